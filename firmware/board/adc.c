@@ -1,0 +1,17 @@
+/* ADC1: both phase currents, bus and potentiometer sampled at once at the centre of the low sides' conduction. */
+#include "board/mclv.h"
+#include "board/peripherals.h"
+
+void adc_init(void)
+{
+    AD1CON1 = BOARD_AD1CON1;
+    AD1CON2 = BOARD_AD1CON2;
+    AD1CON3 = BOARD_AD1CON3;
+    AD1CHS0 = BOARD_AD1CHS0;
+    AD1CHS123 = BOARD_AD1CHS123;
+    AD1CSSL = 0;
+    IFS0bits.AD1IF = 0;
+    IPC3bits.AD1IP = 5;
+    IEC0bits.AD1IE = 1;
+    AD1CON1bits.ADON = 1;
+}

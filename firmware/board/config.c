@@ -1,0 +1,23 @@
+/* Configuration words: start on FRC, crystal and PLL by software, PWM pins inactive at reset, watchdog by software. */
+#ifdef __XC16__
+#pragma config FNOSC = FRC
+#pragma config IESO = OFF
+#pragma config POSCMD = XT
+#pragma config OSCIOFNC = OFF
+#pragma config IOL1WAY = OFF
+#pragma config FCKSM = CSECMD
+#pragma config FWDTEN = OFF
+#pragma config WINDIS = OFF
+#pragma config FPWRT = PWR128
+#pragma config PWMPIN = ON
+#pragma config HPOL = ON
+#pragma config LPOL = ON
+#pragma config ICS = PGD3
+#pragma config JTAGEN = OFF
+#pragma config BWRP = WRPROTECT_OFF
+#pragma config BSS = NO_FLASH
+#pragma config GSS = OFF
+#pragma config GWRP = OFF
+#else
+typedef int board_config_is_for_the_target;
+#endif

@@ -1,0 +1,78 @@
+/* Start-up order and the background loop: panel, supervision of the control interrupt, watch variables, status line. */
+#include "board/firmware.h"
+
+#include "board/mclv.h"
+#include "board/peripherals.h"
+#include "board/status.h"
+#include "board/watch.h"
+
+#define PERIODS_PER_MS ((uint16_t)(0.001F / PARAM_F(LOOPTIME_SEC)))
+
+drive_t board_drive;
+panel_t board_panel;
+
+static uint16_t last_ms_tick;     /* drive ticks already counted as milliseconds */
+static uint16_t supervised_tick;  /* drive ticks at the last check */
+static uint16_t silent_ms;        /* timer 1 milliseconds without a control interrupt */
+
+void firmware_init(void)
+{
+    static const panel_t no_panel;
+    uint16_t clock_failed;
+
+    pwm_outputs_off();
+    last_ms_tick = 0;
+    supervised_tick = 0;
+    silent_ms = 0;
+    CORCON = 0x0020u; /* fractional, unsaturated, no PSV change: the control law's products do not depend on it */
+    INTCON1bits.NSTDIS = 0;
+    clock_failed = clock_init();
+    board_panel = no_panel;
+    drive_init(&board_drive, &board_params);
+    status_init();
+    pins_init();
+    uart_init();
+    timer_init();
+    pwm_init();
+    if (clock_failed) {
+        drive_raise(&board_drive, FAULT_CLOCK);
+    }
+    adc_init();
+}
+
+/** A control interrupt that stays away for 2 ms leaves the bridge without control. */
+static void firmware_supervise(void)
+{
+    if (!timer_ms_passed()) {
+        return;
+    }
+    if (board_drive.ticks != supervised_tick) {
+        supervised_tick = board_drive.ticks;
+        silent_ms = 0;
+    } else if (++silent_ms >= 2u) {
+        silent_ms = 2;
+        pwm_outputs_off();
+        drive_raise(&board_drive, FAULT_ADC_LOST);
+    }
+}
+
+void firmware_background(void)
+{
+    uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
+
+    firmware_supervise();
+    if (elapsed_ms != 0u) {
+        panel_inputs_t in;
+        panel_lights_t lights;
+        last_ms_tick = (uint16_t)(last_ms_tick + elapsed_ms * PERIODS_PER_MS);
+        in.s2_down = BOARD_S2_DOWN();
+        in.s3_down = BOARD_S3_DOWN();
+        in.elapsed_ms = elapsed_ms;
+        lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
+        BOARD_LED_ALIVE = lights.led_alive & 1u;
+        BOARD_LED_RUN = lights.led_run & 1u;
+        watch_refresh();
+        status_tick(elapsed_ms);
+    }
+    status_send();
+}

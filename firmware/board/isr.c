@@ -1,0 +1,92 @@
+/* The interrupts: the control interrupt that is one PWM period, the fault input, and the traps. */
+#include "board/firmware.h"
+#include "board/mclv.h"
+#include "board/peripherals.h"
+#include "board/watch.h"
+#include "drive/drive_tick.h"
+#include "drive/params_init.h"
+
+/* Defined here so that the compiler folds each constant into the interrupt's instructions. */
+const drive_params_t board_params = DRIVE_PARAMS_INIT;
+
+void BOARD_ISR _ADC1Interrupt(void);
+void BOARD_ISR _FLTA1Interrupt(void);
+void BOARD_ISR _OscillatorFail(void);
+void BOARD_ISR _AddressError(void);
+void BOARD_ISR _StackError(void);
+void BOARD_ISR _MathError(void);
+void BOARD_ISR _DefaultInterrupt(void);
+
+QM_INLINE void board_set_outputs(uint16_t outputs)
+{
+    P1OVDCON = (outputs == (uint16_t)OUTPUTS_PWM) ? BOARD_OUTPUTS_PWM
+             : (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) ? BOARD_OUTPUTS_BOOTSTRAP : BOARD_OUTPUTS_OFF;
+}
+
+/** 20 kHz, triggered by PWM1 through the ADC. */
+void BOARD_ISR _ADC1Interrupt(void)
+{
+    drive_samples_t raw;
+    drive_output_t out;
+
+    IFS0bits.AD1IF = 0;
+    raw.pot = (int16_t)ADC1BUF0;
+    raw.i_a = (int16_t)ADC1BUF1;
+    raw.i_b = (int16_t)ADC1BUF2;
+    raw.v_bus = (int16_t)ADC1BUF3;
+    out = drive_tick(&board_drive, &board_params, &raw);
+    P1DC1 = out.duty.a;
+    P1DC2 = out.duty.b;
+    P1DC3 = out.duty.c;
+    /* The duties load when the counter reaches zero. Still counting down and no new sample: in time. */
+    if ((P1TMR & 0x8000u) == 0u || IFS0bits.AD1IF) {
+        drive_raise(&board_drive, FAULT_ISR_OVERRUN);
+        out.outputs = OUTPUTS_OFF;
+    }
+    board_set_outputs(out.outputs);
+    watch_snapshot();
+}
+
+/** The board's comparator: the PWM module has already switched the outputs off. */
+void BOARD_ISR _FLTA1Interrupt(void)
+{
+    pwm_outputs_off();
+    drive_raise(&board_drive, FAULT_OVERCURRENT_HW);
+    IFS3bits.FLTA1IF = 0;
+}
+
+/** A trap: outputs off, the cause kept, the background goes on to say so. */
+static void board_trap(drive_fault_t fault)
+{
+    pwm_outputs_off();
+    drive_raise(&board_drive, fault);
+}
+
+void BOARD_ISR _OscillatorFail(void)
+{
+    board_trap(FAULT_CLOCK);
+    INTCON1bits.OSCFAIL = 0;
+}
+
+void BOARD_ISR _AddressError(void)
+{
+    board_trap(FAULT_TRAP);
+    INTCON1bits.ADDRERR = 0;
+}
+
+void BOARD_ISR _StackError(void)
+{
+    board_trap(FAULT_TRAP);
+    INTCON1bits.STKERR = 0;
+}
+
+void BOARD_ISR _MathError(void)
+{
+    board_trap(FAULT_TRAP);
+    INTCON1bits.MATHERR = 0;
+}
+
+void BOARD_ISR _DefaultInterrupt(void)
+{
+    board_trap(FAULT_TRAP);
+}

@@ -1,0 +1,20 @@
+/* Pins: directions, analogue inputs, remappable functions. */
+#include "board/mclv.h"
+#include "board/peripherals.h"
+
+void pins_init(void)
+{
+    AD1PCFGL = BOARD_AD1PCFGL;
+    LATA = 0;
+    LATB = 0;
+    LATC = 0;
+    TRISA = 0xFFFFu;
+    TRISB = 0xFFFFu; /* the PWM module takes its pins when it is enabled */
+    TRISC = (uint16_t)~BOARD_TRISC_OUTPUTS;
+
+    __builtin_write_OSCCONL(OSCCON & ~0x0040u); /* unlock the pin selection */
+    RPINR12bits.FLTA1R = BOARD_FLTA_RP;
+    RPINR18bits.U1RXR = 20;
+    RPOR9bits.RP19R = BOARD_UART_TX_FUNCTION;
+    __builtin_write_OSCCONL(OSCCON | 0x0040u);
+}

@@ -1,0 +1,40 @@
+/* The drive's beginnings: the object at power-up and the preparation of each start. */
+#include "drive/drive.h"
+
+void drive_init(drive_t *d, const drive_params_t *p)
+{
+    static const drive_t zero;
+    *d = zero;
+    d->direction = 1;
+    d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
+    d->duty_per_volt_q16 = qm_divud(p->duty_per_volt_numerator, (uint16_t)((uint16_t)p->bus_nominal_q15 << 1));
+    d->circle.limit_q14 = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)p->bus_nominal_q15 << 1), p->voltage_limit_per_bus_q16);
+    d->circle.reciprocal = voltage_circle_reciprocal(d->circle.limit_q14);
+    fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, 0);
+    d->state = (uint16_t)DRIVE_CALIBRATE;
+}
+
+void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
+{
+    static const drive_control_t no_control;
+    static const estimator_t no_estimate;
+    static const fieldweak_t no_fieldweak;
+
+    if (d->state != (uint16_t)DRIVE_STOPPED || d->command.run) {
+        return;
+    }
+    d->direction = direction;
+    d->control = no_control;
+    d->estimator = no_estimate;
+    d->fieldweak = no_fieldweak;
+    fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, 0);
+    d->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
+    d->control.iq_limit_q13 = p->current_max_q13;
+    d->control.brake_limit_q13 = p->current_max_q13;
+    d->forced.speed_q10 = 0;
+    d->forced.angle_q32 = (direction >= 0) ? 0xC0000000ul : 0x40000000ul; /* the lock sweeps it to zero */
+    d->angle = forced_angle(&d->forced);
+    d->frame = trig_sincos(d->angle);
+    d->slots = 0;
+    d->command.run = 1;
+}

@@ -1,0 +1,112 @@
+/* Buttons, potentiometer and LEDs: from what a person does to what the drive is asked, in the background. */
+#include "drive/panel.h"
+
+#define BLINK_MS 250u
+#define PAUSE_MS 1500u
+#define POT_STEP_Q15 64 /* one step of the converter */
+
+uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
+{
+    uint16_t before = b->down_ms;
+    if (!down) {
+        b->down_ms = 0;
+        return 0;
+    }
+    b->down_ms = (uint16_t)((before + elapsed_ms > PANEL_DEBOUNCE_MS) ? PANEL_DEBOUNCE_MS : before + elapsed_ms);
+    return (uint16_t)(before < PANEL_DEBOUNCE_MS && b->down_ms >= PANEL_DEBOUNCE_MS);
+}
+
+/** low + (high - low) * fraction, the fraction in Q16. */
+static int16_t between(int16_t low, int16_t high, uint16_t fraction_q16)
+{
+    return (int16_t)(low + (int16_t)qm_mulhi_uu((uint16_t)(high - low), fraction_q16));
+}
+
+int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction)
+{
+    /* the middle of the converter's step, so that the upper end is reached to half a step */
+    uint16_t pot_q16 = (uint16_t)(((uint16_t)pot_q15 ^ 0x8000u) | 0x20u);
+#ifdef BIDIRECTIONAL_SPEED
+    int16_t signed_q15 = (int16_t)(pot_q16 ^ 0x8000u);
+    uint16_t size_q16 = (uint16_t)(2u * (uint16_t)qm_abs(signed_q15));
+    (void)fast_range;
+    if (size_q16 > 2048u) { /* three per cent around the middle keep the direction */
+        direction = (int16_t)((signed_q15 > 0) ? 1 : -1);
+    }
+#ifdef TORQUE_MODE
+    return (int16_t)(direction * between(0, p->current_max_q13, size_q16));
+#else
+    return (int16_t)(direction * between(p->minimum_erpm, p->nominal_erpm, size_q16));
+#endif
+#elif defined(TORQUE_MODE)
+    (void)fast_range;
+    (void)direction;
+    return between(0, p->current_max_q13, pot_q16);
+#else
+    (void)direction;
+    return fast_range ? between(p->nominal_erpm, p->maximum_erpm, pot_q16) : between(p->minimum_erpm, p->nominal_erpm, pot_q16);
+#endif
+}
+
+/** Filters the potentiometer (10 ms) and holds it within a converter step, so that noise does not move the reference. */
+static int16_t panel_pot(panel_t *panel, int16_t sample_q15)
+{
+    int16_t now = qm_lowpass(&panel->pot_q31, sample_q15, 6554);
+    if (now - panel->pot_used_q15 > POT_STEP_Q15 || panel->pot_used_q15 - now > POT_STEP_Q15) {
+        panel->pot_used_q15 = now;
+    }
+    return panel->pot_used_q15;
+}
+
+static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
+{
+    if (button_pressed(&panel->s2, in->s2_down, in->elapsed_ms)) {
+        if (d->fault != (uint16_t)FAULT_NONE) {
+            d->command.clear_fault = 1;
+            panel->wish_run = 0;
+        } else {
+            panel->wish_run = (int16_t)!panel->wish_run;
+        }
+        panel->fast_range = 0;
+    }
+    if (button_pressed(&panel->s3, in->s3_down, in->elapsed_ms) && panel->wish_run) {
+        panel->fast_range = (int16_t)!panel->fast_range;
+    }
+    if (d->fault != (uint16_t)FAULT_NONE) {
+        panel->wish_run = 0;
+    }
+}
+
+static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t elapsed_ms)
+{
+    panel_lights_t lights;
+    uint16_t period = (d->fault == (uint16_t)FAULT_NONE) ? 4u * BLINK_MS : (uint16_t)(2u * BLINK_MS * d->fault + PAUSE_MS);
+    panel->blink_ms = (uint16_t)(panel->blink_ms + elapsed_ms);
+    if (panel->blink_ms >= period) {
+        panel->blink_ms = 0;
+    }
+    if (d->fault == (uint16_t)FAULT_NONE) {
+        lights.led_alive = (uint16_t)(panel->blink_ms < 2u * BLINK_MS);
+    } else {
+        uint16_t in_burst = (uint16_t)(panel->blink_ms < 2u * BLINK_MS * d->fault);
+        lights.led_alive = (uint16_t)(in_burst && (panel->blink_ms / BLINK_MS) % 2u == 0u);
+    }
+    lights.led_run = (uint16_t)(d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING);
+    return lights;
+}
+
+panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in)
+{
+    int16_t target;
+    panel_buttons(panel, d, in);
+    target = panel_target(p, panel_pot(panel, d->pot_q15), panel->fast_range, d->direction);
+    d->command.target_erpm = target;
+    if (!panel->wish_run) {
+        d->command.run = 0;
+    } else if (d->state == (uint16_t)DRIVE_STOPPED) {
+        drive_start(d, p, (int16_t)((target >= 0) ? 1 : -1));
+    } else if ((target ^ d->direction) < 0) {
+        d->command.run = 0; /* the other direction: stop in order, then start again */
+    }
+    return panel_lights(panel, d, in->elapsed_ms);
+}

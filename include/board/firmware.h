@@ -1,0 +1,24 @@
+/* The firmware as a whole: its start, its loop, and the one drive object. */
+#ifndef BOARD_FIRMWARE_H
+#define BOARD_FIRMWARE_H
+
+#include "drive/drive.h"
+#include "drive/panel.h"
+
+/** The drive's parameters, from userparams.h. */
+extern const drive_params_t board_params;
+
+/** The drive; the control interrupt runs it, the background only writes its commands. */
+extern drive_t board_drive;
+
+/** Buttons, potentiometer, lights. */
+extern panel_t board_panel;
+
+/** All that main does before its loop: clock, pins, PWM with its outputs off, ADC, timer, UART, interrupts.
+ *  A clock that does not come up leaves FAULT_CLOCK set; the outputs then stay off. */
+void firmware_init(void);
+
+/** One pass of the loop. */
+void firmware_background(void);
+
+#endif

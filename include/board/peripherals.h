@@ -1,0 +1,36 @@
+/* The peripherals of the board room, one function for each thing that main and the interrupts ask of them. */
+#ifndef BOARD_PERIPHERALS_H
+#define BOARD_PERIPHERALS_H
+
+#include <stdint.h>
+
+#include "drive/drive.h"
+
+/** Starts the PLL and switches to it. @return 0, or 1 when it did not lock in a bounded time */
+uint16_t clock_init(void);
+
+/** Pin directions, analogue pins, remappable inputs and outputs. */
+void pins_init(void);
+
+/** PWM1 running with all six outputs off, fault input armed. */
+void pwm_init(void);
+
+/** ADC1 triggered by PWM1; its interrupt is the control interrupt. */
+void adc_init(void);
+
+/** Timer 1: a 1 ms flag that is independent of the control interrupt. */
+void timer_init(void);
+
+/** 1 once for each millisecond of timer 1. */
+uint16_t timer_ms_passed(void);
+
+/** UART1 at 115200 8N1. */
+void uart_init(void);
+
+/** Sends one character if the transmitter has room. @return 1 when it was taken */
+uint16_t uart_send(char c);
+
+/** All six outputs inactive, whatever else happens. */
+void pwm_outputs_off(void);
+
+#endif

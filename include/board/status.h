@@ -1,0 +1,16 @@
+/* The status line on UART1: state, fault and speed, twice a second. */
+#ifndef BOARD_STATUS_H
+#define BOARD_STATUS_H
+
+#include <stdint.h>
+
+/** Nothing to send. */
+void status_init(void);
+
+/** Composes the next line when it is due: "state 5 fault 0 speed 1000 rpm". */
+void status_tick(uint16_t elapsed_ms);
+
+/** Hands one character to the UART if it has room. */
+void status_send(void);
+
+#endif

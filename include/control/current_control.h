@@ -1,0 +1,48 @@
+/* The two current controllers and the voltage circle: the d axis takes what it needs first, the q axis gets the rest. */
+#ifndef CONTROL_CURRENT_CONTROL_H
+#define CONTROL_CURRENT_CONTROL_H
+
+#include "control/pi.h"
+#include "control/transforms.h"
+
+/** The voltage circle at the measured bus. */
+typedef struct {
+    voltage_q14_t limit_q14;   /**< radius */
+    uint16_t reciprocal;       /**< 2^29 / radius, see voltage_circle_reciprocal() */
+} voltage_circle_t;
+
+/** 2^29 / radius for vq_limit(); a radius below 8193 counts (half of nominal) is taken as 8193, which the limit respects. */
+QM_INLINE uint16_t voltage_circle_reciprocal(voltage_q14_t radius_q14)
+{
+    return qm_divud(1ul << 29, (uint16_t)((radius_q14 > 8193) ? radius_q14 : 8193));
+}
+
+/** Largest |Vd|: 31/32 of the circle, so that the q axis never loses all control. */
+QM_INLINE voltage_q14_t vd_limit(const voltage_circle_t *circle)
+{
+    return (int16_t)(circle->limit_q14 - (circle->limit_q14 >> 5));
+}
+
+/** Largest |Vq|: sqrt(limit^2 - Vd^2), by the circle table, never rounded up. @param vd_q14 within vd_limit() */
+QM_INLINE voltage_q14_t vq_limit(const voltage_circle_t *circle, voltage_q14_t vd_q14)
+{
+    /* |Vd|/limit in Q13, rounded up; below 8192 because |Vd| <= 31/32 limit */
+    uint16_t ratio_q13 = (uint16_t)(qm_mulhi_uu((uint16_t)qm_abs(vd_q14), circle->reciprocal) + 1u);
+    return qm_hi(2 * qm_mulss(circle->limit_q14, trig_circle((int16_t)(ratio_q13 << 2))));
+}
+
+/** One period of both controllers.
+ *  @param ref_q13,meas_q13 d and q currents
+ *  @param limit_q of the q axis, returned for display and for the field-weakening trim
+ *  @return d and q voltage inside the circle */
+QM_INLINE dq_t current_control(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
+                               dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q)
+{
+    dq_t v;
+    v.d = pi_tick(pi_d, gains_d, (int16_t)(ref_q13.d - meas_q13.d), vd_limit(circle));
+    *limit_q = vq_limit(circle, v.d);
+    v.q = pi_tick(pi_q, gains_q, (int16_t)(ref_q13.q - meas_q13.q), *limit_q);
+    return v;
+}
+
+#endif

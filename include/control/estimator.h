@@ -1,0 +1,162 @@
+/* The note's PLL estimator, Equations 1-7: currents and the acting voltage become back-EMF, speed and rotor angle. */
+#ifndef CONTROL_ESTIMATOR_H
+#define CONTROL_ESTIMATOR_H
+
+#include "control/transforms.h"
+
+#define ESTIMATOR_HISTORY 8
+
+/** Motor and filter constants that do not change while the motor runs. */
+typedef struct {
+    uint16_t rs_q16;             /**< Rs I0 / (2 U0) * 65536 >> rs_exp: Q14 current to Q13 voltage */
+    uint16_t rs_exp;             /**< 0..3, for motors whose Rs does not fit */
+    uint16_t ls_exp;             /**< 0..3, the same for Ls */
+    int16_t d_ilimit_ls_q14;     /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
+    int16_t d_ilimit_hs_q14;     /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
+    int16_t deltat_q32;          /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
+    int16_t half_step_q16_rad;   /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per erpm, as high-word factor */
+    int16_t kfilter_velestim_q16;/**< speed filter, 2 * KFILTER_VELESTIM */
+    speed_erpm_t nominal_erpm;   /**< NOMINAL_SPEED_RPM * P: above, the derivative spans one sample instead of eight */
+    speed_erpm_t decimate_erpm;  /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
+} estimator_params_t;
+
+/** Constants that field weakening adapts while the motor runs. */
+typedef struct {
+    uint16_t ls_q16;          /**< Ls/(8 Ts) I0/(2 U0) * 65536 >> ls_exp: Q14 eight-sample difference to Q13 voltage */
+    int16_t inv_kfi;          /**< InvKFi in the note's format: 1/Kphi / 2 in Q15 */
+    int16_t emf_sum_max_q12;  /**< 32767 * 2048 / inv_kfi: keeps the speed in 16 bits */
+    int16_t kfilter_esdq_q16; /**< back-EMF filter, 2 * KFILTER_ESDQ or 2 * KFILTER_ESDQ_FW */
+} estimator_tuning_t;
+
+/** State. Everything zero is a valid start at standstill. */
+typedef struct {
+    alphabeta_t history_q14[ESTIMATOR_HISTORY]; /**< currents of the last eight periods */
+    uint16_t newest;                            /**< index of the most recent one */
+    alphabeta_t v_last_q13;                     /**< voltage commanded one period ago */
+    alphabeta_t v_before_q13;                   /**< and two periods ago */
+    alphabeta_t e_q13;                          /**< back-EMF, half a period in the past */
+    int32_t e_d_q28, e_q_q28;                   /**< filtered back-EMF: Q12 with 16 fraction bits */
+    speed_erpm_t omega_erpm;                    /**< speed of Equation 2; integrates to the angle */
+    int32_t omega_filtered_q16;                 /**< filtered speed, 16 fraction bits: speed loop, thresholds, display */
+    uint32_t rho_q32;                           /**< angle of the rotor flux half a period after the last sample */
+    int16_t half_step_q16_rad;                  /**< half the angle step of a period, radians * 65536 */
+} estimator_t;
+
+/** Filtered speed in electrical rpm. */
+QM_INLINE speed_erpm_t estimator_speed(const estimator_t *e)
+{
+    return qm_hi(e->omega_filtered_q16);
+}
+
+/** Filtered back-EMF in the estimator's own frame, Q12. */
+QM_INLINE dq_t estimator_emf(const estimator_t *e)
+{
+    dq_t r;
+    r.d = qm_hi(e->e_d_q28);
+    r.q = qm_hi(e->e_q_q28);
+    return r;
+}
+
+/** Angle that the next period needs: at the next sample, which is also the centre of the next voltage pulse. */
+QM_INLINE angle_t estimator_next_angle(const estimator_t *e)
+{
+    /* rad * 65536 back to angle counts: / (2 pi) */
+    return (angle_t)((uint16_t)(e->rho_q32 >> 16) + (uint16_t)qm_mulhi(e->half_step_q16_rad, 10430));
+}
+
+/** x turned by a small angle: error a^2/2. @param a_q16_rad angle in radians * 65536, +-0.5 rad */
+QM_INLINE alphabeta_t estimator_turn(alphabeta_t x, int16_t a_q16_rad)
+{
+    alphabeta_t r;
+    r.alpha = (int16_t)(x.alpha - qm_mulhi(x.beta, a_q16_rad));
+    r.beta = (int16_t)(x.beta + qm_mulhi(x.alpha, a_q16_rad));
+    return r;
+}
+
+/** Voltage of the inductance, Q13. Below nominal speed over eight samples, which is four samples old and therefore
+ *  turned forward by 3.5 steps to the middle of the last period; above over one sample. */
+QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t,
+                                          alphabeta_t now, alphabeta_t previous, alphabeta_t oldest)
+{
+    alphabeta_t v;
+    if (qm_abs(estimator_speed(e)) < p->nominal_erpm) {
+        const int16_t limit = p->d_ilimit_ls_q14;
+        v.alpha = qm_mulhi_su(qm_clamp((int16_t)(now.alpha - oldest.alpha), (int16_t)-limit, limit), t->ls_q16);
+        v.beta = qm_mulhi_su(qm_clamp((int16_t)(now.beta - oldest.beta), (int16_t)-limit, limit), t->ls_q16);
+        v = estimator_turn(v, (int16_t)(7 * e->half_step_q16_rad));
+    } else {
+        const int16_t limit = p->d_ilimit_hs_q14;
+        v.alpha = qm_mulhi_su((int16_t)(8 * qm_clamp((int16_t)(now.alpha - previous.alpha), (int16_t)-limit, limit)), t->ls_q16);
+        v.beta = qm_mulhi_su((int16_t)(8 * qm_clamp((int16_t)(now.beta - previous.beta), (int16_t)-limit, limit)), t->ls_q16);
+    }
+    v.alpha = (int16_t)(v.alpha * (1 << p->ls_exp));
+    v.beta = (int16_t)(v.beta * (1 << p->ls_exp));
+    return v;
+}
+
+/** Equation 4 in the stator frame: E = V - Rs I - Ls dI/dt, all taken at the middle of the last period.
+ *
+ *  The delay constant: a vector computed at sample n is loaded at the next PWM boundary, half a period later, and acts
+ *  for one period; so the mean voltage between samples n-1 and n is the mean of the last two vectors. */
+QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14)
+{
+    alphabeta_t previous = e->history_q14[e->newest];
+    uint16_t slot = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
+    alphabeta_t oldest = e->history_q14[slot];
+    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, oldest);
+    int16_t resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), p->rs_q16);
+    int16_t resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), p->rs_q16);
+
+    e->e_q13.alpha = (int16_t)(((e->v_last_q13.alpha + e->v_before_q13.alpha) >> 1)
+                               - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
+    e->e_q13.beta = (int16_t)(((e->v_last_q13.beta + e->v_before_q13.beta) >> 1)
+                              - resistive_beta * (1 << p->rs_exp) - inductive.beta);
+    e->history_q14[slot] = i_q14;
+    e->newest = slot;
+}
+
+/** Equations 1, 2 and 7: filtered Ed and Eq give the speed, the speed gives the angle.
+ *  Lock is stable where cos(error) + sin(error) = K'/K: a wrong Kphi turns the angle, not the speed. */
+QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, dq_t e_q12)
+{
+    int16_t e_d = qm_lowpass(&e->e_d_q28, e_q12.d, t->kfilter_esdq_q16);
+    int16_t e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
+    speed_erpm_t speed = estimator_speed(e);
+    int16_t sign = (qm_abs(speed) > p->decimate_erpm) ? e_q : speed;
+    int16_t sum = (int16_t)((sign >= 0) ? e_q - e_d : e_q + e_d);
+
+    sum = qm_clamp(sum, (int16_t)-t->emf_sum_max_q12, t->emf_sum_max_q12);
+    e->omega_erpm = (int16_t)(qm_mulss(sum, t->inv_kfi) >> 11);
+    e->rho_q32 += (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32);
+    e->half_step_q16_rad = qm_mulhi(e->omega_erpm, p->half_step_q16_rad);
+    (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
+}
+
+/** Remembers the vector that was just given to the modulator. */
+QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
+{
+    e->v_before_q13 = e->v_last_q13;
+    e->v_last_q13 = v_q13;
+}
+
+/** One period while the control frame is the estimator's own: Park with the frame's sine and cosine, turned back by the
+ *  half step from the sample to the middle of the last period, so that no second sine is needed. */
+QM_INLINE void estimator_tick_closed(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t,
+                                     alphabeta_t i_q14, sincos_t frame)
+{
+    dq_t at_sample, at_middle;
+    estimator_back_emf(e, p, t, i_q14);
+    at_sample = park(e->e_q13, frame);
+    at_middle.d = (int16_t)(at_sample.d - qm_mulhi(at_sample.q, e->half_step_q16_rad));
+    at_middle.q = (int16_t)(at_sample.q + qm_mulhi(at_sample.d, e->half_step_q16_rad));
+    estimator_pll(e, p, t, at_middle);
+}
+
+/** One period while another angle drives the motor (lock and ramp): the estimator runs along in its own frame. */
+QM_INLINE void estimator_tick_free(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14)
+{
+    estimator_back_emf(e, p, t, i_q14);
+    estimator_pll(e, p, t, park(e->e_q13, trig_sincos((angle_t)(e->rho_q32 >> 16))));
+}
+
+#endif

@@ -1,0 +1,76 @@
+/* Field weakening by table: the speed reference gives the d current and adapts the estimator, as in the note. */
+#ifndef CONTROL_FIELDWEAK_H
+#define CONTROL_FIELDWEAK_H
+
+#include "control/estimator.h"
+
+#define FIELDWEAK_ENTRIES 18
+#define SPEED_INDEX_CONST 10 /**< one table step is 2^10 electrical rpm */
+
+/** The three tables of the note and what frames them. */
+typedef struct {
+    current_q13_t idref_q13[FIELDWEAK_ENTRIES]; /**< IDREF_SPEED0..17: d current, 0 or negative */
+    int16_t inv_kfi[FIELDWEAK_ENTRIES];         /**< INVKFI_SPEED0..17: 1/Kphi, the note's format */
+    int16_t ls_over2ls0_q15[FIELDWEAK_ENTRIES]; /**< LS_OVER2LS0_SPEED0..17: Ls/(2 Ls0), Q15, 16384 = no change */
+    speed_erpm_t on_speed_erpm;                 /**< speed reference where field weakening starts (qFwOnSpeed) */
+    uint16_t ls_base_q16;                       /**< estimator's ls_q16 at index 0 */
+    int16_t kfilter_esdq_q16;                   /**< back-EMF filter up to the start speed */
+    int16_t kfilter_esdq_fw_q16;                /**< and above */
+    int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
+    int16_t trim_step_q13;                      /**< its change per step (2^3 periods) */
+    int16_t margin_q14;                         /**< voltage kept free for the q axis before the trim acts */
+    speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */
+} fieldweak_params_t;
+
+/** State; all zero at standstill. */
+typedef struct {
+    uint16_t index;          /**< table index in use (FdWeakParm.qIndex) */
+    current_q13_t table_q13; /**< d current from the table */
+    current_q13_t trim_q13;  /**< d current added by the voltage feedback, -trim_max_q13..0 */
+} fieldweak_t;
+
+QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16)
+{
+    return (int16_t)(table[index] - qm_mulhi_su((int16_t)(table[index] - table[index + 1u]), fraction_q16));
+}
+
+/** Looks up the three tables for a speed reference (not the estimated speed) and adapts the estimator.
+ *  Entries above the last are never read: at and beyond index 17 the last entry holds.
+ *  @param ref_erpm speed reference, any value and sign */
+QM_INLINE void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, estimator_tuning_t *tuning, speed_erpm_t ref_erpm)
+{
+    int16_t above = (int16_t)(qm_abs(ref_erpm) - p->on_speed_erpm);
+    uint16_t index = 0, fraction_q16 = 0;
+
+    tuning->kfilter_esdq_q16 = p->kfilter_esdq_q16;
+    if (above > 0) {
+        index = (uint16_t)above >> SPEED_INDEX_CONST;
+        fraction_q16 = (uint16_t)((uint16_t)above << (16 - SPEED_INDEX_CONST));
+        tuning->kfilter_esdq_q16 = p->kfilter_esdq_fw_q16;
+        if (index > FIELDWEAK_ENTRIES - 2) {
+            index = FIELDWEAK_ENTRIES - 2;
+            fraction_q16 = 65535u;
+        }
+    }
+    fw->index = index;
+    fw->table_q13 = fieldweak_between(p->idref_q13, index, fraction_q16);
+    tuning->inv_kfi = fieldweak_between(p->inv_kfi, index, fraction_q16);
+    /* quotient at most 32767 because inv_kfi >= 2048, see the parameter checks */
+    tuning->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)tuning->inv_kfi);
+    tuning->ls_q16 = (uint16_t)(qm_muluu(p->ls_base_q16, (uint16_t)fieldweak_between(p->ls_over2ls0_q15, index, fraction_q16)) >> 14);
+}
+
+/** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later.
+ *  It makes up for a sagging bus or a table that is not tuned; it is bounded, so it cannot run the motor into demagnetisation.
+ *  @param free_q14 q-axis limit minus |Vq| of the last period
+ *  @param speed_erpm filtered estimated speed */
+QM_INLINE void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, voltage_q14_t free_q14, speed_erpm_t speed_erpm)
+{
+    if (free_q14 < p->margin_q14 && qm_abs(speed_erpm) > p->trim_speed_erpm) {
+        fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 - p->trim_step_q13), (int16_t)-p->trim_max_q13, 0);
+    } else {
+        fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 + p->trim_step_q13), (int16_t)-p->trim_max_q13, 0);
+    }
+}
+
+#endif

@@ -1,0 +1,42 @@
+/* The forced angle of the start: a fixed direction while the rotor is locked, then a ramp up to the hand-over speed. */
+#ifndef CONTROL_FORCED_ANGLE_H
+#define CONTROL_FORCED_ANGLE_H
+
+#include "control/qmath.h"
+
+/** Constants of the ramp, in the note's 1/1024 angle counts per period. */
+typedef struct {
+    int32_t end_speed_q10;     /**< END_SPEED_RPM * P * Ts * 65536/60 * 1024 */
+    int16_t increase_rate_q10; /**< OPENLOOP_RAMPSPEED_INCREASERATE: added every period */
+} forced_angle_params_t;
+
+/** State. */
+typedef struct {
+    int32_t speed_q10;   /**< magnitude, 1/1024 angle counts per period */
+    uint32_t angle_q32;  /**< the fraction below one count is kept, so the speed is exact */
+} forced_angle_t;
+
+/** Accelerates by one step and moves the angle. @param direction +1 or -1 @return nonzero at the end speed */
+QM_INLINE int16_t forced_angle_tick(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction)
+{
+    int16_t at_end = 0;
+    f->speed_q10 += p->increase_rate_q10;
+    if (f->speed_q10 >= p->end_speed_q10) {
+        f->speed_q10 = p->end_speed_q10;
+        at_end = 1;
+    }
+    if (direction >= 0) {
+        f->angle_q32 += (uint32_t)f->speed_q10 << 6;
+    } else {
+        f->angle_q32 -= (uint32_t)f->speed_q10 << 6;
+    }
+    return at_end;
+}
+
+/** The angle in counts. */
+QM_INLINE angle_t forced_angle(const forced_angle_t *f)
+{
+    return (angle_t)(f->angle_q32 >> 16);
+}
+
+#endif

@@ -1,0 +1,121 @@
+/* Fixed-point arithmetic of the control law: one interface, the target's built-ins or exact C behind it. */
+#ifndef CONTROL_QMATH_H
+#define CONTROL_QMATH_H
+
+#include <stdint.h>
+
+/** Blocks of the PWM interrupt are composed in one translation unit; a call would cost 18 cycles of saved registers. */
+#define QM_INLINE static inline __attribute__((always_inline))
+
+/** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
+ *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */
+typedef int16_t current_q13_t;  /**< phase, d and q currents: 8192 = full-scale current */
+typedef int16_t current_q14_t;  /**< alpha and beta currents: 16384 = full-scale current */
+typedef int16_t voltage_q14_t;  /**< d and q voltages: 16384 = full-scale voltage */
+typedef int16_t voltage_q13_t;  /**< alpha and beta voltages and back-EMF: 8192 = full-scale voltage */
+typedef int16_t voltage_q12_t;  /**< d and q back-EMF: 4096 = full-scale voltage (4 times the range of Q14) */
+typedef int16_t speed_erpm_t;   /**< electrical revolutions per minute, the note's speed unit */
+typedef uint16_t angle_t;       /**< 65536 = one electrical turn; wraps on purpose */
+typedef int16_t q15_t;          /**< fraction, 32768 = 1 */
+typedef uint16_t duty_t;        /**< PWM on-time of the high side, 2000 = 100 % at 20 kHz */
+
+/** Exact products: one instruction each on the dsPIC (mul.ss, mul.su, mul.uu), independent of CORCON. */
+QM_INLINE int32_t qm_mulss(int16_t a, int16_t b)
+{
+#ifdef __XC16__
+    return __builtin_mulss(a, b);
+#else
+    return (int32_t)a * b;
+#endif
+}
+
+QM_INLINE int32_t qm_mulsu(int16_t a, uint16_t b)
+{
+#ifdef __XC16__
+    return __builtin_mulsu(a, b);
+#else
+    return (int32_t)a * (int32_t)b;
+#endif
+}
+
+QM_INLINE uint32_t qm_muluu(uint16_t a, uint16_t b)
+{
+#ifdef __XC16__
+    return __builtin_muluu(a, b);
+#else
+    return (uint32_t)a * b;
+#endif
+}
+
+/** Upper word of a 32-bit number: free on the target, rounds toward minus infinity. */
+QM_INLINE int16_t qm_hi(int32_t x)
+{
+    return (int16_t)(x >> 16);
+}
+
+/** Upper word of the signed product: a*b/65536. */
+QM_INLINE int16_t qm_mulhi(int16_t a, int16_t b)
+{
+    return qm_hi(qm_mulss(a, b));
+}
+
+/** Upper word of signed times unsigned: a*b/65536. */
+QM_INLINE int16_t qm_mulhi_su(int16_t a, uint16_t b)
+{
+    return qm_hi(qm_mulsu(a, b));
+}
+
+/** Upper word of the unsigned product. */
+QM_INLINE uint16_t qm_mulhi_uu(uint16_t a, uint16_t b)
+{
+    return (uint16_t)(qm_muluu(a, b) >> 16);
+}
+
+/** Unsigned 32/16 division. The caller proves denominator > numerator >> 16, as the core's DIV needs.
+ *  @return quotient, truncated. */
+QM_INLINE uint16_t qm_divud(uint32_t numerator, uint16_t denominator)
+{
+#ifdef __XC16__
+    return __builtin_divud(numerator, denominator);
+#else
+    return (uint16_t)(numerator / denominator);
+#endif
+}
+
+/** x limited to low..high. */
+QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
+{
+    if (x > high) {
+        return high;
+    }
+    return (x < low) ? low : x;
+}
+
+/** Magnitude; -32768 gives 32767. */
+QM_INLINE int16_t qm_abs(int16_t x)
+{
+    if (x >= 0) {
+        return x;
+    }
+    return (int16_t)((x == INT16_MIN) ? INT16_MAX : -x);
+}
+
+/** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */
+QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
+{
+    int32_t difference = (int32_t)a - b;
+    if (difference > 16383) {
+        return 16383;
+    }
+    return (int16_t)((difference < -16383) ? -16383 : difference);
+}
+
+/** First-order low-pass, Equation 7: y += K (x - y), K in Q16, y kept in 32 bits with 16 fraction bits.
+ *  Written as two products because x - y does not fit 16 bits. @return y, the upper word. */
+QM_INLINE int16_t qm_lowpass(int32_t *y_q16, int16_t x, int16_t k_q16)
+{
+    *y_q16 += qm_mulss(x, k_q16) - qm_mulss(qm_hi(*y_q16), k_q16);
+    return qm_hi(*y_q16);
+}
+
+#endif

@@ -1,0 +1,17 @@
+/* The speed reference's ramp: a bounded step towards the target, and a snap when the target is near. */
+#ifndef CONTROL_SPEED_RAMP_H
+#define CONTROL_SPEED_RAMP_H
+
+#include "control/qmath.h"
+
+/** Next reference. @param step_erpm at least 1 @return target when it is nearer than two steps, else one step closer */
+QM_INLINE speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t step_erpm)
+{
+    int32_t difference = (int32_t)target - reference;
+    if (difference > -2 * step_erpm && difference < 2 * step_erpm) {
+        return target;
+    }
+    return (int16_t)((difference > 0) ? reference + step_erpm : reference - step_erpm);
+}
+
+#endif

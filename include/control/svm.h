@@ -1,0 +1,71 @@
+/* Space-vector modulation: a voltage vector and the measured bus become three duty cycles that leave the shunts a window. */
+#ifndef CONTROL_SVM_H
+#define CONTROL_SVM_H
+
+#include "control/transforms.h"
+
+/** Constants of the modulator, in duty counts. */
+typedef struct {
+    int16_t full;           /**< duty of 100 %: 2 (PTPER + 1) */
+    int16_t top;            /**< highest duty before dead-time compensation: keeps the low sides on around the sample */
+    int16_t dead_time;      /**< duty that dead time takes from a leg: Td / Ts * full */
+    int16_t knee_q13;       /**< current at which dead-time compensation is full; linear below, to stay calm at zero */
+    uint16_t dead_slope_q16; /**< dead_time / knee_q13 * 65536 */
+} svm_params_t;
+
+/** The three duties. */
+typedef struct {
+    duty_t a, b, c;
+} duties_t;
+
+/** Duty that restores what dead time takes: the leg loses Td for a positive current and gains it for a negative one. */
+QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t i_q13)
+{
+    return qm_mulhi_su(qm_clamp(i_q13, (int16_t)-p->knee_q13, p->knee_q13), p->dead_slope_q16);
+}
+
+QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t i_q13)
+{
+    /* below zero only by rounding; the sum is bounded by full + dead_time */
+    int16_t duty = (int16_t)(qm_clamp(u, 0, p->top) + svm_dead_time(p, i_q13));
+    return (duty_t)qm_clamp(duty, 0, p->full);
+}
+
+/** Duties for a voltage vector.
+ *  Centred between the extreme phases (min-max injection), then moved down as far as the sampling window asks: more of
+ *  vector 000, less of 111, the same line voltages.
+ *  @param v voltage vector, Q13
+ *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see bus_update())
+ *  @param i_a,i_b,i_c phase currents, Q13, for dead-time compensation */
+QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16,
+                       current_q13_t i_a, current_q13_t i_b, current_q13_t i_c)
+{
+    int16_t a = qm_mulhi_su(v.alpha, duty_per_volt_q16);
+    int16_t t = qm_mulhi_su(qm_mulhi_su(v.beta, duty_per_volt_q16), 56756u); /* sqrt(3)/2 */
+    int16_t half = (int16_t)(a >> 1);
+    int16_t b = (int16_t)(t - half);
+    int16_t c = (int16_t)(-t - half);
+    int16_t max = a, min = a, shift;
+    duties_t d;
+
+    if (b > max) {
+        max = b;
+    } else {
+        min = b;
+    }
+    if (c > max) {
+        max = c;
+    } else if (c < min) {
+        min = c;
+    }
+    shift = (int16_t)((p->full - max - min) >> 1);
+    if ((int16_t)(max + shift) > p->top) {
+        shift = (int16_t)(p->top - max);
+    }
+    d.a = svm_leg(p, (int16_t)(a + shift), i_a);
+    d.b = svm_leg(p, (int16_t)(b + shift), i_b);
+    d.c = svm_leg(p, (int16_t)(c + shift), i_c);
+    return d;
+}
+
+#endif

@@ -1,0 +1,50 @@
+/* Clarke and Park transformations and their inverses (amplitude invariant, alpha along phase A, d along the rotor flux). */
+#ifndef CONTROL_TRANSFORMS_H
+#define CONTROL_TRANSFORMS_H
+
+#include "control/trig.h"
+
+/** A vector in the stator frame; the unit is that of its user. */
+typedef struct {
+    int16_t alpha;
+    int16_t beta;
+} alphabeta_t;
+
+/** A vector in a rotating frame. */
+typedef struct {
+    int16_t d;
+    int16_t q;
+} dq_t;
+
+/** Clarke: alpha = a, beta = (a + 2 b)/sqrt(3), for a + b + c = 0.
+ *  @param a_q13,b_q13 phase currents, |x| <= 10240 (full scale and offset), so that a + 2b fits 16 bits
+ *  @return the current vector in Q14 */
+QM_INLINE alphabeta_t clarke(current_q13_t a_q13, current_q13_t b_q13)
+{
+    int16_t sum = (int16_t)(a_q13 + 2 * b_q13);
+    alphabeta_t r;
+    r.alpha = (int16_t)(2 * a_q13);
+    r.beta = (int16_t)(sum + qm_mulhi(sum, 10138)); /* 2/sqrt(3) = 1 + 10138/65536 */
+    return r;
+}
+
+/** Park: d = alpha cos + beta sin, q = -alpha sin + beta cos.
+ *  @return half the input's counts (Q14 in, Q13 out; Q13 in, Q12 out): the guard bit for |x| up to 23170 per axis */
+QM_INLINE dq_t park(alphabeta_t x, sincos_t sc)
+{
+    dq_t r;
+    r.d = qm_hi(qm_mulss(x.alpha, sc.cos) + qm_mulss(x.beta, sc.sin));
+    r.q = qm_hi(qm_mulss(x.beta, sc.cos) - qm_mulss(x.alpha, sc.sin));
+    return r;
+}
+
+/** Inverse Park: alpha = d cos - q sin, beta = d sin + q cos. @return half the input's counts (Q14 in, Q13 out). */
+QM_INLINE alphabeta_t inverse_park(dq_t x, sincos_t sc)
+{
+    alphabeta_t r;
+    r.alpha = qm_hi(qm_mulss(x.d, sc.cos) - qm_mulss(x.q, sc.sin));
+    r.beta = qm_hi(qm_mulss(x.d, sc.sin) + qm_mulss(x.q, sc.cos));
+    return r;
+}
+
+#endif

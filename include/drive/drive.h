@@ -1,0 +1,146 @@
+/* The drive: one object with everything the machine knows, and one tick that is a whole PWM period from samples to duties. */
+#ifndef DRIVE_DRIVE_H
+#define DRIVE_DRIVE_H
+
+#include "control/current_control.h"
+#include "control/estimator.h"
+#include "control/fieldweak.h"
+#include "control/forced_angle.h"
+#include "control/speed_ramp.h"
+#include "control/svm.h"
+#include "drive/faults.h"
+
+/** X(name, meaning): what the drive is doing. */
+#define DRIVE_STATE_TABLE(X) \
+    X(CALIBRATE, "outputs off, current offsets are averaged") \
+    X(STOPPED, "outputs off, ready") \
+    X(BOOTSTRAP, "low sides on, high-side drivers charge") \
+    X(LOCK, "current in a fixed direction aligns the rotor") \
+    X(RAMP, "forced angle accelerates; the estimator runs along") \
+    X(CLOSED, "the estimator's angle drives the motor") \
+    X(STOPPING, "closed loop, ramping down to a speed where the outputs can go off") \
+    X(FAULT, "outputs off until S2 clears the fault")
+
+#define DRIVE_STATE_ENUM(name, meaning) DRIVE_##name,
+typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_state_t;
+
+/** What drives the six outputs. */
+typedef enum { OUTPUTS_OFF, OUTPUTS_BOOTSTRAP, OUTPUTS_PWM } outputs_t;
+
+/** Constants of the machine around the control law. Times in periods or in slow steps (8 periods). */
+typedef struct {
+    estimator_params_t estimator;
+    fieldweak_params_t fieldweak;
+    forced_angle_params_t forced;
+    svm_params_t svm;
+    pi_gains_t pi_d, pi_q, pi_speed;
+
+    q15_t kcurr_a, kcurr_b;               /**< gain of the samples; Q15 sample to Q13 current by the high word */
+    int16_t offset_max_q13;               /**< largest plausible offset */
+    uint16_t bootstrap_periods;
+    uint16_t lock_periods;
+    uint16_t ready_slots, ready_timeout_slots; /**< agreement needed at the end of the ramp, and how long it may take */
+    uint32_t lock_sweep_q32;              /**< angle step while the first half of the lock turns by 90 degrees */
+
+    current_q13_t open_loop_q13;          /**< Q_CURRENT_REF_OPENLOOP */
+    current_q13_t current_max_q13;        /**< MAXIMUM_CURRENT_A */
+    uint16_t current_max_reciprocal;      /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
+    current_q13_t overcurrent_q13;        /**< OVER_CURRENT_THRESHOLD_A */
+    uint16_t voltage_limit_per_bus_q16;   /**< see params.h */
+    uint32_t duty_per_volt_numerator;
+    int16_t bus_over_q15, bus_under_q15;  /**< trip levels */
+    int16_t bus_regen_q15;                /**< braking current falls from here */
+    int16_t brake_per_bus;                /**< braking current per bus count above, Q13 per count */
+    int16_t bus_nominal_q15;              /**< start value of the bus filter */
+
+    speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
+    int16_t speed_ramp_erpm;              /**< reference step per slow step */
+    int32_t tuning_step_q16;              /**< the same in TUNING */
+    int16_t ramp_hold_erpm;               /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
+    uint16_t stall_slots, lost_lock_slots;
+    speed_erpm_t overspeed_erpm;
+} drive_params_t;
+
+/** Raw converter results, signed fractional Q15. */
+typedef struct {
+    int16_t i_a, i_b, v_bus, pot;
+} drive_samples_t;
+
+/** What the board must do after a tick. */
+typedef struct {
+    duties_t duty;
+    uint16_t outputs; /**< outputs_t */
+} drive_output_t;
+
+/** Requests from the background; 16-bit, so written in one instruction. */
+typedef struct {
+    volatile int16_t run;          /**< 1: start and keep running (see drive_start()), 0: stop in order */
+    volatile int16_t clear_fault;  /**< 1: one request, taken back by the tick */
+    volatile int16_t target_erpm;  /**< speed target, signed; TORQUE_MODE: q current, Q13 */
+} drive_command_t;
+
+/** Controller variables of the closed loop. */
+typedef struct {
+    speed_erpm_t reference_erpm; /**< ramped speed reference */
+    uint16_t tuning_low;         /**< fraction of TUNING's ramp, Q16 */
+    dq_t ref_q13;                /**< current references */
+    current_q13_t iq_limit_q13;  /**< sqrt(Imax^2 - Id^2) */
+    current_q13_t brake_limit_q13; /**< largest braking current, from the bus */
+    current_q13_t handover_q13;  /**< d current left from the hand-over */
+    int16_t handover_offset;     /**< measured angle offset that is left, angle counts, decays one count a period */
+    dq_t i_q13;                  /**< measured currents in the control frame */
+    dq_t v_q14;                  /**< commanded voltages in the control frame */
+    voltage_q14_t vq_limit_q14;
+    pi_t pi_d, pi_q, pi_speed;
+} drive_control_t;
+
+/** Everything the drive knows. Owned by the board; zero plus drive_init() is the start. */
+typedef struct {
+    drive_command_t command;
+    volatile uint16_t state;       /**< drive_state_t */
+    volatile uint16_t fault;       /**< drive_fault_t, kept until cleared */
+    volatile uint16_t ticks;       /**< periods since power-up, wraps; the background's time base */
+    uint16_t timer;                /**< periods in the present state */
+    uint16_t slots;                /**< slow steps, for the checks of the present state */
+    int16_t direction;             /**< +1 or -1, fixed from start to stop */
+    int16_t calibrated;
+
+    int32_t offset_sum_a, offset_sum_b;
+    int16_t offset_a_q13, offset_b_q13;
+
+    current_q13_t i_a_q13, i_b_q13, i_c_q13;
+    int16_t pot_q15;               /**< last sample of the potentiometer, signed fractional */
+    int32_t bus_q31;               /**< filtered bus, upper word Q15 of full scale */
+    voltage_circle_t circle;       /**< voltage circle at this bus */
+    uint16_t duty_per_volt_q16;
+
+    angle_t angle;                 /**< control angle of the next sample */
+    sincos_t frame;                /**< its sine and cosine */
+    forced_angle_t forced;
+    estimator_t estimator;
+    estimator_tuning_t tuning;
+    fieldweak_t fieldweak;
+    drive_control_t control;
+    uint16_t stall_count, lost_count;
+} drive_t;
+
+#define DRIVE_CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
+
+/** Brings the object to CALIBRATE; every field gets its start value. */
+void drive_init(drive_t *d, const drive_params_t *p);
+
+/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
+ *  @param direction +1 or -1 */
+void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
+
+/** Stops at once and keeps the code of the first fault. */
+QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
+{
+    if (d->fault == (uint16_t)FAULT_NONE) {
+        d->fault = (uint16_t)fault;
+    }
+    d->state = (uint16_t)DRIVE_FAULT;
+    d->command.run = 0;
+}
+
+#endif

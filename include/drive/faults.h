@@ -1,0 +1,37 @@
+/* The one table of faults: code, name, cause and remedy feed the enum, docs/faults.md, the LED and every report. */
+#ifndef DRIVE_FAULTS_H
+#define DRIVE_FAULTS_H
+
+/** X(code, name, cause, remedy). Codes never change their meaning; the LED blinks the code. */
+#define DRIVE_FAULT_TABLE(X) \
+    X(0, NONE, "no fault", "nothing to do") \
+    X(1, OVERCURRENT_HW, "the FLTA1 input went low: the board's comparator saw too much current", \
+      "look for a short circuit; check MAXIMUM_CURRENT_A and the current loops") \
+    X(2, OVERCURRENT_SW, "a phase current exceeded OVER_CURRENT_THRESHOLD_A", \
+      "lower CURRENT_BANDWIDTH_HZ or MAXIMUM_CURRENT_A; check NORM_CURRENT_CONST, KCURRA and KCURRB") \
+    X(3, OVERVOLTAGE, "the bus exceeded OVER_VOLTAGE_V", \
+      "brake more gently (SPEEDREFRAMP_RPM_PER_S), lower REGEN_LIMIT_V; check the supply") \
+    X(4, UNDERVOLTAGE, "the bus fell below UNDER_VOLTAGE_V while running", \
+      "check the supply, its cable and current limit") \
+    X(5, START_FAILED, "at the end of the ramp the estimator did not see the ramp's speed: shaft blocked or load too high", \
+      "free the shaft; raise Q_CURRENT_REF_OPENLOOP or LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
+    X(6, STALL, "the estimated speed stayed below half the reference", \
+      "remove the overload; in field weakening see FdWeakParm.qIndex and raise that IDREF_SPEED entry") \
+    X(7, LOST_LOCK, "the estimator's d-axis back-EMF exceeded the q-axis one, or its speed left the possible range", \
+      "check MOTOR_KPHI_V_PER_KRPM, MOTOR_RS_OHM and MOTOR_LS_MH; accelerate more gently") \
+    X(8, ISR_OVERRUN, "the control interrupt missed the PWM boundary, so the voltage's delay is no longer known", \
+      "build with -O2; shorten what was added to the interrupt") \
+    X(9, OFFSET, "a current offset measured before the start is outside its range", \
+      "check the current amplifiers, AN0 and AN1, and that the motor stood still") \
+    X(10, ADC_LOST, "no control interrupt came for two milliseconds", \
+      "check the PWM and ADC set-up; after a reset the fault must not come back") \
+    X(11, CLOCK, "the PLL did not lock or the crystal failed", \
+      "check the 8 MHz crystal and the configuration words") \
+    X(12, TRAP, "the processor took a trap or an unexpected interrupt", \
+      "read RCON and INTCON1; the cause is kept over the reset")
+
+#define DRIVE_FAULT_ENUM(code, name, cause, remedy) FAULT_##name = (code),
+/** Fault codes. */
+typedef enum { DRIVE_FAULT_TABLE(DRIVE_FAULT_ENUM) FAULT_COUNT } drive_fault_t;
+
+#endif

@@ -1,0 +1,47 @@
+/* What a person does at the board: buttons S2 and S3, the potentiometer, and what the LEDs say. */
+#ifndef DRIVE_PANEL_H
+#define DRIVE_PANEL_H
+
+#include "drive/drive.h"
+
+#define PANEL_DEBOUNCE_MS 30
+
+/** One debounced button: acts once when it has been down for PANEL_DEBOUNCE_MS. */
+typedef struct {
+    uint16_t down_ms; /**< how long it has been down, saturated */
+} button_t;
+
+/** Inputs of one background pass. */
+typedef struct {
+    uint16_t s2_down, s3_down; /**< 1 = pressed */
+    uint16_t elapsed_ms;       /**< time since the last pass, 1 or more */
+} panel_inputs_t;
+
+/** What the LEDs show. */
+typedef struct {
+    uint16_t led_alive; /**< blinks once a second; in a fault blinks the code: code times, then a pause */
+    uint16_t led_run;   /**< on while the bridge is switching */
+} panel_lights_t;
+
+/** State of the panel; zero is the start. */
+typedef struct {
+    button_t s2, s3;
+    int16_t wish_run;    /**< the user wants the motor to run */
+    int16_t fast_range;  /**< S3: NOMINAL..MAXIMUM instead of MINIMUM..NOMINAL */
+    int32_t pot_q31;     /**< filtered potentiometer */
+    int16_t pot_used_q15; /**< the value in use: follows the filtered one with one converter step of hysteresis */
+    uint16_t blink_ms;
+} panel_t;
+
+/** 1 once per press. */
+uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms);
+
+/** Speed target for a potentiometer position; TORQUE_MODE: q current in Q13.
+ *  @param pot_q15 signed fractional sample, -32768 = lower end
+ *  @param direction of the running motor: in BIDIRECTIONAL_SPEED the middle keeps it */
+int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction);
+
+/** One pass: buttons to requests, potentiometer to target, state to lights. S2 in a fault only clears the fault. */
+panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in);
+
+#endif
