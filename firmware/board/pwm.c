@@ -11,7 +11,6 @@ void pwm_init(void)
 {
     P1TCON = 0;
     pwm_outputs_off();
-    P1TMR = 0;
     P1TPER = BOARD_P1TPER;
     PWM1CON1 = BOARD_PWM1CON1;
     PWM1CON2 = 0; /* duties load at the period's boundary, overrides at once */

@@ -82,7 +82,8 @@ QM_INLINE void drive_reference_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Speed controller: reference to q current. In TORQUE_MODE it only guards the maximum speed, and the command is its limit. */
+/** Speed controller: reference to q current. In TORQUE_MODE it only guards the
+ *  minimum and maximum speed, and the command is its limit in between. */
 QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
@@ -94,9 +95,12 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p)
 #ifdef TORQUE_MODE
     if (d->state == (uint16_t)DRIVE_CLOSED) {
         int16_t torque = qm_abs(d->command.target_erpm);
-        limit = (torque < limit) ? torque : limit;
         c->reference_erpm = speed; /* field weakening and an orderly stop start from it */
-        reference = drive_signed(d, p->maximum_erpm);
+        reference = drive_signed(d, p->minimum_erpm); /* below, the estimator would lose the rotor: full current may hold it */
+        if (drive_signed(d, speed) >= p->minimum_erpm) {
+            limit = (torque < limit) ? torque : limit;
+            reference = drive_signed(d, p->maximum_erpm);
+        }
     } else
 #endif
     {

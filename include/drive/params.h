@@ -5,6 +5,8 @@
 #ifndef DRIVE_PARAMS_H
 #define DRIVE_PARAMS_H
 
+#include <stdint.h>
+
 #include "userparams.h"
 
 #define PARAM_F(x) ((float)(x))

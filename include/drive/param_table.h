@@ -1,0 +1,83 @@
+/* Units and ranges of everything in userparams.h: one table that the build's checks, the tests and the tools read. */
+#ifndef DRIVE_PARAM_TABLE_H
+#define DRIVE_PARAM_TABLE_H
+
+/** X(name, unit, min, max): the same unit and range as in the comment beside the name in userparams.h (a test compares). */
+#define PARAM_TABLE(X) \
+    X(NOPOLESPAIRS, "pairs", 1, 50) \
+    X(MOTOR_RS_OHM, "ohm", 0.01, 40) \
+    X(MOTOR_LS_MH, "mH", 0.01, 30) \
+    X(MOTOR_KPHI_V_PER_KRPM, "V peak/krpm", 0.2, 200) \
+    X(MOTOR_INERTIA_KGM2, "kg m2", 1e-8, 0.1) \
+    X(NOMINAL_BUS_V, "V", 10, 48) \
+    X(LOOPTIME_SEC, "s", 0.00004, 0.0002) \
+    X(DEADTIME_SEC, "s", 0.0000005, 0.000003) \
+    X(NORM_CURRENT_CONST, "A/count", 0.00001, 0.002) \
+    X(KCURRA, "1", -0.999, 0.999) \
+    X(KCURRB, "1", -0.999, 0.999) \
+    X(BUS_FULL_SCALE_V, "V", 20, 200) \
+    X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004) \
+    X(MINIMUM_SPEED_RPM, "rpm", 50, 10000) \
+    X(NOMINAL_SPEED_RPM, "rpm", 100, 20000) \
+    X(MAXIMUM_SPEED_RPM, "rpm", 100, 30000) \
+    X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000) \
+    X(TUNING_DELAY_RAMPUP, "periods", 0, 4095) \
+    X(LOCK_TIME, "periods", 200, 32000) \
+    X(END_SPEED_RPM, "rpm", 50, 5000) \
+    X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000) \
+    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20) \
+    X(MAXIMUM_CURRENT_A, "A peak", 0.1, 20) \
+    X(OVER_CURRENT_THRESHOLD_A, "A peak", 0.1, 40) \
+    X(OVER_VOLTAGE_V, "V", 12, 100) \
+    X(UNDER_VOLTAGE_V, "V", 5, 45) \
+    X(REGEN_LIMIT_V, "V", 11, 90) \
+    X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000) \
+    X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60) \
+    X(KFILTER_ESDQ, "Q15", 10, 8000) \
+    X(KFILTER_ESDQ_FW, "Q15", 10, 8000) \
+    X(KFILTER_VELESTIM, "Q15", 10, 8000) \
+    X(FW_START_SPEED_RPM, "rpm", 100, 20000) \
+    X(FW_TRIM_CURRENT_A, "A", 0, 20) \
+    PARAM_TABLE_FW(X, IDREF_SPEED, "A", -20, 0) \
+    PARAM_TABLE_FW(X, INVKFI_SPEED, "Q15/2", 2048, 32767) \
+    PARAM_TABLE_FW(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.7) \
+    X(SNAPDELAY, "periods", 1, 32000) \
+    X(DATA_BUFFER_SIZE, "rows", 2, 150)
+
+#define PARAM_TABLE_FW(X, stem, unit, min, max) \
+    X(stem##0, unit, min, max) X(stem##1, unit, min, max) X(stem##2, unit, min, max) X(stem##3, unit, min, max) \
+    X(stem##4, unit, min, max) X(stem##5, unit, min, max) X(stem##6, unit, min, max) X(stem##7, unit, min, max) \
+    X(stem##8, unit, min, max) X(stem##9, unit, min, max) X(stem##10, unit, min, max) X(stem##11, unit, min, max) \
+    X(stem##12, unit, min, max) X(stem##13, unit, min, max) X(stem##14, unit, min, max) X(stem##15, unit, min, max) \
+    X(stem##16, unit, min, max) X(stem##17, unit, min, max)
+
+/** X(condition, message): what must hold between parameters, and what to change when it does not. */
+#define PARAM_RELATION_TABLE(X) \
+    X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM") \
+    X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM") \
+    X(FW_START_SPEED_RPM < MAXIMUM_SPEED_RPM, "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM") \
+    X(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= 32000.0F, "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000: speeds are 16-bit electrical rpm") \
+    X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= 27000.0F, "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000: lower NOMINAL_SPEED_RPM, the one-sample derivative then starts earlier") \
+    X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM") \
+    X(PARAM_RS_FULL < 524287.0F, "MOTOR_RS_OHM does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
+    X(PARAM_LS_FULL * 1.4F < 524287.0F, "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
+    X(PARAM_RS_FULL >= 100.0F, "MOTOR_RS_OHM rounds by more than 0.5 %: the current range is too small for this motor") \
+    X(PARAM_INVKFI >= 2048.0F && PARAM_INVKFI < 32767.0F, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (2048 .. 32767): check its unit, V peak line to line per 1000 rpm") \
+    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A") \
+    X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A") \
+    X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= 0.9F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "OVER_CURRENT_THRESHOLD_A must be at most 90 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
+    X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.0625F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "MAXIMUM_CURRENT_A must be at least 1/16 of the range NORM_CURRENT_CONST * 32768") \
+    X(OVER_VOLTAGE_V > NOMINAL_BUS_V, "OVER_VOLTAGE_V must be above NOMINAL_BUS_V") \
+    X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V, or it never trips") \
+    X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
+    X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, "UNDER_VOLTAGE_V must be below NOMINAL_BUS_V") \
+    X(PARAM_F(UNDER_VOLTAGE_V) >= 0.2F * PARAM_F(NOMINAL_BUS_V), "UNDER_VOLTAGE_V must be at least a fifth of NOMINAL_BUS_V") \
+    X(REGEN_LIMIT_V > NOMINAL_BUS_V, "REGEN_LIMIT_V must be above NOMINAL_BUS_V") \
+    X(PARAM_F(REGEN_LIMIT_V) + 2.0F <= PARAM_F(OVER_VOLTAGE_V), "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V") \
+    X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, "UNDER_VOLTAGE_V is too low for the modulator's division") \
+    X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, "the current gain exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
+    X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
+    X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \
+    X(PARAM_SPEED_KI(SPEEDCNTR_ITERM) >= 1, "the speed integral rounds to zero: raise SPEED_BANDWIDTH_HZ or MOTOR_INERTIA_KGM2")
+
+#endif

@@ -1,0 +1,50 @@
+/* Storage, start values and look-up of the host's special function registers. */
+#include "xc.h"
+
+#include <string.h>
+
+#define HOST_SFR_DEFINE(name, start) volatile uint16_t name = (start);
+HOST_SFR_LIST(HOST_SFR_DEFINE)
+
+#define HOST_SFR_ROW(name, start) {#name, &name, (start)},
+const host_sfr_t host_sfr_table[] = {HOST_SFR_LIST(HOST_SFR_ROW)};
+const size_t host_sfr_count = sizeof host_sfr_table / sizeof host_sfr_table[0];
+
+void host_registers_reset(void)
+{
+    for (size_t i = 0; i < host_sfr_count; i++) {
+        *host_sfr_table[i].pointer = host_sfr_table[i].reset;
+    }
+}
+
+volatile uint16_t *host_sfr_find(const char *name)
+{
+    for (size_t i = 0; i < host_sfr_count; i++) {
+        if (strcmp(host_sfr_table[i].name, name) == 0) {
+            return host_sfr_table[i].pointer;
+        }
+    }
+    return NULL;
+}
+
+void host_write_oscconl(unsigned value)
+{
+    enum { WRITABLE = 0x00C3, CLOCK_FAIL = 0x0008, KEPT = 0xFF20, LOCK = 0x0020, OSWEN = 0x0001 };
+    uint16_t kept = (uint16_t)(OSCCON & (KEPT | CLOCK_FAIL));
+    if ((value & CLOCK_FAIL) == 0u) {
+        kept = (uint16_t)(kept & ~CLOCK_FAIL); /* CF can only be cleared */
+    }
+    uint16_t osccon = (uint16_t)(kept | (value & WRITABLE));
+    if ((osccon & OSWEN) != 0) {
+        uint16_t nosc = (uint16_t)((osccon >> 8) & 7);
+        int has_pll = nosc == 1 || nosc == 3;
+        osccon = (uint16_t)((osccon & 0x07DE) | (nosc << 12));
+        osccon = (uint16_t)(has_pll ? (osccon | LOCK) : (osccon & ~LOCK));
+    }
+    OSCCON = osccon;
+}
+
+void host_write_oscconh(unsigned value)
+{
+    OSCCON = (uint16_t)((OSCCON & 0x70FFu) | ((value & 7u) << 8));
+}
