@@ -25,8 +25,8 @@
 #define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.0002  PWM and control period */
 #define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003  dead time of the bridge */
 #define NORM_CURRENT_CONST 0.0001342773 /* [A/count]   0.00001 .. 0.002  current of one count: full scale / 32768 (MCLV: 4.4 A); calibrate with a probe */
-#define KCURRA -0.5                 /* [1]             -0.999 .. 0.999  gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
-#define KCURRB -0.5                 /* [1]             -0.999 .. 0.999  gain of phase B's current */
+#define KCURRA -0.5                 /* [1]             -0.6 .. 0.6     gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
+#define KCURRB -0.5                 /* [1]             -0.6 .. 0.6     gain of phase B's current */
 #define BUS_FULL_SCALE_V 52.8       /* [V]             20 .. 200      bus voltage that gives 3.3 V at the converter (divider 1:16) */
 #define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004  low sides on for this long on each side of the sample's centre */
 
@@ -103,7 +103,7 @@
 #define INVKFI_SPEED16 NORM_INVKFIBASE
 #define INVKFI_SPEED17 NORM_INVKFIBASE
 
-#define LS_OVER2LS0_SPEED0  0.5     /* [1]             0.1 .. 0.7     Ls / (2 Ls0) of each entry; 0.5 = no change */
+#define LS_OVER2LS0_SPEED0  0.5     /* [1]             0.1 .. 0.6     Ls / (2 Ls0) of each entry; 0.5 = no change */
 #define LS_OVER2LS0_SPEED1  0.5
 #define LS_OVER2LS0_SPEED2  0.5
 #define LS_OVER2LS0_SPEED3  0.5

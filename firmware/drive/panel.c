@@ -91,7 +91,7 @@ static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t el
         uint16_t in_burst = (uint16_t)(panel->blink_ms < 2u * BLINK_MS * d->fault);
         lights.led_alive = (uint16_t)(in_burst && (panel->blink_ms / BLINK_MS) % 2u == 0u);
     }
-    lights.led_run = (uint16_t)(d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING);
+    lights.led_run = drive_is_running(d);
     return lights;
 }
 

@@ -83,7 +83,7 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
         const int16_t limit = p->d_ilimit_ls_q14;
         v.alpha = qm_mulhi_su(qm_clamp((int16_t)(now.alpha - oldest.alpha), (int16_t)-limit, limit), t->ls_q16);
         v.beta = qm_mulhi_su(qm_clamp((int16_t)(now.beta - oldest.beta), (int16_t)-limit, limit), t->ls_q16);
-        v = estimator_turn(v, (int16_t)(7 * e->half_step_q16_rad));
+        v = estimator_turn(v, (int16_t)(7 * qm_clamp(e->half_step_q16_rad, -4681, 4681))); /* 0.5 rad at most */
     } else {
         const int16_t limit = p->d_ilimit_hs_q14;
         v.alpha = qm_mulhi_su((int16_t)(8 * qm_clamp((int16_t)(now.alpha - previous.alpha), (int16_t)-limit, limit)), t->ls_q16);

@@ -133,6 +133,12 @@ void drive_init(drive_t *d, const drive_params_t *p);
  *  @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
+/** 1 while the bridge switches under the law's control. */
+QM_INLINE uint16_t drive_is_running(const drive_t *d)
+{
+    return (uint16_t)(d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING);
+}
+
 /** Stops at once and keeps the code of the first fault. */
 QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
 {

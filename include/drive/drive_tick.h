@@ -223,7 +223,7 @@ QM_INLINE void drive_try_hand_over(drive_t *d, const drive_params_t *p)
     if ((d->ticks & (SLOTS - 1u)) != 0u) {
         return;
     }
-    miss = qm_abs((int16_t)(drive_signed(d, estimator_speed(&d->estimator)) - p->end_erpm));
+    miss = qm_abs(qm_sub_limited(drive_signed(d, estimator_speed(&d->estimator)), p->end_erpm));
     d->timer = (uint16_t)(d->timer + 1u);
     d->slots = (uint16_t)((miss < (p->end_erpm >> 2)) ? d->slots + 1u : 0u);
     if (d->slots >= p->ready_slots) {
@@ -357,13 +357,15 @@ QM_INLINE drive_output_t drive_tick(drive_t *d, const drive_params_t *p, const d
     } else if (slot == 3u) {
         drive_circle_step(d, p);
     }
-    if (d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING) {
-        drive_check_overcurrent(d, p);
-        out.duty = drive_run(d, p, slot);
+    if (drive_is_running(d)) {
+        drive_check_overcurrent(d, p); /* before the law: its formats end above the trip level */
     } else {
         drive_idle(d, p, raw);
     }
-    if (d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING) {
+    if (drive_is_running(d)) {
+        out.duty = drive_run(d, p, slot);
+    }
+    if (drive_is_running(d)) {
         out.outputs = OUTPUTS_PWM;
     } else if (d->state == (uint16_t)DRIVE_BOOTSTRAP) {
         out.outputs = OUTPUTS_BOOTSTRAP;

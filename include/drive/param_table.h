@@ -13,8 +13,8 @@
     X(LOOPTIME_SEC, "s", 0.00004, 0.0002) \
     X(DEADTIME_SEC, "s", 0.0000005, 0.000003) \
     X(NORM_CURRENT_CONST, "A/count", 0.00001, 0.002) \
-    X(KCURRA, "1", -0.999, 0.999) \
-    X(KCURRB, "1", -0.999, 0.999) \
+    X(KCURRA, "1", -0.6, 0.6) \
+    X(KCURRB, "1", -0.6, 0.6) \
     X(BUS_FULL_SCALE_V, "V", 20, 200) \
     X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004) \
     X(MINIMUM_SPEED_RPM, "rpm", 50, 10000) \
@@ -40,7 +40,7 @@
     X(FW_TRIM_CURRENT_A, "A", 0, 20) \
     PARAM_TABLE_FW(X, IDREF_SPEED, "A", -20, 0) \
     PARAM_TABLE_FW(X, INVKFI_SPEED, "Q15/2", 2048, 32767) \
-    PARAM_TABLE_FW(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.7) \
+    PARAM_TABLE_FW(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.6) \
     X(SNAPDELAY, "periods", 1, 32000) \
     X(DATA_BUFFER_SIZE, "rows", 2, 150)
 
@@ -60,13 +60,14 @@
     X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= 27000.0F, "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000: lower NOMINAL_SPEED_RPM, the one-sample derivative then starts earlier") \
     X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM") \
     X(PARAM_RS_FULL < 524287.0F, "MOTOR_RS_OHM does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
-    X(PARAM_LS_FULL * 1.4F < 524287.0F, "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
+    X(PARAM_LS_FULL * 1.2F < 524287.0F, "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
     X(PARAM_RS_FULL >= 100.0F, "MOTOR_RS_OHM rounds by more than 0.5 %: the current range is too small for this motor") \
     X(PARAM_INVKFI >= 2048.0F && PARAM_INVKFI < 32767.0F, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (2048 .. 32767): check its unit, V peak line to line per 1000 rpm") \
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A") \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A") \
-    X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= 0.9F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "OVER_CURRENT_THRESHOLD_A must be at most 90 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
+    X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= 0.865F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "OVER_CURRENT_THRESHOLD_A must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
     X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.0625F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "MAXIMUM_CURRENT_A must be at least 1/16 of the range NORM_CURRENT_CONST * 32768") \
+    X(PARAM_EMF_MAX_V < 131068.0F * NORM_VOLTAGE_CONST, "the back-EMF's format overflows: lower OVER_VOLTAGE_V, OVER_CURRENT_THRESHOLD_A or MAXIMUM_SPEED_RPM") \
     X(OVER_VOLTAGE_V > NOMINAL_BUS_V, "OVER_VOLTAGE_V must be above NOMINAL_BUS_V") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V, or it never trips") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \

@@ -49,7 +49,9 @@
 #define PARAM_EXP(x) ((uint16_t)(((x) < 65535.0F) ? 0 : ((x) < 131071.0F) ? 1 : ((x) < 262143.0F) ? 2 : 3))
 #define PARAM_RS_FULL (PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 32768.0F)
 #define PARAM_LS_FULL (PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 4096.0F)
-#define PARAM_SCALED(x) ((uint16_t)((x) / (float)(1 << PARAM_EXP(x)) + 0.5F))
+#define PARAM_SCALED(x, exp) ((uint16_t)((x) / (float)(1 << (exp)) + 0.5F))
+#define PARAM_RS_EXP PARAM_EXP(PARAM_RS_FULL)
+#define PARAM_LS_EXP PARAM_EXP(PARAM_LS_FULL * 1.2F) /* LS_OVER2LS0 may raise it by a fifth */
 /* A sine of the largest current changes by 2 pi f Ts I a period; the note's formula has 2 in place of 2 pi I/Ipeak and clips. */
 #define PARAM_DI(rpm) (2.0F * PARAM_PI * PARAM_F(rpm) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(LOOPTIME_SEC) * CURRENT_Q14_F(MAXIMUM_CURRENT_A))
 #define PARAM_MIN(a, b) (((a) < (b)) ? (a) : (b))
@@ -57,6 +59,10 @@
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
 #define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in the note's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
+
+/** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format. */
+#define PARAM_EMF_MAX_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3 + 2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM) \
+                         + 2.0F * PARAM_PI * PARAM_F(MAXIMUM_SPEED_RPM) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
 /* ---- Controllers: gains in the note's units (gain/16 and per-period integral, in full scales) from bandwidths.
  *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/4.

@@ -11,9 +11,9 @@
 #define PARAM_LS_ENTRY(i) ((int16_t)PARAM_ROUND(PARAM_F(LS_OVER2LS0_SPEED##i) * 32768.0F))
 
 #define PARAM_ESTIMATOR_INIT { \
-    .rs_q16 = PARAM_SCALED(PARAM_RS_FULL), \
-    .rs_exp = PARAM_EXP(PARAM_RS_FULL), \
-    .ls_exp = PARAM_EXP(PARAM_LS_FULL), \
+    .rs_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP), \
+    .rs_exp = PARAM_RS_EXP, \
+    .ls_exp = PARAM_LS_EXP, \
     .d_ilimit_ls_q14 = D_ILIMIT_LS_Q14, \
     .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
     .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F), \
@@ -27,7 +27,7 @@
     .inv_kfi = PARAM_18(PARAM_INVKFI_ENTRY), \
     .ls_over2ls0_q15 = PARAM_18(PARAM_LS_ENTRY), \
     .on_speed_erpm = (int16_t)FW_START_SPEED_ERPM, \
-    .ls_base_q16 = PARAM_SCALED(PARAM_LS_FULL), \
+    .ls_base_q16 = PARAM_SCALED(PARAM_LS_FULL, PARAM_LS_EXP), \
     .kfilter_esdq_q16 = 2 * (KFILTER_ESDQ), \
     .kfilter_esdq_fw_q16 = 2 * (KFILTER_ESDQ_FW), \
     .trim_max_q13 = CURRENT_Q13(FW_TRIM_CURRENT_A), \

@@ -22,7 +22,7 @@
 
 SIGNAL(state, (double)d->state)
 SIGNAL(fault, (double)d->fault)
-SIGNAL(running, d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING ? 1.0 : 0.0)
+SIGNAL(running, (double)drive_is_running(d))
 SIGNAL(calibrated, (double)d->calibrated)
 SIGNAL(theta_est, ANGLE_DEG(estimator_next_angle(&d->estimator)) - (double)d->estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
 SIGNAL(theta_ctrl, ANGLE_DEG(d->angle))

@@ -1,0 +1,33 @@
+/* What the virtual board can read inside a host-built firmware: signals, parameters and the names of states and faults.
+ *
+ * The firmware's side defines all of it (tools/board/probe.c); without that file the empty defaults of probe_default.c are linked.
+ */
+#ifndef FOC33_BOARD_PROBE_H
+#define FOC33_BOARD_PROBE_H
+
+/* One signal of the running firmware. `name` is without the "fw." that the board puts before it ("theta_est_deg" becomes
+ * "fw.theta_est_deg"; a name that already starts with "fw." is taken as it is). `read` returns the present value in `unit`. */
+typedef struct {
+    const char *name;
+    const char *unit;
+    const char *meaning;
+    double (*read)(void);
+} probe_signal_t;
+
+/* One compiled-in parameter of userparams.h: its macro's name, its value, and the unit of the value. */
+typedef struct {
+    const char *name;
+    double value;
+    const char *unit;
+} probe_param_t;
+
+extern const probe_signal_t probe_signals[];
+extern const unsigned probe_signal_count;
+extern const probe_param_t probe_params[];
+extern const unsigned probe_param_count;
+
+/* Name of a fault code or of a state number as the signals "fault" and "state" give them; "" for a number that has no name. */
+const char *probe_fault_name(int code);
+const char *probe_state_name(int state);
+
+#endif
