@@ -82,33 +82,41 @@ QM_INLINE void drive_reference_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Speed controller: reference to q current. In TORQUE_MODE it only guards the
- *  minimum and maximum speed, and the command is its limit in between. */
+#ifdef TORQUE_MODE
+/** TORQUE_MODE: the command is the q current; the speed controller only keeps it below the maximum speed, and below the
+ *  minimum speed, where the estimator would lose the rotor, a proportional share holds against it. */
+QM_INLINE current_q13_t drive_torque_step(drive_t *d, const drive_params_t *p, speed_erpm_t speed)
+{
+    drive_control_t *c = &d->control;
+    int16_t torque = qm_abs(d->command.target_erpm);
+    int16_t limit = (torque < c->iq_limit_q13) ? torque : c->iq_limit_q13;
+    int16_t iq = pi_tick(&c->pi_speed, &p->pi_speed, qm_sub_limited(drive_signed(d, p->maximum_erpm), speed), limit);
+    int32_t hold = qm_mulss(qm_sub_limited(p->minimum_erpm, drive_signed(d, speed)), p->pi_speed.kp) >> p->pi_speed.shift;
+
+    c->reference_erpm = speed; /* field weakening and an orderly stop start from it */
+    if (hold > c->iq_limit_q13) {
+        hold = c->iq_limit_q13;
+    }
+    return (hold > drive_signed(d, iq)) ? drive_signed(d, (int16_t)hold) : iq;
+}
+#endif
+
+/** Speed controller: the ramped reference and the filtered speed give the q current; braking is limited by the bus. */
 QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
     speed_erpm_t speed = estimator_speed(&d->estimator);
-    current_q13_t limit = c->iq_limit_q13;
-    speed_erpm_t reference;
     int16_t err, iq;
 
 #ifdef TORQUE_MODE
     if (d->state == (uint16_t)DRIVE_CLOSED) {
-        int16_t torque = qm_abs(d->command.target_erpm);
-        c->reference_erpm = speed; /* field weakening and an orderly stop start from it */
-        reference = drive_signed(d, p->minimum_erpm); /* below, the estimator would lose the rotor: full current may hold it */
-        if (drive_signed(d, speed) >= p->minimum_erpm) {
-            limit = (torque < limit) ? torque : limit;
-            reference = drive_signed(d, p->maximum_erpm);
-        }
-    } else
-#endif
-    {
-        drive_reference_step(d, p);
-        reference = c->reference_erpm;
+        c->ref_q13.q = drive_torque_step(d, p, speed);
+        return;
     }
-    err = qm_sub_limited(reference, speed);
-    iq = pi_tick(&c->pi_speed, &p->pi_speed, err, limit);
+#endif
+    drive_reference_step(d, p);
+    err = qm_sub_limited(c->reference_erpm, speed);
+    iq = pi_tick(&c->pi_speed, &p->pi_speed, err, c->iq_limit_q13);
     if ((iq ^ speed) < 0 && qm_abs(iq) > c->brake_limit_q13) {
         iq = (int16_t)((iq < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
         pi_preset(&c->pi_speed, &p->pi_speed, err, iq);

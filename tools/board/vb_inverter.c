@@ -1,0 +1,300 @@
+/* The three half bridges: which device carries each leg, its voltage drop, floating legs, and the current drawn from the bus. */
+#include "vb_internal.h"
+
+#include <math.h>
+
+#define SQRT1_3 0.57735026918962576
+#define FLOAT_STEP_S 5e-6 /* a floating terminal is compared with the diodes' thresholds this often */
+
+static bool is_low_path(vb_cond_t cond)
+{
+    return cond == VB_COND_LOW || cond == VB_COND_DIODE_LOW || cond == VB_COND_SHOOT;
+}
+
+static void set_condition(vb_t *vb, unsigned leg, vb_cond_t cond)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    inv->cond[leg] = cond;
+    bool low = is_low_path(cond);
+    if (low != inv->low_path[leg]) {
+        inv->low_path[leg] = low;
+        inv->low_since_s[leg] = vb->start_s + vb->now_s;
+    }
+    unsigned bit = 1u << leg;
+    inv->float_mask = cond == VB_COND_FLOAT ? inv->float_mask | bit : inv->float_mask & ~bit;
+}
+
+/* A leg's current has reached zero (or its wire is open): take its share out of the motor's currents. */
+static void set_floating(vb_t *vb, unsigned leg)
+{
+    static const double axis_cos[3] = {1.0, -0.5, -0.5};
+    static const double axis_sin[3] = {0.0, 0.86602540378443865, -0.86602540378443865};
+    vb_motor_t *m = &vb->motor;
+    double i_alpha = m->id * m->c - m->iq * m->s;
+    double i_beta = m->id * m->s + m->iq * m->c;
+    double share = i_alpha * axis_cos[leg] + i_beta * axis_sin[leg];
+    vb_motor_set_alpha_beta(m, i_alpha - share * axis_cos[leg], i_beta - share * axis_sin[leg]);
+    vb_motor_phase_currents(m, vb->inverter.i);
+    vb->inverter.i[leg] = 0.0;
+    if (vb->inverter.cond[leg] != VB_COND_FLOAT) {
+        set_condition(vb, leg, VB_COND_FLOAT);
+    }
+}
+
+/* New state of a leg's transistors. With both off the current chooses the diode. */
+void vb_inverter_gate(vb_t *vb, unsigned leg, vb_gate_t gate)
+{
+    static const vb_cond_t on[4] = {VB_COND_FLOAT, VB_COND_LOW, VB_COND_HIGH, VB_COND_SHOOT};
+    vb_inverter_t *inv = &vb->inverter;
+    unsigned bit = 1u << leg;
+    inv->gate[leg] = gate;
+    if ((inv->open_mask & bit) != 0) {
+        inv->off_mask |= bit;
+        set_floating(vb, leg);
+    } else if (gate != VB_GATE_OFF) {
+        inv->off_mask &= ~bit;
+        set_condition(vb, leg, on[gate]);
+    } else if ((inv->off_mask & bit) == 0) {
+        inv->off_mask |= bit;
+        double i = inv->i[leg];
+        set_condition(vb, leg, i > 0.0 ? VB_COND_DIODE_LOW : i < 0.0 ? VB_COND_DIODE_HIGH : VB_COND_FLOAT);
+    }
+}
+
+void vb_inverter_reset(vb_t *vb)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    inv->open_mask = 0;
+    inv->off_mask = 0;
+    inv->float_mask = 0;
+    vb_motor_set_alpha_beta(&vb->motor, 0.0, 0.0);
+    for (unsigned k = 0; k < 3; k++) {
+        inv->i[k] = 0.0;
+        inv->low_path[k] = false;
+        inv->low_since_s[k] = vb->start_s - 1.0;
+        vb_inverter_gate(vb, k, VB_GATE_OFF);
+    }
+    inv->bus_as = 0.0;
+}
+
+/* Follow a phase wire that was opened or closed since the last period. */
+void vb_inverter_prepare(vb_t *vb)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    unsigned open = inv->open_phase > 0.0 ? 1u << ((unsigned)inv->open_phase - 1u) : 0u;
+    if (open == inv->open_mask) {
+        return;
+    }
+    unsigned changed = open | inv->open_mask;
+    inv->open_mask = open;
+    for (unsigned k = 0; k < 3; k++) {
+        if ((changed & (1u << k)) != 0) {
+            vb_inverter_gate(vb, k, inv->gate[k]);
+        }
+    }
+}
+
+static double terminal_voltage(const vb_t *vb, unsigned leg)
+{
+    const vb_inverter_t *inv = &vb->inverter;
+    double i = inv->i[leg];
+    double bus = vb->supply.bus_v;
+    switch (inv->cond[leg]) {
+    case VB_COND_HIGH:
+        return bus - inv->rds_on_ohm * i;
+    case VB_COND_LOW:
+        return -(inv->rds_on_ohm + inv->shunt_ohm) * i;
+    case VB_COND_DIODE_LOW:
+        return -inv->diode_v - (inv->diode_ohm + inv->shunt_ohm) * i;
+    case VB_COND_DIODE_HIGH:
+        return bus + inv->diode_v - inv->diode_ohm * i;
+    case VB_COND_SHOOT:
+        return 0.5 * bus;
+    case VB_COND_FLOAT:
+    default:
+        return 0.0;
+    }
+}
+
+/* Current from the bus into the bridge at this instant. */
+double vb_inverter_bus_a(const vb_t *vb)
+{
+    const vb_inverter_t *inv = &vb->inverter;
+    double sum = 0.0;
+    for (unsigned k = 0; k < 3; k++) {
+        if (inv->cond[k] == VB_COND_HIGH || inv->cond[k] == VB_COND_DIODE_HIGH) {
+            sum += inv->i[k];
+        } else if (inv->cond[k] == VB_COND_SHOOT) {
+            sum += vb->supply.bus_v / (2.0 * inv->rds_on_ohm + inv->shunt_ohm) + fmax(0.0, inv->i[k]);
+        }
+    }
+    return sum;
+}
+
+/* Let a floating leg conduct through the diode that its open-circuit voltage `v` forward-biases. */
+static void clamp_floating(vb_t *vb, unsigned leg, double v)
+{
+    if ((vb->inverter.open_mask & (1u << leg)) != 0) {
+        return;
+    }
+    if (v > vb->supply.bus_v + vb->inverter.diode_v) {
+        set_condition(vb, leg, VB_COND_DIODE_HIGH);
+    } else if (v < -vb->inverter.diode_v) {
+        set_condition(vb, leg, VB_COND_DIODE_LOW);
+    }
+}
+
+/* Two or three legs float, so no current flows. Either one leg is held by a transistor and fixes the star point, or none is and the
+ * line-to-line voltage decides. */
+static void resolve_idle(vb_t *vb)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    double e[3];
+    vb_motor_emf(&vb->motor, e);
+    vb_motor_set_alpha_beta(&vb->motor, 0.0, 0.0);
+    unsigned high = 0, low = 0, held = 3;
+    for (unsigned k = 0; k < 3; k++) {
+        inv->i[k] = 0.0;
+        if ((inv->off_mask & (1u << k)) == 0) {
+            held = k;
+        } else if (inv->cond[k] != VB_COND_FLOAT) {
+            set_condition(vb, k, VB_COND_FLOAT);
+        }
+        high = e[k] > e[high] ? k : high;
+        low = e[k] < e[low] ? k : low;
+    }
+    double star = 0.5 * (vb->supply.bus_v - e[high] - e[low]);
+    if (held < 3) {
+        inv->v[held] = terminal_voltage(vb, held);
+        star = inv->v[held] - e[held];
+    }
+    for (unsigned k = 0; k < 3; k++) {
+        if (k != held) {
+            inv->v[k] = star + e[k];
+            clamp_floating(vb, k, inv->v[k]);
+        }
+    }
+}
+
+static unsigned count_bits(unsigned mask)
+{
+    return (mask & 1u) + ((mask >> 1) & 1u) + ((mask >> 2) & 1u);
+}
+
+/* Decide for every floating leg whether a diode starts to conduct. */
+static void resolve_floating(vb_t *vb)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    if (count_bits(inv->float_mask) >= 2) {
+        resolve_idle(vb);
+        return;
+    }
+    unsigned leg = inv->float_mask == 1u ? 0u : inv->float_mask == 2u ? 1u : 2u;
+    for (unsigned k = 0; k < 3; k++) {
+        if (k != leg) {
+            inv->v[k] = terminal_voltage(vb, k);
+        }
+    }
+    clamp_floating(vb, leg, vb_motor_float_voltage(&vb->motor, inv->v, leg));
+}
+
+static void step_motor(vb_t *vb, double h_s)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    const double *v = inv->v;
+    vb_motor_step(&vb->motor, (2.0 * v[0] - v[1] - v[2]) * (1.0 / 3.0), (v[1] - v[2]) * SQRT1_3, h_s);
+    vb_motor_phase_currents(&vb->motor, inv->i);
+}
+
+/* The part of the step, 0..1, at which the first diode current passes zero; 1 if none does. `leg` is the one. */
+static double first_crossing(const vb_inverter_t *inv, unsigned diodes, const double before[3], unsigned *leg)
+{
+    double first = 1.0;
+    for (unsigned k = 0; k < 3; k++) {
+        if ((diodes & (1u << k)) != 0) {
+            double sign = inv->cond[k] == VB_COND_DIODE_LOW ? 1.0 : -1.0;
+            double end = sign * inv->i[k];
+            if (end < 0.0) {
+                double start = fmax(0.0, sign * before[k]);
+                double part = start / (start - end);
+                if (part < first) {
+                    first = part;
+                    *leg = k;
+                }
+            }
+        }
+    }
+    return first;
+}
+
+/* A stretch in which at least one leg is carried by a diode or floats. Returns the time that passed: it ends early where a diode stops
+ * conducting. */
+static double step_with_off_legs(vb_t *vb, double h_s)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    unsigned floating = inv->float_mask;
+    if (count_bits(floating) >= 2) {
+        vb_motor_turn(&vb->motor, h_s);
+        return h_s;
+    }
+    if (floating != 0) {
+        unsigned leg = floating == 1u ? 0u : floating == 2u ? 1u : 2u;
+        inv->v[leg] = vb_motor_float_voltage(&vb->motor, inv->v, leg);
+    }
+    vb_motor_t before_m = vb->motor;
+    double before_i[3] = {inv->i[0], inv->i[1], inv->i[2]};
+    step_motor(vb, h_s);
+    unsigned ended = 3;
+    double part = first_crossing(inv, inv->off_mask & ~floating, before_i, &ended);
+    if (ended < 3) {
+        vb->motor = before_m;
+        h_s *= part;
+        step_motor(vb, h_s);
+        vb->now_s += h_s; /* the shunt stops carrying here */
+        set_floating(vb, ended);
+        vb->now_s -= h_s;
+    }
+    for (unsigned k = 0; k < 3; k++) {
+        if ((floating & (1u << k)) != 0) {
+            set_floating(vb, k);
+        }
+    }
+    return h_s;
+}
+
+/* Let `h_s` pass without any change of the transistors. Terminal voltages, currents, angle and bus charge follow. */
+void vb_inverter_run(vb_t *vb, double h_s)
+{
+    vb_inverter_t *inv = &vb->inverter;
+    double start = vb->now_s;
+    double done = 0.0;
+    bool hold = false; /* a diode that was found not to conduct stays off for one step */
+    while (done < h_s) {
+        double h = fmin(h_s - done, inv->max_step_s);
+        vb->now_s = start + done;
+        if (inv->float_mask != 0) {
+            h = fmin(h, FLOAT_STEP_S);
+            if (!hold) {
+                resolve_floating(vb);
+            }
+        }
+        double bus_before = vb_inverter_bus_a(vb);
+        for (unsigned k = 0; k < 3; k++) {
+            if ((inv->float_mask & (1u << k)) == 0) {
+                inv->v[k] = terminal_voltage(vb, k);
+            }
+        }
+        hold = false;
+        double passed = h;
+        if (inv->off_mask == 0) {
+            step_motor(vb, h);
+        } else {
+            unsigned cond_high_before = inv->off_mask & ~inv->float_mask;
+            passed = step_with_off_legs(vb, h);
+            hold = passed <= 0.0 && cond_high_before != 0;
+        }
+        inv->bus_as += 0.5 * (bus_before + vb_inverter_bus_a(vb)) * passed;
+        done += passed;
+    }
+    vb->now_s = start + h_s;
+}
