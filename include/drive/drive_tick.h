@@ -3,6 +3,7 @@
 #define DRIVE_DRIVE_TICK_H
 
 #include "drive/drive.h"
+#include "drive/params.h"
 
 QM_INLINE int16_t drive_signed(const drive_t *d, int16_t x)
 {
@@ -327,7 +328,6 @@ QM_INLINE void drive_idle(drive_t *d, const drive_params_t *p, const drive_sampl
         }
         break;
     case DRIVE_BOOTSTRAP:
-        drive_check_overcurrent(d, p);
         d->timer++;
         if (!d->command.run) {
             d->state = (uint16_t)DRIVE_STOPPED;
@@ -335,6 +335,7 @@ QM_INLINE void drive_idle(drive_t *d, const drive_params_t *p, const drive_sampl
             d->timer = 0;
             d->state = (uint16_t)DRIVE_LOCK;
         }
+        drive_check_overcurrent(d, p); /* last: a fault overrides any other change of state */
         break;
     default: /* FAULT */
         if (d->command.clear_fault) {

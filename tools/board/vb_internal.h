@@ -57,7 +57,7 @@ typedef struct {
     double turns; /* mechanical revolutions since creation */
     /* integrals over the period */
     double torque_nms, vd_vs, vq_vs, copper_j;
-    double torque_nm; /* mean of the last period */
+    double torque_nm, vd_v, vq_v, copper_w; /* means of the last period */
     bool derived_stale;
 } vb_motor_t;
 
@@ -112,6 +112,7 @@ typedef struct {
     double a_s, b_s;          /* PWM reference is high before a_s and from b_s on */
     uint8_t pen, povd, pout;  /* bit 0 low, bit 1 high transistor */
     uint8_t port;             /* level from the port latch where PEN is 0 */
+    bool idle;                /* the time base stands still: the module drives neither transistor */
     bool independent;
     bool faulted;
     uint8_t fault_out;
@@ -210,7 +211,6 @@ typedef struct {
 typedef struct {
     double time_s, i_a, i_b, i_c, i_d, i_q, theta_e_deg, speed_rpm, torque_nm, turns;
     double v_d, v_q; /* rotor-frame means of the period before */
-    double v_a, v_b, v_c;
 } vb_latch_t;
 
 typedef struct {
@@ -304,6 +304,7 @@ void vb_adc_decode(vb_t *vb);
 void vb_adc_seed(vb_adc_t *adc);
 void vb_adc_trigger(vb_t *vb);
 void vb_adc_handler(vb_t *vb);
+double vb_adc_next_trigger(const vb_t *vb, double after_s);
 void vb_adc_end(vb_t *vb);
 
 /* vb_io.c */

@@ -289,9 +289,8 @@ void vb_inverter_run(vb_t *vb, double h_s)
         if (inv->off_mask == 0) {
             step_motor(vb, h);
         } else {
-            unsigned cond_high_before = inv->off_mask & ~inv->float_mask;
             passed = step_with_off_legs(vb, h);
-            hold = passed <= 0.0 && cond_high_before != 0;
+            hold = passed < 1e-12;
         }
         inv->bus_as += 0.5 * (bus_before + vb_inverter_bus_a(vb)) * passed;
         done += passed;

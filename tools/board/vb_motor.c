@@ -150,6 +150,9 @@ static double next_speed(const vb_motor_t *m, double speed, double torque, doubl
 void vb_motor_mechanics(vb_motor_t *m, double h_s)
 {
     m->torque_nm = m->torque_nms / h_s;
+    m->vd_v = m->vd_vs / h_s;
+    m->vq_v = m->vq_vs / h_s;
+    m->copper_w = m->copper_j / h_s;
     m->theta = fmod(m->theta + m->omega * h_s, 2.0 * VB_PI);
     if (m->theta < 0.0) {
         m->theta += 2.0 * VB_PI;

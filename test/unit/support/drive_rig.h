@@ -1,0 +1,105 @@
+/* A drive on the bench for unit tests: amperes and volts go in, duties and states come out; no board and no register. */
+#ifndef TEST_DRIVE_RIG_H
+#define TEST_DRIVE_RIG_H
+
+#include "drive/params_init.h"
+
+#include "drive/drive_tick.h"
+
+static const drive_params_t params = DRIVE_PARAMS_INIT;
+static drive_t drive;
+static drive_samples_t samples;
+static drive_output_t out;
+
+/** Converter result that the drive measures as exactly this current (gain -1 and no offset). */
+static inline int16_t rig_raw_current(int16_t current_q13)
+{
+    return (int16_t)(-4 * current_q13);
+}
+
+/** Converter result of a bus voltage. */
+static inline int16_t rig_raw_bus(float bus_v)
+{
+    return (int16_t)(bus_v / PARAM_F(BUS_FULL_SCALE_V) * 65536.0F - 32767.5F);
+}
+
+static inline void rig_bus(float bus_v)
+{
+    samples.v_bus = rig_raw_bus(bus_v);
+}
+
+static inline void rig_currents(int16_t a_q13, int16_t b_q13)
+{
+    samples.i_a = rig_raw_current(a_q13);
+    samples.i_b = rig_raw_current(b_q13);
+}
+
+/** Periods with the present samples. */
+static inline void rig_tick(uint16_t periods)
+{
+    while (periods-- != 0u) {
+        out = drive_tick(&drive, &params, &samples);
+    }
+}
+
+/** Periods until the state is reached, at most `most`. @return how many it took, or most + 1 */
+static inline uint16_t rig_tick_until(drive_state_t state, uint16_t most)
+{
+    uint16_t periods = 0;
+    while (drive.state != (uint16_t)state && periods <= most) {
+        rig_tick(1);
+        periods++;
+    }
+    return periods;
+}
+
+/** Power-up with zero current and nominal bus. */
+static inline void rig_power_up(void)
+{
+    rig_currents(0, 0);
+    rig_bus(PARAM_F(NOMINAL_BUS_V));
+    samples.pot = 0;
+    drive_init(&drive, &params);
+}
+
+/** Power-up and calibration: the drive is STOPPED. */
+static inline void rig_ready(void)
+{
+    rig_power_up();
+    rig_tick(1u << DRIVE_CALIBRATION_LOG2);
+}
+
+/** Ready, then started; the next tick is the first of BOOTSTRAP. */
+static inline void rig_start(int16_t direction)
+{
+    rig_ready();
+    drive_start(&drive, &params, direction);
+}
+
+/** Started, with the first period of LOCK done. */
+static inline void rig_lock(int16_t direction)
+{
+    rig_start(direction);
+    (void)rig_tick_until(DRIVE_LOCK, params.bootstrap_periods + 2u);
+}
+
+/** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
+static inline void rig_closed(int16_t direction, int16_t speed_erpm)
+{
+    rig_start(direction);
+    rig_tick(1);
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    drive.command.target_erpm = speed_erpm;
+    drive.control.reference_erpm = speed_erpm;
+    drive.control.ref_q13.q = 0;
+    drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    drive.estimator.omega_erpm = speed_erpm;
+}
+
+/** Counter of the slow steps brought to a value, so that the next tick runs the block of `slot`. */
+static inline void rig_next_slot(uint16_t slot)
+{
+    drive.ticks = (uint16_t)((drive.ticks & ~7u) + slot - 1u);
+}
+
+#endif
