@@ -20,87 +20,87 @@
         return (expression); \
     }
 
-SIGNAL(state, (double)d->state)
-SIGNAL(fault, (double)d->fault)
-SIGNAL(running, (double)drive_is_running(d))
-SIGNAL(calibrated, (double)d->calibrated)
-SIGNAL(theta_est, ANGLE_DEG(estimator_next_angle(&d->estimator)) - (double)d->estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
-SIGNAL(theta_ctrl, ANGLE_DEG(d->angle))
-SIGNAL(speed_est, SPEED_RPM(estimator_speed(&d->estimator)))
-SIGNAL(speed_raw, SPEED_RPM(d->estimator.omega_erpm))
-SIGNAL(speed_ref, SPEED_RPM(d->control.reference_erpm))
-SIGNAL(speed_target, SPEED_RPM(d->command.target_erpm))
-SIGNAL(i_a, CURRENT_A(d->i_a_q13))
-SIGNAL(i_b, CURRENT_A(d->i_b_q13))
-SIGNAL(i_d, CURRENT_A(d->control.i_q13.d))
-SIGNAL(i_q, CURRENT_A(d->control.i_q13.q))
-SIGNAL(id_ref, CURRENT_A(d->control.ref_q13.d))
-SIGNAL(iq_ref, CURRENT_A(d->control.ref_q13.q))
-SIGNAL(iq_limit, CURRENT_A(d->control.iq_limit_q13))
-SIGNAL(id_trim, CURRENT_A(d->fieldweak.trim_q13))
-SIGNAL(brake_limit, CURRENT_A(d->control.brake_limit_q13))
-SIGNAL(v_d, VOLTAGE_V(d->control.v_q14.d))
-SIGNAL(v_q, VOLTAGE_V(d->control.v_q14.q))
-SIGNAL(v_limit, VOLTAGE_V(d->circle.limit_q14))
-SIGNAL(vq_limit, VOLTAGE_V(d->control.vq_limit_q14))
-SIGNAL(bus, BUS_V(qm_hi(d->bus_q31)))
-SIGNAL(fw_index, (double)d->fieldweak.index)
-SIGNAL(inv_kphi, (double)d->tuning.inv_kfi)
-SIGNAL(ls_ratio, (double)d->tuning.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0)
-SIGNAL(offset, ANGLE_DEG(d->control.handover_offset))
-SIGNAL(e_d, EMF_V(estimator_emf(&d->estimator).d))
-SIGNAL(e_q, EMF_V(estimator_emf(&d->estimator).q))
-SIGNAL(offset_a, CURRENT_A(d->offset_a_q13))
-SIGNAL(offset_b, CURRENT_A(d->offset_b_q13))
+SIGNAL(read_state, (double)d->state)
+SIGNAL(read_fault, (double)d->fault)
+SIGNAL(read_running, (double)drive_is_running(d))
+SIGNAL(read_calibrated, (double)d->calibrated)
+SIGNAL(read_theta_est, ANGLE_DEG(estimator_next_angle(&d->estimator)) - (double)d->estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
+SIGNAL(read_theta_ctrl, ANGLE_DEG(d->angle))
+SIGNAL(read_speed_est, SPEED_RPM(estimator_speed(&d->estimator)))
+SIGNAL(read_speed_raw, SPEED_RPM(d->estimator.omega_erpm))
+SIGNAL(read_speed_ref, SPEED_RPM(d->control.reference_erpm))
+SIGNAL(read_speed_target, SPEED_RPM(d->command.target_erpm))
+SIGNAL(read_i_a, CURRENT_A(d->i_a_q13))
+SIGNAL(read_i_b, CURRENT_A(d->i_b_q13))
+SIGNAL(read_i_d, CURRENT_A(d->control.i_q13.d))
+SIGNAL(read_i_q, CURRENT_A(d->control.i_q13.q))
+SIGNAL(read_id_ref, CURRENT_A(d->control.ref_q13.d))
+SIGNAL(read_iq_ref, CURRENT_A(d->control.ref_q13.q))
+SIGNAL(read_iq_limit, CURRENT_A(d->control.iq_limit_q13))
+SIGNAL(read_id_trim, CURRENT_A(d->fieldweak.trim_q13))
+SIGNAL(read_brake_limit, CURRENT_A(d->control.brake_limit_q13))
+SIGNAL(read_v_d, VOLTAGE_V(d->control.v_q14.d))
+SIGNAL(read_v_q, VOLTAGE_V(d->control.v_q14.q))
+SIGNAL(read_v_limit, VOLTAGE_V(d->circle.limit_q14))
+SIGNAL(read_vq_limit, VOLTAGE_V(d->control.vq_limit_q14))
+SIGNAL(read_bus, BUS_V(qm_hi(d->bus_q31)))
+SIGNAL(read_fw_index, (double)d->fieldweak.index)
+SIGNAL(read_inv_kphi, (double)d->tuning.inv_kfi)
+SIGNAL(read_ls_ratio, (double)d->tuning.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0)
+SIGNAL(read_offset, ANGLE_DEG(d->control.handover_offset))
+SIGNAL(read_e_d, EMF_V(estimator_emf(&d->estimator).d))
+SIGNAL(read_e_q, EMF_V(estimator_emf(&d->estimator).q))
+SIGNAL(read_offset_a, CURRENT_A(d->offset_a_q13))
+SIGNAL(read_offset_b, CURRENT_A(d->offset_b_q13))
 #ifdef SNAPSHOT
-SIGNAL(snap_done, ((void)d, (double)SnapDone))
-SIGNAL(snap_rows, ((void)d, (double)board_snapshot.row))
-SIGNAL(snap1_last, ((void)d, (double)SnapBuf1[DATA_BUFFER_SIZE - 1]))
-SIGNAL(snap2_last, ((void)d, (double)SnapBuf2[DATA_BUFFER_SIZE - 1]))
-SIGNAL(snap3_last, ((void)d, (double)SnapBuf3[DATA_BUFFER_SIZE - 1]))
-SIGNAL(snap4_last, ((void)d, (double)SnapBuf4[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap_done, ((void)d, (double)SnapDone))
+SIGNAL(read_snap_rows, ((void)d, (double)board_snapshot.row))
+SIGNAL(read_snap1_last, ((void)d, (double)SnapBuf1[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap2_last, ((void)d, (double)SnapBuf2[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap3_last, ((void)d, (double)SnapBuf3[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap4_last, ((void)d, (double)SnapBuf4[DATA_BUFFER_SIZE - 1]))
 #endif
 
 const probe_signal_t probe_signals[] = {
-    { "fw.state", "", "drive state (drive_state_t)", state },
-    { "fw.fault", "", "fault code (drive_fault_t)", fault },
-    { "fw.run", "", "1 while the bridge switches", running },
-    { "fw.calibrated", "", "1 after the offset calibration", calibrated },
-    { "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", theta_est },
-    { "fw.theta_ctrl_deg", "deg", "control angle of the next sample", theta_ctrl },
-    { "fw.speed_est_rpm", "rpm", "filtered estimated speed", speed_est },
-    { "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", speed_raw },
-    { "fw.speed_ref_rpm", "rpm", "ramped speed reference", speed_ref },
-    { "fw.speed_target_rpm", "rpm", "speed target", speed_target },
-    { "fw.i_a_a", "A", "measured current of phase A", i_a },
-    { "fw.i_b_a", "A", "measured current of phase B", i_b },
-    { "fw.i_d_a", "A", "measured d current", i_d },
-    { "fw.i_q_a", "A", "measured q current", i_q },
-    { "fw.id_ref_a", "A", "d current reference", id_ref },
-    { "fw.iq_ref_a", "A", "q current reference", iq_ref },
-    { "fw.iq_limit_a", "A", "q current limit", iq_limit },
-    { "fw.id_trim_a", "A", "d current of the voltage feedback", id_trim },
-    { "fw.brake_limit_a", "A", "limit of the braking current", brake_limit },
-    { "fw.v_d_v", "V", "commanded d voltage", v_d },
-    { "fw.v_q_v", "V", "commanded q voltage", v_q },
-    { "fw.v_limit_v", "V", "radius of the voltage circle", v_limit },
-    { "fw.vq_limit_v", "V", "q voltage limit", vq_limit },
-    { "fw.bus_v", "V", "filtered bus voltage", bus },
-    { "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", fw_index },
-    { "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", inv_kphi },
-    { "fw.ls_ratio", "", "Ls/(2 Ls0) in use", ls_ratio },
-    { "fw.offset_deg", "deg", "hand-over angle offset that is left", offset },
-    { "fw.e_d_v", "V", "filtered d back-EMF", e_d },
-    { "fw.e_q_v", "V", "filtered q back-EMF", e_q },
-    { "fw.offset_a_a", "A", "calibrated offset of phase A", offset_a },
-    { "fw.offset_b_a", "A", "calibrated offset of phase B", offset_b },
+    { "fw.state", "", "drive state (drive_state_t)", read_state },
+    { "fw.fault", "", "fault code (drive_fault_t)", read_fault },
+    { "fw.run", "", "1 while the bridge switches", read_running },
+    { "fw.calibrated", "", "1 after the offset calibration", read_calibrated },
+    { "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", read_theta_est },
+    { "fw.theta_ctrl_deg", "deg", "control angle of the next sample", read_theta_ctrl },
+    { "fw.speed_est_rpm", "rpm", "filtered estimated speed", read_speed_est },
+    { "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", read_speed_raw },
+    { "fw.speed_ref_rpm", "rpm", "ramped speed reference", read_speed_ref },
+    { "fw.speed_target_rpm", "rpm", "speed target", read_speed_target },
+    { "fw.i_a_a", "A", "measured current of phase A", read_i_a },
+    { "fw.i_b_a", "A", "measured current of phase B", read_i_b },
+    { "fw.i_d_a", "A", "measured d current", read_i_d },
+    { "fw.i_q_a", "A", "measured q current", read_i_q },
+    { "fw.id_ref_a", "A", "d current reference", read_id_ref },
+    { "fw.iq_ref_a", "A", "q current reference", read_iq_ref },
+    { "fw.iq_limit_a", "A", "q current limit", read_iq_limit },
+    { "fw.id_trim_a", "A", "d current of the voltage feedback", read_id_trim },
+    { "fw.brake_limit_a", "A", "limit of the braking current", read_brake_limit },
+    { "fw.v_d_v", "V", "commanded d voltage", read_v_d },
+    { "fw.v_q_v", "V", "commanded q voltage", read_v_q },
+    { "fw.v_limit_v", "V", "radius of the voltage circle", read_v_limit },
+    { "fw.vq_limit_v", "V", "q voltage limit", read_vq_limit },
+    { "fw.bus_v", "V", "filtered bus voltage", read_bus },
+    { "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", read_fw_index },
+    { "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", read_inv_kphi },
+    { "fw.ls_ratio", "", "Ls/(2 Ls0) in use", read_ls_ratio },
+    { "fw.offset_deg", "deg", "hand-over angle offset that is left", read_offset },
+    { "fw.e_d_v", "V", "filtered d back-EMF", read_e_d },
+    { "fw.e_q_v", "V", "filtered q back-EMF", read_e_q },
+    { "fw.offset_a_a", "A", "calibrated offset of phase A", read_offset_a },
+    { "fw.offset_b_a", "A", "calibrated offset of phase B", read_offset_b },
 #ifdef SNAPSHOT
-    { "fw.snap_done", "", "SnapDone", snap_done },
-    { "fw.snap_rows", "rows", "rows recorded so far", snap_rows },
-    { "fw.snap1_last", "Q15", "last row of SnapBuf1, phase current a", snap1_last },
-    { "fw.snap2_last", "Q15", "last row of SnapBuf2, q current", snap2_last },
-    { "fw.snap3_last", "erpm", "last row of SnapBuf3, speed", snap3_last },
-    { "fw.snap4_last", "1/65536 turn", "last row of SnapBuf4, angle", snap4_last },
+    { "fw.snap_done", "", "SnapDone", read_snap_done },
+    { "fw.snap_rows", "rows", "rows recorded so far", read_snap_rows },
+    { "fw.snap1_last", "Q15", "last row of SnapBuf1, phase current a", read_snap1_last },
+    { "fw.snap2_last", "Q15", "last row of SnapBuf2, q current", read_snap2_last },
+    { "fw.snap3_last", "erpm", "last row of SnapBuf3, speed", read_snap3_last },
+    { "fw.snap4_last", "1/65536 turn", "last row of SnapBuf4, angle", read_snap4_last },
 #endif
 };
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];

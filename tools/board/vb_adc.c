@@ -49,7 +49,7 @@ static double shunt_current(const vb_t *vb, unsigned leg, bool *valid)
 {
     const vb_inverter_t *inv = &vb->inverter;
     double age_s = vb->start_s + vb->now_s - inv->low_since_s[leg];
-    double part = vb->adc.settle_s > 0.0 ? fmin(1.0, age_s / vb->adc.settle_s) : 1.0;
+    double part = vb->adc.settle_s > 0.0 ? vb_min(1.0, age_s / vb->adc.settle_s) : 1.0;
     if (!inv->low_path[leg]) {
         part = 1.0 - part;
     }
@@ -112,7 +112,7 @@ static uint16_t convert(vb_t *vb, unsigned input)
     unsigned bits = adc->twelve_bit ? 12u : 10u;
     double full = (double)(1u << bits);
     double lsb = input_voltage(vb, input) * (full / REFERENCE_V) * (1.0 + adc->gain_error) + adc->noise_lsb * noise(adc);
-    double limited = fmin(fmax(floor(lsb + 0.5), 0.0), full - 1.0);
+    double limited = vb_min(vb_max(floor(lsb + 0.5), 0.0), full - 1.0);
     if (input < 2) {
         adc->reading_a[input] = (adc->offset_v - limited * (REFERENCE_V / full)) / adc->gain_v_per_a;
     }
@@ -244,7 +244,7 @@ static void deliver(vb_t *vb, const uint16_t *result, unsigned count)
     if (++adc->sequence >= adc->sequence_length) {
         adc->sequence = 0;
         adc->fill = 0;
-        adc->handler_s = fmax(adc->conversion_end_s, vb->now_s) + vb->isr_us * 1e-6;
+        adc->handler_s = vb_max(adc->conversion_end_s, vb->now_s) + vb->isr_us * 1e-6;
     }
 }
 
@@ -326,8 +326,8 @@ double vb_adc_next_trigger(const vb_t *vb, double after_s)
         return vb->pwm.trigger_s > after_s ? vb->pwm.trigger_s : VB_NEVER;
     }
     if (ssrc == SSRC_AUTO) {
-        double sample_s = fmax(1.0, (double)((*vb->reg.ad1con3 >> 8) & 0x1Fu)) * adc->tad_s;
-        return fmax(fmax(adc->conversion_end_s, 0.0) + sample_s, after_s);
+        double sample_s = vb_max(1.0, (double)((*vb->reg.ad1con3 >> 8) & 0x1Fu)) * adc->tad_s;
+        return vb_max(vb_max(adc->conversion_end_s, 0.0) + sample_s, after_s);
     }
     return VB_NEVER;
 }
@@ -336,7 +336,7 @@ void vb_adc_end(vb_t *vb)
 {
     vb_adc_t *adc = &vb->adc;
     double period_s = vb->now_s;
-    adc->conversion_end_s = fmax(adc->conversion_end_s - period_s, -1.0);
+    adc->conversion_end_s = vb_max(adc->conversion_end_s - period_s, -1.0);
     if (adc->handler_s < VB_NEVER) {
         adc->handler_s -= period_s;
     }

@@ -66,6 +66,11 @@ typedef struct {
 typedef enum { VB_GATE_OFF = 0, VB_GATE_LOW = 1, VB_GATE_HIGH = 2, VB_GATE_BOTH = 3 } vb_gate_t;
 typedef enum { VB_COND_FLOAT, VB_COND_LOW, VB_COND_HIGH, VB_COND_DIODE_LOW, VB_COND_DIODE_HIGH, VB_COND_SHOOT } vb_cond_t;
 
+/* A leg: terminal voltage = share * bus + fixed - ohm * i; it takes from_bus * i + shoot * bus from the bus. */
+typedef struct {
+    double share, fixed_v, ohm, from_bus, shoot_s;
+} vb_leg_equation_t;
+
 typedef struct {
     double rds_on_ohm, diode_v, diode_ohm, turn_on_s, turn_off_s, trip_a, open_phase;
     double shunt_ohm;
@@ -75,8 +80,8 @@ typedef struct {
     double low_since_s[3];   /* when low_path last changed, absolute time */
     double i[3];             /* phase currents, into the motor */
     double v[3];             /* terminal voltages of the last segment, against bus minus */
-    double bus_a;            /* present current from the bus into the bridge */
-    double bus_as;           /* its integral over this period */
+    vb_leg_equation_t equation[3]; /* what cond[] means for voltages and the bus */
+    double bus_as;           /* integral over this period of the current from the bus into the bridge */
     double max_step_s;       /* upper bound of an integration step */
     unsigned off_mask, float_mask; /* legs (bit k) with both transistors off, and those of them that carry nothing */
     unsigned open_mask;      /* the open phase, as a mask, that the conduction states stand for */
@@ -243,14 +248,38 @@ struct vb {
     bool stuck_in_isr;
     char error[VB_TEXT];
     char warning[VB_WARNINGS][VB_TEXT];
+    const char *warning_format[VB_WARNINGS];
     unsigned warnings;
 };
 
+static inline double vb_min(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static inline double vb_max(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/* `x` brought into 0..range; it is at most a few ranges away. */
+static inline double vb_wrap(double x, double range)
+{
+    while (x >= range) {
+        x -= range;
+    }
+    while (x < 0.0) {
+        x += range;
+    }
+    return x;
+}
+
 /* vboard.c */
 int vb_fail(vb_t *vb, const char *format, ...) __attribute__((format(printf, 2, 3)));
-/* Note a configuration problem once: texts with the same first `key_length` characters (up to the first ':' and the word after) are one. */
+/* Note a configuration problem once: the format string identifies the problem together with the register's name in the text. */
 void vb_warn(vb_t *vb, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void vb_latch(vb_t *vb);
+void vb_stat_reset(vb_t *vb);
 
 /* vb_keys.c */
 void vb_keys_defaults(vb_t *vb);
@@ -268,11 +297,9 @@ double vb_clock_fcy_hz(vb_t *vb);
 
 /* vb_motor.c */
 void vb_motor_prepare(vb_motor_t *m);
-void vb_motor_step(vb_motor_t *m, double v_alpha, double v_beta, double h_s);
 void vb_motor_turn(vb_motor_t *m, double h_s);
 double vb_motor_float_voltage(const vb_motor_t *m, const double v[3], unsigned leg);
 void vb_motor_set_alpha_beta(vb_motor_t *m, double i_alpha, double i_beta);
-void vb_motor_phase_currents(const vb_motor_t *m, double i[3]);
 void vb_motor_emf(const vb_motor_t *m, double e[3]);
 double vb_motor_torque(const vb_motor_t *m);
 void vb_motor_mechanics(vb_motor_t *m, double h_s);
@@ -280,7 +307,7 @@ void vb_motor_mechanics(vb_motor_t *m, double h_s);
 /* vb_inverter.c */
 void vb_inverter_reset(vb_t *vb);
 void vb_inverter_gate(vb_t *vb, unsigned leg, vb_gate_t gate);
-void vb_inverter_run(vb_t *vb, double h_s);
+bool vb_inverter_run(vb_t *vb, double until_s, double trip_a);
 double vb_inverter_bus_a(const vb_t *vb);
 void vb_inverter_prepare(vb_t *vb);
 

@@ -20,13 +20,13 @@ enum {
     TCS = 0x0002
 };
 
-static volatile uint16_t *const *ports_of(const vb_t *vb, volatile uint16_t *set[3], int what)
+/* Registers of the three ports: what = 0 PORTx, 1 LATx, 2 TRISx. */
+static void ports_of(const vb_t *vb, volatile uint16_t *set[3], int what)
 {
     const vb_regs_t *r = &vb->reg;
     set[0] = what == 0 ? r->porta : what == 1 ? r->lata : r->trisa;
     set[1] = what == 0 ? r->portb : what == 1 ? r->latb : r->trisb;
     set[2] = what == 0 ? r->portc : what == 1 ? r->latc : r->trisc;
-    return set;
 }
 
 /* Levels that the board's circuits give to the pins when these are inputs; everything else is pulled up. */
@@ -240,7 +240,7 @@ static void step_receiver(vb_t *vb, double h_s)
     if (u->rx_busy_s < needed_s) {
         return;
     }
-    u->rx_busy_s = fmin(u->rx_busy_s - needed_s, needed_s);
+    u->rx_busy_s = vb_min(u->rx_busy_s - needed_s, needed_s);
     *vb->reg.u1rxreg = (uint16_t)(uint8_t)u->rx[u->rx_head];
     *vb->reg.u1sta = (uint16_t)(*vb->reg.u1sta | URXDA);
     u->rx_head = (u->rx_head + 1u) % VB_UART_RX;

@@ -4,13 +4,12 @@
  *   Ld did/dt = vd - R id + w Lq iq,   Lq diq/dt = vq - R iq - w (Ld id + psi),   T = 3/2 P (psi + (Ld - Lq) id) iq
  */
 #include "vb_internal.h"
+#include "vb_motor_step.h"
 
 #include <math.h>
 
-#define SQRT3 1.7320508075688772
-
 static const double axis_cos[3] = {1.0, -0.5, -0.5};
-static const double axis_sin[3] = {0.0, 0.5 * SQRT3, -0.5 * SQRT3};
+static const double axis_sin[3] = {0.0, 0.5 * VB_SQRT3, -0.5 * VB_SQRT3};
 
 /* Effective R, psi and L of the coming period. Saturation is slow compared with a period: L follows the current once per period. */
 void vb_motor_prepare(vb_motor_t *m)
@@ -21,53 +20,20 @@ void vb_motor_prepare(vb_motor_t *m)
     }
     m->derived_stale = false;
     double above_25 = m->temp_c - 25.0;
-    m->r = m->rs_ohm * fmax(0.0, 1.0 + m->r_tempco * above_25);
-    m->psi = m->psi_vs * fmax(0.0, 1.0 + m->psi_tempco * above_25);
-    double depth = fmin(1.0, (m->id * m->id + m->iq * m->iq) / (m->sat_current_a * m->sat_current_a));
+    m->r = m->rs_ohm * vb_max(0.0, 1.0 + m->r_tempco * above_25);
+    m->psi = m->psi_vs * vb_max(0.0, 1.0 + m->psi_tempco * above_25);
+    double depth = vb_min(1.0, (m->id * m->id + m->iq * m->iq) / (m->sat_current_a * m->sat_current_a));
     m->ld = m->ld_h * (1.0 - m->sat_ld_ratio * depth);
     m->lq = m->lq_h * (1.0 - m->sat_lq_ratio * depth);
     m->inv_ld = 1.0 / m->ld;
     m->inv_lq = 1.0 / m->lq;
 }
 
-/* Rotate the frame by w h; fifth-order in the step angle, which stays below 0.2 rad. */
-static inline void rotation(double angle, double *c, double *s)
-{
-    double x2 = angle * angle;
-    *c = 1.0 - x2 * (0.5 - x2 * (1.0 / 24.0));
-    *s = angle * (1.0 - x2 * ((1.0 / 6.0) - x2 * (1.0 / 120.0)));
-}
-
-/* One stretch of constant terminal voltage: midpoint rule for the currents, voltage seen from the rotor's middle position. */
-void vb_motor_step(vb_motor_t *m, double v_alpha, double v_beta, double h_s)
-{
-    double rc, rs;
-    rotation(0.5 * h_s * m->omega, &rc, &rs);
-    double c = m->c * rc - m->s * rs;
-    double s = m->s * rc + m->c * rs;
-    double vd = v_alpha * c + v_beta * s;
-    double vq = v_beta * c - v_alpha * s;
-    m->c = c * rc - s * rs;
-    m->s = s * rc + c * rs;
-
-    double half = 0.5 * h_s;
-    double w = m->omega;
-    double id = m->id + half * m->inv_ld * (vd - m->r * m->id + w * m->lq * m->iq);
-    double iq = m->iq + half * m->inv_lq * (vq - m->r * m->iq - w * (m->ld * m->id + m->psi));
-    m->id += h_s * m->inv_ld * (vd - m->r * id + w * m->lq * iq);
-    m->iq += h_s * m->inv_lq * (vq - m->r * iq - w * (m->ld * id + m->psi));
-
-    m->torque_nms += h_s * 1.5 * m->pole_pairs * (m->psi + (m->ld - m->lq) * id) * iq;
-    m->copper_j += h_s * 1.5 * m->r * (id * id + iq * iq);
-    m->vd_vs += h_s * vd;
-    m->vq_vs += h_s * vq;
-}
-
 /* The rotor turns without any current. The terminals carry the back-EMF. */
 void vb_motor_turn(vb_motor_t *m, double h_s)
 {
     double rc, rs;
-    rotation(h_s * m->omega, &rc, &rs);
+    vb_rotation(h_s * m->omega, &rc, &rs);
     double c = m->c * rc - m->s * rs;
     m->s = m->s * rc + m->c * rs;
     m->c = c;
@@ -104,21 +70,12 @@ void vb_motor_set_alpha_beta(vb_motor_t *m, double i_alpha, double i_beta)
     m->iq = i_beta * m->c - i_alpha * m->s;
 }
 
-void vb_motor_phase_currents(const vb_motor_t *m, double i[3])
-{
-    double i_alpha = m->id * m->c - m->iq * m->s;
-    double i_beta = m->id * m->s + m->iq * m->c;
-    i[0] = i_alpha;
-    i[1] = -0.5 * i_alpha + (0.5 * SQRT3) * i_beta;
-    i[2] = -i[0] - i[1];
-}
-
 /* Phase voltages of the open winding. */
 void vb_motor_emf(const vb_motor_t *m, double e[3])
 {
     double amplitude = m->psi * m->omega;
     e[0] = -amplitude * m->s;
-    e[1] = amplitude * (0.5 * m->s + (0.5 * SQRT3) * m->c);
+    e[1] = amplitude * (0.5 * m->s + (0.5 * VB_SQRT3) * m->c);
     e[2] = -e[0] - e[1];
 }
 
@@ -135,7 +92,7 @@ static double next_speed(const vb_motor_t *m, double speed, double torque, doubl
     double dry = m->coulomb_nm + m->load_constant_nm;
     double direction = speed;
     if (speed == 0.0) {
-        double hold = fmax(m->stiction_nm, m->coulomb_nm) + m->load_constant_nm;
+        double hold = vb_max(m->stiction_nm, m->coulomb_nm) + m->load_constant_nm;
         if (fabs(drive) <= hold) {
             return 0.0;
         }
@@ -153,10 +110,7 @@ void vb_motor_mechanics(vb_motor_t *m, double h_s)
     m->vd_v = m->vd_vs / h_s;
     m->vq_v = m->vq_vs / h_s;
     m->copper_w = m->copper_j / h_s;
-    m->theta = fmod(m->theta + m->omega * h_s, 2.0 * VB_PI);
-    if (m->theta < 0.0) {
-        m->theta += 2.0 * VB_PI;
-    }
+    m->theta = vb_wrap(m->theta + m->omega * h_s, 2.0 * VB_PI);
     m->c = cos(m->theta);
     m->s = sin(m->theta);
     double speed = m->omega / m->pole_pairs;

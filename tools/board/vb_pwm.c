@@ -65,10 +65,10 @@ static double next_edge(const vb_leg_t *leg, double turn_on_s, double turn_off_s
         return on_s;
     }
     if (s->stage == 1) {
-        return fmax(on_s, off_s);
+        return vb_max(on_s, off_s);
     }
     *gate = off_s <= on_s ? VB_GATE_OFF : VB_GATE_BOTH;
-    return fmin(on_s, off_s);
+    return vb_min(on_s, off_s);
 }
 
 /* Emit the edges before `until_s`. */
@@ -117,10 +117,10 @@ static void decode_duty(vb_pwm_t *pwm)
         double high_s = 0.5 * pwm->tick_s * (double)pwm->duty[k];
         leg->idle = !pwm->running;
         if (pwm->centre) {
-            leg->a_s = fmin(high_s, 0.5 * pwm->period_s);
+            leg->a_s = vb_min(high_s, 0.5 * pwm->period_s);
             leg->b_s = pwm->period_s - leg->a_s;
         } else {
-            leg->a_s = fmin(high_s, pwm->period_s);
+            leg->a_s = vb_min(high_s, pwm->period_s);
             leg->b_s = pwm->period_s;
         }
     }
@@ -169,7 +169,7 @@ static void warn_settings(vb_t *vb)
         vb_warn(vb, "P1FLTACON: FAOVx keeps outputs driven during a fault");
     }
     for (unsigned k = 0; k < 3; k++) {
-        double dead_s = fmin(pwm->leg[k].dead_low_s, pwm->leg[k].dead_high_s);
+        double dead_s = vb_min(pwm->leg[k].dead_low_s, pwm->leg[k].dead_high_s);
         double margin_s = dead_s + vb->inverter.turn_on_s - vb->inverter.turn_off_s;
         if (!pwm->leg[k].independent && (dead_s <= 0.0 || margin_s < 0.0)) {
             vb_warn(vb, "P1DTCON1: a dead time of %.2f us lets both transistors of a leg conduct at once", dead_s * 1e6);

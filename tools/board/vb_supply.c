@@ -1,7 +1,6 @@
 /* The DC bus: a capacitor, what the bridge and the board draw from it, and a supply that gives but (by default) does not take. */
 #include "vb_internal.h"
 
-#include <math.h>
 
 /* One period: implicit in the supply's resistance, so that a small R*C does not limit the step. `bridge_as` is the charge that the bridge
  * took; negative while the motor regenerates. */
@@ -13,10 +12,10 @@ void vb_supply_step(vb_supply_t *s, double bridge_as, double h_s)
     if (v > s->voltage_v && s->sinks == 0.0) {
         v = s->bus_v - per_farad * drawn;
         if (s->bus_v < s->voltage_v) {
-            v = fmax(v, s->voltage_v);
+            v = vb_max(v, s->voltage_v);
         }
     }
-    v = fmax(v, 0.0);
+    v = vb_max(v, 0.0);
     s->supply_a = (v - s->bus_v) / per_farad + drawn;
     s->bus_a = bridge_as / h_s;
     s->bus_v = v;

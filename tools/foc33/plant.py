@@ -83,11 +83,14 @@ def _read_part(kind: str, name: str, folder: Path, tables: tuple[str, ...], need
 
 def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:
     """Refuse a key that the board does not have, or a value that it would refuse."""
-    if key not in keys or not keys[key].writable:
+    if key.startswith("reg."):
+        info = Key(key, "", "", 0.0, 65535.0, True, True)
+    elif key in keys and keys[key].writable:
+        info = keys[key]
+    else:
         writable = [name for name, info in keys.items() if info.writable]
         what = f"'{key}' can only be read" if key in keys else f"unknown key '{key}'"
         raise UserError(what, where, suggestion(key, writable))
-    info = keys[key]
     if not info.minimum <= value <= info.maximum:
         unit = f" {info.unit}" if info.unit else ""
         raise UserError(f"'{key}' = {value:g} is impossible", where, f"choose {info.minimum:g} .. {info.maximum:g}{unit}")

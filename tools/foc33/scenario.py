@@ -41,7 +41,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from . import places
-from .errors import UserError
 from .expect import Expectation, read_expectation
 from .plant import Values
 from .toml_file import Document, Section
@@ -92,6 +91,7 @@ class Scenario:
     events: list[Event] = field(default_factory=list)
     measures: list[Measure] = field(default_factory=list)
     expectations: list[Expectation] = field(default_factory=list)
+    expectations_where: list[str] = field(default_factory=list)
     motor_where: str = ""
     board_where: str = ""
 
@@ -115,7 +115,9 @@ def read(document: Document) -> Scenario:
     scenario.events.sort(key=lambda event: event.at_s)
     _read_measures(root.sections("measure"), scenario)
     names = {measure.name for measure in scenario.measures}
-    scenario.expectations = [read_expectation(section, names, scenario.duration_s) for section in root.sections("expect")]
+    for section in root.sections("expect"):
+        scenario.expectations.append(read_expectation(section, names, scenario.duration_s))
+        scenario.expectations_where.append(section.where("kind"))
     root.close()
     return scenario
 
@@ -185,13 +187,3 @@ def _read_measures(sections: list[Section], scenario: Scenario) -> None:
         if any(measure.name == name for measure in scenario.measures):
             raise section.fail("name", f"two measures are called '{name}'", "rename one")
         scenario.measures.append(Measure(name, from_s, to_s, reference))
-
-
-def check_events(scenario: Scenario, check_key) -> None:
-    """Hand every key that an event sets to `check_key(key, value, where)`."""
-    for event in scenario.events:
-        for key, value in event.keys.items():
-            check_key(key, value, event.where)
-
-
-__all__ = ["Event", "Measure", "Scenario", "UserError", "check_events", "load", "read"]

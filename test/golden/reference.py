@@ -1,0 +1,606 @@
+"""Reference of the control law: float64 for the mathematics, exact integers for the target's word lengths and rounding.
+
+Every block comes twice. The function named `..._real` is the equation itself in float64. The one without is the same
+equation in integers, with the formats that the headers of include/control document: a product is exact, its "upper word"
+is floor(product / 65536), and every intermediate result is checked against the word it has to fit. Nothing wraps, except
+where a format says so (angles). Equation numbers are AN1292's in their corrected form, see docs/architecture.md.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+SQRT3 = math.sqrt(3.0)
+WORD = 65536
+
+
+# ---- words, products, rounding --------------------------------------------------------------------------------------
+
+def s16(x):
+    """x, which must fit a signed word."""
+    if not -32768 <= x <= 32767:
+        raise OverflowError(f"{x} does not fit int16")
+    return x
+
+
+def u16(x):
+    """x, which must fit an unsigned word."""
+    if not 0 <= x <= 65535:
+        raise OverflowError(f"{x} does not fit uint16")
+    return x
+
+
+def s32(x):
+    """x, which must fit a signed double word."""
+    if not -(1 << 31) <= x < (1 << 31):
+        raise OverflowError(f"{x} does not fit int32")
+    return x
+
+
+def wrap16(x):
+    """x as a signed word, modulo 65536: angles only."""
+    return (x + 32768) % WORD - 32768
+
+
+def upper(x):
+    """Upper word of a double word: rounds toward minus infinity."""
+    return s32(x) // WORD
+
+
+def share(x, factor):
+    """x * factor / 65536 by the upper word of the exact product; either may be an unsigned word."""
+    return s16(x * factor // WORD)
+
+
+def clamp(x, low, high):
+    return max(low, min(high, x))
+
+
+def magnitude(x):
+    """|x| in a signed word: -32768 has no counterpart and gives 32767."""
+    return min(abs(s16(x)), 32767)
+
+
+def nearest(x):
+    """Nearest integer, halves away from zero."""
+    return int(math.floor(abs(x) + 0.5)) * (1 if x >= 0 else -1)
+
+
+def q15(x):
+    """Q15 of a fraction as the note rounds it: positive by 32767, negative by 32768, then half up and truncated."""
+    return int(x * 32768 - 0.5) if x < 0 else int(x * 32767 + 0.5)
+
+
+def polynomial_checksum(values, start=0):
+    """Checksum that a 16-bit target computes cheaply: s = 31 s + low word of the value, modulo 2^32."""
+    s = start
+    for v in values:
+        s = (31 * s + v % WORD) % (1 << 32)
+    return s
+
+
+# ---- Equation 7, the first-order low-pass ---------------------------------------------------------------------------
+
+def lowpass(y_q16, x, k_q16):
+    """y += K (x - y): y has 16 fraction bits, K is Q16; the difference uses the whole counts of y."""
+    return s32(y_q16 + k_q16 * (x - upper(y_q16)))
+
+
+def lowpass_real(y, x, k):
+    return y + k * (x - y)
+
+
+def lowpass_corner_hz(k, sample_hz):
+    """-3 dB frequency of y += K (x - y): |K / (1 - (1-K) z^-1)|^2 = 1/2 solved for the frequency."""
+    a = 1.0 - k
+    return sample_hz / (2 * math.pi) * math.acos((1 + a * a - 2 * k * k) / (2 * a))
+
+
+# ---- sine, cosine, circle -------------------------------------------------------------------------------------------
+
+SINE_STEPS = 128
+SINE_AMPLITUDE = 32757  # interpolation by the derivative overshoots by (pi/128)^2/2 = 0.03 %, ten counts
+CIRCLE_STEPS = 64
+
+
+def sine_table():
+    return [nearest(SINE_AMPLITUDE * math.sin(2 * math.pi * i / SINE_STEPS)) for i in range(SINE_STEPS)]
+
+
+def circle_table():
+    """sqrt(1 - (i/64)^2) with 1 = 32767, rounded down; exact by the integer square root."""
+    n = CIRCLE_STEPS
+    return [math.isqrt(32767 * 32767 * (n * n - i * i) // (n * n)) for i in range(n + 1)]
+
+
+_SINE = sine_table()
+_CIRCLE = circle_table()
+_RADIANS_OF_STEP = nearest(2 * math.pi / SINE_STEPS * WORD)
+
+
+def sincos(angle):
+    """sin(a + x) = sin a + x cos a about the nearest table point a; x in radians * 65536."""
+    step = WORD // SINE_STEPS
+    point = (angle + step // 2) // step
+    rest = angle - point * step  # -256..255 counts
+    x = share(rest * (WORD // step), _RADIANS_OF_STEP)
+    s = _SINE[point % SINE_STEPS]
+    c = _SINE[(point + SINE_STEPS // 4) % SINE_STEPS]
+    return s16(s + share(c, x)), s16(c - share(s, x))
+
+
+def sincos_real(angle):
+    a = 2 * math.pi * angle / WORD
+    return 32767 * math.sin(a), 32767 * math.cos(a)
+
+
+def circle(x):
+    """sqrt(1 - x^2), the chord between two table points."""
+    step = 32768 // CIRCLE_STEPS
+    i, rest = divmod(x, step)
+    return s16(_CIRCLE[i] - (_CIRCLE[i] - _CIRCLE[i + 1]) * rest // step)
+
+
+def circle_real(x):
+    return 32767 * math.sqrt(1 - (x / 32768) ** 2)
+
+
+# ---- transformations ------------------------------------------------------------------------------------------------
+
+_CLARKE_EXCESS = nearest((2 / SQRT3 - 1) * WORD)
+
+
+def clarke(a, b):
+    """alpha = a, beta = (a + 2b)/sqrt(3); the result has twice the counts (Q13 in, Q14 out)."""
+    total = s16(a + 2 * b)
+    return s16(2 * a), s16(total + share(total, _CLARKE_EXCESS))
+
+
+def clarke_real(a, b):
+    return 2.0 * a, 2.0 * (a + 2 * b) / SQRT3
+
+
+def park(alpha, beta, sine, cosine):
+    """d = alpha cos + beta sin, q = beta cos - alpha sin; half the counts, because Q15 times 1/2 is the upper word."""
+    return upper(s32(alpha * cosine) + s32(beta * sine)), upper(s32(beta * cosine) - s32(alpha * sine))
+
+
+def park_real(alpha, beta, a):
+    return (alpha * math.cos(a) + beta * math.sin(a)) / 2, (beta * math.cos(a) - alpha * math.sin(a)) / 2
+
+
+def inverse_park(d, q, sine, cosine):
+    """alpha = d cos - q sin, beta = d sin + q cos; half the counts."""
+    return upper(s32(d * cosine) - s32(q * sine)), upper(s32(d * sine) + s32(q * cosine))
+
+
+def inverse_park_real(d, q, a):
+    return (d * math.cos(a) - q * math.sin(a)) / 2, (d * math.sin(a) + q * math.cos(a)) / 2
+
+
+# ---- the machine: engineering values and what follows from them -----------------------------------------------------
+
+@dataclass(frozen=True)
+class Machine:
+    """Motor, supply and limits; properties are the constants of Equations 5 to 8 in float64."""
+    rs_ohm: float = 2.67
+    ls_h: float = 1.92e-3
+    kphi: float = 7.24              # V peak line to line per 1000 rpm
+    pole_pairs: int = 5
+    bus_v: float = 24.0
+    bus_full_scale_v: float = 52.8
+    period_s: float = 50e-6
+    dead_time_s: float = 2e-6
+    window_s: float = 1.6e-6
+    peak_current_a: float = 4.4     # of 32768 counts
+    maximum_current_a: float = 2.75
+    nominal_rpm: float = 2800.0
+    maximum_rpm: float = 5500.0
+    end_rpm: float = 1000.0
+    kfilter_velestim: int = 748
+
+    @property
+    def u0(self):
+        """Volts per count: the largest phase voltage Vbus/sqrt(3), less the dead time's share."""
+        return self.bus_v / SQRT3 * (1 - self.dead_time_s / self.period_s) / 32768
+
+    @property
+    def i0(self):
+        return self.peak_current_a / 32768
+
+    @property
+    def rs(self):
+        """Equation 5b: Rs I0/U0."""
+        return self.rs_ohm * self.i0 / self.u0
+
+    @property
+    def ls(self):
+        """Equation 5a: Ls/Ts I0/U0."""
+        return self.ls_h / self.period_s * self.i0 / self.u0
+
+    @property
+    def inv_kfi(self):
+        """Equation 6: speed counts (electrical rpm) per voltage count; Kphi is line to line, hence sqrt(3)."""
+        return SQRT3 * 1000 * self.pole_pairs * self.u0 / self.kphi
+
+    @property
+    def turns_per_erpm(self):
+        """Share of a turn that one electrical rpm advances in a period."""
+        return self.period_s / 60
+
+    @property
+    def psi(self):
+        """Flux of the rotor in V s per electrical radian: phase back-EMF per electrical speed."""
+        return self.kphi / SQRT3 / (1000 * 2 * math.pi / 60) / self.pole_pairs
+
+    def current_step(self, rpm, periods=1):
+        """Largest change of a sine of the maximum current in some periods: 2 pi f Ts I; in counts of I0."""
+        frequency = rpm / 60 * self.pole_pairs
+        return 2 * math.pi * frequency * self.period_s * periods * self.maximum_current_a / self.i0
+
+    def exponent(self, x):
+        """Binary exponent that brings x below 65535."""
+        return next(e for e in range(4) if x < 65536 * 2 ** e - 2 ** e)
+
+    def estimator(self):
+        rs, ls = self.rs * 32768, self.ls * 4096
+        rs_exp, ls_exp = self.exponent(rs), self.exponent(1.2 * ls)
+        return {
+            "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
+            "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
+            "d_ilimit_ls_q14": min(nearest(self.current_step(self.nominal_rpm, 8) / 2), 16383),
+            "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
+            "deltat_q32": nearest(self.turns_per_erpm * 2 ** 32),
+            "half_step_q16_rad": nearest(self.turns_per_erpm * math.pi * 2 ** 32),
+            "kfilter_velestim_q16": 2 * self.kfilter_velestim,
+            "nominal_erpm": nearest(self.nominal_rpm * self.pole_pairs),
+            "decimate_erpm": nearest(self.nominal_rpm * self.pole_pairs / 10),
+            "inv_kfi": nearest(self.inv_kfi * 16384),
+        }
+
+    def modulator(self):
+        """Duty counts: 2 per PWM clock of 25 ns, 100 % = period / 25 ns."""
+        clock = 25e-9
+        full = nearest(self.period_s / clock)
+        dead = nearest(self.dead_time_s / clock)
+        return {"full": full, "top": full - 2 * nearest(self.window_s / clock), "dead_time": dead,
+                "knee_q13": 2 * dead, "dead_slope_q16": nearest(WORD / 2)}
+
+    def duty_per_volt_q16(self, bus_v):
+        """Duty counts per Q13 voltage count * 65536 for a measured bus."""
+        return u16(int(self.modulator()["full"] * 4 * self.u0 / bus_v * WORD))
+
+    def circle_radius_q14(self, bus_v):
+        """Radius of the largest circle whose line voltages the window leaves: top/full bus/sqrt(3)."""
+        m = self.modulator()
+        return int(m["top"] / m["full"] * bus_v / SQRT3 / (2 * self.u0))
+
+
+# ---- modulator ------------------------------------------------------------------------------------------------------
+
+_HALF_SQRT3 = nearest(SQRT3 / 2 * WORD)
+
+
+def dead_time(p, i_q13):
+    """What dead time takes from a leg, linear up to the knee."""
+    return share(clamp(i_q13, -p["knee_q13"], p["knee_q13"]), p["dead_slope_q16"])
+
+
+def svm(p, alpha, beta, duty_per_volt, currents):
+    """Phase voltages in duty counts, centred by min-max injection, moved down to leave the window, then dead time."""
+    a = share(alpha, duty_per_volt)
+    t = share(share(beta, duty_per_volt), _HALF_SQRT3)
+    phases = [a, s16(t - a // 2), s16(-t - a // 2)]
+    shift = s16(p["full"] - max(phases) - min(phases)) // 2
+    shift = min(shift, p["top"] - max(phases))
+    legs = [clamp(s16(u + shift), 0, p["top"]) + dead_time(p, i) for u, i in zip(phases, currents)]
+    return [clamp(u, 0, p["full"]) for u in legs]
+
+
+def svm_real(p, alpha, beta, duty_per_volt, currents):
+    k = duty_per_volt / WORD
+    phases = [k * alpha, k * (-alpha + SQRT3 * beta) / 2, k * (-alpha - SQRT3 * beta) / 2]
+    shift = (p["full"] - max(phases) - min(phases)) / 2
+    shift = min(shift, p["top"] - max(phases))
+    knee = p["knee_q13"]
+    legs = [clamp(u + shift, 0, p["top"]) + p["dead_time"] * clamp(i / knee, -1, 1) for u, i in zip(phases, currents)]
+    return [clamp(u, 0, p["full"]) for u in legs]
+
+
+# ---- PI controller --------------------------------------------------------------------------------------------------
+
+@dataclass
+class Pi:
+    """U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out)."""
+    kp: int
+    ki: int
+    kc: int     # Q15
+    shift: int  # U counts = output counts << shift
+    sum: int = 0
+
+    def tick(self, err, limit):
+        """The excess counts in whole steps of 65536, by its magnitude, so that both signs are alike."""
+        u = s32(self.sum + s32(err * self.kp))
+        bound = s32(limit << self.shift)
+        excess = u - clamp(u, -bound, bound)
+        steps = abs(s32(excess)) // WORD * (1 if excess > 0 else -1)
+        out = limit if excess > 0 else -limit if excess < 0 else u // (1 << self.shift)
+        self.sum = s32(self.sum + s32(err * self.ki) - 2 * s32(steps * self.kc))
+        return s16(out)
+
+    def preset(self, err, out):
+        self.sum = s32((out << self.shift) - err * self.kp)
+
+
+@dataclass
+class PiReal:
+    kp: float
+    ki: float
+    kc: float
+    shift: int
+    sum: float = 0.0
+
+    def tick(self, err, limit):
+        u = self.sum + self.kp * err
+        bound = limit * 2.0 ** self.shift
+        out = clamp(u, -bound, bound)
+        self.sum += self.ki * err - self.kc / 32768 * (u - out)
+        return out / 2.0 ** self.shift
+
+    def preset(self, err, out):
+        self.sum = out * 2.0 ** self.shift - err * self.kp
+
+
+# ---- voltage circle and current circle ------------------------------------------------------------------------------
+
+def voltage_circle_reciprocal(radius):
+    return u16(2 ** 29 // max(radius, 8193))
+
+
+def vd_limit(radius):
+    """31/32 of the radius; the 32nd is rounded down."""
+    return radius - radius // 32
+
+
+def vq_limit(radius, vd):
+    """sqrt(radius^2 - vd^2): the ratio in Q13 rounded up, the circle's table, the upper word of twice the product."""
+    ratio = magnitude(vd) * voltage_circle_reciprocal(radius) // WORD + 1
+    return upper(2 * s32(radius * circle(4 * ratio)))
+
+
+def vq_limit_real(radius, vd):
+    return math.sqrt(max(0.0, radius * radius - vd * vd))
+
+
+def iq_limit(maximum, i_d):
+    """sqrt(Imax^2 - Id^2); the ratio |Id|/Imax in Q15 by a reciprocal of 2^25/Imax."""
+    reciprocal = nearest(2 ** 25 / maximum)
+    ratio = min(abs(i_d) * reciprocal // 1024, 32767)
+    return upper(2 * s32(maximum * circle(ratio)))
+
+
+def current_control(pi_d, pi_q, ref, meas, radius):
+    """d first within 31/32 of the circle; q gets what the circle leaves."""
+    vd = pi_d.tick(s16(ref[0] - meas[0]), vd_limit(radius))
+    limit = vq_limit(radius, vd)
+    return vd, pi_q.tick(s16(ref[1] - meas[1]), limit), limit
+
+
+# ---- estimator ------------------------------------------------------------------------------------------------------
+
+def emf_sum_max(inv_kfi):
+    """Largest Eq -+ Ed (Q12) whose speed fits a word: E * inv_kfi / 2^11 <= 32767."""
+    return s16(32767 * 2048 // inv_kfi)
+
+
+def turn_small(x, y, a_q16_rad):
+    """A vector turned by a small angle: x - a y, y + a x."""
+    return s16(x - share(y, a_q16_rad)), s16(y + share(x, a_q16_rad))
+
+
+@dataclass
+class Estimator:
+    """The PLL of Equations 1 to 7 in integers; p is Machine.estimator()."""
+    p: dict
+    kfilter_esdq_q16: int = 2400
+    history: list = field(default_factory=lambda: [(0, 0)] * 8)  # oldest first
+    v: list = field(default_factory=lambda: [(0, 0)] * 2)        # two periods ago, one period ago
+    e: tuple = (0, 0)
+    e_d: int = 0
+    e_q: int = 0
+    omega: int = 0
+    filtered: int = 0
+    rho: int = 0        # modulo 2^32
+    half_step: int = 0
+
+    @property
+    def speed(self):
+        return upper(self.filtered)
+
+    def next_angle(self):
+        """The angle half a period after the last sample, plus half a step; radians * 65536 to counts: / (2 pi)."""
+        return (self.rho // WORD + share(self.half_step, nearest(WORD / (2 * math.pi)))) % WORD
+
+    def inductive(self, now, ls_q16):
+        """Ls dI/dt in Q13: eight samples below nominal speed, turned from 4 samples ago to the middle of the last
+        period (3.5 steps, half a radian at most); one sample above, which counts eightfold."""
+        p = self.p
+        slow = magnitude(self.speed) < p["nominal_erpm"]
+        base, limit = (self.history[0], p["d_ilimit_ls_q14"]) if slow else (self.history[-1], p["d_ilimit_hs_q14"])
+        change = [clamp(s16(n - b), -limit, limit) for n, b in zip(now, base)]
+        v = [share(s16(c if slow else 8 * c), ls_q16) for c in change]
+        if slow:
+            v = turn_small(*v, s16(7 * clamp(self.half_step, -4681, 4681)))
+        return [s16(x << p["ls_exp"]) for x in v]
+
+    def back_emf(self, now, ls_q16):
+        """Equation 4 at the middle of the last period: mean of two vectors and of two currents."""
+        p = self.p
+        inductive = self.inductive(now, ls_q16)
+        e = []
+        for axis in (0, 1):
+            mean_i = s16(now[axis] + self.history[-1][axis]) // 2
+            mean_v = (self.v[0][axis] + self.v[1][axis]) // 2
+            e.append(s16(mean_v - s16(share(mean_i, p["rs_q16"]) << p["rs_exp"]) - inductive[axis]))
+        self.e = tuple(e)
+        self.history = self.history[1:] + [tuple(now)]
+
+    def pll(self, e_d, e_q, inv_kfi):
+        """Equations 7, 2 and 1. The sign is Eq's above a tenth of nominal speed, the filtered speed's below."""
+        p = self.p
+        self.e_d = lowpass(self.e_d, e_d, self.kfilter_esdq_q16)
+        self.e_q = lowpass(self.e_q, e_q, self.kfilter_esdq_q16)
+        d, q = upper(self.e_d), upper(self.e_q)
+        decides = q if magnitude(self.speed) > p["decimate_erpm"] else self.speed
+        most = emf_sum_max(inv_kfi)
+        total = clamp(s16(q - d if decides >= 0 else q + d), -most, most)
+        self.omega = s16(total * inv_kfi // 2048)
+        self.rho = (self.rho + self.omega * p["deltat_q32"]) % (1 << 32)
+        self.half_step = share(self.omega, p["half_step_q16_rad"])
+        self.filtered = lowpass(self.filtered, self.omega, p["kfilter_velestim_q16"])
+
+    def tick_free(self, now, ls_q16, inv_kfi):
+        """In the estimator's own frame, by its own sine and cosine."""
+        self.back_emf(now, ls_q16)
+        self.pll(*park(*self.e, *sincos(self.rho // WORD)), inv_kfi)
+
+    def tick_closed(self, now, ls_q16, inv_kfi, frame):
+        """In the control frame of this sample, turned back by half a step to the middle of the last period."""
+        self.back_emf(now, ls_q16)
+        d, q = park(*self.e, *frame)
+        self.pll(s16(d - share(q, self.half_step)), s16(q + share(d, self.half_step)), inv_kfi)
+
+    def commanded(self, v):
+        self.v = [self.v[1], tuple(v)]
+
+
+@dataclass
+class EstimatorReal:
+    """The same equations in float64 and SI units, with exact rotations."""
+    m: Machine
+    kfilter_esdq: float = 1200 / 32768
+    history: list = field(default_factory=lambda: [0j] * 8)
+    v: list = field(default_factory=lambda: [0j] * 2)
+    e_dq: complex = 0j
+    omega: float = 0.0     # electrical rpm
+    filtered: float = 0.0
+    rho: float = 0.0       # turns, not wrapped
+    frame: float = 0.0     # turns: angle of the next sample
+
+    def tick(self, i, inv_kphi_ratio, closed):
+        m, rad = self.m, 2 * math.pi
+        step = self.omega * m.turns_per_erpm  # turns a period
+        if abs(self.filtered) < round(m.nominal_rpm * m.pole_pairs):
+            limit = m.current_step(m.nominal_rpm, 8) * m.i0
+            change = i - self.history[0]
+            change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
+            change *= _unit(clamp(3.5 * step * rad, -0.5, 0.5))
+        else:
+            limit = m.current_step(m.maximum_rpm) * m.i0
+            change = i - self.history[-1]
+            change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit))
+        e = sum(self.v) / 2 - m.rs_ohm * (i + self.history[-1]) / 2 - m.ls_h / m.period_s * change
+        self.history = self.history[1:] + [i]
+        e_dq = e * _unit(-rad * ((self.frame - step / 2) if closed else self.rho))
+        self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
+        decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
+        total = self.e_dq.imag - self.e_dq.real if decides >= 0 else self.e_dq.imag + self.e_dq.real
+        per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
+        self.omega = clamp(total * per_volt, -32767.0, 32767.0)
+        self.rho += self.omega * m.turns_per_erpm
+        self.filtered += m.kfilter_velestim / 32768 * (self.omega - self.filtered)
+        self.frame = self.rho + self.omega * m.turns_per_erpm / 2
+
+    def commanded(self, v):
+        self.v = [self.v[1], v]
+
+
+def _unit(a):
+    return complex(math.cos(a), math.sin(a))
+
+
+def synthetic_motor(m, speed_erpm, current_dq):
+    """Samples of a motor whose speed and d-q current are given for every sample: the current vector, the vector that
+    the drive commands (it acts for the period centred on the next sample), and the rotor's angle in turns.
+
+    @param speed_erpm, current_dq: lists of the same length (complex for the current)
+    @return lists of i (A), v (V), theta (turns), all one shorter
+    """
+    rad, ts = 2 * math.pi, m.period_s
+    theta, i, v = [0.0], [], []
+    for n in range(len(speed_erpm) - 1):
+        theta.append(theta[-1] + (speed_erpm[n] + speed_erpm[n + 1]) / 2 * m.turns_per_erpm)
+    for n in range(len(speed_erpm) - 1):
+        nxt = n + 1
+        omega = speed_erpm[nxt] / 60 * rad
+        slope = (current_dq[min(nxt + 1, len(current_dq) - 1)] - current_dq[n]) / (2 * ts)
+        frame = _unit(rad * theta[nxt])
+        i.append(current_dq[n] * _unit(rad * theta[n]))
+        v.append((m.rs_ohm * current_dq[nxt] + m.ls_h * (slope + 1j * omega * current_dq[nxt]) + 1j * omega * m.psi) * frame)
+    return i, v, theta[:-1]
+
+
+def lock_error_deg(ratio):
+    """Angle of the rotor ahead of the estimate where cos D + sin D = K'/K, i.e. sqrt(2) sin(D + 45 deg) = K'/K."""
+    return math.degrees(math.asin(ratio / math.sqrt(2))) - 45.0
+
+
+# ---- field weakening ------------------------------------------------------------------------------------------------
+
+FIELDWEAK_STEP = 1024  # electrical rpm per table entry
+
+
+def between(table, index, fraction_q16):
+    """Linear between two entries; the fraction's product is rounded down."""
+    return s16(table[index] - (table[index] - table[index + 1]) * fraction_q16 // WORD)
+
+
+def fieldweak(tables, on_speed, ls_base, ref):
+    """Index, Id, 1/Kphi, its EMF limit and Ls for a speed reference; the last interval ends 1/65536 before the end."""
+    above = magnitude(ref) - on_speed
+    index, rest = divmod(above, FIELDWEAK_STEP) if above > 0 else (0, 0)
+    fraction = rest * (WORD // FIELDWEAK_STEP)
+    last = len(tables["idref"]) - 2
+    if index > last:
+        index, fraction = last, WORD - 1
+    i_d, inv_kfi, ratio = (between(tables[n], index, fraction) for n in ("idref", "inv_kfi", "ls"))
+    return index, i_d, inv_kfi, emf_sum_max(inv_kfi), u16(ls_base * ratio // 2 ** 14), int(above > 0)
+
+
+def fieldweak_real(tables, on_speed, ls_base, ref):
+    x = clamp((abs(ref) - on_speed) / FIELDWEAK_STEP, 0, len(tables["idref"]) - 1)
+    i = min(int(x), len(tables["idref"]) - 2)
+    i_d, inv_kfi, ratio = (t[i] + (t[i + 1] - t[i]) * (x - i) for t in (tables["idref"], tables["inv_kfi"], tables["ls"]))
+    return i_d, inv_kfi, ls_base * ratio / 2 ** 14
+
+
+# ---- start ----------------------------------------------------------------------------------------------------------
+
+def forced_angle(rate_q10, end_q10, direction, speed_q10, angle_q32):
+    """One period of the start ramp: counts/1024 per period, angle in 2^-32 turns (2^-16 counts)."""
+    speed = min(speed_q10 + rate_q10, end_q10)
+    return speed, (angle_q32 + direction * speed * 64) % (1 << 32), int(speed == end_q10)
+
+
+def speed_ramp(reference, target, step):
+    """One step closer; the target itself when it is nearer than two steps."""
+    difference = target - reference
+    if abs(difference) < 2 * step:
+        return target
+    return s16(reference + (step if difference > 0 else -step))
+
+
+def hand_over(forced, estimated, v_dq, i_q):
+    """A vector keeps its place in the stator: seen from the estimator's frame it turns by forced - estimated.
+    @return offset, voltage d and q, current d and q"""
+    offset = wrap16(forced - estimated)
+    sc = sincos(offset % WORD)
+    v = [s16(2 * x) for x in inverse_park(*v_dq, *sc)]
+    i = [s16(2 * x) for x in inverse_park(0, i_q, *sc)]
+    return offset, *v, *i
+
+
+def hand_over_real(forced, estimated, v_dq, i_q):
+    a = 2 * math.pi * (forced - estimated) / WORD
+    v = complex(*v_dq) * _unit(a)
+    i = 1j * i_q * _unit(a)
+    return v.real, v.imag, i.real, i.imag

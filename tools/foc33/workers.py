@@ -1,0 +1,79 @@
+"""Simulations in processes of their own: the firmware is one set of globals, so each run needs a fresh process."""
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import wait
+from typing import Any
+
+from .errors import UserError
+
+
+@dataclass
+class _Running:
+    number: int
+    process: Any
+    pipe: Any
+
+
+def run_all(jobs: list[Any], work: Callable[[Any, Callable[[float], None]], Any], progress: Callable[[float], None],
+            processes: int | None = None) -> list[Any]:
+    """Results of work(job, report) for every job, in order, with at most `processes` at a time (default: one per processor).
+
+    `work` runs in a fresh process and calls report(seconds) now and then; `progress` gets the same here. A UserError in a process is
+    raised here; a process that dies is an error too. Whatever happens, no process is left behind.
+    """
+    context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    limit = max(1, processes or len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1)
+    results: list[Any] = [None] * len(jobs)
+    waiting = list(enumerate(jobs))[::-1]
+    running: dict[Any, _Running] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < limit:
+                _start(context, work, waiting.pop(), running)
+            for pipe in wait(list(running)):
+                _receive(running, pipe, results, progress)
+    finally:
+        for item in running.values():
+            item.process.terminate()
+            item.process.join()
+    return results
+
+
+def _start(context: Any, work: Any, numbered_job: tuple[int, Any], running: dict[Any, _Running]) -> None:
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_child, args=(work, numbered_job[1], there), daemon=True)
+    process.start()
+    there.close()
+    running[here] = _Running(numbered_job[0], process, here)
+
+
+def _child(work: Any, job: Any, pipe: Any) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN) # the parent ends it
+    try:
+        pipe.send(("result", work(job, lambda seconds: pipe.send(("progress", seconds)))))
+    except UserError as error:
+        pipe.send(("error", str(error)))
+
+
+def _receive(running: dict[Any, _Running], pipe: Any, results: list[Any], progress: Callable[[float], None]) -> None:
+    item = running[pipe]
+    try:
+        kind, value = pipe.recv()
+    except EOFError:
+        item.process.join()
+        raise UserError("the simulation ended by itself", f"exit code {item.process.exitcode}",
+                        "a crash in the virtual board or the firmware; build with SAN=1 to find it") from None
+    if kind == "progress":
+        progress(value)
+        return
+    if kind == "error":
+        raise UserError(value)
+    results[item.number] = value
+    item.process.join()
+    pipe.close()
+    del running[pipe]

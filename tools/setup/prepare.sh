@@ -1,0 +1,111 @@
+#!/bin/sh
+# Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
+#
+#   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib
+#   tools/setup/prepare.sh test    the same, and Ruby with gem
+#
+# Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby). Result: build/setup/python holds the interpreter's command.
+set -u
+
+state=build/setup
+log=$state/apt.log
+modules="numpy matplotlib"
+python_packages="python3 python3-numpy python3-matplotlib python3-tqdm"
+
+give_up() {
+    echo "foc33: $1" >&2
+    exit 2
+}
+
+has_compiler() {
+    echo '#include <stdio.h>' | ${CC:-gcc} -E - >/dev/null 2>&1 && command -v ar >/dev/null
+}
+
+# has_modules <python> <module>...: Python 3.11 or newer that can find all the modules
+has_modules() {
+    candidate=$1
+    shift
+    "$candidate" -c 'import sys
+from importlib.util import find_spec
+sys.exit(sys.version_info < (3, 11) or not all(map(find_spec, sys.argv[1:])))' "$@" >/dev/null 2>&1
+}
+
+# Prints the first interpreter with everything, else the first one that lacks only the progress bar.
+find_python() {
+    for extra in tqdm ""; do
+        for candidate in ${PYTHON:-python3 /usr/bin/python3 python3.14 python3.13 python3.12 python3.11}; do
+            # shellcheck disable=SC2086
+            if has_modules "$candidate" $modules $extra; then
+                echo "$candidate"
+                return 0
+            fi
+        done
+    done
+    return 1
+}
+
+has_ruby() {
+    command -v "${RUBY:-ruby}" >/dev/null && command -v gem >/dev/null
+}
+
+# Sets `packages` to the Debian packages and `lacking` to the words for a reader.
+look() {
+    packages=""
+    lacking=""
+    if ! has_compiler; then
+        packages="gcc libc6-dev binutils"
+        lacking="a C compiler (${CC:-gcc})"
+    fi
+    if ! python=$(find_python); then
+        packages="$packages $python_packages"
+        lacking="$lacking${lacking:+, }Python 3.11 or newer with numpy and matplotlib"
+    fi
+    if [ "$job" = test ] && ! has_ruby; then
+        packages="$packages ruby"
+        lacking="$lacking${lacking:+, }Ruby with gem"
+    fi
+    packages=${packages# }
+}
+
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then
+        "$@"
+    else
+        sudo "$@"
+    fi
+}
+
+can_install() {
+    command -v apt-get >/dev/null || return 1
+    [ "$(id -u)" -eq 0 ] && return 0
+    command -v sudo >/dev/null || return 1
+    [ -t 0 ] || sudo -n true 2>/dev/null
+}
+
+apt() {
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=300 "$@" >>"$log" 2>&1
+}
+
+job=${1:-}
+case $job in
+    run | test) ;;
+    *) give_up "prepare.sh, '$job': name the job, run or test" ;;
+esac
+
+mkdir -p $state 2>/dev/null || give_up "set-up, $state: cannot be written, check the folder's permissions"
+look
+if [ -n "$packages" ]; then
+    if [ -n "${PYTHON:-}" ] && ! find_python >/dev/null; then
+        give_up "set-up, PYTHON=$PYTHON: is no Python 3.11 with numpy and matplotlib; install them for it (pip install numpy matplotlib tqdm) or leave PYTHON away"
+    fi
+    can_install || give_up "set-up, missing: $lacking: install it (Debian packages: $packages; or pip install numpy matplotlib tqdm) and try again"
+    echo "foc33: installing Debian packages: $packages (log: $log)"
+    : >"$log"
+    apt update
+    # shellcheck disable=SC2086
+    apt install --no-install-recommends $packages ||
+        give_up "set-up, apt-get install $packages: failed ($(grep '^E:' "$log" | tail -n 1)); see $log"
+    look
+    [ -z "$packages" ] || give_up "set-up, still missing after the installation: $lacking: install it by hand and try again"
+fi
+[ "$(cat $state/python 2>/dev/null)" = "$python" ] || echo "$python" >$state/python
