@@ -31,8 +31,8 @@ void test_no_position_in_the_middle_stops_a_reverse_run(void)
     rig_tick(300);
     for (pot = 1000; pot >= -1000; pot--) {
         drive.pot_q15 = pot;
-        panel.pot_q31 = (int32_t)pot * 65536;
-        panel.pot_used_q15 = pot;
+        the_panel.pot_q31 = (int32_t)pot * 65536;
+        the_panel.pot_used_q15 = pot;
         panel_ms(1);
         TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     }

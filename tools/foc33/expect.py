@@ -114,7 +114,7 @@ class MeasureExpectation(Expectation):
         return cls(section.choice("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES)), Bounds.read(section))
 
     def check(self, run: "Run") -> list[Outcome]:
-        got = run.measures()[self.measure][self.value]
+        got = run.measures[self.measure][self.value]
         return [Outcome(f"{self.measure}: {self.value}", self.bounds.hold(got), _number(got), self.bounds.text())]
 
 

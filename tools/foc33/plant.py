@@ -96,15 +96,17 @@ def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:
         raise UserError(f"'{key}' = {value:g} is impossible", where, f"choose {info.minimum:g} .. {info.maximum:g}{unit}")
 
 
-def resolve(layers: list[Values], keys: Mapping[str, Key], defaults: Mapping[str, float]) -> dict[str, float]:
+def resolve(layers: list[Values], keys: Mapping[str, Key]) -> dict[str, float]:
     """Final value of every key: later layers replace or scale earlier ones; what none names keeps the board's default."""
     result: dict[str, float] = {}
     for layer in layers:
         for key, value in layer.values.items():
             where = layer.where.get(key, "")
             if isinstance(value, tuple):
-                check(key, result.get(key, defaults.get(key, 0.0)), keys, where)
-                value = value[1] * result.get(key, defaults.get(key, 0.0))
+                check(key, result.get(key, keys[key].minimum if key in keys else 0.0), keys, where)
+                if key not in result:
+                    raise UserError(f"'{key}' has no value to scale", where, "neither motor nor board file gives it; write a number")
+                value = value[1] * result[key]
             check(key, value, keys, where)
             result[key] = value
     return result

@@ -1,6 +1,7 @@
 """One finished simulation and what can be read from its trace: measures, hand-over, faults, protocol."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -86,6 +87,7 @@ class Run:
         around = self.trace.part(at_s - 0.05, at_s + 1.0).column("plant.speed_rpm") * direction
         return HandOver(at_s, row, after_s2_s, float(overshoot), float(np.min(around)))
 
+    @cached_property
     def measures(self) -> dict[str, dict[str, Any]]:
         """The values of every [[measure]], by name."""
         return {measure.name: measure_values(self.trace.part(measure.from_s, measure.to_s), measure)

@@ -36,14 +36,13 @@ class Job:
     actions: list[panel.Action]
     signals: list[str]
     variables: dict[str, int] = field(default_factory=dict)
-    keep_trace: bool = True
 
 
 def prepare(scenario: Scenario, library: Library, motor: plant.Part, board: plant.Part, extra: plant.Values | None = None) -> Job:
     """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
     keys = library.keys
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
-    values = plant.resolve(layers, keys, {})
+    values = plant.resolve(layers, keys)
     for event in scenario.events:
         for key, value in event.keys.items():
             plant.check(key, value, keys, event.where)

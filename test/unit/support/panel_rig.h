@@ -5,16 +5,16 @@
 #include "drive/panel.h"
 #include "drive_rig.h"
 
-static panel_t panel;
+static panel_t the_panel;
 static panel_inputs_t inputs;
-static panel_lights_t lights;
+static panel_lights_t the_lights;
 
 /** Milliseconds of the panel alone. */
 static inline void panel_ms(uint16_t ms)
 {
     while (ms-- != 0u) {
         inputs.elapsed_ms = 1;
-        lights = panel_tick(&panel, &drive, &params, &inputs);
+        the_lights = panel_tick(&the_panel, &drive, &params, &inputs);
     }
 }
 
@@ -55,7 +55,7 @@ static inline void panel_reset(void)
 {
     static const panel_t no_panel;
     static const panel_inputs_t nothing;
-    panel = no_panel;
+    the_panel = no_panel;
     inputs = nothing;
 }
 

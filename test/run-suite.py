@@ -1,0 +1,49 @@
+"""Runs one test suite, keeps what it prints in a report file, and shows one line about it; the report of all suites comes later.
+
+    test/run-suite.py [--one-test] build/test/unit.test_pi.txt command...
+
+With --one-test the command itself is the test: it passes when it ends with 0. The exit status is 0 whatever the tests say, so that
+make goes on with the other suites; run-report.py decides.
+"""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from report import read_suite
+
+TIME_LIMIT_S = 600
+
+
+def run(command: list[str]) -> tuple[str, str]:
+    """Output of the command and how it ended: "exit 0", "signal 11", "timeout"."""
+    try:
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIME_LIMIT_S, check=False)
+        end = f"exit {done.returncode}" if done.returncode >= 0 else f"signal {-done.returncode}"
+        output = done.stdout
+    except subprocess.TimeoutExpired as late:
+        end, output = f"timeout {TIME_LIMIT_S} s", late.stdout or b""
+    except OSError as error:
+        end, output = f"cannot start: {error.strerror}", b""
+    return output.decode(errors="replace"), end
+
+
+def main() -> None:
+    arguments = sys.argv[1:]
+    one_test = arguments[0] == "--one-test"
+    report, *command = arguments[one_test:]
+    path = Path(report)
+    start = time.monotonic()
+    output, end = run(command)
+    if one_test:
+        result = "PASS" if end == "exit 0" else f"FAIL: {end}\n" + "".join(f"    {line}\n" for line in output.splitlines())
+        output, end = f"{path.stem}:{result}\n", "exit 0" if end == "exit 0" else "exit 1"
+    path.write_text(f"{output.rstrip()}\n{end}\n", encoding="utf-8")
+    suite = read_suite(path)
+    verdict = f"{len(suite.passed):4} passed" + (f", {len(suite.failures)} FAILED" if suite.failures else "")
+    print(f"  test {path.stem:44} {verdict}  ({time.monotonic() - start:.1f} s)", flush=True)
+
+
+if __name__ == "__main__":
+    main()

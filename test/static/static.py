@@ -1,0 +1,187 @@
+"""Static checks of the firmware: compiler warnings in every mode, cppcheck, its MISRA addon and clang-tidy.
+
+A finding passes only if docs/deviations.md lists it, with the check's name, the places and a reason; a line there that no finding needs
+any more fails too, so the page stays true. Environment: CC, CLANG, CLANG_TIDY, CPPCHECK (the tools to use).
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+
+HERE = Path(__file__).parent
+PAGE = "docs/deviations.md"
+MODES = [(), ("OPEN_LOOP_FUNCTIONING",), ("TUNING",), ("TORQUE_MODE",), ("BIDIRECTIONAL_SPEED",), ("SNAPSHOT",),
+         ("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED")]
+GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
+    -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits
+    -Wfloat-equal -Wnull-dereference -Werror -c -o /dev/null""".split()
+# msp430 is not our target, but clang knows it and its int has 16 bits like ours.
+CLANG_16_BIT = "--target=msp430 -ffreestanding -std=gnu99".split()
+# Every warning but those about C dialects, padding and style that the other checks own.
+CLANG_FLAGS = """-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wcomma -Wconditional-uninitialized
+    -Wextra-semi -Wimplicit-fallthrough -Wmissing-prototypes -Wshift-sign-overflow -Wtautological-compare -Wunreachable-code
+    -Werror -fsyntax-only""".split()
+INCLUDES = ["-Itools/host", "-Iinclude", "-I."]
+
+
+@dataclass(frozen=True)
+class Finding:
+    check: str  # tool and rule, as docs/deviations.md names it: "misra 12.1"
+    file: str
+    line: int
+    text: str
+
+
+@dataclass
+class Deviation:
+    check: str
+    places: list[str]
+    reason: str
+    used: int = 0
+
+    def covers(self, finding: Finding) -> bool:
+        return self.check == finding.check and any(fnmatch(finding.file, place) for place in self.places)
+
+
+def read_deviations(page: Path) -> list[Deviation]:
+    """The rows `| check | places | reason |` of every table on the page; places are files or patterns in backquotes."""
+    deviations = []
+    for line in page.read_text().splitlines():
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if line.startswith("| `") and len(cells) == 3:
+            places = re.findall(r"`([^`]+)`", cells[1])
+            if not places or not cells[2]:
+                sys.exit(f"foc33: {page}, {cells[0]}: name the places in backquotes and a reason")
+            deviations.append(Deviation(cells[0].strip("`"), places, cells[2]))
+    return deviations
+
+
+def run(command: list[str]) -> str:
+    """Standard output and error of the command; a tool that cannot run at all ends the program."""
+    try:
+        done = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+    except OSError as error:
+        print(f"foc33: {command[0]}, static checks: cannot be run ({error.strerror}); make static installs it", file=sys.stderr)
+        sys.exit(2)
+    if done.returncode != 0 and not done.stdout.strip():
+        return f"{command[0]} ended with code {done.returncode}"
+    return done.stdout
+
+
+def each(function, items) -> list:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(function, items))
+
+
+def relative(path: str) -> str:
+    return os.path.relpath(path, os.getcwd()) if os.path.isabs(path) else path
+
+
+def compiler(name: str, command: list[str], sources: list[str]) -> list[Finding]:
+    """One finding for each message; these compile clean, so the page has no row for them."""
+    findings = []
+    for source, output in zip(sources, each(lambda source: run(command + [source]), sources)):
+        messages = [line for line in output.splitlines() if re.search(r"(error|warning|ended with code)", line)]
+        findings += [Finding(name, source, 0, message) for message in messages]
+    return findings
+
+
+def cppcheck(sources: list[str], misra: bool) -> list[Finding]:
+    """Every preprocessor configuration of each file, with the target's type sizes."""
+    command = [os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
+               "--inline-suppr", "--template={file}:{line}:{id}:{message}", "--force", *INCLUDES]
+    if misra:
+        outputs = each(lambda source: run(command + ["--addon=misra", source]), sources)
+    else:
+        outputs = [run(command + ["--enable=warning,style,performance,portability,unusedFunction", "--inconclusive", *sources])]
+    findings = set()
+    for line in "\n".join(outputs).splitlines():
+        match = re.fullmatch(r"([^:]+):(\d+):([\w.-]+):(.*)", line)
+        if not match:
+            continue
+        file, number, check, text = match.groups()
+        is_misra = check.startswith("misra-c2012-")
+        if file.startswith("tools/") or is_misra != misra and not (misra and "rror" in check):
+            continue
+        name = f"misra {check.removeprefix('misra-c2012-')}" if is_misra else f"cppcheck {check}"
+        findings.add(Finding(name, file, int(number), text))
+    return sorted(findings, key=lambda f: (f.check, f.file, f.line))
+
+
+def clang_tidy(sources: list[str]) -> list[Finding]:
+    def one(source: str) -> list[Finding]:
+        found = set()
+        for mode in MODES:
+            output = run([os.environ.get("CLANG_TIDY", "clang-tidy-14"), "--quiet", f"--config-file={HERE}/clang-tidy.yaml",
+                          "--header-filter=(include|firmware)/.*", source, "--", *CLANG_16_BIT, *INCLUDES, *(f"-D{m}" for m in mode)])
+            for line in output.splitlines():
+                match = re.fullmatch(r"(.+?):(\d+):\d+: (?:warning|error): (.*) \[([\w.,-]+)\]", line)
+                if match:
+                    file, number, text, checks = match.groups()
+                    found |= {Finding(f"tidy {check}", relative(file), int(number), text) for check in checks.split(",")}
+        return found
+
+    return sorted(set().union(*each(one, sources)), key=lambda f: (f.check, f.file, f.line))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--all", action="store_true", help="print the listed findings too")
+    parser.add_argument("--only", help="name of one check")
+    options = parser.parse_args()
+    sources = sorted(str(path) for path in Path("firmware").rglob("*.c"))
+    portable = [source for source in sources if "/board/" not in source]
+    if not sources:
+        print("foc33: firmware/, static checks: no sources here; run from the project's folder", file=sys.stderr)
+        return 2
+    deviations = read_deviations(Path(PAGE))
+
+    gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS, *INCLUDES]
+    clang = [os.environ.get("CLANG", "clang-14"), *CLANG_16_BIT, *CLANG_FLAGS, *INCLUDES]
+    checks = {}
+    for mode in MODES:
+        defines = [f"-D{name}" for name in mode]
+        label = "+".join(mode) or "default"
+        checks[f"gcc_{label}"] = lambda defines=defines: compiler("gcc", gcc + defines, sources)
+        checks[f"clang_16_bit_{label}"] = lambda defines=defines: compiler("clang", clang + defines, sources)
+    checks["cppcheck"] = lambda: cppcheck(sources, misra=False)
+    checks["misra"] = lambda: cppcheck(sources, misra=True)
+    checks["clang_tidy"] = lambda: clang_tidy(sources)
+
+    passed = failed = 0
+    for name, check in checks.items():
+        if options.only and options.only != name:
+            continue
+        findings = check()
+        unlisted = []
+        for finding in findings:
+            row = next((d for d in deviations if d.covers(finding)), None)
+            if row:
+                row.used += 1
+            else:
+                unlisted.append(finding)
+            if options.all or not row:
+                print(f"  {finding.file}:{finding.line}: [{finding.check}] {finding.text}")
+        if unlisted:
+            print(f"{name}: FAIL: {len(unlisted)} findings that {PAGE} does not list")
+        else:
+            print(f"{name}: PASS" + (f" ({len(findings)} findings, all listed)" if findings else ""))
+        passed, failed = passed + (not unlisted), failed + bool(unlisted)
+    if not options.only:
+        stale = [d for d in deviations if not d.used]
+        for d in stale:
+            print(f"  {PAGE}: `{d.check}` at {' '.join(d.places)} is listed, but nothing reports it any more: delete the line")
+        print("deviations_are_needed: " + (f"FAIL: {len(stale)} lines of {PAGE} are stale" if stale else "PASS"))
+        passed, failed = passed + (not stale), failed + bool(stale)
+    print(f"{passed} passed, {failed} failed")
+    return int(failed != 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Result folders: written under a temporary name and moved into place when complete, so that nothing half-done looks finished."""
+
+import json
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from .errors import UserError
+from .trace import Trace
+
+SUMMARY = "summary.json"
+
+
+class ResultFolder:
+    """Context manager: write into `.work`; at a normal end it replaces `target`, otherwise it vanishes.
+
+    Only an empty folder or an older result (with a summary.json) is replaced.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self.target = target
+        self.work = target
+
+    def __enter__(self) -> "ResultFolder":
+        target = self.target
+        if target.exists() and not (target.is_dir() and (not any(target.iterdir()) or (target / SUMMARY).is_file())):
+            raise UserError(f"'{target}' is not a result folder", "--out", "it holds something else; choose a new or an empty folder")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            self.work = Path(tempfile.mkdtemp(prefix=f".{target.name}-unfinished-", dir=target.parent))
+            self.work.chmod(0o755)
+        except OSError as error:
+            raise UserError(f"cannot write to '{target.parent}' ({error.strerror})", "--out", "choose a folder that can be written") from None
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        if kind is not None:
+            shutil.rmtree(self.work, ignore_errors=True)
+            if isinstance(error, OSError):
+                raise UserError(f"cannot write to '{self.target}' ({error.strerror})", "--out", "free some space, or choose another folder") from None
+            return
+        try:
+            self._move()
+        except OSError as failure:
+            shutil.rmtree(self.work, ignore_errors=True)
+            raise UserError(f"cannot replace '{self.target}' ({failure.strerror})", "--out", "choose a folder that can be written") from None
+
+    def _move(self) -> None:
+        old = self.work.with_name(self.work.name + "-old")
+        if self.target.exists():
+            self.target.rename(old)
+        self.work.rename(self.target)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def write_summary(folder: Path, data: dict[str, Any]) -> None:
+    (folder / SUMMARY).write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def write_trace(path: Path, trace: Trace) -> None:
+    """A CSV file: time and every signal, numbers with six significant digits."""
+    form = "%.5f," + ",".join(["%.6g"] * len(trace.names)) + "\n"
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(["time_s"] + trace.names) + "\n")
+        columns = trace.data.T.tolist()
+        file.writelines(form % (time, *row) for time, row in zip(trace.time_s.tolist(), columns))
+
+
+def write_csv(path: Path, header: list[str], rows: list[list[Any]]) -> None:
+    lines = [",".join(header)] + [",".join("" if cell is None else str(cell) for cell in row) for row in rows]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

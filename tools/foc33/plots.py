@@ -1,0 +1,121 @@
+"""The plots of a run, as PNG files."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
+import numpy as np # noqa: E402
+
+from .run import Run # noqa: E402
+from .trace import Trace, wrapped_deg # noqa: E402
+
+STEP = 20
+"""Every STEP-th period is drawn in the plots over the whole run."""
+HAND_OVER_BEFORE_S, HAND_OVER_AFTER_S = 0.03, 0.07
+
+plt.rcParams.update({"figure.figsize": (10, 5), "figure.dpi": 100, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0,
+                     "legend.loc": "best", "legend.fontsize": 9, "axes.titlesize": 11, "font.size": 10,
+                     "path.simplify_threshold": 0.5, "agg.path.chunksize": 10000})
+
+
+def write_all(run: Run, folder: Path) -> list[str]:
+    """Every plot that the run has data for; returns the file names."""
+    thin = run.trace.thinned(STEP)
+    files = []
+    for name, draw in (("speed", _speed), ("currents", _currents), ("voltages", _voltages), ("angle_error", _angle_error)):
+        files.append(_write(folder, name, run, thin, draw))
+    for name, draw, wanted in (("hand_over", _hand_over, bool(run.hand_overs())), ("field_weakening", _field_weakening, _weakens(run))):
+        if wanted:
+            files.append(_write(folder, name, run, thin, draw))
+    return files
+
+
+def _write(folder: Path, name: str, run: Run, thin: Trace, draw: Callable) -> str:
+    figure, axes = plt.subplots(layout="constrained")
+    draw(run, thin, axes)
+    figure.savefig(folder / f"{name}.png")
+    plt.close(figure)
+    return f"{name}.png"
+
+
+def _lines(axes: plt.Axes, thin: Trace, signals: dict[str, tuple[str, dict]]) -> None:
+    for signal, (label, style) in signals.items():
+        axes.plot(thin.time_s, thin.column(signal), label=label, **style)
+
+
+def _finish(axes: plt.Axes, title: str, y_label: str, x_label: str = "time [s]") -> None:
+    axes.set(title=title, xlabel=x_label, ylabel=y_label)
+    axes.legend()
+
+
+def _closed(run: Run, trace: Trace) -> np.ndarray:
+    """Rows in closed loop, stopping included."""
+    state = trace.column("fw.state")
+    return (state == run.state_number("CLOSED")) | (state == run.state_number("STOPPING"))
+
+
+def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"}),
+                        "fw.speed_est_rpm": ("estimated", {"color": "tab:orange", "linestyle": "--"}),
+                        "fw.speed_ref_rpm": ("reference", {"color": "black", "linewidth": 0.7})})
+    for item in run.hand_overs():
+        axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":", label=f"closed loop, {item.after_s2_s:.2f} s after S2")
+    _finish(axes, f"{run.scenario.title}: speed", "speed [rpm]")
+
+
+def _currents(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"fw.i_d_a": ("Id measured", {"color": "tab:blue", "alpha": 0.5}),
+                        "fw.i_q_a": ("Iq measured", {"color": "tab:red", "alpha": 0.5}),
+                        "fw.id_ref_a": ("Id reference", {"color": "navy"}), "fw.iq_ref_a": ("Iq reference", {"color": "darkred"})})
+    _finish(axes, f"{run.scenario.title}: currents in the control frame", "current [A peak]")
+
+
+def _voltages(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"fw.v_d_v": ("Vd", {"color": "tab:blue"}), "fw.v_q_v": ("Vq", {"color": "tab:red"}),
+                        "fw.v_limit_v": ("limit", {"color": "black", "linewidth": 0.8})})
+    axes.plot(thin.time_s, np.hypot(thin.column("fw.v_d_v"), thin.column("fw.v_q_v")), label="|V|", color="grey", linewidth=0.7)
+    axes.plot(thin.time_s, -thin.column("fw.v_limit_v"), color="black", linewidth=0.8)
+    _finish(axes, f"{run.scenario.title}: commanded voltage", "voltage [V peak, phase]")
+
+
+def _angle_error(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    error = wrapped_deg(thin.column("fw.theta_est_deg").astype(np.float64) - thin.column("plant.theta_e_deg"))
+    closed = _closed(run, thin)
+    axes.plot(thin.time_s, np.where(closed, error, np.nan), label="closed loop", color="tab:blue")
+    if not np.any(closed):
+        running = thin.column("pwm.outputs_on") != 0
+        axes.plot(thin.time_s, np.where(running, error, np.nan), label="open loop", color="tab:orange")
+    _finish(axes, f"{run.scenario.title}: estimated less true angle", "electrical angle [deg]")
+
+
+def _hand_over(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    at_s = run.hand_overs()[0].at_s
+    part = run.trace.part(at_s - HAND_OVER_BEFORE_S, at_s + HAND_OVER_AFTER_S)
+    time_ms = (part.time_s - at_s) * 1e3
+    for signal, label, color in (("plant.i_a", "Ia", "tab:blue"), ("plant.i_b", "Ib", "tab:orange"), ("plant.i_c", "Ic", "tab:green")):
+        axes.plot(time_ms, part.column(signal), label=label, color=color)
+    axes.axvline(0.0, color="black", linewidth=0.8, linestyle=":", label="hand-over")
+    _finish(axes, f"{run.scenario.title}: phase currents around the hand-over", "current [A]", "time after the hand-over [ms]")
+
+
+def _weakens(run: Run) -> bool:
+    return bool(np.any(run.trace.column("fw.fw_index") > 0))
+
+
+def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    """As the note's Figure 8: d current and 1/Kphi as functions of speed."""
+    closed = _closed(run, thin)
+    speed = np.abs(thin.column("plant.speed_rpm"))[closed]
+    other = axes.twinx()
+    axes.plot(speed, thin.column("fw.id_ref_a")[closed], ".", markersize=2, color="tab:blue", label="Id reference")
+    other.plot(speed, thin.column("fw.inv_kphi")[closed], ".", markersize=2, color="tab:red", label="1/Kphi")
+    other.set_ylabel("1/Kphi [counts, Q15/2]")
+    other.set_ylim(bottom=0)
+    other.grid(False)
+    axes.set(title=f"{run.scenario.title}: d current and 1/Kphi over speed (Figure 8)", xlabel="speed [rpm]", ylabel="Id [A peak]")
+    handles = [line for side in (axes, other) for line in side.get_lines()]
+    axes.legend(handles, [line.get_label() for line in handles], markerscale=4)
