@@ -76,8 +76,10 @@ setup-run:
 # ---- firmware and virtual board on the PC --------------------------------------------------------------------------------
 .PHONY: lib vboard FORCE
 lib: $B/libfirmware.a ## build/host/libfirmware.a: the firmware for the PC [DEFINES=-D... USERPARAMS=folder VARIANT=name SAN=1]
+	@:
 
 vboard: $B/libvboard.so ## build/host/libvboard.so: the virtual board with the firmware in it [the same variables]
+	@:
 
 $B/flags: FORCE
 	@test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
@@ -128,13 +130,17 @@ test-quick: setup-test ## the tests for the edit loop, under 30 s [ONLY="test_pi
 
 setup-test:
 	@tools/setup/prepare.sh test
-	@$(MAKE) $(gem_stamp)
+	@$(MAKE) gems
 
 # Unity and CMock are the copies that the ceedling gem carries.
 ceedling := 1.2.1
 gem_stamp := build/gems/ceedling-$(ceedling).stamp
 unity := build/gems/gems/ceedling-$(ceedling)/vendor/unity
 cmock := build/gems/gems/ceedling-$(ceedling)/vendor/cmock
+
+.PHONY: gems
+gems: $(gem_stamp)
+	@:
 
 $(gem_stamp):
 	@tools/setup/gems.sh $(ceedling) $@
@@ -153,7 +159,7 @@ $T/%.o: test/%.c $T/flags | $(gem_stamp)
 
 $T/%_runner.c: test/%.c test/unit/support/cmock.yml | $(gem_stamp)
 	@mkdir -p $(@D)
-	$(quiet)$(RUBY) $(unity)/auto/generate_test_runner.rb test/unit/support/cmock.yml $< $@ 2>$@.log >&2 || { head -n 1 $@.log >&2; exit 1; }
+	$(quiet)$(RUBY) $(unity)/auto/generate_test_runner.rb test/unit/support/cmock.yml $< $@ >$@.log 2>&1 || { head -n 1 $@.log >&2; exit 1; }
 
 $T/%_runner.o: $T/%_runner.c $T/flags
 	$(quiet)$(test_compile) -w -Itest/$(*D) $(call own_defines,test/$*.c) -MMD -MP -c $< -o $@

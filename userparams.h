@@ -52,7 +52,7 @@
 
 /* ---- Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h ------ */
 #define CURRENT_BANDWIDTH_HZ 800    /* [Hz]            20 .. 2000     both current loops */
-#define SPEED_BANDWIDTH_HZ 12       /* [Hz]            0.2 .. 60      speed loop; the estimator is slower the slower the motor turns: 12 holds 500 rpm */
+#define SPEED_BANDWIDTH_HZ 18       /* [Hz]            0.2 .. 60      speed loop; the estimator is slower the slower the motor turns, so above 20 the speed hunts below 1000 rpm */
 
 /* ---- Filters, Equation 7: K in Q15 per period ---------------------------------------------------------------------------- */
 #define KFILTER_ESDQ 1200           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM; 1200 = 118 Hz */

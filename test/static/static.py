@@ -96,12 +96,10 @@ def cppcheck(sources: list[str], misra: bool) -> list[Finding]:
     """Every preprocessor configuration of each file, with the target's type sizes."""
     command = [os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
                "--inline-suppr", "--template={file}:{line}:{id}:{message}", "--force", *INCLUDES]
-    if misra:
-        outputs = each(lambda source: run(command + ["--addon=misra", source]), sources)
-    else:
-        outputs = [run(command + ["--enable=warning,style,performance,portability,unusedFunction", "--inconclusive", *sources])]
+    # All sources at once: unused types, macros and functions are only known at the end.
+    command += ["--addon=misra"] if misra else ["--enable=warning,style,performance,portability,unusedFunction", "--inconclusive"]
     findings = set()
-    for line in "\n".join(outputs).splitlines():
+    for line in run(command + sources).splitlines():
         match = re.fullmatch(r"([^:]+):(\d+):([\w.-]+):(.*)", line)
         if not match:
             continue
@@ -154,11 +152,9 @@ def main() -> int:
     checks["misra"] = lambda: cppcheck(sources, misra=True)
     checks["clang_tidy"] = lambda: clang_tidy(sources)
 
+    checks = {name: check for name, check in checks.items() if options.only in (None, name)}
     passed = failed = 0
-    for name, check in checks.items():
-        if options.only and options.only != name:
-            continue
-        findings = check()
+    for name, findings in zip(checks, each(lambda check: check(), checks.values())):
         unlisted = []
         for finding in findings:
             row = next((d for d in deviations if d.covers(finding)), None)

@@ -1,0 +1,228 @@
+"""The unit tests as mutation testing needs them: built once, then rebuilt and run only as far as one changed file reaches."""
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+FAST = ["-O0", "-g0", "-w"]           # the tests of mutants
+SHIPPED = ["-O2", "-g0", "-w"]        # the firmware, to see whether a change reaches it at all
+SOURCES = ("include", "firmware", "tools/host", "tools/board", "test/unit", "test/behaviour", "test/board")
+DEFINES = re.compile(r"/\* defines: (.*?) \*/")
+FAILED_TEST = re.compile(r"^[^:\n]*:\d+:(\w+):FAIL", re.M)
+
+
+class BuildError(Exception):
+    """The unchanged sources do not build or do not pass."""
+
+
+@dataclass
+class Unit:
+    """One translation unit: how it is compiled and what it reads."""
+    source: str
+    command: list
+    object: str                 # path in the base tree
+    deps: set = field(default_factory=set)
+    content: bytes = b""
+
+
+@dataclass
+class Test:
+    """One executable."""
+    name: str                   # unit/test_svm
+    fixed: list                 # objects that no mutant changes: runner, mocks, Unity
+    units: list                 # the test itself and the firmware objects it needs
+    library: bool = True
+    seconds: float = 0.0
+    argv: list = None           # a check that is a script: run instead of an executable
+
+    def reads(self, file):
+        return any(file in unit.deps for unit in self.units)
+
+
+def run(argv, cwd, timeout=None):
+    """@return (exit code, output); a timeout is exit code None"""
+    try:
+        done = subprocess.run(argv, cwd=cwd, timeout=timeout, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, errors="replace", check=False)
+    except subprocess.TimeoutExpired:
+        return None, ""
+    return done.returncode, done.stdout
+
+
+def copy_sources(root, tree):
+    """The sources that a build reads, and what was generated for it, so that edits during a run do no harm."""
+    if tree.exists():
+        shutil.rmtree(tree)
+    for folder in SOURCES:
+        if (root / folder).is_dir():
+            shutil.copytree(root / folder, tree / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy2(root / "userparams.h", tree)
+    for path in sorted((root / "build").rglob("*")):
+        where = path.relative_to(root)
+        if path.suffix in (".c", ".h", ".inc") and where.parts[1] not in ("gems", "mutate", "setup", "coverage", "avr", "host"):
+            (tree / where).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, tree / where)
+    (tree / "build").mkdir(exist_ok=True)
+    if (root / "build/gems").exists():
+        os.symlink((root / "build/gems").resolve(), tree / "build/gems")
+
+
+class Suite:
+    """Tests of the unchanged sources in `base`, and their results on a changed tree."""
+
+    def __init__(self, root, base, compile_command, jobs):
+        self.root, self.base, self.jobs = Path(root), Path(base), jobs
+        self.compile_command = shlex.split(compile_command)
+        self.tests, self.firmware = [], {}
+        self.shipped = {}
+
+    # ---- building the unchanged sources ----
+    def unit(self, source, flags):
+        name = source.removesuffix(".c").replace("/", ".") + "".join(flags).replace("/", ".").replace(" ", "")
+        return Unit(source, self.compile_command + flags + FAST + ["-c", source, "-o"], f"obj/{name}.o")
+
+    def compile_base(self, unit):
+        deps = self.base / (unit.object + ".d")
+        code, output = run(unit.command + [unit.object, "-MD", "-MF", str(deps)], self.base)
+        if code != 0:
+            raise BuildError(f"{unit.source} does not compile:\n{output}")
+        listed = deps.read_text().replace("\\\n", " ").split(":", 1)[1]
+        unit.deps = {os.path.normpath(path) for path in listed.split()}
+        unit.content = (self.base / unit.object).read_bytes()
+        return unit
+
+    def prepare(self, names, behaviour=()):
+        """Copies, builds and runs everything once. @param names such as unit/test_svm"""
+        copy_sources(self.root, self.base)
+        (self.base / "obj").mkdir()
+        vendor = next(self.base.glob("build/gems/gems/ceedling-*/vendor"), None)
+        if vendor is None:
+            raise BuildError("no Unity: run make test first")
+        vendor = os.path.relpath(vendor, self.base)
+        frame = [self.unit(f"{vendor}/unity/src/unity.c", []), self.unit(f"{vendor}/cmock/src/cmock.c", [])]
+        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/*/*.c"))] + ["tools/host/xc.c"]
+        self.firmware = {u.object: u for u in (self.unit(source, []) for source in firmware)}
+        board = [self.unit(str(p.relative_to(self.base)), []) for p in sorted(self.base.glob("tools/board/*.c"))] if behaviour else []
+        mocks, plans = {}, []
+        for name in (*names, *behaviour):
+            text = (self.base / f"test/{name}.c").read_text()
+            own = DEFINES.search("\n".join(text.splitlines()[:5]))
+            flags = shlex.split(own.group(1)) if own else []
+            uses = sorted(set(re.findall(r"#include \"(mock_\w+)\.h\"", text)))
+            for mock in uses:
+                mocks.setdefault(mock, self.unit(f"build/test/mocks/{mock}.c", []))
+            runner = self.unit(f"build/test/{name}_runner.c", [f"-Itest/{os.path.dirname(name)}", *flags])
+            plans.append((name, self.unit(f"test/{name}.c", flags), runner, [mocks[m] for m in uses]))
+        everything = [*frame, *self.firmware.values(), *mocks.values(), *board]
+        everything += [u for _, test, runner, _ in plans for u in (test, runner)]
+        with ThreadPoolExecutor(self.jobs) as pool:
+            list(pool.map(self.compile_base, everything))
+            run(["ar", "rcs", "obj/firmware.a", *self.firmware], self.base)
+            linked = pool.map(lambda plan: self.link_base(plan, frame, board if plan[0] in behaviour else []), plans)
+            self.tests = sorted(linked, key=lambda t: (t.name in behaviour, t.seconds))
+
+    def link_base(self, plan, frame, board):
+        name, unit, runner, mocks = plan
+        fixed = [u.object for u in (runner, *mocks, *frame)]
+        program = f"obj/{name.replace('/', '.')}"
+        code, output = run(["gcc", "-o", program, unit.object, *fixed, *(u.object for u in board), "obj/firmware.a", "-lm", "-Wl,-t"], self.base)
+        if code != 0:
+            raise BuildError(f"{name} does not link:\n{output}")
+        members = set(re.findall(r"\(?obj/firmware\.a\)?\(?([\w.]+\.o)\)?", output))
+        pulled = [u for path, u in self.firmware.items() if os.path.basename(path) in members]
+        begin = time.monotonic()
+        code, output = run([f"./{program}"], self.base, timeout=600)
+        if code != 0:
+            raise BuildError(f"{name} fails without any change:\n{output}")
+        return Test(name, fixed, [unit, *board, *pulled], seconds=time.monotonic() - begin)
+
+    def add_script(self, name, argv, deps):
+        """A check that is a Python script and compiles by itself; it counts when it passes unchanged in the base tree."""
+        begin = time.monotonic()
+        code, output = run(argv, self.base, timeout=600)
+        if code != 0:
+            return f"{name} does not pass in a copy of the sources and takes no part: {output.strip().splitlines()[-1:]}"
+        unit = Unit(name, [], "", set(deps))
+        self.tests.append(Test(name, [], [unit], seconds=time.monotonic() - begin, argv=argv))
+        return None
+
+    def order(self, file, names):
+        """The tests that read the file: those of its own module first, then the quick ones."""
+        stem = Path(file).stem
+
+        def key(test):
+            module = os.path.basename(test.name).removeprefix("test_")
+            if module == stem:
+                rank = 0
+            elif module.startswith(stem) or stem.startswith(module):
+                rank = 1
+            else:
+                rank = 2
+            return rank, test.seconds, test.name
+        return sorted((t for t in self.tests if t.name in names and t.reads(file)), key=key)
+
+    # ---- one changed tree ----
+    def judge(self, tree, file, names, memory):
+        """Runs the tests on `tree`, in which `file` differs from the base.
+        @return ("killed", by) or ("timeout", by) or ("survived", "") or ("broken", why)"""
+        for test in self.order(file, names):
+            if test.argv:
+                code, _ = run(test.argv, tree, timeout=20 * test.seconds + 10)
+                if code != 0:
+                    return "killed", test.name
+                continue
+            objects, changed = [], False
+            for unit in test.units:
+                path = f"../base/{unit.object}"
+                if file in unit.deps:
+                    state = self.compile_changed(tree, unit, memory)
+                    if state == "broken":
+                        return "broken", unit.source
+                    if state == "changed":
+                        path, changed = unit.object, True
+                objects.append(path)
+            if not changed:
+                continue
+            fixed = [f"../base/{path}" for path in test.fixed]
+            code, _ = run(["gcc", "-o", "obj/program", *objects, *fixed, "-lm"], tree)
+            if code != 0:
+                return "broken", f"link of {test.name}"
+            code, output = run(["./obj/program"], tree, timeout=10 * test.seconds + 2)
+            if code is None:
+                return "timeout", test.name
+            if code != 0:
+                found = FAILED_TEST.search(output)
+                return "killed", f"{test.name}: {found.group(1) if found else f'ended with {code}'}"
+        return "survived", ""
+
+    def compile_changed(self, tree, unit, memory):
+        if unit.object not in memory:
+            code, _ = run(unit.command + [unit.object], tree)
+            if code != 0:
+                memory[unit.object] = "broken"
+            else:
+                same = (tree / unit.object).read_bytes() == unit.content
+                memory[unit.object] = "same" if same else "changed"
+        return memory[unit.object]
+
+    def same_object_code(self, tree, file, modes):
+        """Does the firmware compile to the same object code as without the change, in every mode?"""
+        for unit in self.firmware.values():
+            if file not in unit.deps:
+                continue
+            for mode in modes:
+                command = unit.command[:unit.command.index("-O0")] + mode + SHIPPED + ["-c", unit.source, "-o", "obj/shipped.o"]
+                key = (unit.source, tuple(mode))
+                if key not in self.shipped:
+                    place = f"obj/{abs(hash(key))}.o"
+                    run(command[:-1] + [place], self.base)
+                    self.shipped[key] = (self.base / place).read_bytes()
+                code, _ = run(command, tree)
+                if code != 0 or (tree / "obj/shipped.o").read_bytes() != self.shipped[key]:
+                    return False
+        return True
