@@ -118,7 +118,7 @@ all_suites := $(behaviour_c) $(unittest_py) $(unit_c) $(check_py) $(board_c) war
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
 reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
 # Every chosen suite runs anew. One that cannot be built leaves no report, which the last step counts as a failure.
-run_suites = +@mkdir -p $T; rm -f $T/*.txt; $(MAKE) -k $(call reports,$(call chosen,$1)) || true; \
+run_suites = +@mkdir -p $T; rm -f $T/*.txt; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
     $(python) test/run-report.py $(call reports,$(call chosen,$1))
 
 .PHONY: test test-quick setup-test

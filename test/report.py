@@ -1,7 +1,8 @@
 """Reads the report file of one test suite; shared by run-suite.py and run-report.py.
 
 A result is a line "where:test:PASS", "where:test:FAIL: why" or "where:test:IGNORE: why", as Unity prints it; "test: PASS" is fine too.
-Indented lines after a FAIL belong to it. The last line says how the suite ended; a suite that ended badly has failed in any case.
+Indented lines after a FAIL belong to it. Then comes the suite's own total, Unity's or "N passed, N failed", and a last line that says how
+the suite ended. A suite that ended badly or without a total has failed in any case.
 """
 
 import re
@@ -9,8 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 RESULT = re.compile(r"^(?P<test>\S.*?): ?(?P<result>PASS|FAIL|IGNORE)(?:: ?(?P<why>.*))?$")
-UNITY_TOTAL = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
-OTHER_TOTAL = re.compile(r"^(\d+) passed, (\d+) failed$", re.MULTILINE)
+TOTALS = re.compile(r"^(?:(\d+) Tests (\d+) Failures (\d+) Ignored|(\d+) passed, (\d+) failed$)", re.MULTILINE)
 
 
 @dataclass
@@ -56,14 +56,14 @@ def _read_results(suite: Suite, lines: list[str]) -> None:
 
 def _trouble(suite: Suite, text: str, end: str) -> str:
     """Why the results cannot be the whole story, or ""."""
-    counted = len(suite.passed), len(suite.failures), len(suite.ignored)
-    unity, other = UNITY_TOTAL.search(text), OTHER_TOTAL.search(text)
     if not end.startswith("exit "):
-        return f"crashed: {end}"
-    if unity and (int(unity[1]), int(unity[2]), int(unity[3])) != (sum(counted), counted[1], counted[2]):
-        return f"its total ({unity[0]}) is not what it printed {counted}"
-    if other and (int(other[1]), int(other[2])) != counted[:2]:
-        return f"its total ({other[0]}) is not what it printed {counted}"
+        return f"crashed: {end}, after {suite.passed[-1] if suite.passed else 'no test'}"
+    passed, failed, ignored = len(suite.passed), len(suite.failures), len(suite.ignored)
+    total = TOTALS.search(text)
+    if total is None:
+        return f"stopped early ({end}), without its total"
+    if total[0] not in (f"{passed + failed + ignored} Tests {failed} Failures {ignored} Ignored", f"{passed} passed, {failed} failed"):
+        return f"its total, {total[0]}, is not what it printed: {passed} passed, {failed} failed, {ignored} ignored"
     if end == "exit 0" and suite.failures:
         return "ended with exit 0 in spite of failures"
     if end != "exit 0" and not suite.failures:

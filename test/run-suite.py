@@ -37,8 +37,10 @@ def main() -> None:
     start = time.monotonic()
     output, end = run(command)
     if one_test:
-        result = "PASS" if end == "exit 0" else f"FAIL: {end}\n" + "".join(f"    {line}\n" for line in output.splitlines())
-        output, end = f"{path.stem}:{result}\n", "exit 0" if end == "exit 0" else "exit 1"
+        passed = end == "exit 0"
+        result = "PASS" if passed else f"FAIL: {end}\n" + "".join(f"    {line}\n" for line in output.splitlines())
+        output = f"{path.stem}:{result}\n{int(passed)} passed, {int(not passed)} failed"
+        end = "exit 0" if passed else "exit 1"
     path.write_text(f"{output.rstrip()}\n{end}\n", encoding="utf-8")
     suite = read_suite(path)
     verdict = f"{len(suite.passed):4} passed" + (f", {len(suite.failures)} FAILED" if suite.failures else "")

@@ -6,7 +6,6 @@
 import importlib.util
 import inspect
 import sys
-import traceback
 import unittest
 from pathlib import Path
 
@@ -20,11 +19,12 @@ class Lines(unittest.TestResult):
 
     def _print(self, test: unittest.TestCase, result: str, why: str = "") -> None:
         self.counts[result] += 1
-        print(f"{place(test)}:{test.id().split('.', 1)[-1]}:{result}{': ' + why if why else ''}", flush=True)
+        name = test.id().removeprefix(f"{Path(sys.argv[1]).stem}.")
+        print(f"{place(test)}:{name}:{result}{': ' + why if why else ''}", flush=True)
 
     def _failed(self, test: unittest.TestCase, error: tuple) -> None:
         self._print(test, "FAIL", " ".join(str(error[1]).split()) or error[0].__name__)
-        for line in "".join(traceback.format_exception(*error)).splitlines():
+        for line in self._exc_info_to_string(error, test).splitlines():
             print(f"    {line}", flush=True)
 
     def addSuccess(self, test: unittest.TestCase) -> None:
@@ -52,6 +52,7 @@ class Lines(unittest.TestResult):
 
 def place(test: unittest.TestCase) -> str:
     """file:line of a test method; only the file for a fixture that failed."""
+    test = getattr(test, "test_case", test)
     method = getattr(type(test), getattr(test, "_testMethodName", ""), None)
     if method is None:
         return sys.argv[1]

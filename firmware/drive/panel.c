@@ -34,7 +34,7 @@ int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_rang
         direction = (int16_t)((signed_q15 > 0) ? 1 : -1);
     }
 #ifdef TORQUE_MODE
-    return (int16_t)(direction * between(0, p->current_max_q13, size_q16));
+    return (int16_t)(direction * between(1, p->current_max_q13, size_q16)); /* never 0: the sign is the direction */
 #else
     return (int16_t)(direction * between(p->minimum_erpm, p->nominal_erpm, size_q16));
 #endif

@@ -8,13 +8,16 @@
 /** The voltage circle at the measured bus. */
 typedef struct {
     voltage_q14_t limit_q14;   /**< radius */
-    uint16_t reciprocal;       /**< 2^29 / radius, see voltage_circle_reciprocal() */
+    uint16_t reciprocal;       /**< 2^28 / radius, see voltage_circle_reciprocal() */
 } voltage_circle_t;
 
-/** 2^29 / radius for vq_limit(); a radius below 8193 counts (half of nominal) is taken as 8193, which the limit respects. */
+#define VOLTAGE_CIRCLE_LEAST_Q14 4097 /* a quarter of the nominal bus */
+
+/** 2^28 / radius for vq_limit(), rounded up.
+ *  @param radius_q14 VOLTAGE_CIRCLE_LEAST_Q14 or more (the drive trips on under-voltage above it); less is taken as that */
 QM_INLINE uint16_t voltage_circle_reciprocal(voltage_q14_t radius_q14)
 {
-    return qm_divud(1ul << 29, (uint16_t)((radius_q14 > 8193) ? radius_q14 : 8193));
+    return (uint16_t)(qm_divud(1ul << 28, (uint16_t)((radius_q14 > VOLTAGE_CIRCLE_LEAST_Q14) ? radius_q14 : VOLTAGE_CIRCLE_LEAST_Q14)) + 1u);
 }
 
 /** Largest |Vd|: 31/32 of the circle, so that the q axis never loses all control. */
@@ -26,9 +29,9 @@ QM_INLINE voltage_q14_t vd_limit(const voltage_circle_t *circle)
 /** Largest |Vq|: sqrt(limit^2 - Vd^2), by the circle table, never rounded up. @param vd_q14 within vd_limit() */
 QM_INLINE voltage_q14_t vq_limit(const voltage_circle_t *circle, voltage_q14_t vd_q14)
 {
-    /* |Vd|/limit in Q13, rounded up; below 8192 because |Vd| <= 31/32 limit */
-    uint16_t ratio_q13 = (uint16_t)(qm_mulhi_uu((uint16_t)qm_abs(vd_q14), circle->reciprocal) + 1u);
-    return qm_hi(2 * qm_mulss(circle->limit_q14, trig_circle((int16_t)(ratio_q13 << 2))));
+    /* |Vd|/limit in Q12, rounded up; below 4096 because |Vd| <= 31/32 limit */
+    uint16_t ratio_q12 = (uint16_t)(qm_mulhi_uu((uint16_t)qm_abs(vd_q14), circle->reciprocal) + 1u);
+    return qm_hi(2 * qm_mulss(circle->limit_q14, trig_circle((int16_t)(ratio_q12 << 3))));
 }
 
 /** One period of both controllers.

@@ -35,7 +35,7 @@ QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16
 }
 
 /** Looks up the three tables for a speed reference (not the estimated speed) and adapts the estimator.
- *  Entries above the last are never read: at and beyond index 17 the last entry holds.
+ *  Entries above the last are never read: at and beyond index 17 the last entry holds, to one count.
  *  @param ref_erpm speed reference, any value and sign */
 QM_INLINE void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, estimator_tuning_t *tuning, speed_erpm_t ref_erpm)
 {

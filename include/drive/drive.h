@@ -50,7 +50,7 @@ typedef struct {
     uint32_t duty_per_volt_numerator;
     int16_t bus_over_q15, bus_under_q15;  /**< trip levels */
     int16_t bus_regen_q15;                /**< braking current falls from here */
-    int16_t brake_per_bus;                /**< braking current per bus count above, Q13 per count */
+    int16_t brake_per_bus_q8;             /**< braking current taken off per bus count above, Q13 counts * 256 */
     int16_t bus_nominal_q15;              /**< start value of the bus filter */
 
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;

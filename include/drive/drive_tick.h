@@ -173,7 +173,7 @@ QM_INLINE void drive_handover_step(drive_t *d, const drive_params_t *p)
     }
     c->brake_limit_q13 = p->current_max_q13;
     if (over > 0) {
-        int32_t less = qm_mulss(over, p->brake_per_bus);
+        int32_t less = qm_mulss(over, p->brake_per_bus_q8) >> 8;
         c->brake_limit_q13 = (int16_t)((less > p->current_max_q13) ? 0 : p->current_max_q13 - less);
     }
 }

@@ -72,7 +72,7 @@
     X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V, or it never trips") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
     X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, "UNDER_VOLTAGE_V must be below NOMINAL_BUS_V") \
-    X(PARAM_F(UNDER_VOLTAGE_V) >= 0.2F * PARAM_F(NOMINAL_BUS_V), "UNDER_VOLTAGE_V must be at least a fifth of NOMINAL_BUS_V") \
+    X(PARAM_F(UNDER_VOLTAGE_V) >= 0.3F * PARAM_F(NOMINAL_BUS_V), "UNDER_VOLTAGE_V must be at least 0.3 * NOMINAL_BUS_V: the voltage circle's reciprocal ends there") \
     X(REGEN_LIMIT_V > NOMINAL_BUS_V, "REGEN_LIMIT_V must be above NOMINAL_BUS_V") \
     X(PARAM_F(REGEN_LIMIT_V) + 2.0F <= PARAM_F(OVER_VOLTAGE_V), "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V") \
     X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, "UNDER_VOLTAGE_V is too low for the modulator's division") \

@@ -71,7 +71,7 @@
     .bus_over_q15 = BUS_Q15(OVER_VOLTAGE_V), \
     .bus_under_q15 = BUS_Q15(UNDER_VOLTAGE_V), \
     .bus_regen_q15 = BUS_Q15(REGEN_LIMIT_V), \
-    .brake_per_bus = (int16_t)(PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(2.0F))), /* to nothing in 2 V */ \
+    .brake_per_bus_q8 = (int16_t)(256.0F * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(2.0F)) + 0.5F), /* to nothing in 2 V */ \
     .bus_nominal_q15 = BUS_Q15(NOMINAL_BUS_V), \
     .minimum_erpm = (int16_t)MINIMUM_SPEED_ERPM, \
     .nominal_erpm = (int16_t)NOMINAL_SPEED_ERPM, \

@@ -4,6 +4,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -79,7 +80,7 @@ class Suite:
         self.root, self.base, self.jobs = Path(root), Path(base), jobs
         self.compile_command = shlex.split(compile_command)
         self.tests, self.firmware = [], {}
-        self.shipped = {}
+        self.shipped, self.lock = {}, threading.Lock()
 
     # ---- building the unchanged sources ----
     def unit(self, source, flags):
@@ -130,11 +131,14 @@ class Suite:
         name, unit, runner, mocks = plan
         fixed = [u.object for u in (runner, *mocks, *frame)]
         program = f"obj/{name.replace('/', '.')}"
-        code, output = run(["gcc", "-o", program, unit.object, *fixed, *(u.object for u in board), "obj/firmware.a", "-lm", "-Wl,-t"], self.base)
+        code, output = run(["gcc", "-o", program, unit.object, *fixed, *(u.object for u in board), "obj/firmware.a", "-lm", "-Wl,-t,-t"], self.base)
         if code != 0:
             raise BuildError(f"{name} does not link:\n{output}")
         members = set(re.findall(r"\(?obj/firmware\.a\)?\(?([\w.]+\.o)\)?", output))
         pulled = [u for path, u in self.firmware.items() if os.path.basename(path) in members]
+        code, output = run(["gcc", "-o", program, unit.object, *fixed, *(u.object for u in (*board, *pulled)), "-lm"], self.base)
+        if code != 0:
+            raise BuildError(f"{name} does not link without the library:\n{output}")
         begin = time.monotonic()
         code, output = run([f"./{program}"], self.base, timeout=600)
         if code != 0:
@@ -210,19 +214,30 @@ class Suite:
                 memory[unit.object] = "same" if same else "changed"
         return memory[unit.object]
 
+    def shipped_base(self, unit, mode):
+        """What the firmware's unit reads and its object code in one mode, without a change; compiled when first asked for."""
+        key = (unit.source, tuple(mode))
+        with self.lock:
+            if key not in self.shipped:
+                place = f"obj/shipped{len(self.shipped)}"
+                code, output = run(self.shipped_command(unit, mode) + [f"{place}.o", "-MD", "-MF", f"{place}.d"], self.base)
+                if code != 0:
+                    raise BuildError(f"{unit.source} does not compile with {' '.join(mode)}:\n{output}")
+                listed = (self.base / f"{place}.d").read_text().replace("\\\n", " ").split(":", 1)[1]
+                self.shipped[key] = ({os.path.normpath(path) for path in listed.split()}, (self.base / f"{place}.o").read_bytes())
+            return self.shipped[key]
+
+    def shipped_command(self, unit, mode):
+        return [*self.compile_command, *mode, *SHIPPED, "-c", unit.source, "-o"]
+
     def same_object_code(self, tree, file, modes):
         """Does the firmware compile to the same object code as without the change, in every mode?"""
         for unit in self.firmware.values():
-            if file not in unit.deps:
-                continue
             for mode in modes:
-                command = unit.command[:unit.command.index("-O0")] + mode + SHIPPED + ["-c", unit.source, "-o", "obj/shipped.o"]
-                key = (unit.source, tuple(mode))
-                if key not in self.shipped:
-                    place = f"obj/{abs(hash(key))}.o"
-                    run(command[:-1] + [place], self.base)
-                    self.shipped[key] = (self.base / place).read_bytes()
-                code, _ = run(command, tree)
-                if code != 0 or (tree / "obj/shipped.o").read_bytes() != self.shipped[key]:
+                deps, content = self.shipped_base(unit, mode)
+                if file not in deps:
+                    continue
+                code, _ = run(self.shipped_command(unit, mode) + ["obj/shipped.o"], tree)
+                if code != 0 or (tree / "obj/shipped.o").read_bytes() != content:
                     return False
         return True

@@ -13,9 +13,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 HERE = Path(__file__).parent
 PAGE = "docs/deviations.md"
+BUILD = Path("build/static")
 MODES = [(), ("OPEN_LOOP_FUNCTIONING",), ("TUNING",), ("TORQUE_MODE",), ("BIDIRECTIONAL_SPEED",), ("SNAPSHOT",),
          ("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED")]
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
@@ -94,8 +96,14 @@ def compiler(name: str, command: list[str], sources: list[str]) -> list[Finding]
 
 def cppcheck(sources: list[str], misra: bool) -> list[Finding]:
     """Every preprocessor configuration of each file, with the target's type sizes."""
+    with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
+        return cppcheck_in(folder, sources, misra)
+
+
+def cppcheck_in(folder: str, sources: list[str], misra: bool) -> list[Finding]:
     command = [os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
-               "--inline-suppr", "--template={file}:{line}:{id}:{message}", "--force", *INCLUDES]
+               f"--cppcheck-build-dir={folder}",
+               "--template={file}:{line}:{id}:{message}", "--force", *INCLUDES]
     # All sources at once: unused types, macros and functions are only known at the end.
     command += ["--addon=misra"] if misra else ["--enable=warning,style,performance,portability,unusedFunction", "--inconclusive"]
     findings = set()
@@ -139,6 +147,7 @@ def main() -> int:
         print("foc33: firmware/, static checks: no sources here; run from the project's folder", file=sys.stderr)
         return 2
     deviations = read_deviations(Path(PAGE))
+    BUILD.mkdir(parents=True, exist_ok=True)
 
     gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS, *INCLUDES]
     clang = [os.environ.get("CLANG", "clang-14"), *CLANG_16_BIT, *CLANG_FLAGS, *INCLUDES]

@@ -3,6 +3,8 @@
 #include "panel_rig.h"
 #include "unity.h"
 
+#include "hurst_params.h"
+
 #include "firmware/drive/panel.c"
 
 void setUp(void)

@@ -2,9 +2,10 @@
 #ifndef TEST_DRIVE_RIG_H
 #define TEST_DRIVE_RIG_H
 
-#include "drive/params_init.h"
+#include "hurst_params.h"
 
 #include "drive/drive_tick.h"
+#include "drive/params_init.h"
 
 static const drive_params_t params = DRIVE_PARAMS_INIT;
 static drive_t drive;

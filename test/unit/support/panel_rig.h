@@ -2,8 +2,9 @@
 #ifndef TEST_PANEL_RIG_H
 #define TEST_PANEL_RIG_H
 
-#include "drive/panel.h"
 #include "drive_rig.h"
+
+#include "drive/panel.h"
 
 static panel_t the_panel;
 static panel_inputs_t inputs;

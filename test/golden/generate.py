@@ -1,0 +1,563 @@
+"""Writes the golden vectors from the reference, or compares the committed ones with it (--check)."""
+
+import argparse
+import cmath
+import math
+import pathlib
+import random
+import sys
+from dataclasses import dataclass, field
+
+import reference as ref
+
+HERE = pathlib.Path(__file__).resolve().parent
+SEED = 1292
+EDGES = [-32768, -32767, -16384, -256, -1, 0, 1, 2, 255, 16384, 32767]
+MACHINE = ref.Machine()
+
+
+@dataclass
+class Vectors:
+    """One file: a table of integers, named constants, and how far the integer model is from float64."""
+    name: str
+    what: str
+    format: str
+    columns: str = ""
+    rows: list = field(default_factory=list)
+    constants: dict = field(default_factory=dict)
+    real: list = field(default_factory=list)     # float64
+    model: list = field(default_factory=list)    # the integer model's counterpart
+    least_db: float = 0.0                        # asserted minimum of the signal-to-noise ratio
+
+    def compare(self, real, model):
+        self.real += list(real)
+        self.model += list(model)
+
+    def ratio_db(self):
+        noise = math.fsum((r - m) ** 2 for r, m in zip(self.real, self.model))
+        return 10 * math.log10(math.fsum(r * r for r in self.real) / noise) if noise else math.inf
+
+    def text(self):
+        lines = [f"# {self.what}", f"# format: {self.format}", "# tolerance: 0 LSB"]
+        if self.real:
+            db = self.ratio_db()
+            if db < self.least_db:
+                raise ValueError(f"{self.name}: the integer model has {db:.1f} dB against float64, "
+                                 f"at least {self.least_db} dB are asserted")
+            lines.append(f"# signal to noise: {db:.1f} dB of the exact integers against float64, "
+                         f"at least {self.least_db:g} dB")
+        else:
+            lines.append("# signal to noise: not applicable, exact by definition")
+        lines += [f"# constant {name} = {value}" for name, value in self.constants.items()]
+        if self.rows:
+            lines.append(f"# columns: {self.columns}")
+            lines += [" ".join(str(x) for x in row) for row in self.rows]
+        return "\n".join(lines) + "\n"
+
+
+def dither(rng, low, high, count):
+    return [rng.randrange(low, high + 1) for _ in range(count)]
+
+
+# ---- arithmetic -----------------------------------------------------------------------------------------------------
+
+def multiply(rng):
+    v = Vectors("multiply", "exact products and their upper words, signed, mixed and unsigned",
+                "a, b 16-bit words; ss su uu 32-bit products; hi* upper words (floor)",
+                "a:s16 b:s16 ss:s32 su:s32 uu:u32 hi:s16 hi_su:s16 hi_uu:u16")
+    pairs = [(a, b) for a in EDGES for b in EDGES]
+    pairs += list(zip(dither(rng, -32768, 32767, 180), dither(rng, -32768, 32767, 180)))
+    for a, b in pairs:
+        ua, ub = a % 65536, b % 65536
+        v.rows.append([a, b, a * b, a * ub, ua * ub, ref.share(a, b), ref.share(a, ub), ua * ub // 65536])
+    return v
+
+
+def divide(rng):
+    v = Vectors("divide", "unsigned 32/16 division, truncated", "n / d with d > n >> 16", "n:u32 d:u16 q:u16")
+    pairs = [(1 << 29, 8193), (1 << 29, 16384), (1 << 29, 32767), (32767 * 2048, 2048), (32767 * 2048, 7956),
+             (32767 * 2048, 32767), (0, 1), (65535, 1), (0xFFFEFFFF, 0xFFFF), (0xFFFE0001, 0xFFFF), (0xFFFE0000, 0xFFFF)]
+    for _ in range(80):
+        d = rng.randrange(1, 65536)
+        pairs.append((rng.randrange(0, d * 65536), d))
+    v.rows = [[n, d, n // d] for n, d in pairs]
+    return v
+
+
+def limits(rng):
+    v = Vectors("limits", "magnitude, difference in 17 bits limited to half the range, clamp",
+                "abs_a = |a|; sub = a - b within -16383..16383; clamped = a within min(b, c)..max(b, c)",
+                "a:s16 b:s16 c:s16 abs_a:s16 sub:s16 clamped:s16")
+    rows = [(a, b, rng.choice(EDGES)) for a in EDGES for b in EDGES]
+    rows += [(a, b, c) for a in (-5, -4, -3, 3, 4, 5) for b, c in ((-4, 4), (4, 4), (-4, -4))]
+    rows += [(16383, 0, 0), (16384, 0, 0), (16385, 1, 0), (-16383, 0, 0), (-16384, 0, 0), (-16384, -1, 0)]
+    rows += [tuple(dither(rng, -32768, 32767, 3)) for _ in range(60)]
+    for a, b, c in rows:
+        v.rows.append([a, b, c, ref.magnitude(a), ref.clamp(a - b, -16383, 16383), ref.clamp(a, min(b, c), max(b, c))])
+    return v
+
+
+def lowpass(rng):
+    v = Vectors("lowpass", "Equation 7: full-scale steps both ways, small steps and noise for each filter constant in use",
+                "k Q16 (twice the note's Q15); x counts; y 16 fraction bits; start 1 = y begins at zero; "
+                "-3 dB at 118, 16, 73 Hz for 2400, 328, 1496",
+                "start:u16 k:s16 x:s16 y:s32", least_db=85.0)
+    for k, corner in ((2400, 118.8), (328, 16.0), (1496, 73.5), (16384, None)):
+        if corner and abs(ref.lowpass_corner_hz(k / 65536, 20000.0) - corner) > 0.1:
+            raise ValueError(f"lowpass: -3 dB of {k} is not at {corner} Hz")
+        y, real = 0, 0.0
+        xs = [32767] * 60 + [-32768] * 60 + [0] * 30 + [1] * 10 + [-1] * 10 + dither(rng, -20000, 20000, 50)
+        for n, x in enumerate(xs):
+            y, real = ref.lowpass(y, x, k), ref.lowpass_real(real, x, k / 65536)
+            v.rows.append([int(n == 0), k, x, y])
+            v.compare([real], [y / 65536])
+    return v
+
+
+# ---- sine, circle, transformations ----------------------------------------------------------------------------------
+
+def sine_table(_):
+    return Vectors("sine_table", "every entry of the sine table", "sin(2 pi i / 128) * 32757, nearest", "value:s16",
+                   [[x] for x in ref.sine_table()])
+
+
+def circle_table(_):
+    return Vectors("circle_table", "every entry of the circle table", "sqrt(1 - (i/64)^2) * 32767, rounded down",
+                   "value:s16", [[x] for x in ref.circle_table()])
+
+
+def sincos(rng):
+    v = Vectors("sincos", "sine and cosine: table points, their neighbours, the borders between them, a random sample",
+                "angle 65536 = one turn; sin, cos Q15; checksum s = 31 s + word over sin, cos of all 65536 angles",
+                "angle:u16 sin:s16 cos:s16", least_db=69.0)
+    everything = [ref.sincos(a) for a in range(65536)]
+    for a, sc in enumerate(everything):
+        v.compare(ref.sincos_real(a), sc)
+    v.constants["checksum"] = ref.polynomial_checksum(x for sc in everything for x in sc)
+    angles = [(512 * i + d) % 65536 for i in range(128) for d in (-256, -1, 0, 1, 255)] + dither(rng, 0, 65535, 60)
+    v.rows = [[a, *everything[a]] for a in angles]
+    return v
+
+
+def circle(_):
+    v = Vectors("circle", "sqrt(1 - x^2): table points, the middle and the end of every interval",
+                "x, value Q15; checksum s = 31 s + word over all x from 0 to 32767; the ratio is for x up to 31/32", "x:s16 value:s16", least_db=52.0)
+    everything = [ref.circle(x) for x in range(32768)]
+    used = range(32768 * 31 // 32 + 1)  # both users end at 31/32; beyond, the chord of the steep end is 4 % below
+    v.compare((ref.circle_real(x) for x in used), everything)
+    v.constants["checksum"] = ref.polynomial_checksum(everything)
+    v.rows = [[x, everything[x]] for i in range(64) for x in (512 * i, 512 * i + 1, 512 * i + 256, 512 * i + 511)]
+    return v
+
+
+def clarke(rng):
+    v = Vectors("clarke", "Clarke: the largest currents and offsets, a circle of full-scale current, a random sample",
+                "a, b Q13 phase currents; alpha, beta Q14", "a:s16 b:s16 alpha:s16 beta:s16", least_db=80.0)
+    edges = [-10240, -8192, -1, 0, 1, 8192, 10240]
+    pairs = [(a, b) for a in edges for b in edges if abs(a + b) <= 10240]  # the third phase has the same range
+    pairs += [(round(8192 * math.cos(t)), round(8192 * math.cos(t - 2 * math.pi / 3)))
+              for t in (2 * math.pi * n / 48 for n in range(48))]
+    pairs += [p for p in zip(dither(rng, -10240, 10240, 150), dither(rng, -10240, 10240, 150)) if abs(sum(p)) <= 10240]
+    for a, b in pairs:
+        out = ref.clarke(a, b)
+        v.rows.append([a, b, *out])
+        v.compare(ref.clarke_real(a, b), out)
+    return v
+
+
+def rotations(rng, most):
+    angles = [n * 65536 // 24 for n in range(24)] + [1, 255, 256, 257, 65535]
+    rows = [(x, y, a) for x in (-most, 0, most) for y in (-most, 0, most) for a in angles if x or y]
+    return rows + [(*dither(rng, -most, most, 2), rng.randrange(65536)) for _ in range(120)]
+
+
+def park(rng):
+    v = Vectors("park", "Park: the largest vectors in 24 directions, a random sample",
+                "alpha, beta counts; angle 65536 = one turn; d, q half the counts",
+                "alpha:s16 beta:s16 angle:u16 d:s16 q:s16", least_db=68.0)
+    for x, y, angle in rotations(rng, 23170):
+        out = ref.park(x, y, *ref.sincos(angle))
+        v.rows.append([x, y, angle, *out])
+        v.compare(ref.park_real(x, y, 2 * math.pi * angle / 65536), out)
+    return v
+
+
+def inverse_park(rng):
+    v = Vectors("inverse_park", "inverse Park: the largest vectors in 24 directions, a random sample",
+                "d, q counts; angle 65536 = one turn; alpha, beta half the counts",
+                "d:s16 q:s16 angle:u16 alpha:s16 beta:s16", least_db=68.0)
+    for x, y, angle in rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)]:
+        out = ref.inverse_park(x, y, *ref.sincos(angle))
+        v.rows.append([x, y, angle, *out])
+        v.compare(ref.inverse_park_real(x, y, 2 * math.pi * angle / 65536), out)
+    return v
+
+
+# ---- modulator ------------------------------------------------------------------------------------------------------
+
+def svm(rng):
+    p = MACHINE.modulator()
+    v = Vectors("svm", "modulator at five bus voltages: every sector, its borders and their neighbours, up to and beyond "
+                "the voltage circle, every second row with dead-time compensation",
+                "alpha, beta Q13 volts; gain duty per volt count * 65536; currents Q13; a, b, c duty counts; "
+                "the ratio is that of the line voltages",
+                "alpha:s16 beta:s16 gain:u16 i_a:s16 i_b:s16 i_c:s16 a:u16 b:u16 c:u16", constants=dict(p), least_db=57.0)
+    degrees = sorted({*range(0, 360, 30), *(s + d for s in range(0, 360, 60) for d in (-1, 1)), 17, 101, 223, 318})
+    for bus_v in (12.0, 18.0, 24.0, 30.0, 34.0):
+        gain = MACHINE.duty_per_volt_q16(bus_v)
+        radius = MACHINE.circle_radius_q14(bus_v) / 2
+        for part in (0.02, 0.3, 0.7, 1.0, 1.1, 1.8):
+            for n, angle in enumerate(degrees):
+                vector = cmath.rect(part * radius, math.radians(angle))
+                alpha, beta = round(vector.real), round(vector.imag)
+                currents = [0, 0, 0]
+                if n % 2:
+                    currents = dither(rng, -400, 400, 2)
+                    currents.append(-sum(currents))
+                a, b, c = ref.svm(p, alpha, beta, gain, currents)
+                ra, rb, rc = ref.svm_real(p, alpha, beta, gain, currents)
+                v.rows.append([alpha, beta, gain, *currents, a, b, c])
+                v.compare([ra - rb, rb - rc], [a - b, b - c])
+    return v
+
+
+# ---- controllers ----------------------------------------------------------------------------------------------------
+
+def pi(rng):
+    v = Vectors("pi", "PI: small signals, wind-up against both limits, recovery, no and full anti-windup, limit zero and full",
+                "op 0 tick, 1 clear and tick, 2 preset (err, and limit is the wanted output); sum after the step; "
+                "U counts = output counts << shift; the ratio is for shifts in use (10 and more)",
+                "op:u16 kp:s16 ki:s16 kc:s16 shift:u16 err:s16 limit:s16 out:s16 sum:s32", least_db=62.0)
+    half_full = ref.q15(0.999)
+    for gains in ((6538, 455, half_full, 10), (3000, 40, half_full, 13), (20, 7, 0, 0), (6538, 455, 0, 10),
+                  (16384, 9000, 32767, 14), (900, 300, 16384, 4)):
+        size = max(1, (2000 << gains[3]) // gains[0])  # an error whose proportional share is about 2000 counts
+        small, large = min(size // 4, 16000), min(3 * size, 32767)
+        steps = [(1, small, 32767)] + [(0, small, 32767)] * 5 + [(0, large, 2000)] * 20 + [(0, -small, 2000)] * 20
+        steps += [(0, -large, 1500)] * 20 + [(0, small, 1500)] * 20 + [(0, small, 0)] * 3 + [(0, -small, 0)] * 3
+        steps += [(0, 0, 32767), (2, large, 1234), (0, large, 2000), (2, -small, -987), (0, -small, 2000)]
+        steps += [(0, e, 3000) for e in dither(rng, -large, large, 12)]
+        if gains[2]:
+            steps += [(0, 32767, 0), (0, -32767, 0), (0, 32767, 32767), (0, -32767, 32767)]
+        model, real = ref.Pi(*gains), ref.PiReal(*gains)
+        for op, err, limit in steps:
+            if op == 1:
+                model.sum, real.sum = 0, 0.0
+            if op == 2:
+                model.preset(err, limit)
+                real.preset(err, limit)
+                v.rows.append([op, *gains, err, limit, limit, model.sum])
+                continue
+            out, exact = model.tick(err, limit), real.tick(err, limit)
+            v.rows.append([op, *gains, err, limit, out, model.sum])
+            if gains[3] >= 10 or not gains[2]:  # the excess counts in steps of 65536 >> shift output counts
+                v.compare([exact], [out])
+    return v
+
+
+RADII = (8193, 10000, 12287, 15974, 19000, 22630, 30350)
+
+
+def voltage_circle(_):
+    v = Vectors("voltage_circle", "d-axis limit and what the circle leaves to the q axis, in steps of 1/64 of the d limit",
+                "radius, Vd, limits Q14; checksum_<radius>: s = 31 s + word over Vd from -limit to +limit",
+                "radius:s16 vd_limit:s16 vd:s16 vq_limit:s16", least_db=59.0)
+    for radius in RADII:
+        most = ref.vd_limit(radius)
+        everything = [ref.vq_limit(radius, vd) for vd in range(-most, most + 1)]
+        v.constants[f"checksum_{radius}"] = ref.polynomial_checksum(everything)
+        v.compare((ref.vq_limit_real(radius, vd) for vd in range(-most, most + 1)), everything)
+        v.rows += [[radius, most, vd, everything[vd + most]] for vd in sorted({-most, *range(-63 * most // 64, most, max(1, most // 12)), 0, most})]
+    return v
+
+
+def current_control(rng):
+    gains = (6538, 455, ref.q15(0.999), 10)
+    v = Vectors("current_control", "both current controllers on a sequence that runs into the d limit and the circle and back",
+                "references, currents Q13; radius, voltages, q limit Q14; sequence from cleared integrators",
+                "ref_d:s16 ref_q:s16 meas_d:s16 meas_q:s16 radius:s16 v_d:s16 v_q:s16 limit_q:s16",
+                constants=dict(zip(("kp", "ki", "kc", "shift"), gains)), least_db=60.0)
+    pi_d, pi_q, real_d, real_q = ref.Pi(*gains), ref.Pi(*gains), ref.PiReal(*gains), ref.PiReal(*gains)
+    plan = [(0, 2000, 15974, 60), (-3000, 4000, 15974, 60), (-1000, -4000, 15974, 80), (3000, -100, 15974, 60),
+            (0, 5000, 9000, 60), (0, -200, 9000, 80), (-2000, 300, 22630, 60)]
+    d = q = 0.0
+    for ref_d, ref_q, radius, count in plan:
+        for _ in range(count):
+            meas = [round(d) + rng.randrange(-8, 9), round(q) + rng.randrange(-8, 9)]
+            out = ref.current_control(pi_d, pi_q, (ref_d, ref_q), meas, radius)
+            v_d = real_d.tick(ref_d - meas[0], ref.vd_limit(radius))
+            limit = ref.vq_limit_real(radius, v_d)
+            v.compare([v_d, real_q.tick(ref_q - meas[1], limit), limit], out)
+            v.rows.append([ref_d, ref_q, *meas, radius, *out])
+            d += 0.02 * out[0] - 0.07 * d       # a plant of first order that cannot follow everything
+            q += 0.02 * (out[1] - 9000) - 0.07 * q
+    return v
+
+
+def current_limit(_):
+    v = Vectors("current_limit", "q-current limit sqrt(Imax^2 - Id^2) for a wanted d current, which is limited to 31/32 Imax first",
+                "Q13; reciprocal 2^25/Imax", "maximum:s16 reciprocal:u16 wanted_d:s16 ref_d:s16 iq_limit:s16", least_db=52.0)
+    for amperes in (0.28, 1.0, 2.75, 3.8):
+        maximum = ref.nearest(amperes / MACHINE.i0 / 4)
+        most = maximum - maximum // 32
+        wanted = sorted({n * maximum // 20 for n in range(-20, 21)} | {most, -most, most + 1, -most - 1, most - 1, 1, -1})
+        for i_d in wanted:
+            ref_d = ref.clamp(i_d, -most, most)
+            limit = ref.iq_limit(maximum, ref_d)
+            v.rows.append([maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d, limit])
+            v.compare([math.sqrt(maximum ** 2 - ref_d ** 2)], [limit])
+    return v
+
+
+# ---- estimator ------------------------------------------------------------------------------------------------------
+
+def profile(points):
+    """Linear between (sample, value) points; every sample."""
+    out = []
+    for (n0, y0), (n1, y1) in zip(points, points[1:]):
+        out += [y0 + (y1 - y0) * (n - n0) / (n1 - n0) for n in range(n0, n1)]
+    return out + [points[-1][1]]
+
+
+ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); closed 1 = in the frame "
+                    "of estimator_next_angle(); inv_kfi the note's; omega electrical rpm; rho upper word after the tick; the "
+                    "ratio is that of omega and of the angle in steady state")
+
+
+def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter, least_db, compare_from):
+    """@param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio"""
+    m, p = MACHINE, MACHINE.estimator()
+    constants = dict(p, kfilter_esdq_q16=2 * kfilter)
+    del constants["inv_kfi"]
+    v = Vectors(name, what, ESTIMATOR_FORMAT,
+                "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 closed:u16 inv_kfi:s16 omega:s16 rho:u16",
+                constants=constants, least_db=least_db)
+    model, real = ref.Estimator(p, 2 * kfilter), ref.EstimatorReal(m, kfilter / 32768)
+    amperes, volts, turns = ref.synthetic_motor(m, speed, current)
+    frame = ref.sincos(0)
+    for n, (i, u) in enumerate(zip(amperes, volts)):
+        now = (ref.nearest(i.real / m.i0 / 2), ref.nearest(i.imag / m.i0 / 2))
+        command = (ref.nearest(u.real / m.u0 / 4), ref.nearest(u.imag / m.u0 / 4))
+        kfi = ref.nearest(p["inv_kfi"] * inv_kfi[n])
+        closed = n >= closed_from
+        if closed:
+            model.tick_closed(now, p["ls_q16"], kfi, frame)
+        else:
+            model.tick_free(now, p["ls_q16"], kfi)
+        real.tick(complex(*now) * 2 * m.i0, kfi / 16384 / m.inv_kfi, closed)
+        frame = ref.sincos(model.next_angle())
+        model.commanded(command)
+        real.commanded(complex(*command) * 4 * m.u0)
+        v.rows.append([*now, *command, int(closed), kfi, model.omega, model.rho >> 16])
+        if n in compare_from:
+            v.compare([real.omega, 0.0], [model.omega, ref.wrap16(model.rho // 65536 - round(real.rho * 65536))])
+    return v, model, real, turns
+
+
+def angle_error_deg(m, model, turns, speed, n):
+    """Rotor ahead of the estimate, both half a period after sample n."""
+    true = turns[n] + speed[n] * m.turns_per_erpm / 2
+    return ref.wrap16(round(true * 65536) - (model.rho >> 16)) * 360 / 65536
+
+
+def require_lock(v, error_deg, expected_deg, within_deg):
+    if abs(error_deg - expected_deg) > within_deg:
+        raise ValueError(f"{v.name}: the angle error is {error_deg:.2f} deg, expected {expected_deg:.2f}")
+
+
+def estimator_start(_):
+    speed = profile([(0, 0.0), (200, 0.0), (1600, 5000.0), (2500, 5000.0)])
+    current = [1.41 * cmath.rect(1, math.radians(x)) for x in profile([(0, 5.0), (2000, 20.0), (2100, 80.0), (2500, 80.0)])]
+    v, model, real, turns = estimator_sequence(
+        "estimator_start", "estimator from standstill: the start ramp in its own frame, then the control frame, a load change",
+        speed, current, 1900, [1.0] * 2500, 1200, 45.0, range(1600, 2500))
+    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2499), 0.0, 1.0)
+    return v
+
+
+def estimator_speed(_):
+    speed = profile([(0, 5000.0), (600, 5000.0), (1000, 13900.0), (1200, 14100.0), (1900, 27500.0), (2500, 27500.0)])
+    current = profile([(0, 0.5j), (500, 0.5j), (520, 2j), (1000, 1j), (1900, -2.2 + 0.4j), (2100, -2.2 + 0.4j),
+                       (2110, -2.2 + 1.0j), (2500, -2.2 + 1.0j)])
+    v, model, real, turns = estimator_sequence(
+        "estimator_speed", "estimator started on a turning motor: lock, load step, across nominal speed, field weakening at 5500 rpm",
+        speed, current, 0, [1.0] * 2500, 1200, 45.0, range(500, 2500))
+    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2499), 0.0, 1.5)
+    return v
+
+
+def estimator_reversal(_):
+    speed = profile([(0, -5000.0), (600, -5000.0), (1200, -800.0), (1500, 0.0), (1700, 1200.0), (2300, 6000.0), (2700, 6000.0)])
+    current = profile([(0, -1j), (600, -1j), (700, 1j), (2000, 1j), (2700, 0.3j)])
+    v, model, real, turns = estimator_sequence(
+        "estimator_reversal", "estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
+        speed, current, 0, [1.0] * 2700, 1200, 45.0, [*range(500, 1200), *range(2300, 2700)])
+    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2699), 0.0, 1.0)
+    return v
+
+
+def estimator_kphi(_):
+    ratios = [1.0] * 500 + [1.1] * 500 + [2.0] * 700 + [0.8] * 800
+    speed = [7500.0] * 2501
+    v, model, real, turns = estimator_sequence(
+        "estimator_kphi", "estimator with a wrong Kphi: K'/K = 1, 1.1, 2, 0.8; the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the "
+        "speed stays", speed, [0.8j] * 2501, 0, ratios, 1200, 45.0, [*range(400, 500), *range(900, 1000), *range(2400, 2500)])
+    for end in (500, 1000, 1700, 2500):
+        rho = v.rows[end - 1][7]
+        true = turns[end - 1] + 7500.0 * MACHINE.turns_per_erpm / 2
+        error = ref.wrap16(round(true * 65536) - rho) * 360 / 65536
+        # K'/K in Kphi is inv_kfi's inverse ratio
+        require_lock(v, error, ref.lock_error_deg(1 / ratios[end - 1]), 0.5)
+        v.constants[f"error_counts_{end}"] = ref.nearest(ref.lock_error_deg(1 / ratios[end - 1]) / 360 * 65536)
+        v.constants[f"true_rho_{end}"] = round(true * 65536) % 65536
+    return v
+
+
+# ---- field weakening, start, drive ----------------------------------------------------------------------------------
+
+PUBLISHED = {
+    "inv_kfi": [7956, 8674, 9156, 9638, 10120, 10602, 11084, 11566, 12048, 12530, 13012, 13494, 13976, 14458, 14940, 15422, 15904, 16387],
+    "idref": [ref.nearest(-a / 0.000121 / 4) for a in
+              (0, .7, .9, 1.0, 1.4, 1.7, 2.0, 2.1, 2.2, 2.25, 2.3, 2.35, 2.4, 2.45, 2.5, 2.5, 2.5, 2.5)],
+    "ls": [ref.nearest(x * 32768) for x in (.5, .45, .4, .4, .35, .35, .34, .34, .33, .33, .32, .32, .31, .30, .29, .28, .27, .26)],
+}
+
+
+def fieldweak_tables(_):
+    """A table that falls, rises and jumps everywhere, so that no index can stand in for another."""
+    v = Vectors("fieldweak_tables", "the published tables of the field-weakening vectors", "Id Q13 at 0.000121 A/count; 1/Kphi Q15/2; "
+                "Ls/(2 Ls0) Q15", "idref:s16 inv_kfi:s16 ls:s16")
+    v.rows = [list(x) for x in zip(PUBLISHED["idref"], PUBLISHED["inv_kfi"], PUBLISHED["ls"])]
+    return v
+
+
+def fieldweak(rng):
+    on_speed, ls_base = 13000, MACHINE.estimator()["ls_q16"]
+    v = Vectors("fieldweak", "table look-up: below and at the start speed, every index with its borders and inside, the end, beyond the end",
+                "ref electrical rpm; id Q13; emf_max Q12; ls_q16; above 1 = the filter of field weakening",
+                "ref:s16 index:u16 idref:s16 inv_kfi:s16 emf_max:s16 ls_q16:u16 above:u16",
+                constants={"on_speed": on_speed, "ls_base": ls_base}, least_db=75.0)
+    speeds = [0, 1, 12999] + [on_speed + 1024 * i + d for i in range(18) for d in (-1, 0, 1, 511, 512, 1023)]
+    speeds += [30407, 30408, 30409, 31432, 32000, 32766, 32767] + dither(rng, 13000, 32767, 40)
+    for x in [*speeds, *(-s for s in speeds[::3]), -32767, -32768]:
+        if x > 32767:
+            continue
+        out = ref.fieldweak(PUBLISHED, on_speed, ls_base, x)
+        v.rows.append([x, *out])
+        v.compare(ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[4]])
+    return v
+
+
+def forced_angle(_):
+    exact_end = 1000 * 5 * 50e-6 / 60 * 65536 * 1024
+    rate, end = 10, round(exact_end)
+    v = Vectors("forced_angle", "start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, every 499th period",
+                "tick number; speed 1/1024 counts per period; angle 2^-32 turns; at_end is 1 from tick 27962 = 1.398 s on",
+                "direction:s16 tick:u16 speed:s32 angle:u32 at_end:u16",
+                constants={"end_speed_q10": end, "increase_rate_q10": rate}, least_db=80.0)
+    for direction in (1, -1):
+        speed, angle, exact, exact_speed = 0, 0, 0.0, 0.0
+        for tick in range(1, 31001):
+            speed, angle, at_end = ref.forced_angle(rate, end, direction, speed, angle)
+            exact_speed = min(exact_speed + rate, exact_end)
+            exact += exact_speed / 1024
+            if tick % 499 == 1 or 27960 <= tick <= 27964:
+                v.rows.append([direction, tick, speed, angle, at_end])
+                v.compare([exact], [exact + ref.wrap16(round(direction * angle / 65536 - exact) % 65536)])
+    return v
+
+
+def speed_ramp(rng):
+    v = Vectors("speed_ramp", "reference ramp: far, nearer than two steps (snap), exactly two steps, across zero, at the ends of the range",
+                "electrical rpm", "reference:s16 target:s16 step:s16 next:s16")
+    for step in (1, 8, 100, 1000):
+        for base in (-5000, -1, 0, 7, 14000):
+            for d in (-3 * step, -2 * step - 1, -2 * step, -2 * step + 1, -step, -1, 0, 1, step, 2 * step - 1, 2 * step, 2 * step + 1, 9 * step):
+                v.rows.append([base, base + d, step])
+    v.rows += [[-32768, 32767, 8], [32767, -32768, 8], [32767, 32767, 1], [-32768, -32768, 1], [32760, 32767, 8], [-32760, -32768, 8]]
+    v.rows += [[*dither(rng, -32000, 32000, 2), rng.randrange(1, 700)] for _ in range(40)]
+    for row in v.rows:
+        row.append(ref.speed_ramp(*row))
+    return v
+
+
+def hand_over(rng):
+    v = Vectors("hand_over", "hand-over: voltage and current vectors seen from the estimator's frame, measured offset of every size and sign",
+                "angles 65536 = one turn; voltages Q14; currents Q13; i_q the signed open-loop current",
+                "forced:u16 estimated:u16 v_d:s16 v_q:s16 i_q:s16 offset:s16 new_v_d:s16 new_v_q:s16 new_i_d:s16 new_i_q:s16",
+                least_db=65.0)
+    for offset in [0, 1, -1, 100, -100, 8192, -8192, 15000, -15000, 16384, -16384, 30000, -30000, -32768, 32767] + dither(rng, -32768, 32767, 50):
+        forced = rng.randrange(65536)
+        u = cmath.rect(rng.uniform(500, 15000), rng.uniform(0, 6.3))
+        args = (forced, (forced - offset) % 65536, (round(u.real), round(u.imag)), rng.choice((-2625, 2625)))
+        out = ref.hand_over(*args)
+        v.rows.append([args[0], args[1], *args[2], args[3], *out])
+        v.compare(ref.hand_over_real(*args), out[1:])
+    return v
+
+
+def params(_):
+    """Published constants of the note's motor and, in float64, what include/drive/params.h must give to 1 count."""
+    v = Vectors("params", "constants of Equations 5 to 8 for the note's motor with four current ranges (A * 100 in the name)",
+                "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; rs, ls, inv_kfi, deltat in the note's format, pre-divided by "
+                "2, 256, 2, 1; the rest in the drive's formats")
+    published = {"c395": (12990, 1460), "c709": (23316, 2620), "c440": (14470, 1626)}
+    for amperes in (3.95, 7.09, 4.4, 22.0):
+        m = ref.Machine(peak_current_a=amperes)
+        key = f"c{round(amperes * 100)}"
+        note = (ref.nearest(m.rs * 16384), ref.nearest(m.ls * 128))
+        if key in published:
+            if any(abs(a - b) > 1 for a, b in zip(note, published[key])):
+                raise ValueError(f"params: {note} are not the published {published[key]}")
+            v.constants[f"{key}_norm_rs"], v.constants[f"{key}_norm_ls"] = published[key]
+        for name, value in m.estimator().items():
+            v.constants[f"{key}_{name}"] = value
+    m = MACHINE
+    v.constants["norm_deltat"] = ref.nearest(m.turns_per_erpm * 2 ** 31)
+    v.constants["norm_invkfi"] = ref.nearest(m.inv_kfi * 16384)
+    v.constants["norm_current_141_at_121"] = ref.q15(1.41 / 0.000121 / 32768)
+    v.constants["end_speed_q10"] = round(1000 * 5 * 50e-6 / 60 * 65536 * 1024)
+    for name, value in m.modulator().items():
+        v.constants[f"svm_{name}"] = value
+    v.constants["duty_per_volt_24"] = m.duty_per_volt_q16(24.0)
+    v.constants["duty_per_volt_12"] = m.duty_per_volt_q16(12.0)
+    v.constants["radius_24"] = m.circle_radius_q14(24.0)
+    v.constants["radius_34"] = m.circle_radius_q14(34.0)
+    return v
+
+
+BLOCKS = (multiply, divide, limits, lowpass, sine_table, circle_table, sincos, circle, clarke, park, inverse_park, svm, pi,
+          voltage_circle, current_control, current_limit, estimator_start, estimator_speed, estimator_reversal, estimator_kphi,
+          fieldweak_tables, fieldweak, forced_angle, speed_ramp, hand_over, params)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="compare with the committed files instead of writing them")
+    parser.add_argument("--ratios", action="store_true", help="print the signal-to-noise table")
+    options = parser.parse_args()
+    folder = HERE / "vectors"
+    folder.mkdir(exist_ok=True)
+    bad = 0
+    expected = set()
+    for block in BLOCKS:
+        # a generator for each block: a change in one leaves the others' files alone
+        v = block(random.Random(f"{SEED} {block.__name__}"))
+        text, path = v.text(), folder / f"{v.name}.txt"
+        expected.add(path.name)
+        if options.ratios:
+            print(f"{v.name:20s} {len(v.rows):5d} rows  " + (f"{v.ratio_db():6.1f} dB, at least {v.least_db:g}" if v.real else "   exact"))
+        if not options.check:
+            path.write_text(text, encoding="ascii")
+        elif not path.exists() or path.read_text(encoding="ascii") != text:
+            print(f"foc33: golden vectors differ, test/golden/vectors/{path.name}: run make golden and commit the result", file=sys.stderr)
+            bad = 1
+    for path in sorted(folder.glob("*.txt")):
+        if path.name not in expected:
+            print(f"foc33: no generator, test/golden/vectors/{path.name}: remove it", file=sys.stderr)
+            bad = 1
+    return bad
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+/* The clock: 8 MHz crystal through the PLL to 40 MIPS, and waits that end when the hardware does not answer. */
+#include "hurst_params.h"
+
+#include <xc.h>
+
+/* A stubborn oscillator: what the firmware writes is recorded, the switch happens only if the test says so. */
+static uint16_t oscillator_answers, written_high, written_low, writes;
+
+static void oscillator_high(uint16_t value)
+{
+    written_high = value;
+    writes = (uint16_t)(writes * 10u + 1u);
+    if (oscillator_answers) {
+        host_write_oscconh(value);
+    }
+}
+
+static void oscillator_low(uint16_t value)
+{
+    written_low = value;
+    writes = (uint16_t)(writes * 10u + 2u);
+    if (oscillator_answers) {
+        host_write_oscconl(value);
+    }
+}
+
+#undef __builtin_write_OSCCONH
+#undef __builtin_write_OSCCONL
+#define __builtin_write_OSCCONH(value) oscillator_high((uint16_t)(value))
+#define __builtin_write_OSCCONL(value) oscillator_low((uint16_t)(value))
+#include "firmware/board/clock.c"
+
+#include "unity.h"
+
+void setUp(void)
+{
+    host_registers_reset();
+    OSCCON = 0x0000; /* running on the internal FRC, as after reset */
+    oscillator_answers = 1;
+    writes = 0;
+}
+
+void tearDown(void)
+{
+}
+
+void test_pll_makes_80_MHz_of_8(void)
+{
+    (void)clock_init();
+    TEST_ASSERT_EQUAL_UINT16(38, PLLFBD);       /* times 40 */
+    TEST_ASSERT_EQUAL_HEX16(0x0000, CLKDIV);    /* by 2 before and 2 after, no doze */
+    TEST_ASSERT_EQUAL_HEX16(0x0000, OSCTUN);
+}
+
+void test_switches_to_the_crystal_with_pll_and_reports_success(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(0, clock_init());
+    TEST_ASSERT_EQUAL_UINT16(3, OSCCONbits.COSC);
+    TEST_ASSERT_EQUAL_UINT16(1, OSCCONbits.LOCK);
+    TEST_ASSERT_EQUAL_UINT16(12, writes); /* source first, then the switch */
+    TEST_ASSERT_EQUAL_UINT16(3, written_high);
+    TEST_ASSERT_EQUAL_UINT16(1, written_low & 1u);
+}
+
+void test_software_watchdog_is_off(void)
+{
+    RCONbits.SWDTEN = 1;
+    (void)clock_init();
+    TEST_ASSERT_EQUAL_UINT16(0, RCONbits.SWDTEN);
+}
+
+void test_a_switch_that_never_happens_ends_and_is_reported(void)
+{
+    oscillator_answers = 0;
+    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
+}
+
+void test_a_pll_that_never_locks_ends_and_is_reported(void)
+{
+    oscillator_answers = 0;
+    OSCCON = 0x3300; /* switched, not locked */
+    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
+}
+
+void test_a_locked_pll_of_another_source_is_reported(void)
+{
+    oscillator_answers = 0;
+    OSCCON = 0x1120; /* FRC with PLL */
+    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
+}
+
+void test_the_wait_is_long_enough_for_crystal_and_lock(void)
+{
+    /* a loop takes at least 3 clocks; 2 ms are needed, at 40 MIPS at worst */
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(2ul * 40000ul, 3ul * BOARD_WAIT_LOOPS);
+}

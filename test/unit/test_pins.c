@@ -1,0 +1,66 @@
+/* Pins: what is analogue, what is driven, and which peripheral reaches which pin. */
+#include "hurst_params.h"
+
+#include "firmware/board/pins.c"
+
+#include "unity.h"
+
+void setUp(void)
+{
+    host_registers_reset();
+    LATA = LATB = LATC = 0xFFFF;
+    pins_init();
+}
+
+void tearDown(void)
+{
+}
+
+void test_currents_bus_and_pot_are_analogue_and_nothing_else(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0xFEF8, AD1PCFGL); /* AN0, AN1, AN2, AN8 */
+}
+
+void test_only_leds_and_transmitter_are_outputs(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0xFFFF, TRISA);
+    TEST_ASSERT_EQUAL_HEX16(0xFFFF, TRISB);
+    TEST_ASSERT_EQUAL_HEX16(0xFF37, TRISC); /* RC3 transmits, RC6 and RC7 are LEDs */
+}
+
+void test_every_latch_starts_low(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0, LATA);
+    TEST_ASSERT_EQUAL_HEX16(0, LATB);
+    TEST_ASSERT_EQUAL_HEX16(0, LATC);
+}
+
+void test_fault_input_is_RP8(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(8, RPINR12bits.FLTA1R);
+}
+
+void test_uart_is_on_RP19_and_RP20(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(20, RPINR18bits.U1RXR);
+    TEST_ASSERT_EQUAL_UINT16(3, RPOR9bits.RP19R); /* U1TX */
+    TEST_ASSERT_EQUAL_HEX16(0x0300, RPOR9);
+}
+
+void test_pin_selection_is_locked_again(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(1, OSCCONbits.IOLOCK);
+}
+
+void test_buttons_are_active_low_on_RA8_and_RB4(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(0, BOARD_S2_DOWN());
+    TEST_ASSERT_EQUAL_UINT16(0, BOARD_S3_DOWN());
+    PORTAbits.RA8 = 0;
+    TEST_ASSERT_EQUAL_UINT16(1, BOARD_S2_DOWN());
+    TEST_ASSERT_EQUAL_UINT16(0, BOARD_S3_DOWN());
+    PORTAbits.RA8 = 1;
+    PORTBbits.RB4 = 0;
+    TEST_ASSERT_EQUAL_UINT16(0, BOARD_S2_DOWN());
+    TEST_ASSERT_EQUAL_UINT16(1, BOARD_S3_DOWN());
+}
