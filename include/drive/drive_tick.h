@@ -322,6 +322,8 @@ QM_INLINE void drive_idle(drive_t *d, const drive_params_t *p, const drive_sampl
         drive_calibrate(d, p, raw);
         break;
     case DRIVE_STOPPED:
+        d->estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
+        d->control.reference_erpm = 0;
         if (d->command.run) {
             d->timer = 0;
             d->state = (uint16_t)DRIVE_BOOTSTRAP;

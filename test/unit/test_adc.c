@@ -1,7 +1,23 @@
 /* ADC1's registers against the device facts: four channels at once, signed fractional, started by the PWM. */
 #include "hurst_params.h"
 
+#include <xc.h>
+
+/* Every access to AD1CON1 is seen: the last one switches the converter on. */
+static uint16_t enabled_then, channels_then, clock_then, input_then;
+
+static volatile uint16_t *watch_control(volatile uint16_t *control)
+{
+    enabled_then = IEC0bits.AD1IE;
+    channels_then = AD1CON2;
+    clock_then = AD1CON3;
+    input_then = AD1CHS0;
+    return control;
+}
+
+#define AD1CON1 (*watch_control(&AD1CON1))
 #include "firmware/board/adc.c"
+#undef AD1CON1
 
 #include "unity.h"
 
@@ -42,6 +58,14 @@ void test_channels_are_pot_currents_and_bus(void)
     TEST_ASSERT_EQUAL_HEX16(0x0008, AD1CHS0);   /* CH0 = AN8 */
     TEST_ASSERT_EQUAL_HEX16(0x0000, AD1CHS123); /* CH1..3 = AN0..2 against ground */
     TEST_ASSERT_EQUAL_HEX16(0x0000, AD1CSSL);
+}
+
+void test_converter_is_switched_on_last(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(1, enabled_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0200, channels_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0002, clock_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0008, input_then);
 }
 
 void test_control_interrupt_is_enabled_at_priority_5_with_its_flag_clear(void)

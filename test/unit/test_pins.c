@@ -1,6 +1,23 @@
 /* Pins: what is analogue, what is driven, and which peripheral reaches which pin. */
 #include "hurst_params.h"
 
+#include <xc.h>
+
+/* Each write of the lock bit, and what the pin selection held then: only between unlock and lock does the chip take a write. */
+static uint16_t lock_writes, lock_bit[2], fault_pin_then[2];
+
+static void write_lock(uint16_t value)
+{
+    if (lock_writes < 2u) {
+        lock_bit[lock_writes] = (value >> 6) & 1u;
+        fault_pin_then[lock_writes] = RPINR12;
+    }
+    lock_writes++;
+    host_write_oscconl(value);
+}
+
+#undef __builtin_write_OSCCONL
+#define __builtin_write_OSCCONL(value) write_lock((uint16_t)(value))
 #include "firmware/board/pins.c"
 
 #include "unity.h"
@@ -9,6 +26,7 @@ void setUp(void)
 {
     host_registers_reset();
     LATA = LATB = LATC = 0xFFFF;
+    lock_writes = 0;
     pins_init();
 }
 
@@ -47,8 +65,13 @@ void test_uart_is_on_RP19_and_RP20(void)
     TEST_ASSERT_EQUAL_HEX16(0x0300, RPOR9);
 }
 
-void test_pin_selection_is_locked_again(void)
+void test_pin_selection_is_unlocked_written_and_locked_again(void)
 {
+    TEST_ASSERT_EQUAL_UINT16(2, lock_writes);
+    TEST_ASSERT_EQUAL_UINT16(0, lock_bit[0]);
+    TEST_ASSERT_EQUAL_HEX16(0x001F, fault_pin_then[0]); /* as after reset */
+    TEST_ASSERT_EQUAL_UINT16(1, lock_bit[1]);
+    TEST_ASSERT_EQUAL_HEX16(0x0008, fault_pin_then[1]);
     TEST_ASSERT_EQUAL_UINT16(1, OSCCONbits.IOLOCK);
 }
 

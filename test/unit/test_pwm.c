@@ -1,7 +1,25 @@
 /* PWM1's registers against the device facts: 20 kHz centre-aligned, 2 us dead time, fault input, trigger, outputs off. */
 #include "hurst_params.h"
 
+#include <xc.h>
+
+/* Every access to P1TCON is seen: what the other registers hold when the module is switched on is part of the contract. */
+static uint16_t accesses, override_then, dead_time_then, fault_input_then, pairs_then, first_period_then;
+
+static volatile uint16_t *watch_time_base(volatile uint16_t *time_base)
+{
+    accesses++;
+    override_then = P1OVDCON;
+    dead_time_then = P1DTCON1;
+    fault_input_then = P1FLTACON;
+    pairs_then = PWM1CON1;
+    first_period_then = P1TPER;
+    return time_base;
+}
+
+#define P1TCON (*watch_time_base(&P1TCON))
 #include "firmware/board/pwm.c"
+#undef P1TCON
 
 #include "unity.h"
 
@@ -31,6 +49,18 @@ void test_init_leaves_all_outputs_off(void)
     TEST_ASSERT_EQUAL_UINT16(0, P1DC1);
     TEST_ASSERT_EQUAL_UINT16(0, P1DC2);
     TEST_ASSERT_EQUAL_UINT16(0, P1DC3);
+}
+
+void test_module_is_switched_on_last_with_its_outputs_off(void)
+{
+    accesses = 0;
+    pwm_init();
+    TEST_ASSERT_EQUAL_UINT16(2, accesses); /* off first, on at the end */
+    TEST_ASSERT_EQUAL_HEX16(0x0000, override_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0068, dead_time_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0087, fault_input_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0077, pairs_then);
+    TEST_ASSERT_EQUAL_UINT16(999, first_period_then);
 }
 
 void test_time_base_is_on_centre_aligned_at_20_kHz(void)

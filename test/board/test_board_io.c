@@ -1,0 +1,232 @@
+/* Pins, timers and the serial port as the firmware and the user of the board see them. */
+#include "fake_firmware.inc"
+
+void setUp(void)
+{
+    fake_setup();
+}
+
+void tearDown(void)
+{
+    fake_teardown();
+}
+
+void test_buttons_pull_their_pins_low(void)
+{
+    power_up();
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(1, PORTAbits.RA8);
+    TEST_ASSERT_EQUAL_UINT(1, PORTBbits.RB4);
+    set("input.s2", 1.0);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(0, PORTAbits.RA8);
+    set("input.s3", 1.0);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(0, PORTBbits.RB4);
+    set("input.s2", 0.0);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(1, PORTAbits.RA8);
+}
+
+static void light_on(void)
+{
+    TRISCbits.TRISC6 = 0;
+    LATCbits.LATC6 = 1;
+}
+
+void test_an_output_latch_drives_its_pin(void)
+{
+    fake_init_hook = light_on;
+    power_up();
+    run(1);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RC6"));
+    TEST_ASSERT_EQUAL_UINT(1, PORTCbits.RC6);
+    set("reg.LATC", 0.0);
+    run(1);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("pin.RC6"));
+}
+
+static void write_port(void)
+{
+    TRISCbits.TRISC6 = 0;
+    PORTCbits.RC6 = 0;
+    PORTCbits.RC6 = 1;
+    PORTCbits.RC7 = 0;
+}
+
+void test_writing_a_port_reaches_the_latch_and_is_named(void)
+{
+    power_up();
+    run(1);
+    fake_background_hook = write_port;
+    run(8);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RC6"));
+    TEST_ASSERT_TRUE(warned_about("PORTC"));
+}
+
+void test_analogue_pins_read_zero_as_port_bits(void)
+{
+    power_up();
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(0, PORTAbits.RA0);
+    TEST_ASSERT_EQUAL_UINT(1, PORTBbits.RB1);
+    TEST_ASSERT_EQUAL_UINT(0, PORTCbits.RC2);
+}
+
+static void millisecond_timer(void)
+{
+    PR1 = 4999; /* 40 MHz / 8 / 5000 */
+    T1CON = 0x8010;
+    IEC0bits.T1IE = 1;
+}
+
+void test_timer_1_interrupts_every_millisecond(void)
+{
+    fake_init_hook = millisecond_timer;
+    power_up();
+    run(20000);
+    TEST_ASSERT_UINT_WITHIN(1, 1000, fake_timer_calls);
+    TEST_ASSERT_TRUE(TMR1 <= PR1);
+}
+
+static void polled_timer(void)
+{
+    PR1 = 4999;
+    T1CON = 0x8010;
+}
+
+void test_a_polled_timer_sets_its_flag(void)
+{
+    fake_init_hook = polled_timer;
+    power_up();
+    run(19);
+    TEST_ASSERT_EQUAL_UINT(0, IFS0bits.T1IF);
+    run(2);
+    TEST_ASSERT_EQUAL_UINT(1, IFS0bits.T1IF);
+    TEST_ASSERT_EQUAL_UINT(0, fake_timer_calls);
+}
+
+static void free_timer(void)
+{
+    T2CON = 0x8030; /* 1:256, runs to 0xFFFF */
+}
+
+void test_timer_2_counts_with_its_prescaler(void)
+{
+    fake_init_hook = free_timer;
+    power_up();
+    run(1000);
+    TEST_ASSERT_UINT_WITHIN(1, 7812, TMR2); /* 50 ms at 156.25 kHz */
+}
+
+static const char *text;
+
+static void send_text(void)
+{
+    if (*text != '\0' && !U1STAbits.UTXBF) {
+        U1TXREG = (uint16_t)(uint8_t)*text++;
+    }
+}
+
+static void uart_on(void)
+{
+    RPOR9bits.RP19R = 3;
+    RPINR18bits.U1RXR = 20;
+    U1MODEbits.BRGH = 1;
+    U1BRG = 86; /* 114943 baud */
+    U1MODEbits.UARTEN = 1;
+    U1STAbits.UTXEN = 1;
+}
+
+void test_sent_characters_arrive_in_order_at_the_baud_rate(void)
+{
+    char out[64] = {0};
+    text = "state run\r\n";
+    fake_init_hook = uart_on;
+    fake_background_hook = send_text;
+    power_up();
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(11, vb_uart_read(board, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING("state run\r\n", out);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 40e6 / 4.0 / 87.0, get("uart.baud"));
+    TEST_ASSERT_EQUAL_UINT(1, U1STAbits.TRMT);
+    TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
+}
+
+static void slow_uart(void)
+{
+    uart_on();
+    U1MODEbits.BRGH = 0;
+    U1BRG = 2082; /* 1200 baud: a character takes 8.3 ms */
+}
+
+void test_a_slow_line_fills_the_buffer_and_sets_utxbf(void)
+{
+    char out[64];
+    text = "0123456789";
+    fake_init_hook = slow_uart;
+    fake_background_hook = send_text;
+    power_up();
+    run(60);
+    TEST_ASSERT_EQUAL_UINT(1, U1STAbits.UTXBF);
+    TEST_ASSERT_EQUAL_UINT(0, U1STAbits.TRMT);
+    run(4000);
+    TEST_ASSERT_EQUAL_UINT(10, vb_uart_read(board, out, sizeof out));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("uart.lost_count"));
+}
+
+static void uart_without_pin(void)
+{
+    uart_on();
+    RPOR9 = 0;
+}
+
+void test_a_transmitter_without_a_pin_is_named(void)
+{
+    char out[8];
+    text = "x";
+    fake_init_hook = uart_without_pin;
+    fake_background_hook = send_text;
+    power_up();
+    run(40);
+    TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
+    TEST_ASSERT_TRUE(warned_about("RPOR9"));
+}
+
+static char received[16];
+static unsigned received_count;
+
+static void poll_receiver(void)
+{
+    if (U1STAbits.URXDA && received_count < sizeof received) {
+        received[received_count++] = (char)U1RXREG;
+    }
+}
+
+void test_received_characters_are_seen_once_each(void)
+{
+    memset(received, 0, sizeof received);
+    received_count = 0;
+    fake_init_hook = uart_on;
+    fake_background_hook = poll_receiver;
+    power_up();
+    TEST_ASSERT_EQUAL_UINT(5, vb_uart_write(board, "hello", 5));
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(5, received_count);
+    TEST_ASSERT_EQUAL_STRING("hello", received);
+}
+
+static void uart_interrupt_on(void)
+{
+    uart_on();
+    IEC0bits.U1RXIE = 1;
+}
+
+void test_received_characters_interrupt(void)
+{
+    fake_init_hook = uart_interrupt_on;
+    power_up();
+    TEST_ASSERT_EQUAL_UINT(3, vb_uart_write(board, "abc", 3));
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(3, fake_rx_calls);
+}

@@ -1,0 +1,241 @@
+/* The interrupts: one PWM period from converter to duties, the deadline, the fault input and the traps. */
+#include "hurst_params.h"
+
+#include "drive/drive_tick.h"
+
+/* The real tick, with what the hardware may do meanwhile behind it. */
+static uint16_t sample_arrives_meanwhile, flag_during_tick;
+
+static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
+#define drive_tick(d, p, raw) tick_and_meanwhile(d, p, raw)
+#include "firmware/board/isr.c"
+#undef drive_tick
+
+static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    flag_during_tick = IFS0bits.AD1IF;
+    if (sample_arrives_meanwhile) {
+        IFS0bits.AD1IF = 1;
+    }
+    return drive_tick(d, p, raw);
+}
+
+#include "unity.h"
+
+static int16_t raw_bus(float bus_v)
+{
+    return (int16_t)(bus_v / 52.8F * 65536.0F - 32768.0F);
+}
+
+static void control_interrupts(uint16_t periods)
+{
+    while (periods-- != 0u) {
+        IFS0bits.AD1IF = 1;
+        _ADC1Interrupt();
+    }
+}
+
+/** Running: LOCK has begun. */
+static void bring_to_lock(void)
+{
+    control_interrupts(1024);
+    drive_start(&board_drive, &board_params, 1);
+    control_interrupts(201);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, board_drive.state);
+}
+
+void setUp(void)
+{
+    host_registers_reset();
+    P1OVDCON = 0;
+    ADC1BUF3 = (uint16_t)raw_bus(24.0F);
+    drive_init(&board_drive, &board_params);
+    sample_arrives_meanwhile = 0;
+}
+
+void tearDown(void)
+{
+}
+
+void test_samples_come_from_the_channels_of_the_facts(void)
+{
+    ADC1BUF0 = (uint16_t)-11111; /* potentiometer */
+    ADC1BUF1 = (uint16_t)-4000;  /* phase a */
+    ADC1BUF2 = 8000u;            /* phase b */
+    ADC1BUF3 = (uint16_t)raw_bus(30.0F);
+    control_interrupts(400);
+    TEST_ASSERT_EQUAL_INT16(-11111, board_drive.pot_q15);
+    TEST_ASSERT_EQUAL_INT16(1000, board_drive.i_a_q13);
+    TEST_ASSERT_EQUAL_INT16(-2000, board_drive.i_b_q13);
+    TEST_ASSERT_INT16_WITHIN(2, BUS_Q15(30.0), qm_hi(board_drive.bus_q31));
+}
+
+void test_flag_is_cleared_before_the_work_so_that_a_late_sample_shows(void)
+{
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(0, flag_during_tick);
+    TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.AD1IF);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+}
+
+void test_outputs_stay_overridden_off_until_a_start(void)
+{
+    P1OVDCON = 0x3F00;
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    control_interrupts(3000);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_bootstrap_then_pwm(void)
+{
+    control_interrupts(1024);
+    drive_start(&board_drive, &board_params, 1);
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
+    control_interrupts(199);
+    TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+}
+
+void test_each_duty_reaches_its_own_pair(void)
+{
+    drive_t twin;
+    drive_samples_t raw = { -800, 400, 0, 0 };
+    drive_output_t expected;
+    bring_to_lock();
+    control_interrupts(300);
+    raw.v_bus = (int16_t)ADC1BUF3;
+    ADC1BUF1 = (uint16_t)raw.i_a;
+    ADC1BUF2 = (uint16_t)raw.i_b;
+    twin = board_drive;
+    expected = drive_tick(&twin, &board_params, &raw);
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(expected.duty.a, P1DC1);
+    TEST_ASSERT_EQUAL_UINT16(expected.duty.b, P1DC2);
+    TEST_ASSERT_EQUAL_UINT16(expected.duty.c, P1DC3);
+    TEST_ASSERT_TRUE(P1DC1 != P1DC2 && P1DC2 != P1DC3 && P1DC1 != P1DC3);
+}
+
+void test_duties_stay_within_the_timer(void)
+{
+    uint16_t n;
+    bring_to_lock();
+    for (n = 0; n < 4000u; n++) {
+        control_interrupts(1);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(2000, P1DC1);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(2000, P1DC2);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(2000, P1DC3);
+    }
+}
+
+void test_duties_after_the_boundary_are_an_overrun(void)
+{
+    bring_to_lock();
+    P1TMR = 0x0001; /* counting up: the duties have been loaded */
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_ISR_OVERRUN, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+}
+
+void test_duties_just_before_the_boundary_are_in_time(void)
+{
+    bring_to_lock();
+    P1TMR = 0x8001;
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+}
+
+void test_next_sample_during_the_interrupt_is_an_overrun(void)
+{
+    bring_to_lock();
+    sample_arrives_meanwhile = 1;
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_ISR_OVERRUN, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_outputs_stay_off_after_an_overrun(void)
+{
+    bring_to_lock();
+    P1TMR = 0x0001;
+    control_interrupts(1);
+    P1TMR = 0x81F4;
+    control_interrupts(1000);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_ISR_OVERRUN, board_drive.fault);
+}
+
+void test_software_overcurrent_is_off_within_the_period(void)
+{
+    bring_to_lock();
+    ADC1BUF1 = (uint16_t)(-4 * 7076);
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, board_drive.fault);
+}
+
+void test_fault_input_switches_off_and_keeps_its_code(void)
+{
+    bring_to_lock();
+    IFS3bits.FLTA1IF = 1;
+    _FLTA1Interrupt();
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(0, IFS3bits.FLTA1IF);
+    control_interrupts(100);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+}
+
+static void expect_trap(void (*trap)(void), drive_fault_t fault, uint16_t flags_left)
+{
+    setUp();
+    bring_to_lock();
+    INTCON1 = 0x001E; /* all four causes */
+    trap();
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+    TEST_ASSERT_EQUAL_HEX16(flags_left, INTCON1);
+    control_interrupts(10);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_oscillator_failure_is_a_clock_fault(void)
+{
+    expect_trap(_OscillatorFail, FAULT_CLOCK, 0x001C);
+}
+
+void test_address_error_is_a_trap_fault(void)
+{
+    expect_trap(_AddressError, FAULT_TRAP, 0x0016);
+}
+
+void test_stack_error_is_a_trap_fault(void)
+{
+    expect_trap(_StackError, FAULT_TRAP, 0x001A);
+}
+
+void test_math_error_is_a_trap_fault(void)
+{
+    expect_trap(_MathError, FAULT_TRAP, 0x000E);
+}
+
+void test_unexpected_interrupt_is_a_trap_fault(void)
+{
+    expect_trap(_DefaultInterrupt, FAULT_TRAP, 0x001E);
+}
+
+void test_first_fault_is_kept_through_later_ones(void)
+{
+    bring_to_lock();
+    _FLTA1Interrupt();
+    _MathError();
+    P1TMR = 0;
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
+}
