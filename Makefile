@@ -25,6 +25,7 @@ T := build/test$(suffix)
 
 warnings := -Wall -Wextra -Wconversion -Wshadow
 ifneq ($(SAN),)
+warnings += -Wno-sign-conversion # the checks that the compiler inserts make it see conversions that are not in the source
 sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
@@ -34,6 +35,8 @@ compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFI
 
 firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c) tools/host/xc.c)
 board_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/board/*.c))
+
+part_makefiles := $(wildcard test/*/*.mk)
 
 quiet := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-4s %s\n' $1 $2;)
@@ -45,7 +48,7 @@ remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || pri
 # ---- help ----------------------------------------------------------------------------------------------------------------
 .PHONY: help
 help: ## this list
-	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r target text; do \
+	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' Makefile $(part_makefiles) | while IFS='|' read -r target text; do \
 	    printf 'make %-12s %s\n' "$$target" "$$text"; done
 
 # ---- runs ----------------------------------------------------------------------------------------------------------------
@@ -112,8 +115,8 @@ check_py := $(call py_tests,unit,check)
 unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test)
 modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT
 
-quick_suites := $(unit_c) $(check_py) $(board_c) $(filter tools/%,$(unittest_py))
-all_suites := $(behaviour_c) $(unittest_py) $(unit_c) $(check_py) $(board_c) warnings/default $(modes:%=warnings/%)
+quick_suites := $(check_py) $(unit_c) $(board_c) $(filter tools/%,$(unittest_py))
+all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) golden/unchanged warnings/default $(modes:%=warnings/%)
 
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
 reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
@@ -145,15 +148,29 @@ gems: $(gem_stamp)
 $(gem_stamp):
 	@tools/setup/gems.sh $(ceedling) $@
 
+# Golden vectors: text in test/golden/vectors, headers for the tests in build/golden.
+golden_stamp := build/golden/stamp
+$(golden_stamp): $(wildcard test/golden/vectors/*.txt) test/golden/to_c.py
+	@$(python) test/golden/to_c.py --out $(@D) && touch $@
+
+build/golden/golden_%.h: $(golden_stamp) ;
+
+.PHONY: golden
+golden: setup-run ## write the golden vectors anew from the reference model
+	@$(python) test/golden/generate.py
+
+$T/golden.unchanged.txt:
+	@$(python) test/run-suite.py --one-test $@ $(python) test/golden/generate.py --check
+
 # A test's own flags stand in its first lines: /* defines: -DTUNING */. They act on the test and its runner, not on the library.
 own_defines = $$(sed -n '1,5s@.*/\* defines: \(.*\) \*/.*@\1@p' $1)
-test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support -Itools/board $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks \
+test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support -Itools/board $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
     -isystem $(unity)/src -isystem $(cmock)/src -DUNITY_INCLUDE_CONFIG_H $(DEFINES)
 
 $T/flags: FORCE
 	$(call remember,$(test_compile))
 
-$T/%.o: test/%.c $T/flags | $(gem_stamp)
+$T/%.o: test/%.c $T/flags | $(gem_stamp) $(golden_stamp)
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(test_compile) $(warnings) -Werror $(call own_defines,$<) -MMD -MP -c $< -o $@
 
@@ -212,6 +229,9 @@ $T/warnings.%.txt:
 	@+$(python) test/run-suite.py --one-test $@ \
 	    $(MAKE) -s WERROR=1 SAN= VARIANT=warnings-$* DEFINES=$(if $(filter-out default,$*),-D$*) lib vboard
 
+# Further checks, each with its own rules; they may add suites to all_suites and quick_suites.
+include $(part_makefiles)
+
 # ---- checks and cleaning -------------------------------------------------------------------------------------------------
 .PHONY: warnings sanitize clean
 warnings: ## compile everything in every mode with warnings as errors
@@ -221,10 +241,11 @@ warnings: ## compile everything in every mode with warnings as errors
 sanitize: setup-run ## the demo under -fsanitize=undefined,address [SCENARIO=demo]
 	@$(MAKE) SAN=1 vboard
 	@LD_PRELOAD="$$($(CC) -print-file-name=libasan.so) $$($(CC) -print-file-name=libubsan.so)" \
-	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 SAN=1 \
-	    $(front_end) run $(call quoted,$(SCENARIO)) $(if $(OUT),$(options),$(options) --out build/run/sanitize)
+	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
+	    $(front_end) run $(call quoted,$(SCENARIO)) --library build/host-san/libvboard.so --no-plots \
+	    --out $(call quoted,$(or $(OUT),build/run/sanitize))
 
 clean: ## remove what was built and run (build/gems and build/setup stay; rm -r build removes them too)
-	@rm -rf build/host* build/test* build/run
+	@rm -rf build/host* build/test* build/golden build/run
 
 -include $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)

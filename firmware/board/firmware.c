@@ -17,7 +17,6 @@ static uint16_t silent_ms;        /* timer 1 milliseconds without a control inte
 
 void firmware_init(void)
 {
-    static const panel_t no_panel;
     uint16_t clock_failed;
 
     pwm_outputs_off();
@@ -27,7 +26,7 @@ void firmware_init(void)
     CORCON = 0x0020u; /* fractional, unsaturated, no PSV change: the control law's products do not depend on it */
     INTCON1bits.NSTDIS = 0;
     clock_failed = clock_init();
-    board_panel = no_panel;
+    panel_init(&board_panel);
     drive_init(&board_drive, &board_params);
     status_init();
     pins_init();

@@ -1,10 +1,19 @@
 /* The drive's beginnings: the object at power-up and the preparation of each start. */
 #include "drive/drive.h"
 
+/** Zeroes an object: a constant copy of nothing would cost its size in RAM or flash. */
+static void drive_clear(void *object, uint16_t bytes)
+{
+    uint8_t *byte = object;
+    while (bytes != 0u) {
+        *byte++ = 0;
+        bytes--;
+    }
+}
+
 void drive_init(drive_t *d, const drive_params_t *p)
 {
-    static const drive_t zero;
-    *d = zero;
+    drive_clear(d, sizeof *d);
     d->direction = 1;
     d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
     d->duty_per_volt_q16 = qm_divud(p->duty_per_volt_numerator, (uint16_t)((uint16_t)p->bus_nominal_q15 << 1));
@@ -16,17 +25,13 @@ void drive_init(drive_t *d, const drive_params_t *p)
 
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
 {
-    static const drive_control_t no_control;
-    static const estimator_t no_estimate;
-    static const fieldweak_t no_fieldweak;
-
     if (d->state != (uint16_t)DRIVE_STOPPED || d->command.run) {
         return;
     }
     d->direction = direction;
-    d->control = no_control;
-    d->estimator = no_estimate;
-    d->fieldweak = no_fieldweak;
+    drive_clear(&d->control, sizeof d->control);
+    drive_clear(&d->estimator, sizeof d->estimator);
+    drive_clear(&d->fieldweak, sizeof d->fieldweak);
     fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, 0);
     d->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
     d->control.iq_limit_q13 = p->current_max_q13;

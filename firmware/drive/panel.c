@@ -5,6 +5,17 @@
 #define PAUSE_MS 1500u
 #define POT_STEP_Q15 64 /* one step of the converter */
 
+void panel_init(panel_t *panel)
+{
+    panel->s2.down_ms = 0;
+    panel->s3.down_ms = 0;
+    panel->wish_run = 0;
+    panel->fast_range = 0;
+    panel->pot_q31 = INT32_MIN;
+    panel->pot_used_q15 = INT16_MIN;
+    panel->blink_ms = 0;
+}
+
 uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
 {
     uint16_t before = b->down_ms;

@@ -11,6 +11,7 @@ typedef struct {
     int16_t dead_time;      /**< duty that dead time takes from a leg: Td / Ts * full */
     int16_t knee_q13;       /**< current at which dead-time compensation is full; linear below, to stay calm at zero */
     uint16_t dead_slope_q16; /**< dead_time / knee_q13 * 65536 */
+    int16_t turn_q13;       /**< most that a phase current changes in a period */
 } svm_params_t;
 
 /** The three duties. */
@@ -28,7 +29,9 @@ QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t i_q13)
 {
     /* below zero only by rounding; the sum is bounded by full + dead_time */
     int16_t duty = (int16_t)(qm_clamp(u, 0, p->top) + svm_dead_time(p, i_q13));
-    return (duty_t)qm_clamp(duty, 0, p->full);
+    /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
+     * is open longer by it; otherwise the compensation must not close the window. */
+    return (duty_t)qm_clamp(duty, 0, (i_q13 > p->turn_q13) ? p->full : p->top);
 }
 
 /** Duties for a voltage vector.

@@ -23,7 +23,7 @@ typedef struct {
     uint16_t led_run;   /**< on while the bridge is switching */
 } panel_lights_t;
 
-/** State of the panel; zero is the start. */
+/** State of the panel. */
 typedef struct {
     button_t s2, s3;
     int16_t wish_run;    /**< the user wants the motor to run */
@@ -32,6 +32,9 @@ typedef struct {
     int16_t pot_used_q15; /**< the value in use: follows the filtered one with one converter step of hysteresis */
     uint16_t blink_ms;
 } panel_t;
+
+/** Nothing pressed, nothing wished, potentiometer at its lower end. */
+void panel_init(panel_t *panel);
 
 /** 1 once per press. */
 uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms);

@@ -40,7 +40,8 @@
     .top = PWM_TOP_DUTY, \
     .dead_time = DEAD_TIME_DUTY, \
     .knee_q13 = DEAD_TIME_KNEE_Q13, \
-    .dead_slope_q16 = DEAD_TIME_SLOPE_Q16 }
+    .dead_slope_q16 = DEAD_TIME_SLOPE_Q16, \
+    .turn_q13 = (int16_t)(PARAM_DI(MAXIMUM_SPEED_RPM) / 2.0F) }
 
 #define PARAM_PI_INIT(p, i, c, s) { .kp = PARAM_KP(p), .ki = (i), .kc = Q15(c), .shift = (s) }
 

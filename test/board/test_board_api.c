@@ -69,16 +69,23 @@ void test_power_up_resets_registers_but_keeps_the_shaft_turning(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, get("bus.voltage_v"));
 }
 
+static unsigned background_passes;
+
+static void count_background(void)
+{
+    background_passes++;
+}
+
 void test_the_background_runs_every_few_periods(void)
 {
-    static unsigned passes;
-    passes = 0;
-    struct { void (*hook)(void); } unused = {NULL};
-    (void)unused;
+    fake_background_hook = count_background;
+    background_passes = 0;
     power_up();
     run(400);
-    TEST_ASSERT_EQUAL_UINT(400, fake_adc_calls);
-    (void)passes;
+    TEST_ASSERT_EQUAL_UINT(100, background_passes);
+    set("cpu.background_periods", 20.0);
+    run(400);
+    TEST_ASSERT_UINT_WITHIN(1, 120, background_passes);
 }
 
 void test_trace_has_a_row_each_period_with_the_values_of_the_sample(void)

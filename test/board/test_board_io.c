@@ -89,6 +89,21 @@ void test_timer_1_interrupts_every_millisecond(void)
     TEST_ASSERT_TRUE(TMR1 <= PR1);
 }
 
+static void short_timer(void)
+{
+    PR1 = 9; /* 40 MHz / 256 / 10 */
+    T1CON = 0x8030;
+    IEC0bits.T1IE = 1;
+}
+
+void test_the_period_of_a_timer_is_its_register_plus_one(void)
+{
+    fake_init_hook = short_timer;
+    power_up();
+    run(20000);
+    TEST_ASSERT_UINT_WITHIN(1, 15625, fake_timer_calls);
+}
+
 static void polled_timer(void)
 {
     PR1 = 4999;
@@ -170,7 +185,10 @@ void test_a_slow_line_fills_the_buffer_and_sets_utxbf(void)
     run(60);
     TEST_ASSERT_EQUAL_UINT(1, U1STAbits.UTXBF);
     TEST_ASSERT_EQUAL_UINT(0, U1STAbits.TRMT);
-    run(4000);
+    run(1560);
+    TEST_ASSERT_EQUAL_UINT(0, U1STAbits.TRMT); /* 81 ms: the tenth character is still on the line */
+    run(80);
+    TEST_ASSERT_EQUAL_UINT(1, U1STAbits.TRMT); /* 85 ms */
     TEST_ASSERT_EQUAL_UINT(10, vb_uart_read(board, out, sizeof out));
     TEST_ASSERT_EQUAL_DOUBLE(0.0, get("uart.lost_count"));
 }
@@ -191,6 +209,29 @@ void test_a_transmitter_without_a_pin_is_named(void)
     run(40);
     TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
     TEST_ASSERT_TRUE(warned_about("RPOR9"));
+}
+
+static void transmit_interrupt_on(void)
+{
+    uart_on();
+    IEC0bits.U1TXIE = 1;
+}
+
+void _U1TXInterrupt(void)
+{
+    IFS0bits.U1TXIF = 0;
+    send_text();
+}
+
+void test_the_transmit_interrupt_starts_with_the_transmitter_and_goes_on_with_each_character(void)
+{
+    char out[16] = {0};
+    text = "interrupt";
+    fake_init_hook = transmit_interrupt_on;
+    power_up();
+    run(200);
+    TEST_ASSERT_EQUAL_UINT(9, vb_uart_read(board, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING("interrupt", out);
 }
 
 static char received[16];

@@ -317,27 +317,38 @@ void test_shaft_work_is_torque_times_speed(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * friction * w, friction * w, get("stat.energy_shaft_j"));
 }
 
-static void record_run(double max_step_s, double result[5])
+static void record_run(double max_step_s, double lq_h, double result[5])
 {
     static const char *const key[5] = {"plant.i_a", "plant.i_d", "plant.i_q", "plant.v_q", "stat.energy_bus_j"};
     set("sim.max_step_s", max_step_s);
     set("adc.noise_lsb", 0.0);
+    set("motor.lq_h", lq_h);
     run_synchronously(2000.0, 0.8, 4000);
     for (int k = 0; k < 5; k++) {
         result[k] = get(key[k]);
     }
 }
 
-void test_results_do_not_depend_on_the_integration_step(void)
+static void compare_steps(double lq_h)
 {
     double coarse[5], fine[5];
-    record_run(1.0, coarse);
+    record_run(1.0, lq_h, coarse);
     fake_teardown();
     fake_setup();
-    record_run(2e-7, fine);
+    record_run(2e-7, lq_h, fine);
     for (int k = 0; k < 5; k++) {
         TEST_ASSERT_DOUBLE_WITHIN(0.001 * fabs(fine[k]) + 1e-4, fine[k], coarse[k]);
     }
+}
+
+void test_results_do_not_depend_on_the_integration_step(void)
+{
+    compare_steps(L);
+}
+
+void test_results_of_a_salient_motor_do_not_depend_on_the_integration_step(void)
+{
+    compare_steps(1.5 * L);
 }
 
 void test_dry_friction_slows_the_shaft_at_a_constant_rate_and_holds_it(void)

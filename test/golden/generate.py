@@ -212,7 +212,7 @@ def svm(rng):
                 alpha, beta = round(vector.real), round(vector.imag)
                 currents = [0, 0, 0]
                 if n % 2:
-                    currents = dither(rng, -400, 400, 2)
+                    currents = dither(rng, -400, 400, 2) if n % 4 == 1 else dither(rng, -1500, 1500, 2)
                     currents.append(-sum(currents))
                 a, b, c = ref.svm(p, alpha, beta, gain, currents)
                 ra, rb, rc = ref.svm_real(p, alpha, beta, gain, currents)
@@ -255,7 +255,7 @@ def pi(rng):
     return v
 
 
-RADII = (8193, 10000, 12287, 15974, 19000, 22630, 30350)
+RADII = (4097, 7987, 12287, 15974, 19000, 22630, 30350)
 
 
 def voltage_circle(_):
@@ -400,13 +400,13 @@ def estimator_kphi(_):
     ratios = [1.0] * 500 + [1.1] * 500 + [2.0] * 700 + [0.8] * 800
     speed = [7500.0] * 2501
     v, model, real, turns = estimator_sequence(
-        "estimator_kphi", "estimator with a wrong Kphi: K'/K = 1, 1.1, 2, 0.8; the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the "
+        "estimator_kphi", "estimator with 1/Kphi at 1, 1.1, 2 and 0.8 times the true one: the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the "
         "speed stays", speed, [0.8j] * 2501, 0, ratios, 1200, 47.0, [*range(400, 500), *range(900, 1000), *range(2400, 2500)])
     for end in (500, 1000, 1700, 2500):
         rho = v.rows[end - 1][7]
         true = turns[end - 1] + 7500.0 * MACHINE.turns_per_erpm / 2
         error = ref.wrap16(round(true * 65536) - rho) * 360 / 65536
-        # K'/K in Kphi is inv_kfi's inverse ratio
+        # K'/K is a ratio of Kphi, inv_kfi is its inverse
         require_lock(v, error, ref.lock_error_deg(1 / ratios[end - 1]), 0.5)
         v.constants[f"error_counts_{end}"] = ref.nearest(ref.lock_error_deg(1 / ratios[end - 1]) / 360 * 65536)
         v.constants[f"true_rho_{end}"] = round(true * 65536) % 65536

@@ -262,8 +262,9 @@ class Machine:
         clock = 25e-9
         full = nearest(self.period_s / clock)
         dead = nearest(self.dead_time_s / clock)
-        return {"full": full, "top": full - 2 * nearest(self.window_s / clock), "dead_time": dead,
-                "knee_q13": 2 * dead, "dead_slope_q16": nearest(WORD / 2)}
+        knee = int(1.1 * dead)
+        return {"full": full, "top": full - 2 * nearest(self.window_s / clock), "dead_time": dead, "knee_q13": knee,
+                "dead_slope_q16": nearest(dead / knee * WORD), "turn_q13": int(self.current_step(self.maximum_rpm) / 4)}
 
     def duty_per_volt_q16(self, bus_v):
         """Duty counts per Q13 voltage count * 65536 for a measured bus."""
@@ -292,8 +293,12 @@ def svm(p, alpha, beta, duty_per_volt, currents):
     phases = [a, s16(t - a // 2), s16(-t - a // 2)]
     shift = s16(p["full"] - max(phases) - min(phases)) // 2
     shift = min(shift, p["top"] - max(phases))
-    legs = [clamp(s16(u + shift), 0, p["top"]) + dead_time(p, i) for u, i in zip(phases, currents)]
-    return [clamp(u, 0, p["full"]) for u in legs]
+    return [leg(p, s16(u + shift), i) for u, i in zip(phases, currents)]
+
+
+def leg(p, u, i_q13):
+    """Inside the window; its dead time may go beyond only where the current surely keeps its sign to the next sample."""
+    return clamp(clamp(u, 0, p["top"]) + dead_time(p, i_q13), 0, p["full"] if i_q13 > p["turn_q13"] else p["top"])
 
 
 def svm_real(p, alpha, beta, duty_per_volt, currents):
@@ -303,7 +308,7 @@ def svm_real(p, alpha, beta, duty_per_volt, currents):
     shift = min(shift, p["top"] - max(phases))
     knee = p["knee_q13"]
     legs = [clamp(u + shift, 0, p["top"]) + p["dead_time"] * clamp(i / knee, -1, 1) for u, i in zip(phases, currents)]
-    return [clamp(u, 0, p["full"]) for u in legs]
+    return [clamp(u, 0, p["full"] if i > p["turn_q13"] else p["top"]) for u, i in zip(legs, currents)]
 
 
 # ---- PI controller --------------------------------------------------------------------------------------------------
@@ -353,7 +358,8 @@ class PiReal:
 # ---- voltage circle and current circle ------------------------------------------------------------------------------
 
 def voltage_circle_reciprocal(radius):
-    return u16(2 ** 29 // max(radius, 8193))
+    """2^28 / radius, rounded up: the ratio that it gives is never too small."""
+    return u16(2 ** 28 // max(radius, 4097) + 1)
 
 
 def vd_limit(radius):
@@ -362,9 +368,9 @@ def vd_limit(radius):
 
 
 def vq_limit(radius, vd):
-    """sqrt(radius^2 - vd^2): the ratio in Q13 rounded up, the circle's table, the upper word of twice the product."""
+    """sqrt(radius^2 - vd^2): the ratio in Q12 rounded up, the circle's table, the upper word of twice the product."""
     ratio = magnitude(vd) * voltage_circle_reciprocal(radius) // WORD + 1
-    return upper(2 * s32(radius * circle(4 * ratio)))
+    return upper(2 * s32(radius * circle(8 * ratio)))
 
 
 def vq_limit_real(radius, vd):

@@ -155,6 +155,7 @@ void test_S2_held_for_30_ms_starts_and_bounces_do_not(void)
 {
     uint16_t ms;
     expect_start(0);
+    uart_send_IgnoreAndReturn(0);
     board_drive.state = (uint16_t)DRIVE_STOPPED;
     for (ms = 0; ms < 100u; ms++) {
         PORTAbits.RA8 = (ms % 20u) == 0u; /* bounces */
@@ -187,6 +188,7 @@ void test_S3_changes_the_range_of_a_running_motor(void)
 void test_lights_reach_their_pins(void)
 {
     expect_start(0);
+    uart_send_IgnoreAndReturn(0);
     board_drive.state = (uint16_t)DRIVE_LOCK;
     healthy_ms(1);
     TEST_ASSERT_EQUAL_UINT16(1, LATCbits.LATC6); /* alive: lit in the first half second */

@@ -135,6 +135,23 @@ bool vb_raise(vb_t *vb, vb_vector_t vector)
     return true;
 }
 
+/* Serve flags that were set while their interrupt was disabled or masked, or that software set. */
+void vb_serve_pending(vb_t *vb)
+{
+    if ((*vb->reg.ifs0 & *vb->reg.iec0) == 0 && (*vb->reg.ifs3 & *vb->reg.iec3) == 0) {
+        return;
+    }
+    for (unsigned n = 0; n < VB_VECTOR_COUNT; n++) {
+        vb_vector_t vector = (vb_vector_t)n;
+        unsigned pending = *flags_of(vb, vector) & enables_of(vb, vector);
+        bool dropped = vector == VB_VECTOR_ADC1 && vb->isr_dropped != 0.0;
+        unsigned cpu_level = ((unsigned)*vb->reg.sr >> 5) & 7u;
+        if (((pending >> info[n].bit) & 1u) != 0 && !dropped && priority_of(vb, vector) > cpu_level) {
+            vb_handler(vb, vector);
+        }
+    }
+}
+
 void vb_background(vb_t *vb)
 {
     if (vb->stuck_in_isr) {

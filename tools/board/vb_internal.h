@@ -180,7 +180,7 @@ typedef struct {
     uint8_t fifo[4];
     unsigned fifo_count;
     double tx_busy_s, rx_busy_s; /* time left for the character on the line */
-    bool sending, presented;
+    bool sending, presented, enabled;
     double baud;
     double lost;
 } vb_uart_t;
@@ -290,6 +290,7 @@ double vb_keys_read(const vb_t *vb, const vb_access_t *access);
 extern const vb_cpu_t vb_host_cpu;
 bool vb_raise(vb_t *vb, vb_vector_t vector);
 void vb_background(vb_t *vb);
+void vb_serve_pending(vb_t *vb);
 void vb_handler(vb_t *vb, vb_vector_t vector);
 
 /* vb_clock.c */

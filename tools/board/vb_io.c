@@ -112,6 +112,7 @@ void vb_io_reset(vb_t *vb)
     u->rx_count = 0;
     u->sending = false;
     u->presented = false;
+    u->enabled = false;
     vb_io_ports(vb);
     vb_io_uart_take(vb); /* what the initialisation already sent */
 }
@@ -253,6 +254,11 @@ static void step_receiver(vb_t *vb, double h_s)
 void vb_io_uart_step(vb_t *vb, double h_s)
 {
     vb_uart_t *u = &vb->uart;
+    bool enabled = (*vb->reg.u1mode & UARTEN) != 0 && (*vb->reg.u1sta & UTXEN) != 0;
+    if (enabled && !u->enabled) {
+        (void)vb_raise(vb, VB_VECTOR_U1TX); /* enabling the transmitter sets its flag */
+    }
+    u->enabled = enabled;
     if (u->sending) {
         u->tx_busy_s -= h_s;
         while (u->sending && u->tx_busy_s <= 0.0) {

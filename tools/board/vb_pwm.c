@@ -486,6 +486,7 @@ void vb_fault_check(vb_t *vb, bool period_start)
         fault->active = true;
         fault->latched = (*vb->reg.p1fltacon & FLTAM) == 0;
         if (!was) {
+            vb_io_ports(vb);
             (void)vb_raise(vb, VB_VECTOR_FLTA1);
         }
     } else if (period_start && fault->active && (!fault->latched || (*vb->reg.ifs3 & 0x8000u) == 0)) {

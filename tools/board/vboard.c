@@ -261,6 +261,7 @@ static void run_period(vb_t *vb)
     vb_pwm_begin(vb);
     vb_adc_decode(vb);
     vb_motor_prepare(&vb->motor);
+    vb_serve_pending(vb);
     double period_s = vb->pwm.running ? vb->pwm.period_s : VB_IDLE_PERIOD_S;
     double samples = vb->adc.samples;
     run_events(vb, period_s);

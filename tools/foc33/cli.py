@@ -4,10 +4,13 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 from . import build, output, places, plant, report, scenario, simulate, workers
 from .board import Library
 from .errors import UserError
+from .expect import Outcome
+from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -84,7 +87,7 @@ class Progress:
         except ImportError:
             return
         tqdm.monitor_interval = 0
-        self.bar = tqdm(total=total_s, desc=title, unit="s", leave=False,
+        self.bar = tqdm(total=total_s, desc=title, unit="s", leave=False, ncols=90,
                         bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} s of motor time")
 
     def __call__(self, seconds: float) -> None:
@@ -112,8 +115,8 @@ def _changes(texts: list[str]) -> plant.Values:
     return result
 
 
-def parts_of(item: scenario.Scenario, options: argparse.Namespace) -> tuple[plant.Part, plant.Part]:
-    """Motor and board: from the command line, else from the scenario."""
+def parts_of(item: Any, options: argparse.Namespace) -> tuple[plant.Part, plant.Part]:
+    """Motor and board: from the command line, else from the scenario or table."""
     motor = plant.read_motor(options.motor, "--motor") if options.motor else plant.read_motor(item.motor, item.motor_where)
     board = plant.read_board(options.board, "--board") if options.board else plant.read_board(item.board, item.board_where)
     return motor, board
@@ -132,7 +135,7 @@ def _run(options: argparse.Namespace) -> int:
             progress.close()
         outcomes = report.check(run)
         data = report.summary(run, outcomes, str(places.shown(motor.path)), str(places.shown(board.path)))
-        output.write_trace(folder.work / "trace.csv", run.trace.thinned(10))
+        _write_traces(run, folder.work)
         if not options.no_plots:
             from . import plots
             data["plots"] = plots.write_all(run, folder.work)
@@ -140,13 +143,22 @@ def _run(options: argparse.Namespace) -> int:
     print(report.text(run, outcomes, data))
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core: {run.speed_factor:.1f} times real time")
     print(f"results in {places.shown(target)}/")
-    return _verdict(item.name, [outcome for outcome in outcomes if not outcome.ok], len(outcomes))
+    return verdict(item.name, outcomes)
 
 
-def _verdict(name: str, failed: list, total: int) -> int:
+def _write_traces(run: Run, folder: Path) -> None:
+    """The whole run at a tenth of the rate, and the first hand-over at the full rate."""
+    output.write_trace(folder / "trace.csv", run.trace.thinned(10))
+    for item in run.hand_overs()[:1]:
+        output.write_trace(folder / "hand_over.csv", run.trace.part(item.at_s - HAND_OVER_BEFORE_S, item.at_s + HAND_OVER_AFTER_S))
+
+
+def verdict(name: str, outcomes: list[Outcome]) -> int:
+    """Says how many expectations hold, names the others on stderr, and returns the exit code."""
+    failed = [outcome for outcome in outcomes if not outcome.ok]
+    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} expectations hold", flush=True)
     for outcome in failed:
         print(f"foc33: {name}: {outcome.row}: got {outcome.got}, allowed {outcome.allowed}", file=sys.stderr)
-    print(f"{total - len(failed)} of {total} expectations hold")
     return 1 if failed else 0
 
 

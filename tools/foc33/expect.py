@@ -68,10 +68,10 @@ def _number(value: float | None) -> str:
 
 
 class Expectation:
-    """Base of the kinds: read() takes a section, check() a run."""
+    """Base of the kinds: read() takes a section (measures: see read_expectation), check() a finished run."""
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "Expectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "Expectation":
         raise NotImplementedError
 
     def check(self, run: "Run") -> list[Outcome]:
@@ -109,9 +109,12 @@ class MeasureExpectation(Expectation):
     bounds: Bounds
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "MeasureExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
         from .run import MEASURE_VALUES
-        return cls(section.choice("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES)), Bounds.read(section))
+        measure, value = section.choice("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES))
+        if value == "speed_error_percent" and not measures[measure]:
+            raise section.fail("value", f"'{measure}' has no speed error", "add reference_rpm to the measure")
+        return cls(measure, value, Bounds.read(section))
 
     def check(self, run: "Run") -> list[Outcome]:
         got = run.measures[self.measure][self.value]
@@ -126,7 +129,7 @@ class HandOverExpectation(Expectation):
     no_reverse_motion: bool
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "HandOverExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "HandOverExpectation":
         return cls(section.integer("press", 1, 1), section.number("within_s", REQUIRED, 0.0),
                    section.number("overshoot_percent", None, 0.0), section.flag("no_reverse_motion", False))
 
@@ -168,7 +171,7 @@ class StopExpectation(Expectation):
     speed_max_rpm: float | None
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "StopExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StopExpectation":
         return cls(section.number("after_s", REQUIRED, 0.0, duration_s), section.number("within_s", REQUIRED, 0.0),
                    section.number("speed_max_rpm", None, 0.0))
 
@@ -195,7 +198,7 @@ class OutputsOffExpectation(Expectation):
     to_s: float
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "OutputsOffExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "OutputsOffExpectation":
         return cls(*_window(section, duration_s))
 
     def check(self, run: "Run") -> list[Outcome]:
@@ -215,7 +218,7 @@ class SignalExpectation(Expectation):
     to_s: float
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "SignalExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "SignalExpectation":
         signal, statistic = section.text("signal"), section.choice("statistic", tuple(_STATISTICS))
         return cls(f"{signal} {statistic}", signal, statistic, Bounds.read(section), *_window(section, duration_s))
 
@@ -232,7 +235,7 @@ class BusVoltageExpectation(SignalExpectation):
     """Shorthand: lowest and highest bus voltage."""
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "BusVoltageExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "BusVoltageExpectation":
         return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s))
 
     def check(self, run: "Run") -> list[Outcome]:
@@ -257,7 +260,7 @@ class StateExpectation(Expectation):
     never: bool
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "StateExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StateExpectation":
         name, at_s, never = section.text("name"), section.number("at_s", None, 0.0, duration_s), section.flag("never", False)
         if at_s is None:
             return cls(name, *_window(section, duration_s), never)
@@ -292,7 +295,7 @@ class FaultExpectation(Expectation):
     cleared_from_s: float | None
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "FaultExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "FaultExpectation":
         return cls(section.text("name"), section.number("after_s", REQUIRED, 0.0, duration_s), section.number("within_s", REQUIRED, 0.0),
                    section.integer("outputs_off_within_periods", 1, 0), section.flag("from_cause", False),
                    section.number("kept_to_s", None, 0.0, duration_s), section.number("cleared_from_s", None, 0.0, duration_s))
@@ -345,7 +348,7 @@ class NoFaultExpectation(Expectation):
     to_s: float
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "NoFaultExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoFaultExpectation":
         return cls(*_window(section, duration_s))
 
     def check(self, run: "Run") -> list[Outcome]:
@@ -358,7 +361,7 @@ class NoFaultExpectation(Expectation):
 @dataclass(frozen=True)
 class NoWarningsExpectation(Expectation):
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "NoWarningsExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoWarningsExpectation":
         return cls()
 
     def check(self, run: "Run") -> list[Outcome]:
@@ -373,7 +376,7 @@ class VariableExpectation(Expectation):
     bounds: Bounds
 
     @classmethod
-    def read(cls, section: Section, measures: set[str], duration_s: float) -> "VariableExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "VariableExpectation":
         return cls(section.text("name"), section.integer("count", 1, 1, 1000), section.choice("statistic", tuple(_STATISTICS)),
                    Bounds.read(section))
 
@@ -391,8 +394,8 @@ KINDS: dict[str, type[Expectation]] = {
     "no_fault": NoFaultExpectation, "no_warnings": NoWarningsExpectation, "variable": VariableExpectation}
 
 
-def read_expectation(section: Section, measures: set[str], duration_s: float) -> Expectation:
-    """One [[expect]] table."""
+def read_expectation(section: Section, measures: dict[str, bool], duration_s: float) -> Expectation:
+    """One [[expect]] table. `measures` holds the known measures' names, and whether they have a reference speed."""
     expectation = KINDS[section.choice("kind", tuple(KINDS))].read(section, measures, duration_s)
     section.close()
     return expectation

@@ -19,8 +19,8 @@ class ResultFolder:
     """
 
     def __init__(self, target: Path) -> None:
-        self.target = target
-        self.work = target
+        self.target = target.resolve()
+        self.work = self.target
 
     def __enter__(self) -> "ResultFolder":
         target = self.target

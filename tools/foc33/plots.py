@@ -10,12 +10,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
 import numpy as np # noqa: E402
 
-from .run import Run # noqa: E402
+from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run # noqa: E402
 from .trace import Trace, wrapped_deg # noqa: E402
 
 STEP = 20
 """Every STEP-th period is drawn in the plots over the whole run."""
-HAND_OVER_BEFORE_S, HAND_OVER_AFTER_S = 0.03, 0.07
 
 plt.rcParams.update({"figure.figsize": (10, 5), "figure.dpi": 100, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0,
                      "legend.loc": "best", "legend.fontsize": 9, "axes.titlesize": 11, "font.size": 10,
@@ -28,7 +27,8 @@ def write_all(run: Run, folder: Path) -> list[str]:
     files = []
     for name, draw in (("speed", _speed), ("currents", _currents), ("voltages", _voltages), ("angle_error", _angle_error)):
         files.append(_write(folder, name, run, thin, draw))
-    for name, draw, wanted in (("hand_over", _hand_over, bool(run.hand_overs())), ("field_weakening", _field_weakening, _weakens(run))):
+    for name, draw, wanted in (("hand_over", _hand_over, bool(run.hand_overs())), ("field_weakening", _field_weakening, _weakens(run)),
+                               ("variables", _variables, any(len(values) > 1 for values in run.variables.values()))):
         if wanted:
             files.append(_write(folder, name, run, thin, draw))
     return files
@@ -59,19 +59,20 @@ def _closed(run: Run, trace: Trace) -> np.ndarray:
 
 
 def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
-    _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"}),
-                        "fw.speed_est_rpm": ("estimated", {"color": "tab:orange", "linestyle": "--"}),
-                        "fw.speed_ref_rpm": ("reference", {"color": "black", "linewidth": 0.7})})
+    _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"})})
+    running = thin.column("pwm.outputs_seen") != 0
+    axes.plot(thin.time_s, np.where(running, thin.column("fw.speed_est_rpm"), np.nan), label="estimated", color="tab:orange", linestyle="--")
+    axes.plot(thin.time_s, np.where(_closed(run, thin), thin.column("fw.speed_ref_rpm"), np.nan), label="reference", color="black", linewidth=0.7)
     for item in run.hand_overs():
         axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":", label=f"closed loop, {item.after_s2_s:.2f} s after S2")
-    _finish(axes, f"{run.scenario.title}: speed", "speed [rpm]")
+    _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
 
 
 def _currents(run: Run, thin: Trace, axes: plt.Axes) -> None:
     _lines(axes, thin, {"fw.i_d_a": ("Id measured", {"color": "tab:blue", "alpha": 0.5}),
                         "fw.i_q_a": ("Iq measured", {"color": "tab:red", "alpha": 0.5}),
                         "fw.id_ref_a": ("Id reference", {"color": "navy"}), "fw.iq_ref_a": ("Iq reference", {"color": "darkred"})})
-    _finish(axes, f"{run.scenario.title}: currents in the control frame", "current [A peak]")
+    _finish(axes, f"{run.scenario.name}: currents in the control frame", "current [A peak]")
 
 
 def _voltages(run: Run, thin: Trace, axes: plt.Axes) -> None:
@@ -79,7 +80,7 @@ def _voltages(run: Run, thin: Trace, axes: plt.Axes) -> None:
                         "fw.v_limit_v": ("limit", {"color": "black", "linewidth": 0.8})})
     axes.plot(thin.time_s, np.hypot(thin.column("fw.v_d_v"), thin.column("fw.v_q_v")), label="|V|", color="grey", linewidth=0.7)
     axes.plot(thin.time_s, -thin.column("fw.v_limit_v"), color="black", linewidth=0.8)
-    _finish(axes, f"{run.scenario.title}: commanded voltage", "voltage [V peak, phase]")
+    _finish(axes, f"{run.scenario.name}: commanded voltage", "voltage [V peak, phase]")
 
 
 def _angle_error(run: Run, thin: Trace, axes: plt.Axes) -> None:
@@ -87,9 +88,9 @@ def _angle_error(run: Run, thin: Trace, axes: plt.Axes) -> None:
     closed = _closed(run, thin)
     axes.plot(thin.time_s, np.where(closed, error, np.nan), label="closed loop", color="tab:blue")
     if not np.any(closed):
-        running = thin.column("pwm.outputs_on") != 0
+        running = thin.column("pwm.outputs_seen") != 0
         axes.plot(thin.time_s, np.where(running, error, np.nan), label="open loop", color="tab:orange")
-    _finish(axes, f"{run.scenario.title}: estimated less true angle", "electrical angle [deg]")
+    _finish(axes, f"{run.scenario.name}: estimated less true angle", "electrical angle [deg]")
 
 
 def _hand_over(run: Run, thin: Trace, axes: plt.Axes) -> None:
@@ -99,7 +100,15 @@ def _hand_over(run: Run, thin: Trace, axes: plt.Axes) -> None:
     for signal, label, color in (("plant.i_a", "Ia", "tab:blue"), ("plant.i_b", "Ib", "tab:orange"), ("plant.i_c", "Ic", "tab:green")):
         axes.plot(time_ms, part.column(signal), label=label, color=color)
     axes.axvline(0.0, color="black", linewidth=0.8, linestyle=":", label="hand-over")
-    _finish(axes, f"{run.scenario.title}: phase currents around the hand-over", "current [A]", "time after the hand-over [ms]")
+    _finish(axes, f"{run.scenario.name}: phase currents around the hand-over", "current [A]", "time after the hand-over [ms]")
+
+
+def _variables(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    """Arrays of the firmware, such as SnapBuf1..4, as a debugger would draw them."""
+    for name, values in run.variables.items():
+        if len(values) > 1:
+            axes.plot(values, ".-", label=name)
+    _finish(axes, f"{run.scenario.name}: firmware variables at the end", "counts", "element")
 
 
 def _weakens(run: Run) -> bool:
@@ -116,6 +125,34 @@ def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
     other.set_ylabel("1/Kphi [counts, Q15/2]")
     other.set_ylim(bottom=0)
     other.grid(False)
-    axes.set(title=f"{run.scenario.title}: d current and 1/Kphi over speed (Figure 8)", xlabel="speed [rpm]", ylabel="Id [A peak]")
+    axes.set(title=f"{run.scenario.name}: d current and 1/Kphi over speed (Figure 8)", xlabel="speed [rpm]", ylabel="Id [A peak]")
     handles = [line for side in (axes, other) for line in side.get_lines()]
     axes.legend(handles, [line.get_label() for line in handles], markerscale=4)
+
+
+def write_table2(rows: list[dict], folder: Path) -> list[str]:
+    """Speed and current of Table 2: the note's and ours over the reference speed."""
+    figure, (left, right) = plt.subplots(1, 2, layout="constrained")
+    reference = [row["reference_rpm"] for row in rows]
+    left.plot(reference, reference, color="black", linewidth=0.7, label="reference")
+    for axes, note, ours, label, title in ((left, "note_rpm", "speed_rpm", "speed [rpm]", "speed at the row's torque"),
+                                           (right, "note_current_a", "current_rms_a", "phase current [A RMS]", "phase current")):
+        axes.plot(reference, [row[note] for row in rows], "s--", color="tab:grey", label="note")
+        axes.plot(reference, [row[ours] for row in rows], "o-", color="tab:blue", label="foc33")
+        _finish(axes, f"Table 2: {title}", label, "reference speed [rpm]")
+    figure.savefig(folder / "table2.png")
+    plt.close(figure)
+    return ["table2.png"]
+
+
+def write_starts(rows: list[dict], folder: Path) -> list[str]:
+    """Time to closed loop over the rotor's angle, one line a load."""
+    figure, axes = plt.subplots(layout="constrained")
+    for load in sorted({row["load_nm"] for row in rows}):
+        points = [(row["rotor_deg"], row["closed_after_s"]) for row in rows if row["load_nm"] == load]
+        axes.plot([x for x, _ in points], [np.nan if y is None else y for _, y in points], "o-", label=f"{load:g} N m")
+    _finish(axes, "starts: time from S2 to closed loop", "time [s]", "electrical angle of the rotor at power-up [deg]")
+    axes.set_ylim(bottom=0)
+    figure.savefig(folder / "starts.png")
+    plt.close(figure)
+    return ["starts.png"]

@@ -9,6 +9,8 @@ import numpy as np
 from .scenario import Measure, Scenario
 from .trace import Trace, wrapped_deg
 
+HAND_OVER_BEFORE_S, HAND_OVER_AFTER_S = 0.03, 0.07
+"""The stretch around a hand-over that is kept and drawn at the full rate."""
 AT_LIMIT = 0.985
 """A quantity counts as "at its limit" from this share of it."""
 
@@ -103,12 +105,12 @@ MEASURE_VALUES = {
     "angle_error_max_deg": "largest angle error", "voltage_v": "mean length of the commanded voltage vector",
     "voltage_percent": "the same in per cent of its limit", "voltage_at_limit_percent": "share of time at the voltage limit",
     "current_at_limit_percent": "share of time with the q current reference at its limit", "bus_v": "mean bus voltage",
-    "bus_max_v": "highest bus voltage", "open_loop_percent": "share of time not in closed loop"}
+    "bus_max_v": "highest bus voltage"}
 """What a row of the table can hold, with the meaning."""
 
 
 def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:
-    """Means over one stretch of the trace; None where a signal is missing or the stretch is empty."""
+    """Means over one stretch of the trace; None where there is nothing to tell: no such signal, or a bridge that is off."""
     values: dict[str, Any] = dict.fromkeys(MEASURE_VALUES)
     if not len(part):
         return values
@@ -119,8 +121,9 @@ def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:
     def put(name: str, value: Any) -> None:
         values[name] = None if value is None else float(value)
 
+    switching = "pwm.outputs_seen" not in part or bool(np.any(part.column("pwm.outputs_seen")))
     speed = column("plant.speed_rpm")
-    estimated = column("fw.speed_est_rpm")
+    estimated = column("fw.speed_est_rpm") if switching else None
     if speed is not None:
         put("speed_rpm", speed.mean())
         put("speed_min_rpm", speed.min())
@@ -132,8 +135,12 @@ def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:
         if speed is not None and abs(speed.mean()) > 1.0:
             put("estimate_error_percent", 100.0 * (estimated.mean() / speed.mean() - 1.0))
     _currents(column, put)
-    _angle(column, put)
-    _voltage(column, put)
+    if column("bus.voltage_v") is not None:
+        put("bus_v", column("bus.voltage_v").mean())
+        put("bus_max_v", column("bus.voltage_v").max())
+    if switching:
+        _angle(column, put)
+        _voltage(column, put)
     return values
 
 
@@ -162,13 +169,10 @@ def _angle(column: Any, put: Any) -> None:
 
 
 def _voltage(column: Any, put: Any) -> None:
-    v_d, v_q, limit, bus = column("fw.v_d_v"), column("fw.v_q_v"), column("fw.v_limit_v"), column("bus.voltage_v")
+    v_d, v_q, limit = column("fw.v_d_v"), column("fw.v_q_v"), column("fw.v_limit_v")
     if v_d is not None and v_q is not None:
         length = np.hypot(v_d, v_q)
         put("voltage_v", length.mean())
         if limit is not None and np.all(limit > 0.0):
             put("voltage_percent", 100.0 * np.mean(length / limit))
             put("voltage_at_limit_percent", 100.0 * np.mean(length >= AT_LIMIT * limit))
-    if bus is not None:
-        put("bus_v", bus.mean())
-        put("bus_max_v", bus.max())

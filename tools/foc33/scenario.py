@@ -38,7 +38,6 @@
 """
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from . import places
 from .expect import Expectation, read_expectation
@@ -98,15 +97,14 @@ class Scenario:
 
 def load(name: str) -> Scenario:
     """The scenario tools/scenarios/NAME.toml, or the one in the file NAME."""
-    path = places.find("scenario", name, places.SCENARIOS)
-    return read(Document(places.shown(path)) if path.is_absolute() and Path.cwd() == places.ROOT else Document(path))
+    return read(Document(places.find("scenario", name, places.SCENARIOS)))
 
 
 def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
     scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor"), root.text("board"),
-                        root.number("duration_s", minimum=0.01, maximum=600.0))
+                        root.number("duration_s", minimum=0.01, maximum=120.0))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))
@@ -114,9 +112,9 @@ def read(document: Document) -> Scenario:
     scenario.events = [_read_event(section, scenario.duration_s) for section in root.sections("event")]
     scenario.events.sort(key=lambda event: event.at_s)
     _read_measures(root.sections("measure"), scenario)
-    names = {measure.name for measure in scenario.measures}
+    measures = {measure.name: measure.reference_rpm is not None for measure in scenario.measures}
     for section in root.sections("expect"):
-        scenario.expectations.append(read_expectation(section, names, scenario.duration_s))
+        scenario.expectations.append(read_expectation(section, measures, scenario.duration_s))
         scenario.expectations_where.append(section.where("kind"))
     root.close()
     return scenario

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from . import places
 from .errors import UserError, suggestion
 
 REQUIRED: Any = object()
@@ -16,13 +17,14 @@ class Document:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.label = str(places.shown(path))
         try:
             self.text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise UserError("no such file", str(path), "check the name; `python3 -m tools.foc33 scenarios` lists the scenarios") from None
+            raise UserError("no such file", self.label, "check the name; `python3 -m tools.foc33 scenarios` lists the scenarios") from None
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-            raise UserError(f"cannot read the file ({reason})", str(path), "give a readable TOML file") from None
+            raise UserError(f"cannot read the file ({reason})", self.label, "give a readable TOML file") from None
         try:
             self.data = tomllib.loads(self.text)
         except tomllib.TOMLDecodeError as error:
@@ -33,12 +35,12 @@ class Document:
         place = re.search(r"\(at (?:line (\d+), column (\d+)|end of document)\)", message)
         line = int(place[1]) if place and place[1] else len(self.text.splitlines())
         reason = re.sub(r"\s*\(at .*\)", "", message)
-        return f"{self.path} line {line}", reason[:1].lower() + reason[1:]
+        return f"{self.label} line {line}", reason[:1].lower() + reason[1:]
 
     def where(self, path: tuple) -> str:
         """File and line of a key; `path` holds table names, array indices and the key."""
         line = self._line(path)
-        return f"{self.path}" + (f" line {line}" if line else "")
+        return self.label + (f" line {line}" if line else "")
 
     def _line(self, path: tuple) -> int:
         counts: dict[str, int] = {}

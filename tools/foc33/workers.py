@@ -54,6 +54,7 @@ def _start(context: Any, work: Any, numbered_job: tuple[int, Any], running: dict
 
 def _child(work: Any, job: Any, pipe: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN) # the parent ends it
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
         pipe.send(("result", work(job, lambda seconds: pipe.send(("progress", seconds)))))
     except UserError as error:

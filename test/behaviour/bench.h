@@ -1,0 +1,190 @@
+/* A drive on the bench for closed-loop tests: the whole firmware on the virtual board, with a person's hands on the buttons. */
+#ifndef BEHAVIOUR_BENCH_H
+#define BEHAVIOUR_BENCH_H
+
+#include <math.h>
+#include <stdio.h>
+
+#include "board/firmware.h"
+#include "drive/params.h"
+#include "unity.h"
+#include "vboard.h"
+
+static vb_t *bench;
+static int bench_fast;
+
+/** What a measurement over some time gives. */
+typedef struct {
+    double rpm, rpm_min, rpm_max;        /**< true speed */
+    double i_rms_a, i_d_a, i_q_a, i_peak_a; /**< true phase current (RMS), d and q current (means), longest current vector */
+    double angle_mean_deg, angle_rms_deg; /**< estimated minus true rotor angle */
+    double bus_max_v, v_max_share;       /**< highest bus; longest commanded vector over the voltage circle */
+} measured_t;
+
+static inline void set(const char *key, double value)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, vb_set(bench, key, value), vb_error(bench));
+}
+
+static inline double get(const char *key)
+{
+    double value = NAN;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, vb_get(bench, key, &value), vb_error(bench));
+    return value;
+}
+
+static inline void wait_s(double seconds)
+{
+    TEST_ASSERT_EQUAL_INT(0, vb_run(bench, (uint32_t)(seconds * 20000.0 + 0.5)));
+}
+
+static inline void press(const char *button)
+{
+    set(button, 1.0);
+    wait_s(0.1);
+    set(button, 0.0);
+}
+
+static inline void press_s2(void)
+{
+    press("input.s2");
+    bench_fast = 0;
+}
+
+/** S3 with the potentiometer at its lower end, so that the speed does not jump. */
+static inline void press_s3(void)
+{
+    press("input.s3");
+    bench_fast = !bench_fast;
+}
+
+static inline void turn_to_rpm(double rpm)
+{
+    double low = bench_fast ? NOMINAL_SPEED_RPM : MINIMUM_SPEED_RPM;
+    double high = bench_fast ? MAXIMUM_SPEED_RPM : NOMINAL_SPEED_RPM;
+    set("input.pot", (rpm - low) / (high - low));
+}
+
+/** Power on and wait for the calibration. */
+static inline void power_on(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, vb_power_up(bench));
+    bench_fast = 0;
+    turn_to_rpm(1000.0);
+    wait_s(0.1);
+}
+
+/** S2, then until the loop is closed, a fault, or 2 s. @return seconds since S2 went down */
+static inline double start(void)
+{
+    double begin = get("time_s");
+    press_s2();
+    while (board_drive.state != DRIVE_CLOSED && board_drive.fault == FAULT_NONE && get("time_s") < begin + 2.0) {
+        wait_s(0.005);
+    }
+    return get("time_s") - begin;
+}
+
+/** A running motor at a speed, settled. */
+static inline void run_at(double rpm)
+{
+    power_on();
+    (void)start();
+    TEST_ASSERT_EQUAL_INT_MESSAGE(DRIVE_CLOSED, board_drive.state, "did not start");
+    wait_s(0.5);
+    if (rpm > NOMINAL_SPEED_RPM) {
+        press_s3();
+    }
+    turn_to_rpm(rpm);
+    wait_s(1.7);
+}
+
+static inline void ramp_load(double nm)
+{
+    for (int i = 1; i <= 50; i++) {
+        set("load.constant_nm", nm * i / 50.0);
+        wait_s(0.01);
+    }
+}
+
+static inline measured_t measure(double seconds)
+{
+    measured_t m = { 0.0, 1e9, -1e9, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0 };
+    size_t rows, cols;
+    const float *row;
+    double angle2 = 0.0;
+
+    TEST_ASSERT_EQUAL_INT(0, vb_trace_config(bench, "plant.speed_rpm plant.i_d plant.i_q plant.theta_e_deg fw.theta_est_deg "
+                                                    "bus.voltage_v fw.v_d_v fw.v_q_v fw.v_limit_v", 3));
+    wait_s(seconds);
+    row = vb_trace_data(bench, &rows, &cols);
+    TEST_ASSERT_EQUAL_UINT(9, cols);
+    for (size_t i = 0; i < rows; i++, row += cols) {
+        double i2 = (double)row[1] * row[1] + (double)row[2] * row[2];
+        double angle = remainder((double)row[4] - row[3], 360.0);
+        m.rpm += row[0] / (double)rows;
+        m.rpm_min = fmin(m.rpm_min, row[0]);
+        m.rpm_max = fmax(m.rpm_max, row[0]);
+        m.i_rms_a += i2 / 2.0 / (double)rows;
+        m.i_d_a += row[1] / (double)rows;
+        m.i_q_a += row[2] / (double)rows;
+        m.i_peak_a = fmax(m.i_peak_a, sqrt(i2));
+        m.angle_mean_deg += angle / (double)rows;
+        angle2 += angle * angle / (double)rows;
+        m.bus_max_v = fmax(m.bus_max_v, row[5]);
+        m.v_max_share = fmax(m.v_max_share, hypot(row[6], row[7]) / row[8]);
+    }
+    m.i_rms_a = sqrt(m.i_rms_a);
+    m.angle_rms_deg = sqrt(angle2);
+    (void)vb_trace_config(bench, "", 1);
+    return m;
+}
+
+static inline void assert_outputs_off(void)
+{
+    wait_s(0.0001);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, (int)get("pwm.outputs_seen"), "an output is on");
+}
+
+static inline void assert_fault(drive_fault_t fault)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE((int)fault, board_drive.fault, vb_fault_name((int)board_drive.fault));
+    TEST_ASSERT_EQUAL_INT(DRIVE_FAULT, board_drive.state);
+    assert_outputs_off();
+}
+
+static inline void assert_running(void)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(FAULT_NONE, board_drive.fault, vb_fault_name((int)board_drive.fault));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(DRIVE_CLOSED, board_drive.state, vb_state_name((int)board_drive.state));
+}
+
+static inline void assert_speed(double rpm, double tolerance_percent, const measured_t *m)
+{
+    TEST_ASSERT_DOUBLE_WITHIN(rpm * tolerance_percent / 100.0, rpm, m->rpm);
+}
+
+/** Gives up on a fault, otherwise waits until the condition's time is over. @return seconds until the fault, or limit */
+static inline double seconds_to_fault(double limit)
+{
+    double begin = get("time_s");
+    while (board_drive.fault == FAULT_NONE && get("time_s") < begin + limit) {
+        wait_s(0.00005);
+    }
+    return get("time_s") - begin;
+}
+
+static inline void bench_set_up(void)
+{
+    bench = vb_create();
+    TEST_ASSERT_NOT_NULL(bench);
+    bench_fast = 0;
+}
+
+static inline void bench_tear_down(void)
+{
+    vb_destroy(bench);
+    bench = NULL;
+}
+
+#endif

@@ -1,0 +1,182 @@
+/* The motor starts: from any angle, under load, and not when it must not. */
+#include "bench.h"
+
+void setUp(void)
+{
+    bench_set_up();
+}
+
+void tearDown(void)
+{
+    bench_tear_down();
+}
+
+static void start_from(double degrees, double load_nm)
+{
+    char what[48];
+    measured_t m;
+    (void)snprintf(what, sizeof what, "from %g degrees with %g N m", degrees, load_nm);
+    set("state.speed_rpm", 0.0);
+    set("state.theta_e_deg", degrees);
+    set("load.constant_nm", load_nm);
+    power_on();
+    TEST_ASSERT_TRUE_MESSAGE(start() < 2.0, what);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(DRIVE_CLOSED, board_drive.state, what);
+    wait_s(0.5);
+    m = measure(0.3);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(5.0, 1000.0, m.rpm, what);
+    TEST_ASSERT_TRUE_MESSAGE(m.rpm_min > 900.0, what);
+}
+
+void test_starts_without_load_from_any_angle(void)
+{
+    for (double degrees = 0.0; degrees < 360.0; degrees += 45.0) {
+        start_from(degrees, 0.0);
+    }
+}
+
+void test_starts_under_load_from_any_angle(void)
+{
+    for (double degrees = 15.0; degrees < 375.0; degrees += 45.0) {
+        start_from(degrees, 0.06);
+    }
+}
+
+void test_starts_with_ten_times_the_inertia(void)
+{
+    set("mech.inertia_kgm2", 55e-6);
+    start_from(0.0, 0.0);
+}
+
+void test_closes_the_loop_at_the_time_that_the_parameters_say(void)
+{
+    /* S2's 30 ms of debouncing, 10 ms bootstrap, lock, ramp, 20 ms of agreement */
+    double ramp_s = END_SPEED_RPM * NOPOLESPAIRS * LOOPTIME_SEC / 60.0 * 67108864.0 / OPENLOOP_RAMPSPEED_INCREASERATE * LOOPTIME_SEC;
+    power_on();
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.03 + 0.010 + LOCK_TIME * LOOPTIME_SEC + ramp_s + 0.02, start());
+}
+
+void test_hand_over_is_bumpless_in_current_and_speed(void)
+{
+    measured_t before, after;
+    set("state.theta_e_deg", 30.0);
+    power_on();
+    press_s2();
+    wait_s(1.45);
+    TEST_ASSERT_EQUAL_INT(DRIVE_RAMP, board_drive.state);
+    before = measure(0.05);
+    while (board_drive.state == DRIVE_RAMP) {
+        wait_s(0.0005);
+    }
+    after = measure(0.05);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, Q_CURRENT_REF_OPENLOOP, before.i_peak_a);
+    TEST_ASSERT_TRUE(after.i_peak_a < 1.05 * Q_CURRENT_REF_OPENLOOP);
+    TEST_ASSERT_TRUE(after.rpm_min > 970.0);
+    TEST_ASSERT_TRUE(after.rpm_max < 1030.0);
+}
+
+void test_hand_over_overshoots_less_than_ten_percent_and_never_turns_back(void)
+{
+    measured_t m;
+    power_on();
+    (void)start();
+    m = measure(1.0);
+    TEST_ASSERT_TRUE(m.rpm_max < 1100.0);
+    TEST_ASSERT_TRUE(m.rpm_min > 900.0);
+}
+
+void test_offset_of_the_hand_over_is_gone_after_its_decay(void)
+{
+    measured_t m;
+    power_on();
+    (void)start();
+    TEST_ASSERT_TRUE(fabs(get("fw.offset_deg")) > 60.0); /* without load the rotor leads by most of a quarter turn */
+    wait_s(0.95);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("fw.offset_deg"));
+    m = measure(0.2);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.0, m.i_d_a);
+}
+
+void test_blocked_shaft_faults_in_two_seconds(void)
+{
+    set("load.locked", 1.0);
+    for (double degrees = 0.0; degrees < 360.0; degrees += 60.0) {
+        set("state.theta_e_deg", degrees);
+        power_on();
+        TEST_ASSERT_TRUE(start() < 2.0);
+        assert_fault(FAULT_START_FAILED);
+    }
+}
+
+void test_load_beyond_the_start_current_faults_by_name(void)
+{
+    set("load.constant_nm", 0.12);
+    power_on();
+    TEST_ASSERT_TRUE(start() < 2.0);
+    assert_fault(FAULT_START_FAILED);
+}
+
+void test_outputs_stay_off_until_s2(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, vb_power_up(bench));
+    for (int i = 0; i < 200; i++) {
+        wait_s(0.002);
+        TEST_ASSERT_EQUAL_INT(0, (int)get("pwm.outputs_seen"));
+    }
+    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
+}
+
+void test_implausible_current_offset_forbids_the_start(void)
+{
+    set("shunt.offset_b_v", 0.4);
+    power_on();
+    assert_fault(FAULT_OFFSET);
+    press_s2(); /* clears, calibrates anew, fails anew */
+    wait_s(0.1);
+    press_s2();
+    wait_s(0.5);
+    assert_fault(FAULT_OFFSET);
+}
+
+void test_amplifier_offset_is_calibrated_away(void)
+{
+    measured_t m;
+    set("shunt.offset_a_v", 0.10);
+    set("shunt.offset_b_v", -0.08);
+    run_at(1000.0);
+    m = measure(0.3);
+    assert_speed(1000.0, 0.5, &m);
+    TEST_ASSERT_TRUE(m.angle_rms_deg < 5.0);
+    TEST_ASSERT_TRUE(m.i_rms_a < 0.12);
+}
+
+void test_s2_during_the_ramp_stops_at_once(void)
+{
+    power_on();
+    press_s2();
+    wait_s(0.8);
+    TEST_ASSERT_EQUAL_INT(DRIVE_RAMP, board_drive.state);
+    press_s2();
+    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
+    assert_outputs_off();
+}
+
+void test_starts_again_after_a_stop(void)
+{
+    run_at(1500.0);
+    press_s2();
+    wait_s(1.0);
+    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
+    turn_to_rpm(1000.0);
+    TEST_ASSERT_TRUE(start() < 2.0);
+    assert_running();
+}
+
+void test_starts_on_a_low_and_on_a_high_bus(void)
+{
+    set("supply.voltage_v", 18.0);
+    start_from(0.0, 0.03);
+    set("supply.voltage_v", 26.0);
+    set("bus.voltage_v", 26.0);
+    start_from(0.0, 0.03);
+}

@@ -1,0 +1,73 @@
+"""What the front end's tests share: scenario texts, made-up traces and runs, and calls of the command line."""
+
+import contextlib
+import io
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from tools.foc33 import cli, places
+from tools.foc33.run import Run
+from tools.foc33.scenario import Scenario, read
+from tools.foc33.simulate import SIGNALS
+from tools.foc33.toml_file import Document
+from tools.foc33.trace import Trace
+
+PERIOD_S = 50e-6
+STATES = {0: "CALIBRATE", 1: "STOPPED", 2: "BOOTSTRAP", 3: "LOCK", 4: "RAMP", 5: "CLOSED", 6: "STOPPING", 7: "FAULT"}
+FAULTS = {0: "NONE", 1: "OVERCURRENT_HW", 3: "OVERVOLTAGE", 6: "STALL"}
+LIBRARY = places.ROOT / "build" / "host" / "libvboard.so"
+
+SCENARIO = """
+title = "a test"
+motor = "hurst_dmb0224c10002"
+board = "mclv"
+duration_s = 2.0
+"""
+
+
+def document(text: str) -> Document:
+    """A document with this text, in a file that is gone afterwards."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "test.toml"
+        path.write_text(text, encoding="utf-8")
+        return Document(path)
+
+
+def scenario(more: str = "") -> Scenario:
+    """A scenario of two seconds with more lines at its end."""
+    return read(document(SCENARIO + more))
+
+
+def trace(duration_s: float = 2.0, **signals) -> Trace:
+    """Every recorded signal at 0, but for those given: a number, or a function of time. Dots of names are written as "__"."""
+    time_s = np.arange(1, round(duration_s / PERIOD_S) + 1) * PERIOD_S
+    data = np.zeros((len(SIGNALS), len(time_s)), dtype=np.float32)
+    for name, value in signals.items():
+        data[SIGNALS.index(name.replace("__", "."))] = value(time_s) if callable(value) else value
+    return Trace(list(SIGNALS), time_s, data)
+
+
+def step(*pairs: tuple[float, float]):
+    """A function of time with a value from each moment on: step((0, 1), (1.5, 5)) is 1, and 5 from 1.5 s."""
+    def value(time_s: np.ndarray) -> np.ndarray:
+        result = np.full(len(time_s), pairs[0][1], dtype=np.float64)
+        for from_s, number in pairs:
+            result[time_s >= from_s - 1e-9] = number
+        return result
+    return value
+
+
+def run(more: str = "", recorded: Trace | None = None, **signals) -> Run:
+    """A finished run of scenario(more) with a made-up trace."""
+    return Run(scenario(more), trace(**signals) if recorded is None else recorded, [(0.0, "power-up")], [], STATES, FAULTS,
+               wall_s=0.1, motor_s=2.0)
+
+
+def command(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command line."""
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        code = cli.main(list(arguments))
+    return code, out.getvalue(), error.getvalue()

@@ -1,0 +1,95 @@
+"""The plant: motor and board files, overrides, and the check against the virtual board's keys."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+from support import LIBRARY, document
+
+from tools.foc33 import places, plant
+from tools.foc33.board import Library
+from tools.foc33.errors import UserError
+from tools.foc33.plant import Key, Values, resolve
+
+KEYS = {"motor.rs_ohm": Key("motor.rs_ohm", "ohm", "", 0.001, 100.0, True, True),
+        "load.constant_nm": Key("load.constant_nm", "N.m", "", 0.0, 10.0, True, True),
+        "plant.speed_rpm": Key("plant.speed_rpm", "rpm", "", 0.0, 0.0, True, False)}
+
+
+def layer(**values) -> Values:
+    names = {name.replace("__", "."): value for name, value in values.items()}
+    return Values(names, {name: "file.toml line 7" for name in names})
+
+
+class Overrides(unittest.TestCase):
+    def test_later_layers_replace_earlier_ones(self):
+        self.assertEqual(resolve([layer(motor__rs_ohm=2.0), layer(motor__rs_ohm=3.0)], KEYS), {"motor.rs_ohm": 3.0})
+
+    def test_a_factor_scales_what_is_there(self):
+        self.assertEqual(resolve([layer(motor__rs_ohm=2.0), layer(motor__rs_ohm=("factor", 1.5))], KEYS), {"motor.rs_ohm": 3.0})
+
+    def test_a_factor_of_nothing_is_refused(self):
+        with self.assertRaisesRegex(UserError, "'motor.rs_ohm' has no value to scale"):
+            resolve([layer(motor__rs_ohm=("factor", 1.5))], KEYS)
+
+    def test_a_scaled_value_must_be_possible_too(self):
+        with self.assertRaisesRegex(UserError, "'motor.rs_ohm' = 200 is impossible, file.toml line 7: choose 0.001 .. 100 ohm"):
+            resolve([layer(motor__rs_ohm=2.0), layer(motor__rs_ohm=("factor", 100.0))], KEYS)
+
+    def test_an_unknown_key_gets_the_nearest_one(self):
+        for value in (1.0, ("factor", 2.0)):
+            with self.subTest(value), self.assertRaisesRegex(UserError, "unknown key 'motor.r_ohm', .*did you mean 'motor.rs_ohm'"):
+                resolve([layer(motor__r_ohm=value)], KEYS)
+
+    def test_what_can_only_be_read_cannot_be_set(self):
+        with self.assertRaisesRegex(UserError, "'plant.speed_rpm' can only be read"):
+            resolve([layer(plant__speed_rpm=1.0)], KEYS)
+
+    def test_registers_can_be_set_within_16_bits(self):
+        self.assertEqual(resolve([layer(reg__P1TPER=999)], KEYS), {"reg.P1TPER": 999})
+        with self.assertRaisesRegex(UserError, "'reg.P1TPER' = 70000 is impossible"):
+            resolve([layer(reg__P1TPER=70000)], KEYS)
+
+
+class Files(unittest.TestCase):
+    def read(self, text: str) -> plant.Part:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "motor.toml"
+            path.write_text(text, encoding="utf-8")
+            return plant.read_motor(str(path))
+
+    def test_a_motor_without_a_needed_value_is_refused(self):
+        text = (places.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8")
+        with self.assertRaisesRegex(UserError, "'psi_vs' is missing, .*add it to \\[motor\\]"):
+            self.read("".join(line + "\n" for line in text.splitlines() if not line.startswith("psi_vs")))
+
+    def test_a_motor_with_an_unknown_table_is_refused(self):
+        with self.assertRaisesRegex(UserError, "unknown key 'moter'.*did you mean 'motor'"):
+            self.read("title = \"x\"\n[moter]\nrs_ohm = 1\n")
+
+    def test_an_unknown_motor_gets_the_nearest_name(self):
+        with self.assertRaisesRegex(UserError, "no motor 'hurst', .*did you mean 'hurst_dmb0224c10002'"):
+            plant.read_motor("hurst")
+
+    def test_a_motor_of_an_impossible_value_names_its_line(self):
+        part = self.read("title = \"x\"\n[motor]\nrs_ohm = -1\nld_h = 1e-3\nlq_h = 1e-3\npsi_vs = 0.01\npole_pairs = 4\n"
+                         "[mech]\ninertia_kgm2 = 1e-5\n")
+        with self.assertRaisesRegex(UserError, "'motor.rs_ohm' = -1 is impossible, .*line 3"):
+            resolve([part.values], Library(LIBRARY).keys)
+
+    def test_every_motor_and_board_of_the_project_suits_the_virtual_board(self):
+        keys = Library(LIBRARY).keys
+        for name in places.names(places.MOTORS):
+            with self.subTest(name):
+                resolve([plant.read_motor(name).values], keys)
+        for name in places.names(places.BOARDS):
+            with self.subTest(name):
+                resolve([plant.read_board(name).values], keys)
+
+    def test_plant_sections_remember_their_lines(self):
+        values = Values.from_section(document("[plant]\n\n\"motor.rs_ohm\" = 2\n").root.section("plant"))
+        self.assertIn("line 3", values.where["motor.rs_ohm"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,301 @@
+"""The build refuses a userparams.h that cannot work, by name, value and range; the comments there say what the build enforces."""
+
+import random
+import re
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from support.checks import CFLAGS, ROOT, compiler, run
+
+USERPARAMS = (ROOT / "userparams.h").read_text(encoding="utf-8")
+DEFINE = re.compile(r"^#define (\w+)[ \t]+(\S+)[ \t]*(?:/\* \[([^\]]*)\][ \t]+(\S+) \.\. (\S+)[ \t]+(\S.*?) \*/)?", re.MULTILINE)
+TABLES = re.compile(r"(IDREF_SPEED|INVKFI_SPEED|LS_OVER2LS0_SPEED)\d+")
+
+
+@dataclass
+class Parameter:
+    name: str
+    unit: str
+    low: str
+    high: str
+
+    def below(self) -> str:
+        return f"{float(self.low) - 0.01 * self.size(self.low):.9g}"
+
+    def above(self) -> str:
+        return f"{float(self.high) + 0.01 * self.size(self.high):.9g}"
+
+    def size(self, end: str) -> float:
+        return abs(float(end)) or float(self.high) - float(self.low)
+
+    def refusal(self, value: str) -> str:
+        return f"userparams.h: {self.name} = {value} is outside {self.low} .. {self.high} {self.unit}"
+
+
+def rows(macro: str) -> list[list[str]]:
+    """The rows of an X-macro table of param_table.h, each as its arguments in C spelling."""
+    source = f'#include "drive/param_table.h"\n#define ROW(a, ...) @@ #a @ __VA_ARGS__\n{macro}(ROW)\n'
+    text = compiler(["-E", "-P", "-Iinclude", "-xc", "-"], source).stdout.replace("\n", " ")
+    return [row.strip().split(" @ ", 1) for row in text.split("@@")[1:]]
+
+
+def parameters() -> list[Parameter]:
+    found = []
+    for name, rest in rows("PARAM_TABLE"):
+        unit, low, high = re.fullmatch(r'"([^"]*)" ?, ?(\S+) ?, ?(\S+)', rest.strip()).groups()
+        found.append(Parameter(name.strip('"'), unit, low.replace(" ", ""), high))
+    return found
+
+
+def relations() -> list[str]:
+    return ["".join(re.findall(r'"((?:[^"\\]|\\.)*)"', rest)) for _, rest in rows("PARAM_RELATION_TABLE")]
+
+
+PARAMETERS = parameters()
+
+
+def with_values(values: dict[str, str]) -> str:
+    """userparams.h with other values; a name that it lacks is added."""
+    text = USERPARAMS
+    for name, value in values.items():
+        changed, count = re.subn(rf"^(#define {name}[ \t]+)\S+", rf"\g<1>{value}", text, flags=re.MULTILINE)
+        text = changed if count else text.replace("#define NOPOLESPAIRS", f"#define {name} {value}\n#define NOPOLESPAIRS", 1)
+    return text
+
+
+def build(values: dict[str, str], extra: tuple[str, ...] = ()) -> tuple[int, str]:
+    """Compiles param_check.c with these values: exit code and messages."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "userparams.h").write_text(with_values(values), encoding="utf-8")
+        done = compiler([*CFLAGS, f"-I{folder}", "-Iinclude", "-I.", *extra, "-c", "firmware/drive/param_check.c", "-o", f"{folder}/out.o"])
+        return done.returncode, done.stderr.replace("\\'", "'")
+
+
+def the_values_in_use_are_accepted() -> None:
+    code, messages = build({})
+    assert code == 0 and not messages, messages
+
+
+def each_value_below_its_range_is_refused_by_name_value_and_range() -> None:
+    code, messages = build({p.name: p.below() for p in PARAMETERS})
+    missing = [p.refusal(p.below()) for p in PARAMETERS if p.refusal(p.below()) not in messages]
+    assert code != 0 and not missing, missing
+
+
+def each_value_above_its_range_is_refused_by_name_value_and_range() -> None:
+    code, messages = build({p.name: p.above() for p in PARAMETERS})
+    missing = [p.refusal(p.above()) for p in PARAMETERS if p.refusal(p.above()) not in messages]
+    assert code != 0 and not missing, missing
+
+
+def the_ends_of_every_range_are_inside_it() -> None:
+    for values in ({p.name: p.low for p in PARAMETERS}, {p.name: p.high for p in PARAMETERS}):
+        messages = build(values)[1]
+        assert "is outside" not in messages, messages
+
+
+def one_wrong_value_alone_stops_the_build_with_one_message() -> None:
+    for name in ("TUNING_DELAY_RAMPUP", "KFILTER_VELESTIM", "KFILTER_ESDQ", "IDREF_SPEED9", "LS_OVER2LS0_SPEED17", "DATA_BUFFER_SIZE", "SNAPDELAY"):
+        parameter = next(p for p in PARAMETERS if p.name == name)
+        for value in (parameter.below(), parameter.above()):
+            code, messages = build({name: value})
+            assert code != 0 and messages.count("error:") == 1 and parameter.refusal(value) in messages, f"{name} = {value}: {messages}"
+
+
+# For each relation a set of values that breaks it, and one just inside. R, L and Kphi scale with 24 V, 50 us and 4.4 A.
+RELATIONS = {
+    "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM": [({"MINIMUM_SPEED_RPM": "2800"}, {"MINIMUM_SPEED_RPM": "2799"})],
+    "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM": [({"MAXIMUM_SPEED_RPM": "2799"}, {"MAXIMUM_SPEED_RPM": "2800"})],
+    "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM": [({"FW_START_SPEED_RPM": "5500"}, {"FW_START_SPEED_RPM": "5499"})],
+    "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000": [({"MAXIMUM_SPEED_RPM": "6401"}, {"MAXIMUM_SPEED_RPM": "6400"})],
+    "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000": [({"NOMINAL_SPEED_RPM": "5401"}, {"NOMINAL_SPEED_RPM": "5400"})],
+    "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM": [({"END_SPEED_RPM": "2801"}, {"END_SPEED_RPM": "2800"})],
+    "MOTOR_RS_OHM does not fit its Q format": [
+        ({"NORM_CURRENT_CONST": "0.0002", "MOTOR_RS_OHM": "33"}, {"NORM_CURRENT_CONST": "0.0002", "MOTOR_RS_OHM": "32"})],
+    "MOTOR_LS_MH does not fit its Q format": [({"MOTOR_LS_MH": "16.2"}, {"MOTOR_LS_MH": "16.0"})],
+    "MOTOR_RS_OHM rounds by more than 0.5 %": [
+        ({"NORM_CURRENT_CONST": "0.0001", "MOTOR_RS_OHM": "0.0123"}, {"NORM_CURRENT_CONST": "0.0001", "MOTOR_RS_OHM": "0.0125"})],
+    "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format": [
+        ({"MOTOR_KPHI_V_PER_KRPM": "1.7"}, {"MOTOR_KPHI_V_PER_KRPM": "1.8"}), ({"MOTOR_KPHI_V_PER_KRPM": "28.2"}, {"MOTOR_KPHI_V_PER_KRPM": "28.1"})],
+    "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A": [({"Q_CURRENT_REF_OPENLOOP": "2.76"}, {"Q_CURRENT_REF_OPENLOOP": "2.75"})],
+    "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A": [({"MAXIMUM_CURRENT_A": "3.8"}, {"MAXIMUM_CURRENT_A": "3.79"})],
+    "OVER_CURRENT_THRESHOLD_A must be at most 86.5 %": [({"OVER_CURRENT_THRESHOLD_A": "3.81"}, {"OVER_CURRENT_THRESHOLD_A": "3.8"})],
+    "MAXIMUM_CURRENT_A must be at least 1/16": [({"MAXIMUM_CURRENT_A": "0.27"}, {"MAXIMUM_CURRENT_A": "0.28"})],
+    "the back-EMF's format overflows": [({"MOTOR_RS_OHM": "4.25"}, {"MOTOR_RS_OHM": "4.1"})],
+    "OVER_VOLTAGE_V must be above NOMINAL_BUS_V": [({"OVER_VOLTAGE_V": "24.0"}, {"OVER_VOLTAGE_V": "24.1"})],
+    "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V": [({"BUS_FULL_SCALE_V": "34.6"}, {"BUS_FULL_SCALE_V": "34.8"})],
+    "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V": [({"OVER_VOLTAGE_V": "45.7"}, {"OVER_VOLTAGE_V": "45.5"})],
+    "UNDER_VOLTAGE_V must be below NOMINAL_BUS_V": [({"UNDER_VOLTAGE_V": "24.0"}, {"UNDER_VOLTAGE_V": "23.9"})],
+    "UNDER_VOLTAGE_V must be at least 0.3 * NOMINAL_BUS_V": [({"UNDER_VOLTAGE_V": "7.1"}, {"UNDER_VOLTAGE_V": "7.3"})],
+    "REGEN_LIMIT_V must be above NOMINAL_BUS_V": [({"REGEN_LIMIT_V": "24.0"}, {"REGEN_LIMIT_V": "24.1"})],
+    "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V": [({"REGEN_LIMIT_V": "32.1"}, {"REGEN_LIMIT_V": "31.9"})],
+    "UNDER_VOLTAGE_V is too low for the modulator's division": [({"LOOPTIME_SEC": "0.0002"}, {"LOOPTIME_SEC": "0.0001"})],
+    "the current gain exceeds its Q format": [
+        ({"D_CURRCNTR_PTERM": "1.0"}, {"D_CURRCNTR_PTERM": "0.99"}), ({"Q_CURRCNTR_PTERM": "1.0"}, {"Q_CURRCNTR_PTERM": "0.99"}),
+        ({"CURRENT_BANDWIDTH_HZ": "2000", "MOTOR_LS_MH": "4.0"}, {"CURRENT_BANDWIDTH_HZ": "2000", "MOTOR_LS_MH": "3.8"})],
+    "the current integral exceeds its Q format": [
+        ({"D_CURRCNTR_ITERM": "15.95"}, {"D_CURRCNTR_ITERM": "15.85"}), ({"Q_CURRCNTR_ITERM": "15.95"}, {"Q_CURRCNTR_ITERM": "15.85"})],
+    "the speed gain exceeds its Q format": [({"SPEEDCNTR_PTERM": "1.0"}, {"SPEEDCNTR_PTERM": "0.99"})],
+    "the speed integral rounds to zero": [({"SPEEDCNTR_ITERM": "0.00003"}, {"SPEEDCNTR_ITERM": "0.00004"})],
+}
+# The values that the cases above start from, so that a user's own userparams.h does not change what they mean.
+BASE = dict(re.findall(r"^#define (\w+) (\S+)$", (ROOT / "test/unit/support/hurst_params.h").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def every_relation_has_a_case() -> None:
+    in_table = relations()
+    unknown = [key for key in RELATIONS if not any(message.startswith(key) for message in in_table)]
+    untested = [message for message in in_table if not any(message.startswith(key) for key in RELATIONS)]
+    assert not unknown and not untested, f"no such relation: {unknown}; not tested: {untested}"
+
+
+def every_broken_relation_stops_the_build_with_its_message() -> None:
+    for message, cases in RELATIONS.items():
+        for bad, good in cases:
+            code, messages = build(BASE | bad)
+            assert code != 0 and f"userparams.h: {message}" in messages, f"{bad}: {messages}"
+            messages = build(BASE | good)[1]
+            assert f"userparams.h: {message}" not in messages, f"{good} was refused: {messages}"
+
+
+def the_check_for_the_targets_old_compiler_refuses_the_same() -> None:
+    old = ("-O2", "-U__GNUC__", "-D__GNUC__=4", "-Wno-builtin-macro-redefined", "-w")
+    code, messages = build({}, old)
+    assert code == 0, messages
+    code, messages = build({"KFILTER_ESDQ": "9"}, old)
+    assert code != 0 and "KFILTER_ESDQ = 9 is outside 10 .. 8000 Q15" in messages, messages
+    code, messages = build({"END_SPEED_RPM": "2801"}, old)
+    assert code != 0 and "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM" in messages, messages
+
+
+def comments_in_userparams_state_the_units_and_ranges_that_the_build_enforces() -> None:
+    stated = {name: (unit, low, high, meaning) for name, _, unit, low, high, meaning in DEFINE.findall(USERPARAMS)}
+    for p in PARAMETERS:
+        unit, low, high, meaning = stated[TABLES.sub(r"\g<1>0", p.name)]
+        assert (unit, low, high) == (p.unit, p.low, p.high), f"{p.name}: comment [{unit}] {low} .. {high}, table [{p.unit}] {p.low} .. {p.high}"
+        assert meaning, f"{p.name} has no meaning"
+
+
+def every_define_of_userparams_is_in_the_table_once_and_the_other_way_round() -> None:
+    defined = [name for name, *_ in DEFINE.findall(USERPARAMS) if name != "USERPARAMS_H"]
+    in_table = [p.name for p in PARAMETERS]
+    assert len(set(in_table)) == len(in_table), "a name is twice in the table"
+    assert sorted(defined) == sorted(in_table), sorted(set(defined) ^ set(in_table))
+    listed = re.findall(r"^#define +(\w+)", USERPARAMS, re.MULTILINE)
+    assert sorted(listed) == sorted([*defined, "USERPARAMS_H"]), set(listed) - set(defined)
+
+
+def every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
+    modes = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
+    assert sorted(modes) == ["BIDIRECTIONAL_SPEED", "OPEN_LOOP_FUNCTIONING", "SNAPSHOT", "TORQUE_MODE", "TUNING"], modes
+    sources = "".join(f.read_text(encoding="utf-8") for room in ("firmware", "include") for f in (ROOT / room).rglob("*.[ch]"))
+    unused = [mode for mode in modes if not re.search(rf"#if.*\b{mode}\b|#elif.*\b{mode}\b", sources)]
+    assert not unused, unused
+
+
+# ---- every value that the build accepts fits its number format: the parameters once as they are, once with 64-bit integers ----
+
+MEMBER = re.compile(r"^\s*(\w+) ([\w, \[\]]+);", re.MULTILINE)
+
+
+def members(struct: str, headers: str, prefix: str = "") -> list[str]:
+    """Paths of all numbers in a struct of the headers, array elements included."""
+    body = re.search(r"typedef struct \{([^}]*)\} " + struct + ";", headers).group(1)
+    found = []
+    for kind, names in MEMBER.findall(body):
+        for name in names.split(","):
+            base, _, size = name.strip().rstrip("]").partition("[")
+            if re.search(r"\} " + kind + ";", headers):
+                found += members(kind, headers, f"{prefix}{base}.")
+            else:
+                found += [f"{prefix}{base}[{i}]" for i in (0, 17)] if size else [f"{prefix}{base}"]
+    return found
+
+
+def cases() -> list[dict[str, str]]:
+    """Parameter sets to try: every end of a range, some pairs that are known to matter, and random steps away from the motor in use."""
+    table_middle = re.compile(r"_SPEED([1-9]|1[0-6])$")
+    scalars = [p for p in PARAMETERS if not table_middle.search(p.name)]
+    found = [{p.name: value} for p in scalars for value in (p.low, p.high)]
+    found += [{"LOOPTIME_SEC": "0.0002", "UNDER_VOLTAGE_V": "15"}, {"LOOPTIME_SEC": "0.00014", "UNDER_VOLTAGE_V": "15"},
+              {"MAXIMUM_CURRENT_A": "0.275", "Q_CURRENT_REF_OPENLOOP": "0.2"}, {"NOMINAL_SPEED_RPM": "5400", "END_SPEED_RPM": "5000"},
+              {"NOPOLESPAIRS": "1", "MAXIMUM_SPEED_RPM": "30000", "NOMINAL_SPEED_RPM": "20000"}]
+    dice = random.Random(1)
+    for _ in range(150):
+        chosen = dice.sample(scalars, dice.randint(2, 4))
+        found.append({p.name: random_value(dice, p) for p in chosen})
+    return found
+
+
+def random_value(dice: random.Random, p: Parameter) -> str:
+    """Between the ends, on a logarithmic scale for what cannot be negative."""
+    low, high = float(p.low), float(p.high)
+    value = low * (high / low) ** dice.random() if low > 0 else low + (high - low) * dice.random()
+    return f"{value:.0f}" if re.fullmatch(r"\d+|0x[0-9A-F]+", BASE[p.name]) else f"{value:.6g}"
+
+
+def numbers_in_counts(wide: bool) -> tuple[list[str], list[list[str]]]:
+    """The names of all numbers in the drive's parameters; for each case whether the build accepts it, and the numbers."""
+    headers = "".join((ROOT / "include" / h).read_text(encoding="utf-8") for h in (
+        "control/estimator.h", "control/fieldweak.h", "control/forced_angle.h", "control/svm.h", "control/pi.h", "drive/drive.h"))
+    paths = members("drive_params_t", headers)
+    assert len(paths) > 60, paths
+    source = ["#include <stdint.h>", "#include <stdio.h>"]
+    if wide:
+        source += [f"#define {name}_t int64_t" for name in ("int16", "uint16", "int32", "uint32")]
+    source += ["#define USERPARAMS_H", *(f"#define {name} {value}" for name, value in BASE.items())]
+    source += ['#include "drive/params_init.h"', '#include "drive/param_table.h"', "#define AND(condition, message) && (condition)",
+               "static void show(int accepted, const drive_params_t *p)", "{", '    printf("%d", accepted);',
+               *(f'    printf(" %lld", (long long)p->{path});' for path in paths), '    puts("");', "}"]
+    for n, values in enumerate(cases()):
+        for name, value in values.items():
+            source += [f"#undef {name}", f"#define {name} {value}"]
+        source += [f"static void case_{n}(void)", "{", "    static const drive_params_t p = DRIVE_PARAMS_INIT;",
+                   "    show(1 PARAM_RELATION_TABLE(AND), &p);", "}"]
+        for name in values:
+            source += [f"#undef {name}", f"#define {name} {BASE[name]}"]
+    source += ["int main(void)", "{", *(f"    case_{n}();" for n in range(len(cases())))]
+    source += ["    return 0;", "}"]
+    with tempfile.TemporaryDirectory() as folder:
+        program = f"{folder}/show"
+        # -O1 removes the inline functions that nothing calls, and with them their reference to the tables of trig.c
+        done = compiler(["-std=gnu99", "-w", "-O1", "-Iinclude", "-I.", "-xc", "-", "-o", program], "\n".join(source))
+        assert done.returncode == 0, done.stderr
+        lines = subprocess.run([program], capture_output=True, text=True, check=True).stdout.splitlines()
+    return paths, [line.split() for line in lines]
+
+
+def every_accepted_parameter_set_fits_the_drives_number_formats() -> None:
+    paths, narrow = numbers_in_counts(wide=False)
+    _, wide = numbers_in_counts(wide=True)
+    wrong, accepted = [], 0
+    for values, real, ideal in zip(cases(), narrow, wide, strict=True):
+        if real[0] == "1":
+            accepted += 1
+            wrong += [f"{values}: {path} is {is_} instead of {should}"
+                      for path, is_, should in zip(paths, real[1:], ideal[1:], strict=True) if is_ != should]
+    assert accepted > 60, f"only {accepted} sets were accepted"
+    assert not wrong, "\n".join(wrong)
+
+
+def d_currents_beyond_the_largest_current_are_refused() -> None:
+    for name, value in (("IDREF_SPEED17", "-18.0"), ("FW_TRIM_CURRENT_A", "18.0")):
+        code, _ = build(BASE | {name: value})
+        assert code != 0, f"{name} = {value} is accepted: in counts it wraps around (Q13 ends at 17.6 A), and it is above MAXIMUM_CURRENT_A"
+
+
+run([the_values_in_use_are_accepted,
+     each_value_below_its_range_is_refused_by_name_value_and_range,
+     each_value_above_its_range_is_refused_by_name_value_and_range,
+     the_ends_of_every_range_are_inside_it,
+     one_wrong_value_alone_stops_the_build_with_one_message,
+     every_relation_has_a_case,
+     every_broken_relation_stops_the_build_with_its_message,
+     the_check_for_the_targets_old_compiler_refuses_the_same,
+     comments_in_userparams_state_the_units_and_ranges_that_the_build_enforces,
+     every_define_of_userparams_is_in_the_table_once_and_the_other_way_round,
+     every_mode_of_userparams_is_off_and_used_by_the_firmware,
+     every_accepted_parameter_set_fits_the_drives_number_formats,
+     d_currents_beyond_the_largest_current_are_refused])

@@ -1,0 +1,102 @@
+"""What must hold between the rooms of the firmware: who may include whom, headers that stand alone, no stray files, fuses as in the facts."""
+
+import re
+
+from support.checks import CFLAGS, ROOT, compiler, run
+
+ROOMS = ("control", "drive", "board")
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+
+
+def sources(room: str = "") -> dict[str, str]:
+    """Text of every C file of the firmware, or of one room, by path."""
+    files = sorted(f for top in ("firmware", "include") for f in (ROOT / top / room).rglob("*.[ch]"))
+    assert files, room
+    return {str(f.relative_to(ROOT)): f.read_text(encoding="utf-8") for f in files}
+
+
+def includes(room: str) -> set[tuple[str, str]]:
+    return {(path, name) for path, text in sources(room).items() for name in INCLUDE.findall(text)}
+
+
+def only_the_board_room_sees_the_device() -> None:
+    seen = [path for path, text in sources().items() if "xc.h" in text]
+    assert seen and all(path.split("/")[1] == "board" for path in seen), seen
+
+
+def control_includes_only_control() -> None:
+    wrong = [pair for pair in includes("control") if not pair[1].startswith("control/") and pair[1] != "stdint.h"]
+    assert not wrong, wrong
+
+
+def drive_includes_only_control_drive_and_the_parameters() -> None:
+    allowed = re.compile(r"(control|drive)/\w+\.h|userparams\.h|stdint\.h")
+    wrong = [pair for pair in includes("drive") if not allowed.fullmatch(pair[1])]
+    assert not wrong, wrong
+
+
+def board_includes_only_the_three_rooms_and_the_device() -> None:
+    allowed = re.compile(r"(control|drive|board)/\w+\.h|xc\.h|stdint\.h")
+    wrong = [pair for pair in includes("board") if not allowed.fullmatch(pair[1])]
+    assert not wrong, wrong
+
+
+def only_params_h_reads_userparams_h() -> None:
+    readers = [path for path, text in sources().items() if "userparams.h" in INCLUDE.findall(text)]
+    assert readers == ["include/drive/params.h"], readers
+
+
+def control_and_drive_name_no_register_and_no_motor() -> None:
+    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/host/xc.h").read_text(encoding="utf-8"))
+    assert len(registers) > 100
+    pattern = re.compile(r"\b(" + "|".join([*registers, "Hurst", "MCLV"]) + r")(bits)?\b")
+    for room in ("control", "drive"):
+        for path, text in sources(room).items():
+            code = re.sub(r"/\*.*?\*/|\"[^\"]*\"", "", text, flags=re.DOTALL)
+            found = pattern.findall(code)
+            assert not found, f"{path}: {found}"
+
+
+def every_header_compiles_alone() -> None:
+    for path in sources():
+        if path.endswith(".h"):
+            done = compiler([*CFLAGS, "-Wconversion", "-Wshadow", "-Werror", "-Itools/host", "-Iinclude", "-I.", "-fsyntax-only", "-xc", "-"],
+                            f'#include "{path.removeprefix("include/")}"\n')
+            assert done.returncode == 0, f"{path}: {done.stderr}"
+
+
+def every_header_has_its_own_guard() -> None:
+    for path, text in sources().items():
+        if path.endswith(".h"):
+            guard = "_".join(path.removesuffix(".h").upper().split("/")[1:]) + "_H"
+            assert f"#ifndef {guard}\n#define {guard}\n" in text, f"{path} wants {guard}"
+
+
+def every_file_begins_with_a_sentence_about_itself() -> None:
+    for path, text in sources().items():
+        assert re.match(r"/\* [A-Z0-9].{20,}", text), f"{path}: {text[:40]!r}"
+
+
+def there_are_no_stray_files_in_the_firmware() -> None:
+    stray = [str(f.relative_to(ROOT)) for top in ("firmware", "include") for f in (ROOT / top).rglob("*") if f.is_file() and f.suffix not in (".c", ".h")]
+    assert not stray, stray
+
+
+FUSES = {
+    "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FWDTEN": "OFF", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON",
+    "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF", "BWRP": "WRPROTECT_OFF", "BSS": "NO_FLASH", "GSS": "OFF", "GWRP": "OFF",
+}
+
+
+def configuration_words_are_those_of_the_board() -> None:
+    text = (ROOT / "firmware/board/config.c").read_text(encoding="utf-8")
+    words = re.findall(r"^#pragma config (\w+) = (\w+)$", text, re.MULTILINE)
+    assert len(dict(words)) == len(words), "a word is set twice"
+    wrong = {name: dict(words).get(name) for name, value in FUSES.items() if dict(words).get(name) != value}
+    assert not wrong, wrong
+
+
+run([only_the_board_room_sees_the_device, control_includes_only_control, drive_includes_only_control_drive_and_the_parameters,
+     board_includes_only_the_three_rooms_and_the_device, only_params_h_reads_userparams_h, control_and_drive_name_no_register_and_no_motor,
+     every_header_compiles_alone, every_header_has_its_own_guard, every_file_begins_with_a_sentence_about_itself,
+     there_are_no_stray_files_in_the_firmware, configuration_words_are_those_of_the_board])

@@ -1,0 +1,107 @@
+/* SNAPSHOT: four columns of a recording under the note's names, a row every SNAPDELAY periods. */
+/* defines: -DSNAPSHOT */
+#include "hurst_params.h"
+
+#include "firmware/board/watch.c"
+
+#include "drive/params_init.h"
+#include "unity.h"
+
+drive_t board_drive;
+const drive_params_t board_params = DRIVE_PARAMS_INIT;
+
+void setUp(void)
+{
+    uint16_t n;
+    drive_init(&board_drive, &board_params);
+    for (n = 0; n < 50u; n++) {
+        SnapBuf1[n] = SnapBuf2[n] = SnapBuf3[n] = SnapBuf4[n] = 0x7EEE;
+    }
+    SnapStart = 0;
+    SnapDone = 0;
+    board_snapshot.row = 0;
+    board_snapshot.wait = 0;
+}
+
+void tearDown(void)
+{
+}
+
+/** Periods of a drive whose signals count the periods. */
+static uint16_t period;
+
+static void record(uint16_t periods)
+{
+    while (periods-- != 0u) {
+        period++;
+        board_drive.i_a_q13 = (int16_t)period;
+        board_drive.control.i_q13.q = (int16_t)-period;
+        board_drive.estimator.omega_filtered_q16 = (int32_t)(10 * period) * 65536;
+        board_drive.estimator.rho_q32 = (uint32_t)(100u * period) << 16;
+        watch_snapshot();
+    }
+}
+
+void test_nothing_is_recorded_without_a_request(void)
+{
+    record(1000);
+    TEST_ASSERT_EQUAL_HEX16(0x7EEE, SnapBuf1[0]);
+    TEST_ASSERT_EQUAL_UINT16(0, SnapDone);
+}
+
+void test_a_row_every_five_periods_until_fifty_are_full(void)
+{
+    uint16_t n;
+    period = 0;
+    SnapStart = 1;
+    record(249);
+    TEST_ASSERT_EQUAL_UINT16(0, SnapDone);
+    TEST_ASSERT_EQUAL_UINT16(1, SnapStart);
+    record(1);
+    TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
+    TEST_ASSERT_EQUAL_UINT16(0, SnapStart);
+    for (n = 0; n < 50u; n++) {
+        int16_t at = (int16_t)(5 * (n + 1));
+        TEST_ASSERT_EQUAL_INT16(4 * at, SnapBuf1[n]);   /* phase current a, note's format */
+        TEST_ASSERT_EQUAL_INT16(-4 * at, SnapBuf2[n]);  /* q current */
+        TEST_ASSERT_EQUAL_INT16(10 * at, SnapBuf3[n]);  /* filtered speed */
+        TEST_ASSERT_EQUAL_INT16(100 * at, SnapBuf4[n]); /* angle */
+    }
+}
+
+void test_recording_stops_when_full(void)
+{
+    int16_t last;
+    SnapStart = 1;
+    record(250);
+    last = SnapBuf1[49];
+    record(1000);
+    TEST_ASSERT_EQUAL_INT16(last, SnapBuf1[49]);
+    TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
+}
+
+void test_a_second_request_records_from_the_first_row_again(void)
+{
+    SnapStart = 1;
+    record(250);
+    SnapDone = 0;
+    period = 1000;
+    SnapStart = 1;
+    record(250);
+    TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
+    TEST_ASSERT_EQUAL_INT16(4 * 1005, SnapBuf1[0]);
+    TEST_ASSERT_EQUAL_INT16(4 * 1250, SnapBuf1[49]);
+}
+
+void test_currents_beyond_the_notes_format_are_limited(void)
+{
+    uint16_t n;
+    SnapStart = 1;
+    for (n = 0; n < 5u; n++) {
+        board_drive.i_a_q13 = 9000;
+        board_drive.control.i_q13.q = -9000;
+        watch_snapshot();
+    }
+    TEST_ASSERT_EQUAL_INT16(32764, SnapBuf1[0]);
+    TEST_ASSERT_EQUAL_INT16(-32764, SnapBuf2[0]);
+}

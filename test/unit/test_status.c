@@ -1,0 +1,144 @@
+/* The status line: its text, its rhythm, and a transmitter that is sometimes full. */
+#include "hurst_params.h"
+
+#include "firmware/board/status.c"
+
+#include <string.h>
+
+#include "mock_peripherals.h"
+#include "unity.h"
+
+drive_t board_drive;
+
+static char sent[128];
+static uint16_t sent_count, room;
+
+static uint16_t take(char c, int calls)
+{
+    (void)calls;
+    if (room == 0u) {
+        return 0;
+    }
+    room--;
+    sent[sent_count++] = c;
+    sent[sent_count] = '\0';
+    return 1;
+}
+
+void setUp(void)
+{
+    static const drive_t zero;
+    board_drive = zero;
+    sent_count = 0;
+    sent[0] = '\0';
+    room = 1000;
+    uart_send_Stub(take);
+    status_init();
+}
+
+void tearDown(void)
+{
+}
+
+static void send_passes(uint16_t passes)
+{
+    while (passes-- != 0u) {
+        status_send();
+    }
+}
+
+static void expect_line(uint16_t state, uint16_t fault, int16_t speed_erpm, const char *text)
+{
+    setUp();
+    board_drive.state = state;
+    board_drive.fault = fault;
+    board_drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    status_tick(500);
+    send_passes(60);
+    TEST_ASSERT_EQUAL_STRING(text, sent);
+}
+
+void test_line_tells_state_fault_and_mechanical_speed(void)
+{
+    expect_line(DRIVE_CLOSED, FAULT_NONE, 5000, "state 5 fault 0 speed 1000 rpm\r\n");
+    expect_line(DRIVE_FAULT, FAULT_TRAP, 0, "state 7 fault 12 speed 0 rpm\r\n");
+    expect_line(DRIVE_CLOSED, FAULT_NONE, -27500, "state 5 fault 0 speed -5500 rpm\r\n");
+    expect_line(DRIVE_STOPPED, FAULT_ADC_LOST, 49, "state 1 fault 10 speed 9 rpm\r\n");
+}
+
+void test_longest_line_fits_its_buffer(void)
+{
+    expect_line(DRIVE_FAULT, FAULT_TRAP, -32768, "state 7 fault 12 speed -6553 rpm\r\n");
+    TEST_ASSERT_TRUE(sizeof line > strlen("state 32767 fault 32767 speed -32767 rpm\r\n"));
+}
+
+void test_nothing_is_sent_before_the_first_line_is_due(void)
+{
+    status_tick(499);
+    send_passes(10);
+    TEST_ASSERT_EQUAL_UINT16(0, sent_count);
+    status_tick(1);
+    send_passes(10);
+    TEST_ASSERT_EQUAL_UINT16(10, sent_count);
+}
+
+void test_lines_follow_every_500_ms(void)
+{
+    uint16_t ms, lines = 0, n;
+    for (ms = 0; ms < 2500u; ms++) {
+        status_tick(1);
+        send_passes(4);
+        if (sent_count > 100u) {
+            break;
+        }
+    }
+    for (n = 0; n < sent_count; n++) {
+        lines = (uint16_t)(lines + (sent[n] == '\n'));
+    }
+    TEST_ASSERT_EQUAL_UINT16(3, lines); /* 29 characters each, the fourth is under way */
+    TEST_ASSERT_UINT16_WITHIN(3, 2000, ms);
+}
+
+void test_one_character_a_pass(void)
+{
+    status_tick(500);
+    status_send();
+    TEST_ASSERT_EQUAL_STRING("s", sent);
+    status_send();
+    TEST_ASSERT_EQUAL_STRING("st", sent);
+}
+
+void test_full_transmitter_loses_no_character(void)
+{
+    uint16_t n;
+    status_tick(500);
+    for (n = 0; n < 40u; n++) {
+        room = 0;
+        send_passes(3);
+        room = 1;
+        send_passes(1);
+    }
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+}
+
+void test_a_line_that_is_not_out_yet_is_not_overwritten(void)
+{
+    status_tick(500);
+    send_passes(8);
+    board_drive.fault = FAULT_STALL;
+    status_tick(500);
+    send_passes(60);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+    status_tick(1);
+    send_passes(60);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\nstate 0 fault 6 speed 0 rpm\r\n", sent);
+}
+
+void test_init_drops_a_half_sent_line(void)
+{
+    status_tick(500);
+    send_passes(5);
+    status_init();
+    send_passes(20);
+    TEST_ASSERT_EQUAL_STRING("state", sent);
+}

@@ -1,0 +1,124 @@
+/* The note's watch variables: each shows its quantity in the note's format. */
+#include "hurst_params.h"
+
+#include "firmware/board/watch.c"
+
+#include "drive/params_init.h"
+#include "unity.h"
+
+drive_t board_drive;
+const drive_params_t board_params = DRIVE_PARAMS_INIT;
+
+void setUp(void)
+{
+    drive_init(&board_drive, &board_params);
+}
+
+void tearDown(void)
+{
+}
+
+void test_current_of_1_41_A_reads_NORM_CURRENT_of_it(void)
+{
+    board_drive.i_a_q13 = CURRENT_Q13(1.41);
+    board_drive.i_b_q13 = CURRENT_Q13(-1.41);
+    watch_refresh();
+    TEST_ASSERT_INT16_WITHIN(4, 10500, ParkParm.qIa); /* 1.41 A of 4.40 A; the drive's count is four of the note's */
+    TEST_ASSERT_INT16_WITHIN(4, -10500, ParkParm.qIb);
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.41), ParkParm.qIa);
+}
+
+void test_park_currents(void)
+{
+    board_drive.control.i_q13.d = CURRENT_Q13(-0.5);
+    board_drive.control.i_q13.q = CURRENT_Q13(2.0);
+    watch_refresh();
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-0.5), ParkParm.qId);
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(2.0), ParkParm.qIq);
+}
+
+void test_currents_beyond_the_notes_format_are_limited(void)
+{
+    board_drive.i_a_q13 = 9000;
+    board_drive.i_b_q13 = -9000;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(32764, ParkParm.qIa);
+    TEST_ASSERT_EQUAL_INT16(-32764, ParkParm.qIb);
+}
+
+void test_voltages_are_Q15_of_full_scale(void)
+{
+    board_drive.control.v_q14.d = VOLTAGE_Q14(-3.0);
+    board_drive.control.v_q14.q = VOLTAGE_Q14(10.0);
+    watch_refresh();
+    TEST_ASSERT_INT16_WITHIN(2, -7390, ParkParm.qVd); /* 3 V / 13.302 V * 32768 */
+    TEST_ASSERT_INT16_WITHIN(2, 24634, ParkParm.qVq);
+    board_drive.control.v_q14.q = 20000;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(32766, ParkParm.qVq);
+}
+
+void test_angles_are_65536_a_turn(void)
+{
+    board_drive.angle = 0xC123;
+    board_drive.estimator.rho_q32 = 0xA1234567ul;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_HEX16(0xC123, ParkParm.qAngle);
+    TEST_ASSERT_EQUAL_HEX16(0xA123, EstimParm.qRho);
+}
+
+void test_filtered_and_raw_speed_in_electrical_rpm(void)
+{
+    board_drive.estimator.omega_filtered_q16 = 5000L * 65536 + 1;
+    board_drive.estimator.omega_erpm = -4900;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(5000, EstimParm.qVelEstim);
+    TEST_ASSERT_EQUAL_INT16(-4900, EstimParm.qOmegaMr);
+}
+
+void test_back_emf_is_Q15_of_four_times_full_scale(void)
+{
+    board_drive.estimator.e_d_q28 = -1000L * 65536;
+    board_drive.estimator.e_q_q28 = 4096L * 65536; /* full scale */
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(-2000, EstimParm.qEsdf);
+    TEST_ASSERT_EQUAL_INT16(8192, EstimParm.qEsqf);
+}
+
+void test_references(void)
+{
+    board_drive.control.reference_erpm = -12345;
+    board_drive.control.ref_q13.d = CURRENT_Q13(-1.0);
+    board_drive.control.ref_q13.q = CURRENT_Q13(1.5);
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(-12345, CtrlParm.qVelRef);
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-1.0), CtrlParm.qVdRef);
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.5), CtrlParm.qVqRef);
+    TEST_ASSERT_EQUAL_INT16(CtrlParm.qVdRef, FdWeakParm.qIdRef);
+}
+
+void test_field_weakening_index_and_start(void)
+{
+    fieldweak_tick(&board_drive.fieldweak, &board_params.fieldweak, &board_drive.tuning, 27500);
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(14, FdWeakParm.qIndex);
+    TEST_ASSERT_EQUAL_INT16(13000, FdWeakParm.qFwOnSpeed);
+}
+
+void test_motor_constants_in_the_notes_formats(void)
+{
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(14470, MotorEstimParm.qRs);
+    TEST_ASSERT_INT16_WITHIN(1, 1626, MotorEstimParm.qLsDt);
+    TEST_ASSERT_EQUAL_INT16(7956, MotorEstimParm.qInvKFi);
+    TEST_ASSERT_EQUAL_INT16(1790, MotorEstimParm.qDeltaT);
+}
+
+void test_adapted_constants_are_shown_as_they_are_in_use(void)
+{
+    board_drive.tuning.ls_q16 = (uint16_t)(board_drive.tuning.ls_q16 / 2u);
+    board_drive.tuning.inv_kfi = 12345;
+    watch_refresh();
+    TEST_ASSERT_INT16_WITHIN(1, 813, MotorEstimParm.qLsDt);
+    TEST_ASSERT_EQUAL_INT16(12345, MotorEstimParm.qInvKFi);
+}
