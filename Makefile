@@ -121,7 +121,8 @@ all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) gol
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
 reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
 # Every chosen suite runs anew. One that cannot be built leaves no report, which the last step counts as a failure.
-run_suites = +@mkdir -p $T; rm -f $T/*.txt; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
+run_suites = +@mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
+    rm -f $T/*.txt; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
     $(python) test/run-report.py $(call reports,$(call chosen,$1))
 
 .PHONY: test test-quick setup-test

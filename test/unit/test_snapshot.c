@@ -2,13 +2,12 @@
 /* defines: -DSNAPSHOT */
 #include "hurst_params.h"
 
+#include "firmware/board/isr.c"
 #include "firmware/board/watch.c"
 
-#include "drive/params_init.h"
 #include "unity.h"
 
 drive_t board_drive;
-const drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 void setUp(void)
 {
@@ -104,4 +103,17 @@ void test_currents_beyond_the_notes_format_are_limited(void)
     }
     TEST_ASSERT_EQUAL_INT16(32764, SnapBuf1[0]);
     TEST_ASSERT_EQUAL_INT16(-32764, SnapBuf2[0]);
+}
+
+void test_control_interrupt_records(void)
+{
+    uint16_t n;
+    host_registers_reset();
+    SnapStart = 1;
+    for (n = 0; n < 249u; n++) {
+        _ADC1Interrupt();
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, SnapDone);
+    _ADC1Interrupt();
+    TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
 }
