@@ -85,8 +85,12 @@ class Builder:
         write_vectors(HERE.parent / "golden/vectors", self.out / "golden")
         self.objects = [self.compile(self.unity / "src/unity.c", self.out / "unity.o", ["-w"]),
                         self.compile(HERE / "console.c", self.out / "console.o", WARNINGS)]
-        for source in (*sorted(Path("firmware/control").glob("*.c")), *sorted(Path("firmware/drive").glob("*.c"))):
-            self.objects.append(self.compile(source, self.out / f"{source.stem}.o", [*WARNINGS, "-Wconversion"]))
+        firmware = [self.compile(source, self.out / source.with_suffix(".o"), [*WARNINGS, "-Wconversion"])
+                    for folder in ("control", "drive") for source in sorted(Path("firmware", folder).glob("*.c"))]
+        library = self.out / "libfirmware.a"
+        library.unlink(missing_ok=True)
+        run(["avr-ar", "rcs", str(library), *map(str, firmware)])
+        self.objects.append(library) # last: what a test defines itself is not taken from it
 
     def image(self, name):
         source = Path(f"test/{name}.c")

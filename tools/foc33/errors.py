@@ -15,7 +15,7 @@ class UserError(Exception):
 def suggestion(word: str, known: Iterable[str]) -> str:
     """What to write instead of an unknown word."""
     names = sorted(known)
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5) or [name for name in names if word and name.startswith(word)]
     if near:
         return f"did you mean '{near[0]}'?"
     if len(names) > 30:

@@ -1,0 +1,51 @@
+"""Building a firmware variant: its folder's name, and what a failed build tells the user."""
+
+import os
+import tempfile
+import unittest
+from pathlib import Path
+from unittest import mock
+
+from tools.foc33 import build, places
+from tools.foc33.errors import UserError
+
+
+class Build(unittest.TestCase):
+    def make(self, script: str, defines=()):
+        """build.library() with a make of our own."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "make"
+            path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+            path.chmod(0o755)
+            with mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}", "MAKEFLAGS": "-j8", "RESULT": f"{folder}/result"}):
+                library = build.library(list(defines))
+                return library, Path(folder, "result").read_text(encoding="utf-8") if Path(folder, "result").exists() else ""
+
+    def test_no_defines_mean_the_default_build(self):
+        library, call = self.make("echo \"$@\" > $RESULT")
+        self.assertEqual(library, places.ROOT / "build" / "host" / "libvboard.so")
+        self.assertNotIn("VARIANT", call)
+
+    def test_defines_mean_a_folder_of_their_own(self):
+        library, call = self.make("echo \"$@\" > $RESULT", ["TUNING", "SNAPSHOT"])
+        self.assertEqual(library.parent.name, "host-snapshot-tuning")
+        self.assertIn("VARIANT=snapshot-tuning DEFINES=-DTUNING -DSNAPSHOT", call)
+
+    def test_different_values_of_a_macro_do_not_share_a_folder(self):
+        self.assertNotEqual(build.variant_name(["A=1"]), build.variant_name(["A=2"]))
+
+    def test_the_flags_of_a_surrounding_make_are_not_inherited(self):
+        self.assertEqual(self.make("echo \"flags=$MAKEFLAGS\" > $RESULT")[1].strip(), "flags=")
+
+    def test_a_refused_parameter_is_named(self):
+        message = "include/x.h:3: error: static assertion failed: \"userparams.h: MOTOR_RS_OHM = 99 is outside 0.01 .. 40 ohm\""
+        with self.assertRaisesRegex(UserError, "does not build, make vboard: userparams.h: MOTOR_RS_OHM = 99 is outside 0.01 .. 40 ohm$"):
+            self.make(f"cat >&2 <<'X'\nIn file included from a.c\n{message}\nX\nexit 2")
+
+    def test_another_compiler_error_is_shown_with_its_place(self):
+        with self.assertRaisesRegex(UserError, "a.c:3:1: error: expected"):
+            self.make("echo 'noise' >&2; echo 'a.c:3:1: error: expected ;' >&2; exit 2")
+
+
+if __name__ == "__main__":
+    unittest.main()

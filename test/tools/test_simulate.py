@@ -1,0 +1,166 @@
+"""Running a scenario: what is set when, what is recorded, and what the processes around it do."""
+
+import os
+import time
+import unittest
+
+import numpy as np
+from support import FAULTS, STATES, scenario
+
+from tools.foc33 import simulate, workers
+from tools.foc33.errors import UserError
+from tools.foc33.panel import Ranges, plan
+
+RANGES = Ranges(500.0, 2800.0, 5500.0, 2.75, False, False)
+
+
+class FakeBoard:
+    """A board that only remembers: every call with the time at which it came."""
+
+    def __init__(self, period_s: float = 50e-6) -> None:
+        self.period_s = period_s
+        self.periods = 0
+        self.traced = 0
+        self.calls: list[tuple] = []
+        self.values = {"supply.voltage_v": 24.0}
+
+    def now(self) -> float:
+        return round(self.periods * self.period_s, 7)
+
+    def set(self, key, value):
+        self.values[key] = value
+        self.calls.append((self.now(), key, value))
+
+    def get(self, key):
+        return self.now() if key == "time_s" else self.values[key]
+
+    def power_up(self):
+        self.calls.append((self.now(), "power_up"))
+
+    def run(self, periods):
+        assert 0 < periods <= simulate.CHUNK_PERIODS
+        self.periods += periods
+
+    def trace_start(self, names, decimation):
+        self.columns = len(names)
+
+    def trace_take(self):
+        rows = np.arange(self.traced, self.periods, dtype=np.float32)
+        self.traced = self.periods
+        return np.repeat(rows[:, None], self.columns, axis=1)
+
+    def write_variable(self, name, value):
+        self.calls.append((self.now(), name, value))
+
+    def variable(self, name, count):
+        return [7] * count
+
+    def warnings(self):
+        return []
+
+
+class FakeLibrary:
+    states, faults, params = STATES, FAULTS, {}
+
+
+def simulated(text: str, board: FakeBoard, values=None):
+    item = scenario(text)
+    job = simulate.Job(item, None, values or {}, plan(item, RANGES, {}), ["plant.speed_rpm"], {"SnapBuf1": 3})
+    seconds = []
+    result = simulate._simulate(job, FakeLibrary, board, seconds.append)
+    return result, sum(seconds)
+
+
+class Simulation(unittest.TestCase):
+    def test_events_happen_at_their_period(self):
+        board = FakeBoard()
+        simulated("[[event]]\nat_s = 0.5\npress = \"S2\"\n", board)
+        self.assertIn((0.5, "input.s2", 1.0), board.calls)
+        self.assertIn((0.6, "input.s2", 0.0), board.calls)
+
+    def test_events_at_zero_are_in_place_before_power_up(self):
+        board = FakeBoard()
+        simulated("[[event]]\nat_s = 0.0\npot = 0.25\n[[event]]\nat_s = 0.1\npot = 0.5\n", board)
+        names = [call[1] for call in board.calls]
+        self.assertLess(names.index("input.pot"), names.index("power_up"))
+        self.assertLess(board.calls.index((0.0, "power_up")), board.calls.index((0.1, "input.pot", 0.5)))
+
+    def test_the_shaft_starts_where_the_scenario_says(self):
+        board = FakeBoard()
+        simulated("[start]\nrotor_deg = 75\nspeed_rpm = -300\n", board)
+        self.assertEqual((board.values["state.theta_e_deg"], board.values["state.speed_rpm"]), (75.0, -300.0))
+
+    def test_the_bus_starts_at_the_supply(self):
+        board = FakeBoard()
+        simulated("", board, {"supply.voltage_v": 20.0})
+        self.assertEqual(board.values["bus.voltage_v"], 20.0)
+
+    def test_every_period_is_recorded_once_with_its_time(self):
+        result, seconds = simulated("", FakeBoard())
+        self.assertEqual(len(result.trace), 40000)
+        self.assertTrue(np.array_equal(result.trace.column("plant.speed_rpm"), np.arange(40000)))
+        self.assertTrue(np.allclose(result.trace.time_s, (np.arange(40000) + 1) * 50e-6, atol=1e-9))
+        self.assertAlmostEqual(seconds, 2.0)
+
+    def test_a_wrong_pwm_period_still_ends_at_the_right_time(self):
+        board = FakeBoard(period_s=100e-6)
+        simulated("[[event]]\nat_s = 1.0\npot = 0.5\n", board)
+        self.assertAlmostEqual(board.now(), 2.0, delta=0.2)
+
+    def test_variables_are_written_and_read(self):
+        board = FakeBoard()
+        result, _ = simulated("[[event]]\nat_s = 0.5\ndebug = { SnapStart = 1 }\n", board)
+        self.assertIn((0.5, "SnapStart", 1), board.calls)
+        self.assertEqual(result.variables, {"SnapBuf1": [7, 7, 7]})
+
+    def test_the_protocol_holds_each_event_once(self):
+        result, _ = simulated("[[event]]\nat_s = 0.5\npress = \"S2\"\n", FakeBoard())
+        self.assertEqual(result.actions, [(0.0, "power-up"), (0.5, "S2 pressed")])
+
+
+def square(job, report):
+    report(1.0)
+    return job * job
+
+
+def late_for_small(job, report):
+    time.sleep(0.05 if job == 0 else 0.0)
+    return job
+
+
+def refuse(job, report):
+    raise UserError("no such thing", f"job {job}", "think again")
+
+
+def crash(job, report):
+    os.abort()
+
+
+def own_process(job, report):
+    return os.getpid()
+
+
+class Workers(unittest.TestCase):
+    def test_results_come_in_the_order_of_the_jobs(self):
+        self.assertEqual(workers.run_all([0, 1, 2, 3], late_for_small, lambda seconds: None), [0, 1, 2, 3])
+
+    def test_progress_of_all_processes_arrives(self):
+        seconds = []
+        workers.run_all([1, 2, 3], square, seconds.append, processes=2)
+        self.assertEqual(seconds, [1.0, 1.0, 1.0])
+
+    def test_every_job_has_a_process_of_its_own(self):
+        ids = workers.run_all([0] * 5, own_process, lambda seconds: None, processes=2)
+        self.assertEqual(len(set(ids) | {os.getpid()}), 6)
+
+    def test_a_refusal_in_a_process_is_raised_here(self):
+        with self.assertRaisesRegex(UserError, "no such thing, job 1: think again"):
+            workers.run_all([1], refuse, lambda seconds: None)
+
+    def test_a_crash_is_one_line_and_no_endless_wait(self):
+        with self.assertRaisesRegex(UserError, "the simulation ended by itself, exit code -6"):
+            workers.run_all([1], crash, lambda seconds: None)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,93 @@
+"""Table 2 and the start matrix: their data files, and what makes a row fail."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+from tools.foc33 import places, report, starts, table2
+from tools.foc33.errors import UserError
+
+NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083, 1.513), 2000: (1900, 0.062, 1.117),
+        2500: (2375, 0.031, 0.608), 3000: (2850, 0.020, 0.636), 3500: (3325, 0.019, 1.174), 4000: (3800, 0.015, 1.556)}
+
+
+def result(speed: float = 1500.0, error: float = 0.0, fault: str | None = None, voltage: float = 0.0, current: float = 0.0):
+    return {"speed_rpm": speed, "speed_error_percent": error, "fault": fault, "voltage_at_limit_percent": voltage,
+            "current_at_limit_percent": current}
+
+
+class Table2(unittest.TestCase):
+    def rows(self):
+        return table2.Table.read(places.TABLES / "table2.toml").rows
+
+    def test_the_file_holds_the_note_s_eight_rows(self):
+        self.assertEqual({row.reference_rpm: (row.note_rpm, row.torque_nm, row.note_current_a) for row in self.rows()}, NOTE)
+
+    def test_only_the_first_two_rows_must_reach_half_a_per_cent(self):
+        self.assertEqual([row.error_percent for row in self.rows()], [0.5, 0.5] + [None] * 6)
+
+    def test_a_row_at_the_note_s_speed_holds_and_one_below_fails(self):
+        row = self.rows()[2]
+        self.assertTrue(table2.check(row, result(speed=1425.0))[0].ok)
+        outcome = table2.check(row, result(speed=1424.9))[0]
+        self.assertEqual((outcome.ok, outcome.row, outcome.got), (False, "1500 rpm, 0.083 N m: speed", "1424.9 rpm"))
+
+    def test_the_first_rows_fail_above_and_below_half_a_per_cent(self):
+        row = self.rows()[0]
+        for error, ok in ((0.5, True), (-0.5, True), (0.51, False), (-0.51, False)):
+            self.assertEqual(table2.check(row, result(speed=500 * (1 + error / 100), error=error))[0].ok, ok, error)
+
+    def test_a_fault_fails_a_row_whatever_its_speed(self):
+        outcome = table2.check(self.rows()[2], result(fault="STALL"))[0]
+        self.assertFalse(outcome.ok)
+        self.assertIn("STALL", outcome.got)
+
+    def test_a_shortfall_is_explained_by_a_number(self):
+        self.assertEqual(table2.limit_text(result(error=-3.0, voltage=100.0)), "voltage 100 % of the time")
+        self.assertEqual(table2.limit_text(result(error=-3.0, voltage=0.4, current=80.0)), "current 80 % of the time")
+        self.assertEqual(table2.limit_text(result(error=-0.4, voltage=100.0)), "")
+        self.assertEqual(table2.limit_text(result(error=-3.0)), "neither voltage nor current")
+
+    def test_times_in_the_wrong_order_are_refused(self):
+        text = (places.TABLES / "table2.toml").read_text(encoding="utf-8").replace("measure_from_s = 4.5", "measure_from_s = 1.0")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "t.toml"
+            path.write_text(text, encoding="utf-8")
+            with self.assertRaisesRegex(UserError, "times are not in order"):
+                table2.Table.read(path)
+
+
+def start(angle: float = 0.0, load: float = 0.0, closed: float | None = 1.6, over: float = 1.0, error: float = 0.0, fault: str | None = None):
+    return {"rotor_deg": angle, "load_nm": load, "closed_after_s": closed, "overshoot_percent": over, "speed_error_percent": error, "fault": fault}
+
+
+class Starts(unittest.TestCase):
+    def setUp(self) -> None:
+        self.table = starts.Table.read(places.TABLES / "starts.toml")
+
+    def test_the_matrix_is_every_15_degrees_with_three_loads_within_two_seconds(self):
+        self.assertEqual((self.table.every_deg, self.table.loads_nm, self.table.within_s), (15.0, [0.0, 0.03, 0.06], 2.0))
+
+    def test_a_good_start_holds(self):
+        self.assertTrue(starts.check(self.table, start()).ok)
+
+    def test_each_way_to_fail_is_named_with_angle_and_load(self):
+        for values, got in (({"closed": 2.01}, "closed loop after 2.010 s"), ({"closed": None}, "never in closed loop"),
+                            ({"over": 10.1}, "overshoot 10.1 %"), ({"error": -0.6}, "speed error -0.60 %"), ({"fault": "STALL"}, "fault STALL")):
+            with self.subTest(got):
+                outcome = starts.check(self.table, start(45.0, 0.03, **values))
+                self.assertEqual((outcome.ok, outcome.row, outcome.got), (False, "start from 45 deg with 0.03 N m", got))
+
+    def test_the_printed_table_has_a_line_for_each_angle(self):
+        rows = [start(angle, load, fault="STALL" if angle else None) for load in self.table.loads_nm for angle in (0.0, 15.0)]
+        lines = starts.text(self.table, rows).splitlines()
+        self.assertIn("1.60 s", lines[1])
+        self.assertEqual(lines[2].split(), ["15", "STALL", "STALL", "STALL"])
+
+    def test_columns_of_the_note_are_in_the_table(self):
+        self.assertTrue({"note_rpm", "note_current_a", "speed_rpm", "current_rms_a"} <= {key for key, _, _ in table2.COLUMNS})
+        self.assertIn("limited by", report.table([{"name": "x"}], table2.COLUMNS))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,77 @@
+"""Fills the tables of README.md from the results in build/run/: `make readme` runs what they need first."""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+README = ROOT / "README.md"
+PICTURES = {"demo/speed.png": "demo-speed.png", "demo/field_weakening.png": "demo-field-weakening.png"}
+
+
+def result(name: str) -> dict:
+    path = ROOT / "build/run" / name / "summary.json"
+    try:
+        return json.loads(path.read_text())
+    except OSError:
+        sys.exit(f"foc33: no results, {path.relative_to(ROOT)}: run `make readme`, which makes them")
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def demo() -> str:
+    rows = [[m["name"], f"{m['reference_rpm']:.0f}", f"{m['speed_rpm']:.1f}", f"{m['speed_error_percent']:+.2f} %",
+             f"{m['current_rms_a']:.2f} A", f"{m['angle_error_mean_deg']:+.1f}°", f"{m['angle_error_rms_deg']:.1f}°",
+             f"{m['voltage_percent']:.0f} %"] for m in result("demo")["measures"]]
+    return table(["row", "reference rpm", "true rpm", "error", "phase current RMS", "angle error mean", "angle error RMS",
+                  "of the voltage limit"], rows)
+
+
+def table2() -> str:
+    rows = [[f"{r['reference_rpm']:.0f} rpm", f"{r['torque_nm_set']:.3f} N·m", f"{r['note_rpm']:.0f}", f"{r['speed_rpm']:.0f}",
+             f"{r['note_current_a']:.2f} A", f"{r['current_rms_a']:.2f} A", f"{r['angle_error_rms_deg']:.1f}°", f"{r['voltage_percent']:.0f} %"]
+            for r in result("table2")["rows"]]
+    return table(["reference", "torque", "note: rpm", "ours", "note: current RMS", "ours", "angle error RMS", "of the voltage limit"], rows)
+
+
+def guarantees() -> str:
+    run, top, blocked, starts = result("demo"), result("stop_from_top"), result("fault_stall"), result("starts")
+    hand_over = run["hand_overs"][0]
+    worst_speed = max(abs(m["speed_error_percent"]) for m in run["measures"])
+    worst_angle = max(m["angle_error_rms_deg"] for m in run["measures"])
+    bus = next(e["got"] for e in top["expectations"] if e["row"].startswith("bus"))
+    at = {entry["event"]: entry["at_s"] for entry in reversed(blocked["protocol"])}
+    fault = f"START_FAILED after {at['fault START_FAILED'] - at['S2 pressed']:.2f} s"
+    held = sum(e["ok"] for e in starts["expectations"])
+    rows = [
+        ["closed loop within 2.0 s of S2", f"{hand_over['after_s2_s']:.2f} s, overshoot {hand_over['overshoot_percent']:.1f} %", "`make run`"],
+        ["speed within 0.5 % of its reference, 1000 to 5500 rpm", f"{worst_speed:.2f} %", "`make run`"],
+        ["rotor angle known to 5° RMS from 1000 rpm up", f"{worst_angle:.1f}°", "`make run`"],
+        ["starts from every rotor angle with 0, 0.03 and 0.06 N·m", f"{held} of {len(starts['expectations'])}", "`make starts`"],
+        ["Table 2 of the note: every row at its reference, at the row's torque",
+         f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
+        ["orderly stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
+        ["a blocked shaft is a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
+        ["the virtual board runs at 20 times real time on one core", f"{run['speed_factor']:.0f} times", "`make run`"],
+    ]
+    return table(["guarantee", "measured", "command"], rows)
+
+
+def main() -> None:
+    text = README.read_text()
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2)):
+        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + make() + "\n" + m[2], text, flags=re.S)
+        if count != 1:
+            sys.exit(f"foc33: marks '<!-- {name} -->' and '<!-- end -->', README.md: found {count} times, put them in once")
+    README.write_text(text)
+    for source, target in PICTURES.items():
+        shutil.copy(ROOT / "build/run" / source, ROOT / "docs" / target)
+
+
+if __name__ == "__main__":
+    main()
