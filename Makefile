@@ -53,8 +53,9 @@ help: ## this list
 
 # ---- runs ----------------------------------------------------------------------------------------------------------------
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
+alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR
 python = "$$(cat build/setup/python)"
-front_end = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT $(python) -m tools.foc33
+front_end = $(alone) $(python) -m tools.foc33
 options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(if $(OUT),--out $(call quoted,$(OUT)))
 
 .PHONY: run scenarios table2 starts setup-run
@@ -215,7 +216,7 @@ $(addprefix $T/,$(unit_c)): $B/libfirmware.a
 $(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/host/xc.o
 $(addprefix $T/,$(behaviour_c)): $(board_objects) $B/libfirmware.a
 
-run_suite = @$(python) test/run-suite.py $@
+run_suite = @$(alone) $(python) test/run-suite.py $@
 
 $(call reports,$(unit_c) $(board_c) $(behaviour_c)): $T/%.txt: $T/$$(subst .,/,%)
 	$(run_suite) $<

@@ -147,6 +147,9 @@ void test_saliency_adds_reluctance_torque(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.002, -i, get("plant.i_d"));
     TEST_ASSERT_DOUBLE_WITHIN(0.002, i, get("plant.i_q"));
     TEST_ASSERT_DOUBLE_WITHIN(0.002 * torque, torque, get("plant.torque_nm"));
+    set("stat.reset", 1.0);
+    run(10);
+    TEST_ASSERT_DOUBLE_WITHIN(0.002 * torque, torque, get("stat.torque_mean_nm"));
 }
 
 void test_a_saturated_winding_has_the_remaining_inductance(void)
@@ -224,6 +227,66 @@ void test_coasting_above_the_bus_voltage_rectifies_up_to_the_peak_of_the_line_vo
     run(40000);
     double line_peak = sqrt(3.0) * PSI * omega_e(rpm);
     TEST_ASSERT_DOUBLE_WITHIN(0.15, line_peak - 2.0 * 0.8, get("bus.voltage_v"));
+}
+
+void test_one_held_terminal_lets_the_line_voltage_open_the_other_diodes(void)
+{
+    fake_override = 0x0001; /* low side of A only */
+    power_up();
+    drive_shaft(100.0); /* line to line 0.72 V peak, diodes 0.8 V */
+    run(8000);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("stat.i_peak_a"));
+    drive_shaft(150.0); /* line to line 1.09 V, phase 0.63 V */
+    run(8000);
+    TEST_ASSERT_TRUE(get("stat.i_peak_a") > 0.01);
+}
+
+static double worst_float_error;
+static unsigned float_samples;
+
+/* With A and B at ground, C's open terminal is at one and a half times its back-EMF. */
+static void compare_floating_terminal(void)
+{
+    double theta = get("plant.theta_e_deg") * PI / 180.0;
+    double e_c = -PSI * omega_e(2000.0) * sin(theta + 2.0 * PI / 3.0);
+    double v_c = (double)((ADC1BUF3 ^ 0x8000u) >> 6) / 1024.0 * 3.3 * 16.0;
+    if (get("plant.i_c") == 0.0 && get("time_s") > 0.05) { /* its low diode carries it for the rest of the turn */
+        worst_float_error = fmax(worst_float_error, fabs(v_c - 1.5 * e_c));
+        float_samples++;
+    }
+}
+
+static void sample_terminals(void)
+{
+    AD1CHS123 = 1; /* AN3..5: the terminals through the bus divider */
+    AD1PCFGL = 0x0000;
+}
+
+void test_a_floating_terminal_shows_the_back_emf_while_the_others_carry_current(void)
+{
+    make_ideal();
+    fake_override = 0x0005;
+    fake_init_hook = sample_terminals;
+    fake_adc_hook = compare_floating_terminal;
+    worst_float_error = 0.0;
+    float_samples = 0;
+    power_up();
+    drive_shaft(2000.0);
+    run(4000);
+    TEST_ASSERT_TRUE(get("stat.i_peak_a") > 1.0);
+    TEST_ASSERT_TRUE(float_samples > 500);
+    TEST_ASSERT_DOUBLE_WITHIN(0.08, 0.0, worst_float_error); /* an LSB is 0.05 V; 5 us of turning */
+}
+
+void test_the_bus_capacitor_feeds_the_board_when_the_supply_is_off(void)
+{
+    fake_override = 0x0000;
+    power_up();
+    set("supply.voltage_v", 0.0);
+    set("bus.load_a", 0.1);
+    run(1000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 24.0 - 0.1 * 0.05 / 1e-3, get("bus.voltage_v"));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, get("supply.current_a"));
 }
 
 void test_a_rectifying_bridge_feeds_a_load_with_six_pulses(void)

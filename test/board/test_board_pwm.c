@@ -170,6 +170,14 @@ void test_pulses_shorter_than_the_dead_time_disappear(void)
     TEST_ASSERT_EQUAL_HEX(0x3D, (unsigned)get("pwm.outputs_seen"));
 }
 
+void test_a_dead_time_that_spans_the_start_of_a_period_is_kept(void)
+{
+    set_duties(100, 1000, 1000); /* 2.5 us around the start of the period: on 2.1 us after its begin, off 0.15 us after its end */
+    power_up();
+    run(5);
+    TEST_ASSERT_EQUAL_HEX(0x3F, (unsigned)get("pwm.outputs_seen"));
+}
+
 void test_override_switches_everything_off_within_the_period(void)
 {
     power_up();

@@ -37,12 +37,15 @@ min = 900
 BAD = {
     "unknown plant key": ("[plant]\n\"motor.rs_om\" = 2\n", "unknown key 'motor.rs_om'", "did you mean 'motor.rs_ohm'?"),
     "impossible plant value": ("[plant]\n\"motor.rs_ohm\" = -2\n", "'motor.rs_ohm' = -2 is impossible", "choose"),
-    "unknown key in an event": ("[[event]]\nat_s = 0.5\nset = { \"load.constnt_nm\" = 1 }\n", "unknown key 'load.constnt_nm'", "load.constant_nm"),
-    "impossible value in an event": ("[[event]]\nat_s = 0.5\nset = { \"input.pot\" = 2 }\n", "'input.pot' = 2 is impossible", "0 .. 1"),
+    "unknown key in an event": ("[[event]]\nat_s = 0.5\nset = { \"load.constnt_nm\" = 1 }\n", "unknown key 'load.constnt_nm'",
+                                "load.constant_nm"),
+    "impossible value in an event": ("[[event]]\nat_s = 0.5\nset = { \"input.pot\" = 2 }\n", "'input.pot' = 2 is impossible",
+                                     "0 .. 1"),
     "speed that needs S3": ("[[event]]\nat_s = 0.5\nspeed_rpm = 5000\n", "speed_rpm = 5000 is impossible", "press S3"),
     "unknown signal": ("[[expect]]\nkind = \"signal\"\nsignal = \"fw.sped_est_rpm\"\nstatistic = \"max\"\nmax = 1\n",
                        "no signal 'fw.sped_est_rpm'", "did you mean 'fw.speed_est_rpm'?"),
-    "unknown fault": ("[[expect]]\nkind = \"fault\"\nname = \"OVERVOLTS\"\nafter_s = 1\nwithin_s = 1\n", "no fault 'OVERVOLTS'", "did you mean 'OVERVOLTAGE'?"),
+    "unknown fault": ("[[expect]]\nkind = \"fault\"\nname = \"OVERVOLTS\"\nafter_s = 1\nwithin_s = 1\n", "no fault 'OVERVOLTS'",
+                      "did you mean 'OVERVOLTAGE'?"),
     "unknown state": ("[[expect]]\nkind = \"state\"\nname = \"CLOSE\"\nat_s = 1\n", "no state 'CLOSE'", "did you mean 'CLOSED'?"),
     "syntax": ("x = = 1\n", "TOML syntax", "line 6"),
 }
@@ -110,7 +113,7 @@ class CommandLine(unittest.TestCase):
         code, out, error = self.run_text(START)
         self.assertEqual((code, error), (0, ""))
         self.assertIn("1 of 1 expectations hold", out)
-        self.assertRegex(out, r"simulated 2\.00 s of motor time in \d+\.\d+ s on one core: \d+\.\d times real time")
+        self.assertRegex(out, r"simulated 2\.00 s of motor time in \d+\.\d+ s on one core \(\d+\.\d+ s of processor time\): \d+\.\d times real time")
         data = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
         self.assertTrue(data["passed"])
         self.assertEqual(data["measures"][0]["reference_rpm"], 1000)
@@ -138,8 +141,9 @@ class CommandLine(unittest.TestCase):
     def test_an_ended_run_leaves_neither_results_nor_processes(self):
         path = self.root / "long.toml"
         path.write_text(SCENARIO.replace("2.0", "120.0"), encoding="utf-8")
-        process = subprocess.Popen([sys.executable, "-m", "tools.foc33", "run", str(path), "--out", str(self.out), "--library", str(LIBRARY)],
-                                   cwd=places.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+        line = [sys.executable, "-m", "tools.foc33", "run", str(path), "--out", str(self.out), "--library", str(LIBRARY)]
+        process = subprocess.Popen(line, cwd=places.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   start_new_session=True)
         deadline = time.monotonic() + 20.0
         while time.monotonic() < deadline and not any(item.name.startswith(".out-unfinished") for item in self.root.iterdir()):
             time.sleep(0.02)
@@ -156,7 +160,8 @@ class CommandLine(unittest.TestCase):
 
     def test_every_command_explains_itself(self):
         for name in ("run", "table2", "starts", "scenarios", "keys"):
-            result = subprocess.run([sys.executable, "-m", "tools.foc33", name, "--help"], cwd=places.ROOT, capture_output=True, text=True, check=False)
+            result = subprocess.run([sys.executable, "-m", "tools.foc33", name, "--help"], cwd=places.ROOT, capture_output=True,
+                                    text=True, check=False)
             self.assertEqual((result.returncode, result.stderr), (0, ""), name)
             self.assertIn("usage:", result.stdout)
 

@@ -48,8 +48,8 @@ class Expectations(unittest.TestCase):
         self.fails(MEASURE + expect("measure", measure="row", value="estimated_rpm", min=0), "row: estimated_rpm", "nothing")
 
     def test_a_hand_over_in_time_holds(self):
-        self.holds(S2 + expect("hand_over", within_s=0.8, overshoot_percent=10, no_reverse_motion=True), fw__state=step((0, 4), (0.8, 5)),
-                   plant__speed_rpm=step((0, 0), (0.7, 1000)), fw__speed_ref_rpm=1000)
+        self.holds(S2 + expect("hand_over", within_s=0.8, overshoot_percent=10, no_reverse_motion=True),
+                   fw__state=step((0, 4), (0.8, 5)), plant__speed_rpm=step((0, 0), (0.7, 1000)), fw__speed_ref_rpm=1000)
 
     def test_a_late_hand_over_fails(self):
         self.fails(S2 + expect("hand_over", within_s=0.6), "hand-over: closed loop", "0.700 s", fw__state=step((0, 4), (0.8, 5)),
@@ -73,8 +73,8 @@ class Expectations(unittest.TestCase):
         text = S2 + expect("hand_over", within_s=0.8, no_reverse_motion=True)
         for sign in (1, -1):
             with self.subTest(sign):
-                self.fails(text, "hand-over: no reverse motion", "-30 rpm", fw__state=step((0, 4), (0.8, 5)), fw__speed_ref_rpm=sign * 1000,
-                           plant__speed_rpm=step((0, sign * 1000), (0.76, sign * -30), (0.77, sign * 1000)))
+                self.fails(text, "hand-over: no reverse motion", "-30 rpm", fw__state=step((0, 4), (0.8, 5)),
+                           fw__speed_ref_rpm=sign * 1000, plant__speed_rpm=step((0, sign * 1000), (0.76, sign * -30), (0.77, sign * 1000)))
 
     def test_a_stop_in_time_and_slow_enough_holds(self):
         self.holds(expect("stop", after_s=1.0, within_s=0.5, speed_max_rpm=600), **off_from(1.4),
@@ -104,7 +104,8 @@ class Expectations(unittest.TestCase):
 
     def test_each_statistic_of_a_signal(self):
         half = step((0, -3), (1.0, 1)) # half of the time each
-        for statistic, value in (("min", -3), ("max", 1), ("mean", -1), ("span", 4), ("peak", 3), ("last", 1), ("rms", 5 ** 0.5), ("distinct", 2)):
+        for statistic, value in (("min", -3), ("max", 1), ("mean", -1), ("span", 4), ("peak", 3), ("last", 1), ("rms", 5 ** 0.5),
+                                 ("distinct", 2)):
             with self.subTest(statistic):
                 bounds = {"min": value - 0.01, "max": value + 0.01}
                 self.holds(expect("signal", signal="fw.i_q_a", statistic=statistic, **bounds), fw__i_q_a=half)
@@ -120,7 +121,8 @@ class Expectations(unittest.TestCase):
         self.fails(expect("state", name="STOPPED", at_s=1.5), "state at 1.5 s", "CLOSED", fw__state=signal)
 
     def test_a_state_over_time_must_hold_all_the_time(self):
-        self.fails(expect("state", name="STOPPED", from_s=0.5, to_s=1.5), "state 0.5 .. 1.5 s", "STOPPED CLOSED", fw__state=step((0, 1), (1.0, 5)))
+        self.fails(expect("state", name="STOPPED", from_s=0.5, to_s=1.5), "state 0.5 .. 1.5 s", "STOPPED CLOSED",
+                   fw__state=step((0, 1), (1.0, 5)))
 
     def test_a_state_that_must_never_come(self):
         text = expect("state", name="CLOSED", never=True)

@@ -48,7 +48,8 @@ class Texts(unittest.TestCase):
         self.assertEqual(len({len(line) for line in lines}), 1)
 
     def test_the_protocol_tells_when_the_loop_closed(self):
-        self.assertIn((0.8, "closed loop 0.70 s after S2, overshoot 0.1 %"), [(round(at_s, 3), text) for at_s, text in report.protocol(example())])
+        entries = [(round(at_s, 3), text) for at_s, text in report.protocol(example())]
+        self.assertIn((0.8, "closed loop 0.70 s after S2, overshoot 0.1 %"), entries)
 
     def test_the_protocol_names_a_fault_and_its_end(self):
         texts = [text for _, text in report.protocol(example(fw__fault=step((0, 0), (1.0, 6), (1.5, 0))))]

@@ -64,14 +64,15 @@ class Measures(unittest.TestCase):
 
 class Runs(unittest.TestCase):
     def test_hand_over_is_timed_from_the_last_s2_before_it(self):
-        item = run("[[event]]\nat_s = 0.1\npress = \"S2\"\n[[event]]\nat_s = 0.5\npress = \"S2\"\n", fw__state=step((0, 1), (0.6, 4), (0.8, 5)),
-                   fw__speed_ref_rpm=1000)
+        item = run("[[event]]\nat_s = 0.1\npress = \"S2\"\n[[event]]\nat_s = 0.5\npress = \"S2\"\n",
+                   fw__state=step((0, 1), (0.6, 4), (0.8, 5)), fw__speed_ref_rpm=1000)
         self.assertEqual(len(item.hand_overs()), 1)
         self.assertAlmostEqual(item.hand_overs()[0].after_s2_s, 0.3, delta=2 * PERIOD_S)
 
     def test_overshoot_follows_a_ramped_reference(self):
         ramp = lambda t: 1000 + 500 * np.maximum(t - 0.8, 0) # noqa: E731
-        item = run("[[event]]\nat_s = 0.1\npress = \"S2\"\n", fw__state=step((0, 4), (0.8, 5)), fw__speed_ref_rpm=ramp, plant__speed_rpm=ramp)
+        item = run("[[event]]\nat_s = 0.1\npress = \"S2\"\n", fw__state=step((0, 4), (0.8, 5)), fw__speed_ref_rpm=ramp,
+                   plant__speed_rpm=ramp)
         self.assertAlmostEqual(item.hand_overs()[0].overshoot_percent, 0.0, places=3)
 
     def test_overshoot_ends_with_closed_loop(self):

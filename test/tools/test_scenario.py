@@ -38,8 +38,8 @@ MISTAKES = {
                                    ["neither 'min' nor 'max'"]),
     "bounds in the wrong order": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"m\"\nvalue = \"speed_rpm\"\nmin = 2\nmax = 1",
                                   ["min = 2 is above max = 1"]),
-    "speed error without a reference": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"m\"\nvalue = \"speed_error_percent\"\nmax = 1",
-                                        ["'m' has no speed error", "add reference_rpm"]),
+    "speed error without a reference": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"m\"\n"
+                                        "value = \"speed_error_percent\"\nmax = 1", ["'m' has no speed error", "add reference_rpm"]),
     "expectation with a key of another kind": ("[[expect]]\nkind = \"no_fault\"\nwithin_s = 1", ["unknown key 'within_s'"]),
     "define that is no macro": ("[firmware]\ndefines = [\"TUNING; rm\"]", ["'TUNING; rm' is no macro"]),
     "define that is no text": ("[firmware]\ndefines = \"TUNING\"", ["'defines' is not a list of texts"]),

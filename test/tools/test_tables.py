@@ -11,7 +11,7 @@ NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083
         2500: (2375, 0.031, 0.608), 3000: (2850, 0.020, 0.636), 3500: (3325, 0.019, 1.174), 4000: (3800, 0.015, 1.556)}
 
 
-def result(speed: float = 1500.0, error: float = 0.0, fault: str | None = None, voltage: float = 0.0, current: float = 0.0):
+def result(speed=1500.0, error=0.0, fault=None, voltage=0.0, current=0.0):
     return {"speed_rpm": speed, "speed_error_percent": error, "fault": fault, "voltage_at_limit_percent": voltage,
             "current_at_limit_percent": current}
 
@@ -57,8 +57,9 @@ class Table2(unittest.TestCase):
                 table2.Table.read(path)
 
 
-def start(angle: float = 0.0, load: float = 0.0, closed: float | None = 1.6, over: float = 1.0, error: float = 0.0, fault: str | None = None):
-    return {"rotor_deg": angle, "load_nm": load, "closed_after_s": closed, "overshoot_percent": over, "speed_error_percent": error, "fault": fault}
+def start(angle=0.0, load=0.0, closed=1.6, over=1.0, error=0.0, fault=None):
+    return {"rotor_deg": angle, "load_nm": load, "closed_after_s": closed, "overshoot_percent": over, "speed_error_percent": error,
+            "fault": fault}
 
 
 class Starts(unittest.TestCase):
@@ -73,7 +74,8 @@ class Starts(unittest.TestCase):
 
     def test_each_way_to_fail_is_named_with_angle_and_load(self):
         for values, got in (({"closed": 2.01}, "closed loop after 2.010 s"), ({"closed": None}, "never in closed loop"),
-                            ({"over": 10.1}, "overshoot 10.1 %"), ({"error": -0.6}, "speed error -0.60 %"), ({"fault": "STALL"}, "fault STALL")):
+                            ({"over": 10.1}, "overshoot 10.1 %"), ({"error": -0.6}, "speed error -0.60 %"),
+                            ({"fault": "STALL"}, "fault STALL")):
             with self.subTest(got):
                 outcome = starts.check(self.table, start(45.0, 0.03, **values))
                 self.assertEqual((outcome.ok, outcome.row, outcome.got), (False, "start from 45 deg with 0.03 N m", got))

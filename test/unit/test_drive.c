@@ -472,8 +472,9 @@ void test_braking_current_fades_between_27_and_29_volts(void)
     rig_closed(1, 8000);
     TEST_ASSERT_EQUAL_INT16(params.current_max_q13, brake_limit(24.0F));
     TEST_ASSERT_EQUAL_INT16(params.current_max_q13, brake_limit(27.0F));
-    TEST_ASSERT_INT16_WITHIN(params.current_max_q13 / 20, params.current_max_q13 / 2, brake_limit(28.0F));
-    TEST_ASSERT_INT16_WITHIN(params.current_max_q13 / 20, 0, brake_limit(29.0F));
+    TEST_ASSERT_INT16_WITHIN(20, 4864, brake_limit(27.1F)); /* 95 % */
+    TEST_ASSERT_INT16_WITHIN(20, 2560, brake_limit(28.0F));
+    TEST_ASSERT_INT16_WITHIN(20, 0, brake_limit(29.0F));
     TEST_ASSERT_EQUAL_INT16(0, brake_limit(29.2F));
     TEST_ASSERT_EQUAL_INT16(0, brake_limit(52.0F));
     TEST_ASSERT_EQUAL_INT16(params.current_max_q13, brake_limit(26.0F));

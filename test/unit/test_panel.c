@@ -13,6 +13,25 @@ void tearDown(void)
 {
 }
 
+void test_init_forgets_everything_and_puts_the_pot_at_its_lower_end(void)
+{
+    static const panel_inputs_t nothing = { 0, 0, 1 };
+    the_panel.s2.down_ms = 29;
+    the_panel.s3.down_ms = 29;
+    the_panel.wish_run = 1;
+    the_panel.fast_range = 1;
+    the_panel.blink_ms = 999;
+    panel_init(&the_panel);
+    TEST_ASSERT_EQUAL_UINT16(0, the_panel.s2.down_ms);
+    TEST_ASSERT_EQUAL_UINT16(0, the_panel.s3.down_ms);
+    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_UINT16(0, the_panel.blink_ms);
+    drive.pot_q15 = -32768;
+    the_lights = panel_tick(&the_panel, &drive, &params, &nothing);
+    TEST_ASSERT_INT16_WITHIN(6, 2500, drive.command.target_erpm);
+}
+
 /* ---- debouncing ---- */
 
 void test_button_acts_after_30_ms(void)

@@ -4,12 +4,9 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import Any
 
-from . import build, output, places, plant, report, scenario, simulate, workers
-from .board import Library
+from . import output, places, report, scenario, simulate, starts, steps, table2, workers
 from .errors import UserError
-from .expect import Outcome
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -26,7 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()) # the reader went away; say nothing more
-        return 2
+        return 141
 
 
 class _Parser(argparse.ArgumentParser):
@@ -45,14 +42,14 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--no-plots", action="store_true", help="write summary and trace only")
     run.set_defaults(command=_run)
 
-    table2 = commands.add_parser("table2", help="the eight rows of the note's Table 2 beside ours")
-    table2.set_defaults(command=_table2)
+    loads = commands.add_parser("table2", help="the eight rows of the note's Table 2 beside ours")
+    loads.set_defaults(command=table2.command)
 
-    starts = commands.add_parser("starts", help="start from every rotor angle under several loads")
-    starts.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
-    starts.set_defaults(command=_starts)
+    angles = commands.add_parser("starts", help="start from every rotor angle under several loads")
+    angles.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
+    angles.set_defaults(command=starts.command)
 
-    for command, folder in ((run, "build/run/SCENARIO"), (table2, "build/run/table2"), (starts, "build/run/starts")):
+    for command, folder in ((run, "build/run/SCENARIO"), (loads, "build/run/table2"), (angles, "build/run/starts")):
         command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default {folder}")
         command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
         command.add_argument("--board", help="board file instead of the scenario's: a name in tuning/boards or a path")
@@ -68,71 +65,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def library_for(defines: list[str], given: Path | None) -> Library:
-    """The board with the firmware that the defines ask for."""
-    if given is not None and not given.is_file():
-        raise UserError(f"no library '{given}'", "--library", "check the path")
-    return Library(given if given is not None else build.library(defines))
-
-
-class Progress:
-    """A bar over motor time; silent when asked to be or when nobody looks."""
-
-    def __init__(self, title: str, total_s: float, quiet: bool) -> None:
-        self.bar = None
-        if quiet or not sys.stderr.isatty() and not os.environ.get("FOC33_PROGRESS"):
-            return
-        try:
-            from tqdm import tqdm
-        except ImportError:
-            return
-        tqdm.monitor_interval = 0
-        self.bar = tqdm(total=total_s, desc=title, unit="s", leave=False, ncols=90,
-                        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} s of motor time")
-
-    def __call__(self, seconds: float) -> None:
-        if self.bar is not None:
-            self.bar.update(min(seconds, max(0.0, self.bar.total - self.bar.n)))
-
-    def close(self) -> None:
-        if self.bar is not None:
-            self.bar.close()
-
-
-def _changes(texts: list[str]) -> plant.Values:
-    result = plant.Values()
-    for text in texts:
-        key, sign, value = text.partition("=")
-        factor = value.startswith("x")
-        try:
-            number = float(value[1:] if factor else value)
-        except ValueError:
-            raise UserError(f"'{text}' is no change", "--set", "write KEY=NUMBER or KEY=xFACTOR") from None
-        if not sign:
-            raise UserError(f"'{text}' is no change", "--set", "write KEY=NUMBER or KEY=xFACTOR")
-        result.values[key] = ("factor", number) if factor else number
-        result.where[key] = "--set"
-    return result
-
-
-def parts_of(item: Any, options: argparse.Namespace) -> tuple[plant.Part, plant.Part]:
-    """Motor and board: from the command line, else from the scenario or table."""
-    motor = plant.read_motor(options.motor, "--motor") if options.motor else plant.read_motor(item.motor, item.motor_where)
-    board = plant.read_board(options.board, "--board") if options.board else plant.read_board(item.board, item.board_where)
-    return motor, board
-
-
 def _run(options: argparse.Namespace) -> int:
     item = scenario.load(options.scenario)
-    motor, board = parts_of(item, options)
-    job = simulate.prepare(item, library_for(item.defines, options.library), motor, board, _changes(options.changes))
+    motor, board = steps.parts_of(item, options)
+    job = simulate.prepare(item, steps.library_for(item.defines, options.library), motor, board, steps.changes(options.changes))
     target = options.out or places.RESULTS / item.name
     with output.ResultFolder(target) as folder:
-        progress = Progress(item.name, item.duration_s, options.quiet)
-        try:
+        with steps.Progress(item.name, item.duration_s, options.quiet) as progress:
             run = workers.run_all([job], simulate.simulate, progress)[0]
-        finally:
-            progress.close()
         outcomes = report.check(run)
         data = report.summary(run, outcomes, str(places.shown(motor.path)), str(places.shown(board.path)))
         _write_traces(run, folder.work)
@@ -141,9 +81,10 @@ def _run(options: argparse.Namespace) -> int:
             data["plots"] = plots.write_all(run, folder.work)
         output.write_summary(folder.work, data)
     print(report.text(run, outcomes, data))
-    print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core: {run.speed_factor:.1f} times real time")
+    print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
+          f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time")
     print(f"results in {places.shown(target)}/")
-    return verdict(item.name, outcomes)
+    return steps.verdict(item.name, outcomes)
 
 
 def _write_traces(run: Run, folder: Path) -> None:
@@ -151,15 +92,6 @@ def _write_traces(run: Run, folder: Path) -> None:
     output.write_trace(folder / "trace.csv", run.trace.thinned(10))
     for item in run.hand_overs()[:1]:
         output.write_trace(folder / "hand_over.csv", run.trace.part(item.at_s - HAND_OVER_BEFORE_S, item.at_s + HAND_OVER_AFTER_S))
-
-
-def verdict(name: str, outcomes: list[Outcome]) -> int:
-    """Says how many expectations hold, names the others on stderr, and returns the exit code."""
-    failed = [outcome for outcome in outcomes if not outcome.ok]
-    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} expectations hold", flush=True)
-    for outcome in failed:
-        print(f"foc33: {name}: {outcome.row}: got {outcome.got}, allowed {outcome.allowed}", file=sys.stderr)
-    return 1 if failed else 0
 
 
 def _scenarios(options: argparse.Namespace) -> int:
@@ -171,17 +103,7 @@ def _scenarios(options: argparse.Namespace) -> int:
 
 
 def _keys(options: argparse.Namespace) -> int:
-    for key in library_for([], options.library).keys.values():
+    for key in steps.library_for([], options.library).keys.values():
         span = f"{key.minimum:g} .. {key.maximum:g}" if key.writable else "read only"
         print(f"{key.name:26} {key.unit:8} {span:24} {key.meaning}")
     return 0
-
-
-def _table2(options: argparse.Namespace) -> int:
-    from . import table2
-    return table2.command(options)
-
-
-def _starts(options: argparse.Namespace) -> int:
-    from . import starts
-    return starts.command(options)

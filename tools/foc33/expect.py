@@ -1,6 +1,6 @@
 """Expectations: what a scenario says must hold, each kind read from [[expect]] and checked against the finished run.
 
-    kind = "measure"       measure = "1000 rpm", value = "speed_error_percent", min and/or max   (values: see run.MEASURE_VALUES)
+    kind = "measure"       measure = "1000 rpm", value = "speed_error_percent", min and/or max (values: run.MEASURE_VALUES)
     kind = "hand_over"     within_s of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
     kind = "outputs_off"   from_s, to_s
@@ -148,8 +148,8 @@ class HandOverExpectation(Expectation):
             outcomes.append(Outcome(f"{name}: overshoot", item.overshoot_percent <= self.overshoot_percent,
                                     f"{item.overshoot_percent:.1f} %", f"at most {self.overshoot_percent:g} %"))
         if self.no_reverse_motion:
-            outcomes.append(Outcome(f"{name}: no reverse motion", item.lowest_rpm >= 0.0, f"lowest speed {item.lowest_rpm:.0f} rpm",
-                                    "at least 0 rpm"))
+            outcomes.append(Outcome(f"{name}: no reverse motion", item.lowest_rpm >= 0.0,
+                                    f"lowest speed {item.lowest_rpm:.0f} rpm", "at least 0 rpm"))
         return outcomes
 
 
@@ -225,7 +225,8 @@ class SignalExpectation(Expectation):
     def check(self, run: "Run") -> list[Outcome]:
         column = run.trace.part(self.from_s, self.to_s).column(self.signal).astype(np.float64)
         got = float(_STATISTICS[self.statistic](column)) if len(column) else None
-        return [Outcome(f"{self.row} {_window_text(self.from_s, self.to_s)}", self.bounds.hold(got), _number(got), self.bounds.text())]
+        row = f"{self.row} {_window_text(self.from_s, self.to_s)}"
+        return [Outcome(row, self.bounds.hold(got), _number(got), self.bounds.text())]
 
     def signals(self) -> list[str]:
         return [self.signal]
@@ -296,7 +297,8 @@ class FaultExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "FaultExpectation":
-        return cls(section.text("name"), section.number("after_s", REQUIRED, 0.0, duration_s), section.number("within_s", REQUIRED, 0.0),
+        return cls(section.text("name"), section.number("after_s", REQUIRED, 0.0, duration_s),
+                   section.number("within_s", REQUIRED, 0.0),
                    section.integer("outputs_off_within_periods", 1, 0), section.flag("from_cause", False),
                    section.number("kept_to_s", None, 0.0, duration_s), section.number("cleared_from_s", None, 0.0, duration_s))
 

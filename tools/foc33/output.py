@@ -24,27 +24,28 @@ class ResultFolder:
 
     def __enter__(self) -> "ResultFolder":
         target = self.target
-        if target.exists() and not (target.is_dir() and (not any(target.iterdir()) or (target / SUMMARY).is_file())):
-            raise UserError(f"'{target}' is not a result folder", "--out", "it holds something else; choose a new or an empty folder")
+        if target.exists() and not _replaceable(target):
+            raise UserError(f"'{target}' is not a result folder", "--out",
+                            "it holds something else; choose a new or an empty folder")
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             self.work = Path(tempfile.mkdtemp(prefix=f".{target.name}-unfinished-", dir=target.parent))
             self.work.chmod(0o755)
         except OSError as error:
-            raise UserError(f"cannot write to '{target.parent}' ({error.strerror})", "--out", "choose a folder that can be written") from None
+            raise _unwritable(target.parent, error, "choose a folder that can be written") from None
         return self
 
     def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
         if kind is not None:
             shutil.rmtree(self.work, ignore_errors=True)
             if isinstance(error, OSError):
-                raise UserError(f"cannot write to '{self.target}' ({error.strerror})", "--out", "free some space, or choose another folder") from None
+                raise _unwritable(self.target, error, "free some space, or choose another folder") from None
             return
         try:
             self._move()
         except OSError as failure:
             shutil.rmtree(self.work, ignore_errors=True)
-            raise UserError(f"cannot replace '{self.target}' ({failure.strerror})", "--out", "choose a folder that can be written") from None
+            raise _unwritable(self.target, failure, "choose a folder that can be written") from None
 
     def _move(self) -> None:
         old = self.work.with_name(self.work.name + "-old")
@@ -52,6 +53,14 @@ class ResultFolder:
             self.target.rename(old)
         self.work.rename(self.target)
         shutil.rmtree(old, ignore_errors=True)
+
+
+def _replaceable(folder: Path) -> bool:
+    return folder.is_dir() and (not any(folder.iterdir()) or (folder / SUMMARY).is_file())
+
+
+def _unwritable(place: Path, error: OSError, remedy: str) -> UserError:
+    return UserError(f"cannot write to '{place}' ({error.strerror})", "--out", remedy)
 
 
 def write_summary(folder: Path, data: dict[str, Any]) -> None:

@@ -105,7 +105,8 @@ def resolve(layers: list[Values], keys: Mapping[str, Key]) -> dict[str, float]:
             if isinstance(value, tuple):
                 check(key, result.get(key, keys[key].minimum if key in keys else 0.0), keys, where)
                 if key not in result:
-                    raise UserError(f"'{key}' has no value to scale", where, "neither motor nor board file gives it; write a number")
+                    raise UserError(f"'{key}' has no value to scale", where,
+                                    "neither motor nor board file gives it; write a number")
                 value = value[1] * result[key]
             check(key, value, keys, where)
             result[key] = value

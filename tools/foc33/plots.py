@@ -27,7 +27,8 @@ def write_all(run: Run, folder: Path) -> list[str]:
     files = []
     for name, draw in (("speed", _speed), ("currents", _currents), ("voltages", _voltages), ("angle_error", _angle_error)):
         files.append(_write(folder, name, run, thin, draw))
-    for name, draw, wanted in (("hand_over", _hand_over, bool(run.hand_overs())), ("field_weakening", _field_weakening, _weakens(run)),
+    for name, draw, wanted in (("hand_over", _hand_over, bool(run.hand_overs())),
+                               ("field_weakening", _field_weakening, _weakens(run)),
                                ("variables", _variables, any(len(values) > 1 for values in run.variables.values()))):
         if wanted:
             files.append(_write(folder, name, run, thin, draw))
@@ -61,10 +62,13 @@ def _closed(run: Run, trace: Trace) -> np.ndarray:
 def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
     _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"})})
     running = thin.column("pwm.outputs_seen") != 0
-    axes.plot(thin.time_s, np.where(running, thin.column("fw.speed_est_rpm"), np.nan), label="estimated", color="tab:orange", linestyle="--")
-    axes.plot(thin.time_s, np.where(_closed(run, thin), thin.column("fw.speed_ref_rpm"), np.nan), label="reference", color="black", linewidth=0.7)
+    estimated = np.where(running, thin.column("fw.speed_est_rpm"), np.nan)
+    reference = np.where(_closed(run, thin), thin.column("fw.speed_ref_rpm"), np.nan)
+    axes.plot(thin.time_s, estimated, label="estimated", color="tab:orange", linestyle="--")
+    axes.plot(thin.time_s, reference, label="reference", color="black", linewidth=0.7)
     for item in run.hand_overs():
-        axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":", label=f"closed loop, {item.after_s2_s:.2f} s after S2")
+        axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":",
+                     label=f"closed loop, {item.after_s2_s:.2f} s after S2")
     _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
 
 
@@ -97,7 +101,8 @@ def _hand_over(run: Run, thin: Trace, axes: plt.Axes) -> None:
     at_s = run.hand_overs()[0].at_s
     part = run.trace.part(at_s - HAND_OVER_BEFORE_S, at_s + HAND_OVER_AFTER_S)
     time_ms = (part.time_s - at_s) * 1e3
-    for signal, label, color in (("plant.i_a", "Ia", "tab:blue"), ("plant.i_b", "Ib", "tab:orange"), ("plant.i_c", "Ic", "tab:green")):
+    for signal, label, color in (("plant.i_a", "Ia", "tab:blue"), ("plant.i_b", "Ib", "tab:orange"),
+                                 ("plant.i_c", "Ic", "tab:green")):
         axes.plot(time_ms, part.column(signal), label=label, color=color)
     axes.axvline(0.0, color="black", linewidth=0.8, linestyle=":", label="hand-over")
     _finish(axes, f"{run.scenario.name}: phase currents around the hand-over", "current [A]", "time after the hand-over [ms]")

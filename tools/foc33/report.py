@@ -7,8 +7,9 @@ from .expect import Outcome
 from .run import Run
 
 COLUMNS = (
-    ("reference_rpm", "reference\nrpm", "{:.0f}"), ("speed_rpm", "true\nrpm", "{:.1f}"), ("estimated_rpm", "estimated\nrpm", "{:.1f}"),
-    ("speed_error_percent", "error\n%", "{:+.2f}"), ("current_rms_a", "phase I\nA rms", "{:.3f}"), ("torque_nm", "torque\nN m", "{:.4f}"),
+    ("reference_rpm", "reference\nrpm", "{:.0f}"), ("speed_rpm", "true\nrpm", "{:.1f}"),
+    ("estimated_rpm", "estimated\nrpm", "{:.1f}"), ("speed_error_percent", "error\n%", "{:+.2f}"),
+    ("current_rms_a", "phase I\nA rms", "{:.3f}"), ("torque_nm", "torque\nN m", "{:.4f}"),
     ("angle_error_mean_deg", "angle err\nmean deg", "{:+.2f}"), ("angle_error_rms_deg", "angle err\nrms deg", "{:.2f}"),
     ("voltage_v", "voltage\nV", "{:.2f}"), ("voltage_percent", "of limit\n%", "{:.0f}"))
 """Columns of the summary table: value, heading, format."""
@@ -24,7 +25,7 @@ def summary(run: Run, outcomes: list[Outcome], motor: str, board: str) -> dict[s
     scenario = run.scenario
     return clean({
         "scenario": scenario.name, "title": scenario.title, "motor": motor, "board": board, "defines": scenario.defines,
-        "passed": all(outcome.ok for outcome in outcomes), "motor_seconds": run.motor_s, "wall_seconds": run.wall_s,
+        "passed": all(outcome.ok for outcome in outcomes), "motor_seconds": run.motor_s, "wall_seconds": run.wall_s, "cpu_seconds": run.cpu_s,
         "speed_factor": run.speed_factor,
         "measures": [{"name": measure.name, "from_s": measure.from_s, "to_s": measure.to_s, "reference_rpm": measure.reference_rpm,
                       **run.measures[measure.name]} for measure in scenario.measures],
@@ -69,10 +70,13 @@ def table(rows: list[dict[str, Any]], columns: tuple = COLUMNS) -> str:
     heads = [heading.split("\n") for _, heading, _ in columns]
     cells = [[_cell(row.get(key), form) for key, _, form in columns] for row in rows]
     widths = [max([len(part) for part in head] + [len(line[i]) for line in cells]) for i, head in enumerate(heads)]
-    lines = ["  ".join([names[0].ljust(width) if part == 0 else " " * width] + [head[part].rjust(w) for head, w in zip(heads, widths)])
-             for part in (0, 1)]
+
+    def joined(name: str, parts: list[str]) -> str:
+        return "  ".join([name.ljust(width)] + [part.rjust(w) for part, w in zip(parts, widths)])
+
+    lines = [joined(names[0], [head[0] for head in heads]), joined("", [head[1] for head in heads])]
     lines.append("-" * len(lines[0]))
-    lines += ["  ".join([name.ljust(width)] + [cell.rjust(w) for cell, w in zip(line, widths)]) for name, line in zip(names[1:], cells)]
+    lines += [joined(name, line) for name, line in zip(names[1:], cells)]
     return "\n".join(line.rstrip() for line in lines)
 
 

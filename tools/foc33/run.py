@@ -41,6 +41,7 @@ class Run:
     variables: dict[str, list[int]] = field(default_factory=dict)
     params: dict[str, float] = field(default_factory=dict)
     wall_s: float = 0.0
+    cpu_s: float = 0.0
     motor_s: float = 0.0
 
     @property

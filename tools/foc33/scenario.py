@@ -103,8 +103,8 @@ def load(name: str) -> Scenario:
 def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
-    scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor"), root.text("board"),
-                        root.number("duration_s", minimum=0.01, maximum=120.0))
+    scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor"),
+                        root.text("board"), root.number("duration_s", minimum=0.01, maximum=120.0))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))

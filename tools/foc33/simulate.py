@@ -101,15 +101,15 @@ def _simulate(job: Job, library: Library, board: Any, report: Callable[[float], 
     while pending and pending[0].at_s <= 0.0: # in place before the firmware looks at its pins
         _act(board, pending.pop(0), done)
     board.power_up()
-    started = time.perf_counter()
+    started, cpu_started = time.perf_counter(), time.process_time()
     while pending:
         recorder.run_to(pending[0].at_s)
         _act(board, pending.pop(0), done)
     recorder.run_to(scenario.duration_s)
-    wall_s = time.perf_counter() - started
+    wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
     variables = {name: board.variable(name, count) for name, count in job.variables.items()}
     return Run(scenario, recorder.trace(), done, board.warnings(), library.states, library.faults, variables, library.params,
-               wall_s, board.get("time_s"))
+               wall_s, cpu_s, board.get("time_s"))
 
 
 def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> None:

@@ -1,4 +1,4 @@
-"""`starts`: the motor started from every rotor angle under several loads. The limits are data in tools/scenarios/tables/starts.toml."""
+"""`starts`: the motor started from every rotor angle under several loads. Limits are in tools/scenarios/tables/starts.toml."""
 
 import argparse
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from . import cli, matrix, output, places, report, simulate
+from . import matrix, output, places, report, simulate, steps
 from .board import Library
 from .errors import UserError
 from .expect import Outcome
@@ -41,9 +41,10 @@ class Table:
         root = document.root
         texts = [root.text(key) for key in ("title", "motor", "board")]
         numbers = [root.number("every_deg", minimum=1.0, maximum=360.0)]
-        numbers += [root.number(key, minimum=0.0) for key in ("speed_rpm", "start_s", "within_s", "measure_from_s", "measure_to_s",
-                                                              "error_percent", "overshoot_percent")]
-        table = cls(*texts, *numbers, root.numbers("loads_nm", minimum=0.0), root.where("motor"), root.where("board"), document.label)
+        numbers += [root.number(key, minimum=0.0) for key in
+                    ("speed_rpm", "start_s", "within_s", "measure_from_s", "measure_to_s", "error_percent", "overshoot_percent")]
+        table = cls(*texts, *numbers, root.numbers("loads_nm", minimum=0.0), root.where("motor"), root.where("board"),
+                    document.label)
         root.close()
         if not table.start_s + table.within_s < table.measure_from_s < table.measure_to_s:
             raise UserError("the times are not in order", document.label, "start_s + within_s < measure_from_s < measure_to_s")
@@ -57,30 +58,28 @@ def command(options: argparse.Namespace) -> int:
         if not 1.0 <= options.every_deg <= 360.0:
             raise UserError(f"every-deg = {options.every_deg:g} is impossible", "--every-deg", "choose 1 .. 360")
         table.every_deg = options.every_deg
-    motor, board = cli.parts_of(table, options)
-    library = cli.library_for([], options.library)
+    motor, board = steps.parts_of(table, options)
+    library = steps.library_for([], options.library)
     cases = [(load, angle) for load in table.loads_nm for angle in np.arange(0.0, 360.0, table.every_deg).tolist()]
     jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]
     target = options.out or places.RESULTS / "starts"
     with output.ResultFolder(target) as folder:
-        progress = cli.Progress("starts", table.measure_to_s * len(jobs), options.quiet)
-        try:
+        with steps.Progress("starts", table.measure_to_s * len(jobs), options.quiet) as progress:
             results = matrix.run_cases(jobs, progress)
-        finally:
-            progress.close()
         rows = [{"load_nm": load, "rotor_deg": angle, **result} for (load, angle), result in zip(cases, results)]
         outcomes = [check(table, row) for row in rows]
         _write(folder.work, table, rows, outcomes, motor, board)
     print(f"{table.title}: {len(rows)} starts\n")
     print(text(table, rows))
     print(f"\nresults in {places.shown(target)}/")
-    return cli.verdict("starts", outcomes)
+    return steps.verdict("starts", outcomes)
 
 
 def _job(table: Table, load: float, angle: float, library: Library, motor: Part, board: Part) -> simulate.Job:
     events = matrix.start_events(table.start_s, table.speed_rpm, library.params.get("NOMINAL_SPEED_RPM", 0.0), table.where)
-    scenario = matrix.scenario(f"{angle:g} deg, {load:g} N m", table.title, events, table.speed_rpm, table.measure_from_s, table.measure_to_s,
-                               rotor_deg=angle, plant=Values({"load.constant_nm": load}, {"load.constant_nm": table.where}))
+    scenario = matrix.scenario(f"{angle:g} deg, {load:g} N m", table.title, events, table.speed_rpm, table.measure_from_s,
+                               table.measure_to_s, rotor_deg=angle,
+                               plant=Values({"load.constant_nm": load}, {"load.constant_nm": table.where}))
     return simulate.prepare(scenario, library, motor, board)
 
 
@@ -91,10 +90,12 @@ def check(table: Table, row: dict[str, Any]) -> Outcome:
     if row["fault"]:
         return Outcome(name, False, f"fault {row['fault']}", "no fault")
     if closed is None or closed > table.within_s:
-        return Outcome(name, False, "never in closed loop" if closed is None else f"closed loop after {closed:.3f} s", f"at most {table.within_s:g} s")
+        got = "never in closed loop" if closed is None else f"closed loop after {closed:.3f} s"
+        return Outcome(name, False, got, f"at most {table.within_s:g} s")
     if over > table.overshoot_percent:
         return Outcome(name, False, f"overshoot {over:.1f} %", f"at most {table.overshoot_percent:g} %")
-    return Outcome(name, abs(error) <= table.error_percent, f"speed error {error:+.2f} %", f"at most {table.error_percent:g} %")
+    return Outcome(name, abs(error) <= table.error_percent, f"speed error {error:+.2f} %",
+                   f"at most {table.error_percent:g} %")
 
 
 def text(table: Table, rows: list[dict[str, Any]]) -> str:

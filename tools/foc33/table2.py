@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from . import cli, matrix, output, places, report, simulate
+from . import matrix, output, places, report, simulate, steps
 from .board import Library
 from .errors import UserError
 from .expect import Outcome
@@ -15,7 +15,8 @@ from .toml_file import Document, Section
 
 COLUMNS = (
     ("torque_nm_set", "torque\nN m", "{:.3f}"), ("note_rpm", "note\nrpm", "{:.0f}"), ("speed_rpm", "ours\nrpm", "{:.1f}"),
-    ("speed_error_percent", "error\n%", "{:+.2f}"), ("note_current_a", "note I\nA rms", "{:.3f}"), ("current_rms_a", "our I\nA rms", "{:.3f}"),
+    ("speed_error_percent", "error\n%", "{:+.2f}"), ("note_current_a", "note I\nA rms", "{:.3f}"),
+    ("current_rms_a", "our I\nA rms", "{:.3f}"),
     ("angle_error_mean_deg", "angle err\nmean deg", "{:+.2f}"), ("angle_error_rms_deg", "angle err\nrms deg", "{:.2f}"),
     ("voltage_v", "voltage\nV", "{:.2f}"), ("voltage_percent", "of limit\n%", "{:.0f}"), ("limit", "\nlimited by", "{}"))
 
@@ -75,16 +76,13 @@ class Table:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(places.TABLES / "table2.toml")
-    motor, board = cli.parts_of(table, options)
-    library = cli.library_for([], options.library)
+    motor, board = steps.parts_of(table, options)
+    library = steps.library_for([], options.library)
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
     target = options.out or places.RESULTS / "table2"
     with output.ResultFolder(target) as folder:
-        progress = cli.Progress("table2", table.measure_to_s * len(jobs), options.quiet)
-        try:
+        with steps.Progress("table2", table.measure_to_s * len(jobs), options.quiet) as progress:
             results = matrix.run_cases(jobs, progress)
-        finally:
-            progress.close()
         rows = [_result(row, result) for row, result in zip(table.rows, results)]
         outcomes = [outcome for row, result in zip(table.rows, rows) for outcome in check(row, result)]
         _write(folder.work, table, rows, outcomes, motor, board)
@@ -92,14 +90,16 @@ def command(options: argparse.Namespace) -> int:
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
     print(f"\nresults in {places.shown(target)}/")
-    return cli.verdict("table2", outcomes)
+    return steps.verdict("table2", outcomes)
 
 
 def _job(table: Table, row: Row, library: Library, motor: Part, board: Part) -> simulate.Job:
     nominal = library.params.get("NOMINAL_SPEED_RPM", 0.0)
     events = matrix.start_events(table.start_s, row.reference_rpm, nominal, row.where)
-    events.append(Event(table.torque_from_s, "set", row.where, keys={"load.constant_nm": row.torque_nm}, over_s=table.torque_over_s))
-    scenario = matrix.scenario(f"{row.reference_rpm:g} rpm", table.title, events, row.reference_rpm, table.measure_from_s, table.measure_to_s)
+    events.append(Event(table.torque_from_s, "set", row.where, keys={"load.constant_nm": row.torque_nm},
+                        over_s=table.torque_over_s))
+    scenario = matrix.scenario(f"{row.reference_rpm:g} rpm", table.title, events, row.reference_rpm, table.measure_from_s,
+                               table.measure_to_s)
     return simulate.prepare(scenario, library, motor, board)
 
 
@@ -126,7 +126,8 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     got = f"{result['speed_rpm']:.1f} rpm" + (f", fault {result['fault']}" if result["fault"] else "")
     name = f"{row.reference_rpm:g} rpm, {row.torque_nm:g} N m: speed"
     if row.error_percent is not None:
-        ok = result["speed_error_percent"] is not None and abs(result["speed_error_percent"]) <= row.error_percent
+        error = result["speed_error_percent"]
+        ok = error is not None and abs(error) <= row.error_percent
         allowed = f"{row.reference_rpm:g} rpm +- {row.error_percent:g} %"
     else:
         ok = result["speed_rpm"] >= row.note_rpm
@@ -135,7 +136,7 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
 
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], motor: Part, board: Part) -> None:
-    keys = ["reference_rpm"] + [key for key, _, _ in COLUMNS] + ["voltage_at_limit_percent", "current_at_limit_percent", "fault"]
+    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
     output.write_csv(folder / "table2.csv", keys, [[row[key] for key in keys] for row in rows])
     from . import plots
     data = {"title": table.title, "motor": str(places.shown(motor.path)), "board": str(places.shown(board.path)),

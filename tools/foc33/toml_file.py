@@ -21,7 +21,8 @@ class Document:
         try:
             self.text = path.read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise UserError("no such file", self.label, "check the name; `python3 -m tools.foc33 scenarios` lists the scenarios") from None
+            raise UserError("no such file", self.label,
+                            "check the name; `python3 -m tools.foc33 scenarios` lists the scenarios") from None
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read the file ({reason})", self.label, "give a readable TOML file") from None
@@ -138,9 +139,9 @@ class Section:
             raise self.fail(key, f"'{key}' is not a list of numbers", f"write {key} = [1.0, 2.0]")
         return [self._checked_number(key, item, minimum, maximum) for item in value]
 
-    def values(self, key: str, factors: bool = False, optional: bool = False) -> dict[str, Any]:
-        """A table of numbers under dotted names, quoted or nested; with `factors` also { factor = number }, given as ("factor", number)."""
-        table = self._take(key, {} if optional else REQUIRED)
+    def values(self, key: str, factors: bool = False) -> dict[str, Any]:
+        """A table of numbers under dotted names, quoted or nested; with `factors` also { factor = number } as ("factor", number)."""
+        table = self._take(key, REQUIRED)
         if not isinstance(table, dict):
             raise self.fail(key, f"'{key}' is not a table", f"write {key} = {{ \"name\" = 1.0 }}")
         return flatten(Section(self.document, table, self.path + (key,)), factors)

@@ -19,15 +19,17 @@ class _Running:
     pipe: Any
 
 
-def run_all(jobs: list[Any], work: Callable[[Any, Callable[[float], None]], Any], progress: Callable[[float], None],
-            processes: int | None = None) -> list[Any]:
+Report = Callable[[float], None]
+
+
+def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Report, processes: int | None = None) -> list[Any]:
     """Results of work(job, report) for every job, in order, with at most `processes` at a time (default: one per processor).
 
     `work` runs in a fresh process and calls report(seconds) now and then; `progress` gets the same here. A UserError in a process is
     raised here; a process that dies is an error too. Whatever happens, no process is left behind.
     """
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    limit = max(1, processes or len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1)
+    limit = processes or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()) or 1
     results: list[Any] = [None] * len(jobs)
     waiting = list(enumerate(jobs))[::-1]
     running: dict[Any, _Running] = {}

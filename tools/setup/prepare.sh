@@ -99,7 +99,7 @@ if [ -n "$packages" ]; then
         give_up "set-up, PYTHON=$PYTHON: is no Python 3.11 with numpy and matplotlib; install them for it (pip install numpy matplotlib tqdm) or leave PYTHON away"
     fi
     can_install || give_up "set-up, missing: $lacking: install it (Debian packages: $packages; or pip install numpy matplotlib tqdm) and try again"
-    echo "foc33: installing Debian packages: $packages (log: $log)"
+    echo "foc33: installing Debian packages, a minute or two: $packages (log: $log)"
     : >"$log"
     apt update
     # shellcheck disable=SC2086

@@ -54,9 +54,8 @@ static inline void press_s3(uint16_t ms)
 
 static inline void panel_reset(void)
 {
-    static const panel_t no_panel;
     static const panel_inputs_t nothing;
-    the_panel = no_panel;
+    panel_init(&the_panel);
     inputs = nothing;
 }
 

@@ -1,0 +1,62 @@
+/* The bounds that the proofs share; each is what one function promises and the next one may rely on. */
+#ifndef PROOF_BOUNDS_H
+#define PROOF_BOUNDS_H
+
+#include "drive/drive.h"
+#include "drive/params_init.h"
+
+/** The parameters under proof: those of the userparams.h on the include path. */
+static drive_params_t params;
+
+static int16_t alpha_max;   /**< alpha current below the trip level, Q14: 2 OC */
+static int16_t beta_max;    /**< beta current, Q14: 4/sqrt(3) OC, rounded up */
+static int16_t radius_max;  /**< voltage circle at the over-voltage trip, Q14 */
+static int16_t voltage_max; /**< alpha or beta voltage of a vector in that circle, Q13, and 3 % for the pieces of its proof */
+static int16_t emf_dq_max;  /**< d or q back-EMF, Q12 */
+static int16_t erpm_max;    /**< speed command and reference */
+static int16_t current_max; /**< d and q reference, Q13 */
+
+/** Largest integrator of the current and of the speed controllers. */
+#define SUM_MAX 1200000000l
+/** Inputs of the controllers for which that is proved. */
+#define PI_ERROR_MAX 22400
+#define PI_KC_MIN 29491 /* 0.9 */
+
+/** Largest ls_q16 that field weakening can set. */
+static uint16_t largest_ls(void)
+{
+    int16_t most = 0;
+    for (int i = 0; i < FIELDWEAK_ENTRIES; i++) {
+        if (params.fieldweak.ls_over2ls0_q15[i] > most) {
+            most = params.fieldweak.ls_over2ls0_q15[i];
+        }
+    }
+    return (uint16_t)(qm_muluu(params.fieldweak.ls_base_q16, (uint16_t)most) >> 14);
+}
+
+/** Length of Equation 4's vector in Q13: circle, resistance, and an inductance with both axes at their limit. */
+static int32_t longest_emf(void)
+{
+    const estimator_params_t *e = &params.estimator;
+    int32_t resistive = ((int32_t)qm_mulhi_su(beta_max, e->rs_q16) + 1) * (1 << e->rs_exp);
+    int32_t fast = (int32_t)qm_mulhi_su((int16_t)(8 * e->d_ilimit_hs_q14), largest_ls()) * (1 << e->ls_exp);
+    int32_t slow = (int32_t)qm_mulhi_su(e->d_ilimit_ls_q14, largest_ls()) * (1 << e->ls_exp) * 9 / 8; /* turned: sqrt(1 + 0.5^2) */
+    int32_t inductive = (fast > slow) ? fast : slow;
+    return voltage_max + resistive + inductive * 1449 / 1024 + 8;
+}
+
+static void set_bounds(void)
+{
+    const drive_params_t from_user = DRIVE_PARAMS_INIT; /* not static: the analyser does not fold conditions on floats */
+    params = from_user;
+    alpha_max = (int16_t)(2 * params.overcurrent_q13);
+    beta_max = (int16_t)(((int32_t)params.overcurrent_q13 * 18919 >> 13) + 2);
+    radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_over_q15 << 1), params.voltage_limit_per_bus_q16);
+    voltage_max = (int16_t)(radius_max / 2 + radius_max / 64 + 8);
+    /* Park halves it; the turn to the middle of the period, at most 0.25 rad, lengthens it by 1.031 at most */
+    emf_dq_max = (int16_t)(longest_emf() / 2 + longest_emf() / 64 + 4);
+    erpm_max = params.maximum_erpm;
+    current_max = params.current_max_q13;
+}
+
+#endif

@@ -1,0 +1,156 @@
+/* The estimator against the reference for thousands of periods: start, speed steps, reversal, a wrong Kphi; and its mirror. */
+#include "control/estimator.h"
+#include "golden.h"
+#include "golden_estimator_kphi.h"
+#include "golden_estimator_reversal.h"
+#include "golden_estimator_speed.h"
+#include "golden_estimator_start.h"
+#include "unity.h"
+
+/** An estimator and the frame that its own angle gives. */
+typedef struct {
+    estimator_t e;
+    sincos_t frame;
+} runner_t;
+
+static const estimator_params_t params = {
+    .rs_q16 = GOLDEN_ESTIMATOR_START_RS_Q16,
+    .rs_exp = GOLDEN_ESTIMATOR_START_RS_EXP,
+    .ls_exp = GOLDEN_ESTIMATOR_START_LS_EXP,
+    .d_ilimit_ls_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_LS_Q14,
+    .d_ilimit_hs_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_HS_Q14,
+    .deltat_q32 = GOLDEN_ESTIMATOR_START_DELTAT_Q32,
+    .half_step_q16_rad = GOLDEN_ESTIMATOR_START_HALF_STEP_Q16_RAD,
+    .kfilter_velestim_q16 = GOLDEN_ESTIMATOR_START_KFILTER_VELESTIM_Q16,
+    .nominal_erpm = GOLDEN_ESTIMATOR_START_NOMINAL_ERPM,
+    .decimate_erpm = GOLDEN_ESTIMATOR_START_DECIMATE_ERPM
+};
+static estimator_tuning_t tuning;
+static runner_t ahead, mirror;
+
+static void reset(runner_t *r)
+{
+    static const estimator_t zero;
+    r->e = zero;
+    r->frame = trig_sincos(0);
+}
+
+void setUp(void)
+{
+    tuning.ls_q16 = (uint16_t)GOLDEN_ESTIMATOR_START_LS_Q16;
+    tuning.kfilter_esdq_q16 = GOLDEN_ESTIMATOR_START_KFILTER_ESDQ_Q16;
+    reset(&ahead);
+    reset(&mirror);
+}
+
+void tearDown(void)
+{
+}
+
+/** One row: the tick, the angle of the next one, the vector for the modulator. */
+static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, int16_t inv_kfi)
+{
+    tuning.inv_kfi = inv_kfi;
+    tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
+    if (closed) {
+        estimator_tick_closed(&r->e, &params, &tuning, i, r->frame);
+    } else {
+        estimator_tick_free(&r->e, &params, &tuning, i);
+    }
+    r->frame = trig_sincos(estimator_next_angle(&r->e));
+    estimator_commanded(&r->e, v);
+}
+
+/* Rows of all sequences have the same members but their own types. */
+#define ROW_VECTORS(row) \
+    alphabeta_t i, v; \
+    i.alpha = row.i_alpha; \
+    i.beta = row.i_beta; \
+    v.alpha = row.v_alpha; \
+    v.beta = row.v_beta
+
+#define CHECK_SEQUENCE(name, rows) \
+    uint32_t n; \
+    for (n = 0; n < rows; n++) { \
+        golden_##name##_t row = golden_##name[n]; \
+        ROW_VECTORS(row); \
+        period(&ahead, i, v, row.closed, row.inv_kfi); \
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(row.omega, ahead.e.omega_erpm, golden_row(n)); \
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(row.rho, (uint16_t)(ahead.e.rho_q32 >> 16), golden_row(n)); \
+    }
+
+/** The same with beta negated must turn the other way; rounding toward minus infinity leaves a few counts. */
+#define CHECK_MIRROR(name, rows, from) \
+    uint32_t n; \
+    for (n = 0; n < rows; n++) { \
+        golden_##name##_t row = golden_##name[n]; \
+        ROW_VECTORS(row); \
+        period(&ahead, i, v, row.closed, row.inv_kfi); \
+        i.beta = (int16_t)-i.beta; \
+        v.beta = (int16_t)-v.beta; \
+        period(&mirror, i, v, row.closed, row.inv_kfi); \
+        if (n >= (from)) { \
+            TEST_ASSERT_INT16_WITHIN_MESSAGE(25, (int16_t)-ahead.e.omega_erpm, mirror.e.omega_erpm, golden_row(n)); \
+            TEST_ASSERT_INT16_WITHIN_MESSAGE(60, 0, (int16_t)(uint16_t)((mirror.e.rho_q32 >> 16) + (ahead.e.rho_q32 >> 16)), \
+                                             golden_row(n)); \
+        } \
+    }
+
+void test_start_ramp_and_change_of_frame_equal_the_reference(void)
+{
+    CHECK_SEQUENCE(estimator_start, GOLDEN_ESTIMATOR_START_ROWS)
+}
+
+void test_lock_speed_steps_and_field_weakening_equal_the_reference(void)
+{
+    CHECK_SEQUENCE(estimator_speed, GOLDEN_ESTIMATOR_SPEED_ROWS)
+}
+
+void test_reversal_through_standstill_equals_the_reference(void)
+{
+    CHECK_SEQUENCE(estimator_reversal, GOLDEN_ESTIMATOR_REVERSAL_ROWS)
+}
+
+void test_wrong_Kphi_equals_the_reference(void)
+{
+    CHECK_SEQUENCE(estimator_kphi, GOLDEN_ESTIMATOR_KPHI_ROWS)
+}
+
+void test_mirrored_start_turns_backwards_alike(void)
+{
+    CHECK_MIRROR(estimator_start, GOLDEN_ESTIMATOR_START_ROWS, 1600u)
+}
+
+void test_mirrored_speed_steps_turn_backwards_alike(void)
+{
+    CHECK_MIRROR(estimator_speed, GOLDEN_ESTIMATOR_SPEED_ROWS, 500u)
+}
+
+void test_mirrored_reversal_turns_backwards_alike(void)
+{
+    CHECK_MIRROR(estimator_reversal, GOLDEN_ESTIMATOR_REVERSAL_ROWS, 2300u)
+}
+
+/** Rotor ahead of the estimate after so many rows of the Kphi sequence, in counts. */
+static int16_t error_after(uint32_t rows, uint16_t true_rho)
+{
+    uint32_t n;
+    setUp();
+    for (n = 0; n < rows; n++) {
+        golden_estimator_kphi_t row = golden_estimator_kphi[n];
+        ROW_VECTORS(row);
+        period(&ahead, i, v, row.closed, row.inv_kfi);
+    }
+    return (int16_t)(uint16_t)(true_rho - (uint16_t)(ahead.e.rho_q32 >> 16));
+}
+
+void test_angle_error_is_the_law_of_a_wrong_Kphi_under_load(void)
+{
+    /* sqrt(2) sin(D + 45 deg) = K'/K, within half a degree */
+#define CHECK_LAW(rows) \
+    TEST_ASSERT_INT16_WITHIN(91, GOLDEN_ESTIMATOR_KPHI_ERROR_COUNTS_##rows, error_after(rows, (uint16_t)GOLDEN_ESTIMATOR_KPHI_TRUE_RHO_##rows))
+    CHECK_LAW(500);
+    CHECK_LAW(1000);
+    CHECK_LAW(1700);
+    CHECK_LAW(2500);
+}

@@ -1,0 +1,199 @@
+/* The firmware on the host's registers, as any harness sees it: what firmware_init() leaves in every register, and a start by hand. */
+#include "hurst_params.h"
+
+#include "firmware/board/adc.c"
+#include "firmware/board/clock.c"
+#include "firmware/board/firmware.c"
+#include "firmware/board/isr.c"
+#include "firmware/board/pins.c"
+#include "firmware/board/pwm.c"
+#include "firmware/board/status.c"
+#include "firmware/board/timer.c"
+#include "firmware/board/uart.c"
+#include "firmware/board/watch.c"
+
+#include <string.h>
+
+#include "unity.h"
+
+static void bus_volts(float bus_v)
+{
+    ADC1BUF3 = (uint16_t)(int16_t)(bus_v / 52.8F * 65536.0F - 32768.0F);
+}
+
+void setUp(void)
+{
+    host_registers_reset();
+    bus_volts(24.0F);
+    firmware_init();
+}
+
+void tearDown(void)
+{
+}
+
+/** Milliseconds of a healthy board: 20 control interrupts, timer 1's flag, some passes of the loop. */
+static void board_ms(uint16_t ms)
+{
+    while (ms-- != 0u) {
+        uint16_t n;
+        for (n = 0; n < 20u; n++) {
+            _ADC1Interrupt();
+        }
+        IFS0bits.T1IF = 1;
+        firmware_background();
+        firmware_background();
+    }
+}
+
+/* Every register that the start changes, with its value from the device facts; the rest stays as it was. */
+static const struct {
+    const char *name;
+    uint16_t value;
+} expected[] = {
+    { "CORCON", 0x0020 }, /* fractional, unsaturated: also the reset value */
+    { "OSCCON", 0x3360 }, /* crystal with PLL, locked; pin selection locked */
+    { "PLLFBD", 38 },
+    { "CLKDIV", 0x0000 },
+    { "P1TCON", 0x8002 },
+    { "P1TPER", 999 },
+    { "P1SECMP", 0x8000 | 939 },
+    { "PWM1CON1", 0x0077 },
+    { "P1DTCON1", 0x0068 },
+    { "P1FLTACON", 0x0087 },
+    { "P1OVDCON", 0x0000 },
+    { "AD1CON1", 0x836C },
+    { "AD1CON2", 0x0200 },
+    { "AD1CON3", 0x0002 },
+    { "AD1CHS0", 0x0008 },
+    { "AD1PCFGL", 0xFEF8 },
+    { "RPINR12", 0x0008 }, /* FLTA1 on RP8 */
+    { "RPINR18", 0x1F14 }, /* U1RX on RP20 */
+    { "RPOR9", 0x0300 },   /* U1TX on RP19 */
+    { "TRISA", 0xFFFF },
+    { "TRISB", 0xFFFF },
+    { "TRISC", 0xFF37 },
+    { "IEC0", 0x2000 },    /* AD1IE */
+    { "IEC3", 0x8000 },    /* FLTA1IE */
+    { "IPC3", 0x0054 },    /* AD1IP 5 */
+    { "IPC15", 0x5000 },   /* FLTA1IP 5 */
+    { "T1CON", 0x8000 },
+    { "PR1", 39999u },
+    { "U1MODE", 0x8008 },
+    { "U1STA", 0x0510 },   /* UTXEN */
+    { "U1BRG", 86 },
+};
+
+void test_every_register_after_the_start(void)
+{
+    size_t n, k;
+    for (n = 0; n < host_sfr_count; n++) {
+        uint16_t value = host_sfr_table[n].reset;
+        for (k = 0; k < sizeof expected / sizeof expected[0]; k++) {
+            if (strcmp(expected[k].name, host_sfr_table[n].name) == 0) {
+                value = expected[k].value;
+            }
+        }
+        if (host_sfr_table[n].pointer != &ADC1BUF3) {
+            TEST_ASSERT_EQUAL_HEX16_MESSAGE(value, *host_sfr_table[n].pointer, host_sfr_table[n].name);
+        }
+    }
+}
+
+void test_outputs_are_off_until_S2_whatever_time_passes(void)
+{
+    board_ms(2000);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, board_drive.state);
+}
+
+void test_S2_leads_over_bootstrap_to_pwm(void)
+{
+    uint16_t bootstrap_ms = 0;
+    board_ms(100);
+    PORTAbits.RA8 = 0;
+    board_ms(29);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    board_ms(1);
+    PORTAbits.RA8 = 1;
+    while (P1OVDCON != 0x3F00u && bootstrap_ms < 50u) {
+        board_ms(1);
+        bootstrap_ms++;
+    }
+    TEST_ASSERT_UINT16_WITHIN(1, 11, bootstrap_ms);
+    TEST_ASSERT_TRUE(P1DC1 != 0u || P1DC2 != 0u || P1DC3 != 0u);
+    PORTAbits.RA8 = 0; /* and S2 again stops */
+    board_ms(31);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_no_start_before_the_offsets_are_known(void)
+{
+    PORTAbits.RA8 = 0;
+    board_ms(51); /* 1020 samples */
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, board_drive.state);
+}
+
+void test_implausible_offset_blinks_and_keeps_the_outputs_off(void)
+{
+    ADC1BUF1 = 8192;
+    board_ms(60);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OFFSET, board_drive.fault);
+    PORTAbits.RA8 = 0;
+    board_ms(200); /* cleared, calibrated again, wrong again */
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OFFSET, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_fault_is_cleared_by_S2_and_a_second_press_starts(void)
+{
+    board_ms(100);
+    _FLTA1Interrupt();
+    PORTAbits.RA8 = 0;
+    board_ms(40);
+    PORTAbits.RA8 = 1;
+    board_ms(10);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    PORTAbits.RA8 = 0;
+    board_ms(35);
+    TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
+}
+
+void test_silent_converter_is_found_through_timer_1(void)
+{
+    board_ms(100);
+    PORTAbits.RA8 = 0;
+    board_ms(60);
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    IFS0bits.T1IF = 1;
+    firmware_background();
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    IFS0bits.T1IF = 1;
+    firmware_background();
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_ADC_LOST, board_drive.fault);
+}
+
+void test_clock_that_does_not_come_up_keeps_the_outputs_off(void)
+{
+    board_ms(10);
+    drive_init(&board_drive, &board_params);
+    drive_raise(&board_drive, FAULT_CLOCK);
+    board_ms(500);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_second_start_of_the_firmware_begins_anew(void)
+{
+    board_ms(100);
+    PORTAbits.RA8 = 0;
+    board_ms(60);
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    firmware_init();
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, board_drive.state);
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.calibrated);
+}
