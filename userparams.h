@@ -22,7 +22,7 @@
 
 /* ---- Supply and board ---------------------------------------------------------------------------------------------- */
 #define NOMINAL_BUS_V 24.0          /* [V]             10 .. 48       supply; the unit of voltage follows from it */
-#define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.0002  PWM and control period */
+#define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.00014  PWM and control period */
 #define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003  dead time of the bridge */
 #define NORM_CURRENT_CONST 0.0001342773 /* [A/count]   0.00001 .. 0.002  current of one count: full scale / 32768 (MCLV: 4.4 A); calibrate with a probe */
 #define KCURRA -0.5                 /* [1]             -0.6 .. 0.6     gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */

@@ -14,11 +14,10 @@ panel_t board_panel;
 static uint16_t last_ms_tick;     /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;  /* drive ticks at the last check */
 static uint16_t silent_ms;        /* timer 1 milliseconds without a control interrupt */
+static uint16_t clock_failed;     /* kept: on a wrong clock nothing may run, whatever the user presses */
 
 void firmware_init(void)
 {
-    uint16_t clock_failed;
-
     pwm_outputs_off();
     last_ms_tick = 0;
     supervised_tick = 0;
@@ -60,6 +59,9 @@ void firmware_background(void)
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
 
     firmware_supervise();
+    if (clock_failed) {
+        drive_raise(&board_drive, FAULT_CLOCK);
+    }
     if (elapsed_ms != 0u) {
         panel_inputs_t in;
         panel_lights_t lights;

@@ -9,6 +9,8 @@
 /* Defined here so that the compiler folds each constant into the interrupt's instructions. */
 const drive_params_t board_params = DRIVE_PARAMS_INIT;
 
+volatile uint16_t board_trap_intcon1;
+
 void BOARD_ISR _ADC1Interrupt(void);
 void BOARD_ISR _FLTA1Interrupt(void);
 void BOARD_ISR _OscillatorFail(void);
@@ -59,6 +61,7 @@ void BOARD_ISR _FLTA1Interrupt(void)
 static void board_trap(drive_fault_t fault)
 {
     pwm_outputs_off();
+    board_trap_intcon1 = INTCON1;
     drive_raise(&board_drive, fault);
 }
 

@@ -3,7 +3,7 @@
 
 #define BLINK_MS 250u
 #define PAUSE_MS 1500u
-#define POT_STEP_Q15 64 /* one step of the converter */
+#define POT_STEP_Q15 32 /* half a step of the converter */
 
 void panel_init(panel_t *panel)
 {

@@ -11,8 +11,8 @@
 
 #if __GNUC__ >= 5
 #define CHECK(condition, message) _Static_assert(condition, message);
+PARAM_RELATION_TABLE(CHECK_RELATION) /* first: one wrong value can put several others outside their ranges */
 PARAM_TABLE(CHECK_RANGE)
-PARAM_RELATION_TABLE(CHECK_RELATION)
 #else
 /* gcc 4.5 has no _Static_assert: a call that is left after constant folding stops the build with the message. */
 #define CHECK(condition, message) CHECK_N(__COUNTER__, condition, message)
@@ -27,7 +27,7 @@ PARAM_RELATION_TABLE(CHECK_RELATION)
 void param_check(void);
 void param_check(void)
 {
-    PARAM_TABLE(CHECK_RANGE)
     PARAM_RELATION_TABLE(CHECK_RELATION)
+    PARAM_TABLE(CHECK_RANGE)
 }
 #endif

@@ -127,7 +127,7 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
 
     sum = qm_clamp(sum, (int16_t)-t->emf_sum_max_q12, t->emf_sum_max_q12);
     e->omega_erpm = (int16_t)(qm_mulss(sum, t->inv_kfi) >> 11);
-    e->rho_q32 += (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32);
+    e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32));
     e->half_step_q16_rad = qm_mulhi(e->omega_erpm, p->half_step_q16_rad);
     (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
 }

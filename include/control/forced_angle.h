@@ -26,9 +26,9 @@ QM_INLINE int16_t forced_angle_tick(forced_angle_t *f, const forced_angle_params
         at_end = 1;
     }
     if (direction >= 0) {
-        f->angle_q32 += (uint32_t)f->speed_q10 << 6;
+        f->angle_q32 = qm_turn_add(f->angle_q32, (uint32_t)f->speed_q10 << 6);
     } else {
-        f->angle_q32 -= (uint32_t)f->speed_q10 << 6;
+        f->angle_q32 = qm_turn_sub(f->angle_q32, (uint32_t)f->speed_q10 << 6);
     }
     return at_end;
 }

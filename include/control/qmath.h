@@ -82,6 +82,23 @@ QM_INLINE uint16_t qm_divud(uint32_t numerator, uint16_t denominator)
 #endif
 }
 
+#ifdef __clang__
+#define QM_WRAPS __attribute__((no_sanitize("unsigned-integer-overflow")))
+#else
+#define QM_WRAPS
+#endif
+
+/** a + b and a - b of 32-bit angles (2^32 = one turn): they wrap on purpose. */
+QM_INLINE QM_WRAPS uint32_t qm_turn_add(uint32_t a, uint32_t b)
+{
+    return a + b;
+}
+
+QM_INLINE QM_WRAPS uint32_t qm_turn_sub(uint32_t a, uint32_t b)
+{
+    return a - b;
+}
+
 /** x limited to low..high. */
 QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
 {

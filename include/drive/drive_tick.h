@@ -35,11 +35,11 @@ QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus
 
     if (now_q15 > p->bus_over_q15) {
         drive_raise(d, FAULT_OVERVOLTAGE);
-    } else if (bus_q15 < p->bus_under_q15) {
-        if (d->state != (uint16_t)DRIVE_STOPPED && d->state != (uint16_t)DRIVE_CALIBRATE) {
-            drive_raise(d, FAULT_UNDERVOLTAGE);
-        }
-        bus_q15 = p->bus_under_q15; /* keeps the quotient below within 16 bits */
+    } else if (bus_q15 < p->bus_under_q15 && d->state != (uint16_t)DRIVE_STOPPED && d->state != (uint16_t)DRIVE_CALIBRATE) {
+        drive_raise(d, FAULT_UNDERVOLTAGE);
+    }
+    if (bus_q15 < p->bus_under_q15) {
+        bus_q15 = p->bus_under_q15; /* keeps the quotient within 16 bits */
     }
     d->duty_per_volt_q16 = qm_divud(p->duty_per_volt_numerator, (uint16_t)((uint16_t)bus_q15 << 1));
 }
@@ -47,7 +47,8 @@ QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus
 /** The voltage circle at the filtered bus. */
 QM_INLINE void drive_circle_step(drive_t *d, const drive_params_t *p)
 {
-    d->circle.limit_q14 = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)qm_hi(d->bus_q31) << 1), p->voltage_limit_per_bus_q16);
+    int16_t bus_q15 = qm_clamp(qm_hi(d->bus_q31), 0, p->bus_over_q15); /* above it nothing runs, and the formats end */
+    d->circle.limit_q14 = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)bus_q15 << 1), p->voltage_limit_per_bus_q16);
     d->circle.reciprocal = voltage_circle_reciprocal(d->circle.limit_q14);
 }
 
@@ -250,7 +251,8 @@ QM_INLINE void drive_forced_step(drive_t *d, const drive_params_t *p)
     if (d->state == (uint16_t)DRIVE_LOCK) {
         d->timer++;
         if (d->timer <= (p->lock_periods >> 1)) {
-            d->forced.angle_q32 += (d->direction >= 0) ? p->lock_sweep_q32 : (uint32_t)0 - p->lock_sweep_q32;
+            d->forced.angle_q32 = (d->direction >= 0) ? qm_turn_add(d->forced.angle_q32, p->lock_sweep_q32)
+                                                      : qm_turn_sub(d->forced.angle_q32, p->lock_sweep_q32);
         } else if (d->timer >= p->lock_periods) {
             d->state = (uint16_t)DRIVE_RAMP;
             d->timer = 0;
@@ -303,11 +305,13 @@ QM_INLINE void drive_calibrate(drive_t *d, const drive_params_t *p, const drive_
     d->offset_sum_b += raw->i_b;
     d->timer++;
     if (d->timer == (1u << DRIVE_CALIBRATION_LOG2)) {
-        d->offset_a_q13 = qm_mulhi((int16_t)(d->offset_sum_a >> DRIVE_CALIBRATION_LOG2), p->kcurr_a);
-        d->offset_b_q13 = qm_mulhi((int16_t)(d->offset_sum_b >> DRIVE_CALIBRATION_LOG2), p->kcurr_b);
-        if (qm_abs(d->offset_a_q13) > p->offset_max_q13 || qm_abs(d->offset_b_q13) > p->offset_max_q13) {
+        int16_t a_q13 = qm_mulhi((int16_t)(d->offset_sum_a >> DRIVE_CALIBRATION_LOG2), p->kcurr_a);
+        int16_t b_q13 = qm_mulhi((int16_t)(d->offset_sum_b >> DRIVE_CALIBRATION_LOG2), p->kcurr_b);
+        if (qm_abs(a_q13) > p->offset_max_q13 || qm_abs(b_q13) > p->offset_max_q13) {
             drive_raise(d, FAULT_OFFSET);
         } else {
+            d->offset_a_q13 = a_q13;
+            d->offset_b_q13 = b_q13;
             d->calibrated = 1;
             d->state = (uint16_t)DRIVE_STOPPED;
         }
@@ -360,7 +364,7 @@ QM_INLINE drive_output_t drive_tick(drive_t *d, const drive_params_t *p, const d
     drive_output_t out = { { 0, 0, 0 }, OUTPUTS_OFF };
     uint16_t slot;
 
-    d->ticks++;
+    d->ticks = (uint16_t)(d->ticks + 1u);
     slot = d->ticks & (SLOTS - 1u);
     drive_measure(d, p, raw);
     if (slot == 2u) {

@@ -28,7 +28,7 @@
     X(11, CLOCK, "the PLL did not lock or the crystal failed", \
       "check the 8 MHz crystal and the configuration words") \
     X(12, TRAP, "the processor took a trap or an unexpected interrupt", \
-      "read RCON and INTCON1; the cause is kept over the reset")
+      "read board_trap_intcon1, the copy of INTCON1 that says which trap it was")
 
 #define DRIVE_FAULT_ENUM(code, name, cause, remedy) FAULT_##name = (code),
 /** Fault codes. */

@@ -29,7 +29,7 @@ typedef struct {
     int16_t wish_run;    /**< the user wants the motor to run */
     int16_t fast_range;  /**< S3: NOMINAL..MAXIMUM instead of MINIMUM..NOMINAL */
     int32_t pot_q31;     /**< filtered potentiometer */
-    int16_t pot_used_q15; /**< the value in use: follows the filtered one with one converter step of hysteresis */
+    int16_t pot_used_q15; /**< the value in use: follows the filtered one with half a converter step of hysteresis */
     uint16_t blink_ms;
 } panel_t;
 

@@ -55,14 +55,17 @@
 /* A sine of the largest current changes by 2 pi f Ts I a period; the note's formula has 2 in place of 2 pi I/Ipeak and clips. */
 #define PARAM_DI(rpm) (2.0F * PARAM_PI * PARAM_F(rpm) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(LOOPTIME_SEC) * CURRENT_Q14_F(MAXIMUM_CURRENT_A))
 #define PARAM_MIN(a, b) (((a) < (b)) ? (a) : (b))
+#define PARAM_MAX(a, b) (((a) > (b)) ? (a) : (b))
 #define D_ILIMIT_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_DI(NOMINAL_SPEED_RPM) + 0.5F, 16383.0F))
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
 #define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in the note's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
 
-/** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format. */
+/** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format.
+ *  LS_OVER2LS0 may raise Ls by 1.2; below nominal speed turning the old difference forward may lengthen an axis by 1.5. */
 #define PARAM_EMF_MAX_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3 + 2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM) \
-                         + 2.0F * PARAM_PI * PARAM_F(MAXIMUM_SPEED_RPM) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
+                         + 2.0F * PARAM_PI / 60.0F * PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM)) \
+                           * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
 /* ---- Controllers: gains in the note's units (gain/16 and per-period integral, in full scales) from bandwidths.
  *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/4.

@@ -22,6 +22,7 @@ QM_INLINE void snapshot_tick(snapshot_t *s, const drive_t *d)
         return;
     }
     s->wait = 0;
+    *s->done = 0;
     s->column[0][row] = (int16_t)(4 * qm_clamp(d->i_a_q13, -8191, 8191));
     s->column[1][row] = (int16_t)(4 * qm_clamp(d->control.i_q13.q, -8191, 8191));
     s->column[2][row] = estimator_speed(&d->estimator);

@@ -20,7 +20,7 @@ FLAGS = [f"-mmcu={MCU}", "-std=gnu99", "-O2", "-fno-ivopts", "-ffunction-section
          "-DGOLDEN_STORAGE=const __memx"]
 WARNINGS = ["-Wall", "-Wextra"]
 LARGEST_OBJECT = 32767      # of the compiler
-SIMULATED_SECONDS = 600
+SIMULATED_SECONDS = 60
 RESULT = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):(PASS|FAIL|IGNORE)(.*)$", re.M)
 
 

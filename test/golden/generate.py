@@ -319,18 +319,20 @@ def profile(points):
     return out + [points[-1][1]]
 
 
-ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); closed 1 = in the frame "
-                    "of estimator_next_angle(); inv_kfi the note's; omega electrical rpm; rho upper word after the tick; the "
-                    "ratio is that of omega and of the angle in steady state")
+ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); rows from closed_from on "
+                    "in the frame of estimator_next_angle(); omega electrical rpm; rho upper word after the tick; the ratio is "
+                    "that of omega and of the angle in steady state")
 
 
 def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter, least_db, compare_from):
-    """@param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio"""
+    """At most 32767 bytes of vectors: no compiler for a 16-bit target takes a larger object.
+
+    @param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio"""
     m, p = MACHINE, MACHINE.estimator()
-    constants = dict(p, kfilter_esdq_q16=2 * kfilter)
-    del constants["inv_kfi"]
+    varies = len(set(inv_kfi)) > 1
+    constants = dict(p, kfilter_esdq_q16=2 * kfilter, closed_from=closed_from)
     v = Vectors(name, what, ESTIMATOR_FORMAT,
-                "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 closed:u16 inv_kfi:s16 omega:s16 rho:u16",
+                "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16" + (" inv_kfi:s16" if varies else ""),
                 constants=constants, least_db=least_db)
     model, real = ref.Estimator(p, 2 * kfilter), ref.EstimatorReal(m, kfilter / 32768)
     amperes, volts, turns = ref.synthetic_motor(m, speed, current)
@@ -348,7 +350,7 @@ def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter
         frame = ref.sincos(model.next_angle())
         model.commanded(command)
         real.commanded(complex(*command) * 4 * m.u0)
-        v.rows.append([*now, *command, int(closed), kfi, model.omega, model.rho >> 16])
+        v.rows.append([*now, *command, model.omega, model.rho >> 16] + ([kfi] if varies else []))
         if n in compare_from:
             v.compare([real.omega, 0.0], [model.omega, ref.wrap16(model.rho // 65536 - round(real.rho * 65536))])
     return v, model, real, turns
@@ -397,13 +399,13 @@ def estimator_reversal(_):
 
 
 def estimator_kphi(_):
-    ratios = [1.0] * 500 + [1.1] * 500 + [2.0] * 700 + [0.8] * 800
-    speed = [7500.0] * 2501
+    ratios = [1.0] * 500 + [1.1] * 400 + [2.0] * 600 + [0.8] * 800
+    speed = [7500.0] * 2301
     v, model, real, turns = estimator_sequence(
         "estimator_kphi", "estimator with 1/Kphi at 1, 1.1, 2 and 0.8 times the true one: the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the "
-        "speed stays", speed, [0.8j] * 2501, 0, ratios, 1200, 47.0, [*range(400, 500), *range(900, 1000), *range(2400, 2500)])
-    for end in (500, 1000, 1700, 2500):
-        rho = v.rows[end - 1][7]
+        "speed stays", speed, [0.8j] * 2301, 0, ratios, 1200, 47.0, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
+    for end in (500, 900, 1500, 2300):
+        rho = v.rows[end - 1][5]
         true = turns[end - 1] + 7500.0 * MACHINE.turns_per_erpm / 2
         error = ref.wrap16(round(true * 65536) - rho) * 360 / 65536
         # K'/K is a ratio of Kphi, inv_kfi is its inverse

@@ -313,11 +313,11 @@ void test_speed_is_back_emf_over_Kphi(void)
 
 void test_above_a_tenth_of_nominal_speed_Eq_decides_the_sign(void)
 {
-    TEST_ASSERT_EQUAL_INT16(900 * 7956 / 2048, speed_of(100, 1000, 1401));
+    TEST_ASSERT_EQUAL_INT16(INT32_C(900) * 7956 / 2048, speed_of(100, 1000, 1401));
     TEST_ASSERT_EQUAL_INT16(speed_of(0, -900, -1401), speed_of(100, -1000, -1401));
     /* even against the filtered speed */
     TEST_ASSERT_EQUAL_INT16(speed_of(0, -900, 1401), speed_of(100, -1000, 1401));
-    TEST_ASSERT_EQUAL_INT16(900 * 7956 / 2048, speed_of(100, 1000, -1401));
+    TEST_ASSERT_EQUAL_INT16(INT32_C(900) * 7956 / 2048, speed_of(100, 1000, -1401));
 }
 
 void test_up_to_a_tenth_of_nominal_speed_the_filtered_speed_decides_the_sign(void)
