@@ -7,6 +7,9 @@
 /** Blocks of the PWM interrupt are composed in one translation unit; a call would cost 18 cycles of saved registers. */
 #define QM_INLINE static inline __attribute__((always_inline))
 
+/** Blocks of the interrupt that run rarely or in turn: called, so that they take no registers from the main path. */
+#define QM_RARE static __attribute__((noinline, unused))
+
 /** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
  *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */
 typedef int16_t current_q13_t;  /**< phase, d and q currents: 8192 = full-scale current */

@@ -179,21 +179,29 @@ QM_INLINE void drive_handover_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Closed loop's slow work, one block every period in turn so that no period has more than one. */
-QM_INLINE void drive_slow_closed(drive_t *d, const drive_params_t *p, uint16_t slot)
+/** Slow work, one block every period in turn so that no period has more than one. Bus and circle in every state, the rest in
+ *  closed loop. */
+QM_RARE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
-    switch (slot) {
-    case 0: drive_speed_step(d, p); break;
-    case 1: fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, d->control.reference_erpm); break;
-    case 4: drive_current_limit_step(d, p); break;
-    case 5: drive_protect_step(d, p); break;
-    case 6: drive_handover_step(d, p); break;
-    default: break;
+    uint16_t slot = d->ticks & (SLOTS - 1u);
+    if (slot == 2u) {
+        drive_bus_step(d, p, v_bus_raw);
+    } else if (slot == 3u) {
+        drive_circle_step(d, p);
+    } else if (d->state == (uint16_t)DRIVE_CLOSED || d->state == (uint16_t)DRIVE_STOPPING) {
+        switch (slot) {
+        case 0: drive_speed_step(d, p); break;
+        case 1: fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, d->control.reference_erpm); break;
+        case 4: drive_current_limit_step(d, p); break;
+        case 5: drive_protect_step(d, p); break;
+        case 6: drive_handover_step(d, p); break;
+        default: break;
+        }
     }
 }
 
 /** Bumpless change of frame: currents, voltages and integrators are turned from the forced frame into the estimator's. */
-QM_INLINE void drive_hand_over(drive_t *d, const drive_params_t *p)
+QM_RARE void drive_hand_over(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
     angle_t estimated = estimator_next_angle(&d->estimator);
@@ -267,29 +275,31 @@ QM_INLINE void drive_forced_step(drive_t *d, const drive_params_t *p)
     }
 }
 
+/** Lock and ramp after the current controllers: the forced angle moves; letting go is harmless at these speeds. */
+QM_RARE void drive_open_loop(drive_t *d, const drive_params_t *p, alphabeta_t i_q14)
+{
+    estimator_tick_free(&d->estimator, &p->estimator, &d->tuning, i_q14);
+    drive_forced_step(d, p);
+    if (!d->command.run && d->state != (uint16_t)DRIVE_FAULT) {
+        d->state = (uint16_t)DRIVE_STOPPED;
+    }
+}
+
 /** A period with the bridge switching. */
-QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p, uint16_t slot)
+QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
     alphabeta_t i = clarke(d->i_a_q13, d->i_b_q13), v;
-    int16_t closed = (int16_t)(d->state != (uint16_t)DRIVE_LOCK && d->state != (uint16_t)DRIVE_RAMP);
 
     c->i_q13 = park(i, d->frame);
-    if (closed) {
-        estimator_tick_closed(&d->estimator, &p->estimator, &d->tuning, i, d->frame);
-        drive_slow_closed(d, p, slot);
-        d->angle = estimator_next_angle(&d->estimator);
-        if (!d->command.run) {
-            d->state = (uint16_t)((d->state == (uint16_t)DRIVE_CLOSED) ? DRIVE_STOPPING : d->state);
-        }
-    } else {
-        estimator_tick_free(&d->estimator, &p->estimator, &d->tuning, i);
-    }
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
-    if (!closed) {
-        drive_forced_step(d, p);
-        if (!d->command.run && d->state != (uint16_t)DRIVE_FAULT) {
-            d->state = (uint16_t)DRIVE_STOPPED; /* slow enough to let go */
+    if (d->state == (uint16_t)DRIVE_LOCK || d->state == (uint16_t)DRIVE_RAMP) {
+        drive_open_loop(d, p, i);
+    } else {
+        estimator_tick_closed(&d->estimator, &p->estimator, &d->tuning, i, d->frame);
+        d->angle = estimator_next_angle(&d->estimator);
+        if (!d->command.run && d->state == (uint16_t)DRIVE_CLOSED) {
+            d->state = (uint16_t)DRIVE_STOPPING;
         }
     }
     d->frame = trig_sincos(d->angle);
@@ -319,7 +329,7 @@ QM_INLINE void drive_calibrate(drive_t *d, const drive_params_t *p, const drive_
 }
 
 /** A period with the bridge off or charging its drivers. */
-QM_INLINE void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+QM_RARE void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     switch (d->state) {
     case DRIVE_CALIBRATE:
@@ -362,23 +372,17 @@ QM_INLINE void drive_idle(drive_t *d, const drive_params_t *p, const drive_sampl
 QM_INLINE drive_output_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     drive_output_t out = { { 0, 0, 0 }, OUTPUTS_OFF };
-    uint16_t slot;
 
     d->ticks = (uint16_t)(d->ticks + 1u);
-    slot = d->ticks & (SLOTS - 1u);
     drive_measure(d, p, raw);
-    if (slot == 2u) {
-        drive_bus_step(d, p, raw->v_bus);
-    } else if (slot == 3u) {
-        drive_circle_step(d, p);
-    }
+    drive_slow(d, p, raw->v_bus);
     if (drive_is_running(d)) {
         drive_check_overcurrent(d, p); /* before the law: its formats end above the trip level */
     } else {
         drive_idle(d, p, raw);
     }
     if (drive_is_running(d)) {
-        out.duty = drive_run(d, p, slot);
+        out.duty = drive_run(d, p);
     }
     if (drive_is_running(d)) {
         out.outputs = OUTPUTS_PWM;

@@ -6,4 +6,4 @@ mutate: setup-mutate ## plant small defects in the firmware and count how many t
 
 # What the tool takes over from the normal build: runners and mocks.
 setup-mutate: setup-test
-	@$(MAKE) $(addprefix $T/,$(unit_c) $(if $(findstring --closed-loop,$(MUTATE)),$(behaviour_c)))
+	@$(MAKE) -s $(addprefix $T/,$(unit_c) $(if $(findstring --closed-loop,$(MUTATE)),$(behaviour_c)))

@@ -48,13 +48,15 @@ static int32_t longest_emf(void)
 static void set_bounds(void)
 {
     const drive_params_t from_user = DRIVE_PARAMS_INIT; /* not static: the analyser does not fold conditions on floats */
+    int32_t half_step;
     params = from_user;
     alpha_max = (int16_t)(2 * params.overcurrent_q13);
     beta_max = (int16_t)(((int32_t)params.overcurrent_q13 * 18919 >> 13) + 2);
     radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_over_q15 << 1), params.voltage_limit_per_bus_q16);
     voltage_max = (int16_t)(radius_max / 2 + radius_max / 64 + 8);
-    /* Park halves it; the turn to the middle of the period, at most 0.25 rad, lengthens it by 1.031 at most */
-    emf_dq_max = (int16_t)(longest_emf() / 2 + longest_emf() / 64 + 4);
+    /* Park halves it; the turn by half a step h to the middle of the period lengthens it by sqrt(1 + h^2) < 1 + h^2 / 2 */
+    half_step = qm_mulhi(32767, params.estimator.half_step_q16_rad) + 1;
+    emf_dq_max = (int16_t)(longest_emf() / 2 + (longest_emf() * (half_step * half_step / 65536) >> 18) + 4);
     erpm_max = params.maximum_erpm;
     current_max = params.current_max_q13;
 }

@@ -255,6 +255,19 @@ void test_voltage_circle_follows_the_bus(void)
     TEST_ASSERT_INT16_WITHIN(20, (int16_t)(at_24 * 33.0F / 24.0F), drive.circle.limit_q14);
 }
 
+void test_bus_above_the_trip_level_keeps_the_circle_in_its_format(void)
+{
+    int16_t at_34;
+    rig_ready();
+    rig_bus(34.0F);
+    rig_tick(400);
+    at_34 = drive.circle.limit_q14;
+    rig_bus(52.7F);
+    rig_tick(400);
+    TEST_ASSERT_INT16_WITHIN(20, at_34, drive.circle.limit_q14);
+    TEST_ASSERT_GREATER_THAN_INT16(0, drive.circle.limit_q14);
+}
+
 void test_bus_below_the_trip_level_keeps_the_division_in_range(void)
 {
     uint16_t at_12;
@@ -556,11 +569,13 @@ void test_field_weakening_is_indexed_by_the_reference_and_not_the_speed(void)
 {
     rig_closed(1, 8000);
     drive.estimator.omega_filtered_q16 = 25000L * 65536;
-    drive_slow_closed(&drive, &params, 1);
+    rig_next_slot(1);
+    rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(0, drive.fieldweak.index);
     drive.control.reference_erpm = 13000 + 3 * 1024 + 5;
     drive.estimator.omega_filtered_q16 = 8000L * 65536;
-    drive_slow_closed(&drive, &params, 1);
+    rig_next_slot(1);
+    rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(3, drive.fieldweak.index);
 }
 

@@ -152,6 +152,13 @@ void test_implausible_offset_of_either_phase_and_sign_faults(void)
     expect_offset_fault(8000, -8000);
 }
 
+void test_implausible_offset_is_not_used(void)
+{
+    expect_offset_fault(2000, -3000);
+    TEST_ASSERT_EQUAL_INT16(0, drive.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(0, drive.offset_b_q13);
+}
+
 void test_no_start_after_an_implausible_offset(void)
 {
     expect_offset_fault(2000, 0);

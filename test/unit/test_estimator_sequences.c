@@ -77,7 +77,7 @@ static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, i
     for (n = 0; n < rows; n++) { \
         golden_##name##_t row = golden_##name[n]; \
         ROW_VECTORS(row); \
-        period(&ahead, i, v, (uint16_t)(n >= (closed_from)), kfi); \
+        period(&ahead, i, v, (uint16_t)(n + 1u > (closed_from)), kfi); \
         TEST_ASSERT_EQUAL_INT16_MESSAGE(row.omega, ahead.e.omega_erpm, golden_row(n)); \
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(row.rho, (uint16_t)(ahead.e.rho_q32 >> 16), golden_row(n)); \
     }
@@ -88,10 +88,10 @@ static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, i
     for (n = 0; n < rows; n++) { \
         golden_##name##_t row = golden_##name[n]; \
         ROW_VECTORS(row); \
-        period(&ahead, i, v, (uint16_t)(n >= (closed_from)), BASE_KFI); \
+        period(&ahead, i, v, (uint16_t)(n + 1u > (closed_from)), BASE_KFI); \
         i.beta = (int16_t)-i.beta; \
         v.beta = (int16_t)-v.beta; \
-        period(&mirror, i, v, (uint16_t)(n >= (closed_from)), BASE_KFI); \
+        period(&mirror, i, v, (uint16_t)(n + 1u > (closed_from)), BASE_KFI); \
         if (n >= (from)) { \
             TEST_ASSERT_INT16_WITHIN_MESSAGE(25, (int16_t)-ahead.e.omega_erpm, mirror.e.omega_erpm, golden_row(n)); \
             TEST_ASSERT_INT16_WITHIN_MESSAGE(60, 0, (int16_t)(uint16_t)((mirror.e.rho_q32 >> 16) + (ahead.e.rho_q32 >> 16)), \

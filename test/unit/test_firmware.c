@@ -16,10 +16,10 @@ void tearDown(void)
 {
 }
 
-static void expect_start(uint16_t clock_failed)
+static void expect_start(uint16_t no_lock)
 {
     pwm_outputs_off_Expect();
-    clock_init_ExpectAndReturn(clock_failed);
+    clock_init_ExpectAndReturn(no_lock);
     pins_init_Expect();
     uart_init_Expect();
     timer_init_Expect();
@@ -90,6 +90,26 @@ void test_failed_clock_is_a_fault_with_outputs_off(void)
     expect_start(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
     TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
+}
+
+void test_failed_clock_cannot_be_cleared(void)
+{
+    expect_start(1);
+    board_drive.fault = (uint16_t)FAULT_NONE; /* what the control interrupt makes of S2 */
+    board_drive.state = (uint16_t)DRIVE_STOPPED;
+    board_drive.command.run = 1;
+    pass(0);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
+}
+
+void test_healthy_restart_forgets_a_failed_clock(void)
+{
+    expect_start(1);
+    expect_start(0);
+    pass(0);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
 }
 
 void test_arithmetic_mode_and_nesting_are_set_explicitly(void)

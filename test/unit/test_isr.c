@@ -201,6 +201,7 @@ static void expect_trap(void (*trap)(void), drive_fault_t fault, uint16_t flags_
     TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
     TEST_ASSERT_EQUAL_HEX16(flags_left, INTCON1);
+    TEST_ASSERT_EQUAL_HEX16(0x001E, board_trap_intcon1); /* the cause stays readable */
     control_interrupts(10);
     TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
 }

@@ -107,6 +107,14 @@ void test_difference_saturates_at_half_the_range_for_both_signs(void)
     TEST_ASSERT_EQUAL_INT16(-3, qm_sub_limited(4, 7));
 }
 
+/* ---- angles ---- */
+
+void test_sums_and_differences_of_angles_wrap_at_a_turn(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(UINT32_C(0x00000001), qm_turn_add(UINT32_C(0xFFFFFFFF), 2));
+    TEST_ASSERT_EQUAL_HEX32(UINT32_C(0xC0000000), qm_turn_sub(UINT32_C(0x40000000), UINT32_C(0x80000000)));
+}
+
 /* ---- Equation 7 ---- */
 
 void test_low_pass_equals_the_reference(void)

@@ -68,6 +68,14 @@ void test_a_row_every_five_periods_until_fifty_are_full(void)
     }
 }
 
+void test_done_stays_until_the_next_request(void)
+{
+    SnapStart = 1;
+    record(250);
+    record(1000);
+    TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
+}
+
 void test_recording_stops_when_full(void)
 {
     int16_t last;
@@ -83,10 +91,12 @@ void test_a_second_request_records_from_the_first_row_again(void)
 {
     SnapStart = 1;
     record(250);
-    SnapDone = 0;
+    TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
     period = 1000;
     SnapStart = 1;
-    record(250);
+    record(249);
+    TEST_ASSERT_EQUAL_UINT16(0, SnapDone); /* taken back while recording */
+    record(1);
     TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
     TEST_ASSERT_EQUAL_INT16(4 * 1005, SnapBuf1[0]);
     TEST_ASSERT_EQUAL_INT16(4 * 1250, SnapBuf1[49]);

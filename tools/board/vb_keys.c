@@ -16,7 +16,7 @@ typedef struct {
     size_t offset;
     double (*get)(const vb_t *vb);
     void (*set)(vb_t *vb, double value);
-} key_t_;
+} key_entry_t;
 
 static double get_time(const vb_t *vb) { return vb->start_s + vb->now_s; }
 static double get_theta(const vb_t *vb) { return vb->motor.theta * (180.0 / VB_PI); }
@@ -81,7 +81,7 @@ static void set_stat_reset(vb_t *vb, double value)
     {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, AT(field), NULL, setter}
 #define W(name, setter, unit, meaning) {{name, unit, meaning, 0.0, 1.0, VB_KEY_WRITE}, 0.0, 0, NULL, setter}
 
-static const key_t_ table[] = {
+static const key_entry_t table[] = {
     G("time_s", get_time, "s", "board time since creation"),
     /* motor */
     P("motor.rs_ohm", motor.rs_ohm, 2.67, 1e-4, 1000.0, "ohm", "phase resistance at 25 degC"),
@@ -215,7 +215,7 @@ void vb_keys_defaults(vb_t *vb)
     }
 }
 
-static const key_t_ *find_key(const char *name)
+static const key_entry_t *find_key(const char *name)
 {
     for (unsigned k = 0; k < KEYS; k++) {
         if (strcmp(table[k].info.name, name) == 0) {
@@ -263,7 +263,7 @@ static int find_probe(const char *name)
 int vb_keys_find(vb_t *vb, const char *name, vb_access_t *access)
 {
     memset(access, 0, sizeof *access);
-    const key_t_ *key = find_key(name);
+    const key_entry_t *key = find_key(name);
     if (key != NULL) {
         if ((key->info.flags & VB_KEY_READ) == 0) {
             return vb_fail(vb, "%s: can only be set", name);
@@ -336,7 +336,7 @@ int vb_set(vb_t *vb, const char *key, double value)
     if (strncmp(key, "reg.", 4) == 0) {
         return set_register(vb, key, value);
     }
-    const key_t_ *entry = find_key(key);
+    const key_entry_t *entry = find_key(key);
     if (entry == NULL) {
         unsigned pin = 0;
         bool known = find_pin(key, &pin) || find_probe(key) >= 0;
