@@ -47,6 +47,8 @@ void test_an_impossible_value_is_refused_with_the_range(void)
     TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.rs_ohm", NAN));
     TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.rs_ohm", INFINITY));
     TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "reg.P1DC1", 65536.0));
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.pole_pairs", 2.5));
+    TEST_ASSERT_EQUAL_STRING("motor.pole_pairs: 2.5 is not a whole number", vb_error(board));
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.67, get("motor.rs_ohm"));
 }
 

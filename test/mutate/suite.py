@@ -14,7 +14,7 @@ FAST = ["-O0", "-g0", "-w"]           # the tests of mutants: most are compiled 
 LONG = ["-O1", "-g0", "-w"]           # those that run longer than this:
 LONG_SECONDS = 0.2
 SHIPPED = ["-O2", "-g0", "-w"]        # the firmware, to see whether a change reaches it at all
-SOURCES = ("include", "firmware", "tools/host", "tools/board", "test/unit", "test/behaviour", "test/board")
+SOURCES = ("include", "firmware", "tools/host", "tools/board", "test/unit", "test/behaviour", "test/board", "docs", "tuning")
 DEFINES = re.compile(r"/\* defines: (.*?) \*/")
 FAILED_TEST = re.compile(r"^[^:\n]*:\d+:(\w+):FAIL", re.M)
 
@@ -80,7 +80,7 @@ class Suite:
     def __init__(self, root, base, compile_command, jobs):
         self.root, self.base, self.jobs = Path(root), Path(base), jobs
         self.compile_command = shlex.split(compile_command)
-        self.tests, self.firmware = [], {}
+        self.tests, self.firmware, self.bench = [], {}, []
         self.shipped, self.lock = {}, threading.Lock()
 
     # ---- building the unchanged sources ----
@@ -110,7 +110,9 @@ class Suite:
         frame = [self.unit(f"{vendor}/unity/src/unity.c", []), self.unit(f"{vendor}/cmock/src/cmock.c", [])]
         firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/*/*.c"))] + ["tools/host/xc.c"]
         self.firmware = {u.object: u for u in (self.unit(source, []) for source in firmware)}
-        board = [self.unit(str(p.relative_to(self.base)), []) for p in sorted(self.base.glob("tools/board/*.c"))] if behaviour else []
+        if behaviour: # the virtual board runs for minutes of motor time: all of it optimized
+            board = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("tools/board/*.c"))]
+            self.bench = [self.unit(source, [], SHIPPED) for source in (*board, *firmware) if not source.endswith("/main.c")]
         mocks, plans = {}, []
         for name in (*names, *behaviour):
             text = (self.base / f"test/{name}.c").read_text()
@@ -121,39 +123,43 @@ class Suite:
                 mocks.setdefault(mock, self.unit(f"build/test/mocks/{mock}.c", []))
             runner = self.unit(f"build/test/{name}_runner.c", [f"-Itest/{os.path.dirname(name)}", *flags])
             plans.append((name, [self.unit(f"test/{name}.c", flags, o) for o in (FAST, LONG)], runner, [mocks[m] for m in uses]))
-        everything = [*frame, *self.firmware.values(), *mocks.values(), *board]
+        everything = [*frame, *self.firmware.values(), *mocks.values(), *self.bench]
         everything += [u for _, units, runner, _ in plans for u in (units[0], runner)]
         with ThreadPoolExecutor(self.jobs) as pool:
             list(pool.map(self.compile_base, everything))
             run(["ar", "rcs", "obj/firmware.a", *self.firmware], self.base)
-            linked = pool.map(lambda plan: self.link_base(plan, frame, board if plan[0] in behaviour else []), plans)
+            linked = pool.map(lambda plan: self.link_base(plan, frame, plan[0] in behaviour), plans)
             self.tests = sorted(linked, key=lambda t: (t.name in behaviour, t.seconds))
 
-    def link_base(self, plan, frame, board):
-        """Links and runs a test; one that takes long is built again so that it runs faster."""
+    def link_base(self, plan, frame, on_board):
+        """Links and runs a test; a unit test that takes long is built again so that it runs faster."""
         name, units, runner, mocks = plan
         fixed = [u.object for u in (runner, *mocks, *frame)]
-        test = self.try_base(name, units[0], fixed, board)
-        if test.seconds > LONG_SECONDS:
-            test = self.try_base(name, self.compile_base(units[1]), fixed, board)
+        test = self.try_base(name, units[0], fixed, on_board)
+        if test.seconds > LONG_SECONDS and not on_board:
+            test = self.try_base(name, self.compile_base(units[1]), fixed, on_board)
         return test
 
-    def try_base(self, name, unit, fixed, board):
+    def pulled(self, link):
+        """The firmware objects that a program needs, by the linker's own account."""
+        code, output = run([*link, "obj/firmware.a", "-lm", "-Wl,-t,-t"], self.base)
+        if code != 0:
+            raise BuildError(f"{link[2]} does not link:\n{output}")
+        members = set(re.findall(r"\(?obj/firmware\.a\)?\(?([\w.-]+\.o)\)?", output))
+        return [u for path, u in self.firmware.items() if os.path.basename(path) in members]
+
+    def try_base(self, name, unit, fixed, on_board):
         program = f"obj/{name.replace('/', '.')}"
         link = ["gcc", "-o", program, unit.object, *fixed]
-        code, output = run([*link, *(u.object for u in board), "obj/firmware.a", "-lm", "-Wl,-t,-t"], self.base)
+        needed = self.bench if on_board else self.pulled(link)
+        code, output = run([*link, *(u.object for u in needed), "-lm"], self.base)
         if code != 0:
             raise BuildError(f"{name} does not link:\n{output}")
-        members = set(re.findall(r"\(?obj/firmware\.a\)?\(?([\w.-]+\.o)\)?", output))
-        pulled = [u for path, u in self.firmware.items() if os.path.basename(path) in members]
-        code, output = run([*link, *(u.object for u in (*board, *pulled)), "-lm"], self.base)
-        if code != 0:
-            raise BuildError(f"{name} does not link without the library:\n{output}")
         begin = time.monotonic()
         code, output = run([f"./{program}"], self.base, timeout=600)
         if code != 0:
             raise BuildError(f"{name} fails without any change:\n{output}")
-        return Test(name, fixed, [unit, *board, *pulled], seconds=time.monotonic() - begin)
+        return Test(name, fixed, [unit, *needed], seconds=time.monotonic() - begin)
 
     def add_script(self, name, argv, deps):
         """A check that is a Python script and compiles by itself; it counts when it passes unchanged in the base tree."""
@@ -206,7 +212,7 @@ class Suite:
             code, _ = run(["gcc", "-o", "obj/program", *objects, *fixed, "-lm"], tree)
             if code != 0:
                 return "broken", f"link of {test.name}"
-            code, output = run(["./obj/program"], tree, timeout=10 * test.seconds + 2)
+            code, output = run(["./obj/program"], tree, timeout=(10 if test.seconds < 1 else 5) * test.seconds + 2)
             if code is None:
                 return "timeout", test.name
             if code != 0:

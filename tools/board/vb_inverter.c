@@ -276,8 +276,8 @@ static double step_with_off_legs(vb_t *vb, double h_s)
     return h_s;
 }
 
-/* Go on to `until_s` without any change of the transistors. Terminal voltages, currents, angle and bus charge follow. Returns false, with less
- * time passed, as soon as the bus current exceeds `trip_a`; vb->now_s tells how far it came. */
+/* Go on to `until_s` without any change of the transistors. Terminal voltages, currents, angle and bus charge follow. Returns false, and
+ * stays where it is (vb->now_s), as soon as the bus current exceeds `trip_a`. */
 bool vb_inverter_run(vb_t *vb, double until_s, double trip_a)
 {
     vb_inverter_t *inv = &vb->inverter;

@@ -33,7 +33,9 @@ static double get_conversion_us(const vb_t *vb) { return (double)vb->adc.channel
 
 static double duty_of(const vb_t *vb, unsigned k)
 {
-    return vb->pwm.running ? vb_min(1.0, 0.5 * vb->pwm.tick_s * (double)vb->pwm.duty[k] * (vb->pwm.centre ? 2.0 : 1.0) / vb->pwm.period_s) : 0.0;
+    const vb_pwm_t *pwm = &vb->pwm;
+    double full = 2.0 * (double)(pwm->tper + 1u); /* duty registers count half ticks of half a period, or of the whole one */
+    return pwm->running ? vb_min(1.0, (double)pwm->duty[k] / full) : 0.0;
 }
 
 static double get_duty1(const vb_t *vb) { return duty_of(vb, 0); }
@@ -71,14 +73,17 @@ static void set_stat_reset(vb_t *vb, double value)
 }
 
 #define AT(field) offsetof(struct vb, field)
-/* a field that can be set, a field that can only be read, a computed value, a computed value that can be set, an action */
-#define P(name, field, start, min, max, unit, meaning) {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, AT(field), NULL, NULL}
+/* a field that can be set, one of whole numbers, a field that can only be read, a computed value, a computed value that can be set, an action */
+#define P(name, field, start, min, max, unit, meaning) \
+    {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, AT(field), NULL, NULL}
+#define I(name, field, start, min, max, unit, meaning) \
+    {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE | VB_KEY_WHOLE}, start, AT(field), NULL, NULL}
 #define R(name, field, unit, meaning) {{name, unit, meaning, 0.0, 0.0, VB_KEY_READ}, 0.0, AT(field), NULL, NULL}
 #define G(name, function, unit, meaning) {{name, unit, meaning, 0.0, 0.0, VB_KEY_READ}, 0.0, 0, function, NULL}
 #define S(name, function, setter, start, min, max, unit, meaning) \
     {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, 0, function, setter}
 #define SF(name, field, setter, start, min, max, unit, meaning) \
-    {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, AT(field), NULL, setter}
+    {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE | VB_KEY_WHOLE}, start, AT(field), NULL, setter}
 #define W(name, setter, unit, meaning) {{name, unit, meaning, 0.0, 1.0, VB_KEY_WRITE}, 0.0, 0, NULL, setter}
 
 static const key_entry_t table[] = {
@@ -88,7 +93,7 @@ static const key_entry_t table[] = {
     P("motor.ld_h", motor.ld_h, 1.92e-3, 1e-6, 10.0, "H", "d-axis inductance of a phase"),
     P("motor.lq_h", motor.lq_h, 1.92e-3, 1e-6, 10.0, "H", "q-axis inductance of a phase"),
     P("motor.psi_vs", motor.psi_vs, 7.983e-3, 1e-6, 10.0, "V.s", "rotor flux linkage of a phase at 25 degC, per electrical rad/s"),
-    P("motor.pole_pairs", motor.pole_pairs, 5.0, 1.0, 100.0, "", "pole pairs"),
+    I("motor.pole_pairs", motor.pole_pairs, 5.0, 1.0, 100.0, "", "pole pairs"),
     P("motor.sat_ld_ratio", motor.sat_ld_ratio, 0.0, 0.0, 0.95, "", "share of Ld that is lost at motor.sat_current_a, growing with the square of the current"),
     P("motor.sat_lq_ratio", motor.sat_lq_ratio, 0.0, 0.0, 0.95, "", "the same for Lq"),
     P("motor.sat_current_a", motor.sat_current_a, 4.0, 0.01, 1000.0, "A", "current amplitude at which saturation is complete"),
@@ -104,13 +109,13 @@ static const key_entry_t table[] = {
     P("load.active_nm", motor.load_active_nm, 0.0, -100.0, 100.0, "N.m", "torque that the load applies to the shaft, positive drives it forward"),
     P("load.viscous_nms", motor.load_viscous_nms, 0.0, 0.0, 100.0, "N.m.s", "load torque proportional to speed"),
     P("load.quadratic_nms2", motor.load_quadratic_nms2, 0.0, 0.0, 100.0, "N.m.s2", "load torque proportional to the square of the speed"),
-    P("load.locked", motor.load_locked, 0.0, 0.0, 1.0, "", "1 = the shaft is blocked"),
+    I("load.locked", motor.load_locked, 0.0, 0.0, 1.0, "", "1 = the shaft is blocked"),
     S("state.theta_e_deg", get_theta, set_theta, 0.0, -36000.0, 36000.0, "deg", "electrical angle of the rotor flux against phase A, now"),
     S("state.speed_rpm", get_speed, set_speed, 0.0, -100000.0, 100000.0, "rpm", "mechanical speed, now; positive is the phase order A, B, C"),
     /* supply and bus */
     P("supply.voltage_v", supply.voltage_v, 24.0, 0.0, 100.0, "V", "open-circuit voltage of the supply"),
     P("supply.resistance_ohm", supply.resistance_ohm, 0.1, 1e-3, 1000.0, "ohm", "its inner resistance with the cable"),
-    P("supply.sinks", supply.sinks, 0.0, 0.0, 1.0, "", "1 = the supply takes current back, 0 = regeneration raises the bus"),
+    I("supply.sinks", supply.sinks, 0.0, 0.0, 1.0, "", "1 = the supply takes current back, 0 = regeneration raises the bus"),
     R("supply.current_a", supply.supply_a, "A", "supply current, mean of the last period"),
     P("bus.capacitance_f", supply.capacitance_f, 1e-3, 1e-6, 10.0, "F", "bus capacitor"),
     P("bus.load_a", supply.load_a, 0.05, 0.0, 100.0, "A", "what the board itself draws from the bus"),
@@ -124,7 +129,7 @@ static const key_entry_t table[] = {
     P("inverter.turn_off_s", inverter.turn_off_s, 1.5e-7, 0.0, 2e-6, "s", "delay from a gate signal to the end of conduction"),
     P("inverter.trip_a", inverter.trip_a, 7.0, 0.0, 1000.0, "A", "bus current at which the comparator pulls FLTA1, 0 = no comparator"),
     R("inverter.trip_count", fault.trips, "", "how often it did"),
-    P("fault.open_phase", inverter.open_phase, 0.0, 0.0, 3.0, "", "1..3 = the wire of phase A..C is open, 0 = none"),
+    I("fault.open_phase", inverter.open_phase, 0.0, 0.0, 3.0, "", "1..3 = the wire of phase A..C is open, 0 = none"),
     /* measurement */
     P("shunt.ohm", inverter.shunt_ohm, 0.005, 0.0, 10.0, "ohm", "shunt in the low leg"),
     P("shunt.gain_v_per_a", adc.gain_v_per_a, 0.375, 1e-3, 100.0, "V/A", "amplifier output per ampere; the output falls with current into the motor"),
@@ -143,14 +148,14 @@ static const key_entry_t table[] = {
     R("adc.overrun_count", adc.overruns, "", "conversions that ended before the handler of the previous one"),
     G("adc.conversion_us", get_conversion_us, "us", "time from the trigger to the interrupt"),
     /* controls */
-    P("input.s2", pins.s2, 0.0, 0.0, 1.0, "", "button S2, 1 = pressed"),
-    P("input.s3", pins.s3, 0.0, 0.0, 1.0, "", "button S3, 1 = pressed"),
+    I("input.s2", pins.s2, 0.0, 0.0, 1.0, "", "button S2, 1 = pressed"),
+    I("input.s3", pins.s3, 0.0, 0.0, 1.0, "", "button S3, 1 = pressed"),
     P("input.pot", pins.pot, 0.0, 0.0, 1.0, "", "potentiometer, 0 left to 1 right"),
-    P("input.flta", pins.flta, 0.0, 0.0, 1.0, "", "1 = an external circuit holds FLTA1 active"),
+    I("input.flta", pins.flta, 0.0, 0.0, 1.0, "", "1 = an external circuit holds FLTA1 active"),
     /* CPU */
     P("cpu.isr_us", isr_us, 13.0, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act"),
-    P("cpu.isr_dropped", isr_dropped, 0.0, 0.0, 1.0, "", "1 = the ADC handler is not called any more"),
-    P("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
+    I("cpu.isr_dropped", isr_dropped, 0.0, 0.0, 1.0, "", "1 = the ADC handler is not called any more"),
+    I("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
     P("cpu.crystal_hz", crystal_hz, 8e6, 1e5, 64e6, "Hz", "crystal"),
     R("cpu.fcy_hz", pwm.fcy_hz, "Hz", "instruction clock"),
     P("expect.fcy_hz", expected_fcy_hz, 40e6, 0.0, 1e9, "Hz", "instruction clock that is no cause for a warning, 0 = any"),
@@ -347,6 +352,9 @@ int vb_set(vb_t *vb, const char *key, double value)
     }
     if (!(value >= entry->info.min && value <= entry->info.max)) {
         return vb_fail(vb, "%s: %g is outside %g..%g %s", key, value, entry->info.min, entry->info.max, entry->info.unit);
+    }
+    if ((entry->info.flags & VB_KEY_WHOLE) != 0 && value != floor(value)) {
+        return vb_fail(vb, "%s: %g is not a whole number", key, value);
     }
     if (entry->set != NULL) {
         entry->set(vb, value);

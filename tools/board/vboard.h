@@ -58,7 +58,8 @@ typedef struct {
 
 enum {
     VB_KEY_READ = 1,
-    VB_KEY_WRITE = 2
+    VB_KEY_WRITE = 2,
+    VB_KEY_WHOLE = 4 /* takes whole numbers only */
 };
 
 /* A new board around the firmware that is linked with this library, with the default Hurst motor; NULL if memory ran out. */
