@@ -74,6 +74,16 @@ starts: setup-run ## starts from every rotor angle under several loads [MOTOR=na
 	@$(MAKE) vboard
 	@$(front_end) starts $(options)
 
+.PHONY: readme bench
+readme: ## run what the README's tables and pictures show, and write them into it
+	@$(MAKE) -s run SCENARIO=demo OUT= >build/readme.log && $(MAKE) -s run SCENARIO=stop_from_top OUT= >>build/readme.log && \
+	    $(MAKE) -s run SCENARIO=fault_stall OUT= >>build/readme.log && $(MAKE) -s table2 OUT= >>build/readme.log && \
+	    $(MAKE) -s starts OUT= >>build/readme.log || { tail -n 3 build/readme.log >&2; exit 1; }
+	@$(python) tools/readme.py
+
+bench: vboard ## how many motor seconds the virtual board simulates in a second of one core
+	@$(compile) -Itools/board -o $B/bench test/board/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench
+
 setup-run:
 	@tools/setup/prepare.sh run
 

@@ -34,10 +34,10 @@ void proof_sincos_length(void)
     }
 }
 
-#define RADIUS_PIECES 64
-#define D_PIECES 256
+#define D_PIECES 128
 
 static int16_t d_piece;
+static int32_t largest_square;
 
 /** The d controller's result in pieces, the q controller's whole; both are what proof_pi shows: within the limit. */
 static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit)
@@ -47,16 +47,42 @@ static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t e
     (void)gains;
     (void)err;
     d_piece = -1;
-    return (k >= 0) ? any(piece_low((int16_t)-limit, limit, k, D_PIECES), piece_low((int16_t)-limit, limit, (int16_t)(k + 1), D_PIECES))
-                    : any((int16_t)-limit, limit);
+    return (k >= 0) ? PIECE((int16_t)-limit, limit, k, D_PIECES) : any((int16_t)-limit, limit);
 }
 
-/** Every radius in use, every Vd within its limit: the tables are not left, and Vd^2 + Vq^2 <= 1.03 radius^2. */
+static void circle_between(int16_t low, int16_t high)
+{
+    for (int16_t k = 0; k < D_PIECES; k++) {
+        static const dq_t zero;
+        static pi_t pi;
+        static const pi_gains_t gains;
+        voltage_circle_t circle;
+        voltage_q14_t limit_q;
+        dq_t v;
+        int32_t square;
+
+        circle.limit_q14 = any(low, high);
+        circle.reciprocal = voltage_circle_reciprocal(circle.limit_q14);
+        d_piece = k;
+        v = current_control(&pi, &gains, &pi, &gains, zero, zero, &circle, &limit_q);
+        square = qm_mulss(v.d, v.d) + qm_mulss(v.q, v.q);
+        //@ check length: square <= largest_square;
+        //@ check limit: 0 <= limit_q <= high;
+    }
+}
+
+/** Every radius in use, every Vd within its limit: no table is left, and Vd^2 + Vq^2 <= 1.05 radius^2 of the pieces. */
 void proof_circle(void)
 {
+    int16_t low = 0, high = VOLTAGE_CIRCLE_LEAST_Q14;
     set_bounds();
-    for (int16_t i = 0; i < RADIUS_PIECES; i++) {
-        for (d_piece = 0; d_piece < D_PIECES; d_piece++) {
+    largest_square = qm_mulss(radius_max, radius_max) + qm_mulss(radius_max, radius_max) / 20;
+    while (low < radius_max) {
+        circle_between(low, high);
+        low = high;
+        high = (int16_t)(high + high / 64);
+        if (high > radius_max) {
+            high = radius_max;
         }
     }
 }

@@ -4,7 +4,7 @@
 #include "drive/drive_tick.h"
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
-static uint16_t sample_arrives_meanwhile, flag_during_tick;
+static uint16_t sample_arrives_meanwhile, trap_comes_meanwhile, flag_during_tick;
 
 static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 #define drive_tick(d, p, raw) tick_and_meanwhile(d, p, raw)
@@ -13,11 +13,17 @@ static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, co
 
 static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
+    drive_output_t output;
     flag_during_tick = IFS0bits.AD1IF;
     if (sample_arrives_meanwhile) {
         IFS0bits.AD1IF = 1;
     }
-    return drive_tick(d, p, raw);
+    output = drive_tick(d, p, raw);
+    if (trap_comes_meanwhile) {
+        trap_comes_meanwhile = 0;
+        _MathError();
+    }
+    return output;
 }
 
 #include "unity.h"
@@ -51,6 +57,7 @@ void setUp(void)
     ADC1BUF3 = (uint16_t)raw_bus(24.0F);
     drive_init(&board_drive, &board_params);
     sample_arrives_meanwhile = 0;
+    trap_comes_meanwhile = 0;
 }
 
 void tearDown(void)
@@ -229,6 +236,17 @@ void test_math_error_is_a_trap_fault(void)
 void test_unexpected_interrupt_is_a_trap_fault(void)
 {
     expect_trap(_DefaultInterrupt, FAULT_TRAP, 0x001E);
+}
+
+void test_trap_inside_the_control_interrupt_is_off_within_one_period(void)
+{
+    bring_to_lock();
+    trap_comes_meanwhile = 1;
+    control_interrupts(2); /* the one that was interrupted, and the next */
+    TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    control_interrupts(100);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
 }
 
 void test_first_fault_is_kept_through_later_ones(void)
