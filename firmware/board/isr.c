@@ -43,6 +43,9 @@ void BOARD_ISR _ADC1Interrupt(void)
     /* The duties load when the counter reaches zero. Still counting down and no new sample: in time. */
     if ((P1TMR & 0x8000u) == 0u || IFS0bits.AD1IF) {
         drive_raise(&board_drive, FAULT_ISR_OVERRUN);
+    }
+    if (board_drive.fault != (uint16_t)FAULT_NONE) { /* also a trap's, that came in the middle of the tick */
+        board_drive.state = (uint16_t)DRIVE_FAULT;
         out.outputs = OUTPUTS_OFF;
     }
     board_set_outputs(out.outputs);

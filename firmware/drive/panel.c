@@ -74,7 +74,6 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
     if (button_pressed(&panel->s2, in->s2_down, in->elapsed_ms)) {
         if (d->fault != (uint16_t)FAULT_NONE) {
             d->command.clear_fault = 1;
-            panel->wish_run = 0;
         } else {
             panel->wish_run = (int16_t)!panel->wish_run;
         }

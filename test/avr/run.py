@@ -21,6 +21,7 @@ FLAGS = [f"-mmcu={MCU}", "-std=gnu99", "-O2", "-fno-ivopts", "-ffunction-section
 WARNINGS = ["-Wall", "-Wextra"]
 LARGEST_OBJECT = 32767      # of the compiler
 SIMULATED_SECONDS = 60
+SIMULATOR_FAILED = 255      # exit code of sim; below, it is the program's own
 RESULT = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):(PASS|FAIL|IGNORE)(.*)$", re.M)
 
 
@@ -116,7 +117,7 @@ class Builder:
         if not re.search(r"^\d+ Tests \d+ Failures", output, re.M):
             last = RESULT.findall(output)[-1:]
             raise TestError(f"{name} stopped after {last[0][0] if last else 'the start'}: {remark.strip()}")
-        if code == 3:
+        if code == SIMULATOR_FAILED:
             raise TestError(remark.strip())
         return output, remark.strip()
 
@@ -124,6 +125,13 @@ class Builder:
 def results(output):
     """{test: (verdict, message)} of Unity's output"""
     return {name: (verdict, message) for name, verdict, message in RESULT.findall(output)}
+
+
+def told(result):
+    if result is None:
+        return "no result"
+    verdict, message = result
+    return "passes" if verdict == "PASS" else message.lstrip(": ") or verdict
 
 
 def judge(name, builder, host_folder):
@@ -142,8 +150,7 @@ def judge(name, builder, host_folder):
             passed += 1
             continue
         failed += 1
-        told = ["".join(side.get(test, ("no result", ""))) for side in (avr, host)]
-        lines.append(f"{name}: {test}: FAIL: {told[0]} with 16-bit int, {told[1]} on the PC")
+        lines.append(f"{name}: {test}: FAIL: {told(avr.get(test))} with 16-bit int, {told(host.get(test))} on the PC")
     lines.append(f"{name}: {passed} passed, {failed} failed ({remark}, {time.monotonic() - begin:.1f} s)")
     return lines, passed, failed
 

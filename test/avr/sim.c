@@ -27,7 +27,7 @@ static int fail(const char *program, const char *what)
 {
     fflush(stdout);
     fprintf(stderr, "%s: %s\n", program, what);
-    return 3;
+    return 255; /* the program itself ends with 254 at most */
 }
 
 static avr_t *load(const char *path)

