@@ -42,7 +42,7 @@ def parse(argv):
     parser.add_argument("--full", action="store_true", help="every mutant, not a sample")
     parser.add_argument("--sample", type=int, default=600, help="how many mutants to try (default 600)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
-    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="only files whose path contains one of these texts")
+    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains one of these texts")
     parser.add_argument("--list", action="store_true", help="list the chosen mutants, run nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--out", default="build/mutate")
@@ -155,9 +155,9 @@ def percent(killed, counted):
     return 100.0 * killed / counted if counted else 100.0
 
 
-def table(rows):
+def table(rows, title="file"):
     """@param rows [(name, Counter)]"""
-    lines = [f"{'file':34}{'mutants':>8}{'killed':>8}{'survived':>9}{'score':>8}   not counted"]
+    lines = [f"{title:34}{'mutants':>8}{'killed':>8}{'survived':>9}{'score':>8}   not counted"]
     for name, count in rows:
         killed, survived = count["killed"] + count["timeout"], count["survived"]
         rest = ", ".join(f"{count[k]} {text}" for k, text in (("equivalent", "listed"), ("same", "no effect"), ("broken", "do not compile"))
@@ -177,13 +177,15 @@ def report(results, required, arguments, seconds):
     score = percent(counted - total["survived"], counted)
     survivors = [m for m, result, _ in results if result == "survived"]
     lines = table([*by_file.items(), ("all", total)]) + [""]
-    lines += table(sorted(by_operator.items()))[0:1] + table(sorted(by_operator.items()))[1:]
+    lines += table(sorted(by_operator.items()), "change")
     if survivors:
         lines += ["", "survivors ([-before-]{+after+}):"]
         lines += [f"{m.file}:{m.line}: {m.operator}: {m.key.split(': ', 1)[1]}" for m in survivors]
     tests = "unit and closed-loop tests" if arguments.closed_loop else "unit tests"
     passed = score >= required and counted > 0
-    lines += ["", f"{'every mutant' if arguments.full else f'sample, seed {arguments.seed}'}, {len(results)} tried in {seconds:.0f} s",
+    how = f"every mutant of {' '.join(arguments.files)}" if arguments.files else "every mutant" if arguments.full \
+        else f"sample, seed {arguments.seed}"
+    lines += ["", f"{how}: {len(results)} tried in {seconds:.0f} s",
               f"{score:.1f} % of {counted} mutants killed by the {tests}, {required:.0f} % required: {'PASS' if passed else 'FAIL'}"]
     data = {"score": round(score, 2), "required": required, "passed": passed, "tests": tests, "full": arguments.full,
             "seed": arguments.seed, "seconds": round(seconds, 1), "files": {f: dict(c) for f, c in by_file.items()},

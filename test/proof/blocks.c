@@ -7,6 +7,9 @@
 #include "control/forced_angle.h"
 #include "control/speed_ramp.h"
 #include "control/svm.h"
+#include "drive/params.h"
+
+#include "bounds.h"
 
 /** qmath.h: every function, every int16. */
 void proof_qmath(void)
@@ -26,15 +29,225 @@ void proof_qmath(void)
     //@ check -16383 <= a <= 16383;
 }
 
-/** trig.h: every angle; sine and cosine stay within Q15. */
+/** trig.h: every angle and every x; sine, cosine and chord stay within Q15. */
 void proof_trig(void)
 {
+    //@ loop unroll 512;
     for (uint16_t k = 0; k < 512; k++) {
         sincos_t r = trig_sincos((angle_t)(any_u(0, 127) + 128u * k));
-        //@ check -32767 <= r.sin <= 32767 && -32767 <= r.cos <= 32767;
+        //@ check unit: -32767 <= r.sin <= 32767 && -32767 <= r.cos <= 32767;
     }
-    for (int16_t k = 0; k < 64; k++) {
+    //@ loop unroll 64;
+    for (int16_t k = 0; k < TRIG_CIRCLE_STEPS; k++) {
         q15_t y = trig_circle(any((int16_t)(512 * k), (int16_t)(512 * k + 511)));
-        //@ check 0 <= y <= 32767;
+        //@ check unit: 0 <= y <= 32767;
+    }
+}
+
+/** Park and its inverse: every int16 with every sine and cosine. Clarke: see circle.c. */
+void proof_transforms(void)
+{
+    alphabeta_t x = { ANY16(), ANY16() };
+    dq_t y = { ANY16(), ANY16() };
+    sincos_t sc = { any(-32767, 32767), any(-32767, 32767) };
+    (void)park(x, sc);
+    (void)inverse_park(y, sc);
+}
+
+/** One controller with a piece of its integrator, its error and its gain. */
+static void pi_piece(int16_t shift, int16_t error_max, int16_t limit_low, int16_t limit_high, int16_t sum, int16_t err, int16_t gain)
+{
+    pi_gains_t gains;
+    pi_t pi;
+    int16_t out;
+
+    gains.kp = PIECE(0, INT16_MAX, gain, 8);
+    gains.ki = any(0, INT16_MAX);
+    gains.kc = any(PI_KC_MIN, INT16_MAX);
+    gains.shift = (uint16_t)shift;
+    pi.sum = any_l(SUM_MAX / 16 * sum, SUM_MAX / 16 * (sum + 1));
+    out = pi_tick(&pi, &gains, PIECE((int16_t)-error_max, error_max, err, 32), any(limit_low, limit_high));
+    //@ check limited: -limit_high <= out <= limit_high;
+    //@ check integrator: -SUM_MAX <= pi.sum <= SUM_MAX;
+}
+
+static void pi_pieces(int16_t shift, int16_t error_max, int16_t limit_low, int16_t limit_high)
+{
+    //@ loop unroll 32;
+    for (int16_t sum = -16; sum < 16; sum++) {
+        //@ loop unroll 32;
+        for (int16_t err = 0; err < 32; err++) {
+            //@ loop unroll 8;
+            for (int16_t gain = 0; gain < 8; gain++) {
+                pi_piece(shift, error_max, limit_low, limit_high, sum, err, gain);
+            }
+        }
+    }
+}
+
+/** pi.h, current controllers: the integrator keeps its bound for all gains, errors and limits. */
+void proof_pi_current(void)
+{
+    pi_pieces(CURRENT_PI_SHIFT, PI_ERROR_MAX, 0, INT16_MAX);
+}
+
+/** pi.h, speed controller. */
+void proof_pi_speed(void)
+{
+    pi_pieces(SPEED_PI_SHIFT, 16383, 0, 8192);
+}
+
+/** Presetting an integrator for any output and error stays within its bound. */
+void proof_pi_preset(void)
+{
+    pi_gains_t gains = { any(0, INT16_MAX), 0, 0, CURRENT_PI_SHIFT };
+    pi_t pi;
+    pi_preset(&pi, &gains, 0, ANY16());
+    //@ check current: -SUM_MAX <= pi.sum <= SUM_MAX;
+    gains.shift = SPEED_PI_SHIFT;
+    pi_preset(&pi, &gains, any(-16383, 16383), any(-8192, 8192));
+    //@ check speed: -SUM_MAX <= pi.sum <= SUM_MAX;
+}
+
+static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
+{
+    svm_params_t p;
+    alphabeta_t v;
+    duties_t d;
+
+    p.full = any(1600, 5600);
+    p.top = any(1280, 5480);
+    p.dead_time = any(20, 120);
+    p.knee_q13 = any(20, 240);
+    p.dead_slope_q16 = ANYU16();
+    p.turn_q13 = any(0, 8192);
+    v.alpha = PIECE(-16500, 16500, alpha, 16);
+    v.beta = PIECE(-16500, 16500, beta, 16);
+    d = svm(&p, v, any_u(16384u * ratio, (uint16_t)(16384u * ratio + 16383u)), any(-8192, 8192), any(-8192, 8192), ANY16());
+    //@ check duties: d.a <= 5600 && d.b <= 5600 && d.c <= 5600;
+}
+
+/** svm.h: every vector that twice the nominal bus can hold, every bus, every current, all timings. */
+void proof_svm(void)
+{
+    //@ loop unroll 16;
+    for (int16_t alpha = 0; alpha < 16; alpha++) {
+        //@ loop unroll 16;
+        for (int16_t beta = 0; beta < 16; beta++) {
+            //@ loop unroll 4;
+            for (uint16_t ratio = 0; ratio < 4; ratio++) {
+                svm_piece(alpha, beta, ratio);
+            }
+        }
+    }
+}
+
+/** Interpolation between any two entries stays between them (here: to a piece) and in 16 bits. */
+static void between_piece(int16_t low, int16_t high, int16_t first, int16_t second)
+{
+    int16_t table[2], least, most, y;
+    table[0] = PIECE(low, high, first, 32);
+    table[1] = PIECE(low, high, second, 32);
+    least = piece_low(low, high, (int16_t)(((first < second) ? first : second) - 1), 32);
+    most = piece_low(low, high, (int16_t)(((first < second) ? second : first) + 2), 32);
+    y = fieldweak_between(table, 0, ANYU16());
+    //@ check between: least - 1 <= y <= most + 1;
+}
+
+/** fieldweak.h: any table, any fraction. */
+void proof_fieldweak_between(void)
+{
+    //@ loop unroll 32;
+    for (int16_t first = 0; first < 32; first++) {
+        //@ loop unroll 32;
+        for (int16_t second = 0; second < 32; second++) {
+            between_piece(-8192, 0, first, second);
+            between_piece(2048, 30719, first, second);
+            between_piece(3276, 19661, first, second);
+        }
+    }
+}
+
+/** The voltage feedback, all parameters. */
+void proof_fieldweak_trim(void)
+{
+    fieldweak_params_t p;
+    fieldweak_t fw;
+    p.trim_max_q13 = any(0, 8192);
+    p.trim_step_q13 = any(1, 16);
+    p.margin_q14 = any(0, 4096);
+    p.trim_speed_erpm = any(0, INT16_MAX);
+    fw.trim_q13 = any(-8192, 0);
+    fieldweak_trim(&fw, &p, ANY16(), ANY16());
+    //@ check trim: -8192 <= fw.trim_q13 <= 0;
+}
+
+static void ramp_piece(int16_t step, int16_t end)
+{
+    int16_t inside = (int16_t)(32767 - 2 * step); /* further out, the target is nearer than two steps, or inwards */
+    int16_t low = (int16_t)((end < 0) ? -32767 : (end > 0) ? inside + 1 : -inside);
+    int16_t high = (int16_t)((end < 0) ? -inside - 1 : (end > 0) ? 32767 : inside);
+    int16_t y = speed_ramp(any(low, high), any(-32767, 32767), step);
+    //@ check range: -32767 <= y <= 32767;
+}
+
+/** speed_ramp.h: every reference and target, steps over the parameter's whole range. */
+void proof_speed_ramp(void)
+{
+    //@ loop unroll 4801;
+    for (int16_t step = 1; step <= 4800; step += 13) {
+        ramp_piece(step, -1);
+        ramp_piece(step, 0);
+        ramp_piece(step, 1);
+    }
+}
+
+/** forced_angle.h: all parameters, both directions. */
+void proof_forced_angle(void)
+{
+    forced_angle_params_t p = { any_l(0, 8000000l), any(1, 2000) };
+    forced_angle_t f = { any_l(0, p.end_speed_q10), any_ul(0, UINT32_MAX) };
+    (void)forced_angle_tick(&f, &p, any(0, 1) ? 1 : -1);
+    //@ check speed: 0 <= f.speed_q10 <= 8000000;
+    (void)forced_angle(&f);
+}
+
+/** estimator.h: the small blocks with every int16. */
+void proof_estimator_blocks(void)
+{
+    estimator_t e;
+    alphabeta_t x = { any(-21844, 21844), any(-21844, 21844) };
+    e.rho_q32 = any_ul(0, UINT32_MAX);
+    e.half_step_q16_rad = ANY16();
+    e.omega_filtered_q16 = any_l(INT32_MIN, INT32_MAX);
+    e.e_d_q28 = any_l(INT32_MIN, INT32_MAX);
+    e.e_q_q28 = any_l(INT32_MIN, INT32_MAX);
+    (void)estimator_next_angle(&e);
+    (void)estimator_speed(&e);
+    (void)estimator_emf(&e);
+    (void)estimator_turn(x, ANY16());
+}
+
+static void speed_from_emf(uint16_t inv_kfi)
+{
+    static estimator_t e;
+    static estimator_params_t p;
+    estimator_tuning_t t;
+    dq_t emf = { any(-16383, 16383), any(-16383, 16383) };
+    t.inv_kfi = (int16_t)inv_kfi;
+    t.emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, inv_kfi);
+    t.kfilter_esdq_q16 = 0;
+    e.e_d_q28 = emf.d * 65536l;
+    e.e_q_q28 = emf.q * 65536l;
+    estimator_pll(&e, &p, &t, emf);
+    //@ check speed: -32767 <= e.omega_erpm <= 32767;
+}
+
+/** estimator.h: every 1/Kphi; its limit keeps the speed in 16 bits. */
+void proof_estimator_speed(void)
+{
+    //@ loop unroll 31000;
+    for (uint16_t k = 2048; k < 32768u; k++) {
+        speed_from_emf(k);
     }
 }

@@ -3,11 +3,14 @@
 
 #include "control/pi.h"
 #include "control/transforms.h"
+#include "pieces.h"
 
 static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
 #define pi_tick pi_tick_piece
+#define trig_circle circle_in_pieces
 #include "control/current_control.h"
 #undef pi_tick
+#undef trig_circle
 
 #include "bounds.h"
 

@@ -2,9 +2,8 @@
 #include "any.h"
 
 #include "control/transforms.h"
+#include "pieces.h"
 
-static inline sincos_t sincos_in_pieces(angle_t angle);
-static inline q15_t circle_in_pieces(q15_t x);
 static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16);
 static inline alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13);
 static inline alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc);
@@ -38,27 +37,6 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 #include "bounds.h"
 
 static drive_t drive;
-
-/** One piece for each entry of the table. */
-static inline sincos_t sincos_in_pieces(angle_t angle)
-{
-    for (uint16_t k = 0; k < TRIG_SIN_ENTRIES; k++) {
-        if (angle < 512u * k + 256u) {
-            break;
-        }
-    }
-    return trig_sincos(angle);
-}
-
-static inline q15_t circle_in_pieces(q15_t x)
-{
-    for (int16_t k = 1; k < TRIG_CIRCLE_STEPS; k++) {
-        if (x < 512 * k) {
-            break;
-        }
-    }
-    return trig_circle(x);
-}
 
 /** y += K (x - y) stays in the range of x, but only because y is near x at its ends: pieces that shrink towards them. */
 static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16)
