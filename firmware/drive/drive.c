@@ -5,9 +5,9 @@
 static void drive_clear(void *object, uint16_t bytes)
 {
     uint8_t *byte = object;
-    while (bytes != 0u) {
-        *byte++ = 0;
-        bytes--;
+    uint16_t i;
+    for (i = 0; i < bytes; i++) {
+        byte[i] = 0;
     }
 }
 

@@ -109,6 +109,17 @@ void proof_pi_preset(void)
     //@ check speed: -SUM_MAX <= pi.sum <= SUM_MAX;
 }
 
+#define SVM_PIECES 32
+#define SVM_VOLTAGE_MAX 16500 /* Q13: a circle at twice the nominal bus */
+
+/** Smallest distance of the piece from zero. */
+static int16_t nearest(int16_t k)
+{
+    int16_t low = piece_low(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, k, SVM_PIECES);
+    int16_t high = piece_low(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, (int16_t)(k + 1), SVM_PIECES);
+    return (low > 0) ? low : (high < 0) ? (int16_t)-high : 0;
+}
+
 static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
 {
     svm_params_t p;
@@ -121,21 +132,24 @@ static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
     p.knee_q13 = any(20, 240);
     p.dead_slope_q16 = ANYU16();
     p.turn_q13 = any(0, 8192);
-    v.alpha = PIECE(-16500, 16500, alpha, 16);
-    v.beta = PIECE(-16500, 16500, beta, 16);
-    d = svm(&p, v, any_u(16384u * ratio, (uint16_t)(16384u * ratio + 16383u)), any(-8192, 8192), any(-8192, 8192), ANY16());
+    v.alpha = PIECE(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, alpha, SVM_PIECES);
+    v.beta = PIECE(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, beta, SVM_PIECES);
+    d = svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), any(-8192, 8192), any(-8192, 8192), any(-16384, 16384));
     //@ check duties: d.a <= 5600 && d.b <= 5600 && d.c <= 5600;
 }
 
-/** svm.h: every vector that twice the nominal bus can hold, every bus, every current, all timings. */
+/** svm.h: every vector of the circle that the formats allow, every bus, every current, all timings. */
 void proof_svm(void)
 {
-    //@ loop unroll 16;
-    for (int16_t alpha = 0; alpha < 16; alpha++) {
-        //@ loop unroll 16;
-        for (int16_t beta = 0; beta < 16; beta++) {
-            //@ loop unroll 4;
-            for (uint16_t ratio = 0; ratio < 4; ratio++) {
+    //@ loop unroll SVM_PIECES;
+    for (int16_t alpha = 0; alpha < SVM_PIECES; alpha++) {
+        //@ loop unroll SVM_PIECES;
+        for (int16_t beta = 0; beta < SVM_PIECES; beta++) {
+            if (qm_mulss(nearest(alpha), nearest(alpha)) + qm_mulss(nearest(beta), nearest(beta)) > qm_mulss(SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX)) {
+                continue;
+            }
+            //@ loop unroll 8;
+            for (uint16_t ratio = 0; ratio < 8; ratio++) {
                 svm_piece(alpha, beta, ratio);
             }
         }
@@ -226,28 +240,4 @@ void proof_estimator_blocks(void)
     (void)estimator_speed(&e);
     (void)estimator_emf(&e);
     (void)estimator_turn(x, ANY16());
-}
-
-static void speed_from_emf(uint16_t inv_kfi)
-{
-    static estimator_t e;
-    static estimator_params_t p;
-    estimator_tuning_t t;
-    dq_t emf = { any(-16383, 16383), any(-16383, 16383) };
-    t.inv_kfi = (int16_t)inv_kfi;
-    t.emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, inv_kfi);
-    t.kfilter_esdq_q16 = 0;
-    e.e_d_q28 = emf.d * 65536l;
-    e.e_q_q28 = emf.q * 65536l;
-    estimator_pll(&e, &p, &t, emf);
-    //@ check speed: -32767 <= e.omega_erpm <= 32767;
-}
-
-/** estimator.h: every 1/Kphi; its limit keeps the speed in 16 bits. */
-void proof_estimator_speed(void)
-{
-    //@ loop unroll 31000;
-    for (uint16_t k = 2048; k < 32768u; k++) {
-        speed_from_emf(k);
-    }
 }

@@ -14,17 +14,17 @@ void tearDown(void)
 {
 }
 
-/** The estimator's part against the reference in float64, one count. */
+/** The estimator's part against the reference in float64. */
 static void expect_estimator(const estimator_params_t *p, uint16_t rs_q16, uint16_t rs_exp, uint16_t ls_exp, int16_t limit_ls,
                              int16_t limit_hs)
 {
-    TEST_ASSERT_UINT16_WITHIN(1, rs_q16, p->rs_q16);
+    TEST_ASSERT_EQUAL_UINT16(rs_q16, p->rs_q16);
     TEST_ASSERT_EQUAL_UINT16(rs_exp, p->rs_exp);
     TEST_ASSERT_EQUAL_UINT16(ls_exp, p->ls_exp);
-    TEST_ASSERT_INT16_WITHIN(1, limit_ls, p->d_ilimit_ls_q14);
-    TEST_ASSERT_INT16_WITHIN(1, limit_hs, p->d_ilimit_hs_q14);
-    TEST_ASSERT_INT16_WITHIN(1, GOLDEN_PARAMS_C440_DELTAT_Q32, p->deltat_q32);
-    TEST_ASSERT_INT16_WITHIN(1, GOLDEN_PARAMS_C440_HALF_STEP_Q16_RAD, p->half_step_q16_rad);
+    TEST_ASSERT_EQUAL_INT16(limit_ls, p->d_ilimit_ls_q14);
+    TEST_ASSERT_EQUAL_INT16(limit_hs, p->d_ilimit_hs_q14);
+    TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_C440_DELTAT_Q32, p->deltat_q32);
+    TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_C440_HALF_STEP_Q16_RAD, p->half_step_q16_rad);
     TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_C440_KFILTER_VELESTIM_Q16, p->kfilter_velestim_q16);
     TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_C440_NOMINAL_ERPM, p->nominal_erpm);
     TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_C440_DECIMATE_ERPM, p->decimate_erpm);
@@ -48,7 +48,7 @@ void test_estimator_at_3_95_A_equals_the_reference(void)
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
     expect_estimator(&p, GOLDEN_PARAMS_C395_RS_Q16, GOLDEN_PARAMS_C395_RS_EXP, GOLDEN_PARAMS_C395_LS_EXP,
                      GOLDEN_PARAMS_C395_D_ILIMIT_LS_Q14, GOLDEN_PARAMS_C395_D_ILIMIT_HS_Q14);
-    TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)GOLDEN_PARAMS_C395_LS_Q16, fw.ls_base_q16);
+    TEST_ASSERT_EQUAL_UINT16((uint16_t)GOLDEN_PARAMS_C395_LS_Q16, fw.ls_base_q16);
 }
 
 /* The note's limits 1502 and 6117 are 2 f Ts of the whole scale. Ours are 2 pi f Ts of the largest current, so that a sine
@@ -92,7 +92,7 @@ void test_constants_at_7_09_A_are_23316_and_2620(void)
     TEST_ASSERT_INT16_WITHIN(1, 7956, NORM_INVKFIBASE);
     expect_estimator(&p, (uint16_t)GOLDEN_PARAMS_C709_RS_Q16, GOLDEN_PARAMS_C709_RS_EXP, GOLDEN_PARAMS_C709_LS_EXP,
                      GOLDEN_PARAMS_C709_D_ILIMIT_LS_Q14, GOLDEN_PARAMS_C709_D_ILIMIT_HS_Q14);
-    TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)GOLDEN_PARAMS_C709_LS_Q16, fw.ls_base_q16);
+    TEST_ASSERT_EQUAL_UINT16((uint16_t)GOLDEN_PARAMS_C709_LS_Q16, fw.ls_base_q16);
 }
 
 /* ---- 22 A: beyond a word, so with exponents ---- */
@@ -105,7 +105,7 @@ void test_constants_at_22_A_get_exponents_and_keep_their_size(void)
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
     expect_estimator(&p, (uint16_t)GOLDEN_PARAMS_C2200_RS_Q16, GOLDEN_PARAMS_C2200_RS_EXP, GOLDEN_PARAMS_C2200_LS_EXP,
                      GOLDEN_PARAMS_C2200_D_ILIMIT_LS_Q14, GOLDEN_PARAMS_C2200_D_ILIMIT_HS_Q14);
-    TEST_ASSERT_UINT16_WITHIN(1, GOLDEN_PARAMS_C2200_LS_Q16, fw.ls_base_q16);
+    TEST_ASSERT_EQUAL_UINT16(GOLDEN_PARAMS_C2200_LS_Q16, fw.ls_base_q16);
     /* published 9044 * 16 and 8129 * 256 in Q15 */
     TEST_ASSERT_INT32_WITHIN(20, INT32_C(9044) * 16, (int32_t)p.rs_q16 << p.rs_exp);
     TEST_ASSERT_INT32_WITHIN(20, INT32_C(8129) * 256 / 8, (int32_t)fw.ls_base_q16 << p.ls_exp);
@@ -119,6 +119,14 @@ void test_exponents_change_where_a_word_ends(void)
     TEST_ASSERT_EQUAL_UINT16(2, PARAM_EXP(131072.0F));
     TEST_ASSERT_EQUAL_UINT16(2, PARAM_EXP(262142.0F));
     TEST_ASSERT_EQUAL_UINT16(3, PARAM_EXP(262144.0F));
+}
+
+void test_scaled_constants_are_rounded_to_the_nearest(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(10, PARAM_SCALED(10.4F, 0));
+    TEST_ASSERT_EQUAL_UINT16(11, PARAM_SCALED(10.6F, 0));
+    TEST_ASSERT_EQUAL_UINT16(11, PARAM_SCALED(42.4F, 2));
+    TEST_ASSERT_EQUAL_UINT16(10, PARAM_SCALED(41.6F, 2));
 }
 
 /* ---- 0.000121 A a count: the note's NORM_CURRENT ---- */
@@ -163,7 +171,7 @@ void test_constants_at_4_4_A_are_14470_and_1626(void)
     TEST_ASSERT_INT16_WITHIN(1, 7956, NORM_INVKFIBASE);
     expect_estimator(&p, GOLDEN_PARAMS_C440_RS_Q16, GOLDEN_PARAMS_C440_RS_EXP, GOLDEN_PARAMS_C440_LS_EXP,
                      GOLDEN_PARAMS_C440_D_ILIMIT_LS_Q14, GOLDEN_PARAMS_C440_D_ILIMIT_HS_Q14);
-    TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)GOLDEN_PARAMS_C440_LS_Q16, fw.ls_base_q16);
+    TEST_ASSERT_EQUAL_UINT16((uint16_t)GOLDEN_PARAMS_C440_LS_Q16, fw.ls_base_q16);
 }
 
 void test_angle_step_constants_are_3579_and_11244(void)
@@ -225,9 +233,9 @@ void test_modulator_is_that_of_the_reference(void)
     TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_SVM_FULL, p.full);
     TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_SVM_TOP, p.top);
     TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_SVM_DEAD_TIME, p.dead_time);
-    TEST_ASSERT_INT16_WITHIN(1, GOLDEN_PARAMS_SVM_KNEE_Q13, p.knee_q13);
-    TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)((uint32_t)p.dead_time * 65536u / (uint16_t)p.knee_q13), p.dead_slope_q16);
-    TEST_ASSERT_INT16_WITHIN(1, GOLDEN_PARAMS_SVM_TURN_Q13, p.turn_q13);
+    TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_SVM_KNEE_Q13, p.knee_q13);
+    TEST_ASSERT_EQUAL_UINT16((uint16_t)GOLDEN_PARAMS_SVM_DEAD_SLOPE_Q16, p.dead_slope_q16);
+    TEST_ASSERT_EQUAL_INT16(GOLDEN_PARAMS_SVM_TURN_Q13, p.turn_q13);
 }
 
 static uint16_t bus_q16(int16_t bus_q15)
@@ -256,8 +264,8 @@ void test_current_loop_gains_cancel_the_motors_pole(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     /* 2 pi 800 L = 9.651 V/A is 3.1923 full scales, 2 pi 800 R Ts = 0.6710 V/A is 0.22196; both times 2^11 */
-    TEST_ASSERT_INT16_WITHIN(2, 6538, p.pi_d.kp);
-    TEST_ASSERT_INT16_WITHIN(1, 455, p.pi_d.ki);
+    TEST_ASSERT_EQUAL_INT16(6538, p.pi_d.kp);
+    TEST_ASSERT_EQUAL_INT16(455, p.pi_d.ki);
     TEST_ASSERT_EQUAL_UINT16(10, p.pi_d.shift);
     TEST_ASSERT_EQUAL_INT16(p.pi_d.kp, p.pi_q.kp);
     TEST_ASSERT_EQUAL_INT16(p.pi_d.ki, p.pi_q.ki);
@@ -282,7 +290,7 @@ void test_speed_loop_gains_follow_the_inertia(void)
     TEST_ASSERT_INT16_WITHIN(2, 4609, p.pi_speed.kp);
     TEST_ASSERT_INT16_WITHIN(1, 72, p.pi_speed.ki);
     TEST_ASSERT_EQUAL_UINT16(13, p.pi_speed.shift);
-    TEST_ASSERT_FLOAT_WITHIN(0.0001F, 0.0599F, PARAM_KT);
+    TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
 }
 
 void test_filters_have_twice_the_notes_Q15_constants(void)
