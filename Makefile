@@ -134,14 +134,20 @@ reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
 # Every chosen suite runs anew. One that cannot be built leaves no report, which the last step counts as a failure.
 run_suites = +@mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
     rm -f $T/*.txt; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
-    $(python) test/run-report.py $(call reports,$(call chosen,$1))
+    $(if $(call chosen,$2),$(MAKE) -k -j1 $(call reports,$(call chosen,$2)) || true;) \
+    $(python) test/run-report.py $(call reports,$(call chosen,$1 $2))
 
-.PHONY: test test-quick setup-test
-test: setup-test ## every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
-	$(call run_suites,$(all_suites))
+.PHONY: test test-quick setup-test setup-checks
+test: setup-test setup-checks ## every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
+	$(call run_suites,$(all_suites),$(tool_checks:%=checks/%))
 
 test-quick: setup-test ## the tests for the edit loop, under 30 s [ONLY="test_pi ..."]
 	$(call run_suites,$(quick_suites))
+
+# In one go and in sight; each check's own target looks again for what it alone needs.
+setup-checks:
+	@$(if $(ONLY),:,test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
+	    avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev)
 
 setup-test:
 	@tools/setup/prepare.sh test
@@ -240,6 +246,11 @@ $(call reports,$(unittest_py)): $T/%.txt: test/$$(subst .,/,%).py $B/libvboard.s
 $T/warnings.%.txt:
 	@+$(python) test/run-suite.py --one-test $@ \
 	    $(MAKE) -s WERROR=1 SAN= VARIANT=warnings-$* DEFINES=$(if $(filter-out default,$*),-D$*) lib vboard
+
+# Whole tools that count as one test each; one after the other, since each uses all processors.
+tool_checks := test-avr ubsan static coverage
+$(tool_checks:%=$T/checks.%.txt): $T/checks.%.txt:
+	@$(alone) $(python) test/run-suite.py --one-test $@ $(MAKE) -s $*
 
 # Further checks, each with its own rules; they may add suites to all_suites and quick_suites.
 include $(part_makefiles)

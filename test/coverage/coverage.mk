@@ -5,7 +5,7 @@ coverage_flags = -std=gnu99 -O0 -g -fkeep-inline-functions -Dalways_inline=unuse
 
 .PHONY: coverage
 coverage: setup-test ## lines and branches of the control law that the unit tests reach: 100 % and 95 % required [build/coverage/index.html]
-	@command -v gcovr >/dev/null || { echo "foc33: gcovr not found, make coverage: install Debian's gcovr" >&2; exit 2; }
+	@test/static/need.sh gcovr=gcovr
 	@rm -rf build/coverage build/host-coverage build/test-coverage; mkdir -p build/coverage
 	@$(MAKE) -s VARIANT=coverage SAN= warnings=-w CC=$(call quoted,$(CC) --coverage) CFLAGS=$(call quoted,$(coverage_flags)) \
 	    $(unit_c:%=build/test-coverage/%)

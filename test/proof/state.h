@@ -1,0 +1,119 @@
+/* The drive's state: every value that a period can leave behind, and the check that it is left behind again.
+ *
+ * The including file names the object `drive`. What is not listed here is bounded by its type. */
+#ifndef PROOF_STATE_H
+#define PROOF_STATE_H
+
+#include "any.h"
+#include "bounds.h"
+
+static void any_drive(uint16_t state, uint16_t slot)
+{
+    drive.command.run = any(0, 1);
+    drive.command.clear_fault = any(0, 1);
+    drive.command.target_erpm = any((int16_t)-erpm_max, erpm_max);
+    drive.state = state;
+    drive.fault = any_u(0, FAULT_COUNT - 1);
+    drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
+    drive.timer = ANYU16();
+    drive.slots = ANYU16();
+    drive.direction = any(0, 1) ? 1 : -1;
+    drive.calibrated = any(0, 1);
+    drive.offset_sum_a = any_l(INT32_MIN, INT32_MAX);
+    drive.offset_sum_b = any_l(INT32_MIN, INT32_MAX);
+    drive.offset_a_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
+    drive.offset_b_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
+    drive.bus_q31 = any_l(0, INT32_MAX);
+    drive.circle.limit_q14 = any(0, radius_max);
+    drive.circle.reciprocal = voltage_circle_reciprocal(drive.circle.limit_q14);
+    drive.duty_per_volt_q16 = any_u(0, qm_divud(params.duty_per_volt_numerator, (uint16_t)((uint16_t)params.bus_under_q15 << 1)));
+    drive.angle = ANYU16();
+    drive.frame = PROOF_SINCOS(drive.angle);
+    drive.forced.speed_q10 = any_l(0, params.forced.end_speed_q10);
+    drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
+    drive.stall_count = any_u(0, params.stall_slots);
+    drive.lost_count = any_u(0, params.lost_lock_slots);
+}
+
+static void any_estimator(estimator_t *e)
+{
+    for (int i = 0; i < ESTIMATOR_HISTORY; i++) {
+        e->history_q14[i].alpha = any((int16_t)-alpha_max, alpha_max);
+        e->history_q14[i].beta = any((int16_t)-beta_max, beta_max);
+    }
+    e->newest = any_u(0, ESTIMATOR_HISTORY - 1);
+    e->v_last_q13.alpha = any((int16_t)-voltage_max, voltage_max);
+    e->v_last_q13.beta = any((int16_t)-voltage_max, voltage_max);
+    e->v_before_q13.alpha = any((int16_t)-voltage_max, voltage_max);
+    e->v_before_q13.beta = any((int16_t)-voltage_max, voltage_max);
+    e->e_q13.alpha = ANY16();
+    e->e_q13.beta = ANY16();
+    e->e_d_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
+    e->e_q_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
+    e->omega_erpm = any(-32767, 32767);
+    e->omega_filtered_q16 = any_l(-32767 * 65536l, INT32_MAX);
+    e->rho_q32 = any_ul(0, UINT32_MAX);
+    e->half_step_q16_rad = qm_mulhi(e->omega_erpm, params.estimator.half_step_q16_rad);
+}
+
+static void any_control(drive_control_t *c)
+{
+    c->reference_erpm = any((int16_t)-erpm_max, erpm_max);
+    c->tuning_low = ANYU16();
+    c->ref_q13.d = any((int16_t)-current_max, current_max);
+    c->ref_q13.q = any((int16_t)-current_max, current_max);
+    c->iq_limit_q13 = any(0, current_max);
+    c->brake_limit_q13 = any(0, current_max);
+    c->handover_q13 = any((int16_t)-current_max, current_max);
+    c->handover_offset = ANY16();
+    c->i_q13.d = ANY16();
+    c->i_q13.q = ANY16();
+    c->v_q14.d = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
+    c->v_q14.q = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
+    c->vq_limit_q14 = any(0, radius_max);
+    c->pi_d.sum = any_l(-SUM_MAX, SUM_MAX);
+    c->pi_q.sum = any_l(-SUM_MAX, SUM_MAX);
+    c->pi_speed.sum = any_l(-SUM_MAX, SUM_MAX);
+}
+
+static void bounds_hold_again(void)
+{
+    const estimator_t *e = &drive.estimator;
+    const drive_control_t *c = &drive.control;
+    //@ check state: drive.state <= DRIVE_FAULT && drive.fault < FAULT_COUNT;
+    //@ check direction: drive.direction == 1 || drive.direction == -1;
+    //@ check command: 0 <= drive.command.run <= 1 && -erpm_max <= drive.command.target_erpm <= erpm_max;
+    //@ check offset_a: -params.offset_max_q13 <= drive.offset_a_q13 <= params.offset_max_q13;
+    //@ check offset_b: -params.offset_max_q13 <= drive.offset_b_q13 <= params.offset_max_q13;
+    //@ check bus: 0 <= drive.bus_q31;
+    //@ check circle: 0 <= drive.circle.limit_q14 <= radius_max;
+    //@ check forced: 0 <= drive.forced.speed_q10 <= params.forced.end_speed_q10;
+    //@ check newest: e->newest < ESTIMATOR_HISTORY;
+    //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
+    //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
+    //@ check v_last_alpha: -voltage_max <= e->v_last_q13.alpha <= voltage_max;
+    //@ check v_last_beta: -voltage_max <= e->v_last_q13.beta <= voltage_max;
+    //@ check v_before_alpha: -voltage_max <= e->v_before_q13.alpha <= voltage_max;
+    //@ check v_before_beta: -voltage_max <= e->v_before_q13.beta <= voltage_max;
+    //@ check emf_d: emf_dq_max * -65536 <= e->e_d_q28 <= emf_dq_max * 65536 + 65535;
+    //@ check emf_q: emf_dq_max * -65536 <= e->e_q_q28 <= emf_dq_max * 65536 + 65535;
+    //@ check omega: -32767 <= e->omega_erpm;
+    //@ check omega_filtered: -32767 * 65536 <= e->omega_filtered_q16;
+    //@ check reference: -erpm_max <= c->reference_erpm <= erpm_max;
+    //@ check ref_d: -current_max <= c->ref_q13.d <= current_max;
+    //@ check ref_q: -current_max <= c->ref_q13.q <= current_max;
+    //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;
+    //@ check brake_limit: 0 <= c->brake_limit_q13 <= current_max;
+    //@ check handover: -current_max <= c->handover_q13 <= current_max;
+    //@ check v_d: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max;
+    //@ check v_q: -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;
+    //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;
+    //@ check sum_d: -SUM_MAX <= c->pi_d.sum <= SUM_MAX;
+    //@ check sum_q: -SUM_MAX <= c->pi_q.sum <= SUM_MAX;
+    //@ check sum_speed: -SUM_MAX <= c->pi_speed.sum <= SUM_MAX;
+    //@ check trim: -params.fieldweak.trim_max_q13 <= drive.fieldweak.trim_q13 <= 0;
+    //@ check table: drive.fieldweak.index < FIELDWEAK_ENTRIES;
+    //@ check counts: drive.stall_count <= params.stall_slots + 1 && drive.lost_count <= params.lost_lock_slots + 1;
+}
+
+#endif
