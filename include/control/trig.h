@@ -34,7 +34,7 @@ QM_INLINE sincos_t trig_sincos(angle_t angle)
     return r;
 }
 
-/** sqrt(1 - x^2) for 0 <= x <= 1 in Q15, linear between table entries: a chord, so never above the circle. */
+/** sqrt(1 - x^2) for 0 <= x <= 1 in Q15, linear between table entries: a chord, so above the circle by a tenth of a count at most. */
 QM_INLINE q15_t trig_circle(q15_t x)
 {
     uint16_t index = (uint16_t)x >> 9;

@@ -66,7 +66,6 @@ def header(name, columns, constants, rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="directory of the headers")
-    parser.add_argument("--max-rows", type=int, default=None, help="keep the first rows only, for a target without room")
     parser.add_argument("names", nargs="*", help="vector names, default: all")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -74,7 +73,7 @@ def main():
     for name in names:
         try:
             columns, constants, rows = read(HERE / "vectors" / f"{name}.txt")
-            text = header(name, columns, constants, rows[:options.max_rows])
+            text = header(name, columns, constants, rows)
         except (OSError, ValueError, KeyError) as error:
             print(f"foc33: {error}, test/golden/vectors/{name}.txt: run make golden", file=sys.stderr)
             return 2

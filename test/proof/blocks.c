@@ -1,4 +1,7 @@
-/* The blocks of the control law, each with all inputs and all parameters of their ranges. */
+/* The blocks of the control law, each with all inputs and all parameters of their ranges.
+ *
+ * sources: firmware/control/trig.c
+ * options: -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40 */
 #include "any.h"
 
 #include "control/current_control.h"

@@ -1,10 +1,13 @@
-/* What the tick's proof takes from its blocks: vectors stay in their circles, and phase C bounds the beta current. */
+/* What the tick's proof takes from its blocks: vectors stay in their circles, and phase C bounds the beta current.
+ *
+ * sources: firmware/control/trig.c
+ * options: -eva-subdivide-non-linear-function vd_limit:100 -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40,circle_in_pieces:100 */
 #include "any.h"
 
 #include "control/pi.h"
 #include "control/transforms.h"
-#include "pieces.h"
 
+static inline q15_t circle_in_pieces(q15_t x);
 static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
 #define pi_tick pi_tick_piece
 #define trig_circle circle_in_pieces
@@ -13,6 +16,17 @@ static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t e
 #undef trig_circle
 
 #include "bounds.h"
+
+/** One piece for each entry of the table, so that the analysis keeps neighbours together. */
+static inline q15_t circle_in_pieces(q15_t x)
+{
+    for (int16_t k = 1; k < TRIG_CIRCLE_STEPS; k++) {
+        if (x < 512 * k) {
+            break;
+        }
+    }
+    return trig_circle(x);
+}
 
 #define B_STEP 4
 

@@ -28,7 +28,8 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.circle.reciprocal = voltage_circle_reciprocal(drive.circle.limit_q14);
     drive.duty_per_volt_q16 = any_u(0, qm_divud(params.duty_per_volt_numerator, (uint16_t)((uint16_t)params.bus_under_q15 << 1)));
     drive.angle = ANYU16();
-    drive.frame = PROOF_SINCOS(drive.angle);
+    drive.frame.sin = any(-32767, 32767);
+    drive.frame.cos = any(-32767, 32767);
     drive.forced.speed_q10 = any_l(0, params.forced.end_speed_q10);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
     drive.stall_count = any_u(0, params.stall_slots);

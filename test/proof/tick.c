@@ -1,9 +1,17 @@
-/* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again. */
+/* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
+ *
+ * sources: firmware/control/trig.c firmware/drive/drive.c
+ * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
+ * options: -eva-domains equality,symbolic-locations -eva-subdivide-non-linear-function vd_limit:100
+ *     -inline-calls drive_check_overcurrent,drive_is_running,drive_raise,drive_idle,qm_abs
+ *     -eva-slevel-function drive_tick:200,drive_calibrate:20,drive_clear:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
+ *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20 */
 #include "any.h"
 
 #include "control/transforms.h"
-#include "pieces.h"
 
+static inline sincos_t sincos_bounded(angle_t angle);
+static inline q15_t circle_bounded(q15_t x);
 static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16);
 static inline alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13);
 static inline alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc);
@@ -13,8 +21,8 @@ static inline int16_t speed_ramp_in_pieces(int16_t reference, int16_t target, in
 #include "control/pi.h"
 #include "control/speed_ramp.h"
 static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
-#define trig_sincos sincos_in_pieces
-#define trig_circle circle_in_pieces
+#define trig_sincos sincos_bounded
+#define trig_circle circle_bounded
 #define qm_lowpass lowpass_in_pieces
 #define clarke clarke_bounded
 #define inverse_park inverse_park_bounded
@@ -36,8 +44,22 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 
 static drive_t drive;
 
-#define PROOF_SINCOS sincos_in_pieces
 #include "state.h"
+
+/** blocks.c, proof_trig. */
+static inline sincos_t sincos_bounded(angle_t angle)
+{
+    sincos_t r = { any(-32767, 32767), any(-32767, 32767) };
+    (void)angle;
+    return r;
+}
+
+/** blocks.c, proof_trig. */
+static inline q15_t circle_bounded(q15_t x)
+{
+    //@ check input: 0 <= x;
+    return any(0, 32767);
+}
 
 /** y += K (x - y) stays in the range of x, but only because y is near x at its ends: pieces that shrink towards them. */
 static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16)
@@ -162,10 +184,10 @@ static void calibrate_after(uint16_t k)
     any_state(DRIVE_CALIBRATE, 0);
     drive.ticks = ANYU16();
     drive.timer = k;
+    drive.command.clear_fault = 0; /* in a fault: see proof_tick_recalibrate */
     drive.offset_sum_a = any_l(-32768l * k, 32767l * k);
     drive.offset_sum_b = any_l(-32768l * k, 32767l * k);
     tick();
-    //@ check next: drive.timer == k + 1 || drive.state == DRIVE_FAULT;
     //@ check sum_a: -32768 * (k + 1) <= drive.offset_sum_a <= 32767 * (k + 1);
     //@ check sum_b: -32768 * (k + 1) <= drive.offset_sum_b <= 32767 * (k + 1);
     //@ check ends: k < 1023 || drive.state != DRIVE_CALIBRATE;

@@ -293,6 +293,21 @@ void test_speed_loop_gains_follow_the_inertia(void)
     TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
 }
 
+void test_braking_current_falls_from_the_maximum_to_nothing_in_2_V(void)
+{
+    static const drive_params_t p = DRIVE_PARAMS_INIT;
+    TEST_ASSERT_EQUAL_INT16(1056, p.brake_per_bus_q8); /* 5120 counts in 1241 counts of the bus, times 256 */
+}
+
+void test_trim_moves_by_2_7_A_per_second_up_to_its_limit(void)
+{
+    static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
+    TEST_ASSERT_EQUAL_INT16(2, fw.trim_step_q13); /* 1.07 mA in 400 us */
+    TEST_ASSERT_EQUAL_INT16(1489, fw.trim_max_q13); /* 0.8 A */
+    TEST_ASSERT_INT16_WITHIN(1, 296, fw.margin_q14); /* a hundredth of the bus */
+    TEST_ASSERT_EQUAL_INT16(7800, fw.trim_speed_erpm); /* 60 % of the start speed */
+}
+
 void test_filters_have_twice_the_notes_Q15_constants(void)
 {
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;

@@ -1,0 +1,121 @@
+"""Runs the proofs: Frama-C's Eva over test/proof/*.c with the target's 16-bit int. One proof is one function proof_*().
+
+The head of each file names its sources, Eva's options, and the modes of the firmware in which a proof runs as well. A proof passes if
+Eva raises no alarm, every `check` is valid and reached, and the proof's function returns; there is no list of exceptions.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+BUILD = Path("build/proof")
+KERNEL = """-machdep gcc_x86_16 -warn-signed-overflow -no-warn-left-shift-negative -kernel-warn-key parser:decimal-float=inactive
+    -eva -eva-warn-signed-converted-downcast -eva-no-show-progress -report-unclassified-warning NONE""".split()
+PROVED = {"Valid", "Considered valid", "Valid under hypotheses", "Dead"}
+
+
+@dataclass
+class Proof:
+    name: str
+    function: str
+    file: Path
+    sources: list[str]
+    options: list[str]
+    mode: str
+
+
+def head_entry(text: str, key: str) -> list[str]:
+    match = re.search(rf"^ \* {key}:((?:.*\n \*     )*.*?)(?: \*/)?$", text, re.M)
+    return match[1].replace("\n *     ", " ").split() if match else []
+
+
+def read_proofs(file: Path) -> list[Proof]:
+    text = file.read_text()
+    functions = re.findall(r"^void (proof_\w+)\(void\)$", text, re.M)
+    modes = head_entry(text, "modes")
+    proofs = []
+    for function in functions:
+        for mode in [""] + (modes[1:] if modes and modes[0] == function else []):
+            name = function.removeprefix("proof_") + (f"_{mode}" if mode else "")
+            proofs.append(Proof(name, function, file, head_entry(text, "sources"), head_entry(text, "options"), mode))
+    return proofs
+
+
+def include_path(userparams: str) -> str:
+    return " ".join(f"-I{folder}" for folder in [str(HERE), *([userparams] if userparams else []), "include", "tools/host", "."])
+
+
+def run(proof: Proof, userparams: str) -> tuple[list[str], float]:
+    """What is wrong with the proof, and the seconds it took."""
+    report = BUILD / f"{proof.name}.csv"
+    report.unlink(missing_ok=True)
+    # A register or flag that an interrupt may change is any value at the start of a proof, and constant during a tick.
+    cpp = f"{include_path(userparams)} -Dvolatile= {'-D' + proof.mode if proof.mode else ''}"
+    command = ["frama-c", *KERNEL, *proof.options, f"-cpp-extra-args={cpp}", "-main", proof.function, str(proof.file), *proof.sources,
+               "-then", "-report-csv", str(report)]
+    start = time.monotonic()
+    try:
+        done = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+    except OSError as error:
+        print(f"foc33: {command[0]}, proofs: cannot be run ({error.strerror}); make proof installs it", file=sys.stderr)
+        os._exit(2)
+    seconds = time.monotonic() - start
+    (BUILD / f"{proof.name}.log").write_text(done.stdout)
+    if done.returncode != 0 or not report.exists():
+        errors = [line.strip() for line in done.stdout.splitlines() if "rror" in line]
+        return [f"Frama-C did not finish: {errors[0] if errors else done.returncode}"], seconds
+    return judge(proof, report.read_text(), done.stdout), seconds
+
+
+def judge(proof: Proof, report: str, log: str) -> list[str]:
+    wrong = []
+    analysed = set(re.findall(r"Values at end of function (\w+)", log))
+    ends = re.search(rf"Values at end of function {proof.function}:\n\s*NON TERMINATING", log)
+    if proof.function not in analysed or ends:
+        wrong.append(f"{proof.function} does not return: an alarm or a wrong bound stops every path")
+    for row in report.splitlines()[1:]:
+        directory, file, line, function, kind, status, statement = row.split("\t")
+        if directory.startswith("FRAMAC_SHARE"):
+            continue
+        unreached = status == "Dead" and kind == "user check" and function in analysed
+        if status not in PROVED or unreached:
+            what = "is never reached" if unreached else "may fail"
+            wrong.append(f"{directory}/{file}:{line}: {function}: {kind} {what}: {statement}")
+    return wrong
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("only", nargs="*", help="names of proofs (all)")
+    parser.add_argument("--userparams", default="", help="folder with another userparams.h")
+    parser.add_argument("--list", action="store_true", help="print the names")
+    options = parser.parse_args()
+    proofs = [proof for file in sorted(HERE.glob("*.c")) for proof in read_proofs(file)]
+    proofs = [proof for proof in proofs if not options.only or proof.name in options.only]
+    if not proofs:
+        print(f"foc33: proofs, {' '.join(options.only)}: no such proof; --list shows the names", file=sys.stderr)
+        return 2
+    if options.list:
+        print("\n".join(proof.name for proof in proofs))
+        return 0
+    BUILD.mkdir(parents=True, exist_ok=True)
+    passed = failed = 0
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for proof, (wrong, seconds) in zip(proofs, pool.map(lambda proof: run(proof, options.userparams), proofs)):
+            for line in wrong:
+                print(f"  {line}")
+            print(f"{proof.name}: " + (f"FAIL: {len(wrong)} alarms" if wrong else "PASS") + f" ({seconds:.0f} s)", flush=True)
+            passed, failed = passed + (not wrong), failed + bool(wrong)
+    print(f"{passed} passed, {failed} failed")
+    return int(failed != 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
