@@ -145,7 +145,7 @@ test-quick: setup-test ## the tests for the edit loop, under 30 s [ONLY="test_pi
 	$(call run_suites,$(quick_suites))
 
 # In one go and in sight; each check's own target looks again for what it alone needs.
-setup-checks:
+setup-checks: setup-test
 	@$(if $(ONLY),:,test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
 	    avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev)
 

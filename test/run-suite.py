@@ -6,6 +6,8 @@ With --one-test the command itself is the test: it passes when it ends with 0. T
 make goes on with the other suites; run-report.py decides.
 """
 
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -17,15 +19,21 @@ TIME_LIMIT_S = 600
 
 
 def run(command: list[str]) -> tuple[str, str]:
-    """Output of the command and how it ended: "exit 0", "signal 11", "timeout"."""
+    """Output of the command and how it ended: "exit 0", "signal 11", "timeout". At the time limit all that it started ends too."""
     try:
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIME_LIMIT_S, check=False)
-        end = f"exit {done.returncode}" if done.returncode >= 0 else f"signal {-done.returncode}"
-        output = done.stdout
-    except subprocess.TimeoutExpired as late:
-        end, output = f"timeout {TIME_LIMIT_S} s", late.stdout or b""
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
     except OSError as error:
-        end, output = f"cannot start: {error.strerror}", b""
+        return "", f"cannot start: {error.strerror}"
+    try:
+        output, _ = process.communicate(timeout=TIME_LIMIT_S)
+        end = f"exit {process.returncode}" if process.returncode >= 0 else f"signal {-process.returncode}"
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        output, _ = process.communicate()
+        end = f"timeout {TIME_LIMIT_S} s"
+    except BaseException:
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
     return output.decode(errors="replace"), end
 
 

@@ -13,7 +13,7 @@ static int16_t beta_max;    /**< beta current, Q14: 4/sqrt(3) OC, rounded up */
 static int16_t radius_max;  /**< voltage circle at the over-voltage trip, Q14 */
 static int16_t voltage_max; /**< alpha or beta voltage of a vector in that circle, Q13, and 3 % for the pieces of its proof */
 static int16_t emf_dq_max;  /**< d or q back-EMF, Q12 */
-static int16_t erpm_max;    /**< speed command and reference */
+static int16_t erpm_max;    /**< speed command */
 static int16_t current_max; /**< d and q reference, Q13 */
 
 /** Largest integrator of the current and of the speed controllers. */

@@ -59,7 +59,7 @@ static void any_estimator(estimator_t *e)
 
 static void any_control(drive_control_t *c)
 {
-    c->reference_erpm = any((int16_t)-erpm_max, erpm_max);
+    c->reference_erpm = any(-32767, 32767); /* TORQUE_MODE: the estimated speed */
     c->tuning_low = ANYU16();
     c->ref_q13.d = any((int16_t)-current_max, current_max);
     c->ref_q13.q = any((int16_t)-current_max, current_max);
@@ -100,7 +100,7 @@ static void bounds_hold_again(void)
     //@ check emf_q: emf_dq_max * -65536 <= e->e_q_q28 <= emf_dq_max * 65536 + 65535;
     //@ check omega: -32767 <= e->omega_erpm;
     //@ check omega_filtered: -32767 * 65536 <= e->omega_filtered_q16;
-    //@ check reference: -erpm_max <= c->reference_erpm <= erpm_max;
+    //@ check reference: -32767 <= c->reference_erpm;
     //@ check ref_d: -current_max <= c->ref_q13.d <= current_max;
     //@ check ref_q: -current_max <= c->ref_q13.q <= current_max;
     //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;

@@ -101,16 +101,13 @@ static inline alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc)
     return r;
 }
 
-/** Pieces: nearer than two steps to the end of the range, there is no step outwards. */
+/** Pieces: beyond the largest target, there is no step outwards. */
 static inline int16_t speed_ramp_in_pieces(int16_t reference, int16_t target, int16_t step_erpm)
 {
-    if (reference > erpm_max - 2 * step_erpm) {
+    if (reference > erpm_max) {
         return speed_ramp(reference, target, step_erpm);
     }
-    if (reference < 2 * step_erpm - erpm_max) {
-        return speed_ramp(reference, target, step_erpm);
-    }
-    if (reference < 0) {
+    if (reference < -erpm_max) {
         return speed_ramp(reference, target, step_erpm);
     }
     return speed_ramp(reference, target, step_erpm);
