@@ -62,10 +62,29 @@ def guarantees() -> str:
     return table(["guarantee", "measured", "command"], rows)
 
 
+def tests() -> str | None:
+    """What `make test`, `make coverage` and `make mutate` left in build/; None while one of them has not been run."""
+    paths = [ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test")]
+    if not all(path.exists() for path in paths):
+        return None
+    coverage, mutants = (json.loads(path.read_text()) for path in paths[:2])
+    suites = [path.read_text() for path in sorted(paths[2].glob("*.txt"))]
+    count = sum(len(re.findall(r"(?m)^\S+?:(?:\d+:)?[^:]*:?PASS", text)) for text in suites)
+    rows = [
+        ["unit, board and closed-loop tests", str(count), "`make test`"],
+        ["control law: lines / branches reached by the unit tests", f"{coverage['line_percent']:.0f} % / {coverage['branch_percent']:.0f} %", "`make coverage`"],
+        [f"planted defects noticed ({mutants['tests']}, {'all' if mutants['full'] else 'sample of'} {len(mutants['mutants'])})",
+         f"{mutants['score']:.1f} %", "`make mutate`"],
+    ]
+    return table(["check", "result", "command"], rows)
+
+
 def main() -> None:
     text = README.read_text()
-    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2)):
-        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + make() + "\n" + m[2], text, flags=re.S)
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("tests", tests)):
+        block = make()
+        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
+                              lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)
         if count != 1:
             sys.exit(f"foc33: marks '<!-- {name} -->' and '<!-- end -->', README.md: found {count} times, put them in once")
     README.write_text(text)
