@@ -68,18 +68,18 @@ static void pi_piece(int16_t shift, int16_t error_max, int16_t limit_low, int16_
     gains.ki = any(0, INT16_MAX);
     gains.kc = any(PI_KC_MIN, INT16_MAX);
     gains.shift = (uint16_t)shift;
-    pi.sum = any_l(SUM_MAX / 16 * sum, SUM_MAX / 16 * (sum + 1));
-    out = pi_tick(&pi, &gains, PIECE((int16_t)-error_max, error_max, err, 32), any(limit_low, limit_high));
+    pi.sum = any_l(SUM_MAX / 8 * sum, SUM_MAX / 8 * (sum + 1));
+    out = pi_tick(&pi, &gains, PIECE((int16_t)-error_max, error_max, err, 24), any(limit_low, limit_high));
     //@ check limited: -limit_high <= out <= limit_high;
     //@ check integrator: -SUM_MAX <= pi.sum <= SUM_MAX;
 }
 
 static void pi_pieces(int16_t shift, int16_t error_max, int16_t limit_low, int16_t limit_high)
 {
-    //@ loop unroll 32;
-    for (int16_t sum = -16; sum < 16; sum++) {
-        //@ loop unroll 32;
-        for (int16_t err = 0; err < 32; err++) {
+    //@ loop unroll 16;
+    for (int16_t sum = -8; sum < 8; sum++) {
+        //@ loop unroll 24;
+        for (int16_t err = 0; err < 24; err++) {
             //@ loop unroll 8;
             for (int16_t gain = 0; gain < 8; gain++) {
                 pi_piece(shift, error_max, limit_low, limit_high, sum, err, gain);
@@ -112,7 +112,7 @@ void proof_pi_preset(void)
     //@ check speed: -SUM_MAX <= pi.sum <= SUM_MAX;
 }
 
-#define SVM_PIECES 32
+#define SVM_PIECES 24
 #define SVM_VOLTAGE_MAX 16500 /* Q13: a circle at twice the nominal bus */
 
 /** Smallest distance of the piece from zero. */
@@ -163,10 +163,10 @@ void proof_svm(void)
 static void between_piece(int16_t low, int16_t high, int16_t first, int16_t second)
 {
     int16_t table[2], least, most, y;
-    table[0] = PIECE(low, high, first, 32);
-    table[1] = PIECE(low, high, second, 32);
-    least = piece_low(low, high, (int16_t)(((first < second) ? first : second) - 1), 32);
-    most = piece_low(low, high, (int16_t)(((first < second) ? second : first) + 2), 32);
+    table[0] = PIECE(low, high, first, 16);
+    table[1] = PIECE(low, high, second, 16);
+    least = piece_low(low, high, (int16_t)(((first < second) ? first : second) - 1), 16);
+    most = piece_low(low, high, (int16_t)(((first < second) ? second : first) + 2), 16);
     y = fieldweak_between(table, 0, ANYU16());
     //@ check between: least - 1 <= y <= most + 1;
 }
@@ -174,10 +174,10 @@ static void between_piece(int16_t low, int16_t high, int16_t first, int16_t seco
 /** fieldweak.h: any table, any fraction. */
 void proof_fieldweak_between(void)
 {
-    //@ loop unroll 32;
-    for (int16_t first = 0; first < 32; first++) {
-        //@ loop unroll 32;
-        for (int16_t second = 0; second < 32; second++) {
+    //@ loop unroll 16;
+    for (int16_t first = 0; first < 16; first++) {
+        //@ loop unroll 16;
+        for (int16_t second = 0; second < 16; second++) {
             between_piece(-8192, 0, first, second);
             between_piece(2048, 30719, first, second);
             between_piece(3276, 19661, first, second);

@@ -17,7 +17,7 @@ static int16_t erpm_max;    /**< speed command */
 static int16_t current_max; /**< d and q reference, Q13 */
 
 /** Largest integrator of the current and of the speed controllers. */
-#define SUM_MAX 1200000000l
+#define SUM_MAX 1350000000l
 /** Inputs of the controllers for which that is proved. */
 #define PI_ERROR_MAX 22400
 #define PI_KC_MIN 29491 /* 0.9 */

@@ -28,7 +28,7 @@ static inline q15_t circle_in_pieces(q15_t x)
     return trig_circle(x);
 }
 
-#define B_STEP 4
+#define B_STEP 6
 
 /** b from the given value on: a and c leave between them what the trip level allows. */
 static void phase_c_from(int16_t b_low)
@@ -119,7 +119,7 @@ void proof_circle(void)
             circle_between(low, high);
         }
         low = high;
-        high = (int16_t)(high + high / 48);
+        high = (int16_t)(high + high / 42);
         if (high > radius_max) {
             high = radius_max;
         }

@@ -142,7 +142,7 @@ static void any_state(uint16_t state, uint16_t slot)
     any_estimator(&drive.estimator);
     any_control(&drive.control);
     drive.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
-    fieldweak_tick(&drive.fieldweak, &params.fieldweak, &drive.tuning, any((int16_t)-erpm_max, erpm_max));
+    fieldweak_tick(&drive.fieldweak, &params.fieldweak, &drive.tuning, any(-32767, 32767));
 }
 
 static void tick(void)

@@ -12,6 +12,7 @@ from typing import Any
 from .errors import UserError
 
 
+_ENDING = {signal.SIGINT, signal.SIGTERM}
 _ended: list[int] = []
 
 
@@ -59,15 +60,21 @@ def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Repor
 
 def _start(context: Any, work: Any, numbered_job: tuple[int, Any], running: dict[Any, _Running]) -> None:
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_child, args=(work, numbered_job[1], there), daemon=True)
-    process.start()
-    there.close()
-    running[here] = _Running(numbered_job[0], process, here)
+    process = context.Process(target=_child, args=(work, numbered_job[1], here, there), daemon=True)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING) # a process that runs is one that run_all() knows
+    try:
+        process.start()
+        there.close()
+        running[here] = _Running(numbered_job[0], process, here)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _child(work: Any, job: Any, pipe: Any) -> None:
+def _child(work: Any, job: Any, other_end: Any, pipe: Any) -> None:
+    other_end.close() # so that the pipe breaks if the parent is gone
     signal.signal(signal.SIGINT, signal.SIG_IGN) # the parent ends it
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     try:
         pipe.send(("result", work(job, lambda seconds: pipe.send(("progress", seconds)))))
     except UserError as error:
