@@ -187,6 +187,9 @@ def report(results, required, arguments, seconds):
         else f"sample, seed {arguments.seed}"
     lines += ["", f"{how}: {len(results)} tried in {seconds:.0f} s",
               f"{score:.1f} % of {counted} mutants killed by the {tests}, {required:.0f} % required: {'PASS' if passed else 'FAIL'}"]
+    alone = sum(result in ("killed", "timeout") and by.startswith("behaviour/") for _, result, by in results)
+    if arguments.closed_loop:
+        lines.insert(-1, f"{percent(counted - total['survived'] - alone, counted):.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
     data = {"score": round(score, 2), "required": required, "passed": passed, "tests": tests, "full": arguments.full,
             "seed": arguments.seed, "seconds": round(seconds, 1), "files": {f: dict(c) for f, c in by_file.items()},
             "mutants": [{"file": m.file, "line": m.line, "function": m.function, "operator": m.operator, "diff": m.diff,
