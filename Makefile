@@ -3,7 +3,7 @@
 # Variables: SCENARIO MOTOR OUT (what to run, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
 # ONLY (names of test suites), PYTHON RUBY CC (tools to use), V=1 (show the commands).
 
-SCENARIO ?= demo
+SCENARIO ?= $(if $(MOTOR),rated,demo)
 RUBY ?= ruby
 ifeq ($(origin CC),default)
 CC := gcc
@@ -53,26 +53,63 @@ help: ## this list
 
 # ---- runs ----------------------------------------------------------------------------------------------------------------
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
-alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR
+alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES
 python = "$$(cat build/setup/python)"
 front_end = $(alone) $(python) -m tools.foc33
-options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(if $(OUT),--out $(call quoted,$(OUT)))
+out = $(if $(OUT),--out $(call quoted,$(OUT)))
 
-.PHONY: run scenarios table2 starts setup-run
+# A motor runs with the userparams.h that the tuner writes for it, unless USERPARAMS names another folder.
+tuner = $(alone) $(python) -m tuning
+tuned = build/tune/$(basename $(notdir $(MOTOR)))
+parameters = $(or $(USERPARAMS),$(if $(MOTOR),$(tuned)))
+options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
+ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) --brief),$(MAKE) vboard)
+
+.PHONY: run scenarios table2 starts motors robust setup-run
 run: setup-run ## the firmware turns the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR=name OUT=folder]
-	@$(MAKE) vboard
+	@$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
 
 scenarios: setup-run ## what make run SCENARIO=name can run
 	@$(front_end) scenarios
 
 table2: setup-run ## the eight rows of the note's Table 2 beside ours [MOTOR=name OUT=folder]
-	@$(MAKE) vboard
+	@$(ready)
 	@$(front_end) table2 $(options)
 
 starts: setup-run ## starts from every rotor angle under several loads [MOTOR=name OUT=folder]
-	@$(MAKE) vboard
+	@$(ready)
 	@$(front_end) starts $(options)
+
+motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 and 100 % of rated speed at half the rated torque [OUT=folder]
+	@$(tuner) tune --all --brief
+	@$(front_end) rated $(out)
+
+robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTOR=name OUT=folder]
+	@$(ready)
+	@$(front_end) robust $(options)
+
+# ---- tuning --------------------------------------------------------------------------------------------------------------
+tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
+.PHONY: tune tune-fw identify spreadsheet userparams setup-tune
+tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and a report [MOTOR=name OUT=folder]
+	@$(tuner) tune $(tune_motor) $(out)
+
+tune-fw: setup-run ## field-weakening tables found on the virtual board, into tuning/tables/NAME.toml [MOTOR=name OUT=folder]
+	@$(tuner) tune-fw $(tune_motor) $(out)
+
+identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=name OUT=folder]
+	@$(tuner) identify $(tune_motor) $(out)
+
+userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old [MOTOR=name]
+	@$(tuner) tune $(tune_motor) --brief
+	@cp userparams.h userparams.h.old && cp build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h userparams.h
+
+spreadsheet: setup-tune ## write tuning/tuning_params.xlsx anew
+	@$(tuner) spreadsheet
+
+setup-tune:
+	@tools/setup/prepare.sh tune
 
 .PHONY: readme bench
 readme: ## run what the README's tables and pictures show, and write them into it
@@ -123,8 +160,8 @@ unit_c := $(call c_tests,unit)
 board_c := $(call c_tests,board)
 behaviour_c := $(call c_tests,behaviour)
 check_py := $(call py_tests,unit,check)
-unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test)
-modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT
+unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
+modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
 
 quick_suites := $(check_py) $(unit_c) $(board_c) $(filter tools/%,$(unittest_py))
 all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) golden/unchanged warnings/default $(modes:%=warnings/%)

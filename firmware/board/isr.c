@@ -6,8 +6,8 @@
 #include "drive/drive_tick.h"
 #include "drive/params_init.h"
 
-/* Defined here so that the compiler folds each constant into the interrupt's instructions. */
-const drive_params_t board_params = DRIVE_PARAMS_INIT;
+/* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
+BOARD_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 volatile uint16_t board_trap_intcon1;
 

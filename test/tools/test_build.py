@@ -11,14 +11,14 @@ from tools.foc33.errors import UserError
 
 
 class Build(unittest.TestCase):
-    def make(self, script: str, defines=()):
+    def make(self, script: str, defines=(), userparams=None):
         """build.library() with a make of our own."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "make"
             path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
             path.chmod(0o755)
             with mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}", "MAKEFLAGS": "-j8", "RESULT": f"{folder}/result"}):
-                library = build.library(list(defines))
+                library = build.library(list(defines), userparams)
                 return library, Path(folder, "result").read_text(encoding="utf-8") if Path(folder, "result").exists() else ""
 
     def test_no_defines_mean_the_default_build(self):
@@ -33,6 +33,47 @@ class Build(unittest.TestCase):
 
     def test_different_values_of_a_macro_do_not_share_a_folder(self):
         self.assertNotEqual(build.variant_name(["A=1"]), build.variant_name(["A=2"]))
+
+    def test_a_tuned_header_is_built_under_its_motor_s_name(self):
+        library, call = self.make("echo \"$@\" > $RESULT", userparams=places.TUNED / "some_motor")
+        self.assertEqual(library.parent.name, "host-some_motor")
+        self.assertIn("VARIANT=some_motor DEFINES= USERPARAMS=build/tune/some_motor", call)
+
+    def test_a_header_and_defines_share_no_folder_with_either_alone(self):
+        library, call = self.make("echo \"$@\" > $RESULT", ["TUNING"], places.TUNED / "some_motor")
+        self.assertEqual(library.parent.name, "host-some_motor-tuning")
+        self.assertIn("DEFINES=-DTUNING USERPARAMS=", call)
+
+    def test_headers_in_folders_of_the_same_name_share_no_folder(self):
+        names = {build.variant_name([], Path(folder) / "params") for folder in ("/one", "/two")}
+        self.assertEqual(len(names), 2)
+        for name in names:
+            self.assertRegex(name, r"^params-[0-9a-f]{8}$")
+
+    def test_the_project_s_own_header_is_the_default_build(self):
+        self.assertIsNone(build.header_folder(places.ROOT))
+        self.assertIsNone(build.header_folder(places.ROOT / "userparams.h"))
+
+    def test_a_header_is_found_by_its_folder_or_by_itself(self):
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "userparams.h").write_text("", encoding="utf-8")
+            self.assertEqual(build.header_folder(folder), Path(folder).resolve())
+            self.assertEqual(build.header_folder(Path(folder) / "userparams.h"), Path(folder).resolve())
+
+    def test_a_folder_without_a_header_or_with_a_name_that_make_cannot_take_is_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaisesRegex(UserError, "no userparams.h in .*--userparams: name the folder"):
+                build.header_folder(folder)
+            odd = Path(folder, "two words")
+            odd.mkdir()
+            Path(odd, "userparams.h").write_text("", encoding="utf-8")
+            with self.assertRaisesRegex(UserError, "two words' cannot be given to make"):
+                build.header_folder(odd)
+
+    def test_a_refused_parameter_of_another_header_is_told_with_that_header(self):
+        with self.assertRaisesRegex(UserError, "does not build, build/tune/m/userparams.h: the back-EMF's format"):
+            self.make("echo \"a.h:3: error: static assertion failed: \\\"the back-EMF\\\\'s format\\\"\" >&2; exit 2",
+                      userparams=places.TUNED / "m")
 
     def test_the_flags_of_a_surrounding_make_are_not_inherited(self):
         self.assertEqual(self.make("echo \"flags=$MAKEFLAGS\" > $RESULT")[1].strip(), "flags=")

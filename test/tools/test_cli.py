@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,7 +14,7 @@ from pathlib import Path
 
 from support import LIBRARY, SCENARIO, command
 
-from tools.foc33 import places
+from tools.foc33 import build, motor_file, places, steps
 from tools.foc33.board import Library
 
 START = """
@@ -47,6 +49,8 @@ BAD = {
     "unknown fault": ("[[expect]]\nkind = \"fault\"\nname = \"OVERVOLTS\"\nafter_s = 1\nwithin_s = 1\n", "no fault 'OVERVOLTS'",
                       "did you mean 'OVERVOLTAGE'?"),
     "unknown state": ("[[expect]]\nkind = \"state\"\nname = \"CLOSE\"\nat_s = 1\n", "no state 'CLOSE'", "did you mean 'CLOSED'?"),
+    "speed in per cent beyond the header's": ("[[event]]\nat_s = 0.5\nspeed_percent = 5\n", "speed_percent = 5 (140 rpm) is impossible",
+                                              "the header's speeds are 500 .. 5500 rpm"),
     "syntax": ("x = = 1\n", "TOML syntax", "line 6"),
 }
 
@@ -138,6 +142,40 @@ class CommandLine(unittest.TestCase):
         self.run_text(START)
         self.assertEqual((self.out / "trace.csv").read_bytes(), first)
 
+    def test_the_report_tells_motor_and_header_and_says_if_they_do_not_belong_together(self):
+        own = self.root / "other"
+        own.mkdir()
+        text = (places.ROOT / "userparams.h").read_text(encoding="utf-8")
+        (own / "userparams.h").write_text(re.sub(r"(#define MOTOR_RS_OHM) \S+", r"\1 2.0", text), encoding="utf-8")
+        path = self.root / "test.toml"
+        path.write_text(SCENARIO + START, encoding="utf-8")
+        arguments = ["run", str(path), "--out", str(self.out), "--no-plots", "--quiet"]
+        try:
+            code, out, error = command(*arguments, "--userparams", str(own))
+        finally:
+            shutil.rmtree(places.ROOT / "build" / f"host-{build.variant_name([], own)}", ignore_errors=True)
+        self.assertEqual((code, error), (0, ""))
+        data = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
+        self.assertIn(f"\nheader  {own}/userparams.h\nnote    the header is for another motor: MOTOR_RS_OHM is 2 ohm", out)
+        self.assertEqual((data["header"], data["motor"]), (f"{own}/userparams.h", "tuning/motors/hurst_dmb0224c10002.toml"))
+        code, out, _ = command(*arguments)
+        self.assertIn("\nheader  userparams.h\n\n", out)
+
+    def test_a_header_that_is_not_there_or_comes_twice_is_refused(self):
+        path = self.root / "test.toml"
+        path.write_text(SCENARIO + START, encoding="utf-8")
+        for name in ("run", "table2", "starts"):
+            first = [name, str(path)] if name == "run" else [name]
+            self.refused(command(*first, "--out", str(self.out), "--userparams", "no/where"), "no userparams.h in 'no/where'", "--userparams")
+            self.refused(command(*first, "--out", str(self.out), "--userparams", ".", "--library", str(LIBRARY)), "leave out --library or")
+
+    def test_a_scenario_in_per_cent_follows_the_motor_file(self):
+        text = START.replace("speed_rpm = 1000", "speed_percent = 50", 1).replace("reference_rpm = 1000", "reference_percent = 50")
+        code, out, error = self.run_text(text)
+        self.assertEqual((code, error), (0, ""))
+        self.assertEqual(json.loads((self.out / "summary.json").read_text(encoding="utf-8"))["measures"][0]["reference_rpm"],
+                         0.5 * motor_file.load("hurst_dmb0224c10002").rated_speed_rpm)
+
     def test_an_ended_run_leaves_neither_results_nor_processes(self):
         path = self.root / "long.toml"
         path.write_text(SCENARIO.replace("2.0", "120.0"), encoding="utf-8")
@@ -159,7 +197,7 @@ class CommandLine(unittest.TestCase):
         self.assertEqual((code, [line.split()[0] for line in out.splitlines()]), (0, places.names(places.SCENARIOS)))
 
     def test_every_command_explains_itself(self):
-        for name in ("run", "table2", "starts", "scenarios", "keys"):
+        for name in ("run", "table2", "starts", "rated", "robust", "scenarios", "motors", "keys"):
             result = subprocess.run([sys.executable, "-m", "tools.foc33", name, "--help"], cwd=places.ROOT, capture_output=True,
                                     text=True, check=False)
             self.assertEqual((result.returncode, result.stderr), (0, ""), name)
@@ -169,6 +207,29 @@ class CommandLine(unittest.TestCase):
         code, out, _ = command("keys", "--library", str(LIBRARY))
         self.assertEqual(code, 0)
         self.assertRegex(out, r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w")
+
+
+class HeaderNote(unittest.TestCase):
+    VALUES = {"motor.pole_pairs": 5.0, "motor.rs_ohm": 2.67, "motor.ld_h": 1.8e-3, "motor.lq_h": 2.0e-3, "motor.psi_vs": 7.983e-3}
+    PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR_KPHI_V_PER_KRPM": 7.24}
+
+    def test_a_header_for_this_motor_has_none(self):
+        self.assertEqual(steps.header_note(self.VALUES, self.PARAMS), "")
+
+    def test_a_header_of_a_salient_motor_may_hold_either_inductance(self):
+        for ls_mh in (1.8, 2.0):
+            self.assertEqual(steps.header_note(self.VALUES, self.PARAMS | {"MOTOR_LS_MH": ls_mh}), "")
+
+    def test_each_number_of_another_motor_is_named(self):
+        for name, value, text in (("NOPOLESPAIRS", 4.0, "NOPOLESPAIRS is 4 pairs, the motor's is 5"),
+                                  ("MOTOR_RS_OHM", 2.6, "MOTOR_RS_OHM is 2.6 ohm, the motor's is 2.67"),
+                                  ("MOTOR_LS_MH", 2.1, "MOTOR_LS_MH is 2.1 mH, the motor's is 1.9"),
+                                  ("MOTOR_KPHI_V_PER_KRPM", 7.0, "MOTOR_KPHI_V_PER_KRPM is 7 V peak/krpm, the motor's is 7.24")):
+            self.assertEqual(steps.header_note(self.VALUES, self.PARAMS | {name: value}), f"the header is for another motor: {text}")
+
+    def test_two_numbers_are_both_named(self):
+        note = steps.header_note(self.VALUES, self.PARAMS | {"NOPOLESPAIRS": 2.0, "MOTOR_RS_OHM": 1.0})
+        self.assertIn("NOPOLESPAIRS is 2 pairs, the motor's is 5; MOTOR_RS_OHM is 1 ohm", note)
 
 
 class RealLibrary(unittest.TestCase):

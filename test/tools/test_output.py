@@ -99,6 +99,10 @@ class Results(unittest.TestCase):
         self.assertEqual(lines[1].split(",")[:2], ["0.00005", "1234.5"])
         self.assertEqual(len(lines[1].split(",")), len(lines[0].split(",")))
 
+    def test_a_table_file_quotes_what_would_break_its_columns(self):
+        write_csv(self.root / "t.csv", ["a", "b"], [["one, two", 'say "x"']])
+        self.assertEqual((self.root / "t.csv").read_text(encoding="utf-8"), 'a,b\n"one, two","say ""x"""\n')
+
     def test_a_table_file_leaves_unknown_cells_empty(self):
         write_csv(self.root / "t.csv", ["a", "b"], [[1, None]])
         self.assertEqual((self.root / "t.csv").read_text(encoding="utf-8"), "a,b\n1,\n")

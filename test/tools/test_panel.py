@@ -5,7 +5,8 @@ import unittest
 from support import scenario
 
 from tools.foc33.errors import UserError
-from tools.foc33.panel import Ranges, plan
+from tools.foc33.panel import DEBOUNCE_S, HOLD_S, Ranges, plan
+from tools.foc33.scenario import Rating, in_numbers
 
 PARAMS = {"MINIMUM_SPEED_RPM": 500.0, "NOMINAL_SPEED_RPM": 2800.0, "MAXIMUM_SPEED_RPM": 5500.0, "MAXIMUM_CURRENT_A": 2.75}
 STEP = 1.0 / 1024.0
@@ -13,6 +14,17 @@ STEP = 1.0 / 1024.0
 
 def actions(text: str, defines=(), start=None):
     return plan(scenario(text), Ranges.of(PARAMS, list(defines)), start or {})
+
+
+def percent(text: str, defines=(), params=None):
+    """actions() of a motor with 2500 rpm and 0.08 N m; it is started at 0.2 s."""
+    params = PARAMS | (params or {})
+    item = in_numbers(scenario(event(0.2, "press = \"S2\"") + text), Rating(2500.0, 0.08), params)
+    return plan(item, Ranges.of(params, list(defines)), {"load.constant_nm": 0.0})
+
+
+def presses(found, key: str) -> list[float]:
+    return [action.at_s for action in found if action.keys.get(key) == 1.0]
 
 
 def event(at_s: float, action: str) -> str:
@@ -84,6 +96,97 @@ class Potentiometer(unittest.TestCase):
     def test_a_firmware_that_hides_its_ranges_is_refused(self):
         with self.assertRaisesRegex(UserError, "NOMINAL_SPEED_RPM"):
             Ranges.of({"MINIMUM_SPEED_RPM": 500.0}, [])
+
+
+class PerCent(unittest.TestCase):
+    def rpm(self, found, fast: bool) -> list[float]:
+        low, high = (2800.0, 5500.0) if fast else (500.0, 2800.0)
+        return [low + (high - low) * position for position in pots(found)]
+
+    def test_a_speed_of_the_normal_range_needs_the_potentiometer_only(self):
+        found = percent(event(0.5, "speed_percent = 40"))
+        self.assertAlmostEqual(self.rpm(found, False)[0], 1000.0, delta=2.0)
+        self.assertEqual(presses(found, "input.s3"), [])
+
+    def test_a_speed_beyond_it_is_reached_by_s3_and_the_potentiometer_moves_when_the_button_acts(self):
+        found = percent(event(0.5, "speed_percent = 160"))
+        self.assertEqual(presses(found, "input.s3"), [0.5])
+        self.assertIn((0.5 + HOLD_S, 0.0), [(action.at_s, action.keys.get("input.s3")) for action in found])
+        turned = [action for action in found if "input.pot" in action.keys]
+        self.assertEqual([round(action.at_s, 6) for action in turned], [0.5 + DEBOUNCE_S])
+        self.assertAlmostEqual(self.rpm(found, True)[-1], 4000.0, delta=2.0)
+
+    def test_the_way_back_takes_s3_again(self):
+        found = percent(event(0.5, "speed_percent = 160") + event(1.5, "speed_percent = 40"))
+        self.assertEqual(presses(found, "input.s3"), [0.5, 1.5])
+        self.assertAlmostEqual(self.rpm(found, False)[-1], 1000.0, delta=2.0)
+
+    def test_within_the_fast_range_s3_is_left_alone(self):
+        found = percent(event(0.5, "speed_percent = 160") + event(1.5, "speed_percent = 200") + event(1.7, "speed = \"maximum\""))
+        self.assertEqual(presses(found, "input.s3"), [0.5])
+        self.assertAlmostEqual(self.rpm(found, True)[1], 5000.0, delta=2.0)
+
+    def test_the_border_belongs_to_both_ranges(self):
+        found = percent(event(0.5, "speed = \"nominal\"") + event(0.7, "speed_percent = 160") + event(1.7, "speed = \"nominal\""))
+        self.assertEqual(presses(found, "input.s3"), [0.7])
+
+    def test_a_slow_turn_goes_through_the_border_at_its_share_of_the_time(self):
+        found = percent(event(0.5, "speed = \"minimum\"") + event(0.6, "speed_percent = 160\nover_s = 0.7"))
+        at_s = presses(found, "input.s3")[0]
+        self.assertAlmostEqual(at_s, 0.6 + 0.7 * 2300.0 / 3500.0, delta=0.002)
+        before = [action.keys["input.pot"] for action in found if "input.pot" in action.keys and 0.6 <= action.at_s <= at_s]
+        after = [action.keys["input.pot"] for action in found if "input.pot" in action.keys and action.at_s > at_s]
+        self.assertEqual((before, after), (sorted(before), sorted(after)))
+        self.assertAlmostEqual(before[-1], 1.0, delta=STEP)
+        self.assertAlmostEqual(after[0], 0.0, delta=STEP)
+        self.assertAlmostEqual(after[-1], 1200.0 / 2700.0, delta=STEP)
+        self.assertAlmostEqual(max(action.at_s for action in found if "input.pot" in action.keys), 1.3 + DEBOUNCE_S, delta=0.002)
+
+    def test_a_slow_turn_back_goes_down_in_both_ranges(self):
+        found = percent(event(0.3, "speed = \"maximum\"") + event(0.6, "speed_percent = 40\nover_s = 0.9"))
+        at_s = presses(found, "input.s3")[1]
+        self.assertAlmostEqual(at_s, 0.6 + 0.9 * 2700.0 / 4500.0, delta=0.002)
+        after = [action.keys["input.pot"] for action in found if "input.pot" in action.keys and action.at_s > at_s]
+        self.assertEqual(after, sorted(after, reverse=True))
+        self.assertAlmostEqual(after[0], 1.0, delta=STEP)
+        self.assertAlmostEqual(after[-1], 500.0 / 2300.0, delta=STEP)
+
+    def test_a_button_that_is_still_down_is_let_go_before_it_is_pressed_again(self):
+        first, second = presses(percent(event(0.5, "speed_percent = 160") + event(0.52, "speed_percent = 40")), "input.s3")
+        self.assertGreaterEqual(second, first + HOLD_S + DEBOUNCE_S)
+
+    def test_s3_does_nothing_before_the_start_so_its_range_is_refused_there(self):
+        item = in_numbers(scenario(event(0.0, "speed_percent = 160")), Rating(2500.0, 0.08), PARAMS)
+        with self.assertRaisesRegex(UserError, r"speed_percent = 160 \(4000 rpm\) is impossible, .*line 8: .*before S2; start the motor first"):
+            plan(item, Ranges.of(PARAMS, []), {})
+
+    def test_a_speed_that_the_header_does_not_allow_is_refused_with_its_rpm_and_its_line(self):
+        for share, rpm in ((10, 250), (230, 5750), (-40, -1000)):
+            with self.assertRaisesRegex(UserError, rf"speed_percent = {share} \({rpm} rpm\) is impossible, .*line 11: "
+                                                   "the header's speeds are 500 .. 5500 rpm"):
+                percent(event(0.5, f"speed_percent = {share}"))
+
+    def test_a_header_without_a_fast_range_has_its_end_at_the_nominal_speed(self):
+        self.assertEqual(presses(percent(event(0.5, "speed = \"maximum\""), params={"MAXIMUM_SPEED_RPM": 2800.0}), "input.s3"), [])
+        with self.assertRaisesRegex(UserError, "500 .. 2800 rpm"):
+            percent(event(0.5, "speed_percent = 160"), params={"MAXIMUM_SPEED_RPM": 2800.0})
+
+    def test_backwards_is_possible_where_the_potentiometer_has_a_middle(self):
+        found = percent(event(0.5, "speed_percent = 66") + event(1.0, "speed_percent = -66"), ["BIDIRECTIONAL_SPEED"])
+        self.assertAlmostEqual(pots(found)[0], 0.75)
+        self.assertAlmostEqual(pots(found)[1], 0.25)
+        with self.assertRaisesRegex(UserError, "500 .. 2800 rpm"):
+            percent(event(0.5, "speed_percent = 160"), ["BIDIRECTIONAL_SPEED"])
+
+    def test_torque_is_a_brake_in_per_cent_of_the_rated_one(self):
+        found = percent(event(0.5, "torque_percent = 50\nover_s = 0.1"))
+        values = [action.keys["load.constant_nm"] for action in found if "load.constant_nm" in action.keys]
+        self.assertEqual((values[-1], values), (0.04, sorted(values)))
+        self.assertIn("brake to 50 % of the rated torque: 0.04 N m", [action.text for action in found])
+
+    def test_the_protocol_tells_speed_and_button(self):
+        texts = [action.text for action in percent(event(0.5, "speed_percent = 160\nover_s = 0.5")) if action.text]
+        self.assertEqual(texts, ["S2 pressed", "potentiometer to 4000 rpm", "S3 pressed"])
 
 
 class Actions(unittest.TestCase):

@@ -52,39 +52,26 @@ class Overrides(unittest.TestCase):
 
 
 class Files(unittest.TestCase):
-    def read(self, text: str) -> plant.Part:
+    def test_a_motor_becomes_keys_of_the_virtual_board(self):
+        part = plant.read_motor("hurst_dmb0224c10002")
+        self.assertEqual((part.title, part.path.name), ("Hurst DMB0224C10002", "hurst_dmb0224c10002.toml"))
+        self.assertEqual((part.values.values["motor.rs_ohm"], part.values.values["motor.pole_pairs"]), (2.67, 5.0))
+        self.assertRegex(part.values.where["motor.rs_ohm"], "hurst_dmb0224c10002.toml line [0-9]+")
+
+    def test_an_unknown_motor_or_board_gets_the_nearest_name(self):
+        with self.assertRaisesRegex(UserError, "no motor 'hurst_dmb', scenario.toml line 3: did you mean 'hurst_dmb0224c10002'"):
+            plant.read_motor("hurst_dmb", "scenario.toml line 3")
+        with self.assertRaisesRegex(UserError, "no board 'mclv2', .*did you mean 'mclv'"):
+            plant.read_board("mclv2")
+
+    def test_a_plant_key_that_the_board_refuses_names_its_line(self):
+        text = (places.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8") + "[plant]\n\"motor.sat_lq_ratio\" = 7\n"
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "motor.toml"
             path.write_text(text, encoding="utf-8")
-            return plant.read_motor(str(path))
-
-    def test_a_motor_without_a_needed_value_is_refused(self):
-        text = (places.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8")
-        with self.assertRaisesRegex(UserError, "'psi_vs' is missing, .*add it to \\[motor\\]"):
-            self.read("".join(line + "\n" for line in text.splitlines() if not line.startswith("psi_vs")))
-
-    def test_a_motor_with_an_unknown_table_is_refused(self):
-        with self.assertRaisesRegex(UserError, "unknown key 'moter'.*did you mean 'motor'"):
-            self.read("title = \"x\"\n[moter]\nrs_ohm = 1\n")
-
-    def test_an_unknown_motor_gets_the_nearest_name(self):
-        with self.assertRaisesRegex(UserError, "no motor 'hurst', .*did you mean 'hurst_dmb0224c10002'"):
-            plant.read_motor("hurst")
-
-    def test_a_motor_of_an_impossible_value_names_its_line(self):
-        part = self.read("title = \"x\"\n[motor]\nrs_ohm = -1\nld_h = 1e-3\nlq_h = 1e-3\npsi_vs = 0.01\npole_pairs = 4\n"
-                         "[mech]\ninertia_kgm2 = 1e-5\n")
-        with self.assertRaisesRegex(UserError, "'motor.rs_ohm' = -1 is impossible, .*line 3"):
+            part = plant.read_motor(str(path))
+        with self.assertRaisesRegex(UserError, f"'motor.sat_lq_ratio' = 7 is impossible, .*motor.toml line {text.count(chr(10))}: choose"):
             resolve([part.values], Library(LIBRARY).keys)
-
-    def test_every_motor_and_board_of_the_project_suits_the_virtual_board(self):
-        keys = Library(LIBRARY).keys
-        for name in places.names(places.MOTORS):
-            with self.subTest(name):
-                resolve([plant.read_motor(name).values], keys)
-        for name in places.names(places.BOARDS):
-            with self.subTest(name):
-                resolve([plant.read_board(name).values], keys)
 
     def test_plant_sections_remember_their_lines(self):
         values = Values.from_section(document("[plant]\n\n\"motor.rs_ohm\" = 2\n").root.section("plant"))

@@ -70,6 +70,13 @@ class Texts(unittest.TestCase):
         self.assertIn("warning of the board: P1DTCON1: dead time is 0", report.text(item, [], report.summary(item, [], "", "")))
 
 
+    def test_motor_and_header_are_told_and_a_note_if_they_do_not_fit(self):
+        item, used = example(), {"motor": "m.toml", "motor_title": "M", "header": "userparams.h", "note": ""}
+        text = report.text(item, [], report.summary(item, [], "", "") | used)
+        self.assertIn("motor   m.toml: M\nheader  userparams.h\n\n", text)
+        self.assertIn("\nnote    another\n", report.text(item, [], report.summary(item, [], "", "") | used | {"note": "another"}))
+
+
 class Data(unittest.TestCase):
     def test_a_summary_is_valid_json_even_with_numbers_that_json_lacks(self):
         item = example(plant__torque_nm=np.inf)

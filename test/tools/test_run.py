@@ -63,6 +63,13 @@ class Measures(unittest.TestCase):
 
 
 class Runs(unittest.TestCase):
+    def test_current_is_compared_with_the_header_s_maximum_by_its_amplitude(self):
+        item = run("[[measure]]\nname = \"row\"\nfrom_s = 0.5\nto_s = 1.0\n", plant__i_d=-0.6, plant__i_q=0.8)
+        self.assertIsNone(item.measures["row"]["current_of_maximum_percent"])
+        item = run("[[measure]]\nname = \"row\"\nfrom_s = 0.5\nto_s = 1.0\n", plant__i_d=-0.6, plant__i_q=0.8)
+        item.params["MAXIMUM_CURRENT_A"] = 2.0
+        self.assertAlmostEqual(item.measures["row"]["current_of_maximum_percent"], 50.0, places=3)
+
     def test_hand_over_is_timed_from_the_last_s2_before_it(self):
         item = run("[[event]]\nat_s = 0.1\npress = \"S2\"\n[[event]]\nat_s = 0.5\npress = \"S2\"\n",
                    fw__state=step((0, 1), (0.6, 4), (0.8, 5)), fw__speed_ref_rpm=1000)

@@ -6,7 +6,7 @@ from support import SCENARIO, document, scenario
 
 from tools.foc33 import places
 from tools.foc33.errors import UserError
-from tools.foc33.scenario import load, read
+from tools.foc33.scenario import Rating, asks_for_rating, in_numbers, load, read
 
 EVENT = "[[event]]\nat_s = 1.0\n"
 MEASURE = "[[measure]]\nname = \"m\"\nfrom_s = 0.5\nto_s = 1.0\n"
@@ -41,10 +41,82 @@ MISTAKES = {
     "speed error without a reference": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"m\"\n"
                                         "value = \"speed_error_percent\"\nmax = 1", ["'m' has no speed error", "add reference_rpm"]),
     "expectation with a key of another kind": ("[[expect]]\nkind = \"no_fault\"\nwithin_s = 1", ["unknown key 'within_s'"]),
+    "per cent of a speed as a text": (EVENT + "speed_percent = \"half\"", ["'speed_percent' is not a number", "line 8"]),
+    "torque that drives": (EVENT + "torque_percent = -50", ["'torque_percent' = -50 is impossible", "0 .. 1000", "line 8"]),
+    "absurd per cent of a speed": (EVENT + "speed_percent = 5000", ["'speed_percent' = 5000 is impossible"]),
+    "speed by an unknown name": (EVENT + "speed = \"fast\"", ["'fast' is no speed", "maximum, minimum, nominal"]),
+    "speed in rpm and in per cent": (EVENT + "speed_rpm = 1000\nspeed_percent = 20", ["'speed_rpm' and 'speed_percent' together"]),
+    "holding a speed": (EVENT + "speed_percent = 50\nhold_s = 1", ["'hold_s' with 'speed_percent'"]),
+    "measure with two references": (MEASURE + "reference_rpm = 1000\nreference_percent = 50",
+                                    ["'reference_rpm' and 'reference_percent' together", "line 11"]),
+    "measure of no per cent": (MEASURE + "reference_percent = 0", ["'reference_percent' = 0 is impossible", "line 10"]),
+    "measure of an unknown speed": (MEASURE + "reference = \"top\"", ["'top' is no reference"]),
     "define that is no macro": ("[firmware]\ndefines = [\"TUNING; rm\"]", ["'TUNING; rm' is no macro"]),
     "define that is no text": ("[firmware]\ndefines = \"TUNING\"", ["'defines' is not a list of texts"]),
     "unknown key of [start]": ("[start]\nrotor = 1", ["unknown key 'rotor'", "did you mean 'rotor_deg'?"]),
 }
+
+
+PERCENT = """
+[[event]]
+at_s = 0.5
+speed_percent = 40
+[[event]]
+at_s = 0.6
+torque_percent = 25
+over_s = 0.5
+[[event]]
+at_s = 1.0
+speed = "maximum"
+[[measure]]
+name = "40 %"
+from_s = 0.5
+to_s = 1.0
+reference_percent = 40
+[[measure]]
+name = "top"
+from_s = 1.5
+to_s = 2.0
+reference = "maximum"
+[[expect]]
+kind = "measure"
+measure = "40 %"
+value = "speed_error_percent"
+max = 1
+"""
+
+
+class PerCent(unittest.TestCase):
+    def test_per_cents_become_numbers_of_the_motor_and_names_those_of_the_header(self):
+        item = in_numbers(scenario(PERCENT), Rating(2500.0, 0.08), {"MAXIMUM_SPEED_RPM": 5500.0})
+        self.assertEqual([(event.kind, event.keys or event.value) for event in item.events],
+                         [("speed_rpm", 1000.0), ("set", {"load.constant_nm": 0.02}), ("speed_rpm", 5500.0)])
+        self.assertEqual(item.events[1].over_s, 0.5)
+        self.assertEqual([measure.reference_rpm for measure in item.measures], [1000.0, 5500.0])
+
+    def test_only_per_cents_need_a_rating(self):
+        self.assertTrue(asks_for_rating(scenario(PERCENT)))
+        for text in ("[[event]]\nat_s = 0\nspeed_percent = 20\n", "[[event]]\nat_s = 0\ntorque_percent = 20\n",
+                     MEASURE + "reference_percent = 20\n"):
+            self.assertTrue(asks_for_rating(scenario(text)), text)
+        self.assertFalse(asks_for_rating(scenario(MEASURE + "reference_rpm = 1000\n" + EVENT + "speed = \"maximum\"\n")))
+
+    def test_a_scenario_in_numbers_stays_as_it_is(self):
+        item = scenario(MEASURE + "reference_rpm = 1000\n" + EVENT + "speed_rpm = 1000\n")
+        self.assertEqual(in_numbers(item, None, {}), item)
+
+    def test_a_header_that_does_not_tell_its_speeds_is_refused(self):
+        with self.assertRaisesRegex(UserError, "does not tell MAXIMUM_SPEED_RPM"):
+            in_numbers(scenario(PERCENT), Rating(2500.0, 0.08), {})
+
+    def test_the_rated_scenario_asks_for_20_50_and_100_per_cent_at_half_torque(self):
+        item = load("rated")
+        torque, at = 0.0, {}
+        for event in item.events: # the brake at the end of each measure
+            at |= {measure.reference_percent or measure.reference: torque for measure in item.measures
+                   if measure.name not in at and measure.to_s <= event.at_s and (measure.reference_percent or measure.reference) not in at}
+            torque = event.value if event.kind == "torque_percent" else torque
+        self.assertEqual(at, {20.0: 50.0, 50.0: 50.0, 100.0: 50.0, "maximum": 0.0})
 
 
 class ScenarioFile(unittest.TestCase):

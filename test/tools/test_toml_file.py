@@ -6,7 +6,7 @@ from pathlib import Path
 from support import document
 
 from tools.foc33.errors import UserError
-from tools.foc33.toml_file import Document
+from tools.foc33.toml_file import Document, flatten
 
 
 class TomlFile(unittest.TestCase):
@@ -27,6 +27,22 @@ class TomlFile(unittest.TestCase):
 
     def test_an_unclosed_string_at_the_end_names_the_last_line(self):
         self.refused(lambda: document("a = 1\nb = \"x"), "TOML syntax", "line 2")
+
+    def test_numbers_and_nesting_beyond_all_bounds_are_refused(self):
+        self.refused(lambda: document("x = 1" + "0" * 400).root.number("x"), "'x' is not a number", "line 1")
+        self.refused(lambda: document("x = 1" + "0" * 5000), "a number too long")
+        self.refused(lambda: document("x = " + "[" * 100000), "tables too deep")
+
+    def test_a_key_with_thousands_of_dots_is_refused(self):
+        text = "[plant]\n" + ".".join("a" * 3000) + " = 1\n"
+        self.refused(lambda: flatten(document(text).root.section("plant")), "tables too deep", "line 1")
+
+    def test_control_characters_of_a_file_stay_off_the_terminal(self):
+        root = document('"a\\u001b[31m" = 1\n').root
+        self.refused(root.close, "unknown key 'a?[31m'")
+
+    def test_a_list_of_tables_where_a_table_belongs_is_refused_with_its_line(self):
+        self.refused(lambda: document("a = 1\n[[start]]\nb = 2\n").root.section("start"), "'start' is not a table", "line 2")
 
     def test_a_file_that_is_no_text_is_refused(self):
         with self.subTest("folder"):

@@ -6,6 +6,10 @@
 #include "drive/param_table.h"
 #include "drive/params.h"
 
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
 #define CURRENT_A(q13) ((double)(q13) * 4.0 * (double)PARAM_F(NORM_CURRENT_CONST))
 #define VOLTAGE_V(q14) ((double)(q14) * 2.0 * (double)NORM_VOLTAGE_CONST)
 #define EMF_V(q12) ((double)(q12) * 8.0 * (double)NORM_VOLTAGE_CONST)
@@ -108,6 +112,87 @@ const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[
 #define PARAM_ENTRY(name, unit, min, max) { #name, (double)PARAM_F(name), unit },
 const probe_param_t probe_params[] = { PARAM_TABLE(PARAM_ENTRY) };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
+
+/* What may change while the motor turns: the name of userparams.h (or its stem, for the 18 entries of a table), where the firmware
+ * keeps it, and the value of one count. A name in two rows has two places. */
+typedef struct {
+    const char *name;
+    unsigned entries; /* 0: not a table */
+    int16_t *place;
+    double per_count;
+} tunable_t;
+
+#ifdef BOARD_PARAMS_IN_RAM
+#define TUNABLE(name, field, per_count) { name, 0, &board_params.fieldweak.field, per_count },
+#define TUNABLE_TABLE(stem, field, per_count) { stem, FIELDWEAK_ENTRIES, board_params.fieldweak.field, per_count },
+#else
+#define TUNABLE(name, field, per_count)
+#define TUNABLE_TABLE(stem, field, per_count)
+#endif
+
+static const tunable_t tunables[] = {
+    TUNABLE_TABLE("IDREF_SPEED", idref_q13, CURRENT_A(1))
+    TUNABLE_TABLE("INVKFI_SPEED", inv_kfi, 1.0)
+    TUNABLE_TABLE("LS_OVER2LS0_SPEED", ls_over2ls0_q15, 1.0 / 32768.0)
+    TUNABLE("FW_START_SPEED_RPM", on_speed_erpm, SPEED_RPM(1))
+    TUNABLE("FW_START_SPEED_RPM", trim_speed_erpm, SPEED_RPM(1) / 0.6)
+    TUNABLE("FW_TRIM_CURRENT_A", trim_max_q13, CURRENT_A(1))
+    TUNABLE("KFILTER_ESDQ", kfilter_esdq_q16, 0.5)
+    TUNABLE("KFILTER_ESDQ_FW", kfilter_esdq_fw_q16, 0.5)
+    { NULL, 0, NULL, 0.0 }
+};
+
+typedef struct {
+    const char *name;
+    double min, max;
+} range_t;
+
+#define PARAM_RANGE(name, unit, min, max) { #name, min, max },
+static const range_t ranges[] = { PARAM_TABLE(PARAM_RANGE) };
+
+static int16_t *tunable_place(const tunable_t *t, const char *name)
+{
+    size_t stem = strlen(t->name);
+    unsigned entry = 0;
+    int used = 0;
+    if (t->entries == 0) {
+        return (strcmp(t->name, name) == 0) ? t->place : NULL;
+    }
+    if (strncmp(t->name, name, stem) != 0 || sscanf(name + stem, "%2u%n", &entry, &used) != 1 || name[stem + (size_t)used] != '\0') {
+        return NULL;
+    }
+    return (entry < t->entries) ? &t->place[entry] : NULL;
+}
+
+int probe_param_get(const char *name, double *value)
+{
+    for (const tunable_t *t = tunables; t->name != NULL; t++) {
+        const int16_t *place = tunable_place(t, name);
+        if (place != NULL) {
+            *value = (double)*place * t->per_count;
+            return 0;
+        }
+    }
+    return -1;
+}
+
+int probe_param_set(const char *name, double value)
+{
+    int result = -1;
+    for (size_t n = 0; n < sizeof ranges / sizeof ranges[0]; n++) {
+        if (strcmp(ranges[n].name, name) == 0 && !(value >= ranges[n].min && value <= ranges[n].max)) {
+            return -2;
+        }
+    }
+    for (const tunable_t *t = tunables; t->name != NULL; t++) {
+        int16_t *place = tunable_place(t, name);
+        if (place != NULL) {
+            *place = (int16_t)lround(value / t->per_count);
+            result = 0;
+        }
+    }
+    return result;
+}
 
 const char *probe_fault_name(int code)
 {

@@ -26,6 +26,13 @@ extern const unsigned probe_signal_count;
 extern const probe_param_t probe_params[];
 extern const unsigned probe_param_count;
 
+/* Read or write a parameter while the motor turns, as a debugger does: the entries of the three field-weakening tables and what frames
+ * them, by their names in userparams.h and in its units. The value is rounded to the firmware's counts and used from the next period on.
+ * 0; -1 where this build keeps it as a constant (no PARAMS_IN_RAM), or never lets it change; -2 for a value outside its range. A
+ * power-up does not bring the old values back. */
+int probe_param_get(const char *name, double *value);
+int probe_param_set(const char *name, double value);
+
 /* Name of a fault code or of a state number as the signals "fault" and "state" give them; "" for a number that has no name. */
 const char *probe_fault_name(int code);
 const char *probe_state_name(int state);

@@ -139,6 +139,24 @@ class Board:
         """`count` 16-bit elements of a firmware variable, as a debugger would read them."""
         return list(self._variable(name, count))
 
+    def _parameter(self, function: str, name: str, *rest: Any) -> None:
+        call = getattr(self._c, function, None)
+        result = call(name.encode(), *rest) if call is not None else -1
+        if result == -2:
+            raise BoardError(f"{name} = {rest[0].value:g} is outside its range in userparams.h")
+        if result != 0:
+            raise BoardError(f"{name} cannot change in this firmware: build it with PARAMS_IN_RAM; only the field-weakening tables can")
+
+    def parameter(self, name: str) -> float:
+        """A parameter of userparams.h as the running firmware has it now; needs PARAMS_IN_RAM."""
+        value = ctypes.c_double()
+        self._parameter("probe_param_get", name, ctypes.byref(value))
+        return value.value
+
+    def write_parameter(self, name: str, value: float) -> None:
+        """Change a field-weakening parameter of userparams.h while the motor turns; needs PARAMS_IN_RAM."""
+        self._parameter("probe_param_set", name, ctypes.c_double(value))
+
     def write_variable(self, name: str, value: int) -> None:
         """Write a 16-bit firmware variable, as a debugger would."""
         self._variable(name, 1)[0] = value

@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from . import output, places, report, scenario, simulate, starts, steps, table2, workers
+from . import motor_file, output, places, rated, report, robust, scenario, simulate, starts, steps, table2, workers
 from .errors import UserError
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
@@ -49,15 +49,30 @@ def _parser() -> argparse.ArgumentParser:
     angles.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
     angles.set_defaults(command=starts.command)
 
-    for command, folder in ((run, "build/run/SCENARIO"), (loads, "build/run/table2"), (angles, "build/run/starts")):
-        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default {folder}")
-        command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
+    rating = commands.add_parser("rated", help="every motor with its tuned header at 20, 50 and 100 %% of its rated speed under load")
+    rating.add_argument("--motor", nargs="+", metavar="NAME", help="these motors only: names in tuning/motors or paths")
+    rating.set_defaults(command=rated.command)
+
+    margins = commands.add_parser("robust", help="how far the motor's true R, L and Kphi may be off what the header says")
+    margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
+    margins.set_defaults(command=robust.command)
+
+    own, tuned = "the project's own", "build/tune/NAME, written by make tune MOTOR=NAME"
+    for command, folder, header in ((run, "SCENARIO", own), (loads, "table2", own), (angles, "starts", own), (rating, "rated", tuned),
+                                    (margins, "robust", tuned + "; without --motor " + own)):
+        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}")
+        if command is not rating:
+            command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
+            command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
         command.add_argument("--board", help="board file instead of the scenario's: a name in tuning/boards or a path")
-        command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
+        command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
         command.add_argument("--quiet", action="store_true", help="no progress bar")
 
     listing = commands.add_parser("scenarios", help="list the scenarios")
     listing.set_defaults(command=_scenarios)
+
+    motors = commands.add_parser("motors", help="list the motor files: data and rating")
+    motors.set_defaults(command=_motors)
 
     keys = commands.add_parser("keys", help="list the virtual board's keys: unit, range, meaning")
     keys.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
@@ -68,13 +83,15 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     item = scenario.load(options.scenario)
     motor, board = steps.parts_of(item, options)
-    job = simulate.prepare(item, steps.library_for(item.defines, options.library), motor, board, steps.changes(options.changes))
+    library = steps.library_for(item.defines, options.library, options.userparams)
+    used = steps.used(motor, library, steps.header_name(options.library, options.userparams))
+    job = simulate.prepare(item, library, motor, board, steps.changes(options.changes))
     target = options.out or places.RESULTS / item.name
     with output.ResultFolder(target) as folder:
         with steps.Progress(item.name, item.duration_s, options.quiet) as progress:
             run = workers.run_all([job], simulate.simulate, progress)[0]
         outcomes = report.check(run)
-        data = report.summary(run, outcomes, str(places.shown(motor.path)), str(places.shown(board.path)))
+        data = report.summary(run, outcomes, str(places.shown(motor.path)), str(places.shown(board.path))) | used
         _write_traces(run, folder.work)
         if not options.no_plots:
             from . import plots
@@ -99,6 +116,11 @@ def _scenarios(options: argparse.Namespace) -> int:
     width = max(map(len, names), default=0)
     for name in names:
         print(f"{name.ljust(width)}  {scenario.load(name).title}")
+    return 0
+
+
+def _motors(options: argparse.Namespace) -> int:
+    print(motor_file.listing())
     return 0
 
 

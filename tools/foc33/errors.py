@@ -9,7 +9,8 @@ class UserError(Exception):
 
     def __init__(self, what: str, where: str = "", remedy: str = "") -> None:
         line = what + (f", {where}" if where else "") + (f": {remedy}" if remedy else "")
-        super().__init__(" ".join(line.split()))
+        line = " ".join(line.split())
+        super().__init__("".join(c if c.isprintable() else "?" for c in line)) # a file's control characters stay off the terminal
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -80,5 +80,10 @@ def write_trace(path: Path, trace: Trace) -> None:
 
 
 def write_csv(path: Path, header: list[str], rows: list[list[Any]]) -> None:
-    lines = [",".join(header)] + [",".join("" if cell is None else str(cell) for cell in row) for row in rows]
+    lines = [",".join(_csv_cell(cell) for cell in row) for row in [header, *rows]]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _csv_cell(cell: Any) -> str:
+    text = "" if cell is None else str(cell)
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n') else text

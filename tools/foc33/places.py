@@ -10,6 +10,7 @@ TABLES = SCENARIOS / "tables"
 MOTORS = ROOT / "tuning" / "motors"
 BOARDS = ROOT / "tuning" / "boards"
 RESULTS = ROOT / "build" / "run"
+TUNED = ROOT / "build" / "tune"
 
 
 def find(kind: str, name: str, folder: Path, where: str = "") -> Path:

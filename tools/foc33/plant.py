@@ -1,18 +1,14 @@
 """The plant of a run: motor file, board file and the scenario's overrides, checked against the virtual board's own list of keys."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Mapping
 
-from . import places
+from . import board_file, motor_file
 from .errors import UserError, suggestion
-from .toml_file import Document, Section, flatten
+from .values import Value, Values
 
-MOTOR_NEEDS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "mech.inertia_kgm2")
-BOARD_NEEDS = ("supply.voltage_v",)
-
-Value = float | tuple[str, float]
-"""A number, or ("factor", number) to multiply what the earlier files gave."""
+__all__ = ["Key", "Part", "Value", "Values", "check", "read_board", "read_motor", "resolve"]
 
 
 @dataclass(frozen=True)
@@ -28,24 +24,9 @@ class Key:
     writable: bool
 
 
-@dataclass
-class Values:
-    """Keys with values from one source; `where` says where each was written."""
-
-    values: dict[str, Value] = field(default_factory=dict)
-    where: dict[str, str] = field(default_factory=dict)
-
-    @classmethod
-    def from_section(cls, section: Section | None) -> "Values":
-        if section is None:
-            return cls()
-        values = flatten(section, factors=True)
-        return cls(values, {key: section.where(key) for key in values})
-
-
 @dataclass(frozen=True)
 class Part:
-    """A motor or board file."""
+    """A motor or board file as the virtual board sees it."""
 
     path: Path
     title: str
@@ -53,32 +34,15 @@ class Part:
 
 
 def read_motor(name: str, where: str = "") -> Part:
-    """tuning/motors/NAME.toml or a path: title, then the virtual board's keys by table, e.g. [motor] rs_ohm = 2.67."""
-    return _read_part("motor", name, places.MOTORS, ("motor", "mech"), MOTOR_NEEDS, where)
+    """tuning/motors/NAME.toml or a path, in the form that motor_file.py describes, as keys of the virtual board."""
+    motor = motor_file.load(name, where)
+    return Part(motor.path, motor.title, motor.plant_values())
 
 
 def read_board(name: str, where: str = "") -> Part:
-    """tuning/boards/NAME.toml or a path: title, then the virtual board's keys by table, e.g. [supply] voltage_v = 24."""
-    return _read_part("board", name, places.BOARDS, ("supply", "bus", "inverter", "shunt", "adc", "cpu"), BOARD_NEEDS, where)
-
-
-def _read_part(kind: str, name: str, folder: Path, tables: tuple[str, ...], needs: tuple[str, ...], where: str) -> Part:
-    root = Document(places.find(kind, name, folder, where)).root
-    title = root.text("title")
-    root.text("source", "")
-    result = Values()
-    for table in tables:
-        section = root.section(table)
-        if section is not None:
-            for key, value in flatten(section).items():
-                result.values[f"{table}.{key}"] = value
-                result.where[f"{table}.{key}"] = section.where(key)
-    root.close()
-    for need in needs:
-        if need not in result.values:
-            table, key = need.split(".", 1)
-            raise UserError(f"'{key}' is missing", root.document.where((table,)), f"add it to [{table}]")
-    return Part(root.document.path, title, result)
+    """tuning/boards/NAME.toml or a path, in the form that board_file.py describes, as keys of the virtual board."""
+    board = board_file.load(name, where)
+    return Part(board.path, board.title, board.plant_values())
 
 
 def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:

@@ -161,3 +161,87 @@ def write_starts(rows: list[dict], folder: Path) -> list[str]:
     figure.savefig(folder / "starts.png")
     plt.close(figure)
     return ["starts.png"]
+
+
+def write_rated(rows: list[dict], limits: dict, folder: Path) -> list[str]:
+    """Every motor's rows beside what is allowed: a panel for each quantity, a line for each motor, a mark for each row."""
+    motors = list(dict.fromkeys(row["motor"] for row in rows))
+    marks = {name: f"C{i}" for i, name in enumerate(dict.fromkeys(row["row"] for row in rows))}
+    figure, panels = plt.subplots(1, 4, sharey=True, layout="constrained", figsize=(13, 1.8 + 0.5 * len(motors)))
+    for axes, (key, label, low, high) in zip(panels, (
+            ("speed_error_percent", "speed error [%]", -limits["error_percent"], limits["error_percent"]),
+            ("angle_error_rms_deg", "angle error [deg RMS]", None, limits["angle_error_deg"]),
+            ("current_of_maximum_percent", "current [% of its maximum]", None, limits["current_percent"]),
+            ("voltage_percent", "voltage [% of its limit]", None, None))):
+        for name, color in marks.items():
+            points = [(row[key], motors.index(row["motor"])) for row in rows if row["row"] == name and row[key] is not None]
+            shown = [(x if low is None else min(max(x, 1.5 * low), 1.5 * high), y) for x, y in points]
+            axes.scatter([x for x, _ in shown], [y for _, y in shown], color=color, s=40, label=name, zorder=3)
+        for limit in (low, high):
+            if limit is not None:
+                axes.axvline(limit, color="tab:red", linewidth=0.8, linestyle="--")
+        axes.set(xlabel=label, xlim=(None, None) if low is not None else (0.0, None))
+    panels[0].set(yticks=range(len(motors)), yticklabels=motors, ylim=(len(motors) - 0.5, -0.5))
+    figure.suptitle("speeds in per cent of rated, under load; maximum speed without load; dashed: allowed", fontsize=11)
+    panels[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
+    figure.savefig(folder / "rated.png")
+    plt.close(figure)
+    return ["rated.png"]
+
+
+def write_robust(margins: list[dict], runs: list[dict], promised: dict[str, float], law: Callable, folder: Path) -> list[str]:
+    """How far each parameter may be off, as bars, and the angle error on the way there."""
+    return [_margins(margins, promised, folder), _angle_over_factor(runs, law, folder)]
+
+
+def _margins(margins: list[dict], promised: dict[str, float], folder: Path) -> str:
+    criteria = list(dict.fromkeys(row["criterion"] for row in margins))
+    ends = {(row["parameter"], row["criterion"], row["direction"]): row for row in margins}
+    figure, axes = plt.subplots(layout="constrained", figsize=(10, 4.5))
+    lowest, highest = min(row["factor"] for row in margins), max(row["factor"] for row in margins)
+    for i, name in enumerate(promised):
+        for j, criterion in enumerate(criteria):
+            low, high = ends[name, criterion, "down"], ends[name, criterion, "up"]
+            y = i + 0.2 * (j - (len(criteria) - 1) / 2.0)
+            axes.barh(y, high["factor"] - low["factor"], 0.17, left=low["factor"], color=f"C{j}", label=criterion if i == 0 else None)
+            for end, sign in ((low, "<"), (high, ">")):
+                if end["fails_at"] is None:
+                    axes.plot(end["factor"], y, sign, color="black", markersize=5, clip_on=False)
+        for edge in (1.0 - promised[name], 1.0 + promised[name]):
+            axes.plot([edge, edge], [i - 0.42, i + 0.42], color="black", linewidth=1.5,
+                      label="promised" if i == 0 and edge < 1.0 else None)
+    axes.set_xscale("log")
+    axes.set_xlim(lowest / 1.05, highest * 1.05)
+    ticks = [tick for tick in (0.3, 0.5, 0.7, 0.85, 1.0, 1.15, 1.3, 1.5, 2.0, 3.0) if lowest <= tick <= highest]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set(title="how far the motor may be off (arrow: the search ended there)", xlabel="true value / the header's",
+             yticks=range(len(promised)), yticklabels=list(promised), ylim=(len(promised) - 0.5, -0.5))
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.savefig(folder / "margins.png")
+    plt.close(figure)
+    return "margins.png"
+
+
+def _angle_over_factor(runs: list[dict], law: Callable, folder: Path) -> str:
+    names = list(dict.fromkeys(row["parameter"] for row in sorted(runs, key=lambda row: ("R", "L", "Kphi").index(row["parameter"]))))
+    figure, panels = plt.subplots(1, len(names), sharey=True, layout="constrained", figsize=(12, 4.5))
+    for axes, name in zip(panels, names):
+        for load, color in (("no load", "C0"), ("loaded", "C1")):
+            rows = sorted((row for row in runs if row["parameter"] == name and row["load"] == load), key=lambda row: row["factor"])
+            good = [row for row in rows if row["verdict"] == "ok"]
+            axes.plot([row["factor"] for row in good], [row["angle_error_mean_deg"] for row in good], ".-", color=color, label=load)
+            bad = [row["factor"] for row in rows if row["verdict"] != "ok"]
+            height = 0.03 if load == "no load" else 0.07
+            axes.plot(bad, [height] * len(bad), "x", color=color, label=f"{load}: does not run" if bad else None,
+                      transform=axes.get_xaxis_transform())
+        if name == "Kphi":
+            factors = np.geomspace(2.0 ** -0.5 + 1e-6, max(row["factor"] for row in runs), 200)
+            axes.plot(factors, [law(factor) for factor in factors], color="black", linewidth=0.8, linestyle="--", label="by Kphi alone")
+        axes.set_xscale("log")
+        axes.set_xticks([0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0], ["0.3", "0.5", "0.7", "1", "1.5", "2", "3"])
+        axes.minorticks_off()
+        _finish(axes, name, "estimated less true angle [deg]" if name == names[0] else "", "true value / the header's")
+    figure.savefig(folder / "angle_error.png")
+    plt.close(figure)
+    return "angle_error.png"

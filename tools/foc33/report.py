@@ -96,9 +96,17 @@ def outcomes_text(outcomes: list[Outcome]) -> str:
     return "\n".join(lines)
 
 
+def used_text(data: dict[str, Any]) -> str:
+    """Which motor and header a result was made with (steps.used), and a note if they do not belong together."""
+    lines = [f"motor   {data['motor']}: {data['motor_title']}", f"header  {data['header']}"]
+    return "\n".join(lines + ([f"note    {data['note']}"] if data["note"] else []))
+
+
 def text(run: Run, outcomes: list[Outcome], data: dict[str, Any]) -> str:
     """The whole report of a run, as printed."""
     parts = [f"{run.scenario.name}: {run.scenario.title}"]
+    if "header" in data:
+        parts.append(used_text(data))
     if data["measures"]:
         parts.append(table(data["measures"]))
     parts.append("\n".join(f"{at_s:9.4f} s  {line}" for at_s, line in protocol(run)))

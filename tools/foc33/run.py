@@ -93,14 +93,20 @@ class Run:
     @cached_property
     def measures(self) -> dict[str, dict[str, Any]]:
         """The values of every [[measure]], by name."""
-        return {measure.name: measure_values(self.trace.part(measure.from_s, measure.to_s), measure)
-                for measure in self.scenario.measures}
+        result = {measure.name: measure_values(self.trace.part(measure.from_s, measure.to_s), measure)
+                  for measure in self.scenario.measures}
+        most = self.params.get("MAXIMUM_CURRENT_A")
+        for values in result.values():
+            if most and values["current_rms_a"] is not None:
+                values["current_of_maximum_percent"] = 100.0 * 2.0 ** 0.5 * values["current_rms_a"] / most
+        return result
 
 
 MEASURE_VALUES = {
     "speed_rpm": "true mean speed", "speed_min_rpm": "lowest true speed", "speed_max_rpm": "highest true speed",
     "estimated_rpm": "estimated mean speed", "speed_error_percent": "true mean speed against reference_rpm",
     "estimate_error_percent": "estimated against true mean speed", "current_rms_a": "RMS phase current",
+    "current_of_maximum_percent": "its amplitude in per cent of MAXIMUM_CURRENT_A",
     "id_a": "mean d current", "iq_a": "mean q current", "torque_nm": "mean electrical torque",
     "angle_error_mean_deg": "mean electrical angle error, estimated less true", "angle_error_rms_deg": "RMS of the angle error",
     "angle_error_max_deg": "largest angle error", "voltage_v": "mean length of the commanded voltage vector",

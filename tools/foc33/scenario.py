@@ -21,9 +21,12 @@
     at_s = 0.5
     press = "S2"                     or "S3"; hold_s = 0.1
     speed_rpm = 1000                 potentiometer to this speed, in the range that S3 has chosen; over_s turns it slowly
+    speed_percent = 50               to this part of the motor's rated speed; the operator presses S3 by himself where it takes that
+    speed = "maximum"                to MINIMUM_, NOMINAL_ or MAXIMUM_SPEED_RPM of the header, likewise with S3 where it takes that
     current_a = 0.5                  the same in TORQUE_MODE
     pot = 0.25                       potentiometer to this position, 0 .. 1; over_s
     set = { "load.constant_nm" = 0.05 }   any writable key; over_s makes it a ramp
+    torque_percent = 50              the brake "load.constant_nm" to this part of the motor's rated torque; over_s
     debug = { SnapStart = 1 }        writes a 16-bit firmware variable, as a debugger would
     note = "..."
 
@@ -31,20 +34,24 @@
     name = "1000 rpm"
     from_s = 3.0
     to_s = 4.0
-    reference_rpm = 1000             optional: for the speed error
+    reference_rpm = 1000             optional: for the speed error; or reference_percent = 50, or reference = "maximum"
 
     [[expect]]                       what must hold; kinds are described in expect.py
     kind = "measure"
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from . import places
+from .errors import UserError
 from .expect import Expectation, read_expectation
 from .plant import Values
 from .toml_file import Document, Section
 
-EVENT_KINDS = ("press", "speed_rpm", "current_a", "pot", "set", "debug")
+EVENT_KINDS = ("press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
+SPEEDS = ("minimum", "nominal", "maximum")
+"""Speeds of the header by name."""
+BRAKE = "load.constant_nm"
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,12 @@ class Event:
     variables: dict[str, int] = field(default_factory=dict)
     over_s: float = 0.0
     note: str = ""
+    text: str = ""
+    """which of SPEEDS"""
+    written: str = ""
+    """how the file gave the value, where that is not the kind and the value"""
+    finds_range: bool = False
+    """the operator presses S3 where the speed lies in the potentiometer's other range"""
 
 
 @dataclass(frozen=True)
@@ -71,6 +84,21 @@ class Measure:
     from_s: float
     to_s: float
     reference_rpm: float | None = None
+    reference_percent: float | None = None
+    reference: str = ""
+    """which of SPEEDS"""
+
+    @property
+    def has_reference(self) -> bool:
+        return self.reference_rpm is not None or self.reference_percent is not None or self.reference != ""
+
+
+@dataclass(frozen=True)
+class Rating:
+    """What a hundred per cent are."""
+
+    speed_rpm: float
+    torque_nm: float
 
 
 @dataclass
@@ -112,7 +140,7 @@ def read(document: Document) -> Scenario:
     scenario.events = [_read_event(section, scenario.duration_s) for section in root.sections("event")]
     scenario.events.sort(key=lambda event: event.at_s)
     _read_measures(root.sections("measure"), scenario)
-    measures = {measure.name: measure.reference_rpm is not None for measure in scenario.measures}
+    measures = {measure.name: measure.has_reference for measure in scenario.measures}
     for section in root.sections("expect"):
         scenario.expectations.append(read_expectation(section, measures, scenario.duration_s))
         scenario.expectations_where.append(section.where("kind"))
@@ -158,9 +186,15 @@ def _read_event(section: Section, duration_s: float) -> Event:
         event["keys"] = section.values(kind)
     elif kind == "debug":
         event["variables"] = _variables(section, kind)
+    elif kind == "speed":
+        event["text"] = section.choice(kind, SPEEDS)
     else:
-        event["value"] = section.number(kind, minimum=0.0, maximum=1.0) if kind == "pot" else section.number(kind)
+        event["value"] = section.number(kind, **_EVENT_RANGES.get(kind, {}))
     return Event(**event)
+
+
+_EVENT_RANGES = {"pot": {"minimum": 0.0, "maximum": 1.0}, "speed_percent": {"minimum": -1000.0, "maximum": 1000.0},
+                 "torque_percent": {"minimum": 0.0, "maximum": 1000.0}}
 
 
 def _variables(section: Section, key: str) -> dict[str, int]:
@@ -176,12 +210,57 @@ def _read_measures(sections: list[Section], scenario: Scenario) -> None:
         name = section.text("name")
         from_s = section.number("from_s", minimum=0.0)
         to_s = section.number("to_s", maximum=scenario.duration_s)
-        reference = section.number("reference_rpm", None)
+        given = [key for key in ("reference_rpm", "reference_percent", "reference") if key in section]
+        if len(given) > 1:
+            raise section.fail(given[1], f"'{given[0]}' and '{given[1]}' together", "keep one of them")
+        references = {key: section.number(key, None) for key in ("reference_rpm", "reference_percent")}
+        references["reference"] = section.choice("reference", SPEEDS, "")
         section.close()
         if to_s <= from_s:
             raise section.fail("to_s", f"to_s = {to_s:g} is not after from_s = {from_s:g}", "choose a later one")
-        if reference == 0.0:
-            raise section.fail("reference_rpm", "'reference_rpm' = 0 is impossible", "leave it out where no speed is asked for")
+        if given and references[given[0]] == 0.0:
+            raise section.fail(given[0], f"'{given[0]}' = 0 is impossible", "leave it out where no speed is asked for")
         if any(measure.name == name for measure in scenario.measures):
             raise section.fail("name", f"two measures are called '{name}'", "rename one")
-        scenario.measures.append(Measure(name, from_s, to_s, reference))
+        scenario.measures.append(Measure(name, from_s, to_s, **references))
+
+
+def asks_for_rating(scenario: Scenario) -> bool:
+    """Whether anything is written in per cent."""
+    return any(event.kind in ("speed_percent", "torque_percent") for event in scenario.events) \
+        or any(measure.reference_percent is not None for measure in scenario.measures)
+
+
+def in_numbers(scenario: Scenario, rating: Rating | None, params: dict[str, float]) -> Scenario:
+    """The scenario with every per cent and every named speed replaced by its number; `rating` is needed if asks_for_rating()."""
+    return replace(scenario, events=[_event_in_numbers(event, rating, params) for event in scenario.events],
+                   measures=[_measure_in_numbers(measure, rating, params) for measure in scenario.measures])
+
+
+def _event_in_numbers(event: Event, rating: Rating | None, params: dict[str, float]) -> Event:
+    if event.kind == "speed":
+        rpm = _named_speed(event.text, params)
+        return replace(event, kind="speed_rpm", value=rpm, written=f"speed = \"{event.text}\" ({rpm:g} rpm)", finds_range=True)
+    if event.kind == "speed_percent":
+        rpm = event.value / 100.0 * rating.speed_rpm
+        return replace(event, kind="speed_rpm", value=rpm, written=f"speed_percent = {event.value:g} ({rpm:g} rpm)", finds_range=True)
+    if event.kind == "torque_percent":
+        torque_nm = event.value / 100.0 * rating.torque_nm
+        return replace(event, kind="set", keys={BRAKE: torque_nm},
+                       note=event.note or f"brake to {event.value:g} % of the rated torque: {torque_nm:.4g} N m")
+    return event
+
+
+def _measure_in_numbers(measure: Measure, rating: Rating | None, params: dict[str, float]) -> Measure:
+    if measure.reference:
+        return replace(measure, reference_rpm=_named_speed(measure.reference, params))
+    if measure.reference_percent is not None:
+        return replace(measure, reference_rpm=measure.reference_percent / 100.0 * rating.speed_rpm)
+    return measure
+
+
+def _named_speed(name: str, params: dict[str, float]) -> float:
+    parameter = f"{name.upper()}_SPEED_RPM"
+    if parameter not in params:
+        raise UserError(f"the firmware does not tell {parameter}", "tools/board/probe.c", "rebuild with make vboard")
+    return params[parameter]

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from . import panel, plant
+from . import motor_file, panel, plant
+from . import scenario as scenarios
 from .board import Board, BoardError, Library
 from .errors import UserError, suggestion
 from .run import Run
@@ -41,6 +42,8 @@ class Job:
 def prepare(scenario: Scenario, library: Library, motor: plant.Part, board: plant.Part, extra: plant.Values | None = None) -> Job:
     """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
     keys = library.keys
+    rating = rating_of(motor) if scenarios.asks_for_rating(scenario) else None
+    scenario = scenarios.in_numbers(scenario, rating, library.params)
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
     values = plant.resolve(layers, keys)
     for event in scenario.events:
@@ -57,6 +60,12 @@ def prepare(scenario: Scenario, library: Library, motor: plant.Part, board: plan
             variables[name] = max(count, variables.get(name, 0))
     _check_signals(signals, library, scenario)
     return Job(scenario, library.path, values, actions, signals, variables)
+
+
+def rating_of(motor: plant.Part) -> scenarios.Rating:
+    """What a hundred per cent are for this motor."""
+    data = motor_file.load(str(motor.path))
+    return scenarios.Rating(data.rated_speed_rpm, data.rated_torque_nm)
 
 
 def _check_names(names: dict[str, str], library: Library, where: str) -> None:

@@ -59,7 +59,8 @@ def command(options: argparse.Namespace) -> int:
             raise UserError(f"every-deg = {options.every_deg:g} is impossible", "--every-deg", "choose 1 .. 360")
         table.every_deg = options.every_deg
     motor, board = steps.parts_of(table, options)
-    library = steps.library_for([], options.library)
+    library = steps.library_for([], options.library, options.userparams)
+    used = steps.used(motor, library, steps.header_name(options.library, options.userparams))
     cases = [(load, angle) for load in table.loads_nm for angle in np.arange(0.0, 360.0, table.every_deg).tolist()]
     jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]
     target = options.out or places.RESULTS / "starts"
@@ -68,8 +69,8 @@ def command(options: argparse.Namespace) -> int:
             results = matrix.run_cases(jobs, progress)
         rows = [{"load_nm": load, "rotor_deg": angle, **result} for (load, angle), result in zip(cases, results)]
         outcomes = [check(table, row) for row in rows]
-        _write(folder.work, table, rows, outcomes, motor, board)
-    print(f"{table.title}: {len(rows)} starts\n")
+        _write(folder.work, table, rows, outcomes, used, board)
+    print(f"{table.title}: {len(rows)} starts\n\n{report.used_text(used)}\n")
     print(text(table, rows))
     print(f"\nresults in {places.shown(target)}/")
     return steps.verdict("starts", outcomes)
@@ -117,11 +118,11 @@ def _cell(row: dict[str, Any]) -> str:
     return f"{row['closed_after_s']:.2f} s {row['overshoot_percent']:5.1f} % {row['speed_error_percent']:+5.2f} %"
 
 
-def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], motor: Part, board: Part) -> None:
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
     keys = ["load_nm", "rotor_deg", "closed_after_s", "overshoot_percent", "speed_error_percent", "angle_error_rms_deg", "fault"]
     output.write_csv(folder / "starts.csv", keys, [[row[key] for key in keys] for row in rows])
     from . import plots
-    data = {"title": table.title, "motor": str(places.shown(motor.path)), "board": str(places.shown(board.path)),
+    data = {"title": table.title, **used, "board": str(places.shown(board.path)),
             "passed": all(outcome.ok for outcome in outcomes), "rows": rows,
             "expectations": [vars(outcome) for outcome in outcomes], "plots": plots.write_starts(rows, folder)}
     output.write_summary(folder, report.clean(data))

@@ -1,27 +1,80 @@
 """Steps that all running commands share: which library and plant, a progress bar, the verdict."""
 
 import argparse
+import math
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from . import build, plant
+from . import build, places, plant
 from .board import Library
 from .errors import UserError
 from .expect import Outcome
 
 
-def library_for(defines: list[str], given: Path | None) -> Library:
-    """The board with the firmware that the defines ask for."""
+HEADER_VALUES = (("NOPOLESPAIRS", "pairs"), ("MOTOR_RS_OHM", "ohm"), ("MOTOR_LS_MH", "mH"), ("MOTOR_KPHI_V_PER_KRPM", "V peak/krpm"))
+SAME_MOTOR = 0.01
+"""Header and motor file belong together if their values agree to this."""
+
+
+def library_for(defines: list[str], given: Path | None, userparams: str | Path | None = None) -> Library:
+    """The board with the firmware that the defines ask for, built with the userparams.h in the folder `userparams`."""
     if given is not None and not given.is_file():
         raise UserError(f"no library '{given}'", "--library", "check the path")
-    return Library(given if given is not None else build.library(defines))
+    if given is not None and userparams is not None:
+        raise UserError("a library has its header already", "--userparams", "leave out --library or --userparams")
+    if given is not None:
+        return Library(given)
+    return Library(build.library(defines, None if userparams is None else build.header_folder(userparams)))
+
+
+def header_name(given: Path | None, userparams: str | Path | None) -> str:
+    """The header of a run as a person would name it."""
+    if given is not None:
+        return f"the one in {places.shown(given)}"
+    folder = None if userparams is None else build.header_folder(userparams)
+    return build.HEADER if folder is None else str(places.shown(folder / build.HEADER))
+
+
+def tuned_header(motor: Path) -> Path:
+    """The folder with the header that the tuner has written for a motor file."""
+    folder = places.TUNED / motor.stem
+    if not (folder / build.HEADER).is_file():
+        known = motor.parent.resolve() == places.MOTORS.resolve()
+        name = motor.stem if known else motor
+        raise UserError(f"no {build.HEADER} for motor '{motor.stem}'", str(places.shown(folder)), f"make it with make tune MOTOR={name}")
+    return folder
+
+
+def used(motor: plant.Part, library: Library, header: str) -> dict[str, Any]:
+    """Which motor and which header a run used, for the report; "note" says if they are not for the same motor."""
+    return {"motor": str(places.shown(motor.path)), "motor_title": motor.title, "header": header,
+            "note": header_note(motor.values.values, library.params)}
+
+
+def header_note(values: Mapping[str, Any], params: Mapping[str, float]) -> str:
+    """Where a header is for another motor than the plant's; "" where it is for this one."""
+    try:
+        pairs, flux = values["motor.pole_pairs"], values["motor.psi_vs"]
+        plain = {"NOPOLESPAIRS": (pairs, pairs), "MOTOR_RS_OHM": (values["motor.rs_ohm"],) * 2,
+                 "MOTOR_LS_MH": (1e3 * min(values["motor.ld_h"], values["motor.lq_h"]),
+                                 1e3 * max(values["motor.ld_h"], values["motor.lq_h"])),
+                 "MOTOR_KPHI_V_PER_KRPM": (flux * pairs * 3.0 ** 0.5 * 1000.0 * math.pi / 30.0,) * 2}
+    except (KeyError, TypeError):
+        return ""
+    differ = []
+    for name, unit in HEADER_VALUES:
+        low, high = plain[name]
+        if name in params and not (1.0 - SAME_MOTOR) * low <= params[name] <= (1.0 + SAME_MOTOR) * high:
+            differ.append(f"{name} is {params[name]:.4g} {unit}, the motor's is {(low + high) / 2.0:.4g}")
+    return f"the header is for another motor: {'; '.join(differ)}" if differ else ""
 
 
 class Progress:
-    """A bar over motor time; silent when asked to be or when nobody looks."""
+    """A bar over motor time, or over something else; silent when asked to be or when nobody looks."""
 
-    def __init__(self, title: str, total_s: float, quiet: bool) -> None:
+    def __init__(self, title: str, total_s: float, quiet: bool, unit: str = "s of motor time") -> None:
         self.bar = None
         if quiet or not sys.stderr.isatty():
             return
@@ -31,7 +84,7 @@ class Progress:
             return
         tqdm.monitor_interval = 0
         self.bar = tqdm(total=total_s, desc=title, unit="s", leave=False, ncols=90,
-                        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} s of motor time")
+                        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} " + unit)
 
     def __call__(self, seconds: float) -> None:
         if self.bar is not None:

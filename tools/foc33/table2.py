@@ -9,6 +9,7 @@ from . import matrix, output, places, report, simulate, steps
 from .board import Library
 from .errors import UserError
 from .expect import Outcome
+from .matrix import limit_text
 from .plant import Part
 from .scenario import Event
 from .toml_file import Document, Section
@@ -77,7 +78,8 @@ def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(places.TABLES / "table2.toml")
     motor, board = steps.parts_of(table, options)
-    library = steps.library_for([], options.library)
+    library = steps.library_for([], options.library, options.userparams)
+    used = steps.used(motor, library, steps.header_name(options.library, options.userparams))
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
     target = options.out or places.RESULTS / "table2"
     with output.ResultFolder(target) as folder:
@@ -85,8 +87,8 @@ def command(options: argparse.Namespace) -> int:
             results = matrix.run_cases(jobs, progress)
         rows = [_result(row, result) for row, result in zip(table.rows, results)]
         outcomes = [outcome for row, result in zip(table.rows, rows) for outcome in check(row, result)]
-        _write(folder.work, table, rows, outcomes, motor, board)
-    print(f"{table.title}\n")
+        _write(folder.work, table, rows, outcomes, used, board)
+    print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
     print(f"\nresults in {places.shown(target)}/")
@@ -109,18 +111,6 @@ def _result(row: Row, result: dict[str, Any]) -> dict[str, Any]:
             "note_rpm": row.note_rpm, "note_current_a": row.note_current_a, **result, "limit": limit_text(result)}
 
 
-def limit_text(result: dict[str, Any]) -> str:
-    """The number that explains a shortfall of more than 0.5 %; "" where there is none."""
-    if result["fault"]:
-        return f"fault {result['fault']}"
-    error = result["speed_error_percent"]
-    if error is None or error >= -0.5:
-        return ""
-    parts = [f"{name} {result[key]:.0f} % of the time" for name, key in
-             (("voltage", "voltage_at_limit_percent"), ("current", "current_at_limit_percent")) if (result[key] or 0.0) >= 1.0]
-    return ", ".join(parts) or "neither voltage nor current"
-
-
 def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     """What must hold for one row."""
     got = f"{result['speed_rpm']:.1f} rpm" + (f", fault {result['fault']}" if result["fault"] else "")
@@ -135,11 +125,11 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     return [Outcome(name, ok and not result["fault"], got, allowed)]
 
 
-def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], motor: Part, board: Part) -> None:
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
     keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
     output.write_csv(folder / "table2.csv", keys, [[row[key] for key in keys] for row in rows])
     from . import plots
-    data = {"title": table.title, "motor": str(places.shown(motor.path)), "board": str(places.shown(board.path)),
+    data = {"title": table.title, **used, "board": str(places.shown(board.path)),
             "passed": all(outcome.ok for outcome in outcomes), "rows": rows, "expectations": [vars(outcome) for outcome in outcomes],
             "plots": plots.write_table2(rows, folder)}
     output.write_summary(folder, report.clean(data))

@@ -30,6 +30,8 @@ class Document:
             self.data = tomllib.loads(self.text)
         except tomllib.TOMLDecodeError as error:
             raise UserError("TOML syntax", *self._syntax(str(error))) from None
+        except (ValueError, RecursionError):
+            raise UserError("a number too long or tables too deep", self.label, "write numbers as people do") from None
         self.root = Section(self, self.data, ())
 
     def _syntax(self, message: str) -> tuple[str, str]:
@@ -52,6 +54,8 @@ class Document:
             if header:
                 name = header[2].strip()
                 here = tuple(_key_parts(name))
+                if here == path: # also [[name]] where a table [name] is expected
+                    return number
                 if header[1]:
                     counts[name] = counts.get(name, -1) + 1
                     here += (counts[name],)
@@ -147,7 +151,7 @@ class Section:
         return flatten(Section(self.document, table, self.path + (key,)), factors)
 
     def _checked_number(self, key: str, value: Any, minimum: float, maximum: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e300: # nor inf, nan, huge integers
             raise self.fail(key, f"'{key}' is not a number", "write a number, without quotes")
         if not minimum <= value <= maximum:
             raise self.fail(key, f"'{key}' = {value:g} is impossible", "choose " + _range_text(minimum, maximum))
@@ -196,6 +200,8 @@ def _range_text(minimum: float, maximum: float) -> str:
 def flatten(section: Section, factors: bool = False) -> dict[str, Any]:
     """Numbers of a table and its sub-tables under dotted names: [motor] rs_ohm = 2 and "motor.rs_ohm" = 2 are the same."""
     result: dict[str, Any] = {}
+    if len(section.path) > 20:
+        raise UserError("tables too deep", section.document.where(section.path[:1]), "write \"motor.rs_ohm\" = 2 or [motor] rs_ohm = 2")
     for key, value in section.data.items():
         section.asked.add(key)
         if isinstance(value, dict) and set(value) == {"factor"} and factors:

@@ -2,7 +2,8 @@
 # Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
 #
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib
-#   tools/setup/prepare.sh test    the same, and Ruby with gem
+#   tools/setup/prepare.sh tune    the same, and openpyxl
+#   tools/setup/prepare.sh test    that, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby). Result: build/setup/python holds the interpreter's command.
 set -u
@@ -58,7 +59,7 @@ look() {
     fi
     if ! python=$(find_python); then
         packages="$packages $python_packages"
-        lacking="$lacking${lacking:+, }Python 3.11 or newer with numpy and matplotlib"
+        lacking="$lacking${lacking:+, }Python 3.11 or newer with $modules"
     fi
     if [ "$job" = test ] && ! has_ruby; then
         packages="$packages ruby"
@@ -88,17 +89,21 @@ apt() {
 
 job=${1:-}
 case $job in
-    run | test) ;;
-    *) give_up "prepare.sh, '$job': name the job, run or test" ;;
+    run) ;;
+    tune | test)
+        modules="$modules openpyxl"
+        python_packages="$python_packages python3-openpyxl"
+        ;;
+    *) give_up "prepare.sh, '$job': name the job, run, tune or test" ;;
 esac
 
 mkdir -p $state 2>/dev/null || give_up "set-up, $state: cannot be written, check the folder's permissions"
 look
 if [ -n "$packages" ]; then
     if [ -n "${PYTHON:-}" ] && ! find_python >/dev/null; then
-        give_up "set-up, PYTHON=$PYTHON: is no Python 3.11 with numpy and matplotlib; install them for it (pip install numpy matplotlib tqdm) or leave PYTHON away"
+        give_up "set-up, PYTHON=$PYTHON: is no Python 3.11 with $modules; install them for it (pip install $modules tqdm) or leave PYTHON away"
     fi
-    can_install || give_up "set-up, missing: $lacking: install it (Debian packages: $packages; or pip install numpy matplotlib tqdm) and try again"
+    can_install || give_up "set-up, missing: $lacking: install it (Debian packages: $packages; or pip install $modules tqdm) and try again"
     echo "foc33: installing Debian packages, a minute or two: $packages (log: $log)"
     : >"$log"
     apt update
