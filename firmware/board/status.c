@@ -7,7 +7,11 @@
 
 #define STATUS_PERIOD_MS 500u
 
+#ifdef IDENTIFY
+static char line[128];
+#else
 static char line[48];
+#endif
 static uint16_t next;       /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
@@ -19,15 +23,12 @@ static uint16_t put_text(uint16_t at, const char *text)
     return at;
 }
 
-static uint16_t put_number(uint16_t at, int16_t number)
+static uint16_t put_unsigned(uint16_t at, uint16_t number)
 {
     char digits[6];
     uint16_t count = 0;
-    uint16_t rest = (uint16_t)qm_abs(number);
+    uint16_t rest = number;
 
-    if (number < 0) {
-        line[at++] = '-';
-    }
     do {
         digits[count++] = (char)('0' + rest % 10u);
         rest /= 10u;
@@ -38,6 +39,40 @@ static uint16_t put_number(uint16_t at, int16_t number)
     return at;
 }
 
+#ifdef IDENTIFY
+/** The line's text. @return its length */
+static uint16_t put_line(void)
+{
+    static const char *const results[] = { IDENTIFY_RESULT_TABLE(IDENTIFY_RESULT_NAME) };
+    const identify_t *id = &board_drive.identify;
+    uint16_t at = put_text(put_unsigned(put_text(0, "step "), id->step), " ");
+    at = put_text(put_text(at, results[id->result]), " fault ");
+    at = put_text(put_unsigned(at, board_drive.fault), " R ");
+    at = put_text(put_unsigned(at, id->values.rs_mohm), " mohm Ld ");
+    at = put_text(put_unsigned(at, id->values.ld_uh), " uH Lq ");
+    at = put_text(put_unsigned(at, id->values.lq_uh), " uH Kphi ");
+    return put_text(put_unsigned(at, id->values.kphi_mv_per_krpm), " mV/krpm\r\n");
+}
+#else
+static uint16_t put_number(uint16_t at, int16_t number)
+{
+    uint16_t size = (uint16_t)qm_abs(number);
+    if (number < 0) {
+        line[at++] = '-';
+    }
+    return put_unsigned(at, size);
+}
+
+/** The line's text. @return its length */
+static uint16_t put_line(void)
+{
+    uint16_t at = put_number(put_text(0, "state "), (int16_t)board_drive.state);
+    at = put_number(put_text(at, " fault "), (int16_t)board_drive.fault);
+    at = put_number(put_text(at, " speed "), (int16_t)(estimator_speed(&board_drive.estimator) / NOPOLESPAIRS));
+    return put_text(at, " rpm\r\n");
+}
+#endif
+
 void status_init(void)
 {
     line[0] = '\0';
@@ -47,17 +82,12 @@ void status_init(void)
 
 void status_tick(uint16_t elapsed_ms)
 {
-    uint16_t at;
     waited_ms = (uint16_t)(waited_ms + elapsed_ms);
     if (waited_ms < STATUS_PERIOD_MS || line[next] != '\0') {
         return;
     }
     waited_ms = 0;
-    at = put_number(put_text(0, "state "), (int16_t)board_drive.state);
-    at = put_number(put_text(at, " fault "), (int16_t)board_drive.fault);
-    at = put_number(put_text(at, " speed "), (int16_t)(estimator_speed(&board_drive.estimator) / NOPOLESPAIRS));
-    at = put_text(at, " rpm\r\n");
-    line[at] = '\0';
+    line[put_line()] = '\0';
     next = 0;
 }
 

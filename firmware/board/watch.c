@@ -8,6 +8,9 @@ tMotorEstimParm MotorEstimParm;
 tEstimParm EstimParm;
 tParkParm ParkParm;
 tCtrlParm CtrlParm;
+#ifdef IDENTIFY
+tIdentifyParm IdentifyParm;
+#endif
 
 #ifdef SNAPSHOT
 int16_t SnapBuf1[DATA_BUFFER_SIZE], SnapBuf2[DATA_BUFFER_SIZE], SnapBuf3[DATA_BUFFER_SIZE], SnapBuf4[DATA_BUFFER_SIZE];
@@ -51,4 +54,12 @@ void watch_refresh(void)
     CtrlParm.qVelRef = d->control.reference_erpm;
     CtrlParm.qVdRef = watch_scaled(d->control.ref_q13.d, 2);
     CtrlParm.qVqRef = watch_scaled(d->control.ref_q13.q, 2);
+#ifdef IDENTIFY
+    IdentifyParm.step = d->identify.step;
+    IdentifyParm.result = d->identify.result;
+    IdentifyParm.Rs_mohm = d->identify.values.rs_mohm;
+    IdentifyParm.Ld_uH = d->identify.values.ld_uh;
+    IdentifyParm.Lq_uH = d->identify.values.lq_uh;
+    IdentifyParm.Kphi_mV_per_krpm = d->identify.values.kphi_mv_per_krpm;
+#endif
 }

@@ -41,5 +41,9 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos(d->angle);
     d->slots = 0;
+#ifdef IDENTIFY
+    drive_clear(&d->identify, sizeof d->identify);
+    identify_start(d, p);
+#endif
     d->command.run = 1;
 }

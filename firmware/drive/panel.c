@@ -118,5 +118,10 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
     } else if ((target ^ d->direction) < 0) {
         d->command.run = 0; /* the other direction: stop in order, then start again */
     }
+#ifdef IDENTIFY
+    if (identify_background(d, p)) {
+        panel->wish_run = 0;
+    }
+#endif
     return panel_lights(panel, d, in->elapsed_ms);
 }

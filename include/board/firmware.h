@@ -9,7 +9,6 @@
 /** In RAM a debugger or scope can change a parameter while the motor turns, e.g. board_params.fieldweak.idref_q13[3]; each is
  *  read anew in the next period. Nobody checks its range then. Otherwise parameters are constants in the instructions. */
 #if defined(TUNING) || defined(PARAMS_IN_RAM)
-#define BOARD_PARAMS_IN_RAM
 #define BOARD_PARAMS_PLACE
 #else
 #define BOARD_PARAMS_PLACE const

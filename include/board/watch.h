@@ -37,6 +37,16 @@ extern tEstimParm EstimParm;
 extern tParkParm ParkParm;
 extern tCtrlParm CtrlParm;
 
+#ifdef IDENTIFY
+/** What the drive has measured: step and result (identify_step_t, identify_result_t in drive/identify.h), phase resistance [mohm] with
+ *  the bridge's share, d and q inductance [uH], back-EMF [mV peak line to line per 1000 rpm]; 0 = not measured yet. */
+typedef struct {
+    uint16_t step, result, Rs_mohm, Ld_uH, Lq_uH, Kphi_mV_per_krpm;
+} tIdentifyParm;
+
+extern tIdentifyParm IdentifyParm;
+#endif
+
 #ifdef SNAPSHOT
 /** Set SnapStart to 1; SnapDone becomes 1 when the arrays are full. Columns: phase current a, q current (Q15 of full
  *  scale), filtered estimated speed (electrical rpm), estimated angle. */

@@ -9,6 +9,7 @@
 #include "control/speed_ramp.h"
 #include "control/svm.h"
 #include "drive/faults.h"
+#include "drive/identify.h"
 
 /** X(name, meaning): what the drive is doing. */
 #define DRIVE_STATE_TABLE(X) \
@@ -122,6 +123,9 @@ typedef struct {
     fieldweak_t fieldweak;
     drive_control_t control;
     uint16_t stall_count, lost_count;
+#ifdef IDENTIFY
+    identify_t identify;
+#endif
 } drive_t;
 
 #define DRIVE_CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
@@ -132,6 +136,15 @@ void drive_init(drive_t *d, const drive_params_t *p);
 /** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
  *  @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
+
+#ifdef IDENTIFY
+/** Prepares the first step; called by drive_start() after it has cleared d->identify. */
+void identify_start(drive_t *d, const drive_params_t *p);
+
+/** The background's part: evaluates a finished step and asks for the next one. Once a millisecond.
+ *  @return 1 when the procedure is not running: the bridge is to be off */
+uint16_t identify_background(drive_t *d, const drive_params_t *p);
+#endif
 
 /** 1 while the bridge switches under the law's control. */
 QM_INLINE uint16_t drive_is_running(const drive_t *d)

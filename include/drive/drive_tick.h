@@ -3,6 +3,7 @@
 #define DRIVE_DRIVE_TICK_H
 
 #include "drive/drive.h"
+#include "drive/identify_tick.h"
 #include "drive/params.h"
 
 QM_INLINE int16_t drive_signed(const drive_t *d, int16_t x)
@@ -288,6 +289,9 @@ QM_RARE void drive_open_loop(drive_t *d, const drive_params_t *p, alphabeta_t i_
 /** A period with the bridge switching. */
 QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
 {
+#ifdef IDENTIFY
+    return identify_run(d, p);
+#else
     drive_control_t *c = &d->control;
     alphabeta_t i = clarke(d->i_a_q13, d->i_b_q13), v;
 
@@ -306,6 +310,7 @@ QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
     v = inverse_park(c->v_q14, d->frame);
     estimator_commanded(&d->estimator, v);
     return svm(&p->svm, v, d->duty_per_volt_q16, d->i_a_q13, d->i_b_q13, d->i_c_q13);
+#endif
 }
 
 /** Averages the offsets; a plausible result allows the first start. */

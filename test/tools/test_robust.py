@@ -34,6 +34,11 @@ class Deviations(unittest.TestCase):
         alone = {(1.0, 1.0, 1.0), (0.7, 1.0, 1.0), (1.3, 1.0, 1.0), (1.0, 0.7, 1.0), (1.0, 1.3, 1.0), (1.0, 1.0, 0.85), (1.0, 1.0, 1.15)}
         self.assertEqual(promised, alone | set(itertools.product((0.7, 1.3), (0.7, 1.3), (0.85, 1.15))))
 
+    def test_under_load_each_alone_is_promised_and_combinations_are_only_reported(self):
+        promised = {item.factors for item in robust.deviations(table()) if item.promised_loaded}
+        self.assertEqual(promised, {(1.0, 1.0, 1.0), (0.7, 1.0, 1.0), (1.3, 1.0, 1.0), (1.0, 0.7, 1.0), (1.0, 1.3, 1.0),
+                                    (1.0, 1.0, 0.85), (1.0, 1.0, 1.15)})
+
     def test_a_cold_and_a_hot_motor_are_tried_as_well(self):
         degc = [item.temperature_degc for item in robust.deviations(table()) if item.temperature_degc is not None]
         self.assertLess(min(degc), 0.0)
@@ -220,6 +225,8 @@ class CommandLine(unittest.TestCase):
         data = json.loads((out / "summary.json").read_text(encoding="utf-8"))
         self.assertEqual(len(data["rows"]), 2 * len(robust.deviations(table())))
         self.assertEqual(data["passed"], code == 0)
+        self.assertEqual(sum(item["promised"] for item in data["rows"]), 15 + 7)
+        self.assertEqual(len(data["expectations"]), 15 + 7)
         with (out / "robust.csv").open(encoding="utf-8") as file:
             rows = {(item["case"], item["load"]): item for item in csv.DictReader(file)}
         for load in ("no load", "loaded"):

@@ -122,7 +122,7 @@ typedef struct {
     double per_count;
 } tunable_t;
 
-#ifdef BOARD_PARAMS_IN_RAM
+#if defined(TUNING) || defined(PARAMS_IN_RAM)
 #define TUNABLE(name, field, per_count) { name, 0, &board_params.fieldweak.field, per_count },
 #define TUNABLE_TABLE(stem, field, per_count) { stem, FIELDWEAK_ENTRIES, board_params.fieldweak.field, per_count },
 #else

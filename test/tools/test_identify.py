@@ -1,0 +1,203 @@
+"""The `identify` command: the neutral header, one motor on the virtual board, its report, and what it refuses."""
+
+import contextlib
+import io
+import json
+import re
+import tempfile
+import unittest
+from pathlib import Path
+
+from tools.foc33 import board_file, motor_file, places, plant
+from tools.foc33.errors import UserError
+from tuning import cli, identify
+
+NAME = "hurst_dmb0224c10002"
+
+
+def command(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of `python3 -m tuning ...`."""
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        code = cli.main(list(arguments))
+    return code, out.getvalue(), error.getvalue()
+
+
+class Tables(unittest.TestCase):
+    def test_results_have_name_cause_and_remedy(self):
+        results = identify.results()
+        self.assertEqual(sorted(results), list(range(len(results))))
+        self.assertEqual(results[2].name, "DONE")
+        self.assertEqual(results[8].name, "NOT_TURNING")
+        for result in results.values():
+            self.assertRegex(result.name, r"^[A-Z_]+$")
+            self.assertGreater(len(result.cause), 10)
+            self.assertGreater(len(result.remedy), 5)
+            self.assertNotIn('"', result.cause + result.remedy)
+
+    def test_steps_begin_with_idle_and_end_with_full_speed(self):
+        self.assertEqual(identify.step_names()[0], "IDLE")
+        self.assertEqual(identify.step_names()[-1], "SPIN_FULL")
+
+
+class Header(unittest.TestCase):
+    def setUp(self):
+        self.board = board_file.load("mclv")
+        self.motor = motor_file.load(NAME)
+
+    def define(self, text: str, name: str) -> str:
+        return re.search(rf"^#define {name} (\S+)$", text, re.MULTILINE)[1]
+
+    def test_knows_pole_pairs_current_and_speed_of_the_rating(self):
+        text = identify.header(identify.Known.of(self.motor, self.board), self.board)
+        self.assertEqual(self.define(text, "NOPOLESPAIRS"), "5")
+        self.assertEqual(self.define(text, "Q_CURRENT_REF_OPENLOOP"), "1.53")
+        self.assertEqual(self.define(text, "END_SPEED_RPM"), "1120")
+
+    def test_knows_nothing_of_what_is_to_be_measured(self):
+        """Motors that differ in everything else have the same header."""
+        known = identify.Known(5, 1.0, 1000.0)
+        text = identify.header(known, self.board)
+        for number in ("2.67", "1.92", "7.24", "5.5e-06"):
+            self.assertNotIn(f" {number}\n", text)
+        self.assertEqual(text, identify.header(identify.Known(5, 1.0, 1000.0), self.board))
+
+    def test_current_stays_below_the_boards_trip(self):
+        for name in places.names(places.MOTORS):
+            known = identify.Known.of(motor_file.load(name), self.board)
+            text = identify.header(known, self.board)
+            self.assertLess(1.2 * known.current_a, float(self.define(text, "OVER_CURRENT_THRESHOLD_A")))
+
+    def test_a_bus_below_the_rating_lowers_the_speed(self):
+        import dataclasses
+        high = dataclasses.replace(self.motor, rated_voltage_v=48.0)
+        self.assertAlmostEqual(identify.Known.of(high, self.board).speed_rpm, 560.0)
+
+    def test_current_and_speed_can_be_given(self):
+        known = identify.Known.of(self.motor, self.board, 0.7, 800.0)
+        self.assertEqual((known.current_a, known.speed_rpm), (0.7, 800.0))
+
+
+class Run(unittest.TestCase):
+    """One run for all of these."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = Path(cls.temporary.name) / "result"
+        cls.code, cls.out, cls.error = command("identify", NAME, "--quiet", "--out", str(cls.folder))
+        cls.summary = json.loads((cls.folder / "summary.json").read_text(encoding="utf-8"))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_ends_well(self):
+        self.assertEqual((self.code, self.error), (0, ""))
+        self.assertEqual(self.summary["result"], "DONE")
+
+    def test_every_value_is_within_its_limit_and_close_to_the_truth(self):
+        limits = {row["name"].split()[0]: row for row in self.summary["rows"][1:]}
+        self.assertEqual(sorted(limits), ["Kphi", "Ld", "Lq", "R"])
+        self.assertEqual({name: row["limit_percent"] for name, row in limits.items()}, {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0})
+        for row in limits.values():
+            self.assertLess(abs(row["error_percent"]), 1.0, row)
+
+    def test_table_shows_loop_and_winding(self):
+        self.assertRegex(self.out, r"R loop \[mohm\] +269\d +2692\.5")
+        self.assertRegex(self.out, r"R winding \[mohm\] +26[67]\d\.5 +2670\.0 +[+-]0\.\d\d +3 +PASS")
+
+    def test_every_step_is_in_the_protocol_once(self):
+        seen = [step["step"] for step in self.summary["steps"]]
+        self.assertEqual(seen[1:-1], identify.step_names()[1:])
+
+    def test_the_lines_to_paste_are_a_motor_file(self):
+        lines = (self.folder / "electrical.toml").read_text(encoding="utf-8")
+        self.assertIn(lines.strip(), self.out)
+        text = (places.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
+        pasted = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", text, flags=re.DOTALL | re.MULTILINE)
+        path = self.folder / "pasted.toml"
+        path.write_text(pasted, encoding="utf-8")
+        found, true = motor_file.load(str(path)), motor_file.load(NAME)
+        self.assertAlmostEqual(found.rs_ohm / true.rs_ohm, 1.0, delta=0.01)
+        self.assertAlmostEqual(found.ld_h / true.ld_h, 1.0, delta=0.01)
+        self.assertAlmostEqual(found.kphi_v_per_krpm / true.kphi_v_per_krpm, 1.0, delta=0.01)
+        self.assertFalse(found.salient)
+
+    def test_plots_and_header_are_there(self):
+        for name in ("resistance.png", "inductance.png", "back_emf.png"):
+            self.assertGreater((self.folder / name).stat().st_size, 10000, name)
+        self.assertIn("#define NOPOLESPAIRS 5\n", (self.folder / "userparams.h").read_text(encoding="utf-8"))
+
+
+class Verdict(unittest.TestCase):
+    """Made-up measurements: the comparison itself."""
+
+    def item(self, watch: dict, fault: str = "NONE", **changes) -> identify.Identified:
+        board, motor = board_file.load("mclv"), motor_file.load(NAME)
+        values = {"motor.rs_ohm": 2.67, "motor.ld_h": 1.92e-3, "motor.lq_h": 1.92e-3, "motor.psi_vs": 7.983e-3, "motor.pole_pairs": 5,
+                  "motor.r_tempco": 0.0039, "motor.psi_tempco": -0.002} | changes
+        full = {"step": 0, "result": 2, "Rs_mohm": 2692, "Ld_uH": 1920, "Lq_uH": 1920, "Kphi_mV_per_krpm": 7240} | watch
+        measured = identify.Measured(full, fault, [(0.0, 0)], None)
+        return identify.Identified(motor, board, identify.Known(5, 1.5, 1000.0), "", values, measured)
+
+    def test_true_values_pass(self):
+        self.assertEqual(self.item({}).problems(), [])
+
+    def test_each_limit_is_kept(self):
+        for name, just, beyond in (("Rs_mohm", 2692 + 80, 2692 + 81), ("Ld_uH", 2015, 2017), ("Lq_uH", 1825, 1823),
+                                   ("Kphi_mV_per_krpm", 7384, 7386)):
+            self.assertEqual(self.item({name: just}).problems(), [], name)
+            self.assertEqual(len(self.item({name: beyond}).problems()), 1, name)
+
+    def test_a_hot_motor_has_other_true_values(self):
+        self.assertEqual(len(self.item({}, **{"motor.temp_c": 75.0}).problems()), 2)
+        hot = {"Rs_mohm": round(2670 * 1.195 + 22.5), "Kphi_mV_per_krpm": round(7240 * 0.9)}
+        self.assertEqual(self.item(hot, **{"motor.temp_c": 75.0}).problems(), [])
+
+    def test_salient_motors_get_both_inductances(self):
+        self.assertIn("inductance = { value = 1.93,", self.item({"Lq_uH": 1940}).paste())
+        lines = self.item({"Lq_uH": 2500}).paste()
+        self.assertIn("inductance_d = { value = 1.92,", lines)
+        self.assertIn("inductance_q = { value = 2.5,", lines)
+
+    def test_another_end_is_one_line_with_the_remedy(self):
+        (line,) = self.item({"result": 9}).problems()
+        self.assertIn("VOLTAGE_LIMIT", line)
+        self.assertIn("lower END_SPEED_RPM", line)
+        (line,) = self.item({"result": 3}, "OVERCURRENT_SW").problems()
+        self.assertIn("fault OVERCURRENT_SW", line)
+
+
+class Refused(unittest.TestCase):
+    def refused(self, *arguments: str) -> str:
+        code, out, error = command("identify", *arguments)
+        self.assertEqual((code, out), (2, ""))
+        self.assertEqual(error.count("\n"), 1)
+        return error
+
+    def test_no_motor_or_two_kinds(self):
+        self.assertIn("which motor?", self.refused())
+        self.assertIn("which motor?", self.refused(NAME, "--all"))
+
+    def test_unknown_motor(self):
+        self.assertIn("no motor 'hurst'", self.refused("hurst"))
+
+    def test_impossible_current_and_speed(self):
+        self.assertIn("current = 0.01 is impossible", self.refused(NAME, "--current", "0.01"))
+        self.assertIn("speed = 9000 is impossible", self.refused(NAME, "--speed", "9000"))
+
+    def test_a_current_beyond_the_board_is_named_by_the_build(self):
+        self.assertIn("MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A", self.refused(NAME, "--current", "4.2"))
+
+    def test_one_folder_for_all(self):
+        self.assertIn("one folder", self.refused("--all", "--out", "x"))
+
+    def test_unknown_key(self):
+        self.assertIn("unknown key 'load.lock'", self.refused(NAME, "--set", "load.lock=1"))
+        with self.assertRaises(UserError):
+            identify.identify([NAME], "mclv", plant.Values({"no.key": 1.0}, {}))
+
+
+if __name__ == "__main__":
+    unittest.main()

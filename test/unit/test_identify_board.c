@@ -1,0 +1,78 @@
+/* What the board shows of an identification: the status line and the watch variable. */
+/* defines: -DIDENTIFY */
+#include "hurst_params.h"
+
+#include "firmware/board/status.c"
+#include "firmware/board/watch.c"
+
+#include "drive/params_init.h"
+#include "mock_peripherals.h"
+#include "unity.h"
+
+drive_t board_drive;
+const drive_params_t board_params = DRIVE_PARAMS_INIT;
+
+static char sent[256];
+static uint16_t sent_count;
+
+static uint16_t take(char c, int calls)
+{
+    (void)calls;
+    sent[sent_count++] = c;
+    sent[sent_count] = '\0';
+    return 1;
+}
+
+void setUp(void)
+{
+    static const drive_t zero;
+    board_drive = zero;
+    sent_count = 0;
+    uart_send_Stub(take);
+    status_init();
+}
+
+void tearDown(void)
+{
+}
+
+static void expect_line(const char *text)
+{
+    uint16_t n;
+    status_tick(500);
+    for (n = 0; n < 200u; n++) {
+        status_send();
+    }
+    TEST_ASSERT_EQUAL_STRING(text, sent);
+}
+
+void test_line_before_the_first_measurement(void)
+{
+    expect_line("step 0 NONE fault 0 R 0 mohm Ld 0 uH Lq 0 uH Kphi 0 mV/krpm\r\n");
+}
+
+void test_line_with_the_largest_numbers_fits(void)
+{
+    identify_values_t all = { 65535u, 65535u, 65535u, 65535u };
+    board_drive.identify.step = IDENTIFY_SPIN_FULL;
+    board_drive.identify.result = IDENTIFY_RESULT_CURRENT_NOT_REACHED;
+    board_drive.identify.values = all;
+    board_drive.fault = FAULT_TRAP;
+    expect_line("step 11 CURRENT_NOT_REACHED fault 12 R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm\r\n");
+    TEST_ASSERT_TRUE(sent_count < sizeof line);
+}
+
+void test_watch_variable_shows_all_of_it(void)
+{
+    identify_values_t all = { 2692, 1919, 1920, 40000u };
+    board_drive.identify.step = IDENTIFY_INDUCTANCE_Q;
+    board_drive.identify.result = IDENTIFY_RESULT_BUSY;
+    board_drive.identify.values = all;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INDUCTANCE_Q, IdentifyParm.step);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, IdentifyParm.result);
+    TEST_ASSERT_EQUAL_UINT16(2692, IdentifyParm.Rs_mohm);
+    TEST_ASSERT_EQUAL_UINT16(1919, IdentifyParm.Ld_uH);
+    TEST_ASSERT_EQUAL_UINT16(1920, IdentifyParm.Lq_uH);
+    TEST_ASSERT_EQUAL_UINT16(40000u, IdentifyParm.Kphi_mV_per_krpm);
+}
