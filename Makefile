@@ -36,7 +36,7 @@ compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFI
 firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c) tools/host/xc.c)
 board_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/board/*.c))
 
-part_makefiles := $(wildcard test/*/*.mk)
+part_makefiles := $(wildcard test/*/*.mk tools/*/*.mk firmware/*.mk)
 
 quiet := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-4s %s\n' $1 $2;)
@@ -83,7 +83,7 @@ starts: setup-run ## starts from every rotor angle under several loads [MOTOR=na
 
 motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 and 100 % of rated speed at half the rated torque [OUT=folder]
 	@$(tuner) tune --all --brief
-	@$(front_end) rated $(out)
+	@$(front_end) rated --out $(call quoted,$(or $(OUT),build/run/motors))
 
 robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTOR=name OUT=folder]
 	@$(ready)
@@ -98,8 +98,8 @@ tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and
 tune-fw: setup-run ## field-weakening tables found on the virtual board, into tuning/tables/NAME.toml [MOTOR=name OUT=folder]
 	@$(tuner) tune-fw $(tune_motor) $(out)
 
-identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=name OUT=folder]
-	@$(tuner) identify $(tune_motor) $(out)
+identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=name or all, OUT=folder]
+	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(out)
 
 userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old [MOTOR=name]
 	@$(tuner) tune $(tune_motor) --brief
@@ -113,9 +113,8 @@ setup-tune:
 
 .PHONY: readme bench
 readme: ## run what the README's tables and pictures show, and write them into it
-	@$(MAKE) -s run SCENARIO=demo OUT= >build/readme.log && $(MAKE) -s run SCENARIO=stop_from_top OUT= >>build/readme.log && \
-	    $(MAKE) -s run SCENARIO=fault_stall OUT= >>build/readme.log && $(MAKE) -s table2 OUT= >>build/readme.log && \
-	    $(MAKE) -s starts OUT= >>build/readme.log || { tail -n 3 build/readme.log >&2; exit 1; }
+	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all"; do \
+	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
 	@$(python) tools/readme.py
 
 bench: vboard ## how many motor seconds the virtual board simulates in a second of one core
@@ -163,7 +162,8 @@ check_py := $(call py_tests,unit,check)
 unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
 modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
 
-quick_suites := $(check_py) $(unit_c) $(board_c) $(filter tools/%,$(unittest_py))
+slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design
+quick_suites := $(check_py) $(unit_c) $(board_c) $(filter-out $(slow_suites),$(filter tools/%,$(unittest_py)))
 all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) golden/unchanged warnings/default $(modes:%=warnings/%)
 
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
@@ -184,7 +184,7 @@ test-quick: setup-test ## the tests for the edit loop, under 30 s [ONLY="test_pi
 # In one go and in sight; each check's own target looks again for what it alone needs.
 setup-checks: setup-test
 	@$(if $(ONLY),:,test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
-	    avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev)
+	    avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev soffice=libreoffice-calc-nogui)
 
 setup-test:
 	@tools/setup/prepare.sh test

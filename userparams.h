@@ -1,8 +1,14 @@
 /* Everything a user edits, in engineering units: the motor, the supply, limits, start, control loops and field weakening.
  *
- * Each line states unit, range and meaning; a value outside its range fails the build by name. No number here is computed:
- * the Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE, NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these
- * in include/drive/params.h. A motor's values come from tuning/motors/; change them here to tune. */
+ * Made from tuning/motors/hurst_dmb0224c10002.toml and tuning/boards/mclv.toml by: make tune MOTOR=hurst_dmb0224c10002
+ * (make userparams MOTOR=hurst_dmb0224c10002 writes it to userparams.h). Field weakening: tuning/tables/hurst_dmb0224c10002.toml, found on the virtual board by make tune-fw.
+ *
+ * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep
+ * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,
+ * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/params.h; the table at the end shows them.
+ *
+ * Note: 24 V are too low for the rated torque at rated speed: about 0.063 N m of 0.08 N m at 2800 rpm; raise the supply voltage,
+ * or lower the rated speed to 2300 rpm */
 #ifndef USERPARAMS_H
 #define USERPARAMS_H
 
@@ -13,78 +19,77 @@
 /* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's middle is zero; S3 has no function */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
 
-/* ---- Motor: Hurst DMB0224C10002 (NT Dynamo), star, values per phase ------------------------------------------------ */
+/* ---- Motor: Hurst DMB0224C10002, star, values per phase of the star ----------------------------------------------- */
 #define NOPOLESPAIRS 5              /* [pairs]         1 .. 50        pole pairs */
 #define MOTOR_RS_OHM 2.67           /* [ohm]           0.01 .. 40     phase resistance: half of line to line */
 #define MOTOR_LS_MH 1.92            /* [mH]            0.01 .. 30     phase inductance: half of line to line */
 #define MOTOR_KPHI_V_PER_KRPM 7.24  /* [V peak/krpm]   0.2 .. 200     line-to-line back-EMF per 1000 mechanical rpm */
 #define MOTOR_INERTIA_KGM2 5.5e-6   /* [kg m2]         1e-8 .. 0.1    rotor and whatever turns with it; scales the speed loop */
 
-/* ---- Supply and board ---------------------------------------------------------------------------------------------- */
+/* ---- Supply and board: dsPICDEM MCLV, 24 V supply ----------------------------------------------------------------- */
 #define NOMINAL_BUS_V 24.0          /* [V]             10 .. 48       supply; the unit of voltage follows from it */
-#define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.00014  PWM and control period */
-#define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003  dead time of the bridge */
-#define NORM_CURRENT_CONST 0.0001342773 /* [A/count]   0.00001 .. 0.002  current of one count: full scale / 32768 (MCLV: 4.4 A); calibrate with a probe */
-#define KCURRA -0.5                 /* [1]             -0.6 .. 0.6     gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
-#define KCURRB -0.5                 /* [1]             -0.6 .. 0.6     gain of phase B's current */
-#define BUS_FULL_SCALE_V 52.8       /* [V]             20 .. 200      bus voltage that gives 3.3 V at the converter (divider 1:16) */
-#define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004  low sides on for this long on each side of the sample's centre */
+#define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.00014 PWM and control period */
+#define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003 dead time of the bridge */
+#define NORM_CURRENT_CONST 0.0001342773 /* [A/count]       0.00001 .. 0.002 current of one count: full scale / 32768 (here 4.4 A); calibrate with a probe */
+#define KCURRA -0.5                 /* [1]             -0.6 .. 0.6    gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
+#define KCURRB -0.5                 /* [1]             -0.6 .. 0.6    gain of phase B's current */
+#define BUS_FULL_SCALE_V 52.8       /* [V]             20 .. 200      bus voltage that gives full scale at the converter */
+#define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004 low sides on for this long on each side of the sample's centre */
 
-/* ---- Speeds ---------------------------------------------------------------------------------------------------------- */
+/* ---- Speeds ------------------------------------------------------------------------------------------------------- */
 #define MINIMUM_SPEED_RPM 500       /* [rpm]           50 .. 10000    potentiometer at zero */
 #define NOMINAL_SPEED_RPM 2800      /* [rpm]           100 .. 20000   potentiometer at full scale, S3 off; the estimator's derivative changes here */
 #define MAXIMUM_SPEED_RPM 5500      /* [rpm]           100 .. 30000   potentiometer at full scale, S3 on */
 #define SPEEDREFRAMP_RPM_PER_S 4000 /* [rpm/s]         1 .. 60000     slope of the speed reference */
 #define TUNING_DELAY_RAMPUP 0xF     /* [periods]       0 .. 4095      TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods */
 
-/* ---- Start: lock, ramp, hand-over ------------------------------------------------------------------------------------- */
-#define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each) */
-#define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over */
-#define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000  acceleration of the ramp; 10 = 715 rpm/s with 5 pole pairs */
-#define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of lock and ramp */
+/* ---- Start: lock, ramp, hand-over --------------------------------------------------------------------------------- */
+#define LOCK_TIME 4000              /* [periods]       200 .. 32000   0.2 s: rotor held at a fixed angle (two directions, half the time each) */
+#define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over (back-EMF 4.18 V) */
+#define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
+#define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of lock and ramp: pull-out torque 0.0844 N m */
 
-/* ---- Limits and protections ------------------------------------------------------------------------------------------- */
+/* ---- Limits and protections --------------------------------------------------------------------------------------- */
 #define MAXIMUM_CURRENT_A 2.75      /* [A peak]        0.1 .. 20      length of the current vector that the drive may ask for */
-#define OVER_CURRENT_THRESHOLD_A 3.8 /* [A peak]       0.1 .. 40      any phase above trips at once; must lie inside the converter's range */
+#define OVER_CURRENT_THRESHOLD_A 3.8 /* [A peak]        0.1 .. 40      any phase above trips at once; must lie inside the converter's range */
 #define OVER_VOLTAGE_V 34.0         /* [V]             12 .. 100      bus above trips */
 #define UNDER_VOLTAGE_V 12.0        /* [V]             5 .. 45        bus below trips while running */
 #define REGEN_LIMIT_V 27.0          /* [V]             11 .. 90       braking current is reduced from here, to nothing 2 V higher */
 
-/* ---- Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h ------ */
-#define CURRENT_BANDWIDTH_HZ 800    /* [Hz]            20 .. 2000     both current loops */
-#define SPEED_BANDWIDTH_HZ 18       /* [Hz]            0.2 .. 60      speed loop; the estimator is slower the slower the motor turns, so above 20 the speed hunts below 1000 rpm */
+/* ---- Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h - */
+#define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
+#define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 60 degrees, 60 over the parameter set */
 
-/* ---- Filters, Equation 7: K in Q15 per period ---------------------------------------------------------------------------- */
-#define KFILTER_ESDQ 1200           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM; 1200 = 118 Hz */
-#define KFILTER_ESDQ_FW 1200        /* [Q15]           10 .. 8000     back-EMF above */
-#define KFILTER_VELESTIM 748        /* [Q15]           10 .. 8000     speed for loop, thresholds and display; 748 = 73 Hz */
+/* ---- Filters, Equation 7: K in Q15 per period --------------------------------------------------------------------- */
+#define KFILTER_ESDQ 1200           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM: 119 Hz */
+#define KFILTER_ESDQ_FW 1200        /* [Q15]           10 .. 8000     back-EMF above: 119 Hz */
+#define KFILTER_VELESTIM 748        /* [Q15]           10 .. 8000     speed for loop, thresholds and display: 74 Hz */
 
-/* ---- Field weakening: one entry every 1024 electrical rpm (204.8 rpm with 5 pole pairs) of speed reference ----------------- */
-#define FW_START_SPEED_RPM 2600     /* [rpm]           100 .. 20000   speed reference of entry 0 */
-#define FW_TRIM_CURRENT_A 0.8       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
+/* ---- Field weakening: one entry every 1024 electrical rpm (204.8 rpm with 5 pole pairs) of speed reference -------- */
+#define FW_START_SPEED_RPM 2640     /* [rpm]           100 .. 20000   speed reference of entry 0 */
+#define FW_TRIM_CURRENT_A 1.0       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
 
-#define IDREF_SPEED0     0.00          /* [A]            -20 .. 0        d current of each entry */
-#define IDREF_SPEED1     0.00
-#define IDREF_SPEED2    -0.20
-#define IDREF_SPEED3    -0.47
-#define IDREF_SPEED4    -0.73
-#define IDREF_SPEED5    -0.98
-#define IDREF_SPEED6    -1.20
-#define IDREF_SPEED7    -1.42
-#define IDREF_SPEED8    -1.60
-#define IDREF_SPEED9    -1.78
-#define IDREF_SPEED10   -1.95
-#define IDREF_SPEED11   -2.10
-#define IDREF_SPEED12   -2.25
-#define IDREF_SPEED13   -2.38
-#define IDREF_SPEED14   -2.50
-#define IDREF_SPEED15   -2.60
-#define IDREF_SPEED16   -2.65
-#define IDREF_SPEED17   -2.65
+#define IDREF_SPEED0   0.00               /* [A]             -20 .. 0       d current of each entry */
+#define IDREF_SPEED1  -0.28
+#define IDREF_SPEED2  -0.52
+#define IDREF_SPEED3  -0.78
+#define IDREF_SPEED4  -1.03
+#define IDREF_SPEED5  -1.26
+#define IDREF_SPEED6  -1.48
+#define IDREF_SPEED7  -1.53
+#define IDREF_SPEED8  -1.59
+#define IDREF_SPEED9  -1.76
+#define IDREF_SPEED10 -1.92
+#define IDREF_SPEED11 -2.07
+#define IDREF_SPEED12 -2.22
+#define IDREF_SPEED13 -2.36
+#define IDREF_SPEED14 -2.48
+#define IDREF_SPEED15 -2.60
+#define IDREF_SPEED16 -2.66
+#define IDREF_SPEED17 -2.66
 
-/* 1/Kphi of each entry, in the note's counts. The back-EMF keeps its size above base speed here (it has the range), so a
- * constant Kphi is the right start; the note's rising table made up for a clipped one. More turns the control angle ahead. */
-#define INVKFI_SPEED0  NORM_INVKFIBASE   /* [Q15/2]         2048 .. 32767  1/Kphi of each entry */
+/* 1/Kphi of each entry, in the note's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */
+#define INVKFI_SPEED0  NORM_INVKFIBASE    /* [Q15/2]         2048 .. 32767  1/Kphi of each entry */
 #define INVKFI_SPEED1  NORM_INVKFIBASE
 #define INVKFI_SPEED2  NORM_INVKFIBASE
 #define INVKFI_SPEED3  NORM_INVKFIBASE
@@ -103,27 +108,115 @@
 #define INVKFI_SPEED16 NORM_INVKFIBASE
 #define INVKFI_SPEED17 NORM_INVKFIBASE
 
-#define LS_OVER2LS0_SPEED0  0.5     /* [1]             0.1 .. 0.6     Ls / (2 Ls0) of each entry; 0.5 = no change */
-#define LS_OVER2LS0_SPEED1  0.5
-#define LS_OVER2LS0_SPEED2  0.5
-#define LS_OVER2LS0_SPEED3  0.5
-#define LS_OVER2LS0_SPEED4  0.5
-#define LS_OVER2LS0_SPEED5  0.5
-#define LS_OVER2LS0_SPEED6  0.5
-#define LS_OVER2LS0_SPEED7  0.5
-#define LS_OVER2LS0_SPEED8  0.5
-#define LS_OVER2LS0_SPEED9  0.5
-#define LS_OVER2LS0_SPEED10 0.5
-#define LS_OVER2LS0_SPEED11 0.5
-#define LS_OVER2LS0_SPEED12 0.5
-#define LS_OVER2LS0_SPEED13 0.5
-#define LS_OVER2LS0_SPEED14 0.5
-#define LS_OVER2LS0_SPEED15 0.5
-#define LS_OVER2LS0_SPEED16 0.5
-#define LS_OVER2LS0_SPEED17 0.5
+#define LS_OVER2LS0_SPEED0   0.5          /* [1]             0.1 .. 0.6     Ls / (2 Ls0) of each entry; 0.5 = no change */
+#define LS_OVER2LS0_SPEED1   0.5
+#define LS_OVER2LS0_SPEED2   0.5
+#define LS_OVER2LS0_SPEED3   0.5
+#define LS_OVER2LS0_SPEED4   0.5
+#define LS_OVER2LS0_SPEED5   0.5
+#define LS_OVER2LS0_SPEED6   0.5
+#define LS_OVER2LS0_SPEED7   0.5
+#define LS_OVER2LS0_SPEED8   0.5
+#define LS_OVER2LS0_SPEED9   0.5
+#define LS_OVER2LS0_SPEED10  0.5
+#define LS_OVER2LS0_SPEED11  0.5
+#define LS_OVER2LS0_SPEED12  0.5
+#define LS_OVER2LS0_SPEED13  0.5
+#define LS_OVER2LS0_SPEED14  0.5
+#define LS_OVER2LS0_SPEED15  0.5
+#define LS_OVER2LS0_SPEED16  0.5
+#define LS_OVER2LS0_SPEED17  0.5
 
-/* ---- Snapshot ------------------------------------------------------------------------------------------------------------- */
+/* ---- Snapshot ----------------------------------------------------------------------------------------------------- */
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
+
+/* ---- What the firmware makes of these numbers: engineering value, its count, and how much rounding changes it -----
+ * U0 = 0.000405949 V and I0 = 0.000134277 A per count of Q15 (full scale 13.3 V, 4.4 A)
+ *
+ * motor
+ *   NORM_RS                              2.67 ohm             14470  Q15 / 2                     +0.002 %  Equation 5, the note's constant
+ *   NORM_LSDTBASE                        1.92 mH               1626  Q15 / 256                   +0.011 %  Equation 5, the note's constant
+ *   NORM_INVKFIBASE                      7.24 V/krpm           7956  Q15 / 2, 1/Kphi             +0.002 %  Equation 6
+ *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, the note's constant
+ *   estimator.rs_q16                     2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
+ *   estimator.rs_exp                        1 1                   0  count                          exact  the product is shifted left by it
+ *   fieldweak.ls_base_q16                1.92 mH              52026  Q16 / 1                     -0.000 %  L of the estimator, eight samples
+ *   estimator.ls_exp                        1 1                   0  count                          exact  the product is shifted left by it
+ *
+ * estimator
+ *   estimator.deltat_q32                5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
+ *   estimator.half_step_q16_rad       2.5e-05 s               11244  Q16 rad/erpm                -0.002 %  half of it
+ *   estimator.d_ilimit_ls_q14          1.6127 A                6005  Q14 A                       -0.001 %  D_ILIMIT_LS: change in eight periods
+ *   estimator.d_ilimit_hs_q14         0.39597 A                1474  Q14 A                       -0.031 %  D_ILIMIT_HS: change in a period
+ *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in the note's format
+ *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in the note's format
+ *   fieldweak.kfilter_esdq_q16         118.76 Hz               2400  Q16 a period                   exact  Equation 7
+ *   fieldweak.kfilter_esdq_fw_q16      118.76 Hz               2400  Q16 a period                   exact  Equation 7
+ *   estimator.kfilter_velestim_q16     73.503 Hz               1496  Q16 a period                   exact  Equation 7
+ *
+ * speeds
+ *   minimum_erpm                          500 rpm              2500  erpm                           exact  potentiometer at zero
+ *   nominal_erpm                         2800 rpm             14000  erpm                           exact  potentiometer at full scale, S3 off
+ *   maximum_erpm                         5500 rpm             27500  erpm                           exact  potentiometer at full scale, S3 on
+ *   end_erpm                             1000 rpm              5000  erpm                           exact  end of the ramp
+ *   fieldweak.on_speed_erpm              2640 rpm             13200  erpm                           exact  field weakening starts
+ *   estimator.nominal_erpm               2800 rpm             14000  erpm                           exact  one-sample derivative above
+ *   estimator.decimate_erpm               280 rpm              1400  erpm                           exact  sign of Equation 2 from the filtered speed below
+ *   speed_ramp_erpm                      4000 rpm/s               8  erpm in 8 periods              exact  slope of the reference, rounded up
+ *   tuning_step_q16                        15 periods         32768  Q16 erpm in 8 periods          exact  slope in TUNING
+ *   ramp_hold_erpm                        350 rpm              1750  erpm                           exact  the ramp waits when the motor is further behind
+ *   overspeed_erpm                       6540 rpm             32700  erpm                           exact  lost lock above
+ *
+ * current and speed controllers
+ *   pi_d.kp                            12.064 V/A              8172  Q15 / 16                    -0.003 %  proportional gain
+ *   pi_d.ki                             16776 V/(A s)           568  Q11 a period                -0.040 %  integral gain
+ *   pi_d.kc                             0.999 1               32734  Q15                         -0.004 %  anti-windup
+ *   pi_q.kp                            12.064 V/A              8172  Q15 / 16                    -0.003 %  proportional gain
+ *   pi_q.ki                             16776 V/(A s)           568  Q11 a period                -0.040 %  integral gain
+ *   pi_q.kc                             0.999 1               32734  Q15                         -0.004 %  anti-windup
+ *   pi_speed.kp                    0.00078573 A/rpm            2397  Q15 / 16                    +0.008 %  proportional gain
+ *   pi_speed.ki                      0.021393 A/(rpm s)          26  Q14 in 8 periods            -0.395 %  integral gain
+ *   pi_speed.kc                         0.999 1               32734  Q15                         -0.004 %  anti-windup
+ *
+ * start
+ *   forced.end_speed_q10                 1000 rpm            279620  Q10 angle counts a period   -0.000 %  end of the ramp
+ *   forced.increase_rate_q10           715.26 rpm/s              10  Q10 counts/period^2            exact  acceleration
+ *   lock_periods                          0.2 s                4000  periods                        exact  lock
+ *   lock_sweep_q32                        900 deg/s          536870  Q32 of a turn a period         exact  first half of the lock
+ *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
+ *   bootstrap_periods                    0.01 s                 200  periods                        exact  low sides on before the start
+ *   ready_slots                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
+ *   ready_timeout_slots                   0.2 s                 500  8 periods                      exact  and how long it may take
+ *
+ * limits
+ *   current_max_q13                      2.75 A                5120  Q13 A                       -0.000 %  current vector that is asked for
+ *   overcurrent_q13                       3.8 A                7075  Q13 A                       +0.001 %  phase current that trips
+ *   fieldweak.trim_max_q13                  1 A                1862  Q13 A                       +0.010 %  most that the voltage feedback adds
+ *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal
+ *   bus_over_q15                           34 V               21101  Q15 of full scale           +0.002 %  trips
+ *   bus_under_q15                          12 V                7447  Q15 of full scale           -0.004 %  trips
+ *   bus_regen_q15                          27 V               16756  Q15 of full scale           -0.002 %  braking is reduced from here
+ *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
+ *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
+ *   stall_slots                           0.3 s                 750  8 periods                      exact  stall
+ *   lost_lock_slots                      0.05 s                 125  8 periods                      exact  lost lock
+ *
+ * modulator and bus
+ *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %
+ *   svm.top                              93.6 %                1872  duty                           exact  highest duty: sampling window
+ *   svm.dead_time                           2 us                 80  25 ns                          exact  dead-time compensation
+ *   svm.knee_q13                     0.047266 A                  88  Q13 A                          exact  current from which it is full
+ *   svm.dead_slope_q16                0.90909 1               59578  Q16                            exact  duty per current
+ *   svm.turn_q13                      0.39597 A                 737  Q13 A                          exact  most that a current turns in a period
+ *   voltage_limit_per_bus_q16          0.5404 V/V             35143  Q14 V per Q16 bus           -0.002 %  voltage circle
+ *   duty_per_volt_numerator              52.8 V           264172656  Q32                         +0.000 %  duty per volt at bus 1
+ *   kcurr_a                              -0.5 1              -16384  Q15                            exact  gain of the samples
+ *   kcurr_b                              -0.5 1              -16384  Q15                            exact  gain of the samples
+ *
+ * field weakening
+ *   fieldweak.margin_q14                 0.24 V                 296  Q14 V                       +0.134 %  voltage kept free before the feedback acts
+ *   fieldweak.trim_speed_erpm            1584 rpm              7920  erpm                           exact  speed from which it acts
+ */
 
 #endif

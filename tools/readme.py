@@ -8,11 +8,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
-PICTURES = {"demo/speed.png": "demo-speed.png", "demo/field_weakening.png": "demo-field-weakening.png"}
+PICTURES = {"run/demo/speed.png": "demo-speed.png", "run/demo/field_weakening.png": "demo-field-weakening.png",
+            "tune-fw/hurst_dmb0224c10002/over_speed.png": "tuning-fw.png", "run/robust/margins.png": "tuning-margins.png"}
 
 
-def result(name: str) -> dict:
-    path = ROOT / "build/run" / name / "summary.json"
+def result(name: str, folder: str = "run") -> dict:
+    path = ROOT / "build" / folder / name / "summary.json"
     try:
         return json.loads(path.read_text())
     except OSError:
@@ -39,8 +40,25 @@ def table2() -> str:
     return table(["reference", "torque", "note: rpm", "ours", "note: current RMS", "ours", "angle error RMS", "of the voltage limit"], rows)
 
 
+def motors() -> str:
+    """A line for each motor of tuning/motors: what it was measured to do with its own header."""
+    by_motor: dict[str, list[dict]] = {}
+    for row in result("motors")["rows"]:
+        by_motor.setdefault(row["motor"], []).append(row)
+    rows = []
+    for motor, cases in by_motor.items():
+        held = [case for case in cases if case["torque_nm_set"] > 0.0]
+        found = {row["name"].split(" [")[0]: row["error_percent"] for row in result(motor, "identify")["rows"]}
+        rows.append([motor, " / ".join(f"{case['speed_rpm']:.0f}" for case in held), f"{max(abs(case['speed_error_percent']) for case in held):.2f} %",
+                     f"{max(case['angle_error_rms_deg'] for case in held):.1f}°", f"{max(case['speed_rpm'] for case in cases):.0f}",
+                     " / ".join(f"{found[name]:+.1f}" for name in ("R winding", "Ld", "Lq", "Kphi"))])
+    return table(["motor", "20 / 50 / 100 % of rated speed, half torque: rpm", "worst error", "worst angle RMS", "no load: rpm",
+                  "IDENTIFY: error of R / Ld / Lq / Kphi in %"], rows)
+
+
 def guarantees() -> str:
     run, top, blocked, starts = result("demo"), result("stop_from_top"), result("fault_stall"), result("starts")
+    robust, weakening = result("robust"), result("hurst_dmb0224c10002", "tune-fw")
     hand_over = run["hand_overs"][0]
     worst_speed = max(abs(m["speed_error_percent"]) for m in run["measures"])
     worst_angle = max(m["angle_error_rms_deg"] for m in run["measures"])
@@ -55,6 +73,9 @@ def guarantees() -> str:
         ["starts from every rotor angle with 0, 0.03 and 0.06 N·m", f"{held} of {len(starts['expectations'])}", "`make starts`"],
         ["Table 2 of the note: every row at its reference, at the row's torque",
          f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
+        ["twice the base speed without load", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
+        ["starts and holds half speed with true R ±30 %, L ±30 %, Kphi ±15 %",
+         f"{sum(e['ok'] for e in robust['expectations'])} of {len(robust['expectations'])}", "`make robust`"],
         ["orderly stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
         ["a blocked shaft is a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
         ["the virtual board runs at 20 times real time on one core", f"{run['motor_seconds'] / run['cpu_seconds']:.0f} times", "`make run`"],
@@ -83,7 +104,7 @@ def tests() -> str | None:
 
 def main() -> None:
     text = README.read_text()
-    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("tests", tests)):
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("tests", tests)):
         block = make()
         text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
                               lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)
@@ -91,7 +112,7 @@ def main() -> None:
             sys.exit(f"foc33: marks '<!-- {name} -->' and '<!-- end -->', README.md: found {count} times, put them in once")
     README.write_text(text)
     for source, target in PICTURES.items():
-        shutil.copy(ROOT / "build/run" / source, ROOT / "docs" / target)
+        shutil.copy(ROOT / "build" / source, ROOT / "docs" / target)
 
 
 if __name__ == "__main__":

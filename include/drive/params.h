@@ -68,7 +68,7 @@
                            * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
 /* ---- Controllers: gains in the note's units (gain/16 and per-period integral, in full scales) from bandwidths.
- *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/4.
+ *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/3.
  *      Any of them may be defined in userparams.h instead. ---- */
 #define PARAM_KT (1.5F * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / PARAM_SQRT3 * 60.0F / (2000.0F * PARAM_PI)) /* N m per A peak */
 #ifndef D_CURRCNTR_PTERM
@@ -93,8 +93,8 @@
 #define SPEEDCNTR_PTERM (2.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(MOTOR_INERTIA_KGM2) / PARAM_KT \
                          * (2.0F * PARAM_PI / 60.0F) / PARAM_F(NOPOLESPAIRS) / PARAM_F(NORM_CURRENT_CONST) / 16.0F)
 #endif
-#ifndef SPEEDCNTR_ITERM /* the zero at f/4: Ki per period = 16 Kp 2 pi f/4 Ts */
-#define SPEEDCNTR_ITERM (PARAM_F(SPEEDCNTR_PTERM) * 8.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(LOOPTIME_SEC))
+#ifndef SPEEDCNTR_ITERM /* the zero at f/3: Ki per period = 16 Kp 2 pi f/3 Ts; a slow loop needs its integral for load steps */
+#define SPEEDCNTR_ITERM (PARAM_F(SPEEDCNTR_PTERM) * 32.0F / 3.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(LOOPTIME_SEC))
 #endif
 #ifndef SPEEDCNTR_CTERM
 #define SPEEDCNTR_CTERM 0.999

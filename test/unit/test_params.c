@@ -286,9 +286,9 @@ void test_published_gains_can_be_given_instead(void)
 void test_speed_loop_gains_follow_the_inertia(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
-    /* Kp = 2 pi 25 J/Kt = 0.014429 A s/rad = 0.56265 counts Q13 per electrical rpm, times 2^13; Ki = Kp 2 pi 25/4 400 us */
+    /* Kp = 2 pi 25 J/Kt = 0.014429 A s/rad = 0.56265 counts Q13 per electrical rpm, times 2^13; Ki = Kp 2 pi 25/3 400 us */
     TEST_ASSERT_INT16_WITHIN(2, 4609, p.pi_speed.kp);
-    TEST_ASSERT_INT16_WITHIN(1, 72, p.pi_speed.ki);
+    TEST_ASSERT_INT16_WITHIN(1, 96, p.pi_speed.ki);
     TEST_ASSERT_EQUAL_UINT16(13, p.pi_speed.shift);
     TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
 }

@@ -132,9 +132,9 @@ void test_current_controllers_cancel_the_motors_pole(void)
 
 void test_speed_controller_has_its_bandwidth(void)
 {
-    /* Kp = 2 pi 25 Hz J / Kt = 0.3020 mA per erpm = 0.5622 counts << 13; zero at 6.25 Hz, 400 us steps */
+    /* Kp = 2 pi 25 Hz J / Kt = 0.3020 mA per erpm = 0.5622 counts << 13; zero at 8.33 Hz, 400 us steps */
     TEST_ASSERT_INT16_WITHIN(10, 4607, params.pi_speed.kp);
-    TEST_ASSERT_INT16_WITHIN(1, 72, params.pi_speed.ki);
+    TEST_ASSERT_INT16_WITHIN(1, 96, params.pi_speed.ki);
     TEST_ASSERT_EQUAL_UINT16(13, params.pi_speed.shift);
 }
 

@@ -1,0 +1,524 @@
+"""The field-weakening tuner: its parts with made-up motors, the tables file, and parameters that change while the motor turns."""
+
+import math
+import tempfile
+import unittest
+from dataclasses import replace
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+from tools.foc33 import board_file, build, motor_file, places, plant
+from tools.foc33.board import BoardError, Library
+from tools.foc33.errors import UserError
+from tuning import fw_search, fw_tables, fw_tune
+from tuning.fw_bench import SIGNALS, Bench, Fault, Point, reduced
+from tuning.fw_search import Goal, Search, correction, largest, least, model_current, model_use, peak, voltage_limit
+from tuning.fw_tables import ENTRIES, Entry, Tables
+
+HURST = "hurst_dmb0224c10002"
+HEADER = (places.ROOT / "userparams.h").read_text(encoding="utf-8")
+PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR_KPHI_V_PER_KRPM": 7.24, "NOMINAL_BUS_V": 24.0,
+          "LOOPTIME_SEC": 50e-6, "DEADTIME_SEC": 2e-6, "SAMPLE_WINDOW_SEC": 1.6e-6, "MAXIMUM_CURRENT_A": 2.75, "INVKFI_SPEED0": 7956.0,
+          "END_SPEED_RPM": 1000.0, "MINIMUM_SPEED_RPM": 500.0, "MAXIMUM_SPEED_RPM": 6400.0}
+GOAL = Goal(0.97, 3.0, 2.66, 2.66, 0.08, 2800.0, 0.2, 5500.0)
+
+
+class Least(unittest.TestCase):
+    def test_finds_the_threshold_from_every_guess(self):
+        for low, high in ((0, 0), (0, 1), (0, 37), (5, 30)):
+            for threshold in range(low, high + 1):
+                for guess in range(low - 3, high + 4):
+                    self.assertEqual(least(lambda n: n >= threshold, guess, low, high), threshold, (low, high, threshold, guess))
+
+    def test_none_where_nothing_suffices(self):
+        for guess in range(-2, 40):
+            self.assertIsNone(least(lambda n: False, guess, 0, 37))
+
+    def test_asks_each_value_once_and_not_outside(self):
+        for threshold in range(0, 200, 7):
+            asked = []
+            least(lambda n: asked.append(n) or n >= threshold, 40, 0, 200)
+            self.assertEqual(len(asked), len(set(asked)))
+            self.assertTrue(all(0 <= n <= 200 for n in asked))
+            self.assertLess(len(asked), 20)
+
+    def test_a_guess_that_is_right_costs_little(self):
+        asked = []
+        least(lambda n: asked.append(n) or n >= 100, 100, 0, 266)
+        self.assertLessEqual(len(asked), 4)
+
+
+class Peak(unittest.TestCase):
+    def test_finds_the_top_of_a_hill(self):
+        for top in range(0, 267, 11):
+            known = {0: -float(top), 266: top - 266.0}
+            self.assertLessEqual(abs(peak(lambda n: -abs(n - top), known, 0, 266) - top), 4, top)
+
+    def test_the_end_of_a_rising_line_is_its_top(self):
+        self.assertEqual(peak(float, {}, 0, 266), 266)
+
+    def test_uses_what_is_known(self):
+        asked = []
+        known = {n: -abs(n - 100.0) for n in range(0, 201, 4)}
+        self.assertEqual(peak(lambda n: asked.append(n) or 0.0, known, 0, 200), 100)
+        self.assertEqual(asked, [])
+
+
+class Largest(unittest.TestCase):
+    def test_halves_towards_the_threshold(self):
+        self.assertAlmostEqual(largest(lambda x: x <= 0.3, 1.0, 10), 0.3, delta=1.0 / 1024)
+
+    def test_the_limit_itself_may_be_good(self):
+        self.assertEqual(largest(lambda x: True, 0.2, 8), 0.2)
+
+    def test_nothing_may_be_good(self):
+        self.assertEqual(largest(lambda x: False, 0.2, 8), 0.0)
+
+
+class Model(unittest.TestCase):
+    def test_voltage_circle_is_the_one_of_the_modulator(self):
+        self.assertAlmostEqual(voltage_limit(PARAMS), 0.936 * 24.0 / math.sqrt(3.0), places=6)
+
+    def test_back_emf_alone_is_kphi_over_root_3(self):
+        self.assertAlmostEqual(model_use(PARAMS, 2000.0, 0.0, 0.0) * voltage_limit(PARAMS), 2.0 * 7.24 / math.sqrt(3.0), places=6)
+
+    def test_voltage_by_hand(self):
+        w = 4000.0 * 5.0 * 2.0 * math.pi / 60.0
+        v_d, v_q = 2.67 * -1.5 - w * 1.92e-3 * 0.4, 2.67 * 0.4 + w * (1.92e-3 * -1.5 + 7.983e-3)
+        self.assertAlmostEqual(model_use(PARAMS, 4000.0, -1.5, 0.4) * voltage_limit(PARAMS), math.hypot(v_d, v_q), places=2)
+
+    def test_least_current_of_the_model_is_least(self):
+        current = model_current(PARAMS, 4000.0, 0.3, 0.97, 3.0)
+        self.assertLessEqual(model_use(PARAMS, 4000.0, -current, 0.3), 0.97)
+        self.assertGreater(model_use(PARAMS, 4000.0, -current + 0.01, 0.3), 0.97)
+
+    def test_correction_is_least_squares(self):
+        self.assertAlmostEqual(correction([2.0, 4.0], [1.0, 1.0]), -3.0)
+        self.assertAlmostEqual(correction([3.0], [-1.5]), 2.0)
+        self.assertEqual(correction([3.0], [0.0]), 0.0)
+
+    def test_load_falls_with_one_over_speed_above_rated_speed(self):
+        self.assertAlmostEqual(GOAL.load_nm(2000.0), 0.016)
+        self.assertAlmostEqual(GOAL.load_nm(5600.0), 0.008)
+
+
+class FakeMotor:
+    """Steady state of a motor with saturation, by its equations; `faults_below` lets it fault where too little d current flows."""
+
+    def __init__(self, saturation: float = 0.0, faults_below: float = 0.0, **params: float) -> None:
+        self.params = {**PARAMS, **params}
+        self.saturation, self.faults_below = saturation, faults_below
+        self.table = [Entry(0.0, 7956.0, 0.5)] * ENTRIES
+        self.values: dict[str, float] = {"FW_START_SPEED_RPM": 3000.0}
+        self.load_nm = self.rpm = 0.0
+        self.starts = 0
+        self.running = False
+
+    def start(self) -> None:
+        self.running, self.rpm = True, 1000.0
+        self.starts += 1
+
+    def stopped(self) -> bool:
+        return not self.running
+
+    def run(self, seconds: float) -> None:
+        pass
+
+    def settle(self) -> None:
+        self.check()
+
+    def load(self, torque_nm: float) -> None:
+        self.load_nm = torque_nm
+
+    def speed(self, rpm: float) -> bool:
+        self.rpm = rpm
+        self.check()
+        return True
+
+    def regain(self) -> bool:
+        self.check()
+        return self.point().held
+
+    def entries_from(self, index: int, entry: Entry) -> None:
+        self.table[index:] = [entry] * (ENTRIES - index)
+
+    def set(self, name: str, value: float) -> None:
+        self.values[name] = value
+
+    def now(self) -> Entry:
+        place = max(0.0, (self.rpm - self.values["FW_START_SPEED_RPM"]) * self.params["NOPOLESPAIRS"] / 1024.0)
+        return self.table[min(round(place), ENTRIES - 1)]
+
+    def inductance(self, id_a: float, iq_a: float) -> float:
+        return self.params["MOTOR_LS_MH"] * 1e-3 * (1.0 - self.saturation * min(1.0, (id_a ** 2 + iq_a ** 2) / 9.0))
+
+    def use(self, entry: Entry) -> tuple[float, float]:
+        iq_a = (self.load_nm + 0.008) / fw_search.torque_per_ampere(self.params)
+        ls_h = self.inductance(entry.idref_a, iq_a)
+        return model_use(self.params, self.rpm, entry.idref_a, iq_a, 0.5 * ls_h / self.params["MOTOR_LS_MH"] * 1e3), iq_a
+
+    def check(self) -> None:
+        if self.running and self.use(self.now())[0] > 1.0 + self.faults_below > 1.0:
+            self.running = False
+            raise Fault("STALL")
+
+    def point(self) -> Point:
+        self.check()
+        entry = self.now()
+        use, iq_a = self.use(entry)
+        psi, ls_h = fw_search.flux_vs(self.params), self.inductance(entry.idref_a, iq_a)
+        wrong_h = ls_h - self.params["MOTOR_LS_MH"] * 1e-3 * 2.0 * entry.ls_ratio
+        angle = math.degrees(1.0 - 7956.0 / entry.inv_kfi / (1.0 + wrong_h * entry.idref_a / psi))
+        speed = self.rpm if use <= 1.0 else self.rpm / use
+        return Point(speed, self.rpm, min(use, 1.0), angle, abs(angle), entry.idref_a, iq_a, 0.7 * math.hypot(entry.idref_a, iq_a), 0.0, 24.0)
+
+
+class Measuring(unittest.TestCase):
+    ROW = {"plant.speed_rpm": 3000.0, "plant.theta_e_deg": 359.0, "plant.i_d": -0.6, "plant.i_q": 0.8, "fw.theta_est_deg": 1.0, "fw.v_d_v": -6.0,
+           "fw.v_q_v": 8.0, "fw.v_limit_v": 12.5, "fw.id_ref_a": -0.6, "fw.id_trim_a": -0.1, "bus.voltage_v": 23.9}
+
+    def point(self, **changes: float) -> Point:
+        row = {**self.ROW, **{name.replace("__", "."): value for name, value in changes.items()}}
+        return reduced(np.tile([row[name] for name in SIGNALS], (4, 1)), 3000.0)
+
+    def test_means(self):
+        point = self.point()
+        self.assertAlmostEqual(point.use, 0.8)
+        self.assertAlmostEqual(point.current_rms_a, math.sqrt(0.5))
+        self.assertEqual((point.id_a, point.iq_a, point.trim_a, point.bus_v), (-0.6, 0.8, -0.1, 23.9))
+
+    def test_the_angle_error_is_taken_around_the_circle(self):
+        self.assertAlmostEqual(self.point().angle_deg, 2.0)
+        self.assertAlmostEqual(self.point(plant__theta_e_deg=2.0).angle_deg, -1.0)
+
+    def test_a_speed_is_held_within_half_a_per_cent(self):
+        self.assertTrue(self.point(plant__speed_rpm=2985.5).held)
+        self.assertTrue(self.point(plant__speed_rpm=3014.5).held)
+        self.assertFalse(self.point(plant__speed_rpm=2984.5).held)
+        self.assertFalse(self.point(plant__speed_rpm=3015.5).held)
+
+
+class MadeUpMotors(unittest.TestCase):
+    def search(self, motor: FakeMotor, goal: Goal = GOAL, entries: int = ENTRIES) -> tuple[fw_search.Result, FakeMotor]:
+        return Search(motor, goal, entries=entries).run(), motor
+
+    def test_every_entry_has_the_least_current_with_the_margin(self):
+        result, motor = self.search(FakeMotor())
+        self.assertGreater(len(result.found), 10)
+        for found in result.found[1:]:
+            motor.rpm, motor.load_nm = found.rpm, found.load_nm
+            self.assertLessEqual(motor.use(found.entry)[0], 0.97 + 1e-9)
+            before = result.found[found.index - 1].entry
+            if found.entry.idref_a < before.idref_a:
+                self.assertGreater(motor.use(replace(found.entry, idref_a=found.entry.idref_a + 0.01))[0], 0.97, found.index)
+
+    def test_field_weakening_starts_where_the_voltage_asks_for_it(self):
+        result, motor = self.search(FakeMotor(), entries=2)
+        motor.load_nm = GOAL.load_nm(result.start_rpm)
+        motor.rpm = result.start_rpm
+        self.assertLessEqual(motor.use(Entry())[0], 0.97)
+        motor.rpm += fw_search.START_STEP_RPM
+        self.assertGreater(motor.use(Entry())[0], 0.97)
+
+    def test_without_saturation_the_other_tables_stay_flat(self):
+        result, _ = self.search(FakeMotor())
+        self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
+
+    def test_with_saturation_ls_follows_the_motor(self):
+        result, motor = self.search(FakeMotor(saturation=0.4))
+        changed = [found for found in result.found if found.corrected]
+        self.assertTrue(changed)
+        for found in result.found:
+            self.assertLessEqual(abs(found.free.angle_deg), 3.0)
+            self.assertLessEqual(abs(found.loaded.angle_deg), 3.0)
+        first = changed[0]
+        true = 0.5 * motor.inductance(first.entry.idref_a, first.loaded.iq_a) / 1.92e-3
+        self.assertAlmostEqual(first.entry.ls_ratio, true, delta=0.03)
+
+    def test_a_wrong_kphi_that_ls_cannot_mend_moves_inv_kfi(self):
+        class Weak(FakeMotor):
+            def point(self) -> Point:
+                point = super().point()
+                entry = self.now()
+                return replace(point, angle_deg=60.0 * (entry.inv_kfi / 7956.0 - 0.9) if entry.idref_a else 0.0)
+        result, _ = self.search(Weak(), entries=3)
+        self.assertAlmostEqual(result.found[1].entry.inv_kfi, 0.9 * 7956.0, delta=80.0)
+        self.assertEqual(result.found[1].entry.ls_ratio, 0.5)
+
+    def test_no_correction_without_an_effect(self):
+        class Blind(FakeMotor):
+            def point(self) -> Point:
+                return replace(super().point(), angle_deg=8.0)
+        result, _ = self.search(Blind(), entries=3)
+        self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
+
+    def test_a_correction_that_makes_it_worse_is_taken_back(self):
+        class Corner(FakeMotor):
+            def point(self) -> Point:
+                entry = self.now()
+                return replace(super().point(), angle_deg=5.0 + 50.0 * abs(entry.ls_ratio - 0.5) + 50.0 * abs(entry.inv_kfi / 7956.0 - 1.0))
+        result, _ = self.search(Corner(), entries=3)
+        self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
+
+    def test_stops_at_the_current_limit_and_says_so(self):
+        result, _ = self.search(FakeMotor(), replace(GOAL, limit_a=1.5))
+        self.assertLess(len(result.found), 10)
+        self.assertIn("limit of 1.50 A", result.stopped)
+        entries = result.entries()
+        self.assertEqual(len(entries), ENTRIES)
+        self.assertEqual(entries[-1].idref_a, -1.5)
+        self.assertGreaterEqual(min(entry.idref_a for entry in entries), -1.5)
+
+    def test_stops_where_more_current_gives_no_more_speed(self):
+        result, _ = self.search(FakeMotor(saturation=0.9), replace(GOAL, angle_deg=1000.0))
+        self.assertIn("gives no more speed", result.stopped)
+
+    def test_near_the_limit_the_load_gives_way_first(self):
+        result, _ = self.search(FakeMotor())
+        shares = [found.load_nm / GOAL.load_nm(found.rpm) for found in result.found]
+        self.assertAlmostEqual(shares[1], 1.0)
+        self.assertLess(shares[-1], 0.9)
+        self.assertEqual(shares, sorted(shares, reverse=True))
+
+    def test_above_the_rated_current_only_speed_is_paid_for(self):
+        result, motor = self.search(FakeMotor(), replace(GOAL, rated_a=1.5))
+        self.assertTrue(any(found.entry.idref_a < -2.0 for found in result.found))
+        for found, before in zip(result.found[1:], result.found):
+            if found.entry.idref_a < min(-1.5, before.entry.idref_a):
+                self.assertEqual(found.load_nm, 0.0)
+                motor.rpm, motor.load_nm = found.rpm, 0.0
+                self.assertGreater(motor.use(replace(found.entry, idref_a=found.entry.idref_a + 0.01))[0], 0.97)
+        self.assertEqual(result.found[1].load_nm, GOAL.load_nm(result.found[1].rpm))
+
+    def test_the_current_never_falls_with_speed(self):
+        result, _ = self.search(FakeMotor())
+        currents = [entry.idref_a for entry in result.entries()]
+        self.assertEqual(currents, sorted(currents, reverse=True))
+
+    def test_no_field_weakening_where_none_is_needed(self):
+        result, _ = self.search(FakeMotor(), replace(GOAL, maximum_rpm=2000.0))
+        self.assertFalse(result.needed)
+        self.assertIn("no field weakening is needed", result.stopped)
+        self.assertEqual({entry.idref_a for entry in result.entries()}, {0.0})
+
+    def test_ends_where_the_number_format_ends(self):
+        result, _ = self.search(FakeMotor(MAXIMUM_SPEED_RPM=4000.0))
+        self.assertIn("number format of speeds ends at 4000 rpm", result.stopped)
+        self.assertLessEqual(result.found[-1].rpm, 4000.0)
+
+    def test_a_fault_on_the_way_costs_a_restart_and_changes_nothing(self):
+        calm, _ = self.search(FakeMotor())
+        wild, motor = self.search(FakeMotor(faults_below=0.001))
+        self.assertGreater(motor.starts, 1)
+        self.assertEqual(calm.entries()[:10], wild.entries()[:10])
+
+    def test_the_trim_is_off_while_searching(self):
+        _, motor = self.search(FakeMotor(), entries=2)
+        self.assertEqual(motor.values["FW_TRIM_CURRENT_A"], 0.0)
+
+
+def tables(**changes: object) -> Tables:
+    made = Tables(HURST, 2650.0, [Entry(-0.1 * i, 7956.0 + 10 * (i > 3), 0.5 - 0.01 * (i > 5)) for i in range(ENTRIES)],
+                  {name: PARAMS[name] for name in fw_tables.FINGERPRINT}, 7956.0, 15, 'a "reason" \\ here', 6090.0,
+                  {"torque_share": 0.2}, [{"speed_rpm": 2650.0, "torque_nm": 0.05}])
+    return replace(made, **changes)
+
+
+class TablesFile(unittest.TestCase):
+    def setUp(self) -> None:
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.path = self.folder / f"{HURST}.toml"
+
+    def test_what_is_written_is_read(self):
+        fw_tables.write(self.path, tables())
+        read = fw_tables.load(self.path)
+        self.assertEqual([round(entry.idref_a, 2) for entry in read.entries], [round(-0.1 * i, 2) for i in range(ENTRIES)])
+        self.assertEqual([entry.inv_kfi for entry in read.entries], [entry.inv_kfi for entry in tables().entries])
+        self.assertEqual([entry.ls_ratio for entry in read.entries], [entry.ls_ratio for entry in tables().entries])
+        self.assertEqual((read.stopped, read.last_index, read.maximum_speed_rpm), ('a "reason" \\ here', 15, 6090.0))
+        self.assertEqual(read.mismatch(PARAMS), "")
+        self.assertEqual(read.rows, tables().rows)
+
+    def test_tables_of_another_motor_value_are_not_used_and_the_line_says_which(self):
+        fw_tables.write(self.path, tables())
+        for name in fw_tables.FINGERPRINT:
+            found, reason = fw_tables.load_for(HURST, {**PARAMS, name: PARAMS[name] * 1.01}, self.folder)
+            self.assertIsNone(found)
+            self.assertIn(name, reason)
+            self.assertIn(f"make tune-fw MOTOR={HURST}", reason)
+            self.assertNotIn("\n", reason)
+
+    def test_rounding_of_single_precision_is_no_difference(self):
+        fw_tables.write(self.path, tables())
+        found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, self.folder)
+        self.assertIsNotNone(found)
+        self.assertEqual(reason, "")
+
+    def test_no_file_is_no_complaint(self):
+        self.assertEqual(fw_tables.load_for("nobody", PARAMS, self.folder), (None, ""))
+
+    def test_damaged_files_have_their_line(self):
+        good = fw_tables.text(tables())
+        for wrong, word in ((good.replace("idref_a = [0.00, ", "idref_a = ["), "17 values"), (good.replace("[fingerprint]", "[finger]"), "finger"),
+                            (good.replace("idref_a = [0.00", "idref_a = [0.50"), "impossible"), (good.replace("MOTOR_RS_OHM", "MOTOR_OHM"), "MOTOR_"),
+                            (good[:good.index("idref_a") + 14], "TOML syntax")):
+            self.path.write_text(wrong, encoding="utf-8")
+            with self.assertRaises(UserError) as caught:
+                fw_tables.load(self.path)
+            self.assertIn(word, str(caught.exception))
+
+    def test_an_interrupted_write_leaves_the_old_file(self):
+        self.path.write_text("old", encoding="utf-8")
+        with mock.patch.object(Path, "replace", side_effect=KeyboardInterrupt), self.assertRaises(KeyboardInterrupt):
+            fw_tables.write(self.path, tables())
+        self.assertEqual([file.name for file in self.folder.iterdir()], [self.path.name])
+        self.assertEqual(self.path.read_text(encoding="utf-8"), "old")
+
+    def test_header_names_keep_the_base_value_by_name(self):
+        values = tables().parameters()
+        self.assertEqual((values["INVKFI_SPEED3"], values["INVKFI_SPEED4"]), ("NORM_INVKFIBASE", "7966"))
+        self.assertEqual((values["IDREF_SPEED0"], values["IDREF_SPEED17"]), ("0.00", "-1.70"))
+        self.assertEqual(len(values), 3 * ENTRIES + 1)
+
+
+class Header(unittest.TestCase):
+    def test_values_change_and_comments_stay(self):
+        text = fw_tune.with_values(HEADER, {"FW_START_SPEED_RPM": "2345", "IDREF_SPEED1": "-0.77"})
+        known = fw_tune.defines(text)
+        self.assertEqual((known["FW_START_SPEED_RPM"], known["IDREF_SPEED1"]), (2345.0, -0.77))
+        self.assertEqual(known["IDREF_SPEED10"], fw_tune.defines(HEADER)["IDREF_SPEED10"])
+        self.assertEqual(text.count("/*"), HEADER.count("/*"))
+
+    def test_a_name_that_is_not_there_is_named(self):
+        with self.assertRaisesRegex(UserError, "NO_SUCH_NAME"):
+            fw_tune.with_values(HEADER, {"NO_SUCH_NAME": "1"})
+
+    def test_numbers_are_read(self):
+        known = fw_tune.defines("#define A 1.5 /* x */\n  # define B 0xF\n#define C (-2)\n#define D OTHER\n/* #define E 3 */\n")
+        self.assertEqual(known, {"A": 1.5, "B": 15.0, "C": -2.0})
+
+    def test_highest_speed_of_the_hurst_is_where_the_format_ends(self):
+        self.assertEqual(fw_tune.highest_speed(fw_tune.defines(HEADER)), 6400.0)
+
+    def test_highest_speed_gives_way_to_the_back_emf_s_format(self):
+        known = {**fw_tune.defines(HEADER), "OVER_CURRENT_THRESHOLD_A": 3.81, "MOTOR_LS_MH": 2.2}
+        self.assertLess(fw_tune.highest_speed(known), 6400.0)
+
+    def test_a_header_s_own_table_is_interpolated_as_the_firmware_does(self):
+        known = {"FW_START_SPEED_RPM": 2600.0, "NOPOLESPAIRS": 5.0, **{f"IDREF_SPEED{i}": -0.1 * i for i in range(ENTRIES)}}
+        self.assertEqual(fw_tune.table_current(known, 2000.0), 0.0)
+        self.assertAlmostEqual(fw_tune.table_current(known, 2600.0 + 2.5 * 204.8), -0.25)
+        self.assertAlmostEqual(fw_tune.table_current(known, 9000.0), -1.7)
+
+
+# ---- on the virtual board ------------------------------------------------------------------------------------------------------
+def values(**changes: float) -> dict[str, float]:
+    """The Hurst on its board, as keys of the virtual board."""
+    library = Library(build.library(["PARAMS_IN_RAM"]))
+    layers = [motor_file.load(HURST).plant_values(), board_file.load("mclv").plant_values()]
+    return {**plant.resolve(layers, library.keys), **{key.replace("__", "."): value for key, value in changes.items()}}
+
+
+def bench_work(work):
+    """work(bench) in a process of its own: the firmware is one set of globals."""
+    def run(job, tell):
+        bench = Bench(job, values(), tell)
+        try:
+            return work(bench)
+        finally:
+            bench.close()
+    return run
+
+
+def on_board(work, defines=("PARAMS_IN_RAM",)):
+    from tools.foc33 import workers
+    return workers.run_all([build.library(list(defines))], bench_work(work), lambda seconds: None)[0]
+
+
+def refused(bench, name: str, value: float) -> str:
+    try:
+        bench.set(name, value)
+    except BoardError as error:
+        return str(error)
+    return ""
+
+
+class LiveParameters(unittest.TestCase):
+    def test_a_table_entry_changes_the_running_motor(self):
+        def work(bench):
+            bench.start()
+            bench.speed(3500.0)
+            before = bench.point()
+            for i in range(ENTRIES):
+                bench.set(f"IDREF_SPEED{i}", -1.6)
+            bench.run(0.05)
+            after = bench.point()
+            for i in range(ENTRIES):
+                bench.set(f"INVKFI_SPEED{i}", 1.1 * bench.params["INVKFI_SPEED0"])
+            bench.run(0.1)
+            return before, after, bench.point(), bench.board.parameter("IDREF_SPEED7")
+        before, after, turned, read = on_board(work)
+        self.assertGreater(before.id_a, -1.2)
+        self.assertAlmostEqual(after.id_a, -1.6, delta=0.05)
+        self.assertAlmostEqual(turned.angle_deg - after.angle_deg, 5.0, delta=1.5) # the law cos d + sin d = K'/K
+        self.assertAlmostEqual(read, -1.6, delta=0.001)
+
+    def test_ls_and_the_start_speed_change_too(self):
+        def work(bench):
+            bench.start()
+            bench.speed(3500.0)
+            ratio, index = bench.board.get("fw.ls_ratio"), bench.board.get("fw.fw_index")
+            for i in range(ENTRIES):
+                bench.set(f"LS_OVER2LS0_SPEED{i}", 0.4)
+            bench.set("FW_START_SPEED_RPM", 3400.0)
+            bench.run(0.05)
+            return ratio, index, bench.board.get("fw.ls_ratio"), bench.board.get("fw.fw_index")
+        ratio, index, changed, later = on_board(work)
+        self.assertAlmostEqual(ratio, 0.5, delta=0.001)
+        self.assertAlmostEqual(changed, 0.4, delta=0.001)
+        self.assertGreater(index, 2)
+        self.assertEqual(later, 0)
+
+    def test_the_trim_can_be_switched_off(self):
+        def work(bench):
+            bench.set("FW_TRIM_CURRENT_A", 0.0)
+            for i in range(ENTRIES):
+                bench.set(f"IDREF_SPEED{i}", 0.0)
+            bench.start()
+            bench.speed(3500.0)
+            return bench.point()
+        point = on_board(work)
+        self.assertEqual(point.trim_a, 0.0)
+        self.assertLess(point.speed_rpm, 3450.0)
+
+    def test_values_outside_their_range_and_unknown_names_are_refused(self):
+        def work(bench):
+            return [refused(bench, name, value) for name, value in
+                    (("IDREF_SPEED3", 0.5), ("INVKFI_SPEED0", 100.0), ("LS_OVER2LS0_SPEED17", 0.7), ("IDREF_SPEED18", -1.0),
+                     ("IDREF_SPEED", -1.0), ("IDREF_SPEED1x", -1.0), ("MOTOR_RS_OHM", 2.0), ("FW_TRIM_CURRENT_A", math.nan))]
+        answers = on_board(work)
+        self.assertTrue(all(answers), answers)
+        self.assertIn("range", answers[0])
+        self.assertIn("cannot change", answers[3])
+
+    def test_every_entry_of_every_table_can_be_written_and_read(self):
+        def work(bench):
+            result = []
+            for stem, first, step in (("IDREF_SPEED", -0.05, -0.1), ("INVKFI_SPEED", 5000.0, 7.0), ("LS_OVER2LS0_SPEED", 0.2, 0.01)):
+                for i in range(ENTRIES):
+                    bench.set(f"{stem}{i}", first + i * step)
+                result += [bench.board.parameter(f"{stem}{i}") - first - i * step for i in range(ENTRIES)]
+            return result
+        self.assertLess(max(map(abs, on_board(work))), 0.001)
+
+    def test_a_normal_firmware_keeps_its_parameters(self):
+        self.assertIn("PARAMS_IN_RAM", on_board(lambda bench: refused(bench, "IDREF_SPEED3", -0.5), ()))
+
+    def test_tuning_builds_have_them_in_ram(self):
+        self.assertEqual(on_board(lambda bench: refused(bench, "IDREF_SPEED3", -0.5), ("TUNING",)), "")
+
+
+if __name__ == "__main__":
+    unittest.main()

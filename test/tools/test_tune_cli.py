@@ -1,0 +1,113 @@
+"""The command line: results complete or not at all, one line and exit code 2 for every mistake."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from unittest import mock
+
+from tools.foc33 import places
+from tune_support import HURST, command, motor_path
+
+
+class Tune(unittest.TestCase):
+    def setUp(self) -> None:
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.out = Path(temporary.name) / "result"
+        if not self._testMethodName.startswith("test_the_page") and not self._testMethodName.startswith("test_the_result"):
+            quick = mock.patch("tuning.plots.draw", lambda design: dict.fromkeys(("current_loop", "speed_loop", "start", "torque", "current"), ""))
+            quick.start()
+            self.addCleanup(quick.stop)
+
+    def refused(self, *arguments: str, says: str) -> None:
+        code, out, error = command(*arguments)
+        self.assertEqual((code, out, error.count("\n")), (2, "", 1), error)
+        self.assertTrue(error.startswith("foc33: "), error)
+        self.assertIn(says, error)
+
+    def test_a_motor_becomes_a_header_a_page_and_numbers(self):
+        code, out, error = command("tune", HURST, "--out", str(self.out))
+        self.assertEqual((code, error), (0, ""))
+        self.assertEqual(sorted(path.name for path in self.out.iterdir()), ["report.html", "summary.json", "tuning.json", "userparams.h"])
+        self.assertIn("phase margin", out)
+        self.assertIn("NORM_RS 14470", out)
+        numbers = json.loads((self.out / "tuning.json").read_text(encoding="utf-8"))
+        self.assertEqual(numbers["params"]["MOTOR_RS_OHM"], "2.67")
+        self.assertGreaterEqual(numbers["loops"]["speed"]["worst"]["phase_deg"], 60.0)
+
+    def test_the_page_needs_nothing_else_and_shows_everything(self):
+        command("tune", HURST, "--out", str(self.out))
+        page = (self.out / "report.html").read_text(encoding="utf-8")
+        self.assertEqual(page.count("<svg"), 5)
+        for words in ("src=", "href=\"http", "<script"):
+            self.assertNotIn(words, page)
+        for words in ("Current loop", "Speed loop", "Start", "Parameters", "Constants", "Inputs", "NORM_RS", "AN1292"):
+            self.assertIn(words, page)
+
+    def test_an_unchanged_header_keeps_its_time(self):
+        command("tune", HURST, "--out", str(self.out), "--brief")
+        os.utime(self.out / "userparams.h", (1e9, 1e9))
+        command("tune", HURST, "--out", str(self.out), "--brief")
+        self.assertEqual((self.out / "userparams.h").stat().st_mtime, 1e9)
+        (self.out / "userparams.h").write_text("old", encoding="utf-8")
+        command("tune", HURST, "--out", str(self.out), "--brief")
+        self.assertGreater((self.out / "userparams.h").stat().st_mtime, 1.5e9)
+
+    def test_brief_is_a_line_and_the_warnings(self):
+        _, out, _ = command("tune", "anaheim_bly172s_24v_4000", "--out", str(self.out), "--brief")
+        lines = out.splitlines()
+        self.assertTrue(lines[0].startswith("anaheim_bly172s_24v_4000: "))
+        self.assertTrue(all(line.startswith("  warning: ") for line in lines[1:]))
+
+    def test_the_result_of_the_same_input_is_the_same(self):
+        command("tune", HURST, "--out", str(self.out))
+        before = {path.name: path.read_bytes() for path in self.out.iterdir()}
+        command("tune", HURST, "--out", str(self.out))
+        self.assertEqual({path.name: path.read_bytes() for path in self.out.iterdir()}, before)
+
+    def test_a_refusal_writes_nothing_and_keeps_an_older_result(self):
+        with motor_path(("value = 2500", "value = 4000")) as path:
+            self.refused("tune", str(path), "--out", str(self.out), says="are too low for 4000 rpm")
+            self.assertFalse(self.out.exists())
+        command("tune", HURST, "--out", str(self.out), "--brief")
+        before = sorted(self.out.iterdir())
+        with motor_path(("value = 2500", "value = 4000")) as path:
+            self.refused("tune", str(path), "--out", str(self.out), says="are too low for 4000 rpm")
+        self.assertEqual(sorted(self.out.iterdir()), before)
+        self.assertEqual(len(list(self.out.parent.iterdir())), 1)
+
+    def test_a_motor_by_its_path(self):
+        with motor_path() as path:
+            code, out, error = command("tune", str(path), "--out", str(self.out))
+        self.assertEqual((code, error), (0, ""))
+        self.assertIn("a_motor.toml", (self.out / "userparams.h").read_text(encoding="utf-8"))
+
+    def test_a_folder_that_is_something_else_is_not_replaced(self):
+        self.out.mkdir()
+        (self.out / "precious").write_text("mine", encoding="utf-8")
+        self.refused("tune", HURST, "--out", str(self.out), says="is not a result folder")
+        self.assertTrue((self.out / "precious").is_file())
+
+    def test_mistakes_on_the_command_line(self):
+        self.refused("tune", "hurst", says="no motor 'hurst'")
+        self.refused("tune", "nowhere/motor.toml", says="no motor file")
+        self.refused("tune", HURST, "--board", "mclw", says="mclv")
+        self.refused("tune", says="name one, or write --all")
+        self.refused("tune", HURST, "--all", says="either a motor or --all")
+        self.refused("tune", "--all", "--out", str(self.out), says="one folder for several motors")
+        self.refused("tun", says="command line")
+
+    def test_the_header_alone(self):
+        code, out, _ = command("header", HURST)
+        self.assertEqual(code, 0)
+        self.assertTrue(out.startswith("/* Everything a user edits"))
+        self.assertTrue(out.endswith("#endif\n"))
+
+    def test_as_a_program(self):
+        done = subprocess.run([sys.executable, "-m", "tuning", "tune", "no_such_motor"], cwd=places.ROOT, capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("foc33: no motor 'no_such_motor'", done.stderr)

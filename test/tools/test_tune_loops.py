@@ -1,0 +1,228 @@
+"""The loop models agree with simulations step by step, and the chosen bandwidths keep their margins."""
+
+import cmath
+import math
+import unittest
+from dataclasses import replace
+
+import numpy as np
+
+from tune_support import HURST, designed, motors, of
+from tuning import loops
+from tuning.design import _spread
+from tuning.loops import Gains, Plant, current_gains, current_grid, current_loop, margins, speed_gains, speed_loop
+
+TS = 50e-6
+MOTOR = Plant(2.67, 1.92e-3, 1.92e-3, 7.983e-3, 5, 5.5e-6, 15.3e-6)
+BASE = Gains(0.0, 0.0, 0.0, 0.0, 0.0, 1200 / 32768, 748 / 32768, TS)
+
+
+def erpm(rpm: float) -> float:
+    return rpm * 5 * 2 * math.pi / 60
+
+
+def current_swing(factor: float, omega: float, gains: Gains) -> float:
+    """Growth of a disturbance: a winding in stator coordinates, integrated in small steps, with pulses that begin half a period late."""
+    current, total, before, seen = 1.0 + 0.0j, 0.0j, 0.0j, []
+    small = 40
+    for n in range(400):
+        measured = current * cmath.exp(-1j * omega * TS * n)
+        vector = (-gains.kp_q * factor * measured + total) * cmath.exp(1j * omega * TS * (n + 1))
+        total -= gains.ki * factor * measured
+        for k in range(small):
+            voltage = before if k < small // 2 else vector
+            current += TS / small * (voltage - MOTOR.rs * current) / MOTOR.lq
+        before = vector
+        seen.append(abs(measured))
+    return max(seen[300:]) / max(seen[100:200])
+
+
+class CurrentLoop(unittest.TestCase):
+    def test_the_gain_margin_is_where_a_simulated_loop_begins_to_swing(self):
+        gains = current_gains(MOTOR, 1000.0, BASE)
+        grid = current_grid(TS, 4000)
+        for rpm in (0.0, 5500.0):
+            margin = margins(grid, current_loop(grid, MOTOR, gains, erpm(rpm)))
+            factor = 10.0 ** (margin.gain_db / 20.0)
+            self.assertLess(current_swing(0.95 * factor, erpm(rpm), gains), 1.0, rpm)
+            self.assertGreater(current_swing(1.05 * factor, erpm(rpm), gains), 1.0, rpm)
+
+    def test_without_rotation_and_delay_the_crossover_is_the_bandwidth(self):
+        slow = Gains(0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 0.02, 1e-6)
+        grid = np.geomspace(10.0, 20000.0, 4000)
+        found = margins(grid, current_loop(grid, MOTOR, current_gains(MOTOR, 300.0, slow), 0.0))
+        self.assertAlmostEqual(found.crossover_hz, 300.0, delta=1.0)
+        self.assertAlmostEqual(found.phase_deg, 90.0 - 300.0 * 1e-6 * 360.0, delta=0.2)
+
+    def test_the_delay_is_one_period_and_the_hold(self):
+        """A vector acts from half a period after its sample for one period: a period on average, 18 degrees at 1 kHz."""
+        grid = current_grid(TS, 4000)
+        found = margins(grid, current_loop(grid, MOTOR, current_gains(MOTOR, 1000.0, BASE), 0.0))
+        self.assertAlmostEqual(found.phase_deg, 90.0 - found.crossover_hz * TS * 360.0, delta=1.0)
+
+    def test_rotation_takes_margin_at_one_sign_of_frequency(self):
+        grid = current_grid(TS)
+        gains = current_gains(MOTOR, 400.0, BASE)
+        self.assertLess(margins(grid, current_loop(grid, MOTOR, gains, erpm(5500.0))).phase_deg, margins(grid, current_loop(grid, MOTOR, gains, 0.0)).phase_deg - 5.0)
+
+
+def speed_swing(factor: float, gains: Gains, true: Plant, omega: float) -> float:
+    """Growth of a disturbance: shaft, current loop, estimator and both filters period by period, with the firmware's order of work."""
+    h = math.exp(-true.rs * TS / (2 * true.lq))
+    b = (1 - h) / true.rs
+    w, lag, i, before, i_sum = omega, 0.0, 0.0, 0.0, 0.0
+    load = 0.0
+    e_d, e_q, slow, reference, total = 0.0, true.psi * omega, omega, 0.0, true.viscous * omega / true.pole_pairs / true.kt
+    last_i = total
+    i = total
+    i_sum = true.rs * total
+    before = i_sum
+    seen = []
+    for n in range(24000):
+        load = 2e-4 if 200 <= n < 260 else 0.0
+        if n % 8 == 0:
+            error = omega - slow
+            reference = total + factor * gains.speed_kp * error
+            total += factor * gains.speed_ki * error
+        voltage = gains.kp_q * (reference - i) + i_sum
+        i_sum += gains.ki * (reference - i)
+        wrong = (true.rs - MOTOR.rs) * 0.5 * (i + last_i) + (true.lq - MOTOR.lq) * (i - last_i) / TS
+        e_q += gains.esdq * (true.psi * w * math.cos(lag) + wrong - e_q)
+        e_d += gains.esdq * (-true.psi * w * math.sin(lag) - e_d)
+        estimate = (e_q - e_d) / MOTOR.psi
+        slow += gains.velestim * (estimate - slow)
+        last_i = i
+        i = h * h * i + b * voltage + h * b * before
+        before = voltage
+        lag += (w - estimate) * TS
+        w += TS * true.pole_pairs / true.inertia * (true.kt * i - true.viscous * w / true.pole_pairs - load)
+        seen.append(abs(w - omega))
+    return max(seen[16000:24000]) / max(max(seen[4000:12000]), 1e-9)
+
+
+class SpeedLoop(unittest.TestCase):
+    def test_the_gain_margin_is_where_a_simulated_loop_begins_to_swing(self):
+        gains = speed_gains(MOTOR, 15.0, current_gains(MOTOR, 1000.0, BASE))
+        grid = np.geomspace(0.05, 1100.0, 4000)
+        for rpm, true in ((500.0, MOTOR), (2800.0, MOTOR), (500.0, replace(MOTOR, rs=0.76 * MOTOR.rs, ld=1.26 * MOTOR.ld, lq=1.26 * MOTOR.lq))):
+            margin = margins(grid, speed_loop(grid, true, MOTOR, gains, erpm(rpm)))
+            factor = 10.0 ** (margin.gain_db / 20.0)
+            self.assertLess(speed_swing(0.95 * factor, gains, true, erpm(rpm)), 0.1, rpm)
+            self.assertGreater(speed_swing(1.1 * factor, gains, true, erpm(rpm)), 0.5, rpm)
+
+    def test_far_above_the_filters_the_phase_is_that_of_all_delays(self):
+        """Hold over 8 periods (4 on average), one period of reading, half of the back-EMF's age, and the current loop's own."""
+        gains = replace(speed_gains(MOTOR, 15.0, current_gains(MOTOR, 1000.0, BASE)), esdq=1.0, velestim=1.0, speed_ki=0.0)
+        hz = np.array([60.0])
+        inner = current_loop(hz, MOTOR, gains, 0.0)
+        found = np.degrees(np.angle(speed_loop(hz, MOTOR, MOTOR, gains, erpm(2800.0)) / (inner / (1.0 + inner))))[0]
+        shaft = -math.degrees(math.atan2(2 * math.pi * 60.0 * MOTOR.inertia, MOTOR.viscous))
+        self.assertAlmostEqual(found, shaft - 360.0 * 60.0 * (4.0 + 1.5) * TS, delta=0.05)
+
+    def test_the_bandwidth_is_the_crossover(self):
+        gains = speed_gains(MOTOR, 5.0, current_gains(MOTOR, 1000.0, BASE))
+        grid = np.geomspace(0.05, 1100.0, 2000)
+        self.assertAlmostEqual(margins(grid, speed_loop(grid, MOTOR, MOTOR, gains, erpm(2800.0))).crossover_hz, 5.1, delta=0.2)
+
+    def test_gains_are_those_of_params_h(self):
+        d = of(HURST)
+        found = {item.name: item.value for item in d.constants}
+        bandwidth = d.value("SPEED_BANDWIDTH_HZ")
+        gains = speed_gains(MOTOR, bandwidth, current_gains(MOTOR, 1000.0, BASE))
+        electrical = 5 * 2 * math.pi / 60 # rad/s per rpm
+        self.assertAlmostEqual(found["pi_speed.kp"], gains.speed_kp * electrical, delta=1e-4 * found["pi_speed.kp"])
+        self.assertAlmostEqual(found["pi_speed.ki"], gains.speed_ki * electrical / (8 * TS), delta=1e-4 * found["pi_speed.ki"])
+
+    def test_an_error_of_the_estimator_s_resistance_costs_gain_margin_at_low_speed(self):
+        gains = speed_gains(MOTOR, 15.0, current_gains(MOTOR, 1000.0, BASE))
+        grid = np.geomspace(0.05, 1100.0, 1000)
+        hot = replace(MOTOR, rs=1.3 * MOTOR.rs)
+        slow, fast = (margins(grid, speed_loop(grid, hot, MOTOR, gains, erpm(rpm))).gain_db for rpm in (300.0, 5000.0))
+        self.assertLess(slow, fast)
+
+
+class Margins(unittest.TestCase):
+    def test_an_integrator_with_a_delay(self):
+        grid = np.geomspace(0.1, 1000.0, 4000)
+        s = 2j * np.pi * grid
+        found = margins(grid, 2 * np.pi * 10.0 / s * np.exp(-s * 0.01))
+        self.assertAlmostEqual(found.crossover_hz, 10.0, delta=0.01)
+        self.assertAlmostEqual(found.phase_deg, 90.0 - 36.0, delta=0.1)
+        self.assertAlmostEqual(found.gain_db, 20 * math.log10(2.5), delta=0.05)
+
+    def test_an_unstable_loop_has_a_negative_margin(self):
+        grid = np.geomspace(0.1, 1000.0, 4000)
+        s = 2j * np.pi * grid
+        found = margins(grid, 2 * np.pi * 40.0 / s * np.exp(-s * 0.01))
+        self.assertLess(found.phase_deg, 0.0)
+        self.assertFalse(found.enough)
+
+    def test_the_least_of_several_crossovers_counts(self):
+        grid = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+        response = np.array([2.0, 0.5, 2.0, 0.5, 0.1]) * np.exp(-1j * np.radians([90.0, 90.0, 150.0, 150.0, 150.0]))
+        self.assertAlmostEqual(margins(grid, response).phase_deg, 30.0, delta=1.0)
+
+
+class Choice(unittest.TestCase):
+    def test_every_motor_has_60_degrees_at_both_loops_over_its_parameter_set(self):
+        for name in motors():
+            with self.subTest(name):
+                d = of(name)
+                for loop in (d.current_loop, d.speed_loop):
+                    self.assertGreaterEqual(loop.worst.phase_deg, 60.0, loop.worst_case)
+                    self.assertGreaterEqual(loop.worst.gain_db, 6.0, loop.worst_case)
+
+    def test_the_worst_case_is_no_better_than_any_corner(self):
+        d = of(HURST)
+        gains = current_gains(MOTOR, d.value("CURRENT_BANDWIDTH_HZ"), BASE)
+        speed = speed_gains(MOTOR, d.value("SPEED_BANDWIDTH_HZ"), gains)
+        grid = np.geomspace(0.05, 0.45 / (8 * TS), 400)
+        for name, plant in loops.corners(MOTOR, _spread(d.motor)):
+            found = margins(grid, speed_loop(grid, plant, MOTOR, speed, erpm(d.value("MINIMUM_SPEED_RPM"))))
+            self.assertGreaterEqual(found.phase_deg, d.speed_loop.worst.phase_deg - 0.2, name)
+
+    def test_the_next_larger_speed_bandwidth_would_not_keep_the_margin(self):
+        d = designed_with("MINIMUM_SPEED_RPM = 1000")
+        more = designed_with("MINIMUM_SPEED_RPM = 1000", f"SPEED_BANDWIDTH_HZ = {d.value('SPEED_BANDWIDTH_HZ') + 0.5}")
+        self.assertTrue(d.speed_loop.reached)
+        self.assertFalse(more.speed_loop.reached)
+
+    def test_the_speed_loop_is_slower_than_the_slowest_rotation(self):
+        for name in motors():
+            d = of(name)
+            self.assertLessEqual(d.value("SPEED_BANDWIDTH_HZ"), 0.3125 * d.value("MINIMUM_SPEED_RPM") * d.motor.pole_pairs / 60.0, name)
+        self.assertEqual(designed(("value = 5.5e-6", "value = 2e-5"), more="[tune]\nMINIMUM_SPEED_RPM = 300\n").value("SPEED_BANDWIDTH_HZ"), 7.81)
+
+    def test_but_fast_enough_for_a_load_that_grows(self):
+        """Torque T/s against the integral of the speed controller: error = T/s / (Kt Ki)."""
+        d = designed(("value = 5.5e-6", "value = 3e-6"), more="[tune]\nMINIMUM_SPEED_RPM = 300\n")
+        self.assertGreater(d.value("SPEED_BANDWIDTH_HZ"), 0.3125 * 300 * 5 / 60)
+        gains = speed_gains(replace(MOTOR, inertia=3e-6), d.loaded_hz, BASE)
+        per_second = gains.speed_ki / (8 * TS) * 5 * MOTOR.kt # N m/s per mechanical rad/s
+        self.assertAlmostEqual(0.08 / per_second, 0.18 * 300 * math.pi / 30, delta=0.1)
+
+    def test_the_published_spread_of_a_motor_belongs_to_its_parameter_set(self):
+        names = [name for name, _ in loops.corners(MOTOR, _spread(of(HURST).motor))]
+        self.assertIn("R -24%, L +26%", names)
+
+    def test_a_bandwidth_in_tune_is_kept_and_warned_about(self):
+        d = designed(more="[tune]\nSPEED_BANDWIDTH_HZ = 40\n")
+        self.assertEqual(d.value("SPEED_BANDWIDTH_HZ"), 40.0)
+        self.assertTrue(any("SPEED_BANDWIDTH_HZ = 40: the speed loop has" in warning for warning in d.warnings), d.warnings)
+
+    def test_the_current_loop_stays_below_its_cap_unless_rotation_asks_for_more(self):
+        self.assertEqual(of(HURST).value("CURRENT_BANDWIDTH_HZ"), 1000.0)
+        self.assertGreater(of("maxon_ec45flat_30w_24v").value("CURRENT_BANDWIDTH_HZ"), 1000.0)
+
+    def test_each_axis_of_a_salient_motor_has_its_own_gain(self):
+        d = of("linix_45zwn24_40")
+        self.assertAlmostEqual(d.value("D_CURRCNTR_PTERM") / d.value("Q_CURRCNTR_PTERM"), d.motor.ld_h / d.motor.lq_h, delta=1e-4)
+
+
+def designed_with(*lines: str):
+    """The note's motor with lines in [tune]."""
+    from tools.foc33 import board_file, motor_file
+    from tuning.design import design
+    motor = motor_file.load(HURST)
+    tune = {name: float(value) for name, value in (line.split(" = ") for line in lines)}
+    return design(replace(motor, tune=motor.tune | tune), board_file.load("mclv"))

@@ -1,0 +1,98 @@
+"""The start's rules: enough torque, enough back-EMF, a lock long enough, and a rotor that follows."""
+
+import math
+import unittest
+from dataclasses import replace
+
+from tools.foc33 import board_file, motor_file
+from tune_support import HURST, designed, motors, of
+from tuning import start
+
+BOARD = board_file.load("mclv")
+
+
+class Rules(unittest.TestCase):
+    def setUp(self) -> None:
+        self.motor = motor_file.load(HURST)
+
+    def test_the_note_s_motor_gets_the_note_s_start(self):
+        d = of(HURST)
+        self.assertEqual([d.params[name] for name in ("Q_CURRENT_REF_OPENLOOP", "END_SPEED_RPM", "LOCK_TIME", "OPENLOOP_RAMPSPEED_INCREASERATE", "MINIMUM_SPEED_RPM")],
+                         ["1.41", "1000", "4000", "10", "500"])
+
+    def test_current_carries_the_load_at_50_degrees(self):
+        load = 0.1
+        motor = replace(self.motor, start_torque_nm=load)
+        needed = start.needed_torque(motor, 1000.0)
+        current = start.start_current(motor, 10.0, needed)
+        self.assertAlmostEqual(motor.kt_nm_per_a * current * 0.77, load + 0.004 + 15.3e-6 * 1000 * math.pi / 30, delta=3e-4)
+
+    def test_current_stays_below_the_largest(self):
+        self.assertLess(start.start_current(self.motor, 0.9, 0.5), 0.9)
+
+    def test_the_back_emf_at_the_hand_over_is_three_times_its_error(self):
+        for name in motors():
+            with self.subTest(name):
+                s = of(name).start_up
+                self.assertGreaterEqual(s.emf_v * start.HAND_OVER_SINE, 0.999 * s.error_v)
+
+    def test_the_error_of_the_back_emf(self):
+        dead_v = 4 / math.pi * 24 * 2e-6 / 50e-6
+        self.assertAlmostEqual(start.emf_error_v(self.motor, BOARD, 2.0), 0.3 * 2.67 * 2.0 + 0.2 * dead_v + 2.67 * 8.8 / 1024, delta=1e-9)
+
+    def test_minimum_speed_is_at_most_a_fifth_of_rated_speed(self):
+        for name in motors():
+            d = of(name)
+            self.assertLessEqual(d.value("MINIMUM_SPEED_RPM"), 0.2 * d.motor.rated_speed_rpm, name)
+            self.assertLessEqual(d.value("MINIMUM_SPEED_RPM"), d.value("END_SPEED_RPM"), name)
+        self.assertEqual(start.minimum_speed(self.motor, 2000.0), 560.0)
+        self.assertEqual(start.minimum_speed(self.motor, 300.0), 300.0)
+
+    def test_the_swing_of_the_locked_rotor(self):
+        self.assertAlmostEqual(start.natural_rad_s(self.motor, 1.41, 5.5e-6), math.sqrt(5 * 0.0598743 * 1.41 / 5.5e-6), delta=0.1)
+
+    def test_more_inertia_means_a_longer_lock_and_a_slower_ramp(self):
+        light, heavy = designed(), designed(more='[load]\ninertia = { value = 4e-4, unit = "kg m2" }\n')
+        self.assertGreater(heavy.value("LOCK_TIME"), 2.0 * light.value("LOCK_TIME"))
+        self.assertLess(heavy.start_up.acceleration_rpm_s, light.start_up.acceleration_rpm_s)
+        torque = 4.055e-4 * heavy.start_up.acceleration_rpm_s * math.pi / 30
+        self.assertLess(torque, 0.2 * heavy.start_up.pull_out_nm)
+
+    def test_the_end_speed_follows_the_resistance(self):
+        low = start.end_speed(replace(self.motor, rs_ohm=0.5), BOARD, 1.41, 2800.0)
+        self.assertLess(low, start.end_speed(self.motor, BOARD, 1.41, 2800.0))
+
+    def test_ramp_takes_as_long_as_the_rate_says(self):
+        s = of(HURST).start_up
+        self.assertAlmostEqual(s.acceleration_rpm_s, 10 / 1024 / 65536 / 50e-6 ** 2 * 60 / 5, delta=1e-6)
+        self.assertAlmostEqual(s.ramp_s, 1000 / s.acceleration_rpm_s, delta=1e-9)
+
+
+class Trials(unittest.TestCase):
+    def setUp(self) -> None:
+        self.motor = motor_file.load(HURST)
+
+    def trial(self, current_a: float, load_nm: float, acceleration: float = 715.0, inertia: float = 5.5e-6) -> start.Trial:
+        return start.try_start(replace(self.motor, start_torque_nm=load_nm), inertia, 4e-5, current_a, 0.3, acceleration, 1000.0, angles=12)
+
+    def test_every_motor_follows_its_ramp_from_every_angle(self):
+        for name in motors():
+            s = of(name).start_up
+            self.assertTrue(s.follows, name)
+            self.assertEqual(len(s.trial.labels), 48)
+
+    def test_a_load_within_the_pull_out_torque_is_followed_and_one_beyond_is_not(self):
+        pull = self.motor.kt_nm_per_a * 1.41
+        self.assertTrue(self.trial(1.41, 0.8 * pull).followed.all())
+        loaded = self.trial(1.41, 1.05 * pull).followed
+        self.assertTrue(loaded[:12].all())
+        self.assertFalse(loaded[12:].any())
+
+    def test_a_ramp_faster_than_the_torque_allows_is_lost(self):
+        fastest = self.motor.kt_nm_per_a * 1.41 / 4e-4 * 30 / math.pi
+        self.assertTrue(self.trial(1.41, 0.0, 0.1 * fastest, 4e-4).followed.all())
+        self.assertFalse(self.trial(1.41, 0.0, 1.5 * fastest, 4e-4).followed.any())
+
+    def test_a_motor_that_cannot_follow_is_warned_about(self):
+        d = designed(more="[tune]\nQ_CURRENT_REF_OPENLOOP = 0.1\n")
+        self.assertTrue(any("may not follow the ramp" in warning for warning in d.warnings), d.warnings)

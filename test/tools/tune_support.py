@@ -1,0 +1,78 @@
+"""What the tuner's tests share: a motor file to change, the note's motor, and calls of the command line."""
+
+import contextlib
+import functools
+import io
+import os
+import shlex
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from tools.foc33 import board_file, motor_file, places
+from tuning import cli
+from tuning.design import Design, design
+
+COMPILER = shlex.split(os.environ.get("CC") or "gcc")
+INCLUDES = ["-Itools/host", "-Iinclude", "-I."]
+HURST = "hurst_dmb0224c10002"
+
+MOTOR = """title = "a motor"
+connection = "Y"
+
+[electrical]
+pole_pairs = { value = 5, source = "test" }
+resistance = { value = 2.67, unit = "ohm phase", source = "test" }
+inductance = { value = 1.92, unit = "mH phase", frequency_hz = 1000, source = "test" }
+kphi = { value = 7.24, unit = "V peak line-to-line/krpm", source = "test" }
+
+[mechanical]
+inertia = { value = 5.5e-6, unit = "kg m2", source = "test" }
+viscous_friction = { value = 15.3e-6, unit = "N m s", source = "test" }
+coulomb_friction = { value = 0.004, unit = "N m", source = "test" }
+
+[rating]
+voltage = { value = 24, unit = "V", source = "test" }
+current = { value = 1.53, unit = "A peak", source = "test" }
+torque = { value = 0.08, unit = "N m", source = "test" }
+speed = { value = 2500, unit = "rpm", source = "test" }
+maximum_speed = { value = 5000, unit = "rpm", source = "test" }
+maximum_current = { value = 2.75, unit = "A peak", source = "test" }
+"""
+
+
+def motors() -> list[str]:
+    return places.names(places.MOTORS)
+
+
+@contextlib.contextmanager
+def motor_path(*changes: tuple[str, str], more: str = "") -> Iterator[Path]:
+    """A motor file: MOTOR with texts replaced, and more lines at its end."""
+    text = MOTOR
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a_motor.toml"
+        path.write_text(text + more, encoding="utf-8")
+        yield path
+
+
+def designed(*changes: tuple[str, str], more: str = "", board: str = "mclv") -> Design:
+    """The design of a changed MOTOR."""
+    with motor_path(*changes, more=more) as path:
+        return design(motor_file.load(str(path)), board_file.load(board))
+
+
+@functools.cache
+def of(name: str) -> Design:
+    """The design of one of the project's motors; shared, not to be changed."""
+    return design(motor_file.load(name), board_file.load("mclv"))
+
+
+def command(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command line."""
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        code = cli.main(list(arguments))
+    return code, out.getvalue(), error.getvalue()

@@ -1,0 +1,416 @@
+"""From a motor and a board to every parameter of userparams.h, with the reason for each, the constants, the margins and the warnings."""
+
+import math
+from dataclasses import dataclass, field
+from decimal import Decimal
+
+from tools.foc33 import places
+from tools.foc33.board_file import BoardFile
+from tools.foc33.errors import UserError
+from tools.foc33.motor_file import Motor
+
+from . import constants, fw_tables, limits, loops, params, start
+from .constants import Constant, Formulas, firmware_constants, number_of
+from .limits import RPM, Envelope
+
+ESDQ_HZ = 118.76
+VELESTIM_HZ = 73.5
+"""The note's 1200 and 748 at 50 us."""
+QUICK_ROTOR_S = 0.015
+"""A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with the note's speed filter
+reacts: the filter's corner rises in proportion, up to four times. Its speed gain is small (it goes with J), so noise stays small too."""
+REFERENCE_RISE_S = 0.7
+"""The speed reference goes from 0 to rated speed in this time, unless inertia asks for more."""
+REFERENCE_TORQUE_SHARE = 0.3
+TRIM_SHARE = 0.3
+ROUNDING_LIMIT_PERCENT = 0.1
+MOTOR_CONSTANTS = {"estimator.rs_q16": "MOTOR_RS_OHM", "fieldweak.ls_base_q16": "MOTOR_LS_MH", "NORM_INVKFIBASE": "MOTOR_KPHI_V_PER_KRPM"}
+"""Constants that the estimator computes with: their rounding is an error of the motor's values."""
+ROUNDING_REMEDY = {"MOTOR_RS_OHM": "a larger current range (smaller shunt or gain) gives it more counts",
+                   "MOTOR_LS_MH": "a larger current range or a shorter PWM period gives it more counts",
+                   "MOTOR_KPHI_V_PER_KRPM": "a higher bus voltage gives it more counts"}
+L_FREQUENCY_RATIO = 10.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One parameter: the text that stands in the header, and why."""
+
+    name: str
+    text: str
+    why: str
+
+
+@dataclass
+class Design:
+    """A finished design."""
+
+    motor: Motor
+    board: BoardFile
+    envelope: Envelope
+    choices: dict[str, Choice] = field(default_factory=dict)
+    constants: list[Constant] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    current_loop: loops.LoopDesign | None = None
+    speed_loop: loops.LoopDesign | None = None
+    start_up: start.StartDesign | None = None
+    tables_from: str = ""
+    """where the field-weakening tables come from"""
+    tuned_by_machine: bool = False
+    loaded_hz: float = 0.0
+    """speed bandwidth that holds half the rated torque put on in half a second at minimum speed"""
+
+    @property
+    def params(self) -> dict[str, str]:
+        """Every define by name, as text."""
+        return {name: choice.text for name, choice in self.choices.items()}
+
+    def value(self, name: str) -> float:
+        return number_of(self.choices[name].text)
+
+    def put(self, name: str, text: str, why: str) -> None:
+        """Sets a parameter, unless the motor file's [tune] says otherwise."""
+        if name in self.motor.tune:
+            text, why = plain(self.motor.tune[name]), "the motor file's [tune]"
+        self.choices[name] = Choice(name, text, why)
+
+    def constant(self, name: str) -> Constant:
+        return next(item for item in self.constants if item.name == name)
+
+    def where(self, key: str) -> str:
+        """Line of the motor file that a message is about."""
+        quantity = self.motor.quantities.get(key) or self.motor.quantities.get(f"{key}_q")
+        return quantity.where if quantity else str(places.shown(self.motor.path))
+
+
+def plain(value: float, digits: int = 6) -> str:
+    """A decimal number without exponent."""
+    return format(Decimal(f"{value:.{digits}g}"), "f")
+
+
+def real(value: float, digits: int = 6) -> str:
+    """The same with a point, so that it reads as a physical value."""
+    text = plain(value, digits)
+    return text if "." in text else text + ".0"
+
+
+def short(value: float, digits: int = 4) -> str:
+    """With an exponent where that is shorter: 5.5e-6."""
+    text = f"{value:.{digits}g}"
+    mantissa, sign, exponent = text.partition("e")
+    return f"{mantissa}e{int(exponent)}" if sign else text
+
+
+def design(motor: Motor, board: BoardFile) -> Design:
+    """Everything. Refuses by UserError what cannot work; what works with a cost is in `.warnings`."""
+    currents = _fit_emf(motor, board, limits.currents(motor, board))
+    d = Design(motor, board, Envelope(motor, limits.circle_v(board), currents.maximum_a))
+    _refuse_impossible(d, currents)
+    _motor(d)
+    _board(d)
+    _speeds(d)
+    _currents(d, currents)
+    _loops_and_start(d)
+    _field_weakening(d)
+    d.put("SNAPDELAY", "5", "the note's")
+    d.put("DATA_BUFFER_SIZE", "50", "the note's; 400 bytes of RAM")
+    _check(d)
+    d.constants = firmware_constants(d.params)
+    _warn(d, currents)
+    return d
+
+
+# ---- what cannot work ------------------------------------------------------------------------------------------------------
+
+def _refuse_impossible(d: Design, currents: limits.Currents) -> None:
+    m, e = d.motor, d.envelope
+    rated_erpm = m.rated_speed_rpm * m.pole_pairs
+    if rated_erpm > limits.LARGEST_ERPM:
+        raise UserError(f"rated speed {m.rated_speed_rpm:g} rpm with {m.pole_pairs} pole pairs is {rated_erpm:.0f} electrical rpm", d.where("speed"),
+                        f"the firmware's speeds end at {limits.LARGEST_ERPM:.0f}; a speed of {math.floor(limits.LARGEST_ERPM / m.pole_pairs)} rpm is possible")
+    _refuse_kphi(d)
+    half = 0.5 * m.rated_torque_nm
+    if e.iq(m.rated_speed_rpm, half) > currents.maximum_a:
+        largest = currents.board_a if motor_current_above(d, currents) else m.maximum_current_a
+        raise UserError(f"half the rated torque needs {e.iq(m.rated_speed_rpm, half):.2f} A peak, {largest:.2f} A are allowed", d.where("torque"),
+                        f"use a board with a larger current range than {d.board.current_full_scale_a:.3g} A (smaller shunt or gain), or raise maximum_current")
+    if e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
+        reachable = e.highest_speed(half, limits.FULL_SHARE)
+        raise UserError(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
+                        f"raise the supply voltage in {places.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
+
+
+def _refuse_kphi(d: Design) -> None:
+    """1/Kphi has 16 bits: the electrical speed at full voltage must be 4096 .. 65534 rpm."""
+    unit_v = d.board.nominal_bus_v / math.sqrt(3.0) * (1.0 - d.board.dead_time_s / d.board.pwm_period_s)
+    counts = math.sqrt(3.0) * 500.0 * d.motor.pole_pairs * unit_v / d.motor.kphi_v_per_krpm
+    if counts < 2048.0:
+        raise UserError(f"1/Kphi has only {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs, 2048 is the least",
+                        d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {math.ceil(d.board.nominal_bus_v * 2048.0 / counts)} V")
+    if counts >= 32767.0:
+        raise UserError(f"1/Kphi does not fit 16 bits: {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs",
+                        d.where("kphi"), f"the motor is too fast for {d.board.nominal_bus_v:g} V: use at most {math.floor(d.board.nominal_bus_v * 32766.0 / counts)} V")
+
+
+def motor_current_above(d: Design, currents: limits.Currents) -> bool:
+    return d.motor.maximum_current_a > currents.board_a
+
+
+def _check(d: Design) -> None:
+    """Ranges and relations of the build, in its own words."""
+    wrong = params.check(d.params)
+    if wrong:
+        tuned = [name for name in d.motor.tune if any(name in message for message in wrong)]
+        where = f"{places.shown(d.motor.path)} [tune]" if tuned else str(places.shown(d.motor.path))
+        what, _, remedy = wrong[0].partition(": ")
+        raise UserError(what, where, remedy or "change the motor file or the board file")
+
+
+# ---- motor and board ---------------------------------------------------------------------------------------------------------
+
+def _motor(d: Design) -> None:
+    m = d.motor
+    d.put("NOPOLESPAIRS", str(m.pole_pairs), "motor file")
+    d.put("MOTOR_RS_OHM", plain(m.rs_ohm), "motor file; per phase of the star")
+    d.put("MOTOR_LS_MH", plain(m.lq_h * 1e3), "motor file; per phase of the star" + (
+        ", of the q axis: with Lq in Equation 4 the salient motor's back-EMF lies on the q axis whatever the current, with Ld or a mean "
+        "its angle would turn with the torque" if m.salient else ""))
+    d.put("MOTOR_KPHI_V_PER_KRPM", plain(m.kphi_v_per_krpm), "motor file")
+    d.put("MOTOR_INERTIA_KGM2", short(m.inertia_kgm2 + m.load_inertia_kgm2), "motor file" + (", rotor and load" if m.load_inertia_kgm2 else ""))
+
+
+def _board(d: Design) -> None:
+    b = d.board
+    for name, text in (("NOMINAL_BUS_V", real(b.nominal_bus_v)), ("LOOPTIME_SEC", plain(b.pwm_period_s)), ("DEADTIME_SEC", plain(b.dead_time_s)),
+                       ("NORM_CURRENT_CONST", plain(b.current_full_scale_a / 32768.0, 7)), ("KCURRA", plain(b.current_gain)),
+                       ("KCURRB", plain(b.current_gain)), ("BUS_FULL_SCALE_V", real(b.bus_full_scale_v)),
+                       ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
+                       ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
+        d.put(name, text, "board file")
+    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, the note's corner")
+    d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
+          "the same: the note's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
+    m = d.motor
+    rise_s = (m.inertia_kgm2 + m.load_inertia_kgm2) * m.rated_speed_rpm * RPM / m.rated_torque_nm
+    faster = min(max(QUICK_ROTOR_S / rise_s, 1.0), 4.0)
+    d.put("KFILTER_VELESTIM", str(constants.filter_k(faster * VELESTIM_HZ, b.pwm_period_s)), f"{faster * VELESTIM_HZ:.0f} Hz at this PWM period, " + (
+        "the note's corner" if faster == 1.0 else f"{faster:.2g} times the note's corner: rated torque brings the rotor to rated speed in {rise_s * 1e3:.2g} ms"))
+
+
+# ---- speeds and currents -------------------------------------------------------------------------------------------------------
+
+def _speeds(d: Design) -> None:
+    m, e = d.motor, d.envelope
+    most_rpm = math.floor(limits.LARGEST_ERPM / m.pole_pairs)
+    nominal = min(m.rated_speed_rpm, math.floor(limits.LARGEST_NOMINAL_ERPM / m.pole_pairs))
+    d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else ", lowered to 27000 electrical rpm"))
+    reachable = limits.digits_down(e.highest_speed(0.0, limits.FULL_SHARE), 3)
+    maximum = min(m.maximum_speed_rpm, most_rpm, max(reachable, m.rated_speed_rpm))
+    d.put("MAXIMUM_SPEED_RPM", plain(math.floor(maximum)), "motor file's maximum_speed" if maximum == m.maximum_speed_rpm else
+          "electrical speed's end" if maximum == most_rpm else "what field weakening reaches without load")
+    inertia = m.inertia_kgm2 + m.load_inertia_kgm2
+    slope = min(m.rated_speed_rpm / REFERENCE_RISE_S, REFERENCE_TORQUE_SHARE * m.rated_torque_nm / inertia / RPM, 60000.0)
+    d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(slope, 1.0), 2)),
+          f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque")
+    d.put("TUNING_DELAY_RAMPUP", "0xF", "the note's: 1250 electrical rpm/s")
+
+
+def _currents(d: Design, currents: limits.Currents) -> None:
+    m, maximum = d.motor, currents.maximum_a
+    why = "motor file's maximum_current"
+    if maximum < limits.currents(m, d.board).maximum_a:
+        why = "lowered until the back-EMF's number format holds voltage + R I + L dI/dt"
+    elif motor_current_above(d, currents):
+        why = f"what this board can measure with a margin to its trip level ({currents.board_a:g} A)"
+    d.put("MAXIMUM_CURRENT_A", plain(maximum), why)
+    lowered = currents.trip_a < limits.currents(m, d.board).trip_a
+    d.put("OVER_CURRENT_THRESHOLD_A", plain(currents.trip_a), f"{limits.TRIP_OVER_MAXIMUM:g} times the largest current, at most "
+          f"{limits.TRIP_SHARE:.1%} of the converter's {d.board.current_full_scale_a:.3g} A" + (
+          "; lowered until the back-EMF's number format holds voltage + R I + L dI/dt at the trip level" if lowered else ""))
+    base = limits.table(d.envelope, limits.fw_start_rpm(d.envelope, d.value("MAXIMUM_SPEED_RPM")))[0]
+    half = d.envelope.least_id(m.rated_speed_rpm, 0.5 * m.rated_torque_nm, limits.TABLE_SHARE)
+    needed = -(half if half is not None else d.envelope.deepest_id(d.envelope.iq(m.rated_speed_rpm, 0.5 * m.rated_torque_nm))) + base
+    trim = limits.digits_down(max(TRIM_SHARE * maximum, min(1.2 * needed, 0.8 * maximum)), 1)
+    d.put("FW_TRIM_CURRENT_A", real(trim), f"{TRIM_SHARE:.0%} of the largest current, or what rated speed needs at half the rated torque")
+
+
+def _fit_emf(motor: Motor, board: BoardFile, wanted: limits.Currents) -> limits.Currents:
+    """Lowers first the trip level, then the largest current, until Equation 4 stays inside its format (a relation of param_table.h).
+    Gives up at half the rated current; the relation's own message tells then."""
+    fastest = max(min(motor.maximum_speed_rpm, limits.LARGEST_ERPM / motor.pole_pairs), 1.5 * motor.rated_speed_rpm) * RPM * motor.pole_pairs
+    room_v = 0.985 * 4.0 * board.nominal_bus_v / math.sqrt(3.0) * (1.0 - board.dead_time_s / board.pwm_period_s) - board.over_voltage_v / math.sqrt(3.0)
+
+    def fits(trip_a: float, maximum_a: float) -> bool:
+        return 2.0 / math.sqrt(3.0) * trip_a * motor.rs_ohm + fastest * 1.2 * motor.lq_h * maximum_a < room_v
+
+    trip, maximum = wanted.trip_a, wanted.maximum_a
+    while not fits(trip, maximum) and maximum > 0.5 * motor.rated_current_a:
+        if trip > 1.02 * limits.LEAST_TRIP_OVER_MAXIMUM * maximum:
+            trip = float(f"{max(0.98 * trip, limits.LEAST_TRIP_OVER_MAXIMUM * maximum):.3g}")
+        else:
+            maximum = float(f"{0.97 * maximum:.3g}")
+            trip = float(f"{1.001 * limits.LEAST_TRIP_OVER_MAXIMUM * maximum:.3g}")
+    return limits.Currents(trip, maximum, wanted.board_a) if fits(trip, maximum) else wanted
+
+
+# ---- loops and start -----------------------------------------------------------------------------------------------------------
+
+def _spread(motor: Motor) -> dict[str, tuple[float, float]]:
+    """The motor file's published spread as factors."""
+    found = {}
+    for key, name, nominal in (("rs_ohm", "rs", motor.rs_ohm), ("ls_h", "ls", motor.lq_h), ("kphi_v_per_krpm", "psi", motor.kphi_v_per_krpm)):
+        if key in motor.spread:
+            low, high = motor.spread[key]
+            found[name] = (low / nominal, high / nominal)
+    return found
+
+
+def _loops_and_start(d: Design) -> None:
+    m, period = d.motor, d.board.pwm_period_s
+    plant = loops.Plant(m.rs_ohm, m.ld_h, m.lq_h, m.psi_vs, m.pole_pairs, m.inertia_kgm2 + m.load_inertia_kgm2, m.viscous_nms)
+    base = loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, d.value("KFILTER_ESDQ") / 32768.0, d.value("KFILTER_VELESTIM") / 32768.0, period)
+    f = Formulas({**d.params, "CURRENT_BANDWIDTH_HZ": 1.0, "SPEED_BANDWIDTH_HZ": 1.0}, float)
+    low, high = (float(x) for x in (params.parameters()["CURRENT_BANDWIDTH_HZ"].low, params.parameters()["CURRENT_BANDWIDTH_HZ"].high))
+    largest = min(high, 0.98 / f["Q_CURRCNTR_PTERM"], 15.7 / f["Q_CURRCNTR_ITERM"])
+    d.current_loop = loops.design_current(plant, _spread(m), base, d.envelope.omega(d.value("MAXIMUM_SPEED_RPM")), largest, low,
+                                          m.tune.get("CURRENT_BANDWIDTH_HZ"))
+    bandwidth = d.current_loop.bandwidth_hz
+    cap = f"1/{1 / loops.CURRENT_CAP:.0f} of the PWM frequency"
+    d.put("CURRENT_BANDWIDTH_HZ", plain(bandwidth), (
+        f"the largest up to {cap} (a converter step would shake the voltage more, and nothing outside needs it) with "
+        if bandwidth <= loops.CURRENT_CAP / period else f"above {cap}, because the rotation at top speed takes the margin below: the least with ")
+        + f"{loops.PHASE_MARGIN_DEG:.0f} degrees of phase margin over the parameter set")
+    if m.salient:
+        d.put("D_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.ld_h * f.iu / 16.0, 5), "2 pi f Ld: the d axis has its own inductance")
+        d.put("Q_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.lq_h * f.iu / 16.0, 5), "2 pi f Lq")
+    gains = loops.current_gains(plant, bandwidth, base)
+    _start(d, plant, gains)
+    speeds = {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
+    low, high = (float(x) for x in (params.parameters()["SPEED_BANDWIDTH_HZ"].low, params.parameters()["SPEED_BANDWIDTH_HZ"].high))
+    calm = limits.digits_down(loops.SPEED_CAP * d.value("MINIMUM_SPEED_RPM") * m.pole_pairs / 60.0, 3)
+    d.loaded_hz = limits.digits_down(loops.least_speed_bandwidth(m.rated_torque_nm, plant.inertia, d.value("MINIMUM_SPEED_RPM") * RPM), 3)
+    d.speed_loop = loops.design_speed(plant, _spread(m), gains, {label: d.envelope.omega(d.value(name)) for label, name in speeds.items()},
+                                      max(low, min(high, 0.98 / f["SPEEDCNTR_PTERM"], max(calm, d.loaded_hz))), low, m.tune.get("SPEED_BANDWIDTH_HZ"))
+    d.put("SPEED_BANDWIDTH_HZ", plain(d.speed_loop.bandwidth_hz), f"the largest with {loops.PHASE_MARGIN_DEG:.0f} degrees of phase margin over the "
+          f"parameter set from the minimum to the maximum speed, at most {loops.SPEED_CAP:g} of the electrical frequency at minimum speed ({calm:g} Hz: "
+          f"above, the dead time may make an unloaded motor hunt) or what loads ask for ({d.loaded_hz:g} Hz)")
+
+
+def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
+    m = d.motor
+    s = start.design_start(m, d.board, plant, gains, d.value("MAXIMUM_CURRENT_A"), d.value("NOMINAL_SPEED_RPM"), m.tune)
+    d.start_up = s
+    d.put("Q_CURRENT_REF_OPENLOOP", plain(s.current_a), f"{start.CURRENT_SHARE:.0%} of the rated current, or (load + friction)/(Kt {start.LOAD_ANGLE_SINE:g}): "
+          f"pull-out torque {s.pull_out_nm:.3g} N m for {s.needed_nm:.3g} N m")
+    d.put("END_SPEED_RPM", plain(s.end_speed_rpm), f"back-EMF {s.emf_v:.2f} V: its error, {s.error_v:.2f} V (R {start.R_ERROR:.0%} wrong, "
+          f"{start.DEAD_TIME_ERROR:.0%} of the dead time, one converter step), turns the angle by 20 degrees")
+    d.put("MINIMUM_SPEED_RPM", plain(s.minimum_speed_rpm), "20 % of rated speed, at most END_SPEED_RPM")
+    d.put("LOCK_TIME", str(2 * round(s.lock_s / d.board.pwm_period_s / 2.0)), f"{start.LOCK_SWINGS:.0f} swings of the locked rotor "
+          f"({s.natural_hz:.0f} Hz, damping {s.damping:.3f}), at least {start.LEAST_LOCK_S:g} s")
+    d.put("OPENLOOP_RAMPSPEED_INCREASERATE", str(s.rate), f"{s.ramp_s:.1f} s to END_SPEED_RPM; J dw/dt at most {start.RAMP_TORQUE_SHARE:.0%} of the pull-out torque")
+
+
+# ---- field weakening -----------------------------------------------------------------------------------------------------------
+
+def _field_weakening(d: Design) -> None:
+    start_rpm = limits.fw_start_rpm(d.envelope, d.value("MAXIMUM_SPEED_RPM"))
+    d.put("FW_START_SPEED_RPM", plain(start_rpm), f"7/8 of the no-load base speed {d.envelope.base_speed(0.0):.0f} rpm; 18 entries reach the maximum speed")
+    known = {name: number_of(text) for name, text in d.params.items() if text != "NORM_INVKFIBASE"}
+    tables, reason = fw_tables.load_for(d.motor.name, known)
+    if reason:
+        d.warnings.append(reason)
+    rows = {f"IDREF_SPEED{i}": f"{i_d:.2f}" for i, i_d in enumerate(limits.table(d.envelope, d.value("FW_START_SPEED_RPM")))}
+    rows |= {f"INVKFI_SPEED{i}": "NORM_INVKFIBASE" for i in range(18)}
+    rows |= {f"LS_OVER2LS0_SPEED{i}": "0.5" for i in range(18)}
+    d.tables_from = "the motor's voltage equation"
+    why = f"least d current that keeps the voltage within {limits.TABLE_SHARE:.0%} of its circle without load"
+    if tables is not None and "FW_START_SPEED_RPM" not in d.motor.tune:
+        rows, d.tuned_by_machine = tables.parameters(), True
+        d.tables_from = f"{places.shown(fw_tables.path_of(d.motor.name))}, found on the virtual board by make tune-fw"
+        why = "found on the virtual board"
+    for name, text in rows.items():
+        d.put(name, text, why)
+
+
+# ---- what works with a cost ----------------------------------------------------------------------------------------------------
+
+def _warn(d: Design, currents: limits.Currents) -> None:
+    _warn_currents(d, currents)
+    _warn_speeds(d)
+    _warn_numbers(d)
+    _warn_loops(d)
+
+
+def _warn_currents(d: Design, currents: limits.Currents) -> None:
+    m = d.motor
+    if motor_current_above(d, currents):
+        d.warnings.append(f"maximum_current {m.maximum_current_a:.3g} A peak is above what this board can measure and protect ({currents.board_a:g} A of "
+                          f"{d.board.current_full_scale_a:.3g} A): MAXIMUM_CURRENT_A is {currents.maximum_a:g}; a smaller shunt or gain raises it")
+    elif currents.maximum_a < float(f"{m.maximum_current_a:.3g}"):
+        d.warnings.append(f"MAXIMUM_CURRENT_A is {currents.maximum_a:g} instead of {m.maximum_current_a:.3g}: with more, R I + L dI/dt leave the back-EMF's number "
+                          "format; lower maximum_speed, or raise the supply voltage")
+    if m.rated_current_a > currents.maximum_a:
+        d.warnings.append(f"rated current {m.rated_current_a:.3g} A peak is above MAXIMUM_CURRENT_A = {currents.maximum_a:g}: at most "
+                          f"{m.kt_nm_per_a * currents.maximum_a:.3g} N m of {m.rated_torque_nm:.3g} N m; a smaller shunt or gain raises it")
+
+
+def _warn_speeds(d: Design) -> None:
+    m, e = d.motor, d.envelope
+    torque = e.torque(m.rated_speed_rpm, limits.FULL_SHARE)
+    if torque < 0.99 * m.rated_torque_nm and e.iq(m.rated_speed_rpm, m.rated_torque_nm) <= e.maximum_a:
+        d.warnings.append(f"{d.board.nominal_bus_v:g} V are too low for the rated torque at rated speed: about {torque:.2g} N m of {m.rated_torque_nm:.2g} N m at "
+                          f"{m.rated_speed_rpm:g} rpm; raise the supply voltage, or lower the rated speed to {limits.digits_down(max(e.highest_speed(m.rated_torque_nm, limits.FULL_SHARE), 1.0), 2):g} rpm")
+    most = d.value("MAXIMUM_SPEED_RPM")
+    if most < math.floor(m.maximum_speed_rpm):
+        if most * m.pole_pairs >= limits.LARGEST_ERPM - m.pole_pairs:
+            why = f"{limits.LARGEST_ERPM:.0f} electrical rpm are the firmware's end"
+        else:
+            why = f"{d.board.nominal_bus_v:g} V and {e.maximum_a:g} A reach no more; raise the supply voltage or maximum_current"
+        d.warnings.append(f"maximum_speed {m.maximum_speed_rpm:g} rpm is not reachable, MAXIMUM_SPEED_RPM is {most:g}: {why}")
+    if d.value("NOMINAL_SPEED_RPM") < m.rated_speed_rpm:
+        d.warnings.append(f"rated speed {m.rated_speed_rpm:g} rpm is above {limits.LARGEST_NOMINAL_ERPM:.0f} electrical rpm: NOMINAL_SPEED_RPM is "
+                          f"{d.value('NOMINAL_SPEED_RPM'):g}, use S3 for the rest")
+    electrical_hz = m.rated_speed_rpm * m.pole_pairs / 60.0
+    measured = m.inductance_frequency_hz
+    if measured is not None and not 1.0 / L_FREQUENCY_RATIO <= measured / electrical_hz <= L_FREQUENCY_RATIO:
+        d.warnings.append(f"the inductance was measured at {measured:g} Hz, the motor turns at {electrical_hz:.0f} Hz electrical: iron and eddy currents make "
+                          "it differ; measure it near the motor's frequency or by `make identify`")
+
+
+def _warn_numbers(d: Design) -> None:
+    for name, parameter in MOTOR_CONSTANTS.items():
+        item = d.constant(name)
+        if abs(item.error_percent) > ROUNDING_LIMIT_PERCENT:
+            d.warnings.append(f"{parameter} = {d.choices[parameter].text} is rounded by {item.error_percent:+.2f} % ({name} = {item.q_value}): "
+                              f"{ROUNDING_REMEDY[parameter]}")
+    f = Formulas(d.params, float)
+    for name, wanted, limit in (("D_ILIMIT_LS", 8.0 * f.di("NOMINAL_SPEED_RPM"), 16383.0), ("D_ILIMIT_HS", f.di("MAXIMUM_SPEED_RPM"), 4095.0)):
+        if wanted > 1.02 * limit:
+            d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "
+                              "high current; lower MAXIMUM_CURRENT_A or the speed")
+    ramp = d.constant("speed_ramp_erpm")
+    if ramp.error_percent > 30.0:
+        d.warnings.append(f"SPEEDREFRAMP_RPM_PER_S = {d.choices['SPEEDREFRAMP_RPM_PER_S'].text} becomes {ramp.value * (1 + ramp.error_percent / 100):.0f} rpm/s: one "
+                          "electrical rpm in 8 periods is the slowest; turn the potentiometer slowly with this inertia")
+    integral = d.constant("pi_speed.ki")
+    if abs(integral.error_percent) > 10.0:
+        d.warnings.append(f"the speed controller's integral is rounded by {integral.error_percent:+.0f} % (pi_speed.ki = {integral.q_value}): the zero moves; "
+                          "a smaller current range gives it more counts")
+
+
+def _warn_loops(d: Design) -> None:
+    for what, loop, name in (("current", d.current_loop, "CURRENT_BANDWIDTH_HZ"), ("speed", d.speed_loop, "SPEED_BANDWIDTH_HZ")):
+        if loop and not loop.reached:
+            d.warnings.append(f"{name} = {loop.bandwidth_hz:g}: the {what} loop has {loop.worst.phase_deg:.0f} degrees and {loop.worst.gain_db:.0f} dB of margin at "
+                              f"worst ({loop.worst_case}), {loops.PHASE_MARGIN_DEG:.0f} degrees and {loops.GAIN_MARGIN_DB:.0f} dB are asked for; "
+                              + ("remove it from [tune]" if name in d.motor.tune else "a lower maximum_speed or a shorter PWM period helps" if what == "current"
+                                 else "a smaller load inertia helps"))
+    if d.speed_loop and d.speed_loop.bandwidth_hz < 0.8 * d.loaded_hz:
+        d.warnings.append(f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow for so quick a rotor ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
+                          "second at minimum speed): put loads on slowly, or at a higher speed, or add inertia")
+    s = d.start_up
+    if s and not s.follows and s.trial is not None:
+        lost = [label for label, ok in zip(s.trial.labels, s.trial.followed) if not ok]
+        d.warnings.append(f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): raise maximum_current, or "
+                          "lower start_torque or the load's inertia")
+

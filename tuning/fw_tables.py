@@ -1,0 +1,170 @@
+"""The three field-weakening tables of a motor as a file (tuning/tables/NAME.toml), and which motor values they belong to."""
+
+import math
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tools.foc33 import places
+from tools.foc33.errors import UserError
+from tools.foc33.toml_file import Document
+
+ENTRIES = 18
+STEP_ERPM = 1024
+"""One table step in electrical rpm (the note's SPEED_INDEX_CONST 10)."""
+FOLDER = places.ROOT / "tuning" / "tables"
+FINGERPRINT = ("NOPOLESPAIRS", "MOTOR_RS_OHM", "MOTOR_LS_MH", "MOTOR_KPHI_V_PER_KRPM", "NOMINAL_BUS_V", "LOOPTIME_SEC", "DEADTIME_SEC",
+               "SAMPLE_WINDOW_SEC", "MAXIMUM_CURRENT_A")
+"""Parameters of userparams.h that the tables depend on."""
+NEARLY = 1e-4
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One entry of the three tables: d current, 1/Kphi in the note's counts, Ls/(2 Ls0)."""
+
+    idref_a: float = 0.0
+    inv_kfi: float = 0.0
+    ls_ratio: float = 0.5
+
+
+@dataclass
+class Tables:
+    """A tables file. `rows` holds what was measured at each entry; `stopped` says why no further entry was found."""
+
+    motor: str
+    start_speed_rpm: float
+    entries: list[Entry]
+    fingerprint: dict[str, float]
+    inv_kfi_base: float
+    last_index: int = 0
+    stopped: str = ""
+    maximum_speed_rpm: float = 0.0
+    goal: dict[str, float] = field(default_factory=dict)
+    rows: list[dict[str, float]] = field(default_factory=list)
+
+    def speed_rpm(self, index: int) -> float:
+        """Speed reference of an entry."""
+        return self.start_speed_rpm + index * STEP_ERPM / self.fingerprint["NOPOLESPAIRS"]
+
+    def mismatch(self, params: Mapping[str, float]) -> str:
+        """"" if the tables belong to a motor with these parameters of userparams.h; otherwise the first difference."""
+        return difference(self.fingerprint, params)
+
+    def parameters(self) -> dict[str, str]:
+        """Names and values of userparams.h; an unchanged 1/Kphi is written as NORM_INVKFIBASE."""
+        values = {"FW_START_SPEED_RPM": f"{self.start_speed_rpm:g}"}
+        for i, entry in enumerate(self.entries):
+            flat = abs(entry.inv_kfi - self.inv_kfi_base) < 0.5
+            values |= {f"IDREF_SPEED{i}": f"{entry.idref_a:.2f}" if entry.idref_a else "0.00",
+                       f"INVKFI_SPEED{i}": "NORM_INVKFIBASE" if flat else f"{entry.inv_kfi:.0f}",
+                       f"LS_OVER2LS0_SPEED{i}": f"{entry.ls_ratio:g}"}
+        return values
+
+
+def fingerprint(params: Mapping[str, float]) -> dict[str, float]:
+    """The values that tables found with these parameters belong to."""
+    return {name: float(params[name]) for name in FINGERPRINT}
+
+
+def difference(known: Mapping[str, float], params: Mapping[str, float]) -> str:
+    for name in FINGERPRINT:
+        if not math.isclose(known[name], params[name], rel_tol=NEARLY):
+            return f"they are for {name} = {known[name]:g}, the motor has {params[name]:g}"
+    return ""
+
+
+def path_of(motor: str) -> Path:
+    return FOLDER / f"{motor}.toml"
+
+
+def load(path: Path) -> Tables:
+    """Reads and checks a tables file; a wrong one is a user error with its line."""
+    root = Document(path).root
+    base = root.number("inv_kfi_base", minimum=2048, maximum=32767)
+    columns = [root.numbers("idref_a", -20.0, 0.0), root.numbers("inv_kfi", 2048.0, 32767.0), root.numbers("ls_ratio", 0.1, 0.6)]
+    for name, column in zip(("idref_a", "inv_kfi", "ls_ratio"), columns):
+        if len(column) != ENTRIES:
+            raise root.fail(name, f"'{name}' has {len(column)} values", f"it needs {ENTRIES}; make tune-fw writes the file anew")
+    tables = Tables(root.text("motor"), root.number("start_speed_rpm", minimum=100.0, maximum=20000.0),
+                    [Entry(*values) for values in zip(*columns)], {}, base, root.integer("last_index", 0, 0, ENTRIES - 1),
+                    root.text("stopped", ""), root.number("maximum_speed_rpm", 0.0, 0.0))
+    known, goal = root.section("fingerprint"), root.section("goal")
+    if known is None:
+        raise UserError("'fingerprint' is missing", root.where(), "run make tune-fw for the motor")
+    tables.fingerprint = {name: known.number(name) for name in FINGERPRINT}
+    known.close()
+    if goal is not None:
+        tables.goal = {key: goal.number(key) for key in goal.data}
+    tables.rows = [{key: row.number(key) for key in row.data} for row in root.sections("entry")]
+    root.close()
+    return tables
+
+
+def load_for(motor: str, params: Mapping[str, float], folder: Path = FOLDER) -> tuple[Tables | None, str]:
+    """The motor's tables, or None and the reason in one line ("" where there is simply no file)."""
+    path = folder / f"{motor}.toml"
+    if not path.is_file():
+        return None, ""
+    tables = load(path)
+    reason = tables.mismatch(params)
+    if reason:
+        return None, f"{places.shown(path)} is not used: {reason}; run make tune-fw MOTOR={motor}"
+    return tables, ""
+
+
+def write(path: Path, tables: Tables) -> None:
+    """Writes the file in one step: what is there is either the old file or the whole new one."""
+    unfinished = path.with_name(f".{path.name}-unfinished-{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_text(text(tables), encoding="utf-8")
+        unfinished.replace(path)
+    except OSError as error:
+        raise UserError(f"cannot write '{places.shown(path)}' ({error.strerror})", "", "choose another place with --tables") from None
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def text(tables: Tables) -> str:
+    entries = tables.entries
+    lines = [f"# Field-weakening tables of {tables.motor}, found on the virtual board by: make tune-fw MOTOR={tables.motor}",
+             "# make tune puts them into the motor's userparams.h as long as the fingerprint matches the motor file.",
+             f"motor = {_quoted(tables.motor)}", f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
+             f"last_index = {tables.last_index}          # the last entry that was reached",
+             f"stopped = {_quoted(tables.stopped)}", f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # reached without load",
+             f"inv_kfi_base = {tables.inv_kfi_base:.0f}",
+             "idref_a = " + _list(f"{entry.idref_a:.2f}" for entry in entries),
+             "inv_kfi = " + _list(f"{entry.inv_kfi:.0f}" for entry in entries),
+             "ls_ratio = " + _list(f"{entry.ls_ratio:g}" for entry in entries),
+             "", "[fingerprint]      # parameters of userparams.h that the tables belong to"]
+    lines += [f"{name} = {tables.fingerprint[name]:.6g}" for name in FINGERPRINT]
+    if tables.goal:
+        lines += ["", "[goal]"] + [f"{name} = {value:.6g}" for name, value in tables.goal.items()]
+    for row in tables.rows:
+        lines += ["", "[[entry]]"] + [f"{name} = {_number(value)}" for name, value in row.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}" if math.isfinite(value) else "nan"
+
+
+def _quoted(words: str) -> str:
+    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _list(values: Any) -> str:
+    return "[" + ", ".join("0.00" if value == "-0.00" else value for value in values) + "]"
+
+
+def with_values(header: str, values: Mapping[str, str], where: str) -> str:
+    """The text of a userparams.h with other values, comments and order kept."""
+    for name, value in values.items():
+        header, found = re.subn(rf"^([ \t]*#[ \t]*define[ \t]+{name}[ \t]+)(\S+)", lambda m: m[1] + value, header, flags=re.MULTILINE)
+        if found != 1:
+            raise UserError(f"'{name}' is not defined once", where, "give a complete userparams.h")
+    return header

@@ -1,0 +1,476 @@
+"""`tune-fw`: finds a motor's field-weakening tables on the virtual board, as AN1292's tuning section does by hand, and writes them down.
+
+    1  raise the speed to where the voltage asks for d current: that is FW_START_SPEED_RPM, entry 0
+    2  entry by entry, 1024 electrical rpm apart: the least d current with which speed, lock and a margin of voltage hold at the entry's
+       load; Ls and then 1/Kphi where the angle error asks for them (fw_search.py). The entries change while the motor turns
+       (PARAMS_IN_RAM); the voltage feedback's trim is off, so that the tables carry the load
+    3  with the trim back on: the largest load torque at each entry, and the highest speed without load
+    4  a firmware with the new tables, as make tune would build it, goes to the top and back
+
+The load of an entry is a share of the rated torque, constant up to rated speed and falling with 1/speed above (constant power), as long
+as the rated current is enough for it. Beyond, the tables make room for the speed alone, and the trim for a load.
+"""
+
+import argparse
+import math
+import re
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from tools.foc33 import board_file, build, motor_file, output, places, plant, report, steps, workers
+from tools.foc33.board import Library
+from tools.foc33.errors import UserError
+
+from . import fw_tables
+from .fw_bench import Bench, Fault
+from .fw_search import Found, Goal, Result, Search, largest, least, model_use, torque_per_ampere
+from .fw_tables import ENTRIES, STEP_ERPM, Tables
+
+RESULTS = places.ROOT / "build" / "tune-fw"
+FIRMWARE = places.ROOT / "build" / "tune-fw-firmware"
+TORQUE_SHARE, ANGLE_DEG, MARGIN = 0.2, 3.0, 0.03
+ID_SHARE = 31.0 / 32.0
+"""The firmware keeps d currents below this share of MAXIMUM_CURRENT_A."""
+FORMAT_ERPM = 32000.0
+SPEED_STEP_RPM = 10.0
+TORQUE_STEPS = 8
+COLUMNS = (("speed_rpm", "speed\nrpm", "{:.0f}"), ("before_a", "Id so far\nA", "{:.2f}"), ("idref_a", "Id\nA", "{:.2f}"),
+           ("inv_kfi", "1/Kphi\nQ15/2", "{:.0f}"), ("ls_ratio", "Ls/2Ls0\n", "{:.3f}"), ("load_nm", "its load\nN m", "{:.4f}"),
+           ("use_percent", "voltage\n% of limit", "{:.1f}"), ("use_free_percent", "no load\n%", "{:.1f}"),
+           ("angle_deg", "angle error\nmean deg", "{:+.2f}"), ("angle_free_deg", "no load\ndeg", "{:+.2f}"),
+           ("current_a_rms", "current\nA rms", "{:.2f}"), ("current_free_a_rms", "no load\nA rms", "{:.2f}"),
+           ("torque_nm", "torque\nN m", "{:.4f}"))
+
+
+# ---- the command -----------------------------------------------------------------------------------------------------------
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What `tune-fw` understands."""
+    parser.add_argument("motor", help="a name in tuning/motors, or a motor file")
+    parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
+    parser.add_argument("--userparams", help="folder with the userparams.h to begin with; default: what make tune makes of the motor file")
+    parser.add_argument("--tables", type=Path, help="where the tables go; default tuning/tables/MOTOR.toml")
+    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/MOTOR")
+    parser.add_argument("--torque-share", type=float, default=TORQUE_SHARE, metavar="X",
+                        help=f"load that the tables carry, as a share of the rated torque; default {TORQUE_SHARE:g}")
+    parser.add_argument("--margin", type=float, default=MARGIN, metavar="X",
+                        help=f"share of the voltage limit that stays free at that load; default {MARGIN:g}")
+    parser.add_argument("--angle-deg", type=float, default=ANGLE_DEG, metavar="DEG",
+                        help=f"largest mean angle error; beyond it Ls and 1/Kphi are adapted; default {ANGLE_DEG:g}")
+    parser.add_argument("--limit-a", type=float, metavar="A", help="largest d current; default: what MAXIMUM_CURRENT_A and the motor file allow")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
+                        help="change a key of the virtual board, e.g. motor.sat_lq_ratio=0.3; may be repeated")
+    parser.add_argument("--entries", type=int, default=ENTRIES, metavar="N", help="stop after N entries (for a quick look); default all 18")
+    parser.add_argument("--processes", type=int, metavar="N", help="processes at a time; default one per processor")
+    parser.add_argument("--no-plots", action="store_true", help="no pictures")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def add_command(commands: Any) -> None:
+    """Adds `tune-fw` to a command line's commands."""
+    parser = commands.add_parser("tune-fw", help="field-weakening tables of a motor, found on the virtual board")
+    add_arguments(parser)
+    parser.set_defaults(command=command)
+
+
+def command(options: argparse.Namespace) -> int:
+    """The whole command; returns the exit code."""
+    _check(options)
+    started = time.perf_counter()
+    motor, board = motor_file.load(options.motor, "tune-fw"), board_file.load(options.board, "--board")
+    header = _header(options, motor, board)
+    target = options.out or RESULTS / motor.name
+    path = options.tables or fw_tables.path_of(motor.name)
+    with output.ResultFolder(target) as folder, _Show(options.quiet) as show:
+        work = _Work(motor, header, _layers(motor, board, options), options, show)
+        tables, rows = work.search()
+        check = work.check(tables)
+        data = _write(folder.work, tables, rows, check, motor, options)
+        fw_tables.write(path, tables)
+    _print(motor, tables, rows, check, data)
+    print(f"\nsimulated {work.motor_s:.0f} s of motor time in {time.perf_counter() - started:.0f} s")
+    print(f"tables in {places.shown(path)}, plots and numbers in {places.shown(target)}/")
+    for line in check.problems:
+        print(f"foc33: {motor.name}: {line}", file=sys.stderr)
+    return 1 if check.problems else 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    for name, low, high in (("torque_share", 0.0, 1.0), ("margin", 0.0, 0.3), ("angle_deg", 0.1, 30.0), ("limit_a", 0.01, 20.0),
+                            ("entries", 2, ENTRIES), ("processes", 1, 1024)):
+        value = getattr(options, name)
+        if value is not None and not low <= value <= high:
+            flag = "--" + name.replace("_", "-")
+            raise UserError(f"{flag[2:]} = {value:g} is impossible", flag, f"choose {low:g} .. {high:g}")
+
+
+def _layers(motor: Any, board: Any, options: argparse.Namespace) -> list[Any]:
+    return [motor.plant_values(), board.plant_values(), steps.changes(options.changes)]
+
+
+def _header(options: argparse.Namespace, motor: Any, board: Any) -> str:
+    """The text of the userparams.h to begin with."""
+    if options.userparams:
+        folder = Path(options.userparams)
+        path = folder if folder.is_file() else folder / build.HEADER
+        if not path.is_file():
+            raise UserError(f"no {build.HEADER} in '{options.userparams}'", "--userparams", "name the folder that holds it")
+        return path.read_text(encoding="utf-8")
+    from . import design, header
+    return header.write(design.design(motor, board))
+
+
+# ---- the work --------------------------------------------------------------------------------------------------------------
+@dataclass
+class Check:
+    """What the finished firmware did."""
+
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What a process needs: a library, the plant, and what to do with it."""
+
+    library: Path
+    values: dict[str, float]
+    goal: Goal
+    tables: Tables | None = None
+    index: int = 0
+    entries: int = ENTRIES
+
+
+class _Work:
+    """The steps of one command; `motor_s` counts the motor time."""
+
+    def __init__(self, motor: Any, header: str, layers: list[Any], options: argparse.Namespace, show: "_Show") -> None:
+        self.motor, self.header, self.options, self.show = motor, header, options, show
+        self.motor_s = 0.0
+        known = defines(header)
+        top_rpm = highest_speed(known)
+        library = self._library("search", with_values(header, {"MAXIMUM_SPEED_RPM": f"{top_rpm:.0f}"}), ["PARAMS_IN_RAM"])
+        self.params = library.params
+        self.values = plant.resolve(layers, library.keys)
+        limit_a = min(self.params["MAXIMUM_CURRENT_A"] * ID_SHARE, motor.maximum_current_a)
+        if options.limit_a is not None:
+            limit_a = min(options.limit_a, self.params["MAXIMUM_CURRENT_A"] * ID_SHARE)
+        goal = Goal(1.0 - options.margin, options.angle_deg, limit_a, motor.rated_current_a, motor.rated_torque_nm, motor.rated_speed_rpm, options.torque_share,
+                    motor.maximum_speed_rpm)
+        self.job = _Job(library.path, self.values, goal, entries=options.entries)
+
+    def _library(self, use: str, header: str, defines_: list[str]) -> Library:
+        """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
+        folder = FIRMWARE / f"{self.motor.name}-{use}"
+        path = folder / build.HEADER
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not path.is_file() or path.read_text(encoding="utf-8") != header:
+                path.write_text(header, encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"cannot write '{places.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
+        return Library(build.library(defines_, folder))
+
+    def _count(self, news: Any) -> None:
+        if isinstance(news, tuple):
+            self.show.entry(*news)
+        else:
+            self.motor_s += news
+            self.show.time(self.motor_s)
+
+    def _run(self, jobs: list[_Job], work: Callable, title: str) -> list[Any]:
+        self.show.stage(title, len(jobs))
+        return workers.run_all(jobs, work, self._count, self.options.processes)
+
+    def search(self) -> tuple[Tables, list[dict[str, float]]]:
+        """The tables, and what was measured at each entry."""
+        self.show.stage("search", self.options.entries)
+        try:
+            result: Result = workers.run_all([self.job], _search, self._count, 1)[0]
+        except UserError as error:
+            raise UserError(f"{self.motor.name}: {error}") from None
+        start_rpm = result.start_rpm if result.needed else min(self.params["FW_START_SPEED_RPM"], result.start_rpm - SPEED_STEP_RPM)
+        tables = Tables(self.motor.name, round(start_rpm), result.entries(), fw_tables.fingerprint(self.params),
+                        self.params["INVKFI_SPEED0"], result.found[-1].index, result.stopped, goal=self._goal())
+        job = replace(self.job, tables=tables)
+        torques = self._run([replace(job, index=found.index) for found in result.found], _torque, "torque")
+        tables.maximum_speed_rpm = self._run([job], _maximum, "top speed")[0]
+        tables.rows = [row(found, torque) for found, torque in zip(result.found, torques)]
+        rows = [{"name": str(found.index), "before_a": table_current(defines(self.header), found.rpm), **values}
+                for found, values in zip(result.found, tables.rows)]
+        return tables, rows
+
+    def _goal(self) -> dict[str, float]:
+        goal = self.job.goal
+        return {"torque_share": goal.torque_share, "voltage_margin": 1.0 - goal.use, "angle_error_deg": goal.angle_deg,
+                "current_limit_a": goal.limit_a}
+
+    def check(self, tables: Tables) -> Check:
+        """The new tables in the firmware that a user gets: to the maximum speed, to the highest speed found, and an orderly stop."""
+        wanted = self.job.goal.maximum_rpm
+        top = math.floor(tables.maximum_speed_rpm)
+        values = {**tables.parameters(), "MAXIMUM_SPEED_RPM": f"{max(top, round(self.params['NOMINAL_SPEED_RPM']) + 1):.0f}"}
+        library = self._library("check", with_values(self.header, values), [])
+        speeds = [wanted] if wanted <= top else []
+        speeds += [top] if top > wanted + SPEED_STEP_RPM or not speeds else []
+        job = replace(self.job, library=library.path, tables=tables)
+        check: Check = self._run([job], lambda job, tell: _end_to_end(job, speeds, tell), "check")[0]
+        if top < wanted - 0.005 * wanted:
+            check.problems.append(f"maximum speed {wanted:.0f} rpm is not reached, {top:.0f} rpm is: {tables.stopped}")
+        return check
+
+
+def _search(job: _Job, tell: Callable) -> Result:
+    bench = Bench(job.library, job.values, tell)
+    try:
+        return Search(bench, job.goal, lambda *news: tell(news), job.entries).run()
+    except Fault as fault:
+        raise UserError(f"the motor stopped with {fault} at {bench.target_rpm:.0f} rpm, below field weakening", "",
+                        "run the motor there with make run and look at its plots") from None
+    finally:
+        bench.close()
+
+
+def _ready(job: _Job, tell: Callable) -> Bench:
+    """A bench with the new tables and the trim as in userparams.h, in closed loop."""
+    bench = Bench(job.library, job.values, tell)
+    assert job.tables is not None
+    bench.set("FW_START_SPEED_RPM", job.tables.start_speed_rpm)
+    for i, entry in enumerate(job.tables.entries):
+        bench.entry(i, entry)
+    bench.start()
+    return bench
+
+
+def _torque(job: _Job, tell: Callable) -> float:
+    """Largest load at an entry's speed with the speed still held."""
+    bench = _ready(job, tell)
+    assert job.tables is not None
+    rpm = job.tables.speed_rpm(job.index)
+
+    def held(torque_nm: float) -> bool:
+        return holds(bench, rpm, torque_nm)
+
+    try:
+        limit = torque_per_ampere(bench.params) * bench.params["MAXIMUM_CURRENT_A"]
+        return largest(held, limit, TORQUE_STEPS)
+    finally:
+        bench.close()
+
+
+def holds(bench: Bench, rpm: float, torque_nm: float) -> bool:
+    """From the unloaded motor at `rpm`: the load comes in half a second, and the speed is there after it. Unloads again."""
+    held = False
+    try:
+        if bench.stopped():
+            bench.start()
+        bench.speed(rpm)
+        if bench.regain():
+            for step in range(1, 26):
+                bench.load(torque_nm * step / 25.0)
+                bench.run(0.02)
+            bench.settle()
+            bench.run(0.3)
+            held = bench.point().held
+        bench.load(0.0)
+        bench.regain()
+    except Fault:
+        bench.load(0.0)
+    return held
+
+
+def _maximum(job: _Job, tell: Callable) -> float:
+    """Highest speed held without load."""
+    bench = _ready(job, tell)
+    assert job.tables is not None
+    base = job.tables.speed_rpm(job.tables.last_index)
+    ceiling = bench.params["MAXIMUM_SPEED_RPM"]
+
+    def too_fast(step: int) -> bool:
+        tell((ENTRIES, base + step * SPEED_STEP_RPM, "no load"))
+        return not holds(bench, base + step * SPEED_STEP_RPM, 0.0)
+
+    try:
+        count = max(0, math.floor((ceiling - base) / SPEED_STEP_RPM))
+        first = least(too_fast, 8, 1, count) if count else None
+        return base + (count if first is None else first - 1) * SPEED_STEP_RPM
+    finally:
+        bench.close()
+
+
+def _end_to_end(job: _Job, speeds: list[float], tell: Callable) -> Check:
+    bench = Bench(job.library, job.values, tell)
+    check = Check()
+    try:
+        bench.start()
+        for rpm in speeds:
+            reached = bench.speed(rpm) and bench.regain()
+            bench.run(1.0)
+            point = bench.point(0.5)
+            check.rows.append({"name": f"{rpm:.0f} rpm", "speed_rpm": point.speed_rpm, "id_a": point.id_a,
+                               "current_a_rms": point.current_rms_a, "use_percent": 100.0 * point.use,
+                               "angle_deg": point.angle_deg, "trim_a": point.trim_a})
+            if not reached or not point.held:
+                check.problems.append(f"the firmware with the new tables does not hold {rpm:.0f} rpm, it turns at {point.speed_rpm:.0f} rpm")
+        bench.press("s2")
+        waited = 0.0
+        while bench.state() == "STOPPING" and waited < 20.0:
+            bench.run(0.1)
+            waited += 0.1
+        bench.check()
+        if bench.state() != "STOPPED":
+            check.problems.append(f"the firmware with the new tables does not stop, its state is {bench.state()}")
+    except Fault as fault:
+        check.problems.append(f"the firmware with the new tables stops with {fault} at {bench.target_rpm:.0f} rpm")
+    finally:
+        bench.close()
+    return check
+
+
+# ---- pure parts ------------------------------------------------------------------------------------------------------------
+def defines(header: str) -> dict[str, float]:
+    """The numbers that a userparams.h defines, by name."""
+    found: dict[str, float] = {}
+    for name, value in re.findall(r"^[ \t]*#[ \t]*define[ \t]+(\w+)[ \t]+\(?(\S+?)\)?(?=\s|$)", header, flags=re.MULTILINE):
+        try:
+            found[name] = float(int(value, 16)) if value.lower().startswith("0x") else float(value.rstrip("fF"))
+        except ValueError:
+            continue
+    return found
+
+
+def highest_speed(known: dict[str, float]) -> float:
+    """The highest MAXIMUM_SPEED_RPM that the build accepts for these parameters and that the tables could use."""
+    try:
+        pairs, bus = known["NOPOLESPAIRS"], known["NOMINAL_BUS_V"]
+        base = next((rpm for rpm in range(100, 30000, 100) if model_use(known, rpm, 0.0, 0.0) > 1.0), 30000)
+        ends = base + (ENTRIES + 1) * STEP_ERPM / pairs
+        # the back-EMF's format, as PARAM_EMF_MAX_V of include/drive/params.h
+        u0 = bus / math.sqrt(3.0) * (1.0 - known["DEADTIME_SEC"] / known["LOOPTIME_SEC"]) / 32768.0
+        free_v = 0.9895 * 131068.0 * u0 - known["OVER_VOLTAGE_V"] / math.sqrt(3.0) \
+            - 2.0 / math.sqrt(3.0) * known["OVER_CURRENT_THRESHOLD_A"] * known["MOTOR_RS_OHM"]
+        by_emf = free_v / (2.0 * math.pi / 60.0 * pairs * 1.2 * known["MOTOR_LS_MH"] * 1e-3 * known["MAXIMUM_CURRENT_A"])
+        return max(known["MAXIMUM_SPEED_RPM"], math.floor(min(ends, by_emf, FORMAT_ERPM / pairs, 30000.0)))
+    except KeyError as missing:
+        raise UserError(f"{missing.args[0]} is no number", build.HEADER, "give a complete userparams.h") from None
+
+
+def table_current(known: dict[str, float], rpm: float) -> float:
+    """d current that a header's own table gives at a speed, as the firmware interpolates it."""
+    place = max(0.0, (rpm - known["FW_START_SPEED_RPM"]) * known["NOPOLESPAIRS"] / STEP_ERPM)
+    index = min(int(place), ENTRIES - 2)
+    low, high = known[f"IDREF_SPEED{index}"], known[f"IDREF_SPEED{index + 1}"]
+    return low + (high - low) * min(place - index, 1.0)
+
+
+def with_values(header: str, values: dict[str, str]) -> str:
+    return fw_tables.with_values(header, values, build.HEADER)
+
+
+def row(found: Found, torque_nm: float) -> dict[str, float]:
+    """What the tables file keeps of an entry."""
+    return {"speed_rpm": found.rpm, "idref_a": found.entry.idref_a, "inv_kfi": found.entry.inv_kfi, "ls_ratio": found.entry.ls_ratio,
+            "load_nm": found.load_nm, "use_percent": 100.0 * found.loaded.use, "use_free_percent": 100.0 * found.free.use,
+            "angle_deg": found.loaded.angle_deg, "angle_free_deg": found.free.angle_deg, "current_a_rms": found.loaded.current_rms_a,
+            "current_free_a_rms": found.free.current_rms_a, "bus_v": found.loaded.bus_v, "torque_nm": torque_nm}
+
+
+# ---- what a person sees ----------------------------------------------------------------------------------------------------
+class _Show:
+    """A bar with the entry and the best so far; silent when asked to be or when nobody looks."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.bar: Any = None
+        self.tqdm: Any = None
+        self.title = ""
+        self.told = 0.0
+        if quiet or not sys.stderr.isatty():
+            return
+        try:
+            from tqdm import tqdm
+        except ImportError:
+            return
+        tqdm.monitor_interval = 0
+        self.tqdm = tqdm
+
+    def stage(self, title: str, total: int) -> None:
+        self.close()
+        self.title = title
+        if self.tqdm is not None:
+            self.bar = self.tqdm(total=total, desc=title, leave=False, ncols=110, bar_format="{desc} |{bar:12}|")
+
+    def entry(self, index: int, rpm: float, text: str) -> None:
+        if self.bar is not None:
+            place = f"entry {index}, " if index < ENTRIES else ""
+            self.bar.n = min(index, self.bar.total)
+            self.bar.set_description_str(f"{self.title}: {place}{rpm:.0f} rpm, {text}".ljust(90)[:90])
+
+    def time(self, motor_s: float) -> None:
+        """The motor time so far, where there is nothing else to tell; now and then."""
+        now = time.monotonic()
+        if self.bar is not None and self.title != "search" and now - self.told > 0.2:
+            self.told = now
+            self.bar.set_description_str(f"{self.title}: {motor_s:.0f} s of motor time".ljust(90))
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.close()
+            self.bar = None
+
+    def __enter__(self) -> "_Show":
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.close()
+
+
+def _write(folder: Path, tables: Tables, rows: list[dict[str, Any]], check: Check, motor: Any, options: argparse.Namespace) -> dict[str, Any]:
+    keys = [key for key, _, _ in COLUMNS]
+    output.write_csv(folder / "entries.csv", ["index", *keys], [[item["name"], *(item.get(key) for key in keys)] for item in rows])
+    data = {"motor": str(places.shown(motor.path)), "start_speed_rpm": tables.start_speed_rpm, "last_index": tables.last_index,
+            "stopped": tables.stopped, "maximum_speed_rpm": tables.maximum_speed_rpm, "goal": tables.goal, "entries": rows,
+            "check": check.rows, "problems": check.problems, "plots": []}
+    if not options.no_plots:
+        from . import fw_plots
+        data["plots"] = fw_plots.write_all(tables, motor, folder)
+    output.write_summary(folder, report.clean(data))
+    return data
+
+
+def _print(motor: Any, tables: Tables, rows: list[dict[str, Any]], check: Check, data: dict[str, Any]) -> None:
+    goal = tables.goal
+    what = f"field weakening from {tables.start_speed_rpm:.0f} rpm" if tables.last_index else f"{tables.stopped}, the tables are flat"
+    print(f"{motor.title}: {what}\nTables carry {100.0 * goal['torque_share']:.0f} % of the rated torque of {motor.rated_torque_nm:g} N m (above "
+          f"{motor.rated_speed_rpm:.0f} rpm at constant power), {100.0 * goal['voltage_margin']:.0f} % of the voltage stays free.\n"
+          f"d current up to {goal['current_limit_a']:.2f} A" + (f"; above the rated {motor.rated_current_a:.2f} A it is spent on speed only.\n"
+          if motor.rated_current_a < goal["current_limit_a"] else ".\n"))
+    print(report.table(rows, COLUMNS))
+    if tables.last_index:
+        print(f"\nstopped: {tables.stopped}")
+    print(f"highest speed without load: {tables.maximum_speed_rpm:.0f} rpm; asked for: {motor.maximum_speed_rpm:.0f} rpm")
+    print("\nthe firmware with these tables:")
+    print(report.table(check.rows, (("speed_rpm", "true\nrpm", "{:.1f}"), ("id_a", "Id\nA", "{:.2f}"), ("current_a_rms", "current\nA rms", "{:.2f}"),
+                                    ("use_percent", "voltage\n% of limit", "{:.1f}"), ("angle_deg", "angle error\nmean deg", "{:+.2f}"),
+                                    ("trim_a", "trim\nA", "{:.2f}"))))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """`python3 -m tuning.fw_tune NAME`."""
+    from tools.foc33 import cli
+    parser = cli._Parser(prog="tune-fw", description=(__doc__ or "").split("\n")[0])
+    add_arguments(parser)
+    try:
+        return command(parser.parse_args(arguments))
+    except UserError as error:
+        print(f"foc33: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("foc33: interrupted, nothing was written", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,160 @@
+"""Currents, speeds, voltages and field weakening: what board and motor allow together, by the steady-state voltage equation.
+
+    Vd = R Id - w Lq Iq,   Vq = R Iq + w (Ld Id + psi),   |V| <= circle = highest duty / sqrt(3) * bus
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tools.foc33.board_file import BoardFile
+from tools.foc33.motor_file import Motor
+
+ENTRIES = 18
+STEP_ERPM = 1024.0
+"""One entry of the field-weakening tables."""
+LARGEST_ERPM = 32000.0
+LARGEST_NOMINAL_ERPM = 27000.0
+TRIP_SHARE = 0.865
+"""Largest over-current threshold as a share of the converter's range (a relation of param_table.h)."""
+TRIP_OVER_MAXIMUM = 1.4
+"""Trip level over the largest current that is asked for, where the range allows it: overshoot, noise and the load step's swing."""
+LEAST_TRIP_OVER_MAXIMUM = 1.1
+TABLE_SHARE = 0.95
+"""Share of the circle that the table leaves to the motor without load; the rest is for control, and loads bring the voltage feedback."""
+FULL_SHARE = 0.98
+"""Share of the circle that a loaded motor may use in steady state."""
+D_SHARE = 0.96
+"""The drive clamps the d current to 31/32 of the largest current."""
+RPM = 2.0 * math.pi / 60.0
+
+
+def down(value: float, step: float) -> float:
+    """The largest multiple of a step that is not above."""
+    return math.floor(value / step + 1e-9) * step
+
+
+def digits_down(value: float, digits: int) -> float:
+    """Rounded down to so many significant digits."""
+    step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return float(f"{down(value, step):.10g}")
+
+
+def digits_up(value: float, digits: int) -> float:
+    step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return float(f"{math.ceil(value / step - 1e-9) * step:.10g}")
+
+
+@dataclass(frozen=True)
+class Currents:
+    """Peak values."""
+
+    trip_a: float
+    maximum_a: float
+    board_a: float
+    """largest current that this board leaves, given its range"""
+
+
+def currents(motor: Motor, board: BoardFile) -> Currents:
+    """The trip level lies below the range's end, the largest current below the trip level."""
+    highest_trip = down(TRIP_SHARE * board.current_full_scale_a, 0.05 if board.current_full_scale_a > 1.0 else 0.005)
+    board_a = digits_down(highest_trip / LEAST_TRIP_OVER_MAXIMUM, 3)
+    maximum_a = min(float(f"{motor.maximum_current_a:.3g}"), board_a)
+    return Currents(float(f"{min(digits_down(TRIP_OVER_MAXIMUM * maximum_a, 3), highest_trip):.6g}"), maximum_a, board_a)
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Motor and board as the voltage equation sees them."""
+
+    motor: Motor
+    circle_v: float
+    maximum_a: float
+
+    def omega(self, rpm: float) -> float:
+        """Electrical rad/s."""
+        return rpm * RPM * self.motor.pole_pairs
+
+    def friction_nm(self, rpm: float) -> float:
+        return self.motor.coulomb_nm + self.motor.viscous_nms * rpm * RPM
+
+    def iq(self, rpm: float, load_nm: float) -> float:
+        """q current for a load on top of friction; reluctance torque is left out."""
+        return (load_nm + self.friction_nm(rpm)) / self.motor.kt_nm_per_a
+
+    def voltage(self, rpm: float, i_d: float, i_q: float) -> float:
+        w, m = self.omega(rpm), self.motor
+        return math.hypot(m.rs_ohm * i_d - w * m.lq_h * i_q, m.rs_ohm * i_q + w * (m.ld_h * i_d + m.psi_vs))
+
+    def deepest_id(self, i_q: float) -> float:
+        """Most negative d current: current limit, and the characteristic current psi/Ld beyond which more only heats."""
+        left = (D_SHARE * self.maximum_a) ** 2 - i_q * i_q
+        return -min(math.sqrt(max(left, 0.0)), self.motor.psi_vs / self.motor.ld_h)
+
+    def least_id(self, rpm: float, load_nm: float, share: float) -> float | None:
+        """The smallest |Id| that keeps |V| within a share of the circle; None if none does."""
+        i_q = self.iq(rpm, load_nm)
+        if i_q > self.maximum_a:
+            return None
+        low, high = self.deepest_id(i_q), 0.0
+        limit = share * self.circle_v
+        if self.voltage(rpm, high, i_q) <= limit:
+            return 0.0
+        if self.voltage(rpm, low, i_q) > limit:
+            return None
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.voltage(rpm, middle, i_q) <= limit else (low, middle)
+        return low
+
+    def base_speed(self, load_nm: float) -> float:
+        """Speed at which the motor without d current needs the whole circle."""
+        return self._highest(lambda rpm: self.voltage(rpm, 0.0, self.iq(rpm, load_nm)) <= self.circle_v)
+
+    def highest_speed(self, load_nm: float, share: float) -> float:
+        """Speed that field weakening reaches."""
+        return self._highest(lambda rpm: self.least_id(rpm, load_nm, share) is not None)
+
+    def torque(self, rpm: float, share: float) -> float:
+        """Largest load at a speed."""
+        if self.least_id(rpm, 0.0, share) is None:
+            return 0.0
+        low, high = 0.0, 1.2 * self.motor.kt_nm_per_a * self.maximum_a
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.least_id(rpm, middle, share) is not None else (low, middle)
+        return low
+
+    def _highest(self, holds: Callable[[float], bool]) -> float:
+        low, high = 0.0, 65535.0 / self.motor.pole_pairs
+        if holds(high):
+            return high
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if holds(middle) else (low, middle)
+        return low
+
+
+def circle_v(board: BoardFile) -> float:
+    """Radius of the voltage circle at the nominal bus: the sampling window takes its share of the duty."""
+    return (1.0 - 2.0 * board.sample_window_s / board.pwm_period_s) * board.nominal_bus_v / math.sqrt(3.0)
+
+
+def fw_start_rpm(envelope: Envelope, maximum_rpm: float) -> float:
+    """Where entry 0 lies: seven eighths of the no-load base speed (the last eighth belongs to loads and a sagging supply), but so that the
+    18 entries still reach the maximum speed, and below the maximum speed."""
+    start = down(0.875 * envelope.base_speed(0.0), 50.0)
+    reach = maximum_rpm - (ENTRIES - 1) * STEP_ERPM / envelope.motor.pole_pairs
+    return max(min(max(start, math.ceil(reach / 50.0) * 50.0), down(0.95 * maximum_rpm, 50.0)), 100.0)
+
+
+def table(envelope: Envelope, start_rpm: float) -> list[float]:
+    """d current of the 18 entries from the voltage equation; where no current suffices, the deepest one stays."""
+    found: list[float] = []
+    for i in range(ENTRIES):
+        rpm = start_rpm + i * STEP_ERPM / envelope.motor.pole_pairs
+        least = envelope.least_id(rpm, 0.0, TABLE_SHARE)
+        if least is None:
+            least = envelope.deepest_id(envelope.iq(rpm, 0.0))
+        found.append(min(least, found[-1]) if found else 0.0)
+    return [float(f"{-down(-x, 0.01):.2f}") + 0.0 for x in found]

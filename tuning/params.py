@@ -1,0 +1,96 @@
+"""Names, units, ranges and relations of userparams.h, read from include/drive/param_table.h: one place for the build and the tuner."""
+
+import functools
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tools.foc33 import places
+from tools.foc33.errors import UserError
+
+from .constants import Formulas, nearest
+
+TABLE = places.ROOT / "include" / "drive" / "param_table.h"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One define of userparams.h. The ends of the range are kept as they are written."""
+
+    name: str
+    unit: str
+    low: str
+    high: str
+
+
+@dataclass(frozen=True)
+class Relation:
+    """What must hold between parameters: a C condition, and what to change when it does not."""
+
+    condition: str
+    message: str
+
+
+@functools.cache
+def _text() -> str:
+    return TABLE.read_text(encoding="utf-8").replace("\\\n", " ")
+
+
+@functools.cache
+def parameters() -> dict[str, Parameter]:
+    """Every parameter by name, in the order of the table."""
+    rows = re.search(r"#define PARAM_TABLE\(X\)(.*)", _text())
+    found: dict[str, Parameter] = {}
+    for macro, name, unit, low, high in re.findall(r'(PARAM_TABLE_FW\(X, |X\()(\w+), "([^"]*)", ([^,()]+), ([^,()]+)\)', rows[1] if rows else ""):
+        names = [f"{name}{i}" for i in range(18)] if macro.startswith("PARAM") else [name]
+        found.update({each: Parameter(each, unit, low.strip(), high.strip()) for each in names})
+    return found
+
+
+@functools.cache
+def relations() -> list[Relation]:
+    """Every relation, those of the d currents once for each entry."""
+    rows = re.search(r"#define PARAM_RELATION_TABLE\(X\)(.*)", _text())
+    entry = re.search(r'#define PARAM_RELATION_IDREF\(X, i\)\s*X\((.*), "([^"]*)" #i "([^"]*)"\)', _text())
+    if rows is None or entry is None:
+        raise UserError("the table of relations cannot be read", str(places.shown(TABLE)), "keep PARAM_RELATION_TABLE and PARAM_RELATION_IDREF")
+    found = []
+    for condition, message, number in re.findall(r'X\(((?:[^"])*?), "([^"]*)"\)|PARAM_RELATION_IDREF\(X, (\d+)\)', rows[1]):
+        found.append(Relation(entry[1].replace("##i", number), f"{entry[2]}{number}{entry[3]}") if number else Relation(condition, message))
+    return found
+
+
+def _python(condition: str) -> str:
+    """The C condition as a Python expression in single precision."""
+    text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)F?\b", r"number(\1)", condition)
+    return text.replace("&&", " and ").replace("||", " or ")
+
+
+def _names(params: Mapping[str, Any]) -> dict[str, Any]:
+    f = Formulas(params, np.float32)
+    names: dict[str, Any] = {name: f[name] for name in parameters()}
+    names |= {f"{loop}_{term}": f[f"{loop}_{term}"] for loop in ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR") for term in ("PTERM", "ITERM", "CTERM")}
+    names |= {"number": np.float32, "PARAM_F": np.float32, "PARAM_RS_FULL": f.rs(32768), "PARAM_LS_FULL": f.ls(4096), "PARAM_INVKFI": f.invkfi(),
+              "PARAM_EMF_MAX_V": f.emf_max_v(), "PARAM_VOLTAGE_PER_BUS": f.voltage_per_bus(), "NORM_VOLTAGE_CONST": f.u0,
+              "DUTY_PER_VOLT_NUMERATOR": int(f.duty_numerator()), "BUS_Q15": lambda volt: nearest(f.bus(volt)),
+              "PARAM_SPEED_KI": lambda iterm: nearest(iterm * np.float32(16384))}
+    return names
+
+
+def check(params: Mapping[str, Any]) -> list[str]:
+    """What the build would refuse about these parameters: ranges and relations, in its words."""
+    missing = [name for name in parameters() if name not in params]
+    if missing:
+        return [f"{missing[0]} is missing"]
+    values = _names(params)
+    wrong = [relation.message for relation in relations()
+             if not eval(_python(relation.condition), {"__builtins__": {}}, values)] # noqa: S307  the project's own header
+    kphi_told = any(message.startswith("MOTOR_KPHI") for message in wrong)
+    for p in parameters().values():
+        inside = np.float32(float(p.low)) <= values[p.name] <= np.float32(float(p.high))
+        if not inside and not (kphi_told and params[p.name] == "NORM_INVKFIBASE"):
+            wrong.append(f"{p.name} = {params[p.name]} is outside {p.low} .. {p.high} {p.unit}")
+    return wrong

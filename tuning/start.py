@@ -1,0 +1,204 @@
+"""The start: current, lock, ramp and the speed at which the estimator takes over, each by a rule, then tried on the rotor's equation.
+
+A forced current vector I pulls the rotor with Kt I sin(angle between them): a spring of P Kt I per rad, hardly damped.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.foc33.board_file import BoardFile
+from tools.foc33.motor_file import Motor
+
+from .limits import RPM, digits_down
+from .loops import Gains, Plant, current_loop
+
+CURRENT_SHARE = 0.92
+"""Start current over rated current: the start is short, so the rated current costs nothing, and more of it holds the rotor more firmly."""
+LOAD_ANGLE_SINE = 0.77
+"""Share of the pull-out torque that load and friction may take: 50 degrees of load angle."""
+RAMP_TORQUE_SHARE = 0.15
+"""Share of the pull-out torque for acceleration."""
+RAMP_S = 1.4
+"""Duration of the ramp, as in the note, unless inertia asks for more."""
+R_ERROR = 0.30
+DEAD_TIME_ERROR = 0.20
+"""Share of the dead-time voltage that compensation leaves."""
+HAND_OVER_SINE = 0.35
+"""Sine of the angle error (20 degrees) that the estimator may have at the hand-over."""
+LEAST_LOCK_S = 0.2
+LOCK_SWINGS = 8.0
+"""The lock lasts so many periods of the rotor's swing at least."""
+LARGEST_RATE = 2000
+
+
+@dataclass(frozen=True)
+class StartDesign:
+    """The start's parameters in SI and what they were made from."""
+
+    current_a: float
+    end_speed_rpm: float
+    minimum_speed_rpm: float
+    lock_s: float
+    rate: int
+    """OPENLOOP_RAMPSPEED_INCREASERATE"""
+    acceleration_rpm_s: float
+    ramp_s: float
+    pull_out_nm: float
+    needed_nm: float
+    natural_hz: float
+    damping: float
+    error_v: float
+    """error of the back-EMF at the hand-over"""
+    emf_v: float
+    follows: bool
+    trial: "Trial"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Lock and ramp on the rotor's equation of motion: one column for each start angle and load."""
+
+    time_s: np.ndarray
+    speed_rpm: np.ndarray
+    forced_rpm: np.ndarray
+    followed: np.ndarray
+    labels: list[str]
+
+
+def emf_error_v(motor: Motor, board: BoardFile, current_a: float) -> float:
+    """Error of Equation 4: R wrong by 30 %, a fifth of the dead time's voltage (4/pi Vbus Td/Ts), one step of the converter through R."""
+    dead = 4.0 / math.pi * board.nominal_bus_v * board.dead_time_s / board.pwm_period_s
+    step = 2.0 * board.current_full_scale_a / 2 ** board.adc_bits
+    return R_ERROR * motor.rs_ohm * current_a + DEAD_TIME_ERROR * dead + motor.rs_ohm * step
+
+
+def emf_v(motor: Motor, rpm: float) -> float:
+    """Phase back-EMF, peak."""
+    return motor.psi_vs * rpm * RPM * motor.pole_pairs
+
+
+def speed_for_emf(motor: Motor, volt: float) -> float:
+    return volt / (motor.psi_vs * RPM * motor.pole_pairs)
+
+
+def start_current(motor: Motor, maximum_a: float, needed_nm: float) -> float:
+    """The larger of 92 % of the rated current and what the load needs at 50 degrees of load angle; within the drive's largest current."""
+    wanted = max(CURRENT_SHARE * motor.rated_current_a, needed_nm / (motor.kt_nm_per_a * LOAD_ANGLE_SINE))
+    return float(f"{min(wanted, digits_down(0.98 * maximum_a, 3)):.3g}")
+
+
+def needed_torque(motor: Motor, end_rpm: float) -> float:
+    """Load while starting, friction at the end of the ramp; acceleration comes on top."""
+    return motor.start_torque_nm + motor.coulomb_nm + motor.viscous_nms * end_rpm * RPM
+
+
+def end_speed(motor: Motor, board: BoardFile, current_a: float, nominal_rpm: float) -> float:
+    """Hand-over speed: back-EMF = error / sin(20 degrees), at least a fifth of nominal speed (twice the speed where Equation 2 takes its
+    sign from Eq), at most half of it."""
+    wanted = max(speed_for_emf(motor, emf_error_v(motor, board, current_a) / HAND_OVER_SINE), 0.2 * nominal_rpm)
+    step = 50.0 if wanted > 300.0 else 10.0
+    return min(max(math.ceil(wanted / step - 1e-9) * step, 50.0), digits_down(0.5 * nominal_rpm, 2), 5000.0)
+
+
+def minimum_speed(motor: Motor, end_rpm: float) -> float:
+    """A fifth of rated speed, and not above the hand-over speed: below it the speed loop would have to be slower still (loops.SPEED_CAP)."""
+    return max(digits_down(min(end_rpm, 0.2 * motor.rated_speed_rpm), 2), 50.0)
+
+
+def natural_rad_s(motor: Motor, current_a: float, inertia: float) -> float:
+    """sqrt(P Kt I / J)"""
+    return math.sqrt(motor.pole_pairs * motor.kt_nm_per_a * current_a / inertia)
+
+
+def damping_nms(motor: Motor, plant: Plant, gains: Gains, omega: float) -> float:
+    """Viscous friction and what the current loop adds: the swing's back-EMF drives a current through the loop's admittance."""
+    hz = np.array([omega / (2.0 * math.pi)])
+    h = math.exp(-plant.rs * gains.period_s / plant.lq)
+    open_plant = (1.0 - h) / plant.rs / (np.exp(1j * omega * gains.period_s) - h)
+    admittance = (open_plant / (1.0 + current_loop(hz, plant, gains, 0.0)))[0]
+    return motor.viscous_nms + 1.5 * (motor.pole_pairs * motor.psi_vs) ** 2 * max(float(admittance.real), 0.0)
+
+
+def ramp_rate(motor: Motor, board: BoardFile, current_a: float, end_rpm: float, inertia: float) -> int:
+    """Counts of 1/1024 a period: 1.4 s to the end speed, or slower so that J alpha takes 15 % of the pull-out torque at most."""
+    largest = RAMP_TORQUE_SHARE * motor.kt_nm_per_a * current_a / inertia / RPM
+    return max(1, min(LARGEST_RATE, round(min(end_rpm / RAMP_S, largest) / rpm_s_of_rate(motor, board, 1))))
+
+
+def rpm_s_of_rate(motor: Motor, board: BoardFile, rate: float) -> float:
+    return rate / 67108864.0 / board.pwm_period_s ** 2 * 60.0 / motor.pole_pairs
+
+
+def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lock_s: float, acceleration_rpm_s: float, end_rpm: float,
+              angles: int = 24) -> Trial:
+    """Integrates J dw/dt = Kt I sin(P (forced - rotor)) - friction - load for all start angles, without load and with the start load."""
+    loads = (0.0, motor.start_torque_nm)
+    step = min(400e-6, 0.1 / natural_rad_s(motor, current_a, inertia))
+    ramp_s = end_rpm / acceleration_rpm_s
+    count = int((lock_s + ramp_s + 0.1) / step)
+    pull, pairs = motor.kt_nm_per_a * current_a, motor.pole_pairs
+    rotor = np.tile(np.arange(angles) * 2.0 * math.pi / angles, len(loads))
+    speed = np.zeros_like(rotor)
+    dry = np.repeat(np.array(loads), angles) + motor.coulomb_nm
+    start = rotor.copy()
+    forced = -0.5 * math.pi
+    kept: list[tuple[float, float, np.ndarray]] = []
+    every = max(1, count // 800)
+    for k in range(count):
+        now = k * step
+        if now < lock_s:
+            forced_speed = math.pi / lock_s if now < 0.5 * lock_s else 0.0
+        else:
+            forced_speed = min((now - lock_s) * acceleration_rpm_s, end_rpm) * RPM * pairs
+        forced += forced_speed * step
+        drive = pull * np.sin(forced - rotor) - motor.viscous_nms * speed - (damping - motor.viscous_nms) * (speed - forced_speed / pairs)
+        moving = np.abs(speed) > 1e-9
+        free = speed + step / inertia * drive
+        slowed = np.where(np.abs(free) <= dry * step / inertia, 0.0, free - np.sign(free) * dry * step / inertia)
+        speed = np.where(moving | (np.abs(drive) > dry), slowed, 0.0)
+        rotor = rotor + pairs * speed * step
+        if k % every == 0:
+            kept.append((now, forced_speed / pairs / RPM, speed / RPM))
+    # Each rotor begins within half a turn of the current; one that followed ends within a quarter of it.
+    turns = (rotor - forced) / (2.0 * math.pi)
+    first = (start + 0.5 * math.pi) / (2.0 * math.pi)
+    slipped = np.abs(turns - np.round(turns)) > 0.25
+    lost = np.round(turns) - np.round(first) < -1.5
+    labels = [f"{360.0 * i / angles:.0f} deg, {load:.3g} N m" for load in loads for i in range(angles)]
+    return Trial(np.array([row[0] for row in kept]), np.array([row[2] for row in kept]), np.array([row[1] for row in kept]),
+                 ~(slipped | lost), labels)
+
+
+def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, maximum_a: float, nominal_rpm: float,
+                 fixed: dict[str, float]) -> StartDesign:
+    """All of it. `fixed` holds what the motor file's [tune] says; the trial only changes what is not fixed."""
+    inertia = motor.inertia_kgm2 + motor.load_inertia_kgm2
+    first = needed_torque(motor, 0.3 * nominal_rpm)
+    current = fixed.get("Q_CURRENT_REF_OPENLOOP") or start_current(motor, maximum_a, first)
+    end = fixed.get("END_SPEED_RPM") or end_speed(motor, board, current, nominal_rpm)
+    minimum = fixed.get("MINIMUM_SPEED_RPM") or minimum_speed(motor, end)
+    rate = int(fixed.get("OPENLOOP_RAMPSPEED_INCREASERATE", 0)) or ramp_rate(motor, board, current, end, inertia)
+    omega = natural_rad_s(motor, current, inertia)
+    damping = damping_nms(motor, plant, gains, omega)
+    lock = (fixed.get("LOCK_TIME", 0.0) * board.pwm_period_s
+            or max(LEAST_LOCK_S, math.ceil(LOCK_SWINGS * 2.0 * math.pi / omega / 0.05) * 0.05))
+    longest = 32000 * board.pwm_period_s
+    while True:
+        lock = min(lock, longest)
+        acceleration = rpm_s_of_rate(motor, board, rate)
+        trial = try_start(motor, inertia, damping, current, lock, acceleration, end)
+        follows = bool(trial.followed.all())
+        if follows:
+            break
+        if "LOCK_TIME" not in fixed and lock < 0.99 * longest and lock < 8.0 * LOCK_SWINGS / omega * 2.0 * math.pi:
+            lock *= 1.5
+        elif "OPENLOOP_RAMPSPEED_INCREASERATE" not in fixed and rate > 1 and end / acceleration < 6.0:
+            rate = max(1, int(rate * 0.7))
+        else:
+            break
+    needed = needed_torque(motor, end) + inertia * acceleration * RPM
+    return StartDesign(current, end, minimum, lock, rate, acceleration, end / acceleration, motor.kt_nm_per_a * current, needed,
+                       omega / (2.0 * math.pi), damping / (2.0 * inertia * omega), emf_error_v(motor, board, current), emf_v(motor, end),
+                       follows, trial)
