@@ -9,11 +9,11 @@ uint16_t clock_init(void)
     PLLFBD = BOARD_PLLFBD;
     CLKDIV = BOARD_CLKDIV;
     OSCTUN = 0;
-    RCONbits.SWDTEN = 0;
     __builtin_write_OSCCONH(BOARD_NOSC_PRIPLL);
     __builtin_write_OSCCONL(OSCCON | 0x0001u);
     while ((OSCCONbits.COSC != BOARD_NOSC_PRIPLL || OSCCONbits.LOCK == 0u) && loops != 0u) {
         loops--;
+        ClrWdt(); /* the wait is bounded, but longer than the watchdog's time */
     }
     return (uint16_t)(loops == 0u);
 }

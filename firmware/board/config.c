@@ -1,4 +1,4 @@
-/* Configuration words: start on FRC, crystal and PLL by software, PWM pins inactive at reset, watchdog by software. */
+/* Configuration words: start on FRC, crystal and PLL by software, PWM pins inactive at reset, watchdog on: 32 kHz / 32 / 16, 16 ms. */
 #ifdef __XC16__
 #pragma config FNOSC = FRC
 #pragma config IESO = OFF
@@ -6,8 +6,10 @@
 #pragma config OSCIOFNC = OFF
 #pragma config IOL1WAY = OFF
 #pragma config FCKSM = CSECMD
-#pragma config FWDTEN = OFF
+#pragma config FWDTEN = ON
 #pragma config WINDIS = OFF
+#pragma config WDTPRE = PR32
+#pragma config WDTPOST = PS16
 #pragma config FPWRT = PWR128
 #pragma config PWMPIN = ON
 #pragma config HPOL = ON

@@ -3,6 +3,7 @@
 
 #include "board/mclv.h"
 #include "board/peripherals.h"
+#include "board/reset.h"
 #include "board/status.h"
 #include "board/watch.h"
 
@@ -18,7 +19,10 @@ static uint16_t clock_failed;     /* kept: on a wrong clock nothing may run, wha
 
 void firmware_init(void)
 {
+    drive_fault_t kept;
+
     pwm_outputs_off();
+    kept = reset_take();
     last_ms_tick = 0;
     supervised_tick = 0;
     silent_ms = 0;
@@ -34,8 +38,11 @@ void firmware_init(void)
     pwm_init();
     if (clock_failed) {
         drive_raise(&board_drive, FAULT_CLOCK);
+    } else if (kept != FAULT_NONE) {
+        drive_raise(&board_drive, kept);
     }
     adc_init();
+    ClrWdt();
 }
 
 /** A control interrupt that stays away for 2 ms leaves the bridge without control. */
@@ -62,6 +69,8 @@ void firmware_background(void)
     if (clock_failed) {
         drive_raise(&board_drive, FAULT_CLOCK);
     }
+    reset_keep(board_drive.fault);
+    reset_serve_watchdog(board_drive.ticks);
     if (elapsed_ms != 0u) {
         panel_inputs_t in;
         panel_lights_t lights;

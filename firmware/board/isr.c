@@ -2,14 +2,13 @@
 #include "board/firmware.h"
 #include "board/mclv.h"
 #include "board/peripherals.h"
+#include "board/reset.h"
 #include "board/watch.h"
 #include "drive/drive_tick.h"
 #include "drive/params_init.h"
 
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
 BOARD_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
-
-volatile uint16_t board_trap_intcon1;
 
 void BOARD_ISR _ADC1Interrupt(void);
 void BOARD_ISR _FLTA1Interrupt(void);
@@ -60,12 +59,13 @@ void BOARD_ISR _FLTA1Interrupt(void)
     IFS3bits.FLTA1IF = 0;
 }
 
-/** A trap: outputs off, the cause kept, the background goes on to say so. */
+/** A trap: outputs off, the cause kept. The background goes on to say so; if it cannot, the watchdog's reset follows. */
 static void board_trap(drive_fault_t fault)
 {
     pwm_outputs_off();
     board_trap_intcon1 = INTCON1;
     drive_raise(&board_drive, fault);
+    reset_keep((uint16_t)fault);
 }
 
 void BOARD_ISR _OscillatorFail(void)

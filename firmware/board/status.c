@@ -3,6 +3,7 @@
 
 #include "board/firmware.h"
 #include "board/peripherals.h"
+#include "board/reset.h"
 #include "drive/params.h"
 
 #define STATUS_PERIOD_MS 500u
@@ -73,9 +74,21 @@ static uint16_t put_line(void)
 }
 #endif
 
+/** The first line: "reset POR BOR". */
+static uint16_t put_reset(void)
+{
+    uint16_t at = put_text(0, "reset");
+#define PUT_CAUSE(bit, name, meaning) \
+    if (RESET_WAS(name, board_reset_cause)) { \
+        at = put_text(at, " " #name); \
+    }
+    RESET_CAUSE_TABLE(PUT_CAUSE)
+    return put_text(at, "\r\n");
+}
+
 void status_init(void)
 {
-    line[0] = '\0';
+    line[(board_reset_cause != 0u) ? put_reset() : 0u] = '\0';
     next = 0;
     waited_ms = 0;
 }

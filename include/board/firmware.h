@@ -23,9 +23,6 @@ extern drive_t board_drive;
 /** Buttons, potentiometer, lights. */
 extern panel_t board_panel;
 
-/** INTCON1 at the last trap (FAULT_TRAP): its bits name the trap. */
-extern volatile uint16_t board_trap_intcon1;
-
 /** All that main does before its loop: clock, pins, PWM with its outputs off, ADC, timer, UART, interrupts.
  *  A clock that does not come up raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
 void firmware_init(void);

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "control/qmath.h"
 #include "drive/params.h"
 
 /** Field weakening: table index in use, d reference (Q15 of full-scale current), start speed (electrical rpm). */
@@ -59,15 +60,15 @@ void watch_refresh(void);
 
 /** One period of the recorder; nothing without SNAPSHOT. Control interrupt. */
 #ifdef SNAPSHOT
+#include "board/firmware.h"
 #include "drive/snapshot.h"
-extern drive_t board_drive;
 extern snapshot_t board_snapshot;
 QM_INLINE void watch_snapshot(void)
 {
     snapshot_tick(&board_snapshot, &board_drive);
 }
 #else
-static inline void watch_snapshot(void)
+QM_INLINE void watch_snapshot(void)
 {
 }
 #endif

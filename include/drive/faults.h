@@ -28,7 +28,9 @@
     X(11, CLOCK, "the PLL did not lock or the crystal failed", \
       "check the 8 MHz crystal and the configuration words") \
     X(12, TRAP, "the processor took a trap or an unexpected interrupt", \
-      "read board_trap_intcon1, the copy of INTCON1 that says which trap it was")
+      "read board_trap_intcon1, the copy of INTCON1 that says which trap it was") \
+    X(13, WATCHDOG, "the watchdog reset the processor: the background or the control interrupt stood still", \
+      "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it")
 
 #define DRIVE_FAULT_ENUM(code, name, cause, remedy) FAULT_##name = (code),
 /** Fault codes. */

@@ -62,11 +62,11 @@ void test_switches_to_the_crystal_with_pll_and_reports_success(void)
     TEST_ASSERT_EQUAL_UINT16(1, written_low & 1u);
 }
 
-void test_software_watchdog_is_off(void)
+void test_watchdog_is_served_while_the_oscillator_is_waited_for(void)
 {
-    RCONbits.SWDTEN = 1;
+    oscillator_answers = 0;
     (void)clock_init();
-    TEST_ASSERT_EQUAL_UINT16(0, RCONbits.SWDTEN);
+    TEST_ASSERT_EQUAL_UINT16(BOARD_WAIT_LOOPS, host_watchdog_serves);
 }
 
 void test_a_switch_that_never_happens_ends_and_is_reported(void)

@@ -18,6 +18,7 @@ void tearDown(void)
 
 static void expect_start(uint16_t no_lock)
 {
+    RCON = 0; /* no first line on the UART */
     pwm_outputs_off_Expect();
     clock_init_ExpectAndReturn(no_lock);
     pins_init_Expect();
@@ -102,6 +103,39 @@ void test_failed_clock_cannot_be_cleared(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
     TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
+}
+
+void test_fault_that_was_kept_over_a_watchdog_reset_is_there_at_the_start(void)
+{
+    expect_start(0);
+    board_drive.fault = (uint16_t)FAULT_STALL;
+    healthy_ms(1);
+    pwm_outputs_off_Ignore();
+    clock_init_IgnoreAndReturn(0);
+    pins_init_Ignore();
+    uart_init_Ignore();
+    timer_init_Ignore();
+    pwm_init_Ignore();
+    adc_init_Ignore();
+    RCON = 0x0010u;
+    firmware_init();
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, board_drive.fault);
+}
+
+void test_watchdog_is_served_only_while_background_and_interrupt_are_alive(void)
+{
+    uint16_t served;
+    expect_start(0);
+    served = host_watchdog_serves;
+    healthy_ms(3);
+    TEST_ASSERT_EQUAL_UINT16(served + 3u, host_watchdog_serves);
+    board_drive.ticks = (uint16_t)(board_drive.ticks + 20u); /* the interrupt alone */
+    TEST_ASSERT_EQUAL_UINT16(served + 3u, host_watchdog_serves);
+    pass(0);
+    pass(0); /* the background alone */
+    pass(0);
+    TEST_ASSERT_EQUAL_UINT16(served + 4u, host_watchdog_serves);
 }
 
 void test_healthy_restart_forgets_a_failed_clock(void)

@@ -52,6 +52,7 @@ static const struct {
     uint16_t value;
 } expected[] = {
     { "CORCON", 0x0020 }, /* fractional, unsaturated: also the reset value */
+    { "RCON", 0x0000 },   /* read once and cleared: the next reset has its own cause */
     { "OSCCON", 0x3360 }, /* crystal with PLL, locked; pin selection locked */
     { "PLLFBD", 38 },
     { "CLKDIV", 0x0000 },

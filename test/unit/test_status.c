@@ -9,6 +9,7 @@
 #include "unity.h"
 
 drive_t board_drive;
+volatile uint16_t board_reset_cause;
 
 static char sent[128];
 static uint16_t sent_count, room;
@@ -33,6 +34,7 @@ void setUp(void)
     sent[0] = '\0';
     room = 1000;
     uart_send_Stub(take);
+    board_reset_cause = 0;
     status_init();
 }
 
@@ -70,6 +72,23 @@ void test_longest_line_fits_its_buffer(void)
 {
     expect_line(DRIVE_FAULT, FAULT_TRAP, -32768, "state 7 fault 12 speed -6553 rpm\r\n");
     TEST_ASSERT_TRUE(sizeof line > strlen("state 32767 fault 32767 speed -32767 rpm\r\n"));
+}
+
+static void expect_first_line(uint16_t rcon, const char *text)
+{
+    setUp();
+    board_reset_cause = rcon;
+    status_init();
+    send_passes(60);
+    TEST_ASSERT_EQUAL_STRING(text, sent);
+}
+
+void test_first_line_tells_the_cause_of_the_reset(void)
+{
+    expect_first_line(0x0003u, "reset BOR POR\r\n");
+    expect_first_line(0x0010u, "reset WDTO\r\n");
+    expect_first_line(0xFFFFu, "reset TRAPR IOPUWR EXTR SWR WDTO BOR POR\r\n");
+    TEST_ASSERT_TRUE(sizeof line > strlen(sent));
 }
 
 void test_nothing_is_sent_before_the_first_line_is_due(void)

@@ -10,8 +10,11 @@ HOST_SFR_LIST(HOST_SFR_DEFINE)
 const host_sfr_t host_sfr_table[] = {HOST_SFR_LIST(HOST_SFR_ROW)};
 const size_t host_sfr_count = sizeof host_sfr_table / sizeof host_sfr_table[0];
 
+volatile uint16_t host_watchdog_serves;
+
 void host_registers_reset(void)
 {
+    host_watchdog_serves = 0;
     for (size_t i = 0; i < host_sfr_count; i++) {
         *host_sfr_table[i].pointer = host_sfr_table[i].reset;
     }

@@ -107,13 +107,16 @@ void _MPWM1Interrupt(void);
 void _FLTA1Interrupt(void);
 void _DefaultInterrupt(void);
 
+/** How often the firmware has served the watchdog; there is none on a PC. */
+extern volatile uint16_t host_watchdog_serves;
+
 /* What XC16 builds in, and the instructions with no effect on a PC. */
 #define __builtin_write_OSCCONL(value) host_write_oscconl((unsigned)(value))
 #define __builtin_write_OSCCONH(value) host_write_oscconh((unsigned)(value))
 #define __builtin_disable_interrupts() ((void)(SR = (uint16_t)(SR | 0x00E0u)))
 #define __builtin_enable_interrupts() ((void)(SR = (uint16_t)(SR & ~0x00E0u)))
 #define Nop() ((void)0)
-#define ClrWdt() ((void)0)
+#define ClrWdt() ((void)(host_watchdog_serves = (uint16_t)(host_watchdog_serves + 1u)))
 #define Idle() ((void)0)
 #define Sleep() ((void)0)
 #define SET_CPU_IPL(level) ((void)(SRbits.IPL = (uint16_t)((level) & 7)))

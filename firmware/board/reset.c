@@ -1,0 +1,54 @@
+/* Why the processor started, what is kept over a reset, and the watchdog. */
+#include "board/reset.h"
+
+#include "board/mclv.h"
+
+/* Neither cleared nor set by the start-up code. */
+#ifdef __XC16__
+#define BOARD_PERSISTENT __attribute__((persistent))
+#else
+#define BOARD_PERSISTENT
+#endif
+
+volatile uint16_t board_reset_cause;
+volatile uint16_t board_trap_intcon1 BOARD_PERSISTENT;
+
+static volatile uint16_t kept_fault BOARD_PERSISTENT;
+static volatile uint16_t kept_inverse BOARD_PERSISTENT; /* tells a kept fault from what RAM holds after power-up */
+
+static uint16_t served_tick;
+
+void reset_keep(uint16_t fault)
+{
+    kept_fault = fault;
+    kept_inverse = (uint16_t)~fault;
+}
+
+drive_fault_t reset_take(void)
+{
+    uint16_t cause = RCON;
+    uint16_t fault = kept_fault;
+
+    RCON = 0;
+    board_reset_cause = cause;
+    served_tick = 0;
+    if (RESET_WAS(POR, cause) || RESET_WAS(BOR, cause)) {
+        board_trap_intcon1 = 0;
+        return FAULT_NONE;
+    }
+    if (!RESET_WAS(TRAPR, cause) && !RESET_WAS(IOPUWR, cause) && !RESET_WAS(WDTO, cause)) {
+        return FAULT_NONE;
+    }
+    if (fault != (uint16_t)FAULT_NONE && fault < (uint16_t)FAULT_COUNT && (kept_inverse ^ fault) == 0xFFFFu) {
+        return (drive_fault_t)fault;
+    }
+    return RESET_WAS(WDTO, cause) ? FAULT_WATCHDOG : FAULT_TRAP;
+}
+
+void reset_serve_watchdog(uint16_t ticks)
+{
+    if (ticks != served_tick) {
+        served_tick = ticks;
+        ClrWdt();
+    }
+}

@@ -1,0 +1,44 @@
+/* The last reset's cause, and the fault that is kept over the next one; the watchdog. */
+#ifndef BOARD_RESET_H
+#define BOARD_RESET_H
+
+#include "drive/faults.h"
+
+#include <stdint.h>
+
+/** X(bit, name): the flags of RCON that say why the processor started. */
+#define RESET_CAUSE_TABLE(X) \
+    X(15, TRAPR, "trap conflict") \
+    X(14, IOPUWR, "illegal opcode, or an address from a register that was never written") \
+    X(7, EXTR, "MCLR pin") \
+    X(6, SWR, "RESET instruction") \
+    X(4, WDTO, "watchdog") \
+    X(1, BOR, "supply dipped") \
+    X(0, POR, "power-up")
+
+#define RESET_BIT(bit, name, meaning) RESET_##name = (bit),
+/** Bit numbers in RCON. */
+enum { RESET_CAUSE_TABLE(RESET_BIT) };
+/** 1 if the flag is set in a copy of RCON. */
+#define RESET_WAS(name, rcon) (((rcon) >> RESET_##name) & 1u)
+
+/** RCON as it was found at the start: bits of RESET_CAUSE_TABLE. */
+extern volatile uint16_t board_reset_cause;
+
+/** INTCON1 at the last trap (FAULT_TRAP): its bits name the trap. Kept over every reset but power-up. */
+extern volatile uint16_t board_trap_intcon1;
+
+/** Reads and clears RCON. Once, at the start.
+ *  @return what to start with: the kept fault after a reset by watchdog, trap or illegal opcode (WATCHDOG or TRAP if none was kept),
+ *          else FAULT_NONE */
+drive_fault_t reset_take(void);
+
+/** Keeps a fault (or FAULT_NONE) for the time after a reset. */
+void reset_keep(uint16_t fault);
+
+/** Serves the watchdog if a control interrupt came since the last call; the caller shows that the background is alive.
+ *  Nothing else serves it after the start: when either stands still, the reset comes 16 ms later.
+ *  @param ticks of the drive */
+void reset_serve_watchdog(uint16_t ticks);
+
+#endif
