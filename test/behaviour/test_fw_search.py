@@ -76,9 +76,11 @@ class OnTheBoard(unittest.TestCase):
         self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_ctrl_c_leaves_nothing(self):
+        """Also where the caller ignores SIGINT, as a shell does for its background jobs."""
         self.path.write_text("old", encoding="utf-8")
         command = [sys.executable, "-m", "tuning", "tune-fw", HURST, "--userparams", str(places.ROOT), *self.places]
-        process = subprocess.Popen(command, cwd=places.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+        process = subprocess.Popen(command, cwd=places.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
         time.sleep(3.0)
         os.killpg(process.pid, signal.SIGINT)
         out, error = process.communicate(timeout=20)

@@ -304,7 +304,7 @@ static void stretch(int16_t v_d, int16_t v_q, int16_t i_d, int16_t i_q)
 static void spin(identify_step_t step, uint16_t rs_mohm, uint16_t ld_uh)
 {
     setUp();
-    id->step = step;
+    id->step = (uint16_t)step;
     id->halvings = (uint16_t)(step == IDENTIFY_SPIN_HALF);
     id->values.rs_mohm = rs_mohm;
     id->values.ld_uh = ld_uh;

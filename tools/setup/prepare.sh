@@ -3,7 +3,8 @@
 #
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib
 #   tools/setup/prepare.sh tune    the same, and openpyxl
-#   tools/setup/prepare.sh test    that, and Ruby with gem
+#   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
+#   tools/setup/prepare.sh test    all of that, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby). Result: build/setup/python holds the interpreter's command.
 set -u
@@ -94,16 +95,26 @@ case $job in
         modules="$modules openpyxl"
         python_packages="$python_packages python3-openpyxl"
         ;;
-    *) give_up "prepare.sh, '$job': name the job, run, tune or test" ;;
+    target) ;;
+    *) give_up "prepare.sh, '$job': name the job, run, tune, target or test" ;;
 esac
+
+case $job in
+    target | test)
+        modules="$modules elftools intelhex"
+        python_packages="$python_packages python3-pyelftools python3-intelhex"
+        ;;
+esac
+
+pips=$(echo "$modules" | sed 's/elftools/pyelftools/') # names that pip knows
 
 mkdir -p $state 2>/dev/null || give_up "set-up, $state: cannot be written, check the folder's permissions"
 look
 if [ -n "$packages" ]; then
     if [ -n "${PYTHON:-}" ] && ! find_python >/dev/null; then
-        give_up "set-up, PYTHON=$PYTHON: is no Python 3.11 with $modules; install them for it (pip install $modules tqdm) or leave PYTHON away"
+        give_up "set-up, PYTHON=$PYTHON: is no Python 3.11 with $modules; install them for it (pip install $pips tqdm) or leave PYTHON away"
     fi
-    can_install || give_up "set-up, missing: $lacking: install it (Debian packages: $packages; or pip install $modules tqdm) and try again"
+    can_install || give_up "set-up, missing: $lacking: install it (Debian packages: $packages; or pip install $pips tqdm) and try again"
     echo "foc33: installing Debian packages, a minute or two: $packages (log: $log)"
     : >"$log"
     apt update
