@@ -115,6 +115,7 @@ setup-tune:
 readme: ## run what the README's tables and pictures show, and write them into it
 	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all"; do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
+	@if command -v $(xc16)gcc >/dev/null; then $(MAKE) -s size >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; fi
 	@$(python) tools/readme.py
 
 bench: vboard ## how many motor seconds the virtual board simulates in a second of one core
@@ -162,7 +163,7 @@ check_py := $(call py_tests,unit,check)
 unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
 modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
 
-slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design
+slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design tools/test_target_build
 quick_suites := $(check_py) $(unit_c) $(board_c) $(filter-out $(slow_suites),$(filter tools/%,$(unittest_py)))
 all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) golden/unchanged warnings/default $(modes:%=warnings/%)
 
@@ -306,6 +307,6 @@ sanitize: setup-run ## the demo under -fsanitize=undefined,address [SCENARIO=dem
 	    --out $(call quoted,$(or $(OUT),build/run/sanitize))
 
 clean: ## remove what was built and run (build/gems and build/setup stay; rm -r build removes them too)
-	@rm -rf build/host* build/test* build/golden build/run
+	@rm -rf build/host* build/test* build/target* build/size build/golden build/run
 
 -include $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)

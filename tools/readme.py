@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 README = ROOT / "README.md"
 PICTURES = {"run/demo/speed.png": "demo-speed.png", "run/demo/field_weakening.png": "demo-field-weakening.png",
             "tune-fw/hurst_dmb0224c10002/over_speed.png": "tuning-fw.png", "run/robust/margins.png": "tuning-margins.png"}
@@ -83,6 +84,15 @@ def guarantees() -> str:
     return table(["guarantee", "measured", "command"], rows)
 
 
+def size() -> str | None:
+    """What `make size` left in build/target; None without a compiler for the target."""
+    path = ROOT / "build/target/size.json"
+    if not path.exists():
+        return None
+    from tools.target.size import readme_table
+    return table(*readme_table(json.loads(path.read_text())))
+
+
 def tests() -> str | None:
     """What `make test`, `make coverage` and `make mutate` left in build/; None while the first two have not been run."""
     coverage, mutants, reports = (ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test"))
@@ -104,7 +114,7 @@ def tests() -> str | None:
 
 def main() -> None:
     text = README.read_text()
-    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("tests", tests)):
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("size", size), ("tests", tests)):
         block = make()
         text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
                               lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)

@@ -26,7 +26,7 @@ void firmware_init(void)
     last_ms_tick = 0;
     supervised_tick = 0;
     silent_ms = 0;
-    CORCON = 0x0020u; /* fractional, unsaturated, no PSV change: the control law's products do not depend on it */
+    CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     clock_failed = clock_init();
     panel_init(&board_panel);

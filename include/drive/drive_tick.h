@@ -180,28 +180,8 @@ QM_INLINE void drive_handover_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Slow work, one block every period in turn so that no period has more than one. Bus and circle in every state, the rest in
- *  closed loop. */
-QM_RARE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
-{
-    uint16_t slot = d->ticks & (SLOTS - 1u);
-    if (slot == 2u) {
-        drive_bus_step(d, p, v_bus_raw);
-    } else if (slot == 3u) {
-        drive_circle_step(d, p);
-    } else if (d->state == (uint16_t)DRIVE_CLOSED || d->state == (uint16_t)DRIVE_STOPPING) {
-        switch (slot) {
-        case 0: drive_speed_step(d, p); break;
-        case 1: fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, d->control.reference_erpm); break;
-        case 4: drive_current_limit_step(d, p); break;
-        case 5: drive_protect_step(d, p); break;
-        case 6: drive_handover_step(d, p); break;
-        default: break;
-        }
-    }
-}
-
-/** Bumpless change of frame: currents, voltages and integrators are turned from the forced frame into the estimator's. */
+/** Bumpless change of frame: currents, voltages and integrators are turned from the forced frame into the estimator's. The estimator's
+ *  next angle is that of the sample at hand, for its tick of this period is still to come. */
 QM_RARE void drive_hand_over(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
@@ -226,12 +206,38 @@ QM_RARE void drive_hand_over(drive_t *d, const drive_params_t *p)
     c->reference_erpm = drive_signed(d, p->end_erpm);
     pi_preset(&c->pi_speed, &p->pi_speed, qm_sub_limited(c->reference_erpm, estimator_speed(&d->estimator)), c->ref_q13.q);
     d->angle = estimated;
+    d->frame = trig_sincos(estimated);
     d->stall_count = 0;
     d->lost_count = 0;
     d->state = (uint16_t)DRIVE_CLOSED;
 }
 
-/** At the end speed: hand over once the estimator agrees with the forced speed long enough, or give up by name. */
+/** Slow work, one block every period in turn so that no period has more than one. Bus and circle in every state, the rest in
+ *  closed loop. */
+QM_RARE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
+{
+    uint16_t slot = d->ticks & (SLOTS - 1u);
+    if (slot == 2u) {
+        drive_bus_step(d, p, v_bus_raw);
+    } else if (slot == 3u) {
+        drive_circle_step(d, p);
+    } else if (slot == 1u && d->state == (uint16_t)DRIVE_RAMP) {
+        if (d->slots >= p->ready_slots) {
+            drive_hand_over(d, p); /* a period after the decision: both together would miss the PWM's deadline */
+        }
+    } else if (d->state == (uint16_t)DRIVE_CLOSED || d->state == (uint16_t)DRIVE_STOPPING) {
+        switch (slot) {
+        case 0: drive_speed_step(d, p); break;
+        case 1: fieldweak_tick(&d->fieldweak, &p->fieldweak, &d->tuning, d->control.reference_erpm); break;
+        case 4: drive_current_limit_step(d, p); break;
+        case 5: drive_protect_step(d, p); break;
+        case 6: drive_handover_step(d, p); break;
+        default: break;
+        }
+    }
+}
+
+/** At the end speed: decide for the hand-over once the estimator agrees with the forced speed long enough, or give up by name. */
 QM_INLINE void drive_try_hand_over(drive_t *d, const drive_params_t *p)
 {
 #ifdef OPEN_LOOP_FUNCTIONING
@@ -245,9 +251,7 @@ QM_INLINE void drive_try_hand_over(drive_t *d, const drive_params_t *p)
     miss = qm_abs(qm_sub_limited(drive_signed(d, estimator_speed(&d->estimator)), p->end_erpm));
     d->timer = (uint16_t)(d->timer + 1u);
     d->slots = (uint16_t)((miss < (p->end_erpm >> 2)) ? d->slots + 1u : 0u);
-    if (d->slots >= p->ready_slots) {
-        drive_hand_over(d, p);
-    } else if (d->timer >= p->ready_timeout_slots) {
+    if (d->slots < p->ready_slots && d->timer >= p->ready_timeout_slots) {
         drive_raise(d, FAULT_START_FAILED);
     }
 #endif

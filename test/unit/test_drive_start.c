@@ -539,9 +539,44 @@ static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
         drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
         drive.ticks = (uint16_t)(drive.ticks & ~7u);
         drive_try_hand_over(&drive, &params);
+        drive.ticks = (uint16_t)(drive.ticks + 1u);
+        drive_slow(&drive, &params, 0); /* the next period carries it out */
         steps++;
     }
     return steps;
+}
+
+void test_hand_over_comes_in_the_period_after_the_decision_and_in_no_other(void)
+{
+    uint16_t n;
+    at_the_end_of_the_ramp(1);
+    drive.slots = (uint16_t)(params.ready_slots - 1u);
+    drive.estimator.omega_filtered_q16 = 5000L * 65536;
+    drive.ticks = 8;
+    drive_try_hand_over(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */
+    for (n = 8; n <= 16; n++) {
+        drive.ticks = n;
+        if ((n & 7u) != 1u && (n & 7u) != 2u) {
+            drive_slow(&drive, &params, 0);
+            TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+        }
+    }
+    drive.ticks = 17;
+    drive_slow(&drive, &params, 0);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+}
+
+void test_hand_over_leaves_the_frame_of_the_estimated_angle(void)
+{
+    sincos_t frame;
+    at_the_end_of_the_ramp(1);
+    drive.estimator.rho_q32 = 0x30000000ul;
+    drive_hand_over(&drive, &params);
+    frame = trig_sincos(drive.angle);
+    TEST_ASSERT_EQUAL_HEX16(estimator_next_angle(&drive.estimator), drive.angle);
+    TEST_ASSERT_EQUAL_INT16(frame.sin, drive.frame.sin);
+    TEST_ASSERT_EQUAL_INT16(frame.cos, drive.frame.cos);
 }
 
 void test_estimate_within_a_quarter_of_END_SPEED_for_20_ms_is_ready(void)

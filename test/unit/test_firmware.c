@@ -151,7 +151,7 @@ void test_arithmetic_mode_and_nesting_are_set_explicitly(void)
     CORCON = 0xFFFF;
     INTCON1 = 0xFFFF;
     expect_start(0);
-    TEST_ASSERT_EQUAL_HEX16(0x0020, CORCON);
+    TEST_ASSERT_EQUAL_HEX16(0x0024, CORCON);
     TEST_ASSERT_EQUAL_UINT16(0, INTCON1bits.NSTDIS);
 }
 

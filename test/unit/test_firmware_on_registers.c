@@ -51,7 +51,7 @@ static const struct {
     const char *name;
     uint16_t value;
 } expected[] = {
-    { "CORCON", 0x0020 }, /* fractional, unsaturated: also the reset value */
+    { "CORCON", 0x0024 }, /* fractional, unsaturated; PSV: constants are read from flash */
     { "RCON", 0x0000 },   /* read once and cleared: the next reset has its own cause */
     { "OSCCON", 0x3360 }, /* crystal with PLL, locked; pin selection locked */
     { "PLLFBD", 38 },

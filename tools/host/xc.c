@@ -12,6 +12,11 @@ const size_t host_sfr_count = sizeof host_sfr_table / sizeof host_sfr_table[0];
 
 volatile uint16_t host_watchdog_serves;
 
+void host_clear_watchdog(void)
+{
+    host_watchdog_serves = (uint16_t)(host_watchdog_serves + 1u);
+}
+
 void host_registers_reset(void)
 {
     host_watchdog_serves = 0;

@@ -109,6 +109,7 @@ void _DefaultInterrupt(void);
 
 /** How often the firmware has served the watchdog; there is none on a PC. */
 extern volatile uint16_t host_watchdog_serves;
+void host_clear_watchdog(void);
 
 /* What XC16 builds in, and the instructions with no effect on a PC. */
 #define __builtin_write_OSCCONL(value) host_write_oscconl((unsigned)(value))
@@ -116,7 +117,7 @@ extern volatile uint16_t host_watchdog_serves;
 #define __builtin_disable_interrupts() ((void)(SR = (uint16_t)(SR | 0x00E0u)))
 #define __builtin_enable_interrupts() ((void)(SR = (uint16_t)(SR & ~0x00E0u)))
 #define Nop() ((void)0)
-#define ClrWdt() ((void)(host_watchdog_serves = (uint16_t)(host_watchdog_serves + 1u)))
+#define ClrWdt() host_clear_watchdog()
 #define Idle() ((void)0)
 #define Sleep() ((void)0)
 #define SET_CPU_IPL(level) ((void)(SRbits.IPL = (uint16_t)((level) & 7)))
