@@ -298,9 +298,10 @@ def _loops_and_start(d: Design) -> None:
 
 def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
     m = d.motor
-    s = start.design_start(m, d.board, plant, gains, d.value("MAXIMUM_CURRENT_A"), d.value("NOMINAL_SPEED_RPM"), m.tune)
+    s = start.design_start(m, d.board, plant, gains, d.value("MAXIMUM_CURRENT_A"), d.value("OVER_CURRENT_THRESHOLD_A"),
+                           d.value("NOMINAL_SPEED_RPM"), m.tune)
     d.start_up = s
-    d.put("Q_CURRENT_REF_OPENLOOP", plain(s.current_a), f"{start.CURRENT_SHARE:.0%} of the rated current, or (load + friction)/(Kt {start.LOAD_ANGLE_SINE:g}): "
+    d.put("Q_CURRENT_REF_OPENLOOP", plain(s.current_a), f"{start.CURRENT_SHARE:.0%} of the rated current with the trip level at least {start.TRIP_HEADROOM:g} times that, or (load + friction)/(Kt {start.LOAD_ANGLE_SINE:g}): "
           f"pull-out torque {s.pull_out_nm:.3g} N m for {s.needed_nm:.3g} N m")
     d.put("END_SPEED_RPM", plain(s.end_speed_rpm), f"back-EMF {s.emf_v:.2f} V: its error, {s.error_v:.2f} V (R {start.R_ERROR:.0%} wrong, "
           f"{start.DEAD_TIME_ERROR:.0%} of the dead time, one converter step), turns the angle by 20 degrees")
@@ -314,7 +315,8 @@ def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
 
 def _field_weakening(d: Design) -> None:
     start_rpm = limits.fw_start_rpm(d.envelope, d.value("MAXIMUM_SPEED_RPM"))
-    d.put("FW_START_SPEED_RPM", plain(start_rpm), f"7/8 of the no-load base speed {d.envelope.base_speed(0.0):.0f} rpm; 18 entries reach the maximum speed")
+    d.put("FW_START_SPEED_RPM", plain(start_rpm), f"7/8 of the no-load base speed {d.envelope.base_speed(0.0):.0f} rpm, but at most 95 % of the maximum speed, and 18 "
+          "entries reach that")
     known = {name: number_of(text) for name, text in d.params.items() if text != "NORM_INVKFIBASE"}
     tables, reason = fw_tables.load_for(d.motor.name, known)
     if reason:
@@ -413,4 +415,8 @@ def _warn_loops(d: Design) -> None:
         lost = [label for label, ok in zip(s.trial.labels, s.trial.followed) if not ok]
         d.warnings.append(f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): raise maximum_current, or "
                           "lower start_torque or the load's inertia")
+    elif s and s.loud:
+        d.warnings.append(f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
+                          "to start from some angles: " + ("add [mechanical] coulomb_friction, which the no-load current gives" if d.motor.coulomb_nm == 0.0
+                                                           else "remove LOCK_TIME from [tune]" if "LOCK_TIME" in d.motor.tune else "raise END_SPEED_RPM in [tune]"))
 

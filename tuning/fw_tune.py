@@ -183,15 +183,19 @@ class _Work:
 
     def _run(self, jobs: list[_Job], work: Callable, title: str) -> list[Any]:
         self.show.stage(title, len(jobs))
-        return workers.run_all(jobs, work, self._count, self.options.processes)
+        return self._named(jobs, work, self.options.processes)
+
+    def _named(self, jobs: list[_Job], work: Callable, processes: int | None) -> list[Any]:
+        """The jobs' results; what goes wrong in one says of which motor."""
+        try:
+            return workers.run_all(jobs, work, self._count, processes)
+        except UserError as error:
+            raise UserError(f"{self.motor.name}: {error}") from None
 
     def search(self) -> tuple[Tables, list[dict[str, float]]]:
         """The tables, and what was measured at each entry."""
         self.show.stage("search", self.options.entries)
-        try:
-            result: Result = workers.run_all([self.job], _search, self._count, 1)[0]
-        except UserError as error:
-            raise UserError(f"{self.motor.name}: {error}") from None
+        result: Result = self._named([self.job], _search, 1)[0]
         start_rpm = result.start_rpm if result.needed else min(self.params["FW_START_SPEED_RPM"], result.start_rpm - SPEED_STEP_RPM)
         tables = Tables(self.motor.name, round(start_rpm), result.entries(), fw_tables.fingerprint(self.params),
                         self.params["INVKFI_SPEED0"], result.found[-1].index, result.stopped, goal=self._goal())

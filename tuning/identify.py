@@ -268,17 +268,17 @@ class Identified:
                 for row in self.rows() if row["verdict"] == "FAIL"]
 
     def paste(self) -> str:
-        """The lines for a motor file."""
+        """The lines for a motor file: line to line, which means the same in a star and in a delta."""
         watch = self.measured.watch
         source = f"measured with {MODE}, {self.known.current_a:.3g} A"
         ld_mh, lq_mh = 1e-3 * watch["Ld_uH"], 1e-3 * watch["Lq_uH"]
         lines = ["[electrical]", f'pole_pairs = {{ value = {self.known.pole_pairs}, source = "counted" }}',
-                 f'resistance = {{ value = {self.winding_ohm:.4g}, unit = "ohm phase", at_degc = 25, source = "{source}" }}']
+                 f'resistance = {{ value = {2.0 * self.winding_ohm:.4g}, unit = "ohm line-to-line", at_degc = 25, source = "{source}" }}']
         if abs(ld_mh - lq_mh) <= SALIENT * ld_mh:
-            lines.append(f'inductance = {{ value = {0.5 * (ld_mh + lq_mh):.4g}, unit = "mH phase", source = "{source}" }}')
+            lines.append(f'inductance = {{ value = {ld_mh + lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
         else:
-            lines.append(f'inductance_d = {{ value = {ld_mh:.4g}, unit = "mH phase", source = "{source}" }}')
-            lines.append(f'inductance_q = {{ value = {lq_mh:.4g}, unit = "mH phase", source = "{source}" }}')
+            lines.append(f'inductance_d = {{ value = {2.0 * ld_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
+            lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
         lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
                      f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
         return "\n".join(lines)

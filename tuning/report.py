@@ -13,6 +13,7 @@ from . import header
 from .constants import Constant
 from .design import Design
 from .loops import GAIN_MARGIN_DB, PHASE_MARGIN_DEG, LoopDesign
+from .start import CALM_SHARE
 
 HEADER = "userparams.h"
 REPORT = "report.html"
@@ -175,6 +176,7 @@ def _start_text(d: Design) -> str:
             ("swing of the locked rotor", f"{s.natural_hz:.1f} Hz", "&radic;(P Kt I/J)/2&pi;"),
             ("its damping", f"{s.damping:.4f}", "friction and the current loop's own; dry friction does the rest"),
             ("back-EMF at the hand-over", f"{s.emf_v:.2f} V", f"its error {s.error_v:.2f} V"),
+            ("swing left at the hand-over", f"{s.trial.swing_rpm:.0f} rpm", f"at most {CALM_SHARE:.0%} of {s.end_speed_rpm:g} rpm are asked for"),
             ("rotor follows", "yes" if s.follows else "no", f"{int(s.trial.followed.sum())} of {len(s.trial.labels)} start angles and loads" if s.trial else ""))
     return _table(("", "", ""), rows, numbers=(1,))
 

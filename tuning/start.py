@@ -16,6 +16,9 @@ from .loops import Gains, Plant, current_loop
 
 CURRENT_SHARE = 0.92
 """Start current over rated current: the start is short, so the rated current costs nothing, and more of it holds the rotor more firmly."""
+TRIP_HEADROOM = 1.3
+"""The trip level over the start current, unless the load asks for more: a rotor that swings half a turn into the lock induces faster than
+the current loop gives way, and the current rises by a fifth."""
 LOAD_ANGLE_SINE = 0.77
 """Share of the pull-out torque that load and friction may take: 50 degrees of load angle."""
 RAMP_TORQUE_SHARE = 0.15
@@ -31,6 +34,10 @@ LEAST_LOCK_S = 0.2
 LOCK_SWINGS = 8.0
 """The lock lasts so many periods of the rotor's swing at least."""
 LARGEST_RATE = 2000
+CALM_SHARE = 0.03
+"""Share of the hand-over speed by which the rotor may still swing about it without a longer lock: the hand-over overshoots by several times that."""
+LOUD_SHARE = 0.1
+"""Share beyond which starts fail from some angles."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,11 @@ class StartDesign:
     follows: bool
     trial: "Trial"
 
+    @property
+    def loud(self) -> bool:
+        """True if the lock's swing lasts until the estimator takes over."""
+        return self.trial.swing_rpm > LOUD_SHARE * self.end_speed_rpm
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -65,6 +77,8 @@ class Trial:
     forced_rpm: np.ndarray
     followed: np.ndarray
     labels: list[str]
+    swing_rpm: float
+    """largest swing about the forced speed that is left at the hand-over"""
 
 
 def emf_error_v(motor: Motor, board: BoardFile, current_a: float) -> float:
@@ -83,9 +97,10 @@ def speed_for_emf(motor: Motor, volt: float) -> float:
     return volt / (motor.psi_vs * RPM * motor.pole_pairs)
 
 
-def start_current(motor: Motor, maximum_a: float, needed_nm: float) -> float:
-    """The larger of 92 % of the rated current and what the load needs at 50 degrees of load angle; within the drive's largest current."""
-    wanted = max(CURRENT_SHARE * motor.rated_current_a, needed_nm / (motor.kt_nm_per_a * LOAD_ANGLE_SINE))
+def start_current(motor: Motor, maximum_a: float, trip_a: float, needed_nm: float) -> float:
+    """The larger of 92 % of the rated current (within the trip level's headroom) and what the load needs at 50 degrees of load angle; within
+    the drive's largest current."""
+    wanted = max(min(CURRENT_SHARE * motor.rated_current_a, trip_a / TRIP_HEADROOM), needed_nm / (motor.kt_nm_per_a * LOAD_ANGLE_SINE))
     return float(f"{min(wanted, digits_down(0.98 * maximum_a, 3)):.3g}")
 
 
@@ -167,16 +182,17 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
     slipped = np.abs(turns - np.round(turns)) > 0.25
     lost = np.round(turns) - np.round(first) < -1.5
     labels = [f"{360.0 * i / angles:.0f} deg, {load:.3g} N m" for load in loads for i in range(angles)]
-    return Trial(np.array([row[0] for row in kept]), np.array([row[2] for row in kept]), np.array([row[1] for row in kept]),
-                 ~(slipped | lost), labels)
+    times, forced_rpm, rotor_rpm = (np.array([row[i] for row in kept]) for i in range(3))
+    last = times > times[-1] - 0.1 # the plateau at the end speed
+    return Trial(times, rotor_rpm, forced_rpm, ~(slipped | lost), labels, float(np.abs(rotor_rpm[last] - forced_rpm[last, None]).max()))
 
 
-def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, maximum_a: float, nominal_rpm: float,
+def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, maximum_a: float, trip_a: float, nominal_rpm: float,
                  fixed: dict[str, float]) -> StartDesign:
     """All of it. `fixed` holds what the motor file's [tune] says; the trial only changes what is not fixed."""
     inertia = motor.inertia_kgm2 + motor.load_inertia_kgm2
     first = needed_torque(motor, 0.3 * nominal_rpm)
-    current = fixed.get("Q_CURRENT_REF_OPENLOOP") or start_current(motor, maximum_a, first)
+    current = fixed.get("Q_CURRENT_REF_OPENLOOP") or start_current(motor, maximum_a, trip_a, first)
     end = fixed.get("END_SPEED_RPM") or end_speed(motor, board, current, nominal_rpm)
     minimum = fixed.get("MINIMUM_SPEED_RPM") or minimum_speed(motor, end)
     rate = int(fixed.get("OPENLOOP_RAMPSPEED_INCREASERATE", 0)) or ramp_rate(motor, board, current, end, inertia)
@@ -190,11 +206,11 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
         acceleration = rpm_s_of_rate(motor, board, rate)
         trial = try_start(motor, inertia, damping, current, lock, acceleration, end)
         follows = bool(trial.followed.all())
-        if follows:
+        if follows and trial.swing_rpm <= CALM_SHARE * end:
             break
         if "LOCK_TIME" not in fixed and lock < 0.99 * longest and lock < 8.0 * LOCK_SWINGS / omega * 2.0 * math.pi:
             lock *= 1.5
-        elif "OPENLOOP_RAMPSPEED_INCREASERATE" not in fixed and rate > 1 and end / acceleration < 6.0:
+        elif not follows and "OPENLOOP_RAMPSPEED_INCREASERATE" not in fixed and rate > 1 and end / acceleration < 6.0:
             rate = max(1, int(rate * 0.7))
         else:
             break

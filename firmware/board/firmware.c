@@ -46,7 +46,7 @@ void firmware_init(void)
 }
 
 /** A control interrupt that stays away for 2 ms leaves the bridge without control. */
-static void firmware_supervise(void)
+static void firmware_watch_interrupt(void)
 {
     if (!timer_ms_passed()) {
         return;
@@ -61,16 +61,22 @@ static void firmware_supervise(void)
     }
 }
 
-void firmware_background(void)
+/** What must be right for the bridge to be on, and what tells of it after a reset. */
+QM_INLINE void firmware_supervise(void)
 {
-    uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
-
-    firmware_supervise();
+    firmware_watch_interrupt();
     if (clock_failed) {
         drive_raise(&board_drive, FAULT_CLOCK);
     }
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
+}
+
+void firmware_background(void)
+{
+    uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
+
+    firmware_supervise();
     if (elapsed_ms != 0u) {
         panel_inputs_t in;
         panel_lights_t lights;

@@ -87,6 +87,13 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
     }
 }
 
+/** A fault's code, blinked. */
+QM_INLINE uint16_t panel_fault_light(const panel_t *panel, uint16_t fault)
+{
+    uint16_t in_burst = (uint16_t)(panel->blink_ms < 2u * BLINK_MS * fault);
+    return (uint16_t)(in_burst && (panel->blink_ms / BLINK_MS) % 2u == 0u);
+}
+
 static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t elapsed_ms)
 {
     panel_lights_t lights;
@@ -98,8 +105,7 @@ static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t el
     if (d->fault == (uint16_t)FAULT_NONE) {
         lights.led_alive = (uint16_t)(panel->blink_ms < 2u * BLINK_MS);
     } else {
-        uint16_t in_burst = (uint16_t)(panel->blink_ms < 2u * BLINK_MS * d->fault);
-        lights.led_alive = (uint16_t)(in_burst && (panel->blink_ms / BLINK_MS) % 2u == 0u);
+        lights.led_alive = panel_fault_light(panel, d->fault);
     }
     lights.led_run = drive_is_running(d);
     return lights;

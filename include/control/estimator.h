@@ -101,9 +101,9 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
 QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14)
 {
     alphabeta_t previous = e->history_q14[e->newest];
-    uint16_t slot = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
-    alphabeta_t oldest = e->history_q14[slot];
-    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, oldest);
+    uint16_t newest = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
+    alphabeta_t *slot = &e->history_q14[newest]; /* of the oldest, which makes room */
+    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, *slot);
     int16_t resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), p->rs_q16);
     int16_t resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), p->rs_q16);
 
@@ -111,8 +111,8 @@ QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, c
                                - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
     e->e_q13.beta = (int16_t)(((e->v_last_q13.beta + e->v_before_q13.beta) >> 1)
                               - resistive_beta * (1 << p->rs_exp) - inductive.beta);
-    e->history_q14[slot] = i_q14;
-    e->newest = slot;
+    *slot = i_q14;
+    e->newest = newest;
 }
 
 /** Equations 1, 2 and 7: filtered Ed and Eq give the speed, the speed gives the angle.
@@ -139,24 +139,29 @@ QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
     e->v_last_q13 = v_q13;
 }
 
-/** One period while the control frame is the estimator's own: Park with the frame's sine and cosine, turned back by the
+/** Back-EMF in the control frame while that is the estimator's own: Park with the frame's sine and cosine, turned back by the
  *  half step from the sample to the middle of the last period, so that no second sine is needed. */
-QM_INLINE void estimator_tick_closed(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t,
-                                     alphabeta_t i_q14, sincos_t frame)
+QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, sincos_t frame)
 {
-    dq_t at_sample, at_middle;
-    estimator_back_emf(e, p, t, i_q14);
-    at_sample = park(e->e_q13, frame);
+    dq_t at_sample = park(e->e_q13, frame), at_middle;
     at_middle.d = (int16_t)(at_sample.d - qm_mulhi(at_sample.q, e->half_step_q16_rad));
     at_middle.q = (int16_t)(at_sample.q + qm_mulhi(at_sample.d, e->half_step_q16_rad));
-    estimator_pll(e, p, t, at_middle);
+    return at_middle;
 }
 
-/** One period while another angle drives the motor (lock and ramp): the estimator runs along in its own frame. */
-QM_INLINE void estimator_tick_free(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14)
+/** One period. @param frame of the control
+ *  @param forced nonzero while the forced angle drives the motor (lock and ramp): the estimator runs along in a frame of its own */
+QM_INLINE void estimator_tick(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14,
+                              sincos_t frame, uint16_t forced)
 {
+    dq_t e_q12;
     estimator_back_emf(e, p, t, i_q14);
-    estimator_pll(e, p, t, park(e->e_q13, trig_sincos((angle_t)(e->rho_q32 >> 16))));
+    if (forced) {
+        e_q12 = park(e->e_q13, trig_sincos_called((angle_t)(e->rho_q32 >> 16)));
+    } else {
+        e_q12 = estimator_in_control_frame(e, frame);
+    }
+    estimator_pll(e, p, t, e_q12);
 }
 
 #endif

@@ -29,6 +29,7 @@ typedef struct {
     current_q13_t trim_q13;  /**< d current added by the voltage feedback, -trim_max_q13..0 */
 } fieldweak_t;
 
+/** Entry of a table between two points. @param index 0..FIELDWEAK_ENTRIES - 2 */
 QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16)
 {
     return (int16_t)(table[index] - qm_mulhi_su((int16_t)(table[index] - table[index + 1u]), fraction_q16));
@@ -37,28 +38,7 @@ QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16
 /** Looks up the three tables for a speed reference (not the estimated speed) and adapts the estimator.
  *  Entries above the last are never read: at and beyond index 17 the last entry holds, to one count.
  *  @param ref_erpm speed reference, any value and sign */
-QM_INLINE void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, estimator_tuning_t *tuning, speed_erpm_t ref_erpm)
-{
-    int16_t above = (int16_t)(qm_abs(ref_erpm) - p->on_speed_erpm);
-    uint16_t index = 0, fraction_q16 = 0;
-
-    tuning->kfilter_esdq_q16 = p->kfilter_esdq_q16;
-    if (above > 0) {
-        index = (uint16_t)above >> SPEED_INDEX_CONST;
-        fraction_q16 = (uint16_t)((uint16_t)above << (16 - SPEED_INDEX_CONST));
-        tuning->kfilter_esdq_q16 = p->kfilter_esdq_fw_q16;
-        if (index > FIELDWEAK_ENTRIES - 2) {
-            index = FIELDWEAK_ENTRIES - 2;
-            fraction_q16 = 65535u;
-        }
-    }
-    fw->index = index;
-    fw->table_q13 = fieldweak_between(p->idref_q13, index, fraction_q16);
-    tuning->inv_kfi = fieldweak_between(p->inv_kfi, index, fraction_q16);
-    /* quotient at most 32767 because inv_kfi >= 2048, see the parameter checks */
-    tuning->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)tuning->inv_kfi);
-    tuning->ls_q16 = (uint16_t)(qm_muluu(p->ls_base_q16, (uint16_t)fieldweak_between(p->ls_over2ls0_q15, index, fraction_q16)) >> 14);
-}
+void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, estimator_tuning_t *tuning, speed_erpm_t ref_erpm);
 
 /** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later.
  *  It makes up for a sagging bus or a table that is not tuned; it is bounded, so it cannot run the motor into demagnetisation.

@@ -20,16 +20,14 @@ typedef struct {
 QM_INLINE int16_t forced_angle_tick(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction)
 {
     int16_t at_end = 0;
+    uint32_t step_q32;
     f->speed_q10 += p->increase_rate_q10;
     if (f->speed_q10 >= p->end_speed_q10) {
         f->speed_q10 = p->end_speed_q10;
         at_end = 1;
     }
-    if (direction >= 0) {
-        f->angle_q32 = qm_turn_add(f->angle_q32, (uint32_t)f->speed_q10 << 6);
-    } else {
-        f->angle_q32 = qm_turn_sub(f->angle_q32, (uint32_t)f->speed_q10 << 6);
-    }
+    step_q32 = (uint32_t)f->speed_q10 << 6;
+    f->angle_q32 = (direction >= 0) ? qm_turn_add(f->angle_q32, step_q32) : qm_turn_sub(f->angle_q32, step_q32);
     return at_end;
 }
 

@@ -1,13 +1,14 @@
-/* Sine and cosine from a 128-entry table, and the circle limit sqrt(1 - x^2), without a square root or a branch. */
+/* Sine and cosine from a table of 128 steps a turn, and the circle limit sqrt(1 - x^2), without a square root or a branch. */
 #ifndef CONTROL_TRIG_H
 #define CONTROL_TRIG_H
 
 #include "control/qmath.h"
 
-#define TRIG_SIN_ENTRIES 128
+#define TRIG_SIN_STEPS 128   /* of a turn */
+#define TRIG_SIN_ENTRIES 96  /* half a turn for the sine, a quarter more for the cosine */
 #define TRIG_CIRCLE_STEPS 64
 
-/** sin(2 pi i / 128) * 32757. The amplitude is 10 below 32767 because interpolation by the derivative overshoots by 10. */
+/** sin(2 pi i / 128) * 32757, i = 0..95. The amplitude is 10 below 32767 because interpolation by the derivative overshoots by 10. */
 extern const int16_t trig_sin_table[TRIG_SIN_ENTRIES];
 
 /** sqrt(1 - (i/64)^2) in Q15, i = 0..64, rounded down so that the circle is never left. */
@@ -23,25 +24,32 @@ typedef struct {
  *  Error at most 12 LSB (0.04 %). */
 QM_INLINE sincos_t trig_sincos(angle_t angle)
 {
-    uint16_t index = (uint16_t)((uint16_t)(angle + 256u) >> 9);
-    q15_t s = trig_sin_table[index];
-    q15_t c = trig_sin_table[(index + TRIG_SIN_ENTRIES / 4) & (TRIG_SIN_ENTRIES - 1)];
+    uint16_t nearest = (uint16_t)(angle + 256u);
+    const q15_t *entry = &trig_sin_table[(uint16_t)(nearest >> 9) & (TRIG_SIN_STEPS / 2 - 1)];
+    q15_t s = entry[0];
+    q15_t c = entry[TRIG_SIN_STEPS / 4];
     /* the low nine bits as a signed fraction of one step, then in radians * 65536: 2 pi / 128 / 2 * 65536 / 32768 */
     int16_t rest_q16_rad = qm_mulhi((int16_t)(uint16_t)(angle << 7), 3217);
     sincos_t r;
+    if (nearest >= 32768u) { /* half a turn further both change their signs */
+        s = (int16_t)-s;
+        c = (int16_t)-c;
+    }
     r.sin = (int16_t)(s + qm_mulhi(c, rest_q16_rad));
     r.cos = (int16_t)(c - qm_mulhi(s, rest_q16_rad));
     return r;
 }
 
+/** The same as one called copy, for where it runs rarely. */
+sincos_t trig_sincos_called(angle_t angle);
+
 /** sqrt(1 - x^2) for 0 <= x <= 1 in Q15, linear between table entries: a chord, so above the circle by a tenth of a count at most. */
 QM_INLINE q15_t trig_circle(q15_t x)
 {
-    uint16_t index = (uint16_t)x >> 9;
+    const q15_t *entry = &trig_circle_table[(uint16_t)x >> 9];
     uint16_t fraction_q16 = (uint16_t)((uint16_t)x << 7);
-    int16_t a = trig_circle_table[index];
-    int16_t drop = (int16_t)(a - trig_circle_table[index + 1]);
-    return (int16_t)(a - qm_mulhi_su(drop, fraction_q16));
+    int16_t drop = (int16_t)(entry[0] - entry[1]);
+    return (int16_t)(entry[0] - qm_mulhi_su(drop, fraction_q16));
 }
 
 #endif

@@ -137,6 +137,12 @@ void drive_init(drive_t *d, const drive_params_t *p);
  *  @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
+/** The modulator's gain at the filtered bus. */
+void drive_gain_step(drive_t *d, const drive_params_t *p);
+
+/** The voltage circle at the filtered bus. */
+void drive_circle_step(drive_t *d, const drive_params_t *p);
+
 #ifdef IDENTIFY
 /** Prepares the first step; called by drive_start() after it has cleared d->identify. */
 void identify_start(drive_t *d, const drive_params_t *p);
@@ -146,10 +152,10 @@ void identify_start(drive_t *d, const drive_params_t *p);
 uint16_t identify_background(drive_t *d, const drive_params_t *p);
 #endif
 
-/** 1 while the bridge switches under the law's control. */
+/** 1 while the bridge switches under the law's control: LOCK to STOPPING, in one comparison. */
 QM_INLINE uint16_t drive_is_running(const drive_t *d)
 {
-    return (uint16_t)(d->state >= (uint16_t)DRIVE_LOCK && d->state <= (uint16_t)DRIVE_STOPPING);
+    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_LOCK) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_LOCK);
 }
 
 /** Stops at once and keeps the code of the first fault. */

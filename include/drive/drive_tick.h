@@ -39,18 +39,7 @@ QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus
     } else if (bus_q15 < p->bus_under_q15 && d->state != (uint16_t)DRIVE_STOPPED && d->state != (uint16_t)DRIVE_CALIBRATE) {
         drive_raise(d, FAULT_UNDERVOLTAGE);
     }
-    if (bus_q15 < p->bus_under_q15) {
-        bus_q15 = p->bus_under_q15; /* keeps the quotient within 16 bits */
-    }
-    d->duty_per_volt_q16 = qm_divud(p->duty_per_volt_numerator, (uint16_t)((uint16_t)bus_q15 << 1));
-}
-
-/** The voltage circle at the filtered bus. */
-QM_INLINE void drive_circle_step(drive_t *d, const drive_params_t *p)
-{
-    int16_t bus_q15 = qm_clamp(qm_hi(d->bus_q31), 0, p->bus_over_q15); /* above it nothing runs, and the formats end */
-    d->circle.limit_q14 = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)bus_q15 << 1), p->voltage_limit_per_bus_q16);
-    d->circle.reciprocal = voltage_circle_reciprocal(d->circle.limit_q14);
+    drive_gain_step(d, p);
 }
 
 /** The ramped reference waits while the motor cannot follow: field weakening is indexed by it and must stay true. */
@@ -104,8 +93,18 @@ QM_INLINE current_q13_t drive_torque_step(drive_t *d, const drive_params_t *p, s
 }
 #endif
 
+/** Braking within what the bus takes: the speed controller's integrator goes along. @return the q current */
+QM_INLINE current_q13_t drive_limit_brake(drive_control_t *c, const drive_params_t *p, speed_erpm_t speed, int16_t err, current_q13_t iq)
+{
+    if ((iq ^ speed) < 0 && qm_abs(iq) > c->brake_limit_q13) {
+        iq = (int16_t)((iq < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
+        pi_preset(&c->pi_speed, &p->pi_speed, err, iq);
+    }
+    return iq;
+}
+
 /** Speed controller: the ramped reference and the filtered speed give the q current; braking is limited by the bus. */
-QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p)
+QM_RARE void drive_speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
     speed_erpm_t speed = estimator_speed(&d->estimator);
@@ -120,11 +119,7 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p)
     drive_reference_step(d, p);
     err = qm_sub_limited(c->reference_erpm, speed);
     iq = pi_tick(&c->pi_speed, &p->pi_speed, err, c->iq_limit_q13);
-    if ((iq ^ speed) < 0 && qm_abs(iq) > c->brake_limit_q13) {
-        iq = (int16_t)((iq < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
-        pi_preset(&c->pi_speed, &p->pi_speed, err, iq);
-    }
-    c->ref_q13.q = iq;
+    c->ref_q13.q = drive_limit_brake(c, p, speed, err, iq);
     if (d->state == (uint16_t)DRIVE_STOPPING && qm_abs(speed) < p->minimum_erpm && qm_abs(c->reference_erpm) < p->minimum_erpm) {
         d->state = (uint16_t)DRIVE_STOPPED;
     }
@@ -257,15 +252,20 @@ QM_INLINE void drive_try_hand_over(drive_t *d, const drive_params_t *p)
 #endif
 }
 
-/** The forced angle while the rotor is locked and accelerated. Its vector turns by 90 degrees during the first half of the
- *  lock, so that no rotor position is a dead point. */
+/** The vector turns by 90 degrees during the first half of the lock, so that no rotor position is a dead point. */
+QM_INLINE void drive_lock_sweep(drive_t *d, const drive_params_t *p)
+{
+    d->forced.angle_q32 = (d->direction >= 0) ? qm_turn_add(d->forced.angle_q32, p->lock_sweep_q32)
+                                              : qm_turn_sub(d->forced.angle_q32, p->lock_sweep_q32);
+}
+
+/** The forced angle while the rotor is locked and accelerated. */
 QM_INLINE void drive_forced_step(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_LOCK) {
         d->timer++;
         if (d->timer <= (p->lock_periods >> 1)) {
-            d->forced.angle_q32 = (d->direction >= 0) ? qm_turn_add(d->forced.angle_q32, p->lock_sweep_q32)
-                                                      : qm_turn_sub(d->forced.angle_q32, p->lock_sweep_q32);
+            drive_lock_sweep(d, p);
         } else if (d->timer >= p->lock_periods) {
             d->state = (uint16_t)DRIVE_RAMP;
             d->timer = 0;
@@ -280,10 +280,9 @@ QM_INLINE void drive_forced_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Lock and ramp after the current controllers: the forced angle moves; letting go is harmless at these speeds. */
-QM_RARE void drive_open_loop(drive_t *d, const drive_params_t *p, alphabeta_t i_q14)
+/** Lock and ramp after the estimator: the forced angle moves; letting go is harmless at these speeds. */
+QM_RARE void drive_open_loop(drive_t *d, const drive_params_t *p)
 {
-    estimator_tick_free(&d->estimator, &p->estimator, &d->tuning, i_q14);
     drive_forced_step(d, p);
     if (!d->command.run && d->state != (uint16_t)DRIVE_FAULT) {
         d->state = (uint16_t)DRIVE_STOPPED;
@@ -298,13 +297,14 @@ QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
 #else
     drive_control_t *c = &d->control;
     alphabeta_t i = clarke(d->i_a_q13, d->i_b_q13), v;
+    uint16_t forced = (uint16_t)(d->state <= (uint16_t)DRIVE_RAMP); /* LOCK or RAMP */
 
     c->i_q13 = park(i, d->frame);
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
-    if (d->state == (uint16_t)DRIVE_LOCK || d->state == (uint16_t)DRIVE_RAMP) {
-        drive_open_loop(d, p, i);
+    estimator_tick(&d->estimator, &p->estimator, &d->tuning, i, d->frame, forced);
+    if (forced) {
+        drive_open_loop(d, p);
     } else {
-        estimator_tick_closed(&d->estimator, &p->estimator, &d->tuning, i, d->frame);
         d->angle = estimator_next_angle(&d->estimator);
         if (!d->command.run && d->state == (uint16_t)DRIVE_CLOSED) {
             d->state = (uint16_t)DRIVE_STOPPING;
@@ -337,6 +337,19 @@ QM_INLINE void drive_calibrate(drive_t *d, const drive_params_t *p, const drive_
     }
 }
 
+/** The low sides conduct and charge the high sides' drivers. */
+QM_INLINE void drive_bootstrap_step(drive_t *d, const drive_params_t *p)
+{
+    d->timer++;
+    if (!d->command.run) {
+        d->state = (uint16_t)DRIVE_STOPPED;
+    } else if (d->timer >= p->bootstrap_periods) {
+        d->timer = 0;
+        d->state = (uint16_t)DRIVE_LOCK;
+    }
+    drive_check_overcurrent(d, p); /* last: a fault overrides any other change of state */
+}
+
 /** A period with the bridge off or charging its drivers. */
 QM_RARE void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
@@ -353,14 +366,7 @@ QM_RARE void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples
         }
         break;
     case DRIVE_BOOTSTRAP:
-        d->timer++;
-        if (!d->command.run) {
-            d->state = (uint16_t)DRIVE_STOPPED;
-        } else if (d->timer >= p->bootstrap_periods) {
-            d->timer = 0;
-            d->state = (uint16_t)DRIVE_LOCK;
-        }
-        drive_check_overcurrent(d, p); /* last: a fault overrides any other change of state */
+        drive_bootstrap_step(d, p);
         break;
     default: /* FAULT */
         if (d->command.clear_fault) {

@@ -1,6 +1,6 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
- * sources: firmware/control/trig.c firmware/drive/drive.c
+ * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
  * options: -eva-domains equality,symbolic-locations -eva-subdivide-non-linear-function vd_limit:100
  *     -inline-calls drive_check_overcurrent,drive_is_running,drive_raise,drive_idle,qm_abs
@@ -22,6 +22,7 @@ static inline int16_t speed_ramp_in_pieces(int16_t reference, int16_t target, in
 #include "control/speed_ramp.h"
 static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
 #define trig_sincos sincos_bounded
+#define trig_sincos_called sincos_bounded
 #define trig_circle circle_bounded
 #define qm_lowpass lowpass_in_pieces
 #define clarke clarke_bounded
@@ -34,6 +35,7 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 #define current_control current_control_bounded
 #include "drive/drive_tick.h"
 #undef trig_sincos
+#undef trig_sincos_called
 #undef trig_circle
 #undef qm_lowpass
 #undef clarke

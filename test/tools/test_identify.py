@@ -156,10 +156,23 @@ class Verdict(unittest.TestCase):
         self.assertEqual(self.item(hot, **{"motor.temp_c": 75.0}).problems(), [])
 
     def test_salient_motors_get_both_inductances(self):
-        self.assertIn("inductance = { value = 1.93,", self.item({"Lq_uH": 1940}).paste())
+        self.assertIn('inductance = { value = 3.86, unit = "mH line-to-line"', self.item({"Lq_uH": 1940}).paste())
         lines = self.item({"Lq_uH": 2500}).paste()
-        self.assertIn("inductance_d = { value = 1.92,", lines)
-        self.assertIn("inductance_q = { value = 2.5,", lines)
+        self.assertIn("inductance_d = { value = 3.84,", lines)
+        self.assertIn("inductance_q = { value = 5,", lines)
+
+    def test_the_lines_to_paste_suit_a_star_and_a_delta(self):
+        text = (places.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
+        for connection in ("Y", "delta"):
+            for watch in ({}, {"Lq_uH": 2500}):
+                with self.subTest(connection, watch=watch), tempfile.TemporaryDirectory() as folder:
+                    path = Path(folder) / "pasted.toml"
+                    lines = self.item(watch).paste()
+                    pasted = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", text, flags=re.DOTALL | re.MULTILINE)
+                    path.write_text(pasted.replace('"Y"', f'"{connection}"').split("[spread]")[0], encoding="utf-8")
+                    motor = motor_file.load(str(path))
+                    self.assertAlmostEqual(motor.rs_ohm, 2.6695, delta=1e-3)
+                    self.assertAlmostEqual(motor.ld_h, 1.92e-3, delta=1e-6)
 
     def test_another_end_is_one_line_with_the_remedy(self):
         (line,) = self.item({"result": 9}).problems()

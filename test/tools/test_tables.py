@@ -4,7 +4,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from tools.foc33 import places, report, starts, table2
+from tools.foc33 import motor_file, places, report, starts, table2
 from tools.foc33.errors import UserError
 
 NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083, 1.513), 2000: (1900, 0.062, 1.117),
@@ -68,6 +68,20 @@ class Starts(unittest.TestCase):
 
     def test_the_matrix_is_every_15_degrees_with_three_loads_within_two_seconds(self):
         self.assertEqual((self.table.every_deg, self.table.loads_nm, self.table.within_s), (15.0, [0.0, 0.03, 0.06], 2.0))
+
+    def test_another_motor_gets_shares_of_its_own_ratings_and_its_header_s_time(self):
+        motor = motor_file.load("linix_45zwn24_40")
+        slow = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 800.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 3.0, "LOCK_TIME": 32000.0}
+        table = self.table.for_motor(motor, slow)
+        self.assertEqual(table.loads_nm, [0.0, 0.0115, 0.0231])
+        self.assertEqual((table.motor, table.speed_rpm), ("linix_45zwn24_40", 1600.0))
+        self.assertAlmostEqual(table.within_s, 1.6 + 800 / 536.4 + 0.5, delta=0.01)
+        self.assertAlmostEqual(table.measure_from_s - table.within_s, self.table.measure_from_s - self.table.within_s)
+        self.assertAlmostEqual(table.measure_to_s - table.measure_from_s, self.table.measure_to_s - self.table.measure_from_s)
+
+    def test_the_speed_is_not_below_the_hand_over(self):
+        params = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 1900.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 8.0, "LOCK_TIME": 9000.0}
+        self.assertEqual(self.table.for_motor(motor_file.load("linix_45zwn24_40"), params).speed_rpm, 1900.0)
 
     def test_a_good_start_holds(self):
         self.assertTrue(starts.check(self.table, start()).ok)

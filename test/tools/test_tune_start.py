@@ -24,11 +24,23 @@ class Rules(unittest.TestCase):
         load = 0.1
         motor = replace(self.motor, start_torque_nm=load)
         needed = start.needed_torque(motor, 1000.0)
-        current = start.start_current(motor, 10.0, needed)
+        current = start.start_current(motor, 10.0, 14.0, needed)
         self.assertAlmostEqual(motor.kt_nm_per_a * current * 0.77, load + 0.004 + 15.3e-6 * 1000 * math.pi / 30, delta=3e-4)
 
+    def test_current_leaves_room_to_the_trip_level_for_a_rotor_that_swings_into_the_lock(self):
+        motor = replace(self.motor, rated_current_a=3.4)
+        self.assertAlmostEqual(start.start_current(motor, 3.4, 3.8, 0.05), 3.8 / 1.3, delta=0.005)
+        for name in motors():
+            with self.subTest(name):
+                self.assertLessEqual(1.29 * of(name).start_up.current_a, of(name).value("OVER_CURRENT_THRESHOLD_A"))
+
+    def test_current_for_a_load_may_use_that_room(self):
+        motor = replace(self.motor, rated_current_a=3.4)
+        needed = 3.1 * motor.kt_nm_per_a * 0.77
+        self.assertAlmostEqual(start.start_current(motor, 3.4, 3.8, needed), 3.1, delta=0.005)
+
     def test_current_stays_below_the_largest(self):
-        self.assertLess(start.start_current(self.motor, 0.9, 0.5), 0.9)
+        self.assertLess(start.start_current(self.motor, 0.9, 1.3, 0.5), 0.9)
 
     def test_the_back_emf_at_the_hand_over_is_three_times_its_error(self):
         for name in motors():
@@ -96,3 +108,25 @@ class Trials(unittest.TestCase):
     def test_a_motor_that_cannot_follow_is_warned_about(self):
         d = designed(more="[tune]\nQ_CURRENT_REF_OPENLOOP = 0.1\n")
         self.assertTrue(any("may not follow the ramp" in warning for warning in d.warnings), d.warnings)
+
+    def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau(self):
+        free = replace(self.motor, coulomb_nm=0.0, viscous_nms=0.0, start_torque_nm=0.0)
+        endless = start.try_start(free, 5.5e-6, 1e-5, 1.41, 0.2, 715.0, 1000.0, angles=12)
+        self.assertTrue(endless.followed.all())
+        self.assertGreater(endless.swing_rpm, 200.0)
+        self.assertLess(self.trial(1.41, 0.0).swing_rpm, 10.0)
+
+    def test_the_lock_is_lengthened_until_the_rotor_is_calm_at_the_hand_over(self):
+        for name in motors():
+            with self.subTest(name):
+                s = of(name).start_up
+                self.assertLessEqual(s.trial.swing_rpm, start.CALM_SHARE * s.end_speed_rpm)
+        bare = designed(("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0")).start_up
+        self.assertGreater(bare.lock_s, 1.4 * designed().start_up.lock_s)
+        self.assertLessEqual(bare.trial.swing_rpm, start.CALM_SHARE * bare.end_speed_rpm)
+
+    def test_a_rotor_without_friction_is_warned_about_with_the_line_to_add(self):
+        d = designed(("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 1e-9"),
+                     ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0"))
+        (line,) = [warning for warning in d.warnings if "still swings" in warning]
+        self.assertRegex(line, r"swings by \d+ rpm when the estimator takes over at \d+ rpm.*: add \[mechanical\] coulomb_friction")

@@ -412,11 +412,7 @@ static dq_t emf_after(uint16_t closed, angle_t voltage_angle, angle_t frame_angl
     tuning.kfilter_esdq_q16 = 32767;
     estimator_commanded(&e, v);
     estimator_commanded(&e, v);
-    if (closed) {
-        estimator_tick_closed(&e, &params, &tuning, vector(0, 0), trig_sincos(frame_angle));
-    } else {
-        estimator_tick_free(&e, &params, &tuning, vector(0, 0));
-    }
+    estimator_tick(&e, &params, &tuning, vector(0, 0), trig_sincos(frame_angle), !closed);
     return estimator_emf(&e);
 }
 
@@ -459,7 +455,7 @@ static void run_motor(int16_t direction, uint16_t periods)
     while (periods-- != 0u) {
         uint64_t turn = (direction > 0) ? STEP_7500_Q32 : UINT64_C(0x100000000) - STEP_7500_Q32;
         true_q32 = (uint32_t)((true_q32 + turn) & UINT32_C(0xFFFFFFFF)); /* now the angle of this sample */
-        estimator_tick_closed(&e, &params, &tuning, vector(0, 0), frame);
+        estimator_tick(&e, &params, &tuning, vector(0, 0), frame, 0);
         frame = trig_sincos(estimator_next_angle(&e));
         /* acts for the period centred on the next sample */
         estimator_commanded(&e, inverse_park(rotating(0, (int16_t)(direction * 2 * EMF_7500_Q13)),

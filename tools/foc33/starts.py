@@ -1,18 +1,27 @@
-"""`starts`: the motor started from every rotor angle under several loads. Limits are in tools/scenarios/tables/starts.toml."""
+"""`starts`: the motor started from every rotor angle under several loads. Limits are in tools/scenarios/tables/starts.toml.
+
+Loads, speed and times of the table are for its own motor; another one gets shares of its start torque and rated speed, and the time that
+its header's lock and ramp take.
+"""
 
 import argparse
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from . import matrix, output, places, report, simulate, steps
+from . import matrix, motor_file, output, places, report, simulate, steps
 from .board import Library
 from .errors import UserError
 from .expect import Outcome
 from .plant import Part, Values
 from .toml_file import Document
+
+
+MARGIN_S = 0.1
+"""For the hand-over itself, beside lock and ramp."""
 
 
 @dataclass
@@ -31,6 +40,8 @@ class Table:
     error_percent: float
     overshoot_percent: float
     loads_nm: list[float]
+    other_loads_percent: list[float]
+    other_speed_percent: float
     motor_where: str = ""
     board_where: str = ""
     where: str = ""
@@ -43,12 +54,20 @@ class Table:
         numbers = [root.number("every_deg", minimum=1.0, maximum=360.0)]
         numbers += [root.number(key, minimum=0.0) for key in
                     ("speed_rpm", "start_s", "within_s", "measure_from_s", "measure_to_s", "error_percent", "overshoot_percent")]
-        table = cls(*texts, *numbers, root.numbers("loads_nm", minimum=0.0), root.where("motor"), root.where("board"),
-                    document.label)
+        table = cls(*texts, *numbers, root.numbers("loads_nm", minimum=0.0), root.numbers("other_loads_percent", 0.0, 100.0),
+                    root.number("other_speed_percent", minimum=1.0, maximum=100.0), root.where("motor"), root.where("board"), document.label)
         root.close()
         if not table.start_s + table.within_s < table.measure_from_s < table.measure_to_s:
             raise UserError("the times are not in order", document.label, "start_s + within_s < measure_from_s < measure_to_s")
         return table
+
+    def for_motor(self, motor: motor_file.Motor, params: Mapping[str, float]) -> "Table":
+        """The table for another motor than its own, with that motor's header."""
+        later_s = matrix.start_time_s(dict(params)) + MARGIN_S - self.within_s
+        speed_rpm = max(self.other_speed_percent / 100.0 * motor.rated_speed_rpm, params["END_SPEED_RPM"])
+        return replace(self, motor=motor.name, speed_rpm=round(speed_rpm), within_s=self.within_s + later_s,
+                       measure_from_s=self.measure_from_s + later_s, measure_to_s=self.measure_to_s + later_s,
+                       loads_nm=[float(f"{percent / 100.0 * motor.start_torque_nm:.3g}") for percent in self.other_loads_percent])
 
 
 def command(options: argparse.Namespace) -> int:
@@ -60,6 +79,8 @@ def command(options: argparse.Namespace) -> int:
         table.every_deg = options.every_deg
     motor, board = steps.parts_of(table, options)
     library = steps.library_for([], options.library, options.userparams)
+    if motor.path.stem != table.motor:
+        table = table.for_motor(motor_file.load(str(motor.path)), library.params)
     used = steps.used(motor, library, steps.header_name(options.library, options.userparams))
     cases = [(load, angle) for load in table.loads_nm for angle in np.arange(0.0, 360.0, table.every_deg).tolist()]
     jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]

@@ -1,6 +1,7 @@
 """`table2`: the eight rows of the note's Table 2 beside ours. The rows are data in tools/scenarios/tables/table2.toml."""
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,8 +75,8 @@ class Table:
         return table
 
 
-def command(options: argparse.Namespace) -> int:
-    """The whole command; returns the exit code."""
+def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = matrix.run_cases) -> int:
+    """The whole command; returns the exit code. `run_cases` runs the jobs."""
     table = Table.read(places.TABLES / "table2.toml")
     motor, board = steps.parts_of(table, options)
     library = steps.library_for([], options.library, options.userparams)
@@ -84,7 +85,7 @@ def command(options: argparse.Namespace) -> int:
     target = options.out or places.RESULTS / "table2"
     with output.ResultFolder(target) as folder:
         with steps.Progress("table2", table.measure_to_s * len(jobs), options.quiet) as progress:
-            results = matrix.run_cases(jobs, progress)
+            results = run_cases(jobs, progress)
         rows = [_result(row, result) for row, result in zip(table.rows, results)]
         outcomes = [outcome for row, result in zip(table.rows, rows) for outcome in check(row, result)]
         _write(folder.work, table, rows, outcomes, used, board)

@@ -18,10 +18,10 @@ def start_page(book: Book, motor: DataPage, board: DataPage) -> Page:
     page.section("Current")
     quantity(page, "Load and friction", "first_needed_nm", f"start_torque_nm+coulomb_nm+viscous_nms*0.3*NOMINAL_SPEED_RPM*{RPM}", "N m",
              "at 30 % of nominal speed")
-    wanted = f"MAX({start.CURRENT_SHARE}*rated_current_a,first_needed_nm/(kt_nm_per_a*{start.LOAD_ANGLE_SINE}))"
+    wanted = f"MAX(MIN({start.CURRENT_SHARE}*rated_current_a,OVER_CURRENT_THRESHOLD_A/{start.TRIP_HEADROOM}),first_needed_nm/(kt_nm_per_a*{start.LOAD_ANGLE_SINE}))"
     parameter(page, motor, Rule("Q_CURRENT_REF_OPENLOOP", significant(f"MIN({wanted},{digits_down('(0.98*MAXIMUM_CURRENT_A)', 3)})", 3),
-                                f"{start.CURRENT_SHARE:.0%} of the rated current, or what the load needs at 50 degrees of load angle; within the "
-                                f"largest current"))
+                                f"{start.CURRENT_SHARE:.0%} of the rated current with the trip level at least {start.TRIP_HEADROOM:g} times that, "
+                                f"or what the load needs at 50 degrees of load angle; within the largest current"))
     quantity(page, "Pull-out torque", "pull_out_nm", "kt_nm_per_a*Q_CURRENT_REF_OPENLOOP", "N m", "Kt I")
     page.section("Hand-over")
     dead = "4/PI()*supply_v*dead_time_s/pwm_period_s"
@@ -41,7 +41,7 @@ def start_page(book: Book, motor: DataPage, board: DataPage) -> Page:
     quantity(page, "Swing of the locked rotor", "swing_hz",
              "SQRT(pole_pairs*kt_nm_per_a*Q_CURRENT_REF_OPENLOOP/(inertia_kgm2+load_inertia_kgm2))/(2*PI())", "Hz", "sqrt(P Kt I / J) / 2 pi", "0.0")
     quantity(page, "Lengthened by the command's trial", "lock_factor", _one(motor, "command.lock_factor"), "1",
-             "make tune tries lock and ramp on the rotor's equation and lengthens them until the rotor follows; 1 for your own motor: try it",
+             "make tune tries lock and ramp on the rotor's equation and lengthens them until the rotor follows and is calm; 1 for your own motor: try it",
              "0.000")
     seconds = f"MAX({start.LEAST_LOCK_S},-INT(-{start.LOCK_SWINGS}/swing_hz/0.05)*0.05)*lock_factor"
     parameter(page, motor, Rule("LOCK_TIME", f"2*ROUND(MIN({seconds},32000*pwm_period_s)/pwm_period_s/2,0)",
