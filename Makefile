@@ -115,7 +115,8 @@ setup-tune:
 readme: ## run what the README's tables and pictures show, and write them into it
 	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all"; do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
-	@if command -v $(xc16)gcc >/dev/null; then $(MAKE) -s size >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; fi
+	@if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
+	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done; fi
 	@$(python) tools/readme.py
 
 bench: vboard ## how many motor seconds the virtual board simulates in a second of one core

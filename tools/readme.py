@@ -93,6 +93,15 @@ def size() -> str | None:
     return table(*readme_table(json.loads(path.read_text())))
 
 
+def cycles() -> str | None:
+    """What `make cycles` left in build/target; None without a compiler for the target."""
+    path = ROOT / "build/target/cycles.json"
+    if not path.exists():
+        return None
+    from tools.target.cycles import readme_table
+    return table(*readme_table(json.loads(path.read_text())))
+
+
 def tests() -> str | None:
     """What `make test`, `make coverage` and `make mutate` left in build/; None while the first two have not been run."""
     coverage, mutants, reports = (ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test"))
@@ -114,7 +123,7 @@ def tests() -> str | None:
 
 def main() -> None:
     text = README.read_text()
-    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("size", size), ("tests", tests)):
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("size", size), ("cycles", cycles), ("tests", tests)):
         block = make()
         text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
                               lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)

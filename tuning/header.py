@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 
 from tools.foc33 import places
+from tools.foc33.motor_file import Motor
 
 from .constants import Constant, filter_hz
 from .design import Design
@@ -78,12 +79,17 @@ def _safe(text: str) -> str:
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").replace("??/", "?? /").split())
 
 
+def wanted(motor: Motor) -> str:
+    """What MOTOR= finds a motor by."""
+    return motor.name if motor.path.parent.resolve() == places.MOTORS.resolve() else str(places.shown(motor.path))
+
+
 def _head(design: Design) -> list[str]:
     motor, board = (_safe(str(places.shown(path))) for path in (design.motor.path, design.board.path))
-    wanted = _safe(design.motor.name) if design.motor.path.parent == places.MOTORS else motor
+    name = _safe(wanted(design.motor))
     lines = ["/* Everything a user edits, in engineering units: the motor, the supply, limits, start, control loops and field weakening.", " *",
-             f" * Made from {motor} and {board} by: make tune MOTOR={wanted}",
-             f" * (make userparams MOTOR={wanted} writes it to userparams.h). Field weakening: {design.tables_from}.", " *",
+             f" * Made from {motor} and {board} by: make tune MOTOR={name}",
+             f" * (make userparams MOTOR={name} writes it to userparams.h). Field weakening: {design.tables_from}.", " *",
              " * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep",
              " * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,",
              " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/params.h; the table at the end shows them."]

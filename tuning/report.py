@@ -128,7 +128,7 @@ def _page(design: Design, plots: dict[str, str]) -> str:
     d, m = design, design.motor
     parts = [f"<h1>{html.escape(m.title)}</h1>",
              f'<p class="quiet">{html.escape(str(places.shown(m.path)))} on {html.escape(d.board.title)} ({html.escape(str(places.shown(d.board.path)))}). '
-             f"Made by <code>make tune MOTOR={html.escape(m.name)}</code>; the header is {HEADER} beside this page.</p>"]
+             f"Made by <code>make tune MOTOR={html.escape(header.wanted(m))}</code>; the header is {HEADER} beside this page.</p>"]
     parts += [f'<p class="warning">{html.escape(warning)}</p>' for warning in d.warnings]
     parts += ["<h2>Speed and torque</h2>", _limits_text(d), plots["torque"], plots["current"],
               "<h2>Current loop</h2>", _loop_text(d.current_loop, "Kp = 2&pi;f L, Ki = 2&pi;f R; the controller's zero cancels the winding's pole. A vector "

@@ -2,7 +2,6 @@
 
 import argparse
 import functools
-import math
 from pathlib import Path
 from typing import Any
 
@@ -69,11 +68,10 @@ def _from_the_command(name: str) -> dict[tuple[str, str], Any]:
     m, s = d.motor, d.start_up
     inertia = m.inertia_kgm2 + m.load_inertia_kgm2
     omega = start.natural_rad_s(m, s.current_a, inertia)
-    lock_s = max(start.LEAST_LOCK_S, math.ceil(start.LOCK_SWINGS * 2.0 * math.pi / omega / 0.05) * 0.05)
     found: dict[str, Any] = {
         "CURRENT_BANDWIDTH_HZ": d.current_loop.bandwidth_hz, "SPEED_BANDWIDTH_HZ": d.speed_loop.bandwidth_hz,
         "current_worst_deg": round(d.current_loop.worst.phase_deg, 2), "speed_worst_deg": round(d.speed_loop.worst.phase_deg, 2),
-        "lock_factor": round(s.lock_s / lock_s, 6), "rate_factor": s.rate / start.ramp_rate(m, d.board, s.current_a, s.end_speed_rpm, inertia)}
+        "lock_factor": round(s.lock_s / start.lock_by_rule_s(omega), 6), "rate_factor": s.rate / start.ramp_rate(m, d.board, s.current_a, s.end_speed_rpm, inertia)}
     result = {(f"command.{key}", "value"): value for key, value in found.items()}
     if d.tuned_by_machine:
         tables = fw_tables.load(fw_tables.path_of(name))

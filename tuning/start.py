@@ -127,6 +127,11 @@ def natural_rad_s(motor: Motor, current_a: float, inertia: float) -> float:
     return math.sqrt(motor.pole_pairs * motor.kt_nm_per_a * current_a / inertia)
 
 
+def lock_by_rule_s(omega: float) -> float:
+    """Eight swings of the locked rotor, before the trial lengthens it."""
+    return max(LEAST_LOCK_S, math.ceil(LOCK_SWINGS * 2.0 * math.pi / omega / 0.05) * 0.05)
+
+
 def damping_nms(motor: Motor, plant: Plant, gains: Gains, omega: float) -> float:
     """Viscous friction and what the current loop adds: the swing's back-EMF drives a current through the loop's admittance."""
     hz = np.array([omega / (2.0 * math.pi)])
@@ -199,7 +204,7 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
     omega = natural_rad_s(motor, current, inertia)
     damping = damping_nms(motor, plant, gains, omega)
     lock = (fixed.get("LOCK_TIME", 0.0) * board.pwm_period_s
-            or max(LEAST_LOCK_S, math.ceil(LOCK_SWINGS * 2.0 * math.pi / omega / 0.05) * 0.05))
+            or lock_by_rule_s(omega))
     longest = 32000 * board.pwm_period_s
     while True:
         lock = min(lock, longest)

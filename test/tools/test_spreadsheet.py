@@ -20,7 +20,7 @@ import openpyxl
 from openpyxl.utils import column_index_from_string
 
 from tools.foc33 import board_file, motor_file, places
-from tuning import constants, design, header, loops, spreadsheet
+from tuning import constants, design, header, loops, spreadsheet, start
 
 MOTORS = places.names(places.MOTORS)
 PUBLISHED = {3.95: {"NORM_RS": 12990, "NORM_LSDTBASE": 1460, "NORM_INVKFIBASE": 7956, "NORM_DELTAT": 1790, "D_ILIMIT_HS": 1502, "D_ILIMIT_LS": 6117},
@@ -277,8 +277,10 @@ class AgainstTheCommand(unittest.TestCase):
                 d = design.design(dataclasses.replace(motor_file.load(name), **change.motor), board_file.load(spreadsheet.DEFAULT_BOARD))
                 self.assertFalse(d.tuned_by_machine)
                 found = defines(recalculated()[f"changed {name}"].lines())
-                # Bandwidths are found by trying; the sheet keeps the chosen motor's.
+                # Bandwidths and how much longer the lock has to be are found by trying; the sheet keeps the chosen motor's.
                 wanted = {key: text for key, text in d.params.items() if "_BANDWIDTH_" not in key and "_PTERM" not in key}
+                lock_s = _lock_by_rule_s(d) * designed(name).start_up.lock_s / _lock_by_rule_s(designed(name))
+                wanted["LOCK_TIME"] = str(2 * round(lock_s / d.board.pwm_period_s / 2.0))
                 self.assertEqual({key: (found[key], wanted[key]) for key in wanted if not _equal(found[key], wanted[key])}, {})
 
     def test_the_build_accepts_the_lines_of_every_motor(self):
@@ -340,6 +342,10 @@ class AgainstTheCommand(unittest.TestCase):
                        if row[column - 1] not in (None, "ok", "Check") and not str(row[column - 1]).startswith("warning:")]
                 self.assertEqual(bad, [])
                 self.assertEqual(sheet["red_checks"], 0)
+
+
+def _lock_by_rule_s(d: design.Design) -> float:
+    return start.lock_by_rule_s(start.natural_rad_s(d.motor, d.start_up.current_a, d.motor.inertia_kgm2 + d.motor.load_inertia_kgm2))
 
 
 def _equal(a: str | None, b: str) -> bool:

@@ -25,6 +25,13 @@ class TomlFile(unittest.TestCase):
     def test_a_syntax_error_names_its_line(self):
         self.refused(lambda: document("a = 1\nb = = 2\n"), "TOML syntax", "line 2")
 
+    def test_a_syntax_error_about_a_table_shows_it_as_the_file_does(self):
+        self.refused(lambda: document("[a.b]\nx = 1\n[a.b]\n"), "cannot declare [a.b] twice", "line 3")
+        self.refused(lambda: document("[a]\nx = 1\n[a]\n"), "cannot declare [a] twice", "line 3")
+
+    def test_the_mark_that_some_editors_begin_a_file_with_is_read_over(self):
+        self.assertEqual(document("\ufeffx = 1\n").root.number("x"), 1.0)
+
     def test_an_unclosed_string_at_the_end_names_the_last_line(self):
         self.refused(lambda: document("a = 1\nb = \"x"), "TOML syntax", "line 2")
 

@@ -48,6 +48,14 @@ class Tune(unittest.TestCase):
         for words in ("Current loop", "Speed loop", "Start", "Parameters", "Constants", "Inputs", "NORM_RS", "AN1292"):
             self.assertIn(words, page)
 
+    def test_header_and_page_name_the_command_that_makes_them_again(self):
+        command("tune", HURST, "--out", str(self.out))
+        with motor_path() as path:
+            command("tune", str(path), "--out", str(self.out) + "2")
+            for folder, motor in ((self.out, HURST), (Path(str(self.out) + "2"), str(path))):
+                for name in ("report.html", "userparams.h"):
+                    self.assertIn(f"make tune MOTOR={motor}", (folder / name).read_text(encoding="utf-8"), name)
+
     def test_an_unchanged_header_keeps_its_time(self):
         command("tune", HURST, "--out", str(self.out), "--brief")
         os.utime(self.out / "userparams.h", (1e9, 1e9))

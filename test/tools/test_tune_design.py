@@ -214,6 +214,13 @@ class Voltage(unittest.TestCase):
         start = limits.fw_start_rpm(fast, 4000.0)
         self.assertGreaterEqual(start + 17 * 1024 / 8 + 50.0, 4000.0)
 
+    def test_the_start_of_the_table_stays_in_its_range_for_the_quickest_motor(self):
+        low, high = params.parameters()["FW_START_SPEED_RPM"].low, params.parameters()["FW_START_SPEED_RPM"].high
+        self.assertEqual(limits.FW_START_RPM, (float(low), float(high)))
+        quick = Envelope(replace(self.motor, pole_pairs=1, psi_vs=3e-3, rs_ohm=0.3, ld_h=1e-4, lq_h=1e-4, viscous_nms=1e-7), self.envelope.circle_v, 2.75)
+        self.assertGreater(quick.base_speed(0.0), 25000.0)
+        self.assertEqual(limits.fw_start_rpm(quick, 26000.0), 20000.0)
+
 
 class Parameters(unittest.TestCase):
     def test_ranges_are_those_of_the_table_in_the_firmware(self):

@@ -12,6 +12,7 @@ enum {
     SAMP = 0x0002,
     DONE = 0x0001,
     AD1MD = 0x0001,
+    AD1IF = 0x2000,      /* in IFS0; the enable bit has the same place in IEC0 */
     SSRC_PWM = 3,
     SSRC_AUTO = 7
 };
@@ -187,6 +188,11 @@ static void warn_timing(vb_t *vb)
     }
 }
 
+static void warn_off(vb_t *vb)
+{
+    vb_warn(vb, "AD1CON1: the PWM runs but the ADC is off (ADON is 0), there are no samples and no ADC interrupts");
+}
+
 /* Follow the configuration; cheap when nothing changed. */
 void vb_adc_decode(vb_t *vb)
 {
@@ -211,8 +217,8 @@ void vb_adc_decode(vb_t *vb)
         warn_settings(vb, con1, *r->ad1con2);
         warn_inputs(vb);
         warn_timing(vb);
-    } else if (vb->pwm.running) {
-        vb_warn(vb, "AD1CON1: the PWM runs but the ADC is off (ADON is 0), there are no samples and no ADC interrupts");
+    } else if (vb->pwm.running && vb->live == NULL) {
+        warn_off(vb);
     }
 }
 
@@ -228,8 +234,8 @@ void vb_adc_reset(vb_t *vb)
     adc->fill = 0;
 }
 
-/* Hand a sequence's results to the buffers; when the last of SMPI+1 sequences is in, the handler's end is due. */
-static void deliver(vb_t *vb, const uint16_t *result, unsigned count)
+/* Hand a sequence's results to the buffers. True if it was the last of SMPI+1 sequences. */
+static bool fill_buffers(vb_t *vb, const uint16_t *result, unsigned count)
 {
     vb_adc_t *adc = &vb->adc;
     volatile uint16_t *const buffer[16] = {
@@ -241,11 +247,30 @@ static void deliver(vb_t *vb, const uint16_t *result, unsigned count)
         *buffer[adc->fill & 15u] = result[n];
         adc->fill++;
     }
-    if (++adc->sequence >= adc->sequence_length) {
-        adc->sequence = 0;
-        adc->fill = 0;
-        adc->handler_s = vb_max(adc->conversion_end_s, vb->now_s) + vb->isr_us * 1e-6;
+    if (++adc->sequence < adc->sequence_length) {
+        return false;
     }
+    adc->sequence = 0;
+    adc->fill = 0;
+    return true;
+}
+
+/* The results are there; the handler's end is due. */
+static void deliver(vb_t *vb, const uint16_t *result, unsigned count)
+{
+    if (fill_buffers(vb, result, count)) {
+        vb->adc.handler_s = vb_max(vb->adc.conversion_end_s, vb->now_s) + vb->isr_us * 1e-6;
+    }
+}
+
+/* A CPU with a time of its own gets them when the conversion ends. */
+static void deliver_later(vb_t *vb, const uint16_t *result, unsigned count)
+{
+    vb_adc_t *adc = &vb->adc;
+    memcpy(adc->queued_result, result, count * sizeof *result);
+    adc->queued_count = count;
+    adc->handler_s = adc->conversion_end_s;
+    *vb->reg.ad1con1 = (uint16_t)(*vb->reg.ad1con1 & ~(unsigned)DONE);
 }
 
 /* True if the sample-and-holds are tracking their inputs, as ASAM = 1 or a set SAMP bit arranges. */
@@ -283,7 +308,9 @@ void vb_adc_trigger(vb_t *vb)
         adc->turn = (adc->turn + 1u) % adc->channels;
     }
     adc->conversion_end_s = vb->now_s + (double)count * adc->conversion_s;
-    if (adc->handler_s < VB_NEVER) {
+    if (vb->live != NULL) {
+        deliver_later(vb, result, count);
+    } else if (adc->handler_s < VB_NEVER) {
         memcpy(adc->queued_result, result, sizeof result);
         adc->queued_count = count;
         adc->overruns += 1.0;
@@ -294,11 +321,35 @@ void vb_adc_trigger(vb_t *vb)
     }
 }
 
+/* The end of a conversion for a CPU with a time of its own. */
+static void conversion_done(vb_t *vb)
+{
+    vb_adc_t *adc = &vb->adc;
+    *vb->reg.ad1con1 = (uint16_t)(*vb->reg.ad1con1 | DONE);
+    if (!fill_buffers(vb, adc->queued_result, adc->queued_count)) {
+        return;
+    }
+    if ((*vb->reg.ifs0 & AD1IF) != 0) {
+        adc->overruns += 1.0;
+        vb_warn(vb, "IFS0: AD1IF is still set when the next conversion ends, the handler was late or never came");
+    }
+    if (vb->isr_dropped == 0.0) {
+        (void)vb_raise(vb, VB_VECTOR_ADC1);
+    }
+    if (vb->trace.due && (vb->isr_dropped != 0.0 || (*vb->reg.iec0 & AD1IF) == 0)) {
+        vb_trace_row(vb);
+    }
+}
+
 /* The instant at which the handler's writes become visible: run it. */
 void vb_adc_handler(vb_t *vb)
 {
     vb_adc_t *adc = &vb->adc;
     adc->handler_s = VB_NEVER;
+    if (vb->live != NULL) {
+        conversion_done(vb);
+        return;
+    }
     *vb->reg.ad1con1 = (uint16_t)(*vb->reg.ad1con1 | DONE);
     if (vb->isr_dropped != 0.0) {
         *vb->reg.ifs0 = (uint16_t)(*vb->reg.ifs0 | 0x2000u);
@@ -339,5 +390,16 @@ void vb_adc_end(vb_t *vb)
     adc->conversion_end_s = vb_max(adc->conversion_end_s - period_s, -1.0);
     if (adc->handler_s < VB_NEVER) {
         adc->handler_s -= period_s;
+    }
+}
+
+/* The same warning for a CPU that needs some time to switch on one after the other. */
+void vb_adc_check(vb_t *vb)
+{
+    enum { PATIENCE = 200 };
+    vb_pwm_t *pwm = &vb->pwm;
+    pwm->deaf_periods = pwm->running && !vb->adc.on ? pwm->deaf_periods + 1u : 0u;
+    if (pwm->deaf_periods == PATIENCE) {
+        warn_off(vb);
     }
 }

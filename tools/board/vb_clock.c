@@ -38,6 +38,9 @@ double vb_clock_fcy_hz(vb_t *vb)
     default: fosc_hz = FRC_HZ / (double)(1u << ((*vb->reg.clkdiv >> 8) & 7u)); break;
     }
     double fcy_hz = 0.5 * fosc_hz;
+    if (vb->live != NULL && (*vb->reg.p1tcon & 0x8000u) == 0) {
+        return fcy_hz; /* on the way to its clock; nothing depends on it before the PWM runs */
+    }
     if (source != 3) {
         vb_warn(vb, "OSCCON: the clock source is %u, the crystal with PLL is 3", source);
     }

@@ -112,12 +112,17 @@ void vb_handler(vb_t *vb, vb_vector_t vector)
     cpu_ran(vb);
 }
 
-/* Set an interrupt flag and serve it if it is enabled and its priority is above the CPU's. True if the handler ran. */
+/* Set an interrupt flag and serve it if it is enabled and its priority is above the CPU's. True if the handler ran, or if the CPU
+ * decides by itself when to run it. */
 bool vb_raise(vb_t *vb, vb_vector_t vector)
 {
     const vector_info_t *v = &info[vector];
     volatile uint16_t *flags = flags_of(vb, vector);
     *flags = (uint16_t)(*flags | (1u << v->bit));
+    if (vb->live != NULL) {
+        vb->live->raised(vb->cpu.context, vector);
+        return true;
+    }
     if (((enables_of(vb, vector) >> v->bit) & 1u) == 0) {
         if (vector == VB_VECTOR_ADC1) {
             vb_warn(vb, "%s: %s is 0, conversions end but %s never runs", v->enable_register, v->enable, v->handler);

@@ -1,7 +1,8 @@
-/* The virtual board's state and the interfaces between its modules; nothing outside tools/board includes this. */
+/* The virtual board's state and the interfaces between its modules; nothing outside tools/board and tools/pil includes this. */
 #ifndef FOC33_BOARD_VB_INTERNAL_H
 #define FOC33_BOARD_VB_INTERNAL_H
 
+#include "probe.h"
 #include "vboard.h"
 
 #include <stdarg.h>
@@ -133,7 +134,8 @@ typedef struct {
     uint16_t ovdcon;
     double trigger_s;        /* special event in this period, VB_NEVER if none */
     uint32_t postscale, event_postscale;
-    uint32_t udis_periods, idle_periods;
+    uint32_t udis_periods, idle_periods, deaf_periods;
+    double length_s;         /* of this period, shorter than planned when the time base starts or the device is reset within it */
     vb_leg_t leg[3];
     double planned_from_s;
     uint8_t seen_mask;       /* outputs that were on at any time in this period, bits as in P1OVDCON */
@@ -191,6 +193,31 @@ typedef struct {
     double trips;
 } vb_fault_t;
 
+/* ---- a CPU that has a time of its own (tools/pil) ---- */
+
+/* It executes instructions between the board's events instead of running whole handlers at them, and has timers, serial port, watchdog and
+ * oscillator of its own. Times are within the period.
+ *   run       go on to `until_s`, or to the end of an instruction that the board must follow at once; returns that time
+ *   raised    a peripheral of the board has set the interrupt flag of `vector`
+ *   follow    the plant has reached the time that run() returned
+ *   end       the period of `length_s` is over: times start at 0 again
+ *   destroy   the board is going away */
+typedef struct {
+    double (*run)(void *context, double until_s);
+    void (*raised)(void *context, vb_vector_t vector);
+    void (*follow)(void *context);
+    void (*end)(void *context, double length_s);
+    void (*destroy)(void *context);
+} vb_live_t;
+
+/* What such a CPU has counted; zeroes for the host's. Latency: from the trigger to the write of the third duty. */
+typedef struct {
+    double isr_count, isr_min, isr_max, isr_sum, isr_last;
+    double latency_min, latency_max, latency_sum, latency_count, latency_last;
+    double stack_bytes, instructions, cycles, resets, errors;
+    double ticks, differences;
+} vb_counts_t;
+
 /* ---- trace (vb_trace.c) ---- */
 
 /* How a key reaches its value; see vb_keys.c. */
@@ -228,6 +255,9 @@ enum { VB_WARNINGS = 48, VB_TEXT = 200 };
 
 struct vb {
     vb_cpu_t cpu;
+    const vb_live_t *live;         /* NULL: the CPU has handlers only */
+    const probe_signal_t *signals; /* the firmware's, in the order of probe_signals; NULL: unknown */
+    vb_counts_t count;
     vb_regs_t reg;
     vb_motor_t motor;
     vb_inverter_t inverter;
@@ -280,6 +310,8 @@ int vb_fail(vb_t *vb, const char *format, ...) __attribute__((format(printf, 2, 
 void vb_warn(vb_t *vb, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void vb_latch(vb_t *vb);
 void vb_stat_reset(vb_t *vb);
+/* End this period now. */
+void vb_cut_period(vb_t *vb);
 
 /* vb_keys.c */
 void vb_keys_defaults(vb_t *vb);
@@ -323,6 +355,7 @@ void vb_pwm_replan(vb_t *vb);
 void vb_pwm_half(vb_t *vb);
 void vb_pwm_registers_changed(vb_t *vb);
 void vb_pwm_show_counter(vb_t *vb);
+uint16_t vb_pwm_counter(const vb_t *vb, double now_s);
 uint8_t vb_pwm_mask(const vb_t *vb);
 void vb_fault_check(vb_t *vb, bool period_start);
 
@@ -334,11 +367,13 @@ void vb_adc_trigger(vb_t *vb);
 void vb_adc_handler(vb_t *vb);
 double vb_adc_next_trigger(const vb_t *vb, double after_s);
 void vb_adc_end(vb_t *vb);
+void vb_adc_check(vb_t *vb);
 
 /* vb_io.c */
 void vb_io_reset(vb_t *vb);
 void vb_io_decode(vb_t *vb);
 void vb_io_ports(vb_t *vb);
+void vb_io_external_levels(const vb_t *vb, uint16_t level[3]);
 void vb_io_timers(vb_t *vb, double h_s);
 void vb_io_uart_step(vb_t *vb, double h_s);
 void vb_io_uart_take(vb_t *vb);

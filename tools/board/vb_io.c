@@ -30,7 +30,7 @@ static void ports_of(const vb_t *vb, volatile uint16_t *set[3], int what)
 }
 
 /* Levels that the board's circuits give to the pins when these are inputs; everything else is pulled up. */
-static void external_levels(const vb_t *vb, uint16_t level[3])
+void vb_io_external_levels(const vb_t *vb, uint16_t level[3])
 {
     bool fault = vb->pins.flta != 0.0 || vb->fault.comparator;
     level[0] = (uint16_t)(0x079Fu & ~(vb->pins.s2 != 0.0 ? 1u << 8 : 0u));
@@ -42,7 +42,7 @@ unsigned vb_io_pin_level(const vb_t *vb, unsigned port, unsigned bit)
 {
     volatile uint16_t *tris[3], *lat[3];
     uint16_t level[3];
-    external_levels(vb, level);
+    vb_io_external_levels(vb, level);
     ports_of(vb, tris, 2);
     ports_of(vb, lat, 1);
     unsigned value = ((*tris[port] >> bit) & 1u) != 0 ? level[port] : *lat[port];
@@ -58,7 +58,8 @@ static void decode_analogue(vb_t *vb)
     vb->pins.analogue[2] = (uint16_t)((an >> 6) & 7u);
 }
 
-/* Write the port registers. A PORTx that the firmware wrote is taken as a write of the latch, as on silicon. */
+/* Write the port registers. A PORTx that the firmware wrote is taken as a write of the latch, as on silicon; a CPU with a time of its own
+ * has done that already. */
 void vb_io_ports(vb_t *vb)
 {
     volatile uint16_t *port[3], *lat[3], *tris[3];
@@ -66,11 +67,11 @@ void vb_io_ports(vb_t *vb)
     ports_of(vb, port, 0);
     ports_of(vb, lat, 1);
     ports_of(vb, tris, 2);
-    external_levels(vb, level);
+    vb_io_external_levels(vb, level);
     decode_analogue(vb);
     for (unsigned p = 0; p < 3; p++) {
         uint16_t now = *port[p];
-        if (now != vb->pins.written[p]) {
+        if (now != vb->pins.written[p] && vb->live == NULL) {
             *lat[p] = now;
             vb_warn(vb, "PORT%c: the firmware writes the port, LAT%c is the register for outputs", 'A' + (int)p, 'A' + (int)p);
         }
@@ -114,7 +115,9 @@ void vb_io_reset(vb_t *vb)
     u->presented = false;
     u->enabled = false;
     vb_io_ports(vb);
-    vb_io_uart_take(vb); /* what the initialisation already sent */
+    if (vb->live == NULL) {
+        vb_io_uart_take(vb); /* what the initialisation already sent */
+    }
 }
 
 static void step_timer(vb_t *vb, unsigned n, unsigned con, volatile uint16_t *tmr, unsigned period, double h_s)

@@ -48,6 +48,12 @@ static double get_v_rms(const vb_t *vb) { return sqrt(mean(vb, vb->stat.v2_sum))
 static double get_speed_mean(const vb_t *vb) { return mean(vb, vb->stat.speed_sum); }
 static double get_torque_mean(const vb_t *vb) { return mean(vb, vb->stat.torque_sum); }
 
+static double get_isr_mean(const vb_t *vb) { return vb->count.isr_count > 0.0 ? vb->count.isr_sum / vb->count.isr_count : 0.0; }
+static double get_latency_mean(const vb_t *vb)
+{
+    return vb->count.latency_count > 0.0 ? vb->count.latency_sum / vb->count.latency_count : 0.0;
+}
+
 static void set_theta(vb_t *vb, double deg)
 {
     vb_motor_t *m = &vb->motor;
@@ -70,6 +76,14 @@ static void set_stat_reset(vb_t *vb, double value)
 {
     (void)value;
     vb_stat_reset(vb);
+}
+
+static void set_isr_reset(vb_t *vb, double value)
+{
+    vb_counts_t *c = &vb->count;
+    (void)value;
+    c->isr_count = c->isr_min = c->isr_max = c->isr_sum = 0.0;
+    c->latency_count = c->latency_min = c->latency_max = c->latency_sum = 0.0;
 }
 
 #define AT(field) offsetof(struct vb, field)
@@ -158,6 +172,23 @@ static const key_entry_t table[] = {
     I("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
     P("cpu.crystal_hz", crystal_hz, 8e6, 1e5, 64e6, "Hz", "crystal"),
     R("cpu.fcy_hz", pwm.fcy_hz, "Hz", "instruction clock"),
+    W("cpu.isr_reset", set_isr_reset, "", "any value starts the measurement of the control interrupt anew"),
+    R("cpu.isr_cycles", count.isr_last, "cycles", "the last control interrupt, entry to return"),
+    R("cpu.latency_cycles", count.latency_last, "cycles", "the last control interrupt's write of the third duty after its trigger"),
+    R("cpu.isr_count", count.isr_count, "", "control interrupts measured; 0 = the CPU is the host, which has no cycles"),
+    R("cpu.isr_cycles_min", count.isr_min, "cycles", "shortest control interrupt, entry to return"),
+    R("cpu.isr_cycles_max", count.isr_max, "cycles", "longest control interrupt"),
+    G("cpu.isr_cycles_mean", get_isr_mean, "cycles", "mean control interrupt"),
+    R("cpu.latency_cycles_min", count.latency_min, "cycles", "shortest time from the trigger to the write of the third duty"),
+    R("cpu.latency_cycles_max", count.latency_max, "cycles", "longest time from the trigger to the write of the third duty"),
+    G("cpu.latency_cycles_mean", get_latency_mean, "cycles", "mean time from the trigger to the write of the third duty"),
+    R("cpu.cycles", count.cycles, "cycles", "instruction cycles since power-up"),
+    R("cpu.instructions", count.instructions, "", "instructions since power-up"),
+    R("cpu.stack_bytes", count.stack_bytes, "bytes", "deepest stack"),
+    R("cpu.resets", count.resets, "", "resets since power-up by watchdog, software or error"),
+    R("cpu.errors", count.errors, "", "what the core met that no program should do: see the warnings"),
+    R("pil.ticks", count.ticks, "", "control interrupts compared with the host's"),
+    R("pil.differences", count.differences, "", "of them those that differed"),
     P("expect.fcy_hz", expected_fcy_hz, 40e6, 0.0, 1e9, "Hz", "instruction clock that is no cause for a warning, 0 = any"),
     P("expect.pwm_hz", expected_pwm_hz, 20e3, 0.0, 1e6, "Hz", "PWM frequency that is no cause for a warning, 0 = any"),
     SF("rng.seed", adc.seed, set_seed, 1.0, 0.0, 9e15, "", "start of the noise sequence"),
@@ -288,9 +319,12 @@ int vb_keys_find(vb_t *vb, const char *name, vb_access_t *access)
         return 0;
     }
     int probe = find_probe(name);
+    if (probe >= 0 && vb->signals == NULL) {
+        return vb_fail(vb, "%s: the image has no names, run its ELF file", name);
+    }
     if (probe >= 0) {
         access->kind = KIND_PROBE;
-        access->probe = probe_signals[probe].read;
+        access->probe = vb->signals[probe].read;
         return 0;
     }
     return vb_fail(vb, "%s: unknown key", name);

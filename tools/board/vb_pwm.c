@@ -13,7 +13,8 @@ enum {
     SEVTDIR = 0x8000,
     PWM1MD = 0x0200,
     UDIS_PATIENCE = 200, /* periods of blocked duty updates before the board mentions it */
-    IDLE_PATIENCE = 400  /* periods without PWM, the same */
+    IDLE_PATIENCE = 400, /* periods without PWM, the same */
+    LIVE_PATIENCE = 4000 /* the same when the start-up takes its time */
 };
 
 #define SAME_INSTANT_S 1e-12
@@ -107,7 +108,7 @@ static void plan_leg(vb_t *vb, vb_leg_t *leg, double from_s, double until_s)
 
 static double period_of(const vb_pwm_t *pwm)
 {
-    return pwm->running ? pwm->period_s : VB_IDLE_PERIOD_S;
+    return pwm->length_s;
 }
 
 static void decode_duty(vb_pwm_t *pwm)
@@ -278,6 +279,7 @@ void vb_pwm_reset(vb_t *vb)
     pwm->fcy_hz = vb_clock_fcy_hz(vb);
     pwm->tick_s = 1.0 / pwm->fcy_hz;
     pwm->trigger_s = VB_NEVER;
+    pwm->length_s = VB_IDLE_PERIOD_S;
     for (unsigned k = 0; k < 3; k++) {
         pwm->leg[k].state.stage = 2;
         pwm->leg[k].saved = pwm->leg[k].state;
@@ -331,7 +333,7 @@ static void idle_check(vb_t *vb)
     if (pwm->running) {
         return;
     }
-    if (++pwm->idle_periods == IDLE_PATIENCE) {
+    if (++pwm->idle_periods == (vb->live != NULL ? LIVE_PATIENCE : IDLE_PATIENCE)) {
         vb_warn(vb, "P1TCON: the PWM does not run (PTEN is %u), nothing triggers the ADC", (*vb->reg.p1tcon & PTEN) != 0 ? 1u : 0u);
     }
 }
@@ -377,6 +379,7 @@ void vb_pwm_begin(vb_t *vb)
         decode_time_base(vb);
     }
     load_buffers(vb, !was_running);
+    pwm->length_s = pwm->running ? pwm->period_s : VB_IDLE_PERIOD_S;
     udis_check(vb);
     idle_check(vb);
     if (changed) {
@@ -452,19 +455,20 @@ void vb_pwm_end(vb_t *vb)
     pwm->last_mask = pwm->seen_mask;
 }
 
+/* The running time base's count and direction bit at a time of the period. */
+uint16_t vb_pwm_counter(const vb_t *vb, double now_s)
+{
+    const vb_pwm_t *pwm = &vb->pwm;
+    double counts = now_s / pwm->tick_s;
+    uint32_t n = counts >= (double)pwm->ticks ? pwm->ticks - 1u : (uint32_t)counts;
+    return (uint16_t)(pwm->centre && n > pwm->tper ? 0x8000u | (pwm->ticks - n) : n);
+}
+
 /* Put the time base's present count and direction where the firmware reads them. */
 void vb_pwm_show_counter(vb_t *vb)
 {
-    vb_pwm_t *pwm = &vb->pwm;
-    if (!pwm->running) {
-        return;
-    }
-    double counts = vb->now_s / pwm->tick_s;
-    uint32_t n = counts >= (double)pwm->ticks ? pwm->ticks - 1u : (uint32_t)counts;
-    if (pwm->centre && n > pwm->tper) {
-        *vb->reg.p1tmr = (uint16_t)(0x8000u | (pwm->ticks - n));
-    } else {
-        *vb->reg.p1tmr = (uint16_t)n;
+    if (vb->pwm.running) {
+        *vb->reg.p1tmr = vb_pwm_counter(vb, vb->now_s);
     }
 }
 

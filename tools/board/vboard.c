@@ -76,6 +76,7 @@ vb_t *vb_create_with_cpu(const vb_cpu_t *cpu)
         return NULL;
     }
     vb->cpu = *cpu;
+    vb->signals = probe_signals;
     if (!connect_registers(vb)) {
         free(vb);
         return NULL;
@@ -98,6 +99,9 @@ void vb_destroy(vb_t *vb)
 {
     if (vb != NULL) {
         vb_trace_free(vb);
+        if (vb->live != NULL) {
+            vb->live->destroy(vb->cpu.context);
+        }
         free(vb);
     }
 }
@@ -198,19 +202,34 @@ static double next_edge(const vb_pwm_t *pwm)
     return first;
 }
 
+void vb_cut_period(vb_t *vb)
+{
+    vb->pwm.length_s = vb->now_s;
+}
+
+/* The next instant at which something happens; a CPU with a time of its own goes there first and may find a nearer one. */
+static double next_instant(vb_t *vb, double planned_s)
+{
+    double next_s = vb_min(planned_s, vb->pwm.length_s);
+    return vb->live != NULL && next_s > vb->now_s ? vb->live->run(vb->cpu.context, next_s) : next_s;
+}
+
 /* Everything within one period: edges, trigger, handler, fault, each at its instant. */
-static void run_events(vb_t *vb, double period_s)
+static void run_events(vb_t *vb)
 {
     double trigger_s = vb_adc_next_trigger(vb, -1.0);
-    double half_s = vb->pwm.running && vb->pwm.double_update ? 0.5 * period_s : VB_NEVER;
+    double half_s = vb->pwm.running && vb->pwm.double_update ? 0.5 * vb->pwm.length_s : VB_NEVER;
     for (;;) {
-        double next_s = vb_min(vb_min(next_edge(&vb->pwm), trigger_s), vb_min(vb_min(vb->adc.handler_s, half_s), period_s));
+        double next_s = next_instant(vb, vb_min(vb_min(next_edge(&vb->pwm), trigger_s), vb_min(vb->adc.handler_s, half_s)));
         double trip_a = vb->inverter.trip_a > 0.0 && !vb->fault.comparator ? vb->inverter.trip_a : VB_NEVER;
         if (next_s > vb->now_s && !vb_inverter_run(vb, next_s, trip_a)) {
             vb_fault_check(vb, false);
             continue;
         }
-        if (vb->now_s >= period_s) {
+        if (vb->live != NULL) {
+            vb->live->follow(vb->cpu.context);
+        }
+        if (vb->now_s >= vb->pwm.length_s) {
             return;
         }
         apply_edges(vb);
@@ -230,6 +249,9 @@ static void run_events(vb_t *vb, double period_s)
 
 static void main_loop_pass(vb_t *vb, double period_s)
 {
+    if (vb->live != NULL) {
+        return;
+    }
     vb->background_countdown -= 1.0;
     if (vb->background_countdown > 0.0) {
         return;
@@ -242,7 +264,7 @@ static void main_loop_pass(vb_t *vb, double period_s)
 /* The periodic row of a period in which no handler was due. */
 static void trace_without_handler(vb_t *vb, bool sampled)
 {
-    if (vb->adc.handler_s < VB_NEVER) {
+    if (vb->adc.handler_s < VB_NEVER || (sampled && vb->live != NULL)) {
         return;
     }
     if (!sampled) {
@@ -261,13 +283,20 @@ static void run_period(vb_t *vb)
     vb_pwm_begin(vb);
     vb_adc_decode(vb);
     vb_motor_prepare(&vb->motor);
-    vb_serve_pending(vb);
-    double period_s = vb->pwm.running ? vb->pwm.period_s : VB_IDLE_PERIOD_S;
+    if (vb->live == NULL) {
+        vb_serve_pending(vb);
+    }
     double samples = vb->adc.samples;
-    run_events(vb, period_s);
+    run_events(vb);
+    double period_s = vb->pwm.length_s;
     trace_without_handler(vb, vb->adc.samples != samples);
     main_loop_pass(vb, period_s);
-    vb_io_timers(vb, period_s);
+    if (vb->live != NULL) {
+        vb_adc_check(vb);
+        vb->live->end(vb->cpu.context, period_s);
+    } else {
+        vb_io_timers(vb, period_s);
+    }
     vb_pwm_end(vb);
     vb_adc_end(vb);
     vb->stat.energy_bus_j += vb->inverter.bus_as * vb->supply.bus_v;

@@ -38,10 +38,11 @@ def header_folder(text: str | Path, where: str = "--userparams") -> Path | None:
     return None if folder == places.ROOT else folder
 
 
-def library(defines: list[str], userparams: Path | None = None) -> Path:
-    """Builds build/host[-variant]/libvboard.so if needed and returns its path. `userparams`: folder of the header, None for the root's."""
+def library(defines: list[str], userparams: Path | None = None, target: str = "vboard") -> Path:
+    """Builds build/host[-variant]/libvboard.so if needed and returns its path. `userparams`: folder of the header, None for the root's.
+    `target`: what make shall make, if there is to be more in that folder."""
     variant = variant_name(defines, userparams)
-    command = ["make", "-s", "-C", str(places.ROOT), "vboard"]
+    command = ["make", "-s", "-C", str(places.ROOT), target]
     if variant:
         command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines)]
     if userparams is not None:

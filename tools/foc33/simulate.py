@@ -96,6 +96,11 @@ def simulate(job: Job, report: Callable[[float], None]) -> Run:
         board.close()
 
 
+def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
+    """Run a job on a board that the caller has made and closes."""
+    return _simulate(job, library, board, report)
+
+
 def _simulate(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
     scenario = job.scenario
     for key, value in job.values.items():

@@ -19,7 +19,7 @@ class Document:
         self.path = path
         self.label = str(places.shown(path))
         try:
-            self.text = path.read_text(encoding="utf-8")
+            self.text = path.read_text(encoding="utf-8-sig") # some editors begin a file with a mark
         except FileNotFoundError:
             raise UserError("no such file", self.label,
                             "check the name; `python3 -m tools.foc33 scenarios` lists the scenarios") from None
@@ -38,6 +38,7 @@ class Document:
         place = re.search(r"\(at (?:line (\d+), column (\d+)|end of document)\)", message)
         line = int(place[1]) if place and place[1] else len(self.text.splitlines())
         reason = re.sub(r"\s*\(at .*\)", "", message)
+        reason = re.sub(r"\('([^()]*?)',?\)", lambda match: "[" + match[1].replace("', '", ".") + "]", reason)
         return f"{self.label} line {line}", reason[:1].lower() + reason[1:]
 
     def where(self, path: tuple) -> str:

@@ -65,9 +65,9 @@ def reachable(elf: Elf, image: Image, start: str = INTERRUPT) -> set[int]:
     return found
 
 
-def profile(elf: Elf, image: Image, counts: Counts, helpers: tuple[str, ...] = ()) -> Profile:
+def profile(elf: Elf, image: Image, counts: Counts, with_caller: tuple[str, ...] = ()) -> Profile:
     """The counts by function.
-    @param helpers patterns of small functions that are counted with whoever they are inlined into"""
+    @param with_caller patterns of small functions that are counted with whoever they are inlined into"""
     words = {word.address: word for word in image.words}
     callers = calls(elf, image)
     inside = reachable(elf, image)
@@ -91,7 +91,7 @@ def profile(elf: Elf, image: Image, counts: Counts, helpers: tuple[str, ...] = (
         if not cycles or address not in words or words[address].copy[0] not in inside:
             continue
         names = chain(address)
-        own = next((name for name in reversed(names) if not any(fnmatchcase(name, pattern) for pattern in helpers)), names[0])
+        own = next((name for name in reversed(names) if not any(fnmatchcase(name, pattern) for pattern in with_caller)), names[0])
         result.inlined[own] += cycles
         result.symbols[names[0]] += cycles
         for share, stack in ways_to(words[address].copy[0]):

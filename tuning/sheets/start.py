@@ -41,7 +41,7 @@ def start_page(book: Book, motor: DataPage, board: DataPage) -> Page:
     quantity(page, "Swing of the locked rotor", "swing_hz",
              "SQRT(pole_pairs*kt_nm_per_a*Q_CURRENT_REF_OPENLOOP/(inertia_kgm2+load_inertia_kgm2))/(2*PI())", "Hz", "sqrt(P Kt I / J) / 2 pi", "0.0")
     quantity(page, "Lengthened by the command's trial", "lock_factor", _one(motor, "command.lock_factor"), "1",
-             "make tune tries lock and ramp on the rotor's equation and lengthens them until the rotor follows and is calm; 1 for your own motor: try it",
+             "make tune tries lock and ramp on the rotor's equation and lengthens them until the rotor follows and is calm; this is for the motor file's values, 1 for your own motor: try it",
              "0.000")
     seconds = f"MAX({start.LEAST_LOCK_S},-INT(-{start.LOCK_SWINGS}/swing_hz/0.05)*0.05)*lock_factor"
     parameter(page, motor, Rule("LOCK_TIME", f"2*ROUND(MIN({seconds},32000*pwm_period_s)/pwm_period_s/2,0)",

@@ -48,7 +48,8 @@ def _head(page: Page, motor: DataPage) -> None:
         page.ws.merge_cells(f"F{row}:N{row}")
         page.name(name, f"E{row}")
     reach = f"(MAXIMUM_SPEED_RPM-{(limits.ENTRIES - 1) * limits.STEP_ERPM:g}/pole_pairs)"
-    start = (f"MAX(MIN(MAX({down('0.875*base_speed_rpm', '50')},-INT(-{reach}/50)*50),{down('0.95*MAXIMUM_SPEED_RPM', '50')}),100)")
+    start = (f"MAX(MIN(MAX({down('0.875*base_speed_rpm', '50')},-INT(-{reach}/50)*50),{down('0.95*MAXIMUM_SPEED_RPM', '50')},"
+             f"{limits.FW_START_RPM[1]:g}),{limits.FW_START_RPM[0]:g})")
     table = motor.pick("tables.start_speed_rpm")
     rule = Rule("FW_START_SPEED_RPM", f"IF(tables_match,{table},{start})", "")
     page.book.rules[rule.name] = rule

@@ -1,0 +1,144 @@
+"""Random integer instructions with random registers, memory and flags: the simulator against the reference in alu.py."""
+
+import random
+import unittest
+
+import asm33
+from alu import FLAG_NAMES, RA, Alu, State
+from machine import PROGRAM, RAM, Machine
+from operands import Sampler
+from test_references import ELSEWHERE, is_dsp
+
+ROUNDS = 130
+EXTREMES = [0, 1, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0x8001, 0xFFFF, 0xFFFE]
+ROWS = [row for row in asm33.ROWS if not is_dsp(row) and row.mnemonic not in ELSEWHERE
+        and row.mnemonic not in ("repeat", "disi", "pwrsav", "reset", "tblwtl", "tblwth", "lnk", "ulnk", "push", "pop")]
+
+
+class Case:
+    """One instruction and a state in which its addresses lie in RAM."""
+
+    def __init__(self, chance: random.Random, sampler: Sampler, row: asm33.Row, memory: bytes) -> None:
+        self.chance, self.row, self.memory = chance, row, memory
+        while True:
+            self.text = sampler.text(row).replace("w15", "w13").replace("w14", "w12")
+            try:
+                self.word = asm33.encode(self.text)[0]
+            except ValueError:  # an odd register took the place of an even one
+                continue
+            self.fields = row.extract([self.word])
+            if self._has_roles():
+                break
+        self._place_file()
+        self._make_state()
+
+    def _has_roles(self) -> bool:
+        """Whether every pointer is a register of its own; which one wins else is not written down."""
+        fields = self.fields
+        modes = {"s": fields.get("p", fields.get("g", 0)), "d": fields.get("q", fields.get("h", 0))}
+        if "k" in fields and self.row.operands[0] in ("Wb",) and "p" not in fields:
+            modes["s"] = 0
+        self.pointers = [fields[letter] for letter in "sd" if letter in fields and (modes[letter] or self._by_offset(letter))]
+        self.indexed = any(mode == 6 for mode in modes.values())
+        others = [fields[letter] for letter in "sd" if letter in fields and fields[letter] not in self.pointers]
+        if "w" in fields:
+            others.append(fields["w"])
+        pairs = [register + 1 for register in others] if ":" in "".join(self.row.operands) else []
+        return len(set(self.pointers)) == len(self.pointers) and not set(self.pointers) & {*others, *pairs}
+
+    def _by_offset(self, letter: str) -> bool:
+        return f"[W{letter}+k]" in self.row.operands
+
+    def _place_file(self) -> None:
+        """A file address in RAM."""
+        if "f" in self.fields:
+            address = self.chance.randrange(RAM, RAM + 0x800)
+            if self.row.width("f") == 15:
+                self.fields["f"] = address >> 1
+            else:
+                byte = self.fields.get("B", 0) or "f.bit" in self.row.operands
+                self.fields["f"] = address if byte else address & ~1
+            self.word = self.row.insert(self.fields)[0]
+
+    def _number(self) -> int:
+        return self.chance.choice([self.chance.choice(EXTREMES), self.chance.getrandbits(16)])
+
+    def _make_state(self) -> None:
+        self.state = State(self.memory)
+        self.state.w = [self._number() for _ in range(14)] + [0x5A5A, 0x0F80]
+        step = 1 if self.fields.get("B") or self.row.mnemonic in ("se", "ze") else 2
+        for register in self.pointers:
+            self.state.w[register] = self.chance.randrange(RAM + 0x404, RAM + 0x600, step)
+        if self.indexed:
+            self.state.w[self.fields["w"]] = self.chance.randrange(-0x200, 0x200, step) & 0xFFFF
+        if "k" in self.fields and self.pointers and self.row.operands[0] != "Wb":  # an offset: stay within RAM
+            offset = self.chance.randrange(-0xF0, 0xF0)
+            self.fields["k"] = offset & 0x3FF
+            self.word = self.row.insert(self.fields)[0]
+        if self.row.mnemonic.startswith("div"):
+            self._make_division()
+        self.state.sr = sum(self.chance.getrandbits(1) << bit for name, bit in FLAG_NAMES.items() if name in ("C", "Z", "N", "OV", "DC"))
+
+    def _make_division(self) -> None:
+        """A divisor that is not 0, and mostly a quotient that fits."""
+        w, fields = self.state.w, self.fields
+        while w[fields["s"]] == 0 or fields["s"] == fields["m"] + 1 and w[fields["s"]] == 0:
+            w[fields["s"]] = self._number()
+        if "t" in fields and self.chance.random() < 0.8 and fields["s"] not in (fields["m"], fields["m"] + 1):
+            divisor = w[fields["s"]]
+            quotient, rest = self._number(), self.chance.randrange(divisor)
+            product = quotient * divisor + rest
+            w[fields["m"]], w[fields["m"] + 1] = product & 0xFFFF, product >> 16
+
+
+def run_case(machine: Machine, case: Case) -> tuple[list[str], State]:
+    """Differences between simulator and reference after one instruction."""
+    division = case.row.mnemonic.startswith("div")
+    words = {PROGRAM: 0x090011, PROGRAM + 2: case.word} if division else {PROGRAM: case.word}
+    machine.load(words)
+    state = case.state
+    machine.set_state(state.w, state.sr, [0, 0], {0x20: 0x0FD0, 0x44: 0x20}, case.memory, PROGRAM)
+    cycles = 19 if division else 2 if case.row.mnemonic == "mov.d" else 1
+    stop = machine.run(cycles)
+    before = state.sr
+    Alu(state, case.row, case.fields).execute()
+    after = machine.registers()
+    found = [f"w{index} is {after.w[index]:04x}, not {value:04x}" for index, value in enumerate(state.w)
+             if after.w[index] != value and not (division and state.flag(FLAG_NAMES["OV"]) and index < 2)]
+    mask = 0xFFFF & ~(1 << RA)
+    if division:
+        mask &= ~(1 << FLAG_NAMES["C"]) & (~0xA if state.flag(FLAG_NAMES["OV"]) else ~0)
+    if (after.sr ^ state.sr) & mask:
+        found.append(f"SR is {after.sr:04x}, not {state.sr:04x} (before {before:04x})")
+    memory = machine.memory()
+    wanted = state.memory[RAM:]
+    if memory != wanted:
+        at = next(index for index in range(0x800) if memory[index] != wanted[index])
+        found.append(f"[{RAM + at:04x}] is {memory[at]:02x}, not {wanted[at]:02x}")
+    if after.cycles != cycles or after.pc != PROGRAM + 2 * len(words):
+        found.append(f"{after.cycles} cycles to {after.pc:04x}, not {cycles}")
+    return found + ([f"stopped: {stop}"] if stop else []), state
+
+
+class RandomAlu(unittest.TestCase):
+    def test_every_instruction_does_what_the_reference_does(self) -> None:
+        machine = Machine()
+        chance, sampler = random.Random(2010), Sampler(2011)
+        count = 0
+        for row in ROWS:
+            wrong = []
+            memories = [chance.randbytes(0x800), b"\0" * 0x800, b"\xff" * 0x800, chance.randbytes(0x800)]
+            for turn in range(ROUNDS):
+                case = Case(chance, sampler, row, memories[turn % 4])
+                registers = " ".join(f"{value:04x}" for value in case.state.w)
+                found, _ = run_case(machine, case)
+                count += 1
+                if found:
+                    wrong.append(f"{case.text} = {case.word:06x}, W: {registers}: {'; '.join(found)}")
+            with self.subTest(row.text):
+                self.assertEqual(wrong[:3], [], f"{len(wrong)} of {ROUNDS}")
+        self.assertGreater(count, 15000)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,172 @@
+"""Random DSP instructions in random modes: the simulator against the exact reference in dsp.py, all flags and both accumulators."""
+
+import random
+import unittest
+
+import asm33
+from alu import FLAG_NAMES, OA, OAB, OB, SA, SAB, SB
+from dsp import INDEXED, UNUSED, Dsp, DspState, signed
+from machine import PROGRAM, RAM, Machine
+from operands import Sampler
+from test_references import is_dsp
+
+ROUNDS = 1000
+CHAINS = 400
+ROWS = [row for row in asm33.ROWS if is_dsp(row)]
+WORDS = [0, 1, 0x7FFF, 0x8000, 0x8001, 0xFFFF, 0x4000, 0xC000]
+EDGES = [1 << 31, 1 << 39, 0, 0x7FFF8000, 0x12348000, 0x12358000, (1 << 31) - 0x8000, -(1 << 31), -(1 << 39)]
+MODES = (12, 7, 6, 5, 4, 1, 0)  # US SATA SATB SATDW ACCSAT RND IF
+Y_SPACE = 0x0C00
+
+
+class Chance:
+    """Numbers that lie close to where something happens."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+
+    def word(self) -> int:
+        """A register's value."""
+        return self.random.choice([self.random.choice(WORDS), self.random.getrandbits(16)])
+
+    def accumulator(self) -> int:
+        """A 40-bit value."""
+        near = self.random.choice(EDGES) + self.random.randint(-3, 3)
+        value = self.random.choice([near, near, self.random.getrandbits(40), self.random.getrandbits(32), self.random.getrandbits(16) << 16])
+        return signed(value, 40)
+
+    def corcon(self) -> int:
+        """A mode of the DSP engine."""
+        return sum(self.random.getrandbits(1) << bit for bit in MODES)
+
+
+def reach(chance: random.Random, state: DspState, row: asm33.Row, fields: dict[str, int]) -> None:
+    """Lets the addresses of the instruction lie in RAM: X space for W8, W9, Y space for W10, W11."""
+    w = state.w
+    if "i" in fields:
+        w[12] = chance.randrange(-0x80, 0x80, 2) & 0xFFFF
+        w[8], w[9] = (chance.randrange(0x900, 0xB80, 2) for _ in range(2))
+        w[10], w[11] = (chance.randrange(0xD00, 0xF40, 2) for _ in range(2))
+        if fields.get("a") == 1:
+            w[13] = chance.randrange(0x900, 0xF80, 2)
+        return
+    letter = "d" if "h" in fields else "s"
+    mode = fields.get("h", fields.get("g", 0))
+    if mode:
+        w[fields[letter]] = chance.randrange(0xA00, 0xE00, 2)
+    if mode == 6:
+        w[fields["w"]] = chance.randrange(-0x200, 0x200, 2) & 0xFFFF
+    if row.mnemonic == "sftac" and "s" in fields:
+        w[fields["s"]] = chance.randint(-16, 16) & 0xFFFF
+
+
+def usable(fields: dict[str, int], row: asm33.Row) -> bool:
+    """No case that the data sheet leaves open: one register as pointer and offset, as target of both prefetches, the stack pointer."""
+    if fields.get("h", fields.get("g", 0)) >= 6 and fields["w"] == fields["d" if "h" in fields else "s"]:
+        return False
+    if "j" in fields and row.mnemonic not in ("ed", "edac") and UNUSED not in (fields["i"], fields["j"]) and fields["x"] == fields["y"]:
+        return False
+    if row.mnemonic in ("ed", "edac") and UNUSED in (fields["i"], fields["j"]):
+        return False
+    return 15 not in (fields.get("s"), fields.get("d")) and not (fields.get("h", fields.get("g", 0)) >= 6 and fields["w"] == 15)
+
+
+def sample(sampler: Sampler, row: asm33.Row) -> tuple[str, int, dict[str, int]]:
+    """An instruction of this row."""
+    while True:
+        text = sampler.text(row)
+        word = asm33.encode(text)[0]
+        fields = row.extract([word])
+        if usable(fields, row):
+            return text, word, fields
+
+
+def ram(chance: Chance) -> bytes:
+    """Contents of the memory."""
+    return b"".join(chance.word().to_bytes(2, "little") for _ in range(0x400))
+
+
+def begin(chance: Chance, memory: bytes) -> DspState:
+    """A random state, in the reference."""
+    state = DspState(memory)
+    state.w = [chance.word() for _ in range(14)] + [0x5A5A, 0x0F80]
+    state.corcon = chance.corcon()
+    state.acc = [chance.accumulator(), chance.accumulator()]
+    for first, second, both in ((OA, OB, OAB), (SA, SB, SAB)):
+        for bit in (first, second):
+            state.set_flag(bit, chance.random.random() < 0.2)
+        state.set_flag(both, state.flag(first) or state.flag(second))
+    for name in ("C", "Z", "N", "OV", "DC"):
+        state.set_flag(FLAG_NAMES[name], chance.random.getrandbits(1))
+    return state
+
+
+def compare(machine: Machine, state: DspState) -> list[str]:
+    """What the simulator has otherwise."""
+    after = machine.registers()
+    found = [f"w{index} is {after.w[index]:04x}, not {value:04x}" for index, value in enumerate(state.w) if after.w[index] != value]
+    found += [f"{name} is {after.acc[index]:010x}, not {state.acc[index] & 0xFFFFFFFFFF:010x}"
+              for index, name in enumerate("AB") if after.acc[index] != state.acc[index] & 0xFFFFFFFFFF]
+    if after.sr != state.sr:
+        found.append("SR " + " ".join(f"{name} is {after.sr >> bit & 1}" for name, bit in FLAG_NAMES.items() if (after.sr ^ state.sr) >> bit & 1))
+    if machine.memory() != state.memory[RAM:]:
+        found.append("memory differs")
+    return found
+
+
+class RandomDsp(unittest.TestCase):
+    machine: Machine
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.machine = Machine()
+
+    def test_every_instruction_does_what_the_reference_does(self) -> None:
+        chance, sampler = Chance(40), Sampler(41)
+        count = 0
+        for row in ROWS:
+            wrong = []
+            for turn in range(ROUNDS):
+                memory = ram(chance) if turn % 50 == 0 else memory
+                text, word, fields = sample(sampler, row)
+                state = begin(chance, memory)
+                reach(chance.random, state, row, fields)
+                self.machine.load({PROGRAM: word})
+                self.machine.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, memory, PROGRAM)
+                before = f"{text}: A {state.acc[0] & 0xFFFFFFFFFF:010x} B {state.acc[1] & 0xFFFFFFFFFF:010x} CORCON {state.corcon:04x} SR {state.sr:04x}"
+                stop = self.machine.run(1)
+                Dsp(state, row, fields).execute()
+                found = compare(self.machine, state)
+                cycles = self.machine.registers().cycles
+                found += [f"{cycles} cycles"] if cycles != 1 else []
+                found += [f"stopped: {stop}"] if stop else []
+                count += 1
+                if found:
+                    wrong.append(f"{before}: {'; '.join(found)}")
+            with self.subTest(row.text):
+                self.assertEqual(wrong[:3], [], f"{len(wrong)} of {ROUNDS}")
+        self.assertGreaterEqual(count, 19000)
+
+    def test_chains_of_instructions_end_in_the_same_state(self) -> None:
+        chance, sampler = Chance(42), Sampler(43)
+        rows = [row for row in ROWS if "i" in row.extract([0])]
+        wrong = []
+        memory = ram(chance)
+        for _ in range(CHAINS):
+            state = begin(chance, memory)
+            chain = [sample(sampler, row) + (row,) for row in (chance.random.choice(rows) for _ in range(12))]
+            chain = [part for part in chain if part[2].get("a") != 1 and INDEXED not in (part[2]["i"], part[2]["j"])]
+            state.w[8:12] = 0x9C0, 0xA80, 0xD80, 0xE80
+            self.machine.load({PROGRAM + 2 * index: part[1] for index, part in enumerate(chain)})
+            self.machine.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, memory, PROGRAM)
+            stop = self.machine.run(len(chain))
+            for _, _, fields, row in chain:
+                Dsp(state, row, fields).execute()
+            found = compare(self.machine, state) + ([f"stopped: {stop}"] if stop else [])
+            if found:
+                wrong.append(f"{'; '.join(part[0] for part in chain)}: {'; '.join(found)}")
+        self.assertEqual(wrong[:3], [], f"{len(wrong)} of {CHAINS}")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,82 @@
+"""Address register dependencies: every kind of write of a register before every kind of use, and the one cycle that some pairs cost more."""
+
+import unittest
+
+import asm33
+from machine import PROGRAM, RAM, Machine
+
+# W8 becomes 0900 in each of these.
+WRITES = ["mov w0,w8", "add w0,#0,w8", "mov #0x900,w8", "mov 0x0A00,w8", "mov [w1],w8", "mov [w1+0],w8", "exch w0,w8", "sl w2,#1,w8",
+          "mul.uu w2,#2,w8", "sac a,w8", "lsr w11,w10,w8", "pop w8", "mov.d w0,w8", "add w0,w10,w8", "ze w10,w8; ior w8,w0,w8", "ior #0,w8"]
+# W8 is a destination's pointer and is changed.
+POINTERS = ["mov w3,[w8++]", "mov.b w3,[w8++]", "clr [++w8]", "mov w3,[--w8]", "mov.d w2,[w8++]", "sac a,[w8++]", "add w3,w3,[w8--]"]
+# W8 is not written, or changed as a source's pointer only.
+OTHERS = ["nop", "mov w3,[w8]", "mov [w8++],w3", "mov [--w8],w3", "cp w8,w0", "mov w8,w3", "mov w8,0x0A02", "btst.c [w8],#0", "mov [w8+2],w3",
+          "clr a,[w8]+=2,w6", "add w8,w0,w3", "mov w0,w9"]
+# W8 addresses a source.
+SOURCES = ["mov [w8],w5", "mov [w8+w10],w5", "mov [w10+w8],w5", "mov [w8+2],w5", "mov.b [w8++],w5", "mov [--w8],w5", "add w5,[w8],w5", "cp0 [w8]", "cp w5,[w8]",
+           "bset [w8],#0", "btst.z [w8],#3", "mul.uu w5,[w8],w4", "mac w4*w5,a,[w8]+=2,w6", "clr a,[w8],w6", "lac [w8],a", "mov.d [w8],w4",
+           "se [w8],w5", "push [w8]", "inc [w8],w5", "ff1l [w8],w5", "tblrdl [w8],w5", "mov [w8],[w1]"]
+# W8 is a value, or addresses a destination.
+PLAIN = ["mov w8,w5", "add w8,w8,w5", "mov w5,[w8]", "mov w5,[w8++]", "mov w5,[w8+2]", "mov w5,[w10+w8]", "clr [w8]", "mov w8,0x0A02", "nop", "mov [w1],[w8]",
+         "mov.d w4,[w8]", "add w5,w5,[w8]", "sac a,[w8]", "mov [w1],w5"]
+TWO_CYCLES = ("mov.d", "tblrdl")
+START = {"mov w3,[w8++]": 0x8FE, "mov.b w3,[w8++]": 0x8FF, "clr [++w8]": 0x8FE, "mov w3,[--w8]": 0x902, "mov.d w2,[w8++]": 0x8FC, "sac a,[w8++]": 0x8FE,
+         "add w3,w3,[w8--]": 0x902, "mov [w8++],w3": 0x8FE, "mov [--w8],w3": 0x902, "clr a,[w8]+=2,w6": 0x8FE}
+
+
+def cycles(text: str) -> int:
+    """Of a text without stalls."""
+    return sum(2 if part.strip().startswith(TWO_CYCLES) else 1 for part in text.split(";"))
+
+
+class Stalls(unittest.TestCase):
+    machine: Machine
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.machine = Machine()
+
+    def measured(self, first: str, second: str) -> int:
+        """Cycles of the pair."""
+        words, labels = asm33.assemble(f"{first}; {second}", PROGRAM)
+        w = [0x900, 0xA00, 0x480, 0, 0, 0, 0, 0, START.get(first, 0x900), 0x900, 0, 0x900, 0, 0, 0, 0xE02]
+        ram = bytearray(0x800)
+        for address in (0xA00, 0xE00):
+            ram[address - RAM:address - RAM + 2] = b"\0\x09"
+        self.machine.load(words | {0x900: 0})
+        self.machine.set_state(w, 0, [0x09000000, 0], {0x20: 0x0F00, 0x44: 0}, bytes(ram), PROGRAM)
+        while self.machine.registers().pc != labels["end"]:
+            before = self.machine.registers().cycles
+            self.assertEqual(self.machine.run(before + 1), "", f"{first}; {second}")
+            self.assertLess(before, 12, f"{first}; {second}")
+        return self.machine.registers().cycles
+
+    def check(self, first: list[str], second: list[str], stall: int) -> None:
+        """Every pair costs this much more than its instructions."""
+        wrong = []
+        for one in first:
+            for two in second:
+                more = self.measured(one, two) - cycles(one) - cycles(two)
+                if more != stall:
+                    wrong.append(f"{one}; {two}: {more} more, not {stall}")
+        self.assertEqual(wrong[:20], [], len(wrong))
+
+    def test_a_written_register_that_addresses_the_next_source_costs_one(self) -> None:
+        self.check(WRITES, SOURCES, self.machine.assumption("RAW_STALL_CYCLES"))
+
+    def test_a_changed_destination_pointer_that_addresses_the_next_source_costs_one(self) -> None:
+        self.check(POINTERS, SOURCES, self.machine.assumption("RAW_STALL_CYCLES") * self.machine.assumption("RAW_STALL_POINTER"))
+
+    def test_a_register_that_was_only_read_costs_nothing(self) -> None:
+        self.check(OTHERS, SOURCES, 0)
+
+    def test_a_register_that_the_next_uses_otherwise_costs_nothing(self) -> None:
+        self.check(WRITES + POINTERS + OTHERS, PLAIN, 0)
+
+    def test_an_instruction_between_hides_the_write(self) -> None:
+        self.check([f"{write}; nop" for write in WRITES], SOURCES, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

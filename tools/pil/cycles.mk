@@ -1,0 +1,18 @@
+# The target image on the virtual board: make pil, cycles. Uses firmware/target.mk's image.
+#
+# Variables: SCENARIO MOTOR OUT USERPARAMS as for `make run`; IMAGE (a finished ELF or HEX file instead of one built here).
+.PHONY: pil cycles target-elf
+target-elf: $$X/foc33.elf
+	@echo $<
+
+pil_image = $(if $(IMAGE),--image $(call quoted,$(IMAGE)))
+pil_scenario = $(if $(filter file default undefined,$(origin SCENARIO)),,$(call quoted,$(SCENARIO)))
+
+pil: setup-run $$(if $$(IMAGE),,find-xc16) ## the image for the dsPIC turns the motor: demo and Table 2, compared with the PC tick by tick [SCENARIO=name IMAGE=file OUT=folder]
+	@$(alone) $(python) -m tools.foc33.pil_command $(pil_scenario) $(pil_image) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) \
+	    $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
+
+cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## the control interrupt in cycles and us beside the note's, load, latency, stack, dearest functions, flame picture [SCENARIO=name IMAGE=file.elf OUT=folder]
+	$(target_setup)
+	@$(alone) $(python) -m tools.target.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
+	    $(if $(IMAGE)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)

@@ -1,0 +1,109 @@
+/* tools/board/probe.c once more, for an image in the simulator.
+ *
+ * On the target 32-bit numbers are aligned to two bytes; the drive's structures have no pointers, enumerations or bit-fields, so under
+ * pack(2) they have exactly the target's layout, and the same formulas read a copy of the target's RAM. pil.c compares the size with
+ * the image's symbol table. */
+#include "pil_probe.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <xc.h>
+
+#undef SNAPSHOT /* its recorder has pointers; pil.c reads the arrays by their names */
+
+#pragma GCC diagnostic ignored "-Waddress-of-packed-member"
+#pragma pack(push, 2)
+
+#include "board/firmware.h"
+#include "board/watch.h"
+#include "drive/param_table.h"
+#include "drive/params.h"
+#include "drive/params_init.h"
+
+static drive_t target_drive;
+static drive_params_t target_params = DRIVE_PARAMS_INIT;
+static uint8_t *memory;
+static uint16_t drive_address, params_address;
+
+static drive_t *refreshed_drive(void)
+{
+    if (memory != NULL) {
+        memcpy(&target_drive, memory + drive_address, sizeof target_drive);
+    }
+    return &target_drive;
+}
+
+#define board_drive (*refreshed_drive())
+#define board_params target_params
+#define probe_signals pil_target_signals
+#define probe_signal_count pil_target_signal_count
+#define probe_params pil_unused_params
+#define probe_param_count pil_unused_param_count
+#define probe_fault_name pil_unused_fault_name
+#define probe_state_name pil_unused_state_name
+#define probe_param_get raw_param_get
+#define probe_param_set raw_param_set
+
+static int raw_param_get(const char *name, double *value);
+static int raw_param_set(const char *name, double value);
+const char *pil_unused_fault_name(int code);
+const char *pil_unused_state_name(int code);
+extern const probe_param_t pil_unused_params[];
+extern const unsigned pil_unused_param_count;
+
+#include "../board/probe.c"
+
+#pragma pack(pop)
+
+void pil_target_place(uint8_t *data, uint16_t drive, uint16_t params)
+{
+    memory = data;
+    drive_address = drive;
+    params_address = params;
+}
+
+size_t pil_target_drive_bytes(void)
+{
+    return sizeof target_drive;
+}
+
+size_t pil_target_params_bytes(void)
+{
+    return sizeof target_params;
+}
+
+static bool params_are_in_ram(void)
+{
+    return memory != NULL && params_address != 0;
+}
+
+int pil_target_param_get(const char *name, double *value)
+{
+    if (!params_are_in_ram()) {
+        return -1;
+    }
+    memcpy(&target_params, memory + params_address, sizeof target_params);
+    return raw_param_get(name, value);
+}
+
+int pil_target_param_set(const char *name, double value)
+{
+    if (!params_are_in_ram()) {
+        return -1;
+    }
+    memcpy(&target_params, memory + params_address, sizeof target_params);
+    int result = raw_param_set(name, value);
+    if (result == 0) {
+        memcpy(memory + params_address, &target_params, sizeof target_params);
+    }
+    return result;
+}
+
+pil_commands_t pil_target_commands(void)
+{
+    const drive_t *d = refreshed_drive();
+    return (pil_commands_t){d->command.run, d->command.clear_fault, d->command.target_erpm, d->direction, d->state, d->fault, d->ticks};
+}

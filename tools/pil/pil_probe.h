@@ -1,0 +1,34 @@
+/* The probe's signals, read from a copy of the target's RAM instead of the host's drive object. */
+#ifndef FOC33_PIL_PIL_PROBE_H
+#define FOC33_PIL_PIL_PROBE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "probe.h"
+
+/* The same rows as probe_signals; each read() looks at the target's drive object through pil_target_refresh. */
+extern const probe_signal_t pil_target_signals[];
+extern const unsigned pil_target_signal_count;
+
+/* Where the target's variables are: its data memory, and the addresses of board_drive and board_params (0: a constant in flash).
+ * They are read anew with every signal. NULL memory: the signals read zeroes. */
+void pil_target_place(uint8_t *data, uint16_t drive, uint16_t params);
+
+/* Bytes of a drive object and of its parameters on the target. */
+size_t pil_target_drive_bytes(void);
+size_t pil_target_params_bytes(void);
+
+/* As probe_param_get() and probe_param_set(), in the target's RAM. */
+int pil_target_param_get(const char *name, double *value);
+int pil_target_param_set(const char *name, double value);
+
+/* What the background of the target asks of its control interrupt, and what the interrupt has made of it. */
+typedef struct {
+    int16_t run, clear_fault, target_erpm, direction;
+    uint16_t state, fault, ticks;
+} pil_commands_t;
+
+pil_commands_t pil_target_commands(void);
+
+#endif
