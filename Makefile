@@ -101,9 +101,13 @@ tune-fw: setup-run ## field-weakening tables found on the virtual board, into tu
 identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=name or all, OUT=folder]
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(out)
 
-userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old [MOTOR=name]
+userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old, .old2 ... [MOTOR=name]
 	@$(tuner) tune $(tune_motor) --brief
-	@cp userparams.h userparams.h.old && cp build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h userparams.h
+	@new=build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h; \
+	if cmp -s $$new userparams.h; then echo "userparams.h is up to date"; exit; fi; \
+	old=userparams.h.old; n=1; while test -e $$old; do n=$$((n + 1)); old=userparams.h.old$$n; done; \
+	if test -e userparams.h; then cp userparams.h $$old || exit; echo "yours is kept as $$old"; fi; \
+	cp $$new userparams.h && echo "userparams.h written"
 
 spreadsheet: setup-tune ## write tuning/tuning_params.xlsx anew
 	@$(tuner) spreadsheet
@@ -146,8 +150,8 @@ $B/%.o: %.c $B/flags
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
 $B/libfirmware.a: $(firmware_objects) $B/contents
-	@rm -f $@
-	$(call say,ar,$@)ar rcs $@ $(firmware_objects)
+	@rm -f $@.new
+	$(call say,ar,$@)ar rcs $@.new $(firmware_objects) && mv -f $@.new $@
 
 $B/libvboard.so: $(board_objects) $(firmware_objects) $B/contents
 	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ \

@@ -18,6 +18,8 @@
 /* #define TORQUE_MODE */           /* the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed */
 /* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's middle is zero; S3 has no function */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
+/* #define IDENTIFY */              /* measure R, L and Kphi of the motor instead of running it (docs/tuning.md) */
+/* #define PARAMS_IN_RAM */         /* a debugger can change every parameter while the motor turns; TUNING does it too */
 
 /* ---- Motor: Hurst DMB0224C10002, star, values per phase of the star ----------------------------------------------- */
 #define NOPOLESPAIRS 5              /* [pairs]         1 .. 50        pole pairs */

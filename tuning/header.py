@@ -15,7 +15,9 @@ MODES = (("OPEN_LOOP_FUNCTIONING", "stay on the forced angle at END_SPEED_RPM; t
          ("TUNING", "the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself"),
          ("TORQUE_MODE", "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed"),
          ("BIDIRECTIONAL_SPEED", "the potentiometer's middle is zero; S3 has no function"),
-         ("SNAPSHOT", "record SnapBuf1..4"))
+         ("SNAPSHOT", "record SnapBuf1..4"),
+         ("IDENTIFY", "measure R, L and Kphi of the motor instead of running it (docs/tuning.md)"),
+         ("PARAMS_IN_RAM", "a debugger can change every parameter while the motor turns; TUNING does it too"))
 MEANINGS = {
     "NOPOLESPAIRS": "pole pairs", "MOTOR_RS_OHM": "phase resistance: half of line to line", "MOTOR_LS_MH": "phase inductance: half of line to line",
     "MOTOR_KPHI_V_PER_KRPM": "line-to-line back-EMF per 1000 mechanical rpm",

@@ -4,9 +4,10 @@
 /** Zeroes a part of the object: a constant copy of nothing would cost its size in RAM or flash. */
 QM_RARE void drive_clear(void *begin, const void *end)
 {
-    uint8_t *byte;
-    for (byte = begin; byte != end; byte++) {
+    uint8_t *byte = begin;
+    while (byte != end) {
         *byte = 0;
+        byte++;
     }
 }
 
@@ -28,7 +29,7 @@ void drive_circle_step(drive_t *d, const drive_params_t *p)
 
 void drive_init(drive_t *d, const drive_params_t *p)
 {
-    drive_clear(d, d + 1);
+    drive_clear(d, &d[1]);
     d->direction = 1;
     d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
     drive_gain_step(d, p);
@@ -54,7 +55,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     d->frame = trig_sincos_called(d->angle);
     d->slots = 0;
 #ifdef IDENTIFY
-    drive_clear(&d->identify, d + 1);
+    drive_clear(&d->identify, &d[1]);
     identify_start(d, p);
 #endif
     d->command.run = 1;

@@ -10,6 +10,7 @@
 #include "control/svm.h"
 #include "drive/faults.h"
 #include "drive/identify.h"
+#include "drive/params.h"
 
 /** X(name, meaning): what the drive is doing. */
 #define DRIVE_STATE_TABLE(X) \

@@ -96,11 +96,12 @@ QM_INLINE current_q13_t drive_torque_step(drive_t *d, const drive_params_t *p, s
 /** Braking within what the bus takes: the speed controller's integrator goes along. @return the q current */
 QM_INLINE current_q13_t drive_limit_brake(drive_control_t *c, const drive_params_t *p, speed_erpm_t speed, int16_t err, current_q13_t iq)
 {
+    current_q13_t limited = iq;
     if ((iq ^ speed) < 0 && qm_abs(iq) > c->brake_limit_q13) {
-        iq = (int16_t)((iq < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
-        pi_preset(&c->pi_speed, &p->pi_speed, err, iq);
+        limited = (int16_t)((iq < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
+        pi_preset(&c->pi_speed, &p->pi_speed, err, limited);
     }
-    return iq;
+    return limited;
 }
 
 /** Speed controller: the ramped reference and the filtered speed give the q current; braking is limited by the bus. */

@@ -1,5 +1,6 @@
 """Building a firmware variant: its folder's name, and what a failed build tells the user."""
 
+import concurrent.futures
 import os
 import tempfile
 import unittest
@@ -33,6 +34,14 @@ class Build(unittest.TestCase):
 
     def test_different_values_of_a_macro_do_not_share_a_folder(self):
         self.assertNotEqual(build.variant_name(["A=1"]), build.variant_name(["A=2"]))
+
+    def test_two_builds_of_one_folder_take_turns(self):
+        with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor() as pool:
+            path = Path(folder) / "make"
+            path.write_text(f"#!/bin/sh\nmkdir {folder}/busy || exit 1\nsleep 0.2\nrmdir {folder}/busy\n", encoding="utf-8")
+            path.chmod(0o755)
+            with mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}"}):
+                self.assertEqual(len(list(pool.map(build.library, [["TURNS"]] * 3))), 3)
 
     def test_a_tuned_header_is_built_under_its_motor_s_name(self):
         library, call = self.make("echo \"$@\" > $RESULT", userparams=places.TUNED / "some_motor")

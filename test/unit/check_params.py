@@ -233,10 +233,22 @@ def every_define_of_userparams_is_in_the_table_once_and_the_other_way_round() ->
 
 def every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
     modes = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
-    assert sorted(modes) == ["BIDIRECTIONAL_SPEED", "OPEN_LOOP_FUNCTIONING", "SNAPSHOT", "TORQUE_MODE", "TUNING"], modes
+    assert sorted(modes) == ["BIDIRECTIONAL_SPEED", "IDENTIFY", "OPEN_LOOP_FUNCTIONING", "PARAMS_IN_RAM", "SNAPSHOT", "TORQUE_MODE", "TUNING"], modes
     sources = "".join(f.read_text(encoding="utf-8") for room in ("firmware", "include") for f in (ROOT / room).rglob("*.[ch]"))
     unused = [mode for mode in modes if not re.search(rf"#if.*\b{mode}\b|#elif.*\b{mode}\b", sources)]
     assert not unused, unused
+
+
+def a_mode_means_the_same_in_userparams_and_on_the_command_line() -> None:
+    files = [str(f) for room in ("firmware", "tools/board") for f in sorted((ROOT / room).rglob("*.c"))]
+    with tempfile.TemporaryDirectory() as folder:
+        for mode in re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE):
+            text = USERPARAMS.replace(f"/* #define {mode} */", f"#define {mode}")
+            (Path(folder) / "userparams.h").write_text(text, encoding="utf-8")
+            seen = [compiler([flag, *CFLAGS, "-Itools/host", "-Iinclude", "-I.", "-E", "-P", *files]) for flag in (f"-I{folder}", f"-D{mode}")]
+            assert not any(done.returncode for done in seen), seen[0].stderr + seen[1].stderr
+            differing = [line for line in zip(*(done.stdout.splitlines() for done in seen)) if line[0] != line[1]]
+            assert seen[0].stdout == seen[1].stdout, f"{mode}: {differing[:1]}"
 
 
 # ---- every value that the build accepts fits its number format: the parameters once as they are, once with 64-bit integers ----
@@ -338,5 +350,6 @@ run([the_values_in_use_are_accepted,
      comments_in_userparams_state_the_units_and_ranges_that_the_build_enforces,
      every_define_of_userparams_is_in_the_table_once_and_the_other_way_round,
      every_mode_of_userparams_is_off_and_used_by_the_firmware,
+     a_mode_means_the_same_in_userparams_and_on_the_command_line,
      every_accepted_parameter_set_fits_the_drives_number_formats,
      d_currents_beyond_the_largest_current_are_refused])

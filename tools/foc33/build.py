@@ -1,5 +1,7 @@
 """Building the firmware variant that a scenario needs, through the project's Makefile."""
 
+import contextlib
+import fcntl
 import os
 import re
 import subprocess
@@ -49,12 +51,23 @@ def library(defines: list[str], userparams: Path | None = None, target: str = "v
         command.append(f"USERPARAMS={places.shown(userparams)}")
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     try:
-        result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        with _one_at_a_time(f"host-{variant}" if variant else "host"):
+            result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     except OSError as error:
         raise UserError("cannot run make", "", error.strerror or str(error)) from None
     if result.returncode != 0:
         raise UserError("the firmware does not build", _what(variant, command, userparams), _reason(result.stderr))
     return places.ROOT / "build" / (f"host-{variant}" if variant else "host") / "libvboard.so"
+
+
+@contextlib.contextmanager
+def _one_at_a_time(name: str):
+    """Two programs that build in the same folder would read each other's half-written files."""
+    folder = places.ROOT / "build"
+    folder.mkdir(exist_ok=True)
+    with open(folder / f"{name}.lock", "w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def _what(variant: str, command: list[str], userparams: Path | None) -> str:
