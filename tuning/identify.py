@@ -51,11 +51,13 @@ def _table(name: str, fields: int) -> list[tuple[str, ...]]:
     arguments = ", ".join(f"a{n}" for n in range(fields))
     row = " ~ ".join(f"#a{n}" for n in range(fields))
     source = f'#include "drive/identify.h"\n#define ROW({arguments}) @@ {row}\n{name}(ROW)\n'
-    command = [*shlex.split(os.environ.get("CC") or "gcc"), "-E", "-P", f"-I{places.ROOT / 'include'}", "-xc", "-"]
+    command = [*shlex.split(os.environ.get("CC") or "gcc"), "-E", "-P", f"-I{places.ROOT / 'include'}", f"-I{places.ROOT}", "-xc", "-"]
     try:
         done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
     except OSError as error:
         raise UserError("cannot run the compiler", command[0], error.strerror or str(error)) from None
+    if done.returncode != 0:
+        raise UserError("the compiler cannot read drive/identify.h", command[0], (done.stderr.splitlines() or ["no message"])[0])
     rows = done.stdout.replace("\n", " ").split("@@")[1:]
     return [tuple(_words(cell) for cell in row.split(" ~ ")) for row in rows]
 

@@ -28,26 +28,27 @@ QM_INLINE void board_set_outputs(uint16_t outputs)
 void BOARD_ISR _ADC1Interrupt(void)
 {
     drive_samples_t raw;
-    drive_output_t out;
+    duties_t duty;
 
     IFS0bits.AD1IF = 0;
     raw.pot = (int16_t)ADC1BUF0;
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
-    out = drive_tick(&board_drive, &board_params, &raw);
-    P1DC1 = out.duty.a;
-    P1DC2 = out.duty.b;
-    P1DC3 = out.duty.c;
+    duty = drive_tick(&board_drive, &board_params, &raw);
+    P1DC1 = duty.a;
+    P1DC2 = duty.b;
+    P1DC3 = duty.c;
     /* The duties load when the counter reaches zero. Still counting down and no new sample: in time. */
     if ((P1TMR & 0x8000u) == 0u || IFS0bits.AD1IF) {
         drive_raise(&board_drive, FAULT_ISR_OVERRUN);
     }
+    board_set_outputs((board_drive.fault != (uint16_t)FAULT_NONE) ? (uint16_t)OUTPUTS_OFF : drive_outputs(&board_drive));
+    drive_slow(&board_drive, &board_params, raw.v_bus);
     if (board_drive.fault != (uint16_t)FAULT_NONE) { /* also a trap's, that came in the middle of the tick */
         board_drive.state = (uint16_t)DRIVE_FAULT;
-        out.outputs = OUTPUTS_OFF;
+        pwm_outputs_off();
     }
-    board_set_outputs(out.outputs);
     watch_snapshot();
 }
 

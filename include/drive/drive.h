@@ -68,12 +68,6 @@ typedef struct {
     int16_t i_a, i_b, v_bus, pot;
 } drive_samples_t;
 
-/** What the board must do after a tick. */
-typedef struct {
-    duties_t duty;
-    uint16_t outputs; /**< outputs_t */
-} drive_output_t;
-
 /** Requests from the background; 16-bit, so written in one instruction. */
 typedef struct {
     volatile int16_t run;          /**< 1: start and keep running (see drive_start()), 0: stop in order */

@@ -176,8 +176,8 @@ QM_INLINE void drive_handover_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Bumpless change of frame: currents, voltages and integrators are turned from the forced frame into the estimator's. The estimator's
- *  next angle is that of the sample at hand, for its tick of this period is still to come. */
+/** Bumpless change of frame: currents, voltages and integrators are turned from the forced frame into the estimator's. The angles
+ *  are those of the next sample. */
 QM_RARE void drive_hand_over(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->control;
@@ -208,8 +208,9 @@ QM_RARE void drive_hand_over(drive_t *d, const drive_params_t *p)
     d->state = (uint16_t)DRIVE_CLOSED;
 }
 
-/** Slow work, one block every period in turn so that no period has more than one. Bus and circle in every state, the rest in
- *  closed loop. */
+/** Slow work after the duties of a period are written, for they have a deadline and this has none: one block every period in turn, so
+ *  that no period has more than one. Bus and circle in every state, the rest in closed loop.
+ *  @param v_bus_raw the converter's result for the bus, any value */
 QM_RARE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
     uint16_t slot = d->ticks & (SLOTS - 1u);
@@ -219,7 +220,7 @@ QM_RARE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         drive_circle_step(d, p);
     } else if (slot == 1u && d->state == (uint16_t)DRIVE_RAMP) {
         if (d->slots >= p->ready_slots) {
-            drive_hand_over(d, p); /* a period after the decision: both together would miss the PWM's deadline */
+            drive_hand_over(d, p);
         }
     } else if (d->state == (uint16_t)DRIVE_CLOSED || d->state == (uint16_t)DRIVE_STOPPING) {
         switch (slot) {
@@ -382,30 +383,33 @@ QM_RARE void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples
     d->command.clear_fault = 0;
 }
 
-/** One PWM period.
+/** One PWM period up to the duties; then drive_outputs(), and last drive_slow(), which has no deadline.
  *  @param raw the converter's results at the centre of the low sides' conduction
- *  @return duties and what drives the outputs; the board must load them before the next PWM boundary */
-QM_INLINE drive_output_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+ *  @return duties; the board must load them before the next PWM boundary */
+QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    drive_output_t out = { { 0, 0, 0 }, OUTPUTS_OFF };
+    duties_t duty = { 0, 0, 0 };
 
     d->ticks = (uint16_t)(d->ticks + 1u);
     drive_measure(d, p, raw);
-    drive_slow(d, p, raw->v_bus);
     if (drive_is_running(d)) {
         drive_check_overcurrent(d, p); /* before the law: its formats end above the trip level */
     } else {
         drive_idle(d, p, raw);
     }
     if (drive_is_running(d)) {
-        out.duty = drive_run(d, p);
+        duty = drive_run(d, p);
     }
+    return duty;
+}
+
+/** What drives the bridge (outputs_t) in the drive's present state. */
+QM_INLINE uint16_t drive_outputs(const drive_t *d)
+{
     if (drive_is_running(d)) {
-        out.outputs = OUTPUTS_PWM;
-    } else if (d->state == (uint16_t)DRIVE_BOOTSTRAP) {
-        out.outputs = OUTPUTS_BOOTSTRAP;
+        return (uint16_t)OUTPUTS_PWM;
     }
-    return out;
+    return (uint16_t)((d->state == (uint16_t)DRIVE_BOOTSTRAP) ? OUTPUTS_BOOTSTRAP : OUTPUTS_OFF);
 }
 
 #endif

@@ -155,6 +155,7 @@ static void tick(void)
     raw.v_bus = ANY16();
     raw.pot = ANY16();
     (void)drive_tick(&drive, &params, &raw);
+    drive_slow(&drive, &params, raw.v_bus);
     bounds_hold_again();
 }
 

@@ -832,6 +832,7 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off(void)
     periods = ideal_motor_run_until(DRIVE_STOPPED, 20000);
     /* 7500 erpm at 20000 erpm/s */
     TEST_ASSERT_UINT32_WITHIN(1000, 7500, periods);
+    ideal_motor_run(1);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
     TEST_ASSERT_FLOAT_WITHIN(300.0F, 2500.0F, ideal_motor_erpm());
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
@@ -842,6 +843,7 @@ void test_stop_in_reverse_does_the_same(void)
     run_at(-1, 10000);
     drive.command.run = 0;
     TEST_ASSERT_UINT32_WITHIN(1000, 7500, ideal_motor_run_until(DRIVE_STOPPED, 20000));
+    ideal_motor_run(1);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
     TEST_ASSERT_FLOAT_WITHIN(300.0F, -2500.0F, ideal_motor_erpm());
 }

@@ -84,6 +84,7 @@ void test_motor_accelerates_with_the_command_and_stops_in_order(void)
     TEST_ASSERT_INT16_WITHIN(20, 800, drive.control.ref_q13.q);
     drive.command.run = 0;
     TEST_ASSERT_LESS_THAN_UINT32(40000, ideal_motor_run_until(DRIVE_STOPPED, 40000));
+    ideal_motor_run(1);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }

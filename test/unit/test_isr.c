@@ -23,24 +23,41 @@ static void maybe_trap(void)
 /* The real tick, with what the hardware may do meanwhile behind it. */
 static uint16_t sample_arrives_meanwhile, trap_comes_meanwhile, flag_during_tick;
 
-static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
+static duties_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
+static void slow_and_look(drive_t *d, const drive_params_t *p, int16_t v_bus_raw);
 #define drive_tick(d, p, raw) tick_and_meanwhile(d, p, raw)
+#define drive_slow(d, p, v_bus_raw) slow_and_look(d, p, v_bus_raw)
 #include "firmware/board/isr.c"
 #undef drive_tick
+#undef drive_slow
 
-static drive_output_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+/* What the duties and the override were when the slow work began. */
+static struct {
+    uint16_t duty_a, duty_b, duty_c, override;
+} at_slow;
+
+static void slow_and_look(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
-    drive_output_t output;
+    at_slow.duty_a = P1DC1;
+    at_slow.duty_b = P1DC2;
+    at_slow.duty_c = P1DC3;
+    at_slow.override = P1OVDCON;
+    drive_slow(d, p, v_bus_raw);
+}
+
+static duties_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    duties_t duty;
     flag_during_tick = IFS0bits.AD1IF;
     if (sample_arrives_meanwhile) {
         IFS0bits.AD1IF = 1;
     }
-    output = drive_tick(d, p, raw);
+    duty = drive_tick(d, p, raw);
     if (trap_comes_meanwhile) {
         trap_comes_meanwhile = 0;
         _MathError();
     }
-    return output;
+    return duty;
 }
 
 #include "unity.h"
@@ -128,7 +145,7 @@ void test_each_duty_reaches_its_own_pair(void)
 {
     drive_t twin;
     drive_samples_t raw = { -800, 400, 0, 0 };
-    drive_output_t expected;
+    duties_t expected;
     bring_to_lock();
     control_interrupts(300);
     raw.v_bus = (int16_t)ADC1BUF3;
@@ -137,10 +154,40 @@ void test_each_duty_reaches_its_own_pair(void)
     twin = board_drive;
     expected = drive_tick(&twin, &board_params, &raw);
     control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(expected.duty.a, P1DC1);
-    TEST_ASSERT_EQUAL_UINT16(expected.duty.b, P1DC2);
-    TEST_ASSERT_EQUAL_UINT16(expected.duty.c, P1DC3);
+    TEST_ASSERT_EQUAL_UINT16(expected.a, P1DC1);
+    TEST_ASSERT_EQUAL_UINT16(expected.b, P1DC2);
+    TEST_ASSERT_EQUAL_UINT16(expected.c, P1DC3);
     TEST_ASSERT_TRUE(P1DC1 != P1DC2 && P1DC2 != P1DC3 && P1DC1 != P1DC3);
+}
+
+void test_slow_work_waits_until_duties_and_override_are_written(void)
+{
+    uint16_t n;
+    control_interrupts(1024);
+    drive_start(&board_drive, &board_params, 1);
+    for (n = 0; n < 1000u; n++) {
+        control_interrupts(1);
+        TEST_ASSERT_EQUAL_HEX16(P1OVDCON, at_slow.override);
+        TEST_ASSERT_EQUAL_UINT16(P1DC1, at_slow.duty_a);
+        TEST_ASSERT_EQUAL_UINT16(P1DC2, at_slow.duty_b);
+        TEST_ASSERT_EQUAL_UINT16(P1DC3, at_slow.duty_c);
+    }
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, at_slow.override);
+    TEST_ASSERT_TRUE(P1DC1 != 0);
+}
+
+void test_fault_of_the_slow_work_switches_off_in_its_own_interrupt(void)
+{
+    uint16_t periods = 0;
+    bring_to_lock();
+    ADC1BUF3 = (uint16_t)raw_bus(36.0F);
+    while (board_drive.fault == (uint16_t)FAULT_NONE && periods < 9u) {
+        TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+        control_interrupts(1);
+        periods++;
+    }
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
 }
 
 void test_duties_stay_within_the_timer(void)

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drive/params.h"
+
 enum {
     ADC1_VECTOR = 21, /* (0x2E - 4) / 2 */
     PTEN = 0x8000,
@@ -352,7 +354,7 @@ static void live_end(void *context, double length_s)
 static void live_destroy(void *context)
 {
     pil_t *pil = context;
-    pil_target_place(NULL, 0, 0);
+    pil_target_place(&(pil_places_t){0});
     soc_pty_close(pil->terminal);
     soc_destroy(pil->soc);
     image_free(&pil->image);
@@ -369,22 +371,43 @@ static int failed(char *error, size_t size, const char *text)
     return -1;
 }
 
-/* The target's drive object must have the layout that the host expects. Without names there are no signals. */
-static int find_signals(pil_t *pil, const char *path, char *error, size_t size)
+/* Where a variable is in the target's RAM, 0 if it is not there. A size of 0 is not known: the linker gives none to an object with a
+ * start value. */
+static int find_variable(const pil_t *pil, const char *name, size_t bytes, uint16_t *address, char *error, size_t size)
 {
-    const image_symbol_t *drive = image_find(&pil->image, IMAGE_DATA, "board_drive");
-    const image_symbol_t *params = image_find(&pil->image, IMAGE_DATA, "board_params");
-    uint16_t params_address = params != NULL && params->address < 0x8000u ? (uint16_t)params->address : (uint16_t)0;
-    if (drive == NULL) {
+    const image_symbol_t *s = image_find(&pil->image, IMAGE_DATA, name);
+    *address = s != NULL && s->address < 0x8000u ? (uint16_t)s->address : (uint16_t)0;
+    if (*address == 0 || s->size == 0 || s->size == bytes) {
         return 0;
     }
-    if ((drive->size != 0 && drive->size != pil_target_drive_bytes()) || (params_address != 0 && params->size != pil_target_params_bytes())) {
-        (void)snprintf(error, size, "the image was built from other sources or settings than the simulator (board_drive has %lu bytes, not %zu), "
-                       "%s: build both with the same DEFINES and USERPARAMS", (unsigned long)drive->size, pil_target_drive_bytes(), path);
-        return -1;
+    (void)snprintf(error, size, "the image was built from other sources or settings than the simulator (%s has %lu bytes, not %zu)", name,
+                   (unsigned long)s->size, bytes);
+    return -1;
+}
+
+/* The target's objects must have the layout that the host expects. Without names there are no signals. */
+static int find_signals(pil_t *pil, const char *path, char *error, size_t size)
+{
+    pil_places_t p = {.data = (uint8_t *)iss_data(soc_core(pil->soc))};
+    const struct { const char *name; size_t bytes; uint16_t *address; } row[] = {
+        {"board_drive", pil_target_drive_bytes(), &p.drive}, {"board_params", pil_target_params_bytes(), &p.params},
+#ifdef SNAPSHOT
+        {"board_snapshot", 20, &p.snapshot}, {"SnapStart", 2, &p.snap_start}, {"SnapDone", 2, &p.snap_done},
+        {"SnapBuf1", 2 * DATA_BUFFER_SIZE, &p.snap_buf[0]}, {"SnapBuf2", 2 * DATA_BUFFER_SIZE, &p.snap_buf[1]},
+        {"SnapBuf3", 2 * DATA_BUFFER_SIZE, &p.snap_buf[2]}, {"SnapBuf4", 2 * DATA_BUFFER_SIZE, &p.snap_buf[3]},
+#endif
+    };
+    for (size_t n = 0; n < sizeof row / sizeof row[0]; n++) {
+        if (find_variable(pil, row[n].name, row[n].bytes, row[n].address, error, size) != 0) {
+            size_t length = strlen(error);
+            (void)snprintf(error + length, size - length, ", %s: build both with the same DEFINES and USERPARAMS", path);
+            return -1;
+        }
     }
-    pil_target_place((uint8_t *)iss_data(soc_core(pil->soc)), (uint16_t)drive->address, params_address);
-    pil->signals = true;
+    if (p.drive != 0) {
+        pil_target_place(&p);
+        pil->signals = true;
+    }
     return 0;
 }
 

@@ -12,8 +12,6 @@
 
 #include <xc.h>
 
-#undef SNAPSHOT /* its recorder has pointers; pil.c reads the arrays by their names */
-
 #pragma GCC diagnostic ignored "-Waddress-of-packed-member"
 #pragma pack(push, 2)
 
@@ -25,16 +23,53 @@
 
 static drive_t target_drive;
 static drive_params_t target_params = DRIVE_PARAMS_INIT;
-static uint8_t *memory;
-static uint16_t drive_address, params_address;
+static pil_places_t places;
 
 static drive_t *refreshed_drive(void)
 {
-    if (memory != NULL) {
-        memcpy(&target_drive, memory + drive_address, sizeof target_drive);
+    if (places.data != NULL) {
+        memcpy(&target_drive, places.data + places.drive, sizeof target_drive);
     }
     return &target_drive;
 }
+
+static int16_t target_word(unsigned address)
+{
+    int16_t word = 0;
+    if (places.data != NULL && address != 0) {
+        memcpy(&word, places.data + address, sizeof word);
+    }
+    return word;
+}
+
+#ifdef SNAPSHOT
+/* The recorder's pointers have 16 bits on the target, so its layout is not the host's: four columns, rows, delay, start, done, row. */
+enum { ROW_OFFSET = 8 * 2 };
+typedef struct {
+    uint16_t row;
+} target_snapshot_t;
+
+static target_snapshot_t target_snapshot(void)
+{
+    return (target_snapshot_t){places.snapshot == 0 ? (uint16_t)0 : (uint16_t)target_word(places.snapshot + ROW_OFFSET)};
+}
+
+static const int16_t *target_array(unsigned n)
+{
+    static int16_t copy[DATA_BUFFER_SIZE];
+    if (places.data != NULL && places.snap_buf[n] != 0) {
+        memcpy(copy, places.data + places.snap_buf[n], sizeof copy);
+    }
+    return copy;
+}
+
+#define board_snapshot target_snapshot()
+#define SnapDone target_word(places.snap_done)
+#define SnapBuf1 target_array(0)
+#define SnapBuf2 target_array(1)
+#define SnapBuf3 target_array(2)
+#define SnapBuf4 target_array(3)
+#endif
 
 #define board_drive (*refreshed_drive())
 #define board_params target_params
@@ -58,11 +93,9 @@ extern const unsigned pil_unused_param_count;
 
 #pragma pack(pop)
 
-void pil_target_place(uint8_t *data, uint16_t drive, uint16_t params)
+void pil_target_place(const pil_places_t *found)
 {
-    memory = data;
-    drive_address = drive;
-    params_address = params;
+    places = *found;
 }
 
 size_t pil_target_drive_bytes(void)
@@ -77,7 +110,7 @@ size_t pil_target_params_bytes(void)
 
 static bool params_are_in_ram(void)
 {
-    return memory != NULL && params_address != 0;
+    return places.data != NULL && places.params != 0;
 }
 
 int pil_target_param_get(const char *name, double *value)
@@ -85,7 +118,7 @@ int pil_target_param_get(const char *name, double *value)
     if (!params_are_in_ram()) {
         return -1;
     }
-    memcpy(&target_params, memory + params_address, sizeof target_params);
+    memcpy(&target_params, places.data + places.params, sizeof target_params);
     return raw_param_get(name, value);
 }
 
@@ -94,10 +127,10 @@ int pil_target_param_set(const char *name, double value)
     if (!params_are_in_ram()) {
         return -1;
     }
-    memcpy(&target_params, memory + params_address, sizeof target_params);
+    memcpy(&target_params, places.data + places.params, sizeof target_params);
     int result = raw_param_set(name, value);
     if (result == 0) {
-        memcpy(memory + params_address, &target_params, sizeof target_params);
+        memcpy(places.data + places.params, &target_params, sizeof target_params);
     }
     return result;
 }
@@ -105,5 +138,6 @@ int pil_target_param_set(const char *name, double value)
 pil_commands_t pil_target_commands(void)
 {
     const drive_t *d = refreshed_drive();
-    return (pil_commands_t){d->command.run, d->command.clear_fault, d->command.target_erpm, d->direction, d->state, d->fault, d->ticks};
+    return (pil_commands_t){d->command.run, d->command.clear_fault, d->command.target_erpm, d->direction, d->state, d->fault, d->ticks,
+                            (uint16_t)target_word(places.snap_start)};
 }

@@ -11,9 +11,15 @@
 extern const probe_signal_t pil_target_signals[];
 extern const unsigned pil_target_signal_count;
 
-/* Where the target's variables are: its data memory, and the addresses of board_drive and board_params (0: a constant in flash).
- * They are read anew with every signal. NULL memory: the signals read zeroes. */
-void pil_target_place(uint8_t *data, uint16_t drive, uint16_t params);
+/* Where the target's variables are. An address of 0: not in its RAM (parameters: a constant in flash). */
+typedef struct {
+    uint8_t *data; /* the target's data memory; NULL: the signals read zeroes */
+    uint16_t drive, params;
+    uint16_t snapshot, snap_start, snap_done, snap_buf[4]; /* with SNAPSHOT */
+} pil_places_t;
+
+/* They are read anew with every signal. */
+void pil_target_place(const pil_places_t *places);
 
 /* Bytes of a drive object and of its parameters on the target. */
 size_t pil_target_drive_bytes(void);
@@ -27,6 +33,7 @@ int pil_target_param_set(const char *name, double value);
 typedef struct {
     int16_t run, clear_fault, target_erpm, direction;
     uint16_t state, fault, ticks;
+    uint16_t snap_start;
 } pil_commands_t;
 
 pil_commands_t pil_target_commands(void);

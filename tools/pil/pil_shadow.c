@@ -5,6 +5,7 @@
 #include <xc.h>
 
 #include "board/firmware.h"
+#include "board/watch.h"
 #include "drive/drive.h"
 
 /* Start the host's firmware anew. It takes every reset for power-on: a fault that the target has kept over its reset is followed at the
@@ -16,6 +17,11 @@ void pil_shadow_reset(pil_t *pil)
     if (pil->shadow.on && pil->signals) {
         host_registers_reset();
         firmware_init();
+#ifdef SNAPSHOT
+        board_snapshot.row = 0;
+        board_snapshot.wait = 0;
+        SnapDone = 0;
+#endif
         pil->shadow.running = true;
     }
 #endif
@@ -30,6 +36,9 @@ static void follow_commands(const pil_commands_t *c)
     board_drive.command.run = c->run;
     board_drive.command.clear_fault = c->clear_fault;
     board_drive.command.target_erpm = c->target_erpm;
+#ifdef SNAPSHOT
+    SnapStart = c->snap_start;
+#endif
     if (c->fault != 0 && board_drive.fault == 0) {
         drive_raise(&board_drive, (drive_fault_t)c->fault);
     }

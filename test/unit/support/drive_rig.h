@@ -10,7 +10,10 @@
 static const drive_params_t params = DRIVE_PARAMS_INIT;
 static drive_t drive;
 static drive_samples_t samples;
-static drive_output_t out;
+static struct {
+    duties_t duty;
+    uint16_t outputs;
+} out;
 
 /** Converter result that the drive measures as exactly this current (gain -1 and no offset). */
 static inline int16_t rig_raw_current(int16_t current_q13)
@@ -39,7 +42,12 @@ static inline void rig_currents(int16_t a_q13, int16_t b_q13)
 static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
-        out = drive_tick(&drive, &params, &samples);
+        out.duty = drive_tick(&drive, &params, &samples);
+        out.outputs = drive_outputs(&drive);
+        drive_slow(&drive, &params, samples.v_bus);
+        if (drive.fault != (uint16_t)FAULT_NONE) {
+            out.outputs = (uint16_t)OUTPUTS_OFF;
+        }
     }
 }
 
