@@ -74,7 +74,7 @@
 #define IDREF_SPEED0   0.00               /* [A]             -20 .. 0       d current of each entry */
 #define IDREF_SPEED1  -0.28
 #define IDREF_SPEED2  -0.52
-#define IDREF_SPEED3  -0.78
+#define IDREF_SPEED3  -0.79
 #define IDREF_SPEED4  -1.03
 #define IDREF_SPEED5  -1.26
 #define IDREF_SPEED6  -1.48

@@ -200,12 +200,21 @@ QM_RARE void drive_hand_over(drive_t *d, const drive_params_t *p)
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     c->reference_erpm = drive_signed(d, p->end_erpm);
-    pi_preset(&c->pi_speed, &p->pi_speed, qm_sub_limited(c->reference_erpm, estimator_speed(&d->estimator)), c->ref_q13.q);
     d->angle = estimated;
     d->frame = trig_sincos(estimated);
     d->stall_count = 0;
     d->lost_count = 0;
     d->state = (uint16_t)DRIVE_CLOSED;
+}
+
+/** Six periods after the hand-over, whose own period has enough to do: the speed controller, which comes next, goes on from its q current. */
+QM_INLINE void drive_speed_preset(drive_t *d, const drive_params_t *p)
+{
+    drive_control_t *c = &d->control;
+    if (d->slots != 0u) {
+        d->slots = 0;
+        pi_preset(&c->pi_speed, &p->pi_speed, qm_sub_limited(c->reference_erpm, estimator_speed(&d->estimator)), c->ref_q13.q);
+    }
 }
 
 /** Slow work after the duties of a period are written, for they have a deadline and this has none: one block every period in turn, so
@@ -229,7 +238,7 @@ QM_RARE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         case 4: drive_current_limit_step(d, p); break;
         case 5: drive_protect_step(d, p); break;
         case 6: drive_handover_step(d, p); break;
-        default: break;
+        default: drive_speed_preset(d, p); break; /* 7 */
         }
     }
 }

@@ -693,7 +693,10 @@ static void hand_over(int16_t direction, angle_t forced, int16_t offset, int16_t
     drive.control.v_q14.q = v_q;
     drive.stall_count = 700;
     drive.lost_count = 100;
+    drive.slots = 50;
     drive_hand_over(&drive, &params);
+    drive.ticks = 7;
+    drive_slow(&drive, &params, 0);
 }
 
 static void expect_the_same_stator_voltage(int16_t direction, angle_t forced, int16_t offset)

@@ -38,7 +38,10 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.estimator.omega_filtered_q16 = (int32_t)direction * 4800 * 65536;
     drive.control.v_q14.d = v_d;
     drive.control.v_q14.q = v_q;
+    drive.slots = 50;
     drive_hand_over(&drive, &params);
+    drive.ticks = 7;
+    drive_slow(&drive, &params, 0);
 }
 
 static alphabeta_t stator_voltage(angle_t angle)
@@ -127,6 +130,26 @@ void test_current_controllers_go_on_from_the_voltage_of_the_forced_frame(void)
     v_q = drive.control.v_q14.q;
     TEST_ASSERT_EQUAL_INT16(v_d, pi_tick(&drive.control.pi_d, &params.pi_d, 0, 32767));
     TEST_ASSERT_EQUAL_INT16(v_q, pi_tick(&drive.control.pi_q, &params.pi_q, 0, 32767));
+}
+
+void test_speed_controller_is_preset_once_and_before_its_first_step(void)
+{
+    uint16_t slot;
+    int32_t preset;
+    drive.slots = 50;
+    drive_hand_over(&drive, &params);
+    drive.control.pi_speed.sum = 12345;
+    for (slot = 6; slot <= 7u; slot++) {
+        TEST_ASSERT_EQUAL_INT32(12345, drive.control.pi_speed.sum);
+        drive.ticks = slot;
+        drive_slow(&drive, &params, 0);
+    }
+    preset = drive.control.pi_speed.sum;
+    TEST_ASSERT_NOT_EQUAL_INT32(12345, preset);
+    drive.control.pi_speed.sum = 0;
+    drive.ticks = 15;
+    drive_slow(&drive, &params, 0);
+    TEST_ASSERT_EQUAL_INT32(0, drive.control.pi_speed.sum);
 }
 
 void test_speed_controller_starts_from_the_q_current_in_both_directions(void)
