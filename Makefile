@@ -1,6 +1,6 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
-# Variables: SCENARIO MOTOR OUT (what to run, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
+# Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
 # ONLY (names of test suites), PYTHON RUBY CC (tools to use), V=1 (show the commands).
 
 SCENARIO ?= $(if $(MOTOR),rated,demo)
@@ -62,11 +62,12 @@ out = $(if $(OUT),--out $(call quoted,$(OUT)))
 tuner = $(alone) $(python) -m tuning
 tuned = build/tune/$(basename $(notdir $(MOTOR)))
 parameters = $(or $(USERPARAMS),$(if $(MOTOR),$(tuned)))
-options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
-ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) --brief),$(MAKE) vboard)
+board = $(if $(BOARD),--board $(call quoted,$(BOARD)))
+options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
+ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief),$(MAKE) vboard)
 
 .PHONY: run scenarios table2 starts motors robust setup-run
-run: setup-run ## the firmware turns the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR=name OUT=folder]
+run: setup-run ## the firmware turns the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR=name BOARD=name OUT=folder]
 	@$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
 
@@ -82,8 +83,8 @@ starts: setup-run ## starts from every rotor angle under several loads [MOTOR=na
 	@$(front_end) starts $(options)
 
 motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 and 100 % of rated speed at half the rated torque [OUT=folder]
-	@$(tuner) tune --all --brief
-	@$(front_end) rated --out $(call quoted,$(or $(OUT),build/run/motors))
+	@$(tuner) tune --all $(board) --brief
+	@$(front_end) rated $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
 
 robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTOR=name OUT=folder]
 	@$(ready)
@@ -92,17 +93,17 @@ robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTO
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
 .PHONY: tune tune-fw identify spreadsheet userparams setup-tune
-tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and a report [MOTOR=name OUT=folder]
-	@$(tuner) tune $(tune_motor) $(out)
+tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and a report [MOTOR=name BOARD=name OUT=folder]
+	@$(tuner) tune $(tune_motor) $(board) $(out)
 
 tune-fw: setup-run ## field-weakening tables found on the virtual board, into tuning/tables/NAME.toml [MOTOR=name OUT=folder]
-	@$(tuner) tune-fw $(tune_motor) $(out)
+	@$(tuner) tune-fw $(tune_motor) $(board) $(out)
 
 identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=name or all, OUT=folder]
-	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(out)
+	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
 
 userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old, .old2 ... [MOTOR=name]
-	@$(tuner) tune $(tune_motor) --brief
+	@$(tuner) tune $(tune_motor) $(board) --brief
 	@new=build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h; \
 	if cmp -s $$new userparams.h; then echo "userparams.h is up to date"; exit; fi; \
 	old=userparams.h.old; n=1; while test -e $$old; do n=$$((n + 1)); old=userparams.h.old$$n; done; \
@@ -175,7 +176,9 @@ all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) gol
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
 reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
 # Every chosen suite runs anew. One that cannot be built leaves no report, which the last step counts as a failure.
-run_suites = +@mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
+unknown_suites = $(strip $(foreach name,$(ONLY),$(if $(filter $(name) %/$(name),$1),,$(name))))
+run_suites = +@$(if $(call unknown_suites,$1 $2),echo "foc33: no suite '$(call unknown_suites,$1 $2)'$(comma) make $@: make test runs them all and shows their names" >&2; \
+    exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
     rm -f $T/*.txt; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
     $(if $(call chosen,$2),$(MAKE) -k -j1 $(call reports,$(call chosen,$2)) || true;) \
     $(python) test/run-report.py $(call reports,$(call chosen,$1 $2))

@@ -102,6 +102,12 @@ class Expectations(unittest.TestCase):
         self.fails(text, "bus voltage 0 .. 2 s", "24.00 .. 31.00 V", bus__voltage_v=step((0, 24), (1.0, 31), (1.0001, 24)))
         self.fails(text, "bus voltage 0 .. 2 s", "19.00 .. 24.00 V", bus__voltage_v=step((0, 24), (1.0, 19), (1.0001, 24)))
 
+    def test_bus_voltage_in_percent_is_of_the_headers_nominal_bus(self):
+        item = run(expect("bus_voltage", percent=True, max=125), bus__voltage_v=step((0, 24), (1.0, 30.5), (1.0001, 24)))
+        for nominal_v, ok in ((24.0, False), (25.0, True)):
+            item.params["NOMINAL_BUS_V"] = nominal_v
+            self.assertEqual(report.check(item)[0].ok, ok, nominal_v)
+
     def test_each_statistic_of_a_signal(self):
         half = step((0, -3), (1.0, 1)) # half of the time each
         for statistic, value in (("min", -3), ("max", 1), ("mean", -1), ("span", 4), ("peak", 3), ("last", 1), ("rms", 5 ** 0.5),

@@ -4,7 +4,7 @@
     kind = "hand_over"     within_s of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
     kind = "outputs_off"   from_s, to_s
-    kind = "bus_voltage"   min and/or max, from_s, to_s
+    kind = "bus_voltage"   min and/or max, from_s, to_s; percent = true: in % of NOMINAL_BUS_V
     kind = "signal"        signal, statistic = mean min max rms peak span last, min and/or max, from_s, to_s
     kind = "state"         name, at_s or from_s and to_s; never = true: must not occur
     kind = "fault"         name, after_s (its cause), within_s, outputs_off_within_periods of the fault (of the cause with
@@ -232,20 +232,25 @@ class SignalExpectation(Expectation):
         return [self.signal]
 
 
+@dataclass(frozen=True)
 class BusVoltageExpectation(SignalExpectation):
     """Shorthand: lowest and highest bus voltage."""
 
+    percent: bool
+
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "BusVoltageExpectation":
-        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s))
+        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s), section.flag("percent", False))
 
     def check(self, run: "Run") -> list[Outcome]:
         column = run.trace.part(self.from_s, self.to_s).column(self.signal)
+        unit = run.params["NOMINAL_BUS_V"] / 100.0 if self.percent else 1.0
+        bounds = Bounds(self.bounds.minimum * unit, self.bounds.maximum * unit)
         if not len(column):
-            return [Outcome(self.row, False, "nothing", self.bounds.text() + " V")]
+            return [Outcome(self.row, False, "nothing", bounds.text() + " V")]
         low, high = float(column.min()), float(column.max())
-        return [Outcome(f"{self.row} {_window_text(self.from_s, self.to_s)}", self.bounds.hold(low) and self.bounds.hold(high),
-                        f"{low:.2f} .. {high:.2f} V", self.bounds.text() + " V")]
+        return [Outcome(f"{self.row} {_window_text(self.from_s, self.to_s)}", bounds.hold(low) and bounds.hold(high),
+                        f"{low:.2f} .. {high:.2f} V", bounds.text() + " V")]
 
 
 _STATISTICS: dict[str, Callable[[np.ndarray], Any]] = {

@@ -10,7 +10,7 @@ pil_scenario = $(if $(filter file default undefined,$(origin SCENARIO)),,$(call 
 
 pil: setup-run $$(if $$(IMAGE),,find-xc16) ## the image for the dsPIC turns the motor: demo and Table 2, compared with the PC tick by tick [SCENARIO=name IMAGE=file OUT=folder]
 	@$(if $(MOTOR),$(ready),:)
-	@$(alone) $(python) -m tools.foc33.pil_command $(pil_scenario) $(pil_image) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) \
+	@$(alone) $(python) -m tools.foc33.pil_command $(pil_scenario) $(pil_image) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) \
 	    $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
 
 cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## the control interrupt in cycles and us beside the note's, load, latency, stack, dearest functions, flame picture [SCENARIO=name IMAGE=file.elf OUT=folder]
