@@ -68,18 +68,18 @@ ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MO
 
 .PHONY: run scenarios table2 starts motors robust setup-run
 run: setup-run ## the firmware turns the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR=name BOARD=name OUT=folder]
-	@$(ready)
+	@+$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
 
 scenarios: setup-run ## what make run SCENARIO=name can run
 	@$(front_end) scenarios
 
 table2: setup-run ## the eight rows of the note's Table 2 beside ours [MOTOR=name OUT=folder]
-	@$(ready)
+	@+$(ready)
 	@$(front_end) table2 $(options)
 
 starts: setup-run ## starts from every rotor angle under several loads [MOTOR=name OUT=folder]
-	@$(ready)
+	@+$(ready)
 	@$(front_end) starts $(options)
 
 motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 and 100 % of rated speed at half the rated torque [OUT=folder]
@@ -87,7 +87,7 @@ motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 an
 	@$(front_end) rated $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
 
 robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTOR=name OUT=folder]
-	@$(ready)
+	@+$(ready)
 	@$(front_end) robust $(options)
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------

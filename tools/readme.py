@@ -72,7 +72,7 @@ def guarantees() -> str:
         ["speed within 0.5 % of its reference, 1000 to 5500 rpm", f"{worst_speed:.2f} %", "`make run`"],
         ["rotor angle known to 5° RMS from 1000 rpm up", f"{worst_angle:.1f}°", "`make run`"],
         ["starts from every rotor angle with 0, 0.03 and 0.06 N·m", f"{held} of {len(starts['expectations'])}", "`make starts`"],
-        ["Table 2 of the note: every row at its reference, at the row's torque",
+        ["Table 2 of the note: every row at its reference, rows 2 to 8 at less current than the note",
          f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
         ["twice the base speed without load", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
         ["starts and holds half speed with true R ±30 %, L ±30 %, Kphi ±15 %",

@@ -11,8 +11,8 @@ NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083
         2500: (2375, 0.031, 0.608), 3000: (2850, 0.020, 0.636), 3500: (3325, 0.019, 1.174), 4000: (3800, 0.015, 1.556)}
 
 
-def result(speed=1500.0, error=0.0, fault=None, voltage=0.0, current=0.0):
-    return {"speed_rpm": speed, "speed_error_percent": error, "fault": fault, "voltage_at_limit_percent": voltage,
+def result(speed=1500.0, error=0.0, fault=None, voltage=0.0, current=0.0, current_rms=0.5):
+    return {"speed_rpm": speed, "current_rms_a": current_rms, "speed_error_percent": error, "fault": fault, "voltage_at_limit_percent": voltage,
             "current_at_limit_percent": current}
 
 
@@ -23,19 +23,22 @@ class Table2(unittest.TestCase):
     def test_the_file_holds_the_note_s_eight_rows(self):
         self.assertEqual({row.reference_rpm: (row.note_rpm, row.torque_nm, row.note_current_a) for row in self.rows()}, NOTE)
 
-    def test_only_the_first_two_rows_must_reach_half_a_per_cent(self):
-        self.assertEqual([row.error_percent for row in self.rows()], [0.5, 0.5] + [None] * 6)
+    def test_every_row_must_reach_half_a_per_cent_and_all_but_the_first_at_the_note_s_current(self):
+        self.assertEqual([row.error_percent for row in self.rows()], [0.5] * 8)
+        self.assertEqual([row.no_more_current for row in self.rows()], [False] + [True] * 7)
 
-    def test_a_row_at_the_note_s_speed_holds_and_one_below_fails(self):
+    def test_a_row_fails_above_and_below_half_a_per_cent(self):
         row = self.rows()[2]
-        self.assertTrue(table2.check(row, result(speed=1425.0))[0].ok)
-        outcome = table2.check(row, result(speed=1424.9))[0]
-        self.assertEqual((outcome.ok, outcome.row, outcome.got), (False, "1500 rpm, 0.083 N m: speed", "1424.9 rpm"))
+        for error, ok in ((0.5, True), (-0.5, True), (0.51, False), (-0.51, False), (None, False)):
+            outcome = table2.check(row, result(error=error))[0]
+            self.assertEqual((outcome.ok, outcome.row), (ok, "1500 rpm, 0.083 N m: speed"), error)
 
-    def test_the_first_rows_fail_above_and_below_half_a_per_cent(self):
-        row = self.rows()[0]
-        for error, ok in ((0.5, True), (-0.5, True), (0.51, False), (-0.51, False)):
-            self.assertEqual(table2.check(row, result(speed=500 * (1 + error / 100), error=error))[0].ok, ok, error)
+    def test_a_row_fails_above_the_note_s_current(self):
+        row = self.rows()[2]
+        for current, ok in ((1.513, True), (1.514, False), (None, False)):
+            outcome = table2.check(row, result(current_rms=current))[1]
+            self.assertEqual((outcome.ok, outcome.row), (ok, "1500 rpm, 0.083 N m: current"), current)
+        self.assertEqual(len(table2.check(self.rows()[0], result(current_rms=9.0))), 1)
 
     def test_a_fault_fails_a_row_whatever_its_speed(self):
         outcome = table2.check(self.rows()[2], result(fault="STALL"))[0]

@@ -31,14 +31,15 @@ class Row:
     torque_nm: float
     note_rpm: float
     note_current_a: float
-    error_percent: float | None
+    error_percent: float
+    no_more_current: bool
     where: str
 
     @classmethod
     def read(cls, section: Section) -> "Row":
         row = cls(section.number("reference_rpm", minimum=1.0), section.number("torque_nm", minimum=0.0),
                   section.number("note_rpm", minimum=0.0), section.number("note_current_a", minimum=0.0),
-                  section.number("error_percent", None, 0.0), section.where("reference_rpm"))
+                  section.number("error_percent", minimum=0.0), section.flag("no_more_current", True), section.where("reference_rpm"))
         section.close()
         return row
 
@@ -114,16 +115,16 @@ def _result(row: Row, result: dict[str, Any]) -> dict[str, Any]:
 
 def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     """What must hold for one row."""
+    name = f"{row.reference_rpm:g} rpm, {row.torque_nm:g} N m"
     got = f"{result['speed_rpm']:.1f} rpm" + (f", fault {result['fault']}" if result["fault"] else "")
-    name = f"{row.reference_rpm:g} rpm, {row.torque_nm:g} N m: speed"
-    if row.error_percent is not None:
-        error = result["speed_error_percent"]
-        ok = error is not None and abs(error) <= row.error_percent
-        allowed = f"{row.reference_rpm:g} rpm +- {row.error_percent:g} %"
-    else:
-        ok = result["speed_rpm"] >= row.note_rpm
-        allowed = f"at least {row.note_rpm:g} rpm"
-    return [Outcome(name, ok and not result["fault"], got, allowed)]
+    error = result["speed_error_percent"]
+    ok = error is not None and abs(error) <= row.error_percent and not result["fault"]
+    outcomes = [Outcome(f"{name}: speed", ok, got, f"{row.reference_rpm:g} rpm +- {row.error_percent:g} %")]
+    if row.no_more_current:
+        current = result["current_rms_a"]
+        outcomes.append(Outcome(f"{name}: current", current is not None and current <= row.note_current_a,
+                                "nothing" if current is None else f"{current:.3f} A RMS", f"at most the note's {row.note_current_a:g} A"))
+    return outcomes
 
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
