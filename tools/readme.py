@@ -75,7 +75,7 @@ def guarantees() -> str:
         ["Table 2 of the note: every row at its reference, rows 2 to 8 at less current than the note",
          f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
         ["twice the base speed without load", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
-        ["starts and holds half speed with true R ±30 %, L ±30 %, Kphi ±15 %",
+        ["starts and holds half speed with true R ±30 %, L ±30 %, Kphi ±15 %: each alone with and without load, all combined without",
          f"{sum(e['ok'] for e in robust['expectations'])} of {len(robust['expectations'])}", "`make robust`"],
         ["orderly stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
         ["a blocked shaft is a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
