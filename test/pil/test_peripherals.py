@@ -174,6 +174,11 @@ class Uart(unittest.TestCase):
         self.assertEqual(0x5A, chip.peek(RAM))
 
     def test_on_a_pseudo_terminal(self) -> None:
+        try:
+            for end in os.openpty():
+                os.close(end)
+        except OSError as error:
+            self.skipTest(f"this machine has no pseudo-terminals: {error}")
         chip = board(PLL + UART + "mov #20, w0; mov w0, rpinr18\nagain: btss u1sta, #0; bra again; mov u1rxreg, w0; inc w0, w0\n"
                      "mov w0, u1txreg; bra again\n")
         line = os.open(chip.terminal(), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
