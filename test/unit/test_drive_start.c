@@ -234,6 +234,27 @@ void test_outputs_stay_off_until_a_start_is_requested(void)
     }
 }
 
+void test_a_stopped_drive_shows_neither_speed_nor_reference(void)
+{
+    rig_closed(1, 5000);
+    drive.state = (uint16_t)DRIVE_STOPPED;
+    drive.command.run = 0;
+    rig_tick(1);
+    TEST_ASSERT_EQUAL_INT32(0, drive.estimator.omega_filtered_q16);
+    TEST_ASSERT_EQUAL_INT16(0, drive.control.reference_erpm);
+}
+
+void test_a_request_to_clear_a_fault_does_not_disturb_a_start(void)
+{
+    rig_start(1);
+    rig_tick(5);
+    drive.command.clear_fault = 1;
+    rig_tick(1);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_BOOTSTRAP, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(5, drive.timer); /* the first of the six ended STOPPED */
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.clear_fault);
+}
+
 void test_start_is_refused_before_calibration_is_done(void)
 {
     rig_tick(1000);
