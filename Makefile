@@ -45,6 +45,11 @@ quoted = '$(subst ','\'',$1)'
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@
 
+# A misspelt mode would give the drive without it.
+known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) \
+    $(filter-out $(modes:%=-D%) -U%,$(foreach word,$(DEFINES),$(if $(findstring =,$(word)),,$(word))))), \
+    echo foc33: $(call quoted,no mode $(word)$(comma) DEFINES=$(DEFINES)): 'use $(modes:%=-D%) or -DNAME=value' >&2; exit 2)
+
 # ---- help ----------------------------------------------------------------------------------------------------------------
 .PHONY: help
 help: ## this list
@@ -141,6 +146,7 @@ vboard: $B/libvboard.so ## build/host/libvboard.so: the virtual board with the f
 $B/flags: FORCE
 	@test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
 	    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
+	$(call known_defines)
 	$(call remember,$(compile))
 
 $B/contents: FORCE

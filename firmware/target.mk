@@ -35,10 +35,19 @@ find-xc16:
 	        "Microchip's MPLAB XC16 compiler (the free licence will do; XC compilers page at microchip.com)" \
 	        "and name its folder, e.g. XC16=/opt/microchip/xc16/v2.10" >&2; exit 2; }
 
+# What the compiler would answer with lines of its own about every file.
+.PHONY: target-input
+target-input: find-xc16
+	$(call known_defines)
+	@case $(call quoted,$(OPT)) in -O[123]) ;; *) \
+	    echo foc33: no such level, $(call quoted,OPT=$(OPT)): use -O1, -O2 or -O3 >&2; exit 2;; esac
+	@test -z $(call quoted,$(DFP)) || test -f $(call quoted,$(DFP)/xc16/bin/c30_device.info) || { \
+	    echo foc33: no device pack for XC16, $(call quoted,DFP=$(DFP)): name the folder that has xc16/bin/c30_device.info >&2; exit 2; }
+
 # Python with what reads ELF and HEX.
 target_setup = @tools/setup/prepare.sh target
 
-$X/flags: FORCE | find-xc16
+$X/flags: FORCE | target-input
 	@test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
 	    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
 	$(call remember,$(target_compile) $(target_link_options))
@@ -60,12 +69,13 @@ $X/foc33.hex: $X/foc33.elf
 	    { cat $X/foc33.bin2hex >&2; rm -f $@; exit 1; }
 
 # Another mode has its own tables and arrays: the budget is for the drive as it is delivered.
-target_budget = $(if $(DEFINES),,--budget firmware/budget.toml)
+target_modes = $(DEFINES)$(filter $(modes),$(shell sed -n 's/^ *# *define *\([A-Z_]*\).*/\1/p' $(call quoted,$(or $(USERPARAMS),.)/userparams.h)))
+target_budget = $(if $(target_modes),,--budget firmware/budget.toml)
 target_check = $(python) -m tools.target.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget)
 
 $X/checked: $X/foc33.hex firmware/board/config.c firmware/budget.toml $(wildcard tools/target/*.py)
 	$(target_setup)
-	@$(target_check) >$@.new || { status=$$?; cat $@.new; rm -f $@.new; exit $$status; }
+	@$(target_check) >$@.new || { status=$$?; cat $@.new; rm -f $@.new $@; mv -f $X/foc33.hex $X/foc33.refused.hex; exit $$status; }
 	@mv $@.new $@
 
 flash: firmware ## program the board by MPLAB IPE's command line, or say how [TOOL=PK4|PK5|ICD4|SNAP|PK3 IPE=folder]
@@ -76,6 +86,10 @@ target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h) userpa
     $(foreach word,$(filter-out -Werror,$(target_flags) $(target_warnings)),'flag $(word)') \
     $(foreach word,$(patsubst -I%,%,$(target_includes)),'include $(word)') \
     $(foreach word,$(subst $(comma), ,$(target_link_options)),'link $(word)') 'device $(target_device)'
+
+# For everybody the same, whatever this build is asked for.
+project project-facts: override OPT := -O2
+project project-facts: override USERPARAMS :=
 
 project: ## write the MPLAB X project firmware.X anew
 	$(target_setup)

@@ -15,7 +15,7 @@ CONFIG = """
 #pragma config FCKSM = CSECMD
 #pragma config POSCMD = XT
 #pragma config IOL1WAY = OFF
-#pragma config FWDTEN = OFF
+#pragma config FWDTEN = ON
 #pragma config FPWRT = PWR128
 #pragma config PWMPIN = ON
 #pragma config HPOL = ON
@@ -115,7 +115,7 @@ def made() -> Made:
         image.point(name, image.function(name, 0x000000, RETFIE))
     image.function("main", 0x000000, 0x37FFFE, file="build/target/firmware/board/main.o", section=".text.main")
     image.constant(0x007FFF, 0x00A57E)
-    image.words |= {0xF80000: 0xCF, 0xF80004: 0x07, 0xF80006: 0x00, 0xF80008: 0x45, 0xF8000A: 0x5F, 0xF8000C: 0xF7, 0xF8000E: 0xC1}
+    image.words |= {0xF80000: 0xCF, 0xF80004: 0x07, 0xF80006: 0x00, 0xF80008: 0x45, 0xF8000A: 0xC4, 0xF8000C: 0xF7, 0xF8000E: 0xC1}
     return image
 
 

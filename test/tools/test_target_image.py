@@ -242,7 +242,21 @@ class Library(Case):
 
     def test_a_map_of_another_build_is_refused(self):
         self.image.places.pop()
-        self.fails("2 words from 0x.* on come from no file that the map names: the map is of another build")
+        self.fails("2 words from 0x.* on come from no file that the map names: the map is of another build, or the linker made them for a pointer")
+
+
+class Divisions(Case):
+    def test_a_division_that_is_no_built_in_is_told_with_its_function(self):
+        for word in (0xD80102, 0xD87B85, 0xD88102, 0xD8F90F, 0xD90002): # div.s, div.u, divf
+            with self.subTest(hex(word)):
+                self.image = made()
+                self.image.function("average", 0x090011, word, 0x060000)
+                self.fails(r"average\(\) divides by a variable with / or %: use qm_divud")
+
+    def test_built_in_divisions_and_constants_that_look_like_one_pass(self):
+        self.image.function("average", 0x090011, 0xD88242, 0x090011, 0xD80242, 0x060000) # div.ud, div.sd
+        self.image.constant(0xD80102)
+        self.passes()
 
 
 class Budget(Case):

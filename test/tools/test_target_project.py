@@ -37,6 +37,11 @@ class Project(unittest.TestCase):
         for name, text in project.project(self.facts).items():
             self.assertEqual((PROJECT / name).read_text(encoding="utf-8"), text, f"{name} differs: run make project")
 
+    def test_it_does_not_follow_what_one_build_is_asked_for(self):
+        done = subprocess.run(["make", "-s", "project-facts", "OPT=-O1", "USERPARAMS=/tmp", "DEFINES=-DTUNING"], cwd=ROOT, capture_output=True,
+                              text=True, check=True)
+        self.assertEqual(project.read(done.stdout.splitlines()), self.facts)
+
     def test_every_file_that_it_names_exists(self):
         items = [item.text for item in self.tree.iter("itemPath")]
         self.assertGreater(len(items), 30)

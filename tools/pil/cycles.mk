@@ -16,4 +16,4 @@ pil: setup-run $$(if $$(IMAGE),,find-xc16) ## the image for the dsPIC turns the 
 cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## the control interrupt in cycles and us beside the note's, load, latency, stack, dearest functions, flame picture [SCENARIO=name IMAGE=file.elf OUT=folder]
 	$(target_setup)
 	@$(alone) $(python) -m tools.target.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
-	    $(if $(IMAGE)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
+	    $(if $(IMAGE)$(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)

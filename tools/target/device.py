@@ -86,6 +86,6 @@ FIELDS = {
 
 #: what the board needs, whatever firmware/board/config.c says
 BOARD_NEEDS = {
-    "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON",
-    "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF", "BWRP": "WRPROTECT_OFF", "BSS": "NO_FLASH", "GSS": "OFF", "GWRP": "OFF",
+    "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FWDTEN": "ON", "WINDIS": "OFF", "WDTPRE": "PR32",
+    "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON", "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF", "BWRP": "WRPROTECT_OFF", "BSS": "NO_FLASH", "GSS": "OFF", "GWRP": "OFF",
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 from tools.foc33.errors import UserError
 
 from . import device
-from .linked import Piece, default_handler_is_ours, origins, read_map
+from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
 from .program import Elf, Words, read_elf, read_hex
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -198,7 +198,7 @@ def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, 
           deepest: int | None = None) -> list[str]:
     """Every failure of an image; `pieces` None when there is no map, `deepest` None when nobody has looked for the deepest stack."""
     return [*check_device(elf), *check_memory(words), *check_same(words, elf), *check_reset(words, elf), *check_vectors(words, elf, pieces),
-            *check_configuration(words, config), *(origins(elf, pieces) if pieces is not None else []), *check_budget(words, elf, budget, deepest)]
+            *check_configuration(words, config), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []), *check_budget(words, elf, budget, deepest)]
 
 
 def parser() -> argparse.ArgumentParser:

@@ -85,7 +85,8 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
     unknown = sorted(address for address in elf.words if address in device.PROGRAM and address not in explained)
     failures = []
     if unknown:
-        failures.append(f"{len(unknown)} words from 0x{unknown[0]:04X} on come from no file that the map names: the map is of another build")
+        failures.append(f"{len(unknown)} words from 0x{unknown[0]:04X} on come from no file that the map names: the map is of another build, "
+                        "or the linker made them for a pointer to a function")
     foreign = [piece for piece in pieces if not allowed(piece)]
     called = {piece: calls_into(elf, piece) for piece in foreign}
     # What only another helper needs goes when that one goes; a piece that nothing calls is told if there is no other.
@@ -115,6 +116,19 @@ def advice(helpers: str, where: str) -> str:
             if pattern.search(text):
                 return words
     return "write it without the library"
+
+
+def divisions(elf: Elf, pieces: list[Piece]) -> list[str]:
+    """A line for every function of ours with a division that C's / or % made, not a built-in: nobody has proved its operands' ranges."""
+    own = [piece for piece in pieces if is_own(piece) and ".text" in piece.section]
+    found = {elf.function_at(address) for piece in own for address in range(piece.start, piece.end, 2) if divides_in_c(elf.words.get(address, 0))}
+    return [f"{name}() divides by a variable with / or %: use qm_divud() or __builtin_divsd() with a proven range, or multiply by a constant"
+            for name in sorted(found)]
+
+
+def divides_in_c(word: int) -> bool:
+    """DIVF, DIV.S and DIV.U of 16 bits by 16; the built-ins divide 32 bits by 16."""
+    return word >> 16 == 0xD9 or word >> 16 == 0xD8 and not word & 0x40
 
 
 def calls_into(elf: Elf, piece: Piece) -> dict[int, int]:

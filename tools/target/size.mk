@@ -5,4 +5,4 @@ size: $$X/foc33.elf ## flash, RAM and stack by module and function, the note's f
 	@$(python) -m tools.target.size $< --out $X --objdump $(call quoted,$(xc16)objdump) \
 	    --compile $(call quoted,$(filter-out -Werror,$(target_compile))) \
 	    --link $(call quoted,$(target_link) -o {elf} {objects} -Wl$(comma)-Map={map}$(comma)$(target_link_options)) \
-	    $(if $(DEFINES)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
+	    $(if $(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
