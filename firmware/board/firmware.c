@@ -15,7 +15,6 @@ panel_t board_panel;
 static uint16_t last_ms_tick;     /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;  /* drive ticks at the last check */
 static uint16_t silent_ms;        /* timer 1 milliseconds without a control interrupt */
-static uint16_t clock_failed;     /* kept: on a wrong clock nothing may run, whatever the user presses */
 
 void firmware_init(void)
 {
@@ -28,7 +27,7 @@ void firmware_init(void)
     silent_ms = 0;
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
-    clock_failed = clock_init();
+    board_clock_failed = clock_init();
     panel_init(&board_panel);
     drive_init(&board_drive, &board_params);
     status_init();
@@ -36,7 +35,7 @@ void firmware_init(void)
     uart_init();
     timer_init();
     pwm_init();
-    if (clock_failed) {
+    if (board_clock_failed) {
         drive_raise(&board_drive, FAULT_CLOCK);
     } else if (kept != FAULT_NONE) {
         drive_raise(&board_drive, kept);
@@ -65,7 +64,7 @@ static void firmware_watch_interrupt(void)
 QM_INLINE void firmware_supervise(void)
 {
     firmware_watch_interrupt();
-    if (clock_failed) {
+    if (board_clock_failed) {
         drive_raise(&board_drive, FAULT_CLOCK);
     }
     reset_keep(board_drive.fault);

@@ -10,6 +10,8 @@
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
 BOARD_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
 
+volatile uint16_t board_clock_failed;
+
 void BOARD_ISR _ADC1Interrupt(void);
 void BOARD_ISR _FLTA1Interrupt(void);
 void BOARD_ISR _OscillatorFail(void);
@@ -71,6 +73,7 @@ static void board_trap(drive_fault_t fault)
 
 void BOARD_ISR _OscillatorFail(void)
 {
+    board_clock_failed = 1;
     board_trap(FAULT_CLOCK);
     INTCON1bits.OSCFAIL = 0;
 }

@@ -23,8 +23,11 @@ extern drive_t board_drive;
 /** Buttons, potentiometer, lights. */
 extern panel_t board_panel;
 
+/** Not 0 from a failure of the clock to the next reset: on a wrong clock nothing may run, whatever the user presses. */
+extern volatile uint16_t board_clock_failed;
+
 /** All that main does before its loop: clock, pins, PWM with its outputs off, ADC, timer, UART, interrupts.
- *  A clock that does not come up raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
+ *  A clock that does not come up, or fails later, raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
 void firmware_init(void);
 
 /** One pass of the loop. */

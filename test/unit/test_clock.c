@@ -46,6 +46,7 @@ void tearDown(void)
 
 void test_pll_makes_80_MHz_of_8(void)
 {
+    OSCTUN = 0x003F;
     (void)clock_init();
     TEST_ASSERT_EQUAL_UINT16(38, PLLFBD);       /* times 40 */
     TEST_ASSERT_EQUAL_HEX16(0x0000, CLKDIV);    /* by 2 before and 2 after, no doze */

@@ -123,6 +123,13 @@ void test_fault_that_was_kept_over_a_watchdog_reset_is_there_at_the_start(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, board_drive.fault);
 }
 
+void test_watchdog_starts_afresh_when_the_start_is_done(void)
+{
+    uint16_t before = host_watchdog_serves;
+    expect_start(0);
+    TEST_ASSERT_EQUAL_UINT16(before + 1u, host_watchdog_serves);
+}
+
 void test_watchdog_is_served_only_while_background_and_interrupt_are_alive(void)
 {
     uint16_t served;
@@ -136,6 +143,18 @@ void test_watchdog_is_served_only_while_background_and_interrupt_are_alive(void)
     pass(0); /* the background alone */
     pass(0);
     TEST_ASSERT_EQUAL_UINT16(served + 4u, host_watchdog_serves);
+}
+
+void test_clock_that_fails_later_cannot_be_cleared_either(void)
+{
+    expect_start(0);
+    healthy_ms(1);
+    board_clock_failed = 1; /* as the trap says */
+    board_drive.state = (uint16_t)DRIVE_STOPPED;
+    board_drive.command.run = 1;
+    pass(0);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
 }
 
 void test_healthy_restart_forgets_a_failed_clock(void)
@@ -281,6 +300,14 @@ void test_status_line_goes_out_twice_a_second_a_character_a_pass(void)
 
 /* ---- supervision ---- */
 
+static uint32_t times_off;
+
+static void count_off(int calls)
+{
+    (void)calls;
+    times_off++;
+}
+
 void test_missing_control_interrupt_switches_off_after_two_milliseconds(void)
 {
     expect_start(0);
@@ -315,6 +342,20 @@ void test_outputs_are_held_off_while_the_interrupt_stays_away(void)
         pwm_outputs_off_Expect();
         firmware_background();
     }
+}
+
+void test_outputs_are_held_off_for_ever_while_the_interrupt_stays_away(void)
+{
+    uint32_t n;
+    expect_start(0);
+    pass(1);
+    pwm_outputs_off_Stub(count_off);
+    times_off = 0;
+    timer_ms_passed_IgnoreAndReturn(1);
+    for (n = 0; n < 70000u; n++) {
+        firmware_background();
+    }
+    TEST_ASSERT_EQUAL_UINT32(70000u, times_off);
 }
 
 void test_one_silent_millisecond_is_forgiven(void)

@@ -148,6 +148,9 @@ void test_each_duty_reaches_its_own_pair(void)
     duties_t expected;
     bring_to_lock();
     control_interrupts(300);
+    P1DC1 = 0xFFFFu;
+    P1DC2 = 0xFFFFu;
+    P1DC3 = 0xFFFFu;
     raw.v_bus = (int16_t)ADC1BUF3;
     ADC1BUF1 = (uint16_t)raw.i_a;
     ADC1BUF2 = (uint16_t)raw.i_b;
@@ -267,8 +270,11 @@ static void expect_trap(void (*trap)(void), drive_fault_t fault, uint16_t flags_
 {
     setUp();
     bring_to_lock();
+    reset_keep(FAULT_NONE);
     INTCON1 = 0x001E; /* all four causes */
     trap();
+    RCON = 0x0010u; /* the background does not come back: the watchdog's reset follows */
+    TEST_ASSERT_EQUAL_UINT16(fault, reset_take());
     TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
     TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
@@ -280,7 +286,9 @@ static void expect_trap(void (*trap)(void), drive_fault_t fault, uint16_t flags_
 
 void test_oscillator_failure_is_a_clock_fault(void)
 {
+    board_clock_failed = 0;
     expect_trap(_OscillatorFail, FAULT_CLOCK, 0x001C);
+    TEST_ASSERT_EQUAL_UINT16(1, board_clock_failed); /* no S2 makes the clock right again */
 }
 
 void test_address_error_is_a_trap_fault(void)

@@ -4,12 +4,12 @@
 #include <xc.h>
 
 /* Each write of the lock bit, and what the pin selection held then: only between unlock and lock does the chip take a write. */
-static uint16_t lock_writes, lock_bit[2], fault_pin_then[2];
+static uint16_t lock_writes, written[2], fault_pin_then[2];
 
 static void write_lock(uint16_t value)
 {
     if (lock_writes < 2u) {
-        lock_bit[lock_writes] = (value >> 6) & 1u;
+        written[lock_writes] = value & 0x00FFu;
         fault_pin_then[lock_writes] = RPINR12;
     }
     lock_writes++;
@@ -26,6 +26,8 @@ void setUp(void)
 {
     host_registers_reset();
     LATA = LATB = LATC = 0xFFFF;
+    TRISA = TRISB = TRISC = 0;
+    OSCCON = 0x3363; /* locked pin selection, running on crystal and PLL, a switch under way */
     lock_writes = 0;
     pins_init();
 }
@@ -68,9 +70,9 @@ void test_uart_is_on_RP19_and_RP20(void)
 void test_pin_selection_is_unlocked_written_and_locked_again(void)
 {
     TEST_ASSERT_EQUAL_UINT16(2, lock_writes);
-    TEST_ASSERT_EQUAL_UINT16(0, lock_bit[0]);
+    TEST_ASSERT_EQUAL_HEX16(0x0023, written[0]); /* the lock alone changes */
     TEST_ASSERT_EQUAL_HEX16(0x001F, fault_pin_then[0]); /* as after reset */
-    TEST_ASSERT_EQUAL_UINT16(1, lock_bit[1]);
+    TEST_ASSERT_EQUAL_HEX16(0x0062, written[1]);
     TEST_ASSERT_EQUAL_HEX16(0x0008, fault_pin_then[1]);
     TEST_ASSERT_EQUAL_UINT16(1, OSCCONbits.IOLOCK);
 }

@@ -4,11 +4,12 @@
 #include <xc.h>
 
 /* Every access to P1TCON is seen: what the other registers hold when the module is switched on is part of the contract. */
-static uint16_t accesses, override_then, dead_time_then, fault_input_then, pairs_then, first_period_then;
+static uint16_t accesses, time_base_then, override_then, dead_time_then, fault_input_then, pairs_then, first_period_then;
 
 static volatile uint16_t *watch_time_base(volatile uint16_t *time_base)
 {
     accesses++;
+    time_base_then = *time_base;
     override_then = P1OVDCON;
     dead_time_then = P1DTCON1;
     fault_input_then = P1FLTACON;
@@ -54,8 +55,10 @@ void test_init_leaves_all_outputs_off(void)
 void test_module_is_switched_on_last_with_its_outputs_off(void)
 {
     accesses = 0;
+    P1TCON = 0xFFFF;
     pwm_init();
     TEST_ASSERT_EQUAL_UINT16(2, accesses); /* off first, on at the end */
+    TEST_ASSERT_EQUAL_HEX16(0x0000, time_base_then);
     TEST_ASSERT_EQUAL_HEX16(0x0000, override_then);
     TEST_ASSERT_EQUAL_HEX16(0x0068, dead_time_then);
     TEST_ASSERT_EQUAL_HEX16(0x0087, fault_input_then);

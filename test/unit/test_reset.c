@@ -36,6 +36,8 @@ void test_power_up_starts_without_a_fault_and_without_an_old_trap(void)
     reset_keep(FAULT_STALL);
     TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0002u));
     TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0013u)); /* a watchdog flag beside power-up means nothing */
+    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0011u));
+    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0012u));
 }
 
 void test_cause_is_kept_for_the_reader_and_rcon_is_cleared_for_the_next_reset(void)
@@ -80,6 +82,8 @@ void test_what_ram_happens_to_hold_is_no_kept_fault(void)
     TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
     kept_fault = FAULT_STALL; /* a plausible code, the check word is not */
     TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
+    kept_inverse = 0xFFFFu;
+    TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
     reset_keep(FAULT_COUNT); /* a code that does not exist */
     TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
 }
@@ -95,7 +99,10 @@ void test_illegal_opcode_and_trap_conflict_are_traps(void)
 
 void test_watchdog_is_served_once_for_each_new_period_and_never_without_one(void)
 {
+    served_tick = 77;
     (void)start(POWER_UP);
+    reset_serve_watchdog(0); /* no interrupt has come yet */
+    TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
     reset_serve_watchdog(1);
     TEST_ASSERT_EQUAL_UINT16(1, host_watchdog_serves);
     reset_serve_watchdog(1);

@@ -1,7 +1,21 @@
 /* Timer 1: a millisecond of its own. */
 #include "hurst_params.h"
 
+#include <xc.h>
+
+/* Every access to T1CON is seen: the timer stands still while it is set up. */
+static uint16_t control_then, period_then;
+
+static volatile uint16_t *watch_control(volatile uint16_t *control)
+{
+    control_then = *control;
+    period_then = PR1;
+    return control;
+}
+
+#define T1CON (*watch_control(&T1CON))
 #include "firmware/board/timer.c"
+#undef T1CON
 
 #include "unity.h"
 
@@ -23,6 +37,12 @@ void test_period_is_one_millisecond_at_40_MIPS(void)
     TEST_ASSERT_EQUAL_UINT16(39999u, PR1);
     TEST_ASSERT_EQUAL_HEX16(0x8000, T1CON); /* on, internal clock, no prescaler */
     TEST_ASSERT_EQUAL_UINT16(0, TMR1);
+}
+
+void test_is_switched_on_last(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0x0000, control_then);
+    TEST_ASSERT_EQUAL_UINT16(39999u, period_then);
 }
 
 void test_runs_without_an_interrupt(void)
