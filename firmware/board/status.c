@@ -74,7 +74,7 @@ static uint16_t put_line(void)
 }
 #endif
 
-/** The first line: "reset POR BOR". */
+/** The first line: "reset BOR POR". */
 static uint16_t put_reset(void)
 {
     uint16_t at = put_text(0, "reset");

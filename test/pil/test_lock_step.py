@@ -11,7 +11,7 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from chip import ROOT, library, pass_ms # noqa: E402
+from chip import REGISTERS, ROOT, library, pass_ms # noqa: E402
 from tools.foc33.board import BoardError # noqa: E402
 from tools.foc33.errors import UserError # noqa: E402
 from tools.foc33.pil import PilBoard # noqa: E402
@@ -135,6 +135,71 @@ class LockStep(unittest.TestCase):
         self.assertNotEqual(0, self.chip.get("fw.fault"))
         self.assertEqual("", self.chip.difference())
         self.assertEqual(0, self.chip.get("pwm.outputs_on"))
+
+
+@unittest.skipUnless(XC16, "xc16-gcc is not installed")
+class Resets(unittest.TestCase):
+    """The image when something in the chip goes wrong: outputs off, the watchdog's reset, and a cause that outlives it."""
+
+    T3, AD1, STKERR = 1 << 8, 1 << 13, 1 << 2
+
+    def setUp(self) -> None:
+        subprocess.run(["make", "-s", "-C", str(ROOT), "firmware"], check=True, env={k: v for k, v in os.environ.items() if not k.startswith("MAKE")})
+        self.chip = PilBoard(library, IMAGE)
+        self.addCleanup(self.chip.close)
+        self.core = library.c
+        self.core.vb_iss_core.restype, self.core.vb_iss_core.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+        self.core.iss_poke.restype, self.core.iss_poke.argtypes = None, [ctypes.c_void_p, ctypes.c_uint16, ctypes.c_uint16]
+        self.core.iss_irq_changed.restype, self.core.iss_irq_changed.argtypes = None, [ctypes.c_void_p]
+        self.chip.lock_step(False)
+        start(self.chip)
+        self.assertNotEqual(0, self.chip.get("pwm.outputs_on"))
+        self.assertEqual(0, self.chip.get("cpu.resets"))
+        self.chip.uart_take()
+
+    def change(self, register: str, clear: int, put: int = 0) -> None:
+        address, core = REGISTERS[register], self.core.vb_iss_core(self.chip._vb)
+        self.core.iss_poke(core, address, self.chip.peek(address) & ~clear | put)
+        self.core.iss_irq_changed(core)
+
+    def off_within_ms(self, ms: float) -> None:
+        """From here on until the reset and beyond it no output conducts."""
+        pass_ms(self.chip, ms)
+        for _ in range(int(60 * 20)):
+            self.assertEqual(0, self.chip.get("pwm.outputs_on"))
+            self.chip.run(1)
+
+    def came_back(self, fault: int) -> None:
+        """After one reset by the watchdog, with the fault kept."""
+        pass_ms(self.chip, 700)
+        self.assertEqual(1, self.chip.get("cpu.resets"))
+        self.assertRegex(self.chip.uart_take(), rf"reset WDTO\r\n(.*\n)*state 7 fault {fault} speed")
+        self.assertEqual(0, self.chip.get("pwm.outputs_on"))
+
+    def test_a_control_interrupt_that_stays_away(self) -> None:
+        self.change("iec0", self.AD1)
+        self.off_within_ms(3.1)
+        self.came_back(10) # ADC_LOST
+
+    def test_an_interrupt_that_nobody_expects_and_nobody_ends(self) -> None:
+        self.change("ifs0", 0, self.T3)
+        self.change("iec0", 0, self.T3)
+        self.off_within_ms(0.1)
+        self.came_back(12) # TRAP
+
+    def test_a_stack_that_overflows(self) -> None:
+        self.change("splim", 0xFFFF, self.chip.peek(REGISTERS["wreg15"]) - 4)
+        self.off_within_ms(0.1)
+        pass_ms(self.chip, 700)
+        self.assertEqual(12, self.chip.get("fw.fault"))
+        self.assertEqual(self.STKERR, self.chip.variable("board_trap_intcon1", 1)[0] & self.STKERR)
+
+    def test_power_on_forgets_it_all(self) -> None:
+        self.change("iec0", self.AD1)
+        pass_ms(self.chip, 40)
+        self.chip.power_up()
+        pass_ms(self.chip, 700)
+        self.assertRegex(self.chip.uart_take(), r"reset BOR POR\r\n(.*\n)*state 1 fault 0 speed")
 
 
 if __name__ == "__main__":

@@ -83,6 +83,24 @@ def there_are_no_stray_files_in_the_firmware() -> None:
     assert not stray, stray
 
 
+def the_watchdog_is_served_in_three_places() -> None:
+    served = {path: text.count("ClrWdt()") for path, text in sources().items() if "ClrWdt()" in text}
+    # a bounded wait and the end of the start; later only reset_serve_watchdog()
+    assert served == {"firmware/board/clock.c": 1, "firmware/board/firmware.c": 1, "firmware/board/reset.c": 1}, served
+
+
+def there_is_no_inline_assembly() -> None:
+    found = [path for path, text in sources().items() if re.search(r"\b_*asm_*\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))]
+    assert not found, found
+
+
+def what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
+    text = sources()["firmware/board/reset.c"]
+    assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text
+    kept = re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", text, re.MULTILINE)
+    assert kept == ["board_trap_intcon1", "kept_fault", "kept_inverse"], kept
+
+
 FUSES = {
     "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FWDTEN": "ON",
     "WINDIS": "OFF", "WDTPRE": "PR32", "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON",
@@ -101,4 +119,5 @@ def configuration_words_are_those_of_the_board() -> None:
 run([only_the_board_room_sees_the_device, control_includes_only_control, drive_includes_only_control_drive_and_the_parameters,
      board_includes_only_the_three_rooms_and_the_device, only_params_h_reads_userparams_h, control_and_drive_name_no_register_and_no_motor,
      every_header_compiles_alone, every_header_has_its_own_guard, every_file_begins_with_a_sentence_about_itself,
-     there_are_no_stray_files_in_the_firmware, configuration_words_are_those_of_the_board])
+     there_are_no_stray_files_in_the_firmware, the_watchdog_is_served_in_three_places, there_is_no_inline_assembly,
+     what_outlives_a_reset_is_left_alone_by_the_start_up_code, configuration_words_are_those_of_the_board])

@@ -311,6 +311,21 @@ void test_unexpected_interrupt_is_a_trap_fault(void)
     expect_trap(_DefaultInterrupt, FAULT_TRAP, 0x001E);
 }
 
+void test_no_interrupt_and_no_trap_serves_the_watchdog(void)
+{
+    control_interrupts(1024);
+    drive_start(&board_drive, &board_params, 1);
+    control_interrupts(300);
+    _FLTA1Interrupt();
+    _OscillatorFail();
+    _AddressError();
+    _StackError();
+    _MathError();
+    _DefaultInterrupt();
+    control_interrupts(100);
+    TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
+}
+
 void test_trap_inside_the_control_interrupt_is_off_within_one_period(void)
 {
     bring_to_lock();

@@ -18,9 +18,21 @@ static volatile uint16_t *watch_time_base(volatile uint16_t *time_base)
     return time_base;
 }
 
+/* So is the moment when the pairs take their pins. */
+static uint16_t override_at_pairs, running_at_pairs;
+
+static volatile uint16_t *watch_pairs(volatile uint16_t *pairs)
+{
+    override_at_pairs = P1OVDCON;
+    running_at_pairs = P1TCON;
+    return pairs;
+}
+
 #define P1TCON (*watch_time_base(&P1TCON))
+#define PWM1CON1 (*watch_pairs(&PWM1CON1))
 #include "firmware/board/pwm.c"
 #undef P1TCON
+#undef PWM1CON1
 
 #include "unity.h"
 
@@ -64,6 +76,14 @@ void test_module_is_switched_on_last_with_its_outputs_off(void)
     TEST_ASSERT_EQUAL_HEX16(0x0087, fault_input_then);
     TEST_ASSERT_EQUAL_HEX16(0x0077, pairs_then);
     TEST_ASSERT_EQUAL_UINT16(999, first_period_then);
+}
+
+void test_pairs_take_their_pins_with_the_override_off_and_the_module_at_rest(void)
+{
+    P1OVDCON = 0x3F15;
+    pwm_init();
+    TEST_ASSERT_EQUAL_HEX16(0x0000, override_at_pairs);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, running_at_pairs);
 }
 
 void test_time_base_is_on_centre_aligned_at_20_kHz(void)

@@ -59,6 +59,14 @@ void test_a_millisecond_is_reported_once(void)
     TEST_ASSERT_EQUAL_UINT16(0, timer_ms_passed());
 }
 
+void test_watchdog_is_not_served_by_the_timer(void)
+{
+    IFS0bits.T1IF = 1;
+    (void)timer_ms_passed();
+    (void)timer_ms_passed();
+    TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
+}
+
 void test_other_flags_are_left_alone(void)
 {
     IFS0 = 0xFFFF;
