@@ -7,6 +7,7 @@
 
 #define SETTLE_PERIODS PARAM_PERIODS(0.4F)  /* ten time constants of the slow current controller */
 #define SLOW_LOOP_RAD_S 25.0F               /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
+#define LEAST_CURRENT_Q13 64                /* of the division by a current: above the factor 25 rad/s LOOPTIME 2^14, which is below 58 */
 #define SLOW_SHIFT 14u
 #define LOOP_RAD_S (2.0F * PARAM_PI * 200.0F) /* current loops while turning */
 #define LOOP_SHIFT 10u
@@ -182,7 +183,9 @@ static void rise_done(drive_t *d, const drive_params_t *p)
     if (i_q13 < (id->rise_q13 >> 1)) {
         i_q13 = (int16_t)(id->rise_q13 >> 1); /* a current that breaks down now is found in the next step */
     }
-    /* v 20 / 65536 is far below the smallest current that can be asked for */
+    if (i_q13 < LEAST_CURRENT_Q13) {
+        i_q13 = LEAST_CURRENT_Q13;
+    }
     ki = qm_divud(qm_muluu((uint16_t)v_q14, (uint16_t)(SLOW_LOOP_RAD_S * PARAM_F(LOOPTIME_SEC) * 16384.0F + 0.5F)), (uint16_t)i_q13);
     id->ki_d = (int16_t)((ki > 32767u) ? 32767u : (ki == 0u) ? 1u : ki);
     id->mode = (uint16_t)IDENTIFY_CURRENT;

@@ -152,6 +152,36 @@ void test_speed_controller_is_preset_once_and_before_its_first_step(void)
     TEST_ASSERT_EQUAL_INT32(0, drive.control.pi_speed.sum);
 }
 
+void test_stop_right_after_the_hand_over_goes_on_from_its_q_current_too(void)
+{
+    int16_t direction;
+    for (direction = -1; direction <= 1; direction = (int16_t)(direction + 2)) {
+        setUp();
+        drive.slots = 50;
+        drive.direction = direction;
+        drive.estimator.omega_filtered_q16 = (int32_t)direction * 4800 * 65536;
+        drive_hand_over(&drive, &params);
+        drive.state = (uint16_t)DRIVE_STOPPING; /* the very next period */
+        drive.ticks = 7;
+        drive_slow(&drive, &params, 0);
+        TEST_ASSERT_EQUAL_INT16(drive.control.ref_q13.q, pi_tick(&drive.control.pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120));
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
+    }
+}
+
+void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(void)
+{
+    static const drive_state_t states[] = { DRIVE_STOPPED, DRIVE_FAULT, DRIVE_LOCK };
+    uint16_t n;
+    for (n = 0; n < 3u; n++) {
+        drive.slots = 50;
+        drive.state = (uint16_t)states[n];
+        drive.ticks = 1;
+        drive_slow(&drive, &params, 0);
+        TEST_ASSERT_EQUAL_UINT16(states[n], drive.state);
+    }
+}
+
 void test_speed_controller_starts_from_the_q_current_in_both_directions(void)
 {
     hand_over(20000, 15000, 0, 0, 1); /* reference 5000, estimate 4800 */

@@ -142,6 +142,16 @@ void test_slow_controller_follows_from_voltage_and_current_at_the_end_of_RISE(vo
     TEST_ASSERT_EQUAL_INT16(1, id->ki_d); /* it moves, however small R is */
 }
 
+void test_slow_controller_of_a_tiny_current_stays_inside_the_division(void)
+{
+    id->rise_q13 = 2;
+    drive.control.v_q14.d = 8000;
+    drive.control.i_q13.d = 1; /* 160000 does not fit the quotient */
+    id->ready = 1;
+    (void)identify_background(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(2500, id->ki_d); /* as for 64 counts */
+}
+
 void test_resistance_out_of_range_is_named(void)
 {
     static const int32_t second[] = { 373, 400, 372 }; /* none, negative, 8 mohm */
