@@ -1,6 +1,9 @@
 """The target image on the virtual board against the host's firmware. Needs XC16: the image is what `make firmware` builds."""
 
+import contextlib
 import ctypes
+import io
+import json
 import os
 import shutil
 import struct
@@ -11,7 +14,8 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from chip import REGISTERS, ROOT, library, pass_ms # noqa: E402
+from chip import RAM, REGISTERS, ROOT, STOP, image, library, pass_ms # noqa: E402
+from tools.foc33 import pil_command # noqa: E402
 from tools.foc33.board import BoardError # noqa: E402
 from tools.foc33.errors import UserError # noqa: E402
 from tools.foc33.pil import PilBoard # noqa: E402
@@ -55,6 +59,63 @@ class Refused(unittest.TestCase):
                     PilBoard(library, path).close()
                 self.assertIn(name, str(caught.exception))
                 self.assertNotIn("\n", str(caught.exception))
+
+
+class HexAlone(unittest.TestCase):
+    """A program without names, through the whole of `make pil`."""
+
+    SCENARIO = """
+title = "a moment"
+motor = "hurst_dmb0224c10002"
+board = "mclv"
+duration_s = 0.02
+[[measure]]
+name = "all"
+from_s = 0.0
+to_s = 0.02
+[[expect]]
+kind = "measure"
+measure = "all"
+value = "speed_max_rpm"
+max = 1
+[[expect]]
+kind = "measure"
+measure = "all"
+value = "angle_error_rms_deg"
+max = 5
+[[expect]]
+kind = "hand_over"
+within_s = 0.01
+[[expect]]
+kind = "state"
+name = "CLOSED"
+[[expect]]
+kind = "no_fault"
+[[expect]]
+kind = "no_warnings"
+"""
+
+    def run_program(self, program: str) -> tuple[int, str, dict]:
+        with tempfile.TemporaryDirectory() as folder:
+            scenario, out = Path(folder) / "short.toml", Path(folder) / "out"
+            scenario.write_text(self.SCENARIO, encoding="utf-8")
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
+                code = pil_command.main([str(scenario), "--image", str(image(program)), "--out", str(out), "--quiet"])
+            return code, printed.getvalue(), json.loads((out / "summary.json").read_text())
+
+    def test_it_runs_and_is_judged_by_what_the_plant_shows(self) -> None:
+        code, text, data = self.run_program(STOP)
+        self.assertEqual(0, code, text)
+        self.assertEqual(["all: speed_max_rpm", "no warnings of the board", "target = PC in every interrupt"],
+                         [row["row"] for row in data["expectations"]])
+        self.assertIn("a HEX file alone does not say", text)
+        self.assertEqual(["speed.png"], data["plots"])
+
+    def test_what_the_core_met_is_a_warning_with_its_address(self) -> None:
+        code, text, _ = self.run_program(f"mov {RAM + 6}, w0\n" + STOP)
+        self.assertEqual(1, code)
+        self.assertIn("warning of the board: RAM read before it was written, 0x0806, at 0x000200", text)
 
 
 @unittest.skipUnless(XC16, "xc16-gcc is not installed")

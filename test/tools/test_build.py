@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import os
+import subprocess
 import tempfile
 import unittest
 from pathlib import Path
@@ -42,6 +43,14 @@ class Build(unittest.TestCase):
             path.chmod(0o755)
             with mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}"}):
                 self.assertEqual(len(list(pool.map(build.library, [["TURNS"]] * 3))), 3)
+
+    def test_the_image_s_board_and_the_pc_s_share_objects_and_flags(self):
+        def flags(target: str) -> str:
+            environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+            done = subprocess.run(["make", "-n", "-C", str(places.ROOT), target], env=environment, capture_output=True, text=True, check=True)
+            return next(line for line in done.stdout.splitlines() if "build/host/flags" in line)
+        self.assertEqual(flags("build/host/flags"), flags("build/host/tools/pil/pil.o"))
+        self.assertEqual(flags("build/host/flags"), flags("build/host/tools/iss33f/core.o"))
 
     def test_a_tuned_header_is_built_under_its_motor_s_name(self):
         library, call = self.make("echo \"$@\" > $RESULT", userparams=places.TUNED / "some_motor")

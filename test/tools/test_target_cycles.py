@@ -14,10 +14,12 @@ import numpy as np
 import support
 from test_target_build import NEEDED, make, our_lines, shutil
 
-from tools.foc33 import pil, pil_command
-from tools.foc33.errors import UserError
-from tools.target import cycles
-from tools.target.profile import Counts, Profile
+sys.path.append(str(Path(__file__).resolve().parents[1] / "fuzz"))
+from sample_image import hex_text # noqa: E402
+from tools.foc33 import pil, pil_command # noqa: E402
+from tools.foc33.errors import UserError # noqa: E402
+from tools.target import cycles # noqa: E402
+from tools.target.profile import Counts, Profile # noqa: E402
 
 
 def found(name: str, without: list[int], weakening: list[int], latency: tuple[int, ...] = (700,), stack: int = 100, differences: int = 0) -> cycles.Found:
@@ -142,13 +144,19 @@ class Output(unittest.TestCase):
     def test_comparison_names_the_first_difference(self):
         counted = pil.Cycles(*[0.0] * len(pil.Cycles.__dataclass_fields__))
         run = support.run()
-        elf = Path("foc33.elf")
-        good = pil_command.comparison(pil.PilRun(run, counted, 100, 0, ""), elf)
-        bad = pil_command.comparison(pil.PilRun(run, counted, 100, 4, "tick 7 (0.1 s), P1DC2: target 1, host 2"), elf)
+        good = pil_command.comparison(pil.PilRun(run, counted, 100, 0, ""))
+        bad = pil_command.comparison(pil.PilRun(run, counted, 100, 4, "tick 7 (0.1 s), P1DC2: target 1, host 2"))
         self.assertTrue(good.ok)
         self.assertFalse(bad.ok)
-        self.assertIn("a HEX file", pil_command.comparison(pil.PilRun(run, counted, 0, 0, ""), Path("foc33.HEX")).got)
+        self.assertIn("a HEX file", pil_command.comparison(pil.PilRun(run, counted, 0, 0, "", has_names=False)).got)
         self.assertIn("100 interrupts, 4 differ; first: tick 7 (0.1 s), P1DC2: target 1, host 2", bad.got)
+
+    def test_an_image_that_never_enters_its_interrupt_does_not_agree(self):
+        counted = pil.Cycles(*[0.0] * len(pil.Cycles.__dataclass_fields__))
+        run = support.run()
+        self.assertFalse(pil_command.comparison(pil.PilRun(run, counted, 0, 0, "")).ok)
+        run.scenario.defines.append("IDENTIFY")
+        self.assertTrue(pil_command.comparison(pil.PilRun(run, counted, 0, 0, "")).ok)
 
 
 class ForTheUser(unittest.TestCase):
@@ -195,6 +203,25 @@ class ForTheUser(unittest.TestCase):
         code, lines = self.module("cycles", "--image", str(path))
         self.assertEqual((code, len(lines)), (2, 1))
         self.assertIn(str(path), lines[0])
+
+    def test_an_image_without_names_cannot_be_measured(self):
+        path = self.folder / "alone.hex"
+        path.write_text(hex_text(), encoding="utf-8")
+        code, lines = self.module("cycles", "--image", str(path))
+        self.assertEqual((code, len(lines)), (2, 1))
+        self.assertIn("name the ELF file", lines[0])
+
+    def test_a_file_of_gigabytes_is_refused_at_once(self):
+        path = self.folder / "huge.elf"
+        with path.open("wb") as file:
+            file.write(b"\x7fELF")
+            file.truncate(5 << 30)
+        for name in ("cycles", "pil"):
+            with self.subTest(name):
+                code, lines = self.module(name, "--image", str(path), *(["smoke", "--out", str(self.folder / "out")] if name == "pil" else []))
+                self.assertEqual((code, len(lines)), (2, 1))
+                self.assertIn("cannot be read", lines[0])
+        self.assertFalse((self.folder / "out").exists())
 
     def test_an_unknown_scenario_is_refused(self):
         path = self.folder / "x.elf"

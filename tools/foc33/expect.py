@@ -89,6 +89,10 @@ class Expectation:
         """Names that the firmware must know: "fault" or "state" and the name."""
         return {}
 
+    def reads_firmware(self) -> bool:
+        """Whether it looks into the firmware's variables, which a HEX file does not tell."""
+        return bool(self.names() or self.variables() or any(name.startswith("fw.") for name in self.signals()))
+
 
 def _window(section: Section, duration_s: float) -> tuple[float, float]:
     from_s = section.number("from_s", 0.0, 0.0, duration_s)
@@ -116,6 +120,10 @@ class MeasureExpectation(Expectation):
             raise section.fail("value", f"'{measure}' has no speed error", "add reference_rpm to the measure")
         return cls(measure, value, Bounds.read(section))
 
+    def reads_firmware(self) -> bool:
+        from .run import MEASURED_BY_FIRMWARE
+        return self.value in MEASURED_BY_FIRMWARE
+
     def check(self, run: "Run") -> list[Outcome]:
         got = run.measures[self.measure][self.value]
         return [Outcome(f"{self.measure}: {self.value}", self.bounds.hold(got), _number(got), self.bounds.text())]
@@ -132,6 +140,9 @@ class HandOverExpectation(Expectation):
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "HandOverExpectation":
         return cls(section.integer("press", 1, 1), section.number("within_s", REQUIRED, 0.0),
                    section.number("overshoot_percent", None, 0.0), section.flag("no_reverse_motion", False))
+
+    def reads_firmware(self) -> bool:
+        return True
 
     def check(self, run: "Run") -> list[Outcome]:
         presses = run.press_times("S2")
@@ -357,6 +368,9 @@ class NoFaultExpectation(Expectation):
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoFaultExpectation":
         return cls(*_window(section, duration_s))
+
+    def reads_firmware(self) -> bool:
+        return True
 
     def check(self, run: "Run") -> list[Outcome]:
         part = run.trace.part(self.from_s, self.to_s)

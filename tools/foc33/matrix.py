@@ -113,6 +113,8 @@ def speed_verdict(row: dict[str, Any], error_percent: float) -> str:
 
 def highest_rpm(run: Run) -> float | None:
     """The highest true speed in closed loop that lasted for HIGHEST_OVER_S, against either direction; None without closed loop."""
+    if "fw.state" not in run.trace:
+        return None
     closed = np.flatnonzero(run.trace.column("fw.state") == run.state_number("CLOSED"))
     rows = max(1, round(HIGHEST_OVER_S / run.trace.period_s)) if len(run.trace) > 1 else 1
     if len(closed) < rows:

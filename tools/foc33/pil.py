@@ -4,6 +4,7 @@
 """
 
 import ctypes
+import dataclasses
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from .errors import UserError
 from .run import Run
 
 ERROR_BYTES = 400
+FIRMWARE = "fw."
+"""What begins so is read from the firmware's variables."""
 
 
 class PilLibrary(Library):
@@ -25,7 +28,8 @@ class PilLibrary(Library):
         board, text, out = ctypes.c_void_p, ctypes.c_char_p, ctypes.POINTER
         words, number = out(ctypes.c_int16), out(ctypes.c_double)
         for name, result, arguments in (
-                ("vb_create_iss", board, [text, text, ctypes.c_size_t]), ("vb_iss_difference", text, [board]),
+                ("vb_create_iss", board, [text, text, ctypes.c_size_t]), ("vb_iss_has_names", ctypes.c_int, [board]),
+                ("vb_iss_difference", text, [board]),
                 ("vb_iss_lock_step", None, [board, ctypes.c_int]), ("vb_iss_peek", ctypes.c_int, [board, ctypes.c_uint]),
                 ("vb_iss_read", ctypes.c_int, [board, text, words, ctypes.c_uint]),
                 ("vb_iss_write", ctypes.c_int, [board, text, words, ctypes.c_uint]),
@@ -52,6 +56,11 @@ class PilBoard(Board):
         self._vb = ctypes.c_void_p(self._c.vb_create_iss(str(image).encode(), error, ERROR_BYTES))
         if not self._vb:
             raise UserError(error.value.decode(errors="replace"))
+
+    @property
+    def has_names(self) -> bool:
+        """Whether the image says where the drive's variables are: without them no signals "fw.*" and no comparison."""
+        return bool(self._c.vb_iss_has_names(self._vb))
 
     def lock_step(self, on: bool) -> None:
         """Compare with the host's firmware (the default) or not, from the next power-up on."""
@@ -129,6 +138,8 @@ class PilRun:
     differences: int
     first_difference: str
     """tick, signal and values; "" if target and host agreed in all ticks"""
+    has_names: bool = True
+    """whether the image said where the drive's variables are"""
 
     @property
     def instructions_per_second(self) -> float:
@@ -136,14 +147,29 @@ class PilRun:
         return self.cycles.instructions / self.run.wall_s if self.run.wall_s > 0.0 else 0.0
 
 
+def check_image(pil: PilLibrary, image: Path) -> bool:
+    """Whether the image has names; a damaged or foreign one is a UserError before anything else looks at it."""
+    board = PilBoard(pil, image)
+    try:
+        return board.has_names
+    finally:
+        board.close()
+
+
+def without_names(job: simulate.Job) -> simulate.Job:
+    """The job for an image that does not say where its variables are: what the plant and the registers tell."""
+    return dataclasses.replace(job, signals=[name for name in job.signals if not name.startswith(FIRMWARE)], variables={})
+
+
 def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilRun:
     """Run a job, prepared with a library() of the same defines, on an image; one a process."""
     pil = PilLibrary(job.library)
     board = PilBoard(pil, image)
     try:
-        result = simulate.simulate_on(job, pil, board, report)
+        result = simulate.simulate_on(job if board.has_names else without_names(job), pil, board, report)
         cycles = Cycles(**{name: board.get(f"cpu.{name}") for name in Cycles.__dataclass_fields__})
-        return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference())
+        return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference(),
+                      board.has_names)
     except BoardError as error:
         raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
     finally:

@@ -24,6 +24,8 @@ plt.rcParams.update({"figure.figsize": (10, 5), "figure.dpi": 100, "axes.grid": 
 def write_all(run: Run, folder: Path) -> list[str]:
     """Every plot that the run has data for; returns the file names."""
     thin = run.trace.thinned(STEP)
+    if "fw.state" not in thin: # a target image without names
+        return [_write(folder, "speed", run, thin, _true_speed)]
     files = []
     for name, draw in (("speed", _speed), ("currents", _currents), ("voltages", _voltages), ("angle_error", _angle_error)):
         files.append(_write(folder, name, run, thin, draw))
@@ -69,6 +71,11 @@ def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
     for item in run.hand_overs():
         axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":",
                      label=f"closed loop, {item.after_s2_s:.2f} s after S2")
+    _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
+
+
+def _true_speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"})})
     _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
 
 

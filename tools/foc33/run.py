@@ -59,12 +59,16 @@ class Run:
     def fault_changes(self) -> list[tuple[int, float, str]]:
         """(row, time, name) whenever the fault code changes, the start included."""
         return [(row, float(self.trace.time_s[row]), self.faults.get(int(code), f"code {int(code)}"))
-                for row, code in self.trace.changes("fw.fault")]
+                for row, code in self._firmware_changes("fw.fault")]
+
+    def _firmware_changes(self, name: str) -> list[tuple[int, float]]:
+        """A target image without names leaves no such signals behind."""
+        return self.trace.changes(name) if name in self.trace else []
 
     def state_changes(self) -> list[tuple[int, float, str]]:
         """(row, time, name) whenever the drive's state changes, the start included."""
         return [(row, float(self.trace.time_s[row]), self.states.get(int(code), f"state {int(code)}"))
-                for row, code in self.trace.changes("fw.state")]
+                for row, code in self._firmware_changes("fw.state")]
 
     def press_times(self, button: str) -> list[float]:
         return [event.at_s for event in self.scenario.events if event.kind == "press" and event.button == button]
@@ -114,6 +118,9 @@ MEASURE_VALUES = {
     "current_at_limit_percent": "share of time with the q current reference at its limit", "bus_v": "mean bus voltage",
     "bus_max_v": "highest bus voltage"}
 """What a row of the table can hold, with the meaning."""
+MEASURED_BY_FIRMWARE = {"estimated_rpm", "estimate_error_percent", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_deg", "voltage_v",
+                        "voltage_percent", "voltage_at_limit_percent", "current_at_limit_percent"}
+"""Those that need the firmware's variables; the others are the plant's."""
 
 
 def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:

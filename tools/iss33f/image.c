@@ -1,6 +1,7 @@
 /* The image of a chip's memory: contents, checks that do not depend on the file's kind, and look-up of names. */
 #include "image.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -135,7 +136,8 @@ int image_load(image_t *image, const char *path)
     image_clear(image);
     FILE *file = fopen(path, "rb");
     if (file == NULL) {
-        return image_fail(image, "no such file, %s: build it with make firmware", path);
+        return errno == ENOENT ? image_fail(image, "no such file, %s: build it with make firmware", path)
+                               : image_fail(image, "the file cannot be opened (%s), %s: see that it can be read", strerror(errno), path);
     }
     size_t size = 0;
     uint8_t *data = read_file(image, file, path, &size);

@@ -226,7 +226,7 @@ static int copy_symbols(elf_t *elf, const section_t *table)
     }
     section_t strings = section_of(elf, table->link);
     if (!within(elf, strings.offset, strings.size, 1) || strings.size == 0) {
-        return truncated(elf, "the symbols' names");
+        return truncated(elf, "the table of symbol names");
     }
     image->symbols = calloc(count, sizeof *image->symbols);
     image->names = malloc(strings.size);

@@ -490,6 +490,11 @@ iss_t *vb_iss_core(vb_t *vb)
     return soc_core(pil_of(vb)->soc);
 }
 
+int vb_iss_has_names(const vb_t *vb)
+{
+    return pil_of(vb)->signals ? 1 : 0;
+}
+
 const char *vb_iss_difference(const vb_t *vb)
 {
     return pil_of(vb)->shadow.first;

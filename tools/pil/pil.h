@@ -15,6 +15,9 @@
  * globals: one such board per process. */
 vb_t *vb_create_iss(const char *path, char *error, size_t size);
 
+/* 1 if the image says where the drive's variables are: signals "fw.*" and the comparison; 0: a HEX file without its ELF file. */
+int vb_iss_has_names(const vb_t *vb);
+
 /* The core, for profiles and breakpoints. */
 iss_t *vb_iss_core(vb_t *vb);
 

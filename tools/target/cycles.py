@@ -351,8 +351,11 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
 
 
 def measure(image: Path, userparams: Path | None, names: tuple[str, ...], limits: Limits | None, quiet: bool) -> Report:
-    code, source = program.read_elf(image), attribution.read(image)
     library = pil.library([], userparams)
+    if not pil.check_image(library, image):
+        raise UserError("the image does not say where functions and variables are", str(image), "name the ELF file that the HEX file was made from")
+    elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
+    code, source = program.read_elf(elf), attribution.read(elf)
     jobs = jobs_of(names, library)
     with Progress("cycles", sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         found = merged(workers.run_all(jobs, functools.partial(work, image), progress))
