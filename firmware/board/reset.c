@@ -27,18 +27,19 @@ void reset_keep(uint16_t fault)
 drive_fault_t reset_take(void)
 {
     uint16_t cause = RCON;
-    uint16_t fault = kept_fault;
+    uint16_t fault;
 
     RCON = 0;
     board_reset_cause = cause;
     served_tick = 0;
     if (RESET_WAS(POR, cause) || RESET_WAS(BOR, cause)) {
         board_trap_intcon1 = 0;
-        return FAULT_NONE;
+        return FAULT_NONE; /* what is kept holds anything now: it is not even read */
     }
     if (!RESET_WAS(TRAPR, cause) && !RESET_WAS(IOPUWR, cause) && !RESET_WAS(WDTO, cause)) {
         return FAULT_NONE;
     }
+    fault = kept_fault;
     if (fault != (uint16_t)FAULT_NONE && fault < (uint16_t)FAULT_COUNT && (kept_inverse ^ fault) == 0xFFFFu) {
         return (drive_fault_t)fault;
     }

@@ -2,12 +2,14 @@
 
 import os
 import sys
+import tempfile
 import time
 import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from chip import FRC_FCY, PLL, RAM, REGISTERS, STOP, board, library, pass_ms, run # noqa: E402
+from chip import FRC_FCY, PLL, RAM, REGISTERS, STOP, PilBoard, asm33, board, library, pass_ms, run # noqa: E402
+from sample_image import Elf, Section # noqa: E402
 
 UART = """
     mov #0x743, w1
@@ -26,6 +28,38 @@ class Names(unittest.TestCase):
         import re
         host = set(re.findall(r"X\((\w+), 0x\w+\)", header))
         self.assertEqual(absent, {name for name in host if name.lower() not in REGISTERS})
+
+
+class Memory(unittest.TestCase):
+    """What an ELF file's names do for RAM that is read before anything has been written to it."""
+
+    PERSISTENT, NOBITS = 0x02000003, 8
+    PROGRAM = f"mov {RAM + 0x10}, w0; mov {RAM + 0x12}, w1; mov {RAM + 0x22}, w2; mov w0, {RAM}; mov w1, {RAM + 2}\n" + STOP
+
+    def chip(self) -> PilBoard:
+        words, _ = asm33.assemble(self.PROGRAM, 0x200, REGISTERS)
+        elf = Elf()
+        elf.sections = [Section(".reset", 0, [0x040200, 0]), Section(".text", 0x200, [words[pc] for pc in sorted(words)]),
+                        Section(".pbss", RAM + 0x10, [0], self.PERSISTENT, self.NOBITS), Section(".bss", RAM + 0x20, [0], 3, self.NOBITS)]
+        elf.symbols = [("_main", 0x200, 0, 0x12, 2), ("_kept", RAM + 0x10, 4, 0x11, 3), ("_array", RAM + 0x20, 4, 0x11, 4)]
+        path = Path(self.enterContext(tempfile.TemporaryDirectory())) / "x.elf"
+        path.write_bytes(elf.bytes())
+        result = PilBoard(library, path)
+        result.power_up()
+        pass_ms(result, 1)
+        return result
+
+    def test_persistent_variables_hold_something_and_are_no_mistake(self) -> None:
+        first, second = self.chip(), self.chip()
+        self.assertEqual([first.peek(RAM), first.peek(RAM + 2)], [second.peek(RAM), second.peek(RAM + 2)], "every run begins alike")
+        self.assertNotEqual(0, first.peek(RAM))
+        self.assertEqual(1, len(first.warnings()), first.warnings())
+
+    def test_any_other_is_told_with_address_and_names(self) -> None:
+        self.assertEqual(["RAM read before it was written, 0x0822 (array+2), at 0x000204 (main+4)"], self.chip().warnings())
+
+    def test_without_names_the_address_is_told(self) -> None:
+        self.assertEqual(["RAM read before it was written, 0x0822, at 0x000200"], run(f"mov {RAM + 0x22}, w2\n" + STOP, 1).warnings())
 
 
 class Clock(unittest.TestCase):

@@ -10,6 +10,8 @@ $(target_test_simulator): test/target/sim.c test/target/simulator.h $$(filter $$
 
 .PHONY: test-target
 test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## the unit tests of the control law compiled by XC16, in the simulator; results as on the PC [ONLY="test_pi ..."]
+	@$(if $(call chosen,$(target_tests)),:,echo foc33: no unit test of the control law, ONLY=$(call quoted,$(ONLY)): use \
+	    $(call quoted,$(sort $(notdir $(target_tests)))) >&2; exit 2)
 	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(target_tests)))
 	@mkdir -p $X/test; rm -f $X/test/liblaw.a; $(xc16)ar rcs $X/test/liblaw.a $(target_test_law)
 	@$(python) test/target/run.py --unity $(unity) --runners $T --host $T --out $X/test --library $X/test/liblaw.a \

@@ -168,6 +168,12 @@ class OnTheTarget(unittest.TestCase):
         self.assertEqual(suite.failures, [])
         self.assertGreater(len(suite.passed), 20)
 
+    def test_an_unknown_test_is_one_line(self):
+        environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+        done = subprocess.run(["make", "-s", "test-target", "ONLY=test_nothing"], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+        self.assertRegex(done.stderr, r"\Afoc33: no unit test of the control law, ONLY=test_nothing: use test_[^\n]*\nmake: [^\n]*\n\Z")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,4 +1,4 @@
-/* What the simulator takes for true although no source at hand confirms it; one line each, printed by `make cycles`. */
+/* What the simulator takes for true although no source at hand confirms it, or gives only as a range; one line each, printed by `make cycles`. */
 #ifndef FOC33_ISS33F_ASSUMPTIONS_H
 #define FOC33_ISS33F_ASSUMPTIONS_H
 
@@ -29,7 +29,14 @@
     X(CLR_CLEARS_SATURATION, 1, "CLR of an accumulator clears its SA or SB, not the other's", "dsp.c clear") \
     X(SAC_DROPS_GUARD, 1, "a left shift of SAC drops what goes beyond bit 39 before SATDW looks", "dsp.c shifted_acc") \
     X(WRITE_BACK_ROUNDS, 1, "the accumulator's write-back follows RND and SATDW", "dsp.c MAC_CLASS") \
-    X(DISTANCE_WRAPS, 1, "the difference that ED and EDAC leave wraps at 16 bits", "dsp.c distance")
+    X(DISTANCE_WRAPS, 1, "the difference that ED and EDAC leave wraps at 16 bits", "dsp.c distance") \
+    X(FRC_HZ, 7370000, "Hz of the fast RC oscillator", "sfr_soc.c soc_create") \
+    X(LPRC_HZ, 32000, "Hz of the low-power RC oscillator, which drives the watchdog", "sfr_soc.c soc_create") \
+    X(SECONDARY_HZ, 32768, "Hz of the secondary oscillator", "sfr_clock.c source_hz") \
+    X(PLL_LOCK_US, 1500, "us until the PLL has locked, after power-on and after a switch to it", "sfr_clock.c ready_s") \
+    X(CRYSTAL_START_PERIODS, 1024, "periods that the start-up timer of a crystal counts; an external clock needs none", "sfr_clock.c ready_s") \
+    X(UNLOCK_CYCLES, 2, "cycles within which each write of OSCCON's unlock sequence follows the one before", "sfr_clock.c unlocked") \
+    X(RESET_KEEPS_CLOCK, 1, "a reset other than power-on goes on with the running clock, without waiting for it anew", "sfr_clock.c soc_clock_reset")
 
 enum {
 #define ASSUMPTION_VALUE(id, value, meaning, used_in) ASSUME_##id = (value),

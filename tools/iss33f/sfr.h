@@ -41,13 +41,13 @@ typedef struct {
 #define SOC_ACTING_LIST(X) \
     X(P1TCON) X(PWM1CON1) X(PWM1CON2) X(P1FLTACON) X(P1OVDCON) X(P1DC1) X(P1DC2) X(P1DC3)
 
-/* Times that the data sheet gives as ranges; settable before a reset. */
+/* Clocks and times, settable before a reset. The crystal is the board's; the others the data sheet gives as ranges: assumptions.h. */
 typedef struct {
     double crystal_hz;    /* default 8 MHz */
-    double frc_hz;        /* 7.37 MHz */
-    double lprc_hz;       /* 32 kHz */
-    double pll_lock_s;    /* 1.5 ms */
-    double crystal_start; /* oscillator periods that the start-up timer counts: 1024 */
+    double frc_hz;
+    double lprc_hz;
+    double pll_lock_s;
+    double crystal_start; /* oscillator periods that the start-up timer counts */
 } soc_times_t;
 
 /* A chip with this image in its flash, in power-on reset. NULL if memory ran out. `board` may be NULL; it is copied. */

@@ -13,8 +13,7 @@ enum {
     IOL1WAY = 0x20,     /* FOSC */
     FCKSM_FIXED = 0x80, /* FOSC: no clock switching */
     FNOSC = 0x07,       /* FOSCSEL */
-    DOZEN = 0x0800,     /* CLKDIV */
-    SEQUENCE = 2        /* cycles within which the writes of an unlock sequence follow each other */
+    DOZEN = 0x0800      /* CLKDIV */
 };
 
 static unsigned source_now(const soc_t *soc)
@@ -48,7 +47,7 @@ static double source_hz(const soc_t *soc, unsigned source)
     case 1: return pll_hz(soc, soc->times.frc_hz);
     case 2: return soc->times.crystal_hz;
     case 3: return pll_hz(soc, soc->times.crystal_hz);
-    case 4: return 32768.0;
+    case 4: return ASSUME_SECONDARY_HZ;
     case 5: return soc->times.lprc_hz;
     case 6: return soc->times.frc_hz / 16.0;
     default: return soc->times.frc_hz / (double)(1u << ((soc_get(soc, SFR_CLKDIV) >> 8) & 7u));
@@ -152,7 +151,7 @@ static void write_high(soc_t *soc, unsigned value)
 /* One write of an unlock sequence. True if it comes right after both keys and therefore goes through. */
 static bool unlocked(unsigned *step, uint64_t *last, uint64_t now, unsigned value, unsigned key1, unsigned key2)
 {
-    bool follows = now - *last <= SEQUENCE;
+    bool follows = now - *last <= ASSUME_UNLOCK_CYCLES;
     *last = now;
     if (*step == 2 && follows) {
         *step = 0;

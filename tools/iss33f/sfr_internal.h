@@ -2,6 +2,7 @@
 #ifndef FOC33_ISS33F_SFR_INTERNAL_H
 #define FOC33_ISS33F_SFR_INTERNAL_H
 
+#include "assumptions.h"
 #include "sfr.h"
 
 #define SOC_NEVER UINT64_MAX

@@ -269,7 +269,8 @@ soc_t *soc_create(const image_t *image, const soc_board_t *board)
         return NULL;
     }
     soc->data = iss_data(soc->iss);
-    soc->times = (soc_times_t){8e6, 7.37e6, 32e3, 1.5e-3, 1024.0};
+    soc->times = (soc_times_t){.crystal_hz = 8e6, .frc_hz = ASSUME_FRC_HZ, .lprc_hz = ASSUME_LPRC_HZ, .pll_lock_s = 1e-6 * ASSUME_PLL_LOCK_US,
+                               .crystal_start = ASSUME_CRYSTAL_START_PERIODS};
     if (board != NULL) {
         soc->board = *board;
     }
