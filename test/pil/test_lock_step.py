@@ -189,6 +189,25 @@ class LockStep(unittest.TestCase):
         pass_ms(self.chip, 700)
         self.assertRegex(self.chip.uart_take(), r"state \d fault 0 speed -?\d+ rpm\r\n")
 
+    def test_a_handler_that_is_held_up_is_the_same_fault_in_both(self) -> None:
+        start(self.chip)
+        self.chip.set("cpu.isr_us", 30)
+        pass_ms(self.chip, 2)
+        self.assertEqual("ISR_OVERRUN", library.faults[int(self.chip.get("fw.fault"))])
+        self.assertEqual("", self.chip.difference())
+
+    def test_a_fault_is_shown_without_a_gap_while_the_watchdog_resets(self) -> None:
+        start(self.chip)
+        self.chip.set("cpu.isr_dropped", 1)
+        pass_ms(self.chip, 10)
+        self.chip.trace_start(["fw.fault", "fw.state"], 1)
+        pass_ms(self.chip, 100)
+        self.assertGreater(self.chip.get("cpu.resets"), 3)
+        faults = {library.faults[int(value)] for value in self.chip.trace_take()[:, 0]}
+        self.assertEqual({"ADC_LOST"}, faults)
+        self.chip.power_up()
+        self.assertEqual(0, self.chip.get("fw.fault"))
+
     def test_the_fault_input_is_a_named_fault_in_both(self) -> None:
         start(self.chip)
         self.chip.set("input.flta", 1)

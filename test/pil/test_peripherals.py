@@ -299,6 +299,19 @@ class Adc(unittest.TestCase):
     def test_four_conversions_take_144_cycles_from_the_trigger(self) -> None:
         self.assertAlmostEqual(400 + 4 * 12 * 3, self.finished_at(400), delta=6)
 
+    def test_the_interrupt_can_be_held_up(self) -> None:
+        chip = board(self.SETUP.format(trigger=400) + self.WAIT)
+        chip.set("cpu.isr_us", 13 + 20)
+        pass_ms(chip, 5)
+        self.assertAlmostEqual(400 + 144 + 800, chip.peek(RAM), delta=6)
+
+    def test_an_interrupt_held_up_for_longer_than_a_period_loses_samples(self) -> None:
+        chip = board(self.SETUP.format(trigger=400) + self.WAIT)
+        chip.set("cpu.isr_us", 13 + 60)
+        pass_ms(chip, 5)
+        self.assertAlmostEqual((400 + 144 + 2400) & 0xFFFF, chip.peek(RAM), delta=6)
+        self.assertTrue(any("cpu.isr_us" in text for text in chip.warnings()))
+
     def test_special_event_counting_down(self) -> None:
         self.assertAlmostEqual(2000 - 400 + 144, self.finished_at(0x8000 | 400), delta=6)
 

@@ -263,13 +263,19 @@ static void deliver(vb_t *vb, const uint16_t *result, unsigned count)
     }
 }
 
-/* A CPU with a time of its own gets them when the conversion ends. */
+/* A CPU with a time of its own gets them when the conversion ends. Its handler takes what it takes; a cpu.isr_us above the usual one is
+ * something that holds the interrupt up. */
 static void deliver_later(vb_t *vb, const uint16_t *result, unsigned count)
 {
     vb_adc_t *adc = &vb->adc;
+    if (adc->handler_s < VB_NEVER) {
+        adc->overruns += 1.0;
+        vb_warn(vb, "IFS0: the next conversion ends while the interrupt is still held up (cpu.isr_us), samples are lost");
+        return;
+    }
     memcpy(adc->queued_result, result, count * sizeof *result);
     adc->queued_count = count;
-    adc->handler_s = adc->conversion_end_s;
+    adc->handler_s = adc->conversion_end_s + 1e-6 * vb_max(0.0, vb->isr_us - VB_ISR_US);
     *vb->reg.ad1con1 = (uint16_t)(*vb->reg.ad1con1 & ~(unsigned)DONE);
 }
 

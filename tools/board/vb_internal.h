@@ -11,6 +11,7 @@
 #define VB_PI 3.14159265358979323846
 #define VB_RPM_PER_RAD_S (30.0 / VB_PI)
 #define VB_NEVER 1e30
+#define VB_ISR_US 13.0         /* usual time from the ADC interrupt to the moment when the handler's writes act */
 #define VB_IDLE_PERIOD_S 50e-6 /* length of a "PWM period" while the PWM does not run */
 
 /* Registers that the board reads or writes, as fields of vb_regs_t under their lower-case names. */

@@ -167,7 +167,7 @@ static const key_entry_t table[] = {
     P("input.pot", pins.pot, 0.0, 0.0, 1.0, "", "potentiometer, 0 left to 1 right"),
     I("input.flta", pins.flta, 0.0, 0.0, 1.0, "", "1 = an external circuit holds FLTA1 active"),
     /* CPU */
-    P("cpu.isr_us", isr_us, 13.0, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act"),
+    P("cpu.isr_us", isr_us, VB_ISR_US, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act; on a target image what exceeds 13 holds the interrupt up"),
     I("cpu.isr_dropped", isr_dropped, 0.0, 0.0, 1.0, "", "1 = the ADC handler is not called any more"),
     I("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
     P("cpu.crystal_hz", crystal_hz, 8e6, 1e5, 64e6, "Hz", "crystal"),

@@ -12,7 +12,8 @@ enum {
     ADC1_VECTOR = 21, /* (0x2E - 4) / 2 */
     PTEN = 0x8000,
     PWM1MD = 0x0200,
-    IUE = 0x0004
+    IUE = 0x0004,
+    COUNTER_IN_TIME = 0x81F4 /* counting down: what a handler would see that does not look */
 };
 
 /* ---- time ---- */
@@ -49,15 +50,24 @@ static uint16_t chip_pins(void *context, unsigned port)
     return level[port];
 }
 
-static uint16_t chip_counter(void *context)
+static uint16_t counter_now(const pil_t *pil)
 {
-    const pil_t *pil = context;
     const vb_t *vb = pil->vb;
     if (!vb->pwm.running) {
         return *vb->reg.p1tmr;
     }
     double now_s = time_of(pil, now_cycle(pil)) + 1e-3 / pil->fcy_hz;
     return vb_pwm_counter(vb, now_s >= vb->pwm.period_s ? now_s - vb->pwm.period_s : now_s);
+}
+
+static uint16_t chip_counter(void *context)
+{
+    pil_t *pil = context;
+    uint16_t counter = counter_now(pil);
+    if (pil->in_handler) {
+        pil->counter_seen = counter;
+    }
+    return counter;
 }
 
 static void count_range(double value, double *min, double *max, double *sum, double *count)
@@ -145,6 +155,7 @@ static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
         return;
     }
     pil->in_handler = true;
+    pil->counter_seen = COUNTER_IN_TIME;
     pil->entry_cycle = cycle;
     pil_shadow_tick(pil);
 }
@@ -248,6 +259,7 @@ static int cpu_reset(void *context)
     pil->shadow.ticks = 0;
     pil->shadow.differences = 0;
     pil->shadow.first[0] = '\0';
+    pil_target_restart(true);
     pil_shadow_reset(pil);
     return 0;
 }
@@ -307,6 +319,7 @@ static void follow_reset(pil_t *pil)
     vb->adc.handler_s = VB_NEVER;
     vb->pwm.running = false;
     vb_cut_period(vb);
+    pil_target_restart(false);
     pil_shadow_reset(pil);
 }
 

@@ -26,6 +26,7 @@ typedef struct {
     bool clock_changed, was_reset, written, handled;
     bool in_handler;
     uint64_t entry_cycle, trigger_cycle;
+    uint16_t counter_seen;  /* P1TMR as the handler has read it last */
     bool signals;           /* the image says where board_drive is */
     pil_shadow_t shadow;
 } pil_t;

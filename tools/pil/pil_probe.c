@@ -25,9 +25,22 @@ static drive_t target_drive;
 static drive_params_t target_params = DRIVE_PARAMS_INIT;
 static pil_places_t places;
 
+enum { IEC0_ADDRESS = 0x0094, AD1IE = 0x2000 };
+static bool starting; /* the start-up code clears and fills the RAM */
+
+static bool is_starting(void)
+{
+    uint16_t iec0 = 0;
+    if (starting) {
+        memcpy(&iec0, places.data + IEC0_ADDRESS, sizeof iec0);
+        starting = (iec0 & AD1IE) == 0;
+    }
+    return starting;
+}
+
 static drive_t *refreshed_drive(void)
 {
-    if (places.data != NULL) {
+    if (places.data != NULL && !is_starting()) {
         memcpy(&target_drive, places.data + places.drive, sizeof target_drive);
     }
     return &target_drive;
@@ -96,6 +109,14 @@ extern const unsigned pil_unused_param_count;
 void pil_target_place(const pil_places_t *found)
 {
     places = *found;
+}
+
+void pil_target_restart(bool power_on)
+{
+    starting = true;
+    if (power_on) {
+        memset(&target_drive, 0, sizeof target_drive);
+    }
 }
 
 size_t pil_target_drive_bytes(void)

@@ -2,6 +2,7 @@
 #ifndef FOC33_PIL_PIL_PROBE_H
 #define FOC33_PIL_PIL_PROBE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -20,6 +21,10 @@ typedef struct {
 
 /* They are read anew with every signal. */
 void pil_target_place(const pil_places_t *places);
+
+/* The target has been reset. From here until it enables its control interrupt the RAM belongs to the start-up code: the signals keep their
+ * values; after power-on they are 0. */
+void pil_target_restart(bool power_on);
 
 /* Bytes of a drive object and of its parameters on the target. */
 size_t pil_target_drive_bytes(void);

@@ -1,4 +1,4 @@
-/* Lock-step: the host's firmware gets the target's samples and commands at each control interrupt, and both results are compared. */
+/* Lock-step: the host's firmware gets the target's samples, commands and PWM counter at each control interrupt, and both results are compared. */
 #include "pil_internal.h"
 
 #include <stdio.h>
@@ -44,7 +44,7 @@ static void follow_commands(const pil_commands_t *c)
     }
 }
 
-/* The target enters its control interrupt. */
+/* The target enters its control interrupt: commands and samples as they are now. */
 void pil_shadow_tick(pil_t *pil)
 {
     if (!pil->shadow.running) {
@@ -57,9 +57,6 @@ void pil_shadow_tick(pil_t *pil)
     ADC1BUF1 = *r->adc1buf1;
     ADC1BUF2 = *r->adc1buf2;
     ADC1BUF3 = *r->adc1buf3;
-    P1TMR = 0x81F4; /* in time: a target that is late is a difference */
-    IFS0bits.AD1IF = 1;
-    _ADC1Interrupt();
 }
 
 static void note_difference(pil_t *pil, const char *name, double host, double target)
@@ -99,12 +96,15 @@ static bool signals_agree(pil_t *pil)
     return true;
 }
 
-/* The target leaves its control interrupt. */
+/* The target leaves its control interrupt. The host's handler runs now, when it is known whether the target's was in time. */
 void pil_shadow_compare(pil_t *pil)
 {
     if (!pil->shadow.running) {
         return;
     }
+    P1TMR = pil->counter_seen;
+    IFS0bits.AD1IF = 1;
+    _ADC1Interrupt();
     pil->shadow.ticks++;
     if (!registers_agree(pil) || !signals_agree(pil)) {
         pil->shadow.differences++;
