@@ -133,6 +133,27 @@ void test_the_board_takes_its_clock_from_the_selected_source(void)
     TEST_ASSERT_TRUE(warned_about("OSCCON"));
 }
 
+static unsigned frcdiv;
+
+static void divided_rc(void)
+{
+    OSCCON = 0x7700;
+    CLKDIV = (uint16_t)(frcdiv << 8);
+}
+
+void test_the_divided_rc_oscillator_has_eight_divisors(void)
+{
+    static const double divisor[8] = {1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 256.0};
+    unsigned n;
+    fake_init_hook = divided_rc;
+    for (n = 0; n < 8; n++) {
+        frcdiv = n;
+        power_up();
+        run(1);
+        TEST_ASSERT_DOUBLE_WITHIN(0.1, 3.685e6 / divisor[n], get("cpu.fcy_hz"));
+    }
+}
+
 static void wild_pll(void)
 {
     PLLFBD = 78;

@@ -382,6 +382,11 @@ class Traps(unittest.TestCase):
                 chip = Chip(f"repeat #17\n {text}\n nop\n" + MAIN, self.vectors, enable(), w={2: 100, 5: 0})
                 self.expect(chip, MATHERR | DIV0ERR, MATH, 11)
 
+    def test_a_divisor_of_zero_traps_in_the_first_turn(self) -> None:
+        self.assertEqual(1, Chip.machine.assumption("DIVIDE_ZERO_FIRST_TURN"))
+        chip = Chip("repeat #17\n div.s w2,w5\n nop\n" + MAIN, self.vectors, enable(), w={2: 100, 5: 0})
+        self.assertLess(chip.until("trap"), 10)
+
     def test_an_accumulators_overflow_is_a_math_error_when_enabled(self) -> None:
         for which, enabled, error in (("a", OVATE, OVAERR), ("b", OVBTE, OVBERR)):
             for on in (True, False):
@@ -473,6 +478,15 @@ class Reports(unittest.TestCase):
     def test_program_memory_that_does_not_exist_is_told(self) -> None:
         chip = Chip("tblrdl [w5],w6\n" + MAIN, w={5: 0x5800})
         self.assertRegex(chip.run(20), "5800")
+        for page, address in ((0x10, "080200"), (0xFF, "7F8200"), (0x01, "008200")):
+            chip = Chip("mov [w5],w6\n" + MAIN, registers={CORCON: 0x24, 0x34: page}, w={5: 0x8200})
+            self.assertRegex(chip.run(20), f"read at 0x{address}")
+
+    def test_a_jump_beyond_the_flash_is_told_with_where_it_led(self) -> None:
+        for text in ("goto 0x10200", "call 0x10200", "goto 0x7F0200", "goto 0x5800"):
+            with self.subTest(text):
+                chip = Chip(text + "\n" + MAIN)
+                self.assertRegex(chip.run(20), "no flash.*" + text.split("0x")[1])
 
     def test_an_address_error_in_the_handler_of_a_failing_oscillator_resets(self) -> None:
         chip = Chip("nop\n" + MAIN + "\n .org 0x3C0\n h: mov #0x901,w5\n nop\n mov [w5],w6\n nop\n nop\n .org 0\n goto 0x204", {OSCILLATOR: "h", ADDRESS: "trap"}, enable())

@@ -29,12 +29,13 @@ def _registers() -> dict[str, int]:
 
 REGISTERS = _registers()
 
-PLL = """
-    mov #38, w0; mov w0, pllfbd; clr clkdiv
-    mov #0x743, w1; mov #0x78, w2; mov #0x9A, w3; mov #3, w0
-    mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]
-    mov #0x742, w1; mov #0x46, w2; mov #0x57, w3; mov #1, w0
-    mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]
+def switch(source: int) -> str:
+    """OSCCON's two unlock sequences: NOSC, then OSWEN."""
+    return (f"mov #0x743, w1; mov #0x78, w2; mov #0x9A, w3; mov #{source}, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n"
+            "mov #0x742, w1; mov #0x46, w2; mov #0x57, w3; mov #1, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n")
+
+
+PLL = "mov #38, w0; mov w0, pllfbd; clr clkdiv\n" + switch(3) + """
 pll_wait:
     btss osccon, #5
     bra pll_wait

@@ -102,7 +102,7 @@ kind = "no_warnings"
             printed = io.StringIO()
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
                 code = pil_command.main([str(scenario), "--image", str(image(program)), "--out", str(out), "--quiet"])
-            return code, printed.getvalue(), json.loads((out / "summary.json").read_text())
+            return code, printed.getvalue(), json.loads((out / "summary.json").read_text()) | {"uart": (out / "uart.txt").read_text()}
 
     def test_it_runs_and_is_judged_by_what_the_plant_shows(self) -> None:
         code, text, data = self.run_program(STOP)
@@ -111,6 +111,10 @@ kind = "no_warnings"
                          [row["row"] for row in data["expectations"]])
         self.assertIn("a HEX file alone does not say", text)
         self.assertEqual(["speed.png"], data["plots"])
+
+    def test_what_it_sends_is_kept(self) -> None:
+        setup = "mov #3, w0; mov w0, rpor9; mov #0x8008, w0; mov w0, u1mode; bset u1sta, #10; mov #0x48, w0; mov w0, u1txreg; inc w0, w0; mov w0, u1txreg\n"
+        self.assertEqual("HI", self.run_program(setup + STOP)[2]["uart"])
 
     def test_what_the_core_met_is_a_warning_with_its_address(self) -> None:
         code, text, _ = self.run_program(f"mov {RAM + 6}, w0\n" + STOP)

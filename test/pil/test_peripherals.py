@@ -8,7 +8,7 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from chip import FRC_FCY, PLL, RAM, REGISTERS, STOP, PilBoard, asm33, board, library, pass_ms, run # noqa: E402
+from chip import FRC_FCY, PLL, RAM, REGISTERS, STOP, PilBoard, asm33, board, library, pass_ms, run, switch # noqa: E402
 from sample_image import Elf, Section # noqa: E402
 
 UART = """
@@ -104,6 +104,67 @@ class Clock(unittest.TestCase):
         self.assertAlmostEqual(4000, chip.get("cpu.cycles"), delta=210)
 
 
+    def cycles_per_ms(self, program: str, ms: float = 20.0, **config: int) -> float:
+        """Instruction clock in kHz after `ms` of the program."""
+        chip = run(program + STOP, ms, **config)
+        before, at_s = chip.get("cpu.cycles"), chip.get("time_s")
+        pass_ms(chip, ms)
+        return (chip.get("cpu.cycles") - before) / (chip.get("time_s") - at_s) / 1000
+
+    def test_the_pll_has_a_divider_before_a_multiplier_and_a_divider_behind(self) -> None:
+        frc_khz = 2 * FRC_FCY / 1000
+        for clkdiv, pllfbd, factor in ((0x0040, 0x30, 50 / 2 / 4), (0x00C0, 0x30, 50 / 2 / 8), (0x0041, 0x30, 50 / 3 / 4), (0x0000, 0x20, 34 / 2 / 2),
+                                       (0x00DE, 0x110, 274 / 32 / 8)):
+            with self.subTest(clkdiv=clkdiv, pllfbd=pllfbd):
+                got = self.cycles_per_ms(f"mov #{clkdiv}, w0; mov w0, clkdiv; mov #{pllfbd}, w0; mov w0, pllfbd\n", 5, FOSCSEL=1)
+                self.assertAlmostEqual(frc_khz * factor / 2, got, delta=0.002 * frc_khz * factor)
+
+    def test_every_source_has_its_frequency(self) -> None:
+        for source, khz in ((2, 4000), (4, 16.384), (5, 16), (6, FRC_FCY / 16e3), (7, FRC_FCY / 32e3)):
+            with self.subTest(source=source):
+                got = self.cycles_per_ms("mov #0x3540, w0; mov w0, clkdiv\n" + switch(source))
+                self.assertAlmostEqual(khz, got, delta=0.01 * khz)
+
+    def test_the_divided_rc_oscillator_has_eight_divisors(self) -> None:
+        for bits, divisor in enumerate((1, 2, 4, 8, 16, 32, 64, 256)):
+            with self.subTest(bits=bits):
+                khz = FRC_FCY / 1000 / divisor
+                self.assertAlmostEqual(khz, self.cycles_per_ms(f"mov #{bits << 8 | 0x3040}, w0; mov w0, clkdiv\n" + switch(7), 40), delta=0.02 * khz)
+
+    def test_lock_tells_of_a_pll_only(self) -> None:
+        self.assertEqual(0x2200, int(run(PLL + switch(2) + STOP, 5).get("reg.OSCCON")))
+        self.assertEqual(0x1120, int(run(STOP, 5, FOSCSEL=1).get("reg.OSCCON")))
+
+    def ready_ms(self, source: int, fosc: int) -> float:
+        """When the clock has been switched, to a period of the board that runs without PWM."""
+        chip = board(switch(source) + STOP, FOSC=fosc)
+        while int(chip.get("reg.OSCCON")) >> 12 != source:
+            chip.run(1)
+        return chip.get("time_s") * 1000
+
+    def test_a_crystal_starts_for_1024_periods_and_then_the_pll_locks(self) -> None:
+        crystal, external = 0x41, 0x40
+        self.assertAlmostEqual(0.128, self.ready_ms(2, crystal), delta=0.06)
+        self.assertAlmostEqual(0.0, self.ready_ms(2, external), delta=0.06)
+        self.assertAlmostEqual(1.628, self.ready_ms(3, crystal), delta=0.06)
+        self.assertAlmostEqual(1.5, self.ready_ms(3, external), delta=0.06)
+        self.assertAlmostEqual(1.5, self.ready_ms(1, crystal), delta=0.06)
+
+    def test_clklock_forbids_switching(self) -> None:
+        chip = run("mov #0x742, w1; mov #0x46, w2; mov #0x57, w3; mov #0x80, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n" + switch(2) + STOP, 3)
+        self.assertEqual(0x0080, int(chip.get("reg.OSCCON")))
+
+    def test_clklock_forbids_a_switch_that_was_prepared(self) -> None:
+        high, low = switch(2).split("\n", 1)
+        locked = low.replace("#1, w0", "#0x80, w0")
+        self.assertEqual(0x0280, int(run(f"{high}\n{locked}{low}" + STOP, 3).get("reg.OSCCON")))
+
+    def test_a_reset_goes_on_with_the_running_clock(self) -> None:
+        chip = run("btsc rcon, #6\nbra done\n" + PLL + f"reset\ndone: mov osccon, w0; mov w0, {RAM}\n" + STOP)
+        self.assertEqual(0x3320, chip.peek(RAM))
+        self.assertEqual(1, chip.get("cpu.resets"))
+
+
 class Pins(unittest.TestCase):
     UNLOCK = "mov #0x742, w1; mov #0x46, w2; mov #0x57, w3; mov #{value}, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n"
     LOCKED = UNLOCK.format(value=0x40)
@@ -114,6 +175,13 @@ class Pins(unittest.TestCase):
         self.assertEqual(8, int(run(self.SELECT + STOP).get("reg.RPINR12")))
         self.assertEqual(0x1F, int(run(self.LOCKED + self.SELECT + STOP).get("reg.RPINR12")))
         self.assertEqual(8, int(run(self.LOCKED + self.OPEN + self.SELECT + STOP).get("reg.RPINR12")))
+
+    def test_a_selection_has_five_bits(self) -> None:
+        self.assertEqual(0x1F1F, int(run("setm rpinr18\n" + STOP).get("reg.RPINR18")))
+
+    def test_the_configuration_may_give_the_pwm_its_pins_from_the_reset_on(self) -> None:
+        self.assertEqual(0x0000, int(run(STOP, FPOR=0xF7).get("reg.PWM1CON1")))
+        self.assertEqual(0x0077, int(run(STOP, FPOR=0x77).get("reg.PWM1CON1")))
 
     def test_the_lock_may_be_one_way(self) -> None:
         self.assertEqual(0x1F, int(run(self.LOCKED + self.OPEN + self.SELECT + STOP, FOSC=0x61).get("reg.RPINR12")))
@@ -135,6 +203,16 @@ class Pins(unittest.TestCase):
         program = f"mov #{{pins}}, w0; mov w0, ad1pcfgl; mov portb, w0; mov w0, {RAM}\n" + STOP
         self.assertEqual(0, run(program.format(pins=0)).peek(RAM) & 0x000F)
         self.assertEqual(0xF, run(program.format(pins=0x1FF)).peek(RAM) & 0x000F)
+
+    def test_each_analogue_input_has_its_pin(self) -> None:
+        """AN0 and 1 are RA0 and 1, AN2 to 5 RB0 to 3, AN6 to 8 RC0 to 2."""
+        ports = [("porta", 0x3), ("portb", 0xF), ("portc", 0x7)]
+        program = "mov #{pins}, w0; mov w0, ad1pcfgl\n" + "".join(f"mov {port}, w0; mov w0, {RAM + 2 * n}\n" for n, (port, _) in enumerate(ports)) + STOP
+        for number in range(9):
+            chip = run(program.format(pins=0x1FF & ~(1 << number)))
+            low = [mask & ~chip.peek(RAM + 2 * n) for n, (_, mask) in enumerate(ports)]
+            expected = [1 << number if number < 2 else 0, 1 << number - 2 if 2 <= number < 6 else 0, 1 << number - 6 if number >= 6 else 0]
+            self.assertEqual(expected, low, f"AN{number}")
 
     def test_a_written_port_is_the_latch_and_a_warning(self) -> None:
         chip = run("bclr trisc, #6; bset portc, #6\n" + STOP)
@@ -158,6 +236,27 @@ class Timers(unittest.TestCase):
                    + f"sub w3, w1, w3; mov w3, {RAM}\n" + STOP, 10)
         self.assertAlmostEqual(20000, chip.peek(RAM), delta=4)
 
+    def test_every_prescaler(self) -> None:
+        for bits, cycles in ((0, 1), (1, 8), (2, 64), (3, 256)):
+            chip = run(TIMER.replace("0x8000", hex(0x8000 | bits << 4)) + f"repeat #5117; nop; mov tmr1, w0; mov w0, {RAM}\n" + STOP)
+            self.assertAlmostEqual(5120 / cycles, chip.peek(RAM), delta=1, msg=f"1:{cycles}")
+
+    def test_every_timer_has_its_flag(self) -> None:
+        for number, bit in ((1, 3), (2, 7), (3, 8)):
+            chip = run(f"clr ifs0; mov #99, w0; mov w0, pr{number}; clr tmr{number}; mov #0x8000, w0; mov w0, t{number}con\n" + STOP, 1)
+            self.assertEqual(1 << bit, int(chip.get("reg.IFS0")) & 0x0188, f"timer {number}")
+
+    def test_beyond_its_period_register_a_timer_goes_round(self) -> None:
+        chip = run("mov #0xFFF0, w0; mov #99, w1; mov w1, pr1; mov w0, tmr1; clr ifs0; setm pr2; clr tmr2; mov #0x8000, w0; mov w0, t2con; mov w0, t1con\n"
+                   f"wait: btss ifs0, #3; bra wait; mov tmr2, w0; mov tmr1, w1; mov w0, {RAM}; mov w1, {RAM + 2}\n" + STOP)
+        self.assertAlmostEqual(16 + 100, chip.peek(RAM), delta=5)
+        self.assertLess(chip.peek(RAM + 2), 8)
+
+    def test_a_timer_that_goes_round_shows_the_counts_between(self) -> None:
+        chip = run("mov #0xFFF0, w0; mov #99, w1; mov w1, pr1; mov w0, tmr1; mov #0x8000, w0; mov w0, t1con\n"
+                   f"repeat #60; nop; mov tmr1, w0; mov w0, {RAM}; repeat #139; nop; mov tmr1, w0; mov w0, {RAM + 2}\n" + STOP)
+        self.assertEqual([63 - 16, 63 + 143 - 16 - 100], [chip.peek(RAM), chip.peek(RAM + 2)])
+
     def test_a_stopped_timer_keeps_its_count(self) -> None:
         chip = run(TIMER + "repeat #98; nop; bclr t1con, #15; repeat #98; nop; mov tmr1, w0; mov w0, 0x800\n" + STOP)
         self.assertAlmostEqual(101, chip.peek(RAM), delta=2)
@@ -170,6 +269,53 @@ class Uart(unittest.TestCase):
         self.assertAlmostEqual(10 * 4 * 87, chip.peek(RAM), delta=8)
         self.assertEqual("U", chip.uart_take())
         self.assertAlmostEqual(114943, chip.get("uart.baud"), delta=1)
+
+    def character_cycles(self, mode: int) -> int:
+        return run(PLL + UART.replace("#0x8008", f"#{mode}") + TIMER + "mov #0x55, w0; mov w0, u1txreg\nwait: btss u1sta, #8; bra wait\n"
+                   f"mov tmr1, w0; mov w0, {RAM}\n" + STOP).peek(RAM)
+
+    def test_low_speed_has_sixteen_cycles_a_bit(self) -> None:
+        self.assertAlmostEqual(10 * 16 * 87, self.character_cycles(0x8000), delta=8)
+
+    def test_parity_and_a_second_stop_bit_take_a_bit_each(self) -> None:
+        for bits, length in ((0b001, 11), (0b010, 11), (0b011, 12), (0b111, 12)):
+            self.assertAlmostEqual(length * 4 * 87, self.character_cycles(0x8008 | bits), delta=8, msg=f"{bits:03b}")
+
+    FLAGS = PLL + UART + "mov #{sta}, w0; mov w0, u1sta; clr ifs0\n"
+
+    def flag_times(self, sta: int, characters: int) -> list[int]:
+        """Characters that had left when U1TXIF came, after so many were written."""
+        chip = run(self.FLAGS.format(sta=sta) + f"mov #{RAM}, w4; mov #0x41, w0; " + "mov w0, u1txreg; " * characters + "setm pr1; clr tmr1; mov #0x8000, w1; mov w1, t1con\n"
+                   "again: btss ifs0, #12; bra again; mov tmr1, w0; bclr ifs0, #12; mov w0, [w4++]; bra again\n")
+        return [round(chip.peek(RAM + 2 * n) / (40 * 87)) for n in range(characters) if chip.peek(RAM + 2 * n)]
+
+    def test_the_transmitters_interrupt_comes_when_utxisel_says(self) -> None:
+        self.assertEqual([0, 1, 2], self.flag_times(0x0400, 3), "each character that leaves the buffer")
+        self.assertEqual([3], self.flag_times(0x2400, 3), "everything has left")
+        self.assertEqual([0, 2], self.flag_times(0x8400, 3), "the buffer is empty")
+
+    def test_enabling_the_transmitter_sets_its_flag(self) -> None:
+        chip = run(PLL + "clr ifs0; mov #0x8008, w0; mov w0, u1mode\n" + f"mov ifs0, w1; mov w1, {RAM}; bset u1sta, #10; mov ifs0, w1; mov w1, {RAM + 2}\n" + STOP)
+        self.assertEqual([0, 0x1000], [chip.peek(RAM) & 0x1000, chip.peek(RAM + 2) & 0x1000])
+
+    def test_the_receivers_interrupt_comes_when_urxisel_says(self) -> None:
+        for mode, count in ((0, 1), (1, 1), (2, 3), (3, 4)):
+            chip = board(self.FLAGS.format(sta=0x400 | mode << 6) + "mov #20, w0; mov w0, rpinr18\n" + STOP)
+            pass_ms(chip, 2)
+            for received in range(1, 5):
+                chip.uart_send("a")
+                pass_ms(chip, 0.2)
+                self.assertEqual(received >= count, bool(int(chip.get("reg.IFS0")) & 0x0800), f"URXISEL {mode}, {received} characters")
+
+    def test_clearing_the_overrun_empties_the_receiver(self) -> None:
+        chip = board(PLL + UART + "mov #20, w0; mov w0, rpinr18\nw: btss u1sta, #1; bra w; bclr u1sta, #1\n" + STOP)
+        pass_ms(chip, 2)
+        chip.uart_send("abcdef")
+        pass_ms(chip, 1)
+        self.assertEqual(1, int(chip.get("reg.U1STA")) & 3, "URXDA: the character behind the overrun")
+        chip.uart_send("ghi")
+        pass_ms(chip, 1)
+        self.assertEqual(1, int(chip.get("reg.U1STA")) & 3, "three places were free")
 
     def test_one_character_on_the_line_and_four_waiting(self) -> None:
         chip = run(PLL + UART + "mov #0x41, w0\n" + f"mov w0, u1txreg; mov u1sta, w2; mov w2, {RAM}\n"
@@ -247,6 +393,33 @@ class Watchdog(unittest.TestCase):
 
     def test_postscaler(self) -> None:
         self.assertEqual(2, run(STOP, 10, FWDT=self.ON | 2).get("cpu.resets"))
+
+    def test_prescaler(self) -> None:
+        self.assertEqual(2, run(STOP, 10, FWDT=self.ON | 0x10).get("cpu.resets"))
+
+    def test_with_a_window_serving_it_too_early_resets(self) -> None:
+        serve = "mov #7370, w0\nagain: repeat {wait}; nop; clrwdt; bra again\n"
+        window = self.ON & ~0x40
+        self.assertGreater(run(serve.format(wait="#2000"), 10, FWDT=window).get("cpu.resets"), 10, "every 0.54 ms")
+        self.assertEqual(0, run(serve.format(wait="#3300"), 10, FWDT=window).get("cpu.resets"), "every 0.9 ms")
+        self.assertEqual(0, run(serve.format(wait="#2000"), 10, FWDT=self.ON).get("cpu.resets"), "without a window")
+
+    def test_wakes_a_sleeping_core_without_a_reset(self) -> None:
+        for mode in (0, 1):
+            chip = run(f"clr {RAM}\nagain: pwrsav #{mode}; inc {RAM}; mov rcon, w0; mov w0, {RAM + 2}; bra again\n", 10.5, FWDT=self.ON)
+            self.assertEqual(0, chip.get("cpu.resets"))
+            self.assertEqual(10, chip.peek(RAM))
+            self.assertEqual(0x0010, chip.peek(RAM + 2) & 0x0010, "RCON.WDTO")
+
+    def test_what_the_core_resets_for_is_told_in_rcon(self) -> None:
+        program = f"mov rcon, w0; mov w0, {RAM}; mov #0xC000, w1; and w0, w1, w1\nbra nz, done\n{{cause}}\ndone: " + STOP
+        conflict = "mov #0x900, w15; bset 0x80, #1; nop; nop\nbra done"
+        handler = "\n.org 0x1000\nhandler: mov #0x801, w2; mov [w2], w3; bra handler\n.org 0x6\n.word24 0x001000\n"
+        for cause, bit in ((".word24 0xFD8010", 0x4000), ("mov [w9], w0", 0x4000), (conflict, 0x8000)):
+            with self.subTest(cause):
+                chip = run(program.format(cause=cause) + handler, 1)
+                self.assertEqual(bit, chip.peek(RAM) & 0xC000)
+                self.assertEqual(1, chip.get("cpu.resets"))
 
     def test_its_time_does_not_follow_the_clock(self) -> None:
         self.assertEqual(2, run(PLL + STOP, 10, FWDT=self.ON | 2).get("cpu.resets"))

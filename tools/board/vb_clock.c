@@ -22,6 +22,13 @@ static double pll_hz(vb_t *vb, double input_hz)
     return vco_hz / n2;
 }
 
+/* FRCDIV: powers of two, but the last is 256. */
+static double frc_divisor(unsigned clkdiv)
+{
+    unsigned frcdiv = (clkdiv >> 8) & 7u;
+    return frcdiv == 7 ? 256.0 : (double)(1u << frcdiv);
+}
+
 /* Instruction clock. Warns about a PLL out of range, more than 40 MHz, and a clock that is not the expected one. */
 double vb_clock_fcy_hz(vb_t *vb)
 {
@@ -35,7 +42,7 @@ double vb_clock_fcy_hz(vb_t *vb)
     case 4: fosc_hz = 32768.0; break;
     case 5: fosc_hz = 32000.0; break;
     case 6: fosc_hz = FRC_HZ / 16.0; break;
-    default: fosc_hz = FRC_HZ / (double)(1u << ((*vb->reg.clkdiv >> 8) & 7u)); break;
+    default: fosc_hz = FRC_HZ / frc_divisor(*vb->reg.clkdiv); break;
     }
     double fcy_hz = 0.5 * fosc_hz;
     if (vb->live != NULL && (*vb->reg.p1tcon & 0x8000u) == 0) {

@@ -140,6 +140,8 @@ class PilRun:
     """tick, signal and values; "" if target and host agreed in all ticks"""
     has_names: bool = True
     """whether the image said where the drive's variables are"""
+    sent: str = ""
+    """what left UART1, up to 4096 characters"""
 
     @property
     def instructions_per_second(self) -> float:
@@ -169,7 +171,7 @@ def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilR
         result = simulate.simulate_on(job if board.has_names else without_names(job), pil, board, report)
         cycles = Cycles(**{name: board.get(f"cpu.{name}") for name in Cycles.__dataclass_fields__})
         return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference(),
-                      board.has_names)
+                      board.has_names, board.uart_take())
     except BoardError as error:
         raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
     finally:

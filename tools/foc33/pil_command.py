@@ -102,6 +102,7 @@ def _scenario(name: str, options: argparse.Namespace) -> int:
         data = report.summary(run, outcomes, str(places.shown(motor.path)), str(places.shown(board.path))) | used
         data |= {"image": str(places.shown(image)), "target": report.clean(figures(found))}
         output.write_trace(result.work / "trace.csv", run.trace.thinned(10))
+        (result.work / "uart.txt").write_text(found.sent, encoding="latin-1", newline="")
         if not options.no_plots:
             from . import plots
             data["plots"] = plots.write_all(run, result.work)

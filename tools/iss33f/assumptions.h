@@ -20,6 +20,7 @@
     X(CORCON_RESET, 0x0020, "CORCON after a reset", "core.c iss_reset") \
     X(UNKNOWN_W_BYTE_WRITE, 1, "a byte write makes a W register count as initialised", "decode.c to") \
     X(DIVIDE_LAST_TURN, 1, "W0, W1 and the flags of a division change in its last turn only", "core_multiply.c in_last_turn") \
+    X(DIVIDE_ZERO_FIRST_TURN, 1, "a divisor of 0 raises its trap in the first turn of the division", "core_multiply.c in_last_turn") \
     X(DIVIDE_OVERFLOW, 1, "after an overflow W0 and W1 hold the low words of the exact quotient and remainder; C never changes", "core_multiply.c divide") \
     X(DIVF_ONE_OVERFLOWS, 1, "DIVF of equal numbers, which is 1.0, overflows", "core_multiply.c divf") \
     X(CP0_NO_BORROW, 1, "CP0 is f - 0: it sets C and DC", "core_alu.c COMPARE0") \

@@ -40,6 +40,13 @@ static double pll_hz(const soc_t *soc, double input_hz)
     return input_hz / n1 * m / n2;
 }
 
+/* FRCDIV: powers of two, but the last is 256. */
+static double frc_divisor(const soc_t *soc)
+{
+    unsigned frcdiv = (soc_get(soc, SFR_CLKDIV) >> 8) & 7u;
+    return frcdiv == 7 ? 256.0 : (double)(1u << frcdiv);
+}
+
 static double source_hz(const soc_t *soc, unsigned source)
 {
     switch (source) {
@@ -50,7 +57,7 @@ static double source_hz(const soc_t *soc, unsigned source)
     case 4: return ASSUME_SECONDARY_HZ;
     case 5: return soc->times.lprc_hz;
     case 6: return soc->times.frc_hz / 16.0;
-    default: return soc->times.frc_hz / (double)(1u << ((soc_get(soc, SFR_CLKDIV) >> 8) & 7u));
+    default: return soc->times.frc_hz / frc_divisor(soc);
     }
 }
 
