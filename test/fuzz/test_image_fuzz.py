@@ -110,6 +110,8 @@ class ImageFiles(unittest.TestCase):
         elf = Elf()
         elf.ident = b"\x7fELF\x02\x01\x01" + bytes(9)
         self.refused(elf.bytes(), "32 bits")
+        elf.ident = b"\x7fELF\x01\x02\x01" + bytes(9)
+        self.refused(elf.bytes(), "little endian")
 
     def test_overlapping_sections(self) -> None:
         elf = Elf()
@@ -125,6 +127,33 @@ class ImageFiles(unittest.TestCase):
         lines = hex_lines({0: GOTO_0X200[0], 2: 0, 0x200: 0})
         self.refused("\n".join([*lines, record(0, 0x408, b"\x01\x02"), END]), "bytes are missing")
 
+    def test_a_section_of_three_bytes(self) -> None:
+        data = bytearray(Elf().bytes())
+        headers = int.from_bytes(data[32:36], "little")
+        data[headers + 2 * 40 + 20] -= 1 # sh_size of .text
+        self.refused(bytes(data), "7 bytes are no whole words")
+
+    def test_a_section_at_an_odd_address(self) -> None:
+        elf = Elf()
+        elf.sections.append(Section(".odd", 0x301, [0]))
+        self.refused(elf.bytes(), "0x301 is outside")
+
+    def test_a_file_larger_than_any_image(self) -> None:
+        path = self.folder / "large"
+        for size, code in ((65 << 20, "cannot be read"), (5 << 30, "cannot be read")):
+            with path.open("wb") as file:
+                file.write(hex_text().encode())
+                file.truncate(size)
+            result = subprocess.run([self.harness, "--load", path], capture_output=True, text=True, check=False)
+            self.assertEqual(2, result.returncode)
+            self.assertIn(code, result.stderr)
+        path.unlink()
+
+    def test_a_folder(self) -> None:
+        result = subprocess.run([self.harness, "--load", self.folder], capture_output=True, text=True, check=False)
+        self.assertEqual(2, result.returncode)
+        self.assertIn("cannot be", result.stderr)
+
     def test_missing_reset_vector(self) -> None:
         elf = Elf()
         elf.sections = elf.sections[1:]
@@ -139,6 +168,28 @@ class ImageFiles(unittest.TestCase):
         lines = hex_lines(WORDS)
         lines[1] = lines[1][:-1] + ("0" if lines[1][-1] != "0" else "1")
         self.refused("\n".join([*lines, END]), "checksum")
+
+    def test_hex_record_of_another_length_than_it_says(self) -> None:
+        whole = bytes.fromhex(hex_lines(WORDS)[1][1:-2])
+        for change, wrong in (("longer", whole + b"\0"), ("shorter", whole[:-1])):
+            with self.subTest(change):
+                line = ":" + (wrong + bytes([-sum(wrong) & 0xFF])).hex()
+                self.refused("\n".join([line, END]), "shorter or longer")
+
+    def test_hex_line_longer_than_a_record_can_be(self) -> None:
+        for digits in (522, 524, 1040, 100000):
+            self.refused(":" + "0" * digits + "\n" + END + "\n", "no Intel HEX record")
+
+    def test_hex_end_record_with_data(self) -> None:
+        self.refused("\n".join([*hex_lines(WORDS), record(1, 0, b"\0")]), "end record has data")
+
+    def test_hex_address_records_have_two_bytes(self) -> None:
+        for kind in (2, 4):
+            for data in (b"", b"\0", b"\0\0\0"):
+                self.refused("\n".join([record(kind, 0, data), *hex_lines(WORDS), END]), "no two bytes")
+
+    def test_hex_record_of_unknown_kind(self) -> None:
+        self.refused("\n".join([record(6, 0, b""), *hex_lines(WORDS), END]), "type is unknown")
 
     def test_hex_overlap_names_the_line(self) -> None:
         lines = hex_lines(WORDS)

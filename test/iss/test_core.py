@@ -174,7 +174,15 @@ class Observation(unittest.TestCase):
             ("leave", 8 + INT0, 5 + ENTRY + 5), ("return", PROGRAM + 4, 5 + ENTRY + 5)]))
 
     def test_clrwdt_is_told(self) -> None:
-        chip = Chip("clrwdt\n nop\n clrwdt\n" + MAIN)
+        self.assertEqual(self.cleared("clrwdt\n nop\n clrwdt\n"), [1, 3])
+
+    def test_pwrsav_clears_the_watchdog_too(self) -> None:
+        self.assertEqual(self.cleared("nop\n pwrsav #0\n"), [2])
+        self.assertEqual(self.cleared("nop\n pwrsav #1\n"), [2])
+
+    def cleared(self, text: str) -> list[int]:
+        """Cycles at which the watchdog was cleared in the first three."""
+        chip = Chip(text + MAIN)
         cleared = []
         hook = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(lambda context: cleared.append(chip.machine.registers().cycles))
         chip.machine.library.iss_on_clrwdt(chip.machine.core, hook, NOTHING)
@@ -182,7 +190,7 @@ class Observation(unittest.TestCase):
             chip.run(3)
         finally:
             chip.machine.library.iss_on_clrwdt(chip.machine.core, None, NOTHING)
-        self.assertEqual(cleared, [1, 3])
+        return cleared
 
     def test_program_written_through_the_pointer_is_decoded_when_told(self) -> None:
         chip = Chip("l: inc w5,w5\n bra l")

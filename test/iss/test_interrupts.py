@@ -217,6 +217,18 @@ class Priorities(unittest.TestCase):
         chip.run(100)
         self.assertEqual((chip.w[1], chip.w[2], chip.level), (1, 1, 0))
 
+    def test_with_nstdis_software_cannot_change_the_priority(self) -> None:
+        for nstdis, level in ((NSTDIS, 2), (0, 5)):
+            chip = Chip("mov #0xA0,w5\n mov w5,0x42\n" + MAIN, registers=enable() | {INTCON1: nstdis}, sr=2 << 5)
+            chip.run(3)
+            self.assertEqual(level, chip.level)
+
+    def test_inttreg_cannot_be_written(self) -> None:
+        chip = Chip("setm 0xE0\n mov.b wreg,0xE1\n" + MAIN, registers=enable(), w={0: 0x55})
+        before = chip[INTTREG]
+        chip.run(3)
+        self.assertEqual(before, chip[INTTREG])
+
     def test_interrupts_of_every_register_reach_their_vectors(self) -> None:
         for number in (0, 1, 13, 16, 23, 29, 57, 58, 63, 65, 73, 74):
             with self.subTest(number=number):
@@ -249,6 +261,13 @@ class Disi(unittest.TestCase):
         chip.request(INT0)
         at = chip.until("first")
         self.assertTrue(7 <= at - ENTRY <= 9, at)  # DISI, then 6 cycles, then the end of the present instruction
+
+    def test_holds_back_to_the_cycle(self) -> None:
+        for count in range(8):
+            chip = Chip(f"disi #{count}\n" + "nop\n" * 12 + MAIN, {8 + INT0: "first"}, enable((INT0, 5)))
+            chip.run(1)
+            chip.request(INT0)
+            self.assertEqual(1 + count + ENTRY, chip.until("first"))
 
     def test_does_not_hold_back_priority_7(self) -> None:
         chip = Chip("disi #100\n" + MAIN, {8 + INT0: "first"}, enable((INT0, 7)))
@@ -283,6 +302,16 @@ class Loops(unittest.TestCase):
         self.assertLess(chip.w[0], 20)
         chip.run(80)
         self.assertEqual((chip.w[0], chip.w[1]), (20, 1))
+
+    def test_a_repeated_psv_read_waits_anew_after_an_interrupt(self) -> None:
+        def cycles(interrupted: bool) -> int:
+            chip = Chip("repeat #20\n mov [w5++],w6\n done: nop\n" + MAIN, {8 + INT0: "first"}, enable((INT0, 5)) | {CORCON: 0x24}, w={5: 0x8200})
+            chip.run(12)
+            if interrupted:
+                chip.request(INT0)
+            return chip.until("done")
+        self.assertEqual(1 + 21 + 2, cycles(False))
+        self.assertEqual(1 + 21 + 2 + ENTRY + 1 + 1 + 3 + 1, cycles(True))
 
     def test_the_handlers_own_repeat_needs_rcount_kept(self) -> None:
         chip = Chip("""repeat #19
@@ -363,6 +392,10 @@ class Traps(unittest.TestCase):
         chip.run(20)
         self.assertEqual((chip[INTCON1], chip.w[1]), (0, 0x0B00))
 
+    def test_the_second_word_of_a_double_push_is_watched_too(self) -> None:
+        chip = Chip("mov.d w6,[w15++]\n nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A00})
+        self.expect(chip, STKERR, STACK, 12)
+
     def test_a_push_at_splim_itself_is_none(self) -> None:
         chip = Chip("push w0\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A00})
         chip.run(20)
@@ -426,6 +459,18 @@ class Traps(unittest.TestCase):
                     {MATH: "m"}, enable(), w={2: 100, 5: 0})
         chip.run(100)
         self.assertEqual((chip.w[7], chip.level, chip.w[15], chip[INTCON1]), (1, 0, STACK_AT, 0))
+
+    def test_with_nstdis_a_trap_keeps_its_own_level(self) -> None:
+        chip = Chip("mov [w5],w6\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: NSTDIS}, w={5: 0x0901})
+        self.expect(chip, ADDRERR, ADDRESS, 13)
+
+    def test_a_soft_trap_waits_and_a_hard_one_does_not(self) -> None:
+        delay = Chip.machine.assumption("SOFT_TRAP_DELAY_CYCLES")
+        for text, cycles in (("sftac a,w6", 1 + delay + ENTRY), ("push w0", 1 + delay + ENTRY), ("mov [w5],w6", 1 + ENTRY)):
+            with self.subTest(text):
+                chip = Chip(text + "\n" + "nop\n" * 8 + MAIN, self.vectors, enable() | {SPLIM: 0x0A00},
+                            w={5: 0x0901, 6: 17, 15: 0x0A02 if "push" in text else STACK_AT})
+                self.assertEqual(cycles, chip.until("trap"))
 
     def test_the_alternate_table_is_used_for_traps_too(self) -> None:
         chip = Chip("mov [w5],w6\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON2: ALTIVT}, w={5: 0x0901}, alternate=True)
