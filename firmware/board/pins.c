@@ -14,7 +14,7 @@ void pins_init(void)
 
     __builtin_write_OSCCONL(OSCCON & ~0x0040u); /* unlock the pin selection */
     RPINR12bits.FLTA1R = BOARD_FLTA_RP;
-    RPINR18bits.U1RXR = 20;
-    RPOR9bits.RP19R = BOARD_UART_TX_FUNCTION;
+    RPINR18bits.U1RXR = BOARD_UART_RX_RP;
+    BOARD_UART_TX_PIN = BOARD_UART_TX_FUNCTION;
     __builtin_write_OSCCONL(OSCCON | 0x0040u);
 }

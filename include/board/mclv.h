@@ -1,6 +1,8 @@
 /* The dsPICDEM MCLV with a dsPIC33FJ32MC204: every pin, channel and register value in one place.
  *
- * [?] marks what no published source confirms; check it against your board's schematic before you rely on it. */
+ * [?] marks what no published source confirms; check it against your board's schematic before you rely on it. Two such facts are used
+ * elsewhere: the bus divider of 16 [?, known for the MCLV-2 only] in userparams.h's BUS_FULL_SCALE_V = 16 * 3.3 V, and the
+ * debugger's pins PGC3/PGD3 [?] in config.c. */
 #ifndef BOARD_MCLV_H
 #define BOARD_MCLV_H
 
@@ -50,7 +52,9 @@
 
 /* ---- UART1: 115200 8N1, status lines. RP19/RC3 transmits, RP20/RC4 receives [?] ---- */
 #define BOARD_U1BRG 86u       /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
+#define BOARD_UART_TX_PIN RPOR9bits.RP19R
 #define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
+#define BOARD_UART_RX_RP 20u
 
 /* ---- LEDs [?]: pins are not confirmed for this board; free pins until they are ---- */
 #define BOARD_LED_ALIVE LATCbits.LATC6
