@@ -9,6 +9,7 @@ import tempfile
 import unittest
 from collections import Counter
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import support
@@ -16,7 +17,7 @@ from test_target_build import NEEDED, make, our_lines, shutil
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "fuzz"))
 from sample_image import hex_text # noqa: E402
-from tools.foc33 import pil, pil_command # noqa: E402
+from tools.foc33 import pil, pil_command, places # noqa: E402
 from tools.foc33.errors import UserError # noqa: E402
 from tools.target import cycles # noqa: E402
 from tools.target.profile import Counts, Profile # noqa: E402
@@ -229,6 +230,20 @@ class ForTheUser(unittest.TestCase):
         code, lines = self.module("pil", "demmo", "--image", str(path))
         self.assertEqual(code, 2)
         self.assertIn("did you mean 'demo'?", lines[0])
+
+    def test_what_looks_like_an_option_and_is_none_is_one_line(self):
+        for name in ("pil", "cycles"):
+            code, lines = self.module(name, "--nonsense")
+            self.assertEqual((code, len(lines)), (2, 1))
+            self.assertIn("--nonsense", lines[0])
+
+    def test_table2_goes_where_out_says(self):
+        image = self.folder / "x.hex"
+        image.write_text(hex_text(), encoding="utf-8")
+        for given, wanted in (([], places.RESULTS / "pil-table2"), (["--out", str(self.folder)], self.folder)):
+            with mock.patch.object(pil_command.table2, "command", return_value=0) as command:
+                self.module("pil", "table2", "--image", str(image), *given)
+                self.assertEqual(command.call_args.args[0].out, wanted)
 
     def test_one_folder_for_two_scenarios_is_refused(self):
         code, lines = self.module("pil", "demo", "smoke", "--out", str(self.folder))

@@ -125,7 +125,7 @@ def _table2(options: argparse.Namespace) -> int:
         runs.extend(workers.run_all(jobs, functools.partial(work, image), progress))
         return [matrix.reduced(run.run) for run in runs]
 
-    options = argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": places.RESULTS / "pil-table2"})
+    options = argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": options.out or places.RESULTS / "pil-table2"})
     status = table2.command(options, cases)
     outcomes = [comparison(run) for run in runs]
     print()
@@ -134,8 +134,13 @@ def _table2(options: argparse.Namespace) -> int:
     return max(status, steps.verdict("table2 on the target", outcomes))
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None: # type: ignore[override]
+        raise UserError(message, "command line", f"see {self.prog} --help")
+
+
 def _arguments(arguments: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="foc33 pil", description=__doc__.splitlines()[0])
+    parser = _Parser(prog="python3 -m tools.foc33.pil_command", description=__doc__.splitlines()[0])
     parser.add_argument("scenarios", nargs="*", default=list(DEFAULT), help="names, TOML files, or table2; default demo table2")
     parser.add_argument("--image", type=Path, help="ELF or HEX file; default: built with XC16")
     parser.add_argument("--motor", help="motor file instead of the scenario's")
