@@ -88,6 +88,14 @@ class Resets(unittest.TestCase):
         self.assertEqual((chip.pc, chip.w[15], chip[0x44], chip[0x42], chip[0x52], chip[0x46], chip[0x50] & 0x8000), (0, 0x800, 0x20, 0, 0, 0, 0))
 
 
+    def test_ram_is_unknown_after_power_on_only(self) -> None:
+        for cause, known in ((0, False), (1, False), (2, True), (3, True), (4, True), (5, True), (6, True)):
+            with self.subTest(cause=cause):
+                chip = Chip(MAIN + "\n .org 0x0\n goto 0x400\n .org 0x400\n mov 0x0A00,w6\n again: bra again")
+                chip.machine.library.iss_reset(chip.machine.core, cause)
+                self.assertEqual(known, chip.run(chip.machine.registers().cycles + 8) == "")
+
+
 class Power(unittest.TestCase):
     def test_idle_waits_for_an_interrupt(self) -> None:
         chip = Chip("pwrsav #1\n w: inc w5,w5\n" + MAIN, {8 + INT0: "first"}, enable((INT0, 5)))
@@ -226,6 +234,15 @@ class Observation(unittest.TestCase):
         chip.machine.library.iss_stack_clear(chip.machine.core)
         chip.run(12)
         self.assertEqual((chip.machine.library.iss_stack_bytes(chip.machine.core), chip.w[15]), (4, STACK_AT))
+
+    def test_the_deepest_stack_counts_every_word_and_frame(self) -> None:
+        for text, wanted in (("push w0\n pop w0\n", 2), ("lnk #20\n ulnk\n", 22), ("lnk #20\n push w0\n pop w0\n ulnk\n", 24),
+                             ("mov.d w0,[w15++]\n nop\n", 4), ("rcall f\n bra e\n f: return\n e: nop\n", 4)):
+            with self.subTest(text):
+                chip = Chip("mov #0x900,w15\n " + text + MAIN)
+                chip.machine.library.iss_stack_clear(chip.machine.core)
+                chip.run(14)
+                self.assertEqual(wanted, chip.machine.library.iss_stack_bytes(chip.machine.core))
 
     def test_reports_name_the_symbol(self) -> None:
         chip = Chip("nop\n .word24 0xDB0000\n" + MAIN)

@@ -223,6 +223,13 @@ class Priorities(unittest.TestCase):
             chip.run(3)
             self.assertEqual(level, chip.level)
 
+    def test_with_nstdis_inttreg_has_the_interrupts_own_priority(self) -> None:
+        self.assertEqual(1, Chip.machine.assumption("INTTREG_OWN_PRIORITY"))
+        chip = Chip(vectors={8 + AD1: "second"}, registers=enable((AD1, 4)) | {INTCON1: NSTDIS})
+        chip.request(AD1)
+        chip.run(ENTRY)
+        self.assertEqual((4, 7), (chip[INTTREG] >> 8, chip.level))
+
     def test_inttreg_cannot_be_written(self) -> None:
         chip = Chip("setm 0xE0\n mov.b wreg,0xE1\n" + MAIN, registers=enable(), w={0: 0x55})
         before = chip[INTTREG]
@@ -268,6 +275,22 @@ class Disi(unittest.TestCase):
             chip.run(1)
             chip.request(INT0)
             self.assertEqual(1 + count + ENTRY, chip.until("first"))
+
+    def test_holds_back_to_the_cycle_when_nothing_else_happens(self) -> None:
+        for count in range(8):
+            chip = Chip(f"disi #{count}\n" + "nop\n" * 12 + MAIN, {8 + INT0: "first"}, enable((INT0, 5)))
+            chip.run(1)
+            chip.request(INT0)
+            chip.run(60)
+            self.assertEqual(PROGRAM + 2 * (1 + count), chip[STACK_AT], "where it came")
+
+    def test_disicnt_counts_down(self) -> None:
+        chip = Chip("disi #5\n" + "nop\n" * 12 + MAIN)
+        seen = []
+        for cycle in range(1, 9):
+            chip.run(cycle)
+            seen.append((chip[0x52], chip[INTCON2] >> 14 & 1))
+        self.assertEqual([(5, 1), (4, 1), (3, 1), (2, 1), (1, 1), (0, 0), (0, 0), (0, 0)], seen)
 
     def test_does_not_hold_back_priority_7(self) -> None:
         chip = Chip("disi #100\n" + MAIN, {8 + INT0: "first"}, enable((INT0, 7)))
@@ -392,6 +415,12 @@ class Traps(unittest.TestCase):
         chip.run(20)
         self.assertEqual((chip[INTCON1], chip.w[1]), (0, 0x0B00))
 
+    def test_an_offset_from_the_stack_pointer_is_watched(self) -> None:
+        for text in ("mov w6,[w15+16]", "mov [w15-258],w6", "mov.b w6,[w15+18]"):
+            with self.subTest(text):
+                chip = Chip(f"{text}\n nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0900}, w={15: 0x0900})
+                self.expect(chip, STKERR, STACK, 12)
+
     def test_the_second_word_of_a_double_push_is_watched_too(self) -> None:
         chip = Chip("mov.d w6,[w15++]\n nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A00})
         self.expect(chip, STKERR, STACK, 12)
@@ -436,6 +465,12 @@ class Traps(unittest.TestCase):
         chip = Chip("mac w6*w7,a\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: COVTE, CORCON: 0}, w={6: 0x7FFF, 7: 0x7FFF},
                     acc=[0x7FFFFFFFFF, 0])
         self.expect(chip, MATHERR | COVAERR, MATH, 11)
+
+    def test_the_use_of_guard_bits_is_no_catastrophic_overflow(self) -> None:
+        chip = Chip("mac w6*w7,a\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: COVTE, CORCON: 0}, w={6: 0x7FFF, 7: 0x7FFF},
+                    acc=[0x7FFFFFFF, 0])
+        chip.run(20)
+        self.assertEqual((chip[INTCON1] & MATHERR, chip[SR] >> 15), (0, 1))
 
     def test_an_accumulator_shift_beyond_16_is_a_math_error_and_changes_nothing(self) -> None:
         for shift in (17, 0xFFEF, 0x7FFF):

@@ -15,6 +15,7 @@
     X(SOFT_TRAP_DELAY_CYCLES, 2, "cycles between a stack or math error and its trap", "core_irq.c iss_raise_trap") \
     X(SAME_TRAP_NESTS, 0, "an error inside the handler of its own trap traps again (1 = yes)", "core_irq.c pending_trap") \
     X(VECNUM_OFFSET, 8, "INTTREG.VECNUM is the place in the vector table less this; for traps, which come before 8, modulo 128", "core_irq.c enter_exception") \
+    X(INTTREG_OWN_PRIORITY, 1, "INTTREG.ILR is the interrupt's own priority, also where NSTDIS makes it 7", "core_irq.c enter_exception") \
     X(WRONG_SPACE_VALUE, 0, "what a MAC-class prefetch reads from the other space than its own", "dsp.c fetch") \
     X(OUTSIDE_FLASH_VALUE, 0, "what table and PSV reads get beyond the flash", "core_memory.c") \
     X(CORCON_RESET, 0x0020, "CORCON after a reset", "core.c iss_reset") \
