@@ -550,7 +550,7 @@ class Reports(unittest.TestCase):
         self.assertEqual(chip.run(20), "")
 
     def test_prefetches_from_the_wrong_space_are_told(self) -> None:
-        for text, w in (("clr a,[w8],w6", {8: 0xC00}), ("clr a,[w10],w6", {10: 0xBFE}), ("ed w4*w4,a,[w8],[w10],w6", {8: 0xBFE, 10: 0x900})):
+        for text, w in (("clr a,[w8],w6", {8: 0xC00}), ("clr a,[w10],w6", {10: 0xBFE}), ("clr a,[w10],w6", {10: 0x8200}), ("ed w4*w4,a,[w8],[w10],w6", {8: 0xBFE, 10: 0x900})):
             with self.subTest(text):
                 chip = Chip(f"{text}\n" + MAIN, w=w)
                 self.assertRegex(chip.run(20).lower(), "space.*0*200")

@@ -7,7 +7,7 @@ from machine import PROGRAM, RAM, Machine
 
 # W8 becomes 0900 in each of these.
 WRITES = ["mov w0,w8", "add w0,#0,w8", "mov #0x900,w8", "mov 0x0A00,w8", "mov [w1],w8", "mov [w1+0],w8", "exch w0,w8", "sl w2,#1,w8",
-          "mul.uu w2,#2,w8", "sac a,w8", "lsr w11,w10,w8", "pop w8", "mov.d w0,w8", "add w0,w10,w8", "ze w10,w8; ior w8,w0,w8", "ior #0,w8", "mov w0,0x0010"]
+          "mul.uu w2,#2,w8", "sac a,w8", "lsr w11,w10,w8", "pop w8", "mov.d w0,w8", "add w0,w10,w8", "ze w10,w8; ior w8,w0,w8", "ior #0,w8", "mov w0,0x0010", "exch w8,w0", "bclr w8,#0"]
 # W8 is a destination's pointer and is changed.
 POINTERS = ["mov w3,[w8++]", "mov.b w3,[w8++]", "clr [++w8]", "mov w3,[--w8]", "mov.d w2,[w8++]", "sac a,[w8++]", "add w3,w3,[w8--]"]
 # W8 is not written, or changed as a source's pointer only.

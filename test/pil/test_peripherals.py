@@ -1,6 +1,7 @@
 """The chip's peripherals, seen by programs of a few instructions."""
 
 import os
+import re
 import sys
 import tempfile
 import time
@@ -8,7 +9,7 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from chip import FRC_FCY, PLL, RAM, REGISTERS, STOP, PilBoard, asm33, board, library, pass_ms, run, switch # noqa: E402
+from chip import FRC_FCY, PLL, RAM, REGISTERS, ROOT, STOP, PilBoard, asm33, board, library, pass_ms, run, switch # noqa: E402
 from sample_image import Elf, Section # noqa: E402
 
 UART = """
@@ -25,9 +26,22 @@ class Names(unittest.TestCase):
     def test_every_register_of_the_part_that_the_host_has_is_the_chips(self) -> None:
         absent = {"IFS2", "IEC2", "IPC6", *(f"IPC{n}" for n in range(8, 14)), "IPC17", "CRCCON", *(f"RPINR{n}" for n in (2, 4, 5, 6, 8, 9, 16, 17, 19))}
         header = (Path(__file__).resolve().parents[2] / "tools/host/xc.h").read_text()
-        import re
         host = set(re.findall(r"X\((\w+), 0x\w+\)", header))
         self.assertEqual(absent, {name for name in host if name.lower() not in REGISTERS})
+
+
+class Resets(unittest.TestCase):
+    LIVE = {"PORTA", "PORTB", "PORTC", "RCON", "OSCCON", "P1TMR", "IFS3"} # the fault input is tied to ground, which is active
+
+    def test_every_register_has_its_value_after_power_on_and_after_a_reset(self) -> None:
+        text = (ROOT / "tools/iss33f/sfr_table.h").read_text()
+        table = {name: (int(address, 16), int(value, 16)) for name, address, value in re.findall(r"X\((\w+), (0x\w+), (0x\w+)\)", text)}
+        peripherals = {name: row for name, row in table.items() if row[0] >= 0x60 and name not in self.LIVE}
+        spoil = "btsc rcon, #6\nbra done\n" + "".join(f"com {address}\n" for address, _ in peripherals.values() if not 0x1C0 <= address < 0x200) + "reset\ndone: "
+        for program in (STOP, spoil + STOP):
+            chip = run(program, 1)
+            wrong = [f"{name} {int(chip.get('reg.' + name)):04X}" for name, (_, value) in peripherals.items() if int(chip.get("reg." + name)) != value]
+            self.assertEqual([], wrong)
 
 
 class Memory(unittest.TestCase):
@@ -246,6 +260,10 @@ class Timers(unittest.TestCase):
             chip = run(f"clr ifs0; mov #99, w0; mov w0, pr{number}; clr tmr{number}; mov #0x8000, w0; mov w0, t{number}con\n" + STOP, 1)
             self.assertEqual(1 << bit, int(chip.get("reg.IFS0")) & 0x0188, f"timer {number}")
 
+    def test_a_period_of_zero_gives_no_flag(self) -> None:
+        chip = run("clr ifs0; clr pr1; clr tmr1; mov #0x8000, w0; mov w0, t1con\n" + STOP, 1)
+        self.assertEqual(0, int(chip.get("reg.IFS0")) & 8)
+
     def test_beyond_its_period_register_a_timer_goes_round(self) -> None:
         chip = run("mov #0xFFF0, w0; mov #99, w1; mov w1, pr1; mov w0, tmr1; clr ifs0; setm pr2; clr tmr2; mov #0x8000, w0; mov w0, t2con; mov w0, t1con\n"
                    f"wait: btss ifs0, #3; bra wait; mov tmr2, w0; mov tmr1, w1; mov w0, {RAM}; mov w1, {RAM + 2}\n" + STOP)
@@ -341,6 +359,14 @@ class Uart(unittest.TestCase):
         chip.uart_send("xyz")
         pass_ms(chip, 1)
         self.assertEqual([ord(c) for c in "xyz"], [chip.peek(RAM + 2 * n) for n in range(3)])
+
+    def test_without_a_pin_nothing_arrives(self) -> None:
+        chip = board(PLL + UART + STOP)
+        pass_ms(chip, 2)
+        chip.uart_send("x")
+        pass_ms(chip, 1)
+        self.assertEqual(0, int(chip.get("reg.U1STA")) & 1)
+        self.assertTrue(any(text.startswith("RPINR18") for text in chip.warnings()))
 
     def test_an_unread_receiver_overruns(self) -> None:
         chip = board(PLL + UART + "mov #20, w0; mov w0, rpinr18\n" + STOP)
