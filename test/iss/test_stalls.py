@@ -37,10 +37,12 @@ class Stalls(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.machine = Machine()
 
-    def measured(self, first: str, second: str) -> int:
-        """Cycles of the pair."""
+    def measured(self, first: str, second: str, registers: dict[int, int] | None = None) -> int:
+        """Cycles of the pair; `registers`: other values of W registers."""
         words, labels = asm33.assemble(f"{first}; {second}", PROGRAM)
         w = [0x900, 0xA00, 0x480, 0, 0, 0, 0, 0, START.get(first, 0x900), 0x900, 0, 0x900, 0, 0, 0, 0xE02]
+        for register, value in (registers or {}).items():
+            w[register] = value
         ram = bytearray(0x800)
         for address in (0xA00, 0xE00):
             ram[address - RAM:address - RAM + 2] = b"\0\x09"
@@ -76,6 +78,16 @@ class Stalls(unittest.TestCase):
 
     def test_an_instruction_between_hides_the_write(self) -> None:
         self.check([f"{write}; nop" for write in WRITES], SOURCES, 0)
+
+    def test_the_dsp_engine_writes_what_it_fetches_and_no_more(self) -> None:
+        for first, second, stall in (
+                ("mac w4*w5,a", "mov [w4],w9", 0), ("clr a", "mov [w4],w9", 0), ("clr a,[w8],w5", "mov [w5],w9", 1),
+                ("clr a,[w8],w5", "mov [w4],w9", 0), ("clr a,[w10],w6", "mov [w6],w9", 1), ("clr a,[w10],w6", "mov [w4],w9", 0),
+                ("ed w4*w4,a,[w8],[w10],w5", "mov [w5],w9", 1), ("ed w4*w4,a,[w8],[w10],w5", "mov [w4],w9", 0),
+                ("clr a,w13", "mov [w13],w9", 1), ("clr a,[w13]+=2", "mov [w13],w9", 1), ("mac w4*w5,a", "mov [w13],w9", 0)):
+            with self.subTest(f"{first}; {second}"):
+                registers = {4: 0x900, 5: 0x900, 6: 0x900, 10: 0xE00, 13: 0x8FE if "+=" in first else 0xB00}
+                self.assertEqual(2 + stall, self.measured(first, second, registers))
 
 
 if __name__ == "__main__":
