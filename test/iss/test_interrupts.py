@@ -362,6 +362,11 @@ class Loops(unittest.TestCase):
             # the handler counts in W1, which would be the remainder of what has been worked out so far
             self.assertEqual(chip.w[0] & 0xFFFF, 0xFA6B, f"at {at}")
 
+    def test_the_end_of_do_may_lie_before_it(self) -> None:
+        chip = Chip("b: nop\n do #2,b\n" + MAIN)
+        chip.run(3)
+        self.assertEqual((PROGRAM, 0), (chip[0x3E], chip[0x40]))
+
     def test_do_is_interrupted_and_goes_on(self) -> None:
         for at in range(1, 20):
             chip = Chip("do #4,l\n inc w5,w5\n l: inc w6,w6\n" + MAIN, {8 + INT0: "first"}, enable((INT0, 5)))
@@ -507,6 +512,23 @@ class Traps(unittest.TestCase):
                             w={5: 0x0901, 6: 17, 15: 0x0A02 if "push" in text else STACK_AT})
                 self.assertEqual(cycles, chip.until("trap"))
 
+    def test_a_trap_within_a_trap_returns_to_the_first_ones_level(self) -> None:
+        chip = Chip("sftac a,w6\n" + "nop\n" * 6 + MAIN + """
+            .org 0x3C0
+            m: inc w7,w7
+            mov [w5],w8
+            back: nop
+            bra back
+            .org 0x400
+            a: bclr 0x80,#3
+            mov #0x900,w5
+            retfie""", {MATH: "m", ADDRESS: "a"}, enable(), w={5: 0x0901, 6: 17})
+        chip.until("a")
+        self.assertEqual(13, chip.level)
+        chip.run(chip.machine.registers().cycles + 10)
+        self.assertEqual((11, 1), (chip.level, chip.w[7]))
+        self.assertIn(chip.pc, (chip.labels["back"], chip.labels["back"] + 2))
+
     def test_the_alternate_table_is_used_for_traps_too(self) -> None:
         chip = Chip("mov [w5],w6\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON2: ALTIVT}, w={5: 0x0901}, alternate=True)
         self.expect(chip, ADDRERR, ADDRESS, 13)
@@ -581,6 +603,14 @@ class Reports(unittest.TestCase):
         text = chip.run(20).lower()
         self.assertRegex(text, "0*202")
         self.assertRegex(text, "0*a00")
+
+    def test_ram_that_was_never_written_is_told_once(self) -> None:
+        chip = Chip("mov 0x0A00,w6\n mov 0x0A00,w6\n mov 0x0A02,w6\n" + MAIN)
+        chip.machine.forget(0x0A00)
+        chip.machine.forget(0x0A02)
+        self.assertIn("0A00", chip.run(20))
+        self.assertIn("0A02", chip.run(20))
+        self.assertEqual("", chip.run(20))
 
     def test_ram_is_known_after_a_write_of_just_that_byte(self) -> None:
         chip = Chip("mov.b w0,[w5]\n mov.b [w5],w6\n mov.b [w7],w6\n" + MAIN, w={5: 0x0A00, 7: 0x0A01})
