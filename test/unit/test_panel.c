@@ -335,7 +335,7 @@ void test_alive_LED_blinks_once_a_second(void)
         last = the_lights.led_alive;
     }
     TEST_ASSERT_EQUAL_UINT16(20, edges);
-    TEST_ASSERT_UINT16_WITHIN(10, 5000, on);
+    TEST_ASSERT_EQUAL_UINT16(5000, on);
 }
 
 void test_fault_LED_blinks_the_code_and_then_pauses(void)

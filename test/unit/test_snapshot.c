@@ -48,6 +48,23 @@ void test_nothing_is_recorded_without_a_request(void)
     TEST_ASSERT_EQUAL_UINT16(0, SnapDone);
 }
 
+void test_currents_beyond_the_notes_format_are_limited_not_wrapped(void)
+{
+    int16_t sign;
+    for (sign = -1; sign <= 1; sign = (int16_t)(sign + 2)) {
+        uint16_t n;
+        board_snapshot.row = 0;
+        SnapStart = 1;
+        board_drive.i_a_q13 = (int16_t)(sign * 12000);
+        board_drive.control.i_q13.q = (int16_t)(sign * 8200);
+        for (n = 0; n < 5u; n++) {
+            watch_snapshot();
+        }
+        TEST_ASSERT_EQUAL_INT16(sign * 32764, SnapBuf1[0]);
+        TEST_ASSERT_EQUAL_INT16(sign * 32764, SnapBuf2[0]);
+    }
+}
+
 void test_a_row_every_five_periods_until_fifty_are_full(void)
 {
     uint16_t n;
