@@ -152,6 +152,111 @@ void test_slow_controller_of_a_tiny_current_stays_inside_the_division(void)
     TEST_ASSERT_EQUAL_INT16(2500, id->ki_d); /* as for 64 counts */
 }
 
+void test_current_that_breaks_down_at_the_end_of_RISE_counts_as_half_of_what_was_reached(void)
+{
+    id->rise_q13 = 1312;
+    drive.control.v_q14.d = 4000;
+    drive.control.i_q13.d = 100;
+    id->ready = 1;
+    (void)identify_background(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(4000 * 20 / 656, id->ki_d);
+}
+
+void test_voltage_grows_by_a_128th_every_16_periods_while_the_current_rises(void)
+{
+    int16_t n;
+    (void)rig_tick_until(DRIVE_LOCK, params.bootstrap_periods + 2u);
+    TEST_ASSERT_EQUAL_INT16(16, drive.control.v_q14.d);
+    drive.control.pi_d.sum = 128l << 14;
+    drive.ticks = 0;
+    for (n = 0; n < 16; n++) {
+        (void)identify_voltage(&drive, 1);
+        drive.ticks++;
+    }
+    TEST_ASSERT_EQUAL_INT32(129l << 14, drive.control.pi_d.sum);
+    drive.ticks = 17; /* the even half of 32 periods is as good as the odd one */
+    for (n = 0; n < 15; n++) {
+        (void)identify_voltage(&drive, 1);
+        drive.ticks++;
+    }
+    TEST_ASSERT_EQUAL_INT32(129l << 14, drive.control.pi_d.sum);
+    TEST_ASSERT_EQUAL_INT16(130, identify_voltage(&drive, 1).d);
+    id->ready = 1;
+    TEST_ASSERT_EQUAL_INT16(130, identify_voltage(&drive, 1).d);
+}
+
+/** CONNECT with a current in phase B against the frame's d axis, and its half in phase A. @return the step after it */
+static uint16_t connect_with(int16_t mean_q13, int16_t v_q14)
+{
+    setUp();
+    drive.control.ref_q13.d = 1600;
+    drive.control.v_q14.d = v_q14;
+    id->step = IDENTIFY_CONNECT;
+    id->sum[1] = (int32_t)mean_q13 << (MEAN_LOG2 - 1);
+    id->sum[2] = -((int32_t)mean_q13 << MEAN_LOG2);
+    id->ready = 1;
+    (void)identify_background(&drive, &params);
+    return id->step;
+}
+
+void test_current_an_eighth_below_its_reference_is_reached_and_less_is_not(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_ALIGN, connect_with(1400, 4000));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, connect_with(1399, 4000));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_CURRENT_NOT_REACHED, id->result);
+}
+
+void test_less_than_a_quarter_of_the_reference_is_no_current(void)
+{
+    (void)connect_with(400, 4000);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_CURRENT_NOT_REACHED, id->result);
+    (void)connect_with(399, 4000);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NO_CURRENT, id->result);
+}
+
+void test_current_that_takes_three_quarters_of_the_circle_is_not_reached(void)
+{
+    int16_t most = identify_most(&drive.circle);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_ALIGN, connect_with(1600, (int16_t)(most - 1)));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, connect_with(1600, most));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_CURRENT_NOT_REACHED, id->result);
+}
+
+/** CONNECT at full current in phase B; phases A and C share it unequally. @return the result */
+static uint16_t connect_with_phase_a(int16_t a_q13)
+{
+    setUp();
+    drive.control.ref_q13.d = 1600;
+    drive.control.v_q14.d = 4000;
+    id->step = IDENTIFY_CONNECT;
+    id->sum[1] = (int32_t)a_q13 << MEAN_LOG2;
+    id->sum[2] = -(1600l << MEAN_LOG2);
+    id->ready = 1;
+    (void)identify_background(&drive, &params);
+    return id->result;
+}
+
+void test_phases_that_share_a_current_very_unequally_are_not_connected(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, connect_with_phase_a(1200));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NO_CURRENT, connect_with_phase_a(1201));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, connect_with_phase_a(400));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NO_CURRENT, connect_with_phase_a(399));
+}
+
+void test_sweep_ends_exactly_along_phase_A(void)
+{
+    uint16_t n;
+    id->mode = (uint16_t)IDENTIFY_CURRENT;
+    id->sweep = 1;
+    for (n = 0; n < 20000u && id->sweep; n++) {
+        TEST_ASSERT_EQUAL_UINT16(0, identify_turn(&drive, &params));
+    }
+    TEST_ASSERT_UINT16_WITHIN(10, 10000, n); /* half a second */
+    TEST_ASSERT_EQUAL_HEX32(0, drive.forced.angle_q32);
+    TEST_ASSERT_EQUAL_UINT16(1, identify_turn(&drive, &params));
+}
+
 void test_resistance_out_of_range_is_named(void)
 {
     static const int32_t second[] = { 373, 400, 372 }; /* none, negative, 8 mohm */
@@ -167,6 +272,41 @@ void test_resistance_out_of_range_is_named(void)
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, id->result);
         TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     }
+}
+
+/** Two levels that differ by a sum of duties and a sum of current counts. @return the result */
+static uint16_t resistance_of(int32_t duty, int32_t i)
+{
+    setUp();
+    id->duty_first = duty;
+    id->i_first = i;
+    id->bus_first = (int32_t)BUS_Q16 << MEAN_LOG2;
+    id->step = IDENTIFY_RESISTANCE;
+    id->sum[3] = (int32_t)BUS_Q16 << MEAN_LOG2;
+    id->ready = 1;
+    (void)identify_background(&drive, &params);
+    return id->result;
+}
+
+void test_resistance_is_believed_from_20_mohm_to_40_ohm(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, resistance_of(10725, 4096000l));
+    TEST_ASSERT_EQUAL_UINT16(19, id->values.rs_mohm);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, resistance_of(10726, 4096000l));
+    TEST_ASSERT_EQUAL_UINT16(20, id->values.rs_mohm);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, resistance_of(22887000l, 4261000l));
+    TEST_ASSERT_EQUAL_UINT16(40000u, id->values.rs_mohm);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, resistance_of(22887500l, 4261000l));
+    TEST_ASSERT_EQUAL_UINT16(40001u, id->values.rs_mohm);
+}
+
+void test_smallest_difference_of_two_levels_gives_a_resistance(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, resistance_of(1, 1));
+    TEST_ASSERT_UINT16_WITHIN(2, 7448, id->values.rs_mohm); /* a count of 4 mV over one of 0.5371 mA */
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, resistance_of(0, 1));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, resistance_of(1, 0));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, resistance_of(1, -1));
 }
 
 /** Sums of a coil whose current changes by di in a period between samples in which the voltage had one sign, by nothing where it
@@ -246,6 +386,34 @@ void test_sums_without_sense_are_no_inductance(void)
     TEST_ASSERT_EQUAL_UINT16(0, inductance(id)); /* the time constant is below half a period */
 }
 
+/** Sums of a coil without resistance. @return uH */
+static uint16_t coil_of(int32_t volts, int32_t change)
+{
+    id->values.rs_mohm = 0;
+    id->duty_per_amp = number_of(0);
+    id->bus_q16 = BUS_Q16;
+    id->sum[0] = volts;
+    id->sum[2] = change;
+    return inductance(id);
+}
+
+void test_inductance_is_believed_from_20_uH_to_60_mH(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(0, coil_of(6284, 60000l));
+    TEST_ASSERT_EQUAL_UINT16(20, coil_of(6285, 60000l));
+    TEST_ASSERT_EQUAL_UINT16(60000u, coil_of(19338200l, 60000l));
+    TEST_ASSERT_EQUAL_UINT16(0, coil_of(19338300l, 60000l));
+}
+
+void test_resistance_within_a_period_may_take_less_than_half_of_the_inductance(void)
+{
+    (void)coil(200, 100, 0);
+    id->values.rs_mohm = 34350u;
+    TEST_ASSERT_EQUAL_UINT16(374, inductance(id));
+    id->values.rs_mohm = 34360u;
+    TEST_ASSERT_EQUAL_UINT16(0, inductance(id));
+}
+
 /* ---- The square voltage and its search ---- */
 
 void test_square_voltage_has_halves_of_the_asked_length(void)
@@ -296,6 +464,93 @@ void test_search_ends_at_a_sixth_of_the_current(void)
     try_with(100, 4, (int32_t)(params.open_loop_q13 >> 1) * 21);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INDUCTANCE_D, id->step);
     TEST_ASSERT_EQUAL_UINT16(8192, id->left);
+}
+
+void test_search_on_the_q_axis_ends_at_the_same_current(void)
+{
+    id->on_q = 1; /* phase A + 2 B is 1.73 times as much; 1.5 is asked for */
+    try_with(100, 4, (int32_t)(params.open_loop_q13 - (params.open_loop_q13 >> 2)) * 21 - 1);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_TRY_D, id->step);
+    try_with(100, 4, (int32_t)(params.open_loop_q13 - (params.open_loop_q13 >> 2)) * 21);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INDUCTANCE_D, id->step);
+}
+
+void test_every_square_voltage_has_two_cycles_to_settle(void)
+{
+    try_with(100, 16, 10);
+    TEST_ASSERT_EQUAL_UINT16(64, id->wait);
+    TEST_ASSERT_EQUAL_UINT16(1024, id->left);
+    try_with(100, 16, 100000l);
+    TEST_ASSERT_EQUAL_UINT16(64, id->wait);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INDUCTANCE_D, id->step);
+}
+
+void test_search_starts_with_a_128th_of_the_circle_and_short_halves(void)
+{
+    id->step = IDENTIFY_BIAS;
+    drive.control.v_q14.d = 3000;
+    id->ready = 1;
+    (void)identify_background(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_TRY_D, id->step);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INJECT, id->mode);
+    TEST_ASSERT_EQUAL_INT16(3000, id->bias_q14);
+    TEST_ASSERT_EQUAL_INT16(drive.circle.limit_q14 >> 7, id->square_q14);
+    TEST_ASSERT_EQUAL_UINT16(4, id->half);
+    TEST_ASSERT_EQUAL_UINT16(16, id->wait);
+    TEST_ASSERT_EQUAL_UINT16(256, id->left);
+}
+
+void test_search_on_the_q_axis_starts_with_half_the_square_of_the_d_axis(void)
+{
+    (void)coil(200, 100, 0);
+    id->step = IDENTIFY_INDUCTANCE_D;
+    id->square_q14 = 700;
+    id->half = 8;
+    (void)identify_background(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_TRY_Q, id->step);
+    TEST_ASSERT_EQUAL_UINT16(1, id->on_q);
+    TEST_ASSERT_EQUAL_INT16(350, id->square_q14);
+    TEST_ASSERT_EQUAL_UINT16(32, id->wait);
+    TEST_ASSERT_EQUAL_UINT16(512, id->left);
+}
+
+void test_inductance_that_cannot_be_ends_the_procedure_on_either_axis(void)
+{
+    static const identify_step_t step[] = { IDENTIFY_INDUCTANCE_D, IDENTIFY_INDUCTANCE_Q };
+    uint16_t n;
+    for (n = 0; n < 2u; n++) {
+        setUp();
+        id->step = (uint16_t)step[n];
+        id->ready = 1; /* no sums at all */
+        (void)identify_background(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, id->step);
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_L_RANGE, id->result);
+    }
+}
+
+void test_square_voltage_is_added_to_the_bias_on_one_axis_only(void)
+{
+    dq_t v;
+    id->mode = (uint16_t)IDENTIFY_INJECT;
+    id->bias_q14 = 3000;
+    id->square_q14 = 700;
+    v = identify_voltage(&drive, -1);
+    TEST_ASSERT_EQUAL_INT16(2300, v.d);
+    TEST_ASSERT_EQUAL_INT16(0, v.q);
+    id->on_q = 1;
+    v = identify_voltage(&drive, -1);
+    TEST_ASSERT_EQUAL_INT16(3000, v.d);
+    TEST_ASSERT_EQUAL_INT16(-700, v.q);
+}
+
+void test_square_voltage_begins_in_the_middle_of_a_half(void)
+{
+    static const int16_t expected[] = { 1, 1, -1, -1, -1, -1, 1 };
+    uint16_t n;
+    for (n = 0; n < sizeof expected / sizeof expected[0]; n++) {
+        id->sign = identify_square(id);
+        TEST_ASSERT_EQUAL_INT16(expected[n], id->sign);
+    }
 }
 
 /* ---- Back-EMF ---- */
@@ -380,6 +635,85 @@ void test_swinging_does_not_shorten_the_mean(void)
     TEST_ASSERT_UINT16_WITHIN(4, 7240, id->values.kphi_mv_per_krpm);
 }
 
+/** Stretches of 5148 counts that point to both sides of an axis in turn. @return the result */
+static uint16_t swing(int16_t along, int16_t across, uint16_t along_q)
+{
+    uint16_t n;
+    spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+    for (n = 0; n < 128u; n++) {
+        stretch(along_q ? across : along, along_q ? along : across, 0, 0);
+        stretch(along_q ? (int16_t)-across : along, along_q ? along : (int16_t)-across, 0, 0);
+    }
+    return id->result;
+}
+
+void test_stretches_agree_when_they_lie_within_41_degrees_to_both_sides(void)
+{
+    uint16_t on_q;
+    for (on_q = 0; on_q < 2u; on_q++) {
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, swing(3944, 3309, on_q)); /* 40 degrees */
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, swing(3765, 3511, on_q)); /* 43 degrees */
+    }
+}
+
+void test_each_stretch_is_followed_by_the_next_until_there_are_256(void)
+{
+    spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+    stretches(255, 0, 5148, 0, 0);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_SPIN_FULL, id->step);
+    TEST_ASSERT_EQUAL_UINT16(0, id->ready);
+    TEST_ASSERT_EQUAL_UINT16(0, id->wait);
+    TEST_ASSERT_EQUAL_UINT16(32, id->left);
+    TEST_ASSERT_EQUAL_INT32(0, id->sum[1]);
+    stretch(0, 5148, 0, 0);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, id->result);
+}
+
+void test_half_and_full_speed_agree_within_an_eighth(void)
+{
+    static const struct {
+        int16_t half_more;
+        identify_result_t expected;
+    } cases[] = { { 904, IDENTIFY_RESULT_DONE }, { 905, IDENTIFY_RESULT_NOT_TURNING },
+                  { -904, IDENTIFY_RESULT_DONE }, { -905, IDENTIFY_RESULT_NOT_TURNING } };
+    uint16_t n;
+    for (n = 0; n < 4u; n++) {
+        spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+        stretches(256, 0, 5148, 0, 0);
+        TEST_ASSERT_EQUAL_UINT16(7239, id->values.kphi_mv_per_krpm); /* an eighth is 904 */
+        spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+        id->kphi_half = (uint16_t)(7239 + cases[n].half_more);
+        stretches(256, 0, 5148, 0, 0);
+        TEST_ASSERT_EQUAL_UINT16(cases[n].expected, id->result);
+    }
+}
+
+/** At 7/40 of the usual speed: a few stretches with a count more. @return the result */
+static uint16_t slow_spin(int16_t v_q, uint16_t more)
+{
+    drive_params_t slow = params;
+    uint16_t n;
+    slow.forced.end_speed_q10 = (uint16_t)(params.forced.end_speed_q10 / 40 * 7);
+    spin(IDENTIFY_SPIN_HALF, 0, 0);
+    for (n = 0; n < 256u; n++) {
+        id->sum[0] = 0;
+        id->sum[1] = (int32_t)(v_q + (n < more)) * 32;
+        id->ready = 1;
+        (void)identify_background(&drive, &slow);
+    }
+    return id->result;
+}
+
+void test_back_emf_is_believed_from_500_to_65000_mV(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, slow_spin(31, 19));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, slow_spin(31, 20));
+    TEST_ASSERT_EQUAL_UINT16(500, id->kphi_half);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, slow_spin(4044, 63));
+    TEST_ASSERT_EQUAL_UINT16(64999u, id->kphi_half);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_KPHI_RANGE, slow_spin(4044, 64));
+}
+
 void test_slipping_missing_or_constant_back_emf_is_not_turning(void)
 {
     uint16_t n;
@@ -406,12 +740,34 @@ void test_voltage_at_the_limit_is_named(void)
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_VOLTAGE_LIMIT, id->result);
 }
 
+void test_voltage_limit_is_seven_eighths_of_the_circle(void)
+{
+    int16_t most = (int16_t)(drive.circle.limit_q14 - (drive.circle.limit_q14 >> 3));
+    spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+    stretch(0, most, 0, 0);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, id->result);
+    stretch((int16_t)-most, 0, 0, 0);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, id->result);
+    stretch(0, (int16_t)(most + 1), 0, 0);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_VOLTAGE_LIMIT, id->result);
+}
+
 void test_absurd_back_emf_is_limited_before_it_is_squared(void)
 {
     spin(IDENTIFY_SPIN_FULL, 40000u, 60000u);
     stretches(256, 0, 0, 8191, -8191);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, id->step);
     TEST_ASSERT_EQUAL_INT32(-23170l * 256, id->emf_d_sum);
+}
+
+void test_mean_of_a_stretch_is_limited_to_what_can_be_squared_in_31_bits(void)
+{
+    TEST_ASSERT_EQUAL_INT16(23170, emf_mean(23170l * 32));
+    TEST_ASSERT_EQUAL_INT16(23170, emf_mean(23171l * 32));
+    TEST_ASSERT_EQUAL_INT16(23170, emf_mean(1000000l * 32));
+    TEST_ASSERT_EQUAL_INT16(-23170, emf_mean(-23170l * 32));
+    TEST_ASSERT_EQUAL_INT16(-23170, emf_mean(-23171l * 32));
+    TEST_ASSERT_EQUAL_INT16(-23170, emf_mean(-1000000l * 32));
 }
 
 /* ---- Gains ---- */
@@ -424,6 +780,7 @@ void test_current_gains_follow_from_R_and_L(void)
     id->values.ld_uh = 1920;
     id->bias_q14 = 2000;
     id->ready = 1;
+    drive.control.pi_q.sum = 100000l;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_SPIN_HALF, id->step);
     TEST_ASSERT_INT16_WITHIN(2, 1634, id->kp_d); /* 2 pi 200 Hz * 1.92 mH = 2.413 V/A; 0.6615 * 1024 counts each */
@@ -431,8 +788,36 @@ void test_current_gains_follow_from_R_and_L(void)
     TEST_ASSERT_EQUAL_INT16(id->ki_d, id->ki_q);
     TEST_ASSERT_INT16_WITHIN(1, 114, id->ki_d);  /* 2 pi 200 Hz * 2.67 ohm * 50 us = 0.1678 V/A a period */
     TEST_ASSERT_INT32_WITHIN(2, 2000l << 10, drive.control.pi_d.sum); /* nothing jumps */
+    TEST_ASSERT_EQUAL_INT32(0, drive.control.pi_q.sum);
+    TEST_ASSERT_EQUAL_UINT16(SETTLE_PERIODS, id->wait);
+    TEST_ASSERT_EQUAL_UINT16(32, id->left);
+    TEST_ASSERT_EQUAL_UINT16(0, id->blocks);
     TEST_ASSERT_EQUAL_INT16(32767, gain(number_of(70000ul)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain(number_of(32768ul)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain(number_of(32767ul)));
     TEST_ASSERT_EQUAL_INT16(1, gain(number_scaled(1, 9)));
+}
+
+void test_each_axis_has_its_own_gain(void)
+{
+    dq_t v;
+    id->mode = (uint16_t)IDENTIFY_CURRENT;
+    id->shift = 10;
+    id->kp_d = 1024;
+    id->kp_q = 3072;
+    id->ki_d = 1;
+    id->ki_q = 2;
+    drive.control.pi_d.sum = 0;
+    drive.control.pi_q.sum = 0;
+    drive.control.ref_q13.d = 100;
+    drive.control.ref_q13.q = 100;
+    drive.control.i_q13.d = 0;
+    drive.control.i_q13.q = 0;
+    v = identify_voltage(&drive, 1);
+    TEST_ASSERT_EQUAL_INT16(100, v.d);
+    TEST_ASSERT_EQUAL_INT16(300, v.q);
+    TEST_ASSERT_EQUAL_INT32(100, drive.control.pi_d.sum);
+    TEST_ASSERT_EQUAL_INT32(200, drive.control.pi_q.sum);
 }
 
 /* ---- Hand-over between interrupt and background ---- */
