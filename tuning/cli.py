@@ -3,12 +3,11 @@
 import argparse
 import importlib
 import importlib.util
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tools.foc33 import places
+from tools.foc33 import command_line, places
 from tools.foc33.errors import UserError
 
 if TYPE_CHECKING:
@@ -20,28 +19,15 @@ OTHERS = ("fw_tune", "spreadsheet", "identify")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    try:
+    def work() -> int:
         options = _parser().parse_args(arguments)
         return options.command(options)
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("foc33: interrupted, nothing was written", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()) # the reader went away; say nothing more
-        return 141
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> None: # type: ignore[override]
-        raise UserError(message, "command line", f"see {self.prog} --help")
+    return command_line.run(work)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="tuning", description="Makes a userparams.h from a motor file.")
-    commands = parser.add_subparsers(required=True, metavar="command", parser_class=_Parser)
+    parser = command_line.Parser(prog="tuning", description="Makes a userparams.h from a motor file.")
+    commands = parser.add_subparsers(required=True, metavar="command", parser_class=command_line.Parser)
     tune = commands.add_parser("tune", help="userparams.h and a report for a motor")
     tune.add_argument("motor", nargs="?", help="a name in tuning/motors or the path of a motor file")
     tune.add_argument("--all", action="store_true", help="every motor of tuning/motors")

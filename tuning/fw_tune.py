@@ -459,22 +459,3 @@ def _print(motor: Any, tables: Tables, rows: list[dict[str, Any]], check: Check,
     print(report.table(check.rows, (("speed_rpm", "true\nrpm", "{:.1f}"), ("id_a", "Id\nA", "{:.2f}"), ("current_a_rms", "current\nA rms", "{:.2f}"),
                                     ("use_percent", "voltage\n% of limit", "{:.1f}"), ("angle_deg", "angle error\nmean deg", "{:+.2f}"),
                                     ("trim_a", "trim\nA", "{:.2f}"))))
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """`python3 -m tuning.fw_tune NAME`."""
-    from tools.foc33 import cli
-    parser = cli._Parser(prog="tune-fw", description=(__doc__ or "").split("\n")[0])
-    add_arguments(parser)
-    try:
-        return command(parser.parse_args(arguments))
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("foc33: interrupted, nothing was written", file=sys.stderr)
-        return 130
-
-
-if __name__ == "__main__":
-    sys.exit(main())

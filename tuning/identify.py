@@ -411,5 +411,5 @@ def _write(item: Identified, target: Path, with_plots: bool) -> None:
             (folder.work / "electrical.toml").write_text(item.paste() + "\n", encoding="utf-8")
         if with_plots:
             from . import identify_plots
-            data["plots"] = identify_plots.write_all(item, folder.work)
+            data["plots"] = identify_plots.write_all(item, step_names(), folder.work)
         output.write_summary(folder.work, data)

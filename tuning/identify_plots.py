@@ -22,10 +22,8 @@ plt.rcParams.update({"figure.dpi": 100, "axes.grid": True, "grid.alpha": 0.3, "l
                      "legend.fontsize": 9, "axes.titlesize": 11, "font.size": 10})
 
 
-def write_all(item: "Identified", folder: Path) -> list[str]:
-    """Every plot for which the procedure got far enough; returns the file names."""
-    from .identify import step_names
-    names = step_names()
+def write_all(item: "Identified", names: list[str], folder: Path) -> list[str]:
+    """Every plot for which the procedure got far enough; returns the file names. `names`: of the steps, by number."""
     spans = _spans(item, names)
     files = []
     for name, draw, need in (("resistance", _resistance, "CONNECT"), ("inductance", _inductance, "INDUCTANCE_D"), ("back_emf", _back_emf, "SPIN_HALF")):

@@ -187,7 +187,7 @@ static void rise_done(drive_t *d, const drive_params_t *p)
         i_q13 = LEAST_CURRENT_Q13;
     }
     ki = qm_divud(qm_muluu((uint16_t)v_q14, (uint16_t)(SLOW_LOOP_RAD_S * PARAM_F(LOOPTIME_SEC) * 16384.0F + 0.5F)), (uint16_t)i_q13);
-    id->ki_d = (int16_t)((ki > 32767u) ? 32767u : (ki == 0u) ? 1u : ki);
+    id->ki_d = (int16_t)((ki == 0u) ? 1u : ki); /* at most the voltage: what divides is larger than the factor */
     id->mode = (uint16_t)IDENTIFY_CURRENT;
     go(id, IDENTIFY_CONNECT, SETTLE_PERIODS, 1u << MEAN_LOG2);
 }

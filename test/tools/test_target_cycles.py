@@ -185,12 +185,8 @@ class ForTheUser(unittest.TestCase):
     def module(self, name: str, *arguments: str) -> tuple[int, list[str]]:
         error = io.StringIO()
         with contextlib.redirect_stderr(error), contextlib.redirect_stdout(io.StringIO()):
-            if name == "cycles":
-                return cycles.main(list(arguments)), error.getvalue().splitlines()
-            try:
-                return pil_command.main(list(arguments)), []
-            except UserError as user_error:
-                return 2, [f"foc33: {user_error}"]
+            status = (cycles if name == "cycles" else pil_command).main(list(arguments))
+        return status, error.getvalue().splitlines()
 
     def test_an_image_that_is_not_there_is_named(self):
         for name in ("cycles", "pil"):

@@ -159,7 +159,7 @@ void test_current_that_breaks_down_at_the_end_of_RISE_counts_as_half_of_what_was
     drive.control.i_q13.d = 100;
     id->ready = 1;
     (void)identify_background(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(4000 * 20 / 656, id->ki_d);
+    TEST_ASSERT_EQUAL_INT16(4000l * 20 / 656, id->ki_d);
 }
 
 void test_voltage_grows_by_a_128th_every_16_periods_while_the_current_rises(void)

@@ -1,39 +1,23 @@
 """The command line: `python3 -m tools.foc33 <command>`. Exit codes: 0 all well, 1 an expectation failed, 2 bad input."""
 
 import argparse
-import os
-import sys
 from pathlib import Path
 
-from . import motor_file, output, places, rated, report, robust, scenario, simulate, starts, steps, table2, workers
-from .errors import UserError
+from . import command_line, motor_file, output, places, rated, report, robust, scenario, simulate, starts, steps, table2, workers
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    try:
+    def work() -> int:
         options = _parser().parse_args(arguments)
         return options.command(options)
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("foc33: interrupted, nothing was written", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()) # the reader went away; say nothing more
-        return 141
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> None: # type: ignore[override]
-        raise UserError(message, "command line", f"see {self.prog} --help")
+    return command_line.run(work)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="foc33", description="Runs the foc33 firmware on the virtual MCLV board.")
-    commands = parser.add_subparsers(required=True, metavar="command", parser_class=_Parser)
+    parser = command_line.Parser(prog="foc33", description="Runs the foc33 firmware on the virtual MCLV board.")
+    commands = parser.add_subparsers(required=True, metavar="command", parser_class=command_line.Parser)
 
     run = commands.add_parser("run", help="run a scenario: table, protocol, expectations, plots")
     run.add_argument("scenario", nargs="?", default="demo", help="name (see `scenarios`) or TOML file; default demo")

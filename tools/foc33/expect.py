@@ -1,6 +1,6 @@
 """Expectations: what a scenario says must hold, each kind read from [[expect]] and checked against the finished run.
 
-    kind = "measure"       measure = "1000 rpm", value = "speed_error_percent", min and/or max (values: run.MEASURE_VALUES)
+    kind = "measure"       measure = "1000 rpm", value = "speed_error_percent", min and/or max (values: measure.MEASURE_VALUES)
     kind = "hand_over"     within_s of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
     kind = "outputs_off"   from_s, to_s
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
 
+from .measure import MEASURE_VALUES, MEASURED_BY_FIRMWARE
 from .toml_file import REQUIRED, Section
 
 if TYPE_CHECKING:
@@ -114,14 +115,12 @@ class MeasureExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
-        from .run import MEASURE_VALUES
         measure, value = section.choice("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES))
         if value == "speed_error_percent" and not measures[measure]:
             raise section.fail("value", f"'{measure}' has no speed error", "add reference_rpm to the measure")
         return cls(measure, value, Bounds.read(section))
 
     def reads_firmware(self) -> bool:
-        from .run import MEASURED_BY_FIRMWARE
         return self.value in MEASURED_BY_FIRMWARE
 
     def check(self, run: "Run") -> list[Outcome]:

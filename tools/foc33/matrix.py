@@ -7,8 +7,9 @@ import numpy as np
 
 from . import simulate, workers
 from .errors import UserError
+from .measure import Measure
 from .run import Run
-from .scenario import BRAKE, Event, Measure, Scenario
+from .scenario import BRAKE, Event, Scenario
 
 MEASURE = "measured"
 S3_DEBOUNCE_S = 0.03

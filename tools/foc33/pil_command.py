@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from . import build, matrix, output, pil, places, report, scenario, simulate, steps, table2, workers
+from . import build, command_line, matrix, output, pil, places, report, scenario, simulate, steps, table2, workers
 from .errors import UserError
 from .expect import Outcome
 
@@ -134,13 +134,8 @@ def _table2(options: argparse.Namespace) -> int:
     return max(status, steps.verdict("table2 on the target", outcomes))
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> None: # type: ignore[override]
-        raise UserError(message, "command line", f"see {self.prog} --help")
-
-
-def _arguments(arguments: list[str]) -> argparse.Namespace:
-    parser = _Parser(prog="python3 -m tools.foc33.pil_command", description=__doc__.splitlines()[0])
+def _arguments(arguments: list[str] | None) -> argparse.Namespace:
+    parser = command_line.Parser(prog="python3 -m tools.foc33.pil_command", description=__doc__.splitlines()[0])
     parser.add_argument("scenarios", nargs="*", default=list(DEFAULT), help="names, TOML files, or table2; default demo table2")
     parser.add_argument("--image", type=Path, help="ELF or HEX file; default: built with XC16")
     parser.add_argument("--motor", help="motor file instead of the scenario's")
@@ -152,9 +147,13 @@ def _arguments(arguments: list[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return command_line.run(lambda: _run(_arguments(arguments)))
+
+
+def _run(options: argparse.Namespace) -> int:
     """All scenarios, one after the other; the worst of their exit codes."""
-    options = _arguments(arguments)
     if options.out is not None and len(options.scenarios) > 1:
         raise UserError("one result folder for several scenarios", "--out", "run them one by one")
     status = 0
@@ -166,11 +165,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main(sys.argv[1:]))
-    except UserError as user_error:
-        print(f"foc33: {user_error}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        print("foc33: interrupted, nothing was written", file=sys.stderr)
-        sys.exit(130)
+    sys.exit(main())

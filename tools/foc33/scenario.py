@@ -45,12 +45,11 @@ from dataclasses import dataclass, field, replace
 from . import places
 from .errors import UserError
 from .expect import Expectation, read_expectation
+from .measure import SPEEDS, Measure
 from .plant import Values
 from .toml_file import Document, Section
 
 EVENT_KINDS = ("press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
-SPEEDS = ("minimum", "nominal", "maximum")
-"""Speeds of the header by name."""
 BRAKE = "load.constant_nm"
 
 
@@ -74,23 +73,6 @@ class Event:
     """how the file gave the value, where that is not the kind and the value"""
     finds_range: bool = False
     """the operator presses S3 where the speed lies in the potentiometer's other range"""
-
-
-@dataclass(frozen=True)
-class Measure:
-    """One [[measure]]: a stretch of time that becomes a row of the table."""
-
-    name: str
-    from_s: float
-    to_s: float
-    reference_rpm: float | None = None
-    reference_percent: float | None = None
-    reference: str = ""
-    """which of SPEEDS"""
-
-    @property
-    def has_reference(self) -> bool:
-        return self.reference_rpm is not None or self.reference_percent is not None or self.reference != ""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.foc33 import build, pil, pil_command, places, plant, scenario, simulate, workers
+from tools.foc33 import build, command_line, pil, pil_command, places, plant, scenario, simulate, workers
 from tools.foc33.errors import UserError
 from tools.foc33.steps import Progress
 from tools.foc33.toml_file import Document
@@ -364,34 +364,27 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], limits
     return report
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> None: # type: ignore[override]
-        raise UserError(message, "command line", f"see {self.prog} --help")
-
-
 def main(arguments: list[str] | None = None) -> int:
-    try:
-        parser = _Parser(prog="python3 -m tools.target.cycles", description=__doc__.splitlines()[0])
+    def work() -> int:
+        parser = command_line.Parser(prog="python3 -m tools.target.cycles", description=__doc__.splitlines()[0])
         parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
         parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
         parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
         parser.add_argument("--out", type=Path, help="folder for cycles.json, cycles.svg, cycles.folded; default: the image's")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--quiet", action="store_true", help="no progress bar")
-        options = parser.parse_args(arguments)
-        limits = Limits.read()
-        userparams = None if options.userparams is None else build.header_folder(options.userparams)
-        image = pil_command.image_for([], userparams, options.image)
-        report = measure(image, userparams, tuple(options.scenarios) or limits.scenarios, None if options.no_budget else limits, options.quiet)
-        paths = write(report, options.out or image.parent)
-        print(text(report))
-        print("\nwritten: " + ", ".join(str(places.shown(path)) for path in paths))
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("foc33: interrupted, nothing was written", file=sys.stderr)
-        return 130
+        return _run(parser.parse_args(arguments))
+    return command_line.run(work)
+
+
+def _run(options: argparse.Namespace) -> int:
+    limits = Limits.read()
+    userparams = None if options.userparams is None else build.header_folder(options.userparams)
+    image = pil_command.image_for([], userparams, options.image)
+    report = measure(image, userparams, tuple(options.scenarios) or limits.scenarios, None if options.no_budget else limits, options.quiet)
+    paths = write(report, options.out or image.parent)
+    print(text(report))
+    print("\nwritten: " + ", ".join(str(places.shown(path)) for path in paths))
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)
     return 1 if report.broken else 0

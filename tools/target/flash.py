@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tools.foc33 import command_line
 from tools.foc33.errors import UserError, suggestion
 
 from . import device, image
@@ -61,7 +62,7 @@ def checked(hex_file: Path, elf_file: Path) -> list[str]:
 
 
 def parser() -> argparse.ArgumentParser:
-    result = argparse.ArgumentParser(prog="python3 -m tools.target.flash", description=__doc__.splitlines()[0])
+    result = command_line.Parser(prog="python3 -m tools.target.flash", description=__doc__.splitlines()[0])
     result.add_argument("hex", type=Path)
     result.add_argument("--elf", type=Path, required=True, help="the program that the HEX was made of, for the checks")
     result.add_argument("--tool", default="PK4", help=f"{', '.join(TOOLS)} (PK4)")
@@ -99,11 +100,7 @@ def program(options: argparse.Namespace) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    try:
-        return program(parser().parse_args(arguments))
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
+    return command_line.run(lambda: program(parser().parse_args(arguments)))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+from tools.foc33 import command_line
 from tools.foc33.errors import UserError
 
 from . import device
@@ -202,7 +203,7 @@ def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, 
 
 
 def parser() -> argparse.ArgumentParser:
-    result = argparse.ArgumentParser(prog="python3 -m tools.target.image", description=__doc__.splitlines()[0])
+    result = command_line.Parser(prog="python3 -m tools.target.image", description=__doc__.splitlines()[0])
     result.add_argument("elf", type=Path)
     result.add_argument("hex", type=Path)
     result.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
@@ -214,19 +215,18 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = parser().parse_args(arguments)
+    return command_line.run(lambda: _run(parser().parse_args(arguments)))
+
+
+def _run(options: argparse.Namespace) -> int:
+    elf, words = read_elf(options.elf), read_hex(options.hex)
+    pieces = read_map(options.map) if options.map else None
+    budget = read_budget(options.budget)
+    deepest, unsure = deepest_stack(options.elf, options.objdump) if options.objdump else (None, [])
     try:
-        elf, words = read_elf(options.elf), read_hex(options.hex)
-        pieces = read_map(options.map) if options.map else None
-        budget = read_budget(options.budget)
-        deepest, unsure = deepest_stack(options.elf, options.objdump) if options.objdump else (None, [])
-        try:
-            config = wanted_fields(options.config.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
+        config = wanted_fields(options.config.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
     failures = check(elf, words, pieces, config, budget, deepest) + [f"stack: {reason}" for reason in unsure if budget]
     for failure in failures:
         print(f"foc33: {options.hex.name}, {failure}", file=sys.stderr)

@@ -4,12 +4,12 @@
 
 Three files, those that MPLAB X keeps under version control; it makes the rest when it opens the project."""
 
-import argparse
 import sys
 import xml.sax.saxutils
 from collections.abc import Iterable
 from pathlib import Path
 
+from tools.foc33 import command_line
 from tools.foc33.errors import UserError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -216,20 +216,19 @@ def project(facts: dict[str, list[str]]) -> dict[str, str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python3 -m tools.target.project", description=__doc__.splitlines()[0])
+    parser = command_line.Parser(prog="python3 -m tools.target.project", description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "firmware.X", help="the project's folder (firmware.X)")
-    out = parser.parse_args(arguments).out
+    return command_line.run(lambda: _write(parser.parse_args(arguments).out))
+
+
+def _write(out: Path) -> int:
     try:
         texts = project(read(sys.stdin))
         for name, text in texts.items():
             (out / name).parent.mkdir(parents=True, exist_ok=True)
             (out / name).write_text(text, encoding="utf-8")
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
     except OSError as error:
-        print(f"foc33: cannot write the project ({error.strerror}), {out}: check the folder's permissions", file=sys.stderr)
-        return 2
+        raise UserError(f"cannot write the project ({error.strerror})", str(out), "check the folder's permissions") from None
     print(f"{out.name}: {', '.join(texts)}")
     return 0
 

@@ -13,7 +13,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tools.foc33 import places
+from tools.foc33 import command_line, places
 from tools.foc33.errors import UserError
 
 from . import attribution, base, stack
@@ -248,14 +248,9 @@ def disassemble(objdump: str, elf: Path) -> str:
     return done.stdout
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> None: # type: ignore[override]
-        raise UserError(message, "command line", f"see {self.prog} --help")
-
-
 def main(arguments: list[str] | None = None) -> int:
-    try:
-        parser = _Parser(prog="python3 -m tools.target.size", description=__doc__.splitlines()[0])
+    def work() -> int:
+        parser = command_line.Parser(prog="python3 -m tools.target.size", description=__doc__.splitlines()[0])
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
         parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json, size.csv, size.png")
         parser.add_argument("--objdump", default="xc16-objdump")
@@ -263,11 +258,8 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("--link", default="", help="the same for linking, with {objects}, {elf} and {map}")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--brief", action="store_true", help="no table of functions")
-        options = parser.parse_args(arguments)
-        return _run(options)
-    except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
-        return 2
+        return _run(parser.parse_args(arguments))
+    return command_line.run(work)
 
 
 def _run(options: argparse.Namespace) -> int:

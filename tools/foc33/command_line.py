@@ -1,0 +1,30 @@
+"""What the project's command lines share: one line for bad input, and the exit codes."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+
+from .errors import UserError
+
+
+class Parser(argparse.ArgumentParser):
+    """Bad arguments get one line like all bad input, not the usage."""
+
+    def error(self, message: str) -> None: # type: ignore[override]
+        raise UserError(message, "command line", f"see {self.prog} --help")
+
+
+def run(work: Callable[[], int]) -> int:
+    """Exit code of `work`; 2 after bad input, 130 after Ctrl-C, 141 when the reader of the output went away."""
+    try:
+        return work()
+    except UserError as error:
+        print(f"foc33: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("foc33: interrupted, nothing was written", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()) # say nothing more
+        return 141
