@@ -185,9 +185,9 @@ reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
 unknown_suites = $(strip $(foreach name,$(ONLY),$(if $(filter $(name) %/$(name),$1),,$(name))))
 run_suites = +@$(if $(call unknown_suites,$1 $2),echo "foc33: no suite '$(call unknown_suites,$1 $2)'$(comma) make $@: make test runs them all and shows their names" >&2; \
     exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
-    rm -f $T/*.txt; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
+    rm -f $T/*.txt $T/summary.json; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
     $(if $(call chosen,$2),$(MAKE) -k -j1 $(call reports,$(call chosen,$2)) || true;) \
-    $(python) test/run-report.py $(call reports,$(call chosen,$1 $2))
+    $(python) test/run-report.py $(if $2,$(if $(ONLY),,--summary $T/summary.json)) $(call reports,$(call chosen,$1 $2))
 
 .PHONY: test test-quick setup-test setup-checks
 test: setup-test setup-checks ## every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]

@@ -1,10 +1,12 @@
 """Gathers the report files of all suites: failures with their place, ignored tests, and the last line "N passed, N failed".
 
-    test/run-report.py build/test/unit.test_pi.txt ...
+    test/run-report.py [--summary file.json] build/test/unit.test_pi.txt ...
 
-Exit status 1 when a test failed, a suite crashed or did not build, or nothing ran at all.
+--summary keeps the numbers for the README; for a run of every suite. Exit status 1 when a test failed, a suite crashed or did not
+build, or nothing ran at all.
 """
 
+import json
 import sys
 from pathlib import Path
 
@@ -12,7 +14,9 @@ from report import read_suite
 
 
 def main() -> int:
-    suites = [read_suite(Path(name)) for name in sys.argv[1:]]
+    arguments = sys.argv[1:]
+    summary = Path(arguments[1]) if arguments[:1] == ["--summary"] else None
+    suites = [read_suite(Path(name)) for name in arguments[2 if summary else 0:]]
     passed = sum(len(suite.passed) for suite in suites)
     failed = sum(len(suite.failures) for suite in suites)
     for suite in suites:
@@ -23,6 +27,8 @@ def main() -> int:
             print(f"FAILED {suite.name}: {failure}")
     if not suites:
         print("FAILED: no test suite was run")
+    if summary:
+        summary.write_text(json.dumps({"passed": passed, "failed": failed}) + "\n", encoding="utf-8")
     print(f"{passed} passed, {failed} failed")
     return 0 if passed and not failed else 1
 

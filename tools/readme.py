@@ -104,14 +104,14 @@ def cycles() -> str | None:
 
 def tests() -> str | None:
     """What `make test`, `make coverage` and `make mutate` left in build/; None while the first two have not been run."""
-    coverage, mutants, reports = (ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test"))
-    if not (coverage.exists() and reports.exists()):
+    coverage, mutants, suites = (ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test/summary.json"))
+    if not (coverage.exists() and suites.exists()):
         return None
-    coverage = json.loads(coverage.read_text())
-    suites = [path.read_text() for path in sorted(reports.glob("*.txt"))]
-    count = sum(len(re.findall(r"(?m)^\S+?:(?:\d+:)?[^:]*:?PASS", text)) for text in suites)
+    coverage, suites = json.loads(coverage.read_text()), json.loads(suites.read_text())
+    if suites["failed"]:
+        sys.exit(f"foc33: {suites['failed']} tests failed, build/test/summary.json: repair them, run `make test`, then `make readme`")
     rows = [
-        ["unit, board and closed-loop tests", str(count), "`make test`"],
+        ["unit, board and closed-loop tests", str(suites["passed"]), "`make test`"],
         ["control law: lines / branches reached by the unit tests", f"{coverage['line_percent']:.0f} % / {coverage['branch_percent']:.0f} %", "`make coverage`"],
     ]
     if mutants.exists():
