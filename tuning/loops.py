@@ -36,6 +36,9 @@ lower bandwidth with more of it is calmer at low speed than the other way round.
 SLOTS = 8
 CURRENT_TOP = 1.0 / 12.0
 """Taken above the cap only for a motor whose rotation at top speed would cost the margin below it."""
+CURRENT_NEARLY_DEG = 5.0
+"""Where no bandwidth of the current loops has the margin, the one nearest the cap that has so little less than the best: rotation takes the
+margin then, and a loop twenty times slower would gain three degrees and leave the speed loop nothing to stand on."""
 TOLERANCE = {"rs": (0.9, 1.3), "ls": (0.8, 1.2), "psi": (0.9, 1.1)}
 """Parameter set of every motor, as factors: R 10 % below the sheet up to copper at 100 degC, L and flux as sheets leave them open."""
 
@@ -195,13 +198,15 @@ def _worst(cases: Iterable[tuple[str, Callable[[], Margins]]], stop: bool) -> tu
     return worst, label
 
 
-def _largest(candidates: list[float], worst_of: Callable[[float, bool], tuple[Margins, str]]) -> tuple[float, Margins, str]:
-    """The largest candidate with enough margin; if there is none, the one with the most."""
+def _largest(candidates: list[float], worst_of: Callable[[float, bool], tuple[Margins, str]],
+             nearly_deg: float = 0.0) -> tuple[float, Margins, str]:
+    """The largest candidate with enough margin; if there is none, the first one that is within `nearly_deg` of the most."""
     for candidate in candidates:
         if worst_of(candidate, True)[0].enough:
             return candidate, *worst_of(candidate, False)
     results = [(candidate, *worst_of(candidate, False)) for candidate in candidates[:: max(1, len(candidates) // 20)]]
-    return max(results, key=lambda item: item[1].phase_deg)
+    most = max(item[1].phase_deg for item in results)
+    return next(item for item in results if item[1].phase_deg >= most - nearly_deg)
 
 
 def current_gains(plant: Plant, bandwidth_hz: float, base: Gains) -> Gains:
@@ -233,7 +238,7 @@ def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: G
     cap = min(CURRENT_CAP / base.period_s, largest_hz)
     above = [f for f in _steps(min(CURRENT_TOP / base.period_s, largest_hz), cap, 0.95) if f > cap][::-1]
     candidates = [fixed_hz] if fixed_hz else _steps(cap, max(least_hz, cap / 20.0), 0.95) + above
-    chosen, worst, label = _largest(candidates, worst_of)
+    chosen, worst, label = _largest(candidates, worst_of, CURRENT_NEARLY_DEG)
     gains = current_gains(plant, chosen, base)
     design = LoopDesign(chosen, worst, label, Margins(0.0, 0.0, 0.0))
     for name in dict.fromkeys([*list(cases)[:2 * len(axes)], label]):

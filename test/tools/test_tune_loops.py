@@ -214,6 +214,16 @@ class Choice(unittest.TestCase):
         self.assertEqual(of(HURST).value("CURRENT_BANDWIDTH_HZ"), 1000.0)
         self.assertGreater(of("maxon_ec45flat_30w_24v").value("CURRENT_BANDWIDTH_HZ"), 1000.0)
 
+    def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_few_degrees(self):
+        """A small rotor with short L/R: 57.4 degrees at 53 Hz, 54.5 at 1000 Hz."""
+        d = designed(("pole_pairs = { value = 5", "pole_pairs = { value = 4"), ("value = 2.67", "value = 3.0"), ("value = 1.92", "value = 0.6"),
+                     ("value = 7.24", "value = 4.0"), ("value = 5.5e-6", "value = 1.5e-7"), ("value = 15.3e-6", "value = 1e-9"),
+                     ("value = 0.004", "value = 0.0008"), ("value = 1.53", "value = 1.0"), ("value = 0.08", "value = 0.025"),
+                     ("speed = { value = 2500", "speed = { value = 4000"), ("value = 5000", "value = 5500"), ("value = 2.75", "value = 1.5"))
+        self.assertEqual(d.value("CURRENT_BANDWIDTH_HZ"), 1000.0)
+        self.assertTrue(any("CURRENT_BANDWIDTH_HZ = 1000: the current loop has 5" in warning for warning in d.warnings), d.warnings)
+        self.assertTrue(d.speed_loop.reached)
+
     def test_each_axis_of_a_salient_motor_has_its_own_gain(self):
         d = of("linix_45zwn24_40")
         self.assertAlmostEqual(d.value("D_CURRCNTR_PTERM") / d.value("Q_CURRCNTR_PTERM"), d.motor.ld_h / d.motor.lq_h, delta=1e-4)
