@@ -411,12 +411,14 @@ def _warn_loops(d: Design) -> None:
         d.warnings.append(f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow for so quick a rotor ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
                           "second at minimum speed): put loads on slowly, or at a higher speed, or add inertia")
     s = d.start_up
+    calming = "add [mechanical] coulomb_friction, which the no-load current gives"
     if s and not s.follows and s.trial is not None:
         lost = [label for label, ok in zip(s.trial.labels, s.trial.followed) if not ok]
-        d.warnings.append(f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): raise maximum_current, or "
-                          "lower start_torque or the load's inertia")
+        d.warnings.append(f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): " + (
+            calming if s.damping < 0.0 and d.motor.coulomb_nm == 0.0 else "raise maximum_current, or lower start_torque or the load's inertia"))
     elif s and s.loud:
         d.warnings.append(f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
-                          "to start from some angles: " + ("add [mechanical] coulomb_friction, which the no-load current gives" if d.motor.coulomb_nm == 0.0
-                                                           else "remove LOCK_TIME from [tune]" if "LOCK_TIME" in d.motor.tune else "raise END_SPEED_RPM in [tune]"))
-
+                          "to start from some angles: " + (
+                              calming if d.motor.coulomb_nm == 0.0 else "remove LOCK_TIME from [tune]" if "LOCK_TIME" in d.motor.tune
+                              else "with so little inductance the current's sample, after the pulse's centre, feeds the swing; put chokes into the motor's leads"
+                              if s.damping < 0.0 else "raise END_SPEED_RPM in [tune]"))

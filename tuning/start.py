@@ -34,6 +34,8 @@ LEAST_LOCK_S = 0.2
 LOCK_SWINGS = 8.0
 """The lock lasts so many periods of the rotor's swing at least."""
 LARGEST_RATE = 2000
+SAMPLE_AFTER_MEAN_S = 1.5e-6
+"""BOARD_SAMPLE_DELAY_CLOCKS of include/board/mclv.h: between the two the back-EMF takes E t/L off the current, which the loop then adds."""
 CALM_SHARE = 0.03
 """Share of the hand-over speed by which the rotor may still swing about it without a longer lock: the hand-over overshoots by several times that."""
 LOUD_SHARE = 0.1
@@ -133,12 +135,13 @@ def lock_by_rule_s(omega: float) -> float:
 
 
 def damping_nms(motor: Motor, plant: Plant, gains: Gains, omega: float) -> float:
-    """Viscous friction and what the current loop adds: the swing's back-EMF drives a current through the loop's admittance."""
+    """Viscous friction and what the current loop adds: the swing's back-EMF drives a current through the loop's admittance, less what the
+    sample after the pulse's centre makes of it. Negative where that is more: a small inductance lets the swing grow."""
     hz = np.array([omega / (2.0 * math.pi)])
     h = math.exp(-plant.rs * gains.period_s / plant.lq)
     open_plant = (1.0 - h) / plant.rs / (np.exp(1j * omega * gains.period_s) - h)
     admittance = (open_plant / (1.0 + current_loop(hz, plant, gains, 0.0)))[0]
-    return motor.viscous_nms + 1.5 * (motor.pole_pairs * motor.psi_vs) ** 2 * max(float(admittance.real), 0.0)
+    return motor.viscous_nms + 1.5 * (motor.pole_pairs * motor.psi_vs) ** 2 * (float(admittance.real) - SAMPLE_AFTER_MEAN_S / plant.lq)
 
 
 def ramp_rate(motor: Motor, board: BoardFile, current_a: float, end_rpm: float, inertia: float) -> int:

@@ -1,10 +1,11 @@
 """The start's rules: enough torque, enough back-EMF, a lock long enough, and a rotor that follows."""
 
 import math
+import re
 import unittest
 from dataclasses import replace
 
-from tools.foc33 import board_file, motor_file
+from tools.foc33 import board_file, motor_file, places
 from tune_support import HURST, designed, motors, of
 from tuning import start
 
@@ -124,6 +125,23 @@ class Trials(unittest.TestCase):
         bare = designed(("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0")).start_up
         self.assertGreater(bare.lock_s, 1.4 * designed().start_up.lock_s)
         self.assertLessEqual(bare.trial.swing_rpm, start.CALM_SHARE * bare.end_speed_rpm)
+
+    def test_the_sample_s_delay_is_the_board_s(self):
+        text = (places.ROOT / "include" / "board" / "mclv.h").read_text(encoding="utf-8")
+        clocks = int(re.search(r"BOARD_SAMPLE_DELAY_CLOCKS (\d+)u", text)[1])
+        self.assertAlmostEqual(clocks / 40e6, start.SAMPLE_AFTER_MEAN_S)
+
+    def test_a_small_inductance_lets_the_swing_grow_and_is_warned_about(self):
+        """On the virtual board 20 of 72 starts of this motor succeed; with 0.15 mH all."""
+        changes = (("pole_pairs = { value = 5", "pole_pairs = { value = 1"), ("value = 2.67", "value = 1.5"),
+                   ("value = 7.24", "value = 2.084"), ("value = 5.5e-6", "value = 5e-7"), ("value = 15.3e-6", "value = 1e-9"), ("value = 0.004", "value = 0.001"),
+                   ("value = 1.53", "value = 1.32"), ("value = 0.08", "value = 0.022"), ("speed = { value = 2500", "speed = { value = 8000"),
+                   ("value = 5000", "value = 10000"), ("value = 2.75", "value = 1.98"))
+        small = designed(*changes, ("value = 1.92", "value = 0.1"))
+        self.assertLess(small.start_up.damping, 0.0)
+        self.assertTrue(any("put chokes into the motor's leads" in warning for warning in small.warnings), small.warnings)
+        large = designed(*changes, ("value = 1.92", "value = 0.5"))
+        self.assertFalse(any("chokes" in warning or "swings" in warning for warning in large.warnings), large.warnings)
 
     def test_a_rotor_without_friction_is_warned_about_with_the_line_to_add(self):
         d = designed(("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 1e-9"),
