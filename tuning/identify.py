@@ -112,6 +112,7 @@ def header(known: Known, board: BoardFile) -> str:
     """A userparams.h for the IDENTIFY firmware."""
     maximum_a = max(known.current_a, 0.07 * board.current_full_scale_a)
     top_rpm = 1.3 * known.speed_rpm
+    idle_ohm = min(1.0, 0.2 * board.nominal_bus_v / _trip_a(board)) # with more, R I leaves the back-EMF's format on a board for large currents
     rate = known.speed_rpm * known.pole_pairs * board.pwm_period_s * 65536.0 / 60.0 * 1024.0 / (2.0 / board.pwm_period_s)
     parts = {
         "What somebody has to know, or to try": {
@@ -124,7 +125,7 @@ def header(known: Known, board: BoardFile) -> str:
             "BUS_FULL_SCALE_V": board.bus_full_scale_v, "SAMPLE_WINDOW_SEC": board.sample_window_s, "OVER_VOLTAGE_V": board.over_voltage_v,
             "UNDER_VOLTAGE_V": board.under_voltage_v, "REGEN_LIMIT_V": board.regen_limit_v},
         "Without meaning here": {
-            "MOTOR_RS_OHM": 1.0, "MOTOR_LS_MH": 1.0, "MOTOR_KPHI_V_PER_KRPM": 1.5 * known.pole_pairs, "MOTOR_INERTIA_KGM2": 1e-5,
+            "MOTOR_RS_OHM": idle_ohm, "MOTOR_LS_MH": idle_ohm, "MOTOR_KPHI_V_PER_KRPM": 1.5 * known.pole_pairs, "MOTOR_INERTIA_KGM2": 1e-5,
             "MINIMUM_SPEED_RPM": max(50.0, 0.5 * known.speed_rpm), "NOMINAL_SPEED_RPM": max(100.0, known.speed_rpm * 1.1),
             "MAXIMUM_SPEED_RPM": max(120.0, top_rpm), "FW_START_SPEED_RPM": max(100.0, known.speed_rpm), "SPEEDREFRAMP_RPM_PER_S": 1000,
             "TUNING_DELAY_RAMPUP": 15, "LOCK_TIME": 4000, "CURRENT_BANDWIDTH_HZ": 200, "SPEED_BANDWIDTH_HZ": 10, "SPEEDCNTR_PTERM": 0.1,

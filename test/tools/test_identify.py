@@ -6,11 +6,12 @@ import json
 import re
 import tempfile
 import unittest
+from dataclasses import replace
 from pathlib import Path
 
 from tools.foc33 import board_file, motor_file, places, plant
 from tools.foc33.errors import UserError
-from tuning import cli, identify
+from tuning import cli, identify, params
 
 NAME = "hurst_dmb0224c10002"
 
@@ -53,6 +54,14 @@ class Header(unittest.TestCase):
         self.assertEqual(self.define(text, "NOPOLESPAIRS"), "5")
         self.assertEqual(self.define(text, "Q_CURRENT_REF_OPENLOOP"), "1.53")
         self.assertEqual(self.define(text, "END_SPEED_RPM"), "1120")
+
+    def test_a_board_for_large_currents_builds_too(self):
+        """33 A and 48 A of range: with the placeholders of the MCLV the back-EMF's number format would overflow."""
+        for full_scale_a in (33.0, 46.0):
+            text = identify.header(identify.Known(4, 17.0, 1400.0), replace(self.board, current_full_scale_a=full_scale_a))
+            values = {name: value for name, value in re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE) if name != "USERPARAMS_H"}
+            self.assertEqual(params.check(values), [])
+        self.assertEqual(self.define(identify.header(identify.Known(4, 1.0, 1400.0), self.board), "MOTOR_RS_OHM"), "1")
 
     def test_knows_nothing_of_what_is_to_be_measured(self):
         """Motors that differ in everything else have the same header."""
