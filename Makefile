@@ -109,11 +109,11 @@ identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on t
 
 userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old, .old2 ... [MOTOR=name]
 	@$(tuner) tune $(tune_motor) $(board) --brief
-	@new=build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h; \
-	if cmp -s $$new userparams.h; then echo "userparams.h is up to date"; exit; fi; \
+	@new=$(call quoted,build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h); \
+	if cmp -s "$$new" userparams.h; then echo "userparams.h is up to date"; exit; fi; \
 	old=userparams.h.old; n=1; while test -e $$old; do n=$$((n + 1)); old=userparams.h.old$$n; done; \
 	if test -e userparams.h; then cp userparams.h $$old || exit; echo "yours is kept as $$old"; fi; \
-	cp $$new userparams.h && echo "userparams.h written"
+	cp "$$new" userparams.h && echo "userparams.h written"
 
 spreadsheet: setup-tune ## write tuning/tuning_params.xlsx anew
 	@$(tuner) spreadsheet

@@ -52,6 +52,14 @@ class Build(unittest.TestCase):
         self.assertEqual(flags("build/host/flags"), flags("build/host/tools/pil/pil.o"))
         self.assertEqual(flags("build/host/flags"), flags("build/host/tools/iss33f/core.o"))
 
+    def test_a_motor_file_s_name_with_blanks_and_quotes_is_one_word_to_the_shell(self):
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+        done = subprocess.run(["make", "-n", "-C", str(places.ROOT), "userparams", "MOTOR=/tmp/it's a motor.toml"], env=environment,
+                              capture_output=True, text=True, check=True)
+        line = next(line for line in done.stdout.splitlines() if "new=" in line)
+        self.assertIn("new='build/tune/it'\\''s a motor/userparams.h'", line)
+        self.assertEqual(done.stdout.count("$new"), done.stdout.count('"$new"'))
+
     def test_a_tuned_header_is_built_under_its_motor_s_name(self):
         library, call = self.make("echo \"$@\" > $RESULT", userparams=places.TUNED / "some_motor")
         self.assertEqual(library.parent.name, "host-some_motor")
