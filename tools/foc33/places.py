@@ -15,20 +15,29 @@ TUNED = ROOT / "build" / "tune"
 
 def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
     """The TOML file for a plain name (folder/NAME.toml) or a path."""
-    if "/" in name or name.endswith(".toml"):
-        path = Path(name)
-        if not path.is_file():
-            raise UserError(f"no {kind} file '{name}'", where, "check the path")
-        return path
-    path = folder / f"{name}.toml"
-    if not path.is_file():
+    by_path = "/" in name or name.endswith(".toml")
+    path = Path(name) if by_path else folder / f"{name}.toml"
+    try:
+        found = path.is_file()
+    except OSError as error:
+        raise _unreadable(path.parent, error) from None
+    if not found and by_path:
+        raise UserError(f"no {kind} file '{name}'", where, "check the path")
+    if not found:
         raise UserError(f"no {kind} '{name}'", where or str(shown(folder)), suggestion(name, names(folder)))
     return path
 
 
 def names(folder: Path) -> list[str]:
     """Names of the TOML files in a folder."""
-    return sorted(path.stem for path in folder.glob("*.toml"))
+    try:
+        return sorted(path.stem for path in folder.iterdir() if path.suffix == ".toml")
+    except OSError as error:
+        raise _unreadable(folder, error) from None
+
+
+def _unreadable(folder: Path, error: OSError) -> UserError:
+    return UserError(f"cannot read the folder ({error.strerror})", str(shown(folder)), "make it readable")
 
 
 def shown(path: Path) -> Path:
