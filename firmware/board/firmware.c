@@ -67,6 +67,9 @@ QM_INLINE void firmware_supervise(void)
     if (board_clock_failed) {
         drive_raise(&board_drive, FAULT_CLOCK);
     }
+    if (BOARD_FLTA_LOW()) { /* its interrupt comes once: S2 must not clear a fault that is still there */
+        drive_raise(&board_drive, FAULT_OVERCURRENT_HW);
+    }
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
 }

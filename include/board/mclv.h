@@ -30,6 +30,7 @@
 #define BOARD_P1DTCON1 ((uint16_t)(0x0040u | (uint16_t)(DEAD_TIME_DUTY / 2))) /* unit A, two clocks a count */
 #define BOARD_P1FLTACON 0x0087u /* FLTA: pairs 1-3 inactive, cycle by cycle */
 #define BOARD_FLTA_RP 8u      /* FLTA1 on RP8/RB8 */
+#define BOARD_FLTA_LOW() ((uint16_t)(PORTBbits.RB8 == 0u)) /* the comparator holds the outputs off */
 #define BOARD_OUTPUTS_OFF 0x0000u
 #define BOARD_OUTPUTS_BOOTSTRAP 0x0015u /* all low sides on */
 #define BOARD_OUTPUTS_PWM 0x3F00u

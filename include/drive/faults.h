@@ -6,7 +6,7 @@
 #define DRIVE_FAULT_TABLE(X) \
     X(0, NONE, "no fault", "nothing to do") \
     X(1, OVERCURRENT_HW, "the FLTA1 input went low: the board's comparator saw too much current", \
-      "look for a short circuit; check MAXIMUM_CURRENT_A and the current loops") \
+      "look for a short circuit; check MAXIMUM_CURRENT_A and the current loops; S2 clears it when FLTA1 is high again") \
     X(2, OVERCURRENT_SW, "a phase current exceeded OVER_CURRENT_THRESHOLD_A", \
       "lower CURRENT_BANDWIDTH_HZ or MAXIMUM_CURRENT_A; check NORM_CURRENT_CONST, KCURRA and KCURRB") \
     X(3, OVERVOLTAGE, "the bus exceeded OVER_VOLTAGE_V", \

@@ -185,6 +185,20 @@ void test_start_forgets_what_the_panel_wanted(void)
 
 /* ---- background ---- */
 
+void test_fault_input_that_is_low_is_a_fault_that_cannot_be_cleared(void)
+{
+    expect_start(0);
+    PORTBbits.RB8 = 0;
+    pass(0);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+    PORTBbits.RB8 = 1;
+    board_drive.fault = (uint16_t)FAULT_NONE;
+    board_drive.state = (uint16_t)DRIVE_STOPPED;
+    pass(0);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+}
+
 void test_panel_runs_once_a_millisecond_of_control_time(void)
 {
     expect_start(0);

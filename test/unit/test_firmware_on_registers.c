@@ -162,6 +162,24 @@ void test_fault_is_cleared_by_S2_and_a_second_press_starts(void)
     TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
 }
 
+void test_fault_input_that_stays_low_comes_back_after_S2_and_nothing_starts(void)
+{
+    board_ms(100);
+    PORTBbits.RB8 = 0; /* its beginning alone makes an interrupt */
+    _FLTA1Interrupt();
+    PORTAbits.RA8 = 0;
+    board_ms(40);
+    PORTAbits.RA8 = 1;
+    board_ms(10);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    PORTBbits.RB8 = 1;
+    PORTAbits.RA8 = 0;
+    board_ms(40);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+}
+
 void test_silent_converter_is_found_through_timer_1(void)
 {
     board_ms(100);
