@@ -7,7 +7,7 @@
 #include "board/status.h"
 #include "board/watch.h"
 
-#define PERIODS_PER_MS ((uint16_t)(0.001F / PARAM_F(LOOPTIME_SEC)))
+#define PERIODS_PER_MS PARAM_PERIODS(0.001F)
 
 drive_t board_drive;
 panel_t board_panel;

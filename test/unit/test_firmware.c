@@ -199,6 +199,19 @@ void test_fault_input_that_is_low_is_a_fault_that_cannot_be_cleared(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
 }
 
+void test_milliseconds_are_the_nearest_number_of_periods(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(20, PERIODS_PER_MS);
+#undef LOOPTIME_SEC
+#define LOOPTIME_SEC 0.0000666667 /* 15 kHz */
+    TEST_ASSERT_EQUAL_UINT16(15, PERIODS_PER_MS);
+#undef LOOPTIME_SEC
+#define LOOPTIME_SEC 0.0000555556 /* 18 kHz */
+    TEST_ASSERT_EQUAL_UINT16(18, PERIODS_PER_MS);
+#undef LOOPTIME_SEC
+#define LOOPTIME_SEC 0.00005
+}
+
 void test_panel_runs_once_a_millisecond_of_control_time(void)
 {
     expect_start(0);
