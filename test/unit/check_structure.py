@@ -77,6 +77,24 @@ def every_file_begins_with_a_sentence_about_itself() -> None:
         assert re.match(r"/\* [A-Z0-9].{20,}", text), f"{path}: {text[:40]!r}"
 
 
+def a_function_that_a_comment_names_exists() -> None:
+    comment = re.compile(r"/\*.*?\*/", re.DOTALL)
+    code = "\n".join(comment.sub("", text) for text in sources().values())
+    for path, text in sources().items():
+        named = {name for part in comment.findall(text) for name in re.findall(r"\b([a-z]\w+)\(\)", part)}
+        gone = sorted(name for name in named if not re.search(rf"\b{name}\(", code))
+        assert not gone, f"{path}: {gone}"
+
+
+def a_watch_variable_that_a_page_names_exists() -> None:
+    structs = re.findall(r"typedef struct \{([^}]*)\} t(\w+Parm);", (ROOT / "include/board/watch.h").read_text(encoding="utf-8"))
+    known = {f"{name}.{member}" for members, name in structs for member in re.findall(r"\w+", members)}
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "include/drive/faults.h"]
+    for page in pages:
+        gone = sorted(set(re.findall(r"\b\w+Parm\.\w+", page.read_text(encoding="utf-8"))) - known)
+        assert not gone, f"{page.name}: {gone}"
+
+
 def there_are_no_stray_files_in_the_firmware() -> None:
     stray = [str(f.relative_to(ROOT)) for top in ("firmware", "include") for f in (ROOT / top).rglob("*") if f.is_file() and f.suffix not in (".c", ".h")
              and f.name not in ("target.mk", "budget.toml")]
@@ -119,5 +137,6 @@ def configuration_words_are_those_of_the_board() -> None:
 run([only_the_board_room_sees_the_device, control_includes_only_control, drive_includes_only_control_drive_and_the_parameters,
      board_includes_only_the_three_rooms_and_the_device, only_params_h_reads_userparams_h, control_and_drive_name_no_register_and_no_motor,
      every_header_compiles_alone, every_header_has_its_own_guard, every_file_begins_with_a_sentence_about_itself,
+     a_function_that_a_comment_names_exists, a_watch_variable_that_a_page_names_exists,
      there_are_no_stray_files_in_the_firmware, the_watchdog_is_served_in_three_places, there_is_no_inline_assembly,
      what_outlives_a_reset_is_left_alone_by_the_start_up_code, configuration_words_are_those_of_the_board])
