@@ -269,6 +269,9 @@ class BadInput(Case):
     def test_no_debugging_information(self):
         self.fails("compile with -g", data=Program([(0x200, 1)], debug=False).bytes())
 
+    def test_names_that_are_no_text(self):
+        self.fails("compile with -g", data=Program([(0x200, 1)], debug=False).bytes(), arguments=("--objdump", r"printf '\351'"))
+
     def test_a_file_cut_short_anywhere(self):
         data = Program([(0x200, 5)], [Function("tick", "t.c", 1, 0x200, 0x20A)], lines=[(0x200, "t.c", 2)], lines_end=0x20A,
                        constants=[("_table", 8)], variables=[("_drive", 8, True)], types={"drive": {"a": 8}}).bytes()
