@@ -69,7 +69,7 @@ $X/foc33.hex: $X/foc33.elf
 	    { cat $X/foc33.bin2hex >&2; rm -f $@; exit 1; }
 
 # Another mode has its own tables and arrays: the budget is for the drive as it is delivered.
-target_modes = $(DEFINES)$(filter $(modes),$(shell sed -n 's/^ *# *define *\([A-Z_]*\).*/\1/p' $(call quoted,$(or $(USERPARAMS),.)/userparams.h)))
+target_modes = $(DEFINES)$(filter $(modes),$(shell sed -n 's/^ *# *define *\([A-Z_]*\).*/\1/p' $(call quoted,$(or $(USERPARAMS),.)/userparams.h) 2>/dev/null))
 target_budget = $(if $(target_modes),,--budget firmware/budget.toml)
 target_check = $(python) -m tools.target.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget)
 

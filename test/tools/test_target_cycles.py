@@ -182,6 +182,14 @@ class ForTheUser(unittest.TestCase):
                 self.assertEqual(len(our_lines(done)), 1, done.stderr)
                 self.assertRegex(our_lines(done)[0], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16")
 
+    def test_what_cycles_cannot_do_is_one_line(self):
+        for word, expected in (("MOTOR=hurst_dmb0224c10002", "make cycles has no MOTOR"), ("BOARD=mclv", "no BOARD"), ("USERPARAMS=/nowhere", "no userparams.h")):
+            with self.subTest(word):
+                done = make("cycles", "IMAGE=/nowhere", word)
+                self.assertEqual((done.returncode, len(our_lines(done))), (2, 1), done.stderr)
+                self.assertIn(expected, our_lines(done)[0])
+                self.assertNotIn("No such file", done.stderr)
+
     def module(self, name: str, *arguments: str) -> tuple[int, list[str]]:
         error = io.StringIO()
         with contextlib.redirect_stderr(error), contextlib.redirect_stdout(io.StringIO()):
