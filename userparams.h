@@ -16,7 +16,7 @@
 /* #define OPEN_LOOP_FUNCTIONING */ /* stay on the forced angle at END_SPEED_RPM; the estimator runs along and can be watched */
 /* #define TUNING */                /* the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself */
 /* #define TORQUE_MODE */           /* the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed */
-/* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's middle is zero; S3 has no function */
+/* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
 /* #define IDENTIFY */              /* measure R, L and Kphi of the motor instead of running it (docs/tuning.md) */
 /* #define PARAMS_IN_RAM */         /* a debugger can change every parameter while the motor turns; TUNING does it too */

@@ -14,7 +14,7 @@ from .params import parameters
 MODES = (("OPEN_LOOP_FUNCTIONING", "stay on the forced angle at END_SPEED_RPM; the estimator runs along and can be watched"),
          ("TUNING", "the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself"),
          ("TORQUE_MODE", "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed"),
-         ("BIDIRECTIONAL_SPEED", "the potentiometer's middle is zero; S3 has no function"),
+         ("BIDIRECTIONAL_SPEED", "the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function"),
          ("SNAPSHOT", "record SnapBuf1..4"),
          ("IDENTIFY", "measure R, L and Kphi of the motor instead of running it (docs/tuning.md)"),
          ("PARAMS_IN_RAM", "a debugger can change every parameter while the motor turns; TUNING does it too"))

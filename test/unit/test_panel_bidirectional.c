@@ -1,4 +1,4 @@
-/* The panel in BIDIRECTIONAL_SPEED: the potentiometer's middle is zero, its sides are the directions. */
+/* The panel in BIDIRECTIONAL_SPEED: the potentiometer's sides are the directions, its middle is the lowest speed. */
 /* defines: -DBIDIRECTIONAL_SPEED */
 #include "panel_rig.h"
 #include "unity.h"
