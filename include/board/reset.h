@@ -10,6 +10,7 @@
 #define RESET_CAUSE_TABLE(X) \
     X(15, TRAPR, "trap conflict") \
     X(14, IOPUWR, "illegal opcode, or an address from a register that was never written") \
+    X(9, CM, "pin selection changed without its unlock sequence") \
     X(7, EXTR, "MCLR pin") \
     X(6, SWR, "RESET instruction") \
     X(4, WDTO, "watchdog") \

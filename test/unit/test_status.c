@@ -87,7 +87,8 @@ void test_first_line_tells_the_cause_of_the_reset(void)
 {
     expect_first_line(0x0003u, "reset BOR POR\r\n");
     expect_first_line(0x0010u, "reset WDTO\r\n");
-    expect_first_line(0xFFFFu, "reset TRAPR IOPUWR EXTR SWR WDTO BOR POR\r\n");
+    expect_first_line(0x0200u, "reset CM\r\n");
+    expect_first_line(0xFFFFu, "reset TRAPR IOPUWR CM EXTR SWR WDTO BOR POR\r\n");
     TEST_ASSERT_TRUE(sizeof line > strlen(sent));
 }
 
