@@ -4,7 +4,7 @@
 
 #include "control/qmath.h"
 
-/** Next reference. @param step_erpm at least 1 @return target when it is nearer than two steps, else one step closer */
+/** Next reference. @param step_erpm 0 (stays where it is) or more @return target when it is nearer than two steps, else one step closer */
 QM_INLINE speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t step_erpm)
 {
     int32_t difference = (int32_t)target - reference;

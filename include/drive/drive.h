@@ -96,7 +96,7 @@ typedef struct {
     volatile uint16_t state;       /**< drive_state_t */
     volatile uint16_t fault;       /**< drive_fault_t, kept until cleared */
     volatile uint16_t ticks;       /**< periods since power-up, wraps; the background's time base */
-    uint16_t timer;                /**< periods in the present state */
+    uint16_t timer;                /**< periods in the present state; end of the ramp: slow steps there */
     uint16_t slots;                /**< end of the ramp: slow steps of agreement; closed loop: not 0 until the speed controller is preset */
     int16_t direction;             /**< +1 or -1, fixed from start to stop */
     int16_t calibrated;
