@@ -27,10 +27,10 @@ void firmware_init(void)
     silent_ms = 0;
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
-    board_clock_failed = clock_init();
     panel_init(&board_panel);
-    drive_init(&board_drive, &board_params);
+    drive_init(&board_drive, &board_params); /* before what a trap could tell of */
     status_init();
+    board_clock_failed = clock_init();
     pins_init();
     uart_init();
     timer_init();

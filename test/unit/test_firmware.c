@@ -79,6 +79,27 @@ void test_drive_is_initialised_before_the_control_interrupt_can_come(void)
     TEST_ASSERT_EQUAL_UINT16(1, bus_known_at_adc_init);
 }
 
+static uint16_t trap_while_the_clock_starts(int calls)
+{
+    (void)calls;
+    drive_raise(&board_drive, FAULT_TRAP); /* as isr.c does; traps have no enable bit */
+    return 0;
+}
+
+void test_trap_during_the_start_is_not_forgotten(void)
+{
+    pwm_outputs_off_Ignore();
+    clock_init_Stub(trap_while_the_clock_starts);
+    pins_init_Ignore();
+    uart_init_Ignore();
+    timer_init_Ignore();
+    pwm_init_Ignore();
+    adc_init_Ignore();
+    firmware_init();
+    TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+}
+
 void test_healthy_clock_starts_in_CALIBRATE(void)
 {
     expect_start(0);
