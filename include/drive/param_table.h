@@ -88,6 +88,7 @@
     X(REGEN_LIMIT_V > NOMINAL_BUS_V, "REGEN_LIMIT_V must be above NOMINAL_BUS_V") \
     X(PARAM_F(REGEN_LIMIT_V) + 2.0F <= PARAM_F(OVER_VOLTAGE_V), "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V") \
     X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, "UNDER_VOLTAGE_V is too low for the modulator's division") \
+    X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000501F >= PARAM_F(DEADTIME_SEC), "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us: the low sides then conduct for 1 us before the sample") \
     X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, "the current gain exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \

@@ -147,6 +147,9 @@ RELATIONS = {
     "REGEN_LIMIT_V must be above NOMINAL_BUS_V": [({"REGEN_LIMIT_V": "24.0"}, {"REGEN_LIMIT_V": "24.1"})],
     "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V": [({"REGEN_LIMIT_V": "32.1"}, {"REGEN_LIMIT_V": "31.9"})],
     "UNDER_VOLTAGE_V is too low for the modulator's division": [({"LOOPTIME_SEC": "0.0002"}, {"LOOPTIME_SEC": "0.00014"})],
+    "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us": [
+        ({"DEADTIME_SEC": "0.00000213"}, {"DEADTIME_SEC": "0.0000021"}),
+        ({"DEADTIME_SEC": "0.000003", "SAMPLE_WINDOW_SEC": "0.00000248"}, {"DEADTIME_SEC": "0.000003", "SAMPLE_WINDOW_SEC": "0.0000025"})],
     "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V": [({"BUS_FULL_SCALE_V": "99"}, {"BUS_FULL_SCALE_V": "98"})],
     **{f"IDREF_SPEED{i} must not exceed MAXIMUM_CURRENT_A": [({f"IDREF_SPEED{i}": "-2.76"}, {f"IDREF_SPEED{i}": "-2.75"})] for i in range(18)},
     "the current gain exceeds its Q format": [
