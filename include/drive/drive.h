@@ -156,11 +156,11 @@ QM_INLINE uint16_t drive_is_running(const drive_t *d)
 /** Stops at once and keeps the code of the first fault. */
 QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
 {
-    if (d->fault == (uint16_t)FAULT_NONE) {
-        d->fault = (uint16_t)fault;
-    }
     d->state = (uint16_t)DRIVE_FAULT;
     d->command.run = 0;
+    if (d->fault == (uint16_t)FAULT_NONE) { /* last: when the tick clears a fault in between, no state FAULT without one stays behind */
+        d->fault = (uint16_t)fault;
+    }
 }
 
 #endif
