@@ -30,7 +30,10 @@ void firmware_init(void)
     panel_init(&board_panel);
     drive_init(&board_drive, &board_params); /* before what a trap could tell of */
     status_init();
-    board_clock_failed = clock_init();
+    board_clock_failed = 0;
+    if (clock_init()) { /* the trap may have said so before */
+        board_clock_failed = 1;
+    }
     pins_init();
     uart_init();
     timer_init();

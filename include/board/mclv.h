@@ -20,7 +20,9 @@
 #define BOARD_FCY_HZ 40000000ul
 #define BOARD_PLLFBD 38u      /* M = 40 */
 #define BOARD_CLKDIV 0x0000u  /* N1 = 2, N2 = 2 */
+#define BOARD_NOSC_FRC 0u
 #define BOARD_NOSC_PRIPLL 3u
+#define BOARD_OSCCON_LOCK 0x0020u
 #define BOARD_WAIT_LOOPS 60000u /* bound of every wait on the oscillator, far above its 2 ms */
 
 /* ---- PWM1: centre-aligned, 20 kHz, three complementary pairs; M1 = RB14/15, M2 = RB12/13, M3 = RB10/11 ---- */

@@ -259,6 +259,7 @@ class Resets(unittest.TestCase):
         self.assertEqual(1, self.chip.get("cpu.resets"))
         self.assertRegex(self.chip.uart_take(), rf"reset WDTO\r\n(.*\n)*state 7 fault {fault} speed")
         self.assertEqual(0, self.chip.get("pwm.outputs_on"))
+        self.assertEqual([], [text for text in self.chip.warnings() if "PLL" in text], "the old clock goes on over this reset")
 
     def test_a_control_interrupt_that_stays_away(self) -> None:
         self.change("iec0", self.AD1)

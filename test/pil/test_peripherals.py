@@ -134,6 +134,15 @@ class Clock(unittest.TestCase):
                 got = self.cycles_per_ms(f"mov #{clkdiv}, w0; mov w0, clkdiv; mov #{pllfbd}, w0; mov w0, pllfbd\n", 5, FOSCSEL=1)
                 self.assertAlmostEqual(frc_khz * factor / 2, got, delta=0.002 * frc_khz * factor)
 
+    def test_a_pll_that_is_changed_while_it_is_the_clock_is_told(self) -> None:
+        change = "mov #0x20, w0; mov w0, pllfbd\n"
+        for program, source, told in ((change, 1, True), (change, 0, False), ("mov pllfbd, w0; mov w0, pllfbd\n", 1, False),
+                                      ("mov #0x3000, w0; mov w0, clkdiv\n", 1, True), ("mov #0x3140, w0; mov w0, clkdiv\n", 1, False),
+                                      (switch(0) + change, 1, False)):
+            with self.subTest(program=program, source=source):
+                warnings = run(program + STOP, FOSCSEL=source).warnings()
+                self.assertEqual(told, any("while it is the clock" in text for text in warnings), warnings)
+
     def test_every_source_has_its_frequency(self) -> None:
         for source, khz in ((2, 4000), (4, 16.384), (5, 16), (6, FRC_FCY / 16e3), (7, FRC_FCY / 32e3)):
             with self.subTest(source=source):

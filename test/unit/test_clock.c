@@ -4,7 +4,7 @@
 #include <xc.h>
 
 /* A stubborn oscillator: what the firmware writes is recorded, the switch happens only if the test says so. */
-static uint16_t oscillator_answers, written_high, written_low, writes;
+static uint16_t oscillator_answers, written_high, written_low, writes, pll_at_first_switch;
 
 static void oscillator_high(uint16_t value)
 {
@@ -18,6 +18,9 @@ static void oscillator_high(uint16_t value)
 static void oscillator_low(uint16_t value)
 {
     written_low = value;
+    if (writes == 1u) {
+        pll_at_first_switch = PLLFBD;
+    }
     writes = (uint16_t)(writes * 10u + 2u);
     if (oscillator_answers) {
         host_write_oscconl(value);
@@ -38,6 +41,7 @@ void setUp(void)
     OSCCON = 0x0000; /* running on the internal FRC, as after reset */
     oscillator_answers = 1;
     writes = 0;
+    written_high = 0xFFFF;
 }
 
 void tearDown(void)
@@ -61,6 +65,27 @@ void test_switches_to_the_crystal_with_pll_and_reports_success(void)
     TEST_ASSERT_EQUAL_UINT16(12, writes); /* source first, then the switch */
     TEST_ASSERT_EQUAL_UINT16(3, written_high);
     TEST_ASSERT_EQUAL_UINT16(1, written_low & 1u);
+}
+
+void test_after_a_reset_that_kept_the_pll_running_the_frc_takes_over_before_the_pll_is_changed(void)
+{
+    OSCCON = 0x3320; /* crystal with PLL, locked: watchdog or RESET instruction */
+    PLLFBD = 0x0030;
+    TEST_ASSERT_EQUAL_UINT16(0, clock_init());
+    TEST_ASSERT_EQUAL_UINT16(1212, writes);
+    TEST_ASSERT_EQUAL_HEX16(0x0030, pll_at_first_switch);
+    TEST_ASSERT_EQUAL_UINT16(38, PLLFBD);
+    TEST_ASSERT_EQUAL_UINT16(3, OSCCONbits.COSC);
+}
+
+void test_a_running_pll_that_cannot_be_left_is_not_changed(void)
+{
+    oscillator_answers = 0;
+    OSCCON = 0x3320;
+    PLLFBD = 0x0030;
+    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
+    TEST_ASSERT_EQUAL_HEX16(0x0030, PLLFBD);
+    TEST_ASSERT_EQUAL_UINT16(0, written_high);
 }
 
 void test_watchdog_is_served_while_the_oscillator_is_waited_for(void)

@@ -79,6 +79,18 @@ void test_drive_is_initialised_before_the_control_interrupt_can_come(void)
     TEST_ASSERT_EQUAL_UINT16(1, bus_known_at_adc_init);
 }
 
+static void start_with_clock(uint16_t (*clock_starts)(int calls))
+{
+    pwm_outputs_off_Ignore();
+    clock_init_Stub(clock_starts);
+    pins_init_Ignore();
+    uart_init_Ignore();
+    timer_init_Ignore();
+    pwm_init_Ignore();
+    adc_init_Ignore();
+    firmware_init();
+}
+
 static uint16_t trap_while_the_clock_starts(int calls)
 {
     (void)calls;
@@ -88,16 +100,23 @@ static uint16_t trap_while_the_clock_starts(int calls)
 
 void test_trap_during_the_start_is_not_forgotten(void)
 {
-    pwm_outputs_off_Ignore();
-    clock_init_Stub(trap_while_the_clock_starts);
-    pins_init_Ignore();
-    uart_init_Ignore();
-    timer_init_Ignore();
-    pwm_init_Ignore();
-    adc_init_Ignore();
-    firmware_init();
+    start_with_clock(trap_while_the_clock_starts);
     TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
+}
+
+static uint16_t crystal_fails_while_the_clock_starts(int calls)
+{
+    (void)calls;
+    board_clock_failed = 1; /* as isr.c does */
+    return 0;
+}
+
+void test_crystal_that_fails_during_the_start_is_a_clock_fault_for_good(void)
+{
+    start_with_clock(crystal_fails_while_the_clock_starts);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(1, board_clock_failed);
 }
 
 void test_healthy_clock_starts_in_CALIBRATE(void)

@@ -13,7 +13,8 @@ enum {
     IOL1WAY = 0x20,     /* FOSC */
     FCKSM_FIXED = 0x80, /* FOSC: no clock switching */
     FNOSC = 0x07,       /* FOSCSEL */
-    DOZEN = 0x0800      /* CLKDIV */
+    PLLPRE_PLLPOST = 0x00DF, /* CLKDIV */
+    DOZEN = 0x0800
 };
 
 static unsigned source_now(const soc_t *soc)
@@ -194,7 +195,11 @@ static void write_osccon(void *context, uint16_t address, uint16_t value, uint16
 static void write_divider(void *context, uint16_t address, uint16_t value, uint16_t mask)
 {
     soc_t *soc = context;
-    soc_put(soc, address, soc_merged(soc, address, value, mask));
+    unsigned before = soc_get(soc, address), after = soc_merged(soc, address, value, mask);
+    soc_put(soc, address, after);
+    if (has_pll(source_now(soc)) && ((before ^ after) & (address == SFR_CLKDIV ? PLLPRE_PLLPOST : 0xFFFFu)) != 0) {
+        soc_note(soc, "PLLFBD, CLKDIV: the PLL is changed while it is the clock; switch to FRC first");
+    }
     if ((soc_get(soc, SFR_CLKDIV) & DOZEN) != 0) {
         soc_note(soc, "CLKDIV: DOZEN is set, a slowed core is not modelled");
     }
