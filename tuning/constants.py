@@ -322,8 +322,8 @@ def firmware_constants(params: Mapping[str, str | float]) -> list[Constant]:
 def _motor(t: _Table) -> None:
     rs, ls, kphi, period = t.value("MOTOR_RS_OHM"), t.value("MOTOR_LS_MH"), t.value("MOTOR_KPHI_V_PER_KRPM"), t.value("LOOPTIME_SEC")
     rs_exp, ls_exp = exponent_of(t.single.rs(32768)), exponent_of(t.single.ls(4096) * np.float32(1.2))
-    t.add("NORM_RS", (rs, "ohm"), "Q15 / 2", lambda f: f.rs(16384), "Equation 5, the note's constant")
-    t.add("NORM_LSDTBASE", (ls, "mH"), "Q15 / 256", lambda f: f.ls(128), "Equation 5, the note's constant")
+    t.add("NORM_RS", (rs, "ohm"), "Q15 / 2", lambda f: min(f.rs(16384), f.n(32767)), "Equation 5, the note's constant, at most 32767")
+    t.add("NORM_LSDTBASE", (ls, "mH"), "Q15 / 256", lambda f: min(f.ls(128), f.n(32767)), "Equation 5, the note's constant, at most 32767")
     t.add("NORM_INVKFIBASE", (kphi, "V/krpm"), "Q15 / 2, 1/Kphi", lambda f: f.invkfi(), "Equation 6")
     t.add("NORM_DELTAT", (period, "s"), "Q15 of a turn/erpm", lambda f: f["LOOPTIME_SEC"] / f.n(60) * f.n(2147483648), "Equation 1, the note's constant")
     t.add("estimator.rs_q16", (rs, "ohm"), f"Q16 / {1 << rs_exp}", lambda f: f.rs(32768) / f.n(1 << rs_exp), "R of the estimator", half_up)

@@ -25,7 +25,7 @@
       "check the current amplifiers, AN0 and AN1, and that the motor stood still") \
     X(10, ADC_LOST, "no control interrupt came for two milliseconds", \
       "check the PWM and ADC set-up; after a reset the fault must not come back") \
-    X(11, CLOCK, "the PLL did not lock or the crystal failed", \
+    X(11, CLOCK, "the PLL did not lock at the start, or the clock monitor, where FCKSM has it on, found the crystal dead", \
       "check the 8 MHz crystal and the configuration words, then reset: S2 does not clear this one") \
     X(12, TRAP, "the processor took a trap or an unexpected interrupt", \
       "read board_trap_intcon1, the copy of INTCON1 that says which trap it was") \

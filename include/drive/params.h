@@ -23,9 +23,11 @@
 #define NORM_VOLTAGE_CONST (PARAM_F(NOMINAL_BUS_V) / PARAM_SQRT3 * (1.0F - PARAM_F(DEADTIME_SEC) / PARAM_F(LOOPTIME_SEC)) / 32768.0F)
 #define PARAM_IU (PARAM_F(NORM_CURRENT_CONST) / NORM_VOLTAGE_CONST) /* I0/U0, A/V */
 
-/* ---- The note's motor constants, Equations 5 and 6, pre-divided by 2, 256 and 2 ---- */
-#define NORM_RS ((int16_t)PARAM_ROUND(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F))
-#define NORM_LSDTBASE ((int16_t)PARAM_ROUND(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F))
+/* ---- The note's motor constants, Equations 5 and 6, pre-divided by 2, 256 and 2. The estimator has formats of its own
+ * for R and L, which fit where these two end at 32767. ---- */
+#define PARAM_NOTE(x) ((int16_t)PARAM_ROUND(((x) < 32767.0F) ? (x) : 32767.0F))
+#define NORM_RS PARAM_NOTE(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F)
+#define NORM_LSDTBASE PARAM_NOTE(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F)
 #define PARAM_INVKFI (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) * NORM_VOLTAGE_CONST / PARAM_F(MOTOR_KPHI_V_PER_KRPM) * 16384.0F)
 #define NORM_INVKFIBASE ((int16_t)PARAM_ROUND(PARAM_INVKFI))
 #define NORM_DELTAT ((int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 2147483648.0F))

@@ -79,6 +79,20 @@ void test_derivative_limits_end_where_their_products_end(void)
 #define MAXIMUM_CURRENT_A 2.75
 }
 
+void test_the_notes_R_and_L_end_at_the_largest_number_instead_of_wrapping(void)
+{
+#undef MOTOR_RS_OHM
+#define MOTOR_RS_OHM 10.0
+#undef MOTOR_LS_MH
+#define MOTOR_LS_MH 60.0
+    TEST_ASSERT_EQUAL_INT16(32767, NORM_RS);
+    TEST_ASSERT_EQUAL_INT16(32767, NORM_LSDTBASE);
+#undef MOTOR_RS_OHM
+#define MOTOR_RS_OHM 2.67
+#undef MOTOR_LS_MH
+#define MOTOR_LS_MH 1.92
+}
+
 /* ---- 7.09 A: the constants of 2014 ---- */
 #undef NORM_CURRENT_CONST
 #define NORM_CURRENT_CONST (7.09 / 32768)

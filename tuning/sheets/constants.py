@@ -89,8 +89,8 @@ _MOST = f"MIN({_di('MAXIMUM_SPEED_RPM')},4094.5)"
 _KP_VOLT = "16/" + IU
 
 MOTOR = [
-    Own("NORM_RS", "MOTOR_RS_OHM", "ohm", "Q15 / 2", f"MOTOR_RS_OHM*{IU}*16384", "Equation 5, the note's format"),
-    Own("NORM_LSDTBASE", "MOTOR_LS_MH", "mH", "Q15 / 256", f"MOTOR_LS_MH*0.001/LOOPTIME_SEC*{IU}*128", "Equation 5, the note's format"),
+    Own("NORM_RS", "MOTOR_RS_OHM", "ohm", "Q15 / 2", f"MIN(MOTOR_RS_OHM*{IU}*16384,32767)", "Equation 5, the note's format, at most 32767"),
+    Own("NORM_LSDTBASE", "MOTOR_LS_MH", "mH", "Q15 / 256", f"MIN(MOTOR_LS_MH*0.001/LOOPTIME_SEC*{IU}*128,32767)", "Equation 5, the note's format, at most 32767"),
     Own("NORM_INVKFIBASE", "MOTOR_KPHI_V_PER_KRPM", "V/krpm", "Q15 / 2, 1/Kphi",
         "SQRT(3)*1000*NOPOLESPAIRS*NORM_VOLTAGE_CONST/MOTOR_KPHI_V_PER_KRPM*16384", "Equation 6", limit=LARGEST_ERROR),
     Own("NORM_DELTAT", "LOOPTIME_SEC", "s", "Q15 of a turn/erpm", "LOOPTIME_SEC/60*2147483648", "Equation 1, the note's format"),
