@@ -45,8 +45,8 @@ quoted = '$(subst ','\'',$1)'
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@
 
-# A misspelt mode would give the drive without it.
-known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) \
+# A misspelt mode would give the drive without it, and -DTUNING=0 the drive with it.
+known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) $(filter-out %=1,$(filter $(modes:%=-D%=%),$(DEFINES))) \
     $(filter-out $(modes:%=-D%) -U%,$(foreach word,$(DEFINES),$(if $(findstring =,$(word)),,$(word))))), \
     echo foc33: $(call quoted,no mode $(word)$(comma) DEFINES=$(DEFINES)): 'use $(modes:%=-D%) or -DNAME=value' >&2; exit 2)
 

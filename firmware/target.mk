@@ -52,7 +52,7 @@ $X/flags: FORCE | target-input
 	    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
 	$(call remember,$(target_compile) $(target_link_options))
 
-$X/contents: FORCE
+$X/contents: FORCE | target-input
 	$(call remember,$(target_objects))
 
 $X/%.o: %.c $X/flags

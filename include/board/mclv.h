@@ -1,4 +1,4 @@
-/* The dsPICDEM MCLV with a dsPIC33FJ32MC204: every pin, channel and register value in one place.
+/* The dsPICDEM MCLV with a dsPIC33FJ32MC204: its pins, channels and the values of their registers in one place.
  *
  * [?] marks what no published source confirms; check it against your board's schematic before you rely on it. Two such facts are used
  * elsewhere: the bus divider of 16 [?, known for the MCLV-2 only] in userparams.h's BUS_FULL_SCALE_V = 16 * 3.3 V, and the
@@ -44,7 +44,7 @@
 /* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 75 ns = 3.6 us ---- */
 #define BOARD_AD1CON1 0x036Cu /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */
 #define BOARD_AD1CON2 0x0200u /* CHPS 2: CH0..CH3 */
-#define BOARD_AD1CON3 0x0002u /* TAD = 3 Tcy = 75 ns */
+#define BOARD_AD1CON3 0x0002u /* TAD = 3 Tcy = 75 ns, as published; the data sheet may ask for 76 [?]: 3u costs 1.2 us */
 #define BOARD_AD1CHS0 0x0008u /* CH0: AN8, potentiometer (RC2) */
 #define BOARD_AD1CHS123 0x0000u /* CH1: AN0 I_A (RA0), CH2: AN1 I_B (RA1), CH3: AN2 bus (RB0) */
 #define BOARD_AD1PCFGL ((uint16_t)~0x0107u) /* analogue: AN0, AN1, AN2, AN8 */

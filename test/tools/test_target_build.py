@@ -59,12 +59,14 @@ class WithoutCompiler(unittest.TestCase):
         for word, expected in (("OPT=-O7", "no such level, OPT=-O7: use -O1, -O2 or -O3"), ("OPT=", "no such level, OPT=: use"),
                                ("OPT=-O1 -O2", "no such level"), ("OPT=fast", "no such level"), ("DFP=/nowhere", "no device pack for XC16, DFP=/nowhere: name"),
                                ("DEFINES=-DTUNNING", "no mode -DTUNNING, DEFINES=-DTUNNING: use .*-DTUNING"), ("DEFINES=TUNING", "no mode TUNING"),
+                               ("DEFINES=-DTUNING=0", "no mode -DTUNING=0"),
                                ("USERPARAMS=/nowhere", "no userparams.h, USERPARAMS=/nowhere: name a folder")):
             with self.subTest(word):
                 done = make("firmware", "VARIANT=none", word, path=str(self.folder))
                 self.assertEqual((done.returncode, len(our_lines(done))), (2, 1), done.stderr)
                 self.assertRegex(our_lines(done)[0], expected)
                 self.assertNotIn("No such file", done.stderr)
+        self.assertFalse(list((ROOT / "build").glob("target-O7*")), "no folder for a level that is refused")
 
     def test_a_misspelt_mode_is_refused_on_the_pc_too(self):
         done = make("lib", "VARIANT=none", "DEFINES=-DTUNNING")
