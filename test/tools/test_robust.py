@@ -95,7 +95,7 @@ class Verdicts(unittest.TestCase):
     def test_each_way_to_fail_is_named(self):
         for values, text in (({"closed_after_s": None}, "no start: never in closed loop"),
                              ({"closed_after_s": None, "fault": "START_FAILED", "fault_s": 1.8}, "no start: START_FAILED"),
-                             ({"fault": "STALL", "fault_s": 2.0}, "no start: STALL"), ({"fault": "STALL", "fault_s": 2.4}, "fault STALL"),
+                             ({"fault": "STALL", "fault_s": 2.0}, "closed, then STALL"), ({"fault": "STALL", "fault_s": 2.4}, "fault STALL"),
                              ({"speed_error_percent": 0.6}, "speed +0.6 %"), ({"speed_error_percent": None}, "no speed")):
             with self.subTest(text):
                 self.assertEqual(robust.verdict(table(), row(**values)), text)

@@ -74,7 +74,8 @@ class Starts(unittest.TestCase):
 
     def test_another_motor_gets_shares_of_its_own_ratings_and_its_header_s_time(self):
         motor = motor_file.load("linix_45zwn24_40")
-        slow = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 800.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 3.0, "LOCK_TIME": 32000.0}
+        slow = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 800.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 3.0, "LOCK_TIME": 32000.0,
+                "SPEED_BANDWIDTH_HZ": 12.0}
         table = self.table.for_motor(motor, slow)
         self.assertEqual(table.loads_nm, [0.0, 0.0115, 0.0231])
         self.assertEqual((table.motor, table.speed_rpm), ("linix_45zwn24_40", 1600.0))
@@ -82,8 +83,16 @@ class Starts(unittest.TestCase):
         self.assertAlmostEqual(table.measure_from_s - table.within_s, self.table.measure_from_s - self.table.within_s)
         self.assertAlmostEqual(table.measure_to_s - table.measure_from_s, self.table.measure_to_s - self.table.measure_from_s)
 
+    def test_a_speed_loop_made_slow_by_its_load_gets_time_to_settle(self):
+        params = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 800.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 3.0, "LOCK_TIME": 32000.0}
+        quick, slow = (self.table.for_motor(motor_file.load("linix_45zwn24_40"), params | {"SPEED_BANDWIDTH_HZ": hz}) for hz in (20.0, 1.0))
+        self.assertEqual(quick.within_s, slow.within_s)
+        self.assertAlmostEqual(slow.measure_from_s - slow.start_s - slow.within_s, 5.0)
+        self.assertAlmostEqual(slow.measure_to_s - slow.measure_from_s, quick.measure_to_s - quick.measure_from_s)
+
     def test_the_speed_is_not_below_the_hand_over(self):
-        params = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 1900.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 8.0, "LOCK_TIME": 9000.0}
+        params = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 1900.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 8.0, "LOCK_TIME": 9000.0,
+                  "SPEED_BANDWIDTH_HZ": 12.0}
         self.assertEqual(self.table.for_motor(motor_file.load("linix_45zwn24_40"), params).speed_rpm, 1900.0)
 
     def test_a_good_start_holds(self):

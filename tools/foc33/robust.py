@@ -159,8 +159,10 @@ def started(table: Table, row: dict[str, Any]) -> bool:
 
 def verdict(table: Table, row: dict[str, Any]) -> str:
     """"ok", or the first thing that does not hold."""
-    if not started(table, row):
+    if row["closed_after_s"] is None:
         return f"no start: {row['fault'] or 'never in closed loop'}"
+    if not started(table, row):
+        return f"closed, then {row['fault']}"
     if row["fault"]:
         return f"fault {row['fault']}"
     return matrix.speed_verdict(row, table.error_percent) or "ok"

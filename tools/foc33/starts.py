@@ -22,6 +22,8 @@ from .toml_file import Document
 
 MARGIN_S = 0.1
 """For the hand-over itself, beside lock and ramp."""
+SETTLE_PERIODS = 5.0
+"""Of the speed loop's bandwidth, which a heavy load makes small: what the speed gets to settle, at least the table's own time."""
 
 
 @dataclass
@@ -64,9 +66,10 @@ class Table:
     def for_motor(self, motor: motor_file.Motor, params: Mapping[str, float]) -> "Table":
         """The table for another motor than its own, with that motor's header."""
         later_s = matrix.start_time_s(dict(params)) + MARGIN_S - self.within_s
+        slower_s = max(SETTLE_PERIODS / params["SPEED_BANDWIDTH_HZ"] - (self.measure_from_s - self.start_s - self.within_s), 0.0)
         speed_rpm = max(self.other_speed_percent / 100.0 * motor.rated_speed_rpm, params["END_SPEED_RPM"])
         return replace(self, motor=motor.name, speed_rpm=round(speed_rpm), within_s=self.within_s + later_s,
-                       measure_from_s=self.measure_from_s + later_s, measure_to_s=self.measure_to_s + later_s,
+                       measure_from_s=self.measure_from_s + later_s + slower_s, measure_to_s=self.measure_to_s + later_s + slower_s,
                        loads_nm=[float(f"{percent / 100.0 * motor.start_torque_nm:.3g}") for percent in self.other_loads_percent])
 
 
