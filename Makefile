@@ -88,8 +88,7 @@ starts: setup-run ## starts from every rotor angle under several loads [MOTOR=na
 	@$(front_end) starts $(options)
 
 motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 and 100 % of rated speed at half the rated torque [OUT=folder]
-	@$(tuner) tune --all $(board) --brief
-	@$(front_end) rated $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
+	@$(tuner) motors $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
 
 robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTOR=name OUT=folder]
 	@+$(ready)

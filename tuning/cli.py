@@ -1,4 +1,4 @@
-"""The command line: `python3 -m tuning <command>`. Exit codes: 0 all well, 2 bad input."""
+"""The command line: `python3 -m tuning <command>`. Exit codes: 0 all well, 1 an expectation failed, 2 bad input."""
 
 import argparse
 import importlib
@@ -11,6 +11,8 @@ from tools.foc33 import command_line, places
 from tools.foc33.errors import UserError
 
 if TYPE_CHECKING:
+    from tools.foc33.board_file import BoardFile
+
     from .design import Design
 
 OTHERS = ("fw_tune", "spreadsheet", "identify")
@@ -34,10 +36,14 @@ def _parser() -> argparse.ArgumentParser:
     tune.add_argument("--out", type=Path, help="result folder, replaced when complete; default build/tune/NAME")
     tune.add_argument("--brief", action="store_true", help="one line and the warnings")
     tune.set_defaults(command=_tune)
+    motors = commands.add_parser("motors", help="tune every motor of tuning/motors, then run those that this board can turn: foc33 rated")
+    motors.add_argument("--out", type=Path, help="result folder of the runs; default build/run/rated")
+    motors.add_argument("--quiet", action="store_true", help="no progress bar")
+    motors.set_defaults(command=_motors)
     header = commands.add_parser("header", help="print the userparams.h of a motor, nothing else")
     header.add_argument("motor", help="a name in tuning/motors or the path of a motor file")
     header.set_defaults(command=_header)
-    for command in (tune, header):
+    for command in (tune, motors, header):
         command.add_argument("--board", default="mclv", help="a name in tuning/boards or a path; default mclv")
     for name in OTHERS:
         if importlib.util.find_spec(f"{__package__}.{name}"):
@@ -47,30 +53,53 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _design(motor: str, board: str) -> "Design":
-    from tools.foc33 import board_file, motor_file
+def _board(options: argparse.Namespace) -> "BoardFile":
+    from tools.foc33 import board_file
+    return board_file.load(options.board, "--board")
+
+
+def _design(motor: str, board: "BoardFile") -> "Design":
+    from tools.foc33 import motor_file
 
     from .design import design
-    return design(motor_file.load(motor, "command line"), board_file.load(board, "--board"))
+    return design(motor_file.load(motor, "command line"), board)
 
 
 def _tune(options: argparse.Namespace) -> int:
-    from . import report
     if options.all == (options.motor is not None):
         raise UserError("which motor?", "command line", "name one, or write --all" if not options.all else "write either a motor or --all")
     if options.all and options.out is not None:
         raise UserError("one folder for several motors", "--out", "leave it out, or name one motor")
-    designs = [_design(name, options.board) for name in (places.names(places.MOTORS) if options.all else [options.motor])]
-    for design in designs:
-        target = options.out or places.TUNED / design.motor.name
-        report.write(design, target, anew=not options.brief)
-        print(report.brief(design) if options.brief else report.text(design))
-        if not options.brief:
-            print(f"\nresults in {places.shown(target)}/: userparams.h, report.html")
-    return 0
+    return _tune_each(places.names(places.MOTORS) if options.all else [options.motor], _board(options), options.out, options.brief)[1]
+
+
+def _tune_each(names: list[str], board: "BoardFile", out: Path | None, brief: bool) -> tuple[list[str], int]:
+    """The motors that have got a header, and the exit code: one that is made for another board does not stop the rest."""
+    def tune(name: str) -> str:
+        _tune_one(_design(name, board), out, brief)
+        return name
+    return command_line.each(names, tune)
+
+
+def _tune_one(design: "Design", out: Path | None, brief: bool) -> None:
+    from . import report
+    target = out or places.TUNED / design.motor.name
+    report.write(design, target, anew=not brief)
+    print(report.brief(design) if brief else report.text(design))
+    if not brief:
+        print(f"\nresults in {places.shown(target)}/: userparams.h, report.html")
+    sys.stdout.flush() # in its place among the lines of those that are refused
+
+
+def _motors(options: argparse.Namespace) -> int:
+    from tools.foc33 import rated
+    tuned, code = _tune_each(places.names(places.MOTORS), _board(options), None, True)
+    if not tuned:
+        return code
+    return max(code, rated.command(argparse.Namespace(**vars(options) | {"motor": tuned, "userparams": None})))
 
 
 def _header(options: argparse.Namespace) -> int:
     from . import header
-    sys.stdout.write(header.write(_design(options.motor, options.board)))
+    sys.stdout.write(header.write(_design(options.motor, _board(options))))
     return 0

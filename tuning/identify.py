@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.foc33 import board_file, build, motor_file, output, places, plant, report, steps, workers
+from tools.foc33 import board_file, build, command_line, motor_file, output, places, plant, report, steps, workers
 from tools.foc33.board import Board, BoardError, Library
 from tools.foc33.board_file import BoardFile
 from tools.foc33.errors import UserError
@@ -314,11 +314,10 @@ def _row(name: str, measured: str, true: str, ratio: float | None = None, limit:
             "verdict": "PASS" if abs(error) <= allowed else "FAIL"}
 
 
-def identify(names: list[str], board_name: str, changes: plant.Values, current_a: float | None = None, speed_rpm: float | None = None,
+def identify(motors: list[Motor], board_name: str, changes: plant.Values, current_a: float | None = None, speed_rpm: float | None = None,
              quiet: bool = True) -> list[Identified]:
-    """Identifies every motor named, side by side."""
+    """Identifies the motors, side by side."""
     board = board_file.load(board_name, "--board")
-    motors = [motor_file.load(name, "command line") for name in names]
     known = [Known.of(motor, board, current_a, speed_rpm) for motor in motors]
     headers = [header(item, board) for item in known]
     libraries = [_library(motor, text) for motor, text in zip(motors, headers)]
@@ -369,9 +368,11 @@ def add_command(commands: Any) -> None:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code: 1 if a value is outside its limit or the identification did not end with DONE."""
     _check(options)
-    names = places.names(places.MOTORS) if options.all else [options.motor]
-    found = identify(names, options.board, steps.changes(options.changes), options.current, options.speed, options.quiet)
-    failed = False
+    motors, code = command_line.each(places.names(places.MOTORS) if options.all else [options.motor],
+                                     lambda name: motor_file.load(name, "command line"))
+    if not motors:
+        return code
+    found = identify(motors, options.board, steps.changes(options.changes), options.current, options.speed, options.quiet)
     for item in found:
         target = options.out or RESULTS / item.motor.name
         _write(item, target, not options.no_plots)
@@ -381,8 +382,8 @@ def command(options: argparse.Namespace) -> int:
         sys.stdout.flush()
         for line in item.problems():
             print(f"foc33: {item.motor.name}: {line}", file=sys.stderr)
-            failed = True
-    return 1 if failed else 0
+            code = max(code, 1)
+    return code
 
 
 def _check(options: argparse.Namespace) -> None:

@@ -2,7 +2,7 @@
 
 import unittest
 
-from tools.foc33 import build, places, plant, workers
+from tools.foc33 import build, motor_file, places, plant, workers
 from tuning import identify
 
 HURST = "hurst_dmb0224c10002"
@@ -11,21 +11,21 @@ HURST = "hurst_dmb0224c10002"
 def run(name: str = HURST, **changes: float) -> identify.Identified:
     """One identification with changes to the plant; dots of keys are written as "__"."""
     values = plant.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
-    return identify.identify([name], "mclv", values)[0]
+    return identify.identify([motor_file.load(name)], "mclv", values)[0]
 
 
 def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float, **changes: float) -> identify.Identified:
     """Another motor in the Hurst's housing: 5 pole pairs."""
     psi_vs = kphi / (3.0 ** 0.5 * 1000.0 * 2.0 * 3.14159265 / 60.0 * 5.0)
     values = {"motor.rs_ohm": rs_ohm, "motor.ld_h": ld_h, "motor.lq_h": lq_h, "motor.psi_vs": psi_vs, "mech.coulomb_nm": 0.001} | changes
-    return identify.identify([HURST], "mclv", plant.Values(values, {}), current_a, speed_rpm)[0]
+    return identify.identify([motor_file.load(HURST)], "mclv", plant.Values(values, {}), current_a, speed_rpm)[0]
 
 
 class Motors(unittest.TestCase):
     def test_every_motor_is_within_its_limits(self):
         names = places.names(places.MOTORS)
         self.assertGreaterEqual(len(names), 6)
-        for item in identify.identify(names, "mclv", plant.Values()):
+        for item in identify.identify([motor_file.load(name) for name in names], "mclv", plant.Values()):
             with self.subTest(item.motor.name):
                 self.assertEqual(item.problems(), [])
 

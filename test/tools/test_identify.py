@@ -218,7 +218,7 @@ class Refused(unittest.TestCase):
     def test_unknown_key(self):
         self.assertIn("unknown key 'load.lock'", self.refused(NAME, "--set", "load.lock=1"))
         with self.assertRaises(UserError):
-            identify.identify([NAME], "mclv", plant.Values({"no.key": 1.0}, {}))
+            identify.identify([motor_file.load(NAME)], "mclv", plant.Values({"no.key": 1.0}, {}))
 
 
 if __name__ == "__main__":

@@ -356,7 +356,7 @@ class Project(unittest.TestCase):
                                      set(resolve([part.plant_values()], keys)))
 
     def test_the_listing_has_a_line_for_every_motor(self):
-        lines = motor_file.listing().splitlines()
+        lines = motor_file.listing(self.motors()).splitlines()
         for motor in self.motors():
             self.assertTrue(any(line.startswith(motor.name + " ") for line in lines), motor.name)
         hurst = next(line for line in lines if line.startswith("hurst_dmb0224c10002"))

@@ -151,6 +151,19 @@ class CommandLine(unittest.TestCase):
             self.refused(command("rated", "--motor", HURST, "--out", str(self.out)), f"no userparams.h for motor '{HURST}'",
                          f"make tune MOTOR={HURST}")
 
+    def test_a_motor_without_a_header_does_not_stop_the_others(self):
+        ready = []
+
+        def build(found, options):
+            ready.extend(motor.name for motor, _ in found)
+            raise UserError("that is enough")
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(places, "TUNED", Path(folder)), mock.patch.object(rated, "_candidates", build):
+            (Path(folder) / HURST).mkdir()
+            (Path(folder) / HURST / "userparams.h").write_text("", encoding="utf-8")
+            _, _, error = command("rated", "--motor", "linix_45zwn24_40", HURST, "--out", str(self.out))
+        self.assertEqual(ready, [HURST])
+        self.assertRegex(error, r"\Afoc33: no userparams.h for motor 'linix_45zwn24_40'.*\nfoc33: that is enough\n\Z")
+
     def test_wrong_motors_and_headers_are_refused(self):
         self.refused(command("rated", "--motor", "hurst", "--out", str(self.out)), "no motor 'hurst'", "--motor")
         self.refused(command("rated", "--motor", HURST, HURST, "--userparams", ".", "--out", str(self.out)), "one header for several motors")
@@ -161,6 +174,15 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(code, 0)
         for name in places.names(places.MOTORS):
             self.assertRegex(out, rf"(?m)^{name} ")
+
+    def test_a_motor_file_that_cannot_be_read_is_missing_in_the_list_and_named(self):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(places, "MOTORS", Path(folder)):
+            for name, text in ((HURST, (places.ROOT / "tuning" / "motors" / f"{HURST}.toml").read_text(encoding="utf-8")), ("broken", "x = = 1")):
+                (Path(folder) / f"{name}.toml").write_text(text, encoding="utf-8")
+            code, out, error = command("motors")
+        self.assertEqual((code, error.count("\n")), (2, 1))
+        self.assertRegex(error, r"\Afoc33: TOML syntax, .*broken\.toml line 1")
+        self.assertRegex(out, rf"(?m)^{HURST} ")
 
 
 class Highest(unittest.TestCase):

@@ -1,7 +1,9 @@
 """The command line: results complete or not at all, one line and exit code 2 for every mistake."""
 
+import contextlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -9,8 +11,8 @@ import unittest
 from pathlib import Path
 from unittest import mock
 
-from tools.foc33 import places
-from tune_support import HURST, command, motor_path
+from tools.foc33 import places, rated
+from tune_support import FOR_ANOTHER_BOARD, HURST, command, motor_path
 
 
 class Tune(unittest.TestCase):
@@ -108,6 +110,49 @@ class Tune(unittest.TestCase):
         self.refused("tune", HURST, "--all", says="either a motor or --all")
         self.refused("tune", "--all", "--out", str(self.out), says="one folder for several motors")
         self.refused("tun", says="command line")
+
+    def test_one_motor_that_is_for_another_board_does_not_stop_the_others(self):
+        with self.several_motors():
+            for arguments in (("tune", "--all", "--brief"), ("tune", "--all")):
+                code, out, error = command(*arguments)
+                self.assertEqual((code, error.count("\n")), (2, 1), error)
+                self.assertRegex(error, r"\Afoc33: half the rated torque needs .*b_large\.toml")
+                for name in ("a_first", "c_last"):
+                    self.assertIn(name, out)
+                    self.assertTrue((places.TUNED / name / "userparams.h").is_file(), name)
+            self.assertFalse((places.TUNED / "b_large").exists())
+
+    def test_make_motors_runs_those_that_got_a_header(self):
+        for result, expected in ((0, 2), (1, 2)):
+            with self.several_motors(), mock.patch.object(rated, "command", return_value=result) as runs:
+                code, _, error = command("motors", "--out", str(self.out), "--quiet")
+            (options,) = runs.call_args.args
+            self.assertEqual((code, options.motor, options.out, options.board, error.count("\n")), (expected, ["a_first", "c_last"], self.out, "mclv", 1))
+        with self.several_motors() as folder, mock.patch.object(rated, "command", return_value=1):
+            (folder / "b_large.toml").unlink()
+            self.assertEqual(command("motors", "--out", str(self.out))[0], 1)
+
+    def test_without_any_motor_that_fits_nothing_runs(self):
+        with self.several_motors() as folder, mock.patch.object(rated, "command") as runs:
+            for name in ("a_first", "c_last"):
+                (folder / f"{name}.toml").unlink()
+            self.refused("motors", says="half the rated torque needs")
+        runs.assert_not_called()
+
+    def test_a_wrong_board_is_told_once(self):
+        self.refused("tune", "--all", "--board", "mclw", says="mclv")
+        self.refused("motors", "--board", "mclw", says="mclv")
+
+    @contextlib.contextmanager
+    def several_motors(self):
+        """A folder of three motors; the one in the middle is for another board."""
+        with tempfile.TemporaryDirectory() as root, motor_path() as good, motor_path(*FOR_ANOTHER_BOARD) as large:
+            folder = Path(root) / "motors"
+            folder.mkdir()
+            for name, source in (("a_first", good), ("b_large", large), ("c_last", good)):
+                shutil.copy(source, folder / f"{name}.toml")
+            with mock.patch.object(places, "MOTORS", folder), mock.patch.object(places, "TUNED", Path(root) / "tune"):
+                yield folder
 
     def test_the_header_alone(self):
         code, out, _ = command("header", HURST)

@@ -104,8 +104,9 @@ def _scenarios(options: argparse.Namespace) -> int:
 
 
 def _motors(options: argparse.Namespace) -> int:
-    print(motor_file.listing())
-    return 0
+    motors, code = command_line.each(places.names(places.MOTORS), motor_file.load)
+    print(motor_file.listing(motors))
+    return code
 
 
 def _keys(options: argparse.Namespace) -> int:

@@ -3,9 +3,12 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 from .errors import UserError
+
+Item, Made = TypeVar("Item"), TypeVar("Made")
 
 
 class Parser(argparse.ArgumentParser):
@@ -13,6 +16,18 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> None: # type: ignore[override]
         raise UserError(message, "command line", f"see {self.prog} --help")
+
+
+def each(items: Iterable[Item], work: Callable[[Item], Made]) -> tuple[list[Made], int]:
+    """What `work` makes of every item, and the exit code: an item that is refused gets its line and code 2, the others go on."""
+    made, code = [], 0
+    for item in items:
+        try:
+            made.append(work(item))
+        except UserError as error:
+            print(f"foc33: {error}", file=sys.stderr, flush=True)
+            code = 2
+    return made, code
 
 
 def run(work: Callable[[], int]) -> int:

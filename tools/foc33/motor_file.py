@@ -355,10 +355,10 @@ def _check_limits(motor: Motor, fail: Callable[[str, str, str], UserError]) -> N
             raise fail(name, f"'{name}' is outside its own [spread] {low:.4g} .. {high:.4g}", "widen the spread, or check the units")
 
 
-def listing() -> str:
-    """A table of the motors in tuning/motors, as `python3 -m tools.foc33 motors` prints it."""
+def listing(motors: list[Motor]) -> str:
+    """A table of motors, as `python3 -m tools.foc33 motors` prints it."""
     head = ("name", "winding", "pole pairs", "R ohm", "L mH", "Kphi V/krpm", "Kt N m/A", "rated", "maximum", "unchecked numbers")
-    rows = [_row(load(name)) for name in places.names(places.MOTORS)]
+    rows = [_row(motor) for motor in motors]
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in [head, *rows]]
     return "\n".join(lines + ["R and L of one star phase at 25 degC; Kphi peak line to line; currents and Kt per ampere peak"])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from . import matrix, motor_file, output, places, plant, report, simulate, steps
+from . import command_line, matrix, motor_file, output, places, plant, report, simulate, steps
 from .board import Library
 from .errors import UserError
 from .expect import Outcome
@@ -87,9 +87,12 @@ def command(options: argparse.Namespace) -> int:
     if options.userparams is not None and len(names) != 1:
         raise UserError("one header for several motors", "--userparams", "name one motor with --motor")
     board = plant.read_board(options.board, "--board") if options.board else plant.read_board(table.board, table.board_where)
+    ready, code = command_line.each(names, lambda name: _with_header(name, options))
+    if not ready:
+        return code
     target = options.out or places.RESULTS / "rated"
     with output.ResultFolder(target) as folder:
-        candidates = _candidates(names, options)
+        candidates = _candidates(ready, options)
         cases = [(item, row) for item in candidates for row in rows_of(table, item)]
         jobs = [_job(table, item, row, board) for item, row in cases]
         with steps.Progress("rated", sum(job.scenario.duration_s for job in jobs), options.quiet) as progress:
@@ -99,16 +102,20 @@ def command(options: argparse.Namespace) -> int:
         _write(folder.work, table, candidates, rows, outcomes, board)
     print(text(table, candidates, rows))
     print(f"\nresults in {places.shown(target)}/")
-    return steps.verdict("rated", outcomes)
+    return max(code, steps.verdict("rated", outcomes))
 
 
-def _candidates(names: list[str], options: argparse.Namespace) -> list[Candidate]:
-    """Every motor's firmware, built. Files are looked at before anything is built."""
-    motors = [motor_file.load(name, "--motor") for name in names]
-    headers = [Path(options.userparams) if options.userparams else steps.tuned_header(motor.path) for motor in motors]
+def _with_header(name: str, options: argparse.Namespace) -> tuple[Motor, Path]:
+    """A motor and the folder of its header. Files are looked at before anything is built."""
+    motor = motor_file.load(name, "--motor")
+    return motor, Path(options.userparams) if options.userparams else steps.tuned_header(motor.path)
+
+
+def _candidates(ready: list[tuple[Motor, Path]], options: argparse.Namespace) -> list[Candidate]:
+    """Every motor's firmware, built."""
     result = []
-    with steps.Progress("firmware", len(motors), options.quiet, "headers built") as progress:
-        for motor, header in zip(motors, headers):
+    with steps.Progress("firmware", len(ready), options.quiet, "headers built") as progress:
+        for motor, header in ready:
             library = steps.library_for([], None, header)
             result.append(Candidate(motor, plant.read_motor(str(motor.path)), steps.header_name(None, header), library))
             progress(1.0)
