@@ -7,7 +7,7 @@ from decimal import Decimal
 from tools.foc33 import places
 from tools.foc33.board_file import BoardFile
 from tools.foc33.errors import UserError
-from tools.foc33.motor_file import Motor
+from tools.foc33.motor_file import FACTS, Motor
 
 from . import constants, fw_tables, limits, loops, params, start
 from .constants import Constant, Formulas, firmware_constants, number_of
@@ -130,14 +130,31 @@ def _refuse_impossible(d: Design, currents: limits.Currents) -> None:
                         f"the firmware's speeds end at {limits.LARGEST_ERPM:.0f}; a speed of {math.floor(limits.LARGEST_ERPM / m.pole_pairs)} rpm is possible")
     _refuse_kphi(d)
     half = 0.5 * m.rated_torque_nm
-    if e.iq(m.rated_speed_rpm, half) > currents.maximum_a:
-        largest = currents.board_a if motor_current_above(d, currents) else m.maximum_current_a
-        raise UserError(f"half the rated torque needs {e.iq(m.rated_speed_rpm, half):.2f} A peak, {largest:.2f} A are allowed", d.where("torque"),
-                        f"use a board with a larger current range than {d.board.current_full_scale_a:.3g} A (smaller shunt or gain), or raise maximum_current")
+    needed_a = e.iq(m.rated_speed_rpm, half)
+    if needed_a > currents.maximum_a:
+        raise UserError(f"half the rated torque needs {needed_a:.2f} A peak, {currents.maximum_a:.2f} A are allowed", d.where("torque"),
+                        _current_remedy(d, currents, needed_a))
     if e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
         reachable = e.highest_speed(half, limits.FULL_SHARE)
         raise UserError(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
                         f"raise the supply voltage in {places.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
+
+
+def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> str:
+    """What to change where half the rated torque needs more than is allowed: that depends on who allows no more."""
+    m, board_a = d.motor, currents.board_a
+    if needed_a > board_a:
+        carried_nm = m.kt_nm_per_a * board_a - d.envelope.friction_nm(m.rated_speed_rpm)
+        return (f"lower [rating] torque and current to what the board carries, {limits.digits_down(max(carried_nm, 1e-4), 2):g} N m and {board_a:g} A peak, or use a board "
+                f"with a larger current range than {d.board.current_full_scale_a:.3g} A (smaller shunt or gain)")
+    if needed_a > m.maximum_current_a:
+        return f"{_change_maximum_current(m, 'raise')} to at least {limits.digits_up(needed_a, 3):g} A peak"
+    return "with more current R I + L dI/dt leave the back-EMF's number format: lower maximum_speed, or raise the supply voltage"
+
+
+def _change_maximum_current(motor: Motor, how: str) -> str:
+    """How to set the largest current: without a line in the motor file there is nothing to raise or to lower."""
+    return f"{how} [rating] maximum_current" if "maximum_current" in motor.quantities else "add [rating] maximum_current and set it"
 
 
 def _refuse_kphi(d: Design) -> None:
@@ -163,7 +180,17 @@ def _check(d: Design) -> None:
         tuned = [name for name in d.motor.tune if any(name in message for message in wrong)]
         where = f"{places.shown(d.motor.path)} [tune]" if tuned else str(places.shown(d.motor.path))
         what, _, remedy = wrong[0].partition(": ")
-        raise UserError(what, where, remedy or "change the motor file or the board file")
+        raise UserError(what, where, remedy or _range_remedy(d, what.partition(" ")[0]))
+
+
+def _range_remedy(d: Design, name: str) -> str:
+    """What to change where a parameter is outside its range."""
+    if name in d.motor.tune or name not in FACTS:
+        return "change the motor file or the board file"
+    if name == "MAXIMUM_CURRENT_A":
+        p = params.parameters()[name]
+        return f"{_change_maximum_current(d.motor, 'change')} to {p.low} .. {p.high} A peak"
+    return f"it follows from {FACTS[name]}; change that"
 
 
 # ---- motor and board ---------------------------------------------------------------------------------------------------------
@@ -283,6 +310,7 @@ def _loops_and_start(d: Design) -> None:
     if m.salient:
         d.put("D_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.ld_h * f.iu / 16.0, 5), "2 pi f Ld: the d axis has its own inductance")
         d.put("Q_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.lq_h * f.iu / 16.0, 5), "2 pi f Lq")
+    _refuse_inertia(d, f["SPEEDCNTR_PTERM"])
     gains = loops.current_gains(plant, bandwidth, base)
     _start(d, plant, gains)
     speeds = {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
@@ -294,6 +322,17 @@ def _loops_and_start(d: Design) -> None:
     d.put("SPEED_BANDWIDTH_HZ", plain(d.speed_loop.bandwidth_hz), f"the largest with {loops.PHASE_MARGIN_DEG:.0f} degrees of phase margin over the "
           f"parameter set from the minimum to the maximum speed, at most {loops.SPEED_CAP:g} of the electrical frequency at minimum speed ({calm:g} Hz: "
           f"above, the dead time may make an unloaded motor hunt) or what loads ask for ({d.loaded_hz:g} Hz)")
+
+
+def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:
+    """The speed gain grows with the inertia: at the least bandwidth it must still fit its number."""
+    least_hz = float(params.parameters()["SPEED_BANDWIDTH_HZ"].low)
+    if gain_at_1_hz * least_hz >= 1.0 and "SPEED_BANDWIDTH_HZ" not in d.motor.tune:
+        inertia = d.value("MOTOR_INERTIA_KGM2")
+        raise UserError(f"the speed gain exceeds its Q format with {inertia:.3g} kg m2 even at SPEED_BANDWIDTH_HZ = {least_hz:g}",
+                        d.where("load_inertia" if d.motor.load_inertia_kgm2 else "inertia"),
+                        f"{limits.digits_down(0.98 * inertia / (gain_at_1_hz * least_hz), 2):g} kg m2 of rotor and load are possible with {d.board.current_full_scale_a:.3g} A of "
+                        "current range; a larger one gives room for more")
 
 
 def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:

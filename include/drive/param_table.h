@@ -92,7 +92,7 @@
     X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, "the current gain exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \
-    X(PARAM_SPEED_KI(SPEEDCNTR_ITERM) >= 1, "the speed integral rounds to zero: raise SPEED_BANDWIDTH_HZ or MOTOR_INERTIA_KGM2")
+    X(PARAM_SPEED_KI(SPEEDCNTR_ITERM) >= 1, "the speed integral rounds to zero: raise SPEED_BANDWIDTH_HZ; or the inertia is too low (MOTOR_INERTIA_KGM2; of a motor file, [mechanical] or [load] inertia)")
 
 #define PARAM_RELATION_IDREF(X, i) \
     X(PARAM_F(IDREF_SPEED##i) >= -PARAM_F(MAXIMUM_CURRENT_A), "IDREF_SPEED" #i " must not exceed MAXIMUM_CURRENT_A")

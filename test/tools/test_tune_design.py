@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from tools.foc33 import board_file, motor_file, places
 from tools.foc33.errors import UserError
-from tune_support import COMPILER, HURST, INCLUDES, designed, motor_path, motors, of
+from tune_support import COMPILER, FOR_ANOTHER_BOARD, HURST, INCLUDES, MOTOR, designed, motor_path, motors, of
 from tuning import limits, params
 from tuning.constants import number_of
 from tuning.design import design, plain, real, short
@@ -39,6 +39,29 @@ class Refusals(unittest.TestCase):
     def test_a_current_beyond_the_board_s_range(self):
         self.refused(says=("half the rated torque needs", "larger current range than 1 A"), board=replace(BOARD, current_full_scale_a=1.0),
                      rated_torque_nm=0.12, rated_current_a=2.2)
+
+    def test_a_torque_beyond_the_board_s_current_is_told_what_the_board_carries(self):
+        self.refused(*FOR_ANOTHER_BOARD, says=("3.45 A are allowed", "lower [rating] torque and current to what the board carries, 0.19 N m and 3.45 A peak"))
+        lowered = dict(FOR_ANOTHER_BOARD) | {"value = 1.53": "value = 3.45", "value = 0.08": "value = 0.19"}
+        self.assertEqual(designed(*lowered.items()).value("MAXIMUM_CURRENT_A"), 3.45)
+
+    def test_a_torque_beyond_maximum_current_is_told_to_raise_it(self):
+        self.refused(("value = 2.75", "value = 0.55"), says=("0.55 A are allowed", "raise [rating] maximum_current to at least 0.802 A peak"))
+        self.assertEqual(designed(("value = 2.75", "value = 0.802"), ("value = 2500", "value = 2300")).value("MAXIMUM_CURRENT_A"), 0.802)
+
+    def test_a_largest_current_beyond_its_range_is_told_where_to_set_it(self):
+        large = replace(BOARD, current_full_scale_a=60.0)
+        line = next(line for line in MOTOR.splitlines() if line.startswith("maximum_current"))
+        changes = tuple(change for change in FOR_ANOTHER_BOARD if change[1] != "value = 18")
+        self.refused(*changes, (line, ""), says=("MAXIMUM_CURRENT_A = 23 is outside 0.1 .. 20", "add [rating] maximum_current and set it to 0.1 .. 20 A peak"), board=large)
+        self.refused(*changes, ("value = 2.75", "value = 24"), says=("MAXIMUM_CURRENT_A = 24 is outside", "change [rating] maximum_current to 0.1 .. 20 A peak"), board=large)
+
+    def test_an_inertia_beyond_the_speed_gain_s_format_names_the_largest(self):
+        inertia = '[load]\ninertia = { value = %s, unit = "kg m2" }\n'
+        with motor_path(more=inertia % "5e-3") as path, self.assertRaisesRegex(UserError, "speed gain exceeds its Q format with 0.00501 kg m2") as caught:
+            design(motor_file.load(str(path)), BOARD)
+        largest = float(re.search(r": (\S+) kg m2 of rotor and load are possible", str(caught.exception))[1])
+        self.assertGreaterEqual(designed(more=inertia % (largest - 5.5e-6)).value("SPEED_BANDWIDTH_HZ"), 0.2)
 
     def test_a_kphi_too_large_or_small_for_its_format_names_the_voltage_that_fits(self):
         self.refused(says=("1/Kphi has only", "too slow for 24 V: use at least"), pole_pairs=1, rated_speed_rpm=500.0)
@@ -236,7 +259,7 @@ class Parameters(unittest.TestCase):
         base = of(HURST).params
         for name, value, words in (("MAXIMUM_SPEED_RPM", "6500", "at most 32000"), ("IDREF_SPEED7", "-3", "IDREF_SPEED7 must not exceed"),
                                    ("OVER_CURRENT_THRESHOLD_A", "3.9", "86.5 %"), ("UNDER_VOLTAGE_V", "7.1", "0.3 * NOMINAL_BUS_V"),
-                                   ("SPEEDCNTR_ITERM", "0.00002", "rounds to zero"), ("D_CURRCNTR_CTERM", "0.5", "D_CURRCNTR_CTERM must be"),
+                                   ("SPEEDCNTR_ITERM", "0.00002", "MOTOR_INERTIA_KGM2; of a motor file, [mechanical] or [load] inertia"), ("D_CURRCNTR_CTERM", "0.5", "D_CURRCNTR_CTERM must be"),
                                    ("BUS_FULL_SCALE_V", "99", "too large for NOMINAL_BUS_V"), ("REGEN_LIMIT_V", "33", "REGEN_LIMIT_V + 2 V")):
             wrong = params.check(base | {name: value})
             self.assertTrue(any(words in message for message in wrong), (name, wrong))

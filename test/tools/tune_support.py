@@ -39,7 +39,8 @@ speed = { value = 2500, unit = "rpm", source = "test" }
 maximum_speed = { value = 5000, unit = "rpm", source = "test" }
 maximum_current = { value = 2.75, unit = "A peak", source = "test" }
 """
-FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value = 0.8"), ("value = 2.75", "value = 18"), ("value = 2.67", "value = 0.3"))
+FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value = 0.8"), ("value = 2.75", "value = 18"), ("value = 2.67", "value = 0.3"),
+                     ("value = 1.92", "value = 0.2"))
 """Changes of MOTOR that make it a motor for ten times the current."""
 
 
