@@ -19,6 +19,8 @@ VELESTIM_HZ = 73.5
 QUICK_ROTOR_S = 0.015
 """A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with the note's speed filter
 reacts: the filter's corner rises in proportion, up to four times. Its speed gain is small (it goes with J), so noise stays small too."""
+HEAVY_S = 0.1
+"""A slow speed loop is the inertia's doing, not a quick rotor's, where rated torque needs longer than this to rated speed."""
 REFERENCE_RISE_S = 0.7
 """The speed reference goes from 0 to rated speed in this time, unless inertia asks for more."""
 REFERENCE_TORQUE_SHARE = 0.3
@@ -217,11 +219,15 @@ def _board(d: Design) -> None:
     d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, the note's corner")
     d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
           "the same: the note's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
-    m = d.motor
-    rise_s = (m.inertia_kgm2 + m.load_inertia_kgm2) * m.rated_speed_rpm * RPM / m.rated_torque_nm
+    rise_s = _rise_s(d.motor)
     faster = min(max(QUICK_ROTOR_S / rise_s, 1.0), 4.0)
     d.put("KFILTER_VELESTIM", str(constants.filter_k(faster * VELESTIM_HZ, b.pwm_period_s)), f"{faster * VELESTIM_HZ:.0f} Hz at this PWM period, " + (
         "the note's corner" if faster == 1.0 else f"{faster:.2g} times the note's corner: rated torque brings the rotor to rated speed in {rise_s * 1e3:.2g} ms"))
+
+
+def _rise_s(m: Motor) -> float:
+    """Time in which rated torque brings rotor and load to rated speed."""
+    return (m.inertia_kgm2 + m.load_inertia_kgm2) * m.rated_speed_rpm * RPM / m.rated_torque_nm
 
 
 # ---- speeds and currents -------------------------------------------------------------------------------------------------------
@@ -442,13 +448,16 @@ def _warn_numbers(d: Design) -> None:
 def _warn_loops(d: Design) -> None:
     for what, loop, name in (("current", d.current_loop, "CURRENT_BANDWIDTH_HZ"), ("speed", d.speed_loop, "SPEED_BANDWIDTH_HZ")):
         if loop and not loop.reached:
-            d.warnings.append(f"{name} = {loop.bandwidth_hz:g}: the {what} loop has {loop.worst.phase_deg:.0f} degrees and {loop.worst.gain_db:.0f} dB of margin at "
-                              f"worst ({loop.worst_case}), {loops.PHASE_MARGIN_DEG:.0f} degrees and {loops.GAIN_MARGIN_DB:.0f} dB are asked for; "
+            left = f"has {loop.worst.phase_deg:.0f} degrees and {loop.worst.gain_db:.0f} dB of margin" if loop.worst.stable else "is unstable"
+            d.warnings.append(f"{name} = {loop.bandwidth_hz:g}: the {what} loop {left} at worst ({loop.worst_case}), {loops.PHASE_MARGIN_DEG:.0f} degrees and {loops.GAIN_MARGIN_DB:.0f} dB are asked for; "
                               + ("remove it from [tune]" if name in d.motor.tune else "a lower maximum_speed or a shorter PWM period helps" if what == "current"
                                  else "a smaller load inertia helps"))
-    if d.speed_loop and d.speed_loop.bandwidth_hz < 0.8 * d.loaded_hz:
-        d.warnings.append(f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow for so quick a rotor ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
-                          "second at minimum speed): put loads on slowly, or at a higher speed, or add inertia")
+    if d.speed_loop and d.speed_loop.reached and d.speed_loop.bandwidth_hz < 0.8 * d.loaded_hz:
+        kind, remedy = (" for so quick a rotor", "add inertia") if _rise_s(d.motor) < HEAVY_S else (" with so much inertia", "lower the load's inertia")
+        if "SPEED_BANDWIDTH_HZ" in d.motor.tune:
+            kind, remedy = "", "remove SPEED_BANDWIDTH_HZ from [tune]"
+        d.warnings.append(f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow{kind} ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
+                          f"second at minimum speed): put loads on slowly, or at a higher speed, or {remedy}")
     s = d.start_up
     calming = "add [mechanical] coulomb_friction, which the no-load current gives"
     if s and not s.follows and s.trial is not None:

@@ -37,8 +37,8 @@ MEANINGS = {
     "MAXIMUM_CURRENT_A": "length of the current vector that the drive may ask for",
     "OVER_CURRENT_THRESHOLD_A": "any phase above trips at once; must lie inside the converter's range", "OVER_VOLTAGE_V": "bus above trips",
     "UNDER_VOLTAGE_V": "bus below trips while running", "REGEN_LIMIT_V": "braking current is reduced from here, to nothing 2 V higher",
-    "CURRENT_BANDWIDTH_HZ": "both current loops: phase margin {current_nominal} degrees, {current_worst} over the parameter set",
-    "SPEED_BANDWIDTH_HZ": "speed loop: phase margin {speed_nominal} degrees, {speed_worst} over the parameter set",
+    "CURRENT_BANDWIDTH_HZ": "both current loops: {current_nominal}, {current_worst} over the parameter set",
+    "SPEED_BANDWIDTH_HZ": "speed loop: {speed_nominal}, {speed_worst} over the parameter set",
     "KFILTER_ESDQ": "back-EMF up to FW_START_SPEED_RPM: {KFILTER_ESDQ} Hz", "KFILTER_ESDQ_FW": "back-EMF above: {KFILTER_ESDQ_FW} Hz",
     "KFILTER_VELESTIM": "speed for loop, thresholds and display: {KFILTER_VELESTIM} Hz",
     "FW_START_SPEED_RPM": "speed reference of entry 0", "FW_TRIM_CURRENT_A": "most that the voltage feedback may add to the table's d current",
@@ -122,7 +122,8 @@ def _facts(design: Design) -> dict[str, object]:
                   "ramp_s": f"{s.ramp_s:.2f}", "pull_out": f"{s.pull_out_nm:.3g}"}
     for name, loop in (("current", d.current_loop), ("speed", d.speed_loop)):
         if loop:
-            facts |= {f"{name}_nominal": f"{math.floor(loop.nominal.phase_deg)}", f"{name}_worst": f"{math.floor(loop.worst.phase_deg)}"}
+            facts |= {f"{name}_nominal": f"phase margin {math.floor(loop.nominal.phase_deg)} degrees" if loop.nominal.stable else "unstable",
+                      f"{name}_worst": f"{math.floor(loop.worst.phase_deg)}" if loop.worst.stable else "unstable"}
     return facts
 
 

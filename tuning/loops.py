@@ -83,6 +83,11 @@ class Margins:
     crossover_hz: float
 
     @property
+    def stable(self) -> bool:
+        """A loop that still has gain where its phase has gone beyond -180 degrees is not, and its margins are no margins."""
+        return self.phase_deg > 0.0
+
+    @property
     def enough(self) -> bool:
         return self.phase_deg >= PHASE_MARGIN_DEG and self.gain_db >= GAIN_MARGIN_DB
 

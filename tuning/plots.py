@@ -50,7 +50,7 @@ def _bode(loop: LoopDesign | None, title: str) -> str:
 def _bode_curve(size: plt.Axes, phase: plt.Axes, curve: Curve, colour: str) -> None:
     """Negative frequencies (a rotor that turns makes them differ) are dashed, their phase mirrored."""
     margin = curve.margins
-    label = f"{curve.label}: {margin.phase_deg:.0f}° at {margin.crossover_hz:.3g} Hz, {margin.gain_db:.0f} dB"
+    label = f"{curve.label}: " + (f"{margin.phase_deg:.0f}° at {margin.crossover_hz:.3g} Hz, {margin.gain_db:.0f} dB" if margin.stable else "unstable")
     for sign, dashes in ((1.0, "-"), (-1.0, "--")):
         rows = curve.frequency_hz * sign > 0.0
         if not rows.any():

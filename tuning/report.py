@@ -46,8 +46,10 @@ def text(design: Design) -> str:
 def brief(design: Design) -> str:
     """One line, and the warnings."""
     d = design
-    worst = [f"{loop.worst.phase_deg:.0f}" if loop else "?" for loop in (d.current_loop, d.speed_loop)]
-    line = (f"{d.motor.name}: {d.value('MINIMUM_SPEED_RPM'):g} .. {d.value('MAXIMUM_SPEED_RPM'):g} rpm, phase margins at least {worst[0]} and {worst[1]} degrees, "
+    loops = [(name, loop.worst) for name, loop in (("current", d.current_loop), ("speed", d.speed_loop)) if loop]
+    margins = "phase margins at least " + " and ".join(f"{worst.phase_deg:.0f}" for _, worst in loops) + " degrees"
+    unstable = " and ".join(f"{name} loop" for name, worst in loops if not worst.stable)
+    line = (f"{d.motor.name}: {d.value('MINIMUM_SPEED_RPM'):g} .. {d.value('MAXIMUM_SPEED_RPM'):g} rpm, {f'{unstable} unstable at worst' if unstable else margins}, "
             f"start with {d.value('Q_CURRENT_REF_OPENLOOP'):g} A")
     return "\n".join([line] + [f"  warning: {warning}" for warning in d.warnings])
 
@@ -64,7 +66,10 @@ def _note_constants(design: Design) -> list[Constant]:
 def _margin_text(loop: LoopDesign | None) -> str:
     if loop is None:
         return "-"
-    return (f"{loop.bandwidth_hz:g} Hz, phase margin {loop.nominal.phase_deg:.1f} degrees, {loop.worst.phase_deg:.1f} at worst ({loop.worst_case}), "
+    nominal = f"phase margin {loop.nominal.phase_deg:.1f} degrees" if loop.nominal.stable else "unstable"
+    if not loop.worst.stable:
+        return f"{loop.bandwidth_hz:g} Hz, {nominal}, unstable at worst ({loop.worst_case})"
+    return (f"{loop.bandwidth_hz:g} Hz, {nominal}, {loop.worst.phase_deg:.1f} at worst ({loop.worst_case}), "
             f"gain margin {loop.nominal.gain_db:.0f} dB, {loop.worst.gain_db:.0f} at worst")
 
 
@@ -162,7 +167,7 @@ def _loop_text(loop: LoopDesign | None, how: str) -> str:
     verdict = "" if loop.reached else ' class="bad"'
     rows = [("nominal", loop.nominal, ""), ("worst of the parameter set", loop.worst, loop.worst_case)]
     table = _table(("case", "phase margin", "gain margin", "crossover", ""),
-                   ((name, f"{x.phase_deg:.1f}&deg;", f"{x.gain_db:.1f} dB", f"{x.crossover_hz:.4g} Hz", html.escape(case)) for name, x, case in rows), numbers=(1, 2, 3))
+                   ((name, f"{x.phase_deg:.1f}&deg;" if x.stable else "unstable", f"{x.gain_db:.1f} dB" if x.stable else "&ndash;", f"{x.crossover_hz:.4g} Hz", html.escape(case)) for name, x, case in rows), numbers=(1, 2, 3))
     return (f"<p>{how}</p><p{verdict}>Bandwidth {loop.bandwidth_hz:g} Hz; asked for are {PHASE_MARGIN_DEG:.0f}&deg; and {GAIN_MARGIN_DB:.0f} dB over the parameter set "
             f"(R &minus;10 .. +30 %, L &plusmn;20 %, flux &plusmn;10 %, and the published spread if that is wider).</p>{table}")
 

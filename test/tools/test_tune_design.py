@@ -11,7 +11,7 @@ from dataclasses import replace
 from tools.foc33 import board_file, motor_file, places
 from tools.foc33.errors import UserError
 from tune_support import COMPILER, FOR_ANOTHER_BOARD, HURST, INCLUDES, MOTOR, designed, motor_path, motors, of
-from tuning import limits, params
+from tuning import header, limits, params, report
 from tuning.constants import number_of
 from tuning.design import design, plain, real, short
 from tuning.limits import Envelope
@@ -118,6 +118,25 @@ class Warnings(unittest.TestCase):
 
     def test_an_inductance_measured_far_from_the_motor_s_frequency(self):
         self.warned("was measured at 10000 Hz, the motor turns at 208 Hz", ("frequency_hz = 1000", "frequency_hz = 10000"))
+
+    def test_a_heavy_load_s_slow_speed_loop_is_not_called_a_quick_rotor_s(self):
+        line = self.warned("the speed loop's", more='[load]\ninertia = { value = 12000, unit = "g cm2" }\n')
+        self.assertIn("are slow with so much inertia (0.73 Hz would hold", line)
+        self.assertTrue(line.endswith("or lower the load's inertia"), line)
+        line = self.warned("slow for so quick a rotor", ("value = 5.5e-6", "value = 1.0e-6"), more="[tune]\nKFILTER_VELESTIM = 748\n")
+        self.assertTrue(line.endswith("or add inertia"), line)
+        line = self.warned("the speed loop's 4 Hz are slow (", more="[tune]\nSPEED_BANDWIDTH_HZ = 4\n")
+        self.assertTrue(line.endswith("or remove SPEED_BANDWIDTH_HZ from [tune]"), line)
+
+    def test_an_unstable_loop_is_called_so_and_has_no_margins(self):
+        d = designed(more="[tune]\nSPEED_BANDWIDTH_HZ = 60\n")
+        warning = next(line for line in d.warnings if "SPEED_BANDWIDTH_HZ = 60" in line)
+        self.assertIn("the speed loop is unstable at worst (", warning)
+        self.assertIn("current loop    1000 Hz, phase margin", report.text(d))
+        self.assertRegex(report.text(d), r"speed loop      60 Hz, .*unstable at worst \(")
+        self.assertIn("speed loop unstable at worst", report.brief(d))
+        for text in (warning, report.text(d), report.brief(d), header.write(d)):
+            self.assertNotRegex(text, r"-\d+(\.\d)? degrees|-\d+(\.\d)? (at worst|over the parameter set)")
 
     def test_a_derivative_limit_that_clips(self):
         self.warned("D_ILIMIT_LS ends at", pole_pairs=9, psi_vs=7.983e-3 * 5 / 9, ld_h=3e-4, lq_h=3e-4, maximum_speed_rpm=2600.0,
