@@ -1,9 +1,11 @@
 """The three field-weakening tables of a motor as a file (tuning/tables/NAME.toml), and which motor values they belong to."""
 
+import contextlib
+import errno
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -116,17 +118,33 @@ def load_for(motor: str, params: Mapping[str, float], folder: Path = FOLDER) -> 
     return tables, ""
 
 
+def check_place(path: Path) -> None:
+    """Refuses a place that write() could not write to: nobody wants to hear that after the search."""
+    with _beside(path) as unfinished:
+        unfinished.touch()
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+
+
 def write(path: Path, tables: Tables) -> None:
     """Writes the file in one step: what is there is either the old file or the whole new one."""
+    with _beside(path) as unfinished:
+        unfinished.write_text(text(tables), encoding="utf-8")
+        unfinished.replace(path)
+
+
+@contextlib.contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """A file beside `path` that is gone in the end; what cannot be written is a user error."""
     unfinished = path.with_name(f".{path.name}-unfinished-{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.write_text(text(tables), encoding="utf-8")
-        unfinished.replace(path)
+        yield unfinished
     except OSError as error:
-        raise UserError(f"cannot write '{places.shown(path)}' ({error.strerror})", "", "choose another place with --tables") from None
+        raise UserError(f"cannot write the tables ({error.strerror})", str(places.shown(path)), "make the folder writable") from None
     finally:
-        unfinished.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            unfinished.unlink(missing_ok=True)
 
 
 def text(tables: Tables) -> str:

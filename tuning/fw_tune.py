@@ -84,6 +84,7 @@ def command(options: argparse.Namespace) -> int:
     header = _header(options, motor, board)
     target = options.out or RESULTS / motor.name
     path = options.tables or fw_tables.path_of(motor.name)
+    fw_tables.check_place(path)
     with output.ResultFolder(target) as folder, _Show(options.quiet) as show:
         work = _Work(motor, header, _layers(motor, board, options), options, show)
         tables, rows = work.search()

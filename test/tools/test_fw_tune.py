@@ -16,6 +16,7 @@ from tuning import fw_search, fw_tables, fw_tune
 from tuning.fw_bench import SIGNALS, Bench, Fault, Point, reduced
 from tuning.fw_search import Goal, Search, correction, largest, least, model_current, model_use, peak, voltage_limit
 from tuning.fw_tables import ENTRIES, Entry, Tables
+from tune_support import command
 
 HURST = "hurst_dmb0224c10002"
 HEADER = (places.ROOT / "userparams.h").read_text(encoding="utf-8")
@@ -375,6 +376,17 @@ class TablesFile(unittest.TestCase):
             fw_tables.write(self.path, tables())
         self.assertEqual([file.name for file in self.folder.iterdir()], [self.path.name])
         self.assertEqual(self.path.read_text(encoding="utf-8"), "old")
+
+    def test_a_place_that_cannot_be_written_is_refused_before_the_search(self):
+        self.path.write_text("", encoding="utf-8")
+        self.path.with_name("folder.toml").mkdir()
+        with mock.patch.object(fw_tune, "_Work", side_effect=AssertionError("the search began")):
+            for place, reason in ((self.path / "tables" / "a.toml", "(Not a directory)"), (self.path.with_name("folder.toml"), "(Is a directory)")):
+                code, out, error = command("tune-fw", HURST, "--tables", str(place), "--out", str(self.folder / "out"), "--quiet")
+                self.assertEqual((code, out, error), (2, "", f"foc33: cannot write the tables {reason}, {place}: make the folder writable\n"))
+            with self.assertRaisesRegex(AssertionError, "the search began"):
+                command("tune-fw", HURST, "--tables", str(self.path), "--out", str(self.folder / "out"), "--quiet")
+        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), sorted([self.path.name, "folder.toml"]))
 
     def test_header_names_keep_the_base_value_by_name(self):
         values = tables().parameters()
