@@ -71,13 +71,16 @@ board = $(if $(BOARD),--board $(call quoted,$(BOARD)))
 options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
 ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief),$(MAKE) vboard)
 
-.PHONY: run scenarios table2 starts motors robust setup-run
+.PHONY: run scenarios list-motors table2 starts motors robust setup-run
 run: setup-run ## the firmware turns the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR=name BOARD=name OUT=folder]
 	@+$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
 
 scenarios: setup-run ## what make run SCENARIO=name can run
 	@$(front_end) scenarios
+
+list-motors: setup-run ## the motor files of tuning/motors: data and rating
+	@$(front_end) motors
 
 table2: setup-run ## the eight rows of the note's Table 2 beside ours [MOTOR=name OUT=folder]
 	@+$(ready)

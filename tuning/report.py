@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from tools.foc33 import output, places
+from tools.foc33 import output, places, units
 
 from . import header
 from .constants import Constant
@@ -27,7 +27,8 @@ def text(design: Design) -> str:
     d, m, s = design, design.motor, design.start_up
     value = d.value
     ls = f"{m.lq_h * 1e3:.4g} mH" if not m.salient else f"Ld {m.ld_h * 1e3:.4g} mH, Lq {m.lq_h * 1e3:.4g} mH"
-    rows = [("motor", f"{m.rs_ohm:.4g} ohm, {ls}, {m.kphi_v_per_krpm:.4g} V/krpm, {m.pole_pairs} pole pairs, {value('MOTOR_INERTIA_KGM2'):.3g} kg m2"),
+    rows = [("motor", f"{m.rs_ohm:.4g} ohm, {ls} (phase of the star), {m.pole_pairs} pole pairs, {value('MOTOR_INERTIA_KGM2'):.3g} kg m2"),
+            ("Kphi", units.kphi_forms(m.kphi_v_per_krpm, m.pole_pairs)),
             ("rated", f"{m.rated_torque_nm:.3g} N m at {m.rated_speed_rpm:g} rpm and {m.rated_current_a:.3g} A peak ({d.board.title})"),
             ("speeds", f"{value('MINIMUM_SPEED_RPM'):g} .. {value('NOMINAL_SPEED_RPM'):g} rpm, up to {value('MAXIMUM_SPEED_RPM'):g} rpm with S3"),
             ("current loop", _margin_text(d.current_loop)), ("speed loop", _margin_text(d.speed_loop))]
@@ -193,9 +194,11 @@ def _constants(d: Design) -> str:
 
 
 def _inputs(d: Design) -> str:
-    rows = [(name, html.escape(q.given), f"{q.value_si:.6g}", html.escape(q.source)) for name, q in d.motor.quantities.items()]
-    rows += [(name, html.escape(q.given), f"{q.value_si:.6g}", html.escape(q.source)) for name, q in d.board.quantities.items()]
-    return _table(("quantity", "as written", "SI, star phase", "source"), rows, numbers=(2,))
+    m = d.motor
+    rows = [(name, html.escape(q.given), f"{q.value_si:.6g} {html.escape(q.si_unit)}", html.escape(q.source))
+            for name, q in [*m.quantities.items(), *d.board.quantities.items()]]
+    return (_table(("quantity", "as written", "converted, star phase", "source"), rows, numbers=(2,))
+            + f"<p>Kphi at 25 &deg;C: {html.escape(units.kphi_forms(m.kphi_v_per_krpm, m.pole_pairs))}; V s/rad alone is the flux of a star phase.</p>")
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: tuple[int, ...] = ()) -> str:

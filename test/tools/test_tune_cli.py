@@ -50,6 +50,15 @@ class Tune(unittest.TestCase):
         for words in ("Current loop", "Speed loop", "Start", "Parameters", "Constants", "Inputs", "NORM_RS", "AN1292"):
             self.assertIn(words, page)
 
+    def test_kphi_is_told_in_the_forms_that_sheets_give_and_inputs_with_their_units(self):
+        _, out, _ = command("tune", HURST, "--out", str(self.out))
+        page = (self.out / "report.html").read_text(encoding="utf-8")
+        for words in ("= 0.06914 V s/rad line-to-line =", "= 0.05987 N m/A peak = 0.08468 N m/A rms ="):
+            self.assertIn(words, out)
+            self.assertIn(words, page)
+        for cell in ("7.24 V peak line-to-line/krpm", "2.67 ohm", "2800 rpm", "24 V"):
+            self.assertIn(f'<td class="n">{cell}</td>', page)
+
     def test_header_and_page_name_the_command_that_makes_them_again(self):
         command("tune", HURST, "--out", str(self.out))
         with motor_path() as path:

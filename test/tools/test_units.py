@@ -107,6 +107,13 @@ class Kphi(unittest.TestCase):
     def test_the_two_constants_of_a_flat_motor_s_sheet_agree(self):
         self.assertAlmostEqual(self.read(187.0, "rpm/V") / self.read(51.0, "mN m/A dc"), 1.0, 2)
 
+    def test_the_forms_to_compare_with_are_all_the_same_constant(self):
+        text = units.kphi_forms(7.24, 5)
+        self.assertTrue(text.startswith("7.24 V peak line-to-line/krpm = 5.119 V rms line-to-line/krpm = 0.06914 V s/rad line-to-line = 0.007983 V s/rad = "))
+        for form in text.split(" = "):
+            value, _, unit = form.partition(" ")
+            self.assertAlmostEqual(units.kphi("Y", 5).units[unit](float(value)) / 7.24, 1.0, 3, form)
+
 
 class Others(unittest.TestCase):
     def test_scales(self):

@@ -356,7 +356,7 @@ def _check_limits(motor: Motor, fail: Callable[[str, str, str], UserError]) -> N
 
 
 def listing(motors: list[Motor]) -> str:
-    """A table of motors, as `python3 -m tools.foc33 motors` prints it."""
+    """A table of motors, as `make list-motors` prints it."""
     head = ("name", "winding", "pole pairs", "R ohm", "L mH", "Kphi V/krpm", "Kt N m/A", "rated", "maximum", "unchecked numbers")
     rows = [_row(motor) for motor in motors]
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]

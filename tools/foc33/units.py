@@ -115,6 +115,15 @@ def kphi(connection: str, pole_pairs: int) -> Kind:
     return Kind("V peak line-to-line/krpm", 0.2, 200.0, units | {"rpm/V": Conversion(1000.0 / SIX_STEP_MEAN, reciprocal=True)})
 
 
+KPHI_FORMS = ("V peak line-to-line/krpm", "V rms line-to-line/krpm", "V s/rad line-to-line", "V s/rad", "N m/A peak", "N m/A rms", "N m/A dc", "rpm/V")
+
+
+def kphi_forms(v_per_krpm: float, pole_pairs: int) -> str:
+    """The same motor constant in the forms that sheets give, to compare with; V s/rad alone is the flux of a star phase."""
+    known = kphi("Y", pole_pairs).units
+    return " = ".join(f"{known[unit].given(v_per_krpm):.4g} {unit}" for unit in KPHI_FORMS)
+
+
 RESISTANCE_TEMPCO = Kind("1/K", 0.0, 0.01, {"%/K": Conversion(0.01), "1/K": Conversion(1.0), "ppm/K": Conversion(1e-6)})
 KPHI_TEMPCO = Kind("1/K", -0.004, 0.0, RESISTANCE_TEMPCO.units)
 INERTIA = Kind("kg m2", 1e-8, 0.1, _scaled(kg_m2=1.0, g_cm2=1e-7, kg_cm2=1e-4, g_m2=1e-3, oz_in_s2=OUNCE_INCH_NM))
