@@ -100,16 +100,16 @@ robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTO
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
 .PHONY: tune tune-fw identify spreadsheet userparams setup-tune
-tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and a report [MOTOR=name BOARD=name OUT=folder]
+tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD=name OUT=folder]
 	@$(tuner) tune $(tune_motor) $(board) $(out)
 
-tune-fw: setup-run ## field-weakening tables found on the virtual board, into tuning/tables/NAME.toml [MOTOR=name OUT=folder]
+tune-fw: setup-run ## field-weakening tables found on the virtual board, into tuning/tables/NAME.toml [MOTOR=hurst_dmb0224c10002 OUT=folder]
 	@$(tuner) tune-fw $(tune_motor) $(board) $(out)
 
-identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=name or all, OUT=folder]
+identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=hurst_dmb0224c10002 or all, OUT=folder]
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
 
-userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old, .old2 ... [MOTOR=name]
+userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old, .old2 ... [MOTOR=hurst_dmb0224c10002]
 	@$(tuner) tune $(tune_motor) $(board) --brief
 	@new=$(call quoted,build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h); \
 	if cmp -s "$$new" userparams.h; then echo "userparams.h is up to date"; exit; fi; \

@@ -64,15 +64,16 @@ BAD = {
     "empty source": ("\"g cm2\", source = \"s\"", "\"g cm2\", source = \" \"", "'source' is not a text", "line 11"),
     "unit unknown": (UNITS["J"], "\"g mm2\"", "'g mm2' is no unit of inertia", "line 11", "use one of kg m2"),
     "unit of another quantity": (UNITS["L"], "\"ohm line-to-line\"", "is no unit of inductance", "line 7", "mH line-to-line"),
-    "unit without reference": (UNITS["R"], "\"ohm\"", "'ohm' is no unit of resistance", "line 6", "ohm line-to-line"),
+    "unit without reference": (UNITS["R"], "\"ohm\"", "'ohm' does not say which resistance", "line 6", "write ohm line-to-line or ohm phase or ohm winding"),
     "unit is a number": (UNITS["J"], "2", "'unit' is not a text", "line 11"),
     # values
     "text": ("value = 1.8", "value = \"1.8\"", "'resistance' is not a number", "line 6"),
     "truth": ("value = 1.8", "value = true", "'resistance' is not a number", "line 6"),
     "list": ("value = 1.8", "value = [1.8]", "'resistance' is not a number", "line 6"),
     "nan": ("value = 1.8", "value = nan", "'resistance' is not a number", "line 6"),
-    "infinite": ("value = 1.8", "value = -inf", "'resistance' is not a number", "line 6"),
-    "beyond a double": ("value = 1.8", "value = 1" + "0" * 400, "'resistance' is not a number", "line 6"),
+    "infinite": ("value = 1.8", "value = -inf", "'resistance' = -inf ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
+    "beyond a double": ("value = 1.8", "value = 1" + "0" * 400, "'resistance' = inf ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
+    "beyond reason": ("value = 1.8", "value = 1e30", "'resistance' = 1e+30 ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
     "beyond all": ("value = 1.8", "value = 1" + "0" * 5000, "a number too long"),
     "too deep": ("value = 1.8", "value = " + "[" * 5000, "tables too deep"),
     "negative resistance": ("value = 1.8", "value = -1.8", "'resistance' = -1.8 ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80"),
@@ -131,9 +132,11 @@ BAD = {
     "choice that is a fact": ("", "[tune]\nMOTOR_RS_OHM = 1", "'MOTOR_RS_OHM' is no choice", "line 20", "[electrical] resistance"),
     "plant key that is derived": ("", "[plant]\n\"motor.rs_ohm\" = 1", "'motor.rs_ohm' stands in another table", "line 20"),
     "plant key of the board": ("", "[plant]\n\"supply.voltage_v\" = 1", "'supply.voltage_v' is no key of the motor", "line 20"),
+    "plant key misspelt": ("", "[plant]\n\"motor.sat_lq_ration\" = 0.2", "unknown key 'motor.sat_lq_ration'", "line 20", "did you mean 'motor.sat_lq_ratio'?"),
+    "plant key out of range": ("", "[plant]\n\"motor.temp_c\" = 300", "'motor.temp_c' = 300 is impossible", "line 20", "choose -60 .. 250 degC"),
     "plant key in words": ("", "[plant]\n\"mech.stiction_nm\" = \"x\"", "'mech.stiction_nm' is not a number", "line 20"),
     "plant key of a thousand dots": ("", "[plant]\n" + "a." * 3000 + "a = 1", "tables too deep"),
-    "plant key far too long": ("", "[plant]\n\"mech.stiction_nm\" = 1" + "0" * 400, "'mech.stiction_nm' is not a number", "line 20"),
+    "plant key far too long": ("", "[plant]\n\"mech.stiction_nm\" = 1" + "0" * 400, "'mech.stiction_nm' is out of range", "line 20"),
 }
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from support import LIBRARY, document
 
-from tools.foc33 import places, plant
+from tools.foc33 import motor_file, places, plant
 from tools.foc33.board import Library
 from tools.foc33.errors import UserError
 from tools.foc33.plant import Key, Values, resolve
@@ -69,9 +69,14 @@ class Files(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "motor.toml"
             path.write_text(text, encoding="utf-8")
-            part = plant.read_motor(str(path))
-        with self.assertRaisesRegex(UserError, f"'motor.sat_lq_ratio' = 7 is impossible, .*motor.toml line {text.count(chr(10))}: choose"):
-            resolve([part.values], Library(LIBRARY).keys)
+            with self.assertRaisesRegex(UserError, f"'motor.sat_lq_ratio' = 7 is impossible, .*motor.toml line {text.count(chr(10))}: choose 0 .. 0.95$"):
+                plant.read_motor(str(path))
+
+    def test_a_motor_file_knows_the_ranges_of_the_motor_s_keys_before_anything_is_built(self):
+        keys = {name: (key.unit, key.minimum, key.maximum) for name, key in Library(LIBRARY).keys.items()
+                if key.writable and name.startswith(motor_file.PLANT_TABLES)}
+        self.assertEqual(motor_file.plant_ranges(), keys)
+        self.assertIn("mech.stiction_nm", keys)
 
     def test_plant_sections_remember_their_lines(self):
         values = Values.from_section(document("[plant]\n\n\"motor.rs_ohm\" = 2\n").root.section("plant"))

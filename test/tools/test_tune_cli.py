@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -168,6 +169,13 @@ class Tune(unittest.TestCase):
         self.assertEqual(code, 0)
         self.assertTrue(out.startswith("/* Everything a user edits"))
         self.assertTrue(out.endswith("#endif\n"))
+
+    def test_make_help_names_the_motor_that_is_taken_without_motor(self):
+        makefile = (places.ROOT / "Makefile").read_text(encoding="utf-8")
+        default = re.search(r"tune_motor = .*\$\(or \$\(MOTOR\),(\w+)\)", makefile)[1]
+        lines = subprocess.run(["make", "help"], cwd=places.ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+        for name in ("tune", "tune-fw", "identify", "userparams"):
+            self.assertIn(f"[MOTOR={default}", next(line for line in lines if line.startswith(f"make {name} ")))
 
     def test_as_a_program(self):
         done = subprocess.run([sys.executable, "-m", "tuning", "tune", "no_such_motor"], cwd=places.ROOT, capture_output=True, text=True, check=False)

@@ -142,6 +142,16 @@ class Others(unittest.TestCase):
         with self.assertRaisesRegex(UserError, "'N' is no unit of x, .*line 2: use one of N m, mN m, N cm, oz in"):
             entry(units.TORQUE, 1, "N")
 
+    def test_a_unit_that_does_not_say_of_which_asks_for_it(self):
+        for kind, unit, wanted in ((units.kphi("Y", 5), "N m/A", "N m/A peak or N m/A rms or N m/A dc"),
+                                   (units.kphi("Y", 5), "V rms/krpm", "V rms line-to-line/krpm or V rms phase/krpm"),
+                                   (units.kphi("delta", 5), "V line-to-line/krpm", "V peak line-to-line/krpm or V rms line-to-line/krpm"),
+                                   (units.CURRENT, "A", "A peak or A rms or A dc")):
+            with self.subTest(unit), self.assertRaisesRegex(UserError, f"'{unit}' does not say which x, .*line 2: write {wanted}$"):
+                entry(kind, 1, unit)
+        with self.assertRaisesRegex(UserError, "'V rms dc/krpm' is no unit of x"):
+            entry(units.kphi("Y", 5), 1, "V rms dc/krpm")
+
     def test_limits_are_told_in_the_unit_that_was_written(self):
         with self.assertRaisesRegex(UserError, "'x' = 5.34e\\+06 ohm line-to-line is impossible, .*line 2: choose 0.02 .. 80 ohm line-to-line"):
             entry(units.resistance("Y"), 5.34e6, "ohm line-to-line")

@@ -288,15 +288,28 @@ def _read_tune(section: Section | None) -> dict[str, float]:
     return result
 
 
+@functools.cache
+def plant_ranges() -> dict[str, tuple[str, float, float]]:
+    """Unit, minimum and maximum of the virtual board's keys of a motor, from its source: what runs only when it is built knows too late."""
+    text = (places.ROOT / "tools" / "board" / "vb_keys.c").read_text(encoding="utf-8")
+    rows = re.findall(r'\b[PI]\("((?:motor|mech)\.\w+)", [\w.]+, \S+, (\S+), (\S+), "([^"]*)"', text)
+    return {name: (unit, float(low), float(high)) for name, low, high, unit in rows}
+
+
 def _read_plant(section: Section | None) -> Values:
     if section is None:
         return Values()
-    result = Values()
+    result, ranges = Values(), plant_ranges()
     for key, value in flatten(section).items():
         if key in DERIVED_KEYS:
             raise section.fail(key, f"'{key}' stands in another table of this file", "change the number there")
         if not key.startswith(PLANT_TABLES):
             raise section.fail(key, f"'{key}' is no key of the motor", "use motor.* and mech.* only, see `python3 -m tools.foc33 keys`")
+        if key not in ranges:
+            raise section.fail(key, f"unknown key '{key}'", suggestion(key, set(ranges) - set(DERIVED_KEYS)))
+        unit, low, high = ranges[key]
+        if not low <= value <= high:
+            raise section.fail(key, f"'{key}' = {value:g} is impossible", f"choose {low:g} .. {high:g} {unit}".rstrip())
         result.add(key, value, section.where(key))
     return result
 

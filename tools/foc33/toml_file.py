@@ -152,8 +152,10 @@ class Section:
         return flatten(Section(self.document, table, self.path + (key,)), factors)
 
     def _checked_number(self, key: str, value: Any, minimum: float, maximum: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e300: # nor inf, nan, huge integers
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
             raise self.fail(key, f"'{key}' is not a number", "write a number, without quotes")
+        if not abs(value) < 1e300: # inf, integers that no double holds
+            raise self.fail(key, f"'{key}' is out of range", "choose " + _range_text(minimum, maximum))
         if not minimum <= value <= maximum:
             raise self.fail(key, f"'{key}' = {value:g} is impossible", "choose " + _range_text(minimum, maximum))
         return float(value)
@@ -191,6 +193,8 @@ class Section:
 
 
 def _range_text(minimum: float, maximum: float) -> str:
+    if -minimum == maximum == math.inf:
+        return "a number below 1e300"
     if maximum == math.inf:
         return f"{minimum:g} or more"
     if minimum == -math.inf:

@@ -23,6 +23,7 @@ the peak of the line-to-line back-EMF. The mean of a cosine over +-30 degrees is
 """
 
 import math
+import re
 from dataclasses import dataclass
 
 from .errors import UserError
@@ -35,6 +36,8 @@ OUNCE_INCH_NM = 0.028349523125 * 9.80665 * 0.0254
 SIX_STEP_MEAN = 3.0 / math.pi
 PEAK_PER_DC = 2.0 * SQRT3 / math.pi
 REFERENCE_DEGC = 25.0
+REFERENCES = r"\b(?:peak|rms|dc|phase|winding|line-to-line)\b"
+"""What a unit may say of its number besides the size."""
 
 
 @dataclass(frozen=True)
@@ -211,9 +214,12 @@ def _number(inner: Section, part: str, key: str, value: object = None) -> float:
         if part not in inner:
             raise UserError(f"'{key}' has no {part}", inner.where(), f"add {part} = number")
         value = inner.data[part]
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e30:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
         raise inner.fail(part, f"'{key}' is not a number", "write a number, without quotes")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError: # every caller has a range, which tells it then
+        return math.copysign(math.inf, value > 0 or -1)
 
 
 def _unit(inner: Section, key: str, kind: Kind) -> str:
@@ -221,9 +227,22 @@ def _unit(inner: Section, key: str, kind: Kind) -> str:
     if unit is None:
         raise UserError(f"'{key}' has no unit", inner.where(), "add unit = one of " + ", ".join(kind.units))
     unit = " ".join(unit.split())
+    meant = _of_which(unit, kind)
+    if unit not in kind.units and meant:
+        raise inner.fail("unit", f"'{unit}' does not say which {key}", "write " + " or ".join(meant))
     if unit not in kind.units:
         raise inner.fail("unit", f"'{unit}' is no unit of {key}", "use one of " + ", ".join(kind.units))
     return unit
+
+
+def _of_which(unit: str, kind: Kind) -> list[str]:
+    """The units that say more than this one: N m/A may be peak, rms or dc."""
+    said = set(re.findall(REFERENCES, unit))
+    return [name for name in kind.units if _bare(name) == _bare(unit) and said < set(re.findall(REFERENCES, name))]
+
+
+def _bare(unit: str) -> str:
+    return re.sub(REFERENCES, "", unit).replace(" ", "")
 
 
 def _source(inner: Section, key: str, default: str | None) -> str:
