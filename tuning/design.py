@@ -53,6 +53,8 @@ class Design:
     choices: dict[str, Choice] = field(default_factory=dict)
     constants: list[Constant] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    start_risks: list[str] = field(default_factory=list)
+    """those of the warnings that tell why the motor may not start"""
     current_loop: loops.LoopDesign | None = None
     speed_loop: loops.LoopDesign | None = None
     start_up: start.StartDesign | None = None
@@ -446,27 +448,44 @@ def _warn_numbers(d: Design) -> None:
 
 
 def _warn_loops(d: Design) -> None:
+    margins, start_up = _margin_warnings(d), _start_warnings(d)
+    d.warnings += [*margins, *_slow_loop_warnings(d), *start_up]
+    d.start_risks = [*start_up, *margins]
+
+
+def _margin_warnings(d: Design) -> list[str]:
+    found = []
     for what, loop, name in (("current", d.current_loop, "CURRENT_BANDWIDTH_HZ"), ("speed", d.speed_loop, "SPEED_BANDWIDTH_HZ")):
         if loop and not loop.reached:
             left = f"has {loop.worst.phase_deg:.0f} degrees and {loop.worst.gain_db:.0f} dB of margin" if loop.worst.stable else "is unstable"
-            d.warnings.append(f"{name} = {loop.bandwidth_hz:g}: the {what} loop {left} at worst ({loop.worst_case}), {loops.PHASE_MARGIN_DEG:.0f} degrees and {loops.GAIN_MARGIN_DB:.0f} dB are asked for; "
-                              + ("remove it from [tune]" if name in d.motor.tune else "a lower maximum_speed or a shorter PWM period helps" if what == "current"
-                                 else "a smaller load inertia helps"))
-    if d.speed_loop and d.speed_loop.reached and d.speed_loop.bandwidth_hz < 0.8 * d.loaded_hz:
-        kind, remedy = (" for so quick a rotor", "add inertia") if _rise_s(d.motor) < HEAVY_S else (" with so much inertia", "lower the load's inertia")
-        if "SPEED_BANDWIDTH_HZ" in d.motor.tune:
-            kind, remedy = "", "remove SPEED_BANDWIDTH_HZ from [tune]"
-        d.warnings.append(f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow{kind} ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
-                          f"second at minimum speed): put loads on slowly, or at a higher speed, or {remedy}")
+            found.append(f"{name} = {loop.bandwidth_hz:g}: the {what} loop {left} at worst ({loop.worst_case}), {loops.PHASE_MARGIN_DEG:.0f} degrees and "
+                         f"{loops.GAIN_MARGIN_DB:.0f} dB are asked for; "
+                         + ("remove it from [tune]" if name in d.motor.tune else "a lower maximum_speed or a shorter PWM period helps" if what == "current"
+                            else "a smaller load inertia helps"))
+    return found
+
+
+def _slow_loop_warnings(d: Design) -> list[str]:
+    if not d.speed_loop or not d.speed_loop.reached or d.speed_loop.bandwidth_hz >= 0.8 * d.loaded_hz:
+        return []
+    kind, remedy = (" for so quick a rotor", "add inertia") if _rise_s(d.motor) < HEAVY_S else (" with so much inertia", "lower the load's inertia")
+    if "SPEED_BANDWIDTH_HZ" in d.motor.tune:
+        kind, remedy = "", "remove SPEED_BANDWIDTH_HZ from [tune]"
+    return [f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow{kind} ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
+            f"second at minimum speed): put loads on slowly, or at a higher speed, or {remedy}"]
+
+
+def _start_warnings(d: Design) -> list[str]:
     s = d.start_up
     calming = "add [mechanical] coulomb_friction, which the no-load current gives"
     if s and not s.follows and s.trial is not None:
         lost = [label for label, ok in zip(s.trial.labels, s.trial.followed) if not ok]
-        d.warnings.append(f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): " + (
-            calming if s.damping < 0.0 and d.motor.coulomb_nm == 0.0 else "raise maximum_current, or lower start_torque or the load's inertia"))
-    elif s and s.loud:
-        d.warnings.append(f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
-                          "to start from some angles: " + (
-                              calming if d.motor.coulomb_nm == 0.0 else "remove LOCK_TIME from [tune]" if "LOCK_TIME" in d.motor.tune
-                              else "with so little inductance the current's sample, after the pulse's centre, feeds the swing; put chokes into the motor's leads"
-                              if s.damping < 0.0 else "raise END_SPEED_RPM in [tune]"))
+        return [f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): " + (
+            calming if s.damping < 0.0 and d.motor.coulomb_nm == 0.0 else "raise maximum_current, or lower start_torque or the load's inertia")]
+    if s and s.loud:
+        return [f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
+                "to start from some angles: " + (
+                    calming if d.motor.coulomb_nm == 0.0 else "remove LOCK_TIME from [tune]" if "LOCK_TIME" in d.motor.tune
+                    else "with so little inductance the current's sample, after the pulse's centre, feeds the swing; put chokes into the motor's leads"
+                    if s.damping < 0.0 else "raise END_SPEED_RPM in [tune]")]
+    return []

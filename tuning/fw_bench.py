@@ -9,6 +9,7 @@ import numpy as np
 
 from tools.foc33.board import Board, Library
 from tools.foc33.errors import UserError
+from tools.foc33.matrix import start_time_s
 from tools.foc33.panel import Ranges
 from tools.foc33.trace import wrapped_deg
 
@@ -20,6 +21,7 @@ SIGNALS = ("plant.speed_rpm", "plant.theta_e_deg", "plant.i_d", "plant.i_q", "fw
            "fw.id_ref_a", "fw.id_trim_a", "bus.voltage_v")
 DECIMATION = 3
 START_S = 8.0
+"""Patience with a start beyond its lock and ramp."""
 REMEDY = {"START_FAILED": "the motor does not follow the ramp: raise Q_CURRENT_REF_OPENLOOP, or lower OPENLOOP_RAMPSPEED_INCREASERATE",
           "STALL": "raise Q_CURRENT_REF_OPENLOOP or END_SPEED_RPM",
           "LOST_LOCK": "check MOTOR_RS_OHM, MOTOR_LS_MH and MOTOR_KPHI_V_PER_KRPM",
@@ -55,12 +57,15 @@ class Fault(Exception):
 class Bench:
     """One board in this process. Speeds in mechanical rpm; loads in N m on top of the motor's own friction."""
 
-    def __init__(self, library: Path, values: dict[str, float], report: Callable[[float], None] = lambda seconds: None) -> None:
+    def __init__(self, library: Path, values: dict[str, float], report: Callable[[float], None] = lambda seconds: None,
+                 risks: str = "") -> None:
+        """`risks`: what the tuner has said may keep the motor from starting; it knows better than the fault what to change."""
         self.library = Library(library)
         self.params = self.library.params
         self.states, self.faults = self.library.states, self.library.faults
         self.ranges = Ranges.of(self.params, [])
         self.report = report
+        self.risks = risks
         self.motor_s = 0.0
         self.fast = False
         self.target_rpm = 0.0
@@ -112,12 +117,12 @@ class Bench:
         self.board.set("input.pot", self.ranges.pot_for_speed(max(self.params["END_SPEED_RPM"], self.ranges.minimum_rpm), False))
         self.fast = False
         self.press("s2")
-        waited = 0.0
+        waited, patience_s = 0.0, START_S + start_time_s(self.params)
         while self.state() != "CLOSED":
-            if self.fault() or waited > START_S:
+            if self.fault() or waited > patience_s:
                 fault = self.fault() or "no fault"
                 raise UserError(f"the motor does not start ({fault} in state {self.state()} after {waited:.1f} s)", "",
-                                REMEDY.get(fault, "run `make run` for this motor and look at its plots"))
+                                self.risks or REMEDY.get(fault, "run `make run` for this motor and look at its plots"))
             self.run(0.05)
             waited += 0.05
         self.target_rpm = max(self.params["END_SPEED_RPM"], self.ranges.minimum_rpm)

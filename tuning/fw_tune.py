@@ -81,12 +81,12 @@ def command(options: argparse.Namespace) -> int:
     _check(options)
     started = time.perf_counter()
     motor, board = motor_file.load(options.motor, "tune-fw"), board_file.load(options.board, "--board")
-    header = _header(options, motor, board)
+    header, risks = _header(options, motor, board)
     target = options.out or RESULTS / motor.name
     path = options.tables or fw_tables.path_of(motor.name)
     fw_tables.check_place(path)
     with output.ResultFolder(target) as folder, _Show(options.quiet) as show:
-        work = _Work(motor, header, _layers(motor, board, options), options, show)
+        work = _Work(motor, header, risks, _layers(motor, board, options), options, show)
         tables, rows = work.search()
         check = work.check(tables)
         data = _write(folder.work, tables, rows, check, motor, options)
@@ -112,16 +112,17 @@ def _layers(motor: Any, board: Any, options: argparse.Namespace) -> list[Any]:
     return [motor.plant_values(), board.plant_values(), steps.changes(options.changes)]
 
 
-def _header(options: argparse.Namespace, motor: Any, board: Any) -> str:
-    """The text of the userparams.h to begin with."""
+def _header(options: argparse.Namespace, motor: Any, board: Any) -> tuple[str, str]:
+    """The text of the userparams.h to begin with, and what the tuner warns may keep the motor from starting with it."""
     if options.userparams:
         folder = Path(options.userparams)
         path = folder if folder.is_file() else folder / build.HEADER
         if not path.is_file():
             raise UserError(f"no {build.HEADER} in '{options.userparams}'", "--userparams", "name the folder that holds it")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8"), ""
     from . import design, header
-    return header.write(design.design(motor, board))
+    made = design.design(motor, board)
+    return header.write(made), "; ".join(made.start_risks)
 
 
 # ---- the work --------------------------------------------------------------------------------------------------------------
@@ -143,12 +144,16 @@ class _Job:
     tables: Tables | None = None
     index: int = 0
     entries: int = ENTRIES
+    risks: str = ""
+
+    def bench(self, tell: Callable) -> Bench:
+        return Bench(self.library, self.values, tell, self.risks)
 
 
 class _Work:
     """The steps of one command; `motor_s` counts the motor time."""
 
-    def __init__(self, motor: Any, header: str, layers: list[Any], options: argparse.Namespace, show: "_Show") -> None:
+    def __init__(self, motor: Any, header: str, risks: str, layers: list[Any], options: argparse.Namespace, show: "_Show") -> None:
         self.motor, self.header, self.options, self.show = motor, header, options, show
         self.motor_s = 0.0
         known = defines(header)
@@ -161,7 +166,7 @@ class _Work:
             limit_a = min(options.limit_a, self.params["MAXIMUM_CURRENT_A"] * ID_SHARE)
         goal = Goal(1.0 - options.margin, options.angle_deg, limit_a, motor.rated_current_a, motor.rated_torque_nm, motor.rated_speed_rpm, options.torque_share,
                     motor.maximum_speed_rpm)
-        self.job = _Job(library.path, self.values, goal, entries=options.entries)
+        self.job = _Job(library.path, self.values, goal, entries=options.entries, risks=risks)
 
     def _library(self, use: str, header: str, defines_: list[str]) -> Library:
         """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
@@ -229,7 +234,7 @@ class _Work:
 
 
 def _search(job: _Job, tell: Callable) -> Result:
-    bench = Bench(job.library, job.values, tell)
+    bench = job.bench(tell)
     try:
         return Search(bench, job.goal, lambda *news: tell(news), job.entries).run()
     except Fault as fault:
@@ -241,7 +246,7 @@ def _search(job: _Job, tell: Callable) -> Result:
 
 def _ready(job: _Job, tell: Callable) -> Bench:
     """A bench with the new tables and the trim as in userparams.h, in closed loop."""
-    bench = Bench(job.library, job.values, tell)
+    bench = job.bench(tell)
     assert job.tables is not None
     bench.set("FW_START_SPEED_RPM", job.tables.start_speed_rpm)
     for i, entry in enumerate(job.tables.entries):
@@ -307,7 +312,7 @@ def _maximum(job: _Job, tell: Callable) -> float:
 
 
 def _end_to_end(job: _Job, speeds: list[float], tell: Callable) -> Check:
-    bench = Bench(job.library, job.values, tell)
+    bench = job.bench(tell)
     check = Check()
     try:
         bench.start()

@@ -5,6 +5,7 @@ import tempfile
 import unittest
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -16,7 +17,7 @@ from tuning import fw_search, fw_tables, fw_tune
 from tuning.fw_bench import SIGNALS, Bench, Fault, Point, reduced
 from tuning.fw_search import Goal, Search, correction, largest, least, model_current, model_use, peak, voltage_limit
 from tuning.fw_tables import ENTRIES, Entry, Tables
-from tune_support import command
+from tune_support import command, motor_path
 
 HURST = "hurst_dmb0224c10002"
 HEADER = (places.ROOT / "userparams.h").read_text(encoding="utf-8")
@@ -199,6 +200,42 @@ class Measuring(unittest.TestCase):
         self.assertTrue(self.point(plant__speed_rpm=3014.5).held)
         self.assertFalse(self.point(plant__speed_rpm=2984.5).held)
         self.assertFalse(self.point(plant__speed_rpm=3015.5).held)
+
+
+class Starting(unittest.TestCase):
+    SLOW = {**PARAMS, "LOCK_TIME": 32000.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 1.0}
+    """1.6 s of lock and 14 s of ramp"""
+
+    def start(self, closes_after_s: float, fault: str = "", risks: str = "") -> float:
+        """Motor time of a start; the board is in closed loop, or faults, after a time."""
+        bench = Bench.__new__(Bench)
+        bench.params, bench.risks, bench.board = self.SLOW, risks, mock.Mock()
+        bench.ranges = mock.Mock(minimum_rpm=500.0)
+        times: list[float] = []
+        over = lambda: sum(times) > closes_after_s # noqa: E731
+        with mock.patch.multiple(bench, create=True, run=times.append, press=lambda button: None, load=lambda torque_nm: None,
+                                 fault=lambda: fault if over() else "", state=lambda: "CLOSED" if over() and not fault else "RAMP"):
+            bench.start()
+        return sum(times)
+
+    def test_a_start_that_takes_long_by_its_parameters_is_waited_for(self):
+        self.assertAlmostEqual(self.start(15.5), 16.0, delta=0.2)
+        with self.assertRaisesRegex(UserError, r"does not start \(no fault in state RAMP after 2[3-5]\.\d s\): run `make run`"):
+            self.start(60.0)
+
+    def test_what_the_tuner_warned_about_is_the_remedy_of_a_start_that_fails(self):
+        for risks, remedy in (("", "the motor does not follow the ramp: raise Q_CURRENT_REF_OPENLOOP.*"), ("it swings: add friction", "it swings: add friction")):
+            with self.assertRaisesRegex(UserError, rf"does not start \(START_FAILED [^)]*\): {remedy}\Z"):
+                self.start(3.0, "START_FAILED", risks)
+
+    def test_the_risks_are_the_tuner_s_warnings_about_the_start(self):
+        options = SimpleNamespace(userparams=None)
+        with motor_path(("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 1e-9"),
+                        ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0")) as path:
+            _, risks = fw_tune._header(options, motor_file.load(str(path)), board_file.load("mclv"))
+        self.assertRegex(risks, r"\Athe unloaded rotor still swings .*: add \[mechanical\] coulomb_friction, which the no-load current gives\Z")
+        self.assertEqual(fw_tune._header(options, motor_file.load(HURST), board_file.load("mclv"))[1], "")
+        self.assertEqual(fw_tune._header(SimpleNamespace(userparams=str(places.ROOT)), None, None), (HEADER, ""))
 
 
 class MadeUpMotors(unittest.TestCase):
