@@ -137,8 +137,8 @@
  * U0 = 0.000405949 V and I0 = 0.000134277 A per count of Q15 (full scale 13.3 V, 4.4 A)
  *
  * motor
- *   NORM_RS                              2.67 ohm             14470  Q15 / 2                     +0.002 %  Equation 5, the note's constant
- *   NORM_LSDTBASE                        1.92 mH               1626  Q15 / 256                   +0.011 %  Equation 5, the note's constant
+ *   NORM_RS                              2.67 ohm             14470  Q15 / 2                     +0.002 %  Equation 5, the note's constant, at most 32767
+ *   NORM_LSDTBASE                        1.92 mH               1626  Q15 / 256                   +0.011 %  Equation 5, the note's constant, at most 32767
  *   NORM_INVKFIBASE                      7.24 V/krpm           7956  Q15 / 2, 1/Kphi             +0.002 %  Equation 6
  *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, the note's constant
  *   estimator.rs_q16                     2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
