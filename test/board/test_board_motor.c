@@ -201,6 +201,41 @@ void test_back_emf_follows_the_rotor_in_the_order_a_b_c(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * amplitude, amplitude * sin(theta + 2.0 * PI / 3.0), get("plant.i_c"));
 }
 
+/* Largest speed of the next tenth of a second. */
+static double swing_rpm(void)
+{
+    double most = 0.0;
+    for (int k = 0; k < 2000; k++) {
+        run(1);
+        most = fmax(most, fabs(get("plant.speed_rpm")));
+    }
+    return most;
+}
+
+void test_a_rotor_that_swings_in_a_fixed_field_loses_what_its_back_emf_takes_and_no_more(void)
+{
+    const double psi = 2e-5, inertia = 3.6e-8, volts = 24.0 * 0.5 * 2.0 / 3.0;
+    const double swing = sqrt(POLES * 1.5 * POLES * psi * volts / R / inertia); /* 250 rad/s */
+    const double damping = 1.5 * POLES * POLES * psi * psi * R / (R * R + swing * swing * L * L);
+    make_ideal();
+    fake_init_hook = no_dead_time;
+    set("motor.psi_vs", psi);
+    set("mech.inertia_kgm2", inertia);
+    set("mech.viscous_nms", 0.0);
+    set("mech.coulomb_nm", 0.0);
+    set("mech.stiction_nm", 0.0);
+    set_duties(1500, 500, 500);
+    power_up();
+    set("state.theta_e_deg", 20.0);
+    run(200);
+    double first = swing_rpm();
+    run(16000);
+    double last = swing_rpm();
+    double expected = exp(-0.9 * damping / (2.0 * inertia));
+    TEST_ASSERT_TRUE(expected > 0.9);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, expected, last / first);
+}
+
 void test_coasting_below_the_bus_voltage_carries_no_current(void)
 {
     fake_override = 0x0000;

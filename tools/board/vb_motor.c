@@ -103,10 +103,13 @@ static double next_speed(const vb_motor_t *m, double speed, double torque, doubl
     return next * direction < 0.0 ? 0.0 : next;
 }
 
-/* End of a period: new speed from the mean torque, new angle from the speed that held during the period. */
+/* End of a period: new angle from the speed that held during the period, which is that of its middle; new speed, that of the next one's
+ * middle, from the torque between the two. With this period's mean torque a rotor would swing more and more by itself. */
 void vb_motor_mechanics(vb_motor_t *m, double h_s)
 {
+    double before_nm = m->torque_nm;
     m->torque_nm = m->torque_nms / h_s;
+    double between_nm = 1.5 * m->torque_nm - 0.5 * before_nm;
     m->vd_v = m->vd_vs / h_s;
     m->vq_v = m->vq_vs / h_s;
     m->copper_w = m->copper_j / h_s;
@@ -115,7 +118,7 @@ void vb_motor_mechanics(vb_motor_t *m, double h_s)
     m->s = sin(m->theta);
     double speed = m->omega / m->pole_pairs;
     m->turns += speed * h_s / (2.0 * VB_PI);
-    double next = m->load_locked != 0.0 ? 0.0 : next_speed(m, speed, m->torque_nm, h_s);
+    double next = m->load_locked != 0.0 ? 0.0 : next_speed(m, speed, between_nm, h_s);
     m->omega = next * m->pole_pairs;
     m->torque_nms = 0.0;
     m->vd_vs = 0.0;
