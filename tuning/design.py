@@ -481,7 +481,7 @@ def _start_warnings(d: Design) -> list[str]:
     if s and not s.follows and s.trial is not None:
         lost = [label for label, ok in zip(s.trial.labels, s.trial.followed) if not ok]
         return [f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): " + (
-            calming if s.damping < 0.0 and d.motor.coulomb_nm == 0.0 else "raise maximum_current, or lower start_torque or the load's inertia")]
+            calming if d.motor.coulomb_nm == 0.0 and any(label.endswith(" 0 N m") for label in lost) else "raise maximum_current, or lower start_torque or the load's inertia")]
     if s and s.loud:
         return [f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
                 "to start from some angles: " + (
