@@ -74,10 +74,10 @@
 #define IDREF_SPEED0   0.00               /* [A]             -20 .. 0       d current of each entry */
 #define IDREF_SPEED1  -0.28
 #define IDREF_SPEED2  -0.52
-#define IDREF_SPEED3  -0.79
+#define IDREF_SPEED3  -0.78
 #define IDREF_SPEED4  -1.03
-#define IDREF_SPEED5  -1.26
-#define IDREF_SPEED6  -1.48
+#define IDREF_SPEED5  -1.25
+#define IDREF_SPEED6  -1.47
 #define IDREF_SPEED7  -1.53
 #define IDREF_SPEED8  -1.59
 #define IDREF_SPEED9  -1.76
