@@ -28,7 +28,8 @@ def main() -> int:
     if not suites:
         print("FAILED: no test suite was run")
     if summary:
-        summary.write_text(json.dumps({"passed": passed, "failed": failed}) + "\n", encoding="utf-8")
+        skipped = sum(len(suite.ignored) for suite in suites)
+        summary.write_text(json.dumps({"passed": passed, "failed": failed, "skipped": skipped}) + "\n", encoding="utf-8")
     print(f"{passed} passed, {failed} failed")
     return 0 if passed and not failed else 1
 

@@ -156,7 +156,10 @@ def rpm_s_of_rate(motor: Motor, board: BoardFile, rate: float) -> float:
 
 def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lock_s: float, acceleration_rpm_s: float, end_rpm: float,
               angles: int = 24) -> Trial:
-    """Integrates J dw/dt = Kt I sin(P (forced - rotor)) - friction - load for all start angles, without load and with the start load."""
+    """Integrates J dw/dt = Kt I sin(P (forced - rotor)) - friction - load for all start angles, without load and with the start load.
+
+    `forced` is the current's angle: it begins on phase A, a quarter of a turn ahead of the frame, whose q axis it lies on.
+    """
     loads = (0.0, motor.start_torque_nm)
     step = min(400e-6, 0.1 / natural_rad_s(motor, current_a, inertia))
     ramp_s = end_rpm / acceleration_rpm_s
@@ -166,7 +169,7 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
     speed = np.zeros_like(rotor)
     dry = np.repeat(np.array(loads), angles) + motor.coulomb_nm
     start = rotor.copy()
-    forced = -0.5 * math.pi
+    forced = 0.0
     kept: list[tuple[float, float, np.ndarray]] = []
     every = max(1, count // 800)
     for k in range(count):
@@ -186,7 +189,7 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
             kept.append((now, forced_speed / pairs / RPM, speed / RPM))
     # Each rotor begins within half a turn of the current; one that followed ends within a quarter of it.
     turns = (rotor - forced) / (2.0 * math.pi)
-    first = (start + 0.5 * math.pi) / (2.0 * math.pi)
+    first = start / (2.0 * math.pi)
     slipped = np.abs(turns - np.round(turns)) > 0.25
     lost = np.round(turns) - np.round(first) < -1.5
     labels = [f"{360.0 * i / angles:.0f} deg, {load:.3g} N m" for load in loads for i in range(angles)]

@@ -236,6 +236,25 @@ void test_a_rotor_that_swings_in_a_fixed_field_loses_what_its_back_emf_takes_and
     TEST_ASSERT_DOUBLE_WITHIN(0.01, expected, last / first);
 }
 
+void test_a_power_up_forgets_the_torque_of_the_period_before(void)
+{
+    make_ideal();
+    fake_init_hook = no_dead_time;
+    set("mech.viscous_nms", 0.0);
+    set("mech.coulomb_nm", 0.0);
+    set("mech.stiction_nm", 0.0);
+    set_duties(1500, 500, 500);
+    power_up();
+    set("state.theta_e_deg", 270.0);
+    run(40);
+    TEST_ASSERT_TRUE(fabs(get("plant.torque_nm")) > 0.01);
+    fake_override = 0x0000;
+    set("state.speed_rpm", 100.0);
+    power_up();
+    run(2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 100.0, get("plant.speed_rpm"));
+}
+
 void test_coasting_below_the_bus_voltage_carries_no_current(void)
 {
     fake_override = 0x0000;

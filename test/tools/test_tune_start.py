@@ -110,6 +110,13 @@ class Trials(unittest.TestCase):
         d = designed(more="[tune]\nQ_CURRENT_REF_OPENLOOP = 0.1\n")
         self.assertTrue(any("may not follow the ramp" in warning for warning in d.warnings), d.warnings)
 
+    def test_the_rotor_that_begins_against_the_current_swings_most_as_on_the_virtual_board(self):
+        """The current begins on phase A, so that is the rotor at 180 degrees, as `make starts` counts them."""
+        trial = self.trial(1.41, 0.0)
+        early = abs(trial.speed_rpm[trial.time_s < 0.06, :12]).max(axis=0)
+        self.assertIn(trial.labels[int(early.argmax())], ("150 deg, 0 N m", "180 deg, 0 N m", "210 deg, 0 N m"))
+        self.assertEqual(trial.labels[int(early.argmin())], "0 deg, 0 N m")
+
     def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau(self):
         free = replace(self.motor, coulomb_nm=0.0, viscous_nms=0.0, start_torque_nm=0.0)
         endless = start.try_start(free, 5.5e-6, 1e-5, 1.41, 0.2, 715.0, 1000.0, angles=12)

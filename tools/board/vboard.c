@@ -114,6 +114,7 @@ int vb_power_up(vb_t *vb)
     vb_motor_prepare(&vb->motor);
     memset(&vb->fault, 0, sizeof vb->fault);
     vb_inverter_reset(vb);
+    vb->motor.torque_nm = 0.0; /* of currents that are gone */
     vb->supply.bus_v = vb->supply.voltage_v;
     vb_pwm_reset(vb);
     vb_adc_reset(vb);
