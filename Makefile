@@ -36,7 +36,7 @@ compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFI
 firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c) tools/host/xc.c)
 board_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/board/*.c))
 
-part_makefiles := $(wildcard test/*/*.mk tools/*/*.mk firmware/*.mk)
+part_makefiles := $(wildcard tools/make/*.mk)
 
 quiet := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-4s %s\n' $1 $2;)
@@ -60,7 +60,7 @@ help: ## this list
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
 alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES
 python = "$$(cat build/setup/python)"
-front_end = $(alone) $(python) -m tools.foc33
+front_end = $(alone) $(python) -m tools.bench
 out = $(if $(OUT),--out $(call quoted,$(OUT)))
 
 # A motor runs with the userparams.h that the tuner writes for it, unless USERPARAMS names another folder.
@@ -129,7 +129,7 @@ readme: ## run what the README's tables and pictures show, and write them into i
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
 	@if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done; fi
-	@$(python) tools/readme.py
+	@$(python) tools/docs/readme.py
 
 bench: vboard ## how many motor seconds the virtual board simulates in a second of one core
 	@$(compile) -Itools/board -o $B/bench test/board/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench

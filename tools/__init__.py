@@ -1,1 +1,1 @@
-"""Tools around the firmware; makes `python3 -m tools.foc33` work from the project's root."""
+"""Tools around the firmware; makes `python3 -m tools.bench` work from the project's root."""

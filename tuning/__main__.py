@@ -3,7 +3,7 @@
 import signal
 import sys
 
-from tools.foc33 import workers
+from tools.common import workers
 
 from .cli import main
 

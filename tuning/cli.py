@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tools.foc33 import command_line, places
-from tools.foc33.errors import UserError
+from tools.common import command_line, paths
+from tools.common.errors import UserError
 
 if TYPE_CHECKING:
-    from tools.foc33.board_file import BoardFile
+    from tools.common.board_file import BoardFile
 
     from .design import Design
 
@@ -54,12 +54,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _board(options: argparse.Namespace) -> "BoardFile":
-    from tools.foc33 import board_file
+    from tools.common import board_file
     return board_file.load(options.board, "--board")
 
 
 def _design(motor: str, board: "BoardFile") -> "Design":
-    from tools.foc33 import motor_file
+    from tools.common import motor_file
 
     from .design import design
     return design(motor_file.load(motor, "command line"), board)
@@ -70,7 +70,7 @@ def _tune(options: argparse.Namespace) -> int:
         raise UserError("which motor?", "command line", "name one, or write --all" if not options.all else "write either a motor or --all")
     if options.all and options.out is not None:
         raise UserError("one folder for several motors", "--out", "leave it out, or name one motor")
-    return _tune_each(places.names(places.MOTORS) if options.all else [options.motor], _board(options), options.out, options.brief)[1]
+    return _tune_each(paths.names(paths.MOTORS) if options.all else [options.motor], _board(options), options.out, options.brief)[1]
 
 
 def _tune_each(names: list[str], board: "BoardFile", out: Path | None, brief: bool) -> tuple[list[str], int]:
@@ -83,20 +83,20 @@ def _tune_each(names: list[str], board: "BoardFile", out: Path | None, brief: bo
 
 def _tune_one(design: "Design", out: Path | None, brief: bool) -> None:
     from . import report
-    target = out or places.TUNED / design.motor.name
+    target = out or paths.TUNED / design.motor.name
     report.write(design, target, anew=not brief)
     print(report.brief(design) if brief else report.text(design))
     if not brief:
-        print(f"\nresults in {places.shown(target)}/: userparams.h, report.html")
+        print(f"\nresults in {paths.shown(target)}/: userparams.h, report.html")
     sys.stdout.flush() # in its place among the lines of those that are refused
 
 
 def _motors(options: argparse.Namespace) -> int:
-    from tools.foc33 import rated
-    tuned, code = _tune_each(places.names(places.MOTORS), _board(options), None, True)
+    from tools.bench import rating_sweep
+    tuned, code = _tune_each(paths.names(paths.MOTORS), _board(options), None, True)
     if not tuned:
         return code
-    return max(code, rated.command(argparse.Namespace(**vars(options) | {"motor": tuned, "userparams": None})))
+    return max(code, rating_sweep.command(argparse.Namespace(**vars(options) | {"motor": tuned, "userparams": None})))
 
 
 def _header(options: argparse.Namespace) -> int:

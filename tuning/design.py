@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass, field
 from decimal import Decimal
 
-from tools.foc33 import places
-from tools.foc33.board_file import BoardFile
-from tools.foc33.errors import UserError
-from tools.foc33.motor_file import FACTS, Motor
+from tools.common import paths
+from tools.common.board_file import BoardFile
+from tools.common.errors import UserError
+from tools.common.motor_file import FACTS, Motor
 
 from . import constants, fw_tables, limits, loops, params, start
 from .constants import Constant, Formulas, firmware_constants, number_of
@@ -84,7 +84,7 @@ class Design:
     def where(self, key: str) -> str:
         """Line of the motor file that a message is about."""
         quantity = self.motor.quantities.get(key) or self.motor.quantities.get(f"{key}_q")
-        return quantity.where if quantity else str(places.shown(self.motor.path))
+        return quantity.where if quantity else str(paths.shown(self.motor.path))
 
 
 def plain(value: float, digits: int = 6) -> str:
@@ -141,7 +141,7 @@ def _refuse_impossible(d: Design, currents: limits.Currents) -> None:
     if e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
         reachable = e.highest_speed(half, limits.FULL_SHARE)
         raise UserError(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
-                        f"raise the supply voltage in {places.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
+                        f"raise the supply voltage in {paths.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
 
 
 def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> str:
@@ -182,7 +182,7 @@ def _check(d: Design) -> None:
     wrong = params.check(d.params)
     if wrong:
         tuned = [name for name in d.motor.tune if any(name in message for message in wrong)]
-        where = f"{places.shown(d.motor.path)} [tune]" if tuned else str(places.shown(d.motor.path))
+        where = f"{paths.shown(d.motor.path)} [tune]" if tuned else str(paths.shown(d.motor.path))
         what, _, remedy = wrong[0].partition(": ")
         raise UserError(what, where, remedy or _range_remedy(d, what.partition(" ")[0]))
 
@@ -375,7 +375,7 @@ def _field_weakening(d: Design) -> None:
     why = f"least d current that keeps the voltage within {limits.TABLE_SHARE:.0%} of its circle without load"
     if tables is not None and "FW_START_SPEED_RPM" not in d.motor.tune:
         rows, d.tuned_by_machine = tables.parameters(), True
-        d.tables_from = f"{places.shown(fw_tables.path_of(d.motor.name))}, found on the virtual board by make tune-fw"
+        d.tables_from = f"{paths.shown(fw_tables.path_of(d.motor.name))}, found on the virtual board by make tune-fw"
         why = "found on the virtual board"
     for name, text in rows.items():
         d.put(name, text, why)

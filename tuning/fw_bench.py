@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.foc33.board import Board, Library
-from tools.foc33.errors import UserError
-from tools.foc33.matrix import start_time_s
-from tools.foc33.panel import Ranges
-from tools.foc33.trace import wrapped_deg
+from tools.bench.board import Board, Library
+from tools.common.errors import UserError
+from tools.bench.sweep import start_time_s
+from tools.bench.panel import Ranges
+from tools.common.trace import wrapped_deg
 
 from .fw_tables import ENTRIES, Entry
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.foc33 import plots # noqa: F401  chooses the backend and the style
+from tools.bench import plots # noqa: F401  chooses the backend and the style
 
 import matplotlib.pyplot as plt # noqa: E402, I001  after the backend
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from tools.foc33.errors import UserError
+from tools.common.errors import UserError
 
 from .fw_bench import Fault, Point
 from .fw_tables import ENTRIES, STEP_ERPM, Entry

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tools.foc33 import places
-from tools.foc33.errors import UserError
-from tools.foc33.toml_file import Document
+from tools.common import paths
+from tools.common.errors import UserError
+from tools.common.toml_file import Document
 
 ENTRIES = 18
 STEP_ERPM = 1024
 """One table step in electrical rpm (the note's SPEED_INDEX_CONST 10)."""
-FOLDER = places.ROOT / "tuning" / "tables"
+FOLDER = paths.ROOT / "tuning" / "tables"
 FINGERPRINT = ("NOPOLESPAIRS", "MOTOR_RS_OHM", "MOTOR_LS_MH", "MOTOR_KPHI_V_PER_KRPM", "NOMINAL_BUS_V", "LOOPTIME_SEC", "DEADTIME_SEC",
                "SAMPLE_WINDOW_SEC", "MAXIMUM_CURRENT_A")
 """Parameters of userparams.h that the tables depend on."""
@@ -114,7 +114,7 @@ def load_for(motor: str, params: Mapping[str, float], folder: Path = FOLDER) -> 
     tables = load(path)
     reason = tables.mismatch(params)
     if reason:
-        return None, f"{places.shown(path)} is not used: {reason}; run make tune-fw MOTOR={motor}"
+        return None, f"{paths.shown(path)} is not used: {reason}; run make tune-fw MOTOR={motor}"
     return tables, ""
 
 
@@ -141,7 +141,7 @@ def _beside(path: Path) -> Iterator[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield unfinished
     except OSError as error:
-        raise UserError(f"cannot write the tables ({error.strerror})", str(places.shown(path)), "make the folder writable") from None
+        raise UserError(f"cannot write the tables ({error.strerror})", str(paths.shown(path)), "make the folder writable") from None
     finally:
         with contextlib.suppress(OSError):
             unfinished.unlink(missing_ok=True)

@@ -21,17 +21,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tools.foc33 import board_file, build, motor_file, output, places, plant, report, steps, workers
-from tools.foc33.board import Library
-from tools.foc33.errors import UserError
+from tools.bench import build, command_common, report
+from tools.common import board_file, motor_file, output, paths, plant, workers
+from tools.bench.board import Library
+from tools.common.errors import UserError
 
 from . import fw_tables
 from .fw_bench import Bench, Fault
 from .fw_search import Found, Goal, Result, Search, largest, least, model_use, torque_per_ampere
 from .fw_tables import ENTRIES, STEP_ERPM, Tables
 
-RESULTS = places.ROOT / "build" / "tune-fw"
-FIRMWARE = places.ROOT / "build" / "tune-fw-firmware"
+RESULTS = paths.ROOT / "build" / "tune-fw"
+FIRMWARE = paths.ROOT / "build" / "tune-fw-firmware"
 TORQUE_SHARE, ANGLE_DEG, MARGIN = 0.2, 3.0, 0.03
 ID_SHARE = 31.0 / 32.0
 """The firmware keeps d currents below this share of MAXIMUM_CURRENT_A."""
@@ -93,7 +94,7 @@ def command(options: argparse.Namespace) -> int:
         fw_tables.write(path, tables)
     _print(motor, tables, rows, check, data)
     print(f"\nsimulated {work.motor_s:.0f} s of motor time in {time.perf_counter() - started:.0f} s")
-    print(f"tables in {places.shown(path)}, plots and numbers in {places.shown(target)}/")
+    print(f"tables in {paths.shown(path)}, plots and numbers in {paths.shown(target)}/")
     for line in check.problems:
         print(f"foc33: {motor.name}: {line}", file=sys.stderr)
     return 1 if check.problems else 0
@@ -109,7 +110,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _layers(motor: Any, board: Any, options: argparse.Namespace) -> list[Any]:
-    return [motor.plant_values(), board.plant_values(), steps.changes(options.changes)]
+    return [motor.plant_values(), board.plant_values(), command_common.changes(options.changes)]
 
 
 def _header(options: argparse.Namespace, motor: Any, board: Any) -> tuple[str, str]:
@@ -177,7 +178,7 @@ class _Work:
             if not path.is_file() or path.read_text(encoding="utf-8") != header:
                 path.write_text(header, encoding="utf-8")
         except OSError as error:
-            raise UserError(f"cannot write '{places.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
+            raise UserError(f"cannot write '{paths.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
         return Library(build.library(defines_, folder))
 
     def _count(self, news: Any) -> None:
@@ -440,7 +441,7 @@ class _Show:
 def _write(folder: Path, tables: Tables, rows: list[dict[str, Any]], check: Check, motor: Any, options: argparse.Namespace) -> dict[str, Any]:
     keys = [key for key, _, _ in COLUMNS]
     output.write_csv(folder / "entries.csv", ["index", *keys], [[item["name"], *(item.get(key) for key in keys)] for item in rows])
-    data = {"motor": str(places.shown(motor.path)), "start_speed_rpm": tables.start_speed_rpm, "last_index": tables.last_index,
+    data = {"motor": str(paths.shown(motor.path)), "start_speed_rpm": tables.start_speed_rpm, "last_index": tables.last_index,
             "stopped": tables.stopped, "maximum_speed_rpm": tables.maximum_speed_rpm, "goal": tables.goal, "entries": rows,
             "check": check.rows, "problems": check.problems, "plots": []}
     if not options.no_plots:

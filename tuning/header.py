@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator
 
-from tools.foc33 import places
-from tools.foc33.motor_file import Motor
+from tools.common import paths
+from tools.common.motor_file import Motor
 
 from .constants import Constant, filter_hz
 from .design import Design
@@ -83,11 +83,11 @@ def _safe(text: str) -> str:
 
 def wanted(motor: Motor) -> str:
     """What MOTOR= finds a motor by."""
-    return motor.name if motor.path.parent.resolve() == places.MOTORS.resolve() else str(places.shown(motor.path))
+    return motor.name if motor.path.parent.resolve() == paths.MOTORS.resolve() else str(paths.shown(motor.path))
 
 
 def _head(design: Design) -> list[str]:
-    motor, board = (_safe(str(places.shown(path))) for path in (design.motor.path, design.board.path))
+    motor, board = (_safe(str(paths.shown(path))) for path in (design.motor.path, design.board.path))
     name = _safe(wanted(design.motor))
     lines = ["/* Everything a user edits, in engineering units: the motor, the supply, limits, start, control loops and field weakening.", " *",
              f" * Made from {motor} and {board} by: make tune MOTOR={name}",

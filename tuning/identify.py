@@ -19,14 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from tools.foc33 import board_file, build, command_line, motor_file, output, places, plant, report, steps, workers
-from tools.foc33.board import Board, BoardError, Library
-from tools.foc33.board_file import BoardFile
-from tools.foc33.errors import UserError
-from tools.foc33.motor_file import Motor
-from tools.foc33.trace import Trace
+from tools.bench import build, command_common, report
+from tools.common import board_file, command_line, motor_file, output, paths, plant, workers
+from tools.bench.board import Board, BoardError, Library
+from tools.common.board_file import BoardFile
+from tools.common.errors import UserError
+from tools.common.motor_file import Motor
+from tools.common.trace import Trace
 
-RESULTS = places.ROOT / "build" / "identify"
+RESULTS = paths.ROOT / "build" / "identify"
 HEADERS = RESULTS / "headers"
 MODE = "IDENTIFY"
 LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0}
@@ -51,7 +52,7 @@ def _table(name: str, fields: int) -> list[tuple[str, ...]]:
     arguments = ", ".join(f"a{n}" for n in range(fields))
     row = " ~ ".join(f"#a{n}" for n in range(fields))
     source = f'#include "drive/identify.h"\n#define ROW({arguments}) @@ {row}\n{name}(ROW)\n'
-    command = [*shlex.split(os.environ.get("CC") or "gcc"), "-E", "-P", f"-I{places.ROOT / 'include'}", f"-I{places.ROOT}", "-xc", "-"]
+    command = [*shlex.split(os.environ.get("CC") or "gcc"), "-E", "-P", f"-I{paths.ROOT / 'include'}", f"-I{paths.ROOT}", "-xc", "-"]
     try:
         done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
     except OSError as error:
@@ -299,7 +300,7 @@ class Identified:
 
     def data(self) -> dict[str, Any]:
         names = step_names()
-        return {"motor": str(places.shown(self.motor.path)), "board": str(places.shown(self.board.path)), "result": self.result.name,
+        return {"motor": str(paths.shown(self.motor.path)), "board": str(paths.shown(self.board.path)), "result": self.result.name,
                 "fault": self.measured.fault, "watch": self.measured.watch, "bridge_ohm": self.bridge_ohm, "rows": self.rows() if self.done else [],
                 "steps": [{"at_s": round(at_s, 4), "step": names[number]} for at_s, number in self.measured.steps],
                 "told": {"pole_pairs": self.known.pole_pairs, "current_a": self.known.current_a, "speed_rpm": self.known.speed_rpm}}
@@ -324,7 +325,7 @@ def identify(motors: list[Motor], board_name: str, changes: plant.Values, curren
     keys = workers.run_all(libraries[:1], _keys, lambda seconds: None)[0]
     values = [_plant(motor, board, changes, keys) for motor in motors]
     jobs = [Job(library, value) for library, value in zip(libraries, values)]
-    with steps.Progress("identify", 8.5 * len(jobs), quiet) as progress:
+    with command_common.Progress("identify", 8.5 * len(jobs), quiet) as progress:
         measured = workers.run_all(jobs, measure, progress)
     return [Identified(*item) for item in zip(motors, [board] * len(motors), known, headers, values, measured)]
 
@@ -368,17 +369,17 @@ def add_command(commands: Any) -> None:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code: 1 if a value is outside its limit or the identification did not end with DONE."""
     _check(options)
-    motors, code = command_line.each(places.names(places.MOTORS) if options.all else [options.motor],
+    motors, code = command_line.each(paths.names(paths.MOTORS) if options.all else [options.motor],
                                      lambda name: motor_file.load(name, "command line"))
     if not motors:
         return code
-    found = identify(motors, options.board, steps.changes(options.changes), options.current, options.speed, options.quiet)
+    found = identify(motors, options.board, command_common.changes(options.changes), options.current, options.speed, options.quiet)
     for item in found:
         target = options.out or RESULTS / item.motor.name
         _write(item, target, not options.no_plots)
         print(item.text() if not options.all else _brief(item))
         if not options.all:
-            print(f"\nresults in {places.shown(target)}/")
+            print(f"\nresults in {paths.shown(target)}/")
         sys.stdout.flush()
         for line in item.problems():
             print(f"foc33: {item.motor.name}: {line}", file=sys.stderr)

@@ -10,7 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
 import numpy as np # noqa: E402
 
-from tools.foc33.trace import Trace # noqa: E402
+from tools.common.trace import Trace # noqa: E402
 
 if TYPE_CHECKING:
     from .identify import Identified

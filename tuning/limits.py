@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tools.foc33.board_file import BoardFile
-from tools.foc33.motor_file import Motor
+from tools.common.board_file import BoardFile
+from tools.common.motor_file import Motor
 
 ENTRIES = 18
 STEP_ERPM = 1024.0

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from tools.foc33 import places
-from tools.foc33.errors import UserError
+from tools.common import paths
+from tools.common.errors import UserError
 
 from .constants import Formulas, nearest
 
-TABLE = places.ROOT / "include" / "drive" / "param_table.h"
+TABLE = paths.ROOT / "include" / "drive" / "param_table.h"
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def relations() -> list[Relation]:
     rows = re.search(r"#define PARAM_RELATION_TABLE\(X\)(.*)", _text())
     entry = re.search(r'#define PARAM_RELATION_IDREF\(X, i\)\s*X\((.*), "([^"]*)" #i "([^"]*)"\)', _text())
     if rows is None or entry is None:
-        raise UserError("the table of relations cannot be read", str(places.shown(TABLE)), "keep PARAM_RELATION_TABLE and PARAM_RELATION_IDREF")
+        raise UserError("the table of relations cannot be read", str(paths.shown(TABLE)), "keep PARAM_RELATION_TABLE and PARAM_RELATION_IDREF")
     found = []
     for condition, message, number in re.findall(r'X\(((?:[^"])*?), "([^"]*)"\)|PARAM_RELATION_IDREF\(X, (\d+)\)', rows[1]):
         found.append(Relation(entry[1].replace("##i", number), f"{entry[2]}{number}{entry[3]}") if number else Relation(condition, message))

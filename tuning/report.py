@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from tools.foc33 import output, places, units
+from tools.common import output, paths, units
 
 from . import header
 from .constants import Constant
@@ -40,7 +40,7 @@ def text(design: Design) -> str:
                                  f"{d.tables_from}"),
              ("limits", f"{value('MAXIMUM_CURRENT_A'):g} A, trips at {value('OVER_CURRENT_THRESHOLD_A'):g} A of {d.board.current_full_scale_a:.3g} A"),
              ("constants", ", ".join(f"{item.name} {item.q_value}" for item in _note_constants(d)))]
-    lines = [f"{m.title}: {places.shown(m.path)}"] + [f"  {name:<16}{what}" for name, what in rows]
+    lines = [f"{m.title}: {paths.shown(m.path)}"] + [f"  {name:<16}{what}" for name, what in rows]
     return "\n".join(lines + [f"  warning: {warning}" for warning in d.warnings])
 
 
@@ -106,7 +106,7 @@ def data(design: Design) -> dict[str, Any]:
         if item:
             loop[name] = {"bandwidth_hz": item.bandwidth_hz, "nominal": _margins(item.nominal), "worst": _margins(item.worst), "worst_case": item.worst_case}
     s = d.start_up
-    return {"title": d.motor.title, "motor": str(places.shown(d.motor.path)), "board": str(places.shown(d.board.path)), "params": d.params,
+    return {"title": d.motor.title, "motor": str(paths.shown(d.motor.path)), "board": str(paths.shown(d.board.path)), "params": d.params,
             "why": {name: choice.why for name, choice in d.choices.items()}, "loops": loop, "warnings": d.warnings, "tables_from": d.tables_from,
             "start": {} if s is None else {name: getattr(s, name) for name in ("natural_hz", "damping", "pull_out_nm", "needed_nm", "error_v", "emf_v", "follows")},
             "constants": [{"name": c.name, "value": c.value, "unit": c.unit, "format": c.q_format, "count": c.q_value, "error_percent": c.error_percent}
@@ -133,7 +133,7 @@ svg { width: 100%; height: auto; } .quiet { color: #57606a; }
 def _page(design: Design, plots: dict[str, str]) -> str:
     d, m = design, design.motor
     parts = [f"<h1>{html.escape(m.title)}</h1>",
-             f'<p class="quiet">{html.escape(str(places.shown(m.path)))} on {html.escape(d.board.title)} ({html.escape(str(places.shown(d.board.path)))}). '
+             f'<p class="quiet">{html.escape(str(paths.shown(m.path)))} on {html.escape(d.board.title)} ({html.escape(str(paths.shown(d.board.path)))}). '
              f"Made by <code>make tune MOTOR={html.escape(header.wanted(m))}</code>; the header is {HEADER} beside this page.</p>"]
     parts += [f'<p class="warning">{html.escape(warning)}</p>' for warning in d.warnings]
     parts += ["<h2>Speed and torque</h2>", _limits_text(d), plots["torque"], plots["current"],

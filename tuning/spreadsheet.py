@@ -5,10 +5,10 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from tools.foc33 import board_file, motor_file, places
-from tools.foc33.errors import UserError
+from tools.common import board_file, motor_file, paths
+from tools.common.errors import UserError
 
-FILE = places.ROOT / "tuning" / "tuning_params.xlsx"
+FILE = paths.ROOT / "tuning" / "tuning_params.xlsx"
 DEFAULT_MOTOR = "hurst_dmb0224c10002"
 DEFAULT_BOARD = "mclv"
 ORDER = ("Read me", "Motor", "Parameters", "Loops", "Start", "Field weakening", "Constants", "Paste", "Search", "Bode", "Motors", "Boards", "Units")
@@ -23,7 +23,7 @@ def add_command(commands: Any) -> None:
 
 def _command(options: argparse.Namespace) -> int:
     write(options.out)
-    print(f"wrote {places.shown(options.out)}")
+    print(f"wrote {paths.shown(options.out)}")
     return 0
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.foc33.board_file import BoardFile
-from tools.foc33.motor_file import Motor
+from tools.common.board_file import BoardFile
+from tools.common.motor_file import Motor
 
 from .limits import RPM, digits_down
 from .loops import Gains, Plant, current_loop

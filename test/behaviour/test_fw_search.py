@@ -11,7 +11,7 @@ import time
 import unittest
 from pathlib import Path
 
-from tools.foc33 import places
+from tools.common import paths
 from tuning import cli, fw_tables
 
 HURST = "hurst_dmb0224c10002"
@@ -21,7 +21,7 @@ def tune(*arguments: str) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of `tune-fw`."""
     out, error = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
-        code = cli.main(["tune-fw", HURST, "--userparams", str(places.ROOT), *arguments])
+        code = cli.main(["tune-fw", HURST, "--userparams", str(paths.ROOT), *arguments])
     return code, out.getvalue(), error.getvalue()
 
 
@@ -78,8 +78,8 @@ class OnTheBoard(unittest.TestCase):
     def test_ctrl_c_leaves_nothing(self):
         """Also where the caller ignores SIGINT, as a shell does for its background jobs."""
         self.path.write_text("old", encoding="utf-8")
-        command = [sys.executable, "-m", "tuning", "tune-fw", HURST, "--userparams", str(places.ROOT), *self.places]
-        process = subprocess.Popen(command, cwd=places.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        command = [sys.executable, "-m", "tuning", "tune-fw", HURST, "--userparams", str(paths.ROOT), *self.places]
+        process = subprocess.Popen(command, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
                                    preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
         time.sleep(3.0)
         os.killpg(process.pid, signal.SIGINT)

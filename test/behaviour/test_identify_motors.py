@@ -2,7 +2,8 @@
 
 import unittest
 
-from tools.foc33 import build, motor_file, places, plant, workers
+from tools.bench import build
+from tools.common import motor_file, paths, plant, workers
 from tuning import identify
 
 HURST = "hurst_dmb0224c10002"
@@ -23,7 +24,7 @@ def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: flo
 
 class Motors(unittest.TestCase):
     def test_every_motor_is_within_its_limits(self):
-        names = places.names(places.MOTORS)
+        names = paths.names(paths.MOTORS)
         self.assertGreaterEqual(len(names), 6)
         for item in identify.identify([motor_file.load(name) for name in names], "mclv", plant.Values()):
             with self.subTest(item.motor.name):
@@ -90,7 +91,7 @@ class Troubles(unittest.TestCase):
         began_s = undisturbed.measured.steps[0][0]
         spans = list(zip(undisturbed.measured.steps[1:], undisturbed.measured.steps[2:]))
         presses = [0.5 * (at_s + until_s) - began_s for (at_s, _), (until_s, _) in spans]
-        library = places.ROOT / "build" / f"host-{build.variant_name([identify.MODE], identify.HEADERS / HURST)}" / "libvboard.so"
+        library = paths.ROOT / "build" / f"host-{build.variant_name([identify.MODE], identify.HEADERS / HURST)}" / "libvboard.so"
         jobs = [identify.Job(library, undisturbed.values, stop_after_s=at_s) for at_s in presses]
         for at_s, (step, _), measured in zip(presses, spans, workers.run_all(jobs, identify.measure, lambda seconds: None)):
             with self.subTest(identify.step_names()[step[1]]):

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tools.foc33 import board_file, motor_file, places
-from tools.foc33.errors import UserError
+from tools.common import board_file, motor_file, paths
+from tools.common.errors import UserError
 
 SEED = 33
 CASES = 1000 # of each kind
@@ -63,7 +63,7 @@ SPANS = (re.compile(r"(?<![\w\"])-?\d[\d.e+-]*"), re.compile(r"(?<=\")[^\"\n]*(?
 
 def texts() -> list[str]:
     """The good files that are spoilt."""
-    return [path.read_text(encoding="utf-8") for path in sorted(places.MOTORS.glob("*.toml"))] + [EVERYTHING]
+    return [path.read_text(encoding="utf-8") for path in sorted(paths.MOTORS.glob("*.toml"))] + [EVERYTHING]
 
 
 def spoil_bytes(text: str, dice: random.Random) -> bytes:
@@ -220,7 +220,7 @@ class Fuzz(unittest.TestCase):
         self.assertGreater(refused, CASES // 2)
 
     def test_a_spoilt_board_file_gives_a_board_or_one_line(self):
-        good = (places.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+        good = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
         dice = random.Random(SEED)
         for _ in range(CASES):
             spoil = dice.choice((spoil_bytes, spoil_tokens, spoil_values, spoil_types))

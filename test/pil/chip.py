@@ -11,7 +11,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "test" / "iss"), str(ROOT / "test" / "fuzz
 
 import asm33 # noqa: E402
 from sample_image import hex_text # noqa: E402
-from tools.foc33.pil import PilBoard, PilLibrary # noqa: E402
+from tools.bench.pil import PilBoard, PilLibrary # noqa: E402
 
 RAM = 0x0800
 FOSC_CRYSTAL = 0x41 # clock switching allowed, crystal XT

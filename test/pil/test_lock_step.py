@@ -15,10 +15,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from chip import RAM, REGISTERS, ROOT, STOP, image, library, pass_ms # noqa: E402
-from tools.foc33 import pil_command # noqa: E402
-from tools.foc33.board import BoardError # noqa: E402
-from tools.foc33.errors import UserError # noqa: E402
-from tools.foc33.pil import PilBoard # noqa: E402
+from tools.bench import pil_command # noqa: E402
+from tools.bench.board import BoardError # noqa: E402
+from tools.common.errors import UserError # noqa: E402
+from tools.bench.pil import PilBoard # noqa: E402
 
 XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
 IMAGE = ROOT / "build" / "target" / "foc33.elf"

@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.foc33 import cli, places
-from tools.foc33.run import Run
-from tools.foc33.scenario import Scenario, read
-from tools.foc33.simulate import SIGNALS
-from tools.foc33.toml_file import Document
-from tools.foc33.trace import Trace
+from tools.bench import cli
+from tools.common import paths
+from tools.bench.run import Run
+from tools.bench.scenario import Scenario, read
+from tools.bench.simulate import SIGNALS
+from tools.common.toml_file import Document
+from tools.common.trace import Trace
 
 PERIOD_S = 50e-6
 STATES = {0: "CALIBRATE", 1: "STOPPED", 2: "BOOTSTRAP", 3: "LOCK", 4: "RAMP", 5: "CLOSED", 6: "STOPPING", 7: "FAULT"}
 FAULTS = {0: "NONE", 1: "OVERCURRENT_HW", 3: "OVERVOLTAGE", 6: "STALL"}
-LIBRARY = places.ROOT / "build" / "host" / "libvboard.so"
+LIBRARY = paths.ROOT / "build" / "host" / "libvboard.so"
 
 SCENARIO = """
 title = "a test"

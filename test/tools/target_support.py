@@ -1,10 +1,10 @@
-"""A small made-up image for the tests of tools/target: words, symbols and a map, written as ELF, HEX and map files."""
+"""A small made-up image for the tests of tools/image: words, symbols and a map, written as ELF, HEX and map files."""
 
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tools.target import device
+from tools.image import device
 
 PROGBITS, NOBITS, SYMTAB, STRTAB = 1, 8, 2, 3
 WRITE, ALLOC, EXECUTE = 1, 2, 4
@@ -91,7 +91,7 @@ class Made:
         return "\n".join([*lines, " .debug_info      0x000200       0x10 /lib/libpic30.a(divsf3.eo)", ""])
 
     def write(self, folder: Path) -> list[str]:
-        """Writes the files. @return the arguments of tools.target.image"""
+        """Writes the files. @return the arguments of tools.image.image"""
         (folder / "a.elf").write_bytes(self.elf())
         (folder / "a.hex").write_text(self.hex(), encoding="ascii")
         (folder / "a.map").write_text(self.map(), encoding="utf-8")

@@ -8,8 +8,9 @@ import unittest
 from pathlib import Path
 from unittest import mock
 
-from tools.foc33 import build, places
-from tools.foc33.errors import UserError
+from tools.bench import build
+from tools.common import paths
+from tools.common.errors import UserError
 
 
 class Build(unittest.TestCase):
@@ -25,7 +26,7 @@ class Build(unittest.TestCase):
 
     def test_no_defines_mean_the_default_build(self):
         library, call = self.make("echo \"$@\" > $RESULT")
-        self.assertEqual(library, places.ROOT / "build" / "host" / "libvboard.so")
+        self.assertEqual(library, paths.ROOT / "build" / "host" / "libvboard.so")
         self.assertNotIn("VARIANT", call)
 
     def test_defines_mean_a_folder_of_their_own(self):
@@ -47,26 +48,26 @@ class Build(unittest.TestCase):
     def test_the_image_s_board_and_the_pc_s_share_objects_and_flags(self):
         def flags(target: str) -> str:
             environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
-            done = subprocess.run(["make", "-n", "-C", str(places.ROOT), target], env=environment, capture_output=True, text=True, check=True)
+            done = subprocess.run(["make", "-n", "-C", str(paths.ROOT), target], env=environment, capture_output=True, text=True, check=True)
             return next(line for line in done.stdout.splitlines() if "build/host/flags" in line)
         self.assertEqual(flags("build/host/flags"), flags("build/host/tools/pil/pil.o"))
         self.assertEqual(flags("build/host/flags"), flags("build/host/tools/iss33f/core.o"))
 
     def test_a_motor_file_s_name_with_blanks_and_quotes_is_one_word_to_the_shell(self):
         environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
-        done = subprocess.run(["make", "-n", "-C", str(places.ROOT), "userparams", "MOTOR=/tmp/it's a motor.toml"], env=environment,
+        done = subprocess.run(["make", "-n", "-C", str(paths.ROOT), "userparams", "MOTOR=/tmp/it's a motor.toml"], env=environment,
                               capture_output=True, text=True, check=True)
         line = next(line for line in done.stdout.splitlines() if "new=" in line)
         self.assertIn("new='build/tune/it'\\''s a motor/userparams.h'", line)
         self.assertEqual(done.stdout.count("$new"), done.stdout.count('"$new"'))
 
     def test_a_tuned_header_is_built_under_its_motor_s_name(self):
-        library, call = self.make("echo \"$@\" > $RESULT", userparams=places.TUNED / "some_motor")
+        library, call = self.make("echo \"$@\" > $RESULT", userparams=paths.TUNED / "some_motor")
         self.assertEqual(library.parent.name, "host-some_motor")
         self.assertIn("VARIANT=some_motor DEFINES= USERPARAMS=build/tune/some_motor", call)
 
     def test_a_header_and_defines_share_no_folder_with_either_alone(self):
-        library, call = self.make("echo \"$@\" > $RESULT", ["TUNING"], places.TUNED / "some_motor")
+        library, call = self.make("echo \"$@\" > $RESULT", ["TUNING"], paths.TUNED / "some_motor")
         self.assertEqual(library.parent.name, "host-some_motor-tuning")
         self.assertIn("DEFINES=-DTUNING USERPARAMS=", call)
 
@@ -77,8 +78,8 @@ class Build(unittest.TestCase):
             self.assertRegex(name, r"^params-[0-9a-f]{8}$")
 
     def test_the_project_s_own_header_is_the_default_build(self):
-        self.assertIsNone(build.header_folder(places.ROOT))
-        self.assertIsNone(build.header_folder(places.ROOT / "userparams.h"))
+        self.assertIsNone(build.header_folder(paths.ROOT))
+        self.assertIsNone(build.header_folder(paths.ROOT / "userparams.h"))
 
     def test_a_header_is_found_by_its_folder_or_by_itself(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -99,7 +100,7 @@ class Build(unittest.TestCase):
     def test_a_refused_parameter_of_another_header_is_told_with_that_header(self):
         with self.assertRaisesRegex(UserError, "does not build, build/tune/m/userparams.h: the back-EMF's format"):
             self.make("echo \"a.h:3: error: static assertion failed: \\\"the back-EMF\\\\'s format\\\"\" >&2; exit 2",
-                      userparams=places.TUNED / "m")
+                      userparams=paths.TUNED / "m")
 
     def test_the_flags_of_a_surrounding_make_are_not_inherited(self):
         self.assertEqual(self.make("echo \"flags=$MAKEFLAGS\" > $RESULT")[1].strip(), "flags=")

@@ -14,8 +14,9 @@ from pathlib import Path
 
 from support import LIBRARY, SCENARIO, command
 
-from tools.foc33 import build, motor_file, places, steps
-from tools.foc33.board import Library
+from tools.bench import build, command_common
+from tools.common import motor_file, paths
+from tools.bench.board import Library
 
 START = """
 [[event]]
@@ -145,7 +146,7 @@ class CommandLine(unittest.TestCase):
     def test_the_report_tells_motor_and_header_and_says_if_they_do_not_belong_together(self):
         own = self.root / "other"
         own.mkdir()
-        text = (places.ROOT / "userparams.h").read_text(encoding="utf-8")
+        text = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
         (own / "userparams.h").write_text(re.sub(r"(#define MOTOR_RS_OHM) \S+", r"\1 2.0", text), encoding="utf-8")
         path = self.root / "test.toml"
         path.write_text(SCENARIO + START, encoding="utf-8")
@@ -153,7 +154,7 @@ class CommandLine(unittest.TestCase):
         try:
             code, out, error = command(*arguments, "--userparams", str(own))
         finally:
-            shutil.rmtree(places.ROOT / "build" / f"host-{build.variant_name([], own)}", ignore_errors=True)
+            shutil.rmtree(paths.ROOT / "build" / f"host-{build.variant_name([], own)}", ignore_errors=True)
         self.assertEqual((code, error), (0, ""))
         data = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
         self.assertIn(f"\nheader  {own}/userparams.h\nnote    the header is for another motor: MOTOR_RS_OHM is 2 ohm", out)
@@ -179,8 +180,8 @@ class CommandLine(unittest.TestCase):
     def test_an_ended_run_leaves_neither_results_nor_processes(self):
         path = self.root / "long.toml"
         path.write_text(SCENARIO.replace("2.0", "120.0"), encoding="utf-8")
-        line = [sys.executable, "-m", "tools.foc33", "run", str(path), "--out", str(self.out), "--library", str(LIBRARY)]
-        process = subprocess.Popen(line, cwd=places.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        line = [sys.executable, "-m", "tools.bench", "run", str(path), "--out", str(self.out), "--library", str(LIBRARY)]
+        process = subprocess.Popen(line, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                    start_new_session=True)
         deadline = time.monotonic() + 20.0
         while time.monotonic() < deadline and not any(item.name.startswith(".out-unfinished") for item in self.root.iterdir()):
@@ -194,11 +195,11 @@ class CommandLine(unittest.TestCase):
 
     def test_the_list_of_scenarios_has_a_line_for_each(self):
         code, out, _ = command("scenarios")
-        self.assertEqual((code, [line.split()[0] for line in out.splitlines()]), (0, places.names(places.SCENARIOS)))
+        self.assertEqual((code, [line.split()[0] for line in out.splitlines()]), (0, paths.names(paths.SCENARIOS)))
 
     def test_every_command_explains_itself(self):
         for name in ("run", "table2", "starts", "rated", "robust", "scenarios", "motors", "keys"):
-            result = subprocess.run([sys.executable, "-m", "tools.foc33", name, "--help"], cwd=places.ROOT, capture_output=True,
+            result = subprocess.run([sys.executable, "-m", "tools.bench", name, "--help"], cwd=paths.ROOT, capture_output=True,
                                     text=True, check=False)
             self.assertEqual((result.returncode, result.stderr), (0, ""), name)
             self.assertIn("usage:", result.stdout)
@@ -214,21 +215,21 @@ class HeaderNote(unittest.TestCase):
     PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR_KPHI_V_PER_KRPM": 7.24}
 
     def test_a_header_for_this_motor_has_none(self):
-        self.assertEqual(steps.header_note(self.VALUES, self.PARAMS), "")
+        self.assertEqual(command_common.header_note(self.VALUES, self.PARAMS), "")
 
     def test_a_header_of_a_salient_motor_may_hold_either_inductance(self):
         for ls_mh in (1.8, 2.0):
-            self.assertEqual(steps.header_note(self.VALUES, self.PARAMS | {"MOTOR_LS_MH": ls_mh}), "")
+            self.assertEqual(command_common.header_note(self.VALUES, self.PARAMS | {"MOTOR_LS_MH": ls_mh}), "")
 
     def test_each_number_of_another_motor_is_named(self):
         for name, value, text in (("NOPOLESPAIRS", 4.0, "NOPOLESPAIRS is 4 pairs, the motor's is 5"),
                                   ("MOTOR_RS_OHM", 2.6, "MOTOR_RS_OHM is 2.6 ohm, the motor's is 2.67"),
                                   ("MOTOR_LS_MH", 2.1, "MOTOR_LS_MH is 2.1 mH, the motor's is 1.9"),
                                   ("MOTOR_KPHI_V_PER_KRPM", 7.0, "MOTOR_KPHI_V_PER_KRPM is 7 V peak/krpm, the motor's is 7.24")):
-            self.assertEqual(steps.header_note(self.VALUES, self.PARAMS | {name: value}), f"the header is for another motor: {text}")
+            self.assertEqual(command_common.header_note(self.VALUES, self.PARAMS | {name: value}), f"the header is for another motor: {text}")
 
     def test_two_numbers_are_both_named(self):
-        note = steps.header_note(self.VALUES, self.PARAMS | {"NOPOLESPAIRS": 2.0, "MOTOR_RS_OHM": 1.0})
+        note = command_common.header_note(self.VALUES, self.PARAMS | {"NOPOLESPAIRS": 2.0, "MOTOR_RS_OHM": 1.0})
         self.assertIn("NOPOLESPAIRS is 2 pairs, the motor's is 5; MOTOR_RS_OHM is 1 ohm", note)
 
 
@@ -240,7 +241,7 @@ class RealLibrary(unittest.TestCase):
         self.assertGreater(library.params["NOMINAL_SPEED_RPM"], library.params["MINIMUM_SPEED_RPM"])
 
     def test_every_usual_signal_exists(self):
-        from tools.foc33.simulate import SIGNALS
+        from tools.bench.simulate import SIGNALS
         self.assertLessEqual(set(SIGNALS), set(Library(LIBRARY).keys))
 
 

@@ -4,7 +4,7 @@ import unittest
 
 from support import PERIOD_S, run, step
 
-from tools.foc33 import report
+from tools.bench import report
 
 S2 = "[[event]]\nat_s = 0.1\npress = \"S2\"\n"
 MEASURE = "[[measure]]\nname = \"row\"\nfrom_s = 0.5\nto_s = 1.0\nreference_rpm = 1000\n"

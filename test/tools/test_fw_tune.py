@@ -10,9 +10,10 @@ from unittest import mock
 
 import numpy as np
 
-from tools.foc33 import board_file, build, motor_file, places, plant
-from tools.foc33.board import BoardError, Library
-from tools.foc33.errors import UserError
+from tools.bench import build
+from tools.common import board_file, motor_file, paths, plant
+from tools.bench.board import BoardError, Library
+from tools.common.errors import UserError
 from tuning import fw_search, fw_tables, fw_tune
 from tuning.fw_bench import SIGNALS, Bench, Fault, Point, reduced
 from tuning.fw_search import Goal, Search, correction, largest, least, model_current, model_use, peak, voltage_limit
@@ -20,7 +21,7 @@ from tuning.fw_tables import ENTRIES, Entry, Tables
 from tune_support import command, motor_path
 
 HURST = "hurst_dmb0224c10002"
-HEADER = (places.ROOT / "userparams.h").read_text(encoding="utf-8")
+HEADER = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
 PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR_KPHI_V_PER_KRPM": 7.24, "NOMINAL_BUS_V": 24.0,
           "LOOPTIME_SEC": 50e-6, "DEADTIME_SEC": 2e-6, "SAMPLE_WINDOW_SEC": 1.6e-6, "MAXIMUM_CURRENT_A": 2.75, "INVKFI_SPEED0": 7956.0,
           "END_SPEED_RPM": 1000.0, "MINIMUM_SPEED_RPM": 500.0, "MAXIMUM_SPEED_RPM": 6400.0}
@@ -235,7 +236,7 @@ class Starting(unittest.TestCase):
             _, risks = fw_tune._header(options, motor_file.load(str(path)), board_file.load("mclv"))
         self.assertRegex(risks, r"\Athe unloaded rotor still swings .*: add \[mechanical\] coulomb_friction, which the no-load current gives\Z")
         self.assertEqual(fw_tune._header(options, motor_file.load(HURST), board_file.load("mclv"))[1], "")
-        self.assertEqual(fw_tune._header(SimpleNamespace(userparams=str(places.ROOT)), None, None), (HEADER, ""))
+        self.assertEqual(fw_tune._header(SimpleNamespace(userparams=str(paths.ROOT)), None, None), (HEADER, ""))
 
 
 class MadeUpMotors(unittest.TestCase):
@@ -482,7 +483,7 @@ def bench_work(work):
 
 
 def on_board(work, defines=("PARAMS_IN_RAM",)):
-    from tools.foc33 import workers
+    from tools.common import workers
     return workers.run_all([build.library(list(defines))], bench_work(work), lambda seconds: None)[0]
 
 

@@ -9,8 +9,8 @@ import unittest
 from dataclasses import replace
 from pathlib import Path
 
-from tools.foc33 import board_file, motor_file, places, plant
-from tools.foc33.errors import UserError
+from tools.common import board_file, motor_file, paths, plant
+from tools.common.errors import UserError
 from tuning import cli, identify, params
 
 NAME = "hurst_dmb0224c10002"
@@ -72,7 +72,7 @@ class Header(unittest.TestCase):
         self.assertEqual(text, identify.header(identify.Known(5, 1.0, 1000.0), self.board))
 
     def test_current_stays_below_the_boards_trip(self):
-        for name in places.names(places.MOTORS):
+        for name in paths.names(paths.MOTORS):
             known = identify.Known.of(motor_file.load(name), self.board)
             text = identify.header(known, self.board)
             self.assertLess(1.2 * known.current_a, float(self.define(text, "OVER_CURRENT_THRESHOLD_A")))
@@ -123,7 +123,7 @@ class Run(unittest.TestCase):
     def test_the_lines_to_paste_are_a_motor_file(self):
         lines = (self.folder / "electrical.toml").read_text(encoding="utf-8")
         self.assertIn(lines.strip(), self.out)
-        text = (places.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
+        text = (paths.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
         pasted = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", text, flags=re.DOTALL | re.MULTILINE)
         path = self.folder / "pasted.toml"
         path.write_text(pasted, encoding="utf-8")
@@ -171,7 +171,7 @@ class Verdict(unittest.TestCase):
         self.assertIn("inductance_q = { value = 5,", lines)
 
     def test_the_lines_to_paste_suit_a_star_and_a_delta(self):
-        text = (places.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
+        text = (paths.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
         for connection in ("Y", "delta"):
             for watch in ({}, {"Lq_uH": 2500}):
                 with self.subTest(connection, watch=watch), tempfile.TemporaryDirectory() as folder:

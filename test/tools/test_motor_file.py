@@ -7,10 +7,10 @@ from pathlib import Path
 
 from support import LIBRARY, command
 
-from tools.foc33 import board_file, motor_file, places
-from tools.foc33.board import Library
-from tools.foc33.errors import UserError
-from tools.foc33.plant import resolve
+from tools.common import board_file, motor_file, paths
+from tools.bench.board import Library
+from tools.common.errors import UserError
+from tools.common.plant import resolve
 
 MOTOR = """title = "a motor"
 connection = "Y"
@@ -277,7 +277,7 @@ class Motors(FilesCase):
 class Boards(FilesCase):
     def setUp(self) -> None:
         super().setUp()
-        self.good = (places.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+        self.good = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
 
     def board(self, old: str = "", new: str = "") -> board_file.BoardFile:
         self.path.write_text(changed(old, new, self.good), encoding="utf-8")
@@ -322,7 +322,7 @@ class Boards(FilesCase):
 
 class Project(unittest.TestCase):
     def motors(self) -> list[motor_file.Motor]:
-        return [motor_file.load(name) for name in places.names(places.MOTORS)]
+        return [motor_file.load(name) for name in paths.names(paths.MOTORS)]
 
     def test_there_are_at_least_six_motors_and_one_is_salient(self):
         self.assertGreaterEqual(len(self.motors()), 6)
@@ -353,7 +353,7 @@ class Project(unittest.TestCase):
 
     def test_the_virtual_board_accepts_every_motor_and_board(self):
         keys = Library(LIBRARY).keys
-        for part in [*self.motors(), *(board_file.load(name) for name in places.names(places.BOARDS))]:
+        for part in [*self.motors(), *(board_file.load(name) for name in paths.names(paths.BOARDS))]:
             with self.subTest(part.name):
                 self.assertLessEqual({"motor.psi_vs"} if isinstance(part, motor_file.Motor) else {"supply.voltage_v"},
                                      set(resolve([part.plant_values()], keys)))

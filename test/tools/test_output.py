@@ -7,8 +7,8 @@ from pathlib import Path
 
 from support import trace
 
-from tools.foc33.errors import UserError
-from tools.foc33.output import ResultFolder, write_csv, write_summary, write_trace
+from tools.common.errors import UserError
+from tools.common.output import ResultFolder, write_csv, write_summary, write_trace
 
 
 class Results(unittest.TestCase):

@@ -4,9 +4,9 @@ import unittest
 
 from support import scenario
 
-from tools.foc33.errors import UserError
-from tools.foc33.panel import DEBOUNCE_S, HOLD_S, Ranges, plan
-from tools.foc33.scenario import Rating, in_numbers
+from tools.common.errors import UserError
+from tools.bench.panel import DEBOUNCE_S, HOLD_S, Ranges, plan
+from tools.bench.scenario import Rating, in_numbers
 
 PARAMS = {"MINIMUM_SPEED_RPM": 500.0, "NOMINAL_SPEED_RPM": 2800.0, "MAXIMUM_SPEED_RPM": 5500.0, "MAXIMUM_CURRENT_A": 2.75}
 STEP = 1.0 / 1024.0

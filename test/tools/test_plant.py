@@ -6,10 +6,10 @@ from pathlib import Path
 
 from support import LIBRARY, document
 
-from tools.foc33 import motor_file, places, plant
-from tools.foc33.board import Library
-from tools.foc33.errors import UserError
-from tools.foc33.plant import Key, Values, resolve
+from tools.common import motor_file, paths, plant
+from tools.bench.board import Library
+from tools.common.errors import UserError
+from tools.common.plant import Key, Values, resolve
 
 KEYS = {"motor.rs_ohm": Key("motor.rs_ohm", "ohm", "", 0.001, 100.0, True, True),
         "load.constant_nm": Key("load.constant_nm", "N.m", "", 0.0, 10.0, True, True),
@@ -65,7 +65,7 @@ class Files(unittest.TestCase):
             plant.read_board("mclv2")
 
     def test_a_plant_key_that_the_board_refuses_names_its_line(self):
-        text = (places.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8") + "[plant]\n\"motor.sat_lq_ratio\" = 7\n"
+        text = (paths.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8") + "[plant]\n\"motor.sat_lq_ratio\" = 7\n"
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "motor.toml"
             path.write_text(text, encoding="utf-8")

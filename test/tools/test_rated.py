@@ -10,9 +10,10 @@ from unittest import mock
 
 from support import command
 
-from tools.foc33 import matrix, motor_file, places, plots, rated
-from tools.foc33.errors import UserError
-from tools.foc33.rated import Candidate, Table
+from tools.bench import plots, rating_sweep, sweep
+from tools.common import motor_file, paths
+from tools.common.errors import UserError
+from tools.bench.rating_sweep import Candidate, Table
 
 HURST = "hurst_dmb0224c10002"
 PARAMS = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 5.0, "END_SPEED_RPM": 1000.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 10.0, "LOCK_TIME": 4000.0,
@@ -21,7 +22,7 @@ PARAMS = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 5.0, "END_SPEED_RPM": 1000.0, "
 
 
 def table() -> Table:
-    return Table.read(places.TABLES / "rated.toml")
+    return Table.read(paths.TABLES / "rated.toml")
 
 
 def row(**more):
@@ -39,7 +40,7 @@ class Demands(unittest.TestCase):
     def test_a_motor_s_rows_follow_from_its_rating_and_its_header(self):
         motor = motor_file.load(HURST)
         candidate = Candidate(motor, None, "", SimpleNamespace(params=PARAMS))
-        rows = rated.rows_of(table(), candidate)
+        rows = rating_sweep.rows_of(table(), candidate)
         half = 0.5 * motor.rated_torque_nm
         self.assertEqual([(item.name, item.torque_nm) for item in rows], [("20 %", half), ("50 %", half), ("100 %", half), ("maximum", 0.0)])
         for item, share in zip(rows, (0.2, 0.5, 1.0)):
@@ -47,8 +48,8 @@ class Demands(unittest.TestCase):
         self.assertEqual(rows[-1].rpm, 5500.0)
 
     def test_a_good_row_is_ok(self):
-        self.assertEqual(rated.verdict(table(), row()), "ok")
-        self.assertTrue(rated.check(table(), row(verdict="ok"))[0].ok)
+        self.assertEqual(rating_sweep.verdict(table(), row()), "ok")
+        self.assertTrue(rating_sweep.check(table(), row(verdict="ok"))[0].ok)
 
     def test_each_way_to_fail_is_named(self):
         for values, text in (({"fault": "STALL"}, "fault STALL"), ({"closed_after_s": None}, "never in closed loop"),
@@ -57,57 +58,57 @@ class Demands(unittest.TestCase):
                              ({"current_of_maximum_percent": 100.1}, "current"),
                              ({"speed_error_percent": -2.0, "voltage_at_limit_percent": 100.0}, "speed -2.0 % (voltage 100 % of the time)")):
             with self.subTest(text):
-                self.assertEqual(rated.verdict(table(), row(**values)), text)
+                self.assertEqual(rating_sweep.verdict(table(), row(**values)), text)
 
     def test_a_failed_row_names_motor_row_and_numbers(self):
-        outcome = rated.check(table(), row(verdict="angle", angle_error_rms_deg=12.0))[0]
+        outcome = rating_sweep.check(table(), row(verdict="angle", angle_error_rms_deg=12.0))[0]
         self.assertEqual((outcome.row, outcome.ok), ("m at 50 %", False))
         self.assertIn("angle error 12.0 deg", outcome.got)
         self.assertIn("angle error 10 deg", outcome.allowed)
 
     def test_an_error_at_its_limit_still_holds(self):
         for error, speed in ((0.5, ""), (-0.5, ""), (0.6, "speed +0.6 %")):
-            self.assertEqual(matrix.speed_verdict(row(speed_error_percent=error), 0.5), speed)
+            self.assertEqual(sweep.speed_verdict(row(speed_error_percent=error), 0.5), speed)
 
     def test_what_was_reached_without_load_is_told(self):
-        self.assertEqual(rated.highest_text([row(highest_rpm=5432.1, reference_rpm=5500.0)]),
+        self.assertEqual(rating_sweep.highest_text([row(highest_rpm=5432.1, reference_rpm=5500.0)]),
                          "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)")
-        self.assertEqual(rated.highest_text([row(highest_rpm=None)]), "no closed loop without load")
+        self.assertEqual(rating_sweep.highest_text([row(highest_rpm=None)]), "no closed loop without load")
 
 
 class Schedule(unittest.TestCase):
     TIMES = SimpleNamespace(start_s=0.1, settle_s=1.0, torque_over_s=0.5, where="here")
 
     def test_the_start_takes_lock_and_ramp(self):
-        self.assertAlmostEqual(matrix.start_time_s(PARAMS), 0.2 + 1.398 + matrix.START_MARGIN_S, places=3)
+        self.assertAlmostEqual(sweep.start_time_s(PARAMS), 0.2 + 1.398 + sweep.START_MARGIN_S, places=3)
 
     def test_a_slower_header_is_given_more_time(self):
         for change in ({"LOCK_TIME": 8000.0}, {"OPENLOOP_RAMPSPEED_INCREASERATE": 5.0}, {"END_SPEED_RPM": 1500.0}):
-            self.assertGreater(matrix.start_time_s(PARAMS | change), matrix.start_time_s(PARAMS) + 0.19, change)
+            self.assertGreater(sweep.start_time_s(PARAMS | change), sweep.start_time_s(PARAMS) + 0.19, change)
 
     def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it(self):
-        events, settled_s = matrix.loaded_run(PARAMS, 2600.0, self.TIMES, "x", torque_nm=0.04, start_torque_nm=0.01)
+        events, settled_s = sweep.loaded_run(PARAMS, 2600.0, self.TIMES, "x", torque_nm=0.04, start_torque_nm=0.01)
         brakes = [(event.at_s, event.keys["load.constant_nm"]) for event in events if event.keys]
-        closed_s = 0.1 + matrix.start_time_s(PARAMS)
+        closed_s = 0.1 + sweep.start_time_s(PARAMS)
         self.assertEqual([torque for _, torque in brakes], [0.01, 0.04])
         self.assertAlmostEqual(brakes[1][0], closed_s + 1600.0 / 4000.0 + 1.0)
         self.assertAlmostEqual(settled_s, brakes[1][0] + 0.5 + 1.0)
 
     def test_the_potentiometer_waits_inside_its_normal_range_until_the_loop_is_closed(self):
         for rpm, first in ((5500.0, 2800.0), (1400.0, 1400.0)):
-            events, _ = matrix.loaded_run(PARAMS, rpm, self.TIMES, "x")
+            events, _ = sweep.loaded_run(PARAMS, rpm, self.TIMES, "x")
             speeds = [(event.at_s, event.value) for event in events if event.kind == "speed_rpm"]
             self.assertEqual([speed for _, speed in speeds], [first, rpm])
             self.assertGreater(speeds[1][0], 1.6)
 
     def test_a_firmware_that_hides_a_parameter_is_refused(self):
         with self.assertRaisesRegex(UserError, "does not tell LOCK_TIME"):
-            matrix.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"})
+            sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"})
 
 
 class TableFile(unittest.TestCase):
     def test_mistakes_are_one_line_with_their_place(self):
-        text = (places.TABLES / "rated.toml").read_text(encoding="utf-8")
+        text = (paths.TABLES / "rated.toml").read_text(encoding="utf-8")
         for old, new, said in (("settle_s = 1.5", "settle_s = 0", "'settle_s' = 0 is impossible"),
                                ("speeds_percent = [20, 50, 100]", "speeds_percent = []", "not a list of numbers"),
                                ("error_percent", "eror_percent", "'error_percent' is missing"),
@@ -134,7 +135,7 @@ class CommandLine(unittest.TestCase):
         self.assertFalse(self.out.exists())
 
     def test_one_motor_in_full(self):
-        code, out, error = command("rated", "--motor", HURST, "--userparams", str(places.ROOT), "--out", str(self.out), "--quiet")
+        code, out, error = command("rated", "--motor", HURST, "--userparams", str(paths.ROOT), "--out", str(self.out), "--quiet")
         self.assertEqual((code, error), (0, ""), out)
         self.assertIn("4 of 4 expectations hold", out)
         self.assertRegex(out, r"without load up to 5[45]\d\d rpm \(MAXIMUM_SPEED_RPM 5500\)")
@@ -147,7 +148,7 @@ class CommandLine(unittest.TestCase):
         self.assertEqual({path.name for path in self.out.iterdir()}, {"summary.json", "rated.csv", "rated.png"})
 
     def test_a_motor_that_was_not_tuned_is_refused_with_the_way_to_tune_it(self):
-        with tempfile.TemporaryDirectory() as folder, mock.patch.object(places, "TUNED", Path(folder)):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(paths, "TUNED", Path(folder)):
             self.refused(command("rated", "--motor", HURST, "--out", str(self.out)), f"no userparams.h for motor '{HURST}'",
                          f"make tune MOTOR={HURST}")
 
@@ -157,7 +158,7 @@ class CommandLine(unittest.TestCase):
         def build(found, options):
             ready.extend(motor.name for motor, _ in found)
             raise UserError("that is enough")
-        with tempfile.TemporaryDirectory() as folder, mock.patch.object(places, "TUNED", Path(folder)), mock.patch.object(rated, "_candidates", build):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(paths, "TUNED", Path(folder)), mock.patch.object(rating_sweep, "_candidates", build):
             (Path(folder) / HURST).mkdir()
             (Path(folder) / HURST / "userparams.h").write_text("", encoding="utf-8")
             _, _, error = command("rated", "--motor", "linix_45zwn24_40", HURST, "--out", str(self.out))
@@ -172,12 +173,12 @@ class CommandLine(unittest.TestCase):
     def test_the_list_of_motors_has_a_line_for_each(self):
         code, out, _ = command("motors")
         self.assertEqual(code, 0)
-        for name in places.names(places.MOTORS):
+        for name in paths.names(paths.MOTORS):
             self.assertRegex(out, rf"(?m)^{name} ")
 
     def test_a_motor_file_that_cannot_be_read_is_missing_in_the_list_and_named(self):
-        with tempfile.TemporaryDirectory() as folder, mock.patch.object(places, "MOTORS", Path(folder)):
-            for name, text in ((HURST, (places.ROOT / "tuning" / "motors" / f"{HURST}.toml").read_text(encoding="utf-8")), ("broken", "x = = 1")):
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(paths, "MOTORS", Path(folder)):
+            for name, text in ((HURST, (paths.ROOT / "tuning" / "motors" / f"{HURST}.toml").read_text(encoding="utf-8")), ("broken", "x = = 1")):
                 (Path(folder) / f"{name}.toml").write_text(text, encoding="utf-8")
             code, out, error = command("motors")
         self.assertEqual((code, error.count("\n")), (2, 1))
@@ -190,15 +191,15 @@ class Highest(unittest.TestCase):
         from support import run, step
         speed = step((0, 9000), (0.5, 1000), (1.0, 3000), (1.005, 2000), (1.5, 8000))
         item = run(fw__state=step((0, 4), (0.5, 5), (1.5, 1)), plant__speed_rpm=speed)
-        self.assertAlmostEqual(matrix.highest_rpm(item), 2000.0 + 1000.0 * 0.005 / 0.1, delta=1.0)
+        self.assertAlmostEqual(sweep.highest_rpm(item), 2000.0 + 1000.0 * 0.005 / 0.1, delta=1.0)
 
     def test_without_closed_loop_there_is_none(self):
         from support import run
-        self.assertIsNone(matrix.highest_rpm(run(fw__state=4, plant__speed_rpm=1000)))
+        self.assertIsNone(sweep.highest_rpm(run(fw__state=4, plant__speed_rpm=1000)))
 
     def test_a_run_backwards_counts_as_well(self):
         from support import run
-        self.assertAlmostEqual(matrix.highest_rpm(run(fw__state=5, plant__speed_rpm=-1500)), 1500.0)
+        self.assertAlmostEqual(sweep.highest_rpm(run(fw__state=5, plant__speed_rpm=-1500)), 1500.0)
 
 
 class Plot(unittest.TestCase):

@@ -8,10 +8,10 @@ import unittest
 from pathlib import Path
 from unittest import mock
 
-from tools import readme
-from tools.foc33 import places
+from tools.docs import readme
+from tools.common import paths
 
-REPORTER = places.ROOT / "test" / "run-report.py"
+REPORTER = paths.ROOT / "test" / "run-report.py"
 
 
 class Counts(unittest.TestCase):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from support import run, step
 
-from tools.foc33 import plots, report
+from tools.bench import plots, report
 
 TEXT = """
 [[event]]

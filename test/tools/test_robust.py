@@ -10,16 +10,17 @@ from pathlib import Path
 
 from support import LIBRARY, command
 
-from tools.foc33 import motor_file, places, plant, plots, robust
-from tools.foc33.board import Library
-from tools.foc33.errors import UserError
-from tools.foc33.robust import Bench, Deviation, Margins, Search, Table
+from tools.bench import plots, robust
+from tools.common import motor_file, paths, plant
+from tools.bench.board import Library
+from tools.common.errors import UserError
+from tools.bench.robust import Bench, Deviation, Margins, Search, Table
 
 HURST = "hurst_dmb0224c10002"
 
 
 def table() -> Table:
-    return Table.read(places.TABLES / "robust.toml")
+    return Table.read(paths.TABLES / "robust.toml")
 
 
 def row(**more):
@@ -248,7 +249,7 @@ class CommandLine(unittest.TestCase):
 
     def test_a_wrong_table_is_refused(self):
         path = self.root / "robust.toml"
-        text = (places.TABLES / "robust.toml").read_text(encoding="utf-8")
+        text = (paths.TABLES / "robust.toml").read_text(encoding="utf-8")
         path.write_text(text.replace("lowest_factor = 0.3", "lowest_factor = 1.5"), encoding="utf-8")
         with self.assertRaisesRegex(UserError, "'lowest_factor' = 1.5 is impossible, .*line"):
             Table.read(path)

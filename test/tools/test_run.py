@@ -5,8 +5,8 @@ import unittest
 import numpy as np
 from support import PERIOD_S, run, step, trace
 
-from tools.foc33.measure import MEASURE_VALUES, Measure, measure_values
-from tools.foc33.trace import wrapped_deg
+from tools.bench.metrics import MEASURE_VALUES, Measure, measure_values
+from tools.common.trace import wrapped_deg
 
 ROW = Measure("row", 0.5, 1.5, 1000.0)
 

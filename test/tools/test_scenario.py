@@ -4,9 +4,9 @@ import unittest
 
 from support import SCENARIO, document, scenario
 
-from tools.foc33 import places
-from tools.foc33.errors import UserError
-from tools.foc33.scenario import Rating, asks_for_rating, in_numbers, load, read
+from tools.common import paths
+from tools.common.errors import UserError
+from tools.bench.scenario import Rating, asks_for_rating, in_numbers, load, read
 
 EVENT = "[[event]]\nat_s = 1.0\n"
 MEASURE = "[[measure]]\nname = \"m\"\nfrom_s = 0.5\nto_s = 1.0\n"
@@ -153,14 +153,14 @@ class ScenarioFile(unittest.TestCase):
             load("dmeo")
 
     def test_every_scenario_of_the_project_is_valid_and_expects_something(self):
-        for name in places.names(places.SCENARIOS):
+        for name in paths.names(paths.SCENARIOS):
             with self.subTest(name):
                 self.assertTrue(load(name).expectations)
 
     def test_there_is_a_scenario_for_each_mode_and_each_fault(self):
-        defines = {define for name in places.names(places.SCENARIOS) for define in load(name).defines}
+        defines = {define for name in paths.names(paths.SCENARIOS) for define in load(name).defines}
         self.assertEqual(defines, {"OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT"})
-        faults = {expectation.name for name in places.names(places.SCENARIOS) for expectation in load(name).expectations
+        faults = {expectation.name for name in paths.names(paths.SCENARIOS) for expectation in load(name).expectations
                   if type(expectation).__name__ == "FaultExpectation"}
         self.assertLessEqual({"OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
                               "ISR_OVERRUN"}, faults)

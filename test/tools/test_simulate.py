@@ -7,9 +7,10 @@ import unittest
 import numpy as np
 from support import FAULTS, STATES, scenario
 
-from tools.foc33 import simulate, workers
-from tools.foc33.errors import UserError
-from tools.foc33.panel import Ranges, plan
+from tools.bench import simulate
+from tools.common import workers
+from tools.common.errors import UserError
+from tools.bench.panel import Ranges, plan
 
 RANGES = Ranges(500.0, 2800.0, 5500.0, 2.75, False, False)
 

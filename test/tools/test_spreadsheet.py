@@ -19,10 +19,10 @@ import numpy as np
 import openpyxl
 from openpyxl.utils import column_index_from_string
 
-from tools.foc33 import board_file, motor_file, places
+from tools.common import board_file, motor_file, paths
 from tuning import constants, design, header, loops, spreadsheet, start
 
-MOTORS = places.names(places.MOTORS)
+MOTORS = paths.names(paths.MOTORS)
 PUBLISHED = {3.95: {"NORM_RS": 12990, "NORM_LSDTBASE": 1460, "NORM_INVKFIBASE": 7956, "NORM_DELTAT": 1790, "D_ILIMIT_HS": 1502, "D_ILIMIT_LS": 6117},
              7.09: {"NORM_RS": 23316, "NORM_LSDTBASE": 2620, "NORM_INVKFIBASE": 7956},
              22.0: {"NORM_RS": 9044, "NORM_LSDTBASE": 8129, "NORM_INVKFIBASE": 7956}}
@@ -289,7 +289,7 @@ class AgainstTheCommand(unittest.TestCase):
                 (Path(folder) / "userparams.h").write_text("\n".join(recalculated()[name].lines()) + "\n", encoding="utf-8")
                 build = subprocess.run([os.environ.get("CC", "gcc"), "-std=gnu99", "-fsyntax-only", f"-I{folder}", "-Itools/host", "-Iinclude",
                                         "firmware/drive/param_check.c"],
-                                       cwd=places.ROOT, capture_output=True, text=True)
+                                       cwd=paths.ROOT, capture_output=True, text=True)
                 self.assertEqual(build.stderr, "")
 
     def test_a_comma_as_decimal_sign_changes_no_line(self):

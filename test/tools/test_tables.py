@@ -4,8 +4,9 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from tools.foc33 import motor_file, places, report, starts, table2
-from tools.foc33.errors import UserError
+from tools.bench import report, start_sweep, table2
+from tools.common import motor_file, paths
+from tools.common.errors import UserError
 
 NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083, 1.513), 2000: (1900, 0.062, 1.117),
         2500: (2375, 0.031, 0.608), 3000: (2850, 0.020, 0.636), 3500: (3325, 0.019, 1.174), 4000: (3800, 0.015, 1.556)}
@@ -18,7 +19,7 @@ def result(speed=1500.0, error=0.0, fault=None, voltage=0.0, current=0.0, curren
 
 class Table2(unittest.TestCase):
     def rows(self):
-        return table2.Table.read(places.TABLES / "table2.toml").rows
+        return table2.Table.read(paths.TABLES / "table2.toml").rows
 
     def test_the_file_holds_the_note_s_eight_rows(self):
         self.assertEqual({row.reference_rpm: (row.note_rpm, row.torque_nm, row.note_current_a) for row in self.rows()}, NOTE)
@@ -52,7 +53,7 @@ class Table2(unittest.TestCase):
         self.assertEqual(table2.limit_text(result(error=-3.0)), "neither voltage nor current")
 
     def test_times_in_the_wrong_order_are_refused(self):
-        text = (places.TABLES / "table2.toml").read_text(encoding="utf-8").replace("measure_from_s = 4.5", "measure_from_s = 1.0")
+        text = (paths.TABLES / "table2.toml").read_text(encoding="utf-8").replace("measure_from_s = 4.5", "measure_from_s = 1.0")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "t.toml"
             path.write_text(text, encoding="utf-8")
@@ -67,7 +68,7 @@ def start(angle=0.0, load=0.0, closed=1.6, over=1.0, error=0.0, fault=None):
 
 class Starts(unittest.TestCase):
     def setUp(self) -> None:
-        self.table = starts.Table.read(places.TABLES / "starts.toml")
+        self.table = start_sweep.Table.read(paths.TABLES / "starts.toml")
 
     def test_the_matrix_is_every_15_degrees_with_three_loads_within_two_seconds(self):
         self.assertEqual((self.table.every_deg, self.table.loads_nm, self.table.within_s), (15.0, [0.0, 0.03, 0.06], 2.0))
@@ -96,19 +97,19 @@ class Starts(unittest.TestCase):
         self.assertEqual(self.table.for_motor(motor_file.load("linix_45zwn24_40"), params).speed_rpm, 1900.0)
 
     def test_a_good_start_holds(self):
-        self.assertTrue(starts.check(self.table, start()).ok)
+        self.assertTrue(start_sweep.check(self.table, start()).ok)
 
     def test_each_way_to_fail_is_named_with_angle_and_load(self):
         for values, got in (({"closed": 2.01}, "closed loop after 2.010 s"), ({"closed": None}, "never in closed loop"),
                             ({"over": 10.1}, "overshoot 10.1 %"), ({"error": -0.6}, "speed error -0.60 %"),
                             ({"fault": "STALL"}, "fault STALL")):
             with self.subTest(got):
-                outcome = starts.check(self.table, start(45.0, 0.03, **values))
+                outcome = start_sweep.check(self.table, start(45.0, 0.03, **values))
                 self.assertEqual((outcome.ok, outcome.row, outcome.got), (False, "start from 45 deg with 0.03 N m", got))
 
     def test_the_printed_table_has_a_line_for_each_angle(self):
         rows = [start(angle, load, fault="STALL" if angle else None) for load in self.table.loads_nm for angle in (0.0, 15.0)]
-        lines = starts.text(self.table, rows).splitlines()
+        lines = start_sweep.text(self.table, rows).splitlines()
         self.assertIn("1.60 s", lines[1])
         self.assertEqual(lines[2].split(), ["15", "STALL", "STALL", "STALL"])
 

@@ -7,11 +7,11 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from tools.target import device, image
+from tools.image import device, image
 
 ROOT = Path(__file__).resolve().parents[2]
 MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
-TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/foc33", "tools/target", "tools/setup")
+TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/bench", "tools/image", "tools/setup")
 NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname", "head",
           "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr")
 

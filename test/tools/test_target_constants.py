@@ -15,7 +15,7 @@ from pathlib import Path
 
 from elftools.elf.elffile import ELFFile
 
-from tools.target import device
+from tools.image import device
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = '#include "drive/params_init.h"\nconst drive_params_t board_params = DRIVE_PARAMS_INIT;\n'

@@ -17,10 +17,11 @@ from test_target_build import NEEDED, make, our_lines, shutil
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "fuzz"))
 from sample_image import hex_text # noqa: E402
-from tools.foc33 import pil, pil_command, places # noqa: E402
-from tools.foc33.errors import UserError # noqa: E402
-from tools.target import cycles # noqa: E402
-from tools.target.profile import Counts, Profile # noqa: E402
+from tools.bench import pil, pil_command
+from tools.common import paths # noqa: E402
+from tools.common.errors import UserError # noqa: E402
+from tools.image import cycles # noqa: E402
+from tools.image.profile import Counts, Profile # noqa: E402
 
 
 def found(name: str, without: list[int], weakening: list[int], latency: tuple[int, ...] = (700,), stack: int = 100, differences: int = 0) -> cycles.Found:
@@ -134,13 +135,13 @@ class Output(unittest.TestCase):
 
     def test_files_are_written_and_the_readme_table_follows_from_them(self):
         with tempfile.TemporaryDirectory() as folder:
-            paths = cycles.write(report(found("demo", [400], [440, 480])), Path(folder))
-            data = json.loads(paths[0].read_text())
+            files = cycles.write(report(found("demo", [400], [440, 480])), Path(folder))
+            data = json.loads(files[0].read_text())
             head, rows = cycles.readme_table(data)
             self.assertTrue(all(len(row) == len(head) for row in rows))
             self.assertIn(["interrupt with field weakening", "14.975 / 23.325 / 23.65", "440 / 460 / 480", "11.00 / 11.50 / 12.00"], rows)
-            self.assertTrue(paths[1].read_text().startswith("<svg"))
-            self.assertEqual(paths[2].read_text(), "_ADC1Interrupt;pi 440.000\n")
+            self.assertTrue(files[1].read_text().startswith("<svg"))
+            self.assertEqual(files[2].read_text(), "_ADC1Interrupt;pi 440.000\n")
 
     def test_comparison_names_the_first_difference(self):
         counted = pil.Cycles(*[0.0] * len(pil.Cycles.__dataclass_fields__))
@@ -244,7 +245,7 @@ class ForTheUser(unittest.TestCase):
     def test_table2_goes_where_out_says(self):
         image = self.folder / "x.hex"
         image.write_text(hex_text(), encoding="utf-8")
-        for given, wanted in (([], places.RESULTS / "pil-table2"), (["--out", str(self.folder)], self.folder)):
+        for given, wanted in (([], paths.RESULTS / "pil-table2"), (["--out", str(self.folder)], self.folder)):
             with mock.patch.object(pil_command.table2, "command", return_value=0) as command:
                 self.module("pil", "table2", "--image", str(image), *given)
                 self.assertEqual(command.call_args.args[0].out, wanted)
@@ -255,7 +256,7 @@ class ForTheUser(unittest.TestCase):
         self.assertIn("--out", lines[0])
 
     def test_modules_run_from_the_command_line(self):
-        for name in ("tools.target.cycles", "tools.foc33.pil_command"):
+        for name in ("tools.image.cycles", "tools.bench.pil_command"):
             done = subprocess.run([sys.executable, "-m", name, "--help"], capture_output=True, text=True, check=False)
             self.assertIn("--image", done.stdout + done.stderr)
 

@@ -10,7 +10,7 @@ from unittest import mock
 
 from target_support import made
 
-from tools.target import flash, image
+from tools.image import flash, image
 
 IPECMD = "#!/bin/sh\nprintf '%s\\n' \"$@\" >\"$RESULT\"\npwd >>\"$RESULT\"\nexit ${STATUS:-0}\n"
 

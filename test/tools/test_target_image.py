@@ -11,7 +11,7 @@ from unittest import mock
 import target_support
 from target_support import LIBRARY, RETFIE, made
 
-from tools.target import device, image
+from tools.image import device, image
 
 CALL = 0x020000
 RCALL = 0x070000

@@ -4,10 +4,10 @@ import unittest
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 
-from tools.target import flame
-from tools.target.attribution import Frame, Image, Word
-from tools.target.profile import Counts, folded, profile, reachable
-from tools.target.program import Elf
+from tools.image import flame
+from tools.image.attribution import Frame, Image, Word
+from tools.image.profile import Counts, folded, profile, reachable
+from tools.image.program import Elf
 
 CALL, RCALL, NOP_WORD = 0x020000, 0x070000, 0x780000
 

@@ -10,8 +10,8 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from unittest import mock
 
-from tools.foc33.errors import UserError
-from tools.target import project
+from tools.common.errors import UserError
+from tools.image import project
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = ROOT / "firmware.X"

@@ -13,10 +13,10 @@ from unittest import mock
 
 from size_support import Function, Program
 
-from tools.foc33 import places
-from tools.foc33.errors import UserError
-from tools.target import attribution, base, size, stack
-from tools.target.budget import Budget, shares
+from tools.common import paths
+from tools.common.errors import UserError
+from tools.image import attribution, base, size, stack
+from tools.image.budget import Budget, shares
 
 BUDGET = """
 with_caller = ["qm_*"]
@@ -233,12 +233,12 @@ class Limits(Case):
 
     def test_the_files_hold_the_same_sums(self):
         report = self.report(20, 3, ram=10)
-        paths = size.write(report, self.folder / "out")
-        self.assertEqual([path.name for path in paths], ["size.json", "size.csv", "size.png"])
-        data = json.loads(paths[0].read_text(encoding="utf-8"))
+        files = size.write(report, self.folder / "out")
+        self.assertEqual([path.name for path in files], ["size.json", "size.csv", "size.png"])
+        data = json.loads(files[0].read_text(encoding="utf-8"))
         self.assertEqual(next(row["flash"] for row in data["rows"] if row["name"] == "whole image"), 69)
-        self.assertEqual(len(paths[1].read_text(encoding="utf-8").splitlines()), len(data["rows"]) + 1)
-        self.assertTrue(paths[2].read_bytes().startswith(b"\x89PNG"))
+        self.assertEqual(len(files[1].read_text(encoding="utf-8").splitlines()), len(data["rows"]) + 1)
+        self.assertTrue(files[2].read_bytes().startswith(b"\x89PNG"))
         head, body = size.readme_table(data)
         self.assertEqual({len(row) for row in body}, {len(head)})
         self.assertEqual([row[0] for row in body], ["the law", "additions", size.NOTE_TITLE, "whole image", "stack at its deepest"])
@@ -409,7 +409,7 @@ class TheProject(unittest.TestCase):
             self.assertEqual(sorted(names), sorted(set(names)))
 
     def test_the_levels_of_the_interrupts_are_in_the_board_s_sources(self):
-        text = "".join(path.read_text(encoding="utf-8") for path in sorted((places.ROOT / "firmware/board").glob("*.c")))
+        text = "".join(path.read_text(encoding="utf-8") for path in sorted((paths.ROOT / "firmware/board").glob("*.c")))
         self.assertEqual({name: stack.priorities(text).get(name) for name in ("_ADC1Interrupt", "_FLTA1Interrupt")},
                          {"_ADC1Interrupt": 5, "_FLTA1Interrupt": 5})
 

@@ -2,7 +2,7 @@
 
 import unittest
 
-from tools.target import stack
+from tools.image import stack
 
 WIDE = ("call 0x", "goto 0x", "call {", "goto {", "do ") # instructions of two words
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from support import document
 
-from tools.foc33.errors import UserError
-from tools.foc33.toml_file import Document, flatten
+from tools.common.errors import UserError
+from tools.common.toml_file import Document, flatten
 
 
 class TomlFile(unittest.TestCase):

@@ -12,7 +12,8 @@ import unittest
 from pathlib import Path
 from unittest import mock
 
-from tools.foc33 import places, rated
+from tools.bench import rating_sweep
+from tools.common import paths
 from tune_support import FOR_ANOTHER_BOARD, HURST, command, motor_path
 
 
@@ -129,21 +130,21 @@ class Tune(unittest.TestCase):
                 self.assertRegex(error, r"\Afoc33: half the rated torque needs .*b_large\.toml")
                 for name in ("a_first", "c_last"):
                     self.assertIn(name, out)
-                    self.assertTrue((places.TUNED / name / "userparams.h").is_file(), name)
-            self.assertFalse((places.TUNED / "b_large").exists())
+                    self.assertTrue((paths.TUNED / name / "userparams.h").is_file(), name)
+            self.assertFalse((paths.TUNED / "b_large").exists())
 
     def test_make_motors_runs_those_that_got_a_header(self):
         for result, expected in ((0, 2), (1, 2)):
-            with self.several_motors(), mock.patch.object(rated, "command", return_value=result) as runs:
+            with self.several_motors(), mock.patch.object(rating_sweep, "command", return_value=result) as runs:
                 code, _, error = command("motors", "--out", str(self.out), "--quiet")
             (options,) = runs.call_args.args
             self.assertEqual((code, options.motor, options.out, options.board, error.count("\n")), (expected, ["a_first", "c_last"], self.out, "mclv", 1))
-        with self.several_motors() as folder, mock.patch.object(rated, "command", return_value=1):
+        with self.several_motors() as folder, mock.patch.object(rating_sweep, "command", return_value=1):
             (folder / "b_large.toml").unlink()
             self.assertEqual(command("motors", "--out", str(self.out))[0], 1)
 
     def test_without_any_motor_that_fits_nothing_runs(self):
-        with self.several_motors() as folder, mock.patch.object(rated, "command") as runs:
+        with self.several_motors() as folder, mock.patch.object(rating_sweep, "command") as runs:
             for name in ("a_first", "c_last"):
                 (folder / f"{name}.toml").unlink()
             self.refused("motors", says="half the rated torque needs")
@@ -161,7 +162,7 @@ class Tune(unittest.TestCase):
             folder.mkdir()
             for name, source in (("a_first", good), ("b_large", large), ("c_last", good)):
                 shutil.copy(source, folder / f"{name}.toml")
-            with mock.patch.object(places, "MOTORS", folder), mock.patch.object(places, "TUNED", Path(root) / "tune"):
+            with mock.patch.object(paths, "MOTORS", folder), mock.patch.object(paths, "TUNED", Path(root) / "tune"):
                 yield folder
 
     def test_the_header_alone(self):
@@ -171,13 +172,13 @@ class Tune(unittest.TestCase):
         self.assertTrue(out.endswith("#endif\n"))
 
     def test_make_help_names_the_motor_that_is_taken_without_motor(self):
-        makefile = (places.ROOT / "Makefile").read_text(encoding="utf-8")
+        makefile = (paths.ROOT / "Makefile").read_text(encoding="utf-8")
         default = re.search(r"tune_motor = .*\$\(or \$\(MOTOR\),(\w+)\)", makefile)[1]
-        lines = subprocess.run(["make", "help"], cwd=places.ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+        lines = subprocess.run(["make", "help"], cwd=paths.ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
         for name in ("tune", "tune-fw", "identify", "userparams"):
             self.assertIn(f"[MOTOR={default}", next(line for line in lines if line.startswith(f"make {name} ")))
 
     def test_as_a_program(self):
-        done = subprocess.run([sys.executable, "-m", "tuning", "tune", "no_such_motor"], cwd=places.ROOT, capture_output=True, text=True, check=False)
+        done = subprocess.run([sys.executable, "-m", "tuning", "tune", "no_such_motor"], cwd=paths.ROOT, capture_output=True, text=True, check=False)
         self.assertEqual((done.returncode, done.stdout), (2, ""))
         self.assertIn("foc33: no motor 'no_such_motor'", done.stderr)

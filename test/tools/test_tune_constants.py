@@ -7,7 +7,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from tools.foc33 import places
+from tools.common import paths
 from tune_support import COMPILER, INCLUDES, designed, motors, of
 from tuning import header
 from tuning.constants import SheetInputs, choose_exponent, filter_hz, filter_k, firmware_constants, sheet
@@ -85,7 +85,7 @@ def compiled(design: Design) -> dict[str, int]:
         (Path(folder) / "userparams.h").write_text(header.write(design), encoding="utf-8")
         program = f"{folder}/program"
         subprocess.run([*COMPILER, "-std=gnu99", "-O1", "-w", f"-I{folder}", *INCLUDES, "-xc", "-", "-o", program], input="\n".join(source), text=True,
-                       cwd=places.ROOT, check=True, capture_output=True)
+                       cwd=paths.ROOT, check=True, capture_output=True)
         lines = subprocess.run([program], capture_output=True, text=True, check=True).stdout.split()
     return dict(zip((item.name for item in design.constants), map(int, lines), strict=True))
 
@@ -108,7 +108,7 @@ class Compiled(unittest.TestCase):
     def test_all_numbers_of_the_drive_s_parameters_are_listed(self):
         """A new field of drive_params_t without a constant here would be a number that no table shows."""
         listed = {item.name.split("[")[0] for item in of("hurst_dmb0224c10002").constants}
-        text = (places.ROOT / "include/drive/params_init.h").read_text(encoding="utf-8")
+        text = (paths.ROOT / "include/drive/params_init.h").read_text(encoding="utf-8")
         fields = set(re.findall(r"\.(\w+) = ", text)) - {"estimator", "fieldweak", "forced", "svm", "pi_d", "pi_q", "pi_speed"}
         known = {name.split(".")[-1] for name in listed}
         plain = {"shift", "trim_step_q13", "offset_max_q13"} # written as numbers in params_init.h itself

@@ -8,8 +8,8 @@ import tempfile
 import unittest
 from dataclasses import replace
 
-from tools.foc33 import board_file, motor_file, places
-from tools.foc33.errors import UserError
+from tools.common import board_file, motor_file, paths
+from tools.common.errors import UserError
 from tune_support import COMPILER, FOR_ANOTHER_BOARD, HURST, INCLUDES, MOTOR, designed, motor_path, motors, of
 from tuning import header, limits, params, report
 from tuning.constants import number_of
@@ -300,7 +300,7 @@ class Parameters(unittest.TestCase):
                 lines += [f"#undef {name}", f"#define {name} {base[name]}"]
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([*COMPILER, "-std=gnu99", "-O1", "-w", *INCLUDES, "-xc", "-", "-o", f"{folder}/program"], input="\n".join([*lines, "return 0;", "}"]),
-                           text=True, cwd=places.ROOT, check=True, capture_output=True)
+                           text=True, cwd=paths.ROOT, check=True, capture_output=True)
             found = subprocess.run([f"{folder}/program"], capture_output=True, text=True, check=True).stdout.split()
         broken = 0
         for case, bits in zip(cases, found, strict=True):

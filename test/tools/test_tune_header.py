@@ -6,7 +6,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from tools.foc33 import places
+from tools.common import paths
 from tune_support import COMPILER, HURST, INCLUDES, designed, motors, of
 from tuning import header
 from tuning.params import parameters
@@ -17,7 +17,7 @@ DEFINE = re.compile(r"^#define (\w+)[ \t]+(\S+)[ \t]*(?:/\* \[([^\]]*)\][ \t]+(\
 
 class Root(unittest.TestCase):
     def test_the_project_s_userparams_is_the_tuner_s_output_for_the_note_s_motor(self):
-        self.assertEqual((places.ROOT / "userparams.h").read_text(encoding="utf-8"), header.write(of(HURST)),
+        self.assertEqual((paths.ROOT / "userparams.h").read_text(encoding="utf-8"), header.write(of(HURST)),
                          f"the motor file, the tables or the tuner have changed: write it anew with make userparams MOTOR={HURST}")
 
 
@@ -26,10 +26,10 @@ class Builds(unittest.TestCase):
         """What the compiler says about the whole firmware with this header, the interrupt optimised as in the library."""
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "userparams.h").write_text(text, encoding="utf-8")
-            sources = sorted(str(path.relative_to(places.ROOT)) for path in (places.ROOT / "firmware").glob("*/*.c"))
+            sources = sorted(str(path.relative_to(paths.ROOT)) for path in (paths.ROOT / "firmware").glob("*/*.c"))
             says = ""
             for arguments in (["-fsyntax-only", *sources], ["-O2", "-c", "firmware/board/isr.c", "-o", f"{folder}/isr.o"]):
-                done = subprocess.run([*COMPILER, *WARNINGS, f"-I{folder}", *INCLUDES, *arguments], cwd=places.ROOT, capture_output=True, text=True, check=False)
+                done = subprocess.run([*COMPILER, *WARNINGS, f"-I{folder}", *INCLUDES, *arguments], cwd=paths.ROOT, capture_output=True, text=True, check=False)
                 says += done.stderr if done.returncode or done.stderr else ""
             return says
 

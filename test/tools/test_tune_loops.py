@@ -231,7 +231,7 @@ class Choice(unittest.TestCase):
 
 def designed_with(*lines: str):
     """The note's motor with lines in [tune]."""
-    from tools.foc33 import board_file, motor_file
+    from tools.common import board_file, motor_file
     from tuning.design import design
     motor = motor_file.load(HURST)
     tune = {name: float(value) for name, value in (line.split(" = ") for line in lines)}

@@ -5,7 +5,7 @@ import re
 import unittest
 from dataclasses import replace
 
-from tools.foc33 import board_file, motor_file, places
+from tools.common import board_file, motor_file, paths
 from tune_support import HURST, designed, motors, of
 from tuning import start
 
@@ -134,7 +134,7 @@ class Trials(unittest.TestCase):
         self.assertLessEqual(bare.trial.swing_rpm, start.CALM_SHARE * bare.end_speed_rpm)
 
     def test_the_sample_s_delay_is_the_board_s(self):
-        text = (places.ROOT / "include" / "board" / "mclv.h").read_text(encoding="utf-8")
+        text = (paths.ROOT / "include" / "board" / "mclv.h").read_text(encoding="utf-8")
         clocks = int(re.search(r"BOARD_SAMPLE_DELAY_CLOCKS (\d+)u", text)[1])
         self.assertAlmostEqual(clocks / 40e6, start.SAMPLE_AFTER_MEAN_S)
 

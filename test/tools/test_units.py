@@ -5,8 +5,8 @@ import unittest
 
 from support import document
 
-from tools.foc33 import units
-from tools.foc33.errors import UserError
+from tools.common import units
+from tools.common.errors import UserError
 
 # One motor in every form: 5 pole pairs, 7.24 V peak line to line at 1000 rpm. Worked out by hand from the note's Table 1.
 SAME_KPHI = {"V peak line-to-line/krpm": 7.24, "V rms line-to-line/krpm": 5.119453, "V dc/krpm": 6.913691, "V peak phase/krpm": 4.180016,

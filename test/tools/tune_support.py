@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from tools.foc33 import board_file, motor_file, places
+from tools.common import board_file, motor_file, paths
 from tuning import cli
 from tuning.design import Design, design
 
@@ -45,7 +45,7 @@ FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value =
 
 
 def motors() -> list[str]:
-    return places.names(places.MOTORS)
+    return paths.names(paths.MOTORS)
 
 
 @contextlib.contextmanager

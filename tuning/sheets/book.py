@@ -17,8 +17,8 @@ from openpyxl.utils import get_column_letter
 from openpyxl.workbook.defined_name import DefinedName
 from openpyxl.worksheet.datavalidation import DataValidation
 
-from tools.foc33.errors import UserError
-from tools.foc33.places import shown
+from tools.common.errors import UserError
+from tools.common.paths import shown
 
 INK, BLUE, PALE, YELLOW, GREY = "1F2933", "1F4E79", "DDE8F3", "FFF2B3", "6B7785"
 RED, RED_INK, AMBER, AMBER_INK, GREEN_INK = "F8CBC6", "9C0006", "FFE3B8", "7A4B00", "22662F"

@@ -7,8 +7,8 @@ from typing import Any
 
 from openpyxl.utils import get_column_letter
 
-from tools.foc33 import board_file, units
-from tools.foc33.units import Kind
+from tools.common import board_file, units
+from tools.common.units import Kind
 
 from .book import Book
 
@@ -58,7 +58,7 @@ def unit_name(kind: UnitKind) -> str:
 def units_page(book: Book) -> None:
     """A block of rows for each kind: unit, factor for star and delta, times pole pairs or not, reciprocal or not."""
     page = book.page("Units", [26, 28, 18, 18, 12, 12, 14, 14, 24], "A5A5A5",
-                     "Factors from a data sheet's unit to SI and one star phase; made from tools/foc33/units.py, where the equations stand.")
+                     "Factors from a data sheet's unit to SI and one star phase; made from tools/common/units.py, where the equations stand.")
     page.heads(["Quantity", "Unit", "Factor, star", "Factor, delta", "x pole pairs", "Reciprocal", "Smallest (SI)", "Largest (SI)", "SI unit"],
                freeze=True)
     for kind in KINDS.values():

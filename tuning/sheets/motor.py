@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from tools.foc33 import motor_file, places, units
+from tools.common import motor_file, paths, units
 
 from .book import Book, Page
 from .data import KINDS, DataPage, entries, unit_name
@@ -70,11 +70,11 @@ BOARD = [
 
 def motors() -> dict[str, dict[tuple[str, str], Any]]:
     """Every motor file that loads, an inductance without an axis as both."""
-    return {name: _both_axes(entries(motor_file.load(name).path)) for name in places.names(places.MOTORS)}
+    return {name: _both_axes(entries(motor_file.load(name).path)) for name in paths.names(paths.MOTORS)}
 
 
 def boards() -> dict[str, dict[tuple[str, str], Any]]:
-    return {name: entries(places.BOARDS / f"{name}.toml") for name in places.names(places.BOARDS)}
+    return {name: entries(paths.BOARDS / f"{name}.toml") for name in paths.names(paths.BOARDS)}
 
 
 def _both_axes(file: dict[tuple[str, str], Any]) -> dict[tuple[str, str], Any]:

@@ -1,0 +1,85 @@
+"""Building the firmware variant that a scenario needs, through the project's Makefile."""
+
+import contextlib
+import fcntl
+import os
+import re
+import subprocess
+import zlib
+from pathlib import Path
+
+from tools.common import paths
+from tools.common.errors import UserError
+
+HEADER = "userparams.h"
+
+
+def variant_name(defines: list[str], userparams: Path | None = None) -> str:
+    """Folder suffix for a header and a set of defines; "" for the default build."""
+    macros = re.sub(r"[^a-z0-9]+", "-", "-".join(sorted(defines)).lower()).strip("-")
+    return "-".join(part for part in ("" if userparams is None else _header_name(userparams), macros) if part)
+
+
+def _header_name(folder: Path) -> str:
+    """The motor's name for a tuned header; for any other folder its own name and a number that tells it from its namesakes."""
+    folder = folder.resolve()
+    name = re.sub(r"[^A-Za-z0-9_]+", "-", folder.name).strip("-")
+    return name if folder.parent == paths.TUNED.resolve() else f"{name}-{zlib.crc32(str(folder).encode()):08x}"
+
+
+def header_folder(text: str | Path, where: str = "--userparams") -> Path | None:
+    """The folder with a userparams.h that a user has named; None for the project's own, which needs no variant."""
+    folder = Path(text)
+    if folder.name == HEADER and folder.is_file():
+        folder = folder.parent
+    if not (folder / HEADER).is_file():
+        raise UserError(f"no {HEADER} in '{text}'", where, "name the folder that holds it; make tune MOTOR=name writes one")
+    folder = folder.resolve()
+    if re.search(r"[\s'\"$#:\\]", str(folder)):
+        raise UserError(f"'{folder}' cannot be given to make", where, "use a folder whose path has no blanks, quotes, '$', '#', ':' or '\\'")
+    return None if folder == paths.ROOT else folder
+
+
+def library(defines: list[str], userparams: Path | None = None, target: str = "vboard") -> Path:
+    """Builds build/host[-variant]/libvboard.so if needed and returns its path. `userparams`: folder of the header, None for the root's.
+    `target`: what make shall make, if there is to be more in that folder."""
+    variant = variant_name(defines, userparams)
+    command = ["make", "-s", "-C", str(paths.ROOT), target]
+    if variant:
+        command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines)]
+    if userparams is not None:
+        command.append(f"USERPARAMS={paths.shown(userparams)}")
+    environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    try:
+        with _one_at_a_time(f"host-{variant}" if variant else "host"):
+            result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise UserError("cannot run make", "", error.strerror or str(error)) from None
+    if result.returncode != 0:
+        raise UserError("the firmware does not build", _what(variant, command, userparams), _reason(result.stderr))
+    return paths.ROOT / "build" / (f"host-{variant}" if variant else "host") / "libvboard.so"
+
+
+@contextlib.contextmanager
+def _one_at_a_time(name: str):
+    """Two programs that build in the same folder would read each other's half-written files."""
+    folder = paths.ROOT / "build"
+    folder.mkdir(exist_ok=True)
+    with open(folder / f"{name}.lock", "w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _what(variant: str, command: list[str], userparams: Path | None) -> str:
+    if userparams is not None:
+        return str(paths.shown(userparams) / HEADER)
+    return " ".join(command[-2:]) if variant else "make vboard"
+
+
+def _reason(text: str) -> str:
+    """The line of the compiler's output that a user needs."""
+    for pattern in (r'static assertion failed: "(.*)"', r"(.*\berror: .*)", r"(.*\S.*)"):
+        found = re.search(pattern, text)
+        if found:
+            return found[1].replace("\\'", "'")
+    return "run make vboard to see why"

@@ -1,0 +1,117 @@
+"""The command line: `python3 -m tools.bench <command>`. Exit codes: 0 all well, 1 an expectation failed, 2 bad input."""
+
+import argparse
+from pathlib import Path
+
+from tools.common import command_line, motor_file, output, paths, workers
+from . import command_common, rating_sweep, report, robust, scenario, simulate, start_sweep, table2
+from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns the exit code."""
+    def work() -> int:
+        options = _parser().parse_args(arguments)
+        return options.command(options)
+    return command_line.run(work)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = command_line.Parser(prog="foc33", description="Runs the foc33 firmware on the virtual MCLV board.")
+    commands = parser.add_subparsers(required=True, metavar="command", parser_class=command_line.Parser)
+
+    run = commands.add_parser("run", help="run a scenario: table, protocol, expectations, plots")
+    run.add_argument("scenario", nargs="?", default="demo", help="name (see `scenarios`) or TOML file; default demo")
+    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
+                     help="change a plant key; KEY=x0.5 multiplies it (see `keys`); may be repeated")
+    run.add_argument("--no-plots", action="store_true", help="write summary and trace only")
+    run.set_defaults(command=_run)
+
+    loads = commands.add_parser("table2", help="the eight rows of the note's Table 2 beside ours")
+    loads.set_defaults(command=table2.command)
+
+    angles = commands.add_parser("starts", help="start from every rotor angle under several loads")
+    angles.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
+    angles.set_defaults(command=start_sweep.command)
+
+    rating = commands.add_parser("rated", help="every motor with its tuned header at 20, 50 and 100 %% of its rated speed under load")
+    rating.add_argument("--motor", nargs="+", metavar="NAME", help="these motors only: names in tuning/motors or paths")
+    rating.set_defaults(command=rating_sweep.command)
+
+    margins = commands.add_parser("robust", help="how far the motor's true R, L and Kphi may be off what the header says")
+    margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
+    margins.set_defaults(command=robust.command)
+
+    own, tuned = "the project's own", "build/tune/NAME, written by make tune MOTOR=NAME"
+    for command, folder, header in ((run, "SCENARIO", own), (loads, "table2", own), (angles, "starts", own), (rating, "rated", tuned),
+                                    (margins, "robust", tuned + "; without --motor " + own)):
+        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}")
+        if command is not rating:
+            command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
+            command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
+        command.add_argument("--board", help="board file instead of the scenario's: a name in tuning/boards or a path")
+        command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
+        command.add_argument("--quiet", action="store_true", help="no progress bar")
+
+    listing = commands.add_parser("scenarios", help="list the scenarios")
+    listing.set_defaults(command=_scenarios)
+
+    motors = commands.add_parser("motors", help="list the motor files: data and rating")
+    motors.set_defaults(command=_motors)
+
+    keys = commands.add_parser("keys", help="list the virtual board's keys: unit, range, meaning")
+    keys.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
+    keys.set_defaults(command=_keys)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    item = scenario.load(options.scenario)
+    motor, board = command_common.parts_of(item, options)
+    library = command_common.library_for(item.defines, options.library, options.userparams)
+    used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
+    job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
+    target = options.out or paths.RESULTS / item.name
+    with output.ResultFolder(target) as folder:
+        with command_common.Progress(item.name, item.duration_s, options.quiet) as progress:
+            run = workers.run_all([job], simulate.simulate, progress)[0]
+        outcomes = report.check(run)
+        data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
+        _write_traces(run, folder.work)
+        if not options.no_plots:
+            from . import plots
+            data["plots"] = plots.write_all(run, folder.work)
+        output.write_summary(folder.work, data)
+    print(report.text(run, outcomes, data))
+    print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
+          f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time")
+    print(f"results in {paths.shown(target)}/")
+    return command_common.verdict(item.name, outcomes)
+
+
+def _write_traces(run: Run, folder: Path) -> None:
+    """The whole run at a tenth of the rate, and the first hand-over at the full rate."""
+    output.write_trace(folder / "trace.csv", run.trace.thinned(10))
+    for item in run.hand_overs()[:1]:
+        output.write_trace(folder / "hand_over.csv", run.trace.part(item.at_s - HAND_OVER_BEFORE_S, item.at_s + HAND_OVER_AFTER_S))
+
+
+def _scenarios(options: argparse.Namespace) -> int:
+    names = paths.names(paths.SCENARIOS)
+    width = max(map(len, names), default=0)
+    for name in names:
+        print(f"{name.ljust(width)}  {scenario.load(name).title}")
+    return 0
+
+
+def _motors(options: argparse.Namespace) -> int:
+    motors, code = command_line.each(paths.names(paths.MOTORS), motor_file.load)
+    print(motor_file.listing(motors))
+    return code
+
+
+def _keys(options: argparse.Namespace) -> int:
+    for key in command_common.library_for([], options.library).keys.values():
+        span = f"{key.minimum:g} .. {key.maximum:g}" if key.writable else "read only"
+        print(f"{key.name:26} {key.unit:8} {span:24} {key.meaning}")
+    return 0

@@ -1,0 +1,421 @@
+"""Expectations: what a scenario says must hold, each kind read from [[expect]] and checked against the finished run.
+
+    kind = "measure"       measure = "1000 rpm", value = "speed_error_percent", min and/or max (values: measure.MEASURE_VALUES)
+    kind = "hand_over"     within_s of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
+    kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
+    kind = "outputs_off"   from_s, to_s
+    kind = "bus_voltage"   min and/or max, from_s, to_s; percent = true: in % of NOMINAL_BUS_V
+    kind = "signal"        signal, statistic = mean min max rms peak span last, min and/or max, from_s, to_s
+    kind = "state"         name, at_s or from_s and to_s; never = true: must not occur
+    kind = "fault"         name, after_s (its cause), within_s, outputs_off_within_periods of the fault (of the cause with
+                           from_cause = true), kept_to_s, cleared_from_s
+    kind = "no_fault"      from_s, to_s
+    kind = "no_warnings"   the virtual board found nothing wrong with the configuration
+    kind = "variable"      name, count, statistic = min max mean span distinct, min and/or max: a firmware variable at the end
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Callable
+
+import numpy as np
+
+from .metrics import MEASURE_VALUES, MEASURED_BY_FIRMWARE
+from tools.common.toml_file import REQUIRED, Section
+
+if TYPE_CHECKING:
+    from .run import Run
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One checked line: `row` names it, `got` and `allowed` are the numbers as text."""
+
+    row: str
+    ok: bool
+    got: str
+    allowed: str
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """An allowed range; at least one end is given."""
+
+    minimum: float
+    maximum: float
+
+    @classmethod
+    def read(cls, section: Section) -> "Bounds":
+        low, high = section.number("min", None), section.number("max", None)
+        if low is None and high is None:
+            raise section.fail("kind", "neither 'min' nor 'max' is there", "add one, or both")
+        if low is not None and high is not None and low > high:
+            raise section.fail("min", f"min = {low:g} is above max = {high:g}", "exchange them")
+        return cls(-math.inf if low is None else low, math.inf if high is None else high)
+
+    def hold(self, value: float | None) -> bool:
+        return value is not None and self.minimum <= value <= self.maximum
+
+    def text(self) -> str:
+        if self.maximum == math.inf:
+            return f"at least {self.minimum:g}"
+        if self.minimum == -math.inf:
+            return f"at most {self.maximum:g}"
+        return f"{self.minimum:g} .. {self.maximum:g}"
+
+
+def _number(value: float | None) -> str:
+    return "nothing" if value is None or not math.isfinite(value) else f"{value:.4g}"
+
+
+class Expectation:
+    """Base of the kinds: read() takes a section (measures: see read_expectation), check() a finished run."""
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "Expectation":
+        raise NotImplementedError
+
+    def check(self, run: "Run") -> list[Outcome]:
+        raise NotImplementedError
+
+    def signals(self) -> list[str]:
+        """Signals that must be recorded for it, besides the usual ones."""
+        return []
+
+    def variables(self) -> dict[str, int]:
+        """Firmware variables (name, element count) to read at the end."""
+        return {}
+
+    def names(self) -> dict[str, str]:
+        """Names that the firmware must know: "fault" or "state" and the name."""
+        return {}
+
+    def reads_firmware(self) -> bool:
+        """Whether it looks into the firmware's variables, which a HEX file does not tell."""
+        return bool(self.names() or self.variables() or any(name.startswith("fw.") for name in self.signals()))
+
+
+def _window(section: Section, duration_s: float) -> tuple[float, float]:
+    from_s = section.number("from_s", 0.0, 0.0, duration_s)
+    to_s = section.number("to_s", duration_s, 0.0, duration_s)
+    if to_s < from_s:
+        raise section.fail("to_s", f"to_s = {to_s:g} is before from_s = {from_s:g}", "choose a later one")
+    return from_s, to_s
+
+
+def _window_text(from_s: float, to_s: float) -> str:
+    return f"{from_s:g} .. {to_s:g} s"
+
+
+@dataclass(frozen=True)
+class MeasureExpectation(Expectation):
+    measure: str
+    value: str
+    bounds: Bounds
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
+        measure, value = section.choice("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES))
+        if value == "speed_error_percent" and not measures[measure]:
+            raise section.fail("value", f"'{measure}' has no speed error", "add reference_rpm to the measure")
+        return cls(measure, value, Bounds.read(section))
+
+    def reads_firmware(self) -> bool:
+        return self.value in MEASURED_BY_FIRMWARE
+
+    def check(self, run: "Run") -> list[Outcome]:
+        got = run.measures[self.measure][self.value]
+        return [Outcome(f"{self.measure}: {self.value}", self.bounds.hold(got), _number(got), self.bounds.text())]
+
+
+@dataclass(frozen=True)
+class HandOverExpectation(Expectation):
+    press: int
+    within_s: float
+    overshoot_percent: float | None
+    no_reverse_motion: bool
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "HandOverExpectation":
+        return cls(section.integer("press", 1, 1), section.number("within_s", REQUIRED, 0.0),
+                   section.number("overshoot_percent", None, 0.0), section.flag("no_reverse_motion", False))
+
+    def reads_firmware(self) -> bool:
+        return True
+
+    def check(self, run: "Run") -> list[Outcome]:
+        presses = run.press_times("S2")
+        name = "hand-over" if self.press == 1 else f"hand-over after S2 number {self.press}"
+        since = presses[self.press - 1] if len(presses) >= self.press else math.inf
+        found = [item for item in run.hand_overs() if item.at_s > since]
+        allowed = f"at most {self.within_s:g} s after S2"
+        if not found:
+            return [Outcome(f"{name}: closed loop", False, "never", allowed)]
+        item = found[0]
+        took = item.at_s - since
+        outcomes = [Outcome(f"{name}: closed loop", took <= self.within_s, f"{took:.3f} s", allowed)]
+        if self.overshoot_percent is not None:
+            outcomes.append(Outcome(f"{name}: overshoot", item.overshoot_percent <= self.overshoot_percent,
+                                    f"{item.overshoot_percent:.1f} %", f"at most {self.overshoot_percent:g} %"))
+        if self.no_reverse_motion:
+            outcomes.append(Outcome(f"{name}: no reverse motion", item.lowest_rpm >= 0.0,
+                                    f"lowest speed {item.lowest_rpm:.0f} rpm", "at least 0 rpm"))
+        return outcomes
+
+
+def _off_row(run: "Run", from_row: int) -> int | None:
+    """First row from `from_row` on with all six outputs off."""
+    off = np.flatnonzero(run.trace.column("pwm.outputs_on")[from_row:] == 0)
+    return None if len(off) == 0 else from_row + int(off[0])
+
+
+def _stays_off(run: "Run", off_row: int, to_row: int | None = None) -> bool:
+    """No output is on after `off_row`. "pwm.outputs_seen" tells of the whole period before its row."""
+    return not np.any(run.trace.column("pwm.outputs_seen")[off_row + 2:to_row])
+
+
+@dataclass(frozen=True)
+class StopExpectation(Expectation):
+    after_s: float
+    within_s: float
+    speed_max_rpm: float | None
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StopExpectation":
+        return cls(section.number("after_s", REQUIRED, 0.0, duration_s), section.number("within_s", REQUIRED, 0.0),
+                   section.number("speed_max_rpm", None, 0.0))
+
+    def check(self, run: "Run") -> list[Outcome]:
+        first = int(np.searchsorted(run.trace.time_s, self.after_s))
+        row = _off_row(run, first)
+        allowed = f"at most {self.within_s:g} s after {self.after_s:g} s, and to the end"
+        if row is None:
+            return [Outcome("stop: outputs off", False, "never", allowed)]
+        took = float(run.trace.time_s[row]) - self.after_s
+        stays = _stays_off(run, row)
+        got = f"{took:.3f} s" + ("" if stays else ", on again later")
+        outcomes = [Outcome("stop: outputs off", took <= self.within_s and stays, got, allowed)]
+        if self.speed_max_rpm is not None:
+            speed = abs(float(run.trace.column("plant.speed_rpm")[row]))
+            outcomes.append(Outcome("stop: speed when the outputs go off", speed <= self.speed_max_rpm, f"{speed:.0f} rpm",
+                                    f"at most {self.speed_max_rpm:g} rpm"))
+        return outcomes
+
+
+@dataclass(frozen=True)
+class OutputsOffExpectation(Expectation):
+    from_s: float
+    to_s: float
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "OutputsOffExpectation":
+        return cls(*_window(section, duration_s))
+
+    def check(self, run: "Run") -> list[Outcome]:
+        part = run.trace.part(self.from_s, self.to_s)
+        on = np.flatnonzero(part.column("pwm.outputs_seen"))
+        got = "on at %.4f s" % part.time_s[on[0]] if len(on) else ("off" if len(part) else "nothing")
+        return [Outcome(f"outputs off {_window_text(self.from_s, self.to_s)}", got == "off", got, "all six off")]
+
+
+@dataclass(frozen=True)
+class SignalExpectation(Expectation):
+    row: str
+    signal: str
+    statistic: str
+    bounds: Bounds
+    from_s: float
+    to_s: float
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "SignalExpectation":
+        signal, statistic = section.text("signal"), section.choice("statistic", tuple(_STATISTICS))
+        return cls(f"{signal} {statistic}", signal, statistic, Bounds.read(section), *_window(section, duration_s))
+
+    def check(self, run: "Run") -> list[Outcome]:
+        column = run.trace.part(self.from_s, self.to_s).column(self.signal).astype(np.float64)
+        got = float(_STATISTICS[self.statistic](column)) if len(column) else None
+        row = f"{self.row} {_window_text(self.from_s, self.to_s)}"
+        return [Outcome(row, self.bounds.hold(got), _number(got), self.bounds.text())]
+
+    def signals(self) -> list[str]:
+        return [self.signal]
+
+
+@dataclass(frozen=True)
+class BusVoltageExpectation(SignalExpectation):
+    """Shorthand: lowest and highest bus voltage."""
+
+    percent: bool
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "BusVoltageExpectation":
+        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s), section.flag("percent", False))
+
+    def check(self, run: "Run") -> list[Outcome]:
+        column = run.trace.part(self.from_s, self.to_s).column(self.signal)
+        unit = run.params["NOMINAL_BUS_V"] / 100.0 if self.percent else 1.0
+        bounds = Bounds(self.bounds.minimum * unit, self.bounds.maximum * unit)
+        if not len(column):
+            return [Outcome(self.row, False, "nothing", bounds.text() + " V")]
+        low, high = float(column.min()), float(column.max())
+        return [Outcome(f"{self.row} {_window_text(self.from_s, self.to_s)}", bounds.hold(low) and bounds.hold(high),
+                        f"{low:.2f} .. {high:.2f} V", bounds.text() + " V")]
+
+
+_STATISTICS: dict[str, Callable[[np.ndarray], Any]] = {
+    "mean": np.mean, "min": np.min, "max": np.max, "rms": lambda x: np.sqrt(np.mean(x * x)), "peak": lambda x: np.max(np.abs(x)),
+    "span": np.ptp, "last": lambda x: x[-1], "distinct": lambda x: len(np.unique(x))}
+
+
+@dataclass(frozen=True)
+class StateExpectation(Expectation):
+    name: str
+    from_s: float
+    to_s: float
+    never: bool
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StateExpectation":
+        name, at_s, never = section.text("name"), section.number("at_s", None, 0.0, duration_s), section.flag("never", False)
+        if at_s is None:
+            return cls(name, *_window(section, duration_s), never)
+        return cls(name, at_s, at_s, never)
+
+    def names(self) -> dict[str, str]:
+        return {"state": self.name}
+
+    def check(self, run: "Run") -> list[Outcome]:
+        part = run.trace.part(self.from_s, max(self.to_s, self.from_s + 1.5 * run.trace.period_s))
+        there = part.column("fw.state") == run.state_number(self.name)
+        when = f"at {self.from_s:g} s" if self.from_s == self.to_s else _window_text(self.from_s, self.to_s)
+        seen = [name for _, _, name in _named_changes(part, run.states)]
+        got = " ".join(dict.fromkeys(seen)) or "nothing"
+        if self.never:
+            return [Outcome(f"state never {self.name} {when}", len(part) > 0 and not np.any(there), got, f"not {self.name}")]
+        return [Outcome(f"state {when}", len(part) > 0 and bool(np.all(there)), got, self.name)]
+
+
+def _named_changes(part: Any, names: dict[int, str]) -> list[tuple[int, float, str]]:
+    return [(row, float(part.time_s[row]), names.get(int(value), "?")) for row, value in part.changes("fw.state")]
+
+
+@dataclass(frozen=True)
+class FaultExpectation(Expectation):
+    name: str
+    after_s: float
+    within_s: float
+    outputs_off_within_periods: int
+    from_cause: bool
+    kept_to_s: float | None
+    cleared_from_s: float | None
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "FaultExpectation":
+        return cls(section.text("name"), section.number("after_s", REQUIRED, 0.0, duration_s),
+                   section.number("within_s", REQUIRED, 0.0),
+                   section.integer("outputs_off_within_periods", 1, 0), section.flag("from_cause", False),
+                   section.number("kept_to_s", None, 0.0, duration_s), section.number("cleared_from_s", None, 0.0, duration_s))
+
+    def names(self) -> dict[str, str]:
+        return {"fault": self.name}
+
+    def check(self, run: "Run") -> list[Outcome]:
+        title = f"fault {self.name}"
+        raised = [(row, at_s, name) for row, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
+        allowed = f"{self.name} within {self.within_s:g} s of {self.after_s:g} s"
+        if not raised:
+            return [Outcome(f"{title}: raised", False, "no fault", allowed)]
+        row, at_s, name = raised[0]
+        ok = name == self.name and self.after_s <= at_s <= self.after_s + self.within_s
+        outcomes = [Outcome(f"{title}: raised", ok, f"{name} at {at_s:.4f} s", allowed), self._outputs(run, title, row)]
+        if self.kept_to_s is not None:
+            outcomes.append(self._code(run, f"{title}: kept to {self.kept_to_s:g} s", at_s, self.kept_to_s, self.name))
+        if self.cleared_from_s is not None:
+            outcomes.append(self._code(run, f"{title}: cleared from {self.cleared_from_s:g} s", self.cleared_from_s, math.inf,
+                                       run.faults.get(0, "NONE")))
+        return outcomes
+
+    def _outputs(self, run: "Run", title: str, fault_row: int) -> Outcome:
+        """The row after `first` is one period later."""
+        first = int(np.searchsorted(run.trace.time_s, self.after_s)) if self.from_cause else fault_row
+        off = _off_row(run, first)
+        periods = None if off is None else off - first
+        kept = off is not None and _stays_off(run, off, self._kept_row(run))
+        got = "never" if periods is None else f"{periods} periods" + ("" if kept else ", on again later")
+        origin = "cause" if self.from_cause else "fault"
+        return Outcome(f"{title}: outputs off", kept and periods is not None and periods <= self.outputs_off_within_periods, got,
+                       f"at most {self.outputs_off_within_periods} after the {origin}")
+
+    def _kept_row(self, run: "Run") -> int | None:
+        if self.kept_to_s is None:
+            return None
+        return int(np.searchsorted(run.trace.time_s, self.kept_to_s))
+
+    @staticmethod
+    def _code(run: "Run", row: str, from_s: float, to_s: float, name: str) -> Outcome:
+        codes = np.unique(run.trace.part(from_s, to_s).column("fw.fault"))
+        got = " ".join(run.faults.get(int(code), "?") for code in codes) or "nothing"
+        return Outcome(row, got == name, got, name)
+
+
+@dataclass(frozen=True)
+class NoFaultExpectation(Expectation):
+    from_s: float
+    to_s: float
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoFaultExpectation":
+        return cls(*_window(section, duration_s))
+
+    def reads_firmware(self) -> bool:
+        return True
+
+    def check(self, run: "Run") -> list[Outcome]:
+        part = run.trace.part(self.from_s, self.to_s)
+        raised = [(part.time_s[row], run.faults.get(int(code), "?")) for row, code in part.changes("fw.fault") if code != 0]
+        got = f"{raised[0][1]} at {raised[0][0]:.4f} s" if raised else "none"
+        return [Outcome(f"no fault {_window_text(self.from_s, self.to_s)}", not raised and len(part) > 0, got, "none")]
+
+
+@dataclass(frozen=True)
+class NoWarningsExpectation(Expectation):
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoWarningsExpectation":
+        return cls()
+
+    def check(self, run: "Run") -> list[Outcome]:
+        return [Outcome("no warnings of the board", not run.warnings, run.warnings[0] if run.warnings else "none", "none")]
+
+
+@dataclass(frozen=True)
+class VariableExpectation(Expectation):
+    name: str
+    count: int
+    statistic: str
+    bounds: Bounds
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "VariableExpectation":
+        return cls(section.text("name"), section.integer("count", 1, 1, 1000), section.choice("statistic", tuple(_STATISTICS)),
+                   Bounds.read(section))
+
+    def check(self, run: "Run") -> list[Outcome]:
+        got = float(_STATISTICS[self.statistic](np.array(run.variables[self.name][:self.count], dtype=np.float64)))
+        return [Outcome(f"{self.name} {self.statistic}", self.bounds.hold(got), _number(got), self.bounds.text())]
+
+    def variables(self) -> dict[str, int]:
+        return {self.name: self.count}
+
+
+KINDS: dict[str, type[Expectation]] = {
+    "measure": MeasureExpectation, "hand_over": HandOverExpectation, "stop": StopExpectation, "outputs_off": OutputsOffExpectation,
+    "bus_voltage": BusVoltageExpectation, "signal": SignalExpectation, "state": StateExpectation, "fault": FaultExpectation,
+    "no_fault": NoFaultExpectation, "no_warnings": NoWarningsExpectation, "variable": VariableExpectation}
+
+
+def read_expectation(section: Section, measures: dict[str, bool], duration_s: float) -> Expectation:
+    """One [[expect]] table. `measures` holds the known measures' names, and whether they have a reference speed."""
+    expectation = KINDS[section.choice("kind", tuple(KINDS))].read(section, measures, duration_s)
+    section.close()
+    return expectation

@@ -1,0 +1,216 @@
+"""The virtual board around an image of the target (processor in the loop): libpil.so through ctypes, and runs of scenarios on it.
+
+    python3 -m tools.bench.pil build/target/foc33.elf [SCENARIO]
+"""
+
+import ctypes
+import dataclasses
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tools.common import paths
+from . import build, command_common, scenario, simulate
+from .board import Board, BoardError, Library
+from tools.common.errors import UserError
+from .run import Run
+
+ERROR_BYTES = 400
+FIRMWARE = "fw."
+"""What begins so is read from the firmware's variables."""
+
+
+class PilLibrary(Library):
+    """libpil.so: everything of libvboard.so, and boards around an image."""
+
+    def _declare(self) -> None:
+        super()._declare()
+        board, text, out = ctypes.c_void_p, ctypes.c_char_p, ctypes.POINTER
+        words, number = out(ctypes.c_int16), out(ctypes.c_double)
+        for name, result, arguments in (
+                ("vb_create_iss", board, [text, text, ctypes.c_size_t]), ("vb_iss_has_names", ctypes.c_int, [board]),
+                ("vb_iss_difference", text, [board]),
+                ("vb_iss_lock_step", None, [board, ctypes.c_int]), ("vb_iss_peek", ctypes.c_int, [board, ctypes.c_uint]),
+                ("vb_iss_read", ctypes.c_int, [board, text, words, ctypes.c_uint]),
+                ("vb_iss_write", ctypes.c_int, [board, text, words, ctypes.c_uint]),
+                ("vb_iss_param_get", ctypes.c_int, [board, text, number]), ("vb_iss_param_set", ctypes.c_int, [board, text, ctypes.c_double]),
+                ("vb_iss_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]),
+                ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]),
+                ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t])):
+            function = getattr(self.c, name)
+            function.restype, function.argtypes = result, arguments
+
+
+def library(defines: list[str], userparams: Path | None = None) -> PilLibrary:
+    """Builds build/host[-variant]/libpil.so if needed and loads it."""
+    return PilLibrary(build.library(defines, userparams, "pil-library").with_name("libpil.so"))
+
+
+class PilBoard(Board):
+    """A virtual board with an image of the target in its CPU. The comparison's other half is one set of globals: one a process."""
+
+    def __init__(self, pil: PilLibrary, image: Path) -> None: # pylint: disable=super-init-not-called
+        self.library = pil
+        self._c = pil.c
+        error = ctypes.create_string_buffer(ERROR_BYTES)
+        self._vb = ctypes.c_void_p(self._c.vb_create_iss(str(image).encode(), error, ERROR_BYTES))
+        if not self._vb:
+            raise UserError(error.value.decode(errors="replace"))
+
+    @property
+    def has_names(self) -> bool:
+        """Whether the image says where the drive's variables are: without them no signals "fw.*" and no comparison."""
+        return bool(self._c.vb_iss_has_names(self._vb))
+
+    def lock_step(self, on: bool) -> None:
+        """Compare with the host's firmware (the default) or not, from the next power-up on."""
+        self._c.vb_iss_lock_step(self._vb, int(on))
+
+    def difference(self) -> str:
+        """Where target and host first differed; "" if nowhere."""
+        return self._c.vb_iss_difference(self._vb).decode()
+
+    def peek(self, address: int) -> int:
+        """The 16-bit word at an address of data memory."""
+        return self._c.vb_iss_peek(self._vb, address)
+
+    def uart_take(self) -> str:
+        """What the target has sent since the last call."""
+        text = ctypes.create_string_buffer(4096)
+        count = self._c.vb_uart_read(self._vb, text, len(text))
+        return text.raw[:count].decode("latin-1")
+
+    def uart_send(self, text: str) -> None:
+        self._c.vb_uart_write(self._vb, text.encode("latin-1"), len(text))
+
+    def terminal(self) -> str:
+        """Open a pseudo-terminal for UART1 and return its path."""
+        path = ctypes.create_string_buffer(ERROR_BYTES)
+        self._check(self._c.vb_iss_terminal(self._vb, path, ERROR_BYTES))
+        return path.value.decode()
+
+    def variable(self, name: str, count: int) -> list[int]:
+        values = (ctypes.c_int16 * count)()
+        self._check(self._c.vb_iss_read(self._vb, name.encode(), values, count))
+        return list(values)
+
+    def write_variable(self, name: str, value: int) -> None:
+        self._check(self._c.vb_iss_write(self._vb, name.encode(), (ctypes.c_int16 * 1)(value), 1))
+
+    def parameter(self, name: str) -> float:
+        value = ctypes.c_double()
+        if self._c.vb_iss_param_get(self._vb, name.encode(), ctypes.byref(value)) != 0:
+            raise BoardError(f"{name} cannot change in this image: build it with PARAMS_IN_RAM")
+        return value.value
+
+    def write_parameter(self, name: str, value: float) -> None:
+        result = self._c.vb_iss_param_set(self._vb, name.encode(), value)
+        if result == -2:
+            raise BoardError(f"{name} = {value:g} is outside its range in userparams.h")
+        if result != 0:
+            raise BoardError(f"{name} cannot change in this image: build it with PARAMS_IN_RAM")
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """What the core has counted in a run."""
+
+    isr_count: float
+    isr_cycles_min: float
+    isr_cycles_mean: float
+    isr_cycles_max: float
+    latency_cycles_min: float
+    latency_cycles_mean: float
+    latency_cycles_max: float
+    cycles: float
+    instructions: float
+    stack_bytes: float
+    resets: float
+
+
+@dataclass
+class PilRun:
+    """A scenario that ran on the target image: the run itself, the cycles, and the comparison with the host's firmware."""
+
+    run: Run
+    cycles: Cycles
+    ticks: int
+    differences: int
+    first_difference: str
+    """tick, signal and values; "" if target and host agreed in all ticks"""
+    has_names: bool = True
+    """whether the image said where the drive's variables are"""
+    sent: str = ""
+    """what left UART1, up to 4096 characters"""
+
+    @property
+    def instructions_per_second(self) -> float:
+        """Simulated instructions in a second of wall time."""
+        return self.cycles.instructions / self.run.wall_s if self.run.wall_s > 0.0 else 0.0
+
+
+def check_image(pil: PilLibrary, image: Path) -> bool:
+    """Whether the image has names; a damaged or foreign one is a UserError before anything else looks at it."""
+    board = PilBoard(pil, image)
+    try:
+        return board.has_names
+    finally:
+        board.close()
+
+
+def without_names(job: simulate.Job) -> simulate.Job:
+    """The job for an image that does not say where its variables are: what the plant and the registers tell."""
+    return dataclasses.replace(job, signals=[name for name in job.signals if not name.startswith(FIRMWARE)], variables={})
+
+
+def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilRun:
+    """Run a job, prepared with a library() of the same defines, on an image; one a process."""
+    pil = PilLibrary(job.library)
+    board = PilBoard(pil, image)
+    try:
+        result = simulate.simulate_on(job if board.has_names else without_names(job), pil, board, report)
+        cycles = Cycles(**{name: board.get(f"cpu.{name}") for name in Cycles.__dataclass_fields__})
+        return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference(),
+                      board.has_names, board.uart_take())
+    except BoardError as error:
+        raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
+    finally:
+        board.close()
+
+
+def main(arguments: list[str]) -> int:
+    """One scenario on an image, in a few lines."""
+    if not 1 <= len(arguments) <= 2:
+        raise UserError("an image and perhaps a scenario are needed", "command line", "python3 -m tools.bench.pil build/target/foc33.elf smoke")
+    item = scenario.load(arguments[1] if len(arguments) > 1 else "smoke")
+    pil = library(item.defines)
+    motor, board = command_common.parts_of(item, _NoOptions())
+    with command_common.Progress(item.name, item.duration_s, False) as progress:
+        result = run(simulate.prepare(item, pil, motor, board), Path(arguments[0]), progress)
+    for _, at_s, name in result.run.state_changes():
+        print(f"{at_s:8.4f} s  {name}")
+    for text in result.run.warnings:
+        print(f"warning: {text}")
+    c = result.cycles
+    print(f"interrupt {c.isr_cycles_min:.0f} / {c.isr_cycles_mean:.1f} / {c.isr_cycles_max:.0f} cycles (min / mean / max), {c.isr_count:.0f} times")
+    print(f"trigger to duties {c.latency_cycles_min:.0f} / {c.latency_cycles_mean:.1f} / {c.latency_cycles_max:.0f} cycles")
+    print(f"stack {c.stack_bytes:.0f} bytes, {result.instructions_per_second / 1e6:.1f} million instructions a second, "
+          f"{result.run.speed_factor:.2f} times real time")
+    print(f"{result.ticks} interrupts compared, {result.differences} differ" + (f": {result.first_difference}" if result.differences else ""))
+    return 1 if result.differences else 0
+
+
+class _NoOptions:
+    """No --motor and no --board."""
+
+    motor = None
+    board = None
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except UserError as user_error:
+        print(f"foc33: {user_error}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,254 @@
+"""The plots of a run, as PNG files."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
+import numpy as np # noqa: E402
+
+from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run # noqa: E402
+from tools.common.trace import Trace, wrapped_deg # noqa: E402
+
+STEP = 20
+"""Every STEP-th period is drawn in the plots over the whole run."""
+
+plt.rcParams.update({"figure.figsize": (10, 5), "figure.dpi": 100, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0,
+                     "legend.loc": "best", "legend.fontsize": 9, "axes.titlesize": 11, "font.size": 10,
+                     "path.simplify_threshold": 0.5, "agg.path.chunksize": 10000})
+
+
+def write_all(run: Run, folder: Path) -> list[str]:
+    """Every plot that the run has data for; returns the file names."""
+    thin = run.trace.thinned(STEP)
+    if "fw.state" not in thin: # a target image without names
+        return [_write(folder, "speed", run, thin, _true_speed)]
+    files = []
+    for name, draw in (("speed", _speed), ("currents", _currents), ("voltages", _voltages), ("angle_error", _angle_error)):
+        files.append(_write(folder, name, run, thin, draw))
+    for name, draw, wanted in (("hand_over", _hand_over, bool(run.hand_overs())),
+                               ("field_weakening", _field_weakening, _weakens(run)),
+                               ("variables", _variables, any(len(values) > 1 for values in run.variables.values()))):
+        if wanted:
+            files.append(_write(folder, name, run, thin, draw))
+    return files
+
+
+def _write(folder: Path, name: str, run: Run, thin: Trace, draw: Callable) -> str:
+    figure, axes = plt.subplots(layout="constrained")
+    draw(run, thin, axes)
+    figure.savefig(folder / f"{name}.png")
+    plt.close(figure)
+    return f"{name}.png"
+
+
+def _lines(axes: plt.Axes, thin: Trace, signals: dict[str, tuple[str, dict]]) -> None:
+    for signal, (label, style) in signals.items():
+        axes.plot(thin.time_s, thin.column(signal), label=label, **style)
+
+
+def _finish(axes: plt.Axes, title: str, y_label: str, x_label: str = "time [s]") -> None:
+    axes.set(title=title, xlabel=x_label, ylabel=y_label)
+    axes.legend()
+
+
+def _closed(run: Run, trace: Trace) -> np.ndarray:
+    """Rows in closed loop, stopping included."""
+    state = trace.column("fw.state")
+    return (state == run.state_number("CLOSED")) | (state == run.state_number("STOPPING"))
+
+
+def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"})})
+    running = thin.column("pwm.outputs_seen") != 0
+    estimated = np.where(running, thin.column("fw.speed_est_rpm"), np.nan)
+    reference = np.where(_closed(run, thin), thin.column("fw.speed_ref_rpm"), np.nan)
+    axes.plot(thin.time_s, estimated, label="estimated", color="tab:orange", linestyle="--")
+    axes.plot(thin.time_s, reference, label="reference", color="black", linewidth=0.7)
+    for item in run.hand_overs():
+        axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":",
+                     label=f"closed loop, {item.after_s2_s:.2f} s after S2")
+    _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
+
+
+def _true_speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"plant.speed_rpm": ("true", {"color": "tab:blue"})})
+    _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
+
+
+def _currents(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"fw.i_d_a": ("Id measured", {"color": "tab:blue", "alpha": 0.5}),
+                        "fw.i_q_a": ("Iq measured", {"color": "tab:red", "alpha": 0.5}),
+                        "fw.id_ref_a": ("Id reference", {"color": "navy"}), "fw.iq_ref_a": ("Iq reference", {"color": "darkred"})})
+    _finish(axes, f"{run.scenario.name}: currents in the control frame", "current [A peak]")
+
+
+def _voltages(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    _lines(axes, thin, {"fw.v_d_v": ("Vd", {"color": "tab:blue"}), "fw.v_q_v": ("Vq", {"color": "tab:red"}),
+                        "fw.v_limit_v": ("limit", {"color": "black", "linewidth": 0.8})})
+    axes.plot(thin.time_s, np.hypot(thin.column("fw.v_d_v"), thin.column("fw.v_q_v")), label="|V|", color="grey", linewidth=0.7)
+    axes.plot(thin.time_s, -thin.column("fw.v_limit_v"), color="black", linewidth=0.8)
+    _finish(axes, f"{run.scenario.name}: commanded voltage", "voltage [V peak, phase]")
+
+
+def _angle_error(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    error = wrapped_deg(thin.column("fw.theta_est_deg").astype(np.float64) - thin.column("plant.theta_e_deg"))
+    closed = _closed(run, thin)
+    axes.plot(thin.time_s, np.where(closed, error, np.nan), label="closed loop", color="tab:blue")
+    if not np.any(closed):
+        running = thin.column("pwm.outputs_seen") != 0
+        axes.plot(thin.time_s, np.where(running, error, np.nan), label="open loop", color="tab:orange")
+    _finish(axes, f"{run.scenario.name}: estimated less true angle", "electrical angle [deg]")
+
+
+def _hand_over(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    at_s = run.hand_overs()[0].at_s
+    part = run.trace.part(at_s - HAND_OVER_BEFORE_S, at_s + HAND_OVER_AFTER_S)
+    time_ms = (part.time_s - at_s) * 1e3
+    for signal, label, color in (("plant.i_a", "Ia", "tab:blue"), ("plant.i_b", "Ib", "tab:orange"),
+                                 ("plant.i_c", "Ic", "tab:green")):
+        axes.plot(time_ms, part.column(signal), label=label, color=color)
+    axes.axvline(0.0, color="black", linewidth=0.8, linestyle=":", label="hand-over")
+    _finish(axes, f"{run.scenario.name}: phase currents around the hand-over", "current [A]", "time after the hand-over [ms]")
+
+
+def _variables(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    """Arrays of the firmware, such as SnapBuf1..4, as a debugger would draw them."""
+    for name, values in run.variables.items():
+        if len(values) > 1:
+            axes.plot(values, ".-", label=name)
+    _finish(axes, f"{run.scenario.name}: firmware variables at the end", "counts", "element")
+
+
+def _weakens(run: Run) -> bool:
+    return bool(np.any(run.trace.column("fw.fw_index") > 0))
+
+
+def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
+    """As the note's Figure 8: d current and 1/Kphi as functions of speed."""
+    closed = _closed(run, thin)
+    speed = np.abs(thin.column("plant.speed_rpm"))[closed]
+    other = axes.twinx()
+    axes.plot(speed, thin.column("fw.id_ref_a")[closed], ".", markersize=2, color="tab:blue", label="Id reference")
+    other.plot(speed, thin.column("fw.inv_kphi")[closed], ".", markersize=2, color="tab:red", label="1/Kphi")
+    other.set_ylabel("1/Kphi [counts, Q15/2]")
+    other.set_ylim(bottom=0)
+    other.grid(False)
+    axes.set(title=f"{run.scenario.name}: d current and 1/Kphi over speed (Figure 8)", xlabel="speed [rpm]", ylabel="Id [A peak]")
+    handles = [line for side in (axes, other) for line in side.get_lines()]
+    axes.legend(handles, [line.get_label() for line in handles], markerscale=4)
+
+
+def write_table2(rows: list[dict], folder: Path) -> list[str]:
+    """Speed and current of Table 2: the note's and ours over the reference speed."""
+    figure, (left, right) = plt.subplots(1, 2, layout="constrained")
+    reference = [row["reference_rpm"] for row in rows]
+    left.plot(reference, reference, color="black", linewidth=0.7, label="reference")
+    for axes, note, ours, label, title in ((left, "note_rpm", "speed_rpm", "speed [rpm]", "speed at the row's torque"),
+                                           (right, "note_current_a", "current_rms_a", "phase current [A RMS]", "phase current")):
+        axes.plot(reference, [row[note] for row in rows], "s--", color="tab:grey", label="note")
+        axes.plot(reference, [row[ours] for row in rows], "o-", color="tab:blue", label="foc33")
+        _finish(axes, f"Table 2: {title}", label, "reference speed [rpm]")
+    figure.savefig(folder / "table2.png")
+    plt.close(figure)
+    return ["table2.png"]
+
+
+def write_starts(rows: list[dict], folder: Path) -> list[str]:
+    """Time to closed loop over the rotor's angle, one line a load."""
+    figure, axes = plt.subplots(layout="constrained")
+    for load in sorted({row["load_nm"] for row in rows}):
+        points = [(row["rotor_deg"], row["closed_after_s"]) for row in rows if row["load_nm"] == load]
+        axes.plot([x for x, _ in points], [np.nan if y is None else y for _, y in points], "o-", label=f"{load:g} N m")
+    _finish(axes, "starts: time from S2 to closed loop", "time [s]", "electrical angle of the rotor at power-up [deg]")
+    axes.set_ylim(bottom=0)
+    figure.savefig(folder / "starts.png")
+    plt.close(figure)
+    return ["starts.png"]
+
+
+def write_rated(rows: list[dict], limits: dict, folder: Path) -> list[str]:
+    """Every motor's rows beside what is allowed: a panel for each quantity, a line for each motor, a mark for each row."""
+    motors = list(dict.fromkeys(row["motor"] for row in rows))
+    marks = {name: f"C{i}" for i, name in enumerate(dict.fromkeys(row["row"] for row in rows))}
+    figure, panels = plt.subplots(1, 4, sharey=True, layout="constrained", figsize=(13, 1.8 + 0.5 * len(motors)))
+    for axes, (key, label, low, high) in zip(panels, (
+            ("speed_error_percent", "speed error [%]", -limits["error_percent"], limits["error_percent"]),
+            ("angle_error_rms_deg", "angle error [deg RMS]", None, limits["angle_error_deg"]),
+            ("current_of_maximum_percent", "current [% of its maximum]", None, limits["current_percent"]),
+            ("voltage_percent", "voltage [% of its limit]", None, None))):
+        for name, color in marks.items():
+            points = [(row[key], motors.index(row["motor"])) for row in rows if row["row"] == name and row[key] is not None]
+            shown = [(x if low is None else min(max(x, 1.5 * low), 1.5 * high), y) for x, y in points]
+            axes.scatter([x for x, _ in shown], [y for _, y in shown], color=color, s=40, label=name, zorder=3)
+        for limit in (low, high):
+            if limit is not None:
+                axes.axvline(limit, color="tab:red", linewidth=0.8, linestyle="--")
+        axes.set(xlabel=label, xlim=(None, None) if low is not None else (0.0, None))
+    panels[0].set(yticks=range(len(motors)), yticklabels=motors, ylim=(len(motors) - 0.5, -0.5))
+    figure.suptitle("speeds in per cent of rated, under load; maximum speed without load; dashed: allowed", fontsize=11)
+    panels[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
+    figure.savefig(folder / "rated.png")
+    plt.close(figure)
+    return ["rated.png"]
+
+
+def write_robust(margins: list[dict], runs: list[dict], promised: dict[str, float], law: Callable, folder: Path) -> list[str]:
+    """How far each parameter may be off, as bars, and the angle error on the way there."""
+    return [_margins(margins, promised, folder), _angle_over_factor(runs, law, folder)]
+
+
+def _margins(margins: list[dict], promised: dict[str, float], folder: Path) -> str:
+    criteria = list(dict.fromkeys(row["criterion"] for row in margins))
+    ends = {(row["parameter"], row["criterion"], row["direction"]): row for row in margins}
+    figure, axes = plt.subplots(layout="constrained", figsize=(10, 4.5))
+    lowest, highest = min(row["factor"] for row in margins), max(row["factor"] for row in margins)
+    for i, name in enumerate(promised):
+        for j, criterion in enumerate(criteria):
+            low, high = ends[name, criterion, "down"], ends[name, criterion, "up"]
+            y = i + 0.2 * (j - (len(criteria) - 1) / 2.0)
+            axes.barh(y, high["factor"] - low["factor"], 0.17, left=low["factor"], color=f"C{j}", label=criterion if i == 0 else None)
+            for end, sign in ((low, "<"), (high, ">")):
+                if end["fails_at"] is None:
+                    axes.plot(end["factor"], y, sign, color="black", markersize=5, clip_on=False)
+        for edge in (1.0 - promised[name], 1.0 + promised[name]):
+            axes.plot([edge, edge], [i - 0.42, i + 0.42], color="black", linewidth=1.5,
+                      label="promised" if i == 0 and edge < 1.0 else None)
+    axes.set_xscale("log")
+    axes.set_xlim(lowest / 1.05, highest * 1.05)
+    ticks = [tick for tick in (0.3, 0.5, 0.7, 0.85, 1.0, 1.15, 1.3, 1.5, 2.0, 3.0) if lowest <= tick <= highest]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set(title="how far the motor may be off (arrow: the search ended there)", xlabel="true value / the header's",
+             yticks=range(len(promised)), yticklabels=list(promised), ylim=(len(promised) - 0.5, -0.5))
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.savefig(folder / "margins.png")
+    plt.close(figure)
+    return "margins.png"
+
+
+def _angle_over_factor(runs: list[dict], law: Callable, folder: Path) -> str:
+    names = list(dict.fromkeys(row["parameter"] for row in sorted(runs, key=lambda row: ("R", "L", "Kphi").index(row["parameter"]))))
+    figure, panels = plt.subplots(1, len(names), sharey=True, layout="constrained", figsize=(12, 4.5))
+    for axes, name in zip(panels, names):
+        for load, color in (("no load", "C0"), ("loaded", "C1")):
+            rows = sorted((row for row in runs if row["parameter"] == name and row["load"] == load), key=lambda row: row["factor"])
+            good = [row for row in rows if row["verdict"] == "ok"]
+            axes.plot([row["factor"] for row in good], [row["angle_error_mean_deg"] for row in good], ".-", color=color, label=load)
+            bad = [row["factor"] for row in rows if row["verdict"] != "ok"]
+            height = 0.03 if load == "no load" else 0.07
+            axes.plot(bad, [height] * len(bad), "x", color=color, label=f"{load}: does not run" if bad else None,
+                      transform=axes.get_xaxis_transform())
+        if name == "Kphi":
+            factors = np.geomspace(2.0 ** -0.5 + 1e-6, max(row["factor"] for row in runs), 200)
+            axes.plot(factors, [law(factor) for factor in factors], color="black", linewidth=0.8, linestyle="--", label="by Kphi alone")
+        axes.set_xscale("log")
+        axes.set_xticks([0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0], ["0.3", "0.5", "0.7", "1", "1.5", "2", "3"])
+        axes.minorticks_off()
+        _finish(axes, name, "estimated less true angle [deg]" if name == names[0] else "", "true value / the header's")
+    figure.savefig(folder / "angle_error.png")
+    plt.close(figure)
+    return "angle_error.png"

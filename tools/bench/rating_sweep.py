@@ -1,0 +1,206 @@
+"""`rated`: every motor with its tuned header at parts of its rated speed under load, and how fast it gets without. What is asked and what
+must hold is in tools/bench/scenarios/tables/rated.toml."""
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tools.common import command_line, motor_file, output, paths, plant
+from . import command_common, report, simulate, sweep
+from .board import Library
+from tools.common.errors import UserError
+from .expect import Outcome
+from tools.common.motor_file import Motor
+from tools.common.toml_file import Document
+
+COLUMNS = (
+    ("torque_nm_set", "brake\nN m", "{:.4f}"), ("reference_rpm", "reference\nrpm", "{:.0f}"), ("speed_rpm", "true\nrpm", "{:.1f}"),
+    ("speed_error_percent", "error\n%", "{:+.2f}"), ("current_rms_a", "phase I\nA rms", "{:.3f}"),
+    ("current_of_maximum_percent", "of max\n%", "{:.0f}"), ("angle_error_mean_deg", "angle err\nmean deg", "{:+.1f}"),
+    ("angle_error_rms_deg", "angle err\nrms deg", "{:.1f}"), ("voltage_percent", "voltage\n% of limit", "{:.0f}"),
+    ("closed_after_s", "closed\nafter s", "{:.2f}"), ("verdict", "\nverdict", "{}"))
+KEYS = ("motor", "row", "torque_nm_set", "reference_rpm", "speed_rpm", "speed_error_percent", "current_rms_a",
+        "current_of_maximum_percent", "angle_error_mean_deg", "angle_error_rms_deg", "voltage_percent", "closed_after_s", "highest_rpm",
+        "fault", "verdict")
+
+
+@dataclass
+class Table:
+    """tables/rated.toml."""
+
+    title: str
+    board: str
+    speeds_percent: list[float]
+    torque_percent: float
+    start_s: float
+    within_s: float
+    settle_s: float
+    torque_over_s: float
+    measure_s: float
+    error_percent: float
+    angle_error_deg: float
+    current_percent: float
+    board_where: str = ""
+    where: str = ""
+
+    @classmethod
+    def read(cls, path: Path) -> "Table":
+        document = Document(path)
+        root = document.root
+        title, board = root.text("title"), root.text("board")
+        speeds = root.numbers("speeds_percent", minimum=1.0, maximum=1000.0)
+        torque = root.number("torque_percent", minimum=0.0, maximum=1000.0)
+        times = [root.number(key, minimum=0.01, maximum=60.0) for key in ("start_s", "within_s", "settle_s", "torque_over_s", "measure_s")]
+        limits = [root.number(key, minimum=0.0) for key in ("error_percent", "angle_error_deg", "current_percent")]
+        table = cls(title, board, speeds, torque, *times, *limits, root.where("board"), document.label)
+        root.close()
+        return table
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A motor with the firmware that was built for it."""
+
+    motor: Motor
+    part: plant.Part
+    header: str
+    library: Library
+
+    @property
+    def params(self) -> dict[str, float]:
+        return self.library.params
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one row asks of a motor."""
+
+    name: str
+    rpm: float
+    torque_nm: float
+
+
+def command(options: argparse.Namespace) -> int:
+    """The whole command; returns the exit code."""
+    table = Table.read(paths.TABLES / "rated.toml")
+    names = options.motor or paths.names(paths.MOTORS)
+    if options.userparams is not None and len(names) != 1:
+        raise UserError("one header for several motors", "--userparams", "name one motor with --motor")
+    board = plant.read_board(options.board, "--board") if options.board else plant.read_board(table.board, table.board_where)
+    ready, code = command_line.each(names, lambda name: _with_header(name, options))
+    if not ready:
+        return code
+    target = options.out or paths.RESULTS / "rated"
+    with output.ResultFolder(target) as folder:
+        candidates = _candidates(ready, options)
+        cases = [(item, row) for item in candidates for row in rows_of(table, item)]
+        jobs = [_job(table, item, row, board) for item, row in cases]
+        with command_common.Progress("rated", sum(job.scenario.duration_s for job in jobs), options.quiet) as progress:
+            results = sweep.run_cases(jobs, progress)
+        rows = [_result(table, item, row, result) for (item, row), result in zip(cases, results)]
+        outcomes = [outcome for row in rows for outcome in check(table, row)]
+        _write(folder.work, table, candidates, rows, outcomes, board)
+    print(text(table, candidates, rows))
+    print(f"\nresults in {paths.shown(target)}/")
+    return max(code, command_common.verdict("rated", outcomes))
+
+
+def _with_header(name: str, options: argparse.Namespace) -> tuple[Motor, Path]:
+    """A motor and the folder of its header. Files are looked at before anything is built."""
+    motor = motor_file.load(name, "--motor")
+    return motor, Path(options.userparams) if options.userparams else command_common.tuned_header(motor.path)
+
+
+def _candidates(ready: list[tuple[Motor, Path]], options: argparse.Namespace) -> list[Candidate]:
+    """Every motor's firmware, built."""
+    result = []
+    with command_common.Progress("firmware", len(ready), options.quiet, "headers built") as progress:
+        for motor, header in ready:
+            library = command_common.library_for([], None, header)
+            result.append(Candidate(motor, plant.read_motor(str(motor.path)), command_common.header_name(None, header), library))
+            progress(1.0)
+    return result
+
+
+def rows_of(table: Table, item: Candidate) -> list[Row]:
+    """The rows of one motor: loaded at each speed, then as fast as the header allows."""
+    motor, torque_nm = item.motor, table.torque_percent / 100.0 * item.motor.rated_torque_nm
+    rows = [Row(f"{percent:g} %", percent / 100.0 * motor.rated_speed_rpm, torque_nm) for percent in table.speeds_percent]
+    return [*rows, Row("maximum", item.params["MAXIMUM_SPEED_RPM"], 0.0)]
+
+
+def _job(table: Table, item: Candidate, row: Row, board: plant.Part) -> simulate.Job:
+    asked = f"{item.motor.name}: {row.name} ({row.rpm:g} rpm)"
+    events, settled_s = sweep.loaded_run(item.params, row.rpm, table, asked, row.torque_nm)
+    scenario = sweep.scenario(asked, table.title, events, row.rpm, settled_s, settled_s + table.measure_s)
+    return simulate.prepare(scenario, item.library, item.part, board)
+
+
+def _result(table: Table, item: Candidate, row: Row, result: dict[str, Any]) -> dict[str, Any]:
+    """A row of the printed table."""
+    data = {"motor": item.motor.name, "row": row.name, "name": f"  {row.name}", "reference_rpm": row.rpm, "torque_nm_set": row.torque_nm,
+            **result}
+    return data | {"verdict": verdict(table, data)}
+
+
+def verdict(table: Table, row: dict[str, Any]) -> str:
+    """"ok", or the first thing that does not hold."""
+    closed, speed = row["closed_after_s"], sweep.speed_verdict(row, table.error_percent)
+    if row["fault"]:
+        return f"fault {row['fault']}"
+    if closed is None:
+        return "never in closed loop"
+    if closed > table.within_s:
+        return f"closed loop after {closed:.2f} s"
+    if speed:
+        return speed
+    if row["angle_error_rms_deg"] is None or row["angle_error_rms_deg"] > table.angle_error_deg:
+        return "angle"
+    if row["current_of_maximum_percent"] > table.current_percent:
+        return "current"
+    return "ok"
+
+
+def check(table: Table, row: dict[str, Any]) -> list[Outcome]:
+    """What must hold for one row: its verdict with the numbers."""
+    numbers = [f"{text} {row[key]:{form}} {unit}" for text, key, form, unit in
+               (("error", "speed_error_percent", "+.2f", "%"), ("angle error", "angle_error_rms_deg", ".1f", "deg"),
+                ("current", "current_of_maximum_percent", ".0f", "% of its maximum")) if row[key] is not None]
+    allowed = f"no fault, closed loop within {table.within_s:g} s, error {table.error_percent:g} %, angle error " \
+              f"{table.angle_error_deg:g} deg, current {table.current_percent:g} %"
+    return [Outcome(f"{row['motor']} at {row['row']}", row["verdict"] == "ok", ", ".join([row["verdict"], *numbers]), allowed)]
+
+
+def highest_text(rows: list[dict[str, Any]]) -> str:
+    """How fast a motor got without load, of what its header allows."""
+    row = rows[-1]
+    if row["highest_rpm"] is None:
+        return "no closed loop without load"
+    return f"without load up to {row['highest_rpm']:.0f} rpm (MAXIMUM_SPEED_RPM {row['reference_rpm']:.0f})"
+
+
+def text(table: Table, candidates: list[Candidate], rows: list[dict[str, Any]]) -> str:
+    """The table as printed: a heading for each motor, then its rows."""
+    lines = report.table(rows, COLUMNS).splitlines()
+    parts = [f"{table.title}: {table.torque_percent:g} % of the rated torque", "", *lines[:3]]
+    per_motor = len(rows) // len(candidates)
+    for number, item in enumerate(candidates):
+        part = slice(number * per_motor, (number + 1) * per_motor)
+        rating = f"{item.motor.rated_speed_rpm:g} rpm, {item.motor.rated_torque_nm:.3g} N m"
+        parts += [f"{item.motor.name} ({rating}), {item.header}: {highest_text(rows[part])}", *lines[3:][part]]
+        note = command_common.header_note(item.part.values.values, item.params)
+        parts += [f"  note: {note}"] if note else []
+    return "\n".join(parts)
+
+
+def _write(folder: Path, table: Table, candidates: list[Candidate], rows: list[dict[str, Any]], outcomes: list[Outcome],
+           board: plant.Part) -> None:
+    output.write_csv(folder / "rated.csv", list(KEYS), [[row[key] for key in KEYS] for row in rows])
+    from . import plots
+    motors = [command_common.used(item.part, item.library, item.header) | {"name": item.motor.name, "rated_speed_rpm": item.motor.rated_speed_rpm,
+                                                                   "rated_torque_nm": item.motor.rated_torque_nm} for item in candidates]
+    data = {"title": table.title, "board": str(paths.shown(board.path)), "passed": all(outcome.ok for outcome in outcomes),
+            "motors": motors, "rows": rows, "expectations": [vars(outcome) for outcome in outcomes],
+            "plots": plots.write_rated(rows, vars(table), folder)}
+    output.write_summary(folder, report.clean(data))

@@ -1,0 +1,105 @@
+"""One finished simulation and what can be read from its trace: measures, hand-over, faults, protocol."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .metrics import measure_values
+from .scenario import Scenario
+from tools.common.trace import Trace
+
+HAND_OVER_BEFORE_S, HAND_OVER_AFTER_S = 0.03, 0.07
+"""The stretch around a hand-over that is kept and drawn at the full rate."""
+
+
+@dataclass(frozen=True)
+class HandOver:
+    """The moment at which the estimator takes over."""
+
+    at_s: float
+    row: int
+    after_s2_s: float
+    overshoot_percent: float
+    lowest_rpm: float
+    """lowest true speed in the direction of rotation, from 50 ms before the hand-over to 1 s after it"""
+
+
+@dataclass
+class Run:
+    """Everything that a simulation left behind."""
+
+    scenario: Scenario
+    trace: Trace
+    actions: list[tuple[float, str]] = field(default_factory=list)
+    """what the operator did: time and text"""
+    warnings: list[str] = field(default_factory=list)
+    states: dict[int, str] = field(default_factory=dict)
+    faults: dict[int, str] = field(default_factory=dict)
+    variables: dict[str, list[int]] = field(default_factory=dict)
+    params: dict[str, float] = field(default_factory=dict)
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+    motor_s: float = 0.0
+
+    @property
+    def speed_factor(self) -> float:
+        """Seconds of motor time per second of wall time, on one core."""
+        return self.motor_s / self.wall_s if self.wall_s > 0.0 else 0.0
+
+    def state_number(self, name: str) -> int:
+        """Number of a state; -1 if the firmware has no such state."""
+        return next((number for number, known in self.states.items() if known == name), -1)
+
+    def fault_number(self, name: str) -> int:
+        return next((number for number, known in self.faults.items() if known == name), -1)
+
+    def fault_changes(self) -> list[tuple[int, float, str]]:
+        """(row, time, name) whenever the fault code changes, the start included."""
+        return [(row, float(self.trace.time_s[row]), self.faults.get(int(code), f"code {int(code)}"))
+                for row, code in self._firmware_changes("fw.fault")]
+
+    def _firmware_changes(self, name: str) -> list[tuple[int, float]]:
+        """A target image without names leaves no such signals behind."""
+        return self.trace.changes(name) if name in self.trace else []
+
+    def state_changes(self) -> list[tuple[int, float, str]]:
+        """(row, time, name) whenever the drive's state changes, the start included."""
+        return [(row, float(self.trace.time_s[row]), self.states.get(int(code), f"state {int(code)}"))
+                for row, code in self._firmware_changes("fw.state")]
+
+    def press_times(self, button: str) -> list[float]:
+        return [event.at_s for event in self.scenario.events if event.kind == "press" and event.button == button]
+
+    def hand_overs(self) -> list[HandOver]:
+        """Every change from the ramp to closed loop."""
+        result = []
+        changes = self.state_changes()
+        for (_, _, before), (row, at_s, name) in zip(changes, changes[1:]):
+            if name == "CLOSED" and before == "RAMP":
+                presses = [time for time in self.press_times("S2") if time < at_s]
+                result.append(self._hand_over(row, at_s, at_s - presses[-1] if presses else float("nan")))
+        return result
+
+    def _hand_over(self, row: int, at_s: float, after_s2_s: float) -> HandOver:
+        after = self.trace.part(at_s, at_s + 1.0)
+        reference = after.column("fw.speed_ref_rpm").astype(np.float64)
+        direction = -1.0 if reference[min(1, len(reference) - 1)] < 0.0 else 1.0
+        speed = direction * after.column("plant.speed_rpm")
+        reference = np.maximum(direction * reference, 1.0)
+        still_closed = after.column("fw.state") == self.state_number("CLOSED")
+        overshoot = np.max(np.where(still_closed, (speed - reference) / reference, -1.0)) * 100.0
+        around = self.trace.part(at_s - 0.05, at_s + 1.0).column("plant.speed_rpm") * direction
+        return HandOver(at_s, row, after_s2_s, float(overshoot), float(np.min(around)))
+
+    @cached_property
+    def measures(self) -> dict[str, dict[str, Any]]:
+        """The values of every [[measure]], by name."""
+        result = {measure.name: measure_values(self.trace.part(measure.from_s, measure.to_s), measure)
+                  for measure in self.scenario.measures}
+        most = self.params.get("MAXIMUM_CURRENT_A")
+        for values in result.values():
+            if most and values["current_rms_a"] is not None:
+                values["current_of_maximum_percent"] = 100.0 * 2.0 ** 0.5 * values["current_rms_a"] / most
+        return result

@@ -1,0 +1,168 @@
+"""Runs one scenario on the virtual board and records it."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.common import motor_file, plant
+from . import panel
+from . import scenario as scenarios
+from .board import Board, BoardError, Library
+from tools.common.errors import UserError, suggestion
+from .run import Run
+from .scenario import Scenario
+from tools.common.trace import Trace
+
+CHUNK_PERIODS = 2000
+
+SIGNALS = (
+    "plant.speed_rpm", "plant.theta_e_deg", "plant.i_a", "plant.i_b", "plant.i_c", "plant.i_d", "plant.i_q", "plant.torque_nm",
+    "bus.voltage_v", "pwm.outputs_on", "pwm.outputs_seen",
+    "fw.state", "fw.fault", "fw.speed_ref_rpm", "fw.speed_est_rpm", "fw.theta_est_deg", "fw.i_d_a", "fw.i_q_a", "fw.id_ref_a",
+    "fw.iq_ref_a", "fw.iq_limit_a", "fw.v_d_v", "fw.v_q_v", "fw.v_limit_v", "fw.fw_index", "fw.inv_kphi", "fw.offset_deg")
+"""What every run records."""
+
+
+@dataclass
+class Job:
+    """A checked scenario with everything needed to run it; made by prepare()."""
+
+    scenario: Scenario
+    library: Path
+    values: dict[str, float]
+    actions: list[panel.Action]
+    signals: list[str]
+    variables: dict[str, int] = field(default_factory=dict)
+
+
+def prepare(scenario: Scenario, library: Library, motor: plant.Part, board: plant.Part, extra: plant.Values | None = None) -> Job:
+    """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
+    keys = library.keys
+    rating = rating_of(motor) if scenarios.asks_for_rating(scenario) else None
+    scenario = scenarios.in_numbers(scenario, rating, library.params)
+    layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
+    values = plant.resolve(layers, keys)
+    for event in scenario.events:
+        for key, value in event.keys.items():
+            plant.check(key, value, keys, event.where)
+    start = {key: values.get(key, 0.0) for event in scenario.events for key in event.keys}
+    actions = panel.plan(scenario, panel.Ranges.of(library.params, scenario.defines), start)
+    variables: dict[str, int] = {}
+    signals = list(SIGNALS)
+    for expectation, where in zip(scenario.expectations, scenario.expectations_where):
+        _check_names(expectation.names(), library, where)
+        signals += [name for name in expectation.signals() if name not in signals]
+        for name, count in expectation.variables().items():
+            variables[name] = max(count, variables.get(name, 0))
+    _check_signals(signals, library, scenario)
+    return Job(scenario, library.path, values, actions, signals, variables)
+
+
+def rating_of(motor: plant.Part) -> scenarios.Rating:
+    """What a hundred per cent are for this motor."""
+    data = motor_file.load(str(motor.path))
+    return scenarios.Rating(data.rated_speed_rpm, data.rated_torque_nm)
+
+
+def _check_names(names: dict[str, str], library: Library, where: str) -> None:
+    for kind, name in names.items():
+        known = (library.faults if kind == "fault" else library.states).values()
+        if name not in known:
+            raise UserError(f"the firmware knows no {kind} '{name}'", where, suggestion(name, known))
+
+
+def _check_signals(signals: list[str], library: Library, scenario: Scenario) -> None:
+    readable = [name for name, key in library.keys.items() if key.readable]
+    for name in signals:
+        if name not in readable and not name.startswith("reg."):
+            where = next((where for expectation, where in zip(scenario.expectations, scenario.expectations_where)
+                          if name in expectation.signals()), str(library.path))
+            raise UserError(f"the board has no signal '{name}'", where, suggestion(name, readable))
+
+
+def simulate(job: Job, report: Callable[[float], None]) -> Run:
+    """Run a job in this process; `report` gets the motor time that has passed since the last call."""
+    library = Library(job.library)
+    board = Board(library)
+    try:
+        return _simulate(job, library, board, report)
+    except BoardError as error:
+        raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
+    finally:
+        board.close()
+
+
+def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
+    """Run a job on a board that the caller has made and closes."""
+    return _simulate(job, library, board, report)
+
+
+def _simulate(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
+    scenario = job.scenario
+    for key, value in job.values.items():
+        board.set(key, value)
+    board.set("state.theta_e_deg", scenario.rotor_deg)
+    board.set("state.speed_rpm", scenario.speed_rpm)
+    if "bus.voltage_v" not in job.values:
+        board.set("bus.voltage_v", board.get("supply.voltage_v"))
+    recorder = _Recorder(board, job.signals, report)
+    done: list[tuple[float, str]] = [(0.0, "power-up")]
+    pending = list(job.actions)
+    while pending and pending[0].at_s <= 0.0: # in place before the firmware looks at its pins
+        _act(board, pending.pop(0), done)
+    board.power_up()
+    started, cpu_started = time.perf_counter(), time.process_time()
+    while pending:
+        recorder.run_to(pending[0].at_s)
+        _act(board, pending.pop(0), done)
+    recorder.run_to(scenario.duration_s)
+    wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
+    variables = {name: board.variable(name, count) for name, count in job.variables.items()}
+    return Run(scenario, recorder.trace(), done, board.warnings(), library.states, library.faults, variables, library.params,
+               wall_s, cpu_s, board.get("time_s"))
+
+
+def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> None:
+    for key, value in action.keys.items():
+        board.set(key, value)
+    for name, value in action.variables.items():
+        board.write_variable(name, value)
+    if action.text:
+        done.append((action.at_s, action.text))
+
+
+class _Recorder:
+    """Lets the board run and collects its trace, a chunk at a time."""
+
+    def __init__(self, board: Any, signals: list[str], report: Callable[[float], None]) -> None:
+        self.board = board
+        self.signals = signals
+        self.report = report
+        self.now_s = 0.0
+        self.period_s = 50e-6
+        self.rows: list[np.ndarray] = []
+        self.times: list[np.ndarray] = []
+        self.board.trace_start(signals, 1)
+
+    def run_to(self, until_s: float) -> None:
+        while (periods := math.ceil((until_s - self.now_s) / self.period_s - 1e-6)) > 0:
+            periods = min(periods, CHUNK_PERIODS)
+            self.board.run(periods)
+            now_s = self.board.get("time_s")
+            rows = self.board.trace_take()
+            if len(rows):
+                self.rows.append(rows)
+                self.times.append(self.now_s + (now_s - self.now_s) / len(rows) * np.arange(1, len(rows) + 1))
+            self.report(now_s - self.now_s)
+            self.period_s = (now_s - self.now_s) / periods
+            self.now_s = now_s
+
+    def trace(self) -> Trace:
+        if not self.rows:
+            return Trace(self.signals, np.empty(0), np.empty((len(self.signals), 0), dtype=np.float32))
+        return Trace(self.signals, np.concatenate(self.times), np.ascontiguousarray(np.concatenate(self.rows).T))

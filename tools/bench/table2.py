@@ -1,0 +1,138 @@
+"""`table2`: the eight rows of the note's Table 2 beside ours. The rows are data in tools/bench/scenarios/tables/table2.toml."""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tools.common import output, paths
+from . import command_common, report, simulate, sweep
+from .board import Library
+from tools.common.errors import UserError
+from .expect import Outcome
+from .sweep import limit_text
+from tools.common.plant import Part
+from .scenario import Event
+from tools.common.toml_file import Document, Section
+
+COLUMNS = (
+    ("torque_nm_set", "torque\nN m", "{:.3f}"), ("note_rpm", "note\nrpm", "{:.0f}"), ("speed_rpm", "ours\nrpm", "{:.1f}"),
+    ("speed_error_percent", "error\n%", "{:+.2f}"), ("note_current_a", "note I\nA rms", "{:.3f}"),
+    ("current_rms_a", "our I\nA rms", "{:.3f}"),
+    ("angle_error_mean_deg", "angle err\nmean deg", "{:+.2f}"), ("angle_error_rms_deg", "angle err\nrms deg", "{:.2f}"),
+    ("voltage_v", "voltage\nV", "{:.2f}"), ("voltage_percent", "of limit\n%", "{:.0f}"), ("limit", "\nlimited by", "{}"))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the note's table, and what must hold for it."""
+
+    reference_rpm: float
+    torque_nm: float
+    note_rpm: float
+    note_current_a: float
+    error_percent: float
+    no_more_current: bool
+    where: str
+
+    @classmethod
+    def read(cls, section: Section) -> "Row":
+        row = cls(section.number("reference_rpm", minimum=1.0), section.number("torque_nm", minimum=0.0),
+                  section.number("note_rpm", minimum=0.0), section.number("note_current_a", minimum=0.0),
+                  section.number("error_percent", minimum=0.0), section.flag("no_more_current", True), section.where("reference_rpm"))
+        section.close()
+        return row
+
+
+@dataclass
+class Table:
+    """tables/table2.toml."""
+
+    title: str
+    motor: str
+    board: str
+    start_s: float
+    torque_from_s: float
+    torque_over_s: float
+    measure_from_s: float
+    measure_to_s: float
+    rows: list[Row]
+    motor_where: str = ""
+    board_where: str = ""
+
+    @classmethod
+    def read(cls, path: Path) -> "Table":
+        document = Document(path)
+        root = document.root
+        numbers = [root.number(key, minimum=0.0) for key in
+                   ("start_s", "torque_from_s", "torque_over_s", "measure_from_s", "measure_to_s")]
+        table = cls(root.text("title"), root.text("motor"), root.text("board"), *numbers,
+                    [Row.read(section) for section in root.sections("row")], root.where("motor"), root.where("board"))
+        root.close()
+        if not table.start_s < table.torque_from_s < table.measure_from_s < table.measure_to_s:
+            raise UserError("the times are not in order", document.label, "start_s < torque_from_s < measure_from_s < measure_to_s")
+        if not table.rows:
+            raise UserError("no rows", document.label, "add [[row]]")
+        return table
+
+
+def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = sweep.run_cases) -> int:
+    """The whole command; returns the exit code. `run_cases` runs the jobs."""
+    table = Table.read(paths.TABLES / "table2.toml")
+    motor, board = command_common.parts_of(table, options)
+    library = command_common.library_for([], options.library, options.userparams)
+    used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
+    jobs = [_job(table, row, library, motor, board) for row in table.rows]
+    target = options.out or paths.RESULTS / "table2"
+    with output.ResultFolder(target) as folder:
+        with command_common.Progress("table2", table.measure_to_s * len(jobs), options.quiet) as progress:
+            results = run_cases(jobs, progress)
+        rows = [_result(row, result) for row, result in zip(table.rows, results)]
+        outcomes = [outcome for row, result in zip(table.rows, rows) for outcome in check(row, result)]
+        _write(folder.work, table, rows, outcomes, used, board)
+    print(f"{table.title}\n\n{report.used_text(used)}\n")
+    print(report.table(rows, COLUMNS))
+    print("\n" + report.outcomes_text(outcomes))
+    print(f"\nresults in {paths.shown(target)}/")
+    return command_common.verdict("table2", outcomes)
+
+
+def _job(table: Table, row: Row, library: Library, motor: Part, board: Part) -> simulate.Job:
+    nominal = library.params.get("NOMINAL_SPEED_RPM", 0.0)
+    events = sweep.start_events(table.start_s, row.reference_rpm, nominal, row.where)
+    events.append(Event(table.torque_from_s, "set", row.where, keys={"load.constant_nm": row.torque_nm},
+                        over_s=table.torque_over_s))
+    scenario = sweep.scenario(f"{row.reference_rpm:g} rpm", table.title, events, row.reference_rpm, table.measure_from_s,
+                               table.measure_to_s)
+    return simulate.prepare(scenario, library, motor, board)
+
+
+def _result(row: Row, result: dict[str, Any]) -> dict[str, Any]:
+    """A row of the printed table: the note's numbers and ours."""
+    return {"name": f"{row.reference_rpm:.0f} rpm", "reference_rpm": row.reference_rpm, "torque_nm_set": row.torque_nm,
+            "note_rpm": row.note_rpm, "note_current_a": row.note_current_a, **result, "limit": limit_text(result)}
+
+
+def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
+    """What must hold for one row."""
+    name = f"{row.reference_rpm:g} rpm, {row.torque_nm:g} N m"
+    got = f"{result['speed_rpm']:.1f} rpm" + (f", fault {result['fault']}" if result["fault"] else "")
+    error = result["speed_error_percent"]
+    ok = error is not None and abs(error) <= row.error_percent and not result["fault"]
+    outcomes = [Outcome(f"{name}: speed", ok, got, f"{row.reference_rpm:g} rpm +- {row.error_percent:g} %")]
+    if row.no_more_current:
+        current = result["current_rms_a"]
+        outcomes.append(Outcome(f"{name}: current", current is not None and current <= row.note_current_a,
+                                "nothing" if current is None else f"{current:.3f} A RMS", f"at most the note's {row.note_current_a:g} A"))
+    return outcomes
+
+
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
+    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
+    output.write_csv(folder / "table2.csv", keys, [[row[key] for key in keys] for row in rows])
+    from . import plots
+    data = {"title": table.title, **used, "board": str(paths.shown(board.path)),
+            "passed": all(outcome.ok for outcome in outcomes), "rows": rows, "expectations": [vars(outcome) for outcome in outcomes],
+            "plots": plots.write_table2(rows, folder)}
+    output.write_summary(folder, report.clean(data))

@@ -1,0 +1,154 @@
+"""Board files: supply, bridge, shunts, converter, PWM and limits; the tuner and the virtual board read the same numbers.
+
+    title = "..."
+    [supply] voltage, resistance, sinks = false      [bus] capacitance, load
+    [inverter] rds_on, diode_voltage, trip_current   [shunt] resistance, amplifier_gain, reference, settle, inverted = true
+    [adc] bits, full_scale, bus_divider, noise       [pwm] period, dead_time, sample_window
+    [limits] over_voltage, under_voltage, regen      [plant] further keys of the virtual board, by key
+
+Every number is { value = ..., unit = "...", source = "..." }. Nothing is said twice: the current at the end of the converter's range
+is reference / (resistance * gain), the bus voltage there is full_scale * divider."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import paths, units
+from .errors import UserError
+from .motor_file import read_safely
+from .toml_file import Section, flatten
+from .units import Conversion, Kind, Quantity
+from .plant_overrides import Values
+
+_VOLT = {"V": Conversion(1.0), "mV": Conversion(1e-3)}
+_OHM = {"ohm": Conversion(1.0), "mohm": Conversion(1e-3)}
+_TIME = {"s": Conversion(1.0), "ms": Conversion(1e-3), "us": Conversion(1e-6), "ns": Conversion(1e-9)}
+_AMPERE = {"A": Conversion(1.0), "mA": Conversion(1e-3)}
+_ONE = {"1": Conversion(1.0)}
+
+TABLES: dict[str, dict[str, tuple[str, Kind]]] = {
+    "supply": {"voltage": ("supply.voltage_v", Kind("V", 6.0, 60.0, _VOLT)),
+               "resistance": ("supply.resistance_ohm", Kind("ohm", 0.001, 10.0, _OHM))},
+    "bus": {"capacitance": ("bus.capacitance_f", Kind("F", 1e-6, 1.0, {"F": Conversion(1.0), "mF": Conversion(1e-3), "uF": Conversion(1e-6)})),
+            "load": ("bus.load_a", Kind("A", 0.0, 10.0, _AMPERE))},
+    "inverter": {"rds_on": ("inverter.rds_on_ohm", Kind("ohm", 1e-4, 1.0, _OHM)),
+                 "diode_voltage": ("inverter.diode_v", Kind("V", 0.0, 2.0, _VOLT)),
+                 "trip_current": ("inverter.trip_a", Kind("A", 0.0, 100.0, _AMPERE))},
+    "shunt": {"resistance": ("shunt.ohm", Kind("ohm", 1e-4, 1.0, _OHM)), "amplifier_gain": ("", Kind("1", 1.0, 500.0, _ONE)),
+              "reference": ("shunt.reference_v", Kind("V", 0.1, 3.2, _VOLT)),
+              "settle": ("shunt.settle_s", Kind("s", 0.0, 1e-4, _TIME))},
+    "adc": {"full_scale": ("", Kind("V", 1.0, 5.5, _VOLT)), "bus_divider": ("adc.vbus_ratio", Kind("1", 1.0, 100.0, _ONE)),
+            "noise": ("adc.noise_lsb", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}))},
+    "pwm": {"period": ("", Kind("s", 40e-6, 140e-6, _TIME)), "dead_time": ("", Kind("s", 0.5e-6, 3e-6, _TIME)),
+            "sample_window": ("", Kind("s", 1.5e-6, 4e-6, _TIME))},
+    "limits": {"over_voltage": ("", Kind("V", 6.0, 100.0, _VOLT)), "under_voltage": ("", Kind("V", 3.0, 60.0, _VOLT)),
+               "regen": ("", Kind("V", 6.0, 100.0, _VOLT))}}
+"""Table and key of the file: key of the virtual board ("" for what only the firmware needs to know) and what it may be."""
+
+OTHERS = {"supply": ("sinks",), "shunt": ("inverted",), "adc": ("bits",)}
+"""Keys without a unit: true or false, and a count."""
+
+
+@dataclass(frozen=True)
+class BoardFile:
+    """A board in SI units."""
+
+    name: str
+    path: Path
+    title: str
+    pwm_period_s: float
+    dead_time_s: float
+    sample_window_s: float
+    nominal_bus_v: float
+    bus_full_scale_v: float
+    """Bus voltage at the end of the converter's range."""
+    current_full_scale_a: float
+    """Phase current at the end of the converter's range; divided by 32768 it is NORM_CURRENT_CONST."""
+    current_gain: float
+    """KCURRA and KCURRB of the note: 0.5 is gain 1; negative if the amplifier's output falls with current into the motor."""
+    rds_on_ohm: float
+    shunt_ohm: float
+    over_voltage_v: float
+    under_voltage_v: float
+    regen_limit_v: float
+    adc_bits: int
+    quantities: dict[str, Quantity]
+    """Every number of the file by table and key, e.g. "pwm.period"."""
+    values: Values
+
+    def plant_values(self) -> Values:
+        """Keys of the virtual board; each `where` is the line of the number."""
+        return self.values
+
+
+def load(name_or_path: str, where: str = "") -> BoardFile:
+    """tuning/boards/NAME.toml or a path; `where` says who asked for it, for the error about a name that does not exist."""
+    return read_safely(paths.find("board", name_or_path, paths.BOARDS, where), _read)
+
+
+def _read(root: Section) -> BoardFile:
+    root.close({"title", "plant", *TABLES})
+    title = root.text("title")
+    found: dict[str, Quantity] = {}
+    values = Values()
+    inverted = False
+    for table, keys in TABLES.items():
+        section = root.section(table)
+        if section is None:
+            raise UserError(f"the table [{table}] is missing", root.document.label, "add it with " + ", ".join(keys))
+        section.close({*keys, *OTHERS.get(table, ())})
+        _read_table(section, table, keys, found, values)
+        if table == "supply":
+            values.add("supply.sinks", float(section.flag("sinks")), section.where("sinks"))
+        if table == "shunt":
+            inverted = section.flag("inverted")
+        if table == "adc":
+            found["adc.bits"] = units.read_count(section, "bits", 8, 16, "bits")
+    volts_per_ampere = found["shunt.resistance"].value_si * found["shunt.amplifier_gain"].value_si
+    values.add("shunt.gain_v_per_a", volts_per_ampere, found["shunt.amplifier_gain"].where)
+    _read_plant(root.section("plant"), values)
+    board = _board(root.document.path, title, found, values, inverted, volts_per_ampere)
+    _check(board)
+    return board
+
+
+def _read_table(section: Section, table: str, keys: dict[str, tuple[str, Kind]], found: dict[str, Quantity], values: Values) -> None:
+    for key, (plant_key, kind) in keys.items():
+        quantity = units.read(section, key, kind)
+        found[f"{table}.{key}"] = quantity
+        if plant_key:
+            values.add(plant_key, quantity.value_si, quantity.where)
+
+
+def _read_plant(section: Section | None, values: Values) -> None:
+    if section is None:
+        return
+    for key, value in flatten(section).items():
+        if key in values.values:
+            raise section.fail(key, f"'{key}' stands in another table of this file", "change the number there")
+        if key.startswith(("motor.", "mech.")):
+            raise section.fail(key, f"'{key}' is no key of a board", "write it into the motor file")
+        values.add(key, value, section.where(key))
+
+
+def _board(path: Path, title: str, found: dict[str, Quantity], values: Values, inverted: bool, volts_per_ampere: float) -> BoardFile:
+    si = {name: quantity.value_si for name, quantity in found.items()}
+    return BoardFile(
+        name=path.stem, path=path, title=title, pwm_period_s=si["pwm.period"], dead_time_s=si["pwm.dead_time"],
+        sample_window_s=si["pwm.sample_window"], nominal_bus_v=si["supply.voltage"],
+        bus_full_scale_v=si["adc.full_scale"] * si["adc.bus_divider"], current_full_scale_a=si["shunt.reference"] / volts_per_ampere,
+        current_gain=-0.5 if inverted else 0.5, rds_on_ohm=si["inverter.rds_on"], shunt_ohm=si["shunt.resistance"],
+        over_voltage_v=si["limits.over_voltage"], under_voltage_v=si["limits.under_voltage"], regen_limit_v=si["limits.regen"],
+        adc_bits=int(si["adc.bits"]), quantities=found, values=values)
+
+
+def _check(board: BoardFile) -> None:
+    where = {name: quantity.where for name, quantity in board.quantities.items()}
+    full_scale_v = board.quantities["adc.full_scale"].value_si
+    reference_v = board.quantities["shunt.reference"].value_si
+    if not 0.45 <= reference_v / full_scale_v <= 0.55:
+        raise UserError(f"reference = {reference_v:g} V is not the middle of the converter's {full_scale_v:g} V", where["shunt.reference"],
+                        "a current in both directions needs the middle")
+    if not board.under_voltage_v < board.nominal_bus_v < board.regen_limit_v < board.over_voltage_v < board.bus_full_scale_v:
+        raise UserError("under_voltage, supply voltage, regen, over_voltage and the converter's bus range do not rise in this order",
+                        where["limits.over_voltage"], f"they are {board.under_voltage_v:g}, {board.nominal_bus_v:g}, {board.regen_limit_v:g}, "
+                        f"{board.over_voltage_v:g} and {board.bus_full_scale_v:g} V")

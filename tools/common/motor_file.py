@@ -1,0 +1,386 @@
+"""Motor files: the numbers of a data sheet with unit and source, turned into one star phase in SI, and checked for sense.
+
+    title = "Hurst DMB0224C10002"
+    connection = "Y"                 or "delta": counts for values "winding"
+
+    [electrical]                     every number: { value = ..., unit = "...", source = "..." }; units.py lists the units
+    pole_pairs = { value = 5, source = "..." }
+    resistance = { value = 5.34, unit = "ohm line-to-line", at_degc = 25, source = "..." }
+    inductance = { value = 3.84, unit = "mH line-to-line", frequency_hz = 1000, source = "..." }
+                                     or inductance_d and inductance_q, if they differ
+    kphi = { value = 7.24, unit = "V peak line-to-line/krpm", at_degc = 25, source = "..." }
+    resistance_tempco = ...          optional, copper if not given
+    kphi_tempco = ...                optional, ferrite magnets if not given
+
+    [mechanical]
+    inertia = ...
+    viscous_friction = ...           optional, as is coulomb_friction
+
+    [rating]
+    voltage, current, torque, speed; maximum_speed (what the user wants to reach, with field weakening if need be);
+    maximum_current                  optional, 1.5 times current if not given
+
+    [spread]                         optional: what other sheets and measurements say of resistance, inductance, kphi
+    kphi = { values = [7.24, 7.57], unit = "...", source = "..." }
+
+    [load]                           optional: inertia and start_torque of what the motor drives; a source is not needed
+    [tune]                           optional: values of userparams.h that replace the ones the tuner would choose
+    [plant]                          optional: keys of the virtual board that no sheet gives, e.g. "motor.sat_lq_ratio" = 0.2
+"""
+
+import functools
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from . import paths, units
+from .errors import UserError, suggestion
+from .toml_file import Document, Section, flatten
+from .units import Quantity
+from .plant_overrides import Values
+
+COPPER_PER_K = 0.0039
+FERRITE_PER_K = -0.002
+LARGEST_FILE = 65536
+PLANT_TABLES = ("motor.", "mech.")
+DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "motor.r_tempco", "motor.psi_tempco",
+                "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm")
+
+TABLES = {"electrical": ("pole_pairs", "resistance", "inductance", "inductance_d", "inductance_q", "kphi", "resistance_tempco",
+                         "kphi_tempco"),
+          "mechanical": ("inertia", "viscous_friction", "coulomb_friction"),
+          "rating": ("voltage", "current", "torque", "speed", "maximum_speed", "maximum_current"),
+          "spread": ("resistance", "inductance", "kphi"), "load": ("inertia", "start_torque"), "tune": None, "plant": None}
+"""Tables of a motor file with their keys; None: any key, checked elsewhere."""
+
+FACTS = {"NOPOLESPAIRS": "[electrical] pole_pairs", "MOTOR_RS_OHM": "[electrical] resistance", "MOTOR_LS_MH": "[electrical] inductance",
+         "MOTOR_KPHI_V_PER_KRPM": "[electrical] kphi", "MOTOR_INERTIA_KGM2": "[mechanical] inertia",
+         "MAXIMUM_SPEED_RPM": "[rating] maximum_speed", "MAXIMUM_CURRENT_A": "[rating] maximum_current",
+         "NOMINAL_BUS_V": "the board file", "LOOPTIME_SEC": "the board file", "DEADTIME_SEC": "the board file",
+         "SAMPLE_WINDOW_SEC": "the board file", "NORM_CURRENT_CONST": "the board file", "KCURRA": "the board file",
+         "KCURRB": "the board file", "BUS_FULL_SCALE_V": "the board file"}
+"""What userparams.h holds but [tune] may not: it is said elsewhere."""
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A motor in SI units; impedances and flux are those of one phase of the star with the same terminals, at 25 degC."""
+
+    name: str
+    path: Path
+    title: str
+    connection: str
+    pole_pairs: int
+    rs_ohm: float
+    ld_h: float
+    lq_h: float
+    psi_vs: float
+    """Flux linkage of a phase: peak back-EMF per electrical rad/s."""
+    kphi_v_per_krpm: float
+    """Peak line-to-line back-EMF at 1000 mechanical rpm."""
+    resistance_tempco_per_k: float
+    kphi_tempco_per_k: float
+    inductance_frequency_hz: float | None
+    inertia_kgm2: float
+    viscous_nms: float
+    coulomb_nm: float
+    rated_voltage_v: float
+    rated_current_a: float
+    """Peak of a phase current, as all currents here."""
+    rated_torque_nm: float
+    rated_speed_rpm: float
+    maximum_speed_rpm: float
+    maximum_current_a: float
+    load_inertia_kgm2: float
+    start_torque_nm: float
+    """What the shaft carries while starting, friction of the motor not included."""
+    tune: dict[str, float]
+    spread: dict[str, tuple[float, float]]
+    """Smallest and largest published value of rs_ohm, ls_h, kphi_v_per_krpm, if the file has them."""
+    quantities: dict[str, Quantity]
+    """Every number that the file gives, by the name it has there."""
+    plant_extra: Values
+
+    @property
+    def kt_nm_per_a(self) -> float:
+        """Torque per ampere of peak phase current: 3/2 P psi."""
+        return 1.5 * self.pole_pairs * self.psi_vs
+
+    @property
+    def salient(self) -> bool:
+        """True if the two inductances differ."""
+        return self.ld_h != self.lq_h
+
+    def plant_values(self) -> Values:
+        """Keys of the virtual board; each `where` is the line of the number that it follows from."""
+        result = Values()
+        for key, value, origin in (
+                ("motor.rs_ohm", self.rs_ohm, "resistance"), ("motor.ld_h", self.ld_h, "inductance_d"),
+                ("motor.lq_h", self.lq_h, "inductance_q"), ("motor.psi_vs", self.psi_vs, "kphi"),
+                ("motor.pole_pairs", float(self.pole_pairs), "pole_pairs"),
+                ("motor.r_tempco", self.resistance_tempco_per_k, "resistance_tempco"),
+                ("motor.psi_tempco", self.kphi_tempco_per_k, "kphi_tempco"),
+                ("mech.inertia_kgm2", self.inertia_kgm2 + self.load_inertia_kgm2, "inertia"),
+                ("mech.viscous_nms", self.viscous_nms, "viscous_friction"), ("mech.coulomb_nm", self.coulomb_nm, "coulomb_friction")):
+            quantity = self.quantities.get(origin) or self.quantities.get("inductance" if origin.startswith("inductance") else "")
+            result.add(key, value, quantity.where if quantity else str(paths.shown(self.path)))
+        for key, value in self.plant_extra.values.items():
+            result.add(key, value, self.plant_extra.where[key])
+        return result
+
+
+def load(name_or_path: str, where: str = "") -> Motor:
+    """tuning/motors/NAME.toml or a path; `where` says who asked for it, for the error about a name that does not exist."""
+    path = paths.find("motor", name_or_path, paths.MOTORS, where)
+    return read_safely(path, _read)
+
+
+def read_safely(path: Path, reader: Callable[[Section], Any]) -> Any:
+    """What `reader` makes of a file's root table; a file beyond all bounds is a UserError, too."""
+    label = str(paths.shown(path))
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise UserError("the file is too large", label, f"give a file of at most {LARGEST_FILE // 1024} KiB")
+        return reader(Document(path).root)
+    except OSError as error:
+        raise UserError(f"cannot read the file ({error.strerror})", label, "give a readable TOML file") from None
+    except RecursionError: # a key with thousands of dots
+        raise UserError("tables too deep", label, "write keys as a data sheet's names") from None
+
+
+class _Reader:
+    """Collects the quantities of a file by name."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, Quantity] = {}
+
+    def need(self, section: Section, key: str, kind: units.Kind, extra: tuple[str, ...] = ()) -> float:
+        self.found[key] = units.read(section, key, kind, extra=extra)
+        return self.found[key].value_si
+
+    def may(self, section: Section, key: str, kind: units.Kind, default: float) -> float:
+        return self.need(section, key, kind) if key in section else default
+
+
+def _tables(root: Section) -> dict[str, Section | None]:
+    """All tables, present or not; unknown tables and keys come first, for a slip of the pen makes another one missing."""
+    root.close({"title", "connection", *TABLES})
+    sections = {name: root.section(name) for name in TABLES}
+    for name, section in sections.items():
+        keys = TABLES[name]
+        if section is not None and keys is not None:
+            section.close(set(keys))
+        elif section is None and name in ("electrical", "mechanical", "rating"):
+            raise UserError(f"the table [{name}] is missing", root.document.label, "add it with " + ", ".join(keys or ()))
+    return sections
+
+
+def _read(root: Section) -> Motor:
+    tables = _tables(root)
+    title, connection = root.text("title"), root.choice("connection", ("Y", "delta"))
+    electrical, mechanical, rating = (tables[name] for name in ("electrical", "mechanical", "rating"))
+    assert electrical and mechanical and rating
+    reader = _Reader()
+    values = _read_electrical(electrical, connection, reader)
+    values["inertia_kgm2"] = reader.need(mechanical, "inertia", units.INERTIA)
+    values["viscous_nms"] = reader.may(mechanical, "viscous_friction", units.VISCOUS, 0.0)
+    values["coulomb_nm"] = reader.may(mechanical, "coulomb_friction", units.FRICTION, 0.0)
+    values |= _read_rating(rating, reader)
+    values |= _read_load(tables["load"], values["rated_torque_nm"], reader)
+    path = root.document.path
+    motor = Motor(name=path.stem, path=path, title=title, connection=connection, quantities=reader.found,
+                  spread=_read_spread(tables["spread"], connection, values["pole_pairs"]), tune=_read_tune(tables["tune"]),
+                  plant_extra=_read_plant(tables["plant"]), **values)
+    _check(motor)
+    return motor
+
+
+def _read_electrical(section: Section, connection: str, reader: _Reader) -> dict[str, Any]:
+    reader.found["pole_pairs"] = units.read_count(section, "pole_pairs", 1, 50, "pole pairs")
+    pole_pairs = int(reader.found["pole_pairs"].value_si)
+    r_tempco = reader.may(section, "resistance_tempco", units.RESISTANCE_TEMPCO, COPPER_PER_K)
+    psi_tempco = reader.may(section, "kphi_tempco", units.KPHI_TEMPCO, FERRITE_PER_K)
+    rs_ohm = reader.need(section, "resistance", units.resistance(connection), extra=("at_degc",))
+    rs_ohm /= 1.0 + r_tempco * _above_25(section, "resistance")
+    kphi = reader.need(section, "kphi", units.kphi(connection, pole_pairs), extra=("at_degc",))
+    kphi /= 1.0 + psi_tempco * _above_25(section, "kphi")
+    ld_h, lq_h, frequency_hz = _read_inductance(section, connection, reader)
+    return {"pole_pairs": pole_pairs, "rs_ohm": rs_ohm, "ld_h": ld_h, "lq_h": lq_h, "inductance_frequency_hz": frequency_hz,
+            "kphi_v_per_krpm": kphi, "psi_vs": kphi / (units.SQRT3 * units.KRPM * pole_pairs),
+            "resistance_tempco_per_k": r_tempco, "kphi_tempco_per_k": psi_tempco}
+
+
+def _read_inductance(section: Section, connection: str, reader: _Reader) -> tuple[float, float, float | None]:
+    both = [key for key in ("inductance_d", "inductance_q") if key in section]
+    if both and "inductance" in section:
+        raise section.fail("inductance", f"'inductance' and '{both[0]}' together", "give either one or d and q")
+    kind = units.inductance(connection)
+    keys = ("inductance_d", "inductance_q") if both else ("inductance",)
+    found = [reader.need(section, key, kind, extra=("frequency_hz",)) for key in keys]
+    return found[0], found[-1], units.detail(section, keys[0], "frequency_hz", None, 1.0, 1e6)
+
+
+def _above_25(section: Section, key: str) -> float:
+    at_degc = units.detail(section, key, "at_degc", units.REFERENCE_DEGC, -40.0, 155.0)
+    return (at_degc or 0.0) - units.REFERENCE_DEGC
+
+
+def _read_rating(section: Section, reader: _Reader) -> dict[str, float]:
+    result = {name: reader.need(section, key, kind) for name, key, kind in (
+        ("rated_voltage_v", "voltage", units.VOLTAGE), ("rated_current_a", "current", units.CURRENT),
+        ("rated_torque_nm", "torque", units.TORQUE), ("rated_speed_rpm", "speed", units.SPEED),
+        ("maximum_speed_rpm", "maximum_speed", units.SPEED))}
+    result["maximum_current_a"] = reader.may(section, "maximum_current", units.CURRENT, 1.5 * result["rated_current_a"])
+    return result
+
+
+def _read_load(section: Section | None, rated_torque_nm: float, reader: _Reader) -> dict[str, float]:
+    result = {"load_inertia_kgm2": 0.0, "start_torque_nm": 0.25 * rated_torque_nm}
+    if section is None:
+        return result
+    for name, key, kind in (("load_inertia_kgm2", "inertia", units.LOAD_INERTIA), ("start_torque_nm", "start_torque", units.FRICTION)):
+        if key in section:
+            quantity = units.read(section, key, kind, source="the user's load")
+            reader.found["load_inertia" if key == "inertia" else key] = quantity
+            result[name] = quantity.value_si
+    return result
+
+
+def _read_spread(section: Section | None, connection: str, pole_pairs: int) -> dict[str, tuple[float, float]]:
+    result: dict[str, tuple[float, float]] = {}
+    if section is None:
+        return result
+    for name, key, kind in (("rs_ohm", "resistance", units.resistance(connection)), ("ls_h", "inductance", units.inductance(connection)),
+                            ("kphi_v_per_krpm", "kphi", units.kphi(connection, pole_pairs))):
+        if key in section:
+            result[name] = units.read_pair(section, key, kind)
+    return result
+
+
+@functools.cache
+def tune_ranges() -> dict[str, tuple[str, float, float]]:
+    """Unit, minimum and maximum of every name in userparams.h, from include/drive/param_table.h."""
+    text = (paths.ROOT / "include" / "drive" / "param_table.h").read_text(encoding="utf-8")
+    number = r"([-+0-9.eE]+)"
+    result: dict[str, tuple[str, float, float]] = {}
+    for stem, unit, low, high in re.findall(rf"PARAM_TABLE_FW\(X, (\w+), \"([^\"]*)\", {number}, {number}\)", text):
+        result.update({f"{stem}{i}": (unit, float(low), float(high)) for i in range(18)})
+    for name, unit, low, high in re.findall(rf"X\((\w+), \"([^\"]*)\", {number}, {number}\)", text):
+        result[name] = (unit, float(low), float(high))
+    return result
+
+
+def _read_tune(section: Section | None) -> dict[str, float]:
+    result: dict[str, float] = {}
+    if section is None:
+        return result
+    ranges = tune_ranges()
+    for name in section.data:
+        if name in FACTS:
+            raise section.fail(name, f"'{name}' is no choice of the tuner", f"it follows from {FACTS[name]}; change that")
+        if name not in ranges:
+            raise section.fail(name, f"'{name}' is no parameter of userparams.h", suggestion(name, set(ranges) - set(FACTS)))
+        _, low, high = ranges[name]
+        result[name] = section.number(name, minimum=low, maximum=high)
+    return result
+
+
+@functools.cache
+def plant_ranges() -> dict[str, tuple[str, float, float]]:
+    """Unit, minimum and maximum of the virtual board's keys of a motor, from its source: what runs only when it is built knows too late."""
+    text = (paths.ROOT / "tools" / "board" / "vb_keys.c").read_text(encoding="utf-8")
+    rows = re.findall(r'\b[PI]\("((?:motor|mech)\.\w+)", [\w.]+, \S+, (\S+), (\S+), "([^"]*)"', text)
+    return {name: (unit, float(low), float(high)) for name, low, high, unit in rows}
+
+
+def _read_plant(section: Section | None) -> Values:
+    if section is None:
+        return Values()
+    result, ranges = Values(), plant_ranges()
+    for key, value in flatten(section).items():
+        if key in DERIVED_KEYS:
+            raise section.fail(key, f"'{key}' stands in another table of this file", "change the number there")
+        if not key.startswith(PLANT_TABLES):
+            raise section.fail(key, f"'{key}' is no key of the motor", "use motor.* and mech.* only, see `python3 -m tools.bench keys`")
+        if key not in ranges:
+            raise section.fail(key, f"unknown key '{key}'", suggestion(key, set(ranges) - set(DERIVED_KEYS)))
+        unit, low, high = ranges[key]
+        if not low <= value <= high:
+            raise section.fail(key, f"'{key}' = {value:g} is impossible", f"choose {low:g} .. {high:g} {unit}".rstrip())
+        result.add(key, value, section.where(key))
+    return result
+
+
+def _check(motor: Motor) -> None:
+    """Numbers that do not fit each other are nearly always a wrong unit or a slipped power of ten."""
+
+    def fail(key: str, what: str, remedy: str) -> UserError:
+        quantity = motor.quantities.get(key) or motor.quantities.get("inductance_q")
+        return UserError(what, quantity.where if quantity else str(paths.shown(motor.path)), remedy)
+
+    rated_rad_s = motor.rated_speed_rpm * units.RPM
+    time_constant_s = motor.lq_h / motor.rs_ohm
+    if not 2e-5 <= time_constant_s <= 0.05:
+        raise fail("inductance", f"L/R = {time_constant_s * 1e3:.3g} ms is implausible", "0.02 .. 50 ms are usual; check both units")
+    if not 0.5 <= motor.lq_h / motor.ld_h <= 5.0:
+        raise fail("inductance_q", f"Lq/Ld = {motor.lq_h / motor.ld_h:.3g} is implausible", "0.5 .. 5 are usual; check both units")
+    emf_v = motor.kphi_v_per_krpm * motor.rated_speed_rpm / 1000.0
+    if not 0.25 <= emf_v / motor.rated_voltage_v <= 1.25:
+        raise fail("kphi", f"the back-EMF at rated speed, {emf_v:.3g} V peak line to line, does not suit {motor.rated_voltage_v:g} V",
+                   "0.25 .. 1.25 of it are usual; check the units of kphi, speed and voltage")
+    torque_nm = motor.kt_nm_per_a * motor.rated_current_a
+    if not 0.5 <= torque_nm / motor.rated_torque_nm <= 2.0:
+        raise fail("torque", f"rated torque is {motor.rated_torque_nm:.3g} N m, but kphi and rated current give {torque_nm:.3g} N m",
+                   "probably a wrong unit of torque, current or kphi")
+    drop_v = units.SQRT3 * motor.rs_ohm * motor.rated_current_a
+    if drop_v > motor.rated_voltage_v:
+        raise fail("resistance", f"the rated current needs {drop_v:.3g} V for the resistance alone",
+                   f"that is more than the rated {motor.rated_voltage_v:g} V; check the units of resistance and current")
+    friction_nm = motor.coulomb_nm + motor.viscous_nms * rated_rad_s
+    if friction_nm > motor.rated_torque_nm:
+        key = "coulomb_friction" if motor.coulomb_nm > motor.rated_torque_nm / 2.0 else "viscous_friction"
+        raise fail(key, f"friction at rated speed, {friction_nm:.3g} N m, exceeds the rated torque", "check the unit of friction")
+    acceleration_s = motor.inertia_kgm2 * rated_rad_s / motor.rated_torque_nm
+    if not 1e-3 <= acceleration_s <= 5.0:
+        raise fail("inertia", f"rated torque would bring the bare rotor to rated speed in {acceleration_s:.3g} s",
+                   "0.001 .. 5 s are usual; check the unit of inertia")
+    _check_limits(motor, fail)
+
+
+def _check_limits(motor: Motor, fail: Callable[[str, str, str], UserError]) -> None:
+    if motor.maximum_speed_rpm < motor.rated_speed_rpm:
+        raise fail("maximum_speed", f"maximum_speed = {motor.maximum_speed_rpm:g} rpm is below the rated {motor.rated_speed_rpm:g} rpm",
+                   "raise it, or lower speed")
+    if not 0.2 * motor.rated_current_a <= motor.maximum_current_a <= 10.0 * motor.rated_current_a:
+        raise fail("maximum_current", f"maximum_current = {motor.maximum_current_a:.3g} A peak beside a rated {motor.rated_current_a:.3g} A peak",
+                   "choose 0.2 .. 10 times the rated current; check both units")
+    most_nm = motor.kt_nm_per_a * motor.maximum_current_a
+    if motor.start_torque_nm > most_nm:
+        raise fail("start_torque", f"start_torque = {motor.start_torque_nm:.3g} N m is more than maximum_current gives, {most_nm:.3g} N m",
+                   "lower it, or raise maximum_current")
+    for key, name, value in (("rs_ohm", "resistance", motor.rs_ohm), ("ls_h", "inductance", motor.lq_h),
+                             ("kphi_v_per_krpm", "kphi", motor.kphi_v_per_krpm)):
+        low, high = motor.spread.get(key, (value, value))
+        if not 0.999 * low <= value <= 1.001 * high:
+            raise fail(name, f"'{name}' is outside its own [spread] {low:.4g} .. {high:.4g}", "widen the spread, or check the units")
+
+
+def listing(motors: list[Motor]) -> str:
+    """A table of motors, as `make list-motors` prints it."""
+    head = ("name", "winding", "pole pairs", "R ohm", "L mH", "Kphi V/krpm", "Kt N m/A", "rated", "maximum", "unchecked numbers")
+    rows = [_row(motor) for motor in motors]
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in [head, *rows]]
+    return "\n".join(lines + ["R and L of one star phase at 25 degC; Kphi peak line to line; currents and Kt per ampere peak"])
+
+
+def _row(motor: Motor) -> tuple[str, ...]:
+    inductance = f"{motor.ld_h * 1e3:.3f}" + (f"/{motor.lq_h * 1e3:.3f}" if motor.salient else "")
+    marked = sum(quantity.unchecked for quantity in motor.quantities.values())
+    return (motor.name, motor.connection, str(motor.pole_pairs), f"{motor.rs_ohm:.3f}", inductance, f"{motor.kphi_v_per_krpm:.3f}",
+            f"{motor.kt_nm_per_a:.4f}", f"{motor.rated_voltage_v:g} V, {motor.rated_speed_rpm:g} rpm, {motor.rated_torque_nm:.3g} N m, "
+            f"{motor.rated_current_a:.2f} A", f"{motor.maximum_speed_rpm:g} rpm, {motor.maximum_current_a:.2f} A",
+            f"{marked} of {len(motor.quantities)}")

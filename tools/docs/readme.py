@@ -1,0 +1,142 @@
+"""Fills the tables of README.md from the results in build/run/: `make readme` runs what they need first."""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+README = ROOT / "README.md"
+PICTURES = {"run/demo/speed.png": "demo-speed.png", "run/demo/field_weakening.png": "demo-field-weakening.png",
+            "tune-fw/hurst_dmb0224c10002/over_speed.png": "tuning-fw.png", "run/robust/margins.png": "tuning-margins.png"}
+
+
+def result(name: str, folder: str = "run") -> dict:
+    path = ROOT / "build" / folder / name / "summary.json"
+    try:
+        return json.loads(path.read_text())
+    except OSError:
+        sys.exit(f"foc33: no results, {path.relative_to(ROOT)}: run `make readme`, which makes them")
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def demo() -> str:
+    rows = [[m["name"], f"{m['reference_rpm']:.0f}", f"{m['speed_rpm']:.1f}", f"{m['speed_error_percent']:+.2f} %",
+             f"{m['current_rms_a']:.2f} A", f"{m['angle_error_mean_deg']:+.1f}°", f"{m['angle_error_rms_deg']:.1f}°",
+             f"{m['voltage_percent']:.0f} %"] for m in result("demo")["measures"]]
+    return table(["row", "reference rpm", "true rpm", "error", "phase current RMS", "angle error mean", "angle error RMS",
+                  "of the voltage limit"], rows)
+
+
+def table2() -> str:
+    rows = [[f"{r['reference_rpm']:.0f} rpm", f"{r['torque_nm_set']:.3f} N·m", f"{r['note_rpm']:.0f}", f"{r['speed_rpm']:.0f}",
+             f"{r['note_current_a']:.2f} A", f"{r['current_rms_a']:.2f} A", f"{r['angle_error_rms_deg']:.1f}°", f"{r['voltage_percent']:.0f} %"]
+            for r in result("table2")["rows"]]
+    return table(["reference", "torque", "note: rpm", "ours", "note: current RMS", "ours", "angle error RMS", "of the voltage limit"], rows)
+
+
+def motors() -> str:
+    """A line for each motor of tuning/motors: what it was measured to do with its own header."""
+    by_motor: dict[str, list[dict]] = {}
+    for row in result("motors")["rows"]:
+        by_motor.setdefault(row["motor"], []).append(row)
+    rows = []
+    for motor, cases in by_motor.items():
+        held = [case for case in cases if case["torque_nm_set"] > 0.0]
+        found = {row["name"].split(" [")[0]: row["error_percent"] for row in result(motor, "identify")["rows"]}
+        rows.append([motor, " / ".join(f"{case['speed_rpm']:.0f}" for case in held), f"{max(abs(case['speed_error_percent']) for case in held):.2f} %",
+                     f"{max(case['angle_error_rms_deg'] for case in held):.1f}°", f"{max(case['speed_rpm'] for case in cases):.0f}",
+                     " / ".join(f"{found[name]:+.1f}" for name in ("R winding", "Ld", "Lq", "Kphi"))])
+    return table(["motor", "20 / 50 / 100 % of rated speed, half torque: rpm", "worst error", "worst angle RMS", "no load: rpm",
+                  "IDENTIFY: error of R / Ld / Lq / Kphi in %"], rows)
+
+
+def guarantees() -> str:
+    run, top, blocked, starts = result("demo"), result("stop_from_top"), result("fault_stall"), result("starts")
+    robust, weakening = result("robust"), result("hurst_dmb0224c10002", "tune-fw")
+    hand_over = run["hand_overs"][0]
+    worst_speed = max(abs(m["speed_error_percent"]) for m in run["measures"])
+    worst_angle = max(m["angle_error_rms_deg"] for m in run["measures"])
+    bus = next(e["got"] for e in top["expectations"] if e["row"].startswith("bus"))
+    at = {entry["event"]: entry["at_s"] for entry in reversed(blocked["protocol"])}
+    fault = f"START_FAILED after {at['fault START_FAILED'] - at['S2 pressed']:.2f} s"
+    held = sum(e["ok"] for e in starts["expectations"])
+    rows = [
+        ["closed loop within 2.0 s of S2", f"{hand_over['after_s2_s']:.2f} s, overshoot {hand_over['overshoot_percent']:.1f} %", "`make run`"],
+        ["speed within 0.5 % of its reference, 1000 to 5500 rpm", f"{worst_speed:.2f} %", "`make run`"],
+        ["rotor angle known to 5° RMS from 1000 rpm up", f"{worst_angle:.1f}°", "`make run`"],
+        ["starts from every rotor angle with 0, 0.03 and 0.06 N·m", f"{held} of {len(starts['expectations'])}", "`make starts`"],
+        ["Table 2 of the note: every row at its reference, rows 2 to 8 at less current than the note",
+         f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
+        ["twice the base speed without load", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
+        ["starts and holds half speed with true R ±30 %, L ±30 %, Kphi ±15 %: each alone with and without load, all combined without",
+         f"{sum(e['ok'] for e in robust['expectations'])} of {len(robust['expectations'])}", "`make robust`"],
+        ["orderly stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
+        ["a blocked shaft is a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
+        ["the virtual board runs at 20 times real time on one core", f"{run['motor_seconds'] / run['cpu_seconds']:.0f} times", "`make run`"],
+    ]
+    return table(["guarantee", "measured", "command"], rows)
+
+
+def size() -> str | None:
+    """What `make size` left in build/target; None without a compiler for the target."""
+    path = ROOT / "build/target/size.json"
+    if not path.exists():
+        return None
+    from tools.image.size import readme_table
+    return table(*readme_table(json.loads(path.read_text())))
+
+
+def cycles() -> str | None:
+    """What `make cycles` left in build/target; None without a compiler for the target."""
+    path = ROOT / "build/target/cycles.json"
+    if not path.exists():
+        return None
+    from tools.image.cycles import readme_table
+    return table(*readme_table(json.loads(path.read_text())))
+
+
+def tests() -> str | None:
+    """What `make test`, `make coverage` and `make mutate` left in build/; None while the first two have not been run."""
+    coverage, mutants, suites = (ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test/summary.json"))
+    if not (coverage.exists() and suites.exists()):
+        return None
+    coverage, suites = json.loads(coverage.read_text()), json.loads(suites.read_text())
+    if suites["failed"]:
+        sys.exit(f"foc33: {suites['failed']} tests failed, build/test/summary.json: repair them, run `make test`, then `make readme`")
+    rows = [
+        ["unit, board and closed-loop tests" + (f" ({suites['skipped']} more were skipped)" if suites["skipped"] else ", those that need XC16 included"),
+         str(suites["passed"]), "`make test`"],
+        ["control law: lines / branches reached by the unit tests", f"{coverage['line_percent']:.0f} % / {coverage['branch_percent']:.0f} %", "`make coverage`"],
+    ]
+    if mutants.exists():
+        found = json.loads(mutants.read_text())
+        rows.append([f"planted defects noticed ({found['tests']}, {'all' if found['full'] else 'sample of'} {len(found['mutants'])})",
+                     f"{found['score']:.1f} %", "`make mutate`"])
+    return table(["check", "result", "command"], rows)
+
+
+def main() -> None:
+    for source in PICTURES: # before anything is written
+        if not (ROOT / "build" / source).exists():
+            sys.exit(f"foc33: no picture, build/{source}: run `make readme`, which makes it")
+    text = README.read_text()
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("size", size), ("cycles", cycles), ("tests", tests)):
+        block = make()
+        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
+                              lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)
+        if count != 1:
+            sys.exit(f"foc33: marks '<!-- {name} -->' and '<!-- end -->', README.md: found {count} times, put them in once")
+    README.write_text(text)
+    for source, target in PICTURES.items():
+        shutil.copy(ROOT / "build" / source, ROOT / "docs" / target)
+
+
+if __name__ == "__main__":
+    main()

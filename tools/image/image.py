@@ -1,0 +1,240 @@
+"""Checks a target image before it is flashed: device, vectors, configuration words, HEX against ELF, library helpers, budgets.
+
+    python3 -m tools.image.image build/target/foc33.elf build/target/foc33.hex [--map build/target/foc33.map] [--budget firmware/budget.toml]
+
+One line for each failure and exit status 1; a file that cannot be read is one line and exit status 2."""
+
+import argparse
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+from tools.common import command_line
+from tools.common.errors import UserError
+
+from . import device
+from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
+from .program import Elf, Words, read_elf, read_hex
+
+ROOT = Path(__file__).resolve().parents[2]
+CONFIG_C = ROOT / "firmware" / "board" / "config.c"
+PRAGMA = re.compile(r"^\s*#\s*pragma\s+config\s+(\w+)\s*=\s*(\w+)\s*$", re.MULTILINE)
+BYTES_PER_WORD = 3 # as data sheets count
+
+
+def check_device(elf: Elf) -> list[str]:
+    """The part that every object was compiled for."""
+    if elf.devices == {device.NAME}:
+        return []
+    found = ", ".join(sorted(elf.devices)) or "no part at all"
+    return [f"the image is for {found}, not for the {device.NAME}: compile every file with -mcpu={device.NAME}"]
+
+
+def check_memory(words: Words) -> list[str]:
+    """Every word is in the flash or is a configuration word."""
+    outside = sorted(address for address in words if address not in device.FLASH and address not in device.CONFIGURATION)
+    if not outside:
+        return []
+    return [f"{len(outside)} words outside the flash of the {device.NAME} (0x0000 .. 0x{device.FLASH[-1]:04X}), the first at 0x{outside[0]:06X}"]
+
+
+def check_same(hex_words: Words, elf: Elf) -> list[str]:
+    """The HEX file is the ELF file, word for word. A word that one of them lacks is erased flash."""
+    different = sorted(address for address in hex_words.keys() | elf.words.keys()
+                       if hex_words.get(address, device.ERASED) != elf.words.get(address, device.ERASED))
+    if not different:
+        return []
+    first = different[0]
+    return [f"HEX and ELF differ in {len(different)} words, the first at 0x{first:06X}: {_shown(hex_words, first)} in the HEX, "
+            f"{_shown(elf.words, first)} in the ELF"]
+
+
+def _shown(words: Words, address: int) -> str:
+    return f"0x{words[address]:06X}" if address in words else "erased"
+
+
+def check_reset(words: Words, elf: Elf) -> list[str]:
+    """The first instruction goes to the start-up code."""
+    first, second = words.get(0, device.ERASED), words.get(2, device.ERASED)
+    if first >> 16 != 0x04 or second >> 7 != 0:
+        return [f"reset vector: 0x{first:06X} 0x{second:06X} is no GOTO"]
+    target = first & 0xFFFE | second << 16
+    starts = {elf.symbols[name] for name in ("__reset", "__resetPRI") if name in elf.symbols}
+    if not starts:
+        return ["reset vector: the image has no start-up code (__reset)"]
+    return [] if target in starts else [f"reset vector: goes to 0x{target:06X} ({elf.function_at(target)}), not to the start-up code at "
+                                        f"0x{min(starts):06X}"]
+
+
+def check_vectors(words: Words, elf: Elf, pieces: list[Piece] | None) -> list[str]:
+    """Both tables: each entry goes to its function; one without a function to _DefaultInterrupt, which must be ours."""
+    default = elf.symbols.get("_" + device.DEFAULT_VECTOR)
+    if default is None:
+        return [f"vectors: the image has no {device.DEFAULT_VECTOR}"]
+    failures = []
+    for name in device.REQUIRED:
+        if "_" + name not in elf.symbols:
+            failures.append(f"vectors: the image has no {name}: a misspelt name in the sources, or a file that is not linked")
+    for symbol in sorted(elf.symbols):
+        name = symbol.removeprefix("_")
+        if re.fullmatch(r"_[A-Z]\w*(Interrupt|Error|Fail|Trap\d)", name) and elf.symbols[symbol] in device.PROGRAM \
+                and name != device.DEFAULT_VECTOR and name.replace("_Alt", "_", 1) not in device.VECTORS:
+            failures.append(f"vectors: {name} is no vector of the {device.NAME}: the function never runs")
+    for table, base, prefix in (("IVT", device.IVT, "_"), ("AIVT", device.AIVT, "_Alt")):
+        wrong = []
+        for number, name in enumerate(device.VECTORS):
+            wanted = elf.symbols.get("_" + prefix + name[1:], elf.symbols.get("_" + name, default))
+            got = words.get(base + 2 * number, device.ERASED)
+            if got == device.ERASED and number >= len(device.TRAPS) + device.LEFT_ERASED:
+                continue
+            if got != wanted:
+                what = "is erased" if got == device.ERASED else f"goes to 0x{got:06X} ({elf.function_at(got)})"
+                wrong.append(f"vector {name} of the {table} (0x{base + 2 * number:03X}) {what}, not to 0x{wanted:06X} "
+                             f"({elf.function_at(wanted)})")
+        failures += wrong[:3] + ([f"and {len(wrong) - 3} more vectors of the {table}"] if len(wrong) > 3 else [])
+    if pieces is not None and not default_handler_is_ours(elf, pieces):
+        failures.append(f"vectors: {device.DEFAULT_VECTOR} is the compiler's, which leaves the outputs as they are: define it in firmware/board/isr.c")
+    return failures
+
+
+def wanted_fields(text: str) -> dict[str, str]:
+    """The settings of config.c."""
+    return dict(PRAGMA.findall(text))
+
+
+def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
+    """Every field of the configuration words as config.c and the board want it; a field that neither names is left alone."""
+    failures = []
+    for name, value in device.BOARD_NEEDS.items():
+        if config.get(name, value) != value:
+            failures.append(f"configuration: {name} = {config[name]} in config.c, but the board needs {value} "
+                            f"({device.FIELDS[name].values[value][1]})")
+    for name, value in {**device.BOARD_NEEDS, **config}.items():
+        field = device.FIELDS.get(name)
+        if field is None or value not in field.values:
+            failures.append(f"configuration: {name} = {value} in config.c is unknown for the {device.NAME}: add it to tools/image/device.py")
+            continue
+        word = words.get(field.word)
+        if word is None:
+            failures.append(f"configuration word {device.WORDS[field.word]} (0x{field.word:06X}) is missing: {name} must be {value}")
+        elif word & field.mask != field.values[value][0]:
+            failures.append(f"configuration word {device.WORDS[field.word]} (0x{field.word:06X}) = 0x{word & 0xFF:02X}: {name} is "
+                            f"{field.meaning(word)}, must be {value} ({field.values[value][1]})")
+    return failures
+
+
+def configuration_table(words: Words) -> list[str]:
+    """Each field of the configuration words in the image, with its meaning."""
+    lines = []
+    for name, field in device.FIELDS.items():
+        word = words.get(field.word, device.ERASED)
+        lines.append(f"{device.WORDS[field.word]:8} 0x{word & 0xFF:02X}  {name:9} {field.meaning(word)}")
+    return lines
+
+
+def flash_bytes(words: Words) -> int:
+    """Program memory above the vectors, as the linker's report and data sheets count it."""
+    return BYTES_PER_WORD * sum(address in device.PROGRAM for address in words)
+
+
+def stack_space(elf: Elf) -> int | None:
+    """Bytes between the start of the stack and its limit."""
+    low, high = elf.symbols.get("__SP_init"), elf.symbols.get("__SPLIM_init")
+    return None if low is None or high is None else high - low
+
+
+def read_budget(path: Path | None) -> dict[str, int]:
+    """flash_bytes, ram_bytes and, where the file has it, stack_bytes."""
+    if path is None:
+        return {}
+    try:
+        with path.open("rb") as file:
+            table = tomllib.load(file)
+        budget = table["budget"]["image"]
+        return {name: int(budget[name]) for name in ("flash_bytes", "ram_bytes", "stack_bytes") if name != "stack_bytes" or name in budget}
+    except OSError as error:
+        raise UserError(f"cannot read the budget ({error.strerror})", str(path)) from None
+    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+        raise UserError(f"no budget for the image ({error})", str(path), "give flash_bytes and ram_bytes in [budget.image]") from None
+
+
+def deepest_stack(elf: Path, objdump: str) -> tuple[int, list[str]]:
+    """Bytes of the deepest stack, and what keeps it from being known for sure, as make size finds them."""
+    from . import size # its modules draw and read DWARF; the checks of a HEX file need neither
+    from .budget import Budget
+    sources = "".join(path.read_text(encoding="utf-8") for path in sorted(CONFIG_C.parent.glob("*.c")))
+    result = size.measure(elf, Budget.read(), size.disassemble(objdump, elf), sources, None, limits=False).stack
+    return result.depth, result.errors
+
+
+def check_budget(words: Words, elf: Elf, budget: dict[str, int], deepest: int | None = None) -> list[str]:
+    """Flash and RAM in their budgets, the stack in its own and in what is left of the RAM."""
+    failures = []
+    flash, stack = flash_bytes(words), stack_space(elf)
+    if deepest is not None and deepest > (limit := budget.get("stack_bytes", stack if stack is not None else deepest)):
+        failures.append(f"stack: up to {deepest} bytes of {limit}; make size shows the calls")
+    if flash > budget.get("flash_bytes", flash):
+        failures.append(f"flash: {flash} bytes of a budget of {budget['flash_bytes']}; make size shows what takes them")
+    if elf.ram_bytes > budget.get("ram_bytes", elf.ram_bytes):
+        failures.append(f"RAM: {elf.ram_bytes} bytes of a budget of {budget['ram_bytes']}, the stack not counted; make size shows what takes them")
+    if stack is not None and stack < budget.get("stack_bytes", stack):
+        failures.append(f"stack: {stack} bytes are left for it, the budget says {budget['stack_bytes']}")
+    return failures
+
+
+def summary(words: Words, elf: Elf, budget: dict[str, int], deepest: int | None = None) -> str:
+    """What the image takes of its budget, or of the chip where there is none."""
+    def of(name: str, chip: int) -> str:
+        return f"{budget[name]} bytes" if name in budget else f"{chip} bytes of the chip"
+    stack = stack_space(elf)
+    return (f"flash {flash_bytes(words)} of {of('flash_bytes', len(device.PROGRAM) * BYTES_PER_WORD)}, "
+            f"RAM {elf.ram_bytes} of {of('ram_bytes', len(device.RAM))}, "
+            + (f"stack at most {deepest} of {budget['stack_bytes']} bytes, " if deepest is not None and "stack_bytes" in budget
+               else f"stack at most {deepest} bytes, " if deepest is not None else "")
+            + f"{stack if stack is not None else 'unknown'} bytes free for it")
+
+
+def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, str], budget: dict[str, int],
+          deepest: int | None = None) -> list[str]:
+    """Every failure of an image; `pieces` None when there is no map, `deepest` None when nobody has looked for the deepest stack."""
+    return [*check_device(elf), *check_memory(words), *check_same(words, elf), *check_reset(words, elf), *check_vectors(words, elf, pieces),
+            *check_configuration(words, config), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []), *check_budget(words, elf, budget, deepest)]
+
+
+def parser() -> argparse.ArgumentParser:
+    result = command_line.Parser(prog="python3 -m tools.image.image", description=__doc__.splitlines()[0])
+    result.add_argument("elf", type=Path)
+    result.add_argument("hex", type=Path)
+    result.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
+    result.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
+    result.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
+    result.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
+    result.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")
+    return result
+
+
+def main(arguments: list[str] | None = None) -> int:
+    return command_line.run(lambda: _run(parser().parse_args(arguments)))
+
+
+def _run(options: argparse.Namespace) -> int:
+    elf, words = read_elf(options.elf), read_hex(options.hex)
+    pieces = read_map(options.map) if options.map else None
+    budget = read_budget(options.budget)
+    deepest, unsure = deepest_stack(options.elf, options.objdump) if options.objdump else (None, [])
+    try:
+        config = wanted_fields(options.config.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
+    failures = check(elf, words, pieces, config, budget, deepest) + [f"stack: {reason}" for reason in unsure if budget]
+    for failure in failures:
+        print(f"foc33: {options.hex.name}, {failure}", file=sys.stderr)
+    if options.table:
+        print("\n".join(configuration_table(words)))
+    print(f"{options.hex}: {summary(words, elf, budget, deepest)}{f'; {len(failures)} checks failed' if failures else ''}")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,281 @@
+"""`make size`: flash, RAM and stack of the target image by module and function, beside the note's figures, the budget and the last commit.
+
+Program memory is counted as data sheets do, three bytes a word, without the vector tables. Exit status: 0, 1 when a budget is broken
+(a line for each), 2 when the image or the compiler is missing."""
+
+import argparse
+import csv
+import json
+import shlex
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tools.common import command_line, paths
+from tools.common.errors import UserError
+
+from . import attribution, base, stack
+from .budget import UNASSIGNED, Budget, Share, shares
+
+OUT = paths.ROOT / "build" / "target"
+NOTE_TITLE = "as in the note"
+
+
+@dataclass
+class Row:
+    """A line of the table. `kind`: function, module, group or total."""
+    kind: str
+    name: str
+    group: str = ""
+    module: str = ""
+    note: int | None = None
+    flash: int = 0
+    budget: int | None = None
+    flash_change: int | None = None
+    ram: int = 0
+    note_ram: int | None = None
+    ram_budget: int | None = None
+    ram_change: int | None = None
+    copies: int = 0
+
+
+@dataclass
+class Report:
+    rows: list[Row]
+    stack: stack.Result
+    budget: Budget
+    base_name: str = ""       # commit compared with, "" without one
+    no_base: str = ""         # why there is none
+    broken: list[str] = field(default_factory=list)
+
+
+def measure(elf: Path, budget: Budget, listing: str, sources: str, before: dict[tuple[str, str], Share] | None,
+            limits: bool = True) -> Report:
+    """All figures of an image.
+    @param listing its disassembly
+    @param sources the text of firmware/board, which sets the interrupts' priorities
+    @param before shares of the image to compare with
+    @param limits whether the budget is for this image"""
+    image = attribution.read(elf)
+    functions = {function.instructions[0].address: stack.plain(function.name) for function in stack.parse(listing)}
+    handlers = [functions[address] for address in image.handlers if address in functions]
+    depth = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
+    if image.initial_calls:
+        depth.errors.append("the list of start values names a function to call")
+    now = shares(image, budget)
+    report = Report(rows(now, before, budget), depth, budget)
+    report.broken = broken(report, now, limits)
+    return report
+
+
+def rows(now: dict[tuple[str, str], Share], before: dict[tuple[str, str], Share] | None, budget: Budget) -> list[Row]:
+    """Functions and objects under their modules, modules under their groups, then the totals."""
+    result, totals = [], []
+    modules = [*budget.modules, UNASSIGNED]
+    for group in [*budget.groups, None]:
+        title = group.title if group else UNASSIGNED.name
+        inside: list[Row] = []
+        for module in (module for module in modules if module.group == (group.name if group else "")):
+            keys = sorted({key for key in [*now, *(before or {})] if key[0] == module.name})
+            below = [_row(key, title, now, before) for key in keys]
+            below.sort(key=lambda row: (-row.flash, -row.ram, row.name))
+            if below:
+                inside += [_sum("module", module.name, title, below, budget=module.flash_budget), *below]
+        if inside:
+            total = _sum("group", title, title, [row for row in inside if row.kind == "module"], note=group.note_flash if group else None)
+            totals.append((total, group))
+            result += [total, *inside]
+    # what is not assigned counts as the note's until somebody says otherwise
+    as_note = [row for row, group in totals if group is None or group.note_flash is not None]
+    known = [group.note_flash for group in budget.groups if group.note_flash is not None]
+    result.append(_sum("total", NOTE_TITLE, "", as_note, note=sum(known), budget=budget.note.flash, note_ram=budget.note.ram,
+                       ram_budget=budget.note.ram))
+    result.append(_sum("total", "whole image", "", [row for row, _ in totals], budget=budget.image.flash, ram_budget=budget.image.ram))
+    return result
+
+
+def _row(key: tuple[str, str], group: str, now: dict, before: dict | None) -> Row:
+    share, old = now.get(key, Share()), (before or {}).get(key, Share())
+    known = before is not None
+    return Row("function", key[1], group, key[0], flash=share.flash, ram=share.ram, copies=len(share.copies),
+               flash_change=share.flash - old.flash if known else None, ram_change=share.ram - old.ram if known else None)
+
+
+def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
+    def change(attribute: str) -> int | None:
+        values = [getattr(row, attribute) for row in below]
+        return None if not values or None in values else sum(values)
+    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below), ram=sum(row.ram for row in below),
+               flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
+
+
+def broken(report: Report, now: dict[tuple[str, str], Share], limits: bool) -> list[str]:
+    """A line for each budget that does not hold, and for what no module of the budget file claims."""
+    lines = []
+    for row in report.rows:
+        what = {NOTE_TITLE: "control law, field weakening and user interface"}.get(row.name, row.name)
+        for memory, size, limit in (("flash", row.flash, row.budget), ("RAM", row.ram, row.ram_budget)):
+            if limits and limit is not None and size > limit:
+                lines.append(f"{memory}, {what}: {size} bytes, {size - limit} over the budget of {limit}")
+    limit = report.budget.image.stack
+    if limits and report.stack.depth > limit:
+        lines.append(f"stack: {report.stack.depth} bytes at its deepest, {report.stack.depth - limit} over the budget of {limit}")
+    lines += [f"stack: {error}" for error in report.stack.errors]
+    lines += [f"'{name}' is counted with no module: name it in firmware/budget.toml"
+              for module, name in sorted(now) if module == UNASSIGNED.name]
+    return lines
+
+
+# ---- output --------------------------------------------------------------------------------------------------------------
+HEAD = f"{'':<44}{'note':>7}{'flash':>7}{'budget':>8}{'change':>8}{'RAM':>7}{'budget':>8}{'change':>8}"
+
+
+def _line(row: Row) -> str:
+    indent = {"group": "", "module": "  ", "function": "    ", "total": ""}[row.kind]
+    name = indent + row.name + (f" ({row.copies} copies)" if row.copies > 1 else "")
+    return (f"{name:<44}{_number(row.note)}{row.flash:>7}{_number(row.budget, 8)}{_change(row.flash_change)}"
+            f"{row.ram:>7}{_number(row.ram_budget, 8)}{_change(row.ram_change)}").rstrip()
+
+
+def _number(value: int | None, width: int = 7) -> str:
+    return f"{'' if value is None else value:>{width}}"
+
+
+def _change(value: int | None) -> str:
+    return f"{'' if value is None else '.' if value == 0 else f'{value:+d}':>8}"
+
+
+def text(report: Report, functions: bool = True) -> str:
+    """The tables for a terminal; the sums come last, where the eye is."""
+    lines = []
+    if functions:
+        lines += [HEAD, *(_line(row) for row in report.rows if row.kind != "total"), ""]
+    lines += ["deepest stack, bytes" + " " * 21 + "adds  so far", *stack.table(report.stack), ""]
+    changed = [row for row in report.rows if row.kind == "function" and (row.flash_change or row.ram_change)]
+    if changed:
+        lines += [f"changed since {report.base_name}", *(_line(row) for row in changed), ""]
+    lines += [HEAD, *(_line(row) for row in report.rows if row.kind != "function")]
+    lines.append(f"{'stack':<44}{'':>7}{'':>7}{'':>8}{'':>8}{report.stack.depth:>7}{report.budget.image.stack:>8}")
+    lines.append("bytes; flash is 3 bytes a word, vector tables and configuration words not counted; the note is at its -O3")
+    lines.append(f"change: since {report.base_name}" if report.base_name else f"no column for the change: {report.no_base}")
+    return "\n".join(lines)
+
+
+def summary(report: Report) -> dict:
+    """What size.json holds."""
+    return {"rows": [vars(row) for row in report.rows], "stack_bytes": report.stack.depth, "stack_budget_bytes": report.budget.image.stack,
+            "stack": [{"priority": 0, "steps": report.stack.main.steps}] +
+                     [{"priority": level.priority, "steps": level.chain.steps} for level in report.stack.levels],
+            "base": report.base_name or None, "broken": report.broken}
+
+
+def write(report: Report, folder: Path) -> list[Path]:
+    """size.json, size.csv and size.png."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [folder / f"size.{ending}" for ending in ("json", "csv", "png")]
+        files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
+        with files[1].open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, list(vars(report.rows[0])))
+            writer.writeheader()
+            writer.writerows(vars(row) for row in report.rows)
+        _plot(report, files[2])
+    except OSError as error:
+        raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
+    return files
+
+
+def _plot(report: Report, path: Path) -> None:
+    """A bar for each group: its modules side by side, the note's figure as a mark."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    groups = [row for row in report.rows if row.kind == "group"]
+    colors = plt.get_cmap("Set3").colors
+    figure, axes = plt.subplots(figsize=(11, 1.6 + 0.9 * len(groups)), layout="constrained")
+    for place, group in enumerate(groups):
+        start = 0
+        for index, row in enumerate(row for row in report.rows if row.kind == "module" and row.group == group.name):
+            axes.barh(place, row.flash, left=start, color=colors[index % len(colors)], edgecolor="white")
+            if row.flash >= 60:
+                axes.text(start + row.flash / 2, place, f"{row.name} {row.flash}".replace(" ", "\n") if row.flash > 400 else row.name,
+                          ha="center", va="center", fontsize=7, rotation=0 if row.flash > 400 else 90)
+            start += row.flash
+        axes.text(start + 40, place, str(group.flash), va="center")
+        if group.note is not None:
+            axes.plot([group.note] * 2, [place - 0.45, place + 0.45], color="black", linewidth=2, label="the note's" if place == 0 else None)
+    axes.set(yticks=range(len(groups)), yticklabels=[group.name for group in groups], xlabel="flash [bytes]",
+             title=f"flash by module: {report.rows[-1].flash} bytes")
+    axes.invert_yaxis()
+    axes.legend(loc="lower right")
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of the README's table, from what size.json holds."""
+    def cell(value: int | None) -> str:
+        return "" if value is None else str(value)
+    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]), cell(row["ram_budget"])]
+            for row in data["rows"] if row["kind"] in ("group", "total")]
+    body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
+    return ["bytes", "note: flash", "flash", "budget", "note: RAM", "RAM", "budget"], body
+
+
+# ---- command line --------------------------------------------------------------------------------------------------------
+def compare(compile_text: str, link_text: str, budget: Budget, cache: Path | None = None) -> tuple[dict | None, str, str]:
+    """Shares of the last commit's image and the commit's name, or None and why there is nothing to compare with."""
+    try:
+        if not compile_text or not link_text:
+            raise base.NoBase("no compiler was named (--compile, --link)")
+        commit = base.commit()
+        elf = base.build(commit, shlex.split(compile_text), shlex.split(link_text), cache=cache)
+        return shares(attribution.read(elf), budget), commit[:7], ""
+    except base.NoBase as reason:
+        return None, "", str(reason)
+
+
+def disassemble(objdump: str, elf: Path) -> str:
+    words = shlex.split(objdump)
+    if shutil.which(words[0]) is None:
+        raise UserError(f"no {words[0]}", "PATH", "install Microchip's XC16, or say where it is with XC16=folder")
+    done = subprocess.run([*words, "-d", str(elf)], capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode != 0:
+        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)), "build the image anew with `make firmware`")
+    return done.stdout
+
+
+def main(arguments: list[str] | None = None) -> int:
+    def work() -> int:
+        parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
+        parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
+        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json, size.csv, size.png")
+        parser.add_argument("--objdump", default="xc16-objdump")
+        parser.add_argument("--compile", default="", help="compiler and flags, for the last commit's image")
+        parser.add_argument("--link", default="", help="the same for linking, with {objects}, {elf} and {map}")
+        parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
+        parser.add_argument("--brief", action="store_true", help="no table of functions")
+        return _run(parser.parse_args(arguments))
+    return command_line.run(work)
+
+
+def _run(options: argparse.Namespace) -> int:
+    budget = Budget.read()
+    listing = disassemble(options.objdump, options.elf)
+    sources = "".join(path.read_text(encoding="utf-8") for path in sorted((paths.ROOT / "firmware" / "board").glob("*.c")))
+    before, name, reason = compare(options.compile, options.link, budget)
+    report = measure(options.elf, budget, listing, sources, before, not options.no_budget)
+    report.base_name, report.no_base = name, reason
+    files = write(report, options.out)
+    print(text(report, not options.brief))
+    print("written: " + ", ".join(str(paths.shown(path)) for path in files))
+    for line in report.broken:
+        print(f"foc33: {line}", file=sys.stderr)
+    return 1 if report.broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
