@@ -39,6 +39,7 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.run.control.v_q14.d = v_d;
     drive.run.control.v_q14.q = v_q;
     drive.run.handover.agreed_steps = 50;
+    drive.run.handover.speed_is_preset = 0; /* as the start has left it */
     handover_now(&drive, &params);
     drive.ticks = 7;
     drive_slow(&drive, &params, 0);
@@ -137,6 +138,7 @@ void test_speed_controller_is_preset_once_and_before_its_first_step(void)
     uint16_t slot;
     int32_t preset;
     drive.run.handover.agreed_steps = 50;
+    drive.run.handover.speed_is_preset = 0; /* as the start has left it */
     handover_now(&drive, &params);
     drive.run.control.pi_speed.sum = 12345;
     for (slot = 6; slot <= 7u; slot++) {
