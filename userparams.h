@@ -5,7 +5,7 @@
  *
  * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep
  * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,
- * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/params.h; the table at the end shows them.
+ * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them.
  *
  * Note: 24 V are too low for the rated torque at rated speed: about 0.063 N m of 0.08 N m at 2800 rpm; raise the supply voltage,
  * or lower the rated speed to 2300 rpm */
@@ -58,7 +58,7 @@
 #define UNDER_VOLTAGE_V 12.0        /* [V]             5 .. 45        bus below trips while running */
 #define REGEN_LIMIT_V 27.0          /* [V]             11 .. 90       braking current is reduced from here, to nothing 2 V higher */
 
-/* ---- Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h - */
+/* ---- Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/param_scaling.h  */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
 #define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 60 degrees, 60 over the parameter set */
 

@@ -1,7 +1,7 @@
 """From engineering values to counts: the note's spreadsheet as a pure function, and the firmware's own constants.
 
-The sheet is AN1292's tuning_params.xls with the published exponents. The firmware's constants repeat include/drive/params.h and
-params_init.h in single precision, bit for bit (a test compiles the header and compares), and once more in double precision: the
+The sheet is AN1292's tuning_params.xls with the published exponents. The firmware's constants repeat include/drive/param_scaling.h and
+param_init.h in single precision, bit for bit (a test compiles the header and compares), and once more in double precision: the
 difference between the two is the rounding error that the tables show.
 """
 
@@ -128,7 +128,7 @@ class Constant:
 
     group: str
     name: str
-    """a macro of params.h, or a field of drive_params_t"""
+    """a macro of param_scaling.h, or a field of drive_params_t"""
     value: float
     """engineering value that it stands for"""
     unit: str
@@ -156,7 +156,7 @@ def number_of(text: str | float) -> float:
 
 
 class Formulas:
-    """params.h, macro by macro and in its order of operations, in single precision (np.float32) or exactly (float)."""
+    """param_scaling.h, macro by macro and in its order of operations, in single precision (np.float32) or exactly (float)."""
 
     def __init__(self, params: Mapping[str, str | float], number: Number) -> None:
         self.params = params
@@ -175,7 +175,7 @@ class Formulas:
         return self.n(number_of(self.params[name]))
 
     def _derived(self, name: str) -> Any:
-        """What params.h derives where userparams.h does not define it."""
+        """What param_scaling.h derives where userparams.h does not define it."""
         n = self.n
         if name in ("D_CURRCNTR_PTERM", "Q_CURRCNTR_PTERM"):
             return self["D_CURRCNTR_PTERM"] if name[0] == "Q" else (

@@ -50,7 +50,7 @@ SECTIONS = (
     ("Speeds", ("MINIMUM_SPEED_RPM", "NOMINAL_SPEED_RPM", "MAXIMUM_SPEED_RPM", "SPEEDREFRAMP_RPM_PER_S", "TUNING_DELAY_RAMPUP")),
     ("Start: lock, ramp, hand-over", ("LOCK_TIME", "END_SPEED_RPM", "OPENLOOP_RAMPSPEED_INCREASERATE", "Q_CURRENT_REF_OPENLOOP")),
     ("Limits and protections", ("MAXIMUM_CURRENT_A", "OVER_CURRENT_THRESHOLD_A", "OVER_VOLTAGE_V", "UNDER_VOLTAGE_V", "REGEN_LIMIT_V")),
-    ("Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h", ("CURRENT_BANDWIDTH_HZ", "SPEED_BANDWIDTH_HZ")),
+    ("Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/param_scaling.h", ("CURRENT_BANDWIDTH_HZ", "SPEED_BANDWIDTH_HZ")),
     ("Filters, Equation 7: K in Q15 per period", ("KFILTER_ESDQ", "KFILTER_ESDQ_FW", "KFILTER_VELESTIM")),
     ("Field weakening: one entry every {step_erpm:.0f} electrical rpm ({step_rpm:.5g} rpm with {pairs} pole pairs) of speed reference",
      ("FW_START_SPEED_RPM", "FW_TRIM_CURRENT_A")))
@@ -94,7 +94,7 @@ def _head(design: Design) -> list[str]:
              f" * (make userparams MOTOR={name} writes it to userparams.h). Field weakening: {design.tables_from}.", " *",
              " * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep",
              " * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,",
-             " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/params.h; the table at the end shows them."]
+             " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them."]
     for warning in design.warnings:
         lines += [" *", *(f" * {line}" for line in _wrapped("Note: " + _safe(warning), WIDTH + 8))]
     lines[-1] += " */"

@@ -31,7 +31,7 @@ LOAD_DIP = 0.18
 """Share of the lowest speed that half the rated torque may take when it comes in half a second: what grows steadily is held by the
 integral alone, error = dT/dt / (J (2 pi f)^2 / ZERO_RATIO)."""
 ZERO_RATIO = 3.0
-"""The speed controller's zero lies at the bandwidth / 3 (SPEEDCNTR_ITERM in params.h): the integral is what holds a load that grows, and a
+"""The speed controller's zero lies at the bandwidth / 3 (SPEEDCNTR_ITERM in param_scaling.h): the integral is what holds a load that grows, and a
 lower bandwidth with more of it is calmer at low speed than the other way round."""
 SLOTS = 8
 CURRENT_TOP = 1.0 / 12.0

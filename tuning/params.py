@@ -10,20 +10,10 @@ import numpy as np
 
 from tools.common import paths
 from tools.common.errors import UserError
+from tools.common.param_rows import TABLE, parameters
 
 from .constants import Formulas, nearest
 
-TABLE = paths.ROOT / "include" / "drive" / "param_table.h"
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One define of userparams.h. The ends of the range are kept as they are written."""
-
-    name: str
-    unit: str
-    low: str
-    high: str
 
 
 @dataclass(frozen=True)
@@ -37,17 +27,6 @@ class Relation:
 @functools.cache
 def _text() -> str:
     return TABLE.read_text(encoding="utf-8").replace("\\\n", " ")
-
-
-@functools.cache
-def parameters() -> dict[str, Parameter]:
-    """Every parameter by name, in the order of the table."""
-    rows = re.search(r"#define PARAM_TABLE\(X\)(.*)", _text())
-    found: dict[str, Parameter] = {}
-    for macro, name, unit, low, high in re.findall(r'(PARAM_TABLE_FW\(X, |X\()(\w+), "([^"]*)", ([^,()]+), ([^,()]+)\)', rows[1] if rows else ""):
-        names = [f"{name}{i}" for i in range(18)] if macro.startswith("PARAM") else [name]
-        found.update({each: Parameter(each, unit, low.strip(), high.strip()) for each in names})
-    return found
 
 
 @functools.cache

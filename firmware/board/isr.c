@@ -5,7 +5,7 @@
 #include "board/reset.h"
 #include "board/watch.h"
 #include "drive/drive_tick.h"
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
 BOARD_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;

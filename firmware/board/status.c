@@ -4,7 +4,7 @@
 #include "board/firmware.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #define STATUS_PERIOD_MS 500u
 

@@ -1,7 +1,7 @@
 /* The background's part of the identification: takes the interrupt's sums, computes R, L and Kphi, and asks for the next step. */
 #include "drive/drive.h"
 #include "drive/identify_tick.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #ifdef IDENTIFY
 

@@ -4,7 +4,7 @@
 
 #include "drive/drive.h"
 #include "drive/panel.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 /** In RAM a debugger or scope can change a parameter while the motor turns, e.g. board_params.fieldweak.idref_q13[3]; each is
  *  read anew in the next period. Nobody checks its range then. Otherwise parameters are constants in the instructions. */

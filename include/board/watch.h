@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "control/qmath.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 /** Field weakening: table index in use, d reference (Q15 of full-scale current), start speed (electrical rpm). */
 typedef struct {

@@ -4,7 +4,7 @@
 
 #include "drive/drive.h"
 #include "drive/identify_tick.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 QM_INLINE int16_t drive_signed(const drive_t *d, int16_t x)
 {

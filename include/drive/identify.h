@@ -7,7 +7,7 @@
 #define DRIVE_IDENTIFY_H
 
 #include "control/qmath.h"
-#include "drive/params.h" /* userparams.h may define IDENTIFY */
+#include "drive/param_scaling.h" /* userparams.h may define IDENTIFY */
 
 /** X(name, meaning): steps of the procedure. */
 #define IDENTIFY_STEP_TABLE(X) \

@@ -3,7 +3,7 @@
 #define DRIVE_IDENTIFY_TICK_H
 
 #include "drive/drive.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #ifdef IDENTIFY
 

@@ -79,7 +79,7 @@ class Sheet(unittest.TestCase):
 def compiled(design: Design) -> dict[str, int]:
     """Every constant as a C program prints it that includes the header."""
     names = [item.expression for item in design.constants]
-    source = ["#include <stdio.h>", '#include "drive/params_init.h"', "static const drive_params_t p = DRIVE_PARAMS_INIT;", "int main(void)", "{",
+    source = ["#include <stdio.h>", '#include "drive/param_init.h"', "static const drive_params_t p = DRIVE_PARAMS_INIT;", "int main(void)", "{",
               *(f'    printf("%lld\\n", (long long)({name}));' for name in names), "    return 0;", "}"]
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "userparams.h").write_text(header.write(design), encoding="utf-8")
@@ -108,10 +108,10 @@ class Compiled(unittest.TestCase):
     def test_all_numbers_of_the_drive_s_parameters_are_listed(self):
         """A new field of drive_params_t without a constant here would be a number that no table shows."""
         listed = {item.name.split("[")[0] for item in of("hurst_dmb0224c10002").constants}
-        text = (paths.ROOT / "include/drive/params_init.h").read_text(encoding="utf-8")
+        text = (paths.ROOT / "include/drive/param_init.h").read_text(encoding="utf-8")
         fields = set(re.findall(r"\.(\w+) = ", text)) - {"estimator", "fieldweak", "forced", "svm", "pi_d", "pi_q", "pi_speed"}
         known = {name.split(".")[-1] for name in listed}
-        plain = {"shift", "trim_step_q13", "offset_max_q13"} # written as numbers in params_init.h itself
+        plain = {"shift", "trim_step_q13", "offset_max_q13"} # written as numbers in param_init.h itself
         self.assertFalse(fields - known - plain)
 
 

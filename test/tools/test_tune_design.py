@@ -290,7 +290,7 @@ class Parameters(unittest.TestCase):
         scalars = [name for name in base if not re.search(r"_SPEED\d+$", name) and name not in ("NOPOLESPAIRS", "LOCK_TIME", "DATA_BUFFER_SIZE", "SNAPDELAY",
                                                                                               "TUNING_DELAY_RAMPUP", "KCURRA", "KCURRB")]
         cases = [{name: plain(number_of(base[name]) * 3.0 ** dice.uniform(-1.0, 1.0)) for name in dice.sample(scalars, 3)} for _ in range(60)]
-        lines = ["#include <stdio.h>", "#define USERPARAMS_H", *(f"#define {name} {text}" for name, text in base.items()), '#include "drive/params_init.h"',
+        lines = ["#include <stdio.h>", "#define USERPARAMS_H", *(f"#define {name} {text}" for name, text in base.items()), '#include "drive/param_init.h"',
                  '#include "drive/param_table.h"', "#define HOLDS(condition, message) putchar((condition) ? '1' : '0');", "int main(void)", "{"]
         for case in cases:
             for name, text in case.items():

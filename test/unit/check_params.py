@@ -44,7 +44,7 @@ def rows(macro: str) -> list[list[str]]:
 def parameters() -> list[Parameter]:
     found = []
     for name, rest in rows("PARAM_TABLE"):
-        unit, low, high = re.fullmatch(r'"([^"]*)" ?, ?(\S+) ?, ?(\S+)', rest.strip()).groups()
+        unit, low, high = re.fullmatch(r'"([^"]*)" ?, ?(\S+) ?, ?(\S+) ?, .*', rest.strip()).groups()
         found.append(Parameter(name.strip('"'), unit, low.replace(" ", ""), high))
     return found
 
@@ -164,8 +164,8 @@ RELATIONS = {
 BASE = dict(re.findall(r"^#define (\w+) (\S+)$", (ROOT / "test/unit/support/hurst_params.h").read_text(encoding="utf-8"), re.MULTILINE))
 
 
-# Parameters that have a default in params.h, with that default.
-DERIVED = {name: value for name, value in re.findall(r"^#ifndef (?:\w+).*\n#define (\w+) ((?:.*\\\n)*.*)", (ROOT / "include/drive/params.h").read_text(
+# Parameters that have a default in param_scaling.h, with that default.
+DERIVED = {name: value for name, value in re.findall(r"^#ifndef (?:\w+).*\n#define (\w+) ((?:.*\\\n)*.*)", (ROOT / "include/drive/param_scaling.h").read_text(
     encoding="utf-8"), re.MULTILINE)}
 
 
@@ -180,7 +180,7 @@ def every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     """One program says for each case which relations hold: the macros take the values that they find at the place of use."""
     tried = [(message, values, holds) for message, pairs in RELATIONS.items() for pair in pairs for values, holds in zip(pair, (False, True), strict=True)]
     source = ["#include <stdio.h>", "#define USERPARAMS_H", *(f"#define {name} {value}" for name, value in BASE.items()),
-              '#include "drive/params_init.h"', '#include "drive/param_table.h"', "#define HOLDS(condition, message) putchar((condition) ? '1' : '0');",
+              '#include "drive/param_init.h"', '#include "drive/param_table.h"', "#define HOLDS(condition, message) putchar((condition) ? '1' : '0');",
               "int main(void)", "{"]
     for _, values, _ in tried:
         for name, value in values.items():
@@ -307,7 +307,7 @@ def numbers_in_counts(wide: bool) -> tuple[list[str], list[list[str]]]:
     if wide:
         source += [f"#define {name}_t int64_t" for name in ("int16", "uint16", "int32", "uint32")]
     source += ["#define USERPARAMS_H", *(f"#define {name} {value}" for name, value in BASE.items())]
-    source += ['#include "drive/params_init.h"', '#include "drive/param_table.h"', "#define AND(condition, message) && (condition)",
+    source += ['#include "drive/param_init.h"', '#include "drive/param_table.h"', "#define AND(condition, message) && (condition)",
                "static void show(int accepted, const drive_params_t *p)", "{", '    printf("%d", accepted);',
                *(f'    printf(" %lld", (long long)p->{path});' for path in paths), '    puts("");', "}"]
     for n, values in enumerate(cases()):

@@ -40,7 +40,7 @@ NOTE = [
 
 @dataclass(frozen=True)
 class Own:
-    """A number of drive_params_t or a macro of params.h. `rounding`: nearest, up (half up), down, next (to the next whole number), count (it is
+    """A number of drive_params_t or a macro of param_scaling.h. `rounding`: nearest, up (half up), down, next (to the next whole number), count (it is
     a whole number already)."""
 
     name: str

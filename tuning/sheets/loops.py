@@ -80,7 +80,7 @@ def _margin(page: Page, label: str, name: str, margins: dict[str, str], why: str
 
 
 def _gains(page: Page, motor: DataPage) -> None:
-    page.section("Gains in userparams.h units (derived by include/drive/params.h; lines to paste only for a salient motor)")
+    page.section("Gains in userparams.h units (derived by include/drive/param_scaling.h; lines to paste only for a salient motor)")
     common = f"2*PI()*CURRENT_BANDWIDTH_HZ*MOTOR_LS_MH*0.001*{IU}/16"
     for name, inductance in (("D_CURRCNTR_PTERM", "ld_h"), ("Q_CURRCNTR_PTERM", "lq_h")):
         own = significant(f"(2*PI()*CURRENT_BANDWIDTH_HZ*{inductance}*{IU}/16)", 5)

@@ -138,7 +138,7 @@ def _currents(page: Page, motor: DataPage) -> None:
     fastest = f"{RPM}*MAX(MAXIMUM_SPEED_RPM,1.5*NOMINAL_SPEED_RPM)*NOPOLESPAIRS"
     quantity(page, "Largest back-EMF at the trip level", "emf_max_v",
              f"OVER_VOLTAGE_V/SQRT(3)+2/SQRT(3)*MOTOR_RS_OHM*OVER_CURRENT_THRESHOLD_A+{fastest}*1.2*MOTOR_LS_MH*0.001*MAXIMUM_CURRENT_A", "V peak",
-             "PARAM_EMF_MAX_V in drive/params.h", "0.00")
+             "PARAM_EMF_MAX_V in drive/param_scaling.h", "0.00")
     needed = "IF(id_half_table=\"\",-id_half_deepest,-id_half_table)"
     wanted = f"MAX({design.TRIM_SHARE}*MAXIMUM_CURRENT_A,MIN(1.2*{needed},0.8*MAXIMUM_CURRENT_A))"
     parameter(page, motor, Rule("FW_TRIM_CURRENT_A", digits_down(wanted, 1),
