@@ -54,7 +54,7 @@
     X(KFILTER_ESDQ_FW, "Q15", 10, 8000, FROM_TUNER, "back-EMF above") \
     X(KFILTER_VELESTIM, "Q15", 10, 8000, FROM_TUNER, "speed for loop, thresholds and display")
 
-#define PARAM_FIELD_WEAKENING(X) /* Field weakening: one entry every 1024 electrical rpm of speed reference */ \
+#define PARAM_FIELD_WEAKENING(X) /* Field weakening: a table entry every 1024 electrical rpm of speed reference */ \
     X(FW_START_SPEED_RPM, "rpm", 100, 20000, FROM_TUNER, "speed reference of entry 0") \
     X(FW_TRIM_CURRENT_A, "A", 0, 20, FROM_TUNER, "most that the voltage feedback may add to the table's d current") \
     PARAM_ENTRIES(X, IDREF_SPEED, "A", -20, 0, FROM_TUNER, "d current of each entry") \
