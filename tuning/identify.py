@@ -48,17 +48,17 @@ COLUMNS = (("measured", "measured\n", "{}"), ("true", "true\n", "{}"), ("error_p
 # ---- the firmware's own tables ---------------------------------------------------------------------------------------------
 @functools.cache
 def _table(name: str, fields: int) -> list[tuple[str, ...]]:
-    """Rows of an X-macro of include/drive/identify.h as the compiler sees them."""
+    """Rows of an X-macro of include/drive/modes/identify.h as the compiler sees them."""
     arguments = ", ".join(f"a{n}" for n in range(fields))
     row = " ~ ".join(f"#a{n}" for n in range(fields))
-    source = f'#include "drive/identify.h"\n#define ROW({arguments}) @@ {row}\n{name}(ROW)\n'
+    source = f'#include "drive/modes/identify.h"\n#define ROW({arguments}) @@ {row}\n{name}(ROW)\n'
     command = [*shlex.split(os.environ.get("CC") or "gcc"), "-E", "-P", f"-I{paths.ROOT / 'include'}", f"-I{paths.ROOT}", "-xc", "-"]
     try:
         done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
     except OSError as error:
         raise UserError("cannot run the compiler", command[0], error.strerror or str(error)) from None
     if done.returncode != 0:
-        raise UserError("the compiler cannot read drive/identify.h", command[0], (done.stderr.splitlines() or ["no message"])[0])
+        raise UserError("the compiler cannot read drive/modes/identify.h", command[0], (done.stderr.splitlines() or ["no message"])[0])
     rows = done.stdout.replace("\n", " ").split("@@")[1:]
     return [tuple(_words(cell) for cell in row.split(" ~ ")) for row in rows]
 

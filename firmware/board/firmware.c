@@ -6,6 +6,7 @@
 #include "board/reset.h"
 #include "board/status.h"
 #include "board/watch.h"
+#include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
 
@@ -28,7 +29,7 @@ void firmware_init(void)
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
-    drive_init(&board_drive, &board_params); /* before what a trap could tell of */
+    drive_init(&board_drive, &board_params); /* before anything can trap */
     status_init();
     board_clock_failed = 0;
     if (clock_init()) { /* the trap may have said so before */

@@ -3,19 +3,12 @@
 #define BOARD_FIRMWARE_H
 
 #include "drive/drive.h"
+#include "drive/modes/params_in_ram.h"
 #include "drive/panel.h"
 #include "drive/param_scaling.h"
 
-/** In RAM a debugger or scope can change a parameter while the motor turns, e.g. board_params.fieldweak.idref_q13[3]; each is
- *  read anew in the next period. Nobody checks its range then. Otherwise parameters are constants in the instructions. */
-#if defined(TUNING) || defined(PARAMS_IN_RAM)
-#define BOARD_PARAMS_PLACE
-#else
-#define BOARD_PARAMS_PLACE const
-#endif
-
 /** The drive's parameters, from userparams.h. */
-extern BOARD_PARAMS_PLACE drive_params_t board_params;
+extern MODE_PARAMS_PLACE drive_params_t board_params;
 
 /** The drive; the control interrupt runs it, the background only writes its commands. */
 extern drive_t board_drive;

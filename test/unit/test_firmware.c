@@ -329,7 +329,7 @@ void test_lights_reach_their_pins(void)
 {
     expect_start(0);
     uart_send_IgnoreAndReturn(0);
-    board_drive.state = (uint16_t)DRIVE_LOCK;
+    board_drive.state = (uint16_t)DRIVE_ALIGN;
     healthy_ms(1);
     TEST_ASSERT_EQUAL_UINT16(1, LATCbits.LATC6); /* alive: lit in the first half second */
     TEST_ASSERT_EQUAL_UINT16(1, LATCbits.LATC7); /* running */
@@ -342,7 +342,7 @@ void test_lights_reach_their_pins(void)
 void test_watch_variables_are_refreshed_in_the_background(void)
 {
     expect_start(0);
-    board_drive.control.reference_erpm = 4321;
+    board_drive.run.control.reference_erpm = 4321;
     healthy_ms(1);
     TEST_ASSERT_EQUAL_INT16(4321, CtrlParm.qVelRef);
 }

@@ -210,8 +210,8 @@ static int16_t brake_limit(const drive_params_t *p, float above_v)
 {
     rig_closed(1, 8000);
     drive.bus_q31 = (int32_t)((PARAM_F(REGEN_LIMIT_V) + above_v) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F) * 65536;
-    drive_handover_step(&drive, p);
-    return drive.control.brake_limit_q13;
+    limits_braking(&drive.run, p, qm_hi(drive.bus_q31));
+    return drive.run.control.brake_limit_q13;
 }
 
 static void expect_braking_to_end_2_V_above(const drive_params_t *p)

@@ -1,12 +1,13 @@
-/* Identification: the drive measures R, Ld, Lq and Kphi of a motor that nobody knows. Only in builds with IDENTIFY.
+/* IDENTIFY: the drive measures R, Ld, Lq and Kphi of an unknown motor.
  *
- * The control interrupt is the instrument (drive/identify_tick.h): it holds a current, superposes a square voltage or turns a
- * current vector, and adds up what it sees. The background is the one who measures (firmware/drive/identify.c): it takes the sums,
- * computes, and asks for the next step. `ready` passes between the two; who does not have it does not touch what it covers. */
-#ifndef DRIVE_IDENTIFY_H
-#define DRIVE_IDENTIFY_H
+ * The control interrupt is the instrument (identify_tick.h): it holds a current, superposes a square voltage or turns a current
+ * vector, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks for the next step.
+ * `ready` names the owner; the other side must not access the guarded fields. */
+#ifndef DRIVE_MODES_IDENTIFY_H
+#define DRIVE_MODES_IDENTIFY_H
 
 #include "control/qmath.h"
+#include "control/soft_float.h"
 #include "drive/param_scaling.h" /* userparams.h may define IDENTIFY */
 
 /** X(name, meaning): steps of the procedure. */
@@ -66,12 +67,6 @@ typedef struct {
     uint16_t kphi_mv_per_krpm;  /**< back-EMF, mV peak line to line per 1000 mechanical rpm */
 } identify_values_t;
 
-/** A positive number with 16 significant bits: m * 2^e, m = 32768 .. 65535, or all 0. */
-typedef struct {
-    uint16_t m;
-    int16_t e;
-} identify_number_t;
-
 /** State. */
 typedef struct {
     volatile uint16_t ready;     /**< 1: the interrupt has finished, all of this belongs to the background; 0: the other way round */
@@ -100,7 +95,7 @@ typedef struct {
     volatile uint16_t step;      /**< identify_step_t */
     volatile uint16_t result;    /**< identify_result_t */
     identify_values_t values;
-    identify_number_t duty_per_amp; /**< duty counts per current count along phase A: R before it is scaled */
+    soft_float_t duty_per_amp; /**< duty counts per current count along phase A: R before it is scaled */
     int32_t duty_first, i_first, bus_first; /**< sums of the first level */
     int32_t dead_q13;               /**< what dead time and diodes take beyond the compensation, as the current for which R takes it */
     uint16_t blocks;                /**< stretches of back-EMF that have been evaluated */
@@ -109,5 +104,9 @@ typedef struct {
     uint16_t kphi_half;             /**< mV per 1000 rpm at half speed */
 } identify_t;
 
+#define IDENTIFY_STATE identify_t identify;
+#else
+#define IDENTIFY_STATE
 #endif
+
 #endif

@@ -1,10 +1,10 @@
-/* The note's snapshot: four arrays filled with one row every SNAPDELAY periods, on request. */
-#ifndef DRIVE_SNAPSHOT_H
-#define DRIVE_SNAPSHOT_H
+/* SNAPSHOT, AN1292's recorder: four arrays filled with one row every SNAPDELAY periods, on request. */
+#ifndef DRIVE_MODES_SNAPSHOT_H
+#define DRIVE_MODES_SNAPSHOT_H
 
 #include "drive/drive.h"
 
-/** Recorder; the arrays belong to the board and bear the note's names. */
+/** Recorder; the arrays belong to the board and bear AN1292's names. */
 typedef struct {
     int16_t *column[4];    /**< SnapBuf1..4: phase current a, q current, filtered speed, angle */
     uint16_t rows;         /**< DATA_BUFFER_SIZE */
@@ -14,7 +14,7 @@ typedef struct {
     uint16_t row, wait;
 } snapshot_t;
 
-/** One period of the recorder. Currents are in the note's format (Q15 of full scale). */
+/** One period of the recorder. Currents are in AN1292's format (Q15 of full scale). */
 QM_INLINE void snapshot_tick(snapshot_t *s, const drive_t *d)
 {
     uint16_t row = s->row;
@@ -24,9 +24,9 @@ QM_INLINE void snapshot_tick(snapshot_t *s, const drive_t *d)
     s->wait = 0;
     *s->done = 0;
     s->column[0][row] = (int16_t)(4 * qm_clamp(d->i_a_q13, -8191, 8191));
-    s->column[1][row] = (int16_t)(4 * qm_clamp(d->control.i_q13.q, -8191, 8191));
-    s->column[2][row] = estimator_speed(&d->estimator);
-    s->column[3][row] = (int16_t)(d->estimator.rho_q32 >> 16);
+    s->column[1][row] = (int16_t)(4 * qm_clamp(d->run.control.i_q13.q, -8191, 8191));
+    s->column[2][row] = estimator_speed(&d->run.estimator);
+    s->column[3][row] = (int16_t)(d->run.estimator.rho_q32 >> 16);
     s->row = (uint16_t)(row + 1u);
     if (s->row >= s->rows) {
         s->row = 0;

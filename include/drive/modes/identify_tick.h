@@ -1,9 +1,8 @@
-/* The interrupt's part of the identification: one PWM period of holding, injecting or turning a vector, and of adding up. */
-#ifndef DRIVE_IDENTIFY_TICK_H
-#define DRIVE_IDENTIFY_TICK_H
+/* IDENTIFY, the interrupt's part: one PWM period of holding, injecting or turning a vector, and of adding up. */
+#ifndef DRIVE_MODES_IDENTIFY_TICK_H
+#define DRIVE_MODES_IDENTIFY_TICK_H
 
-#include "drive/drive.h"
-#include "drive/param_scaling.h"
+#include "drive/state.h"
 
 #ifdef IDENTIFY
 
@@ -25,7 +24,7 @@ QM_INLINE uint16_t identify_bus(const drive_t *d)
 /** Current along the axis of the square voltage, in counts that both axes share: phase A, or A + 2 B = sqrt(3) beta. */
 QM_INLINE int16_t identify_current(const drive_t *d)
 {
-    return (int16_t)(d->identify.on_q ? d->i_a_q13 + 2 * d->i_b_q13 : d->i_a_q13);
+    return (int16_t)(d->run.identify.on_q ? d->i_a_q13 + 2 * d->i_b_q13 : d->i_a_q13);
 }
 
 /** Duties along the same axis: three times the alpha voltage, or sqrt(3) times three times the beta voltage, over the bus. */
@@ -38,13 +37,13 @@ QM_INLINE int16_t identify_duty(const identify_t *id, duties_t duty)
 /** Moves the frame. @return 1 when it stands or has reached its speed */
 QM_INLINE uint16_t identify_turn(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     uint16_t settled = 1;
     if (id->mode == (uint16_t)IDENTIFY_TURN) {
         forced_angle_params_t to = p->forced;
         to.end_speed_q10 >>= id->halvings;
-        if (d->state == (uint16_t)DRIVE_LOCK) {
-            d->state = (uint16_t)DRIVE_RAMP;
+        if (d->state == (uint16_t)DRIVE_ALIGN) {
+            drive_enter(d, DRIVE_RAMP);
         }
         settled = (uint16_t)forced_angle_tick(&d->forced, &to, 1);
     } else if (id->sweep) {
@@ -73,8 +72,8 @@ QM_INLINE int16_t identify_square(identify_t *id)
 /** Next voltage in the frame. @param sign of the square voltage */
 QM_INLINE dq_t identify_voltage(drive_t *d, int16_t sign)
 {
-    identify_t *id = &d->identify;
-    drive_control_t *c = &d->control;
+    identify_t *id = &d->run.identify;
+    drive_control_t *c = &d->run.control;
     pi_gains_t gains_d, gains_q;
 
     if (id->mode == (uint16_t)IDENTIFY_INJECT) {
@@ -111,13 +110,13 @@ QM_INLINE dq_t identify_voltage(drive_t *d, int16_t sign)
  *  Turning: voltage d and q (centred on the sample, as commanded a period ago), current d and q. */
 QM_INLINE void identify_add(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     int16_t i_q13 = identify_current(d);
     if (id->mode == (uint16_t)IDENTIFY_TURN) {
-        id->sum[0] += d->control.v_q14.d;
-        id->sum[1] += d->control.v_q14.q;
-        id->sum[2] += d->control.i_q13.d;
-        id->sum[3] += d->control.i_q13.q;
+        id->sum[0] += d->run.control.v_q14.d;
+        id->sum[1] += d->run.control.v_q14.q;
+        id->sum[2] += d->run.control.i_q13.d;
+        id->sum[3] += d->run.control.i_q13.q;
     } else if (id->mode != (uint16_t)IDENTIFY_INJECT) {
         id->sum[0] += id->duty - 4 * p->svm.dead_time;
         id->sum[1] += i_q13;
@@ -137,13 +136,13 @@ QM_INLINE void identify_add(drive_t *d, const drive_params_t *p)
 /** Waits, then adds up, then hands over to the background. @param settled the frame stands or has its speed */
 QM_INLINE void identify_record(drive_t *d, const drive_params_t *p, uint16_t settled)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     uint16_t done = 0;
     if (id->ready || !settled) {
         return;
     }
     if (id->mode == (uint16_t)IDENTIFY_GROW) {
-        done = (uint16_t)(d->control.i_q13.d >= id->rise_q13 || d->control.v_q14.d >= identify_most(&d->circle));
+        done = (uint16_t)(d->run.control.i_q13.d >= id->rise_q13 || d->run.control.v_q14.d >= identify_most(&d->circle));
     } else if (id->wait != 0u) {
         id->wait--;
     } else {
@@ -162,17 +161,17 @@ QM_INLINE void identify_record(drive_t *d, const drive_params_t *p, uint16_t set
  *  costs up to 0.3 V across the current, which is where the back-EMF is; standing, the first current would come with a jump. */
 QM_INLINE duties_t identify_duties(const drive_t *d, const drive_params_t *p)
 {
-    alphabeta_t i_q12 = inverse_park(d->control.ref_q13, d->frame);
+    alphabeta_t i_q12 = inverse_park(d->run.control.ref_q13, d->frame);
     int16_t t = (int16_t)(2 * qm_mulhi_su(i_q12.beta, 56756u)); /* sqrt(3)/2 */
-    return svm(&p->svm, inverse_park(d->control.v_q14, d->frame), d->duty_per_volt_q16,
+    return svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16,
                (int16_t)(2 * i_q12.alpha), (int16_t)(t - i_q12.alpha), (int16_t)(-t - i_q12.alpha));
 }
 
 /** A period with the bridge switching; S2 stops at once. */
-QM_RARE duties_t identify_run(drive_t *d, const drive_params_t *p)
+NOINLINE duties_t identify_run(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
-    drive_control_t *c = &d->control;
+    identify_t *id = &d->run.identify;
+    drive_control_t *c = &d->run.control;
     int16_t sign;
     duties_t duty;
 
@@ -187,11 +186,56 @@ QM_RARE duties_t identify_run(drive_t *d, const drive_params_t *p)
     id->sign = sign;
     id->duty = identify_duty(id, duty);
     id->i_before_q13 = identify_current(d);
-    if (!d->command.run && d->state != (uint16_t)DRIVE_FAULT) {
-        d->state = (uint16_t)DRIVE_STOPPED;
+    if (!d->command.run) {
+        drive_enter(d, DRIVE_STOPPED);
     }
     return duty;
 }
 
+/** Prepares the first step. */
+void identify_start(drive_t *d, const drive_params_t *p);
+
+/** The background's part: evaluates a finished step and asks for the next one. Once a millisecond.
+ *  @return 1 when the procedure is not running: the bridge is to be off */
+uint16_t identify_background(drive_t *d, const drive_params_t *p);
+
 #endif
+
+/** A period with the bridge switching. @return 1 if the mode has taken it */
+QM_INLINE uint16_t mode_run(drive_t *d, const drive_params_t *p, duties_t *duty)
+{
+#ifdef IDENTIFY
+    *duty = identify_run(d, p);
+    return 1;
+#else
+    (void)d;
+    (void)p;
+    (void)duty;
+    return 0;
+#endif
+}
+
+/** The last thing that drive_start() prepares. */
+QM_INLINE void mode_start(drive_t *d, const drive_params_t *p)
+{
+#ifdef IDENTIFY
+    identify_start(d, p);
+#else
+    (void)d;
+    (void)p;
+#endif
+}
+
+/** A pass of the background. @return 1 when the motor is to stop */
+QM_INLINE uint16_t mode_background(drive_t *d, const drive_params_t *p)
+{
+#ifdef IDENTIFY
+    return identify_background(d, p);
+#else
+    (void)d;
+    (void)p;
+    return 0;
+#endif
+}
+
 #endif

@@ -1,9 +1,10 @@
-/* The background's part of the identification: takes the interrupt's sums, computes R, L and Kphi, and asks for the next step. */
-#include "drive/drive.h"
-#include "drive/identify_tick.h"
-#include "drive/param_scaling.h"
+/* IDENTIFY, the background's part: takes the interrupt's sums, computes R, L and Kphi, and asks for the next step. */
+#include "drive/modes/identify_tick.h"
 
 #ifdef IDENTIFY
+
+#include "control/root.h"
+#include "drive/param_scaling.h"
 
 #define SETTLE_PERIODS PARAM_PERIODS(0.4F)  /* ten time constants of the slow current controller */
 #define SLOW_LOOP_RAD_S 25.0F               /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
@@ -20,112 +21,21 @@
 #define BLOCKS_LOG2 8                       /* stretches: many swings */
 #define BLOCKS 256u
 
-/* ---- Numbers with 16 significant bits ---- */
-
-static identify_number_t number_of(uint32_t x)
-{
-    identify_number_t n = { 0, 0 };
-    if (x != 0u) {
-        uint32_t left = x;
-        n.e = 16;
-        while (left < 0x80000000ul) {
-            left <<= 1;
-            n.e--;
-        }
-        n.m = (uint16_t)(left >> 16);
-    }
-    return n;
-}
-
-/** A constant that comes multiplied by 2^bits. */
-static identify_number_t number_scaled(uint32_t x, int16_t bits)
-{
-    identify_number_t n = number_of(x);
-    n.e = (int16_t)(n.e - bits);
-    return n;
-}
-
-static identify_number_t number_mul(identify_number_t a, identify_number_t b)
-{
-    identify_number_t n = number_of(qm_muluu(a.m, b.m));
-    n.e = (int16_t)(n.e + a.e + b.e);
-    return n;
-}
-
-/** a / b; 0 for b = 0. */
-static identify_number_t number_div(identify_number_t a, identify_number_t b)
-{
-    identify_number_t n = { 0, 0 };
-    if (b.m != 0u) { /* then 32768 or more: above the numerator's upper word */
-        n = number_of(qm_divud((uint32_t)a.m << 15, b.m));
-        n.e = (int16_t)(n.e + a.e - b.e - 15);
-    }
-    return n;
-}
-
-/** Rounded, at most 65535. */
-static uint16_t number_to_uint16(identify_number_t a)
-{
-    if (a.e > 0) {
-        return 65535u;
-    }
-    if (a.e == 0) {
-        return a.m;
-    }
-    if (a.e < -16) {
-        return 0;
-    }
-    return (uint16_t)((((uint32_t)a.m >> (uint16_t)(-a.e - 1)) + 1u) >> 1);
-}
-
-/** x times a, for products below 2^30. */
-static int32_t number_times(int32_t x, identify_number_t a)
-{
-    identify_number_t n = number_mul(number_of((uint32_t)((x < 0) ? -x : x)), a);
-    uint32_t size = 0;
-    if (n.e >= 0) {
-        size = (n.e > 14) ? 0x3FFFFFFFul : (uint32_t)n.m << (uint16_t)n.e;
-    } else if (n.e > -16) {
-        size = (uint32_t)n.m >> (uint16_t)-n.e;
-    } else {
-        /* below one */
-    }
-    return (x < 0) ? -(int32_t)size : (int32_t)size;
-}
-
-/** Square root, rounded down. @param x below 2^31 */
-static uint16_t root(uint32_t x)
-{
-    uint16_t r = 0, bit;
-    for (bit = 0x8000u; bit != 0u; bit >>= 1) {
-        uint16_t next = (uint16_t)(r | bit);
-        if (qm_muluu(next, next) <= x) {
-            r = next;
-        }
-    }
-    return r;
-}
-
-static uint16_t length(int16_t x, int16_t y)
-{
-    return root((uint32_t)(qm_mulss(x, x) + qm_mulss(y, y)));
-}
-
 /* ---- Constants from the board's parameters ---- */
 #define TS_US (PARAM_F(LOOPTIME_SEC) * 1000000.0F)
 /* mohm for a bus of 1 (Q16) and one duty count along phase A per current count. */
 #define MOHM_PER_RATIO (1000.0F * PARAM_F(BUS_FULL_SCALE_V) / (65536.0F * 3.0F * (float)PWM_FULL_DUTY * 4.0F * PARAM_F(NORM_CURRENT_CONST)))
-#define C_RESISTANCE number_scaled((uint32_t)(MOHM_PER_RATIO * 16777216.0F), 24)
+#define C_RESISTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * 16777216.0F), 24)
 /* The sums of duties are sums of two. */
-#define C_INDUCTANCE number_scaled((uint32_t)(MOHM_PER_RATIO * TS_US / 2000.0F * 268435456.0F), 28)
-#define C_TS number_scaled((uint32_t)(TS_US / 1000.0F * 16777216.0F), 24) /* uH per mohm */
-#define C_KP number_scaled((uint32_t)(LOOP_RAD_S * 0.000001F * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 16777216.0F), 24)
-#define C_KI number_scaled((uint32_t)(LOOP_RAD_S * 0.001F * PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 268435456.0F), 28)
-#define C_OHMIC number_scaled((uint32_t)(0.001F * 2.0F * PARAM_IU * 4294967296.0F), 32) /* Q13 current to Q14 voltage per mohm */
+#define C_INDUCTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * TS_US / 2000.0F * 268435456.0F), 28)
+#define C_TS soft_float_scaled((uint32_t)(TS_US / 1000.0F * 16777216.0F), 24) /* uH per mohm */
+#define C_KP soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.000001F * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 16777216.0F), 24)
+#define C_KI soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.001F * PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 268435456.0F), 28)
+#define C_OHMIC soft_float_scaled((uint32_t)(0.001F * 2.0F * PARAM_IU * 4294967296.0F), 32) /* Q13 current to Q14 voltage per mohm */
 /* The same per uH and 1/1024 angle count a period. */
-#define C_REACTIVE number_scaled((uint32_t)(0.000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 72057594037927936.0F), 56)
+#define C_REACTIVE soft_float_scaled((uint32_t)(0.000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 72057594037927936.0F), 56)
 /* mV line to line per 1000 rpm, from Q14 voltage over 1/1024 angle counts a period. */
-#define C_KPHI number_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
+#define C_KPHI soft_float_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
                                         * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), 6)
 
 /* ---- Requests to the interrupt ---- */
@@ -145,23 +55,23 @@ static void go(identify_t *id, identify_step_t step, uint16_t wait, uint16_t per
 
 static void finish(drive_t *d, identify_result_t result)
 {
-    d->identify.result = (uint16_t)result;
-    d->identify.step = (uint16_t)IDENTIFY_IDLE;
+    d->run.identify.result = (uint16_t)result;
+    d->run.identify.step = (uint16_t)IDENTIFY_IDLE;
     d->command.run = 0;
 }
 
 void identify_start(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     id->result = (uint16_t)IDENTIFY_RESULT_BUSY;
     id->mode = (uint16_t)IDENTIFY_GROW;
     id->shift = SLOW_SHIFT;
     id->half = FIRST_HALF;
     id->half_left = FIRST_HALF / 2u;
     id->rise_q13 = (int16_t)(p->open_loop_q13 >> 1);
-    d->control.pi_d.sum = (int32_t)16 << SLOW_SHIFT; /* about ten millivolts */
-    d->control.ref_q13.d = id->rise_q13;
-    d->control.ref_q13.q = 0;
+    d->run.control.pi_d.sum = (int32_t)16 << SLOW_SHIFT; /* about ten millivolts */
+    d->run.control.ref_q13.d = id->rise_q13;
+    d->run.control.ref_q13.q = 0;
     d->forced.angle_q32 = IDENTIFY_START_ANGLE_Q32;
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos(d->angle);
@@ -173,8 +83,8 @@ void identify_start(drive_t *d, const drive_params_t *p)
 /** Voltage and current at the end of RISE give R well enough for a slow integral controller of any motor. */
 static void rise_done(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
-    int16_t i_q13 = d->control.i_q13.d, v_q14 = d->control.v_q14.d;
+    identify_t *id = &d->run.identify;
+    int16_t i_q13 = d->run.control.i_q13.d, v_q14 = d->run.control.v_q14.d;
     uint16_t ki;
     if (v_q14 >= identify_most(&d->circle)) {
         finish(d, (i_q13 < (p->open_loop_q13 >> 3)) ? IDENTIFY_RESULT_NO_CURRENT : IDENTIFY_RESULT_CURRENT_NOT_REACHED);
@@ -195,12 +105,12 @@ static void rise_done(drive_t *d, const drive_params_t *p)
 /** 1 if the current is within an eighth of what was asked for; else the end of the procedure. @param mean_q13 along the frame's d axis */
 static uint16_t current_reached(drive_t *d, int16_t mean_q13)
 {
-    int16_t ref_q13 = d->control.ref_q13.d;
+    int16_t ref_q13 = d->run.control.ref_q13.d;
     if (mean_q13 < (ref_q13 >> 2)) {
         finish(d, IDENTIFY_RESULT_NO_CURRENT);
         return 0;
     }
-    if (mean_q13 < ref_q13 - (ref_q13 >> 3) || d->control.v_q14.d >= identify_most(&d->circle)) {
+    if (mean_q13 < ref_q13 - (ref_q13 >> 3) || d->run.control.v_q14.d >= identify_most(&d->circle)) {
         finish(d, IDENTIFY_RESULT_CURRENT_NOT_REACHED);
         return 0;
     }
@@ -210,28 +120,28 @@ static uint16_t current_reached(drive_t *d, int16_t mean_q13)
 /** At -60 degrees phase B carries all of the current and A and C half of it each. */
 static void connect_done(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     int16_t a_q13 = (int16_t)(id->sum[1] >> MEAN_LOG2), b_q13 = (int16_t)(id->sum[2] >> MEAN_LOG2);
     if (!current_reached(d, (int16_t)-b_q13)) {
         return;
     }
-    if (qm_abs((int16_t)(2 * a_q13 + b_q13)) > (d->control.ref_q13.d >> 1)) {
+    if (qm_abs((int16_t)(2 * a_q13 + b_q13)) > (d->run.control.ref_q13.d >> 1)) {
         finish(d, IDENTIFY_RESULT_NO_CURRENT);
         return;
     }
-    d->control.ref_q13.d = p->open_loop_q13;
+    d->run.control.ref_q13.d = p->open_loop_q13;
     id->sweep = 1;
     go(id, IDENTIFY_ALIGN, SETTLE_PERIODS, 1u << MEAN_LOG2);
 }
 
 static void align_done(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     if (current_reached(d, (int16_t)(id->sum[1] >> MEAN_LOG2))) {
         id->duty_first = id->sum[0];
         id->i_first = id->sum[1];
         id->bus_first = id->sum[3];
-        d->control.ref_q13.d = (int16_t)(p->open_loop_q13 >> 1);
+        d->run.control.ref_q13.d = (int16_t)(p->open_loop_q13 >> 1);
         go(id, IDENTIFY_RESISTANCE, SETTLE_PERIODS, 1u << MEAN_LOG2);
     }
 }
@@ -240,24 +150,24 @@ static void align_done(drive_t *d, const drive_params_t *p)
  *  level's duties are brought to the bus of the second. */
 static void resistance_done(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
-    identify_number_t bus = number_div(number_of((uint32_t)id->bus_first), number_of((uint32_t)id->sum[3]));
-    int32_t duty_first = number_times(id->duty_first, bus);
+    identify_t *id = &d->run.identify;
+    soft_float_t bus = soft_float_div(soft_float_of((uint32_t)id->bus_first), soft_float_of((uint32_t)id->sum[3]));
+    int32_t duty_first = soft_float_times(id->duty_first, bus);
     int32_t duty = duty_first - id->sum[0], i = id->i_first - id->sum[1];
     if (duty <= 0 || i <= 0) {
         finish(d, IDENTIFY_RESULT_R_RANGE);
         return;
     }
-    id->duty_per_amp = number_div(number_of((uint32_t)duty), number_of((uint32_t)i));
+    id->duty_per_amp = soft_float_div(soft_float_of((uint32_t)duty), soft_float_of((uint32_t)i));
     /* Standing, one phase carries it and the other two their halves: 4/3 of a leg's voltage; turning, 4/pi. */
-    id->dead_q13 = number_times((number_times(duty_first, number_div(number_of(1), id->duty_per_amp)) - id->i_first) >> MEAN_LOG2,
-                                number_scaled((uint32_t)(3.0F / PARAM_PI * 65536.0F), 16));
-    id->values.rs_mohm = number_to_uint16(number_mul(number_mul(id->duty_per_amp, number_of((uint32_t)(id->sum[3] >> MEAN_LOG2))), C_RESISTANCE));
+    id->dead_q13 = soft_float_times((soft_float_times(duty_first, soft_float_div(soft_float_of(1), id->duty_per_amp)) - id->i_first) >> MEAN_LOG2,
+                                soft_float_scaled((uint32_t)(3.0F / PARAM_PI * 65536.0F), 16));
+    id->values.rs_mohm = soft_float_to_uint16(soft_float_mul(soft_float_mul(id->duty_per_amp, soft_float_of((uint32_t)(id->sum[3] >> MEAN_LOG2))), C_RESISTANCE));
     if (id->values.rs_mohm < 20u || id->values.rs_mohm > 40000u) {
         finish(d, IDENTIFY_RESULT_R_RANGE);
         return;
     }
-    d->control.ref_q13.d = (int16_t)(p->open_loop_q13 - (p->open_loop_q13 >> 2));
+    d->run.control.ref_q13.d = (int16_t)(p->open_loop_q13 - (p->open_loop_q13 >> 2));
     go(id, IDENTIFY_BIAS, SETTLE_PERIODS, 1);
 }
 
@@ -266,13 +176,13 @@ static void resistance_done(drive_t *d, const drive_params_t *p)
 /** Largest square voltage: what the bias leaves of seven eighths of the circle. */
 static int16_t square_most(const drive_t *d)
 {
-    return (int16_t)(d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - d->identify.bias_q14);
+    return (int16_t)(d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - d->run.identify.bias_q14);
 }
 
 static void bias_done(drive_t *d)
 {
-    identify_t *id = &d->identify;
-    id->bias_q14 = d->control.v_q14.d;
+    identify_t *id = &d->run.identify;
+    id->bias_q14 = d->run.control.v_q14.d;
     id->square_q14 = (int16_t)(d->circle.limit_q14 >> 7);
     id->mode = (uint16_t)IDENTIFY_INJECT;
     go(id, IDENTIFY_TRY_D, 4u * FIRST_HALF, TRY_HALVES * FIRST_HALF);
@@ -282,7 +192,7 @@ static void bias_done(drive_t *d)
  *  3/4 of it no phase current reaches zero on either axis. @param next step of the measurement proper */
 static void try_done(drive_t *d, const drive_params_t *p, identify_step_t next)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     uint16_t half = id->half;
     /* phase A, or sqrt(3) beta */
     int32_t wanted = (int32_t)(id->on_q ? p->open_loop_q13 - (p->open_loop_q13 >> 2) : p->open_loop_q13 >> 1) * (int32_t)(TRY_HALVES / 3u);
@@ -308,23 +218,23 @@ static void try_done(drive_t *d, const drive_params_t *p, identify_step_t next)
  *  samples, which makes this L too large by 3/8 (Ts R / (2 L))^2. @return uH, or 0 when it cannot be */
 static uint16_t inductance(const identify_t *id)
 {
-    int32_t volts = id->sum[0] - number_times(id->sum[1], id->duty_per_amp);
-    identify_number_t l, rt;
+    int32_t volts = id->sum[0] - soft_float_times(id->sum[1], id->duty_per_amp);
+    soft_float_t l, rt;
     uint16_t l_uh, less_uh;
     if (volts <= 0 || id->sum[2] <= 0) {
         return 0;
     }
-    l = number_div(number_of((uint32_t)volts), number_of((uint32_t)id->sum[2]));
-    l = number_mul(number_mul(l, number_of(id->bus_q16)), C_INDUCTANCE);
-    rt = number_mul(number_of(id->values.rs_mohm), C_TS);
-    less_uh = number_to_uint16(number_div(number_mul(number_mul(rt, rt), number_scaled(3, 5)), l));
-    l_uh = number_to_uint16(l);
+    l = soft_float_div(soft_float_of((uint32_t)volts), soft_float_of((uint32_t)id->sum[2]));
+    l = soft_float_mul(soft_float_mul(l, soft_float_of(id->bus_q16)), C_INDUCTANCE);
+    rt = soft_float_mul(soft_float_of(id->values.rs_mohm), C_TS);
+    less_uh = soft_float_to_uint16(soft_float_div(soft_float_mul(soft_float_mul(rt, rt), soft_float_scaled(3, 5)), l));
+    l_uh = soft_float_to_uint16(l);
     return (uint16_t)((l_uh >= 20u && l_uh <= 60000u && less_uh < l_uh >> 1) ? (uint16_t)(l_uh - less_uh) : 0u);
 }
 
 static void inductance_d_done(drive_t *d)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     id->values.ld_uh = inductance(id);
     if (id->values.ld_uh == 0u) {
         finish(d, IDENTIFY_RESULT_L_RANGE);
@@ -337,9 +247,9 @@ static void inductance_d_done(drive_t *d)
 
 /* ---- Back-EMF ---- */
 
-static int16_t gain(identify_number_t x)
+static int16_t gain(soft_float_t x)
 {
-    uint16_t g = number_to_uint16(x);
+    uint16_t g = soft_float_to_uint16(x);
     return (int16_t)((g > 32767u) ? 32767u : (g == 0u) ? 1u : g);
 }
 
@@ -354,22 +264,22 @@ static void forget_emf(identify_t *id)
 /** R and L known: fast current controllers, then the vector turns. It starts along the rotor, so nothing jumps. */
 static void inductance_q_done(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     pi_gains_t gains = { 0, 0, 0, LOOP_SHIFT };
     id->values.lq_uh = inductance(id);
     if (id->values.lq_uh == 0u) {
         finish(d, IDENTIFY_RESULT_L_RANGE);
         return;
     }
-    id->kp_d = gain(number_mul(number_of(id->values.ld_uh), C_KP));
-    id->kp_q = gain(number_mul(number_of(id->values.lq_uh), C_KP));
-    id->ki_d = gain(number_mul(number_of(id->values.rs_mohm), C_KI));
+    id->kp_d = gain(soft_float_mul(soft_float_of(id->values.ld_uh), C_KP));
+    id->kp_q = gain(soft_float_mul(soft_float_of(id->values.lq_uh), C_KP));
+    id->ki_d = gain(soft_float_mul(soft_float_of(id->values.rs_mohm), C_KI));
     id->ki_q = id->ki_d;
     id->shift = LOOP_SHIFT;
     id->halvings = 1;
-    pi_preset(&d->control.pi_d, &gains, 0, id->bias_q14);
-    pi_preset(&d->control.pi_q, &gains, 0, 0);
-    d->control.ref_q13.d = p->open_loop_q13;
+    pi_preset(&d->run.control.pi_d, &gains, 0, id->bias_q14);
+    pi_preset(&d->run.control.pi_q, &gains, 0, 0);
+    d->run.control.ref_q13.d = p->open_loop_q13;
     id->mode = (uint16_t)IDENTIFY_TURN;
     forget_emf(id);
     go(id, IDENTIFY_SPIN_HALF, SETTLE_PERIODS, 1u << BLOCK_LOG2);
@@ -378,10 +288,10 @@ static void inductance_q_done(drive_t *d, const drive_params_t *p)
 /** Speed of the vector in 1/1024 angle counts a period. */
 static uint32_t turn_speed(const drive_t *d, const drive_params_t *p)
 {
-    return (uint32_t)p->forced.end_speed_q10 >> d->identify.halvings;
+    return (uint32_t)p->forced.end_speed_q10 >> d->run.identify.halvings;
 }
 
-/** Mean of a stretch, within what length() can square. */
+/** Mean of a stretch, within what root_length() can square. */
 static int16_t emf_mean(int32_t sum)
 {
     int32_t mean = sum >> BLOCK_LOG2;
@@ -392,13 +302,13 @@ static int16_t emf_mean(int32_t sum)
  *  voltage that dead time takes has the current's direction. */
 static void emf_block(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
-    identify_number_t ohmic = number_mul(number_of(id->values.rs_mohm), C_OHMIC);
-    identify_number_t reactive = number_mul(number_mul(number_of(id->values.ld_uh), number_of(turn_speed(d, p))), C_REACTIVE);
-    int16_t e_d = emf_mean(id->sum[0] - number_times(id->sum[2] + id->dead_q13 * (1 << BLOCK_LOG2), ohmic) + number_times(id->sum[3], reactive));
-    int16_t e_q = emf_mean(id->sum[1] - number_times(id->sum[3], ohmic) - number_times(id->sum[2], reactive));
+    identify_t *id = &d->run.identify;
+    soft_float_t ohmic = soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC);
+    soft_float_t reactive = soft_float_mul(soft_float_mul(soft_float_of(id->values.ld_uh), soft_float_of(turn_speed(d, p))), C_REACTIVE);
+    int16_t e_d = emf_mean(id->sum[0] - soft_float_times(id->sum[2] + id->dead_q13 * (1 << BLOCK_LOG2), ohmic) + soft_float_times(id->sum[3], reactive));
+    int16_t e_q = emf_mean(id->sum[1] - soft_float_times(id->sum[3], ohmic) - soft_float_times(id->sum[2], reactive));
     id->blocks++;
-    id->emf_sum += length(e_d, e_q);
+    id->emf_sum += root_length(e_d, e_q);
     id->emf_d_sum += e_d;
     id->emf_q_sum += e_q;
 }
@@ -406,26 +316,26 @@ static void emf_block(drive_t *d, const drive_params_t *p)
 /** mV per 1000 rpm: the mean length, so that swinging of the rotor, which turns the vector to and fro, does not shorten it. */
 static uint16_t kphi(const drive_t *d, const drive_params_t *p)
 {
-    identify_number_t mean = number_of(d->identify.emf_sum);
+    soft_float_t mean = soft_float_of(d->run.identify.emf_sum);
     mean.e = (int16_t)(mean.e - BLOCKS_LOG2);
-    return number_to_uint16(number_mul(number_div(mean, number_of(turn_speed(d, p))), C_KPHI));
+    return soft_float_to_uint16(soft_float_mul(soft_float_div(mean, soft_float_of(turn_speed(d, p))), C_KPHI));
 }
 
 /** 1 if the stretches agree in direction: a rotor that slips has them everywhere. */
 static uint16_t coherent(const identify_t *id)
 {
     uint16_t mean = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
-    return (uint16_t)(length((int16_t)(id->emf_d_sum >> BLOCKS_LOG2), (int16_t)(id->emf_q_sum >> BLOCKS_LOG2)) > mean - (mean >> 2));
+    return (uint16_t)(root_length((int16_t)(id->emf_d_sum >> BLOCKS_LOG2), (int16_t)(id->emf_q_sum >> BLOCKS_LOG2)) > mean - (mean >> 2));
 }
 
 static void spin_done(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     uint16_t result_mv;
     dq_t v;
     v.d = (int16_t)(id->sum[0] >> BLOCK_LOG2);
     v.q = (int16_t)(id->sum[1] >> BLOCK_LOG2);
-    if (length(v.d, v.q) > (uint16_t)(d->circle.limit_q14 - (d->circle.limit_q14 >> 3))) {
+    if (root_length(v.d, v.q) > (uint16_t)(d->circle.limit_q14 - (d->circle.limit_q14 >> 3))) {
         finish(d, IDENTIFY_RESULT_VOLTAGE_LIMIT);
         return;
     }
@@ -454,7 +364,7 @@ static void spin_done(drive_t *d, const drive_params_t *p)
 
 uint16_t identify_background(drive_t *d, const drive_params_t *p)
 {
-    identify_t *id = &d->identify;
+    identify_t *id = &d->run.identify;
     if (id->step != (uint16_t)IDENTIFY_IDLE && !d->command.run) { /* S2 or a fault */
         finish(d, IDENTIFY_RESULT_STOPPED);
     }
