@@ -6,29 +6,16 @@
 
 import argparse
 import itertools
-import os
 import re
-import shlex
-import subprocess
 import sys
 from collections.abc import Callable
 
+from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.paths import ROOT
+from tools.common.x_macro import rows
 
 BEGIN, END = "<!-- table -->\n", "<!-- end -->"
-
-
-def rows(folder: str, header: str, macro: str, columns: str) -> list[list[str]]:
-    """The rows of an X-macro as the compiler sees it; `columns` are its parameters, with # those that are no texts."""
-    names = columns.replace("#", "").split()
-    source = f'#include "{header}"\n#define ROW({", ".join(names)}) @@ {" @ ".join(columns.split())}\n{macro}(ROW)\n'
-    compiler = shlex.split(os.environ.get("CC") or "gcc")
-    done = subprocess.run([*compiler, "-E", "-P", f"-I{ROOT / folder}", "-xc", "-"], input=source, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        sys.exit(f"foc33: {folder}/{header} does not compile, {compiler[0]}: {(done.stderr.splitlines() or ['no message'])[0]}")
-    found = [row.split(" @ ") for row in done.stdout.replace("\n", " ").split("@@")[1:]]
-    return [["".join(re.findall(r'"((?:[^"\\]|\\.)*)"', cell)) for cell in row] for row in found]
 
 
 def table(head: str, align: str, lines: list[list[str]]) -> str:
@@ -83,6 +70,8 @@ def main() -> None:
             (ROOT / "docs" / f"{name}.md").write_text(page(name), encoding="utf-8")
     except OSError as error:
         sys.exit(f"foc33: {error.strerror}, {error.filename}: check the file")
+    except UserError as error:
+        sys.exit(f"foc33: {error}")
 
 
 if __name__ == "__main__":
