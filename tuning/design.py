@@ -17,9 +17,9 @@ from .limits import RPM, Envelope
 
 ESDQ_HZ = 118.76
 VELESTIM_HZ = 73.5
-"""The note's 1200 and 748 at 50 us."""
+"""AN1292's 1200 and 748 at 50 us."""
 QUICK_ROTOR_S = 0.015
-"""A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with the note's speed filter
+"""A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with AN1292's speed filter
 reacts: the filter's corner rises in proportion, up to four times. Its speed gain is small (it goes with J), so noise stays small too."""
 HEAVY_S = 0.1
 """A slow speed loop is the inertia's doing, not a quick rotor's, where rated torque needs longer than this to rated speed."""
@@ -239,13 +239,13 @@ def _board(d: Design) -> None:
                        ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
                        ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
         d.put(name, text, "board file")
-    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, the note's corner")
+    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, AN1292's corner")
     d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
-          "the same: the note's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
+          "the same: AN1292's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
     rise_s = _rise_s(d.motor)
     faster = min(max(QUICK_ROTOR_S / rise_s, 1.0), 4.0)
     d.put("KFILTER_VELESTIM", str(constants.filter_k(faster * VELESTIM_HZ, b.pwm_period_s)), f"{faster * VELESTIM_HZ:.0f} Hz at this PWM period, " + (
-        "the note's corner" if faster == 1.0 else f"{faster:.2g} times the note's corner: rated torque brings the rotor to rated speed in {rise_s * 1e3:.2g} ms"))
+        "AN1292's corner" if faster == 1.0 else f"{faster:.2g} times AN1292's corner: rated torque brings the rotor to rated speed in {rise_s * 1e3:.2g} ms"))
 
 
 def _rise_s(m: Motor) -> float:

@@ -245,7 +245,7 @@ def _constants(book: Any) -> None:
                   (f"=INT(C{row}/2^D{row}+0.5)", "result"), (f"=100*(F{row}*2^D{row}/C{row}-1)", "value"), (f"=15-D{row}", "value"),
                   (f'=IF(F{row}>32767,"too large for 16 bits: raise the exponent","ok")', "check"), (meaning, "label"))
         page.range(f"E{row}", 0, 15, "Exponent")
-        book.name(f"note_{name}", "Constants", f"F{row}")
+        book.name(f"AN1292_{name}", "Constants", f"F{row}")
     for title, rows in CONSTANTS.items():
         page.section(f"The firmware's: {title}")
         for name, formula, q_format, meaning in rows:

@@ -36,7 +36,7 @@ def build(text: str, *arguments: str, includes: list[str] = INCLUDES) -> str:
 
 
 class Project(unittest.TestCase):
-    def test_the_project_s_userparams_is_the_tuner_s_output_for_the_note_s_motor(self):
+    def test_the_project_s_userparams_is_the_tuner_s_output_for_the_hurst(self):
         self.assertEqual((paths.ROOT / "userparams.h").read_text(encoding="utf-8"), written(HURST),
                          f"the motor file, the tables or the tuner have changed: write it anew with make userparams MOTOR={HURST}")
 
