@@ -4,7 +4,7 @@
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "board/watch.h"
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 #include "drive/tick.h"
 
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */

@@ -5,7 +5,7 @@
 #include "drive/drive.h"
 #include "drive/modes/params_in_ram.h"
 #include "drive/panel.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 /** The drive's parameters, from userparams.h. */
 extern MODE_PARAMS_PLACE drive_params_t board_params;

@@ -47,7 +47,7 @@ typedef struct {
     current_q13_t current_max_q13;        /**< MAXIMUM_CURRENT_A */
     uint16_t current_max_reciprocal;      /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;        /**< OVER_CURRENT_THRESHOLD_A */
-    uint16_t voltage_limit_per_bus_q16;   /**< see params.h */
+    uint16_t voltage_limit_per_bus_q16;   /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
     int16_t bus_over_q15, bus_under_q15;  /**< trip levels */
     int16_t bus_regen_q15;                /**< braking current falls from here */

@@ -1,7 +1,7 @@
 /* Above base speed: field weakening reaches twice the base speed and survives what users do to it. */
 #include "bench.h"
 
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 
 #define IDREF_ENTRY(i) IDREF_SPEED##i
 static const double idref_a[] = PARAM_18(IDREF_ENTRY);

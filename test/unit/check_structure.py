@@ -43,7 +43,7 @@ def board_includes_only_the_three_rooms_and_the_device() -> None:
 
 def only_params_h_reads_userparams_h() -> None:
     readers = [path for path, text in sources().items() if "userparams.h" in INCLUDE.findall(text)]
-    assert readers == ["include/drive/params.h"], readers
+    assert readers == ["include/drive/param_scaling.h"], readers
 
 
 def control_and_drive_name_no_register_and_no_motor() -> None:

@@ -1,5 +1,5 @@
 /* The current circle: the d reference of table, trim and hand-over, and what sqrt(Imax^2 - Id^2) leaves to q. */
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #include "drive/tick.h"
 #include "golden.h"

@@ -1,5 +1,5 @@
 /* The hand-over: the measured offset, and voltage and current vectors that keep their place in the stator. */
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #include "drive/tick.h"
 #include "golden.h"

@@ -6,7 +6,7 @@
 #include "firmware/board/status.c"
 #include "firmware/board/watch.c"
 
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 #include "mock_peripherals.h"
 #include "unity.h"
 

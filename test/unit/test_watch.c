@@ -4,7 +4,7 @@
 
 #include "firmware/board/watch.c"
 
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 #include "unity.h"
 
 drive_t board_drive;

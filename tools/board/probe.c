@@ -4,7 +4,7 @@
 #include "board/firmware.h"
 #include "board/watch.h"
 #include "drive/param_table.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -109,7 +109,7 @@ const probe_signal_t probe_signals[] = {
 };
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
 
-#define PARAM_ENTRY(name, unit, min, max) { #name, (double)PARAM_F(name), unit },
+#define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },
 const probe_param_t probe_params[] = { PARAM_TABLE(PARAM_ENTRY) };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 
@@ -147,7 +147,7 @@ typedef struct {
     double min, max;
 } range_t;
 
-#define PARAM_RANGE(name, unit, min, max) { #name, min, max },
+#define PARAM_RANGE(name, unit, min, max, value, meaning) { #name, min, max },
 static const range_t ranges[] = { PARAM_TABLE(PARAM_RANGE) };
 
 static int16_t *tunable_place(const tunable_t *t, const char *name)

@@ -4,7 +4,7 @@
 #ifdef IDENTIFY
 
 #include "control/root.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #define SETTLE_PERIODS PARAM_PERIODS(0.4F)  /* ten time constants of the slow current controller */
 #define SLOW_LOOP_RAD_S 25.0F               /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */

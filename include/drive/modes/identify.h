@@ -8,7 +8,7 @@
 
 #include "control/qmath.h"
 #include "control/soft_float.h"
-#include "drive/params.h" /* userparams.h may define IDENTIFY */
+#include "drive/param_scaling.h" /* userparams.h may define IDENTIFY */
 
 /** X(name, meaning): steps of the procedure. */
 #define IDENTIFY_STEP_TABLE(X) \

@@ -2,7 +2,7 @@
 #ifndef DRIVE_MODES_PARAMS_IN_RAM_H
 #define DRIVE_MODES_PARAMS_IN_RAM_H
 
-#include "drive/params.h" /* userparams.h may define the mode */
+#include "drive/param_scaling.h" /* userparams.h may define the mode */
 
 /** In RAM each parameter is read anew in the next period, e.g. board_params.fieldweak.idref_q13[3], and nobody checks its range.
  *  Otherwise parameters are constants in the interrupt's instructions. */

@@ -5,7 +5,7 @@
 #include "hurst_params.h"
 
 #include "drive/tick.h"
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 
 static const drive_params_t params = DRIVE_PARAMS_INIT;
 static drive_t drive;

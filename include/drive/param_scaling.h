@@ -1,9 +1,9 @@
-/* From userparams.h to counts: the note's constants, and the parameter structures of the control law and the drive.
+/* From userparams.h to counts: AN1292's constants, and the parameter structures of the control law and the drive.
  *
  * Every constant is a single-precision expression, so that the target's compiler (whose double has 32 bits) and a PC's
  * fold it to the same integer. Equation numbers are AN1292's, in their corrected form (docs/architecture.md). */
-#ifndef DRIVE_PARAMS_H
-#define DRIVE_PARAMS_H
+#ifndef DRIVE_PARAM_SCALING_H
+#define DRIVE_PARAM_SCALING_H
 
 #include <stdint.h>
 
@@ -14,20 +14,20 @@
 #define PARAM_PI 3.14159265F
 #define PARAM_SQRT3 1.73205081F
 
-/** Q15 of a fraction, rounded as the note does: positive * 32767, negative * 32768. */
+/** Q15 of a fraction, rounded as AN1292 does: positive * 32767, negative * 32768. */
 #define Q15(x) ((int16_t)((PARAM_F(x) < 0.0F) ? PARAM_F(x) * 32768.0F - 0.5F : PARAM_F(x) * 32767.0F + 0.5F))
-/** Counts of a current in the note's format (Q15 of full scale): NORM_CURRENT(1.41) = 11653 at 0.000121 A/count. */
+/** Counts of a current in AN1292's format (Q15 of full scale): NORM_CURRENT(1.41) = 11653 at 0.000121 A/count. */
 #define NORM_CURRENT(current_a) Q15(PARAM_F(current_a) / PARAM_F(NORM_CURRENT_CONST) / 32768.0F)
 
 /* ---- Base quantities (facts: U0 is the largest phase voltage Vbus/sqrt(3), less the dead time's share) ---- */
 #define NORM_VOLTAGE_CONST (PARAM_F(NOMINAL_BUS_V) / PARAM_SQRT3 * (1.0F - PARAM_F(DEADTIME_SEC) / PARAM_F(LOOPTIME_SEC)) / 32768.0F)
 #define PARAM_IU (PARAM_F(NORM_CURRENT_CONST) / NORM_VOLTAGE_CONST) /* I0/U0, A/V */
 
-/* ---- The note's motor constants, Equations 5 and 6, pre-divided by 2, 256 and 2. The estimator has formats of its own
+/* ---- AN1292's motor constants, Equations 5 and 6, pre-divided by 2, 256 and 2. The estimator has formats of its own
  * for R and L, which fit where these two end at 32767. ---- */
-#define PARAM_NOTE(x) ((int16_t)PARAM_ROUND(((x) < 32767.0F) ? (x) : 32767.0F))
-#define NORM_RS PARAM_NOTE(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F)
-#define NORM_LSDTBASE PARAM_NOTE(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F)
+#define PARAM_AN1292(x) ((int16_t)PARAM_ROUND(((x) < 32767.0F) ? (x) : 32767.0F))
+#define NORM_RS PARAM_AN1292(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F)
+#define NORM_LSDTBASE PARAM_AN1292(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F)
 #define PARAM_INVKFI (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) * NORM_VOLTAGE_CONST / PARAM_F(MOTOR_KPHI_V_PER_KRPM) * 16384.0F)
 #define NORM_INVKFIBASE ((int16_t)PARAM_ROUND(PARAM_INVKFI))
 #define NORM_DELTAT ((int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 2147483648.0F))
@@ -54,13 +54,13 @@
 #define PARAM_SCALED(x, exp) ((uint16_t)((x) / (float)(1 << (exp)) + 0.5F))
 #define PARAM_RS_EXP PARAM_EXP(PARAM_RS_FULL)
 #define PARAM_LS_EXP PARAM_EXP(PARAM_LS_FULL * 1.2F) /* LS_OVER2LS0 may raise it by a fifth */
-/* A sine of the largest current changes by 2 pi f Ts I a period; the note's formula has 2 in place of 2 pi I/Ipeak and clips. */
+/* A sine of the largest current changes by 2 pi f Ts I a period; AN1292's formula has 2 in place of 2 pi I/Ipeak and clips. */
 #define PARAM_DI(rpm) (2.0F * PARAM_PI * PARAM_F(rpm) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(LOOPTIME_SEC) * CURRENT_Q14_F(MAXIMUM_CURRENT_A))
 #define PARAM_MIN(a, b) (((a) < (b)) ? (a) : (b))
 #define PARAM_MAX(a, b) (((a) > (b)) ? (a) : (b))
 #define D_ILIMIT_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_DI(NOMINAL_SPEED_RPM) + 0.5F, 16383.0F))
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
-#define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in the note's format */
+#define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in AN1292's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
 
 /** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format.
@@ -69,7 +69,7 @@
                          + 2.0F * PARAM_PI / 60.0F * PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM)) \
                            * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
-/* ---- Controllers: gains in the note's units (gain/16 and per-period integral, in full scales) from bandwidths.
+/* ---- Controllers: gains in AN1292's units (gain/16 and per-period integral, in full scales) from bandwidths.
  *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/3.
  *      Any of them may be defined in userparams.h instead. ---- */
 #define PARAM_KT (1.5F * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / PARAM_SQRT3 * 60.0F / (2000.0F * PARAM_PI)) /* N m per A peak */

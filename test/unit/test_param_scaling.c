@@ -1,5 +1,5 @@
 /* From engineering units to counts: the constants that were published for the note's motor, and every derived parameter. */
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 
 #include "golden.h"
 #include "golden_params.h"

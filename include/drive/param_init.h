@@ -1,9 +1,9 @@
 /* The drive's parameter structure, filled from userparams.h at compile time. */
-#ifndef DRIVE_PARAMS_INIT_H
-#define DRIVE_PARAMS_INIT_H
+#ifndef DRIVE_PARAM_INIT_H
+#define DRIVE_PARAM_INIT_H
 
 #include "drive/drive.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #define PARAM_18(f) { f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15), f(16), f(17) }
 #define PARAM_IDREF(i) CURRENT_Q13(IDREF_SPEED##i)
