@@ -10,7 +10,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "test" / "target"), str(ROOT / "test")]
+sys.path[:0] = [str(ROOT / "test" / "sixteen_bit"), str(ROOT / "test")]
 import report # noqa: E402
 import run as target_run # noqa: E402
 import vectors # noqa: E402

@@ -12,7 +12,7 @@ ACCESS = re.compile(r"\b(golden_\w*)(##\w+)?\[([^][]+)\]")
 
 
 def words(columns: list[tuple[str, str]], row: list[str]) -> list[int]:
-    """A row as the target has it in memory: low word first, members without gaps."""
+    """A row as the chip has it in memory: low word first, members without gaps."""
     result = []
     for (_, ctype), cell in zip(columns, row):
         value = int(cell)
@@ -22,16 +22,10 @@ def words(columns: list[tuple[str, str]], row: list[str]) -> list[int]:
 
 def header(name: str, table: int, columns: list, constants: dict, rows: list) -> str:
     """to_c's header with a function golden_NAME_row() instead of the array."""
-    text = to_c.header(name, columns, constants, rows)
-    if not rows:
-        return text
-    begin = text.index("static GOLDEN_STORAGE")
-    end = text.index("};\n", begin) + len("};\n")
-    fetch = [f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{",
-             f"    golden_{name}_t row;",
-             f"    golden_fetch({table}, n * {sum(int(ctype[1:]) for _, ctype in columns) // 16}u, &row, sizeof row / 2u);",
-             "    return row;", "}", ""]
-    return text[:begin] + '#include "golden_fetch.h"\n\n' + "\n".join(fetch) + text[end:]
+    size = sum(int(ctype[1:]) for _, ctype in columns) // 16
+    return to_c.header(name, columns, constants, rows, [
+        '#include "golden_fetch.h"', "", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{", f"    golden_{name}_t row;",
+        f"    golden_fetch({table}, n * {size}u, &row, sizeof row / 2u);", "    return row;", "}"])
 
 
 def write(vectors: Path, out: Path) -> list[Path]:
@@ -41,13 +35,9 @@ def write(vectors: Path, out: Path) -> list[Path]:
     tables = []
     for number, path in enumerate(sorted(vectors.glob("*.txt"))):
         columns, constants, rows = to_c.read(path)
-        target, table = out / f"golden_{path.stem}.h", out / f"{path.stem}.words"
-        data = b"".join(word.to_bytes(2, "little") for row in rows for word in words(columns, row))
-        if not table.exists() or table.read_bytes() != data:
-            table.write_bytes(data)
-        text = header(path.stem, number, columns, constants, rows)
-        if not target.exists() or target.read_text() != text:
-            target.write_text(text)
+        table = out / f"{path.stem}.words"
+        table.write_bytes(b"".join(word.to_bytes(2, "little") for row in rows for word in words(columns, row)))
+        to_c.write_new(out / f"golden_{path.stem}.h", header(path.stem, number, columns, constants, rows))
         tables.append(table)
     return tables
 

@@ -1,6 +1,6 @@
-/* Golden vectors on the target: rows come from the simulator. */
-#ifndef TEST_TARGET_GOLDEN_FETCH_H
-#define TEST_TARGET_GOLDEN_FETCH_H
+/* Golden vectors in a test image: rows come from the simulator. */
+#ifndef TEST_GOLDEN_FETCH_H
+#define TEST_GOLDEN_FETCH_H
 
 #include <stdint.h>
 
