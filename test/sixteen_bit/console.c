@@ -1,5 +1,4 @@
 /* A test image's side of the simulator: Unity's characters go out, golden vectors come in, the exit code ends the run. */
-#include "golden_fetch.h"
 #include "ports.h"
 #include "unity_config.h"
 

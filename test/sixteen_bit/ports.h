@@ -4,6 +4,8 @@
 #ifndef TEST_PORTS_H
 #define TEST_PORTS_H
 
+#include <stdint.h>
+
 #ifdef __AVR__
 #define PORT(number) (*(volatile unsigned char *)(0xE0 + (number)))
 #else
@@ -20,5 +22,11 @@ enum {
 };
 
 enum { PORT_UNEXPECTED = 255 }; /* exit code: a trap or an interrupt that nobody has asked for */
+
+/** In the image: copies a row of a table.
+ *  @param table its number
+ *  @param place of the row's first 16-bit word in the table
+ *  @param words of a row */
+void golden_fetch(uint16_t table, uint32_t place, void *row, uint16_t words);
 
 #endif

@@ -24,7 +24,7 @@ def header(name: str, table: int, columns: list, constants: dict, rows: list) ->
     """to_c's header with a function golden_NAME_row() instead of the array."""
     size = sum(int(ctype[1:]) for _, ctype in columns) // 16
     return to_c.header(name, columns, constants, rows, [
-        '#include "golden_fetch.h"', "", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{", f"    golden_{name}_t row;",
+        '#include "ports.h"', "", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{", f"    golden_{name}_t row;",
         f"    golden_fetch({table}, n * {size}u, &row, sizeof row / 2u);", "    return row;", "}"])
 
 
