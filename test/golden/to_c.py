@@ -1,7 +1,7 @@
 """Turns the committed text vectors into C headers, so that tests need no files and run on a small target as well.
 
-vectors/park.txt becomes golden_park.h: the type golden_park_t with one member a column, the array golden_park[],
-GOLDEN_PARK_ROWS, and GOLDEN_PARK_<NAME> for each constant line.
+vectors/park.txt becomes golden_park.h: the type golden_park_t with one member a column, golden_park_row(n) for each of the
+GOLDEN_PARK_ROWS, also named golden_park_rows, and GOLDEN_PARK_<NAME> for each constant line.
 """
 
 import argparse
@@ -50,16 +50,17 @@ def read(path):
 
 
 def header(name, columns, constants, rows, access=None):
-    """@param access lines of C that give a row, in place of the array of all rows"""
+    """@param access statements that return row n, in place of the array of all rows"""
     upper = f"GOLDEN_{name.upper()}"
     out = [f"/* Generated from test/golden/vectors/{name}.txt. */", f"#ifndef {upper}_H", f"#define {upper}_H", "", "#include <stdint.h>", ""]
     out += [f"#define {upper}_{key.upper()} {constant(value)}" for key, value in constants.items()]
     if rows:
         out += ["", f"#define {upper}_ROWS {len(rows)}u", "typedef struct {"]
         out += [f"    {TYPES[ctype]} {column};" for column, ctype in columns]
-        out += [f"}} golden_{name}_t;"]
-        out += access or [f"static const golden_{name}_t golden_{name}[{upper}_ROWS] = {{",
-                          *("    { " + ", ".join(literal(x, c[1]) for x, c in zip(row, columns)) + " }," for row in rows), "};"]
+        out += [f"}} golden_{name}_t;", f"enum {{ golden_{name}_rows = {len(rows)} }};"]
+        out += [] if access else [f"static const golden_{name}_t golden_{name}[{upper}_ROWS] = {{",
+                                  *("    { " + ", ".join(literal(x, c[1]) for x, c in zip(row, columns)) + " }," for row in rows), "};"]
+        out += ["", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{", *(access or [f"    return golden_{name}[n];"]), "}"]
     return "\n".join(out + ["", "#endif", ""])
 
 

@@ -1,8 +1,16 @@
 /* A test image's side of the simulator: Unity's characters go out, golden vectors come in, the exit code ends the run. */
 #include "ports.h"
-#include "unity_config.h"
+#include "unity.h"
 
 int test_main(void);
+
+void __attribute__((weak)) setUp(void)
+{
+}
+
+void __attribute__((weak)) tearDown(void)
+{
+}
 
 void console_put(int c)
 {

@@ -84,15 +84,12 @@ class Builder:
         source = Path(f"test/{name}.c")
         text = source.read_text(encoding="utf-8")
         own = re.search(r"/\* defines: (.*?) \*/", "\n".join(text.splitlines()[:5]))
-        copy = self.out / f"{name}.c"
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_text(vectors.fed(text, str(source)), encoding="utf-8")
-        extra = ["-Wall", "-Wextra", f"-I{source.parent}", *(shlex.split(own[1]) if own else [])]
+        extra = ["-Wall", "-Wextra", *(shlex.split(own[1]) if own else [])]
         runner = self.runners / f"{name}_runner.c"
         tests = LISTED.findall(runner.read_text(encoding="utf-8")) if runner.exists() else []
         if not tests:
             raise TestError(f"{runner}, the runner on the PC, lists no test")
-        return self.compile(copy, copy.with_suffix(".o"), extra), tests
+        return self.compile(source, self.out / f"{name}.o", extra), tests
 
     def link(self, name: str, part: str, test: Path, tests: list[tuple[str, str]]) -> Path | None:
         """An image with these tests; None if it is too large."""

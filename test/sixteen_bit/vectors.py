@@ -1,14 +1,11 @@
-"""Golden vectors for test images: headers without the rows, the rows as 16-bit words for the simulator, and tests that ask for them."""
+"""Golden vectors for test images: headers without the rows, and the rows as 16-bit words for the simulator."""
 
-import re
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "golden"))
 import to_c # noqa: E402
-
-ACCESS = re.compile(r"\b(golden_\w*)(##\w+)?\[([^][]+)\]")
 
 
 def words(columns: list[tuple[str, str]], row: list[str]) -> list[int]:
@@ -21,11 +18,10 @@ def words(columns: list[tuple[str, str]], row: list[str]) -> list[int]:
 
 
 def header(name: str, table: int, columns: list, constants: dict, rows: list) -> str:
-    """to_c's header with a function golden_NAME_row() instead of the array."""
+    """to_c's header, but golden_NAME_row() asks the simulator."""
     size = sum(int(ctype[1:]) for _, ctype in columns) // 16
-    return to_c.header(name, columns, constants, rows, [
-        '#include "ports.h"', "", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{", f"    golden_{name}_t row;",
-        f"    golden_fetch({table}, n * {size}u, &row, sizeof row / 2u);", "    return row;", "}"])
+    return '#include "ports.h"\n' + to_c.header(name, columns, constants, rows, [
+        f"    golden_{name}_t row;", f"    golden_fetch({table}, n * {size}u, &row, sizeof row / 2u);", "    return row;"])
 
 
 def write(vectors: Path, out: Path) -> list[Path]:
@@ -40,10 +36,3 @@ def write(vectors: Path, out: Path) -> list[Path]:
         to_c.write_new(out / f"golden_{path.stem}.h", header(path.stem, number, columns, constants, rows))
         tables.append(table)
     return tables
-
-
-def fed(source: str, name: str) -> str:
-    """A test's text with golden_x[n] read by golden_x_row(n); lines keep their numbers."""
-    def call(match: re.Match) -> str:
-        return f"{match[1]}{match[2] or ''}{'##' if match[2] else ''}_row({match[3]})"
-    return f'#line 1 "{name}"\n' + ACCESS.sub(call, source)
