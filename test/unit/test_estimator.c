@@ -157,8 +157,8 @@ void test_eight_sample_voltage_is_turned_forward_by_three_and_a_half_steps(void)
         e.half_step_q16_rad = cases[n].half_step;
         filtered_speed(cases[n].speed);
         back_emf(cases[n].i_alpha, cases[n].i_beta);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, cases[n].e_alpha, e.e_q13.alpha, cases[n].what);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, cases[n].e_beta, e.e_q13.beta, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e.e_q13.alpha, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e.e_q13.beta, cases[n].what);
     }
 }
 
