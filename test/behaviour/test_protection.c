@@ -49,8 +49,7 @@ void test_over_voltage_trips(void)
     run_at(1500.0);
     set("supply.voltage_v", OVER_VOLTAGE_V + 2.0);
     TEST_ASSERT_TRUE(seconds_to_fault(0.1) < 0.05);
-    set("supply.voltage_v", 24.0);
-    set("bus.voltage_v", 24.0);
+    supply_v(24.0);
     cause_away_fault_stays_until_s2(FAULT_OVERVOLTAGE);
 }
 
@@ -66,8 +65,7 @@ void test_under_voltage_trips_while_running(void)
 void test_under_voltage_at_rest_is_no_fault(void)
 {
     power_on();
-    set("supply.voltage_v", 8.0);
-    set("bus.voltage_v", 8.0);
+    supply_v(8.0);
     wait_s(0.3);
     TEST_ASSERT_EQUAL_INT(FAULT_NONE, board_drive.fault);
 }
@@ -121,8 +119,7 @@ void test_first_fault_is_the_one_that_is_kept(void)
     run_at(1500.0);
     set("input.flta", 1.0);
     wait_s(0.001);
-    set("supply.voltage_v", 40.0);
-    set("bus.voltage_v", 40.0);
+    supply_v(40.0);
     wait_s(0.1);
     TEST_ASSERT_EQUAL_INT(FAULT_OVERCURRENT_HW, board_drive.fault);
 }
