@@ -63,16 +63,6 @@ void test_limit_for_every_d_voltage_has_the_reference_checksum(void)
     }
 }
 
-void test_d_voltage_may_take_31_of_32_parts_of_the_circle_and_leaves_the_rest_to_q(void)
-{
-    voltage_circle_t c = circle_of(16000);
-    TEST_ASSERT_EQUAL_INT16(15500, vd_limit(&c));
-    TEST_ASSERT_INT16_WITHIN(2, 15999, vq_limit(&c, 0));
-    TEST_ASSERT_INT16_WITHIN(8, 12800, vq_limit(&c, 9600));
-    TEST_ASSERT_INT16_WITHIN(8, 12800, vq_limit(&c, -9600));
-    TEST_ASSERT_INT16_WITHIN(8, 9600, vq_limit(&c, 12800));
-}
-
 /** Every d voltage of both signs stays inside, not by more than a half percent of the radius. */
 static void expect_tight_circle(int16_t radius)
 {

@@ -48,10 +48,3 @@ void test_end_speed_that_is_not_a_multiple_of_the_rate_is_not_passed(void)
     TEST_ASSERT_TRUE(run(&odd, 1, 1) != 0);
     TEST_ASSERT_EQUAL_INT32(25, forced.speed_q10);
 }
-
-void test_fraction_below_a_count_is_kept(void)
-{
-    static const forced_angle_params_t slow = { 100, 100 }; /* 0.0977 counts a period */
-    (void)run(&slow, 1, 10240);
-    TEST_ASSERT_EQUAL_UINT16(1000, forced_angle(&forced));
-}
