@@ -36,6 +36,7 @@ void test_ramp_equals_the_reference_in_both_directions(void)
         tick = v.tick;
         TEST_ASSERT_EQUAL_INT32_MESSAGE(v.speed, forced.speed_q10, golden_row(n));
         TEST_ASSERT_EQUAL_HEX32_MESSAGE(v.angle, forced.angle_q32, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((uint16_t)(v.angle >> 16), forced_angle(&forced), golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE((int16_t)v.at_end, at_end, golden_row(n));
     }
     TEST_ASSERT_EQUAL_INT32(279620, forced.speed_q10); /* 1000 rpm of 5 pole pairs, and it stays there */
