@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "board/firmware.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 #include "unity.h"
 #include "vboard.h"
 
