@@ -56,8 +56,7 @@ void BOARD_ISR _ADC1Interrupt(void)
 /** The board's comparator: the PWM module has already switched the outputs off. */
 void BOARD_ISR _FLTA1Interrupt(void)
 {
-    pwm_outputs_off();
-    drive_raise(&board_drive, FAULT_OVERCURRENT_HW);
+    firmware_trip(FAULT_OVERCURRENT_HW);
     IFS3bits.FLTA1IF = 0;
 }
 

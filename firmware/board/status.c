@@ -13,34 +13,34 @@ static char line[STATUS_LINE_BYTES];
 static uint16_t next;       /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
-/** The line's text. @return its length */
-static uint16_t put_line(void)
+/** The line's text. @return its end */
+static char *put_line(void)
 {
-    uint16_t at = mode_status_line(line, &board_drive);
-    if (at == 0u) {
-        at = text_put_signed(line, text_put(line, 0, "state "), (int16_t)board_drive.state);
-        at = text_put_signed(line, text_put(line, at, " fault "), (int16_t)board_drive.fault);
-        at = text_put_signed(line, text_put(line, at, " speed "), (int16_t)(estimator_speed(&board_drive.run.estimator) / NOPOLESPAIRS));
-        at = text_put(line, at, " rpm\r\n");
+    char *at = mode_status_line(line, &board_drive);
+    if (at == line) {
+        at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
+        at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
+        at = text_put_signed(text_put(at, " speed "), (int16_t)(estimator_speed(&board_drive.run.estimator) / NOPOLESPAIRS));
+        at = text_put(at, " rpm\r\n");
     }
     return at;
 }
 
 /** The first line: "reset BOR POR". */
-static uint16_t put_reset(void)
+static char *put_reset(void)
 {
-    uint16_t at = text_put(line, 0, "reset");
+    char *at = text_put(line, "reset");
 #define PUT_CAUSE(bit, name, meaning) \
     if (RESET_WAS(name, board_reset_cause)) { \
-        at = text_put(line, at, " " #name); \
+        at = text_put(at, " " #name); \
     }
     RESET_CAUSE_TABLE(PUT_CAUSE)
-    return text_put(line, at, "\r\n");
+    return text_put(at, "\r\n");
 }
 
 void status_init(void)
 {
-    line[(board_reset_cause != 0u) ? put_reset() : 0u] = '\0';
+    *((board_reset_cause != 0u) ? put_reset() : line) = '\0';
     next = 0;
     waited_ms = 0;
 }
@@ -52,7 +52,7 @@ void status_tick(uint16_t elapsed_ms)
         return;
     }
     waited_ms = 0;
-    line[put_line()] = '\0';
+    *put_line() = '\0';
     next = 0;
 }
 

@@ -3,17 +3,19 @@
 
 #include "control/qmath.h"
 
-uint16_t text_put(char *line, uint16_t at, const char *text)
+char *text_put(char *at, const char *text)
 {
+    char *next = at;
     while (*text != '\0') {
-        line[at++] = *text++;
+        *next++ = *text++;
     }
-    return at;
+    return next;
 }
 
-uint16_t text_put_unsigned(char *line, uint16_t at, uint16_t number)
+char *text_put_unsigned(char *at, uint16_t number)
 {
     char digits[6];
+    char *next = at;
     uint16_t count = 0;
     uint16_t rest = number;
 
@@ -22,16 +24,16 @@ uint16_t text_put_unsigned(char *line, uint16_t at, uint16_t number)
         rest /= 10u;
     } while (rest != 0u);
     while (count != 0u) {
-        line[at++] = digits[--count];
+        *next++ = digits[--count];
     }
-    return at;
+    return next;
 }
 
-uint16_t text_put_signed(char *line, uint16_t at, int16_t number)
+char *text_put_signed(char *at, int16_t number)
 {
-    uint16_t size = (uint16_t)qm_abs(number);
+    char *next = at;
     if (number < 0) {
-        line[at++] = '-';
+        *next++ = '-';
     }
-    return text_put_unsigned(line, at, size);
+    return text_put_unsigned(next, (uint16_t)qm_abs(number));
 }

@@ -14,13 +14,6 @@ static int16_t watch_scaled(int16_t x, uint16_t bits)
     return (int16_t)(qm_clamp(x, (int16_t)-limit, limit) * (1 << bits));
 }
 
-/** NORM_RS of the estimator's resistance, at most 32767. */
-static int16_t watch_rs(const estimator_params_t *motor)
-{
-    uint32_t rs_q16 = (uint32_t)motor->rs_q16 << motor->rs_exp;
-    return (int16_t)((rs_q16 > 65533u) ? 32767u : (uint16_t)((uint16_t)rs_q16 + 1u) >> 1);
-}
-
 void watch_refresh(void)
 {
     const drive_t *d = &board_drive;
@@ -31,7 +24,7 @@ void watch_refresh(void)
     FdWeakParm.qIndex = (int16_t)run->fieldweak.index;
     FdWeakParm.qIdRef = watch_scaled(run->control.ref_q13.d, 2);
     FdWeakParm.qFwOnSpeed = board_params.fieldweak.on_speed_erpm;
-    MotorEstimParm.qRs = watch_rs(motor);
+    MotorEstimParm.qRs = (motor->rs_exp == 0u) ? (int16_t)(motor->rs_q16 >> 1) : INT16_MAX; /* the exponent begins where NORM_RS ends */
     MotorEstimParm.qLsDt = (int16_t)qm_mulhi_uu(run->model.ls_q16, (uint16_t)(2048u << motor->ls_exp));
     MotorEstimParm.qInvKFi = run->model.inv_kfi;
     MotorEstimParm.qDeltaT = (int16_t)((motor->deltat_q32 + 1) >> 1);

@@ -23,6 +23,9 @@ extern volatile uint16_t board_clock_failed;
  *  A clock that does not come up, or fails later, raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
 void firmware_init(void);
 
+/** Outputs off and the fault raised, from anywhere but the control interrupt. */
+void firmware_trip(drive_fault_t fault);
+
 /** One pass of the loop. */
 void firmware_background(void);
 

@@ -4,9 +4,9 @@
 
 #include <stdint.h>
 
-/** Each puts its text at line[at] without a closing zero. The caller has room. @return where the next text goes */
-uint16_t text_put(char *line, uint16_t at, const char *text);
-uint16_t text_put_unsigned(char *line, uint16_t at, uint16_t number);
-uint16_t text_put_signed(char *line, uint16_t at, int16_t number);
+/** Each writes from `at` on, without a closing zero, and returns where the next text goes. The caller has room. */
+char *text_put(char *at, const char *text);
+char *text_put_unsigned(char *at, uint16_t number);
+char *text_put_signed(char *at, int16_t number);
 
 #endif

@@ -4,8 +4,8 @@
 
 #include "drive/state.h"
 
-/** One sample. The last one allows the first start if both offsets are plausible, else raises FAULT_OFFSET. */
-QM_INLINE void calibration_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+/** One sample. The last one raises FAULT_OFFSET unless both offsets are plausible. @return the next state */
+QM_INLINE drive_state_t calibration_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     calibration_t *c = &d->calibration;
     c->sum_a += raw->i_a;
@@ -20,9 +20,10 @@ QM_INLINE void calibration_step(drive_t *d, const drive_params_t *p, const drive
             c->offset_a_q13 = a_q13;
             c->offset_b_q13 = b_q13;
             c->done = 1;
-            drive_enter(d, DRIVE_STOPPED);
+            return DRIVE_STOPPED;
         }
     }
+    return DRIVE_CALIBRATE;
 }
 
 /** Sums begin anew, after a fault that came before the offsets were known. */

@@ -97,7 +97,7 @@ typedef struct {
 typedef struct {
     uint16_t waited_steps;         /**< at the end of the ramp */
     uint16_t agreed_steps;         /**< of them, the last ones in which the estimator agreed with the forced speed */
-    uint16_t speed_preset_due;     /**< 1 until the speed controller has been preset */
+    uint16_t speed_is_preset;      /**< 1 from six periods after the hand-over on */
     int16_t offset;                /**< angle that is left of the change of frame, angle counts */
     current_q13_t id_q13;          /**< d current that goes with it */
 } handover_t;

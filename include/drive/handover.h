@@ -21,12 +21,6 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** 1 when the estimator has agreed long enough. */
-QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p)
-{
-    return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && d->run.handover.agreed_steps >= p->ready_slots);
-}
-
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
  *  those of the next sample. */
 NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
@@ -49,7 +43,6 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     c->ref_q13.d = (int16_t)(2 * y.alpha);
     c->ref_q13.q = (int16_t)(2 * y.beta);
     h->id_q13 = c->ref_q13.d;
-    h->speed_preset_due = 1;
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     c->reference_erpm = along_direction(d, p->end_erpm);
@@ -58,12 +51,20 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     drive_enter(d, DRIVE_CLOSED);
 }
 
+/** In RAMP, every eighth period: hands over once the estimator has agreed long enough. */
+QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
+{
+    if (d->run.handover.agreed_steps >= p->ready_slots) {
+        handover_now(d, p);
+    }
+}
+
 /** Six periods after the hand-over, whose own period has enough to do: the speed controller, which comes next, goes on from its q current. */
 QM_INLINE void handover_preset_speed(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
-    if (run->handover.speed_preset_due) {
-        run->handover.speed_preset_due = 0;
+    if (!run->handover.speed_is_preset) {
+        run->handover.speed_is_preset = 1;
         pi_preset(&c->pi_speed, &p->pi_speed, qm_sub_limited(c->reference_erpm, estimator_speed(&run->estimator)), c->ref_q13.q);
     }
 }

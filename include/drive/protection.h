@@ -16,11 +16,15 @@ QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
 /** Over-voltage at once, under-voltage while anything is on, every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
 QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
+    drive_fault_t found;
     if (now_q15 > p->bus_over_q15) {
-        drive_raise(d, FAULT_OVERVOLTAGE);
+        found = FAULT_OVERVOLTAGE;
     } else if (bus_q15 < p->bus_under_q15 && d->state != (uint16_t)DRIVE_STOPPED && d->state != (uint16_t)DRIVE_CALIBRATE) {
-        drive_raise(d, FAULT_UNDERVOLTAGE);
+        found = FAULT_UNDERVOLTAGE;
+    } else {
+        return;
     }
+    drive_raise(d, found);
 }
 
 /** Stall and lost lock: conditions that must not last. Every eighth period in closed loop. */
@@ -35,12 +39,9 @@ QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
         least = (int16_t)(p->minimum_erpm >> 1);
     }
     run->stall_steps = (uint16_t)((speed < least) ? run->stall_steps + 1u : 0u);
-    if (run->stall_steps > p->stall_slots) {
-        drive_raise(d, FAULT_STALL);
-    }
     run->lost_lock_steps = (uint16_t)((qm_abs(emf.d) > qm_abs(emf.q) || speed > p->overspeed_erpm) ? run->lost_lock_steps + 1u : 0u);
-    if (run->lost_lock_steps > p->lost_lock_slots) {
-        drive_raise(d, FAULT_LOST_LOCK);
+    if (run->stall_steps > p->stall_slots || run->lost_lock_steps > p->lost_lock_slots) {
+        drive_raise(d, (run->stall_steps > p->stall_slots) ? FAULT_STALL : FAULT_LOST_LOCK);
     }
 }
 

@@ -10,11 +10,13 @@
 /** The next speed reference. STOPPING ramps to zero. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
 {
+    speed_erpm_t target = d->command.target_erpm;
     if (d->state == (uint16_t)DRIVE_STOPPING) {
-        reference_step(d, p, 0, p->speed_ramp_erpm);
-    } else if (!mode_reference_step(d, p)) {
-        reference_step(d, p, d->command.target_erpm, p->speed_ramp_erpm);
+        target = 0;
+    } else if (mode_reference_step(d, p)) {
+        return;
     }
+    reference_step(d, p, target, p->speed_ramp_erpm);
 }
 
 /** One step of the controller, every eighth period in closed loop. STOPPING ends below the minimum speed. */
@@ -24,7 +26,7 @@ NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
     speed_erpm_t speed = estimator_speed(&d->run.estimator);
     int16_t err, iq_q13;
 
-    if (d->state == (uint16_t)DRIVE_CLOSED && mode_current_step(d, p, speed)) {
+    if (mode_current_step(d, p, speed)) {
         return;
     }
     speed_reference_step(d, p);

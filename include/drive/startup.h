@@ -5,16 +5,15 @@
 #include "drive/handover.h"
 #include "drive/protection.h"
 
-/** The low sides conduct and charge the high sides' drivers. */
-QM_INLINE void startup_bootstrap(drive_t *d, const drive_params_t *p)
+/** The low sides conduct and charge the high sides' drivers. @return the next state */
+QM_INLINE drive_state_t startup_bootstrap(drive_t *d, const drive_params_t *p)
 {
+    protection_check_current(d, p);
     d->periods++;
     if (!d->command.run) {
-        drive_enter(d, DRIVE_STOPPED);
-    } else if (d->periods >= p->bootstrap_periods) {
-        drive_enter(d, DRIVE_ALIGN);
+        return DRIVE_STOPPED;
     }
-    protection_check_current(d, p);
+    return (d->periods >= p->bootstrap_periods) ? DRIVE_ALIGN : DRIVE_BOOTSTRAP;
 }
 
 /** The vector turns by 90 degrees during the first half of ALIGN, so that no rotor position is a dead point. */

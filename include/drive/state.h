@@ -7,7 +7,7 @@
 /** Enters a state; its clock begins anew. While a fault is kept, every way leads to FAULT: only drive_clear_fault() opens it. */
 QM_INLINE void drive_enter(drive_t *d, drive_state_t next)
 {
-    d->state = (uint16_t)((d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
+    d->state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
     d->periods = 0;
 }
 
@@ -29,14 +29,14 @@ QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
     if (d->fault == (uint16_t)FAULT_NONE) {
         d->fault = (uint16_t)fault;
     }
-    (void)drive_settle(d);
+    drive_enter(d, DRIVE_FAULT);
 }
 
-/** Forgets the fault: back to STOPPED, or to the calibration that it has interrupted. Control interrupt only. */
-QM_INLINE void drive_clear_fault(drive_t *d)
+/** Forgets the fault. Control interrupt only. @return the next state: STOPPED, or the calibration that it has interrupted */
+QM_INLINE drive_state_t drive_clear_fault(drive_t *d)
 {
     d->fault = (uint16_t)FAULT_NONE;
-    drive_enter(d, d->calibration.done ? DRIVE_STOPPED : DRIVE_CALIBRATE);
+    return d->calibration.done ? DRIVE_STOPPED : DRIVE_CALIBRATE;
 }
 
 /** 1 while the bridge switches under the law's control: ALIGN to STOPPING, in one comparison. */
@@ -48,7 +48,7 @@ QM_INLINE uint16_t drive_is_running(const drive_t *d)
 /** 1 with the estimator's angle in command: CLOSED or STOPPING. */
 QM_INLINE uint16_t drive_is_closed(const drive_t *d)
 {
-    return (uint16_t)(d->state == (uint16_t)DRIVE_CLOSED || d->state == (uint16_t)DRIVE_STOPPING);
+    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
 }
 
 /** What drives the bridge (outputs_t) in the drive's present state. */

@@ -54,9 +54,7 @@ QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
         idle_step(d, p, raw);
     }
     if (drive_is_running(d)) {
-        if (!mode_run(d, p, &duty)) {
-            duty = drive_run(d, p);
-        }
+        duty = MODE_RUN(d, p);
     }
     return duty;
 }
@@ -67,19 +65,20 @@ QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
 NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
     drive_run_t *run = &d->run;
-    uint16_t closed = drive_is_closed(d);
 
     switch (d->ticks & (SLOTS - 1u)) {
     case 0:
-        if (closed) {
+        if (drive_is_closed(d)) {
             speed_step(d, p);
         }
         break;
     case 1:
-        if (closed) {
+        if (d->state == (uint16_t)DRIVE_RAMP) {
+            handover_step(d, p);
+        } else if (drive_is_closed(d)) {
             fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, run->control.reference_erpm);
-        } else if (handover_is_due(d, p)) {
-            handover_now(d, p);
+        } else {
+            /* nothing to weaken */
         }
         break;
     case 2:
@@ -89,23 +88,23 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         bus_update_voltage_limit(d, p);
         break;
     case 4:
-        if (closed) {
+        if (drive_is_closed(d)) {
             limits_current(run, p);
         }
         break;
     case 5:
-        if (closed) {
+        if (drive_is_closed(d)) {
             protection_check_rotor(d, p);
         }
         break;
     case 6:
-        if (closed) {
+        if (drive_is_closed(d)) {
             handover_decay(d, p);
             limits_braking(run, p, qm_hi(d->bus_q31));
         }
         break;
     default: /* 7 */
-        if (closed) {
+        if (drive_is_closed(d)) {
             handover_preset_speed(run, p);
         }
         break;

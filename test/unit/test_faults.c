@@ -189,12 +189,11 @@ void test_a_cleared_fault_before_the_calibration_calibrates_anew(void)
 {
     drive.calibration.done = 0;
     drive_raise(&drive, FAULT_CLOCK);
-    drive_clear_fault(&drive);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
+    TEST_ASSERT_EQUAL_INT(DRIVE_CALIBRATE, drive_clear_fault(&drive));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     drive.calibration.done = 1;
     drive_raise(&drive, FAULT_CLOCK);
-    drive_clear_fault(&drive);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
+    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, drive_clear_fault(&drive));
 }
 
 void test_a_fault_that_came_in_the_middle_of_a_period_outlives_it(void)

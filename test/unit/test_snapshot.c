@@ -7,8 +7,6 @@
 
 #include "unity.h"
 
-drive_t board_drive;
-panel_t board_panel;
 
 void setUp(void)
 {

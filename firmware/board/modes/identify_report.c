@@ -7,17 +7,17 @@
 
 tIdentifyParm IdentifyParm;
 
-uint16_t identify_status_line(char *line, const drive_t *d)
+char *identify_status_line(char *line, const drive_t *d)
 {
     static const char *const results[] = { IDENTIFY_RESULT_TABLE(IDENTIFY_RESULT_NAME) };
     const identify_t *id = &d->run.identify;
-    uint16_t at = text_put(line, text_put_unsigned(line, text_put(line, 0, "step "), id->step), " ");
-    at = text_put(line, text_put(line, at, results[id->result]), " fault ");
-    at = text_put(line, text_put_unsigned(line, at, d->fault), " R ");
-    at = text_put(line, text_put_unsigned(line, at, id->values.rs_mohm), " mohm Ld ");
-    at = text_put(line, text_put_unsigned(line, at, id->values.ld_uh), " uH Lq ");
-    at = text_put(line, text_put_unsigned(line, at, id->values.lq_uh), " uH Kphi ");
-    return text_put(line, text_put_unsigned(line, at, id->values.kphi_mv_per_krpm), " mV/krpm\r\n");
+    char *at = text_put(text_put_unsigned(text_put(line, "step "), id->step), " ");
+    at = text_put(text_put(at, results[id->result]), " fault ");
+    at = text_put(text_put_unsigned(at, d->fault), " R ");
+    at = text_put(text_put_unsigned(at, id->values.rs_mohm), " mohm Ld ");
+    at = text_put(text_put_unsigned(at, id->values.ld_uh), " uH Lq ");
+    at = text_put(text_put_unsigned(at, id->values.lq_uh), " uH Kphi ");
+    return text_put(text_put_unsigned(at, id->values.kphi_mv_per_krpm), " mV/krpm\r\n");
 }
 
 void identify_watch(const drive_t *d)

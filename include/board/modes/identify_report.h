@@ -15,8 +15,8 @@ extern tIdentifyParm IdentifyParm;
 
 #define STATUS_LINE_BYTES 128
 
-/** "step 11 BUSY fault 0 R 2692 mohm Ld 1919 uH Lq 1920 uH Kphi 0 mV/krpm" in one line. @return its length */
-uint16_t identify_status_line(char *line, const drive_t *d);
+/** "step 11 BUSY fault 0 R 2692 mohm Ld 1919 uH Lq 1920 uH Kphi 0 mV/krpm" in one line. @return its end */
+char *identify_status_line(char *line, const drive_t *d);
 
 /** Copies what has been measured to IdentifyParm. */
 void identify_watch(const drive_t *d);
@@ -24,15 +24,14 @@ void identify_watch(const drive_t *d);
 #define STATUS_LINE_BYTES 48
 #endif
 
-/** The mode's status line. @return its length, 0 without the mode */
-QM_INLINE uint16_t mode_status_line(char *line, const drive_t *d)
+/** The mode's status line. @return its end; the line itself without the mode */
+QM_INLINE char *mode_status_line(char *line, const drive_t *d)
 {
 #ifdef IDENTIFY
     return identify_status_line(line, d);
 #else
-    (void)line;
     (void)d;
-    return 0;
+    return line;
 #endif
 }
 

@@ -201,19 +201,12 @@ uint16_t identify_background(drive_t *d, const drive_params_t *p);
 
 #endif
 
-/** A period with the bridge switching. @return 1 if the mode has taken it */
-QM_INLINE uint16_t mode_run(drive_t *d, const drive_params_t *p, duties_t *duty)
-{
+/** What runs a period with the bridge switching. */
 #ifdef IDENTIFY
-    *duty = identify_run(d, p);
-    return 1;
+#define MODE_RUN identify_run
 #else
-    (void)d;
-    (void)p;
-    (void)duty;
-    return 0;
+#define MODE_RUN drive_run
 #endif
-}
 
 /** The last thing that drive_start() prepares. */
 QM_INLINE void mode_start(drive_t *d, const drive_params_t *p)

@@ -1,7 +1,7 @@
 /* The seam between the drive and its modes: each mode is one file, which defines its hook twice, with the mode and without it.
  *
  * hook                  mode                   what it takes over
- * mode_run              IDENTIFY               a period with the bridge switching
+ * MODE_RUN              IDENTIFY               a period with the bridge switching
  * mode_start            IDENTIFY               the end of drive_start()
  * mode_background       IDENTIFY               a pass of the background
  * mode_reference_step   TUNING                 the speed reference in closed loop

@@ -25,7 +25,7 @@ QM_INLINE mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_r
     return range;
 }
 
-/** The q current in closed loop: as commanded; the speed controller keeps it below the maximum speed, and below the minimum speed,
+/** The q current in CLOSED: as commanded; the speed controller keeps it below the maximum speed, and below the minimum speed,
  *  where the estimator would lose the rotor, a proportional share holds against it. @return 1 if the mode has taken the step */
 QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, speed_erpm_t speed)
 {
@@ -33,9 +33,14 @@ QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, speed_
     drive_control_t *c = &d->run.control;
     int16_t torque = qm_abs(d->command.target_erpm);
     int16_t limit = (torque < c->iq_limit_q13) ? torque : c->iq_limit_q13;
-    int16_t iq = pi_tick(&c->pi_speed, &p->pi_speed, qm_sub_limited(along_direction(d, p->maximum_erpm), speed), limit);
-    int32_t hold = qm_mulss(qm_sub_limited(p->minimum_erpm, along_direction(d, speed)), p->pi_speed.kp) >> p->pi_speed.shift;
+    int16_t iq;
+    int32_t hold;
 
+    if (d->state != (uint16_t)DRIVE_CLOSED) {
+        return 0;
+    }
+    iq = pi_tick(&c->pi_speed, &p->pi_speed, qm_sub_limited(along_direction(d, p->maximum_erpm), speed), limit);
+    hold = qm_mulss(qm_sub_limited(p->minimum_erpm, along_direction(d, speed)), p->pi_speed.kp) >> p->pi_speed.shift;
     c->reference_erpm = speed; /* field weakening and an orderly stop start from it */
     if (hold > c->iq_limit_q13) {
         hold = c->iq_limit_q13;
