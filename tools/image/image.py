@@ -15,7 +15,7 @@ from tools.common.errors import UserError
 
 from . import device
 from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
-from .program import Elf, Words, read_elf, read_hex
+from .program import Elf, Words, read_elf, read_hex, reset_target
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG_C = ROOT / "firmware" / "board" / "config.c"
@@ -56,10 +56,9 @@ def _shown(words: Words, address: int) -> str:
 
 def check_reset(words: Words, elf: Elf) -> list[str]:
     """The first instruction goes to the start-up code."""
-    first, second = words.get(0, device.ERASED), words.get(2, device.ERASED)
-    if first >> 16 != 0x04 or second >> 7 != 0:
-        return [f"reset vector: 0x{first:06X} 0x{second:06X} is no GOTO"]
-    target = first & 0xFFFE | second << 16
+    target = reset_target(words)
+    if target is None:
+        return [f"reset vector: 0x{words.get(0, device.ERASED):06X} 0x{words.get(2, device.ERASED):06X} is no GOTO"]
     starts = {elf.symbols[name] for name in ("__reset", "__resetPRI") if name in elf.symbols}
     if not starts:
         return ["reset vector: the image has no start-up code (__reset)"]

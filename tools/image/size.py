@@ -18,6 +18,7 @@ from tools.common.errors import UserError
 
 from . import attribution, base, stack
 from .budget import UNASSIGNED, Budget, Share, shares
+from .sources import Sources
 
 OUT = paths.ROOT / "build" / "target"
 NOTE_TITLE = "as in the note"
@@ -269,6 +270,7 @@ def _run(options: argparse.Namespace) -> int:
     before, name, reason = compare(options.compile, options.link, budget)
     report = measure(options.elf, budget, listing, sources, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
+    report.broken += budget.unmatched(Sources.read(), attribution.read(options.elf))
     files = write(report, options.out)
     print(text(report, not options.brief))
     print("written: " + ", ".join(str(paths.shown(path)) for path in files))
