@@ -27,6 +27,15 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class CycleLimits:
+    """[cycles]: of the control interrupt, and the scenarios to find them with."""
+    isr_max: int
+    isr_mean: int
+    latency_max: int
+    scenarios: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Group:
     """A part of the whole beside a figure of AN1292; None: AN1292 does not have it."""
     name: str
@@ -60,6 +69,7 @@ UNASSIGNED = Module("not assigned", "")
 class Budget:
     note: Limits
     image: Limits
+    cycles: CycleLimits
     groups: list[Group]
     modules: list[Module]
     with_caller: tuple[str, ...]
@@ -84,9 +94,10 @@ class Budget:
                                  section.integer("stack_bytes", minimum=0) if name == "image" else 0))
             section.close()
         budget.close()
-        cycles = root.section("cycles") # its limits are for `make cycles`
-        if cycles is not None:
-            listed(cycles, "scenarios", "scenario")
+        section = _required(root, "cycles")
+        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "isr_mean", "latency_max")),
+                             listed(section, "scenarios", "scenario", required=True))
+        section.close()
         stack = _required(root, "stack")
         calls_nothing = listed(stack, "calls_nothing", "compiler", required=True)
         stack.close()
@@ -101,7 +112,7 @@ class Budget:
             section.close()
         with_caller = listed(root, "with_caller", "function", required=True)
         root.close()
-        return Budget(*limits, groups, modules, with_caller, calls_nothing, names)
+        return Budget(*limits, cycles, groups, modules, with_caller, calls_nothing, names)
 
     # ---- what belongs to what --------------------------------------------------------------------------------------------
     def of_function(self, name: str, file: str) -> Module:
@@ -166,9 +177,12 @@ class Share:
     copies: set[tuple[int, ...]] = field(default_factory=set)
 
 
-def shares(image: Image, budget: Budget) -> dict[tuple[str, str], Share]:
-    """Flash and RAM of every (module, function or object)."""
-    result: dict[tuple[str, str], Share] = {}
+Shares = dict[tuple[str, str], Share]   # by module, and function or object
+
+
+def shares(image: Image, budget: Budget) -> Shares:
+    """Flash and RAM of everything in the image."""
+    result: Shares = {}
     for word in image.words:
         module, name, copy = budget.of_word(word)
         share = result.setdefault((module.name, name), Share())
