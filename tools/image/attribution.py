@@ -116,7 +116,7 @@ class _Debug:
                 self._variable(die, files, os.path.normpath(_text(top, "DW_AT_name")))
         for rows in _sequences(program):
             for row, following in zip(rows, rows[1:]):
-                for address in range(row.address, following.address, 2):
+                for address in range(row.address, min(following.address, device.PROGRAM.stop), 2):
                     self.lines[address] = (files.get(row.file, "?"), row.line)
 
     def _variable(self, die, files: dict[int, str], unit: str) -> None:
