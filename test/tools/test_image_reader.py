@@ -7,6 +7,7 @@ from sample_image import CONSTANTS, END, PERSISTENT, PROGBITS, NOBITS, WRITE, Fu
 
 from tools.common.errors import UserError
 from tools.image import attribution, device
+from tools.image.linked import read_map
 from tools.image.program import CODE, CONSTANTS as CONST, DATA, Elf, load, read_elf, read_hex
 
 MUTATIONS = 800
@@ -148,14 +149,15 @@ def mutate(data: bytearray, rng: random.Random) -> None:
 
 def test_mutated_files_are_read_or_refused_in_one_line(tmp_path):
     rng = random.Random(20240607)
-    originals = [sample(constants=[("_table", 8)], variables=[("_drive", 8, True, "m.c")], types={"drive": {"a": 8}}).elf(), sample().hex().encode()]
+    whole = sample(constants=[("_table", 8)], variables=[("_drive", 8, True, "m.c")], types={"drive": {"a": 8}}, places=[(0x200, 4, ".text", "m.o")])
+    originals = [whole.elf(), whole.elf(), whole.hex().encode(), whole.map().encode()]
     path = tmp_path / "x"
     for turn in range(MUTATIONS):
-        data = bytearray(originals[turn % 3 // 2])
+        data = bytearray(originals[turn % 4])
         for _ in range(rng.choice((1, 1, 2, 8))):
             mutate(data, rng)
         path.write_bytes(data)
-        for read in (load, attribution.read):
+        for read in (load, attribution.read, read_map):
             try:
                 elf = read(path)
                 assert read is not load or all(elf.function_at(address) for address in (0, 0x200, 0x57FE))

@@ -128,7 +128,7 @@ def broken(report: Report, now: Shares, limits: bool) -> list[str]:
     if limits and report.stack.depth > limit:
         lines.append(f"stack: {report.stack.depth} bytes at its deepest, {report.stack.depth - limit} over the budget of {limit}")
     lines += [f"stack: {error}" for error in report.stack.errors]
-    lines += [f"'{name}' is counted with no module: name it in firmware/budget.toml"
+    lines += [f"'{name}' is counted with no module: name its file in firmware/budget.toml"
               for module, name in sorted(now) if module == UNASSIGNED.name]
     return lines
 
