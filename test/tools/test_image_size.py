@@ -334,19 +334,18 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, sample, argu
 
 
 # ---- the last commit, with a repository and a compiler of the test's own ---------------------------------------------------
-COMPILER = """#!/bin/sh
-echo "$@" >>"$LOG"
-[ -z "$FAIL" ] || exit 1
-for word; do last=$before; before=$word; done
-cp "$IMAGE" "$before"
+MAKEFILE = """target-elf:
+	@echo "$(OPT) $$(cat firmware/board/main.c)" >>"$(LOG)"; [ -z "$(FAIL)" ] && cp "$(IMAGE)" made.elf && echo made.elf
 """
 
 
 class Repository:
     def __init__(self, folder: Path) -> None:
-        self.root, self.log, self.compiler = folder / "repository", folder / "log", folder / "compiler"
+        self.root, self.log = folder / "repository", folder / "log"
         self.main = self.root / "firmware" / "board" / "main.c"
-        self.main.parent.mkdir(parents=True)
+        for name, text in {"Makefile": MAKEFILE, "tools/make/x.mk": "", "include/x.h": "", "userparams.h": "", "firmware/board/main.c": ""}.items():
+            (self.root / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.root / name).write_text(text, encoding="utf-8")
 
     def git(self, *words: str) -> str:
         return subprocess.run(["git", *words], cwd=self.root, check=True, capture_output=True, text=True).stdout.strip()
@@ -363,7 +362,7 @@ class Repository:
         self.main.write_text(f"/* {text} */\n", encoding="utf-8")
 
     def build(self, commit: str, flag: str = "-O2") -> Path:
-        return base.build(commit, [str(self.compiler), flag], [str(self.compiler), "{objects}", "-Wl,-Map={map}", "-o", "{elf}"], self.root)
+        return base.build(commit, [f"OPT={flag}"], self.root)
 
 
 @pytest.fixture
@@ -371,8 +370,6 @@ def repository(tmp_path, monkeypatch):
     if not shutil.which("git"):
         pytest.skip("git is not installed")
     result = Repository(tmp_path)
-    result.compiler.write_text(COMPILER, encoding="utf-8")
-    result.compiler.chmod(0o755)
     (tmp_path / "made.elf").write_bytes(program((0x200, 3), functions=[tick(0x206)]).elf())
     for name, value in {"LOG": result.log, "IMAGE": tmp_path / "made.elf", "FAIL": "", "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull,
                         "GIT_CEILING_DIRECTORIES": tmp_path, "GIT_AUTHOR_NAME": "t", "GIT_AUTHOR_EMAIL": "t@example.org", "GIT_COMMITTER_NAME": "t",
@@ -407,32 +404,26 @@ def test_no_history_and_no_git_are_said(repository, monkeypatch):
         base.commit(repository.root)
 
 
-def test_the_commit_s_own_sources_are_compiled_with_the_same_flags_once(repository):
+def test_the_commit_s_own_sources_are_built_with_the_same_settings_once(repository):
     commit = repository.commit("one")
     repository.edit("two")
     elf = repository.build(commit)
     assert attribution.read(elf).flash_bytes == 9
-    assert "one" in (elf.parent / "source/firmware/board/main.c").read_text(encoding="utf-8")
-    lines = repository.log.read_text(encoding="utf-8").splitlines()
-    assert re.fullmatch(r"-O2 -c firmware/board/main\.c -o .*main\.o", lines[0])
-    assert re.fullmatch(r"\S*main\.o -Wl,-Map=\S+foc33\.map -o \S+\.elf", lines[1])
     assert repository.build(commit) == elf
-    assert len(repository.log.read_text(encoding="utf-8").splitlines()) == 2
     assert repository.build(commit, "-O1") != elf
+    assert repository.log.read_text(encoding="utf-8").splitlines() == ["-O2 /* one */", "-O1 /* one */"]
 
 
-def test_a_commit_that_does_not_compile_is_said_and_not_kept(repository, monkeypatch):
+def test_a_commit_that_does_not_build_is_said_and_not_kept(repository, monkeypatch):
     commit = repository.commit("one")
     monkeypatch.setenv("FAIL", "1")
-    with pytest.raises(base.NoBase, match=f"{commit[:7]} does not compile"):
+    with pytest.raises(base.NoBase, match=f"{commit[:7]} does not build"):
         repository.build(commit)
     monkeypatch.setenv("FAIL", "")
     repository.build(commit)
-
-
-def test_without_a_compiler_command_there_is_no_column(budget):
-    found, name, reason = size.compare("", "", budget)
-    assert (found, name) == (None, "") and "no compiler" in reason
+    repository.git("rm", "-rq", "include")
+    with pytest.raises(base.NoBase, match="no firmware in the folders of today"):
+        repository.build(repository.commit("three"))
 
 
 # ---- with the real compiler: the total is the linker's, and the debugging information is read as it is ---------------------

@@ -202,14 +202,11 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def compare(compile_text: str, link_text: str, budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
+def compare(variables: list[str], budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
     """Shares of the last commit's image and the commit's name, or None and why there is nothing to compare with."""
     try:
-        if not compile_text or not link_text:
-            raise base.NoBase("no compiler was named (--compile, --link)")
         commit = base.commit()
-        elf = base.build(commit, shlex.split(compile_text), shlex.split(link_text), cache=cache)
-        return shares(attribution.read(elf), budget), commit[:7], ""
+        return shares(attribution.read(base.build(commit, variables, cache=cache)), budget), commit[:7], ""
     except base.NoBase as reason:
         return None, "", str(reason)
 
@@ -230,8 +227,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
         parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json and size.csv")
         parser.add_argument("--objdump", default="xc16-objdump")
-        parser.add_argument("--compile", default="", help="compiler and flags, for the last commit's image")
-        parser.add_argument("--link", default="", help="the same for linking, with {objects}, {elf} and {map}")
+        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE", help="compare with the last commit's image, built by make with these variables")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--brief", action="store_true", help="no table of functions")
         return _run(parser.parse_args(arguments))
@@ -242,7 +238,7 @@ def _run(options: argparse.Namespace) -> int:
     budget = Budget.read()
     listing = disassemble(options.objdump, options.elf)
     image = attribution.read(options.elf)
-    before, name, reason = compare(options.compile, options.link, budget)
+    before, name, reason = (None, "", "not asked for (--base)") if options.base is None else compare(options.base, budget)
     report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
