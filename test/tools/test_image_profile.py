@@ -1,11 +1,9 @@
-"""From counts by address to functions and stacks: every count as if added by hand."""
+"""From counts by address to functions: every count as if added by hand."""
 
 from collections import Counter
 
-import pytest
-
 from tools.image.attribution import Frame, Image, Word
-from tools.image.profile import Counts, folded, profile, reachable
+from tools.image.profile import Counts, profile, reachable
 from tools.image.program import CODE, Elf, Section, Symbol
 
 CALL, NOP = 0x020000, 0x780000
@@ -47,35 +45,16 @@ def test_a_helper_is_counted_with_what_it_is_inlined_into():
     assert found.inlined["pi"] == 30 and "qm_clamp" not in found.inlined
 
 
-def test_stacks_begin_at_the_interrupt_and_follow_its_calls():
-    found = profile(*INTERRUPT, COUNTS)
-    assert [found.stacks["_ADC1Interrupt", *rest] for rest in (("slow", "deep"), ("slow", "ramp"), ("pi", "qm_clamp"))] == [7, 2, 20]
-    assert sum(found.stacks.values()) == found.total
-
-
 def test_words_that_never_ran_are_told_by_function():
     assert profile(*INTERRUPT, Counts({0x200: 1}, {0x200: 1})).executed == {"_ADC1Interrupt": (1, 5), "slow": (0, 2), "deep": (0, 1)}
-
-
-def test_a_function_with_two_callers_is_shared_by_their_calls():
-    image = made(("_ADC1Interrupt", 0x200, [rcall(0x200, 0x400), rcall(0x202, 0x300)]), ("slow", 0x300, [rcall(0x300, 0x400)]), ("deep", 0x400, [NOP]))
-    found = profile(*image, Counts({0x200: 3, 0x202: 1, 0x300: 1, 0x400: 4}, {0x200: 3, 0x202: 1, 0x300: 1, 0x400: 8}))
-    assert found.stacks["_ADC1Interrupt", "deep"] == pytest.approx(6.0)
-    assert found.stacks["_ADC1Interrupt", "slow", "deep"] == pytest.approx(2.0)
 
 
 def test_second_word_of_a_call_is_no_instruction():
     found = profile(*made(("_ADC1Interrupt", 0x200, [CALL | 0x300, 0, NOP]), ("far", 0x300, [NOP])),
                     Counts({0x200: 1, 0x204: 1, 0x300: 1}, {0x200: 2, 0x204: 1, 0x300: 1}))
     assert found.executed == {"_ADC1Interrupt": (2, 2), "far": (1, 1)}
-    assert found.stacks["_ADC1Interrupt", "far"] == 1
 
 
 def test_recursion_does_not_hang():
     image = made(("_ADC1Interrupt", 0x200, [rcall(0x200, 0x300)]), ("ping", 0x300, [rcall(0x300, 0x400)]), ("pong", 0x400, [rcall(0x400, 0x300)]))
-    found = profile(*image, Counts({0x200: 1, 0x300: 5, 0x400: 4}, {0x200: 1, 0x300: 5, 0x400: 4}))
-    assert sum(found.stacks.values()) == pytest.approx(10)
-
-
-def test_folded_lines_are_what_flame_tools_read():
-    assert folded(Counter({("a", "b"): 4, ("a",): 1}), 2) == ["a 0.500", "a;b 2.000"]
+    assert profile(*image, Counts({0x200: 1, 0x300: 5, 0x400: 4}, {0x200: 1, 0x300: 5, 0x400: 4})).total == 10

@@ -20,7 +20,7 @@ from tools.common import command_line, paths, plant, workers
 from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
-from tools.image.profile import Counts, Profile, folded, profile
+from tools.image.profile import Counts, Profile, profile
 
 from . import build, pil, pil_command, scenario, simulate
 from .command_common import Progress
@@ -281,17 +281,15 @@ def summary(report: Report) -> dict[str, Any]:
             "executed": report.profile.executed, "assumptions": report.assumptions, "broken": report.broken}
 
 
-def write(report: Report, folder: Path) -> list[Path]:
-    """cycles.json, and the stacks of functions as tools for flame graphs read them."""
-    interrupts = max(report.all.number, 1)
+def write(report: Report, folder: Path) -> Path:
+    """cycles.json."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / name for name in ("cycles.json", "cycles.folded")]
-        files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-        files[1].write_text("\n".join(folded(report.profile.stacks, interrupts)) + "\n", encoding="utf-8")
+        path = folder / "cycles.json"
+        path.write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-    return files
+    return path
 
 
 def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
@@ -345,7 +343,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
         parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
         parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-        parser.add_argument("--out", type=Path, help="folder for cycles.json and cycles.folded; default: the image's")
+        parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--quiet", action="store_true", help="no progress bar")
         return _run(parser.parse_args(arguments))
@@ -357,9 +355,9 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    files = write(report, options.out or image.parent)
+    path = write(report, options.out or image.parent)
     print(text(report))
-    print("\nwritten: " + ", ".join(str(paths.shown(path)) for path in files))
+    print(f"\nwritten: {paths.shown(path)}")
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)
     return 1 if report.broken else 0
