@@ -1,4 +1,4 @@
-"""make cycles and make pil around the simulator: classes of interrupts, figures, budgets, texts, and what a user sees when something is missing."""
+"""make cycles and make pil around the simulator: classes of interrupts, figures, budgets, texts, and what a user sees."""
 
 import json
 import re
@@ -26,9 +26,11 @@ def spread(values) -> cycles.Spread:
     return cycles.Spread.of(np.array(values))
 
 
-def found(name: str, without: list[int], weakening: list[int], latency: tuple[int, ...] = (700,), stack: int = 100, differences: int = 0) -> cycles.Found:
+def found(name: str, without: list[int], weakening: list[int], latency: tuple[int, ...] = (700,), stack: int = 100,
+          differences: int = 0) -> cycles.Found:
     """A scenario with these interrupts in closed loop."""
-    return cycles.Found({"STOPPED": spread([]), "CLOSED": spread(without + weakening), cycles.WITHOUT: spread(without), cycles.WITH: spread(weakening)},
+    return cycles.Found({"STOPPED": spread([]), "CLOSED": spread(without + weakening), cycles.WITHOUT: spread(without),
+                         cycles.WITH: spread(weakening)},
                         spread(latency), Counts({0x200: 1}, {0x200: sum(without + weakening)}), stack, differences, 10,
                         "tick 3, P1DC1" if differences else "", {name: (max(without + weakening), 1.5, "CLOSED")}, 967, 2.0, 1.0, 5e6)
 
@@ -78,7 +80,8 @@ def test_scenarios_are_put_together():
     (found("demo", [400], [390, 601]), BUDGET, ["longest interrupt: 601 cycles, 1 over the budget of 600 (demo at 1.5000 s, CLOSED)"]),
     (found("demo", [400], [400], latency=(961,), stack=513), BUDGET,
      ["trigger to duties: 961 cycles, over the budget of 960", "stack: 513 bytes, over the budget of 512"]),
-    (found("demo", [400], [400], latency=(967,)), None, ["trigger to duties: 967 cycles, but the duties load 967 cycles after the trigger"]),
+    (found("demo", [400], [400], latency=(967,)), None,
+     ["trigger to duties: 967 cycles, but the duties load 967 cycles after the trigger"]),
     (found("demo", [400], [400], differences=2), None, ["target and PC differ in 2 interrupts, the first: tick 3, P1DC1"]),
     (found("smoke", [400], []), None, ["no scenario ran with and without field weakening: the figures are not those of the table"])])
 def test_each_broken_budget_is_a_line(item, budget, lines):
@@ -112,8 +115,10 @@ def test_the_file_is_written_and_the_readme_table_follows_from_them(tmp_path):
 
 
 @pytest.mark.parametrize("ticks, differences, first, defines, has_names, ok, got", [
-    (100, 0, "", [], True, True, ""), (0, 0, "", [], True, False, ""), (0, 0, "", ["IDENTIFY"], True, True, ""), (0, 0, "", [], False, True, "a HEX file"),
-    (100, 4, "tick 7 (0.1 s), P1DC2: target 1, host 2", [], True, False, "100 interrupts, 4 differ; first: tick 7 (0.1 s), P1DC2: target 1, host 2")])
+    (100, 0, "", [], True, True, ""), (0, 0, "", [], True, False, ""), (0, 0, "", ["IDENTIFY"], True, True, ""),
+                                                                                    (0, 0, "", [], False, True, "a HEX file"),
+    (100, 4, "tick 7 (0.1 s), P1DC2: target 1, host 2", [], True, False,
+     "100 interrupts, 4 differ; first: tick 7 (0.1 s), P1DC2: target 1, host 2")])
 def test_comparison_with_the_pc(ticks, differences, first, defines, has_names, ok, got):
     run = support.run()
     run.scenario.defines += defines
@@ -158,8 +163,10 @@ def refused(tmp_path, capsys):
     ("cycles", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
     ("pil", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
     ("cycles", ["--image", "{}/text.elf"], "text.elf"), ("cycles", ["--image", "{}/alone.hex"], "name the ELF file"),
-    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"), ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
-    ("pil", ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), ("pil", ["--nonsense"], "--nonsense"), ("cycles", ["--nonsense"], "--nonsense"),
+    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"), ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"],
+                                                               "cannot be read"),
+    ("pil", ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), ("pil", ["--nonsense"], "--nonsense"),
+                                                       ("cycles", ["--nonsense"], "--nonsense"),
     ("pil", ["demo", "smoke", "--out", "{}"], "--out")])
 def test_bad_input_is_one_line(tmp_path, refused, command, arguments, words):
     assert words in refused(command, *arguments)

@@ -1,4 +1,4 @@
-"""make firmware as a user calls it: without the compiler one clear line; with it no warning at any level, and a build that fails for a bad image."""
+"""make firmware as a user calls it: without the compiler one clear line; with it no warning, and a build that fails for a bad image."""
 
 import os
 import re
@@ -14,7 +14,8 @@ from tools.image import device, image
 ROOT = paths.ROOT
 MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
 TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/common", "tools/image", "tools/make", "tools/setup")
-NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname", "head",
+NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname",
+          "head",
           "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr")
 
 
@@ -44,7 +45,8 @@ def compiler_free_path(folder: Path, *more: str) -> str:
 
 # ---- without the compiler ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("words, expected", [
-    ([], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16 .*XC16="), (["XC16=/nowhere/v2.10"], "XC16=/nowhere/v2.10 has no bin/xc16-gcc")])
+    ([], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16 .*XC16="), (["XC16=/nowhere/v2.10"],
+                                                                               "XC16=/nowhere/v2.10 has no bin/xc16-gcc")])
 def test_a_missing_compiler_is_one_line_that_says_what_to_install(tmp_path, words, expected):
     done = make("firmware", "VARIANT=none", *words, path=compiler_free_path(tmp_path))
     assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr
@@ -94,7 +96,8 @@ def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
         assert words[base + 2 * device.VECTORS.index("_T3Interrupt")] == elf.symbols["__DefaultInterrupt"]
     # starts on FRC; XT, clock switching, pin selection may be unlocked; watchdog always on, no window, 32 kHz / 32 / 16;
     # PWM pins inputs at reset, active high, 128 ms; PGD3, no JTAG
-    for address, mask, value in ((0xF80006, 0x07, 0), (0xF80008, 0xE7, 0x45), (0xF8000A, 0xDF, 0xC4), (0xF8000C, 0xE7, 0xE7), (0xF8000E, 0x23, 0x01)):
+    for address, mask, value in ((0xF80006, 0x07, 0), (0xF80008, 0xE7, 0x45), (0xF8000A, 0xDF, 0xC4), (0xF8000C, 0xE7, 0xE7),
+                                 (0xF8000E, 0x23, 0x01)):
         assert words[address] & mask == value
 
 
@@ -139,8 +142,8 @@ def tree(tmp_path):
 
 HEAD = "void firmware_background(void)\n{\n"
 NUMBERS, NOINLINE = "static volatile int32_t spoil_a, spoil_b;", "static __attribute__((noinline)) void"
-RECURSIVE = (f"{NOINLINE} spoil(volatile uint16_t n);\n{NOINLINE} spoil(volatile uint16_t n)\n{{\n    if (n) {{\n        spoil((uint16_t)(n - 1u));\n"
-             "        n = 3;\n    }\n}")
+RECURSIVE = (f"{NOINLINE} spoil(volatile uint16_t n);\n{NOINLINE} spoil(volatile uint16_t n)\n{{\n    if (n) {{\n"
+             "        spoil((uint16_t)(n - 1u));\n        n = 3;\n    }\n}")
 DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n}}\n"
         f"{NOINLINE} spoil(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n    deeper();\n    some[1] = 1;\n}}")
 
@@ -149,10 +152,12 @@ DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some
 @pytest.mark.parametrize("body, before, told", [
     ("spoil_a = (int32_t)((float)spoil_b * 1.5F);", NUMBERS, r"called by firmware_background\(\).*: a float: use a Q format"),
     ("spoil_a = spoil_a / spoil_b;", NUMBERS, r"called by firmware_background\(\).*: a division: use qm_divud"),
-    ("spoil_c = spoil_c / board_drive.ticks;", "static volatile int64_t spoil_c;", r"called by firmware_background\(\).*: a division: use qm_divud"),
+    ("spoil_c = spoil_c / board_drive.ticks;", "static volatile int64_t spoil_c;",
+     r"called by firmware_background\(\).*: a division: use qm_divud"),
     ("board_drive.ticks = (uint16_t)(100u / board_drive.ticks);", "", r"firmware_background\(\) divides by a variable"),
     ("spoil_ram[board_drive.ticks & 255u] = 1;", "static volatile int16_t spoil_ram[256];", "RAM: [0-9]+ bytes of a budget of 768"),
-    ("board_drive.ticks = spoil_flash[board_drive.ticks & 1023u];", "extern const uint16_t spoil_flash[1024];\nconst uint16_t spoil_flash[1024] = { 1 };",
+    ("board_drive.ticks = spoil_flash[board_drive.ticks & 1023u];",
+     "extern const uint16_t spoil_flash[1024];\nconst uint16_t spoil_flash[1024] = { 1 };",
      "flash: [0-9]+ bytes of a budget of 12288"),
     ("spoil(board_drive.ticks);", RECURSIVE, "stack: recursion: spoil -> spoil"),
     ("spoil_pointer();", "extern void (*volatile spoil_pointer)(void);\nvoid (*volatile spoil_pointer)(void) = pwm_outputs_off;",
@@ -162,7 +167,8 @@ def test_code_that_fails_the_build_is_told_with_its_place(tree, body, before, to
     assert re.search(told, " ".join(tree.spoil("firmware/board/firmware.c", HEAD, f"{before}\n{HEAD}    {body}\n").splitlines()))
 
 
-WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS32768"), ("WDTPRE = PR32", "WDTPRE = PR128"), ("WINDIS = OFF", "WINDIS = ON"))
+WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS32768"), ("WDTPRE = PR32", "WDTPRE = PR128"),
+            ("WINDIS = OFF", "WINDIS = ON"))
 
 
 @with_compiler

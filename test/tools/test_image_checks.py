@@ -89,8 +89,10 @@ def test_a_hex_of_another_elf_is_refused(bench):
 # ---- vectors -------------------------------------------------------------------------------------------------------------
 def test_the_vectors_have_the_addresses_of_the_family_s_reference_manual():
     places = {name: 4 + 2 * number for number, name in enumerate(device.VECTORS)}
-    known = {"_OscillatorFail": 0x06, "_AddressError": 0x08, "_StackError": 0x0A, "_MathError": 0x0C, "_INT0Interrupt": 0x14, "_T1Interrupt": 0x1A,
-             "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86, "_FLTA1Interrupt": 0x92}
+    known = {"_OscillatorFail": 0x06, "_AddressError": 0x08, "_StackError": 0x0A, "_MathError": 0x0C, "_INT0Interrupt": 0x14,
+             "_T1Interrupt": 0x1A,
+             "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86,
+             "_FLTA1Interrupt": 0x92}
     assert {name: places[name] for name in known} == known
     assert len(device.VECTORS) == (0x100 - 0x04) // 2
 
@@ -204,12 +206,14 @@ def test_the_projects_own_settings_are_all_known_and_what_the_board_needs():
 
 # ---- the compiler's library ----------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("helper, member, advice", [
-    ("__divsf3", "divsf3.eo", "a float"), ("__divsi3", "divsi3.eo", "a division"), ("__muldi3", "muldi3.eo", "64-bit"), ("memcpy", "memcpy.eo", "a copy"),
+    ("__divsf3", "divsf3.eo", "a float"), ("__divsi3", "divsi3.eo", "a division"), ("__muldi3", "muldi3.eo", "64-bit"),
+                                                    ("memcpy", "memcpy.eo", "a copy"),
     ("__udivmodsi4", "lib_int.o", "a division"), ("oddity", "x.o", "without the library")])
 def test_a_helper_is_named_with_its_caller_and_what_to_write_instead(bench, helper, member, advice):
     target = bench.image.function(helper, 0x000000, 0x060000, file=f"{LIBRARY}({member})", section=".libm.x")
     bench.image.function("caller", CALL | target, 0x000000, 0x060000, file="a.o")
-    bench.fails(rf"{helper}\(\) of the compiler's library is in the image \(libc99-pic30-elf.a\({member}\)\), called by caller\(\): .*{advice}")
+    bench.fails(rf"{helper}\(\) of the compiler's library is in the image \(libc99-pic30-elf.a\({member}\)\), "
+                rf"called by caller\(\): .*{advice}")
 
 
 @pytest.mark.parametrize("opcode", [RCALL, 0x370000, 0x320000, 0x0C0000])
@@ -230,10 +234,12 @@ def test_what_only_a_helper_calls_is_not_told_too(bench):
 def test_a_helper_or_constant_that_nothing_visible_calls_is_still_told(bench):
     bench.image.function("__divsf3", 0x060000, file=f"{LIBRARY}(divsf3.eo)")
     bench.image.constant(1, 2, file=f"{LIBRARY}(fp_thenan.o)")
-    bench.fails(r"__divsf3\(\) .*called by nothing that can be seen", r"\.const of the compiler's library .*fp_thenan.o\)\), called by nothing that can be seen")
+    bench.fails(r"__divsf3\(\) .*called by nothing that can be seen",
+                r"\.const of the compiler's library .*fp_thenan.o\)\), called by nothing that can be seen")
 
 
-@pytest.mark.parametrize("member", ["crt0_standard.o", "crt0_extended.o", "crt1_standard.o", "crt0.o", "data_init_standard.o", "crt_start_mode_normal.Leo",
+@pytest.mark.parametrize("member", ["crt0_standard.o", "crt0_extended.o", "crt1_standard.o", "crt0.o", "data_init_standard.o",
+                                    "crt_start_mode_normal.Leo",
                                     "crt_start_mode.o"])
 def test_start_up_code_is_allowed_under_its_known_names(bench, member):
     bench.image.function("start", 0x060000, file=f"{LIBRARY}({member})", section=".libpic30_crt_start_mode")
@@ -242,7 +248,8 @@ def test_start_up_code_is_allowed_under_its_known_names(bench, member):
 
 def test_a_map_of_another_build_is_refused(bench):
     bench.image.places.pop()
-    bench.fails("2 words from 0x.* on come from no file that the map names: the map is of another build, or the linker made them for a pointer")
+    bench.fails("2 words from 0x.* on come from no file that the map names: "
+                "the map is of another build, or the linker made them for a pointer")
 
 
 @pytest.mark.parametrize("word", [0xD80102, 0xD87B85, 0xD88102, 0xD8F90F, 0xD90002]) # div.s, div.u, divf
@@ -291,7 +298,8 @@ def test_the_projects_budget_is_read():
 
 # ---- files ---------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name, data, words", [
-    ("a.elf", None, "No such file"), ("a.hex", None, "No such file"), ("a.map", None, "No such file"), ("a.elf", b"\x7fELF", ""), ("a.elf", b"text\n" * 40, ""),
+    ("a.elf", None, "No such file"), ("a.hex", None, "No such file"), ("a.map", None, "No such file"), ("a.elf", b"\x7fELF", ""),
+                                               ("a.elf", b"text\n" * 40, ""),
     ("a.hex", record(0, 2, b"\0\0\0\0").encode(), ""), ("a.map", b"\xff\xfe nothing", "not a map file")])
 def test_a_file_that_is_missing_or_another_is_one_line(bench, name, data, words):
     arguments = bench.image.write(bench.folder)

@@ -28,7 +28,8 @@ def made(*functions: tuple) -> tuple[Elf, Image]:
 
 # An interrupt that has pi() inlined, with a helper in it, and calls slow(), which calls deep(); the background calls deep(), too.
 INTERRUPT = made(("_ADC1Interrupt", 0x200, [NOP, NOP, NOP, rcall(0x206, 0x300), NOP], {0x202: ("pi",), 0x204: ("pi", "qm_clamp")}),
-                 ("slow", 0x300, [NOP, rcall(0x302, 0x400)], {0x300: ("ramp",)}), ("deep", 0x400, [NOP]), ("main", 0x500, [rcall(0x500, 0x400), NOP]))
+                 ("slow", 0x300, [NOP, rcall(0x302, 0x400)], {0x300: ("ramp",)}), ("deep", 0x400, [NOP]),
+                 ("main", 0x500, [rcall(0x500, 0x400), NOP]))
 COUNTS = Counts({0x200: 10, 0x202: 10, 0x204: 10, 0x206: 2, 0x208: 10, 0x300: 2, 0x302: 1, 0x400: 1, 0x500: 50, 0x502: 50},
                 {0x200: 50, 0x202: 10, 0x204: 20, 0x206: 4, 0x208: 30, 0x300: 2, 0x302: 2, 0x400: 7, 0x500: 100, 0x502: 50})
 
@@ -56,5 +57,6 @@ def test_second_word_of_a_call_is_no_instruction():
 
 
 def test_recursion_does_not_hang():
-    image = made(("_ADC1Interrupt", 0x200, [rcall(0x200, 0x300)]), ("ping", 0x300, [rcall(0x300, 0x400)]), ("pong", 0x400, [rcall(0x400, 0x300)]))
+    image = made(("_ADC1Interrupt", 0x200, [rcall(0x200, 0x300)]), ("ping", 0x300, [rcall(0x300, 0x400)]),
+                 ("pong", 0x400, [rcall(0x400, 0x300)]))
     assert profile(*image, Counts({0x200: 1, 0x300: 5, 0x400: 4}, {0x200: 1, 0x300: 5, 0x400: 4})).total == 10

@@ -27,7 +27,8 @@ def test_the_committed_project_is_the_generated_one_whatever_one_build_is_asked_
 
 def test_it_has_every_source_and_header_of_the_firmware_and_no_other():
     items = {item.text for item in TREE.iter("itemPath")}
-    files = {f"../{path.relative_to(ROOT)}" for pattern in ("firmware/*/*.c", "include/*/*.h", "userparams.h") for path in ROOT.glob(pattern)}
+    files = {f"../{path.relative_to(ROOT)}" for pattern in ("firmware/*/*.c", "include/*/*.h", "userparams.h")
+             for path in ROOT.glob(pattern)}
     assert items == files | {"Makefile"}
     roots = {"/".join(item.split("/")[:-1][:2]) for item in items - {"Makefile"}}
     assert roots == {element.text for element in TREE.iter("Elem")}
@@ -53,7 +54,8 @@ def test_what_has_no_box_becomes_an_additional_option_and_odd_characters_stay():
     tree = ET.fromstring(project.updated(TEXT, facts))
     assert tree.find(".//C30/appendMe").get("value") == '-std=gnu99 -DNAME="a<b>&c"'
     assert tree.find(".//C30-LD/appendMe").get("value") == "--odd"
-    assert [item.text for item in tree.iter("itemPath")] == ["../include/drive/b.h", "../userparams.h", "../firmware/board/a&b.c", "../firmware/board/a.c",
+    assert [item.text for item in tree.iter("itemPath")] == ["../include/drive/b.h", "../userparams.h", "../firmware/board/a&b.c",
+                                                             "../firmware/board/a.c",
                                                              "Makefile"]
     assert "isolate-each-function" not in boxes(tree, "C30") and boxes(tree, "C30")["enable-fatal-warnings"] == "false"
 
@@ -64,7 +66,8 @@ def test_facts_that_are_none_are_refused(lines):
         project.read(lines)
 
 
-@pytest.mark.parametrize("lines, text, status", [(FACTS, TEXT, 0), (["nonsense"], TEXT, 2), (FACTS, "<a/>", 2), (FACTS, "no xml", 2), (FACTS, None, 2)])
+@pytest.mark.parametrize("lines, text, status", [(FACTS, TEXT, 0), (["nonsense"], TEXT, 2), (FACTS, "<a/>", 2), (FACTS, "no xml", 2),
+                                                 (FACTS, None, 2)])
 def test_the_command_writes_the_project_or_says_why_not(tmp_path, monkeypatch, capsys, lines, text, status):
     path = tmp_path / project.CONFIGURATIONS
     path.parent.mkdir()

@@ -113,7 +113,8 @@ MIXED = [(0x200, TICK, 2), (0x202, GUARD, 4), (0x204, TICK, 3), (0x206, GUARD, 5
     pytest.param(program((0x200, 10), functions=[tick(0x214)]), {("control", "tick"): 30}, id="a word is three bytes"),
     pytest.param(program((0x200, 10), functions=[tick(0x214, guard(0x204, 0x20A))]), {("control", "tick"): 21, ("guard", "guard"): 9},
                  id="what is inlined is counted with the file it is written in"),
-    pytest.param(program((0x200, 10), functions=[HELPERS]), {("control", "tick"): 21, ("guard", "guard"): 9}, id="small helpers count with their caller"),
+    pytest.param(program((0x200, 10), functions=[HELPERS]), {("control", "tick"): 21, ("guard", "guard"): 9},
+                 id="small helpers count with their caller"),
     pytest.param(program((0x200, 10), functions=[WHOLE]), {("control", "tick"): 12, ("hand-over", "hand_over"): 18}, id="a whole module"),
     pytest.param(program((0x200, 3), functions=[tick(0x202), Function("tick_guard", TICK, 5, 0x202, 0x206)]),
                  {("control", "tick"): 3, ("guard", "tick_guard"): 6}, id="a name comes before the file"),
@@ -124,17 +125,21 @@ MIXED = [(0x200, TICK, 2), (0x202, GUARD, 4), (0x204, TICK, 3), (0x206, GUARD, 5
                  {("control", "tick"): 9, ("guard", "guard"): 6}, id="where stretches have gaps the line says the function"),
     pytest.param(program((0x200, 2), functions=[guard(0, 0x300, Function("park", PARK, 1, 0x200, 0x204))], symbols={"__reset": 0x200}),
                  {("start", "_reset"): 6}, id="a function that the linker removed"),
-    pytest.param(program((0x200, 3), (0x300, 2), functions=[Function("tick", TICK, 1, 0x300, 0x304)], symbols={"__reset": 0x200, ".Lx": 0x202}),
+    pytest.param(program((0x200, 3), (0x300, 2), functions=[Function("tick", TICK, 1, 0x300, 0x304)],
+                         symbols={"__reset": 0x200, ".Lx": 0x202}),
                  {("start", "_reset"): 9, ("control", "tick"): 6}, id="code without debugging information goes by its label"),
     pytest.param(program((0x200, 1), functions=[tick(0x202)], start_values=[0x800, 4, 0, 0]),
                  {("control", "tick"): 3, ("start", "(start values)"): 12}, id="start values are counted"),
     pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 128), (".LC0", 6), (".LC1", 4)]),
-                 {("control", "tick"): 3, ("control", "drive"): 192, ("hand-over", "(texts)"): 15}, id="constants take three bytes for two"),
+                 {("control", "tick"): 3, ("control", "drive"): 192, ("hand-over", "(texts)"): 15},
+                 id="constants take three bytes for two"),
     pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 4), (".LC0", 3), (".LC1", 5)]),
                  {("control", "tick"): 3, ("control", "drive"): 6, ("hand-over", "(texts)"): 12}, id="texts of an odd length share a word"),
-    pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 10)], types={"drive": {"gain": 2, "fault": 2, "rest": 6}}),
+    pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 10)], types={"drive": {"gain": 2, "fault": 2,
+                                                                                                           "rest": 6}}),
                  {("control", "tick"): 3, ("control", "drive"): 12, ("guard", "drive.fault"): 3}, id="a member of a constant"),
-    pytest.param(program((0x200, 2), functions=[Function("new", "include/a/new.h", 1, 0x200, 0x204)]), {("not assigned", "new"): 6}, id="not assigned")])
+    pytest.param(program((0x200, 2), functions=[Function("new", "include/a/new.h", 1, 0x200, 0x204)]), {("not assigned", "new"): 6},
+                 id="not assigned")])
 def test_flash(counted, sample, expected):
     assert counted(sample) == expected
 
@@ -149,7 +154,8 @@ def test_vectors_are_the_handlers_and_not_counted(image):
     assert (found.handlers, found.flash_bytes) == ([0x200, 0x300], 3)
 
 
-@pytest.mark.parametrize("values, calls", [([0x800, 4, 0, 0], False), ([0x800, 4, 1, 7, 7, 0], False), ([0x800, 4, 2, 7, 7, 0], False), ([0x800, 4, 3, 0], True),
+@pytest.mark.parametrize("values, calls", [([0x800, 4, 0, 0], False), ([0x800, 4, 1, 7, 7, 0], False), ([0x800, 4, 2, 7, 7, 0], False),
+                                           ([0x800, 4, 3, 0], True),
                                            ([0x800, 4, 1, 7, 7, 0x900, 2, 3, 0], True), ([0x800, 0x10000 + 4, 0x7F0000, 0], False)])
 def test_a_list_of_start_values_that_calls_a_function_is_noticed(image, values, calls):
     assert image(program((0x200, 1), functions=[tick(0x202)], start_values=values)).initial_calls == calls
@@ -161,7 +167,8 @@ TYPES = {"drive": {"fault": 2, "estimator": {"history": 8, "lost": 2}, "rest": 4
 
 @pytest.mark.parametrize("variables, types, expected", [
     pytest.param([("_drive", 16, True)], TYPES, {("control", "drive"): 4, ("start", "drive.estimator"): 8, ("guard", "drive.fault"): 2,
-                                                 ("guard", "drive.estimator.lost"): 2}, id="members go to their modules and the rest stays"),
+                                                 ("guard", "drive.estimator.lost"): 2},
+                 id="members go to their modules and the rest stays"),
     pytest.param([("_table", 6, False, TABLE), ("_drive", 10, True, "all.c")], {}, {("control", "table"): 6, ("control", "drive"): 10},
                  id="an object goes by its file, and one without a size ends at the next"),
     pytest.param([("_silent", 2, True, TABLE)], {}, {("guard", "silent"): 2}, id="a name comes before the file"),
@@ -174,9 +181,11 @@ def test_ram(counted, variables, types, expected):
 # ---- limits: 60 and 120 bytes of flash, 20 and 40 of RAM, 30 of stack -----------------------------------------------------
 @pytest.fixture
 def report(image, budget):
-    def of(words: int, more: int = 0, ram: int = 0, new: int = 0, listing: str = RETURN, before=None, limits: bool = True, held=budget) -> size.Report:
+    def of(words: int, more: int = 0, ram: int = 0, new: int = 0, listing: str = RETURN, before=None, limits: bool = True,
+           held=budget) -> size.Report:
         variables = [item for item in (("_drive", ram, True), ("_new", new, True, "new.c")) if item[1]]
-        found = image(program((0x200, words), (0x400, more), functions=[tick(0x200 + 2 * words), guard(0x400, 0x400 + 2 * more)], variables=variables))
+        found = image(program((0x200, words), (0x400, more), functions=[tick(0x200 + 2 * words), guard(0x400, 0x400 + 2 * more)],
+                              variables=variables))
         return size.measure(found, size.deepest(found, listing, held, Path("none")), held, before, limits)
     return of
 
@@ -259,7 +268,8 @@ static void hand_over(void)
 void tick_guard(void);
 void tick_guard(void) { }
 """
-FILES = {"include/a/tick.h": TICK_H, "firmware/a/table.c": "drive_t drive;\nconst int16_t table[2] = {\n    1, 2\n};\nstatic uint16_t silent KEPT;\n",
+FILES = {"include/a/tick.h": TICK_H, "firmware/a/table.c": "drive_t drive;\nconst int16_t table[2] = {\n    1, 2\n};\n"
+                                                             "static uint16_t silent KEPT;\n",
          "include/a/park.h": "int park(int a) { return a; }\n", "include/a/guard.h": "void guard(void)\n{\n}\n", "firmware/a/guard.c": "",
          "include/a/qmath.h": "int qm_abs(int a) { return a; }\nint small_one(void)\n{\n}\n"}
 
@@ -276,7 +286,8 @@ def test_sources_tell_what_they_define(tree):
     found = Sources.read(tree)
     assert found.functions["include/a/tick.h"] == {"tick", "hand_over", "tick_guard"}
     assert set(found.variables["firmware/a/table.c"]) == {"drive", "table", "silent"}
-    assert found.objects() >= {"drive", "drive.fault", "drive.state", "drive.identify", "drive.estimator.history", "drive.estimator.lost", "table"}
+    assert found.objects() >= {"drive", "drive.fault", "drive.state", "drive.identify", "drive.estimator.history", "drive.estimator.lost",
+                               "table"}
     assert not any("old" in name or "elsewhere" in name for name in found.objects())
 
 
@@ -284,8 +295,10 @@ def test_sources_tell_what_they_define(tree):
     ("", "", []),
     ('"include/a/guard.h"', '"include/a/gurad.h"', [r"'include/a/gurad.h' is no file of the firmware, \S*budget.toml line \d+: correct it",
                                                      "'include/a/guard.h' is in no module: add it"]),
-    ('"tick_guard"', '"tick_gaurd"', ["'tick_gaurd' is no function of the firmware"]), ('"small_*"', '"smal_*"', ["'smal_\\*' is no function"]),
-    ('"drive.fault"', '"drive.failure"', ["'drive.failure' is no variable or member"]), ('"drive.estimator.lost"', '"drive.lost"', ["'drive.lost' is no"]),
+    ('"tick_guard"', '"tick_gaurd"', ["'tick_gaurd' is no function of the firmware"]), ('"small_*"', '"smal_*"',
+                                                                                        ["'smal_\\*' is no function"]),
+    ('"drive.fault"', '"drive.failure"', ["'drive.failure' is no variable or member"]), ('"drive.estimator.lost"', '"drive.lost"',
+                                                                                         ["'drive.lost' is no"]),
     ('"demo"', '"demmo"', ["'demmo' is no scenario"]), ('"silent"', '"drive"', ["'drive' is named twice"]),
     ('"_reset*"', '"_rset*"', [r"'_rset\*' is no function of the compiler's start-up code in the image"]),
     ('"_fill"', '"_filll"', ["'_filll' is no function of the compiler's"])])
@@ -297,7 +310,8 @@ def test_a_name_that_matches_nothing_is_a_line(tree, image, old, new, expected):
 
 
 @pytest.mark.parametrize("old, new, told", [('group = "more"', 'group = "mroe"', "'mroe' is no group, .*budget.toml line .*more"),
-                                            ("whole = true", "hole = true", "unknown key 'hole'"), ("[stack]", "[stak]", r"no table \[stack\]")])
+                                            ("whole = true", "hole = true", "unknown key 'hole'"),
+                                            ("[stack]", "[stak]", r"no table \[stack\]")])
 def test_a_budget_file_with_a_mistake(tmp_path, old, new, told):
     with pytest.raises(UserError, match=told):
         budget_in(tmp_path, old, new)
@@ -322,7 +336,9 @@ GOOD, BARE, OTHER = program((0x200, 1), functions=[tick(0x202)]), program((0x200
 
 @pytest.mark.parametrize("sample, arguments, words", [
     (None, (), ("No such file", "make firmware")), (GOOD, ("--objdump", "no-such-objdump"), ("no no-such-objdump", "XC16")),
-    (OTHER, (), ("not a linked program for a dsPIC",)), (BARE, (), ("compile with -g",)), (BARE, ("--objdump", r"printf '\351'"), ("compile with -g",)), (None, ("--wrong",), ("--help",))])
+    (OTHER, (), ("not a linked program for a dsPIC",)), (BARE, (), ("compile with -g",)), (BARE, ("--objdump", r"printf '\351'"),
+                                                                                           ("compile with -g",)),
+                                                      (None, ("--wrong",), ("--help",))])
 def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, sample, arguments, words):
     if sample is not None:
         (tmp_path / "bad.elf").write_bytes(sample.elf())
@@ -343,7 +359,8 @@ class Repository:
     def __init__(self, folder: Path) -> None:
         self.root, self.log = folder / "repository", folder / "log"
         self.main = self.root / "firmware" / "board" / "main.c"
-        for name, text in {"Makefile": MAKEFILE, "tools/make/x.mk": "", "include/x.h": "", "userparams.h": "", "firmware/board/main.c": ""}.items():
+        for name, text in {"Makefile": MAKEFILE, "tools/make/x.mk": "", "include/x.h": "", "userparams.h": "",
+                           "firmware/board/main.c": ""}.items():
             (self.root / name).parent.mkdir(parents=True, exist_ok=True)
             (self.root / name).write_text(text, encoding="utf-8")
 
@@ -371,8 +388,10 @@ def repository(tmp_path, monkeypatch):
         pytest.skip("git is not installed")
     result = Repository(tmp_path)
     (tmp_path / "made.elf").write_bytes(program((0x200, 3), functions=[tick(0x206)]).elf())
-    for name, value in {"LOG": result.log, "IMAGE": tmp_path / "made.elf", "FAIL": "", "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull,
-                        "GIT_CEILING_DIRECTORIES": tmp_path, "GIT_AUTHOR_NAME": "t", "GIT_AUTHOR_EMAIL": "t@example.org", "GIT_COMMITTER_NAME": "t",
+    for name, value in {"LOG": result.log, "IMAGE": tmp_path / "made.elf", "FAIL": "", "GIT_CONFIG_GLOBAL": os.devnull,
+                        "GIT_CONFIG_SYSTEM": os.devnull,
+                        "GIT_CEILING_DIRECTORIES": tmp_path, "GIT_AUTHOR_NAME": "t", "GIT_AUTHOR_EMAIL": "t@example.org",
+                        "GIT_COMMITTER_NAME": "t",
                         "GIT_COMMITTER_EMAIL": "t@example.org"}.items():
         monkeypatch.setenv(name, str(value))
     return result
@@ -449,12 +468,15 @@ def test_a_compiled_program(tmp_path):
     image = attribution.read(tmp_path / "t.elf")
     for memory, total in (("program", image.flash_bytes), ("data", image.ram_bytes)):
         assert re.search(rf'Total "{memory}" memory used \(bytes\):\s+0x[0-9a-f]+\s+\({total}\)', done.stdout + done.stderr)
-    assert {thing.name: thing.file for thing in image.data + image.constants if thing.name in ("drive", "table")} == {"drive": "guard.c", "table": "guard.c"}
+    assert {thing.name: thing.file for thing in image.data + image.constants if thing.name in ("drive", "table")} == {"drive": "guard.c",
+                                                                                                                      "table": "guard.c"}
     found = shares(image, budget_in(tmp_path, '"firmware/a/guard.c"', '"guard.c"'))
     assert found["guard", "park"].flash > 0 and found["guard", "guard"].flash > 0
-    assert (found["guard", "drive.fault"].ram, found["guard", "drive.estimator.lost"].ram, found["start", "drive.estimator"].ram) == (2, 2, 8)
+    assert (found["guard", "drive.fault"].ram, found["guard", "drive.estimator.lost"].ram, found["start", "drive.estimator"].ram) == (2, 2,
+                                                                                                                                      8)
     assert found["guard", "table"].flash == 60
-    result = stack.analyse(size.disassemble(f"{XC16}xc16-objdump", tmp_path / "t.elf"), image.entry, ["_ADC1Interrupt"], {}, ("_data_init",))
+    result = stack.analyse(size.disassemble(f"{XC16}xc16-objdump", tmp_path / "t.elf"), image.entry, ["_ADC1Interrupt"], {},
+                           ("_data_init",))
     assert result.errors == []
     assert [name for name, _ in result.levels[0].chain.steps] == ["interrupt entry", "_ADC1Interrupt", "guard"]
     assert result.levels[0].chain.steps[-1][1] >= 8

@@ -1,4 +1,4 @@
-"""The deepest stack from a disassembly: each way to use it counts what a hand count gives, and what cannot be followed is an error by name."""
+"""The deepest stack from a disassembly: each use counts what a hand count gives, what cannot be followed is an error by name."""
 
 import pytest
 
@@ -45,14 +45,16 @@ LOADS = "".join(f"mov.d [--w15], w{i}\n" for i in range(12, -2, -2))
 @pytest.mark.parametrize("code, depth", [
     pytest.param("mov.w #0x5, w0\nreturn", 0, id="a leaf"),
     pytest.param("lnk #0x28\nulnk\nreturn", 42, id="a frame is its size and the saved frame pointer"),
-    pytest.param(f"push 0x36\n{SAVES}lnk #0x28\nulnk\n{LOADS}pop 0x36\nretfie", 2 + 7 * 4 + 2 + 0x28, id="an interrupt that saves everything"),
+    pytest.param(f"push 0x36\n{SAVES}lnk #0x28\nulnk\n{LOADS}pop 0x36\nretfie", 2 + 7 * 4 + 2 + 0x28,
+                 id="an interrupt that saves everything"),
     ("push w8\npop w8\nreturn", 2), ("push.d w8\npop.d w8\nreturn", 4), ("push 0x36\npop 0x36\nreturn", 2),
     ("mov.w w8, [w15++]\nmov.w [--w15], w8\nreturn", 2), ("mov.d w8, [w15++]\nmov.d [--w15], w8\nreturn", 4),
     ("clr.w [w15++]\nsub.w w15, #0x2, w15\nreturn", 2), ("add.w w15, #0x6, w15\nsub.w w15, #0x6, w15\nreturn", 6),
     ("add.w #0x20, w15\nsub.w #0x20, w15\nreturn", 32), ("inc2.w w15, w15\ndec2.w w15, w15\nreturn", 2),
     pytest.param("push.s\npop.s\nreturn", 0, id="shadow registers"),
     pytest.param("lnk #0x4\nsub.w w0, #0x2, [w15]\nmov.w [w15-4], w1\nsub.w w15, #0x4, w3\nulnk\nreturn", 6, id="reading and comparing"),
-    pytest.param("bra Z, {.L2}\npush w8\npop w8\nreturn\n.L2:\npush.d w8\npush.d w10\npop.d w10\npop.d w8\nreturn", 8, id="the deeper of two ways"),
+    pytest.param("bra Z, {.L2}\npush w8\npop w8\nreturn\n.L2:\npush.d w8\npush.d w10\npop.d w10\npop.d w8\nreturn", 8,
+                 id="the deeper of two ways"),
     pytest.param("lnk #0x0\nrepeat #0x3\nclr.w [w15++]\nulnk\nreturn", 2 + 4 * 2, id="a repeated push"),
     pytest.param("btss w0, #0x1\nbra {.L3}\nreturn\n.L3:\npush w8\npop w8\nreturn", 2, id="a skip over a branch goes both ways"),
     pytest.param("mov.w #0x934, w15\npush w8\nreset", 2, id="the start-up code begins the stack"),
@@ -63,7 +65,8 @@ def test_depth_of_one_function(code, depth):
 
 
 @pytest.mark.parametrize("code, words", [
-    ("lnk #0x0\nrepeat w3\nclr.w [w15++]\nulnk\nreturn", "unknown number"), ("lnk #0x0\n.L1:\npush w8\nbra NZ, {.L1}\nulnk\nreturn", "grows in a loop"),
+    ("lnk #0x0\nrepeat w3\nclr.w [w15++]\nulnk\nreturn", "unknown number"), ("lnk #0x0\n.L1:\npush w8\nbra NZ, {.L1}\nulnk\nreturn",
+                                                                             "grows in a loop"),
     ("lnk #0x0\nbtsc w0, #0x1\npush w8\nmov.w w1, w2\nulnk\nreturn", "disagree"), ("push w8\nreturn", "returns with 2 bytes"),
     ("mov.w w0, w15\nreset", "computed"), ("add.w w0, w15, w15\nreset", "computed"), ("sub.w w15, w1, w15\nreset", "computed"),
     ("mov.w [w0], w15\nreset", "computed"), ("lnk #0x4\nulnk\nulnk\nreturn", "not open"), ("mov.w w0, w1", "no code")])
@@ -78,7 +81,8 @@ def test_what_cannot_be_followed_is_one_error_with_the_functions_name(code, word
     ("_f:\nlnk #0x2\ncall {_g}\nulnk\nreturn\n_g:\npush.d w8\npop.d w8\nreturn", ["f", "g"], 4 + 4 + 4),
     # the frame and the call are not there at the same time
     ("_f:\nrcall {_g}\nlnk #0x10\nulnk\nreturn\n_g:\nlnk #0x8\nulnk\nreturn", ["f"], 0x12),
-    ("_f:\nrcall {_a}\nrcall {_b}\nreturn\n_a:\npush w8\npop w8\nreturn\n_b:\nlnk #0x6\nrcall {_a}\nulnk\nreturn", ["f", "b", "a"], 4 + 8 + 4 + 2),
+    ("_f:\nrcall {_a}\nrcall {_b}\nreturn\n_a:\npush w8\npop w8\nreturn\n_b:\nlnk #0x6\nrcall {_a}\nulnk\nreturn", ["f", "b", "a"],
+     4 + 8 + 4 + 2),
     ("_f:\nbra {_g}\n_g:\nlnk #0x8\nulnk\nreturn", ["f", "g"], 10), ("_f:\ngoto 0x204 <_g>\n_g:\nlnk #0x8\nulnk\nreturn", ["f", "g"], 10),
     ("_f:\nmov.w w0, w1\n_g:\nlnk #0x8\nulnk\nreturn", ["f", "g"], 10), # runs on into the next function
     ("_f:\nbra w0\nbra {.A}\nbra {.B}\n.A:\npush w8\npop w8\nreturn\n.B:\nlnk #0x4\nulnk\nreturn", ["f"], 6)]) # a switch

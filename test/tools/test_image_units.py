@@ -1,4 +1,4 @@
-"""make test-target around the compiler and the simulator: vectors as the target reads them, images split where the flash ends, and the verdict."""
+"""make test-target around compiler and simulator: vectors as the chip reads them, images split where the flash ends, the verdict."""
 
 import argparse
 import re
@@ -50,7 +50,8 @@ def test_a_row_is_words_low_word_first_without_gaps():
 
 def test_header_keeps_type_rows_and_constants_and_fetches_rows():
     text = vectors.header("x", 7, [("a", "s16"), ("b", "s32")], {"k": "5"}, [["1", "2"], ["3", "4"]])
-    for part in ("#define GOLDEN_X_K 5", "#define GOLDEN_X_ROWS 2u", "int32_t b;", "golden_x_t golden_x_row(uint32_t n)", "golden_fetch(7, n * 3u, &row,"):
+    for part in ("#define GOLDEN_X_K 5", "#define GOLDEN_X_ROWS 2u", "int32_t b;", "golden_x_t golden_x_row(uint32_t n)",
+                 "golden_fetch(7, n * 3u, &row,"):
         assert part in text
     assert "golden_x[" not in text
     constants = vectors.header("x", 7, [], {"k": "5"}, []) # a file with constants only stays as it is
@@ -58,7 +59,8 @@ def test_header_keeps_type_rows_and_constants_and_fetches_rows():
 
 
 def test_every_access_to_a_row_becomes_a_call_and_lines_keep_their_numbers():
-    text = vectors.fed("one\ngolden_pi_t v = golden_pi[n];\ngolden_##name##_t row = golden_##name[n];\ntable[golden_sine[n + 1u].value]\n", "t.c")
+    text = vectors.fed("one\ngolden_pi_t v = golden_pi[n];\ngolden_##name##_t row = golden_##name[n];\ntable[golden_sine[n + 1u].value]\n",
+                       "t.c")
     assert text == ('#line 1 "t.c"\none\ngolden_pi_t v = golden_pi_row(n);\ngolden_##name##_t row = golden_##name##_row(n);\n'
                     "table[golden_sine_row(n + 1u).value]\n")
     for path in sorted((ROOT / "test/unit").glob("test_*.c")):
@@ -87,10 +89,12 @@ def judge(tmp_path, monkeypatch):
 
     def of(on_chip: list[str], on_pc: dict[str, str] | None = None, source: str = "int x;\n"):
         Path("test/unit/test_x.c").write_text(source)
-        Path("runners/unit/test_x_runner.c").write_text("".join(f'  a[{i}].name = "{name}";\n  a[{i}].line_num = {i};\n' for i, name in enumerate(on_chip)))
+        Path("runners/unit/test_x_runner.c").write_text("".join(f'  a[{i}].name = "{name}";\n  a[{i}].line_num = {i};\n' for i,
+                                                                name in enumerate(on_chip)))
         host = Path("runners/unit/test_x")
         results = on_pc if on_pc is not None else {name: "PASS" for name in on_chip}
-        host.write_text("#!/bin/sh\ncat <<END\n" + "".join(f"test/unit/test_x.c:1:{name}:{text}\n" for name, text in results.items()) + "END\n")
+        host.write_text("#!/bin/sh\ncat <<END\n" + "".join(f"test/unit/test_x.c:1:{name}:{text}\n" for name, text in results.items())
+                        + "END\n")
         host.chmod(0o755)
         options = argparse.Namespace(out=f"{tmp_path}/out", unity="unity", runners="runners", compile=f"{tmp_path}/cc",
                                      link=f"{tmp_path}/ld {{elf}} {{objects}}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1)

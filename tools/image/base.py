@@ -50,7 +50,8 @@ def build(commit_id: str, variables: list[str], root: Path = paths.ROOT, cache: 
     with tarfile.open(fileobj=BytesIO(archive.stdout)) as tar:
         tar.extractall(source)
     environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN}
-    done = subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "target-elf", *variables], cwd=source, env=environment, stdin=subprocess.DEVNULL,
+    done = subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "target-elf", *variables], cwd=source, env=environment,
+                          stdin=subprocess.DEVNULL,
                           capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0 or not done.stdout.strip():
         raise NoBase(f"commit {commit_id[:7]} does not build with these settings")

@@ -1,4 +1,4 @@
-"""`make size`: flash, RAM and stack of the target image by module and function, beside the note's figures, the budget and the last commit.
+"""`make size`: flash, RAM and stack of the image by module and function, beside AN1292's figures, the budget and the last commit.
 
 Program memory is counted as data sheets do, three bytes a word, without the vector tables. Exit status: 0, 1 when a budget is broken
 (a line for each), 2 when the image or the compiler is missing."""
@@ -112,7 +112,8 @@ def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
     def change(attribute: str) -> int | None:
         values = [getattr(row, attribute) for row in below]
         return None if not values or None in values else sum(values)
-    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below), ram=sum(row.ram for row in below),
+    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below),
+               ram=sum(row.ram for row in below),
                flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
 
 
@@ -195,7 +196,8 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
     def cell(value: int | None) -> str:
         return "" if value is None else str(value)
-    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]), cell(row["ram_budget"])]
+    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]),
+             cell(row["ram_budget"])]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
     return ["bytes", "note: flash", "flash", "budget", "note: RAM", "RAM", "budget"], body
@@ -217,7 +219,8 @@ def disassemble(objdump: str, elf: Path) -> str:
         raise UserError(f"no {words[0]}", "PATH", "install Microchip's XC16, or say where it is with XC16=folder")
     done = subprocess.run([*words, "-d", str(elf)], capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0:
-        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)), "build the image anew with `make firmware`")
+        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)),
+                        "build the image anew with `make firmware`")
     return done.stdout
 
 
@@ -227,7 +230,8 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
         parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json and size.csv")
         parser.add_argument("--objdump", default="xc16-objdump")
-        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE", help="compare with the last commit's image, built by make with these variables")
+        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
+                            help="compare with the last commit's image, built by make with these variables")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--brief", action="store_true", help="no table of functions")
         return _run(parser.parse_args(arguments))
