@@ -17,7 +17,7 @@ from test_image_build import ROOT, with_compiler, xc16
 from tools.image import device
 from tools.image.attribution import type_of
 
-SOURCE = '#include "drive/params_init.h"\nconst drive_params_t board_params = DRIVE_PARAMS_INIT;\n'
+SOURCE = '#include "drive/param_init.h"\nconst drive_params_t board_params = DRIVE_PARAMS_INIT;\n'
 NUMBER = re.compile(r"^(#define +\w+ +)(-?\d+\.\d+(?:e-?\d+)?)\b", re.MULTILINE)
 
 

@@ -27,7 +27,7 @@ def test_the_committed_project_is_the_generated_one_whatever_one_build_is_asked_
 
 def test_it_has_every_source_and_header_of_the_firmware_and_no_other():
     items = {item.text for item in TREE.iter("itemPath")}
-    files = {f"../{path.relative_to(ROOT)}" for pattern in ("firmware/*/*.c", "include/*/*.h", "userparams.h")
+    files = {f"../{path.relative_to(ROOT)}" for pattern in ("firmware/**/*.c", "include/**/*.h", "userparams.h")
              for path in ROOT.glob(pattern)}
     assert items == files | {"Makefile"}
     roots = {"/".join(item.split("/")[:-1][:2]) for item in items - {"Makefile"}}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from test_image_build import ROOT, make, with_compiler
 
-sys.path[:0] = [str(ROOT / "test" / "target"), str(ROOT / "test")]
+sys.path[:0] = [str(ROOT / "test" / "sixteen_bit"), str(ROOT / "test")]
 import report # noqa: E402
 import run as target_run # noqa: E402
 import vectors # noqa: E402
@@ -56,15 +56,6 @@ def test_header_keeps_type_rows_and_constants_and_fetches_rows():
     assert "golden_x[" not in text
     constants = vectors.header("x", 7, [], {"k": "5"}, []) # a file with constants only stays as it is
     assert "#define GOLDEN_X_K 5" in constants and "golden_fetch" not in constants
-
-
-def test_every_access_to_a_row_becomes_a_call_and_lines_keep_their_numbers():
-    text = vectors.fed("one\ngolden_pi_t v = golden_pi[n];\ngolden_##name##_t row = golden_##name[n];\ntable[golden_sine[n + 1u].value]\n",
-                       "t.c")
-    assert text == ('#line 1 "t.c"\none\ngolden_pi_t v = golden_pi_row(n);\ngolden_##name##_t row = golden_##name##_row(n);\n'
-                    "table[golden_sine_row(n + 1u).value]\n")
-    for path in sorted((ROOT / "test/unit").glob("test_*.c")):
-        assert not re.search(r"golden_\w*(?:##\w+)?\[", vectors.fed(path.read_text(encoding="utf-8"), path.name)), path.name
 
 
 def test_tables_hold_every_row_of_the_vectors(tmp_path):

@@ -55,11 +55,11 @@ def updated(text: str, facts: dict[str, list[str]]) -> str:
 def _fill(folder: ET.Element, files: list[str]) -> None:
     """MPLAB X's folder of files, with one folder inside for each folder of the sources."""
     folder[:] = []
-    groups = sorted({Path(file).parent.name for file in files}, key=lambda name: (not name, name))
-    for number, group in enumerate(groups, 1):
+    inside = {file: "/".join(Path(file).parent.parts[1:]) for file in files}
+    for number, group in enumerate(sorted(set(inside.values()), key=lambda name: (not name, name)), 1):
         into = ET.SubElement(folder, "logicalFolder", name=f"f{number}", displayName=group, projectFiles="true") if group else folder
         for file in files:
-            if Path(file).parent.name == group:
+            if inside[file] == group:
                 ET.SubElement(into, "itemPath").text = above(file)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tools.common import paths
 
-PATTERNS = ("firmware/*/*.c", "include/*/*.h")
+PATTERNS = ("firmware/**/*.c", "include/**/*.h")
 DROPPED = re.compile(r"/\*.*?\*/|//[^\n]*|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.DOTALL | re.MULTILINE) # comments, lines of the preprocessor
 FUNCTION = re.compile(r"^\w[\w \*]*?\b(\w+)\([^(){};]*\)\s*\{", re.MULTILINE)
 VARIABLE = re.compile(r"^((?:\w+[ \*]+)+)(?![A-Z_]+;)(\w+(?:, \*?\w+)*)(?: [A-Z_]+)?(?: =|;)",

@@ -22,7 +22,7 @@ target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(
 target_link_options := --gc-sections,--report-mem
 target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 
-target_sources := $(wildcard firmware/*/*.c)
+target_sources := $(wildcard firmware/*/*.c firmware/*/*/*.c)
 target_objects := $(target_sources:%.c=$X/%.o)
 
 .PHONY: firmware flash project find-xc16
@@ -82,7 +82,7 @@ flash: firmware ## program the board by MPLAB IPE's command line, or say how [TO
 	@$(python) -m tools.image.flash $X/foc33.hex --elf $X/foc33.elf $(if $(TOOL),--tool $(call quoted,$(TOOL))) $(if $(IPE),--ipe $(call quoted,$(IPE)))
 
 # What the MPLAB X project is made of, one item a line: it cannot say anything else than this file does.
-target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h) userparams.h,'file $(word)') \
+target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h include/*/*/*.h) userparams.h,'file $(word)') \
     $(foreach word,$(filter-out -Werror,$(target_flags) $(target_warnings)),'flag $(word)') \
     $(foreach word,$(patsubst -I%,%,$(target_includes)),'include $(word)') \
     $(foreach word,$(subst $(comma), ,$(target_link_options)),'link $(word)') 'device $(target_device)'
