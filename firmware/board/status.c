@@ -5,13 +5,14 @@
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "drive/params.h"
+#include "version.h"
 
 #define STATUS_PERIOD_MS 500u
 
 #ifdef IDENTIFY
 static char line[128];
 #else
-static char line[48];
+static char line[64];
 #endif
 static uint16_t next;       /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
@@ -74,10 +75,10 @@ static uint16_t put_line(void)
 }
 #endif
 
-/** The first line: "reset BOR POR". */
+/** The first line: "foc33 0.9.0 reset BOR POR". */
 static uint16_t put_reset(void)
 {
-    uint16_t at = put_text(0, "reset");
+    uint16_t at = put_text(0, "foc33 " FOC33_VERSION " reset");
 #define PUT_CAUSE(bit, name, meaning) \
     if (RESET_WAS(name, board_reset_cause)) { \
         at = put_text(at, " " #name); \
