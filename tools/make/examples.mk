@@ -1,0 +1,18 @@
+# examples/: a harness, a scenario and a board of one's own, compiled and run as their first lines say. Uses the variables of the main Makefile.
+turn_motor := $B/examples/turn_motor
+all_suites += examples/run
+
+.PHONY: examples
+examples: setup-run $(turn_motor) $B/libvboard.so ## [tests] compile and run examples/: a harness, a scenario, a board
+	@$(turn_motor)
+	@$(front_end) run examples/my_scenario.toml --out build/run/my_scenario --no-plots
+	@$(tuner) tune hurst_dmb0224c10002 --board examples/my_board.toml --brief --out build/tune/my_board
+
+$(turn_motor): examples/turn_motor.c $B/libfirmware.a
+	@mkdir -p $(@D)
+	$(call say,cc,$<)$(compile) -MMD -MP -o $@ $^ -lm
+
+$T/examples.run.txt: $(turn_motor) $B/libvboard.so
+	@+$(python) test/run-suite.py --one-test $@ $(MAKE) -s examples
+
+-include $(turn_motor).d
