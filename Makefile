@@ -33,7 +33,7 @@ CFLAGS := -std=gnu99 -O2 -g -fPIC -ftrack-macro-expansion=0 $(sanitizer)
 INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
 
-firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c) tools/host/xc.c)
+firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c firmware/*/*/*.c) tools/host/xc.c)
 board_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/board/*.c))
 
 part_makefiles := $(wildcard tools/make/*.mk)

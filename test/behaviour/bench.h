@@ -6,7 +6,7 @@
 #include <stdio.h>
 
 #include "board/firmware.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 #include "unity.h"
 #include "vboard.h"
 

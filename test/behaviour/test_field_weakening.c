@@ -1,7 +1,7 @@
 /* Above base speed: field weakening reaches twice the base speed and survives what users do to it. */
 #include "bench.h"
 
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 
 #define IDREF_ENTRY(i) IDREF_SPEED##i
 static const double idref_a[] = PARAM_18(IDREF_ENTRY);
@@ -29,7 +29,7 @@ void test_reaches_5500_rpm_without_load(void)
     m = measure(0.5);
     assert_speed(5500.0, 0.5, &m);
     TEST_ASSERT_TRUE(m.angle_rms_deg < 5.0);
-    TEST_ASSERT_EQUAL_INT((int)place_in_table(5500.0), board_drive.fieldweak.index);
+    TEST_ASSERT_EQUAL_INT((int)place_in_table(5500.0), board_drive.run.fieldweak.index);
     assert_running();
 }
 
@@ -51,7 +51,7 @@ void test_d_current_follows_the_table(void)
     int index = (int)place;
     run_at(4000.0);
     m = measure(0.3);
-    TEST_ASSERT_EQUAL_INT(index, board_drive.fieldweak.index);
+    TEST_ASSERT_EQUAL_INT(index, board_drive.run.fieldweak.index);
     TEST_ASSERT_DOUBLE_WITHIN(0.06, idref_a[index] + (place - index) * (idref_a[index + 1] - idref_a[index]), m.i_d_a);
 }
 

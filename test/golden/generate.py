@@ -499,7 +499,7 @@ def hand_over(rng):
 
 
 def params(_):
-    """Published constants of the note's motor and, in float64, what include/drive/params.h must give to 1 count."""
+    """Published constants of the note's motor and, in float64, what include/drive/param_scaling.h must give to 1 count."""
     v = Vectors("params", "constants of Equations 5 to 8 for the note's motor with four current ranges (A * 100 in the name)",
                 "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; rs, ls, inv_kfi, deltat in the note's format, pre-divided by "
                 "2, 256, 2, 1; the rest in the drive's formats")

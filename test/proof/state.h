@@ -15,14 +15,13 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.state = state;
     drive.fault = any_u(0, FAULT_COUNT - 1);
     drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
-    drive.timer = ANYU16();
-    drive.slots = ANYU16();
+    drive.periods = ANYU16();
     drive.direction = any(0, 1) ? 1 : -1;
-    drive.calibrated = any(0, 1);
-    drive.offset_sum_a = any_l(INT32_MIN, INT32_MAX);
-    drive.offset_sum_b = any_l(INT32_MIN, INT32_MAX);
-    drive.offset_a_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
-    drive.offset_b_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
+    drive.calibration.done = any(0, 1);
+    drive.calibration.sum_a = any_l(INT32_MIN, INT32_MAX);
+    drive.calibration.sum_b = any_l(INT32_MIN, INT32_MAX);
+    drive.calibration.offset_a_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
+    drive.calibration.offset_b_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
     drive.bus_q31 = any_l(0, INT32_MAX);
     drive.circle.limit_q14 = any(0, radius_max);
     drive.circle.reciprocal = voltage_circle_reciprocal(drive.circle.limit_q14);
@@ -32,8 +31,8 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.frame.cos = any(-32767, 32767);
     drive.forced.speed_q10 = any_l(0, params.forced.end_speed_q10);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
-    drive.stall_count = any_u(0, params.stall_slots);
-    drive.lost_count = any_u(0, params.lost_lock_slots);
+    drive.run.stall_steps = any_u(0, params.stall_slots);
+    drive.run.lost_lock_steps = any_u(0, params.lost_lock_slots);
 }
 
 static void any_estimator(estimator_t *e)
@@ -79,13 +78,13 @@ static void any_control(drive_control_t *c)
 
 static void bounds_hold_again(void)
 {
-    const estimator_t *e = &drive.estimator;
-    const drive_control_t *c = &drive.control;
+    const estimator_t *e = &drive.run.estimator;
+    const drive_control_t *c = &drive.run.control;
     //@ check state: drive.state <= DRIVE_FAULT && drive.fault < FAULT_COUNT;
     //@ check direction: drive.direction == 1 || drive.direction == -1;
     //@ check command: 0 <= drive.command.run <= 1 && -erpm_max <= drive.command.target_erpm <= erpm_max;
-    //@ check offset_a: -params.offset_max_q13 <= drive.offset_a_q13 <= params.offset_max_q13;
-    //@ check offset_b: -params.offset_max_q13 <= drive.offset_b_q13 <= params.offset_max_q13;
+    //@ check offset_a: -params.offset_max_q13 <= drive.calibration.offset_a_q13 <= params.offset_max_q13;
+    //@ check offset_b: -params.offset_max_q13 <= drive.calibration.offset_b_q13 <= params.offset_max_q13;
     //@ check bus: 0 <= drive.bus_q31;
     //@ check circle: 0 <= drive.circle.limit_q14 <= radius_max;
     //@ check forced: 0 <= drive.forced.speed_q10 <= params.forced.end_speed_q10;
@@ -112,9 +111,9 @@ static void bounds_hold_again(void)
     //@ check sum_d: -SUM_MAX <= c->pi_d.sum <= SUM_MAX;
     //@ check sum_q: -SUM_MAX <= c->pi_q.sum <= SUM_MAX;
     //@ check sum_speed: -SUM_MAX <= c->pi_speed.sum <= SUM_MAX;
-    //@ check trim: -params.fieldweak.trim_max_q13 <= drive.fieldweak.trim_q13 <= 0;
-    //@ check table: drive.fieldweak.index < FIELDWEAK_ENTRIES;
-    //@ check counts: drive.stall_count <= params.stall_slots + 1 && drive.lost_count <= params.lost_lock_slots + 1;
+    //@ check trim: -params.fieldweak.trim_max_q13 <= drive.run.fieldweak.trim_q13 <= 0;
+    //@ check table: drive.run.fieldweak.index < FIELDWEAK_ENTRIES;
+    //@ check counts: drive.run.stall_steps <= params.stall_slots + 1 && drive.run.lost_lock_steps <= params.lost_lock_slots + 1;
 }
 
 #endif

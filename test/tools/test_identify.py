@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tools.common import board_file, motor_file, paths, plant
 from tools.common.errors import UserError
-from tuning import cli, identify, params
+from tuning import cli, constants, identify, identify_result
 
 NAME = "hurst_dmb0224c10002"
 
@@ -26,7 +26,7 @@ def command(*arguments: str) -> tuple[int, str, str]:
 
 class Tables(unittest.TestCase):
     def test_results_have_name_cause_and_remedy(self):
-        results = identify.results()
+        results = identify_result.results()
         self.assertEqual(sorted(results), list(range(len(results))))
         self.assertEqual(results[2].name, "DONE")
         self.assertEqual(results[8].name, "NOT_TURNING")
@@ -37,8 +37,8 @@ class Tables(unittest.TestCase):
             self.assertNotIn('"', result.cause + result.remedy)
 
     def test_steps_begin_with_idle_and_end_with_full_speed(self):
-        self.assertEqual(identify.step_names()[0], "IDLE")
-        self.assertEqual(identify.step_names()[-1], "SPIN_FULL")
+        self.assertEqual(identify_result.step_names()[0], "IDLE")
+        self.assertEqual(identify_result.step_names()[-1], "SPIN_FULL")
 
 
 class Header(unittest.TestCase):
@@ -50,7 +50,7 @@ class Header(unittest.TestCase):
         return re.search(rf"^#define {name} (\S+)$", text, re.MULTILINE)[1]
 
     def test_knows_pole_pairs_current_and_speed_of_the_rating(self):
-        text = identify.header(identify.Known.of(self.motor, self.board), self.board)
+        text = identify.header(identify_result.Known.of(self.motor, self.board), self.board)
         self.assertEqual(self.define(text, "NOPOLESPAIRS"), "5")
         self.assertEqual(self.define(text, "Q_CURRENT_REF_OPENLOOP"), "1.53")
         self.assertEqual(self.define(text, "END_SPEED_RPM"), "1120")
@@ -58,32 +58,32 @@ class Header(unittest.TestCase):
     def test_a_board_for_large_currents_builds_too(self):
         """33 A and 48 A of range: with the placeholders of the MCLV the back-EMF's number format would overflow."""
         for full_scale_a in (33.0, 46.0):
-            text = identify.header(identify.Known(4, 17.0, 1400.0), replace(self.board, current_full_scale_a=full_scale_a))
+            text = identify.header(identify_result.Known(4, 17.0, 1400.0), replace(self.board, current_full_scale_a=full_scale_a))
             values = {name: value for name, value in re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE) if name != "USERPARAMS_H"}
-            self.assertEqual(params.check(values), [])
-        self.assertEqual(self.define(identify.header(identify.Known(4, 1.0, 1400.0), self.board), "MOTOR_RS_OHM"), "1")
+            self.assertEqual(constants.header(values).wrong, [])
+        self.assertEqual(self.define(identify.header(identify_result.Known(4, 1.0, 1400.0), self.board), "MOTOR_RS_OHM"), "1")
 
     def test_knows_nothing_of_what_is_to_be_measured(self):
         """Motors that differ in everything else have the same header."""
-        known = identify.Known(5, 1.0, 1000.0)
+        known = identify_result.Known(5, 1.0, 1000.0)
         text = identify.header(known, self.board)
         for number in ("2.67", "1.92", "7.24", "5.5e-06"):
             self.assertNotIn(f" {number}\n", text)
-        self.assertEqual(text, identify.header(identify.Known(5, 1.0, 1000.0), self.board))
+        self.assertEqual(text, identify.header(identify_result.Known(5, 1.0, 1000.0), self.board))
 
     def test_current_stays_below_the_boards_trip(self):
         for name in paths.names(paths.MOTORS):
-            known = identify.Known.of(motor_file.load(name), self.board)
+            known = identify_result.Known.of(motor_file.load(name), self.board)
             text = identify.header(known, self.board)
             self.assertLess(1.2 * known.current_a, float(self.define(text, "OVER_CURRENT_THRESHOLD_A")))
 
     def test_a_bus_below_the_rating_lowers_the_speed(self):
         import dataclasses
         high = dataclasses.replace(self.motor, rated_voltage_v=48.0)
-        self.assertAlmostEqual(identify.Known.of(high, self.board).speed_rpm, 560.0)
+        self.assertAlmostEqual(identify_result.Known.of(high, self.board).speed_rpm, 560.0)
 
     def test_current_and_speed_can_be_given(self):
-        known = identify.Known.of(self.motor, self.board, 0.7, 800.0)
+        known = identify_result.Known.of(self.motor, self.board, 0.7, 800.0)
         self.assertEqual((known.current_a, known.speed_rpm), (0.7, 800.0))
 
 
@@ -118,7 +118,7 @@ class Run(unittest.TestCase):
 
     def test_every_step_is_in_the_protocol_once(self):
         seen = [step["step"] for step in self.summary["steps"]]
-        self.assertEqual(seen[1:-1], identify.step_names()[1:])
+        self.assertEqual(seen[1:-1], identify_result.step_names()[1:])
 
     def test_the_lines_to_paste_are_a_motor_file(self):
         lines = (self.folder / "electrical.toml").read_text(encoding="utf-8")
@@ -142,13 +142,13 @@ class Run(unittest.TestCase):
 class Verdict(unittest.TestCase):
     """Made-up measurements: the comparison itself."""
 
-    def item(self, watch: dict, fault: str = "NONE", **changes) -> identify.Identified:
+    def item(self, watch: dict, fault: str = "NONE", **changes) -> identify_result.Identified:
         board, motor = board_file.load("mclv"), motor_file.load(NAME)
         values = {"motor.rs_ohm": 2.67, "motor.ld_h": 1.92e-3, "motor.lq_h": 1.92e-3, "motor.psi_vs": 7.983e-3, "motor.pole_pairs": 5,
                   "motor.r_tempco": 0.0039, "motor.psi_tempco": -0.002} | changes
         full = {"step": 0, "result": 2, "Rs_mohm": 2692, "Ld_uH": 1920, "Lq_uH": 1920, "Kphi_mV_per_krpm": 7240} | watch
-        measured = identify.Measured(full, fault, [(0.0, 0)], None)
-        return identify.Identified(motor, board, identify.Known(5, 1.5, 1000.0), "", values, measured)
+        measured = identify_result.Measured(full, fault, [(0.0, 0)], None)
+        return identify_result.Identified(motor, board, identify_result.Known(5, 1.5, 1000.0), "", values, measured)
 
     def test_true_values_pass(self):
         self.assertEqual(self.item({}).problems(), [])

@@ -18,7 +18,7 @@ from elftools.elf.elffile import ELFFile
 from tools.image import device
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCE = '#include "drive/params_init.h"\nconst drive_params_t board_params = DRIVE_PARAMS_INIT;\n'
+SOURCE = '#include "drive/param_init.h"\nconst drive_params_t board_params = DRIVE_PARAMS_INIT;\n'
 NUMBER = re.compile(r"^(#define +\w+ +)(-?\d+\.\d+(?:e-?\d+)?)\b", re.MULTILINE)
 
 

@@ -46,12 +46,12 @@ files = ["pi.h"]
 name = "start"
 group = "law"
 functions = ["_reset*"]
-objects = ["(start values)", "drive.estimator"]
+objects = ["(start values)", "drive.run.estimator"]
 [[module]]
 name = "guard"
 group = "more"
 functions = ["guard", "tick*"]
-objects = ["drive.fault", "drive.estimator.lost", "table.limit"]
+objects = ["drive.fault", "drive.run.estimator.lost", "table.limit"]
 [[module]]
 name = "hand-over"
 group = "more"
@@ -167,7 +167,7 @@ class Ram(Case):
 
     def test_members_go_to_their_modules_and_the_rest_stays(self):
         self.assertEqual(self.ram(Program(variables=[("_drive", 16, True)], types=self.TYPES)),
-                         {("control", "drive"): 4, ("start", "drive.estimator"): 8, ("guard", "drive.fault"): 2, ("guard", "drive.estimator.lost"): 2})
+                         {("control", "drive"): 4, ("start", "drive.run.estimator"): 8, ("guard", "drive.fault"): 2, ("guard", "drive.run.estimator.lost"): 2})
 
     def test_an_object_without_a_size_ends_at_the_next(self):
         self.assertEqual(self.ram(Program(variables=[("_table", 6, False), ("_drive", 10, True)])), {("control", "table"): 6, ("control", "drive"): 10})
@@ -420,8 +420,8 @@ static __attribute__((noinline)) int guard(int x) { volatile int y[4]; y[x & 3] 
 volatile struct { int fault; struct { int history[4]; int lost; } estimator; } drive;
 const int table[20] = { 1, 2, 3 };
 void __attribute__((interrupt, no_auto_psv)) _ADC1Interrupt(void);
-void __attribute__((interrupt, no_auto_psv)) _ADC1Interrupt(void) { drive.fault = guard(drive.fault) + table[drive.estimator.lost & 15]; }
-int main(void) { for (;;) { drive.estimator.lost = park(drive.fault, drive.estimator.history[1]); } }
+void __attribute__((interrupt, no_auto_psv)) _ADC1Interrupt(void) { drive.fault = guard(drive.fault) + table[drive.run.estimator.lost & 15]; }
+int main(void) { for (;;) { drive.run.estimator.lost = park(drive.fault, drive.run.estimator.history[1]); } }
 """
 
 
@@ -449,8 +449,8 @@ class Compiled(Case):
         self.assertGreater(found["control", "park"].flash, 0)
         self.assertGreater(found["guard", "guard"].flash, 0)
         self.assertEqual(found["guard", "drive.fault"].ram, 2)
-        self.assertEqual(found["guard", "drive.estimator.lost"].ram, 2)
-        self.assertEqual(found["start", "drive.estimator"].ram, 8)
+        self.assertEqual(found["guard", "drive.run.estimator.lost"].ram, 2)
+        self.assertEqual(found["start", "drive.run.estimator"].ram, 8)
         self.assertEqual(found["control", "table"].flash, 60)
 
     def test_the_stack_is_followed_from_reset_into_the_interrupt(self):

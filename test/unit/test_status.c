@@ -54,7 +54,7 @@ static void expect_line(uint16_t state, uint16_t fault, int16_t speed_erpm, cons
     setUp();
     board_drive.state = state;
     board_drive.fault = fault;
-    board_drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    board_drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
     status_tick(500);
     send_passes(60);
     TEST_ASSERT_EQUAL_STRING(text, sent);

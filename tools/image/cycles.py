@@ -121,7 +121,7 @@ class Found:
 def classes(state: np.ndarray, states: dict[int, str], reference_rpm: np.ndarray, fw_start_rpm: float) -> dict[str, np.ndarray]:
     """Which interrupts belong to each state, and which had field weakening in them."""
     numbers = {name: number for number, name in states.items()}
-    on = (state >= numbers["LOCK"]) & (state <= numbers["STOPPING"])
+    on = (state >= numbers["ALIGN"]) & (state <= numbers["STOPPING"])
     weakening = on & (np.abs(reference_rpm) >= fw_start_rpm) & (state >= numbers["CLOSED"])
     return {**{name: state == number for number, name in states.items()}, WITHOUT: on & ~weakening, WITH: weakening}
 

@@ -22,7 +22,7 @@ target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(
 target_link_options := --gc-sections,--report-mem
 target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 
-target_sources := $(wildcard firmware/*/*.c)
+target_sources := $(wildcard firmware/*/*.c firmware/*/*/*.c)
 target_objects := $(target_sources:%.c=$X/%.o)
 
 .PHONY: firmware flash project find-xc16

@@ -1,4 +1,4 @@
-/* The note's motor, board and limits in place of whatever userparams.h says now: macros of params.h expand where they are used. */
+/* The note's motor, board and limits in place of whatever userparams.h says now: macros of param_scaling.h expand where they are used. */
 #undef NOPOLESPAIRS
 #define NOPOLESPAIRS 5
 #undef MOTOR_RS_OHM
