@@ -1,6 +1,5 @@
 # examples/: a harness, a scenario and a board of one's own, compiled and run as their first lines say. Uses the variables of the main Makefile.
 turn_motor := $B/examples/turn_motor
-all_suites += examples/run
 
 .PHONY: examples
 examples: setup-run $(turn_motor) $B/libvboard.so ## [tests] compile and run examples/: a harness, a scenario, a board
@@ -12,7 +11,6 @@ $(turn_motor): examples/turn_motor.c $B/libfirmware.a
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -o $@ $^ -lm
 
-$T/examples.run.txt: $(turn_motor) $B/libvboard.so
-	@+$(python) test/run-suite.py --one-test $@ $(MAKE) -s examples
+$T/tools.test_examples.txt $T/made/tools/test_examples: $(turn_motor) # built before the test, not by it
 
 -include $(turn_motor).d
