@@ -20,7 +20,7 @@ from . import attribution, base, stack
 from .budget import UNASSIGNED, Budget, Share, shares
 
 OUT = paths.ROOT / "build" / "target"
-NOTE_TITLE = "as in the note"
+NOTE_TITLE = "as in AN1292"
 
 
 @dataclass
@@ -222,7 +222,7 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]), cell(row["ram_budget"])]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
-    return ["bytes", "note: flash", "flash", "budget", "note: RAM", "RAM", "budget"], body
+    return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
