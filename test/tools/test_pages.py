@@ -68,6 +68,9 @@ class Facts(unittest.TestCase):
         version = re.search(r'FOC33_VERSION "(\d+\.\d+\.\d+)"', (ROOT / "include/version.h").read_text(encoding="utf-8"))[1]
         newest = re.search(r"^## \[(\d\S*)\] - \d{4}-\d\d-\d\d$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)[1]
         self.assertEqual(version, newest)
+        for page, text in pages().items():
+            if page != "CHANGELOG.md":
+                self.assertEqual(set(), set(re.findall(r"foc33 (\d+\.\d+\.\d+)", text)) - {version}, page)
 
     def test_make_lists_every_target_in_a_group(self):
         listed = re.findall(r"^([a-z0-9-]+):.*## (?:\[(.*?)\])?", makefiles(), re.MULTILINE)
