@@ -33,6 +33,11 @@ class Vectors:
         self.real += list(real)
         self.model += list(model)
 
+    def add(self, arguments, out, real):
+        """A row: arguments and the model's results; the results in float64 are compared."""
+        self.rows.append([*arguments, *out])
+        self.compare(real, out)
+
     def ratio_db(self):
         noise = math.fsum((r - m) ** 2 for r, m in zip(self.real, self.model))
         return 10 * math.log10(math.fsum(r * r for r in self.real) / noise) if noise else math.inf
@@ -158,10 +163,8 @@ def clarke(rng):
     pairs += [(round(8192 * math.cos(t)), round(8192 * math.cos(t - 2 * math.pi / 3)))
               for t in (2 * math.pi * n / 48 for n in range(48))]
     pairs += [p for p in zip(dither(rng, -10240, 10240, 150), dither(rng, -10240, 10240, 150)) if abs(sum(p)) <= 10240]
-    for a, b in pairs:
-        out = ref.clarke(a, b)
-        v.rows.append([a, b, *out])
-        v.compare(ref.clarke_real(a, b), out)
+    for pair in pairs:
+        v.add(pair, ref.clarke(*pair), ref.clarke_real(*pair))
     return v
 
 
@@ -171,26 +174,22 @@ def rotations(rng, most):
     return rows + [(*dither(rng, -most, most, 2), rng.randrange(65536)) for _ in range(120)]
 
 
-def park(rng):
-    v = Vectors("park", "Park: the largest vectors in 24 directions, a random sample",
-                "alpha, beta counts; angle 65536 = one turn; d, q half the counts",
-                "alpha:s16 beta:s16 angle:u16 d:s16 q:s16", least_db=71.0)
-    for x, y, angle in rotations(rng, 23170):
-        out = ref.park(x, y, *ref.sincos(angle))
-        v.rows.append([x, y, angle, *out])
-        v.compare(ref.park_real(x, y, 2 * math.pi * angle / 65536), out)
+def rotation(name, what, columns, rows, model, real):
+    v = Vectors(name, f"{what}: the largest vectors in 24 directions, a random sample", *columns, least_db=71.0)
+    for x, y, angle in rows:
+        v.add((x, y, angle), model(x, y, *ref.sincos(angle)), real(x, y, 2 * math.pi * angle / 65536))
     return v
+
+
+def park(rng):
+    return rotation("park", "Park", ("alpha, beta counts; angle 65536 = one turn; d, q half the counts", "alpha:s16 beta:s16 angle:u16 d:s16 q:s16"),
+                    rotations(rng, 23170), ref.park, ref.park_real)
 
 
 def inverse_park(rng):
-    v = Vectors("inverse_park", "inverse Park: the largest vectors in 24 directions, a random sample",
-                "d, q counts; angle 65536 = one turn; alpha, beta half the counts",
-                "d:s16 q:s16 angle:u16 alpha:s16 beta:s16", least_db=71.0)
-    for x, y, angle in rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)]:
-        out = ref.inverse_park(x, y, *ref.sincos(angle))
-        v.rows.append([x, y, angle, *out])
-        v.compare(ref.inverse_park_real(x, y, 2 * math.pi * angle / 65536), out)
-    return v
+    return rotation("inverse_park", "inverse Park", ("d, q counts; angle 65536 = one turn; alpha, beta half the counts",
+                                                     "d:s16 q:s16 angle:u16 alpha:s16 beta:s16"),
+                    rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)], ref.inverse_park, ref.inverse_park_real)
 
 
 # ---- modulator ------------------------------------------------------------------------------------------------------
@@ -324,17 +323,16 @@ ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulat
                     "that of omega and of the angle in steady state")
 
 
-def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter, least_db, compare_from):
-    """At most 32767 bytes of vectors: no compiler for a 16-bit target takes a larger object.
-
-    @param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio"""
+def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, least_db, compare_from):
+    """@param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio
+    @return (vectors, angle of the rotor in turns for every sample)"""
     m, p = MACHINE, MACHINE.estimator()
     varies = len(set(inv_kfi)) > 1
-    constants = dict(p, kfilter_esdq_q16=2 * kfilter, closed_from=closed_from)
+    constants = dict(p, kfilter_esdq_q16=2400, closed_from=closed_from)
     v = Vectors(name, what, ESTIMATOR_FORMAT,
                 "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16" + (" inv_kfi:s16" if varies else ""),
                 constants=constants, least_db=least_db)
-    model, real = ref.Estimator(p, 2 * kfilter), ref.EstimatorReal(m, kfilter / 32768)
+    model, real = ref.Estimator(p), ref.EstimatorReal(m)
     amperes, volts, turns = ref.synthetic_motor(m, speed, current)
     frame = ref.sincos(0)
     for n, (i, u) in enumerate(zip(amperes, volts)):
@@ -353,65 +351,59 @@ def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter
         v.rows.append([*now, *command, model.omega, model.rho >> 16] + ([kfi] if varies else []))
         if n in compare_from:
             v.compare([real.omega, 0.0], [model.omega, ref.wrap16(model.rho // 65536 - round(real.rho * 65536))])
-    return v, model, real, turns
+    return v, turns
 
 
-def angle_error_deg(m, model, turns, speed, n):
-    """Rotor ahead of the estimate, both half a period after sample n."""
-    true = turns[n] + speed[n] * m.turns_per_erpm / 2
-    return ref.wrap16(round(true * 65536) - (model.rho >> 16)) * 360 / 65536
-
-
-def require_lock(v, error_deg, expected_deg, within_deg):
+def require_lock(v, turns, speed, n, expected_deg, within_deg):
+    """@param n sample, -1 the last one @return angle of the rotor half a period after it, in counts"""
+    n = n % len(v.rows)
+    true = round((turns[n] + speed[n] * MACHINE.turns_per_erpm / 2) * 65536)
+    error_deg = ref.wrap16(true - v.rows[n][5]) * 360 / 65536
     if abs(error_deg - expected_deg) > within_deg:
         raise ValueError(f"{v.name}: the angle error is {error_deg:.2f} deg, expected {expected_deg:.2f}")
+    return true % 65536
+
+
+def locked_sequence(name, what, speed, current, closed_from, least_db, compare_from, within_deg):
+    """A sequence with the right Kphi that ends on the rotor's angle."""
+    v, turns = estimator_sequence(name, what, speed, current, closed_from, [1.0] * len(speed), least_db, compare_from)
+    require_lock(v, turns, speed, -1, 0.0, within_deg)
+    return v
 
 
 def estimator_start(_):
     speed = profile([(0, 0.0), (200, 0.0), (1600, 5000.0), (2500, 5000.0)])
     current = [1.41 * cmath.rect(1, math.radians(x)) for x in profile([(0, 5.0), (2000, 20.0), (2100, 80.0), (2500, 80.0)])]
-    v, model, real, turns = estimator_sequence(
-        "estimator_start", "estimator from standstill: the start ramp in its own frame, then the control frame, a load change",
-        speed, current, 1900, [1.0] * 2500, 1200, 44.0, range(1600, 2500))
-    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2499), 0.0, 1.0)
-    return v
+    return locked_sequence("estimator_start", "estimator from standstill: the start ramp in its own frame, then the control frame, a load change",
+                           speed, current, 1900, 44.0, range(1600, 2500), 1.0)
 
 
 def estimator_speed(_):
     speed = profile([(0, 5000.0), (600, 5000.0), (1000, 13900.0), (1200, 14100.0), (1900, 27500.0), (2500, 27500.0)])
     current = profile([(0, 0.5j), (500, 0.5j), (520, 2j), (1000, 1j), (1900, -2.2 + 0.4j), (2100, -2.2 + 0.4j),
                        (2110, -2.2 + 1.0j), (2500, -2.2 + 1.0j)])
-    v, model, real, turns = estimator_sequence(
-        "estimator_speed", "estimator started on a turning motor: lock, load step, across nominal speed, field weakening at 5500 rpm",
-        speed, current, 0, [1.0] * 2500, 1200, 53.0, range(500, 2500))
-    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2499), 0.0, 1.5)
-    return v
+    return locked_sequence("estimator_speed", "estimator started on a turning motor: lock, load step, across nominal speed, field weakening at "
+                           "5500 rpm", speed, current, 0, 53.0, range(500, 2500), 1.5)
 
 
 def estimator_reversal(_):
     speed = profile([(0, -5000.0), (600, -5000.0), (1200, -800.0), (1500, 0.0), (1700, 1200.0), (2300, 6000.0), (2700, 6000.0)])
     current = profile([(0, -1j), (600, -1j), (700, 1j), (2000, 1j), (2700, 0.3j)])
-    v, model, real, turns = estimator_sequence(
-        "estimator_reversal", "estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
-        speed, current, 0, [1.0] * 2700, 1200, 47.0, [*range(500, 1200), *range(2300, 2700)])
-    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2699), 0.0, 1.0)
-    return v
+    return locked_sequence("estimator_reversal", "estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
+                           speed, current, 0, 47.0, [*range(500, 1200), *range(2300, 2700)], 1.0)
 
 
 def estimator_kphi(_):
     ratios = [1.0] * 500 + [1.1] * 400 + [2.0] * 600 + [0.8] * 800
     speed = [7500.0] * 2301
-    v, model, real, turns = estimator_sequence(
+    v, turns = estimator_sequence(
         "estimator_kphi", "estimator with 1/Kphi at 1, 1.1, 2 and 0.8 times the true one: the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the "
-        "speed stays", speed, [0.8j] * 2301, 0, ratios, 1200, 47.0, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
+        "speed stays", speed, [0.8j] * 2301, 0, ratios, 47.0, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
     for end in (500, 900, 1500, 2300):
-        rho = v.rows[end - 1][5]
-        true = turns[end - 1] + 7500.0 * MACHINE.turns_per_erpm / 2
-        error = ref.wrap16(round(true * 65536) - rho) * 360 / 65536
-        # K'/K is a ratio of Kphi, inv_kfi is its inverse
-        require_lock(v, error, ref.lock_error_deg(1 / ratios[end - 1]), 0.5)
-        v.constants[f"error_counts_{end}"] = ref.nearest(ref.lock_error_deg(1 / ratios[end - 1]) / 360 * 65536)
-        v.constants[f"true_rho_{end}"] = round(true * 65536) % 65536
+        expected = ref.lock_error_deg(1 / ratios[end - 1]) # K'/K is a ratio of Kphi, inv_kfi is its inverse
+        true = require_lock(v, turns, speed, end - 1, expected, 0.5)
+        v.constants[f"error_counts_{end}"] = ref.nearest(expected / 360 * 65536)
+        v.constants[f"true_rho_{end}"] = true
     return v
 
 
