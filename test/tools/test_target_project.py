@@ -50,7 +50,7 @@ class Project(unittest.TestCase):
 
     def test_it_has_every_source_and_header_of_the_firmware(self):
         items = {item.text for item in self.tree.iter("itemPath")}
-        files = {f"../{path.relative_to(ROOT)}" for pattern in ("firmware/*/*.c", "include/*.h", "include/*/*.h", "userparams.h") for path in ROOT.glob(pattern)}
+        files = {f"../{path.relative_to(ROOT)}" for pattern in ("firmware/**/*.c", "include/**/*.h", "userparams.h") for path in ROOT.glob(pattern)}
         self.assertEqual(items, files | {"Makefile"})
 
     def test_device_folders_and_flags_are_those_of_make_firmware(self):
