@@ -4,7 +4,7 @@ iss_objects := $(patsubst tools/iss33f/%.c,$(iss_folder)/%.o,$(filter-out %_test
 iss_compile = $(CC) -std=c11 -O2 -g -fPIC $(sanitizer) $(warnings) -Werror
 
 .PHONY: iss iss-bench
-iss: $(iss_folder)/libiss33f.a $(iss_folder)/libiss33f.so ## build/iss/libiss33f.a, .so: the dsPIC33F simulator without a board [SAN=1]
+iss: $(iss_folder)/libiss33f.a $(iss_folder)/libiss33f.so ## [simulator] build/iss/libiss33f.a, .so: the dsPIC33F simulator without a board [SAN=1]
 	@:
 
 $(iss_folder)/flags: FORCE
@@ -20,7 +20,7 @@ $(iss_folder)/libiss33f.a: $(iss_objects)
 $(iss_folder)/libiss33f.so: $(iss_objects)
 	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ $^ -lm
 
-iss-bench: $(iss_folder)/bench ## how many instructions per second the simulator executes on one core
+iss-bench: $(iss_folder)/bench ## [simulator] instructions per second that the simulator executes on one core
 	@$< $(wildcard build/target/foc33.elf)
 
 $(iss_folder)/bench: test/iss/bench.c $(iss_folder)/libiss33f.a
