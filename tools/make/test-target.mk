@@ -5,8 +5,8 @@ target_tests = $(avr_tests)
 target_test_law = $(filter $X/firmware/control/%.o $X/firmware/drive/%.o,$(target_objects))
 target_test_simulator := $B/target-test
 
-$(target_test_simulator): test/target/sim.c test/target/simulator.h $$(filter $$B/tools/iss33f/%,$$(pil_objects)) $B/flags
-	$(call say,cc,$@)$(CC) $(subst gnu99,c11,$(CFLAGS)) $(warnings) -Itools/iss33f -Itest/target -o $@ $(filter %.c %.o,$^) -lm
+$(target_test_simulator): test/target/sim.c test/target/simulator.h $(iss_folder)/libiss33f.a
+	$(call say,cc,$@)$(iss_compile) -Itest/target -o $@ $(filter %.c %.a,$^) -lm
 
 .PHONY: test-target
 test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## the unit tests of the control law compiled by XC16, in the simulator; results as on the PC [ONLY="test_pi ..."]
