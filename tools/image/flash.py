@@ -58,7 +58,7 @@ def find(ipe: Path | None, usual: tuple[str, ...] = USUAL) -> str | None:
 def checked(hex_file: Path, elf_file: Path) -> list[str]:
     """Failures of the image that is about to be programmed."""
     elf, words = image.read_elf(elf_file), image.read_hex(hex_file)
-    return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), {})
+    return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), None)
 
 
 def parser() -> argparse.ArgumentParser:

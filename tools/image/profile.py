@@ -3,10 +3,10 @@
 A function that the interrupt can reach is counted wholly with it: what little the background executes of such a function, too."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 
-from .attribution import Image
+from .attribution import Image, Word
 from .linked import branch_target
 from .program import Elf
 from .stack import plain
@@ -65,9 +65,9 @@ def reachable(elf: Elf, image: Image, start: str = INTERRUPT) -> set[int]:
     return found
 
 
-def profile(elf: Elf, image: Image, counts: Counts, with_caller: tuple[str, ...] = ()) -> Profile:
+def profile(elf: Elf, image: Image, counts: Counts, counted_at: Callable[[Word], int] = lambda word: len(word.chain) - 1) -> Profile:
     """The counts by function.
-    @param with_caller patterns of small functions that are counted with whoever they are inlined into"""
+    @param counted_at place in a word's chain of the function that it counts with (budget.Budget.counted_at)"""
     words = {word.address: word for word in image.words}
     callers = calls(elf, image)
     inside = reachable(elf, image)
@@ -91,8 +91,7 @@ def profile(elf: Elf, image: Image, counts: Counts, with_caller: tuple[str, ...]
         if not cycles or address not in words or words[address].copy[0] not in inside:
             continue
         names = chain(address)
-        own = next((name for name in reversed(names) if not any(fnmatchcase(name, pattern) for pattern in with_caller)), names[0])
-        result.inlined[own] += cycles
+        result.inlined[names[counted_at(words[address])]] += cycles
         result.symbols[names[0]] += cycles
         for share, stack in ways_to(words[address].copy[0]):
             result.stacks[(*stack, *names)] += share * cycles

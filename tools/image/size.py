@@ -17,9 +17,11 @@ from tools.common import command_line, paths
 from tools.common.errors import UserError
 
 from . import attribution, base, stack
-from .budget import UNASSIGNED, Budget, Share, shares
+from .budget import UNASSIGNED, Budget, Share, Shares, shares
+from .sources import Sources
 
 OUT = paths.ROOT / "build" / "target"
+BOARD = paths.ROOT / "firmware" / "board"
 NOTE_TITLE = "as in the note"
 
 
@@ -51,26 +53,29 @@ class Report:
     broken: list[str] = field(default_factory=list)
 
 
-def measure(elf: Path, budget: Budget, listing: str, sources: str, before: dict[tuple[str, str], Share] | None,
-            limits: bool = True) -> Report:
-    """All figures of an image.
-    @param listing its disassembly
-    @param sources the text of firmware/board, which sets the interrupts' priorities
-    @param before shares of the image to compare with
-    @param limits whether the budget is for this image"""
-    image = attribution.read(elf)
+def deepest(image: attribution.Image, listing: str, budget: Budget, board: Path = BOARD) -> stack.Result:
+    """The deepest stack, with the levels that the interrupts get in the sources of firmware/board.
+    @param listing the image's disassembly"""
     functions = {function.instructions[0].address: stack.plain(function.name) for function in stack.parse(listing)}
     handlers = [functions[address] for address in image.handlers if address in functions]
-    depth = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
+    sources = "".join(path.read_text(encoding="utf-8") for path in sorted(board.glob("*.c")))
+    result = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
     if image.initial_calls:
-        depth.errors.append("the list of start values names a function to call")
+        result.errors.append("the list of start values names a function to call")
+    return result
+
+
+def measure(image: attribution.Image, depth: stack.Result, budget: Budget, before: Shares | None = None, limits: bool = True) -> Report:
+    """All figures of an image.
+    @param before shares of the image to compare with
+    @param limits whether the budget is for this image"""
     now = shares(image, budget)
     report = Report(rows(now, before, budget), depth, budget)
     report.broken = broken(report, now, limits)
     return report
 
 
-def rows(now: dict[tuple[str, str], Share], before: dict[tuple[str, str], Share] | None, budget: Budget) -> list[Row]:
+def rows(now: Shares, before: Shares | None, budget: Budget) -> list[Row]:
     """Functions and objects under their modules, modules under their groups, then the totals."""
     result, totals = [], []
     modules = [*budget.modules, UNASSIGNED]
@@ -111,7 +116,7 @@ def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
                flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
 
 
-def broken(report: Report, now: dict[tuple[str, str], Share], limits: bool) -> list[str]:
+def broken(report: Report, now: Shares, limits: bool) -> list[str]:
     """A line for each budget that does not hold, and for what no module of the budget file claims."""
     lines = []
     for row in report.rows:
@@ -172,47 +177,18 @@ def summary(report: Report) -> dict:
 
 
 def write(report: Report, folder: Path) -> list[Path]:
-    """size.json, size.csv and size.png."""
+    """size.json and size.csv."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / f"size.{ending}" for ending in ("json", "csv", "png")]
+        files = [folder / f"size.{ending}" for ending in ("json", "csv")]
         files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
         with files[1].open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, list(vars(report.rows[0])))
             writer.writeheader()
             writer.writerows(vars(row) for row in report.rows)
-        _plot(report, files[2])
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
     return files
-
-
-def _plot(report: Report, path: Path) -> None:
-    """A bar for each group: its modules side by side, the note's figure as a mark."""
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    groups = [row for row in report.rows if row.kind == "group"]
-    colors = plt.get_cmap("Set3").colors
-    figure, axes = plt.subplots(figsize=(11, 1.6 + 0.9 * len(groups)), layout="constrained")
-    for place, group in enumerate(groups):
-        start = 0
-        for index, row in enumerate(row for row in report.rows if row.kind == "module" and row.group == group.name):
-            axes.barh(place, row.flash, left=start, color=colors[index % len(colors)], edgecolor="white")
-            if row.flash >= 60:
-                axes.text(start + row.flash / 2, place, f"{row.name} {row.flash}".replace(" ", "\n") if row.flash > 400 else row.name,
-                          ha="center", va="center", fontsize=7, rotation=0 if row.flash > 400 else 90)
-            start += row.flash
-        axes.text(start + 40, place, str(group.flash), va="center")
-        if group.note is not None:
-            axes.plot([group.note] * 2, [place - 0.45, place + 0.45], color="black", linewidth=2, label="the note's" if place == 0 else None)
-    axes.set(yticks=range(len(groups)), yticklabels=[group.name for group in groups], xlabel="flash [bytes]",
-             title=f"flash by module: {report.rows[-1].flash} bytes")
-    axes.invert_yaxis()
-    axes.legend(loc="lower right")
-    figure.savefig(path)
-    plt.close(figure)
 
 
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
@@ -226,7 +202,7 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def compare(compile_text: str, link_text: str, budget: Budget, cache: Path | None = None) -> tuple[dict | None, str, str]:
+def compare(compile_text: str, link_text: str, budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
     """Shares of the last commit's image and the commit's name, or None and why there is nothing to compare with."""
     try:
         if not compile_text or not link_text:
@@ -252,7 +228,7 @@ def main(arguments: list[str] | None = None) -> int:
     def work() -> int:
         parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
-        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json, size.csv, size.png")
+        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json and size.csv")
         parser.add_argument("--objdump", default="xc16-objdump")
         parser.add_argument("--compile", default="", help="compiler and flags, for the last commit's image")
         parser.add_argument("--link", default="", help="the same for linking, with {objects}, {elf} and {map}")
@@ -265,10 +241,11 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     budget = Budget.read()
     listing = disassemble(options.objdump, options.elf)
-    sources = "".join(path.read_text(encoding="utf-8") for path in sorted((paths.ROOT / "firmware" / "board").glob("*.c")))
+    image = attribution.read(options.elf)
     before, name, reason = compare(options.compile, options.link, budget)
-    report = measure(options.elf, budget, listing, sources, before, not options.no_budget)
+    report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
+    report.broken += budget.unmatched(Sources.read(), image)
     files = write(report, options.out)
     print(text(report, not options.brief))
     print("written: " + ", ".join(str(paths.shown(path)) for path in files))

@@ -1,6 +1,6 @@
 """`make cycles`: what the control interrupt costs on the simulated core, by scenario, state and function, beside the note's figures.
 
-    python3 -m tools.image.cycles [--image build/target/foc33.elf] [scenario ...]
+    python3 -m tools.bench.cycles [--image build/target/foc33.elf] [scenario ...]
 
 Exit status: 0, 1 when a budget is broken (a line for each), 2 when the image or the compiler is missing."""
 
@@ -16,17 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from tools.bench import build, pil, pil_command, scenario, simulate
 from tools.common import command_line, paths, plant, workers
 from tools.common.errors import UserError
-from tools.bench.command_common import Progress
-from tools.common.toml_file import Document
+from tools.image import attribution, program
+from tools.image.budget import Budget
+from tools.image.profile import Counts, Profile, folded, profile
 
-from . import attribution, flame, program
-from .budget import Budget
-from .profile import Counts, Profile, folded, profile
+from . import build, pil, pil_command, scenario, simulate
+from .command_common import Progress
 
-BUDGET = paths.ROOT / "firmware" / "budget.toml"
 FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
 P1SECMP = 0x01C6    # the counter's value at the trigger; it counts down to zero from there, and the duties load
@@ -36,30 +34,6 @@ WITHOUT, WITH = "without field weakening", "with field weakening"
 NOTE_US = {WITHOUT: (14.725, 20.8, 21.4), WITH: (14.975, 23.325, 23.65)}
 MEANING = {WITHOUT: "bridge on, speed reference below FW_START_SPEED_RPM", WITH: "bridge on, speed reference above it"}
 SIGNALS = ("cpu.isr_cycles", "cpu.latency_cycles")
-
-
-@dataclass(frozen=True)
-class Limits:
-    """[cycles] of the budget file."""
-
-    isr_max: int
-    isr_mean: int
-    latency_max: int
-    stack: int
-    scenarios: tuple[str, ...]
-
-    @staticmethod
-    def read(path: Path = BUDGET) -> "Limits":
-        root = Document(path).root
-        section, budget = root.section("cycles"), root.section("budget")
-        image = budget.section("image") if budget is not None else None
-        if section is None or image is None:
-            raise root.fail("cycles", "no table [cycles] or [budget.image]", "add it")
-        limits = Limits(section.integer("isr_max_cycles", minimum=1), section.integer("isr_mean_cycles", minimum=1),
-                        section.integer("latency_max_cycles", minimum=1), image.integer("stack_bytes", minimum=1),
-                        tuple(section.texts("scenarios")))
-        section.close()
-        return limits
 
 
 @dataclass
@@ -169,7 +143,7 @@ class Report:
     image: str
     found: Found
     profile: Profile
-    limits: Limits | None
+    budget: Budget | None
     assumptions: list[list[str]]
     broken: list[str] = field(default_factory=list)
 
@@ -219,7 +193,7 @@ class _Core:
 
 def broken(report: Report) -> list[str]:
     """A line for each limit that does not hold."""
-    lines, limits, found = [], report.limits, report.found
+    lines, found = [], report.found
     if found.differences:
         lines.append(f"target and PC differ in {found.differences} interrupts, the first: {found.first_difference}")
     if abs(report.profile.total - report.all.total) > MISSED * report.all.total:
@@ -228,8 +202,9 @@ def broken(report: Report) -> list[str]:
         lines.append("no scenario ran with and without field weakening: the figures are not those of the table")
     if found.latency.most >= found.load_cycles:
         lines.append(f"trigger to duties: {found.latency.most} cycles, but the duties load {found.load_cycles} cycles after the trigger")
-    if limits is None:
+    if report.budget is None:
         return lines
+    limits, stack = report.budget.cycles, report.budget.image.stack
     worst = max(found.longest.items(), key=lambda item: item[1][0])
     if report.all.most > limits.isr_max:
         lines.append(f"longest interrupt: {report.all.most} cycles, {report.all.most - limits.isr_max} over the budget of {limits.isr_max} "
@@ -239,8 +214,8 @@ def broken(report: Report) -> list[str]:
             lines.append(f"mean interrupt {name}: {found.spreads[name].mean:.1f} cycles, over the budget of {limits.isr_mean}")
     if found.latency.most > limits.latency_max:
         lines.append(f"trigger to duties: {found.latency.most} cycles, over the budget of {limits.latency_max}")
-    if found.stack_bytes > limits.stack:
-        lines.append(f"stack: {found.stack_bytes} bytes, over the budget of {limits.stack}")
+    if found.stack_bytes > stack:
+        lines.append(f"stack: {found.stack_bytes} bytes, over the budget of {stack}")
     return lines
 
 
@@ -307,15 +282,13 @@ def summary(report: Report) -> dict[str, Any]:
 
 
 def write(report: Report, folder: Path) -> list[Path]:
-    """cycles.json, the flame-style picture and its stacks as text."""
+    """cycles.json, and the stacks of functions as tools for flame graphs read them."""
     interrupts = max(report.all.number, 1)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / name for name in ("cycles.json", "cycles.svg", "cycles.folded")]
+        files = [folder / name for name in ("cycles.json", "cycles.folded")]
         files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-        files[1].write_text(flame.svg(report.profile.stacks, f"control interrupt: {report.all.mean:.0f} cycles in the mean of "
-                                      f"{report.all.number} interrupts", interrupts), encoding="utf-8")
-        files[2].write_text("\n".join(folded(report.profile.stacks, interrupts)) + "\n", encoding="utf-8")
+        files[1].write_text("\n".join(folded(report.profile.stacks, interrupts)) + "\n", encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
     return files
@@ -351,27 +324,28 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
     return jobs
 
 
-def measure(image: Path, userparams: Path | None, names: tuple[str, ...], limits: Limits | None, quiet: bool) -> Report:
+def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool) -> Report:
     library = pil.library([], userparams)
     if not pil.check_image(library, image):
         raise UserError("the image does not say where functions and variables are", str(image), "name the ELF file that the HEX file was made from")
     elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
     code, source = program.read_elf(elf), attribution.read(elf)
-    jobs = jobs_of(names, library)
+    jobs = jobs_of(names or budget.cycles.scenarios, library)
     with Progress("cycles", sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         found = merged(workers.run_all(jobs, functools.partial(work, image), progress))
-    report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, Budget.read().with_caller), limits, assumptions(library))
+    report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, budget.counted_at), budget if limits else None,
+                    assumptions(library))
     report.broken = broken(report)
     return report
 
 
 def main(arguments: list[str] | None = None) -> int:
     def work() -> int:
-        parser = command_line.Parser(prog="python3 -m tools.image.cycles", description=__doc__.splitlines()[0])
+        parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
         parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
         parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
         parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-        parser.add_argument("--out", type=Path, help="folder for cycles.json, cycles.svg, cycles.folded; default: the image's")
+        parser.add_argument("--out", type=Path, help="folder for cycles.json and cycles.folded; default: the image's")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--quiet", action="store_true", help="no progress bar")
         return _run(parser.parse_args(arguments))
@@ -379,10 +353,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    limits = Limits.read()
+    budget = Budget.read()
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
-    report = measure(image, userparams, tuple(options.scenarios) or limits.scenarios, None if options.no_budget else limits, options.quiet)
+    report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
     files = write(report, options.out or image.parent)
     print(text(report))
     print("\nwritten: " + ", ".join(str(paths.shown(path)) for path in files))
