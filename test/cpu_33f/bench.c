@@ -1,16 +1,15 @@
-/* How fast the simulator is on one core: an integer loop, a DSP loop, and, given its ELF file, the firmware with an interrupt every 50 us. */
+/* How fast the simulator is on one core: an integer loop, a DSP loop, and, given its image, the firmware with an interrupt every 50 us. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
-#include "sfr.h"
+#include "iss_cpu.h"
 
 enum {
     START = 0x200,
     PERIOD = 2000,                     /* cycles of 50 us */
-    ADC1_BUFFERS = 0x300, IFS0 = 0x084, AD1IF = 13,
     ZERO_CURRENT = 0, BUS_24_V = -3072, HALF_POT = 0, /* ADC results, signed fractional */
     S2_PORT = 0, S2_BIT = 8            /* RA8, low while it is pressed */
 };
@@ -91,30 +90,29 @@ static int bench_loop(const char *what, const uint32_t *words, size_t count, uns
 
 static bool s2_down;
 
-static uint16_t pins(void *context, unsigned port)
+static void levels(void *context, uint16_t level[3])
 {
     (void)context;
-    return port == S2_PORT && s2_down ? (uint16_t)(0xFFFFu & ~(1u << S2_BIT)) : (uint16_t)0xFFFFu;
+    level[S2_PORT] = s2_down ? (uint16_t)(0xFFFFu & ~(1u << S2_BIT)) : (uint16_t)0xFFFFu;
 }
 
-static uint16_t counting_down(void *context)
+static uint16_t counting_down(iss_cpu_t *cpu)
 {
-    (void)context;
+    (void)cpu;
     return 0x81F4;
 }
 
-static int run_firmware(soc_t *soc, unsigned periods)
+static int run_firmware(iss_cpu_t *cpu, unsigned periods)
 {
     static const int16_t samples[4] = {HALF_POT, ZERO_CURRENT, ZERO_CURRENT, BUS_24_V};
-    iss_t *iss = soc_core(soc);
     for (unsigned n = 0; n < periods; n++) {
-        memcpy(iss_data(iss) + ADC1_BUFFERS / 2, samples, sizeof samples);
-        soc_flag(soc, IFS0, AD1IF);
-        uint64_t end = iss_cycles(iss) + PERIOD;
-        while (iss_cycles(iss) < end) {
-            iss_stop_t stop = soc_run(soc, end);
+        memcpy(iss_data(cpu->iss) + SFR_ADC1BUF0 / 2, samples, sizeof samples);
+        (void)chip_irq_raise(cpu->chip, CHIP_IRQ_ADC1);
+        uint64_t end = iss_cycles(cpu->iss) + PERIOD;
+        while (iss_cycles(cpu->iss) < end) {
+            iss_stop_t stop = iss_cpu_run(cpu, end);
             if (stop == ISS_STOP_ERROR) {
-                return fail(iss_error(iss));
+                return fail(iss_error(cpu->iss));
             }
         }
     }
@@ -123,32 +121,31 @@ static int run_firmware(soc_t *soc, unsigned periods)
 
 static int bench_firmware(const char *path)
 {
-    static image_t image;
-    const soc_board_t board = {.pins = pins, .counter = counting_down};
-    image_clear(&image);
-    if (image_load(&image, path) != 0) {
-        return fail(image.error);
+    static iss_image_t image;
+    static iss_cpu_t cpu;
+    static chip_t chip;
+    const chip_board_t board = {.levels = levels};
+    chip_cpu_t functions = {.reset = NULL};
+    if (iss_image_read(&image, path) != 0 || !iss_cpu_create(&cpu, &image, &functions) || !chip_connect(&chip, &functions, &board, NULL)) {
+        return fail("the image cannot be used, iss-bench: build it with make firmware");
     }
-    soc_t *soc = soc_create(&image, &board);
-    if (soc == NULL) {
-        return fail("no memory for the simulator, iss-bench: free some");
-    }
-    iss_stop_on(soc_core(soc), ISS_STOP_DEFAULT & ~(1u << ISS_ERROR_UNKNOWN_RAM)); /* variables kept over a reset are looked at */
-    int result = run_firmware(soc, 4000);
+    cpu.counter = counting_down;
+    iss_cpu_connect(&cpu, &chip, &image);
+    iss_stop_on(cpu.iss, ISS_STOP_DEFAULT & ~(1u << ISS_ERROR_UNKNOWN_RAM)); /* variables kept over a reset are looked at */
+    int result = run_firmware(&cpu, 4000);
     s2_down = true;
-    result = result != 0 ? result : run_firmware(soc, 1500);
+    result = result != 0 ? result : run_firmware(&cpu, 1500);
     s2_down = false;
-    const iss_t *iss = soc_core(soc);
-    double instructions = (double)iss_instructions(iss), cycles = (double)iss_cycles(iss), start_s = seconds();
-    result = result != 0 ? result : run_firmware(soc, 20000);
+    double instructions = (double)iss_instructions(cpu.iss), cycles = (double)iss_cycles(cpu.iss), start_s = seconds();
+    result = result != 0 ? result : run_firmware(&cpu, 20000);
     double time_s = seconds() - start_s;
-    cycles = (double)iss_cycles(iss) - cycles;
+    cycles = (double)iss_cycles(cpu.iss) - cycles;
     if (result == 0) {
-        print("the firmware, interrupt every 50 us", (double)iss_instructions(iss) - instructions, cycles, time_s);
+        print("the firmware, interrupt every 50 us", (double)iss_instructions(cpu.iss) - instructions, cycles, time_s);
         printf("that is %.1f times real time at 40 MIPS\n", cycles / 40e6 / time_s);
     }
-    soc_destroy(soc);
-    image_free(&image);
+    iss_cpu_destroy(&cpu);
+    iss_image_free(&image);
     return result;
 }
 

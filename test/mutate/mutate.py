@@ -70,42 +70,36 @@ def sample(by_file, size, seed):
 
 
 def read_equivalent(path):
-    """Entries of equivalent.txt: a line with a mutant's key, then an indented line with the reason. @return {key: reason}"""
-    entries, key = {}, None
+    """Entries of equivalent.txt: mutants' keys, a line each, then an indented line with the reason of them all. @return {key: reason}"""
+    entries, keys = {}, []
     for number, line in enumerate(path.read_text().splitlines() if path.exists() else [], 1):
         if not line.strip() or line.startswith("#"):
             continue
         if line[0] not in " \t":
-            if key is not None and not entries[key]:
-                fail(f"no reason for {key}", str(path), "add an indented line that says why the change has no effect")
-            key = line.strip()
-            entries[key] = ""
-        elif key is None:
-            fail("a reason without a mutant", f"{path}:{number}", "put the mutant's line before it")
+            keys.append(line.strip())
+        elif keys:
+            entries |= dict.fromkeys(keys, line.strip())
+            keys = []
         else:
-            entries[key] = f"{entries[key]} {line.strip()}".strip()
-    if key is not None and not entries[key]:
-        fail(f"no reason for {key}", str(path), "add an indented line that says why the change has no effect")
+            fail("a reason without a mutant", f"{path}:{number}", "put the mutant's line before it")
+    if keys:
+        fail(f"no reason for {keys[0]}", str(path), "add an indented line that says why the change has no effect")
     return entries
 
 
 class Progress:
-    """A line on a terminal that is rewritten, or a line every tenth of the way."""
+    """A line every tenth of the way."""
 
     def __init__(self, total):
-        self.total, self.done, self.killed, self.begin, self.shown = total, 0, 0, time.monotonic(), -1
-        self.lock = threading.Lock()
+        self.total, self.done, self.killed, self.begin, self.lock = total, 0, 0, time.monotonic(), threading.Lock()
 
     def step(self, result):
         with self.lock:
             self.done += 1
             self.killed += result in ("killed", "timeout")
-            line = f"{self.done}/{self.total} mutants, {self.killed} killed, {time.monotonic() - self.begin:.0f} s"
-            if sys.stderr.isatty():
-                print(f"\r{line}", end="" if self.done < self.total else "\n", file=sys.stderr, flush=True)
-            elif 10 * self.done // self.total != self.shown:
-                self.shown = 10 * self.done // self.total
-                print(line, file=sys.stderr, flush=True)
+            if 10 * self.done // self.total != 10 * (self.done - 1) // self.total:
+                seconds = time.monotonic() - self.begin
+                print(f"{self.done}/{self.total} mutants, {self.killed} killed, {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 class Runner:
@@ -197,16 +191,6 @@ def report(results, required, arguments, seconds):
     return "\n".join(lines) + "\n", data, passed
 
 
-def add_scripts(tests, names):
-    notes = []
-    reads = [*PARAMETER_FILES, "include/drive/drive.h"]
-    for name in names:
-        note = tests.add_script(name, [sys.executable, f"test/{name}.py"], reads)
-        if note:
-            notes.append(note)
-    return notes
-
-
 def main(argv=None):
     arguments = parse(argv)
     root, out = Path.cwd(), Path(arguments.out).resolve()
@@ -216,9 +200,7 @@ def main(argv=None):
         fail("no mutants", " ".join(arguments.files), "--files takes a part of a path such as svm.h")
     equivalent = read_equivalent(equivalent_file)
     known = {m.key for found in by_file.values() for m in found}
-    stale = [key for key in equivalent if key not in known and any(key.startswith(f"{f} ") for f in by_file)]
-    if not arguments.files:
-        stale = [key for key in equivalent if key not in known]
+    stale = [key for key in equivalent if key not in known and (not arguments.files or any(key.startswith(f"{f} ") for f in by_file))]
     if stale:
         fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root), "the code has changed; look at the entry again or remove it")
     chosen = by_file if arguments.full or arguments.files else sample(by_file, arguments.sample, arguments.seed)
@@ -236,8 +218,10 @@ def main(argv=None):
     behaviour = arguments.behaviour if arguments.closed_loop else []
     try:
         tests.prepare(arguments.tests, behaviour)
-        for note in add_scripts(tests, arguments.scripts):
-            print(note, file=sys.stderr)
+        for name in arguments.scripts:
+            note = tests.add_script(name, [sys.executable, f"test/{name}.py"], [*PARAMETER_FILES, "include/drive/drive.h"])
+            if note:
+                print(note, file=sys.stderr)
         print(f"{len(tests.tests)} tests built and passed in {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)
         stages = [{t.name for t in tests.tests if t.name not in behaviour}]
         if behaviour:

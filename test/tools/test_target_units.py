@@ -10,7 +10,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "test" / "target"), str(ROOT / "test")]
+sys.path[:0] = [str(ROOT / "test" / "sixteen_bit"), str(ROOT / "test")]
 import report # noqa: E402
 import run as target_run # noqa: E402
 import vectors # noqa: E402
@@ -59,16 +59,6 @@ class Vectors(unittest.TestCase):
         text = vectors.header("x", 7, [], {"k": "5"}, [])
         self.assertIn("#define GOLDEN_X_K 5", text)
         self.assertNotIn("golden_fetch", text)
-
-    def test_every_access_to_a_row_becomes_a_call_and_lines_keep_their_numbers(self):
-        text = vectors.fed("one\ngolden_pi_t v = golden_pi[n];\ngolden_##name##_t row = golden_##name[n];\ntable[golden_sine[n + 1u].value]\n", "t.c")
-        self.assertEqual(text, '#line 1 "t.c"\none\ngolden_pi_t v = golden_pi_row(n);\ngolden_##name##_t row = golden_##name##_row(n);\n'
-                               "table[golden_sine_row(n + 1u).value]\n")
-
-    def test_tests_of_the_project_have_no_access_that_is_missed(self):
-        for path in sorted((ROOT / "test/unit").glob("test_*.c")):
-            with self.subTest(path.name):
-                self.assertNotRegex(vectors.fed(path.read_text(encoding="utf-8"), path.name), r"golden_\w*(?:##\w+)?\[")
 
     def test_tables_hold_every_row_of_the_vectors(self):
         with tempfile.TemporaryDirectory() as folder:

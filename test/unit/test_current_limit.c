@@ -27,7 +27,7 @@ void test_limits_equal_the_reference(void)
 {
     uint32_t n;
     for (n = 0; n < GOLDEN_CURRENT_LIMIT_ROWS; n++) {
-        golden_current_limit_t v = golden_current_limit[n];
+        golden_current_limit_t v = golden_current_limit_row(n);
         params.current_max_q13 = v.maximum;
         params.current_max_reciprocal = v.reciprocal;
         drive.control.handover_q13 = v.wanted_d;

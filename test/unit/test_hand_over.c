@@ -53,7 +53,7 @@ void test_vectors_equal_the_reference(void)
 {
     uint32_t n;
     for (n = 0; n < GOLDEN_HAND_OVER_ROWS; n++) {
-        golden_hand_over_t v = golden_hand_over[n];
+        golden_hand_over_t v = golden_hand_over_row(n);
         hand_over(v.forced, v.estimated, v.v_d, v.v_q, (int16_t)((v.i_q > 0) ? 1 : -1));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.offset, drive.control.handover_offset, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_v_d, drive.control.v_q14.d, golden_row(n));

@@ -18,10 +18,6 @@ void setUp(void)
     board_trap_intcon1 = 0x0008u;
 }
 
-void tearDown(void)
-{
-}
-
 static drive_fault_t start(uint16_t rcon)
 {
     RCON = rcon;

@@ -76,6 +76,23 @@ int iss_image_parse(iss_image_t *image, const char *text)
     return 0;
 }
 
+int iss_image_read(iss_image_t *image, const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    long size = -1;
+    if (file != NULL && fseek(file, 0, SEEK_END) == 0) {
+        size = ftell(file);
+        rewind(file);
+    }
+    char *text = size >= 0 ? calloc(1, (size_t)size + 1u) : NULL;
+    int result = text != NULL && fread(text, 1, (size_t)size, file) == (size_t)size ? iss_image_parse(image, text) : -1;
+    free(text);
+    if (file != NULL) {
+        (void)fclose(file);
+    }
+    return result;
+}
+
 void iss_image_free(iss_image_t *image)
 {
     for (size_t n = 0; n < image->symbol_count; n++) {

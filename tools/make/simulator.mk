@@ -23,8 +23,9 @@ $(iss_folder)/libiss33f.a: $(iss_objects)
 $(iss_folder)/libiss33f.so: $(iss_objects)
 	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ $^ -lm
 
-iss-bench: $(iss_folder)/bench ## how many instructions per second the simulator executes on one core
-	@$< $(wildcard build/target/foc33.elf)
+iss-bench: $(iss_folder)/bench setup-run ## how many instructions per second the simulator executes on one core
+	@elf=$(or $(IMAGE),$(wildcard build/target/foc33.elf)); test -z "$$elf" || $(python) -m tools.image.load "$$elf" >$(iss_folder)/bench.image || exit; \
+	    $< $${elf:+$(iss_folder)/bench.image}
 
 $(iss_folder)/bench: test/cpu_33f/bench.c $(iss_folder)/libiss33f.a
 	$(call say,cc,$<)$(iss_compile) -o $@ $^ -lm

@@ -1,4 +1,4 @@
-/* Unity's options on the dsPIC: 16-bit int, no double, results to the simulator. */
+/* Unity's options where int has 16 bits: no double, results to the simulator. */
 #ifndef UNITY_CONFIG_H
 #define UNITY_CONFIG_H
 

@@ -1,43 +1,54 @@
-"""Builds unit tests with XC16, runs them in the instruction-set simulator, and compares every result with the PC's.
+"""Runs unit tests of the control law where int has 16 bits, in a simulator, and compares every result with the PC's.
 
-A test is one image with the part's own linker script, or several where its flash does not hold all of it."""
+The chip is the command line's: compiler, linker, simulator. A test is one image, or several where the flash does not hold all of it."""
 
 import argparse
-import importlib.util
 import os
 import re
 import shlex
+import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import vectors
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import vectors # noqa: E402
 
 HERE = Path(__file__).resolve().parent
-
-
-def _avr():
-    """test/avr/run.py: Unity's results are read and worded alike."""
-    spec = importlib.util.spec_from_file_location("avr_run", HERE.parent / "avr" / "run.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-avr = _avr()
-TestError, told, results, run_command = avr.TestError, avr.told, avr.results, avr.run
 SIMULATOR_FAILED = 255  # exit code; below, it is the number of failed tests
 MISSING_HEADER = re.compile(r"fatal error: (\S+): No such file")
 DOES_NOT_FIT = re.compile(r"could not allocate|not enough|will not fit|overflow|out of (?:range|memory)|exceeds", re.IGNORECASE)
 LISTED = re.compile(r'\.name = "(\w+)";\s*\S+\.line_num = (\d+);')
+RESULT = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):(PASS|FAIL|IGNORE)(.*)$", re.MULTILINE)
+
+
+class TestError(Exception):
+    """A test that gives no results, and why."""
+
+
+def run_command(argv: list[str]) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr."""
+    done = subprocess.run(argv, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def results(output: str) -> dict[str, tuple[str, str]]:
+    """{test: (verdict, message)} of Unity's output"""
+    return {name: (verdict, message) for name, verdict, message in RESULT.findall(output)}
+
+
+def told(result: tuple[str, str] | None) -> str:
+    if result is None:
+        return "no result"
+    verdict, message = result
+    return "passes" if verdict == "PASS" else message.lstrip(": ") or verdict
 
 
 @dataclass
 class Outcome:
     """What one test file gave on the target."""
-
     results: dict[str, tuple[str, str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     images: int = 0
@@ -50,6 +61,7 @@ class Builder:
         self.out, self.unity, self.runners = Path(options.out), Path(options.unity), Path(options.runners)
         self.compiler, self.linker = shlex.split(options.compile), shlex.split(options.link)
         self.library, self.simulator, self.cycles = options.library, options.simulator, options.cycles
+        self.flat = options.flat
         self.includes = [f"-I{HERE}", "-Itest/unit/support", f"-I{self.out}/golden", "-isystem", f"{self.unity}/src"]
         self.tables: list[Path] = []
         self.objects: list[Path] = []
@@ -65,7 +77,7 @@ class Builder:
 
     def shared(self) -> None:
         """Vectors, Unity and the console."""
-        self.tables = vectors.write(HERE.parent / "golden" / "vectors", self.out / "golden")
+        self.tables = vectors.write(HERE.parent / "golden/vectors", self.out / "golden")
         self.objects = [self.compile(self.unity / "src/unity.c", self.out / "unity.o", ["-w"]),
                         self.compile(HERE / "console.c", self.out / "console.o", ["-Wall", "-Wextra"])]
 
@@ -74,15 +86,12 @@ class Builder:
         source = Path(f"test/{name}.c")
         text = source.read_text(encoding="utf-8")
         own = re.search(r"/\* defines: (.*?) \*/", "\n".join(text.splitlines()[:5]))
-        copy = self.out / f"{name}.c"
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_text(vectors.fed(text, str(source)), encoding="utf-8")
-        extra = ["-Wall", "-Wextra", f"-I{source.parent}", *(shlex.split(own[1]) if own else [])]
+        extra = ["-Wall", "-Wextra", *(shlex.split(own[1]) if own else [])]
         runner = self.runners / f"{name}_runner.c"
         tests = LISTED.findall(runner.read_text(encoding="utf-8")) if runner.exists() else []
         if not tests:
             raise TestError(f"{runner}, the runner on the PC, lists no test")
-        return self.compile(copy, copy.with_suffix(".o"), extra), tests
+        return self.compile(source, self.out / f"{name}.o", extra), tests
 
     def link(self, name: str, part: str, test: Path, tests: list[tuple[str, str]]) -> Path | None:
         """An image with these tests; None if it is too large."""
@@ -119,13 +128,22 @@ class Builder:
                 todo[:0] = [part[:len(part) // 2], part[len(part) // 2:]]
         return done
 
+    def loadable(self, elf: Path) -> Path:
+        """What the simulator reads."""
+        if not self.flat:
+            return elf
+        from tools.image import load
+        image = elf.with_suffix(".image")
+        image.write_text(load.text(load.load(elf)), encoding="utf-8")
+        return image
+
     def simulate(self, name: str) -> Outcome:
         outcome = Outcome()
         for elf, count in self.images(name):
-            code, output, remark = run_command([self.simulator, str(elf), str(self.cycles), *map(str, self.tables)])
+            code, output, remark = run_command([self.simulator, str(self.loadable(elf)), str(self.cycles), *map(str, self.tables)])
             elf.with_suffix(".txt").write_text(output, encoding="utf-8")
             if code == SIMULATOR_FAILED or not re.search(rf"^{count} Tests \d+ Failures", output, re.MULTILINE):
-                last = avr.RESULT.findall(output)[-1:]
+                last = RESULT.findall(output)[-1:]
                 raise TestError(f"stopped after {last[0][0] if last else 'the start'}: {remark.strip() or 'no total'}")
             outcome.results |= results(output)
             outcome.remarks.append(remark.strip())
@@ -163,8 +181,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--unity", required=True, help="Unity's folder")
     parser.add_argument("--compile", required=True, help="compiler with its flags; -c, source and object are added")
     parser.add_argument("--link", required=True, help="command with {objects}, {elf} and {map} in it")
-    parser.add_argument("--library", required=True, help="archive of the control law, compiled as in the image")
+    parser.add_argument("--library", required=True, help="archive of the control law for that chip")
     parser.add_argument("--simulator", required=True)
+    parser.add_argument("--flat", action="store_true", help="the simulator reads images as tools/image/load.py writes them")
     parser.add_argument("--runners", required=True, help="folder of the generated runners")
     parser.add_argument("--host", required=True, help="folder of the PC's executables")
     parser.add_argument("--out", required=True)
