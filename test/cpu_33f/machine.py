@@ -68,7 +68,7 @@ class Machine:
         self._ram = ctypes.create_string_buffer(0x800)
 
     def assumption(self, name: str) -> int:
-        """A value of tools/iss33f/assumptions.h."""
+        """A value of tools/cpu_33f/iss_assumptions.h."""
         row, line = 0, _Assumption()
         while self.library.iss_assumption(ctypes.c_size_t(row), ctypes.byref(line)):
             if line.id == name.encode():

@@ -1,4 +1,4 @@
-"""The simulator against the hand-derived vectors of test/iss/vectors (form of a line: vectors.py): registers, memory, flags, cycles."""
+"""The simulator against the hand-derived vectors of test/cpu_33f/vectors (form of a line: vectors.py): registers, memory, flags, cycles."""
 
 import random
 import unittest

@@ -1,4 +1,4 @@
-"""Reads the hand-derived vectors of test/iss/vectors. A line, columns between bars, numbers hexadecimal (cycles decimal):
+"""Reads the hand-derived vectors of test/cpu_33f/vectors. A line, columns between bars, numbers hexadecimal (cycles decimal):
 
     program | before | after | flags | cycles     # comment
 

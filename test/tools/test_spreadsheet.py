@@ -287,7 +287,7 @@ class AgainstTheCommand(unittest.TestCase):
         for name in MOTORS:
             with self.subTest(motor=name), tempfile.TemporaryDirectory() as folder:
                 (Path(folder) / "userparams.h").write_text("\n".join(recalculated()[name].lines()) + "\n", encoding="utf-8")
-                build = subprocess.run([os.environ.get("CC", "gcc"), "-std=gnu99", "-fsyntax-only", f"-I{folder}", "-Itools/host", "-Iinclude",
+                build = subprocess.run([os.environ.get("CC", "gcc"), "-std=gnu99", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude",
                                         "firmware/drive/param_check.c"],
                                        cwd=paths.ROOT, capture_output=True, text=True)
                 self.assertEqual(build.stderr, "")

@@ -32,6 +32,7 @@ enum { CHIP_FBS = 0, CHIP_FGS = 2, CHIP_FOSCSEL = 3, CHIP_FOSC = 4, CHIP_FWDT = 
  *   cycles         instruction cycles so far
  *   raised         the flag of an interrupt has been set; true if a handler for it is still to come, false if it has run or never will
  *   attend         something is due before the cycle chip_t.limit, to which the processor runs; NULL: it never runs ahead
+ *   clock          the instruction clock has changed; NULL: of no concern
  *   wake           the watchdog's time is over: true if that has woken it from sleep
  *   begin, end     a PWM period starts, is over
  *   run            go on to `until_s`, or to an instant before at which the board must follow; returns that time. NULL: handlers take no time
@@ -46,6 +47,7 @@ typedef struct {
     uint64_t (*cycles)(void *context);
     bool (*raised)(void *context, unsigned irq);
     void (*attend)(void *context);
+    void (*clock)(void *context);
     bool (*wake)(void *context);
     void (*begin)(void *context);
     double (*run)(void *context, double until_s);
@@ -61,7 +63,6 @@ typedef struct {
  *   served     nothing more will happen with this sample: its handler has run, or none will
  *   send       a character has left UART1
  *   receive    the next character for UART1, or -1
- *   clock      the instruction clock has changed
  *   warn       the firmware uses a peripheral in a way that cannot work; the text starts with the register's name
  *   fault_rp   the RPn pin with the fault signal; channel: the input that sample-and-hold 0..3 should take, and its name */
 typedef struct {
@@ -72,7 +73,6 @@ typedef struct {
     void (*served)(void *context);
     void (*send)(void *context, uint8_t character);
     int (*receive)(void *context);
-    void (*clock)(void *context);
     void (*warn)(void *context, const char *format, va_list args);
     unsigned fault_rp;
     struct { unsigned input; const char *name; } channel[4];

@@ -85,8 +85,8 @@ void chip_clock_follow(chip_t *chip)
     chip->clock.base_cycle = now;
     chip->clock.fcy_hz = fcy_hz;
     chip_watchdog_reschedule(chip);
-    if (chip->board.clock != NULL) {
-        chip->board.clock(chip->board.context);
+    if (chip->cpu.clock != NULL) {
+        chip->cpu.clock(chip->cpu.context);
     }
 }
 

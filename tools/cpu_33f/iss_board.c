@@ -354,6 +354,7 @@ static int build(iss_board_t *b, const char *image, char *error, size_t size)
     }
     b->core_raised = cpu.raised;
     cpu.raised = live_raised;
+    cpu.clock = clock_changed;
     iss_on_interrupt(b->cpu.iss, enter_interrupt, leave_interrupt, b);
     iss_on_report(b->cpu.iss, core_report, b);
     iss_on_symbol(b->cpu.iss, iss_image_name, &b->image);
@@ -376,9 +377,7 @@ vb_t *vb_create_iss(const char *image, char *error, size_t size)
         live_destroy(b);
         return NULL;
     }
-    chip_t *chip = vb_chip(b->vb);
-    chip->board.clock = clock_changed;
-    iss_cpu_connect(&b->cpu, chip, &b->image);
+    iss_cpu_connect(&b->cpu, vb_chip(b->vb), &b->image);
     b->cpu.written = core_written;
     b->cpu.counter = core_counter;
     b->cpu.was_reset = core_reset;

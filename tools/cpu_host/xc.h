@@ -1,7 +1,7 @@
 /* The host's device header: dsPIC33FJ32MC204 special function registers as plain 16-bit globals under Microchip's names.
  *
  * firmware/ includes <xc.h> on both sides: XC16 finds the vendor's file, the PC finds this one. Registers are memory here:
- * nothing answers while the firmware runs, a harness (tools/board or a test) writes inputs and reads outputs between calls.
+ * nothing answers while the firmware runs, a harness (tools/vboard or a test) writes inputs and reads outputs between calls.
  */
 #ifndef FOC33_HOST_XC_H
 #define FOC33_HOST_XC_H

@@ -1,4 +1,4 @@
-"""Writes the table of assumptions into docs/simulator.md from the one in the simulator, tools/iss33f/assumptions.h.
+"""Writes the table of assumptions into docs/simulator.md from the one in the simulator, tools/cpu_33f/iss_assumptions.h.
 
     python3 tools/docs/simulator.py            writes the page
     python3 tools/docs/simulator.py --print    prints it instead
@@ -19,11 +19,11 @@ HEAD = "| name | value | meaning | where |\n|---|---:|---|---|\n"
 
 def assumptions() -> list[tuple[str, str, str, str]]:
     """Name, value, meaning and place of each assumption, as the compiler sees the X-macro."""
-    source = '#include "assumptions.h"\n#define ROW(id, value, meaning, place) @@ #id @ #value @ meaning @ place\nASSUMPTIONS(ROW)\n'
+    source = '#include "iss_assumptions.h"\n#define ROW(id, value, meaning, place) @@ #id @ #value @ meaning @ place\nASSUMPTIONS(ROW)\n'
     compiler = shlex.split(os.environ.get("CC") or "gcc")
-    done = subprocess.run([*compiler, "-E", "-P", f"-I{ROOT / 'tools/iss33f'}", "-xc", "-"], input=source, capture_output=True, text=True, check=False)
+    done = subprocess.run([*compiler, "-E", "-P", f"-I{ROOT / 'tools/cpu_33f'}", f"-I{ROOT / 'tools/chip'}", "-xc", "-"], input=source, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        sys.exit(f"foc33: tools/iss33f/assumptions.h does not compile, {compiler[0]}: {(done.stderr.splitlines() or ['no message'])[0]}")
+        sys.exit(f"foc33: tools/cpu_33f/iss_assumptions.h does not compile, {compiler[0]}: {(done.stderr.splitlines() or ['no message'])[0]}")
     rows = []
     for row in done.stdout.replace("\n", " ").split("@@")[1:]:
         parts = [part.strip() for part in row.split(" @ ")]

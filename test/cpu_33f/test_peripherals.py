@@ -25,7 +25,7 @@ TIMER = "clr tmr1; setm pr1; mov #0x8000, w0; mov w0, t1con\n"
 class Names(unittest.TestCase):
     def test_every_register_of_the_part_that_the_host_has_is_the_chips(self) -> None:
         absent = {"IFS2", "IEC2", "IPC6", *(f"IPC{n}" for n in range(8, 14)), "IPC17", "CRCCON", *(f"RPINR{n}" for n in (2, 4, 5, 6, 8, 9, 16, 17, 19))}
-        header = (Path(__file__).resolve().parents[2] / "tools/host/xc.h").read_text()
+        header = (Path(__file__).resolve().parents[2] / "tools/cpu_host/xc.h").read_text()
         host = set(re.findall(r"X\((\w+), 0x\w+\)", header))
         self.assertEqual(absent, {name for name in host if name.lower() not in REGISTERS})
 
@@ -34,7 +34,7 @@ class Resets(unittest.TestCase):
     LIVE = {"PORTA", "PORTB", "PORTC", "RCON", "OSCCON", "P1TMR", "IFS3"} # the fault input is tied to ground, which is active
 
     def test_every_register_has_its_value_after_power_on_and_after_a_reset(self) -> None:
-        text = (ROOT / "tools/iss33f/sfr_table.h").read_text()
+        text = (ROOT / "tools/chip/chip_registers.h").read_text()
         table = {name: (int(address, 16), int(value, 16)) for name, address, value in re.findall(r"X\((\w+), (0x\w+), (0x\w+)\)", text)}
         peripherals = {name: row for name, row in table.items() if row[0] >= 0x60 and name not in self.LIVE}
         spoil = "btsc rcon, #6\nbra done\n" + "".join(f"com {address}\n" for address, _ in peripherals.values() if not 0x1C0 <= address < 0x200) + "reset\ndone: "

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "test" / "iss"), str(ROOT / "test" / "tools")]
+sys.path[:0] = [str(ROOT), str(ROOT / "test" / "tools")]
 
 import asm33 # noqa: E402
 from sample_image import hex_text # noqa: E402
@@ -23,7 +23,7 @@ library = PilLibrary(Path(os.environ.get("PIL_LIBRARY", ROOT / "build/host/libpi
 
 
 def _registers() -> dict[str, int]:
-    text = (ROOT / "tools/iss33f/sfr_table.h").read_text()
+    text = (ROOT / "tools/chip/chip_registers.h").read_text()
     return {name.lower(): int(address, 16) for name, address in re.findall(r"X\((\w+), (0x\w+), 0x\w+\)", text)}
 
 
