@@ -219,7 +219,7 @@ void test_an_adc_that_is_off_is_named(void)
 {
     more_init = adc_off;
     power_up();
-    run(10);
+    run(200);
     TEST_ASSERT_EQUAL_UINT(0, fake_adc_calls);
     TEST_ASSERT_TRUE(warned_about("AD1CON1"));
 }

@@ -1,5 +1,6 @@
 /* The library's surface: keys and their ranges, errors, trace, warnings, power-up. */
 #include "fake_firmware.inc"
+#include "vb_cpu.h"
 
 void setUp(void)
 {
@@ -226,23 +227,36 @@ static int own_reset(void *context)
     return 0;
 }
 
-static int own_interrupt(void *context, vb_vector_t vector)
+static uint64_t own_cycles(void *context)
 {
     (void)context;
-    own_interrupts += vector == VB_VECTOR_ADC1 ? 1u : 0u;
-    volatile uint16_t *ifs0 = own_register(NULL, "IFS0");
-    *ifs0 = (uint16_t)(*ifs0 & ~0x2000u);
-    return 1;
+    return 0;
 }
 
-static void own_background(void *context)
+static bool own_raised(void *context, unsigned irq)
 {
     (void)context;
+    own_interrupts += irq == CHIP_IRQ_ADC1 ? 1u : 0u;
+    volatile uint16_t *ifs0 = own_register(NULL, "IFS0");
+    *ifs0 = (uint16_t)(*ifs0 & ~0x2000u);
+    return false;
+}
+
+static void own_nothing(void *context)
+{
+    (void)context;
+}
+
+static void own_end(void *context, double length_s)
+{
+    (void)context;
+    (void)length_s;
 }
 
 void test_another_cpu_can_sit_on_the_board(void)
 {
-    static const vb_cpu_t cpu = {NULL, own_register, own_reset, own_interrupt, own_background};
+    static const chip_cpu_t cpu = {.reg = own_register, .reset = own_reset, .cycles = own_cycles, .raised = own_raised, .begin = own_nothing,
+                                   .end = own_end, .destroy = own_nothing};
     vb_destroy(board);
     board = vb_create_with_cpu(&cpu);
     TEST_ASSERT_NOT_NULL(board);

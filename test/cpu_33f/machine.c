@@ -64,7 +64,7 @@ void machine_load(machine_t *machine, unsigned count, const uint32_t *words)
 void machine_set(machine_t *machine, const registers_t *to, const uint8_t *ram, unsigned count, const uint32_t *registers)
 {
     iss_t *iss = machine->iss;
-    iss_reset(iss, ISS_RESET_POR);
+    iss_reset(iss, CHIP_RESET_POR);
     iss_restart(iss, to->pc);
     for (unsigned i = 0; i < 16; i++)
         iss_poke(iss, (uint16_t)(2 * i), to->w[i]);
