@@ -1,6 +1,5 @@
-/* The chip as a whole: registers, resets, and what happens by itself in its order. */
+/* What all parts of the chip use: registers, time, events in their order, interrupt flags, warnings. */
 #include "chip.h"
-#include "chip_assumptions.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,7 +10,6 @@ static const struct { const char *name; uint16_t address, reset; } registers[] =
 #undef ROW
 };
 enum { REGISTERS = (int)(sizeof registers / sizeof registers[0]) };
-enum { FPOR_PWMPIN = 0x80 };
 
 int chip_register(const char *name)
 {
@@ -66,6 +64,32 @@ void chip_write(chip_t *chip, uint16_t address, uint16_t value, uint16_t mask)
     }
 }
 
+/* Registers of the peripherals to their values after power-on; `kept` tells which stay as they are. */
+void chip_put_reset_values(chip_t *chip, bool (*kept)(uint16_t address))
+{
+    for (size_t n = 0; n < REGISTERS; n++) {
+        if (registers[n].address >= SFR_CNEN1 && (kept == NULL || !kept(registers[n].address))) {
+            chip_put(chip, registers[n].address, registers[n].reset);
+        }
+    }
+}
+
+/* Ask the processor where it has them. False if one is missing. */
+bool chip_find_registers(chip_t *chip)
+{
+    for (unsigned n = 0; n < CHIP_WORDS; n++) {
+        chip->place[n] = &chip->nowhere;
+    }
+    for (size_t n = 0; n < REGISTERS; n++) {
+        volatile uint16_t *place = chip->cpu.reg(chip->cpu.context, registers[n].name);
+        if (registers[n].address >= SFR_CNEN1 && place == NULL) {
+            return false;
+        }
+        chip->place[registers[n].address / 2u] = place != NULL ? place : &chip->nowhere;
+    }
+    return true;
+}
+
 /* ---- time and events ---- */
 
 double chip_time_at(const chip_t *chip, uint64_t cycle)
@@ -102,34 +126,12 @@ uint64_t chip_next_event(const chip_t *chip)
     return chip->event[first_event(chip)];
 }
 
-static void happen(chip_t *chip, chip_event_t event)
-{
-    chip->event[event] = CHIP_NEVER;
-    switch (event) {
-    case CHIP_EVENT_CLOCK: chip_clock_event(chip); break;
-    case CHIP_EVENT_WATCHDOG: chip_watchdog_event(chip); break;
-    case CHIP_EVENT_TIMER1: chip_timer_event(chip, 0); break;
-    case CHIP_EVENT_TIMER2: chip_timer_event(chip, 1); break;
-    case CHIP_EVENT_TIMER3: chip_timer_event(chip, 2); break;
-    case CHIP_EVENT_SEND: chip_uart_sent(chip); break;
-    case CHIP_EVENT_RECEIVE: chip_uart_received(chip); break;
-    case CHIP_EVENTS: break;
-    }
-}
-
 void chip_happen(chip_t *chip)
 {
     for (chip_event_t event = first_event(chip); chip->event[event] <= chip_now(chip); event = first_event(chip)) {
-        happen(chip, event);
+        chip->event[event] = CHIP_NEVER;
+        chip->on_event[event](chip);
     }
-}
-
-void chip_end(chip_t *chip)
-{
-    chip_uart_wake(chip);
-    chip_happen(chip);
-    chip_pwm_end(chip);
-    chip_adc_end(chip);
 }
 
 /* ---- interrupts ---- */
@@ -153,74 +155,4 @@ void chip_request_reset(chip_t *chip, chip_reset_t cause)
     if (chip->cpu.attend != NULL) {
         chip->cpu.attend(chip->cpu.context);
     }
-}
-
-/* Registers that no reset but power-on changes: the causes of the resets, and the running clock. */
-static bool survives(uint16_t address, chip_reset_t cause)
-{
-    return cause != CHIP_RESET_POR && (address == SFR_RCON || address == SFR_OSCCON);
-}
-
-static void reset_registers(chip_t *chip, chip_reset_t cause)
-{
-    for (size_t n = 0; n < REGISTERS; n++) {
-        if (registers[n].address >= SFR_CNEN1 && !survives(registers[n].address, cause)) {
-            chip_put(chip, registers[n].address, registers[n].reset);
-        }
-    }
-    if ((chip->config[CHIP_FPOR] & FPOR_PWMPIN) == 0) {
-        chip_put(chip, SFR_PWM1CON1, 0x0077); /* the PWM module owns its pins from the reset on */
-    }
-    chip_put(chip, SFR_RCON, cause == CHIP_RESET_POR ? 3u : chip_get(chip, SFR_RCON) | chip_watchdog_cause(cause));
-}
-
-void chip_reset(chip_t *chip, chip_reset_t cause)
-{
-    chip->pending_reset = false;
-    reset_registers(chip, cause);
-    for (unsigned n = 0; n < CHIP_EVENTS; n++) {
-        chip->event[n] = CHIP_NEVER;
-    }
-    chip_clock_reset(chip, cause);
-    chip_timer_reset(chip);
-    chip_uart_reset(chip);
-    chip_watchdog_reset(chip);
-}
-
-/* ---- creation ---- */
-
-bool chip_connect(chip_t *chip, const chip_cpu_t *cpu, const chip_board_t *board, plant_t *plant)
-{
-    memset(chip, 0, sizeof *chip);
-    chip->cpu = *cpu;
-    chip->plant = plant;
-    if (board != NULL) {
-        chip->board = *board;
-    }
-    for (unsigned n = 0; n < CHIP_WORDS; n++) {
-        chip->place[n] = &chip->nowhere;
-    }
-    for (size_t n = 0; n < REGISTERS; n++) {
-        volatile uint16_t *place = cpu->reg(cpu->context, registers[n].name);
-        if (registers[n].address >= SFR_CNEN1 && place == NULL) {
-            return false;
-        }
-        chip->place[registers[n].address / 2u] = place != NULL ? place : &chip->nowhere;
-    }
-    for (unsigned n = 0; n < CHIP_CONFIG_WORDS; n++) {
-        chip->config[n] = 0xFFFFFF;
-    }
-    chip->clock.crystal_hz = 8e6;
-    chip->clock.frc_hz = ASSUME_FRC_HZ;
-    chip->clock.lprc_hz = ASSUME_LPRC_HZ;
-    chip->clock.pll_lock_s = 1e-6 * ASSUME_PLL_LOCK_US;
-    chip->clock.crystal_start = ASSUME_CRYSTAL_START_PERIODS;
-    chip->clock.fcy_hz = 0.5 * chip->clock.frc_hz;
-    chip->adc.due_s = PLANT_NEVER;
-    chip_clock_hooks(chip);
-    chip_watchdog_hooks(chip);
-    chip_ports_hooks(chip);
-    chip_timer_hooks(chip);
-    chip_uart_hooks(chip);
-    return true;
 }

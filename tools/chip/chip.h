@@ -205,6 +205,7 @@ struct chip {
     chip_hook_t hook[CHIP_WORDS];
     uint32_t config[CHIP_CONFIG_WORDS];
     uint64_t event[CHIP_EVENTS], limit;
+    void (*on_event[CHIP_EVENTS])(chip_t *chip);
     bool pending_reset;
     chip_reset_t pending_cause;
     unsigned resets;             /* other than the first */
@@ -219,7 +220,7 @@ struct chip {
     uint16_t analogue_seen;
 };
 
-/* ---- the chip as a whole (chip.c) ---- */
+/* ---- the chip as a whole (chip_device.c, chip.c) ---- */
 
 /* Connect a chip with its processor and, unless NULL, its board and plant. False if the processor lacks a register. */
 bool chip_connect(chip_t *chip, const chip_cpu_t *cpu, const chip_board_t *board, plant_t *plant);
@@ -284,8 +285,9 @@ void chip_warn(chip_t *chip, const char *format, ...) __attribute__((format(prin
 void chip_schedule(chip_t *chip, chip_event_t event, uint64_t cycle);
 void chip_hook(chip_t *chip, uint16_t address, uint16_t (*read)(void *, uint16_t), void (*write)(void *, uint16_t, uint16_t, uint16_t));
 
-/* chip_irq.c */
-bool chip_irq_raise(chip_t *chip, unsigned irq);
+bool chip_irq_raise(chip_t *chip, unsigned irq); /* set its flag; true if a handler is still to come */
+void chip_put_reset_values(chip_t *chip, bool (*kept)(uint16_t address));
+bool chip_find_registers(chip_t *chip);
 
 /* chip_clock.c */
 void chip_clock_hooks(chip_t *chip);
@@ -313,7 +315,9 @@ bool chip_ports_have_function(const chip_t *chip, unsigned function);
 /* chip_timer.c */
 void chip_timer_hooks(chip_t *chip);
 void chip_timer_reset(chip_t *chip);
-void chip_timer_event(chip_t *chip, unsigned n);
+void chip_timer_1(chip_t *chip); /* its count has reached the period register */
+void chip_timer_2(chip_t *chip);
+void chip_timer_3(chip_t *chip);
 
 /* chip_uart.c */
 void chip_uart_hooks(chip_t *chip);

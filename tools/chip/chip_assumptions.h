@@ -4,8 +4,8 @@
 
 /* X(name, value, meaning, where it is used). */
 #define CHIP_ASSUMPTIONS(X) \
-    X(FRC_HZ, 7370000, "Hz of the fast RC oscillator", "chip.c chip_connect") \
-    X(LPRC_HZ, 32000, "Hz of the low-power RC oscillator, which drives the watchdog", "chip.c chip_connect") \
+    X(FRC_HZ, 7370000, "Hz of the fast RC oscillator", "chip_device.c chip_connect") \
+    X(LPRC_HZ, 32000, "Hz of the low-power RC oscillator, which drives the watchdog", "chip_device.c chip_connect") \
     X(SECONDARY_HZ, 32768, "Hz of the secondary oscillator", "chip_clock.c source_hz") \
     X(PLL_LOCK_US, 1500, "us until the PLL has locked, after power-on and after a switch to it", "chip_clock.c ready_s") \
     X(CRYSTAL_START_PERIODS, 1024, "periods that the start-up timer of a crystal counts; an external clock needs none", "chip_clock.c ready_s") \

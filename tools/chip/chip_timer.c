@@ -55,13 +55,28 @@ static void schedule(chip_t *chip, unsigned n)
     chip_schedule(chip, (chip_event_t)(CHIP_EVENT_TIMER1 + (int)n), matches ? cycle : CHIP_NEVER);
 }
 
-void chip_timer_event(chip_t *chip, unsigned n)
+static void match(chip_t *chip, unsigned n)
 {
     chip_timer_t *t = &chip->timer[n];
     t->base_cycle += (uint64_t)counts_to_match(chip, n) * prescale(chip, n);
     t->base_count = 0;
     schedule(chip, n);
     (void)chip_irq_raise(chip, place[n].irq);
+}
+
+void chip_timer_1(chip_t *chip)
+{
+    match(chip, 0);
+}
+
+void chip_timer_2(chip_t *chip)
+{
+    match(chip, 1);
+}
+
+void chip_timer_3(chip_t *chip)
+{
+    match(chip, 2);
 }
 
 static uint16_t read_timer(void *context, uint16_t address)

@@ -1,5 +1,5 @@
 /* Arithmetic and logic: ADD to XOR, comparisons, INC to SETM, in their file-register, literal and register forms. */
-#include "iss_core.h"
+#include "iss_access.h"
 
 /* ---- what the operations do: value and flags ---- */
 

@@ -14,13 +14,13 @@
     X(RAW_STALL_POINTER, 1, "a destination pointer changed by ++ or -- counts as written for the next source address (1 = yes)", "iss_decode.c") \
     X(RAW_STALL_DESTINATION, 0, "destination addresses stall as source addresses do (1 = yes)", "iss_decode.c") \
     X(RAW_STALL_RETURN, 0, "returns stall when the instruction before has written W15, as ULNK does (1 = yes)", "iss_flow.c rows") \
-    X(SOFT_TRAP_DELAY_CYCLES, 2, "cycles between a stack or math error and its trap", "iss_irq.c iss_raise_trap") \
+    X(SOFT_TRAP_DELAY_CYCLES, 2, "cycles between a stack or math error and its trap", "iss_registers.c iss_raise_trap") \
     X(SAME_TRAP_NESTS, 0, "an error inside the handler of its own trap traps again (1 = yes)", "iss_irq.c pending_trap") \
     X(VECNUM_OFFSET, 8, "INTTREG.VECNUM is the place in the vector table less this; for traps, which come before 8, modulo 128", "iss_irq.c enter_exception") \
     X(INTTREG_OWN_PRIORITY, 1, "INTTREG.ILR is the interrupt's own priority, also where NSTDIS makes it 7", "iss_irq.c enter_exception") \
     X(WRONG_SPACE_VALUE, 0, "what a MAC-class prefetch reads from the other space than its own", "iss_dsp.c fetch") \
     X(OUTSIDE_FLASH_VALUE, 0, "what table and PSV reads get beyond the flash", "iss_memory.c") \
-    X(CORCON_RESET, 0x0020, "CORCON after a reset", "iss_core.c iss_reset") \
+    X(CORCON_RESET, 0x0020, "CORCON after a reset", "iss_registers.c iss_reset") \
     X(UNKNOWN_W_BYTE_WRITE, 1, "a byte write makes a W register count as initialised", "iss_decode.c to") \
     X(DIVIDE_LAST_TURN, 1, "W0, W1 and the flags of a division change in its last turn only", "iss_multiply.c in_last_turn") \
     X(DIVIDE_ZERO_FIRST_TURN, 1, "a divisor of 0 raises its trap in the first turn of the division", "iss_multiply.c in_last_turn") \

@@ -1,5 +1,5 @@
 /* Decoder: finds the row of a word and makes an instruction that is ready to run. */
-#include "iss_core.h"
+#include "iss_state.h"
 
 static const row_t *const groups[] = {iss_rows_alu, iss_rows_bit, iss_rows_move, iss_rows_multiply, iss_rows_flow, iss_rows_dsp};
 enum { GROUPS = (int)(sizeof groups / sizeof groups[0]), USUAL_BYTE_BIT = 0x4000 };
@@ -16,14 +16,14 @@ const row_t *iss_row(size_t n)
     return NULL;
 }
 
-static uint32_t byte_bit(const row_t *row)
+uint32_t iss_row_byte_bit(const row_t *row)
 {
     return row->byte == NULL ? 0u : row->byte_bit != 0 ? row->byte_bit : USUAL_BYTE_BIT;
 }
 
 bool iss_row_is_byte(const row_t *row, uint32_t word)
 {
-    return (word & byte_bit(row)) != 0;
+    return (word & iss_row_byte_bit(row)) != 0;
 }
 
 static unsigned bits(uint32_t word, unsigned high, unsigned low)
@@ -308,19 +308,4 @@ void iss_decode(iss_t *m, uint32_t index)
     }
     uint32_t next = index + 1u < ISS_PROGRAM_WORDS ? m->program[index + 1u] : 0u;
     (void)iss_fill(i, m->program[index], next, index);
-}
-
-bool iss_encoding(size_t n, iss_encoding_t *encoding)
-{
-    const row_t *row = iss_row(n);
-    if (row == NULL) {
-        return false;
-    }
-    encoding->mnemonic = row->name;
-    encoding->mask = row->mask & ~byte_bit(row);
-    encoding->value = row->value;
-    encoding->byte_bit = byte_bit(row);
-    encoding->words = iss_row_has_two_words(row) ? 2 : 1;
-    iss_syntax(row, encoding->syntax, sizeof encoding->syntax);
-    return true;
 }

@@ -1,5 +1,5 @@
 /* Instructions as text, from the decoder's table. */
-#include "iss_core.h"
+#include "iss_state.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -175,4 +175,19 @@ unsigned iss_disassemble(uint32_t word, uint32_t next, uint32_t pc, char *buffer
         operand_text(&t, row->operand[n], &i, word, next, pc);
     }
     return i.words;
+}
+
+bool iss_encoding(size_t n, iss_encoding_t *encoding)
+{
+    const row_t *row = iss_row(n);
+    if (row == NULL) {
+        return false;
+    }
+    encoding->mnemonic = row->name;
+    encoding->mask = row->mask & ~iss_row_byte_bit(row);
+    encoding->value = row->value;
+    encoding->byte_bit = iss_row_byte_bit(row);
+    encoding->words = iss_row_has_two_words(row) ? 2 : 1;
+    iss_syntax(row, encoding->syntax, sizeof encoding->syntax);
+    return true;
 }

@@ -1,5 +1,5 @@
 /* DSP engine: 40-bit accumulators, products, saturation, rounding, prefetch and write-back. */
-#include "iss_core.h"
+#include "iss_access.h"
 
 #define BIT31 ((int64_t)1 << 31)
 #define BIT39 ((int64_t)1 << 39)

@@ -1,5 +1,28 @@
 /* Branches, calls, returns, skips, REPEAT and DO, and what acts on the core as a whole. */
-#include "iss_core.h"
+#include "iss_access.h"
+
+/* ---- instructions that are none ---- */
+
+void iss_op_illegal(iss_t *m, const insn_t *i)
+{
+    (void)i;
+    iss_report(m, ISS_ERROR_OPCODE, "illegal opcode 0x%06X: the chip resets", (unsigned)m->program[iss_here(m) / 2u]);
+    iss_demand_reset(m, CHIP_RESET_ILLEGAL);
+}
+
+void iss_op_erased(iss_t *m, const insn_t *i)
+{
+    (void)i;
+    iss_report(m, ISS_ERROR_FETCH, "erased flash is executed");
+}
+
+void iss_op_outside(iss_t *m, const insn_t *i)
+{
+    (void)i;
+    m->pc = CODE_OUTSIDE;
+    iss_report(m, ISS_ERROR_FETCH, "an instruction is fetched where there is no flash: address error trap");
+    iss_raise_trap(m, INTCON1_ADDRERR);
+}
 
 #define W_B(name) name##_w, name##_b
 

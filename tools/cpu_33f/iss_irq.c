@@ -1,5 +1,5 @@
 /* Interrupts and traps: what is pending, entry, return, DISI, waking up. */
-#include "iss_core.h"
+#include "iss_access.h"
 
 enum { IVT = 0x04, AIVT = 0x104, FIRST_INTERRUPT = 8, LEVEL_STACK = 12, LEVEL_ADDRESS = 13, LEVEL_OSCILLATOR = 14 };
 
@@ -18,13 +18,6 @@ typedef struct {
 
 void iss_irq_changed(iss_t *m)
 {
-    iss_attend(m);
-}
-
-void iss_raise_trap(iss_t *m, unsigned intcon1_bits)
-{
-    m->data[R_INTCON1] = (uint16_t)(m->data[R_INTCON1] | intcon1_bits);
-    m->trap_at = m->cycle + ASSUME_SOFT_TRAP_DELAY_CYCLES;
     iss_attend(m);
 }
 

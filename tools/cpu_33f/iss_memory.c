@@ -1,5 +1,5 @@
 /* Data memory beyond known RAM: registers and hooks, the PSV window, addresses that do not exist; modulo and bit-reversed addressing, stack limits. */
-#include "iss_core.h"
+#include "iss_state.h"
 
 /* ---- errors ---- */
 

@@ -1,5 +1,5 @@
 /* Moves, stack, program memory as tables, EXCH and SWAP. */
-#include "iss_core.h"
+#include "iss_access.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Multiplication and division of integers. */
-#include "iss_core.h"
+#include "iss_access.h"
 
 #define W_B(name) name##_w, name##_b
 

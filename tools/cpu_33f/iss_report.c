@@ -1,5 +1,5 @@
 /* What can be observed: errors with names, hooks, profile, stack, assumptions. */
-#include "iss_core.h"
+#include "iss_state.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* The virtual board's state, for vb*.c and vboard.c only. */
+/* The virtual board's state, for vb_*.c only. */
 #ifndef FOC33_VBOARD_VB_STATE_H
 #define FOC33_VBOARD_VB_STATE_H
 
@@ -82,9 +82,10 @@ struct vb {
 /* vb_message.c */
 void vb_warn_list(vb_t *vb, const char *format, va_list args);
 
-/* vboard.c */
+/* vb_record.c */
 void vb_latch(vb_t *vb);
 void vb_stat_reset(vb_t *vb);
+void vb_stat_collect(vb_t *vb, double h_s);
 
 /* vb_keys.c */
 void vb_keys_defaults(vb_t *vb);

@@ -102,6 +102,15 @@ void vb_trace_row(vb_t *vb)
     t->rows++;
 }
 
+void vb_served(void *context)
+{
+    vb_t *vb = context;
+    vb->awaits_handler = false;
+    if (vb->trace.due) {
+        vb_trace_row(vb);
+    }
+}
+
 const float *vb_trace_data(const vb_t *vb, size_t *rows, size_t *cols)
 {
     *rows = vb->trace.rows;

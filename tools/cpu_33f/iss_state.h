@@ -1,6 +1,6 @@
-/* The core's state and what its files share: predecoded instructions, registers and data memory. For core*.c, decode*.c and iss_dsp.c only. */
-#ifndef FOC33_CPU_33F_CORE_H
-#define FOC33_CPU_33F_CORE_H
+/* The core's state and what its files share: predecoded instructions, registers and data memory. For the core's own files only. */
+#ifndef FOC33_CPU_33F_ISS_STATE_H
+#define FOC33_CPU_33F_ISS_STATE_H
 
 #include "iss_assumptions.h"
 #include "iss.h"
@@ -196,9 +196,11 @@ struct iss {
 
 /* ---- between the files ---- */
 
-/* iss_core.c */
+/* iss_registers.c */
 void iss_demand_reset(iss_t *m, chip_reset_t cause);
 void iss_refresh(iss_t *m);
+void iss_refresh_do(iss_t *m);
+void iss_raise_trap(iss_t *m, unsigned intcon1_bits);
 
 /* iss_memory.c: everything but known RAM at an aligned address */
 unsigned iss_load16_slow(iss_t *m, unsigned address);
@@ -211,10 +213,8 @@ unsigned iss_step_modulo(const iss_t *m, unsigned address, int step, bool y_spac
 uint16_t iss_core_read(iss_t *m, unsigned index);
 void iss_core_write(iss_t *m, unsigned index, unsigned value, unsigned mask);
 uint32_t iss_table_word(iss_t *m, uint32_t address);
-void iss_refresh_do(iss_t *m);
 
 /* iss_irq.c */
-void iss_raise_trap(iss_t *m, unsigned intcon1_bits);
 void iss_serve(iss_t *m);
 bool iss_exception_pending(const iss_t *m);
 void iss_left_exception(iss_t *m);
@@ -229,6 +229,7 @@ const row_t *iss_row(size_t n);
 const row_t *iss_fill(insn_t *i, uint32_t word, uint32_t next, uint32_t index);
 bool iss_row_is_byte(const row_t *row, uint32_t word);
 bool iss_row_has_two_words(const row_t *row);
+uint32_t iss_row_byte_bit(const row_t *row);
 
 /* iss_decode_text.c */
 void iss_syntax(const row_t *row, char *buffer, size_t size);
@@ -239,10 +240,8 @@ bool iss_is_divide(const insn_t *i);
 /* Rows by groups of instructions; each ends with a row without a name. */
 extern const row_t iss_rows_alu[], iss_rows_bit[], iss_rows_move[], iss_rows_multiply[], iss_rows_flow[], iss_rows_dsp[];
 
-/* Handlers that are not in a row: iss_core.c */
+/* Handlers that are not in a row: iss_flow.c */
 handler_t iss_op_illegal, iss_op_erased, iss_op_outside;
-
-/* ---- small things that must be fast ---- */
 
 static inline void iss_attend(iss_t *m)
 {
@@ -267,172 +266,15 @@ static inline void set_w(iss_t *m, unsigned n, unsigned value)
     m->data[15] &= 0xFFFEu;
 }
 
-static inline void set_w8(iss_t *m, unsigned n, unsigned value)
-{
-    set_w(m, n, (m->data[n] & 0xFF00u) | (value & 0xFFu));
-}
-
-static inline unsigned load16(iss_t *m, unsigned address)
-{
-    unsigned offset = address - ISS_RAM_START;
-    if (offset < ISS_RAM_END - ISS_RAM_START && (address & 1u) == 0 && m->known[offset / 2u] == 0xFFFFu) {
-        return m->data[address / 2u];
-    }
-    return iss_load16_slow(m, address);
-}
-
-static inline void store16(iss_t *m, unsigned address, unsigned value)
-{
-    unsigned offset = address - ISS_RAM_START;
-    if (offset < ISS_RAM_END - ISS_RAM_START && (address & 1u) == 0) {
-        m->known[offset / 2u] = 0xFFFFu;
-        m->data[address / 2u] = (uint16_t)value;
-    } else {
-        iss_store16_slow(m, address, value);
-    }
-}
-
-static inline unsigned load8(iss_t *m, unsigned address)
-{
-    unsigned offset = address - ISS_RAM_START, shift = 8u * (address & 1u);
-    if (offset < ISS_RAM_END - ISS_RAM_START && ((m->known[offset / 2u] >> shift) & 0xFFu) != 0) {
-        return ((unsigned)m->data[address / 2u] >> shift) & 0xFFu;
-    }
-    return iss_load8_slow(m, address);
-}
-
-static inline void store8(iss_t *m, unsigned address, unsigned value)
-{
-    unsigned offset = address - ISS_RAM_START, shift = 8u * (address & 1u), mask = 0xFFu << shift;
-    if (offset < ISS_RAM_END - ISS_RAM_START) {
-        m->known[offset / 2u] = (uint16_t)(m->known[offset / 2u] | mask);
-        m->data[address / 2u] = (uint16_t)((m->data[address / 2u] & ~mask) | ((value << shift) & mask));
-    } else {
-        iss_store8_slow(m, address, value);
-    }
-}
-
-static inline unsigned load(iss_t *m, unsigned address, unsigned bits)
-{
-    return bits == 8 ? load8(m, address) : load16(m, address);
-}
-
-static inline void store(iss_t *m, unsigned address, unsigned value, unsigned bits)
-{
-    if (bits == 8) {
-        store8(m, address, value);
-    } else {
-        store16(m, address, value);
-    }
-}
-
-/* Effective address of an indirect operand, with the pointer's change. Modes: 1 [W], 2 [W--], 3 [W++], 4 [--W], 5 [++W], 6 and 7 [W+Wb]. */
-static inline unsigned indirect(iss_t *m, unsigned reg, unsigned mode, unsigned index, unsigned step, bool writes)
-{
-    unsigned address = m->data[reg];
-    if (m->bent) {
-        return iss_bent_address(m, reg, mode, index, step, writes);
-    }
-    switch (mode) {
-    case 1: break;
-    case 2: set_w(m, reg, address - step); break;
-    case 3: set_w(m, reg, address + step); break;
-    case 4: address = (address - step) & 0xFFFFu; set_w(m, reg, address); break;
-    case 5: address = (address + step) & 0xFFFFu; set_w(m, reg, address); break;
-    default: address = (address + m->data[index]) & 0xFFFFu; break;
-    }
-    if (reg == 15) {
-        iss_stack_access(m, address);
-    }
-    return address;
-}
-
-static inline unsigned ones(unsigned bits)
-{
-    return (1u << bits) - 1u;
-}
-
-/* The value of source operand Ws in whatever mode. */
-static inline unsigned source(iss_t *m, const insn_t *i, unsigned bits)
-{
-    if (i->p == 0) {
-        return m->data[i->s] & ones(bits);
-    }
-    return load(m, indirect(m, i->s, i->p, i->w, bits / 8u, false), bits);
-}
-
-/* Write the result to destination operand Wd in whatever mode. */
-static inline void destination(iss_t *m, const insn_t *i, unsigned value, unsigned bits)
-{
-    if (i->q != 0) {
-        store(m, indirect(m, i->d, i->q, i->w, bits / 8u, true), value, bits);
-    } else if (bits == 8) {
-        set_w8(m, i->d, value);
-    } else {
-        set_w(m, i->d, value);
-    }
-}
-
-/* The result to WREG or f (d: 1 = f). */
-static inline void to_file_or_wreg(iss_t *m, const insn_t *i, unsigned result, unsigned bits)
-{
-    if (i->d != 0) {
-        store(m, i->k, result, bits);
-    } else if (bits == 8) {
-        set_w8(m, 0, result);
-    } else {
-        set_w(m, 0, result);
-    }
-}
-
-static inline void to_register(iss_t *m, unsigned n, unsigned result, unsigned bits)
-{
-    if (bits == 8) {
-        set_w8(m, n, result);
-    } else {
-        set_w(m, n, result);
-    }
-}
-
-static inline unsigned carry_of(const iss_t *m)
-{
-    return m->data[R_SR] & SR_C;
-}
-
 static inline int as_int16(unsigned value)
 {
     return (int)(int16_t)(uint16_t)value;
-}
-
-/* Flags N and Z of a result; the others stay. */
-static inline void flags_nz(iss_t *m, unsigned result, unsigned bits)
-{
-    unsigned sr = m->data[R_SR] & ~(unsigned)(SR_N | SR_Z);
-    sr |= ((result >> (bits - 1u)) & 1u) << 3;
-    sr |= (unsigned)((result & ones(bits)) == 0) << 1;
-    m->data[R_SR] = (uint16_t)sr;
 }
 
 static inline void flag(iss_t *m, unsigned bit, bool on)
 {
     unsigned sr = m->data[R_SR];
     m->data[R_SR] = (uint16_t)(on ? sr | bit : sr & ~bit);
-}
-
-static inline void push16(iss_t *m, unsigned value)
-{
-    unsigned address = m->data[15];
-    iss_stack_access(m, address);
-    set_w(m, 15, address + 2u);
-    store16(m, address, value);
-}
-
-static inline unsigned pop16(iss_t *m)
-{
-    unsigned address = (m->data[15] - 2u) & 0xFFFFu;
-    set_w(m, 15, address);
-    iss_stack_access(m, address);
-    return load16(m, address);
 }
 
 /* Go to a PC address. */
