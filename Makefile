@@ -29,7 +29,7 @@ warnings += -Wno-sign-conversion # the checks that the compiler inserts make it 
 sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
-CFLAGS := -std=gnu99 -O2 -g -fPIC -ftrack-macro-expansion=0 $(sanitizer)
+CFLAGS := -std=gnu99 -O2 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
 INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/cpu_host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
 

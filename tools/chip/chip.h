@@ -330,15 +330,12 @@ void chip_uart_wake(chip_t *chip); /* there may be characters to receive */
 void chip_pwm_reset(chip_t *chip);
 void chip_pwm_begin(chip_t *chip);
 void chip_pwm_end(chip_t *chip);
-void chip_pwm_apply_edges(chip_t *chip);
-double chip_pwm_next_edge(const chip_t *chip);
 void chip_pwm_half(chip_t *chip);
 void chip_pwm_written(chip_t *chip);
 void chip_pwm_cut(chip_t *chip);
 bool chip_pwm_enabled(const chip_t *chip);
 uint16_t chip_pwm_counter(const chip_t *chip, double now_s);
 void chip_pwm_show_counter(chip_t *chip);
-uint8_t chip_pwm_mask(const chip_t *chip);
 void chip_pwm_fault(chip_t *chip, bool period_start);
 
 /* chip_adc.c */

@@ -1,5 +1,5 @@
 /* The motor-control PWM module: time base, duty buffers, dead-time generators, overrides, fault input, special event trigger. */
-#include "chip.h"
+#include "chip_pwm_edges.h"
 
 #include <math.h>
 #include <string.h>
@@ -292,16 +292,6 @@ void chip_pwm_reset(chip_t *chip)
     }
 }
 
-/* The gates as they are now, bits as in P1OVDCON. */
-uint8_t chip_pwm_mask(const chip_t *chip)
-{
-    unsigned mask = 0;
-    for (unsigned k = 0; k < 3; k++) {
-        mask |= (unsigned)chip->plant->inverter.gate[k] << (2u * k);
-    }
-    return (uint8_t)mask;
-}
-
 static void update_faulted_legs(chip_t *chip)
 {
     unsigned fltacon = CHIP_REG(chip, P1FLTACON);
@@ -481,31 +471,6 @@ void chip_pwm_show_counter(chip_t *chip)
 void chip_pwm_cut(chip_t *chip)
 {
     chip->pwm.length_s = chip->plant->now_s;
-}
-
-/* Transistors change at their planned edges. */
-void chip_pwm_apply_edges(chip_t *chip)
-{
-    for (unsigned k = 0; k < 3; k++) {
-        chip_leg_t *leg = &chip->pwm.leg[k];
-        while (leg->next < leg->count && leg->edge_s[leg->next] <= chip->plant->now_s) {
-            plant_inverter_gate(chip->plant, k, (plant_gate_t)leg->edge_gate[leg->next]);
-            leg->next++;
-        }
-    }
-    chip->pwm.seen_mask = (uint8_t)(chip->pwm.seen_mask | chip_pwm_mask(chip));
-}
-
-double chip_pwm_next_edge(const chip_t *chip)
-{
-    double first = PLANT_NEVER;
-    for (unsigned k = 0; k < 3; k++) {
-        const chip_leg_t *leg = &chip->pwm.leg[k];
-        if (leg->next < leg->count && leg->edge_s[leg->next] < first) {
-            first = leg->edge_s[leg->next];
-        }
-    }
-    return first;
 }
 
 /* Follow the fault pin. Outputs enter their fault state at once and leave it at the start of a period: by themselves in cycle-by-cycle mode,

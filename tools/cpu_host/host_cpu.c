@@ -28,6 +28,7 @@ typedef struct {
     vb_t *vb;
     chip_t *chip;
     double start_s, background_countdown;
+    volatile uint16_t *place[WATCHED];
     uint16_t before[WATCHED];
     bool offered; /* a received character stands in U1RXREG */
     bool stuck;   /* a handler leaves its flag set: the main loop stands still */
@@ -50,7 +51,7 @@ static void show_registers(host_t *h)
         U1RXREG = chip->uart.rx[0];
     }
     for (unsigned n = 0; n < WATCHED; n++) {
-        h->before[n] = chip_get(chip, watched[n]);
+        h->before[n] = *h->place[n];
     }
 }
 
@@ -59,9 +60,9 @@ static void follow_writes(host_t *h, bool reads_receiver)
 {
     chip_t *chip = h->chip;
     for (unsigned n = 0; n < WATCHED; n++) {
-        uint16_t now = chip_get(chip, watched[n]);
+        uint16_t now = *h->place[n];
         if (now != h->before[n]) {
-            chip_put(chip, watched[n], h->before[n]);
+            *h->place[n] = h->before[n];
             chip_write(chip, watched[n], now, 0xFFFF);
         }
     }
@@ -234,6 +235,9 @@ vb_t *vb_create(void)
         return NULL;
     }
     h->chip = vb_chip(h->vb);
+    for (unsigned n = 0; n < WATCHED; n++) {
+        h->place[n] = h->chip->place[watched[n] / 2u];
+    }
     h->chip->config[CHIP_FOSCSEL] = 3; /* the crystal with the PLL, as xc.h's OSCCON has it */
     h->chip->config[CHIP_FWDT] = 0;    /* no watchdog on a PC: time stands still while the firmware runs */
     return h->vb;

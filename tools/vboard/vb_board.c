@@ -1,4 +1,5 @@
 /* The board as a whole: creation, power-up, and one PWM period after the other. */
+#include "chip_pwm_edges.h"
 #include "vb_state.h"
 
 #include <stdlib.h>

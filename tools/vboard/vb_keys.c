@@ -1,4 +1,5 @@
 /* The string keys: one table of names, units, ranges, defaults and meanings, and the way to each value. */
+#include "chip_pwm_edges.h"
 #include "plant_motor_step.h"
 #include "vb_state.h"
 
