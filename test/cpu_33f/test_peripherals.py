@@ -22,14 +22,6 @@ UART = """
 TIMER = "clr tmr1; setm pr1; mov #0x8000, w0; mov w0, t1con\n"
 
 
-class Names(unittest.TestCase):
-    def test_every_register_of_the_part_that_the_host_has_is_the_chips(self) -> None:
-        absent = {"IFS2", "IEC2", "IPC6", *(f"IPC{n}" for n in range(8, 14)), "IPC17", "CRCCON", *(f"RPINR{n}" for n in (2, 4, 5, 6, 8, 9, 16, 17, 19))}
-        header = (Path(__file__).resolve().parents[2] / "tools/cpu_host/xc.h").read_text()
-        host = set(re.findall(r"X\((\w+), 0x\w+\)", header))
-        self.assertEqual(absent, {name for name in host if name.lower() not in REGISTERS})
-
-
 class Resets(unittest.TestCase):
     LIVE = {"PORTA", "PORTB", "PORTC", "RCON", "OSCCON", "P1TMR", "IFS3"} # the fault input is tied to ground, which is active
 

@@ -47,7 +47,7 @@ def only_params_h_reads_userparams_h() -> None:
 
 
 def control_and_drive_name_no_register_and_no_motor() -> None:
-    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/cpu_host/xc.h").read_text(encoding="utf-8"))
+    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/chip/chip_registers.h").read_text(encoding="utf-8"))
     assert len(registers) > 100
     pattern = re.compile(r"\b(" + "|".join([*registers, "Hurst", "MCLV"]) + r")(bits)?\b")
     for room in ("control", "drive"):

@@ -156,8 +156,8 @@ static void host_begin(void *context)
     if ((IFS0 & IEC0) == 0 && (IFS3 & IEC3) == 0) {
         return;
     }
-    uint16_t ifs[CHIP_IRQ_WORDS] = {IFS0, IFS1, IFS2, IFS3, IFS4}, ipc[4 * CHIP_IRQ_WORDS];
-    const uint16_t iec[CHIP_IRQ_WORDS] = {IEC0, IEC1, IEC2, IEC3, IEC4};
+    uint16_t ifs[CHIP_IRQ_WORDS] = {IFS0, IFS1, 0, IFS3, IFS4}, ipc[4 * CHIP_IRQ_WORDS];
+    const uint16_t iec[CHIP_IRQ_WORDS] = {IEC0, IEC1, 0, IEC3, IEC4};
     for (unsigned n = 0; n < 4 * CHIP_IRQ_WORDS; n++) {
         ipc[n] = chip_get(h->chip, SFR_IPC0 + 2u * n);
     }

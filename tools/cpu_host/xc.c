@@ -3,12 +3,31 @@
 
 #include <string.h>
 
-#define HOST_SFR_DEFINE(name, start) volatile uint16_t name = (start);
-HOST_SFR_LIST(HOST_SFR_DEFINE)
+#define HOST_SFR_DEFINE(name, address, start) volatile uint16_t name = (start);
+SFR_TABLE(HOST_SFR_DEFINE)
 
-#define HOST_SFR_ROW(name, start) {#name, &name, (start)},
-const host_sfr_t host_sfr_table[] = {HOST_SFR_LIST(HOST_SFR_ROW)};
+#define HOST_SFR_ROW(name, address, start) {#name, &name, (start)},
+host_sfr_t host_sfr_table[] = {SFR_TABLE(HOST_SFR_ROW)};
 const size_t host_sfr_count = sizeof host_sfr_table / sizeof host_sfr_table[0];
+
+/* Nothing answers while the firmware runs: a switch to the crystal with PLL "has happened" (COSC = NOSC = 3, LOCK), every pin reads high
+ * (buttons released, fault input inactive), the PWM's time base "counts down at 500" for a deadline check, no character waits. */
+static const struct { volatile uint16_t *pointer; uint16_t start; } ready[] = {
+    {&OSCCON, 0x3320}, {&PORTA, 0x079F}, {&PORTB, 0xFFFF}, {&PORTC, 0x03FF}, {&P1TMR, 0x81F4}, {&U1TXREG, HOST_U1TXREG_EMPTY},
+};
+
+/* The start values stand there before main(). */
+__attribute__((constructor)) static void prepare(void)
+{
+    for (size_t i = 0; i < host_sfr_count; i++) {
+        for (size_t k = 0; k < sizeof ready / sizeof ready[0]; k++) {
+            if (host_sfr_table[i].pointer == ready[k].pointer) {
+                host_sfr_table[i].reset = ready[k].start;
+            }
+        }
+    }
+    host_registers_reset();
+}
 
 volatile uint16_t host_watchdog_serves;
 

@@ -9,59 +9,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* One line per register: X(name, start value). The start value is the silicon's reset value, except where the comment says otherwise. */
-#define HOST_SFR_LIST(X) \
-    /* core */ \
-    X(SR, 0x0000) X(CORCON, 0x0020) X(PSVPAG, 0x0000) X(TBLPAG, 0x0000) X(DISICNT, 0x0000) X(SPLIM, 0x0000) \
-    X(MODCON, 0x0000) X(RCOUNT, 0x0000) X(DCOUNT, 0x0000) \
-    /* interrupts; IFS2, IEC2 and the IPCn that this part lacks exist for code shared within the family */ \
-    X(INTCON1, 0x0000) X(INTCON2, 0x0000) X(INTTREG, 0x0000) \
-    X(IFS0, 0x0000) X(IFS1, 0x0000) X(IFS2, 0x0000) X(IFS3, 0x0000) X(IFS4, 0x0000) \
-    X(IEC0, 0x0000) X(IEC1, 0x0000) X(IEC2, 0x0000) X(IEC3, 0x0000) X(IEC4, 0x0000) \
-    X(IPC0, 0x4444) X(IPC1, 0x4440) X(IPC2, 0x4444) X(IPC3, 0x0044) X(IPC4, 0x4044) X(IPC5, 0x4404) X(IPC6, 0x0000) \
-    X(IPC7, 0x0040) X(IPC8, 0x0000) X(IPC9, 0x0000) X(IPC10, 0x0000) X(IPC11, 0x0000) X(IPC12, 0x0000) \
-    X(IPC13, 0x0000) X(IPC14, 0x0440) X(IPC15, 0x4000) X(IPC16, 0x0040) X(IPC17, 0x0000) X(IPC18, 0x0440) \
-    /* clock and reset: a switch to the crystal with PLL "has happened" (COSC = NOSC = 3, LOCK), power-on is the cause of reset */ \
-    X(OSCCON, 0x3320) X(CLKDIV, 0x3040) X(PLLFBD, 0x0030) X(OSCTUN, 0x0000) X(RCON, 0x0003) \
-    X(PMD1, 0x0000) X(PMD2, 0x0000) X(PMD3, 0x0000) X(NVMCON, 0x0000) X(NVMKEY, 0x0000) X(CRCCON, 0x0000) \
-    /* ports: every pin reads high (buttons released, fault input inactive) */ \
-    X(PORTA, 0x079F) X(PORTB, 0xFFFF) X(PORTC, 0x03FF) X(LATA, 0x0000) X(LATB, 0x0000) X(LATC, 0x0000) \
-    X(TRISA, 0x079F) X(TRISB, 0xFFFF) X(TRISC, 0x03FF) X(ODCA, 0x0000) X(ODCB, 0x0000) X(ODCC, 0x0000) \
-    X(CNEN1, 0x0000) X(CNEN2, 0x0000) X(CNPU1, 0x0000) X(CNPU2, 0x0000) \
-    /* peripheral pin select */ \
-    X(RPINR0, 0x1F00) X(RPINR1, 0x001F) X(RPINR2, 0x0000) X(RPINR3, 0x1F1F) X(RPINR4, 0x0000) X(RPINR5, 0x0000) \
-    X(RPINR6, 0x0000) X(RPINR7, 0x1F1F) X(RPINR8, 0x0000) X(RPINR9, 0x0000) X(RPINR10, 0x1F1F) X(RPINR11, 0x001F) \
-    X(RPINR12, 0x001F) X(RPINR13, 0x001F) X(RPINR14, 0x1F1F) X(RPINR15, 0x001F) X(RPINR16, 0x0000) X(RPINR17, 0x0000) \
-    X(RPINR18, 0x1F1F) X(RPINR19, 0x0000) X(RPINR20, 0x1F1F) X(RPINR21, 0x001F) \
-    X(RPOR0, 0x0000) X(RPOR1, 0x0000) X(RPOR2, 0x0000) X(RPOR3, 0x0000) X(RPOR4, 0x0000) X(RPOR5, 0x0000) X(RPOR6, 0x0000) \
-    X(RPOR7, 0x0000) X(RPOR8, 0x0000) X(RPOR9, 0x0000) X(RPOR10, 0x0000) X(RPOR11, 0x0000) X(RPOR12, 0x0000) \
-    /* timers, capture, compare */ \
-    X(TMR1, 0x0000) X(PR1, 0xFFFF) X(T1CON, 0x0000) X(TMR2, 0x0000) X(TMR3HLD, 0x0000) X(TMR3, 0x0000) X(PR2, 0xFFFF) \
-    X(PR3, 0xFFFF) X(T2CON, 0x0000) X(T3CON, 0x0000) \
-    X(IC1BUF, 0x0000) X(IC1CON, 0x0000) X(IC2BUF, 0x0000) X(IC2CON, 0x0000) X(IC7BUF, 0x0000) X(IC7CON, 0x0000) \
-    X(IC8BUF, 0x0000) X(IC8CON, 0x0000) X(OC1RS, 0x0000) X(OC1R, 0x0000) X(OC1CON, 0x0000) X(OC2RS, 0x0000) \
-    X(OC2R, 0x0000) X(OC2CON, 0x0000) \
-    /* motor control PWM: the time base "counts down at 500", so that a deadline check in a plain harness passes */ \
-    X(P1TCON, 0x0000) X(P1TMR, 0x81F4) X(P1TPER, 0x0000) X(P1SECMP, 0x0000) X(PWM1CON1, 0x0000) X(PWM1CON2, 0x0000) \
-    X(P1DTCON1, 0x0000) X(P1DTCON2, 0x0000) X(P1FLTACON, 0x0000) X(P1OVDCON, 0x3F00) X(P1DC1, 0x0000) X(P1DC2, 0x0000) \
-    X(P1DC3, 0x0000) \
-    X(P2TCON, 0x0000) X(P2TMR, 0x0000) X(P2TPER, 0x0000) X(P2SECMP, 0x0000) X(PWM2CON1, 0x0000) X(PWM2CON2, 0x0000) \
-    X(P2DTCON1, 0x0000) X(P2DTCON2, 0x0000) X(P2FLTACON, 0x0000) X(P2OVDCON, 0x0300) X(P2DC1, 0x0000) \
-    X(QEI1CON, 0x0000) X(DFLT1CON, 0x0000) X(POS1CNT, 0x0000) X(MAX1CNT, 0xFFFF) \
-    /* ADC */ \
-    X(AD1CON1, 0x0000) X(AD1CON2, 0x0000) X(AD1CON3, 0x0000) X(AD1CHS0, 0x0000) X(AD1CHS123, 0x0000) X(AD1CSSL, 0x0000) \
-    X(AD1PCFGL, 0x0000) \
-    X(ADC1BUF0, 0x0000) X(ADC1BUF1, 0x0000) X(ADC1BUF2, 0x0000) X(ADC1BUF3, 0x0000) X(ADC1BUF4, 0x0000) X(ADC1BUF5, 0x0000) \
-    X(ADC1BUF6, 0x0000) X(ADC1BUF7, 0x0000) X(ADC1BUF8, 0x0000) X(ADC1BUF9, 0x0000) X(ADC1BUFA, 0x0000) X(ADC1BUFB, 0x0000) \
-    X(ADC1BUFC, 0x0000) X(ADC1BUFD, 0x0000) X(ADC1BUFE, 0x0000) X(ADC1BUFF, 0x0000) \
-    /* serial; U1TXREG holds 0xFFFF while no character waits in it (see HOST_U1TXREG_EMPTY) */ \
-    X(U1MODE, 0x0000) X(U1STA, 0x0110) X(U1TXREG, 0xFFFF) X(U1RXREG, 0x0000) X(U1BRG, 0x0000) \
-    X(SPI1STAT, 0x0000) X(SPI1CON1, 0x0000) X(SPI1CON2, 0x0000) X(SPI1BUF, 0x0000) \
-    X(I2C1RCV, 0x0000) X(I2C1TRN, 0x00FF) X(I2C1BRG, 0x0000) X(I2C1CON, 0x1000) X(I2C1STAT, 0x0000) X(I2C1ADD, 0x0000) \
-    X(I2C1MSK, 0x0000)
+#include "../chip/chip_registers.h"
 
-#define HOST_SFR_DECLARE(name, start) extern volatile uint16_t name;
-HOST_SFR_LIST(HOST_SFR_DECLARE)
+/* Every register of the part is a variable. They start with the silicon's reset values, except those that nothing would change while the
+ * firmware waits for them (xc.c). */
+#define HOST_SFR_DECLARE(name, address, reset) extern volatile uint16_t name;
+SFR_TABLE(HOST_SFR_DECLARE)
 #undef HOST_SFR_DECLARE
 
 /* A harness that takes a character from U1TXREG writes this value back, because a write of the same character twice would not show. */
@@ -74,8 +27,8 @@ typedef struct {
     uint16_t reset;
 } host_sfr_t;
 
-/* Every register of HOST_SFR_LIST in that order, and how many there are. */
-extern const host_sfr_t host_sfr_table[];
+/* Every register in the order of SFR_TABLE, and how many there are. */
+extern host_sfr_t host_sfr_table[];
 extern const size_t host_sfr_count;
 
 /* Put every register back to its start value, as power-up does. */
