@@ -31,7 +31,6 @@ typedef struct iss iss_t;
 typedef enum {
     ISS_STOP_NONE,       /* until_cycle reached */
     ISS_STOP_REQUEST,    /* iss_request_stop() */
-    ISS_STOP_BREAKPOINT, /* the instruction at iss_pc() has not been executed */
     ISS_STOP_ERROR       /* iss_error() tells which */
 } iss_stop_t;
 
@@ -72,9 +71,6 @@ void iss_program_changed(iss_t *iss);
 
 /* Program one word, of flash or of the configuration words; ISS_ERASED erases it. False: there is no such address. */
 bool iss_write_program(iss_t *iss, uint32_t pc, uint32_t word);
-uint32_t iss_read_program(const iss_t *iss, uint32_t pc);
-bool iss_is_programmed(const iss_t *iss, uint32_t pc);
-void iss_erase(iss_t *iss);
 
 /* Data memory as words, index = address / 2. Little-endian as bytes on a little-endian host. */
 uint16_t *iss_data(iss_t *iss);
@@ -120,16 +116,10 @@ iss_power_t iss_power(const iss_t *iss);
 /* Leave IDLE or SLEEP, as a watchdog does. */
 void iss_wake(iss_t *iss);
 
-/* ISS_STOP_BREAKPOINT before the instruction at this address. */
-void iss_breakpoint(iss_t *iss, uint32_t pc, bool on);
-
 /* ---- errors ---- */
 
 /* The last error as one line "what, where: why", "" if there was none; valid until the next one. */
 const char *iss_error(const iss_t *iss);
-
-/* How often this kind has been met. */
-uint64_t iss_error_count(const iss_t *iss, iss_error_t kind);
 
 /* Bit mask 1 << iss_error_t of the kinds that end iss_run() with ISS_STOP_ERROR; ISS_STOP_DEFAULT to begin with. */
 void iss_stop_on(iss_t *iss, unsigned mask);
@@ -165,24 +155,15 @@ void iss_on_reset(iss_t *iss, void (*reset)(void *context, chip_reset_t cause), 
 void iss_on_interrupt(iss_t *iss, void (*enter)(void *context, unsigned vector, uint64_t cycle),
                       void (*leave)(void *context, unsigned vector, uint64_t cycle), void *context);
 
-/* Around calls: after CALL, RCALL and interrupt entry with the target, after RETURN, RETLW, RETFIE with the address returned to. */
-void iss_on_call(iss_t *iss, void (*call)(void *context, uint32_t target, uint64_t cycle), void (*ret)(void *context, uint32_t to, uint64_t cycle),
-                 void *context);
-
 /* Count executions and cycles of every address (off at first). The arrays have ISS_PROGRAM_WORDS elements, index = PC / 2; cycles of an interrupt's
  * entry belong to its first instruction. Switching on clears them. NULL if never switched on. */
 bool iss_profile(iss_t *iss, bool on);
 const uint32_t *iss_profile_counts(const iss_t *iss);
 const uint64_t *iss_profile_cycles(const iss_t *iss);
 
-/* Stack: first address (the last literal moved to W15), the first free address at its highest so far, and the difference. iss_stack_clear() starts anew. */
-uint16_t iss_stack_base(const iss_t *iss);
-uint16_t iss_stack_top(const iss_t *iss);
+/* Bytes of stack at its deepest, above the last literal moved to W15. iss_stack_clear() starts anew. */
 unsigned iss_stack_bytes(const iss_t *iss);
 void iss_stack_clear(iss_t *iss);
-
-/* Cycles spent in IDLE or SLEEP. */
-uint64_t iss_idle_cycles(const iss_t *iss);
 
 /* ---- instructions as text ---- */
 

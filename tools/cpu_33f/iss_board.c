@@ -199,7 +199,7 @@ static double live_run(void *context, double until_s)
         b->pending_s = plant_max(plant_min(time_of(b, now_cycle(b)), until_s), b->cpu.chip->plant->now_s);
         return b->pending_s;
     }
-    return until_s; /* a breakpoint is the caller's of iss_cpu_run(); errors do not stop */
+    return until_s; /* errors do not stop */
 }
 
 /* A conversion is over; from its trigger the latency counts. */

@@ -17,7 +17,7 @@ vb_t *vb_create_iss(const char *image, char *error, size_t size);
 /* 1 if the image says where the drive's variables are: signals "fw.*" and the comparison; 0: a HEX file has none. */
 int vb_iss_has_names(vb_t *vb);
 
-/* The core, for profiles and breakpoints. */
+/* The core, for profiles. */
 iss_t *vb_iss_core(vb_t *vb);
 
 /* "" while both agree; otherwise where they first differed: tick, signal, both values. */

@@ -14,6 +14,29 @@ static void mark_core_registers(iss_t *m)
     }
 }
 
+void iss_program_changed(iss_t *m)
+{
+    for (uint32_t n = 0; n < ISS_PROGRAM_WORDS; n++) {
+        m->program[n] &= 0xFFFFFFu;
+        m->programmed[n] = m->program[n] != ISS_ERASED;
+    }
+    for (uint32_t n = 0; n <= ISS_PROGRAM_WORDS; n++) {
+        iss_decode(m, n);
+    }
+    iss_refresh_do(m);
+}
+
+static void erase(iss_t *m)
+{
+    for (uint32_t n = 0; n < ISS_PROGRAM_WORDS; n++) {
+        m->program[n] = ISS_ERASED;
+    }
+    for (uint32_t n = 0; n < ISS_CONFIG_WORDS; n++) {
+        m->config[n] = ISS_ERASED;
+    }
+    iss_program_changed(m);
+}
+
 iss_t *iss_create(void)
 {
     iss_t *m = calloc(1, sizeof *m);
@@ -22,8 +45,7 @@ iss_t *iss_create(void)
     }
     mark_core_registers(m);
     m->stop_mask = ISS_STOP_DEFAULT;
-    m->break_pc = UINT32_MAX;
-    iss_erase(m);
+    erase(m);
     iss_reset(m, CHIP_RESET_POR);
     return m;
 }
@@ -44,29 +66,6 @@ uint32_t *iss_program(iss_t *m)
     return m->program;
 }
 
-void iss_program_changed(iss_t *m)
-{
-    for (uint32_t n = 0; n < ISS_PROGRAM_WORDS; n++) {
-        m->program[n] &= 0xFFFFFFu;
-        m->programmed[n] = m->program[n] != ISS_ERASED;
-    }
-    for (uint32_t n = 0; n <= ISS_PROGRAM_WORDS; n++) {
-        iss_decode(m, n);
-    }
-    iss_refresh_do(m);
-}
-
-void iss_erase(iss_t *m)
-{
-    for (uint32_t n = 0; n < ISS_PROGRAM_WORDS; n++) {
-        m->program[n] = ISS_ERASED;
-    }
-    for (uint32_t n = 0; n < ISS_CONFIG_WORDS; n++) {
-        m->config[n] = ISS_ERASED;
-    }
-    iss_program_changed(m);
-}
-
 bool iss_write_program(iss_t *m, uint32_t pc, uint32_t word)
 {
     uint32_t index = pc / 2u;
@@ -84,19 +83,6 @@ bool iss_write_program(iss_t *m, uint32_t pc, uint32_t word)
         iss_decode(m, index - 1u); /* it may have two words */
     }
     return true;
-}
-
-uint32_t iss_read_program(const iss_t *m, uint32_t pc)
-{
-    if (pc >= ISS_CONFIG_START && (pc - ISS_CONFIG_START) / 2u < ISS_CONFIG_WORDS) {
-        return m->config[(pc - ISS_CONFIG_START) / 2u];
-    }
-    return pc / 2u < ISS_PROGRAM_WORDS ? m->program[pc / 2u] : ISS_ERASED;
-}
-
-bool iss_is_programmed(const iss_t *m, uint32_t pc)
-{
-    return pc / 2u < ISS_PROGRAM_WORDS && m->programmed[pc / 2u] != 0;
 }
 
 /* ---- registers and memory from outside ---- */
@@ -204,18 +190,12 @@ static void count_instruction(iss_t *m, uint32_t pc)
     }
 }
 
-/* The same with profile and breakpoints. */
-static void run_observed(iss_t *m)
+/* The same with the profile. */
+static void run_profiled(iss_t *m)
 {
     while (m->cycle < m->limit) {
         uint32_t pc = m->pc;
         const insn_t *i = &m->code[pc];
-        if (m->breakpoint[pc] != 0 && m->break_pc != pc) {
-            m->break_pc = pc;
-            m->stop = ISS_STOP_BREAKPOINT;
-            return;
-        }
-        m->break_pc = UINT32_MAX;
         step(m, i);
         if (i == m->do_end) {
             end_turn(m);
@@ -250,7 +230,6 @@ static void run_repeated(iss_t *m)
 static void run_asleep(iss_t *m)
 {
     if (m->cycle < m->limit) {
-        m->idle_cycles += m->limit - m->cycle;
         m->cycle = m->limit;
         m->profile_mark = m->cycle;
     }
@@ -263,8 +242,8 @@ static void run_on(iss_t *m)
         run_asleep(m);
     } else if ((m->data[R_SR] & SR_RA) != 0) {
         run_repeated(m);
-    } else if (m->profiling || m->breaks != 0) {
-        run_observed(m);
+    } else if (m->profiling) {
+        run_profiled(m);
     } else {
         run_fast(m);
     }
@@ -315,13 +294,4 @@ void iss_wake(iss_t *m)
 {
     m->power = ISS_POWER_RUN;
     m->limit = 0;
-}
-
-void iss_breakpoint(iss_t *m, uint32_t pc, bool on)
-{
-    uint32_t index = pc / 2u;
-    if (index < ISS_PROGRAM_WORDS && (m->breakpoint[index] != 0) != on) {
-        m->breakpoint[index] = on;
-        m->breaks += on ? 1u : UINT32_MAX;
-    }
 }

@@ -107,25 +107,10 @@ static inline void push_pc(iss_t *m)
     push16(m, pc >> 16);
 }
 
-static inline void called(iss_t *m)
-{
-    if (m->on_call != NULL) {
-        m->on_call(m->call_context, 2u * m->pc, m->cycle);
-    }
-}
-
-static inline void returned(iss_t *m)
-{
-    if (m->on_return != NULL) {
-        m->on_return(m->call_context, 2u * m->pc, m->cycle);
-    }
-}
-
 static void call_far(iss_t *m, const insn_t *i)
 {
     push_pc(m);
     goto_far(m, i);
-    called(m);
 }
 
 static void call_w(iss_t *m, const insn_t *i)
@@ -133,14 +118,12 @@ static void call_w(iss_t *m, const insn_t *i)
     unsigned target = m->data[i->s];
     push_pc(m);
     jump(m, target);
-    called(m);
 }
 
 static void rcall(iss_t *m, const insn_t *i)
 {
     push_pc(m);
     take(m, i);
-    called(m);
 }
 
 static void rcall_w(iss_t *m, const insn_t *i)
@@ -148,7 +131,6 @@ static void rcall_w(iss_t *m, const insn_t *i)
     uint32_t target = 2u * m->pc + 2u * (uint32_t)as_int16(m->data[i->s]);
     push_pc(m);
     jump(m, target);
-    called(m);
 }
 
 static void return_plain(iss_t *m, const insn_t *i)
@@ -156,7 +138,6 @@ static void return_plain(iss_t *m, const insn_t *i)
     (void)i;
     uint32_t high = pop16(m), low = pop16(m);
     jump(m, (high & 0x7Fu) << 16 | (low & 0xFFFEu));
-    returned(m);
 }
 
 static void retlw_w(iss_t *m, const insn_t *i)
@@ -183,7 +164,6 @@ static void retfie(iss_t *m, const insn_t *i)
     if (iss_exception_pending(m)) {
         m->cycle -= (uint64_t)(3 - ASSUME_RETFIE_PENDING_CYCLES);
     }
-    returned(m);
     iss_left_exception(m);
 }
 

@@ -82,9 +82,6 @@ static void enter_exception(iss_t *m, exception_t e)
         iss_report(m, ISS_ERROR_FETCH, "vector %u of the table at 0x%04X is empty", e.vector, (unsigned)table);
     }
     jump(m, handler);
-    if (m->on_call != NULL) {
-        m->on_call(m->call_context, 2u * m->pc, m->cycle);
-    }
     iss_attend(m);
 }
 

@@ -29,7 +29,6 @@ static void forget_pipeline(iss_t *m)
     m->trap_at = 0;
     m->wake_at = ISS_NEVER;
     m->nested = 0;
-    m->break_pc = UINT32_MAX;
 }
 
 void iss_reset(iss_t *m, chip_reset_t cause)
@@ -80,7 +79,6 @@ uint32_t iss_pc(const iss_t *m)
 void iss_set_pc(iss_t *m, uint32_t pc)
 {
     jump(m, pc);
-    m->break_pc = UINT32_MAX;
 }
 
 int64_t iss_acc(const iss_t *m, unsigned which)

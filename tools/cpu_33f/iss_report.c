@@ -33,7 +33,6 @@ void iss_report(iss_t *m, iss_error_t kind, const char *format, ...)
     va_end(arguments);
     (void)iss_place(m, false, pc, place, sizeof place);
     (void)snprintf(m->error, sizeof m->error, "%s, at %s", what, place);
-    m->errors[kind]++;
     if (m->on_report != NULL) {
         m->on_report(m->report_context, kind, pc, m->error);
     }
@@ -46,11 +45,6 @@ void iss_report(iss_t *m, iss_error_t kind, const char *format, ...)
 const char *iss_error(const iss_t *m)
 {
     return m->error;
-}
-
-uint64_t iss_error_count(const iss_t *m, iss_error_t kind)
-{
-    return (unsigned)kind < ISS_ERROR_KINDS ? m->errors[kind] : 0u;
 }
 
 void iss_stop_on(iss_t *m, unsigned mask)
@@ -91,13 +85,6 @@ void iss_on_interrupt(iss_t *m, void (*enter)(void *, unsigned, uint64_t), void 
     m->interrupt_context = context;
 }
 
-void iss_on_call(iss_t *m, void (*call)(void *, uint32_t, uint64_t), void (*ret)(void *, uint32_t, uint64_t), void *context)
-{
-    m->on_call = call;
-    m->on_return = ret;
-    m->call_context = context;
-}
-
 /* ---- profile ---- */
 
 bool iss_profile(iss_t *m, bool on)
@@ -134,16 +121,6 @@ const uint64_t *iss_profile_cycles(const iss_t *m)
 
 /* ---- stack ---- */
 
-uint16_t iss_stack_base(const iss_t *m)
-{
-    return m->stack_base;
-}
-
-uint16_t iss_stack_top(const iss_t *m)
-{
-    return m->stack_top;
-}
-
 unsigned iss_stack_bytes(const iss_t *m)
 {
     return m->stack_top > m->stack_base ? (unsigned)(m->stack_top - m->stack_base) : 0u;
@@ -152,11 +129,6 @@ unsigned iss_stack_bytes(const iss_t *m)
 void iss_stack_clear(iss_t *m)
 {
     m->stack_top = m->data[15];
-}
-
-uint64_t iss_idle_cycles(const iss_t *m)
-{
-    return m->idle_cycles;
 }
 
 /* ---- assumptions ---- */

@@ -149,19 +149,16 @@ struct iss {
     bool repeat_edge;   /* this turn of REPEAT is the first, or the first after an interrupt */
     uint16_t stack_base, stack_top;
 
-    uint64_t until, wake_at, disi_end, trap_at, idle_cycles;
+    uint64_t until, wake_at, disi_end, trap_at;
     iss_stop_t stop;
     iss_power_t power;
     uint32_t lost_pc;   /* where outside the flash */
-    uint32_t break_pc;  /* where the last run stopped for a breakpoint */
     do_shadow_t do_shadow;
     uint16_t shadow_w[4], shadow_sr;
     uint8_t nest[NESTING];
     unsigned nested;
-    unsigned breaks;
 
     unsigned stop_mask;
-    uint64_t errors[ISS_ERROR_KINDS];
     char error[ISS_TEXT];
     uint32_t *profile_counts;
     uint64_t *profile_cycles;
@@ -179,9 +176,6 @@ struct iss {
     void (*on_enter)(void *, unsigned, uint64_t);
     void (*on_leave)(void *, unsigned, uint64_t);
     void *interrupt_context;
-    void (*on_call)(void *, uint32_t, uint64_t);
-    void (*on_return)(void *, uint32_t, uint64_t);
-    void *call_context;
 
     uint32_t config[ISS_CONFIG_WORDS];
     uint8_t sfr_kind[SFR_WORDS];
@@ -191,7 +185,6 @@ struct iss {
     insn_t code[ISS_PROGRAM_WORDS + 1];
     uint32_t program[ISS_PROGRAM_WORDS];
     uint8_t programmed[ISS_PROGRAM_WORDS];
-    uint8_t breakpoint[ISS_PROGRAM_WORDS + 1];
 };
 
 /* ---- between the files ---- */
