@@ -16,5 +16,5 @@ pil: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the image turns the mo
 cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the control interrupt in cycles, load, latency, stack, flame graph [SCENARIO= IMAGE=file.elf OUT=]
 	@$(if $(MOTOR)$(BOARD),echo foc33: make cycles has no MOTOR and no BOARD: it takes those of its scenarios$(comma) use make pil MOTOR=name >&2; exit 2)
 	$(target_setup)
-	@$(alone) $(python) -m tools.image.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
+	@$(alone) $(python) -m tools.bench.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
 	    $(if $(IMAGE)$(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)

@@ -4,7 +4,7 @@ law_tests := $(filter-out $(patsubst test/%.c,%,$(shell grep -lE 'mock_|ideal_mo
 sixteen_bit = @$(python) test/sixteen_bit/run.py --unity $(unity) --runners $T --host $T
 
 avr_compile = avr-gcc -mmcu=atmega2560 -std=gnu99 -O2 -fno-ivopts -ffunction-sections -fdata-sections -Iinclude -I. $(DEFINES)
-avr_law := $(patsubst %.c,build/avr/%.o,$(wildcard firmware/control/*.c firmware/drive/*.c))
+avr_law := $(patsubst %.c,build/avr/%.o,$(wildcard firmware/control/*.c firmware/drive/*.c firmware/drive/*/*.c))
 
 build/avr/flags: FORCE
 	$(call remember,$(avr_compile) $(avr_law))
