@@ -29,12 +29,15 @@ warnings += -Wno-sign-conversion # the checks that the compiler inserts make it 
 sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
-CFLAGS := -std=gnu99 -O2 -g -fPIC -ftrack-macro-expansion=0 $(sanitizer)
-INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/host -Iinclude -I.
+CFLAGS := -std=gnu99 -O2 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
+INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/cpu_host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
 
-firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c firmware/*/*/*.c) tools/host/xc.c)
-board_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/board/*.c))
+# The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.
+board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
+board_includes := $(board_rooms:%=-I%)
+firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c firmware/*/*/*.c) tools/cpu_host/xc.c)
+board_objects := $(patsubst %.c,$B/%.o,$(filter-out tools/cpu_host/xc.c,$(wildcard $(board_rooms:%=%/*.c))))
 
 part_makefiles := $(wildcard tools/make/*.mk)
 
@@ -135,7 +138,7 @@ readme: ## [upkeep] run what the README's tables and pictures show, and write th
 	@$(python) tools/docs/readme.py
 
 bench: vboard ## [simulator] motor seconds that the virtual board simulates in one second of one core
-	@$(compile) -Itools/board -o $B/bench test/board/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench
+	@$(compile) $(board_includes) -o $B/bench test/chip/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench
 
 setup-run:
 	@tools/setup/prepare.sh run
@@ -157,6 +160,8 @@ $B/flags: FORCE
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
 
+$(board_objects): private INCLUDES += $(board_includes)
+
 $B/%.o: %.c $B/flags
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
@@ -174,7 +179,7 @@ c_tests = $(patsubst test/%.c,%,$(wildcard test/$1/test_*.c))
 py_tests = $(patsubst test/%.py,%,$(wildcard test/$1/$2_*.py))
 
 unit_c := $(call c_tests,unit)
-board_c := $(call c_tests,board)
+board_c := $(call c_tests,chip)
 behaviour_c := $(call c_tests,behaviour)
 check_py := $(call py_tests,unit,check)
 unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
@@ -239,7 +244,7 @@ $T/golden.unchanged.txt:
 
 # A test's own flags stand in its first lines: /* defines: -DTUNING */. They act on the test and its runner, not on the library.
 own_defines = $$(sed -n '1,5s@.*/\* defines: \(.*\) \*/.*@\1@p' $1)
-test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support -Itools/board $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
+test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes) $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
     -isystem $(unity)/src -isystem $(cmock)/src -DUNITY_INCLUDE_CONFIG_H $(DEFINES)
 
 $T/flags: FORCE
@@ -286,7 +291,7 @@ c_executables := $(addprefix $T/,$(unit_c) $(board_c) $(behaviour_c))
 $(c_executables): %: %.o %_runner.o $T/unity.o $T/cmock.o
 	$(quiet)$(CC) $(sanitizer) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lm
 $(addprefix $T/,$(unit_c)): $B/libfirmware.a
-$(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/host/xc.o
+$(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/cpu_host/xc.o
 $(addprefix $T/,$(behaviour_c)): $(board_objects) $B/libfirmware.a
 
 run_suite = @$(alone) $(python) test/run-suite.py $@

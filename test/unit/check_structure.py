@@ -47,7 +47,7 @@ def only_params_h_reads_userparams_h() -> None:
 
 
 def control_and_drive_name_no_register_and_no_motor() -> None:
-    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/host/xc.h").read_text(encoding="utf-8"))
+    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/chip/chip_registers.h").read_text(encoding="utf-8"))
     assert len(registers) > 100
     pattern = re.compile(r"\b(" + "|".join([*registers, "Hurst", "MCLV"]) + r")(bits)?\b")
     for room in ("control", "drive"):
@@ -60,7 +60,7 @@ def control_and_drive_name_no_register_and_no_motor() -> None:
 def every_header_compiles_alone() -> None:
     for path in sources():
         if path.endswith(".h"):
-            done = compiler([*CFLAGS, "-Wconversion", "-Wshadow", "-Werror", "-Itools/host", "-Iinclude", "-I.", "-fsyntax-only", "-xc", "-"],
+            done = compiler([*CFLAGS, "-Wconversion", "-Wshadow", "-Werror", "-Itools/cpu_host", "-Iinclude", "-I.", "-fsyntax-only", "-xc", "-"],
                             f'#include "{path.removeprefix("include/")}"\n')
             assert done.returncode == 0, f"{path}: {done.stderr}"
 
