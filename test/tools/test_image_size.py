@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from sample_image import Function, Sample, program
 
-from tools.common import paths
 from tools.common.errors import UserError
 from tools.image import attribution, base, size, stack
 from tools.image.budget import Budget, shares

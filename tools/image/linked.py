@@ -7,7 +7,7 @@ from pathlib import Path
 from tools.common.errors import UserError
 
 from . import device
-from .program import Elf, Words, c_name
+from .program import Elf, Words
 
 #: What may be in the image besides our own objects, by the file that the map names: the compiler's start-up code and what its linker
 #: makes. Names of the product seen in published maps of versions 1.35 and 1.50; those of 2.10 are taken to be the same [?].
