@@ -88,7 +88,8 @@ def judge(tmp_path, monkeypatch):
                         + "END\n")
         host.chmod(0o755)
         options = argparse.Namespace(out=f"{tmp_path}/out", unity="unity", runners="runners", compile=f"{tmp_path}/cc",
-                                     link=f"{tmp_path}/ld {{elf}} {{objects}}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1)
+                                     link=f"{tmp_path}/ld {{elf}} {{objects}}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1,
+                                     flat=False)
         builder = target_run.Builder(options)
         builder.shared()
         return target_run.judge("unit/test_x", builder, Path("runners"))
