@@ -45,9 +45,9 @@ def report(item: cycles.Found, budget: Budget | None = BUDGET) -> cycles.Report:
 
 
 # ---- figures -------------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("one, figures", [(spread([5, 7, 7, 9, 12]), (5, 5, 8.0, 12)), (cycles.added([spread([3]), spread([100, 2])]),
-                                                                                        (3, 2, 35.0, 100)),
-                                          (cycles.Spread(), (0, 0, 0.0, 0))])
+@pytest.mark.parametrize("one, figures", [
+    (spread([5, 7, 7, 9, 12]), (5, 5, 8.0, 12)), (cycles.added([spread([3]), spread([100, 2])]), (3, 2, 35.0, 100)),
+    (cycles.Spread(), (0, 0, 0.0, 0))])
 def test_number_least_mean_and_most(one, figures):
     assert tuple(one.data().values()) == figures
 
@@ -119,7 +119,7 @@ def test_the_file_is_written_and_the_readme_table_follows_from_them(tmp_path):
 
 @pytest.mark.parametrize("ticks, differences, first, defines, has_names, ok, got", [
     (100, 0, "", [], True, True, ""), (0, 0, "", [], True, False, ""), (0, 0, "", ["IDENTIFY"], True, True, ""),
-                                                                                    (0, 0, "", [], False, True, "a HEX file"),
+    (0, 0, "", [], False, True, "a HEX file"),
     (100, 4, "tick 7 (0.1 s), P1DC2: target 1, host 2", [], True, False,
      "100 interrupts, 4 differ; first: tick 7 (0.1 s), P1DC2: target 1, host 2")])
 def test_comparison_with_the_pc(ticks, differences, first, defines, has_names, ok, got):
@@ -166,10 +166,10 @@ def refused(tmp_path, capsys):
     ("cycles", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
     ("pil", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
     ("cycles", ["--image", "{}/text.elf"], "text.elf"), ("cycles", ["--image", "{}/alone.hex"], "name the ELF file"),
-    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"), ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"],
-                                                               "cannot be read"),
+    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"),
+    ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
     ("pil", ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), ("pil", ["--nonsense"], "--nonsense"),
-                                                       ("cycles", ["--nonsense"], "--nonsense"),
+    ("cycles", ["--nonsense"], "--nonsense"),
     ("pil", ["demo", "smoke", "--out", "{}"], "--out")])
 def test_bad_input_is_one_line(tmp_path, refused, command, arguments, words):
     assert words in refused(command, *arguments)

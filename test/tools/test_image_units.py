@@ -80,8 +80,8 @@ def judge(tmp_path, monkeypatch):
 
     def of(on_chip: list[str], on_pc: dict[str, str] | None = None, source: str = "int x;\n"):
         Path("test/unit/test_x.c").write_text(source)
-        Path("runners/unit/test_x_runner.c").write_text("".join(f'  a[{i}].name = "{name}";\n  a[{i}].line_num = {i};\n' for i,
-                                                                name in enumerate(on_chip)))
+        Path("runners/unit/test_x_runner.c").write_text(
+            "".join(f'  a[{i}].name = "{name}";\n  a[{i}].line_num = {i};\n' for i, name in enumerate(on_chip)))
         host = Path("runners/unit/test_x")
         results = on_pc if on_pc is not None else {name: "PASS" for name in on_chip}
         host.write_text("#!/bin/sh\ncat <<END\n" + "".join(f"test/unit/test_x.c:1:{name}:{text}\n" for name, text in results.items())

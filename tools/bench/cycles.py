@@ -257,8 +257,8 @@ def text(report: Report) -> str:
                 for name, cycles in table.most_common(MOST_EXPENSIVE)]
         parts.append("\n".join([f"{title:<44}{'cycles':>10}{'':>10}   (own cycles, mean of all interrupts)", *rows]))
     parts.append("\n".join([f"{'code of the interrupt that was executed':<44}{'words':>10}{'of':>6}",
-                            *(f"{name:<44}{done:>10}{of:>6}" for name, (done, of) in sorted(shape.executed.items(),
-                                                                                            key=lambda item: -item[1][1]))]))
+                            *(f"{name:<44}{done:>10}{of:>6}"
+                              for name, (done, of) in sorted(shape.executed.items(), key=lambda item: -item[1][1]))]))
     if report.assumptions:
         width = [max(len(row[column]) for row in report.assumptions) for column in (0, 1)]
         parts.append("\n".join(["assumed about the chip, for want of a source:",
@@ -270,8 +270,8 @@ def summary(report: Report) -> dict[str, Any]:
     """The report as plain data."""
     found = report.found
     interrupts = max(report.all.total(), 1)
-    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US, "spreads": {name: item.data() for name,
-                                                                                       item in found.spreads.items()},
+    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US,
+            "spreads": {name: item.data() for name, item in found.spreads.items()},
             "all": report.all.data(), "latency": found.latency.data(), "stack_bytes": found.stack_bytes, "ticks": found.ticks,
             "differences": found.differences, "first_difference": found.first_difference,
             "longest": {name: {"cycles": cycles, "at_s": at_s, "state": state} for name, (cycles, at_s, state) in found.longest.items()},

@@ -102,8 +102,8 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
 
 def helper_names(elf: Elf, piece: Piece, calls: dict[int, int]) -> str:
     """The functions of a library's piece that something calls, else all of them."""
-    names = {elf.function_at(target) for target in calls.values()} or {name for address, name in elf.functions
-                                                                       if piece.start <= address < piece.end}
+    inside = {name for address, name in elf.functions if piece.start <= address < piece.end}
+    names = {elf.function_at(target) for target in calls.values()} or inside
     return " and ".join(f"{name}()" for name in sorted(names)) or piece.section
 
 
