@@ -71,7 +71,7 @@ FIELDS = {
                                      "NONE": (3, "no crystal")}),
     "OSCIOFNC": Field(0xF80008, 0x04, {"ON": (0x00, "OSC2 is a port pin"), "OFF": (0x04, "OSC2 is no port pin")}),
     "IOL1WAY": Field(0xF80008, 0x20, {"OFF": (0x00, "pin selection may be unlocked again"), "ON": (0x20, "pin selection only once")}),
-    "FCKSM": Field(0xF80008, 0xC0, {"CSECME": (0x00, "clock switching, clock monitor"), 
+    "FCKSM": Field(0xF80008, 0xC0, {"CSECME": (0x00, "clock switching, clock monitor"),
                                     "CSECMD": (0x40, "clock switching, no clock monitor"),
                                     "CSDCMD": (0x80, "no clock switching, no clock monitor")}),
     "WDTPOST": Field(0xF8000A, 0x0F, {f"PS{1 << n}": (n, f"watchdog / {1 << n}") for n in range(16)}),
