@@ -9,6 +9,7 @@ pil_image = $(if $(IMAGE),--image $(call quoted,$(IMAGE)))
 pil_scenario = $(if $(filter file default undefined,$(origin SCENARIO)),,$(call quoted,$(SCENARIO)))
 
 pil: setup-run $$(if $$(IMAGE),,find-xc16) ## the image for the dsPIC turns the motor: demo and Table 2, compared with the PC tick by tick [SCENARIO=name IMAGE=file OUT=folder]
+	$(target_setup)
 	@+$(if $(MOTOR),$(ready),:)
 	@$(alone) $(python) -m tools.bench.pil_command $(pil_scenario) $(pil_image) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) \
 	    $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
