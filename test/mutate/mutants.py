@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import c_tokens
 
 # Files whose macros are computations or register values; elsewhere a macro is a name or a table.
-MACRO_FILES = ("include/drive/params.h", "include/drive/params_init.h", "include/board/mclv.h")
+MACRO_FILES = ("include/drive/param_scaling.h", "include/drive/param_init.h", "include/board/mclv.h")
 # A constant of a long table is one of many alike: this many of a table are enough, and more would flatter the score.
 TABLE_SITES = 8
 TABLE_LENGTH = 16

@@ -48,7 +48,7 @@ def told(result: tuple[str, str] | None) -> str:
 
 @dataclass
 class Outcome:
-    """What one test file gave on the target."""
+    """What one test file gave in the simulator."""
     results: dict[str, tuple[str, str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     images: int = 0

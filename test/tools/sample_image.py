@@ -16,7 +16,8 @@ RETFIE = 0x064000
 LIBRARY = "c:/program files (x86)/microchip/xc16/v2.10/lib\\libc99-pic30-elf.a"
 OBJECT = "build/target/firmware/board/isr.o"
 CONFIG = "".join(f"#pragma config {line}\n" for line in (
-    "FNOSC = FRC", "FCKSM = CSECMD", "POSCMD = XT", "IOL1WAY = OFF", "FWDTEN = ON", "FPWRT = PWR128", "PWMPIN = ON", "HPOL = ON", "LPOL = ON",
+    "FNOSC = FRC", "FCKSM = CSECMD", "POSCMD = XT", "IOL1WAY = OFF", "FWDTEN = ON", "FPWRT = PWR128", "PWMPIN = ON", "HPOL = ON",
+                                                         "LPOL = ON",
     "ICS = PGD3", "JTAGEN = OFF"))
 
 
@@ -131,7 +132,8 @@ class Sample:
             names += name.encode() + b"\0"
         texts = [section.name for section in sections] + [".symtab", ".strtab", ".shstrtab"]
         strings = b"\0" + b"".join(text.encode() + b"\0" for text in texts)
-        everything = [*sections, Section(".symtab", 0, table, 0, SYMTAB), Section(".strtab", 0, names, 0, STRTAB), Section("", 0, strings, 0, STRTAB)]
+        everything = [*sections, Section(".symtab", 0, table, 0, SYMTAB), Section(".strtab", 0, names, 0, STRTAB),
+                      Section("", 0, strings, 0, STRTAB)]
         body, headers = b"", bytes(40)
         for section, text in zip(everything, texts):
             symtab = section.kind == SYMTAB
@@ -170,7 +172,7 @@ def program(*code: tuple[int, int], **fields) -> Sample:
 
 
 def good_image() -> Sample:
-    """One that passes every check: start-up code, the handlers the drive needs, both vector tables, the configuration words, 300 bytes of RAM."""
+    """One that passes every check: start-up code, the drive's handlers, both vector tables, configuration words, 300 bytes of RAM."""
     image = Sample()
     image.function("_reset", *[0] * 8, file=f"{LIBRARY}(crt0_standard.o)", section=".init")
     default = image.function("_DefaultInterrupt", 0xFE0000)

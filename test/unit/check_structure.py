@@ -30,20 +30,20 @@ def control_includes_only_control() -> None:
 
 
 def drive_includes_only_control_drive_and_the_parameters() -> None:
-    allowed = re.compile(r"(control|drive)/\w+\.h|userparams\.h|stdint\.h")
+    allowed = re.compile(r"(control|drive|drive/modes)/\w+\.h|userparams\.h|stdint\.h")
     wrong = [pair for pair in includes("drive") if not allowed.fullmatch(pair[1])]
     assert not wrong, wrong
 
 
 def board_includes_only_the_three_rooms_and_the_device() -> None:
-    allowed = re.compile(r"(control|drive|board)/\w+\.h|xc\.h|stdint\.h")
+    allowed = re.compile(r"(control|drive|drive/modes|board|board/modes)/\w+\.h|version\.h|xc\.h|stdint\.h")
     wrong = [pair for pair in includes("board") if not allowed.fullmatch(pair[1])]
     assert not wrong, wrong
 
 
 def only_params_h_reads_userparams_h() -> None:
     readers = [path for path, text in sources().items() if "userparams.h" in INCLUDE.findall(text)]
-    assert readers == ["include/drive/params.h"], readers
+    assert readers == ["include/drive/param_scaling.h"], readers
 
 
 def control_and_drive_name_no_register_and_no_motor() -> None:
@@ -119,6 +119,18 @@ def what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
     assert kept == ["board_trap_intcon1", "kept_fault", "kept_inverse"], kept
 
 
+def the_state_is_written_in_one_place() -> None:
+    written = [(path, line) for path, text in sources().items() for line in re.findall(r".*(?:->|\.)state\s*=(?!=).*", text)]
+    assert [path for path, _ in written] == ["include/drive/state.h"], written
+
+
+def a_modes_name_stands_in_the_modes_rooms_only() -> None:
+    names = "IDENTIFY|TUNING|TORQUE_MODE|SNAPSHOT|BIDIRECTIONAL_SPEED|OPEN_LOOP_FUNCTIONING|PARAMS_IN_RAM"
+    condition = re.compile(rf"^\s*#\s*(?:if|ifdef|ifndef|elif)\b.*\b(?:{names})\b", re.MULTILINE)
+    asked = [path for path, text in sources().items() if condition.search(text)]
+    assert asked and all("/modes/" in path for path in asked), asked
+
+
 FUSES = {
     "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FWDTEN": "ON",
     "WINDIS": "OFF", "WDTPRE": "PR32", "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON",
@@ -139,4 +151,5 @@ run([only_the_board_room_sees_the_device, control_includes_only_control, drive_i
      every_header_compiles_alone, every_header_has_its_own_guard, every_file_begins_with_a_sentence_about_itself,
      a_function_that_a_comment_names_exists, a_watch_variable_that_a_page_names_exists,
      there_are_no_stray_files_in_the_firmware, the_watchdog_is_served_in_three_places, there_is_no_inline_assembly,
-     what_outlives_a_reset_is_left_alone_by_the_start_up_code, configuration_words_are_those_of_the_board])
+     what_outlives_a_reset_is_left_alone_by_the_start_up_code, the_state_is_written_in_one_place,
+     a_modes_name_stands_in_the_modes_rooms_only, configuration_words_are_those_of_the_board])

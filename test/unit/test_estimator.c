@@ -162,15 +162,6 @@ void test_eight_sample_voltage_is_turned_forward_by_three_and_a_half_steps(void)
     }
 }
 
-void test_small_turn_is_counter_clockwise_for_a_positive_angle(void)
-{
-    alphabeta_t x = estimator_turn(vector(8000, 0), 6554), y = estimator_turn(vector(0, 8000), 6554); /* 0.1 rad */
-    TEST_ASSERT_EQUAL_INT16(8000, x.alpha);
-    TEST_ASSERT_INT16_WITHIN(1, 800, x.beta);
-    TEST_ASSERT_INT16_WITHIN(1, -800, y.alpha);
-    TEST_ASSERT_EQUAL_INT16(8000, y.beta);
-}
-
 /* ---- Equation 2 and its sign ---- */
 
 /** Speed of a steady filtered back-EMF at a filtered speed. */
@@ -227,15 +218,12 @@ void test_angle_advances_by_the_unfiltered_speed(void)
     TEST_ASSERT_INT16_WITHIN(1, -858, e.half_step_q16_rad);
 }
 
-void test_speed_filter_makes_its_share_of_the_way(void)
+void test_filters_make_their_share_of_the_way(void)
 {
     int16_t omega = speed_of(0, 1287, 0);
     TEST_ASSERT_EQUAL_INT32((int32_t)omega * 1496, e.omega_filtered_q16);
     TEST_ASSERT_EQUAL_INT16(114, estimator_speed(&e));
-}
-
-void test_back_emf_filter_makes_its_share_of_the_way_on_both_axes(void)
-{
+    setUp();
     estimator_pll(&e, &params, &tuning, rotating(1000, -3000));
     TEST_ASSERT_EQUAL_INT32(INT32_C(1000) * 2400, e.e_d_q28);
     TEST_ASSERT_EQUAL_INT32(-INT32_C(3000) * 2400, e.e_q_q28);
@@ -323,23 +311,15 @@ static int16_t angle_error(int16_t direction)
     return (int16_t)(uint16_t)(truth - (uint16_t)(e.rho_q32 >> 16));
 }
 
-static void kphi(int16_t inv_kfi)
-{
-    tuning.inv_kfi = inv_kfi;
-    tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
-}
-
-/** Angle error times the direction, after lock in. */
-static int16_t locked_error(int16_t inv_kfi, int16_t direction)
+/** A locked estimator, and from now on another Kphi. */
+static void locked_then(int16_t inv_kfi, int16_t direction)
 {
     setUp();
     true_q32 = (direction > 0) ? 0 : UINT32_C(0x20000000);
     filtered_speed((int16_t)(direction * 7500));
     run_motor(direction, 1500);
-    kphi(inv_kfi);
-    run_motor(direction, 2000);
-    TEST_ASSERT_INT16_WITHIN(25, (int16_t)(direction * 7500), estimator_speed(&e));
-    return (int16_t)(direction * angle_error(direction));
+    tuning.inv_kfi = inv_kfi;
+    tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
 }
 
 void test_angle_error_is_the_law_of_a_wrong_Kphi_in_both_directions(void)
@@ -354,17 +334,19 @@ void test_angle_error_is_the_law_of_a_wrong_Kphi_in_both_directions(void)
         { "too small by half leads by 24.3 degrees", 15912, -4423 },
         { "too large by a quarter lags by 17.1 degrees", 6365, 3116 },
     };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(91, cases[n].error, locked_error(cases[n].inv_kfi, 1), cases[n].what);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(91, cases[n].error, locked_error(cases[n].inv_kfi, -1), cases[n].what);
+    for (unsigned n = 0; n < 2u * sizeof cases / sizeof cases[0]; n++) {
+        int16_t direction = (n % 2u) ? -1 : 1;
+        locked_then(cases[n / 2u].inv_kfi, direction);
+        run_motor(direction, 2000);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(25, (int16_t)(direction * 7500), estimator_speed(&e), cases[n / 2u].what);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(91, cases[n / 2u].error, (int16_t)(direction * angle_error(direction)), cases[n / 2u].what);
     }
 }
 
 void test_Kphi_too_large_by_more_than_41_percent_has_no_lock(void)
 {
     uint16_t n, slipped = 0;
-    (void)locked_error(7956, 1);
-    kphi(5300); /* 1.5 */
+    locked_then(5300, 1); /* 1.5 */
     for (n = 0; n < 200u; n++) {
         run_motor(1, 50);
         slipped = (uint16_t)(slipped + ((qm_abs(angle_error(1)) > 16384) ? 1u : 0u));

@@ -1,4 +1,4 @@
-"""`make cycles`: what the control interrupt costs on the simulated core, by scenario, state and function, beside the note's figures.
+"""`make cycles`: what the control interrupt costs on the simulated core, by scenario, state and function, beside AN1292's figures.
 
     python3 -m tools.bench.cycles [--image build/target/foc33.elf] [scenario ...]
 
@@ -20,7 +20,7 @@ from tools.common import command_line, paths, plant, workers
 from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
-from tools.image.profile import Counts, Profile, folded, profile
+from tools.image.profile import Counts, Profile, profile
 
 from . import build, pil, pil_command, scenario, simulate
 from .command_common import Progress
@@ -29,7 +29,7 @@ FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
 P1SECMP = 0x01C6    # the counter's value at the trigger; it counts down to zero from there, and the duties load
 MOST_EXPENSIVE = 10
-MISSED = 0.002      # share of the cycles by which the profile by address may be off: what the background executes of the interrupt's functions
+MISSED = 0.002      # share of the cycles by which the profile may be off: the background executes some of the interrupt's functions
 WITHOUT, WITH = "without field weakening", "with field weakening"
 NOTE_US = {WITHOUT: (14.725, 20.8, 21.4), WITH: (14.975, 23.325, 23.65)}
 MEANING = {WITHOUT: "bridge on, speed reference below FW_START_SPEED_RPM", WITH: "bridge on, speed reference above it"}
@@ -95,7 +95,7 @@ class Found:
 def classes(state: np.ndarray, states: dict[int, str], reference_rpm: np.ndarray, fw_start_rpm: float) -> dict[str, np.ndarray]:
     """Which interrupts belong to each state, and which had field weakening in them."""
     numbers = {name: number for number, name in states.items()}
-    on = (state >= numbers["LOCK"]) & (state <= numbers["STOPPING"])
+    on = (state >= numbers["ALIGN"]) & (state <= numbers["STOPPING"])
     weakening = on & (np.abs(reference_rpm) >= fw_start_rpm) & (state >= numbers["CLOSED"])
     return {**{name: state == number for number, name in states.items()}, WITHOUT: on & ~weakening, WITH: weakening}
 
@@ -115,7 +115,8 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
         worst = int(np.argmax(isr))
         where = (int(isr[worst]), float(trace.time_s[worst]), run.states.get(int(state[worst]), "?"))
         latency = trace.column("cpu.latency_cycles")
-        return Found(spreads, Spread.of(latency[latency > 0]), core.counts(), int(board.get("cpu.stack_bytes")), int(board.get("pil.differences")),
+        return Found(spreads, Spread.of(latency[latency > 0]), core.counts(), int(board.get("cpu.stack_bytes")),
+                     int(board.get("pil.differences")),
                      int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, board.peek(P1SECMP) & 0x7FFF,
                      run.motor_s, run.cpu_s, board.get("cpu.instructions"))
     except pil.BoardError as error:
@@ -197,7 +198,8 @@ def broken(report: Report) -> list[str]:
     if found.differences:
         lines.append(f"target and PC differ in {found.differences} interrupts, the first: {found.first_difference}")
     if abs(report.profile.total - report.all.total) > MISSED * report.all.total:
-        lines.append(f"the profile has {report.profile.total} cycles, the interrupts took {report.all.total}: the figures by function are wrong")
+        lines.append(f"the profile has {report.profile.total} cycles, the interrupts took {report.all.total}: "
+                     "the figures by function are wrong")
     if not found.spreads[WITH].number or not found.spreads[WITHOUT].number:
         lines.append("no scenario ran with and without field weakening: the figures are not those of the table")
     if found.latency.most >= found.load_cycles:
@@ -235,13 +237,15 @@ def _spread_line(name: str, spread: Spread, note: tuple[float, ...] | None = Non
 def text(report: Report) -> str:
     """The whole report, as printed."""
     found, shape = report.found, report.profile
-    head = f"{'control interrupt':<26}{'number':>10}{'min':>8}{'mean':>9}{'max':>7}{'min us':>10}{'mean':>8}{'max':>8}{'load':>10}   the note's us"
+    head = (f"{'control interrupt':<26}{'number':>10}{'min':>8}{'mean':>9}{'max':>7}{'min us':>10}{'mean':>8}{'max':>8}{'load':>10}"
+            "   the note's us")
     where: dict[str, list[str]] = {}
     for name, (cycles, at_s, state) in sorted(found.longest.items(), key=lambda item: -item[1][0]):
         where.setdefault(f"{cycles} in {state} at {at_s:.4f} s", []).append(name)
     parts = [f"{report.image}: the control interrupt in cycles (entry to return), at {FCY_MHZ:g} MIPS in us, and its share of the core",
              "\n".join([head, "-" * len(head), *(_spread_line(name, found.spreads[name], NOTE_US[name]) for name in NOTE_US),
-                        *(_spread_line(f"  {name}", spread) for name, spread in found.spreads.items() if name not in NOTE_US and spread.number),
+                        *(_spread_line(f"  {name}", spread) for name, spread in found.spreads.items() if name not in NOTE_US
+                          and spread.number),
                         _spread_line("all", report.all)]),
              "\n".join(f"{name}: {meaning}" for name, meaning in MEANING.items()),
              "longest in each scenario:\n" + "\n".join(f"  {place}: {', '.join(names)}" for place, names in where.items())]
@@ -251,15 +255,16 @@ def text(report: Report) -> str:
                  f"                            the duties load {found.load_cycles} cycles after the trigger\n"
                  f"deepest stack               {found.stack_bytes} bytes\n"
                  f"target = PC                 {found.ticks} interrupts compared, {found.differences} differ\n"
-                 f"speed                       {found.instructions / found.cpu_s / 1e6:.0f} million instructions a second of processor time, "
-                 f"{found.motor_s / found.cpu_s:.2f} times real time (while counting by address)")
+                 f"speed                       {found.instructions / found.cpu_s / 1e6:.0f} million instructions a second "
+                 f"of processor time, {found.motor_s / found.cpu_s:.2f} times real time (while counting by address)")
     interrupts = max(report.all.number, 1)
     for title, table in (("function, wherever it is inlined", shape.inlined), ("function as linked", shape.symbols)):
         rows = [f"{name:<44}{cycles / interrupts:>10.1f}{100.0 * cycles / max(shape.total, 1):>8.1f} %"
                 for name, cycles in table.most_common(MOST_EXPENSIVE)]
         parts.append("\n".join([f"{title:<44}{'cycles':>10}{'':>10}   (own cycles, mean of all interrupts)", *rows]))
     parts.append("\n".join([f"{'code of the interrupt that was executed':<44}{'words':>10}{'of':>6}",
-                            *(f"{name:<44}{done:>10}{of:>6}" for name, (done, of) in sorted(shape.executed.items(), key=lambda item: -item[1][1]))]))
+                            *(f"{name:<44}{done:>10}{of:>6}" for name, (done, of) in sorted(shape.executed.items(),
+                                                                                            key=lambda item: -item[1][1]))]))
     if report.assumptions:
         width = [max(len(row[column]) for row in report.assumptions) for column in (0, 1)]
         parts.append("\n".join(["assumed about the chip, for want of a source:",
@@ -271,27 +276,27 @@ def summary(report: Report) -> dict[str, Any]:
     """The report as plain data."""
     found = report.found
     interrupts = max(report.all.number, 1)
-    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US, "spreads": {name: item.data() for name, item in found.spreads.items()},
+    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US, "spreads": {name: item.data() for name,
+                                                                                       item in found.spreads.items()},
             "all": report.all.data(), "latency": found.latency.data(), "stack_bytes": found.stack_bytes, "ticks": found.ticks,
             "differences": found.differences, "first_difference": found.first_difference,
             "longest": {name: {"cycles": cycles, "at_s": at_s, "state": state} for name, (cycles, at_s, state) in found.longest.items()},
-            "load_cycles": found.load_cycles, "instructions_per_second": found.instructions / found.cpu_s, "speed_factor": found.motor_s / found.cpu_s,
+            "load_cycles": found.load_cycles, "instructions_per_second": found.instructions / found.cpu_s,
+            "speed_factor": found.motor_s / found.cpu_s,
             "functions": {name: cycles / interrupts for name, cycles in report.profile.inlined.most_common()},
             "symbols": {name: cycles / interrupts for name, cycles in report.profile.symbols.most_common()},
             "executed": report.profile.executed, "assumptions": report.assumptions, "broken": report.broken}
 
 
-def write(report: Report, folder: Path) -> list[Path]:
-    """cycles.json, and the stacks of functions as tools for flame graphs read them."""
-    interrupts = max(report.all.number, 1)
+def write(report: Report, folder: Path) -> Path:
+    """cycles.json."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / name for name in ("cycles.json", "cycles.folded")]
-        files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-        files[1].write_text("\n".join(folded(report.profile.stacks, interrupts)) + "\n", encoding="utf-8")
+        path = folder / "cycles.json"
+        path.write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-    return files
+    return path
 
 
 def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
@@ -306,7 +311,7 @@ def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
     load = 100.0 * data["spreads"][WITH]["mean"] / PERIOD_CYCLES
     rows.append(["load of the core with field weakening", f"{100.0 * data['note_us'][WITH][1] / 50.0:.0f} %", f"{load:.0f} %", ""])
     rows.append(["deepest stack seen", "", f"{data['stack_bytes']} bytes", ""])
-    return ["min / mean / max", "note, us", "cycles", "us"], rows
+    return ["min / mean / max", "AN1292, us", "cycles", "us"], rows
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
@@ -318,7 +323,8 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
         if item.defines:
             raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
                             "measure scenarios of the firmware as it is delivered")
-        job = simulate.prepare(item, library, plant.read_motor(item.motor, item.motor_where), plant.read_board(item.board, item.board_where))
+        job = simulate.prepare(item, library, plant.read_motor(item.motor, item.motor_where),
+                               plant.read_board(item.board, item.board_where))
         job.signals += [signal for signal in SIGNALS if signal not in job.signals]
         jobs.append(job)
     return jobs
@@ -327,7 +333,8 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
 def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool) -> Report:
     library = pil.library([], userparams)
     if not pil.check_image(library, image):
-        raise UserError("the image does not say where functions and variables are", str(image), "name the ELF file that the HEX file was made from")
+        raise UserError("the image does not say where functions and variables are", str(image),
+                        "name the ELF file that the HEX file was made from")
     elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
     code, source = program.read_elf(elf), attribution.read(elf)
     jobs = jobs_of(names or budget.cycles.scenarios, library)
@@ -345,7 +352,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
         parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
         parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-        parser.add_argument("--out", type=Path, help="folder for cycles.json and cycles.folded; default: the image's")
+        parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--quiet", action="store_true", help="no progress bar")
         return _run(parser.parse_args(arguments))
@@ -357,9 +364,9 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    files = write(report, options.out or image.parent)
+    path = write(report, options.out or image.parent)
     print(text(report))
-    print("\nwritten: " + ", ".join(str(paths.shown(path)) for path in files))
+    print(f"\nwritten: {paths.shown(path)}")
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)
     return 1 if report.broken else 0

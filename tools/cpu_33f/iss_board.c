@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 enum {
     ADC1_VECTOR = 21, /* (0x2E - 4) / 2 */

@@ -18,8 +18,8 @@
 #include "board/firmware.h"
 #include "board/watch.h"
 #include "drive/param_table.h"
-#include "drive/params.h"
-#include "drive/params_init.h"
+#include "drive/param_scaling.h"
+#include "drive/param_init.h"
 
 static drive_t target_drive;
 static drive_params_t target_params = DRIVE_PARAMS_INIT;

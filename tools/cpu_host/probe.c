@@ -4,7 +4,7 @@
 #include "board/firmware.h"
 #include "board/watch.h"
 #include "drive/param_table.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,35 +27,35 @@
 SIGNAL(read_state, (double)d->state)
 SIGNAL(read_fault, (double)d->fault)
 SIGNAL(read_running, (double)drive_is_running(d))
-SIGNAL(read_calibrated, (double)d->calibrated)
-SIGNAL(read_theta_est, ANGLE_DEG(estimator_next_angle(&d->estimator)) - (double)d->estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
+SIGNAL(read_calibrated, (double)d->calibration.done)
+SIGNAL(read_theta_est, ANGLE_DEG(estimator_next_angle(&d->run.estimator)) - (double)d->run.estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
 SIGNAL(read_theta_ctrl, ANGLE_DEG(d->angle))
-SIGNAL(read_speed_est, SPEED_RPM(estimator_speed(&d->estimator)))
-SIGNAL(read_speed_raw, SPEED_RPM(d->estimator.omega_erpm))
-SIGNAL(read_speed_ref, SPEED_RPM(d->control.reference_erpm))
+SIGNAL(read_speed_est, SPEED_RPM(estimator_speed(&d->run.estimator)))
+SIGNAL(read_speed_raw, SPEED_RPM(d->run.estimator.omega_erpm))
+SIGNAL(read_speed_ref, SPEED_RPM(d->run.control.reference_erpm))
 SIGNAL(read_speed_target, SPEED_RPM(d->command.target_erpm))
 SIGNAL(read_i_a, CURRENT_A(d->i_a_q13))
 SIGNAL(read_i_b, CURRENT_A(d->i_b_q13))
-SIGNAL(read_i_d, CURRENT_A(d->control.i_q13.d))
-SIGNAL(read_i_q, CURRENT_A(d->control.i_q13.q))
-SIGNAL(read_id_ref, CURRENT_A(d->control.ref_q13.d))
-SIGNAL(read_iq_ref, CURRENT_A(d->control.ref_q13.q))
-SIGNAL(read_iq_limit, CURRENT_A(d->control.iq_limit_q13))
-SIGNAL(read_id_trim, CURRENT_A(d->fieldweak.trim_q13))
-SIGNAL(read_brake_limit, CURRENT_A(d->control.brake_limit_q13))
-SIGNAL(read_v_d, VOLTAGE_V(d->control.v_q14.d))
-SIGNAL(read_v_q, VOLTAGE_V(d->control.v_q14.q))
+SIGNAL(read_i_d, CURRENT_A(d->run.control.i_q13.d))
+SIGNAL(read_i_q, CURRENT_A(d->run.control.i_q13.q))
+SIGNAL(read_id_ref, CURRENT_A(d->run.control.ref_q13.d))
+SIGNAL(read_iq_ref, CURRENT_A(d->run.control.ref_q13.q))
+SIGNAL(read_iq_limit, CURRENT_A(d->run.control.iq_limit_q13))
+SIGNAL(read_id_trim, CURRENT_A(d->run.fieldweak.trim_q13))
+SIGNAL(read_brake_limit, CURRENT_A(d->run.control.brake_limit_q13))
+SIGNAL(read_v_d, VOLTAGE_V(d->run.control.v_q14.d))
+SIGNAL(read_v_q, VOLTAGE_V(d->run.control.v_q14.q))
 SIGNAL(read_v_limit, VOLTAGE_V(d->circle.limit_q14))
-SIGNAL(read_vq_limit, VOLTAGE_V(d->control.vq_limit_q14))
+SIGNAL(read_vq_limit, VOLTAGE_V(d->run.control.vq_limit_q14))
 SIGNAL(read_bus, BUS_V(qm_hi(d->bus_q31)))
-SIGNAL(read_fw_index, (double)d->fieldweak.index)
-SIGNAL(read_inv_kphi, (double)d->tuning.inv_kfi)
-SIGNAL(read_ls_ratio, (double)d->tuning.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0)
-SIGNAL(read_offset, ANGLE_DEG(d->control.handover_offset))
-SIGNAL(read_e_d, EMF_V(estimator_emf(&d->estimator).d))
-SIGNAL(read_e_q, EMF_V(estimator_emf(&d->estimator).q))
-SIGNAL(read_offset_a, CURRENT_A(d->offset_a_q13))
-SIGNAL(read_offset_b, CURRENT_A(d->offset_b_q13))
+SIGNAL(read_fw_index, (double)d->run.fieldweak.index)
+SIGNAL(read_inv_kphi, (double)d->run.model.inv_kfi)
+SIGNAL(read_ls_ratio, (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0)
+SIGNAL(read_offset, ANGLE_DEG(d->run.handover.offset))
+SIGNAL(read_e_d, EMF_V(estimator_emf(&d->run.estimator).d))
+SIGNAL(read_e_q, EMF_V(estimator_emf(&d->run.estimator).q))
+SIGNAL(read_offset_a, CURRENT_A(d->calibration.offset_a_q13))
+SIGNAL(read_offset_b, CURRENT_A(d->calibration.offset_b_q13))
 #ifdef SNAPSHOT
 SIGNAL(read_snap_done, ((void)d, (double)SnapDone))
 SIGNAL(read_snap_rows, ((void)d, (double)board_snapshot.row))
@@ -109,7 +109,7 @@ const probe_signal_t probe_signals[] = {
 };
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
 
-#define PARAM_ENTRY(name, unit, min, max) { #name, (double)PARAM_F(name), unit },
+#define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },
 const probe_param_t probe_params[] = { PARAM_TABLE(PARAM_ENTRY) };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 
@@ -147,7 +147,7 @@ typedef struct {
     double min, max;
 } range_t;
 
-#define PARAM_RANGE(name, unit, min, max) { #name, min, max },
+#define PARAM_RANGE(name, unit, min, max, value, meaning) { #name, min, max },
 static const range_t ranges[] = { PARAM_TABLE(PARAM_RANGE) };
 
 static int16_t *tunable_place(const tunable_t *t, const char *name)

@@ -88,7 +88,8 @@ class _Debug:
         names = [name for name in parameters.co_varnames[2:parameters.co_argcount] if name.endswith("_sec")]
         held = {name: sections.get(name.removesuffix("_sec")) for name in names}
         self.dwarf = DWARFInfo(DwarfConfig(little_endian=True, machine_arch="dsPIC", default_address_size=4),
-                               **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0) for name, data in held.items()})
+                               **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0) for name,
+                                  data in held.items()})
         self.nodes: dict[int, Node] = {}        # called functions, by start
         self.inside: dict[int, list[Node]] = {} # every copy in a called function, by that function's start
         self.lines: dict[int, tuple[str, int]] = {}
@@ -252,7 +253,7 @@ def _constants(section: Section, named: dict[int, Symbol], debug: _Debug) -> lis
 
 def _members(die, path: str):
     """Every member of a structure and of the structures in it, with its size in bytes of data."""
-    kind = _type(die)
+    kind = type_of(die)
     if kind is None or kind.tag != "DW_TAG_structure_type":
         return
     for member in kind.iter_children():
@@ -262,7 +263,7 @@ def _members(die, path: str):
             yield from _members(member, name)
 
 
-def _type(die):
+def type_of(die):
     """What a variable, member or type stands for, without typedef, const and volatile."""
     while die is not None and "DW_AT_type" in die.attributes:
         die = die.get_DIE_from_attribute("DW_AT_type")
@@ -272,7 +273,7 @@ def _type(die):
 
 
 def _size(die) -> int:
-    kind = _type(die)
+    kind = type_of(die)
     if kind is None:
         return 0
     if kind.tag == "DW_TAG_array_type":

@@ -105,7 +105,8 @@ class Budget:
                   for section in root.sections("group")]
         modules = []
         for section in root.sections("module"):
-            modules.append(Module(section.text("name"), section.choice("group", [group.name for group in groups]), listed(section, "files", "file"),
+            modules.append(Module(section.text("name"), section.choice("group", [group.name for group in groups]),
+                                  listed(section, "files", "file"),
                                   listed(section, "functions", "function") + listed(section, "compiler", "compiler"),
                                   listed(section, "objects", "object"), section.flag("whole", False),
                                   section.integer("flash_bytes", None, minimum=0)))

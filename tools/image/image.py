@@ -1,6 +1,6 @@
-"""Checks a target image before it is flashed: device, vectors, configuration words, HEX against ELF, library helpers, budgets.
+"""Checks an image before it is flashed: device, vectors, configuration words, HEX against ELF, library helpers, budgets.
 
-    python3 -m tools.image.image build/target/foc33.elf build/target/foc33.hex [--map build/target/foc33.map] [--budget firmware/budget.toml]
+    python3 -m tools.image.image foc33.elf foc33.hex [--map foc33.map] [--budget firmware/budget.toml]
 
 One line for each failure and exit status 1; a file that cannot be read is one line and exit status 2."""
 
@@ -35,7 +35,8 @@ def check_memory(words: Words) -> list[str]:
     outside = sorted(address for address in words if address not in device.FLASH and address not in device.CONFIGURATION)
     if not outside:
         return []
-    return [f"{len(outside)} words outside the flash of the {device.NAME} (0x0000 .. 0x{device.FLASH[-1]:04X}), the first at 0x{outside[0]:06X}"]
+    return [f"{len(outside)} words outside the flash of the {device.NAME} (0x0000 .. 0x{device.FLASH[-1]:04X}), "
+            f"the first at 0x{outside[0]:06X}"]
 
 
 def check_same(hex_words: Words, elf: Elf) -> list[str]:
@@ -92,7 +93,8 @@ def check_vectors(words: Words, elf: Elf, pieces: list[Piece] | None) -> list[st
                              f"({elf.function_at(wanted)})")
         failures += wrong[:3] + ([f"and {len(wrong) - 3} more vectors of the {table}"] if len(wrong) > 3 else [])
     if pieces is not None and not default_handler_is_ours(elf, pieces):
-        failures.append(f"vectors: {device.DEFAULT_VECTOR} is the compiler's, which leaves the outputs as they are: define it in firmware/board/isr.c")
+        failures.append(f"vectors: {device.DEFAULT_VECTOR} is the compiler's, which leaves the outputs as they are: "
+                        "define it in firmware/board/isr.c")
     return failures
 
 
@@ -111,7 +113,8 @@ def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
     for name, value in {**device.BOARD_NEEDS, **config}.items():
         field = device.FIELDS.get(name)
         if field is None or value not in field.values:
-            failures.append(f"configuration: {name} = {value} in config.c is unknown for the {device.NAME}: add it to tools/image/device.py")
+            failures.append(f"configuration: {name} = {value} in config.c is unknown for the {device.NAME}: "
+                            "add it to tools/image/device.py")
             continue
         word = words.get(field.word)
         if word is None:

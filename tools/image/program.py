@@ -166,7 +166,8 @@ def read_elf(path: Path, data: bytes | None = None) -> Elf:
 def _elf(path: Path, data: bytes) -> Elf:
     file = elftools.elf.elffile.ELFFile(BytesIO(data))
     if file.elfclass != 32 or not file.little_endian or file["e_machine"] != device.ELF_MACHINE or file["e_type"] != "ET_EXEC":
-        raise UserError(f"not a linked program for a dsPIC ({file.elfclass} bits, {file['e_machine']}, {file['e_type']})", str(path), REMEDY)
+        raise UserError(f"not a linked program for a dsPIC ({file.elfclass} bits, {file['e_machine']}, {file['e_type']})", str(path),
+                        REMEDY)
     words: Words = {}
     sections: dict[int, Section] = {}
     debug = {}
@@ -205,7 +206,8 @@ def _symbols(table, sections: dict[int, Section]) -> list[Symbol]:
         wanted = not name.startswith(".") or section is not None and section.memory == CONSTANTS
         if name and wanted and (place == "SHN_ABS" or section is not None and kind != "STT_SECTION"):
             result.append(Symbol(name, symbol["st_value"], symbol["st_size"], kind == "STT_FUNC", section))
-    return sorted(result, key=lambda item: (item.section is not None and item.section.memory != CODE, item.address, not item.function, item.name))
+    return sorted(result, key=lambda item: (item.section is not None and item.section.memory != CODE, item.address, not item.function,
+                                            item.name))
 
 
 # ---- HEX -----------------------------------------------------------------------------------------------------------------

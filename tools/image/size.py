@@ -1,4 +1,4 @@
-"""`make size`: flash, RAM and stack of the target image by module and function, beside the note's figures, the budget and the last commit.
+"""`make size`: flash, RAM and stack of the image by module and function, beside AN1292's figures, the budget and the last commit.
 
 Program memory is counted as data sheets do, three bytes a word, without the vector tables. Exit status: 0, 1 when a budget is broken
 (a line for each), 2 when the image or the compiler is missing."""
@@ -22,7 +22,7 @@ from .sources import Sources
 
 OUT = paths.ROOT / "build" / "target"
 BOARD = paths.ROOT / "firmware" / "board"
-NOTE_TITLE = "as in the note"
+NOTE_TITLE = "as in AN1292"
 
 
 @dataclass
@@ -112,7 +112,8 @@ def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
     def change(attribute: str) -> int | None:
         values = [getattr(row, attribute) for row in below]
         return None if not values or None in values else sum(values)
-    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below), ram=sum(row.ram for row in below),
+    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below),
+               ram=sum(row.ram for row in below),
                flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
 
 
@@ -128,7 +129,7 @@ def broken(report: Report, now: Shares, limits: bool) -> list[str]:
     if limits and report.stack.depth > limit:
         lines.append(f"stack: {report.stack.depth} bytes at its deepest, {report.stack.depth - limit} over the budget of {limit}")
     lines += [f"stack: {error}" for error in report.stack.errors]
-    lines += [f"'{name}' is counted with no module: name it in firmware/budget.toml"
+    lines += [f"'{name}' is counted with no module: name its file in firmware/budget.toml"
               for module, name in sorted(now) if module == UNASSIGNED.name]
     return lines
 
@@ -195,21 +196,19 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
     def cell(value: int | None) -> str:
         return "" if value is None else str(value)
-    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]), cell(row["ram_budget"])]
+    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]),
+             cell(row["ram_budget"])]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
-    return ["bytes", "note: flash", "flash", "budget", "note: RAM", "RAM", "budget"], body
+    return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def compare(compile_text: str, link_text: str, budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
+def compare(variables: list[str], budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
     """Shares of the last commit's image and the commit's name, or None and why there is nothing to compare with."""
     try:
-        if not compile_text or not link_text:
-            raise base.NoBase("no compiler was named (--compile, --link)")
         commit = base.commit()
-        elf = base.build(commit, shlex.split(compile_text), shlex.split(link_text), cache=cache)
-        return shares(attribution.read(elf), budget), commit[:7], ""
+        return shares(attribution.read(base.build(commit, variables, cache=cache)), budget), commit[:7], ""
     except base.NoBase as reason:
         return None, "", str(reason)
 
@@ -220,7 +219,8 @@ def disassemble(objdump: str, elf: Path) -> str:
         raise UserError(f"no {words[0]}", "PATH", "install Microchip's XC16, or say where it is with XC16=folder")
     done = subprocess.run([*words, "-d", str(elf)], capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0:
-        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)), "build the image anew with `make firmware`")
+        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)),
+                        "build the image anew with `make firmware`")
     return done.stdout
 
 
@@ -230,8 +230,8 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
         parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json and size.csv")
         parser.add_argument("--objdump", default="xc16-objdump")
-        parser.add_argument("--compile", default="", help="compiler and flags, for the last commit's image")
-        parser.add_argument("--link", default="", help="the same for linking, with {objects}, {elf} and {map}")
+        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
+                            help="compare with the last commit's image, built by make with these variables")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--brief", action="store_true", help="no table of functions")
         return _run(parser.parse_args(arguments))
@@ -242,7 +242,7 @@ def _run(options: argparse.Namespace) -> int:
     budget = Budget.read()
     listing = disassemble(options.objdump, options.elf)
     image = attribution.read(options.elf)
-    before, name, reason = compare(options.compile, options.link, budget)
+    before, name, reason = (None, "", "not asked for (--base)") if options.base is None else compare(options.base, budget)
     report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)

@@ -1,4 +1,4 @@
-"""What the firmware's sources define: functions and variables by file, and every member of a structure as a path like board_drive.control.pi_d."""
+"""What the firmware's sources define: functions and variables by file, and members of structures (board_drive.control.pi_d)."""
 
 import re
 from dataclasses import dataclass, field
@@ -6,10 +6,11 @@ from pathlib import Path
 
 from tools.common import paths
 
-PATTERNS = ("firmware/*/*.c", "include/*/*.h")
+PATTERNS = ("firmware/**/*.c", "include/**/*.h")
 DROPPED = re.compile(r"/\*.*?\*/|//[^\n]*|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.DOTALL | re.MULTILINE) # comments, lines of the preprocessor
 FUNCTION = re.compile(r"^\w[\w \*]*?\b(\w+)\([^(){};]*\)\s*\{", re.MULTILINE)
-VARIABLE = re.compile(r"^((?:\w+[ \*]+)+)(?![A-Z_]+;)(\w+(?:, \*?\w+)*)(?: [A-Z_]+)?(?: =|;)", re.MULTILINE) # after array sizes are taken out
+VARIABLE = re.compile(r"^((?:\w+[ \*]+)+)(?![A-Z_]+;)(\w+(?:, \*?\w+)*)(?: [A-Z_]+)?(?: =|;)",
+                      re.MULTILINE) # after array sizes are taken out
 STRUCT = re.compile(r"^typedef struct\b[^{;]*\{", re.MULTILINE)
 NOT_DEFINED = ("typedef", "extern", "return")
 

@@ -6,7 +6,7 @@ iss_includes := -Itools/plant -Itools/chip -Itools/cpu_33f
 iss_compile = $(CC) -std=c11 -O2 -g -fPIC $(sanitizer) $(warnings) -Werror $(iss_includes)
 
 .PHONY: iss iss-bench
-iss: $(iss_folder)/libiss33f.a $(iss_folder)/libiss33f.so ## build/iss/libiss33f.a, .so: the dsPIC33F simulator without a board [SAN=1]
+iss: $(iss_folder)/libiss33f.a $(iss_folder)/libiss33f.so ## [simulator] build/iss/libiss33f.a, .so: the dsPIC33F simulator without a board [SAN=1]
 	@:
 
 $(iss_folder)/flags: FORCE
@@ -23,7 +23,7 @@ $(iss_folder)/libiss33f.a: $(iss_objects)
 $(iss_folder)/libiss33f.so: $(iss_objects)
 	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ $^ -lm
 
-iss-bench: $(iss_folder)/bench setup-run ## how many instructions per second the simulator executes on one core
+iss-bench: $(iss_folder)/bench setup-run ## [simulator] instructions per second that the simulator executes on one core
 	@elf=$(or $(IMAGE),$(wildcard build/target/foc33.elf)); test -z "$$elf" || $(python) -m tools.image.load "$$elf" >$(iss_folder)/bench.image || exit; \
 	    $< $${elf:+$(iss_folder)/bench.image}
 

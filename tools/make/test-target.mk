@@ -10,7 +10,7 @@ $(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/run_imag
 	$(call say,cc,$@)$(iss_compile) -o $@ $(filter %.c %.a,$^) -lm
 
 .PHONY: test-target
-test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## the unit tests of the control law compiled by XC16, in the simulator; results as on the PC [ONLY="test_pi ..."]
+test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## [tests] the unit tests of the control law as target code, in the simulator [ONLY="test_pi ..."]
 	@$(if $(call chosen,$(law_tests)),:,echo foc33: no unit test of the control law, ONLY=$(call quoted,$(ONLY)): use \
 	    $(call quoted,$(sort $(notdir $(law_tests)))) >&2; exit 2)
 	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(law_tests)))
