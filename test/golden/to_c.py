@@ -73,11 +73,9 @@ def write_new(path, text):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="directory of the headers")
-    parser.add_argument("names", nargs="*", help="vector names, default: all")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    names = options.names or sorted(p.stem for p in (HERE / "vectors").glob("*.txt"))
-    for name in names:
+    for name in sorted(p.stem for p in (HERE / "vectors").glob("*.txt")):
         try:
             columns, constants, rows = read(HERE / "vectors" / f"{name}.txt")
             text = header(name, columns, constants, rows)

@@ -7,11 +7,8 @@
 
 void setUp(void)
 {
-    static const register_value_t before[] = { /* nothing may depend on what was there */
-        { "AD1CON1", 0x5555 }, { "AD1CON2", 0x5555 }, { "AD1CON3", 0x5555 }, { "AD1CHS0", 0x5555 }, { "AD1CHS123", 0x5555 }, { "AD1CSSL", 0x5555 },
-    };
     host_registers_reset();
-    SET_REGISTERS(before);
+    AD1CON1 = AD1CON2 = AD1CON3 = AD1CHS0 = AD1CHS123 = AD1CSSL = 0x5555; /* nothing may depend on what was there */
     adc_init();
 }
 
