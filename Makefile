@@ -177,7 +177,7 @@ check_py := $(call py_tests,unit,check)
 unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
 modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
 
-slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design tools/test_target_build
+slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design tools/test_image_build
 quick_suites := $(check_py) $(unit_c) $(board_c) $(filter-out $(slow_suites),$(filter tools/%,$(unittest_py)))
 all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) golden/unchanged warnings/default $(modes:%=warnings/%)
 

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "test" / "iss"), str(ROOT / "test" / "fuzz")]
+sys.path[:0] = [str(ROOT), str(ROOT / "test" / "iss"), str(ROOT / "test" / "tools")]
 
 import asm33 # noqa: E402
 from sample_image import hex_text # noqa: E402

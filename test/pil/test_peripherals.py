@@ -10,7 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from chip import FRC_FCY, PLL, RAM, REGISTERS, ROOT, STOP, PilBoard, asm33, board, library, pass_ms, run, switch # noqa: E402
-from sample_image import Elf, Section # noqa: E402
+from sample_image import NOBITS, PERSISTENT, WRITE, Sample, Section # noqa: E402
 
 UART = """
     mov #0x743, w1
@@ -47,17 +47,15 @@ class Resets(unittest.TestCase):
 class Memory(unittest.TestCase):
     """What an ELF file's names do for RAM that is read before anything has been written to it."""
 
-    PERSISTENT, NOBITS = 0x02000003, 8
     PROGRAM = f"mov {RAM + 0x10}, w0; mov {RAM + 0x12}, w1; mov {RAM + 0x22}, w2; mov w0, {RAM}; mov w1, {RAM + 2}\n" + STOP
 
     def chip(self) -> PilBoard:
         words, _ = asm33.assemble(self.PROGRAM, 0x200, REGISTERS)
-        elf = Elf()
-        elf.sections = [Section(".reset", 0, [0x040200, 0]), Section(".text", 0x200, [words[pc] for pc in sorted(words)]),
-                        Section(".pbss", RAM + 0x10, [0], self.PERSISTENT, self.NOBITS), Section(".bss", RAM + 0x20, [0], 3, self.NOBITS)]
-        elf.symbols = [("_main", 0x200, 0, 0x12, 2), ("_kept", RAM + 0x10, 4, 0x11, 3), ("_array", RAM + 0x20, 4, 0x11, 4)]
+        elf = Sample(words, {"_main": 0x200}, sections=[
+            Section(".pbss", RAM + 0x10, b"", PERSISTENT, NOBITS, 8, [("_kept", RAM + 0x10, 4)]),
+            Section(".bss", RAM + 0x20, b"", WRITE, NOBITS, 8, [("_array", RAM + 0x20, 4)])])
         path = Path(self.enterContext(tempfile.TemporaryDirectory())) / "x.elf"
-        path.write_bytes(elf.bytes())
+        path.write_bytes(elf.elf())
         result = PilBoard(library, path)
         result.power_up()
         pass_ms(result, 1)

@@ -1,7 +1,5 @@
 """The `identify` command: the neutral header, one motor on the virtual board, its report, and what it refuses."""
 
-import contextlib
-import io
 import json
 import re
 import tempfile
@@ -11,17 +9,8 @@ from pathlib import Path
 
 from tools.common import board_file, motor_file, paths, plant
 from tools.common.errors import UserError
-from tuning import cli, constants, identify, identify_result
-
-NAME = "hurst_dmb0224c10002"
-
-
-def command(*arguments: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of `python3 -m tuning ...`."""
-    out, error = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
-        code = cli.main(list(arguments))
-    return code, out.getvalue(), error.getvalue()
+from tune_support import HURST, command, motors
+from tuning import constants, identify, identify_result
 
 
 class Tables(unittest.TestCase):
@@ -44,7 +33,7 @@ class Tables(unittest.TestCase):
 class Header(unittest.TestCase):
     def setUp(self):
         self.board = board_file.load("mclv")
-        self.motor = motor_file.load(NAME)
+        self.motor = motor_file.load(HURST)
 
     def define(self, text: str, name: str) -> str:
         return re.search(rf"^#define {name} (\S+)$", text, re.MULTILINE)[1]
@@ -72,14 +61,13 @@ class Header(unittest.TestCase):
         self.assertEqual(text, identify.header(identify_result.Known(5, 1.0, 1000.0), self.board))
 
     def test_current_stays_below_the_boards_trip(self):
-        for name in paths.names(paths.MOTORS):
+        for name in motors():
             known = identify_result.Known.of(motor_file.load(name), self.board)
             text = identify.header(known, self.board)
             self.assertLess(1.2 * known.current_a, float(self.define(text, "OVER_CURRENT_THRESHOLD_A")))
 
     def test_a_bus_below_the_rating_lowers_the_speed(self):
-        import dataclasses
-        high = dataclasses.replace(self.motor, rated_voltage_v=48.0)
+        high = replace(self.motor, rated_voltage_v=48.0)
         self.assertAlmostEqual(identify_result.Known.of(high, self.board).speed_rpm, 560.0)
 
     def test_current_and_speed_can_be_given(self):
@@ -94,7 +82,7 @@ class Run(unittest.TestCase):
     def setUpClass(cls):
         cls.temporary = tempfile.TemporaryDirectory()
         cls.folder = Path(cls.temporary.name) / "result"
-        cls.code, cls.out, cls.error = command("identify", NAME, "--quiet", "--out", str(cls.folder))
+        cls.code, cls.out, cls.error = command("identify", HURST, "--quiet", "--out", str(cls.folder))
         cls.summary = json.loads((cls.folder / "summary.json").read_text(encoding="utf-8"))
 
     @classmethod
@@ -123,11 +111,11 @@ class Run(unittest.TestCase):
     def test_the_lines_to_paste_are_a_motor_file(self):
         lines = (self.folder / "electrical.toml").read_text(encoding="utf-8")
         self.assertIn(lines.strip(), self.out)
-        text = (paths.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
+        text = (paths.MOTORS / f"{HURST}.toml").read_text(encoding="utf-8")
         pasted = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", text, flags=re.DOTALL | re.MULTILINE)
         path = self.folder / "pasted.toml"
         path.write_text(pasted, encoding="utf-8")
-        found, true = motor_file.load(str(path)), motor_file.load(NAME)
+        found, true = motor_file.load(str(path)), motor_file.load(HURST)
         self.assertAlmostEqual(found.rs_ohm / true.rs_ohm, 1.0, delta=0.01)
         self.assertAlmostEqual(found.ld_h / true.ld_h, 1.0, delta=0.01)
         self.assertAlmostEqual(found.kphi_v_per_krpm / true.kphi_v_per_krpm, 1.0, delta=0.01)
@@ -143,7 +131,7 @@ class Verdict(unittest.TestCase):
     """Made-up measurements: the comparison itself."""
 
     def item(self, watch: dict, fault: str = "NONE", **changes) -> identify_result.Identified:
-        board, motor = board_file.load("mclv"), motor_file.load(NAME)
+        board, motor = board_file.load("mclv"), motor_file.load(HURST)
         values = {"motor.rs_ohm": 2.67, "motor.ld_h": 1.92e-3, "motor.lq_h": 1.92e-3, "motor.psi_vs": 7.983e-3, "motor.pole_pairs": 5,
                   "motor.r_tempco": 0.0039, "motor.psi_tempco": -0.002} | changes
         full = {"step": 0, "result": 2, "Rs_mohm": 2692, "Ld_uH": 1920, "Lq_uH": 1920, "Kphi_mV_per_krpm": 7240} | watch
@@ -171,7 +159,7 @@ class Verdict(unittest.TestCase):
         self.assertIn("inductance_q = { value = 5,", lines)
 
     def test_the_lines_to_paste_suit_a_star_and_a_delta(self):
-        text = (paths.MOTORS / f"{NAME}.toml").read_text(encoding="utf-8")
+        text = (paths.MOTORS / f"{HURST}.toml").read_text(encoding="utf-8")
         for connection in ("Y", "delta"):
             for watch in ({}, {"Lq_uH": 2500}):
                 with self.subTest(connection, watch=watch), tempfile.TemporaryDirectory() as folder:
@@ -198,27 +186,16 @@ class Refused(unittest.TestCase):
         self.assertEqual(error.count("\n"), 1)
         return error
 
-    def test_no_motor_or_two_kinds(self):
-        self.assertIn("which motor?", self.refused())
-        self.assertIn("which motor?", self.refused(NAME, "--all"))
-
-    def test_unknown_motor(self):
-        self.assertIn("no motor 'hurst'", self.refused("hurst"))
-
-    def test_impossible_current_and_speed(self):
-        self.assertIn("current = 0.01 is impossible", self.refused(NAME, "--current", "0.01"))
-        self.assertIn("speed = 9000 is impossible", self.refused(NAME, "--speed", "9000"))
+    def test_mistakes_on_the_command_line(self):
+        for arguments, says in (((), "which motor?"), ((HURST, "--all"), "which motor?"), (("hurst",), "no motor 'hurst'"),
+                                ((HURST, "--current", "0.01"), "current = 0.01 is impossible"), ((HURST, "--speed", "9000"), "speed = 9000 is impossible"),
+                                (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'")):
+            self.assertIn(says, self.refused(*arguments))
+        with self.assertRaises(UserError):
+            identify.identify([motor_file.load(HURST)], "mclv", plant.Values({"no.key": 1.0}, {}))
 
     def test_a_current_beyond_the_board_is_named_by_the_build(self):
-        self.assertIn("MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A", self.refused(NAME, "--current", "4.2"))
-
-    def test_one_folder_for_all(self):
-        self.assertIn("one folder", self.refused("--all", "--out", "x"))
-
-    def test_unknown_key(self):
-        self.assertIn("unknown key 'load.lock'", self.refused(NAME, "--set", "load.lock=1"))
-        with self.assertRaises(UserError):
-            identify.identify([motor_file.load(NAME)], "mclv", plant.Values({"no.key": 1.0}, {}))
+        self.assertIn("MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A", self.refused(HURST, "--current", "4.2"))
 
 
 if __name__ == "__main__":

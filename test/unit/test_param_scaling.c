@@ -1,4 +1,4 @@
-/* From engineering units to counts: the constants that were published for the note's motor, and every derived parameter. */
+/* From engineering units to counts: the constants that AN1292 publishes, and every derived parameter. */
 #include "hurst_params.h"
 
 #include "drive/param_init.h"
@@ -183,9 +183,10 @@ void test_constants_at_4_4_A_are_14470_and_1626(void)
 {
     static const estimator_params_t p = PARAM_ESTIMATOR_INIT;
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    TEST_ASSERT_INT16_WITHIN(1, 14470, NORM_RS);
-    TEST_ASSERT_INT16_WITHIN(1, 1626, NORM_LSDTBASE);
-    TEST_ASSERT_INT16_WITHIN(1, 7956, NORM_INVKFIBASE);
+    TEST_ASSERT_EQUAL_INT16(14470, NORM_RS);
+    TEST_ASSERT_EQUAL_INT16(1626, NORM_LSDTBASE);
+    TEST_ASSERT_EQUAL_INT16(7956, NORM_INVKFIBASE);
+    TEST_ASSERT_EQUAL_INT16(1790, NORM_DELTAT);
     expect_estimator(&p, GOLDEN_PARAMS_C440_RS_Q16, GOLDEN_PARAMS_C440_RS_EXP, GOLDEN_PARAMS_C440_LS_EXP,
                      GOLDEN_PARAMS_C440_D_ILIMIT_LS_Q14, GOLDEN_PARAMS_C440_D_ILIMIT_HS_Q14);
     TEST_ASSERT_EQUAL_UINT16((uint16_t)GOLDEN_PARAMS_C440_LS_Q16, fw.ls_base_q16);
@@ -287,6 +288,8 @@ void test_current_loop_gains_cancel_the_motors_pole(void)
     TEST_ASSERT_EQUAL_INT16(p.pi_d.kp, p.pi_q.kp);
     TEST_ASSERT_EQUAL_INT16(p.pi_d.ki, p.pi_q.ki);
     TEST_ASSERT_EQUAL_INT16(32734, p.pi_q.kc); /* 0.999 */
+    TEST_ASSERT_EQUAL_INT16(p.pi_d.kc, p.pi_q.kc);
+    TEST_ASSERT_EQUAL_UINT16(p.pi_d.shift, p.pi_q.shift);
 }
 
 void test_published_gains_can_be_given_instead(void)

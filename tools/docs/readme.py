@@ -98,7 +98,7 @@ def cycles() -> str | None:
     path = ROOT / "build/target/cycles.json"
     if not path.exists():
         return None
-    from tools.image.cycles import readme_table
+    from tools.bench.cycles import readme_table
     return table(*readme_table(json.loads(path.read_text())))
 
 

@@ -13,8 +13,8 @@ pil: setup-run $$(if $$(IMAGE),,find-xc16) ## the image for the dsPIC turns the 
 	@$(alone) $(python) -m tools.bench.pil_command $(pil_scenario) $(pil_image) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) \
 	    $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
 
-cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## the control interrupt in cycles and us beside the note's, load, latency, stack, dearest functions, flame picture [SCENARIO=name IMAGE=file.elf OUT=folder]
+cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## the control interrupt in cycles and us beside the note's, load, latency, stack, dearest functions [SCENARIO=name IMAGE=file.elf OUT=folder]
 	@$(if $(MOTOR)$(BOARD),echo foc33: make cycles has no MOTOR and no BOARD: it takes those of its scenarios$(comma) use make pil MOTOR=name >&2; exit 2)
 	$(target_setup)
-	@$(alone) $(python) -m tools.image.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
+	@$(alone) $(python) -m tools.bench.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
 	    $(if $(IMAGE)$(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)

@@ -82,7 +82,7 @@ flash: firmware ## program the board by MPLAB IPE's command line, or say how [TO
 	@$(python) -m tools.image.flash $X/foc33.hex --elf $X/foc33.elf $(if $(TOOL),--tool $(call quoted,$(TOOL))) $(if $(IPE),--ipe $(call quoted,$(IPE)))
 
 # What the MPLAB X project is made of, one item a line: it cannot say anything else than this file does.
-target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h) userparams.h,'file $(word)') \
+target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h include/*/*/*.h) userparams.h,'file $(word)') \
     $(foreach word,$(filter-out -Werror,$(target_flags) $(target_warnings)),'flag $(word)') \
     $(foreach word,$(patsubst -I%,%,$(target_includes)),'include $(word)') \
     $(foreach word,$(subst $(comma), ,$(target_link_options)),'link $(word)') 'device $(target_device)'

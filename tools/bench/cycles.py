@@ -1,6 +1,6 @@
-"""`make cycles`: what the control interrupt costs on the simulated core, by scenario, state and function, beside the note's figures.
+"""`make cycles`: what the control interrupt costs on the simulated core, by scenario, state and function, beside AN1292's figures.
 
-    python3 -m tools.image.cycles [--image build/target/foc33.elf] [scenario ...]
+    python3 -m tools.bench.cycles [--image build/target/foc33.elf] [scenario ...]
 
 Exit status: 0, 1 when a budget is broken (a line for each), 2 when the image or the compiler is missing."""
 
@@ -16,50 +16,24 @@ from typing import Any
 
 import numpy as np
 
-from tools.bench import build, pil, pil_command, scenario, simulate
 from tools.common import command_line, paths, plant, workers
 from tools.common.errors import UserError
-from tools.bench.command_common import Progress
-from tools.common.toml_file import Document
+from tools.image import attribution, program
+from tools.image.budget import Budget
+from tools.image.profile import Counts, Profile, profile
 
-from . import attribution, flame, program
-from .budget import Budget
-from .profile import Counts, Profile, folded, profile
+from . import build, pil, pil_command, scenario, simulate
+from .command_common import Progress
 
-BUDGET = paths.ROOT / "firmware" / "budget.toml"
 FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
 P1SECMP = 0x01C6    # the counter's value at the trigger; it counts down to zero from there, and the duties load
 MOST_EXPENSIVE = 10
-MISSED = 0.002      # share of the cycles by which the profile by address may be off: what the background executes of the interrupt's functions
+MISSED = 0.002      # share of the cycles by which the profile may be off: the background executes some of the interrupt's functions
 WITHOUT, WITH = "without field weakening", "with field weakening"
 NOTE_US = {WITHOUT: (14.725, 20.8, 21.4), WITH: (14.975, 23.325, 23.65)}
 MEANING = {WITHOUT: "bridge on, speed reference below FW_START_SPEED_RPM", WITH: "bridge on, speed reference above it"}
 SIGNALS = ("cpu.isr_cycles", "cpu.latency_cycles")
-
-
-@dataclass(frozen=True)
-class Limits:
-    """[cycles] of the budget file."""
-
-    isr_max: int
-    isr_mean: int
-    latency_max: int
-    stack: int
-    scenarios: tuple[str, ...]
-
-    @staticmethod
-    def read(path: Path = BUDGET) -> "Limits":
-        root = Document(path).root
-        section, budget = root.section("cycles"), root.section("budget")
-        image = budget.section("image") if budget is not None else None
-        if section is None or image is None:
-            raise root.fail("cycles", "no table [cycles] or [budget.image]", "add it")
-        limits = Limits(section.integer("isr_max_cycles", minimum=1), section.integer("isr_mean_cycles", minimum=1),
-                        section.integer("latency_max_cycles", minimum=1), image.integer("stack_bytes", minimum=1),
-                        tuple(section.texts("scenarios")))
-        section.close()
-        return limits
 
 
 @dataclass
@@ -141,7 +115,8 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
         worst = int(np.argmax(isr))
         where = (int(isr[worst]), float(trace.time_s[worst]), run.states.get(int(state[worst]), "?"))
         latency = trace.column("cpu.latency_cycles")
-        return Found(spreads, Spread.of(latency[latency > 0]), core.counts(), int(board.get("cpu.stack_bytes")), int(board.get("pil.differences")),
+        return Found(spreads, Spread.of(latency[latency > 0]), core.counts(), int(board.get("cpu.stack_bytes")),
+                     int(board.get("pil.differences")),
                      int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, board.peek(P1SECMP) & 0x7FFF,
                      run.motor_s, run.cpu_s, board.get("cpu.instructions"))
     except pil.BoardError as error:
@@ -169,7 +144,7 @@ class Report:
     image: str
     found: Found
     profile: Profile
-    limits: Limits | None
+    budget: Budget | None
     assumptions: list[list[str]]
     broken: list[str] = field(default_factory=list)
 
@@ -219,17 +194,19 @@ class _Core:
 
 def broken(report: Report) -> list[str]:
     """A line for each limit that does not hold."""
-    lines, limits, found = [], report.limits, report.found
+    lines, found = [], report.found
     if found.differences:
         lines.append(f"target and PC differ in {found.differences} interrupts, the first: {found.first_difference}")
     if abs(report.profile.total - report.all.total) > MISSED * report.all.total:
-        lines.append(f"the profile has {report.profile.total} cycles, the interrupts took {report.all.total}: the figures by function are wrong")
+        lines.append(f"the profile has {report.profile.total} cycles, the interrupts took {report.all.total}: "
+                     "the figures by function are wrong")
     if not found.spreads[WITH].number or not found.spreads[WITHOUT].number:
         lines.append("no scenario ran with and without field weakening: the figures are not those of the table")
     if found.latency.most >= found.load_cycles:
         lines.append(f"trigger to duties: {found.latency.most} cycles, but the duties load {found.load_cycles} cycles after the trigger")
-    if limits is None:
+    if report.budget is None:
         return lines
+    limits, stack = report.budget.cycles, report.budget.image.stack
     worst = max(found.longest.items(), key=lambda item: item[1][0])
     if report.all.most > limits.isr_max:
         lines.append(f"longest interrupt: {report.all.most} cycles, {report.all.most - limits.isr_max} over the budget of {limits.isr_max} "
@@ -239,8 +216,8 @@ def broken(report: Report) -> list[str]:
             lines.append(f"mean interrupt {name}: {found.spreads[name].mean:.1f} cycles, over the budget of {limits.isr_mean}")
     if found.latency.most > limits.latency_max:
         lines.append(f"trigger to duties: {found.latency.most} cycles, over the budget of {limits.latency_max}")
-    if found.stack_bytes > limits.stack:
-        lines.append(f"stack: {found.stack_bytes} bytes, over the budget of {limits.stack}")
+    if found.stack_bytes > stack:
+        lines.append(f"stack: {found.stack_bytes} bytes, over the budget of {stack}")
     return lines
 
 
@@ -260,13 +237,15 @@ def _spread_line(name: str, spread: Spread, note: tuple[float, ...] | None = Non
 def text(report: Report) -> str:
     """The whole report, as printed."""
     found, shape = report.found, report.profile
-    head = f"{'control interrupt':<26}{'number':>10}{'min':>8}{'mean':>9}{'max':>7}{'min us':>10}{'mean':>8}{'max':>8}{'load':>10}   the note's us"
+    head = (f"{'control interrupt':<26}{'number':>10}{'min':>8}{'mean':>9}{'max':>7}{'min us':>10}{'mean':>8}{'max':>8}{'load':>10}"
+            "   the note's us")
     where: dict[str, list[str]] = {}
     for name, (cycles, at_s, state) in sorted(found.longest.items(), key=lambda item: -item[1][0]):
         where.setdefault(f"{cycles} in {state} at {at_s:.4f} s", []).append(name)
     parts = [f"{report.image}: the control interrupt in cycles (entry to return), at {FCY_MHZ:g} MIPS in us, and its share of the core",
              "\n".join([head, "-" * len(head), *(_spread_line(name, found.spreads[name], NOTE_US[name]) for name in NOTE_US),
-                        *(_spread_line(f"  {name}", spread) for name, spread in found.spreads.items() if name not in NOTE_US and spread.number),
+                        *(_spread_line(f"  {name}", spread) for name, spread in found.spreads.items() if name not in NOTE_US
+                          and spread.number),
                         _spread_line("all", report.all)]),
              "\n".join(f"{name}: {meaning}" for name, meaning in MEANING.items()),
              "longest in each scenario:\n" + "\n".join(f"  {place}: {', '.join(names)}" for place, names in where.items())]
@@ -276,15 +255,16 @@ def text(report: Report) -> str:
                  f"                            the duties load {found.load_cycles} cycles after the trigger\n"
                  f"deepest stack               {found.stack_bytes} bytes\n"
                  f"target = PC                 {found.ticks} interrupts compared, {found.differences} differ\n"
-                 f"speed                       {found.instructions / found.cpu_s / 1e6:.0f} million instructions a second of processor time, "
-                 f"{found.motor_s / found.cpu_s:.2f} times real time (while counting by address)")
+                 f"speed                       {found.instructions / found.cpu_s / 1e6:.0f} million instructions a second "
+                 f"of processor time, {found.motor_s / found.cpu_s:.2f} times real time (while counting by address)")
     interrupts = max(report.all.number, 1)
     for title, table in (("function, wherever it is inlined", shape.inlined), ("function as linked", shape.symbols)):
         rows = [f"{name:<44}{cycles / interrupts:>10.1f}{100.0 * cycles / max(shape.total, 1):>8.1f} %"
                 for name, cycles in table.most_common(MOST_EXPENSIVE)]
         parts.append("\n".join([f"{title:<44}{'cycles':>10}{'':>10}   (own cycles, mean of all interrupts)", *rows]))
     parts.append("\n".join([f"{'code of the interrupt that was executed':<44}{'words':>10}{'of':>6}",
-                            *(f"{name:<44}{done:>10}{of:>6}" for name, (done, of) in sorted(shape.executed.items(), key=lambda item: -item[1][1]))]))
+                            *(f"{name:<44}{done:>10}{of:>6}" for name, (done, of) in sorted(shape.executed.items(),
+                                                                                            key=lambda item: -item[1][1]))]))
     if report.assumptions:
         width = [max(len(row[column]) for row in report.assumptions) for column in (0, 1)]
         parts.append("\n".join(["assumed about the chip, for want of a source:",
@@ -296,29 +276,27 @@ def summary(report: Report) -> dict[str, Any]:
     """The report as plain data."""
     found = report.found
     interrupts = max(report.all.number, 1)
-    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US, "spreads": {name: item.data() for name, item in found.spreads.items()},
+    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US, "spreads": {name: item.data() for name,
+                                                                                       item in found.spreads.items()},
             "all": report.all.data(), "latency": found.latency.data(), "stack_bytes": found.stack_bytes, "ticks": found.ticks,
             "differences": found.differences, "first_difference": found.first_difference,
             "longest": {name: {"cycles": cycles, "at_s": at_s, "state": state} for name, (cycles, at_s, state) in found.longest.items()},
-            "load_cycles": found.load_cycles, "instructions_per_second": found.instructions / found.cpu_s, "speed_factor": found.motor_s / found.cpu_s,
+            "load_cycles": found.load_cycles, "instructions_per_second": found.instructions / found.cpu_s,
+            "speed_factor": found.motor_s / found.cpu_s,
             "functions": {name: cycles / interrupts for name, cycles in report.profile.inlined.most_common()},
             "symbols": {name: cycles / interrupts for name, cycles in report.profile.symbols.most_common()},
             "executed": report.profile.executed, "assumptions": report.assumptions, "broken": report.broken}
 
 
-def write(report: Report, folder: Path) -> list[Path]:
-    """cycles.json, the flame-style picture and its stacks as text."""
-    interrupts = max(report.all.number, 1)
+def write(report: Report, folder: Path) -> Path:
+    """cycles.json."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / name for name in ("cycles.json", "cycles.svg", "cycles.folded")]
-        files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-        files[1].write_text(flame.svg(report.profile.stacks, f"control interrupt: {report.all.mean:.0f} cycles in the mean of "
-                                      f"{report.all.number} interrupts", interrupts), encoding="utf-8")
-        files[2].write_text("\n".join(folded(report.profile.stacks, interrupts)) + "\n", encoding="utf-8")
+        path = folder / "cycles.json"
+        path.write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-    return files
+    return path
 
 
 def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
@@ -345,33 +323,36 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
         if item.defines:
             raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
                             "measure scenarios of the firmware as it is delivered")
-        job = simulate.prepare(item, library, plant.read_motor(item.motor, item.motor_where), plant.read_board(item.board, item.board_where))
+        job = simulate.prepare(item, library, plant.read_motor(item.motor, item.motor_where),
+                               plant.read_board(item.board, item.board_where))
         job.signals += [signal for signal in SIGNALS if signal not in job.signals]
         jobs.append(job)
     return jobs
 
 
-def measure(image: Path, userparams: Path | None, names: tuple[str, ...], limits: Limits | None, quiet: bool) -> Report:
+def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool) -> Report:
     library = pil.library([], userparams)
     if not pil.check_image(library, image):
-        raise UserError("the image does not say where functions and variables are", str(image), "name the ELF file that the HEX file was made from")
+        raise UserError("the image does not say where functions and variables are", str(image),
+                        "name the ELF file that the HEX file was made from")
     elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
     code, source = program.read_elf(elf), attribution.read(elf)
-    jobs = jobs_of(names, library)
+    jobs = jobs_of(names or budget.cycles.scenarios, library)
     with Progress("cycles", sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         found = merged(workers.run_all(jobs, functools.partial(work, image), progress))
-    report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, Budget.read().with_caller), limits, assumptions(library))
+    report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, budget.counted_at), budget if limits else None,
+                    assumptions(library))
     report.broken = broken(report)
     return report
 
 
 def main(arguments: list[str] | None = None) -> int:
     def work() -> int:
-        parser = command_line.Parser(prog="python3 -m tools.image.cycles", description=__doc__.splitlines()[0])
+        parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
         parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
         parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
         parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-        parser.add_argument("--out", type=Path, help="folder for cycles.json, cycles.svg, cycles.folded; default: the image's")
+        parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--quiet", action="store_true", help="no progress bar")
         return _run(parser.parse_args(arguments))
@@ -379,13 +360,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    limits = Limits.read()
+    budget = Budget.read()
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
-    report = measure(image, userparams, tuple(options.scenarios) or limits.scenarios, None if options.no_budget else limits, options.quiet)
-    files = write(report, options.out or image.parent)
+    report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
+    path = write(report, options.out or image.parent)
     print(text(report))
-    print("\nwritten: " + ", ".join(str(paths.shown(path)) for path in files))
+    print(f"\nwritten: {paths.shown(path)}")
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)
     return 1 if report.broken else 0

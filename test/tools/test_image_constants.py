@@ -1,4 +1,4 @@
-"""The drive's constants are the same to the bit on the target and on the PC: double has 32 bits on the target and 64 on the PC.
+"""The drive's constants are the same to the bit on the chip and on the PC: double has 32 bits on the chip and 64 on the PC.
 
 Both compilers get the same parameters; every field of the result is compared. Needs XC16."""
 
@@ -6,26 +6,19 @@ import os
 import random
 import re
 import shlex
-import shutil
 import subprocess
-import tempfile
-import unittest
 from io import BytesIO
 from pathlib import Path
 
+import pytest
 from elftools.elf.elffile import ELFFile
+from test_image_build import ROOT, with_compiler, xc16
 
 from tools.image import device
+from tools.image.attribution import type_of
 
-ROOT = Path(__file__).resolve().parents[2]
 SOURCE = '#include "drive/param_init.h"\nconst drive_params_t board_params = DRIVE_PARAMS_INIT;\n'
 NUMBER = re.compile(r"^(#define +\w+ +)(-?\d+\.\d+(?:e-?\d+)?)\b", re.MULTILINE)
-
-
-def xc16() -> str | None:
-    """The compiler, as make firmware finds it."""
-    folder = os.environ.get("XC16")
-    return shutil.which(f"{folder}/bin/xc16-gcc" if folder else "xc16-gcc")
 
 
 def compiled(command: list[str], header: Path, folder: Path) -> ELFFile:
@@ -47,23 +40,15 @@ def symbol_bytes(elf: ELFFile, name: str, size: int, octets: int) -> bytes:
     return data[symbol["st_value"]:symbol["st_value"] + size]
 
 
-def plain_type(die):
-    """A variable's or member's type without typedef, const and volatile."""
-    while True:
-        die = die.get_DIE_from_attribute("DW_AT_type")
-        if die.tag not in ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"):
-            return die
-
-
 def fields(kind, path: str, offset: int) -> list[tuple[str, int, int, bool]]:
     """Every number inside a type: path, offset, size, signed."""
     if kind.tag == "DW_TAG_structure_type":
         return [field for member in kind.iter_children() if member.tag == "DW_TAG_member"
-                for field in fields(plain_type(member), f"{path}.{member.attributes['DW_AT_name'].value.decode()}",
+                for field in fields(type_of(member), f"{path}.{member.attributes['DW_AT_name'].value.decode()}",
                                     offset + member.attributes["DW_AT_data_member_location"].value)]
     if kind.tag == "DW_TAG_array_type":
         count = next(kind.iter_children()).attributes["DW_AT_upper_bound"].value + 1
-        inner = plain_type(kind)
+        inner = type_of(kind)
         size = inner.attributes["DW_AT_byte_size"].value
         return [field for i in range(count) for field in fields(inner, f"{path}[{i}]", offset + i * size)]
     assert kind.tag == "DW_TAG_base_type", kind.tag
@@ -75,14 +60,15 @@ def host_values(header: Path, folder: Path) -> list[tuple[str, int, bool, int]]:
     host = compiled([*shlex.split(os.environ.get("CC") or "gcc"), "-g", "-gdwarf-4"], header, folder)
     variable = next(die for unit in host.get_dwarf_info().iter_CUs() for die in unit.iter_DIEs()
                     if die.tag == "DW_TAG_variable" and die.attributes["DW_AT_name"].value == b"board_params")
-    kind = plain_type(variable)
+    kind = type_of(variable)
     layout = fields(kind, "board_params", 0)
     data = symbol_bytes(host, "board_params", kind.attributes["DW_AT_byte_size"].value, 1)
-    return [(path, size, signed, int.from_bytes(data[offset:offset + size], "little", signed=signed)) for path, offset, size, signed in layout]
+    return [(path, size, signed, int.from_bytes(data[offset:offset + size], "little", signed=signed)) for path, offset, size,
+            signed in layout]
 
 
 def values(header: Path, folder: Path, target: str) -> list[tuple[str, int, int]]:
-    """Each field of board_params with its value on the PC and on the target, where nothing is aligned to more than two bytes."""
+    """Each field of board_params with its value on the PC and on the chip, where nothing is aligned to more than two bytes."""
     here = host_values(header, folder)
     there = symbol_bytes(compiled([target, f"-mcpu={device.NAME}", "-omf=elf"], header, folder), "_board_params",
                          sum(size for _, size, _, _ in here), 2)
@@ -93,41 +79,27 @@ def values(header: Path, folder: Path, target: str) -> list[tuple[str, int, int]
     return result
 
 
-class Reader(unittest.TestCase):
-    def test_the_fields_are_read_with_their_names_sizes_and_signs(self):
-        with tempfile.TemporaryDirectory() as folder:
-            fields_ = {path: (size, signed, value) for path, size, signed, value in host_values(ROOT / "userparams.h", Path(folder))}
-        text = (ROOT / "userparams.h").read_text(encoding="utf-8")
-        numbers = {name: float(number) for name, number in re.findall(r"^#define +(\w+) +(-?[\d.]+)\b", text, re.MULTILINE)}
-        self.assertEqual(fields_["board_params.lock_periods"], (2, False, numbers["LOCK_TIME"]))
-        self.assertEqual(fields_["board_params.kcurr_a"], (2, True, round(numbers["KCURRA"] * 32768)))
-        self.assertEqual(fields_["board_params.maximum_erpm"], (2, True, numbers["MAXIMUM_SPEED_RPM"] * numbers["NOPOLESPAIRS"]))
-        self.assertEqual(fields_["board_params.duty_per_volt_numerator"][:2], (4, False))
-        self.assertIn("board_params.fieldweak.idref_q13[17]", fields_)
+def test_the_fields_are_read_with_their_names_sizes_and_signs(tmp_path):
+    found = {path: (size, signed, value) for path, size, signed, value in host_values(ROOT / "userparams.h", tmp_path)}
+    text = (ROOT / "userparams.h").read_text(encoding="utf-8")
+    numbers = {name: float(number) for name, number in re.findall(r"^#define +(\w+) +(-?[\d.]+)\b", text, re.MULTILINE)}
+    assert found["board_params.lock_periods"] == (2, False, numbers["LOCK_TIME"])
+    assert found["board_params.kcurr_a"] == (2, True, round(numbers["KCURRA"] * 32768))
+    assert found["board_params.maximum_erpm"] == (2, True, numbers["MAXIMUM_SPEED_RPM"] * numbers["NOPOLESPAIRS"])
+    assert found["board_params.duty_per_volt_numerator"][:2] == (4, False)
+    assert "board_params.fieldweak.idref_q13[17]" in found
 
 
-@unittest.skipUnless(xc16(), "xc16-gcc is not on PATH; give XC16=folder")
-class Constants(unittest.TestCase):
-    def compare(self, text: str) -> None:
-        with tempfile.TemporaryDirectory() as name:
-            header = Path(name) / "userparams.h"
-            header.write_text(text, encoding="utf-8")
-            pairs = values(header, Path(name), xc16())
-        self.assertGreater(len(pairs), 100)
-        self.assertGreater(sum(host != 0 for _, host, _ in pairs), 90)
-        self.assertEqual([f"{path}: {host} on the PC, {target} on the target" for path, host, target in pairs if host != target], [])
-
-    def test_every_field_of_the_projects_own_parameters(self):
-        self.compare((ROOT / "userparams.h").read_text(encoding="utf-8"))
-
-    def test_every_field_of_other_parameters(self):
-        rng = random.Random(16)
-        original = (ROOT / "userparams.h").read_text(encoding="utf-8")
-        self.assertGreater(len(NUMBER.findall(original)), 40)
-        for turn in range(12):
-            with self.subTest(turn=turn):
-                self.compare(NUMBER.sub(lambda m: f"{m[1]}{float(m[2]) * rng.uniform(0.9, 1.1):.7g}", original))
-
-
-if __name__ == "__main__":
-    unittest.main()
+@with_compiler
+@pytest.mark.parametrize("seed", [None, *range(12)])
+def test_every_field_is_the_same_for_the_projects_own_parameters_and_for_others(tmp_path, seed):
+    text = (ROOT / "userparams.h").read_text(encoding="utf-8")
+    assert len(NUMBER.findall(text)) > 40
+    if seed is not None:
+        rng = random.Random(seed)
+        text = NUMBER.sub(lambda m: f"{m[1]}{float(m[2]) * rng.uniform(0.9, 1.1):.7g}", text)
+    header = tmp_path / "userparams.h"
+    header.write_text(text, encoding="utf-8")
+    pairs = values(header, tmp_path, xc16())
+    assert len(pairs) > 100 and sum(host != 0 for _, host, _ in pairs) > 90
+    assert [f"{path}: {host} on the PC, {image} on the chip" for path, host, image in pairs if host != image] == []
