@@ -308,8 +308,7 @@ def current_limit(v, _):
         for i_d in wanted:
             ref_d = ref.clamp(i_d, -most, most)
             limit = ref.iq_limit(maximum, ref_d)
-            v.rows.append([maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d, limit])
-            v.compare([math.sqrt(maximum ** 2 - ref_d ** 2)], [limit])
+            v.add((maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d), [limit], [math.sqrt(maximum ** 2 - ref_d ** 2)])
 
 
 # ---- estimator ------------------------------------------------------------------------------------------------------
