@@ -8,7 +8,7 @@
 
 #include "unity.h"
 
-enum { REGISTERS_MOST = 256 };
+enum { REGISTERS_MOST = 1024 }; /* words of the chip's register space */
 
 /** A register and its value. */
 typedef struct {
