@@ -241,10 +241,10 @@ class _Region:
 
     def negate(self, first, after):
         inside = self.tokens[first:after]
-        if len([t for t in inside if t.text in ("<", "<=", ">", ">=", "==", "!=")]) == 1 and not any(t.text in ("&&", "||") for t in inside):
+        joined = any(t.text in ("&&", "||") for t in inside)
+        comparisons = [t for t in inside if t.text in ("<", "<=", ">", ">=", "==", "!=")]
+        if not joined and (len(comparisons) == 1 or inside and inside[0].text == "!"):
             return # the operator's own mutants contain the negation
-        if inside and inside[0].text == "!" and not any(t.text in ("&&", "||") for t in inside):
-            return
         start, end = inside[0].start, inside[-1].end
         self.add("condition", start, end, "!(" + " ".join(self.text[start:end].split()) + ")")
 

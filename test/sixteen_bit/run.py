@@ -95,8 +95,8 @@ class Builder:
         runner = self.out / f"{name}{part}_runner.c"
         declared = "\n".join(f"void {test}(void);" for test, _ in tests)
         calls = "\n".join(f'    UnityDefaultTestRun({test}, "{test}", {line});' for test, line in tests)
-        runner.write_text(f'#include "unity.h"\nint test_main(void);\n{declared}\nint test_main(void)\n{{\n    UnityBegin("test/{name}.c");\n'
-                          f"{calls}\n    return UNITY_END();\n}}\n", encoding="utf-8")
+        runner.write_text(f'#include "unity.h"\nint test_main(void);\n{declared}\nint test_main(void)\n{{\n'
+                          f'    UnityBegin("test/{name}.c");\n{calls}\n    return UNITY_END();\n}}\n', encoding="utf-8")
         objects = [test, self.compile(runner, runner.with_suffix(".o"), ["-w"]), *self.objects, self.library]
         elf = self.out / f"{name}{part}.elf"
         command = []

@@ -197,7 +197,8 @@ void test_speed_is_back_emf_over_Kphi_with_the_sign_of_Eq_or_of_the_filtered_spe
         { "just short of it", 0, 8433, 20000, 8433 },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        TEST_ASSERT_EQUAL_INT16_MESSAGE((int32_t)cases[n].sum * 7956 >> 11, speed_of(cases[n].e_d, cases[n].e_q, cases[n].filtered), cases[n].what);
+        int16_t speed = speed_of(cases[n].e_d, cases[n].e_q, cases[n].filtered);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE((int32_t)cases[n].sum * 7956 >> 11, speed, cases[n].what);
     }
     TEST_ASSERT_INT16_WITHIN(3, 5000, speed_of(0, 1287, 5000)); /* 4.180 V of phase back-EMF at 1000 rpm */
 }
