@@ -15,7 +15,7 @@ FAST = ["-O0", "-g0", "-w", "-Dalways_inline=unused", "-DUNITY_TEST_ABORT()=_Exi
 LONG = ["-O1", "-g0", "-w"]           # those that run longer than this:
 LONG_SECONDS = 0.2
 SHIPPED = ["-O2", "-g0", "-w"]        # the firmware, to see whether a change reaches it at all
-SOURCES = ("include", "firmware", "tools/host", "tools/board", "test/unit", "test/behaviour", "test/board", "docs", "tuning")
+SOURCES = ("include", "firmware", "tools/plant", "tools/chip", "tools/vboard", "tools/cpu_host", "test/unit", "test/behaviour", "test/chip", "docs", "tuning")
 DEFINES = re.compile(r"/\* defines: (.*?) \*/")
 FAILED_TEST = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):FAIL", re.M)
 
@@ -113,10 +113,10 @@ class Suite:
             raise BuildError("no Unity: run make test first")
         vendor = os.path.relpath(vendor, self.base)
         frame = [self.unit(f"{vendor}/unity/src/unity.c", []), self.unit(f"{vendor}/cmock/src/cmock.c", [])]
-        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/**/*.c"))] + ["tools/host/xc.c"]
+        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/**/*.c"))] + ["tools/cpu_host/xc.c"]
         self.firmware = {u.object: u for u in (self.unit(source, []) for source in firmware)}
         if behaviour: # the virtual board runs for minutes of motor time: all of it optimized
-            board = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("tools/board/*.c"))]
+            board = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("tools/*/*.c")) if p.name != "xc.c"]
             self.bench = [self.unit(source, [], SHIPPED) for source in (*board, *firmware) if not source.endswith("/main.c")]
         mocks, plans = {}, []
         for name in (*names, *behaviour):

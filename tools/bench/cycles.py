@@ -311,7 +311,7 @@ def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
     load = 100.0 * data["spreads"][WITH]["mean"] / PERIOD_CYCLES
     rows.append(["load of the core with field weakening", f"{100.0 * data['note_us'][WITH][1] / 50.0:.0f} %", f"{load:.0f} %", ""])
     rows.append(["deepest stack seen", "", f"{data['stack_bytes']} bytes", ""])
-    return ["min / mean / max", "note, us", "cycles", "us"], rows
+    return ["min / mean / max", "AN1292, us", "cycles", "us"], rows
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------

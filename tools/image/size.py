@@ -22,7 +22,7 @@ from .sources import Sources
 
 OUT = paths.ROOT / "build" / "target"
 BOARD = paths.ROOT / "firmware" / "board"
-NOTE_TITLE = "as in the note"
+NOTE_TITLE = "as in AN1292"
 
 
 @dataclass
@@ -200,7 +200,7 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
              cell(row["ram_budget"])]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
-    return ["bytes", "note: flash", "flash", "budget", "note: RAM", "RAM", "budget"], body
+    return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
