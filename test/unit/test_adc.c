@@ -1,9 +1,12 @@
 /* ADC1's registers against the device facts: four channels at once, signed fractional, started by the PWM. */
 #include "registers.h"
 
-#define AD1CON1 (*registers_watch(&AD1CON1)) /* the last access switches the converter on */
+static volatile AD1CON1BITS *const control_bits = &AD1CON1bits;
+
+/* The access to the bits switches the converter on. */
+#define AD1CON1bits (*((void)registers_watch(&AD1CON1), control_bits))
 #include "firmware/board/adc.c"
-#undef AD1CON1
+#undef AD1CON1bits
 
 void setUp(void)
 {
