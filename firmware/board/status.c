@@ -6,6 +6,7 @@
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "board/text.h"
+#include "version.h"
 
 #define STATUS_PERIOD_MS 500u
 
@@ -26,10 +27,10 @@ static char *put_line(void)
     return at;
 }
 
-/** The first line: "reset BOR POR". */
+/** The first line: "foc33 0.9.0 reset BOR POR". */
 static char *put_reset(void)
 {
-    char *at = text_put(line, "reset");
+    char *at = text_put(line, "foc33 " FOC33_VERSION " reset");
 #define PUT_CAUSE(bit, name, meaning) \
     if (RESET_WAS(name, board_reset_cause)) { \
         at = text_put(at, " " #name); \

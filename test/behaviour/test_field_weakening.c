@@ -33,7 +33,7 @@ void test_reaches_5500_rpm_without_load(void)
 void test_voltage_never_leaves_its_circle(void)
 {
     run_at(2800.0);
-    press_s3();
+    press("input.s3");
     turn_to_rpm(5500.0);
     measured_t m = measure(1.5);
     TEST_ASSERT_TRUE(m.v_max_share > 0.9); /* it is used */
@@ -79,7 +79,6 @@ void test_speed_range_switched_at_the_upper_end_follows_the_ramp(void)
 {
     run_at(2800.0);
     press("input.s3"); /* the potentiometer stays at its end: straight to maximum speed */
-    bench_fast = 1;
     measured_t m = measure(1.5);
     TEST_ASSERT_TRUE(m.rpm_max < 1.03 * MAXIMUM_SPEED_RPM);
     (void)assert_holds(5500.0, 0.3);

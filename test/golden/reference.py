@@ -59,7 +59,7 @@ def nearest(x):
 
 
 def q15(x):
-    """Q15 of a fraction as the note rounds it: positive by 32767, negative by 32768, then half up and truncated."""
+    """Q15 of a fraction as AN1292 rounds it: positive by 32767, negative by 32768, then half up and truncated."""
     return int(x * 32768 - 0.5) if x < 0 else int(x * 32767 + 0.5)
 
 

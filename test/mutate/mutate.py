@@ -19,7 +19,7 @@ from pathlib import Path
 import mutants
 import suite
 
-FILES = ("include/control/*.h", "include/drive/*.h", "include/board/*.h", "firmware/control/*.c", "firmware/drive/*.c", "firmware/board/*.c")
+FILES = ("include/*/**/*.h", "firmware/**/*.c")
 # Tables of names, ranges and texts: build-time checks and documents read them, not the control law.
 NOT_MUTATED = ("include/drive/param_table.h", "include/drive/faults.h", "firmware/drive/param_check.c", "firmware/board/config.c")
 PARAMETER_FILES = ("include/drive/param_scaling.h", "include/drive/param_init.h")

@@ -31,6 +31,14 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.frame.cos = any(-32767, 32767);
     drive.forced.speed_q10 = any_l(0, params.forced.end_speed_q10);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
+    drive.run.handover.waited_steps = ANYU16();
+    drive.run.handover.agreed_steps = ANYU16();
+    drive.run.handover.speed_is_preset = any_u(0, 1);
+    drive.run.handover.offset = ANY16();
+    drive.run.handover.id_q13 = any((int16_t)-current_max, current_max);
+#ifdef TUNING
+    drive.run.tuning_q16 = ANYU16();
+#endif
     drive.run.stall_steps = any_u(0, params.stall_slots);
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_slots);
 }
@@ -59,13 +67,10 @@ static void any_estimator(estimator_t *e)
 static void any_control(drive_control_t *c)
 {
     c->reference_erpm = any(-32767, 32767); /* TORQUE_MODE: the estimated speed */
-    c->tuning_low = ANYU16();
     c->ref_q13.d = any((int16_t)-current_max, current_max);
     c->ref_q13.q = any((int16_t)-current_max, current_max);
     c->iq_limit_q13 = any(0, current_max);
     c->brake_limit_q13 = any(0, current_max);
-    c->handover_q13 = any((int16_t)-current_max, current_max);
-    c->handover_offset = ANY16();
     c->i_q13.d = ANY16();
     c->i_q13.q = ANY16();
     c->v_q14.d = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
@@ -104,7 +109,7 @@ static void bounds_hold_again(void)
     //@ check ref_q: -current_max <= c->ref_q13.q <= current_max;
     //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;
     //@ check brake_limit: 0 <= c->brake_limit_q13 <= current_max;
-    //@ check handover: -current_max <= c->handover_q13 <= current_max;
+    //@ check handover: -current_max <= drive.run.handover.id_q13 <= current_max;
     //@ check v_d: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max;
     //@ check v_q: -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;
     //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;

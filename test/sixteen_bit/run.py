@@ -13,7 +13,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import vectors
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import vectors # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 SIMULATOR_FAILED = 255  # exit code; below, it is the number of failed tests
@@ -47,7 +48,7 @@ def told(result: tuple[str, str] | None) -> str:
 
 @dataclass
 class Outcome:
-    """What one test file gave on the target."""
+    """What one test file gave in the simulator."""
     results: dict[str, tuple[str, str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     images: int = 0
@@ -60,6 +61,7 @@ class Builder:
         self.out, self.unity, self.runners = Path(options.out), Path(options.unity), Path(options.runners)
         self.compiler, self.linker = shlex.split(options.compile), shlex.split(options.link)
         self.library, self.simulator, self.cycles = options.library, options.simulator, options.cycles
+        self.flat = options.flat
         self.includes = [f"-I{HERE}", "-Itest/unit/support", f"-I{self.out}/golden", "-isystem", f"{self.unity}/src"]
         self.tables: list[Path] = []
         self.objects: list[Path] = []
@@ -126,10 +128,19 @@ class Builder:
                 todo[:0] = [part[:len(part) // 2], part[len(part) // 2:]]
         return done
 
+    def loadable(self, elf: Path) -> Path:
+        """What the simulator reads."""
+        if not self.flat:
+            return elf
+        from tools.image import load
+        image = elf.with_suffix(".image")
+        image.write_text(load.text(load.load(elf)), encoding="utf-8")
+        return image
+
     def simulate(self, name: str) -> Outcome:
         outcome = Outcome()
         for elf, count in self.images(name):
-            code, output, remark = run_command([self.simulator, str(elf), str(self.cycles), *map(str, self.tables)])
+            code, output, remark = run_command([self.simulator, str(self.loadable(elf)), str(self.cycles), *map(str, self.tables)])
             elf.with_suffix(".txt").write_text(output, encoding="utf-8")
             if code == SIMULATOR_FAILED or not re.search(rf"^{count} Tests \d+ Failures", output, re.MULTILINE):
                 last = RESULT.findall(output)[-1:]
@@ -172,6 +183,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--link", required=True, help="command with {objects}, {elf} and {map} in it")
     parser.add_argument("--library", required=True, help="archive of the control law for that chip")
     parser.add_argument("--simulator", required=True)
+    parser.add_argument("--flat", action="store_true", help="the simulator reads images as tools/image/load.py writes them")
     parser.add_argument("--runners", required=True, help="folder of the generated runners")
     parser.add_argument("--host", required=True, help="folder of the PC's executables")
     parser.add_argument("--out", required=True)

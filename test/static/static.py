@@ -29,7 +29,7 @@ CLANG_16_BIT = "--target=msp430 -ffreestanding -std=gnu99".split()
 CLANG_FLAGS = """-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wcomma -Wconditional-uninitialized
     -Wextra-semi -Wimplicit-fallthrough -Wmissing-prototypes -Wshift-sign-overflow -Wtautological-compare -Wunreachable-code
     -Werror -fsyntax-only""".split()
-INCLUDES = ["-Itools/host", "-Iinclude", "-I."]
+INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 
 
 @dataclass(frozen=True)

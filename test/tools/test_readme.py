@@ -37,7 +37,7 @@ class Counts(unittest.TestCase):
 
     def test_without_a_skipped_test_the_compiler_was_there(self):
         self.run_suites("a:x:PASS\n1 passed, 0 failed\nexit 0\n")
-        self.assertIn("| unit, board and closed-loop tests, those that need XC16 included | 1 |", readme.tests())
+        self.assertIn("| unit, board and closed-loop tests, with those that need XC16 | 1 |", readme.tests())
 
     def test_a_failed_test_keeps_the_readme_as_it_is(self):
         self.assertEqual(1, self.run_suites("a:x:FAIL: no\n0 passed, 1 failed\nexit 1\n"))

@@ -146,7 +146,7 @@ class AgainstTheCommand(unittest.TestCase):
             with self.subTest(motor=name), tempfile.TemporaryDirectory() as folder:
                 self.assertEqual(numbers(recalculated()[name].params), numbers(of(name).params))
                 (Path(folder) / "userparams.h").write_text("\n".join(recalculated()[name].lines) + "\n", encoding="utf-8")
-                build = subprocess.run([os.environ.get("CC", "gcc"), "-std=gnu99", "-fsyntax-only", f"-I{folder}", "-Itools/host", "-Iinclude",
+                build = subprocess.run([os.environ.get("CC", "gcc"), "-std=gnu99", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude",
                                         "firmware/drive/param_check.c"], cwd=paths.ROOT, capture_output=True, text=True, check=False)
                 self.assertEqual(build.stderr, "")
 

@@ -225,13 +225,16 @@ def every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
     assert not unused, unused
 
 
+BOARD_INCLUDES = ["-Itools/vboard", "-Itools/chip", "-Itools/plant"]
+
+
 def a_mode_means_the_same_in_userparams_and_on_the_command_line() -> None:
-    files = [str(f) for room in ("firmware", "tools/board") for f in sorted((ROOT / room).rglob("*.c"))]
+    files = [str(f) for room in ("firmware", "tools/cpu_host") for f in sorted((ROOT / room).rglob("*.c"))]
     with tempfile.TemporaryDirectory() as folder:
         for mode in re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE):
             text = USERPARAMS.replace(f"/* #define {mode} */", f"#define {mode}")
             (Path(folder) / "userparams.h").write_text(text, encoding="utf-8")
-            seen = [compiler([flag, *CFLAGS, "-Itools/host", "-Iinclude", "-I.", "-E", "-P", *files]) for flag in (f"-I{folder}", f"-D{mode}")]
+            seen = [compiler([flag, *CFLAGS, "-Itools/cpu_host", *BOARD_INCLUDES, "-Iinclude", "-I.", "-E", "-P", *files]) for flag in (f"-I{folder}", f"-D{mode}")]
             assert not any(done.returncode for done in seen), seen[0].stderr + seen[1].stderr
             differing = [line for line in zip(*(done.stdout.splitlines() for done in seen)) if line[0] != line[1]]
             assert seen[0].stdout == seen[1].stdout, f"{mode}: {differing[:1]}"

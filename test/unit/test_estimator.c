@@ -162,15 +162,6 @@ void test_eight_sample_voltage_is_turned_forward_by_three_and_a_half_steps(void)
     }
 }
 
-void test_small_turn_is_counter_clockwise_for_a_positive_angle(void)
-{
-    alphabeta_t x = estimator_turn(vector(8000, 0), 6554), y = estimator_turn(vector(0, 8000), 6554); /* 0.1 rad */
-    TEST_ASSERT_EQUAL_INT16(8000, x.alpha);
-    TEST_ASSERT_INT16_WITHIN(1, 800, x.beta);
-    TEST_ASSERT_INT16_WITHIN(1, -800, y.alpha);
-    TEST_ASSERT_EQUAL_INT16(8000, y.beta);
-}
-
 /* ---- Equation 2 and its sign ---- */
 
 /** Speed of a steady filtered back-EMF at a filtered speed. */

@@ -50,19 +50,6 @@ void test_look_ups_equal_the_reference_in_both_directions(void)
     }
 }
 
-void test_every_entry_is_read_at_its_own_speed(void)
-{
-    uint16_t n;
-    for (n = 0; n < FIELDWEAK_ENTRIES - 1u; n++) {
-        look_up((int16_t)(13000 + (int16_t)(n * 1024u)));
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n, fw.index, golden_row(n));
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(params.idref_q13[n], fw.table_q13, golden_row(n));
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(params.inv_kfi[n], tuning.inv_kfi, golden_row(n));
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE((uint16_t)(qm_muluu(params.ls_base_q16, (uint16_t)params.ls_over2ls0_q15[n]) >> 14),
-                                         tuning.ls_q16, golden_row(n));
-    }
-}
-
 void test_beyond_the_end_nothing_is_read_and_the_last_entry_holds_to_one_count(void)
 {
     static const int16_t beyond[] = { 13000 + 17 * 1024, 32767, -32767, INT16_MIN };
@@ -76,16 +63,6 @@ void test_beyond_the_end_nothing_is_read_and_the_last_entry_holds_to_one_count(v
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(16, fw.index, golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, -2000, fw.table_q13, golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, 9000, tuning.inv_kfi, golden_row(n));
-    }
-}
-
-void test_emf_limit_keeps_the_speed_in_16_bits(void)
-{
-    int16_t ref;
-    for (ref = 0; ref < 32000; ref = (int16_t)(ref + 777)) {
-        look_up(ref);
-        TEST_ASSERT_TRUE(qm_mulss(tuning.emf_sum_max_q12, tuning.inv_kfi) >> 11 <= 32767);
-        TEST_ASSERT_TRUE(qm_mulss(tuning.emf_sum_max_q12, tuning.inv_kfi) >> 11 > 32740);
     }
 }
 

@@ -36,6 +36,7 @@ void test_ramp_equals_the_reference_in_both_directions(void)
         tick = v.tick;
         TEST_ASSERT_EQUAL_INT32_MESSAGE(v.speed, forced.speed_q10, golden_row(n));
         TEST_ASSERT_EQUAL_HEX32_MESSAGE(v.angle, forced.angle_q32, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((uint16_t)(v.angle >> 16), forced_angle(&forced), golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE((int16_t)v.at_end, at_end, golden_row(n));
     }
     TEST_ASSERT_EQUAL_INT32(279620, forced.speed_q10); /* 1000 rpm of 5 pole pairs, and it stays there */
@@ -47,11 +48,4 @@ void test_end_speed_that_is_not_a_multiple_of_the_rate_is_not_passed(void)
     TEST_ASSERT_EQUAL_INT16(0, run(&odd, 1, 2));
     TEST_ASSERT_TRUE(run(&odd, 1, 1) != 0);
     TEST_ASSERT_EQUAL_INT32(25, forced.speed_q10);
-}
-
-void test_fraction_below_a_count_is_kept(void)
-{
-    static const forced_angle_params_t slow = { 100, 100 }; /* 0.0977 counts a period */
-    (void)run(&slow, 1, 10240);
-    TEST_ASSERT_EQUAL_UINT16(1000, forced_angle(&forced));
 }

@@ -81,15 +81,6 @@ void test_both_signs_wind_up_and_recover_alike(void)
     }
 }
 
-void test_output_rounds_toward_minus_infinity(void)
-{
-    gains.ki = 0;
-    gains.kp = 1;
-    TEST_ASSERT_EQUAL_INT16(0, pi_tick(&pi, &gains, 1023, 100));
-    TEST_ASSERT_EQUAL_INT16(1, pi_tick(&pi, &gains, 1024, 100));
-    TEST_ASSERT_EQUAL_INT16(-1, pi_tick(&pi, &gains, -1, 100));
-}
-
 void test_preset_makes_the_next_output_what_was_asked_for(void)
 {
     pi_preset(&pi, &gains, 300, 1234);

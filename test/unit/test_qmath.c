@@ -19,15 +19,6 @@ void test_products_and_upper_words_equal_the_reference(void)
     }
 }
 
-void test_upper_word_rounds_toward_minus_infinity(void)
-{
-    TEST_ASSERT_EQUAL_INT16(0, qm_hi(INT32_C(65535)));
-    TEST_ASSERT_EQUAL_INT16(1, qm_hi(INT32_C(65536)));
-    TEST_ASSERT_EQUAL_INT16(-1, qm_hi(-1));
-    TEST_ASSERT_EQUAL_INT16(-1, qm_hi(-INT32_C(65536)));
-    TEST_ASSERT_EQUAL_INT16(-2, qm_hi(-INT32_C(65537)));
-}
-
 void test_quotients_equal_the_reference(void)
 {
     GOLDEN_EACH(divide, v) {
@@ -43,12 +34,6 @@ void test_magnitude_difference_and_clamp_equal_the_reference(void)
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.sub, qm_sub_limited(v.a, v.b), golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.clamped, qm_clamp(v.a, low, high), golden_row(n));
     }
-}
-
-void test_sums_and_differences_of_angles_wrap_at_a_turn(void)
-{
-    TEST_ASSERT_EQUAL_HEX32(UINT32_C(0x00000001), qm_turn_add(UINT32_C(0xFFFFFFFF), 2));
-    TEST_ASSERT_EQUAL_HEX32(UINT32_C(0xC0000000), qm_turn_sub(UINT32_C(0x40000000), UINT32_C(0x80000000)));
 }
 
 void test_low_pass_equals_the_reference(void)

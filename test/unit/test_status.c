@@ -79,12 +79,12 @@ static void expect_first_line(uint16_t rcon, const char *text)
     TEST_ASSERT_EQUAL_STRING(text, sent);
 }
 
-void test_first_line_tells_the_cause_of_the_reset(void)
+void test_first_line_tells_the_version_and_the_cause_of_the_reset(void)
 {
-    expect_first_line(0x0003u, "reset BOR POR\r\n");
-    expect_first_line(0x0010u, "reset WDTO\r\n");
-    expect_first_line(0x0200u, "reset CM\r\n");
-    expect_first_line(0xFFFFu, "reset TRAPR IOPUWR CM EXTR SWR WDTO BOR POR\r\n");
+    expect_first_line(0x0003u, "foc33 " FOC33_VERSION " reset BOR POR\r\n");
+    expect_first_line(0x0010u, "foc33 " FOC33_VERSION " reset WDTO\r\n");
+    expect_first_line(0x0200u, "foc33 " FOC33_VERSION " reset CM\r\n");
+    expect_first_line(0xFFFFu, "foc33 " FOC33_VERSION " reset TRAPR IOPUWR CM EXTR SWR WDTO BOR POR\r\n");
     TEST_ASSERT_TRUE(sizeof line > strlen(sent));
 }
 

@@ -65,16 +65,6 @@ static duty_t lowest(duties_t d)
     return (d.c < low) ? d.c : low;
 }
 
-void test_highest_leg_changes_from_A_to_B_to_C_as_the_vector_turns_forward(void)
-{
-    uint16_t degree;
-    for (degree = 5; degree < 360u; degree = (uint16_t)(degree + 10u)) {
-        duties_t d = duties_at(7000, (angle_t)(degree * UINT32_C(65536) / 360u));
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE((degree < 60u || degree > 300u) ? d.a : (degree < 180u) ? d.b : d.c, highest(d), golden_row(degree));
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE((degree > 120u && degree < 240u) ? d.a : (degree > 240u) ? d.b : d.c, lowest(d), golden_row(degree));
-    }
-}
-
 void test_legs_are_centred_then_moved_out_of_the_window_then_limited_to_it(void)
 {
     uint32_t a;

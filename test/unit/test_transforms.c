@@ -87,13 +87,3 @@ void test_directions_of_inverse_park(void)
         TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].s, got.beta, cases[n].what);
     }
 }
-
-void test_park_holds_the_largest_vector_in_every_frame(void)
-{
-    uint32_t a;
-    for (a = 0; a < UINT32_C(65536); a += 64u) {
-        dq_t r = park_at(23170, -23170, (angle_t)a);
-        int32_t square = qm_mulss(r.d, r.d) + qm_mulss(r.q, r.q);
-        TEST_ASSERT_INT32_WITHIN_MESSAGE(INT32_C(25) * 16384, INT32_C(268425000), square, golden_row(a));
-    }
-}

@@ -277,7 +277,7 @@ def _read_tune(section: Section | None) -> dict[str, float]:
 @functools.cache
 def plant_ranges() -> dict[str, tuple[str, float, float]]:
     """Unit, minimum and maximum of the virtual board's keys of a motor, from its source: what runs only when it is built knows too late."""
-    text = (paths.ROOT / "tools" / "board" / "vb_keys.c").read_text(encoding="utf-8")
+    text = (paths.ROOT / "tools" / "vboard" / "vb_keys.c").read_text(encoding="utf-8")
     rows = re.findall(r'\b[PI]\("((?:motor|mech)\.\w+)", [\w.]+, \S+, (\S+), (\S+), "([^"]*)"', text)
     return {name: (unit, float(low), float(high)) for name, low, high, unit in rows}
 

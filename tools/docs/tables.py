@@ -30,7 +30,7 @@ def faults() -> str:
 
 
 def simulator() -> str:
-    found = rows("tools/iss33f", "assumptions.h", "ASSUMPTIONS", "#name #value meaning place")
+    found = rows("tools/cpu_33f", "iss_assumptions.h", "ASSUMPTIONS", "#name #value meaning place", also="tools/chip")
     return table("name, value, meaning, where", "lrll", [[f"`{name}`", *rest] for name, *rest in found])
 
 

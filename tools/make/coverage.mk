@@ -4,7 +4,7 @@
 coverage_flags = -std=gnu99 -O0 -g -fkeep-inline-functions -Dalways_inline=unused
 
 .PHONY: coverage
-coverage: setup-test ## lines and branches of the control law that the unit tests reach, 100 % of both required [build/coverage/index.html]
+coverage: setup-test ## [tests] the control law by the unit tests: 100 % of lines and branches required [build/coverage/index.html]
 	@test/static/need.sh gcovr=gcovr
 	@rm -rf build/coverage build/host-coverage build/test-coverage; mkdir -p build/coverage
 	@$(MAKE) -s VARIANT=coverage SAN= warnings=-w CC=$(call quoted,$(CC) --coverage) CFLAGS=$(call quoted,$(coverage_flags)) \

@@ -4,7 +4,7 @@ law_tests := $(filter-out $(patsubst test/%.c,%,$(shell grep -lE 'mock_|ideal_mo
 sixteen_bit = @$(python) test/sixteen_bit/run.py --unity $(unity) --runners $T --host $T
 
 avr_compile = avr-gcc -mmcu=atmega2560 -std=gnu99 -O2 -fno-ivopts -ffunction-sections -fdata-sections -Iinclude -I. $(DEFINES)
-avr_law := $(patsubst %.c,build/avr/%.o,$(wildcard firmware/control/*.c firmware/drive/*.c))
+avr_law := $(patsubst %.c,build/avr/%.o,$(wildcard firmware/control/*.c firmware/drive/*.c firmware/drive/*/*.c))
 
 build/avr/flags: FORCE
 	$(call remember,$(avr_compile) $(avr_law))
@@ -20,7 +20,7 @@ build/avr/sim: test/sixteen_bit/sim_avr.c test/sixteen_bit/run_image.h test/sixt
 	$(call say,cc,$@)$(CC) -std=gnu99 -O2 -Wall -Wextra -o $@ $< -lsimavr -lelf
 
 .PHONY: test-avr
-test-avr: setup-test ## the unit tests of the control law with a 16-bit int, in an AVR simulator; results as on the PC [ONLY="test_pi ..."]
+test-avr: setup-test ## [tests] the unit tests of the control law with a 16-bit int, in an AVR simulator
 	@test/static/need.sh avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev
 	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(law_tests))) build/avr/liblaw.a build/avr/sim
 	$(sixteen_bit) --out build/avr --library build/avr/liblaw.a --simulator build/avr/sim --compile $(call quoted,$(avr_compile)) \

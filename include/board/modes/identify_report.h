@@ -21,7 +21,7 @@ char *identify_status_line(char *line, const drive_t *d);
 /** Copies what has been measured to IdentifyParm. */
 void identify_watch(const drive_t *d);
 #else
-#define STATUS_LINE_BYTES 48
+#define STATUS_LINE_BYTES 64
 #endif
 
 /** The mode's status line. @return its end; the line itself without the mode */
