@@ -36,7 +36,7 @@ def parse(argv):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--compile", required=True, help="compiler and flags of the tests, without -c")
     parser.add_argument("--tests", nargs="*", default=[], metavar="unit/test_x", help="unit tests")
-    parser.add_argument("--scripts", nargs="*", default=[], metavar="unit/check_x", help="checks in Python, run for the parameters")
+    parser.add_argument("--scripts", nargs="*", default=[], metavar="unit/test_x", help="tests in Python, run for the parameters")
     parser.add_argument("--behaviour", nargs="*", default=[], metavar="behaviour/test_x", help="closed-loop tests")
     parser.add_argument("--closed-loop", action="store_true", help="survivors of the unit tests meet the closed-loop tests")
     parser.add_argument("--full", action="store_true", help="every mutant, not a sample")
@@ -201,7 +201,7 @@ def add_scripts(tests, names):
     notes = []
     reads = [*PARAMETER_FILES, "include/drive/drive.h"]
     for name in names:
-        note = tests.add_script(name, [sys.executable, f"test/{name}.py"], reads)
+        note = tests.add_script(name, [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"], reads)
         if note:
             notes.append(note)
     return notes

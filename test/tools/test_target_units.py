@@ -10,8 +10,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "test" / "target"), str(ROOT / "test")]
-import report # noqa: E402
+sys.path.insert(0, str(ROOT / "test" / "target"))
 import run as target_run # noqa: E402
 import vectors # noqa: E402
 
@@ -164,9 +163,9 @@ class OnTheTarget(unittest.TestCase):
         environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
         done = subprocess.run(["make", "-s", "test-target", "ONLY=test_pi test_trig"], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        suite = report.read_suite(ROOT / "build/target/test/report.txt")
-        self.assertEqual(suite.failures, [])
-        self.assertGreater(len(suite.passed), 20)
+        results = (ROOT / "build/target/test/report.txt").read_text()
+        self.assertNotIn(":FAIL", results)
+        self.assertGreater(results.count(":PASS"), 20)
 
     def test_an_unknown_test_is_one_line(self):
         environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}

@@ -1,6 +1,5 @@
 # The chip's peripherals and the lock-step comparison, on the virtual board with the simulator in it.
-pil_suites := pil/test_peripherals pil/test_lock_step
+pil_suites := $(call py_tests,pil)
 all_suites += $(pil_suites)
 
-$(call reports,$(pil_suites)): $T/%.txt: test/$$(subst .,/,%).py $B/libpil.so
-	@PIL_LIBRARY=$B/libpil.so $(alone) $(python) test/run-suite.py $@ $(python) test/run-unittest.py $<
+$(addprefix $T/made/,$(pil_suites)): $B/libpil.so
