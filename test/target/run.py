@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import vectors
+import golden_words
 
 HERE = Path(__file__).resolve().parent
 
@@ -65,7 +65,7 @@ class Builder:
 
     def shared(self) -> None:
         """Vectors, Unity and the console."""
-        self.tables = vectors.write(HERE.parent / "golden" / "vectors", self.out / "golden")
+        self.tables = golden_words.write(HERE.parent / "golden" / "vectors", self.out / "golden")
         self.objects = [self.compile(self.unity / "src/unity.c", self.out / "unity.o", ["-w"]),
                         self.compile(HERE / "console.c", self.out / "console.o", ["-Wall", "-Wextra"])]
 
@@ -76,7 +76,7 @@ class Builder:
         own = re.search(r"/\* defines: (.*?) \*/", "\n".join(text.splitlines()[:5]))
         copy = self.out / f"{name}.c"
         copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_text(vectors.fed(text, str(source)), encoding="utf-8")
+        copy.write_text(golden_words.fed(text, str(source)), encoding="utf-8")
         extra = ["-Wall", "-Wextra", f"-I{source.parent}", *(shlex.split(own[1]) if own else [])]
         runner = self.runners / f"{name}_runner.c"
         tests = LISTED.findall(runner.read_text(encoding="utf-8")) if runner.exists() else []

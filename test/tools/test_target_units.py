@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test" / "target"))
 import run as target_run # noqa: E402
-import vectors # noqa: E402
+import golden_words # noqa: E402
 
 # A compiler that copies, a linker with room for three tests, and a simulator in which every test passes but those named *_fails.
 COMPILER = """#!/bin/sh
@@ -46,32 +46,32 @@ exit $bad
 class Vectors(unittest.TestCase):
     def test_a_row_is_words_low_word_first_without_gaps(self):
         columns = [("a", "s16"), ("b", "s32"), ("c", "u16"), ("d", "u32")]
-        self.assertEqual(vectors.words(columns, ["-1", "-2", "65535", "65536"]), [0xFFFF, 0xFFFE, 0xFFFF, 0xFFFF, 0, 1])
+        self.assertEqual(golden_words.words(columns, ["-1", "-2", "65535", "65536"]), [0xFFFF, 0xFFFE, 0xFFFF, 0xFFFF, 0, 1])
 
     def test_header_keeps_type_rows_and_constants_and_fetches_rows(self):
-        text = vectors.header("x", 7, [("a", "s16"), ("b", "s32")], {"k": "5"}, [["1", "2"], ["3", "4"]])
+        text = golden_words.header("x", 7, [("a", "s16"), ("b", "s32")], {"k": "5"}, [["1", "2"], ["3", "4"]])
         for part in ("#define GOLDEN_X_K 5", "#define GOLDEN_X_ROWS 2u", "int32_t b;", "golden_x_t golden_x_row(uint32_t n)", "golden_fetch(7, n * 3u, &row,"):
             self.assertIn(part, text)
         self.assertNotIn("golden_x[", text)
 
     def test_a_file_with_constants_only_stays_as_it_is(self):
-        text = vectors.header("x", 7, [], {"k": "5"}, [])
+        text = golden_words.header("x", 7, [], {"k": "5"}, [])
         self.assertIn("#define GOLDEN_X_K 5", text)
         self.assertNotIn("golden_fetch", text)
 
     def test_every_access_to_a_row_becomes_a_call_and_lines_keep_their_numbers(self):
-        text = vectors.fed("one\ngolden_pi_t v = golden_pi[n];\ngolden_##name##_t row = golden_##name[n];\ntable[golden_sine[n + 1u].value]\n", "t.c")
+        text = golden_words.fed("one\ngolden_pi_t v = golden_pi[n];\ngolden_##name##_t row = golden_##name[n];\ntable[golden_sine[n + 1u].value]\n", "t.c")
         self.assertEqual(text, '#line 1 "t.c"\none\ngolden_pi_t v = golden_pi_row(n);\ngolden_##name##_t row = golden_##name##_row(n);\n'
                                "table[golden_sine_row(n + 1u).value]\n")
 
     def test_tests_of_the_project_have_no_access_that_is_missed(self):
         for path in sorted((ROOT / "test/unit").glob("test_*.c")):
             with self.subTest(path.name):
-                self.assertNotRegex(vectors.fed(path.read_text(encoding="utf-8"), path.name), r"golden_\w*(?:##\w+)?\[")
+                self.assertNotRegex(golden_words.fed(path.read_text(encoding="utf-8"), path.name), r"golden_\w*(?:##\w+)?\[")
 
     def test_tables_hold_every_row_of_the_vectors(self):
         with tempfile.TemporaryDirectory() as folder:
-            tables = vectors.write(ROOT / "test/golden/vectors", Path(folder))
+            tables = golden_words.write(ROOT / "test/golden/vectors", Path(folder))
             sizes = {table.stem: table.stat().st_size for table in tables}
             self.assertEqual(sizes["sincos"], 700 * 6)
             self.assertEqual(sizes["multiply"], 301 * 22)
