@@ -6,7 +6,8 @@ from support import SCENARIO, document, scenario
 
 from tools.common import paths
 from tools.common.errors import UserError
-from tools.bench.scenario import Rating, asks_for_rating, in_numbers, load, read
+from tools.bench.scenario import Rating, asks_for_rating, in_numbers
+from tools.bench.scenario_file import load, read
 
 EVENT = "[[event]]\nat_s = 1.0\n"
 MEASURE = "[[measure]]\nname = \"m\"\nfrom_s = 0.5\nto_s = 1.0\n"

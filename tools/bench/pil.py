@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tools.common import paths
-from . import build, command_common, scenario, simulate
+from . import build, command_common, scenario_file, simulate
 from .board import Board, BoardError, Library
 from tools.common.errors import UserError
 from .run import Run
@@ -183,7 +183,7 @@ def main(arguments: list[str]) -> int:
     """One scenario on an image, in a few lines."""
     if not 1 <= len(arguments) <= 2:
         raise UserError("an image and perhaps a scenario are needed", "command line", "python3 -m tools.bench.pil build/target/foc33.elf smoke")
-    item = scenario.load(arguments[1] if len(arguments) > 1 else "smoke")
+    item = scenario_file.load(arguments[1] if len(arguments) > 1 else "smoke")
     pil = library(item.defines)
     motor, board = command_common.parts_of(item, _NoOptions())
     with command_common.Progress(item.name, item.duration_s, False) as progress:

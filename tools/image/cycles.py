@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.bench import build, pil, pil_command, scenario, simulate
+from tools.bench import build, pil, pil_command, scenario_file, simulate
 from tools.common import command_line, paths, plant, workers
 from tools.common.errors import UserError
 from tools.bench.command_common import Progress
@@ -341,7 +341,7 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
     """The scenarios, recorded with the interrupt's cycles; all with the firmware as it is delivered."""
     jobs = []
     for name in names:
-        item = scenario.load(name)
+        item = scenario_file.load(name)
         if item.defines:
             raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
                             "measure scenarios of the firmware as it is delivered")
