@@ -9,7 +9,7 @@ import unittest
 from dataclasses import replace
 from pathlib import Path
 
-from tools.common import board_file, motor_file, paths, plant
+from tools.common import board_file, board_keys, motor_file, paths
 from tools.common.errors import UserError
 from tuning import cli, identify, params
 
@@ -218,7 +218,7 @@ class Refused(unittest.TestCase):
     def test_unknown_key(self):
         self.assertIn("unknown key 'load.lock'", self.refused(NAME, "--set", "load.lock=1"))
         with self.assertRaises(UserError):
-            identify.identify([motor_file.load(NAME)], "mclv", plant.Values({"no.key": 1.0}, {}))
+            identify.identify([motor_file.load(NAME)], "mclv", board_keys.Values({"no.key": 1.0}, {}))
 
 
 if __name__ == "__main__":

@@ -43,7 +43,3 @@ class Counts(unittest.TestCase):
         with mock.patch.object(readme, "README", page), self.assertRaisesRegex(SystemExit, r"^foc33: no picture, build/run/demo/speed.png: run `make readme`"):
             readme.main()
         self.assertEqual("as it was", page.read_text())
-
-
-if __name__ == "__main__":
-    unittest.main()

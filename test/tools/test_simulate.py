@@ -163,7 +163,3 @@ class Workers(unittest.TestCase):
     def test_a_crash_is_one_line_and_no_endless_wait(self):
         with self.assertRaisesRegex(UserError, "the simulation ended by itself, exit code -6"):
             workers.run_all([1], crash, lambda seconds: None)
-
-
-if __name__ == "__main__":
-    unittest.main()

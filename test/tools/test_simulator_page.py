@@ -18,7 +18,3 @@ class Page(unittest.TestCase):
         text = (ROOT / "tools/iss33f/assumptions.h").read_text(encoding="utf-8")
         self.assertEqual(PAGE.read_text(encoding="utf-8").count("\n| `") - sum(line.startswith("| `make") for line in PAGE.read_text().splitlines()),
                          text.count("    X("))
-
-
-if __name__ == "__main__":
-    unittest.main()

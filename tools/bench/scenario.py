@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tools.common.errors import UserError
-from tools.common.plant import Values
+from tools.common.board_keys import Values
 from .metrics import Measure
 
 BRAKE = "load.constant_nm"

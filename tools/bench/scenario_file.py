@@ -41,7 +41,7 @@
 """
 
 from tools.common import paths
-from tools.common.plant import Values
+from tools.common.board_keys import Values
 from tools.common.toml_file import Document, Section
 from .expect import read_expectation
 from .metrics import SPEEDS, Measure
