@@ -178,8 +178,8 @@ bench_py := $(call py_tests,tools) $(call py_tests,behaviour) $(call py_tests,fu
 tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,avr)
 modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
 
-# The longest first, so that none of them is left alone at the end; quick is what the edit loop of firmware and bench needs.
-slow_suites := $(addprefix tools/test_,spreadsheet tune_design tune_cli tune_start tune_header target_build)
+# The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust target_build),$(bench_py))
 longest := $(addprefix behaviour/test_,identify_motors fw_search) $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
 all_suites := $(tools_py) $(longest) $(filter-out $(longest),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
