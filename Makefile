@@ -194,7 +194,7 @@ run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unkn
     exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
     rm -rf $T/made $T/summary.json; $(MAKE) -k $(call stamps,$(call chosen,$1)) || true; \
     PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
-    --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1)) 9>&-
+    --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
 .PHONY: test test-quick setup-test setup-checks
 test: setup-test setup-checks ## every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
