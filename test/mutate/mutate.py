@@ -36,7 +36,7 @@ def parse(argv):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--compile", required=True, help="compiler and flags of the tests, without -c")
     parser.add_argument("--tests", nargs="*", default=[], metavar="unit/test_x", help="unit tests")
-    parser.add_argument("--scripts", nargs="*", default=[], metavar="unit/check_x", help="checks in Python, run for the parameters")
+    parser.add_argument("--scripts", nargs="*", default=[], metavar="unit/test_x", help="tests in Python, run for the parameters")
     parser.add_argument("--behaviour", nargs="*", default=[], metavar="behaviour/test_x", help="closed-loop tests")
     parser.add_argument("--closed-loop", action="store_true", help="survivors of the unit tests meet the closed-loop tests")
     parser.add_argument("--full", action="store_true", help="every mutant, not a sample")
@@ -221,7 +221,7 @@ def main(argv=None):
     try:
         tests.prepare(arguments.tests, behaviour)
         for name in arguments.scripts:
-            note = tests.add_script(name, [sys.executable, f"test/{name}.py"], [*PARAMETER_FILES, "include/drive/drive.h"])
+            note = tests.add_script(name, [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"], [*PARAMETER_FILES, "include/drive/drive.h"])
             if note:
                 print(note, file=sys.stderr)
         print(f"{len(tests.tests)} tests built and passed in {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.common import command_line, paths, plant, workers
+from tools.common import board_file, command_line, motor_file, paths, workers
 from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
@@ -302,12 +302,11 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
     """The scenarios, recorded with the interrupt's cycles; all with the firmware as it is delivered."""
     jobs = []
     for name in names:
-        item = scenario.load(name)
+        item = scenario_file.load(name)
         if item.defines:
             raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
                             "measure scenarios of the firmware as it is delivered")
-        job = simulate.prepare(item, library, plant.read_motor(item.motor, item.motor_where),
-                               plant.read_board(item.board, item.board_where))
+        job = simulate.prepare(item, library, motor_file.part(item.motor, item.motor_where), board_file.part(item.board, item.board_where))
         job.signals += [signal for signal in SIGNALS if signal not in job.signals]
         jobs.append(job)
     return jobs
