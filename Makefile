@@ -29,12 +29,15 @@ warnings += -Wno-sign-conversion # the checks that the compiler inserts make it 
 sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
-CFLAGS := -std=gnu99 -O2 -g -fPIC -ftrack-macro-expansion=0 $(sanitizer)
-INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/host -Iinclude -I.
+CFLAGS := -std=gnu99 -O2 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
+INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/cpu_host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
 
-firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c) tools/host/xc.c)
-board_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/board/*.c))
+# The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.
+board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
+board_includes := $(board_rooms:%=-I%)
+firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c firmware/*/*/*.c) tools/cpu_host/xc.c)
+board_objects := $(patsubst %.c,$B/%.o,$(filter-out tools/cpu_host/xc.c,$(wildcard $(board_rooms:%=%/*.c))))
 
 part_makefiles := $(wildcard tools/make/*.mk)
 
@@ -51,10 +54,13 @@ known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) $(f
     echo foc33: $(call quoted,no mode $(word)$(comma) DEFINES=$(DEFINES)): 'use $(modes:%=-D%) or -DNAME=value' >&2; exit 2)
 
 # ---- help ----------------------------------------------------------------------------------------------------------------
+# A target's line: "## [group] what it does [variables]".
+help_groups := run 'your motor' 'your board' tests simulator upkeep
 .PHONY: help
-help: ## this list
-	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' Makefile $(part_makefiles) | while IFS='|' read -r target text; do \
-	    printf 'make %-12s %s\n' "$$target" "$$text"; done
+help: ## [upkeep] this list
+	@for group in $(help_groups); do printf '%s\n' "$$group"; \
+	    sed -n "s/^\([a-z0-9-]*\):.*## \[$$group\] \(.*\)/\1|\2/p" Makefile $(part_makefiles) | while IFS='|' read -r target text; do \
+	    printf '  make %-12s %s\n' "$$target" "$$text"; done; done
 
 # ---- runs ----------------------------------------------------------------------------------------------------------------
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
@@ -72,44 +78,44 @@ options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(paramet
 ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief),$(MAKE) vboard)
 
 .PHONY: run scenarios list-motors table2 starts motors robust setup-run
-run: setup-run ## the firmware turns the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR=name BOARD=name OUT=folder]
+run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= OUT=folder]
 	@+$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
 
-scenarios: setup-run ## what make run SCENARIO=name can run
+scenarios: setup-run ## [run] list the scenarios of make run SCENARIO=name
 	@$(front_end) scenarios
 
-list-motors: setup-run ## the motor files of tuning/motors: data and rating
+list-motors: setup-run ## [your motor] the motor files of tuning/motors: data and rating
 	@$(front_end) motors
 
-table2: setup-run ## the eight rows of the note's Table 2 beside ours [MOTOR=name OUT=folder]
+table2: setup-run ## [run] the eight rows of AN1292's Table 2 beside ours [MOTOR= OUT=]
 	@+$(ready)
 	@$(front_end) table2 $(options)
 
-starts: setup-run ## starts from every rotor angle under several loads [MOTOR=name OUT=folder]
+starts: setup-run ## [run] starts from every rotor angle under several loads [MOTOR= OUT=]
 	@+$(ready)
 	@$(front_end) starts $(options)
 
-motors: setup-run ## every motor of tuning/motors with its own header: 20, 50 and 100 % of rated speed at half the rated torque [OUT=folder]
+motors: setup-run ## [your motor] every motor with its own header: 20, 50, 100 % of rated speed at half torque [BOARD= OUT=]
 	@$(tuner) motors $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
 
-robust: setup-run ## how far R, L and Kphi may be off before a start fails [MOTOR=name OUT=folder]
+robust: setup-run ## [run] how far R, L and Kphi may be off before a start fails [MOTOR= OUT=]
 	@+$(ready)
 	@$(front_end) robust $(options)
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
 .PHONY: tune tune-fw identify spreadsheet userparams setup-tune
-tune: setup-run ## from a motor's data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD=name OUT=folder]
+tune: setup-run ## [your motor] data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD= OUT=]
 	@$(tuner) tune $(tune_motor) $(board) $(out)
 
-tune-fw: setup-run ## field-weakening tables found on the virtual board, into tuning/tables/NAME.toml [MOTOR=hurst_dmb0224c10002 OUT=folder]
+tune-fw: setup-run ## [your motor] search the field-weakening tables, into tuning/tables/NAME.toml [MOTOR= BOARD= OUT=]
 	@$(tuner) tune-fw $(tune_motor) $(board) $(out)
 
-identify: setup-run ## R, L and Kphi as the IDENTIFY firmware measures them on the virtual board [MOTOR=hurst_dmb0224c10002 or all, OUT=folder]
+identify: setup-run ## [your motor] R, L and Kphi as the IDENTIFY firmware measures them [MOTOR=name or all, BOARD= OUT=]
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
 
-userparams: setup-run ## write userparams.h anew for a motor; yours is kept as userparams.h.old, .old2 ... [MOTOR=hurst_dmb0224c10002]
+userparams: setup-run ## [your motor] install the tuned header; yours is kept as userparams.h.old [MOTOR= BOARD=]
 	@$(tuner) tune $(tune_motor) $(board) --brief
 	@new=$(call quoted,build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h); \
 	if cmp -s "$$new" userparams.h; then echo "userparams.h is up to date"; exit; fi; \
@@ -117,32 +123,32 @@ userparams: setup-run ## write userparams.h anew for a motor; yours is kept as u
 	if test -e userparams.h; then cp userparams.h $$old || exit; echo "yours is kept as $$old"; fi; \
 	cp "$$new" userparams.h && echo "userparams.h written"
 
-spreadsheet: setup-tune ## write tuning/tuning_params.xlsx anew
+spreadsheet: setup-tune ## [upkeep] write tuning/tuning_params.xlsx
 	@$(tuner) spreadsheet
 
 setup-tune:
 	@tools/setup/prepare.sh tune
 
 .PHONY: readme bench
-readme: ## run what the README's tables and pictures show, and write them into it
+readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
 	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all"; do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
 	@if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done; fi
 	@$(python) tools/docs/readme.py
 
-bench: vboard ## how many motor seconds the virtual board simulates in a second of one core
-	@$(compile) -Itools/board -o $B/bench test/board/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench
+bench: vboard ## [simulator] motor seconds that the virtual board simulates in one second of one core
+	@$(compile) $(board_includes) -o $B/bench test/chip/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench
 
 setup-run:
 	@tools/setup/prepare.sh run
 
 # ---- firmware and virtual board on the PC --------------------------------------------------------------------------------
 .PHONY: lib vboard FORCE
-lib: $B/libfirmware.a ## build/host/libfirmware.a: the firmware for the PC [DEFINES=-D... USERPARAMS=folder VARIANT=name SAN=1]
+lib: $B/libfirmware.a ## [run] build/host/libfirmware.a: the firmware as a PC library [DEFINES=-D... USERPARAMS=folder VARIANT= SAN=1]
 	@:
 
-vboard: $B/libvboard.so ## build/host/libvboard.so: the virtual board with the firmware in it [the same variables]
+vboard: $B/libvboard.so ## [run] build/host/libvboard.so: the virtual board with the firmware in it [as lib]
 	@:
 
 $B/flags: FORCE
@@ -153,6 +159,8 @@ $B/flags: FORCE
 
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
+
+$(board_objects): private INCLUDES += $(board_includes)
 
 $B/%.o: %.c $B/flags
 	@mkdir -p $(@D)
@@ -171,15 +179,15 @@ c_tests = $(patsubst test/%.c,%,$(wildcard test/$1/test_*.c))
 py_tests = $(patsubst test/%.py,%,$(wildcard test/$1/test_*.py))
 
 unit_c := $(call c_tests,unit)
-board_c := $(call c_tests,board)
+board_c := $(call c_tests,chip)
 behaviour_c := $(call c_tests,behaviour)
 source_py := $(call py_tests,unit) $(call py_tests,golden)
 bench_py := $(call py_tests,tools) $(call py_tests,behaviour) $(call py_tests,fuzz)
-tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,avr)
-modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
+tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,sixteen_bit)
+modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust target_build),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust image_build),$(bench_py))
 longest := $(addprefix behaviour/test_,identify_motors fw_search) $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
 all_suites := $(tools_py) $(longest) $(filter-out $(longest),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
@@ -197,10 +205,10 @@ run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unkn
     --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
 .PHONY: test test-quick setup-test setup-checks
-test: setup-test setup-checks ## every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
+test: setup-test setup-checks ## [tests] every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
 	$(call run_suites,$(all_suites),$(if $(ONLY),,--summary $T/summary.json))
 
-test-quick: setup-test ## the tests for the edit loop, under 30 s [ONLY="test_pi ..."]
+test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ..."]
 	$(call run_suites,$(quick_suites))
 
 # In one go and in sight; each check's own target looks again for what it alone needs.
@@ -233,12 +241,12 @@ $(golden_stamp): $(wildcard test/golden/vectors/*.txt) test/golden/to_c.py
 build/golden/golden_%.h: $(golden_stamp) ;
 
 .PHONY: golden
-golden: setup-run ## write the golden vectors anew from the reference model
+golden: setup-run ## [upkeep] write the golden vectors from the reference model
 	@$(python) test/golden/generate.py
 
 # A test's own flags stand in its first lines: /* defines: -DTUNING */. They act on the test and its runner, not on the library.
 own_defines = $$(sed -n '1,5s@.*/\* defines: \(.*\) \*/.*@\1@p' $1)
-test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support -Itools/board $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
+test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes) $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
     -isystem $(unity)/src -isystem $(cmock)/src -DUNITY_INCLUDE_CONFIG_H $(DEFINES)
 
 $T/flags: FORCE
@@ -285,7 +293,7 @@ c_executables := $(addprefix $T/,$(unit_c) $(board_c) $(behaviour_c))
 $(c_executables): %: %.o %_runner.o $T/unity.o $T/cmock.o
 	$(quiet)$(CC) $(sanitizer) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lm
 $(addprefix $T/,$(unit_c)): $B/libfirmware.a
-$(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/host/xc.o
+$(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/cpu_host/xc.o
 $(addprefix $T/,$(behaviour_c)): $(board_objects) $B/libfirmware.a
 
 $T/made/%:
@@ -303,18 +311,18 @@ include $(part_makefiles)
 
 # ---- checks and cleaning -------------------------------------------------------------------------------------------------
 .PHONY: warnings sanitize clean
-warnings: ## compile everything in every mode with warnings as errors
+warnings: ## [tests] compile every mode with warnings as errors
 	@for mode in "" $(modes:%=-D%); do \
 	    $(MAKE) WERROR=1 SAN= VARIANT=warnings-"$${mode:-default}" DEFINES="$$mode" lib vboard || exit 1; done
 
-sanitize: setup-run ## the demo under -fsanitize=undefined,address [SCENARIO=demo]
+sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCENARIO=demo]
 	@$(MAKE) SAN=1 vboard
 	@LD_PRELOAD="$$($(CC) -print-file-name=libasan.so) $$($(CC) -print-file-name=libubsan.so)" \
 	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	    $(front_end) run $(call quoted,$(SCENARIO)) --library build/host-san/libvboard.so --no-plots \
 	    --out $(call quoted,$(or $(OUT),build/run/sanitize))
 
-clean: ## remove what was built and run (build/gems and build/setup stay; rm -r build removes them too)
+clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
 	@rm -rf build/host* build/test* build/target* build/size build/golden build/run
 
 -include $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)

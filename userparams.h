@@ -5,7 +5,7 @@
  *
  * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep
  * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,
- * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/params.h; the table at the end shows them.
+ * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them.
  *
  * Note: 24 V are too low for the rated torque at rated speed: about 0.063 N m of 0.08 N m at 2800 rpm; raise the supply voltage,
  * or lower the rated speed to 2300 rpm */
@@ -21,7 +21,7 @@
 /* #define IDENTIFY */              /* measure R, L and Kphi of the motor instead of running it (docs/tuning.md) */
 /* #define PARAMS_IN_RAM */         /* a debugger can change every parameter while the motor turns; TUNING does it too */
 
-/* ---- Motor: Hurst DMB0224C10002, star, values per phase of the star ----------------------------------------------- */
+/* ---- Motor, values per phase of the star: Hurst DMB0224C10002, star ----------------------------------------------- */
 #define NOPOLESPAIRS 5              /* [pairs]         1 .. 50        pole pairs */
 #define MOTOR_RS_OHM 2.67           /* [ohm]           0.01 .. 40     phase resistance: half of line to line */
 #define MOTOR_LS_MH 1.92            /* [mH]            0.01 .. 30     phase inductance: half of line to line */
@@ -32,7 +32,7 @@
 #define NOMINAL_BUS_V 24.0          /* [V]             10 .. 48       supply; the unit of voltage follows from it */
 #define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.00014 PWM and control period */
 #define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003 dead time of the bridge */
-#define NORM_CURRENT_CONST 0.0001342773 /* [A/count]       0.00001 .. 0.002 current of one count: full scale / 32768 (here 4.4 A); calibrate with a probe */
+#define NORM_CURRENT_CONST 0.0001342773 /* [A/count]       0.00001 .. 0.002 current of one count, full scale / 32768; calibrate with a probe: 4.4 A full scale */
 #define KCURRA -0.5                 /* [1]             -0.6 .. 0.6    gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
 #define KCURRB -0.5                 /* [1]             -0.6 .. 0.6    gain of phase B's current */
 #define BUS_FULL_SCALE_V 52.8       /* [V]             20 .. 200      bus voltage that gives full scale at the converter */
@@ -46,8 +46,8 @@
 #define TUNING_DELAY_RAMPUP 0xF     /* [periods]       0 .. 4095      TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods */
 
 /* ---- Start: lock, ramp, hand-over --------------------------------------------------------------------------------- */
-#define LOCK_TIME 4000              /* [periods]       200 .. 32000   0.2 s: rotor held at a fixed angle (two directions, half the time each) */
-#define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over (back-EMF 4.18 V) */
+#define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each): 0.2 s */
+#define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
 #define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of lock and ramp: pull-out torque 0.0844 N m */
 
@@ -58,7 +58,7 @@
 #define UNDER_VOLTAGE_V 12.0        /* [V]             5 .. 45        bus below trips while running */
 #define REGEN_LIMIT_V 27.0          /* [V]             11 .. 90       braking current is reduced from here, to nothing 2 V higher */
 
-/* ---- Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h - */
+/* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
 #define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 60 degrees, 60 over the parameter set */
 
@@ -67,7 +67,7 @@
 #define KFILTER_ESDQ_FW 1200        /* [Q15]           10 .. 8000     back-EMF above: 119 Hz */
 #define KFILTER_VELESTIM 748        /* [Q15]           10 .. 8000     speed for loop, thresholds and display: 74 Hz */
 
-/* ---- Field weakening: one entry every 1024 electrical rpm (204.8 rpm with 5 pole pairs) of speed reference -------- */
+/* ---- Field weakening: a table entry every 1024 electrical rpm of speed reference, 204.8 rpm with 5 pole pairs ----- */
 #define FW_START_SPEED_RPM 2640     /* [rpm]           100 .. 20000   speed reference of entry 0 */
 #define FW_TRIM_CURRENT_A 1.0       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
 
@@ -90,7 +90,7 @@
 #define IDREF_SPEED16 -2.66
 #define IDREF_SPEED17 -2.66
 
-/* 1/Kphi of each entry, in the note's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */
+/* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */
 #define INVKFI_SPEED0  NORM_INVKFIBASE    /* [Q15/2]         2048 .. 32767  1/Kphi of each entry */
 #define INVKFI_SPEED1  NORM_INVKFIBASE
 #define INVKFI_SPEED2  NORM_INVKFIBASE
@@ -137,10 +137,10 @@
  * U0 = 0.000405949 V and I0 = 0.000134277 A per count of Q15 (full scale 13.3 V, 4.4 A)
  *
  * motor
- *   NORM_RS                              2.67 ohm             14470  Q15 / 2                     +0.002 %  Equation 5, the note's constant, at most 32767
- *   NORM_LSDTBASE                        1.92 mH               1626  Q15 / 256                   +0.011 %  Equation 5, the note's constant, at most 32767
+ *   NORM_RS                              2.67 ohm             14470  Q15 / 2                     +0.002 %  Equation 5, AN1292's constant, at most 32767
+ *   NORM_LSDTBASE                        1.92 mH               1626  Q15 / 256                   +0.011 %  Equation 5, AN1292's constant, at most 32767
  *   NORM_INVKFIBASE                      7.24 V/krpm           7956  Q15 / 2, 1/Kphi             +0.002 %  Equation 6
- *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, the note's constant
+ *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, AN1292's constant
  *   estimator.rs_q16                     2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
  *   estimator.rs_exp                        1 1                   0  count                          exact  the product is shifted left by it
  *   fieldweak.ls_base_q16                1.92 mH              52026  Q16 / 1                     -0.000 %  L of the estimator, eight samples
@@ -151,8 +151,8 @@
  *   estimator.half_step_q16_rad       2.5e-05 s               11244  Q16 rad/erpm                -0.002 %  half of it
  *   estimator.d_ilimit_ls_q14          1.6127 A                6005  Q14 A                       -0.001 %  D_ILIMIT_LS: change in eight periods
  *   estimator.d_ilimit_hs_q14         0.39597 A                1474  Q14 A                       -0.031 %  D_ILIMIT_HS: change in a period
- *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in the note's format
- *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in the note's format
+ *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in AN1292's format
+ *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in AN1292's format
  *   fieldweak.kfilter_esdq_q16         118.76 Hz               2400  Q16 a period                   exact  Equation 7
  *   fieldweak.kfilter_esdq_fw_q16      118.76 Hz               2400  Q16 a period                   exact  Equation 7
  *   estimator.kfilter_velestim_q16     73.503 Hz               1496  Q16 a period                   exact  Equation 7

@@ -1,8 +1,6 @@
 """The command line: `python3 -m tuning <command>`. Exit codes: 0 all well, 1 an expectation failed, 2 bad input."""
 
 import argparse
-import importlib
-import importlib.util
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,13 +8,12 @@ from typing import TYPE_CHECKING
 from tools.common import command_line, paths
 from tools.common.errors import UserError
 
+from . import fw_tune, identify, spreadsheet
+
 if TYPE_CHECKING:
     from tools.common.board_file import BoardFile
 
     from .design import Design
-
-OTHERS = ("fw_tune", "spreadsheet", "identify")
-"""Modules that bring a command of their own: add_command(commands)."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -45,11 +42,8 @@ def _parser() -> argparse.ArgumentParser:
     header.set_defaults(command=_header)
     for command in (tune, motors, header):
         command.add_argument("--board", default="mclv", help="a name in tuning/boards or a path; default mclv")
-    for name in OTHERS:
-        if importlib.util.find_spec(f"{__package__}.{name}"):
-            module = importlib.import_module(f"{__package__}.{name}")
-            if hasattr(module, "add_command"):
-                module.add_command(commands)
+    for module in (fw_tune, spreadsheet, identify):
+        module.add_command(commands)
     return parser
 
 

@@ -1,5 +1,6 @@
 """From a motor and a board to every parameter of userparams.h, with the reason for each, the constants, the margins and the warnings."""
 
+import functools
 import math
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -8,16 +9,17 @@ from tools.common import paths
 from tools.common.board_file import BoardFile
 from tools.common.errors import UserError
 from tools.common.motor_file import FACTS, Motor
+from tools.common.param_rows import FOLLOWS, parameters
 
-from . import constants, fw_tables, limits, loops, params, start
-from .constants import Constant, Formulas, firmware_constants, number_of
+from . import constants, fw_tables, limits, loops, start
+from .constants import Constant, number_of
 from .limits import RPM, Envelope
 
 ESDQ_HZ = 118.76
 VELESTIM_HZ = 73.5
-"""The note's 1200 and 748 at 50 us."""
+"""AN1292's 1200 and 748 at 50 us."""
 QUICK_ROTOR_S = 0.015
-"""A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with the note's speed filter
+"""A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with AN1292's speed filter
 reacts: the filter's corner rises in proportion, up to four times. Its speed gain is small (it goes with J), so noise stays small too."""
 HEAVY_S = 0.1
 """A slow speed loop is the inertia's doing, not a quick rotor's, where rated torque needs longer than this to rated speed."""
@@ -43,6 +45,19 @@ class Choice:
     why: str
 
 
+@dataclass(frozen=True)
+class Scales:
+    """Numbers that param_scaling.h makes of motor and board."""
+
+    invkfi: float
+    """counts of 1/Kphi"""
+    ampere_per_volt: float
+    """I0/U0"""
+    pterm_per_hz: float
+    iterm_per_hz: float
+    speed_pterm_per_hz: float
+
+
 @dataclass
 class Design:
     """A finished design."""
@@ -63,6 +78,12 @@ class Design:
     tuned_by_machine: bool = False
     loaded_hz: float = 0.0
     """speed bandwidth that holds half the rated torque put on in half a second at minimum speed"""
+
+    @functools.cached_property
+    def scales(self) -> Scales:
+        """What the header makes of motor and board; asked for when their parameters are chosen."""
+        return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1"}, "PARAM_INVKFI", "PARAM_IU",
+                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM"))
 
     @property
     def params(self) -> dict[str, str]:
@@ -109,17 +130,19 @@ def design(motor: Motor, board: BoardFile) -> Design:
     """Everything. Refuses by UserError what cannot work; what works with a cost is in `.warnings`."""
     currents = _fit_emf(motor, board, limits.currents(motor, board))
     d = Design(motor, board, Envelope(motor, limits.circle_v(board), currents.maximum_a))
-    _refuse_impossible(d, currents)
     _motor(d)
     _board(d)
+    _refuse_impossible(d, currents)
     _speeds(d)
     _currents(d, currents)
     _loops_and_start(d)
     _field_weakening(d)
-    d.put("SNAPDELAY", "5", "the note's")
-    d.put("DATA_BUFFER_SIZE", "50", "the note's; 400 bytes of RAM")
-    _check(d)
-    d.constants = firmware_constants(d.params)
+    for name, row in parameters().items():
+        if name not in d.choices and row.default not in FOLLOWS:
+            d.put(name, row.default, "the default")
+    found = constants.header(d.params)
+    _check(d, found.wrong)
+    d.constants = found.constants
     _warn(d, currents)
     return d
 
@@ -163,8 +186,7 @@ def _change_maximum_current(motor: Motor, how: str) -> str:
 
 def _refuse_kphi(d: Design) -> None:
     """1/Kphi has 16 bits: the electrical speed at full voltage must be 4096 .. 65534 rpm."""
-    unit_v = d.board.nominal_bus_v / math.sqrt(3.0) * (1.0 - d.board.dead_time_s / d.board.pwm_period_s)
-    counts = math.sqrt(3.0) * 500.0 * d.motor.pole_pairs * unit_v / d.motor.kphi_v_per_krpm
+    counts = d.scales.invkfi
     if counts < 2048.0:
         raise UserError(f"1/Kphi has only {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs, 2048 is the least",
                         d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {math.ceil(d.board.nominal_bus_v * 2048.0 / counts)} V")
@@ -177,9 +199,8 @@ def motor_current_above(d: Design, currents: limits.Currents) -> bool:
     return d.motor.maximum_current_a > currents.board_a
 
 
-def _check(d: Design) -> None:
+def _check(d: Design, wrong: list[str]) -> None:
     """Ranges and relations of the build, in its own words."""
-    wrong = params.check(d.params)
     if wrong:
         tuned = [name for name in d.motor.tune if any(name in message for message in wrong)]
         where = f"{paths.shown(d.motor.path)} [tune]" if tuned else str(paths.shown(d.motor.path))
@@ -192,7 +213,7 @@ def _range_remedy(d: Design, name: str) -> str:
     if name in d.motor.tune or name not in FACTS:
         return "change the motor file or the board file"
     if name == "MAXIMUM_CURRENT_A":
-        p = params.parameters()[name]
+        p = parameters()[name]
         return f"{_change_maximum_current(d.motor, 'change')} to {p.low} .. {p.high} A peak"
     return f"it follows from {FACTS[name]}; change that"
 
@@ -218,13 +239,13 @@ def _board(d: Design) -> None:
                        ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
                        ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
         d.put(name, text, "board file")
-    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, the note's corner")
+    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, AN1292's corner")
     d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
-          "the same: the note's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
+          "the same: AN1292's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
     rise_s = _rise_s(d.motor)
     faster = min(max(QUICK_ROTOR_S / rise_s, 1.0), 4.0)
     d.put("KFILTER_VELESTIM", str(constants.filter_k(faster * VELESTIM_HZ, b.pwm_period_s)), f"{faster * VELESTIM_HZ:.0f} Hz at this PWM period, " + (
-        "the note's corner" if faster == 1.0 else f"{faster:.2g} times the note's corner: rated torque brings the rotor to rated speed in {rise_s * 1e3:.2g} ms"))
+        "AN1292's corner" if faster == 1.0 else f"{faster:.2g} times AN1292's corner: rated torque brings the rotor to rated speed in {rise_s * 1e3:.2g} ms"))
 
 
 def _rise_s(m: Motor) -> float:
@@ -247,7 +268,6 @@ def _speeds(d: Design) -> None:
     slope = min(m.rated_speed_rpm / REFERENCE_RISE_S, REFERENCE_TORQUE_SHARE * m.rated_torque_nm / inertia / RPM, 60000.0)
     d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(slope, 1.0), 2)),
           f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque")
-    d.put("TUNING_DELAY_RAMPUP", "0xF", "the note's: 1250 electrical rpm/s")
 
 
 def _currents(d: Design, currents: limits.Currents) -> None:
@@ -288,6 +308,11 @@ def _fit_emf(motor: Motor, board: BoardFile, wanted: limits.Currents) -> limits.
     return limits.Currents(trip, maximum, wanted.board_a) if fits(trip, maximum) else wanted
 
 
+def _range(name: str) -> tuple[float, float]:
+    row = parameters()[name]
+    return float(row.low), float(row.high)
+
+
 # ---- loops and start -----------------------------------------------------------------------------------------------------------
 
 def _spread(motor: Motor) -> dict[str, tuple[float, float]]:
@@ -304,9 +329,8 @@ def _loops_and_start(d: Design) -> None:
     m, period = d.motor, d.board.pwm_period_s
     plant = loops.Plant(m.rs_ohm, m.ld_h, m.lq_h, m.psi_vs, m.pole_pairs, m.inertia_kgm2 + m.load_inertia_kgm2, m.viscous_nms)
     base = loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, d.value("KFILTER_ESDQ") / 32768.0, d.value("KFILTER_VELESTIM") / 32768.0, period)
-    f = Formulas({**d.params, "CURRENT_BANDWIDTH_HZ": 1.0, "SPEED_BANDWIDTH_HZ": 1.0}, float)
-    low, high = (float(x) for x in (params.parameters()["CURRENT_BANDWIDTH_HZ"].low, params.parameters()["CURRENT_BANDWIDTH_HZ"].high))
-    largest = min(high, 0.98 / f["Q_CURRCNTR_PTERM"], 15.7 / f["Q_CURRCNTR_ITERM"])
+    low, high = _range("CURRENT_BANDWIDTH_HZ")
+    largest = min(high, 0.98 / d.scales.pterm_per_hz, 15.7 / d.scales.iterm_per_hz)
     d.current_loop = loops.design_current(plant, _spread(m), base, d.envelope.omega(d.value("MAXIMUM_SPEED_RPM")), largest, low,
                                           m.tune.get("CURRENT_BANDWIDTH_HZ"))
     bandwidth = d.current_loop.bandwidth_hz
@@ -316,17 +340,17 @@ def _loops_and_start(d: Design) -> None:
         if bandwidth <= loops.CURRENT_CAP / period else f"above {cap}, because the rotation at top speed takes the margin below: the least with ")
         + f"{loops.PHASE_MARGIN_DEG:.0f} degrees of phase margin over the parameter set")
     if m.salient:
-        d.put("D_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.ld_h * f.iu / 16.0, 5), "2 pi f Ld: the d axis has its own inductance")
-        d.put("Q_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.lq_h * f.iu / 16.0, 5), "2 pi f Lq")
-    _refuse_inertia(d, f["SPEEDCNTR_PTERM"])
+        d.put("D_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.ld_h * d.scales.ampere_per_volt / 16.0, 5), "2 pi f Ld: the d axis has its own inductance")
+        d.put("Q_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.lq_h * d.scales.ampere_per_volt / 16.0, 5), "2 pi f Lq")
+    _refuse_inertia(d, d.scales.speed_pterm_per_hz)
     gains = loops.current_gains(plant, bandwidth, base)
     _start(d, plant, gains)
     speeds = {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
-    low, high = (float(x) for x in (params.parameters()["SPEED_BANDWIDTH_HZ"].low, params.parameters()["SPEED_BANDWIDTH_HZ"].high))
+    low, high = _range("SPEED_BANDWIDTH_HZ")
     calm = limits.digits_down(loops.SPEED_CAP * d.value("MINIMUM_SPEED_RPM") * m.pole_pairs / 60.0, 3)
     d.loaded_hz = limits.digits_down(loops.least_speed_bandwidth(m.rated_torque_nm, plant.inertia, d.value("MINIMUM_SPEED_RPM") * RPM), 3)
     d.speed_loop = loops.design_speed(plant, _spread(m), gains, {label: d.envelope.omega(d.value(name)) for label, name in speeds.items()},
-                                      max(low, min(high, 0.98 / f["SPEEDCNTR_PTERM"], max(calm, d.loaded_hz))), low, m.tune.get("SPEED_BANDWIDTH_HZ"))
+                                      max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz, max(calm, d.loaded_hz))), low, m.tune.get("SPEED_BANDWIDTH_HZ"))
     d.put("SPEED_BANDWIDTH_HZ", plain(d.speed_loop.bandwidth_hz), f"the largest with {loops.PHASE_MARGIN_DEG:.0f} degrees of phase margin over the "
           f"parameter set from the minimum to the maximum speed, at most {loops.SPEED_CAP:g} of the electrical frequency at minimum speed ({calm:g} Hz: "
           f"above, the dead time may make an unloaded motor hunt) or what loads ask for ({d.loaded_hz:g} Hz)")
@@ -334,7 +358,7 @@ def _loops_and_start(d: Design) -> None:
 
 def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:
     """The speed gain grows with the inertia: at the least bandwidth it must still fit its number."""
-    least_hz = float(params.parameters()["SPEED_BANDWIDTH_HZ"].low)
+    least_hz, _ = _range("SPEED_BANDWIDTH_HZ")
     if gain_at_1_hz * least_hz >= 1.0 and "SPEED_BANDWIDTH_HZ" not in d.motor.tune:
         inertia = d.value("MOTOR_INERTIA_KGM2")
         raise UserError(f"the speed gain exceeds its Q format with {inertia:.3g} kg m2 even at SPEED_BANDWIDTH_HZ = {least_hz:g}",
@@ -369,8 +393,7 @@ def _field_weakening(d: Design) -> None:
     if reason:
         d.warnings.append(reason)
     rows = {f"IDREF_SPEED{i}": f"{i_d:.2f}" for i, i_d in enumerate(limits.table(d.envelope, d.value("FW_START_SPEED_RPM")))}
-    rows |= {f"INVKFI_SPEED{i}": "NORM_INVKFIBASE" for i in range(18)}
-    rows |= {f"LS_OVER2LS0_SPEED{i}": "0.5" for i in range(18)}
+    rows |= {name: row.default for name, row in parameters().items() if row.stem in ("INVKFI_SPEED", "LS_OVER2LS0_SPEED")}
     d.tables_from = "the motor's voltage equation"
     why = f"least d current that keeps the voltage within {limits.TABLE_SHARE:.0%} of its circle without load"
     if tables is not None and "FW_START_SPEED_RPM" not in d.motor.tune:
@@ -432,8 +455,9 @@ def _warn_numbers(d: Design) -> None:
         if abs(item.error_percent) > ROUNDING_LIMIT_PERCENT:
             d.warnings.append(f"{parameter} = {d.choices[parameter].text} is rounded by {item.error_percent:+.2f} % ({name} = {item.q_value}): "
                               f"{ROUNDING_REMEDY[parameter]}")
-    f = Formulas(d.params, float)
-    for name, wanted, limit in (("D_ILIMIT_LS", 8.0 * f.di("NOMINAL_SPEED_RPM"), 16383.0), ("D_ILIMIT_HS", f.di("MAXIMUM_SPEED_RPM"), 4095.0)):
+    fast = d.constant("svm.turn_q13").value / (2.0 * d.value("NORM_CURRENT_CONST"))
+    slow = fast * d.value("NOMINAL_SPEED_RPM") / d.value("MAXIMUM_SPEED_RPM")
+    for name, wanted, limit in (("D_ILIMIT_LS", 8.0 * slow, 16383.0), ("D_ILIMIT_HS", fast, 4095.0)):
         if wanted > 1.02 * limit:
             d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "
                               "high current; lower MAXIMUM_CURRENT_A or the speed")

@@ -1,4 +1,4 @@
-"""The plots of a field-weakening search: the tables as the note's Figure 8, and current, angle error and torque over speed."""
+"""The plots of a field-weakening search: the tables as AN1292's Figure 8, and current, angle error and torque over speed."""
 
 from pathlib import Path
 from typing import Any

@@ -1,6 +1,6 @@
-"""The search for the field-weakening tables: the note's procedure, one entry after the other, on a bench that runs the motor.
+"""The search for the field-weakening tables: AN1292's procedure, one entry after the other, on a bench that runs the motor.
 
-Order, as in the note: d current first; then, only where the angle error asks for it, Ls and last 1/Kphi. The least d current is the one
+Order, as in AN1292: d current first; then, only where the angle error asks for it, Ls and last 1/Kphi. The least d current is the one
 with which the voltage stays a margin inside the circle at the entry's load, because the voltage is what ends every other way: the
 q current cannot follow, the speed falls, and with the reference ahead of the speed the tables no longer fit.
 """

@@ -16,7 +16,7 @@ from tools.common.toml_file import Document
 
 ENTRIES = 18
 STEP_ERPM = 1024
-"""One table step in electrical rpm (the note's SPEED_INDEX_CONST 10)."""
+"""One table step in electrical rpm (AN1292's SPEED_INDEX_CONST 10)."""
 FOLDER = paths.ROOT / "tuning" / "tables"
 FINGERPRINT = ("NOPOLESPAIRS", "MOTOR_RS_OHM", "MOTOR_LS_MH", "MOTOR_KPHI_V_PER_KRPM", "NOMINAL_BUS_V", "LOOPTIME_SEC", "DEADTIME_SEC",
                "SAMPLE_WINDOW_SEC", "MAXIMUM_CURRENT_A")
@@ -26,7 +26,7 @@ NEARLY = 1e-4
 
 @dataclass(frozen=True)
 class Entry:
-    """One entry of the three tables: d current, 1/Kphi in the note's counts, Ls/(2 Ls0)."""
+    """One entry of the three tables: d current, 1/Kphi in AN1292's counts, Ls/(2 Ls0)."""
 
     idref_a: float = 0.0
     inv_kfi: float = 0.0

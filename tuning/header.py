@@ -1,77 +1,34 @@
-"""The text of a userparams.h: sections, units, ranges and meanings in the user's order, and what the firmware makes of the numbers."""
+"""The text of a userparams.h: the rows of include/drive/param_table.h with a design's values, and what the firmware makes of them."""
 
+import itertools
 import math
+import re
 from collections.abc import Iterator
 
 from tools.common import paths
 from tools.common.motor_file import Motor
+from tools.common.param_rows import Parameter, modes, parameters
 
 from .constants import Constant, filter_hz
 from .design import Design
 from .limits import STEP_ERPM
-from .params import parameters
 
-MODES = (("OPEN_LOOP_FUNCTIONING", "stay on the forced angle at END_SPEED_RPM; the estimator runs along and can be watched"),
-         ("TUNING", "the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself"),
-         ("TORQUE_MODE", "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed"),
-         ("BIDIRECTIONAL_SPEED", "the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function"),
-         ("SNAPSHOT", "record SnapBuf1..4"),
-         ("IDENTIFY", "measure R, L and Kphi of the motor instead of running it (docs/tuning.md)"),
-         ("PARAMS_IN_RAM", "a debugger can change every parameter while the motor turns; TUNING does it too"))
-MEANINGS = {
-    "NOPOLESPAIRS": "pole pairs", "MOTOR_RS_OHM": "phase resistance: half of line to line", "MOTOR_LS_MH": "phase inductance: half of line to line",
-    "MOTOR_KPHI_V_PER_KRPM": "line-to-line back-EMF per 1000 mechanical rpm",
-    "MOTOR_INERTIA_KGM2": "rotor and whatever turns with it; scales the speed loop",
-    "NOMINAL_BUS_V": "supply; the unit of voltage follows from it", "LOOPTIME_SEC": "PWM and control period", "DEADTIME_SEC": "dead time of the bridge",
-    "NORM_CURRENT_CONST": "current of one count: full scale / 32768 (here {full_scale} A); calibrate with a probe",
-    "KCURRA": "gain of phase A's current, 0.5 = 1; negative: shunt in the low leg", "KCURRB": "gain of phase B's current",
-    "BUS_FULL_SCALE_V": "bus voltage that gives full scale at the converter",
-    "SAMPLE_WINDOW_SEC": "low sides on for this long on each side of the sample's centre",
-    "MINIMUM_SPEED_RPM": "potentiometer at zero", "NOMINAL_SPEED_RPM": "potentiometer at full scale, S3 off; the estimator's derivative changes here",
-    "MAXIMUM_SPEED_RPM": "potentiometer at full scale, S3 on", "SPEEDREFRAMP_RPM_PER_S": "slope of the speed reference",
-    "TUNING_DELAY_RAMPUP": "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods",
-    "LOCK_TIME": "{lock_s} s: rotor held at a fixed angle (two directions, half the time each)",
-    "END_SPEED_RPM": "end of the ramp, where the estimator takes over (back-EMF {emf_v} V)",
-    "OPENLOOP_RAMPSPEED_INCREASERATE": "acceleration of the ramp: {acceleration} rpm/s, {ramp_s} s to the end",
-    "Q_CURRENT_REF_OPENLOOP": "current of lock and ramp: pull-out torque {pull_out} N m",
-    "MAXIMUM_CURRENT_A": "length of the current vector that the drive may ask for",
-    "OVER_CURRENT_THRESHOLD_A": "any phase above trips at once; must lie inside the converter's range", "OVER_VOLTAGE_V": "bus above trips",
-    "UNDER_VOLTAGE_V": "bus below trips while running", "REGEN_LIMIT_V": "braking current is reduced from here, to nothing 2 V higher",
-    "CURRENT_BANDWIDTH_HZ": "both current loops: {current_nominal}, {current_worst} over the parameter set",
-    "SPEED_BANDWIDTH_HZ": "speed loop: {speed_nominal}, {speed_worst} over the parameter set",
-    "KFILTER_ESDQ": "back-EMF up to FW_START_SPEED_RPM: {KFILTER_ESDQ} Hz", "KFILTER_ESDQ_FW": "back-EMF above: {KFILTER_ESDQ_FW} Hz",
-    "KFILTER_VELESTIM": "speed for loop, thresholds and display: {KFILTER_VELESTIM} Hz",
-    "FW_START_SPEED_RPM": "speed reference of entry 0", "FW_TRIM_CURRENT_A": "most that the voltage feedback may add to the table's d current",
-    "IDREF_SPEED": "d current of each entry", "INVKFI_SPEED": "1/Kphi of each entry", "LS_OVER2LS0_SPEED": "Ls / (2 Ls0) of each entry; 0.5 = no change",
-    "SNAPDELAY": "one row every SNAPDELAY periods", "DATA_BUFFER_SIZE": "rows of each of the four arrays"}
-SECTIONS = (
-    ("Motor: {motor}, values per phase of the star", ("NOPOLESPAIRS", "MOTOR_RS_OHM", "MOTOR_LS_MH", "MOTOR_KPHI_V_PER_KRPM", "MOTOR_INERTIA_KGM2")),
-    ("Supply and board: {board}", ("NOMINAL_BUS_V", "LOOPTIME_SEC", "DEADTIME_SEC", "NORM_CURRENT_CONST", "KCURRA", "KCURRB", "BUS_FULL_SCALE_V", "SAMPLE_WINDOW_SEC")),
-    ("Speeds", ("MINIMUM_SPEED_RPM", "NOMINAL_SPEED_RPM", "MAXIMUM_SPEED_RPM", "SPEEDREFRAMP_RPM_PER_S", "TUNING_DELAY_RAMPUP")),
-    ("Start: lock, ramp, hand-over", ("LOCK_TIME", "END_SPEED_RPM", "OPENLOOP_RAMPSPEED_INCREASERATE", "Q_CURRENT_REF_OPENLOOP")),
-    ("Limits and protections", ("MAXIMUM_CURRENT_A", "OVER_CURRENT_THRESHOLD_A", "OVER_VOLTAGE_V", "UNDER_VOLTAGE_V", "REGEN_LIMIT_V")),
-    ("Control loops: bandwidths; the note's D_CURRCNTR_PTERM ... can be given directly instead, see drive/params.h", ("CURRENT_BANDWIDTH_HZ", "SPEED_BANDWIDTH_HZ")),
-    ("Filters, Equation 7: K in Q15 per period", ("KFILTER_ESDQ", "KFILTER_ESDQ_FW", "KFILTER_VELESTIM")),
-    ("Field weakening: one entry every {step_erpm:.0f} electrical rpm ({step_rpm:.5g} rpm with {pairs} pole pairs) of speed reference",
-     ("FW_START_SPEED_RPM", "FW_TRIM_CURRENT_A")))
-INVKFI_FLAT = """/* 1/Kphi of each entry, in the note's counts. The back-EMF keeps its size above base speed here (it has the range), so a
- * constant Kphi is the right start; the note's rising table made up for a clipped one. More turns the control angle ahead. */"""
-INVKFI_TUNED = "/* 1/Kphi of each entry, in the note's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */"
+INVKFI_FLAT = """/* 1/Kphi of each entry, in AN1292's counts. The back-EMF keeps its size above base speed here (it has the range), so a
+ * constant Kphi is the right start; AN1292's rising table made up for a clipped one. More turns the control angle ahead. */"""
+INVKFI_TUNED = "/* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */"
 WIDTH = 118
 
 
 def write(design: Design) -> str:
     """The whole file."""
-    lines = [*_head(design), *_modes()]
-    facts = _facts(design)
-    for title, names in SECTIONS:
-        lines += ["", _rule(title.format(**facts))]
-        lines += [_define(design, name, facts) for name in names]
+    lines, facts = [*_head(design), *_modes()], _facts(design)
+    for title, rows in itertools.groupby(parameters().values(), lambda row: row.section):
+        lines += ["", _rule(title + facts.get(re.split("[:,]", title)[0], ""))]
+        for stem, group in itertools.groupby(rows, lambda row: row.stem):
+            lines += _entries(design, list(group)) if stem else [_define(design, row, facts) for row in group]
         if title.startswith("Control loops") and "D_CURRCNTR_PTERM" in design.choices:
             lines += [f"{_left('D_CURRCNTR_PTERM', design)}/* [V/A, Q15/16] 2 pi f Ld: the salient motor's d axis has its own inductance */",
                       f"{_left('Q_CURRCNTR_PTERM', design)}/* [V/A, Q15/16] 2 pi f Lq */"]
-    lines += _tables(design)
-    lines += ["", _rule("Snapshot"), _define(design, "SNAPDELAY", facts), _define(design, "DATA_BUFFER_SIZE", facts)]
     lines += ["", *_constants(design), "", "#endif"]
     return "\n".join(lines) + "\n"
 
@@ -94,7 +51,7 @@ def _head(design: Design) -> list[str]:
              f" * (make userparams MOTOR={name} writes it to userparams.h). Field weakening: {design.tables_from}.", " *",
              " * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep",
              " * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,",
-             " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/params.h; the table at the end shows them."]
+             " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them."]
     for warning in design.warnings:
         lines += [" *", *(f" * {line}" for line in _wrapped("Note: " + _safe(warning), WIDTH + 8))]
     lines[-1] += " */"
@@ -103,27 +60,32 @@ def _head(design: Design) -> list[str]:
 
 def _modes() -> list[str]:
     lines = [_rule("Modes: remove the comment marks, or build with -D")]
-    return lines + [f"/* #define {name} */".ljust(36) + f"/* {meaning} */" for name, meaning in MODES]
+    return lines + [f"/* #define {name} */".ljust(36) + f"/* {meaning} */" for name, meaning in modes().items()]
 
 
 def _rule(title: str) -> str:
     return f"/* ---- {title} ".ljust(WIDTH, "-") + " */"
 
 
-def _facts(design: Design) -> dict[str, object]:
+def _facts(design: Design) -> dict[str, str]:
+    """What this motor and board add to a section's title or a parameter's meaning."""
     d, s = design, design.start_up
     period = d.board.pwm_period_s
-    facts: dict[str, object] = {
-        "motor": f"{_safe(d.motor.title)}, {'star' if d.motor.connection == 'Y' else 'delta'}", "board": _safe(d.board.title), "pairs": d.motor.pole_pairs,
-        "full_scale": f"{d.board.current_full_scale_a:.4g}", "step_erpm": STEP_ERPM, "step_rpm": STEP_ERPM / d.motor.pole_pairs}
-    facts |= {name: f"{filter_hz(d.value(name), period):.0f}" for name in ("KFILTER_ESDQ", "KFILTER_ESDQ_FW", "KFILTER_VELESTIM")}
+    facts = {"Motor": f": {_safe(d.motor.title)}, {'star' if d.motor.connection == 'Y' else 'delta'}", "Supply and board": f": {_safe(d.board.title)}",
+             "Field weakening": f", {STEP_ERPM / d.motor.pole_pairs:.5g} rpm with {d.motor.pole_pairs} pole pairs",
+             "NORM_CURRENT_CONST": f": {d.board.current_full_scale_a:.4g} A full scale"}
+    if d.motor.salient:
+        facts["MOTOR_LS_MH"] = f"; of the q axis (Ld = {d.motor.ld_h * 1e3:.4g} mH): with it the estimated angle does not turn with the torque"
+    facts |= {name: f": {filter_hz(d.value(name), period):.0f} Hz" for name in ("KFILTER_ESDQ", "KFILTER_ESDQ_FW", "KFILTER_VELESTIM")}
     if s:
-        facts |= {"lock_s": f"{d.value('LOCK_TIME') * period:.3g}", "emf_v": f"{s.emf_v:.2f}", "acceleration": f"{s.acceleration_rpm_s:.0f}",
-                  "ramp_s": f"{s.ramp_s:.2f}", "pull_out": f"{s.pull_out_nm:.3g}"}
-    for name, loop in (("current", d.current_loop), ("speed", d.speed_loop)):
+        facts |= {"LOCK_TIME": f": {d.value('LOCK_TIME') * period:.3g} s", "END_SPEED_RPM": f": back-EMF {s.emf_v:.2f} V",
+                  "OPENLOOP_RAMPSPEED_INCREASERATE": f": {s.acceleration_rpm_s:.0f} rpm/s, {s.ramp_s:.2f} s to the end",
+                  "Q_CURRENT_REF_OPENLOOP": f": pull-out torque {s.pull_out_nm:.3g} N m"}
+    for name, loop in (("CURRENT_BANDWIDTH_HZ", d.current_loop), ("SPEED_BANDWIDTH_HZ", d.speed_loop)):
         if loop:
-            facts |= {f"{name}_nominal": f"phase margin {math.floor(loop.nominal.phase_deg)} degrees" if loop.nominal.stable else "unstable",
-                      f"{name}_worst": f"{math.floor(loop.worst.phase_deg)}" if loop.worst.stable else "unstable"}
+            nominal = f"phase margin {math.floor(loop.nominal.phase_deg)} degrees" if loop.nominal.stable else "unstable"
+            worst = f"{math.floor(loop.worst.phase_deg)}" if loop.worst.stable else "unstable"
+            facts[name] = f": {nominal}, {worst} over the parameter set"
     return facts
 
 
@@ -132,35 +94,33 @@ def _left(name: str, design: Design) -> str:
     return text.ljust(36) + ("" if len(text) < 36 else " ")
 
 
-def _define(design: Design, name: str, facts: dict[str, object]) -> str:
-    p = parameters()[name]
-    meaning = MEANINGS[name].format(**facts)
-    if name == "MOTOR_LS_MH" and design.motor.salient:
-        meaning = f"phase inductance of the q axis (Ld = {design.motor.ld_h * 1e3:.4g} mH): with it the estimated angle does not turn with the torque"
-    return f"{_left(name, design)}/* {('[' + p.unit + ']').ljust(15)} {(p.low + ' .. ' + p.high).ljust(14)} {meaning} */"
+def _define(design: Design, row: Parameter, facts: dict[str, str]) -> str:
+    return f"{_left(row.name, design)}{_comment(row, facts.get(row.name, ''))}"
 
 
-def _tables(design: Design) -> Iterator[str]:
-    for stem, comment in (("IDREF_SPEED", ""), ("INVKFI_SPEED", INVKFI_TUNED if design.tuned_by_machine else INVKFI_FLAT), ("LS_OVER2LS0_SPEED", "")):
-        yield ""
-        if comment:
-            yield comment
-        p = parameters()[f"{stem}0"]
-        for i in range(18):
-            text = design.choices[f"{stem}{i}"].text
-            text = text if text.startswith(("-", "N")) else " " + text
-            line = f"#define {stem}{i}".ljust(len(f"#define {stem}17") + 1) + text
-            if i == 0:
-                line = line.ljust(42) + f"/* {('[' + p.unit + ']').ljust(15)} {(p.low + ' .. ' + p.high).ljust(14)} {MEANINGS[stem]} */"
-            yield line.rstrip()
+def _comment(row: Parameter, fact: str = "") -> str:
+    return f"/* {f'[{row.unit}]'.ljust(15)} {f'{row.low} .. {row.high}'.ljust(14)} {row.meaning}{fact} */"
+
+
+def _entries(design: Design, rows: list[Parameter]) -> Iterator[str]:
+    """One table; unit, range and meaning stand beside its first entry."""
+    yield ""
+    if rows[0].stem == "INVKFI_SPEED":
+        yield INVKFI_TUNED if design.tuned_by_machine else INVKFI_FLAT
+    for row in rows:
+        text = design.choices[row.name].text
+        text = text if text.startswith(("-", "N")) else " " + text
+        line = f"#define {row.name}".ljust(len(f"#define {rows[-1].name}") + 1) + text
+        yield line.ljust(42) + _comment(row) if row is rows[0] else line
 
 
 def _constants(design: Design) -> list[str]:
     """The comment table of derived constants; the 54 table entries are left out, they stand above."""
     rows = [item for item in design.constants if "[" not in item.name]
     lines = ["/* ---- What the firmware makes of these numbers: engineering value, its count, and how much rounding changes it ".ljust(WIDTH, "-")]
-    base = [f" * U0 = {_volt_per_count(design):.6g} V and I0 = {design.value('NORM_CURRENT_CONST'):.6g} A per count of Q15 (full scale "
-            f"{_volt_per_count(design) * 32768:.4g} V, {design.value('NORM_CURRENT_CONST') * 32768:.4g} A)"]
+    ampere = design.value("NORM_CURRENT_CONST")
+    volt = ampere / design.scales.ampere_per_volt
+    base = [f" * U0 = {volt:.6g} V and I0 = {ampere:.6g} A per count of Q15 (full scale {volt * 32768:.4g} V, {ampere * 32768:.4g} A)"]
     group = ""
     for item in rows:
         if item.group != group:
@@ -173,10 +133,6 @@ def _constants(design: Design) -> list[str]:
 def _constant_row(item: Constant) -> str:
     error = "exact" if abs(item.error_percent) < 5e-6 else f"{item.error_percent:+.3f} %"
     return (f" *   {item.name.ljust(30)}{item.value:>11.5g} {item.unit.ljust(9)}{item.q_value:>12d}  {item.q_format.ljust(26)}{error:>10}  {item.meaning}").rstrip()
-
-
-def _volt_per_count(design: Design) -> float:
-    return (design.value("NOMINAL_BUS_V") / math.sqrt(3.0) * (1.0 - design.value("DEADTIME_SEC") / design.value("LOOPTIME_SEC")) / 32768.0)
 
 
 def _wrapped(text: str, width: int) -> list[str]:

@@ -6,11 +6,6 @@ share, which is known from the board file: one transistor, and the shunt for the
 """
 
 import argparse
-import functools
-import os
-import re
-import shlex
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,21 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from tools.bench import build, command_common, report
-from tools.common import board_file, board_keys, command_line, motor_file, output, paths, workers
+from tools.bench import build, command_common
 from tools.bench.board import Board, BoardError, Library
+from tools.common import board_file, board_keys, command_line, motor_file, output, paths, workers
 from tools.common.board_file import BoardFile
 from tools.common.errors import UserError
 from tools.common.motor_file import Motor
+from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.trace import Trace
+
+from .identify_result import MODE, Identified, Known, Measured, step_names, trip_a
 
 RESULTS = paths.ROOT / "build" / "identify"
 HEADERS = RESULTS / "headers"
-MODE = "IDENTIFY"
-LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0}
-SALIENT = 0.03
-"""Inductances that differ by less are one."""
-ENTRIES = 18
 LONGEST_S = 20.0
 POWER_UP_S = 0.1
 PRESS_S = 0.1
@@ -41,85 +34,20 @@ PERIODS_A_LOOK = 20
 SIGNALS = ("plant.i_a", "plant.i_b", "plant.speed_rpm", "fw.i_d_a", "fw.i_q_a", "fw.v_d_v", "fw.v_q_v")
 WATCH = ("step", "result", "Rs_mohm", "Ld_uH", "Lq_uH", "Kphi_mV_per_krpm")
 """Members of IdentifyParm in include/board/watch.h."""
-COLUMNS = (("measured", "measured\n", "{}"), ("true", "true\n", "{}"), ("error_percent", "error\n%", "{:+.2f}"), ("limit_percent", "limit\n%", "{:g}"),
-           ("verdict", "\nverdict", "{}"))
-
-
-# ---- the firmware's own tables ---------------------------------------------------------------------------------------------
-@functools.cache
-def _table(name: str, fields: int) -> list[tuple[str, ...]]:
-    """Rows of an X-macro of include/drive/identify.h as the compiler sees them."""
-    arguments = ", ".join(f"a{n}" for n in range(fields))
-    row = " ~ ".join(f"#a{n}" for n in range(fields))
-    source = f'#include "drive/identify.h"\n#define ROW({arguments}) @@ {row}\n{name}(ROW)\n'
-    command = [*shlex.split(os.environ.get("CC") or "gcc"), "-E", "-P", f"-I{paths.ROOT / 'include'}", f"-I{paths.ROOT}", "-xc", "-"]
-    try:
-        done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
-    except OSError as error:
-        raise UserError("cannot run the compiler", command[0], error.strerror or str(error)) from None
-    if done.returncode != 0:
-        raise UserError("the compiler cannot read drive/identify.h", command[0], (done.stderr.splitlines() or ["no message"])[0])
-    rows = done.stdout.replace("\n", " ").split("@@")[1:]
-    return [tuple(_words(cell) for cell in row.split(" ~ ")) for row in rows]
-
-
-def _words(cell: str) -> str:
-    """A stringised macro argument without its quotes."""
-    text = re.sub(r'^\s*"|"\s*$', "", cell.strip())
-    return re.sub(r'\\"\s*\\"|\\"', "", text)
-
-
-def step_names() -> list[str]:
-    """Names of the numbers in IdentifyParm.step."""
-    return [name for name, _ in _table("IDENTIFY_STEP_TABLE", 2)]
-
-
-@dataclass(frozen=True)
-class Result:
-    """How an identification ended."""
-
-    name: str
-    cause: str
-    remedy: str
-
-
-def results() -> dict[int, Result]:
-    """Meaning of the numbers in IdentifyParm.result."""
-    return {int(code): Result(name, cause, remedy) for code, name, cause, remedy in _table("IDENTIFY_RESULT_TABLE", 4)}
 
 
 # ---- the neutral header ----------------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Known:
-    """What somebody without a data sheet knows of a motor, or dares to try."""
-
-    pole_pairs: int
-    current_a: float
-    speed_rpm: float
-
-    @classmethod
-    def of(cls, motor: Motor, board: BoardFile, current_a: float | None = None, speed_rpm: float | None = None) -> "Known":
-        """From the rating: the rated current as far as the board allows it, and 40 % of the speed that the rating promises at this bus."""
-        share = min(1.0, board.nominal_bus_v / motor.rated_voltage_v)
-        return cls(motor.pole_pairs, current_a or min(motor.rated_current_a, 0.8 * _trip_a(board)),
-                   speed_rpm or max(50.0, min(0.4 * share * motor.rated_speed_rpm, 5000.0)))
-
-
-def _trip_a(board: BoardFile) -> float:
-    return 0.86 * board.current_full_scale_a
-
-
 def header(known: Known, board: BoardFile) -> str:
     """A userparams.h for the IDENTIFY firmware."""
     maximum_a = max(known.current_a, 0.07 * board.current_full_scale_a)
     top_rpm = 1.3 * known.speed_rpm
-    idle_ohm = min(1.0, 0.2 * board.nominal_bus_v / _trip_a(board)) # with more, R I leaves the back-EMF's format on a board for large currents
+    idle_ohm = min(1.0, 0.2 * board.nominal_bus_v / trip_a(board)) # with more, R I leaves the back-EMF's format on a board for large currents
     rate = known.speed_rpm * known.pole_pairs * board.pwm_period_s * 65536.0 / 60.0 * 1024.0 / (2.0 / board.pwm_period_s)
     parts = {
         "What somebody has to know, or to try": {
             "NOPOLESPAIRS": known.pole_pairs, "Q_CURRENT_REF_OPENLOOP": known.current_a, "END_SPEED_RPM": known.speed_rpm,
             "OPENLOOP_RAMPSPEED_INCREASERATE": max(1, round(rate)), "MAXIMUM_CURRENT_A": maximum_a,
-            "OVER_CURRENT_THRESHOLD_A": _trip_a(board)},
+            "OVER_CURRENT_THRESHOLD_A": trip_a(board)},
         "The board": {
             "NOMINAL_BUS_V": board.nominal_bus_v, "LOOPTIME_SEC": board.pwm_period_s, "DEADTIME_SEC": board.dead_time_s,
             "NORM_CURRENT_CONST": board.current_full_scale_a / 32768.0, "KCURRA": board.current_gain, "KCURRB": board.current_gain,
@@ -129,10 +57,10 @@ def header(known: Known, board: BoardFile) -> str:
             "MOTOR_RS_OHM": idle_ohm, "MOTOR_LS_MH": idle_ohm, "MOTOR_KPHI_V_PER_KRPM": 1.5 * known.pole_pairs, "MOTOR_INERTIA_KGM2": 1e-5,
             "MINIMUM_SPEED_RPM": max(50.0, 0.5 * known.speed_rpm), "NOMINAL_SPEED_RPM": max(100.0, known.speed_rpm * 1.1),
             "MAXIMUM_SPEED_RPM": max(120.0, top_rpm), "FW_START_SPEED_RPM": max(100.0, known.speed_rpm), "SPEEDREFRAMP_RPM_PER_S": 1000,
-            "TUNING_DELAY_RAMPUP": 15, "LOCK_TIME": 4000, "CURRENT_BANDWIDTH_HZ": 200, "SPEED_BANDWIDTH_HZ": 10, "SPEEDCNTR_PTERM": 0.1,
+            "LOCK_TIME": 4000, "CURRENT_BANDWIDTH_HZ": 200, "SPEED_BANDWIDTH_HZ": 10, "SPEEDCNTR_PTERM": 0.1,
             "SPEEDCNTR_ITERM": 0.001, "KFILTER_ESDQ": 1200, "KFILTER_ESDQ_FW": 1200, "KFILTER_VELESTIM": 748, "FW_TRIM_CURRENT_A": 0,
-            **{f"IDREF_SPEED{n}": 0 for n in range(ENTRIES)}, **{f"INVKFI_SPEED{n}": "NORM_INVKFIBASE" for n in range(ENTRIES)},
-            **{f"LS_OVER2LS0_SPEED{n}": 0.5 for n in range(ENTRIES)}, "SNAPDELAY": 5, "DATA_BUFFER_SIZE": 50}}
+            **{name: 0 if row.stem == "IDREF_SPEED" else row.default for name, row in parameters().items()
+               if row.stem == "IDREF_SPEED" or row.default not in FOLLOWS}}}
     lines = ["/* Parameters for a motor of which nobody knows R, L and Kphi: build with IDENTIFY. */", "#ifndef USERPARAMS_H", "#define USERPARAMS_H"]
     for title, values in parts.items():
         lines += ["", f"/* ---- {title} ---- */"]
@@ -159,20 +87,6 @@ class Job:
     values: dict[str, float]
     stop_after_s: float = LONGEST_S
     """When S2 is pressed again, counted from the first time."""
-
-
-@dataclass
-class Measured:
-    """What the firmware said, and when."""
-
-    watch: dict[str, int]
-    fault: str
-    steps: list[tuple[float, int]]
-    """Time and number of every change of the step."""
-    trace: Trace
-    motor_s: float = 0.0
-    outputs_seen: float = 0.0
-    """Outputs that were on in the last period."""
 
 
 def measure(job: Job, report_s: Callable[[float], None]) -> Measured:
@@ -220,101 +134,7 @@ def _measure(job: Job, library: Library, board: Board, report_s: Callable[[float
                     Trace(list(SIGNALS), time_s, np.ascontiguousarray(data.T)), now_s - began_s, board.get("pwm.outputs_seen"))
 
 
-# ---- the comparison --------------------------------------------------------------------------------------------------------
-@dataclass
-class Identified:
-    """A motor, what was told, what was measured."""
-
-    motor: Motor
-    board: BoardFile
-    known: Known
-    header: str
-    values: dict[str, float]
-    measured: Measured
-
-    @property
-    def result(self) -> Result:
-        return results()[self.measured.watch["result"]]
-
-    @property
-    def done(self) -> bool:
-        return self.result.name == "DONE"
-
-    @property
-    def bridge_ohm(self) -> float:
-        """What transistors and shunt add to a phase."""
-        return self.board.rds_on_ohm + 0.5 * self.board.shunt_ohm
-
-    @property
-    def winding_ohm(self) -> float:
-        return 1e-3 * self.measured.watch["Rs_mohm"] - self.bridge_ohm
-
-    def rows(self) -> list[dict[str, Any]]:
-        """Measured and true values with the limits of the errors. The truth is the plant's, changes and temperature included."""
-        watch, plant_now = self.measured.watch, self.values
-        degrees = plant_now.get("motor.temp_c", 25.0) - 25.0
-        rs_ohm = plant_now["motor.rs_ohm"] * (1.0 + plant_now["motor.r_tempco"] * degrees)
-        kphi = 3.0 ** 0.5 * plant_now["motor.psi_vs"] * plant_now["motor.pole_pairs"] * 1000.0 * 2.0 * np.pi / 60.0
-        kphi *= 1.0 + plant_now["motor.psi_tempco"] * degrees
-        return [
-            _row("R loop [mohm]", f"{watch['Rs_mohm']}", f"{1e3 * (rs_ohm + self.bridge_ohm):.1f}"),
-            _row("R winding [mohm]", f"{1e3 * self.winding_ohm:.1f}", f"{1e3 * rs_ohm:.1f}", self.winding_ohm / rs_ohm, "R"),
-            _row("Ld [uH]", f"{watch['Ld_uH']}", f"{1e6 * plant_now['motor.ld_h']:.1f}", 1e-6 * watch["Ld_uH"] / plant_now["motor.ld_h"], "Ld"),
-            _row("Lq [uH]", f"{watch['Lq_uH']}", f"{1e6 * plant_now['motor.lq_h']:.1f}", 1e-6 * watch["Lq_uH"] / plant_now["motor.lq_h"], "Lq"),
-            _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi")]
-
-    def problems(self) -> list[str]:
-        """What is wrong, one line each."""
-        if not self.done:
-            fault = f" (fault {self.measured.fault})" if self.measured.fault != "NONE" else ""
-            return [f"{self.result.name}{fault}: {self.result.cause}: {self.result.remedy}"]
-        return [f"{row['name']} is off by {row['error_percent']:+.2f} %, allowed are {row['limit_percent']:g} %"
-                for row in self.rows() if row["verdict"] == "FAIL"]
-
-    def paste(self) -> str:
-        """The lines for a motor file: line to line, which means the same in a star and in a delta."""
-        watch = self.measured.watch
-        source = f"measured with {MODE}, {self.known.current_a:.3g} A"
-        ld_mh, lq_mh = 1e-3 * watch["Ld_uH"], 1e-3 * watch["Lq_uH"]
-        lines = ["[electrical]", f'pole_pairs = {{ value = {self.known.pole_pairs}, source = "counted" }}',
-                 f'resistance = {{ value = {2.0 * self.winding_ohm:.4g}, unit = "ohm line-to-line", at_degc = 25, source = "{source}" }}']
-        if abs(ld_mh - lq_mh) <= SALIENT * ld_mh:
-            lines.append(f'inductance = {{ value = {ld_mh + lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
-        else:
-            lines.append(f'inductance_d = {{ value = {2.0 * ld_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
-            lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
-        lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
-                     f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
-        return "\n".join(lines)
-
-    def text(self) -> str:
-        """The whole report, as printed."""
-        known = self.known
-        parts = [f"{self.motor.name}: {self.motor.title}",
-                 f"told: {known.pole_pairs} pole pairs, {known.current_a:.3g} A, {known.speed_rpm:.4g} rpm; "
-                 f"bridge of {self.board.name}: {1e3 * self.bridge_ohm:.1f} mohm (transistor, half of the shunt)",
-                 "\n".join(f"{at_s:9.4f} s  {step_names()[number]}" for at_s, number in self.measured.steps[1:])]
-        if self.done:
-            parts += [report.table(self.rows(), COLUMNS), "For the motor file (R without the bridge; note the winding's temperature):\n\n" + self.paste()]
-        return "\n\n".join(parts)
-
-    def data(self) -> dict[str, Any]:
-        names = step_names()
-        return {"motor": str(paths.shown(self.motor.path)), "board": str(paths.shown(self.board.path)), "result": self.result.name,
-                "fault": self.measured.fault, "watch": self.measured.watch, "bridge_ohm": self.bridge_ohm, "rows": self.rows() if self.done else [],
-                "steps": [{"at_s": round(at_s, 4), "step": names[number]} for at_s, number in self.measured.steps],
-                "told": {"pole_pairs": self.known.pole_pairs, "current_a": self.known.current_a, "speed_rpm": self.known.speed_rpm}}
-
-
-def _row(name: str, measured: str, true: str, ratio: float | None = None, limit: str = "") -> dict[str, Any]:
-    if ratio is None:
-        return {"name": name, "measured": measured, "true": true, "error_percent": None, "limit_percent": None, "verdict": None}
-    error = 100.0 * (ratio - 1.0)
-    allowed = LIMITS_PERCENT[limit]
-    return {"name": name, "measured": measured, "true": true, "error_percent": error, "limit_percent": allowed,
-            "verdict": "PASS" if abs(error) <= allowed else "FAIL"}
-
-
+# ---- several motors at once -------------------------------------------------------------------------------------------------
 def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, current_a: float | None = None, speed_rpm: float | None = None,
              quiet: bool = True) -> list[Identified]:
     """Identifies the motors, side by side."""

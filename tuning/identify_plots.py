@@ -1,7 +1,6 @@
 """The plots of an identification: two levels of current, the square voltage and its current, the back-EMF while turning."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 
@@ -12,8 +11,7 @@ import numpy as np # noqa: E402
 
 from tools.common.trace import Trace # noqa: E402
 
-if TYPE_CHECKING:
-    from .identify import Identified
+from .identify_result import Identified # noqa: E402
 
 BLOCK = 32
 """Periods of one stretch of back-EMF in the firmware."""
@@ -22,7 +20,7 @@ plt.rcParams.update({"figure.dpi": 100, "axes.grid": True, "grid.alpha": 0.3, "l
                      "legend.fontsize": 9, "axes.titlesize": 11, "font.size": 10})
 
 
-def write_all(item: "Identified", names: list[str], folder: Path) -> list[str]:
+def write_all(item: Identified, names: list[str], folder: Path) -> list[str]:
     """Every plot for which the procedure got far enough; returns the file names. `names`: of the steps, by number."""
     spans = _spans(item, names)
     files = []
@@ -36,7 +34,7 @@ def write_all(item: "Identified", names: list[str], folder: Path) -> list[str]:
     return files
 
 
-def _spans(item: "Identified", names: list[str]) -> dict[str, tuple[float, float]]:
+def _spans(item: Identified, names: list[str]) -> dict[str, tuple[float, float]]:
     """From when to when each step lasted."""
     changes = item.measured.steps + [(item.measured.trace.time_s[-1], 0)]
     return {names[number]: (at_s, until_s) for (at_s, number), (until_s, _) in zip(changes, changes[1:]) if number != 0}
@@ -49,7 +47,7 @@ def _label_steps(axes: plt.Axes, spans: dict[str, tuple[float, float]], wanted: 
             axes.text(sum(spans[name]) / 2.0, 0.02, name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
 
 
-def _resistance(item: "Identified", spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
+def _resistance(item: Identified, spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
     steps = ("RISE", "CONNECT", "ALIGN", "RESISTANCE", "BIAS")
     until_s = max(spans[name][1] for name in steps if name in spans)
     part = item.measured.trace.part(spans["RISE"][0], until_s).thinned(10)
@@ -60,7 +58,7 @@ def _resistance(item: "Identified", spans: dict[str, tuple[float, float]], axes:
     axes[0].set_title(f"{item.motor.name}: two levels of current along phase A; R loop = {item.measured.watch['Rs_mohm']} mohm")
 
 
-def _inductance(item: "Identified", spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
+def _inductance(item: Identified, spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
     for ax, step, on_q, value in ((axes[0], "INDUCTANCE_D", False, "Ld_uH"), (axes[1], "INDUCTANCE_Q", True, "Lq_uH")):
         if step not in spans:
             ax.set_axis_off()
@@ -88,7 +86,7 @@ def _blocks(part: Trace, name: str) -> np.ndarray:
     return column[:count * BLOCK].reshape(count, BLOCK).mean(axis=1)
 
 
-def _back_emf(item: "Identified", spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
+def _back_emf(item: Identified, spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
     steps = [name for name in ("SPIN_HALF", "SPIN_FULL") if name in spans]
     part = item.measured.trace.part(spans[steps[0]][0], spans[steps[-1]][1])
     time_s = part.time_s[:len(part) // BLOCK * BLOCK:BLOCK]

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
+from tools.common.param_rows import parameters
 
 ENTRIES = 18
 STEP_ERPM = 1024.0
 """One entry of the field-weakening tables."""
-FW_START_RPM = (100.0, 20000.0)
-"""Range of FW_START_SPEED_RPM in param_table.h."""
 LARGEST_ERPM = 32000.0
 LARGEST_NOMINAL_ERPM = 27000.0
 TRIP_SHARE = 0.865
@@ -147,7 +146,8 @@ def fw_start_rpm(envelope: Envelope, maximum_rpm: float) -> float:
     18 entries still reach the maximum speed, below the maximum speed, and within the parameter's range."""
     start = down(0.875 * envelope.base_speed(0.0), 50.0)
     reach = maximum_rpm - (ENTRIES - 1) * STEP_ERPM / envelope.motor.pole_pairs
-    return max(min(max(start, math.ceil(reach / 50.0) * 50.0), down(0.95 * maximum_rpm, 50.0), FW_START_RPM[1]), FW_START_RPM[0])
+    row = parameters()["FW_START_SPEED_RPM"]
+    return max(min(max(start, math.ceil(reach / 50.0) * 50.0), down(0.95 * maximum_rpm, 50.0), float(row.high)), float(row.low))
 
 
 def table(envelope: Envelope, start_rpm: float) -> list[float]:

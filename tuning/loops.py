@@ -26,12 +26,12 @@ of the converter causes grows with it."""
 SPEED_CAP = 0.3125
 """Highest bandwidth of the speed loop over the electrical frequency at the lowest speed, if loads allow it (LOAD_DIP). Without load the
 currents lie where the dead time's compensation is only linear; the voltage that is missing there looks like back-EMF, and the estimator
-rejects it no faster than the motor turns. On the virtual board the note's motor hunts by 4 % of its speed from 0.34 on; all six are calm here."""
+rejects it no faster than the motor turns. On the virtual board the Hurst hunts by 4 % of its speed from 0.34 on; all six are calm here."""
 LOAD_DIP = 0.18
 """Share of the lowest speed that half the rated torque may take when it comes in half a second: what grows steadily is held by the
 integral alone, error = dT/dt / (J (2 pi f)^2 / ZERO_RATIO)."""
 ZERO_RATIO = 3.0
-"""The speed controller's zero lies at the bandwidth / 3 (SPEEDCNTR_ITERM in params.h): the integral is what holds a load that grows, and a
+"""The speed controller's zero lies at the bandwidth / 3 (SPEEDCNTR_ITERM in param_scaling.h): the integral is what holds a load that grows, and a
 lower bandwidth with more of it is calmer at low speed than the other way round."""
 SLOTS = 8
 CURRENT_TOP = 1.0 / 12.0

@@ -39,7 +39,7 @@ def text(design: Design) -> str:
     rows += [("field weakening", f"from {value('FW_START_SPEED_RPM'):g} rpm, Id to {deepest:g} A, feedback to {value('FW_TRIM_CURRENT_A'):g} A more; "
                                  f"{d.tables_from}"),
              ("limits", f"{value('MAXIMUM_CURRENT_A'):g} A, trips at {value('OVER_CURRENT_THRESHOLD_A'):g} A of {d.board.current_full_scale_a:.3g} A"),
-             ("constants", ", ".join(f"{item.name} {item.q_value}" for item in _note_constants(d)))]
+             ("constants", ", ".join(f"{item.name} {item.q_value}" for item in _an1292_constants(d)))]
     lines = [f"{m.title}: {paths.shown(m.path)}"] + [f"  {name:<16}{what}" for name, what in rows]
     return "\n".join(lines + [f"  warning: {warning}" for warning in d.warnings])
 
@@ -60,7 +60,7 @@ def _entries_in_use(design: Design) -> range:
     return range(min(18, max(1, int(span) + 2)))
 
 
-def _note_constants(design: Design) -> list[Constant]:
+def _an1292_constants(design: Design) -> list[Constant]:
     return [design.constant(name) for name in ("NORM_RS", "NORM_LSDTBASE", "NORM_INVKFIBASE", "NORM_DELTAT", "D_ILIMIT_HS", "D_ILIMIT_LS")]
 
 

@@ -24,7 +24,7 @@ LOAD_ANGLE_SINE = 0.77
 RAMP_TORQUE_SHARE = 0.15
 """Share of the pull-out torque for acceleration."""
 RAMP_S = 1.4
-"""Duration of the ramp, as in the note, unless inertia asks for more."""
+"""Duration of the ramp, as in AN1292, unless inertia asks for more."""
 R_ERROR = 0.30
 DEAD_TIME_ERROR = 0.20
 """Share of the dead-time voltage that compensation leaves."""

@@ -6,6 +6,7 @@
 #include "board/reset.h"
 #include "board/status.h"
 #include "board/watch.h"
+#include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
 
@@ -15,6 +16,12 @@ panel_t board_panel;
 static uint16_t last_ms_tick;     /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;  /* drive ticks at the last check */
 static uint16_t silent_ms;        /* timer 1 milliseconds without a control interrupt */
+
+void firmware_trip(drive_fault_t fault)
+{
+    pwm_outputs_off();
+    drive_raise(&board_drive, fault);
+}
 
 void firmware_init(void)
 {
@@ -28,7 +35,7 @@ void firmware_init(void)
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
-    drive_init(&board_drive, &board_params); /* before what a trap could tell of */
+    drive_init(&board_drive, &board_params); /* before anything can trap */
     status_init();
     board_clock_failed = 0;
     if (clock_init()) { /* the trap may have said so before */
@@ -39,9 +46,9 @@ void firmware_init(void)
     timer_init();
     pwm_init();
     if (board_clock_failed) {
-        drive_raise(&board_drive, FAULT_CLOCK);
+        firmware_trip(FAULT_CLOCK);
     } else if (kept != FAULT_NONE) {
-        drive_raise(&board_drive, kept);
+        firmware_trip(kept);
     }
     adc_init();
     ClrWdt();
@@ -58,8 +65,7 @@ static void firmware_watch_interrupt(void)
         silent_ms = 0;
     } else if (++silent_ms >= 2u) {
         silent_ms = 2;
-        pwm_outputs_off();
-        drive_raise(&board_drive, FAULT_ADC_LOST);
+        firmware_trip(FAULT_ADC_LOST);
     }
 }
 
@@ -68,10 +74,10 @@ QM_INLINE void firmware_supervise(void)
 {
     firmware_watch_interrupt();
     if (board_clock_failed) {
-        drive_raise(&board_drive, FAULT_CLOCK);
+        firmware_trip(FAULT_CLOCK);
     }
     if (BOARD_FLTA_LOW()) { /* its interrupt comes once: S2 must not clear a fault that is still there */
-        drive_raise(&board_drive, FAULT_OVERCURRENT_HW);
+        firmware_trip(FAULT_OVERCURRENT_HW);
     }
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);

@@ -4,11 +4,11 @@
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "board/watch.h"
-#include "drive/drive_tick.h"
-#include "drive/params_init.h"
+#include "drive/param_init.h"
+#include "drive/tick.h"
 
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
-BOARD_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
+MODE_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 volatile uint16_t board_clock_failed;
 
@@ -33,7 +33,7 @@ void BOARD_ISR _ADC1Interrupt(void)
     duties_t duty;
 
     IFS0bits.AD1IF = 0;
-    raw.pot = (int16_t)ADC1BUF0;
+    board_panel.pot_q15 = (int16_t)ADC1BUF0;
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
@@ -45,20 +45,18 @@ void BOARD_ISR _ADC1Interrupt(void)
     if ((P1TMR & 0x8000u) == 0u || IFS0bits.AD1IF) {
         drive_raise(&board_drive, FAULT_ISR_OVERRUN);
     }
-    board_set_outputs((board_drive.fault != (uint16_t)FAULT_NONE) ? (uint16_t)OUTPUTS_OFF : drive_outputs(&board_drive));
+    board_set_outputs(drive_outputs(&board_drive));
     drive_slow(&board_drive, &board_params, raw.v_bus);
-    if (board_drive.fault != (uint16_t)FAULT_NONE) { /* also a trap's, that came in the middle of the tick */
-        board_drive.state = (uint16_t)DRIVE_FAULT;
+    if (drive_settle(&board_drive)) {
         pwm_outputs_off();
     }
-    watch_snapshot();
+    mode_record();
 }
 
 /** The board's comparator: the PWM module has already switched the outputs off. */
 void BOARD_ISR _FLTA1Interrupt(void)
 {
-    pwm_outputs_off();
-    drive_raise(&board_drive, FAULT_OVERCURRENT_HW);
+    firmware_trip(FAULT_OVERCURRENT_HW);
     IFS3bits.FLTA1IF = 0;
 }
 

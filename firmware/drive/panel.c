@@ -1,6 +1,8 @@
 /* Buttons, potentiometer and LEDs: from what a person does to what the drive is asked, in the background. */
 #include "drive/panel.h"
 
+#include "drive/modes/modes.h"
+
 #define BLINK_MS 250u
 #define PAUSE_MS 1500u
 #define POT_STEP_Q15 32 /* half a step of the converter */
@@ -11,6 +13,7 @@ void panel_init(panel_t *panel)
     panel->s3.down_ms = 0;
     panel->wish_run = 0;
     panel->fast_range = 0;
+    panel->pot_q15 = INT16_MIN;
     panel->pot_q31 = INT32_MIN;
     panel->pot_used_q15 = INT16_MIN;
     panel->blink_ms = 0;
@@ -37,32 +40,16 @@ int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_rang
 {
     /* the middle of the converter's step, so that the upper end is reached to half a step */
     uint16_t pot_q16 = (uint16_t)(((uint16_t)pot_q15 ^ 0x8000u) | 0x20u);
-#ifdef BIDIRECTIONAL_SPEED
-    int16_t signed_q15 = (int16_t)(pot_q16 ^ 0x8000u);
-    uint16_t size_q16 = (uint16_t)(2u * (uint16_t)qm_abs(signed_q15));
-    (void)fast_range;
-    if (size_q16 > 2048u) { /* three per cent around the middle keep the direction */
-        direction = (int16_t)((signed_q15 > 0) ? 1 : -1);
-    }
-#ifdef TORQUE_MODE
-    return (int16_t)(direction * between(1, p->current_max_q13, size_q16)); /* never 0: the sign is the direction */
-#else
-    return (int16_t)(direction * between(p->minimum_erpm, p->nominal_erpm, size_q16));
-#endif
-#elif defined(TORQUE_MODE)
-    (void)fast_range;
-    (void)direction;
-    return between(0, p->current_max_q13, pot_q16);
-#else
-    (void)direction;
-    return fast_range ? between(p->nominal_erpm, p->maximum_erpm, pot_q16) : between(p->minimum_erpm, p->nominal_erpm, pot_q16);
-#endif
+    int16_t towards = direction;
+    uint16_t travel_q16 = mode_pot_split(pot_q16, &towards);
+    mode_range_t range = mode_target_range(p, fast_range);
+    return (int16_t)(towards * between(range.low, range.high, travel_q16));
 }
 
 /** Filters the potentiometer (10 ms) and holds it within a converter step, so that noise does not move the reference. */
-static int16_t panel_pot(panel_t *panel, int16_t sample_q15)
+static int16_t panel_pot(panel_t *panel)
 {
-    int16_t now = qm_lowpass(&panel->pot_q31, sample_q15, 6554);
+    int16_t now = qm_lowpass(&panel->pot_q31, panel->pot_q15, 6554);
     if (now - panel->pot_used_q15 > POT_STEP_Q15 || panel->pot_used_q15 - now > POT_STEP_Q15) {
         panel->pot_used_q15 = now;
     }
@@ -115,7 +102,7 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
 {
     int16_t target;
     panel_buttons(panel, d, in);
-    target = panel_target(p, panel_pot(panel, d->pot_q15), panel->fast_range, d->direction);
+    target = panel_target(p, panel_pot(panel), panel->fast_range, d->direction);
     d->command.target_erpm = target;
     if (!panel->wish_run) {
         d->command.run = 0;
@@ -124,10 +111,8 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
     } else if ((target ^ d->direction) < 0) {
         d->command.run = 0; /* the other direction: stop in order, then start again */
     }
-#ifdef IDENTIFY
-    if (identify_background(d, p)) {
+    if (mode_background(d, p)) {
         panel->wish_run = 0;
     }
-#endif
     return panel_lights(panel, d, in->elapsed_ms);
 }

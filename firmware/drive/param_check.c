@@ -1,10 +1,10 @@
 /* Refuses a userparams.h that cannot work: every value against its range, and the values against each other, by name. */
+#include "drive/param_scaling.h"
 #include "drive/param_table.h"
-#include "drive/params.h"
 
 #define CHECK_TEXT_(x) #x
 #define CHECK_TEXT(x) CHECK_TEXT_(x)
-#define CHECK_RANGE(name, unit, min, max) \
+#define CHECK_RANGE(name, unit, min, max, value, meaning) \
     CHECK(PARAM_F(name) >= PARAM_F(min) && PARAM_F(name) <= PARAM_F(max), \
           "userparams.h: " #name " = " CHECK_TEXT(name) " is outside " #min " .. " #max " " unit)
 #define CHECK_RELATION(condition, message) CHECK(condition, "userparams.h: " message)

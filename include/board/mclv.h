@@ -8,7 +8,7 @@
 
 #include <xc.h>
 
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #ifdef __XC16__
 #define BOARD_ISR __attribute__((interrupt, no_auto_psv))

@@ -8,7 +8,7 @@
 #define QM_INLINE static inline __attribute__((always_inline))
 
 /** Blocks of the interrupt that run rarely or in turn: called, so that they take no registers from the main path. */
-#define QM_RARE static __attribute__((noinline, unused))
+#define NOINLINE static __attribute__((noinline, unused))
 
 /** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
  *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */

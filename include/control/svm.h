@@ -38,7 +38,7 @@ QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t i_q13)
  *  Centred between the extreme phases (min-max injection), then moved down as far as the sampling window asks: more of
  *  vector 000, less of 111, the same line voltages.
  *  @param v voltage vector, Q13
- *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see drive_gain_step())
+ *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see bus_update_gain())
  *  @param i_a,i_b,i_c phase currents, Q13, for dead-time compensation */
 QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16,
                        current_q13_t i_a, current_q13_t i_b, current_q13_t i_c)

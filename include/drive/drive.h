@@ -1,4 +1,4 @@
-/* The drive: one object with everything the machine knows, and one tick that is a whole PWM period from samples to duties. */
+/* The drive's types: states, parameters, and the one object with everything the machine knows. */
 #ifndef DRIVE_DRIVE_H
 #define DRIVE_DRIVE_H
 
@@ -9,15 +9,14 @@
 #include "control/speed_ramp.h"
 #include "control/svm.h"
 #include "drive/faults.h"
-#include "drive/identify.h"
-#include "drive/params.h"
+#include "drive/modes/mode_state.h"
 
 /** X(name, meaning): what the drive is doing. */
 #define DRIVE_STATE_TABLE(X) \
     X(CALIBRATE, "outputs off, current offsets are averaged") \
     X(STOPPED, "outputs off, ready") \
     X(BOOTSTRAP, "low sides on, high-side drivers charge") \
-    X(LOCK, "current in a fixed direction aligns the rotor") \
+    X(ALIGN, "current in a fixed direction aligns the rotor") \
     X(RAMP, "forced angle accelerates; the estimator runs along") \
     X(CLOSED, "the estimator's angle drives the motor") \
     X(STOPPING, "closed loop, ramping down to a speed where the outputs can go off") \
@@ -48,7 +47,7 @@ typedef struct {
     current_q13_t current_max_q13;        /**< MAXIMUM_CURRENT_A */
     uint16_t current_max_reciprocal;      /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;        /**< OVER_CURRENT_THRESHOLD_A */
-    uint16_t voltage_limit_per_bus_q16;   /**< see params.h */
+    uint16_t voltage_limit_per_bus_q16;   /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
     int16_t bus_over_q15, bus_under_q15;  /**< trip levels */
     int16_t bus_regen_q15;                /**< braking current falls from here */
@@ -65,65 +64,77 @@ typedef struct {
 
 /** Raw converter results, signed fractional Q15. */
 typedef struct {
-    int16_t i_a, i_b, v_bus, pot;
+    int16_t i_a, i_b, v_bus;
 } drive_samples_t;
 
 /** Requests from the background; 16-bit, so written in one instruction. */
 typedef struct {
-    volatile int16_t run;          /**< 1: start and keep running (see drive_start()), 0: stop in order */
+    volatile int16_t run;          /**< 1: start and keep running (see drive_start()), 0: stop in order; faults clear it */
     volatile int16_t clear_fault;  /**< 1: one request, taken back by the tick */
     volatile int16_t target_erpm;  /**< speed target, signed; TORQUE_MODE: q current, Q13 */
 } drive_command_t;
 
+/** Current offsets and the sums they come from. */
+typedef struct {
+    int32_t sum_a, sum_b;
+    int16_t offset_a_q13, offset_b_q13;
+    int16_t done;                  /**< 1: the offsets are known */
+} calibration_t;
+
 /** Controller variables of the closed loop. */
 typedef struct {
-    speed_erpm_t reference_erpm; /**< ramped speed reference */
-    uint16_t tuning_low;         /**< fraction of TUNING's ramp, Q16 */
-    dq_t ref_q13;                /**< current references */
-    current_q13_t iq_limit_q13;  /**< sqrt(Imax^2 - Id^2) */
+    speed_erpm_t reference_erpm;   /**< ramped speed reference */
+    dq_t ref_q13;                  /**< current references */
+    current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2) */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */
-    current_q13_t handover_q13;  /**< d current left from the hand-over */
-    int16_t handover_offset;     /**< measured angle offset that is left, angle counts, decays one count a period */
-    dq_t i_q13;                  /**< measured currents in the control frame */
-    dq_t v_q14;                  /**< commanded voltages in the control frame */
+    dq_t i_q13;                    /**< measured currents in the control frame */
+    dq_t v_q14;                    /**< commanded voltages in the control frame */
     voltage_q14_t vq_limit_q14;
     pi_t pi_d, pi_q, pi_speed;
 } drive_control_t;
 
+/** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
+typedef struct {
+    uint16_t waited_steps;         /**< at the end of the ramp */
+    uint16_t agreed_steps;         /**< of them, the last ones in which the estimator agreed with the forced speed */
+    uint16_t speed_is_preset;      /**< 1 from six periods after the hand-over on */
+    int16_t offset;                /**< angle that is left of the change of frame, angle counts */
+    current_q13_t id_q13;          /**< d current that goes with it */
+} handover_t;
+
+/** What a start begins anew: all of it is cleared. */
+typedef struct {
+    estimator_t estimator;
+    estimator_tuning_t model;      /**< the motor's constants, as field weakening adapts them */
+    fieldweak_t fieldweak;
+    handover_t handover;
+    drive_control_t control;
+    uint16_t stall_steps, lost_lock_steps; /**< how long each condition has lasted, slow steps */
+    MODE_STATE
+} drive_run_t;
+
 /** Everything the drive knows. Owned by the board; zero plus drive_init() is the start. */
 typedef struct {
     drive_command_t command;
-    volatile uint16_t state;       /**< drive_state_t */
-    volatile uint16_t fault;       /**< drive_fault_t, kept until cleared */
+    volatile uint16_t state;       /**< drive_state_t; written by drive_enter() only */
+    volatile uint16_t fault;       /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
     volatile uint16_t ticks;       /**< periods since power-up, wraps; the background's time base */
-    uint16_t timer;                /**< periods in the present state; end of the ramp: slow steps there */
-    uint16_t slots;                /**< end of the ramp: slow steps of agreement; closed loop: not 0 until the speed controller is preset */
+    uint16_t periods;              /**< in the present state: CALIBRATE, BOOTSTRAP and ALIGN count it */
     int16_t direction;             /**< +1 or -1, fixed from start to stop */
-    int16_t calibrated;
 
-    int32_t offset_sum_a, offset_sum_b;
-    int16_t offset_a_q13, offset_b_q13;
-
+    calibration_t calibration;
     current_q13_t i_a_q13, i_b_q13, i_c_q13;
-    int16_t pot_q15;               /**< last sample of the potentiometer, signed fractional */
     int32_t bus_q31;               /**< filtered bus, upper word Q15 of full scale */
     voltage_circle_t circle;       /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
 
+    forced_angle_t forced;
     angle_t angle;                 /**< control angle of the next sample */
     sincos_t frame;                /**< its sine and cosine */
-    forced_angle_t forced;
-    estimator_t estimator;
-    estimator_tuning_t tuning;
-    fieldweak_t fieldweak;
-    drive_control_t control;
-    uint16_t stall_count, lost_count;
-#ifdef IDENTIFY
-    identify_t identify;
-#endif
+    drive_run_t run;
 } drive_t;
 
-#define DRIVE_CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
+#define CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
 
 /** Brings the object to CALIBRATE; every field gets its start value. */
 void drive_init(drive_t *d, const drive_params_t *p);
@@ -132,35 +143,10 @@ void drive_init(drive_t *d, const drive_params_t *p);
  *  @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
-/** The modulator's gain at the filtered bus. */
-void drive_gain_step(drive_t *d, const drive_params_t *p);
-
-/** The voltage circle at the filtered bus. */
-void drive_circle_step(drive_t *d, const drive_params_t *p);
-
-#ifdef IDENTIFY
-/** Prepares the first step; called by drive_start() after it has cleared d->identify. */
-void identify_start(drive_t *d, const drive_params_t *p);
-
-/** The background's part: evaluates a finished step and asks for the next one. Once a millisecond.
- *  @return 1 when the procedure is not running: the bridge is to be off */
-uint16_t identify_background(drive_t *d, const drive_params_t *p);
-#endif
-
-/** 1 while the bridge switches under the law's control: LOCK to STOPPING, in one comparison. */
-QM_INLINE uint16_t drive_is_running(const drive_t *d)
+/** x turned into the direction of rotation. */
+QM_INLINE int16_t along_direction(const drive_t *d, int16_t x)
 {
-    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_LOCK) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_LOCK);
-}
-
-/** Stops at once and keeps the code of the first fault. */
-QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
-{
-    d->state = (uint16_t)DRIVE_FAULT;
-    d->command.run = 0;
-    if (d->fault == (uint16_t)FAULT_NONE) { /* last: when the tick clears a fault in between, no state FAULT without one stays behind */
-        d->fault = (uint16_t)fault;
-    }
+    return (int16_t)((d->direction >= 0) ? x : -x);
 }
 
 #endif

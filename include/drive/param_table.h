@@ -1,55 +1,76 @@
-/* Units and ranges of everything in userparams.h: one table that the build's checks, the tests and the tools read. */
+/* Every parameter of userparams.h, one row each, and what must hold between them. */
 #ifndef DRIVE_PARAM_TABLE_H
 #define DRIVE_PARAM_TABLE_H
 
-/** X(name, unit, min, max): the same unit and range as in the comment beside the name in userparams.h (a test compares). */
-#define PARAM_TABLE(X) \
-    X(NOPOLESPAIRS, "pairs", 1, 50) \
-    X(MOTOR_RS_OHM, "ohm", 0.01, 40) \
-    X(MOTOR_LS_MH, "mH", 0.01, 30) \
-    X(MOTOR_KPHI_V_PER_KRPM, "V peak/krpm", 0.2, 200) \
-    X(MOTOR_INERTIA_KGM2, "kg m2", 1e-8, 0.1) \
-    X(NOMINAL_BUS_V, "V", 10, 48) \
-    X(LOOPTIME_SEC, "s", 0.00004, 0.00014) \
-    X(DEADTIME_SEC, "s", 0.0000005, 0.000003) \
-    X(NORM_CURRENT_CONST, "A/count", 0.00001, 0.002) \
-    X(KCURRA, "1", -0.6, 0.6) \
-    X(KCURRB, "1", -0.6, 0.6) \
-    X(BUS_FULL_SCALE_V, "V", 20, 200) \
-    X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004) \
-    X(MINIMUM_SPEED_RPM, "rpm", 50, 10000) \
-    X(NOMINAL_SPEED_RPM, "rpm", 100, 20000) \
-    X(MAXIMUM_SPEED_RPM, "rpm", 100, 30000) \
-    X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000) \
-    X(TUNING_DELAY_RAMPUP, "periods", 0, 4095) \
-    X(LOCK_TIME, "periods", 200, 32000) \
-    X(END_SPEED_RPM, "rpm", 50, 5000) \
-    X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000) \
-    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20) \
-    X(MAXIMUM_CURRENT_A, "A peak", 0.1, 20) \
-    X(OVER_CURRENT_THRESHOLD_A, "A peak", 0.1, 40) \
-    X(OVER_VOLTAGE_V, "V", 12, 100) \
-    X(UNDER_VOLTAGE_V, "V", 5, 45) \
-    X(REGEN_LIMIT_V, "V", 11, 90) \
-    X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000) \
-    X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60) \
-    X(KFILTER_ESDQ, "Q15", 10, 8000) \
-    X(KFILTER_ESDQ_FW, "Q15", 10, 8000) \
-    X(KFILTER_VELESTIM, "Q15", 10, 8000) \
-    X(FW_START_SPEED_RPM, "rpm", 100, 20000) \
-    X(FW_TRIM_CURRENT_A, "A", 0, 20) \
-    PARAM_TABLE_FW(X, IDREF_SPEED, "A", -20, 0) \
-    PARAM_TABLE_FW(X, INVKFI_SPEED, "Q15/2", 2048, 32767) \
-    PARAM_TABLE_FW(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.6) \
-    X(SNAPDELAY, "periods", 1, 32000) \
-    X(DATA_BUFFER_SIZE, "rows", 2, 150)
+/** X(name, unit, minimum, maximum, default, meaning): one row a parameter. The build checks the range; userparams.h, the tuner,
+ *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
+ *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
+#define PARAM_TABLE(X) PARAM_MOTOR(X) PARAM_BOARD(X) PARAM_SPEEDS(X) PARAM_START(X) PARAM_LIMITS(X) PARAM_LOOPS(X) PARAM_FILTERS(X) \
+    PARAM_FIELD_WEAKENING(X) PARAM_SNAPSHOT(X)
 
-#define PARAM_TABLE_FW(X, stem, unit, min, max) \
-    X(stem##0, unit, min, max) X(stem##1, unit, min, max) X(stem##2, unit, min, max) X(stem##3, unit, min, max) \
-    X(stem##4, unit, min, max) X(stem##5, unit, min, max) X(stem##6, unit, min, max) X(stem##7, unit, min, max) \
-    X(stem##8, unit, min, max) X(stem##9, unit, min, max) X(stem##10, unit, min, max) X(stem##11, unit, min, max) \
-    X(stem##12, unit, min, max) X(stem##13, unit, min, max) X(stem##14, unit, min, max) X(stem##15, unit, min, max) \
-    X(stem##16, unit, min, max) X(stem##17, unit, min, max)
+#define PARAM_MOTOR(X) /* Motor, values per phase of the star */ \
+    X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
+    X(MOTOR_RS_OHM, "ohm", 0.01, 40, FROM_MOTOR, "phase resistance: half of line to line") \
+    X(MOTOR_LS_MH, "mH", 0.01, 30, FROM_MOTOR, "phase inductance: half of line to line") \
+    X(MOTOR_KPHI_V_PER_KRPM, "V peak/krpm", 0.2, 200, FROM_MOTOR, "line-to-line back-EMF per 1000 mechanical rpm") \
+    X(MOTOR_INERTIA_KGM2, "kg m2", 1e-8, 0.1, FROM_MOTOR, "rotor and whatever turns with it; scales the speed loop")
+
+#define PARAM_BOARD(X) /* Supply and board */ \
+    X(NOMINAL_BUS_V, "V", 10, 48, FROM_BOARD, "supply; the unit of voltage follows from it") \
+    X(LOOPTIME_SEC, "s", 0.00004, 0.00014, FROM_BOARD, "PWM and control period") \
+    X(DEADTIME_SEC, "s", 0.0000005, 0.000003, FROM_BOARD, "dead time of the bridge") \
+    X(NORM_CURRENT_CONST, "A/count", 0.00001, 0.002, FROM_BOARD, "current of one count, full scale / 32768; calibrate with a probe") \
+    X(KCURRA, "1", -0.6, 0.6, FROM_BOARD, "gain of phase A's current, 0.5 = 1; negative: shunt in the low leg") \
+    X(KCURRB, "1", -0.6, 0.6, FROM_BOARD, "gain of phase B's current") \
+    X(BUS_FULL_SCALE_V, "V", 20, 200, FROM_BOARD, "bus voltage that gives full scale at the converter") \
+    X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004, FROM_BOARD, "low sides on for this long on each side of the sample's centre")
+
+#define PARAM_SPEEDS(X) /* Speeds */ \
+    X(MINIMUM_SPEED_RPM, "rpm", 50, 10000, FROM_TUNER, "potentiometer at zero") \
+    X(NOMINAL_SPEED_RPM, "rpm", 100, 20000, FROM_TUNER, "potentiometer at full scale, S3 off; the estimator's derivative changes here") \
+    X(MAXIMUM_SPEED_RPM, "rpm", 100, 30000, FROM_MOTOR, "potentiometer at full scale, S3 on") \
+    X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000, FROM_TUNER, "slope of the speed reference") \
+    X(TUNING_DELAY_RAMPUP, "periods", 0, 4095, 0xF, "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods")
+
+#define PARAM_START(X) /* Start: lock, ramp, hand-over */ \
+    X(LOCK_TIME, "periods", 200, 32000, FROM_TUNER, "rotor held at a fixed angle (two directions, half the time each)") \
+    X(END_SPEED_RPM, "rpm", 50, 5000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
+    X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000, FROM_TUNER, "acceleration of the ramp") \
+    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of lock and ramp")
+
+#define PARAM_LIMITS(X) /* Limits and protections */ \
+    X(MAXIMUM_CURRENT_A, "A peak", 0.1, 20, FROM_MOTOR, "length of the current vector that the drive may ask for") \
+    X(OVER_CURRENT_THRESHOLD_A, "A peak", 0.1, 40, FROM_TUNER, "any phase above trips at once; must lie inside the converter's range") \
+    X(OVER_VOLTAGE_V, "V", 12, 100, FROM_BOARD, "bus above trips") \
+    X(UNDER_VOLTAGE_V, "V", 5, 45, FROM_BOARD, "bus below trips while running") \
+    X(REGEN_LIMIT_V, "V", 11, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher")
+
+#define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
+    X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
+    X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60, FROM_TUNER, "speed loop")
+
+#define PARAM_FILTERS(X) /* Filters, Equation 7: K in Q15 per period */ \
+    X(KFILTER_ESDQ, "Q15", 10, 8000, FROM_TUNER, "back-EMF up to FW_START_SPEED_RPM") \
+    X(KFILTER_ESDQ_FW, "Q15", 10, 8000, FROM_TUNER, "back-EMF above") \
+    X(KFILTER_VELESTIM, "Q15", 10, 8000, FROM_TUNER, "speed for loop, thresholds and display")
+
+#define PARAM_FIELD_WEAKENING(X) /* Field weakening: a table entry every 1024 electrical rpm of speed reference */ \
+    X(FW_START_SPEED_RPM, "rpm", 100, 20000, FROM_TUNER, "speed reference of entry 0") \
+    X(FW_TRIM_CURRENT_A, "A", 0, 20, FROM_TUNER, "most that the voltage feedback may add to the table's d current") \
+    PARAM_ENTRIES(X, IDREF_SPEED, "A", -20, 0, FROM_TUNER, "d current of each entry") \
+    PARAM_ENTRIES(X, INVKFI_SPEED, "Q15/2", 2048, 32767, NORM_INVKFIBASE, "1/Kphi of each entry") \
+    PARAM_ENTRIES(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.6, 0.5, "Ls / (2 Ls0) of each entry; 0.5 = no change")
+
+#define PARAM_SNAPSHOT(X) /* Snapshot */ \
+    X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
+    X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
+
+/** The 18 parameters of a table: stem0 .. stem17. */
+#define PARAM_ENTRIES(X, stem, ...) \
+    X(stem##0, __VA_ARGS__) X(stem##1, __VA_ARGS__) X(stem##2, __VA_ARGS__) X(stem##3, __VA_ARGS__) X(stem##4, __VA_ARGS__) \
+    X(stem##5, __VA_ARGS__) X(stem##6, __VA_ARGS__) X(stem##7, __VA_ARGS__) X(stem##8, __VA_ARGS__) X(stem##9, __VA_ARGS__) \
+    X(stem##10, __VA_ARGS__) X(stem##11, __VA_ARGS__) X(stem##12, __VA_ARGS__) X(stem##13, __VA_ARGS__) X(stem##14, __VA_ARGS__) \
+    X(stem##15, __VA_ARGS__) X(stem##16, __VA_ARGS__) X(stem##17, __VA_ARGS__)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */
 #define PARAM_RELATION_TABLE(X) \

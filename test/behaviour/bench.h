@@ -4,9 +4,10 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "board/firmware.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 #include "unity.h"
 #include "vboard.h"
 
@@ -38,24 +39,13 @@ static inline void wait_s(double seconds)
     TEST_ASSERT_EQUAL_INT(0, vb_run(bench, (uint32_t)(seconds * 20000.0 + 0.5)));
 }
 
+/** input.s2 starts and stops at the low range, input.s3 changes the range; the potentiometer stays where it is. */
 static inline void press(const char *button)
 {
     set(button, 1.0);
     wait_s(0.1);
     set(button, 0.0);
-}
-
-static inline void press_s2(void)
-{
-    press("input.s2");
-    bench_fast = 0;
-}
-
-/** S3 with the potentiometer at its lower end, so that the speed does not jump. */
-static inline void press_s3(void)
-{
-    press("input.s3");
-    bench_fast = !bench_fast;
+    bench_fast = (strcmp(button, "input.s3") == 0) ? !bench_fast : 0;
 }
 
 static inline void turn_to_rpm(double rpm)
@@ -65,9 +55,10 @@ static inline void turn_to_rpm(double rpm)
     set("input.pot", (rpm - low) / (high - low));
 }
 
-/** Power on and wait for the calibration. */
+/** Power on with the shaft at rest, and wait for the calibration. */
 static inline void power_on(void)
 {
+    set("state.speed_rpm", 0.0);
     TEST_ASSERT_EQUAL_INT(0, vb_power_up(bench));
     bench_fast = 0;
     turn_to_rpm(1000.0);
@@ -78,7 +69,7 @@ static inline void power_on(void)
 static inline double start(void)
 {
     double begin = get("time_s");
-    press_s2();
+    press("input.s2");
     while (board_drive.state != DRIVE_CLOSED && board_drive.fault == FAULT_NONE && get("time_s") < begin + 2.0) {
         wait_s(0.005);
     }
@@ -93,7 +84,7 @@ static inline void run_at(double rpm)
     TEST_ASSERT_EQUAL_INT_MESSAGE(DRIVE_CLOSED, board_drive.state, "did not start");
     wait_s(0.5);
     if (rpm > NOMINAL_SPEED_RPM) {
-        press_s3();
+        press("input.s3");
     }
     turn_to_rpm(rpm);
     wait_s(1.7);
@@ -109,15 +100,13 @@ static inline void ramp_load(double nm)
 
 static inline measured_t measure(double seconds)
 {
-    measured_t m = { 0.0, 1e9, -1e9, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0 };
+    measured_t m = { .rpm_min = 1e9, .rpm_max = -1e9 };
     size_t rows, cols;
-    const float *row;
     double angle2 = 0.0;
-
     TEST_ASSERT_EQUAL_INT(0, vb_trace_config(bench, "plant.speed_rpm plant.i_d plant.i_q plant.theta_e_deg fw.theta_est_deg "
                                                     "bus.voltage_v fw.v_d_v fw.v_q_v fw.v_limit_v", 3));
     wait_s(seconds);
-    row = vb_trace_data(bench, &rows, &cols);
+    const float *row = vb_trace_data(bench, &rows, &cols);
     TEST_ASSERT_EQUAL_UINT(9, cols);
     for (size_t i = 0; i < rows; i++, row += cols) {
         double i2 = (double)row[1] * row[1] + (double)row[2] * row[2];
@@ -159,9 +148,23 @@ static inline void assert_running(void)
     TEST_ASSERT_EQUAL_INT_MESSAGE(DRIVE_CLOSED, board_drive.state, vb_state_name((int)board_drive.state));
 }
 
-static inline void assert_speed(double rpm, double tolerance_percent, const measured_t *m)
+/** The speed is held to half a percent over some time, and nothing has failed. */
+static inline measured_t assert_holds(double rpm, double seconds)
 {
-    TEST_ASSERT_DOUBLE_WITHIN(rpm * tolerance_percent / 100.0, rpm, m->rpm);
+    measured_t m = measure(seconds);
+    TEST_ASSERT_DOUBLE_WITHIN(rpm * 0.005, rpm, m.rpm);
+    assert_running();
+    return m;
+}
+
+/** From a start on. */
+static inline measured_t assert_holds_under_load(double rpm, double nm)
+{
+    set("load.constant_nm", 0.0);
+    run_at(rpm);
+    ramp_load(nm);
+    wait_s(0.5);
+    return assert_holds(rpm, 0.5);
 }
 
 /** Gives up on a fault, otherwise waits until the condition's time is over. @return seconds until the fault, or limit */
@@ -179,6 +182,23 @@ static inline void bench_set_up(void)
     bench = vb_create();
     TEST_ASSERT_NOT_NULL(bench);
     bench_fast = 0;
+}
+
+/** No current sample was taken while its low side was off. */
+static inline void assert_shunts_see_the_current(void)
+{
+    set("adc.ia_invalid_count", 0.0);
+    set("adc.ib_invalid_count", 0.0);
+    wait_s(0.5);
+    TEST_ASSERT_EQUAL_INT(0, (int)get("adc.ia_invalid_count"));
+    TEST_ASSERT_EQUAL_INT(0, (int)get("adc.ib_invalid_count"));
+}
+
+/** The supply at a voltage, and the bus with it. */
+static inline void supply_v(double volts)
+{
+    set("supply.voltage_v", volts);
+    set("bus.voltage_v", volts);
 }
 
 static inline void bench_tear_down(void)

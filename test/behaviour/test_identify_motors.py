@@ -4,18 +4,18 @@ import unittest
 
 from tools.bench import build
 from tools.common import board_keys, motor_file, paths, workers
-from tuning import identify
+from tuning import identify, identify_result
 
 HURST = "hurst_dmb0224c10002"
 
 
-def run(name: str = HURST, **changes: float) -> identify.Identified:
+def run(name: str = HURST, **changes: float) -> identify_result.Identified:
     """One identification with changes to the plant; dots of keys are written as "__"."""
     values = board_keys.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
     return identify.identify([motor_file.load(name)], "mclv", values)[0]
 
 
-def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float, **changes: float) -> identify.Identified:
+def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float, **changes: float) -> identify_result.Identified:
     """Another motor in the Hurst's housing: 5 pole pairs."""
     psi_vs = kphi / (3.0 ** 0.5 * 1000.0 * 2.0 * 3.14159265 / 60.0 * 5.0)
     values = {"motor.rs_ohm": rs_ohm, "motor.ld_h": ld_h, "motor.lq_h": lq_h, "motor.psi_vs": psi_vs, "mech.coulomb_nm": 0.001} | changes
@@ -60,7 +60,7 @@ class Motors(unittest.TestCase):
 
 
 class Troubles(unittest.TestCase):
-    def assert_ends(self, item: identify.Identified, result: str) -> None:
+    def assert_ends(self, item: identify_result.Identified, result: str) -> None:
         self.assertEqual((item.result.name, item.measured.fault), (result, "NONE"))
         self.assertEqual(item.measured.outputs_seen, 0.0)
 
@@ -91,11 +91,15 @@ class Troubles(unittest.TestCase):
         began_s = undisturbed.measured.steps[0][0]
         spans = list(zip(undisturbed.measured.steps[1:], undisturbed.measured.steps[2:]))
         presses = [0.5 * (at_s + until_s) - began_s for (at_s, _), (until_s, _) in spans]
-        library = paths.ROOT / "build" / f"host-{build.variant_name([identify.MODE], identify.HEADERS / HURST)}" / "libvboard.so"
+        library = paths.ROOT / "build" / f"host-{build.variant_name([identify_result.MODE], identify.HEADERS / HURST)}" / "libvboard.so"
         jobs = [identify.Job(library, undisturbed.values, stop_after_s=at_s) for at_s in presses]
         for at_s, (step, _), measured in zip(presses, spans, workers.run_all(jobs, identify.measure, lambda seconds: None)):
-            with self.subTest(identify.step_names()[step[1]]):
-                self.assertEqual(identify.results()[measured.watch["result"]].name, "STOPPED")
+            with self.subTest(identify_result.step_names()[step[1]]):
+                self.assertEqual(identify_result.results()[measured.watch["result"]].name, "STOPPED")
                 self.assertEqual((measured.fault, measured.outputs_seen), ("NONE", 0.0))
                 self.assertIn(step[1], [number for _, number in measured.steps])
                 self.assertLess(measured.steps[-1][0] - began_s - at_s, 0.035)
+
+
+if __name__ == "__main__":
+    unittest.main()

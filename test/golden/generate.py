@@ -33,6 +33,11 @@ class Vectors:
         self.real += list(real)
         self.model += list(model)
 
+    def add(self, arguments, out, real):
+        """A row: arguments and the model's results; the results in float64 are compared."""
+        self.rows.append([*arguments, *out])
+        self.compare(real, out)
+
     def ratio_db(self):
         noise = math.fsum((r - m) ** 2 for r, m in zip(self.real, self.model))
         return 10 * math.log10(math.fsum(r * r for r in self.real) / noise) if noise else math.inf
@@ -55,53 +60,66 @@ class Vectors:
         return "\n".join(lines) + "\n"
 
 
+BLOCKS = []
+
+
+def block(what, layout, columns="", least_db=0.0):
+    """The function that follows fills the vectors of its own name; its random numbers are its own, so that a change in one block leaves
+    the others' files alone."""
+    def register(fill):
+        def make():
+            v = Vectors(fill.__name__, what, layout, columns, least_db=least_db)
+            fill(v, random.Random(f"{SEED} {fill.__name__}"))
+            return v
+        BLOCKS.append(make)
+        return fill
+    return register
+
+
 def dither(rng, low, high, count):
     return [rng.randrange(low, high + 1) for _ in range(count)]
 
 
 # ---- arithmetic -----------------------------------------------------------------------------------------------------
 
-def multiply(rng):
-    v = Vectors("multiply", "exact products and their upper words, signed, mixed and unsigned",
-                "a, b 16-bit words; ss su uu 32-bit products; hi* upper words (floor)",
-                "a:s16 b:s16 ss:s32 su:s32 uu:u32 hi:s16 hi_su:s16 hi_uu:u16")
+@block("exact products and their upper words, signed, mixed and unsigned",
+       "a, b 16-bit words; ss su uu 32-bit products; hi* upper words (floor)",
+       "a:s16 b:s16 ss:s32 su:s32 uu:u32 hi:s16 hi_su:s16 hi_uu:u16")
+def multiply(v, rng):
     pairs = [(a, b) for a in EDGES for b in EDGES]
     pairs += list(zip(dither(rng, -32768, 32767, 180), dither(rng, -32768, 32767, 180)))
     for a, b in pairs:
         ua, ub = a % 65536, b % 65536
         v.rows.append([a, b, a * b, a * ub, ua * ub, ref.share(a, b), ref.share(a, ub), ua * ub // 65536])
-    return v
 
 
-def divide(rng):
-    v = Vectors("divide", "unsigned 32/16 division, truncated", "n / d with d > n >> 16", "n:u32 d:u16 q:u16")
+@block("unsigned 32/16 division, truncated", "n / d with d > n >> 16", "n:u32 d:u16 q:u16")
+def divide(v, rng):
     pairs = [(1 << 29, 8193), (1 << 29, 16384), (1 << 29, 32767), (32767 * 2048, 2048), (32767 * 2048, 7956),
              (32767 * 2048, 32767), (0, 1), (65535, 1), (0xFFFEFFFF, 0xFFFF), (0xFFFE0001, 0xFFFF), (0xFFFE0000, 0xFFFF)]
     for _ in range(80):
         d = rng.randrange(1, 65536)
         pairs.append((rng.randrange(0, d * 65536), d))
     v.rows = [[n, d, n // d] for n, d in pairs]
-    return v
 
 
-def limits(rng):
-    v = Vectors("limits", "magnitude, difference in 17 bits limited to half the range, clamp",
-                "abs_a = |a|; sub = a - b within -16383..16383; clamped = a within min(b, c)..max(b, c)",
-                "a:s16 b:s16 c:s16 abs_a:s16 sub:s16 clamped:s16")
+@block("magnitude, difference in 17 bits limited to half the range, clamp",
+       "abs_a = |a|; sub = a - b within -16383..16383; clamped = a within min(b, c)..max(b, c)",
+       "a:s16 b:s16 c:s16 abs_a:s16 sub:s16 clamped:s16")
+def limits(v, rng):
     rows = [(a, b, rng.choice(EDGES)) for a in EDGES for b in EDGES]
     rows += [(a, b, c) for a in (-5, -4, -3, 3, 4, 5) for b, c in ((-4, 4), (4, 4), (-4, -4))]
     rows += [(16383, 0, 0), (16384, 0, 0), (16385, 1, 0), (-16383, 0, 0), (-16384, 0, 0), (-16384, -1, 0)]
     rows += [tuple(dither(rng, -32768, 32767, 3)) for _ in range(60)]
     for a, b, c in rows:
         v.rows.append([a, b, c, ref.magnitude(a), ref.clamp(a - b, -16383, 16383), ref.clamp(a, min(b, c), max(b, c))])
-    return v
 
 
-def lowpass(rng):
-    v = Vectors("lowpass", "Equation 7: full-scale steps both ways, small steps and noise for each filter constant in use",
-                "k Q16 (twice the note's Q15); x counts; y 16 fraction bits; start 1 = y begins at zero; "
-                "-3 dB at 118, 16, 73 Hz for 2400, 328, 1496",
-                "start:u16 k:s16 x:s16 y:s32", least_db=90.0)
+@block("Equation 7: full-scale steps both ways, small steps and noise for each filter constant in use",
+       "k Q16 (twice the note's Q15); x counts; y 16 fraction bits; start 1 = y begins at zero; "
+       "-3 dB at 118, 16, 73 Hz for 2400, 328, 1496",
+       "start:u16 k:s16 x:s16 y:s32", least_db=90.0)
+def lowpass(v, rng):
     for k, corner in ((2400, 118.8), (328, 16.0), (1496, 73.5), (16384, None)):
         if corner and abs(ref.lowpass_corner_hz(k / 65536, 20000.0) - corner) > 0.1:
             raise ValueError(f"lowpass: -3 dB of {k} is not at {corner} Hz")
@@ -111,58 +129,53 @@ def lowpass(rng):
             y, real = ref.lowpass(y, x, k), ref.lowpass_real(real, x, k / 65536)
             v.rows.append([int(n == 0), k, x, y])
             v.compare([real], [y / 65536])
-    return v
 
 
 # ---- sine, circle, transformations ----------------------------------------------------------------------------------
 
-def sine_table(_):
-    return Vectors("sine_table", "every entry of the sine table", "sin(2 pi i / 128) * 32757, nearest", "value:s16",
-                   [[x] for x in ref.sine_table()])
+@block("every entry of the sine table", "sin(2 pi i / 128) * 32757, nearest", "value:s16")
+def sine_table(v, _):
+    v.rows = [[x] for x in ref.sine_table()]
 
 
-def circle_table(_):
-    return Vectors("circle_table", "every entry of the circle table", "sqrt(1 - (i/64)^2) * 32767, rounded down",
-                   "value:s16", [[x] for x in ref.circle_table()])
+@block("every entry of the circle table", "sqrt(1 - (i/64)^2) * 32767, rounded down", "value:s16")
+def circle_table(v, _):
+    v.rows = [[x] for x in ref.circle_table()]
 
 
-def sincos(rng):
-    v = Vectors("sincos", "sine and cosine: table points, their neighbours, the borders between them, a random sample",
-                "angle 65536 = one turn; sin, cos Q15; checksum s = 31 s + word over sin, cos of all 65536 angles",
-                "angle:u16 sin:s16 cos:s16", least_db=72.0)
+@block("sine and cosine: table points, their neighbours, the borders between them, a random sample",
+       "angle 65536 = one turn; sin, cos Q15; checksum s = 31 s + word over sin, cos of all 65536 angles",
+       "angle:u16 sin:s16 cos:s16", least_db=72.0)
+def sincos(v, rng):
     everything = [ref.sincos(a) for a in range(65536)]
     for a, sc in enumerate(everything):
         v.compare(ref.sincos_real(a), sc)
     v.constants["checksum"] = ref.polynomial_checksum(x for sc in everything for x in sc)
     angles = [(512 * i + d) % 65536 for i in range(128) for d in (-256, -1, 0, 1, 255)] + dither(rng, 0, 65535, 60)
     v.rows = [[a, *everything[a]] for a in angles]
-    return v
 
 
-def circle(_):
-    v = Vectors("circle", "sqrt(1 - x^2): table points, the middle and the end of every interval",
-                "x, value Q15; checksum s = 31 s + word over all x from 0 to 32767; the ratio is for x up to 31/32", "x:s16 value:s16", least_db=72.0)
+@block("sqrt(1 - x^2): table points, the middle and the end of every interval",
+       "x, value Q15; checksum s = 31 s + word over all x from 0 to 32767; the ratio is for x up to 31/32",
+       "x:s16 value:s16", least_db=72.0)
+def circle(v, _):
     everything = [ref.circle(x) for x in range(32768)]
     used = range(32768 * 31 // 32 + 1)  # both users end at 31/32; beyond, the chord of the steep end is 4 % below
     v.compare((ref.circle_real(x) for x in used), everything)
     v.constants["checksum"] = ref.polynomial_checksum(everything)
     v.rows = [[x, everything[x]] for i in range(64) for x in (512 * i, 512 * i + 1, 512 * i + 256, 512 * i + 511)]
-    return v
 
 
-def clarke(rng):
-    v = Vectors("clarke", "Clarke: the largest currents and offsets, a circle of full-scale current, a random sample",
-                "a, b Q13 phase currents; alpha, beta Q14", "a:s16 b:s16 alpha:s16 beta:s16", least_db=88.0)
+@block("Clarke: the largest currents and offsets, a circle of full-scale current, a random sample",
+       "a, b Q13 phase currents; alpha, beta Q14", "a:s16 b:s16 alpha:s16 beta:s16", least_db=88.0)
+def clarke(v, rng):
     edges = [-10240, -8192, -1, 0, 1, 8192, 10240]
     pairs = [(a, b) for a in edges for b in edges if abs(a + b) <= 10240]  # the third phase has the same range
     pairs += [(round(8192 * math.cos(t)), round(8192 * math.cos(t - 2 * math.pi / 3)))
               for t in (2 * math.pi * n / 48 for n in range(48))]
     pairs += [p for p in zip(dither(rng, -10240, 10240, 150), dither(rng, -10240, 10240, 150)) if abs(sum(p)) <= 10240]
-    for a, b in pairs:
-        out = ref.clarke(a, b)
-        v.rows.append([a, b, *out])
-        v.compare(ref.clarke_real(a, b), out)
-    return v
+    for pair in pairs:
+        v.add(pair, ref.clarke(*pair), ref.clarke_real(*pair))
 
 
 def rotations(rng, most):
@@ -171,37 +184,34 @@ def rotations(rng, most):
     return rows + [(*dither(rng, -most, most, 2), rng.randrange(65536)) for _ in range(120)]
 
 
-def park(rng):
-    v = Vectors("park", "Park: the largest vectors in 24 directions, a random sample",
-                "alpha, beta counts; angle 65536 = one turn; d, q half the counts",
-                "alpha:s16 beta:s16 angle:u16 d:s16 q:s16", least_db=71.0)
-    for x, y, angle in rotations(rng, 23170):
-        out = ref.park(x, y, *ref.sincos(angle))
-        v.rows.append([x, y, angle, *out])
-        v.compare(ref.park_real(x, y, 2 * math.pi * angle / 65536), out)
-    return v
+def rotate(v, rows, model, real):
+    for x, y, angle in rows:
+        v.add((x, y, angle), model(x, y, *ref.sincos(angle)), real(x, y, 2 * math.pi * angle / 65536))
 
 
-def inverse_park(rng):
-    v = Vectors("inverse_park", "inverse Park: the largest vectors in 24 directions, a random sample",
-                "d, q counts; angle 65536 = one turn; alpha, beta half the counts",
-                "d:s16 q:s16 angle:u16 alpha:s16 beta:s16", least_db=71.0)
-    for x, y, angle in rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)]:
-        out = ref.inverse_park(x, y, *ref.sincos(angle))
-        v.rows.append([x, y, angle, *out])
-        v.compare(ref.inverse_park_real(x, y, 2 * math.pi * angle / 65536), out)
-    return v
+@block("Park: the largest vectors in 24 directions, a random sample", "alpha, beta counts; angle 65536 = one turn; d, q half the counts",
+       "alpha:s16 beta:s16 angle:u16 d:s16 q:s16", least_db=71.0)
+def park(v, rng):
+    rotate(v, rotations(rng, 23170), ref.park, ref.park_real)
+
+
+@block("inverse Park: the largest vectors in 24 directions, a random sample",
+       "d, q counts; angle 65536 = one turn; alpha, beta half the counts",
+       "d:s16 q:s16 angle:u16 alpha:s16 beta:s16", least_db=71.0)
+def inverse_park(v, rng):
+    rotate(v, rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)], ref.inverse_park, ref.inverse_park_real)
 
 
 # ---- modulator ------------------------------------------------------------------------------------------------------
 
-def svm(rng):
+@block("modulator at five bus voltages: every sector, its borders and their neighbours, up to and beyond "
+       "the voltage circle, every second row with dead-time compensation",
+       "alpha, beta Q13 volts; gain duty per volt count * 65536; currents Q13; a, b, c duty counts; "
+       "the ratio is that of the line voltages",
+       "alpha:s16 beta:s16 gain:u16 i_a:s16 i_b:s16 i_c:s16 a:u16 b:u16 c:u16", least_db=56.0)
+def svm(v, rng):
     p = MACHINE.modulator()
-    v = Vectors("svm", "modulator at five bus voltages: every sector, its borders and their neighbours, up to and beyond "
-                "the voltage circle, every second row with dead-time compensation",
-                "alpha, beta Q13 volts; gain duty per volt count * 65536; currents Q13; a, b, c duty counts; "
-                "the ratio is that of the line voltages",
-                "alpha:s16 beta:s16 gain:u16 i_a:s16 i_b:s16 i_c:s16 a:u16 b:u16 c:u16", constants=dict(p), least_db=56.0)
+    v.constants = dict(p)
     degrees = sorted({*range(0, 360, 30), *(s + d for s in range(0, 360, 60) for d in (-1, 1)), 17, 101, 223, 318})
     for bus_v in (12.0, 18.0, 24.0, 30.0, 34.0):
         gain = MACHINE.duty_per_volt_q16(bus_v)
@@ -218,16 +228,15 @@ def svm(rng):
                 ra, rb, rc = ref.svm_real(p, alpha, beta, gain, currents)
                 v.rows.append([alpha, beta, gain, *currents, a, b, c])
                 v.compare([ra - rb, rb - rc], [a - b, b - c])
-    return v
 
 
 # ---- controllers ----------------------------------------------------------------------------------------------------
 
-def pi(rng):
-    v = Vectors("pi", "PI: small signals, wind-up against both limits, recovery, no and full anti-windup, limit zero and full",
-                "op 0 tick, 1 clear and tick, 2 preset (err, and limit is the wanted output); sum after the step; "
-                "U counts = output counts << shift; the ratio is for shifts in use (10 and more)",
-                "op:u16 kp:s16 ki:s16 kc:s16 shift:u16 err:s16 limit:s16 out:s16 sum:s32", least_db=55.0)
+@block("PI: small signals, wind-up against both limits, recovery, no and full anti-windup, limit zero and full",
+       "op 0 tick, 1 clear and tick, 2 preset (err, and limit is the wanted output); sum after the step; "
+       "U counts = output counts << shift; the ratio is for shifts in use (10 and more)",
+       "op:u16 kp:s16 ki:s16 kc:s16 shift:u16 err:s16 limit:s16 out:s16 sum:s32", least_db=55.0)
+def pi(v, rng):
     half_full = ref.q15(0.999)
     for gains in ((6538, 455, half_full, 10), (3000, 40, half_full, 13), (20, 7, 0, 0), (6538, 455, 0, 10),
                   (16384, 9000, 32767, 14), (900, 300, 16384, 4)):
@@ -252,31 +261,30 @@ def pi(rng):
             v.rows.append([op, *gains, err, limit, out, model.sum])
             if gains[3] >= 10 or not gains[2]:  # the excess counts in steps of 65536 >> shift output counts
                 v.compare([exact], [out])
-    return v
 
 
 RADII = (4097, 7987, 12287, 15974, 19000, 22630, 30350)
 
 
-def voltage_circle(_):
-    v = Vectors("voltage_circle", "d-axis limit and what the circle leaves to the q axis, in steps of 1/64 of the d limit",
-                "radius, Vd, limits Q14; checksum_<radius>: s = 31 s + word over Vd from -limit to +limit",
-                "radius:s16 vd_limit:s16 vd:s16 vq_limit:s16", least_db=66.0)
+@block("d-axis limit and what the circle leaves to the q axis, in steps of 1/64 of the d limit",
+       "radius, Vd, limits Q14; checksum_<radius>: s = 31 s + word over Vd from -limit to +limit",
+       "radius:s16 vd_limit:s16 vd:s16 vq_limit:s16", least_db=66.0)
+def voltage_circle(v, _):
     for radius in RADII:
         most = ref.vd_limit(radius)
         everything = [ref.vq_limit(radius, vd) for vd in range(-most, most + 1)]
         v.constants[f"checksum_{radius}"] = ref.polynomial_checksum(everything)
         v.compare((ref.vq_limit_real(radius, vd) for vd in range(-most, most + 1)), everything)
-        v.rows += [[radius, most, vd, everything[vd + most]] for vd in sorted({-most, *range(-63 * most // 64, most, max(1, most // 12)), 0, most})]
-    return v
+        chosen = {-most, *range(-63 * most // 64, most, max(1, most // 12)), 0, most}
+        v.rows += [[radius, most, vd, everything[vd + most]] for vd in sorted(chosen)]
 
 
-def current_control(rng):
+@block("both current controllers on a sequence that runs into the d limit and the circle and back",
+       "references, currents Q13; radius, voltages, q limit Q14; sequence from cleared integrators",
+       "ref_d:s16 ref_q:s16 meas_d:s16 meas_q:s16 radius:s16 v_d:s16 v_q:s16 limit_q:s16", least_db=48.0)
+def current_control(v, rng):
     gains = (6538, 455, ref.q15(0.999), 10)
-    v = Vectors("current_control", "both current controllers on a sequence that runs into the d limit and the circle and back",
-                "references, currents Q13; radius, voltages, q limit Q14; sequence from cleared integrators",
-                "ref_d:s16 ref_q:s16 meas_d:s16 meas_q:s16 radius:s16 v_d:s16 v_q:s16 limit_q:s16",
-                constants=dict(zip(("kp", "ki", "kc", "shift"), gains)), least_db=48.0)
+    v.constants = dict(zip(("kp", "ki", "kc", "shift"), gains))
     pi_d, pi_q, real_d, real_q = ref.Pi(*gains), ref.Pi(*gains), ref.PiReal(*gains), ref.PiReal(*gains)
     plan = [(0, 2000, 15974, 60), (-3000, 4000, 15974, 60), (-1000, -4000, 15974, 80), (3000, -100, 15974, 60),
             (0, 5000, 9000, 60), (0, -200, 9000, 80), (-2000, 300, 22630, 60)]
@@ -291,12 +299,11 @@ def current_control(rng):
             v.rows.append([ref_d, ref_q, *meas, radius, *out])
             d += 0.02 * out[0] - 0.07 * d       # a plant of first order that cannot follow everything
             q += 0.02 * (out[1] - 9000) - 0.07 * q
-    return v
 
 
-def current_limit(_):
-    v = Vectors("current_limit", "q-current limit sqrt(Imax^2 - Id^2) for a wanted d current, which is limited to 31/32 Imax first",
-                "Q13; reciprocal 2^25/Imax", "maximum:s16 reciprocal:u16 wanted_d:s16 ref_d:s16 iq_limit:s16", least_db=67.0)
+@block("q-current limit sqrt(Imax^2 - Id^2) for a wanted d current, which is limited to 31/32 Imax first",
+       "Q13; reciprocal 2^25/Imax", "maximum:s16 reciprocal:u16 wanted_d:s16 ref_d:s16 iq_limit:s16", least_db=67.0)
+def current_limit(v, _):
     for amperes in (0.28, 1.0, 2.75, 3.8):
         maximum = ref.nearest(amperes / MACHINE.i0 / 4)
         most = maximum - maximum // 32
@@ -304,9 +311,7 @@ def current_limit(_):
         for i_d in wanted:
             ref_d = ref.clamp(i_d, -most, most)
             limit = ref.iq_limit(maximum, ref_d)
-            v.rows.append([maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d, limit])
-            v.compare([math.sqrt(maximum ** 2 - ref_d ** 2)], [limit])
-    return v
+            v.add((maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d), [limit], [math.sqrt(maximum ** 2 - ref_d ** 2)])
 
 
 # ---- estimator ------------------------------------------------------------------------------------------------------
@@ -324,17 +329,15 @@ ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulat
                     "that of omega and of the angle in steady state")
 
 
-def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter, least_db, compare_from):
-    """At most 32767 bytes of vectors: no compiler for a 16-bit target takes a larger object.
+ESTIMATOR_COLUMNS = "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16"
 
-    @param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio"""
+
+def estimator_sequence(v, speed, current, closed_from, inv_kfi, compare_from):
+    """@param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio
+    @return angle of the rotor in turns for every sample"""
     m, p = MACHINE, MACHINE.estimator()
-    varies = len(set(inv_kfi)) > 1
-    constants = dict(p, kfilter_esdq_q16=2 * kfilter, closed_from=closed_from)
-    v = Vectors(name, what, ESTIMATOR_FORMAT,
-                "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16" + (" inv_kfi:s16" if varies else ""),
-                constants=constants, least_db=least_db)
-    model, real = ref.Estimator(p, 2 * kfilter), ref.EstimatorReal(m, kfilter / 32768)
+    v.constants = dict(p, kfilter_esdq_q16=2400, closed_from=closed_from)
+    model, real = ref.Estimator(p), ref.EstimatorReal(m)
     amperes, volts, turns = ref.synthetic_motor(m, speed, current)
     frame = ref.sincos(0)
     for n, (i, u) in enumerate(zip(amperes, volts)):
@@ -350,69 +353,63 @@ def estimator_sequence(name, what, speed, current, closed_from, inv_kfi, kfilter
         frame = ref.sincos(model.next_angle())
         model.commanded(command)
         real.commanded(complex(*command) * 4 * m.u0)
-        v.rows.append([*now, *command, model.omega, model.rho >> 16] + ([kfi] if varies else []))
+        v.rows.append([*now, *command, model.omega, model.rho >> 16] + ([kfi] if "inv_kfi" in v.columns else []))
         if n in compare_from:
             v.compare([real.omega, 0.0], [model.omega, ref.wrap16(model.rho // 65536 - round(real.rho * 65536))])
-    return v, model, real, turns
+    return turns
 
 
-def angle_error_deg(m, model, turns, speed, n):
-    """Rotor ahead of the estimate, both half a period after sample n."""
-    true = turns[n] + speed[n] * m.turns_per_erpm / 2
-    return ref.wrap16(round(true * 65536) - (model.rho >> 16)) * 360 / 65536
-
-
-def require_lock(v, error_deg, expected_deg, within_deg):
+def require_lock(v, turns, speed, n, expected_deg, within_deg):
+    """@param n sample, -1 the last one @return angle of the rotor half a period after it, in counts"""
+    n = n % len(v.rows)
+    true = round((turns[n] + speed[n] * MACHINE.turns_per_erpm / 2) * 65536)
+    error_deg = ref.wrap16(true - v.rows[n][5]) * 360 / 65536
     if abs(error_deg - expected_deg) > within_deg:
         raise ValueError(f"{v.name}: the angle error is {error_deg:.2f} deg, expected {expected_deg:.2f}")
+    return true % 65536
 
 
-def estimator_start(_):
+def locked_sequence(v, speed, current, closed_from, compare_from, within_deg):
+    """A sequence with the right Kphi that ends on the rotor's angle."""
+    turns = estimator_sequence(v, speed, current, closed_from, [1.0] * len(speed), compare_from)
+    require_lock(v, turns, speed, -1, 0.0, within_deg)
+
+
+@block("estimator from standstill: the start ramp in its own frame, then the control frame, a load change",
+       ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS, 44.0)
+def estimator_start(v, _):
     speed = profile([(0, 0.0), (200, 0.0), (1600, 5000.0), (2500, 5000.0)])
     current = [1.41 * cmath.rect(1, math.radians(x)) for x in profile([(0, 5.0), (2000, 20.0), (2100, 80.0), (2500, 80.0)])]
-    v, model, real, turns = estimator_sequence(
-        "estimator_start", "estimator from standstill: the start ramp in its own frame, then the control frame, a load change",
-        speed, current, 1900, [1.0] * 2500, 1200, 44.0, range(1600, 2500))
-    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2499), 0.0, 1.0)
-    return v
+    locked_sequence(v, speed, current, 1900, range(1600, 2500), 1.0)
 
 
-def estimator_speed(_):
+@block("estimator started on a turning motor: lock, load step, across nominal speed, field weakening at 5500 rpm",
+       ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS, 53.0)
+def estimator_speed(v, _):
     speed = profile([(0, 5000.0), (600, 5000.0), (1000, 13900.0), (1200, 14100.0), (1900, 27500.0), (2500, 27500.0)])
     current = profile([(0, 0.5j), (500, 0.5j), (520, 2j), (1000, 1j), (1900, -2.2 + 0.4j), (2100, -2.2 + 0.4j),
                        (2110, -2.2 + 1.0j), (2500, -2.2 + 1.0j)])
-    v, model, real, turns = estimator_sequence(
-        "estimator_speed", "estimator started on a turning motor: lock, load step, across nominal speed, field weakening at 5500 rpm",
-        speed, current, 0, [1.0] * 2500, 1200, 53.0, range(500, 2500))
-    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2499), 0.0, 1.5)
-    return v
+    locked_sequence(v, speed, current, 0, range(500, 2500), 1.5)
 
 
-def estimator_reversal(_):
+@block("estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
+       ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS, 47.0)
+def estimator_reversal(v, _):
     speed = profile([(0, -5000.0), (600, -5000.0), (1200, -800.0), (1500, 0.0), (1700, 1200.0), (2300, 6000.0), (2700, 6000.0)])
     current = profile([(0, -1j), (600, -1j), (700, 1j), (2000, 1j), (2700, 0.3j)])
-    v, model, real, turns = estimator_sequence(
-        "estimator_reversal", "estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
-        speed, current, 0, [1.0] * 2700, 1200, 47.0, [*range(500, 1200), *range(2300, 2700)])
-    require_lock(v, angle_error_deg(MACHINE, model, turns, speed, 2699), 0.0, 1.0)
-    return v
+    locked_sequence(v, speed, current, 0, [*range(500, 1200), *range(2300, 2700)], 1.0)
 
 
-def estimator_kphi(_):
+@block("estimator with 1/Kphi at 1, 1.1, 2 and 0.8 times the true one: the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the speed stays",
+       ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS + " inv_kfi:s16", 47.0)
+def estimator_kphi(v, _):
     ratios = [1.0] * 500 + [1.1] * 400 + [2.0] * 600 + [0.8] * 800
     speed = [7500.0] * 2301
-    v, model, real, turns = estimator_sequence(
-        "estimator_kphi", "estimator with 1/Kphi at 1, 1.1, 2 and 0.8 times the true one: the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the "
-        "speed stays", speed, [0.8j] * 2301, 0, ratios, 1200, 47.0, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
+    turns = estimator_sequence(v, speed, [0.8j] * 2301, 0, ratios, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
     for end in (500, 900, 1500, 2300):
-        rho = v.rows[end - 1][5]
-        true = turns[end - 1] + 7500.0 * MACHINE.turns_per_erpm / 2
-        error = ref.wrap16(round(true * 65536) - rho) * 360 / 65536
-        # K'/K is a ratio of Kphi, inv_kfi is its inverse
-        require_lock(v, error, ref.lock_error_deg(1 / ratios[end - 1]), 0.5)
-        v.constants[f"error_counts_{end}"] = ref.nearest(ref.lock_error_deg(1 / ratios[end - 1]) / 360 * 65536)
-        v.constants[f"true_rho_{end}"] = round(true * 65536) % 65536
-    return v
+        expected = ref.lock_error_deg(1 / ratios[end - 1]) # K'/K is a ratio of Kphi, inv_kfi is its inverse
+        true = require_lock(v, turns, speed, end - 1, expected, 0.5)
+        v.constants |= {f"error_counts_{end}": ref.nearest(expected / 360 * 65536), f"true_rho_{end}": true}
 
 
 # ---- field weakening, start, drive ----------------------------------------------------------------------------------
@@ -425,20 +422,19 @@ PUBLISHED = {
 }
 
 
-def fieldweak_tables(_):
+@block("the published tables of the field-weakening vectors", "Id Q13 at 0.000121 A/count; 1/Kphi Q15/2; "
+       "Ls/(2 Ls0) Q15", "idref:s16 inv_kfi:s16 ls:s16")
+def fieldweak_tables(v, _):
     """A table that falls, rises and jumps everywhere, so that no index can stand in for another."""
-    v = Vectors("fieldweak_tables", "the published tables of the field-weakening vectors", "Id Q13 at 0.000121 A/count; 1/Kphi Q15/2; "
-                "Ls/(2 Ls0) Q15", "idref:s16 inv_kfi:s16 ls:s16")
     v.rows = [list(x) for x in zip(PUBLISHED["idref"], PUBLISHED["inv_kfi"], PUBLISHED["ls"])]
-    return v
 
 
-def fieldweak(rng):
+@block("table look-up: below and at the start speed, every index with its borders and inside, the end, beyond the end",
+       "ref electrical rpm; id Q13; emf_max Q12; ls_q16; above 1 = the filter of field weakening",
+       "ref:s16 index:u16 idref:s16 inv_kfi:s16 emf_max:s16 ls_q16:u16 above:u16", least_db=86.0)
+def fieldweak(v, rng):
     on_speed, ls_base = 13000, MACHINE.estimator()["ls_q16"]
-    v = Vectors("fieldweak", "table look-up: below and at the start speed, every index with its borders and inside, the end, beyond the end",
-                "ref electrical rpm; id Q13; emf_max Q12; ls_q16; above 1 = the filter of field weakening",
-                "ref:s16 index:u16 idref:s16 inv_kfi:s16 emf_max:s16 ls_q16:u16 above:u16",
-                constants={"on_speed": on_speed, "ls_base": ls_base}, least_db=86.0)
+    v.constants = {"on_speed": on_speed, "ls_base": ls_base}
     speeds = [0, 1, 12999] + [on_speed + 1024 * i + d for i in range(18) for d in (-1, 0, 1, 511, 512, 1023)]
     speeds += [30407, 30408, 30409, 31432, 32000, 32766, 32767] + dither(rng, 13000, 32767, 40)
     for x in [*speeds, *(-s for s in speeds[::3]), -32767, -32768]:
@@ -447,16 +443,15 @@ def fieldweak(rng):
         out = ref.fieldweak(PUBLISHED, on_speed, ls_base, x)
         v.rows.append([x, *out])
         v.compare(ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[4]])
-    return v
 
 
-def forced_angle(_):
+@block("start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, every 499th period",
+       "tick number; speed 1/1024 counts per period; angle 2^-32 turns; at_end is 1 from tick 27962 = 1.398 s on",
+       "direction:s16 tick:u16 speed:s32 angle:u32 at_end:u16", least_db=130.0)
+def forced_angle(v, _):
     exact_end = 1000 * 5 * 50e-6 / 60 * 65536 * 1024
     rate, end = 10, round(exact_end)
-    v = Vectors("forced_angle", "start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, every 499th period",
-                "tick number; speed 1/1024 counts per period; angle 2^-32 turns; at_end is 1 from tick 27962 = 1.398 s on",
-                "direction:s16 tick:u16 speed:s32 angle:u32 at_end:u16",
-                constants={"end_speed_q10": end, "increase_rate_q10": rate}, least_db=130.0)
+    v.constants = {"end_speed_q10": end, "increase_rate_q10": rate}
     for direction in (1, -1):
         speed, angle, exact, exact_speed = 0, 0, 0.0, 0.0
         for tick in range(1, 31001):
@@ -466,51 +461,50 @@ def forced_angle(_):
             if tick % 499 == 1 or 27960 <= tick <= 27964:
                 v.rows.append([direction, tick, speed, angle, at_end])
                 v.compare([exact], [exact + ref.wrap16(round(direction * angle / 65536 - exact) % 65536)])
-    return v
 
 
-def speed_ramp(rng):
-    v = Vectors("speed_ramp", "reference ramp: far, nearer than two steps (snap), exactly two steps, across zero, at the ends of the range",
-                "electrical rpm", "reference:s16 target:s16 step:s16 next:s16")
+@block("reference ramp: far, nearer than two steps (snap), exactly two steps, across zero, at the ends of the range",
+       "electrical rpm", "reference:s16 target:s16 step:s16 next:s16")
+def speed_ramp(v, rng):
     for step in (1, 8, 100, 1000):
         for base in (-5000, -1, 0, 7, 14000):
-            for d in (-3 * step, -2 * step - 1, -2 * step, -2 * step + 1, -step, -1, 0, 1, step, 2 * step - 1, 2 * step, 2 * step + 1, 9 * step):
+            for d in (-3 * step, -2 * step - 1, -2 * step, -2 * step + 1, -step, -1, 0,
+                      1, step, 2 * step - 1, 2 * step, 2 * step + 1, 9 * step):
                 v.rows.append([base, base + d, step])
     v.rows += [[-32768, 32767, 8], [32767, -32768, 8], [32767, 32767, 1], [-32768, -32768, 1], [32760, 32767, 8], [-32760, -32768, 8]]
     v.rows += [[*dither(rng, -32000, 32000, 2), rng.randrange(1, 700)] for _ in range(40)]
     for row in v.rows:
         row.append(ref.speed_ramp(*row))
-    return v
 
 
-def hand_over(rng):
-    v = Vectors("hand_over", "hand-over: voltage and current vectors seen from the estimator's frame, measured offset of every size and sign",
-                "angles 65536 = one turn; voltages Q14; currents Q13; i_q the signed open-loop current",
-                "forced:u16 estimated:u16 v_d:s16 v_q:s16 i_q:s16 offset:s16 new_v_d:s16 new_v_q:s16 new_i_d:s16 new_i_q:s16",
-                least_db=67.0)
-    for offset in [0, 1, -1, 100, -100, 8192, -8192, 15000, -15000, 16384, -16384, 30000, -30000, -32768, 32767] + dither(rng, -32768, 32767, 50):
+@block("hand-over: voltage and current vectors seen from the estimator's frame, measured offset of every size and sign",
+       "angles 65536 = one turn; voltages Q14; currents Q13; i_q the signed open-loop current",
+       "forced:u16 estimated:u16 v_d:s16 v_q:s16 i_q:s16 offset:s16 new_v_d:s16 new_v_q:s16 new_i_d:s16 new_i_q:s16",
+       least_db=67.0)
+def hand_over(v, rng):
+    edges = [0, 1, -1, 100, -100, 8192, -8192, 15000, -15000, 16384, -16384, 30000, -30000, -32768, 32767]
+    for offset in edges + dither(rng, -32768, 32767, 50):
         forced = rng.randrange(65536)
         u = cmath.rect(rng.uniform(500, 15000), rng.uniform(0, 6.3))
         args = (forced, (forced - offset) % 65536, (round(u.real), round(u.imag)), rng.choice((-2625, 2625)))
         out = ref.hand_over(*args)
         v.rows.append([args[0], args[1], *args[2], args[3], *out])
         v.compare(ref.hand_over_real(*args), out[1:])
-    return v
 
 
-def params(_):
-    """Published constants of the note's motor and, in float64, what include/drive/params.h must give to 1 count."""
-    v = Vectors("params", "constants of Equations 5 to 8 for the note's motor with four current ranges (A * 100 in the name)",
-                "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; rs, ls, inv_kfi, deltat in the note's format, pre-divided by "
-                "2, 256, 2, 1; the rest in the drive's formats")
+@block("constants of Equations 5 to 8 for the note's motor with four current ranges (A * 100 in the name)",
+       "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; rs, ls, inv_kfi, deltat in the note's format, pre-divided by "
+       "2, 256, 2, 1; the rest in the drive's formats")
+def params(v, _):
+    """Published constants of the motor of AN1292 and, in float64, what include/drive/param_scaling.h must give to 1 count."""
     published = {"c395": (12990, 1460), "c709": (23316, 2620), "c440": (14470, 1626)}
     for amperes in (3.95, 7.09, 4.4, 22.0):
         m = ref.Machine(peak_current_a=amperes)
         key = f"c{round(amperes * 100)}"
-        note = (ref.nearest(m.rs * 16384), ref.nearest(m.ls * 128))
+        rounded = (ref.nearest(m.rs * 16384), ref.nearest(m.ls * 128))
         if key in published:
-            if any(abs(a - b) > 1 for a, b in zip(note, published[key])):
-                raise ValueError(f"params: {note} are not the published {published[key]}")
+            if any(abs(a - b) > 1 for a, b in zip(rounded, published[key])):
+                raise ValueError(f"params: {rounded} are not the published {published[key]}")
             v.constants[f"{key}_norm_rs"], v.constants[f"{key}_norm_ls"] = published[key]
         for name, value in m.estimator().items():
             v.constants[f"{key}_{name}"] = value
@@ -525,12 +519,6 @@ def params(_):
     v.constants["duty_per_volt_12"] = m.duty_per_volt_q16(12.0)
     v.constants["radius_24"] = m.circle_radius_q14(24.0)
     v.constants["radius_34"] = m.circle_radius_q14(34.0)
-    return v
-
-
-BLOCKS = (multiply, divide, limits, lowpass, sine_table, circle_table, sincos, circle, clarke, park, inverse_park, svm, pi,
-          voltage_circle, current_control, current_limit, estimator_start, estimator_speed, estimator_reversal, estimator_kphi,
-          fieldweak_tables, fieldweak, forced_angle, speed_ramp, hand_over, params)
 
 
 def main():
@@ -538,8 +526,7 @@ def main():
     parser.add_argument("--check", action="store_true", help="compare with the committed files instead of writing them")
     parser.add_argument("--ratios", action="store_true", help="print the signal-to-noise table")
     options = parser.parse_args()
-    # a random generator for each block: a change in one leaves the others' files alone
-    vectors = [block(random.Random(f"{SEED} {block.__name__}")) for block in BLOCKS]
+    vectors = [make() for make in BLOCKS]
     texts = {f"{v.name}.txt": v.text() for v in vectors}
     if options.ratios:
         for v in vectors:

@@ -15,25 +15,18 @@ WORD = 65536
 
 # ---- words, products, rounding --------------------------------------------------------------------------------------
 
-def s16(x):
-    """x, which must fit a signed word."""
-    if not -32768 <= x <= 32767:
-        raise OverflowError(f"{x} does not fit int16")
-    return x
+def word(low, high):
+    """A function that returns its argument, which must fit the word."""
+    def fits(x):
+        if not low <= x <= high:
+            raise OverflowError(f"{x} does not fit {low}..{high}")
+        return x
+    return fits
 
 
-def u16(x):
-    """x, which must fit an unsigned word."""
-    if not 0 <= x <= 65535:
-        raise OverflowError(f"{x} does not fit uint16")
-    return x
-
-
-def s32(x):
-    """x, which must fit a signed double word."""
-    if not -(1 << 31) <= x < (1 << 31):
-        raise OverflowError(f"{x} does not fit int32")
-    return x
+s16 = word(-32768, 32767)
+u16 = word(0, 65535)
+s32 = word(-(1 << 31), (1 << 31) - 1)
 
 
 def wrap16(x):
@@ -66,7 +59,7 @@ def nearest(x):
 
 
 def q15(x):
-    """Q15 of a fraction as the note rounds it: positive by 32767, negative by 32768, then half up and truncated."""
+    """Q15 of a fraction as AN1292 rounds it: positive by 32767, negative by 32768, then half up and truncated."""
     return int(x * 32768 - 0.5) if x < 0 else int(x * 32767 + 0.5)
 
 
@@ -336,13 +329,8 @@ class Pi:
         self.sum = s32((out << self.shift) - err * self.kp)
 
 
-@dataclass
-class PiReal:
-    kp: float
-    ki: float
-    kc: float
-    shift: int
-    sum: float = 0.0
+class PiReal(Pi):
+    """The same in float64."""
 
     def tick(self, err, limit):
         u = self.sum + self.kp * err

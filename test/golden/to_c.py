@@ -1,7 +1,7 @@
 """Turns the committed text vectors into C headers, so that tests need no files and run on a small target as well.
 
-vectors/park.txt becomes golden_park.h: the type golden_park_t with one member a column, the array golden_park[],
-GOLDEN_PARK_ROWS, and GOLDEN_PARK_<NAME> for each constant line.
+vectors/park.txt becomes golden_park.h: the type golden_park_t with one member a column, golden_park_row(n) for each of the
+GOLDEN_PARK_ROWS, also named golden_park_rows, and GOLDEN_PARK_<NAME> for each constant line.
 """
 
 import argparse
@@ -49,37 +49,42 @@ def read(path):
     return columns, constants, rows
 
 
-def header(name, columns, constants, rows):
+def header(name, columns, constants, rows, access=None):
+    """@param access statements that return row n, in place of the array of all rows"""
     upper = f"GOLDEN_{name.upper()}"
     out = [f"/* Generated from test/golden/vectors/{name}.txt. */", f"#ifndef {upper}_H", f"#define {upper}_H", "",
-           "#include <stdint.h>", "", "#ifndef GOLDEN_STORAGE", "#define GOLDEN_STORAGE const", "#endif", ""]
+           "#include <stdint.h>", ""]
     out += [f"#define {upper}_{key.upper()} {constant(value)}" for key, value in constants.items()]
     if rows:
         out += ["", f"#define {upper}_ROWS {len(rows)}u", "typedef struct {"]
         out += [f"    {TYPES[ctype]} {column};" for column, ctype in columns]
-        out += [f"}} golden_{name}_t;", f"static GOLDEN_STORAGE golden_{name}_t golden_{name}[{upper}_ROWS] = {{"]
-        out += ["    { " + ", ".join(literal(x, c[1]) for x, c in zip(row, columns)) + " }," for row in rows]
-        out += ["};"]
+        out += [f"}} golden_{name}_t;", f"enum {{ golden_{name}_rows = {len(rows)} }};"]
+        out += [] if access else [f"static const golden_{name}_t golden_{name}[{upper}_ROWS] = {{",
+                                  *("    { " + ", ".join(literal(x, c[1]) for x, c in zip(row, columns)) + " }," for row in rows), "};"]
+        out += ["", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{"]
+        out += [*(access or [f"    return golden_{name}[n];"]), "}"]
     return "\n".join(out + ["", "#endif", ""])
+
+
+def write_new(path, text):
+    """Only what is new, so that nothing else is built again."""
+    if not path.exists() or path.read_text(encoding="ascii") != text:
+        path.write_text(text, encoding="ascii")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="directory of the headers")
-    parser.add_argument("names", nargs="*", help="vector names, default: all")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    names = options.names or sorted(p.stem for p in (HERE / "vectors").glob("*.txt"))
-    for name in names:
+    for name in sorted(p.stem for p in (HERE / "vectors").glob("*.txt")):
         try:
             columns, constants, rows = read(HERE / "vectors" / f"{name}.txt")
             text = header(name, columns, constants, rows)
         except (OSError, ValueError, KeyError) as error:
             print(f"foc33: {error}, test/golden/vectors/{name}.txt: run make golden", file=sys.stderr)
             return 2
-        target = options.out / f"golden_{name}.h"
-        if not target.exists() or target.read_text(encoding="ascii") != text:
-            target.write_text(text, encoding="ascii")
+        write_new(options.out / f"golden_{name}.h", text)
     return 0
 
 

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 PUNCTUATORS = ("<<=", ">>=", "...", "->", "++", "--", "<<", ">>", "<=", ">=", "==", "!=", "&&", "||", "+=", "-=", "*=", "/=", "%=",
                "&=", "|=", "^=", "##")
 
-_SKIP = re.compile(r"(?:\s|\\\n|//[^\n]*|/\*.*?\*/)+", re.S)
 _TOKEN = re.compile(
-    r"(?P<id>[A-Za-z_]\w*)"
+    r"(?P<space>(?:\s|\\\n)+)"
+    r"|(?P<id>[A-Za-z_]\w*)"
     r"|(?P<num>\.?\d(?:[eEpP][+-]|[\w.])*)"
     r"|(?P<chr>'(?:\\.|[^'\\\n])+')"
     r"|(?P<str>\"(?:\\.|[^\"\\\n])*\")"
     r"|(?P<punct>" + "|".join(re.escape(p) for p in PUNCTUATORS) + r"|[^\s\w])", re.S)
-_DIRECTIVE = re.compile(r"[ \t]*#((?:\\\n|/\*.*?\*/|[^\n])*)", re.S)
+_COMMENT_OR_STRING = re.compile(r"(/\*.*?\*/|//[^\n]*)|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])+'", re.S)
+_DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.M)
 _DEFINE = re.compile(r"[ \t]*#[ \t]*define[ \t]+(\w+)(\([^)]*\))?")
 
 # Conditions that no host build fulfils, and those that every host build does: their dead branches are not mutated.
@@ -28,76 +29,33 @@ class Token:
     end: int
 
 
-@dataclass(frozen=True)
-class Macro:
-    """The body of one #define."""
-    name: str
-    tokens: list
-
-
 def _tokens(text, start, end):
-    at, result = start, []
-    while at < end:
-        skip = _SKIP.match(text, at, end)
-        if skip:
-            at = skip.end()
-            continue
-        match = _TOKEN.match(text, at, end)
-        if not match:
-            raise ValueError(f"character {text[at]!r} at offset {at} is no C token")
-        result.append(Token(match.lastgroup, match.group(), match.start(), match.end()))
-        at = match.end()
-    return result
+    found = _TOKEN.finditer(text, start, end)
+    return [Token(m.lastgroup, m.group(), m.start(), m.end()) for m in found if m.lastgroup != "space"]
 
 
-class _Conditions:
-    """The stack of #if: says whether a line can be part of a host build."""
-
-    def __init__(self):
-        self._stack = []
-
-    def directive(self, words):
-        name = words.split(" ", 1)[0]
-        if name in ("if", "ifdef", "ifndef"):
-            self._stack.append(_ALWAYS.get(words))
-        elif name in ("else", "elif") and self._stack:
-            known = self._stack[-1]
-            self._stack[-1] = None if known is None else not known
-        elif name == "endif" and self._stack:
-            self._stack.pop()
-
-    def live(self):
-        return all(state is not False for state in self._stack)
+def _nested(conditions, words):
+    """The stack of #if after a directive: True, False, or None for a branch that may be part of a host build."""
+    name = words.split(" ", 1)[0]
+    if name in ("if", "ifdef", "ifndef"):
+        return [*conditions, _ALWAYS.get(words)]
+    if name in ("else", "elif") and conditions:
+        return [*conditions[:-1], None if conditions[-1] is None else not conditions[-1]]
+    return conditions[:-1] if name == "endif" else conditions
 
 
 def split(text):
-    """@return (tokens of the code, macros), without comments and without branches that are never compiled on a PC"""
-    code, macros, conditions, at = [], [], _Conditions(), 0
-    comment_or_string = re.compile(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])+'", re.S)
-    line_start = True
-    begin = 0
-
-    def flush(end):
-        if conditions.live():
-            code.extend(_tokens(text, begin, end))
-
-    while at < len(text):
-        directive = _DIRECTIVE.match(text, at) if line_start else None
+    """@return (tokens of the code, [(name, tokens)] of macros), without comments and without branches that are never compiled on a PC"""
+    text = _COMMENT_OR_STRING.sub(lambda m: re.sub(r"[^\n]", " ", m.group()) if m.group(1) else m.group(), text)
+    code, macros, conditions, begin = [], [], [], 0
+    for directive in [*_DIRECTIVE.finditer(text), None]:
+        live = False not in conditions
+        if live:
+            code += _tokens(text, begin, directive.start() if directive else len(text))
         if directive:
-            flush(at)
-            words = " ".join(re.sub(r"/\*.*?\*/|\\\n", " ", directive.group(1), flags=re.S).split())
-            define = _DEFINE.match(text, at)
-            if define and conditions.live():
-                macros.append(Macro(define.group(1), _tokens(text, define.end(), directive.end())))
-            conditions.directive(words)
-            at = begin = directive.end()
-            continue
-        other = comment_or_string.match(text, at)
-        if other:
-            line_start = False
-            at = other.end()
-            continue
-        line_start = text[at] == "\n" or (line_start and text[at] in " \t")
-        at += 1
-    flush(len(text))
+            define = _DEFINE.match(directive.group())
+            if define and live:
+                macros.append((define.group(1), _tokens(text, directive.start() + define.end(), directive.end())))
+            conditions = _nested(conditions, " ".join(directive.group().replace("\\\n", " ").replace("#", " ", 1).split()))
+            begin = directive.end()
     return code, macros

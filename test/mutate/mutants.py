@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import c_tokens
 
 # Files whose macros are computations or register values; elsewhere a macro is a name or a table.
-MACRO_FILES = ("include/drive/params.h", "include/drive/params_init.h", "include/board/mclv.h")
+MACRO_FILES = ("include/drive/param_scaling.h", "include/drive/param_init.h", "include/board/mclv.h")
 # A constant of a long table is one of many alike: this many of a table are enough, and more would flatter the score.
 TABLE_SITES = 8
 TABLE_LENGTH = 16
@@ -48,18 +48,23 @@ def _is_type(token):
     return token.kind == "id" and (token.text in TYPE_WORDS or token.text.endswith("_t") or token.text == "QM_INLINE")
 
 
-def _match_forward(tokens, i, opening, closing):
-    """Index of the bracket that closes tokens[i]."""
-    depth = 0
-    for k in range(i, len(tokens)):
-        depth += (tokens[k].text == opening) - (tokens[k].text == closing)
-        if depth == 0:
-            return k
-    raise ValueError(f"{opening} without {closing}")
+OPENS = {"(": ")", "[": "]", "{": "}"}
+
+
+def _partners(tokens):
+    """Index of the other bracket for the index of each bracket."""
+    found, open_brackets = {}, []
+    for i, token in enumerate(tokens):
+        if token.kind == "punct" and token.text in OPENS:
+            open_brackets.append(i)
+        elif token.kind == "punct" and token.text in OPENS.values():
+            found[i] = open_brackets.pop()
+            found[found[i]] = i
+    return found
 
 
 def _number(text):
-    """Value and suffix of a number, or None."""
+    """Value and suffix of a number, and whether it is hexadecimal; or None."""
     match = re.fullmatch(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)", text)
     if match:
         return int(match.group(1), 0), match.group(2), match.group(1)[:2].lower() == "0x"
@@ -73,16 +78,16 @@ def _other_numbers(text):
     if parsed is None:
         return []
     value, suffix, is_hex = parsed
-    values = []
-    for other in (value + 1, value - 1, value * 2, value * 0):
-        if other != value and other not in values and not (other < 0 and "u" in suffix.lower()):
-            values.append(other)
-    if is_hex:
-        return [f"0x{v:X}{suffix}" for v in values]
-    if isinstance(value, float):
-        digits = [f"{v:.9g}" if re.search(r"[.e]", f"{v:.9g}") else f"{v:.9g}.0" for v in values]
-        return [d + suffix if not d.startswith("-") else f"({d}{suffix})" for d in digits]
-    return [f"{v}{suffix}" if v >= 0 else f"({v}{suffix})" for v in values]
+
+    def written(other):
+        if is_hex:
+            return f"0x{other:X}{suffix}"
+        digits = f"{other:.9g}" if isinstance(value, float) else str(other)
+        if isinstance(value, float) and not re.search(r"[.e]", digits):
+            digits += ".0"
+        return f"({digits}{suffix})" if other < 0 else f"{digits}{suffix}"
+    return [written(other) for other in dict.fromkeys((value + 1, value - 1, value * 2, value * 0))
+            if other != value and not (other < 0 and "u" in suffix.lower())]
 
 
 class _Region:
@@ -91,6 +96,7 @@ class _Region:
     def __init__(self, file, text, name, kind, tokens, returns_scalar=True):
         self.file, self.text, self.name, self.kind, self.tokens = file, text, name, kind, tokens
         self.returns_scalar = returns_scalar
+        self.partner = _partners(tokens)
         self.found = []
         self.declared_dimension = set()
 
@@ -103,9 +109,6 @@ class _Region:
         shown = re.sub(r"/\*.*?(\*/|$)", " ", shown)
         shown = " ".join(shown.replace("\\\n", " ").split()).removesuffix("\\").strip()
         self.found.append(Mutant(self.file, self.text.count("\n", 0, start) + 1, self.name, operator, start, end, new, shown))
-
-    def before(self, i):
-        return self.tokens[i - 1] if i > 0 else None
 
     def is_operand_end(self, i):
         """Does an operand end at token i, so that a following + - & * has two operands?"""
@@ -122,12 +125,7 @@ class _Region:
 
     def is_cast(self, i):
         """Is the parenthesis that closes at token i a cast?"""
-        depth, k = 0, i
-        while k >= 0:
-            depth += (self.tokens[k].text == ")") - (self.tokens[k].text == "(")
-            if depth == 0:
-                break
-            k -= 1
+        k = self.partner[i]
         inside = self.tokens[k + 1:i]
         return bool(inside) and all(_is_type(t) or t.text == "*" for t in inside) and not (k > 0 and self.tokens[k - 1].text == "sizeof")
 
@@ -135,7 +133,7 @@ class _Region:
         """Index after the postfix expression (or cast, or parenthesis) that starts at token i."""
         tokens = self.tokens
         if tokens[i].text == "(":
-            i = _match_forward(tokens, i, "(", ")")
+            i = self.partner[i]
             if self.is_cast(i):
                 return self.operand_end(i + 1)
             i += 1
@@ -144,10 +142,7 @@ class _Region:
         else:
             i += 1
         while i < len(tokens) and tokens[i].text in ("->", ".", "(", "["):
-            if tokens[i].text in ("->", "."):
-                i += 2
-            else:
-                i = _match_forward(tokens, i, tokens[i].text, {"(": ")", "[": "]"}[tokens[i].text]) + 1
+            i = i + 2 if tokens[i].text in ("->", ".") else self.partner[i] + 1
         return i
 
     # ---- kinds ----
@@ -175,7 +170,7 @@ class _Region:
     def signs(self):
         """A minus before each product that is used as a value."""
         for i, token in enumerate(self.tokens):
-            before = self.before(i)
+            before = self.tokens[i - 1] if i > 0 else None
             if token.kind == "id" and PRODUCTS.match(token.text) and before is not None and self.tokens[i + 1].text == "(" \
                     and before.text not in ("+", "-", "+=", "-="):
                 if before.text != ")" or self.is_cast(i - 1):
@@ -200,7 +195,7 @@ class _Region:
     def components(self):
         """The other axis or phase, where a value is read."""
         for i, token in enumerate(self.tokens):
-            before = self.before(i)
+            before = self.tokens[i - 1] if i > 0 else None
             if token.kind != "id" or before is None or before.text not in (".", "->") or token.text not in COMPONENT:
                 continue
             following = self.tokens[i + 1].text if i + 1 < len(self.tokens) else ";"
@@ -213,14 +208,12 @@ class _Region:
         for i, token in enumerate(self.tokens):
             if token.text != "qm_clamp" or self.tokens[i + 1].text != "(" or self.name == "qm_clamp":
                 continue
-            close = _match_forward(self.tokens, i + 1, "(", ")")
-            arguments, depth, first = [], 0, i + 2
-            for k in range(i + 2, close + 1):
-                text = self.tokens[k].text
-                if (text == "," and depth == 0) or k == close:
+            arguments, k, first, close = [], i + 2, i + 2, self.partner[i + 1]
+            while k <= close:
+                if self.tokens[k].text == "," or k == close:
                     arguments.append((self.tokens[first].start, self.tokens[k - 1].end))
                     first = k + 1
-                depth += (text in "([") - (text in ")]")
+                k = self.partner[k] + 1 if self.tokens[k].text in OPENS else k + 1
             if len(arguments) != 3:
                 continue
             low, high = (self.text[a:b] for a, b in arguments[1:])
@@ -232,62 +225,46 @@ class _Region:
         tokens = self.tokens
         for i, token in enumerate(tokens):
             if token.text in ("if", "while") and tokens[i + 1].text == "(":
-                close = _match_forward(tokens, i + 1, "(", ")")
-                self.negate(i + 2, close)
+                self.negate(i + 2, self.partner[i + 1])
+            elif token.text == "?" and tokens[i - 1].text == ")":
+                k = self.partner[i - 1]
+                if tokens[k - 1].kind != "id" or tokens[k - 1].text in STATEMENT_WORDS:
+                    self.negate(k + 1, i - 1)
             elif token.text == "?":
                 k = i - 1
-                if tokens[k].text == ")":
-                    depth = 0
-                    while k >= 0:
-                        depth += (tokens[k].text == ")") - (tokens[k].text == "(")
-                        if depth == 0:
-                            break
-                        k -= 1
-                    if tokens[k - 1].kind != "id" or tokens[k - 1].text in STATEMENT_WORDS:
-                        self.negate(k + 1, i - 1)
-                else:
-                    while k > 0 and (tokens[k - 1].text in ("->", ".") or tokens[k].text in ("->", ".")):
-                        k -= 1
-                    self.negate(k, i)
+                while k > 0 and (tokens[k - 1].text in ("->", ".") or tokens[k].text in ("->", ".")):
+                    k -= 1
+                self.negate(k, i)
 
     def negate(self, first, after):
         inside = self.tokens[first:after]
-        if len([t for t in inside if t.text in ("<", "<=", ">", ">=", "==", "!=")]) == 1 and not any(t.text in ("&&", "||") for t in inside):
+        joined = any(t.text in ("&&", "||") for t in inside)
+        comparisons = [t for t in inside if t.text in ("<", "<=", ">", ">=", "==", "!=")]
+        if not joined and (len(comparisons) == 1 or inside and inside[0].text == "!"):
             return # the operator's own mutants contain the negation
-        if inside and inside[0].text == "!" and not any(t.text in ("&&", "||") for t in inside):
-            return
         start, end = inside[0].start, inside[-1].end
         self.add("condition", start, end, "!(" + " ".join(self.text[start:end].split()) + ")")
 
     def statements(self):
         """Removes each expression statement, break and continue; changes each returned value."""
-        tokens, i = self.tokens, 0
-        start = True
+        tokens, i, start = self.tokens, 0, True
         while i < len(tokens):
-            token = tokens[i]
-            if not start:
-                start = token.text in (";", "{", "}", "else", "do")
+            text = tokens[i].text
+            if not start or text in (";", "{", "}", "else", "do"):
+                start = text in (";", "{", "}", "else", "do")
                 i += 1
-                continue
-            if token.text in ("if", "while", "switch", "for") and tokens[i + 1].text == "(":
-                i = _match_forward(tokens, i + 1, "(", ")") + 1
-                continue
-            if token.text in ("case", "default"):
+            elif text in ("if", "while", "switch", "for") and tokens[i + 1].text == "(":
+                i = self.partner[i + 1] + 1
+            elif text in ("case", "default"):
                 while tokens[i].text != ":":
                     i += 1
                 i += 1
-                continue
-            if token.text in (";", "{", "}", "else", "do"):
-                i += 1
-                continue
-            end = i
-            depth = 0
-            while tokens[end].text != ";" or depth:
-                depth += (tokens[end].text in ("(", "{")) - (tokens[end].text in (")", "}"))
-                end += 1
-            self.statement(i, end)
-            i = end + 1
-        return self
+            else:
+                end = i
+                while tokens[end].text != ";":
+                    end = self.partner[end] + 1 if tokens[end].text in OPENS else end + 1
+                self.statement(i, end)
+                i = end + 1
 
     def statement(self, first, semicolon):
         tokens = self.tokens
@@ -303,7 +280,7 @@ class _Region:
         elif _is_type(tokens[first]):
             for i in range(first, semicolon - 1):
                 if tokens[i].text == "[" and tokens[i - 1].kind == "id" and not any(t.text == "=" for t in tokens[first:i]):
-                    self.declared_dimension.update(range(i, _match_forward(tokens, i, "[", "]")))
+                    self.declared_dimension.update(range(i, self.partner[i]))
         elif not (tokens[first].text == "(" and tokens[first + 1].text == "void" and semicolon == first + 4):
             self.add("statement", start, end, ";")
 
@@ -321,14 +298,15 @@ class _Region:
 
 def _regions(file, text, struct_names):
     tokens, macros = c_tokens.split(text)
+    partner = _partners(tokens)
     i, begin = 0, 0
     while i < len(tokens):
         token = tokens[i]
         if token.text == "{":
-            close = _match_forward(tokens, i, "{", "}")
+            close = partner[i]
             before = tokens[i - 1].text if i else ""
             if before == ")":
-                opening = next(k for k in range(begin, i) if tokens[k].text == "(" and _match_forward(tokens, k, "(", ")") == i - 1)
+                opening = partner[i - 1]
                 returned = {t.text for t in tokens[begin:opening - 1]}
                 yield _Region(file, text, tokens[opening - 1].text, "function", tokens[i + 1:close], not returned & struct_names)
                 begin = close + 1
@@ -341,9 +319,9 @@ def _regions(file, text, struct_names):
             begin = i + 1
         i += 1
     if file in MACRO_FILES:
-        for macro in macros:
-            if macro.tokens:
-                yield _Region(file, text, macro.name, "macro", macro.tokens)
+        for name, body in macros:
+            if body:
+                yield _Region(file, text, name, "macro", body)
 
 
 def struct_types(texts):

@@ -19,10 +19,10 @@ from pathlib import Path
 import mutants
 import suite
 
-FILES = ("include/control/*.h", "include/drive/*.h", "include/board/*.h", "firmware/control/*.c", "firmware/drive/*.c", "firmware/board/*.c")
+FILES = ("include/*/**/*.h", "firmware/**/*.c")
 # Tables of names, ranges and texts: build-time checks and documents read them, not the control law.
 NOT_MUTATED = ("include/drive/param_table.h", "include/drive/faults.h", "firmware/drive/param_check.c", "firmware/board/config.c")
-PARAMETER_FILES = ("include/drive/params.h", "include/drive/params_init.h")
+PARAMETER_FILES = ("include/drive/param_scaling.h", "include/drive/param_init.h")
 UNIT_SHARE, CLOSED_LOOP_SHARE = 85.0, 90.0
 COUNTED = ("killed", "timeout", "survived")
 
@@ -42,7 +42,7 @@ def parse(argv):
     parser.add_argument("--full", action="store_true", help="every mutant, not a sample")
     parser.add_argument("--sample", type=int, default=600, help="how many mutants to try (default 600)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
-    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains one of these texts")
+    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains a text")
     parser.add_argument("--list", action="store_true", help="list the chosen mutants, run nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--out", default="build/mutate")
@@ -70,42 +70,36 @@ def sample(by_file, size, seed):
 
 
 def read_equivalent(path):
-    """Entries of equivalent.txt: a line with a mutant's key, then an indented line with the reason. @return {key: reason}"""
-    entries, key = {}, None
+    """Entries of equivalent.txt: mutants' keys, a line each, then an indented line with the reason of them all. @return {key: reason}"""
+    entries, keys = {}, []
     for number, line in enumerate(path.read_text().splitlines() if path.exists() else [], 1):
         if not line.strip() or line.startswith("#"):
             continue
         if line[0] not in " \t":
-            if key is not None and not entries[key]:
-                fail(f"no reason for {key}", str(path), "add an indented line that says why the change has no effect")
-            key = line.strip()
-            entries[key] = ""
-        elif key is None:
-            fail("a reason without a mutant", f"{path}:{number}", "put the mutant's line before it")
+            keys.append(line.strip())
+        elif keys:
+            entries |= dict.fromkeys(keys, line.strip())
+            keys = []
         else:
-            entries[key] = f"{entries[key]} {line.strip()}".strip()
-    if key is not None and not entries[key]:
-        fail(f"no reason for {key}", str(path), "add an indented line that says why the change has no effect")
+            fail("a reason without a mutant", f"{path}:{number}", "put the mutant's line before it")
+    if keys:
+        fail(f"no reason for {keys[0]}", str(path), "add an indented line that says why the change has no effect")
     return entries
 
 
 class Progress:
-    """A line on a terminal that is rewritten, or a line every tenth of the way."""
+    """A line every tenth of the way."""
 
     def __init__(self, total):
-        self.total, self.done, self.killed, self.begin, self.shown = total, 0, 0, time.monotonic(), -1
-        self.lock = threading.Lock()
+        self.total, self.done, self.killed, self.begin, self.lock = total, 0, 0, time.monotonic(), threading.Lock()
 
     def step(self, result):
         with self.lock:
             self.done += 1
             self.killed += result in ("killed", "timeout")
-            line = f"{self.done}/{self.total} mutants, {self.killed} killed, {time.monotonic() - self.begin:.0f} s"
-            if sys.stderr.isatty():
-                print(f"\r{line}", end="" if self.done < self.total else "\n", file=sys.stderr, flush=True)
-            elif 10 * self.done // self.total != self.shown:
-                self.shown = 10 * self.done // self.total
-                print(line, file=sys.stderr, flush=True)
+            if 10 * self.done // self.total != 10 * (self.done - 1) // self.total:
+                seconds = time.monotonic() - self.begin
+                print(f"{self.done}/{self.total} mutants, {self.killed} killed, {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 class Runner:
@@ -189,22 +183,13 @@ def report(results, required, arguments, seconds):
               f"{score:.1f} % of {counted} mutants killed by the {tests}, {required:.0f} % required: {'PASS' if passed else 'FAIL'}"]
     alone = sum(result in ("killed", "timeout") and by.startswith("behaviour/") for _, result, by in results)
     if arguments.closed_loop:
-        lines.insert(-1, f"{percent(counted - total['survived'] - alone, counted):.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
+        unit = percent(counted - total["survived"] - alone, counted)
+        lines.insert(-1, f"{unit:.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
     data = {"score": round(score, 2), "required": required, "passed": passed, "tests": tests, "full": arguments.full,
             "seed": arguments.seed, "seconds": round(seconds, 1), "files": {f: dict(c) for f, c in by_file.items()},
             "mutants": [{"file": m.file, "line": m.line, "function": m.function, "operator": m.operator, "diff": m.diff,
                          "key": m.key, "result": result, "by": by} for m, result, by in results]}
     return "\n".join(lines) + "\n", data, passed
-
-
-def add_scripts(tests, names):
-    notes = []
-    reads = [*PARAMETER_FILES, "include/drive/drive.h"]
-    for name in names:
-        note = tests.add_script(name, [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"], reads)
-        if note:
-            notes.append(note)
-    return notes
 
 
 def main(argv=None):
@@ -216,11 +201,10 @@ def main(argv=None):
         fail("no mutants", " ".join(arguments.files), "--files takes a part of a path such as svm.h")
     equivalent = read_equivalent(equivalent_file)
     known = {m.key for found in by_file.values() for m in found}
-    stale = [key for key in equivalent if key not in known and any(key.startswith(f"{f} ") for f in by_file)]
-    if not arguments.files:
-        stale = [key for key in equivalent if key not in known]
+    stale = [key for key in equivalent if key not in known and (not arguments.files or any(key.startswith(f"{f} ") for f in by_file))]
     if stale:
-        fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root), "the code has changed; look at the entry again or remove it")
+        fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root),
+             "the code has changed; look at the entry again or remove it")
     chosen = by_file if arguments.full or arguments.files else sample(by_file, arguments.sample, arguments.seed)
     chosen = [m for found in chosen.values() for m in found]
     if arguments.list:
@@ -236,8 +220,11 @@ def main(argv=None):
     behaviour = arguments.behaviour if arguments.closed_loop else []
     try:
         tests.prepare(arguments.tests, behaviour)
-        for note in add_scripts(tests, arguments.scripts):
-            print(note, file=sys.stderr)
+        for name in arguments.scripts:
+            command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"]
+            note = tests.add_script(name, command, [*PARAMETER_FILES, "include/drive/drive.h"])
+            if note:
+                print(note, file=sys.stderr)
         print(f"{len(tests.tests)} tests built and passed in {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)
         stages = [{t.name for t in tests.tests if t.name not in behaviour}]
         if behaviour:

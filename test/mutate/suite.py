@@ -1,7 +1,6 @@
 """The unit tests as mutation testing needs them: built once, then rebuilt and run only as far as one changed file reaches."""
 import os
 import re
-import select
 import shlex
 import shutil
 import subprocess
@@ -12,11 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 # The tests of mutants: most take longer to compile than to run, so nothing is optimized or inlined.
-FAST = ["-O0", "-g0", "-w", "-Dalways_inline=unused"]
+FAST = ["-O0", "-g0", "-w", "-Dalways_inline=unused", "-DUNITY_TEST_ABORT()=_Exit(1)"] # the first failure ends the run
 LONG = ["-O1", "-g0", "-w"]           # those that run longer than this:
 LONG_SECONDS = 0.2
 SHIPPED = ["-O2", "-g0", "-w"]        # the firmware, to see whether a change reaches it at all
-SOURCES = ("include", "firmware", "tools/host", "tools/board", "test/unit", "test/behaviour", "test/board", "docs", "tuning")
+SOURCES = ("include", "firmware", "tools/plant", "tools/chip", "tools/vboard", "tools/cpu_host", "test/unit", "test/behaviour", "test/chip", "docs", "tuning")
 DEFINES = re.compile(r"/\* defines: (.*?) \*/")
 FAILED_TEST = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):FAIL", re.M)
 
@@ -58,26 +57,9 @@ def run(argv, cwd, timeout=None):
     return done.returncode, done.stdout
 
 
-def run_test(argv, cwd, timeout):
-    """Runs a test up to its first failure. @return (exit code, or None for a timeout; name of the failed test or "")"""
-    deadline, output = time.monotonic() + timeout, b""
-    with subprocess.Popen(argv, cwd=cwd, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
-        try:
-            while True:
-                ready, _, _ = select.select([process.stdout], [], [], max(0.0, deadline - time.monotonic()))
-                if not ready:
-                    return None, ""
-                more = os.read(process.stdout.fileno(), 65536)
-                output = (output + more)[-1000000:]
-                failed = FAILED_TEST.search(output.decode(errors="replace"))
-                if failed:
-                    return 1, failed.group(1)
-                if not more:
-                    return process.wait(max(0.1, deadline - time.monotonic())), ""
-        except subprocess.TimeoutExpired:
-            return None, ""
-        finally:
-            process.kill()
+def listed(deps):
+    """The files that the compiler's dependency file names."""
+    return {os.path.normpath(path) for path in deps.read_text().replace("\\\n", " ").split(":", 1)[1].split()}
 
 
 def copy_sources(root, tree):
@@ -118,8 +100,7 @@ class Suite:
         code, output = run(unit.command + [unit.object, "-MD", "-MF", str(deps)], self.base)
         if code != 0:
             raise BuildError(f"{unit.source} does not compile:\n{output}")
-        listed = deps.read_text().replace("\\\n", " ").split(":", 1)[1]
-        unit.deps = {os.path.normpath(path) for path in listed.split()}
+        unit.deps = listed(deps)
         unit.content = (self.base / unit.object).read_bytes()
         return unit
 
@@ -132,10 +113,10 @@ class Suite:
             raise BuildError("no Unity: run make test first")
         vendor = os.path.relpath(vendor, self.base)
         frame = [self.unit(f"{vendor}/unity/src/unity.c", []), self.unit(f"{vendor}/cmock/src/cmock.c", [])]
-        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/*/*.c"))] + ["tools/host/xc.c"]
+        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/**/*.c"))] + ["tools/cpu_host/xc.c"]
         self.firmware = {u.object: u for u in (self.unit(source, []) for source in firmware)}
         if behaviour: # the virtual board runs for minutes of motor time: all of it optimized
-            board = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("tools/board/*.c"))]
+            board = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("tools/*/*.c")) if p.name != "xc.c"]
             self.bench = [self.unit(source, [], SHIPPED) for source in (*board, *firmware) if not source.endswith("/main.c")]
         mocks, plans = {}, []
         for name in (*names, *behaviour):
@@ -201,13 +182,8 @@ class Suite:
 
         def key(test):
             module = os.path.basename(test.name).removeprefix("test_")
-            if module == stem:
-                rank = 0
-            elif module.startswith(stem) or stem.startswith(module):
-                rank = 1
-            else:
-                rank = 2
-            return rank, test.seconds, test.name
+            related = module.startswith(stem) or stem.startswith(module)
+            return module != stem, not related, test.seconds, test.name
         return sorted((t for t in self.tests if t.name in names and t.reads(file)), key=key)
 
     # ---- one changed tree ----
@@ -236,11 +212,12 @@ class Suite:
             code, _ = run(["gcc", "-o", "obj/program", *objects, *fixed, "-lm"], tree)
             if code != 0:
                 return "broken", f"link of {test.name}"
-            code, failed = run_test(["./obj/program"], tree, (10 if test.seconds < 1 else 5) * test.seconds + 2)
+            code, output = run(["./obj/program"], tree, (10 if test.seconds < 1 else 5) * test.seconds + 2)
             if code is None:
                 return "timeout", test.name
             if code != 0:
-                return "killed", f"{test.name}: {failed or f'ended with {code}'}"
+                failed = FAILED_TEST.search(output)
+                return "killed", f"{test.name}: {failed[1] if failed else f'ended with {code}'}"
         return "survived", ""
 
     def compile_changed(self, tree, unit, memory):
@@ -262,8 +239,7 @@ class Suite:
                 code, output = run(self.shipped_command(unit, mode) + [f"{place}.o", "-MD", "-MF", f"{place}.d"], self.base)
                 if code != 0:
                     raise BuildError(f"{unit.source} does not compile with {' '.join(mode)}:\n{output}")
-                listed = (self.base / f"{place}.d").read_text().replace("\\\n", " ").split(":", 1)[1]
-                self.shipped[key] = ({os.path.normpath(path) for path in listed.split()}, (self.base / f"{place}.o").read_bytes())
+                self.shipped[key] = (listed(self.base / f"{place}.d"), (self.base / f"{place}.o").read_bytes())
             return self.shipped[key]
 
     def shipped_command(self, unit, mode):

@@ -10,7 +10,7 @@
 #include "control/forced_angle.h"
 #include "control/speed_ramp.h"
 #include "control/svm.h"
-#include "drive/params.h"
+#include "drive/param_scaling.h"
 
 #include "bounds.h"
 

@@ -3,7 +3,7 @@
 #define PROOF_BOUNDS_H
 
 #include "drive/drive.h"
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 
 /** The parameters under proof: those of the userparams.h on the include path. */
 static drive_params_t params;

@@ -49,7 +49,7 @@ def read_proofs(file: Path) -> list[Proof]:
 
 
 def include_path(userparams: str) -> str:
-    return " ".join(f"-I{folder}" for folder in [str(HERE), *([userparams] if userparams else []), "include", "tools/host", "."])
+    return " ".join(f"-I{folder}" for folder in [str(HERE), *([userparams] if userparams else []), "include", "tools/cpu_host", "."])
 
 
 def run(proof: Proof, userparams: str) -> tuple[list[str], float]:

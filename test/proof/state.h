@@ -15,14 +15,13 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.state = state;
     drive.fault = any_u(0, FAULT_COUNT - 1);
     drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
-    drive.timer = ANYU16();
-    drive.slots = ANYU16();
+    drive.periods = ANYU16();
     drive.direction = any(0, 1) ? 1 : -1;
-    drive.calibrated = any(0, 1);
-    drive.offset_sum_a = any_l(INT32_MIN, INT32_MAX);
-    drive.offset_sum_b = any_l(INT32_MIN, INT32_MAX);
-    drive.offset_a_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
-    drive.offset_b_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
+    drive.calibration.done = any(0, 1);
+    drive.calibration.sum_a = any_l(INT32_MIN, INT32_MAX);
+    drive.calibration.sum_b = any_l(INT32_MIN, INT32_MAX);
+    drive.calibration.offset_a_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
+    drive.calibration.offset_b_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
     drive.bus_q31 = any_l(0, INT32_MAX);
     drive.circle.limit_q14 = any(0, radius_max);
     drive.circle.reciprocal = voltage_circle_reciprocal(drive.circle.limit_q14);
@@ -32,8 +31,16 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.frame.cos = any(-32767, 32767);
     drive.forced.speed_q10 = any_l(0, params.forced.end_speed_q10);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
-    drive.stall_count = any_u(0, params.stall_slots);
-    drive.lost_count = any_u(0, params.lost_lock_slots);
+    drive.run.handover.waited_steps = ANYU16();
+    drive.run.handover.agreed_steps = ANYU16();
+    drive.run.handover.speed_is_preset = any_u(0, 1);
+    drive.run.handover.offset = ANY16();
+    drive.run.handover.id_q13 = any((int16_t)-current_max, current_max);
+#ifdef TUNING
+    drive.run.tuning_q16 = ANYU16();
+#endif
+    drive.run.stall_steps = any_u(0, params.stall_slots);
+    drive.run.lost_lock_steps = any_u(0, params.lost_lock_slots);
 }
 
 static void any_estimator(estimator_t *e)
@@ -60,13 +67,10 @@ static void any_estimator(estimator_t *e)
 static void any_control(drive_control_t *c)
 {
     c->reference_erpm = any(-32767, 32767); /* TORQUE_MODE: the estimated speed */
-    c->tuning_low = ANYU16();
     c->ref_q13.d = any((int16_t)-current_max, current_max);
     c->ref_q13.q = any((int16_t)-current_max, current_max);
     c->iq_limit_q13 = any(0, current_max);
     c->brake_limit_q13 = any(0, current_max);
-    c->handover_q13 = any((int16_t)-current_max, current_max);
-    c->handover_offset = ANY16();
     c->i_q13.d = ANY16();
     c->i_q13.q = ANY16();
     c->v_q14.d = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
@@ -79,13 +83,13 @@ static void any_control(drive_control_t *c)
 
 static void bounds_hold_again(void)
 {
-    const estimator_t *e = &drive.estimator;
-    const drive_control_t *c = &drive.control;
+    const estimator_t *e = &drive.run.estimator;
+    const drive_control_t *c = &drive.run.control;
     //@ check state: drive.state <= DRIVE_FAULT && drive.fault < FAULT_COUNT;
     //@ check direction: drive.direction == 1 || drive.direction == -1;
     //@ check command: 0 <= drive.command.run <= 1 && -erpm_max <= drive.command.target_erpm <= erpm_max;
-    //@ check offset_a: -params.offset_max_q13 <= drive.offset_a_q13 <= params.offset_max_q13;
-    //@ check offset_b: -params.offset_max_q13 <= drive.offset_b_q13 <= params.offset_max_q13;
+    //@ check offset_a: -params.offset_max_q13 <= drive.calibration.offset_a_q13 <= params.offset_max_q13;
+    //@ check offset_b: -params.offset_max_q13 <= drive.calibration.offset_b_q13 <= params.offset_max_q13;
     //@ check bus: 0 <= drive.bus_q31;
     //@ check circle: 0 <= drive.circle.limit_q14 <= radius_max;
     //@ check forced: 0 <= drive.forced.speed_q10 <= params.forced.end_speed_q10;
@@ -105,16 +109,16 @@ static void bounds_hold_again(void)
     //@ check ref_q: -current_max <= c->ref_q13.q <= current_max;
     //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;
     //@ check brake_limit: 0 <= c->brake_limit_q13 <= current_max;
-    //@ check handover: -current_max <= c->handover_q13 <= current_max;
+    //@ check handover: -current_max <= drive.run.handover.id_q13 <= current_max;
     //@ check v_d: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max;
     //@ check v_q: -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;
     //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;
     //@ check sum_d: -SUM_MAX <= c->pi_d.sum <= SUM_MAX;
     //@ check sum_q: -SUM_MAX <= c->pi_q.sum <= SUM_MAX;
     //@ check sum_speed: -SUM_MAX <= c->pi_speed.sum <= SUM_MAX;
-    //@ check trim: -params.fieldweak.trim_max_q13 <= drive.fieldweak.trim_q13 <= 0;
-    //@ check table: drive.fieldweak.index < FIELDWEAK_ENTRIES;
-    //@ check counts: drive.stall_count <= params.stall_slots + 1 && drive.lost_count <= params.lost_lock_slots + 1;
+    //@ check trim: -params.fieldweak.trim_max_q13 <= drive.run.fieldweak.trim_q13 <= 0;
+    //@ check table: drive.run.fieldweak.index < FIELDWEAK_ENTRIES;
+    //@ check counts: drive.run.stall_steps <= params.stall_slots + 1 && drive.run.lost_lock_steps <= params.lost_lock_slots + 1;
 }
 
 #endif

@@ -1,10 +1,10 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
- * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c
+ * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
  * options: -eva-domains equality,symbolic-locations -eva-subdivide-non-linear-function vd_limit:100
- *     -inline-calls drive_check_overcurrent,drive_is_running,drive_raise,drive_bootstrap_step,drive_idle,qm_abs
- *     -eva-slevel-function drive_tick:200,drive_calibrate:20,drive_clear:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
+ *     -inline-calls protection_check_current,drive_is_running,drive_raise,startup_bootstrap,idle_step,qm_abs
+ *     -eva-slevel-function drive_tick:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
  *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20 */
 #include "any.h"
 
@@ -33,7 +33,7 @@ static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t
 static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
                                            dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q);
 #define current_control current_control_bounded
-#include "drive/drive_tick.h"
+#include "drive/tick.h"
 #undef trig_sincos
 #undef trig_sincos_called
 #undef trig_circle
@@ -70,7 +70,7 @@ static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16
     int16_t low = -32767, high = 32767;
     if (y_q16 == &drive.bus_q31) {
         low = 0;
-    } else if (y_q16 != &drive.estimator.omega_filtered_q16) {
+    } else if (y_q16 != &drive.run.estimator.omega_filtered_q16) {
         low = (int16_t)-emf_dq_max;
         high = emf_dq_max;
         //@ admit length_of_the_back_emf: low <= x <= high;
@@ -141,10 +141,10 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 static void any_state(uint16_t state, uint16_t slot)
 {
     any_drive(state, slot);
-    any_estimator(&drive.estimator);
-    any_control(&drive.control);
-    drive.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
-    fieldweak_tick(&drive.fieldweak, &params.fieldweak, &drive.tuning, any(-32767, 32767));
+    any_estimator(&drive.run.estimator);
+    any_control(&drive.run.control);
+    drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
+    fieldweak_tick(&drive.run.fieldweak, &params.fieldweak, &drive.run.model, any(-32767, 32767));
 }
 
 static void tick(void)
@@ -153,7 +153,6 @@ static void tick(void)
     raw.i_a = ANY16();
     raw.i_b = ANY16();
     raw.v_bus = ANY16();
-    raw.pot = ANY16();
     (void)drive_tick(&drive, &params, &raw);
     drive_slow(&drive, &params, raw.v_bus);
     bounds_hold_again();
@@ -183,13 +182,13 @@ static void calibrate_after(uint16_t k)
 {
     any_state(DRIVE_CALIBRATE, 0);
     drive.ticks = ANYU16();
-    drive.timer = k;
+    drive.periods = k;
     drive.command.clear_fault = 0; /* in a fault: see proof_tick_recalibrate */
-    drive.offset_sum_a = any_l(-32768l * k, 32767l * k);
-    drive.offset_sum_b = any_l(-32768l * k, 32767l * k);
+    drive.calibration.sum_a = any_l(-32768l * k, 32767l * k);
+    drive.calibration.sum_b = any_l(-32768l * k, 32767l * k);
     tick();
-    //@ check sum_a: -32768 * (k + 1) <= drive.offset_sum_a <= 32767 * (k + 1);
-    //@ check sum_b: -32768 * (k + 1) <= drive.offset_sum_b <= 32767 * (k + 1);
+    //@ check sum_a: -32768 * (k + 1) <= drive.calibration.sum_a <= 32767 * (k + 1);
+    //@ check sum_b: -32768 * (k + 1) <= drive.calibration.sum_b <= 32767 * (k + 1);
     //@ check ends: k < 1023 || drive.state != DRIVE_CALIBRATE;
 }
 
@@ -198,7 +197,7 @@ void proof_tick_calibrate(void)
 {
     set_bounds();
     //@ loop unroll 1024;
-    for (uint16_t k = 0; k < 1u << DRIVE_CALIBRATION_LOG2; k++) {
+    for (uint16_t k = 0; k < 1u << CALIBRATION_LOG2; k++) {
         calibrate_after(k);
     }
 }
@@ -209,9 +208,9 @@ void proof_tick_recalibrate(void)
     set_bounds();
     any_state(DRIVE_FAULT, 0);
     drive.command.clear_fault = 1;
-    drive.calibrated = 0;
+    drive.calibration.done = 0;
     tick();
-    //@ check anew: drive.state == DRIVE_CALIBRATE && drive.timer == 0 && drive.offset_sum_a == 0 && drive.offset_sum_b == 0;
+    //@ check anew: drive.state == DRIVE_CALIBRATE && drive.periods == 0 && drive.calibration.sum_a == 0 && drive.calibration.sum_b == 0;
 }
 
 /** drive_init() and drive_start() establish the bounds. */

@@ -30,7 +30,7 @@ CLANG_FLAGS = """-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -
     -Wextra-semi -Wimplicit-fallthrough -Wmissing-prototypes -Wshift-sign-overflow -Wtautological-compare -Wunreachable-code
     -Werror -fsyntax-only""".split()
 CLANG = os.environ.get("CLANG", "clang-14")
-INCLUDES = ["-Itools/host", "-Iinclude", "-I."]
+INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 
 
 @dataclass(frozen=True)

@@ -50,8 +50,8 @@ class Build(unittest.TestCase):
             environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
             done = subprocess.run(["make", "-n", "-C", str(paths.ROOT), target], env=environment, capture_output=True, text=True, check=True)
             return next(line for line in done.stdout.splitlines() if "build/host/flags" in line)
-        self.assertEqual(flags("build/host/flags"), flags("build/host/tools/pil/pil.o"))
-        self.assertEqual(flags("build/host/flags"), flags("build/host/tools/iss33f/core.o"))
+        self.assertEqual(flags("build/host/flags"), flags("build/host/tools/cpu_33f/iss_board.o"))
+        self.assertEqual(flags("build/host/flags"), flags("build/host/tools/cpu_33f/iss_core.o"))
 
     def test_a_motor_file_s_name_with_blanks_and_quotes_is_one_word_to_the_shell(self):
         environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}

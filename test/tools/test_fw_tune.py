@@ -28,79 +28,48 @@ PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR
 GOAL = Goal(0.97, 3.0, 2.66, 2.66, 0.08, 2800.0, 0.2, 5500.0)
 
 
-class Least(unittest.TestCase):
-    def test_finds_the_threshold_from_every_guess(self):
+class Parts(unittest.TestCase):
+    def test_least_finds_the_threshold_from_every_guess_and_none_where_nothing_suffices(self):
         for low, high in ((0, 0), (0, 1), (0, 37), (5, 30)):
-            for threshold in range(low, high + 1):
-                for guess in range(low - 3, high + 4):
+            for guess in range(low - 3, high + 4):
+                for threshold in range(low, high + 1):
                     self.assertEqual(least(lambda n: n >= threshold, guess, low, high), threshold, (low, high, threshold, guess))
+                self.assertIsNone(least(lambda n: False, guess, low, high))
 
-    def test_none_where_nothing_suffices(self):
-        for guess in range(-2, 40):
-            self.assertIsNone(least(lambda n: False, guess, 0, 37))
-
-    def test_asks_each_value_once_and_not_outside(self):
-        for threshold in range(0, 200, 7):
+    def test_least_asks_each_value_once_and_not_outside_and_little_where_the_guess_is_right(self):
+        for threshold, guess, most in (*((threshold, 40, 19) for threshold in range(0, 200, 7)), (100, 100, 4)):
             asked = []
-            least(lambda n: asked.append(n) or n >= threshold, 40, 0, 200)
+            least(lambda n: asked.append(n) or n >= threshold, guess, 0, 200)
             self.assertEqual(len(asked), len(set(asked)))
             self.assertTrue(all(0 <= n <= 200 for n in asked))
-            self.assertLess(len(asked), 20)
+            self.assertLessEqual(len(asked), most)
 
-    def test_a_guess_that_is_right_costs_little(self):
-        asked = []
-        least(lambda n: asked.append(n) or n >= 100, 100, 0, 266)
-        self.assertLessEqual(len(asked), 4)
-
-
-class Peak(unittest.TestCase):
-    def test_finds_the_top_of_a_hill(self):
+    def test_peak_finds_the_top_of_a_hill_or_a_line_and_uses_what_is_known(self):
         for top in range(0, 267, 11):
             known = {0: -float(top), 266: top - 266.0}
             self.assertLessEqual(abs(peak(lambda n: -abs(n - top), known, 0, 266) - top), 4, top)
-
-    def test_the_end_of_a_rising_line_is_its_top(self):
         self.assertEqual(peak(float, {}, 0, 266), 266)
-
-    def test_uses_what_is_known(self):
         asked = []
-        known = {n: -abs(n - 100.0) for n in range(0, 201, 4)}
-        self.assertEqual(peak(lambda n: asked.append(n) or 0.0, known, 0, 200), 100)
+        self.assertEqual(peak(lambda n: asked.append(n) or 0.0, {n: -abs(n - 100.0) for n in range(0, 201, 4)}, 0, 200), 100)
         self.assertEqual(asked, [])
 
-
-class Largest(unittest.TestCase):
-    def test_halves_towards_the_threshold(self):
+    def test_largest_halves_towards_the_threshold(self):
         self.assertAlmostEqual(largest(lambda x: x <= 0.3, 1.0, 10), 0.3, delta=1.0 / 1024)
+        self.assertEqual((largest(lambda x: True, 0.2, 8), largest(lambda x: False, 0.2, 8)), (0.2, 0.0))
 
-    def test_the_limit_itself_may_be_good(self):
-        self.assertEqual(largest(lambda x: True, 0.2, 8), 0.2)
-
-    def test_nothing_may_be_good(self):
-        self.assertEqual(largest(lambda x: False, 0.2, 8), 0.0)
-
-
-class Model(unittest.TestCase):
-    def test_voltage_circle_is_the_one_of_the_modulator(self):
+    def test_the_voltage_model_is_the_equation_and_its_circle_the_modulator_s(self):
         self.assertAlmostEqual(voltage_limit(PARAMS), 0.936 * 24.0 / math.sqrt(3.0), places=6)
-
-    def test_back_emf_alone_is_kphi_over_root_3(self):
         self.assertAlmostEqual(model_use(PARAMS, 2000.0, 0.0, 0.0) * voltage_limit(PARAMS), 2.0 * 7.24 / math.sqrt(3.0), places=6)
-
-    def test_voltage_by_hand(self):
         w = 4000.0 * 5.0 * 2.0 * math.pi / 60.0
         v_d, v_q = 2.67 * -1.5 - w * 1.92e-3 * 0.4, 2.67 * 0.4 + w * (1.92e-3 * -1.5 + 7.983e-3)
         self.assertAlmostEqual(model_use(PARAMS, 4000.0, -1.5, 0.4) * voltage_limit(PARAMS), math.hypot(v_d, v_q), places=2)
-
-    def test_least_current_of_the_model_is_least(self):
         current = model_current(PARAMS, 4000.0, 0.3, 0.97, 3.0)
         self.assertLessEqual(model_use(PARAMS, 4000.0, -current, 0.3), 0.97)
         self.assertGreater(model_use(PARAMS, 4000.0, -current + 0.01, 0.3), 0.97)
 
     def test_correction_is_least_squares(self):
-        self.assertAlmostEqual(correction([2.0, 4.0], [1.0, 1.0]), -3.0)
-        self.assertAlmostEqual(correction([3.0], [-1.5]), 2.0)
-        self.assertEqual(correction([3.0], [0.0]), 0.0)
+        for errors, slopes, wanted in (([2.0, 4.0], [1.0, 1.0], -3.0), ([3.0], [-1.5], 2.0), ([3.0], [0.0], 0.0)):
+            self.assertAlmostEqual(correction(errors, slopes), wanted)
 
     def test_load_falls_with_one_over_speed_above_rated_speed(self):
         self.assertAlmostEqual(GOAL.load_nm(2000.0), 0.016)
@@ -186,21 +155,17 @@ class Measuring(unittest.TestCase):
         row = {**self.ROW, **{name.replace("__", "."): value for name, value in changes.items()}}
         return reduced(np.tile([row[name] for name in SIGNALS], (4, 1)), 3000.0)
 
-    def test_means(self):
+    def test_means_and_an_angle_error_taken_around_the_circle(self):
         point = self.point()
         self.assertAlmostEqual(point.use, 0.8)
         self.assertAlmostEqual(point.current_rms_a, math.sqrt(0.5))
         self.assertEqual((point.id_a, point.iq_a, point.trim_a, point.bus_v), (-0.6, 0.8, -0.1, 23.9))
-
-    def test_the_angle_error_is_taken_around_the_circle(self):
-        self.assertAlmostEqual(self.point().angle_deg, 2.0)
+        self.assertAlmostEqual(point.angle_deg, 2.0)
         self.assertAlmostEqual(self.point(plant__theta_e_deg=2.0).angle_deg, -1.0)
 
     def test_a_speed_is_held_within_half_a_per_cent(self):
-        self.assertTrue(self.point(plant__speed_rpm=2985.5).held)
-        self.assertTrue(self.point(plant__speed_rpm=3014.5).held)
-        self.assertFalse(self.point(plant__speed_rpm=2984.5).held)
-        self.assertFalse(self.point(plant__speed_rpm=3015.5).held)
+        for rpm, held in ((2985.5, True), (3014.5, True), (2984.5, False), (3015.5, False)):
+            self.assertEqual(self.point(plant__speed_rpm=rpm).held, held, rpm)
 
 
 class Starting(unittest.TestCase):
@@ -261,10 +226,6 @@ class MadeUpMotors(unittest.TestCase):
         motor.rpm += fw_search.START_STEP_RPM
         self.assertGreater(motor.use(Entry())[0], 0.97)
 
-    def test_without_saturation_the_other_tables_stay_flat(self):
-        result, _ = self.search(FakeMotor())
-        self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
-
     def test_with_saturation_ls_follows_the_motor(self):
         result, motor = self.search(FakeMotor(saturation=0.4))
         changed = [found for found in result.found if found.corrected]
@@ -276,30 +237,23 @@ class MadeUpMotors(unittest.TestCase):
         true = 0.5 * motor.inductance(first.entry.idref_a, first.loaded.iq_a) / 1.92e-3
         self.assertAlmostEqual(first.entry.ls_ratio, true, delta=0.03)
 
+    def with_angle(self, angle) -> fw_search.Result:
+        """A search on a motor whose angle error follows from the entry."""
+        motor = FakeMotor()
+        point = motor.point
+        motor.point = lambda: replace(point(), angle_deg=angle(motor.now()))
+        return self.search(motor, entries=3)[0]
+
     def test_a_wrong_kphi_that_ls_cannot_mend_moves_inv_kfi(self):
-        class Weak(FakeMotor):
-            def point(self) -> Point:
-                point = super().point()
-                entry = self.now()
-                return replace(point, angle_deg=60.0 * (entry.inv_kfi / 7956.0 - 0.9) if entry.idref_a else 0.0)
-        result, _ = self.search(Weak(), entries=3)
-        self.assertAlmostEqual(result.found[1].entry.inv_kfi, 0.9 * 7956.0, delta=80.0)
-        self.assertEqual(result.found[1].entry.ls_ratio, 0.5)
+        found = self.with_angle(lambda entry: 60.0 * (entry.inv_kfi / 7956.0 - 0.9) if entry.idref_a else 0.0).found[1]
+        self.assertAlmostEqual(found.entry.inv_kfi, 0.9 * 7956.0, delta=80.0)
+        self.assertEqual(found.entry.ls_ratio, 0.5)
 
-    def test_no_correction_without_an_effect(self):
-        class Blind(FakeMotor):
-            def point(self) -> Point:
-                return replace(super().point(), angle_deg=8.0)
-        result, _ = self.search(Blind(), entries=3)
-        self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
-
-    def test_a_correction_that_makes_it_worse_is_taken_back(self):
-        class Corner(FakeMotor):
-            def point(self) -> Point:
-                entry = self.now()
-                return replace(super().point(), angle_deg=5.0 + 50.0 * abs(entry.ls_ratio - 0.5) + 50.0 * abs(entry.inv_kfi / 7956.0 - 1.0))
-        result, _ = self.search(Corner(), entries=3)
-        self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
+    def test_without_an_error_or_an_effect_or_where_it_gets_worse_the_other_tables_stay_flat(self):
+        flat = [self.search(FakeMotor())[0], self.with_angle(lambda entry: 8.0),
+                self.with_angle(lambda entry: 5.0 + 50.0 * abs(entry.ls_ratio - 0.5) + 50.0 * abs(entry.inv_kfi / 7956.0 - 1.0))]
+        for result in flat:
+            self.assertEqual({(found.entry.inv_kfi, found.entry.ls_ratio) for found in result.found}, {(7956.0, 0.5)})
 
     def test_stops_at_the_current_limit_and_says_so(self):
         result, _ = self.search(FakeMotor(), replace(GOAL, limit_a=1.5))
@@ -314,8 +268,10 @@ class MadeUpMotors(unittest.TestCase):
         result, _ = self.search(FakeMotor(saturation=0.9), replace(GOAL, angle_deg=1000.0))
         self.assertIn("gives no more speed", result.stopped)
 
-    def test_near_the_limit_the_load_gives_way_first(self):
+    def test_near_the_limit_the_load_gives_way_first_and_the_current_never_falls_with_speed(self):
         result, _ = self.search(FakeMotor())
+        currents = [entry.idref_a for entry in result.entries()]
+        self.assertEqual(currents, sorted(currents, reverse=True))
         shares = [found.load_nm / GOAL.load_nm(found.rpm) for found in result.found]
         self.assertAlmostEqual(shares[1], 1.0)
         self.assertLess(shares[-1], 0.9)
@@ -331,11 +287,6 @@ class MadeUpMotors(unittest.TestCase):
                 self.assertGreater(motor.use(replace(found.entry, idref_a=found.entry.idref_a + 0.01))[0], 0.97)
         self.assertEqual(result.found[1].load_nm, GOAL.load_nm(result.found[1].rpm))
 
-    def test_the_current_never_falls_with_speed(self):
-        result, _ = self.search(FakeMotor())
-        currents = [entry.idref_a for entry in result.entries()]
-        self.assertEqual(currents, sorted(currents, reverse=True))
-
     def test_no_field_weakening_where_none_is_needed(self):
         result, _ = self.search(FakeMotor(), replace(GOAL, maximum_rpm=2000.0))
         self.assertFalse(result.needed)
@@ -347,14 +298,11 @@ class MadeUpMotors(unittest.TestCase):
         self.assertIn("number format of speeds ends at 4000 rpm", result.stopped)
         self.assertLessEqual(result.found[-1].rpm, 4000.0)
 
-    def test_a_fault_on_the_way_costs_a_restart_and_changes_nothing(self):
+    def test_a_fault_on_the_way_costs_a_restart_and_changes_nothing_and_the_trim_is_off(self):
         calm, _ = self.search(FakeMotor())
         wild, motor = self.search(FakeMotor(faults_below=0.001))
         self.assertGreater(motor.starts, 1)
         self.assertEqual(calm.entries()[:10], wild.entries()[:10])
-
-    def test_the_trim_is_off_while_searching(self):
-        _, motor = self.search(FakeMotor(), entries=2)
         self.assertEqual(motor.values["FW_TRIM_CURRENT_A"], 0.0)
 
 
@@ -373,30 +321,23 @@ class TablesFile(unittest.TestCase):
     def test_what_is_written_is_read(self):
         fw_tables.write(self.path, tables())
         read = fw_tables.load(self.path)
-        self.assertEqual([round(entry.idref_a, 2) for entry in read.entries], [round(-0.1 * i, 2) for i in range(ENTRIES)])
-        self.assertEqual([entry.inv_kfi for entry in read.entries], [entry.inv_kfi for entry in tables().entries])
-        self.assertEqual([entry.ls_ratio for entry in read.entries], [entry.ls_ratio for entry in tables().entries])
+        self.assertEqual([(round(x.idref_a, 2), x.inv_kfi, x.ls_ratio) for x in read.entries], [(round(x.idref_a, 2), x.inv_kfi, x.ls_ratio) for x in tables().entries])
         self.assertEqual((read.stopped, read.last_index, read.maximum_speed_rpm), ('a "reason" \\ here', 15, 6090.0))
         self.assertEqual(read.mismatch(PARAMS), "")
         self.assertEqual(read.rows, tables().rows)
 
     def test_tables_of_another_motor_value_are_not_used_and_the_line_says_which(self):
+        """The rounding of single precision is no difference, no file no complaint."""
         fw_tables.write(self.path, tables())
+        found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, self.folder)
+        self.assertEqual((found is None, reason), (False, ""))
+        self.assertEqual(fw_tables.load_for("nobody", PARAMS, self.folder), (None, ""))
         for name in fw_tables.FINGERPRINT:
             found, reason = fw_tables.load_for(HURST, {**PARAMS, name: PARAMS[name] * 1.01}, self.folder)
             self.assertIsNone(found)
             self.assertIn(name, reason)
             self.assertIn(f"make tune-fw MOTOR={HURST}", reason)
             self.assertNotIn("\n", reason)
-
-    def test_rounding_of_single_precision_is_no_difference(self):
-        fw_tables.write(self.path, tables())
-        found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, self.folder)
-        self.assertIsNotNone(found)
-        self.assertEqual(reason, "")
-
-    def test_no_file_is_no_complaint(self):
-        self.assertEqual(fw_tables.load_for("nobody", PARAMS, self.folder), (None, ""))
 
     def test_damaged_files_have_their_line(self):
         good = fw_tables.text(tables())
@@ -440,8 +381,6 @@ class Header(unittest.TestCase):
         self.assertEqual((known["FW_START_SPEED_RPM"], known["IDREF_SPEED1"]), (2345.0, -0.77))
         self.assertEqual(known["IDREF_SPEED10"], fw_tune.defines(HEADER)["IDREF_SPEED10"])
         self.assertEqual(text.count("/*"), HEADER.count("/*"))
-
-    def test_a_name_that_is_not_there_is_named(self):
         with self.assertRaisesRegex(UserError, "NO_SUCH_NAME"):
             fw_tune.with_values(HEADER, {"NO_SUCH_NAME": "1"})
 
@@ -449,18 +388,15 @@ class Header(unittest.TestCase):
         known = fw_tune.defines("#define A 1.5 /* x */\n  # define B 0xF\n#define C (-2)\n#define D OTHER\n/* #define E 3 */\n")
         self.assertEqual(known, {"A": 1.5, "B": 15.0, "C": -2.0})
 
-    def test_highest_speed_of_the_hurst_is_where_the_format_ends(self):
-        self.assertEqual(fw_tune.highest_speed(fw_tune.defines(HEADER)), 6400.0)
-
-    def test_highest_speed_gives_way_to_the_back_emf_s_format(self):
-        known = {**fw_tune.defines(HEADER), "OVER_CURRENT_THRESHOLD_A": 3.81, "MOTOR_LS_MH": 2.2}
-        self.assertLess(fw_tune.highest_speed(known), 6400.0)
+    def test_highest_speed_is_where_the_format_of_speeds_or_of_the_back_emf_ends(self):
+        known = fw_tune.defines(HEADER)
+        self.assertEqual(fw_tune.highest_speed(known), 6400.0)
+        self.assertLess(fw_tune.highest_speed({**known, "OVER_CURRENT_THRESHOLD_A": 3.81, "MOTOR_LS_MH": 2.2}), 6400.0)
 
     def test_a_header_s_own_table_is_interpolated_as_the_firmware_does(self):
         known = {"FW_START_SPEED_RPM": 2600.0, "NOPOLESPAIRS": 5.0, **{f"IDREF_SPEED{i}": -0.1 * i for i in range(ENTRIES)}}
-        self.assertEqual(fw_tune.table_current(known, 2000.0), 0.0)
-        self.assertAlmostEqual(fw_tune.table_current(known, 2600.0 + 2.5 * 204.8), -0.25)
-        self.assertAlmostEqual(fw_tune.table_current(known, 9000.0), -1.7)
+        for rpm, wanted in ((2000.0, 0.0), (2600.0 + 2.5 * 204.8, -0.25), (9000.0, -1.7)):
+            self.assertAlmostEqual(fw_tune.table_current(known, rpm), wanted)
 
 
 # ---- on the virtual board ------------------------------------------------------------------------------------------------------
@@ -563,10 +499,8 @@ class LiveParameters(unittest.TestCase):
             return result
         self.assertLess(max(map(abs, on_board(work))), 0.001)
 
-    def test_a_normal_firmware_keeps_its_parameters(self):
+    def test_only_builds_with_parameters_in_ram_change_them(self):
         self.assertIn("PARAMS_IN_RAM", on_board(lambda bench: refused(bench, "IDREF_SPEED3", -0.5), ()))
-
-    def test_tuning_builds_have_them_in_ram(self):
         self.assertEqual(on_board(lambda bench: refused(bench, "IDREF_SPEED3", -0.5), ("TUNING",)), "")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from support import LIBRARY, command
 
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, motor_file, param_rows, paths
 from tools.bench.board import Library
 from tools.common.errors import UserError
 from tools.common.board_keys import resolve
@@ -269,9 +269,11 @@ class Motors(FilesCase):
         self.refused(lambda: motor_file.load(f"{self.path.parent}/"), "no motor file")
 
     def test_every_choice_that_is_refused_as_a_fact_is_a_parameter(self):
-        self.assertLessEqual(set(motor_file.FACTS), set(motor_file.tune_ranges()))
-        self.assertEqual(motor_file.tune_ranges()["LS_OVER2LS0_SPEED17"], ("1", 0.1, 0.6))
-        self.assertEqual(motor_file.tune_ranges()["MOTOR_INERTIA_KGM2"], ("kg m2", 1e-8, 0.1))
+        self.assertLessEqual(set(motor_file.FACTS), set(param_rows.parameters()))
+        row = param_rows.parameters()["LS_OVER2LS0_SPEED17"]
+        self.assertEqual((row.unit, row.low, row.high, row.default, row.stem), ("1", "0.1", "0.6", "0.5", "LS_OVER2LS0_SPEED"))
+        row = param_rows.parameters()["MOTOR_INERTIA_KGM2"]
+        self.assertEqual((row.unit, row.low, row.high, row.default), ("kg m2", "1e-8", "0.1", "FROM_MOTOR"))
 
 
 class Boards(FilesCase):

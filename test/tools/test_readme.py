@@ -27,7 +27,7 @@ class Counts(unittest.TestCase):
 
     def test_without_a_skipped_test_the_compiler_was_there(self):
         self.result(1, 0, 0)
-        self.assertIn("| unit, board and closed-loop tests, those that need XC16 included | 1 |", readme.tests())
+        self.assertIn("| unit, board and closed-loop tests, with those that need XC16 | 1 |", readme.tests())
 
     def test_a_failed_test_keeps_the_readme_as_it_is(self):
         self.result(0, 1, 0)

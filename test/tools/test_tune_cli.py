@@ -17,15 +17,49 @@ from tools.common import paths
 from tune_support import FOR_ANOTHER_BOARD, HURST, command, motor_path
 
 
+class Result(unittest.TestCase):
+    """The whole result of one motor, plots included."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        folder = cls.enterClassContext(tempfile.TemporaryDirectory())
+        cls.folder = Path(folder) / "result"
+        cls.code, cls.out, cls.error = command("tune", HURST, "--out", str(cls.folder))
+        cls.page = (cls.folder / "report.html").read_text(encoding="utf-8")
+
+    def test_a_motor_becomes_a_header_a_page_and_numbers(self):
+        self.assertEqual((self.code, self.error), (0, ""))
+        self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ["report.html", "summary.json", "tuning.json", "userparams.h"])
+        self.assertIn("phase margin", self.out)
+        self.assertIn("NORM_RS 14470", self.out)
+        numbers = json.loads((self.folder / "tuning.json").read_text(encoding="utf-8"))
+        self.assertEqual(numbers["params"]["MOTOR_RS_OHM"], "2.67")
+        self.assertGreaterEqual(numbers["loops"]["speed"]["worst"]["phase_deg"], 60.0)
+
+    def test_the_page_needs_nothing_else_and_shows_everything(self):
+        self.assertEqual(self.page.count("<svg"), 5)
+        for words in ("src=", "href=\"http", "<script"):
+            self.assertNotIn(words, self.page)
+        for words in ("Current loop", "Speed loop", "Start", "Parameters", "Constants", "Inputs", "NORM_RS", "AN1292"):
+            self.assertIn(words, self.page)
+        for cell in ("7.24 V peak line-to-line/krpm", "2.67 ohm", "2800 rpm", "24 V"):
+            self.assertIn(f'<td class="n">{cell}</td>', self.page)
+
+    def test_kphi_is_told_in_the_forms_that_sheets_give(self):
+        for words in ("= 0.06914 V s/rad line-to-line =", "= 0.05987 N m/A peak = 0.08468 N m/A rms ="):
+            self.assertIn(words, self.out)
+            self.assertIn(words, self.page)
+
+    def test_the_result_of_the_same_input_is_the_same(self):
+        before = {path.name: path.read_bytes() for path in self.folder.iterdir()}
+        command("tune", HURST, "--out", str(self.folder))
+        self.assertEqual({path.name: path.read_bytes() for path in self.folder.iterdir()}, before)
+
+
 class Tune(unittest.TestCase):
     def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.out = Path(temporary.name) / "result"
-        if not self._testMethodName.startswith("test_the_page") and not self._testMethodName.startswith("test_the_result"):
-            quick = mock.patch("tuning.plots.draw", lambda design: dict.fromkeys(("current_loop", "speed_loop", "start", "torque", "current"), ""))
-            quick.start()
-            self.addCleanup(quick.stop)
+        self.out = Path(self.enterContext(tempfile.TemporaryDirectory())) / "result"
+        self.enterContext(mock.patch("tuning.plots.draw", lambda design: dict.fromkeys(("current_loop", "speed_loop", "start", "torque", "current"), "")))
 
     def refused(self, *arguments: str, says: str) -> None:
         code, out, error = command(*arguments)
@@ -33,41 +67,13 @@ class Tune(unittest.TestCase):
         self.assertTrue(error.startswith("foc33: "), error)
         self.assertIn(says, error)
 
-    def test_a_motor_becomes_a_header_a_page_and_numbers(self):
-        code, out, error = command("tune", HURST, "--out", str(self.out))
-        self.assertEqual((code, error), (0, ""))
-        self.assertEqual(sorted(path.name for path in self.out.iterdir()), ["report.html", "summary.json", "tuning.json", "userparams.h"])
-        self.assertIn("phase margin", out)
-        self.assertIn("NORM_RS 14470", out)
-        numbers = json.loads((self.out / "tuning.json").read_text(encoding="utf-8"))
-        self.assertEqual(numbers["params"]["MOTOR_RS_OHM"], "2.67")
-        self.assertGreaterEqual(numbers["loops"]["speed"]["worst"]["phase_deg"], 60.0)
-
-    def test_the_page_needs_nothing_else_and_shows_everything(self):
-        command("tune", HURST, "--out", str(self.out))
-        page = (self.out / "report.html").read_text(encoding="utf-8")
-        self.assertEqual(page.count("<svg"), 5)
-        for words in ("src=", "href=\"http", "<script"):
-            self.assertNotIn(words, page)
-        for words in ("Current loop", "Speed loop", "Start", "Parameters", "Constants", "Inputs", "NORM_RS", "AN1292"):
-            self.assertIn(words, page)
-
-    def test_kphi_is_told_in_the_forms_that_sheets_give_and_inputs_with_their_units(self):
-        _, out, _ = command("tune", HURST, "--out", str(self.out))
-        page = (self.out / "report.html").read_text(encoding="utf-8")
-        for words in ("= 0.06914 V s/rad line-to-line =", "= 0.05987 N m/A peak = 0.08468 N m/A rms ="):
-            self.assertIn(words, out)
-            self.assertIn(words, page)
-        for cell in ("7.24 V peak line-to-line/krpm", "2.67 ohm", "2800 rpm", "24 V"):
-            self.assertIn(f'<td class="n">{cell}</td>', page)
-
-    def test_header_and_page_name_the_command_that_makes_them_again(self):
-        command("tune", HURST, "--out", str(self.out))
+    def test_a_motor_by_its_name_or_path_and_the_command_that_makes_the_result_again(self):
         with motor_path() as path:
-            command("tune", str(path), "--out", str(self.out) + "2")
-            for folder, motor in ((self.out, HURST), (Path(str(self.out) + "2"), str(path))):
+            for motor in (HURST, str(path)):
+                code, _, error = command("tune", motor, "--out", str(self.out))
+                self.assertEqual((code, error), (0, ""))
                 for name in ("report.html", "userparams.h"):
-                    self.assertIn(f"make tune MOTOR={motor}", (folder / name).read_text(encoding="utf-8"), name)
+                    self.assertIn(f"make tune MOTOR={motor}", (self.out / name).read_text(encoding="utf-8"), name)
 
     def test_an_unchanged_header_keeps_its_time(self):
         command("tune", HURST, "--out", str(self.out), "--brief")
@@ -84,12 +90,6 @@ class Tune(unittest.TestCase):
         self.assertTrue(lines[0].startswith("anaheim_bly172s_24v_4000: "))
         self.assertTrue(all(line.startswith("  warning: ") for line in lines[1:]))
 
-    def test_the_result_of_the_same_input_is_the_same(self):
-        command("tune", HURST, "--out", str(self.out))
-        before = {path.name: path.read_bytes() for path in self.out.iterdir()}
-        command("tune", HURST, "--out", str(self.out))
-        self.assertEqual({path.name: path.read_bytes() for path in self.out.iterdir()}, before)
-
     def test_a_refusal_writes_nothing_and_keeps_an_older_result(self):
         with motor_path(("value = 2500", "value = 4000")) as path:
             self.refused("tune", str(path), "--out", str(self.out), says="are too low for 4000 rpm")
@@ -101,12 +101,6 @@ class Tune(unittest.TestCase):
         self.assertEqual(sorted(self.out.iterdir()), before)
         self.assertEqual(len(list(self.out.parent.iterdir())), 1)
 
-    def test_a_motor_by_its_path(self):
-        with motor_path() as path:
-            code, out, error = command("tune", str(path), "--out", str(self.out))
-        self.assertEqual((code, error), (0, ""))
-        self.assertIn("a_motor.toml", (self.out / "userparams.h").read_text(encoding="utf-8"))
-
     def test_a_folder_that_is_something_else_is_not_replaced(self):
         self.out.mkdir()
         (self.out / "precious").write_text("mine", encoding="utf-8")
@@ -114,13 +108,11 @@ class Tune(unittest.TestCase):
         self.assertTrue((self.out / "precious").is_file())
 
     def test_mistakes_on_the_command_line(self):
-        self.refused("tune", "hurst", says="no motor 'hurst'")
-        self.refused("tune", "nowhere/motor.toml", says="no motor file")
-        self.refused("tune", HURST, "--board", "mclw", says="mclv")
-        self.refused("tune", says="name one, or write --all")
-        self.refused("tune", HURST, "--all", says="either a motor or --all")
-        self.refused("tune", "--all", "--out", str(self.out), says="one folder for several motors")
-        self.refused("tun", says="command line")
+        for arguments, says in ((("tune", "hurst"), "no motor 'hurst'"), (("tune", "nowhere/motor.toml"), "no motor file"), (("tune", HURST, "--board", "mclw"), "mclv"),
+                                (("tune",), "name one, or write --all"), (("tune", HURST, "--all"), "either a motor or --all"),
+                                (("tune", "--all", "--out", str(self.out)), "one folder for several motors"), (("tun",), "command line"),
+                                (("tune", "--all", "--board", "mclw"), "mclv"), (("motors", "--board", "mclw"), "mclv")):
+            self.refused(*arguments, says=says)
 
     def test_one_motor_that_is_for_another_board_does_not_stop_the_others(self):
         with self.several_motors():
@@ -150,10 +142,6 @@ class Tune(unittest.TestCase):
             self.refused("motors", says="half the rated torque needs")
         runs.assert_not_called()
 
-    def test_a_wrong_board_is_told_once(self):
-        self.refused("tune", "--all", "--board", "mclw", says="mclv")
-        self.refused("motors", "--board", "mclw", says="mclv")
-
     @contextlib.contextmanager
     def several_motors(self):
         """A folder of three motors; the one in the middle is for another board."""
@@ -174,9 +162,10 @@ class Tune(unittest.TestCase):
     def test_make_help_names_the_motor_that_is_taken_without_motor(self):
         makefile = (paths.ROOT / "Makefile").read_text(encoding="utf-8")
         default = re.search(r"tune_motor = .*\$\(or \$\(MOTOR\),(\w+)\)", makefile)[1]
-        lines = subprocess.run(["make", "help"], cwd=paths.ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
-        for name in ("tune", "tune-fw", "identify", "userparams"):
-            self.assertIn(f"[MOTOR={default}", next(line for line in lines if line.startswith(f"make {name} ")))
+        text = subprocess.run(["make", "help"], cwd=paths.ROOT, capture_output=True, text=True, check=True).stdout
+        self.assertRegex(text, rf"make tune +.*\[MOTOR={default}\b")
+        for name in ("tune-fw", "identify", "userparams"):
+            self.assertRegex(text, rf"make {name} +.*\[MOTOR=")
 
     def test_as_a_program(self):
         done = subprocess.run([sys.executable, "-m", "tuning", "tune", "no_such_motor"], cwd=paths.ROOT, capture_output=True, text=True, check=False)

@@ -14,7 +14,7 @@ from tuning import cli
 from tuning.design import Design, design
 
 COMPILER = shlex.split(os.environ.get("CC") or "gcc")
-INCLUDES = ["-Itools/host", "-Iinclude", "-I."]
+INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 HURST = "hurst_dmb0224c10002"
 
 MOTOR = """title = "a motor"

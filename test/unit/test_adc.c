@@ -1,71 +1,39 @@
 /* ADC1's registers against the device facts: four channels at once, signed fractional, started by the PWM. */
-#include "hurst_params.h"
+#include "registers.h"
 
-#include <xc.h>
+static volatile AD1CON1BITS *const control_bits = &AD1CON1bits;
 
-/* Every access to AD1CON1 is seen: the last one switches the converter on. */
-static uint16_t enabled_then, channels_then, clock_then, input_then;
-
-static volatile uint16_t *watch_control(volatile uint16_t *control)
-{
-    enabled_then = IEC0bits.AD1IE;
-    channels_then = AD1CON2;
-    clock_then = AD1CON3;
-    input_then = AD1CHS0;
-    return control;
-}
-
-#define AD1CON1 (*watch_control(&AD1CON1))
+/* The access to the bits switches the converter on. */
+#define AD1CON1bits (*((void)registers_watch(&AD1CON1), control_bits))
 #include "firmware/board/adc.c"
-#undef AD1CON1
-
-#include "unity.h"
+#undef AD1CON1bits
 
 void setUp(void)
 {
-    uint16_t n;
     host_registers_reset();
-    for (n = 0; n < host_sfr_count; n++) { /* nothing may depend on what was there */
-        if (host_sfr_table[n].pointer == &AD1CON1 || host_sfr_table[n].pointer == &AD1CON2 || host_sfr_table[n].pointer == &AD1CON3
-            || host_sfr_table[n].pointer == &AD1CHS0 || host_sfr_table[n].pointer == &AD1CHS123 || host_sfr_table[n].pointer == &AD1CSSL) {
-            *host_sfr_table[n].pointer = 0x5555;
-        }
-    }
+    AD1CON1 = AD1CON2 = AD1CON3 = AD1CHS0 = AD1CHS123 = AD1CSSL = 0x5555; /* nothing may depend on what was there */
     adc_init();
 }
 
-void tearDown(void)
+void test_registers_hold_the_boards_conversion(void)
 {
-}
-
-void test_signed_fractional_started_by_the_pwm_all_channels_at_once(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0x836C, AD1CON1); /* ADON, FORM 3, SSRC 3, SIMSAM, ASAM */
-}
-
-void test_four_channels_and_an_interrupt_after_each_conversion(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0x0200, AD1CON2); /* CHPS 2, SMPI 0, supply as reference */
-}
-
-void test_conversion_clock_is_75_ns(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0x0002, AD1CON3);
-}
-
-void test_channels_are_pot_currents_and_bus(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0x0008, AD1CHS0);   /* CH0 = AN8 */
-    TEST_ASSERT_EQUAL_HEX16(0x0000, AD1CHS123); /* CH1..3 = AN0..2 against ground */
-    TEST_ASSERT_EQUAL_HEX16(0x0000, AD1CSSL);
+    static const register_value_t expected[] = {
+        { "AD1CON1", 0x836C },   /* ADON, FORM 3: signed fractional, SSRC 3: started by the PWM, SIMSAM, ASAM: all channels at once */
+        { "AD1CON2", 0x0200 },   /* CHPS 2: four channels, SMPI 0: an interrupt after each conversion, supply as reference */
+        { "AD1CON3", 0x0002 },   /* 75 ns */
+        { "AD1CHS0", 0x0008 },   /* CH0 = AN8, the potentiometer */
+        { "AD1CHS123", 0x0000 }, /* CH1..3 = AN0..2, currents and bus, against ground */
+        { "AD1CSSL", 0x0000 },
+    };
+    EXPECT_REGISTERS(expected);
 }
 
 void test_converter_is_switched_on_last(void)
 {
-    TEST_ASSERT_EQUAL_UINT16(1, enabled_then);
-    TEST_ASSERT_EQUAL_HEX16(0x0200, channels_then);
-    TEST_ASSERT_EQUAL_HEX16(0x0002, clock_then);
-    TEST_ASSERT_EQUAL_HEX16(0x0008, input_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0200, register_then("AD1CON2"));
+    TEST_ASSERT_EQUAL_HEX16(0x0002, register_then("AD1CON3"));
+    TEST_ASSERT_EQUAL_HEX16(0x0008, register_then("AD1CHS0"));
+    TEST_ASSERT_EQUAL_HEX16(1u << 13, register_then("IEC0")); /* AD1IE */
 }
 
 void test_control_interrupt_is_enabled_at_priority_5_with_its_flag_clear(void)

@@ -1,7 +1,5 @@
 /* The clock: 8 MHz crystal through the PLL to 40 MIPS, and waits that end when the hardware does not answer. */
-#include "hurst_params.h"
-
-#include <xc.h>
+#include "registers.h"
 
 /* A stubborn oscillator: what the firmware writes is recorded, the switch happens only if the test says so. */
 static uint16_t oscillator_answers, written_high, written_low, writes, pll_at_first_switch;
@@ -33,8 +31,6 @@ static void oscillator_low(uint16_t value)
 #define __builtin_write_OSCCONL(value) oscillator_low((uint16_t)(value))
 #include "firmware/board/clock.c"
 
-#include "unity.h"
-
 void setUp(void)
 {
     host_registers_reset();
@@ -44,17 +40,16 @@ void setUp(void)
     written_high = 0xFFFF;
 }
 
-void tearDown(void)
-{
-}
-
 void test_pll_makes_80_MHz_of_8(void)
 {
+    static const register_value_t expected[] = {
+        { "PLLFBD", 38 },       /* times 40 */
+        { "CLKDIV", 0x0000 },   /* by 2 before and 2 after, no doze */
+        { "OSCTUN", 0x0000 },
+    };
     OSCTUN = 0x003F;
     (void)clock_init();
-    TEST_ASSERT_EQUAL_UINT16(38, PLLFBD);       /* times 40 */
-    TEST_ASSERT_EQUAL_HEX16(0x0000, CLKDIV);    /* by 2 before and 2 after, no doze */
-    TEST_ASSERT_EQUAL_HEX16(0x0000, OSCTUN);
+    EXPECT_REGISTERS(expected);
 }
 
 void test_switches_to_the_crystal_with_pll_and_reports_success(void)
@@ -88,31 +83,19 @@ void test_a_running_pll_that_cannot_be_left_is_not_changed(void)
     TEST_ASSERT_EQUAL_UINT16(0, written_high);
 }
 
-void test_watchdog_is_served_while_the_oscillator_is_waited_for(void)
+void test_an_oscillator_that_never_gets_there_ends_the_wait_and_is_reported(void)
 {
+    static const struct {
+        const char *what;
+        uint16_t osccon;
+    } cases[] = { { "never switches", 0x0000 }, { "switched, never locks", 0x3300 }, { "locked PLL of the FRC", 0x1120 } };
     oscillator_answers = 0;
-    (void)clock_init();
-    TEST_ASSERT_EQUAL_UINT16(BOARD_WAIT_LOOPS, host_watchdog_serves);
-}
-
-void test_a_switch_that_never_happens_ends_and_is_reported(void)
-{
-    oscillator_answers = 0;
-    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
-}
-
-void test_a_pll_that_never_locks_ends_and_is_reported(void)
-{
-    oscillator_answers = 0;
-    OSCCON = 0x3300; /* switched, not locked */
-    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
-}
-
-void test_a_locked_pll_of_another_source_is_reported(void)
-{
-    oscillator_answers = 0;
-    OSCCON = 0x1120; /* FRC with PLL */
-    TEST_ASSERT_EQUAL_UINT16(1, clock_init());
+    for (unsigned n = 0; n < 3u; n++) {
+        OSCCON = cases[n].osccon;
+        host_watchdog_serves = 0;
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(1, clock_init(), cases[n].what);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(BOARD_WAIT_LOOPS, host_watchdog_serves, cases[n].what);
+    }
 }
 
 void test_the_wait_is_long_enough_for_crystal_and_lock(void)

@@ -20,7 +20,7 @@ static void expect_overcurrent(int16_t direction, int16_t a_q13, int16_t b_q13, 
     rig_currents(a_q13, b_q13);
     rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(fault, drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(fault ? DRIVE_FAULT : DRIVE_LOCK, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(fault ? DRIVE_FAULT : DRIVE_ALIGN, drive.state);
     TEST_ASSERT_EQUAL_UINT16(fault ? OUTPUTS_OFF : OUTPUTS_PWM, out.outputs);
 }
 
@@ -60,7 +60,7 @@ void test_overcurrent_of_phase_c_trips_though_it_is_not_measured(void)
 void test_overcurrent_trips_in_every_running_state(void)
 {
     uint16_t state;
-    for (state = DRIVE_LOCK; state <= (uint16_t)DRIVE_STOPPING; state++) {
+    for (state = DRIVE_ALIGN; state <= (uint16_t)DRIVE_STOPPING; state++) {
         rig_lock(1);
         drive.state = state;
         rig_currents(7076, 0);
@@ -77,7 +77,7 @@ void test_overcurrent_uses_the_current_without_its_offset(void)
     rig_currents(1000, 0);
     rig_tick(1024);
     drive_start(&drive, &params, 1);
-    (void)rig_tick_until(DRIVE_LOCK, 300);
+    (void)rig_tick_until(DRIVE_ALIGN, 300);
     rig_currents(1000 + 7075, -3537);
     rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
@@ -146,8 +146,8 @@ void test_undervoltage_trips_while_the_bridge_is_on(void)
     for (state = DRIVE_BOOTSTRAP; state <= (uint16_t)DRIVE_STOPPING; state++) {
         rig_lock(1);
         drive.state = state;
-        drive.estimator.omega_filtered_q16 = 10000L * 65536;
-        drive.control.reference_erpm = 10000;
+        drive.run.estimator.omega_filtered_q16 = 10000L * 65536;
+        drive.run.control.reference_erpm = 10000;
         samples.v_bus = raw_bus_q15(0);
         rig_tick(32);
         TEST_ASSERT_EQUAL_UINT16(FAULT_UNDERVOLTAGE, drive.fault);
@@ -301,26 +301,26 @@ void test_each_slow_block_runs_in_its_own_period_of_eight(void)
     rig_closed(1, 8000);
     for (n = 0; n < 32u; n++) {
         uint16_t slot;
-        drive.control.reference_erpm = 7000;
+        drive.run.control.reference_erpm = 7000;
         drive.command.target_erpm = 8000;
-        drive.fieldweak.index = 99;
+        drive.run.fieldweak.index = 99;
         drive.duty_per_volt_q16 = 1;
         drive.circle.reciprocal = 1;
-        drive.control.iq_limit_q13 = 1;
-        drive.stall_count = 99;
-        drive.control.brake_limit_q13 = 1;
-        drive.estimator.omega_filtered_q16 = 8000L * 65536;
-        drive.estimator.e_q_q28 = 10000L * 65536;
+        drive.run.control.iq_limit_q13 = 1;
+        drive.run.stall_steps = 99;
+        drive.run.control.brake_limit_q13 = 1;
+        drive.run.estimator.omega_filtered_q16 = 8000L * 65536;
+        drive.run.estimator.e_q_q28 = 10000L * 65536;
         rig_tick(1);
         slot = drive.ticks & 7u;
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 0u, drive.control.reference_erpm != 7000, "speed");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 1u, drive.fieldweak.index != 99u, "field weakening");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 0u, drive.run.control.reference_erpm != 7000, "speed");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 1u, drive.run.fieldweak.index != 99u, "field weakening");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 2u, drive.duty_per_volt_q16 != 1u, "bus");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 3u, drive.circle.reciprocal != 1u, "circle");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 4u, drive.control.iq_limit_q13 != 1, "current limit");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 5u, drive.stall_count != 99u, "protection");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 6u, drive.control.brake_limit_q13 != 1, "hand-over");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 5u, drive.run.stall_steps != 99u, "protection");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 6u, drive.run.control.brake_limit_q13 != 1, "hand-over");
     }
 }
 
@@ -342,25 +342,25 @@ void test_reference_ramps_at_4000_rpm_per_second(void)
     uint16_t n;
     rig_closed(1, 5000);
     drive.command.target_erpm = 10000;
-    drive.estimator.omega_filtered_q16 = 7000L * 65536;
+    drive.run.estimator.omega_filtered_q16 = 7000L * 65536;
     for (n = 1; n <= 100u; n++) {
-        drive_reference_step(&drive, &params);
-        TEST_ASSERT_EQUAL_INT16(5000 + 8 * (int16_t)n, drive.control.reference_erpm); /* 20000 erpm/s * 400 us */
+        speed_reference_step(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(5000 + 8 * (int16_t)n, drive.run.control.reference_erpm); /* 20000 erpm/s * 400 us */
     }
     drive.command.target_erpm = 2500;
-    drive.estimator.omega_filtered_q16 = 5000L * 65536;
-    drive_reference_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(5800 - 8, drive.control.reference_erpm);
+    drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(5800 - 8, drive.run.control.reference_erpm);
 }
 
 void test_reference_arrives_at_its_target_and_stays(void)
 {
     rig_closed(1, 5000);
     drive.command.target_erpm = 5013;
-    drive_reference_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(5013, drive.control.reference_erpm);
-    drive_reference_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(5013, drive.control.reference_erpm);
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(5013, drive.run.control.reference_erpm);
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(5013, drive.run.control.reference_erpm);
 }
 
 /** Reference after one step from 10000 to 20000 (times direction) at a real speed. */
@@ -368,18 +368,18 @@ static int16_t step_up(int16_t direction, int16_t speed_erpm)
 {
     rig_closed(direction, (int16_t)(direction * 10000));
     drive.command.target_erpm = (int16_t)(direction * 20000);
-    drive.estimator.omega_filtered_q16 = (int32_t)(direction * speed_erpm) * 65536;
-    drive_reference_step(&drive, &params);
-    return (int16_t)(direction * drive.control.reference_erpm);
+    drive.run.estimator.omega_filtered_q16 = (int32_t)(direction * speed_erpm) * 65536;
+    speed_reference_step(&drive, &params);
+    return (int16_t)(direction * drive.run.control.reference_erpm);
 }
 
 static int16_t step_down(int16_t direction, int16_t speed_erpm)
 {
     rig_closed(direction, (int16_t)(direction * 10000));
     drive.command.target_erpm = (int16_t)(direction * 3000);
-    drive.estimator.omega_filtered_q16 = (int32_t)(direction * speed_erpm) * 65536;
-    drive_reference_step(&drive, &params);
-    return (int16_t)(direction * drive.control.reference_erpm);
+    drive.run.estimator.omega_filtered_q16 = (int32_t)(direction * speed_erpm) * 65536;
+    speed_reference_step(&drive, &params);
+    return (int16_t)(direction * drive.run.control.reference_erpm);
 }
 
 void test_reference_waits_while_the_motor_is_350_rpm_behind(void)
@@ -407,36 +407,36 @@ void test_reference_waits_while_a_slowing_motor_is_350_rpm_ahead(void)
 void test_speed_below_the_reference_asks_for_driving_current(void)
 {
     rig_closed(1, 8000);
-    drive.estimator.omega_filtered_q16 = 7000L * 65536;
-    drive_speed_step(&drive, &params);
-    TEST_ASSERT_GREATER_THAN_INT16(0, drive.control.ref_q13.q);
+    drive.run.estimator.omega_filtered_q16 = 7000L * 65536;
+    speed_step(&drive, &params);
+    TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
     rig_closed(-1, -8000);
-    drive.estimator.omega_filtered_q16 = -7000L * 65536;
-    drive_speed_step(&drive, &params);
-    TEST_ASSERT_LESS_THAN_INT16(0, drive.control.ref_q13.q);
+    drive.run.estimator.omega_filtered_q16 = -7000L * 65536;
+    speed_step(&drive, &params);
+    TEST_ASSERT_LESS_THAN_INT16(0, drive.run.control.ref_q13.q);
 }
 
 void test_speed_controller_stays_within_the_q_current_limit(void)
 {
     uint16_t n;
     rig_closed(1, 10000);
-    drive.control.iq_limit_q13 = 1234;
-    drive.estimator.omega_filtered_q16 = 8500L * 65536;
+    drive.run.control.iq_limit_q13 = 1234;
+    drive.run.estimator.omega_filtered_q16 = 8500L * 65536;
     for (n = 0; n < 200u; n++) {
-        drive_speed_step(&drive, &params);
-        TEST_ASSERT_LESS_OR_EQUAL_INT16(1234, drive.control.ref_q13.q);
+        speed_step(&drive, &params);
+        TEST_ASSERT_LESS_OR_EQUAL_INT16(1234, drive.run.control.ref_q13.q);
     }
-    TEST_ASSERT_EQUAL_INT16(1234, drive.control.ref_q13.q);
+    TEST_ASSERT_EQUAL_INT16(1234, drive.run.control.ref_q13.q);
 }
 
 /** q current after a step with the motor much too fast, at a braking limit. */
 static int16_t braking_current(int16_t direction, int16_t limit_q13)
 {
     rig_closed(direction, (int16_t)(direction * 5000));
-    drive.control.brake_limit_q13 = limit_q13;
-    drive.estimator.omega_filtered_q16 = (int32_t)(direction * 20000) * 65536;
-    drive_speed_step(&drive, &params);
-    return drive.control.ref_q13.q;
+    drive.run.control.brake_limit_q13 = limit_q13;
+    drive.run.estimator.omega_filtered_q16 = (int32_t)(direction * 20000) * 65536;
+    speed_step(&drive, &params);
+    return drive.run.control.ref_q13.q;
 }
 
 void test_braking_current_is_held_to_the_brake_limit_in_both_directions(void)
@@ -450,34 +450,34 @@ void test_braking_current_is_held_to_the_brake_limit_in_both_directions(void)
 void test_brake_limit_does_not_touch_driving_current(void)
 {
     rig_closed(1, 20000);
-    drive.control.brake_limit_q13 = 0;
-    drive.estimator.omega_filtered_q16 = 5000L * 65536;
-    drive_speed_step(&drive, &params);
-    TEST_ASSERT_GREATER_THAN_INT16(1000, drive.control.ref_q13.q);
+    drive.run.control.brake_limit_q13 = 0;
+    drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
+    speed_step(&drive, &params);
+    TEST_ASSERT_GREATER_THAN_INT16(1000, drive.run.control.ref_q13.q);
 }
 
 void test_brake_limit_does_not_wind_the_speed_controller_up(void)
 {
     uint16_t n;
     rig_closed(1, 5000);
-    drive.control.brake_limit_q13 = 300;
-    drive.estimator.omega_filtered_q16 = 9000L * 65536;
+    drive.run.control.brake_limit_q13 = 300;
+    drive.run.estimator.omega_filtered_q16 = 9000L * 65536;
     for (n = 0; n < 2500u; n++) {
-        drive_speed_step(&drive, &params);
+        speed_step(&drive, &params);
     }
-    TEST_ASSERT_EQUAL_INT16(-300, drive.control.ref_q13.q);
-    drive.estimator.omega_filtered_q16 = 4990L * 65536; /* just below: the current must turn at once */
-    drive_speed_step(&drive, &params);
-    drive_speed_step(&drive, &params);
-    TEST_ASSERT_GREATER_THAN_INT16(0, drive.control.ref_q13.q);
+    TEST_ASSERT_EQUAL_INT16(-300, drive.run.control.ref_q13.q);
+    drive.run.estimator.omega_filtered_q16 = 4990L * 65536; /* just below: the current must turn at once */
+    speed_step(&drive, &params);
+    speed_step(&drive, &params);
+    TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
 }
 
 /** Brake limit at a bus voltage. */
 static int16_t brake_limit(float bus_v)
 {
     drive.bus_q31 = (int32_t)(bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F) * 65536;
-    drive_handover_step(&drive, &params);
-    return drive.control.brake_limit_q13;
+    limits_braking(&drive.run, &params, qm_hi(drive.bus_q31));
+    return drive.run.control.brake_limit_q13;
 }
 
 void test_braking_current_fades_between_27_and_29_volts(void)
@@ -497,12 +497,12 @@ void test_braking_current_fades_between_27_and_29_volts(void)
 
 static int16_t iq_limit(int16_t id_q13)
 {
-    drive.control.handover_q13 = id_q13;
-    drive.fieldweak.table_q13 = 0;
-    drive.fieldweak.trim_q13 = 0;
-    drive.control.vq_limit_q14 = 16000;
-    drive_current_limit_step(&drive, &params);
-    return drive.control.iq_limit_q13;
+    drive.run.handover.id_q13 = id_q13;
+    drive.run.fieldweak.table_q13 = 0;
+    drive.run.fieldweak.trim_q13 = 0;
+    drive.run.control.vq_limit_q14 = 16000;
+    limits_current(&drive.run, &params);
+    return drive.run.control.iq_limit_q13;
 }
 
 void test_q_current_limit_is_what_the_d_current_leaves_of_the_circle(void)
@@ -524,8 +524,8 @@ void test_current_vector_never_leaves_its_circle(void)
     for (id = -5120; id <= 5120; id = (int16_t)(id + 37)) {
         int32_t d_q, q_q;
         (void)iq_limit(id);
-        d_q = drive.control.ref_q13.d;
-        q_q = drive.control.iq_limit_q13;
+        d_q = drive.run.control.ref_q13.d;
+        q_q = drive.run.control.iq_limit_q13;
         TEST_ASSERT_LESS_OR_EQUAL_INT32(5120L * 5120L, d_q * d_q + q_q * q_q);
         TEST_ASSERT_GREATER_THAN_INT32(0, q_q);
     }
@@ -534,49 +534,49 @@ void test_current_vector_never_leaves_its_circle(void)
 void test_d_reference_is_handover_plus_table_plus_trim(void)
 {
     rig_closed(1, 8000);
-    drive.control.handover_q13 = 500;
-    drive.fieldweak.table_q13 = -900;
-    drive.fieldweak.trim_q13 = -100;
-    drive.control.vq_limit_q14 = 16000; /* plenty of voltage: the trim goes back by one step */
-    drive_current_limit_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + params.fieldweak.trim_step_q13, drive.control.ref_q13.d);
+    drive.run.handover.id_q13 = 500;
+    drive.run.fieldweak.table_q13 = -900;
+    drive.run.fieldweak.trim_q13 = -100;
+    drive.run.control.vq_limit_q14 = 16000; /* plenty of voltage: the trim goes back by one step */
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
 }
 
 void test_d_reference_leaves_the_q_axis_a_share(void)
 {
     rig_closed(1, 8000);
     (void)iq_limit(-6000);
-    TEST_ASSERT_EQUAL_INT16(-4960, drive.control.ref_q13.d); /* 31/32 of 5120 */
+    TEST_ASSERT_EQUAL_INT16(-4960, drive.run.control.ref_q13.d); /* 31/32 of 5120 */
     (void)iq_limit(6000);
-    TEST_ASSERT_EQUAL_INT16(4960, drive.control.ref_q13.d);
+    TEST_ASSERT_EQUAL_INT16(4960, drive.run.control.ref_q13.d);
 }
 
 void test_voltage_trim_acts_when_the_q_axis_runs_out_of_voltage(void)
 {
     rig_closed(1, 16000);
-    drive.control.vq_limit_q14 = 10000;
-    drive.control.v_q14.q = 9990;
-    drive_current_limit_step(&drive, &params);
-    TEST_ASSERT_LESS_THAN_INT16(0, drive.fieldweak.trim_q13);
+    drive.run.control.vq_limit_q14 = 10000;
+    drive.run.control.v_q14.q = 9990;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_LESS_THAN_INT16(0, drive.run.fieldweak.trim_q13);
     rig_closed(-1, -16000);
-    drive.control.vq_limit_q14 = 10000;
-    drive.control.v_q14.q = -9990;
-    drive_current_limit_step(&drive, &params);
-    TEST_ASSERT_LESS_THAN_INT16(0, drive.fieldweak.trim_q13);
+    drive.run.control.vq_limit_q14 = 10000;
+    drive.run.control.v_q14.q = -9990;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_LESS_THAN_INT16(0, drive.run.fieldweak.trim_q13);
 }
 
 void test_field_weakening_is_indexed_by_the_reference_and_not_the_speed(void)
 {
     rig_closed(1, 8000);
-    drive.estimator.omega_filtered_q16 = 25000L * 65536;
+    drive.run.estimator.omega_filtered_q16 = 25000L * 65536;
     rig_next_slot(1);
     rig_tick(1);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.fieldweak.index);
-    drive.control.reference_erpm = 13000 + 3 * 1024 + 5;
-    drive.estimator.omega_filtered_q16 = 8000L * 65536;
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.fieldweak.index);
+    drive.run.control.reference_erpm = 13000 + 3 * 1024 + 5;
+    drive.run.estimator.omega_filtered_q16 = 8000L * 65536;
     rig_next_slot(1);
     rig_tick(1);
-    TEST_ASSERT_EQUAL_UINT16(3, drive.fieldweak.index);
+    TEST_ASSERT_EQUAL_UINT16(3, drive.run.fieldweak.index);
 }
 
 /* ---- stall and lost lock: steps of 400 us ---- */
@@ -586,11 +586,11 @@ static uint16_t steps_to_fault(int16_t reference_erpm, int16_t speed_erpm, int16
 {
     uint16_t steps = 0;
     rig_closed(1, reference_erpm);
-    drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
-    drive.estimator.e_d_q28 = (int32_t)e_d * 65536;
-    drive.estimator.e_q_q28 = (int32_t)e_q * 65536;
+    drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    drive.run.estimator.e_d_q28 = (int32_t)e_d * 65536;
+    drive.run.estimator.e_q_q28 = (int32_t)e_q * 65536;
     while (drive.state == (uint16_t)DRIVE_CLOSED && steps < most) {
-        drive_protect_step(&drive, &params);
+        protection_check_rotor(&drive, &params);
         steps++;
     }
     return steps;
@@ -623,15 +623,15 @@ void test_a_short_dip_of_speed_is_no_stall(void)
 {
     uint16_t n;
     rig_closed(1, 10000);
-    drive.estimator.e_q_q28 = 100L * 65536;
+    drive.run.estimator.e_q_q28 = 100L * 65536;
     for (n = 0; n < 3u; n++) {
         uint16_t k;
-        drive.estimator.omega_filtered_q16 = 1000L * 65536;
+        drive.run.estimator.omega_filtered_q16 = 1000L * 65536;
         for (k = 0; k < 750u; k++) {
-            drive_protect_step(&drive, &params);
+            protection_check_rotor(&drive, &params);
         }
-        drive.estimator.omega_filtered_q16 = 6000L * 65536;
-        drive_protect_step(&drive, &params);
+        drive.run.estimator.omega_filtered_q16 = 6000L * 65536;
+        protection_check_rotor(&drive, &params);
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
@@ -667,13 +667,13 @@ void test_a_short_loss_of_lock_rides_through(void)
     rig_closed(1, 10000);
     for (n = 0; n < 3u; n++) {
         uint16_t k;
-        drive.estimator.e_d_q28 = 2000L * 65536;
-        drive.estimator.e_q_q28 = 1000L * 65536;
+        drive.run.estimator.e_d_q28 = 2000L * 65536;
+        drive.run.estimator.e_q_q28 = 1000L * 65536;
         for (k = 0; k < 125u; k++) {
-            drive_protect_step(&drive, &params);
+            protection_check_rotor(&drive, &params);
         }
-        drive.estimator.e_d_q28 = 0;
-        drive_protect_step(&drive, &params);
+        drive.run.estimator.e_d_q28 = 0;
+        protection_check_rotor(&drive, &params);
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
@@ -686,15 +686,15 @@ static void hand_over(int16_t direction, angle_t forced, int16_t offset, int16_t
     rig_lock(direction);
     drive.state = (uint16_t)DRIVE_RAMP;
     drive.angle = forced;
-    drive.estimator.rho_q32 = (uint32_t)(angle_t)(forced - (uint16_t)offset) << 16;
-    drive.estimator.half_step_q16_rad = 0;
-    drive.estimator.omega_filtered_q16 = (int32_t)(direction * 4900) * 65536;
-    drive.control.v_q14.d = v_d;
-    drive.control.v_q14.q = v_q;
-    drive.stall_count = 700;
-    drive.lost_count = 100;
-    drive.slots = 50;
-    drive_hand_over(&drive, &params);
+    drive.run.estimator.rho_q32 = (uint32_t)(angle_t)(forced - (uint16_t)offset) << 16;
+    drive.run.estimator.half_step_q16_rad = 0;
+    drive.run.estimator.omega_filtered_q16 = (int32_t)(direction * 4900) * 65536;
+    drive.run.control.v_q14.d = v_d;
+    drive.run.control.v_q14.q = v_q;
+    drive.run.stall_steps = 700;
+    drive.run.lost_lock_steps = 100;
+    drive.run.handover.agreed_steps = 50;
+    handover_now(&drive, &params);
     drive.ticks = 7;
     drive_slow(&drive, &params, 0);
 }
@@ -707,10 +707,10 @@ static void expect_the_same_stator_voltage(int16_t direction, angle_t forced, in
     before.q = (int16_t)(direction * 6000);
     hand_over(direction, forced, offset, before.d, before.q);
     was = inverse_park(before, trig_sincos(forced));
-    is = inverse_park(drive.control.v_q14, trig_sincos(drive.angle));
+    is = inverse_park(drive.run.control.v_q14, trig_sincos(drive.angle));
     TEST_ASSERT_INT16_WITHIN(6, was.alpha, is.alpha);
     TEST_ASSERT_INT16_WITHIN(6, was.beta, is.beta);
-    TEST_ASSERT_EQUAL_INT16(offset, drive.control.handover_offset);
+    TEST_ASSERT_EQUAL_INT16(offset, drive.run.handover.offset);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
 
@@ -733,10 +733,10 @@ void test_hand_over_keeps_the_current_in_the_stator(void)
         open_loop.q = params.open_loop_q13;
         hand_over(1, 30000, (int16_t)offset, 0, 5000);
         was = inverse_park(open_loop, trig_sincos(30000));
-        is = inverse_park(drive.control.ref_q13, trig_sincos(drive.angle));
+        is = inverse_park(drive.run.control.ref_q13, trig_sincos(drive.angle));
         TEST_ASSERT_INT16_WITHIN(4, was.alpha, is.alpha);
         TEST_ASSERT_INT16_WITHIN(4, was.beta, is.beta);
-        TEST_ASSERT_EQUAL_INT16(drive.control.ref_q13.d, drive.control.handover_q13);
+        TEST_ASSERT_EQUAL_INT16(drive.run.control.ref_q13.d, drive.run.handover.id_q13);
     }
 }
 
@@ -746,21 +746,19 @@ void test_hand_over_presets_all_three_controllers_without_a_bump(void)
     for (direction = -1; direction <= 1; direction = (int16_t)(direction + 2)) {
         int16_t err;
         hand_over(direction, 7000, (int16_t)(direction * -9000), 200, (int16_t)(direction * 6000));
-        TEST_ASSERT_INT16_WITHIN(1, drive.control.v_q14.d, pi_tick(&drive.control.pi_d, &params.pi_d, 0, 16000));
-        TEST_ASSERT_INT16_WITHIN(1, drive.control.v_q14.q, pi_tick(&drive.control.pi_q, &params.pi_q, 0, 16000));
+        TEST_ASSERT_INT16_WITHIN(1, drive.run.control.v_q14.d, pi_tick(&drive.run.control.pi_d, &params.pi_d, 0, 16000));
+        TEST_ASSERT_INT16_WITHIN(1, drive.run.control.v_q14.q, pi_tick(&drive.run.control.pi_q, &params.pi_q, 0, 16000));
         err = (int16_t)(direction * (5000 - 4900));
-        TEST_ASSERT_INT16_WITHIN(1, drive.control.ref_q13.q, pi_tick(&drive.control.pi_speed, &params.pi_speed, err, 5120));
+        TEST_ASSERT_INT16_WITHIN(1, drive.run.control.ref_q13.q, pi_tick(&drive.run.control.pi_speed, &params.pi_speed, err, 5120));
     }
 }
 
-void test_hand_over_starts_from_END_SPEED_with_fresh_counters(void)
+void test_hand_over_starts_from_END_SPEED(void)
 {
     hand_over(1, 7000, 0, 0, 5000);
-    TEST_ASSERT_EQUAL_INT16(5000, drive.control.reference_erpm);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.stall_count);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.lost_count);
+    TEST_ASSERT_EQUAL_INT16(5000, drive.run.control.reference_erpm);
     hand_over(-1, 7000, 0, 0, -5000);
-    TEST_ASSERT_EQUAL_INT16(-5000, drive.control.reference_erpm);
+    TEST_ASSERT_EQUAL_INT16(-5000, drive.run.control.reference_erpm);
 }
 
 void test_hand_over_offset_decays_one_count_a_period_from_both_signs(void)
@@ -769,15 +767,15 @@ void test_hand_over_offset_decays_one_count_a_period_from_both_signs(void)
     for (sign = -1; sign <= 1; sign = (int16_t)(sign + 2)) {
         int16_t n;
         rig_closed(1, 8000);
-        drive.control.handover_offset = (int16_t)(sign * 1000);
+        drive.run.handover.offset = (int16_t)(sign * 1000);
         for (n = 1; n < 124; n++) {
-            drive_handover_step(&drive, &params); /* every eighth period */
-            TEST_ASSERT_EQUAL_INT16(sign * (1000 - 8 * n), drive.control.handover_offset);
+            handover_decay(&drive, &params); /* every eighth period */
+            TEST_ASSERT_EQUAL_INT16(sign * (1000 - 8 * n), drive.run.handover.offset);
         }
-        drive_handover_step(&drive, &params);
-        drive_handover_step(&drive, &params);
-        TEST_ASSERT_EQUAL_INT16(0, drive.control.handover_offset);
-        TEST_ASSERT_EQUAL_INT16(0, drive.control.handover_q13);
+        handover_decay(&drive, &params);
+        handover_decay(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
     }
 }
 
@@ -785,16 +783,16 @@ void test_hand_over_current_follows_its_offset(void)
 {
     /* d = -Iq sin(offset) */
     rig_closed(1, 8000);
-    drive.control.handover_offset = 8192 + 8; /* 45 degrees after the step */
-    drive_handover_step(&drive, &params);
-    TEST_ASSERT_INT16_WITHIN(3, -1856, drive.control.handover_q13);
-    drive.control.handover_offset = -8192 - 8;
-    drive_handover_step(&drive, &params);
-    TEST_ASSERT_INT16_WITHIN(3, 1856, drive.control.handover_q13);
+    drive.run.handover.offset = 8192 + 8; /* 45 degrees after the step */
+    handover_decay(&drive, &params);
+    TEST_ASSERT_INT16_WITHIN(3, -1856, drive.run.handover.id_q13);
+    drive.run.handover.offset = -8192 - 8;
+    handover_decay(&drive, &params);
+    TEST_ASSERT_INT16_WITHIN(3, 1856, drive.run.handover.id_q13);
     rig_closed(-1, -8000);
-    drive.control.handover_offset = 8192 + 8;
-    drive_handover_step(&drive, &params);
-    TEST_ASSERT_INT16_WITHIN(3, 1856, drive.control.handover_q13);
+    drive.run.handover.offset = 8192 + 8;
+    handover_decay(&drive, &params);
+    TEST_ASSERT_INT16_WITHIN(3, 1856, drive.run.handover.id_q13);
 }
 
 void test_finished_hand_over_leaves_no_current_behind(void)
@@ -803,12 +801,12 @@ void test_finished_hand_over_leaves_no_current_behind(void)
     rig_start(1);
     drive.command.target_erpm = 5000;
     (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
-    while (drive.control.handover_offset != 0 && n++ < 20000u) {
+    while (drive.run.handover.offset != 0 && n++ < 20000u) {
         ideal_motor_run(1);
     }
     ideal_motor_run(400);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-    TEST_ASSERT_EQUAL_INT16(0, drive.control.ref_q13.d);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.d);
 }
 
 /* ---- stop ---- */
@@ -856,8 +854,8 @@ static uint16_t stops(int16_t speed_erpm, int16_t reference_erpm)
     rig_closed(1, reference_erpm);
     drive.state = (uint16_t)DRIVE_STOPPING;
     drive.command.run = 0;
-    drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
-    drive_speed_step(&drive, &params);
+    drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    speed_step(&drive, &params);
     return (uint16_t)(drive.state == (uint16_t)DRIVE_STOPPED);
 }
 
@@ -874,7 +872,7 @@ void test_stop_ends_when_speed_and_reference_are_below_the_minimum(void)
 void test_low_speed_alone_does_not_end_closed_loop(void)
 {
     rig_closed(1, 2000);
-    drive_speed_step(&drive, &params);
+    speed_step(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
 
@@ -887,7 +885,8 @@ void test_withdrawn_request_in_every_state(void)
     for (state = 0; state < (uint16_t)DRIVE_STATE_COUNT; state++) {
         rig_closed(1, 8000);
         drive.state = state;
-        drive.timer = 0;
+        drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
+        drive.periods = 0;
         drive.command.run = 0;
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(next[state], drive.state);
@@ -924,8 +923,9 @@ void test_outputs_of_every_state(void)
     uint16_t state;
     for (state = 0; state < (uint16_t)DRIVE_STATE_COUNT; state++) {
         rig_closed(1, 8000);
-        drive.timer = 0;
+        drive.periods = 0;
         drive.state = state;
+        drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         if (state == (uint16_t)DRIVE_STOPPED || state == (uint16_t)DRIVE_STOPPING) {
             drive.command.run = 0;
         }
@@ -1002,7 +1002,7 @@ void test_speed_comes_back_after_a_load_step(void)
     ideal_motor_run(6000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
     TEST_ASSERT_FLOAT_WITHIN(50.0F, 10000.0F, ideal_motor_erpm());
-    TEST_ASSERT_GREATER_THAN_INT16(1300, drive.control.i_q13.q); /* (0.05 + 0.004) / 0.0599 A = 1678 counts */
+    TEST_ASSERT_GREATER_THAN_INT16(1300, drive.run.control.i_q13.q); /* (0.05 + 0.004) / 0.0599 A = 1678 counts */
 }
 
 void test_field_weakening_doubles_the_base_speed(void)
@@ -1012,7 +1012,7 @@ void test_field_weakening_doubles_the_base_speed(void)
     ideal_motor_run(30000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
     TEST_ASSERT_FLOAT_WITHIN(140.0F, 27500.0F, ideal_motor_erpm());
-    TEST_ASSERT_EQUAL_UINT16(14, drive.fieldweak.index);
+    TEST_ASSERT_EQUAL_UINT16(14, drive.run.fieldweak.index);
 }
 
 void test_blocked_shaft_in_closed_loop_ends_in_a_fault_within_a_second(void)
@@ -1022,11 +1022,4 @@ void test_blocked_shaft_in_closed_loop_ends_in_a_fault_within_a_second(void)
     TEST_ASSERT_LESS_THAN_UINT32(20000, ideal_motor_run_until(DRIVE_FAULT, 30000));
     TEST_ASSERT_TRUE(drive.fault == (uint16_t)FAULT_STALL || drive.fault == (uint16_t)FAULT_LOST_LOCK);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
-}
-
-void test_potentiometer_sample_is_handed_on(void)
-{
-    samples.pot = -12345;
-    rig_tick(1);
-    TEST_ASSERT_EQUAL_INT16(-12345, drive.pot_q15);
 }

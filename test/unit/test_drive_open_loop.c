@@ -25,7 +25,7 @@ void test_stays_on_the_ramps_end_speed_for_ever(void)
 void test_estimator_runs_along(void)
 {
     ideal_motor_run(50000);
-    TEST_ASSERT_INT16_WITHIN(60, 5000, estimator_speed(&drive.estimator));
+    TEST_ASSERT_INT16_WITHIN(60, 5000, estimator_speed(&drive.run.estimator));
 }
 
 void test_an_estimator_that_disagrees_is_no_fault(void)

@@ -21,7 +21,7 @@ void test_power_up_is_CALIBRATE_with_outputs_off_and_no_fault(void)
 {
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
-    TEST_ASSERT_EQUAL_INT16(0, drive.calibrated);
+    TEST_ASSERT_EQUAL_INT16(0, drive.calibration.done);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
 }
@@ -36,10 +36,10 @@ void test_init_forgets_everything_of_an_earlier_run(void)
     drive_init(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
-    TEST_ASSERT_EQUAL_INT16(0, drive.calibrated);
-    TEST_ASSERT_EQUAL_INT16(0, drive.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(0, drive.calibration.done);
+    TEST_ASSERT_EQUAL_INT16(0, drive.calibration.offset_a_q13);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
-    TEST_ASSERT_EQUAL_INT32(0, drive.control.pi_q.sum);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_q.sum);
     TEST_ASSERT_EQUAL_UINT16(0, drive.ticks);
 }
 
@@ -56,9 +56,9 @@ void test_init_knows_bus_gain_and_circle_of_the_nominal_supply(void)
 
 void test_init_gives_the_estimator_the_base_constants(void)
 {
-    TEST_ASSERT_EQUAL_INT16(NORM_INVKFIBASE, drive.tuning.inv_kfi);
-    TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.tuning.kfilter_esdq_q16);
-    TEST_ASSERT_UINT16_WITHIN(1, params.fieldweak.ls_base_q16, drive.tuning.ls_q16);
+    TEST_ASSERT_EQUAL_INT16(NORM_INVKFIBASE, drive.run.model.inv_kfi);
+    TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.run.model.kfilter_esdq_q16);
+    TEST_ASSERT_UINT16_WITHIN(1, params.fieldweak.ls_base_q16, drive.run.model.ls_q16);
 }
 
 void test_calibration_takes_1024_samples_with_outputs_off(void)
@@ -68,20 +68,20 @@ void test_calibration_takes_1024_samples_with_outputs_off(void)
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
         TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
-        TEST_ASSERT_EQUAL_INT16(0, drive.calibrated);
+        TEST_ASSERT_EQUAL_INT16(0, drive.calibration.done);
     }
     rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
-    TEST_ASSERT_EQUAL_INT16(1, drive.calibrated);
+    TEST_ASSERT_EQUAL_INT16(1, drive.calibration.done);
 }
 
 void test_calibrated_offset_is_removed_from_each_phase(void)
 {
     rig_currents(400, -250);
     rig_tick(1024);
-    TEST_ASSERT_EQUAL_INT16(400, drive.offset_a_q13);
-    TEST_ASSERT_EQUAL_INT16(-250, drive.offset_b_q13);
+    TEST_ASSERT_EQUAL_INT16(400, drive.calibration.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(-250, drive.calibration.offset_b_q13);
     rig_currents(400 + 1000, -250 + 300);
     rig_tick(1);
     TEST_ASSERT_EQUAL_INT16(1000, drive.i_a_q13);
@@ -97,8 +97,8 @@ void test_calibration_averages_noise_away(void)
         rig_currents((int16_t)(100 + noise), (int16_t)(-100 - noise));
         rig_tick(1);
     }
-    TEST_ASSERT_INT16_WITHIN(1, 100, drive.offset_a_q13);
-    TEST_ASSERT_INT16_WITHIN(1, -100, drive.offset_b_q13);
+    TEST_ASSERT_INT16_WITHIN(1, 100, drive.calibration.offset_a_q13);
+    TEST_ASSERT_INT16_WITHIN(1, -100, drive.calibration.offset_b_q13);
 }
 
 void test_calibration_weighs_all_1024_samples_alike(void)
@@ -109,8 +109,8 @@ void test_calibration_weighs_all_1024_samples_alike(void)
         rig_currents(step, (int16_t)-step);
         rig_tick(1);
     }
-    TEST_ASSERT_EQUAL_INT16(400, drive.offset_a_q13);
-    TEST_ASSERT_EQUAL_INT16(-400, drive.offset_b_q13);
+    TEST_ASSERT_EQUAL_INT16(400, drive.calibration.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(-400, drive.calibration.offset_b_q13);
 }
 
 void test_negative_gain_means_a_shunt_in_the_low_leg(void)
@@ -129,7 +129,7 @@ void test_offset_up_to_an_eighth_of_full_scale_is_accepted(void)
     rig_currents(1024, -1024);
     rig_tick(1024);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-    TEST_ASSERT_EQUAL_INT16(1, drive.calibrated);
+    TEST_ASSERT_EQUAL_INT16(1, drive.calibration.done);
 }
 
 static void expect_offset_fault(int16_t a_q13, int16_t b_q13)
@@ -139,7 +139,7 @@ static void expect_offset_fault(int16_t a_q13, int16_t b_q13)
     rig_tick(1024);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
     TEST_ASSERT_EQUAL_UINT16(FAULT_OFFSET, drive.fault);
-    TEST_ASSERT_EQUAL_INT16(0, drive.calibrated);
+    TEST_ASSERT_EQUAL_INT16(0, drive.calibration.done);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
 }
 
@@ -155,8 +155,8 @@ void test_implausible_offset_of_either_phase_and_sign_faults(void)
 void test_implausible_offset_is_not_used(void)
 {
     expect_offset_fault(2000, -3000);
-    TEST_ASSERT_EQUAL_INT16(0, drive.offset_a_q13);
-    TEST_ASSERT_EQUAL_INT16(0, drive.offset_b_q13);
+    TEST_ASSERT_EQUAL_INT16(0, drive.calibration.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(0, drive.calibration.offset_b_q13);
 }
 
 void test_no_start_after_an_implausible_offset(void)
@@ -181,8 +181,8 @@ void test_clearing_an_offset_fault_calibrates_again_from_the_start(void)
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
     rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-    TEST_ASSERT_EQUAL_INT16(100, drive.offset_a_q13);
-    TEST_ASSERT_EQUAL_INT16(50, drive.offset_b_q13);
+    TEST_ASSERT_EQUAL_INT16(100, drive.calibration.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(50, drive.calibration.offset_b_q13);
 }
 
 void test_offset_that_is_still_implausible_faults_again(void)
@@ -218,7 +218,7 @@ void test_a_fault_after_calibration_keeps_the_offsets(void)
     drive.command.clear_fault = 1;
     rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-    TEST_ASSERT_EQUAL_INT16(200, drive.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(200, drive.calibration.offset_a_q13);
 }
 
 /* ---- the request ---- */
@@ -240,8 +240,8 @@ void test_a_stopped_drive_shows_neither_speed_nor_reference(void)
     drive.state = (uint16_t)DRIVE_STOPPED;
     drive.command.run = 0;
     rig_tick(1);
-    TEST_ASSERT_EQUAL_INT32(0, drive.estimator.omega_filtered_q16);
-    TEST_ASSERT_EQUAL_INT16(0, drive.control.reference_erpm);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.estimator.omega_filtered_q16);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.reference_erpm);
 }
 
 void test_a_request_to_clear_a_fault_does_not_disturb_a_start(void)
@@ -251,7 +251,7 @@ void test_a_request_to_clear_a_fault_does_not_disturb_a_start(void)
     drive.command.clear_fault = 1;
     rig_tick(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_BOOTSTRAP, drive.state);
-    TEST_ASSERT_EQUAL_UINT16(5, drive.timer); /* the first of the six ended STOPPED */
+    TEST_ASSERT_EQUAL_UINT16(5, drive.periods); /* the first of the six ended STOPPED */
     TEST_ASSERT_EQUAL_INT16(0, drive.command.clear_fault);
 }
 
@@ -282,35 +282,35 @@ void test_second_start_request_does_not_change_the_first(void)
     rig_start(1);
     drive_start(&drive, &params, -1);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
-    TEST_ASSERT_EQUAL_INT16(params.open_loop_q13, drive.control.ref_q13.q);
+    TEST_ASSERT_EQUAL_INT16(params.open_loop_q13, drive.run.control.ref_q13.q);
 }
 
 void test_start_begins_without_memory_of_the_last_run(void)
 {
     rig_ready();
-    drive.control.pi_q.sum = 123456;
-    drive.control.reference_erpm = 9000;
-    drive.control.handover_offset = 77;
-    drive.estimator.omega_filtered_q16 = 99999999;
-    drive.estimator.rho_q32 = 12345678ul;
-    drive.fieldweak.trim_q13 = -100;
-    drive.tuning.inv_kfi = 1;
-    drive.tuning.kfilter_esdq_q16 = 1;
+    drive.run.control.pi_q.sum = 123456;
+    drive.run.control.reference_erpm = 9000;
+    drive.run.handover.offset = 77;
+    drive.run.estimator.omega_filtered_q16 = 99999999;
+    drive.run.estimator.rho_q32 = 12345678ul;
+    drive.run.fieldweak.trim_q13 = -100;
+    drive.run.model.inv_kfi = 1;
+    drive.run.model.kfilter_esdq_q16 = 1;
     drive.forced.speed_q10 = 5000;
-    drive.slots = 49;
+    drive.run.handover.agreed_steps = 49;
     drive_start(&drive, &params, 1);
-    TEST_ASSERT_EQUAL_INT32(0, drive.control.pi_q.sum);
-    TEST_ASSERT_EQUAL_INT16(0, drive.control.reference_erpm);
-    TEST_ASSERT_EQUAL_INT16(0, drive.control.handover_offset);
-    TEST_ASSERT_EQUAL_INT32(0, drive.estimator.omega_filtered_q16);
-    TEST_ASSERT_EQUAL_UINT32(0, drive.estimator.rho_q32);
-    TEST_ASSERT_EQUAL_INT16(0, drive.fieldweak.trim_q13);
-    TEST_ASSERT_EQUAL_INT16(NORM_INVKFIBASE, drive.tuning.inv_kfi);
-    TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.tuning.kfilter_esdq_q16);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_q.sum);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.reference_erpm);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.estimator.omega_filtered_q16);
+    TEST_ASSERT_EQUAL_UINT32(0, drive.run.estimator.rho_q32);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.fieldweak.trim_q13);
+    TEST_ASSERT_EQUAL_INT16(NORM_INVKFIBASE, drive.run.model.inv_kfi);
+    TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.run.model.kfilter_esdq_q16);
     TEST_ASSERT_EQUAL_INT32(0, drive.forced.speed_q10);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.slots);
-    TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.control.iq_limit_q13);
-    TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.control.brake_limit_q13);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
+    TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.run.control.iq_limit_q13);
+    TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.run.control.brake_limit_q13);
 }
 
 /* ---- bootstrap ---- */
@@ -325,14 +325,14 @@ void test_bootstrap_charges_all_low_sides_for_ten_milliseconds(void)
         TEST_ASSERT_EQUAL_UINT16(OUTPUTS_BOOTSTRAP, out.outputs);
     }
     rig_tick(1);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, drive.state);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_PWM, out.outputs);
 }
 
 void test_first_lock_period_already_has_the_duties_of_the_law(void)
 {
     rig_start(1);
-    (void)rig_tick_until(DRIVE_LOCK, 300);
+    (void)rig_tick_until(DRIVE_ALIGN, 300);
     TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.a);
     TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.b);
 }
@@ -391,7 +391,7 @@ void test_lock_sweeps_a_quarter_turn_in_its_first_half_and_then_holds(void)
     {
         angle_t held = drive.angle;
         rig_tick(1999);
-        TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, drive.state);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, drive.state);
         TEST_ASSERT_EQUAL_HEX16(held, drive.angle);
     }
 }
@@ -409,22 +409,22 @@ void test_lock_sweeps_the_other_way_in_reverse(void)
 void test_lock_and_ramp_carry_the_open_loop_current(void)
 {
     rig_start(1);
-    (void)ideal_motor_run_until(DRIVE_LOCK, 300);
+    (void)ideal_motor_run_until(DRIVE_ALIGN, 300);
     ideal_motor_run(3000);
-    TEST_ASSERT_INT16_WITHIN(30, 2625, drive.control.i_q13.q); /* 1.41 A */
-    TEST_ASSERT_INT16_WITHIN(30, 0, drive.control.i_q13.d);
+    TEST_ASSERT_INT16_WITHIN(30, 2625, drive.run.control.i_q13.q); /* 1.41 A */
+    TEST_ASSERT_INT16_WITHIN(30, 0, drive.run.control.i_q13.d);
     ideal_motor_run(10000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
-    TEST_ASSERT_INT16_WITHIN(30, 2625, drive.control.i_q13.q);
-    TEST_ASSERT_INT16_WITHIN(30, 0, drive.control.i_q13.d);
+    TEST_ASSERT_INT16_WITHIN(30, 2625, drive.run.control.i_q13.q);
+    TEST_ASSERT_INT16_WITHIN(30, 0, drive.run.control.i_q13.d);
 }
 
 void test_reverse_start_carries_the_negative_open_loop_current(void)
 {
     rig_start(-1);
-    (void)ideal_motor_run_until(DRIVE_LOCK, 300);
+    (void)ideal_motor_run_until(DRIVE_ALIGN, 300);
     ideal_motor_run(3000);
-    TEST_ASSERT_INT16_WITHIN(30, -2625, drive.control.i_q13.q);
+    TEST_ASSERT_INT16_WITHIN(30, -2625, drive.run.control.i_q13.q);
 }
 
 void test_stop_during_lock_switches_off_at_once(void)
@@ -495,7 +495,7 @@ void test_whole_start_is_BOOTSTRAP_LOCK_RAMP_CLOSED(void)
     drive.command.target_erpm = params.end_erpm;
     ideal_motor_run(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_BOOTSTRAP, drive.state);
-    TEST_ASSERT_EQUAL_UINT32(200, ideal_motor_run_until(DRIVE_LOCK, 60000));
+    TEST_ASSERT_EQUAL_UINT32(200, ideal_motor_run_until(DRIVE_ALIGN, 60000));
     TEST_ASSERT_EQUAL_UINT32(LOCK_PERIODS - 1u, ideal_motor_run_until(DRIVE_RAMP, 60000));
     ready = ideal_motor_run_until(DRIVE_CLOSED, 60000);
     /* the end of the ramp and 50 agreeing slow steps, on a grid of eight periods */
@@ -548,7 +548,7 @@ static void at_the_end_of_the_ramp(int16_t direction)
 {
     rig_lock(direction);
     drive.state = (uint16_t)DRIVE_RAMP;
-    drive.timer = 0;
+    drive.run.handover.waited_steps = 0;
     drive.forced.speed_q10 = params.forced.end_speed_q10;
 }
 
@@ -557,9 +557,9 @@ static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
 {
     uint16_t steps = 0;
     while (drive.state == (uint16_t)DRIVE_RAMP && steps < most) {
-        drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+        drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
         drive.ticks = (uint16_t)(drive.ticks & ~7u);
-        drive_try_hand_over(&drive, &params);
+        handover_wait(&drive, &params);
         drive.ticks = (uint16_t)(drive.ticks + 1u);
         drive_slow(&drive, &params, 0); /* the next period carries it out */
         steps++;
@@ -571,10 +571,10 @@ void test_hand_over_comes_in_the_period_after_the_decision_and_in_no_other(void)
 {
     uint16_t n;
     at_the_end_of_the_ramp(1);
-    drive.slots = (uint16_t)(params.ready_slots - 1u);
-    drive.estimator.omega_filtered_q16 = 5000L * 65536;
+    drive.run.handover.agreed_steps = (uint16_t)(params.ready_slots - 1u);
+    drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
     drive.ticks = 8;
-    drive_try_hand_over(&drive, &params);
+    handover_wait(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */
     for (n = 8; n <= 16; n++) {
         drive.ticks = n;
@@ -592,10 +592,10 @@ void test_hand_over_leaves_the_frame_of_the_estimated_angle(void)
 {
     sincos_t frame;
     at_the_end_of_the_ramp(1);
-    drive.estimator.rho_q32 = 0x30000000ul;
-    drive_hand_over(&drive, &params);
+    drive.run.estimator.rho_q32 = 0x30000000ul;
+    handover_now(&drive, &params);
     frame = trig_sincos(drive.angle);
-    TEST_ASSERT_EQUAL_HEX16(estimator_next_angle(&drive.estimator), drive.angle);
+    TEST_ASSERT_EQUAL_HEX16(estimator_next_angle(&drive.run.estimator), drive.angle);
     TEST_ASSERT_EQUAL_INT16(frame.sin, drive.frame.sin);
     TEST_ASSERT_EQUAL_INT16(frame.cos, drive.frame.cos);
 }
@@ -649,14 +649,14 @@ void test_readiness_is_looked_at_every_eighth_period_only(void)
 {
     uint16_t n;
     at_the_end_of_the_ramp(1);
-    drive.estimator.omega_filtered_q16 = 5000L * 65536;
+    drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
     for (n = 1; n < 8; n++) {
         drive.ticks = n;
-        drive_try_hand_over(&drive, &params);
-        TEST_ASSERT_EQUAL_UINT16(0, drive.slots);
-        TEST_ASSERT_EQUAL_UINT16(0, drive.timer);
+        handover_wait(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.waited_steps);
     }
     drive.ticks = 8;
-    drive_try_hand_over(&drive, &params);
-    TEST_ASSERT_EQUAL_UINT16(1, drive.slots);
+    handover_wait(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(1, drive.run.handover.agreed_steps);
 }

@@ -19,9 +19,9 @@ static int16_t torque_step(int16_t direction, int16_t command_q13, int16_t speed
     rig_closed(direction, (int16_t)(direction * speed_erpm));
     drive.command.target_erpm = command_q13;
     for (n = 0; n < 400u; n++) {
-        drive_speed_step(&drive, &params);
+        speed_step(&drive, &params);
     }
-    return drive.control.ref_q13.q;
+    return drive.run.control.ref_q13.q;
 }
 
 void test_command_is_the_q_current_between_minimum_and_maximum_speed(void)
@@ -41,9 +41,9 @@ void test_command_is_limited_by_the_current_circle(void)
 {
     rig_closed(1, 10000);
     drive.command.target_erpm = 5000;
-    drive.control.iq_limit_q13 = 2000;
-    drive_speed_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(2000, drive.control.ref_q13.q);
+    drive.run.control.iq_limit_q13 = 2000;
+    speed_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(2000, drive.run.control.ref_q13.q);
 }
 
 void test_no_more_driving_current_above_maximum_speed(void)
@@ -63,15 +63,15 @@ void test_holding_current_stays_within_the_circle(void)
 {
     rig_closed(1, 0);
     drive.command.target_erpm = 0;
-    drive.control.iq_limit_q13 = 700;
-    drive_speed_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(700, drive.control.ref_q13.q);
+    drive.run.control.iq_limit_q13 = 700;
+    speed_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(700, drive.run.control.ref_q13.q);
 }
 
 void test_field_weakening_follows_the_speed(void)
 {
     (void)torque_step(1, 1000, 20000);
-    TEST_ASSERT_EQUAL_INT16(20000, drive.control.reference_erpm);
+    TEST_ASSERT_EQUAL_INT16(20000, drive.run.control.reference_erpm);
 }
 
 void test_motor_accelerates_with_the_command_and_stops_in_order(void)
@@ -81,7 +81,7 @@ void test_motor_accelerates_with_the_command_and_stops_in_order(void)
     (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
     ideal_motor_run(4000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-    TEST_ASSERT_INT16_WITHIN(20, 800, drive.control.ref_q13.q);
+    TEST_ASSERT_INT16_WITHIN(20, 800, drive.run.control.ref_q13.q);
     drive.command.run = 0;
     TEST_ASSERT_LESS_THAN_UINT32(40000, ideal_motor_run_until(DRIVE_STOPPED, 40000));
     ideal_motor_run(1);

@@ -19,10 +19,10 @@ static int16_t reference_after(int16_t direction, int16_t from_erpm, uint16_t st
     rig_closed(direction, (int16_t)(direction * from_erpm));
     drive.command.target_erpm = 0;
     while (steps-- != 0u) {
-        drive.estimator.omega_filtered_q16 = (int32_t)drive.control.reference_erpm * 65536;
-        drive_reference_step(&drive, &params);
+        drive.run.estimator.omega_filtered_q16 = (int32_t)drive.run.control.reference_erpm * 65536;
+        speed_reference_step(&drive, &params);
     }
-    return (int16_t)(direction * drive.control.reference_erpm);
+    return (int16_t)(direction * drive.run.control.reference_erpm);
 }
 
 void test_ramp_is_one_erpm_every_16_periods(void)
@@ -43,28 +43,28 @@ void test_ramp_ignores_the_potentiometer(void)
 {
     rig_closed(1, 8000);
     drive.command.target_erpm = 2500;
-    drive_reference_step(&drive, &params);
-    drive_reference_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(8001, drive.control.reference_erpm);
+    speed_reference_step(&drive, &params);
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(8001, drive.run.control.reference_erpm);
 }
 
 void test_ramp_waits_for_a_motor_that_cannot_follow(void)
 {
     uint16_t n;
     rig_closed(1, 8000);
-    drive.estimator.omega_filtered_q16 = 6250L * 65536;
+    drive.run.estimator.omega_filtered_q16 = 6250L * 65536;
     for (n = 0; n < 100u; n++) {
-        drive_reference_step(&drive, &params);
+        speed_reference_step(&drive, &params);
     }
-    TEST_ASSERT_EQUAL_INT16(8000, drive.control.reference_erpm);
+    TEST_ASSERT_EQUAL_INT16(8000, drive.run.control.reference_erpm);
 }
 
 void test_stop_ramps_down_as_ever(void)
 {
     rig_closed(1, 8000);
     drive.state = (uint16_t)DRIVE_STOPPING;
-    drive_reference_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(7992, drive.control.reference_erpm);
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(7992, drive.run.control.reference_erpm);
 }
 
 void test_motor_follows_at_250_rpm_per_second_from_END_SPEED(void)
@@ -72,9 +72,9 @@ void test_motor_follows_at_250_rpm_per_second_from_END_SPEED(void)
     int16_t at_start;
     rig_start(1);
     (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
-    at_start = drive.control.reference_erpm;
+    at_start = drive.run.control.reference_erpm;
     TEST_ASSERT_EQUAL_INT16(5000, at_start);
     ideal_motor_run(20000);
-    TEST_ASSERT_INT16_WITHIN(10, 5000 + 1250, drive.control.reference_erpm);
+    TEST_ASSERT_INT16_WITHIN(10, 5000 + 1250, drive.run.control.reference_erpm);
     TEST_ASSERT_FLOAT_WITHIN(60.0F, 6250.0F, ideal_motor_erpm());
 }

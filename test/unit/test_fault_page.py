@@ -9,11 +9,11 @@ PAGE = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
 
 
 def made() -> str:
-    return subprocess.run([sys.executable, "tools/docs/faults.py", "--print"], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    return subprocess.run([sys.executable, "-m", "tools.docs.tables", "--print", "faults"], capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
 
 def test_the_page_is_the_one_made_from_the_table() -> None:
-    assert made() == PAGE, "run python3 tools/docs/faults.py"
+    assert made() == PAGE, "run python3 -m tools.docs.tables"
 
 
 def test_the_page_has_a_row_for_every_code() -> None:

@@ -158,5 +158,61 @@ void test_drive_starts_again_after_a_cleared_fault(void)
     drive_start(&drive, &params, 1);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     rig_tick(201);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, drive.state);
+}
+
+/* ---- the gate ---- */
+
+void test_no_state_is_entered_past_a_fault(void)
+{
+    uint16_t next;
+    for (next = 0; next < (uint16_t)DRIVE_STATE_COUNT; next++) {
+        rig_ready();
+        drive_raise(&drive, FAULT_STALL);
+        drive_enter(&drive, (drive_state_t)next);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+    }
+}
+
+void test_every_state_is_entered_without_a_fault_and_begins_at_period_0(void)
+{
+    uint16_t next;
+    for (next = 0; next < (uint16_t)DRIVE_STATE_COUNT; next++) {
+        drive.periods = 77;
+        drive_enter(&drive, (drive_state_t)next);
+        TEST_ASSERT_EQUAL_UINT16(next, drive.state);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.periods);
+    }
+}
+
+void test_a_cleared_fault_before_the_calibration_calibrates_anew(void)
+{
+    drive.calibration.done = 0;
+    drive_raise(&drive, FAULT_CLOCK);
+    TEST_ASSERT_EQUAL_INT(DRIVE_CALIBRATE, drive_clear_fault(&drive));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+    drive.calibration.done = 1;
+    drive_raise(&drive, FAULT_CLOCK);
+    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, drive_clear_fault(&drive));
+}
+
+void test_a_fault_that_came_in_the_middle_of_a_period_outlives_it(void)
+{
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    drive.fault = (uint16_t)FAULT_TRAP; /* a trap, just after the period has looked and before it entered CLOSED */
+    TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, drive_outputs(&drive));
+    TEST_ASSERT_EQUAL_UINT16(1, drive_settle(&drive));
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+    drive.fault = (uint16_t)FAULT_NONE;
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    TEST_ASSERT_EQUAL_UINT16(0, drive_settle(&drive));
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(OUTPUTS_PWM, drive_outputs(&drive));
+}
+
+void test_state_FAULT_never_stays_without_a_fault(void)
+{
+    drive.state = (uint16_t)DRIVE_FAULT; /* the background raised while the interrupt cleared */
+    rig_tick(1);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
 }

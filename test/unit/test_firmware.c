@@ -25,6 +25,9 @@ static void expect_start(uint16_t no_lock)
     uart_init_Expect();
     timer_init_Expect();
     pwm_init_Expect();
+    if (no_lock) {
+        pwm_outputs_off_Expect();
+    }
     adc_init_Expect();
     firmware_init();
 }
@@ -33,6 +36,14 @@ static void expect_start(uint16_t no_lock)
 static void pass(uint16_t timer_ms)
 {
     timer_ms_passed_ExpectAndReturn(timer_ms);
+    firmware_background();
+}
+
+/** One pass that finds a fault. */
+static void tripping_pass(void)
+{
+    timer_ms_passed_ExpectAndReturn(0);
+    pwm_outputs_off_Expect();
     firmware_background();
 }
 
@@ -139,7 +150,7 @@ void test_failed_clock_cannot_be_cleared(void)
     board_drive.fault = (uint16_t)FAULT_NONE; /* what the control interrupt makes of S2 */
     board_drive.state = (uint16_t)DRIVE_STOPPED;
     board_drive.command.run = 1;
-    pass(0);
+    tripping_pass();
     TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
     TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
@@ -192,7 +203,7 @@ void test_clock_that_fails_later_cannot_be_cleared_either(void)
     board_clock_failed = 1; /* as the trap says */
     board_drive.state = (uint16_t)DRIVE_STOPPED;
     board_drive.command.run = 1;
-    pass(0);
+    tripping_pass();
     TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
     TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
 }
@@ -229,7 +240,7 @@ void test_fault_input_that_is_low_is_a_fault_that_cannot_be_cleared(void)
 {
     expect_start(0);
     PORTBbits.RB8 = 0;
-    pass(0);
+    tripping_pass();
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
     PORTBbits.RB8 = 1;
@@ -329,7 +340,7 @@ void test_lights_reach_their_pins(void)
 {
     expect_start(0);
     uart_send_IgnoreAndReturn(0);
-    board_drive.state = (uint16_t)DRIVE_LOCK;
+    board_drive.state = (uint16_t)DRIVE_ALIGN;
     healthy_ms(1);
     TEST_ASSERT_EQUAL_UINT16(1, LATCbits.LATC6); /* alive: lit in the first half second */
     TEST_ASSERT_EQUAL_UINT16(1, LATCbits.LATC7); /* running */
@@ -342,7 +353,7 @@ void test_lights_reach_their_pins(void)
 void test_watch_variables_are_refreshed_in_the_background(void)
 {
     expect_start(0);
-    board_drive.control.reference_erpm = 4321;
+    board_drive.run.control.reference_erpm = 4321;
     healthy_ms(1);
     TEST_ASSERT_EQUAL_INT16(4321, CtrlParm.qVelRef);
 }

@@ -217,5 +217,5 @@ void test_second_start_of_the_firmware_begins_anew(void)
     firmware_init();
     TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, board_drive.state);
-    TEST_ASSERT_EQUAL_INT16(0, board_drive.calibrated);
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.calibration.done);
 }

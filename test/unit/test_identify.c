@@ -1,13 +1,13 @@
-/* The identification's arithmetic and its bookkeeping with exact data: numbers of 16 bits, sums, timing of the square voltage, results. */
+/* The identification's bookkeeping with exact data: sums, timing of the square voltage, results. */
 /* defines: -DIDENTIFY */
 #include "panel_rig.h"
 #include "unity.h"
 
 #include "firmware/drive/drive.c"
-#include "firmware/drive/identify.c"
+#include "firmware/drive/modes/identify.c"
 #include "firmware/drive/panel.c"
 
-static identify_t *const id = &drive.identify;
+static identify_t *const id = &drive.run.identify;
 
 void setUp(void)
 {
@@ -18,80 +18,6 @@ void setUp(void)
 
 void tearDown(void)
 {
-}
-
-/* ---- Numbers ---- */
-
-static void expect_number(uint16_t m, int16_t e, identify_number_t n)
-{
-    TEST_ASSERT_EQUAL_UINT16(m, n.m);
-    TEST_ASSERT_EQUAL_INT16(e, n.e);
-}
-
-void test_number_keeps_the_upper_16_bits(void)
-{
-    expect_number(0, 0, number_of(0));
-    expect_number(32768u, -15, number_of(1));
-    expect_number(65535u, 0, number_of(65535u));
-    expect_number(32768u, 1, number_of(65536ul));
-    expect_number(65535u, 16, number_of(0xFFFFFFFFul));
-    expect_number(40000u, -3 - 4, number_scaled(5000u, 4));
-}
-
-void test_products_and_quotients_are_right_to_a_few_parts_in_65536(void)
-{
-    static const uint32_t value[] = { 1, 3, 19, 255, 4097, 50000ul, 65535ul, 1000003ul, 87654321ul };
-    uint16_t i, j;
-    for (i = 0; i < sizeof value / sizeof value[0]; i++) {
-        for (j = 0; j < sizeof value / sizeof value[0]; j++) {
-            identify_number_t p = number_mul(number_of(value[i]), number_of(value[j]));
-            identify_number_t q = number_div(p, number_of(value[j]));
-            uint32_t back = (q.e >= 0) ? (uint32_t)q.m << (uint16_t)q.e : (((uint32_t)q.m >> (uint16_t)(-q.e - 1)) + 1u) >> 1;
-            uint32_t miss = (back > value[i]) ? back - value[i] : value[i] - back;
-            TEST_ASSERT_TRUE(miss <= (value[i] >> 13));
-        }
-    }
-}
-
-void test_division_by_zero_gives_zero(void)
-{
-    expect_number(0, 0, number_div(number_of(7), number_of(0)));
-    expect_number(0, 0, number_div(number_of(0), number_of(1)));
-    TEST_ASSERT_EQUAL_UINT16(0, number_to_uint16(number_div(number_of(0), number_of(1))));
-}
-
-void test_whole_numbers_are_rounded_and_limited(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(0, number_to_uint16(number_of(0)));
-    TEST_ASSERT_EQUAL_UINT16(1, number_to_uint16(number_of(1)));
-    TEST_ASSERT_EQUAL_UINT16(3, number_to_uint16(number_scaled(5, 1)));
-    TEST_ASSERT_EQUAL_UINT16(2, number_to_uint16(number_scaled(9, 2)));
-    TEST_ASSERT_EQUAL_UINT16(1, number_to_uint16(number_scaled(1, 1)));
-    TEST_ASSERT_EQUAL_UINT16(0, number_to_uint16(number_scaled(1, 2)));
-    TEST_ASSERT_EQUAL_UINT16(65535u, number_to_uint16(number_of(65535u)));
-    TEST_ASSERT_EQUAL_UINT16(65535u, number_to_uint16(number_of(65536ul)));
-    TEST_ASSERT_EQUAL_UINT16(65535u, number_to_uint16(number_of(0xFFFFFFFFul)));
-}
-
-void test_signed_products(void)
-{
-    TEST_ASSERT_EQUAL_INT32(-100000l, number_times(-40000l, number_scaled(5, 1)));
-    TEST_ASSERT_EQUAL_INT32(100000l, number_times(40000l, number_scaled(5, 1)));
-    TEST_ASSERT_EQUAL_INT32(0, number_times(0, number_of(5)));
-    TEST_ASSERT_EQUAL_INT32(0, number_times(3, number_scaled(1, 20)));
-    TEST_ASSERT_EQUAL_INT32(0x3FFFFFFFl, number_times(0x3FFFFFFFl, number_of(65535u)));
-    TEST_ASSERT_INT32_WITHIN(20000l, 1000000000l, number_times(1000000l, number_of(1000)));
-}
-
-void test_square_roots_are_exact(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(0, root(0));
-    TEST_ASSERT_EQUAL_UINT16(1, root(3));
-    TEST_ASSERT_EQUAL_UINT16(2, root(4));
-    TEST_ASSERT_EQUAL_UINT16(23169u, root(536848899ul));
-    TEST_ASSERT_EQUAL_UINT16(23170u, root(536848900ul));
-    TEST_ASSERT_EQUAL_UINT16(46340u, root(0x7FFFFFFFul));
-    TEST_ASSERT_EQUAL_UINT16(5, length(-3, 4));
 }
 
 /* ---- Sums ---- */
@@ -111,12 +37,12 @@ static void standing_sums(int32_t duty, int32_t i_q13)
 /* 1 ohm: 24 V / 6000 duty counts = 4 mV, 0.5371 mA a current count: 0.134273 duty counts each */
 void test_two_exact_levels_give_R_to_a_milliohm(void)
 {
-    drive.control.ref_q13.d = 2000;
+    drive.run.control.ref_q13.d = 2000;
     standing_sums(15 + 358, 2000);
     id->step = IDENTIFY_ALIGN;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESISTANCE, id->step);
-    TEST_ASSERT_EQUAL_INT16(params.open_loop_q13 >> 1, drive.control.ref_q13.d);
+    TEST_ASSERT_EQUAL_INT16(params.open_loop_q13 >> 1, drive.run.control.ref_q13.d);
     standing_sums(15 + 179, 1000);
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_BIAS, id->step);
@@ -126,8 +52,8 @@ void test_two_exact_levels_give_R_to_a_milliohm(void)
 
 void test_slow_controller_follows_from_voltage_and_current_at_the_end_of_RISE(void)
 {
-    drive.control.v_q14.d = 4000;
-    drive.control.i_q13.d = 1312;
+    drive.run.control.v_q14.d = 4000;
+    drive.run.control.i_q13.d = 1312;
     id->ready = 1;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_CONNECT, id->step);
@@ -135,8 +61,8 @@ void test_slow_controller_follows_from_voltage_and_current_at_the_end_of_RISE(vo
     TEST_ASSERT_EQUAL_INT16(0, id->kp_d);
     TEST_ASSERT_EQUAL_INT16(0, id->ki_q);
     setUp();
-    drive.control.v_q14.d = 10;
-    drive.control.i_q13.d = 1312;
+    drive.run.control.v_q14.d = 10;
+    drive.run.control.i_q13.d = 1312;
     id->ready = 1;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_INT16(1, id->ki_d); /* it moves, however small R is */
@@ -145,8 +71,8 @@ void test_slow_controller_follows_from_voltage_and_current_at_the_end_of_RISE(vo
 void test_slow_controller_of_a_tiny_current_stays_inside_the_division(void)
 {
     id->rise_q13 = 2;
-    drive.control.v_q14.d = 8000;
-    drive.control.i_q13.d = 1; /* 160000 does not fit the quotient */
+    drive.run.control.v_q14.d = 8000;
+    drive.run.control.i_q13.d = 1; /* 160000 does not fit the quotient */
     id->ready = 1;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_INT16(2500, id->ki_d); /* as for 64 counts */
@@ -155,8 +81,8 @@ void test_slow_controller_of_a_tiny_current_stays_inside_the_division(void)
 void test_current_that_breaks_down_at_the_end_of_RISE_counts_as_half_of_what_was_reached(void)
 {
     id->rise_q13 = 1312;
-    drive.control.v_q14.d = 4000;
-    drive.control.i_q13.d = 100;
+    drive.run.control.v_q14.d = 4000;
+    drive.run.control.i_q13.d = 100;
     id->ready = 1;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_INT16(4000l * 20 / 656, id->ki_d);
@@ -165,21 +91,21 @@ void test_current_that_breaks_down_at_the_end_of_RISE_counts_as_half_of_what_was
 void test_voltage_grows_by_a_128th_every_16_periods_while_the_current_rises(void)
 {
     int16_t n;
-    (void)rig_tick_until(DRIVE_LOCK, params.bootstrap_periods + 2u);
-    TEST_ASSERT_EQUAL_INT16(16, drive.control.v_q14.d);
-    drive.control.pi_d.sum = 128l << 14;
+    (void)rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u);
+    TEST_ASSERT_EQUAL_INT16(16, drive.run.control.v_q14.d);
+    drive.run.control.pi_d.sum = 128l << 14;
     drive.ticks = 0;
     for (n = 0; n < 16; n++) {
         (void)identify_voltage(&drive, 1);
         drive.ticks++;
     }
-    TEST_ASSERT_EQUAL_INT32(129l << 14, drive.control.pi_d.sum);
+    TEST_ASSERT_EQUAL_INT32(129l << 14, drive.run.control.pi_d.sum);
     drive.ticks = 17; /* the even half of 32 periods is as good as the odd one */
     for (n = 0; n < 15; n++) {
         (void)identify_voltage(&drive, 1);
         drive.ticks++;
     }
-    TEST_ASSERT_EQUAL_INT32(129l << 14, drive.control.pi_d.sum);
+    TEST_ASSERT_EQUAL_INT32(129l << 14, drive.run.control.pi_d.sum);
     TEST_ASSERT_EQUAL_INT16(130, identify_voltage(&drive, 1).d);
     id->ready = 1;
     TEST_ASSERT_EQUAL_INT16(130, identify_voltage(&drive, 1).d);
@@ -189,8 +115,8 @@ void test_voltage_grows_by_a_128th_every_16_periods_while_the_current_rises(void
 static uint16_t connect_with(int16_t mean_q13, int16_t v_q14)
 {
     setUp();
-    drive.control.ref_q13.d = 1600;
-    drive.control.v_q14.d = v_q14;
+    drive.run.control.ref_q13.d = 1600;
+    drive.run.control.v_q14.d = v_q14;
     id->step = IDENTIFY_CONNECT;
     id->sum[1] = (int32_t)mean_q13 << (MEAN_LOG2 - 1);
     id->sum[2] = -((int32_t)mean_q13 << MEAN_LOG2);
@@ -226,8 +152,8 @@ void test_current_that_takes_three_quarters_of_the_circle_is_not_reached(void)
 static uint16_t connect_with_phase_a(int16_t a_q13)
 {
     setUp();
-    drive.control.ref_q13.d = 1600;
-    drive.control.v_q14.d = 4000;
+    drive.run.control.ref_q13.d = 1600;
+    drive.run.control.v_q14.d = 4000;
     id->step = IDENTIFY_CONNECT;
     id->sum[1] = (int32_t)a_q13 << MEAN_LOG2;
     id->sum[2] = -(1600l << MEAN_LOG2);
@@ -357,7 +283,7 @@ void test_periods_in_which_the_voltage_changes_sign_do_not_count(void)
 void test_resistance_is_taken_from_the_voltage(void)
 {
     uint16_t without = coil(200, 100, 0);
-    id->duty_per_amp = number_scaled(1, 3);
+    id->duty_per_amp = soft_float_scaled(1, 3);
     id->sum[1] = 80000l;
     TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)((uint32_t)without * 230u / 240u), inductance(id));
 }
@@ -390,7 +316,7 @@ void test_sums_without_sense_are_no_inductance(void)
 static uint16_t coil_of(int32_t volts, int32_t change)
 {
     id->values.rs_mohm = 0;
-    id->duty_per_amp = number_of(0);
+    id->duty_per_amp = soft_float_of(0);
     id->bus_q16 = BUS_Q16;
     id->sum[0] = volts;
     id->sum[2] = change;
@@ -488,7 +414,7 @@ void test_every_square_voltage_has_two_cycles_to_settle(void)
 void test_search_starts_with_a_128th_of_the_circle_and_short_halves(void)
 {
     id->step = IDENTIFY_BIAS;
-    drive.control.v_q14.d = 3000;
+    drive.run.control.v_q14.d = 3000;
     id->ready = 1;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_TRY_D, id->step);
@@ -780,22 +706,22 @@ void test_current_gains_follow_from_R_and_L(void)
     id->values.ld_uh = 1920;
     id->bias_q14 = 2000;
     id->ready = 1;
-    drive.control.pi_q.sum = 100000l;
+    drive.run.control.pi_q.sum = 100000l;
     (void)identify_background(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_SPIN_HALF, id->step);
     TEST_ASSERT_INT16_WITHIN(2, 1634, id->kp_d); /* 2 pi 200 Hz * 1.92 mH = 2.413 V/A; 0.6615 * 1024 counts each */
     TEST_ASSERT_INT16_WITHIN(2, 634, id->kp_q); /* 0.745 mH */
     TEST_ASSERT_EQUAL_INT16(id->ki_d, id->ki_q);
     TEST_ASSERT_INT16_WITHIN(1, 114, id->ki_d);  /* 2 pi 200 Hz * 2.67 ohm * 50 us = 0.1678 V/A a period */
-    TEST_ASSERT_INT32_WITHIN(2, 2000l << 10, drive.control.pi_d.sum); /* nothing jumps */
-    TEST_ASSERT_EQUAL_INT32(0, drive.control.pi_q.sum);
+    TEST_ASSERT_INT32_WITHIN(2, 2000l << 10, drive.run.control.pi_d.sum); /* nothing jumps */
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_q.sum);
     TEST_ASSERT_EQUAL_UINT16(SETTLE_PERIODS, id->wait);
     TEST_ASSERT_EQUAL_UINT16(32, id->left);
     TEST_ASSERT_EQUAL_UINT16(0, id->blocks);
-    TEST_ASSERT_EQUAL_INT16(32767, gain(number_of(70000ul)));
-    TEST_ASSERT_EQUAL_INT16(32767, gain(number_of(32768ul)));
-    TEST_ASSERT_EQUAL_INT16(32767, gain(number_of(32767ul)));
-    TEST_ASSERT_EQUAL_INT16(1, gain(number_scaled(1, 9)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain(soft_float_of(70000ul)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain(soft_float_of(32768ul)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain(soft_float_of(32767ul)));
+    TEST_ASSERT_EQUAL_INT16(1, gain(soft_float_scaled(1, 9)));
 }
 
 void test_each_axis_has_its_own_gain(void)
@@ -807,17 +733,17 @@ void test_each_axis_has_its_own_gain(void)
     id->kp_q = 3072;
     id->ki_d = 1;
     id->ki_q = 2;
-    drive.control.pi_d.sum = 0;
-    drive.control.pi_q.sum = 0;
-    drive.control.ref_q13.d = 100;
-    drive.control.ref_q13.q = 100;
-    drive.control.i_q13.d = 0;
-    drive.control.i_q13.q = 0;
+    drive.run.control.pi_d.sum = 0;
+    drive.run.control.pi_q.sum = 0;
+    drive.run.control.ref_q13.d = 100;
+    drive.run.control.ref_q13.q = 100;
+    drive.run.control.i_q13.d = 0;
+    drive.run.control.i_q13.q = 0;
     v = identify_voltage(&drive, 1);
     TEST_ASSERT_EQUAL_INT16(100, v.d);
     TEST_ASSERT_EQUAL_INT16(300, v.q);
-    TEST_ASSERT_EQUAL_INT32(100, drive.control.pi_d.sum);
-    TEST_ASSERT_EQUAL_INT32(200, drive.control.pi_q.sum);
+    TEST_ASSERT_EQUAL_INT32(100, drive.run.control.pi_d.sum);
+    TEST_ASSERT_EQUAL_INT32(200, drive.run.control.pi_q.sum);
 }
 
 /* ---- Hand-over between interrupt and background ---- */

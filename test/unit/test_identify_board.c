@@ -2,10 +2,11 @@
 /* defines: -DIDENTIFY */
 #include "hurst_params.h"
 
+#include "firmware/board/modes/identify_report.c"
 #include "firmware/board/status.c"
 #include "firmware/board/watch.c"
 
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 #include "mock_peripherals.h"
 #include "unity.h"
 
@@ -54,9 +55,9 @@ void test_line_before_the_first_measurement(void)
 void test_line_with_the_largest_numbers_fits(void)
 {
     identify_values_t all = { 65535u, 65535u, 65535u, 65535u };
-    board_drive.identify.step = IDENTIFY_SPIN_FULL;
-    board_drive.identify.result = IDENTIFY_RESULT_CURRENT_NOT_REACHED;
-    board_drive.identify.values = all;
+    board_drive.run.identify.step = IDENTIFY_SPIN_FULL;
+    board_drive.run.identify.result = IDENTIFY_RESULT_CURRENT_NOT_REACHED;
+    board_drive.run.identify.values = all;
     board_drive.fault = FAULT_TRAP;
     expect_line("step 11 CURRENT_NOT_REACHED fault 12 R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm\r\n");
     TEST_ASSERT_TRUE(sent_count < sizeof line);
@@ -65,9 +66,9 @@ void test_line_with_the_largest_numbers_fits(void)
 void test_watch_variable_shows_all_of_it(void)
 {
     identify_values_t all = { 2692, 1919, 1920, 40000u };
-    board_drive.identify.step = IDENTIFY_INDUCTANCE_Q;
-    board_drive.identify.result = IDENTIFY_RESULT_BUSY;
-    board_drive.identify.values = all;
+    board_drive.run.identify.step = IDENTIFY_INDUCTANCE_Q;
+    board_drive.run.identify.result = IDENTIFY_RESULT_BUSY;
+    board_drive.run.identify.values = all;
     watch_refresh();
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INDUCTANCE_Q, IdentifyParm.step);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, IdentifyParm.result);

@@ -6,7 +6,7 @@
 #include "unity.h"
 
 #include "firmware/drive/drive.c"
-#include "firmware/drive/identify.c"
+#include "firmware/drive/modes/identify.c"
 #include "firmware/drive/panel.c"
 
 void setUp(void)
@@ -22,10 +22,10 @@ static void expect_measured(float rs, float ld_mh, float lq_mh, float kphi)
 {
     unknown_set(rs, ld_mh, lq_mh, kphi);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
-    TEST_ASSERT_FLOAT_WITHIN(0.01F * rs + 0.0005F, rs, (float)drive.identify.values.rs_mohm * 0.001F);
-    TEST_ASSERT_FLOAT_WITHIN(0.015F * ld_mh, ld_mh, (float)drive.identify.values.ld_uh * 0.001F);
-    TEST_ASSERT_FLOAT_WITHIN(0.015F * lq_mh, lq_mh, (float)drive.identify.values.lq_uh * 0.001F);
-    TEST_ASSERT_FLOAT_WITHIN(0.01F * kphi, kphi, (float)drive.identify.values.kphi_mv_per_krpm * 0.001F);
+    TEST_ASSERT_FLOAT_WITHIN(0.01F * rs + 0.0005F, rs, (float)drive.run.identify.values.rs_mohm * 0.001F);
+    TEST_ASSERT_FLOAT_WITHIN(0.015F * ld_mh, ld_mh, (float)drive.run.identify.values.ld_uh * 0.001F);
+    TEST_ASSERT_FLOAT_WITHIN(0.015F * lq_mh, lq_mh, (float)drive.run.identify.values.lq_uh * 0.001F);
+    TEST_ASSERT_FLOAT_WITHIN(0.01F * kphi, kphi, (float)drive.run.identify.values.kphi_mv_per_krpm * 0.001F);
     unknown_ms();
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
@@ -67,8 +67,8 @@ void test_finds_the_rotor_wherever_it_stands(void)
         unknown_set(2.67F, 1.0F, 2.0F, 7.24F);
         ideal_motor_reset(at[n][0], at[n][1]);
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
-        TEST_ASSERT_UINT16_WITHIN(20, 1000, drive.identify.values.ld_uh);
-        TEST_ASSERT_UINT16_WITHIN(40, 2000, drive.identify.values.lq_uh);
+        TEST_ASSERT_UINT16_WITHIN(20, 1000, drive.run.identify.values.ld_uh);
+        TEST_ASSERT_UINT16_WITHIN(40, 2000, drive.run.identify.values.lq_uh);
     }
 }
 
@@ -80,8 +80,8 @@ void test_a_rotor_that_swings_does_not_change_the_back_emf(void)
     (void)unknown_until(IDENTIFY_SPIN_FULL);
     motor.omega *= 0.9F; /* a knock */
     (void)unknown_until(IDENTIFY_IDLE);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, drive.identify.result);
-    TEST_ASSERT_UINT16_WITHIN(72, 7240, drive.identify.values.kphi_mv_per_krpm);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, drive.run.identify.result);
+    TEST_ASSERT_UINT16_WITHIN(72, 7240, drive.run.identify.values.kphi_mv_per_krpm);
 }
 
 void test_a_bus_that_sags_with_the_current_does_not_change_R(void)
@@ -91,25 +91,25 @@ void test_a_bus_that_sags_with_the_current_does_not_change_R(void)
     (void)unknown_until(IDENTIFY_RESISTANCE);
     motor.bus_v += 0.5F; /* the second level takes less from the supply */
     (void)unknown_until(IDENTIFY_BIAS);
-    TEST_ASSERT_UINT16_WITHIN(27, 2670, drive.identify.values.rs_mohm);
+    TEST_ASSERT_UINT16_WITHIN(27, 2670, drive.run.identify.values.rs_mohm);
 }
 
 static void expect_refused(identify_result_t result)
 {
     TEST_ASSERT_EQUAL_UINT16(result, unknown_identify());
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, drive.identify.step);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, drive.run.identify.step);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     unknown_ms();
     TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.identify.values.kphi_mv_per_krpm);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.identify.values.kphi_mv_per_krpm);
 }
 
 void test_blocked_shaft_is_not_turning(void)
 {
     unknown.blocked = 1;
     expect_refused(IDENTIFY_RESULT_NOT_TURNING);
-    TEST_ASSERT_UINT16_WITHIN(27, 2670, drive.identify.values.rs_mohm); /* what standstill tells is kept */
-    TEST_ASSERT_UINT16_WITHIN(20, 1920, drive.identify.values.ld_uh);
+    TEST_ASSERT_UINT16_WITHIN(27, 2670, drive.run.identify.values.rs_mohm); /* what standstill tells is kept */
+    TEST_ASSERT_UINT16_WITHIN(20, 1920, drive.run.identify.values.ld_uh);
 }
 
 void test_shaft_too_heavy_for_the_ramp_is_not_turning(void)
@@ -135,13 +135,13 @@ void test_wire_that_opens_later_is_named_too(void)
     (void)unknown_until(IDENTIFY_RESISTANCE);
     unknown.open_phase = 4;
     (void)unknown_until(IDENTIFY_IDLE);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, drive.identify.result);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_R_RANGE, drive.run.identify.result);
     unknown_set(2.67F, 1.92F, 1.92F, 7.24F);
     unknown_begin();
     (void)unknown_until(IDENTIFY_ALIGN);
     unknown.open_phase = 4;
     (void)unknown_until(IDENTIFY_IDLE);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NO_CURRENT, drive.identify.result);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NO_CURRENT, drive.run.identify.result);
 }
 
 void test_current_that_the_bus_cannot_drive_is_named(void)
@@ -171,13 +171,13 @@ void test_S2_in_any_step_stops_at_once(void)
         setUp();
         unknown_begin();
         (void)unknown_until((identify_step_t)step);
-        TEST_ASSERT_EQUAL_UINT16(step, drive.identify.step);
+        TEST_ASSERT_EQUAL_UINT16(step, drive.run.identify.step);
         inputs.s2_down = 1;
         panel_ms(PANEL_DEBOUNCE_MS);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
         TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
-        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_STOPPED, drive.identify.result);
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_STOPPED, drive.run.identify.result);
         inputs.s2_down = 0;
         unknown_ms();
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
@@ -196,7 +196,7 @@ void test_overcurrent_in_any_step_is_a_fault_and_switches_off_in_the_same_period
         TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, drive.fault);
         TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
         panel_ms(1);
-        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_STOPPED, drive.identify.result);
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_STOPPED, drive.run.identify.result);
         TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
     }
 }
@@ -227,9 +227,9 @@ void test_does_not_start_again_by_itself_but_with_S2(void)
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
     unknown.open_phase = 0;
     unknown_press_s2();
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, drive.identify.result);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, drive.run.identify.result);
     (void)unknown_until(IDENTIFY_IDLE);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, drive.identify.result);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, drive.run.identify.result);
 }
 
 void test_a_new_start_forgets_the_old_values(void)
@@ -237,6 +237,6 @@ void test_a_new_start_forgets_the_old_values(void)
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
     motor.omega = 0.0F;
     unknown_press_s2();
-    TEST_ASSERT_EQUAL_UINT16(0, drive.identify.values.rs_mohm);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.identify.values.kphi_mv_per_krpm);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.identify.values.rs_mohm);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.identify.values.kphi_mv_per_krpm);
 }

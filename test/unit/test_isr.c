@@ -17,7 +17,7 @@ static void maybe_trap(void)
 }
 
 #define pi_preset(pi, gains, err, output) (maybe_trap(), pi_preset(pi, gains, err, output))
-#include "drive/drive_tick.h"
+#include "drive/tick.h"
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
@@ -75,13 +75,13 @@ static void control_interrupts(uint16_t periods)
     }
 }
 
-/** Running: LOCK has begun. */
+/** Running: ALIGN has begun. */
 static void bring_to_lock(void)
 {
     control_interrupts(1024);
     drive_start(&board_drive, &board_params, 1);
     control_interrupts(201);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, board_drive.state);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, board_drive.state);
 }
 
 void setUp(void)
@@ -106,7 +106,7 @@ void test_samples_come_from_the_channels_of_the_facts(void)
     ADC1BUF2 = 8000u;            /* phase b */
     ADC1BUF3 = (uint16_t)raw_bus(30.0F);
     control_interrupts(400);
-    TEST_ASSERT_EQUAL_INT16(-11111, board_drive.pot_q15);
+    TEST_ASSERT_EQUAL_INT16(-11111, board_panel.pot_q15);
     TEST_ASSERT_EQUAL_INT16(1000, board_drive.i_a_q13);
     TEST_ASSERT_EQUAL_INT16(-2000, board_drive.i_b_q13);
     TEST_ASSERT_INT16_WITHIN(2, BUS_Q15(30.0), qm_hi(board_drive.bus_q31));
@@ -144,7 +144,7 @@ void test_bootstrap_then_pwm(void)
 void test_each_duty_reaches_its_own_pair(void)
 {
     drive_t twin;
-    drive_samples_t raw = { -800, 400, 0, 0 };
+    drive_samples_t raw = { -800, 400, 0 };
     duties_t expected;
     bring_to_lock();
     control_interrupts(300);
@@ -342,13 +342,13 @@ void test_trap_in_the_middle_of_the_hand_over_is_not_overwritten(void)
     uint16_t n;
     bring_to_lock();
     board_drive.state = (uint16_t)DRIVE_RAMP;
-    board_drive.timer = 0;
+    board_drive.periods = 0;
     board_drive.forced.speed_q10 = board_params.forced.end_speed_q10;
-    board_drive.slots = board_params.ready_slots;
+    board_drive.run.handover.agreed_steps = board_params.ready_slots;
     trap_comes_in_the_hand_over = 1;
     for (n = 0; n < 16u && trap_comes_in_the_hand_over; n++) {
-        board_drive.estimator.omega_filtered_q16 = 5000L * 65536;
-        board_drive.slots = board_params.ready_slots;
+        board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
+        board_drive.run.handover.agreed_steps = board_params.ready_slots;
         control_interrupts(1);
     }
     TEST_ASSERT_EQUAL_UINT16(0, trap_comes_in_the_hand_over);

@@ -27,7 +27,7 @@ void test_init_forgets_everything_and_puts_the_pot_at_its_lower_end(void)
     TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
     TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
     TEST_ASSERT_EQUAL_UINT16(0, the_panel.blink_ms);
-    drive.pot_q15 = -32768;
+    the_panel.pot_q15 = -32768;
     the_lights = panel_tick(&the_panel, &drive, &params, &nothing);
     TEST_ASSERT_INT16_WITHIN(6, 2500, drive.command.target_erpm);
 }
@@ -110,7 +110,7 @@ void test_S2_stops(void)
 {
     press_s2(50);
     rig_tick(500);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, drive.state);
     press_s2(50);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     rig_tick(1);
@@ -262,7 +262,7 @@ void test_pot_noise_of_one_step_does_not_move_the_target(void)
     int16_t before = 0, ms;
     panel_turn_pot(500);
     for (ms = 0; ms < 600; ms++) {
-        drive.pot_q15 = (int16_t)((uint16_t)((500u + (uint16_t)(ms & 1)) << 6) ^ 0x8000u);
+        the_panel.pot_q15 = (int16_t)((uint16_t)((500u + (uint16_t)(ms & 1)) << 6) ^ 0x8000u);
         panel_ms(1);
         if (ms == 100) { /* settled */
             before = drive.command.target_erpm;
@@ -277,8 +277,8 @@ void test_pot_noise_of_one_step_does_not_move_the_target(void)
 static int16_t used_at_distance(int16_t counts)
 {
     the_panel.pot_used_q15 = 1000;
-    drive.pot_q15 = (int16_t)(1000 + counts);
-    the_panel.pot_q31 = (int32_t)drive.pot_q15 * 65536; /* the filter has settled */
+    the_panel.pot_q15 = (int16_t)(1000 + counts);
+    the_panel.pot_q31 = (int32_t)the_panel.pot_q15 * 65536; /* the filter has settled */
     panel_ms(400);
     return the_panel.pot_used_q15;
 }
@@ -306,7 +306,7 @@ void test_pot_moves_the_target_from_two_steps_on(void)
 void test_pot_is_filtered_over_ten_milliseconds(void)
 {
     panel_turn_pot(0);
-    drive.pot_q15 = 32704;
+    the_panel.pot_q15 = 32704;
     panel_ms(10); /* 1 - 0.9^10 = 65 % */
     TEST_ASSERT_INT16_WITHIN(300, (int16_t)(2500 + 0.65F * 11500.0F), drive.command.target_erpm);
 }
@@ -319,7 +319,7 @@ void test_run_LED_is_on_exactly_while_the_bridge_switches(void)
     for (state = 0; state < (uint16_t)DRIVE_STATE_COUNT; state++) {
         drive.state = state;
         panel_ms(1);
-        TEST_ASSERT_EQUAL_UINT16(state >= (uint16_t)DRIVE_LOCK && state <= (uint16_t)DRIVE_STOPPING, the_lights.led_run);
+        TEST_ASSERT_EQUAL_UINT16(state >= (uint16_t)DRIVE_ALIGN && state <= (uint16_t)DRIVE_STOPPING, the_lights.led_run);
     }
 }
 

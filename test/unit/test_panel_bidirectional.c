@@ -66,7 +66,7 @@ void test_the_other_direction_is_a_stop_and_a_new_start(void)
     press_s2(50);
     rig_tick(300);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_LOCK, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, drive.state);
     panel_turn_pot(0);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);

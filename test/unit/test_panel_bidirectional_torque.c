@@ -32,7 +32,7 @@ void test_no_position_in_the_middle_stops_a_reverse_run(void)
     TEST_ASSERT_EQUAL_INT16(-1, drive.direction);
     rig_tick(300);
     for (pot = 1000; pot >= -1000; pot--) {
-        drive.pot_q15 = pot;
+        the_panel.pot_q15 = pot;
         the_panel.pot_q31 = (int32_t)pot * 65536;
         the_panel.pot_used_q15 = pot;
         panel_ms(1);

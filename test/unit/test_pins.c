@@ -1,7 +1,5 @@
 /* Pins: what is analogue, what is driven, and which peripheral reaches which pin. */
-#include "hurst_params.h"
-
-#include <xc.h>
+#include "registers.h"
 
 /* Each write of the lock bit, and what the pin selection held then: only between unlock and lock does the chip take a write. */
 static uint16_t lock_writes, written[2], fault_pin_then[2];
@@ -20,8 +18,6 @@ static void write_lock(uint16_t value)
 #define __builtin_write_OSCCONL(value) write_lock((uint16_t)(value))
 #include "firmware/board/pins.c"
 
-#include "unity.h"
-
 void setUp(void)
 {
     host_registers_reset();
@@ -32,39 +28,17 @@ void setUp(void)
     pins_init();
 }
 
-void tearDown(void)
+void test_registers_hold_the_boards_pins(void)
 {
-}
-
-void test_currents_bus_and_pot_are_analogue_and_nothing_else(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0xFEF8, AD1PCFGL); /* AN0, AN1, AN2, AN8 */
-}
-
-void test_only_leds_and_transmitter_are_outputs(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0xFFFF, TRISA);
-    TEST_ASSERT_EQUAL_HEX16(0xFFFF, TRISB);
-    TEST_ASSERT_EQUAL_HEX16(0xFF37, TRISC); /* RC3 transmits, RC6 and RC7 are LEDs */
-}
-
-void test_every_latch_starts_low(void)
-{
-    TEST_ASSERT_EQUAL_HEX16(0, LATA);
-    TEST_ASSERT_EQUAL_HEX16(0, LATB);
-    TEST_ASSERT_EQUAL_HEX16(0, LATC);
-}
-
-void test_fault_input_is_RP8(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(8, RPINR12bits.FLTA1R);
-}
-
-void test_uart_is_on_RP19_and_RP20(void)
-{
+    static const register_value_t expected[] = {
+        { "AD1PCFGL", 0xFEF8 }, /* analogue: AN0, AN1, AN2, AN8, currents, bus and potentiometer */
+        { "TRISA", 0xFFFF }, { "TRISB", 0xFFFF }, { "TRISC", 0xFF37 }, /* outputs: RC3 transmits, RC6 and RC7 are LEDs */
+        { "LATA", 0 }, { "LATB", 0 }, { "LATC", 0 },
+        { "RPINR12", 0x0008 },  /* the fault input is RP8 */
+        { "RPOR9", 0x0300 },    /* U1TX on RP19 */
+    };
+    EXPECT_REGISTERS(expected);
     TEST_ASSERT_EQUAL_UINT16(20, RPINR18bits.U1RXR);
-    TEST_ASSERT_EQUAL_UINT16(3, RPOR9bits.RP19R); /* U1TX */
-    TEST_ASSERT_EQUAL_HEX16(0x0300, RPOR9);
 }
 
 void test_pin_selection_is_unlocked_written_and_locked_again(void)

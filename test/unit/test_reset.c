@@ -18,48 +18,41 @@ void setUp(void)
     board_trap_intcon1 = 0x0008u;
 }
 
-void tearDown(void)
-{
-}
-
 static drive_fault_t start(uint16_t rcon)
 {
     RCON = rcon;
     return reset_take();
 }
 
-void test_power_up_starts_without_a_fault_and_without_an_old_trap(void)
+void test_cause_of_the_reset_decides_about_the_kept_fault_and_the_trap(void)
 {
-    reset_keep(FAULT_STALL);
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(POWER_UP));
-    TEST_ASSERT_EQUAL_HEX16(0, board_trap_intcon1);
-    reset_keep(FAULT_STALL);
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0002u));
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0013u)); /* a watchdog flag beside power-up means nothing */
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0011u));
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(0x0012u));
-}
-
-void test_cause_is_kept_for_the_reader_and_rcon_is_cleared_for_the_next_reset(void)
-{
-    (void)start(PIN);
-    TEST_ASSERT_EQUAL_HEX16(PIN, board_reset_cause);
-    TEST_ASSERT_EQUAL_HEX16(0, RCON);
-}
-
-void test_pin_and_software_resets_forget_the_fault_but_not_the_trap(void)
-{
-    reset_keep(FAULT_TRAP);
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(PIN));
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, start(SOFTWARE));
-    TEST_ASSERT_EQUAL_HEX16(0x0008u, board_trap_intcon1);
-}
-
-void test_trap_that_ends_in_a_watchdog_reset_is_still_a_trap(void)
-{
-    reset_keep(FAULT_TRAP);
-    TEST_ASSERT_EQUAL_INT(FAULT_TRAP, start(WATCHDOG));
-    TEST_ASSERT_EQUAL_HEX16(0x0008u, board_trap_intcon1);
+    static const struct {
+        const char *what;
+        uint16_t kept, rcon, fault, trap;
+    } cases[] = {
+        { "power-up: no fault, no old trap", FAULT_STALL, POWER_UP, FAULT_NONE, 0 },
+        { "power-up without the brown-out's flag", FAULT_STALL, 0x0001u, FAULT_NONE, 0 },
+        { "brown-out", FAULT_STALL, 0x0002u, FAULT_NONE, 0 },
+        { "a watchdog flag beside power-up means nothing", FAULT_STALL, 0x0013u, FAULT_NONE, 0 },
+        { "nor beside its own flag", FAULT_STALL, 0x0011u, FAULT_NONE, 0 },
+        { "nor beside brown-out", FAULT_STALL, 0x0012u, FAULT_NONE, 0 },
+        { "the pin forgets the fault but not the trap", FAULT_TRAP, PIN, FAULT_NONE, 0x0008u },
+        { "so does software", FAULT_TRAP, SOFTWARE, FAULT_NONE, 0x0008u },
+        { "a trap that ends in a watchdog reset is still a trap", FAULT_TRAP, WATCHDOG, FAULT_TRAP, 0x0008u },
+        { "watchdog out of a healthy run", FAULT_NONE, WATCHDOG, FAULT_WATCHDOG, 0x0008u },
+        { "a code that does not exist", FAULT_COUNT, WATCHDOG, FAULT_WATCHDOG, 0x0008u },
+        { "illegal opcode", FAULT_NONE, OPCODE, FAULT_TRAP, 0x0008u },
+        { "trap conflict", FAULT_NONE, TRAP_CONFLICT, FAULT_TRAP, 0x0008u },
+        { "illegal opcode after a fault", FAULT_OVERCURRENT_HW, OPCODE, FAULT_OVERCURRENT_HW, 0x0008u },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        setUp();
+        reset_keep(cases[n].kept);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cases[n].fault, start(cases[n].rcon), cases[n].what);
+        TEST_ASSERT_EQUAL_HEX16_MESSAGE(cases[n].trap, board_trap_intcon1, cases[n].what);
+        TEST_ASSERT_EQUAL_HEX16_MESSAGE(cases[n].rcon, board_reset_cause, cases[n].what);
+        TEST_ASSERT_EQUAL_HEX16_MESSAGE(0, RCON, cases[n].what); /* cleared for the next reset */
+    }
 }
 
 void test_each_kept_fault_comes_back_after_a_watchdog_reset(void)
@@ -71,12 +64,6 @@ void test_each_kept_fault_comes_back_after_a_watchdog_reset(void)
     }
 }
 
-void test_watchdog_reset_out_of_a_healthy_run_is_WATCHDOG(void)
-{
-    reset_keep(FAULT_NONE);
-    TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
-}
-
 void test_what_ram_happens_to_hold_is_no_kept_fault(void)
 {
     TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
@@ -84,17 +71,6 @@ void test_what_ram_happens_to_hold_is_no_kept_fault(void)
     TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
     kept_inverse = 0xFFFFu;
     TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
-    reset_keep(FAULT_COUNT); /* a code that does not exist */
-    TEST_ASSERT_EQUAL_INT(FAULT_WATCHDOG, start(WATCHDOG));
-}
-
-void test_illegal_opcode_and_trap_conflict_are_traps(void)
-{
-    reset_keep(FAULT_NONE);
-    TEST_ASSERT_EQUAL_INT(FAULT_TRAP, start(OPCODE));
-    TEST_ASSERT_EQUAL_INT(FAULT_TRAP, start(TRAP_CONFLICT));
-    reset_keep(FAULT_OVERCURRENT_HW);
-    TEST_ASSERT_EQUAL_INT(FAULT_OVERCURRENT_HW, start(OPCODE));
 }
 
 void test_watchdog_is_served_once_for_each_new_period_and_never_without_one(void)

@@ -3,11 +3,10 @@
 #include "hurst_params.h"
 
 #include "firmware/board/isr.c"
-#include "firmware/board/watch.c"
+#include "firmware/board/modes/snapshot_arrays.c"
 
 #include "unity.h"
 
-drive_t board_drive;
 
 void setUp(void)
 {
@@ -34,10 +33,10 @@ static void record(uint16_t periods)
     while (periods-- != 0u) {
         period++;
         board_drive.i_a_q13 = (int16_t)period;
-        board_drive.control.i_q13.q = (int16_t)-period;
-        board_drive.estimator.omega_filtered_q16 = (int32_t)(10 * period) * 65536;
-        board_drive.estimator.rho_q32 = (uint32_t)(100u * period) << 16;
-        watch_snapshot();
+        board_drive.run.control.i_q13.q = (int16_t)-period;
+        board_drive.run.estimator.omega_filtered_q16 = (int32_t)(10 * period) * 65536;
+        board_drive.run.estimator.rho_q32 = (uint32_t)(100u * period) << 16;
+        mode_record();
     }
 }
 
@@ -56,9 +55,9 @@ void test_currents_beyond_the_notes_format_are_limited_not_wrapped(void)
         board_snapshot.row = 0;
         SnapStart = 1;
         board_drive.i_a_q13 = (int16_t)(sign * 12000);
-        board_drive.control.i_q13.q = (int16_t)(sign * 8200);
+        board_drive.run.control.i_q13.q = (int16_t)(sign * 8200);
         for (n = 0; n < 5u; n++) {
-            watch_snapshot();
+            mode_record();
         }
         TEST_ASSERT_EQUAL_INT16(sign * 32764, SnapBuf1[0]);
         TEST_ASSERT_EQUAL_INT16(sign * 32764, SnapBuf2[0]);
@@ -125,8 +124,8 @@ void test_currents_beyond_the_notes_format_are_limited(void)
     SnapStart = 1;
     for (n = 0; n < 5u; n++) {
         board_drive.i_a_q13 = 9000;
-        board_drive.control.i_q13.q = -9000;
-        watch_snapshot();
+        board_drive.run.control.i_q13.q = -9000;
+        mode_record();
     }
     TEST_ASSERT_EQUAL_INT16(32764, SnapBuf1[0]);
     TEST_ASSERT_EQUAL_INT16(-32764, SnapBuf2[0]);

@@ -16,7 +16,7 @@ void test_steps_equal_the_reference(void)
 {
     uint32_t n;
     for (n = 0; n < GOLDEN_SPEED_RAMP_ROWS; n++) {
-        golden_speed_ramp_t v = golden_speed_ramp[n];
+        golden_speed_ramp_t v = golden_speed_ramp_row(n);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.next, speed_ramp(v.reference, v.target, v.step), golden_row(n));
     }
 }

@@ -30,24 +30,24 @@ def test_control_includes_only_control() -> None:
 
 
 def test_drive_includes_only_control_drive_and_the_parameters() -> None:
-    allowed = re.compile(r"(control|drive)/\w+\.h|userparams\.h|stdint\.h")
+    allowed = re.compile(r"(control|drive|drive/modes)/\w+\.h|userparams\.h|stdint\.h")
     wrong = [pair for pair in includes("drive") if not allowed.fullmatch(pair[1])]
     assert not wrong, wrong
 
 
 def test_board_includes_only_the_three_rooms_and_the_device() -> None:
-    allowed = re.compile(r"(control|drive|board)/\w+\.h|xc\.h|stdint\.h")
+    allowed = re.compile(r"(control|drive|drive/modes|board|board/modes)/\w+\.h|version\.h|xc\.h|stdint\.h")
     wrong = [pair for pair in includes("board") if not allowed.fullmatch(pair[1])]
     assert not wrong, wrong
 
 
 def test_only_params_h_reads_userparams_h() -> None:
     readers = [path for path, text in sources().items() if "userparams.h" in INCLUDE.findall(text)]
-    assert readers == ["include/drive/params.h"], readers
+    assert readers == ["include/drive/param_scaling.h"], readers
 
 
 def test_control_and_drive_name_no_register_and_no_motor() -> None:
-    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/host/xc.h").read_text(encoding="utf-8"))
+    registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/chip/chip_registers.h").read_text(encoding="utf-8"))
     assert len(registers) > 100
     pattern = re.compile(r"\b(" + "|".join([*registers, "Hurst", "MCLV"]) + r")(bits)?\b")
     for room in ("control", "drive"):
@@ -60,7 +60,7 @@ def test_control_and_drive_name_no_register_and_no_motor() -> None:
 def test_every_header_compiles_alone() -> None:
     for path in sources():
         if path.endswith(".h"):
-            done = compiler([*CFLAGS, "-Wconversion", "-Wshadow", "-Werror", "-Itools/host", "-Iinclude", "-I.", "-fsyntax-only", "-xc", "-"],
+            done = compiler([*CFLAGS, "-Wconversion", "-Wshadow", "-Werror", "-Itools/cpu_host", "-Iinclude", "-I.", "-fsyntax-only", "-xc", "-"],
                             f'#include "{path.removeprefix("include/")}"\n')
             assert done.returncode == 0, f"{path}: {done.stderr}"
 
@@ -117,6 +117,18 @@ def test_what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
     assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text
     kept = re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", text, re.MULTILINE)
     assert kept == ["board_trap_intcon1", "kept_fault", "kept_inverse"], kept
+
+
+def test_the_state_is_written_in_one_place() -> None:
+    written = [(path, line) for path, text in sources().items() for line in re.findall(r".*(?:->|\.)state\s*=(?!=).*", text)]
+    assert [path for path, _ in written] == ["include/drive/state.h"], written
+
+
+def test_a_modes_name_stands_in_the_modes_rooms_only() -> None:
+    names = "IDENTIFY|TUNING|TORQUE_MODE|SNAPSHOT|BIDIRECTIONAL_SPEED|OPEN_LOOP_FUNCTIONING|PARAMS_IN_RAM"
+    condition = re.compile(rf"^\s*#\s*(?:if|ifdef|ifndef|elif)\b.*\b(?:{names})\b", re.MULTILINE)
+    asked = [path for path, text in sources().items() if condition.search(text)]
+    assert asked and all("/modes/" in path for path in asked), asked
 
 
 FUSES = {

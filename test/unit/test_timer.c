@@ -1,23 +1,9 @@
 /* Timer 1: a millisecond of its own. */
-#include "hurst_params.h"
+#include "registers.h"
 
-#include <xc.h>
-
-/* Every access to T1CON is seen: the timer stands still while it is set up. */
-static uint16_t control_then, period_then;
-
-static volatile uint16_t *watch_control(volatile uint16_t *control)
-{
-    control_then = *control;
-    period_then = PR1;
-    return control;
-}
-
-#define T1CON (*watch_control(&T1CON))
+#define T1CON (*registers_watch(&T1CON)) /* the timer stands still while it is set up */
 #include "firmware/board/timer.c"
 #undef T1CON
-
-#include "unity.h"
 
 void setUp(void)
 {
@@ -28,48 +14,26 @@ void setUp(void)
     timer_init();
 }
 
-void tearDown(void)
+void test_period_is_one_millisecond_at_40_MIPS_without_an_interrupt(void)
 {
-}
-
-void test_period_is_one_millisecond_at_40_MIPS(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(39999u, PR1);
-    TEST_ASSERT_EQUAL_HEX16(0x8000, T1CON); /* on, internal clock, no prescaler */
-    TEST_ASSERT_EQUAL_UINT16(0, TMR1);
+    static const register_value_t expected[] = {
+        { "PR1", 39999u }, { "T1CON", 0x8000 }, /* on, internal clock, no prescaler */ { "TMR1", 0 }, { "IEC0", 0 }
+    };
+    EXPECT_REGISTERS(expected);
 }
 
 void test_is_switched_on_last(void)
 {
-    TEST_ASSERT_EQUAL_HEX16(0x0000, control_then);
-    TEST_ASSERT_EQUAL_UINT16(39999u, period_then);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, register_then("T1CON"));
+    TEST_ASSERT_EQUAL_UINT16(39999u, register_then("PR1"));
 }
 
-void test_runs_without_an_interrupt(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(0, IEC0bits.T1IE);
-}
-
-void test_a_millisecond_is_reported_once(void)
+void test_a_millisecond_is_reported_once_and_nothing_else_is_touched(void)
 {
     TEST_ASSERT_EQUAL_UINT16(0, timer_ms_passed());
-    IFS0bits.T1IF = 1;
-    TEST_ASSERT_EQUAL_UINT16(1, timer_ms_passed());
-    TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.T1IF);
-    TEST_ASSERT_EQUAL_UINT16(0, timer_ms_passed());
-}
-
-void test_watchdog_is_not_served_by_the_timer(void)
-{
-    IFS0bits.T1IF = 1;
-    (void)timer_ms_passed();
-    (void)timer_ms_passed();
-    TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
-}
-
-void test_other_flags_are_left_alone(void)
-{
     IFS0 = 0xFFFF;
-    (void)timer_ms_passed();
+    TEST_ASSERT_EQUAL_UINT16(1, timer_ms_passed());
     TEST_ASSERT_EQUAL_HEX16(0xFFF7, IFS0);
+    TEST_ASSERT_EQUAL_UINT16(0, timer_ms_passed());
+    TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
 }

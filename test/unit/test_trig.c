@@ -7,38 +7,26 @@
 #include "golden_sine_table.h"
 #include "unity.h"
 
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
-
 void test_every_entry_of_the_sine_table(void)
 {
-    uint32_t n;
     TEST_ASSERT_EQUAL_UINT32(TRIG_SIN_STEPS, GOLDEN_SINE_TABLE_ROWS);
-    for (n = 0; n < GOLDEN_SINE_TABLE_ROWS; n++) {
+    GOLDEN_EACH(sine_table, v) {
         int16_t entry = (int16_t)((n < TRIG_SIN_ENTRIES) ? trig_sin_table[n] : -trig_sin_table[n - TRIG_SIN_STEPS / 2]);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(golden_sine_table[n].value, entry, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.value, entry, golden_row(n));
     }
 }
 
 void test_every_entry_of_the_circle_table(void)
 {
-    uint32_t n;
     TEST_ASSERT_EQUAL_UINT32(TRIG_CIRCLE_STEPS + 1, GOLDEN_CIRCLE_TABLE_ROWS);
-    for (n = 0; n < GOLDEN_CIRCLE_TABLE_ROWS; n++) {
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(golden_circle_table[n].value, trig_circle_table[n], golden_row(n));
+    GOLDEN_EACH(circle_table, v) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.value, trig_circle_table[n], golden_row(n));
     }
 }
 
 void test_sine_and_cosine_equal_the_reference(void)
 {
-    uint32_t n;
-    for (n = 0; n < GOLDEN_SINCOS_ROWS; n++) {
-        golden_sincos_t v = golden_sincos[n];
+    GOLDEN_EACH(sincos, v) {
         sincos_t sc = trig_sincos(v.angle);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.sin, sc.sin, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.cos, sc.cos, golden_row(n));
@@ -55,23 +43,6 @@ void test_all_65536_angles_have_the_reference_checksum(void)
     TEST_ASSERT_EQUAL_HEX32(GOLDEN_SINCOS_CHECKSUM, s);
 }
 
-void test_sine_and_cosine_of_the_quarter_turns(void)
-{
-    static const int16_t sines[] = { 0, 32757, 0, -32757, 0 };
-    uint16_t quarter;
-    for (quarter = 0; quarter < 4u; quarter++) {
-        sincos_t sc = trig_sincos((angle_t)(quarter << 14));
-        TEST_ASSERT_EQUAL_INT16(sines[quarter], sc.sin);
-        TEST_ASSERT_EQUAL_INT16(sines[quarter + 1u], sc.cos);
-    }
-}
-
-void test_sine_of_30_degrees_is_a_half(void)
-{
-    TEST_ASSERT_INT16_WITHIN(12, 16384, trig_sincos(5461).sin);
-    TEST_ASSERT_INT16_WITHIN(12, -16384, trig_sincos(65536u - 5461u).sin);
-}
-
 void test_sine_squared_plus_cosine_squared_is_one_at_every_angle(void)
 {
     uint32_t a;
@@ -83,57 +54,26 @@ void test_sine_squared_plus_cosine_squared_is_one_at_every_angle(void)
     }
 }
 
-void test_angle_one_count_below_zero_is_continuous(void)
-{
-    sincos_t below = trig_sincos(65535u), zero = trig_sincos(0);
-    TEST_ASSERT_INT16_WITHIN(4, zero.sin, below.sin);
-    TEST_ASSERT_INT16_WITHIN(1, zero.cos, below.cos);
-    TEST_ASSERT_TRUE(below.sin < 0);
-}
-
 void test_circle_equals_the_reference(void)
 {
-    uint32_t n;
-    for (n = 0; n < GOLDEN_CIRCLE_ROWS; n++) {
-        golden_circle_t v = golden_circle[n];
+    GOLDEN_EACH(circle, v) {
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.value, trig_circle(v.x), golden_row(n));
     }
 }
 
-void test_circle_of_all_32768_arguments_has_the_reference_checksum(void)
+void test_circle_falls_from_one_to_zero_and_is_nowhere_left_by_a_count(void)
 {
+    int16_t last = 32767;
     uint32_t x, s = 0;
+    TEST_ASSERT_EQUAL_INT16(last, trig_circle(0));
     for (x = 0; x < UINT32_C(32768); x++) {
-        s = golden_checksum(s, trig_circle((int16_t)x));
-    }
-    TEST_ASSERT_EQUAL_HEX32(GOLDEN_CIRCLE_CHECKSUM, s);
-}
-
-void test_circle_is_nowhere_left_by_a_count(void)
-{
-    uint32_t x;
-    for (x = 0; x < UINT32_C(32768); x++) {
-        int16_t inside = (int16_t)(trig_circle((int16_t)x) - 1);
+        int16_t y = trig_circle((int16_t)x), inside = (int16_t)(y - 1);
         uint32_t square = (uint32_t)qm_mulss((int16_t)x, (int16_t)x) + (uint32_t)qm_mulss(inside, inside);
         TEST_ASSERT_TRUE_MESSAGE(square < UINT32_C(0x40000000), golden_row(x));
-    }
-}
-
-void test_circle_falls_from_one_to_zero_without_a_rise(void)
-{
-    int16_t last = trig_circle(0);
-    uint32_t x;
-    TEST_ASSERT_EQUAL_INT16(32767, last);
-    for (x = 1; x < UINT32_C(32768); x++) {
-        int16_t y = trig_circle((int16_t)x);
         TEST_ASSERT_TRUE_MESSAGE(y <= last, golden_row(x));
+        s = golden_checksum(s, y);
         last = y;
     }
     TEST_ASSERT_INT16_WITHIN(12, 0, last);
-}
-
-void test_circle_of_0_6_is_0_8(void)
-{
-    TEST_ASSERT_INT16_WITHIN(12, 26214, trig_circle(19661));
-    TEST_ASSERT_INT16_WITHIN(12, 19661, trig_circle(26214));
+    TEST_ASSERT_EQUAL_HEX32(GOLDEN_CIRCLE_CHECKSUM, s);
 }

@@ -1,16 +1,19 @@
-/* The note's watch variables: each shows its quantity in the note's format. */
+/* AN1292's watch variables: each shows its quantity in AN1292's format. */
+/* defines: -DPARAMS_IN_RAM */
 #include "hurst_params.h"
 
 #include "firmware/board/watch.c"
 
-#include "drive/params_init.h"
+#include "drive/param_init.h"
 #include "unity.h"
 
 drive_t board_drive;
-const drive_params_t board_params = DRIVE_PARAMS_INIT;
+static const drive_params_t fresh = DRIVE_PARAMS_INIT;
+drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 void setUp(void)
 {
+    board_params = fresh;
     drive_init(&board_drive, &board_params);
 }
 
@@ -30,8 +33,8 @@ void test_current_of_1_41_A_reads_NORM_CURRENT_of_it(void)
 
 void test_park_currents(void)
 {
-    board_drive.control.i_q13.d = CURRENT_Q13(-0.5);
-    board_drive.control.i_q13.q = CURRENT_Q13(2.0);
+    board_drive.run.control.i_q13.d = CURRENT_Q13(-0.5);
+    board_drive.run.control.i_q13.q = CURRENT_Q13(2.0);
     watch_refresh();
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-0.5), ParkParm.qId);
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(2.0), ParkParm.qIq);
@@ -48,12 +51,12 @@ void test_currents_beyond_the_notes_format_are_limited(void)
 
 void test_voltages_are_Q15_of_full_scale(void)
 {
-    board_drive.control.v_q14.d = VOLTAGE_Q14(-3.0);
-    board_drive.control.v_q14.q = VOLTAGE_Q14(10.0);
+    board_drive.run.control.v_q14.d = VOLTAGE_Q14(-3.0);
+    board_drive.run.control.v_q14.q = VOLTAGE_Q14(10.0);
     watch_refresh();
     TEST_ASSERT_INT16_WITHIN(2, -7390, ParkParm.qVd); /* 3 V / 13.302 V * 32768 */
     TEST_ASSERT_INT16_WITHIN(2, 24634, ParkParm.qVq);
-    board_drive.control.v_q14.q = 20000;
+    board_drive.run.control.v_q14.q = 20000;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(32766, ParkParm.qVq);
 }
@@ -61,7 +64,7 @@ void test_voltages_are_Q15_of_full_scale(void)
 void test_angles_are_65536_a_turn(void)
 {
     board_drive.angle = 0xC123;
-    board_drive.estimator.rho_q32 = 0xA1234567ul;
+    board_drive.run.estimator.rho_q32 = 0xA1234567ul;
     watch_refresh();
     TEST_ASSERT_EQUAL_HEX16(0xC123, ParkParm.qAngle);
     TEST_ASSERT_EQUAL_HEX16(0xA123, EstimParm.qRho);
@@ -69,8 +72,8 @@ void test_angles_are_65536_a_turn(void)
 
 void test_filtered_and_raw_speed_in_electrical_rpm(void)
 {
-    board_drive.estimator.omega_filtered_q16 = 5000L * 65536 + 1;
-    board_drive.estimator.omega_erpm = -4900;
+    board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536 + 1;
+    board_drive.run.estimator.omega_erpm = -4900;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(5000, EstimParm.qVelEstim);
     TEST_ASSERT_EQUAL_INT16(-4900, EstimParm.qOmegaMr);
@@ -78,8 +81,8 @@ void test_filtered_and_raw_speed_in_electrical_rpm(void)
 
 void test_back_emf_is_Q15_of_four_times_full_scale(void)
 {
-    board_drive.estimator.e_d_q28 = -1000L * 65536;
-    board_drive.estimator.e_q_q28 = 4096L * 65536; /* full scale */
+    board_drive.run.estimator.e_d_q28 = -1000L * 65536;
+    board_drive.run.estimator.e_q_q28 = 4096L * 65536; /* full scale */
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(-2000, EstimParm.qEsdf);
     TEST_ASSERT_EQUAL_INT16(8192, EstimParm.qEsqf);
@@ -87,9 +90,9 @@ void test_back_emf_is_Q15_of_four_times_full_scale(void)
 
 void test_references(void)
 {
-    board_drive.control.reference_erpm = -12345;
-    board_drive.control.ref_q13.d = CURRENT_Q13(-1.0);
-    board_drive.control.ref_q13.q = CURRENT_Q13(1.5);
+    board_drive.run.control.reference_erpm = -12345;
+    board_drive.run.control.ref_q13.d = CURRENT_Q13(-1.0);
+    board_drive.run.control.ref_q13.q = CURRENT_Q13(1.5);
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(-12345, CtrlParm.qVelRef);
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-1.0), CtrlParm.qVdRef);
@@ -99,7 +102,7 @@ void test_references(void)
 
 void test_field_weakening_index_and_start(void)
 {
-    fieldweak_tick(&board_drive.fieldweak, &board_params.fieldweak, &board_drive.tuning, 27500);
+    fieldweak_tick(&board_drive.run.fieldweak, &board_params.fieldweak, &board_drive.run.model, 27500);
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(14, FdWeakParm.qIndex);
     TEST_ASSERT_EQUAL_INT16(13000, FdWeakParm.qFwOnSpeed);
@@ -116,9 +119,29 @@ void test_motor_constants_in_the_notes_formats(void)
 
 void test_adapted_constants_are_shown_as_they_are_in_use(void)
 {
-    board_drive.tuning.ls_q16 = (uint16_t)(board_drive.tuning.ls_q16 / 2u);
-    board_drive.tuning.inv_kfi = 12345;
+    board_drive.run.model.ls_q16 = (uint16_t)(board_drive.run.model.ls_q16 / 2u);
+    board_drive.run.model.inv_kfi = 12345;
     watch_refresh();
     TEST_ASSERT_INT16_WITHIN(1, 813, MotorEstimParm.qLsDt);
     TEST_ASSERT_EQUAL_INT16(12345, MotorEstimParm.qInvKFi);
+}
+
+void test_motor_constants_that_a_debugger_has_changed_are_shown(void)
+{
+    board_params.estimator.rs_q16 = 20001;
+    board_params.estimator.deltat_q32 = 1234;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(10000, MotorEstimParm.qRs);
+    TEST_ASSERT_EQUAL_INT16(617, MotorEstimParm.qDeltaT);
+}
+
+void test_resistance_beyond_AN1292s_format_reads_32767(void)
+{
+    board_params.estimator.rs_q16 = 65535u;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(32767, MotorEstimParm.qRs);
+    board_params.estimator.rs_q16 = 32768u;
+    board_params.estimator.rs_exp = 1;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(32767, MotorEstimParm.qRs);
 }

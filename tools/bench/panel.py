@@ -46,7 +46,7 @@ class Ranges:
             return cls(params["MINIMUM_SPEED_RPM"], params["NOMINAL_SPEED_RPM"], params["MAXIMUM_SPEED_RPM"],
                        params["MAXIMUM_CURRENT_A"], "TORQUE_MODE" in names, "BIDIRECTIONAL_SPEED" in names)
         except KeyError as missing:
-            raise UserError(f"the firmware does not tell {missing.args[0]}", "tools/board/probe.c",
+            raise UserError(f"the firmware does not tell {missing.args[0]}", "tools/cpu_host/probe.c",
                             "rebuild with make vboard") from None
 
     def pot_for_speed(self, rpm: float, fast: bool) -> float:

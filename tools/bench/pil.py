@@ -9,6 +9,7 @@ from pathlib import Path
 from . import build, simulate
 from .board import Board, BoardError, Library
 from tools.common.errors import UserError
+from tools.image import load
 from .run import Run
 
 ERROR_BYTES = 400
@@ -30,7 +31,7 @@ class PilLibrary(Library):
                 ("vb_iss_read", ctypes.c_int, [board, text, words, ctypes.c_uint]),
                 ("vb_iss_write", ctypes.c_int, [board, text, words, ctypes.c_uint]),
                 ("vb_iss_param_get", ctypes.c_int, [board, text, number]), ("vb_iss_param_set", ctypes.c_int, [board, text, ctypes.c_double]),
-                ("vb_iss_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]),
+                ("vb_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]),
                 ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]),
                 ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t])):
             function = getattr(self.c, name)
@@ -49,9 +50,9 @@ class PilBoard(Board):
         self.library = pil
         self._c = pil.c
         error = ctypes.create_string_buffer(ERROR_BYTES)
-        self._vb = ctypes.c_void_p(self._c.vb_create_iss(str(image).encode(), error, ERROR_BYTES))
+        self._vb = ctypes.c_void_p(self._c.vb_create_iss(load.text(load.load(image)).encode(), error, ERROR_BYTES))
         if not self._vb:
-            raise UserError(error.value.decode(errors="replace"))
+            raise UserError(f"{image}: {error.value.decode(errors='replace')}")
 
     @property
     def has_names(self) -> bool:
@@ -82,7 +83,7 @@ class PilBoard(Board):
     def terminal(self) -> str:
         """Open a pseudo-terminal for UART1 and return its path."""
         path = ctypes.create_string_buffer(ERROR_BYTES)
-        self._check(self._c.vb_iss_terminal(self._vb, path, ERROR_BYTES))
+        self._check(self._c.vb_terminal(self._vb, path, ERROR_BYTES))
         return path.value.decode()
 
     def variable(self, name: str, count: int) -> list[int]:

@@ -100,5 +100,5 @@ def _measure_in_numbers(measure: Measure, rating: Rating | None, params: dict[st
 def _named_speed(name: str, params: dict[str, float]) -> float:
     parameter = f"{name.upper()}_SPEED_RPM"
     if parameter not in params:
-        raise UserError(f"the firmware does not tell {parameter}", "tools/board/probe.c", "rebuild with make vboard")
+        raise UserError(f"the firmware does not tell {parameter}", "tools/cpu_host/probe.c", "rebuild with make vboard")
     return params[parameter]

@@ -52,7 +52,7 @@ def ramp_time_s(params: dict[str, float], rpm: float) -> float:
 
 def _param(params: dict[str, float], name: str) -> float:
     if name not in params:
-        raise UserError(f"the firmware does not tell {name}", "tools/board/probe.c", "rebuild with make vboard")
+        raise UserError(f"the firmware does not tell {name}", "tools/cpu_host/probe.c", "rebuild with make vboard")
     return params[name]
 
 

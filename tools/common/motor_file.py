@@ -36,7 +36,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from . import paths, units
+from . import param_rows, paths, units
 from .board_keys import Part, Values
 from .errors import UserError, suggestion
 from .toml_file import Document, Section, flatten
@@ -266,38 +266,24 @@ def _read_spread(section: Section | None, connection: str, pole_pairs: int) -> d
     return result
 
 
-@functools.cache
-def tune_ranges() -> dict[str, tuple[str, float, float]]:
-    """Unit, minimum and maximum of every name in userparams.h, from include/drive/param_table.h."""
-    text = (paths.ROOT / "include" / "drive" / "param_table.h").read_text(encoding="utf-8")
-    number = r"([-+0-9.eE]+)"
-    result: dict[str, tuple[str, float, float]] = {}
-    for stem, unit, low, high in re.findall(rf"PARAM_TABLE_FW\(X, (\w+), \"([^\"]*)\", {number}, {number}\)", text):
-        result.update({f"{stem}{i}": (unit, float(low), float(high)) for i in range(18)})
-    for name, unit, low, high in re.findall(rf"X\((\w+), \"([^\"]*)\", {number}, {number}\)", text):
-        result[name] = (unit, float(low), float(high))
-    return result
-
-
 def _read_tune(section: Section | None) -> dict[str, float]:
     result: dict[str, float] = {}
     if section is None:
         return result
-    ranges = tune_ranges()
+    known = param_rows.parameters()
     for name in section.data:
         if name in FACTS:
             raise section.fail(name, f"'{name}' is no choice of the tuner", f"it follows from {FACTS[name]}; change that")
-        if name not in ranges:
-            raise section.fail(name, f"'{name}' is no parameter of userparams.h", suggestion(name, set(ranges) - set(FACTS)))
-        _, low, high = ranges[name]
-        result[name] = section.number(name, minimum=low, maximum=high)
+        if name not in known:
+            raise section.fail(name, f"'{name}' is no parameter of userparams.h", suggestion(name, set(known) - set(FACTS)))
+        result[name] = section.number(name, minimum=float(known[name].low), maximum=float(known[name].high))
     return result
 
 
 @functools.cache
 def plant_ranges() -> dict[str, tuple[str, float, float]]:
     """Unit, minimum and maximum of the virtual board's keys of a motor, from its source: what runs only when it is built knows too late."""
-    text = (paths.ROOT / "tools" / "board" / "vb_keys.c").read_text(encoding="utf-8")
+    text = (paths.ROOT / "tools" / "vboard" / "vb_keys.c").read_text(encoding="utf-8")
     rows = re.findall(r'\b[PI]\("((?:motor|mech)\.\w+)", [\w.]+, \S+, (\S+), (\S+), "([^"]*)"', text)
     return {name: (unit, float(low), float(high)) for name, low, high, unit in rows}
 

@@ -30,15 +30,15 @@ def demo() -> str:
     rows = [[m["name"], f"{m['reference_rpm']:.0f}", f"{m['speed_rpm']:.1f}", f"{m['speed_error_percent']:+.2f} %",
              f"{m['current_rms_a']:.2f} A", f"{m['angle_error_mean_deg']:+.1f}°", f"{m['angle_error_rms_deg']:.1f}°",
              f"{m['voltage_percent']:.0f} %"] for m in result("demo")["measures"]]
-    return table(["row", "reference rpm", "true rpm", "error", "phase current RMS", "angle error mean", "angle error RMS",
-                  "of the voltage limit"], rows)
+    return table(["step", "reference rpm", "true rpm", "error", "phase current RMS", "angle error mean", "angle error RMS",
+                  "share of the voltage limit"], rows)
 
 
 def table2() -> str:
     rows = [[f"{r['reference_rpm']:.0f} rpm", f"{r['torque_nm_set']:.3f} N·m", f"{r['note_rpm']:.0f}", f"{r['speed_rpm']:.0f}",
              f"{r['note_current_a']:.2f} A", f"{r['current_rms_a']:.2f} A", f"{r['angle_error_rms_deg']:.1f}°", f"{r['voltage_percent']:.0f} %"]
             for r in result("table2")["rows"]]
-    return table(["reference", "torque", "note: rpm", "ours", "note: current RMS", "ours", "angle error RMS", "of the voltage limit"], rows)
+    return table(["reference", "torque", "AN1292: rpm", "ours", "AN1292: current RMS", "ours", "angle error RMS", "share of the voltage limit"], rows)
 
 
 def motors() -> str:
@@ -53,7 +53,7 @@ def motors() -> str:
         rows.append([motor, " / ".join(f"{case['speed_rpm']:.0f}" for case in held), f"{max(abs(case['speed_error_percent']) for case in held):.2f} %",
                      f"{max(case['angle_error_rms_deg'] for case in held):.1f}°", f"{max(case['speed_rpm'] for case in cases):.0f}",
                      " / ".join(f"{found[name]:+.1f}" for name in ("R winding", "Ld", "Lq", "Kphi"))])
-    return table(["motor", "20 / 50 / 100 % of rated speed, half torque: rpm", "worst error", "worst angle RMS", "no load: rpm",
+    return table(["motor", "rpm at 20 / 50 / 100 % of rated speed, half the rated torque", "worst speed error", "worst angle error RMS", "top rpm, no load",
                   "IDENTIFY: error of R / Ld / Lq / Kphi in %"], rows)
 
 
@@ -68,18 +68,18 @@ def guarantees() -> str:
     fault = f"START_FAILED after {at['fault START_FAILED'] - at['S2 pressed']:.2f} s"
     held = sum(e["ok"] for e in starts["expectations"])
     rows = [
-        ["closed loop within 2.0 s of S2", f"{hand_over['after_s2_s']:.2f} s, overshoot {hand_over['overshoot_percent']:.1f} %", "`make run`"],
-        ["speed within 0.5 % of its reference, 1000 to 5500 rpm", f"{worst_speed:.2f} %", "`make run`"],
-        ["rotor angle known to 5° RMS from 1000 rpm up", f"{worst_angle:.1f}°", "`make run`"],
-        ["starts from every rotor angle with 0, 0.03 and 0.06 N·m", f"{held} of {len(starts['expectations'])}", "`make starts`"],
-        ["Table 2 of the note: every row at its reference, rows 2 to 8 at less current than the note",
+        ["closed loop within 2.0 s after S2", f"{hand_over['after_s2_s']:.2f} s, overshoot {hand_over['overshoot_percent']:.1f} %", "`make run`"],
+        ["speed within 0.5 % of the reference, 1000 to 5500 rpm", f"{worst_speed:.2f} %", "`make run`"],
+        ["rotor angle error below 5° RMS from 1000 rpm up", f"{worst_angle:.1f}°", "`make run`"],
+        ["starts from every rotor angle, loaded with 0, 0.03 and 0.06 N·m", f"{held} of {len(starts['expectations'])}", "`make starts`"],
+        ["holds the reference in all rows of AN1292's Table 2; rows 2 to 8 take less current",
          f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
-        ["twice the base speed without load", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
-        ["starts and holds half speed with true R ±30 %, L ±30 %, Kphi ±15 %: each alone with and without load, all combined without",
+        ["twice the base speed, unloaded", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
+        ["starts and holds half speed with R ±30 %, L ±30 %, Kphi ±15 %: one at a time, loaded and unloaded; all together, unloaded",
          f"{sum(e['ok'] for e in robust['expectations'])} of {len(robust['expectations'])}", "`make robust`"],
-        ["orderly stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
-        ["a blocked shaft is a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
-        ["the virtual board runs at 20 times real time on one core", f"{run['motor_seconds'] / run['cpu_seconds']:.0f} times", "`make run`"],
+        ["controlled stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
+        ["a blocked shaft ends in a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
+        ["virtual board: 20 times real time on one core", f"{run['motor_seconds'] / run['cpu_seconds']:.0f} times", "`make run`"],
     ]
     return table(["guarantee", "measured", "command"], rows)
 
@@ -98,7 +98,7 @@ def cycles() -> str | None:
     path = ROOT / "build/target/cycles.json"
     if not path.exists():
         return None
-    from tools.image.cycles import readme_table
+    from tools.bench.cycles import readme_table
     return table(*readme_table(json.loads(path.read_text())))
 
 
@@ -111,9 +111,9 @@ def tests() -> str | None:
     if suites["failed"]:
         sys.exit(f"foc33: {suites['failed']} tests failed, build/test/summary.json: repair them, run `make test`, then `make readme`")
     rows = [
-        ["unit, board and closed-loop tests" + (f" ({suites['skipped']} more were skipped)" if suites["skipped"] else ", those that need XC16 included"),
+        ["unit, board and closed-loop tests" + (f" ({suites['skipped']} more were skipped)" if suites["skipped"] else ", with those that need XC16"),
          str(suites["passed"]), "`make test`"],
-        ["control law: lines / branches reached by the unit tests", f"{coverage['line_percent']:.0f} % / {coverage['branch_percent']:.0f} %", "`make coverage`"],
+        ["control law: lines / branches that the unit tests reach", f"{coverage['line_percent']:.0f} % / {coverage['branch_percent']:.0f} %", "`make coverage`"],
     ]
     if mutants.exists():
         found = json.loads(mutants.read_text())

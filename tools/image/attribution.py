@@ -1,28 +1,25 @@
-"""Where each program word of the image comes from (function, and the functions it is inlined into) and what each object takes."""
+"""Where each program word of the image comes from (function, file, and the functions it is inlined into) and what each object takes."""
 
 import bisect
 import os
 from dataclasses import dataclass, field
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 
 from tools.common.errors import UserError
 
 from . import device
+from .program import CODE, CONSTANTS, DATA, Elf, Section, Symbol, read_elf, reading
 
 try:
-    from elftools.common.exceptions import DWARFError, ELFError
-    from elftools.construct.core import ConstructError
     from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
-    from elftools.elf.elffile import ELFFile
-    MISSING = ""
-except ImportError as missing:
-    MISSING = str(missing.name)
+except ImportError:
+    pass # program.reading() says so
 
 BYTES_PER_WORD = 3          # as data sheets count program memory
 COPIES = 2                  # the start-up code's ways to fill RAM: 0 clear, 1 two bytes a word, 2 three; above: call a function
-WRITE, ALLOC, EXECUTE, PSV = 0x1, 0x2, 0x4, 0x10000000
-DEBUG_SECTIONS = ("debug_info", "debug_abbrev", "debug_line", "debug_str", "debug_loc", "debug_ranges")
+ADDRESS = 0x03              # DW_OP_addr: a variable with a place of its own
 
 
 @dataclass(frozen=True)
@@ -59,10 +56,11 @@ class Word:
 
 @dataclass
 class Thing:
-    """An object or constant, with those of its members that are structures or fields: path, size."""
+    """An object or constant, the file that defines it, and its members: path, size."""
     name: str
     size: int
     members: list[tuple[str, int]] = field(default_factory=list)
+    file: str = ""
 
 
 @dataclass
@@ -75,6 +73,7 @@ class Image:
     handlers: list[int]       # addresses in the vector table
     ram_bytes: int
     entry: int
+    labels: frozenset[str] = frozenset()    # names in the code
 
     @property
     def flash_bytes(self) -> int:
@@ -84,25 +83,27 @@ class Image:
 class _Debug:
     """The image's DWARF: functions with what is inlined into them, lines, and types of variables."""
 
-    def __init__(self, elf: "ELFFile") -> None:
-        # This ELF stores a byte of the debugging sections in every second byte of the file.
-        found = {name: elf.get_section_by_name("." + name) for name in DEBUG_SECTIONS}
-        sections = {f"{name}_sec": DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0)
-                    for name, section in found.items() if section for data in [section.data()[::2]]}
-        self.known = {"debug_info_sec", "debug_abbrev_sec", "debug_line_sec"} <= set(sections)
-        absent = [name for name in _section_parameters() if name not in sections]
+    def __init__(self, sections: dict[str, bytes]) -> None:
+        parameters = DWARFInfo.__init__.__code__
+        names = [name for name in parameters.co_varnames[2:parameters.co_argcount] if name.endswith("_sec")]
+        held = {name: sections.get(name.removesuffix("_sec")) for name in names}
         self.dwarf = DWARFInfo(DwarfConfig(little_endian=True, machine_arch="dsPIC", default_address_size=4),
-                               **sections, **dict.fromkeys(absent))
-        self.nodes: list[Node] = []          # called functions
+                               **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0)
+                                  for name, data in held.items()})
+        self.nodes: dict[int, Node] = {}        # called functions, by start
         self.inside: dict[int, list[Node]] = {} # every copy in a called function, by that function's start
         self.lines: dict[int, tuple[str, int]] = {}
         self.functions: dict[str, list[tuple[int, str]]] = {} # of a file: line and name, sorted
-        self.types: dict[str, object] = {}
-        if self.known:
-            for unit in self.dwarf.iter_CUs():
-                self._read(unit)
+        self.variables: dict[str, object] = {}
+        self.files: dict[int, str] = {}         # which file defines the variable at an address
+        for unit in self.dwarf.iter_CUs():
+            self._read(unit)
         for known in self.functions.values():
             known.sort()
+
+    @cached_property
+    def starts(self) -> list[int]:
+        return sorted(self.nodes)
 
     def _read(self, unit) -> None:
         top = unit.get_top_DIE()
@@ -111,12 +112,24 @@ class _Debug:
         for die in top.iter_children():
             if die.tag == "DW_TAG_subprogram":
                 self._subprogram(die, files)
-            elif die.tag == "DW_TAG_variable" and "DW_AT_name" in die.attributes and "DW_AT_type" in die.attributes:
-                self.types.setdefault(_text(die, "DW_AT_name"), die)
+        for die in unit.iter_DIEs():
+            if die.tag == "DW_TAG_variable":
+                self._variable(die, files, os.path.normpath(_text(top, "DW_AT_name")))
         for rows in _sequences(program):
             for row, following in zip(rows, rows[1:]):
-                for address in range(row.address, following.address, 2):
+                for address in range(row.address, min(following.address, device.PROGRAM.stop), 2):
                     self.lines[address] = (files.get(row.file, "?"), row.line)
+
+    def _variable(self, die, files: dict[int, str], unit: str) -> None:
+        """One that others see is defined in the unit, whatever header declares it; a static one where it is written."""
+        name = _text(die, "DW_AT_name")
+        if "DW_AT_type" in die.attributes:
+            self.variables.setdefault(name, die)
+        place = die.attributes.get("DW_AT_location")
+        if place is not None and isinstance(place.value, (list, bytes)) and len(place.value) > 1 and place.value[0] == ADDRESS:
+            written = die.attributes.get("DW_AT_decl_file")
+            self.files[int.from_bytes(bytes(place.value[1:]), "little")] = \
+                unit if "DW_AT_external" in die.attributes or written is None else files.get(written.value, unit)
 
     def _subprogram(self, die, files: dict[int, str]) -> None:
         if "DW_AT_name" in die.attributes and "DW_AT_decl_line" in die.attributes:
@@ -127,7 +140,7 @@ class _Debug:
         low, high = _range(die)
         if high > low >= device.VECTORS_END: # a function that the linker has removed starts at 0
             node = Node(_frame(die, files), low, high)
-            self.nodes.append(node)
+            self.nodes[low] = node
             self.inside[low] = []
             self._inlined(die, node, files, self.inside[low])
 
@@ -146,63 +159,40 @@ class _Debug:
         index = bisect.bisect_right(known, (line, "\uffff")) - 1
         return known[index][1] if index >= 0 else None
 
-    def members(self, name: str) -> list[tuple[str, int]]:
-        die = self.types.get(name)
-        return list(_members(die, name)) if die is not None else []
+    def thing(self, symbol: Symbol, size: int) -> Thing:
+        """An object with what is known of it."""
+        die = self.variables.get(symbol.name)
+        return Thing(symbol.name, size, list(_members(die, symbol.name)) if die is not None else [], self.files.get(symbol.address, ""))
 
 
 def read(path: Path) -> Image:
     """The image in an ELF file of XC16."""
-    if MISSING:
-        raise UserError(f"no Python module {MISSING}", "tools/image", "install the Debian package python3-pyelftools")
-    try:
-        with path.open("rb") as file:
-            elf = ELFFile(file)
-            if elf["e_machine"] != device.ELF_MACHINE or elf["e_type"] != "ET_EXEC":
-                raise UserError("not a linked dsPIC program", str(path), "build it with `make firmware`")
-            return _read(elf, path)
-    except OSError as error:
-        raise UserError(f"cannot read the file ({error.strerror})", str(path), "build it with `make firmware`") from None
-    except (ELFError, DWARFError, ConstructError, KeyError, ValueError, IndexError, TypeError, AttributeError, AssertionError) as error:
-        raise UserError(f"not a whole ELF file ({type(error).__name__})", str(path), "build it anew with `make firmware`") from None
-
-
-def _read(elf: "ELFFile", path: Path) -> Image:
-    debug = _Debug(elf)
-    if not debug.known:
+    elf = read_elf(path)
+    if not {"debug_info", "debug_abbrev", "debug_line"} <= set(elf.debug):
         raise UserError("no debugging information", str(path), "compile with -g")
-    symbols = [symbol for symbol in elf.get_section_by_name(".symtab").iter_symbols() if isinstance(symbol["st_shndx"], int)]
-    words, constants, data, initial, handlers, ram = [], [], [], [], set(), 0
-    for number, section in enumerate(elf.iter_sections()):
-        flags, address = section["sh_flags"], section["sh_addr"]
-        if not flags & ALLOC and not flags & EXECUTE or not section["sh_size"]:
-            continue
-        inside = [symbol for symbol in symbols if symbol["st_shndx"] == number]
-        if flags & WRITE:
-            if address in device.RAM:
-                ram += section["sh_size"] // 2
-                data += _variables(section, inside, debug)
-        elif flags & PSV:
-            constants += _constants(section, inside, debug)
+    with reading("ELF", path):
+        return _read(elf)
+
+
+def _read(elf: Elf) -> Image:
+    debug = _Debug(elf.debug)
+    words, constants, data, initial = [], [], [], []
+    for section in elf.sections:
+        named = {item.address: item for item in elf.names if item.section is section}
+        if section.memory == DATA:
+            data += _variables(section, named, debug)
+        elif section.memory == CONSTANTS:
+            constants += _constants(section, named, debug)
         elif section.name == ".dinit":
-            initial += _raw(section)
-        elif flags & EXECUTE and device.IVT <= address < device.VECTORS_END:
-            handlers.update(_raw(section))
-        elif flags & EXECUTE and address in device.PROGRAM:
-            words += _words(section, inside, debug)
-    rest = ram - sum(thing.size for thing in data)
+            initial += [elf.words[address] for address in range(section.start, section.end, 2)]
+        elif section.memory == CODE and section.start in device.PROGRAM:
+            words += [_word(address, debug) or _unknown(address, named) for address in range(section.start, section.end, 2)]
+    rest = elf.ram_bytes - sum(thing.size for thing in data)
     if rest:
         data.append(Thing("(alignment)", rest))
-    return Image(words, constants, data, len(initial), _calls(initial), sorted(handlers), ram, elf["e_entry"])
-
-
-def _raw(section) -> list[int]:
-    """The section's program words; a word is four bytes in the file."""
-    return [int.from_bytes(raw, "little") for raw in _quads(section.data())]
-
-
-def _quads(data: bytes):
-    return (data[at:at + 4] for at in range(0, len(data), 4))
+    handlers = {elf.words[address] for address in range(device.IVT, device.VECTORS_END, 2) if address in elf.words}
+    return Image(words, constants, data, len(initial), _calls(initial), sorted(handlers), elf.ram_bytes, elf.entry,
+                 frozenset(item.name for item in elf.names if item.section is not None and item.section.memory == CODE))
 
 
 def _calls(records: list[int]) -> bool:
@@ -216,22 +206,18 @@ def _calls(records: list[int]) -> bool:
     return False
 
 
-def _words(section, symbols: list, debug: _Debug) -> list[Word]:
-    low = section["sh_addr"]
-    nodes = {node.low: node for node in debug.nodes}
-    starts = sorted(nodes)
-    labels = sorted((symbol["st_value"], symbol.name) for symbol in symbols
-                    if symbol.name and not symbol.name.startswith(".") and symbol["st_info"]["type"] != "STT_SECTION")
-    return [_word(address, nodes, starts, labels, debug) for address in range(low, low + section["sh_size"] // 2, 2)]
+def _unknown(address: int, named: dict[int, Symbol]) -> Word:
+    """A word of the start-up code or of a library: the name before it."""
+    start = max((place for place in named if place <= address), default=0)
+    return Word(address, (Frame(named[start].name if start in named else "?", ""),), (start,))
 
 
-def _word(address: int, nodes: dict[int, Node], starts: list[int], labels: list[tuple[int, str]], debug: _Debug) -> Word:
-    index = bisect.bisect_right(starts, address) - 1
-    if index < 0 or nodes[starts[index]].high <= address: # no C function: start-up code or a library
-        label = bisect.bisect_right(labels, (address, "\uffff")) - 1
-        name = labels[label][1] if label >= 0 else "?"
-        return Word(address, (Frame(_plain(name), ""),), (labels[label][0] if label >= 0 else 0,))
-    function = nodes[starts[index]]
+def _word(address: int, debug: _Debug) -> Word | None:
+    """A word of a C function."""
+    index = bisect.bisect_right(debug.starts, address) - 1
+    if index < 0 or debug.nodes[debug.starts[index]].high <= address:
+        return None
+    function = debug.nodes[debug.starts[index]]
     copies = debug.inside[function.low]
     best = max((node for node in copies if node.low <= address < node.high), key=lambda node: (node.depth, node.low - node.high),
                default=function)
@@ -245,34 +231,29 @@ def _word(address: int, nodes: dict[int, Node], starts: list[int], labels: list[
     return Word(address, tuple(node.frame for node in chain), tuple(node.low for node in chain))
 
 
-def _variables(section, symbols: list, debug: _Debug) -> list[Thing]:
+def _variables(section: Section, named: dict[int, Symbol], debug: _Debug) -> list[Thing]:
     """The linker keeps no size of an object with a start value: it ends where the next one begins."""
-    named = {symbol["st_value"]: symbol for symbol in symbols
-             if symbol["st_info"]["type"] != "STT_SECTION" and symbol.name and not symbol.name.startswith(".")}
-    ends = [*sorted(named), section["sh_addr"] + section["sh_size"] // 2]
-    return [Thing(_plain(named[start].name), named[start]["st_size"] or end - start, debug.members(_plain(named[start].name)))
-            for start, end in zip(ends, ends[1:])]
+    ends = [*sorted(named), section.end]
+    return [debug.thing(named[start], named[start].size or end - start) for start, end in zip(ends, ends[1:])]
 
 
-def _constants(section, symbols: list, debug: _Debug) -> list[Thing]:
-    """A word of flash shows two bytes to the data space and takes three."""
-    low, end = section["sh_addr"], section["sh_addr"] + section["sh_size"] // 2
-    named = {symbol["st_value"]: symbol.name for symbol in symbols if symbol.name and symbol["st_info"]["type"] != "STT_SECTION"}
-    starts = sorted({low, *named})
+def _constants(section: Section, named: dict[int, Symbol], debug: _Debug) -> list[Thing]:
+    """A word of flash shows two bytes to the data space and takes three. What has no name of its own is a text."""
+    starts = sorted({section.start, *named})
     things: dict[str, Thing] = {}
-    for start, following in zip(starts, [*starts[1:], end]):
-        label = named.get(start, "")
-        name = "(texts)" if label.startswith(".LC") or not label else _plain(label)
+    for start, following in zip(starts, [*starts[1:], section.end]):
+        found = debug.thing(named[start], 0) if start in named and not named[start].local else Thing("(texts)", 0)
+        thing = things.setdefault(found.name, found)
         # a boundary in the middle of a word belongs to what starts before it
-        words = (following - low + 1) // 2 - (start - low + 1) // 2
-        thing = things.setdefault(name, Thing(name, 0, [(path, size * BYTES_PER_WORD // 2) for path, size in debug.members(name)]))
-        thing.size += BYTES_PER_WORD * words
+        thing.size += BYTES_PER_WORD * ((following - section.start + 1) // 2 - (start - section.start + 1) // 2)
+    for thing in things.values():
+        thing.members = [(path, size * BYTES_PER_WORD // 2) for path, size in thing.members]
     return list(things.values())
 
 
 def _members(die, path: str):
     """Every member of a structure and of the structures in it, with its size in bytes of data."""
-    kind = _type(die)
+    kind = type_of(die)
     if kind is None or kind.tag != "DW_TAG_structure_type":
         return
     for member in kind.iter_children():
@@ -282,7 +263,7 @@ def _members(die, path: str):
             yield from _members(member, name)
 
 
-def _type(die):
+def type_of(die):
     """What a variable, member or type stands for, without typedef, const and volatile."""
     while die is not None and "DW_AT_type" in die.attributes:
         die = die.get_DIE_from_attribute("DW_AT_type")
@@ -292,7 +273,7 @@ def _type(die):
 
 
 def _size(die) -> int:
-    kind = _type(die)
+    kind = type_of(die)
     if kind is None:
         return 0
     if kind.tag == "DW_TAG_array_type":
@@ -302,11 +283,6 @@ def _size(die) -> int:
                 size *= dimension.attributes["DW_AT_upper_bound"].value + 1
         return size
     return kind.attributes["DW_AT_byte_size"].value if "DW_AT_byte_size" in kind.attributes else 2
-
-
-def _section_parameters() -> list[str]:
-    code = DWARFInfo.__init__.__code__
-    return [name for name in code.co_varnames[2:code.co_argcount] if name.endswith("_sec")]
 
 
 def _file_names(top, program) -> dict[int, str]:
@@ -355,8 +331,3 @@ def _frame(die, files: dict[int, str]) -> Frame:
 def _text(die, name: str) -> str:
     value = die.attributes[name].value if name in die.attributes else b"?"
     return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
-
-
-def _plain(symbol: str) -> str:
-    """A symbol's name in C: one underscore less."""
-    return symbol.removeprefix("_")

@@ -1,4 +1,7 @@
-"""firmware/budget.toml: what the image may take, and the module that each word and byte of it is counted with."""
+"""firmware/budget.toml: what the image may take, and the module that each word and byte of it is counted with.
+
+A module is a list of files: a function or object is counted with the module that has the file it is written in. Names are exceptions:
+members of a structure, and what belongs to another module than the rest of its file. A name that matches nothing is an error."""
 
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -8,10 +11,12 @@ from tools.common import paths
 from tools.common.toml_file import Document, Section
 
 from .attribution import Image, Thing, Word
+from .sources import Sources
 from .stack import plain
 
 PATH = paths.ROOT / "firmware" / "budget.toml"
-START_VALUES = "(start values)"
+START_VALUES, TEXTS, ALIGNMENT = "(start values)", "(texts)", "(alignment)"
+SPECIAL = (START_VALUES, TEXTS, ALIGNMENT)
 
 
 @dataclass(frozen=True)
@@ -22,8 +27,17 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class CycleLimits:
+    """[cycles]: of the control interrupt, and the scenarios to find them with."""
+    isr_max: int
+    isr_mean: int
+    latency_max: int
+    scenarios: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Group:
-    """A part of the whole beside a figure of the note; None: the note does not have it."""
+    """A part of the whole beside a figure of AN1292; None: AN1292 does not have it."""
     name: str
     title: str
     note_flash: int | None
@@ -33,29 +47,45 @@ class Group:
 class Module:
     name: str
     group: str
-    functions: tuple[str, ...]
-    objects: tuple[str, ...]
-    files: tuple[str, ...]
-    whole: bool          # also what is inlined into its functions
-    flash_budget: int | None
+    files: tuple[str, ...] = ()
+    functions: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
+    whole: bool = False          # also what is inlined into its functions
+    flash_budget: int | None = None
 
 
-UNASSIGNED = Module("not assigned", "", (), (), (), False, None)
+@dataclass(frozen=True)
+class Name:
+    """A name in the file, to be looked for: kind is file, function, object, compiler or scenario."""
+    kind: str
+    text: str
+    where: str
+
+
+UNASSIGNED = Module("not assigned", "")
 
 
 @dataclass
 class Budget:
     note: Limits
     image: Limits
+    cycles: CycleLimits
     groups: list[Group]
     modules: list[Module]
     with_caller: tuple[str, ...]
     calls_nothing: tuple[str, ...]
+    names: list[Name]
 
     @staticmethod
     def read(path: Path = PATH) -> "Budget":
-        document = Document(path)
-        root = document.root
+        root = Document(path).root
+        names: list[Name] = []
+
+        def listed(section: Section, key: str, kind: str, required: bool = False) -> tuple[str, ...]:
+            texts = section.texts(key) if required else section.texts(key, [])
+            names.extend(Name("file" if "/" in text else kind, text, section.where(key)) for text in texts)
+            return tuple(texts)
+
         budget = _required(root, "budget")
         limits = []
         for name in ("note", "image"):
@@ -64,34 +94,80 @@ class Budget:
                                  section.integer("stack_bytes", minimum=0) if name == "image" else 0))
             section.close()
         budget.close()
-        root.section("cycles") # for `make cycles`
+        section = _required(root, "cycles")
+        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "isr_mean", "latency_max")),
+                             listed(section, "scenarios", "scenario", required=True))
+        section.close()
         stack = _required(root, "stack")
-        calls_nothing = tuple(stack.texts("calls_nothing"))
+        calls_nothing = listed(stack, "calls_nothing", "compiler", required=True)
         stack.close()
         groups = [Group(section.text("name"), section.text("title"), section.integer("note_flash_bytes", None, minimum=0))
                   for section in root.sections("group")]
-        modules = [_module(section, [group.name for group in groups]) for section in root.sections("module")]
-        with_caller = tuple(root.texts("with_caller"))
+        modules = []
+        for section in root.sections("module"):
+            modules.append(Module(section.text("name"), section.choice("group", [group.name for group in groups]),
+                                  listed(section, "files", "file"),
+                                  listed(section, "functions", "function") + listed(section, "compiler", "compiler"),
+                                  listed(section, "objects", "object"), section.flag("whole", False),
+                                  section.integer("flash_bytes", None, minimum=0)))
+            section.close()
+        with_caller = listed(root, "with_caller", "function", required=True)
         root.close()
-        return Budget(*limits, groups, modules, with_caller, calls_nothing)
+        return Budget(*limits, cycles, groups, modules, with_caller, calls_nothing, names)
 
+    # ---- what belongs to what --------------------------------------------------------------------------------------------
     def of_function(self, name: str, file: str) -> Module:
-        """By name; a function that nobody names by the file it is written in."""
-        return (_nearest(name, [(pattern, module) for module in self.modules for pattern in module.functions])
-                or next((module for module in self.modules if file and file in module.files), UNASSIGNED))
+        return next((module for module in self.modules if fits(name, module.functions)), self._of_file(file))
 
-    def of_object(self, path: str) -> Module | None:
-        return _nearest(path, [(pattern, module) for module in self.modules for pattern in module.objects])
+    def of_object(self, path: str, file: str) -> Module:
+        return next((module for module in self.modules if fits(path, module.objects)), self._of_file(file))
+
+    def _of_file(self, file: str) -> Module:
+        return next((module for module in self.modules if file in module.files), UNASSIGNED)
 
     def of_word(self, word: Word) -> tuple[Module, str, tuple[int, ...]]:
         """The module a word is counted with, the function it is shown under, and which copy of that function it is in."""
         names = [plain(f"_{frame.name}") for frame in word.chain]
-        last = next((i for i in reversed(range(len(names))) if not _fits(names[i], self.with_caller)), 0)
+        last = self.counted_at(word)
         for index in reversed(range(last + 1)):
             module = self.of_function(names[index], word.chain[index].file)
             if module.whole:
                 return module, names[index], word.copy[:index + 1]
         return self.of_function(names[last], word.chain[last].file), names[last], word.copy[:last + 1]
+
+    def counted_at(self, word: Word) -> int:
+        """Place in the word's chain of the innermost function that is not counted with its caller."""
+        return next((i for i in reversed(range(len(word.chain)))
+                     if word.chain[i].file not in self.with_caller and not fits(word.chain[i].name, self.with_caller)), 0)
+
+    # ---- names that match nothing ----------------------------------------------------------------------------------------
+    def unmatched(self, sources: Sources, image: Image | None = None, root: Path = paths.ROOT) -> list[str]:
+        """A line for every name that matches nothing or is given twice, and for every file with functions that is in no module.
+        @param image for the names of the compiler's start-up code, which is in no source"""
+        functions = {name for known in sources.functions.values() for name in known}
+        known = {"function": functions, "object": sources.objects() | set(SPECIAL), "scenario": set(paths.names(paths.SCENARIOS)),
+                 "compiler": image.labels if image else None}
+        lines, seen = [], set()
+        for name in self.names:
+            if name.kind == "file":
+                found = (root / name.text).is_file()
+            else:
+                found = known[name.kind] is None or any(fnmatchcase(item, name.text) for item in known[name.kind])
+            if not found:
+                what = {"compiler": "function of the compiler's start-up code in the image", "object": "variable or member",
+                        "scenario": "scenario in tools/bench/scenarios"}.get(name.kind, f"{name.kind} of the firmware")
+                lines.append(f"'{name.text}' is no {what}, {name.where}: correct it or take it out")
+            if (name.kind, name.text) in seen:
+                lines.append(f"'{name.text}' is named twice, {name.where}: leave it in one place")
+            if name.kind not in ("compiler", "scenario"):
+                seen.add((name.kind, name.text))
+        listed = {name.text for name in self.names if name.kind == "file"}
+        return lines + [f"'{file}' is in no module: add it to the files of one in firmware/budget.toml"
+                        for file, defined in sources.functions.items() if file not in listed and (defined or sources.variables[file])]
+
+
+def fits(name: str, patterns: tuple[str, ...]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 @dataclass
@@ -102,9 +178,12 @@ class Share:
     copies: set[tuple[int, ...]] = field(default_factory=set)
 
 
-def shares(image: Image, budget: Budget) -> dict[tuple[str, str], Share]:
-    """Flash and RAM of every (module, function or object)."""
-    result: dict[tuple[str, str], Share] = {}
+Shares = dict[tuple[str, str], Share]   # by module, and function or object
+
+
+def shares(image: Image, budget: Budget) -> Shares:
+    """Flash and RAM of everything in the image."""
+    result: Shares = {}
     for word in image.words:
         module, name, copy = budget.of_word(word)
         share = result.setdefault((module.name, name), Share())
@@ -122,13 +201,13 @@ def shares(image: Image, budget: Budget) -> dict[tuple[str, str], Share]:
 
 def _split(thing: Thing, budget: Budget) -> list[tuple[str, Module, int]]:
     """A structure is counted with several modules: each member that a module names, and the rest with the structure's own."""
-    own = budget.of_object(thing.name) or UNASSIGNED
+    own = budget.of_object(thing.name, thing.file)
     parts: list[list] = [[thing.name, own, thing.size]]
     at = {thing.name: parts[0]}
     for path, size in thing.members: # outer members come before those inside them
         part = at[path.rpartition(".")[0]]
-        module = budget.of_object(path)
-        if module is not None and module is not part[1]:
+        module = budget.of_object(path, "")
+        if module is not UNASSIGNED and module is not part[1]:
             part[2] -= size
             part = [path, module, size]
             parts.append(part)
@@ -136,26 +215,8 @@ def _split(thing: Thing, budget: Budget) -> list[tuple[str, Module, int]]:
     return [(path, module, size) for path, module, size in parts if size]
 
 
-def _module(section: Section, groups: list[str]) -> Module:
-    module = Module(section.text("name"), section.choice("group", groups), tuple(section.texts("functions", [])),
-                    tuple(section.texts("objects", [])), tuple(section.texts("files", [])), section.flag("whole", False),
-                    section.integer("flash_bytes", None, minimum=0))
-    section.close()
-    return module
-
-
 def _required(section: Section, key: str) -> Section:
     found = section.section(key)
     if found is None:
         raise section.fail(key, f"no table [{key}]", "add it")
     return found
-
-
-def _nearest(name: str, patterns: list[tuple[str, Module]]) -> Module | None:
-    """The module with the longest pattern that fits; a name written in full comes before any pattern."""
-    fitting = [(pattern == name, len(pattern), -place, module) for place, (pattern, module) in enumerate(patterns) if fnmatchcase(name, pattern)]
-    return max(fitting, key=lambda item: item[:3])[3] if fitting else None
-
-
-def _fits(name: str, patterns: tuple[str, ...]) -> bool:
-    return any(fnmatchcase(name, pattern) for pattern in patterns)

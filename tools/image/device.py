@@ -26,7 +26,7 @@ INTERRUPTS = {
 }
 #: C names of the functions of all vectors, in the table's order; number n of the interrupts that the part lacks is _Interrupt<n>
 VECTORS = (*TRAPS, *(f"_{INTERRUPTS[n]}Interrupt" if n in INTERRUPTS else f"_Interrupt{n}" for n in range(118)))
-#: from this interrupt on the product leaves both tables erased (seen in a published image for a related part [?]); the chip has none of them
+#: from this interrupt on the product leaves both tables erased (seen in a published image for a related part [?]); the chip has none
 LEFT_ERASED = 80
 DEFAULT_VECTOR = "_DefaultInterrupt"
 #: without these the drive is not controlled, or does not stop when it must
@@ -52,14 +52,16 @@ class Field:
 WORDS = {0xF80000: "FBS", 0xF80004: "FGS", 0xF80006: "FOSCSEL", 0xF80008: "FOSC", 0xF8000A: "FWDT", 0xF8000C: "FPOR", 0xF8000E: "FICD"}
 
 FIELDS = {
-    "BWRP": Field(0xF80000, 0x01, {"WRPROTECT_ON": (0x00, "boot segment write-protected"), "WRPROTECT_OFF": (0x01, "boot segment may be written")}),
+    "BWRP": Field(0xF80000, 0x01, {"WRPROTECT_ON": (0x00, "boot segment write-protected"),
+                                   "WRPROTECT_OFF": (0x01, "boot segment may be written")}),
     "BSS": Field(0xF80000, 0x0E, {
         "LARGE_FLASH_HIGH": (0x00, "large boot segment, high security"), "MEDIUM_FLASH_HIGH": (0x02, "medium boot segment, high security"),
         "SMALL_FLASH_HIGH": (0x04, "small boot segment, high security"), "LARGE_FLASH_STD": (0x08, "large boot segment"),
         "MEDIUM_FLASH_STD": (0x0A, "medium boot segment"), "SMALL_FLASH_STD": (0x0C, "small boot segment"),
         "NO_FLASH": (0x0E, "no boot segment")}),
     "GWRP": Field(0xF80004, 0x01, {"ON": (0x00, "program write-protected"), "OFF": (0x01, "program may be written")}),
-    "GSS": Field(0xF80004, 0x06, {"HIGH": (0x02, "code protection, high"), "STD": (0x04, "code protection"), "OFF": (0x06, "no code protection")}),
+    "GSS": Field(0xF80004, 0x06, {"HIGH": (0x02, "code protection, high"), "STD": (0x04, "code protection"),
+                                  "OFF": (0x06, "no code protection")}),
     "FNOSC": Field(0xF80006, 0x07, {
         "FRC": (0, "internal oscillator"), "FRCPLL": (1, "internal oscillator, PLL"), "PRI": (2, "crystal"), "PRIPLL": (3, "crystal, PLL"),
         "SOSC": (4, "secondary oscillator"), "LPRC": (5, "low-power oscillator"), "FRCDIV16": (6, "internal oscillator / 16"),
@@ -69,23 +71,27 @@ FIELDS = {
                                      "NONE": (3, "no crystal")}),
     "OSCIOFNC": Field(0xF80008, 0x04, {"ON": (0x00, "OSC2 is a port pin"), "OFF": (0x04, "OSC2 is no port pin")}),
     "IOL1WAY": Field(0xF80008, 0x20, {"OFF": (0x00, "pin selection may be unlocked again"), "ON": (0x20, "pin selection only once")}),
-    "FCKSM": Field(0xF80008, 0xC0, {"CSECME": (0x00, "clock switching, clock monitor"), "CSECMD": (0x40, "clock switching, no clock monitor"),
+    "FCKSM": Field(0xF80008, 0xC0, {"CSECME": (0x00, "clock switching, clock monitor"),
+                                    "CSECMD": (0x40, "clock switching, no clock monitor"),
                                     "CSDCMD": (0x80, "no clock switching, no clock monitor")}),
     "WDTPOST": Field(0xF8000A, 0x0F, {f"PS{1 << n}": (n, f"watchdog / {1 << n}") for n in range(16)}),
     "WDTPRE": Field(0xF8000A, 0x10, {"PR32": (0x00, "watchdog clock / 32"), "PR128": (0x10, "watchdog clock / 128")}),
     "WINDIS": Field(0xF8000A, 0x40, {"ON": (0x00, "watchdog with a window"), "OFF": (0x40, "watchdog without a window")}),
     "FWDTEN": Field(0xF8000A, 0x80, {"OFF": (0x00, "watchdog by software"), "ON": (0x80, "watchdog always on")}),
-    "FPWRT": Field(0xF8000C, 0x07, {"PWR1": (0, "no power-up delay"), **{f"PWR{1 << n}": (n, f"power-up delay {1 << n} ms") for n in range(1, 8)}}),
+    "FPWRT": Field(0xF8000C, 0x07, {"PWR1": (0, "no power-up delay"),
+                                    **{f"PWR{1 << n}": (n, f"power-up delay {1 << n} ms") for n in range(1, 8)}}),
     "ALTI2C": Field(0xF8000C, 0x10, {"ON": (0x00, "I2C on ASDA1/ASCL1"), "OFF": (0x10, "I2C on SDA1/SCL1")}),
     "LPOL": Field(0xF8000C, 0x20, {"OFF": (0x00, "low sides active low"), "ON": (0x20, "low sides active high")}),
     "HPOL": Field(0xF8000C, 0x40, {"OFF": (0x00, "high sides active low"), "ON": (0x40, "high sides active high")}),
     "PWMPIN": Field(0xF8000C, 0x80, {"OFF": (0x00, "PWM pins driven at reset"), "ON": (0x80, "PWM pins are inputs at reset")}),
-    "ICS": Field(0xF8000E, 0x03, {"PGD3": (1, "debugger on PGC3/PGD3"), "PGD2": (2, "debugger on PGC2/PGD2"), "PGD1": (3, "debugger on PGC1/PGD1")}),
+    "ICS": Field(0xF8000E, 0x03, {"PGD3": (1, "debugger on PGC3/PGD3"), "PGD2": (2, "debugger on PGC2/PGD2"),
+                                  "PGD1": (3, "debugger on PGC1/PGD1")}),
     "JTAGEN": Field(0xF8000E, 0x20, {"OFF": (0x00, "no JTAG"), "ON": (0x20, "JTAG")}),
 }
 
 #: what the board needs, whatever firmware/board/config.c says
 BOARD_NEEDS = {
     "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FWDTEN": "ON", "WINDIS": "OFF", "WDTPRE": "PR32",
-    "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON", "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF", "BWRP": "WRPROTECT_OFF", "BSS": "NO_FLASH", "GSS": "OFF", "GWRP": "OFF",
+    "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON", "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF",
+               "BWRP": "WRPROTECT_OFF", "BSS": "NO_FLASH", "GSS": "OFF", "GWRP": "OFF",
 }

@@ -20,7 +20,8 @@ from . import device, image
 TOOLS = {"PK3": "PICkit 3", "PK4": "MPLAB PICkit 4", "PK5": "MPLAB PICkit 5", "ICD4": "MPLAB ICD 4", "SNAP": "MPLAB Snap"}
 NAMES = ("ipecmd.sh", "ipecmd", "ipecmd.exe")
 INSIDE = ("", "bin", "mplab_platform/mplab_ipe", "mplab_platform/mplab_ipe/bin", "mplab_platform/bin", "mplab_ipe", "mplab_ipe/bin")
-USUAL = ("/opt/microchip/mplabx", "/Applications/microchip/mplabx", "C:/Program Files/Microchip/MPLABX", "C:/Program Files (x86)/Microchip/MPLABX")
+USUAL = ("/opt/microchip/mplabx", "/Applications/microchip/mplabx", "C:/Program Files/Microchip/MPLABX",
+         "C:/Program Files (x86)/Microchip/MPLABX")
 
 
 def command(ipecmd: str, tool: str, hex_file: Path) -> list[str]:
@@ -58,7 +59,7 @@ def find(ipe: Path | None, usual: tuple[str, ...] = USUAL) -> str | None:
 def checked(hex_file: Path, elf_file: Path) -> list[str]:
     """Failures of the image that is about to be programmed."""
     elf, words = image.read_elf(elf_file), image.read_hex(hex_file)
-    return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), {})
+    return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), None)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -1,24 +1,23 @@
-"""Checks a target image before it is flashed: device, vectors, configuration words, HEX against ELF, library helpers, budgets.
+"""Checks an image before it is flashed: device, vectors, configuration words, HEX against ELF, library helpers, budgets.
 
-    python3 -m tools.image.image build/target/foc33.elf build/target/foc33.hex [--map build/target/foc33.map] [--budget firmware/budget.toml]
+    python3 -m tools.image.image foc33.elf foc33.hex [--map foc33.map] [--budget firmware/budget.toml]
 
 One line for each failure and exit status 1; a file that cannot be read is one line and exit status 2."""
 
 import argparse
 import re
 import sys
-import tomllib
 from pathlib import Path
 
-from tools.common import command_line
+from tools.common import command_line, paths
 from tools.common.errors import UserError
 
-from . import device
+from . import attribution, device, size
+from .budget import Budget, Limits
 from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
-from .program import Elf, Words, read_elf, read_hex
+from .program import Elf, Words, read_elf, read_hex, reset_target
 
-ROOT = Path(__file__).resolve().parents[2]
-CONFIG_C = ROOT / "firmware" / "board" / "config.c"
+CONFIG_C = paths.ROOT / "firmware" / "board" / "config.c"
 PRAGMA = re.compile(r"^\s*#\s*pragma\s+config\s+(\w+)\s*=\s*(\w+)\s*$", re.MULTILINE)
 BYTES_PER_WORD = 3 # as data sheets count
 
@@ -36,7 +35,8 @@ def check_memory(words: Words) -> list[str]:
     outside = sorted(address for address in words if address not in device.FLASH and address not in device.CONFIGURATION)
     if not outside:
         return []
-    return [f"{len(outside)} words outside the flash of the {device.NAME} (0x0000 .. 0x{device.FLASH[-1]:04X}), the first at 0x{outside[0]:06X}"]
+    return [f"{len(outside)} words outside the flash of the {device.NAME} (0x0000 .. 0x{device.FLASH[-1]:04X}), "
+            f"the first at 0x{outside[0]:06X}"]
 
 
 def check_same(hex_words: Words, elf: Elf) -> list[str]:
@@ -56,10 +56,9 @@ def _shown(words: Words, address: int) -> str:
 
 def check_reset(words: Words, elf: Elf) -> list[str]:
     """The first instruction goes to the start-up code."""
-    first, second = words.get(0, device.ERASED), words.get(2, device.ERASED)
-    if first >> 16 != 0x04 or second >> 7 != 0:
-        return [f"reset vector: 0x{first:06X} 0x{second:06X} is no GOTO"]
-    target = first & 0xFFFE | second << 16
+    target = reset_target(words)
+    if target is None:
+        return [f"reset vector: 0x{words.get(0, device.ERASED):06X} 0x{words.get(2, device.ERASED):06X} is no GOTO"]
     starts = {elf.symbols[name] for name in ("__reset", "__resetPRI") if name in elf.symbols}
     if not starts:
         return ["reset vector: the image has no start-up code (__reset)"]
@@ -94,7 +93,8 @@ def check_vectors(words: Words, elf: Elf, pieces: list[Piece] | None) -> list[st
                              f"({elf.function_at(wanted)})")
         failures += wrong[:3] + ([f"and {len(wrong) - 3} more vectors of the {table}"] if len(wrong) > 3 else [])
     if pieces is not None and not default_handler_is_ours(elf, pieces):
-        failures.append(f"vectors: {device.DEFAULT_VECTOR} is the compiler's, which leaves the outputs as they are: define it in firmware/board/isr.c")
+        failures.append(f"vectors: {device.DEFAULT_VECTOR} is the compiler's, which leaves the outputs as they are: "
+                        "define it in firmware/board/isr.c")
     return failures
 
 
@@ -113,7 +113,8 @@ def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
     for name, value in {**device.BOARD_NEEDS, **config}.items():
         field = device.FIELDS.get(name)
         if field is None or value not in field.values:
-            failures.append(f"configuration: {name} = {value} in config.c is unknown for the {device.NAME}: add it to tools/image/device.py")
+            failures.append(f"configuration: {name} = {value} in config.c is unknown for the {device.NAME}: "
+                            "add it to tools/image/device.py")
             continue
         word = words.get(field.word)
         if word is None:
@@ -144,62 +145,46 @@ def stack_space(elf: Elf) -> int | None:
     return None if low is None or high is None else high - low
 
 
-def read_budget(path: Path | None) -> dict[str, int]:
-    """flash_bytes, ram_bytes and, where the file has it, stack_bytes."""
-    if path is None:
-        return {}
-    try:
-        with path.open("rb") as file:
-            table = tomllib.load(file)
-        budget = table["budget"]["image"]
-        return {name: int(budget[name]) for name in ("flash_bytes", "ram_bytes", "stack_bytes") if name != "stack_bytes" or name in budget}
-    except OSError as error:
-        raise UserError(f"cannot read the budget ({error.strerror})", str(path)) from None
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
-        raise UserError(f"no budget for the image ({error})", str(path), "give flash_bytes and ram_bytes in [budget.image]") from None
-
-
-def deepest_stack(elf: Path, objdump: str) -> tuple[int, list[str]]:
+def deepest_stack(elf: Path, objdump: str, budget: Budget) -> tuple[int, list[str]]:
     """Bytes of the deepest stack, and what keeps it from being known for sure, as make size finds them."""
-    from . import size # its modules draw and read DWARF; the checks of a HEX file need neither
-    from .budget import Budget
-    sources = "".join(path.read_text(encoding="utf-8") for path in sorted(CONFIG_C.parent.glob("*.c")))
-    result = size.measure(elf, Budget.read(), size.disassemble(objdump, elf), sources, None, limits=False).stack
+    result = size.deepest(attribution.read(elf), size.disassemble(objdump, elf), budget)
     return result.depth, result.errors
 
 
-def check_budget(words: Words, elf: Elf, budget: dict[str, int], deepest: int | None = None) -> list[str]:
+def check_budget(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None) -> list[str]:
     """Flash and RAM in their budgets, the stack in its own and in what is left of the RAM."""
     failures = []
     flash, stack = flash_bytes(words), stack_space(elf)
-    if deepest is not None and deepest > (limit := budget.get("stack_bytes", stack if stack is not None else deepest)):
-        failures.append(f"stack: up to {deepest} bytes of {limit}; make size shows the calls")
-    if flash > budget.get("flash_bytes", flash):
-        failures.append(f"flash: {flash} bytes of a budget of {budget['flash_bytes']}; make size shows what takes them")
-    if elf.ram_bytes > budget.get("ram_bytes", elf.ram_bytes):
-        failures.append(f"RAM: {elf.ram_bytes} bytes of a budget of {budget['ram_bytes']}, the stack not counted; make size shows what takes them")
-    if stack is not None and stack < budget.get("stack_bytes", stack):
-        failures.append(f"stack: {stack} bytes are left for it, the budget says {budget['stack_bytes']}")
+    room = limits.stack if limits else stack
+    if deepest is not None and room is not None and deepest > room:
+        failures.append(f"stack: up to {deepest} bytes of {room}; make size shows the calls")
+    if limits is None:
+        return failures
+    if flash > limits.flash:
+        failures.append(f"flash: {flash} bytes of a budget of {limits.flash}; make size shows what takes them")
+    if elf.ram_bytes > limits.ram:
+        failures.append(f"RAM: {elf.ram_bytes} bytes of a budget of {limits.ram}, the stack not counted; make size shows what takes them")
+    if stack is not None and stack < limits.stack:
+        failures.append(f"stack: {stack} bytes are left for it, the budget says {limits.stack}")
     return failures
 
 
-def summary(words: Words, elf: Elf, budget: dict[str, int], deepest: int | None = None) -> str:
+def summary(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None) -> str:
     """What the image takes of its budget, or of the chip where there is none."""
-    def of(name: str, chip: int) -> str:
-        return f"{budget[name]} bytes" if name in budget else f"{chip} bytes of the chip"
+    flash, ram = ((f"{limits.flash} bytes", f"{limits.ram} bytes") if limits else
+                  (f"{len(device.PROGRAM) * BYTES_PER_WORD} bytes of the chip", f"{len(device.RAM)} bytes of the chip"))
     stack = stack_space(elf)
-    return (f"flash {flash_bytes(words)} of {of('flash_bytes', len(device.PROGRAM) * BYTES_PER_WORD)}, "
-            f"RAM {elf.ram_bytes} of {of('ram_bytes', len(device.RAM))}, "
-            + (f"stack at most {deepest} of {budget['stack_bytes']} bytes, " if deepest is not None and "stack_bytes" in budget
-               else f"stack at most {deepest} bytes, " if deepest is not None else "")
+    return (f"flash {flash_bytes(words)} of {flash}, RAM {elf.ram_bytes} of {ram}, "
+            + ("" if deepest is None else f"stack at most {deepest}{f' of {limits.stack}' if limits else ''} bytes, ")
             + f"{stack if stack is not None else 'unknown'} bytes free for it")
 
 
-def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, str], budget: dict[str, int],
+def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, str], limits: Limits | None,
           deepest: int | None = None) -> list[str]:
     """Every failure of an image; `pieces` None when there is no map, `deepest` None when nobody has looked for the deepest stack."""
     return [*check_device(elf), *check_memory(words), *check_same(words, elf), *check_reset(words, elf), *check_vectors(words, elf, pieces),
-            *check_configuration(words, config), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []), *check_budget(words, elf, budget, deepest)]
+            *check_configuration(words, config), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []),
+            *check_budget(words, elf, limits, deepest)]
 
 
 def parser() -> argparse.ArgumentParser:
@@ -221,18 +206,18 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     elf, words = read_elf(options.elf), read_hex(options.hex)
     pieces = read_map(options.map) if options.map else None
-    budget = read_budget(options.budget)
-    deepest, unsure = deepest_stack(options.elf, options.objdump) if options.objdump else (None, [])
+    limits = Budget.read(options.budget).image if options.budget else None
+    deepest, unsure = deepest_stack(options.elf, options.objdump, Budget.read()) if options.objdump else (None, [])
     try:
         config = wanted_fields(options.config.read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
-    failures = check(elf, words, pieces, config, budget, deepest) + [f"stack: {reason}" for reason in unsure if budget]
+    failures = check(elf, words, pieces, config, limits, deepest) + [f"stack: {reason}" for reason in unsure if limits]
     for failure in failures:
         print(f"foc33: {options.hex.name}, {failure}", file=sys.stderr)
     if options.table:
         print("\n".join(configuration_table(words)))
-    print(f"{options.hex}: {summary(words, elf, budget, deepest)}{f'; {len(failures)} checks failed' if failures else ''}")
+    print(f"{options.hex}: {summary(words, elf, limits, deepest)}{f'; {len(failures)} checks failed' if failures else ''}")
     return 1 if failures else 0
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from tools.common.errors import UserError
 
 from . import device
-from .program import Elf, Words, c_name
+from .program import Elf, Words
 
 #: What may be in the image besides our own objects, by the file that the map names: the compiler's start-up code and what its linker
 #: makes. Names of the product seen in published maps of versions 1.35 and 1.50; those of 2.10 are taken to be the same [?].
@@ -85,7 +85,8 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
     unknown = sorted(address for address in elf.words if address in device.PROGRAM and address not in explained)
     failures = []
     if unknown:
-        failures.append(f"{len(unknown)} words from 0x{unknown[0]:04X} on come from no file that the map names: the map is of another build, "
+        failures.append(f"{len(unknown)} words from 0x{unknown[0]:04X} on come from no file that the map names: "
+                        "the map is of another build, "
                         "or the linker made them for a pointer to a function")
     foreign = [piece for piece in pieces if not allowed(piece)]
     called = {piece: calls_into(elf, piece) for piece in foreign}
@@ -101,7 +102,8 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
 
 def helper_names(elf: Elf, piece: Piece, calls: dict[int, int]) -> str:
     """The functions of a library's piece that something calls, else all of them."""
-    names = {elf.function_at(target) for target in calls.values()} or {name for address, name in elf.functions if piece.start <= address < piece.end}
+    inside = {name for address, name in elf.functions if piece.start <= address < piece.end}
+    names = {elf.function_at(target) for target in calls.values()} or inside
     return " and ".join(f"{name}()" for name in sorted(names)) or piece.section
 
 
@@ -121,8 +123,10 @@ def advice(helpers: str, where: str) -> str:
 def divisions(elf: Elf, pieces: list[Piece]) -> list[str]:
     """A line for every function of ours with a division that C's / or % made, not a built-in: nobody has proved its operands' ranges."""
     own = [piece for piece in pieces if is_own(piece) and ".text" in piece.section]
-    found = {elf.function_at(address) for piece in own for address in range(piece.start, piece.end, 2) if divides_in_c(elf.words.get(address, 0))}
-    return [f"{name}() divides by a variable with / or %: use qm_divud() or __builtin_divsd() with a proven range, or multiply by a constant"
+    found = {elf.function_at(address) for piece in own for address in range(piece.start, piece.end, 2)
+             if divides_in_c(elf.words.get(address, 0))}
+    return [f"{name}() divides by a variable with / or %: use qm_divud() or __builtin_divsd() with a proven range, "
+            "or multiply by a constant"
             for name in sorted(found)]
 
 

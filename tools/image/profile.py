@@ -1,12 +1,12 @@
-"""Cycles of the control interrupt by function: from counts by address to functions, functions inlined into others, and call stacks.
+"""Cycles of the control interrupt by function, as linked and as written.
 
 A function that the interrupt can reach is counted wholly with it: what little the background executes of such a function, too."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 
-from .attribution import Image
+from .attribution import Image, Word
 from .linked import branch_target
 from .program import Elf
 from .stack import plain
@@ -31,20 +31,8 @@ class Profile:
 
     inlined: Counter = field(default_factory=Counter)   # by function as it is written
     symbols: Counter = field(default_factory=Counter)   # by function as it is linked, with what is inlined into it
-    stacks: Counter = field(default_factory=Counter)    # by chain of functions, outermost first
     executed: dict[str, tuple[int, int]] = field(default_factory=dict) # words of a linked function: executed at least once, all
     total: int = 0
-
-
-def calls(elf: Elf, image: Image) -> dict[int, list[int]]:
-    """Places that call each function or jump into it from another one, by the function's first address."""
-    first = {word.address: word.copy[0] for word in image.words}
-    result: dict[int, list[int]] = {}
-    for place in first:
-        target = branch_target(elf.words, place)
-        if target in first and first[target] != first[place]:
-            result.setdefault(first[target], []).append(place)
-    return result
 
 
 def reachable(elf: Elf, image: Image, start: str = INTERRUPT) -> set[int]:
@@ -65,37 +53,18 @@ def reachable(elf: Elf, image: Image, start: str = INTERRUPT) -> set[int]:
     return found
 
 
-def profile(elf: Elf, image: Image, counts: Counts, with_caller: tuple[str, ...] = ()) -> Profile:
+def profile(elf: Elf, image: Image, counts: Counts, counted_at: Callable[[Word], int] = lambda word: len(word.chain) - 1) -> Profile:
     """The counts by function.
-    @param with_caller patterns of small functions that are counted with whoever they are inlined into"""
+    @param counted_at place in a word's chain of the function that it counts with (budget.Budget.counted_at)"""
     words = {word.address: word for word in image.words}
-    callers = calls(elf, image)
     inside = reachable(elf, image)
     result = Profile()
-    ways: dict[int, list[tuple[float, tuple[str, ...]]]] = {}
-
-    def chain(address: int) -> tuple[str, ...]:
-        return tuple(plain(f"_{frame.name}") for frame in words[address].chain)
-
-    def ways_to(function: int, path: tuple[int, ...] = ()) -> list[tuple[float, tuple[str, ...]]]:
-        """How a linked function was reached: share and stack of each executed call."""
-        if function not in ways:
-            taken = [(counts.executions[place], place) for place in callers.get(function, ())
-                     if counts.executions.get(place) and words[place].copy[0] in inside and words[place].copy[0] not in (*path, function)]
-            whole = sum(count for count, _ in taken)
-            ways[function] = [(share * count / whole, (*stack, *chain(place))) for count, place in taken
-                              for share, stack in ways_to(words[place].copy[0], (*path, function))] if whole else [(1.0, ())]
-        return ways[function]
-
     for address, cycles in counts.cycles.items():
         if not cycles or address not in words or words[address].copy[0] not in inside:
             continue
-        names = chain(address)
-        own = next((name for name in reversed(names) if not any(fnmatchcase(name, pattern) for pattern in with_caller)), names[0])
-        result.inlined[own] += cycles
+        names = [plain(f"_{frame.name}") for frame in words[address].chain]
+        result.inlined[names[counted_at(words[address])]] += cycles
         result.symbols[names[0]] += cycles
-        for share, stack in ways_to(words[address].copy[0]):
-            result.stacks[(*stack, *names)] += share * cycles
         result.total += cycles
     code = {place for start, end in elf.code for place in range(start, end, 2)}
     for address, word in words.items():
@@ -109,8 +78,3 @@ def profile(elf: Elf, image: Image, counts: Counts, with_caller: tuple[str, ...]
 def _second_word(elf: Elf, address: int) -> bool:
     """The second word of CALL, GOTO and DO: it starts with a zero byte, and what is before it with one of theirs."""
     return elf.words.get(address, 0) >> 16 == 0 and elf.words.get(address - 2, 0) >> 16 in (0x02, 0x04, 0x08)
-
-
-def folded(stacks: Counter, per: float = 1.0) -> list[str]:
-    """A line for each stack, as tools for flame graphs read it."""
-    return [f"{';'.join(stack)} {count / per:.3f}" for stack, count in sorted(stacks.items())]

@@ -1,10 +1,9 @@
-"""`make size`: flash, RAM and stack of the target image by module and function, beside the note's figures, the budget and the last commit.
+"""`make size`: flash, RAM and stack of the image by module and function, beside AN1292's figures, the budget and the last commit.
 
 Program memory is counted as data sheets do, three bytes a word, without the vector tables. Exit status: 0, 1 when a budget is broken
 (a line for each), 2 when the image or the compiler is missing."""
 
 import argparse
-import csv
 import json
 import shlex
 import shutil
@@ -17,10 +16,12 @@ from tools.common import command_line, paths
 from tools.common.errors import UserError
 
 from . import attribution, base, stack
-from .budget import UNASSIGNED, Budget, Share, shares
+from .budget import UNASSIGNED, Budget, Share, Shares, shares
+from .sources import Sources
 
 OUT = paths.ROOT / "build" / "target"
-NOTE_TITLE = "as in the note"
+BOARD = paths.ROOT / "firmware" / "board"
+NOTE_TITLE = "as in AN1292"
 
 
 @dataclass
@@ -51,26 +52,29 @@ class Report:
     broken: list[str] = field(default_factory=list)
 
 
-def measure(elf: Path, budget: Budget, listing: str, sources: str, before: dict[tuple[str, str], Share] | None,
-            limits: bool = True) -> Report:
-    """All figures of an image.
-    @param listing its disassembly
-    @param sources the text of firmware/board, which sets the interrupts' priorities
-    @param before shares of the image to compare with
-    @param limits whether the budget is for this image"""
-    image = attribution.read(elf)
+def deepest(image: attribution.Image, listing: str, budget: Budget, board: Path = BOARD) -> stack.Result:
+    """The deepest stack, with the levels that the interrupts get in the sources of firmware/board.
+    @param listing the image's disassembly"""
     functions = {function.instructions[0].address: stack.plain(function.name) for function in stack.parse(listing)}
     handlers = [functions[address] for address in image.handlers if address in functions]
-    depth = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
+    sources = "".join(path.read_text(encoding="utf-8") for path in sorted(board.glob("*.c")))
+    result = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
     if image.initial_calls:
-        depth.errors.append("the list of start values names a function to call")
+        result.errors.append("the list of start values names a function to call")
+    return result
+
+
+def measure(image: attribution.Image, depth: stack.Result, budget: Budget, before: Shares | None = None, limits: bool = True) -> Report:
+    """All figures of an image.
+    @param before shares of the image to compare with
+    @param limits whether the budget is for this image"""
     now = shares(image, budget)
     report = Report(rows(now, before, budget), depth, budget)
     report.broken = broken(report, now, limits)
     return report
 
 
-def rows(now: dict[tuple[str, str], Share], before: dict[tuple[str, str], Share] | None, budget: Budget) -> list[Row]:
+def rows(now: Shares, before: Shares | None, budget: Budget) -> list[Row]:
     """Functions and objects under their modules, modules under their groups, then the totals."""
     result, totals = [], []
     modules = [*budget.modules, UNASSIGNED]
@@ -107,11 +111,12 @@ def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
     def change(attribute: str) -> int | None:
         values = [getattr(row, attribute) for row in below]
         return None if not values or None in values else sum(values)
-    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below), ram=sum(row.ram for row in below),
+    return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below),
+               ram=sum(row.ram for row in below),
                flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
 
 
-def broken(report: Report, now: dict[tuple[str, str], Share], limits: bool) -> list[str]:
+def broken(report: Report, now: Shares, limits: bool) -> list[str]:
     """A line for each budget that does not hold, and for what no module of the budget file claims."""
     lines = []
     for row in report.rows:
@@ -123,7 +128,7 @@ def broken(report: Report, now: dict[tuple[str, str], Share], limits: bool) -> l
     if limits and report.stack.depth > limit:
         lines.append(f"stack: {report.stack.depth} bytes at its deepest, {report.stack.depth - limit} over the budget of {limit}")
     lines += [f"stack: {error}" for error in report.stack.errors]
-    lines += [f"'{name}' is counted with no module: name it in firmware/budget.toml"
+    lines += [f"'{name}' is counted with no module: name its file in firmware/budget.toml"
               for module, name in sorted(now) if module == UNASSIGNED.name]
     return lines
 
@@ -171,69 +176,34 @@ def summary(report: Report) -> dict:
             "base": report.base_name or None, "broken": report.broken}
 
 
-def write(report: Report, folder: Path) -> list[Path]:
-    """size.json, size.csv and size.png."""
+def write_json(data: dict, folder: Path, name: str) -> Path:
+    """folder/name.json."""
+    path = folder / f"{name}.json"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / f"size.{ending}" for ending in ("json", "csv", "png")]
-        files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-        with files[1].open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(vars(report.rows[0])))
-            writer.writeheader()
-            writer.writerows(vars(row) for row in report.rows)
-        _plot(report, files[2])
+        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-    return files
-
-
-def _plot(report: Report, path: Path) -> None:
-    """A bar for each group: its modules side by side, the note's figure as a mark."""
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    groups = [row for row in report.rows if row.kind == "group"]
-    colors = plt.get_cmap("Set3").colors
-    figure, axes = plt.subplots(figsize=(11, 1.6 + 0.9 * len(groups)), layout="constrained")
-    for place, group in enumerate(groups):
-        start = 0
-        for index, row in enumerate(row for row in report.rows if row.kind == "module" and row.group == group.name):
-            axes.barh(place, row.flash, left=start, color=colors[index % len(colors)], edgecolor="white")
-            if row.flash >= 60:
-                axes.text(start + row.flash / 2, place, f"{row.name} {row.flash}".replace(" ", "\n") if row.flash > 400 else row.name,
-                          ha="center", va="center", fontsize=7, rotation=0 if row.flash > 400 else 90)
-            start += row.flash
-        axes.text(start + 40, place, str(group.flash), va="center")
-        if group.note is not None:
-            axes.plot([group.note] * 2, [place - 0.45, place + 0.45], color="black", linewidth=2, label="the note's" if place == 0 else None)
-    axes.set(yticks=range(len(groups)), yticklabels=[group.name for group in groups], xlabel="flash [bytes]",
-             title=f"flash by module: {report.rows[-1].flash} bytes")
-    axes.invert_yaxis()
-    axes.legend(loc="lower right")
-    figure.savefig(path)
-    plt.close(figure)
+    return path
 
 
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
     def cell(value: int | None) -> str:
         return "" if value is None else str(value)
-    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]), cell(row["ram_budget"])]
+    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]),
+             cell(row["ram_budget"])]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
-    return ["bytes", "note: flash", "flash", "budget", "note: RAM", "RAM", "budget"], body
+    return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def compare(compile_text: str, link_text: str, budget: Budget, cache: Path | None = None) -> tuple[dict | None, str, str]:
+def compare(variables: list[str], budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
     """Shares of the last commit's image and the commit's name, or None and why there is nothing to compare with."""
     try:
-        if not compile_text or not link_text:
-            raise base.NoBase("no compiler was named (--compile, --link)")
         commit = base.commit()
-        elf = base.build(commit, shlex.split(compile_text), shlex.split(link_text), cache=cache)
-        return shares(attribution.read(elf), budget), commit[:7], ""
+        return shares(attribution.read(base.build(commit, variables, cache=cache)), budget), commit[:7], ""
     except base.NoBase as reason:
         return None, "", str(reason)
 
@@ -244,7 +214,8 @@ def disassemble(objdump: str, elf: Path) -> str:
         raise UserError(f"no {words[0]}", "PATH", "install Microchip's XC16, or say where it is with XC16=folder")
     done = subprocess.run([*words, "-d", str(elf)], capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0:
-        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)), "build the image anew with `make firmware`")
+        raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)),
+                        "build the image anew with `make firmware`")
     return done.stdout
 
 
@@ -252,10 +223,10 @@ def main(arguments: list[str] | None = None) -> int:
     def work() -> int:
         parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
-        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json, size.csv, size.png")
+        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json")
         parser.add_argument("--objdump", default="xc16-objdump")
-        parser.add_argument("--compile", default="", help="compiler and flags, for the last commit's image")
-        parser.add_argument("--link", default="", help="the same for linking, with {objects}, {elf} and {map}")
+        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
+                            help="compare with the last commit's image, built by make with these variables")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
         parser.add_argument("--brief", action="store_true", help="no table of functions")
         return _run(parser.parse_args(arguments))
@@ -265,13 +236,14 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     budget = Budget.read()
     listing = disassemble(options.objdump, options.elf)
-    sources = "".join(path.read_text(encoding="utf-8") for path in sorted((paths.ROOT / "firmware" / "board").glob("*.c")))
-    before, name, reason = compare(options.compile, options.link, budget)
-    report = measure(options.elf, budget, listing, sources, before, not options.no_budget)
+    image = attribution.read(options.elf)
+    before, name, reason = (None, "", "not asked for (--base)") if options.base is None else compare(options.base, budget)
+    report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
-    files = write(report, options.out)
+    report.broken += budget.unmatched(Sources.read(), image)
+    path = write_json(summary(report), options.out, "size")
     print(text(report, not options.brief))
-    print("written: " + ", ".join(str(paths.shown(path)) for path in files))
+    print(f"written: {paths.shown(path)}")
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)
     return 1 if report.broken else 0

@@ -22,11 +22,11 @@ target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(
 target_link_options := --gc-sections,--report-mem
 target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 
-target_sources := $(wildcard firmware/*/*.c)
+target_sources := $(wildcard firmware/*/*.c firmware/*/*/*.c)
 target_objects := $(target_sources:%.c=$X/%.o)
 
 .PHONY: firmware flash project find-xc16
-firmware: $X/checked ## the image for the dsPIC, by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES=-D... USERPARAMS=folder]
+firmware: $X/checked ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
 	@cat $<
 
 find-xc16:
@@ -78,11 +78,11 @@ $X/checked: $X/foc33.hex firmware/board/config.c firmware/budget.toml $(wildcard
 	@$(target_check) >$@.new || { status=$$?; cat $@.new; rm -f $@.new $@; mv -f $X/foc33.hex $X/foc33.refused.hex; exit $$status; }
 	@mv $@.new $@
 
-flash: firmware ## program the board by MPLAB IPE's command line, or say how [TOOL=PK4|PK5|ICD4|SNAP|PK3 IPE=folder]
+flash: firmware ## [your board] program the board by MPLAB IPE's command line, or say how [TOOL=PK4|PK5|ICD4|SNAP|PK3 IPE=folder]
 	@$(python) -m tools.image.flash $X/foc33.hex --elf $X/foc33.elf $(if $(TOOL),--tool $(call quoted,$(TOOL))) $(if $(IPE),--ipe $(call quoted,$(IPE)))
 
 # What the MPLAB X project is made of, one item a line: it cannot say anything else than this file does.
-target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h) userparams.h,'file $(word)') \
+target_facts = $(foreach word,$(target_sources) $(wildcard include/*.h include/*/*.h include/*/*/*.h) userparams.h,'file $(word)') \
     $(foreach word,$(filter-out -Werror,$(target_flags) $(target_warnings)),'flag $(word)') \
     $(foreach word,$(patsubst -I%,%,$(target_includes)),'include $(word)') \
     $(foreach word,$(subst $(comma), ,$(target_link_options)),'link $(word)') 'device $(target_device)'
@@ -91,7 +91,7 @@ target_facts = $(foreach word,$(target_sources) $(wildcard include/*/*.h) userpa
 project project-facts: override OPT := -O2
 project project-facts: override USERPARAMS :=
 
-project: ## write the MPLAB X project firmware.X anew
+project: ## [your board] write the MPLAB X project firmware.X
 	$(target_setup)
 	@printf '%s\n' $(target_facts) | $(python) -m tools.image.project
 

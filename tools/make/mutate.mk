@@ -1,6 +1,6 @@
 # Mutation testing: how much of what could be wrong in the firmware the tests notice. Uses the variables of the main Makefile.
 .PHONY: mutate setup-mutate
-mutate: setup-mutate ## plant small defects in the firmware and count how many the tests notice [MUTATE="--full --closed-loop --files svm.h"]
+mutate: setup-mutate ## [tests] plant small defects and count how many the tests notice [MUTATE="--full --closed-loop --files svm.h"]
 	@$(python) test/mutate/mutate.py --compile $(call quoted,$(test_compile)) --tests $(unit_c) --scripts $(filter %/test_param_ranges,$(source_py)) \
 	    --behaviour $(behaviour_c) $(MUTATE)
 

@@ -1,5 +1,5 @@
 # Proofs of the control law and the drive.
 .PHONY: proof
-proof: ## Frama-C Eva, 16-bit int: no run-time error and no overflow for any sample, state and parameter [ONLY="tick ..."]
+proof: ## [tests] Frama-C, 16-bit int: no run-time error and no overflow for any input [ONLY="tick ..."]
 	@test/static/need.sh frama-c=frama-c-base
 	@python3 test/proof/proof.py $(ONLY)

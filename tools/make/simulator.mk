@@ -1,29 +1,26 @@
-# The instruction-set simulator as a library of its own: build/iss/libiss33f.a and, for Python, libiss33f.so; and its benchmark.
+# The simulator's core, without chip and board, as a library of its own: build/iss/libiss33f.a; and its benchmark.
 iss_folder := build/iss$(if $(SAN),-san)
-iss_objects := $(patsubst tools/iss33f/%.c,$(iss_folder)/%.o,$(filter-out %_test.c,$(wildcard tools/iss33f/*.c)))
-iss_compile = $(CC) -std=c11 -O2 -g -fPIC $(sanitizer) $(warnings) -Werror
+iss_sources := $(filter-out $(addprefix tools/cpu_33f/iss_,board.c cpu.c probe.c shadow.c),$(wildcard tools/cpu_33f/*.c))
+iss_objects := $(iss_sources:tools/%.c=$(iss_folder)/%.o)
+iss_includes := -Itools/chip -Itools/cpu_33f
+iss_compile = $(CC) -std=c11 -O2 -g -fPIC $(sanitizer) $(warnings) -Werror $(iss_includes)
 
 .PHONY: iss iss-bench
-iss: $(iss_folder)/libiss33f.a $(iss_folder)/libiss33f.so ## build/iss/libiss33f.a, .so: the dsPIC33F simulator without a board [SAN=1]
+iss: $(iss_folder)/libiss33f.a ## [simulator] build/iss/libiss33f.a: the dsPIC33F's core without a board [SAN=1]
 	@:
 
 $(iss_folder)/flags: FORCE
 	$(call remember,$(iss_compile) $(iss_objects))
 
-$(iss_folder)/%.o: tools/iss33f/%.c $(iss_folder)/flags
+$(iss_folder)/%.o: tools/%.c $(iss_folder)/flags
+	@mkdir -p $(@D)
 	$(call say,cc,$<)$(iss_compile) -MMD -MP -c $< -o $@
 
 $(iss_folder)/libiss33f.a: $(iss_objects)
 	@rm -f $@
 	$(call say,ar,$@)ar rcs $@ $^
 
-$(iss_folder)/libiss33f.so: $(iss_objects)
-	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ $^ -lm
-
-iss-bench: $(iss_folder)/bench ## how many instructions per second the simulator executes on one core
-	@$< $(wildcard build/target/foc33.elf)
-
-$(iss_folder)/bench: test/iss/bench.c $(iss_folder)/libiss33f.a
-	$(call say,cc,$<)$(iss_compile) -Itools/iss33f -o $@ $^ -lm
+iss-bench: setup-run build/iss/libmachine.so ## [simulator] instruction cycles per second that the simulator executes on one core
+	@$(python) test/cpu_33f/bench.py
 
 -include $(iss_objects:.o=.d)

@@ -1,9 +1,15 @@
 # Static checks and the sanitizer build of the unit tests.
 .PHONY: static
-static: ## gcc and clang warnings in every mode, cppcheck, MISRA, clang-tidy; exceptions in docs/deviations.md
-	@test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14
+static: ## [tests] compiler warnings in every mode, cppcheck, MISRA, clang-tidy, format [docs/deviations.md]
+	@test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 clang-format-14=clang-format-14
+	@python3 test/static/format.py
 	@python3 test/static/static.py
 
+.PHONY: format
+format: ## [upkeep] write the C files in the style of .clang-format
+	@test/static/need.sh clang-format-14=clang-format-14
+	@python3 test/static/format.py --write
+
 .PHONY: ubsan
-ubsan: setup-test ## the unit tests built with clang's undefined, integer and implicit-conversion sanitizers
+ubsan: setup-test ## [tests] the unit tests under clang's undefined, integer and implicit-conversion sanitizers
 	@test/static/ubsan.sh

@@ -1,21 +1,20 @@
-# The unit tests of the control law as target code: compiled by XC16, run in the instruction-set simulator. Uses tools/make/image.mk.
+# The unit tests of the control law as the chip runs them: compiled by XC16, in the instruction-set simulator. Uses tools/make/image.mk.
 #
-# The same tests as on the AVR: those without mocks, registers and the motor in floating point.
-target_tests = $(avr_tests)
+# The same tests as on the AVR: those without mocks, registers and the motor in floating point (tools/make/test-avr.mk).
 target_test_law = $(filter $X/firmware/control/%.o $X/firmware/drive/%.o,$(target_objects))
 target_test_simulator := $B/target-test
 
-$(target_test_simulator): test/target/sim.c test/target/simulator.h $$(filter $$B/tools/iss33f/%,$$(pil_objects)) $B/flags
-	$(call say,cc,$@)$(CC) $(subst gnu99,c11,$(CFLAGS)) $(warnings) -Itools/iss33f -Itest/target -o $@ $(filter %.c %.o,$^) -lm
+$(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/run_image.h test/sixteen_bit/ports.h \
+    $$(iss_folder)/libiss33f.a
+	@mkdir -p $(@D)
+	$(call say,cc,$@)$(iss_compile) -o $@ $(filter %.c %.a,$^) -lm
 
 .PHONY: test-target
-test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## the unit tests of the control law compiled by XC16, in the simulator; results as on the PC [ONLY="test_pi ..."]
-	@$(if $(call chosen,$(target_tests)),:,echo foc33: no unit test of the control law, ONLY=$(call quoted,$(ONLY)): use \
-	    $(call quoted,$(sort $(notdir $(target_tests)))) >&2; exit 2)
-	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(target_tests)))
+test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## [tests] the unit tests of the control law as target code, in the simulator [ONLY="test_pi ..."]
+	@$(if $(call chosen,$(law_tests)),:,echo foc33: no unit test of the control law, ONLY=$(call quoted,$(ONLY)): use \
+	    $(call quoted,$(sort $(notdir $(law_tests)))) >&2; exit 2)
+	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(law_tests)))
 	@mkdir -p $X/test; rm -f $X/test/liblaw.a; $(xc16)ar rcs $X/test/liblaw.a $(target_test_law)
-	@$(python) test/target/run.py --unity $(unity) --runners $T --host $T --out $X/test --library $X/test/liblaw.a \
-	    --simulator $(target_test_simulator) \
+	$(sixteen_bit) --out $X/test --library $X/test/liblaw.a --simulator $(target_test_simulator) --flat \
 	    --compile $(call quoted,$(xc16)gcc $(target_part) $(target_flags) $(target_includes) $(DEFINES)) \
-	    --link $(call quoted,$(target_link) -o {elf} {objects} -Wl$(comma)-Map={map}$(comma)$(target_link_options)) \
-	    $(call chosen,$(target_tests))
+	    --link $(call quoted,$(target_link) -o {elf} {objects} -Wl$(comma)-Map={map}$(comma)$(target_link_options)) $(call chosen,$(law_tests))

@@ -4,8 +4,8 @@
 
 #include "hurst_params.h"
 
-#include "drive/drive_tick.h"
-#include "drive/params_init.h"
+#include "drive/tick.h"
+#include "drive/param_init.h"
 
 static const drive_params_t params = DRIVE_PARAMS_INIT;
 static drive_t drive;
@@ -45,7 +45,7 @@ static inline void rig_tick(uint16_t periods)
         out.duty = drive_tick(&drive, &params, &samples);
         out.outputs = drive_outputs(&drive);
         drive_slow(&drive, &params, samples.v_bus);
-        if (drive.fault != (uint16_t)FAULT_NONE) {
+        if (drive_settle(&drive)) {
             out.outputs = (uint16_t)OUTPUTS_OFF;
         }
     }
@@ -67,7 +67,6 @@ static inline void rig_power_up(void)
 {
     rig_currents(0, 0);
     rig_bus(PARAM_F(NOMINAL_BUS_V));
-    samples.pot = 0;
     drive_init(&drive, &params);
 }
 
@@ -75,7 +74,7 @@ static inline void rig_power_up(void)
 static inline void rig_ready(void)
 {
     rig_power_up();
-    rig_tick(1u << DRIVE_CALIBRATION_LOG2);
+    rig_tick(1u << CALIBRATION_LOG2);
 }
 
 /** Ready, then started; the next tick is the first of BOOTSTRAP. */
@@ -85,11 +84,11 @@ static inline void rig_start(int16_t direction)
     drive_start(&drive, &params, direction);
 }
 
-/** Started, with the first period of LOCK done. */
+/** Started, with the first period of ALIGN done. */
 static inline void rig_lock(int16_t direction)
 {
     rig_start(direction);
-    (void)rig_tick_until(DRIVE_LOCK, params.bootstrap_periods + 2u);
+    (void)rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u);
 }
 
 /** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
@@ -99,10 +98,10 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     rig_tick(1);
     drive.state = (uint16_t)DRIVE_CLOSED;
     drive.command.target_erpm = speed_erpm;
-    drive.control.reference_erpm = speed_erpm;
-    drive.control.ref_q13.q = 0;
-    drive.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
-    drive.estimator.omega_erpm = speed_erpm;
+    drive.run.control.reference_erpm = speed_erpm;
+    drive.run.control.ref_q13.q = 0;
+    drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    drive.run.estimator.omega_erpm = speed_erpm;
 }
 
 /** Counter of the slow steps brought to a value, so that the next tick runs the block of `slot`. */

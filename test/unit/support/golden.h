@@ -1,4 +1,4 @@
-/* Helpers of the golden-vector tests: the failing row in the message, and the generator's checksum. */
+/* Helpers of the golden-vector tests: a walk through a table, the failing row in the message, and the generator's checksum. */
 #ifndef TEST_GOLDEN_H
 #define TEST_GOLDEN_H
 
@@ -15,6 +15,11 @@ static inline const char *golden_row(uint32_t n)
     }
     return text;
 }
+
+/** For each row v, whose number is n, of the vectors `name`: GOLDEN_EACH(park, v) { ... } */
+#define GOLDEN_EACH(name, v) \
+    golden_##name##_t v; \
+    for (uint32_t n = 0; n < golden_##name##_rows && (v = golden_##name##_row(n), 1); n++)
 
 /** s = 31 s + the value's low word, modulo 2^32. */
 static inline uint32_t golden_checksum(uint32_t s, int16_t value)

@@ -118,7 +118,7 @@ static inline void unknown_begin(void)
 static inline uint16_t unknown_until(identify_step_t step)
 {
     uint16_t ms = 0;
-    while (drive.identify.step != (uint16_t)step && drive.identify.result == (uint16_t)IDENTIFY_RESULT_BUSY && ms < 20000u) {
+    while (drive.run.identify.step != (uint16_t)step && drive.run.identify.result == (uint16_t)IDENTIFY_RESULT_BUSY && ms < 20000u) {
         unknown_ms();
         ms++;
     }
@@ -130,7 +130,7 @@ static inline uint16_t unknown_identify(void)
 {
     unknown_begin();
     (void)unknown_until(IDENTIFY_IDLE);
-    return drive.identify.result;
+    return drive.run.identify.result;
 }
 
 #endif

@@ -31,8 +31,7 @@ static inline void panel_and_drive_ms(uint16_t ms)
 /** Potentiometer at a 10-bit converter result, long enough for the filter. */
 static inline void panel_turn_pot(uint16_t result)
 {
-    samples.pot = (int16_t)((uint16_t)(result << 6) ^ 0x8000u);
-    drive.pot_q15 = samples.pot;
+    the_panel.pot_q15 = (int16_t)((uint16_t)(result << 6) ^ 0x8000u);
     panel_ms(400);
 }
 

@@ -1,0 +1,388 @@
+/* IDENTIFY, the background's part: takes the interrupt's sums, computes R, L and Kphi, and asks for the next step. */
+#include "drive/modes/identify_tick.h"
+
+#ifdef IDENTIFY
+
+#include "control/root.h"
+#include "drive/param_scaling.h"
+
+#define SETTLE_PERIODS PARAM_PERIODS(0.4F)  /* ten time constants of the slow current controller */
+#define SLOW_LOOP_RAD_S 25.0F               /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
+#define LEAST_CURRENT_Q13 64                /* of the division by a current: above the factor 25 rad/s LOOPTIME 2^14, which is below 58 */
+#define SLOW_SHIFT 14u
+#define LOOP_RAD_S (2.0F * PARAM_PI * 200.0F) /* current loops while turning */
+#define LOOP_SHIFT 10u
+#define MEAN_LOG2 12                        /* periods of a mean at standstill */
+#define TRY_HALVES 64u
+#define INDUCTANCE_PERIODS 8192u
+#define FIRST_HALF 4u                       /* periods of half a square wave: short, so that the rotor does not answer */
+#define LAST_HALF 64u
+#define BLOCK_LOG2 5                        /* periods of a stretch of back-EMF: short against the rotor's swinging */
+#define BLOCKS_LOG2 8                       /* stretches: many swings */
+#define BLOCKS 256u
+
+/* ---- Constants from the board's parameters ---- */
+#define TS_US (PARAM_F(LOOPTIME_SEC) * 1000000.0F)
+/* mohm for a bus of 1 (Q16) and one duty count along phase A per current count. */
+#define MOHM_PER_RATIO (1000.0F * PARAM_F(BUS_FULL_SCALE_V) / (65536.0F * 3.0F * (float)PWM_FULL_DUTY * 4.0F * PARAM_F(NORM_CURRENT_CONST)))
+#define C_RESISTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * 16777216.0F), 24)
+/* The sums of duties are sums of two. */
+#define C_INDUCTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * TS_US / 2000.0F * 268435456.0F), 28)
+#define C_TS soft_float_scaled((uint32_t)(TS_US / 1000.0F * 16777216.0F), 24) /* uH per mohm */
+#define C_KP soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.000001F * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 16777216.0F), 24)
+#define C_KI soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.001F * PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 268435456.0F), 28)
+#define C_OHMIC soft_float_scaled((uint32_t)(0.001F * 2.0F * PARAM_IU * 4294967296.0F), 32) /* Q13 current to Q14 voltage per mohm */
+/* The same per uH and 1/1024 angle count a period. */
+#define C_REACTIVE soft_float_scaled((uint32_t)(0.000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 72057594037927936.0F), 56)
+/* mV line to line per 1000 rpm, from Q14 voltage over 1/1024 angle counts a period. */
+#define C_KPHI soft_float_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
+                                        * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), 6)
+
+/* ---- Requests to the interrupt ---- */
+
+/** Sums anew: `periods` of them after `wait`. The last word of every step: from here on the interrupt owns the state. */
+static void go(identify_t *id, identify_step_t step, uint16_t wait, uint16_t periods)
+{
+    int16_t n;
+    for (n = 0; n < 4; n++) {
+        id->sum[n] = 0;
+    }
+    id->wait = wait;
+    id->left = periods;
+    id->step = (uint16_t)step;
+    id->ready = 0;
+}
+
+static void finish(drive_t *d, identify_result_t result)
+{
+    d->run.identify.result = (uint16_t)result;
+    d->run.identify.step = (uint16_t)IDENTIFY_IDLE;
+    d->command.run = 0;
+}
+
+void identify_start(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    id->result = (uint16_t)IDENTIFY_RESULT_BUSY;
+    id->mode = (uint16_t)IDENTIFY_GROW;
+    id->shift = SLOW_SHIFT;
+    id->half = FIRST_HALF;
+    id->half_left = FIRST_HALF / 2u;
+    id->rise_q13 = (int16_t)(p->open_loop_q13 >> 1);
+    d->run.control.pi_d.sum = (int32_t)16 << SLOW_SHIFT; /* about ten millivolts */
+    d->run.control.ref_q13.d = id->rise_q13;
+    d->run.control.ref_q13.q = 0;
+    d->forced.angle_q32 = IDENTIFY_START_ANGLE_Q32;
+    d->angle = forced_angle(&d->forced);
+    d->frame = trig_sincos(d->angle);
+    go(id, IDENTIFY_RISE, 0, 1);
+}
+
+/* ---- Resistance ---- */
+
+/** Voltage and current at the end of RISE give R well enough for a slow integral controller of any motor. */
+static void rise_done(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    int16_t i_q13 = d->run.control.i_q13.d, v_q14 = d->run.control.v_q14.d;
+    uint16_t ki;
+    if (v_q14 >= identify_most(&d->circle)) {
+        finish(d, (i_q13 < (p->open_loop_q13 >> 3)) ? IDENTIFY_RESULT_NO_CURRENT : IDENTIFY_RESULT_CURRENT_NOT_REACHED);
+        return;
+    }
+    if (i_q13 < (id->rise_q13 >> 1)) {
+        i_q13 = (int16_t)(id->rise_q13 >> 1); /* a current that breaks down now is found in the next step */
+    }
+    if (i_q13 < LEAST_CURRENT_Q13) {
+        i_q13 = LEAST_CURRENT_Q13;
+    }
+    ki = qm_divud(qm_muluu((uint16_t)v_q14, (uint16_t)(SLOW_LOOP_RAD_S * PARAM_F(LOOPTIME_SEC) * 16384.0F + 0.5F)), (uint16_t)i_q13);
+    id->ki_d = (int16_t)((ki == 0u) ? 1u : ki); /* at most the voltage: what divides is larger than the factor */
+    id->mode = (uint16_t)IDENTIFY_CURRENT;
+    go(id, IDENTIFY_CONNECT, SETTLE_PERIODS, 1u << MEAN_LOG2);
+}
+
+/** 1 if the current is within an eighth of what was asked for; else the end of the procedure. @param mean_q13 along the frame's d axis */
+static uint16_t current_reached(drive_t *d, int16_t mean_q13)
+{
+    int16_t ref_q13 = d->run.control.ref_q13.d;
+    if (mean_q13 < (ref_q13 >> 2)) {
+        finish(d, IDENTIFY_RESULT_NO_CURRENT);
+        return 0;
+    }
+    if (mean_q13 < ref_q13 - (ref_q13 >> 3) || d->run.control.v_q14.d >= identify_most(&d->circle)) {
+        finish(d, IDENTIFY_RESULT_CURRENT_NOT_REACHED);
+        return 0;
+    }
+    return 1;
+}
+
+/** At -60 degrees phase B carries all of the current and A and C half of it each. */
+static void connect_done(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    int16_t a_q13 = (int16_t)(id->sum[1] >> MEAN_LOG2), b_q13 = (int16_t)(id->sum[2] >> MEAN_LOG2);
+    if (!current_reached(d, (int16_t)-b_q13)) {
+        return;
+    }
+    if (qm_abs((int16_t)(2 * a_q13 + b_q13)) > (d->run.control.ref_q13.d >> 1)) {
+        finish(d, IDENTIFY_RESULT_NO_CURRENT);
+        return;
+    }
+    d->run.control.ref_q13.d = p->open_loop_q13;
+    id->sweep = 1;
+    go(id, IDENTIFY_ALIGN, SETTLE_PERIODS, 1u << MEAN_LOG2);
+}
+
+static void align_done(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    if (current_reached(d, (int16_t)(id->sum[1] >> MEAN_LOG2))) {
+        id->duty_first = id->sum[0];
+        id->i_first = id->sum[1];
+        id->bus_first = id->sum[3];
+        d->run.control.ref_q13.d = (int16_t)(p->open_loop_q13 >> 1);
+        go(id, IDENTIFY_RESISTANCE, SETTLE_PERIODS, 1u << MEAN_LOG2);
+    }
+}
+
+/** R from two levels: what dead time and the diodes take is the same in both, for no phase current comes near zero. The first
+ *  level's duties are brought to the bus of the second. */
+static void resistance_done(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    soft_float_t bus = soft_float_div(soft_float_of((uint32_t)id->bus_first), soft_float_of((uint32_t)id->sum[3]));
+    int32_t duty_first = soft_float_times(id->duty_first, bus);
+    int32_t duty = duty_first - id->sum[0], i = id->i_first - id->sum[1];
+    if (duty <= 0 || i <= 0) {
+        finish(d, IDENTIFY_RESULT_R_RANGE);
+        return;
+    }
+    id->duty_per_amp = soft_float_div(soft_float_of((uint32_t)duty), soft_float_of((uint32_t)i));
+    /* Standing, one phase carries it and the other two their halves: 4/3 of a leg's voltage; turning, 4/pi. */
+    id->dead_q13 = soft_float_times((soft_float_times(duty_first, soft_float_div(soft_float_of(1), id->duty_per_amp)) - id->i_first) >> MEAN_LOG2,
+                                soft_float_scaled((uint32_t)(3.0F / PARAM_PI * 65536.0F), 16));
+    id->values.rs_mohm = soft_float_to_uint16(soft_float_mul(soft_float_mul(id->duty_per_amp, soft_float_of((uint32_t)(id->sum[3] >> MEAN_LOG2))), C_RESISTANCE));
+    if (id->values.rs_mohm < 20u || id->values.rs_mohm > 40000u) {
+        finish(d, IDENTIFY_RESULT_R_RANGE);
+        return;
+    }
+    d->run.control.ref_q13.d = (int16_t)(p->open_loop_q13 - (p->open_loop_q13 >> 2));
+    go(id, IDENTIFY_BIAS, SETTLE_PERIODS, 1);
+}
+
+/* ---- Inductance ---- */
+
+/** Largest square voltage: what the bias leaves of seven eighths of the circle. */
+static int16_t square_most(const drive_t *d)
+{
+    return (int16_t)(d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - d->run.identify.bias_q14);
+}
+
+static void bias_done(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    id->bias_q14 = d->run.control.v_q14.d;
+    id->square_q14 = (int16_t)(d->circle.limit_q14 >> 7);
+    id->mode = (uint16_t)IDENTIFY_INJECT;
+    go(id, IDENTIFY_TRY_D, 4u * FIRST_HALF, TRY_HALVES * FIRST_HALF);
+}
+
+/** More voltage, then longer halves, until the current changes by 1/6 to 1/3 of Q_CURRENT_REF_OPENLOOP from peak to peak; with a bias of
+ *  3/4 of it no phase current reaches zero on either axis. @param next step of the measurement proper */
+static void try_done(drive_t *d, const drive_params_t *p, identify_step_t next)
+{
+    identify_t *id = &d->run.identify;
+    uint16_t half = id->half;
+    /* phase A, or sqrt(3) beta */
+    int32_t wanted = (int32_t)(id->on_q ? p->open_loop_q13 - (p->open_loop_q13 >> 2) : p->open_loop_q13 >> 1) * (int32_t)(TRY_HALVES / 3u);
+    int32_t seen = id->sum[2];
+    int16_t most = square_most(d);
+    if (seen >= wanted) {
+        go(id, next, 4u * half, INDUCTANCE_PERIODS);
+        return;
+    }
+    if (id->square_q14 < most) {
+        id->square_q14 = (int16_t)((id->square_q14 > (most >> 1)) ? most : 2 * id->square_q14);
+    } else if (half < LAST_HALF) {
+        half = (uint16_t)(2u * half);
+        id->half = half;
+    } else {
+        finish(d, IDENTIFY_RESULT_L_RANGE);
+        return;
+    }
+    go(id, (identify_step_t)id->step, (uint16_t)(4u * half), (uint16_t)(TRY_HALVES * half));
+}
+
+/** L = Ts sum((v - R i) s) / sum(di s), less what R/L does within a period: voltages come as pulses a quarter period from the
+ *  samples, which makes this L too large by 3/8 (Ts R / (2 L))^2. @return uH, or 0 when it cannot be */
+static uint16_t inductance(const identify_t *id)
+{
+    int32_t volts = id->sum[0] - soft_float_times(id->sum[1], id->duty_per_amp);
+    soft_float_t l, rt;
+    uint16_t l_uh, less_uh;
+    if (volts <= 0 || id->sum[2] <= 0) {
+        return 0;
+    }
+    l = soft_float_div(soft_float_of((uint32_t)volts), soft_float_of((uint32_t)id->sum[2]));
+    l = soft_float_mul(soft_float_mul(l, soft_float_of(id->bus_q16)), C_INDUCTANCE);
+    rt = soft_float_mul(soft_float_of(id->values.rs_mohm), C_TS);
+    less_uh = soft_float_to_uint16(soft_float_div(soft_float_mul(soft_float_mul(rt, rt), soft_float_scaled(3, 5)), l));
+    l_uh = soft_float_to_uint16(l);
+    return (uint16_t)((l_uh >= 20u && l_uh <= 60000u && less_uh < l_uh >> 1) ? (uint16_t)(l_uh - less_uh) : 0u);
+}
+
+static void inductance_d_done(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    id->values.ld_uh = inductance(id);
+    if (id->values.ld_uh == 0u) {
+        finish(d, IDENTIFY_RESULT_L_RANGE);
+        return;
+    }
+    id->on_q = 1;
+    id->square_q14 = (int16_t)(id->square_q14 >> 1);
+    go(id, IDENTIFY_TRY_Q, (uint16_t)(4u * id->half), (uint16_t)(TRY_HALVES * id->half));
+}
+
+/* ---- Back-EMF ---- */
+
+static int16_t gain(soft_float_t x)
+{
+    uint16_t g = soft_float_to_uint16(x);
+    return (int16_t)((g > 32767u) ? 32767u : (g == 0u) ? 1u : g);
+}
+
+static void forget_emf(identify_t *id)
+{
+    id->blocks = 0;
+    id->emf_sum = 0;
+    id->emf_d_sum = 0;
+    id->emf_q_sum = 0;
+}
+
+/** R and L known: fast current controllers, then the vector turns. It starts along the rotor, so nothing jumps. */
+static void inductance_q_done(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    pi_gains_t gains = { 0, 0, 0, LOOP_SHIFT };
+    id->values.lq_uh = inductance(id);
+    if (id->values.lq_uh == 0u) {
+        finish(d, IDENTIFY_RESULT_L_RANGE);
+        return;
+    }
+    id->kp_d = gain(soft_float_mul(soft_float_of(id->values.ld_uh), C_KP));
+    id->kp_q = gain(soft_float_mul(soft_float_of(id->values.lq_uh), C_KP));
+    id->ki_d = gain(soft_float_mul(soft_float_of(id->values.rs_mohm), C_KI));
+    id->ki_q = id->ki_d;
+    id->shift = LOOP_SHIFT;
+    id->halvings = 1;
+    pi_preset(&d->run.control.pi_d, &gains, 0, id->bias_q14);
+    pi_preset(&d->run.control.pi_q, &gains, 0, 0);
+    d->run.control.ref_q13.d = p->open_loop_q13;
+    id->mode = (uint16_t)IDENTIFY_TURN;
+    forget_emf(id);
+    go(id, IDENTIFY_SPIN_HALF, SETTLE_PERIODS, 1u << BLOCK_LOG2);
+}
+
+/** Speed of the vector in 1/1024 angle counts a period. */
+static uint32_t turn_speed(const drive_t *d, const drive_params_t *p)
+{
+    return (uint32_t)p->forced.end_speed_q10 >> d->run.identify.halvings;
+}
+
+/** Mean of a stretch, within what root_length() can square. */
+static int16_t emf_mean(int32_t sum)
+{
+    int32_t mean = sum >> BLOCK_LOG2;
+    return (int16_t)((mean > 23170) ? 23170 : (mean < -23170) ? -23170 : mean);
+}
+
+/** Means of one stretch, back-EMF e = v - R i - j w Ld i: with the current along the rotor, as without load, Lq has no say. The
+ *  voltage that dead time takes has the current's direction. */
+static void emf_block(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    soft_float_t ohmic = soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC);
+    soft_float_t reactive = soft_float_mul(soft_float_mul(soft_float_of(id->values.ld_uh), soft_float_of(turn_speed(d, p))), C_REACTIVE);
+    int16_t e_d = emf_mean(id->sum[0] - soft_float_times(id->sum[2] + id->dead_q13 * (1 << BLOCK_LOG2), ohmic) + soft_float_times(id->sum[3], reactive));
+    int16_t e_q = emf_mean(id->sum[1] - soft_float_times(id->sum[3], ohmic) - soft_float_times(id->sum[2], reactive));
+    id->blocks++;
+    id->emf_sum += root_length(e_d, e_q);
+    id->emf_d_sum += e_d;
+    id->emf_q_sum += e_q;
+}
+
+/** mV per 1000 rpm: the mean length, so that swinging of the rotor, which turns the vector to and fro, does not shorten it. */
+static uint16_t kphi(const drive_t *d, const drive_params_t *p)
+{
+    soft_float_t mean = soft_float_of(d->run.identify.emf_sum);
+    mean.e = (int16_t)(mean.e - BLOCKS_LOG2);
+    return soft_float_to_uint16(soft_float_mul(soft_float_div(mean, soft_float_of(turn_speed(d, p))), C_KPHI));
+}
+
+/** 1 if the stretches agree in direction: a rotor that slips has them everywhere. */
+static uint16_t coherent(const identify_t *id)
+{
+    uint16_t mean = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
+    return (uint16_t)(root_length((int16_t)(id->emf_d_sum >> BLOCKS_LOG2), (int16_t)(id->emf_q_sum >> BLOCKS_LOG2)) > mean - (mean >> 2));
+}
+
+static void spin_done(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    uint16_t result_mv;
+    dq_t v;
+    v.d = (int16_t)(id->sum[0] >> BLOCK_LOG2);
+    v.q = (int16_t)(id->sum[1] >> BLOCK_LOG2);
+    if (root_length(v.d, v.q) > (uint16_t)(d->circle.limit_q14 - (d->circle.limit_q14 >> 3))) {
+        finish(d, IDENTIFY_RESULT_VOLTAGE_LIMIT);
+        return;
+    }
+    emf_block(d, p);
+    if (id->blocks < BLOCKS) {
+        go(id, (identify_step_t)id->step, 0, 1u << BLOCK_LOG2);
+        return;
+    }
+    result_mv = kphi(d, p);
+    if (!coherent(id) || result_mv < 500u) {
+        finish(d, IDENTIFY_RESULT_NOT_TURNING);
+    } else if (result_mv > 65000u) {
+        finish(d, IDENTIFY_RESULT_KPHI_RANGE);
+    } else if (id->step == (uint16_t)IDENTIFY_SPIN_HALF) {
+        id->kphi_half = result_mv;
+        id->halvings = 0;
+        forget_emf(id);
+        go(id, IDENTIFY_SPIN_FULL, SETTLE_PERIODS, 1u << BLOCK_LOG2);
+    } else if ((uint16_t)((result_mv > id->kphi_half) ? result_mv - id->kphi_half : id->kphi_half - result_mv) > result_mv >> 3) {
+        finish(d, IDENTIFY_RESULT_NOT_TURNING);
+    } else {
+        id->values.kphi_mv_per_krpm = result_mv;
+        finish(d, IDENTIFY_RESULT_DONE);
+    }
+}
+
+uint16_t identify_background(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    if (id->step != (uint16_t)IDENTIFY_IDLE && !d->command.run) { /* S2 or a fault */
+        finish(d, IDENTIFY_RESULT_STOPPED);
+    }
+    if (id->step != (uint16_t)IDENTIFY_IDLE && id->ready) {
+        switch (id->step) {
+        case IDENTIFY_RISE: rise_done(d, p); break;
+        case IDENTIFY_CONNECT: connect_done(d, p); break;
+        case IDENTIFY_ALIGN: align_done(d, p); break;
+        case IDENTIFY_RESISTANCE: resistance_done(d, p); break;
+        case IDENTIFY_BIAS: bias_done(d); break;
+        case IDENTIFY_TRY_D: try_done(d, p, IDENTIFY_INDUCTANCE_D); break;
+        case IDENTIFY_INDUCTANCE_D: inductance_d_done(d); break;
+        case IDENTIFY_TRY_Q: try_done(d, p, IDENTIFY_INDUCTANCE_Q); break;
+        case IDENTIFY_INDUCTANCE_Q: inductance_q_done(d, p); break;
+        default: spin_done(d, p); break;
+        }
+    }
+    return (uint16_t)(id->step == (uint16_t)IDENTIFY_IDLE);
+}
+
+#endif

@@ -1,0 +1,12 @@
+/* Text into a buffer, for the status line. */
+#ifndef BOARD_TEXT_H
+#define BOARD_TEXT_H
+
+#include <stdint.h>
+
+/** Each writes from `at` on, without a closing zero, and returns where the next text goes. The caller has room. */
+char *text_put(char *at, const char *text);
+char *text_put_unsigned(char *at, uint16_t number);
+char *text_put_signed(char *at, int16_t number);
+
+#endif

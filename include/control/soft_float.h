@@ -1,0 +1,31 @@
+/* Positive numbers with 16 significant bits and any exponent, for background work whose range no Q format holds. */
+#ifndef CONTROL_SOFT_FLOAT_H
+#define CONTROL_SOFT_FLOAT_H
+
+#include "control/qmath.h"
+
+/** m * 2^e; m = 32768 .. 65535, or m = e = 0 for zero. */
+typedef struct {
+    uint16_t m;
+    int16_t e;
+} soft_float_t;
+
+/** An integer, truncated to 16 significant bits. */
+soft_float_t soft_float_of(uint32_t x);
+
+/** A constant that comes multiplied by 2^bits. */
+soft_float_t soft_float_scaled(uint32_t x, int16_t bits);
+
+/** a * b, truncated. */
+soft_float_t soft_float_mul(soft_float_t a, soft_float_t b);
+
+/** a / b, truncated; 0 for b = 0. */
+soft_float_t soft_float_div(soft_float_t a, soft_float_t b);
+
+/** Rounded, at most 65535. */
+uint16_t soft_float_to_uint16(soft_float_t a);
+
+/** x times a, truncated towards zero, for products below 2^30. */
+int32_t soft_float_times(int32_t x, soft_float_t a);
+
+#endif

@@ -1,0 +1,36 @@
+/* Calibration: the current offsets, averaged once with the outputs off. */
+#ifndef DRIVE_CALIBRATION_H
+#define DRIVE_CALIBRATION_H
+
+#include "drive/state.h"
+
+/** One sample. The last one raises FAULT_OFFSET unless both offsets are plausible. @return the next state */
+QM_INLINE drive_state_t calibration_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    calibration_t *c = &d->calibration;
+    c->sum_a += raw->i_a;
+    c->sum_b += raw->i_b;
+    d->periods++;
+    if (d->periods == (1u << CALIBRATION_LOG2)) {
+        int16_t a_q13 = qm_mulhi((int16_t)(c->sum_a >> CALIBRATION_LOG2), p->kcurr_a);
+        int16_t b_q13 = qm_mulhi((int16_t)(c->sum_b >> CALIBRATION_LOG2), p->kcurr_b);
+        if (qm_abs(a_q13) > p->offset_max_q13 || qm_abs(b_q13) > p->offset_max_q13) {
+            drive_raise(d, FAULT_OFFSET);
+        } else {
+            c->offset_a_q13 = a_q13;
+            c->offset_b_q13 = b_q13;
+            c->done = 1;
+            return DRIVE_STOPPED;
+        }
+    }
+    return DRIVE_CALIBRATE;
+}
+
+/** Sums begin anew, after a fault that came before the offsets were known. */
+QM_INLINE void calibration_restart(calibration_t *c)
+{
+    c->sum_a = 0;
+    c->sum_b = 0;
+}
+
+#endif

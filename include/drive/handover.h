@@ -1,0 +1,89 @@
+/* The hand-over from the forced angle to the estimator's: the decision, the change of frame, and what decays after it. */
+#ifndef DRIVE_HANDOVER_H
+#define DRIVE_HANDOVER_H
+
+#include "drive/modes/modes.h"
+#include "drive/state.h"
+
+/** At the end of the ramp, every eighth period: counts how long the estimator agrees with the forced speed, or gives up by name. */
+QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
+{
+    handover_t *h = &d->run.handover;
+    int16_t miss;
+    if (!mode_hands_over() || (d->ticks & (SLOTS - 1u)) != 0u) {
+        return;
+    }
+    miss = qm_abs(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), p->end_erpm));
+    h->waited_steps = (uint16_t)(h->waited_steps + 1u);
+    h->agreed_steps = (uint16_t)((miss < (p->end_erpm >> 2)) ? h->agreed_steps + 1u : 0u);
+    if (h->agreed_steps < p->ready_slots && h->waited_steps >= p->ready_timeout_slots) {
+        drive_raise(d, FAULT_START_FAILED);
+    }
+}
+
+/** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
+ *  those of the next sample. */
+NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
+{
+    drive_control_t *c = &d->run.control;
+    handover_t *h = &d->run.handover;
+    angle_t estimated = estimator_next_angle(&d->run.estimator);
+    sincos_t turn;
+    dq_t x;
+    alphabeta_t y;
+
+    h->offset = (int16_t)(angle_t)(d->angle - estimated);
+    turn = trig_sincos((angle_t)h->offset);
+    y = inverse_park(c->v_q14, turn);
+    c->v_q14.d = (int16_t)(2 * y.alpha);
+    c->v_q14.q = (int16_t)(2 * y.beta);
+    x.d = 0;
+    x.q = along_direction(d, p->open_loop_q13);
+    y = inverse_park(x, turn);
+    c->ref_q13.d = (int16_t)(2 * y.alpha);
+    c->ref_q13.q = (int16_t)(2 * y.beta);
+    h->id_q13 = c->ref_q13.d;
+    pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
+    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
+    c->reference_erpm = along_direction(d, p->end_erpm);
+    d->angle = estimated;
+    d->frame = trig_sincos(estimated);
+    drive_enter(d, DRIVE_CLOSED);
+}
+
+/** In RAMP, every eighth period: hands over once the estimator has agreed long enough. */
+QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
+{
+    if (d->run.handover.agreed_steps >= p->ready_slots) {
+        handover_now(d, p);
+    }
+}
+
+/** Six periods after the hand-over, whose own period has enough to do: the speed controller, which comes next, goes on from its q current. */
+QM_INLINE void handover_preset_speed(drive_run_t *run, const drive_params_t *p)
+{
+    drive_control_t *c = &run->control;
+    if (!run->handover.speed_is_preset) {
+        run->handover.speed_is_preset = 1;
+        pi_preset(&c->pi_speed, &p->pi_speed, qm_sub_limited(c->reference_erpm, estimator_speed(&run->estimator)), c->ref_q13.q);
+    }
+}
+
+/** What is left of the angle offset falls by one count a period, every eighth period by eight; its d current follows. */
+QM_INLINE void handover_decay(drive_t *d, const drive_params_t *p)
+{
+    handover_t *h = &d->run.handover;
+    int16_t offset = h->offset;
+    if (offset == 0) {
+        return;
+    }
+    if (offset > -2 * SLOTS && offset < 2 * SLOTS) {
+        offset = 0;
+    } else {
+        offset = (int16_t)((offset > 0) ? offset - SLOTS : offset + SLOTS);
+    }
+    h->offset = offset;
+    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(along_direction(d, p->open_loop_q13), trig_sincos((angle_t)offset).sin));
+}
+
+#endif

@@ -1,0 +1,39 @@
+/* The states with the bridge off or charging its drivers. */
+#ifndef DRIVE_IDLE_H
+#define DRIVE_IDLE_H
+
+#include "drive/calibration.h"
+#include "drive/startup.h"
+
+/** A period with the bridge off or charging its drivers: each state says which comes next, the gate lets it in or not. */
+NOINLINE void idle_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    uint16_t next = d->state;
+    switch (next) {
+    case DRIVE_CALIBRATE:
+        next = (uint16_t)calibration_step(d, p, raw);
+        break;
+    case DRIVE_STOPPED:
+        d->run.estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
+        d->run.control.reference_erpm = 0;
+        if (d->command.run) {
+            next = (uint16_t)DRIVE_BOOTSTRAP;
+        }
+        break;
+    case DRIVE_BOOTSTRAP:
+        next = (uint16_t)startup_bootstrap(d, p);
+        break;
+    default: /* FAULT */
+        if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) { /* raised in the background while it was cleared here */
+            calibration_restart(&d->calibration);
+            next = (uint16_t)drive_clear_fault(d);
+        }
+        break;
+    }
+    d->command.clear_fault = 0;
+    if (d->state != next) {
+        drive_enter(d, (drive_state_t)next);
+    }
+}
+
+#endif

@@ -1,0 +1,46 @@
+/* Limits of the current: the d axis takes what field weakening and hand-over ask for, the q axis gets the rest of the circle,
+ * and braking what the bus absorbs. */
+#ifndef DRIVE_LIMITS_H
+#define DRIVE_LIMITS_H
+
+#include "drive/drive.h"
+
+/** d current: what is left of the hand-over, the table and its trim; the q current gets the rest of the circle. */
+QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
+{
+    drive_control_t *c = &run->control;
+    int16_t id_max = (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
+    uint32_t ratio;
+
+    fieldweak_trim(&run->fieldweak, &p->fieldweak, (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q)), estimator_speed(&run->estimator));
+    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13), (int16_t)-id_max, id_max);
+    ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
+    c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
+}
+
+/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 filtered */
+QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15)
+{
+    int16_t over = (int16_t)(bus_q15 - p->bus_regen_q15);
+    int16_t most = p->current_max_q13;
+
+    if (over > 0) {
+        int32_t less = qm_mulss(over, p->brake_per_bus_q8) >> 8;
+        most = (int16_t)((less > p->current_max_q13) ? 0 : p->current_max_q13 - less);
+    }
+    run->control.brake_limit_q13 = most;
+}
+
+/** Limits braking current to what the bus absorbs; presets the speed controller's integrator to match.
+ *  @param err of the speed controller @param iq_q13 its output @return the q current */
+QM_INLINE current_q13_t limits_apply_braking(drive_control_t *c, const drive_params_t *p, speed_erpm_t speed, int16_t err, current_q13_t iq_q13)
+{
+    current_q13_t limited = iq_q13;
+    if ((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13) {
+        limited = (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
+        pi_preset(&c->pi_speed, &p->pi_speed, err, limited);
+    }
+    return limited;
+}
+
+#endif

@@ -1,0 +1,112 @@
+/* IDENTIFY: the drive measures R, Ld, Lq and Kphi of an unknown motor.
+ *
+ * The control interrupt is the instrument (identify_tick.h): it holds a current, superposes a square voltage or turns a current
+ * vector, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks for the next step.
+ * `ready` names the owner; the other side must not access the guarded fields. */
+#ifndef DRIVE_MODES_IDENTIFY_H
+#define DRIVE_MODES_IDENTIFY_H
+
+#include "control/qmath.h"
+#include "control/soft_float.h"
+#include "drive/param_scaling.h" /* userparams.h may define IDENTIFY */
+
+/** X(name, meaning): steps of the procedure. */
+#define IDENTIFY_STEP_TABLE(X) \
+    X(IDLE, "nothing is being measured") \
+    X(RISE, "the voltage rises until current flows") \
+    X(CONNECT, "current in a direction where all three phases carry some") \
+    X(ALIGN, "the current turns to phase A and takes the rotor along; R, first level: all of the current") \
+    X(RESISTANCE, "R, second level: half of the current") \
+    X(BIAS, "three quarters of the current, for the inductances") \
+    X(TRY_D, "square voltage on the d axis: search for an amplitude") \
+    X(INDUCTANCE_D, "Ld") \
+    X(TRY_Q, "the same on the q axis") \
+    X(INDUCTANCE_Q, "Lq") \
+    X(SPIN_HALF, "the vector turns at half of END_SPEED_RPM: back-EMF, for comparison") \
+    X(SPIN_FULL, "the vector turns at END_SPEED_RPM: Kphi")
+
+/** X(code, name, cause, remedy): how it went. Codes never change their meaning. */
+#define IDENTIFY_RESULT_TABLE(X) \
+    X(0, NONE, "nothing has been measured yet", "press S2") \
+    X(1, BUSY, "the measurement is running", "wait; it takes about eight seconds") \
+    X(2, DONE, "R, L and Kphi have been measured", "write them into the motor file") \
+    X(3, STOPPED, "S2 or a fault ended it", "see the fault, if there is one; press S2 to begin anew") \
+    X(4, NO_CURRENT, "current does not flow through all three phases: motor not connected, or a phase open", "check the three wires") \
+    X(5, CURRENT_NOT_REACHED, "the bus voltage cannot drive Q_CURRENT_REF_OPENLOOP through the winding", \
+      "lower Q_CURRENT_REF_OPENLOOP; check NORM_CURRENT_CONST") \
+    X(6, R_RANGE, "R is not between 0.02 and 40 ohm", "check KCURRA, KCURRB, NORM_CURRENT_CONST and the wires") \
+    X(7, L_RANGE, "L is not between 0.02 and 60 mH, or changes the current too little to be measured", \
+      "raise Q_CURRENT_REF_OPENLOOP; check the wires") \
+    X(8, NOT_TURNING, "the rotor did not follow: its back-EMF is missing, slips, or is not proportional to speed", \
+      "free the shaft and take the load off; raise Q_CURRENT_REF_OPENLOOP, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
+    X(9, VOLTAGE_LIMIT, "the bus voltage is too low for END_SPEED_RPM", "lower END_SPEED_RPM") \
+    X(10, KPHI_RANGE, "Kphi is above 65 V per 1000 rpm", "check NOPOLESPAIRS")
+
+#define IDENTIFY_RESULT_NAME(code, name, cause, remedy) #name,
+
+#ifdef IDENTIFY
+
+#define IDENTIFY_STEP_ENUM(name, meaning) IDENTIFY_##name,
+typedef enum { IDENTIFY_STEP_TABLE(IDENTIFY_STEP_ENUM) IDENTIFY_STEP_COUNT } identify_step_t;
+
+#define IDENTIFY_RESULT_ENUM(code, name, cause, remedy) IDENTIFY_RESULT_##name = (code),
+typedef enum { IDENTIFY_RESULT_TABLE(IDENTIFY_RESULT_ENUM) IDENTIFY_RESULT_COUNT } identify_result_t;
+
+/** What the interrupt does with the bridge. */
+typedef enum {
+    IDENTIFY_CURRENT, /**< d current by its controller, q voltage likewise; gains 0 hold the voltage */
+    IDENTIFY_GROW,    /**< the same, and the d voltage grows by 1/128 every 16 periods until ready */
+    IDENTIFY_INJECT,  /**< fixed voltage and a square one */
+    IDENTIFY_TURN     /**< currents controlled while the frame turns */
+} identify_mode_t;
+
+/** What has been measured, in engineering units; 0 = not yet. Loop values: winding, bridge and wires together. */
+typedef struct {
+    uint16_t rs_mohm;           /**< phase resistance, mohm */
+    uint16_t ld_uh, lq_uh;      /**< phase inductances, uH */
+    uint16_t kphi_mv_per_krpm;  /**< back-EMF, mV peak line to line per 1000 mechanical rpm */
+} identify_values_t;
+
+/** State. */
+typedef struct {
+    volatile uint16_t ready;     /**< 1: the interrupt has finished, all of this belongs to the background; 0: the other way round */
+    volatile uint16_t mode;      /**< identify_mode_t */
+    volatile uint16_t wait;      /**< periods before the sums begin, counted once the frame stands or has its speed */
+    volatile uint16_t left;      /**< periods to sum */
+    volatile uint16_t sweep;     /**< 1: the frame turns to phase A */
+    volatile uint16_t halvings;  /**< IDENTIFY_TURN: up to END_SPEED_RPM / 2^halvings */
+    volatile int16_t kp_d, ki_d, kp_q, ki_q; /**< gains of the current controllers */
+    volatile uint16_t shift;     /**< and their shift */
+    volatile current_q13_t rise_q13; /**< IDENTIFY_GROW ends at this current */
+    volatile int16_t bias_q14;   /**< IDENTIFY_INJECT: d voltage */
+    volatile int16_t square_q14; /**< amplitude of the square voltage */
+    volatile uint16_t on_q;      /**< 1: it is on the q axis */
+    volatile uint16_t half;      /**< periods of one half of it */
+    volatile int32_t sum[4];     /**< see identify_record() */
+    volatile uint16_t bus_q16;   /**< bus when the sums were complete, Q16 of full scale */
+
+    /* The interrupt's own. */
+    uint16_t half_left;          /**< periods until the square voltage changes sign */
+    int16_t sign, sign_before;   /**< of the square voltage commanded one and two periods ago; the next one is decided anew */
+    int16_t duty;                /**< duties commanded one period ago, along the axis */
+    int16_t i_before_q13;        /**< current along the axis one period ago */
+
+    /* The background's own. */
+    volatile uint16_t step;      /**< identify_step_t */
+    volatile uint16_t result;    /**< identify_result_t */
+    identify_values_t values;
+    soft_float_t duty_per_amp; /**< duty counts per current count along phase A: R before it is scaled */
+    int32_t duty_first, i_first, bus_first; /**< sums of the first level */
+    int32_t dead_q13;               /**< what dead time and diodes take beyond the compensation, as the current for which R takes it */
+    uint16_t blocks;                /**< stretches of back-EMF that have been evaluated */
+    uint32_t emf_sum;               /**< their lengths */
+    int32_t emf_d_sum, emf_q_sum;   /**< and their components */
+    uint16_t kphi_half;             /**< mV per 1000 rpm at half speed */
+} identify_t;
+
+#define IDENTIFY_STATE identify_t identify;
+#else
+#define IDENTIFY_STATE
+#endif
+
+#endif

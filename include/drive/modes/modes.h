@@ -1,0 +1,25 @@
+/* The seam between the drive and its modes: each mode is one file, which defines its hook twice, with the mode and without it.
+ *
+ * hook                  mode                   what it takes over
+ * MODE_RUN              IDENTIFY               a period with the bridge switching
+ * mode_start            IDENTIFY               the end of drive_start()
+ * mode_background       IDENTIFY               a pass of the background
+ * mode_reference_step   TUNING                 the speed reference in closed loop
+ * mode_current_step     TORQUE_MODE            the speed controller in closed loop
+ * mode_target_range     TORQUE_MODE            what the potentiometer's travel means
+ * mode_pot_split        BIDIRECTIONAL_SPEED    the potentiometer's direction
+ * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
+ * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
+ *
+ * SNAPSHOT (modes/snapshot.h) is called by the board, which owns its arrays. */
+#ifndef DRIVE_MODES_MODES_H
+#define DRIVE_MODES_MODES_H
+
+#include "drive/modes/bidirectional.h"
+#include "drive/modes/identify_tick.h"
+#include "drive/modes/open_loop.h"
+#include "drive/modes/params_in_ram.h"
+#include "drive/modes/torque.h"
+#include "drive/modes/tuning.h"
+
+#endif

@@ -1,0 +1,22 @@
+/* TUNING: in closed loop the reference climbs slowly to the maximum speed, whatever the potentiometer says. */
+#ifndef DRIVE_MODES_TUNING_H
+#define DRIVE_MODES_TUNING_H
+
+#include "drive/reference.h"
+
+/** One step of the reference in closed loop. @return 1 if the mode has taken it */
+QM_INLINE uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
+{
+#ifdef TUNING
+    int32_t sum = (int32_t)d->run.tuning_q16 + p->tuning_step_q16;
+    d->run.tuning_q16 = (uint16_t)sum;
+    reference_step(d, p, along_direction(d, p->maximum_erpm), qm_hi(sum));
+    return 1;
+#else
+    (void)d;
+    (void)p;
+    return 0;
+#endif
+}
+
+#endif

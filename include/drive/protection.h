@@ -1,0 +1,48 @@
+/* Protection: the conditions that the control interrupt finds itself and that end in a fault. */
+#ifndef DRIVE_PROTECTION_H
+#define DRIVE_PROTECTION_H
+
+#include "drive/state.h"
+
+/** Over-current of any phase, every period with the bridge on. */
+QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
+{
+    const int16_t limit = p->overcurrent_q13;
+    if (qm_abs(d->i_a_q13) > limit || qm_abs(d->i_b_q13) > limit || qm_abs(d->i_c_q13) > limit) {
+        drive_raise(d, FAULT_OVERCURRENT_SW);
+    }
+}
+
+/** Over-voltage at once, under-voltage while anything is on, every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
+QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
+{
+    drive_fault_t found;
+    if (now_q15 > p->bus_over_q15) {
+        found = FAULT_OVERVOLTAGE;
+    } else if (bus_q15 < p->bus_under_q15 && d->state != (uint16_t)DRIVE_STOPPED && d->state != (uint16_t)DRIVE_CALIBRATE) {
+        found = FAULT_UNDERVOLTAGE;
+    } else {
+        return;
+    }
+    drive_raise(d, found);
+}
+
+/** Stall and lost lock: conditions that must not last. Every eighth period in closed loop. */
+QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    int16_t speed = qm_abs(estimator_speed(&run->estimator));
+    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1);
+    dq_t emf = estimator_emf(&run->estimator);
+
+    if (least < (p->minimum_erpm >> 1)) {
+        least = (int16_t)(p->minimum_erpm >> 1);
+    }
+    run->stall_steps = (uint16_t)((speed < least) ? run->stall_steps + 1u : 0u);
+    run->lost_lock_steps = (uint16_t)((qm_abs(emf.d) > qm_abs(emf.q) || speed > p->overspeed_erpm) ? run->lost_lock_steps + 1u : 0u);
+    if (run->stall_steps > p->stall_slots || run->lost_lock_steps > p->lost_lock_slots) {
+        drive_raise(d, (run->stall_steps > p->stall_slots) ? FAULT_STALL : FAULT_LOST_LOCK);
+    }
+}
+
+#endif

@@ -1,0 +1,24 @@
+/* The ramped speed reference: a bounded slope, and a wait while the motor cannot follow. */
+#ifndef DRIVE_REFERENCE_H
+#define DRIVE_REFERENCE_H
+
+#include "drive/drive.h"
+
+/** 1 while the motor is near enough to the reference: field weakening is indexed by it, so it must stay true. */
+QM_INLINE int16_t reference_may_move(const drive_t *d, const drive_params_t *p, speed_erpm_t target)
+{
+    int32_t reference = along_direction(d, d->run.control.reference_erpm);
+    int32_t ahead = along_direction(d, estimator_speed(&d->run.estimator)) - reference;
+    return (int16_t)((along_direction(d, target) > reference) ? ahead > -p->ramp_hold_erpm : ahead < p->ramp_hold_erpm);
+}
+
+/** One step of the reference towards the target. @param step_erpm 0 or more */
+QM_INLINE void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t target, int16_t step_erpm)
+{
+    drive_control_t *c = &d->run.control;
+    if (reference_may_move(d, p, target)) {
+        c->reference_erpm = speed_ramp(c->reference_erpm, target, step_erpm);
+    }
+}
+
+#endif

@@ -1,0 +1,66 @@
+/* The gate: the only place that writes the drive's state, and the only one that raises and clears faults. */
+#ifndef DRIVE_STATE_H
+#define DRIVE_STATE_H
+
+#include "drive/drive.h"
+
+/** Enters a state; its clock begins anew. While a fault is kept, every way leads to FAULT: only drive_clear_fault() opens it. */
+QM_INLINE void drive_enter(drive_t *d, drive_state_t next)
+{
+    d->state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
+    d->periods = 0;
+}
+
+/** The last word of a period: a fault that a trap has raised in the middle of it outlives what the period has entered since.
+ *  @return 1 when the outputs must be off */
+QM_INLINE uint16_t drive_settle(drive_t *d)
+{
+    if (d->fault == (uint16_t)FAULT_NONE) {
+        return 0;
+    }
+    drive_enter(d, DRIVE_FAULT);
+    return 1;
+}
+
+/** Stops at once and keeps the code of the first fault. Any context: background, interrupt, trap. */
+QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
+{
+    d->command.run = 0;
+    if (d->fault == (uint16_t)FAULT_NONE) {
+        d->fault = (uint16_t)fault;
+    }
+    drive_enter(d, DRIVE_FAULT);
+}
+
+/** Forgets the fault. Control interrupt only. @return the next state: STOPPED, or the calibration that it has interrupted */
+QM_INLINE drive_state_t drive_clear_fault(drive_t *d)
+{
+    d->fault = (uint16_t)FAULT_NONE;
+    return d->calibration.done ? DRIVE_STOPPED : DRIVE_CALIBRATE;
+}
+
+/** 1 while the bridge switches under the law's control: ALIGN to STOPPING, in one comparison. */
+QM_INLINE uint16_t drive_is_running(const drive_t *d)
+{
+    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_ALIGN) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_ALIGN);
+}
+
+/** 1 with the estimator's angle in command: CLOSED or STOPPING. */
+QM_INLINE uint16_t drive_is_closed(const drive_t *d)
+{
+    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
+}
+
+/** What drives the bridge (outputs_t) in the drive's present state. */
+QM_INLINE uint16_t drive_outputs(const drive_t *d)
+{
+    if (d->fault != (uint16_t)FAULT_NONE) {
+        return (uint16_t)OUTPUTS_OFF;
+    }
+    if (drive_is_running(d)) {
+        return (uint16_t)OUTPUTS_PWM;
+    }
+    return (uint16_t)((d->state == (uint16_t)DRIVE_BOOTSTRAP) ? OUTPUTS_BOOTSTRAP : OUTPUTS_OFF);
+}
+
+#endif

@@ -1,0 +1,114 @@
+/* One PWM period of the drive, top to bottom: samples, currents, current control, angle, modulation; then the slow work. */
+#ifndef DRIVE_TICK_H
+#define DRIVE_TICK_H
+
+#include "drive/bus.h"
+#include "drive/idle.h"
+#include "drive/speed.h"
+
+/** Phase currents from the samples: gain, then the calibrated offset. */
+QM_INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    d->i_a_q13 = (int16_t)(qm_mulhi(raw->i_a, p->kcurr_a) - d->calibration.offset_a_q13);
+    d->i_b_q13 = (int16_t)(qm_mulhi(raw->i_b, p->kcurr_b) - d->calibration.offset_b_q13);
+    d->i_c_q13 = (int16_t)(-d->i_a_q13 - d->i_b_q13);
+}
+
+/** A period with the bridge switching. */
+QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    drive_control_t *c = &run->control;
+    alphabeta_t i = clarke(d->i_a_q13, d->i_b_q13), v;
+    uint16_t forced = (uint16_t)(d->state <= (uint16_t)DRIVE_RAMP); /* ALIGN or RAMP */
+
+    c->i_q13 = park(i, d->frame);
+    c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
+    estimator_tick(&run->estimator, &p->estimator, &run->model, i, d->frame, forced);
+    if (forced) {
+        startup_step(d, p);
+    } else {
+        d->angle = estimator_next_angle(&run->estimator);
+        if (!d->command.run && d->state == (uint16_t)DRIVE_CLOSED) {
+            drive_enter(d, DRIVE_STOPPING);
+        }
+    }
+    d->frame = trig_sincos(d->angle);
+    v = inverse_park(c->v_q14, d->frame);
+    estimator_commanded(&run->estimator, v);
+    return svm(&p->svm, v, d->duty_per_volt_q16, d->i_a_q13, d->i_b_q13, d->i_c_q13);
+}
+
+/** One PWM period up to the duties; then drive_outputs(), and last drive_slow(), which has no deadline.
+ *  @param raw the converter's results at the centre of the low sides' conduction
+ *  @return duties; the board must load them before the next PWM boundary */
+QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    duties_t duty = { 0, 0, 0 };
+
+    d->ticks = (uint16_t)(d->ticks + 1u);
+    drive_measure(d, p, raw);
+    if (drive_is_running(d)) {
+        protection_check_current(d, p); /* before the law: its formats end above the trip level */
+    } else {
+        idle_step(d, p, raw);
+    }
+    if (drive_is_running(d)) {
+        duty = MODE_RUN(d, p);
+    }
+    return duty;
+}
+
+/** Slow work after the duties of a period are written, for they have a deadline and this has none: one block a period in turn. Bus and
+ *  circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
+ *  @param v_bus_raw the converter's result for the bus, any value */
+NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
+{
+    drive_run_t *run = &d->run;
+
+    switch (d->ticks & (SLOTS - 1u)) {
+    case 0:
+        if (drive_is_closed(d)) {
+            speed_step(d, p);
+        }
+        break;
+    case 1:
+        if (d->state == (uint16_t)DRIVE_RAMP) {
+            handover_step(d, p);
+        } else if (drive_is_closed(d)) {
+            fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, run->control.reference_erpm);
+        } else {
+            /* nothing to weaken */
+        }
+        break;
+    case 2:
+        bus_step(d, p, v_bus_raw);
+        break;
+    case 3:
+        bus_update_voltage_limit(d, p);
+        break;
+    case 4:
+        if (drive_is_closed(d)) {
+            limits_current(run, p);
+        }
+        break;
+    case 5:
+        if (drive_is_closed(d)) {
+            protection_check_rotor(d, p);
+        }
+        break;
+    case 6:
+        if (drive_is_closed(d)) {
+            handover_decay(d, p);
+            limits_braking(run, p, qm_hi(d->bus_q31));
+        }
+        break;
+    default: /* 7 */
+        if (drive_is_closed(d)) {
+            handover_preset_speed(run, p);
+        }
+        break;
+    }
+}
+
+#endif

@@ -1,0 +1,176 @@
+/* Pins, timers and the serial port as the host's firmware and the user of the board see them; what the chip makes of the registers:
+ * test/cpu_33f/test_peripherals.py. */
+#include "fake_firmware.inc"
+
+void setUp(void)
+{
+    fake_setup();
+}
+
+void tearDown(void)
+{
+    fake_teardown();
+}
+
+void test_buttons_pull_their_pins_low(void)
+{
+    power_up();
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(1, PORTAbits.RA8);
+    TEST_ASSERT_EQUAL_UINT(1, PORTBbits.RB4);
+    set("input.s2", 1.0);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(0, PORTAbits.RA8);
+    set("input.s3", 1.0);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(0, PORTBbits.RB4);
+    set("input.s2", 0.0);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT(1, PORTAbits.RA8);
+}
+
+static void write_port(void)
+{
+    TRISCbits.TRISC6 = 0;
+    PORTCbits.RC6 = 0;
+    PORTCbits.RC6 = 1;
+    PORTCbits.RC7 = 0;
+}
+
+void test_writing_a_port_reaches_the_latch_and_is_named(void)
+{
+    power_up();
+    run(1);
+    fake_background_hook = write_port;
+    run(8);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RC6"));
+    TEST_ASSERT_TRUE(warned_about("PORTC"));
+}
+
+static void millisecond_timer(void)
+{
+    PR1 = 4999; /* 40 MHz / 8 / 5000 */
+    T1CON = 0x8010;
+    IEC0bits.T1IE = 1;
+}
+
+void test_timer_1_interrupts_every_millisecond(void)
+{
+    fake_init_hook = millisecond_timer;
+    power_up();
+    run(20000);
+    TEST_ASSERT_UINT_WITHIN(1, 1000, fake_timer_calls);
+    TEST_ASSERT_TRUE(TMR1 <= PR1);
+}
+
+static void polled_timer(void)
+{
+    PR1 = 4999;
+    T1CON = 0x8010;
+}
+
+void test_a_polled_timer_sets_its_flag(void)
+{
+    fake_init_hook = polled_timer;
+    power_up();
+    run(19);
+    TEST_ASSERT_EQUAL_UINT(0, IFS0bits.T1IF);
+    run(2);
+    TEST_ASSERT_EQUAL_UINT(1, IFS0bits.T1IF);
+    TEST_ASSERT_EQUAL_UINT(0, fake_timer_calls);
+}
+
+static const char *text;
+
+static void send_text(void)
+{
+    if (*text != '\0' && !U1STAbits.UTXBF) {
+        U1TXREG = (uint16_t)(uint8_t)*text++;
+    }
+}
+
+static void uart_on(void)
+{
+    RPOR9bits.RP19R = 3;
+    RPINR18bits.U1RXR = 20;
+    U1MODEbits.BRGH = 1;
+    U1BRG = 86; /* 114943 baud */
+    U1MODEbits.UARTEN = 1;
+    U1STAbits.UTXEN = 1;
+}
+
+void test_sent_characters_arrive_in_order_at_the_baud_rate(void)
+{
+    char out[64] = {0};
+    text = "state run\r\n";
+    fake_init_hook = uart_on;
+    fake_background_hook = send_text;
+    power_up();
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(11, vb_uart_read(board, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING("state run\r\n", out);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 40e6 / 4.0 / 87.0, get("uart.baud"));
+    TEST_ASSERT_EQUAL_UINT(1, U1STAbits.TRMT);
+    TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
+}
+
+static void transmit_interrupt_on(void)
+{
+    uart_on();
+    IEC0bits.U1TXIE = 1;
+}
+
+void _U1TXInterrupt(void)
+{
+    IFS0bits.U1TXIF = 0;
+    send_text();
+}
+
+void test_the_transmit_interrupt_starts_with_the_transmitter_and_goes_on_with_each_character(void)
+{
+    char out[16] = {0};
+    text = "interrupt";
+    fake_init_hook = transmit_interrupt_on;
+    power_up();
+    run(200);
+    TEST_ASSERT_EQUAL_UINT(9, vb_uart_read(board, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING("interrupt", out);
+}
+
+static char received[16];
+static unsigned received_count;
+
+static void poll_receiver(void)
+{
+    if (U1STAbits.URXDA && received_count < sizeof received) {
+        received[received_count++] = (char)U1RXREG;
+    }
+}
+
+void test_received_characters_are_seen_once_each(void)
+{
+    memset(received, 0, sizeof received);
+    received_count = 0;
+    fake_init_hook = uart_on;
+    fake_background_hook = poll_receiver;
+    power_up();
+    TEST_ASSERT_EQUAL_UINT(5, vb_uart_write(board, "hello", 5));
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(5, received_count);
+    TEST_ASSERT_EQUAL_STRING("hello", received);
+}
+
+static void uart_interrupt_on(void)
+{
+    uart_on();
+    IEC0bits.U1RXIE = 1;
+}
+
+void test_received_characters_interrupt(void)
+{
+    fake_init_hook = uart_interrupt_on;
+    power_up();
+    TEST_ASSERT_EQUAL_UINT(3, vb_uart_write(board, "abc", 3));
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(3, fake_rx_calls);
+}

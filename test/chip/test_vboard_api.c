@@ -1,0 +1,268 @@
+/* The library's surface: keys and their ranges, errors, trace, warnings, power-up. */
+#include "fake_firmware.inc"
+#include "vb_cpu.h"
+
+void setUp(void)
+{
+    fake_setup();
+}
+
+void tearDown(void)
+{
+    fake_teardown();
+}
+
+void test_every_listed_key_can_be_used_as_its_flags_say(void)
+{
+    unsigned count = 0;
+    power_up();
+    for (const vb_key_t *key; (key = vb_key_info(count)) != NULL; count++) {
+        double value = 0.0;
+        TEST_ASSERT_TRUE(key->meaning[0] != '\0');
+        TEST_ASSERT_EQUAL_INT_MESSAGE((key->flags & VB_KEY_READ) != 0 ? 0 : -1, vb_get(board, key->name, &value), key->name);
+        if ((key->flags & VB_KEY_WRITE) != 0) {
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, vb_set(board, key->name, key->min), key->name);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, vb_set(board, key->name, key->max), key->name);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(-1, vb_set(board, key->name, key->max * 1.001 + 1.0), key->name);
+        } else {
+            TEST_ASSERT_EQUAL_INT_MESSAGE(-1, vb_set(board, key->name, value), key->name);
+        }
+    }
+    TEST_ASSERT_TRUE(count > 100);
+}
+
+void test_an_unknown_key_is_refused_by_name(void)
+{
+    double value;
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.rs", 1.0));
+    TEST_ASSERT_EQUAL_STRING("motor.rs: unknown key", vb_error(board));
+    TEST_ASSERT_EQUAL_INT(-1, vb_get(board, "pin.RD0", &value));
+    TEST_ASSERT_EQUAL_INT(-1, vb_get(board, "pin.RB4x", &value));
+    TEST_ASSERT_EQUAL_INT(-1, vb_get(board, "reg.NOPE", &value));
+}
+
+void test_an_impossible_value_is_refused_with_the_range(void)
+{
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.rs_ohm", 0.0));
+    TEST_ASSERT_EQUAL_STRING("motor.rs_ohm: 0 is outside 0.0001..1000 ohm", vb_error(board));
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.rs_ohm", NAN));
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.rs_ohm", INFINITY));
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "reg.P1DC1", 65536.0));
+    TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "motor.pole_pairs", 2.5));
+    TEST_ASSERT_EQUAL_STRING("motor.pole_pairs: 2.5 is not a whole number", vb_error(board));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.67, get("motor.rs_ohm"));
+}
+
+void test_running_before_power_up_is_refused(void)
+{
+    TEST_ASSERT_EQUAL_INT(-1, vb_run(board, 1));
+    TEST_ASSERT_TRUE(strstr(vb_error(board), "vb_power_up") != NULL);
+}
+
+void test_power_up_resets_registers_but_keeps_the_shaft_turning(void)
+{
+    power_up();
+    run(10);
+    set("reg.LATC", 0x55);
+    set("state.speed_rpm", 1234.0);
+    set("supply.voltage_v", 20.0);
+    power_up();
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("reg.LATC"));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1234.0, get("state.speed_rpm"));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, get("bus.voltage_v"));
+}
+
+static unsigned background_passes;
+
+static void count_background(void)
+{
+    background_passes++;
+}
+
+void test_the_background_runs_every_few_periods(void)
+{
+    fake_background_hook = count_background;
+    background_passes = 0;
+    power_up();
+    run(400);
+    TEST_ASSERT_EQUAL_UINT(100, background_passes);
+    set("cpu.background_periods", 20.0);
+    run(400);
+    TEST_ASSERT_UINT_WITHIN(1, 120, background_passes);
+}
+
+void test_trace_has_a_row_each_period_with_the_values_of_the_sample(void)
+{
+    size_t rows, cols;
+    power_up();
+    TEST_ASSERT_EQUAL_INT(0, vb_trace_config(board, "plant.time_s, plant.theta_e_deg\nplant.speed_rpm", 1));
+    set("mech.inertia_kgm2", 100.0);
+    set("state.speed_rpm", 1000.0);
+    run(10);
+    const float *data = vb_trace_data(board, &rows, &cols);
+    TEST_ASSERT_EQUAL_UINT(10, rows);
+    TEST_ASSERT_EQUAL_UINT(3, cols);
+    for (size_t n = 0; n < rows; n++) {
+        double t = 50e-6 * (double)n + 25.025e-6; /* P1SECMP 999, counting down */
+        TEST_ASSERT_FLOAT_WITHIN(1e-8f, (float)t, data[n * cols]);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, (float)(t * 1000.0 * 6.0 * 5.0), data[n * cols + 1]);
+    }
+}
+
+void test_trace_decimation_keeps_every_nth_row(void)
+{
+    size_t rows, cols;
+    power_up();
+    TEST_ASSERT_EQUAL_INT(0, vb_trace_config(board, "time_s", 4));
+    run(10000);
+    (void)vb_trace_data(board, &rows, &cols);
+    TEST_ASSERT_EQUAL_UINT(2500, rows);
+    vb_trace_clear(board);
+    run(8);
+    const float *data = vb_trace_data(board, &rows, &cols);
+    TEST_ASSERT_EQUAL_UINT(2, rows);
+    TEST_ASSERT_TRUE(data[0] > 0.49f);
+}
+
+static void stop_the_pwm(void)
+{
+    P1TCON = 0;
+}
+
+void test_trace_goes_on_without_interrupts(void)
+{
+    size_t rows, cols;
+    fake_init_hook = stop_the_pwm;
+    power_up();
+    TEST_ASSERT_EQUAL_INT(0, vb_trace_config(board, "plant.speed_rpm", 1));
+    run(10);
+    (void)vb_trace_data(board, &rows, &cols);
+    TEST_ASSERT_EQUAL_UINT(10, rows);
+}
+
+void test_trace_refuses_unknown_names_and_keeps_nothing(void)
+{
+    size_t rows, cols;
+    TEST_ASSERT_EQUAL_INT(-1, vb_trace_config(board, "time_s,plant.speed", 1));
+    TEST_ASSERT_EQUAL_STRING("plant.speed: unknown key", vb_error(board));
+    TEST_ASSERT_EQUAL_INT(-1, vb_trace_config(board, "time_s", 0));
+    power_up();
+    run(5);
+    (void)vb_trace_data(board, &rows, &cols);
+    TEST_ASSERT_EQUAL_UINT(0, rows);
+}
+
+static void break_things(void)
+{
+    P1FLTACON = 0;
+    P1SECMP = 0;
+}
+
+void test_each_problem_is_reported_once(void)
+{
+    fake_init_hook = break_things;
+    power_up();
+    run(100);
+    unsigned count = vb_warning_count(board);
+    TEST_ASSERT_EQUAL_UINT(2, count);
+    set("reg.LATB", 1.0); /* another decoding pass */
+    run(100);
+    TEST_ASSERT_EQUAL_UINT(count, vb_warning_count(board));
+    TEST_ASSERT_NULL(vb_warning(board, count));
+}
+
+void test_statistics_start_anew(void)
+{
+    power_up();
+    run(10);
+    TEST_ASSERT_EQUAL_DOUBLE(10.0, get("stat.periods"));
+    set("stat.reset", 1.0);
+    run(5);
+    TEST_ASSERT_EQUAL_DOUBLE(5.0, get("stat.periods"));
+}
+
+void test_a_run_is_repeatable(void)
+{
+    double angle[2];
+    for (int k = 0; k < 2; k++) {
+        if (k == 1) {
+            fake_teardown();
+            fake_setup();
+        }
+        set_duties(1200, 900, 900);
+        power_up();
+        set("state.theta_e_deg", 40.0);
+        run(2000);
+        angle[k] = get("state.theta_e_deg");
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(angle[0], angle[1]);
+}
+
+/* A CPU of its own: registers in an array, no host globals. */
+static uint16_t cells[256];
+static unsigned own_interrupts;
+
+static volatile uint16_t *own_register(void *context, const char *name)
+{
+    (void)context;
+    for (size_t n = 0; n < host_sfr_count; n++) {
+        if (strcmp(host_sfr_table[n].name, name) == 0) {
+            return &cells[n];
+        }
+    }
+    return NULL;
+}
+
+static int own_reset(void *context)
+{
+    (void)context;
+    for (size_t n = 0; n < host_sfr_count; n++) {
+        cells[n] = host_sfr_table[n].reset;
+    }
+    firmware_init(); /* to have its settings */
+    for (size_t n = 0; n < host_sfr_count; n++) {
+        cells[n] = *host_sfr_table[n].pointer;
+    }
+    host_registers_reset();
+    return 0;
+}
+
+static uint64_t own_cycles(void *context)
+{
+    (void)context;
+    return 0;
+}
+
+static bool own_raised(void *context, unsigned irq)
+{
+    (void)context;
+    own_interrupts += irq == CHIP_IRQ_ADC1 ? 1u : 0u;
+    volatile uint16_t *ifs0 = own_register(NULL, "IFS0");
+    *ifs0 = (uint16_t)(*ifs0 & ~0x2000u);
+    return false;
+}
+
+static void own_nothing(void *context)
+{
+    (void)context;
+}
+
+static void own_end(void *context, double length_s)
+{
+    (void)context;
+    (void)length_s;
+}
+
+void test_another_cpu_can_sit_on_the_board(void)
+{
+    static const chip_cpu_t cpu = {.reg = own_register, .reset = own_reset, .cycles = own_cycles, .raised = own_raised, .begin = own_nothing,
+                                   .end = own_end, .destroy = own_nothing};
+    vb_destroy(board);
+    board = vb_create_with_cpu(&cpu);
+    TEST_ASSERT_NOT_NULL(board);
+    own_interrupts = 0;
+    power_up();
+    run(25);
+    TEST_ASSERT_EQUAL_UINT(25, own_interrupts);
+    TEST_ASSERT_EQUAL_HEX16(0, P1TCON);
+}

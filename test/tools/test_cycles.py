@@ -1,0 +1,191 @@
+"""make cycles and make pil around the simulator: classes of interrupts, figures, budgets, texts, and what a user sees."""
+
+import json
+import re
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+import support
+from sample_image import hex_text
+from test_image_build import compiler_free_path, make, our_lines
+
+from tools.bench import cycles, pil, pil_command
+from tools.common import paths
+from tools.image.budget import Budget, CycleLimits, Limits
+from tools.image.profile import Counts, Profile
+from tools.image.size import write_json
+
+BUDGET = Budget(Limits(0, 0), Limits(0, 0, 512), CycleLimits(600, 500, 960, ("demo",)), [], [], (), (), [])
+WORDS = {0: 0x040200, 2: 0, 0x200: 0, 0x202: 0x37FFFF}
+NO_CYCLES = pil.Cycles(*[0.0] * len(pil.Cycles.__dataclass_fields__))
+
+
+def spread(values) -> cycles.Spread:
+    return cycles.Spread.of(np.array(values))
+
+
+def found(name: str, without: list[int], weakening: list[int], latency: tuple[int, ...] = (700,), stack: int = 100,
+          differences: int = 0) -> cycles.Found:
+    """A scenario with these interrupts in closed loop."""
+    return cycles.Found({"STOPPED": spread([]), "CLOSED": spread(without + weakening), cycles.WITHOUT: spread(without),
+                         cycles.WITH: spread(weakening)},
+                        spread(latency), Counts({0x200: 1}, {0x200: sum(without + weakening)}), stack, differences, 10,
+                        "tick 3, P1DC1" if differences else "", {name: (max(without + weakening), 1.5, "CLOSED")}, 967, 2.0, 1.0, 5e6)
+
+
+def report(item: cycles.Found, budget: Budget | None = BUDGET) -> cycles.Report:
+    total = sum(item.counts.cycles.values())
+    result = cycles.Report("foc33.elf", item, Profile(Counter(pi=total), Counter(_ADC1Interrupt=total),
+                           {"_ADC1Interrupt": (9, 10)}, total), budget, [["ENTRY", "4", "cycles of an entry", "interrupts"]])
+    result.broken = cycles.broken(result)
+    return result
+
+
+# ---- figures -------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("one, figures", [
+    (spread([5, 7, 7, 9, 12]), (5, 5, 8.0, 12)), (cycles.added([spread([3]), spread([100, 2])]), (3, 2, 35.0, 100)),
+    (cycles.Spread(), (0, 0, 0.0, 0))])
+def test_number_least_mean_and_most(one, figures):
+    assert tuple(one.data().values()) == figures
+
+
+def classes(states: list[int], reference: list[float]) -> dict[str, list[bool]]:
+    return {name: which.tolist() for name, which in cycles.classes(np.array(states), support.STATES, np.array(reference), 2640.0).items()}
+
+
+def test_every_interrupt_belongs_to_one_state_and_bridge_off_to_neither_figure():
+    result = classes(list(range(8)), [0.0] * 8)
+    assert all(result[name] == [i == number for i in range(8)] for number, name in support.STATES.items())
+    off = classes([0, 1, 2, 7], [3000.0] * 4)
+    assert not any(off[cycles.WITH] + off[cycles.WITHOUT])
+
+
+def test_field_weakening_is_closed_loop_above_its_first_speed_either_way():
+    result = classes([4, 5, 5, 5, 6, 6], [4000.0, 2600.0, 2640.0, -5500.0, 3000.0, 900.0])
+    assert result[cycles.WITH] == [False, False, True, True, True, False]
+    assert result[cycles.WITHOUT] == [True, True, False, False, False, True]
+
+
+def test_scenarios_are_put_together():
+    whole = cycles.merged([found("demo", [400], [500], stack=90), found("stop", [300], [450], latency=(800,), stack=110)])
+    assert (min(whole.spreads[cycles.WITHOUT]), whole.spreads[cycles.WITH].most) == (300, 500)
+    assert (whole.latency.most, whole.stack_bytes, set(whole.longest), whole.counts.cycles) == (800, 110, {"demo", "stop"}, {0x200: 1650})
+
+
+# ---- budgets -------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("item, budget, lines", [
+    (found("demo", [500], [490, 510]), BUDGET, []),
+    (found("demo", [500], [500, 510]), BUDGET, ["mean interrupt with field weakening: 505.0 cycles, over the budget of 500"]),
+    (found("demo", [400], [390, 601]), BUDGET, ["longest interrupt: 601 cycles, 1 over the budget of 600 (demo at 1.5000 s, CLOSED)"]),
+    (found("demo", [400], [400], latency=(961,), stack=513), BUDGET,
+     ["trigger to duties: 961 cycles, over the budget of 960", "stack: 513 bytes, over the budget of 512"]),
+    (found("demo", [400], [400], latency=(967,)), None,
+     ["trigger to duties: 967 cycles, but the duties load 967 cycles after the trigger"]),
+    (found("demo", [400], [400], differences=2), None, ["target and PC differ in 2 interrupts, the first: tick 3, P1DC1"]),
+    (found("smoke", [400], []), None, ["no scenario ran with and without field weakening: the figures are not those of the table"])])
+def test_each_broken_budget_is_a_line(item, budget, lines):
+    assert report(item, budget).broken == lines
+
+
+def test_a_profile_that_misses_cycles_is_an_error():
+    item = found("demo", [400], [400])
+    item.counts.cycles[0x200] = 700
+    assert "the profile has 700 cycles, the interrupts took 800" in report(item, None).broken[0]
+
+
+def test_budget_file_has_the_limits():
+    limits = Budget.read().cycles
+    assert limits.isr_max <= 946 # AN1292's
+    assert "demo" in limits.scenarios and len(limits.scenarios) > 3
+
+
+# ---- output --------------------------------------------------------------------------------------------------------------
+def test_table_has_cycles_us_load_and_the_notes_figures():
+    lines = cycles.text(report(found("demo", [400, 600], [500]))).splitlines()
+    row = next(line for line in lines if line.startswith(cycles.WITHOUT))
+    assert row.split() == "without field weakening 2 400 500.0 600 10.00 12.50 15.00 25.0 % 14.725 / 20.8 / 21.4".split()
+    assert any("ENTRY" in line and "cycles of an entry" in line for line in lines)
+
+
+def test_the_file_is_written_and_the_readme_table_follows_from_them(tmp_path):
+    head, rows = cycles.readme_table(json.loads(write_json(cycles.summary(report(found("demo", [400], [440, 480]))), tmp_path,
+                                                           "cycles").read_text()))
+    assert all(len(row) == len(head) for row in rows)
+    assert ["interrupt with field weakening", "14.975 / 23.325 / 23.65", "440 / 460 / 480", "11.00 / 11.50 / 12.00"] in rows
+
+
+@pytest.mark.parametrize("ticks, differences, first, defines, has_names, ok, got", [
+    (100, 0, "", [], True, True, ""), (0, 0, "", [], True, False, ""), (0, 0, "", ["IDENTIFY"], True, True, ""),
+    (0, 0, "", [], False, True, "a HEX file"),
+    (100, 4, "tick 7 (0.1 s), P1DC2: target 1, host 2", [], True, False,
+     "100 interrupts, 4 differ; first: tick 7 (0.1 s), P1DC2: target 1, host 2")])
+def test_comparison_with_the_pc(ticks, differences, first, defines, has_names, ok, got):
+    run = support.run()
+    run.scenario.defines += defines
+    outcome = pil_command.comparison(pil.PilRun(run, NO_CYCLES, ticks, differences, first, has_names=has_names))
+    assert outcome.ok == ok and got in outcome.got
+
+
+# ---- for the user --------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("target", ["pil", "cycles", "test-target"])
+def test_without_the_compiler_each_command_says_so_in_one_line(tmp_path, target):
+    done = make(target, "VARIANT=none", path=compiler_free_path(tmp_path, "ruby", "gem", "dpkg", "date", "tr", "ld", "as"))
+    assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr
+    assert "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16" in our_lines(done)[0]
+
+
+@pytest.mark.parametrize("word, expected", [("MOTOR=hurst_dmb0224c10002", "make cycles has no MOTOR"), ("BOARD=mclv", "no BOARD"),
+                                            ("USERPARAMS=/nowhere", "no userparams.h")])
+def test_what_cycles_cannot_do_is_one_line(word, expected):
+    done = make("cycles", "IMAGE=/nowhere", word)
+    assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr
+    assert expected in our_lines(done)[0] and "No such file" not in done.stderr
+
+
+@pytest.fixture
+def refused(tmp_path, capsys):
+    """A command is refused with one line; {} stands for the file's path."""
+    def of(command: str, *arguments: str) -> str:
+        status = (cycles if command == "cycles" else pil_command).main([word.format(tmp_path) for word in arguments])
+        lines = capsys.readouterr().err.splitlines()
+        assert (status, len(lines)) == (2, 1), lines
+        return lines[0]
+
+    (tmp_path / "text.elf").write_text("hello", encoding="utf-8")
+    (tmp_path / "alone.hex").write_text(hex_text(WORDS), encoding="utf-8")
+    with (tmp_path / "huge.elf").open("wb") as file:
+        file.write(b"\x7fELF")
+        file.truncate(5 << 30)
+    return of
+
+
+@pytest.mark.parametrize("command, arguments, words", [
+    ("cycles", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
+    ("pil", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
+    ("cycles", ["--image", "{}/text.elf"], "text.elf"), ("cycles", ["--image", "{}/alone.hex"], "name the ELF file"),
+    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"),
+    ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
+    ("pil", ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), ("pil", ["--nonsense"], "--nonsense"),
+    ("cycles", ["--nonsense"], "--nonsense"),
+    ("pil", ["demo", "smoke", "--out", "{}"], "--out")])
+def test_bad_input_is_one_line(tmp_path, refused, command, arguments, words):
+    assert words in refused(command, *arguments)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("given", [[], ["--out", "{}"]])
+def test_table2_goes_where_out_says(tmp_path, monkeypatch, given):
+    (tmp_path / "x.hex").write_text(hex_text(WORDS), encoding="utf-8")
+    asked = []
+    monkeypatch.setattr(pil_command.table2, "command", lambda options, *_, **__: asked.append(options.out) or 0)
+    pil_command.main(["table2", "--image", str(tmp_path / "x.hex"), *(word.format(tmp_path) for word in given)])
+    assert asked == [tmp_path if given else paths.RESULTS / "pil-table2"]
+
+
+@pytest.mark.parametrize("name", ["tools.bench.cycles", "tools.bench.pil_command"])
+def test_modules_run_from_the_command_line(name):
+    done = subprocess.run([sys.executable, "-m", name, "--help"], cwd=paths.ROOT, capture_output=True, text=True, check=False)
+    assert re.search("--image", done.stdout + done.stderr)

@@ -1,0 +1,189 @@
+"""make firmware as a user calls it: without the compiler one clear line; with it no warning, and a build that fails for a bad image."""
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tools.common import paths
+from tools.image import device, image
+
+ROOT = paths.ROOT
+MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
+TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/common", "tools/image", "tools/make", "tools/setup")
+NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname",
+          "head",
+          "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr")
+
+
+def xc16() -> str | None:
+    folder = os.environ.get("XC16")
+    return shutil.which(f"{folder}/bin/xc16-gcc" if folder else "xc16-gcc")
+
+
+def make(*arguments: str, root: Path = ROOT, path: str | None = None) -> subprocess.CompletedProcess:
+    environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN and (path is None or name != "XC16")}
+    if path is not None:
+        environment["PATH"] = path
+    return subprocess.run(["make", "-s", *arguments], cwd=root, env=environment, capture_output=True, text=True, check=False)
+
+
+def our_lines(done: subprocess.CompletedProcess) -> list[str]:
+    return [line for line in done.stderr.splitlines() if line.startswith("foc33: ")]
+
+
+def compiler_free_path(folder: Path, *more: str) -> str:
+    """A PATH that has everything but the compiler."""
+    for name in (*NEEDED, *more):
+        if found := shutil.which(name):
+            (folder / name).symlink_to(found)
+    return str(folder)
+
+
+# ---- without the compiler ------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("words, expected", [
+    ([], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16 .*XC16="),
+    (["XC16=/nowhere/v2.10"], "XC16=/nowhere/v2.10 has no bin/xc16-gcc")])
+def test_a_missing_compiler_is_one_line_that_says_what_to_install(tmp_path, words, expected):
+    done = make("firmware", "VARIANT=none", *words, path=compiler_free_path(tmp_path))
+    assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr
+    assert re.search(expected, our_lines(done)[0])
+    assert not (ROOT / "build/target-none/foc33.hex").exists()
+
+
+@pytest.mark.parametrize("word, expected", [
+    ("OPT=-O7", "no such level, OPT=-O7: use -O1, -O2 or -O3"), ("OPT=", "no such level, OPT=: use"), ("OPT=-O1 -O2", "no such level"),
+    ("OPT=fast", "no such level"), ("DFP=/nowhere", "no device pack for XC16, DFP=/nowhere: name"),
+    ("DEFINES=-DTUNNING", "no mode -DTUNNING, DEFINES=-DTUNNING: use .*-DTUNING"), ("DEFINES=TUNING", "no mode TUNING"),
+    ("DEFINES=-DTUNING=0", "no mode -DTUNING=0"), ("USERPARAMS=/nowhere", "no userparams.h, USERPARAMS=/nowhere: name a folder")])
+def test_bad_input_is_one_line_that_says_what_to_give(tmp_path, word, expected):
+    path = compiler_free_path(tmp_path)
+    (tmp_path / "xc16-gcc").symlink_to(shutil.which("true"))
+    done = make("firmware", "VARIANT=none", word, path=path)
+    assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr
+    assert re.search(expected, our_lines(done)[0]) and "No such file" not in done.stderr
+    assert not list((ROOT / "build").glob("target-O7*")), "no folder for a level that is refused"
+
+
+def test_a_misspelt_mode_is_refused_on_the_pc_too():
+    done = make("lib", "VARIANT=none", "DEFINES=-DTUNNING")
+    assert (done.returncode, len(our_lines(done))) == (2, 1) and "no mode -DTUNNING" in our_lines(done)[0]
+
+
+# ---- with it -------------------------------------------------------------------------------------------------------------
+with_compiler = pytest.mark.skipif(not xc16(), reason="xc16-gcc is not on PATH; give XC16=folder")
+MODES = ("OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT", "IDENTIFY", "PARAMS_IN_RAM")
+
+
+@with_compiler
+@pytest.mark.parametrize("words", [*([f"OPT={level}", "VARIANT=check"] for level in ("-O1", "-O2", "-O3")),
+                                   *([f"DEFINES=-D{mode}", f"VARIANT=check-{mode}"] for mode in MODES)])
+def test_no_warning_and_a_good_image_at_every_level_and_in_every_mode(words):
+    done = make("firmware", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@with_compiler
+def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
+    assert make("firmware", "VARIANT=check").returncode == 0
+    elf, words = (read(ROOT / "build/target-check" / name) for read, name in ((image.read_elf, "foc33.elf"), (image.read_hex, "foc33.hex")))
+    assert words[0] == 0x040000 | elf.symbols["__reset"]
+    for base in (device.IVT, device.AIVT):
+        assert words[base + 2 * device.VECTORS.index("_ADC1Interrupt")] == elf.symbols["__ADC1Interrupt"]
+        assert words[base + 2 * device.VECTORS.index("_T3Interrupt")] == elf.symbols["__DefaultInterrupt"]
+    # starts on FRC; XT, clock switching, pin selection may be unlocked; watchdog always on, no window, 32 kHz / 32 / 16;
+    # PWM pins inputs at reset, active high, 128 ms; PGD3, no JTAG
+    for address, mask, value in ((0xF80006, 0x07, 0), (0xF80008, 0xE7, 0x45), (0xF8000A, 0xDF, 0xC4), (0xF8000C, 0xE7, 0xE7),
+                                 (0xF8000E, 0x23, 0x01)):
+        assert words[address] & mask == value
+
+
+@with_compiler
+def test_other_flags_rebuild_and_the_same_flags_do_not():
+    elf, times = ROOT / "build/target-check/foc33.elf", []
+    for words in ([], [], ["DEFINES=-DPARAMS_IN_RAM"]):
+        assert make("firmware", "VARIANT=check", *words).returncode == 0
+        times.append(elf.stat().st_mtime_ns)
+    assert times[0] == times[1] != times[2]
+
+
+# ---- sources with a mistake, in a copy of the project ----------------------------------------------------------------------
+class Tree:
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        for name in TREE:
+            source, target = ROOT / name, root / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
+
+    def change(self, file: str, old: str, new: str) -> None:
+        path = self.root / file
+        text = path.read_text(encoding="utf-8")
+        assert old in text
+        path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    def spoil(self, file: str, old: str, new: str) -> str:
+        """The build fails. @return all that it says"""
+        self.change(file, old, new)
+        done = make("firmware", root=self.root)
+        assert done.returncode == 2, done.stdout + done.stderr
+        for name in ("checked", "foc33.hex"): # nothing that looks like an image to flash
+            assert not (self.root / "build/target" / name).exists(), name
+        return done.stderr
+
+
+@pytest.fixture
+def tree(tmp_path):
+    return Tree(tmp_path)
+
+
+HEAD = "void firmware_background(void)\n{\n"
+NUMBERS, NOINLINE = "static volatile int32_t spoil_a, spoil_b;", "static __attribute__((noinline)) void"
+RECURSIVE = (f"{NOINLINE} spoil(volatile uint16_t n);\n{NOINLINE} spoil(volatile uint16_t n)\n{{\n    if (n) {{\n"
+             "        spoil((uint16_t)(n - 1u));\n        n = 3;\n    }\n}")
+DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n}}\n"
+        f"{NOINLINE} spoil(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n    deeper();\n    some[1] = 1;\n}}")
+
+
+@with_compiler
+@pytest.mark.parametrize("body, before, told", [
+    ("spoil_a = (int32_t)((float)spoil_b * 1.5F);", NUMBERS, r"called by firmware_background\(\).*: a float: use a Q format"),
+    ("spoil_a = spoil_a / spoil_b;", NUMBERS, r"called by firmware_background\(\).*: a division: use qm_divud"),
+    ("spoil_c = spoil_c / board_drive.ticks;", "static volatile int64_t spoil_c;",
+     r"called by firmware_background\(\).*: a division: use qm_divud"),
+    ("board_drive.ticks = (uint16_t)(100u / board_drive.ticks);", "", r"firmware_background\(\) divides by a variable"),
+    ("spoil_ram[board_drive.ticks & 255u] = 1;", "static volatile int16_t spoil_ram[256];", "RAM: [0-9]+ bytes of a budget of 768"),
+    ("board_drive.ticks = spoil_flash[board_drive.ticks & 1023u];",
+     "extern const uint16_t spoil_flash[1024];\nconst uint16_t spoil_flash[1024] = { 1 };",
+     "flash: [0-9]+ bytes of a budget of 12288"),
+    ("spoil(board_drive.ticks);", RECURSIVE, "stack: recursion: spoil -> spoil"),
+    ("spoil_pointer();", "extern void (*volatile spoil_pointer)(void);\nvoid (*volatile spoil_pointer)(void) = pwm_outputs_off;",
+     "stack: firmware_background: call through a pointer"),
+    ("spoil();", DEEP, "stack: up to [0-9]+ bytes of 512")])
+def test_code_that_fails_the_build_is_told_with_its_place(tree, body, before, told):
+    assert re.search(told, " ".join(tree.spoil("firmware/board/firmware.c", HEAD, f"{before}\n{HEAD}    {body}\n").splitlines()))
+
+
+WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS32768"), ("WDTPRE = PR32", "WDTPRE = PR128"),
+            ("WINDIS = OFF", "WINDIS = ON"))
+
+
+@with_compiler
+@pytest.mark.parametrize("file, old, new, told", [
+    ("isr.c", "void BOARD_ISR _MathError(void)\n{", "void BOARD_ISR _T2Interrupt(void);\nvoid BOARD_ISR _T2Interrupt(void)\n{",
+     "the image has no _MathError"),
+    ("config.c", "PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON (PWM pins are inputs at reset)"),
+    *(("config.c", old, new, f"{new} in config.c, but the board needs") for old, new in WATCHDOG), # off or too slow
+    ("main.c", "int main(void)\n{", "int main(void)\n{\n    int unused = 1;", "unused variable")])
+def test_a_mistake_in_the_boards_files_fails_the_build(tree, file, old, new, told):
+    assert told in tree.spoil(f"firmware/board/{file}", old, new)
+
+
+@with_compiler
+def test_a_mode_in_userparams_h_is_not_held_to_the_budget_of_the_delivered_drive(tree):
+    tree.change("userparams.h", "/* #define IDENTIFY */", "#define IDENTIFY")
+    done = make("firmware", root=tree.root)
+    assert (done.returncode, done.stderr) == (0, "") and "of 33024 bytes of the chip" in done.stdout

@@ -1,0 +1,309 @@
+"""The checks of an image: a good image passes, and each broken thing is one line that says what and where."""
+
+import re
+
+import pytest
+from sample_image import CONFIG, LIBRARY, RETFIE, good_image, record, take_ram
+
+from tools.common import paths
+from tools.image import device, image
+from tools.image.budget import Budget
+
+CALL, RCALL = 0x020000, 0x070000
+BUDGET = """with_caller = []
+budget = {{ note = {{ flash_bytes = 1, ram_bytes = 1 }}, image = {{ flash_bytes = {}, ram_bytes = {}, stack_bytes = {} }} }}
+cycles = {{ isr_max_cycles = 1, isr_mean_cycles = 1, latency_max_cycles = 1, scenarios = [] }}
+stack = {{ calls_nothing = [] }}
+"""
+
+
+class Bench:
+    """An image to break, and the command that checks it."""
+
+    def __init__(self, folder, capsys):
+        self.folder, self.capsys, self.image = folder, capsys, good_image()
+
+    def run(self, arguments: list[str]) -> tuple[int, str, list[str]]:
+        """Exit status, stdout, lines of stderr."""
+        status = image.main(arguments)
+        out, error = self.capsys.readouterr()
+        return status, out, error.splitlines()
+
+    def check(self, *more: str) -> tuple[int, str, list[str]]:
+        return self.run([*self.image.write(self.folder), *more])
+
+    def fails(self, *patterns: str, more: tuple[str, ...] = ()) -> None:
+        """The image fails with exactly these lines."""
+        status, _, lines = self.check(*more)
+        assert (status, len(lines)) == (1, len(patterns)), lines
+        for pattern, line in zip(patterns, lines):
+            assert re.search(pattern, line), line
+
+    def passes(self, *more: str) -> str:
+        status, out, lines = self.check(*more)
+        assert (status, lines) == (0, [])
+        return out
+
+    def budget(self, *figures: int) -> tuple[str, str]:
+        path = self.folder / "budget.toml"
+        path.write_text(BUDGET.format(*figures), encoding="utf-8")
+        return "--budget", str(path)
+
+    @property
+    def flash(self) -> int:
+        return 3 * (sum(address in device.PROGRAM for address in self.image.words) + len(self.image.constant_words))
+
+
+@pytest.fixture
+def bench(tmp_path, capsys):
+    return Bench(tmp_path, capsys)
+
+
+# ---- the whole -----------------------------------------------------------------------------------------------------------
+def test_a_good_image_passes_and_its_sizes_are_printed(bench):
+    assert f"flash {bench.flash} of 33024 bytes of the chip, RAM 300 of 2048 bytes of the chip, 1732 bytes free" in bench.passes()
+
+
+@pytest.mark.parametrize("parts, told", [(["33FJ128MC802"], "33FJ128MC802"), ([device.NAME, "33FJ64MC204"], "33FJ32MC204, 33FJ64MC204")])
+def test_an_image_of_which_any_part_is_for_another_chip_is_refused(bench, parts, told):
+    del bench.image.numbers[f"__{device.NAME}"]
+    bench.image.numbers |= {f"__{part}": 1 for part in parts}
+    bench.fails(f"the image is for {told}, not for the 33FJ32MC204")
+
+
+def test_the_last_word_of_the_flash_is_inside_and_the_next_one_is_not(bench):
+    bench.image.words[0x57FE] = 0
+    bench.image.places.append((0x57FE, 2, ".text", "a.o"))
+    bench.passes()
+    bench.image.words[0x5800] = 0
+    bench.fails("1 words outside the flash .*0x005800")
+
+
+def test_a_hex_of_another_elf_is_refused(bench):
+    bench.image.constants = []
+    bench.image.places = [place for place in bench.image.places if place[2] != ".const"]
+    bench.image.hex_words = {**bench.image.words, 0x204: 1, 0x5000: 7}
+    bench.fails("HEX and ELF differ in 2 words, the first at 0x000204: 0x000001 in the HEX, 0x000000 in the ELF")
+
+
+# ---- vectors -------------------------------------------------------------------------------------------------------------
+def test_the_vectors_have_the_addresses_of_the_family_s_reference_manual():
+    places = {name: 4 + 2 * number for number, name in enumerate(device.VECTORS)}
+    known = {"_OscillatorFail": 0x06, "_AddressError": 0x08, "_StackError": 0x0A, "_MathError": 0x0C, "_INT0Interrupt": 0x14,
+             "_T1Interrupt": 0x1A,
+             "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86,
+             "_FLTA1Interrupt": 0x92}
+    assert {name: places[name] for name in known} == known
+    assert len(device.VECTORS) == (0x100 - 0x04) // 2
+
+
+@pytest.mark.parametrize("base, table", [(device.IVT, "IVT"), (device.AIVT, "AIVT")])
+def test_every_erased_vector_is_found(bench, base, table):
+    for number, name in enumerate(device.VECTORS[:8 + device.LEFT_ERASED]):
+        kept = bench.image.words.pop(base + 2 * number)
+        bench.fails(rf"vector {name} of the {table} \(0x{base + 2 * number:03X}\) is erased")
+        bench.image.words[base + 2 * number] = kept
+
+
+def test_the_product_may_leave_the_end_of_the_tables_erased(bench):
+    for base in (device.IVT, device.AIVT):
+        for number in range(8 + device.LEFT_ERASED, len(device.VECTORS)):
+            del bench.image.words[base + 2 * number]
+    bench.passes()
+
+
+def test_a_vector_that_goes_elsewhere_is_found(bench):
+    symbols = bench.image.symbols
+    bench.image.point("_ADC1Interrupt", symbols["__FLTA1Interrupt"])
+    bench.fails(r"vector _ADC1Interrupt of the IVT \(0x02E\) goes to .* \(_FLTA1Interrupt\), not to .* \(_ADC1Interrupt\)", "of the AIVT")
+    bench.image.point("_ADC1Interrupt", symbols["__ADC1Interrupt"])
+    bench.image.point("_T2Interrupt", symbols["_main"])
+    bench.fails(r"_T2Interrupt of the IVT .*\(main\), not to .*_DefaultInterrupt", "AIVT")
+
+
+def test_a_function_that_exists_must_be_in_its_vector(bench):
+    bench.image.function("_T1Interrupt", RETFIE)
+    bench.fails("_T1Interrupt of the IVT .*_DefaultInterrupt.*, not to .*_T1Interrupt", "AIVT")
+
+
+def test_many_wrong_vectors_are_a_few_lines(bench):
+    bench.image.words |= {device.IVT + 2 * number: 0 for number in range(len(device.VECTORS))}
+    bench.fails("IVT", "IVT", "IVT", "and 123 more vectors of the IVT")
+
+
+@pytest.mark.parametrize("name", device.REQUIRED)
+def test_a_missing_handler_is_named(bench, name):
+    del bench.image.symbols[f"_{name}"]
+    bench.image.point(name, bench.image.symbols["__DefaultInterrupt"])
+    bench.fails(f"the image has no {name}: ")
+
+
+def test_a_misspelt_handler_is_named(bench):
+    bench.image.function("_ADC1Interupt", RETFIE)
+    bench.passes() # no vector's name at all: the compiler warns of it
+    bench.image.function("_ADC2Interrupt", RETFIE)
+    bench.fails("_ADC2Interrupt is no vector of the 33FJ32MC204: the function never runs")
+
+
+def test_the_compilers_own_default_handler_is_refused(bench):
+    start = bench.image.symbols["__DefaultInterrupt"]
+    bench.image.places = [place if place[0] != start else (*place[:2], ".isr", "default_isr") for place in bench.image.places]
+    bench.fails("_DefaultInterrupt is the compiler's")
+
+
+def test_the_reset_vector_goes_to_the_start_up_code(bench):
+    bench.image.words[0] = 0x040000 | bench.image.symbols["_main"]
+    bench.fails(r"reset vector: goes to .* \(main\), not to the start-up code at 0x000200")
+    del bench.image.words[0], bench.image.words[2]
+    bench.fails("reset vector: 0xFFFFFF 0xFFFFFF is no GOTO")
+
+
+# ---- configuration words -------------------------------------------------------------------------------------------------
+KNOWN = {**device.BOARD_NEEDS, **image.wanted_fields(CONFIG)}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_every_wrong_bit_of_a_known_field_is_found(bench, name):
+    field = device.FIELDS[name]
+    for bit in (1 << n for n in range(8) if field.mask & 1 << n):
+        bench.image.words[field.word] ^= bit
+        bench.fails(rf"configuration word {device.WORDS[field.word]} .*: {name} is .*, must be {KNOWN[name]} \(")
+        bench.image.words[field.word] ^= bit
+
+
+def test_bits_that_mean_nothing_do_not_matter(bench):
+    bench.image.words |= {0xF80000: 0xFFFFFF, 0xF8000E: 0x01}
+    bench.passes()
+
+
+def test_a_missing_word_is_named_with_its_fields(bench):
+    del bench.image.words[0xF80006]
+    bench.fails(r"word FOSCSEL \(0xF80006\) is missing: FNOSC must be FRC")
+
+
+@pytest.mark.parametrize("old, new, expected", [("PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON"),
+                                                ("#pragma", "#pragma config PLLKEN = ON\n#pragma", "PLLKEN = ON in config.c is unknown")])
+def test_sources_that_set_what_the_board_cannot_have_are_refused(bench, old, new, expected):
+    arguments = bench.image.write(bench.folder)
+    path = bench.folder / "config.c"
+    path.write_text(path.read_text().replace(old, new, 1))
+    status, _, lines = bench.run(arguments)
+    assert status == 1 and expected in lines[0]
+
+
+def test_the_table_names_every_field_with_its_meaning(bench):
+    out = bench.passes("--table")
+    for text in ("FOSCSEL  0x00  FNOSC     FRC (internal oscillator)", "FICD     0xC1  ICS       PGD3 (debugger on PGC3/PGD3)"):
+        assert text in out
+
+
+def test_the_projects_own_settings_are_all_known_and_what_the_board_needs():
+    config = image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8"))
+    assert len(config) > 10
+    for name, value in config.items():
+        assert value in device.FIELDS[name].values and value == device.BOARD_NEEDS.get(name, value), name
+
+
+# ---- the compiler's library ----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("helper, member, advice", [
+    ("__divsf3", "divsf3.eo", "a float"), ("__divsi3", "divsi3.eo", "a division"), ("__muldi3", "muldi3.eo", "64-bit"),
+                                                    ("memcpy", "memcpy.eo", "a copy"),
+    ("__udivmodsi4", "lib_int.o", "a division"), ("oddity", "x.o", "without the library")])
+def test_a_helper_is_named_with_its_caller_and_what_to_write_instead(bench, helper, member, advice):
+    target = bench.image.function(helper, 0x000000, 0x060000, file=f"{LIBRARY}({member})", section=".libm.x")
+    bench.image.function("caller", CALL | target, 0x000000, 0x060000, file="a.o")
+    bench.fails(rf"{helper}\(\) of the compiler's library is in the image \(libc99-pic30-elf.a\({member}\)\), "
+                rf"called by caller\(\): .*{advice}")
+
+
+@pytest.mark.parametrize("opcode", [RCALL, 0x370000, 0x320000, 0x0C0000])
+def test_relative_calls_and_jumps_are_seen_too(bench, opcode):
+    target = bench.image.function("__mulsf3", 0x060000, file=f"{LIBRARY}(mulsf3.eo)")
+    at = bench.image.function("caller", 0, 0x060000, file="a.o")
+    bench.image.words[at] = opcode | (target - at - 2) // 2 & 0xFFFF
+    bench.fails(r"called by caller\(\)")
+
+
+def test_what_only_a_helper_calls_is_not_told_too(bench):
+    inner = bench.image.function("__fpack", 0x060000, file=f"{LIBRARY}(fpack.eo)")
+    outer = bench.image.function("__mulsf3", CALL | inner, 0, 0x060000, file=f"{LIBRARY}(mulsf3.eo)")
+    bench.image.function("caller", CALL | outer, 0, file="a.o")
+    bench.fails(r"__mulsf3\(\) .*called by caller\(\)")
+
+
+def test_a_helper_or_constant_that_nothing_visible_calls_is_still_told(bench):
+    bench.image.function("__divsf3", 0x060000, file=f"{LIBRARY}(divsf3.eo)")
+    bench.image.constant(1, 2, file=f"{LIBRARY}(fp_thenan.o)")
+    bench.fails(r"__divsf3\(\) .*called by nothing that can be seen",
+                r"\.const of the compiler's library .*fp_thenan.o\)\), called by nothing that can be seen")
+
+
+@pytest.mark.parametrize("member", ["crt0_standard.o", "crt0_extended.o", "crt1_standard.o", "crt0.o", "data_init_standard.o",
+                                    "crt_start_mode_normal.Leo",
+                                    "crt_start_mode.o"])
+def test_start_up_code_is_allowed_under_its_known_names(bench, member):
+    bench.image.function("start", 0x060000, file=f"{LIBRARY}({member})", section=".libpic30_crt_start_mode")
+    bench.passes()
+
+
+def test_a_map_of_another_build_is_refused(bench):
+    bench.image.places.pop()
+    bench.fails("2 words from 0x.* on come from no file that the map names: "
+                "the map is of another build, or the linker made them for a pointer")
+
+
+@pytest.mark.parametrize("word", [0xD80102, 0xD87B85, 0xD88102, 0xD8F90F, 0xD90002]) # div.s, div.u, divf
+def test_a_division_that_is_no_built_in_is_told_with_its_function(bench, word):
+    bench.image.function("average", 0x090011, word, 0x060000)
+    bench.fails(r"average\(\) divides by a variable with / or %: use qm_divud")
+
+
+def test_built_in_divisions_and_constants_that_look_like_one_pass(bench):
+    bench.image.function("average", 0x090011, 0xD88242, 0x090011, 0xD80242, 0x060000) # div.ud, div.sd
+    bench.image.constant(0xD80102)
+    bench.passes()
+
+
+# ---- budget --------------------------------------------------------------------------------------------------------------
+def test_a_budget_that_is_just_kept_passes_and_each_that_is_broken_is_a_line(bench):
+    flash = bench.flash
+    assert f"flash {flash} of {flash} bytes, RAM 300 of 300 bytes" in bench.passes(*bench.budget(flash, 300, 1732))
+    bench.fails(f"flash: {flash} bytes of a budget of {flash - 1}", "RAM: 300 bytes of a budget of 299", "stack: 1732 bytes are left",
+                more=bench.budget(flash - 1, 299, 1733))
+
+
+def test_a_stack_that_is_deeper_than_its_budget_or_than_what_is_free_is_a_line(bench, monkeypatch):
+    budget = bench.budget(12288, 768, 400)
+    monkeypatch.setattr(image, "deepest_stack", lambda *_: (400, []))
+    assert "stack at most 400 of 400 bytes, 1732 bytes free" in bench.passes("--objdump", "x", *budget)
+    take_ram(bench.image, 1700)
+    bench.fails("stack: up to 400 bytes of 332", more=("--objdump", "x"))
+    take_ram(bench.image, 300)
+    monkeypatch.setattr(image, "deepest_stack", lambda *_: (401, ["f: calls through a pointer"]))
+    bench.fails("stack: up to 401 bytes of 400; make size", "stack: f: calls through a pointer", more=("--objdump", "x", *budget))
+
+
+@pytest.mark.parametrize("text", ["", "[budget.image]\nflash_bytes = 1\n", "[budget]\nnote = 3\n", "not toml"])
+def test_a_budget_file_without_budgets_is_one_line(bench, text):
+    path = bench.folder / "budget.toml"
+    path.write_text(text, encoding="utf-8")
+    status, _, lines = bench.check("--budget", str(path))
+    assert (status, len(lines)) == (2, 1) and "budget.toml" in lines[0]
+
+
+def test_the_projects_budget_is_read():
+    limits = Budget.read(paths.ROOT / "firmware" / "budget.toml").image
+    assert (limits.flash, limits.ram) == (12288, 768)
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name, data, words", [
+    ("a.elf", None, "No such file"), ("a.hex", None, "No such file"), ("a.map", None, "No such file"), ("a.elf", b"\x7fELF", ""),
+                                               ("a.elf", b"text\n" * 40, ""),
+    ("a.hex", record(0, 2, b"\0\0\0\0").encode(), ""), ("a.map", b"\xff\xfe nothing", "not a map file")])
+def test_a_file_that_is_missing_or_another_is_one_line(bench, name, data, words):
+    arguments = bench.image.write(bench.folder)
+    (bench.folder / name).unlink() if data is None else (bench.folder / name).write_bytes(data)
+    status, out, lines = bench.run(arguments)
+    assert (status, out, len(lines)) == (2, "", 1)
+    assert re.search(rf"^foc33: .*{words}.*{name}: (build it|check)", lines[0]), lines

@@ -1,0 +1,21 @@
+/* What the chip's peripherals take for true although no source at hand confirms it, or gives only as a range; printed by `make cycles`. */
+#ifndef FOC33_CHIP_CHIP_ASSUMPTIONS_H
+#define FOC33_CHIP_CHIP_ASSUMPTIONS_H
+
+/* X(name, value, meaning, where it is used). */
+#define CHIP_ASSUMPTIONS(X) \
+    X(FRC_HZ, 7370000, "Hz of the fast RC oscillator", "chip_device.c chip_connect") \
+    X(LPRC_HZ, 32000, "Hz of the low-power RC oscillator, which drives the watchdog", "chip_device.c chip_connect") \
+    X(SECONDARY_HZ, 32768, "Hz of the secondary oscillator", "chip_clock.c source_hz") \
+    X(PLL_LOCK_US, 1500, "us until the PLL has locked, after power-on and after a switch to it", "chip_clock.c ready_s") \
+    X(CRYSTAL_START_PERIODS, 1024, "periods that the start-up timer of a crystal counts; an external clock needs none", "chip_clock.c ready_s") \
+    X(UNLOCK_CYCLES, 2, "cycles within which each write of OSCCON's unlock sequence follows the one before", "chip_clock.c unlocked") \
+    X(RESET_KEEPS_CLOCK, 1, "a reset other than power-on goes on with the running clock, without waiting for it anew", "chip_clock.c chip_clock_reset")
+
+enum {
+#define ASSUMPTION_VALUE(id, value, meaning, used_in) ASSUME_##id = (value),
+    CHIP_ASSUMPTIONS(ASSUMPTION_VALUE)
+#undef ASSUMPTION_VALUE
+};
+
+#endif

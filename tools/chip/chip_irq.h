@@ -1,0 +1,39 @@
+/* What chip and core say to each other: interrupts by number (bit `number % 16` of IFSx and IECx, x = `number / 16`), and resets by their cause. */
+#ifndef FOC33_CHIP_CHIP_IRQ_H
+#define FOC33_CHIP_CHIP_IRQ_H
+
+#include <stdint.h>
+
+enum {
+    CHIP_IRQ_T1 = 3, CHIP_IRQ_T2 = 7, CHIP_IRQ_T3 = 8, CHIP_IRQ_U1RX = 11, CHIP_IRQ_U1TX = 12, CHIP_IRQ_ADC1 = 13, CHIP_IRQ_PWM1 = 57,
+    CHIP_IRQ_FLTA1 = 63,
+    CHIP_IRQ_WORDS = 5
+};
+
+typedef enum {
+    CHIP_RESET_POR, CHIP_RESET_BOR, CHIP_RESET_MCLR, CHIP_RESET_SOFTWARE, CHIP_RESET_WATCHDOG, CHIP_RESET_TRAP,
+    CHIP_RESET_ILLEGAL /* illegal opcode or uninitialised W register (RCON.IOPUWR) */
+} chip_reset_t;
+
+/* An interrupt and its priority; priority 0: none. */
+typedef struct {
+    unsigned priority, number;
+} chip_irq_t;
+
+/* The enabled interrupt with a set flag of the highest priority; among equals that of the lowest number. The arrays start with IFS0, IEC0, IPC0. */
+static inline chip_irq_t chip_irq_pending(const uint16_t *ifs, const uint16_t *iec, const uint16_t *ipc)
+{
+    chip_irq_t best = {0, 0};
+    for (unsigned word = 0; word < CHIP_IRQ_WORDS; word++) {
+        unsigned active = (unsigned)ifs[word] & iec[word];
+        for (unsigned bit = 0; active != 0; bit++, active >>= 1) {
+            unsigned number = 16u * word + bit, priority = (unsigned)ipc[number / 4u] >> 4u * (number % 4u) & 7u;
+            if ((active & 1u) != 0 && priority > best.priority) {
+                best = (chip_irq_t){priority, number};
+            }
+        }
+    }
+    return best;
+}
+
+#endif

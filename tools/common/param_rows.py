@@ -1,0 +1,53 @@
+"""What userparams.h is made of: the rows of include/drive/param_table.h with unit, range, default and meaning, and the modes."""
+
+import functools
+import re
+from dataclasses import dataclass
+
+from . import paths
+from .errors import UserError
+from .x_macro import rows
+
+TABLE = paths.ROOT / "include" / "drive" / "param_table.h"
+ENTRIES = 18
+"""Parameters of a field-weakening table: stem0 .. stem17."""
+FOLLOWS = {"FROM_MOTOR": "motor file", "FROM_BOARD": "board file", "FROM_TUNER": "tuner"}
+"""Defaults that are no number: what the value follows from."""
+_GROUP = re.compile(r"#define PARAM_\w+\(X\) /\* (.+?) \*/(.*)")
+_ROW = re.compile(r'(PARAM_ENTRIES\(X, |X\()(\w+), "([^"]*)", ([^,()]+), ([^,()]+), ([^,()]+), "([^"]*)"\)')
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One define of userparams.h. Range and default are kept as they are written."""
+
+    name: str
+    unit: str
+    low: str
+    high: str
+    default: str
+    """a number, or a key of FOLLOWS"""
+    meaning: str
+    section: str
+    stem: str = ""
+    """of the table whose entry this is"""
+
+
+@functools.cache
+def parameters() -> dict[str, Parameter]:
+    """Every parameter by name, in the order of the table."""
+    found: dict[str, Parameter] = {}
+    for section, row_text in _GROUP.findall(TABLE.read_text(encoding="utf-8").replace("\\\n", " ")):
+        left = _ROW.sub("", row_text).strip()
+        if left:
+            raise UserError(f"a row cannot be read: {left[:60]}", str(paths.shown(TABLE)), "write X(NAME, \"unit\", minimum, maximum, default, \"meaning\")")
+        for macro, name, *columns in _ROW.findall(row_text):
+            for each in (f"{name}{i}" for i in range(ENTRIES)) if macro.startswith("PARAM") else (name,):
+                found[each] = Parameter(each, *columns, section, name if each != name else "")
+    return found
+
+
+@functools.cache
+def modes() -> dict[str, str]:
+    """Every mode and what it does, in the order of include/drive/modes/mode_table.h."""
+    return {name: meaning for name, meaning in rows("include", "drive/modes/mode_table.h", "MODE_TABLE", "#name meaning")}

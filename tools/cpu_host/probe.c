@@ -1,0 +1,212 @@
+/* The virtual board's view into the firmware: its signals in engineering units, its parameters and names. */
+#include "probe.h"
+
+#include "board/firmware.h"
+#include "board/watch.h"
+#include "drive/param_table.h"
+#include "drive/param_scaling.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define CURRENT_A(q13) ((double)(q13) * 4.0 * (double)PARAM_F(NORM_CURRENT_CONST))
+#define VOLTAGE_V(q14) ((double)(q14) * 2.0 * (double)NORM_VOLTAGE_CONST)
+#define EMF_V(q12) ((double)(q12) * 8.0 * (double)NORM_VOLTAGE_CONST)
+#define ANGLE_DEG(counts) ((double)(counts) * 360.0 / 65536.0)
+#define SPEED_RPM(erpm) ((double)(erpm) / (double)(NOPOLESPAIRS))
+#define BUS_V(q15) ((double)(q15) / 32768.0 * (double)PARAM_F(BUS_FULL_SCALE_V))
+
+#define SIGNAL(function, expression) \
+    static double function(void) \
+    { \
+        const drive_t *d = &board_drive; \
+        return (expression); \
+    }
+
+SIGNAL(read_state, (double)d->state)
+SIGNAL(read_fault, (double)d->fault)
+SIGNAL(read_running, (double)drive_is_running(d))
+SIGNAL(read_calibrated, (double)d->calibration.done)
+SIGNAL(read_theta_est, ANGLE_DEG(estimator_next_angle(&d->run.estimator)) - (double)d->run.estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
+SIGNAL(read_theta_ctrl, ANGLE_DEG(d->angle))
+SIGNAL(read_speed_est, SPEED_RPM(estimator_speed(&d->run.estimator)))
+SIGNAL(read_speed_raw, SPEED_RPM(d->run.estimator.omega_erpm))
+SIGNAL(read_speed_ref, SPEED_RPM(d->run.control.reference_erpm))
+SIGNAL(read_speed_target, SPEED_RPM(d->command.target_erpm))
+SIGNAL(read_i_a, CURRENT_A(d->i_a_q13))
+SIGNAL(read_i_b, CURRENT_A(d->i_b_q13))
+SIGNAL(read_i_d, CURRENT_A(d->run.control.i_q13.d))
+SIGNAL(read_i_q, CURRENT_A(d->run.control.i_q13.q))
+SIGNAL(read_id_ref, CURRENT_A(d->run.control.ref_q13.d))
+SIGNAL(read_iq_ref, CURRENT_A(d->run.control.ref_q13.q))
+SIGNAL(read_iq_limit, CURRENT_A(d->run.control.iq_limit_q13))
+SIGNAL(read_id_trim, CURRENT_A(d->run.fieldweak.trim_q13))
+SIGNAL(read_brake_limit, CURRENT_A(d->run.control.brake_limit_q13))
+SIGNAL(read_v_d, VOLTAGE_V(d->run.control.v_q14.d))
+SIGNAL(read_v_q, VOLTAGE_V(d->run.control.v_q14.q))
+SIGNAL(read_v_limit, VOLTAGE_V(d->circle.limit_q14))
+SIGNAL(read_vq_limit, VOLTAGE_V(d->run.control.vq_limit_q14))
+SIGNAL(read_bus, BUS_V(qm_hi(d->bus_q31)))
+SIGNAL(read_fw_index, (double)d->run.fieldweak.index)
+SIGNAL(read_inv_kphi, (double)d->run.model.inv_kfi)
+SIGNAL(read_ls_ratio, (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0)
+SIGNAL(read_offset, ANGLE_DEG(d->run.handover.offset))
+SIGNAL(read_e_d, EMF_V(estimator_emf(&d->run.estimator).d))
+SIGNAL(read_e_q, EMF_V(estimator_emf(&d->run.estimator).q))
+SIGNAL(read_offset_a, CURRENT_A(d->calibration.offset_a_q13))
+SIGNAL(read_offset_b, CURRENT_A(d->calibration.offset_b_q13))
+#ifdef SNAPSHOT
+SIGNAL(read_snap_done, ((void)d, (double)SnapDone))
+SIGNAL(read_snap_rows, ((void)d, (double)board_snapshot.row))
+SIGNAL(read_snap1_last, ((void)d, (double)SnapBuf1[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap2_last, ((void)d, (double)SnapBuf2[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap3_last, ((void)d, (double)SnapBuf3[DATA_BUFFER_SIZE - 1]))
+SIGNAL(read_snap4_last, ((void)d, (double)SnapBuf4[DATA_BUFFER_SIZE - 1]))
+#endif
+
+const probe_signal_t probe_signals[] = {
+    { "fw.state", "", "drive state (drive_state_t)", read_state },
+    { "fw.fault", "", "fault code (drive_fault_t)", read_fault },
+    { "fw.run", "", "1 while the bridge switches", read_running },
+    { "fw.calibrated", "", "1 after the offset calibration", read_calibrated },
+    { "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", read_theta_est },
+    { "fw.theta_ctrl_deg", "deg", "control angle of the next sample", read_theta_ctrl },
+    { "fw.speed_est_rpm", "rpm", "filtered estimated speed", read_speed_est },
+    { "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", read_speed_raw },
+    { "fw.speed_ref_rpm", "rpm", "ramped speed reference", read_speed_ref },
+    { "fw.speed_target_rpm", "rpm", "speed target", read_speed_target },
+    { "fw.i_a_a", "A", "measured current of phase A", read_i_a },
+    { "fw.i_b_a", "A", "measured current of phase B", read_i_b },
+    { "fw.i_d_a", "A", "measured d current", read_i_d },
+    { "fw.i_q_a", "A", "measured q current", read_i_q },
+    { "fw.id_ref_a", "A", "d current reference", read_id_ref },
+    { "fw.iq_ref_a", "A", "q current reference", read_iq_ref },
+    { "fw.iq_limit_a", "A", "q current limit", read_iq_limit },
+    { "fw.id_trim_a", "A", "d current of the voltage feedback", read_id_trim },
+    { "fw.brake_limit_a", "A", "limit of the braking current", read_brake_limit },
+    { "fw.v_d_v", "V", "commanded d voltage", read_v_d },
+    { "fw.v_q_v", "V", "commanded q voltage", read_v_q },
+    { "fw.v_limit_v", "V", "radius of the voltage circle", read_v_limit },
+    { "fw.vq_limit_v", "V", "q voltage limit", read_vq_limit },
+    { "fw.bus_v", "V", "filtered bus voltage", read_bus },
+    { "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", read_fw_index },
+    { "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", read_inv_kphi },
+    { "fw.ls_ratio", "", "Ls/(2 Ls0) in use", read_ls_ratio },
+    { "fw.offset_deg", "deg", "hand-over angle offset that is left", read_offset },
+    { "fw.e_d_v", "V", "filtered d back-EMF", read_e_d },
+    { "fw.e_q_v", "V", "filtered q back-EMF", read_e_q },
+    { "fw.offset_a_a", "A", "calibrated offset of phase A", read_offset_a },
+    { "fw.offset_b_a", "A", "calibrated offset of phase B", read_offset_b },
+#ifdef SNAPSHOT
+    { "fw.snap_done", "", "SnapDone", read_snap_done },
+    { "fw.snap_rows", "rows", "rows recorded so far", read_snap_rows },
+    { "fw.snap1_last", "Q15", "last row of SnapBuf1, phase current a", read_snap1_last },
+    { "fw.snap2_last", "Q15", "last row of SnapBuf2, q current", read_snap2_last },
+    { "fw.snap3_last", "erpm", "last row of SnapBuf3, speed", read_snap3_last },
+    { "fw.snap4_last", "1/65536 turn", "last row of SnapBuf4, angle", read_snap4_last },
+#endif
+};
+const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
+
+#define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },
+const probe_param_t probe_params[] = { PARAM_TABLE(PARAM_ENTRY) };
+const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
+
+/* What may change while the motor turns: the name of userparams.h (or its stem, for the 18 entries of a table), where the firmware
+ * keeps it, and the value of one count. A name in two rows has two places. */
+typedef struct {
+    const char *name;
+    unsigned entries; /* 0: not a table */
+    int16_t *place;
+    double per_count;
+} tunable_t;
+
+#if defined(TUNING) || defined(PARAMS_IN_RAM)
+#define TUNABLE(name, field, per_count) { name, 0, &board_params.fieldweak.field, per_count },
+#define TUNABLE_TABLE(stem, field, per_count) { stem, FIELDWEAK_ENTRIES, board_params.fieldweak.field, per_count },
+#else
+#define TUNABLE(name, field, per_count)
+#define TUNABLE_TABLE(stem, field, per_count)
+#endif
+
+static const tunable_t tunables[] = {
+    TUNABLE_TABLE("IDREF_SPEED", idref_q13, CURRENT_A(1))
+    TUNABLE_TABLE("INVKFI_SPEED", inv_kfi, 1.0)
+    TUNABLE_TABLE("LS_OVER2LS0_SPEED", ls_over2ls0_q15, 1.0 / 32768.0)
+    TUNABLE("FW_START_SPEED_RPM", on_speed_erpm, SPEED_RPM(1))
+    TUNABLE("FW_START_SPEED_RPM", trim_speed_erpm, SPEED_RPM(1) / 0.6)
+    TUNABLE("FW_TRIM_CURRENT_A", trim_max_q13, CURRENT_A(1))
+    TUNABLE("KFILTER_ESDQ", kfilter_esdq_q16, 0.5)
+    TUNABLE("KFILTER_ESDQ_FW", kfilter_esdq_fw_q16, 0.5)
+    { NULL, 0, NULL, 0.0 }
+};
+
+typedef struct {
+    const char *name;
+    double min, max;
+} range_t;
+
+#define PARAM_RANGE(name, unit, min, max, value, meaning) { #name, min, max },
+static const range_t ranges[] = { PARAM_TABLE(PARAM_RANGE) };
+
+static int16_t *tunable_place(const tunable_t *t, const char *name)
+{
+    size_t stem = strlen(t->name);
+    unsigned entry = 0;
+    int used = 0;
+    if (t->entries == 0) {
+        return (strcmp(t->name, name) == 0) ? t->place : NULL;
+    }
+    if (strncmp(t->name, name, stem) != 0 || sscanf(name + stem, "%2u%n", &entry, &used) != 1 || name[stem + (size_t)used] != '\0') {
+        return NULL;
+    }
+    return (entry < t->entries) ? &t->place[entry] : NULL;
+}
+
+int probe_param_get(const char *name, double *value)
+{
+    for (const tunable_t *t = tunables; t->name != NULL; t++) {
+        const int16_t *place = tunable_place(t, name);
+        if (place != NULL) {
+            *value = (double)*place * t->per_count;
+            return 0;
+        }
+    }
+    return -1;
+}
+
+int probe_param_set(const char *name, double value)
+{
+    int result = -1;
+    for (size_t n = 0; n < sizeof ranges / sizeof ranges[0]; n++) {
+        if (strcmp(ranges[n].name, name) == 0 && !(value >= ranges[n].min && value <= ranges[n].max)) {
+            return -2;
+        }
+    }
+    for (const tunable_t *t = tunables; t->name != NULL; t++) {
+        int16_t *place = tunable_place(t, name);
+        if (place != NULL) {
+            *place = (int16_t)lround(value / t->per_count);
+            result = 0;
+        }
+    }
+    return result;
+}
+
+const char *probe_fault_name(int code)
+{
+#define FAULT_NAME(number, name, cause, remedy) \
+    if (code == (number)) { \
+        return #name; \
+    }
+    DRIVE_FAULT_TABLE(FAULT_NAME)
+    return "?";
+}
+
+const char *probe_state_name(int code)
+{
+#define STATE_NAME(name, meaning) #name,
+    static const char *const names[] = { DRIVE_STATE_TABLE(STATE_NAME) };
+    return (code >= 0 && code < (int)DRIVE_STATE_COUNT) ? names[code] : "?";
+}

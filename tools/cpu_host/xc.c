@@ -1,0 +1,77 @@
+/* Storage, start values and look-up of the host's special function registers. */
+#include "xc.h"
+
+#include <string.h>
+
+#define HOST_SFR_DEFINE(name, address, start) volatile uint16_t name = (start);
+SFR_TABLE(HOST_SFR_DEFINE)
+
+#define HOST_SFR_ROW(name, address, start) {#name, &name, (start)},
+host_sfr_t host_sfr_table[] = {SFR_TABLE(HOST_SFR_ROW)};
+const size_t host_sfr_count = sizeof host_sfr_table / sizeof host_sfr_table[0];
+
+/* Nothing answers while the firmware runs: a switch to the crystal with PLL "has happened" (COSC = NOSC = 3, LOCK), every pin reads high
+ * (buttons released, fault input inactive), the PWM's time base "counts down at 500" for a deadline check, no character waits. */
+static const struct { volatile uint16_t *pointer; uint16_t start; } ready[] = {
+    {&OSCCON, 0x3320}, {&PORTA, 0x079F}, {&PORTB, 0xFFFF}, {&PORTC, 0x03FF}, {&P1TMR, 0x81F4}, {&U1TXREG, HOST_U1TXREG_EMPTY},
+};
+
+/* The start values stand there before main(). */
+__attribute__((constructor)) static void prepare(void)
+{
+    for (size_t i = 0; i < host_sfr_count; i++) {
+        for (size_t k = 0; k < sizeof ready / sizeof ready[0]; k++) {
+            if (host_sfr_table[i].pointer == ready[k].pointer) {
+                host_sfr_table[i].reset = ready[k].start;
+            }
+        }
+    }
+    host_registers_reset();
+}
+
+volatile uint16_t host_watchdog_serves;
+
+void host_clear_watchdog(void)
+{
+    host_watchdog_serves = (uint16_t)(host_watchdog_serves + 1u);
+}
+
+void host_registers_reset(void)
+{
+    host_watchdog_serves = 0;
+    for (size_t i = 0; i < host_sfr_count; i++) {
+        *host_sfr_table[i].pointer = host_sfr_table[i].reset;
+    }
+}
+
+volatile uint16_t *host_sfr_find(const char *name)
+{
+    for (size_t i = 0; i < host_sfr_count; i++) {
+        if (strcmp(host_sfr_table[i].name, name) == 0) {
+            return host_sfr_table[i].pointer;
+        }
+    }
+    return NULL;
+}
+
+void host_write_oscconl(unsigned value)
+{
+    enum { WRITABLE = 0x00C3, CLOCK_FAIL = 0x0008, KEPT = 0xFF20, LOCK = 0x0020, OSWEN = 0x0001 };
+    uint16_t kept = (uint16_t)(OSCCON & (KEPT | CLOCK_FAIL));
+    if ((value & CLOCK_FAIL) == 0u) {
+        kept = (uint16_t)(kept & ~CLOCK_FAIL); /* CF can only be cleared */
+    }
+    uint16_t osccon = (uint16_t)(kept | (value & WRITABLE));
+    if ((osccon & OSWEN) != 0) {
+        uint16_t nosc = (uint16_t)((osccon >> 8) & 7);
+        int has_pll = nosc == 1 || nosc == 3;
+        osccon = (uint16_t)((osccon & 0x07DE) | (nosc << 12));
+        osccon = (uint16_t)(has_pll ? (osccon | LOCK) : (osccon & ~LOCK));
+    }
+    OSCCON = osccon;
+}
+
+void host_write_oscconh(unsigned value)
+{
+    OSCCON = (uint16_t)((OSCCON & 0x70FFu) | ((value & 7u) << 8));
+}

@@ -1,0 +1,89 @@
+/* What the MCLV board has between chip and plant: buttons, potentiometer, comparator, current amplifiers, bus divider, and the wiring. */
+#include "vb_state.h"
+
+#define REFERENCE_V 3.3
+
+enum { FLTA_RP = 8 }; /* FLTA1 is on RB8 */
+
+/* Levels that the circuits give to the pins when these are inputs; everything else is pulled up. */
+static void levels(void *context, uint16_t level[3])
+{
+    const vb_t *vb = context;
+    bool fault = vb->controls.flta != 0.0 || vb->controls.comparator;
+    level[0] = (uint16_t)(0x079Fu & ~(vb->controls.s2 != 0.0 ? 1u << 8 : 0u));
+    level[1] = (uint16_t)(0xFFFFu & ~(vb->controls.s3 != 0.0 ? 1u << 4 : 0u) & ~(fault ? 1u << FLTA_RP : 0u));
+    level[2] = 0x03FFu;
+}
+
+/* Follow the over-current comparator, which stays active to the end of the period. */
+void vb_circuit_comparator(vb_t *vb, bool period_start)
+{
+    vb_controls_t *c = &vb->controls;
+    double limit_a = vb->plant.inverter.trip_a;
+    bool over = limit_a > 0.0 && plant_inverter_bus_a(&vb->plant) > limit_a;
+    if (over && !c->comparator) {
+        c->trips += 1.0;
+    }
+    c->comparator = over || (c->comparator && !period_start);
+}
+
+/* Current that the shunt of leg 0 (A) or 1 (B) shows at this instant. It needs settle_s after a change of the leg's path; until then the
+ * amplifier is on its way. `valid` tells whether the sample is the true current. */
+static double shunt_current(const vb_t *vb, unsigned leg, bool *valid)
+{
+    const plant_inverter_t *inv = &vb->plant.inverter;
+    double age_s = vb->plant.start_s + vb->plant.now_s - inv->low_since_s[leg];
+    double part = vb->analogue.settle_s > 0.0 ? plant_min(1.0, age_s / vb->analogue.settle_s) : 1.0;
+    if (!inv->low_path[leg]) {
+        part = 1.0 - part;
+    }
+    double i = inv->i[leg];
+    *valid = part >= 1.0 || inv->cond[leg] == PLANT_COND_FLOAT;
+    return part * i;
+}
+
+static double current_voltage(vb_t *vb, unsigned leg)
+{
+    bool valid = false;
+    double i = shunt_current(vb, leg, &valid);
+    if (!valid) {
+        *(leg == 0 ? &vb->analogue.ia_invalid : &vb->analogue.ib_invalid) += 1.0;
+    }
+    return vb->analogue.offset_v + vb->analogue.shunt_offset_v[leg] - vb->analogue.gain_v_per_a * i;
+}
+
+/* Voltage at the analogue input AN<input>. */
+static double input_voltage(void *context, unsigned input)
+{
+    vb_t *vb = context;
+    switch (input) {
+    case 0:
+    case 1:
+        return current_voltage(vb, input);
+    case 2:
+        return vb->plant.supply.bus_v / vb->analogue.vbus_ratio;
+    case 3:
+    case 4:
+    case 5:
+        return vb->plant.inverter.v[input - 3] / vb->analogue.vbus_ratio;
+    case 8:
+        return vb->controls.pot * REFERENCE_V;
+    default:
+        return 0.0;
+    }
+}
+
+static void sampled(void *context)
+{
+    vb_latch(context);
+}
+
+static void warn(void *context, const char *format, va_list args)
+{
+    vb_warn_list(context, format, args);
+}
+
+const chip_board_t vb_circuit = {
+    .levels = levels, .input_v = input_voltage, .sampled = sampled, .served = vb_served, .send = vb_serial_send, .receive = vb_serial_receive, .warn = warn,
+    .fault_rp = FLTA_RP, .channel = {{8, "the potentiometer"}, {0, "IA"}, {1, "IB"}, {2, "VBUS"}},
+};

@@ -1,0 +1,174 @@
+"""The result of an identification: what was told, what the firmware measured, and how far that is from the truth."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tools.bench import report
+from tools.common import paths, x_macro
+from tools.common.board_file import BoardFile
+from tools.common.motor_file import Motor
+from tools.common.trace import Trace
+
+MODE = "IDENTIFY"
+LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0}
+SALIENT = 0.03
+"""Inductances that differ by less are one."""
+COLUMNS = (("measured", "measured\n", "{}"), ("true", "true\n", "{}"), ("error_percent", "error\n%", "{:+.2f}"), ("limit_percent", "limit\n%", "{:g}"),
+           ("verdict", "\nverdict", "{}"))
+
+
+# ---- the firmware's own tables ---------------------------------------------------------------------------------------------
+@functools.cache
+def step_names() -> list[str]:
+    """Names of the numbers in IdentifyParm.step."""
+    return [name for name, _ in x_macro.rows("include", "drive/modes/identify.h", "IDENTIFY_STEP_TABLE", "#name meaning")]
+
+
+@dataclass(frozen=True)
+class Result:
+    """How an identification ended."""
+
+    name: str
+    cause: str
+    remedy: str
+
+
+@functools.cache
+def results() -> dict[int, Result]:
+    """Meaning of the numbers in IdentifyParm.result."""
+    table = x_macro.rows("include", "drive/modes/identify.h", "IDENTIFY_RESULT_TABLE", "#code #name cause remedy")
+    return {int(code): Result(*texts) for code, *texts in table}
+
+
+# ---- what was told, what was measured ----------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Known:
+    """What somebody without a data sheet knows of a motor, or dares to try."""
+
+    pole_pairs: int
+    current_a: float
+    speed_rpm: float
+
+    @classmethod
+    def of(cls, motor: Motor, board: BoardFile, current_a: float | None = None, speed_rpm: float | None = None) -> "Known":
+        """From the rating: the rated current as far as the board allows it, and 40 % of the speed that the rating promises at this bus."""
+        share = min(1.0, board.nominal_bus_v / motor.rated_voltage_v)
+        return cls(motor.pole_pairs, current_a or min(motor.rated_current_a, 0.8 * trip_a(board)),
+                   speed_rpm or max(50.0, min(0.4 * share * motor.rated_speed_rpm, 5000.0)))
+
+
+def trip_a(board: BoardFile) -> float:
+    """Over-current threshold that suits any motor."""
+    return 0.86 * board.current_full_scale_a
+
+
+@dataclass
+class Measured:
+    """What the firmware said, and when."""
+
+    watch: dict[str, int]
+    fault: str
+    steps: list[tuple[float, int]]
+    """Time and number of every change of the step."""
+    trace: Trace
+    motor_s: float = 0.0
+    outputs_seen: float = 0.0
+    """Outputs that were on in the last period."""
+
+
+# ---- the comparison ---------------------------------------------------------------------------------------------------------
+@dataclass
+class Identified:
+    """A motor, what was told, what was measured."""
+
+    motor: Motor
+    board: BoardFile
+    known: Known
+    header: str
+    values: dict[str, float]
+    measured: Measured
+
+    @property
+    def result(self) -> Result:
+        return results()[self.measured.watch["result"]]
+
+    @property
+    def done(self) -> bool:
+        return self.result.name == "DONE"
+
+    @property
+    def bridge_ohm(self) -> float:
+        """What transistors and shunt add to a phase."""
+        return self.board.rds_on_ohm + 0.5 * self.board.shunt_ohm
+
+    @property
+    def winding_ohm(self) -> float:
+        return 1e-3 * self.measured.watch["Rs_mohm"] - self.bridge_ohm
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Measured and true values with the limits of the errors. The truth is the plant's, changes and temperature included."""
+        watch, plant_now = self.measured.watch, self.values
+        degrees = plant_now.get("motor.temp_c", 25.0) - 25.0
+        rs_ohm = plant_now["motor.rs_ohm"] * (1.0 + plant_now["motor.r_tempco"] * degrees)
+        kphi = 3.0 ** 0.5 * plant_now["motor.psi_vs"] * plant_now["motor.pole_pairs"] * 1000.0 * 2.0 * np.pi / 60.0
+        kphi *= 1.0 + plant_now["motor.psi_tempco"] * degrees
+        return [
+            _row("R loop [mohm]", f"{watch['Rs_mohm']}", f"{1e3 * (rs_ohm + self.bridge_ohm):.1f}"),
+            _row("R winding [mohm]", f"{1e3 * self.winding_ohm:.1f}", f"{1e3 * rs_ohm:.1f}", self.winding_ohm / rs_ohm, "R"),
+            _row("Ld [uH]", f"{watch['Ld_uH']}", f"{1e6 * plant_now['motor.ld_h']:.1f}", 1e-6 * watch["Ld_uH"] / plant_now["motor.ld_h"], "Ld"),
+            _row("Lq [uH]", f"{watch['Lq_uH']}", f"{1e6 * plant_now['motor.lq_h']:.1f}", 1e-6 * watch["Lq_uH"] / plant_now["motor.lq_h"], "Lq"),
+            _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi")]
+
+    def problems(self) -> list[str]:
+        """What is wrong, one line each."""
+        if not self.done:
+            fault = f" (fault {self.measured.fault})" if self.measured.fault != "NONE" else ""
+            return [f"{self.result.name}{fault}: {self.result.cause}: {self.result.remedy}"]
+        return [f"{row['name']} is off by {row['error_percent']:+.2f} %, allowed are {row['limit_percent']:g} %"
+                for row in self.rows() if row["verdict"] == "FAIL"]
+
+    def paste(self) -> str:
+        """The lines for a motor file: line to line, which means the same in a star and in a delta."""
+        watch = self.measured.watch
+        source = f"measured with {MODE}, {self.known.current_a:.3g} A"
+        ld_mh, lq_mh = 1e-3 * watch["Ld_uH"], 1e-3 * watch["Lq_uH"]
+        lines = ["[electrical]", f'pole_pairs = {{ value = {self.known.pole_pairs}, source = "counted" }}',
+                 f'resistance = {{ value = {2.0 * self.winding_ohm:.4g}, unit = "ohm line-to-line", at_degc = 25, source = "{source}" }}']
+        if abs(ld_mh - lq_mh) <= SALIENT * ld_mh:
+            lines.append(f'inductance = {{ value = {ld_mh + lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
+        else:
+            lines.append(f'inductance_d = {{ value = {2.0 * ld_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
+            lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
+        lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
+                     f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
+        return "\n".join(lines)
+
+    def text(self) -> str:
+        """The whole report, as printed."""
+        known = self.known
+        parts = [f"{self.motor.name}: {self.motor.title}",
+                 f"told: {known.pole_pairs} pole pairs, {known.current_a:.3g} A, {known.speed_rpm:.4g} rpm; "
+                 f"bridge of {self.board.name}: {1e3 * self.bridge_ohm:.1f} mohm (transistor, half of the shunt)",
+                 "\n".join(f"{at_s:9.4f} s  {step_names()[number]}" for at_s, number in self.measured.steps[1:])]
+        if self.done:
+            parts += [report.table(self.rows(), COLUMNS), "For the motor file (R without the bridge; note the winding's temperature):\n\n" + self.paste()]
+        return "\n\n".join(parts)
+
+    def data(self) -> dict[str, Any]:
+        names = step_names()
+        return {"motor": str(paths.shown(self.motor.path)), "board": str(paths.shown(self.board.path)), "result": self.result.name,
+                "fault": self.measured.fault, "watch": self.measured.watch, "bridge_ohm": self.bridge_ohm, "rows": self.rows() if self.done else [],
+                "steps": [{"at_s": round(at_s, 4), "step": names[number]} for at_s, number in self.measured.steps],
+                "told": {"pole_pairs": self.known.pole_pairs, "current_a": self.known.current_a, "speed_rpm": self.known.speed_rpm}}
+
+
+def _row(name: str, measured: str, true: str, ratio: float | None = None, limit: str = "") -> dict[str, Any]:
+    if ratio is None:
+        return {"name": name, "measured": measured, "true": true, "error_percent": None, "limit_percent": None, "verdict": None}
+    error = 100.0 * (ratio - 1.0)
+    allowed = LIMITS_PERCENT[limit]
+    return {"name": name, "measured": measured, "true": true, "error_percent": error, "limit_percent": allowed,
+            "verdict": "PASS" if abs(error) <= allowed else "FAIL"}

@@ -1,0 +1,183 @@
+/* What the firmware makes of a userparams.h, a line each: every constant with the value that it stands for, and what the build refuses. */
+#include <math.h>
+#include <stdio.h>
+
+#include "drive/param_init.h"
+#include "drive/param_table.h"
+
+static const drive_params_t p = DRIVE_PARAMS_INIT;
+
+/** `one` is the worth of one count in the value's unit; the rounding error follows from it. 0: a whole number, no rounding. */
+static void constant(const char *name, long long count, double value, const char *unit, double one, const char *format, const char *meaning)
+{
+    double error = (one == 0.0 || value == 0.0) ? 0.0 : 100.0 * ((double)count / (value / one) - 1.0);
+    printf("constant|%s|%.17g|%s|%s|%lld|%.17g|%s\n", name, value, unit, format, count, error, meaning);
+}
+
+#define PI 3.14159265358979323846
+#define GROUP(name) puts("group|" name)
+#define FIELD(path, ...) constant(#path, (long long)p.path, __VA_ARGS__)
+#define MACRO(name, ...) constant(#name, (long long)(name), __VA_ARGS__)
+
+/* The worth of one count, in double precision */
+static const double ampere = NORM_CURRENT_CONST, period = LOOPTIME_SEC, pairs = NOPOLESPAIRS;
+static double volt, ohm, q13_a, erpm, slots;
+static const char *const q16_divided[] = { "Q16 / 1", "Q16 / 2", "Q16 / 4", "Q16 / 8" };
+
+static double at_most(double value, double largest)
+{
+    return (value < largest) ? value : largest;
+}
+
+static double filter_hz(double k_q15)
+{
+    return -log(1.0 - k_q15 / 32768.0) / (2.0 * PI * period);
+}
+
+static void motor(void)
+{
+    double rs = MOTOR_RS_OHM, ls = MOTOR_LS_MH, kphi = MOTOR_KPHI_V_PER_KRPM, one_ls = ohm * period * 1000.0;
+    GROUP("motor");
+    MACRO(NORM_RS, rs, "ohm", rs / at_most(rs / ohm * 16384.0, 32767.0), "Q15 / 2", "Equation 5, AN1292's constant, at most 32767");
+    MACRO(NORM_LSDTBASE, ls, "mH", ls / at_most(ls / one_ls * 128.0, 32767.0), "Q15 / 256", "Equation 5, AN1292's constant, at most 32767");
+    MACRO(NORM_INVKFIBASE, kphi, "V/krpm", kphi * kphi / (sqrt(3.0) * 1000.0 * pairs * volt * 16384.0), "Q15 / 2, 1/Kphi", "Equation 6");
+    MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
+    FIELD(estimator.rs_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
+    FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
+    FIELD(fieldweak.ls_base_q16, ls, "mH", one_ls / 4096.0 * (1 << p.estimator.ls_exp), q16_divided[p.estimator.ls_exp],
+          "L of the estimator, eight samples");
+    FIELD(estimator.ls_exp, 1 << p.estimator.ls_exp, "1", 0.0, "count", "the product is shifted left by it");
+}
+
+static void estimator(void)
+{
+    double least = at_most(8.0 * PARAM_DI(NOMINAL_SPEED_RPM), 16383.0), most = at_most(PARAM_DI(MAXIMUM_SPEED_RPM), 4095.0), q14_a = 2.0 * ampere;
+    GROUP("estimator");
+    FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0, "Q32 of a turn/erpm", "angle a period");
+    FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0, "Q16 rad/erpm", "half of it");
+    FIELD(estimator.d_ilimit_ls_q14, least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A", "D_ILIMIT_LS: change in eight periods");
+    FIELD(estimator.d_ilimit_hs_q14, most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A", "D_ILIMIT_HS: change in a period");
+    MACRO(D_ILIMIT_LS, least * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
+    MACRO(D_ILIMIT_HS, most * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
+    FIELD(fieldweak.kfilter_esdq_q16, filter_hz(KFILTER_ESDQ), "Hz", 0.0, "Q16 a period", "Equation 7");
+    FIELD(fieldweak.kfilter_esdq_fw_q16, filter_hz(KFILTER_ESDQ_FW), "Hz", 0.0, "Q16 a period", "Equation 7");
+    FIELD(estimator.kfilter_velestim_q16, filter_hz(KFILTER_VELESTIM), "Hz", 0.0, "Q16 a period", "Equation 7");
+}
+
+static void speeds(void)
+{
+    GROUP("speeds");
+    FIELD(minimum_erpm, MINIMUM_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at zero");
+    FIELD(nominal_erpm, NOMINAL_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at full scale, S3 off");
+    FIELD(maximum_erpm, MAXIMUM_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at full scale, S3 on");
+    FIELD(end_erpm, END_SPEED_RPM, "rpm", erpm, "erpm", "end of the ramp");
+    FIELD(fieldweak.on_speed_erpm, FW_START_SPEED_RPM, "rpm", erpm, "erpm", "field weakening starts");
+    FIELD(estimator.nominal_erpm, NOMINAL_SPEED_RPM, "rpm", erpm, "erpm", "one-sample derivative above");
+    FIELD(estimator.decimate_erpm, NOMINAL_SPEED_RPM / 10.0, "rpm", erpm, "erpm", "sign of Equation 2 from the filtered speed below");
+    FIELD(speed_ramp_erpm, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots, "erpm in 8 periods", "slope of the reference, rounded up");
+    FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (524288.0 / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm in 8 periods",
+          "slope in TUNING");
+    FIELD(ramp_hold_erpm, NOMINAL_SPEED_RPM / 8.0, "rpm", erpm, "erpm", "the ramp waits when the motor is further behind");
+    FIELD(overspeed_erpm, at_most(MAXIMUM_SPEED_RPM * 1.25, 32700.0 / pairs), "rpm", erpm, "erpm", "lost lock above");
+}
+
+static void controllers(void)
+{
+    double q15_16 = 16.0 / 32768.0;
+    GROUP("current and speed controllers");
+#define CURRENT_LOOP(pi, AXIS) \
+    FIELD(pi.kp, AXIS##_CURRCNTR_PTERM * 16.0 * ohm, "V/A", q15_16 * ohm, "Q15 / 16", "proportional gain"); \
+    FIELD(pi.ki, AXIS##_CURRCNTR_ITERM * ohm / period, "V/(A s)", ohm / period / 2048.0, "Q11 a period", "integral gain"); \
+    FIELD(pi.kc, AXIS##_CURRCNTR_CTERM, "1", 1.0 / 32768.0, "Q15", "anti-windup")
+    CURRENT_LOOP(pi_d, D);
+    CURRENT_LOOP(pi_q, Q);
+    FIELD(pi_speed.kp, SPEEDCNTR_PTERM * 16.0 * ampere * pairs, "A/rpm", q15_16 * ampere * pairs, "Q15 / 16", "proportional gain");
+    FIELD(pi_speed.ki, SPEEDCNTR_ITERM * ampere * pairs / period, "A/(rpm s)", ampere * pairs / period / 16384.0, "Q14 in 8 periods",
+          "integral gain");
+    FIELD(pi_speed.kc, SPEEDCNTR_CTERM, "1", 1.0 / 32768.0, "Q15", "anti-windup");
+}
+
+static void start(void)
+{
+    GROUP("start");
+    FIELD(forced.end_speed_q10, END_SPEED_RPM, "rpm", erpm * 60.0 / period / 67108864.0, "Q10 angle counts a period", "end of the ramp");
+    FIELD(forced.increase_rate_q10, OPENLOOP_RAMPSPEED_INCREASERATE / 67108864.0 / (period * period) * 60.0 / pairs, "rpm/s", 0.0,
+          "Q10 counts/period^2", "acceleration");
+    FIELD(lock_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
+    FIELD(lock_sweep_q32, 90.0 / (LOCK_TIME / 2.0 * period), "deg/s", 0.0, "Q32 of a turn a period", "first half of the lock");
+    FIELD(open_loop_q13, Q_CURRENT_REF_OPENLOOP, "A", q13_a, "Q13 A", "current of lock and ramp");
+    FIELD(bootstrap_periods, 0.010, "s", period, "periods", "low sides on before the start");
+    FIELD(ready_slots, 0.02, "s", slots, "8 periods", "agreement before the hand-over");
+    FIELD(ready_timeout_slots, 0.2, "s", slots, "8 periods", "and how long it may take");
+}
+
+static void limits(void)
+{
+    double bus = BUS_FULL_SCALE_V / 32768.0, most = MAXIMUM_CURRENT_A;
+    GROUP("limits");
+    FIELD(current_max_q13, most, "A", q13_a, "Q13 A", "current vector that is asked for");
+    FIELD(overcurrent_q13, OVER_CURRENT_THRESHOLD_A, "A", q13_a, "Q13 A", "phase current that trips");
+    FIELD(fieldweak.trim_max_q13, FW_TRIM_CURRENT_A, "A", q13_a, "Q13 A", "most that the voltage feedback adds");
+    FIELD(current_max_reciprocal, most, "A", most / (33554432.0 / (most / q13_a)), "2^25 / Q13", "its reciprocal");
+    FIELD(bus_over_q15, OVER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");
+    FIELD(bus_under_q15, UNDER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");
+    FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
+    FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
+    FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
+    FIELD(stall_slots, 0.3, "s", slots, "8 periods", "stall");
+    FIELD(lost_lock_slots, 0.05, "s", slots, "8 periods", "lost lock");
+}
+
+static void modulator(void)
+{
+    double top = (double)p.svm.top / p.svm.full;
+    GROUP("modulator and bus");
+    FIELD(svm.full, period * 1e6, "us", 0.025, "25 ns", "duty of 100 %");
+    FIELD(svm.top, 100.0 * top, "%", 0.0, "duty", "highest duty: sampling window");
+    FIELD(svm.dead_time, DEADTIME_SEC * 1e6, "us", 0.025, "25 ns", "dead-time compensation");
+    FIELD(svm.knee_q13, p.svm.knee_q13 * q13_a, "A", 0.0, "Q13 A", "current from which it is full");
+    FIELD(svm.dead_slope_q16, (double)p.svm.dead_time / p.svm.knee_q13, "1", 0.0, "Q16", "duty per current");
+    FIELD(svm.turn_q13, PARAM_DI(MAXIMUM_SPEED_RPM) * 2.0 * ampere, "A", 0.0, "Q13 A", "most that a current turns in a period");
+    FIELD(voltage_limit_per_bus_q16, top / sqrt(3.0), "V/V", 2.0 * volt / BUS_FULL_SCALE_V, "Q14 V per Q16 bus", "voltage circle");
+    FIELD(duty_per_volt_numerator, BUS_FULL_SCALE_V, "V", BUS_FULL_SCALE_V / (p.svm.full * 4.0 * volt / BUS_FULL_SCALE_V * 4294967296.0), "Q32",
+          "duty per volt at bus 1");
+    FIELD(kcurr_a, KCURRA, "1", 1.0 / 32768.0, "Q15", "gain of the samples");
+    FIELD(kcurr_b, KCURRB, "1", 1.0 / 32768.0, "Q15", "gain of the samples");
+}
+
+static void field_weakening(void)
+{
+    double kphi = MOTOR_KPHI_V_PER_KRPM * PARAM_INVKFI;
+    GROUP("field weakening");
+    FIELD(fieldweak.margin_q14, NOMINAL_BUS_V * 0.01, "V", 2.0 * volt, "Q14 V", "voltage kept free before the feedback acts");
+    FIELD(fieldweak.trim_speed_erpm, FW_START_SPEED_RPM * 0.6, "rpm", erpm, "erpm", "speed from which it acts");
+#define ENTRY(i) \
+    FIELD(fieldweak.idref_q13[i], IDREF_SPEED##i, "A", q13_a, "Q13 A", "d current"); \
+    FIELD(fieldweak.inv_kfi[i], kphi / p.fieldweak.inv_kfi[i], "V/krpm", 0.0, "Q15 / 2, 1/Kphi", "1/Kphi"); \
+    FIELD(fieldweak.ls_over2ls0_q15[i], LS_OVER2LS0_SPEED##i, "1", 1.0 / 32768.0, "Q15", "Ls/(2 Ls0)")
+    ENTRY(0); ENTRY(1); ENTRY(2); ENTRY(3); ENTRY(4); ENTRY(5); ENTRY(6); ENTRY(7); ENTRY(8);
+    ENTRY(9); ENTRY(10); ENTRY(11); ENTRY(12); ENTRY(13); ENTRY(14); ENTRY(15); ENTRY(16); ENTRY(17);
+}
+
+#define RELATION(condition, message) if (!(condition)) { puts("relation|" message); }
+#define RANGE(name, unit, min, max, value, meaning) if (!(PARAM_F(name) >= PARAM_F(min) && PARAM_F(name) <= PARAM_F(max))) { puts("range|" #name); }
+
+int main(void)
+{
+    volt = NOMINAL_BUS_V / sqrt(3.0) * (1.0 - DEADTIME_SEC / LOOPTIME_SEC) / 32768.0;
+    ohm = volt / ampere;
+    q13_a = 4.0 * ampere;
+    erpm = 1.0 / pairs;
+    slots = 8.0 * period;
+    motor();
+    estimator();
+    speeds();
+    controllers();
+    start();
+    limits();
+    modulator();
+    field_weakening();
+    PARAM_RELATION_TABLE(RELATION)
+    PARAM_TABLE(RANGE)
+    return 0;
+}
