@@ -99,3 +99,7 @@ class Troubles(unittest.TestCase):
                 self.assertEqual((measured.fault, measured.outputs_seen), ("NONE", 0.0))
                 self.assertIn(step[1], [number for _, number in measured.steps])
                 self.assertLess(measured.steps[-1][0] - began_s - at_s, 0.035)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-import vectors # noqa: E402
+import golden_words # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 SIMULATOR_FAILED = 255  # exit code; below, it is the number of failed tests
@@ -76,7 +76,7 @@ class Builder:
 
     def shared(self) -> None:
         """Vectors, Unity and the console."""
-        self.tables = vectors.write(HERE.parent / "golden/vectors", self.out / "golden")
+        self.tables = golden_words.write(HERE.parent / "golden/vectors", self.out / "golden")
         self.objects = [self.compile(self.unity / "src/unity.c", self.out / "unity.o", ["-w"]),
                         self.compile(HERE / "console.c", self.out / "console.o", ["-Wall", "-Wextra"])]
 

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 from test_image_build import ROOT, make, with_compiler
 
-sys.path[:0] = [str(ROOT / "test" / "sixteen_bit"), str(ROOT / "test")]
-import report # noqa: E402
+sys.path.insert(0, str(ROOT / "test" / "sixteen_bit"))
 import run as target_run # noqa: E402
-import vectors # noqa: E402
+import golden_words # noqa: E402
 
 # A compiler that copies, a linker with room for three tests, and a simulator in which every test passes but those named *_fails.
 COMPILER = """#!/bin/sh
@@ -45,21 +44,21 @@ exit $bad
 # ---- vectors -------------------------------------------------------------------------------------------------------------
 def test_a_row_is_words_low_word_first_without_gaps():
     columns = [("a", "s16"), ("b", "s32"), ("c", "u16"), ("d", "u32")]
-    assert vectors.words(columns, ["-1", "-2", "65535", "65536"]) == [0xFFFF, 0xFFFE, 0xFFFF, 0xFFFF, 0, 1]
+    assert golden_words.words(columns, ["-1", "-2", "65535", "65536"]) == [0xFFFF, 0xFFFE, 0xFFFF, 0xFFFF, 0, 1]
 
 
 def test_header_keeps_type_rows_and_constants_and_fetches_rows():
-    text = vectors.header("x", 7, [("a", "s16"), ("b", "s32")], {"k": "5"}, [["1", "2"], ["3", "4"]])
+    text = golden_words.header("x", 7, [("a", "s16"), ("b", "s32")], {"k": "5"}, [["1", "2"], ["3", "4"]])
     for part in ("#define GOLDEN_X_K 5", "#define GOLDEN_X_ROWS 2u", "int32_t b;", "golden_x_t golden_x_row(uint32_t n)",
                  "golden_fetch(7, n * 3u, &row,"):
         assert part in text
     assert "golden_x[" not in text
-    constants = vectors.header("x", 7, [], {"k": "5"}, []) # a file with constants only stays as it is
+    constants = golden_words.header("x", 7, [], {"k": "5"}, []) # a file with constants only stays as it is
     assert "#define GOLDEN_X_K 5" in constants and "golden_fetch" not in constants
 
 
 def test_tables_hold_every_row_of_the_vectors(tmp_path):
-    tables = vectors.write(ROOT / "test/golden/vectors", tmp_path)
+    tables = golden_words.write(ROOT / "test/golden/vectors", tmp_path)
     sizes = {table.stem: table.stat().st_size for table in tables}
     assert (sizes["sincos"], sizes["multiply"]) == (700 * 6, 301 * 22)
     assert f"golden_fetch({list(sizes).index('sincos')}, " in (tmp_path / "golden_sincos.h").read_text()
@@ -133,8 +132,8 @@ def test_an_error_of_the_compiler_is_shown(judge):
 def test_some_unit_tests_give_the_pcs_results():
     done = make("test-target", "ONLY=test_pi test_trig")
     assert done.returncode == 0, done.stdout + done.stderr
-    suite = report.read_suite(ROOT / "build/target/test/report.txt")
-    assert suite.failures == [] and len(suite.passed) > 10
+    results = (ROOT / "build/target/test/report.txt").read_text(encoding="utf-8")
+    assert ":FAIL" not in results and results.count(":PASS") > 10
 
 
 @with_compiler

@@ -24,7 +24,7 @@ from tools.image.budget import Budget
 from tools.image.profile import Counts, Profile, profile
 from tools.image.size import write_json
 
-from . import build, pil, pil_command, scenario, simulate
+from . import build, pil, pil_command, scenario_file, simulate
 from .command_common import Progress
 
 FCY_MHZ = 40.0
@@ -306,7 +306,8 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
         if item.defines:
             raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
                             "measure scenarios of the firmware as it is delivered")
-        job = simulate.prepare(item, library, motor_file.part(item.motor, item.motor_where), board_file.part(item.board, item.board_where))
+        job = simulate.prepare(item, library, motor_file.part(item.motor, item.motor_where),
+                               board_file.part(item.board, item.board_where))
         job.signals += [signal for signal in SIGNALS if signal not in job.signals]
         jobs.append(job)
     return jobs
