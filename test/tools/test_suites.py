@@ -62,7 +62,7 @@ def run(root: Path, *options: str | Path) -> tuple[int, str]:
     """Exit code and output of a run of all suites in the folder."""
     done = subprocess.run([sys.executable, "-m", "pytest", "-p", "unity_suites", "-p", "side_by_side", "-p", "no:cacheprovider", "-qq", "-rN", "--capture=sys",
                            "--continue-on-collection-errors", "--basetemp", root / "tmp", "--jobs", "2", *options, *sorted(root.glob("test/unit/test_*"))],
-                          env=os.environ | {"PYTHONPATH": str(TEST)}, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+                          env=os.environ | {"PYTHONPATH": str(TEST)}, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
     return done.returncode, done.stdout
 
 
