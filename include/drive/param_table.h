@@ -2,6 +2,9 @@
 #ifndef DRIVE_PARAM_TABLE_H
 #define DRIVE_PARAM_TABLE_H
 
+/* Rows on lines of their own: clang-format would stagger them. */
+/* clang-format off */
+
 /** X(name, unit, minimum, maximum, default, meaning): one row a parameter. The build checks the range; userparams.h, the tuner,
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
