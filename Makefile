@@ -174,34 +174,39 @@ $B/libvboard.so: $(board_objects) $(firmware_objects) $B/contents
 	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ \
 	    $(board_objects) $(filter-out %/main.o,$(firmware_objects)) -lm
 
-# ---- tests: suites, one report each in build/test/*.txt ------------------------------------------------------------------
+# ---- tests: pytest runs the Python tests and the Unity executables, after make has built what they need ----------------------
 c_tests = $(patsubst test/%.c,%,$(wildcard test/$1/test_*.c))
-py_tests = $(patsubst test/%.py,%,$(wildcard test/$1/$2_*.py))
+py_tests = $(patsubst test/%.py,%,$(wildcard test/$1/test_*.py))
 
 unit_c := $(call c_tests,unit)
 board_c := $(call c_tests,chip)
 behaviour_c := $(call c_tests,behaviour)
-check_py := $(call py_tests,unit,check)
-unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
+source_py := $(call py_tests,unit) $(call py_tests,golden)
+bench_py := $(call py_tests,tools) $(call py_tests,behaviour) $(call py_tests,fuzz)
+tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,sixteen_bit)
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
-slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design tools/test_image_build
-quick_suites := $(check_py) $(unit_c) $(board_c) $(filter-out $(slow_suites),$(filter tools/%,$(unittest_py)))
-all_suites := $(check_py) $(behaviour_c) $(unittest_py) $(unit_c) $(board_c) golden/unchanged warnings/default $(modes:%=warnings/%)
+# The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust image_build),$(bench_py))
+longest := $(addprefix behaviour/test_,identify_motors fw_search) $(slow_suites)
+quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
+all_suites := $(tools_py) $(longest) $(filter-out $(longest),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
 
+# Every chosen suite runs anew. make leaves a stamp for each that it could build; one without has failed.
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
-reports = $(foreach suite,$1,$T/$(subst /,.,$(suite)).txt)
-# Every chosen suite runs anew. One that cannot be built leaves no report, which the last step counts as a failure.
 unknown_suites = $(strip $(foreach name,$(ONLY),$(if $(filter $(name) %/$(name),$1),,$(name))))
-run_suites = +@$(if $(call unknown_suites,$1 $2),echo "foc33: no suite '$(call unknown_suites,$1 $2)'$(comma) make $@: make test runs them all and shows their names" >&2; \
+suite_files = $(foreach suite,$1,$(firstword $(wildcard test/$(suite).c test/$(suite).py)))
+mode_stamps := $(addprefix $T/made/modes/,default $(modes))
+stamps = $(addprefix $T/made/,$1) $(if $(filter static/test_modes,$1),$(mode_stamps))
+run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unknown_suites,$1)'$(comma) make $@: make test runs them all and shows their names" >&2; \
     exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
-    rm -f $T/*.txt $T/summary.json; $(if $(call chosen,$1),$(MAKE) -k $(call reports,$(call chosen,$1)) || true;) \
-    $(if $(call chosen,$2),$(MAKE) -k -j1 $(call reports,$(call chosen,$2)) || true;) \
-    $(python) test/run-report.py $(if $2,$(if $(ONLY),,--summary $T/summary.json)) $(call reports,$(call chosen,$1 $2))
+    rm -rf $T/made $T/summary.json; $(MAKE) -k $(call stamps,$(call chosen,$1)) || true; \
+    PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
+    --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
 .PHONY: test test-quick setup-test setup-checks
 test: setup-test setup-checks ## [tests] every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
-	$(call run_suites,$(all_suites),$(tool_checks:%=checks/%))
+	$(call run_suites,$(all_suites),$(if $(ONLY),,--summary $T/summary.json))
 
 test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ..."]
 	$(call run_suites,$(quick_suites))
@@ -238,9 +243,6 @@ build/golden/golden_%.h: $(golden_stamp) ;
 .PHONY: golden
 golden: setup-run ## [upkeep] write the golden vectors from the reference model
 	@$(python) test/golden/generate.py
-
-$T/golden.unchanged.txt:
-	@$(python) test/run-suite.py --one-test $@ $(python) test/golden/generate.py --check
 
 # A test's own flags stand in its first lines: /* defines: -DTUNING */. They act on the test and its runner, not on the library.
 own_defines = $$(sed -n '1,5s@.*/\* defines: \(.*\) \*/.*@\1@p' $1)
@@ -294,27 +296,17 @@ $(addprefix $T/,$(unit_c)): $B/libfirmware.a
 $(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/cpu_host/xc.o
 $(addprefix $T/,$(behaviour_c)): $(board_objects) $B/libfirmware.a
 
-run_suite = @$(alone) $(python) test/run-suite.py $@
+$T/made/%:
+	@mkdir -p $(@D) && touch $@
 
-$(call reports,$(unit_c) $(board_c) $(behaviour_c)): $T/%.txt: $T/$$(subst .,/,%)
-	$(run_suite) $<
+$(addprefix $T/made/,$(unit_c) $(board_c) $(behaviour_c)): $T/made/%: $T/%
+$(addprefix $T/made/,$(bench_py)): $B/libvboard.so
 
-$(call reports,$(check_py)): $T/%.txt: test/$$(subst .,/,%).py
-	$(run_suite) $(python) $<
+$(mode_stamps): $T/made/modes/%:
+	@+$(MAKE) -s WERROR=1 SAN= VARIANT=warnings-$* DEFINES=$(if $(filter-out default,$*),-D$*) lib vboard
+	@mkdir -p $(@D) && touch $@
 
-$(call reports,$(unittest_py)): $T/%.txt: test/$$(subst .,/,%).py $B/libvboard.so
-	$(run_suite) $(python) test/run-unittest.py $<
-
-$T/warnings.%.txt:
-	@+$(python) test/run-suite.py --one-test $@ \
-	    $(MAKE) -s WERROR=1 SAN= VARIANT=warnings-$* DEFINES=$(if $(filter-out default,$*),-D$*) lib vboard
-
-# Whole tools that count as one test each; one after the other, since each uses all processors.
-tool_checks := test-avr ubsan static coverage
-$(tool_checks:%=$T/checks.%.txt): $T/checks.%.txt:
-	@$(alone) $(python) test/run-suite.py --one-test $@ $(MAKE) -s $*
-
-# Further checks, each with its own rules; they may add suites to all_suites and quick_suites.
+# Further checks, each with its own rules; they may add suites to all_suites.
 include $(part_makefiles)
 
 # ---- checks and cleaning -------------------------------------------------------------------------------------------------

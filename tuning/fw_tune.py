@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.bench import build, command_common, report
-from tools.common import board_file, motor_file, output, paths, plant, workers
+from tools.common import board_file, board_keys, motor_file, output, paths, workers
 from tools.bench.board import Library
 from tools.common.errors import UserError
 
@@ -161,7 +161,7 @@ class _Work:
         top_rpm = highest_speed(known)
         library = self._library("search", with_values(header, {"MAXIMUM_SPEED_RPM": f"{top_rpm:.0f}"}), ["PARAMS_IN_RAM"])
         self.params = library.params
-        self.values = plant.resolve(layers, library.keys)
+        self.values = board_keys.resolve(layers, library.keys)
         limit_a = min(self.params["MAXIMUM_CURRENT_A"] * ID_SHARE, motor.maximum_current_a)
         if options.limit_a is not None:
             limit_a = min(options.limit_a, self.params["MAXIMUM_CURRENT_A"] * ID_SHARE)

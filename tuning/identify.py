@@ -16,7 +16,7 @@ import numpy as np
 
 from tools.bench import build, command_common
 from tools.bench.board import Board, BoardError, Library
-from tools.common import board_file, command_line, motor_file, output, paths, plant, workers
+from tools.common import board_file, board_keys, command_line, motor_file, output, paths, workers
 from tools.common.board_file import BoardFile
 from tools.common.errors import UserError
 from tools.common.motor_file import Motor
@@ -135,7 +135,7 @@ def _measure(job: Job, library: Library, board: Board, report_s: Callable[[float
 
 
 # ---- several motors at once -------------------------------------------------------------------------------------------------
-def identify(motors: list[Motor], board_name: str, changes: plant.Values, current_a: float | None = None, speed_rpm: float | None = None,
+def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, current_a: float | None = None, speed_rpm: float | None = None,
              quiet: bool = True) -> list[Identified]:
     """Identifies the motors, side by side."""
     board = board_file.load(board_name, "--board")
@@ -150,13 +150,13 @@ def identify(motors: list[Motor], board_name: str, changes: plant.Values, curren
     return [Identified(*item) for item in zip(motors, [board] * len(motors), known, headers, values, measured)]
 
 
-def _keys(library: Path, report_s: Callable[[float], None]) -> dict[str, plant.Key]:
+def _keys(library: Path, report_s: Callable[[float], None]) -> dict[str, board_keys.Key]:
     """The board's keys, from a process of its own: a library that this one has loaded would stay as it is when it is built anew."""
     return Library(library).keys
 
 
-def _plant(motor: Motor, board: BoardFile, changes: plant.Values, keys: Any) -> dict[str, float]:
-    values = plant.resolve([motor.plant_values(), board.plant_values(), changes], keys)
+def _plant(motor: Motor, board: BoardFile, changes: board_keys.Values, keys: Any) -> dict[str, float]:
+    values = board_keys.resolve([motor.plant_values(), board.plant_values(), changes], keys)
     values.setdefault("state.theta_e_deg", 137.0)
     values.setdefault("bus.voltage_v", values["supply.voltage_v"])
     values.setdefault("motor.r_tempco", motor.resistance_tempco_per_k)

@@ -88,7 +88,3 @@ class OnTheBoard(unittest.TestCase):
         self.assertEqual(error, "foc33: interrupted, nothing was written\n")
         self.assertEqual([file.name for file in self.folder.iterdir()], [self.path.name])
         self.assertEqual(self.path.read_text(encoding="utf-8"), "old")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,7 +3,7 @@
 import unittest
 
 from tools.bench import build
-from tools.common import motor_file, paths, plant, workers
+from tools.common import board_keys, motor_file, paths, workers
 from tuning import identify, identify_result
 
 HURST = "hurst_dmb0224c10002"
@@ -11,7 +11,7 @@ HURST = "hurst_dmb0224c10002"
 
 def run(name: str = HURST, **changes: float) -> identify_result.Identified:
     """One identification with changes to the plant; dots of keys are written as "__"."""
-    values = plant.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
+    values = board_keys.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
     return identify.identify([motor_file.load(name)], "mclv", values)[0]
 
 
@@ -19,14 +19,14 @@ def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: flo
     """Another motor in the Hurst's housing: 5 pole pairs."""
     psi_vs = kphi / (3.0 ** 0.5 * 1000.0 * 2.0 * 3.14159265 / 60.0 * 5.0)
     values = {"motor.rs_ohm": rs_ohm, "motor.ld_h": ld_h, "motor.lq_h": lq_h, "motor.psi_vs": psi_vs, "mech.coulomb_nm": 0.001} | changes
-    return identify.identify([motor_file.load(HURST)], "mclv", plant.Values(values, {}), current_a, speed_rpm)[0]
+    return identify.identify([motor_file.load(HURST)], "mclv", board_keys.Values(values, {}), current_a, speed_rpm)[0]
 
 
 class Motors(unittest.TestCase):
     def test_every_motor_is_within_its_limits(self):
         names = paths.names(paths.MOTORS)
         self.assertGreaterEqual(len(names), 6)
-        for item in identify.identify([motor_file.load(name) for name in names], "mclv", plant.Values()):
+        for item in identify.identify([motor_file.load(name) for name in names], "mclv", board_keys.Values()):
             with self.subTest(item.motor.name):
                 self.assertEqual(item.problems(), [])
 
@@ -99,7 +99,3 @@ class Troubles(unittest.TestCase):
                 self.assertEqual((measured.fault, measured.outputs_seen), ("NONE", 0.0))
                 self.assertIn(step[1], [number for _, number in measured.steps])
                 self.assertLess(measured.steps[-1][0] - began_s - at_s, 0.035)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -113,65 +113,9 @@ void test_reset_restores_every_register(void)
     }
 }
 
-static uint16_t source;
-
-static void other_source(void)
-{
-    __builtin_write_OSCCONH(source);
-    __builtin_write_OSCCONL(OSCCON | 1);
-}
-
-void test_the_board_takes_its_clock_from_the_selected_source(void)
-{
-    static const double expected_hz[8] = {3.685e6, 36.85e6, 4e6, 40e6, 16384.0, 16000.0, 230312.5, 3.685e6};
-    fake_init_hook = other_source;
-    for (source = 0; source < 8; source++) {
-        power_up();
-        run(1);
-        TEST_ASSERT_DOUBLE_WITHIN(1.0, expected_hz[source], get("cpu.fcy_hz"));
-    }
-    TEST_ASSERT_TRUE(warned_about("OSCCON"));
-}
-
-static unsigned frcdiv;
-
-static void divided_rc(void)
-{
-    OSCCON = 0x7700;
-    CLKDIV = (uint16_t)(frcdiv << 8);
-}
-
-void test_the_divided_rc_oscillator_has_eight_divisors(void)
-{
-    static const double divisor[8] = {1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 256.0};
-    unsigned n;
-    fake_init_hook = divided_rc;
-    for (n = 0; n < 8; n++) {
-        frcdiv = n;
-        power_up();
-        run(1);
-        TEST_ASSERT_DOUBLE_WITHIN(0.1, 3.685e6 / divisor[n], get("cpu.fcy_hz"));
-    }
-}
-
-static void wild_pll(void)
-{
-    PLLFBD = 78;
-    CLKDIV = 0x001E;
-}
-
 static void fast_pll(void)
 {
     PLLFBD = 58;
-}
-
-void test_a_pll_outside_its_range_is_named(void)
-{
-    fake_init_hook = wild_pll;
-    power_up();
-    run(1);
-    TEST_ASSERT_TRUE(warned_about("CLKDIV"));
-    TEST_ASSERT_TRUE(warned_about("PLLFBD"));
 }
 
 void test_a_clock_above_the_devices_limit_is_named(void)

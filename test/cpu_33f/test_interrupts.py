@@ -376,6 +376,33 @@ class Loops(unittest.TestCase):
             self.assertEqual((chip.w[5], chip.w[6], chip.w[1]), (5, 5, 1), f"at {at}")
 
 
+MODULO = {0x46: 0x8FF1, 0x48: 0x0B00, 0x4A: 0x0B07, SPLIM: 0x0A00} # of W1, while W15 is watched
+ODD, LIMIT, FULL = {5: 0x0901}, {SPLIM: 0x0A00}, {15: 0x0A02}
+PRODUCT = {6: 0x8000, 7: 0x8000}
+ERRORS = { # kind: vector, level, and cases of instructions, registers, W registers, accumulator A, bits of INTCON1
+    "address": (ADDRESS, 13, [
+        *((text, {}, ODD, 0, ADDRERR) for text in ("mov [w5],w6", "mov w6,[w5]", "mov [w5++],w6", "add w6,[w5],w6", "clr [w5]", "mov.d [w5],w6")),
+        *((text, {}, {5: address}, 0, ADDRERR) for text in ("mov [w5],w6", "mov w6,[w5]") for address in (0x1000, 0x2000, 0x7FFE)),
+        ("mov [w5],w6", {CORCON: 0x20}, {5: 0x8200}, 0, ADDRERR),               # PSV is off
+        ("mov [w5],w6", {INTCON1: NSTDIS}, ODD, 0, ADDRERR),
+        ("disi #100\n mov [w5],w6", {SR: 7 << 5}, ODD, 0, ADDRERR)]),
+    "stack": (STACK, 12, [
+        ("push w0\n push w0", LIMIT, FULL, 0, STKERR), ("push w0", MODULO, FULL, 0, STKERR), ("call f\n f: nop", LIMIT, FULL, 0, STKERR),
+        ("mov.d w6,[w15++]", LIMIT, {15: 0x0A00}, 0, STKERR), ("pop w0", {}, {15: 0x0800}, 0, STKERR),
+        *((text, {SPLIM: 0x0900}, {15: 0x0900}, 0, STKERR) for text in ("mov w6,[w15+16]", "mov [w15-258],w6", "mov.b w6,[w15+18]"))]),
+    "math": (MATH, 11, [
+        *((f"repeat #17\n {text}", {}, {2: 100, 5: 0}, 0, MATHERR | DIV0ERR)
+          for text in ("div.s w2,w5", "div.u w2,w5", "div.sd w2,w5", "div.ud w2,w5", "divf w2,w5")),
+        ("mpy w6*w7,a", {INTCON1: OVATE, CORCON: 0}, PRODUCT, 0, MATHERR | OVAERR),
+        ("mpy w6*w7,b", {INTCON1: OVBTE, CORCON: 0}, PRODUCT, 0, MATHERR | OVBERR),
+        ("mac w6*w7,a", {INTCON1: COVTE, CORCON: 0}, {6: 0x7FFF, 7: 0x7FFF}, 0x7FFFFFFFFF, MATHERR | COVAERR)]),
+    "none": (0, 0, [
+        ("mov.b w6,[w5]\n mov.b [w5],w6", {}, ODD, 0, 0), ("push w0", LIMIT, {15: 0x0A00}, 0, 0), ("mov w0,[w1++]", MODULO, {1: 0x0B06}, 0, 0),
+        ("mpy w6*w7,a", {CORCON: 0}, PRODUCT, 0, 0), ("mpy w6*w7,b", {CORCON: 0}, PRODUCT, 0, 0),
+        ("mac w6*w7,a", {INTCON1: COVTE, CORCON: 0}, {6: 0x7FFF, 7: 0x7FFF}, 0x7FFFFFFF, 0)]), # only guard bits are used
+}
+
+
 class Traps(unittest.TestCase):
     vectors = {OSCILLATOR: "trap", ADDRESS: "trap", STACK: "trap", MATH: "trap"}
 
@@ -386,96 +413,21 @@ class Traps(unittest.TestCase):
         self.assertEqual(chip[INTCON1] & error, error)
         self.assertEqual((chip.w[4] & 0x7F, chip.w[4] >> 8 & 15, chip.level), (vector - chip.machine.assumption("VECNUM_OFFSET") & 0x7F, level, level))
 
-    def test_a_word_at_an_odd_address_is_an_address_error(self) -> None:
-        for text in ("mov [w5],w6", "mov w6,[w5]", "mov [w5++],w6", "add w6,[w5],w6", "clr [w5]", "mov.d [w5],w6"):
-            with self.subTest(text):
-                chip = Chip(f"{text}\n nop\n nop\n" + MAIN, self.vectors, enable(), w={5: 0x0901})
-                self.expect(chip, ADDRERR, ADDRESS, 13)
-
-    def test_a_byte_at_an_odd_address_is_none(self) -> None:
-        chip = Chip("mov.b w6,[w5]\n mov.b [w5],w6\n" + MAIN, self.vectors, enable(), w={5: 0x0901})
-        chip.run(20)
-        self.assertEqual(chip[INTCON1], 0)
-
-    def test_unimplemented_data_memory_is_an_address_error(self) -> None:
-        for address in (0x1000, 0x2000, 0x7FFE):
-            for text in ("mov [w5],w6", "mov w6,[w5]"):
-                with self.subTest(f"{text} {address:04x}"):
-                    chip = Chip(f"{text}\n nop\n nop\n" + MAIN, self.vectors, enable(), w={5: address})
-                    self.expect(chip, ADDRERR, ADDRESS, 13)
-
-    def test_psv_space_without_psv_is_an_address_error(self) -> None:
-        chip = Chip("mov [w5],w6\n nop\n nop\n" + MAIN, self.vectors, enable() | {CORCON: 0x20}, w={5: 0x8200})
-        self.expect(chip, ADDRERR, ADDRESS, 13)
-
-    def test_a_push_beyond_splim_is_a_stack_error(self) -> None:
-        chip = Chip("push w0\n push w0\n nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A02})
-        self.expect(chip, STKERR, STACK, 12)
-
-    def test_the_stack_is_watched_while_modulo_addressing_bends_another_register(self) -> None:
-        modulo = {0x46: 0x8FF1, 0x48: 0x0B00, 0x4A: 0x0B07}
-        chip = Chip("push w0\n nop\n nop\n" + MAIN, self.vectors, enable() | modulo | {SPLIM: 0x0A00}, w={15: 0x0A02})
-        self.expect(chip, STKERR, STACK, 12)
-        chip = Chip("mov w0,[w1++]\n nop\n nop\n" + MAIN, self.vectors, enable() | modulo | {SPLIM: 0x0A00}, w={1: 0x0B06, 15: 0x0900})
-        chip.run(20)
-        self.assertEqual((chip[INTCON1], chip.w[1]), (0, 0x0B00))
-
-    def test_an_offset_from_the_stack_pointer_is_watched(self) -> None:
-        for text in ("mov w6,[w15+16]", "mov [w15-258],w6", "mov.b w6,[w15+18]"):
-            with self.subTest(text):
-                chip = Chip(f"{text}\n nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0900}, w={15: 0x0900})
-                self.expect(chip, STKERR, STACK, 12)
-
-    def test_the_second_word_of_a_double_push_is_watched_too(self) -> None:
-        chip = Chip("mov.d w6,[w15++]\n nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A00})
-        self.expect(chip, STKERR, STACK, 12)
-
-    def test_a_push_at_splim_itself_is_none(self) -> None:
-        chip = Chip("push w0\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A00})
-        chip.run(20)
-        self.assertEqual(chip[INTCON1], 0)
-
-    def test_a_call_beyond_splim_is_a_stack_error(self) -> None:
-        chip = Chip("call f\n f: nop\n nop\n" + MAIN, self.vectors, enable() | {SPLIM: 0x0A00}, w={15: 0x0A02})
-        self.expect(chip, STKERR, STACK, 12)
-
-    def test_a_stack_pointer_below_ram_is_a_stack_error(self) -> None:
-        chip = Chip("pop w0\n nop\n nop\n" + MAIN, self.vectors, enable(), w={15: 0x0800})
-        self.expect(chip, STKERR, STACK, 12)
-
-    def test_division_by_zero_is_a_math_error(self) -> None:
-        for text in ("div.s w2,w5", "div.u w2,w5", "div.sd w2,w5", "div.ud w2,w5", "divf w2,w5"):
-            with self.subTest(text):
-                chip = Chip(f"repeat #17\n {text}\n nop\n" + MAIN, self.vectors, enable(), w={2: 100, 5: 0})
-                self.expect(chip, MATHERR | DIV0ERR, MATH, 11)
+    def test_each_error_has_its_trap(self) -> None:
+        for kind, (vector, level, cases) in ERRORS.items():
+            for text, registers, w, acc, error in cases:
+                with self.subTest(f"{kind}: {text}"):
+                    chip = Chip(f"{text}\n nop\n nop\n" + MAIN, self.vectors, enable() | registers, w=w, acc=[acc, 0], sr=registers.get(SR, 0))
+                    if kind != "none":
+                        self.expect(chip, error, vector, level)
+                    else:
+                        chip.run(20)
+                        self.assertEqual((chip[INTCON1] & ~COVTE, chip.w[3]), (0, 0))
 
     def test_a_divisor_of_zero_traps_in_the_first_turn(self) -> None:
         self.assertEqual(1, Chip.machine.assumption("DIVIDE_ZERO_FIRST_TURN"))
         chip = Chip("repeat #17\n div.s w2,w5\n nop\n" + MAIN, self.vectors, enable(), w={2: 100, 5: 0})
         self.assertLess(chip.until("trap"), 10)
-
-    def test_an_accumulators_overflow_is_a_math_error_when_enabled(self) -> None:
-        for which, enabled, error in (("a", OVATE, OVAERR), ("b", OVBTE, OVBERR)):
-            for on in (True, False):
-                with self.subTest(f"{which} {on}"):
-                    chip = Chip(f"mpy w6*w7,{which}\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: enabled if on else 0, CORCON: 0},
-                                w={6: 0x8000, 7: 0x8000})
-                    if on:
-                        self.expect(chip, MATHERR | error, MATH, 11)
-                    else:
-                        chip.run(20)
-                        self.assertEqual(chip[INTCON1] & MATHERR, 0)
-
-    def test_a_catastrophic_overflow_is_a_math_error_when_enabled(self) -> None:
-        chip = Chip("mac w6*w7,a\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: COVTE, CORCON: 0}, w={6: 0x7FFF, 7: 0x7FFF},
-                    acc=[0x7FFFFFFFFF, 0])
-        self.expect(chip, MATHERR | COVAERR, MATH, 11)
-
-    def test_the_use_of_guard_bits_is_no_catastrophic_overflow(self) -> None:
-        chip = Chip("mac w6*w7,a\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: COVTE, CORCON: 0}, w={6: 0x7FFF, 7: 0x7FFF},
-                    acc=[0x7FFFFFFF, 0])
-        chip.run(20)
-        self.assertEqual((chip[INTCON1] & MATHERR, chip[SR] >> 15), (0, 1))
 
     def test_an_accumulator_shift_beyond_16_is_a_math_error_and_changes_nothing(self) -> None:
         for shift in (17, 0xFFEF, 0x7FFF):
@@ -490,19 +442,11 @@ class Traps(unittest.TestCase):
         chip.machine.irq_changed()
         self.expect(chip, OSCFAIL, OSCILLATOR, 14)
 
-    def test_traps_do_not_wait_for_disi_or_priority_7(self) -> None:
-        chip = Chip("disi #100\n mov [w5],w6\n nop\n nop\n" + MAIN, self.vectors, enable(), w={5: 0x0901}, sr=7 << 5)
-        self.expect(chip, ADDRERR, ADDRESS, 13)
-
     def test_a_handler_that_clears_the_error_returns(self) -> None:
         chip = Chip("repeat #17\n div.u w2,w5\n" + MAIN + "\n .org 0x3C0\n m: bclr 0x80,#4\n bclr 0x80,#6\n mov #1,w5\n inc w7,w7\n retfie",
                     {MATH: "m"}, enable(), w={2: 100, 5: 0})
         chip.run(100)
         self.assertEqual((chip.w[7], chip.level, chip.w[15], chip[INTCON1]), (1, 0, STACK_AT, 0))
-
-    def test_with_nstdis_a_trap_keeps_its_own_level(self) -> None:
-        chip = Chip("mov [w5],w6\n nop\n nop\n" + MAIN, self.vectors, enable() | {INTCON1: NSTDIS}, w={5: 0x0901})
-        self.expect(chip, ADDRERR, ADDRESS, 13)
 
     def test_a_soft_trap_waits_and_a_hard_one_does_not(self) -> None:
         delay = Chip.machine.assumption("SOFT_TRAP_DELAY_CYCLES")

@@ -242,7 +242,3 @@ class Fuzz(unittest.TestCase):
                 for factor in (1e3, 1e-3, -1.0, 0.0):
                     data = text[:match.start(2)] + repr(float(match[2]) * factor) + text[match.end(2):]
                     self.assertIsNone(self.outcome(data.encode(), motor_file.load), f"{match[0]} times {factor:g}")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -36,13 +36,13 @@ def parse(argv):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--compile", required=True, help="compiler and flags of the tests, without -c")
     parser.add_argument("--tests", nargs="*", default=[], metavar="unit/test_x", help="unit tests")
-    parser.add_argument("--scripts", nargs="*", default=[], metavar="unit/check_x", help="checks in Python, run for the parameters")
+    parser.add_argument("--scripts", nargs="*", default=[], metavar="unit/test_x", help="tests in Python, run for the parameters")
     parser.add_argument("--behaviour", nargs="*", default=[], metavar="behaviour/test_x", help="closed-loop tests")
     parser.add_argument("--closed-loop", action="store_true", help="survivors of the unit tests meet the closed-loop tests")
     parser.add_argument("--full", action="store_true", help="every mutant, not a sample")
     parser.add_argument("--sample", type=int, default=600, help="how many mutants to try (default 600)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
-    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains one of these texts")
+    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains a text")
     parser.add_argument("--list", action="store_true", help="list the chosen mutants, run nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--out", default="build/mutate")
@@ -183,7 +183,8 @@ def report(results, required, arguments, seconds):
               f"{score:.1f} % of {counted} mutants killed by the {tests}, {required:.0f} % required: {'PASS' if passed else 'FAIL'}"]
     alone = sum(result in ("killed", "timeout") and by.startswith("behaviour/") for _, result, by in results)
     if arguments.closed_loop:
-        lines.insert(-1, f"{percent(counted - total['survived'] - alone, counted):.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
+        unit = percent(counted - total["survived"] - alone, counted)
+        lines.insert(-1, f"{unit:.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
     data = {"score": round(score, 2), "required": required, "passed": passed, "tests": tests, "full": arguments.full,
             "seed": arguments.seed, "seconds": round(seconds, 1), "files": {f: dict(c) for f, c in by_file.items()},
             "mutants": [{"file": m.file, "line": m.line, "function": m.function, "operator": m.operator, "diff": m.diff,
@@ -202,7 +203,8 @@ def main(argv=None):
     known = {m.key for found in by_file.values() for m in found}
     stale = [key for key in equivalent if key not in known and (not arguments.files or any(key.startswith(f"{f} ") for f in by_file))]
     if stale:
-        fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root), "the code has changed; look at the entry again or remove it")
+        fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root),
+             "the code has changed; look at the entry again or remove it")
     chosen = by_file if arguments.full or arguments.files else sample(by_file, arguments.sample, arguments.seed)
     chosen = [m for found in chosen.values() for m in found]
     if arguments.list:
@@ -219,7 +221,7 @@ def main(argv=None):
     try:
         tests.prepare(arguments.tests, behaviour)
         for name in arguments.scripts:
-            note = tests.add_script(name, [sys.executable, f"test/{name}.py"], [*PARAMETER_FILES, "include/drive/drive.h"])
+            note = tests.add_script(name, [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"], [*PARAMETER_FILES, "include/drive/drive.h"])
             if note:
                 print(note, file=sys.stderr)
         print(f"{len(tests.tests)} tests built and passed in {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)

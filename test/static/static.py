@@ -29,6 +29,7 @@ CLANG_16_BIT = "--target=msp430 -ffreestanding -std=gnu99".split()
 CLANG_FLAGS = """-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wcomma -Wconditional-uninitialized
     -Wextra-semi -Wimplicit-fallthrough -Wmissing-prototypes -Wshift-sign-overflow -Wtautological-compare -Wunreachable-code
     -Werror -fsyntax-only""".split()
+CLANG = os.environ.get("CLANG", "clang-14")
 INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 
 
@@ -85,35 +86,45 @@ def relative(path: str) -> str:
     return os.path.relpath(path, os.getcwd()) if os.path.isabs(path) else path
 
 
+def distinct(preprocessor: list[str], sources: list[str]) -> list[tuple[str, list[str]]]:
+    """Each source with the options of the modes to compile it in: one of all in which it has the same text and macros."""
+    def text(job: tuple[str, list[str]]) -> str:
+        source, options = job
+        names = {f"#define {option.removeprefix('-D')} 1" for option in options}
+        return "\n".join(line for line in run([*preprocessor, *INCLUDES, *options, "-E", "-dD", source]).splitlines() if line not in names)
+
+    jobs = [(source, [f"-D{name}" for name in mode]) for source in sources for mode in MODES]
+    first = {}
+    for job, seen in zip(jobs, each(text, jobs), strict=True):
+        first.setdefault((job[0], seen), job)
+    return list(first.values())
+
+
 def compiler(name: str, command: list[str], sources: list[str]) -> list[Finding]:
-    """One finding for each message; these compile clean, so the page has no row for them."""
-    findings = []
-    for source, output in zip(sources, each(lambda source: run(command + [source]), sources)):
-        messages = [line for line in output.splitlines() if re.search(r"(error|warning|ended with code)", line)]
-        findings += [Finding(name, source, 0, message) for message in messages]
-    return findings
-
-
-def cppcheck(sources: list[str], misra: bool) -> list[Finding]:
-    """Every preprocessor configuration of each file, with the target's type sizes."""
-    with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
-        return cppcheck_in(folder, sources, misra)
-
-
-def cppcheck_in(folder: str, sources: list[str], misra: bool) -> list[Finding]:
-    command = [os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
-               f"--cppcheck-build-dir={folder}",
-               "--template={file}:{line}:{id}:{message}", "--force", *INCLUDES]
-    # All sources at once: unused types, macros and functions are only known at the end.
-    command += ["--addon=misra"] if misra else ["--enable=warning,style,performance,portability,unusedFunction", "--inconclusive"]
+    """One finding for each message in any mode; these compile clean, so the page has no row for them."""
+    jobs = distinct([option for option in command if not option.startswith(("-c", "-o", "-W"))], sources)
     findings = set()
-    for line in run(command + sources).splitlines():
+    for (source, options), output in zip(jobs, each(lambda job: run([*command, *INCLUDES, *job[1], job[0]]), jobs), strict=True):
+        messages = [line for line in output.splitlines() if re.search(r"(error|warning|ended with code)", line)]
+        findings |= {Finding(name, source, 0, " ".join([message, *options])) for message in messages}
+    return sorted(findings, key=lambda f: (f.file, f.text))
+
+
+def cppcheck(sources: list[str]) -> list[Finding]:
+    """Every preprocessor configuration of each file, with the target's type sizes; its own checks and those of its MISRA addon."""
+    with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
+        # All sources at once: unused types, macros and functions are only known at the end.
+        output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
+                      f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--force", "--inconclusive",
+                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", *INCLUDES, *sources])
+    findings = set()
+    for line in output.splitlines():
         match = re.fullmatch(r"([^:]+):(\d+):([\w.-]+):(.*)", line)
         if not match:
             continue
         file, number, check, text = match.groups()
         is_misra = check.startswith("misra-c2012-")
-        if file.startswith("tools/") or is_misra != misra and not (misra and "rror" in check):
+        if file.startswith("tools/"):
             continue
         name = f"misra {check.removeprefix('misra-c2012-')}" if is_misra else f"cppcheck {check}"
         findings.add(Finding(name, file, int(number), text))
@@ -121,19 +132,18 @@ def cppcheck_in(folder: str, sources: list[str], misra: bool) -> list[Finding]:
 
 
 def clang_tidy(sources: list[str]) -> list[Finding]:
-    def one(source: str) -> list[Finding]:
+    def one(job: tuple[str, list[str]]) -> set[Finding]:
         found = set()
-        for mode in MODES:
-            output = run([os.environ.get("CLANG_TIDY", "clang-tidy-14"), "--quiet", f"--config-file={HERE}/clang-tidy.yaml",
-                          "--header-filter=(include|firmware)/.*", source, "--", *CLANG_16_BIT, *INCLUDES, *(f"-D{m}" for m in mode)])
-            for line in output.splitlines():
-                match = re.fullmatch(r"(.+?):(\d+):\d+: (?:warning|error): (.*) \[([\w.,-]+)\]", line)
-                if match:
-                    file, number, text, checks = match.groups()
-                    found |= {Finding(f"tidy {check}", relative(file), int(number), text) for check in checks.split(",")}
+        output = run([os.environ.get("CLANG_TIDY", "clang-tidy-14"), "--quiet", f"--config-file={HERE}/clang-tidy.yaml",
+                      "--header-filter=(include|firmware)/.*", job[0], "--", *CLANG_16_BIT, *INCLUDES, *job[1]])
+        for line in output.splitlines():
+            match = re.fullmatch(r"(.+?):(\d+):\d+: (?:warning|error): (.*) \[([\w.,-]+)\]", line)
+            if match:
+                file, number, text, checks = match.groups()
+                found |= {Finding(f"tidy {check}", relative(file), int(number), text) for check in checks.split(",")}
         return found
 
-    return sorted(set().union(*each(one, sources)), key=lambda f: (f.check, f.file, f.line))
+    return sorted(set().union(*each(one, distinct([CLANG, *CLANG_16_BIT], sources))), key=lambda f: (f.check, f.file, f.line))
 
 
 def main() -> int:
@@ -142,25 +152,19 @@ def main() -> int:
     parser.add_argument("--only", help="name of one check")
     options = parser.parse_args()
     sources = sorted(str(path) for path in Path("firmware").rglob("*.c"))
-    portable = [source for source in sources if "/board/" not in source]
     if not sources:
         print("foc33: firmware/, static checks: no sources here; run from the project's folder", file=sys.stderr)
         return 2
     deviations = read_deviations(Path(PAGE))
     BUILD.mkdir(parents=True, exist_ok=True)
 
-    gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS, *INCLUDES]
-    clang = [os.environ.get("CLANG", "clang-14"), *CLANG_16_BIT, *CLANG_FLAGS, *INCLUDES]
-    checks = {}
-    for mode in MODES:
-        defines = [f"-D{name}" for name in mode]
-        label = "+".join(mode) or "default"
-        checks[f"gcc_{label}"] = lambda defines=defines: compiler("gcc", gcc + defines, sources)
-        checks[f"clang_16_bit_{label}"] = lambda defines=defines: compiler("clang", clang + defines, sources)
-    checks["cppcheck"] = lambda: cppcheck(sources, misra=False)
-    checks["misra"] = lambda: cppcheck(sources, misra=True)
-    checks["clang_tidy"] = lambda: clang_tidy(sources)
-
+    gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS]
+    checks = {
+        "cppcheck": lambda: cppcheck(sources),
+        "clang_tidy": lambda: clang_tidy(sources),
+        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], sources),
+        "gcc": lambda: compiler("gcc", gcc, sources),
+    }
     checks = {name: check for name, check in checks.items() if options.only in (None, name)}
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):

@@ -10,7 +10,8 @@ import numpy as np
 from tools.bench import cli
 from tools.common import paths
 from tools.bench.run import Run
-from tools.bench.scenario import Scenario, read
+from tools.bench.scenario import Scenario
+from tools.bench.scenario_file import read
 from tools.bench.simulate import SIGNALS
 from tools.common.toml_file import Document
 from tools.common.trace import Trace

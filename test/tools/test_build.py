@@ -113,7 +113,3 @@ class Build(unittest.TestCase):
     def test_another_compiler_error_is_shown_with_its_place(self):
         with self.assertRaisesRegex(UserError, "a.c:3:1: error: expected"):
             self.make("echo 'noise' >&2; echo 'a.c:3:1: error: expected ;' >&2; exit 2")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -243,7 +243,3 @@ class RealLibrary(unittest.TestCase):
     def test_every_usual_signal_exists(self):
         from tools.bench.simulate import SIGNALS
         self.assertLessEqual(set(SIGNALS), set(Library(LIBRARY).keys))
-
-
-if __name__ == "__main__":
-    unittest.main()

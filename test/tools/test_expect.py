@@ -44,6 +44,10 @@ class Expectations(unittest.TestCase):
         self.fails(text, "row: speed_error_percent", "0.6", plant__speed_rpm=1006)
         self.fails(text, "row: speed_error_percent", "-0.6", plant__speed_rpm=994)
 
+    def test_one_expectation_for_several_measures_has_a_row_for_each(self):
+        text = MEASURE + MEASURE.replace("row", "later").replace("0.5", "0.8") + expect("measure", measure=["row", "later"], value="speed_rpm", min=1000)
+        self.fails(text, "later: speed_rpm", "990", plant__speed_rpm=step((0, 1100), (0.8, 990)))
+
     def test_a_measure_of_an_estimate_while_the_bridge_is_off_fails(self):
         self.fails(MEASURE + expect("measure", measure="row", value="estimated_rpm", min=0), "row: estimated_rpm", "nothing")
 
@@ -192,7 +196,3 @@ class Expectations(unittest.TestCase):
                 item = run(text)
                 item.trace = item.trace.part(0.0, 1.0)
                 self.assertFalse(report.check(item)[0].ok)
-
-
-if __name__ == "__main__":
-    unittest.main()

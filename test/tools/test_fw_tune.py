@@ -11,7 +11,7 @@ from unittest import mock
 import numpy as np
 
 from tools.bench import build
-from tools.common import board_file, motor_file, paths, plant
+from tools.common import board_file, board_keys, motor_file, paths
 from tools.bench.board import BoardError, Library
 from tools.common.errors import UserError
 from tuning import fw_search, fw_tables, fw_tune
@@ -404,7 +404,7 @@ def values(**changes: float) -> dict[str, float]:
     """The Hurst on its board, as keys of the virtual board."""
     library = Library(build.library(["PARAMS_IN_RAM"]))
     layers = [motor_file.load(HURST).plant_values(), board_file.load("mclv").plant_values()]
-    return {**plant.resolve(layers, library.keys), **{key.replace("__", "."): value for key, value in changes.items()}}
+    return {**board_keys.resolve(layers, library.keys), **{key.replace("__", "."): value for key, value in changes.items()}}
 
 
 def bench_work(work):

@@ -7,7 +7,7 @@ import unittest
 from dataclasses import replace
 from pathlib import Path
 
-from tools.common import board_file, motor_file, paths, plant
+from tools.common import board_file, board_keys, motor_file, paths
 from tools.common.errors import UserError
 from tune_support import HURST, command, motors
 from tuning import constants, identify, identify_result
@@ -192,7 +192,7 @@ class Refused(unittest.TestCase):
                                 (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'")):
             self.assertIn(says, self.refused(*arguments))
         with self.assertRaises(UserError):
-            identify.identify([motor_file.load(HURST)], "mclv", plant.Values({"no.key": 1.0}, {}))
+            identify.identify([motor_file.load(HURST)], "mclv", board_keys.Values({"no.key": 1.0}, {}))
 
     def test_a_current_beyond_the_board_is_named_by_the_build(self):
         self.assertIn("MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A", self.refused(HURST, "--current", "4.2"))

@@ -10,7 +10,7 @@ from support import LIBRARY, command
 from tools.common import board_file, motor_file, param_rows, paths
 from tools.bench.board import Library
 from tools.common.errors import UserError
-from tools.common.plant import resolve
+from tools.common.board_keys import resolve
 
 MOTOR = """title = "a motor"
 connection = "Y"
@@ -366,7 +366,3 @@ class Project(unittest.TestCase):
             self.assertTrue(any(line.startswith(motor.name + " ") for line in lines), motor.name)
         hurst = next(line for line in lines if line.startswith("hurst_dmb0224c10002"))
         self.assertRegex(hurst, r" Y +5 +2\.670 +1\.920 +7\.240 +0\.0599 +24 V, 2800 rpm, 0\.08 N m, 1\.53 A +5500 rpm, 2\.75 A +\d+ of \d+\Z")
-
-
-if __name__ == "__main__":
-    unittest.main()

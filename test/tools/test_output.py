@@ -106,7 +106,3 @@ class Results(unittest.TestCase):
     def test_a_table_file_leaves_unknown_cells_empty(self):
         write_csv(self.root / "t.csv", ["a", "b"], [[1, None]])
         self.assertEqual((self.root / "t.csv").read_text(encoding="utf-8"), "a,b\n1,\n")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -215,7 +215,3 @@ class Actions(unittest.TestCase):
     def test_actions_come_in_order_of_time(self):
         found = actions(event(0.5, "press = \"S2\"\nhold_s = 1.0") + event(0.7, "pot = 0.1"))
         self.assertEqual([action.at_s for action in found], [0.5, 0.7, 1.5])
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -209,7 +209,3 @@ class Plot(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             self.assertEqual(plots.write_rated(rows, vars(table()), Path(folder)), ["rated.png"])
             self.assertEqual((Path(folder) / "rated.png").read_bytes()[:4], b"\x89PNG")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -106,7 +106,3 @@ class Plots(unittest.TestCase):
         item = example(fw__fw_index=step((0, 0), (1.5, 3)), fw__inv_kphi=7956)
         item.variables = {"SnapBuf1": [1, 2, 3]}
         self.assertLessEqual({"hand_over.png", "field_weakening.png", "variables.png"}, self.names(item))
-
-
-if __name__ == "__main__":
-    unittest.main()

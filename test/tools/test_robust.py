@@ -11,7 +11,7 @@ from pathlib import Path
 from support import LIBRARY, command
 
 from tools.bench import plots, robust
-from tools.common import motor_file, paths, plant
+from tools.common import board_file, motor_file, paths
 from tools.bench.board import Library
 from tools.common.errors import UserError
 from tools.bench.robust import Bench, Deviation, Margins, Search, Table
@@ -56,7 +56,7 @@ class Deviations(unittest.TestCase):
 
     def test_the_plant_of_a_job_is_changed_and_its_header_is_not(self):
         library = Library(LIBRARY)
-        bench = Bench(table(), motor_file.load(HURST), plant.read_motor(HURST), plant.read_board("mclv"), library)
+        bench = Bench(table(), motor_file.load(HURST), motor_file.part(HURST), board_file.part("mclv"), library)
         motor = bench.motor
         job = bench.job(Deviation("x", (0.7, 1.3, 0.85), temperature_degc=80.0), True)
         self.assertAlmostEqual(job.values["motor.rs_ohm"], 0.7 * motor.rs_ohm)
@@ -253,7 +253,3 @@ class CommandLine(unittest.TestCase):
         path.write_text(text.replace("lowest_factor = 0.3", "lowest_factor = 1.5"), encoding="utf-8")
         with self.assertRaisesRegex(UserError, "'lowest_factor' = 1.5 is impossible, .*line"):
             Table.read(path)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -110,7 +110,3 @@ class Traces(unittest.TestCase):
 
     def test_angles_wrap_to_half_a_turn(self):
         self.assertTrue(np.allclose(wrapped_deg(np.array([350.0, -350.0, 90.0, 720.0])), [-10.0, 10.0, 90.0, 0.0]))
-
-
-if __name__ == "__main__":
-    unittest.main()

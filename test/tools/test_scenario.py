@@ -6,7 +6,8 @@ from support import SCENARIO, document, scenario
 
 from tools.common import paths
 from tools.common.errors import UserError
-from tools.bench.scenario import Rating, asks_for_rating, in_numbers, load, read
+from tools.bench.scenario import Rating, asks_for_rating, in_numbers
+from tools.bench.scenario_file import load, read
 
 EVENT = "[[event]]\nat_s = 1.0\n"
 MEASURE = "[[measure]]\nname = \"m\"\nfrom_s = 0.5\nto_s = 1.0\n"
@@ -32,6 +33,8 @@ MISTAKES = {
     "unknown kind of expectation": ("[[expect]]\nkind = \"hope\"", ["'hope' is no kind"]),
     "expectation of an unknown measure": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"n\"\nvalue = \"speed_rpm\"\nmin = 1",
                                           ["'n' is no measure", "use one of m"]),
+    "expectation of several measures, one unknown": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = [\"m\", \"n\"]\nvalue = \"speed_rpm\"\nmin = 1",
+                                                     ["'n' is no measure", "use one of m"]),
     "expectation of an unknown value": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"m\"\nvalue = \"sped_rpm\"\nmin = 1",
                                         ["'sped_rpm' is no value", "did you mean 'speed_rpm'?"]),
     "expectation without bounds": (MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = \"m\"\nvalue = \"speed_rpm\"",
@@ -164,7 +167,3 @@ class ScenarioFile(unittest.TestCase):
                   if type(expectation).__name__ == "FaultExpectation"}
         self.assertLessEqual({"OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
                               "ISR_OVERRUN"}, faults)
-
-
-if __name__ == "__main__":
-    unittest.main()

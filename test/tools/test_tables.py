@@ -116,7 +116,3 @@ class Starts(unittest.TestCase):
     def test_columns_of_the_note_are_in_the_table(self):
         self.assertTrue({"note_rpm", "note_current_a", "speed_rpm", "current_rms_a"} <= {key for key, _, _ in table2.COLUMNS})
         self.assertIn("limited by", report.table([{"name": "x"}], table2.COLUMNS))
-
-
-if __name__ == "__main__":
-    unittest.main()

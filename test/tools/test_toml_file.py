@@ -132,7 +132,3 @@ class TomlFile(unittest.TestCase):
     def test_a_table_where_a_list_of_tables_belongs_is_refused(self):
         self.refused(lambda: document("[event]\nat_s = 1").root.sections("event"), "write [[event]]")
         self.refused(lambda: document("[[start]]\nx = 1").root.section("start"), "write [start]")
-
-
-if __name__ == "__main__":
-    unittest.main()

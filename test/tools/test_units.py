@@ -161,7 +161,3 @@ class Others(unittest.TestCase):
     def test_the_limits_themselves_are_allowed(self):
         self.assertAlmostEqual(entry(units.resistance("Y"), 80, "ohm line-to-line").value_si, 40.0)
         self.assertAlmostEqual(entry(units.resistance("delta"), 0.03, "ohm winding").value_si, 0.01)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tools.common.errors import UserError
-from tools.common.plant import Key
+from tools.common.board_keys import Key
 
 _READ, _WRITE = 1, 2
 

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths, workers
-from . import command_common, rating_sweep, report, robust, scenario, simulate, start_sweep, table2
+from . import command_common, rating_sweep, report, robust, scenario_file, simulate, start_sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    item = scenario.load(options.scenario)
+    item = scenario_file.load(options.scenario)
     motor, board = command_common.parts_of(item, options)
     library = command_common.library_for(item.defines, options.library, options.userparams)
     used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
@@ -100,7 +100,7 @@ def _scenarios(options: argparse.Namespace) -> int:
     names = paths.names(paths.SCENARIOS)
     width = max(map(len, names), default=0)
     for name in names:
-        print(f"{name.ljust(width)}  {scenario.load(name).title}")
+        print(f"{name.ljust(width)}  {scenario_file.load(name).title}")
     return 0
 
 

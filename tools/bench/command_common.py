@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tools.common import paths, plant
+from tools.common import board_file, board_keys, motor_file, paths
 from . import build
 from .board import Library
 from tools.common.errors import UserError
@@ -48,7 +48,7 @@ def tuned_header(motor: Path) -> Path:
     return folder
 
 
-def used(motor: plant.Part, library: Library, header: str) -> dict[str, Any]:
+def used(motor: board_keys.Part, library: Library, header: str) -> dict[str, Any]:
     """Which motor and which header a run used, for the report; "note" says if they are not for the same motor."""
     return {"motor": str(paths.shown(motor.path)), "motor_title": motor.title, "header": header,
             "note": header_note(motor.values.values, library.params)}
@@ -99,9 +99,9 @@ class Progress:
             self.bar.close()
 
 
-def changes(texts: list[str]) -> plant.Values:
+def changes(texts: list[str]) -> board_keys.Values:
     """Plant changes written as KEY=NUMBER or KEY=xFACTOR."""
-    result = plant.Values()
+    result = board_keys.Values()
     for text in texts:
         key, sign, value = text.partition("=")
         factor = value.startswith("x")
@@ -116,10 +116,10 @@ def changes(texts: list[str]) -> plant.Values:
     return result
 
 
-def parts_of(item: Any, options: argparse.Namespace) -> tuple[plant.Part, plant.Part]:
+def parts_of(item: Any, options: argparse.Namespace) -> tuple[board_keys.Part, board_keys.Part]:
     """Motor and board: from the command line, else from the scenario or table."""
-    motor = plant.read_motor(options.motor, "--motor") if options.motor else plant.read_motor(item.motor, item.motor_where)
-    board = plant.read_board(options.board, "--board") if options.board else plant.read_board(item.board, item.board_where)
+    motor = motor_file.part(options.motor, "--motor") if options.motor else motor_file.part(item.motor, item.motor_where)
+    board = board_file.part(options.board, "--board") if options.board else board_file.part(item.board, item.board_where)
     return motor, board
 
 

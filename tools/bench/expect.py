@@ -1,6 +1,7 @@
 """Expectations: what a scenario says must hold, each kind read from [[expect]] and checked against the finished run.
 
-    kind = "measure"       measure = "1000 rpm", value = "speed_error_percent", min and/or max (values: measure.MEASURE_VALUES)
+    kind = "measure"       measure = "1000 rpm" or ["1000 rpm", "2500 rpm"], value = "speed_error_percent", min and/or max
+                           (values: metrics.MEASURE_VALUES)
     kind = "hand_over"     within_s of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
     kind = "outputs_off"   from_s, to_s
@@ -15,16 +16,15 @@
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Callable
+from typing import Any
 
 import numpy as np
 
-from .metrics import MEASURE_VALUES, MEASURED_BY_FIRMWARE
 from tools.common.toml_file import REQUIRED, Section
-
-if TYPE_CHECKING:
-    from .run import Run
+from .metrics import MEASURE_VALUES, MEASURED_BY_FIRMWARE
+from .run import Run
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Expectation:
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "Expectation":
         raise NotImplementedError
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         raise NotImplementedError
 
     def signals(self) -> list[str]:
@@ -109,23 +109,24 @@ def _window_text(from_s: float, to_s: float) -> str:
 
 @dataclass(frozen=True)
 class MeasureExpectation(Expectation):
-    measure: str
+    measures: list[str]
     value: str
     bounds: Bounds
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
-        measure, value = section.choice("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES))
-        if value == "speed_error_percent" and not measures[measure]:
-            raise section.fail("value", f"'{measure}' has no speed error", "add reference_rpm to the measure")
-        return cls(measure, value, Bounds.read(section))
+        names, value = section.choices("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES))
+        for name in names:
+            if value == "speed_error_percent" and not measures[name]:
+                raise section.fail("value", f"'{name}' has no speed error", "add reference_rpm to the measure")
+        return cls(names, value, Bounds.read(section))
 
     def reads_firmware(self) -> bool:
         return self.value in MEASURED_BY_FIRMWARE
 
-    def check(self, run: "Run") -> list[Outcome]:
-        got = run.measures[self.measure][self.value]
-        return [Outcome(f"{self.measure}: {self.value}", self.bounds.hold(got), _number(got), self.bounds.text())]
+    def check(self, run: Run) -> list[Outcome]:
+        found = {name: run.measures[name][self.value] for name in self.measures}
+        return [Outcome(f"{name}: {self.value}", self.bounds.hold(got), _number(got), self.bounds.text()) for name, got in found.items()]
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ class HandOverExpectation(Expectation):
     def reads_firmware(self) -> bool:
         return True
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         presses = run.press_times("S2")
         name = "hand-over" if self.press == 1 else f"hand-over after S2 number {self.press}"
         since = presses[self.press - 1] if len(presses) >= self.press else math.inf
@@ -163,13 +164,13 @@ class HandOverExpectation(Expectation):
         return outcomes
 
 
-def _off_row(run: "Run", from_row: int) -> int | None:
+def _off_row(run: Run, from_row: int) -> int | None:
     """First row from `from_row` on with all six outputs off."""
     off = np.flatnonzero(run.trace.column("pwm.outputs_on")[from_row:] == 0)
     return None if len(off) == 0 else from_row + int(off[0])
 
 
-def _stays_off(run: "Run", off_row: int, to_row: int | None = None) -> bool:
+def _stays_off(run: Run, off_row: int, to_row: int | None = None) -> bool:
     """No output is on after `off_row`. "pwm.outputs_seen" tells of the whole period before its row."""
     return not np.any(run.trace.column("pwm.outputs_seen")[off_row + 2:to_row])
 
@@ -185,7 +186,7 @@ class StopExpectation(Expectation):
         return cls(section.number("after_s", REQUIRED, 0.0, duration_s), section.number("within_s", REQUIRED, 0.0),
                    section.number("speed_max_rpm", None, 0.0))
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         first = int(np.searchsorted(run.trace.time_s, self.after_s))
         row = _off_row(run, first)
         allowed = f"at most {self.within_s:g} s after {self.after_s:g} s, and to the end"
@@ -211,7 +212,7 @@ class OutputsOffExpectation(Expectation):
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "OutputsOffExpectation":
         return cls(*_window(section, duration_s))
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.from_s, self.to_s)
         on = np.flatnonzero(part.column("pwm.outputs_seen"))
         got = "on at %.4f s" % part.time_s[on[0]] if len(on) else ("off" if len(part) else "nothing")
@@ -232,7 +233,7 @@ class SignalExpectation(Expectation):
         signal, statistic = section.text("signal"), section.choice("statistic", tuple(_STATISTICS))
         return cls(f"{signal} {statistic}", signal, statistic, Bounds.read(section), *_window(section, duration_s))
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         column = run.trace.part(self.from_s, self.to_s).column(self.signal).astype(np.float64)
         got = float(_STATISTICS[self.statistic](column)) if len(column) else None
         row = f"{self.row} {_window_text(self.from_s, self.to_s)}"
@@ -252,7 +253,7 @@ class BusVoltageExpectation(SignalExpectation):
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "BusVoltageExpectation":
         return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s), section.flag("percent", False))
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         column = run.trace.part(self.from_s, self.to_s).column(self.signal)
         unit = run.params["NOMINAL_BUS_V"] / 100.0 if self.percent else 1.0
         bounds = Bounds(self.bounds.minimum * unit, self.bounds.maximum * unit)
@@ -285,7 +286,7 @@ class StateExpectation(Expectation):
     def names(self) -> dict[str, str]:
         return {"state": self.name}
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.from_s, max(self.to_s, self.from_s + 1.5 * run.trace.period_s))
         there = part.column("fw.state") == run.state_number(self.name)
         when = f"at {self.from_s:g} s" if self.from_s == self.to_s else _window_text(self.from_s, self.to_s)
@@ -320,7 +321,7 @@ class FaultExpectation(Expectation):
     def names(self) -> dict[str, str]:
         return {"fault": self.name}
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         title = f"fault {self.name}"
         raised = [(row, at_s, name) for row, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
         allowed = f"{self.name} within {self.within_s:g} s of {self.after_s:g} s"
@@ -336,7 +337,7 @@ class FaultExpectation(Expectation):
                                        run.faults.get(0, "NONE")))
         return outcomes
 
-    def _outputs(self, run: "Run", title: str, fault_row: int) -> Outcome:
+    def _outputs(self, run: Run, title: str, fault_row: int) -> Outcome:
         """The row after `first` is one period later."""
         first = int(np.searchsorted(run.trace.time_s, self.after_s)) if self.from_cause else fault_row
         off = _off_row(run, first)
@@ -347,13 +348,13 @@ class FaultExpectation(Expectation):
         return Outcome(f"{title}: outputs off", kept and periods is not None and periods <= self.outputs_off_within_periods, got,
                        f"at most {self.outputs_off_within_periods} after the {origin}")
 
-    def _kept_row(self, run: "Run") -> int | None:
+    def _kept_row(self, run: Run) -> int | None:
         if self.kept_to_s is None:
             return None
         return int(np.searchsorted(run.trace.time_s, self.kept_to_s))
 
     @staticmethod
-    def _code(run: "Run", row: str, from_s: float, to_s: float, name: str) -> Outcome:
+    def _code(run: Run, row: str, from_s: float, to_s: float, name: str) -> Outcome:
         codes = np.unique(run.trace.part(from_s, to_s).column("fw.fault"))
         got = " ".join(run.faults.get(int(code), "?") for code in codes) or "nothing"
         return Outcome(row, got == name, got, name)
@@ -371,7 +372,7 @@ class NoFaultExpectation(Expectation):
     def reads_firmware(self) -> bool:
         return True
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.from_s, self.to_s)
         raised = [(part.time_s[row], run.faults.get(int(code), "?")) for row, code in part.changes("fw.fault") if code != 0]
         got = f"{raised[0][1]} at {raised[0][0]:.4f} s" if raised else "none"
@@ -384,7 +385,7 @@ class NoWarningsExpectation(Expectation):
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoWarningsExpectation":
         return cls()
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         return [Outcome("no warnings of the board", not run.warnings, run.warnings[0] if run.warnings else "none", "none")]
 
 
@@ -400,7 +401,7 @@ class VariableExpectation(Expectation):
         return cls(section.text("name"), section.integer("count", 1, 1, 1000), section.choice("statistic", tuple(_STATISTICS)),
                    Bounds.read(section))
 
-    def check(self, run: "Run") -> list[Outcome]:
+    def check(self, run: Run) -> list[Outcome]:
         got = float(_STATISTICS[self.statistic](np.array(run.variables[self.name][:self.count], dtype=np.float64)))
         return [Outcome(f"{self.name} {self.statistic}", self.bounds.hold(got), _number(got), self.bounds.text())]
 

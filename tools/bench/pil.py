@@ -1,17 +1,12 @@
-"""The virtual board around an image of the target (processor in the loop): libpil.so through ctypes, and runs of scenarios on it.
-
-    python3 -m tools.bench.pil build/target/foc33.elf [SCENARIO]
-"""
+"""The virtual board around an image of the target (processor in the loop): libpil.so through ctypes, and runs of scenarios on it."""
 
 import ctypes
 import dataclasses
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.common import paths
-from . import build, command_common, scenario, simulate
+from . import build, simulate
 from .board import Board, BoardError, Library
 from tools.common.errors import UserError
 from tools.image import load
@@ -145,11 +140,6 @@ class PilRun:
     sent: str = ""
     """what left UART1, up to 4096 characters"""
 
-    @property
-    def instructions_per_second(self) -> float:
-        """Simulated instructions in a second of wall time."""
-        return self.cycles.instructions / self.run.wall_s if self.run.wall_s > 0.0 else 0.0
-
 
 def check_image(pil: PilLibrary, image: Path) -> bool:
     """Whether the image has names; a damaged or foreign one is a UserError before anything else looks at it."""
@@ -178,40 +168,3 @@ def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilR
         raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
     finally:
         board.close()
-
-
-def main(arguments: list[str]) -> int:
-    """One scenario on an image, in a few lines."""
-    if not 1 <= len(arguments) <= 2:
-        raise UserError("an image and perhaps a scenario are needed", "command line", "python3 -m tools.bench.pil build/target/foc33.elf smoke")
-    item = scenario.load(arguments[1] if len(arguments) > 1 else "smoke")
-    pil = library(item.defines)
-    motor, board = command_common.parts_of(item, _NoOptions())
-    with command_common.Progress(item.name, item.duration_s, False) as progress:
-        result = run(simulate.prepare(item, pil, motor, board), Path(arguments[0]), progress)
-    for _, at_s, name in result.run.state_changes():
-        print(f"{at_s:8.4f} s  {name}")
-    for text in result.run.warnings:
-        print(f"warning: {text}")
-    c = result.cycles
-    print(f"interrupt {c.isr_cycles_min:.0f} / {c.isr_cycles_mean:.1f} / {c.isr_cycles_max:.0f} cycles (min / mean / max), {c.isr_count:.0f} times")
-    print(f"trigger to duties {c.latency_cycles_min:.0f} / {c.latency_cycles_mean:.1f} / {c.latency_cycles_max:.0f} cycles")
-    print(f"stack {c.stack_bytes:.0f} bytes, {result.instructions_per_second / 1e6:.1f} million instructions a second, "
-          f"{result.run.speed_factor:.2f} times real time")
-    print(f"{result.ticks} interrupts compared, {result.differences} differ" + (f": {result.first_difference}" if result.differences else ""))
-    return 1 if result.differences else 0
-
-
-class _NoOptions:
-    """No --motor and no --board."""
-
-    motor = None
-    board = None
-
-
-if __name__ == "__main__":
-    try:
-        sys.exit(main(sys.argv[1:]))
-    except UserError as user_error:
-        print(f"foc33: {user_error}", file=sys.stderr)
-        sys.exit(2)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.common import command_line, output, paths, workers
-from . import build, command_common, pil, report, scenario, simulate, sweep, table2
+from . import build, command_common, pil, report, scenario_file, simulate, sweep, table2
 from tools.common.errors import UserError
 from .expect import Outcome
 
@@ -87,7 +87,7 @@ def core_text(run: pil.PilRun) -> str:
 
 
 def _scenario(name: str, options: argparse.Namespace) -> int:
-    item = scenario.load(name)
+    item = scenario_file.load(name)
     motor, board = command_common.parts_of(item, options)
     folder = None if options.userparams is None else build.header_folder(options.userparams)
     image = image_for(item.defines, folder, options.image)

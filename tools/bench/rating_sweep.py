@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tools.common import command_line, motor_file, output, paths, plant
+from tools.common import board_file, board_keys, command_line, motor_file, output, paths
 from . import command_common, report, simulate, sweep
 from .board import Library
 from tools.common.errors import UserError
@@ -63,7 +63,7 @@ class Candidate:
     """A motor with the firmware that was built for it."""
 
     motor: Motor
-    part: plant.Part
+    part: board_keys.Part
     header: str
     library: Library
 
@@ -87,7 +87,7 @@ def command(options: argparse.Namespace) -> int:
     names = options.motor or paths.names(paths.MOTORS)
     if options.userparams is not None and len(names) != 1:
         raise UserError("one header for several motors", "--userparams", "name one motor with --motor")
-    board = plant.read_board(options.board, "--board") if options.board else plant.read_board(table.board, table.board_where)
+    board = board_file.part(options.board, "--board") if options.board else board_file.part(table.board, table.board_where)
     ready, code = command_line.each(names, lambda name: _with_header(name, options))
     if not ready:
         return code
@@ -118,7 +118,7 @@ def _candidates(ready: list[tuple[Motor, Path]], options: argparse.Namespace) ->
     with command_common.Progress("firmware", len(ready), options.quiet, "headers built") as progress:
         for motor, header in ready:
             library = command_common.library_for([], None, header)
-            result.append(Candidate(motor, plant.read_motor(str(motor.path)), command_common.header_name(None, header), library))
+            result.append(Candidate(motor, motor_file.part(str(motor.path)), command_common.header_name(None, header), library))
             progress(1.0)
     return result
 
@@ -130,7 +130,7 @@ def rows_of(table: Table, item: Candidate) -> list[Row]:
     return [*rows, Row("maximum", item.params["MAXIMUM_SPEED_RPM"], 0.0)]
 
 
-def _job(table: Table, item: Candidate, row: Row, board: plant.Part) -> simulate.Job:
+def _job(table: Table, item: Candidate, row: Row, board: board_keys.Part) -> simulate.Job:
     asked = f"{item.motor.name}: {row.name} ({row.rpm:g} rpm)"
     events, settled_s = sweep.loaded_run(item.params, row.rpm, table, asked, row.torque_nm)
     scenario = sweep.scenario(asked, table.title, events, row.rpm, settled_s, settled_s + table.measure_s)
@@ -195,7 +195,7 @@ def text(table: Table, candidates: list[Candidate], rows: list[dict[str, Any]]) 
 
 
 def _write(folder: Path, table: Table, candidates: list[Candidate], rows: list[dict[str, Any]], outcomes: list[Outcome],
-           board: plant.Part) -> None:
+           board: board_keys.Part) -> None:
     output.write_csv(folder / "rated.csv", list(KEYS), [[row[key] for key in KEYS] for row in rows])
     from . import plots
     motors = [command_common.used(item.part, item.library, item.header) | {"name": item.motor.name, "rated_speed_rpm": item.motor.rated_speed_rpm,

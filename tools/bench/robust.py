@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tools.common import motor_file, output, paths, plant
+from tools.common import board_keys, motor_file, output, paths
 from . import command_common, report, simulate, sweep
 from .board import Library
 from .expect import Outcome
@@ -86,8 +86,8 @@ class Deviation:
     promised_loaded: bool = False
     """Under load, too: not the combinations, see robust.toml"""
 
-    def values(self) -> plant.Values:
-        result = plant.Values()
+    def values(self) -> board_keys.Values:
+        result = board_keys.Values()
         for keys, factor in zip(PARAMETERS.values(), self.factors):
             for key in keys:
                 result.values[key] = ("factor", factor)
@@ -103,8 +103,8 @@ class Bench:
 
     table: Table
     motor: Motor
-    part: plant.Part
-    board: plant.Part
+    part: board_keys.Part
+    board: board_keys.Part
     library: Library
 
     @property

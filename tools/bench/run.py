@@ -52,9 +52,6 @@ class Run:
         """Number of a state; -1 if the firmware has no such state."""
         return next((number for number, known in self.states.items() if known == name), -1)
 
-    def fault_number(self, name: str) -> int:
-        return next((number for number, known in self.faults.items() if known == name), -1)
-
     def fault_changes(self) -> list[tuple[int, float, str]]:
         """(row, time, name) whenever the fault code changes, the start included."""
         return [(row, float(self.trace.time_s[row]), self.faults.get(int(code), f"code {int(code)}"))

@@ -1,55 +1,12 @@
-"""Scenarios: what happens to the board over time, what to measure and what to expect, read from TOML. Unknown keys are refused.
-
-    title = "..."                    one line for the list of scenarios
-    description = "..."              optional, longer
-    motor = "hurst_dmb0224c10002"    tuning/motors/NAME.toml or a path
-    board = "mclv"                   tuning/boards/NAME.toml or a path
-    duration_s = 10.0
-
-    [firmware]                       optional
-    defines = ["TUNING"]             builds this variant of the firmware with -DTUNING
-
-    [plant]                          optional: changes to motor and board, by key of the virtual board (`foc33 keys` lists them)
-    "motor.psi_vs" = { factor = 0.9 }
-    "load.constant_nm" = 0.03
-
-    [start]                          optional: the shaft at power-up
-    rotor_deg = 90                   electrical angle
-    speed_rpm = 0
-
-    [[event]]                        any number; at_s, one action, optionally a note for the protocol
-    at_s = 0.5
-    press = "S2"                     or "S3"; hold_s = 0.1
-    speed_rpm = 1000                 potentiometer to this speed, in the range that S3 has chosen; over_s turns it slowly
-    speed_percent = 50               to this part of the motor's rated speed; the operator presses S3 by himself where it takes that
-    speed = "maximum"                to MINIMUM_, NOMINAL_ or MAXIMUM_SPEED_RPM of the header, likewise with S3 where it takes that
-    current_a = 0.5                  the same in TORQUE_MODE
-    pot = 0.25                       potentiometer to this position, 0 .. 1; over_s
-    set = { "load.constant_nm" = 0.05 }   any writable key; over_s makes it a ramp
-    torque_percent = 50              the brake "load.constant_nm" to this part of the motor's rated torque; over_s
-    debug = { SnapStart = 1 }        writes a 16-bit firmware variable, as a debugger would
-    note = "..."
-
-    [[measure]]                      a row of the summary table
-    name = "1000 rpm"
-    from_s = 3.0
-    to_s = 4.0
-    reference_rpm = 1000             optional: for the speed error; or reference_percent = 50, or reference = "maximum"
-
-    [[expect]]                       what must hold; kinds are described in expect.py
-    kind = "measure"
-"""
+"""A scenario: what happens to the board over time, what to measure and what to expect. scenario_file.py reads it."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from tools.common import paths
 from tools.common.errors import UserError
-from .expect import Expectation, read_expectation
-from .metrics import SPEEDS, Measure
-from tools.common.plant import Values
-from tools.common.toml_file import Document, Section
+from tools.common.board_keys import Values
+from .metrics import Measure
 
-EVENT_KINDS = ("press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
 BRAKE = "load.constant_nm"
 
 
@@ -99,112 +56,11 @@ class Scenario:
     speed_rpm: float = 0.0
     events: list[Event] = field(default_factory=list)
     measures: list[Measure] = field(default_factory=list)
-    expectations: list[Expectation] = field(default_factory=list)
+    expectations: list[Any] = field(default_factory=list)
+    """of expect.py's kinds"""
     expectations_where: list[str] = field(default_factory=list)
     motor_where: str = ""
     board_where: str = ""
-
-
-def load(name: str) -> Scenario:
-    """The scenario tools/bench/scenarios/NAME.toml, or the one in the file NAME."""
-    return read(Document(paths.find("scenario", name, paths.SCENARIOS)))
-
-
-def read(document: Document) -> Scenario:
-    """Check a whole document and return what it says."""
-    root = document.root
-    scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor"),
-                        root.text("board"), root.number("duration_s", minimum=0.01, maximum=120.0))
-    scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
-    _read_firmware(root.section("firmware"), scenario)
-    scenario.plant = Values.from_section(root.section("plant"))
-    _read_start(root.section("start"), scenario)
-    scenario.events = [_read_event(section, scenario.duration_s) for section in root.sections("event")]
-    scenario.events.sort(key=lambda event: event.at_s)
-    _read_measures(root.sections("measure"), scenario)
-    measures = {measure.name: measure.has_reference for measure in scenario.measures}
-    for section in root.sections("expect"):
-        scenario.expectations.append(read_expectation(section, measures, scenario.duration_s))
-        scenario.expectations_where.append(section.where("kind"))
-    root.close()
-    return scenario
-
-
-def _read_firmware(section: Section | None, scenario: Scenario) -> None:
-    if section is None:
-        return
-    scenario.defines = section.texts("defines", [])
-    for define in scenario.defines:
-        name, _, value = define.partition("=")
-        if not name.isidentifier() or not all(c.isalnum() or c in "+-._" for c in value):
-            raise section.fail("defines", f"'{define}' is no macro", "write \"NAME\" or \"NAME=value\"")
-    section.close()
-
-
-def _read_start(section: Section | None, scenario: Scenario) -> None:
-    if section is None:
-        return
-    scenario.rotor_deg = section.number("rotor_deg", 0.0, -360.0, 360.0)
-    scenario.speed_rpm = section.number("speed_rpm", 0.0, -10000.0, 10000.0)
-    section.close()
-
-
-def _read_event(section: Section, duration_s: float) -> Event:
-    at_s = section.number("at_s", minimum=0.0)
-    if at_s > duration_s:
-        raise section.fail("at_s", f"at_s = {at_s:g} is after the end", f"choose 0 .. duration_s = {duration_s:g}")
-    note = section.text("note", "")
-    hold_s = section.number("hold_s", None, 0.001, duration_s)
-    over_s = section.number("over_s", None, 0.0, duration_s)
-    kind = section.one_of(EVENT_KINDS)
-    if hold_s is not None and kind != "press":
-        raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
-    if over_s is not None and kind in ("press", "debug"):
-        raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
-    event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
-    if kind == "press":
-        event |= {"button": section.choice(kind, ("S2", "S3")), "hold_s": 0.1 if hold_s is None else hold_s}
-    elif kind == "set":
-        event["keys"] = section.values(kind)
-    elif kind == "debug":
-        event["variables"] = _variables(section, kind)
-    elif kind == "speed":
-        event["text"] = section.choice(kind, SPEEDS)
-    else:
-        event["value"] = section.number(kind, **_EVENT_RANGES.get(kind, {}))
-    return Event(**event)
-
-
-_EVENT_RANGES = {"pot": {"minimum": 0.0, "maximum": 1.0}, "speed_percent": {"minimum": -1000.0, "maximum": 1000.0},
-                 "torque_percent": {"minimum": 0.0, "maximum": 1000.0}}
-
-
-def _variables(section: Section, key: str) -> dict[str, int]:
-    values = section.values(key)
-    for name, value in values.items():
-        if value != int(value) or not -32768 <= value <= 65535:
-            raise section.fail(key, f"'{name}' = {value:g} is impossible", "choose a whole number within 16 bits")
-    return {name: int(value) for name, value in values.items()}
-
-
-def _read_measures(sections: list[Section], scenario: Scenario) -> None:
-    for section in sections:
-        name = section.text("name")
-        from_s = section.number("from_s", minimum=0.0)
-        to_s = section.number("to_s", maximum=scenario.duration_s)
-        given = [key for key in ("reference_rpm", "reference_percent", "reference") if key in section]
-        if len(given) > 1:
-            raise section.fail(given[1], f"'{given[0]}' and '{given[1]}' together", "keep one of them")
-        references = {key: section.number(key, None) for key in ("reference_rpm", "reference_percent")}
-        references["reference"] = section.choice("reference", SPEEDS, "")
-        section.close()
-        if to_s <= from_s:
-            raise section.fail("to_s", f"to_s = {to_s:g} is not after from_s = {from_s:g}", "choose a later one")
-        if given and references[given[0]] == 0.0:
-            raise section.fail(given[0], f"'{given[0]}' = 0 is impossible", "leave it out where no speed is asked for")
-        if any(measure.name == name for measure in scenario.measures):
-            raise section.fail("name", f"two measures are called '{name}'", "rename one")
-        scenario.measures.append(Measure(name, from_s, to_s, **references))
 
 
 def asks_for_rating(scenario: Scenario) -> bool:

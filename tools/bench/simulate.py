@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.common import motor_file, plant
+from tools.common import board_keys, motor_file
 from . import panel
 from . import scenario as scenarios
 from .board import Board, BoardError, Library
@@ -40,16 +40,16 @@ class Job:
     variables: dict[str, int] = field(default_factory=dict)
 
 
-def prepare(scenario: Scenario, library: Library, motor: plant.Part, board: plant.Part, extra: plant.Values | None = None) -> Job:
+def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board: board_keys.Part, extra: board_keys.Values | None = None) -> Job:
     """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
     keys = library.keys
     rating = rating_of(motor) if scenarios.asks_for_rating(scenario) else None
     scenario = scenarios.in_numbers(scenario, rating, library.params)
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
-    values = plant.resolve(layers, keys)
+    values = board_keys.resolve(layers, keys)
     for event in scenario.events:
         for key, value in event.keys.items():
-            plant.check(key, value, keys, event.where)
+            board_keys.check(key, value, keys, event.where)
     start = {key: values.get(key, 0.0) for event in scenario.events for key in event.keys}
     actions = panel.plan(scenario, panel.Ranges.of(library.params, scenario.defines), start)
     variables: dict[str, int] = {}
@@ -63,7 +63,7 @@ def prepare(scenario: Scenario, library: Library, motor: plant.Part, board: plan
     return Job(scenario, library.path, values, actions, signals, variables)
 
 
-def rating_of(motor: plant.Part) -> scenarios.Rating:
+def rating_of(motor: board_keys.Part) -> scenarios.Rating:
     """What a hundred per cent are for this motor."""
     data = motor_file.load(str(motor.path))
     return scenarios.Rating(data.rated_speed_rpm, data.rated_torque_nm)

@@ -17,7 +17,7 @@ from . import command_common, report, simulate, sweep
 from .board import Library
 from tools.common.errors import UserError
 from .expect import Outcome
-from tools.common.plant import Part, Values
+from tools.common.board_keys import Part, Values
 from tools.common.toml_file import Document
 
 

@@ -12,7 +12,7 @@ from .board import Library
 from tools.common.errors import UserError
 from .expect import Outcome
 from .sweep import limit_text
-from tools.common.plant import Part
+from tools.common.board_keys import Part
 from .scenario import Event
 from tools.common.toml_file import Document, Section
 

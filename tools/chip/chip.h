@@ -16,6 +16,11 @@
 #include "chip_registers.h"
 #include "plant.h"
 
+/* Addresses of the registers: SFR_OSCCON and so on. */
+#define CHIP_ADDRESS(name, address, reset) SFR_##name = (address),
+enum { SFR_TABLE(CHIP_ADDRESS) SFR_END = 0x0800 };
+#undef CHIP_ADDRESS
+
 #define CHIP_NEVER UINT64_MAX
 #define CHIP_IDLE_PERIOD_S 50e-6 /* length of a "PWM period" while the PWM does not run */
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import paths, units
+from .board_keys import Part, Values
 from .errors import UserError
 from .motor_file import read_safely
 from .toml_file import Section, flatten
 from .units import Conversion, Kind, Quantity
-from .plant_overrides import Values
 
 _VOLT = {"V": Conversion(1.0), "mV": Conversion(1e-3)}
 _OHM = {"ohm": Conversion(1.0), "mohm": Conversion(1e-3)}
@@ -83,6 +83,12 @@ class BoardFile:
 def load(name_or_path: str, where: str = "") -> BoardFile:
     """tuning/boards/NAME.toml or a path; `where` says who asked for it, for the error about a name that does not exist."""
     return read_safely(paths.find("board", name_or_path, paths.BOARDS, where), _read)
+
+
+def part(name_or_path: str, where: str = "") -> Part:
+    """The same as keys of the virtual board."""
+    board = load(name_or_path, where)
+    return Part(board.path, board.title, board.plant_values())
 
 
 def _read(root: Section) -> BoardFile:

@@ -36,10 +36,10 @@ from pathlib import Path
 from typing import Any
 
 from . import param_rows, paths, units
+from .board_keys import Part, Values
 from .errors import UserError, suggestion
 from .toml_file import Document, Section, flatten
 from .units import Quantity
-from .plant_overrides import Values
 
 COPPER_PER_K = 0.0039
 FERRITE_PER_K = -0.002
@@ -135,6 +135,12 @@ def load(name_or_path: str, where: str = "") -> Motor:
     """tuning/motors/NAME.toml or a path; `where` says who asked for it, for the error about a name that does not exist."""
     path = paths.find("motor", name_or_path, paths.MOTORS, where)
     return read_safely(path, _read)
+
+
+def part(name_or_path: str, where: str = "") -> Part:
+    """The same as keys of the virtual board."""
+    motor = load(name_or_path, where)
+    return Part(motor.path, motor.title, motor.plant_values())
 
 
 def read_safely(path: Path, reader: Callable[[Section], Any]) -> Any:

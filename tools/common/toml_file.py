@@ -113,6 +113,15 @@ class Section:
             raise self.fail(key, f"'{value}' is no {key}", suggestion(str(value), options))
         return value
 
+    def choices(self, key: str, options: list[str] | tuple[str, ...]) -> list[str]:
+        """One of the options, or a list of them."""
+        if not isinstance(self.data.get(key), list):
+            return [self.choice(key, options)]
+        for item in self.texts(key):
+            if item not in options:
+                raise self.fail(key, f"'{item}' is no {key}", suggestion(item, options))
+        return self.data[key]
+
     def flag(self, key: str, default: Any = REQUIRED) -> Any:
         value = self._take(key, default)
         if value is not default and not isinstance(value, bool):

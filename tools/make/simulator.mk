@@ -1,12 +1,12 @@
-# The instruction-set simulator as a library of its own: build/iss/libiss33f.a and, for Python, libiss33f.so; and its benchmark.
+# The simulator's core, without chip and board, as a library of its own: build/iss/libiss33f.a; and its benchmark.
 iss_folder := build/iss$(if $(SAN),-san)
-iss_sources := $(wildcard tools/plant/*.c tools/chip/*.c) $(filter-out $(addprefix tools/cpu_33f/iss_,board.c probe.c shadow.c),$(wildcard tools/cpu_33f/*.c))
+iss_sources := $(filter-out $(addprefix tools/cpu_33f/iss_,board.c cpu.c probe.c shadow.c),$(wildcard tools/cpu_33f/*.c))
 iss_objects := $(iss_sources:tools/%.c=$(iss_folder)/%.o)
-iss_includes := -Itools/plant -Itools/chip -Itools/cpu_33f
+iss_includes := -Itools/chip -Itools/cpu_33f
 iss_compile = $(CC) -std=c11 -O2 -g -fPIC $(sanitizer) $(warnings) -Werror $(iss_includes)
 
 .PHONY: iss iss-bench
-iss: $(iss_folder)/libiss33f.a $(iss_folder)/libiss33f.so ## [simulator] build/iss/libiss33f.a, .so: the dsPIC33F simulator without a board [SAN=1]
+iss: $(iss_folder)/libiss33f.a ## [simulator] build/iss/libiss33f.a: the dsPIC33F's core without a board [SAN=1]
 	@:
 
 $(iss_folder)/flags: FORCE
@@ -20,14 +20,7 @@ $(iss_folder)/libiss33f.a: $(iss_objects)
 	@rm -f $@
 	$(call say,ar,$@)ar rcs $@ $^
 
-$(iss_folder)/libiss33f.so: $(iss_objects)
-	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ $^ -lm
-
-iss-bench: $(iss_folder)/bench setup-run ## [simulator] instructions per second that the simulator executes on one core
-	@elf=$(or $(IMAGE),$(wildcard build/target/foc33.elf)); test -z "$$elf" || $(python) -m tools.image.load "$$elf" >$(iss_folder)/bench.image || exit; \
-	    $< $${elf:+$(iss_folder)/bench.image}
-
-$(iss_folder)/bench: test/cpu_33f/bench.c $(iss_folder)/libiss33f.a
-	$(call say,cc,$<)$(iss_compile) -o $@ $^ -lm
+iss-bench: setup-run build/iss/libmachine.so ## [simulator] instruction cycles per second that the simulator executes on one core
+	@$(python) test/cpu_33f/bench.py
 
 -include $(iss_objects:.o=.d)

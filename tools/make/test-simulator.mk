@@ -1,10 +1,9 @@
 # The simulator's own tests: hand-derived vectors, random programs against independent references, interrupts, encodings. No XC16 is
 # needed; where it is installed (PATH or XC16=dir), the encodings are held against its assembler and disassembler too.
-iss_tests := $(filter-out %/test_peripherals %/test_lock_step,$(call py_tests,cpu_33f,test))
+iss_tests := $(filter-out %/test_peripherals %/test_lock_step,$(call py_tests,cpu_33f))
 all_suites += $(iss_tests)
 
-$(call reports,$(iss_tests)): $T/%.txt: test/$$(subst .,/,%).py build/iss/libmachine.so
-	$(run_suite) $(python) test/run-unittest.py $<
+$(addprefix $T/made/,$(iss_tests)): build/iss/libmachine.so
 
 build/iss/libmachine.so: test/cpu_33f/machine.c tools/cpu_33f/iss.h build/iss/libiss33f.a
 	$(call say,ld,$@)$(CC) -std=c11 -O2 -g -fPIC $(warnings) -Werror -shared $(iss_includes) -o $@ $< \

@@ -4,7 +4,7 @@
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib
 #   tools/setup/prepare.sh tune    the same, and openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
-#   tools/setup/prepare.sh test    all of that, and Ruby with gem
+#   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby). Result: build/setup/python holds the interpreter's command.
 set -u
@@ -105,6 +105,11 @@ case $job in
         python_packages="$python_packages python3-pyelftools python3-intelhex"
         ;;
 esac
+
+if [ "$job" = test ]; then
+    modules="$modules pytest"
+    python_packages="$python_packages python3-pytest"
+fi
 
 pips=$(echo "$modules" | sed 's/elftools/pyelftools/') # names that pip knows
 

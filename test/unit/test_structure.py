@@ -2,7 +2,7 @@
 
 import re
 
-from support.checks import CFLAGS, ROOT, compiler, run
+from c_compiler import CFLAGS, ROOT, compiler
 
 ROOMS = ("control", "drive", "board")
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
@@ -19,34 +19,34 @@ def includes(room: str) -> set[tuple[str, str]]:
     return {(path, name) for path, text in sources(room).items() for name in INCLUDE.findall(text)}
 
 
-def only_the_board_room_sees_the_device() -> None:
+def test_only_the_board_room_sees_the_device() -> None:
     seen = [path for path, text in sources().items() if "xc.h" in text]
     assert seen and all(path.split("/")[1] == "board" for path in seen), seen
 
 
-def control_includes_only_control() -> None:
+def test_control_includes_only_control() -> None:
     wrong = [pair for pair in includes("control") if not pair[1].startswith("control/") and pair[1] != "stdint.h"]
     assert not wrong, wrong
 
 
-def drive_includes_only_control_drive_and_the_parameters() -> None:
+def test_drive_includes_only_control_drive_and_the_parameters() -> None:
     allowed = re.compile(r"(control|drive|drive/modes)/\w+\.h|userparams\.h|stdint\.h")
     wrong = [pair for pair in includes("drive") if not allowed.fullmatch(pair[1])]
     assert not wrong, wrong
 
 
-def board_includes_only_the_three_rooms_and_the_device() -> None:
+def test_board_includes_only_the_three_rooms_and_the_device() -> None:
     allowed = re.compile(r"(control|drive|drive/modes|board|board/modes)/\w+\.h|version\.h|xc\.h|stdint\.h")
     wrong = [pair for pair in includes("board") if not allowed.fullmatch(pair[1])]
     assert not wrong, wrong
 
 
-def only_params_h_reads_userparams_h() -> None:
+def test_only_params_h_reads_userparams_h() -> None:
     readers = [path for path, text in sources().items() if "userparams.h" in INCLUDE.findall(text)]
     assert readers == ["include/drive/param_scaling.h"], readers
 
 
-def control_and_drive_name_no_register_and_no_motor() -> None:
+def test_control_and_drive_name_no_register_and_no_motor() -> None:
     registers = re.findall(r"\bX\((\w+), 0x", (ROOT / "tools/chip/chip_registers.h").read_text(encoding="utf-8"))
     assert len(registers) > 100
     pattern = re.compile(r"\b(" + "|".join([*registers, "Hurst", "MCLV"]) + r")(bits)?\b")
@@ -57,7 +57,7 @@ def control_and_drive_name_no_register_and_no_motor() -> None:
             assert not found, f"{path}: {found}"
 
 
-def every_header_compiles_alone() -> None:
+def test_every_header_compiles_alone() -> None:
     for path in sources():
         if path.endswith(".h"):
             done = compiler([*CFLAGS, "-Wconversion", "-Wshadow", "-Werror", "-Itools/cpu_host", "-Iinclude", "-I.", "-fsyntax-only", "-xc", "-"],
@@ -65,19 +65,19 @@ def every_header_compiles_alone() -> None:
             assert done.returncode == 0, f"{path}: {done.stderr}"
 
 
-def every_header_has_its_own_guard() -> None:
+def test_every_header_has_its_own_guard() -> None:
     for path, text in sources().items():
         if path.endswith(".h"):
             guard = "_".join(path.removesuffix(".h").upper().split("/")[1:]) + "_H"
             assert f"#ifndef {guard}\n#define {guard}\n" in text, f"{path} wants {guard}"
 
 
-def every_file_begins_with_a_sentence_about_itself() -> None:
+def test_every_file_begins_with_a_sentence_about_itself() -> None:
     for path, text in sources().items():
         assert re.match(r"/\* [A-Z0-9].{20,}", text), f"{path}: {text[:40]!r}"
 
 
-def a_function_that_a_comment_names_exists() -> None:
+def test_a_function_that_a_comment_names_exists() -> None:
     comment = re.compile(r"/\*.*?\*/", re.DOTALL)
     code = "\n".join(comment.sub("", text) for text in sources().values())
     for path, text in sources().items():
@@ -86,7 +86,7 @@ def a_function_that_a_comment_names_exists() -> None:
         assert not gone, f"{path}: {gone}"
 
 
-def a_watch_variable_that_a_page_names_exists() -> None:
+def test_a_watch_variable_that_a_page_names_exists() -> None:
     structs = re.findall(r"typedef struct \{([^}]*)\} t(\w+Parm);", (ROOT / "include/board/watch.h").read_text(encoding="utf-8"))
     known = {f"{name}.{member}" for members, name in structs for member in re.findall(r"\w+", members)}
     pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "include/drive/faults.h"]
@@ -95,36 +95,36 @@ def a_watch_variable_that_a_page_names_exists() -> None:
         assert not gone, f"{page.name}: {gone}"
 
 
-def there_are_no_stray_files_in_the_firmware() -> None:
+def test_there_are_no_stray_files_in_the_firmware() -> None:
     stray = [str(f.relative_to(ROOT)) for top in ("firmware", "include") for f in (ROOT / top).rglob("*") if f.is_file() and f.suffix not in (".c", ".h")
              and f.name != "budget.toml"]
     assert not stray, stray
 
 
-def the_watchdog_is_served_in_three_places() -> None:
+def test_the_watchdog_is_served_in_three_places() -> None:
     served = {path: text.count("ClrWdt()") for path, text in sources().items() if "ClrWdt()" in text}
     # a bounded wait and the end of the start; later only reset_serve_watchdog()
     assert served == {"firmware/board/clock.c": 1, "firmware/board/firmware.c": 1, "firmware/board/reset.c": 1}, served
 
 
-def there_is_no_inline_assembly() -> None:
+def test_there_is_no_inline_assembly() -> None:
     found = [path for path, text in sources().items() if re.search(r"\b_*asm_*\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))]
     assert not found, found
 
 
-def what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
+def test_what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
     text = sources()["firmware/board/reset.c"]
     assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text
     kept = re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", text, re.MULTILINE)
     assert kept == ["board_trap_intcon1", "kept_fault", "kept_inverse"], kept
 
 
-def the_state_is_written_in_one_place() -> None:
+def test_the_state_is_written_in_one_place() -> None:
     written = [(path, line) for path, text in sources().items() for line in re.findall(r".*(?:->|\.)state\s*=(?!=).*", text)]
     assert [path for path, _ in written] == ["include/drive/state.h"], written
 
 
-def a_modes_name_stands_in_the_modes_rooms_only() -> None:
+def test_a_modes_name_stands_in_the_modes_rooms_only() -> None:
     names = "IDENTIFY|TUNING|TORQUE_MODE|SNAPSHOT|BIDIRECTIONAL_SPEED|OPEN_LOOP_FUNCTIONING|PARAMS_IN_RAM"
     condition = re.compile(rf"^\s*#\s*(?:if|ifdef|ifndef|elif)\b.*\b(?:{names})\b", re.MULTILINE)
     asked = [path for path, text in sources().items() if condition.search(text)]
@@ -138,18 +138,9 @@ FUSES = {
 }
 
 
-def configuration_words_are_those_of_the_board() -> None:
+def test_configuration_words_are_those_of_the_board() -> None:
     text = (ROOT / "firmware/board/config.c").read_text(encoding="utf-8")
     words = re.findall(r"^#pragma config (\w+) = (\w+)$", text, re.MULTILINE)
     assert len(dict(words)) == len(words), "a word is set twice"
     wrong = {name: dict(words).get(name) for name, value in FUSES.items() if dict(words).get(name) != value}
     assert not wrong, wrong
-
-
-run([only_the_board_room_sees_the_device, control_includes_only_control, drive_includes_only_control_drive_and_the_parameters,
-     board_includes_only_the_three_rooms_and_the_device, only_params_h_reads_userparams_h, control_and_drive_name_no_register_and_no_motor,
-     every_header_compiles_alone, every_header_has_its_own_guard, every_file_begins_with_a_sentence_about_itself,
-     a_function_that_a_comment_names_exists, a_watch_variable_that_a_page_names_exists,
-     there_are_no_stray_files_in_the_firmware, the_watchdog_is_served_in_three_places, there_is_no_inline_assembly,
-     what_outlives_a_reset_is_left_alone_by_the_start_up_code, the_state_is_written_in_one_place,
-     a_modes_name_stands_in_the_modes_rooms_only, configuration_words_are_those_of_the_board])

@@ -1,4 +1,5 @@
-/* Pins, timers and the serial port as the firmware and the user of the board see them. */
+/* Pins, timers and the serial port as the host's firmware and the user of the board see them; what the chip makes of the registers:
+ * test/cpu_33f/test_peripherals.py. */
 #include "fake_firmware.inc"
 
 void setUp(void)
@@ -28,24 +29,6 @@ void test_buttons_pull_their_pins_low(void)
     TEST_ASSERT_EQUAL_UINT(1, PORTAbits.RA8);
 }
 
-static void light_on(void)
-{
-    TRISCbits.TRISC6 = 0;
-    LATCbits.LATC6 = 1;
-}
-
-void test_an_output_latch_drives_its_pin(void)
-{
-    fake_init_hook = light_on;
-    power_up();
-    run(1);
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RC6"));
-    TEST_ASSERT_EQUAL_UINT(1, PORTCbits.RC6);
-    set("reg.LATC", 0.0);
-    run(1);
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("pin.RC6"));
-}
-
 static void write_port(void)
 {
     TRISCbits.TRISC6 = 0;
@@ -64,15 +47,6 @@ void test_writing_a_port_reaches_the_latch_and_is_named(void)
     TEST_ASSERT_TRUE(warned_about("PORTC"));
 }
 
-void test_analogue_pins_read_zero_as_port_bits(void)
-{
-    power_up();
-    run(1);
-    TEST_ASSERT_EQUAL_UINT(0, PORTAbits.RA0);
-    TEST_ASSERT_EQUAL_UINT(1, PORTBbits.RB1);
-    TEST_ASSERT_EQUAL_UINT(0, PORTCbits.RC2);
-}
-
 static void millisecond_timer(void)
 {
     PR1 = 4999; /* 40 MHz / 8 / 5000 */
@@ -87,21 +61,6 @@ void test_timer_1_interrupts_every_millisecond(void)
     run(20000);
     TEST_ASSERT_UINT_WITHIN(1, 1000, fake_timer_calls);
     TEST_ASSERT_TRUE(TMR1 <= PR1);
-}
-
-static void short_timer(void)
-{
-    PR1 = 9; /* 40 MHz / 256 / 10 */
-    T1CON = 0x8030;
-    IEC0bits.T1IE = 1;
-}
-
-void test_the_period_of_a_timer_is_its_register_plus_one(void)
-{
-    fake_init_hook = short_timer;
-    power_up();
-    run(20000);
-    TEST_ASSERT_UINT_WITHIN(1, 15625, fake_timer_calls);
 }
 
 static void polled_timer(void)
@@ -119,19 +78,6 @@ void test_a_polled_timer_sets_its_flag(void)
     run(2);
     TEST_ASSERT_EQUAL_UINT(1, IFS0bits.T1IF);
     TEST_ASSERT_EQUAL_UINT(0, fake_timer_calls);
-}
-
-static void free_timer(void)
-{
-    T2CON = 0x8030; /* 1:256, runs to 0xFFFF */
-}
-
-void test_timer_2_counts_with_its_prescaler(void)
-{
-    fake_init_hook = free_timer;
-    power_up();
-    run(1000);
-    TEST_ASSERT_UINT_WITHIN(1, 7812, TMR2); /* 50 ms at 156.25 kHz */
 }
 
 static const char *text;
@@ -166,49 +112,6 @@ void test_sent_characters_arrive_in_order_at_the_baud_rate(void)
     TEST_ASSERT_DOUBLE_WITHIN(1.0, 40e6 / 4.0 / 87.0, get("uart.baud"));
     TEST_ASSERT_EQUAL_UINT(1, U1STAbits.TRMT);
     TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
-}
-
-static void slow_uart(void)
-{
-    uart_on();
-    U1MODEbits.BRGH = 0;
-    U1BRG = 2082; /* 1200 baud: a character takes 8.3 ms */
-}
-
-void test_a_slow_line_fills_the_buffer_and_sets_utxbf(void)
-{
-    char out[64];
-    text = "0123456789";
-    fake_init_hook = slow_uart;
-    fake_background_hook = send_text;
-    power_up();
-    run(60);
-    TEST_ASSERT_EQUAL_UINT(1, U1STAbits.UTXBF);
-    TEST_ASSERT_EQUAL_UINT(0, U1STAbits.TRMT);
-    run(1560);
-    TEST_ASSERT_EQUAL_UINT(0, U1STAbits.TRMT); /* 81 ms: the tenth character is still on the line */
-    run(80);
-    TEST_ASSERT_EQUAL_UINT(1, U1STAbits.TRMT); /* 85 ms */
-    TEST_ASSERT_EQUAL_UINT(10, vb_uart_read(board, out, sizeof out));
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("uart.lost_count"));
-}
-
-static void uart_without_pin(void)
-{
-    uart_on();
-    RPOR9 = 0;
-}
-
-void test_a_transmitter_without_a_pin_is_named(void)
-{
-    char out[8];
-    text = "x";
-    fake_init_hook = uart_without_pin;
-    fake_background_hook = send_text;
-    power_up();
-    run(40);
-    TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
-    TEST_ASSERT_TRUE(warned_about("RPOR9"));
 }
 
 static void transmit_interrupt_on(void)

@@ -196,63 +196,6 @@ void test_a_sample_just_after_the_high_side_took_over_shows_the_rest_of_it(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, shown_part(0x8000 | (2000 - 1626)));
 }
 
-static void never_triggered(void)
-{
-    P1SECMP = 1500;
-}
-
-void test_a_compare_value_beyond_the_period_never_triggers_and_is_named(void)
-{
-    more_init = never_triggered;
-    power_up();
-    run(10);
-    TEST_ASSERT_EQUAL_UINT(0, fake_adc_calls);
-    TEST_ASSERT_TRUE(warned_about("P1SECMP"));
-}
-
-static void adc_off(void)
-{
-    AD1CON1 = 0x036C;
-}
-
-void test_an_adc_that_is_off_is_named(void)
-{
-    more_init = adc_off;
-    power_up();
-    run(200);
-    TEST_ASSERT_EQUAL_UINT(0, fake_adc_calls);
-    TEST_ASSERT_TRUE(warned_about("AD1CON1"));
-}
-
-static void interrupt_off(void)
-{
-    IEC0bits.AD1IE = 0;
-}
-
-void test_a_disabled_interrupt_leaves_the_flag_set_and_is_named(void)
-{
-    more_init = interrupt_off;
-    power_up();
-    run(10);
-    TEST_ASSERT_EQUAL_UINT(0, fake_adc_calls);
-    TEST_ASSERT_EQUAL_HEX(0x2000, (unsigned)get("reg.IFS0"));
-    TEST_ASSERT_TRUE(warned_about("IEC0"));
-}
-
-static void priority_zero(void)
-{
-    IPC3bits.AD1IP = 0;
-}
-
-void test_priority_zero_never_interrupts_and_is_named(void)
-{
-    more_init = priority_zero;
-    power_up();
-    run(10);
-    TEST_ASSERT_EQUAL_UINT(0, fake_adc_calls);
-    TEST_ASSERT_TRUE(warned_about("IPC3"));
-}
-
 static void interrupts_masked(void)
 {
     __builtin_disable_interrupts();
@@ -267,90 +210,6 @@ void test_interrupts_wait_while_the_cpu_masks_them(void)
     set("reg.SR", 0.0);
     run(10);
     TEST_ASSERT_EQUAL_UINT(11, fake_adc_calls); /* the one that waited, and ten new ones */
-}
-
-static void swapped_inputs(void)
-{
-    AD1CHS123 = 1;
-}
-
-void test_the_wrong_inputs_are_named(void)
-{
-    more_init = swapped_inputs;
-    power_up();
-    run(2);
-    TEST_ASSERT_TRUE(warned_about("AD1CHS123"));
-    TEST_ASSERT_FALSE(warned_about("AD1CHS0"));
-}
-
-static void digital_pins(void)
-{
-    AD1PCFGL = 0xFFFF;
-}
-
-void test_a_digital_pin_reads_the_lowest_code_and_is_named(void)
-{
-    more_init = digital_pins;
-    power_up();
-    run(2);
-    TEST_ASSERT_EQUAL_HEX16(0x8000, buffer[1]);
-    TEST_ASSERT_TRUE(warned_about("AD1PCFGL"));
-}
-
-static void fewer_channels(void)
-{
-    AD1CON2 = 0x0000;
-}
-
-void test_channels_that_are_not_converted_keep_their_buffers_and_are_named(void)
-{
-    more_init = fewer_channels;
-    set("input.pot", 0.25);
-    power_up();
-    run(2);
-    TEST_ASSERT_EQUAL_HEX16(0xC000, buffer[0]);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, buffer[3]);
-    TEST_ASSERT_TRUE(warned_about("AD1CON2"));
-}
-
-static void sequential_sampling(void)
-{
-    AD1CON1 = 0x8364;
-}
-
-void test_sequential_sampling_is_named(void)
-{
-    more_init = sequential_sampling;
-    power_up();
-    run(2);
-    TEST_ASSERT_TRUE(warned_about("AD1CON1"));
-}
-
-static void slow_conversion(void)
-{
-    AD1CON3 = 63; /* TAD 1.6 us, four conversions 76.8 us */
-}
-
-void test_conversions_longer_than_the_period_lose_triggers_and_are_named(void)
-{
-    more_init = slow_conversion;
-    power_up();
-    run(100);
-    TEST_ASSERT_UINT_WITHIN(1, 50, fake_adc_calls);
-    TEST_ASSERT_TRUE(warned_about("AD1CON3"));
-}
-
-static void fast_conversion(void)
-{
-    AD1CON3 = 0;
-}
-
-void test_a_conversion_clock_beyond_the_converter_is_named(void)
-{
-    more_init = fast_conversion;
-    power_up();
-    run(2);
-    TEST_ASSERT_TRUE(warned_about("AD1CON3"));
 }
 
 void test_a_handler_slower_than_the_period_overruns_and_is_named(void)
@@ -435,22 +294,6 @@ void test_the_seed_decides_the_noise(void)
     double first = sum_with_seed(5.0);
     TEST_ASSERT_EQUAL_DOUBLE(first, sum_with_seed(5.0));
     TEST_ASSERT_TRUE(first != sum_with_seed(6.0));
-}
-
-static void several_sequences(void)
-{
-    AD1CON2 = 0x0204; /* interrupt after two sequences */
-}
-
-void test_two_sequences_fill_eight_buffers_before_the_interrupt(void)
-{
-    more_init = several_sequences;
-    set("input.pot", 0.25);
-    power_up();
-    run(10);
-    TEST_ASSERT_EQUAL_UINT(5, fake_adc_calls);
-    TEST_ASSERT_EQUAL_HEX(0xC000, (unsigned)get("reg.ADC1BUF4"));
-    TEST_ASSERT_TRUE(warned_about("AD1CON2"));
 }
 
 static void free_running(void)

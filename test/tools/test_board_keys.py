@@ -6,10 +6,10 @@ from pathlib import Path
 
 from support import LIBRARY, document
 
-from tools.common import motor_file, paths, plant
+from tools.common import board_file, motor_file, paths
 from tools.bench.board import Library
 from tools.common.errors import UserError
-from tools.common.plant import Key, Values, resolve
+from tools.common.board_keys import Key, Values, resolve
 
 KEYS = {"motor.rs_ohm": Key("motor.rs_ohm", "ohm", "", 0.001, 100.0, True, True),
         "load.constant_nm": Key("load.constant_nm", "N.m", "", 0.0, 10.0, True, True),
@@ -53,16 +53,16 @@ class Overrides(unittest.TestCase):
 
 class Files(unittest.TestCase):
     def test_a_motor_becomes_keys_of_the_virtual_board(self):
-        part = plant.read_motor("hurst_dmb0224c10002")
+        part = motor_file.part("hurst_dmb0224c10002")
         self.assertEqual((part.title, part.path.name), ("Hurst DMB0224C10002", "hurst_dmb0224c10002.toml"))
         self.assertEqual((part.values.values["motor.rs_ohm"], part.values.values["motor.pole_pairs"]), (2.67, 5.0))
         self.assertRegex(part.values.where["motor.rs_ohm"], "hurst_dmb0224c10002.toml line [0-9]+")
 
     def test_an_unknown_motor_or_board_gets_the_nearest_name(self):
         with self.assertRaisesRegex(UserError, "no motor 'hurst_dmb', scenario.toml line 3: did you mean 'hurst_dmb0224c10002'"):
-            plant.read_motor("hurst_dmb", "scenario.toml line 3")
+            motor_file.part("hurst_dmb", "scenario.toml line 3")
         with self.assertRaisesRegex(UserError, "no board 'mclv2', .*did you mean 'mclv'"):
-            plant.read_board("mclv2")
+            board_file.part("mclv2")
 
     def test_a_plant_key_that_the_board_refuses_names_its_line(self):
         text = (paths.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8") + "[plant]\n\"motor.sat_lq_ratio\" = 7\n"
@@ -70,7 +70,7 @@ class Files(unittest.TestCase):
             path = Path(folder) / "motor.toml"
             path.write_text(text, encoding="utf-8")
             with self.assertRaisesRegex(UserError, f"'motor.sat_lq_ratio' = 7 is impossible, .*motor.toml line {text.count(chr(10))}: choose 0 .. 0.95$"):
-                plant.read_motor(str(path))
+                motor_file.part(str(path))
 
     def test_a_motor_file_knows_the_ranges_of_the_motor_s_keys_before_anything_is_built(self):
         keys = {name: (key.unit, key.minimum, key.maximum) for name, key in Library(LIBRARY).keys.items()
@@ -81,7 +81,3 @@ class Files(unittest.TestCase):
     def test_plant_sections_remember_their_lines(self):
         values = Values.from_section(document("[plant]\n\n\"motor.rs_ohm\" = 2\n").root.section("plant"))
         self.assertIn("line 3", values.where["motor.rs_ohm"])
-
-
-if __name__ == "__main__":
-    unittest.main()

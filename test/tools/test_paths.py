@@ -32,7 +32,3 @@ class Places(unittest.TestCase):
         with mock.patch.object(Path, "iterdir", side_effect=PermissionError(13, "Permission denied")), \
                 self.assertRaisesRegex(UserError, r"cannot read the folder \(Permission denied\)"):
             paths.names(self.folder)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,14 +1,35 @@
-"""The plant of a run: motor file, board file and the scenario's overrides, checked against the virtual board's own list of keys."""
+"""Keys of the virtual board with their values from motor file, board file, scenario and command line, checked against the board's own list."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Mapping
 
-from . import board_file, motor_file
 from .errors import UserError, suggestion
-from .plant_overrides import Value, Values
+from .toml_file import Section, flatten
 
-__all__ = ["Key", "Part", "Value", "Values", "check", "read_board", "read_motor", "resolve"]
+Value = float | tuple[str, float]
+"""A number, or ("factor", number) to multiply what the earlier sources gave."""
+
+
+@dataclass
+class Values:
+    """Keys with values from one source; `where` says where each was written."""
+
+    values: dict[str, Value] = field(default_factory=dict)
+    where: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def from_section(cls, section: Section | None) -> "Values":
+        """The numbers and factors of a [plant] table."""
+        if section is None:
+            return cls()
+        values = flatten(section, factors=True)
+        return cls(values, {key: section.where(key) for key in values})
+
+    def add(self, key: str, value: Value, where: str) -> None:
+        """One more key."""
+        self.values[key] = value
+        self.where[key] = where
 
 
 @dataclass(frozen=True)
@@ -31,18 +52,6 @@ class Part:
     path: Path
     title: str
     values: Values
-
-
-def read_motor(name: str, where: str = "") -> Part:
-    """tuning/motors/NAME.toml or a path, in the form that motor_file.py describes, as keys of the virtual board."""
-    motor = motor_file.load(name, where)
-    return Part(motor.path, motor.title, motor.plant_values())
-
-
-def read_board(name: str, where: str = "") -> Part:
-    """tuning/boards/NAME.toml or a path, in the form that board_file.py describes, as keys of the virtual board."""
-    board = board_file.load(name, where)
-    return Part(board.path, board.title, board.plant_values())
 
 
 def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:

@@ -7,7 +7,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from support.checks import CFLAGS, ROOT, compiler, run
+from c_compiler import CFLAGS, ROOT, compiler
 
 USERPARAMS = (ROOT / "userparams.h").read_text(encoding="utf-8")
 
@@ -81,30 +81,30 @@ def output_of(source: list[str]) -> list[str]:
         return subprocess.run([f"{folder}/program"], capture_output=True, text=True, check=True).stdout.splitlines()
 
 
-def the_values_in_use_are_accepted() -> None:
+def test_the_values_in_use_are_accepted() -> None:
     code, messages = build({})
     assert code == 0 and not messages, messages
 
 
-def each_value_below_its_range_is_refused_by_name_value_and_range() -> None:
+def test_each_value_below_its_range_is_refused_by_name_value_and_range() -> None:
     code, messages = build({p.name: p.below() for p in PARAMETERS})
     missing = [p.refusal(p.below()) for p in PARAMETERS if p.refusal(p.below()) not in messages]
     assert code != 0 and not missing, missing
 
 
-def each_value_above_its_range_is_refused_by_name_value_and_range() -> None:
+def test_each_value_above_its_range_is_refused_by_name_value_and_range() -> None:
     code, messages = build({p.name: p.above() for p in PARAMETERS})
     missing = [p.refusal(p.above()) for p in PARAMETERS if p.refusal(p.above()) not in messages]
     assert code != 0 and not missing, missing
 
 
-def the_ends_of_every_range_are_inside_it() -> None:
+def test_the_ends_of_every_range_are_inside_it() -> None:
     for values in ({p.name: p.low for p in PARAMETERS}, {p.name: p.high for p in PARAMETERS}):
         messages = build(values)[1]
         assert "is outside" not in messages, messages
 
 
-def one_wrong_value_alone_stops_the_build_with_one_message() -> None:
+def test_one_wrong_value_alone_stops_the_build_with_one_message() -> None:
     for name in ("TUNING_DELAY_RAMPUP", "KFILTER_VELESTIM", "KFILTER_ESDQ", "INVKFI_SPEED9", "LS_OVER2LS0_SPEED17", "DATA_BUFFER_SIZE", "SNAPDELAY"):
         parameter = next(p for p in PARAMETERS if p.name == name)
         for value in (parameter.below(), parameter.above()):
@@ -169,14 +169,14 @@ DERIVED = {name: value for name, value in re.findall(r"^#ifndef (?:\w+).*\n#defi
     encoding="utf-8"), re.MULTILINE)}
 
 
-def every_relation_has_a_case() -> None:
+def test_every_relation_has_a_case() -> None:
     in_table = relations()
     unknown = [key for key in RELATIONS if not any(message.startswith(key) for message in in_table)]
     untested = [message for message in in_table if not any(message.startswith(key) for key in RELATIONS)]
     assert not unknown and not untested, f"no such relation: {unknown}; not tested: {untested}"
 
 
-def every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
+def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     """One program says for each case which relations hold: the macros take the values that they find at the place of use."""
     tried = [(message, values, holds) for message, pairs in RELATIONS.items() for pair in pairs for values, holds in zip(pair, (False, True), strict=True)]
     source = ["#include <stdio.h>", "#define USERPARAMS_H", *(f"#define {name} {value}" for name, value in BASE.items()),
@@ -198,7 +198,7 @@ def every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def a_broken_relation_stops_the_build_with_its_message() -> None:
+def test_a_broken_relation_stops_the_build_with_its_message() -> None:
     for values, message in (({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM"),
                             ({"MOTOR_KPHI_V_PER_KRPM": "1.7"}, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format"),
                             ({"IDREF_SPEED3": "-2.76"}, "IDREF_SPEED3 must not exceed MAXIMUM_CURRENT_A")):
@@ -207,7 +207,7 @@ def a_broken_relation_stops_the_build_with_its_message() -> None:
         assert code != 0 and f"userparams.h: {message}" in first, messages
 
 
-def the_check_for_the_targets_old_compiler_refuses_the_same() -> None:
+def test_the_check_for_the_targets_old_compiler_refuses_the_same() -> None:
     old = ("-O2", "-U__GNUC__", "-D__GNUC__=4", "-Wno-builtin-macro-redefined", "-w")
     code, messages = build({}, old)
     assert code == 0, messages
@@ -217,7 +217,7 @@ def the_check_for_the_targets_old_compiler_refuses_the_same() -> None:
     assert code != 0 and "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM" in messages, messages
 
 
-def every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
+def test_every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
     modes = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
     assert sorted(modes) == ["BIDIRECTIONAL_SPEED", "IDENTIFY", "OPEN_LOOP_FUNCTIONING", "PARAMS_IN_RAM", "SNAPSHOT", "TORQUE_MODE", "TUNING"], modes
     sources = "".join(f.read_text(encoding="utf-8") for room in ("firmware", "include") for f in (ROOT / room).rglob("*.[ch]"))
@@ -228,7 +228,7 @@ def every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
 BOARD_INCLUDES = ["-Itools/vboard", "-Itools/chip", "-Itools/plant"]
 
 
-def a_mode_means_the_same_in_userparams_and_on_the_command_line() -> None:
+def test_a_mode_means_the_same_in_userparams_and_on_the_command_line() -> None:
     files = [str(f) for room in ("firmware", "tools/cpu_host") for f in sorted((ROOT / room).rglob("*.c"))]
     with tempfile.TemporaryDirectory() as folder:
         for mode in re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE):
@@ -308,7 +308,7 @@ def numbers_in_counts(wide: bool) -> tuple[list[str], list[list[str]]]:
     return paths, [line.split() for line in output_of(source)]
 
 
-def every_accepted_parameter_set_fits_the_drives_number_formats() -> None:
+def test_every_accepted_parameter_set_fits_the_drives_number_formats() -> None:
     paths, narrow = numbers_in_counts(wide=False)
     _, wide = numbers_in_counts(wide=True)
     wrong, accepted = [], 0
@@ -321,22 +321,7 @@ def every_accepted_parameter_set_fits_the_drives_number_formats() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def d_currents_beyond_the_largest_current_are_refused() -> None:
+def test_d_currents_beyond_the_largest_current_are_refused() -> None:
     for name, value in (("IDREF_SPEED0", "-18.0"), ("IDREF_SPEED17", "-18.0"), ("FW_TRIM_CURRENT_A", "18.0")):
         code, _ = build(BASE | {name: value})
         assert code != 0, f"{name} = {value} is accepted: in counts it wraps around (Q13 ends at 17.6 A), and it is above MAXIMUM_CURRENT_A"
-
-
-run([the_values_in_use_are_accepted,
-     each_value_below_its_range_is_refused_by_name_value_and_range,
-     each_value_above_its_range_is_refused_by_name_value_and_range,
-     the_ends_of_every_range_are_inside_it,
-     one_wrong_value_alone_stops_the_build_with_one_message,
-     every_relation_has_a_case,
-     every_relation_is_broken_by_its_case_and_kept_just_inside,
-     a_broken_relation_stops_the_build_with_its_message,
-     the_check_for_the_targets_old_compiler_refuses_the_same,
-     every_mode_of_userparams_is_off_and_used_by_the_firmware,
-     a_mode_means_the_same_in_userparams_and_on_the_command_line,
-     every_accepted_parameter_set_fits_the_drives_number_formats,
-     d_currents_beyond_the_largest_current_are_refused])

@@ -1,0 +1,18 @@
+"""What pytest knows beyond Python tests: Unity executables (unity_suites.py) and suites side by side, as make test shows them (side_by_side.py)."""
+
+import subprocess
+
+import pytest
+
+pytest_plugins = ["unity_suites", "side_by_side"]
+
+
+@pytest.fixture
+def make(pytestconfig: pytest.Config):
+    """Runs a make target that is a test by itself; what it says is the failure's text."""
+    def run(target: str) -> None:
+        done = subprocess.run(["make", "-s", target], cwd=pytestconfig.rootpath.parent, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                              check=False)
+        if done.returncode != 0:
+            pytest.fail(done.stdout, pytrace=False)
+    return run
