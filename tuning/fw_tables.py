@@ -12,9 +12,9 @@ from typing import Any
 
 from tools.common import paths
 from tools.common.errors import UserError
+from tools.common.param_rows import ENTRIES
 from tools.common.toml_file import Document
 
-ENTRIES = 18
 STEP_ERPM = 1024
 """One table step in electrical rpm (AN1292's SPEED_INDEX_CONST 10)."""
 FOLDER = paths.ROOT / "tuning" / "tables"

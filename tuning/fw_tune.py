@@ -30,13 +30,13 @@ from . import fw_tables
 from .fw_bench import Bench, Fault
 from .fw_search import Found, Goal, Result, Search, largest, least, model_use, torque_per_ampere
 from .fw_tables import ENTRIES, STEP_ERPM, Tables
+from .limits import LARGEST_ERPM
 
 RESULTS = paths.ROOT / "build" / "tune-fw"
 FIRMWARE = paths.ROOT / "build" / "tune-fw-firmware"
 TORQUE_SHARE, ANGLE_DEG, MARGIN = 0.2, 3.0, 0.03
 ID_SHARE = 31.0 / 32.0
 """The firmware keeps d currents below this share of MAXIMUM_CURRENT_A."""
-FORMAT_ERPM = 32000.0
 SPEED_STEP_RPM = 10.0
 TORQUE_STEPS = 8
 COLUMNS = (("speed_rpm", "speed\nrpm", "{:.0f}"), ("before_a", "Id so far\nA", "{:.2f}"), ("idref_a", "Id\nA", "{:.2f}"),
@@ -364,7 +364,7 @@ def highest_speed(known: dict[str, float]) -> float:
         free_v = 0.9895 * 131068.0 * u0 - known["OVER_VOLTAGE_V"] / math.sqrt(3.0) \
             - 2.0 / math.sqrt(3.0) * known["OVER_CURRENT_THRESHOLD_A"] * known["MOTOR_RS_OHM"]
         by_emf = free_v / (2.0 * math.pi / 60.0 * pairs * 1.2 * known["MOTOR_LS_MH"] * 1e-3 * known["MAXIMUM_CURRENT_A"])
-        return max(known["MAXIMUM_SPEED_RPM"], math.floor(min(ends, by_emf, FORMAT_ERPM / pairs, 30000.0)))
+        return max(known["MAXIMUM_SPEED_RPM"], math.floor(min(ends, by_emf, LARGEST_ERPM / pairs, 30000.0)))
     except KeyError as missing:
         raise UserError(f"{missing.args[0]} is no number", build.HEADER, "give a complete userparams.h") from None
 

@@ -11,7 +11,7 @@ from tools.common.param_rows import Parameter, modes, parameters
 
 from .constants import Constant, filter_hz
 from .design import Design
-from .limits import STEP_ERPM
+from .fw_tables import STEP_ERPM
 
 INVKFI_FLAT = """/* 1/Kphi of each entry, in AN1292's counts. The back-EMF keeps its size above base speed here (it has the range), so a
  * constant Kphi is the right start; AN1292's rising table made up for a clipped one. More turns the control angle ahead. */"""

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 
 from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
-from tools.common.param_rows import parameters
+from tools.common.param_rows import ENTRIES, number, parameters
 
-ENTRIES = 18
-STEP_ERPM = 1024.0
-"""One entry of the field-weakening tables."""
-LARGEST_ERPM = 32000.0
-LARGEST_NOMINAL_ERPM = 27000.0
-TRIP_SHARE = 0.865
-"""Largest over-current threshold as a share of the converter's range (a relation of param_table.h)."""
+from .fw_tables import STEP_ERPM
+
+LARGEST_ERPM = number("PARAM_LARGEST_ERPM")
+LARGEST_NOMINAL_ERPM = number("PARAM_LARGEST_NOMINAL_ERPM")
+TRIP_SHARE = number("PARAM_TRIP_SHARE")
+"""Largest over-current threshold as a share of the converter's range."""
 TRIP_OVER_MAXIMUM = 1.4
 """Trip level over the largest current that is asked for, where the range allows it: overshoot, noise and the load step's swing."""
 LEAST_TRIP_OVER_MAXIMUM = 1.1

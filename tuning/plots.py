@@ -9,8 +9,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
 import numpy as np # noqa: E402
 
+from tools.common.param_rows import ENTRIES # noqa: E402
+
 from . import limits # noqa: E402
 from .design import Design # noqa: E402
+from .fw_tables import STEP_ERPM # noqa: E402
 from .loops import PHASE_MARGIN_DEG, Curve, LoopDesign # noqa: E402
 
 STYLE = {"axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.2, "legend.fontsize": 8, "axes.titlesize": 10, "font.size": 9,
@@ -117,8 +120,8 @@ def _current(design: Design) -> str:
     figure, axes = plt.subplots(figsize=(8, 3.8), layout="constrained")
     e = design.envelope
     top = design.value("MAXIMUM_SPEED_RPM")
-    entries = design.value("FW_START_SPEED_RPM") + np.arange(limits.ENTRIES) * limits.STEP_ERPM / design.motor.pole_pairs
-    table = np.array([design.value(f"IDREF_SPEED{i}") for i in range(limits.ENTRIES)])
+    entries = design.value("FW_START_SPEED_RPM") + np.arange(ENTRIES) * STEP_ERPM / design.motor.pole_pairs
+    table = np.array([design.value(f"IDREF_SPEED{i}") for i in range(ENTRIES)])
     speeds = np.linspace(0.0, top, 300)
     i_d = np.interp(speeds, entries, table, left=table[0])
     i_q = np.array([e.iq(rpm, 0.0) for rpm in speeds])

@@ -48,7 +48,9 @@
 #define BUS_Q15(voltage_v) ((int16_t)PARAM_ROUND(PARAM_F(voltage_v) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F))
 
 /* ---- Estimator ---- */
-#define PARAM_EXP(x) ((uint16_t)(((x) < 65535.0F) ? 0 : ((x) < 131071.0F) ? 1 : ((x) < 262143.0F) ? 2 : 3))
+#define PARAM_EXP(x) ((uint16_t)(((x) < 65535.0F) ? 0 : ((x) < 131071.0F) ? 1 \
+                                                    : ((x) < 262143.0F)   ? 2 \
+                                                                          : 3))
 #define PARAM_RS_FULL (PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 32768.0F)
 #define PARAM_LS_FULL (PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 4096.0F)
 #define PARAM_SCALED(x, exp) ((uint16_t)((x) / (float)(1 << (exp)) + 0.5F))
@@ -67,7 +69,7 @@
  *  LS_OVER2LS0 may raise Ls by 1.2; below nominal speed turning the old difference forward may lengthen an axis by 1.5. */
 #define PARAM_EMF_MAX_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3 + 2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM) \
                          + 2.0F * PARAM_PI / 60.0F * PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM)) \
-                           * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
+                               * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
 /* ---- Controllers: gains in AN1292's units (gain/16 and per-period integral, in full scales) from bandwidths.
  *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/3.

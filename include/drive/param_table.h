@@ -2,6 +2,9 @@
 #ifndef DRIVE_PARAM_TABLE_H
 #define DRIVE_PARAM_TABLE_H
 
+/* Rows on lines of their own: clang-format would stagger them. */
+/* clang-format off */
+
 /** X(name, unit, minimum, maximum, default, meaning): one row a parameter. The build checks the range; userparams.h, the tuner,
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
@@ -72,29 +75,46 @@
     X(stem##10, __VA_ARGS__) X(stem##11, __VA_ARGS__) X(stem##12, __VA_ARGS__) X(stem##13, __VA_ARGS__) X(stem##14, __VA_ARGS__) \
     X(stem##15, __VA_ARGS__) X(stem##16, __VA_ARGS__) X(stem##17, __VA_ARGS__)
 
+/* Ends of number formats that the tuner keeps to as well: electrical rpm, and the trip level's share of the current range. */
+#define PARAM_LARGEST_ERPM 32000
+#define PARAM_LARGEST_NOMINAL_ERPM 27000
+#define PARAM_TRIP_SHARE 0.865
+
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */
 #define PARAM_RELATION_TABLE(X) \
     X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM") \
     X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM") \
     X(FW_START_SPEED_RPM < MAXIMUM_SPEED_RPM, "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM") \
-    X(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= 32000.0F, "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000: speeds are 16-bit electrical rpm") \
-    X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= 27000.0F, "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000: lower NOMINAL_SPEED_RPM, the one-sample derivative then starts earlier") \
+    X(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_ERPM), \
+      "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000: speeds are 16-bit electrical rpm") \
+    X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_NOMINAL_ERPM), \
+      "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000: lower NOMINAL_SPEED_RPM, the one-sample derivative then starts earlier") \
     X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM") \
-    X(PARAM_RS_FULL < 524287.0F, "MOTOR_RS_OHM does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
-    X(PARAM_LS_FULL * 1.2F < 524287.0F, "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
+    X(PARAM_RS_FULL < 524287.0F, \
+      "MOTOR_RS_OHM does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
+    X(PARAM_LS_FULL * 1.2F < 524287.0F, \
+      "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
     X(PARAM_RS_FULL >= 100.0F, "MOTOR_RS_OHM rounds by more than 0.5 %: the current range is too small for this motor") \
-    X(PARAM_INVKFI >= 2048.0F && PARAM_INVKFI < 32767.0F, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (2048 .. 32767): check its unit, V peak line to line per 1000 rpm") \
+    X(PARAM_INVKFI >= 2048.0F && PARAM_INVKFI < 32767.0F, \
+      "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (2048 .. 32767): check its unit, V peak line to line per 1000 rpm") \
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A") \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A") \
-    X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= 0.865F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "OVER_CURRENT_THRESHOLD_A must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
-    X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.063F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), "MAXIMUM_CURRENT_A must be at least 6.3 % of the range NORM_CURRENT_CONST * 32768") \
+    X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= PARAM_F(PARAM_TRIP_SHARE) * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
+      "OVER_CURRENT_THRESHOLD_A must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
+    X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.063F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
+      "MAXIMUM_CURRENT_A must be at least 6.3 % of the range NORM_CURRENT_CONST * 32768") \
     X(PARAM_F(FW_TRIM_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), "FW_TRIM_CURRENT_A must not exceed MAXIMUM_CURRENT_A") \
-    X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, "Q_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(SPEEDCNTR_CTERM) >= 0.9F && PARAM_F(SPEEDCNTR_CTERM) < 1.0F, "SPEEDCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, "the controllers' PTERMs must be positive") \
+    X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \
+      "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+    X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \
+      "Q_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+    X(PARAM_F(SPEEDCNTR_CTERM) >= 0.9F && PARAM_F(SPEEDCNTR_CTERM) < 1.0F, \
+      "SPEEDCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+    X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, \
+      "the controllers' PTERMs must be positive") \
     X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F && PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F, "the current controllers' ITERMs must not be negative") \
-    X(PARAM_EMF_MAX_V < 0.99F * 131068.0F * NORM_VOLTAGE_CONST, "the back-EMF's format overflows: lower OVER_VOLTAGE_V, OVER_CURRENT_THRESHOLD_A or MAXIMUM_SPEED_RPM") \
+    X(PARAM_EMF_MAX_V < 0.99F * 131068.0F * NORM_VOLTAGE_CONST, \
+      "the back-EMF's format overflows: lower OVER_VOLTAGE_V, OVER_CURRENT_THRESHOLD_A or MAXIMUM_SPEED_RPM") \
     PARAM_RELATION_IDREF(X, 0) PARAM_RELATION_IDREF(X, 1) PARAM_RELATION_IDREF(X, 2) PARAM_RELATION_IDREF(X, 3) \
     PARAM_RELATION_IDREF(X, 4) PARAM_RELATION_IDREF(X, 5) PARAM_RELATION_IDREF(X, 6) PARAM_RELATION_IDREF(X, 7) \
     PARAM_RELATION_IDREF(X, 8) PARAM_RELATION_IDREF(X, 9) PARAM_RELATION_IDREF(X, 10) PARAM_RELATION_IDREF(X, 11) \
@@ -103,17 +123,25 @@
     X(PARAM_VOLTAGE_PER_BUS < 65535.0F, "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V: their ratio must be at most 4") \
     X(OVER_VOLTAGE_V > NOMINAL_BUS_V, "OVER_VOLTAGE_V must be above NOMINAL_BUS_V") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V, or it never trips") \
-    X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
+    X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), \
+      "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
     X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, "UNDER_VOLTAGE_V must be below NOMINAL_BUS_V") \
-    X(PARAM_F(UNDER_VOLTAGE_V) >= 0.3F * PARAM_F(NOMINAL_BUS_V), "UNDER_VOLTAGE_V must be at least 0.3 * NOMINAL_BUS_V: the voltage circle's reciprocal ends there") \
+    X(PARAM_F(UNDER_VOLTAGE_V) >= 0.3F * PARAM_F(NOMINAL_BUS_V), \
+      "UNDER_VOLTAGE_V must be at least 0.3 * NOMINAL_BUS_V: the voltage circle's reciprocal ends there") \
     X(REGEN_LIMIT_V > NOMINAL_BUS_V, "REGEN_LIMIT_V must be above NOMINAL_BUS_V") \
     X(PARAM_F(REGEN_LIMIT_V) + 2.0F <= PARAM_F(OVER_VOLTAGE_V), "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V") \
-    X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, "UNDER_VOLTAGE_V is too low for the modulator's division") \
-    X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000501F >= PARAM_F(DEADTIME_SEC), "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us: the low sides then conduct for 1 us before the sample") \
-    X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, "the current gain exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
-    X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
+    X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, \
+      "UNDER_VOLTAGE_V is too low for the modulator's division") \
+    X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000501F >= PARAM_F(DEADTIME_SEC), \
+      "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us: the low sides then conduct for 1 us before the sample") \
+    X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, \
+      "the current gain exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
+    X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, \
+      "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \
-    X(PARAM_SPEED_KI(SPEEDCNTR_ITERM) >= 1, "the speed integral rounds to zero: raise SPEED_BANDWIDTH_HZ; or the inertia is too low (MOTOR_INERTIA_KGM2; of a motor file, [mechanical] or [load] inertia)")
+    X(PARAM_SPEED_KI(SPEEDCNTR_ITERM) >= 1, \
+      "the speed integral rounds to zero: raise SPEED_BANDWIDTH_HZ; or the inertia is too low " \
+      "(MOTOR_INERTIA_KGM2; of a motor file, [mechanical] or [load] inertia)")
 
 #define PARAM_RELATION_IDREF(X, i) \
     X(PARAM_F(IDREF_SPEED##i) >= -PARAM_F(MAXIMUM_CURRENT_A), "IDREF_SPEED" #i " must not exceed MAXIMUM_CURRENT_A")

@@ -322,9 +322,9 @@ void test_braking_current_falls_from_the_maximum_to_nothing_in_2_V(void)
 void test_trim_moves_by_2_7_A_per_second_up_to_its_limit(void)
 {
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    TEST_ASSERT_EQUAL_INT16(2, fw.trim_step_q13); /* 1.07 mA in 400 us */
-    TEST_ASSERT_EQUAL_INT16(1489, fw.trim_max_q13); /* 0.8 A */
-    TEST_ASSERT_INT16_WITHIN(1, 296, fw.margin_q14); /* a hundredth of the bus */
+    TEST_ASSERT_EQUAL_INT16(2, fw.trim_step_q13);      /* 1.07 mA in 400 us */
+    TEST_ASSERT_EQUAL_INT16(1489, fw.trim_max_q13);    /* 0.8 A */
+    TEST_ASSERT_INT16_WITHIN(1, 296, fw.margin_q14);   /* a hundredth of the bus */
     TEST_ASSERT_EQUAL_INT16(7800, fw.trim_speed_erpm); /* 60 % of the start speed */
 }
 
@@ -341,10 +341,10 @@ void test_times_are_periods_and_slow_steps(void)
     TEST_ASSERT_EQUAL_UINT16(200, p.bootstrap_periods); /* 10 ms */
     TEST_ASSERT_EQUAL_UINT16(4000, p.lock_periods);
     TEST_ASSERT_EQUAL_UINT32(UINT32_C(0x40000000) / 2000u, p.lock_sweep_q32); /* a quarter turn in half the time */
-    TEST_ASSERT_EQUAL_UINT16(50, p.ready_slots); /* 20 ms */
-    TEST_ASSERT_EQUAL_UINT16(500, p.ready_timeout_slots); /* 200 ms */
-    TEST_ASSERT_EQUAL_UINT16(750, p.stall_slots); /* 0.3 s */
-    TEST_ASSERT_EQUAL_UINT16(125, p.lost_lock_slots); /* 50 ms */
+    TEST_ASSERT_EQUAL_UINT16(50, p.ready_slots);                              /* 20 ms */
+    TEST_ASSERT_EQUAL_UINT16(500, p.ready_timeout_slots);                     /* 200 ms */
+    TEST_ASSERT_EQUAL_UINT16(750, p.stall_slots);                             /* 0.3 s */
+    TEST_ASSERT_EQUAL_UINT16(125, p.lost_lock_slots);                         /* 50 ms */
 }
 
 /* ---- tables ---- */

@@ -29,7 +29,6 @@
 """
 
 import functools
-import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

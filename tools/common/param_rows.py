@@ -33,6 +33,14 @@ class Parameter:
     """of the table whose entry this is"""
 
 
+def number(name: str) -> float:
+    """A limit of the table's relations that is a macro of its own."""
+    found = re.search(rf"^#define {name} ([\d.]+)$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
+    if found is None:
+        raise UserError(f"{name} cannot be read", str(paths.shown(TABLE)), f"write #define {name} and its number")
+    return float(found[1])
+
+
 @functools.cache
 def parameters() -> dict[str, Parameter]:
     """Every parameter by name, in the order of the table."""
