@@ -183,7 +183,7 @@ board_c := $(call c_tests,chip)
 behaviour_c := $(call c_tests,behaviour)
 check_py := $(call py_tests,unit,check)
 unittest_py := $(call py_tests,tools,test) $(call py_tests,behaviour,test) $(call py_tests,fuzz,test)
-modes := OPEN_LOOP_FUNCTIONING TUNING TORQUE_MODE BIDIRECTIONAL_SPEED SNAPSHOT IDENTIFY PARAMS_IN_RAM
+modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 slow_suites := tools/test_spreadsheet tools/test_tune_cli tools/test_tune_design tools/test_image_build
 quick_suites := $(check_py) $(unit_c) $(board_c) $(filter-out $(slow_suites),$(filter tools/%,$(unittest_py)))

@@ -1,5 +1,6 @@
 """What the firmware makes of parameters and what the build refuses: the headers, compiled by this machine's compiler, say it."""
 
+import contextlib
 import functools
 import hashlib
 import math
@@ -97,14 +98,14 @@ def _output(source: str, params: Mapping[str, str]) -> str:
     """What a program prints that is compiled with these parameters; kept from the last time if nothing has changed since."""
     defines = "".join(f"#define {name} {text}\n" for name, text in params.items())
     kept = KEPT / hashlib.sha256("\0".join([source, defines, _headers()]).encode()).hexdigest()[:32]
-    try:
+    with contextlib.suppress(OSError):
         return kept.read_text(encoding="utf-8")
-    except OSError:
-        text = _compiled(source, f"#ifndef USERPARAMS_H\n#define USERPARAMS_H\n{defines}#endif\n")
-    KEPT.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", dir=KEPT, delete=False, encoding="utf-8") as new:
-        new.write(text)
-    os.replace(new.name, kept)
+    text = _compiled(source, f"#ifndef USERPARAMS_H\n#define USERPARAMS_H\n{defines}#endif\n")
+    with contextlib.suppress(OSError): # what cannot be kept is compiled again
+        KEPT.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("w", dir=KEPT, delete=False, encoding="utf-8") as new:
+            new.write(text)
+        os.replace(new.name, kept)
     return text
 
 

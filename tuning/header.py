@@ -7,19 +7,12 @@ from collections.abc import Iterator
 
 from tools.common import paths
 from tools.common.motor_file import Motor
-from tools.common.param_rows import Parameter, parameters
+from tools.common.param_rows import Parameter, modes, parameters
 
 from .constants import Constant, filter_hz
 from .design import Design
 from .limits import STEP_ERPM
 
-MODES = (("OPEN_LOOP_FUNCTIONING", "stay on the forced angle at END_SPEED_RPM; the estimator runs along and can be watched"),
-         ("TUNING", "the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself"),
-         ("TORQUE_MODE", "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed"),
-         ("BIDIRECTIONAL_SPEED", "the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function"),
-         ("SNAPSHOT", "record SnapBuf1..4"),
-         ("IDENTIFY", "measure R, L and Kphi of the motor instead of running it (docs/tuning.md)"),
-         ("PARAMS_IN_RAM", "a debugger can change every parameter while the motor turns; TUNING does it too"))
 INVKFI_FLAT = """/* 1/Kphi of each entry, in AN1292's counts. The back-EMF keeps its size above base speed here (it has the range), so a
  * constant Kphi is the right start; AN1292's rising table made up for a clipped one. More turns the control angle ahead. */"""
 INVKFI_TUNED = "/* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */"
@@ -67,7 +60,7 @@ def _head(design: Design) -> list[str]:
 
 def _modes() -> list[str]:
     lines = [_rule("Modes: remove the comment marks, or build with -D")]
-    return lines + [f"/* #define {name} */".ljust(36) + f"/* {meaning} */" for name, meaning in MODES]
+    return lines + [f"/* #define {name} */".ljust(36) + f"/* {meaning} */" for name, meaning in modes().items()]
 
 
 def _rule(title: str) -> str:

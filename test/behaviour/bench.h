@@ -48,11 +48,6 @@ static inline void press(const char *button)
     bench_fast = (strcmp(button, "input.s3") == 0) ? !bench_fast : 0;
 }
 
-static inline void press_s2(void)
-{
-    press("input.s2");
-}
-
 static inline void turn_to_rpm(double rpm)
 {
     double low = bench_fast ? NOMINAL_SPEED_RPM : MINIMUM_SPEED_RPM;
@@ -74,7 +69,7 @@ static inline void power_on(void)
 static inline double start(void)
 {
     double begin = get("time_s");
-    press_s2();
+    press("input.s2");
     while (board_drive.state != DRIVE_CLOSED && board_drive.fault == FAULT_NONE && get("time_s") < begin + 2.0) {
         wait_s(0.005);
     }

@@ -16,7 +16,7 @@ static void cause_away_fault_stays_until_s2(drive_fault_t fault)
     wait_s(0.3);
     assert_fault(fault);
     set("state.speed_rpm", 0.0);
-    press_s2();
+    press("input.s2");
     TEST_ASSERT_EQUAL_INT(FAULT_NONE, board_drive.fault);
     wait_s(0.3);
     TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);

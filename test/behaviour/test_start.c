@@ -59,7 +59,7 @@ void test_hand_over_is_bumpless_in_current_and_speed(void)
     measured_t before, after;
     set("state.theta_e_deg", 30.0);
     power_on();
-    press_s2();
+    press("input.s2");
     wait_s(1.45);
     TEST_ASSERT_EQUAL_INT(DRIVE_RAMP, board_drive.state);
     before = measure(0.05);
@@ -127,9 +127,9 @@ void test_implausible_current_offset_forbids_the_start(void)
     set("shunt.offset_b_v", 0.4);
     power_on();
     assert_fault(FAULT_OFFSET);
-    press_s2(); /* clears, calibrates anew, fails anew */
+    press("input.s2"); /* clears, calibrates anew, fails anew */
     wait_s(0.1);
-    press_s2();
+    press("input.s2");
     wait_s(0.5);
     assert_fault(FAULT_OFFSET);
 }
@@ -147,10 +147,10 @@ void test_amplifier_offset_is_calibrated_away(void)
 void test_s2_during_the_ramp_stops_at_once(void)
 {
     power_on();
-    press_s2();
+    press("input.s2");
     wait_s(0.8);
     TEST_ASSERT_EQUAL_INT(DRIVE_RAMP, board_drive.state);
-    press_s2();
+    press("input.s2");
     TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
     assert_outputs_off();
 }
@@ -158,7 +158,7 @@ void test_s2_during_the_ramp_stops_at_once(void)
 void test_starts_again_after_a_stop(void)
 {
     run_at(1500.0);
-    press_s2();
+    press("input.s2");
     wait_s(1.0);
     TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
     turn_to_rpm(1000.0);

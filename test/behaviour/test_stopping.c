@@ -17,7 +17,7 @@ static void stops_in_order_from(double rpm, double limit_s)
     run_at(rpm);
     set("stat.reset", 1.0);
     begin = get("time_s");
-    press_s2();
+    press("input.s2");
     while (board_drive.state != DRIVE_STOPPED && get("time_s") < begin + limit_s) {
         wait_s(0.0005);
     }
@@ -61,11 +61,11 @@ void test_braking_a_heavy_rotor_keeps_the_bus_below_30_V(void)
 void test_stop_can_be_turned_into_a_new_start(void)
 {
     run_at(2800.0);
-    press_s2();
+    press("input.s2");
     wait_s(0.1);
     TEST_ASSERT_EQUAL_INT(DRIVE_STOPPING, board_drive.state);
     turn_to_rpm(1000.0);
-    press_s2(); /* wants to run again: completes the stop, then starts */
+    press("input.s2"); /* wants to run again: completes the stop, then starts */
     wait_s(3.5);
     assert_running();
 }

@@ -156,7 +156,8 @@ def sincos(v, rng):
 
 
 @block("sqrt(1 - x^2): table points, the middle and the end of every interval",
-       "x, value Q15; checksum s = 31 s + word over all x from 0 to 32767; the ratio is for x up to 31/32", "x:s16 value:s16", least_db=72.0)
+       "x, value Q15; checksum s = 31 s + word over all x from 0 to 32767; the ratio is for x up to 31/32",
+       "x:s16 value:s16", least_db=72.0)
 def circle(v, _):
     everything = [ref.circle(x) for x in range(32768)]
     used = range(32768 * 31 // 32 + 1)  # both users end at 31/32; beyond, the chord of the steep end is 4 % below
@@ -194,7 +195,8 @@ def park(v, rng):
     rotate(v, rotations(rng, 23170), ref.park, ref.park_real)
 
 
-@block("inverse Park: the largest vectors in 24 directions, a random sample", "d, q counts; angle 65536 = one turn; alpha, beta half the counts",
+@block("inverse Park: the largest vectors in 24 directions, a random sample",
+       "d, q counts; angle 65536 = one turn; alpha, beta half the counts",
        "d:s16 q:s16 angle:u16 alpha:s16 beta:s16", least_db=71.0)
 def inverse_park(v, rng):
     rotate(v, rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)], ref.inverse_park, ref.inverse_park_real)
@@ -273,7 +275,8 @@ def voltage_circle(v, _):
         everything = [ref.vq_limit(radius, vd) for vd in range(-most, most + 1)]
         v.constants[f"checksum_{radius}"] = ref.polynomial_checksum(everything)
         v.compare((ref.vq_limit_real(radius, vd) for vd in range(-most, most + 1)), everything)
-        v.rows += [[radius, most, vd, everything[vd + most]] for vd in sorted({-most, *range(-63 * most // 64, most, max(1, most // 12)), 0, most})]
+        chosen = {-most, *range(-63 * most // 64, most, max(1, most // 12)), 0, most}
+        v.rows += [[radius, most, vd, everything[vd + most]] for vd in sorted(chosen)]
 
 
 @block("both current controllers on a sequence that runs into the d limit and the circle and back",
@@ -308,8 +311,7 @@ def current_limit(v, _):
         for i_d in wanted:
             ref_d = ref.clamp(i_d, -most, most)
             limit = ref.iq_limit(maximum, ref_d)
-            v.rows.append([maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d, limit])
-            v.compare([math.sqrt(maximum ** 2 - ref_d ** 2)], [limit])
+            v.add((maximum, ref.nearest(2 ** 25 / maximum), i_d, ref_d), [limit], [math.sqrt(maximum ** 2 - ref_d ** 2)])
 
 
 # ---- estimator ------------------------------------------------------------------------------------------------------
@@ -466,7 +468,8 @@ def forced_angle(v, _):
 def speed_ramp(v, rng):
     for step in (1, 8, 100, 1000):
         for base in (-5000, -1, 0, 7, 14000):
-            for d in (-3 * step, -2 * step - 1, -2 * step, -2 * step + 1, -step, -1, 0, 1, step, 2 * step - 1, 2 * step, 2 * step + 1, 9 * step):
+            for d in (-3 * step, -2 * step - 1, -2 * step, -2 * step + 1, -step, -1, 0,
+                      1, step, 2 * step - 1, 2 * step, 2 * step + 1, 9 * step):
                 v.rows.append([base, base + d, step])
     v.rows += [[-32768, 32767, 8], [32767, -32768, 8], [32767, 32767, 1], [-32768, -32768, 1], [32760, 32767, 8], [-32760, -32768, 8]]
     v.rows += [[*dither(rng, -32000, 32000, 2), rng.randrange(1, 700)] for _ in range(40)]
@@ -479,7 +482,8 @@ def speed_ramp(v, rng):
        "forced:u16 estimated:u16 v_d:s16 v_q:s16 i_q:s16 offset:s16 new_v_d:s16 new_v_q:s16 new_i_d:s16 new_i_q:s16",
        least_db=67.0)
 def hand_over(v, rng):
-    for offset in [0, 1, -1, 100, -100, 8192, -8192, 15000, -15000, 16384, -16384, 30000, -30000, -32768, 32767] + dither(rng, -32768, 32767, 50):
+    edges = [0, 1, -1, 100, -100, 8192, -8192, 15000, -15000, 16384, -16384, 30000, -30000, -32768, 32767]
+    for offset in edges + dither(rng, -32768, 32767, 50):
         forced = rng.randrange(65536)
         u = cmath.rect(rng.uniform(500, 15000), rng.uniform(0, 6.3))
         args = (forced, (forced - offset) % 65536, (round(u.real), round(u.imag)), rng.choice((-2625, 2625)))

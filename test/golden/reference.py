@@ -329,13 +329,8 @@ class Pi:
         self.sum = s32((out << self.shift) - err * self.kp)
 
 
-@dataclass
-class PiReal:
-    kp: float
-    ki: float
-    kc: float
-    shift: int
-    sum: float = 0.0
+class PiReal(Pi):
+    """The same in float64."""
 
     def tick(self, err, limit):
         u = self.sum + self.kp * err

@@ -52,7 +52,8 @@ def read(path):
 def header(name, columns, constants, rows, access=None):
     """@param access statements that return row n, in place of the array of all rows"""
     upper = f"GOLDEN_{name.upper()}"
-    out = [f"/* Generated from test/golden/vectors/{name}.txt. */", f"#ifndef {upper}_H", f"#define {upper}_H", "", "#include <stdint.h>", ""]
+    out = [f"/* Generated from test/golden/vectors/{name}.txt. */", f"#ifndef {upper}_H", f"#define {upper}_H", "",
+           "#include <stdint.h>", ""]
     out += [f"#define {upper}_{key.upper()} {constant(value)}" for key, value in constants.items()]
     if rows:
         out += ["", f"#define {upper}_ROWS {len(rows)}u", "typedef struct {"]
@@ -60,7 +61,8 @@ def header(name, columns, constants, rows, access=None):
         out += [f"}} golden_{name}_t;", f"enum {{ golden_{name}_rows = {len(rows)} }};"]
         out += [] if access else [f"static const golden_{name}_t golden_{name}[{upper}_ROWS] = {{",
                                   *("    { " + ", ".join(literal(x, c[1]) for x, c in zip(row, columns)) + " }," for row in rows), "};"]
-        out += ["", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{", *(access or [f"    return golden_{name}[n];"]), "}"]
+        out += ["", f"static inline golden_{name}_t golden_{name}_row(uint32_t n)", "{"]
+        out += [*(access or [f"    return golden_{name}[n];"]), "}"]
     return "\n".join(out + ["", "#endif", ""])
 
 
@@ -73,11 +75,9 @@ def write_new(path, text):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=pathlib.Path, required=True, help="directory of the headers")
-    parser.add_argument("names", nargs="*", help="vector names, default: all")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    names = options.names or sorted(p.stem for p in (HERE / "vectors").glob("*.txt"))
-    for name in names:
+    for name in sorted(p.stem for p in (HERE / "vectors").glob("*.txt")):
         try:
             columns, constants, rows = read(HERE / "vectors" / f"{name}.txt")
             text = header(name, columns, constants, rows)

@@ -29,13 +29,6 @@ class Token:
     end: int
 
 
-@dataclass(frozen=True)
-class Macro:
-    """The body of one #define."""
-    name: str
-    tokens: list
-
-
 def _tokens(text, start, end):
     found = _TOKEN.finditer(text, start, end)
     return [Token(m.lastgroup, m.group(), m.start(), m.end()) for m in found if m.lastgroup != "space"]
@@ -52,7 +45,7 @@ def _nested(conditions, words):
 
 
 def split(text):
-    """@return (tokens of the code, macros), without comments and without branches that are never compiled on a PC"""
+    """@return (tokens of the code, [(name, tokens)] of macros), without comments and without branches that are never compiled on a PC"""
     text = _COMMENT_OR_STRING.sub(lambda m: re.sub(r"[^\n]", " ", m.group()) if m.group(1) else m.group(), text)
     code, macros, conditions, begin = [], [], [], 0
     for directive in [*_DIRECTIVE.finditer(text), None]:
@@ -62,7 +55,7 @@ def split(text):
         if directive:
             define = _DEFINE.match(directive.group())
             if define and live:
-                macros.append(Macro(define.group(1), _tokens(text, directive.start() + define.end(), directive.end())))
+                macros.append((define.group(1), _tokens(text, directive.start() + define.end(), directive.end())))
             conditions = _nested(conditions, " ".join(directive.group().replace("\\\n", " ").replace("#", " ", 1).split()))
             begin = directive.end()
     return code, macros

@@ -110,9 +110,6 @@ class _Region:
         shown = " ".join(shown.replace("\\\n", " ").split()).removesuffix("\\").strip()
         self.found.append(Mutant(self.file, self.text.count("\n", 0, start) + 1, self.name, operator, start, end, new, shown))
 
-    def before(self, i):
-        return self.tokens[i - 1] if i > 0 else None
-
     def is_operand_end(self, i):
         """Does an operand end at token i, so that a following + - & * has two operands?"""
         if i < 0:
@@ -173,7 +170,7 @@ class _Region:
     def signs(self):
         """A minus before each product that is used as a value."""
         for i, token in enumerate(self.tokens):
-            before = self.before(i)
+            before = self.tokens[i - 1] if i > 0 else None
             if token.kind == "id" and PRODUCTS.match(token.text) and before is not None and self.tokens[i + 1].text == "(" \
                     and before.text not in ("+", "-", "+=", "-="):
                 if before.text != ")" or self.is_cast(i - 1):
@@ -198,7 +195,7 @@ class _Region:
     def components(self):
         """The other axis or phase, where a value is read."""
         for i, token in enumerate(self.tokens):
-            before = self.before(i)
+            before = self.tokens[i - 1] if i > 0 else None
             if token.kind != "id" or before is None or before.text not in (".", "->") or token.text not in COMPONENT:
                 continue
             following = self.tokens[i + 1].text if i + 1 < len(self.tokens) else ";"
@@ -241,10 +238,10 @@ class _Region:
 
     def negate(self, first, after):
         inside = self.tokens[first:after]
-        if len([t for t in inside if t.text in ("<", "<=", ">", ">=", "==", "!=")]) == 1 and not any(t.text in ("&&", "||") for t in inside):
+        joined = any(t.text in ("&&", "||") for t in inside)
+        comparisons = [t for t in inside if t.text in ("<", "<=", ">", ">=", "==", "!=")]
+        if not joined and (len(comparisons) == 1 or inside and inside[0].text == "!"):
             return # the operator's own mutants contain the negation
-        if inside and inside[0].text == "!" and not any(t.text in ("&&", "||") for t in inside):
-            return
         start, end = inside[0].start, inside[-1].end
         self.add("condition", start, end, "!(" + " ".join(self.text[start:end].split()) + ")")
 
@@ -322,9 +319,9 @@ def _regions(file, text, struct_names):
             begin = i + 1
         i += 1
     if file in MACRO_FILES:
-        for macro in macros:
-            if macro.tokens:
-                yield _Region(file, text, macro.name, "macro", macro.tokens)
+        for name, body in macros:
+            if body:
+                yield _Region(file, text, name, "macro", body)
 
 
 def struct_types(texts):

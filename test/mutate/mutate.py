@@ -42,7 +42,7 @@ def parse(argv):
     parser.add_argument("--full", action="store_true", help="every mutant, not a sample")
     parser.add_argument("--sample", type=int, default=600, help="how many mutants to try (default 600)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
-    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains one of these texts")
+    parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains a text")
     parser.add_argument("--list", action="store_true", help="list the chosen mutants, run nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--out", default="build/mutate")
@@ -183,7 +183,8 @@ def report(results, required, arguments, seconds):
               f"{score:.1f} % of {counted} mutants killed by the {tests}, {required:.0f} % required: {'PASS' if passed else 'FAIL'}"]
     alone = sum(result in ("killed", "timeout") and by.startswith("behaviour/") for _, result, by in results)
     if arguments.closed_loop:
-        lines.insert(-1, f"{percent(counted - total['survived'] - alone, counted):.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
+        unit = percent(counted - total["survived"] - alone, counted)
+        lines.insert(-1, f"{unit:.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
     data = {"score": round(score, 2), "required": required, "passed": passed, "tests": tests, "full": arguments.full,
             "seed": arguments.seed, "seconds": round(seconds, 1), "files": {f: dict(c) for f, c in by_file.items()},
             "mutants": [{"file": m.file, "line": m.line, "function": m.function, "operator": m.operator, "diff": m.diff,
@@ -202,7 +203,8 @@ def main(argv=None):
     known = {m.key for found in by_file.values() for m in found}
     stale = [key for key in equivalent if key not in known and (not arguments.files or any(key.startswith(f"{f} ") for f in by_file))]
     if stale:
-        fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root), "the code has changed; look at the entry again or remove it")
+        fail(f"no such mutant: {stale[0]}", os.path.relpath(equivalent_file, root),
+             "the code has changed; look at the entry again or remove it")
     chosen = by_file if arguments.full or arguments.files else sample(by_file, arguments.sample, arguments.seed)
     chosen = [m for found in chosen.values() for m in found]
     if arguments.list:

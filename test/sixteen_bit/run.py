@@ -50,8 +50,7 @@ def told(result: tuple[str, str] | None) -> str:
 class Outcome:
     """What one test file gave in the simulator."""
     results: dict[str, tuple[str, str]] = field(default_factory=dict)
-    remarks: list[str] = field(default_factory=list)
-    images: int = 0
+    remarks: list[str] = field(default_factory=list) # one an image
 
 
 class Builder:
@@ -98,8 +97,8 @@ class Builder:
         runner = self.out / f"{name}{part}_runner.c"
         declared = "\n".join(f"void {test}(void);" for test, _ in tests)
         calls = "\n".join(f'    UnityDefaultTestRun({test}, "{test}", {line});' for test, line in tests)
-        runner.write_text(f'#include "unity.h"\nint test_main(void);\n{declared}\nint test_main(void)\n{{\n    UnityBegin("test/{name}.c");\n'
-                          f"{calls}\n    return UNITY_END();\n}}\n", encoding="utf-8")
+        runner.write_text(f'#include "unity.h"\nint test_main(void);\n{declared}\nint test_main(void)\n{{\n'
+                          f'    UnityBegin("test/{name}.c");\n{calls}\n    return UNITY_END();\n}}\n', encoding="utf-8")
         objects = [test, self.compile(runner, runner.with_suffix(".o"), ["-w"]), *self.objects, self.library]
         elf = self.out / f"{name}{part}.elf"
         command = []
@@ -147,7 +146,6 @@ class Builder:
                 raise TestError(f"stopped after {last[0][0] if last else 'the start'}: {remark.strip() or 'no total'}")
             outcome.results |= results(output)
             outcome.remarks.append(remark.strip())
-            outcome.images += 1
         return outcome
 
 
@@ -171,7 +169,7 @@ def judge(name: str, builder: Builder, host_folder: Path) -> tuple[list[str], li
         report.append(f"{place}:{test}:FAIL: {text}")
         lines.append(f"{name}: {test}: FAIL: {text}")
     failed = len(report) - passed
-    images = f"{outcome.images} images, " if outcome.images > 1 else ""
+    images = f"{len(outcome.remarks)} images, " if len(outcome.remarks) > 1 else ""
     lines.append(f"{name}: {passed} passed, {failed} failed ({images}{'; '.join(outcome.remarks)}, {time.monotonic() - begin:.1f} s)")
     return lines, report, passed, failed
 
@@ -208,8 +206,7 @@ def main() -> int:
             print("\n".join(lines), flush=True)
             report += entries
             passed, failed = passed + good, failed + bad
-    end = 1 if failed or not passed else 0
-    total = f"{passed} passed, {failed} failed"
+    end, total = int(failed > 0 or passed == 0), f"{passed} passed, {failed} failed"
     Path(options.out, "report.txt").write_text("\n".join([*report, total, f"exit {end}"]) + "\n", encoding="utf-8")
     print(total)
     return end

@@ -66,7 +66,7 @@ def main() -> int:
                 "editorconfig": [problem for path in texts for problem in problems(path, wanted(rules, path))]}
     for name, lines in messages.items():
         print(*(f"  {line}" for line in lines[:20]), sep="\n", end="\n" if lines else "")
-        print(f"{name}: " + (f"FAIL: {len(lines)} places; make format mends the C files" if lines else "PASS"))
+        print(f"{name}: " + (f"FAIL: {len(lines)} places; make format writes the C files" if lines else "PASS"))
     return int(any(messages.values()))
 
 

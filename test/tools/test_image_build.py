@@ -45,8 +45,8 @@ def compiler_free_path(folder: Path, *more: str) -> str:
 
 # ---- without the compiler ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("words, expected", [
-    ([], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16 .*XC16="), (["XC16=/nowhere/v2.10"],
-                                                                               "XC16=/nowhere/v2.10 has no bin/xc16-gcc")])
+    ([], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16 .*XC16="),
+    (["XC16=/nowhere/v2.10"], "XC16=/nowhere/v2.10 has no bin/xc16-gcc")])
 def test_a_missing_compiler_is_one_line_that_says_what_to_install(tmp_path, words, expected):
     done = make("firmware", "VARIANT=none", *words, path=compiler_free_path(tmp_path))
     assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr

@@ -63,8 +63,8 @@ def host_values(header: Path, folder: Path) -> list[tuple[str, int, bool, int]]:
     kind = type_of(variable)
     layout = fields(kind, "board_params", 0)
     data = symbol_bytes(host, "board_params", kind.attributes["DW_AT_byte_size"].value, 1)
-    return [(path, size, signed, int.from_bytes(data[offset:offset + size], "little", signed=signed)) for path, offset, size,
-            signed in layout]
+    return [(path, size, signed, int.from_bytes(data[offset:offset + size], "little", signed=signed))
+            for path, offset, size, signed in layout]
 
 
 def values(header: Path, folder: Path, target: str) -> list[tuple[str, int, int]]:

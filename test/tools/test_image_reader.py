@@ -65,11 +65,11 @@ def test_constants_are_programmed_where_their_window_shows_them(image):
 
 
 def test_start_values_of_variables_are_memory_and_no_program(image):
-    elf = image(sample(sections=[Section(".ndata", 0x900, four(1) + four(2), WRITE), Section(".pbss", 0xA00, b"", PERSISTENT, NOBITS,
-                                                                                             8)]).elf())
+    elf = image(sample(sections=[Section(".ndata", 0x900, four(1) + four(2), WRITE),
+                                   Section(".pbss", 0xA00, b"", PERSISTENT, NOBITS, 8)]).elf())
     assert elf.words == WORDS
-    assert [(item.start, item.end, item.persistent) for item in elf.sections if item.memory == DATA] == [(0x900, 0x904, False),
-                                                                                                         (0xA00, 0xA04, True)]
+    found = [(item.start, item.end, item.persistent) for item in elf.sections if item.memory == DATA]
+    assert found == [(0x900, 0x904, False), (0xA00, 0xA04, True)]
 
 
 @pytest.mark.parametrize("text", [
@@ -85,8 +85,8 @@ def test_hex_in_every_way_of_writing_it(image, text):
     ("", {"ident": b"\x7fELF\x01\x02\x01" + bytes(9)}), ("for the 33FJ128MC802", {"numbers": {"__33FJ128MC802": 1}}),
     ("two words for address 0x000202", {"sections": [Section(".again", 0x202, four(0))]}),
     ("two words", {"sections": [Section(".a\x1b[2J\n", 0x202, four(0))]}),
-    ("0x5800 is outside", {"sections": [Section(".far", 0x57FE, four(0) * 2)]}), ("0x000301",
-                                                                                  {"sections": [Section(".odd", 0x301, four(0))]}),
+    ("0x5800 is outside", {"sections": [Section(".far", 0x57FE, four(0) * 2)]}),
+    ("0x000301", {"sections": [Section(".odd", 0x301, four(0))]}),
     ("3 bytes of section .short", {"sections": [Section(".short", 0x300, bytes(3))]}),
     ("does not end inside", {"sections": [Section(".long", 0x300, four(0), size=1 << 20)]}),
     ("no 24-bit word at 0x000300", {"sections": [Section(".phantom", 0x300, four(1 << 24))]})])
@@ -97,19 +97,19 @@ def test_elf_that_is_not_for_this_chip_or_damaged(refused, words, change):
 @pytest.mark.parametrize("words, given", [
     ("no reset vector", {0x200: 0}), ("is no GOTO", {0: 0, 2: 0, 0x200: 0}), ("leads to 0x300", {0: 0x040300, 2: 0, 0x200: 0}),
     ("0x5800 is outside", {**WORDS, 0x5800: 0}), ("0xF80018 is outside", {**WORDS, 0xF80018: 0}),
-                                          ("no 24-bit word", {**WORDS, 0x204: 1 << 24})])
+    ("no 24-bit word", {**WORDS, 0x204: 1 << 24})])
 def test_words_that_are_no_program(refused, words, given):
     refused(hex_text(given), words)
 
 
 @pytest.mark.parametrize("words, text", [
     ("neither", ""), ("neither", "hello\n"), ("end record", "".join(LINES)), ("end record", "".join(LINES) + END + LINES[1]),
-    ("end record", "".join(LINES) + record(1, 0, b"\0")), ("checksum", LINES[0] + LINES[1][:-2] + ("1" if LINES[1][-2] == "0" else "0")
-                                                           + "\n" + END),
-    ("overlap", "".join([*LINES[:2], LINES[1], *LINES[2:], END])), ("half a word", "".join(LINES) + record(4, 0, bytes(2))
-                                                                    + record(0, 0x800, b"\1\2") + END),
+    ("end record", "".join(LINES) + record(1, 0, b"\0")),
+    ("checksum", LINES[0] + LINES[1][:-2] + ("1" if LINES[1][-2] == "0" else "0") + "\n" + END),
+    ("overlap", "".join([*LINES[:2], LINES[1], *LINES[2:], END])),
+    ("half a word", "".join(LINES) + record(4, 0, bytes(2)) + record(0, 0x800, b"\1\2") + END),
     ("length", ":05000000" + "00" * 7 + "\n" + END), ("invalid", record(6, 0, b"") + "".join(LINES) + END),
-                                         ("", record(4, 0, b"\0") + "".join(LINES) + END),
+    ("", record(4, 0, b"\0") + "".join(LINES) + END),
     ("", record(2, 0, b"\0\0\0") + "".join(LINES) + END), ("invalid", ":" + "0" * 1040 + "\n" + END), ("no data", END)])
 def test_hex_that_is_damaged(refused, words, text):
     refused(text if words in ("neither", "no data") else ":" + text.lstrip(":"), words)

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from sample_image import Function, Sample, program
 
-from tools.common import paths
 from tools.common.errors import UserError
 from tools.image import attribution, base, size, stack
 from tools.image.budget import Budget, shares
@@ -135,8 +134,8 @@ MIXED = [(0x200, TICK, 2), (0x202, GUARD, 4), (0x204, TICK, 3), (0x206, GUARD, 5
                  id="constants take three bytes for two"),
     pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 4), (".LC0", 3), (".LC1", 5)]),
                  {("control", "tick"): 3, ("control", "drive"): 6, ("hand-over", "(texts)"): 12}, id="texts of an odd length share a word"),
-    pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 10)], types={"drive": {"gain": 2, "fault": 2,
-                                                                                                           "rest": 6}}),
+    pytest.param(program((0x200, 1), functions=[tick(0x202)], constants=[("_drive", 10)],
+                         types={"drive": {"gain": 2, "fault": 2, "rest": 6}}),
                  {("control", "tick"): 3, ("control", "drive"): 12, ("guard", "drive.fault"): 3}, id="a member of a constant"),
     pytest.param(program((0x200, 2), functions=[Function("new", "include/a/new.h", 1, 0x200, 0x204)]), {("not assigned", "new"): 6},
                  id="not assigned")])
@@ -224,17 +223,15 @@ def test_the_change_is_counted_for_what_came_what_went_and_the_sums(report, imag
     assert {row.flash_change for row in report(7).rows} == {None}
 
 
-def test_table_and_files_hold_the_same_sums(report, tmp_path):
+def test_table_and_file_hold_the_same_sums(report, tmp_path):
     found = report(20, 3, ram=10)
     found.no_base = "there is no git history here"
     lines = size.text(found).splitlines()
     assert next(line.split() for line in lines if line.startswith("the law")) == ["the", "law", "60", "60", "10"]
     assert next(line.split() for line in lines if line.startswith("whole image")) == ["whole", "image", "69", "120", "10", "40"]
     assert lines[-1] == "no column for the change: there is no git history here"
-    files = size.write(found, tmp_path / "out")
-    data = json.loads(files[0].read_text(encoding="utf-8"))
+    data = json.loads(size.write_json(size.summary(found), tmp_path / "out", "size").read_text(encoding="utf-8"))
     assert next(row["flash"] for row in data["rows"] if row["name"] == "whole image") == 69
-    assert len(files[1].read_text(encoding="utf-8").splitlines()) == len(data["rows"]) + 1
     head, body = size.readme_table(data)
     assert {len(row) for row in body} == {len(head)}
     assert [row[0] for row in body] == ["the law", "additions", size.NOTE_TITLE, "whole image", "stack at its deepest"]
@@ -295,10 +292,10 @@ def test_sources_tell_what_they_define(tree):
     ("", "", []),
     ('"include/a/guard.h"', '"include/a/gurad.h"', [r"'include/a/gurad.h' is no file of the firmware, \S*budget.toml line \d+: correct it",
                                                      "'include/a/guard.h' is in no module: add it"]),
-    ('"tick_guard"', '"tick_gaurd"', ["'tick_gaurd' is no function of the firmware"]), ('"small_*"', '"smal_*"',
-                                                                                        ["'smal_\\*' is no function"]),
-    ('"drive.fault"', '"drive.failure"', ["'drive.failure' is no variable or member"]), ('"drive.estimator.lost"', '"drive.lost"',
-                                                                                         ["'drive.lost' is no"]),
+    ('"tick_guard"', '"tick_gaurd"', ["'tick_gaurd' is no function of the firmware"]),
+    ('"small_*"', '"smal_*"', ["'smal_\\*' is no function"]),
+    ('"drive.fault"', '"drive.failure"', ["'drive.failure' is no variable or member"]),
+    ('"drive.estimator.lost"', '"drive.lost"', ["'drive.lost' is no"]),
     ('"demo"', '"demmo"', ["'demmo' is no scenario"]), ('"silent"', '"drive"', ["'drive' is named twice"]),
     ('"_reset*"', '"_rset*"', [r"'_rset\*' is no function of the compiler's start-up code in the image"]),
     ('"_fill"', '"_filll"', ["'_filll' is no function of the compiler's"])])
@@ -337,8 +334,8 @@ GOOD, BARE, OTHER = program((0x200, 1), functions=[tick(0x202)]), program((0x200
 @pytest.mark.parametrize("sample, arguments, words", [
     (None, (), ("No such file", "make firmware")), (GOOD, ("--objdump", "no-such-objdump"), ("no no-such-objdump", "XC16")),
     (OTHER, (), ("not a linked program for a dsPIC",)), (BARE, (), ("compile with -g",)), (BARE, ("--objdump", r"printf '\351'"),
-                                                                                           ("compile with -g",)),
-                                                      (None, ("--wrong",), ("--help",))])
+    ("compile with -g",)),
+    (None, ("--wrong",), ("--help",))])
 def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, sample, arguments, words):
     if sample is not None:
         (tmp_path / "bad.elf").write_bytes(sample.elf())
@@ -468,12 +465,12 @@ def test_a_compiled_program(tmp_path):
     image = attribution.read(tmp_path / "t.elf")
     for memory, total in (("program", image.flash_bytes), ("data", image.ram_bytes)):
         assert re.search(rf'Total "{memory}" memory used \(bytes\):\s+0x[0-9a-f]+\s+\({total}\)', done.stdout + done.stderr)
-    assert {thing.name: thing.file for thing in image.data + image.constants if thing.name in ("drive", "table")} == {"drive": "guard.c",
-                                                                                                                      "table": "guard.c"}
+    files = {thing.name: thing.file for thing in image.data + image.constants}
+    assert (files["drive"], files["table"]) == ("guard.c", "guard.c")
     found = shares(image, budget_in(tmp_path, '"firmware/a/guard.c"', '"guard.c"'))
     assert found["guard", "park"].flash > 0 and found["guard", "guard"].flash > 0
-    assert (found["guard", "drive.fault"].ram, found["guard", "drive.estimator.lost"].ram, found["start", "drive.estimator"].ram) == (2, 2,
-                                                                                                                                      8)
+    members = (("guard", "drive.fault"), ("guard", "drive.estimator.lost"), ("start", "drive.estimator"))
+    assert [found[member].ram for member in members] == [2, 2, 8]
     assert found["guard", "table"].flash == 60
     result = stack.analyse(size.disassemble(f"{XC16}xc16-objdump", tmp_path / "t.elf"), image.entry, ["_ADC1Interrupt"], {},
                            ("_data_init",))

@@ -65,8 +65,8 @@ def test_depth_of_one_function(code, depth):
 
 
 @pytest.mark.parametrize("code, words", [
-    ("lnk #0x0\nrepeat w3\nclr.w [w15++]\nulnk\nreturn", "unknown number"), ("lnk #0x0\n.L1:\npush w8\nbra NZ, {.L1}\nulnk\nreturn",
-                                                                             "grows in a loop"),
+    ("lnk #0x0\nrepeat w3\nclr.w [w15++]\nulnk\nreturn", "unknown number"),
+    ("lnk #0x0\n.L1:\npush w8\nbra NZ, {.L1}\nulnk\nreturn", "grows in a loop"),
     ("lnk #0x0\nbtsc w0, #0x1\npush w8\nmov.w w1, w2\nulnk\nreturn", "disagree"), ("push w8\nreturn", "returns with 2 bytes"),
     ("mov.w w0, w15\nreset", "computed"), ("add.w w0, w15, w15\nreset", "computed"), ("sub.w w15, w1, w15\nreset", "computed"),
     ("mov.w [w0], w15\nreset", "computed"), ("lnk #0x4\nulnk\nulnk\nreturn", "not open"), ("mov.w w0, w1", "no code")])

@@ -80,15 +80,16 @@ def judge(tmp_path, monkeypatch):
 
     def of(on_chip: list[str], on_pc: dict[str, str] | None = None, source: str = "int x;\n"):
         Path("test/unit/test_x.c").write_text(source)
-        Path("runners/unit/test_x_runner.c").write_text("".join(f'  a[{i}].name = "{name}";\n  a[{i}].line_num = {i};\n' for i,
-                                                                name in enumerate(on_chip)))
+        Path("runners/unit/test_x_runner.c").write_text(
+            "".join(f'  a[{i}].name = "{name}";\n  a[{i}].line_num = {i};\n' for i, name in enumerate(on_chip)))
         host = Path("runners/unit/test_x")
         results = on_pc if on_pc is not None else {name: "PASS" for name in on_chip}
         host.write_text("#!/bin/sh\ncat <<END\n" + "".join(f"test/unit/test_x.c:1:{name}:{text}\n" for name, text in results.items())
                         + "END\n")
         host.chmod(0o755)
         options = argparse.Namespace(out=f"{tmp_path}/out", unity="unity", runners="runners", compile=f"{tmp_path}/cc",
-                                     link=f"{tmp_path}/ld {{elf}} {{objects}}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1)
+                                     link=f"{tmp_path}/ld {{elf}} {{objects}}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1,
+                                     flat=False)
         builder = target_run.Builder(options)
         builder.shared()
         return target_run.judge("unit/test_x", builder, Path("runners"))
@@ -133,7 +134,7 @@ def test_some_unit_tests_give_the_pcs_results():
     done = make("test-target", "ONLY=test_pi test_trig")
     assert done.returncode == 0, done.stdout + done.stderr
     suite = report.read_suite(ROOT / "build/target/test/report.txt")
-    assert suite.failures == [] and len(suite.passed) > 20
+    assert suite.failures == [] and len(suite.passed) > 10
 
 
 @with_compiler

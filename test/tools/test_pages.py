@@ -59,6 +59,13 @@ class Pages(unittest.TestCase):
         self.each(r"SCENARIO=([a-z]\w*)\b(?!/)", "no such scenario", lambda name: name == "name" or is_there(f"tools/bench/scenarios/**/{name}.toml"))
         self.each(r"MOTOR=([a-z]\w*)", "no such motor", lambda name: name in ("name", "all", "my_motor") or is_there(f"tuning/motors/{name}.toml"))
 
+    def test_every_name_is_in_the_file_beside_it(self):
+        for _, file, name in re.findall(r"^\| ([^|]*) \| ([^|]*`include/[^|]*|[^|]*`firmware/[^|]*) \| ([^|]*) \|$", pages()["docs/architecture.md"], re.MULTILINE):
+            text = "".join((ROOT / path).read_text(encoding="utf-8") for path in re.findall(r"`([\w/]+\.[ch])`", file))
+            for word in re.findall(r"`([A-Za-z]\w+)", name):
+                with self.subTest(file=file, name=word):
+                    self.assertTrue(not text or re.search(rf"\b{word}", text))
+
     def test_AN1292_is_called_by_its_name(self):
         self.each(r"\b([Tt]he note(?:'s)?)\b", "write AN1292", lambda name: False)
 

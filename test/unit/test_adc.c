@@ -1,17 +1,17 @@
 /* ADC1's registers against the device facts: four channels at once, signed fractional, started by the PWM. */
 #include "registers.h"
 
-#define AD1CON1 (*registers_watch(&AD1CON1)) /* the last access switches the converter on */
+static volatile AD1CON1BITS *const control_bits = &AD1CON1bits;
+
+/* The access to the bits switches the converter on. */
+#define AD1CON1bits (*((void)registers_watch(&AD1CON1), control_bits))
 #include "firmware/board/adc.c"
-#undef AD1CON1
+#undef AD1CON1bits
 
 void setUp(void)
 {
-    static const register_value_t before[] = { /* nothing may depend on what was there */
-        { "AD1CON1", 0x5555 }, { "AD1CON2", 0x5555 }, { "AD1CON3", 0x5555 }, { "AD1CHS0", 0x5555 }, { "AD1CHS123", 0x5555 }, { "AD1CSSL", 0x5555 },
-    };
     host_registers_reset();
-    SET_REGISTERS(before);
+    AD1CON1 = AD1CON2 = AD1CON3 = AD1CHS0 = AD1CHS123 = AD1CSSL = 0x5555; /* nothing may depend on what was there */
     adc_init();
 }
 

@@ -197,26 +197,13 @@ void test_speed_is_back_emf_over_Kphi_with_the_sign_of_Eq_or_of_the_filtered_spe
         { "just short of it", 0, 8433, 20000, 8433 },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        TEST_ASSERT_EQUAL_INT16_MESSAGE((int32_t)cases[n].sum * 7956 >> 11, speed_of(cases[n].e_d, cases[n].e_q, cases[n].filtered), cases[n].what);
+        int16_t speed = speed_of(cases[n].e_d, cases[n].e_q, cases[n].filtered);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE((int32_t)cases[n].sum * 7956 >> 11, speed, cases[n].what);
     }
     TEST_ASSERT_INT16_WITHIN(3, 5000, speed_of(0, 1287, 5000)); /* 4.180 V of phase back-EMF at 1000 rpm */
 }
 
-/* ---- Equations 1 and 7 ---- */
-
-void test_angle_advances_by_the_unfiltered_speed(void)
-{
-    (void)speed_of(0, 1287, 0);
-    TEST_ASSERT_EQUAL_HEX32((uint32_t)qm_mulss(e.omega_erpm, 3579), e.rho_q32);
-    TEST_ASSERT_EQUAL_UINT16(273, (uint16_t)(e.rho_q32 >> 16)); /* 4999 electrical rpm: 273 counts a period */
-    TEST_ASSERT_INT16_WITHIN(1, 858, e.half_step_q16_rad); /* 0.026180 / 2 rad * 65536 */
-    e.rho_q32 = UINT32_C(0xFFFF0000);
-    estimator_pll(&e, &params, &tuning, rotating(0, 1287));
-    TEST_ASSERT_EQUAL_UINT16(272, (uint16_t)(e.rho_q32 >> 16)); /* wraps at a turn */
-    (void)speed_of(0, -1287, -5000);
-    TEST_ASSERT_EQUAL_UINT16(65536u - 274u, (uint16_t)(e.rho_q32 >> 16));
-    TEST_ASSERT_INT16_WITHIN(1, -858, e.half_step_q16_rad);
-}
+/* ---- Equation 7 ---- */
 
 void test_filters_make_their_share_of_the_way(void)
 {
@@ -229,56 +216,6 @@ void test_filters_make_their_share_of_the_way(void)
     TEST_ASSERT_EQUAL_INT32(-INT32_C(3000) * 2400, e.e_q_q28);
     TEST_ASSERT_EQUAL_INT16(36, estimator_emf(&e).d);
     TEST_ASSERT_EQUAL_INT16(-110, estimator_emf(&e).q);
-}
-
-void test_next_angle_is_half_a_step_ahead_both_ways(void)
-{
-    e.rho_q32 = UINT32_C(0x80000000);
-    e.half_step_q16_rad = 6283; /* 1000 counts */
-    TEST_ASSERT_UINT16_WITHIN(1, 32768u + 1000u, estimator_next_angle(&e));
-    e.half_step_q16_rad = -6283;
-    TEST_ASSERT_UINT16_WITHIN(1, 32768u - 1000u, estimator_next_angle(&e));
-    e.rho_q32 = UINT32_C(0xFFFF8000);
-    e.half_step_q16_rad = 6283;
-    TEST_ASSERT_UINT16_WITHIN(1, 999u, estimator_next_angle(&e));
-}
-
-/* ---- frames ---- */
-
-/** Filtered back-EMF after one tick with a steady voltage along an angle and the filter at one half. */
-static dq_t emf_after(uint16_t closed, angle_t voltage_angle, angle_t frame_angle)
-{
-    alphabeta_t v = inverse_park(rotating(16000, 0), trig_sincos(voltage_angle));
-    tuning.kfilter_esdq_q16 = 32767;
-    estimator_commanded(&e, v);
-    estimator_commanded(&e, v);
-    estimator_tick(&e, &params, &tuning, vector(0, 0), trig_sincos(frame_angle), !closed);
-    return estimator_emf(&e);
-}
-
-void test_free_estimator_uses_its_own_angle(void)
-{
-    dq_t emf;
-    e.rho_q32 = UINT32_C(0x30000000);
-    emf = emf_after(0, 0x3000u + 16384u, 0);
-    TEST_ASSERT_INT16_WITHIN(4, 0, emf.d);
-    TEST_ASSERT_INT16_WITHIN(4, 2000, emf.q);
-}
-
-void test_closed_estimator_uses_the_control_frame_turned_back_by_half_a_step(void)
-{
-    static const int16_t half_steps[] = { 0, 5243, -5243 }; /* 0.08 rad: 834 counts */
-    uint16_t n;
-    for (n = 0; n < 3u; n++) {
-        dq_t emf;
-        angle_t frame = (angle_t)(20000 + ((n == 0u) ? 0 : (n == 1u) ? 834 : -834));
-        setUp();
-        e.half_step_q16_rad = half_steps[n];
-        e.rho_q32 = UINT32_C(0x12340000); /* plays no part */
-        emf = emf_after(1, 20000u + 16384u, frame);
-        TEST_ASSERT_INT16_WITHIN(4, 0, emf.d);
-        TEST_ASSERT_INT16_WITHIN(8, 2000, emf.q);
-    }
 }
 
 /* ---- lock, with a turning motor that carries no current ---- */

@@ -69,18 +69,6 @@ void test_a_long_time_at_the_limit_does_not_wind_up(void)
     TEST_ASSERT_TRUE(pi_tick(&pi, &gains, -100, 3000) < 3000);
 }
 
-void test_both_signs_wind_up_and_recover_alike(void)
-{
-    pi_t mirror = { 0 };
-    uint16_t n;
-    for (n = 0; n < 60u; n++) {
-        int16_t err = (int16_t)((n < 30u) ? 4096 : -1024); /* no rounding with these */
-        int16_t up = pi_tick(&pi, &gains, err, 2048), down = pi_tick(&mirror, &gains, (int16_t)-err, 2048);
-        TEST_ASSERT_EQUAL_INT32_MESSAGE(-pi.sum, mirror.sum, golden_row(n));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, (int16_t)-up, down, golden_row(n));
-    }
-}
-
 void test_preset_makes_the_next_output_what_was_asked_for(void)
 {
     pi_preset(&pi, &gains, 300, 1234);

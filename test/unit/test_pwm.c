@@ -19,12 +19,10 @@ static volatile uint16_t *watch_pairs(volatile uint16_t *pairs)
 
 void setUp(void)
 {
-    static const register_value_t before[] = {
-        { "P1TCON", 0xFFFF }, { "P1OVDCON", 0x3F15 }, { "P1DC1", 1000 }, { "P1DC2", 1000 }, { "P1DC3", 1000 }, { "PWM1CON2", 0xFFFF },
-        { "P1DTCON2", 0xFFFF }
-    };
     host_registers_reset();
-    SET_REGISTERS(before);
+    P1TCON = PWM1CON2 = P1DTCON2 = 0xFFFF;
+    P1OVDCON = 0x3F15;
+    P1DC1 = P1DC2 = P1DC3 = 1000;
     IFS3bits.FLTA1IF = 1;
     registers_accesses = 0;
     pwm_init();

@@ -60,30 +60,21 @@ void test_directions_of_clarke(void)
     }
 }
 
-void test_directions_of_park(void)
+void test_directions_of_park_and_its_inverse(void)
 {
     static const direction_t cases[] = {
         { "alpha at angle zero: d", 16384, 0, 0, 8192, 0 },
         { "beta at angle zero: q", 0, 16384, 0, 0, 8192 },
         { "along the frame: d", 0, 16384, 16384u, 8192, 0 },
         { "behind the frame: negative q", 16384, 0, 16384u, 0, -8192 },
+        { "between alpha and beta, along the frame: d", 11585, 11585, 8192u, 8192, 0 },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         dq_t got = park_at(cases[n].x, cases[n].y, cases[n].angle);
         TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].r, got.d, cases[n].what);
         TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].s, got.q, cases[n].what);
-    }
-}
-
-void test_directions_of_inverse_park(void)
-{
-    static const direction_t cases[] = {
-        { "d: along the frame", 16384, 0, 8192u, 5793, 5793 },
-        { "q: a quarter turn ahead of the frame", 0, 16384, 8192u, -5793, 5793 },
-    };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        alphabeta_t got = inverse_park_at(cases[n].x, cases[n].y, cases[n].angle);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].r, got.alpha, cases[n].what);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].s, got.beta, cases[n].what);
+        alphabeta_t back = inverse_park_at(got.d, got.q, cases[n].angle); /* either halves */
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].x / 4, back.alpha, cases[n].what);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, cases[n].y / 4, back.beta, cases[n].what);
     }
 }

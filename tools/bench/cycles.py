@@ -9,7 +9,8 @@ import ctypes
 import functools
 import json
 import sys
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
 from tools.image.profile import Counts, Profile, profile
+from tools.image.size import write_json
 
 from . import build, pil, pil_command, scenario, simulate
 from .command_common import Progress
@@ -36,42 +38,35 @@ MEANING = {WITHOUT: "bridge on, speed reference below FW_START_SPEED_RPM", WITH:
 SIGNALS = ("cpu.isr_cycles", "cpu.latency_cycles")
 
 
-@dataclass
-class Spread:
-    """How many interrupts took how many cycles: counts[cycles]."""
-
-    counts: np.ndarray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+class Spread(Counter):
+    """How many interrupts took how many cycles."""
 
     @staticmethod
     def of(values: np.ndarray) -> "Spread":
-        return Spread(np.bincount(values.astype(np.int64), minlength=1))
-
-    def __add__(self, other: "Spread") -> "Spread":
-        size = max(len(self.counts), len(other.counts))
-        return Spread(sum(np.pad(item.counts, (0, size - len(item.counts))) for item in (self, other)))
-
-    @property
-    def number(self) -> int:
-        return int(self.counts.sum())
-
-    @property
-    def least(self) -> int:
-        return int(np.flatnonzero(self.counts)[0]) if self.number else 0
+        return Spread(values.astype(np.int64).tolist())
 
     @property
     def most(self) -> int:
-        return int(np.flatnonzero(self.counts)[-1]) if self.number else 0
+        return max(self, default=0)
 
     @property
-    def total(self) -> int:
-        return int((self.counts * np.arange(len(self.counts))).sum())
+    def sum(self) -> int:
+        return sum(cycles * number for cycles, number in self.items())
 
     @property
     def mean(self) -> float:
-        return self.total / self.number if self.number else 0.0
+        return self.sum / max(self.total(), 1)
 
     def data(self) -> dict[str, Any]:
-        return {"interrupts": self.number, "min": self.least, "mean": self.mean, "max": self.most}
+        return {"interrupts": self.total(), "min": min(self, default=0), "mean": self.mean, "max": self.most}
+
+
+def added(spreads: Iterable[Spread]) -> Spread:
+    """All of them together."""
+    result = Spread()
+    for spread in spreads:
+        result.update(spread)
+    return result
 
 
 @dataclass
@@ -129,8 +124,8 @@ def merged(found: list[Found]) -> Found:
     """All scenarios together."""
     whole = found[0]
     for item in found[1:]:
-        spreads = {name: whole.spreads.get(name, Spread()) + item.spreads.get(name, Spread()) for name in {**whole.spreads, **item.spreads}}
-        whole = Found(spreads, whole.latency + item.latency, whole.counts + item.counts, max(whole.stack_bytes, item.stack_bytes),
+        spreads = {name: added(one.spreads.get(name, Spread()) for one in (whole, item)) for name in {**whole.spreads, **item.spreads}}
+        whole = Found(spreads, added([whole.latency, item.latency]), whole.counts + item.counts, max(whole.stack_bytes, item.stack_bytes),
                       whole.differences + item.differences, whole.ticks + item.ticks, whole.first_difference or item.first_difference,
                       whole.longest | item.longest, min(whole.load_cycles, item.load_cycles), whole.motor_s + item.motor_s,
                       whole.cpu_s + item.cpu_s, whole.instructions + item.instructions)
@@ -151,7 +146,7 @@ class Report:
     @property
     def all(self) -> Spread:
         """Every interrupt: the states, which do not overlap."""
-        return sum((spread for name, spread in self.found.spreads.items() if name not in NOTE_US), Spread())
+        return added(spread for name, spread in self.found.spreads.items() if name not in NOTE_US)
 
 
 class _Assumption(ctypes.Structure):
@@ -197,10 +192,10 @@ def broken(report: Report) -> list[str]:
     lines, found = [], report.found
     if found.differences:
         lines.append(f"target and PC differ in {found.differences} interrupts, the first: {found.first_difference}")
-    if abs(report.profile.total - report.all.total) > MISSED * report.all.total:
-        lines.append(f"the profile has {report.profile.total} cycles, the interrupts took {report.all.total}: "
+    if abs(report.profile.total - report.all.sum) > MISSED * report.all.sum:
+        lines.append(f"the profile has {report.profile.total} cycles, the interrupts took {report.all.sum}: "
                      "the figures by function are wrong")
-    if not found.spreads[WITH].number or not found.spreads[WITHOUT].number:
+    if not found.spreads[WITH] or not found.spreads[WITHOUT]:
         lines.append("no scenario ran with and without field weakening: the figures are not those of the table")
     if found.latency.most >= found.load_cycles:
         lines.append(f"trigger to duties: {found.latency.most} cycles, but the duties load {found.load_cycles} cycles after the trigger")
@@ -227,10 +222,10 @@ def us(cycles: float) -> float:
 
 
 def _spread_line(name: str, spread: Spread, note: tuple[float, ...] | None = None) -> str:
-    if not spread.number:
+    if not spread:
         return f"{name:<26}{'-':>10}"
-    told = f"{name:<26}{spread.number:>10}{spread.least:>8}{spread.mean:>9.1f}{spread.most:>7}"
-    told += f"{us(spread.least):>10.2f}{us(spread.mean):>8.2f}{us(spread.most):>8.2f}{100.0 * spread.mean / PERIOD_CYCLES:>8.1f} %"
+    told = f"{name:<26}{spread.total():>10}{min(spread):>8}{spread.mean:>9.1f}{spread.most:>7}"
+    told += f"{us(min(spread)):>10.2f}{us(spread.mean):>8.2f}{us(spread.most):>8.2f}{100.0 * spread.mean / PERIOD_CYCLES:>8.1f} %"
     return told + (f"   {note[0]:g} / {note[1]:g} / {note[2]:g}" if note else "")
 
 
@@ -244,27 +239,26 @@ def text(report: Report) -> str:
         where.setdefault(f"{cycles} in {state} at {at_s:.4f} s", []).append(name)
     parts = [f"{report.image}: the control interrupt in cycles (entry to return), at {FCY_MHZ:g} MIPS in us, and its share of the core",
              "\n".join([head, "-" * len(head), *(_spread_line(name, found.spreads[name], NOTE_US[name]) for name in NOTE_US),
-                        *(_spread_line(f"  {name}", spread) for name, spread in found.spreads.items() if name not in NOTE_US
-                          and spread.number),
+                        *(_spread_line(f"  {name}", spread) for name, spread in found.spreads.items() if name not in NOTE_US and spread),
                         _spread_line("all", report.all)]),
              "\n".join(f"{name}: {meaning}" for name, meaning in MEANING.items()),
              "longest in each scenario:\n" + "\n".join(f"  {place}: {', '.join(names)}" for place, names in where.items())]
-    latency = found.latency
-    parts.append(f"trigger to the third duty   {latency.least} / {latency.mean:.1f} / {latency.most} cycles (min / mean / max), "
-                 f"{us(latency.least):.2f} / {us(latency.mean):.2f} / {us(latency.most):.2f} us;\n"
+    latency, least = found.latency, min(found.latency, default=0)
+    parts.append(f"trigger to the third duty   {least} / {latency.mean:.1f} / {latency.most} cycles (min / mean / max), "
+                 f"{us(least):.2f} / {us(latency.mean):.2f} / {us(latency.most):.2f} us;\n"
                  f"                            the duties load {found.load_cycles} cycles after the trigger\n"
                  f"deepest stack               {found.stack_bytes} bytes\n"
                  f"target = PC                 {found.ticks} interrupts compared, {found.differences} differ\n"
                  f"speed                       {found.instructions / found.cpu_s / 1e6:.0f} million instructions a second "
                  f"of processor time, {found.motor_s / found.cpu_s:.2f} times real time (while counting by address)")
-    interrupts = max(report.all.number, 1)
+    interrupts = max(report.all.total(), 1)
     for title, table in (("function, wherever it is inlined", shape.inlined), ("function as linked", shape.symbols)):
         rows = [f"{name:<44}{cycles / interrupts:>10.1f}{100.0 * cycles / max(shape.total, 1):>8.1f} %"
                 for name, cycles in table.most_common(MOST_EXPENSIVE)]
         parts.append("\n".join([f"{title:<44}{'cycles':>10}{'':>10}   (own cycles, mean of all interrupts)", *rows]))
     parts.append("\n".join([f"{'code of the interrupt that was executed':<44}{'words':>10}{'of':>6}",
-                            *(f"{name:<44}{done:>10}{of:>6}" for name, (done, of) in sorted(shape.executed.items(),
-                                                                                            key=lambda item: -item[1][1]))]))
+                            *(f"{name:<44}{done:>10}{of:>6}"
+                              for name, (done, of) in sorted(shape.executed.items(), key=lambda item: -item[1][1]))]))
     if report.assumptions:
         width = [max(len(row[column]) for row in report.assumptions) for column in (0, 1)]
         parts.append("\n".join(["assumed about the chip, for want of a source:",
@@ -275,9 +269,9 @@ def text(report: Report) -> str:
 def summary(report: Report) -> dict[str, Any]:
     """The report as plain data."""
     found = report.found
-    interrupts = max(report.all.number, 1)
-    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US, "spreads": {name: item.data() for name,
-                                                                                       item in found.spreads.items()},
+    interrupts = max(report.all.total(), 1)
+    return {"image": report.image, "fcy_mhz": FCY_MHZ, "note_us": NOTE_US,
+            "spreads": {name: item.data() for name, item in found.spreads.items()},
             "all": report.all.data(), "latency": found.latency.data(), "stack_bytes": found.stack_bytes, "ticks": found.ticks,
             "differences": found.differences, "first_difference": found.first_difference,
             "longest": {name: {"cycles": cycles, "at_s": at_s, "state": state} for name, (cycles, at_s, state) in found.longest.items()},
@@ -286,17 +280,6 @@ def summary(report: Report) -> dict[str, Any]:
             "functions": {name: cycles / interrupts for name, cycles in report.profile.inlined.most_common()},
             "symbols": {name: cycles / interrupts for name, cycles in report.profile.symbols.most_common()},
             "executed": report.profile.executed, "assumptions": report.assumptions, "broken": report.broken}
-
-
-def write(report: Report, folder: Path) -> Path:
-    """cycles.json."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / "cycles.json"
-        path.write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-    return path
 
 
 def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
@@ -364,7 +347,7 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    path = write(report, options.out or image.parent)
+    path = write_json(summary(report), options.out or image.parent, "cycles")
     print(text(report))
     print(f"\nwritten: {paths.shown(path)}")
     for line in report.broken:

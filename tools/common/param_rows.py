@@ -1,4 +1,4 @@
-"""The rows of include/drive/param_table.h: every parameter of userparams.h with unit, range, default and meaning."""
+"""What userparams.h is made of: the rows of include/drive/param_table.h with unit, range, default and meaning, and the modes."""
 
 import functools
 import re
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from . import paths
 from .errors import UserError
+from .x_macro import rows
 
 TABLE = paths.ROOT / "include" / "drive" / "param_table.h"
 ENTRIES = 18
@@ -36,11 +37,17 @@ class Parameter:
 def parameters() -> dict[str, Parameter]:
     """Every parameter by name, in the order of the table."""
     found: dict[str, Parameter] = {}
-    for section, rows in _GROUP.findall(TABLE.read_text(encoding="utf-8").replace("\\\n", " ")):
-        left = _ROW.sub("", rows).strip()
+    for section, row_text in _GROUP.findall(TABLE.read_text(encoding="utf-8").replace("\\\n", " ")):
+        left = _ROW.sub("", row_text).strip()
         if left:
             raise UserError(f"a row cannot be read: {left[:60]}", str(paths.shown(TABLE)), "write X(NAME, \"unit\", minimum, maximum, default, \"meaning\")")
-        for macro, name, *columns in _ROW.findall(rows):
+        for macro, name, *columns in _ROW.findall(row_text):
             for each in (f"{name}{i}" for i in range(ENTRIES)) if macro.startswith("PARAM") else (name,):
                 found[each] = Parameter(each, *columns, section, name if each != name else "")
     return found
+
+
+@functools.cache
+def modes() -> dict[str, str]:
+    """Every mode and what it does, in the order of include/drive/modes/mode_table.h."""
+    return {name: meaning for name, meaning in rows("include", "drive/modes/mode_table.h", "MODE_TABLE", "#name meaning")}

@@ -88,8 +88,8 @@ class _Debug:
         names = [name for name in parameters.co_varnames[2:parameters.co_argcount] if name.endswith("_sec")]
         held = {name: sections.get(name.removesuffix("_sec")) for name in names}
         self.dwarf = DWARFInfo(DwarfConfig(little_endian=True, machine_arch="dsPIC", default_address_size=4),
-                               **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0) for name,
-                                  data in held.items()})
+                               **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0)
+                                  for name, data in held.items()})
         self.nodes: dict[int, Node] = {}        # called functions, by start
         self.inside: dict[int, list[Node]] = {} # every copy in a called function, by that function's start
         self.lines: dict[int, tuple[str, int]] = {}

@@ -7,7 +7,7 @@ from pathlib import Path
 from tools.common.errors import UserError
 
 from . import device
-from .program import Elf, Words, c_name
+from .program import Elf, Words
 
 #: What may be in the image besides our own objects, by the file that the map names: the compiler's start-up code and what its linker
 #: makes. Names of the product seen in published maps of versions 1.35 and 1.50; those of 2.10 are taken to be the same [?].
@@ -102,8 +102,8 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
 
 def helper_names(elf: Elf, piece: Piece, calls: dict[int, int]) -> str:
     """The functions of a library's piece that something calls, else all of them."""
-    names = {elf.function_at(target) for target in calls.values()} or {name for address, name in elf.functions
-                                                                       if piece.start <= address < piece.end}
+    inside = {name for address, name in elf.functions if piece.start <= address < piece.end}
+    names = {elf.function_at(target) for target in calls.values()} or inside
     return " and ".join(f"{name}()" for name in sorted(names)) or piece.section
 
 

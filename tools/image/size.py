@@ -4,7 +4,6 @@ Program memory is counted as data sheets do, three bytes a word, without the vec
 (a line for each), 2 when the image or the compiler is missing."""
 
 import argparse
-import csv
 import json
 import shlex
 import shutil
@@ -177,19 +176,15 @@ def summary(report: Report) -> dict:
             "base": report.base_name or None, "broken": report.broken}
 
 
-def write(report: Report, folder: Path) -> list[Path]:
-    """size.json and size.csv."""
+def write_json(data: dict, folder: Path, name: str) -> Path:
+    """folder/name.json."""
+    path = folder / f"{name}.json"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / f"size.{ending}" for ending in ("json", "csv")]
-        files[0].write_text(json.dumps(summary(report), indent=1) + "\n", encoding="utf-8")
-        with files[1].open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(vars(report.rows[0])))
-            writer.writeheader()
-            writer.writerows(vars(row) for row in report.rows)
+        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write to '{folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-    return files
+    return path
 
 
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
@@ -228,7 +223,7 @@ def main(arguments: list[str] | None = None) -> int:
     def work() -> int:
         parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
         parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
-        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json and size.csv")
+        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json")
         parser.add_argument("--objdump", default="xc16-objdump")
         parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
                             help="compare with the last commit's image, built by make with these variables")
@@ -246,9 +241,9 @@ def _run(options: argparse.Namespace) -> int:
     report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
-    files = write(report, options.out)
+    path = write_json(summary(report), options.out, "size")
     print(text(report, not options.brief))
-    print("written: " + ", ".join(str(paths.shown(path)) for path in files))
+    print(f"written: {paths.shown(path)}")
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)
     return 1 if report.broken else 0

@@ -1,4 +1,4 @@
-# examples/: a harness, a scenario and a board of one's own, compiled and run as their first lines say. Uses the variables of the main Makefile.
+# examples/: a harness, a scenario and a board, compiled and run. Uses the variables of the main Makefile.
 turn_motor := $B/examples/turn_motor
 
 .PHONY: examples
