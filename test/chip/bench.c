@@ -13,7 +13,8 @@ static double wall_s(void)
 
 int main(void)
 {
-    enum { CHUNKS = 200, PERIODS = 1000 };
+    enum { CHUNKS = 200,
+           PERIODS = 1000 };
     vb_t *vb = vb_create();
     if (vb == NULL || vb_power_up(vb) != 0) {
         fprintf(stderr, "foc33: the board could not be started, bench: check the build\n");

@@ -104,7 +104,7 @@ static void other_format(void)
 
 void test_each_result_format_has_its_bits_in_place(void)
 {
-    static const uint16_t expected[4] = {0x0100, 0xFF00, 0x4000, 0xC000}; /* code 256 */
+    static const uint16_t expected[4] = { 0x0100, 0xFF00, 0x4000, 0xC000 }; /* code 256 */
     more_init = other_format;
     set("input.pot", 0.25);
     for (format = 0; format < 4; format++) {

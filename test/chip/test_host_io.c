@@ -101,7 +101,7 @@ static void uart_on(void)
 
 void test_sent_characters_arrive_in_order_at_the_baud_rate(void)
 {
-    char out[64] = {0};
+    char out[64] = { 0 };
     text = "state run\r\n";
     fake_init_hook = uart_on;
     fake_background_hook = send_text;
@@ -128,7 +128,7 @@ void _U1TXInterrupt(void)
 
 void test_the_transmit_interrupt_starts_with_the_transmitter_and_goes_on_with_each_character(void)
 {
-    char out[16] = {0};
+    char out[16] = { 0 };
     text = "interrupt";
     fake_init_hook = transmit_interrupt_on;
     power_up();

@@ -418,7 +418,7 @@ void test_shaft_work_is_torque_times_speed(void)
 
 static void record_run(double max_step_s, double lq_h, double result[5])
 {
-    static const char *const key[5] = {"plant.i_a", "plant.i_d", "plant.i_q", "plant.v_q", "stat.energy_bus_j"};
+    static const char *const key[5] = { "plant.i_a", "plant.i_d", "plant.i_q", "plant.v_q", "stat.energy_bus_j" };
     set("sim.max_step_s", max_step_s);
     set("adc.noise_lsb", 0.0);
     set("motor.lq_h", lq_h);

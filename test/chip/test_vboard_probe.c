@@ -13,11 +13,11 @@ static double constant(void)
 }
 
 const probe_signal_t probe_signals[] = {
-    {"calls", "", "handler calls", counted_calls},
-    {"fw.constant_a", "A", "a constant", constant},
+    { "calls", "", "handler calls", counted_calls },
+    { "fw.constant_a", "A", "a constant", constant },
 };
 const unsigned probe_signal_count = 2;
-const probe_param_t probe_params[] = {{"END_SPEED_RPM", 1000.0, "rpm"}};
+const probe_param_t probe_params[] = { { "END_SPEED_RPM", 1000.0, "rpm" } };
 const unsigned probe_param_count = 1;
 
 const char *probe_fault_name(int code)

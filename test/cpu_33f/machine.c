@@ -5,7 +5,11 @@
 
 #include "iss.h"
 
-enum { SR = 0x42, CORCON = 0x44, RAM_BYTES = ISS_RAM_END - ISS_RAM_START, MOST_WORDS = 512, TEXT = 400 };
+enum { SR = 0x42,
+       CORCON = 0x44,
+       RAM_BYTES = ISS_RAM_END - ISS_RAM_START,
+       MOST_WORDS = 512,
+       TEXT = 400 };
 
 typedef struct {
     iss_t *iss;

@@ -1,7 +1,7 @@
 /* The chip: the peripherals of the dsPIC33FJ32MC204 by register, once for whatever processor executes the firmware.
  *
- * The processor (chip_cpu_t) holds the registers; the chip reads and writes them in place and is told of accesses that mean more than storing
- * (chip_read, chip_write). What is soldered to the pins is chip_board_t; the bridge that the PWM drives is the plant. Time is counted in
+ * The processor (chip_cpu_t) holds the registers; the chip reads and writes them in place and is told of accesses that mean more than
+ * storing (chip_read, chip_write). What is soldered to the pins is chip_board_t; the bridge that the PWM drives is the plant. Time is counted in
  * instruction cycles for what the chip does by itself (events), and in seconds within a PWM period for PWM and ADC.
  */
 #ifndef FOC33_CHIP_CHIP_H
@@ -40,7 +40,7 @@ enum { CHIP_FBS = 0, CHIP_FGS = 2, CHIP_FOSCSEL = 3, CHIP_FOSC = 4, CHIP_FWDT = 
  *   clock          the instruction clock has changed; NULL: of no concern
  *   wake           the watchdog's time is over: true if that has woken it from sleep
  *   begin, end     a PWM period starts, is over
- *   run            go on to `until_s`, or to an instant before at which the board must follow; returns that time. NULL: handlers take no time
+ *   run            go on to `until_s`, or to an instant before at which the board must follow; returns it. NULL: handlers take no time
  *   follow         the plant has reached the time that run() returned
  *   destroy        the board is going away */
 typedef struct {
@@ -93,7 +93,8 @@ typedef struct {
 
 /* Things that happen by themselves at a cycle. */
 typedef enum {
-    CHIP_EVENT_CLOCK, CHIP_EVENT_WATCHDOG, CHIP_EVENT_TIMER1, CHIP_EVENT_TIMER2, CHIP_EVENT_TIMER3, CHIP_EVENT_SEND, CHIP_EVENT_RECEIVE, CHIP_EVENTS
+    CHIP_EVENT_CLOCK, CHIP_EVENT_WATCHDOG, CHIP_EVENT_TIMER1, CHIP_EVENT_TIMER2, CHIP_EVENT_TIMER3, CHIP_EVENT_SEND,
+    CHIP_EVENT_RECEIVE, CHIP_EVENTS
 } chip_event_t;
 
 /* ---- oscillator (chip_clock.c) ---- */

@@ -168,7 +168,8 @@ void chip_adc_begin(chip_t *chip)
         (void)chip_irq_raise(chip, CHIP_IRQ_ADC1);
     }
     uint16_t con1 = (uint16_t)(CHIP_REG(chip, AD1CON1) & ~(unsigned)(SAMP | DONE));
-    uint16_t now[7] = {con1, CHIP_REG(chip, AD1CON2), CHIP_REG(chip, AD1CON3), CHIP_REG(chip, AD1CHS0), CHIP_REG(chip, AD1CHS123), CHIP_REG(chip, AD1PCFGL), CHIP_REG(chip, PMD1)};
+    uint16_t now[7] = {con1, CHIP_REG(chip, AD1CON2), CHIP_REG(chip, AD1CON3), CHIP_REG(chip, AD1CHS0),
+                       CHIP_REG(chip, AD1CHS123), CHIP_REG(chip, AD1PCFGL), CHIP_REG(chip, PMD1)};
     if (memcmp(now, adc->seen, sizeof now) == 0) {
         return;
     }
@@ -225,7 +226,8 @@ static void deliver(chip_t *chip, const uint16_t *result, unsigned count)
     bool interrupts = adc->sequence + 1u >= adc->sequence_length;
     memcpy(adc->result, result, count * sizeof *result);
     adc->result_count = count;
-    adc->due_s = plant_max(adc->conversion_end_s, chip->plant->now_s) + (interrupts ? plant_max(0.0, adc->hold_us - chip->cpu.own_isr_us) * 1e-6 : 0.0);
+    double held_s = interrupts ? plant_max(0.0, adc->hold_us - chip->cpu.own_isr_us) * 1e-6 : 0.0;
+    adc->due_s = plant_max(adc->conversion_end_s, chip->plant->now_s) + held_s;
     CHIP_REG(chip, AD1CON1) = (uint16_t)(CHIP_REG(chip, AD1CON1) & ~(unsigned)DONE);
 }
 

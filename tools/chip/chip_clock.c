@@ -114,8 +114,8 @@ void chip_clock_check(chip_t *chip)
         chip_warn(chip, "PLLFBD: the instruction clock would be %.1f MHz, the device is specified up to 40 MHz", c->fcy_hz * 1e-6);
     }
     if (c->expected_fcy_hz > 0.0 && fabs(c->fcy_hz / c->expected_fcy_hz - 1.0) > 0.01) {
-        chip_warn(chip, "%s: the instruction clock is %.2f MHz, expected %.2f MHz; every time scales with it", source == 3 ? "PLLFBD" : "OSCCON",
-                  c->fcy_hz * 1e-6, c->expected_fcy_hz * 1e-6);
+        chip_warn(chip, "%s: the instruction clock is %.2f MHz, expected %.2f MHz; every time scales with it",
+                  source == 3 ? "PLLFBD" : "OSCCON", c->fcy_hz * 1e-6, c->expected_fcy_hz * 1e-6);
     }
 }
 

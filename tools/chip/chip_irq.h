@@ -1,4 +1,4 @@
-/* What chip and core say to each other: interrupts by number (bit `number % 16` of IFSx and IECx, x = `number / 16`), and resets by their cause. */
+/* What chip and core say to each other: interrupts by number (bit `number % 16` of IFSx and IECx, x = `number / 16`), and resets. */
 #ifndef FOC33_CHIP_CHIP_IRQ_H
 #define FOC33_CHIP_CHIP_IRQ_H
 
@@ -20,7 +20,7 @@ typedef struct {
     unsigned priority, number;
 } chip_irq_t;
 
-/* The enabled interrupt with a set flag of the highest priority; among equals that of the lowest number. The arrays start with IFS0, IEC0, IPC0. */
+/* The enabled interrupt with a set flag of the highest priority; among equals that of the lowest number. Arrays from IFS0, IEC0, IPC0. */
 static inline chip_irq_t chip_irq_pending(const uint16_t *ifs, const uint16_t *iec, const uint16_t *ipc)
 {
     chip_irq_t best = {0, 0};

@@ -81,7 +81,8 @@ static void write_port(void *context, uint16_t address, uint16_t value, uint16_t
 {
     uint16_t lat = (uint16_t)(address + LAT_BEHIND);
     chip_put(context, lat, chip_merged(context, lat, value, mask));
-    chip_warn(context, "PORT%c: the firmware writes the port, LAT%c is the register for outputs", 'A' + (int)port_of(address), 'A' + (int)port_of(address));
+    int letter = 'A' + (int)port_of(address);
+    chip_warn(context, "PORT%c: the firmware writes the port, LAT%c is the register for outputs", letter, letter);
 }
 
 static void write_selection(void *context, uint16_t address, uint16_t value, uint16_t mask)

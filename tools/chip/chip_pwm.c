@@ -147,7 +147,8 @@ static void decode_legs(chip_t *chip)
         leg->dead_low_s = ((dtcon2 >> (2u * k)) & 1u) != 0 ? unit_b_s : unit_a_s;
         leg->dead_high_s = ((dtcon2 >> (2u * k + 1u)) & 1u) != 0 ? unit_b_s : unit_a_s;
         if (pwm->leg[k].pout == 3 && leg->povd != 3 && !leg->independent) {
-            chip_warn(chip, "P1OVDCON: both transistors of pair %u are commanded on, a complementary pair drives the high side only", k + 1u);
+            chip_warn(chip, "P1OVDCON: both transistors of pair %u are commanded on, a complementary pair drives the high side only",
+                      k + 1u);
         }
     }
 }
@@ -265,10 +266,14 @@ static void load_buffers(chip_t *chip, bool started)
 /* True if a register that the module watches differs from what was last decoded. */
 static bool settings_changed(chip_t *chip)
 {
-    uint16_t now[16] = {
-        CHIP_REG(chip, P1TCON),    CHIP_REG(chip, P1TPER),    CHIP_REG(chip, P1SECMP), CHIP_REG(chip, PWM1CON1), CHIP_REG(chip, PWM1CON2), CHIP_REG(chip, P1DTCON1), CHIP_REG(chip, P1DTCON2), CHIP_REG(chip, P1FLTACON),
-        CHIP_REG(chip, P1OVDCON),  CHIP_REG(chip, OSCCON),    CHIP_REG(chip, CLKDIV),  CHIP_REG(chip, PLLFBD),   CHIP_REG(chip, PMD1),     CHIP_REG(chip, RPINR12),  CHIP_REG(chip, LATB),     CHIP_REG(chip, TRISB),
+    static const uint16_t watched[16] = {
+        SFR_P1TCON, SFR_P1TPER, SFR_P1SECMP, SFR_PWM1CON1, SFR_PWM1CON2, SFR_P1DTCON1, SFR_P1DTCON2, SFR_P1FLTACON,
+        SFR_P1OVDCON, SFR_OSCCON, SFR_CLKDIV, SFR_PLLFBD, SFR_PMD1, SFR_RPINR12, SFR_LATB, SFR_TRISB,
     };
+    uint16_t now[16];
+    for (unsigned n = 0; n < 16; n++) {
+        now[n] = chip_get(chip, watched[n]);
+    }
     if (memcmp(now, chip->pwm.seen, sizeof now) == 0) {
         return false;
     }
@@ -330,7 +335,8 @@ static void idle_check(chip_t *chip)
         return;
     }
     if (++pwm->idle_periods == IDLE_PATIENCE + chip->cpu.start_periods) {
-        chip_warn(chip, "P1TCON: the PWM does not run (PTEN is %u), nothing triggers the ADC", (CHIP_REG(chip, P1TCON) & PTEN) != 0 ? 1u : 0u);
+        chip_warn(chip, "P1TCON: the PWM does not run (PTEN is %u), nothing triggers the ADC",
+                  (CHIP_REG(chip, P1TCON) & PTEN) != 0 ? 1u : 0u);
     }
 }
 
@@ -417,7 +423,8 @@ void chip_pwm_written(chip_t *chip)
 {
     chip_pwm_t *pwm = &chip->pwm;
     bool immediate = (CHIP_REG(chip, PWM1CON2) & IUE) != 0
-                     && (pwm->duty[0] != CHIP_REG(chip, P1DC1) || pwm->duty[1] != CHIP_REG(chip, P1DC2) || pwm->duty[2] != CHIP_REG(chip, P1DC3));
+                     && (pwm->duty[0] != CHIP_REG(chip, P1DC1) || pwm->duty[1] != CHIP_REG(chip, P1DC2)
+                         || pwm->duty[2] != CHIP_REG(chip, P1DC3));
     bool override = (CHIP_REG(chip, PWM1CON2) & OSYNC) == 0 && pwm->ovdcon != CHIP_REG(chip, P1OVDCON);
     bool outputs = CHIP_REG(chip, PWM1CON1) != pwm->seen[3] || CHIP_REG(chip, P1FLTACON) != pwm->seen[7];
     if (override) {
@@ -473,8 +480,8 @@ void chip_pwm_cut(chip_t *chip)
     chip->pwm.length_s = chip->plant->now_s;
 }
 
-/* Follow the fault pin. Outputs enter their fault state at once and leave it at the start of a period: by themselves in cycle-by-cycle mode,
- * after FLTA1IF was cleared in latched mode. */
+/* Follow the fault pin. Outputs enter their fault state at once and leave it at the start of a period: by themselves in cycle-by-cycle
+ * mode, after FLTA1IF was cleared in latched mode. */
 void chip_pwm_fault(chip_t *chip, bool period_start)
 {
     chip_fault_t *fault = &chip->fault;

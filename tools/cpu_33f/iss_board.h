@@ -1,8 +1,8 @@
 /* The virtual board around an image of the target: the very program runs in the instruction-set simulator, and the firmware that is
  * linked with this library runs beside it, interrupt by interrupt, as the judge.
  *
- * Everything in vboard.h works as with the host's firmware; the signals "fw.*" come from the target's RAM by the names in its ELF file. Lock-step: at each
- * control interrupt the host's handler gets the same samples and commands; duties, overrides and all signals must be equal to the bit.
+ * Everything in vboard.h works as with the host's firmware; the signals "fw.*" come from the target's RAM by the names in its ELF file.
+ * Lock-step: at each control interrupt the host's handler gets the same samples and commands; duties, overrides and all signals must be equal to the bit.
  */
 #ifndef FOC33_CPU_33F_ISS_BOARD_H
 #define FOC33_CPU_33F_ISS_BOARD_H
@@ -10,8 +10,8 @@
 #include "iss.h"
 #include "vboard.h"
 
-/* A new board around the image, a text as iss_image.h describes it; NULL with one line "what, where: what to do" in `error`. The host's firmware
- * is a set of globals: one such board per process. */
+/* A new board around the image, a text as iss_image.h describes it; NULL with one line "what, where: what to do" in `error`. The host's
+ * firmware is a set of globals: one such board per process. */
 vb_t *vb_create_iss(const char *image, char *error, size_t size);
 
 /* 1 if the image says where the drive's variables are: signals "fw.*" and the comparison; 0: a HEX file has none. */

@@ -40,7 +40,8 @@ static bool put_line(iss_image_t *image, const char *line)
     if (sscanf(line, "word %lx %lx", &address, &size) == 2) {
         return put_word(image, (uint32_t)address, (uint32_t)size);
     }
-    return sscanf(line, "%15s %lx %lx %511s", kind, &address, &size, name) == 4 && put_symbol(image, kind, (uint32_t)address, (uint32_t)size, name);
+    return sscanf(line, "%15s %lx %lx %511s", kind, &address, &size, name) == 4
+           && put_symbol(image, kind, (uint32_t)address, (uint32_t)size, name);
 }
 
 int iss_image_parse(iss_image_t *image, const char *text)

@@ -27,7 +27,7 @@ typedef struct {
     size_t symbol_count;
 } iss_image_t;
 
-/* Reads the text, or a file with it. 0, or the number of the first line that cannot be; -1: no file or no memory. Free the image in any case. */
+/* Reads the text, or a file with it. 0, or the number of the first line that cannot be; -1: no file or memory. Free the image anyway. */
 int iss_image_parse(iss_image_t *image, const char *text);
 int iss_image_read(iss_image_t *image, const char *path);
 void iss_image_free(iss_image_t *image);

@@ -72,7 +72,8 @@ static bool registers_agree(iss_board_t *b)
 {
     const chip_t *chip = b->cpu.chip;
     const struct { const char *name; uint16_t target, host; } row[] = {
-        {"P1DC1", CHIP_REG(chip, P1DC1), P1DC1}, {"P1DC2", CHIP_REG(chip, P1DC2), P1DC2}, {"P1DC3", CHIP_REG(chip, P1DC3), P1DC3}, {"P1OVDCON", CHIP_REG(chip, P1OVDCON), P1OVDCON},
+        {"P1DC1", CHIP_REG(chip, P1DC1), P1DC1}, {"P1DC2", CHIP_REG(chip, P1DC2), P1DC2},
+        {"P1DC3", CHIP_REG(chip, P1DC3), P1DC3}, {"P1OVDCON", CHIP_REG(chip, P1OVDCON), P1OVDCON},
     };
     for (size_t n = 0; n < sizeof row / sizeof row[0]; n++) {
         if (row[n].target != row[n].host) {

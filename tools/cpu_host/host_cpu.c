@@ -89,10 +89,13 @@ typedef struct {
 static const handler_t *handler_of(unsigned irq)
 {
     static const handler_t handlers[] = {
-        {CHIP_IRQ_ADC1, _ADC1Interrupt, "_ADC1Interrupt", "AD1IF", "AD1IE"}, {CHIP_IRQ_FLTA1, _FLTA1Interrupt, "_FLTA1Interrupt", "FLTA1IF", "FLTA1IE"},
-        {CHIP_IRQ_PWM1, _MPWM1Interrupt, "_MPWM1Interrupt", "PWM1IF", "PWM1IE"}, {CHIP_IRQ_T1, _T1Interrupt, "_T1Interrupt", "T1IF", "T1IE"},
+        {CHIP_IRQ_ADC1, _ADC1Interrupt, "_ADC1Interrupt", "AD1IF", "AD1IE"},
+        {CHIP_IRQ_FLTA1, _FLTA1Interrupt, "_FLTA1Interrupt", "FLTA1IF", "FLTA1IE"},
+        {CHIP_IRQ_PWM1, _MPWM1Interrupt, "_MPWM1Interrupt", "PWM1IF", "PWM1IE"},
+        {CHIP_IRQ_T1, _T1Interrupt, "_T1Interrupt", "T1IF", "T1IE"},
         {CHIP_IRQ_T2, _T2Interrupt, "_T2Interrupt", "T2IF", "T2IE"}, {CHIP_IRQ_T3, _T3Interrupt, "_T3Interrupt", "T3IF", "T3IE"},
-        {CHIP_IRQ_U1RX, _U1RXInterrupt, "_U1RXInterrupt", "U1RXIF", "U1RXIE"}, {CHIP_IRQ_U1TX, _U1TXInterrupt, "_U1TXInterrupt", "U1TXIF", "U1TXIE"},
+        {CHIP_IRQ_U1RX, _U1RXInterrupt, "_U1RXInterrupt", "U1RXIF", "U1RXIE"},
+        {CHIP_IRQ_U1TX, _U1TXInterrupt, "_U1TXInterrupt", "U1TXIF", "U1TXIE"},
     };
     for (size_t n = 0; n < sizeof handlers / sizeof handlers[0]; n++) {
         if (handlers[n].irq == irq) {
@@ -118,7 +121,8 @@ static void serve(host_t *h, unsigned irq)
     show_registers(h);
     handler->run();
     if ((chip_get(h->chip, word_of(SFR_IFS0, irq)) >> irq % 16u & 1u) != 0) {
-        chip_warn(h->chip, "IFS%u: %s leaves %s set, the interrupt repeats for ever and the main loop stands still", irq / 16u, handler->name, handler->flag);
+        chip_warn(h->chip, "IFS%u: %s leaves %s set, the interrupt repeats for ever and the main loop stands still", irq / 16u,
+                  handler->name, handler->flag);
         h->stuck = true;
     }
     follow_writes(h, irq == CHIP_IRQ_U1RX);
@@ -227,8 +231,8 @@ vb_t *vb_create(void)
     if (h == NULL) {
         return NULL;
     }
-    const chip_cpu_t cpu = {.context = h, .reg = host_reg, .reset = host_reset, .cycles = host_cycles, .raised = host_raised, .begin = host_begin,
-                            .end = host_end, .destroy = host_destroy};
+    const chip_cpu_t cpu = {.context = h, .reg = host_reg, .reset = host_reset, .cycles = host_cycles, .raised = host_raised,
+                            .begin = host_begin, .end = host_end, .destroy = host_destroy};
     h->vb = vb_create_with_cpu(&cpu);
     if (h->vb == NULL) {
         free(h);

@@ -31,7 +31,9 @@ typedef struct {
 /* ---- inverter (plant_inverter.c) ---- */
 
 typedef enum { PLANT_GATE_OFF = 0, PLANT_GATE_LOW = 1, PLANT_GATE_HIGH = 2, PLANT_GATE_BOTH = 3 } plant_gate_t;
-typedef enum { PLANT_COND_FLOAT, PLANT_COND_LOW, PLANT_COND_HIGH, PLANT_COND_DIODE_LOW, PLANT_COND_DIODE_HIGH, PLANT_COND_SHOOT } plant_cond_t;
+typedef enum {
+    PLANT_COND_FLOAT, PLANT_COND_LOW, PLANT_COND_HIGH, PLANT_COND_DIODE_LOW, PLANT_COND_DIODE_HIGH, PLANT_COND_SHOOT
+} plant_cond_t;
 
 /* A leg: terminal voltage = share * bus + fixed - ohm * i; it takes from_bus * i + shoot * bus from the bus. */
 typedef struct {

@@ -84,6 +84,7 @@ static void warn(void *context, const char *format, va_list args)
 }
 
 const chip_board_t vb_circuit = {
-    .levels = levels, .input_v = input_voltage, .sampled = sampled, .served = vb_served, .send = vb_serial_send, .receive = vb_serial_receive, .warn = warn,
+    .levels = levels, .input_v = input_voltage, .sampled = sampled, .served = vb_served, .send = vb_serial_send,
+    .receive = vb_serial_receive, .warn = warn,
     .fault_rp = FLTA_RP, .channel = {{8, "the potentiometer"}, {0, "IA"}, {1, "IB"}, {2, "VBUS"}},
 };
