@@ -221,7 +221,8 @@ def main(argv=None):
     try:
         tests.prepare(arguments.tests, behaviour)
         for name in arguments.scripts:
-            note = tests.add_script(name, [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"], [*PARAMETER_FILES, "include/drive/drive.h"])
+            command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"test/{name}.py"]
+            note = tests.add_script(name, command, [*PARAMETER_FILES, "include/drive/drive.h"])
             if note:
                 print(note, file=sys.stderr)
         print(f"{len(tests.tests)} tests built and passed in {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)
