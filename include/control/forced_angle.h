@@ -12,8 +12,8 @@ typedef struct {
 
 /** State. */
 typedef struct {
-    int32_t speed_q10;   /**< magnitude, 1/1024 angle counts per period */
-    uint32_t angle_q32;  /**< the fraction below one count is kept, so the speed is exact */
+    int32_t speed_q10;  /**< magnitude, 1/1024 angle counts per period */
+    uint32_t angle_q32; /**< the fraction below one count is kept, so the speed is exact */
 } forced_angle_t;
 
 /** Accelerates by one step and moves the angle. @param direction +1 or -1 @return nonzero at the end speed */
