@@ -1,4 +1,4 @@
-/* The note's PLL estimator, Equations 1-7: currents and the acting voltage become back-EMF, speed and rotor angle. */
+/* AN1292's PLL estimator, Equations 1-7: currents and the acting voltage become back-EMF, speed and rotor angle. */
 #ifndef CONTROL_ESTIMATOR_H
 #define CONTROL_ESTIMATOR_H
 
@@ -23,7 +23,7 @@ typedef struct {
 /** Constants that field weakening adapts while the motor runs. */
 typedef struct {
     uint16_t ls_q16;          /**< Ls/(8 Ts) I0/(2 U0) * 65536 >> ls_exp: Q14 eight-sample difference to Q13 voltage */
-    int16_t inv_kfi;          /**< InvKFi in the note's format: 1/Kphi / 2 in Q15 */
+    int16_t inv_kfi;          /**< InvKFi in AN1292's format: 1/Kphi / 2 in Q15 */
     int16_t emf_sum_max_q12;  /**< 32767 * 2048 / inv_kfi: keeps the speed in 16 bits */
     int16_t kfilter_esdq_q16; /**< back-EMF filter, 2 * KFILTER_ESDQ or 2 * KFILTER_ESDQ_FW */
 } estimator_tuning_t;

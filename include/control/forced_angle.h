@@ -4,7 +4,7 @@
 
 #include "control/qmath.h"
 
-/** Constants of the ramp, in the note's 1/1024 angle counts per period. */
+/** Constants of the ramp, in AN1292's 1/1024 angle counts per period. */
 typedef struct {
     int32_t end_speed_q10;     /**< END_SPEED_RPM * P * Ts * 65536/60 * 1024 */
     int16_t increase_rate_q10; /**< OPENLOOP_RAMPSPEED_INCREASERATE: added every period */

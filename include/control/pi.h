@@ -1,4 +1,4 @@
-/* The note's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out). */
+/* AN1292's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out). */
 #ifndef CONTROL_PI_H
 #define CONTROL_PI_H
 
