@@ -2,6 +2,8 @@
 /* defines: -DTUNING */
 #include "ideal_motor.h"
 
+#include "firmware/drive/drive.c"
+
 void setUp(void)
 {
     rig_power_up();
