@@ -68,6 +68,10 @@ void test_agreement_must_be_without_a_gap(void)
     TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
     TEST_ASSERT_EQUAL_UINT16(1, ready_steps(5000, 1));
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+    at_the_end_of_the_ramp(1);
+    TEST_ASSERT_EQUAL_UINT16(450, ready_steps(0, 450));
+    TEST_ASSERT_EQUAL_UINT16(50, ready_steps(5000, 1000)); /* the last moment */
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
 
 void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_one_only(void)
@@ -212,6 +216,9 @@ void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(voi
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
         }
+        drive.run.handover.offset = sign;
+        handover_decay(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
     }
 }
 

@@ -79,6 +79,8 @@ void test_braking_current_fades_between_27_and_29_volts(void)
         limits_braking(&drive.run, &params, (int16_t)(cases[n].bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(cases[n].tolerance, cases[n].limit_q13, drive.run.control.brake_limit_q13, golden_row(n));
     }
+    limits_braking(&drive.run, &params, (int16_t)(params.bus_regen_q15 + 1));
+    TEST_ASSERT_LESS_THAN_INT16(5120, drive.run.control.brake_limit_q13);
 }
 
 void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)
@@ -93,11 +95,13 @@ void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)
         speed_step(&drive, &params);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].iq_q13, drive.run.control.ref_q13.q, golden_row(n));
     }
-    rig_closed(1, 20000);
-    drive.run.control.brake_limit_q13 = 0;
-    rig_speed(5000);
-    speed_step(&drive, &params);
-    TEST_ASSERT_GREATER_THAN_INT16(1000, drive.run.control.ref_q13.q);
+    EACH_DIRECTION(direction) {
+        rig_closed(direction, (int16_t)(direction * 20000));
+        drive.run.control.brake_limit_q13 = 0;
+        rig_speed((int16_t)(direction * 5000));
+        speed_step(&drive, &params);
+        TEST_ASSERT_TRUE(direction * drive.run.control.ref_q13.q > 1000);
+    }
 }
 
 void test_brake_limit_does_not_wind_the_speed_controller_up(void)

@@ -81,6 +81,7 @@ void test_stop_ends_when_speed_and_reference_are_below_the_minimum(void)
         { DRIVE_STOPPING, DRIVE_STOPPED, 2499, 2499 }, { DRIVE_STOPPING, DRIVE_STOPPED, -2499, -2499 },
         { DRIVE_STOPPING, DRIVE_STOPPING, 2500, 2400 }, { DRIVE_STOPPING, DRIVE_STOPPING, -2500, 2400 },
         { DRIVE_STOPPING, DRIVE_STOPPING, 2400, 2600 }, { DRIVE_STOPPING, DRIVE_STOPPING, 2400, -2600 },
+        { DRIVE_STOPPING, DRIVE_STOPPING, 2400, 2508 }, /* a step from there is the minimum */
         { DRIVE_CLOSED, DRIVE_CLOSED, 2000, 2000 }, /* low speed alone */
     };
     EACH(n, cases) {

@@ -87,6 +87,7 @@ void test_outputs_of_every_state(void)
         rig_tick(1);
         EXPECT_DRIVE(state, fault, golden_row(state));
         TEST_ASSERT_EQUAL_INT16(rig_outputs[state] == (uint16_t)OUTPUTS_PWM, drive_is_running(&drive));
+        TEST_ASSERT_EQUAL_INT16(state == (uint16_t)DRIVE_CLOSED || state == (uint16_t)DRIVE_STOPPING, drive_is_closed(&drive));
         if (rig_outputs[state] != (uint16_t)OUTPUTS_PWM) {
             TEST_ASSERT_EQUAL_UINT16(0, out.duty.a);
             TEST_ASSERT_EQUAL_UINT16(0, out.duty.b);
