@@ -40,7 +40,7 @@ void test_measures_motors_of_every_kind(void)
         TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].lq_mh, cases[n].lq_mh, (float)values->lq_uh * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].kphi, cases[n].kphi, (float)values->kphi_mv_per_krpm * 0.001F);
         expect_off();
-        TEST_ASSERT_TRUE(highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
+        TEST_ASSERT_TRUE(motor.highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
     }
 }
 
@@ -49,7 +49,8 @@ void test_finds_the_rotor_wherever_it_stands(void)
     static const float at[4][2] = { { 1.0F, 0.0F }, { -1.0F, 0.0F }, { -0.5F, 0.8660254F }, { 0.5F, -0.8660254F } };
     EACH(n, at) {
         unknown_set(2.67F, 1.0F, 2.0F, 7.24F);
-        ideal_motor_reset(at[n][0], at[n][1]);
+        motor.cos_e = at[n][0];
+        motor.sin_e = at[n][1];
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
         TEST_ASSERT_UINT16_WITHIN(20, 1000, values->ld_uh);
         TEST_ASSERT_UINT16_WITHIN(40, 2000, values->lq_uh);
@@ -58,7 +59,7 @@ void test_finds_the_rotor_wherever_it_stands(void)
 
 void test_a_rotor_that_swings_does_not_change_the_back_emf(void)
 {
-    unknown.friction_nm = 0.0F;
+    motor.friction_nm = 0.0F;
     unknown_begin();
     (void)unknown_until(IDENTIFY_SPIN_FULL);
     motor.omega *= 0.9F; /* a knock */
@@ -98,14 +99,14 @@ void test_each_motor_that_cannot_be_measured_is_refused_by_name(void)
     };
     EACH(n, cases) {
         unknown_set(cases[n].rs, cases[n].l_mh, cases[n].l_mh, cases[n].kphi);
-        unknown.inertia = cases[n].inertia;
-        unknown.blocked = cases[n].blocked;
-        unknown.open_phase = cases[n].open_phase;
+        motor.inertia = cases[n].inertia;
+        motor.blocked = cases[n].blocked;
+        motor.open_phase = cases[n].open_phase;
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, unknown_identify(), cases[n].what);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_IDLE, drive.run.identify.step, cases[n].what);
         expect_off();
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, values->kphi_mv_per_krpm, cases[n].what);
-        TEST_ASSERT_TRUE_MESSAGE(cases[n].open_phase == 0u || highest_a < PARAM_F(Q_CURRENT_REF_OPENLOOP), cases[n].what);
+        TEST_ASSERT_TRUE_MESSAGE(cases[n].open_phase == 0u || motor.highest_a < PARAM_F(Q_CURRENT_REF_OPENLOOP), cases[n].what);
         if (cases[n].blocked) { /* what standstill tells is kept */
             TEST_ASSERT_UINT16_WITHIN(27, 2670, values->rs_mohm);
             TEST_ASSERT_UINT16_WITHIN(20, 1920, values->ld_uh);
@@ -138,7 +139,7 @@ void test_what_happens_during_a_step_ends_it_by_name(void)
     };
     EACH(n, cases) {
         begin_until(cases[n].step);
-        unknown.open_phase = cases[n].open_phase;
+        motor.open_phase = cases[n].open_phase;
         motor.bus_v = cases[n].bus_v;
         (void)unknown_until(IDENTIFY_IDLE);
         TEST_ASSERT_EQUAL_UINT16(cases[n].result, drive.run.identify.result);
@@ -171,13 +172,13 @@ void test_S2_and_overcurrent_in_any_step_switch_off_at_once(void)
 void test_does_not_start_again_by_itself_but_with_S2_which_forgets_the_old_values(void)
 {
     int16_t n;
-    unknown.open_phase = 4;
+    motor.open_phase = 4;
     (void)unknown_identify();
     for (n = 0; n < 500; n++) {
         unknown_ms();
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-    unknown.open_phase = 0;
+    motor.open_phase = 0;
     unknown_press_s2();
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, drive.run.identify.result);
     (void)unknown_until(IDENTIFY_IDLE);
