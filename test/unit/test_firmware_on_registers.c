@@ -135,23 +135,6 @@ void test_S2_leads_over_bootstrap_to_pwm_and_stops_and_nothing_else_does(void)
     expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);
 }
 
-void test_no_start_before_the_offsets_are_known(void)
-{
-    PORTAbits.RA8 = 0;
-    board_ms(51); /* 1020 samples */
-    expect(DRIVE_CALIBRATE, FAULT_NONE, 0x0000);
-}
-
-void test_implausible_offset_keeps_the_outputs_off(void)
-{
-    ADC1BUF1 = 8192;
-    board_ms(60);
-    expect(DRIVE_FAULT, FAULT_OFFSET, 0x0000);
-    PORTAbits.RA8 = 0;
-    board_ms(200); /* cleared, calibrated again, wrong again */
-    expect(DRIVE_FAULT, FAULT_OFFSET, 0x0000);
-}
-
 void test_fault_is_cleared_by_S2_once_its_input_is_high_and_a_second_press_starts(void)
 {
     board_ms(100);
@@ -178,15 +161,6 @@ void test_silent_converter_is_found_through_timer_1(void)
     IFS0bits.T1IF = 1;
     firmware_background();
     expect(DRIVE_FAULT, FAULT_ADC_LOST, 0x0000);
-}
-
-void test_clock_that_does_not_come_up_keeps_the_outputs_off(void)
-{
-    board_ms(10);
-    drive_init(&board_drive, &board_params);
-    drive_raise(&board_drive, FAULT_CLOCK);
-    board_ms(500);
-    expect(DRIVE_FAULT, FAULT_CLOCK, 0x0000);
 }
 
 void test_second_start_of_the_firmware_begins_anew(void)

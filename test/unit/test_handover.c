@@ -138,7 +138,8 @@ void test_vectors_equal_the_reference_and_all_three_controllers_go_on_from_them(
         TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * 5000, c->reference_erpm, golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_d, pi_tick(&c->pi_d, &params.pi_d, 0, 32767), golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_q, pi_tick(&c->pi_q, &params.pi_q, 0, 32767), golden_row(n));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_i_q, pi_tick(&c->pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120), golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_i_q, pi_tick(&c->pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120),
+                                         golden_row(n));
     }
 }
 

@@ -243,6 +243,7 @@ void test_inductance_is_believed_from_20_uH_to_60_mH_and_sums_without_sense_are_
         { 6284, 60000l, 0 }, { 6285, 60000l, 20 }, { 19338200l, 60000l, 60000u }, { 19338300l, 60000l, 0 },
         { 240000l, 0, 0 }, { 240000l, -5, 0 }, { 0, 60000l, 0 }, { 600, 60000l, 0 }, /* the last: 2 uH */
     };
+    static const identify_step_t axes[] = { IDENTIFY_INDUCTANCE_D, IDENTIFY_INDUCTANCE_Q };
     EACH(n, cases) {
         id->values.rs_mohm = 0;
         id->duty_per_amp = soft_float_of(0);
@@ -250,12 +251,11 @@ void test_inductance_is_believed_from_20_uH_to_60_mH_and_sums_without_sense_are_
         set_sums(cases[n].volts, 0, cases[n].change, 0);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].uh, inductance(id), golden_row(n));
     }
-    setUp();
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_L_RANGE, finished(IDENTIFY_INDUCTANCE_D)); /* no sums at all end the procedure on either axis */
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, id->step);
-    setUp();
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_L_RANGE, finished(IDENTIFY_INDUCTANCE_Q));
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, id->step);
+    EACH(n, axes) { /* no sums at all end the procedure */
+        setUp();
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_L_RANGE, finished(axes[n]));
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, id->step);
+    }
 }
 
 /* ---- The square voltage and its search ---- */
@@ -281,7 +281,7 @@ void test_square_voltage_begins_in_the_middle_of_a_half_and_is_added_to_the_bias
 }
 
 /** A step of the search that has seen this change of current. */
-static void expect_search(int16_t square_q14, uint16_t half, int32_t seen, identify_step_t step, int16_t next_square_q14, uint16_t next_half)
+static void expect_search(int16_t square_q14, uint16_t half, int32_t seen, identify_step_t step, int16_t next_q14, uint16_t next_half)
 {
     id->mode = (uint16_t)IDENTIFY_INJECT;
     id->bias_q14 = 1000;
@@ -290,7 +290,7 @@ static void expect_search(int16_t square_q14, uint16_t half, int32_t seen, ident
     id->sum[2] = seen;
     (void)finished(IDENTIFY_TRY_D);
     TEST_ASSERT_EQUAL_UINT16(step, id->step);
-    TEST_ASSERT_EQUAL_INT16(next_square_q14, id->square_q14);
+    TEST_ASSERT_EQUAL_INT16(next_q14, id->square_q14);
     TEST_ASSERT_EQUAL_UINT16(next_half, id->half);
     TEST_ASSERT_EQUAL_UINT16(4u * next_half, id->wait); /* two cycles to settle */
     TEST_ASSERT_EQUAL_UINT16((step == IDENTIFY_TRY_D) ? 64u * next_half : 8192u, id->left);

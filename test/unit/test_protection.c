@@ -155,7 +155,7 @@ void test_stall_and_lost_lock_are_faults_when_they_last(void)
         { "highest speed", 27500, 32700, 0, 1000, NEVER },
     };
     EACH(n, cases) {
-        uint16_t steps = 0;
+        uint16_t steps = 0, fault;
         rig_closed(1, cases[n].reference_erpm);
         rig_speed(cases[n].speed_erpm);
         drive.run.estimator.e_d_q28 = (int32_t)cases[n].e_d * 65536;
@@ -165,8 +165,8 @@ void test_stall_and_lost_lock_are_faults_when_they_last(void)
             steps++;
         }
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].steps, steps, cases[n].what);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE((steps == (uint16_t)STALL) ? FAULT_STALL : (steps == (uint16_t)LOST_LOCK) ? FAULT_LOST_LOCK : FAULT_NONE,
-                                         drive.fault, cases[n].what);
+        fault = (uint16_t)((steps == (uint16_t)STALL) ? FAULT_STALL : (steps == (uint16_t)LOST_LOCK) ? FAULT_LOST_LOCK : FAULT_NONE);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(fault, drive.fault, cases[n].what);
     }
 }
 
