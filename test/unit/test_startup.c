@@ -50,6 +50,20 @@ void test_start_begins_without_memory_of_the_last_run(void)
     TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.run.control.brake_limit_q13);
 }
 
+void test_first_period_finds_the_frame_of_the_first_angle(void)
+{
+    EACH_DIRECTION(direction) {
+        rig_ready();
+        drive.angle = 0x1234;
+        drive.frame.sin = 1;
+        drive.frame.cos = 2;
+        drive_start(&drive, &params, direction);
+        TEST_ASSERT_EQUAL_HEX16((direction > 0) ? 0xC000u : 0x4000u, drive.angle);
+        TEST_ASSERT_INT16_WITHIN(11, (int16_t)(direction * -32757), drive.frame.sin);
+        TEST_ASSERT_INT16_WITHIN(3, 0, drive.frame.cos);
+    }
+}
+
 void test_stop_switches_off_at_once_before_the_loop_is_closed(void)
 {
     static const drive_state_t states[] = { DRIVE_BOOTSTRAP, DRIVE_ALIGN, DRIVE_RAMP };
