@@ -38,7 +38,6 @@ class Point:
     reference_rpm: float
     use: float
     angle_deg: float
-    angle_rms_deg: float
     id_a: float
     iq_a: float
     current_rms_a: float
@@ -221,6 +220,6 @@ def reduced(rows: np.ndarray, reference_rpm: float) -> Point:
     squares = column["plant.i_d"] ** 2 + column["plant.i_q"] ** 2
     mean = lambda name: float(np.mean(column[name])) # noqa: E731
     return Point(mean("plant.speed_rpm"), reference_rpm, float(np.mean(length / column["fw.v_limit_v"])), float(np.mean(error)),
-                 math.sqrt(float(np.mean(error ** 2))), mean("plant.i_d"), mean("plant.i_q"), math.sqrt(float(np.mean(squares)) / 2.0),
+                 mean("plant.i_d"), mean("plant.i_q"), math.sqrt(float(np.mean(squares)) / 2.0),
                  mean("fw.id_trim_a"), mean("bus.voltage_v"))
 

@@ -165,8 +165,9 @@ def _plant(motor: Motor, board: BoardFile, changes: board_keys.Values, keys: Any
 
 
 # ---- the command -----------------------------------------------------------------------------------------------------------
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `identify` understands."""
+def add_command(commands: Any) -> None:
+    """Adds `identify` to a command line's commands."""
+    parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
     parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
@@ -177,12 +178,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/MOTOR")
     parser.add_argument("--no-plots", action="store_true", help="no pictures")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
-
-
-def add_command(commands: Any) -> None:
-    """Adds `identify` to a command line's commands."""
-    parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
-    add_arguments(parser)
     parser.set_defaults(command=command)
 
 

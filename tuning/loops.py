@@ -12,7 +12,7 @@ F/(1 + F w0 I) (dR + s dL)/psi times the q current, which is what makes a slow m
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -178,14 +178,12 @@ def current_grid(period_s: float, points: int = 400) -> np.ndarray:
 def corners(plant: Plant, spread: dict[str, tuple[float, float]] | None = None) -> list[tuple[str, Plant]]:
     """The parameter set: every combination of R, L and flux at both ends of their published spread, or of the tolerance
     where none is published, and the middle."""
-    ends = dict(TOLERANCE)
-    ends |= spread or {}
+    ends = TOLERANCE | (spread or {})
     found = [("nominal", plant)]
     for r, l, k in product(*((1.0, *ends[name]) for name in ("rs", "ls", "psi"))):
         if (r, l, k) != (1.0, 1.0, 1.0):
             text = ", ".join(f"{name} {factor - 1.0:+.0%}" for name, factor in (("R", r), ("L", l), ("flux", k)) if factor != 1.0)
-            found.append((text,
-                          Plant(plant.rs * r, plant.ld * l, plant.lq * l, plant.psi * k, plant.pole_pairs, plant.inertia, plant.viscous)))
+            found.append((text, replace(plant, rs=plant.rs * r, ld=plant.ld * l, lq=plant.lq * l, psi=plant.psi * k)))
     return found
 
 
@@ -217,14 +215,14 @@ def _largest(candidates: list[float], worst_of: Callable[[float, bool], tuple[Ma
 def current_gains(plant: Plant, bandwidth_hz: float, base: Gains) -> Gains:
     """Pole-zero cancellation: Kp = 2 pi f L of each axis, Ki = 2 pi f R."""
     w = 2.0 * np.pi * bandwidth_hz
-    return Gains(w * plant.ld, w * plant.lq, w * plant.rs * base.period_s, base.speed_kp, base.speed_ki, base.esdq, base.velestim, base.period_s)
+    return replace(base, kp_d=w * plant.ld, kp_q=w * plant.lq, ki=w * plant.rs * base.period_s)
 
 
 def speed_gains(plant: Plant, bandwidth_hz: float, base: Gains) -> Gains:
     """Kp = 2 pi f J/Kt per mechanical, i.e. / P per electrical rad/s; zero at f/3."""
     w = 2.0 * np.pi * bandwidth_hz
     kp = w * plant.inertia / plant.kt / plant.pole_pairs
-    return Gains(base.kp_d, base.kp_q, base.ki, kp, kp * w / ZERO_RATIO * SLOTS * base.period_s, base.esdq, base.velestim, base.period_s)
+    return replace(base, speed_kp=kp, speed_ki=kp * w / ZERO_RATIO * SLOTS * base.period_s)
 
 
 def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: Gains, top_rad_s: float, largest_hz: float, least_hz: float,

@@ -192,7 +192,7 @@ class FakeMotor:
         psi, ls_h = fw_search.flux_vs(self.params), self.inductance(entry.idref_a, iq_a)
         wrong_h = ls_h - self.params["MOTOR_LS_MH"] * 1e-3 * 2.0 * entry.ls_ratio
         angle = self.angle(entry) if self.angle else math.degrees(1.0 - 7956.0 / entry.inv_kfi / (1.0 + wrong_h * entry.idref_a / psi))
-        return Point(self.rpm / max(use, 1.0), self.rpm, min(use, 1.0), angle, abs(angle), entry.idref_a, iq_a,
+        return Point(self.rpm / max(use, 1.0), self.rpm, min(use, 1.0), angle, entry.idref_a, iq_a,
                      0.7 * math.hypot(entry.idref_a, iq_a), 0.0, 24.0)
 
     def needs(self, found: fw_search.Found, load_nm: float) -> bool:
@@ -357,11 +357,11 @@ KNOWN = fw_tune.defines(HEADER)
 
 
 def test_values_change_and_comments_stay():
-    text = fw_tune.with_values(HEADER, {"FW_START_SPEED_RPM": "2345", "IDREF_SPEED1": "-0.77"})
+    text = fw_tables.with_values(HEADER, {"FW_START_SPEED_RPM": "2345", "IDREF_SPEED1": "-0.77"})
     assert fw_tune.defines(text) == KNOWN | {"FW_START_SPEED_RPM": 2345.0, "IDREF_SPEED1": -0.77}
     assert text.count("/*") == HEADER.count("/*")
     with pytest.raises(UserError, match="NO_SUCH_NAME"):
-        fw_tune.with_values(HEADER, {"NO_SUCH_NAME": "1"})
+        fw_tables.with_values(HEADER, {"NO_SUCH_NAME": "1"})
 
 
 def test_numbers_are_read():
