@@ -154,11 +154,6 @@ def test_without_any_motor_that_fits_nothing_runs(several):
     runs.assert_not_called()
 
 
-def test_the_header_alone():
-    code, text, _ = command("header", HURST)
-    assert code == 0 and text.startswith("/* Everything a user edits") and text.endswith("#endif\n")
-
-
 def test_make_help_names_the_motor_that_is_taken_without_motor():
     makefile = (paths.ROOT / "Makefile").read_text(encoding="utf-8")
     default = re.search(r"tune_motor = .*\$\(or \$\(MOTOR\),(\w+)\)", makefile)[1]
