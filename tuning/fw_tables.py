@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import json
 import math
 import os
 import re
@@ -54,7 +55,10 @@ class Tables:
 
     def mismatch(self, params: Mapping[str, float]) -> str:
         """"" if the tables belong to a motor with these parameters of userparams.h; otherwise the first difference."""
-        return difference(self.fingerprint, params)
+        for name, known in self.fingerprint.items():
+            if not math.isclose(known, params[name], rel_tol=NEARLY):
+                return f"they are for {name} = {known:g}, the motor has {params[name]:g}"
+        return ""
 
     def parameters(self) -> dict[str, str]:
         """Names and values of userparams.h; an unchanged 1/Kphi is written as NORM_INVKFIBASE."""
@@ -70,13 +74,6 @@ class Tables:
 def fingerprint(params: Mapping[str, float]) -> dict[str, float]:
     """The values that tables found with these parameters belong to."""
     return {name: float(params[name]) for name in FINGERPRINT}
-
-
-def difference(known: Mapping[str, float], params: Mapping[str, float]) -> str:
-    for name in FINGERPRINT:
-        if not math.isclose(known[name], params[name], rel_tol=NEARLY):
-            return f"they are for {name} = {known[name]:g}, the motor has {params[name]:g}"
-    return ""
 
 
 def path_of(motor: str) -> Path:
@@ -151,9 +148,9 @@ def text(tables: Tables) -> str:
     entries = tables.entries
     lines = [f"# Field-weakening tables of {tables.motor}, found on the virtual board by: make tune-fw MOTOR={tables.motor}",
              "# make tune puts them into the motor's userparams.h as long as the fingerprint matches the motor file.",
-             f"motor = {_quoted(tables.motor)}", f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
+             f"motor = {json.dumps(tables.motor, ensure_ascii=False)}", f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
              f"last_index = {tables.last_index}          # the last entry that was reached",
-             f"stopped = {_quoted(tables.stopped)}", f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # reached without load",
+             f"stopped = {json.dumps(tables.stopped, ensure_ascii=False)}", f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # reached without load",
              f"inv_kfi_base = {tables.inv_kfi_base:.0f}",
              "idref_a = " + _list(f"{entry.idref_a:.2f}" for entry in entries),
              "inv_kfi = " + _list(f"{entry.inv_kfi:.0f}" for entry in entries),
@@ -169,10 +166,6 @@ def text(tables: Tables) -> str:
 
 def _number(value: float) -> str:
     return f"{value:.5g}" if math.isfinite(value) else "nan"
-
-
-def _quoted(words: str) -> str:
-    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _list(values: Any) -> str:

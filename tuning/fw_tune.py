@@ -12,11 +12,12 @@ as the rated current is enough for it. Beyond, the tables make room for the spee
 """
 
 import argparse
+import contextlib
 import math
 import re
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -131,8 +132,8 @@ class _Job:
     entries: int = ENTRIES
     risks: str = ""
 
-    def bench(self, tell: Callable) -> Bench:
-        return Bench(self.library, self.values, tell, self.risks)
+    def bench(self, tell: Callable) -> "contextlib.closing[Bench]":
+        return contextlib.closing(Bench(self.library, self.values, tell, self.risks))
 
 
 class _Work:
@@ -217,41 +218,31 @@ class _Work:
 
 
 def _search(job: _Job, tell: Callable) -> Result:
-    bench = job.bench(tell)
-    try:
-        return Search(bench, job.goal, lambda *news: tell(news), job.entries).run()
-    except Fault as fault:
-        raise UserError(f"the motor stopped with {fault} at {bench.target_rpm:.0f} rpm, below field weakening", "",
-                        "run the motor there with make run and look at its plots") from None
-    finally:
-        bench.close()
+    with job.bench(tell) as bench:
+        try:
+            return Search(bench, job.goal, lambda *news: tell(news), job.entries).run()
+        except Fault as fault:
+            raise UserError(f"the motor stopped with {fault} at {bench.target_rpm:.0f} rpm, below field weakening", "",
+                            "run the motor there with make run and look at its plots") from None
 
 
-def _ready(job: _Job, tell: Callable) -> Bench:
+@contextlib.contextmanager
+def _ready(job: _Job, tell: Callable) -> Iterator[tuple[Bench, Tables]]:
     """A bench with the new tables and the trim as in userparams.h, in closed loop."""
-    bench = job.bench(tell)
     assert job.tables is not None
-    bench.set("FW_START_SPEED_RPM", job.tables.start_speed_rpm)
-    for i, entry in enumerate(job.tables.entries):
-        bench.entry(i, entry)
-    bench.start()
-    return bench
+    with job.bench(tell) as bench:
+        bench.set("FW_START_SPEED_RPM", job.tables.start_speed_rpm)
+        for i, entry in enumerate(job.tables.entries):
+            bench.entry(i, entry)
+        bench.start()
+        yield bench, job.tables
 
 
 def _torque(job: _Job, tell: Callable) -> float:
     """Largest load at an entry's speed with the speed still held."""
-    bench = _ready(job, tell)
-    assert job.tables is not None
-    rpm = job.tables.speed_rpm(job.index)
-
-    def held(torque_nm: float) -> bool:
-        return holds(bench, rpm, torque_nm)
-
-    try:
+    with _ready(job, tell) as (bench, tables):
         limit = torque_per_ampere(bench.params) * bench.params["MAXIMUM_CURRENT_A"]
-        return largest(held, limit, TORQUE_STEPS)
-    finally:
-        bench.close()
+        return largest(lambda torque_nm: holds(bench, tables.speed_rpm(job.index), torque_nm), limit, TORQUE_STEPS)
 
 
 def holds(bench: Bench, rpm: float, torque_nm: float) -> bool:
@@ -277,50 +268,47 @@ def holds(bench: Bench, rpm: float, torque_nm: float) -> bool:
 
 def _maximum(job: _Job, tell: Callable) -> float:
     """Highest speed held without load."""
-    bench = _ready(job, tell)
-    assert job.tables is not None
-    base = job.tables.speed_rpm(job.tables.last_index)
-    ceiling = bench.params["MAXIMUM_SPEED_RPM"]
+    with _ready(job, tell) as (bench, tables):
+        base = tables.speed_rpm(tables.last_index)
 
-    def too_fast(step: int) -> bool:
-        tell((ENTRIES, base + step * SPEED_STEP_RPM, "no load"))
-        return not holds(bench, base + step * SPEED_STEP_RPM, 0.0)
+        def too_fast(step: int) -> bool:
+            tell((ENTRIES, base + step * SPEED_STEP_RPM, "no load"))
+            return not holds(bench, base + step * SPEED_STEP_RPM, 0.0)
 
-    try:
-        count = max(0, math.floor((ceiling - base) / SPEED_STEP_RPM))
+        count = max(0, math.floor((bench.params["MAXIMUM_SPEED_RPM"] - base) / SPEED_STEP_RPM))
         first = least(too_fast, 8, 1, count) if count else None
         return base + (count if first is None else first - 1) * SPEED_STEP_RPM
-    finally:
-        bench.close()
 
 
 def _end_to_end(job: _Job, speeds: list[float], tell: Callable) -> Check:
-    bench = job.bench(tell)
     check = Check()
-    try:
-        bench.start()
-        for rpm in speeds:
-            reached = bench.speed(rpm) and bench.regain()
-            bench.run(1.0)
-            point = bench.point(0.5)
-            check.rows.append({"name": f"{rpm:.0f} rpm", "speed_rpm": point.speed_rpm, "id_a": point.id_a,
-                               "current_a_rms": point.current_rms_a, "use_percent": 100.0 * point.use,
-                               "angle_deg": point.angle_deg, "trim_a": point.trim_a})
-            if not reached or not point.held:
-                check.problems.append(f"the firmware with the new tables does not hold {rpm:.0f} rpm, it turns at {point.speed_rpm:.0f} rpm")
-        bench.press("s2")
-        waited = 0.0
-        while bench.state() == "STOPPING" and waited < 20.0:
-            bench.run(0.1)
-            waited += 0.1
-        bench.check()
-        if bench.state() != "STOPPED":
-            check.problems.append(f"the firmware with the new tables does not stop, its state is {bench.state()}")
-    except Fault as fault:
-        check.problems.append(f"the firmware with the new tables stops with {fault} at {bench.target_rpm:.0f} rpm")
-    finally:
-        bench.close()
+    with job.bench(tell) as bench:
+        try:
+            _drive(bench, speeds, check)
+        except Fault as fault:
+            check.problems.append(f"the firmware with the new tables stops with {fault} at {bench.target_rpm:.0f} rpm")
     return check
+
+
+def _drive(bench: Bench, speeds: list[float], check: Check) -> None:
+    """Start, every speed, stop."""
+    bench.start()
+    for rpm in speeds:
+        reached = bench.speed(rpm) and bench.regain()
+        bench.run(1.0)
+        point = bench.point(0.5)
+        check.rows.append({"name": f"{rpm:.0f} rpm", "speed_rpm": point.speed_rpm, "id_a": point.id_a, "current_a_rms": point.current_rms_a,
+                           "use_percent": 100.0 * point.use, "angle_deg": point.angle_deg, "trim_a": point.trim_a})
+        if not reached or not point.held:
+            check.problems.append(f"the firmware with the new tables does not hold {rpm:.0f} rpm, it turns at {point.speed_rpm:.0f} rpm")
+    bench.press("s2")
+    waited = 0.0
+    while bench.state() == "STOPPING" and waited < 20.0:
+        bench.run(0.1)
+        waited += 0.1
+    bench.check()
+    if bench.state() != "STOPPED":
+        check.problems.append(f"the firmware with the new tables does not stop, its state is {bench.state()}")
 
 
 # ---- pure parts ------------------------------------------------------------------------------------------------------------

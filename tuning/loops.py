@@ -243,12 +243,14 @@ def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: G
     candidates = [fixed_hz] if fixed_hz else _steps(cap, max(least_hz, cap / 20.0), 0.95) + above
     chosen, worst, label = _largest(candidates, worst_of, CURRENT_NEARLY_DEG)
     gains = current_gains(plant, chosen, base)
-    design = LoopDesign(chosen, worst, label, Margins(0.0, 0.0, 0.0))
-    for name in dict.fromkeys([*list(cases)[:2 * len(axes)], label]):
-        response = current_loop(grid, cases[name][0], gains, *cases[name][1:])
-        design.curves.append(Curve(name, grid, response, margins(grid, response)))
-    design.nominal = design.curves[0].margins
-    return design
+    shown = dict.fromkeys([*list(cases)[:2 * len(axes)], label])
+    return _made(chosen, worst, label, grid, {name: current_loop(grid, cases[name][0], gains, *cases[name][1:]) for name in shown})
+
+
+def _made(chosen: float, worst: Margins, label: str, grid: np.ndarray, responses: dict[str, np.ndarray]) -> LoopDesign:
+    """A design with the curves that the report shows, the nominal one first."""
+    curves = [Curve(name, grid, response, margins(grid, response)) for name, response in responses.items()]
+    return LoopDesign(chosen, worst, label, curves[0].margins, curves)
 
 
 def _steps(highest: float, lowest: float, ratio: float) -> list[float]:
@@ -286,10 +288,6 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
         finer = [float(f"{chosen + k * step:.3g}") for k in range(30, -1, -1)]
         chosen, worst, label = _largest([f for f in finer if f <= largest_hz], worst_of)
     gains = speed_gains(plant, chosen, base)
-    design = LoopDesign(chosen, worst, label, Margins(0.0, 0.0, 0.0))
     nominal = list(cases)[:len(speeds_rad_s)]
-    for name in dict.fromkeys([nominal[0], nominal[-1], label]):
-        response = speed_loop(grid, cases[name][0], plant, gains, cases[name][1])
-        design.curves.append(Curve(name, grid, response, margins(grid, response)))
-    design.nominal = design.curves[0].margins
-    return design
+    shown = dict.fromkeys([nominal[0], nominal[-1], label])
+    return _made(chosen, worst, label, grid, {name: speed_loop(grid, cases[name][0], plant, gains, cases[name][1]) for name in shown})

@@ -1,5 +1,6 @@
 """The field-weakening tuner: its parts with made-up motors, the tables file, and parameters that change while the motor turns."""
 
+import contextlib
 import functools
 import math
 import re
@@ -385,11 +386,8 @@ def on_board(work, defines=("PARAMS_IN_RAM",)):
     """work(bench) with the Hurst on its board, in a process of its own: the firmware is one set of globals."""
     def run(library, tell):
         layers = [motor_file.load(HURST).plant_values(), board_file.load("mclv").plant_values()]
-        bench = Bench(library, board_keys.resolve(layers, Library(library).keys), tell)
-        try:
+        with contextlib.closing(Bench(library, board_keys.resolve(layers, Library(library).keys), tell)) as bench:
             return work(bench)
-        finally:
-            bench.close()
     return workers.run_all([build.library(list(defines))], run, lambda seconds: None)[0]
 
 
