@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tools.bench import build
 from tools.bench.board import Board, Library
-from tools.common.errors import UserError
-from tools.bench.sweep import start_time_s
 from tools.bench.panel import Ranges
+from tools.bench.sweep import start_time_s
+from tools.common import paths
+from tools.common.errors import UserError
 from tools.common.trace import wrapped_deg
 
 from .fw_tables import ENTRIES, Entry
@@ -28,6 +30,18 @@ REMEDY = {"START_FAILED": "the motor does not follow the ramp: raise Q_CURRENT_R
           "OVERCURRENT_SW": "lower CURRENT_BANDWIDTH_HZ, or raise OVER_CURRENT_THRESHOLD_A",
           "OVERCURRENT_HW": "lower CURRENT_BANDWIDTH_HZ, or raise inverter.trip_a of the board file",
           "UNDERVOLTAGE": "check the supply in the board file", "OVERVOLTAGE": "lower REGEN_LIMIT_V or SPEEDREFRAMP_RPM_PER_S"}
+
+
+def built(folder: Path, header: str, defines: list[str]) -> Path:
+    """The virtual board with the firmware for this header, whose text is kept in `folder`: built anew only where it has changed."""
+    path = folder / build.HEADER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not path.is_file() or path.read_text(encoding="utf-8") != header:
+            path.write_text(header, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"cannot write '{paths.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
+    return build.library(defines, folder)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from tools.bench.board import Library
 from tools.common.errors import UserError
 
 from . import fw_tables
-from .fw_bench import Bench, Fault
+from .fw_bench import Bench, Fault, built
 from .fw_search import Found, Goal, Result, Search, largest, least, model_use, torque_per_ampere
 from .fw_tables import ENTRIES, STEP_ERPM, Tables
 from .limits import LARGEST_ERPM
@@ -54,7 +54,6 @@ def add_command(commands: Any) -> None:
     parser = commands.add_parser("tune-fw", help="field-weakening tables of a motor, found on the virtual board")
     parser.add_argument("motor", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
-    parser.add_argument("--userparams", help="folder with the userparams.h to begin with; default: what make tune makes of the motor file")
     parser.add_argument("--tables", type=Path, help="where the tables go; default tuning/tables/MOTOR.toml")
     parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/MOTOR")
     parser.add_argument("--torque-share", type=float, default=TORQUE_SHARE, metavar="X",
@@ -72,7 +71,7 @@ def command(options: argparse.Namespace) -> int:
     _check(options)
     started = time.perf_counter()
     motor, board = motor_file.load(options.motor, "tune-fw"), board_file.load(options.board, "--board")
-    header, risks = _header(options, motor, board)
+    header, risks = _header(motor, board)
     target = options.out or RESULTS / motor.name
     path = options.tables or fw_tables.path_of(motor.name)
     fw_tables.check_place(path)
@@ -98,14 +97,8 @@ def _check(options: argparse.Namespace) -> None:
             raise UserError(f"{flag[2:]} = {value:g} is impossible", flag, f"choose {low:g} .. {high:g}")
 
 
-def _header(options: argparse.Namespace, motor: Any, board: Any) -> tuple[str, str]:
+def _header(motor: Any, board: Any) -> tuple[str, str]:
     """The text of the userparams.h to begin with, and what the tuner warns may keep the motor from starting with it."""
-    if options.userparams:
-        folder = Path(options.userparams)
-        path = folder if folder.is_file() else folder / build.HEADER
-        if not path.is_file():
-            raise UserError(f"no {build.HEADER} in '{options.userparams}'", "--userparams", "name the folder that holds it")
-        return path.read_text(encoding="utf-8"), ""
     from . import design, header
     made = design.design(motor, board)
     return header.write(made), "; ".join(made.start_risks)
@@ -154,15 +147,7 @@ class _Work:
 
     def _library(self, use: str, header: str, defines_: list[str]) -> Library:
         """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
-        folder = FIRMWARE / f"{self.motor.name}-{use}"
-        path = folder / build.HEADER
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            if not path.is_file() or path.read_text(encoding="utf-8") != header:
-                path.write_text(header, encoding="utf-8")
-        except OSError as error:
-            raise UserError(f"cannot write '{paths.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
-        return Library(build.library(defines_, folder))
+        return Library(built(FIRMWARE / f"{self.motor.name}-{use}", header, defines_))
 
     def _run(self, jobs: list[_Job], work: Callable, title: str, total: int = 1, unit: str = "") -> list[Any]:
         """The jobs' results, with a bar that says where they are; what goes wrong in one says of which motor."""

@@ -22,7 +22,7 @@ def path(tmp_path):
 
 @pytest.fixture
 def places(path):
-    return ("--userparams", str(paths.ROOT), "--tables", str(path), "--out", str(path.parent / "out"))
+    return ("--tables", str(path), "--out", str(path.parent / "out"))
 
 
 def test_two_entries_of_the_hurst(path, places):
@@ -55,7 +55,7 @@ def test_a_motor_that_saturates_gets_another_ls(path, places):
     (("--set", "load.locked=1"), r"hurst_\w+: the motor does not start \(\w+ in state FAULT.*Q_CURRENT_REF_OPENLOOP"),
     (("--torque-share", "2"), "torque-share = 2 is impossible"), (("--torque-share", "nan"), "impossible"),
     (("--entries", "1"), "entries = 1 is impossible"), (("--set", "motor.nothing=1"), "motor.nothing"),
-    (("--set", "motor.rs_ohm"), "is no change"), (("--userparams", "/nowhere"), "no userparams.h in '/nowhere'")])
+    (("--set", "motor.rs_ohm"), "is no change")])
 def test_a_motor_that_does_not_start_and_impossible_options_are_one_line(path, places, options, told):
     code, out, error = command("tune-fw", HURST, *places, *options)
     assert (code, out, error.count("\n")) == (2, "", 1) and re.match(f"foc33: .*{told}", error), error

@@ -6,7 +6,6 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -124,13 +123,12 @@ def test_what_the_tuner_warned_about_is_the_remedy_of_a_start_that_fails(given, 
 
 
 def test_the_risks_are_the_tuner_s_warnings_about_the_start():
-    tuned, board = SimpleNamespace(userparams=None), board_file.load("mclv")
+    board = board_file.load("mclv")
     with motor_path(("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 1e-9"),
                     ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0")) as path:
-        _, risks = fw_tune._header(tuned, motor_file.load(str(path)), board)
+        _, risks = fw_tune._header(motor_file.load(str(path)), board)
     assert re.search(r"\Athe unloaded rotor still swings .*: add \[mechanical\] coulomb_friction, which the no-load current gives\Z", risks)
-    assert fw_tune._header(tuned, motor_file.load(HURST), board)[1] == ""
-    assert fw_tune._header(SimpleNamespace(userparams=str(paths.ROOT)), None, None) == (HEADER, "")
+    assert fw_tune._header(motor_file.load(HURST), board) == (HEADER, "")
 
 
 # ---- made-up motors --------------------------------------------------------------------------------------------------------
