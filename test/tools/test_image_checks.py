@@ -140,8 +140,7 @@ def test_each_broken_thing_is_a_line_that_says_what_and_where(bench, change, pat
 def test_the_vectors_have_the_addresses_of_the_family_s_reference_manual():
     places = {name: 4 + 2 * number for number, name in enumerate(device.VECTORS)}
     known = {"_OscillatorFail": 0x06, "_AddressError": 0x08, "_StackError": 0x0A, "_MathError": 0x0C, "_INT0Interrupt": 0x14,
-             "_T1Interrupt": 0x1A,
-             "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86,
+             "_T1Interrupt": 0x1A, "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86,
              "_FLTA1Interrupt": 0x92}
     assert {name: places[name] for name in known} == known
     assert len(device.VECTORS) == (0x100 - 0x04) // 2
@@ -238,8 +237,7 @@ def test_relative_calls_and_jumps_are_seen_too(bench, opcode):
 
 
 @pytest.mark.parametrize("member", ["crt0_standard.o", "crt0_extended.o", "crt1_standard.o", "crt0.o", "data_init_standard.o",
-                                    "crt_start_mode_normal.Leo",
-                                    "crt_start_mode.o"])
+                                    "crt_start_mode_normal.Leo", "crt_start_mode.o"])
 def test_start_up_code_is_allowed_under_its_known_names(bench, member):
     bench.image.function("start", 0x060000, file=f"{LIBRARY}({member})", section=".libpic30_crt_start_mode")
     bench.passes()

@@ -112,8 +112,7 @@ def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
         values = [getattr(row, attribute) for row in below]
         return None if not values or None in values else sum(values)
     return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below),
-               ram=sum(row.ram for row in below),
-               flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
+               ram=sum(row.ram for row in below), flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
 
 
 def broken(report: Report, now: Shares, limits: bool) -> list[str]:
