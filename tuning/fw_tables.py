@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import functools
 import json
 import math
 import os
@@ -23,6 +24,7 @@ FINGERPRINT = ("NOPOLESPAIRS", "MOTOR_RS_OHM", "MOTOR_LS_MH", "MOTOR_KPHI_V_PER_
                "SAMPLE_WINDOW_SEC", "MAXIMUM_CURRENT_A")
 """Parameters of userparams.h that the tables depend on."""
 NEARLY = 1e-4
+_quoted = functools.partial(json.dumps, ensure_ascii=False)
 
 
 @dataclass(frozen=True)
@@ -148,9 +150,9 @@ def text(tables: Tables) -> str:
     entries = tables.entries
     lines = [f"# Field-weakening tables of {tables.motor}, found on the virtual board by: make tune-fw MOTOR={tables.motor}",
              "# make tune puts them into the motor's userparams.h as long as the fingerprint matches the motor file.",
-             f"motor = {json.dumps(tables.motor, ensure_ascii=False)}", f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
+             f"motor = {_quoted(tables.motor)}", f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
              f"last_index = {tables.last_index}          # the last entry that was reached",
-             f"stopped = {json.dumps(tables.stopped, ensure_ascii=False)}", f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # reached without load",
+             f"stopped = {_quoted(tables.stopped)}", f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # reached without load",
              f"inv_kfi_base = {tables.inv_kfi_base:.0f}",
              "idref_a = " + _list(f"{entry.idref_a:.2f}" for entry in entries),
              "inv_kfi = " + _list(f"{entry.inv_kfi:.0f}" for entry in entries),

@@ -19,7 +19,8 @@ def run(name: str = HURST, current_a: float | None = None, speed_rpm: float | No
 def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float) -> identify_result.Identified:
     """Another motor in the Hurst's housing: 5 pole pairs."""
     psi_vs = kphi / (3.0 ** 0.5 * 1000.0 * 2.0 * 3.14159265 / 60.0 * 5.0)
-    return run(HURST, current_a, speed_rpm, motor__rs_ohm=rs_ohm, motor__ld_h=ld_h, motor__lq_h=lq_h, motor__psi_vs=psi_vs, mech__coulomb_nm=0.001)
+    return run(HURST, current_a, speed_rpm, motor__rs_ohm=rs_ohm, motor__ld_h=ld_h, motor__lq_h=lq_h, motor__psi_vs=psi_vs,
+               mech__coulomb_nm=0.001)
 
 
 def ends(item: identify_result.Identified, result: str) -> bool:
@@ -69,7 +70,8 @@ def test_a_blocked_shaft_has_a_resistance_and_no_kphi():
 
 
 @pytest.mark.parametrize("result, motor", [
-    *(("NOT_TURNING", {"name": "linix_45zwn24_40", "load__locked": 1.0, "state__theta_e_deg": angle}) for angle in (0.0, 45.0, 90.0, 200.0)),
+    *(("NOT_TURNING", {"name": "linix_45zwn24_40", "load__locked": 1.0, "state__theta_e_deg": angle})
+      for angle in (0.0, 45.0, 90.0, 200.0)),
     *(("NO_CURRENT", {"fault__open_phase": phase}) for phase in (1.0, 2.0, 3.0)), ("NOT_TURNING", {"load__constant_nm": 0.2}),
     ("CURRENT_NOT_REACHED", (20.0, 1e-2, 1e-2, 7.24, 1.5, 1000.0)), ("L_RANGE", (5.0, 0.4, 0.4, 7.24, 1.0, 1000.0)),
     ("VOLTAGE_LIMIT", (2.67, 1.92e-3, 1.92e-3, 30.0, 1.0, 1000.0))], ids=str)

@@ -119,8 +119,8 @@ def test_a_folder_that_is_something_else_is_not_replaced(out):
 
 
 @pytest.mark.parametrize("arguments, says", [
-    (("tune", "hurst"), "no motor 'hurst'"), (("tune", "nowhere/motor.toml"), "no motor file"), (("tune", HURST, "--board", "mclw"), "mclv"),
-    (("tune",), "name one, or write --all"), (("tune", HURST, "--all"), "either a motor or --all"),
+    (("tune", "hurst"), "no motor 'hurst'"), (("tune", "nowhere/motor.toml"), "no motor file"),
+    (("tune", HURST, "--board", "mclw"), "mclv"), (("tune",), "name one, or write --all"), (("tune", HURST, "--all"), "either a motor or --all"),
     (("tune", "--all", "--out", "x"), "one folder for several motors"), (("tun",), "command line"),
     (("tune", "--all", "--board", "mclw"), "mclv"), (("motors", "--board", "mclw"), "mclv")])
 def test_mistakes_on_the_command_line(arguments, says):

@@ -144,7 +144,8 @@ def test_the_trip_level_then_the_largest_current_is_lowered_until_the_back_emf_f
     d = made(rs_ohm=3.9, rated_torque_nm=0.04, rated_speed_rpm=2000.0)
     assert d.value("OVER_CURRENT_THRESHOLD_A") < 3.8 and d.value("MAXIMUM_CURRENT_A") == 2.75
     d = made(rs_ohm=6.0, rated_torque_nm=0.04, rated_current_a=0.7, rated_speed_rpm=1800.0)
-    assert d.value("MAXIMUM_CURRENT_A") < 2.75 and any("leave the back-EMF's number format" in warning for warning in d.warnings), d.warnings
+    assert d.value("MAXIMUM_CURRENT_A") < 2.75
+    assert any("leave the back-EMF's number format" in warning for warning in d.warnings), d.warnings
 
 
 def test_filters_keep_their_corner_at_another_period():

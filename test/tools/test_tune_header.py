@@ -130,7 +130,8 @@ def test_a_new_row_appears_in_the_header_the_build_the_tuner_the_spreadsheet_and
 
 
 def test_a_row_that_cannot_be_read_is_told(include):
-    param_rows.TABLE.write_text(param_rows.TABLE.read_text(encoding="utf-8").replace('0.1, 20, 1.5, "what', '0.1, 20, "what'), encoding="utf-8")
+    text = param_rows.TABLE.read_text(encoding="utf-8")
+    param_rows.TABLE.write_text(text.replace('0.1, 20, 1.5, "what', '0.1, 20, "what'), encoding="utf-8")
     forget()
     with pytest.raises(UserError, match=r"a row cannot be read: X\(NEW_A, .*param_table.h"):
         parameters()
@@ -150,5 +151,5 @@ def test_every_page_has_the_table_that_its_header_has_now(name):
 def test_every_assumption_of_the_simulator_and_every_relation_has_a_row():
     files = (paths.ROOT / "tools" / name for name in ("cpu_33f/iss_assumptions.h", "chip/chip_assumptions.h"))
     assert tables.simulator().count("\n| `") == "".join(path.read_text(encoding="utf-8") for path in files).count("    X(")
-    text = param_rows.TABLE.read_text(encoding="utf-8").partition("#define PARAM_RELATION_TABLE")[2].partition("#define PARAM_RELATION_IDREF")[0]
-    assert tables.params().count("\n- ") == text.count("    X(") + 1
+    rows = param_rows.TABLE.read_text(encoding="utf-8").partition("#define PARAM_RELATION_TABLE")[2]
+    assert tables.params().count("\n- ") == rows.partition("#define PARAM_RELATION_IDREF")[0].count("    X(") + 1
