@@ -37,10 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     motors.add_argument("--out", type=Path, help="result folder of the runs; default build/run/rated")
     motors.add_argument("--quiet", action="store_true", help="no progress bar")
     motors.set_defaults(command=_motors)
-    header = commands.add_parser("header", help="print the userparams.h of a motor, nothing else")
-    header.add_argument("motor", help="a name in tuning/motors or the path of a motor file")
-    header.set_defaults(command=_header)
-    for command in (tune, motors, header):
+    for command in (tune, motors):
         command.add_argument("--board", default="mclv", help="a name in tuning/boards or a path; default mclv")
     for module in (fw_tune, spreadsheet, identify):
         module.add_command(commands)
@@ -91,9 +88,3 @@ def _motors(options: argparse.Namespace) -> int:
     if not tuned:
         return code
     return max(code, rating_sweep.command(argparse.Namespace(**vars(options) | {"motor": tuned, "userparams": None})))
-
-
-def _header(options: argparse.Namespace) -> int:
-    from . import header
-    sys.stdout.write(header.write(_design(options.motor, _board(options))))
-    return 0

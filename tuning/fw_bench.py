@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tools.bench import build
 from tools.bench.board import Board, Library
-from tools.common.errors import UserError
-from tools.bench.sweep import start_time_s
 from tools.bench.panel import Ranges
+from tools.bench.sweep import start_time_s
+from tools.common import paths
+from tools.common.errors import UserError
 from tools.common.trace import wrapped_deg
 
 from .fw_tables import ENTRIES, Entry
@@ -30,6 +32,18 @@ REMEDY = {"START_FAILED": "the motor does not follow the ramp: raise Q_CURRENT_R
           "UNDERVOLTAGE": "check the supply in the board file", "OVERVOLTAGE": "lower REGEN_LIMIT_V or SPEEDREFRAMP_RPM_PER_S"}
 
 
+def built(folder: Path, header: str, defines: list[str]) -> Path:
+    """The virtual board with the firmware for this header, whose text is kept in `folder`: built anew only where it has changed."""
+    path = folder / build.HEADER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not path.is_file() or path.read_text(encoding="utf-8") != header:
+            path.write_text(header, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"cannot write '{paths.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
+    return build.library(defines, folder)
+
+
 @dataclass(frozen=True)
 class Point:
     """Means over a stretch of steady running; `use` is the commanded voltage as a share of its limit."""
@@ -38,7 +52,6 @@ class Point:
     reference_rpm: float
     use: float
     angle_deg: float
-    angle_rms_deg: float
     id_a: float
     iq_a: float
     current_rms_a: float
@@ -221,6 +234,6 @@ def reduced(rows: np.ndarray, reference_rpm: float) -> Point:
     squares = column["plant.i_d"] ** 2 + column["plant.i_q"] ** 2
     mean = lambda name: float(np.mean(column[name])) # noqa: E731
     return Point(mean("plant.speed_rpm"), reference_rpm, float(np.mean(length / column["fw.v_limit_v"])), float(np.mean(error)),
-                 math.sqrt(float(np.mean(error ** 2))), mean("plant.i_d"), mean("plant.i_q"), math.sqrt(float(np.mean(squares)) / 2.0),
+                 mean("plant.i_d"), mean("plant.i_q"), math.sqrt(float(np.mean(squares)) / 2.0),
                  mean("fw.id_trim_a"), mean("bus.voltage_v"))
 

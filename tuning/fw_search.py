@@ -7,13 +7,13 @@ q current cannot follow, the speed falls, and with the reference ahead of the sp
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import dataclass, field, replace
 
 from tools.common.errors import UserError
 
-from .fw_bench import Fault, Point
+from .fw_bench import Bench, Fault, Point
 from .fw_tables import ENTRIES, STEP_ERPM, Entry
+from .limits import halved
 
 STEP_A = 0.01
 """Resolution of a d current in the table."""
@@ -70,23 +70,6 @@ class Result:
         return entries + [self.beyond or entries[-1]] * (ENTRIES - len(entries))
 
 
-class Motor(Protocol):
-    """What the search needs of a bench (see fw_bench.Bench)."""
-
-    params: dict[str, float]
-
-    def start(self) -> None: ...
-    def stopped(self) -> bool: ...
-    def run(self, seconds: float) -> None: ...
-    def load(self, torque_nm: float) -> None: ...
-    def speed(self, rpm: float) -> bool: ...
-    def regain(self) -> bool: ...
-    def settle(self) -> None: ...
-    def point(self) -> Point: ...
-    def entries_from(self, index: int, entry: Entry) -> None: ...
-    def set(self, name: str, value: float) -> None: ...
-
-
 # ---- pure parts --------------------------------------------------------------------------------------------------------------
 def least(good: Callable[[int], bool], guess: int, low: int, high: int) -> int | None:
     """The smallest n in low .. high for which good(n), if good() is false below it and true above; None if it is false at `high`.
@@ -103,19 +86,14 @@ def least(good: Callable[[int], bool], guess: int, low: int, high: int) -> int |
         else:
             bad = n
             n = min(n + step, enough - 1)
-        if enough == low or bad == high:
-            break
-        if bad >= low and enough <= high:
+        if enough == low or bad == high or bad >= low and enough <= high:
             break
         step *= 2
     if bad == high:
         return None
     while enough - bad > 1:
         middle = (bad + enough) // 2
-        if good(middle):
-            enough = middle
-        else:
-            bad = middle
+        bad, enough = (bad, middle) if good(middle) else (middle, enough)
     return enough
 
 
@@ -141,16 +119,7 @@ def peak(value: Callable[[int], float], known: dict[int, float], low: int, high:
 
 def largest(good: Callable[[float], bool], limit: float, steps: int) -> float:
     """The largest value in 0 .. limit with good(value), to limit / 2^steps; 0 if there is none. Halving; 0 itself is not asked for."""
-    if good(limit):
-        return limit
-    low, high = 0.0, limit
-    for _ in range(steps):
-        middle = 0.5 * (low + high)
-        if good(middle):
-            low = middle
-        else:
-            high = middle
-    return low
+    return limit if good(limit) else halved(good, 0.0, limit, steps)
 
 
 def model_use(params: dict[str, float], rpm: float, id_a: float, iq_a: float, ls_ratio: float = 0.5) -> float:
@@ -197,7 +166,7 @@ def worst(errors: list[float]) -> float:
 class Search:
     """One motor's search. `tell(index, rpm, text)` hears where it is."""
 
-    def __init__(self, motor: Motor, goal: Goal, tell: Callable[[int, float, str], None] = lambda index, rpm, text: None,
+    def __init__(self, motor: Bench, goal: Goal, tell: Callable[[int, float, str], None] = lambda index, rpm, text: None,
                  entries: int = ENTRIES) -> None:
         self.motor, self.goal, self.tell = motor, goal, tell
         self.params = motor.params
@@ -260,9 +229,7 @@ class Search:
         guess = next((n for n in range(steps) if model_use(self.params, high - n * START_STEP_RPM, 0.0,
                      self.goal.load_nm(high - n * START_STEP_RPM) / torque_per_ampere(self.params)) <= use), steps)
         step = least(enough, guess, 0, steps)
-        if step is None:
-            return low
-        return high - step * START_STEP_RPM
+        return low if step is None else high - step * START_STEP_RPM
 
     def first(self, rpm: float) -> Found:
         """Entry 0: no d current, and the motor's own Ls and 1/Kphi, because it counts for all speeds below."""
@@ -461,11 +428,9 @@ def current_steps(entry: Entry) -> int:
 
 
 def _with_current(entry: Entry, steps: int) -> Entry:
-    return Entry(round(-steps * STEP_A, 4) if steps else 0.0, entry.inv_kfi, entry.ls_ratio)
+    return replace(entry, idref_a=round(-steps * STEP_A, 4) if steps else 0.0)
 
 
 def _with(entry: Entry, name: str, value: float, bounds: tuple[float, float]) -> Entry:
-    values: dict[str, Any] = {"idref_a": entry.idref_a, "inv_kfi": entry.inv_kfi, "ls_ratio": entry.ls_ratio}
     value = min(max(value, bounds[0]), bounds[1])
-    values[name] = round(value) if name == "inv_kfi" else round(value, 4)
-    return Entry(**values)
+    return replace(entry, **{name: round(value) if name == "inv_kfi" else round(value, 4)})

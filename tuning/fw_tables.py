@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import functools
+import json
 import math
 import os
 import re
@@ -22,6 +24,7 @@ FINGERPRINT = ("NOPOLESPAIRS", "MOTOR_RS_OHM", "MOTOR_LS_MH", "MOTOR_KPHI_V_PER_
                "SAMPLE_WINDOW_SEC", "MAXIMUM_CURRENT_A")
 """Parameters of userparams.h that the tables depend on."""
 NEARLY = 1e-4
+_quoted = functools.partial(json.dumps, ensure_ascii=False)
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,10 @@ class Tables:
 
     def mismatch(self, params: Mapping[str, float]) -> str:
         """"" if the tables belong to a motor with these parameters of userparams.h; otherwise the first difference."""
-        return difference(self.fingerprint, params)
+        for name, known in self.fingerprint.items():
+            if not math.isclose(known, params[name], rel_tol=NEARLY):
+                return f"they are for {name} = {known:g}, the motor has {params[name]:g}"
+        return ""
 
     def parameters(self) -> dict[str, str]:
         """Names and values of userparams.h; an unchanged 1/Kphi is written as NORM_INVKFIBASE."""
@@ -70,13 +76,6 @@ class Tables:
 def fingerprint(params: Mapping[str, float]) -> dict[str, float]:
     """The values that tables found with these parameters belong to."""
     return {name: float(params[name]) for name in FINGERPRINT}
-
-
-def difference(known: Mapping[str, float], params: Mapping[str, float]) -> str:
-    for name in FINGERPRINT:
-        if not math.isclose(known[name], params[name], rel_tol=NEARLY):
-            return f"they are for {name} = {known[name]:g}, the motor has {params[name]:g}"
-    return ""
 
 
 def path_of(motor: str) -> Path:
@@ -171,18 +170,14 @@ def _number(value: float) -> str:
     return f"{value:.5g}" if math.isfinite(value) else "nan"
 
 
-def _quoted(words: str) -> str:
-    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
 def _list(values: Any) -> str:
     return "[" + ", ".join("0.00" if value == "-0.00" else value for value in values) + "]"
 
 
-def with_values(header: str, values: Mapping[str, str], where: str) -> str:
+def with_values(header: str, values: Mapping[str, str]) -> str:
     """The text of a userparams.h with other values, comments and order kept."""
     for name, value in values.items():
         header, found = re.subn(rf"^([ \t]*#[ \t]*define[ \t]+{name}[ \t]+)(\S+)", lambda m: m[1] + value, header, flags=re.MULTILINE)
         if found != 1:
-            raise UserError(f"'{name}' is not defined once", where, "give a complete userparams.h")
+            raise UserError(f"'{name}' is not defined once", "userparams.h", "give a complete userparams.h")
     return header

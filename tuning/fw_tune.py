@@ -12,11 +12,12 @@ as the rated current is enough for it. Beyond, the tables make room for the spee
 """
 
 import argparse
+import contextlib
 import math
 import re
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from tools.bench.board import Library
 from tools.common.errors import UserError
 
 from . import fw_tables
-from .fw_bench import Bench, Fault
+from .fw_bench import Bench, Fault, built
 from .fw_search import Found, Goal, Result, Search, largest, least, model_use, torque_per_ampere
 from .fw_tables import ENTRIES, STEP_ERPM, Tables
 from .limits import LARGEST_ERPM
@@ -48,32 +49,20 @@ COLUMNS = (("speed_rpm", "speed\nrpm", "{:.0f}"), ("before_a", "Id so far\nA", "
 
 
 # ---- the command -----------------------------------------------------------------------------------------------------------
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `tune-fw` understands."""
+def add_command(commands: Any) -> None:
+    """Adds `tune-fw` to a command line's commands."""
+    parser = commands.add_parser("tune-fw", help="field-weakening tables of a motor, found on the virtual board")
     parser.add_argument("motor", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
-    parser.add_argument("--userparams", help="folder with the userparams.h to begin with; default: what make tune makes of the motor file")
     parser.add_argument("--tables", type=Path, help="where the tables go; default tuning/tables/MOTOR.toml")
     parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/MOTOR")
     parser.add_argument("--torque-share", type=float, default=TORQUE_SHARE, metavar="X",
                         help=f"load that the tables carry, as a share of the rated torque; default {TORQUE_SHARE:g}")
-    parser.add_argument("--margin", type=float, default=MARGIN, metavar="X",
-                        help=f"share of the voltage limit that stays free at that load; default {MARGIN:g}")
-    parser.add_argument("--angle-deg", type=float, default=ANGLE_DEG, metavar="DEG",
-                        help=f"largest mean angle error; beyond it Ls and 1/Kphi are adapted; default {ANGLE_DEG:g}")
-    parser.add_argument("--limit-a", type=float, metavar="A", help="largest d current; default: what MAXIMUM_CURRENT_A and the motor file allow")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
                         help="change a key of the virtual board, e.g. motor.sat_lq_ratio=0.3; may be repeated")
     parser.add_argument("--entries", type=int, default=ENTRIES, metavar="N", help="stop after N entries (for a quick look); default all 18")
-    parser.add_argument("--processes", type=int, metavar="N", help="processes at a time; default one per processor")
     parser.add_argument("--no-plots", action="store_true", help="no pictures")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
-
-
-def add_command(commands: Any) -> None:
-    """Adds `tune-fw` to a command line's commands."""
-    parser = commands.add_parser("tune-fw", help="field-weakening tables of a motor, found on the virtual board")
-    add_arguments(parser)
     parser.set_defaults(command=command)
 
 
@@ -82,12 +71,12 @@ def command(options: argparse.Namespace) -> int:
     _check(options)
     started = time.perf_counter()
     motor, board = motor_file.load(options.motor, "tune-fw"), board_file.load(options.board, "--board")
-    header, risks = _header(options, motor, board)
+    header, risks = _header(motor, board)
     target = options.out or RESULTS / motor.name
     path = options.tables or fw_tables.path_of(motor.name)
     fw_tables.check_place(path)
-    with output.ResultFolder(target) as folder, _Show(options.quiet) as show:
-        work = _Work(motor, header, risks, _layers(motor, board, options), options, show)
+    with output.ResultFolder(target) as folder:
+        work = _Work(motor, header, risks, [motor.plant_values(), board.plant_values(), command_common.changes(options.changes)], options)
         tables, rows = work.search()
         check = work.check(tables)
         data = _write(folder.work, tables, rows, check, motor, options)
@@ -101,26 +90,15 @@ def command(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    for name, low, high in (("torque_share", 0.0, 1.0), ("margin", 0.0, 0.3), ("angle_deg", 0.1, 30.0), ("limit_a", 0.01, 20.0),
-                            ("entries", 2, ENTRIES), ("processes", 1, 1024)):
+    for name, low, high in (("torque_share", 0.0, 1.0), ("entries", 2, ENTRIES)):
         value = getattr(options, name)
-        if value is not None and not low <= value <= high:
+        if not low <= value <= high:
             flag = "--" + name.replace("_", "-")
             raise UserError(f"{flag[2:]} = {value:g} is impossible", flag, f"choose {low:g} .. {high:g}")
 
 
-def _layers(motor: Any, board: Any, options: argparse.Namespace) -> list[Any]:
-    return [motor.plant_values(), board.plant_values(), command_common.changes(options.changes)]
-
-
-def _header(options: argparse.Namespace, motor: Any, board: Any) -> tuple[str, str]:
+def _header(motor: Any, board: Any) -> tuple[str, str]:
     """The text of the userparams.h to begin with, and what the tuner warns may keep the motor from starting with it."""
-    if options.userparams:
-        folder = Path(options.userparams)
-        path = folder if folder.is_file() else folder / build.HEADER
-        if not path.is_file():
-            raise UserError(f"no {build.HEADER} in '{options.userparams}'", "--userparams", "name the folder that holds it")
-        return path.read_text(encoding="utf-8"), ""
     from . import design, header
     made = design.design(motor, board)
     return header.write(made), "; ".join(made.start_risks)
@@ -147,62 +125,52 @@ class _Job:
     entries: int = ENTRIES
     risks: str = ""
 
-    def bench(self, tell: Callable) -> Bench:
-        return Bench(self.library, self.values, tell, self.risks)
+    def bench(self, tell: Callable) -> "contextlib.closing[Bench]":
+        return contextlib.closing(Bench(self.library, self.values, tell, self.risks))
 
 
 class _Work:
     """The steps of one command; `motor_s` counts the motor time."""
 
-    def __init__(self, motor: Any, header: str, risks: str, layers: list[Any], options: argparse.Namespace, show: "_Show") -> None:
-        self.motor, self.header, self.options, self.show = motor, header, options, show
+    def __init__(self, motor: Any, header: str, risks: str, layers: list[Any], options: argparse.Namespace) -> None:
+        self.motor, self.header, self.quiet = motor, header, options.quiet
         self.motor_s = 0.0
         known = defines(header)
         top_rpm = highest_speed(known)
-        library = self._library("search", with_values(header, {"MAXIMUM_SPEED_RPM": f"{top_rpm:.0f}"}), ["PARAMS_IN_RAM"])
+        library = self._library("search", fw_tables.with_values(header, {"MAXIMUM_SPEED_RPM": f"{top_rpm:.0f}"}), ["PARAMS_IN_RAM"])
         self.params = library.params
         self.values = board_keys.resolve(layers, library.keys)
         limit_a = min(self.params["MAXIMUM_CURRENT_A"] * ID_SHARE, motor.maximum_current_a)
-        if options.limit_a is not None:
-            limit_a = min(options.limit_a, self.params["MAXIMUM_CURRENT_A"] * ID_SHARE)
-        goal = Goal(1.0 - options.margin, options.angle_deg, limit_a, motor.rated_current_a, motor.rated_torque_nm, motor.rated_speed_rpm, options.torque_share,
-                    motor.maximum_speed_rpm)
+        goal = Goal(1.0 - MARGIN, ANGLE_DEG, limit_a, motor.rated_current_a, motor.rated_torque_nm, motor.rated_speed_rpm,
+                    options.torque_share, motor.maximum_speed_rpm)
         self.job = _Job(library.path, self.values, goal, entries=options.entries, risks=risks)
 
     def _library(self, use: str, header: str, defines_: list[str]) -> Library:
         """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
-        folder = FIRMWARE / f"{self.motor.name}-{use}"
-        path = folder / build.HEADER
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            if not path.is_file() or path.read_text(encoding="utf-8") != header:
-                path.write_text(header, encoding="utf-8")
-        except OSError as error:
-            raise UserError(f"cannot write '{paths.shown(path)}' ({error.strerror})", "", "free some space, or make build/ writable") from None
-        return Library(build.library(defines_, folder))
+        return Library(built(FIRMWARE / f"{self.motor.name}-{use}", header, defines_))
 
-    def _count(self, news: Any) -> None:
-        if isinstance(news, tuple):
-            self.show.entry(*news)
-        else:
-            self.motor_s += news
-            self.show.time(self.motor_s)
-
-    def _run(self, jobs: list[_Job], work: Callable, title: str) -> list[Any]:
-        self.show.stage(title, len(jobs))
-        return self._named(jobs, work, self.options.processes)
-
-    def _named(self, jobs: list[_Job], work: Callable, processes: int | None) -> list[Any]:
-        """The jobs' results; what goes wrong in one says of which motor."""
-        try:
-            return workers.run_all(jobs, work, self._count, processes)
-        except UserError as error:
-            raise UserError(f"{self.motor.name}: {error}") from None
+    def _run(self, jobs: list[_Job], work: Callable, title: str, total: int = 1, unit: str = "") -> list[Any]:
+        """The jobs' results, with a bar that says where they are; what goes wrong in one says of which motor."""
+        with command_common.Progress(title, total, self.quiet, unit) as progress:
+            def tell(news: Any) -> None:
+                index, place = 0, ""
+                if isinstance(news, tuple):
+                    index, rpm, text = news
+                    place = f"{rpm:.0f} rpm, {text}"
+                else:
+                    self.motor_s += news
+                if progress.bar is not None:
+                    progress.bar.n = max(progress.bar.n, min(index, total))
+                    progress.bar.set_description_str(f"{title}: {place or f'{self.motor_s:.0f} s of motor time'}", refresh=False)
+                    progress(0.0)
+            try:
+                return workers.run_all(jobs, work, tell)
+            except UserError as error:
+                raise UserError(f"{self.motor.name}: {error}") from None
 
     def search(self) -> tuple[Tables, list[dict[str, float]]]:
         """The tables, and what was measured at each entry."""
-        self.show.stage("search", self.options.entries)
-        result: Result = self._named([self.job], _search, 1)[0]
+        result: Result = self._run([self.job], _search, "search", self.job.entries, "entries")[0]
         start_rpm = result.start_rpm if result.needed else min(self.params["FW_START_SPEED_RPM"], result.start_rpm - SPEED_STEP_RPM)
         tables = Tables(self.motor.name, round(start_rpm), result.entries(), fw_tables.fingerprint(self.params),
                         self.params["INVKFI_SPEED0"], result.found[-1].index, result.stopped, goal=self._goal())
@@ -224,7 +192,7 @@ class _Work:
         wanted = self.job.goal.maximum_rpm
         top = math.floor(tables.maximum_speed_rpm)
         values = {**tables.parameters(), "MAXIMUM_SPEED_RPM": f"{max(top, round(self.params['NOMINAL_SPEED_RPM']) + 1):.0f}"}
-        library = self._library("check", with_values(self.header, values), [])
+        library = self._library("check", fw_tables.with_values(self.header, values), [])
         speeds = [wanted] if wanted <= top else []
         speeds += [top] if top > wanted + SPEED_STEP_RPM or not speeds else []
         job = replace(self.job, library=library.path, tables=tables)
@@ -235,41 +203,31 @@ class _Work:
 
 
 def _search(job: _Job, tell: Callable) -> Result:
-    bench = job.bench(tell)
-    try:
-        return Search(bench, job.goal, lambda *news: tell(news), job.entries).run()
-    except Fault as fault:
-        raise UserError(f"the motor stopped with {fault} at {bench.target_rpm:.0f} rpm, below field weakening", "",
-                        "run the motor there with make run and look at its plots") from None
-    finally:
-        bench.close()
+    with job.bench(tell) as bench:
+        try:
+            return Search(bench, job.goal, lambda *news: tell(news), job.entries).run()
+        except Fault as fault:
+            raise UserError(f"the motor stopped with {fault} at {bench.target_rpm:.0f} rpm, below field weakening", "",
+                            "run the motor there with make run and look at its plots") from None
 
 
-def _ready(job: _Job, tell: Callable) -> Bench:
+@contextlib.contextmanager
+def _ready(job: _Job, tell: Callable) -> Iterator[tuple[Bench, Tables]]:
     """A bench with the new tables and the trim as in userparams.h, in closed loop."""
-    bench = job.bench(tell)
     assert job.tables is not None
-    bench.set("FW_START_SPEED_RPM", job.tables.start_speed_rpm)
-    for i, entry in enumerate(job.tables.entries):
-        bench.entry(i, entry)
-    bench.start()
-    return bench
+    with job.bench(tell) as bench:
+        bench.set("FW_START_SPEED_RPM", job.tables.start_speed_rpm)
+        for i, entry in enumerate(job.tables.entries):
+            bench.entry(i, entry)
+        bench.start()
+        yield bench, job.tables
 
 
 def _torque(job: _Job, tell: Callable) -> float:
     """Largest load at an entry's speed with the speed still held."""
-    bench = _ready(job, tell)
-    assert job.tables is not None
-    rpm = job.tables.speed_rpm(job.index)
-
-    def held(torque_nm: float) -> bool:
-        return holds(bench, rpm, torque_nm)
-
-    try:
+    with _ready(job, tell) as (bench, tables):
         limit = torque_per_ampere(bench.params) * bench.params["MAXIMUM_CURRENT_A"]
-        return largest(held, limit, TORQUE_STEPS)
-    finally:
-        bench.close()
+        return largest(lambda torque_nm: holds(bench, tables.speed_rpm(job.index), torque_nm), limit, TORQUE_STEPS)
 
 
 def holds(bench: Bench, rpm: float, torque_nm: float) -> bool:
@@ -295,50 +253,47 @@ def holds(bench: Bench, rpm: float, torque_nm: float) -> bool:
 
 def _maximum(job: _Job, tell: Callable) -> float:
     """Highest speed held without load."""
-    bench = _ready(job, tell)
-    assert job.tables is not None
-    base = job.tables.speed_rpm(job.tables.last_index)
-    ceiling = bench.params["MAXIMUM_SPEED_RPM"]
+    with _ready(job, tell) as (bench, tables):
+        base = tables.speed_rpm(tables.last_index)
 
-    def too_fast(step: int) -> bool:
-        tell((ENTRIES, base + step * SPEED_STEP_RPM, "no load"))
-        return not holds(bench, base + step * SPEED_STEP_RPM, 0.0)
+        def too_fast(step: int) -> bool:
+            tell((ENTRIES, base + step * SPEED_STEP_RPM, "no load"))
+            return not holds(bench, base + step * SPEED_STEP_RPM, 0.0)
 
-    try:
-        count = max(0, math.floor((ceiling - base) / SPEED_STEP_RPM))
+        count = max(0, math.floor((bench.params["MAXIMUM_SPEED_RPM"] - base) / SPEED_STEP_RPM))
         first = least(too_fast, 8, 1, count) if count else None
         return base + (count if first is None else first - 1) * SPEED_STEP_RPM
-    finally:
-        bench.close()
 
 
 def _end_to_end(job: _Job, speeds: list[float], tell: Callable) -> Check:
-    bench = job.bench(tell)
     check = Check()
-    try:
-        bench.start()
-        for rpm in speeds:
-            reached = bench.speed(rpm) and bench.regain()
-            bench.run(1.0)
-            point = bench.point(0.5)
-            check.rows.append({"name": f"{rpm:.0f} rpm", "speed_rpm": point.speed_rpm, "id_a": point.id_a,
-                               "current_a_rms": point.current_rms_a, "use_percent": 100.0 * point.use,
-                               "angle_deg": point.angle_deg, "trim_a": point.trim_a})
-            if not reached or not point.held:
-                check.problems.append(f"the firmware with the new tables does not hold {rpm:.0f} rpm, it turns at {point.speed_rpm:.0f} rpm")
-        bench.press("s2")
-        waited = 0.0
-        while bench.state() == "STOPPING" and waited < 20.0:
-            bench.run(0.1)
-            waited += 0.1
-        bench.check()
-        if bench.state() != "STOPPED":
-            check.problems.append(f"the firmware with the new tables does not stop, its state is {bench.state()}")
-    except Fault as fault:
-        check.problems.append(f"the firmware with the new tables stops with {fault} at {bench.target_rpm:.0f} rpm")
-    finally:
-        bench.close()
+    with job.bench(tell) as bench:
+        try:
+            _drive(bench, speeds, check)
+        except Fault as fault:
+            check.problems.append(f"the firmware with the new tables stops with {fault} at {bench.target_rpm:.0f} rpm")
     return check
+
+
+def _drive(bench: Bench, speeds: list[float], check: Check) -> None:
+    """Start, every speed, stop."""
+    bench.start()
+    for rpm in speeds:
+        reached = bench.speed(rpm) and bench.regain()
+        bench.run(1.0)
+        point = bench.point(0.5)
+        check.rows.append({"name": f"{rpm:.0f} rpm", "speed_rpm": point.speed_rpm, "id_a": point.id_a, "current_a_rms": point.current_rms_a,
+                           "use_percent": 100.0 * point.use, "angle_deg": point.angle_deg, "trim_a": point.trim_a})
+        if not reached or not point.held:
+            check.problems.append(f"the firmware with the new tables does not hold {rpm:.0f} rpm, it turns at {point.speed_rpm:.0f} rpm")
+    bench.press("s2")
+    waited = 0.0
+    while bench.state() == "STOPPING" and waited < 20.0:
+        bench.run(0.1)
+        waited += 0.1
+    bench.check()
+    if bench.state() != "STOPPED":
+        check.problems.append(f"the firmware with the new tables does not stop, its state is {bench.state()}")
 
 
 # ---- pure parts ------------------------------------------------------------------------------------------------------------
@@ -377,10 +332,6 @@ def table_current(known: dict[str, float], rpm: float) -> float:
     return low + (high - low) * min(place - index, 1.0)
 
 
-def with_values(header: str, values: dict[str, str]) -> str:
-    return fw_tables.with_values(header, values, build.HEADER)
-
-
 def row(found: Found, torque_nm: float) -> dict[str, float]:
     """What the tables file keeps of an entry."""
     return {"speed_rpm": found.rpm, "idref_a": found.entry.idref_a, "inv_kfi": found.entry.inv_kfi, "ls_ratio": found.entry.ls_ratio,
@@ -390,54 +341,6 @@ def row(found: Found, torque_nm: float) -> dict[str, float]:
 
 
 # ---- what a person sees ----------------------------------------------------------------------------------------------------
-class _Show:
-    """A bar with the entry and the best so far; silent when asked to be or when nobody looks."""
-
-    def __init__(self, quiet: bool) -> None:
-        self.bar: Any = None
-        self.tqdm: Any = None
-        self.title = ""
-        self.told = 0.0
-        if quiet or not sys.stderr.isatty():
-            return
-        try:
-            from tqdm import tqdm
-        except ImportError:
-            return
-        tqdm.monitor_interval = 0
-        self.tqdm = tqdm
-
-    def stage(self, title: str, total: int) -> None:
-        self.close()
-        self.title = title
-        if self.tqdm is not None:
-            self.bar = self.tqdm(total=total, desc=title, leave=False, ncols=110, bar_format="{desc} |{bar:12}|")
-
-    def entry(self, index: int, rpm: float, text: str) -> None:
-        if self.bar is not None:
-            place = f"entry {index}, " if index < ENTRIES else ""
-            self.bar.n = min(index, self.bar.total)
-            self.bar.set_description_str(f"{self.title}: {place}{rpm:.0f} rpm, {text}".ljust(90)[:90])
-
-    def time(self, motor_s: float) -> None:
-        """The motor time so far, where there is nothing else to tell; now and then."""
-        now = time.monotonic()
-        if self.bar is not None and self.title != "search" and now - self.told > 0.2:
-            self.told = now
-            self.bar.set_description_str(f"{self.title}: {motor_s:.0f} s of motor time".ljust(90))
-
-    def close(self) -> None:
-        if self.bar is not None:
-            self.bar.close()
-            self.bar = None
-
-    def __enter__(self) -> "_Show":
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self.close()
-
-
 def _write(folder: Path, tables: Tables, rows: list[dict[str, Any]], check: Check, motor: Any, options: argparse.Namespace) -> dict[str, Any]:
     keys = [key for key, _, _ in COLUMNS]
     output.write_csv(folder / "entries.csv", ["index", *keys], [[item["name"], *(item.get(key) for key in keys)] for item in rows])

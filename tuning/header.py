@@ -3,6 +3,7 @@
 import itertools
 import math
 import re
+import textwrap
 from collections.abc import Iterator
 
 from tools.common import paths
@@ -53,7 +54,8 @@ def _head(design: Design) -> list[str]:
              " * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,",
              " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them."]
     for warning in design.warnings:
-        lines += [" *", *(f" * {line}" for line in _wrapped("Note: " + _safe(warning), WIDTH + 8))]
+        lines += [" *", *(f" * {line}" for line in textwrap.wrap("Note: " + _safe(warning), WIDTH + 8, break_long_words=False,
+                                                             break_on_hyphens=False))]
     lines[-1] += " */"
     return [*lines, "#ifndef USERPARAMS_H", "#define USERPARAMS_H", ""]
 
@@ -133,14 +135,3 @@ def _constants(design: Design) -> list[str]:
 def _constant_row(item: Constant) -> str:
     error = "exact" if abs(item.error_percent) < 5e-6 else f"{item.error_percent:+.3f} %"
     return (f" *   {item.name.ljust(30)}{item.value:>11.5g} {item.unit.ljust(9)}{item.q_value:>12d}  {item.q_format.ljust(26)}{error:>10}  {item.meaning}").rstrip()
-
-
-def _wrapped(text: str, width: int) -> list[str]:
-    lines, line = [], ""
-    for word in text.split():
-        if len(line) + len(word) + 1 > width and line:
-            lines.append(line)
-            line = word
-        else:
-            line = f"{line} {word}".strip()
-    return [*lines, line]

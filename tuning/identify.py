@@ -23,6 +23,7 @@ from tools.common.motor_file import Motor
 from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.trace import Trace
 
+from .fw_bench import built
 from .identify_result import MODE, Identified, Known, Measured, step_names, trip_a
 
 RESULTS = paths.ROOT / "build" / "identify"
@@ -66,16 +67,6 @@ def header(known: Known, board: BoardFile) -> str:
         lines += ["", f"/* ---- {title} ---- */"]
         lines += [f"#define {name} {value if isinstance(value, (str, int)) else format(value, '.7g')}" for name, value in values.items()]
     return "\n".join([*lines, "", "#endif", ""])
-
-
-def _library(motor: Motor, text: str) -> Path:
-    """The virtual board with the IDENTIFY firmware for this header; built anew only when the header has changed."""
-    folder = HEADERS / motor.name
-    path = folder / build.HEADER
-    if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    return build.library([MODE], folder)
 
 
 # ---- the measurement -------------------------------------------------------------------------------------------------------
@@ -141,7 +132,7 @@ def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, c
     board = board_file.load(board_name, "--board")
     known = [Known.of(motor, board, current_a, speed_rpm) for motor in motors]
     headers = [header(item, board) for item in known]
-    libraries = [_library(motor, text) for motor, text in zip(motors, headers)]
+    libraries = [built(HEADERS / motor.name, text, [MODE]) for motor, text in zip(motors, headers)]
     keys = workers.run_all(libraries[:1], _keys, lambda seconds: None)[0]
     values = [_plant(motor, board, changes, keys) for motor in motors]
     jobs = [Job(library, value) for library, value in zip(libraries, values)]
@@ -165,8 +156,9 @@ def _plant(motor: Motor, board: BoardFile, changes: board_keys.Values, keys: Any
 
 
 # ---- the command -----------------------------------------------------------------------------------------------------------
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `identify` understands."""
+def add_command(commands: Any) -> None:
+    """Adds `identify` to a command line's commands."""
+    parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
     parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
@@ -175,14 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
                         help="change a key of the virtual board, e.g. load.locked=1; may be repeated")
     parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/MOTOR")
-    parser.add_argument("--no-plots", action="store_true", help="no pictures")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
-
-
-def add_command(commands: Any) -> None:
-    """Adds `identify` to a command line's commands."""
-    parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
-    add_arguments(parser)
     parser.set_defaults(command=command)
 
 
@@ -196,7 +181,7 @@ def command(options: argparse.Namespace) -> int:
     found = identify(motors, options.board, command_common.changes(options.changes), options.current, options.speed, options.quiet)
     for item in found:
         target = options.out or RESULTS / item.motor.name
-        _write(item, target, not options.no_plots)
+        _write(item, target)
         print(item.text() if not options.all else _brief(item))
         if not options.all:
             print(f"\nresults in {paths.shown(target)}/")
@@ -226,13 +211,12 @@ def _brief(item: Identified) -> str:
     return f"{item.motor.name:28}  {errors}"
 
 
-def _write(item: Identified, target: Path, with_plots: bool) -> None:
+def _write(item: Identified, target: Path) -> None:
     with output.ResultFolder(target) as folder:
         data = item.data()
         (folder.work / build.HEADER).write_text(item.header, encoding="utf-8")
         if item.done:
             (folder.work / "electrical.toml").write_text(item.paste() + "\n", encoding="utf-8")
-        if with_plots:
-            from . import identify_plots
-            data["plots"] = identify_plots.write_all(item, step_names(), folder.work)
+        from . import identify_plots
+        data["plots"] = identify_plots.write_all(item, step_names(), folder.work)
         output.write_summary(folder.work, data)

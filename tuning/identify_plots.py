@@ -2,22 +2,18 @@
 
 from pathlib import Path
 
-import matplotlib
+import numpy as np
 
-matplotlib.use("Agg")
+from tools.bench import plots # noqa: F401  chooses the backend and the style
+from tools.common.trace import Trace
 
-import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
-import numpy as np # noqa: E402
+import matplotlib.pyplot as plt # noqa: E402, I001  after the backend
 
-from tools.common.trace import Trace # noqa: E402
-
-from .identify_result import Identified # noqa: E402
+from .identify_result import Identified
 
 BLOCK = 32
 """Periods of one stretch of back-EMF in the firmware."""
 SHOWN_S = 0.003
-plt.rcParams.update({"figure.dpi": 100, "axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.0, "legend.loc": "best",
-                     "legend.fontsize": 9, "axes.titlesize": 11, "font.size": 10})
 
 
 def write_all(item: Identified, names: list[str], folder: Path) -> list[str]:

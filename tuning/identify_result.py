@@ -166,9 +166,8 @@ class Identified:
 
 
 def _row(name: str, measured: str, true: str, ratio: float | None = None, limit: str = "") -> dict[str, Any]:
-    if ratio is None:
-        return {"name": name, "measured": measured, "true": true, "error_percent": None, "limit_percent": None, "verdict": None}
-    error = 100.0 * (ratio - 1.0)
-    allowed = LIMITS_PERCENT[limit]
-    return {"name": name, "measured": measured, "true": true, "error_percent": error, "limit_percent": allowed,
-            "verdict": "PASS" if abs(error) <= allowed else "FAIL"}
+    error, allowed, verdict = None, None, None
+    if ratio is not None:
+        error, allowed = 100.0 * (ratio - 1.0), LIMITS_PERCENT[limit]
+        verdict = "PASS" if abs(error) <= allowed else "FAIL"
+    return {"name": name, "measured": measured, "true": true, "error_percent": error, "limit_percent": allowed, "verdict": verdict}

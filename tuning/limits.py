@@ -45,6 +45,14 @@ def digits_up(value: float, digits: int) -> float:
     return float(f"{math.ceil(value / step - 1e-9) * step:.10g}")
 
 
+def halved(good: Callable[[float], bool], low: float, high: float, steps: int) -> float:
+    """The largest value that is good, where `low` is and `high` is not, to (high - low) / 2^steps."""
+    for _ in range(steps):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low
+
+
 @dataclass(frozen=True)
 class Currents:
     """Peak values."""
@@ -96,16 +104,12 @@ class Envelope:
         i_q = self.iq(rpm, load_nm)
         if i_q > self.maximum_a:
             return None
-        low, high = self.deepest_id(i_q), 0.0
-        limit = share * self.circle_v
-        if self.voltage(rpm, high, i_q) <= limit:
+        deepest, limit = self.deepest_id(i_q), share * self.circle_v
+        if self.voltage(rpm, 0.0, i_q) <= limit:
             return 0.0
-        if self.voltage(rpm, low, i_q) > limit:
+        if self.voltage(rpm, deepest, i_q) > limit:
             return None
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.voltage(rpm, middle, i_q) <= limit else (low, middle)
-        return low
+        return halved(lambda i_d: self.voltage(rpm, i_d, i_q) <= limit, deepest, 0.0, 50)
 
     def base_speed(self, load_nm: float) -> float:
         """Speed at which the motor without d current needs the whole circle."""
@@ -119,20 +123,16 @@ class Envelope:
         """Largest load at a speed."""
         if self.least_id(rpm, 0.0, share) is None:
             return 0.0
-        low, high = 0.0, 1.2 * self.motor.kt_nm_per_a * self.maximum_a
-        for _ in range(40):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.least_id(rpm, middle, share) is not None else (low, middle)
-        return low
+        return halved(lambda load_nm: self.least_id(rpm, load_nm, share) is not None, 0.0, self.most_nm, 40)
+
+    @property
+    def most_nm(self) -> float:
+        """More torque than the largest current gives."""
+        return 1.2 * self.motor.kt_nm_per_a * self.maximum_a
 
     def _highest(self, holds: Callable[[float], bool]) -> float:
-        low, high = 0.0, 65535.0 / self.motor.pole_pairs
-        if holds(high):
-            return high
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if holds(middle) else (low, middle)
-        return low
+        highest = 65535.0 / self.motor.pole_pairs
+        return highest if holds(highest) else halved(holds, 0.0, highest, 50)
 
 
 def circle_v(board: BoardFile) -> float:

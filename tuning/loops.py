@@ -12,7 +12,7 @@ F/(1 + F w0 I) (dR + s dL)/psi times the q current, which is what makes a slow m
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -178,14 +178,12 @@ def current_grid(period_s: float, points: int = 400) -> np.ndarray:
 def corners(plant: Plant, spread: dict[str, tuple[float, float]] | None = None) -> list[tuple[str, Plant]]:
     """The parameter set: every combination of R, L and flux at both ends of their published spread, or of the tolerance
     where none is published, and the middle."""
-    ends = dict(TOLERANCE)
-    ends |= spread or {}
+    ends = TOLERANCE | (spread or {})
     found = [("nominal", plant)]
     for r, l, k in product(*((1.0, *ends[name]) for name in ("rs", "ls", "psi"))):
         if (r, l, k) != (1.0, 1.0, 1.0):
             text = ", ".join(f"{name} {factor - 1.0:+.0%}" for name, factor in (("R", r), ("L", l), ("flux", k)) if factor != 1.0)
-            found.append((text,
-                          Plant(plant.rs * r, plant.ld * l, plant.lq * l, plant.psi * k, plant.pole_pairs, plant.inertia, plant.viscous)))
+            found.append((text, replace(plant, rs=plant.rs * r, ld=plant.ld * l, lq=plant.lq * l, psi=plant.psi * k)))
     return found
 
 
@@ -217,14 +215,14 @@ def _largest(candidates: list[float], worst_of: Callable[[float, bool], tuple[Ma
 def current_gains(plant: Plant, bandwidth_hz: float, base: Gains) -> Gains:
     """Pole-zero cancellation: Kp = 2 pi f L of each axis, Ki = 2 pi f R."""
     w = 2.0 * np.pi * bandwidth_hz
-    return Gains(w * plant.ld, w * plant.lq, w * plant.rs * base.period_s, base.speed_kp, base.speed_ki, base.esdq, base.velestim, base.period_s)
+    return replace(base, kp_d=w * plant.ld, kp_q=w * plant.lq, ki=w * plant.rs * base.period_s)
 
 
 def speed_gains(plant: Plant, bandwidth_hz: float, base: Gains) -> Gains:
     """Kp = 2 pi f J/Kt per mechanical, i.e. / P per electrical rad/s; zero at f/3."""
     w = 2.0 * np.pi * bandwidth_hz
     kp = w * plant.inertia / plant.kt / plant.pole_pairs
-    return Gains(base.kp_d, base.kp_q, base.ki, kp, kp * w / ZERO_RATIO * SLOTS * base.period_s, base.esdq, base.velestim, base.period_s)
+    return replace(base, speed_kp=kp, speed_ki=kp * w / ZERO_RATIO * SLOTS * base.period_s)
 
 
 def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: Gains, top_rad_s: float, largest_hz: float, least_hz: float,
@@ -245,12 +243,14 @@ def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: G
     candidates = [fixed_hz] if fixed_hz else _steps(cap, max(least_hz, cap / 20.0), 0.95) + above
     chosen, worst, label = _largest(candidates, worst_of, CURRENT_NEARLY_DEG)
     gains = current_gains(plant, chosen, base)
-    design = LoopDesign(chosen, worst, label, Margins(0.0, 0.0, 0.0))
-    for name in dict.fromkeys([*list(cases)[:2 * len(axes)], label]):
-        response = current_loop(grid, cases[name][0], gains, *cases[name][1:])
-        design.curves.append(Curve(name, grid, response, margins(grid, response)))
-    design.nominal = design.curves[0].margins
-    return design
+    shown = dict.fromkeys([*list(cases)[:2 * len(axes)], label])
+    return _made(chosen, worst, label, grid, {name: current_loop(grid, cases[name][0], gains, *cases[name][1:]) for name in shown})
+
+
+def _made(chosen: float, worst: Margins, label: str, grid: np.ndarray, responses: dict[str, np.ndarray]) -> LoopDesign:
+    """A design with the curves that the report shows, the nominal one first."""
+    curves = [Curve(name, grid, response, margins(grid, response)) for name, response in responses.items()]
+    return LoopDesign(chosen, worst, label, curves[0].margins, curves)
 
 
 def _steps(highest: float, lowest: float, ratio: float) -> list[float]:
@@ -288,10 +288,6 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
         finer = [float(f"{chosen + k * step:.3g}") for k in range(30, -1, -1)]
         chosen, worst, label = _largest([f for f in finer if f <= largest_hz], worst_of)
     gains = speed_gains(plant, chosen, base)
-    design = LoopDesign(chosen, worst, label, Margins(0.0, 0.0, 0.0))
     nominal = list(cases)[:len(speeds_rad_s)]
-    for name in dict.fromkeys([nominal[0], nominal[-1], label]):
-        response = speed_loop(grid, cases[name][0], plant, gains, cases[name][1])
-        design.curves.append(Curve(name, grid, response, margins(grid, response)))
-    design.nominal = design.curves[0].margins
-    return design
+    shown = dict.fromkeys([nominal[0], nominal[-1], label])
+    return _made(chosen, worst, label, grid, {name: speed_loop(grid, cases[name][0], plant, gains, cases[name][1]) for name in shown})

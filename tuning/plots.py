@@ -105,15 +105,13 @@ def _torque(design: Design) -> str:
 
 
 def _torque_without(envelope: limits.Envelope, rpm: float) -> float:
-    low, high = 0.0, 1.2 * envelope.motor.kt_nm_per_a * envelope.maximum_a
     if envelope.voltage(rpm, 0.0, envelope.iq(rpm, 0.0)) > limits.FULL_SHARE * envelope.circle_v:
         return 0.0
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        i_q = envelope.iq(rpm, middle)
-        fits = i_q <= envelope.maximum_a and envelope.voltage(rpm, 0.0, i_q) <= limits.FULL_SHARE * envelope.circle_v
-        low, high = (middle, high) if fits else (low, middle)
-    return low
+
+    def fits(load_nm: float) -> bool:
+        i_q = envelope.iq(rpm, load_nm)
+        return i_q <= envelope.maximum_a and envelope.voltage(rpm, 0.0, i_q) <= limits.FULL_SHARE * envelope.circle_v
+    return limits.halved(fits, 0.0, envelope.most_nm, 30)
 
 
 def _current(design: Design) -> str:

@@ -127,14 +127,12 @@ READ_ME = (
 
 def add_command(commands: Any) -> None:
     """`python3 -m tuning spreadsheet`"""
-    command = commands.add_parser("spreadsheet", help="write tuning/tuning_params.xlsx anew")
-    command.add_argument("--out", type=Path, default=FILE, help="the file; default tuning/tuning_params.xlsx")
-    command.set_defaults(command=_command)
+    commands.add_parser("spreadsheet", help="write tuning/tuning_params.xlsx anew").set_defaults(command=_command)
 
 
-def _command(options: argparse.Namespace) -> int:
-    write(options.out)
-    print(f"wrote {paths.shown(options.out)}")
+def _command(_: argparse.Namespace) -> int:
+    write(FILE)
+    print(f"wrote {paths.shown(FILE)}")
     return 0
 
 

@@ -95,10 +95,6 @@ def emf_v(motor: Motor, rpm: float) -> float:
     return motor.psi_vs * rpm * RPM * motor.pole_pairs
 
 
-def speed_for_emf(motor: Motor, volt: float) -> float:
-    return volt / (motor.psi_vs * RPM * motor.pole_pairs)
-
-
 def start_current(motor: Motor, maximum_a: float, trip_a: float, needed_nm: float) -> float:
     """The larger of 92 % of the rated current (within the trip level's headroom) and what the load needs at 50 degrees of load angle; within
     the drive's largest current."""
@@ -114,7 +110,7 @@ def needed_torque(motor: Motor, end_rpm: float) -> float:
 def end_speed(motor: Motor, board: BoardFile, current_a: float, nominal_rpm: float) -> float:
     """Hand-over speed: back-EMF = error / sin(20 degrees), at least a fifth of nominal speed (twice the speed where Equation 2 takes its
     sign from Eq), at most half of it."""
-    wanted = max(speed_for_emf(motor, emf_error_v(motor, board, current_a) / HAND_OVER_SINE), 0.2 * nominal_rpm)
+    wanted = max(emf_error_v(motor, board, current_a) / HAND_OVER_SINE / emf_v(motor, 1.0), 0.2 * nominal_rpm)
     step = 50.0 if wanted > 300.0 else 10.0
     return min(max(math.ceil(wanted / step - 1e-9) * step, 50.0), digits_down(0.5 * nominal_rpm, 2), 5000.0)
 
@@ -209,8 +205,7 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
     rate = int(fixed.get("OPENLOOP_RAMPSPEED_INCREASERATE", 0)) or ramp_rate(motor, board, current, end, inertia)
     omega = natural_rad_s(motor, current, inertia)
     damping = damping_nms(motor, plant, gains, omega)
-    lock = (fixed.get("LOCK_TIME", 0.0) * board.pwm_period_s
-            or lock_by_rule_s(omega))
+    lock = fixed.get("LOCK_TIME", 0.0) * board.pwm_period_s or lock_by_rule_s(omega)
     longest = 32000 * board.pwm_period_s
     while True:
         lock = min(lock, longest)

@@ -1,6 +1,7 @@
 """Identification on the virtual board: every motor within its limits, and what happens when something is wrong with motor, wires or shaft."""
 
-import unittest
+import pytest
+from pytest import approx
 
 from tools.bench import build
 from tools.common import board_keys, motor_file, paths, workers
@@ -9,97 +10,83 @@ from tuning import identify, identify_result
 HURST = "hurst_dmb0224c10002"
 
 
-def run(name: str = HURST, **changes: float) -> identify_result.Identified:
+def run(name: str = HURST, current_a: float | None = None, speed_rpm: float | None = None, **changes: float) -> identify_result.Identified:
     """One identification with changes to the plant; dots of keys are written as "__"."""
     values = board_keys.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
-    return identify.identify([motor_file.load(name)], "mclv", values)[0]
+    return identify.identify([motor_file.load(name)], "mclv", values, current_a, speed_rpm)[0]
 
 
-def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float, **changes: float) -> identify_result.Identified:
+def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float) -> identify_result.Identified:
     """Another motor in the Hurst's housing: 5 pole pairs."""
     psi_vs = kphi / (3.0 ** 0.5 * 1000.0 * 2.0 * 3.14159265 / 60.0 * 5.0)
-    values = {"motor.rs_ohm": rs_ohm, "motor.ld_h": ld_h, "motor.lq_h": lq_h, "motor.psi_vs": psi_vs, "mech.coulomb_nm": 0.001} | changes
-    return identify.identify([motor_file.load(HURST)], "mclv", board_keys.Values(values, {}), current_a, speed_rpm)[0]
+    return run(HURST, current_a, speed_rpm, motor__rs_ohm=rs_ohm, motor__ld_h=ld_h, motor__lq_h=lq_h, motor__psi_vs=psi_vs,
+               mech__coulomb_nm=0.001)
 
 
-class Motors(unittest.TestCase):
-    def test_every_motor_is_within_its_limits(self):
-        names = paths.names(paths.MOTORS)
-        self.assertGreaterEqual(len(names), 6)
-        for item in identify.identify([motor_file.load(name) for name in names], "mclv", board_keys.Values()):
-            with self.subTest(item.motor.name):
-                self.assertEqual(item.problems(), [])
-
-    def test_the_corners_of_the_range(self):
-        for name, motor in (("low R, long time constant", (0.1, 1e-3, 1e-3, 5.0, 3.0, 1000.0)),
-                            ("low R and L, little flux", (0.1, 5e-5, 5e-5, 1.0, 3.0, 2000.0)),
-                            ("high R and L, much flux", (20.0, 20e-3, 20e-3, 60.0, 0.4, 120.0)),
-                            ("time constant of two periods", (0.5, 5e-5, 5e-5, 3.0, 2.0, 1500.0)),
-                            ("Lq twice Ld", (2.0, 1e-3, 2e-3, 8.0, 1.0, 800.0)),
-                            ("small current", (2.67, 1.92e-3, 1.92e-3, 7.24, 0.3, 1000.0))):
-            with self.subTest(name):
-                self.assertEqual(made_up(*motor).problems(), [])
-
-    def test_rotor_anywhere_heavy_light_or_without_friction(self):
-        for changes in ({"state__theta_e_deg": 0.0}, {"state__theta_e_deg": 120.0}, {"state__theta_e_deg": 240.0},
-                        {"mech__inertia_kgm2": 5.5e-5}, {"mech__inertia_kgm2": 2e-6}, {"mech__coulomb_nm": 0.0, "mech__viscous_nms": 0.0},
-                        {"load__constant_nm": 0.02}):
-            with self.subTest(**changes):
-                self.assertEqual(run(**changes).problems(), [])
-
-    def test_noise_supply_and_bridge_do_not_matter(self):
-        for changes in ({"adc__noise_lsb": 2.0}, {"adc__noise_lsb": 0.0}, {"supply__voltage_v": 20.0}, {"supply__resistance_ohm": 1.0},
-                        {"inverter__diode_v": 1.2, "inverter__turn_off_s": 4e-7}, {"shunt__offset_a_v": 0.05}):
-            with self.subTest(**changes):
-                self.assertEqual(run(**changes).problems(), [])
-
-    def test_a_hot_motor_is_measured_hot(self):
-        item = run(motor__temp_c=75.0)
-        self.assertEqual(item.problems(), [])
-        self.assertGreater(item.winding_ohm, 3.1)
+def ends(item: identify_result.Identified, result: str) -> bool:
+    """Did it end so, without a fault and with the outputs off?"""
+    return (item.result.name, item.measured.fault, item.measured.outputs_seen) == (result, "NONE", 0.0)
 
 
-class Troubles(unittest.TestCase):
-    def assert_ends(self, item: identify_result.Identified, result: str) -> None:
-        self.assertEqual((item.result.name, item.measured.fault), (result, "NONE"))
-        self.assertEqual(item.measured.outputs_seen, 0.0)
-
-    def test_blocked_shaft(self):
-        item = run(load__locked=1.0)
-        self.assert_ends(item, "NOT_TURNING")
-        self.assertAlmostEqual(item.winding_ohm, 2.67, delta=0.03)
-        self.assertEqual(item.measured.watch["Kphi_mV_per_krpm"], 0)
-
-    def test_blocked_shaft_of_a_salient_motor_in_any_position(self):
-        for angle in (0.0, 45.0, 90.0, 200.0):
-            self.assert_ends(run("linix_45zwn24_40", load__locked=1.0, state__theta_e_deg=angle), "NOT_TURNING")
-
-    def test_each_open_phase(self):
-        for phase in (1.0, 2.0, 3.0):
-            self.assert_ends(run(fault__open_phase=phase), "NO_CURRENT")
-
-    def test_load_beyond_the_current(self):
-        self.assert_ends(run(load__constant_nm=0.2), "NOT_TURNING")
-
-    def test_too_much_resistance_too_much_inductance_too_much_flux(self):
-        self.assert_ends(made_up(20.0, 1e-2, 1e-2, 7.24, 1.5, 1000.0), "CURRENT_NOT_REACHED")
-        self.assert_ends(made_up(5.0, 0.4, 0.4, 7.24, 1.0, 1000.0), "L_RANGE")
-        self.assert_ends(made_up(2.67, 1.92e-3, 1.92e-3, 30.0, 1.0, 1000.0), "VOLTAGE_LIMIT")
-
-    def test_S2_in_every_step_stops_within_its_debouncing(self):
-        undisturbed = run()
-        began_s = undisturbed.measured.steps[0][0]
-        spans = list(zip(undisturbed.measured.steps[1:], undisturbed.measured.steps[2:]))
-        presses = [0.5 * (at_s + until_s) - began_s for (at_s, _), (until_s, _) in spans]
-        library = paths.ROOT / "build" / f"host-{build.variant_name([identify_result.MODE], identify.HEADERS / HURST)}" / "libvboard.so"
-        jobs = [identify.Job(library, undisturbed.values, stop_after_s=at_s) for at_s in presses]
-        for at_s, (step, _), measured in zip(presses, spans, workers.run_all(jobs, identify.measure, lambda seconds: None)):
-            with self.subTest(identify_result.step_names()[step[1]]):
-                self.assertEqual(identify_result.results()[measured.watch["result"]].name, "STOPPED")
-                self.assertEqual((measured.fault, measured.outputs_seen), ("NONE", 0.0))
-                self.assertIn(step[1], [number for _, number in measured.steps])
-                self.assertLess(measured.steps[-1][0] - began_s - at_s, 0.035)
+# ---- values ----------------------------------------------------------------------------------------------------------------
+def test_every_motor_is_within_its_limits():
+    names = paths.names(paths.MOTORS)
+    items = identify.identify([motor_file.load(name) for name in names], "mclv", board_keys.Values())
+    assert len(names) >= 6 and {item.motor.name: item.problems() for item in items} == {name: [] for name in names}
 
 
-if __name__ == "__main__":
-    unittest.main()
+@pytest.mark.parametrize("motor", [
+    pytest.param((0.1, 1e-3, 1e-3, 5.0, 3.0, 1000.0), id="low R, long time constant"),
+    pytest.param((0.1, 5e-5, 5e-5, 1.0, 3.0, 2000.0), id="low R and L, little flux"),
+    pytest.param((20.0, 20e-3, 20e-3, 60.0, 0.4, 120.0), id="high R and L, much flux"),
+    pytest.param((0.5, 5e-5, 5e-5, 3.0, 2.0, 1500.0), id="time constant of two periods"),
+    pytest.param((2.0, 1e-3, 2e-3, 8.0, 1.0, 800.0), id="Lq twice Ld"),
+    pytest.param((2.67, 1.92e-3, 1.92e-3, 7.24, 0.3, 1000.0), id="small current")])
+def test_the_corners_of_the_range(motor):
+    assert made_up(*motor).problems() == []
+
+
+@pytest.mark.parametrize("changes", [
+    # the rotor anywhere, heavy, light, without friction
+    {"state__theta_e_deg": 0.0}, {"state__theta_e_deg": 120.0}, {"state__theta_e_deg": 240.0}, {"mech__inertia_kgm2": 5.5e-5},
+    {"mech__inertia_kgm2": 2e-6}, {"mech__coulomb_nm": 0.0, "mech__viscous_nms": 0.0}, {"load__constant_nm": 0.02},
+    # noise, supply, bridge
+    {"adc__noise_lsb": 2.0}, {"adc__noise_lsb": 0.0}, {"supply__voltage_v": 20.0}, {"supply__resistance_ohm": 1.0},
+    {"inverter__diode_v": 1.2, "inverter__turn_off_s": 4e-7}, {"shunt__offset_a_v": 0.05}], ids=str)
+def test_what_does_not_matter(changes):
+    assert run(**changes).problems() == []
+
+
+def test_a_hot_motor_is_measured_hot():
+    item = run(motor__temp_c=75.0)
+    assert item.problems() == [] and item.winding_ohm > 3.1
+
+
+# ---- troubles --------------------------------------------------------------------------------------------------------------
+def test_a_blocked_shaft_has_a_resistance_and_no_kphi():
+    item = run(load__locked=1.0)
+    assert ends(item, "NOT_TURNING") and item.winding_ohm == approx(2.67, abs=0.03)
+    assert item.measured.watch["Kphi_mV_per_krpm"] == 0
+
+
+@pytest.mark.parametrize("result, motor", [
+    *(("NOT_TURNING", {"name": "linix_45zwn24_40", "load__locked": 1.0, "state__theta_e_deg": angle})
+      for angle in (0.0, 45.0, 90.0, 200.0)),
+    *(("NO_CURRENT", {"fault__open_phase": phase}) for phase in (1.0, 2.0, 3.0)), ("NOT_TURNING", {"load__constant_nm": 0.2}),
+    ("CURRENT_NOT_REACHED", (20.0, 1e-2, 1e-2, 7.24, 1.5, 1000.0)), ("L_RANGE", (5.0, 0.4, 0.4, 7.24, 1.0, 1000.0)),
+    ("VOLTAGE_LIMIT", (2.67, 1.92e-3, 1.92e-3, 30.0, 1.0, 1000.0))], ids=str)
+def test_what_ends_otherwise(result, motor):
+    assert ends(run(**motor) if isinstance(motor, dict) else made_up(*motor), result)
+
+
+def test_s2_in_every_step_stops_within_its_debouncing():
+    undisturbed = run()
+    began_s = undisturbed.measured.steps[0][0]
+    spans = list(zip(undisturbed.measured.steps[1:], undisturbed.measured.steps[2:]))
+    presses = [0.5 * (at_s + until_s) - began_s for (at_s, _), (until_s, _) in spans]
+    library = paths.ROOT / "build" / f"host-{build.variant_name([identify_result.MODE], identify.HEADERS / HURST)}" / "libvboard.so"
+    jobs = [identify.Job(library, undisturbed.values, stop_after_s=at_s) for at_s in presses]
+    for at_s, ((_, step), _), measured in zip(presses, spans, workers.run_all(jobs, identify.measure, lambda seconds: None)):
+        assert identify_result.results()[measured.watch["result"]].name == "STOPPED", identify_result.step_names()[step]
+        assert (measured.fault, measured.outputs_seen) == ("NONE", 0.0)
+        assert step in [number for _, number in measured.steps] and measured.steps[-1][0] - began_s - at_s < 0.035

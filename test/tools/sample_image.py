@@ -17,8 +17,7 @@ LIBRARY = "c:/program files (x86)/microchip/xc16/v2.10/lib\\libc99-pic30-elf.a"
 OBJECT = "build/target/firmware/board/isr.o"
 CONFIG = "".join(f"#pragma config {line}\n" for line in (
     "FNOSC = FRC", "FCKSM = CSECMD", "POSCMD = XT", "IOL1WAY = OFF", "FWDTEN = ON", "FPWRT = PWR128", "PWMPIN = ON", "HPOL = ON",
-                                                         "LPOL = ON",
-    "ICS = PGD3", "JTAGEN = OFF"))
+    "LPOL = ON", "ICS = PGD3", "JTAGEN = OFF"))
 
 
 @dataclass

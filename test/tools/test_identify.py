@@ -2,201 +2,157 @@
 
 import json
 import re
-import tempfile
-import unittest
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from pytest import approx
+from tune_support import HURST, command, motors
 
 from tools.common import board_file, board_keys, motor_file, paths
 from tools.common.errors import UserError
-from tune_support import HURST, command, motors
 from tuning import constants, identify, identify_result
+from tuning.identify_result import Known
+
+BOARD, MOTOR = board_file.load("mclv"), motor_file.load(HURST)
+FILE = (paths.MOTORS / f"{HURST}.toml").read_text(encoding="utf-8")
 
 
-class Tables(unittest.TestCase):
-    def test_results_have_name_cause_and_remedy(self):
-        results = identify_result.results()
-        self.assertEqual(sorted(results), list(range(len(results))))
-        self.assertEqual(results[2].name, "DONE")
-        self.assertEqual(results[8].name, "NOT_TURNING")
-        for result in results.values():
-            self.assertRegex(result.name, r"^[A-Z_]+$")
-            self.assertGreater(len(result.cause), 10)
-            self.assertGreater(len(result.remedy), 5)
-            self.assertNotIn('"', result.cause + result.remedy)
-
-    def test_steps_begin_with_idle_and_end_with_full_speed(self):
-        self.assertEqual(identify_result.step_names()[0], "IDLE")
-        self.assertEqual(identify_result.step_names()[-1], "SPIN_FULL")
+def pasted(lines: str, path: Path, connection: str = "Y") -> motor_file.Motor:
+    """The Hurst's file with other electrical values, read again."""
+    text = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", FILE, flags=re.DOTALL | re.MULTILINE)
+    path.write_text(text.replace('"Y"', f'"{connection}"').split("[spread]")[0], encoding="utf-8")
+    return motor_file.load(str(path))
 
 
-class Header(unittest.TestCase):
-    def setUp(self):
-        self.board = board_file.load("mclv")
-        self.motor = motor_file.load(HURST)
-
-    def define(self, text: str, name: str) -> str:
-        return re.search(rf"^#define {name} (\S+)$", text, re.MULTILINE)[1]
-
-    def test_knows_pole_pairs_current_and_speed_of_the_rating(self):
-        text = identify.header(identify_result.Known.of(self.motor, self.board), self.board)
-        self.assertEqual(self.define(text, "NOPOLESPAIRS"), "5")
-        self.assertEqual(self.define(text, "Q_CURRENT_REF_OPENLOOP"), "1.53")
-        self.assertEqual(self.define(text, "END_SPEED_RPM"), "1120")
-
-    def test_a_board_for_large_currents_builds_too(self):
-        """33 A and 48 A of range: with the placeholders of the MCLV the back-EMF's number format would overflow."""
-        for full_scale_a in (33.0, 46.0):
-            text = identify.header(identify_result.Known(4, 17.0, 1400.0), replace(self.board, current_full_scale_a=full_scale_a))
-            values = {name: value for name, value in re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE) if name != "USERPARAMS_H"}
-            self.assertEqual(constants.header(values).wrong, [])
-        self.assertEqual(self.define(identify.header(identify_result.Known(4, 1.0, 1400.0), self.board), "MOTOR_RS_OHM"), "1")
-
-    def test_knows_nothing_of_what_is_to_be_measured(self):
-        """Motors that differ in everything else have the same header."""
-        known = identify_result.Known(5, 1.0, 1000.0)
-        text = identify.header(known, self.board)
-        for number in ("2.67", "1.92", "7.24", "5.5e-06"):
-            self.assertNotIn(f" {number}\n", text)
-        self.assertEqual(text, identify.header(identify_result.Known(5, 1.0, 1000.0), self.board))
-
-    def test_current_stays_below_the_boards_trip(self):
-        for name in motors():
-            known = identify_result.Known.of(motor_file.load(name), self.board)
-            text = identify.header(known, self.board)
-            self.assertLess(1.2 * known.current_a, float(self.define(text, "OVER_CURRENT_THRESHOLD_A")))
-
-    def test_a_bus_below_the_rating_lowers_the_speed(self):
-        high = replace(self.motor, rated_voltage_v=48.0)
-        self.assertAlmostEqual(identify_result.Known.of(high, self.board).speed_rpm, 560.0)
-
-    def test_current_and_speed_can_be_given(self):
-        known = identify_result.Known.of(self.motor, self.board, 0.7, 800.0)
-        self.assertEqual((known.current_a, known.speed_rpm), (0.7, 800.0))
+# ---- the firmware's tables -------------------------------------------------------------------------------------------------
+def test_results_have_name_cause_and_remedy_and_steps_go_from_idle_to_full_speed():
+    results, steps = identify_result.results(), identify_result.step_names()
+    assert sorted(results) == list(range(len(results)))
+    assert (results[2].name, results[8].name, steps[0], steps[-1]) == ("DONE", "NOT_TURNING", "IDLE", "SPIN_FULL")
+    for result in results.values():
+        assert re.fullmatch("[A-Z_]+", result.name) and len(result.cause) > 10 and len(result.remedy) > 5
+        assert '"' not in result.cause + result.remedy
 
 
-class Run(unittest.TestCase):
-    """One run for all of these."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.folder = Path(cls.temporary.name) / "result"
-        cls.code, cls.out, cls.error = command("identify", HURST, "--quiet", "--out", str(cls.folder))
-        cls.summary = json.loads((cls.folder / "summary.json").read_text(encoding="utf-8"))
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.temporary.cleanup()
-
-    def test_ends_well(self):
-        self.assertEqual((self.code, self.error), (0, ""))
-        self.assertEqual(self.summary["result"], "DONE")
-
-    def test_every_value_is_within_its_limit_and_close_to_the_truth(self):
-        limits = {row["name"].split()[0]: row for row in self.summary["rows"][1:]}
-        self.assertEqual(sorted(limits), ["Kphi", "Ld", "Lq", "R"])
-        self.assertEqual({name: row["limit_percent"] for name, row in limits.items()}, {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0})
-        for row in limits.values():
-            self.assertLess(abs(row["error_percent"]), 1.0, row)
-
-    def test_table_shows_loop_and_winding(self):
-        self.assertRegex(self.out, r"R loop \[mohm\] +269\d +2692\.5")
-        self.assertRegex(self.out, r"R winding \[mohm\] +26[67]\d\.5 +2670\.0 +[+-]0\.\d\d +3 +PASS")
-
-    def test_every_step_is_in_the_protocol_once(self):
-        seen = [step["step"] for step in self.summary["steps"]]
-        self.assertEqual(seen[1:-1], identify_result.step_names()[1:])
-
-    def test_the_lines_to_paste_are_a_motor_file(self):
-        lines = (self.folder / "electrical.toml").read_text(encoding="utf-8")
-        self.assertIn(lines.strip(), self.out)
-        text = (paths.MOTORS / f"{HURST}.toml").read_text(encoding="utf-8")
-        pasted = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", text, flags=re.DOTALL | re.MULTILINE)
-        path = self.folder / "pasted.toml"
-        path.write_text(pasted, encoding="utf-8")
-        found, true = motor_file.load(str(path)), motor_file.load(HURST)
-        self.assertAlmostEqual(found.rs_ohm / true.rs_ohm, 1.0, delta=0.01)
-        self.assertAlmostEqual(found.ld_h / true.ld_h, 1.0, delta=0.01)
-        self.assertAlmostEqual(found.kphi_v_per_krpm / true.kphi_v_per_krpm, 1.0, delta=0.01)
-        self.assertFalse(found.salient)
-
-    def test_plots_and_header_are_there(self):
-        for name in ("resistance.png", "inductance.png", "back_emf.png"):
-            self.assertGreater((self.folder / name).stat().st_size, 10000, name)
-        self.assertIn("#define NOPOLESPAIRS 5\n", (self.folder / "userparams.h").read_text(encoding="utf-8"))
+# ---- the neutral header ----------------------------------------------------------------------------------------------------
+def defines(known: Known, board=BOARD) -> dict[str, str]:
+    return dict(re.findall(r"^#define (\w+) (\S+)$", identify.header(known, board), re.MULTILINE))
 
 
-class Verdict(unittest.TestCase):
-    """Made-up measurements: the comparison itself."""
-
-    def item(self, watch: dict, fault: str = "NONE", **changes) -> identify_result.Identified:
-        board, motor = board_file.load("mclv"), motor_file.load(HURST)
-        values = {"motor.rs_ohm": 2.67, "motor.ld_h": 1.92e-3, "motor.lq_h": 1.92e-3, "motor.psi_vs": 7.983e-3, "motor.pole_pairs": 5,
-                  "motor.r_tempco": 0.0039, "motor.psi_tempco": -0.002} | changes
-        full = {"step": 0, "result": 2, "Rs_mohm": 2692, "Ld_uH": 1920, "Lq_uH": 1920, "Kphi_mV_per_krpm": 7240} | watch
-        measured = identify_result.Measured(full, fault, [(0.0, 0)], None)
-        return identify_result.Identified(motor, board, identify_result.Known(5, 1.5, 1000.0), "", values, measured)
-
-    def test_true_values_pass(self):
-        self.assertEqual(self.item({}).problems(), [])
-
-    def test_each_limit_is_kept(self):
-        for name, just, beyond in (("Rs_mohm", 2692 + 80, 2692 + 81), ("Ld_uH", 2015, 2017), ("Lq_uH", 1825, 1823),
-                                   ("Kphi_mV_per_krpm", 7384, 7386)):
-            self.assertEqual(self.item({name: just}).problems(), [], name)
-            self.assertEqual(len(self.item({name: beyond}).problems()), 1, name)
-
-    def test_a_hot_motor_has_other_true_values(self):
-        self.assertEqual(len(self.item({}, **{"motor.temp_c": 75.0}).problems()), 2)
-        hot = {"Rs_mohm": round(2670 * 1.195 + 22.5), "Kphi_mV_per_krpm": round(7240 * 0.9)}
-        self.assertEqual(self.item(hot, **{"motor.temp_c": 75.0}).problems(), [])
-
-    def test_salient_motors_get_both_inductances(self):
-        self.assertIn('inductance = { value = 3.86, unit = "mH line-to-line"', self.item({"Lq_uH": 1940}).paste())
-        lines = self.item({"Lq_uH": 2500}).paste()
-        self.assertIn("inductance_d = { value = 3.84,", lines)
-        self.assertIn("inductance_q = { value = 5,", lines)
-
-    def test_the_lines_to_paste_suit_a_star_and_a_delta(self):
-        text = (paths.MOTORS / f"{HURST}.toml").read_text(encoding="utf-8")
-        for connection in ("Y", "delta"):
-            for watch in ({}, {"Lq_uH": 2500}):
-                with self.subTest(connection, watch=watch), tempfile.TemporaryDirectory() as folder:
-                    path = Path(folder) / "pasted.toml"
-                    lines = self.item(watch).paste()
-                    pasted = re.sub(r"\[electrical\].*?(?=^\[mechanical\])", lambda _: lines + "\n", text, flags=re.DOTALL | re.MULTILINE)
-                    path.write_text(pasted.replace('"Y"', f'"{connection}"').split("[spread]")[0], encoding="utf-8")
-                    motor = motor_file.load(str(path))
-                    self.assertAlmostEqual(motor.rs_ohm, 2.6695, delta=1e-3)
-                    self.assertAlmostEqual(motor.ld_h, 1.92e-3, delta=1e-6)
-
-    def test_another_end_is_one_line_with_the_remedy(self):
-        (line,) = self.item({"result": 9}).problems()
-        self.assertIn("VOLTAGE_LIMIT", line)
-        self.assertIn("lower END_SPEED_RPM", line)
-        (line,) = self.item({"result": 3}, "OVERCURRENT_SW").problems()
-        self.assertIn("fault OVERCURRENT_SW", line)
+def test_the_header_knows_pole_pairs_current_and_speed_of_the_rating():
+    values = defines(Known.of(MOTOR, BOARD))
+    assert [values[name] for name in ("NOPOLESPAIRS", "Q_CURRENT_REF_OPENLOOP", "END_SPEED_RPM")] == ["5", "1.53", "1120"]
 
 
-class Refused(unittest.TestCase):
-    def refused(self, *arguments: str) -> str:
-        code, out, error = command("identify", *arguments)
-        self.assertEqual((code, out), (2, ""))
-        self.assertEqual(error.count("\n"), 1)
-        return error
-
-    def test_mistakes_on_the_command_line(self):
-        for arguments, says in (((), "which motor?"), ((HURST, "--all"), "which motor?"), (("hurst",), "no motor 'hurst'"),
-                                ((HURST, "--current", "0.01"), "current = 0.01 is impossible"), ((HURST, "--speed", "9000"), "speed = 9000 is impossible"),
-                                (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'")):
-            self.assertIn(says, self.refused(*arguments))
-        with self.assertRaises(UserError):
-            identify.identify([motor_file.load(HURST)], "mclv", board_keys.Values({"no.key": 1.0}, {}))
-
-    def test_a_current_beyond_the_board_is_named_by_the_build(self):
-        self.assertIn("MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A", self.refused(HURST, "--current", "4.2"))
+@pytest.mark.parametrize("full_scale_a", [33.0, 46.0])
+def test_a_board_for_large_currents_builds_too(full_scale_a):
+    """With the placeholders of the MCLV the back-EMF's number format would overflow."""
+    values = defines(Known(4, 17.0, 1400.0), replace(BOARD, current_full_scale_a=full_scale_a))
+    assert constants.header(values).wrong == []
+    assert defines(Known(4, 1.0, 1400.0))["MOTOR_RS_OHM"] == "1"
 
 
-if __name__ == "__main__":
-    unittest.main()
+def test_the_header_knows_nothing_of_what_is_to_be_measured():
+    assert not {"2.67", "1.92", "7.24", "5.5e-06"} & set(defines(Known(5, 1.0, 1000.0)).values())
+
+
+@pytest.mark.parametrize("name", motors())
+def test_current_stays_below_the_boards_trip(name):
+    known = Known.of(motor_file.load(name), BOARD)
+    assert 1.2 * known.current_a < float(defines(known)["OVER_CURRENT_THRESHOLD_A"])
+
+
+def test_a_bus_below_the_rating_lowers_the_speed_and_current_and_speed_can_be_given():
+    assert Known.of(replace(MOTOR, rated_voltage_v=48.0), BOARD).speed_rpm == approx(560.0, abs=5e-8)
+    assert Known.of(MOTOR, BOARD, 0.7, 800.0) == Known(5, 0.7, 800.0)
+
+
+# ---- one run ---------------------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("identify") / "result"
+    code, out, error = command("identify", HURST, "--quiet", "--out", str(folder))
+    assert (code, error) == (0, "")
+    return SimpleNamespace(folder=folder, out=out, summary=json.loads((folder / "summary.json").read_text(encoding="utf-8")))
+
+
+def test_every_value_is_within_its_limit_and_close_to_the_truth(run):
+    assert run.summary["result"] == "DONE"
+    limits = {row["name"].split()[0]: row for row in run.summary["rows"][1:]}
+    assert {name: row["limit_percent"] for name, row in limits.items()} == {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0}
+    assert all(abs(row["error_percent"]) < 1.0 for row in limits.values()), limits
+
+
+def test_table_shows_loop_and_winding_and_every_step_is_in_the_protocol_once(run):
+    assert re.search(r"R loop \[mohm\] +269\d +2692\.5", run.out)
+    assert re.search(r"R winding \[mohm\] +26[67]\d\.5 +2670\.0 +[+-]0\.\d\d +3 +PASS", run.out)
+    assert [step["step"] for step in run.summary["steps"]][1:-1] == identify_result.step_names()[1:]
+
+
+def test_the_lines_to_paste_are_a_motor_file(run, tmp_path):
+    lines = (run.folder / "electrical.toml").read_text(encoding="utf-8")
+    assert lines.strip() in run.out
+    found = pasted(lines, tmp_path / "pasted.toml")
+    for name in ("rs_ohm", "ld_h", "kphi_v_per_krpm"):
+        assert getattr(found, name) == approx(getattr(MOTOR, name), rel=0.01)
+    assert not found.salient
+
+
+def test_plots_and_header_are_there(run):
+    assert all((run.folder / f"{name}.png").stat().st_size > 10000 for name in ("resistance", "inductance", "back_emf"))
+    assert "#define NOPOLESPAIRS 5\n" in (run.folder / "userparams.h").read_text(encoding="utf-8")
+
+
+# ---- the verdict on made-up measurements -----------------------------------------------------------------------------------
+def item(fault: str = "NONE", temp_c: float = 25.0, **watch: int) -> identify_result.Identified:
+    values = {"motor.rs_ohm": 2.67, "motor.ld_h": 1.92e-3, "motor.lq_h": 1.92e-3, "motor.psi_vs": 7.983e-3, "motor.pole_pairs": 5,
+              "motor.r_tempco": 0.0039, "motor.psi_tempco": -0.002, "motor.temp_c": temp_c}
+    full = {"step": 0, "result": 2, "Rs_mohm": 2692, "Ld_uH": 1920, "Lq_uH": 1920, "Kphi_mV_per_krpm": 7240} | watch
+    measured = identify_result.Measured(full, fault, [(0.0, 0)], None)
+    return identify_result.Identified(MOTOR, BOARD, Known(5, 1.5, 1000.0), "", values, measured)
+
+
+@pytest.mark.parametrize("watch, problems", [
+    ({}, 0), ({"Rs_mohm": 2692 + 80}, 0), ({"Rs_mohm": 2692 + 81}, 1), ({"Ld_uH": 2015}, 0), ({"Ld_uH": 2017}, 1), ({"Lq_uH": 1825}, 0),
+    ({"Lq_uH": 1823}, 1), ({"Kphi_mV_per_krpm": 7384}, 0), ({"Kphi_mV_per_krpm": 7386}, 1), ({"temp_c": 75.0}, 2), # hot: other true values
+    ({"temp_c": 75.0, "Rs_mohm": round(2670 * 1.195 + 22.5), "Kphi_mV_per_krpm": round(7240 * 0.9)}, 0)])
+def test_each_limit_is_kept(watch, problems):
+    assert len(item(**watch).problems()) == problems
+
+
+def test_salient_motors_get_both_inductances():
+    assert 'inductance = { value = 3.86, unit = "mH line-to-line"' in item(Lq_uH=1940).paste()
+    lines = item(Lq_uH=2500).paste()
+    assert "inductance_d = { value = 3.84," in lines and "inductance_q = { value = 5," in lines
+
+
+@pytest.mark.parametrize("connection", ["Y", "delta"])
+@pytest.mark.parametrize("watch", [{}, {"Lq_uH": 2500}])
+def test_the_lines_to_paste_suit_a_star_and_a_delta(tmp_path, connection, watch):
+    motor = pasted(item(**watch).paste(), tmp_path / "pasted.toml", connection)
+    assert (motor.rs_ohm, motor.ld_h) == (approx(2.6695, abs=1e-3), approx(1.92e-3, abs=1e-6))
+
+
+@pytest.mark.parametrize("told, words", [({"result": 9}, ("VOLTAGE_LIMIT", "lower END_SPEED_RPM")),
+                                         ({"result": 3, "fault": "OVERCURRENT_SW"}, ("fault OVERCURRENT_SW",))])
+def test_another_end_is_one_line_with_the_remedy(told, words):
+    (line,) = item(**told).problems()
+    assert all(word in line for word in words)
+
+
+# ---- refusals --------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("arguments, says", [
+    ((), "which motor?"), ((HURST, "--all"), "which motor?"), (("hurst",), "no motor 'hurst'"),
+    ((HURST, "--current", "0.01"), "current = 0.01 is impossible"), ((HURST, "--speed", "9000"), "speed = 9000 is impossible"),
+    (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'"),
+    ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
+def test_mistakes_on_the_command_line(arguments, says):
+    code, out, error = command("identify", *arguments)
+    assert (code, out, error.count("\n")) == (2, "", 1) and says in error, error
+
+
+def test_an_unknown_key_is_refused():
+    with pytest.raises(UserError):
+        identify.identify([MOTOR], "mclv", board_keys.Values({"no.key": 1.0}, {}))

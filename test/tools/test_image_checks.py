@@ -79,19 +79,68 @@ def test_the_last_word_of_the_flash_is_inside_and_the_next_one_is_not(bench):
     bench.fails("1 words outside the flash .*0x005800")
 
 
-def test_a_hex_of_another_elf_is_refused(bench):
-    bench.image.constants = []
-    bench.image.places = [place for place in bench.image.places if place[2] != ".const"]
-    bench.image.hex_words = {**bench.image.words, 0x204: 1, 0x5000: 7}
-    bench.fails("HEX and ELF differ in 2 words, the first at 0x000204: 0x000001 in the HEX, 0x000000 in the ELF")
+# ---- what is broken is a line each ------------------------------------------------------------------------------------------
+def other_elf(image):
+    image.constants = []
+    image.places = [place for place in image.places if place[2] != ".const"]
+    image.hex_words = {**image.words, 0x204: 1, 0x5000: 7}
+
+
+def compilers_default(image):
+    start = image.symbols["__DefaultInterrupt"]
+    image.places = [place if place[0] != start else (*place[:2], ".isr", "default_isr") for place in image.places]
+
+
+def no_reset_vector(image):
+    del image.words[0], image.words[2]
+
+
+def nested_helper(image):
+    inner = image.function("__fpack", 0x060000, file=f"{LIBRARY}(fpack.eo)")
+    outer = image.function("__mulsf3", CALL | inner, 0, 0x060000, file=f"{LIBRARY}(mulsf3.eo)")
+    image.function("caller", CALL | outer, 0, file="a.o")
+
+
+def unseen_helper(image):
+    image.function("__divsf3", 0x060000, file=f"{LIBRARY}(divsf3.eo)")
+    image.constant(1, 2, file=f"{LIBRARY}(fp_thenan.o)")
+
+
+@pytest.mark.parametrize("change, patterns", [
+    pytest.param(other_elf, ["HEX and ELF differ in 2 words, the first at 0x000204: 0x000001 in the HEX, 0x000000 in the ELF"],
+                 id="a HEX of another ELF"),
+    pytest.param(lambda image: image.point("_ADC1Interrupt", image.symbols["__FLTA1Interrupt"]), [
+        r"vector _ADC1Interrupt of the IVT \(0x02E\) goes to .* \(_FLTA1Interrupt\), not to .* \(_ADC1Interrupt\)", "of the AIVT"],
+                 id="a vector that goes to another handler"),
+    pytest.param(lambda image: image.point("_T2Interrupt", image.symbols["_main"]),
+                 [r"_T2Interrupt of the IVT .*\(main\), not to .*_DefaultInterrupt", "AIVT"], id="a vector that goes elsewhere"),
+    pytest.param(lambda image: image.function("_T1Interrupt", RETFIE),
+                 ["_T1Interrupt of the IVT .*_DefaultInterrupt.*, not to .*_T1Interrupt", "AIVT"], id="a function that is not in its vector"),
+    pytest.param(lambda image: image.words.update({device.IVT + 2 * number: 0 for number in range(len(device.VECTORS))}),
+                 ["IVT", "IVT", "IVT", "and 123 more vectors of the IVT"], id="many wrong vectors"),
+    pytest.param(compilers_default, ["_DefaultInterrupt is the compiler's"], id="the compiler's own default handler"),
+    pytest.param(lambda image: image.words.update({0: 0x040000 | image.symbols["_main"]}),
+                 [r"reset vector: goes to .* \(main\), not to the start-up code at 0x000200"], id="a reset vector that goes elsewhere"),
+    pytest.param(no_reset_vector, ["reset vector: 0xFFFFFF 0xFFFFFF is no GOTO"], id="no reset vector"),
+    pytest.param(lambda image: image.words.pop(0xF80006), [r"word FOSCSEL \(0xF80006\) is missing: FNOSC must be FRC"],
+                 id="a configuration word that is missing"),
+    pytest.param(nested_helper, [r"__mulsf3\(\) .*called by caller\(\)"], id="what only a helper calls is not told too"),
+    pytest.param(unseen_helper, [r"__divsf3\(\) .*called by nothing that can be seen",
+                                 r"\.const of the compiler's library .*fp_thenan.o\)\), called by nothing that can be seen"],
+                 id="a helper and a constant that nothing visible calls"),
+    pytest.param(lambda image: image.places.pop(), [
+        "2 words from 0x.* on come from no file that the map names: the map is of another build, or the linker made them for a pointer"],
+                 id="a map of another build")])
+def test_each_broken_thing_is_a_line_that_says_what_and_where(bench, change, patterns):
+    change(bench.image)
+    bench.fails(*patterns)
 
 
 # ---- vectors -------------------------------------------------------------------------------------------------------------
 def test_the_vectors_have_the_addresses_of_the_family_s_reference_manual():
     places = {name: 4 + 2 * number for number, name in enumerate(device.VECTORS)}
     known = {"_OscillatorFail": 0x06, "_AddressError": 0x08, "_StackError": 0x0A, "_MathError": 0x0C, "_INT0Interrupt": 0x14,
-             "_T1Interrupt": 0x1A,
-             "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86,
+             "_T1Interrupt": 0x1A, "_U1RXInterrupt": 0x2A, "_U1TXInterrupt": 0x2C, "_ADC1Interrupt": 0x2E, "_CNInterrupt": 0x3A, "_MPWM1Interrupt": 0x86,
              "_FLTA1Interrupt": 0x92}
     assert {name: places[name] for name in known} == known
     assert len(device.VECTORS) == (0x100 - 0x04) // 2
@@ -112,25 +161,6 @@ def test_the_product_may_leave_the_end_of_the_tables_erased(bench):
     bench.passes()
 
 
-def test_a_vector_that_goes_elsewhere_is_found(bench):
-    symbols = bench.image.symbols
-    bench.image.point("_ADC1Interrupt", symbols["__FLTA1Interrupt"])
-    bench.fails(r"vector _ADC1Interrupt of the IVT \(0x02E\) goes to .* \(_FLTA1Interrupt\), not to .* \(_ADC1Interrupt\)", "of the AIVT")
-    bench.image.point("_ADC1Interrupt", symbols["__ADC1Interrupt"])
-    bench.image.point("_T2Interrupt", symbols["_main"])
-    bench.fails(r"_T2Interrupt of the IVT .*\(main\), not to .*_DefaultInterrupt", "AIVT")
-
-
-def test_a_function_that_exists_must_be_in_its_vector(bench):
-    bench.image.function("_T1Interrupt", RETFIE)
-    bench.fails("_T1Interrupt of the IVT .*_DefaultInterrupt.*, not to .*_T1Interrupt", "AIVT")
-
-
-def test_many_wrong_vectors_are_a_few_lines(bench):
-    bench.image.words |= {device.IVT + 2 * number: 0 for number in range(len(device.VECTORS))}
-    bench.fails("IVT", "IVT", "IVT", "and 123 more vectors of the IVT")
-
-
 @pytest.mark.parametrize("name", device.REQUIRED)
 def test_a_missing_handler_is_named(bench, name):
     del bench.image.symbols[f"_{name}"]
@@ -143,19 +173,6 @@ def test_a_misspelt_handler_is_named(bench):
     bench.passes() # no vector's name at all: the compiler warns of it
     bench.image.function("_ADC2Interrupt", RETFIE)
     bench.fails("_ADC2Interrupt is no vector of the 33FJ32MC204: the function never runs")
-
-
-def test_the_compilers_own_default_handler_is_refused(bench):
-    start = bench.image.symbols["__DefaultInterrupt"]
-    bench.image.places = [place if place[0] != start else (*place[:2], ".isr", "default_isr") for place in bench.image.places]
-    bench.fails("_DefaultInterrupt is the compiler's")
-
-
-def test_the_reset_vector_goes_to_the_start_up_code(bench):
-    bench.image.words[0] = 0x040000 | bench.image.symbols["_main"]
-    bench.fails(r"reset vector: goes to .* \(main\), not to the start-up code at 0x000200")
-    del bench.image.words[0], bench.image.words[2]
-    bench.fails("reset vector: 0xFFFFFF 0xFFFFFF is no GOTO")
 
 
 # ---- configuration words -------------------------------------------------------------------------------------------------
@@ -174,11 +191,6 @@ def test_every_wrong_bit_of_a_known_field_is_found(bench, name):
 def test_bits_that_mean_nothing_do_not_matter(bench):
     bench.image.words |= {0xF80000: 0xFFFFFF, 0xF8000E: 0x01}
     bench.passes()
-
-
-def test_a_missing_word_is_named_with_its_fields(bench):
-    del bench.image.words[0xF80006]
-    bench.fails(r"word FOSCSEL \(0xF80006\) is missing: FNOSC must be FRC")
 
 
 @pytest.mark.parametrize("old, new, expected", [("PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON"),
@@ -224,32 +236,11 @@ def test_relative_calls_and_jumps_are_seen_too(bench, opcode):
     bench.fails(r"called by caller\(\)")
 
 
-def test_what_only_a_helper_calls_is_not_told_too(bench):
-    inner = bench.image.function("__fpack", 0x060000, file=f"{LIBRARY}(fpack.eo)")
-    outer = bench.image.function("__mulsf3", CALL | inner, 0, 0x060000, file=f"{LIBRARY}(mulsf3.eo)")
-    bench.image.function("caller", CALL | outer, 0, file="a.o")
-    bench.fails(r"__mulsf3\(\) .*called by caller\(\)")
-
-
-def test_a_helper_or_constant_that_nothing_visible_calls_is_still_told(bench):
-    bench.image.function("__divsf3", 0x060000, file=f"{LIBRARY}(divsf3.eo)")
-    bench.image.constant(1, 2, file=f"{LIBRARY}(fp_thenan.o)")
-    bench.fails(r"__divsf3\(\) .*called by nothing that can be seen",
-                r"\.const of the compiler's library .*fp_thenan.o\)\), called by nothing that can be seen")
-
-
 @pytest.mark.parametrize("member", ["crt0_standard.o", "crt0_extended.o", "crt1_standard.o", "crt0.o", "data_init_standard.o",
-                                    "crt_start_mode_normal.Leo",
-                                    "crt_start_mode.o"])
+                                    "crt_start_mode_normal.Leo", "crt_start_mode.o"])
 def test_start_up_code_is_allowed_under_its_known_names(bench, member):
     bench.image.function("start", 0x060000, file=f"{LIBRARY}({member})", section=".libpic30_crt_start_mode")
     bench.passes()
-
-
-def test_a_map_of_another_build_is_refused(bench):
-    bench.image.places.pop()
-    bench.fails("2 words from 0x.* on come from no file that the map names: "
-                "the map is of another build, or the linker made them for a pointer")
 
 
 @pytest.mark.parametrize("word", [0xD80102, 0xD87B85, 0xD88102, 0xD8F90F, 0xD90002]) # div.s, div.u, divf

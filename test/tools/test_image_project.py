@@ -55,8 +55,7 @@ def test_what_has_no_box_becomes_an_additional_option_and_odd_characters_stay():
     assert tree.find(".//C30/appendMe").get("value") == '-std=gnu99 -DNAME="a<b>&c"'
     assert tree.find(".//C30-LD/appendMe").get("value") == "--odd"
     assert [item.text for item in tree.iter("itemPath")] == ["../include/drive/b.h", "../userparams.h", "../firmware/board/a&b.c",
-                                                             "../firmware/board/a.c",
-                                                             "Makefile"]
+                                                             "../firmware/board/a.c", "Makefile"]
     assert "isolate-each-function" not in boxes(tree, "C30") and boxes(tree, "C30")["enable-fatal-warnings"] == "false"
 
 

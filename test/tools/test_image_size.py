@@ -386,27 +386,21 @@ def repository(tmp_path, monkeypatch):
     result = Repository(tmp_path)
     (tmp_path / "made.elf").write_bytes(program((0x200, 3), functions=[tick(0x206)]).elf())
     for name, value in {"LOG": result.log, "IMAGE": tmp_path / "made.elf", "FAIL": "", "GIT_CONFIG_GLOBAL": os.devnull,
-                        "GIT_CONFIG_SYSTEM": os.devnull,
-                        "GIT_CEILING_DIRECTORIES": tmp_path, "GIT_AUTHOR_NAME": "t", "GIT_AUTHOR_EMAIL": "t@example.org",
-                        "GIT_COMMITTER_NAME": "t",
-                        "GIT_COMMITTER_EMAIL": "t@example.org"}.items():
+                        "GIT_CONFIG_SYSTEM": os.devnull, "GIT_CEILING_DIRECTORIES": tmp_path, "GIT_AUTHOR_NAME": "t",
+                        "GIT_AUTHOR_EMAIL": "t@example.org", "GIT_COMMITTER_NAME": "t", "GIT_COMMITTER_EMAIL": "t@example.org"}.items():
         monkeypatch.setenv(name, str(value))
     return result
 
 
-def test_changed_sources_and_new_files_are_compared_with_the_last_commit(repository):
-    commit = repository.commit("one")
-    repository.edit("two")
-    assert base.commit(repository.root) == commit
-    repository.edit("one")
-    repository.main.with_name("new.c").write_text("", encoding="utf-8")
-    assert base.commit(repository.root) == commit
-
-
-def test_unchanged_sources_are_compared_with_the_commit_before(repository):
+def test_changed_sources_are_compared_with_the_last_commit_and_unchanged_ones_with_the_one_before(repository):
     first = repository.commit("one")
     with pytest.raises(base.NoBase, match="only commit"):
         base.commit(repository.root)
+    repository.edit("two")
+    assert base.commit(repository.root) == first
+    repository.edit("one")
+    repository.main.with_name("new.c").write_text("", encoding="utf-8")
+    assert base.commit(repository.root) == first
     repository.commit("two")
     (repository.root / "notes.txt").write_text("no source", encoding="utf-8")
     assert base.commit(repository.root) == first

@@ -1,21 +1,20 @@
 """The workbook tuning/tuning_params.xlsx: it is what the script writes, and recalculated by LibreOffice it agrees with make tune."""
 
 import functools
-import io
-import os
 import re
 import shutil
 import subprocess
 import tempfile
-import unittest
 from pathlib import Path
 from typing import Any
 
 import openpyxl
+import pytest
 from openpyxl.utils import column_index_from_string
+from pytest import approx
+from tune_support import COMPILER, HURST, INCLUDES, motors, of
 
 from tools.common import paths
-from tune_support import HURST, motors, of
 from tuning import constants, spreadsheet
 
 PUBLISHED = {3.95: {"NORM_RS": 12990, "NORM_LSDTBASE": 1460, "NORM_INVKFIBASE": 7956, "NORM_DELTAT": 1790, "D_ILIMIT_HS": 1502, "D_ILIMIT_LS": 6117},
@@ -94,91 +93,93 @@ def recalculated() -> dict[str, Recalculated]:
     return recalculate(CASES)
 
 
-def written(folder: str) -> bytes:
-    """The workbook as the script writes it now."""
-    spreadsheet.write(Path(folder) / "new.xlsx")
-    return (Path(folder) / "new.xlsx").read_bytes()
-
-
 def numbers(params: dict[str, str]) -> dict[str, Any]:
     return {name: text if text.startswith("NORM") else constants.number_of(text) for name, text in params.items()}
 
 
-class File(unittest.TestCase):
-    def test_the_committed_file_is_what_the_script_writes_and_writing_twice_gives_the_same_bytes(self):
-        with tempfile.TemporaryDirectory() as folder:
-            first, second = written(folder), written(folder)
-        self.assertEqual(first, second)
-        new, old = openpyxl.load_workbook(io.BytesIO(first)), openpyxl.load_workbook(spreadsheet.FILE)
-        self.assertEqual(new.sheetnames, old.sheetnames, "run: make spreadsheet")
-        for sheet in new:
-            cells = {cell.coordinate: (cell.value, cell.fill.start_color.rgb) for row in sheet for cell in row}
-            before = {cell.coordinate: (cell.value, cell.fill.start_color.rgb) for row in old[sheet.title] for cell in row}
-            self.assertEqual(sorted(key for key in cells | before if cells.get(key) != before.get(key))[:5], [], f"{sheet.title}; run: make spreadsheet")
-            self.assertEqual(*(sorted((str(rule.sqref), rule.formula1, rule.formula2) for rule in book[sheet.title].data_validations.dataValidation)
-                               for book in (new, old)))
-        self.assertEqual(named(new), named(old))
-
-    def test_every_motor_can_be_chosen_and_every_input_refuses_what_is_impossible(self):
-        book = openpyxl.load_workbook(spreadsheet.FILE)
-        self.assertEqual([cell.value for cell in book["Motors"][4]][1:], [*motors(), spreadsheet.OWN])
-        for sheet in book.worksheets[1:]:
-            rules = sheet.data_validations.dataValidation
-            guarded = {ranges.coord for rule in rules for ranges in rule.sqref.ranges}
-            inputs = {cell.coordinate for row in sheet for cell in row if cell.fill.start_color.rgb == "00FFF2B3"}
-            self.assertEqual(inputs, guarded, sheet.title)
-            self.assertLessEqual(max((max(len(rule.error), len(rule.formula1)) for rule in rules), default=0), 255)
-
-    def test_formulas_and_names_are_what_every_spreadsheet_takes(self):
-        book = openpyxl.load_workbook(spreadsheet.FILE)
-        for sheet in book:
-            for formula, cell in ((cell.value, cell.coordinate) for row in sheet for cell in row if str(cell.value or "").startswith("=")):
-                self.assertLessEqual(set(re.findall(r"([A-Z][A-Z0-9.]*)\(", re.sub(r'"[^"]*"', "", formula))), FUNCTIONS, f"{sheet.title}!{cell}")
-                self.assertLess(max(map(len, re.findall(r'"([^"]*)"', formula)), default=0), 255, f"{sheet.title}!{cell}")
-        names = list(named(book))
-        self.assertEqual(len({name.lower() for name in names}), len(names))
-        self.assertEqual([name for name in names if re.fullmatch(r"(?i)[a-z]{1,3}\d+|r|c|r\d*c\d*", name)], [])
+every_motor = pytest.mark.parametrize("name", motors())
 
 
-class AgainstTheCommand(unittest.TestCase):
-    def test_the_lines_of_every_motor_are_the_tuners_and_the_build_accepts_them(self):
-        for name in motors():
-            with self.subTest(motor=name), tempfile.TemporaryDirectory() as folder:
-                self.assertEqual(numbers(recalculated()[name].params), numbers(of(name).params))
-                (Path(folder) / "userparams.h").write_text("\n".join(recalculated()[name].lines) + "\n", encoding="utf-8")
-                build = subprocess.run([os.environ.get("CC", "gcc"), "-std=gnu99", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude",
-                                        "firmware/drive/param_check.c"], cwd=paths.ROOT, capture_output=True, text=True, check=False)
-                self.assertEqual(build.stderr, "")
-
-    def test_its_constants_are_those_of_the_compiled_header(self):
-        for name in motors():
-            rows = recalculated()[name].sheets["Constants"]
-            start = next(i for i, row in enumerate(rows) if str(row[0]).startswith("The firmware's"))
-            found = {row[0]: (row[2], row[5]) for row in rows[start:] if isinstance(row[5], (int, float))}
-            self.assertEqual(set(found), {row[0] for rows in spreadsheet.CONSTANTS.values() for row in rows})
-            for key, (exact, stored) in found.items():
-                # Single precision may round the other way where the exact value lies on the edge.
-                edge = abs(exact % 1.0 - 0.5) < 3e-6 * abs(exact)
-                self.assertAlmostEqual(stored, of(name).constant(key).q_value, delta=edge + 1e-9, msg=f"{name} {key}")
-
-    def test_a_motor_of_ones_own_needs_its_numbers_and_then_gets_the_same_lines(self):
-        self.assertTrue(any(line == "#error MOTOR_RS_OHM needs a value" for line in recalculated()["empty"].lines))
-        self.assertGreater(recalculated()["empty"]["motor_column"], len(motors()))
-        self.assertEqual(numbers(recalculated()["own"].params), numbers(of(HURST).params))
-        self.assertEqual((recalculated()["own"].red(), recalculated()["empty"].red() > 30), (0, True))
-
-    def test_a_comma_as_decimal_sign_changes_no_line(self):
-        self.assertEqual(recalculate({"comma": (HURST, {})}, COMMA)["comma"].lines, recalculated()[HURST].lines)
-
-    def test_no_formula_fails_and_no_check_is_red(self):
-        for name in motors():
-            errors = [cell for rows in recalculated()[name].sheets.values() for row in rows for cell in row if re.match(r"#(?!define|error|if|end)", str(cell))]
-            self.assertEqual((errors, recalculated()[name].red()), ([], 0), name)
-
-    def test_published_constants_come_out_to_the_last_digit(self):
-        for amperes, wanted in PUBLISHED.items():
-            self.assertEqual({name: recalculated()[f"{amperes} A"][f"AN1292_{name}"] for name in wanted}, wanted)
+# ---- the file --------------------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def book() -> openpyxl.Workbook:
+    return openpyxl.load_workbook(spreadsheet.FILE)
 
 
-if __name__ == "__main__":
-    unittest.main()
+def contents(book: openpyxl.Workbook) -> dict[str, Any]:
+    """Everything that matters in a workbook."""
+    return {"names": named(book), **{sheet.title: (
+        {cell.coordinate: (cell.value, cell.fill.start_color.rgb) for row in sheet for cell in row},
+        sorted((str(rule.sqref), rule.formula1, rule.formula2) for rule in sheet.data_validations.dataValidation)) for sheet in book}}
+
+
+def test_the_committed_file_is_what_the_script_writes_and_writing_twice_gives_the_same_bytes(tmp_path, book):
+    new, again = tmp_path / "new.xlsx", tmp_path / "again.xlsx"
+    spreadsheet.write(new)
+    spreadsheet.write(again)
+    assert new.read_bytes() == again.read_bytes()
+    written = openpyxl.load_workbook(new)
+    assert written.sheetnames == book.sheetnames and contents(written) == contents(book), "run: make spreadsheet"
+
+
+def test_every_motor_can_be_chosen_and_every_input_refuses_what_is_impossible(book):
+    assert [cell.value for cell in book["Motors"][4]][1:] == [*motors(), spreadsheet.OWN]
+    for sheet in book.worksheets[1:]:
+        rules = sheet.data_validations.dataValidation
+        inputs = {cell.coordinate for row in sheet for cell in row if cell.fill.start_color.rgb == "00FFF2B3"}
+        assert inputs == {ranges.coord for rule in rules for ranges in rule.sqref.ranges}, sheet.title
+        assert all(len(text) <= 255 for rule in rules for text in (rule.error, rule.formula1))
+
+
+def test_formulas_and_names_are_what_every_spreadsheet_takes(book):
+    for place, formula in ((f"{sheet.title}!{cell.coordinate}", cell.value) for sheet in book for row in sheet for cell in row):
+        if str(formula or "").startswith("="):
+            assert set(re.findall(r"([A-Z][A-Z0-9.]*)\(", re.sub(r'"[^"]*"', "", formula))) <= FUNCTIONS, place
+            assert all(len(text) < 255 for text in re.findall(r'"([^"]*)"', formula)), place
+    names = list(named(book))
+    assert len({name.lower() for name in names}) == len(names)
+    assert not [name for name in names if re.fullmatch(r"(?i)[a-z]{1,3}\d+|r|c|r\d*c\d*", name)]
+
+
+# ---- against the command ---------------------------------------------------------------------------------------------------
+@every_motor
+def test_the_lines_of_every_motor_are_the_tuners_and_the_build_accepts_them(tmp_path, name):
+    assert numbers(recalculated()[name].params) == numbers(of(name).params)
+    (tmp_path / "userparams.h").write_text("\n".join(recalculated()[name].lines) + "\n", encoding="utf-8")
+    build = subprocess.run([*COMPILER, "-std=gnu99", "-fsyntax-only", f"-I{tmp_path}", *INCLUDES[:2], "firmware/drive/param_check.c"],
+                           cwd=paths.ROOT, capture_output=True, text=True, check=False)
+    assert build.stderr == ""
+
+
+@every_motor
+def test_its_constants_are_those_of_the_compiled_header(name):
+    rows = recalculated()[name].sheets["Constants"]
+    start = next(i for i, row in enumerate(rows) if str(row[0]).startswith("The firmware's"))
+    found = {row[0]: (row[2], row[5]) for row in rows[start:] if isinstance(row[5], (int, float))}
+    assert set(found) == {row[0] for rows in spreadsheet.CONSTANTS.values() for row in rows}
+    for key, (exact, stored) in found.items():
+        # Single precision may round the other way where the exact value lies on the edge.
+        edge = abs(exact % 1.0 - 0.5) < 3e-6 * abs(exact)
+        assert stored == approx(of(name).constant(key).q_value, rel=0.0, abs=edge + 1e-9), key
+
+
+@every_motor
+def test_no_formula_fails_and_no_check_is_red(name):
+    found = recalculated()[name]
+    errors = [cell for rows in found.sheets.values() for row in rows for cell in row if re.match(r"#(?!define|error|if|end)", str(cell))]
+    assert (errors, found.red()) == ([], 0)
+
+
+def test_a_motor_of_ones_own_needs_its_numbers_and_then_gets_the_same_lines():
+    empty, own = recalculated()["empty"], recalculated()["own"]
+    assert "#error MOTOR_RS_OHM needs a value" in empty.lines and empty["motor_column"] > len(motors()) and empty.red() > 30
+    assert numbers(own.params) == numbers(of(HURST).params) and own.red() == 0
+
+
+def test_a_comma_as_decimal_sign_changes_no_line():
+    assert recalculate({"comma": (HURST, {})}, COMMA)["comma"].lines == recalculated()[HURST].lines
+
+
+@pytest.mark.parametrize("amperes, wanted", PUBLISHED.items())
+def test_published_constants_come_out_to_the_last_digit(amperes, wanted):
+    assert {name: recalculated()[f"{amperes} A"][f"AN1292_{name}"] for name in wanted} == wanted

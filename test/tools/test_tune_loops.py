@@ -2,25 +2,30 @@
 
 import cmath
 import math
-import unittest
 from dataclasses import replace
 
 import numpy as np
-
+import pytest
+from pytest import approx
 from tune_support import HURST, designed, motors, of
+
+from tools.common import board_file, motor_file
 from tuning import loops
-from tuning.design import _spread
+from tuning.design import _spread, design
 from tuning.loops import Gains, Plant, current_gains, current_grid, current_loop, margins, speed_gains, speed_loop
 
 TS = 50e-6
 MOTOR = Plant(2.67, 1.92e-3, 1.92e-3, 7.983e-3, 5, 5.5e-6, 15.3e-6)
 BASE = Gains(0.0, 0.0, 0.0, 0.0, 0.0, 1200 / 32768, 748 / 32768, TS)
+AT_1000_HZ = current_gains(MOTOR, 1000.0, BASE)
+GRID, SPEED_GRID = current_grid(TS, 4000), np.geomspace(0.05, 1100.0, 4000)
 
 
 def erpm(rpm: float) -> float:
     return rpm * 5 * 2 * math.pi / 60
 
 
+# ---- current loop ----------------------------------------------------------------------------------------------------------
 def current_swing(factor: float, omega: float, gains: Gains) -> float:
     """Growth of a disturbance: a winding in stator coordinates, integrated in small steps, with pulses that begin half a period late."""
     current, total, before, seen = 1.0 + 0.0j, 0.0j, 0.0j, []
@@ -37,47 +42,39 @@ def current_swing(factor: float, omega: float, gains: Gains) -> float:
     return max(seen[300:]) / max(seen[100:200])
 
 
-class CurrentLoop(unittest.TestCase):
-    def test_the_gain_margin_is_where_a_simulated_loop_begins_to_swing(self):
-        gains = current_gains(MOTOR, 1000.0, BASE)
-        grid = current_grid(TS, 4000)
-        for rpm in (0.0, 5500.0):
-            margin = margins(grid, current_loop(grid, MOTOR, gains, erpm(rpm)))
-            factor = 10.0 ** (margin.gain_db / 20.0)
-            self.assertLess(current_swing(0.95 * factor, erpm(rpm), gains), 1.0, rpm)
-            self.assertGreater(current_swing(1.05 * factor, erpm(rpm), gains), 1.0, rpm)
-
-    def test_without_rotation_and_delay_the_crossover_is_the_bandwidth(self):
-        slow = Gains(0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 0.02, 1e-6)
-        grid = np.geomspace(10.0, 20000.0, 4000)
-        found = margins(grid, current_loop(grid, MOTOR, current_gains(MOTOR, 300.0, slow), 0.0))
-        self.assertAlmostEqual(found.crossover_hz, 300.0, delta=1.0)
-        self.assertAlmostEqual(found.phase_deg, 90.0 - 300.0 * 1e-6 * 360.0, delta=0.2)
-
-    def test_the_delay_is_one_period_and_the_hold(self):
-        """A vector acts from half a period after its sample for one period: a period on average, 18 degrees at 1 kHz."""
-        grid = current_grid(TS, 4000)
-        found = margins(grid, current_loop(grid, MOTOR, current_gains(MOTOR, 1000.0, BASE), 0.0))
-        self.assertAlmostEqual(found.phase_deg, 90.0 - found.crossover_hz * TS * 360.0, delta=1.0)
-
-    def test_rotation_takes_margin_at_one_sign_of_frequency(self):
-        grid = current_grid(TS)
-        gains = current_gains(MOTOR, 400.0, BASE)
-        self.assertLess(margins(grid, current_loop(grid, MOTOR, gains, erpm(5500.0))).phase_deg, margins(grid, current_loop(grid, MOTOR, gains, 0.0)).phase_deg - 5.0)
+@pytest.mark.parametrize("rpm", [0.0, 5500.0])
+def test_the_gain_margin_is_where_a_simulated_current_loop_begins_to_swing(rpm):
+    factor = 10.0 ** (margins(GRID, current_loop(GRID, MOTOR, AT_1000_HZ, erpm(rpm))).gain_db / 20.0)
+    assert current_swing(0.95 * factor, erpm(rpm), AT_1000_HZ) < 1.0 < current_swing(1.05 * factor, erpm(rpm), AT_1000_HZ)
 
 
+def test_without_rotation_and_delay_the_crossover_is_the_bandwidth():
+    slow, grid = Gains(0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 0.02, 1e-6), np.geomspace(10.0, 20000.0, 4000)
+    found = margins(grid, current_loop(grid, MOTOR, current_gains(MOTOR, 300.0, slow), 0.0))
+    assert found.crossover_hz == approx(300.0, abs=1.0)
+    assert found.phase_deg == approx(90.0 - 300.0 * 1e-6 * 360.0, abs=0.2)
+
+
+def test_the_delay_is_one_period_and_the_hold():
+    """A vector acts from half a period after its sample for one period: a period on average, 18 degrees at 1 kHz."""
+    found = margins(GRID, current_loop(GRID, MOTOR, AT_1000_HZ, 0.0))
+    assert found.phase_deg == approx(90.0 - found.crossover_hz * TS * 360.0, abs=1.0)
+
+
+def test_rotation_takes_margin_at_one_sign_of_frequency():
+    gains, grid = current_gains(MOTOR, 400.0, BASE), current_grid(TS)
+    turning, still = (margins(grid, current_loop(grid, MOTOR, gains, erpm(rpm))).phase_deg for rpm in (5500.0, 0.0))
+    assert turning < still - 5.0
+
+
+# ---- speed loop ------------------------------------------------------------------------------------------------------------
 def speed_swing(factor: float, gains: Gains, true: Plant, omega: float) -> float:
     """Growth of a disturbance: shaft, current loop, estimator and both filters period by period, with the firmware's order of work."""
     h = math.exp(-true.rs * TS / (2 * true.lq))
     b = (1 - h) / true.rs
-    w, lag, i, before, i_sum = omega, 0.0, 0.0, 0.0, 0.0
-    load = 0.0
-    e_d, e_q, slow, reference, total = 0.0, true.psi * omega, omega, 0.0, true.viscous * omega / true.pole_pairs / true.kt
-    last_i = total
-    i = total
-    i_sum = true.rs * total
-    before = i_sum
-    seen = []
+    w, lag, e_d, e_q, slow, seen = omega, 0.0, 0.0, true.psi * omega, omega, []
+    reference = total = last_i = i = true.viscous * omega / true.pole_pairs / true.kt
+    before = i_sum = true.rs * total
     for n in range(24000):
         load = 2e-4 if 200 <= n < 260 else 0.0
         if n % 8 == 0:
@@ -100,139 +97,124 @@ def speed_swing(factor: float, gains: Gains, true: Plant, omega: float) -> float
     return max(seen[16000:24000]) / max(max(seen[4000:12000]), 1e-9)
 
 
-class SpeedLoop(unittest.TestCase):
-    def test_the_gain_margin_is_where_a_simulated_loop_begins_to_swing(self):
-        gains = speed_gains(MOTOR, 15.0, current_gains(MOTOR, 1000.0, BASE))
-        grid = np.geomspace(0.05, 1100.0, 4000)
-        for rpm, true in ((500.0, MOTOR), (2800.0, MOTOR), (500.0, replace(MOTOR, rs=0.76 * MOTOR.rs, ld=1.26 * MOTOR.ld, lq=1.26 * MOTOR.lq))):
-            margin = margins(grid, speed_loop(grid, true, MOTOR, gains, erpm(rpm)))
-            factor = 10.0 ** (margin.gain_db / 20.0)
-            self.assertLess(speed_swing(0.95 * factor, gains, true, erpm(rpm)), 0.1, rpm)
-            self.assertGreater(speed_swing(1.1 * factor, gains, true, erpm(rpm)), 0.5, rpm)
-
-    def test_far_above_the_filters_the_phase_is_that_of_all_delays(self):
-        """Hold over 8 periods (4 on average), one period of reading, half of the back-EMF's age, and the current loop's own."""
-        gains = replace(speed_gains(MOTOR, 15.0, current_gains(MOTOR, 1000.0, BASE)), esdq=1.0, velestim=1.0, speed_ki=0.0)
-        hz = np.array([60.0])
-        inner = current_loop(hz, MOTOR, gains, 0.0)
-        found = np.degrees(np.angle(speed_loop(hz, MOTOR, MOTOR, gains, erpm(2800.0)) / (inner / (1.0 + inner))))[0]
-        shaft = -math.degrees(math.atan2(2 * math.pi * 60.0 * MOTOR.inertia, MOTOR.viscous))
-        self.assertAlmostEqual(found, shaft - 360.0 * 60.0 * (4.0 + 1.5) * TS, delta=0.05)
-
-    def test_the_bandwidth_is_the_crossover(self):
-        gains = speed_gains(MOTOR, 5.0, current_gains(MOTOR, 1000.0, BASE))
-        grid = np.geomspace(0.05, 1100.0, 2000)
-        self.assertAlmostEqual(margins(grid, speed_loop(grid, MOTOR, MOTOR, gains, erpm(2800.0))).crossover_hz, 5.1, delta=0.2)
-
-    def test_gains_are_those_of_params_h(self):
-        d = of(HURST)
-        found = {item.name: item.value for item in d.constants}
-        bandwidth = d.value("SPEED_BANDWIDTH_HZ")
-        gains = speed_gains(MOTOR, bandwidth, current_gains(MOTOR, 1000.0, BASE))
-        electrical = 5 * 2 * math.pi / 60 # rad/s per rpm
-        self.assertAlmostEqual(found["pi_speed.kp"], gains.speed_kp * electrical, delta=1e-4 * found["pi_speed.kp"])
-        self.assertAlmostEqual(found["pi_speed.ki"], gains.speed_ki * electrical / (8 * TS), delta=1e-4 * found["pi_speed.ki"])
-
-    def test_an_error_of_the_estimator_s_resistance_costs_gain_margin_at_low_speed(self):
-        gains = speed_gains(MOTOR, 15.0, current_gains(MOTOR, 1000.0, BASE))
-        grid = np.geomspace(0.05, 1100.0, 1000)
-        hot = replace(MOTOR, rs=1.3 * MOTOR.rs)
-        slow, fast = (margins(grid, speed_loop(grid, hot, MOTOR, gains, erpm(rpm))).gain_db for rpm in (300.0, 5000.0))
-        self.assertLess(slow, fast)
+@pytest.mark.parametrize("rpm, true", [
+    (500.0, MOTOR), (2800.0, MOTOR), (500.0, replace(MOTOR, rs=0.76 * MOTOR.rs, ld=1.26 * MOTOR.ld, lq=1.26 * MOTOR.lq))])
+def test_the_gain_margin_is_where_a_simulated_speed_loop_begins_to_swing(rpm, true):
+    gains = speed_gains(MOTOR, 15.0, AT_1000_HZ)
+    factor = 10.0 ** (margins(SPEED_GRID, speed_loop(SPEED_GRID, true, MOTOR, gains, erpm(rpm))).gain_db / 20.0)
+    assert speed_swing(0.95 * factor, gains, true, erpm(rpm)) < 0.1
+    assert speed_swing(1.1 * factor, gains, true, erpm(rpm)) > 0.5
 
 
-class Margins(unittest.TestCase):
-    def test_an_integrator_with_a_delay(self):
-        grid = np.geomspace(0.1, 1000.0, 4000)
-        s = 2j * np.pi * grid
-        found = margins(grid, 2 * np.pi * 10.0 / s * np.exp(-s * 0.01))
-        self.assertAlmostEqual(found.crossover_hz, 10.0, delta=0.01)
-        self.assertAlmostEqual(found.phase_deg, 90.0 - 36.0, delta=0.1)
-        self.assertAlmostEqual(found.gain_db, 20 * math.log10(2.5), delta=0.05)
-
-    def test_an_unstable_loop_has_a_negative_margin(self):
-        grid = np.geomspace(0.1, 1000.0, 4000)
-        s = 2j * np.pi * grid
-        found = margins(grid, 2 * np.pi * 40.0 / s * np.exp(-s * 0.01))
-        self.assertLess(found.phase_deg, 0.0)
-        self.assertFalse(found.enough)
-
-    def test_the_least_of_several_crossovers_counts(self):
-        grid = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-        response = np.array([2.0, 0.5, 2.0, 0.5, 0.1]) * np.exp(-1j * np.radians([90.0, 90.0, 150.0, 150.0, 150.0]))
-        self.assertAlmostEqual(margins(grid, response).phase_deg, 30.0, delta=1.0)
+def test_far_above_the_filters_the_phase_is_that_of_all_delays():
+    """Hold over 8 periods (4 on average), one period of reading, half of the back-EMF's age, and the current loop's own."""
+    gains, hz = replace(speed_gains(MOTOR, 15.0, AT_1000_HZ), esdq=1.0, velestim=1.0, speed_ki=0.0), np.array([60.0])
+    inner = current_loop(hz, MOTOR, gains, 0.0)
+    found = np.degrees(np.angle(speed_loop(hz, MOTOR, MOTOR, gains, erpm(2800.0)) / (inner / (1.0 + inner))))[0]
+    shaft = -math.degrees(math.atan2(2 * math.pi * 60.0 * MOTOR.inertia, MOTOR.viscous))
+    assert found == approx(shaft - 360.0 * 60.0 * (4.0 + 1.5) * TS, abs=0.05)
 
 
-class Choice(unittest.TestCase):
-    def test_every_motor_has_60_degrees_at_both_loops_over_its_parameter_set(self):
-        for name in motors():
-            with self.subTest(name):
-                d = of(name)
-                for loop in (d.current_loop, d.speed_loop):
-                    self.assertGreaterEqual(loop.worst.phase_deg, 60.0, loop.worst_case)
-                    self.assertGreaterEqual(loop.worst.gain_db, 6.0, loop.worst_case)
-
-    def test_the_worst_case_is_no_better_than_any_corner(self):
-        d = of(HURST)
-        gains = current_gains(MOTOR, d.value("CURRENT_BANDWIDTH_HZ"), BASE)
-        speed = speed_gains(MOTOR, d.value("SPEED_BANDWIDTH_HZ"), gains)
-        grid = np.geomspace(0.05, 0.45 / (8 * TS), 400)
-        for name, plant in loops.corners(MOTOR, _spread(d.motor)):
-            found = margins(grid, speed_loop(grid, plant, MOTOR, speed, erpm(d.value("MINIMUM_SPEED_RPM"))))
-            self.assertGreaterEqual(found.phase_deg, d.speed_loop.worst.phase_deg - 0.2, name)
-
-    def test_the_next_larger_speed_bandwidth_would_not_keep_the_margin(self):
-        d = designed_with("MINIMUM_SPEED_RPM = 1000")
-        more = designed_with("MINIMUM_SPEED_RPM = 1000", f"SPEED_BANDWIDTH_HZ = {d.value('SPEED_BANDWIDTH_HZ') + 0.5}")
-        self.assertTrue(d.speed_loop.reached)
-        self.assertFalse(more.speed_loop.reached)
-
-    def test_the_speed_loop_is_slower_than_the_slowest_rotation(self):
-        for name in motors():
-            d = of(name)
-            self.assertLessEqual(d.value("SPEED_BANDWIDTH_HZ"), 0.3125 * d.value("MINIMUM_SPEED_RPM") * d.motor.pole_pairs / 60.0, name)
-        self.assertEqual(designed(("value = 5.5e-6", "value = 2e-5"), more="[tune]\nMINIMUM_SPEED_RPM = 300\n").value("SPEED_BANDWIDTH_HZ"), 7.81)
-
-    def test_but_fast_enough_for_a_load_that_grows(self):
-        """Torque T/s against the integral of the speed controller: error = T/s / (Kt Ki)."""
-        d = designed(("value = 5.5e-6", "value = 3e-6"), more="[tune]\nMINIMUM_SPEED_RPM = 300\n")
-        self.assertGreater(d.value("SPEED_BANDWIDTH_HZ"), 0.3125 * 300 * 5 / 60)
-        gains = speed_gains(replace(MOTOR, inertia=3e-6), d.loaded_hz, BASE)
-        per_second = gains.speed_ki / (8 * TS) * 5 * MOTOR.kt # N m/s per mechanical rad/s
-        self.assertAlmostEqual(0.08 / per_second, 0.18 * 300 * math.pi / 30, delta=0.1)
-
-    def test_the_published_spread_of_a_motor_belongs_to_its_parameter_set(self):
-        names = [name for name, _ in loops.corners(MOTOR, _spread(of(HURST).motor))]
-        self.assertIn("R -24%, L +26%", names)
-
-    def test_a_bandwidth_in_tune_is_kept_and_warned_about(self):
-        d = designed(more="[tune]\nSPEED_BANDWIDTH_HZ = 40\n")
-        self.assertEqual(d.value("SPEED_BANDWIDTH_HZ"), 40.0)
-        self.assertTrue(any("SPEED_BANDWIDTH_HZ = 40: the speed loop has" in warning for warning in d.warnings), d.warnings)
-
-    def test_the_current_loop_stays_below_its_cap_unless_rotation_asks_for_more(self):
-        self.assertEqual(of(HURST).value("CURRENT_BANDWIDTH_HZ"), 1000.0)
-        self.assertGreater(of("maxon_ec45flat_30w_24v").value("CURRENT_BANDWIDTH_HZ"), 1000.0)
-
-    def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_few_degrees(self):
-        """A small rotor with short L/R: 57.4 degrees at 53 Hz, 54.5 at 1000 Hz."""
-        d = designed(("pole_pairs = { value = 5", "pole_pairs = { value = 4"), ("value = 2.67", "value = 3.0"), ("value = 1.92", "value = 0.6"),
-                     ("value = 7.24", "value = 4.0"), ("value = 5.5e-6", "value = 1.5e-7"), ("value = 15.3e-6", "value = 1e-9"),
-                     ("value = 0.004", "value = 0.0008"), ("value = 1.53", "value = 1.0"), ("value = 0.08", "value = 0.025"),
-                     ("speed = { value = 2500", "speed = { value = 4000"), ("value = 5000", "value = 5500"), ("value = 2.75", "value = 1.5"))
-        self.assertEqual(d.value("CURRENT_BANDWIDTH_HZ"), 1000.0)
-        self.assertTrue(any("CURRENT_BANDWIDTH_HZ = 1000: the current loop has 5" in warning for warning in d.warnings), d.warnings)
-        self.assertTrue(d.speed_loop.reached)
-
-    def test_each_axis_of_a_salient_motor_has_its_own_gain(self):
-        d = of("linix_45zwn24_40")
-        self.assertAlmostEqual(d.value("D_CURRCNTR_PTERM") / d.value("Q_CURRCNTR_PTERM"), d.motor.ld_h / d.motor.lq_h, delta=1e-4)
+def test_the_bandwidth_is_the_crossover():
+    loop = speed_loop(SPEED_GRID, MOTOR, MOTOR, speed_gains(MOTOR, 5.0, AT_1000_HZ), erpm(2800.0))
+    assert margins(SPEED_GRID, loop).crossover_hz == approx(5.1, abs=0.2)
 
 
-def designed_with(*lines: str):
-    """The note's motor with lines in [tune]."""
-    from tools.common import board_file, motor_file
-    from tuning.design import design
-    motor = motor_file.load(HURST)
-    tune = {name: float(value) for name, value in (line.split(" = ") for line in lines)}
-    return design(replace(motor, tune=motor.tune | tune), board_file.load("mclv"))
+def test_gains_are_those_of_the_header():
+    d = of(HURST)
+    gains = speed_gains(MOTOR, d.value("SPEED_BANDWIDTH_HZ"), AT_1000_HZ)
+    electrical = 5 * 2 * math.pi / 60 # rad/s per rpm
+    assert d.constant("pi_speed.kp").value == approx(gains.speed_kp * electrical, rel=1e-4)
+    assert d.constant("pi_speed.ki").value == approx(gains.speed_ki * electrical / (8 * TS), rel=1e-4)
+
+
+def test_an_error_of_the_estimator_s_resistance_costs_gain_margin_at_low_speed():
+    gains, hot = speed_gains(MOTOR, 15.0, AT_1000_HZ), replace(MOTOR, rs=1.3 * MOTOR.rs)
+    slow, fast = (margins(SPEED_GRID, speed_loop(SPEED_GRID, hot, MOTOR, gains, erpm(rpm))).gain_db for rpm in (300.0, 5000.0))
+    assert slow < fast
+
+
+# ---- margins ---------------------------------------------------------------------------------------------------------------
+def delayed(crossover_hz: float) -> loops.Margins:
+    """Margins of an integrator with a delay of 10 ms."""
+    grid = np.geomspace(0.1, 1000.0, 4000)
+    s = 2j * np.pi * grid
+    return margins(grid, 2 * np.pi * crossover_hz / s * np.exp(-s * 0.01))
+
+
+def test_an_integrator_with_a_delay_and_an_unstable_loop():
+    found = delayed(10.0)
+    assert found.crossover_hz == approx(10.0, abs=0.01)
+    assert found.phase_deg == approx(90.0 - 36.0, abs=0.1)
+    assert found.gain_db == approx(20 * math.log10(2.5), abs=0.05)
+    assert delayed(40.0).phase_deg < 0.0 and not delayed(40.0).enough
+
+
+def test_the_least_of_several_crossovers_counts():
+    grid = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    response = np.array([2.0, 0.5, 2.0, 0.5, 0.1]) * np.exp(-1j * np.radians([90.0, 90.0, 150.0, 150.0, 150.0]))
+    assert margins(grid, response).phase_deg == approx(30.0, abs=1.0)
+
+
+# ---- choice ----------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", motors())
+def test_every_motor_keeps_its_margins_over_its_parameter_set_and_a_loop_slower_than_the_slowest_rotation(name):
+    d = of(name)
+    for loop in (d.current_loop, d.speed_loop):
+        assert loop.worst.phase_deg >= 60.0 and loop.worst.gain_db >= 6.0, loop.worst_case
+    assert d.value("SPEED_BANDWIDTH_HZ") <= 0.3125 * d.value("MINIMUM_SPEED_RPM") * d.motor.pole_pairs / 60.0
+
+
+def test_the_worst_case_is_no_better_than_any_corner_and_the_published_spread_is_among_them():
+    d = of(HURST)
+    gains = speed_gains(MOTOR, d.value("SPEED_BANDWIDTH_HZ"), current_gains(MOTOR, d.value("CURRENT_BANDWIDTH_HZ"), BASE))
+    grid = np.geomspace(0.05, 0.45 / (8 * TS), 400)
+    corners = dict(loops.corners(MOTOR, _spread(d.motor)))
+    assert "R -24%, L +26%" in corners
+    for name, plant in corners.items():
+        found = margins(grid, speed_loop(grid, plant, MOTOR, gains, erpm(d.value("MINIMUM_SPEED_RPM"))))
+        assert found.phase_deg >= d.speed_loop.worst.phase_deg - 0.2, name
+
+
+def test_the_next_larger_speed_bandwidth_would_not_keep_the_margin():
+    motor, board = motor_file.load(HURST), board_file.load("mclv")
+    d = design(replace(motor, tune=motor.tune | {"MINIMUM_SPEED_RPM": 1000.0}), board)
+    more = d.value("SPEED_BANDWIDTH_HZ") + 0.5
+    assert d.speed_loop.reached
+    assert not design(replace(d.motor, tune=d.motor.tune | {"SPEED_BANDWIDTH_HZ": more}), board).speed_loop.reached
+
+
+def test_the_speed_loop_is_as_slow_as_rotation_asks_but_fast_enough_for_a_load_that_grows():
+    """Torque T/s against the integral of the speed controller: error = T/s / (Kt Ki)."""
+    calm = designed(("value = 5.5e-6", "value = 2e-5"), more="[tune]\nMINIMUM_SPEED_RPM = 300\n")
+    assert calm.value("SPEED_BANDWIDTH_HZ") == 7.81
+    d = designed(("value = 5.5e-6", "value = 3e-6"), more="[tune]\nMINIMUM_SPEED_RPM = 300\n")
+    assert d.value("SPEED_BANDWIDTH_HZ") > 0.3125 * 300 * 5 / 60
+    gains = speed_gains(replace(MOTOR, inertia=3e-6), d.loaded_hz, BASE)
+    per_second = gains.speed_ki / (8 * TS) * 5 * MOTOR.kt # N m/s per mechanical rad/s
+    assert 0.08 / per_second == approx(0.18 * 300 * math.pi / 30, abs=0.1)
+
+
+def test_a_bandwidth_in_tune_is_kept_and_warned_about():
+    d = designed(more="[tune]\nSPEED_BANDWIDTH_HZ = 40\n")
+    assert d.value("SPEED_BANDWIDTH_HZ") == 40.0
+    assert any("SPEED_BANDWIDTH_HZ = 40: the speed loop has" in warning for warning in d.warnings), d.warnings
+
+
+def test_the_current_loop_stays_below_its_cap_unless_rotation_asks_for_more():
+    assert of(HURST).value("CURRENT_BANDWIDTH_HZ") == 1000.0 < of("maxon_ec45flat_30w_24v").value("CURRENT_BANDWIDTH_HZ")
+
+
+def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_few_degrees():
+    """A small rotor with short L/R: 57.4 degrees at 53 Hz, 54.5 at 1000 Hz."""
+    d = designed(("pole_pairs = { value = 5", "pole_pairs = { value = 4"), ("value = 2.67", "value = 3.0"), ("value = 1.92", "value = 0.6"),
+                 ("value = 7.24", "value = 4.0"), ("value = 5.5e-6", "value = 1.5e-7"), ("value = 15.3e-6", "value = 1e-9"),
+                 ("value = 0.004", "value = 0.0008"), ("value = 1.53", "value = 1.0"), ("value = 0.08", "value = 0.025"),
+                 ("speed = { value = 2500", "speed = { value = 4000"), ("value = 5000", "value = 5500"), ("value = 2.75", "value = 1.5"))
+    assert d.value("CURRENT_BANDWIDTH_HZ") == 1000.0 and d.speed_loop.reached
+    assert any("CURRENT_BANDWIDTH_HZ = 1000: the current loop has 5" in warning for warning in d.warnings), d.warnings
+
+
+def test_each_axis_of_a_salient_motor_has_its_own_gain():
+    d = of("linix_45zwn24_40")
+    assert d.value("D_CURRCNTR_PTERM") / d.value("Q_CURRCNTR_PTERM") == approx(d.motor.ld_h / d.motor.lq_h, abs=1e-4)

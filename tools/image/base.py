@@ -33,11 +33,11 @@ def commit(root: Path = paths.ROOT) -> str:
     return found
 
 
-def build(commit_id: str, variables: list[str], root: Path = paths.ROOT, cache: Path | None = None) -> Path:
+def build(commit_id: str, variables: list[str], root: Path = paths.ROOT) -> Path:
     """The commit's ELF file, from the cache if it has been built so before.
     @param variables of make: OPT=-O2, XC16=folder ..."""
     key = hashlib.sha256("\0".join(variables).encode()).hexdigest()[:8]
-    folder = (cache or root / "build" / "size") / f"{commit_id[:12]}-{key}"
+    folder = root / "build" / "size" / f"{commit_id[:12]}-{key}"
     elf = folder / "foc33.elf"
     if elf.is_file():
         return elf
@@ -51,8 +51,7 @@ def build(commit_id: str, variables: list[str], root: Path = paths.ROOT, cache: 
         tar.extractall(source)
     environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN}
     done = subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "target-elf", *variables], cwd=source, env=environment,
-                          stdin=subprocess.DEVNULL,
-                          capture_output=True, text=True, errors="replace", check=False)
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0 or not done.stdout.strip():
         raise NoBase(f"commit {commit_id[:7]} does not build with these settings")
     (source / done.stdout.split()[-1]).rename(elf)

@@ -86,8 +86,7 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
     failures = []
     if unknown:
         failures.append(f"{len(unknown)} words from 0x{unknown[0]:04X} on come from no file that the map names: "
-                        "the map is of another build, "
-                        "or the linker made them for a pointer to a function")
+                        "the map is of another build, or the linker made them for a pointer to a function")
     foreign = [piece for piece in pieces if not allowed(piece)]
     called = {piece: calls_into(elf, piece) for piece in foreign}
     # What only another helper needs goes when that one goes; a piece that nothing calls is told if there is no other.

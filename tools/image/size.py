@@ -112,8 +112,7 @@ def _sum(kind: str, name: str, group: str, below: list[Row], **more) -> Row:
         values = [getattr(row, attribute) for row in below]
         return None if not values or None in values else sum(values)
     return Row(kind, name, group, name if kind == "module" else "", flash=sum(row.flash for row in below),
-               ram=sum(row.ram for row in below),
-               flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
+               ram=sum(row.ram for row in below), flash_change=change("flash_change"), ram_change=change("ram_change"), **more)
 
 
 def broken(report: Report, now: Shares, limits: bool) -> list[str]:
@@ -152,12 +151,10 @@ def _change(value: int | None) -> str:
     return f"{'' if value is None else '.' if value == 0 else f'{value:+d}':>8}"
 
 
-def text(report: Report, functions: bool = True) -> str:
+def text(report: Report) -> str:
     """The tables for a terminal; the sums come last, where the eye is."""
-    lines = []
-    if functions:
-        lines += [HEAD, *(_line(row) for row in report.rows if row.kind != "total"), ""]
-    lines += ["deepest stack, bytes" + " " * 21 + "adds  so far", *stack.table(report.stack), ""]
+    lines = [HEAD, *(_line(row) for row in report.rows if row.kind != "total"), "",
+             "deepest stack, bytes" + " " * 21 + "adds  so far", *stack.table(report.stack), ""]
     changed = [row for row in report.rows if row.kind == "function" and (row.flash_change or row.ram_change)]
     if changed:
         lines += [f"changed since {report.base_name}", *(_line(row) for row in changed), ""]
@@ -199,11 +196,11 @@ def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def compare(variables: list[str], budget: Budget, cache: Path | None = None) -> tuple[Shares | None, str, str]:
+def compare(variables: list[str], budget: Budget) -> tuple[Shares | None, str, str]:
     """Shares of the last commit's image and the commit's name, or None and why there is nothing to compare with."""
     try:
         commit = base.commit()
-        return shares(attribution.read(base.build(commit, variables, cache=cache)), budget), commit[:7], ""
+        return shares(attribution.read(base.build(commit, variables)), budget), commit[:7], ""
     except base.NoBase as reason:
         return None, "", str(reason)
 
@@ -228,7 +225,6 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
                             help="compare with the last commit's image, built by make with these variables")
         parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
-        parser.add_argument("--brief", action="store_true", help="no table of functions")
         return _run(parser.parse_args(arguments))
     return command_line.run(work)
 
@@ -242,7 +238,7 @@ def _run(options: argparse.Namespace) -> int:
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
     path = write_json(summary(report), options.out, "size")
-    print(text(report, not options.brief))
+    print(text(report))
     print(f"written: {paths.shown(path)}")
     for line in report.broken:
         print(f"foc33: {line}", file=sys.stderr)

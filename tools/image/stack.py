@@ -169,69 +169,54 @@ class Program:
     def _step(self, function: Function, instruction: Instruction, depth: int, frames: tuple[int, ...], use: Use):
         """The instructions that can come next, with the depth there."""
         name, mnemonic = plain(function.name), instruction.mnemonic
-        following = instruction.address + instruction.size
-        target = _target(instruction)
-        if mnemonic in RETURNS:
-            if depth:
-                use.errors.append(f"{name}: returns with {depth} bytes on the stack at 0x{instruction.address:x}")
-            return []
-        if mnemonic == "reset":
-            return []
-        if mnemonic in ("call", "rcall"):
+        following, target = instruction.address + instruction.size, _target(instruction)
+        body = self.at[following][1] if following in self.at else None
+
+        def tell(problem: str, text: str = f" ({instruction.text})") -> None:
+            use.errors.append(f"{name}: {problem} at 0x{instruction.address:x}{text}")
+
+        ways = [following]
+        if mnemonic in RETURNS or mnemonic == "reset":
+            if depth and mnemonic != "reset":
+                tell(f"returns with {depth} bytes on the stack", "")
+            ways = []
+        elif mnemonic in ("call", "rcall"):
             if target is not None:
                 use.calls.append((target, depth, ENTRY_BYTES))
             elif name not in self.calls_nothing:
-                use.errors.append(f"{name}: call through a pointer at 0x{instruction.address:x} ({instruction.text})")
-            return [(following, depth, frames)]
-        if mnemonic == "goto" or mnemonic == "bra":
-            return self._jump(name, instruction, target, following, depth, frames, use)
-        depth, frames, problem = _effect(instruction, depth, frames)
-        if problem:
-            use.errors.append(f"{name}: {problem} at 0x{instruction.address:x} ({instruction.text})")
-        use.own = max(use.own, depth)
-        if mnemonic == "repeat":
-            return self._repeat(name, instruction, following, depth, frames, use)
-        if mnemonic.startswith(SKIPS) and following in self.at:
-            return [(following, depth, frames), (following + self.at[following][1].size, depth, frames)]
-        return [(following, depth, frames)]
-
-    def _jump(self, name, instruction, target, following, depth, frames, use):
-        if target is None:
-            table = self._table(instruction, following)
-            if not table:
-                use.errors.append(f"{name}: jump through a pointer at 0x{instruction.address:x} ({instruction.text})")
-            return [(address, depth, frames) for address in table]
-        ways = [(target, depth, frames)]
-        if instruction.mnemonic == "bra" and "," in re.sub(r"<[^>]*>", "", instruction.operands): # has a condition
-            ways.append((following, depth, frames))
-        return ways
+                tell("call through a pointer")
+        elif mnemonic in ("goto", "bra"):
+            ways = self._table(instruction, following) if target is None else [target, *(ways if _conditional(instruction) else [])]
+            if not ways:
+                tell("jump through a pointer")
+        else:
+            depth, frames, problem = _effect(instruction, depth, frames)
+            if problem:
+                tell(problem)
+            if body and mnemonic.startswith(SKIPS):
+                ways.append(following + body.size)
+            moved = _effect(body, depth, frames)[0] - depth if body and mnemonic == "repeat" else 0
+            if moved and (count := _LITERAL.search(instruction.operands)):
+                depth, ways = depth + moved * (int(count[1], 16) + 1), [following + body.size]
+            elif moved:
+                tell("the stack grows by an unknown number of repetitions", "")
+            use.own = max(use.own, depth)
+        return [(way, depth, frames) for way in ways]
 
     def _table(self, instruction: Instruction, following: int) -> list[int]:
         """A switch: bra wn, followed by a branch for each case."""
         table = []
         while instruction.mnemonic == "bra" and following in self.at:
             case = self.at[following][1]
-            if case.mnemonic not in ("bra", "goto") or _target(case) is None or "," in re.sub(r"<[^>]*>", "", case.operands):
+            if case.mnemonic not in ("bra", "goto") or _target(case) is None or _conditional(case):
                 break
             table.append(following)
             following += case.size
         return table
 
-    def _repeat(self, name, instruction, following, depth, frames, use):
-        """REPEAT with something that moves the stack: as often as its literal says."""
-        if following not in self.at:
-            return [(following, depth, frames)]
-        body = self.at[following][1]
-        after, _, _ = _effect(body, depth, frames)
-        if after == depth:
-            return [(following, depth, frames)]
-        count = _LITERAL.search(instruction.operands)
-        if not count:
-            use.errors.append(f"{name}: the stack grows by an unknown number of repetitions at 0x{instruction.address:x}")
-            return [(following, depth, frames)]
-        depth += (after - depth) * (int(count[1], 16) + 1)
-        use.own = max(use.own, depth)
-        return [(following + body.size, depth, frames)]
+
+def _conditional(branch: Instruction) -> bool:
+    return branch.mnemonic == "bra" and "," in re.sub(r"<[^>]*>", "", branch.operands)
 
 
 def _target(instruction: Instruction) -> int | None:
