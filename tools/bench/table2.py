@@ -37,10 +37,10 @@ class Row:
     where: str
 
     @classmethod
-    def read(cls, section: Section) -> "Row":
+    def read(cls, section: Section, error_percent: float) -> "Row":
         row = cls(section.number("reference_rpm", minimum=1.0), section.number("torque_nm", minimum=0.0),
                   section.number("note_rpm", minimum=0.0), section.number("note_current_a", minimum=0.0),
-                  section.number("error_percent", minimum=0.0), section.flag("no_more_current", True), section.where("reference_rpm"))
+                  error_percent, section.flag("no_more_current", True), section.where("reference_rpm"))
         section.close()
         return row
 
@@ -65,10 +65,11 @@ class Table:
     def read(cls, path: Path) -> "Table":
         document = Document(path)
         root = document.root
+        error_percent = root.number("error_percent", minimum=0.0)
         numbers = [root.number(key, minimum=0.0) for key in
                    ("start_s", "torque_from_s", "torque_over_s", "measure_from_s", "measure_to_s")]
         table = cls(root.text("title"), root.text("motor"), root.text("board"), *numbers,
-                    [Row.read(section) for section in root.sections("row")], root.where("motor"), root.where("board"))
+                    [Row.read(section, error_percent) for section in root.sections("row")], root.where("motor"), root.where("board"))
         root.close()
         if not table.start_s < table.torque_from_s < table.measure_from_s < table.measure_to_s:
             raise UserError("the times are not in order", document.label, "start_s < torque_from_s < measure_from_s < measure_to_s")
