@@ -49,7 +49,7 @@ EXACT = [
     (L, 3.84, "mH line-to-line", 1.92e-3), (L_DELTA, 3.84, "mH line-to-line", 1.92e-3),
     (R_DELTA, 1.2, "ohm winding", 0.4), (L_DELTA, 900, "uH winding", 300e-6), (R_DELTA, TERMINALS, "ohm line-to-line", 0.4),
     (R, 1.2, "ohm winding", 1.2), (R, 1.2, "ohm phase", 1.2), (R, 570, "mohm line-to-line", 0.285), (L, 400, "uH phase", 0.4e-3),
-    (L, 0.0026, "H line-to-line", 1.3e-3), (R, 80, "ohm line-to-line", 40.0), (R_DELTA, 0.03, "ohm winding", 0.01),,
+    (L, 0.0026, "H line-to-line", 1.3e-3), (R, 80, "ohm line-to-line", 40.0), (R_DELTA, 0.03, "ohm winding", 0.01),
     (units.SPEED, 100, "  rpm ", 100.0), (units.CURRENT, 1.2, "A peak", 1.2)]
 ROUNDED = [
     (units.INERTIA, 24, "g cm2", 24e-7), (units.INERTIA, 6.8e-4, "oz in s2", 4.802e-6), (units.INERTIA, 0.055, "kg cm2", 5.5e-6),
