@@ -69,7 +69,7 @@ def simulated(text: str, board: FakeBoard, values=None):
     item = scenario(text)
     job = simulate.Job(item, None, values or {}, plan(item, RANGES, {}), ["plant.speed_rpm"], {"SnapBuf1": 3})
     seconds = []
-    result = simulate._simulate(job, FakeLibrary, board, seconds.append)
+    result = simulate.simulate_on(job, FakeLibrary, board, seconds.append)
     return result, sum(seconds)
 
 

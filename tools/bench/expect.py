@@ -75,7 +75,7 @@ class Expectation:
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "Expectation":
-        raise NotImplementedError
+        return cls()
 
     def check(self, run: Run) -> list[Outcome]:
         raise NotImplementedError
@@ -209,14 +209,18 @@ class StopExpectation(Expectation):
 
 
 @dataclass(frozen=True)
-class OutputsOffExpectation(Expectation):
+class WindowExpectation(Expectation):
+    """Base of those that have nothing but their time."""
+
     from_s: float
     to_s: float
 
     @classmethod
-    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "OutputsOffExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "WindowExpectation":
         return cls(*_window(section, duration_s))
 
+
+class OutputsOffExpectation(WindowExpectation):
     def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.from_s, self.to_s)
         on = np.flatnonzero(part.column("pwm.outputs_seen"))
@@ -365,15 +369,7 @@ class FaultExpectation(Expectation):
         return Outcome(row, got == name, got, name)
 
 
-@dataclass(frozen=True)
-class NoFaultExpectation(Expectation):
-    from_s: float
-    to_s: float
-
-    @classmethod
-    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoFaultExpectation":
-        return cls(*_window(section, duration_s))
-
+class NoFaultExpectation(WindowExpectation):
     def reads_firmware(self) -> bool:
         return True
 
@@ -384,12 +380,7 @@ class NoFaultExpectation(Expectation):
         return [Outcome(f"no fault {_window_text(self.from_s, self.to_s)}", not raised and len(part) > 0, got, "none")]
 
 
-@dataclass(frozen=True)
 class NoWarningsExpectation(Expectation):
-    @classmethod
-    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoWarningsExpectation":
-        return cls()
-
     def check(self, run: Run) -> list[Outcome]:
         return [Outcome("no warnings of the board", not run.warnings, run.warnings[0] if run.warnings else "none", "none")]
 
