@@ -81,9 +81,7 @@ class Table:
 def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = sweep.run_cases) -> int:
     """The whole command; returns the exit code. `run_cases` runs the jobs."""
     table = Table.read(paths.TABLES / "table2.toml")
-    motor, board = command_common.parts_of(table, options)
-    library = command_common.library_for([], options.library, options.userparams)
-    used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
+    motor, board, library, used = command_common.set_up(table, options, [], options.userparams)
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
     target = options.out or paths.RESULTS / "table2"
     with output.ResultFolder(target) as folder:
@@ -131,9 +129,6 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
     keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
-    output.write_csv(folder / "table2.csv", keys, [[row[key] for key in keys] for row in rows])
     from . import plots
-    data = {"title": table.title, **used, "board": str(paths.shown(board.path)),
-            "passed": all(outcome.ok for outcome in outcomes), "rows": rows, "expectations": [vars(outcome) for outcome in outcomes],
-            "plots": plots.write_table2(rows, folder)}
-    output.write_summary(folder, report.clean(data))
+    report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
+                       {"plots": plots.write_table2(rows, folder)})
