@@ -28,7 +28,8 @@ def test_later_layers_replace_or_scale_earlier_ones(layers, values):
 
 @pytest.mark.parametrize("layers, part", [
     ([("motor.rs_ohm", ("factor", 1.5))], "'motor.rs_ohm' has no value to scale"),
-    ([("motor.rs_ohm", 2.0), ("motor.rs_ohm", ("factor", 100.0))], "'motor.rs_ohm' = 200 is impossible, file.toml line 7: choose 0.001 .. 100 ohm"),
+    ([("motor.rs_ohm", 2.0), ("motor.rs_ohm", ("factor", 100.0))],
+     "'motor.rs_ohm' = 200 is impossible, file.toml line 7: choose 0.001 .. 100 ohm"),
     ([("motor.r_ohm", 1.0)], "unknown key 'motor.r_ohm', file.toml line 7: did you mean 'motor.rs_ohm'"),
     ([("motor.r_ohm", ("factor", 2.0))], "unknown key 'motor.r_ohm', file.toml line 7: did you mean 'motor.rs_ohm'"),
     ([("plant.speed_rpm", 1.0)], "'plant.speed_rpm' can only be read"), ([("reg.P1TPER", 70000)], "'reg.P1TPER' = 70000 is impossible")])

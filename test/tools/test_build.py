@@ -33,7 +33,8 @@ def fake(tmp_path, monkeypatch):
 def plan(*arguments: str) -> str:
     """What make would do."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
-    return subprocess.run(["make", "-n", "-C", str(paths.ROOT), *arguments], env=environment, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(["make", "-n", "-C", str(paths.ROOT), *arguments], env=environment, capture_output=True, text=True,
+                          check=True).stdout
 
 
 # ---- folders -------------------------------------------------------------------------------------------------------------

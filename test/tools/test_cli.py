@@ -87,15 +87,18 @@ def test_every_mistake_in_a_scenario_is_one_line_and_leaves_no_result(place, tex
 
 @pytest.mark.parametrize("arguments, parts", [
     (["run", "no_such"], ["no scenario 'no_such'"]), (["run", "no/such.toml"], ["no scenario file 'no/such.toml'"]),
-    (["run", "demo", "--library", "no.so"], ["no library 'no.so'"]), (["run", "demo", "--library", "{}/wrong.so"], ["cannot load the virtual board"]),
+    (["run", "demo", "--library", "no.so"], ["no library 'no.so'"]),
+    (["run", "demo", "--library", "{}/wrong.so"], ["cannot load the virtual board"]),
     (["walk"], ["invalid choice: 'walk'"]), (["run", "--speed"], ["unrecognized arguments: --speed"]),
     (["starts", "--every-deg", "0", "--library", str(LIBRARY)], ["every-deg = 0 is impossible"]),
     *((["run", "demo", "--library", str(LIBRARY), *words], parts) for words, parts in (
         (["--motor", "no_such"], ["no motor 'no_such'", "--motor"]), (["--board", "no_such"], ["no board 'no_such'", "--board"]),
-        (["--set", "motor.rs_ohm"], ["'motor.rs_ohm' is no change", "--set"]), (["--set", "motor.rs_ohm=big"], ["'motor.rs_ohm=big' is no change"]),
+        (["--set", "motor.rs_ohm"], ["'motor.rs_ohm' is no change", "--set"]),
+        (["--set", "motor.rs_ohm=big"], ["'motor.rs_ohm=big' is no change"]),
         (["--out", "{}/wrong.so/out"], ["cannot write to", "--out"]))),
     *(([*name, "--userparams", folder, *words], parts) for name in (["run", "demo"], ["table2"], ["starts"]) for folder, words, parts in (
-        ("no/where", [], ["no userparams.h in 'no/where'", "--userparams"]), (".", ["--library", str(LIBRARY)], ["leave out --library or"])))])
+        ("no/where", [], ["no userparams.h in 'no/where'", "--userparams"]),
+        (".", ["--library", str(LIBRARY)], ["leave out --library or"])))])
 def test_wrong_options_are_one_line(place, arguments, parts):
     (place.root / "wrong.so").write_text("no library", encoding="utf-8")
     out = [] if arguments[0] == "walk" or "--out" in arguments else ["--out", str(place.out)]
@@ -113,7 +116,8 @@ def test_a_folder_that_holds_something_else_is_left_alone(place):
 def test_a_good_run_ends_with_zero_and_complete_results_the_same_to_the_last_digit_each_time(place):
     code, out, error = place.run(START)
     assert (code, error) == (0, "") and "1 of 1 expectations hold" in out
-    assert re.search(r"simulated 2\.00 s of motor time in \d+\.\d+ s on one core \(\d+\.\d+ s of processor time\): \d+\.\d times real time", out)
+    assert re.search(r"simulated 2\.00 s of motor time in \d+\.\d+ s on one core "
+                     r"\(\d+\.\d+ s of processor time\): \d+\.\d times real time", out)
     assert (place.summary()["passed"], place.summary()["measures"][0]["reference_rpm"]) == (True, 1000)
     first = (place.out / "trace.csv").read_bytes()
     assert first.count(b"\n") > 3900 and not list(place.root.glob(".*"))
@@ -121,7 +125,8 @@ def test_a_good_run_ends_with_zero_and_complete_results_the_same_to_the_last_dig
     assert (place.out / "trace.csv").read_bytes() == first
 
 
-@pytest.mark.parametrize("text, more, allowed", [(START.replace("min = 900", "min = 5000"), [], "5000"), (START, ["--set", "motor.psi_vs=x0.1"], "900")])
+@pytest.mark.parametrize("text, more, allowed",
+                         [(START.replace("min = 900", "min = 5000"), [], "5000"), (START, ["--set", "motor.psi_vs=x0.1"], "900")])
 def test_a_failed_expectation_ends_with_one_and_names_the_row_and_the_numbers(place, text, more, allowed):
     code, out, error = place.run(text, *more)
     assert code == 1 and "FAIL  waiting: speed_rpm" in out and not place.summary()["passed"]
@@ -192,7 +197,8 @@ PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR
 
 @pytest.mark.parametrize("changes, text", [
     ({}, ""), ({"MOTOR_LS_MH": 1.8}, ""), ({"MOTOR_LS_MH": 2.0}, ""), # a salient motor's header may hold either inductance
-    ({"NOPOLESPAIRS": 4.0}, "NOPOLESPAIRS is 4 pairs, the motor's is 5"), ({"MOTOR_RS_OHM": 2.6}, "MOTOR_RS_OHM is 2.6 ohm, the motor's is 2.67"),
+    ({"NOPOLESPAIRS": 4.0}, "NOPOLESPAIRS is 4 pairs, the motor's is 5"),
+    ({"MOTOR_RS_OHM": 2.6}, "MOTOR_RS_OHM is 2.6 ohm, the motor's is 2.67"),
     ({"MOTOR_LS_MH": 2.1}, "MOTOR_LS_MH is 2.1 mH, the motor's is 1.9"),
     ({"MOTOR_KPHI_V_PER_KRPM": 7.0}, "MOTOR_KPHI_V_PER_KRPM is 7 V peak/krpm, the motor's is 7.24"),
     ({"NOPOLESPAIRS": 2.0, "MOTOR_RS_OHM": 1.0}, "NOPOLESPAIRS is 2 pairs, the motor's is 5; MOTOR_RS_OHM is 1 ohm, the motor's is 2.67")])

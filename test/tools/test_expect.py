@@ -28,7 +28,8 @@ ON = {"pwm__outputs_on": 21, "pwm__outputs_seen": 63}
 ERROR = MEASURE + expect("measure", measure="row", value="speed_error_percent", min=-0.5, max=0.5)
 HELD = MEASURE + expect("speed", measure="row")
 CLOSED = {"fw__state": step((0, 4), (0.8, 5)), "fw__speed_ref_rpm": 1000}
-REVERSED = {sign: CLOSED | {"fw__speed_ref_rpm": sign * 1000, "plant__speed_rpm": step((0, sign * 1000), (0.76, sign * -30), (0.77, sign * 1000))}
+REVERSED = {sign: CLOSED | {"fw__speed_ref_rpm": sign * 1000,
+                            "plant__speed_rpm": step((0, sign * 1000), (0.76, sign * -30), (0.77, sign * 1000))}
             for sign in (1, -1)}
 OVERSHOOT = S2 + expect("hand_over", within_s=0.8, overshoot_percent=10)
 NO_REVERSE = S2 + expect("hand_over", within_s=0.8, no_reverse_motion=True)
@@ -59,13 +60,15 @@ HOLDS = {
     "signal outside its bounds after the window": (expect("signal", signal="fw.i_q_a", statistic="max", max=5, to_s=1.5), PEAK),
     "states at two moments": (expect("state", name="STOPPED", at_s=0.5) + expect("state", name="CLOSED", at_s=1.5), STATES),
     "state that never comes": (NEVER, {"fw__state": 4}),
-    "fault in time, outputs off a period later": (KEPT + "cleared_from_s = 1.7\n", raised(1.05, outputs_off_s=1.05 + PERIOD_S, cleared_s=1.6)),
+    "fault in time, outputs off a period later": (KEPT + "cleared_from_s = 1.7\n",
+                                                  raised(1.05, outputs_off_s=1.05 + PERIOD_S, cleared_s=1.6)),
     "hardware a period after the cause": (HARDWARE, raised(1.01, 1, 1.0 + PERIOD_S)),
     "fault after the window": (NO_FAULT, {"fw__fault": step((0, 0), (1.5, 6))}),
     "clean": (expect("clean"), {}),
     **{f"statistic {name}": (expect("signal", signal="fw.i_q_a", statistic=name, min=value - 0.01, max=value + 0.01),
                              {"fw__i_q_a": step((0, -3), (1.0, 1))}) # half of the time each
-       for name, value in (("min", -3), ("max", 1), ("mean", -1), ("span", 4), ("peak", 3), ("last", 1), ("rms", 5 ** 0.5), ("distinct", 2))},
+       for name, value in (("min", -3), ("max", 1), ("mean", -1), ("span", 4), ("peak", 3), ("last", 1), ("rms", 5 ** 0.5),
+                           ("distinct", 2))},
 }
 
 
@@ -80,7 +83,8 @@ FAILS = [
     (ERROR, "row: speed_error_percent", "0.6", {"plant__speed_rpm": 1006}),
     (ERROR, "row: speed_error_percent", "-0.6", {"plant__speed_rpm": 994}),
     (HELD, "row: speed_error_percent", "-0.6", {"plant__speed_rpm": 994}),
-    (MEASURE + MEASURE.replace("row", "later").replace("0.5", "0.8") + expect("measure", measure=["row", "later"], value="speed_rpm", min=1000),
+    (MEASURE + MEASURE.replace("row", "later").replace("0.5", "0.8") + expect("measure", measure=["row", "later"], value="speed_rpm",
+                                                                              min=1000),
      "later: speed_rpm", "990", {"plant__speed_rpm": step((0, 1100), (0.8, 990))}),
     (MEASURE + expect("measure", measure="row", value="estimated_rpm", min=0), "row: estimated_rpm", "nothing", {}), # the bridge is off
     (S2 + expect("hand_over", within_s=0.6), "hand-over: closed loop", "0.700 s", CLOSED),
@@ -141,7 +145,8 @@ def test_a_firmware_variable_is_checked_over_its_elements(values, ok, got):
     assert (report.check(item)[0].ok, report.check(item)[0].got) == (ok, got)
 
 
-@pytest.mark.parametrize("text", [expect("no_fault", from_s=2.0), expect("outputs_off", from_s=2.0), expect("bus_voltage", max=30, from_s=2.0),
+@pytest.mark.parametrize("text", [expect("no_fault", from_s=2.0), expect("outputs_off", from_s=2.0),
+                                  expect("bus_voltage", max=30, from_s=2.0),
                                   expect("signal", signal="fw.i_q_a", statistic="max", max=5, from_s=2.0)])
 def test_an_empty_window_never_holds(text):
     item = run(text)

@@ -67,20 +67,16 @@ BAD = {
     # values
     "text": ("value = 1.8", "value = \"1.8\"", "'resistance' is not a number", "line 6"),
     "truth": ("value = 1.8", "value = true", "'resistance' is not a number", "line 6"),
-    "list": ("value = 1.8", "value = [1.8]", "'resistance' is not a number", "line 6"),
     "nan": ("value = 1.8", "value = nan", "'resistance' is not a number", "line 6"),
     "infinite": ("value = 1.8", "value = -inf", "'resistance' = -inf ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
     "beyond a double": ("value = 1.8", "value = 1" + "0" * 400, "'resistance' = inf ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
-    "beyond reason": ("value = 1.8", "value = 1e30", "'resistance' = 1e+30 ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
     "beyond all": ("value = 1.8", "value = 1" + "0" * 5000, "a number too long"),
     "too deep": ("value = 1.8", "value = " + "[" * 5000, "tables too deep"),
     "negative resistance": ("value = 1.8", "value = -1.8", "'resistance' = -1.8 ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80"),
     "zero inductance": ("value = 2.6", "value = 0", "'inductance' = 0 mH line-to-line is impossible", "line 7", "choose 0.02 .. 60 mH"),
     "megohms": ("value = 1.8", "value = 1.8e6", "'resistance' = 1.8e+06 ohm line-to-line is impossible", "line 6"),
-    "a flywheel": ("value = 24, unit = \"g cm2\"", "value = 5.5, unit = \"kg m2\"", "'inertia' = 5.5 kg m2 is impossible", "line 11"),
     "no pole pairs": ("value = 4,", "value = 0,", "'pole_pairs' = 0 is impossible", "line 5", "choose 1 .. 50"),
     "half a pole pair": ("value = 4,", "value = 2.5,", "'pole_pairs' = 2.5 is not a whole number", "line 5"),
-    "negative pole pairs": ("value = 4,", "value = -4,", "'pole_pairs' = -4 is impossible", "line 5"),
     "hot winding": ("\"ohm line-to-line\",", "\"ohm line-to-line\", at_degc = 400,", "'at_degc' of resistance = 400 is impossible", "line 6"),
     "temperature in words": ("\"ohm line-to-line\",", "\"ohm line-to-line\", at_degc = \"hot\",", "'at_degc' is not a number", "line 6"),
     "temperature of an inertia": ("\"g cm2\",", "\"g cm2\", at_degc = 25,", "unknown key 'at_degc'", "line 11"),
@@ -89,7 +85,6 @@ BAD = {
                                 "'inductance' and 'inductance_d' together", "line 7"),
     "d without q": ("inductance =", "inductance_d =", "'inductance_q' is missing", "line 4"),
     # numbers that do not fit each other
-    "uH for mH": (UNITS["L"], "\"uH line-to-line\"", "'inductance' = 2.6 uH line-to-line is impossible", "line 7"),
     "inductance and resistance": ("value = 2.6", "value = 0.02", "L/R = 0.0111 ms is implausible", "line 7"),
     "milliohms": ("value = 1.8", "value = 0.02", "L/R = 130 ms is implausible", "line 7"),
     "d and q": ("inductance = { value = 2.6, unit = \"mH line-to-line\", source = \"s\" }",
@@ -102,7 +97,6 @@ BAD = {
     "torque in oz in": ("0.0625, unit = \"N m\"", "8.85, unit = \"N m\"", "rated torque is 8.85 N m, but kphi and rated current give 0.0629 N m",
                         "line 16", "probably a wrong unit"),
     "torque in mN m": ("0.0625, unit = \"N m\"", "0.625, unit = \"N cm\"", "rated torque is 0.00625 N m", "line 16"),
-    "current of a tenth": ("value = 1.9", "value = 0.19", "rated torque is 0.0625 N m, but", "line 16"),
     "resistance too large for the current": ("value = 1.8", "value = 18", "the rated current needs 29.6 V for the resistance alone", "line 6"),
     "friction": ("[rating]", "coulomb_friction = { value = 100, unit = \"mN m\", source = \"s\" }\n[rating]",
                  "friction at rated speed, 0.1 N m, exceeds the rated torque", "line 13"),
@@ -169,8 +163,10 @@ def test_values_are_those_of_a_star_phase_in_si_and_what_a_file_leaves_out_has_d
     motor = load(MOTOR)
     shows(motor, {"name": "file", "title": "a motor", "connection": "Y", "pole_pairs": 4, "rs_ohm": 0.9, "ld_h": 1.3e-3, "lq_h": 1.3e-3,
                   "kphi_v_per_krpm": 4.0, "psi_vs": 5.513289e-3, "kt_nm_per_a": 0.03307973, "inertia_kgm2": 2.4e-6, "rated_voltage_v": 24.0,
-                  "rated_current_a": 1.9, "rated_torque_nm": 0.0625, "rated_speed_rpm": 4000.0, "maximum_speed_rpm": 6000.0, "salient": False}, 1e-6)
-    shows(motor, {"viscous_nms": 0.0, "coulomb_nm": 0.0, "load_inertia_kgm2": 0.0, "inductance_frequency_hz": None, "maximum_current_a": 2.85,
+                  "rated_current_a": 1.9, "rated_torque_nm": 0.0625, "rated_speed_rpm": 4000.0, "maximum_speed_rpm": 6000.0,
+                  "salient": False}, 1e-6)
+    shows(motor, {"viscous_nms": 0.0, "coulomb_nm": 0.0, "load_inertia_kgm2": 0.0, "inductance_frequency_hz": None,
+                  "maximum_current_a": 2.85,
                   "start_torque_nm": 0.015625, "resistance_tempco_per_k": 0.0039, "kphi_tempco_per_k": -0.002, "tune": {}, "spread": {}})
     assert motor.plant_extra.values == {}
 
@@ -230,7 +226,8 @@ def test_a_bad_motor_file_ends_a_run_with_its_line_and_exit_code_2(tmp_path, nam
     old, new, *parts = BAD[name]
     (tmp_path / "file.toml").write_text(changed(old, new), encoding="utf-8")
     out = tmp_path / "out"
-    refused(command("run", "smoke", "--motor", str(tmp_path / "file.toml"), "--library", str(LIBRARY), "--out", str(out), "--quiet"), *parts)
+    refused(command("run", "smoke", "--motor", str(tmp_path / "file.toml"), "--library", str(LIBRARY), "--out", str(out), "--quiet"),
+            *parts)
     assert not out.exists()
 
 

@@ -87,7 +87,8 @@ def test_a_firmware_that_hides_its_ranges_is_refused():
     ([(0.5, "speed_percent = 160"), (1.5, "speed_percent = 40")], [0.5, 1.5], 1000.0),
     ([(0.5, "speed_percent = 160"), (1.5, "speed_percent = 200")], [0.5], 5000.0),
     ([(0.5, "speed_percent = 160"), (1.5, "speed = \"maximum\"")], [0.5], 5500.0),
-    ([(0.5, "speed = \"nominal\""), (0.7, "speed_percent = 160"), (1.7, "speed = \"nominal\"")], [0.7], 2800.0)]) # the border is in both ranges
+    ([(0.5, "speed = \"nominal\""), (0.7, "speed_percent = 160"), (1.7, "speed = \"nominal\"")], [0.7],
+     2800.0)]) # the border is in both ranges
 def test_s3_is_pressed_where_the_speed_takes_it(pairs, pressed, rpm):
     found = percent(*pairs)
     low, high = (2800.0, 5500.0) if len(pressed) % 2 else (500.0, 2800.0)
@@ -127,7 +128,8 @@ def test_a_button_that_is_still_down_is_let_go_before_it_is_pressed_again():
 
 def test_s3_does_nothing_before_the_start_so_its_range_is_refused_there():
     item = in_numbers(scenario(events((0.0, "speed_percent = 160"))), Rating(2500.0, 0.08), PARAMS)
-    refusal(lambda: plan(item, Ranges.of(PARAMS, []), {}), "speed_percent = 160 (4000 rpm) is impossible, ", "line 8: ", "before S2; start the motor first")
+    refusal(lambda: plan(item, Ranges.of(PARAMS, []), {}), "speed_percent = 160 (4000 rpm) is impossible, ", "line 8: ",
+            "before S2; start the motor first")
 
 
 @pytest.mark.parametrize("share, defines, maximum_rpm, parts", [

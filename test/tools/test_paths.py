@@ -20,5 +20,6 @@ def test_a_folder_that_is_not_there_or_cannot_be_read_is_named(tmp_path, monkeyp
     refusal(lambda: paths.names(tmp_path / "nowhere"), "cannot read the folder (No such file or directory), ", "nowhere: make it readable")
     monkeypatch.setattr(Path, "iterdir", denied)
     monkeypatch.setattr(Path, "is_file", denied)
-    for call in (lambda: paths.find("motor", "a", tmp_path), lambda: paths.find("motor", str(tmp_path / "a.toml"), tmp_path), lambda: paths.names(tmp_path)):
+    for call in (lambda: paths.find("motor", "a", tmp_path), lambda: paths.find("motor", str(tmp_path / "a.toml"), tmp_path),
+                 lambda: paths.names(tmp_path)):
         refusal(call, f"cannot read the folder (Permission denied), {tmp_path}: make it readable")

@@ -42,9 +42,11 @@ def test_a_motor_s_rows_follow_from_its_rating_and_its_header():
 
 
 @pytest.mark.parametrize("values, text", [
-    ({}, "ok"), ({"speed_error_percent": -0.5}, "ok"), ({"fault": "STALL"}, "fault STALL"), ({"closed_after_s": None}, "never in closed loop"),
+    ({}, "ok"), ({"speed_error_percent": -0.5}, "ok"), ({"fault": "STALL"}, "fault STALL"),
+    ({"closed_after_s": None}, "never in closed loop"),
     ({"closed_after_s": 5.1}, "closed loop after 5.10 s"), ({"speed_error_percent": 0.51}, "speed +0.5 %"),
-    ({"speed_error_percent": None}, "no speed"), ({"angle_error_rms_deg": 10.1}, "angle"), ({"current_of_maximum_percent": 100.1}, "current"),
+    ({"speed_error_percent": None}, "no speed"), ({"angle_error_rms_deg": 10.1}, "angle"),
+    ({"current_of_maximum_percent": 100.1}, "current"),
     ({"speed_error_percent": -2.0, "voltage_at_limit_percent": 100.0}, "speed -2.0 % (voltage 100 % of the time)")])
 def test_each_way_to_fail_is_named(values, text):
     assert rating_sweep.verdict(TABLE, row(**values)) == text
@@ -56,7 +58,8 @@ def test_a_failed_row_names_motor_row_and_numbers():
     assert outcome.row == "m at 50 %" and "angle error 12.0 deg" in outcome.got and "angle error 10 deg" in outcome.allowed
 
 
-@pytest.mark.parametrize("rpm, text", [(5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"), (None, "no closed loop without load")])
+@pytest.mark.parametrize("rpm, text", [(5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"),
+                                       (None, "no closed loop without load")])
 def test_what_was_reached_without_load_is_told(rpm, text):
     assert rating_sweep.highest_text([row(highest_rpm=rpm, reference_rpm=5500.0)]) == text
 
@@ -72,7 +75,8 @@ def test_the_start_takes_lock_and_ramp_and_a_slower_header_is_given_more_time():
 def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it():
     events, settled_s = sweep.loaded_run(PARAMS, 2600.0, TIMES, "x", torque_nm=0.04, start_torque_nm=0.01)
     at_speed_s = 0.1 + sweep.start_time_s(PARAMS) + 1600.0 / 4000.0 + 1.0
-    assert [(event.at_s, event.keys["load.constant_nm"]) for event in events if event.keys] == [(0.0, 0.01), (pytest.approx(at_speed_s), 0.04)]
+    brakes = [(event.at_s, event.keys["load.constant_nm"]) for event in events if event.keys]
+    assert brakes == [(0.0, 0.01), (pytest.approx(at_speed_s), 0.04)]
     assert settled_s == pytest.approx(at_speed_s + 0.5 + 1.0)
 
 
@@ -87,7 +91,8 @@ def test_a_firmware_that_hides_a_parameter_is_refused():
 
 
 @pytest.mark.parametrize("signals, rpm", [
-    ({"fw__state": step((0, 4), (0.5, 5), (1.5, 1)), "plant__speed_rpm": step((0, 9000), (0.5, 1000), (1.0, 3000), (1.005, 2000), (1.5, 8000))},
+    ({"fw__state": step((0, 4), (0.5, 5), (1.5, 1)), "plant__speed_rpm": step((0, 9000), (0.5, 1000), (1.0, 3000), (1.005, 2000),
+                                                                              (1.5, 8000))},
      pytest.approx(2000.0 + 1000.0 * 0.005 / 0.1, abs=1.0)), # a mean in closed loop
     ({"fw__state": 4, "plant__speed_rpm": 1000}, None), ({"fw__state": 5, "plant__speed_rpm": -1500}, pytest.approx(1500.0))])
 def test_the_highest_speed(signals, rpm):
@@ -96,7 +101,8 @@ def test_the_highest_speed(signals, rpm):
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("old, new, said", [
-    ("settle_s = 1.5", "settle_s = 0", "'settle_s' = 0 is impossible"), ("speeds_percent = [20, 50, 100]", "speeds_percent = []", "not a list of numbers"),
+    ("settle_s = 1.5", "settle_s = 0", "'settle_s' = 0 is impossible"),
+    ("speeds_percent = [20, 50, 100]", "speeds_percent = []", "not a list of numbers"),
     ("error_percent", "eror_percent", "'error_percent' is missing"), ("start_s", "more = 1\nstart_s", "unknown key 'more'")])
 def test_a_mistake_in_the_table_is_one_line(tmp_path, old, new, said):
     text = (paths.TABLES / "rated.toml").read_text(encoding="utf-8")

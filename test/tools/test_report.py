@@ -57,7 +57,8 @@ def test_the_protocol_names_a_fault_and_its_end():
 
 
 def test_failed_expectations_are_marked():
-    assert report.outcomes_text(report.check(example())).startswith("FAIL  hand-over: closed loop  0.700 s  (allowed: at most 0.5 s after S2)")
+    line = report.outcomes_text(report.check(example()))
+    assert line.startswith("FAIL  hand-over: closed loop  0.700 s  (allowed: at most 0.5 s after S2)")
 
 
 def test_warnings_of_the_board_are_printed():
@@ -87,7 +88,8 @@ BASIC = {"speed.png", "currents.png", "voltages.png", "angle_error.png"}
 
 @pytest.mark.parametrize("signals, variables, names", [
     ({"fw__state": 4}, {}, BASIC),
-    ({"fw__fw_index": step((0, 0), (1.5, 3)), "fw__inv_kphi": 7956}, {"SnapBuf1": [1, 2, 3]}, BASIC | {"hand_over.png", "field_weakening.png", "variables.png"})])
+    ({"fw__fw_index": step((0, 0), (1.5, 3)), "fw__inv_kphi": 7956}, {"SnapBuf1": [1, 2, 3]},
+     BASIC | {"hand_over.png", "field_weakening.png", "variables.png"})])
 def test_hand_over_field_weakening_and_arrays_get_their_own_plots(tmp_path, signals, variables, names):
     item = example(**signals)
     item.variables = variables

@@ -43,7 +43,8 @@ def test_the_plant_of_a_job_is_changed_and_its_header_is_not():
     bench = Bench(TABLE, motor, motor_file.part(HURST), board_file.part("mclv"), library)
     job = bench.job(Deviation("x", (0.7, 1.3, 0.85), temperature_degc=80.0), True)
     assert {key: job.values[key] for key in ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.temp_c")} == pytest.approx({
-        "motor.rs_ohm": 0.7 * motor.rs_ohm, "motor.ld_h": 1.3 * motor.ld_h, "motor.lq_h": 1.3 * motor.lq_h, "motor.psi_vs": 0.85 * motor.psi_vs,
+        "motor.rs_ohm": 0.7 * motor.rs_ohm, "motor.ld_h": 1.3 * motor.ld_h, "motor.lq_h": 1.3 * motor.lq_h,
+        "motor.psi_vs": 0.85 * motor.psi_vs,
         "motor.temp_c": 80.0})
     brakes = [action.keys["load.constant_nm"] for action in job.actions if "load.constant_nm" in action.keys]
     assert (brakes[0], brakes[-1]) == pytest.approx((motor.start_torque_nm, 0.5 * motor.rated_torque_nm))
@@ -58,7 +59,8 @@ def test_temperature_shows_in_the_true_factors():
 
 
 # A true Kphi has no error, a smaller one lags and a larger one leads; a header 41 per cent too high is the end of lock.
-@pytest.mark.parametrize("factor, degrees, within", [(1.0, 0.0, 1e-7), (1.1, 5.0, 0.1), (2.0, 24.3, 0.1), (0.8, -17.1, 0.2), (1.0 / 1.4142, -45.0, 1.0),
+@pytest.mark.parametrize("factor, degrees, within",
+                         [(1.0, 0.0, 1e-7), (1.1, 5.0, 0.1), (2.0, 24.3, 0.1), (0.8, -17.1, 0.2), (1.0 / 1.4142, -45.0, 1.0),
                                                      (1.0 / 1.4143, None, 0.0)])
 def test_the_law_of_kphi(factor, degrees, within):
     assert robust.law_deg(factor) == (None if degrees is None else pytest.approx(degrees, abs=within))
@@ -138,14 +140,16 @@ def test_a_parameter_without_a_limit_ends_at_the_bound():
     assert (search.good, search.bad, search.next(0.02)) == (3.0, None, None)
 
 
-@pytest.mark.parametrize("ends, text", [((0.0, 99.0), r"<0\.30 \.\. >3\.00"), ((0.6, 1.5), r"0\.6\d \.\. 1\.[34]\d"), ((1.0, 1.0), "not at all")])
+@pytest.mark.parametrize("ends, text", [((0.0, 99.0), r"<0\.30 \.\. >3\.00"), ((0.6, 1.5), r"0\.6\d \.\. 1\.[34]\d"),
+                                        ((1.0, 1.0), "not at all")])
 def test_the_printed_margin_marks_an_end_that_is_only_the_search_s(ends, text):
     assert re.fullmatch(text, margins(*ends).cell("R", "runs, loaded"))
 
 
 def test_the_printed_table_tells_what_happens_beyond():
     text = robust.margins_text(TABLE, margins(0.0, 1.5))
-    assert re.search(r"(?m)^R x1\.\d\d: no \[starts, no load; runs, no load; starts, loaded; runs, loaded\]$", text) and "0.85 .. 1.15" in text
+    assert re.search(r"(?m)^R x1\.\d\d: no \[starts, no load; runs, no load; starts, loaded; runs, loaded\]$",
+                     text) and "0.85 .. 1.15" in text
 
 
 def test_every_case_is_tried_in_a_handful_of_rounds_and_never_twice():
@@ -158,7 +162,8 @@ def test_every_case_is_tried_in_a_handful_of_rounds_and_never_twice():
             rounds.append(title)
             seen.extend((item.name, loaded) for item, loaded in cases)
             good = [0.71 < item.factors[2] < 2.0 and item.factors[0] < 2.5 for item, _ in cases]
-            return [{"started": ok, "verdict": "ok" if ok else "no", "load": robust.load_name(loaded)} for ok, (_, loaded) in zip(good, cases)]
+            return [{"started": ok, "verdict": "ok" if ok else "no", "load": robust.load_name(loaded)}
+                    for ok, (_, loaded) in zip(good, cases)]
 
     found = robust.find_margins(FakeBench(), True)
     assert len(set(seen)) == len(seen) and len(rounds) <= 5
@@ -188,7 +193,8 @@ def test_the_promised_deviations_in_full(tmp_path):
     assert data["passed"] == (code == 0)
     with (tmp_path / "out" / "robust.csv").open(encoding="utf-8") as file:
         rows = {(item["case"], item["load"]): item for item in csv.DictReader(file)}
-    for load, case in itertools.product(("no load", "loaded"), ("as in the header", "R -30 %", "R +30 %", "L -30 %", "L +30 %", "Kphi -15 %", "Kphi +15 %")):
+    for load, case in itertools.product(("no load", "loaded"),
+                                        ("as in the header", "R -30 %", "R +30 %", "L -30 %", "L +30 %", "Kphi -15 %", "Kphi +15 %")):
         assert rows[case, load]["verdict"] == "ok", (case, load)
     own_deg = float(rows["as in the header", "no load"]["angle_error_mean_deg"])
     for case in ("Kphi -15 %", "Kphi +15 %"): # the law, with the header's own error taken off

@@ -23,7 +23,8 @@ def test_every_value_is_described():
     ({"plant__speed_rpm": step((0, 5), (0.5, 990), (1.0, 1000), (1.5, 7))}, # only the window counts
      {"speed_rpm": 995, "speed_error_percent": -0.5, "speed_min_rpm": 990, "speed_max_rpm": 1000}, 0.01),
     ({"plant__i_d": -3, "plant__i_q": 4}, {"current_rms_a": 5 / 2 ** 0.5}, 1e-5), # the RMS of the vector
-    ({"fw__theta_est_deg": 1.0, "plant__theta_e_deg": 359.0}, {"angle_error_mean_deg": 2.0, "angle_error_rms_deg": 2.0}, 1e-3), # across the turn
+    ({"fw__theta_est_deg": 1.0, "plant__theta_e_deg": 359.0}, # across the turn
+     {"angle_error_mean_deg": 2.0, "angle_error_rms_deg": 2.0}, 1e-3),
     ({"fw__theta_est_deg": lambda t: np.where(np.arange(len(t)) % 2, 10.0, 350.0)}, # the RMS includes what the mean hides
      {"angle_error_mean_deg": 0.0, "angle_error_rms_deg": 10.0}, 1e-3),
     ({"fw__v_d_v": -3, "fw__v_q_v": 4, "fw__v_limit_v": step((0, 10), (1.0, 5))},

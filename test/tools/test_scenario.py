@@ -17,7 +17,8 @@ MISTAKES = {
     "event without a time": ("[[event]]\npress = \"S2\"", ["'at_s' is missing"]),
     "event without an action": (EVENT, ["nothing to do", "press, speed_rpm"]),
     "slow start": (EVENT + "start_rpm = 1000\nover_s = 1", ["'over_s' with 'start_rpm'"]),
-    "speed without a reference": (MEASURE + "[[expect]]\nkind = \"speed\"\nmeasure = \"m\"", ["'m' has no speed error", "add reference_rpm"]),
+    "speed without a reference": (MEASURE + "[[expect]]\nkind = \"speed\"\nmeasure = \"m\"",
+        ["'m' has no speed error", "add reference_rpm"]),
     "event with two actions": (EVENT + "press = \"S2\"\npot = 0.5", ["'press' and 'pot' together"]),
     "unknown button": (EVENT + "press = \"S4\"", ["'S4' is no press"]),
     "event after the end": ("[[event]]\nat_s = 2.5\npress = \"S2\"", ["at_s = 2.5 is after the end", "0 .. duration_s = 2"]),
@@ -29,6 +30,7 @@ MISTAKES = {
     "variable beyond 16 bits": (EVENT + "debug = { SnapStart = 70000 }", ["'SnapStart' = 70000 is impossible"]),
     "measure backwards": ("[[measure]]\nname = \"m\"\nfrom_s = 1.0\nto_s = 0.5", ["to_s = 0.5 is not after from_s = 1"]),
     "measure after the end": ("[[measure]]\nname = \"m\"\nfrom_s = 1.0\nto_s = 3.0", ["'to_s' = 3 is impossible"]),
+    "measure without a name": ("[[measure]]\nfrom_s = 0.5\nto_s = 1.0", ["'name' is missing"]),
     "measure of no speed": (MEASURE + "reference_rpm = 0", ["'reference_rpm' = 0 is impossible"]),
     "two measures of one name": (MEASURE + MEASURE, ["two measures are called 'm'"]),
     "unknown kind of expectation": ("[[expect]]\nkind = \"hope\"", ["'hope' is no kind"]),
@@ -39,7 +41,8 @@ MISTAKES = {
                                         ["'sped_rpm' is no value", "did you mean 'speed_rpm'?"]),
     "expectation without bounds": (EXPECT + "\"m\"\nvalue = \"speed_rpm\"", ["neither 'min' nor 'max'"]),
     "bounds in the wrong order": (EXPECT + "\"m\"\nvalue = \"speed_rpm\"\nmin = 2\nmax = 1", ["min = 2 is above max = 1"]),
-    "speed error without a reference": (EXPECT + "\"m\"\nvalue = \"speed_error_percent\"\nmax = 1", ["'m' has no speed error", "add reference_rpm"]),
+    "speed error without a reference": (EXPECT + "\"m\"\nvalue = \"speed_error_percent\"\nmax = 1",
+        ["'m' has no speed error", "add reference_rpm"]),
     "expectation with a key of another kind": ("[[expect]]\nkind = \"no_fault\"\nwithin_s = 1", ["unknown key 'within_s'"]),
     "per cent of a speed as a text": (EVENT + "speed_percent = \"half\"", ["'speed_percent' is not a number", "line 8"]),
     "torque that drives": (EVENT + "torque_percent = -50", ["'torque_percent' = -50 is impossible", "0 .. 1000", "line 8"]),
@@ -115,7 +118,8 @@ def test_per_cents_become_numbers_of_the_motor_and_names_those_of_the_header():
 
 
 @pytest.mark.parametrize("text, asks", [
-    (PERCENT, True), (EVENT + "speed_percent = 20\n", True), (EVENT + "torque_percent = 20\n", True), (MEASURE + "reference_percent = 20\n", True),
+    (PERCENT, True), (EVENT + "speed_percent = 20\n", True), (EVENT + "torque_percent = 20\n", True),
+    (MEASURE + "reference_percent = 20\n", True),
     (MEASURE + "reference_rpm = 1000\n" + EVENT + "speed = \"maximum\"\n", False)])
 def test_only_per_cents_need_a_rating(text, asks):
     assert asks_for_rating(scenario(text)) == asks
@@ -140,6 +144,12 @@ def test_the_rated_scenario_asks_for_20_50_and_100_per_cent_at_half_torque():
     assert at == {20.0: 50.0, 50.0: 50.0, 100.0: 50.0, "maximum": 0.0}
 
 
+def test_a_measure_is_called_by_its_reference_and_the_speed_is_checked_in_all_that_have_one():
+    item = scenario(MEASURE + MEASURE.replace('name = "m"', "reference_rpm = 1500") + MEASURE.replace('"m"', '"n"\nreference = "nominal"')
+                    + "[[expect]]\nkind = \"speed\"\n")
+    assert [measure.name for measure in item.measures] == ["m", "1500 rpm", "n"] and item.expectations[0].measures == ["1500 rpm", "n"]
+
+
 def test_events_come_in_order_of_time():
     assert [event.at_s for event in scenario("[[event]]\nat_s = 1.5\npot = 1\n[[event]]\nat_s = 0.5\npot = 0\n").events] == [0.5, 1.5]
 
@@ -155,6 +165,8 @@ def test_every_scenario_of_the_project_is_valid_and_expects_something(name):
 
 def test_there_is_a_scenario_for_each_mode_and_each_fault():
     items = [load(name) for name in paths.names(paths.SCENARIOS)]
-    assert {define for item in items for define in item.defines} == {"OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT"}
+    assert {define for item in items for define in item.defines} == {"OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE",
+                                                                     "BIDIRECTIONAL_SPEED", "SNAPSHOT"}
     faults = {expectation.name for item in items for expectation in item.expectations if type(expectation).__name__ == "FaultExpectation"}
-    assert {"OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK", "ISR_OVERRUN"} <= faults
+    assert {"OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
+            "ISR_OVERRUN"} <= faults

@@ -60,7 +60,8 @@ def test_columns_of_the_note_are_in_the_table():
 
 # ---- starts --------------------------------------------------------------------------------------------------------------
 def start(**more):
-    return {"rotor_deg": 45.0, "load_nm": 0.03, "closed_after_s": 1.6, "overshoot_percent": 1.0, "speed_error_percent": 0.0, "fault": None} | more
+    return {"rotor_deg": 45.0, "load_nm": 0.03, "closed_after_s": 1.6, "overshoot_percent": 1.0, "speed_error_percent": 0.0,
+            "fault": None} | more
 
 
 def other(**params):

@@ -30,7 +30,8 @@ REFUSED = [
     ('"a\\u001b[31m" = 1\n', close, "unknown key 'a?[31m'"),
     ("title = \"x\"\nduraton_s = 3\n", close, "unknown key 'duraton_s'", "line 2", "did you mean 'duration_s'?"),
     ("zzz = 3\n", close, "unknown key 'zzz'", "use one of duration_s, title"),
-    ("[[event]]\ntitle = \"a\"\n\n[[event]]\ntitle = \"b\"\nwrong = 1\n", lambda root: close(root.sections("event")[1]), "unknown key 'wrong'", "line 6"),
+    ("[[event]]\ntitle = \"a\"\n\n[[event]]\ntitle = \"b\"\nwrong = 1\n", lambda root: close(root.sections("event")[1]),
+     "unknown key 'wrong'", "line 6"),
     ("x = 1\n[[event]]\ny = 1\n", lambda root: root.sections("event")[0].number("at_s"), "'at_s' is missing", "line 2"),
     ("a = \"1\"", lambda root: root.number("a"), "'a' is not a number", "line 1"),
     ("a = true", lambda root: root.number("a"), "'a' is not a number"),
@@ -44,7 +45,8 @@ REFUSED = [
     ("pres = 1", lambda root: root.one_of(KEYS), "unknown key 'pres'", "did you mean 'press'?"),
     ("[event]\nat_s = 1", lambda root: root.sections("event"), "write [[event]]"),
     ("a = 1\n[[start]]\nb = 2\n", lambda root: root.section("start"), "'start' is not a table", "line 2", "write [start]"),
-    *((f"a = {value}", lambda root, limits=limits: root.number("a", **limits), "'a' is out of range", remedy) for value in ("inf", "-inf", "1e300")
+    *((f"a = {value}", lambda root, limits=limits: root.number("a", **limits), "'a' is out of range", remedy)
+      for value in ("inf", "-inf", "1e300")
       for limits, remedy in (({}, "choose"), ({"minimum": 0.0}, "choose 0 or more"), ({"maximum": 2.0}, "choose 2 or less")))]
 
 

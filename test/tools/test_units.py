@@ -73,7 +73,8 @@ def test_a_number_becomes_si(kind, value, unit, si, within):
     (Y, 1, "V rms dc/krpm", ["'V rms dc/krpm' is no unit of x"]),
     *((kind, 1, unit, [f"'{unit}' does not say which x, ", f"line 2: write {wanted}"]) for kind, unit, wanted in (
         (Y, "N m/A", "N m/A peak or N m/A rms or N m/A dc"), (Y, "V rms/krpm", "V rms line-to-line/krpm or V rms phase/krpm"),
-        (DELTA, "V line-to-line/krpm", "V peak line-to-line/krpm or V rms line-to-line/krpm"), (units.CURRENT, "A", "A peak or A rms or A dc"))),
+        (DELTA, "V line-to-line/krpm", "V peak line-to-line/krpm or V rms line-to-line/krpm"),
+        (units.CURRENT, "A", "A peak or A rms or A dc"))),
     (R, 5.34e6, "ohm line-to-line", ["'x' = 5.34e+06 ohm line-to-line is impossible, ", "line 2: choose 0.02 .. 80 ohm line-to-line"]),
     (Y, 0, "rpm/V", ["'x' = 0 rpm/V is impossible, ", ": choose 5.23599 .. 5235.99 rpm/V"])])
 def test_what_is_no_unit_or_impossible_in_it_is_refused(kind, value, unit, parts):
@@ -122,7 +123,8 @@ def test_the_two_constants_of_a_flat_motor_s_sheet_agree():
 
 def test_the_forms_to_compare_with_are_all_the_same_constant():
     text = units.kphi_forms(7.24, 5)
-    assert text.startswith("7.24 V peak line-to-line/krpm = 5.119 V rms line-to-line/krpm = 0.06914 V s/rad line-to-line = 0.007983 V s/rad = ")
+    assert text.startswith("7.24 V peak line-to-line/krpm = 5.119 V rms line-to-line/krpm = "
+                           "0.06914 V s/rad line-to-line = 0.007983 V s/rad = ")
     for form in text.split(" = "):
         value, _, unit = form.partition(" ")
         assert Y.units[unit](float(value)) == pytest.approx(7.24, rel=5e-4), form

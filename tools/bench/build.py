@@ -62,7 +62,8 @@ def make(target: str, defines: list[str], userparams: Path | None) -> subprocess
         command.append(f"USERPARAMS={paths.shown(userparams)}")
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     try:
-        return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
+        return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+                              check=False)
     except OSError as error:
         raise UserError("cannot run make", "", error.strerror or str(error)) from None
 

@@ -164,7 +164,8 @@ class _Core:
 
     def __init__(self, board: pil.PilBoard) -> None:
         c = board.library.c
-        board.library.declare(("vb_iss_core", ctypes.c_void_p, [ctypes.c_void_p]), ("iss_profile", ctypes.c_bool, [ctypes.c_void_p, ctypes.c_bool]),
+        board.library.declare(("vb_iss_core", ctypes.c_void_p, [ctypes.c_void_p]),
+                              ("iss_profile", ctypes.c_bool, [ctypes.c_void_p, ctypes.c_bool]),
                               ("iss_profile_counts", ctypes.POINTER(ctypes.c_uint32), [ctypes.c_void_p]),
                               ("iss_profile_cycles", ctypes.POINTER(ctypes.c_uint64), [ctypes.c_void_p]))
         self._c, self._core = c, c.vb_iss_core(board._vb) # pylint: disable=protected-access

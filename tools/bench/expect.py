@@ -2,7 +2,7 @@
 
     kind = "measure"       measure = "1000 rpm" or ["1000 rpm", "2500 rpm"], value = "speed_error_percent", min and/or max
                            (values: metrics.MEASURE_VALUES)
-    kind = "speed"         measure: its true mean speed holds the reference to percent = 0.5
+    kind = "speed"         measure (all with a reference if not given): its true mean speed holds the reference to percent = 0.5
     kind = "hand_over"     within_s = 2.0 of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
     kind = "outputs_off"   from_s, to_s
@@ -117,8 +117,9 @@ class MeasureExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
-        names = section.choices("measure", sorted(measures))
         speed = section.data["kind"] == "speed"
+        referred = [name for name, has_reference in measures.items() if has_reference]
+        names = referred if speed and referred and "measure" not in section else section.choices("measure", sorted(measures))
         value = "speed_error_percent" if speed else section.choice("value", tuple(MEASURE_VALUES))
         for name in names:
             if value == "speed_error_percent" and not measures[name]:

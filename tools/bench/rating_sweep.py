@@ -199,5 +199,6 @@ def _write(folder: Path, table: Table, candidates: list[Candidate], rows: list[d
     from . import plots
     motors = [command_common.used(item.part, item.library, item.header) | {"name": item.motor.name, "rated_speed_rpm": item.motor.rated_speed_rpm,
                                                                    "rated_torque_nm": item.motor.rated_torque_nm} for item in candidates]
-    report.write_table(folder, "rated", KEYS, rows, outcomes, {"title": table.title, "board": str(paths.shown(board.path)), "motors": motors},
+    report.write_table(folder, "rated", KEYS, rows, outcomes,
+                       {"title": table.title, "board": str(paths.shown(board.path)), "motors": motors},
                        {"plots": plots.write_rated(rows, vars(table), folder)})

@@ -54,7 +54,8 @@ def write_table(folder: Path, name: str, keys: Sequence[str], rows: list[dict[st
                 more: dict[str, Any]) -> None:
     """What a table of many runs leaves: NAME.csv with the keys of each row, and all of it in the summary."""
     output.write_csv(folder / f"{name}.csv", list(keys), [[row[key] for key in keys] for row in rows])
-    data = {**head, "passed": all(outcome.ok for outcome in outcomes), "rows": rows, "expectations": [vars(outcome) for outcome in outcomes], **more}
+    data = {**head, "passed": all(outcome.ok for outcome in outcomes), "rows": rows,
+            "expectations": [vars(outcome) for outcome in outcomes], **more}
     output.write_summary(folder, clean(data))
 
 

@@ -32,7 +32,7 @@
     note = "..."
 
     [[measure]]                      a row of the summary table
-    name = "1000 rpm"
+    name = "1000 rpm"                its reference_rpm if not given
     from_s = 3.0
     to_s = 4.0
     reference_rpm = 1000             optional: for the speed error; or reference_percent = 50, or reference = "maximum"
@@ -43,7 +43,7 @@
 
 from tools.common import paths
 from tools.common.board_keys import Values
-from tools.common.toml_file import Document, Section
+from tools.common.toml_file import REQUIRED, Document, Section
 from .expect import read_expectations
 from .metrics import SPEEDS, Measure
 from .panel import HOLD_S
@@ -141,14 +141,15 @@ def _variables(section: Section, key: str) -> dict[str, int]:
 
 def _read_measures(sections: list[Section], scenario: Scenario) -> None:
     for section in sections:
-        name = section.text("name")
+        rpm = section.number("reference_rpm", None)
+        name = section.text("name", REQUIRED if rpm is None else f"{rpm:g} rpm")
         from_s = section.number("from_s", minimum=0.0)
         to_s = section.number("to_s", maximum=scenario.duration_s)
         given = [key for key in ("reference_rpm", "reference_percent", "reference") if key in section]
         if len(given) > 1:
             raise section.fail(given[1], f"'{given[0]}' and '{given[1]}' together", "keep one of them")
-        references = {key: section.number(key, None) for key in ("reference_rpm", "reference_percent")}
-        references["reference"] = section.choice("reference", SPEEDS, "")
+        references = {"reference_rpm": rpm, "reference_percent": section.number("reference_percent", None),
+                      "reference": section.choice("reference", SPEEDS, "")}
         section.close()
         if to_s <= from_s:
             raise section.fail("to_s", f"to_s = {to_s:g} is not after from_s = {from_s:g}", "choose a later one")
