@@ -87,7 +87,3 @@ class Facts(unittest.TestCase):
 
     def test_the_workflow_runs_what_a_push_runs(self):
         self.assertIn("- run: .ci/run", re.sub(r"- name: .*\n\s+run", "- run", Path(ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")))
-
-
-if __name__ == "__main__":
-    unittest.main()
