@@ -3,12 +3,12 @@
 import math
 import random
 import re
-import tempfile
 import tomllib
-import unittest
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from tools.common import board_file, motor_file, paths
 from tools.common.errors import UserError
@@ -150,95 +150,71 @@ def written(value: Any) -> str:
     return quoted(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
 
 
-class Fuzz(unittest.TestCase):
-    def setUp(self) -> None:
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = Path(folder.name) / "file.toml"
-
-    def outcome(self, data: bytes, load: Callable[[str], Any]) -> Any:
-        """What the loader returns, None if it refuses properly; anything else is a failure that shows the file."""
-        self.path.write_bytes(data)
+@pytest.fixture
+def outcome(tmp_path):
+    """What a loader makes of a file, None if it refuses properly; anything else is a failure that shows the file."""
+    def of(data: bytes, load: Callable[[str], Any]) -> Any:
+        (tmp_path / "file.toml").write_bytes(data)
         try:
-            return load(str(self.path))
+            return load(str(tmp_path / "file.toml"))
         except UserError as error:
             line = str(error)
-            self.assertEqual(len(line.splitlines()), 1, data)
-            self.assertIn("file.toml", line, data)
+            assert len(line.splitlines()) == 1 and "file.toml" in line, data
             return None
         except Exception as error: # whatever it is, a user would see a traceback
-            self.fail(f"{type(error).__name__}: {error} for {data!r}")
+            pytest.fail(f"{type(error).__name__}: {error} for {data!r}")
+    return of
 
-    def sane(self, motor: motor_file.Motor, data: bytes) -> None:
-        for name, low, high in (("pole_pairs", 1, 50), ("rs_ohm", 0.005, 120.0), ("ld_h", 1e-5, 0.03), ("lq_h", 1e-5, 0.03), ("psi_vs", 1e-6, 2.0),
-                                ("kphi_v_per_krpm", 0.15, 600.0), ("inertia_kgm2", 1e-8, 0.1), ("viscous_nms", 0.0, 0.1), ("coulomb_nm", 0.0, 10.0),
-                                ("rated_voltage_v", 3.0, 400.0), ("rated_current_a", 0.01, 200.0), ("rated_torque_nm", 1e-4, 100.0),
-                                ("rated_speed_rpm", 49.0, 30001.0), ("maximum_speed_rpm", motor.rated_speed_rpm, 30001.0),
-                                ("maximum_current_a", 0.01, 2000.0), ("load_inertia_kgm2", 0.0, 0.1), ("start_torque_nm", 0.0, 100.0),
-                                ("resistance_tempco_per_k", 0.0, 0.01), ("kphi_tempco_per_k", -0.004, 0.0)):
-            self.assertTrue(low * (1.0 - 1e-9) <= getattr(motor, name) <= high * (1.0 + 1e-9) or getattr(motor, name) == low, (name, getattr(motor, name), data))
-        self.assertIs(type(motor.pole_pairs), int)
-        self.assertTrue(0.49 < 1.5 * motor.pole_pairs * motor.psi_vs * motor.rated_current_a / motor.rated_torque_nm < 2.01, data)
-        for low, high in motor.spread.values():
-            self.assertTrue(0.0 < low <= high < 1e3, data)
-        for value in [*motor.tune.values(), *motor.plant_values().values.values()]:
-            self.assertTrue(isinstance(value, float) and math.isfinite(value), data)
 
-    def run_cases(self, spoil: Callable[[str, random.Random], bytes]) -> tuple[int, int]:
-        """Accepted and refused files."""
-        dice = random.Random(f"{SEED} {spoil.__name__}")
-        originals = texts()
-        accepted = 0
-        for _ in range(CASES):
-            data = spoil(dice.choice(originals), dice)
-            motor = self.outcome(data, motor_file.load)
-            if motor is not None:
-                self.sane(motor, data)
-                accepted += 1
-        return accepted, CASES - accepted
+LIMITS = {"pole_pairs": (1, 50), "rs_ohm": (0.005, 120.0), "ld_h": (1e-5, 0.03), "lq_h": (1e-5, 0.03), "psi_vs": (1e-6, 2.0),
+          "kphi_v_per_krpm": (0.15, 600.0), "inertia_kgm2": (1e-8, 0.1), "viscous_nms": (0.0, 0.1), "coulomb_nm": (0.0, 10.0),
+          "rated_voltage_v": (3.0, 400.0), "rated_current_a": (0.01, 200.0), "rated_torque_nm": (1e-4, 100.0), "rated_speed_rpm": (49.0, 30001.0),
+          "maximum_speed_rpm": (49.0, 30001.0), "maximum_current_a": (0.01, 2000.0), "load_inertia_kgm2": (0.0, 0.1),
+          "start_torque_nm": (0.0, 100.0), "resistance_tempco_per_k": (0.0, 0.01), "kphi_tempco_per_k": (-0.004, 0.0)}
 
-    def check_kind(self, spoil: Callable[[str, random.Random], bytes]) -> None:
-        """Every case ends well, and the cases are not all of one kind: some files are still motors, some are not."""
-        accepted, refused = self.run_cases(spoil)
-        self.assertGreater(accepted, CASES // 100)
-        self.assertGreater(refused, CASES // 10)
 
-    def test_changed_bytes_give_a_sane_motor_or_one_line(self):
-        self.check_kind(spoil_bytes)
+def sane(motor: motor_file.Motor, data: bytes) -> None:
+    for name, (low, high) in LIMITS.items():
+        value = getattr(motor, name)
+        assert low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9) or value == low, (name, value, data)
+    assert type(motor.pole_pairs) is int and motor.maximum_speed_rpm >= motor.rated_speed_rpm * (1.0 - 1e-9), data
+    assert 0.49 < 1.5 * motor.pole_pairs * motor.psi_vs * motor.rated_current_a / motor.rated_torque_nm < 2.01, data
+    assert all(0.0 < low <= high < 1e3 for low, high in motor.spread.values()), data
+    assert all(isinstance(value, float) and math.isfinite(value) for value in [*motor.tune.values(), *motor.plant_values().values.values()]), data
 
-    def test_changed_tokens_give_a_sane_motor_or_one_line(self):
-        self.check_kind(spoil_tokens)
 
-    def test_changed_lines_give_a_sane_motor_or_one_line(self):
-        self.check_kind(spoil_lines)
+@pytest.mark.parametrize("spoil, least_accepted, least_refused", [
+    *((spoil, CASES // 100, CASES // 10) for spoil in (spoil_bytes, spoil_tokens, spoil_lines, spoil_values)), (spoil_types, -1, CASES // 2)])
+def test_a_spoilt_file_gives_a_sane_motor_or_one_line(outcome, spoil, least_accepted, least_refused):
+    """The cases are not all of one kind: some files are still motors, some are not."""
+    dice = random.Random(f"{SEED} {spoil.__name__}")
+    originals = texts()
+    accepted = 0
+    for _ in range(CASES):
+        data = spoil(dice.choice(originals), dice)
+        motor = outcome(data, motor_file.load)
+        if motor is not None:
+            sane(motor, data)
+            accepted += 1
+    assert accepted > least_accepted and CASES - accepted > least_refused
 
-    def test_changed_values_give_a_sane_motor_or_one_line(self):
-        self.check_kind(spoil_values)
 
-    def test_changed_types_give_a_sane_motor_or_one_line(self):
-        accepted, refused = self.run_cases(spoil_types)
-        self.assertGreater(refused, CASES // 2)
+def test_a_spoilt_board_file_gives_a_board_or_one_line(outcome):
+    good = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+    dice = random.Random(SEED)
+    for _ in range(CASES):
+        data = dice.choice((spoil_bytes, spoil_tokens, spoil_values, spoil_types))(good, dice)
+        board = outcome(data, board_file.load)
+        if board is not None:
+            assert 0.0 < board.current_full_scale_a < 1e5 and 0.0 < board.bus_full_scale_v < 1e3, data
+            assert all(math.isfinite(value) for value in board.plant_values().values.values()), data
 
-    def test_a_spoilt_board_file_gives_a_board_or_one_line(self):
-        good = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
-        dice = random.Random(SEED)
-        for _ in range(CASES):
-            spoil = dice.choice((spoil_bytes, spoil_tokens, spoil_values, spoil_types))
-            data = spoil(good, dice)
-            board = self.outcome(data, board_file.load)
-            if board is not None:
-                self.assertTrue(0.0 < board.current_full_scale_a < 1e5 and 0.0 < board.bus_full_scale_v < 1e3, data)
-                self.assertTrue(all(math.isfinite(value) for value in board.plant_values().values.values()), data)
 
-    def test_the_unspoilt_files_are_motors(self):
-        for text in texts():
-            self.assertIsNotNone(self.outcome(text.encode(), motor_file.load), text)
-
-    def test_a_slip_of_three_digits_or_a_wrong_sign_in_any_essential_number_is_refused(self):
-        for text in texts():
-            for match in re.finditer(r"(\w+) = \{ value = ([-+0-9.e]+)", text):
-                if match[1] not in ESSENTIAL or "[load]" in text[:match.start()]:
-                    continue
-                for factor in (1e3, 1e-3, -1.0, 0.0):
-                    data = text[:match.start(2)] + repr(float(match[2]) * factor) + text[match.end(2):]
-                    self.assertIsNone(self.outcome(data.encode(), motor_file.load), f"{match[0]} times {factor:g}")
+@pytest.mark.parametrize("text", texts(), ids=lambda text: text.splitlines()[0][:40])
+def test_an_unspoilt_file_is_a_motor_but_not_after_a_slip_of_three_digits_or_a_wrong_sign_in_any_essential_number(outcome, text):
+    assert outcome(text.encode(), motor_file.load) is not None
+    for match in re.finditer(r"(\w+) = \{ value = ([-+0-9.e]+)", text):
+        if match[1] in ESSENTIAL and "[load]" not in text[:match.start()]:
+            for factor in (1e3, 1e-3, -1.0, 0.0):
+                data = text[:match.start(2)] + repr(float(match[2]) * factor) + text[match.end(2):]
+                assert outcome(data.encode(), motor_file.load) is None, f"{match[0]} times {factor:g}"

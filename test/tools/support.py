@@ -2,13 +2,16 @@
 
 import contextlib
 import io
+import re
 import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tools.bench import cli
 from tools.common import paths
+from tools.common.errors import UserError
 from tools.bench.run import Run
 from tools.bench.scenario import Scenario
 from tools.bench.scenario_file import read
@@ -73,3 +76,19 @@ def command(*arguments: str) -> tuple[int, str, str]:
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
         code = cli.main(list(arguments))
     return code, out.getvalue(), error.getvalue()
+
+
+def refusal(call, *parts: str) -> str:
+    """The line with which `call` refuses bad input; it holds every part."""
+    with pytest.raises(UserError) as caught:
+        call()
+    line = str(caught.value)
+    assert "\n" not in line and [part for part in parts if part not in line] == [], line
+    return line
+
+
+def refused(result: tuple[int, str, str], *parts: str) -> None:
+    """A command line that ended as after bad input: exit code 2 and one line, which holds every part."""
+    code, out, error = result
+    assert (code, out) == (2, ""), error
+    assert re.fullmatch(r"foc33: [^\n]+\n", error) and [part for part in parts if part not in error] == [], error

@@ -7,16 +7,16 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
-import unittest
 from pathlib import Path
 
-from support import LIBRARY, SCENARIO, command
+import pytest
+from support import LIBRARY, SCENARIO, command, refused
 
-from tools.bench import build, command_common
-from tools.common import motor_file, paths
+from tools.bench import build, cli, command_common
 from tools.bench.board import Library
+from tools.bench.simulate import SIGNALS
+from tools.common import motor_file, paths
 
 START = """
 [[event]]
@@ -56,190 +56,158 @@ BAD = {
 }
 
 
-class CommandLine(unittest.TestCase):
-    def setUp(self) -> None:
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.root = Path(folder.name)
-        self.out = self.root / "out"
+class Place:
+    """A folder with a scenario in it, and the results' place."""
 
-    def run_text(self, text: str, *more: str) -> tuple[int, str, str]:
-        path = self.root / "test.toml"
-        path.write_text(SCENARIO + text, encoding="utf-8")
-        return command("run", str(path), "--out", str(self.out), "--library", str(LIBRARY), "--no-plots", "--quiet", *more)
+    def __init__(self, root: Path) -> None:
+        self.root, self.out, self.path = root, root / "out", root / "test.toml"
+
+    def run(self, text: str, *more: str) -> tuple[int, str, str]:
+        self.path.write_text(SCENARIO + text, encoding="utf-8")
+        return command("run", str(self.path), "--out", str(self.out), "--library", str(LIBRARY), "--no-plots", "--quiet", *more)
 
     def refused(self, result: tuple[int, str, str], *parts: str) -> None:
-        code, out, error = result
-        self.assertEqual((code, out), (2, ""), error)
-        self.assertRegex(error, r"\Afoc33: [^\n]+\n\Z")
-        for part in parts:
-            self.assertIn(part, error)
-        self.assertFalse(self.out.exists())
-        self.assertEqual([path.name for path in self.root.iterdir() if path.name.startswith(".")], [])
+        refused(result, *parts)
+        assert not self.out.exists() and not list(self.root.glob(".*"))
 
-    def test_every_mistake_in_a_scenario_is_one_line_and_leaves_no_result(self):
-        for name, (text, *parts) in BAD.items():
-            with self.subTest(name):
-                self.refused(self.run_text(text), *parts, "line ")
-
-    def test_a_missing_scenario_motor_board_or_library_is_refused(self):
-        self.refused(command("run", "no_such", "--out", str(self.out)), "no scenario 'no_such'")
-        self.refused(command("run", "no/such.toml", "--out", str(self.out)), "no scenario file 'no/such.toml'")
-        self.refused(self.run_text("", "--motor", "no_such"), "no motor 'no_such'", "--motor")
-        self.refused(self.run_text("", "--board", "no_such"), "no board 'no_such'", "--board")
-        self.refused(command("run", "demo", "--out", str(self.out), "--library", "no.so"), "no library 'no.so'")
-
-    def test_a_library_that_is_none_is_refused(self):
-        path = self.root / "wrong.so"
-        path.write_text("no library", encoding="utf-8")
-        self.refused(command("run", "demo", "--out", str(self.out), "--library", str(path)), "cannot load the virtual board")
-
-    def test_an_output_folder_that_cannot_be_written_is_refused(self):
-        (self.root / "file").write_text("x", encoding="utf-8")
-        self.out = self.root / "file" / "out"
-        self.refused(self.run_text(""), "cannot write to", "--out")
-
-    def test_a_folder_that_holds_something_else_is_left_alone(self):
-        self.out.mkdir()
-        (self.out / "mine.txt").write_text("x", encoding="utf-8")
-        code, _, error = self.run_text("")
-        self.assertEqual(code, 2)
-        self.assertIn("is not a result folder", error)
-        self.assertEqual([path.name for path in self.out.iterdir()], ["mine.txt"])
-
-    def test_wrong_options_are_one_line(self):
-        self.refused(command("walk"), "invalid choice: 'walk'")
-        self.refused(command("run", "--speed"), "unrecognized arguments: --speed")
-        self.refused(self.run_text("", "--set", "motor.rs_ohm"), "'motor.rs_ohm' is no change", "--set")
-        self.refused(self.run_text("", "--set", "motor.rs_ohm=big"), "'motor.rs_ohm=big' is no change")
-        self.refused(command("starts", "--every-deg", "0", "--library", str(LIBRARY)), "every-deg = 0 is impossible")
-
-    def test_a_good_run_ends_with_zero_and_complete_results(self):
-        code, out, error = self.run_text(START)
-        self.assertEqual((code, error), (0, ""))
-        self.assertIn("1 of 1 expectations hold", out)
-        self.assertRegex(out, r"simulated 2\.00 s of motor time in \d+\.\d+ s on one core \(\d+\.\d+ s of processor time\): \d+\.\d times real time")
-        data = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
-        self.assertTrue(data["passed"])
-        self.assertEqual(data["measures"][0]["reference_rpm"], 1000)
-        self.assertGreater(len((self.out / "trace.csv").read_text(encoding="utf-8").splitlines()), 3900)
-        self.assertEqual([path.name for path in self.root.iterdir() if path.name.startswith(".")], [])
-
-    def test_a_failed_expectation_ends_with_one_and_names_the_row_and_the_numbers(self):
-        code, out, error = self.run_text(START.replace("min = 900", "min = 5000"))
-        self.assertEqual(code, 1)
-        self.assertRegex(error, r"\Afoc33: test: waiting: speed_rpm: got \d+, allowed at least 5000\n\Z")
-        self.assertIn("FAIL  waiting: speed_rpm", out)
-        self.assertFalse(json.loads((self.out / "summary.json").read_text(encoding="utf-8"))["passed"])
-
-    def test_a_wrong_motor_makes_the_expectation_fail_by_name(self):
-        code, _, error = self.run_text(START, "--set", "motor.psi_vs=x0.1")
-        self.assertEqual(code, 1)
-        self.assertIn("waiting: speed_rpm", error)
-
-    def test_two_runs_of_a_scenario_are_the_same_to_the_last_digit(self):
-        self.run_text(START)
-        first = (self.out / "trace.csv").read_bytes()
-        self.run_text(START)
-        self.assertEqual((self.out / "trace.csv").read_bytes(), first)
-
-    def test_the_report_tells_motor_and_header_and_says_if_they_do_not_belong_together(self):
-        own = self.root / "other"
-        own.mkdir()
-        text = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
-        (own / "userparams.h").write_text(re.sub(r"(#define MOTOR_RS_OHM) \S+", r"\1 2.0", text), encoding="utf-8")
-        path = self.root / "test.toml"
-        path.write_text(SCENARIO + START, encoding="utf-8")
-        arguments = ["run", str(path), "--out", str(self.out), "--no-plots", "--quiet"]
-        try:
-            code, out, error = command(*arguments, "--userparams", str(own))
-        finally:
-            shutil.rmtree(paths.ROOT / "build" / f"host-{build.variant_name([], own)}", ignore_errors=True)
-        self.assertEqual((code, error), (0, ""))
-        data = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
-        self.assertIn(f"\nheader  {own}/userparams.h\nnote    the header is for another motor: MOTOR_RS_OHM is 2 ohm", out)
-        self.assertEqual((data["header"], data["motor"]), (f"{own}/userparams.h", "tuning/motors/hurst_dmb0224c10002.toml"))
-        code, out, _ = command(*arguments)
-        self.assertIn("\nheader  userparams.h\n\n", out)
-
-    def test_a_header_that_is_not_there_or_comes_twice_is_refused(self):
-        path = self.root / "test.toml"
-        path.write_text(SCENARIO + START, encoding="utf-8")
-        for name in ("run", "table2", "starts"):
-            first = [name, str(path)] if name == "run" else [name]
-            self.refused(command(*first, "--out", str(self.out), "--userparams", "no/where"), "no userparams.h in 'no/where'", "--userparams")
-            self.refused(command(*first, "--out", str(self.out), "--userparams", ".", "--library", str(LIBRARY)), "leave out --library or")
-
-    def test_a_scenario_in_per_cent_follows_the_motor_file(self):
-        text = START.replace("speed_rpm = 1000", "speed_percent = 50", 1).replace("reference_rpm = 1000", "reference_percent = 50")
-        code, out, error = self.run_text(text)
-        self.assertEqual((code, error), (0, ""))
-        self.assertEqual(json.loads((self.out / "summary.json").read_text(encoding="utf-8"))["measures"][0]["reference_rpm"],
-                         0.5 * motor_file.load("hurst_dmb0224c10002").rated_speed_rpm)
-
-    def test_an_ended_run_leaves_neither_results_nor_processes(self):
-        path = self.root / "long.toml"
-        path.write_text(SCENARIO.replace("2.0", "120.0"), encoding="utf-8")
-        line = [sys.executable, "-m", "tools.bench", "run", str(path), "--out", str(self.out), "--library", str(LIBRARY)]
-        process = subprocess.Popen(line, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   start_new_session=True)
-        deadline = time.monotonic() + 20.0
-        while time.monotonic() < deadline and not any(item.name.startswith(".out-unfinished") for item in self.root.iterdir()):
-            time.sleep(0.02)
-        process.send_signal(signal.SIGTERM)
-        _, error = process.communicate(timeout=20)
-        self.assertEqual((process.returncode, error), (130, "foc33: interrupted, nothing was written\n"))
-        self.assertEqual([item.name for item in self.root.iterdir()], ["long.toml"])
-        with self.assertRaises(ProcessLookupError):
-            os.killpg(process.pid, 0)
-
-    def test_the_list_of_scenarios_has_a_line_for_each(self):
-        code, out, _ = command("scenarios")
-        self.assertEqual((code, [line.split()[0] for line in out.splitlines()]), (0, paths.names(paths.SCENARIOS)))
-
-    def test_every_command_explains_itself(self):
-        for name in ("run", "table2", "starts", "rated", "robust", "scenarios", "motors", "keys"):
-            result = subprocess.run([sys.executable, "-m", "tools.bench", name, "--help"], cwd=paths.ROOT, capture_output=True,
-                                    text=True, check=False)
-            self.assertEqual((result.returncode, result.stderr), (0, ""), name)
-            self.assertIn("usage:", result.stdout)
-
-    def test_keys_lists_unit_and_range_of_the_board_s_keys(self):
-        code, out, _ = command("keys", "--library", str(LIBRARY))
-        self.assertEqual(code, 0)
-        self.assertRegex(out, r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w")
+    def summary(self) -> dict:
+        return json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
 
 
-class HeaderNote(unittest.TestCase):
-    VALUES = {"motor.pole_pairs": 5.0, "motor.rs_ohm": 2.67, "motor.ld_h": 1.8e-3, "motor.lq_h": 2.0e-3, "motor.psi_vs": 7.983e-3}
-    PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR_KPHI_V_PER_KRPM": 7.24}
-
-    def test_a_header_for_this_motor_has_none(self):
-        self.assertEqual(command_common.header_note(self.VALUES, self.PARAMS), "")
-
-    def test_a_header_of_a_salient_motor_may_hold_either_inductance(self):
-        for ls_mh in (1.8, 2.0):
-            self.assertEqual(command_common.header_note(self.VALUES, self.PARAMS | {"MOTOR_LS_MH": ls_mh}), "")
-
-    def test_each_number_of_another_motor_is_named(self):
-        for name, value, text in (("NOPOLESPAIRS", 4.0, "NOPOLESPAIRS is 4 pairs, the motor's is 5"),
-                                  ("MOTOR_RS_OHM", 2.6, "MOTOR_RS_OHM is 2.6 ohm, the motor's is 2.67"),
-                                  ("MOTOR_LS_MH", 2.1, "MOTOR_LS_MH is 2.1 mH, the motor's is 1.9"),
-                                  ("MOTOR_KPHI_V_PER_KRPM", 7.0, "MOTOR_KPHI_V_PER_KRPM is 7 V peak/krpm, the motor's is 7.24")):
-            self.assertEqual(command_common.header_note(self.VALUES, self.PARAMS | {name: value}), f"the header is for another motor: {text}")
-
-    def test_two_numbers_are_both_named(self):
-        note = command_common.header_note(self.VALUES, self.PARAMS | {"NOPOLESPAIRS": 2.0, "MOTOR_RS_OHM": 1.0})
-        self.assertIn("NOPOLESPAIRS is 2 pairs, the motor's is 5; MOTOR_RS_OHM is 1 ohm", note)
+@pytest.fixture
+def place(tmp_path) -> Place:
+    return Place(tmp_path)
 
 
-class RealLibrary(unittest.TestCase):
-    def test_the_firmware_tells_parameters_states_and_faults(self):
-        library = Library(LIBRARY)
-        self.assertEqual(library.faults[0], "NONE")
-        self.assertLessEqual({"RAMP", "CLOSED", "STOPPING", "STOPPED", "FAULT"}, set(library.states.values()))
-        self.assertGreater(library.params["NOMINAL_SPEED_RPM"], library.params["MINIMUM_SPEED_RPM"])
+# ---- refusals ------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("text, parts", [(text, parts) for text, *parts in BAD.values()], ids=BAD)
+def test_every_mistake_in_a_scenario_is_one_line_and_leaves_no_result(place, text, parts):
+    place.refused(place.run(text), *parts, "line ")
 
-    def test_every_usual_signal_exists(self):
-        from tools.bench.simulate import SIGNALS
-        self.assertLessEqual(set(SIGNALS), set(Library(LIBRARY).keys))
+
+@pytest.mark.parametrize("arguments, parts", [
+    (["run", "no_such"], ["no scenario 'no_such'"]), (["run", "no/such.toml"], ["no scenario file 'no/such.toml'"]),
+    (["run", "demo", "--library", "no.so"], ["no library 'no.so'"]),
+    (["run", "demo", "--library", "{}/wrong.so"], ["cannot load the virtual board"]),
+    (["walk"], ["invalid choice: 'walk'"]), (["run", "--speed"], ["unrecognized arguments: --speed"]),
+    (["starts", "--every-deg", "0", "--library", str(LIBRARY)], ["every-deg = 0 is impossible"]),
+    *((["run", "demo", "--library", str(LIBRARY), *words], parts) for words, parts in (
+        (["--motor", "no_such"], ["no motor 'no_such'", "--motor"]), (["--board", "no_such"], ["no board 'no_such'", "--board"]),
+        (["--set", "motor.rs_ohm"], ["'motor.rs_ohm' is no change", "--set"]),
+        (["--set", "motor.rs_ohm=big"], ["'motor.rs_ohm=big' is no change"]),
+        (["--out", "{}/wrong.so/out"], ["cannot write to", "--out"]))),
+    *(([*name, "--userparams", folder, *words], parts) for name in (["run", "demo"], ["table2"], ["starts"]) for folder, words, parts in (
+        ("no/where", [], ["no userparams.h in 'no/where'", "--userparams"]),
+        (".", ["--library", str(LIBRARY)], ["leave out --library or"])))])
+def test_wrong_options_are_one_line(place, arguments, parts):
+    (place.root / "wrong.so").write_text("no library", encoding="utf-8")
+    out = [] if arguments[0] == "walk" or "--out" in arguments else ["--out", str(place.out)]
+    place.refused(command(*(word.format(place.root) for word in arguments), *out), *parts)
+
+
+def test_a_folder_that_holds_something_else_is_left_alone(place):
+    place.out.mkdir()
+    (place.out / "mine.txt").write_text("x", encoding="utf-8")
+    refused(place.run(""), "is not a result folder")
+    assert [path.name for path in place.out.iterdir()] == ["mine.txt"]
+
+
+# ---- runs ----------------------------------------------------------------------------------------------------------------
+def test_a_good_run_ends_with_zero_and_complete_results_the_same_to_the_last_digit_each_time(place):
+    code, out, error = place.run(START)
+    assert (code, error) == (0, "") and "1 of 1 expectations hold" in out
+    assert re.search(r"simulated 2\.00 s of motor time in \d+\.\d+ s on one core "
+                     r"\(\d+\.\d+ s of processor time\): \d+\.\d times real time", out)
+    assert (place.summary()["passed"], place.summary()["measures"][0]["reference_rpm"]) == (True, 1000)
+    first = (place.out / "trace.csv").read_bytes()
+    assert first.count(b"\n") > 3900 and not list(place.root.glob(".*"))
+    place.run(START)
+    assert (place.out / "trace.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize("text, more, allowed",
+                         [(START.replace("min = 900", "min = 5000"), [], "5000"), (START, ["--set", "motor.psi_vs=x0.1"], "900")])
+def test_a_failed_expectation_ends_with_one_and_names_the_row_and_the_numbers(place, text, more, allowed):
+    code, out, error = place.run(text, *more)
+    assert code == 1 and "FAIL  waiting: speed_rpm" in out and not place.summary()["passed"]
+    assert re.fullmatch(rf"foc33: test: waiting: speed_rpm: got \S+, allowed at least {allowed}\n", error)
+
+
+def test_the_report_tells_motor_and_header_and_says_if_they_do_not_belong_together(place):
+    own = place.root / "other"
+    own.mkdir()
+    text = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
+    (own / "userparams.h").write_text(re.sub(r"(#define MOTOR_RS_OHM) \S+", r"\1 2.0", text), encoding="utf-8")
+    place.path.write_text(SCENARIO + START, encoding="utf-8")
+    arguments = ["run", str(place.path), "--out", str(place.out), "--no-plots", "--quiet"]
+    try:
+        code, out, error = command(*arguments, "--userparams", str(own))
+    finally:
+        shutil.rmtree(paths.ROOT / "build" / f"host-{build.variant_name([], own)}", ignore_errors=True)
+    assert (code, error) == (0, "")
+    assert f"\nheader  {own}/userparams.h\nnote    the header is for another motor: MOTOR_RS_OHM is 2 ohm" in out
+    assert (place.summary()["header"], place.summary()["motor"]) == (f"{own}/userparams.h", "tuning/motors/hurst_dmb0224c10002.toml")
+    assert "\nheader  userparams.h\n\n" in command(*arguments)[1]
+
+
+def test_a_scenario_in_per_cent_follows_the_motor_file(place):
+    text = START.replace("speed_rpm = 1000", "speed_percent = 50", 1).replace("reference_rpm = 1000", "reference_percent = 50")
+    code, _, error = place.run(text)
+    assert (code, error) == (0, "")
+    assert place.summary()["measures"][0]["reference_rpm"] == 0.5 * motor_file.load("hurst_dmb0224c10002").rated_speed_rpm
+
+
+def test_an_ended_run_leaves_neither_results_nor_processes(place):
+    place.path.write_text(SCENARIO.replace("2.0", "120.0"), encoding="utf-8")
+    line = [sys.executable, "-m", "tools.bench", "run", str(place.path), "--out", str(place.out), "--library", str(LIBRARY)]
+    process = subprocess.Popen(line, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline and not list(place.root.glob(".out-unfinished*")):
+        time.sleep(0.02)
+    process.send_signal(signal.SIGTERM)
+    _, error = process.communicate(timeout=20)
+    assert (process.returncode, error) == (130, "foc33: interrupted, nothing was written\n")
+    assert [item.name for item in place.root.iterdir()] == ["test.toml"]
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
+# ---- lists ---------------------------------------------------------------------------------------------------------------
+def test_the_list_of_scenarios_has_a_line_for_each():
+    code, out, _ = command("scenarios")
+    assert (code, [line.split()[0] for line in out.splitlines()]) == (0, paths.names(paths.SCENARIOS))
+
+
+@pytest.mark.parametrize("name", ["run", "table2", "starts", "rated", "robust", "scenarios", "motors", "keys"])
+def test_every_command_explains_itself(name, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([name, "--help"])
+    assert (ended.value.code, "usage:" in capsys.readouterr().out) == (0, True)
+
+
+def test_keys_lists_unit_and_range_of_the_board_s_keys():
+    code, out, _ = command("keys", "--library", str(LIBRARY))
+    assert code == 0 and re.search(r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w", out)
+
+
+# ---- a header for another motor ------------------------------------------------------------------------------------------
+VALUES = {"motor.pole_pairs": 5.0, "motor.rs_ohm": 2.67, "motor.ld_h": 1.8e-3, "motor.lq_h": 2.0e-3, "motor.psi_vs": 7.983e-3}
+PARAMS = {"NOPOLESPAIRS": 5.0, "MOTOR_RS_OHM": 2.67, "MOTOR_LS_MH": 1.92, "MOTOR_KPHI_V_PER_KRPM": 7.24}
+
+
+@pytest.mark.parametrize("changes, text", [
+    ({}, ""), ({"MOTOR_LS_MH": 1.8}, ""), ({"MOTOR_LS_MH": 2.0}, ""), # a salient motor's header may hold either inductance
+    ({"NOPOLESPAIRS": 4.0}, "NOPOLESPAIRS is 4 pairs, the motor's is 5"),
+    ({"MOTOR_RS_OHM": 2.6}, "MOTOR_RS_OHM is 2.6 ohm, the motor's is 2.67"),
+    ({"MOTOR_LS_MH": 2.1}, "MOTOR_LS_MH is 2.1 mH, the motor's is 1.9"),
+    ({"MOTOR_KPHI_V_PER_KRPM": 7.0}, "MOTOR_KPHI_V_PER_KRPM is 7 V peak/krpm, the motor's is 7.24"),
+    ({"NOPOLESPAIRS": 2.0, "MOTOR_RS_OHM": 1.0}, "NOPOLESPAIRS is 2 pairs, the motor's is 5; MOTOR_RS_OHM is 1 ohm, the motor's is 2.67")])
+def test_each_number_of_another_motor_is_named(changes, text):
+    assert command_common.header_note(VALUES, PARAMS | changes) == (text and f"the header is for another motor: {text}")
+
+
+def test_the_firmware_tells_parameters_states_and_faults_and_has_every_usual_signal():
+    library = Library(LIBRARY)
+    assert library.faults[0] == "NONE" and {"RAMP", "CLOSED", "STOPPING", "STOPPED", "FAULT"} <= set(library.states.values())
+    assert library.params["NOMINAL_SPEED_RPM"] > library.params["MINIMUM_SPEED_RPM"]
+    assert set(SIGNALS) <= set(library.keys)

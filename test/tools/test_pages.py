@@ -2,8 +2,9 @@
 
 import re
 import subprocess
-import unittest
 from pathlib import Path
+
+import pytest
 
 from tools.common.paths import ROOT
 
@@ -31,63 +32,52 @@ def is_there(name: str) -> bool:
     return any(ROOT.glob(re.sub(r"NAME|<\w+>", "*", name).rstrip("/")))
 
 
-class Pages(unittest.TestCase):
-    def each(self, pattern: str, what, good) -> None:
-        """No page has a match of the pattern that is not good."""
-        for page, text in pages().items():
-            with self.subTest(page=page):
-                self.assertEqual([], sorted({name for name in re.findall(pattern, text) if not good(name)}), what)
-
-    def test_every_link_leads_somewhere(self):
-        for page, text in pages().items():
-            for target in re.findall(r"\]\(([^)\s]+)\)", text):
-                if not target.startswith("http"):
-                    file, _, anchor = target.partition("#")
-                    path = (ROOT / page).parent / file if file else ROOT / page
-                    with self.subTest(page=page, target=target):
-                        self.assertTrue(path.exists())
-                        self.assertTrue(not anchor or anchor in anchors(path.read_text(encoding="utf-8")))
-
-    def test_every_path_exists(self):
-        self.each(rf"(?<![\w/.-])((?:{TOPS})/[\w./*<>-]*[\w/*>])", "no such file", is_there)
-
-    def test_every_make_target_exists(self):
-        known = set(re.findall(r"^([a-z0-9-]+):", makefiles(), re.MULTILINE))
-        self.each(r"(?:`|^|\| )make ([a-z][\w-]*)", "no such target", known.__contains__)
-
-    def test_every_scenario_and_motor_exists(self):
-        self.each(r"SCENARIO=([a-z]\w*)\b(?!/)", "no such scenario", lambda name: name == "name" or is_there(f"tools/bench/scenarios/**/{name}.toml"))
-        self.each(r"MOTOR=([a-z]\w*)", "no such motor", lambda name: name in ("name", "all", "my_motor") or is_there(f"tuning/motors/{name}.toml"))
-
-    def test_every_name_is_in_the_file_beside_it(self):
-        for _, file, name in re.findall(r"^\| ([^|]*) \| ([^|]*`include/[^|]*|[^|]*`firmware/[^|]*) \| ([^|]*) \|$", pages()["docs/architecture.md"], re.MULTILINE):
-            text = "".join((ROOT / path).read_text(encoding="utf-8") for path in re.findall(r"`([\w/]+\.[ch])`", file))
-            for word in re.findall(r"`([A-Za-z]\w+)", name):
-                with self.subTest(file=file, name=word):
-                    self.assertTrue(not text or re.search(rf"\b{word}", text))
-
-    def test_AN1292_is_called_by_its_name(self):
-        self.each(r"\b([Tt]he note(?:'s)?)\b", "write AN1292", lambda name: False)
+# What a page names by this pattern is there, or is one of the words that stand for any.
+NAMED = {
+    "path": (rf"(?<![\w/.-])((?:{TOPS})/[\w./*<>-]*[\w/*>])", is_there),
+    "make target": (r"(?:`|^|\| )make ([a-z][\w-]*)", set(re.findall(r"^([a-z0-9-]+):", makefiles(), re.MULTILINE)).__contains__),
+    "scenario": (r"SCENARIO=([a-z]\w*)\b(?!/)", lambda name: name == "name" or is_there(f"tools/bench/scenarios/**/{name}.toml")),
+    "motor": (r"MOTOR=([a-z]\w*)", lambda name: name in ("name", "all", "my_motor") or is_there(f"tuning/motors/{name}.toml")),
+    "AN1292 by its name": (r"\b([Tt]he note(?:'s)?)\b", lambda name: False),
+}
 
 
-class Facts(unittest.TestCase):
-    def test_the_newest_version_is_the_headers(self):
-        version = re.search(r'FOC33_VERSION "(\d+\.\d+\.\d+)"', (ROOT / "include/version.h").read_text(encoding="utf-8"))[1]
-        newest = re.search(r"^## \[(\d\S*)\] - \d{4}-\d\d-\d\d$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)[1]
-        self.assertEqual(version, newest)
-        for page, text in pages().items():
-            if page != "CHANGELOG.md":
-                self.assertEqual(set(), set(re.findall(r"foc33 (\d+\.\d+\.\d+)", text)) - {version}, page)
-
-    def test_make_lists_every_target_in_a_group(self):
-        listed = re.findall(r"^([a-z0-9-]+):.*## (?:\[(.*?)\])?", makefiles(), re.MULTILINE)
-        self.assertEqual([], [name for name, group in listed if group not in GROUPS])
-        shown = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-        self.assertEqual(sorted(name for name, _ in listed), sorted(re.findall(r"^  make ([\w-]+) ", shown, re.MULTILINE)))
-
-    def test_the_workflow_runs_what_a_push_runs(self):
-        self.assertIn("- run: .ci/run", re.sub(r"- name: .*\n\s+run", "- run", Path(ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")))
+@pytest.mark.parametrize("pattern, good", NAMED.values(), ids=NAMED)
+def test_what_a_page_names_exists(pattern, good):
+    assert [] == [(page, name) for page, text in pages().items() for name in re.findall(pattern, text) if not good(name)]
 
 
-if __name__ == "__main__":
-    unittest.main()
+def test_every_link_leads_somewhere():
+    for page, text in pages().items():
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            if not target.startswith("http"):
+                file, _, anchor = target.partition("#")
+                path = (ROOT / page).parent / file if file else ROOT / page
+                assert path.exists(), (page, target)
+                assert not anchor or anchor in anchors(path.read_text(encoding="utf-8")), (page, target)
+
+
+def test_every_name_is_in_the_file_beside_it():
+    rows = re.findall(r"^\| ([^|]*) \| ([^|]*`include/[^|]*|[^|]*`firmware/[^|]*) \| ([^|]*) \|$", pages()["docs/architecture.md"], re.MULTILINE)
+    for _, file, name in rows:
+        text = "".join((ROOT / path).read_text(encoding="utf-8") for path in re.findall(r"`([\w/]+\.[ch])`", file))
+        assert [] == [word for word in re.findall(r"`([A-Za-z]\w+)", name) if text and not re.search(rf"\b{word}", text)], file
+
+
+def test_the_newest_version_is_the_headers():
+    version = re.search(r'FOC33_VERSION "(\d+\.\d+\.\d+)"', (ROOT / "include/version.h").read_text(encoding="utf-8"))[1]
+    newest = re.search(r"^## \[(\d\S*)\] - \d{4}-\d\d-\d\d$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    told = {number for page, text in pages().items() if page != "CHANGELOG.md" for number in re.findall(r"foc33 (\d+\.\d+\.\d+)", text)}
+    assert version == newest and told <= {version}
+
+
+def test_make_lists_every_target_in_a_group():
+    listed = re.findall(r"^([a-z0-9-]+):.*## (?:\[(.*?)\])?", makefiles(), re.MULTILINE)
+    assert [] == [name for name, group in listed if group not in GROUPS]
+    shown = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert sorted(name for name, _ in listed) == sorted(re.findall(r"^  make ([\w-]+) ", shown, re.MULTILINE))
+
+
+def test_the_workflow_runs_what_a_push_runs():
+    workflow = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
+    assert "- run: .ci/run" in re.sub(r"- name: .*\n\s+run", "- run", workflow)

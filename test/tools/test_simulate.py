@@ -3,10 +3,10 @@
 import faulthandler
 import os
 import time
-import unittest
 
 import numpy as np
-from support import FAULTS, STATES, scenario
+import pytest
+from support import FAULTS, STATES, refusal, scenario
 
 from tools.bench import simulate
 from tools.common import workers
@@ -69,57 +69,50 @@ def simulated(text: str, board: FakeBoard, values=None):
     item = scenario(text)
     job = simulate.Job(item, None, values or {}, plan(item, RANGES, {}), ["plant.speed_rpm"], {"SnapBuf1": 3})
     seconds = []
-    result = simulate._simulate(job, FakeLibrary, board, seconds.append)
+    result = simulate.simulate_on(job, FakeLibrary, board, seconds.append)
     return result, sum(seconds)
 
 
-class Simulation(unittest.TestCase):
-    def test_events_happen_at_their_period(self):
-        board = FakeBoard()
-        simulated("[[event]]\nat_s = 0.5\npress = \"S2\"\n", board)
-        self.assertIn((0.5, "input.s2", 1.0), board.calls)
-        self.assertIn((0.6, "input.s2", 0.0), board.calls)
-
-    def test_events_at_zero_are_in_place_before_power_up(self):
-        board = FakeBoard()
-        simulated("[[event]]\nat_s = 0.0\npot = 0.25\n[[event]]\nat_s = 0.1\npot = 0.5\n", board)
-        names = [call[1] for call in board.calls]
-        self.assertLess(names.index("input.pot"), names.index("power_up"))
-        self.assertLess(board.calls.index((0.0, "power_up")), board.calls.index((0.1, "input.pot", 0.5)))
-
-    def test_the_shaft_starts_where_the_scenario_says(self):
-        board = FakeBoard()
-        simulated("[start]\nrotor_deg = 75\nspeed_rpm = -300\n", board)
-        self.assertEqual((board.values["state.theta_e_deg"], board.values["state.speed_rpm"]), (75.0, -300.0))
-
-    def test_the_bus_starts_at_the_supply(self):
-        board = FakeBoard()
-        simulated("", board, {"supply.voltage_v": 20.0})
-        self.assertEqual(board.values["bus.voltage_v"], 20.0)
-
-    def test_every_period_is_recorded_once_with_its_time(self):
-        result, seconds = simulated("", FakeBoard())
-        self.assertEqual(len(result.trace), 40000)
-        self.assertTrue(np.array_equal(result.trace.column("plant.speed_rpm"), np.arange(40000)))
-        self.assertTrue(np.allclose(result.trace.time_s, (np.arange(40000) + 1) * 50e-6, atol=1e-9))
-        self.assertAlmostEqual(seconds, 2.0)
-
-    def test_a_wrong_pwm_period_still_ends_at_the_right_time(self):
-        board = FakeBoard(period_s=100e-6)
-        simulated("[[event]]\nat_s = 1.0\npot = 0.5\n", board)
-        self.assertAlmostEqual(board.now(), 2.0, delta=0.2)
-
-    def test_variables_are_written_and_read(self):
-        board = FakeBoard()
-        result, _ = simulated("[[event]]\nat_s = 0.5\ndebug = { SnapStart = 1 }\n", board)
-        self.assertIn((0.5, "SnapStart", 1), board.calls)
-        self.assertEqual(result.variables, {"SnapBuf1": [7, 7, 7]})
-
-    def test_the_protocol_holds_each_event_once(self):
-        result, _ = simulated("[[event]]\nat_s = 0.5\npress = \"S2\"\n", FakeBoard())
-        self.assertEqual(result.actions, [(0.0, "power-up"), (0.5, "S2 pressed")])
+def test_events_happen_at_their_period_and_are_in_the_protocol_once():
+    board = FakeBoard()
+    result, _ = simulated("[[event]]\nat_s = 0.5\npress = \"S2\"\n", board)
+    assert {(0.5, "input.s2", 1.0), (0.6, "input.s2", 0.0)} <= set(board.calls)
+    assert result.actions == [(0.0, "power-up"), (0.5, "S2 pressed")]
 
 
+def test_events_at_zero_are_in_place_before_power_up():
+    board = FakeBoard()
+    simulated("[[event]]\nat_s = 0.0\npot = 0.25\n[[event]]\nat_s = 0.1\npot = 0.5\n", board)
+    calls = [call for call in board.calls if call[1] in ("input.pot", "power_up")]
+    assert calls == [(0.0, "input.pot", 0.25), (0.0, "power_up"), (0.1, "input.pot", 0.5)]
+
+
+def test_the_shaft_starts_where_the_scenario_says_and_the_bus_at_the_supply():
+    board = FakeBoard()
+    simulated("[start]\nrotor_deg = 75\nspeed_rpm = -300\n", board, {"supply.voltage_v": 20.0})
+    assert [board.values[key] for key in ("state.theta_e_deg", "state.speed_rpm", "bus.voltage_v")] == [75.0, -300.0, 20.0]
+
+
+def test_every_period_is_recorded_once_with_its_time():
+    result, seconds = simulated("", FakeBoard())
+    assert len(result.trace) == 40000 and np.array_equal(result.trace.column("plant.speed_rpm"), np.arange(40000))
+    assert np.allclose(result.trace.time_s, (np.arange(40000) + 1) * 50e-6, atol=1e-9)
+    assert seconds == pytest.approx(2.0)
+
+
+def test_a_wrong_pwm_period_still_ends_at_the_right_time():
+    board = FakeBoard(period_s=100e-6)
+    simulated("[[event]]\nat_s = 1.0\npot = 0.5\n", board)
+    assert board.now() == pytest.approx(2.0, abs=0.2)
+
+
+def test_variables_are_written_and_read():
+    board = FakeBoard()
+    result, _ = simulated("[[event]]\nat_s = 0.5\ndebug = { SnapStart = 1 }\n", board)
+    assert (0.5, "SnapStart", 1) in board.calls and result.variables == {"SnapBuf1": [7, 7, 7]}
+
+
+# ---- processes -----------------------------------------------------------------------------------------------------------
 def square(job, report):
     report(1.0)
     return job * job
@@ -143,23 +136,24 @@ def own_process(job, report):
     return os.getpid()
 
 
-class Workers(unittest.TestCase):
-    def test_results_come_in_the_order_of_the_jobs(self):
-        self.assertEqual(workers.run_all([0, 1, 2, 3], late_for_small, lambda seconds: None), [0, 1, 2, 3])
+def ignore(seconds: float) -> None:
+    """Nobody looks at the progress."""
 
-    def test_progress_of_all_processes_arrives(self):
-        seconds = []
-        workers.run_all([1, 2, 3], square, seconds.append, processes=2)
-        self.assertEqual(seconds, [1.0, 1.0, 1.0])
 
-    def test_every_job_has_a_process_of_its_own(self):
-        ids = workers.run_all([0] * 5, own_process, lambda seconds: None, processes=2)
-        self.assertEqual(len(set(ids) | {os.getpid()}), 6)
+def test_results_come_in_the_order_of_the_jobs():
+    assert workers.run_all([0, 1, 2, 3], late_for_small, ignore) == [0, 1, 2, 3]
 
-    def test_a_refusal_in_a_process_is_raised_here(self):
-        with self.assertRaisesRegex(UserError, "no such thing, job 1: think again"):
-            workers.run_all([1], refuse, lambda seconds: None)
 
-    def test_a_crash_is_one_line_and_no_endless_wait(self):
-        with self.assertRaisesRegex(UserError, "the simulation ended by itself, exit code -6"):
-            workers.run_all([1], crash, lambda seconds: None)
+def test_progress_of_all_processes_arrives():
+    seconds = []
+    workers.run_all([1, 2, 3], square, seconds.append, processes=2)
+    assert seconds == [1.0, 1.0, 1.0]
+
+
+def test_every_job_has_a_process_of_its_own():
+    assert len({os.getpid(), *workers.run_all([0] * 5, own_process, ignore, processes=2)}) == 6
+
+
+@pytest.mark.parametrize("work, line", [(refuse, "no such thing, job 1: think again"), (crash, "the simulation ended by itself, exit code -6")])
+def test_a_refusal_or_a_crash_in_a_process_is_one_line_here_and_no_endless_wait(work, line):
+    refusal(lambda: workers.run_all([1], work, ignore), line)

@@ -1,12 +1,11 @@
 """Units: every form in which a data sheet prints a number arrives at the same star phase in SI, and what is no unit is refused."""
 
 import math
-import unittest
 
-from support import document
+import pytest
+from support import document, refusal
 
 from tools.common import units
-from tools.common.errors import UserError
 
 # One motor in every form: 5 pole pairs, 7.24 V peak line to line at 1000 rpm. Worked out by hand from the note's Table 1.
 SAME_KPHI = {"V peak line-to-line/krpm": 7.24, "V rms line-to-line/krpm": 5.119453, "V dc/krpm": 6.913691, "V peak phase/krpm": 4.180016,
@@ -40,124 +39,92 @@ def sine(pole_pairs: int, psi_vs: float, peak_a: float) -> float:
     return sum(pole_pairs * psi_vs * peak_a * math.cos(2.0 * math.pi * (0.1 - number / 3.0)) ** 2 for number in range(3))
 
 
-class Impedances(unittest.TestCase):
-    def test_line_to_line_is_two_star_phases_whatever_the_connection(self):
-        for connection in ("Y", "delta"):
-            with self.subTest(connection):
-                self.assertAlmostEqual(entry(units.resistance(connection), 5.34, "ohm line-to-line").value_si, 2.67, 12)
-                self.assertAlmostEqual(entry(units.inductance(connection), 3.84, "mH line-to-line").value_si, 1.92e-3, 12)
-
-    def test_a_delta_winding_is_three_star_phases(self):
-        self.assertAlmostEqual(entry(units.resistance("delta"), 1.2, "ohm winding").value_si, 0.4, 12)
-        self.assertAlmostEqual(entry(units.inductance("delta"), 900, "uH winding").value_si, 300e-6, 12)
-
-    def test_a_star_winding_is_a_phase(self):
-        for unit in ("ohm winding", "ohm phase"):
-            self.assertEqual(entry(units.resistance("Y"), 1.2, unit).value_si, 1.2)
-
-    def test_a_delta_winding_measured_at_the_terminals_gives_the_same_as_line_to_line(self):
-        terminals = 1.2 * 2.4 / (1.2 + 2.4) # one winding parallel to the two others
-        self.assertAlmostEqual(entry(units.resistance("delta"), terminals, "ohm line-to-line").value_si,
-                               entry(units.resistance("delta"), 1.2, "ohm winding").value_si, 12)
-
-    def test_phase_of_a_delta_motor_is_ambiguous_and_refused(self):
-        for kind, unit in ((units.resistance("delta"), "ohm phase"), (units.inductance("delta"), "mH phase"),
-                           (units.kphi("delta", 4), "V peak phase/krpm")):
-            with self.subTest(unit), self.assertRaisesRegex(UserError, f"'{unit}' is no unit of x, .*line 2: use one of .*line-to-line"):
-                entry(kind, 1.0, unit)
-
-    def test_scales(self):
-        self.assertAlmostEqual(entry(units.resistance("Y"), 570, "mohm line-to-line").value_si, 0.285, 12)
-        self.assertAlmostEqual(entry(units.inductance("Y"), 400, "uH phase").value_si, 0.4e-3, 12)
-        self.assertAlmostEqual(entry(units.inductance("Y"), 0.0026, "H line-to-line").value_si, 1.3e-3, 12)
+Y, DELTA = units.kphi("Y", 5), units.kphi("delta", 5)
+R, L, R_DELTA, L_DELTA = units.resistance("Y"), units.inductance("Y"), units.resistance("delta"), units.inductance("delta")
+TERMINALS = 1.2 * 2.4 / (1.2 + 2.4) # one delta winding of 1.2 ohm parallel to the two others
 
 
-class Kphi(unittest.TestCase):
-    def test_every_form_of_the_same_motor_gives_the_same_kphi(self):
-        for unit, value in SAME_KPHI.items():
-            with self.subTest(unit):
-                self.assertAlmostEqual(entry(units.kphi("Y", 5), value, unit).value_si / 7.24, 1.0, 5)
-
-    def test_every_unit_of_kphi_is_among_the_tested_ones(self):
-        self.assertEqual(set(units.kphi("Y", 5).units), set(SAME_KPHI))
-        self.assertEqual(set(units.kphi("delta", 5).units), {unit for unit in SAME_KPHI if " phase/" not in unit})
-
-    def test_only_the_flux_linkage_depends_on_the_pole_pairs(self):
-        for unit in SAME_KPHI:
-            ratio = units.kphi("Y", 10).units[unit](1.0) / units.kphi("Y", 5).units[unit](1.0)
-            self.assertAlmostEqual(ratio, 2.0 if unit in ("V s/rad", "mV s/rad") else 1.0, 12, unit)
-
-    def read(self, value: float, unit: str) -> float:
-        kind = units.kphi("Y", 4)
-        return kind.units[unit](value)
-
-    def test_dc_torque_constant_is_that_of_a_commutated_motor(self):
-        psi_vs = 5.4e-3
-        self.assertAlmostEqual(self.read(six_step(4, psi_vs, 1.0), "N m/A dc"), self.read(psi_vs, "V s/rad"), 6)
-
-    def test_peak_torque_constant_is_that_of_sinusoidal_currents(self):
-        psi_vs = 5.4e-3
-        self.assertAlmostEqual(self.read(sine(4, psi_vs, 1.0), "N m/A peak"), self.read(psi_vs, "V s/rad"), 9)
-
-    def test_a_dc_current_and_its_peak_give_the_same_torque(self):
-        peak_a = entry(units.CURRENT, 2.3, "A dc").value_si
-        self.assertAlmostEqual(sine(4, 5.4e-3, peak_a) / six_step(4, 5.4e-3, 2.3), 1.0, 7)
-        self.assertAlmostEqual(peak_a, 2.536, 3)
-
-    def test_the_two_constants_of_a_flat_motor_s_sheet_agree(self):
-        self.assertAlmostEqual(self.read(187.0, "rpm/V") / self.read(51.0, "mN m/A dc"), 1.0, 2)
-
-    def test_the_forms_to_compare_with_are_all_the_same_constant(self):
-        text = units.kphi_forms(7.24, 5)
-        self.assertTrue(text.startswith("7.24 V peak line-to-line/krpm = 5.119 V rms line-to-line/krpm = 0.06914 V s/rad line-to-line = 0.007983 V s/rad = "))
-        for form in text.split(" = "):
-            value, _, unit = form.partition(" ")
-            self.assertAlmostEqual(units.kphi("Y", 5).units[unit](float(value)) / 7.24, 1.0, 3, form)
+EXACT = [
+    (R, 5.34, "ohm line-to-line", 2.67), (R_DELTA, 5.34, "ohm line-to-line", 2.67), # two star phases whatever the connection
+    (L, 3.84, "mH line-to-line", 1.92e-3), (L_DELTA, 3.84, "mH line-to-line", 1.92e-3),
+    (R_DELTA, 1.2, "ohm winding", 0.4), (L_DELTA, 900, "uH winding", 300e-6), (R_DELTA, TERMINALS, "ohm line-to-line", 0.4),
+    (R, 1.2, "ohm winding", 1.2), (R, 1.2, "ohm phase", 1.2), (R, 570, "mohm line-to-line", 0.285), (L, 400, "uH phase", 0.4e-3),
+    (L, 0.0026, "H line-to-line", 1.3e-3), (R, 80, "ohm line-to-line", 40.0), (R_DELTA, 0.03, "ohm winding", 0.01),
+    (units.SPEED, 100, "  rpm ", 100.0), (units.CURRENT, 1.2, "A peak", 1.2)]
+ROUNDED = [
+    (units.INERTIA, 24, "g cm2", 24e-7), (units.INERTIA, 6.8e-4, "oz in s2", 4.802e-6), (units.INERTIA, 0.055, "kg cm2", 5.5e-6),
+    (units.INERTIA, 0.0055, "g m2", 5.5e-6), (units.TORQUE, 62.5, "mN m", 0.0625), (units.TORQUE, 6.25, "N cm", 0.0625),
+    (units.TORQUE, 17.7, "oz in", 0.12499), (units.VISCOUS, 15.3, "uN m s", 15.3e-6), (units.VISCOUS, 1.602, "mN m/krpm", 15.298e-6),
+    (units.VISCOUS, 1e-3, "N m/krpm", 9.5493e-6), (units.CURRENT, 1.2, "A rms", 1.69706),
+    (units.SPEED, 314.159, "rad/s", 3000.0), (units.KPHI_TEMPCO, -1100, "ppm/K", -0.0011),
+    (units.RESISTANCE_TEMPCO, 0.39, "%/K", 0.0039)]
 
 
-class Others(unittest.TestCase):
-    def test_scales(self):
-        for kind, value, unit, si in ((units.INERTIA, 24, "g cm2", 24e-7), (units.INERTIA, 6.8e-4, "oz in s2", 4.802e-6),
-                                      (units.INERTIA, 0.055, "kg cm2", 5.5e-6), (units.INERTIA, 0.0055, "g m2", 5.5e-6),
-                                      (units.TORQUE, 62.5, "mN m", 0.0625), (units.TORQUE, 6.25, "N cm", 0.0625),
-                                      (units.TORQUE, 17.7, "oz in", 0.12499), (units.VISCOUS, 15.3, "uN m s", 15.3e-6),
-                                      (units.VISCOUS, 1.602, "mN m/krpm", 15.298e-6), (units.VISCOUS, 1e-3, "N m/krpm", 9.5493e-6),
-                                      (units.CURRENT, 1.2, "A rms", 1.69706), (units.CURRENT, 1.2, "A peak", 1.2),
-                                      (units.SPEED, 314.159, "rad/s", 3000.0), (units.KPHI_TEMPCO, -1100, "ppm/K", -0.0011),
-                                      (units.RESISTANCE_TEMPCO, 0.39, "%/K", 0.0039)):
-            with self.subTest(unit):
-                self.assertAlmostEqual(entry(kind, value, unit).value_si / si, 1.0, 4)
+@pytest.mark.parametrize("kind, value, unit, si, within", [*((*row, 1e-12) for row in EXACT), *((*row, 5e-5) for row in ROUNDED)])
+def test_a_number_becomes_si(kind, value, unit, si, within):
+    assert entry(kind, value, unit).value_si == pytest.approx(si, rel=within)
 
-    def test_blanks_in_a_unit_do_not_matter(self):
-        self.assertEqual(entry(units.SPEED, 100, "  rpm ").value_si, 100.0)
 
-    def test_a_quantity_remembers_what_was_written_where_and_if_it_was_checked(self):
-        quantity = entry(units.INERTIA, 24, "g cm2", "source = \"a sheet [?]\"")
-        self.assertEqual((quantity.given, quantity.source, quantity.si_unit), ("24 g cm2", "a sheet [?]", "kg m2"))
-        self.assertTrue(quantity.where.endswith("line 2"))
-        self.assertTrue(quantity.unchecked)
-        self.assertFalse(entry(units.INERTIA, 24, "g cm2").unchecked)
+@pytest.mark.parametrize("kind, value, unit, parts", [
+    # of a delta motor some sheets mean the winding by "phase", some the star phase
+    *((kind, 1.0, unit, [f"'{unit}' is no unit of x, ", "line 2: use one of ", "line-to-line"]) for kind, unit in (
+        (R_DELTA, "ohm phase"), (L_DELTA, "mH phase"), (DELTA, "V peak phase/krpm"))),
+    (units.TORQUE, 1, "N", ["'N' is no unit of x, ", "line 2: use one of N m, mN m, N cm, oz in"]),
+    (Y, 1, "V rms dc/krpm", ["'V rms dc/krpm' is no unit of x"]),
+    *((kind, 1, unit, [f"'{unit}' does not say which x, ", f"line 2: write {wanted}"]) for kind, unit, wanted in (
+        (Y, "N m/A", "N m/A peak or N m/A rms or N m/A dc"), (Y, "V rms/krpm", "V rms line-to-line/krpm or V rms phase/krpm"),
+        (DELTA, "V line-to-line/krpm", "V peak line-to-line/krpm or V rms line-to-line/krpm"),
+        (units.CURRENT, "A", "A peak or A rms or A dc"))),
+    (R, 5.34e6, "ohm line-to-line", ["'x' = 5.34e+06 ohm line-to-line is impossible, ", "line 2: choose 0.02 .. 80 ohm line-to-line"]),
+    (Y, 0, "rpm/V", ["'x' = 0 rpm/V is impossible, ", ": choose 5.23599 .. 5235.99 rpm/V"])])
+def test_what_is_no_unit_or_impossible_in_it_is_refused(kind, value, unit, parts):
+    line = refusal(lambda: entry(kind, value, unit), *parts)
+    assert line.endswith(parts[-1]) or "use one of" in line or len(parts) == 1
 
-    def test_an_unknown_unit_gets_the_list_of_known_ones(self):
-        with self.assertRaisesRegex(UserError, "'N' is no unit of x, .*line 2: use one of N m, mN m, N cm, oz in"):
-            entry(units.TORQUE, 1, "N")
 
-    def test_a_unit_that_does_not_say_of_which_asks_for_it(self):
-        for kind, unit, wanted in ((units.kphi("Y", 5), "N m/A", "N m/A peak or N m/A rms or N m/A dc"),
-                                   (units.kphi("Y", 5), "V rms/krpm", "V rms line-to-line/krpm or V rms phase/krpm"),
-                                   (units.kphi("delta", 5), "V line-to-line/krpm", "V peak line-to-line/krpm or V rms line-to-line/krpm"),
-                                   (units.CURRENT, "A", "A peak or A rms or A dc")):
-            with self.subTest(unit), self.assertRaisesRegex(UserError, f"'{unit}' does not say which x, .*line 2: write {wanted}$"):
-                entry(kind, 1, unit)
-        with self.assertRaisesRegex(UserError, "'V rms dc/krpm' is no unit of x"):
-            entry(units.kphi("Y", 5), 1, "V rms dc/krpm")
+def test_a_quantity_remembers_what_was_written_where_and_if_it_was_checked():
+    quantity = entry(units.INERTIA, 24, "g cm2", "source = \"a sheet [?]\"")
+    assert (quantity.given, quantity.source, quantity.si_unit, quantity.unchecked) == ("24 g cm2", "a sheet [?]", "kg m2", True)
+    assert quantity.where.endswith("line 2") and not entry(units.INERTIA, 24, "g cm2").unchecked
 
-    def test_limits_are_told_in_the_unit_that_was_written(self):
-        with self.assertRaisesRegex(UserError, "'x' = 5.34e\\+06 ohm line-to-line is impossible, .*line 2: choose 0.02 .. 80 ohm line-to-line"):
-            entry(units.resistance("Y"), 5.34e6, "ohm line-to-line")
-        with self.assertRaisesRegex(UserError, "'x' = 0 rpm/V is impossible, .*: choose 5.23599 .. 5235.99 rpm/V"):
-            entry(units.kphi("Y", 5), 0, "rpm/V")
 
-    def test_the_limits_themselves_are_allowed(self):
-        self.assertAlmostEqual(entry(units.resistance("Y"), 80, "ohm line-to-line").value_si, 40.0)
-        self.assertAlmostEqual(entry(units.resistance("delta"), 0.03, "ohm winding").value_si, 0.01)
+# ---- the motor constant --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("unit, value", SAME_KPHI.items())
+def test_every_form_of_the_same_motor_gives_the_same_kphi(unit, value):
+    assert entry(Y, value, unit).value_si == pytest.approx(7.24, rel=5e-6)
+    only_flux = 2.0 if unit in ("V s/rad", "mV s/rad") else 1.0 # depends on the pole pairs
+    assert units.kphi("Y", 10).units[unit](1.0) / Y.units[unit](1.0) == pytest.approx(only_flux)
+
+
+def test_every_unit_of_kphi_is_among_the_tested_ones():
+    assert set(Y.units) == set(SAME_KPHI)
+    assert set(DELTA.units) == {unit for unit in SAME_KPHI if " phase/" not in unit}
+
+
+def kphi(value: float, unit: str) -> float:
+    """Of a motor with four pole pairs."""
+    return units.kphi("Y", 4).units[unit](value)
+
+
+def test_torque_constants_are_those_of_a_commutated_motor_and_of_sinusoidal_currents():
+    assert kphi(six_step(4, 5.4e-3, 1.0), "N m/A dc") == pytest.approx(kphi(5.4e-3, "V s/rad"), abs=5e-7)
+    assert kphi(sine(4, 5.4e-3, 1.0), "N m/A peak") == pytest.approx(kphi(5.4e-3, "V s/rad"), abs=5e-10)
+
+
+def test_a_dc_current_and_its_peak_give_the_same_torque():
+    peak_a = entry(units.CURRENT, 2.3, "A dc").value_si
+    assert sine(4, 5.4e-3, peak_a) / six_step(4, 5.4e-3, 2.3) == pytest.approx(1.0, abs=5e-8)
+    assert peak_a == pytest.approx(2.536, abs=5e-4)
+
+
+def test_the_two_constants_of_a_flat_motor_s_sheet_agree():
+    assert kphi(187.0, "rpm/V") / kphi(51.0, "mN m/A dc") == pytest.approx(1.0, abs=5e-3)
+
+
+def test_the_forms_to_compare_with_are_all_the_same_constant():
+    text = units.kphi_forms(7.24, 5)
+    assert text.startswith("7.24 V peak line-to-line/krpm = 5.119 V rms line-to-line/krpm = "
+                           "0.06914 V s/rad line-to-line = 0.007983 V s/rad = ")
+    for form in text.split(" = "):
+        value, _, unit = form.partition(" ")
+        assert Y.units[unit](float(value)) == pytest.approx(7.24, rel=5e-4), form

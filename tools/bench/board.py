@@ -38,7 +38,7 @@ class Library:
         board, text, number = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double
         out = ctypes.POINTER
         size = out(ctypes.c_size_t)
-        for name, result, arguments in (
+        self.declare(
                 ("vb_create", board, []), ("vb_destroy", None, [board]), ("vb_set", ctypes.c_int, [board, text, number]),
                 ("vb_get", ctypes.c_int, [board, text, out(number)]), ("vb_error", text, [board]),
                 ("vb_key_info", out(_KeyInfo), [ctypes.c_uint]), ("vb_power_up", ctypes.c_int, [board]),
@@ -46,7 +46,11 @@ class Library:
                 ("vb_trace_data", out(ctypes.c_float), [board, size, size]), ("vb_trace_clear", None, [board]),
                 ("vb_warning_count", ctypes.c_uint, [board]), ("vb_warning", text, [board, ctypes.c_uint]),
                 ("vb_param", ctypes.c_int, [ctypes.c_uint, out(text), out(number), out(text)]),
-                ("vb_fault_name", text, [ctypes.c_int]), ("vb_state_name", text, [ctypes.c_int])):
+                ("vb_fault_name", text, [ctypes.c_int]), ("vb_state_name", text, [ctypes.c_int]))
+
+    def declare(self, *rows: tuple[str, Any, list[Any]]) -> None:
+        """Functions of the library: name, what it returns, what it takes."""
+        for name, result, arguments in rows:
             function = getattr(self.c, name)
             function.restype, function.argtypes = result, arguments
 
@@ -82,6 +86,8 @@ class Library:
 
 class Board:
     """A virtual board with the firmware in it. The firmware is one set of globals: make one Board per process."""
+
+    FIXED_IN = "this firmware: build it with PARAMS_IN_RAM; only the field-weakening tables can"
 
     def __init__(self, library: Library) -> None:
         self.library = library
@@ -139,23 +145,25 @@ class Board:
         """`count` 16-bit elements of a firmware variable, as a debugger would read them."""
         return list(self._variable(name, count))
 
-    def _parameter(self, function: str, name: str, *rest: Any) -> None:
-        call = getattr(self._c, function, None)
-        result = call(name.encode(), *rest) if call is not None else -1
+    def _probe(self, action: str, name: str, value: Any) -> int:
+        call = getattr(self._c, f"probe_param_{action}", None)
+        return call(name.encode(), value) if call is not None else -1
+
+    def _parameter(self, action: str, name: str, value: ctypes.c_double) -> float:
+        result = self._probe(action, name, ctypes.byref(value) if action == "get" else value)
         if result == -2:
-            raise BoardError(f"{name} = {rest[0].value:g} is outside its range in userparams.h")
+            raise BoardError(f"{name} = {value.value:g} is outside its range in userparams.h")
         if result != 0:
-            raise BoardError(f"{name} cannot change in this firmware: build it with PARAMS_IN_RAM; only the field-weakening tables can")
+            raise BoardError(f"{name} cannot change in {self.FIXED_IN}")
+        return value.value
 
     def parameter(self, name: str) -> float:
         """A parameter of userparams.h as the running firmware has it now; needs PARAMS_IN_RAM."""
-        value = ctypes.c_double()
-        self._parameter("probe_param_get", name, ctypes.byref(value))
-        return value.value
+        return self._parameter("get", name, ctypes.c_double())
 
     def write_parameter(self, name: str, value: float) -> None:
         """Change a field-weakening parameter of userparams.h while the motor turns; needs PARAMS_IN_RAM."""
-        self._parameter("probe_param_set", name, ctypes.c_double(value))
+        self._parameter("set", name, ctypes.c_double(value))
 
     def write_variable(self, name: str, value: int) -> None:
         """Write a 16-bit firmware variable, as a debugger would."""

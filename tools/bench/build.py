@@ -44,6 +44,17 @@ def library(defines: list[str], userparams: Path | None = None, target: str = "v
     """Builds build/host[-variant]/libvboard.so if needed and returns its path. `userparams`: folder of the header, None for the root's.
     `target`: what make shall make, if there is to be more in that folder."""
     variant = variant_name(defines, userparams)
+    folder = f"host-{variant}" if variant else "host"
+    with _one_at_a_time(folder):
+        result = make(target, defines, userparams)
+    if result.returncode != 0:
+        raise UserError("the firmware does not build", _what(variant, result.args, userparams), _reason(result.stderr))
+    return paths.ROOT / "build" / folder / "libvboard.so"
+
+
+def make(target: str, defines: list[str], userparams: Path | None) -> subprocess.CompletedProcess:
+    """What make says when it makes the target in the folder of these settings."""
+    variant = variant_name(defines, userparams)
     command = ["make", "-s", "-C", str(paths.ROOT), target]
     if variant:
         command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines)]
@@ -51,13 +62,10 @@ def library(defines: list[str], userparams: Path | None = None, target: str = "v
         command.append(f"USERPARAMS={paths.shown(userparams)}")
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     try:
-        with _one_at_a_time(f"host-{variant}" if variant else "host"):
-            result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+                              check=False)
     except OSError as error:
         raise UserError("cannot run make", "", error.strerror or str(error)) from None
-    if result.returncode != 0:
-        raise UserError("the firmware does not build", _what(variant, command, userparams), _reason(result.stderr))
-    return paths.ROOT / "build" / (f"host-{variant}" if variant else "host") / "libvboard.so"
 
 
 @contextlib.contextmanager

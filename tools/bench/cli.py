@@ -67,9 +67,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace) -> int:
     item = scenario_file.load(options.scenario)
-    motor, board = command_common.parts_of(item, options)
-    library = command_common.library_for(item.defines, options.library, options.userparams)
-    used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
+    motor, board, library, used = command_common.set_up(item, options, item.defines, options.userparams)
     job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
     target = options.out or paths.RESULTS / item.name
     with output.ResultFolder(target) as folder:

@@ -48,6 +48,14 @@ def tuned_header(motor: Path) -> Path:
     return folder
 
 
+def set_up(item: Any, options: argparse.Namespace, defines: list[str], userparams: str | Path | None) \
+        -> tuple[board_keys.Part, board_keys.Part, Library, dict[str, Any]]:
+    """Motor and board, the firmware, and what the report tells of them (used())."""
+    motor, board = parts_of(item, options)
+    library = library_for(defines, options.library, userparams)
+    return motor, board, library, used(motor, library, header_name(options.library, userparams))
+
+
 def used(motor: board_keys.Part, library: Library, header: str) -> dict[str, Any]:
     """Which motor and which header a run used, for the report; "note" says if they are not for the same motor."""
     return {"motor": str(paths.shown(motor.path)), "motor_title": motor.title, "header": header,

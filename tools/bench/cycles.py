@@ -98,8 +98,7 @@ def classes(state: np.ndarray, states: dict[int, str], reference_rpm: np.ndarray
 def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> Found:
     """One scenario on the image, counted by address and interrupt by interrupt; in a process of its own."""
     library = pil.PilLibrary(job.library)
-    board = pil.PilBoard(library, image)
-    try:
+    with simulate.using(pil.PilBoard(library, image), job) as board:
         core = _Core(board)
         run = simulate.simulate_on(job, library, board, progress)
         trace = run.trace
@@ -114,10 +113,6 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
                      int(board.get("pil.differences")),
                      int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, board.peek(P1SECMP) & 0x7FFF,
                      run.motor_s, run.cpu_s, board.get("cpu.instructions"))
-    except pil.BoardError as error:
-        raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
-    finally:
-        board.close()
 
 
 def merged(found: list[Found]) -> Found:
@@ -156,8 +151,7 @@ class _Assumption(ctypes.Structure):
 def assumptions(library: pil.PilLibrary) -> list[list[str]]:
     """The simulator's table of what is assumed about the chip: name, value, meaning, where it is used."""
     rows, row = [], _Assumption()
-    library.c.iss_assumption.argtypes = [ctypes.c_size_t, ctypes.POINTER(_Assumption)]
-    library.c.iss_assumption.restype = ctypes.c_bool
+    library.declare(("iss_assumption", ctypes.c_bool, [ctypes.c_size_t, ctypes.POINTER(_Assumption)]))
     while library.c.iss_assumption(len(rows), ctypes.byref(row)):
         rows.append([row.id.decode(), str(row.value), row.meaning.decode(), row.used_in.decode()])
     return rows
@@ -170,12 +164,10 @@ class _Core:
 
     def __init__(self, board: pil.PilBoard) -> None:
         c = board.library.c
-        for name, result, arguments in (("vb_iss_core", ctypes.c_void_p, [ctypes.c_void_p]),
-                                        ("iss_profile", ctypes.c_bool, [ctypes.c_void_p, ctypes.c_bool]),
-                                        ("iss_profile_counts", ctypes.POINTER(ctypes.c_uint32), [ctypes.c_void_p]),
-                                        ("iss_profile_cycles", ctypes.POINTER(ctypes.c_uint64), [ctypes.c_void_p])):
-            function = getattr(c, name)
-            function.restype, function.argtypes = result, arguments
+        board.library.declare(("vb_iss_core", ctypes.c_void_p, [ctypes.c_void_p]),
+                              ("iss_profile", ctypes.c_bool, [ctypes.c_void_p, ctypes.c_bool]),
+                              ("iss_profile_counts", ctypes.POINTER(ctypes.c_uint32), [ctypes.c_void_p]),
+                              ("iss_profile_cycles", ctypes.POINTER(ctypes.c_uint64), [ctypes.c_void_p]))
         self._c, self._core = c, c.vb_iss_core(board._vb) # pylint: disable=protected-access
         if not c.iss_profile(self._core, True):
             raise UserError("no memory for the profile", "make cycles", "free some")

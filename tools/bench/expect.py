@@ -2,7 +2,8 @@
 
     kind = "measure"       measure = "1000 rpm" or ["1000 rpm", "2500 rpm"], value = "speed_error_percent", min and/or max
                            (values: metrics.MEASURE_VALUES)
-    kind = "hand_over"     within_s of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
+    kind = "speed"         measure (all with a reference if not given): its true mean speed holds the reference to percent = 0.5
+    kind = "hand_over"     within_s = 2.0 of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
     kind = "outputs_off"   from_s, to_s
     kind = "bus_voltage"   min and/or max, from_s, to_s; percent = true: in % of NOMINAL_BUS_V
@@ -12,6 +13,7 @@
                            from_cause = true), kept_to_s, cleared_from_s
     kind = "no_fault"      from_s, to_s
     kind = "no_warnings"   the virtual board found nothing wrong with the configuration
+    kind = "clean"         no fault and no warnings, from power-up to the end
     kind = "variable"      name, count, statistic = min max mean span distinct, min and/or max: a firmware variable at the end
 """
 
@@ -69,11 +71,11 @@ def _number(value: float | None) -> str:
 
 
 class Expectation:
-    """Base of the kinds: read() takes a section (measures: see read_expectation), check() a finished run."""
+    """Base of the kinds: read() takes a section (measures: see read_expectations), check() a finished run."""
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "Expectation":
-        raise NotImplementedError
+        return cls()
 
     def check(self, run: Run) -> list[Outcome]:
         raise NotImplementedError
@@ -115,11 +117,15 @@ class MeasureExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
-        names, value = section.choices("measure", sorted(measures)), section.choice("value", tuple(MEASURE_VALUES))
+        speed = section.data["kind"] == "speed"
+        referred = [name for name, has_reference in measures.items() if has_reference]
+        names = referred if speed and referred and "measure" not in section else section.choices("measure", sorted(measures))
+        value = "speed_error_percent" if speed else section.choice("value", tuple(MEASURE_VALUES))
         for name in names:
             if value == "speed_error_percent" and not measures[name]:
-                raise section.fail("value", f"'{name}' has no speed error", "add reference_rpm to the measure")
-        return cls(names, value, Bounds.read(section))
+                raise section.fail("kind" if speed else "value", f"'{name}' has no speed error", "add reference_rpm to the measure")
+        percent = section.number("percent", 0.5, 0.0) if speed else 0.0
+        return cls(names, value, Bounds(-percent, percent) if speed else Bounds.read(section))
 
     def reads_firmware(self) -> bool:
         return self.value in MEASURED_BY_FIRMWARE
@@ -138,7 +144,7 @@ class HandOverExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "HandOverExpectation":
-        return cls(section.integer("press", 1, 1), section.number("within_s", REQUIRED, 0.0),
+        return cls(section.integer("press", 1, 1), section.number("within_s", 2.0, 0.0),
                    section.number("overshoot_percent", None, 0.0), section.flag("no_reverse_motion", False))
 
     def reads_firmware(self) -> bool:
@@ -204,14 +210,18 @@ class StopExpectation(Expectation):
 
 
 @dataclass(frozen=True)
-class OutputsOffExpectation(Expectation):
+class WindowExpectation(Expectation):
+    """Base of those that have nothing but their time."""
+
     from_s: float
     to_s: float
 
     @classmethod
-    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "OutputsOffExpectation":
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "WindowExpectation":
         return cls(*_window(section, duration_s))
 
+
+class OutputsOffExpectation(WindowExpectation):
     def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.from_s, self.to_s)
         on = np.flatnonzero(part.column("pwm.outputs_seen"))
@@ -360,15 +370,7 @@ class FaultExpectation(Expectation):
         return Outcome(row, got == name, got, name)
 
 
-@dataclass(frozen=True)
-class NoFaultExpectation(Expectation):
-    from_s: float
-    to_s: float
-
-    @classmethod
-    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoFaultExpectation":
-        return cls(*_window(section, duration_s))
-
+class NoFaultExpectation(WindowExpectation):
     def reads_firmware(self) -> bool:
         return True
 
@@ -379,12 +381,7 @@ class NoFaultExpectation(Expectation):
         return [Outcome(f"no fault {_window_text(self.from_s, self.to_s)}", not raised and len(part) > 0, got, "none")]
 
 
-@dataclass(frozen=True)
 class NoWarningsExpectation(Expectation):
-    @classmethod
-    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "NoWarningsExpectation":
-        return cls()
-
     def check(self, run: Run) -> list[Outcome]:
         return [Outcome("no warnings of the board", not run.warnings, run.warnings[0] if run.warnings else "none", "none")]
 
@@ -409,14 +406,16 @@ class VariableExpectation(Expectation):
         return {self.name: self.count}
 
 
-KINDS: dict[str, type[Expectation]] = {
-    "measure": MeasureExpectation, "hand_over": HandOverExpectation, "stop": StopExpectation, "outputs_off": OutputsOffExpectation,
-    "bus_voltage": BusVoltageExpectation, "signal": SignalExpectation, "state": StateExpectation, "fault": FaultExpectation,
-    "no_fault": NoFaultExpectation, "no_warnings": NoWarningsExpectation, "variable": VariableExpectation}
+KINDS: dict[str, tuple[type[Expectation], ...]] = {
+    "measure": (MeasureExpectation,), "speed": (MeasureExpectation,), "hand_over": (HandOverExpectation,), "stop": (StopExpectation,),
+    "outputs_off": (OutputsOffExpectation,), "bus_voltage": (BusVoltageExpectation,), "signal": (SignalExpectation,),
+    "state": (StateExpectation,), "fault": (FaultExpectation,), "no_fault": (NoFaultExpectation,), "no_warnings": (NoWarningsExpectation,),
+    "clean": (NoFaultExpectation, NoWarningsExpectation), "variable": (VariableExpectation,)}
 
 
-def read_expectation(section: Section, measures: dict[str, bool], duration_s: float) -> Expectation:
-    """One [[expect]] table. `measures` holds the known measures' names, and whether they have a reference speed."""
-    expectation = KINDS[section.choice("kind", tuple(KINDS))].read(section, measures, duration_s)
+def read_expectations(section: Section, measures: dict[str, bool], duration_s: float) -> list[Expectation]:
+    """What one [[expect]] table asks for. `measures` holds the known measures' names, and whether they have a reference speed."""
+    kinds = KINDS[section.choice("kind", tuple(KINDS))]
+    found = [kind.read(section, measures, duration_s) for kind in kinds]
     section.close()
-    return expectation
+    return found

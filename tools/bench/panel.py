@@ -15,7 +15,7 @@ RAMP_STEP_S = 0.002
 DEBOUNCE_S = 0.03
 """The firmware acts on a button when it has been down that long."""
 HOLD_S = 0.1
-"""How long the operator holds S3 down."""
+"""How long the operator holds a button down."""
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,15 @@
 """The virtual board around an image of the target (processor in the loop): libpil.so through ctypes, and runs of scenarios on it."""
 
+import contextlib
 import ctypes
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from . import build, simulate
-from .board import Board, BoardError, Library
+from .board import Board, Library
 from tools.common.errors import UserError
 from tools.image import load
 from .run import Run
@@ -24,7 +26,7 @@ class PilLibrary(Library):
         super()._declare()
         board, text, out = ctypes.c_void_p, ctypes.c_char_p, ctypes.POINTER
         words, number = out(ctypes.c_int16), out(ctypes.c_double)
-        for name, result, arguments in (
+        self.declare(
                 ("vb_create_iss", board, [text, text, ctypes.c_size_t]), ("vb_iss_has_names", ctypes.c_int, [board]),
                 ("vb_iss_difference", text, [board]),
                 ("vb_iss_lock_step", None, [board, ctypes.c_int]), ("vb_iss_peek", ctypes.c_int, [board, ctypes.c_uint]),
@@ -33,9 +35,7 @@ class PilLibrary(Library):
                 ("vb_iss_param_get", ctypes.c_int, [board, text, number]), ("vb_iss_param_set", ctypes.c_int, [board, text, ctypes.c_double]),
                 ("vb_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]),
                 ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]),
-                ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t])):
-            function = getattr(self.c, name)
-            function.restype, function.argtypes = result, arguments
+                ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t]))
 
 
 def library(defines: list[str], userparams: Path | None = None) -> PilLibrary:
@@ -45,6 +45,8 @@ def library(defines: list[str], userparams: Path | None = None) -> PilLibrary:
 
 class PilBoard(Board):
     """A virtual board with an image of the target in its CPU. The comparison's other half is one set of globals: one a process."""
+
+    FIXED_IN = "this image: build it with PARAMS_IN_RAM"
 
     def __init__(self, pil: PilLibrary, image: Path) -> None: # pylint: disable=super-init-not-called
         self.library = pil
@@ -94,18 +96,8 @@ class PilBoard(Board):
     def write_variable(self, name: str, value: int) -> None:
         self._check(self._c.vb_iss_write(self._vb, name.encode(), (ctypes.c_int16 * 1)(value), 1))
 
-    def parameter(self, name: str) -> float:
-        value = ctypes.c_double()
-        if self._c.vb_iss_param_get(self._vb, name.encode(), ctypes.byref(value)) != 0:
-            raise BoardError(f"{name} cannot change in this image: build it with PARAMS_IN_RAM")
-        return value.value
-
-    def write_parameter(self, name: str, value: float) -> None:
-        result = self._c.vb_iss_param_set(self._vb, name.encode(), value)
-        if result == -2:
-            raise BoardError(f"{name} = {value:g} is outside its range in userparams.h")
-        if result != 0:
-            raise BoardError(f"{name} cannot change in this image: build it with PARAMS_IN_RAM")
+    def _probe(self, action: str, name: str, value: Any) -> int:
+        return getattr(self._c, f"vb_iss_param_{action}")(self._vb, name.encode(), value)
 
 
 @dataclass(frozen=True)
@@ -143,11 +135,8 @@ class PilRun:
 
 def check_image(pil: PilLibrary, image: Path) -> bool:
     """Whether the image has names; a damaged or foreign one is a UserError before anything else looks at it."""
-    board = PilBoard(pil, image)
-    try:
+    with contextlib.closing(PilBoard(pil, image)) as board:
         return board.has_names
-    finally:
-        board.close()
 
 
 def without_names(job: simulate.Job) -> simulate.Job:
@@ -158,13 +147,8 @@ def without_names(job: simulate.Job) -> simulate.Job:
 def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilRun:
     """Run a job, prepared with a library() of the same defines, on an image; one a process."""
     pil = PilLibrary(job.library)
-    board = PilBoard(pil, image)
-    try:
+    with simulate.using(PilBoard(pil, image), job) as board:
         result = simulate.simulate_on(job if board.has_names else without_names(job), pil, board, report)
         cycles = Cycles(**{name: board.get(f"cpu.{name}") for name in Cycles.__dataclass_fields__})
         return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference(),
                       board.has_names, board.uart_take())
-    except BoardError as error:
-        raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
-    finally:
-        board.close()

@@ -5,8 +5,6 @@
 
 import argparse
 import functools
-import os
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -28,20 +26,13 @@ def image_for(defines: list[str], userparams: Path | None, given: Path | None) -
         if not given.is_file():
             raise UserError(f"no image '{given}'", "--image", "build one with make firmware, or name a file that is there")
         return given
-    variant = build.variant_name(defines, userparams)
-    command = ["make", "-s", "-C", str(paths.ROOT), "target-elf"]
-    if variant:
-        command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines)]
-    if userparams is not None:
-        command.append(f"USERPARAMS={paths.shown(userparams)}")
-    environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
+    done = build.make("target-elf", defines, userparams)
     if done.returncode != 0:
         lines = [line for line in done.stderr.splitlines() if line.strip()]
         told = next((line for line in lines if line.startswith("foc33: ")), None)
         if told is not None:
             raise UserError(told.removeprefix("foc33: "))
-        raise UserError("the target image does not build", " ".join(command[4:]), (lines or ["run make firmware to see why"])[0])
+        raise UserError("the target image does not build", " ".join(done.args[4:]), (lines or ["run make firmware to see why"])[0])
     return paths.ROOT / done.stdout.split()[-1]
 
 

@@ -40,6 +40,10 @@ def write_all(run: Run, folder: Path) -> list[str]:
 def _write(folder: Path, name: str, run: Run, thin: Trace, draw: Callable) -> str:
     figure, axes = plt.subplots(layout="constrained")
     draw(run, thin, axes)
+    return _saved(figure, folder, name)
+
+
+def _saved(figure: plt.Figure, folder: Path, name: str) -> str:
     figure.savefig(folder / f"{name}.png")
     plt.close(figure)
     return f"{name}.png"
@@ -152,9 +156,7 @@ def write_table2(rows: list[dict], folder: Path) -> list[str]:
         axes.plot(reference, [row[note] for row in rows], "s--", color="tab:grey", label="note")
         axes.plot(reference, [row[ours] for row in rows], "o-", color="tab:blue", label="foc33")
         _finish(axes, f"Table 2: {title}", label, "reference speed [rpm]")
-    figure.savefig(folder / "table2.png")
-    plt.close(figure)
-    return ["table2.png"]
+    return [_saved(figure, folder, "table2")]
 
 
 def write_starts(rows: list[dict], folder: Path) -> list[str]:
@@ -165,9 +167,7 @@ def write_starts(rows: list[dict], folder: Path) -> list[str]:
         axes.plot([x for x, _ in points], [np.nan if y is None else y for _, y in points], "o-", label=f"{load:g} N m")
     _finish(axes, "starts: time from S2 to closed loop", "time [s]", "electrical angle of the rotor at power-up [deg]")
     axes.set_ylim(bottom=0)
-    figure.savefig(folder / "starts.png")
-    plt.close(figure)
-    return ["starts.png"]
+    return [_saved(figure, folder, "starts")]
 
 
 def write_rated(rows: list[dict], limits: dict, folder: Path) -> list[str]:
@@ -191,9 +191,7 @@ def write_rated(rows: list[dict], limits: dict, folder: Path) -> list[str]:
     panels[0].set(yticks=range(len(motors)), yticklabels=motors, ylim=(len(motors) - 0.5, -0.5))
     figure.suptitle("speeds in per cent of rated, under load; maximum speed without load; dashed: allowed", fontsize=11)
     panels[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
-    figure.savefig(folder / "rated.png")
-    plt.close(figure)
-    return ["rated.png"]
+    return [_saved(figure, folder, "rated")]
 
 
 def write_robust(margins: list[dict], runs: list[dict], promised: dict[str, float], law: Callable, folder: Path) -> list[str]:
@@ -225,9 +223,7 @@ def _margins(margins: list[dict], promised: dict[str, float], folder: Path) -> s
     axes.set(title="how far the motor may be off (arrow: the search ended there)", xlabel="true value / the header's",
              yticks=range(len(promised)), yticklabels=list(promised), ylim=(len(promised) - 0.5, -0.5))
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(folder / "margins.png")
-    plt.close(figure)
-    return "margins.png"
+    return _saved(figure, folder, "margins")
 
 
 def _angle_over_factor(runs: list[dict], law: Callable, folder: Path) -> str:
@@ -249,6 +245,4 @@ def _angle_over_factor(runs: list[dict], law: Callable, folder: Path) -> str:
         axes.set_xticks([0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0], ["0.3", "0.5", "0.7", "1", "1.5", "2", "3"])
         axes.minorticks_off()
         _finish(axes, name, "estimated less true angle [deg]" if name == names[0] else "", "true value / the header's")
-    figure.savefig(folder / "angle_error.png")
-    plt.close(figure)
-    return "angle_error.png"
+    return _saved(figure, folder, "angle_error")

@@ -196,11 +196,9 @@ def text(table: Table, candidates: list[Candidate], rows: list[dict[str, Any]]) 
 
 def _write(folder: Path, table: Table, candidates: list[Candidate], rows: list[dict[str, Any]], outcomes: list[Outcome],
            board: board_keys.Part) -> None:
-    output.write_csv(folder / "rated.csv", list(KEYS), [[row[key] for key in KEYS] for row in rows])
     from . import plots
     motors = [command_common.used(item.part, item.library, item.header) | {"name": item.motor.name, "rated_speed_rpm": item.motor.rated_speed_rpm,
                                                                    "rated_torque_nm": item.motor.rated_torque_nm} for item in candidates]
-    data = {"title": table.title, "board": str(paths.shown(board.path)), "passed": all(outcome.ok for outcome in outcomes),
-            "motors": motors, "rows": rows, "expectations": [vars(outcome) for outcome in outcomes],
-            "plots": plots.write_rated(rows, vars(table), folder)}
-    output.write_summary(folder, report.clean(data))
+    report.write_table(folder, "rated", KEYS, rows, outcomes,
+                       {"title": table.title, "board": str(paths.shown(board.path)), "motors": motors},
+                       {"plots": plots.write_rated(rows, vars(table), folder)})

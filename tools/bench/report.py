@@ -1,8 +1,11 @@
 """What a run leaves for people and programs: the summary as data (summary.json) and as text (table, protocol, expectations)."""
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+from tools.common import output
 from .expect import Outcome
 from .run import Run
 
@@ -45,6 +48,15 @@ def clean(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def write_table(folder: Path, name: str, keys: Sequence[str], rows: list[dict[str, Any]], outcomes: list[Outcome], head: dict[str, Any],
+                more: dict[str, Any]) -> None:
+    """What a table of many runs leaves: NAME.csv with the keys of each row, and all of it in the summary."""
+    output.write_csv(folder / f"{name}.csv", list(keys), [[row[key] for key in keys] for row in rows])
+    data = {**head, "passed": all(outcome.ok for outcome in outcomes), "rows": rows,
+            "expectations": [vars(outcome) for outcome in outcomes], **more}
+    output.write_summary(folder, clean(data))
 
 
 def protocol(run: Run) -> list[tuple[float, str]]:

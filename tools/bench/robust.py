@@ -283,13 +283,11 @@ def deviation_of(parameter: str, factor: float) -> Deviation:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(paths.TABLES / "robust.toml")
-    part, board = command_common.parts_of(table, options)
     userparams = options.userparams
     if userparams is None and options.library is None and options.motor:
-        userparams = command_common.tuned_header(part.path)
-    library = command_common.library_for([], options.library, userparams)
+        userparams = command_common.tuned_header(motor_file.part(options.motor, "--motor").path)
+    part, board, library, used = command_common.set_up(table, options, [], userparams)
     bench = Bench(table, motor_file.load(str(part.path)), part, board, library)
-    used = command_common.used(part, library, command_common.header_name(options.library, userparams))
     target = options.out or paths.RESULTS / "robust"
     with output.ResultFolder(target) as folder:
         cases = [(deviation, loaded) for loaded in (False, True) for deviation in deviations(table)]
@@ -340,15 +338,13 @@ def margins_text(table: Table, margins: Margins) -> str:
 
 def _write(folder: Path, bench: Bench, rows: list[dict[str, Any]], margins: Margins | None, outcomes: list[Outcome],
            used: dict[str, Any]) -> None:
-    output.write_csv(folder / "robust.csv", list(KEYS), [[row[key] for key in KEYS] for row in rows])
-    data = {"title": bench.table.title, **used, "board": str(paths.shown(bench.board.path)), "speed_rpm": bench.rpm,
-            "torque_nm": bench.torque_nm(True), "start_torque_nm": bench.motor.start_torque_nm,
-            "passed": all(outcome.ok for outcome in outcomes), "rows": rows, "expectations": [vars(outcome) for outcome in outcomes]}
+    head = {"title": bench.table.title, **used, "board": str(paths.shown(bench.board.path)), "speed_rpm": bench.rpm,
+            "torque_nm": bench.torque_nm(True), "start_torque_nm": bench.motor.start_torque_nm}
+    more: dict[str, Any] = {}
     if margins is not None:
         from . import plots
         found = [{"parameter": parameter, "criterion": criterion, "direction": "up" if upwards else "down", "factor": search.good,
                   "fails_at": search.bad, "why": search.why} for (parameter, criterion, upwards), search in margins.searches.items()]
         output.write_csv(folder / "margins.csv", list(found[0]), [list(row.values()) for row in found])
-        data["margins"] = found
-        data["plots"] = plots.write_robust(found, margins.rows, bench.table.promised, law_deg, folder)
-    output.write_summary(folder, report.clean(data))
+        more = {"margins": found, "plots": plots.write_robust(found, margins.rows, bench.table.promised, law_deg, folder)}
+    report.write_table(folder, "robust", KEYS, rows, outcomes, head, more)

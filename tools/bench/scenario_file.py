@@ -2,8 +2,8 @@
 
     title = "..."                    one line for the list of scenarios
     description = "..."              optional, longer
-    motor = "hurst_dmb0224c10002"    tuning/motors/NAME.toml or a path
-    board = "mclv"                   tuning/boards/NAME.toml or a path
+    motor = "hurst_dmb0224c10002"    tuning/motors/NAME.toml or a path; this one if not given
+    board = "mclv"                   tuning/boards/NAME.toml or a path; this one if not given
     duration_s = 10.0
 
     [firmware]                       optional
@@ -19,6 +19,7 @@
 
     [[event]]                        any number; at_s, one action, optionally a note for the protocol
     at_s = 0.5
+    start_rpm = 1000                 S2, with the potentiometer at this speed since power-up
     press = "S2"                     or "S3"; hold_s = 0.1
     speed_rpm = 1000                 potentiometer to this speed, in the range that S3 has chosen; over_s turns it slowly
     speed_percent = 50               to this part of the motor's rated speed; the operator presses S3 by himself where it takes that
@@ -31,7 +32,7 @@
     note = "..."
 
     [[measure]]                      a row of the summary table
-    name = "1000 rpm"
+    name = "1000 rpm"                its reference_rpm if not given
     from_s = 3.0
     to_s = 4.0
     reference_rpm = 1000             optional: for the speed error; or reference_percent = 50, or reference = "maximum"
@@ -42,12 +43,14 @@
 
 from tools.common import paths
 from tools.common.board_keys import Values
-from tools.common.toml_file import Document, Section
-from .expect import read_expectation
+from tools.common.toml_file import REQUIRED, Document, Section
+from .expect import read_expectations
 from .metrics import SPEEDS, Measure
+from .panel import HOLD_S
 from .scenario import Event, Scenario
 
-EVENT_KINDS = ("press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
+MOTOR, BOARD = "hurst_dmb0224c10002", "mclv"
+EVENT_KINDS = ("start_rpm", "press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
 
 
 def load(name: str) -> Scenario:
@@ -58,19 +61,20 @@ def load(name: str) -> Scenario:
 def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
-    scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor"),
-                        root.text("board"), root.number("duration_s", minimum=0.01, maximum=120.0))
+    scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor", MOTOR),
+                        root.text("board", BOARD), root.number("duration_s", minimum=0.01, maximum=120.0))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))
     _read_start(root.section("start"), scenario)
-    scenario.events = [_read_event(section, scenario.duration_s) for section in root.sections("event")]
+    scenario.events = [event for section in root.sections("event") for event in _read_event(section, scenario.duration_s)]
     scenario.events.sort(key=lambda event: event.at_s)
     _read_measures(root.sections("measure"), scenario)
     measures = {measure.name: measure.has_reference for measure in scenario.measures}
     for section in root.sections("expect"):
-        scenario.expectations.append(read_expectation(section, measures, scenario.duration_s))
-        scenario.expectations_where.append(section.where("kind"))
+        found = read_expectations(section, measures, scenario.duration_s)
+        scenario.expectations += found
+        scenario.expectations_where += [section.where("kind")] * len(found)
     root.close()
     return scenario
 
@@ -94,7 +98,7 @@ def _read_start(section: Section | None, scenario: Scenario) -> None:
     section.close()
 
 
-def _read_event(section: Section, duration_s: float) -> Event:
+def _read_event(section: Section, duration_s: float) -> list[Event]:
     at_s = section.number("at_s", minimum=0.0)
     if at_s > duration_s:
         raise section.fail("at_s", f"at_s = {at_s:g} is after the end", f"choose 0 .. duration_s = {duration_s:g}")
@@ -104,11 +108,14 @@ def _read_event(section: Section, duration_s: float) -> Event:
     kind = section.one_of(EVENT_KINDS)
     if hold_s is not None and kind != "press":
         raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
-    if over_s is not None and kind in ("press", "debug"):
+    if over_s is not None and kind in ("start_rpm", "press", "debug"):
         raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
     event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
+    if kind == "start_rpm":
+        turned = Event(0.0, "speed_rpm", event["where"], value=section.number(kind))
+        return [turned, Event(at_s, "press", event["where"], button="S2", hold_s=HOLD_S, note=note)]
     if kind == "press":
-        event |= {"button": section.choice(kind, ("S2", "S3")), "hold_s": 0.1 if hold_s is None else hold_s}
+        event |= {"button": section.choice(kind, ("S2", "S3")), "hold_s": HOLD_S if hold_s is None else hold_s}
     elif kind == "set":
         event["keys"] = section.values(kind)
     elif kind == "debug":
@@ -117,7 +124,7 @@ def _read_event(section: Section, duration_s: float) -> Event:
         event["text"] = section.choice(kind, SPEEDS)
     else:
         event["value"] = section.number(kind, **_EVENT_RANGES.get(kind, {}))
-    return Event(**event)
+    return [Event(**event)]
 
 
 _EVENT_RANGES = {"pot": {"minimum": 0.0, "maximum": 1.0}, "speed_percent": {"minimum": -1000.0, "maximum": 1000.0},
@@ -134,14 +141,15 @@ def _variables(section: Section, key: str) -> dict[str, int]:
 
 def _read_measures(sections: list[Section], scenario: Scenario) -> None:
     for section in sections:
-        name = section.text("name")
+        rpm = section.number("reference_rpm", None)
+        name = section.text("name", REQUIRED if rpm is None else f"{rpm:g} rpm")
         from_s = section.number("from_s", minimum=0.0)
         to_s = section.number("to_s", maximum=scenario.duration_s)
         given = [key for key in ("reference_rpm", "reference_percent", "reference") if key in section]
         if len(given) > 1:
             raise section.fail(given[1], f"'{given[0]}' and '{given[1]}' together", "keep one of them")
-        references = {key: section.number(key, None) for key in ("reference_rpm", "reference_percent")}
-        references["reference"] = section.choice("reference", SPEEDS, "")
+        references = {"reference_rpm": rpm, "reference_percent": section.number("reference_percent", None),
+                      "reference": section.choice("reference", SPEEDS, "")}
         section.close()
         if to_s <= from_s:
             raise section.fail("to_s", f"to_s = {to_s:g} is not after from_s = {from_s:g}", "choose a later one")

@@ -1,8 +1,9 @@
 """Runs one scenario on the virtual board and records it."""
 
+import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -88,9 +89,15 @@ def _check_signals(signals: list[str], library: Library, scenario: Scenario) -> 
 def simulate(job: Job, report: Callable[[float], None]) -> Run:
     """Run a job in this process; `report` gets the motor time that has passed since the last call."""
     library = Library(job.library)
-    board = Board(library)
+    with using(Board(library), job) as board:
+        return simulate_on(job, library, board, report)
+
+
+@contextlib.contextmanager
+def using(board: Any, job: Job) -> Iterator[Any]:
+    """The board, closed at the end; what it refuses is the scenario's mistake."""
     try:
-        return _simulate(job, library, board, report)
+        yield board
     except BoardError as error:
         raise UserError(f"the virtual board refuses: {error}", job.scenario.name, "correct the scenario") from None
     finally:
@@ -99,10 +106,6 @@ def simulate(job: Job, report: Callable[[float], None]) -> Run:
 
 def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
     """Run a job on a board that the caller has made and closes."""
-    return _simulate(job, library, board, report)
-
-
-def _simulate(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
     scenario = job.scenario
     for key, value in job.values.items():
         board.set(key, value)

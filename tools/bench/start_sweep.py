@@ -81,11 +81,9 @@ def command(options: argparse.Namespace) -> int:
         if not 1.0 <= options.every_deg <= 360.0:
             raise UserError(f"every-deg = {options.every_deg:g} is impossible", "--every-deg", "choose 1 .. 360")
         table.every_deg = options.every_deg
-    motor, board = command_common.parts_of(table, options)
-    library = command_common.library_for([], options.library, options.userparams)
+    motor, board, library, used = command_common.set_up(table, options, [], options.userparams)
     if motor.path.stem != table.motor:
         table = table.for_motor(motor_file.load(str(motor.path)), library.params)
-    used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
     cases = [(load, angle) for load in table.loads_nm for angle in np.arange(0.0, 360.0, table.every_deg).tolist()]
     jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]
     target = options.out or paths.RESULTS / "starts"
@@ -145,9 +143,6 @@ def _cell(row: dict[str, Any]) -> str:
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
     keys = ["load_nm", "rotor_deg", "closed_after_s", "overshoot_percent", "speed_error_percent", "angle_error_rms_deg", "fault"]
-    output.write_csv(folder / "starts.csv", keys, [[row[key] for key in keys] for row in rows])
     from . import plots
-    data = {"title": table.title, **used, "board": str(paths.shown(board.path)),
-            "passed": all(outcome.ok for outcome in outcomes), "rows": rows,
-            "expectations": [vars(outcome) for outcome in outcomes], "plots": plots.write_starts(rows, folder)}
-    output.write_summary(folder, report.clean(data))
+    report.write_table(folder, "starts", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
+                       {"plots": plots.write_starts(rows, folder)})

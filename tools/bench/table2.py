@@ -37,10 +37,10 @@ class Row:
     where: str
 
     @classmethod
-    def read(cls, section: Section) -> "Row":
+    def read(cls, section: Section, error_percent: float) -> "Row":
         row = cls(section.number("reference_rpm", minimum=1.0), section.number("torque_nm", minimum=0.0),
                   section.number("note_rpm", minimum=0.0), section.number("note_current_a", minimum=0.0),
-                  section.number("error_percent", minimum=0.0), section.flag("no_more_current", True), section.where("reference_rpm"))
+                  error_percent, section.flag("no_more_current", True), section.where("reference_rpm"))
         section.close()
         return row
 
@@ -65,10 +65,11 @@ class Table:
     def read(cls, path: Path) -> "Table":
         document = Document(path)
         root = document.root
+        error_percent = root.number("error_percent", minimum=0.0)
         numbers = [root.number(key, minimum=0.0) for key in
                    ("start_s", "torque_from_s", "torque_over_s", "measure_from_s", "measure_to_s")]
         table = cls(root.text("title"), root.text("motor"), root.text("board"), *numbers,
-                    [Row.read(section) for section in root.sections("row")], root.where("motor"), root.where("board"))
+                    [Row.read(section, error_percent) for section in root.sections("row")], root.where("motor"), root.where("board"))
         root.close()
         if not table.start_s < table.torque_from_s < table.measure_from_s < table.measure_to_s:
             raise UserError("the times are not in order", document.label, "start_s < torque_from_s < measure_from_s < measure_to_s")
@@ -80,9 +81,7 @@ class Table:
 def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = sweep.run_cases) -> int:
     """The whole command; returns the exit code. `run_cases` runs the jobs."""
     table = Table.read(paths.TABLES / "table2.toml")
-    motor, board = command_common.parts_of(table, options)
-    library = command_common.library_for([], options.library, options.userparams)
-    used = command_common.used(motor, library, command_common.header_name(options.library, options.userparams))
+    motor, board, library, used = command_common.set_up(table, options, [], options.userparams)
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
     target = options.out or paths.RESULTS / "table2"
     with output.ResultFolder(target) as folder:
@@ -130,9 +129,6 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
     keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
-    output.write_csv(folder / "table2.csv", keys, [[row[key] for key in keys] for row in rows])
     from . import plots
-    data = {"title": table.title, **used, "board": str(paths.shown(board.path)),
-            "passed": all(outcome.ok for outcome in outcomes), "rows": rows, "expectations": [vars(outcome) for outcome in outcomes],
-            "plots": plots.write_table2(rows, folder)}
-    output.write_summary(folder, report.clean(data))
+    report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
+                       {"plots": plots.write_table2(rows, folder)})
