@@ -15,7 +15,7 @@ from typing import Any
 from tools.common import paths
 from tools.common.errors import UserError
 from tools.common.param_rows import ENTRIES
-from tools.common.toml_file import Document
+from tools.common.toml_file import Document, Section
 
 STEP_ERPM = 1024
 """One table step in electrical rpm (AN1292's SPEED_INDEX_CONST 10)."""
@@ -100,9 +100,20 @@ def load(path: Path) -> Tables:
     known.close()
     if goal is not None:
         tables.goal = {key: goal.number(key) for key in goal.data}
-    tables.rows = [{key: row.number(key) for key in row.data} for row in root.sections("entry")]
+    tables.rows = _rows(root.section("entries"))
     root.close()
     return tables
+
+
+def _rows(measured: Section | None) -> list[dict[str, float]]:
+    """What was measured at each entry: the file has a list for each quantity."""
+    if measured is None:
+        return []
+    columns = {key: measured.numbers(key) for key in measured.data}
+    for key, column in columns.items():
+        if len(column) != len(next(iter(columns.values()))):
+            raise measured.fail(key, f"'{key}' has {len(column)} values, the others have more or fewer", "make tune-fw writes the file anew")
+    return [dict(zip(columns, values)) for values in zip(*columns.values())]
 
 
 def load_for(motor: str, params: Mapping[str, float], folder: Path = FOLDER) -> tuple[Tables | None, str]:
@@ -161,8 +172,9 @@ def text(tables: Tables) -> str:
     lines += [f"{name} = {tables.fingerprint[name]:.6g}" for name in FINGERPRINT]
     if tables.goal:
         lines += ["", "[goal]"] + [f"{name} = {value:.6g}" for name, value in tables.goal.items()]
-    for row in tables.rows:
-        lines += ["", "[[entry]]"] + [f"{name} = {_number(value)}" for name, value in row.items()]
+    if tables.rows:
+        lines += ["", "[entries]          # what was measured at each entry"]
+        lines += [f"{name} = " + _list(_number(row[name]) for row in tables.rows) for name in tables.rows[0]]
     return "\n".join(lines) + "\n"
 
 

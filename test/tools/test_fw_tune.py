@@ -319,7 +319,8 @@ def test_tables_of_another_motor_value_are_not_used_and_the_line_says_which(path
 @pytest.mark.parametrize("wrong, word", [
     (GOOD.replace("idref_a = [0.00, ", "idref_a = ["), "17 values"), (GOOD.replace("[fingerprint]", "[finger]"), "finger"),
     (GOOD.replace("idref_a = [0.00", "idref_a = [0.50"), "impossible"), (GOOD.replace("MOTOR_RS_OHM", "MOTOR_OHM"), "MOTOR_"),
-    (GOOD[:GOOD.index("idref_a") + 14], "TOML syntax")])
+    (GOOD[:GOOD.index("idref_a") + 14], "TOML syntax"),
+    (GOOD + "\n[entries]\nspeed_rpm = [1, 2]\nbus_v = [24]\n", "'bus_v' has 1 values")])
 def test_damaged_files_have_their_line(path, wrong, word):
     path.write_text(wrong, encoding="utf-8")
     with pytest.raises(UserError, match=word):
@@ -340,7 +341,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_search(path, place
     place, out = path.parent / place, path.parent / "out"
     with mock.patch.object(fw_tune, "_Work", side_effect=UserError("the search began")):
         told = command("tune-fw", HURST, "--tables", str(place), "--out", str(out), "--quiet")
-    expected = f"cannot write the tables {reason}, {place}: make the folder writable" if reason else "the search began"
+    expected = f"cannot write the tables {reason}, {paths.shown(place)}: make the folder writable" if reason else "the search began"
     assert told == (2, "", f"foc33: {expected}\n")
     assert sorted(file.name for file in path.parent.iterdir()) == ["folder.toml", path.name]
 
