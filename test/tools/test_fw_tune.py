@@ -320,7 +320,7 @@ def test_tables_of_another_motor_value_are_not_used_and_the_line_says_which(path
     (GOOD.replace("idref_a = [0.00, ", "idref_a = ["), "17 values"), (GOOD.replace("[fingerprint]", "[finger]"), "finger"),
     (GOOD.replace("idref_a = [0.00", "idref_a = [0.50"), "impossible"), (GOOD.replace("MOTOR_RS_OHM", "MOTOR_OHM"), "MOTOR_"),
     (GOOD[:GOOD.index("idref_a") + 14], "TOML syntax"),
-    (GOOD + "\n[entries]\nspeed_rpm = [1, 2]\nbus_v = [24]\n", "'bus_v' has 1 values")])
+    (GOOD.replace("torque_nm = [0.05]", "torque_nm = [0.05, 0.04]"), "'torque_nm' has 2 values")])
 def test_damaged_files_have_their_line(path, wrong, word):
     path.write_text(wrong, encoding="utf-8")
     with pytest.raises(UserError, match=word):
