@@ -56,7 +56,7 @@ void iss_restart(iss_t *m, uint32_t pc)
     forget_pipeline(m);
     m->cycle = 0;
     m->profile_mark = 0;
-    iss_set_pc(m, pc);
+    jump(m, pc);
 }
 
 /* The core demands a reset: the hook does it later; without one it happens here. */
@@ -74,11 +74,6 @@ void iss_demand_reset(iss_t *m, chip_reset_t cause)
 uint32_t iss_pc(const iss_t *m)
 {
     return m->pc == CODE_OUTSIDE ? m->lost_pc : 2u * m->pc;
-}
-
-void iss_set_pc(iss_t *m, uint32_t pc)
-{
-    jump(m, pc);
 }
 
 int64_t iss_acc(const iss_t *m, unsigned which)
