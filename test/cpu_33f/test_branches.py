@@ -36,7 +36,3 @@ class Branches(unittest.TestCase):
                 if (now.pc, now.cycles) != ((labels["t"], 2) if condition(flags) else (labels["n"], 1)):
                     wrong.append(f"bra {name} with {' '.join(flag for flag in FLAGS if flags[flag]) or 'no flag'}")
         self.assertEqual([], wrong)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -246,7 +246,3 @@ class Observation(unittest.TestCase):
             now = chip.machine.registers().cycles
             chip.request(INT0)
             self.assertEqual(chip.until("first"), now + ENTRY)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -560,7 +560,3 @@ class Reports(unittest.TestCase):
         chip = Chip("mov.b w0,[w5]\n mov.b [w5],w6\n mov.b [w7],w6\n" + MAIN, w={5: 0x0A00, 7: 0x0A01})
         chip.machine.forget(0x0A00)
         self.assertRegex(chip.run(20).lower(), "0*204")
-
-
-if __name__ == "__main__":
-    unittest.main()

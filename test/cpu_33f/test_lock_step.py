@@ -285,7 +285,3 @@ class Resets(unittest.TestCase):
         self.chip.power_up()
         pass_ms(self.chip, 700)
         self.assertRegex(self.chip.uart_take(), r"reset BOR POR\r\n(.*\n)*state 1 fault 0 speed")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -568,7 +568,3 @@ class Adc(unittest.TestCase):
         self.assertAlmostEqual(144 + 10, chip.get("cpu.latency_cycles_mean"), delta=8)
         chip.set("cpu.isr_reset", 1)
         self.assertEqual(0, chip.get("cpu.isr_count"))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -138,7 +138,3 @@ class RandomAlu(unittest.TestCase):
             with self.subTest(row.text):
                 self.assertEqual(wrong[:3], [], f"{len(wrong)} of {ROUNDS}")
         self.assertGreater(count, 15000)
-
-
-if __name__ == "__main__":
-    unittest.main()

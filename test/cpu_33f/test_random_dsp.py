@@ -166,7 +166,3 @@ class RandomDsp(unittest.TestCase):
             if found:
                 wrong.append(f"{'; '.join(part[0] for part in chain)}: {'; '.join(found)}")
         self.assertEqual(wrong[:3], [], f"{len(wrong)} of {CHAINS}")
-
-
-if __name__ == "__main__":
-    unittest.main()

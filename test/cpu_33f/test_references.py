@@ -79,7 +79,3 @@ class References(unittest.TestCase):
             elif value == "?":
                 expected = expected & ~bit | state.sr & bit
         self.assertEqual(f"sr {state.sr:04x}", f"sr {expected:04x}")
-
-
-if __name__ == "__main__":
-    unittest.main()

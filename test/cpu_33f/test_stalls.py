@@ -88,7 +88,3 @@ class Stalls(unittest.TestCase):
             with self.subTest(f"{first}; {second}"):
                 registers = {4: 0x900, 5: 0x900, 6: 0x900, 10: 0xE00, 13: 0x8FE if "+=" in first else 0xB00}
                 self.assertEqual(2 + stall, self.measured(first, second, registers))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -98,6 +98,3 @@ def _add_tests() -> None:
 
 
 _add_tests()
-
-if __name__ == "__main__":
-    unittest.main()
