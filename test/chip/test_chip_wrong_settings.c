@@ -1,6 +1,9 @@
 /* Settings that are wrong: the effect that they have on silicon, and the register that is named for it. */
 #include "fake_firmware.inc"
 
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
+
 typedef struct {
     const char *what;
     struct {
@@ -40,29 +43,13 @@ static const wrong_t rows[] = {
     { "conversion clock too fast", { { "AD1CON3", 0 } }, 2, { "AD1CON3" }, { { NULL, 0.0, 0.0 } } },
 };
 
-static const wrong_t *row;
-
-static void set_registers(void)
-{
-    for (unsigned n = 0; n < 2 && row->set[n].name != NULL; n++) {
-        *host_sfr_find(row->set[n].name) = row->set[n].value;
-    }
-}
-
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
-
 void test_each_has_its_effect_and_is_named(void)
 {
-    for (row = rows; row < rows + sizeof rows / sizeof rows[0]; row++) {
-        fake_setup();
-        fake_init_hook = set_registers;
+    for (const wrong_t *row = rows; row < rows + sizeof rows / sizeof rows[0]; row++) {
+        fake_restart();
+        for (unsigned n = 0; n < 2 && row->set[n].name != NULL; n++) {
+            at_init(row->set[n].name, row->set[n].value);
+        }
         set("adc.noise_lsb", 0.0);
         set("input.pot", 0.25);
         power_up();
@@ -75,6 +62,5 @@ void test_each_has_its_effect_and_is_named(void)
             TEST_ASSERT_TRUE_MESSAGE(warned_about(row->named[n]), row->what);
         }
         TEST_ASSERT_FALSE_MESSAGE(warned_about("AD1CHS0"), row->what); /* which nobody has touched */
-        fake_teardown();
     }
 }

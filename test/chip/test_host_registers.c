@@ -1,15 +1,13 @@
 /* The host's device header: start values, bit views, the clock switch, look-up by name. */
+#define FAKE_OWN_SETUP
 #include "fake_firmware.inc"
+
+void tearDown(void);
 
 void setUp(void)
 {
     fake_setup();
     host_registers_reset();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
 }
 
 void test_start_values_let_an_initialisation_pass_its_waits(void)
@@ -113,17 +111,11 @@ void test_reset_restores_every_register(void)
     }
 }
 
-static void fast_pll(void)
-{
-    PLLFBD = 58;
-}
-
 void test_a_clock_above_the_devices_limit_is_named(void)
 {
-    fake_init_hook = fast_pll;
+    at_init("PLLFBD", 58);
     set("expect.fcy_hz", 0.0);
-    power_up();
-    run(1);
+    start(1);
     TEST_ASSERT_DOUBLE_WITHIN(1.0, 60e6, get("cpu.fcy_hz"));
     TEST_ASSERT_TRUE(warned_about("PLLFBD"));
 }
