@@ -309,7 +309,6 @@ void chip_watchdog_reset(chip_t *chip);
 void chip_watchdog_event(chip_t *chip);
 void chip_watchdog_clear(void *chip);
 void chip_watchdog_reschedule(chip_t *chip);
-uint16_t chip_watchdog_cause(chip_reset_t cause);
 
 /* chip_ports.c */
 void chip_ports_hooks(chip_t *chip);

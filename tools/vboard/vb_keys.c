@@ -342,17 +342,11 @@ int vb_keys_find(vb_t *vb, const char *name, vb_access_t *access)
 double vb_keys_read(const vb_t *vb, const vb_access_t *access)
 {
     switch (access->kind) {
-    case KIND_GET:
-        return access->get(vb);
-    case KIND_PROBE:
-        return access->probe();
-    case KIND_REG:
-        return (double)*access->reg;
-    case KIND_PIN:
-        return (double)chip_ports_pin(&vb->chip, access->pin >> 4, access->pin & 15u);
-    case KIND_FIELD:
-    default:
-        return *(const double *)((const char *)vb + access->offset);
+    case KIND_GET: return access->get(vb);
+    case KIND_PROBE: return access->probe();
+    case KIND_REG: return (double)*access->reg;
+    case KIND_PIN: return (double)chip_ports_pin(&vb->chip, access->pin >> 4, access->pin & 15u);
+    default: return *(const double *)((const char *)vb + access->offset);
     }
 }
 
