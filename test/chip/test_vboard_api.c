@@ -222,7 +222,7 @@ static void own_end(void *context, double length_s)
 void test_another_cpu_can_sit_on_the_board(void)
 {
     static const chip_cpu_t cpu = { .reg = own_register, .reset = own_reset, .cycles = own_cycles,
-                                    .raised = own_raised, .begin = own_nothing, .end = own_end, .destroy = own_nothing };
+                                    .raised = own_raised, .end = own_end, .destroy = own_nothing };
     vb_destroy(board);
     board = vb_create_with_cpu(&cpu);
     TEST_ASSERT_NOT_NULL(board);
