@@ -4,8 +4,6 @@
 void setUp(void); /* both in fake_firmware.inc */
 void tearDown(void);
 
-enum { ALL_LOW = 0x15 };
-
 void test_the_notes_settings_give_20_khz_2_us_and_no_warning(void)
 {
     start(1000);
@@ -35,23 +33,18 @@ static void change_duty_in_third_call(void)
     }
 }
 
-void test_a_handler_that_ends_before_the_load_acts_in_the_next_period(void)
+void test_a_handler_acts_in_the_next_period_a_late_one_a_period_later(void)
 {
-    fake_adc_hook = change_duty_in_third_call;
-    start(3);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
-    run(1);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, get("pwm.duty1"));
-}
-
-void test_a_late_handler_misses_the_load_and_acts_a_period_later(void)
-{
-    fake_adc_hook = change_duty_in_third_call;
-    set("cpu.isr_us", 30.0); /* trigger at 25 us, conversion 3.6 us */
-    start(4);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
-    run(1);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, get("pwm.duty1"));
+    static const double isr_us[] = { 13.0, 30.0 }; /* trigger at 25 us, conversion 3.6 us */
+    for (unsigned late = 0; late < 2; late++) {
+        fake_restart();
+        fake_adc_hook = change_duty_in_third_call;
+        set("cpu.isr_us", isr_us[late]);
+        start(3 + late);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
+        run(1);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, get("pwm.duty1"));
+    }
 }
 
 void test_udis_holds_the_duties_back(void)
@@ -93,25 +86,22 @@ void test_mean_terminal_voltage_follows_the_duties(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, get("plant.v_q"));
 }
 
-void test_full_and_zero_duty_never_switch(void)
+void test_short_pulses_meet_the_dead_time(void)
 {
-    set_duties(2000, 0, 2400);
-    start(3);
-    TEST_ASSERT_EQUAL_HEX(0x26, (unsigned)get("pwm.outputs_seen"));
-}
-
-void test_pulses_shorter_than_the_dead_time_disappear(void)
-{
-    set_duties(60, 1000, 1000); /* 1.5 us */
-    start(5);
-    TEST_ASSERT_EQUAL_HEX(0x3D, (unsigned)get("pwm.outputs_seen"));
-}
-
-void test_a_dead_time_that_spans_the_start_of_a_period_is_kept(void)
-{
-    set_duties(100, 1000, 1000); /* 2.5 us around the start of the period: on 2.1 us after its begin, off 0.15 us after its end */
-    start(5);
-    TEST_ASSERT_EQUAL_HEX(0x3F, (unsigned)get("pwm.outputs_seen"));
+    static const struct {
+        uint16_t duty[3];
+        unsigned seen;
+    } row[] = {
+        { { 2000, 0, 2400 }, 0x26 },   /* full and zero duty never switch */
+        { { 60, 1000, 1000 }, 0x3D },  /* 1.5 us, shorter than the dead time */
+        { { 100, 1000, 1000 }, 0x3F }, /* 2.5 us around the start of the period: on 2.1 us after its begin, off 0.15 us after its end */
+    };
+    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+        fake_restart();
+        set_duties(row[n].duty[0], row[n].duty[1], row[n].duty[2]);
+        start(5);
+        TEST_ASSERT_EQUAL_HEX(row[n].seen, (unsigned)get("pwm.outputs_seen"));
+    }
 }
 
 void test_override_switches_everything_off_within_the_period(void)
@@ -149,25 +139,12 @@ void test_synchronised_override_waits_for_the_next_period(void)
     TEST_ASSERT_EQUAL_HEX(0, (unsigned)get("pwm.outputs_on"));
 }
 
-void test_all_low_sides_on_for_the_bootstrap_capacitors(void)
-{
-    fake_override = 0x0015;
-    start(2);
-    TEST_ASSERT_EQUAL_HEX(ALL_LOW, (unsigned)get("pwm.outputs_on"));
-    TEST_ASSERT_EQUAL_HEX(ALL_LOW, (unsigned)get("pwm.outputs_seen"));
-}
-
 void test_no_dead_time_shoots_through_trips_the_comparator_and_is_named(void)
 {
     at_init("P1DTCON1", 0); /* no dead time */
     start(20);
     TEST_ASSERT_TRUE(warned_about("P1DTCON1"));
     TEST_ASSERT_TRUE(get("inverter.trip_count") > 0.0);
-}
-
-void test_shoot_through_draws_current_from_the_bus(void)
-{
-    at_init("P1DTCON1", 0); /* no dead time */
     set("inverter.trip_a", 0.0);
     start(20);
     TEST_ASSERT_TRUE(get("bus.current_a") > 1.0);
@@ -187,14 +164,9 @@ void test_fault_input_stops_the_outputs_and_lets_them_go_on_cycle_by_cycle(void)
     TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RB8"));
 }
 
-static void latched_fault(void)
-{
-    P1FLTACON = 0x0007;
-}
-
 void test_latched_fault_holds_the_outputs_until_the_flag_is_cleared(void)
 {
-    fake_init_hook = latched_fault;
+    at_init("P1FLTACON", 0x0007);
     start(5);
     set("input.flta", 1.0);
     run(2);
@@ -242,11 +214,6 @@ void test_over_current_trips_within_the_period_and_ends_the_current(void)
     TEST_ASSERT_TRUE(get("stat.i_peak_a") < 3.2);
 }
 
-static void immediate_updates(void)
-{
-    PWM1CON2 = 0x0004;
-}
-
 static void start_high(void)
 {
     fake_duty[0] = 2000;
@@ -280,7 +247,7 @@ void test_legs_at_the_same_duty_leave_a_resting_motor_without_current(void)
 
 void test_immediate_updates_act_in_the_same_period(void)
 {
-    fake_init_hook = immediate_updates;
+    at_init("PWM1CON2", 0x0004);
     set("cpu.isr_us", 0.0);
     set_duties(400, 400, 400);
     start(5);
@@ -299,11 +266,4 @@ void test_double_update_mode_loads_in_the_middle_of_the_period_too(void)
     run(1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.8, get("pwm.duty1"));
     TEST_ASSERT_TRUE(warned_about("P1TCON"));
-}
-
-void test_the_special_event_postscaler_skips_triggers(void)
-{
-    at_init("PWM1CON2", 0x0100);
-    start(100);
-    TEST_ASSERT_EQUAL_UINT(50, fake_adc_calls);
 }

@@ -1,4 +1,4 @@
-/* Settings that are wrong: the effect that they have on silicon, and the register that is named for it. */
+/* Settings: the effect that they have on silicon, and the registers that are named for wrong ones. */
 #include "fake_firmware.inc"
 
 void setUp(void); /* both in fake_firmware.inc */
@@ -40,6 +40,8 @@ static const wrong_t rows[] = {
     { "two sequences", { { "AD1CON2", 0x0204 } }, 10, { "AD1CON2" }, { { "calls", 5.0, 0.0 }, { "reg.ADC1BUF4", 0xC000, 0.0 } } },
     { "sequential sampling", { { "AD1CON1", 0x8364 } }, 2, { "AD1CON1" }, { { NULL, 0.0, 0.0 } } },
     { "conversions longer than the period", { { "AD1CON3", 63 } }, 100, { "AD1CON3" }, { { "calls", 50.0, 1.0 } } },
+    { "all low sides on", { { "P1OVDCON", 0x0015 } }, 2, { NULL }, { { "pwm.outputs_on", 0x15, 0.0 }, { "pwm.outputs_seen", 0x15, 0.0 } } },
+    { "special event postscaler", { { "PWM1CON2", 0x0100 } }, 100, { NULL }, { { "calls", 50.0, 0.0 } } },
     { "conversion clock too fast", { { "AD1CON3", 0 } }, 2, { "AD1CON3" }, { { NULL, 0.0, 0.0 } } },
 };
 

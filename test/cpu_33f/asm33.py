@@ -196,7 +196,8 @@ def _single(line: str) -> list[str]:
     if not names:
         return [line]
     bits = [iter(f"{number:0{line.count('@')}b}") for number in range(names[0].count("|") + 1)]
-    return [re.sub("@", lambda _: next(number), line.replace(names[0], name)) for name, number in zip(names[0].split("|"), bits) if name != "-"]
+    return [re.sub("@", lambda _: next(number), line.replace(names[0], name))
+            for name, number in zip(names[0].split("|"), bits) if name != "-"]
 
 
 def _read_rows() -> list[Row]:

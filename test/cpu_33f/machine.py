@@ -19,7 +19,8 @@ RAM_NAMES = [f"[{address:x}]" for address in range(RAM, RAM + 0x800, 2)]
 _P, _U, _U32, _TEXT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint32, ctypes.c_char_p
 SIGNATURES = { # of machine.c: the result, the arguments
     "machine_create": (_P,), "machine_core": (_P, _P), "machine_run": (_TEXT, _P, ctypes.c_uint64), "machine_load": (None, _P, _U, _P),
-    "machine_set": (None, _P, _P, _TEXT, _U, _P), "machine_get": (None, _P, _P), "machine_ram": (None, _P, _TEXT), "machine_peek": (_U, _P, _U),
+    "machine_set": (None, _P, _P, _TEXT, _U, _P), "machine_get": (None, _P, _P), "machine_ram": (None, _P, _TEXT),
+    "machine_peek": (_U, _P, _U),
     "machine_poke": (None, _P, _U, _U), "machine_forget": (None, _P, _U, _U), "machine_forget_w": (None, _P, _U),
     "machine_disassemble": (_TEXT, _P, _U32, _U32, _U32), "machine_irq_changed": (None, _P),
 }

@@ -53,7 +53,8 @@ def accesses(text: str) -> tuple[Chip, list[tuple]]:
 
 
 @pytest.mark.parametrize("text, value, mask", [
-    ("mov w0,0x2C0", 0xABCD, 0xFFFF), ("mov.b wreg,0x2C0", 0x00CD, 0x00FF), ("mov.b wreg,0x2C1", 0xCD00, 0xFF00), ("mov w0,[w5]", 0xABCD, 0xFFFF),
+    ("mov w0,0x2C0", 0xABCD, 0xFFFF), ("mov.b wreg,0x2C0", 0x00CD, 0x00FF), ("mov.b wreg,0x2C1", 0xCD00, 0xFF00),
+    ("mov w0,[w5]", 0xABCD, 0xFFFF),
     ("mov.b w0,[w6]", 0xCD00, 0xFF00), ("clr 0x2C0", 0, 0xFFFF), ("setm.b 0x2C1", 0xFF00, 0xFF00)])
 def test_hooks_see_words_and_bytes_with_the_bits_that_count(text: str, value: int, mask: int) -> None:
     assert accesses(text)[1] == [("write", AT, value, mask)]
@@ -65,7 +66,8 @@ def test_hooks_give_what_is_read(text: str, value: int) -> None:
     assert (seen, chip.w[1]) == ([("read", AT)], value)
 
 
-@pytest.mark.parametrize("text, wanted", [("bset 0x2C0,#0", 0x1235), ("bclr 0x2C0,#12", 0x0234), ("btg 0x2C0,#15", 0x9234), ("inc 0x2C0", 0x1235),
+@pytest.mark.parametrize("text, wanted", [("bset 0x2C0,#0", 0x1235), ("bclr 0x2C0,#12", 0x0234), ("btg 0x2C0,#15", 0x9234),
+                                          ("inc 0x2C0", 0x1235),
                                           ("ior 0x2C0", 0xBBFD)])
 def test_hooks_see_a_read_and_a_write_of_an_instruction_that_changes_bits(text: str, wanted: int) -> None:
     (kind, _), (name, address, new, mask) = accesses(text)[1]
@@ -175,7 +177,8 @@ def test_nothing_changes_while_the_profile_is_on() -> None:
 
 
 @pytest.mark.parametrize("text, wanted", [
-    ("push w0\n pop w0\n", 2), ("push w0\n push w0\n pop w0\n pop w0\n", 4), ("lnk #20\n ulnk\n", 22), ("lnk #20\n push w0\n pop w0\n ulnk\n", 24),
+    ("push w0\n pop w0\n", 2), ("push w0\n push w0\n pop w0\n pop w0\n", 4), ("lnk #20\n ulnk\n", 22),
+    ("lnk #20\n push w0\n pop w0\n ulnk\n", 24),
     ("mov.d w0,[w15++]\n nop\n", 4), ("rcall f\n bra e\n f: return\n e: nop\n", 4)])
 def test_the_deepest_stack_counts_every_word_and_frame(text: str, wanted: int) -> None:
     chip = Chip("mov #0x900,w15\n " + text + MAIN)
@@ -202,7 +205,8 @@ def test_program_written_through_the_pointer_is_decoded_when_told() -> None:
     assert chip.w[5] == 0xFFFF
 
 
-@pytest.mark.parametrize("address, exists", [(0x57FE, True), (0x5800, False), (0xF7FFFE, False), (0xF80000, True), (0xF80016, True), (0xF80018, False)])
+@pytest.mark.parametrize("address, exists", [(0x57FE, True), (0x5800, False), (0xF7FFFE, False), (0xF80000, True), (0xF80016, True),
+                                             (0xF80018, False)])
 def test_program_memory_ends_where_the_chips_does(address: int, exists: bool) -> None:
     chip = Chip()
     chip.machine.library.iss_write_program.restype = ctypes.c_bool

@@ -112,7 +112,8 @@ def first(priority: int = 5, text: str = MAIN, registers: dict[int, int] | None 
 
 def both(first_priority: int, second_priority: int, registers: dict[int, int] | None = None) -> Chip:
     """A chip whose interrupt INT0 counts in W1 and AD1 in W2."""
-    return Chip(vectors={8 + INT0: "first", 8 + AD1: "second"}, registers=enable((INT0, first_priority), (AD1, second_priority)) | (registers or {}))
+    return Chip(vectors={8 + INT0: "first", 8 + AD1: "second"},
+                registers=enable((INT0, first_priority), (AD1, second_priority)) | (registers or {}))
 
 
 def requested(chip: Chip, at: int, until: int, *numbers: int) -> Chip:
@@ -314,7 +315,8 @@ def test_the_handlers_own_repeat_needs_rcount_kept() -> None:
 
 @pytest.mark.parametrize("at", range(1, 19))
 def test_a_division_is_interrupted_and_goes_on(at: int) -> None:
-    chip = requested(first(text="repeat #17\n div.sd w2,w4\n" + MAIN.replace("inc w0,w0", "nop"), w={2: 0x2500, 3: 0xFF42, 4: 0x2200}), at, 80)
+    text = "repeat #17\n div.sd w2,w4\n" + MAIN.replace("inc w0,w0", "nop")
+    chip = requested(first(text=text, w={2: 0x2500, 3: 0xFF42, 4: 0x2200}), at, 80)
     assert chip.w[0] == 0xFA6B  # the handler counts in W1, which would be the remainder of what has been worked out so far
 
 
@@ -370,7 +372,8 @@ def expect_trap(chip: Chip, error: int, vector: int, level: int) -> None:
     assert (chip.w[4] & 0x7F, chip.w[4] >> 8 & 15, chip.level) == (vector - chip.machine.assumption("VECNUM_OFFSET") & 0x7F, level, level)
 
 
-@pytest.mark.parametrize("kind, text, registers, w, acc, error", [(kind, *case) for kind, (_, _, cases) in ERRORS.items() for case in cases])
+@pytest.mark.parametrize("kind, text, registers, w, acc, error",
+                         [(kind, *case) for kind, (_, _, cases) in ERRORS.items() for case in cases])
 def test_each_error_has_its_trap(kind: str, text: str, registers: dict[int, int], w: dict[int, int], acc: int, error: int) -> None:
     chip = Chip(f"{text}\n nop\n nop\n" + MAIN, VECTORS, enable() | registers, w=w, acc=[acc, 0], sr=registers.get(SR, 0))
     if kind != "none":
@@ -410,7 +413,8 @@ def test_a_handler_that_clears_the_error_returns() -> None:
 
 @pytest.mark.parametrize("text, soft", [("sftac a,w6", True), ("push w0", True), ("mov [w5],w6", False)])
 def test_a_soft_trap_waits_and_a_hard_one_does_not(text: str, soft: bool) -> None:
-    chip = Chip(text + "\n" + "nop\n" * 8 + MAIN, VECTORS, enable() | {SPLIM: 0x0A00}, w={5: 0x0901, 6: 17, 15: 0x0A02 if "push" in text else STACK_AT})
+    chip = Chip(text + "\n" + "nop\n" * 8 + MAIN, VECTORS, enable() | {SPLIM: 0x0A00},
+                w={5: 0x0901, 6: 17, 15: 0x0A02 if "push" in text else STACK_AT})
     assert chip.until("trap") == 1 + ENTRY + (chip.machine.assumption("SOFT_TRAP_DELAY_CYCLES") if soft else 0)
 
 
@@ -468,7 +472,8 @@ def test_an_empty_vector_is_told() -> None:
     assert "vector" in chip.run(20).lower()
 
 
-@pytest.mark.parametrize("text, register", [("mov [w5],w6", 5), ("mov w6,[w5++]", 5), ("mov [w5+2],w6", 5), ("mov w6,[w7+w5]", 5), ("tblrdl [w5],w6", 5),
+@pytest.mark.parametrize("text, register", [("mov [w5],w6", 5), ("mov w6,[w5++]", 5), ("mov [w5+2],w6", 5), ("mov w6,[w7+w5]", 5),
+                                            ("tblrdl [w5],w6", 5),
                                             ("clr a,[w8],w6", 8)])
 def test_a_register_never_written_that_addresses_memory_is_told(text: str, register: int) -> None:
     chip = Chip("nop\n " + text + "\n" + MAIN, w=POINTERS)

@@ -44,7 +44,8 @@ def start(chip: PilBoard) -> None:
     chip.set("input.s2", 0)
 
 
-@pytest.mark.parametrize("name, content", [("missing.elf", None), ("empty.elf", b""), ("text.elf", b"no image"), ("cut.hex", b":10000000AA\n")])
+@pytest.mark.parametrize("name, content", [("missing.elf", None), ("empty.elf", b""), ("text.elf", b"no image"),
+                                           ("cut.hex", b":10000000AA\n")])
 def test_an_image_that_is_no_image_is_one_line(tmp_path: Path, name: str, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / name).write_bytes(content)
@@ -102,14 +103,16 @@ def pil(tmp_path: Path, capsys: pytest.CaptureFixture):
 def test_it_runs_and_is_judged_by_what_the_plant_shows(pil) -> None:
     code, text, data = pil(STOP)
     assert code == 0, text
-    assert [row["row"] for row in data["expectations"]] == ["all: speed_max_rpm", "no warnings of the board", "target = PC in every interrupt"]
+    assert [row["row"] for row in data["expectations"]] == ["all: speed_max_rpm", "no warnings of the board",
+                                                            "target = PC in every interrupt"]
     assert "a HEX file alone does not say" in text
     assert data["plots"] == ["speed.png"]
 
 
 def test_what_it_sends_is_kept(pil) -> None:
-    setup = "mov #3, w0; mov w0, rpor9; mov #0x8008, w0; mov w0, u1mode; bset u1sta, #10; mov #0x48, w0; mov w0, u1txreg; inc w0, w0; mov w0, u1txreg\n"
-    assert pil(setup + STOP)[2]["uart"] == "HI"
+    setup = "mov #3, w0; mov w0, rpor9; mov #0x8008, w0; mov w0, u1mode; bset u1sta, #10\n"
+    text = "mov #0x48, w0; mov w0, u1txreg; inc w0, w0; mov w0, u1txreg\n"
+    assert pil(setup + text + STOP)[2]["uart"] == "HI"
 
 
 def test_what_the_core_met_is_a_warning_with_its_address(pil) -> None:
@@ -125,7 +128,8 @@ def firmware() -> Path:
     """The ELF file that `make firmware` builds, with the HEX file beside it."""
     if not XC16:
         pytest.skip("xc16-gcc is not installed")
-    subprocess.run(["make", "-s", "-C", str(ROOT), "firmware"], check=True, env={k: v for k, v in os.environ.items() if not k.startswith("MAKE")})
+    subprocess.run(["make", "-s", "-C", str(ROOT), "firmware"], check=True,
+                   env={k: v for k, v in os.environ.items() if not k.startswith("MAKE")})
     return IMAGE
 
 
@@ -261,7 +265,8 @@ def off_within_ms(chip: PilBoard, ms: float) -> None:
 @pytest.mark.parametrize("registers, off_ms, fault", [
     ([("iec0", AD1, 0)], 3.1, 10), ([("ifs0", 0, T3), ("iec0", 0, T3)], 0.1, 12)],
     ids=["ADC_LOST: a control interrupt that stays away", "TRAP: an interrupt that nobody expects and nobody ends"])
-def test_outputs_go_off_and_the_fault_outlives_the_watchdogs_reset(running: PilBoard, registers: list[tuple], off_ms: float, fault: int) -> None:
+def test_outputs_go_off_and_the_fault_outlives_the_watchdogs_reset(running: PilBoard, registers: list[tuple], off_ms: float,
+                                                                   fault: int) -> None:
     for register, clear, put in registers:
         change(running, register, clear, put)
     off_within_ms(running, off_ms)

@@ -58,9 +58,11 @@ def character(mode: int = 0x8008) -> str:
 
 # Name, program, milliseconds and configuration words, what it leaves: registers, keys and words of RAM, as (mask, value) or a value.
 CASES = [
-    ("the clock starts on the fast RC oscillator", "", {"ms": 1}, {"reg.OSCCON": (0xF000, 0), "cpu.cycles": approx(FRC_FCY * 1e-3, abs=3 + FRC_FCY * 51e-6)}),
+    ("the clock starts on the fast RC oscillator", "", {"ms": 1},
+     {"reg.OSCCON": (0xF000, 0), "cpu.cycles": approx(FRC_FCY * 1e-3, abs=3 + FRC_FCY * 51e-6)}),
     ("the configuration chooses the first clock", "", {"ms": 1, "FOSCSEL": 2}, {"cpu.cycles": approx(4000, abs=210)}),
-    ("no switch without the unlock sequence", "mov #0x743, w1; mov #3, w0; mov.b w0, [w1]; bset osccon, #0\n", {"ms": 4}, {"reg.OSCCON": 0}),
+    ("no switch without the unlock sequence", "mov #0x743, w1; mov #3, w0; mov.b w0, [w1]; bset osccon, #0\n", {"ms": 4},
+     {"reg.OSCCON": 0}),
     ("a cycle between the keys", keys_with("nop;"), {"ms": 4}, {"reg.OSCCON": 0x3320}),
     ("two cycles between the keys", keys_with("nop; nop;"), {"ms": 4}, {"reg.OSCCON": 0}),
     ("a wrong key of the low byte", KEYS.replace("mov #0x57, w3", "mov #0x58, w3"), {"ms": 4}, {"reg.OSCCON": 0x0300}),
@@ -71,7 +73,8 @@ CASES = [
     ("software cannot set the failure bit", UNLOCK.format(value=8), {}, {"reg.OSCCON": 0}),
     ("CLKLOCK forbids switching", UNLOCK.format(value=0x80) + switch(2), {"ms": 3}, {"reg.OSCCON": 0x0080}),
     ("CLKLOCK forbids a prepared switch", late_switch(), {"ms": 3}, {"reg.OSCCON": 0x0280}),
-    ("a reset goes on with the running clock", ONCE + PLL + f"reset\ndone: mov osccon, w0; mov w0, {RAM}\n", {}, {RAM: 0x3320, "cpu.resets": 1}),
+    ("a reset goes on with the running clock", ONCE + PLL + f"reset\ndone: mov osccon, w0; mov w0, {RAM}\n", {},
+     {RAM: 0x3320, "cpu.resets": 1}),
     ("pins: selection is open after reset", SELECT, {}, {"reg.RPINR12": 8}),
     ("pins: locked", LOCK_PINS + SELECT, {}, {"reg.RPINR12": 0x1F}),
     ("pins: open again", LOCK_PINS + OPEN_PINS + SELECT, {}, {"reg.RPINR12": 8}),
@@ -80,48 +83,61 @@ CASES = [
     ("pins: a selection has five bits", "setm rpinr18\n", {}, {"reg.RPINR18": 0x1F1F}),
     ("pins: FPOR leaves them to the ports", "", {"FPOR": 0xF7}, {"reg.PWM1CON1": 0x0000}),
     ("pins: FPOR gives them to the PWM", "", {"FPOR": 0x77}, {"reg.PWM1CON1": 0x0077}),
-    *((f"port {port}: absent pins read zero", f"setm ad1pcfgl; clr tris{port}; setm lat{port}; mov port{port}, w0; mov w0, {RAM}\n", {}, {RAM: bits})
+    *((f"port {port}: absent pins read zero", f"setm ad1pcfgl; clr tris{port}; setm lat{port}; mov port{port}, w0; mov w0, {RAM}\n", {},
+       {RAM: bits})
       for port, bits in (("a", 0x079F), ("b", 0xFFFF), ("c", 0x03FF))),
-    ("port: the latch reaches the pin", f"bclr trisc, #6; bset latc, #6; mov portc, w0; mov w0, {RAM}\n", {}, {"pin.RC6": 1, RAM: (0x40, 0x40)}),
-    *((f"port: analogue pins, AD1PCFGL {pins:03x}", f"mov #{pins}, w0; mov w0, ad1pcfgl; mov portb, w0; mov w0, {RAM}\n", {}, {RAM: (0xF, low)})
+    ("port: the latch reaches the pin", f"bclr trisc, #6; bset latc, #6; mov portc, w0; mov w0, {RAM}\n", {},
+     {"pin.RC6": 1, RAM: (0x40, 0x40)}),
+    *((f"port: analogue pins, AD1PCFGL {pins:03x}", f"mov #{pins}, w0; mov w0, ad1pcfgl; mov portb, w0; mov w0, {RAM}\n", {},
+       {RAM: (0xF, low)})
       for pins, low in ((0, 0), (0x1FF, 0xF))),
     ("port: written, it is the latch", "bclr trisc, #6; bset portc, #6\n", {}, {"pin.RC6": 1, WARNED: "PORTC:"}),
     ("timer: instruction cycles", timer_after(0, 98), {}, {RAM: 101}), # REPEAT, 99 NOPs, MOV: the write of T1CON ends before the first
     *((f"timer: prescaler 1:{cycles}", timer_after(bits, 5117), {}, {RAM: approx(5120 / cycles, abs=1)})
       for bits, cycles in ((0, 1), (1, 8), (2, 64), (3, 256))),
-    *((f"timer {number} has its flag", f"clr ifs0; mov #99, w0; mov w0, pr{number}; clr tmr{number}; mov #0x8000, w0; mov w0, t{number}con\n", {"ms": 1},
+    *((f"timer {number} has its flag",
+       f"clr ifs0; mov #99, w0; mov w0, pr{number}; clr tmr{number}; mov #0x8000, w0; mov w0, t{number}con\n", {"ms": 1},
        {"reg.IFS0": (0x0188, 1 << bit)}) for number, bit in ((1, 3), (2, 7), (3, 8))),
-    ("timer: a period of zero gives no flag", "clr ifs0; clr pr1; clr tmr1; mov #0x8000, w0; mov w0, t1con\n", {"ms": 1}, {"reg.IFS0": (8, 0)}),
+    ("timer: a period of zero gives no flag", "clr ifs0; clr pr1; clr tmr1; mov #0x8000, w0; mov w0, t1con\n", {"ms": 1},
+     {"reg.IFS0": (8, 0)}),
     ("timer: beyond its period it goes round", "mov #0xFFF0, w0; mov #99, w1; mov w1, pr1; mov w0, tmr1; mov #0x8000, w0; mov w0, t1con\n"
-     f"repeat #60; nop; mov tmr1, w0; mov w0, {RAM}; repeat #139; nop; mov tmr1, w0; mov w0, {RAM + 2}\n", {}, {RAM: 63 - 16, RAM + 2: 63 + 143 - 16 - 100}),
+     f"repeat #60; nop; mov tmr1, w0; mov w0, {RAM}; repeat #139; nop; mov tmr1, w0; mov w0, {RAM + 2}\n", {},
+     {RAM: 63 - 16, RAM + 2: 63 + 143 - 16 - 100}),
     ("timer: stopped, it keeps its count", TIMER + f"repeat #98; nop; bclr t1con, #15; repeat #98; nop; mov tmr1, w0; mov w0, {RAM}\n", {},
      {RAM: approx(101, abs=2)}),
-    ("uart: a character takes ten bits", character(), {}, {RAM: approx(10 * 4 * 87, abs=8), "text": "U", "uart.baud": approx(114943, abs=1)}),
+    ("uart: a character takes ten bits", character(), {}, {RAM: approx(10 * 4 * 87, abs=8), "text": "U",
+                                                           "uart.baud": approx(114943, abs=1)}),
     ("uart: sixteen cycles a bit at low speed", character(0x8000), {}, {RAM: approx(10 * 16 * 87, abs=8)}),
     *((f"uart: PDSEL, STSEL {bits:03b}", character(0x8008 | bits), {}, {RAM: approx(length * 4 * 87, abs=8)})
       for bits, length in ((0b001, 11), (0b010, 11), (0b011, 12), (0b111, 12))),
     ("uart: enabling the transmitter sets its flag", PLL + "clr ifs0; mov #0x8008, w0; mov w0, u1mode\n"
      f"mov ifs0, w1; mov w1, {RAM}; bset u1sta, #10; mov ifs0, w1; mov w1, {RAM + 2}\n", {}, {RAM: (0x1000, 0), RAM + 2: (0x1000, 0x1000)}),
     ("uart: one on the line and four waiting", PLL + UART + f"mov #0x41, w0\nmov w0, u1txreg; mov u1sta, w2; mov w2, {RAM}\n"
-     f"mov w0, u1txreg; mov w0, u1txreg; mov w0, u1txreg\nmov u1sta, w2; mov w2, {RAM + 2}\nmov w0, u1txreg; mov u1sta, w2; mov w2, {RAM + 4}\n", {},
+     f"mov w0, u1txreg; mov w0, u1txreg; mov w0, u1txreg\nmov u1sta, w2; mov w2, {RAM + 2}\n"
+     f"mov w0, u1txreg; mov u1sta, w2; mov w2, {RAM + 4}\n", {},
      {RAM: (0x200, 0), RAM + 2: (0x200, 0), RAM + 4: (0x200, 0x200), "text": "AAAAA"}),
     ("uart: a sixth character is lost", PLL + UART + "mov #0x41, w0\n" + "mov w0, u1txreg\n" * 6, {}, {"text": "AAAAA", WARNED: "UTXBF"}),
-    ("uart: without a pin nothing leaves", PLL + UART.replace("rpor9", f"{RAM}") + "mov #0x41, w0; mov w0, u1txreg\n", {}, {"text": "", WARNED: "RPOR9"}),
-    ("uart: loop back", PLL + UART + f"bset u1mode, #6; mov #0x5A, w0; mov w0, u1txreg\nw: btss u1sta, #0; bra w; mov u1rxreg, w0; mov w0, {RAM}\n", {},
+    ("uart: without a pin nothing leaves", PLL + UART.replace("rpor9", f"{RAM}") + "mov #0x41, w0; mov w0, u1txreg\n", {},
+     {"text": "", WARNED: "RPOR9"}),
+    ("uart: loop back",
+     PLL + UART + f"bset u1mode, #6; mov #0x5A, w0; mov w0, u1txreg\nw: btss u1sta, #0; bra w; mov u1rxreg, w0; mov w0, {RAM}\n", {},
      {RAM: 0x5A}),
     ("watchdog: resets what does not serve it", COUNT, {"ms": 10.5, "FWDT": ON}, {"cpu.resets": 10, RAM + 2: (0x0010, 0x0010)}),
     ("watchdog: leaves alone what serves it", COUNT + "again: clrwdt; bra again\n", {"ms": 10, "FWDT": ON}, {"cpu.resets": 0, RAM + 2: 3}),
     ("watchdog: off until software enables it", "", {"ms": 10, "FWDT": 0x40}, {"cpu.resets": 0}),
-    ("watchdog: what software enabled a reset disables", "btsc rcon, #4\nbra done\nbset rcon, #5\ndone: ", {"ms": 10, "FWDT": 0x40}, {"cpu.resets": 1}),
+    ("watchdog: what software enabled a reset disables", "btsc rcon, #4\nbra done\nbset rcon, #5\ndone: ", {"ms": 10, "FWDT": 0x40},
+     {"cpu.resets": 1}),
     ("watchdog: postscaler", "", {"ms": 10, "FWDT": ON | 2}, {"cpu.resets": 2}),
     ("watchdog: prescaler", "", {"ms": 10, "FWDT": ON | 0x10}, {"cpu.resets": 2}),
     ("watchdog: its time does not follow the clock", PLL, {"ms": 10, "FWDT": ON | 2}, {"cpu.resets": 2}),
-    ("watchdog: too early for its window, 0.54 ms", SERVE.format(wait="#2000"), {"ms": 10, "FWDT": ON & ~0x40}, {"cpu.resets": approx(18, abs=7)}),
+    ("watchdog: too early for its window, 0.54 ms", SERVE.format(wait="#2000"), {"ms": 10, "FWDT": ON & ~0x40},
+     {"cpu.resets": approx(18, abs=7)}),
     ("watchdog: in its window, 0.9 ms", SERVE.format(wait="#3300"), {"ms": 10, "FWDT": ON & ~0x40}, {"cpu.resets": 0}),
     ("watchdog: without a window, 0.54 ms", SERVE.format(wait="#2000"), {"ms": 10, "FWDT": ON}, {"cpu.resets": 0}),
     *((f"watchdog: wakes from PWRSAV #{mode}", WATCHDOG_SLEEP.format(mode=mode), {"ms": 10.5, "FWDT": ON},
        {"cpu.resets": 0, RAM: 10, RAM + 2: (0x0010, 0x0010)}) for mode in (0, 1)),
-    ("a reset instruction says so", ONCE + f"reset\ndone: mov rcon, w0; mov w0, {RAM}\n", {}, {"cpu.resets": 1, RAM: 0x43}), # nobody cleared the rest
+    ("a reset instruction says so", ONCE + f"reset\ndone: mov rcon, w0; mov w0, {RAM}\n", {},
+     {"cpu.resets": 1, RAM: 0x43}), # nobody cleared the rest
 ]
 
 
@@ -150,7 +166,8 @@ def test_every_register_has_its_value_after_power_on_and_after_a_reset() -> None
     spoil = ONCE + "".join(f"com {address}\n" for address, _ in peripherals.values() if not 0x1C0 <= address < 0x200) + "reset\ndone: "
     for program in (STOP, spoil + STOP):
         chip = run(program, 1)
-        wrong = [f"{name} {int(chip.get('reg.' + name)):04X}" for name, (_, value) in peripherals.items() if int(chip.get("reg." + name)) != value]
+        wrong = [f"{name} {int(chip.get('reg.' + name)):04X}"
+                 for name, (_, value) in peripherals.items() if int(chip.get("reg." + name)) != value]
         assert wrong == []
 
 
@@ -211,7 +228,8 @@ def test_the_pll_has_a_divider_before_a_multiplier_and_a_divider_behind(clkdiv: 
 
 
 @pytest.mark.parametrize("program, source, expected", [
-    (CHANGE_PLL, 1, True), (CHANGE_PLL, 0, False), ("mov pllfbd, w0; mov w0, pllfbd\n", 1, False), ("mov #0x3000, w0; mov w0, clkdiv\n", 1, True),
+    (CHANGE_PLL, 1, True), (CHANGE_PLL, 0, False), ("mov pllfbd, w0; mov w0, pllfbd\n", 1, False),
+    ("mov #0x3000, w0; mov w0, clkdiv\n", 1, True),
     ("mov #0x3140, w0; mov w0, clkdiv\n", 1, False), (switch(0) + CHANGE_PLL, 1, False)])
 def test_a_pll_that_is_changed_while_it_is_the_clock_is_told(program: str, source: int, expected: bool) -> None:
     assert told(run(program + STOP, FOSCSEL=source), "while it is the clock") == expected
@@ -239,7 +257,8 @@ def test_after_power_on_a_pll_has_to_lock() -> None:
 CRYSTAL, EXTERNAL = 0x41, 0x40
 
 
-@pytest.mark.parametrize("source, fosc, ready_ms", [(2, CRYSTAL, 0.128), (2, EXTERNAL, 0.0), (3, CRYSTAL, 1.628), (3, EXTERNAL, 1.5), (1, CRYSTAL, 1.5)])
+@pytest.mark.parametrize("source, fosc, ready_ms", [(2, CRYSTAL, 0.128), (2, EXTERNAL, 0.0), (3, CRYSTAL, 1.628), (3, EXTERNAL, 1.5),
+                                                    (1, CRYSTAL, 1.5)])
 def test_a_crystal_starts_for_1024_periods_and_then_the_pll_locks(source: int, fosc: int, ready_ms: float) -> None:
     chip = board(switch(source) + STOP, FOSC=fosc)
     while int(chip.get("reg.OSCCON")) >> 12 != source:
@@ -268,11 +287,13 @@ def test_a_button_is_read() -> None:
 def test_each_analogue_input_has_its_pin() -> None:
     """AN0 and 1 are RA0 and 1, AN2 to 5 RB0 to 3, AN6 to 8 RC0 to 2."""
     ports = [("porta", 0x3), ("portb", 0xF), ("portc", 0x7)]
-    program = "mov #{pins}, w0; mov w0, ad1pcfgl\n" + "".join(f"mov {port}, w0; mov w0, {RAM + 2 * n}\n" for n, (port, _) in enumerate(ports)) + STOP
+    reads = "".join(f"mov {port}, w0; mov w0, {RAM + 2 * n}\n" for n, (port, _) in enumerate(ports))
+    program = "mov #{pins}, w0; mov w0, ad1pcfgl\n" + reads + STOP
     for number in range(9):
         chip = run(program.format(pins=0x1FF & ~(1 << number)))
         low = [mask & ~chip.peek(RAM + 2 * n) for n, (_, mask) in enumerate(ports)]
-        assert low == [1 << number if number < 2 else 0, 1 << number - 2 if 2 <= number < 6 else 0, 1 << number - 6 if number >= 6 else 0], f"AN{number}"
+        assert low == [1 << number if number < 2 else 0, 1 << number - 2 if 2 <= number < 6 else 0,
+                       1 << number - 6 if number >= 6 else 0], f"AN{number}"
 
 
 # ---- timers --------------------------------------------------------------------------------------------------------------
@@ -286,7 +307,8 @@ def test_flag_comes_every_period_register_plus_one() -> None:
 
 
 def test_beyond_its_period_register_the_flag_comes_after_a_whole_round() -> None:
-    chip = run("mov #0xFFF0, w0; mov #99, w1; mov w1, pr1; mov w0, tmr1; clr ifs0; setm pr2; clr tmr2; mov #0x8000, w0; mov w0, t2con; mov w0, t1con\n"
+    chip = run("mov #0xFFF0, w0; mov #99, w1; mov w1, pr1; mov w0, tmr1; clr ifs0; setm pr2; clr tmr2\n"
+               "mov #0x8000, w0; mov w0, t2con; mov w0, t1con\n"
                f"wait: btss ifs0, #3; bra wait; mov tmr2, w0; mov tmr1, w1; mov w0, {RAM}; mov w1, {RAM + 2}\n" + STOP)
     assert chip.peek(RAM) == approx(16 + 100, abs=5)
     assert chip.peek(RAM + 2) < 8
@@ -300,7 +322,8 @@ FLAGS = PLL + UART + "mov #{sta}, w0; mov w0, u1sta; clr ifs0\n"
 @pytest.mark.parametrize("sta, left", [(0x0400, [0, 1, 2]), (0x2400, [3]), (0x8400, [0, 2])],
                          ids=["each character that leaves the buffer", "everything has left", "the buffer is empty"])
 def test_the_transmitters_interrupt_comes_when_utxisel_says(sta: int, left: list[int]) -> None:
-    chip = run(FLAGS.format(sta=sta) + f"mov #{RAM}, w4; mov #0x41, w0; " + "mov w0, u1txreg; " * 3 + "setm pr1; clr tmr1; mov #0x8000, w1; mov w1, t1con\n"
+    chip = run(FLAGS.format(sta=sta) + f"mov #{RAM}, w4; mov #0x41, w0; " + "mov w0, u1txreg; " * 3
+               + "setm pr1; clr tmr1; mov #0x8000, w1; mov w1, t1con\n"
                "again: btss ifs0, #12; bra again; mov tmr1, w0; bclr ifs0, #12; mov w0, [w4++]; bra again\n")
     assert [round(chip.peek(RAM + 2 * n) / (40 * 87)) for n in range(3) if chip.peek(RAM + 2 * n)] == left
 
@@ -329,7 +352,8 @@ def test_received_characters_arrive_in_order_also_those_that_wait() -> None:
 
 
 @pytest.mark.parametrize("program, texts, status", [
-    (STOP, ["x"], [0]), (RECEIVER + STOP, ["abcdef"], [3]), (RECEIVER + "w: btss u1sta, #1; bra w; bclr u1sta, #1\n" + STOP, ["abcdef", "ghi"], [1, 1])],
+    (STOP, ["x"], [0]), (RECEIVER + STOP, ["abcdef"], [3]), (RECEIVER + "w: btss u1sta, #1; bra w; bclr u1sta, #1\n" + STOP,
+                                                             ["abcdef", "ghi"], [1, 1])],
     ids=["without a pin nothing arrives", "unread it overruns", "clearing the overrun empties the receiver"])
 def test_the_receivers_status(program: str, texts: list[str], status: list[int]) -> None:
     assert sent_to(program, *texts)[:len(texts)] == status
@@ -371,7 +395,8 @@ def test_software_can_enable_the_watchdog() -> None:
 
 
 @pytest.mark.parametrize("cause, bit", [(".word24 0xFD8010", 0x4000), ("mov [w9], w0", 0x4000),
-                                        ("mov #0x900, w15; bset 0x80, #1; nop; nop\nbra done", 0x8000)], ids=["opcode", "address", "conflict"])
+                                        ("mov #0x900, w15; bset 0x80, #1; nop; nop\nbra done", 0x8000)],
+                                        ids=["opcode", "address", "conflict"])
 def test_what_the_core_resets_for_is_told_in_rcon(cause: str, bit: int) -> None:
     chip = run(f"mov rcon, w0; mov w0, {RAM}; mov #0xC000, w1; and w0, w1, w1\nbra nz, done\n{cause}\ndone: " + STOP
                + "\n.org 0x1000\nhandler: mov #0x801, w2; mov [w2], w3; bra handler\n.org 0x6\n.word24 0x001000\n", 1)
@@ -412,7 +437,8 @@ WAIT = f"wait: btss ifs0, #13; bra wait; mov tmr1, w0; mov w0, {RAM}; mov adc1bu
 
 @pytest.mark.parametrize("trigger, isr_us, at, warning", [
     (400, 13, 400 + 4 * 12 * 3, False), (0x8000 | 400, 13, 2000 - 400 + 144, False), (400, 13 + 20, 400 + 144 + 800, False),
-    (400, 13 + 60, 400 + 144 + 2400, True)], ids=["four conversions take 144 cycles", "counting down", "held up", "held up beyond a period"])
+    (400, 13 + 60, 400 + 144 + 2400, True)], ids=["four conversions take 144 cycles", "counting down", "held up",
+                                                  "held up beyond a period"])
 def test_the_conversions_end(trigger: int, isr_us: float, at: int, warning: bool) -> None:
     chip = board(SETUP.format(trigger=trigger) + WAIT)
     chip.set("cpu.isr_us", isr_us)

@@ -13,7 +13,8 @@ from operands import Sampler
 ROUNDS = 130
 EXTREMES = [0, 1, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0x8001, 0xFFFF, 0xFFFE]
 # What the vectors alone test: program flow, tables, stack frames, and what acts on the core as a whole.
-ELSEWHERE = {"bra", "call", "rcall", "goto", "return", "retlw", "retfie", "do", "repeat", "btss", "btsc", "cpseq", "cpsne", "cpsgt", "cpslt", "push", "pop",
+ELSEWHERE = {"bra", "call", "rcall", "goto", "return", "retlw", "retfie", "do", "repeat", "btss", "btsc", "cpseq", "cpsne", "cpsgt",
+             "cpslt", "push", "pop",
              "push.s", "pop.s", "lnk", "ulnk", "tblrdl", "tblrdh", "tblwtl", "tblwth", "nop", "nopr", "clrwdt", "disi", "pwrsav", "reset"}
 ROWS = [row for row in asm33.ROWS if not is_dsp(row) and row.mnemonic not in ELSEWHERE]
 

@@ -129,7 +129,8 @@ def test_every_instruction_does_what_the_reference_does(machine: Machine, number
         state = begin(chance, memory)
         reach(chance.random, state, row, fields)
         start(machine, state, memory, word)
-        before = f"{text}: A {state.acc[0] & 0xFFFFFFFFFF:010x} B {state.acc[1] & 0xFFFFFFFFFF:010x} CORCON {state.corcon:04x} SR {state.sr:04x}"
+        acc = " ".join(f"{value & 0xFFFFFFFFFF:010x}" for value in state.acc)
+        before = f"{text}: A, B {acc} CORCON {state.corcon:04x} SR {state.sr:04x}"
         stop = machine.run(1)
         Dsp(state, row, fields).execute()
         cycles = machine.registers().cycles

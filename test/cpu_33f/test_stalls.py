@@ -53,9 +53,12 @@ def measured(machine: Machine, first: str, second: str, registers: dict[int, int
 @pytest.mark.parametrize("first, second, assumptions", [
     (WRITES, SOURCES, ["RAW_STALL_CYCLES"]), (POINTERS, SOURCES, ["RAW_STALL_CYCLES", "RAW_STALL_POINTER"]), (OTHERS, SOURCES, []),
     (WRITES + POINTERS + OTHERS, PLAIN, []), ([f"{write}; nop" for write in WRITES], SOURCES, [])],
-    ids=["a written register that addresses the next source costs one", "a changed destination pointer that addresses the next source costs one",
-         "a register that was only read costs nothing", "a register that the next uses otherwise costs nothing", "an instruction between hides the write"])
-def test_every_pair_costs_as_much_more_than_its_instructions(machine: Machine, first: list[str], second: list[str], assumptions: list[str]) -> None:
+    ids=["a written register that addresses the next source costs one",
+         "a changed destination pointer that addresses the next source costs one",
+         "a register that was only read costs nothing", "a register that the next uses otherwise costs nothing",
+         "an instruction between hides the write"])
+def test_every_pair_costs_as_much_more_than_its_instructions(machine: Machine, first: list[str], second: list[str],
+                                                             assumptions: list[str]) -> None:
     stall = math.prod(machine.assumption(name) for name in assumptions) if assumptions else 0
     found = {f"{one}; {two}": measured(machine, one, two) - cycles(one) - cycles(two) for one in first for two in second}
     assert {pair: more for pair, more in found.items() if more != stall} == {}, stall

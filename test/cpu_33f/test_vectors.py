@@ -78,5 +78,7 @@ for one in read_all():
 @pytest.mark.parametrize("group", GROUPS)
 def test_group(machine: Machine, group: str) -> None:
     """With all open flags clear and with all set."""
-    wrong = [f"{vector}\n    {'; '.join(found)}" for vector in GROUPS[group] for flags in (0, 1) if (found := differences(vector, machine, flags))]
+    wrong = [f"{vector}\n    {'; '.join(found)}" for vector in GROUPS[group] for flags in (0,
+                                                                                           1) if (found := differences(vector, machine,
+                                                                                                                       flags))]
     assert wrong == [], "\n" + "\n".join(wrong[:30])
