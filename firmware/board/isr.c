@@ -22,8 +22,15 @@ void BOARD_ISR _DefaultInterrupt(void);
 
 QM_INLINE void board_set_outputs(uint16_t outputs)
 {
-    P1OVDCON = (outputs == (uint16_t)OUTPUTS_PWM) ? BOARD_OUTPUTS_PWM
-             : (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) ? BOARD_OUTPUTS_BOOTSTRAP : BOARD_OUTPUTS_OFF;
+    uint16_t override = BOARD_OUTPUTS_OFF;
+    if (outputs == (uint16_t)OUTPUTS_PWM) {
+        override = BOARD_OUTPUTS_PWM;
+    } else if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) {
+        override = BOARD_OUTPUTS_BOOTSTRAP;
+    } else {
+        /* off */
+    }
+    P1OVDCON = override;
 }
 
 /** 20 kHz, triggered by PWM1 through the ADC. */

@@ -11,7 +11,7 @@
 #define STATUS_PERIOD_MS 500u
 
 static char line[STATUS_LINE_BYTES];
-static uint16_t next;       /* index of the next character; a zero byte ends the line */
+static uint16_t next; /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
 /** The line's text. @return its end */

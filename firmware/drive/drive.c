@@ -9,10 +9,10 @@
 NOINLINE void drive_zero(void *object, uint16_t size)
 {
     uint8_t *byte = object;
-    while (size != 0u) {
+    uint16_t left;
+    for (left = size; left != 0u; left--) {
         *byte = 0;
         byte++;
-        size--;
     }
 }
 

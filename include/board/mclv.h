@@ -18,8 +18,8 @@
 
 /* ---- Clock: 8 MHz crystal * 40 / (2 * 2) = 80 MHz, 40 MIPS ---- */
 #define BOARD_FCY_HZ 40000000ul
-#define BOARD_PLLFBD 38u      /* M = 40 */
-#define BOARD_CLKDIV 0x0000u  /* N1 = 2, N2 = 2 */
+#define BOARD_PLLFBD 38u     /* M = 40 */
+#define BOARD_CLKDIV 0x0000u /* N1 = 2, N2 = 2 */
 #define BOARD_NOSC_FRC 0u
 #define BOARD_NOSC_PRIPLL 3u
 #define BOARD_OSCCON_LOCK 0x0020u
@@ -27,12 +27,12 @@
 
 /* ---- PWM1: centre-aligned, 20 kHz, three complementary pairs; M1 = RB14/15, M2 = RB12/13, M3 = RB10/11 ---- */
 #define BOARD_P1TPER ((uint16_t)(PWM_FULL_DUTY / 2 - 1))
-#define BOARD_P1TCON 0x8002u  /* on, up/down counting */
-#define BOARD_PWM1CON1 0x0077u /* pairs 1-3 enabled, complementary */
+#define BOARD_P1TCON 0x8002u                                                  /* on, up/down counting */
+#define BOARD_PWM1CON1 0x0077u                                                /* pairs 1-3 enabled, complementary */
 #define BOARD_P1DTCON1 ((uint16_t)(0x0040u | (uint16_t)(DEAD_TIME_DUTY / 2))) /* unit A, two clocks a count */
-#define BOARD_P1FLTACON 0x0087u /* FLTA: pairs 1-3 inactive, cycle by cycle */
-#define BOARD_FLTA_RP 8u      /* FLTA1 on RP8/RB8 */
-#define BOARD_FLTA_LOW() ((uint16_t)(PORTBbits.RB8 == 0u)) /* the comparator holds the outputs off */
+#define BOARD_P1FLTACON 0x0087u                                               /* FLTA: pairs 1-3 inactive, cycle by cycle */
+#define BOARD_FLTA_RP 8u                                                      /* FLTA1 on RP8/RB8 */
+#define BOARD_FLTA_LOW() ((uint16_t)(PORTBbits.RB8 == 0u))                    /* the comparator holds the outputs off */
 #define BOARD_OUTPUTS_OFF 0x0000u
 #define BOARD_OUTPUTS_BOOTSTRAP 0x0015u /* all low sides on */
 #define BOARD_OUTPUTS_PWM 0x3F00u
@@ -42,11 +42,11 @@
 #define BOARD_P1SECMP ((uint16_t)(0x8000u | (BOARD_P1TPER - BOARD_SAMPLE_DELAY_CLOCKS)))
 
 /* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 75 ns = 3.6 us ---- */
-#define BOARD_AD1CON1 0x036Cu /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */
-#define BOARD_AD1CON2 0x0200u /* CHPS 2: CH0..CH3 */
-#define BOARD_AD1CON3 0x0002u /* TAD = 3 Tcy = 75 ns, as published; the data sheet may ask for 76 [?]: 3u costs 1.2 us */
-#define BOARD_AD1CHS0 0x0008u /* CH0: AN8, potentiometer (RC2) */
-#define BOARD_AD1CHS123 0x0000u /* CH1: AN0 I_A (RA0), CH2: AN1 I_B (RA1), CH3: AN2 bus (RB0) */
+#define BOARD_AD1CON1 0x036Cu               /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */
+#define BOARD_AD1CON2 0x0200u               /* CHPS 2: CH0..CH3 */
+#define BOARD_AD1CON3 0x0002u               /* TAD = 3 Tcy = 75 ns, as published; the data sheet may ask for 76 [?]: 3u costs 1.2 us */
+#define BOARD_AD1CHS0 0x0008u               /* CH0: AN8, potentiometer (RC2) */
+#define BOARD_AD1CHS123 0x0000u             /* CH1: AN0 I_A (RA0), CH2: AN1 I_B (RA1), CH3: AN2 bus (RB0) */
 #define BOARD_AD1PCFGL ((uint16_t)~0x0107u) /* analogue: AN0, AN1, AN2, AN8 */
 
 /* ---- Buttons, active low ---- */
@@ -54,7 +54,7 @@
 #define BOARD_S3_DOWN() ((uint16_t)(PORTBbits.RB4 == 0u)) /* speed range */
 
 /* ---- UART1: 115200 8N1, status lines. RP19/RC3 transmits, RP20/RC4 receives [?] ---- */
-#define BOARD_U1BRG 86u       /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
+#define BOARD_U1BRG 86u /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
 #define BOARD_UART_TX_PIN RPOR9bits.RP19R
 #define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
 #define BOARD_UART_RX_RP 20u

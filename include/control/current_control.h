@@ -7,8 +7,8 @@
 
 /** The voltage circle at the measured bus. */
 typedef struct {
-    voltage_q14_t limit_q14;   /**< radius */
-    uint16_t reciprocal;       /**< 2^28 / radius, see voltage_circle_reciprocal() */
+    voltage_q14_t limit_q14; /**< radius */
+    uint16_t reciprocal;     /**< 2^28 / radius, see voltage_circle_reciprocal() */
 } voltage_circle_t;
 
 #define VOLTAGE_CIRCLE_LEAST_Q14 4097 /* a quarter of the nominal bus */

@@ -1,4 +1,4 @@
-/* The note's PLL estimator, Equations 1-7: currents and the acting voltage become back-EMF, speed and rotor angle. */
+/* AN1292's PLL estimator, Equations 1-7: currents and the acting voltage become back-EMF, speed and rotor angle. */
 #ifndef CONTROL_ESTIMATOR_H
 #define CONTROL_ESTIMATOR_H
 
@@ -8,22 +8,22 @@
 
 /** Motor and filter constants that do not change while the motor runs. */
 typedef struct {
-    uint16_t rs_q16;             /**< Rs I0 / (2 U0) * 65536 >> rs_exp: Q14 current to Q13 voltage */
-    uint16_t rs_exp;             /**< 0..3, for motors whose Rs does not fit */
-    uint16_t ls_exp;             /**< 0..3, the same for Ls */
-    int16_t d_ilimit_ls_q14;     /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
-    int16_t d_ilimit_hs_q14;     /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
-    int16_t deltat_q32;          /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
-    int16_t half_step_q16_rad;   /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per erpm, as high-word factor */
-    int16_t kfilter_velestim_q16;/**< speed filter, 2 * KFILTER_VELESTIM */
-    speed_erpm_t nominal_erpm;   /**< NOMINAL_SPEED_RPM * P: above, the derivative spans one sample instead of eight */
-    speed_erpm_t decimate_erpm;  /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
+    uint16_t rs_q16;              /**< Rs I0 / (2 U0) * 65536 >> rs_exp: Q14 current to Q13 voltage */
+    uint16_t rs_exp;              /**< 0..3, for motors whose Rs does not fit */
+    uint16_t ls_exp;              /**< 0..3, the same for Ls */
+    int16_t d_ilimit_ls_q14;      /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
+    int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
+    int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
+    int16_t half_step_q16_rad;    /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per erpm, as high-word factor */
+    int16_t kfilter_velestim_q16; /**< speed filter, 2 * KFILTER_VELESTIM */
+    speed_erpm_t nominal_erpm;    /**< NOMINAL_SPEED_RPM * P: above, the derivative spans one sample instead of eight */
+    speed_erpm_t decimate_erpm;   /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
 } estimator_params_t;
 
 /** Constants that field weakening adapts while the motor runs. */
 typedef struct {
     uint16_t ls_q16;          /**< Ls/(8 Ts) I0/(2 U0) * 65536 >> ls_exp: Q14 eight-sample difference to Q13 voltage */
-    int16_t inv_kfi;          /**< InvKFi in the note's format: 1/Kphi / 2 in Q15 */
+    int16_t inv_kfi;          /**< InvKFi in AN1292's format: 1/Kphi / 2 in Q15 */
     int16_t emf_sum_max_q12;  /**< 32767 * 2048 / inv_kfi: keeps the speed in 16 bits */
     int16_t kfilter_esdq_q16; /**< back-EMF filter, 2 * KFILTER_ESDQ or 2 * KFILTER_ESDQ_FW */
 } estimator_tuning_t;

@@ -1,4 +1,4 @@
-/* Field weakening by table: the speed reference gives the d current and adapts the estimator, as in the note. */
+/* Field weakening by table: the speed reference gives the d current and adapts the estimator, as in AN1292. */
 #ifndef CONTROL_FIELDWEAK_H
 #define CONTROL_FIELDWEAK_H
 
@@ -7,10 +7,10 @@
 #define FIELDWEAK_ENTRIES 18
 #define SPEED_INDEX_CONST 10 /**< one table step is 2^10 electrical rpm */
 
-/** The three tables of the note and what frames them. */
+/** The three tables of AN1292 and what frames them. */
 typedef struct {
     current_q13_t idref_q13[FIELDWEAK_ENTRIES]; /**< IDREF_SPEED0..17: d current, 0 or negative */
-    int16_t inv_kfi[FIELDWEAK_ENTRIES];         /**< INVKFI_SPEED0..17: 1/Kphi, the note's format */
+    int16_t inv_kfi[FIELDWEAK_ENTRIES];         /**< INVKFI_SPEED0..17: 1/Kphi, AN1292's format */
     int16_t ls_over2ls0_q15[FIELDWEAK_ENTRIES]; /**< LS_OVER2LS0_SPEED0..17: Ls/(2 Ls0), Q15, 16384 = no change */
     speed_erpm_t on_speed_erpm;                 /**< speed reference where field weakening starts (qFwOnSpeed) */
     uint16_t ls_base_q16;                       /**< estimator's ls_q16 at index 0 */

@@ -4,7 +4,7 @@
 
 #include "control/qmath.h"
 
-/** Constants of the ramp, in the note's 1/1024 angle counts per period. */
+/** Constants of the ramp, in AN1292's 1/1024 angle counts per period. */
 typedef struct {
     int32_t end_speed_q10;     /**< END_SPEED_RPM * P * Ts * 65536/60 * 1024 */
     int16_t increase_rate_q10; /**< OPENLOOP_RAMPSPEED_INCREASERATE: added every period */
@@ -12,8 +12,8 @@ typedef struct {
 
 /** State. */
 typedef struct {
-    int32_t speed_q10;   /**< magnitude, 1/1024 angle counts per period */
-    uint32_t angle_q32;  /**< the fraction below one count is kept, so the speed is exact */
+    int32_t speed_q10;  /**< magnitude, 1/1024 angle counts per period */
+    uint32_t angle_q32; /**< the fraction below one count is kept, so the speed is exact */
 } forced_angle_t;
 
 /** Accelerates by one step and moves the angle. @param direction +1 or -1 @return nonzero at the end speed */

@@ -1,4 +1,4 @@
-/* The note's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out). */
+/* AN1292's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out). */
 #ifndef CONTROL_PI_H
 #define CONTROL_PI_H
 
@@ -11,9 +11,9 @@ typedef struct {
 
 /** Gains of one controller; U counts are output counts << shift. */
 typedef struct {
-    int16_t kp;    /**< U counts per error count */
-    int16_t ki;    /**< U counts per error count and step */
-    q15_t kc;      /**< share of the excess that is taken back from the integrator, Q15 */
+    int16_t kp;     /**< U counts per error count */
+    int16_t ki;     /**< U counts per error count and step */
+    q15_t kc;       /**< share of the excess that is taken back from the integrator, Q15 */
     uint16_t shift; /**< 0..14 */
 } pi_gains_t;
 

@@ -12,15 +12,15 @@
 
 /** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
  *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */
-typedef int16_t current_q13_t;  /**< phase, d and q currents: 8192 = full-scale current */
-typedef int16_t current_q14_t;  /**< alpha and beta currents: 16384 = full-scale current */
-typedef int16_t voltage_q14_t;  /**< d and q voltages: 16384 = full-scale voltage */
-typedef int16_t voltage_q13_t;  /**< alpha and beta voltages and back-EMF: 8192 = full-scale voltage */
-typedef int16_t voltage_q12_t;  /**< d and q back-EMF: 4096 = full-scale voltage (4 times the range of Q14) */
-typedef int16_t speed_erpm_t;   /**< electrical revolutions per minute, the note's speed unit */
-typedef uint16_t angle_t;       /**< 65536 = one electrical turn; wraps on purpose */
-typedef int16_t q15_t;          /**< fraction, 32768 = 1 */
-typedef uint16_t duty_t;        /**< PWM on-time of the high side, 2000 = 100 % at 20 kHz */
+typedef int16_t current_q13_t; /**< phase, d and q currents: 8192 = full-scale current */
+typedef int16_t current_q14_t; /**< alpha and beta currents: 16384 = full-scale current */
+typedef int16_t voltage_q14_t; /**< d and q voltages: 16384 = full-scale voltage */
+typedef int16_t voltage_q13_t; /**< alpha and beta voltages and back-EMF: 8192 = full-scale voltage */
+typedef int16_t voltage_q12_t; /**< d and q back-EMF: 4096 = full-scale voltage (4 times the range of Q14) */
+typedef int16_t speed_erpm_t;  /**< electrical revolutions per minute, AN1292's speed unit */
+typedef uint16_t angle_t;      /**< 65536 = one electrical turn; wraps on purpose */
+typedef int16_t q15_t;         /**< fraction, 32768 = 1 */
+typedef uint16_t duty_t;       /**< PWM on-time of the high side, 2000 = 100 % at 20 kHz */
 
 /** Exact products: one instruction each on the dsPIC (mul.ss, mul.su, mul.uu), independent of CORCON. */
 QM_INLINE int32_t qm_mulss(int16_t a, int16_t b)

@@ -6,12 +6,12 @@
 
 /** Constants of the modulator, in duty counts. */
 typedef struct {
-    int16_t full;           /**< duty of 100 %: 2 (PTPER + 1) */
-    int16_t top;            /**< highest duty before dead-time compensation: keeps the low sides on around the sample */
-    int16_t dead_time;      /**< duty that dead time takes from a leg: Td / Ts * full */
-    int16_t knee_q13;       /**< current at which dead-time compensation is full; linear below, to stay calm at zero */
+    int16_t full;            /**< duty of 100 %: 2 (PTPER + 1) */
+    int16_t top;             /**< highest duty before dead-time compensation: keeps the low sides on around the sample */
+    int16_t dead_time;       /**< duty that dead time takes from a leg: Td / Ts * full */
+    int16_t knee_q13;        /**< current at which dead-time compensation is full; linear below, to stay calm at zero */
     uint16_t dead_slope_q16; /**< dead_time / knee_q13 * 65536 */
-    int16_t turn_q13;       /**< most that a phase current changes in a period */
+    int16_t turn_q13;        /**< most that a phase current changes in a period */
 } svm_params_t;
 
 /** The three duties. */

@@ -4,8 +4,8 @@
 
 #include "control/qmath.h"
 
-#define TRIG_SIN_STEPS 128   /* of a turn */
-#define TRIG_SIN_ENTRIES 96  /* half a turn for the sine, a quarter more for the cosine */
+#define TRIG_SIN_STEPS 128  /* of a turn */
+#define TRIG_SIN_ENTRIES 96 /* half a turn for the sine, a quarter more for the cosine */
 #define TRIG_CIRCLE_STEPS 64
 
 /** sin(2 pi i / 128) * 32757, i = 0..95. The amplitude is 10 below 32767 because interpolation by the derivative overshoots by 10. */

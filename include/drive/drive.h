@@ -26,7 +26,11 @@
 typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_state_t;
 
 /** What drives the six outputs. */
-typedef enum { OUTPUTS_OFF, OUTPUTS_BOOTSTRAP, OUTPUTS_PWM } outputs_t;
+typedef enum {
+    OUTPUTS_OFF,
+    OUTPUTS_BOOTSTRAP,
+    OUTPUTS_PWM
+} outputs_t;
 
 /** Constants of the machine around the control law. Times in periods or in slow steps (8 periods). */
 typedef struct {
@@ -36,28 +40,28 @@ typedef struct {
     svm_params_t svm;
     pi_gains_t pi_d, pi_q, pi_speed;
 
-    q15_t kcurr_a, kcurr_b;               /**< gain of the samples; Q15 sample to Q13 current by the high word */
-    int16_t offset_max_q13;               /**< largest plausible offset */
+    q15_t kcurr_a, kcurr_b; /**< gain of the samples; Q15 sample to Q13 current by the high word */
+    int16_t offset_max_q13; /**< largest plausible offset */
     uint16_t bootstrap_periods;
     uint16_t lock_periods;
     uint16_t ready_slots, ready_timeout_slots; /**< agreement needed at the end of the ramp, and how long it may take */
-    uint32_t lock_sweep_q32;              /**< angle step while the first half of the lock turns by 90 degrees */
+    uint32_t lock_sweep_q32;                   /**< angle step while the first half of the lock turns by 90 degrees */
 
-    current_q13_t open_loop_q13;          /**< Q_CURRENT_REF_OPENLOOP */
-    current_q13_t current_max_q13;        /**< MAXIMUM_CURRENT_A */
-    uint16_t current_max_reciprocal;      /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
-    current_q13_t overcurrent_q13;        /**< OVER_CURRENT_THRESHOLD_A */
-    uint16_t voltage_limit_per_bus_q16;   /**< see param_scaling.h */
+    current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
+    current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
+    uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
+    current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
+    uint16_t voltage_limit_per_bus_q16; /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
-    int16_t bus_over_q15, bus_under_q15;  /**< trip levels */
-    int16_t bus_regen_q15;                /**< braking current falls from here */
-    int16_t brake_per_bus_q8;             /**< braking current taken off per bus count above, Q13 counts * 256 */
-    int16_t bus_nominal_q15;              /**< start value of the bus filter */
+    int16_t bus_over_q15, bus_under_q15; /**< trip levels */
+    int16_t bus_regen_q15;               /**< braking current falls from here */
+    int16_t brake_per_bus_q8;            /**< braking current taken off per bus count above, Q13 counts * 256 */
+    int16_t bus_nominal_q15;             /**< start value of the bus filter */
 
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
-    int16_t speed_ramp_erpm;              /**< reference step per slow step */
-    int32_t tuning_step_q16;              /**< the same in TUNING */
-    int16_t ramp_hold_erpm;               /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
+    int16_t speed_ramp_erpm; /**< reference step per slow step */
+    int32_t tuning_step_q16; /**< the same in TUNING */
+    int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
     uint16_t stall_slots, lost_lock_slots;
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
@@ -69,16 +73,16 @@ typedef struct {
 
 /** Requests from the background; 16-bit, so written in one instruction. */
 typedef struct {
-    volatile int16_t run;          /**< 1: start and keep running (see drive_start()), 0: stop in order; faults clear it */
-    volatile int16_t clear_fault;  /**< 1: one request, taken back by the tick */
-    volatile int16_t target_erpm;  /**< speed target, signed; TORQUE_MODE: q current, Q13 */
+    volatile int16_t run;         /**< 1: start and keep running (see drive_start()), 0: stop in order; faults clear it */
+    volatile int16_t clear_fault; /**< 1: one request, taken back by the tick */
+    volatile int16_t target_erpm; /**< speed target, signed; TORQUE_MODE: q current, Q13 */
 } drive_command_t;
 
 /** Current offsets and the sums they come from. */
 typedef struct {
     int32_t sum_a, sum_b;
     int16_t offset_a_q13, offset_b_q13;
-    int16_t done;                  /**< 1: the offsets are known */
+    int16_t done; /**< 1: the offsets are known */
 } calibration_t;
 
 /** Controller variables of the closed loop. */
@@ -95,17 +99,17 @@ typedef struct {
 
 /** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
 typedef struct {
-    uint16_t waited_steps;         /**< at the end of the ramp */
-    uint16_t agreed_steps;         /**< of them, the last ones in which the estimator agreed with the forced speed */
-    uint16_t speed_is_preset;      /**< 1 from six periods after the hand-over on */
-    int16_t offset;                /**< angle that is left of the change of frame, angle counts */
-    current_q13_t id_q13;          /**< d current that goes with it */
+    uint16_t waited_steps;    /**< at the end of the ramp */
+    uint16_t agreed_steps;    /**< of them, the last ones in which the estimator agreed with the forced speed */
+    uint16_t speed_is_preset; /**< 1 from six periods after the hand-over on */
+    int16_t offset;           /**< angle that is left of the change of frame, angle counts */
+    current_q13_t id_q13;     /**< d current that goes with it */
 } handover_t;
 
 /** What a start begins anew: all of it is cleared. */
 typedef struct {
     estimator_t estimator;
-    estimator_tuning_t model;      /**< the motor's constants, as field weakening adapts them */
+    estimator_tuning_t model; /**< the motor's constants, as field weakening adapts them */
     fieldweak_t fieldweak;
     handover_t handover;
     drive_control_t control;
@@ -116,21 +120,21 @@ typedef struct {
 /** Everything the drive knows. Owned by the board; zero plus drive_init() is the start. */
 typedef struct {
     drive_command_t command;
-    volatile uint16_t state;       /**< drive_state_t; written by drive_enter() only */
-    volatile uint16_t fault;       /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
-    volatile uint16_t ticks;       /**< periods since power-up, wraps; the background's time base */
-    uint16_t periods;              /**< in the present state: CALIBRATE, BOOTSTRAP and ALIGN count it */
-    int16_t direction;             /**< +1 or -1, fixed from start to stop */
+    volatile uint16_t state; /**< drive_state_t; written by drive_enter() only */
+    volatile uint16_t fault; /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
+    volatile uint16_t ticks; /**< periods since power-up, wraps; the background's time base */
+    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP and ALIGN count it */
+    int16_t direction;       /**< +1 or -1, fixed from start to stop */
 
     calibration_t calibration;
     current_q13_t i_a_q13, i_b_q13, i_c_q13;
-    int32_t bus_q31;               /**< filtered bus, upper word Q15 of full scale */
-    voltage_circle_t circle;       /**< voltage circle at this bus */
+    int32_t bus_q31;         /**< filtered bus, upper word Q15 of full scale */
+    voltage_circle_t circle; /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
 
     forced_angle_t forced;
-    angle_t angle;                 /**< control angle of the next sample */
-    sincos_t frame;                /**< its sine and cosine */
+    angle_t angle;  /**< control angle of the next sample */
+    sincos_t frame; /**< its sine and cosine */
     drive_run_t run;
 } drive_t;
 

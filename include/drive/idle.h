@@ -23,8 +23,8 @@ NOINLINE void idle_step(drive_t *d, const drive_params_t *p, const drive_samples
     case DRIVE_BOOTSTRAP:
         next = (uint16_t)startup_bootstrap(d, p);
         break;
-    default: /* FAULT */
-        if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) { /* raised in the background while it was cleared here */
+    default: /* FAULT; without a fault when the background raised one while it was cleared here */
+        if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) {
             calibration_restart(&d->calibration);
             next = (uint16_t)drive_clear_fault(d);
         }

@@ -26,11 +26,11 @@ typedef struct {
 /** State of the panel. */
 typedef struct {
     button_t s2, s3;
-    int16_t wish_run;    /**< the user wants the motor to run */
-    int16_t fast_range;  /**< S3: NOMINAL..MAXIMUM instead of MINIMUM..NOMINAL */
+    int16_t wish_run;         /**< the user wants the motor to run */
+    int16_t fast_range;       /**< S3: NOMINAL..MAXIMUM instead of MINIMUM..NOMINAL */
     volatile int16_t pot_q15; /**< last sample of the potentiometer, signed fractional; the control interrupt writes it */
-    int32_t pot_q31;     /**< filtered potentiometer */
-    int16_t pot_used_q15; /**< the value in use: follows the filtered one with half a converter step of hysteresis */
+    int32_t pot_q31;          /**< filtered potentiometer */
+    int16_t pot_used_q15;     /**< the value in use: follows the filtered one with half a converter step of hysteresis */
     uint16_t blink_ms;
 } panel_t;
 

@@ -3,7 +3,7 @@
  * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
  * options: -eva-domains equality,symbolic-locations -eva-subdivide-non-linear-function vd_limit:100
- *     -inline-calls protection_check_current,drive_is_running,drive_raise,startup_bootstrap,idle_step,qm_abs
+ *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
  *     -eva-slevel-function drive_tick:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
  *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20 */
 #include "any.h"

@@ -28,10 +28,6 @@ void setUp(void)
     firmware_init();
 }
 
-void tearDown(void)
-{
-}
-
 /** Milliseconds of a healthy board: 20 control interrupts, timer 1's flag, some passes of the loop. */
 static void board_ms(uint16_t ms)
 {
@@ -44,6 +40,23 @@ static void board_ms(uint16_t ms)
         firmware_background();
         firmware_background();
     }
+}
+
+/* S2 down and up again, both for longer than it bounces. */
+static void press_s2(void)
+{
+    PORTAbits.RA8 = 0;
+    board_ms(40);
+    PORTAbits.RA8 = 1;
+    board_ms(10);
+}
+
+/** State, fault and override: 0 all off, 0x0015 the low sides, 0x3F00 PWM. */
+static void expect(drive_state_t state, drive_fault_t fault, uint16_t override)
+{
+    TEST_ASSERT_EQUAL_UINT16(state, board_drive.state);
+    TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
+    TEST_ASSERT_EQUAL_HEX16(override, P1OVDCON);
 }
 
 /* Every register that the start changes, with its value from the device facts; the rest stays as it was. */
@@ -101,20 +114,14 @@ void test_every_register_after_the_start(void)
     }
 }
 
-void test_outputs_are_off_until_S2_whatever_time_passes(void)
-{
-    board_ms(2000);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, board_drive.state);
-}
-
-void test_S2_leads_over_bootstrap_to_pwm(void)
+void test_S2_leads_over_bootstrap_to_pwm_and_stops_and_nothing_else_does(void)
 {
     uint16_t bootstrap_ms = 0;
-    board_ms(100);
+    board_ms(2000);
+    expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);
     PORTAbits.RA8 = 0;
     board_ms(29);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);
     board_ms(1);
     PORTAbits.RA8 = 1;
     while (P1OVDCON != 0x3F00u && bootstrap_ms < 50u) {
@@ -125,62 +132,22 @@ void test_S2_leads_over_bootstrap_to_pwm(void)
     TEST_ASSERT_TRUE(P1DC1 != 0u || P1DC2 != 0u || P1DC3 != 0u);
     PORTAbits.RA8 = 0; /* and S2 again stops */
     board_ms(31);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);
 }
 
-void test_no_start_before_the_offsets_are_known(void)
-{
-    PORTAbits.RA8 = 0;
-    board_ms(51); /* 1020 samples */
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, board_drive.state);
-}
-
-void test_implausible_offset_blinks_and_keeps_the_outputs_off(void)
-{
-    ADC1BUF1 = 8192;
-    board_ms(60);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OFFSET, board_drive.fault);
-    PORTAbits.RA8 = 0;
-    board_ms(200); /* cleared, calibrated again, wrong again */
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OFFSET, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-}
-
-/* S2 down and up again, both for longer than it bounces. */
-static void press_s2(void)
-{
-    PORTAbits.RA8 = 0;
-    board_ms(40);
-    PORTAbits.RA8 = 1;
-    board_ms(10);
-}
-
-void test_fault_is_cleared_by_S2_and_a_second_press_starts(void)
-{
-    board_ms(100);
-    _FLTA1Interrupt();
-    press_s2();
-    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    PORTAbits.RA8 = 0;
-    board_ms(35);
-    TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
-}
-
-void test_fault_input_that_stays_low_comes_back_after_S2_and_nothing_starts(void)
+void test_fault_is_cleared_by_S2_once_its_input_is_high_and_a_second_press_starts(void)
 {
     board_ms(100);
     PORTBbits.RB8 = 0; /* its beginning alone makes an interrupt */
     _FLTA1Interrupt();
     press_s2();
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect(DRIVE_FAULT, FAULT_OVERCURRENT_HW, 0x0000);
     PORTBbits.RB8 = 1;
+    press_s2();
+    expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);
     PORTAbits.RA8 = 0;
-    board_ms(40);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    board_ms(35);
+    expect(DRIVE_BOOTSTRAP, FAULT_NONE, 0x0015);
 }
 
 void test_silent_converter_is_found_through_timer_1(void)
@@ -188,24 +155,12 @@ void test_silent_converter_is_found_through_timer_1(void)
     board_ms(100);
     PORTAbits.RA8 = 0;
     board_ms(60);
-    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
     IFS0bits.T1IF = 1;
     firmware_background();
-    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    expect(DRIVE_ALIGN, FAULT_NONE, 0x3F00);
     IFS0bits.T1IF = 1;
     firmware_background();
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_ADC_LOST, board_drive.fault);
-}
-
-void test_clock_that_does_not_come_up_keeps_the_outputs_off(void)
-{
-    board_ms(10);
-    drive_init(&board_drive, &board_params);
-    drive_raise(&board_drive, FAULT_CLOCK);
-    board_ms(500);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_CLOCK, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect(DRIVE_FAULT, FAULT_ADC_LOST, 0x0000);
 }
 
 void test_second_start_of_the_firmware_begins_anew(void)
@@ -213,9 +168,8 @@ void test_second_start_of_the_firmware_begins_anew(void)
     board_ms(100);
     PORTAbits.RA8 = 0;
     board_ms(60);
-    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    expect(DRIVE_ALIGN, FAULT_NONE, 0x3F00);
     firmware_init();
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, board_drive.state);
+    expect(DRIVE_CALIBRATE, FAULT_NONE, 0x0000);
     TEST_ASSERT_EQUAL_INT16(0, board_drive.calibration.done);
 }

@@ -33,10 +33,6 @@ void setUp(void)
     status_init();
 }
 
-void tearDown(void)
-{
-}
-
 static void expect_line(const char *text)
 {
     uint16_t n;

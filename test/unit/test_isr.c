@@ -75,13 +75,11 @@ static void control_interrupts(uint16_t periods)
     }
 }
 
-/** Running: ALIGN has begun. */
-static void bring_to_lock(void)
+static void expect_off(drive_fault_t fault)
 {
-    control_interrupts(1024);
-    drive_start(&board_drive, &board_params, 1);
-    control_interrupts(201);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, board_drive.state);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
 }
 
 void setUp(void)
@@ -95,8 +93,14 @@ void setUp(void)
     trap_comes_in_the_hand_over = 0;
 }
 
-void tearDown(void)
+/** Running: ALIGN has begun. */
+static void bring_to_align(void)
 {
+    setUp();
+    control_interrupts(1024);
+    drive_start(&board_drive, &board_params, 1);
+    control_interrupts(201);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, board_drive.state);
 }
 
 void test_samples_come_from_the_channels_of_the_facts(void)
@@ -112,33 +116,22 @@ void test_samples_come_from_the_channels_of_the_facts(void)
     TEST_ASSERT_INT16_WITHIN(2, BUS_Q15(30.0), qm_hi(board_drive.bus_q31));
 }
 
-void test_flag_is_cleared_before_the_work_so_that_a_late_sample_shows(void)
+void test_outputs_stay_overridden_off_until_a_start_then_bootstrap_then_pwm(void)
 {
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(0, flag_during_tick);
-    TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.AD1IF);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
-}
-
-void test_outputs_stay_overridden_off_until_a_start(void)
-{
+    static const uint16_t expected[][2] = { /* periods, 0: the start; override */
+        { 1, 0x0000 }, { 3000, 0x0000 }, { 0, 0x0000 }, { 1, 0x0015 }, { 199, 0x0015 }, { 1, 0x3F00 }
+    };
     P1OVDCON = 0x3F00;
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    control_interrupts(3000);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-}
-
-void test_bootstrap_then_pwm(void)
-{
-    control_interrupts(1024);
-    drive_start(&board_drive, &board_params, 1);
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
-    control_interrupts(199);
-    TEST_ASSERT_EQUAL_HEX16(0x0015, P1OVDCON);
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    for (unsigned n = 0; n < sizeof expected / sizeof expected[0]; n++) {
+        if (expected[n][0] == 0u) {
+            drive_start(&board_drive, &board_params, 1);
+        }
+        control_interrupts(expected[n][0]);
+        TEST_ASSERT_EQUAL_HEX16(expected[n][1], P1OVDCON);
+        TEST_ASSERT_EQUAL_UINT16(0, flag_during_tick); /* cleared before the work, so that a late sample shows */
+        TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.AD1IF);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    }
 }
 
 void test_each_duty_reaches_its_own_pair(void)
@@ -146,7 +139,7 @@ void test_each_duty_reaches_its_own_pair(void)
     drive_t twin;
     drive_samples_t raw = { -800, 400, 0 };
     duties_t expected;
-    bring_to_lock();
+    bring_to_align();
     control_interrupts(300);
     P1DC1 = 0xFFFFu;
     P1DC2 = 0xFFFFu;
@@ -163,17 +156,18 @@ void test_each_duty_reaches_its_own_pair(void)
     TEST_ASSERT_TRUE(P1DC1 != P1DC2 && P1DC2 != P1DC3 && P1DC1 != P1DC3);
 }
 
-void test_slow_work_waits_until_duties_and_override_are_written(void)
+void test_slow_work_waits_until_duties_and_override_are_written_and_they_fit_the_timer(void)
 {
     uint16_t n;
     control_interrupts(1024);
     drive_start(&board_drive, &board_params, 1);
-    for (n = 0; n < 1000u; n++) {
+    for (n = 0; n < 4200u; n++) {
         control_interrupts(1);
         TEST_ASSERT_EQUAL_HEX16(P1OVDCON, at_slow.override);
         TEST_ASSERT_EQUAL_UINT16(P1DC1, at_slow.duty_a);
         TEST_ASSERT_EQUAL_UINT16(P1DC2, at_slow.duty_b);
         TEST_ASSERT_EQUAL_UINT16(P1DC3, at_slow.duty_c);
+        TEST_ASSERT_TRUE(P1DC1 <= 2000u && P1DC2 <= 2000u && P1DC3 <= 2000u);
     }
     TEST_ASSERT_EQUAL_HEX16(0x3F00, at_slow.override);
     TEST_ASSERT_TRUE(P1DC1 != 0);
@@ -182,169 +176,107 @@ void test_slow_work_waits_until_duties_and_override_are_written(void)
 void test_fault_of_the_slow_work_switches_off_in_its_own_interrupt(void)
 {
     uint16_t periods = 0;
-    bring_to_lock();
+    bring_to_align();
     ADC1BUF3 = (uint16_t)raw_bus(36.0F);
     while (board_drive.fault == (uint16_t)FAULT_NONE && periods < 9u) {
         TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
         control_interrupts(1);
         periods++;
     }
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect_off(FAULT_OVERVOLTAGE);
 }
 
-void test_duties_stay_within_the_timer(void)
+void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
 {
-    uint16_t n;
-    bring_to_lock();
-    for (n = 0; n < 4000u; n++) {
+    static const struct {
+        const char *what;
+        uint16_t timer, sample_arrives, i_a;
+        drive_fault_t fault;
+    } cases[] = {
+        { "duties just before the boundary", 0x8001, 0, 0, FAULT_NONE },
+        { "duties after the boundary: counting up, they have been loaded", 0x0001, 0, 0, FAULT_ISR_OVERRUN },
+        { "the next sample during the interrupt", 0x8001, 1, 0, FAULT_ISR_OVERRUN },
+        { "too much current", 0x8001, 0, (uint16_t)(-4 * 7076), FAULT_OVERCURRENT_SW },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        bring_to_align();
+        P1TMR = cases[n].timer;
+        sample_arrives_meanwhile = cases[n].sample_arrives;
+        ADC1BUF1 = cases[n].i_a;
         control_interrupts(1);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(2000, P1DC1);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(2000, P1DC2);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(2000, P1DC3);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault, board_drive.fault, cases[n].what);
+        TEST_ASSERT_EQUAL_HEX16_MESSAGE(cases[n].fault ? 0x0000 : 0x3F00, P1OVDCON, cases[n].what);
+        if (cases[n].fault) {
+            P1TMR = 0x81F4;
+            sample_arrives_meanwhile = 0;
+            control_interrupts(1000);
+            expect_off(cases[n].fault);
+        }
     }
 }
 
-void test_duties_after_the_boundary_are_an_overrun(void)
+void test_fault_input_switches_off_and_keeps_its_code_through_later_faults(void)
 {
-    bring_to_lock();
-    P1TMR = 0x0001; /* counting up: the duties have been loaded */
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_ISR_OVERRUN, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
-}
-
-void test_duties_just_before_the_boundary_are_in_time(void)
-{
-    bring_to_lock();
-    P1TMR = 0x8001;
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
-}
-
-void test_next_sample_during_the_interrupt_is_an_overrun(void)
-{
-    bring_to_lock();
-    sample_arrives_meanwhile = 1;
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_ISR_OVERRUN, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-}
-
-void test_outputs_stay_off_after_an_overrun(void)
-{
-    bring_to_lock();
-    P1TMR = 0x0001;
-    control_interrupts(1);
-    P1TMR = 0x81F4;
-    control_interrupts(1000);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_ISR_OVERRUN, board_drive.fault);
-}
-
-void test_software_overcurrent_is_off_within_the_period(void)
-{
-    bring_to_lock();
-    ADC1BUF1 = (uint16_t)(-4 * 7076);
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, board_drive.fault);
-}
-
-void test_fault_input_switches_off_and_keeps_its_code(void)
-{
-    bring_to_lock();
+    bring_to_align();
     IFS3bits.FLTA1IF = 1;
     _FLTA1Interrupt();
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
+    expect_off(FAULT_OVERCURRENT_HW);
     TEST_ASSERT_EQUAL_UINT16(0, IFS3bits.FLTA1IF);
-    control_interrupts(100);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
-}
-
-static void expect_trap(void (*trap)(void), drive_fault_t fault, uint16_t flags_left)
-{
-    setUp();
-    bring_to_lock();
-    reset_keep(FAULT_NONE);
-    INTCON1 = 0x001E; /* all four causes */
-    trap();
-    RCON = 0x0010u; /* the background does not come back: the watchdog's reset follows */
-    TEST_ASSERT_EQUAL_UINT16(fault, reset_take());
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-    TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
-    TEST_ASSERT_EQUAL_HEX16(flags_left, INTCON1);
-    TEST_ASSERT_EQUAL_HEX16(0x001E, board_trap_intcon1); /* the cause stays readable */
-    control_interrupts(10);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-}
-
-void test_oscillator_failure_is_a_clock_fault(void)
-{
-    board_clock_failed = 0;
-    expect_trap(_OscillatorFail, FAULT_CLOCK, 0x001C);
-    TEST_ASSERT_EQUAL_UINT16(1, board_clock_failed); /* no S2 makes the clock right again */
-}
-
-void test_address_error_is_a_trap_fault(void)
-{
-    expect_trap(_AddressError, FAULT_TRAP, 0x0016);
-}
-
-void test_stack_error_is_a_trap_fault(void)
-{
-    expect_trap(_StackError, FAULT_TRAP, 0x001A);
-}
-
-void test_math_error_is_a_trap_fault(void)
-{
-    expect_trap(_MathError, FAULT_TRAP, 0x000E);
-}
-
-void test_unexpected_interrupt_is_a_trap_fault(void)
-{
-    expect_trap(_DefaultInterrupt, FAULT_TRAP, 0x001E);
-}
-
-void test_no_interrupt_and_no_trap_serves_the_watchdog(void)
-{
-    control_interrupts(1024);
-    drive_start(&board_drive, &board_params, 1);
-    control_interrupts(300);
-    _FLTA1Interrupt();
-    _OscillatorFail();
-    _AddressError();
-    _StackError();
     _MathError();
-    _DefaultInterrupt();
+    P1TMR = 0;
     control_interrupts(100);
-    TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
+    expect_off(FAULT_OVERCURRENT_HW);
+}
+
+void test_each_trap_clears_its_own_flag_and_is_kept_over_the_reset_that_follows(void)
+{
+    static const struct {
+        void (*trap)(void);
+        drive_fault_t fault;
+        uint16_t flags_left;
+    } cases[] = {
+        { _OscillatorFail, FAULT_CLOCK, 0x001C },
+        { _AddressError, FAULT_TRAP, 0x0016 },
+        { _StackError, FAULT_TRAP, 0x001A },
+        { _MathError, FAULT_TRAP, 0x000E },
+        { _DefaultInterrupt, FAULT_TRAP, 0x001E },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        bring_to_align();
+        board_clock_failed = 0;
+        reset_keep(FAULT_NONE);
+        INTCON1 = 0x001E; /* all four causes */
+        cases[n].trap();
+        RCON = 0x0010u; /* the background does not come back: the watchdog's reset follows */
+        TEST_ASSERT_EQUAL_UINT16(cases[n].fault, reset_take());
+        expect_off(cases[n].fault);
+        TEST_ASSERT_EQUAL_HEX16(cases[n].flags_left, INTCON1);
+        TEST_ASSERT_EQUAL_HEX16(0x001E, board_trap_intcon1); /* the cause stays readable */
+        TEST_ASSERT_EQUAL_UINT16(cases[n].fault == FAULT_CLOCK, board_clock_failed); /* no S2 makes the clock right again */
+        control_interrupts(10);
+        expect_off(cases[n].fault);
+        _FLTA1Interrupt();
+        TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves); /* by no interrupt and no trap */
+    }
 }
 
 void test_trap_inside_the_control_interrupt_is_off_within_one_period(void)
 {
-    bring_to_lock();
+    bring_to_align();
     trap_comes_meanwhile = 1;
     control_interrupts(2); /* the one that was interrupted, and the next */
-    TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect_off(FAULT_TRAP);
     control_interrupts(100);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+    expect_off(FAULT_TRAP);
 }
 
 void test_trap_in_the_middle_of_the_hand_over_is_not_overwritten(void)
 {
     uint16_t n;
-    bring_to_lock();
+    bring_to_align();
     board_drive.state = (uint16_t)DRIVE_RAMP;
     board_drive.periods = 0;
     board_drive.forced.speed_q10 = board_params.forced.end_speed_q10;
-    board_drive.run.handover.agreed_steps = board_params.ready_slots;
     trap_comes_in_the_hand_over = 1;
     for (n = 0; n < 16u && trap_comes_in_the_hand_over; n++) {
         board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
@@ -353,17 +285,5 @@ void test_trap_in_the_middle_of_the_hand_over_is_not_overwritten(void)
     }
     TEST_ASSERT_EQUAL_UINT16(0, trap_comes_in_the_hand_over);
     control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, board_drive.state);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
-}
-
-void test_first_fault_is_kept_through_later_ones(void)
-{
-    bring_to_lock();
-    _FLTA1Interrupt();
-    _MathError();
-    P1TMR = 0;
-    control_interrupts(1);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_drive.fault);
+    expect_off(FAULT_TRAP);
 }

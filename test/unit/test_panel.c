@@ -1,16 +1,11 @@
 /* The panel: debounced buttons, what S2 and S3 do in every state, the potentiometer's range and calm, and the LEDs. */
 #include "panel_rig.h"
-#include "unity.h"
 
 void setUp(void)
 {
     panel_reset();
     rig_ready();
     panel_turn_pot(0);
-}
-
-void tearDown(void)
-{
 }
 
 void test_init_forgets_everything_and_puts_the_pot_at_its_lower_end(void)
@@ -34,62 +29,38 @@ void test_init_forgets_everything_and_puts_the_pot_at_its_lower_end(void)
 
 /* ---- debouncing ---- */
 
-void test_button_acts_after_30_ms(void)
+void test_button_acts_once_after_30_ms_of_calm_contact(void)
 {
-    button_t b = { 0 };
-    uint16_t ms;
-    for (ms = 1; ms < 30u; ms++) {
-        TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, 1, 1));
-    }
-    TEST_ASSERT_EQUAL_UINT16(1, button_pressed(&b, 1, 1));
-}
-
-void test_long_press_acts_once(void)
-{
-    button_t b = { 0 };
-    uint16_t ms, acts = 0;
-    for (ms = 0; ms < 60000u; ms++) {
-        acts = (uint16_t)(acts + button_pressed(&b, 1, 1));
-    }
-    TEST_ASSERT_EQUAL_UINT16(1, acts);
-}
-
-void test_bouncing_contact_does_not_act_before_it_is_calm(void)
-{
-    button_t b = { 0 };
-    uint16_t ms;
-    for (ms = 0; ms < 200u; ms++) {
-        TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, (uint16_t)((ms % 30u) != 29u), 1));
+    enum { MOST = 60000 };
+    static const struct {
+        const char *what;
+        uint16_t ms, bounce_every, acts_at; /* 0: never */
+    } cases[] = {
+        { "a long press", MOST, 0, 30 },
+        { "a contact that opens every 30 ms", 200, 30, 0 },
+        { "one that opens every other millisecond", 200, 2, 0 },
+    };
+    EACH(n, cases) {
+        button_t b = { 0 };
+        uint16_t ms;
+        for (ms = 1; ms <= cases[n].ms; ms++) {
+            uint16_t down = (uint16_t)(cases[n].bounce_every == 0u || (ms % cases[n].bounce_every) != 0u);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(ms == cases[n].acts_at, button_pressed(&b, down, 1), cases[n].what);
+        }
+        for (ms = 0; ms < 50u; ms++) { /* bounces at release */
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, button_pressed(&b, ms & 1u, 1), cases[n].what);
+        }
     }
 }
 
-void test_bounces_at_release_do_not_act_again(void)
+void test_each_press_acts_and_slow_passes_count_their_elapsed_time(void)
 {
+    static const uint16_t presses[][2] = { { 40, 1 }, { 29, 0 }, { 30, 1 }, { 31, 1 } };
     button_t b = { 0 };
-    uint16_t ms, acts = 0;
-    for (ms = 0; ms < 100u; ms++) {
-        (void)button_pressed(&b, 1, 1);
-    }
-    for (ms = 0; ms < 50u; ms++) {
-        acts = (uint16_t)(acts + button_pressed(&b, ms & 1u, 1));
-    }
-    TEST_ASSERT_EQUAL_UINT16(0, acts);
-}
-
-void test_each_press_acts(void)
-{
-    button_t b = { 0 };
-    uint16_t press, acts = 0;
-    for (press = 0; press < 5u; press++) {
-        acts = (uint16_t)(acts + button_pressed(&b, 1, 40));
+    EACH(n, presses) {
+        TEST_ASSERT_EQUAL_UINT16(presses[n][1], button_pressed(&b, 1, presses[n][0]));
         (void)button_pressed(&b, 0, 1);
     }
-    TEST_ASSERT_EQUAL_UINT16(5, acts);
-}
-
-void test_slow_passes_count_their_elapsed_time(void)
-{
-    button_t b = { 0 };
     TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, 1, 10));
     TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, 1, 19));
     TEST_ASSERT_EQUAL_UINT16(1, button_pressed(&b, 1, 1));
@@ -97,34 +68,23 @@ void test_slow_passes_count_their_elapsed_time(void)
 
 /* ---- S2 ---- */
 
-void test_S2_starts(void)
+void test_S2_starts_and_stops_and_nothing_else_starts(void)
 {
+    panel_and_drive_ms(1000);
+    press_s3(100);
     press_s2(29);
+    panel_and_drive_ms(100);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "no S2 yet");
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     press_s2(30);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
-}
-
-void test_S2_stops(void)
-{
-    press_s2(50);
     rig_tick(500);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, drive.state);
+    EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "started");
     press_s2(50);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
-    rig_tick(1);
     panel_and_drive_ms(100);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-}
-
-void test_no_start_without_S2(void)
-{
-    panel_and_drive_ms(1000);
-    press_s3(100);
-    panel_and_drive_ms(100);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-    TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "stopped");
 }
 
 void test_S2_during_calibration_starts_only_after_it(void)
@@ -134,36 +94,26 @@ void test_S2_during_calibration_starts_only_after_it(void)
     press_s2(40);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     panel_and_drive_ms(30);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
-    TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, out.outputs);
+    EXPECT_DRIVE(DRIVE_CALIBRATE, FAULT_NONE, "calibrating");
     panel_and_drive_ms(40);
     TEST_ASSERT_TRUE(drive.state > (uint16_t)DRIVE_STOPPED);
 }
 
-void test_S2_in_a_fault_only_clears_it(void)
-{
-    drive_raise(&drive, FAULT_STALL);
-    press_s2(50);
-    TEST_ASSERT_EQUAL_INT16(1, drive.command.clear_fault);
-    panel_and_drive_ms(500);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-    TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
-}
-
-void test_fault_while_running_needs_two_presses_to_run_again(void)
+void test_S2_in_a_fault_only_clears_it_and_a_second_press_runs_again(void)
 {
     press_s2(50);
     panel_and_drive_ms(50);
     drive_raise(&drive, FAULT_OVERCURRENT_HW);
     panel_and_drive_ms(500);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERCURRENT_HW, "not yet cleared");
     press_s2(50);
+    TEST_ASSERT_EQUAL_INT16(1, drive.command.clear_fault);
     panel_and_drive_ms(500);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "cleared");
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     press_s2(50);
     panel_and_drive_ms(5);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_BOOTSTRAP, drive.state);
+    EXPECT_DRIVE(DRIVE_BOOTSTRAP, FAULT_NONE, "asked for again");
 }
 
 void test_S2_held_from_before_a_fault_does_not_clear_it(void)
@@ -172,7 +122,7 @@ void test_S2_held_from_before_a_fault_does_not_clear_it(void)
     panel_and_drive_ms(100);
     drive_raise(&drive, FAULT_OVERVOLTAGE);
     panel_and_drive_ms(1000);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, drive.fault);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERVOLTAGE, "held");
 }
 
 void test_S2_while_stopping_starts_again_after_the_stop(void)
@@ -191,7 +141,7 @@ void test_S2_while_stopping_starts_again_after_the_stop(void)
 
 /* ---- S3 ---- */
 
-void test_S3_changes_the_range_only_while_running(void)
+void test_S3_changes_the_range_only_while_running_and_every_start_begins_in_the_low_range(void)
 {
     press_s3(50);
     TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
@@ -204,11 +154,6 @@ void test_S3_changes_the_range_only_while_running(void)
     press_s3(50);
     TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
     TEST_ASSERT_INT16_WITHIN(15, 2500, drive.command.target_erpm);
-}
-
-void test_every_start_begins_in_the_low_range(void)
-{
-    press_s2(50);
     press_s3(50);
     press_s2(50);
     TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
@@ -218,25 +163,17 @@ void test_every_start_begins_in_the_low_range(void)
 
 /* ---- potentiometer ---- */
 
-void test_pot_spans_MINIMUM_to_NOMINAL(void)
+void test_pot_spans_MINIMUM_to_NOMINAL_and_with_S3_NOMINAL_to_MAXIMUM(void)
 {
-    TEST_ASSERT_INT16_WITHIN(6, 2500, panel_target(&params, -32768, 0, 1));
-    TEST_ASSERT_INT16_WITHIN(6, 14000, panel_target(&params, 32704, 0, 1)); /* half a converter step: 11500 / 2048 */
-    TEST_ASSERT_INT16_WITHIN(6, 8250, panel_target(&params, 0, 0, 1));
-    TEST_ASSERT_INT16_WITHIN(6, 5375, panel_target(&params, -16384, 0, 1));
-}
-
-void test_pot_with_S3_spans_NOMINAL_to_MAXIMUM(void)
-{
-    TEST_ASSERT_INT16_WITHIN(7, 14000, panel_target(&params, -32768, 1, 1));
-    TEST_ASSERT_INT16_WITHIN(7, 27500, panel_target(&params, 32704, 1, 1));
-    TEST_ASSERT_INT16_WITHIN(7, 20750, panel_target(&params, 0, 1, 1));
-}
-
-void test_pot_never_leaves_its_range(void)
-{
+    static const int16_t cases[][3] = { /* pot, target, with S3; half a converter step is 11500 / 2048 */
+        { -32768, 2500, 14000 }, { -16384, 5375, 17375 }, { 0, 8250, 20750 }, { 32704, 14000, 27500 }, { 32767, 14000, 27500 }
+    };
     int32_t pot;
     int16_t last = 0;
+    EACH(n, cases) {
+        TEST_ASSERT_INT16_WITHIN(6, cases[n][1], panel_target(&params, cases[n][0], 0, 1));
+        TEST_ASSERT_INT16_WITHIN(7, cases[n][2], panel_target(&params, cases[n][0], 1, 1));
+    }
     for (pot = -32768; pot <= 32767; pot += 61) {
         int16_t target = panel_target(&params, (int16_t)pot, 0, 1);
         TEST_ASSERT_TRUE(target >= 2500 && target <= 14000);
@@ -247,53 +184,28 @@ void test_pot_never_leaves_its_range(void)
     TEST_ASSERT_TRUE(panel_target(&params, -32768, 1, 1) >= 14000);
 }
 
-void test_pot_arrives_at_the_command(void)
+void test_pot_arrives_at_the_command_over_ten_milliseconds(void)
 {
-    panel_turn_pot(512);
-    TEST_ASSERT_INT16_WITHIN(15, 8250, drive.command.target_erpm);
-    panel_turn_pot(1023);
-    TEST_ASSERT_INT16_WITHIN(15, 14000, drive.command.target_erpm);
-    panel_turn_pot(0);
-    TEST_ASSERT_INT16_WITHIN(15, 2500, drive.command.target_erpm);
+    static const int16_t cases[][2] = { { 512, 8250 }, { 1023, 14000 }, { 0, 2500 } };
+    EACH(n, cases) {
+        panel_turn_pot((uint16_t)cases[n][0]);
+        TEST_ASSERT_INT16_WITHIN(15, cases[n][1], drive.command.target_erpm);
+    }
+    the_panel.pot_q15 = 32704;
+    panel_ms(10); /* 1 - 0.9^10 = 65 % */
+    TEST_ASSERT_INT16_WITHIN(300, (int16_t)(2500 + 0.65F * 11500.0F), drive.command.target_erpm);
 }
 
-void test_pot_noise_of_one_step_does_not_move_the_target(void)
+void test_pot_noise_of_one_step_does_not_move_the_target_and_two_steps_do(void)
 {
     int16_t before = 0, ms;
     panel_turn_pot(500);
     for (ms = 0; ms < 600; ms++) {
         the_panel.pot_q15 = (int16_t)((uint16_t)((500u + (uint16_t)(ms & 1)) << 6) ^ 0x8000u);
         panel_ms(1);
-        if (ms == 100) { /* settled */
-            before = drive.command.target_erpm;
-        }
-        if (ms > 100) {
-            TEST_ASSERT_EQUAL_INT16(before, drive.command.target_erpm);
-        }
+        before = (ms <= 100) ? drive.command.target_erpm : before; /* settled */
+        TEST_ASSERT_EQUAL_INT16(before, drive.command.target_erpm);
     }
-}
-
-/** Value in use after the pot has rested at a distance from it. */
-static int16_t used_at_distance(int16_t counts)
-{
-    the_panel.pot_used_q15 = 1000;
-    the_panel.pot_q15 = (int16_t)(1000 + counts);
-    the_panel.pot_q31 = (int32_t)the_panel.pot_q15 * 65536; /* the filter has settled */
-    panel_ms(400);
-    return the_panel.pot_used_q15;
-}
-
-void test_pot_is_held_within_half_a_converter_step(void)
-{
-    TEST_ASSERT_EQUAL_INT16(1000, used_at_distance(32));
-    TEST_ASSERT_EQUAL_INT16(1000, used_at_distance(-32));
-    TEST_ASSERT_INT16_WITHIN(1, 1033, used_at_distance(33));
-    TEST_ASSERT_INT16_WITHIN(1, 967, used_at_distance(-33));
-}
-
-void test_pot_moves_the_target_from_two_steps_on(void)
-{
-    int16_t before;
     panel_turn_pot(500);
     before = drive.command.target_erpm;
     panel_turn_pot(502);
@@ -303,64 +215,72 @@ void test_pot_moves_the_target_from_two_steps_on(void)
     TEST_ASSERT_LESS_THAN_INT16(before, drive.command.target_erpm);
 }
 
-void test_pot_is_filtered_over_ten_milliseconds(void)
+void test_pot_is_held_within_half_a_converter_step(void)
 {
-    panel_turn_pot(0);
-    the_panel.pot_q15 = 32704;
-    panel_ms(10); /* 1 - 0.9^10 = 65 % */
-    TEST_ASSERT_INT16_WITHIN(300, (int16_t)(2500 + 0.65F * 11500.0F), drive.command.target_erpm);
+    static const int16_t cases[][2] = { { 32, 1000 }, { -32, 1000 }, { 33, 1033 }, { -33, 967 } };
+    EACH(n, cases) {
+        the_panel.pot_used_q15 = 1000;
+        the_panel.pot_q15 = (int16_t)(1000 + cases[n][0]);
+        the_panel.pot_q31 = (int32_t)the_panel.pot_q15 * 65536; /* the filter has settled */
+        panel_ms(400);
+        TEST_ASSERT_INT16_WITHIN(cases[n][1] != 1000, cases[n][1], the_panel.pot_used_q15);
+    }
 }
 
 /* ---- LEDs ---- */
 
 void test_run_LED_is_on_exactly_while_the_bridge_switches(void)
 {
-    uint16_t state;
-    for (state = 0; state < (uint16_t)DRIVE_STATE_COUNT; state++) {
+    EACH(state, rig_outputs) {
         drive.state = state;
         panel_ms(1);
-        TEST_ASSERT_EQUAL_UINT16(state >= (uint16_t)DRIVE_ALIGN && state <= (uint16_t)DRIVE_STOPPING, the_lights.led_run);
+        TEST_ASSERT_EQUAL_UINT16(rig_outputs[state] == (uint16_t)OUTPUTS_PWM, the_lights.led_run);
     }
+}
+
+/** What the alive LED does for a while. */
+typedef struct {
+    uint16_t on_ms, flashes, longest_dark_ms, lit_at_end;
+} blinking_t;
+
+static blinking_t watch_led(uint16_t ms)
+{
+    blinking_t seen = { 0, 0, 0, 0 };
+    uint16_t dark = 0;
+    while (ms-- != 0u) {
+        uint16_t before = seen.lit_at_end;
+        panel_ms(1);
+        seen.lit_at_end = the_lights.led_alive;
+        seen.on_ms = (uint16_t)(seen.on_ms + the_lights.led_alive);
+        seen.flashes = (uint16_t)(seen.flashes + (the_lights.led_alive && !before));
+        dark = (uint16_t)(the_lights.led_alive ? 0 : dark + 1);
+        seen.longest_dark_ms = (dark > seen.longest_dark_ms) ? dark : seen.longest_dark_ms;
+    }
+    return seen;
 }
 
 void test_alive_LED_blinks_once_a_second(void)
 {
-    uint16_t ms, on = 0, edges = 0, last;
-    panel_ms(1);
-    last = the_lights.led_alive;
-    for (ms = 0; ms < 10000u; ms++) {
-        panel_ms(1);
-        on = (uint16_t)(on + the_lights.led_alive);
-        edges = (uint16_t)(edges + (the_lights.led_alive != last));
-        last = the_lights.led_alive;
-    }
-    TEST_ASSERT_EQUAL_UINT16(20, edges);
-    TEST_ASSERT_EQUAL_UINT16(5000, on);
+    blinking_t seen;
+    panel_reset();
+    seen = watch_led(10000);
+    TEST_ASSERT_UINT16_WITHIN(1, 10, (uint16_t)(seen.flashes - (seen.lit_at_end != 0u)));
+    TEST_ASSERT_EQUAL_UINT16(5000, seen.on_ms);
+    TEST_ASSERT_UINT16_WITHIN(1, 500, seen.longest_dark_ms);
 }
 
 void test_fault_LED_blinks_the_code_and_then_pauses(void)
 {
     uint16_t code;
     for (code = 1; code < (uint16_t)FAULT_COUNT; code++) {
-        uint16_t ms, flashes = 0, last = 0, dark = 0, longest_dark = 0;
+        uint16_t cycle_ms = (uint16_t)(500u * code + 1500u);
+        blinking_t seen;
         panel_reset();
         drive.fault = code;
         drive.state = (uint16_t)DRIVE_FAULT;
-        for (ms = 0; ms < (uint16_t)(500u * code + 1500u); ms++) {
-            panel_ms(1);
-            flashes = (uint16_t)(flashes + (the_lights.led_alive && !last));
-            dark = (uint16_t)(the_lights.led_alive ? 0 : dark + 1);
-            longest_dark = (dark > longest_dark) ? dark : longest_dark;
-            last = the_lights.led_alive;
-        }
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(code, flashes - (uint16_t)(last != 0u), "flashes in one cycle");
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, 1750, longest_dark, "last gap and pause");
-        flashes = 0;
-        for (ms = 0; ms < (uint16_t)(500u * code + 1500u); ms++) {
-            panel_ms(1);
-            flashes = (uint16_t)(flashes + (the_lights.led_alive && !last));
-            last = the_lights.led_alive;
-        }
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(1, code, flashes, "the next cycle");
+        seen = watch_led(cycle_ms);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(code, seen.flashes - (seen.lit_at_end != 0u), "flashes in one cycle");
+        TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, 1750, seen.longest_dark_ms, "last gap and pause");
+        TEST_ASSERT_UINT16_WITHIN_MESSAGE(1, code, watch_led(cycle_ms).flashes, "the next cycle");
     }
 }

@@ -17,31 +17,24 @@ void setUp(void)
     drive_init(&board_drive, &board_params);
 }
 
-void tearDown(void)
+void test_currents_are_Q15_of_full_scale_and_limited_to_it(void)
 {
-}
-
-void test_current_of_1_41_A_reads_NORM_CURRENT_of_it(void)
-{
+    drive_control_t *c = &board_drive.run.control;
     board_drive.i_a_q13 = CURRENT_Q13(1.41);
     board_drive.i_b_q13 = CURRENT_Q13(-1.41);
+    c->i_q13.d = CURRENT_Q13(-0.5);
+    c->i_q13.q = CURRENT_Q13(2.0);
+    c->ref_q13.d = CURRENT_Q13(-1.0);
+    c->ref_q13.q = CURRENT_Q13(1.5);
     watch_refresh();
-    TEST_ASSERT_INT16_WITHIN(4, 10500, ParkParm.qIa); /* 1.41 A of 4.40 A; the drive's count is four of the note's */
+    TEST_ASSERT_INT16_WITHIN(4, 10500, ParkParm.qIa); /* 1.41 A of 4.40 A; the drive's count is four of AN1292's */
     TEST_ASSERT_INT16_WITHIN(4, -10500, ParkParm.qIb);
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.41), ParkParm.qIa);
-}
-
-void test_park_currents(void)
-{
-    board_drive.run.control.i_q13.d = CURRENT_Q13(-0.5);
-    board_drive.run.control.i_q13.q = CURRENT_Q13(2.0);
-    watch_refresh();
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-0.5), ParkParm.qId);
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(2.0), ParkParm.qIq);
-}
-
-void test_currents_beyond_the_notes_format_are_limited(void)
-{
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-1.0), CtrlParm.qVdRef);
+    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.5), CtrlParm.qVqRef);
+    TEST_ASSERT_EQUAL_INT16(CtrlParm.qVdRef, FdWeakParm.qIdRef);
     board_drive.i_a_q13 = 9000;
     board_drive.i_b_q13 = -9000;
     watch_refresh();
@@ -49,89 +42,55 @@ void test_currents_beyond_the_notes_format_are_limited(void)
     TEST_ASSERT_EQUAL_INT16(-32764, ParkParm.qIb);
 }
 
-void test_voltages_are_Q15_of_full_scale(void)
+void test_voltages_are_Q15_of_full_scale_and_back_emf_of_four_times_it(void)
 {
     board_drive.run.control.v_q14.d = VOLTAGE_Q14(-3.0);
     board_drive.run.control.v_q14.q = VOLTAGE_Q14(10.0);
+    board_drive.run.estimator.e_d_q28 = -1000L * 65536;
+    board_drive.run.estimator.e_q_q28 = 4096L * 65536; /* full scale */
     watch_refresh();
     TEST_ASSERT_INT16_WITHIN(2, -7390, ParkParm.qVd); /* 3 V / 13.302 V * 32768 */
     TEST_ASSERT_INT16_WITHIN(2, 24634, ParkParm.qVq);
+    TEST_ASSERT_EQUAL_INT16(-2000, EstimParm.qEsdf);
+    TEST_ASSERT_EQUAL_INT16(8192, EstimParm.qEsqf);
     board_drive.run.control.v_q14.q = 20000;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(32766, ParkParm.qVq);
 }
 
-void test_angles_are_65536_a_turn(void)
+void test_angles_are_65536_a_turn_and_speeds_electrical_rpm(void)
 {
     board_drive.angle = 0xC123;
     board_drive.run.estimator.rho_q32 = 0xA1234567ul;
+    board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536 + 1;
+    board_drive.run.estimator.omega_erpm = -4900;
+    board_drive.run.control.reference_erpm = -12345;
+    fieldweak_tick(&board_drive.run.fieldweak, &board_params.fieldweak, &board_drive.run.model, 27500);
     watch_refresh();
     TEST_ASSERT_EQUAL_HEX16(0xC123, ParkParm.qAngle);
     TEST_ASSERT_EQUAL_HEX16(0xA123, EstimParm.qRho);
-}
-
-void test_filtered_and_raw_speed_in_electrical_rpm(void)
-{
-    board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536 + 1;
-    board_drive.run.estimator.omega_erpm = -4900;
-    watch_refresh();
     TEST_ASSERT_EQUAL_INT16(5000, EstimParm.qVelEstim);
     TEST_ASSERT_EQUAL_INT16(-4900, EstimParm.qOmegaMr);
-}
-
-void test_back_emf_is_Q15_of_four_times_full_scale(void)
-{
-    board_drive.run.estimator.e_d_q28 = -1000L * 65536;
-    board_drive.run.estimator.e_q_q28 = 4096L * 65536; /* full scale */
-    watch_refresh();
-    TEST_ASSERT_EQUAL_INT16(-2000, EstimParm.qEsdf);
-    TEST_ASSERT_EQUAL_INT16(8192, EstimParm.qEsqf);
-}
-
-void test_references(void)
-{
-    board_drive.run.control.reference_erpm = -12345;
-    board_drive.run.control.ref_q13.d = CURRENT_Q13(-1.0);
-    board_drive.run.control.ref_q13.q = CURRENT_Q13(1.5);
-    watch_refresh();
     TEST_ASSERT_EQUAL_INT16(-12345, CtrlParm.qVelRef);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-1.0), CtrlParm.qVdRef);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.5), CtrlParm.qVqRef);
-    TEST_ASSERT_EQUAL_INT16(CtrlParm.qVdRef, FdWeakParm.qIdRef);
-}
-
-void test_field_weakening_index_and_start(void)
-{
-    fieldweak_tick(&board_drive.run.fieldweak, &board_params.fieldweak, &board_drive.run.model, 27500);
-    watch_refresh();
     TEST_ASSERT_EQUAL_INT16(14, FdWeakParm.qIndex);
     TEST_ASSERT_EQUAL_INT16(13000, FdWeakParm.qFwOnSpeed);
 }
 
-void test_motor_constants_in_the_notes_formats(void)
+void test_motor_constants_are_shown_as_adaptation_and_a_debugger_left_them(void)
 {
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(14470, MotorEstimParm.qRs);
     TEST_ASSERT_INT16_WITHIN(1, 1626, MotorEstimParm.qLsDt);
     TEST_ASSERT_EQUAL_INT16(7956, MotorEstimParm.qInvKFi);
     TEST_ASSERT_EQUAL_INT16(1790, MotorEstimParm.qDeltaT);
-}
-
-void test_adapted_constants_are_shown_as_they_are_in_use(void)
-{
     board_drive.run.model.ls_q16 = (uint16_t)(board_drive.run.model.ls_q16 / 2u);
     board_drive.run.model.inv_kfi = 12345;
-    watch_refresh();
-    TEST_ASSERT_INT16_WITHIN(1, 813, MotorEstimParm.qLsDt);
-    TEST_ASSERT_EQUAL_INT16(12345, MotorEstimParm.qInvKFi);
-}
-
-void test_motor_constants_that_a_debugger_has_changed_are_shown(void)
-{
     board_params.estimator.rs_q16 = 20001;
     board_params.estimator.deltat_q32 = 1234;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(10000, MotorEstimParm.qRs);
+    TEST_ASSERT_INT16_WITHIN(1, 813, MotorEstimParm.qLsDt);
+    TEST_ASSERT_EQUAL_INT16(12345, MotorEstimParm.qInvKFi);
     TEST_ASSERT_EQUAL_INT16(617, MotorEstimParm.qDeltaT);
 }
 

@@ -6,19 +6,19 @@
 #include "control/root.h"
 #include "drive/param_scaling.h"
 
-#define SETTLE_PERIODS PARAM_PERIODS(0.4F)  /* ten time constants of the slow current controller */
-#define SLOW_LOOP_RAD_S 25.0F               /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
-#define LEAST_CURRENT_Q13 64                /* of the division by a current: above the factor 25 rad/s LOOPTIME 2^14, which is below 58 */
+#define SETTLE_PERIODS PARAM_PERIODS(0.4F) /* ten time constants of the slow current controller */
+#define SLOW_LOOP_RAD_S 25.0F              /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
+#define LEAST_CURRENT_Q13 64               /* of the division by a current: above the factor 25 rad/s LOOPTIME 2^14, which is below 58 */
 #define SLOW_SHIFT 14u
 #define LOOP_RAD_S (2.0F * PARAM_PI * 200.0F) /* current loops while turning */
 #define LOOP_SHIFT 10u
-#define MEAN_LOG2 12                        /* periods of a mean at standstill */
+#define MEAN_LOG2 12 /* periods of a mean at standstill */
 #define TRY_HALVES 64u
 #define INDUCTANCE_PERIODS 8192u
-#define FIRST_HALF 4u                       /* periods of half a square wave: short, so that the rotor does not answer */
+#define FIRST_HALF 4u /* periods of half a square wave: short, so that the rotor does not answer */
 #define LAST_HALF 64u
-#define BLOCK_LOG2 5                        /* periods of a stretch of back-EMF: short against the rotor's swinging */
-#define BLOCKS_LOG2 8                       /* stretches: many swings */
+#define BLOCK_LOG2 5  /* periods of a stretch of back-EMF: short against the rotor's swinging */
+#define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
 
 /* ---- Constants from the board's parameters ---- */
@@ -36,7 +36,8 @@
 #define C_REACTIVE soft_float_scaled((uint32_t)(0.000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 72057594037927936.0F), 56)
 /* mV line to line per 1000 rpm, from Q14 voltage over 1/1024 angle counts a period. */
 #define C_KPHI soft_float_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
-                                        * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), 6)
+                                            * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), \
+                                 6)
 
 /* ---- Requests to the interrupt ---- */
 
@@ -161,7 +162,7 @@ static void resistance_done(drive_t *d, const drive_params_t *p)
     id->duty_per_amp = soft_float_div(soft_float_of((uint32_t)duty), soft_float_of((uint32_t)i));
     /* Standing, one phase carries it and the other two their halves: 4/3 of a leg's voltage; turning, 4/pi. */
     id->dead_q13 = soft_float_times((soft_float_times(duty_first, soft_float_div(soft_float_of(1), id->duty_per_amp)) - id->i_first) >> MEAN_LOG2,
-                                soft_float_scaled((uint32_t)(3.0F / PARAM_PI * 65536.0F), 16));
+                                    soft_float_scaled((uint32_t)(3.0F / PARAM_PI * 65536.0F), 16));
     id->values.rs_mohm = soft_float_to_uint16(soft_float_mul(soft_float_mul(id->duty_per_amp, soft_float_of((uint32_t)(id->sum[3] >> MEAN_LOG2))), C_RESISTANCE));
     if (id->values.rs_mohm < 20u || id->values.rs_mohm > 40000u) {
         finish(d, IDENTIFY_RESULT_R_RANGE);
@@ -250,7 +251,10 @@ static void inductance_d_done(drive_t *d)
 static int16_t gain(soft_float_t x)
 {
     uint16_t g = soft_float_to_uint16(x);
-    return (int16_t)((g > 32767u) ? 32767u : (g == 0u) ? 1u : g);
+    if (g > 32767u) {
+        return 32767;
+    }
+    return (int16_t)((g == 0u) ? 1u : g);
 }
 
 static void forget_emf(identify_t *id)
@@ -295,7 +299,10 @@ static uint32_t turn_speed(const drive_t *d, const drive_params_t *p)
 static int16_t emf_mean(int32_t sum)
 {
     int32_t mean = sum >> BLOCK_LOG2;
-    return (int16_t)((mean > 23170) ? 23170 : (mean < -23170) ? -23170 : mean);
+    if (mean > 23170) {
+        return 23170;
+    }
+    return (int16_t)((mean < -23170) ? -23170 : mean);
 }
 
 /** Means of one stretch, back-EMF e = v - R i - j w Ld i: with the current along the rotor, as without load, Lq has no say. The

@@ -62,46 +62,46 @@ typedef enum {
 
 /** What has been measured, in engineering units; 0 = not yet. Loop values: winding, bridge and wires together. */
 typedef struct {
-    uint16_t rs_mohm;           /**< phase resistance, mohm */
-    uint16_t ld_uh, lq_uh;      /**< phase inductances, uH */
-    uint16_t kphi_mv_per_krpm;  /**< back-EMF, mV peak line to line per 1000 mechanical rpm */
+    uint16_t rs_mohm;          /**< phase resistance, mohm */
+    uint16_t ld_uh, lq_uh;     /**< phase inductances, uH */
+    uint16_t kphi_mv_per_krpm; /**< back-EMF, mV peak line to line per 1000 mechanical rpm */
 } identify_values_t;
 
 /** State. */
 typedef struct {
-    volatile uint16_t ready;     /**< 1: the interrupt has finished, all of this belongs to the background; 0: the other way round */
-    volatile uint16_t mode;      /**< identify_mode_t */
-    volatile uint16_t wait;      /**< periods before the sums begin, counted once the frame stands or has its speed */
-    volatile uint16_t left;      /**< periods to sum */
-    volatile uint16_t sweep;     /**< 1: the frame turns to phase A */
-    volatile uint16_t halvings;  /**< IDENTIFY_TURN: up to END_SPEED_RPM / 2^halvings */
+    volatile uint16_t ready;                 /**< 1: the interrupt has finished, all of this belongs to the background; 0: the other way round */
+    volatile uint16_t mode;                  /**< identify_mode_t */
+    volatile uint16_t wait;                  /**< periods before the sums begin, counted once the frame stands or has its speed */
+    volatile uint16_t left;                  /**< periods to sum */
+    volatile uint16_t sweep;                 /**< 1: the frame turns to phase A */
+    volatile uint16_t halvings;              /**< IDENTIFY_TURN: up to END_SPEED_RPM / 2^halvings */
     volatile int16_t kp_d, ki_d, kp_q, ki_q; /**< gains of the current controllers */
-    volatile uint16_t shift;     /**< and their shift */
-    volatile current_q13_t rise_q13; /**< IDENTIFY_GROW ends at this current */
-    volatile int16_t bias_q14;   /**< IDENTIFY_INJECT: d voltage */
-    volatile int16_t square_q14; /**< amplitude of the square voltage */
-    volatile uint16_t on_q;      /**< 1: it is on the q axis */
-    volatile uint16_t half;      /**< periods of one half of it */
-    volatile int32_t sum[4];     /**< see identify_record() */
-    volatile uint16_t bus_q16;   /**< bus when the sums were complete, Q16 of full scale */
+    volatile uint16_t shift;                 /**< and their shift */
+    volatile current_q13_t rise_q13;         /**< IDENTIFY_GROW ends at this current */
+    volatile int16_t bias_q14;               /**< IDENTIFY_INJECT: d voltage */
+    volatile int16_t square_q14;             /**< amplitude of the square voltage */
+    volatile uint16_t on_q;                  /**< 1: it is on the q axis */
+    volatile uint16_t half;                  /**< periods of one half of it */
+    volatile int32_t sum[4];                 /**< see identify_record() */
+    volatile uint16_t bus_q16;               /**< bus when the sums were complete, Q16 of full scale */
 
     /* The interrupt's own. */
-    uint16_t half_left;          /**< periods until the square voltage changes sign */
-    int16_t sign, sign_before;   /**< of the square voltage commanded one and two periods ago; the next one is decided anew */
-    int16_t duty;                /**< duties commanded one period ago, along the axis */
-    int16_t i_before_q13;        /**< current along the axis one period ago */
+    uint16_t half_left;        /**< periods until the square voltage changes sign */
+    int16_t sign, sign_before; /**< of the square voltage commanded one and two periods ago; the next one is decided anew */
+    int16_t duty;              /**< duties commanded one period ago, along the axis */
+    int16_t i_before_q13;      /**< current along the axis one period ago */
 
     /* The background's own. */
-    volatile uint16_t step;      /**< identify_step_t */
-    volatile uint16_t result;    /**< identify_result_t */
+    volatile uint16_t step;   /**< identify_step_t */
+    volatile uint16_t result; /**< identify_result_t */
     identify_values_t values;
-    soft_float_t duty_per_amp; /**< duty counts per current count along phase A: R before it is scaled */
+    soft_float_t duty_per_amp;              /**< duty counts per current count along phase A: R before it is scaled */
     int32_t duty_first, i_first, bus_first; /**< sums of the first level */
-    int32_t dead_q13;               /**< what dead time and diodes take beyond the compensation, as the current for which R takes it */
-    uint16_t blocks;                /**< stretches of back-EMF that have been evaluated */
-    uint32_t emf_sum;               /**< their lengths */
-    int32_t emf_d_sum, emf_q_sum;   /**< and their components */
-    uint16_t kphi_half;             /**< mV per 1000 rpm at half speed */
+    int32_t dead_q13;                       /**< what dead time and diodes take beyond the compensation, as the current for which R takes it */
+    uint16_t blocks;                        /**< stretches of back-EMF that have been evaluated */
+    uint32_t emf_sum;                       /**< their lengths */
+    int32_t emf_d_sum, emf_q_sum;           /**< and their components */
+    uint16_t kphi_half;                     /**< mV per 1000 rpm at half speed */
 } identify_t;
 
 #define IDENTIFY_STATE identify_t identify;

@@ -6,7 +6,7 @@
 
 #ifdef IDENTIFY
 
-#define IDENTIFY_START_ANGLE_Q32 0xD5555555ul /**< -60 degrees: all three phases carry current */
+#define IDENTIFY_START_ANGLE_Q32 0xD5555555ul                                          /**< -60 degrees: all three phases carry current */
 #define IDENTIFY_SWEEP_Q32 ((uint32_t)(715827882.0F / (0.5F / PARAM_F(LOOPTIME_SEC)))) /**< to phase A within half a second */
 
 /** Largest voltage that holds a current: the rest is for the square voltage. */

@@ -6,9 +6,9 @@
 
 /** Recorder; the arrays belong to the board and bear AN1292's names. */
 typedef struct {
-    int16_t *column[4];    /**< SnapBuf1..4: phase current a, q current, filtered speed, angle */
-    uint16_t rows;         /**< DATA_BUFFER_SIZE */
-    uint16_t delay;        /**< SNAPDELAY, periods per row */
+    int16_t *column[4];       /**< SnapBuf1..4: phase current a, q current, filtered speed, angle */
+    uint16_t rows;            /**< DATA_BUFFER_SIZE */
+    uint16_t delay;           /**< SNAPDELAY, periods per row */
     volatile uint16_t *start; /**< set to 1 to record; goes back to 0 when done */
     volatile uint16_t *done;  /**< 1 when the arrays are full */
     uint16_t row, wait;

@@ -41,7 +41,7 @@ QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, speed_
     }
     iq = pi_tick(&c->pi_speed, &p->pi_speed, qm_sub_limited(along_direction(d, p->maximum_erpm), speed), limit);
     hold = qm_mulss(qm_sub_limited(p->minimum_erpm, along_direction(d, speed)), p->pi_speed.kp) >> p->pi_speed.shift;
-    c->reference_erpm = speed; /* field weakening and an orderly stop start from it */
+    c->reference_erpm = speed; /* field weakening and a controlled stop start from it */
     if (hold > c->iq_limit_q13) {
         hold = c->iq_limit_q13;
     }

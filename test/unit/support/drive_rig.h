@@ -6,6 +6,8 @@
 
 #include "drive/tick.h"
 #include "drive/param_init.h"
+#include "golden.h"
+#include "unity.h"
 
 static const drive_params_t params = DRIVE_PARAMS_INIT;
 static drive_t drive;
@@ -14,6 +16,24 @@ static struct {
     duties_t duty;
     uint16_t outputs;
 } out;
+
+/** What drives the bridge in each state. */
+static const uint16_t rig_outputs[DRIVE_STATE_COUNT] = {
+    OUTPUTS_OFF, OUTPUTS_OFF, OUTPUTS_BOOTSTRAP, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_OFF
+};
+
+/** State and fault after a period, and the outputs that go with the state. */
+#define EXPECT_DRIVE(expected_state, expected_fault, what) do { \
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(expected_fault, drive.fault, what); \
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(expected_state, drive.state, what); \
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(rig_outputs[expected_state], out.outputs, what); \
+    } while (0)
+
+/** EACH_DIRECTION(direction) { ... }: -1, then 1. */
+#define EACH_DIRECTION(direction) for (int16_t direction = -1; direction <= 1; direction = (int16_t)(direction + 2))
+
+/** EACH(n, table) { ... }: the index of each row. */
+#define EACH(n, table) for (uint16_t n = 0; n < sizeof (table) / sizeof (table)[0]; n++)
 
 /** Converter result that the drive measures as exactly this current (gain -1 and no offset). */
 static inline int16_t rig_raw_current(int16_t current_q13)
@@ -91,6 +111,12 @@ static inline void rig_lock(int16_t direction)
     (void)rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u);
 }
 
+/** The estimator's filtered speed. */
+static inline void rig_speed(int16_t speed_erpm)
+{
+    drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+}
+
 /** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
 static inline void rig_closed(int16_t direction, int16_t speed_erpm)
 {
@@ -100,7 +126,7 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     drive.command.target_erpm = speed_erpm;
     drive.run.control.reference_erpm = speed_erpm;
     drive.run.control.ref_q13.q = 0;
-    drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    rig_speed(speed_erpm);
     drive.run.estimator.omega_erpm = speed_erpm;
 }
 

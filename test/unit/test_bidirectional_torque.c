@@ -1,9 +1,6 @@
 /* The panel in BIDIRECTIONAL_SPEED and TORQUE_MODE together: a signed q current. */
 /* defines: -DBIDIRECTIONAL_SPEED -DTORQUE_MODE */
 #include "panel_rig.h"
-#include "unity.h"
-
-#include "hurst_params.h"
 
 #include "firmware/drive/panel.c"
 
@@ -12,10 +9,6 @@ void setUp(void)
     panel_reset();
     rig_ready();
     panel_turn_pot(0);
-}
-
-void tearDown(void)
-{
 }
 
 void test_ends_of_the_pot_are_MAXIMUM_CURRENT_in_both_directions(void)

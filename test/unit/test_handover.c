@@ -1,0 +1,237 @@
+/* The hand-over: when the estimator is ready, vectors that keep their place in the stator, controllers that go on, and the decay. */
+#include "drive_rig.h"
+#include "golden_hand_over.h"
+
+/** As at the end of the ramp: the forced speed has arrived and the test sets the estimate. */
+static void at_the_end_of_the_ramp(int16_t direction)
+{
+    rig_lock(direction);
+    drive.state = (uint16_t)DRIVE_RAMP;
+    drive.run.handover.waited_steps = 0;
+    drive.forced.speed_q10 = params.forced.end_speed_q10;
+    rig_speed((int16_t)(direction * 4800));
+}
+
+void setUp(void)
+{
+    rig_power_up();
+    at_the_end_of_the_ramp(1);
+}
+
+/** The slow work of one period. */
+static void slow(uint16_t slot)
+{
+    drive.ticks = slot;
+    drive_slow(&drive, &params, rig_raw_bus(24.0F));
+}
+
+/* ---- readiness ---- */
+
+/** Slow steps of the readiness check with this estimated speed, until the state changes. */
+static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
+{
+    uint16_t steps = 0;
+    while (drive.state == (uint16_t)DRIVE_RAMP && steps < most) {
+        rig_speed(speed_erpm);
+        drive.ticks = 8;
+        handover_wait(&drive, &params);
+        slow(9); /* the next period carries it out */
+        steps++;
+    }
+    return steps;
+}
+
+void test_estimate_within_a_quarter_of_END_SPEED_for_20_ms_is_ready_and_no_other(void)
+{
+    enum { READY = 50, NEVER = 500 }; /* 20 ms, 200 ms */
+    static const struct {
+        int16_t direction, speed_erpm;
+        uint16_t steps;
+    } cases[] = {
+        { 1, 5000 - 1249, READY }, { 1, 5000 + 1249, READY }, { -1, -5000 - 1249, READY }, { -1, -5000 + 1249, READY },
+        { 1, 5000 - 1250, NEVER }, { 1, 5000 + 1250, NEVER }, { 1, -5000, NEVER }, { -1, 5000, NEVER }, { 1, 0, NEVER },
+    };
+    EACH(n, cases) {
+        rig_power_up();
+        at_the_end_of_the_ramp(cases[n].direction);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].steps, ready_steps(cases[n].speed_erpm, 1000), golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].steps == (uint16_t)READY) ? DRIVE_CLOSED : DRIVE_FAULT, drive.state, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].steps == (uint16_t)READY) ? FAULT_NONE : FAULT_START_FAILED, drive.fault, golden_row(n));
+    }
+}
+
+void test_agreement_must_be_without_a_gap(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(49, ready_steps(5000, 49));
+    TEST_ASSERT_EQUAL_UINT16(1, ready_steps(0, 1));
+    TEST_ASSERT_EQUAL_UINT16(49, ready_steps(5000, 49));
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(1, ready_steps(5000, 1));
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+    at_the_end_of_the_ramp(1);
+    TEST_ASSERT_EQUAL_UINT16(450, ready_steps(0, 450));
+    TEST_ASSERT_EQUAL_UINT16(50, ready_steps(5000, 1000)); /* the last moment */
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+}
+
+void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_one_only(void)
+{
+    uint16_t n;
+    drive.run.handover.agreed_steps = (uint16_t)(params.ready_slots - 1u);
+    for (n = 1; n <= 8u; n++) {
+        drive.ticks = n;
+        handover_wait(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(params.ready_slots - (n < 8u), drive.run.handover.agreed_steps);
+        TEST_ASSERT_EQUAL_UINT16(n == 8u, drive.run.handover.waited_steps);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */
+    }
+    for (n = 8; n <= 17u; n++) {
+        if (n != 9u) {
+            slow(n);
+            TEST_ASSERT_EQUAL_UINT16((n == 17u) ? DRIVE_CLOSED : DRIVE_RAMP, drive.state);
+        }
+    }
+}
+
+void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(void)
+{
+    static const drive_state_t states[] = { DRIVE_STOPPED, DRIVE_FAULT, DRIVE_ALIGN };
+    drive.run.handover.agreed_steps = params.ready_slots;
+    EACH(n, states) {
+        drive.state = (uint16_t)states[n];
+        slow(1);
+        TEST_ASSERT_EQUAL_UINT16(states[n], drive.state);
+    }
+}
+
+/* ---- the change of frame ---- */
+
+/** @param forced,estimated angles @param v_d,v_q voltages in the forced frame */
+static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_q, int16_t direction)
+{
+    drive.direction = direction;
+    drive.state = (uint16_t)DRIVE_RAMP;
+    drive.angle = forced;
+    drive.run.estimator.rho_q32 = (uint32_t)estimated << 16;
+    drive.run.estimator.half_step_q16_rad = 0;
+    rig_speed((int16_t)(direction * 4800));
+    drive.run.control.v_q14.d = v_d;
+    drive.run.control.v_q14.q = v_q;
+    drive.run.handover.speed_is_preset = 0; /* as the start has left it */
+    handover_now(&drive, &params);
+    slow(7);
+}
+
+void test_vectors_equal_the_reference_and_all_three_controllers_go_on_from_them(void)
+{
+    GOLDEN_EACH(hand_over, v) {
+        drive_control_t *c = &drive.run.control;
+        int16_t direction = (int16_t)((v.i_q > 0) ? 1 : -1);
+        hand_over(v.forced, v.estimated, v.v_d, v.v_q, direction);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(DRIVE_CLOSED, drive.state, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.offset, drive.run.handover.offset, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_v_d, c->v_q14.d, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_v_q, c->v_q14.q, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_i_d, c->ref_q13.d, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_i_q, c->ref_q13.q, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_i_d, drive.run.handover.id_q13, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * 5000, c->reference_erpm, golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_d, pi_tick(&c->pi_d, &params.pi_d, 0, 32767), golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_q, pi_tick(&c->pi_q, &params.pi_q, 0, 32767), golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_i_q, pi_tick(&c->pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120),
+                                         golden_row(n));
+    }
+}
+
+void test_voltage_and_current_keep_their_place_in_the_stator(void)
+{
+    uint32_t estimated;
+    for (estimated = 0; estimated < UINT32_C(65536); estimated += 3001u) {
+        sincos_t forced_frame = trig_sincos(12345), frame = trig_sincos((angle_t)estimated);
+        dq_t v = { -3000, 9000 }, i = { 0, params.open_loop_q13 };
+        alphabeta_t v_before = inverse_park(v, forced_frame), i_before = inverse_park(i, forced_frame), v_after, i_after;
+        hand_over(12345, (angle_t)estimated, v.d, v.q, 1);
+        v_after = inverse_park(drive.run.control.v_q14, frame);
+        i_after = inverse_park(drive.run.control.ref_q13, frame);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(6, v_before.alpha, v_after.alpha, golden_row(estimated));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(6, v_before.beta, v_after.beta, golden_row(estimated));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, i_before.alpha, i_after.alpha, golden_row(estimated));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, i_before.beta, i_after.beta, golden_row(estimated));
+    }
+}
+
+void test_estimated_angle_of_the_next_sample_takes_over_with_its_frame(void)
+{
+    sincos_t frame;
+    drive.angle = 20000;
+    drive.run.estimator.rho_q32 = 15000ul << 16;
+    drive.run.estimator.half_step_q16_rad = 6283; /* 1000 counts */
+    handover_now(&drive, &params);
+    frame = trig_sincos(drive.angle);
+    TEST_ASSERT_UINT16_WITHIN(1, 16000, drive.angle);
+    TEST_ASSERT_EQUAL_HEX16(estimator_next_angle(&drive.run.estimator), drive.angle);
+    TEST_ASSERT_INT16_WITHIN(1, 4000, drive.run.handover.offset);
+    TEST_ASSERT_EQUAL_INT16(frame.sin, drive.frame.sin);
+    TEST_ASSERT_EQUAL_INT16(frame.cos, drive.frame.cos);
+}
+
+void test_speed_controller_is_preset_once_and_before_its_first_step(void)
+{
+    handover_now(&drive, &params);
+    drive.run.control.pi_speed.sum = 12345;
+    slow(6);
+    TEST_ASSERT_EQUAL_INT32(12345, drive.run.control.pi_speed.sum);
+    slow(7);
+    TEST_ASSERT_NOT_EQUAL_INT32(12345, drive.run.control.pi_speed.sum);
+    drive.run.control.pi_speed.sum = 0;
+    slow(15);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_speed.sum);
+}
+
+void test_stop_right_after_the_hand_over_goes_on_from_its_q_current_too(void)
+{
+    EACH_DIRECTION(direction) {
+        at_the_end_of_the_ramp(direction);
+        handover_now(&drive, &params);
+        drive.state = (uint16_t)DRIVE_STOPPING; /* the very next period */
+        slow(7);
+        TEST_ASSERT_INT16_WITHIN(1, drive.run.control.ref_q13.q,
+                                 pi_tick(&drive.run.control.pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120));
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
+    }
+}
+
+/* ---- the decay ---- */
+
+void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(void)
+{
+    EACH_DIRECTION(sign) {
+        int16_t n, odd;
+        for (odd = 0; odd <= 3; odd = (int16_t)(odd + 3)) {
+            drive.run.handover.offset = (int16_t)(sign * (1000 + odd));
+            for (n = 1; n <= 124; n++) {
+                handover_decay(&drive, &params); /* every eighth period */
+                TEST_ASSERT_EQUAL_INT16(sign * (1000 + odd - 8 * n), drive.run.handover.offset);
+            }
+            handover_decay(&drive, &params);
+            TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
+            TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
+        }
+        drive.run.handover.offset = sign;
+        handover_decay(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
+    }
+}
+
+void test_current_follows_its_offset(void)
+{
+    EACH_DIRECTION(direction) { /* d = -Iq sin(offset), at 45 degrees after the step */
+        drive.direction = direction;
+        drive.run.handover.offset = 8192 + 8;
+        handover_decay(&drive, &params);
+        TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * -1856), drive.run.handover.id_q13);
+        drive.run.handover.offset = -8192 - 8;
+        handover_decay(&drive, &params);
+        TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * 1856), drive.run.handover.id_q13);
+    }
+}

@@ -1,0 +1,121 @@
+/* Current limits: the circle that the d reference leaves to q, and braking current that fades with the bus. */
+#include "drive_rig.h"
+#include "golden_current_limit.h"
+
+static drive_params_t limited;
+
+void setUp(void)
+{
+    rig_closed(1, 8000);
+    drive.run.fieldweak.table_q13 = 0;
+    drive.run.fieldweak.trim_q13 = 0;
+    drive.run.control.vq_limit_q14 = 16000; /* plenty of voltage */
+    limited = params;
+}
+
+/* ---- the circle ---- */
+
+void test_limits_equal_the_reference(void)
+{
+    GOLDEN_EACH(current_limit, v) {
+        limited.current_max_q13 = v.maximum;
+        limited.current_max_reciprocal = v.reciprocal;
+        drive.run.handover.id_q13 = v.wanted_d;
+        limits_current(&drive.run, &limited);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.ref_d, drive.run.control.ref_q13.d, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.iq_limit, drive.run.control.iq_limit_q13, golden_row(n));
+    }
+}
+
+void test_current_vector_fills_its_circle_and_never_leaves_it(void)
+{
+    int16_t i_d;
+    for (i_d = -5120; i_d <= 5120; i_d++) {
+        int32_t square;
+        drive.run.handover.id_q13 = i_d;
+        limits_current(&drive.run, &params);
+        square = qm_mulss(drive.run.control.ref_q13.d, drive.run.control.ref_q13.d)
+                 + qm_mulss(drive.run.control.iq_limit_q13, drive.run.control.iq_limit_q13);
+        TEST_ASSERT_TRUE_MESSAGE(square <= INT32_C(5120) * 5120, golden_row((uint32_t)(i_d + 5120)));
+        TEST_ASSERT_TRUE_MESSAGE(square >= INT32_C(5090) * 5090, golden_row((uint32_t)(i_d + 5120)));
+        TEST_ASSERT_TRUE_MESSAGE(drive.run.control.iq_limit_q13 > 0, golden_row((uint32_t)(i_d + 5120)));
+    }
+}
+
+void test_d_reference_is_the_sum_of_hand_over_table_and_trim(void)
+{
+    drive.run.handover.id_q13 = 500;
+    drive.run.fieldweak.table_q13 = -900;
+    drive.run.fieldweak.trim_q13 = -100;
+    limits_current(&drive.run, &params); /* the trim goes back by one step */
+    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
+}
+
+void test_trim_sees_the_voltage_that_q_leaves_unused_in_both_directions(void)
+{
+    EACH_DIRECTION(direction) {
+        rig_speed((int16_t)(direction * 20000));
+        drive.run.control.v_q14.q = (int16_t)(direction * (16000 - params.fieldweak.margin_q14 + 1));
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(-params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
+        drive.run.control.v_q14.q = (int16_t)(direction * (16000 - params.fieldweak.margin_q14));
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.d);
+    }
+}
+
+/* ---- braking ---- */
+
+void test_braking_current_fades_between_27_and_29_volts(void)
+{
+    static const struct {
+        float bus_v;
+        int16_t limit_q13, tolerance;
+    } cases[] = {
+        { 24.0F, 5120, 0 }, { 27.0F, 5120, 0 }, { 27.1F, 4864, 20 }, { 28.0F, 2560, 20 }, { 29.0F, 0, 20 }, { 29.2F, 0, 0 },
+        { 52.0F, 0, 0 }, { 26.0F, 5120, 0 },
+    };
+    EACH(n, cases) {
+        limits_braking(&drive.run, &params, (int16_t)(cases[n].bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(cases[n].tolerance, cases[n].limit_q13, drive.run.control.brake_limit_q13, golden_row(n));
+    }
+    limits_braking(&drive.run, &params, (int16_t)(params.bus_regen_q15 + 1));
+    TEST_ASSERT_LESS_THAN_INT16(5120, drive.run.control.brake_limit_q13);
+}
+
+void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)
+{
+    static const struct {
+        int16_t reference_erpm, speed_erpm, limit_q13, iq_q13;
+    } cases[] = { { 5000, 20000, 700, -700 }, { -5000, -20000, 700, 700 }, { 5000, 20000, 0, 0 }, { -5000, -20000, 0, 0 } };
+    EACH(n, cases) {
+        rig_closed((int16_t)((cases[n].reference_erpm > 0) ? 1 : -1), cases[n].reference_erpm);
+        drive.run.control.brake_limit_q13 = cases[n].limit_q13;
+        rig_speed(cases[n].speed_erpm);
+        speed_step(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].iq_q13, drive.run.control.ref_q13.q, golden_row(n));
+    }
+    EACH_DIRECTION(direction) {
+        rig_closed(direction, (int16_t)(direction * 20000));
+        drive.run.control.brake_limit_q13 = 0;
+        rig_speed((int16_t)(direction * 5000));
+        speed_step(&drive, &params);
+        TEST_ASSERT_TRUE(direction * drive.run.control.ref_q13.q > 1000);
+    }
+}
+
+void test_brake_limit_does_not_wind_the_speed_controller_up(void)
+{
+    uint16_t n;
+    rig_closed(1, 5000);
+    drive.run.control.brake_limit_q13 = 300;
+    rig_speed(9000);
+    for (n = 0; n < 2500u; n++) {
+        speed_step(&drive, &params);
+    }
+    TEST_ASSERT_EQUAL_INT16(-300, drive.run.control.ref_q13.q);
+    rig_speed(4990); /* just below: the current must turn at once */
+    speed_step(&drive, &params);
+    speed_step(&drive, &params);
+    TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
+}

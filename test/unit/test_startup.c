@@ -1,0 +1,196 @@
+/* The start: requests, bootstrap, the sweep of ALIGN, the ramp, and both of its ends, on the ideal motor. */
+#include <string.h>
+
+#include "ideal_motor.h"
+
+#define LOCK_PERIODS 4000u   /* 0.2 s */
+#define RAMP_PERIODS 27962u  /* 1.398 s: 279620 / 10 */
+
+void setUp(void)
+{
+    rig_power_up();
+    ideal_motor_reset(1.0F, 0.0F);
+}
+
+/* ---- the request ---- */
+
+void test_start_is_refused_in_every_state_but_STOPPED_and_a_second_one_changes_nothing(void)
+{
+    EACH(state, rig_outputs) {
+        int16_t starts = (int16_t)(state == (uint16_t)DRIVE_STOPPED);
+        rig_ready();
+        drive.state = state;
+        drive_start(&drive, &params, -1);
+        TEST_ASSERT_EQUAL_INT16(starts, drive.command.run);
+        TEST_ASSERT_EQUAL_INT16(starts ? -1 : 1, drive.direction);
+        drive_start(&drive, &params, 1);
+        TEST_ASSERT_EQUAL_INT16(starts ? -1 : 1, drive.direction);
+        TEST_ASSERT_EQUAL_INT16(starts ? -params.open_loop_q13 : 0, drive.run.control.ref_q13.q);
+    }
+}
+
+void test_start_begins_without_memory_of_the_last_run(void)
+{
+    drive_run_t fresh;
+    rig_start(1);
+    fresh = drive.run;
+    rig_ready();
+    memset(&drive.run, 0x5A, sizeof drive.run);
+    drive.forced.speed_q10 = 5000;
+    drive_start(&drive, &params, 1);
+    TEST_ASSERT_EQUAL_MEMORY(&fresh, &drive.run, sizeof fresh);
+    TEST_ASSERT_EQUAL_INT32(0, drive.forced.speed_q10);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_q.sum);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.reference_erpm);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.estimator.omega_filtered_q16);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
+    TEST_ASSERT_EQUAL_INT16(NORM_INVKFIBASE, drive.run.model.inv_kfi);
+    TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.run.model.kfilter_esdq_q16);
+    TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.run.control.iq_limit_q13);
+    TEST_ASSERT_EQUAL_INT16(params.current_max_q13, drive.run.control.brake_limit_q13);
+}
+
+void test_first_period_finds_the_frame_of_the_first_angle(void)
+{
+    EACH_DIRECTION(direction) {
+        rig_ready();
+        drive.angle = 0x1234;
+        drive.frame.sin = 1;
+        drive.frame.cos = 2;
+        drive_start(&drive, &params, direction);
+        TEST_ASSERT_EQUAL_HEX16((direction > 0) ? 0xC000u : 0x4000u, drive.angle);
+        TEST_ASSERT_INT16_WITHIN(11, (int16_t)(direction * -32757), drive.frame.sin);
+        TEST_ASSERT_INT16_WITHIN(3, 0, drive.frame.cos);
+    }
+}
+
+void test_stop_switches_off_at_once_before_the_loop_is_closed(void)
+{
+    static const drive_state_t states[] = { DRIVE_BOOTSTRAP, DRIVE_ALIGN, DRIVE_RAMP };
+    EACH(n, states) {
+        rig_start(1);
+        (void)ideal_motor_run_until(states[n], 5000);
+        ideal_motor_run(100);
+        EXPECT_DRIVE(states[n], FAULT_NONE, golden_row(n));
+        drive.command.run = 0;
+        ideal_motor_run(1);
+        EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, golden_row(n));
+    }
+}
+
+/* ---- bootstrap and align ---- */
+
+void test_bootstrap_charges_all_low_sides_for_ten_milliseconds(void)
+{
+    uint16_t n;
+    rig_start(1);
+    for (n = 0; n < 200u; n++) {
+        rig_tick(1);
+        EXPECT_DRIVE(DRIVE_BOOTSTRAP, FAULT_NONE, golden_row(n));
+    }
+    rig_tick(1);
+    EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "charged");
+    TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.a); /* the first period already has the duties of the law */
+    TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.b);
+}
+
+void test_align_sweeps_a_quarter_turn_in_its_first_half_then_holds_and_ends_in_the_ramp(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t held;
+        rig_lock(direction); /* with the first period */
+        TEST_ASSERT_UINT16_WITHIN(9, (direction > 0) ? 0xC000u : 0x4000u, drive.angle);
+        rig_tick(999);
+        TEST_ASSERT_UINT16_WITHIN(2, (direction > 0) ? 0xE000u : 0x2000u, drive.angle);
+        rig_tick(1000);
+        TEST_ASSERT_INT16_WITHIN(2, 0, (int16_t)drive.angle);
+        held = drive.angle;
+        rig_tick(LOCK_PERIODS - 2001u);
+        EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "held");
+        TEST_ASSERT_EQUAL_HEX16(held, drive.angle);
+        rig_tick(1);
+        EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "aligned");
+    }
+}
+
+void test_ramp_accelerates_by_its_rate_every_period_in_both_directions(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t before;
+        rig_lock(direction);
+        (void)rig_tick_until(DRIVE_RAMP, 5000);
+        before = drive.angle;
+        rig_tick(1000);
+        TEST_ASSERT_EQUAL_INT32(10000, drive.forced.speed_q10);
+        /* 10 / 1024 * 1000 * 1001 / 2 counts */
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(direction * 4888), (int16_t)(uint16_t)(drive.angle - before));
+    }
+}
+
+void test_align_and_ramp_carry_the_open_loop_current(void)
+{
+    EACH_DIRECTION(direction) {
+        static const uint16_t periods[] = { 3000, 10000 };
+        rig_start(direction);
+        (void)ideal_motor_run_until(DRIVE_ALIGN, 300);
+        EACH(n, periods) {
+            ideal_motor_run(periods[n]);
+            EXPECT_DRIVE((n == 0u) ? DRIVE_ALIGN : DRIVE_RAMP, FAULT_NONE, golden_row(n));
+            TEST_ASSERT_INT16_WITHIN(30, (int16_t)(direction * 2625), drive.run.control.i_q13.q); /* 1.41 A */
+            TEST_ASSERT_INT16_WITHIN(30, 0, drive.run.control.i_q13.d);
+        }
+    }
+}
+
+/* ---- the whole start ---- */
+
+void test_start_is_BOOTSTRAP_ALIGN_RAMP_CLOSED_in_the_times_of_the_parameters(void)
+{
+    uint16_t n;
+    rig_start(1);
+    drive.command.target_erpm = params.end_erpm;
+    ideal_motor_run(1);
+    EXPECT_DRIVE(DRIVE_BOOTSTRAP, FAULT_NONE, "started");
+    TEST_ASSERT_EQUAL_UINT32(200, ideal_motor_run_until(DRIVE_ALIGN, 60000));
+    TEST_ASSERT_EQUAL_UINT32(LOCK_PERIODS - 1u, ideal_motor_run_until(DRIVE_RAMP, 60000));
+    for (n = 1; n < RAMP_PERIODS; n++) {
+        ideal_motor_run(1);
+        TEST_ASSERT_TRUE(drive.forced.speed_q10 < 279620);
+    }
+    ideal_motor_run(1);
+    TEST_ASSERT_INT32_WITHIN(1, 279620, drive.forced.speed_q10); /* 1000 rpm, 5 pole pairs */
+    ideal_motor_run(100);
+    TEST_ASSERT_INT32_WITHIN(1, 279620, drive.forced.speed_q10);
+    EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "at the end of the ramp");
+    /* 50 agreeing slow steps, on a grid of eight periods */
+    TEST_ASSERT_UINT32_WITHIN(8, 50u * 8u - 100u, ideal_motor_run_until(DRIVE_CLOSED, 60000));
+    EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "handed over");
+}
+
+void test_starts_from_every_quarter_of_a_turn_in_both_directions(void)
+{
+    static const float cosines[] = { 1.0F, 0.0F, -1.0F, 0.0F };
+    EACH_DIRECTION(direction) {
+        EACH(quarter, cosines) {
+            rig_start(direction);
+            drive.command.target_erpm = (int16_t)(direction * params.end_erpm);
+            ideal_motor_reset(cosines[quarter], cosines[(quarter + 3) & 3]);
+            (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
+            ideal_motor_run(10000);
+            EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, golden_row(quarter));
+            TEST_ASSERT_FLOAT_WITHIN(50.0F, (float)(direction * params.end_erpm), ideal_motor_erpm());
+        }
+    }
+}
+
+void test_blocked_shaft_is_START_FAILED_within_200_ms_after_the_ramp(void)
+{
+    motor.blocked = 1;
+    EACH_DIRECTION(direction) {
+        rig_start(direction);
+        (void)ideal_motor_run_until(DRIVE_RAMP, 5000);
+        ideal_motor_run(RAMP_PERIODS);
+        TEST_ASSERT_UINT32_WITHIN(16, 4000, ideal_motor_run_until(DRIVE_FAULT, 10000));
+        EXPECT_DRIVE(DRIVE_FAULT, FAULT_START_FAILED, "blocked");
+    }
+}

@@ -1,0 +1,188 @@
+/* The gate of states and faults: codes that never change, the first fault wins, and it stays until it is cleared. */
+#include <string.h>
+
+#include "drive_rig.h"
+
+void setUp(void)
+{
+    rig_ready();
+}
+
+/** The state alone, as if the drive had come there. */
+static void put_in(uint16_t state)
+{
+    rig_ready();
+    drive.state = state;
+}
+
+/* ---- the table of faults ---- */
+
+#define FAULT_ROW(code, name, cause, remedy) { (code), FAULT_##name, #name, cause, remedy },
+static const struct {
+    int16_t code, constant;
+    const char *name, *cause, *remedy;
+} rows[] = { DRIVE_FAULT_TABLE(FAULT_ROW) };
+
+void test_codes_never_change_their_meaning(void)
+{
+    static const char *const names[] = {
+        "NONE", "OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
+        "ISR_OVERRUN", "OFFSET", "ADC_LOST", "CLOCK", "TRAP", "WATCHDOG"
+    };
+    TEST_ASSERT_EQUAL_INT(FAULT_COUNT, sizeof rows / sizeof rows[0]);
+    EACH(n, names) {
+        TEST_ASSERT_EQUAL_STRING(names[n], rows[n].name);
+    }
+    EACH(n, rows) {
+        TEST_ASSERT_EQUAL_INT16(n, rows[n].code);
+        TEST_ASSERT_EQUAL_INT16(n, rows[n].constant);
+    }
+}
+
+void test_every_fault_names_cause_and_remedy_once(void)
+{
+    EACH(n, rows) {
+        uint16_t k;
+        TEST_ASSERT_TRUE(strlen(rows[n].cause) > 5u);
+        TEST_ASSERT_TRUE(strlen(rows[n].remedy) > 5u);
+        for (k = 0; k < n; k++) {
+            TEST_ASSERT_NOT_EQUAL_INT(0, strcmp(rows[k].name, rows[n].name));
+            TEST_ASSERT_NOT_EQUAL_INT(0, strcmp(rows[k].cause, rows[n].cause));
+        }
+    }
+}
+
+/* ---- the gate ---- */
+
+void test_every_state_is_entered_at_period_0_and_none_but_FAULT_past_a_fault(void)
+{
+    EACH(state, rig_outputs) {
+        drive.periods = 77;
+        drive_enter(&drive, (drive_state_t)state);
+        TEST_ASSERT_EQUAL_UINT16(state, drive.state);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.periods);
+        put_in(state);
+        drive.command.run = 1;
+        drive_raise(&drive, FAULT_TRAP);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, drive.fault);
+        TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
+        drive_enter(&drive, (drive_state_t)state);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+        drive.fault = (uint16_t)FAULT_NONE;
+    }
+}
+
+void test_outputs_of_every_state(void)
+{
+    EACH(state, rig_outputs) {
+        uint16_t fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
+        rig_closed(1, 8000);
+        drive.periods = 0;
+        drive.state = state;
+        drive.fault = fault;
+        if (state == (uint16_t)DRIVE_STOPPED || state == (uint16_t)DRIVE_STOPPING) {
+            drive.command.run = 0;
+        }
+        rig_tick(1);
+        EXPECT_DRIVE(state, fault, golden_row(state));
+        TEST_ASSERT_EQUAL_INT16(rig_outputs[state] == (uint16_t)OUTPUTS_PWM, drive_is_running(&drive));
+        TEST_ASSERT_EQUAL_INT16(state == (uint16_t)DRIVE_CLOSED || state == (uint16_t)DRIVE_STOPPING, drive_is_closed(&drive));
+        if (rig_outputs[state] != (uint16_t)OUTPUTS_PWM) {
+            TEST_ASSERT_EQUAL_UINT16(0, out.duty.a);
+            TEST_ASSERT_EQUAL_UINT16(0, out.duty.b);
+            TEST_ASSERT_EQUAL_UINT16(0, out.duty.c);
+        }
+    }
+}
+
+void test_a_fault_that_came_in_the_middle_of_a_period_outlives_it(void)
+{
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    drive.fault = (uint16_t)FAULT_TRAP; /* a trap, just after the period has looked and before it entered CLOSED */
+    TEST_ASSERT_EQUAL_UINT16(OUTPUTS_OFF, drive_outputs(&drive));
+    TEST_ASSERT_EQUAL_UINT16(1, drive_settle(&drive));
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+    drive.fault = (uint16_t)FAULT_NONE;
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    TEST_ASSERT_EQUAL_UINT16(0, drive_settle(&drive));
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+    TEST_ASSERT_EQUAL_UINT16(OUTPUTS_PWM, drive_outputs(&drive));
+}
+
+/* ---- a fault's life ---- */
+
+void test_the_first_fault_stays_with_outputs_off_whatever_follows(void)
+{
+    uint16_t n;
+    drive_raise(&drive, FAULT_OVERVOLTAGE);
+    drive_raise(&drive, FAULT_OVERCURRENT_HW);
+    drive_raise(&drive, FAULT_CLOCK);
+    drive.command.run = 1;
+    for (n = 0; n < 40000u; n++) {
+        rig_tick(1);
+        EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERVOLTAGE, golden_row(n));
+    }
+}
+
+void test_clearing_returns_to_STOPPED_is_served_once_and_a_start_must_be_asked_for(void)
+{
+    drive_start(&drive, &params, 1);
+    rig_tick(50);
+    drive_raise(&drive, FAULT_OVERCURRENT_HW);
+    rig_tick(10);
+    drive.command.clear_fault = 1;
+    rig_tick(1);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "cleared");
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.clear_fault);
+    rig_tick(1000);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "no start by itself");
+    drive_start(&drive, &params, 1);
+    rig_tick(202);
+    EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "asked for");
+    drive_raise(&drive, FAULT_OVERVOLTAGE);
+    rig_tick(100);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERVOLTAGE, "the request does not wait for the next one");
+}
+
+void test_a_clear_request_without_a_fault_is_taken_back_and_disturbs_nothing(void)
+{
+    drive.command.clear_fault = 1;
+    rig_tick(1);
+    drive_raise(&drive, FAULT_OVERVOLTAGE);
+    rig_tick(100);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERVOLTAGE, "asked for while stopped");
+    rig_start(1);
+    rig_tick(5);
+    drive.command.clear_fault = 1;
+    rig_tick(1);
+    EXPECT_DRIVE(DRIVE_BOOTSTRAP, FAULT_NONE, "asked for in a start");
+    TEST_ASSERT_EQUAL_UINT16(5, drive.periods); /* the first of the six ended STOPPED */
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.clear_fault);
+}
+
+void test_a_fault_whose_cause_remains_comes_back(void)
+{
+    rig_bus(40.0F);
+    rig_tick(8);
+    drive.command.clear_fault = 1;
+    rig_tick(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+    rig_tick(8);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERVOLTAGE, "still 40 V");
+}
+
+void test_a_cleared_fault_before_the_calibration_calibrates_anew(void)
+{
+    drive.calibration.done = 0;
+    drive_raise(&drive, FAULT_CLOCK);
+    TEST_ASSERT_EQUAL_INT(DRIVE_CALIBRATE, drive_clear_fault(&drive));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
+void test_state_FAULT_never_stays_without_a_fault(void)
+{
+    drive.state = (uint16_t)DRIVE_FAULT; /* the background raised while the interrupt cleared */
+    rig_tick(1);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "left");
+}

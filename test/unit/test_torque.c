@@ -1,0 +1,103 @@
+/* TORQUE_MODE: the potentiometer commands the q current, speed is only guarded. */
+/* defines: -DTORQUE_MODE */
+#include "ideal_motor.h"
+#include "panel_rig.h"
+
+#include "firmware/drive/panel.c"
+
+void setUp(void)
+{
+    panel_reset();
+    rig_ready();
+    ideal_motor_reset(1.0F, 0.0F);
+}
+
+/** q current after a while at a speed, in the direction of rotation. @param steps of the controller */
+static int16_t torque(int16_t direction, int16_t command_q13, int16_t speed_erpm, int16_t limit_q13, uint16_t steps)
+{
+    rig_closed(direction, (int16_t)(direction * speed_erpm));
+    drive.command.target_erpm = command_q13;
+    drive.run.control.iq_limit_q13 = limit_q13;
+    while (steps-- != 0u) {
+        speed_step(&drive, &params);
+    }
+    TEST_ASSERT_EQUAL_INT16(direction * speed_erpm, drive.run.control.reference_erpm); /* field weakening follows the speed */
+    return (int16_t)(direction * drive.run.control.ref_q13.q);
+}
+
+void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_below(void)
+{
+    static const struct {
+        const char *what;
+        int16_t command_q13, speed_erpm, limit_q13;
+        uint16_t steps;
+        int16_t least, most; /* in the direction of rotation */
+    } cases[] = {
+        { "as commanded", 1000, 10000, 5120, 400, 1000, 1000 },
+        { "its sign has no say: the direction is fixed", -1000, 10000, 5120, 400, 1000, 1000 },
+        { "large", 3000, 10000, 5120, 400, 3000, 3000 },
+        { "none", 0, 10000, 5120, 400, 0, 0 },
+        { "limited by the circle", 5000, 10000, 2000, 1, 2000, 2000 },
+        { "nothing that drives above maximum speed", 3000, 28000, 5120, 400, -5120, 0 },
+        { "below minimum speed it holds the motor without a command", 0, 1500, 5120, 400, 1, 5120 },
+        { "within the circle", 0, 0, 700, 1, 700, 700 },
+    };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            int16_t iq = torque(direction, cases[n].command_q13, cases[n].speed_erpm, cases[n].limit_q13, cases[n].steps);
+            TEST_ASSERT_TRUE_MESSAGE(iq >= cases[n].least && iq <= cases[n].most, cases[n].what);
+        }
+        TEST_ASSERT_TRUE(torque(direction, 0, 1000, 5120, 400) > torque(direction, 0, 1500, 5120, 400));
+    }
+}
+
+void test_motor_accelerates_with_the_command_and_stops_in_order(void)
+{
+    rig_start(1);
+    drive.command.target_erpm = 800;
+    (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
+    ideal_motor_run(4000);
+    EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "accelerating");
+    TEST_ASSERT_INT16_WITHIN(20, 800, drive.run.control.ref_q13.q);
+    drive.command.run = 0;
+    TEST_ASSERT_LESS_THAN_UINT32(40000, ideal_motor_run_until(DRIVE_STOPPED, 40000));
+    ideal_motor_run(1);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "stopped");
+}
+
+void test_motor_stays_between_minimum_and_maximum_speed_whatever_the_command(void)
+{
+    static const struct {
+        int16_t command_q13;
+        float least_erpm, most_erpm;
+    } cases[] = { { 0, 1900.0F, 3100.0F }, { 2000, 14000.0F, 28000.0F } };
+    EACH(n, cases) {
+        rig_ready();
+        drive_start(&drive, &params, 1);
+        ideal_motor_reset(1.0F, 0.0F);
+        drive.command.target_erpm = cases[n].command_q13;
+        (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
+        ideal_motor_run(60000);
+        EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, golden_row(n));
+        TEST_ASSERT_TRUE(ideal_motor_erpm() > cases[n].least_erpm && ideal_motor_erpm() < cases[n].most_erpm);
+    }
+}
+
+/* ---- panel ---- */
+
+void test_pot_spans_zero_to_MAXIMUM_CURRENT_and_S3_does_not_change_it(void)
+{
+    static const int16_t cases[][2] = { { -32768, 0 }, { 32704, 5120 }, { 0, 2560 } };
+    EACH(n, cases) {
+        TEST_ASSERT_INT16_WITHIN(3, cases[n][1], panel_target(&params, cases[n][0], 0, 1));
+        TEST_ASSERT_INT16_WITHIN(3, cases[n][1], panel_target(&params, cases[n][0], 1, 1));
+    }
+}
+
+void test_pot_at_zero_still_starts_forward(void)
+{
+    panel_turn_pot(0);
+    press_s2(50);
+    TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
+    TEST_ASSERT_EQUAL_INT16(1, drive.direction);
+}

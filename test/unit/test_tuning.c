@@ -1,0 +1,54 @@
+/* The drive in TUNING: the reference ramps by itself from END_SPEED to MAXIMUM_SPEED. */
+/* defines: -DTUNING */
+#include "ideal_motor.h"
+
+#include "firmware/drive/drive.c"
+
+void setUp(void)
+{
+    rig_power_up();
+    ideal_motor_reset(1.0F, 0.0F);
+}
+
+void test_ramp_is_one_erpm_every_16_periods_up_to_maximum_speed_whatever_the_potentiometer_says(void)
+{
+    static const struct {
+        int16_t from_erpm, steps, reference_erpm;
+    } cases[] = { { 5000, 1, 5000 }, { 5000, 2, 5001 }, { 5000, 1000, 5500 }, { 27400, 1000, 27500 } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            int16_t step;
+            rig_closed(direction, (int16_t)(direction * cases[n].from_erpm));
+            drive.command.target_erpm = (int16_t)((n & 1u) ? 2500 : 0);
+            for (step = 0; step < cases[n].steps; step++) {
+                rig_speed(drive.run.control.reference_erpm); /* the motor follows */
+                speed_reference_step(&drive, &params);
+            }
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * cases[n].reference_erpm, drive.run.control.reference_erpm, golden_row(n));
+        }
+    }
+}
+
+void test_ramp_waits_for_a_motor_that_cannot_follow_and_a_stop_ramps_down_as_ever(void)
+{
+    uint16_t n;
+    rig_closed(1, 8000);
+    rig_speed(6250);
+    for (n = 0; n < 100u; n++) {
+        speed_reference_step(&drive, &params);
+    }
+    TEST_ASSERT_EQUAL_INT16(8000, drive.run.control.reference_erpm);
+    drive.state = (uint16_t)DRIVE_STOPPING;
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(7992, drive.run.control.reference_erpm);
+}
+
+void test_motor_follows_at_250_rpm_per_second_from_END_SPEED(void)
+{
+    rig_start(1);
+    (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
+    TEST_ASSERT_EQUAL_INT16(5000, drive.run.control.reference_erpm);
+    ideal_motor_run(20000);
+    TEST_ASSERT_INT16_WITHIN(10, 5000 + 1250, drive.run.control.reference_erpm);
+    TEST_ASSERT_FLOAT_WITHIN(60.0F, 6250.0F, ideal_motor_erpm());
+}
