@@ -1,5 +1,8 @@
 /* What the ADC and the board's measuring circuits deliver: formats, channels, trigger, shunt window, noise, and the warnings. */
+#define FAKE_OWN_SETUP
 #include "fake_firmware.inc"
+
+void tearDown(void);
 
 static uint16_t buffer[4];
 
@@ -11,28 +14,12 @@ static void keep_buffers(void)
     buffer[3] = ADC1BUF3;
 }
 
-static void (*more_init)(void);
-
-static void init(void)
-{
-    if (more_init != NULL) {
-        more_init();
-    }
-}
-
 void setUp(void)
 {
     fake_setup();
-    more_init = NULL;
     memset(buffer, 0, sizeof buffer);
-    fake_init_hook = init;
     fake_adc_hook = keep_buffers;
     set("adc.noise_lsb", 0.0);
-}
-
-void tearDown(void)
-{
-    fake_teardown();
 }
 
 /* Current of phase A held by a DC voltage on a blocked rotor. */
@@ -41,14 +28,12 @@ static void hold_current(uint16_t spread)
     set("load.locked", 1.0);
     set("motor.rs_ohm", 1.0);
     set_duties((uint16_t)(1000 + spread), (uint16_t)(1000 - spread), (uint16_t)(1000 - spread));
-    power_up();
-    run(1000);
+    start(1000);
 }
 
 void test_zero_current_reads_zero_in_signed_fractional_format(void)
 {
-    power_up();
-    run(2);
+    start(2);
     TEST_ASSERT_EQUAL_HEX16(0x0000, buffer[1]);
     TEST_ASSERT_EQUAL_HEX16(0x0000, buffer[2]);
 }
@@ -78,8 +63,7 @@ void test_bus_and_potentiometer_readings(void)
     set("input.pot", 0.25);
     set("bus.load_a", 0.0);
     set("supply.resistance_ohm", 1e-3);
-    power_up();
-    run(10);
+    start(10);
     TEST_ASSERT_EQUAL_HEX16((uint16_t)((256u << 6) ^ 0x8000u), buffer[0]);
     double volts = (double)((buffer[3] ^ 0x8000u) >> 6) / 1024.0 * 3.3 * 16.0;
     TEST_ASSERT_DOUBLE_WITHIN(0.03, 24.0, volts);
@@ -89,40 +73,26 @@ void test_offset_and_gain_errors_show_in_the_reading(void)
 {
     set("shunt.offset_a_v", 0.0330); /* 10.24 counts */
     set("adc.gain_error", 0.01);
-    power_up();
-    run(2);
+    start(2);
     TEST_ASSERT_EQUAL_INT(15, (int16_t)buffer[1] / 64); /* (512 + 10.24) * 1.01 - 512 */
     TEST_ASSERT_EQUAL_INT(5, (int16_t)buffer[2] / 64);
-}
-
-static uint16_t format;
-
-static void other_format(void)
-{
-    AD1CON1 = (uint16_t)(0x806C | (format << 8));
 }
 
 void test_each_result_format_has_its_bits_in_place(void)
 {
     static const uint16_t expected[4] = { 0x0100, 0xFF00, 0x4000, 0xC000 }; /* code 256 */
-    more_init = other_format;
     set("input.pot", 0.25);
-    for (format = 0; format < 4; format++) {
-        power_up();
-        run(2);
+    for (unsigned format = 0; format < 4; format++) {
+        at_init("AD1CON1", (uint16_t)(0x806C | (format << 8)));
+        start(2);
         TEST_ASSERT_EQUAL_HEX16(expected[format], buffer[0]);
     }
     TEST_ASSERT_TRUE(warned_about("AD1CON1"));
 }
 
-static void early_trigger(void)
-{
-    P1SECMP = 0x0000; /* counter at zero: the high sides conduct */
-}
-
 void test_a_trigger_under_the_high_sides_reads_no_current_and_is_named(void)
 {
-    more_init = early_trigger;
+    at_init("P1SECMP", 0x0000); /* counter at zero: the high sides conduct */
     hold_current(250);
     TEST_ASSERT_TRUE(get("plant.i_a") > 1.0);
     TEST_ASSERT_EQUAL_HEX16(0x0000, buffer[1]);
@@ -140,10 +110,7 @@ void test_samples_are_valid_while_the_low_side_has_conducted_long_enough(void)
 void test_a_high_duty_closes_the_window_of_its_shunt(void)
 {
     set("inverter.trip_a", 0.0);
-    set("load.locked", 1.0);
-    set_duties(1960, 1500, 1500); /* low for 1 us, dead time included */
-    power_up();
-    run(400);
+    run_blocked(400, 1960, 1500, 1500); /* low for 1 us, dead time included */
     TEST_ASSERT_TRUE(get("adc.ia_invalid_count") > 350.0);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, get("adc.ib_invalid_count"));
     TEST_ASSERT_TRUE(fabs((double)(int16_t)buffer[1] / 64.0 * 3.3 / 1024.0 / 0.375) < 0.7 * get("plant.i_a"));
@@ -151,61 +118,39 @@ void test_a_high_duty_closes_the_window_of_its_shunt(void)
 
 void test_the_low_diode_keeps_the_window_open_through_the_dead_time(void)
 {
-    set("load.locked", 1.0);
-    set_duties(1900, 1500, 1500); /* low path of A from 47.5/2 us on: 1.25 us before the middle, on its diode (i > 0) */
-    power_up();
-    run(400);
+    run_blocked(400, 1900, 1500, 1500); /* low path of A from 47.5/2 us on: 1.25 us before the middle, on its diode (i > 0) */
     TEST_ASSERT_EQUAL_DOUBLE(0.0, get("adc.ia_invalid_count"));
     TEST_ASSERT_DOUBLE_WITHIN(0.01, get("plant.i_a"), get("adc.ia_a"));
-}
-
-static uint16_t trigger_count;
-
-static void other_trigger(void)
-{
-    P1SECMP = trigger_count;
 }
 
 /* Part of phase A's current that a sample at the given compare value shows. */
 static double shown_part(uint16_t secmp)
 {
-    trigger_count = secmp;
-    more_init = other_trigger;
+    at_init("P1SECMP", secmp);
     set("shunt.settle_s", 1e-6);
     set("load.locked", 1.0);
     set("motor.rs_ohm", 1.0);
     set_duties(1000, 500, 500);
-    power_up();
-    run(1000);
+    start(1000);
     return get("adc.ia_a") / get("plant.i_a");
 }
 
-void test_a_sample_just_after_the_low_side_took_over_shows_part_of_the_current(void)
+void test_a_sample_just_after_a_side_took_over_shows_part_of_the_current(void)
 {
     /* A's low diode carries from 12.5 us + turn-off delay 0.15 us on */
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, shown_part(505));
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, shown_part(526));
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, shown_part(548));
-}
-
-void test_a_sample_just_after_the_high_side_took_over_shows_the_rest_of_it(void)
-{
     /* A's low diode gives up at 37.5 us + dead time 2 us + turn-on delay 0.1 us */
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, shown_part(0x8000 | (2000 - 1583)));
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, shown_part(0x8000 | (2000 - 1604)));
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, shown_part(0x8000 | (2000 - 1626)));
 }
 
-static void interrupts_masked(void)
-{
-    __builtin_disable_interrupts();
-}
-
 void test_interrupts_wait_while_the_cpu_masks_them(void)
 {
-    more_init = interrupts_masked;
-    power_up();
-    run(10);
+    at_init("SR", 0x00E0); /* level 7 */
+    start(10);
     TEST_ASSERT_EQUAL_UINT(0, fake_adc_calls);
     set("reg.SR", 0.0);
     run(10);
@@ -215,8 +160,7 @@ void test_interrupts_wait_while_the_cpu_masks_them(void)
 void test_a_handler_slower_than_the_period_overruns_and_is_named(void)
 {
     set("cpu.isr_us", 70.0);
-    power_up();
-    run(100);
+    start(100);
     TEST_ASSERT_UINT_WITHIN(1, 71, fake_adc_calls); /* 5 ms in handlers of 70 us, one after the other */
     TEST_ASSERT_TRUE(get("adc.overrun_count") > 90.0);
     TEST_ASSERT_TRUE(warned_about("IFS0"));
@@ -227,28 +171,17 @@ static void forget_the_flag(void)
     IFS0bits.AD1IF = 1;
 }
 
-static unsigned background_passes;
-
-static void count_background(void)
-{
-    background_passes++;
-}
-
 void test_a_handler_that_leaves_its_flag_set_starves_the_main_loop_and_is_named(void)
 {
     fake_adc_hook = forget_the_flag;
-    fake_background_hook = count_background;
-    background_passes = 0;
-    power_up();
-    run(100);
-    TEST_ASSERT_EQUAL_UINT(0, background_passes);
+    start(100);
+    TEST_ASSERT_EQUAL_UINT(0, fake_background_calls);
     TEST_ASSERT_TRUE(warned_about("IFS0"));
 }
 
 void test_a_dropped_handler_leaves_the_outputs_as_they_were(void)
 {
-    power_up();
-    run(10);
+    start(10);
     set("cpu.isr_dropped", 1.0);
     set_duties(0, 0, 0);
     run(10);
@@ -272,8 +205,7 @@ void test_noise_has_the_set_deviation_and_no_mean(void)
     fake_adc_hook = collect_noise;
     noise_sum = 0.0;
     noise_square = 0.0;
-    power_up();
-    run(20000);
+    start(20000);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.0, noise_sum / 20000.0);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, sqrt(4.0 + 1.0 / 12.0), sqrt(noise_square / 20000.0));
 }
@@ -284,8 +216,7 @@ static double sum_with_seed(double seed)
     set("rng.seed", seed);
     fake_adc_hook = collect_noise;
     noise_square = 0.0;
-    power_up();
-    run(200);
+    start(200);
     return noise_square;
 }
 
@@ -296,18 +227,12 @@ void test_the_seed_decides_the_noise(void)
     TEST_ASSERT_TRUE(first != sum_with_seed(6.0));
 }
 
-static void free_running(void)
-{
-    AD1CON1 = 0x83EC; /* SSRC = 7 */
-    AD1CON3 = 0x1F02;
-}
-
 void test_a_free_running_converter_ignores_the_pwm_and_is_named(void)
 {
-    more_init = free_running;
+    at_init("AD1CON1", 0x83EC); /* SSRC = 7 */
+    at_init("AD1CON3", 0x1F02);
     set("cpu.isr_us", 1.0);
-    power_up();
-    run(100);
+    start(100);
     TEST_ASSERT_TRUE(fake_adc_calls > 500);
     TEST_ASSERT_TRUE(warned_about("AD1CON1"));
 }

@@ -1,22 +1,12 @@
 /* What the PWM module makes of its registers: period, duty, dead time, overrides, fault input, and the warnings about them. */
 #include "fake_firmware.inc"
 
-enum { ALL_LOW = 0x15 };
-
-void setUp(void)
-{
-    fake_setup();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
 
 void test_the_notes_settings_give_20_khz_2_us_and_no_warning(void)
 {
-    power_up();
-    run(1000);
+    start(1000);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 20000.0, get("pwm.frequency_hz"));
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0, get("pwm.dead_time_us"));
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
@@ -27,8 +17,7 @@ void test_the_notes_settings_give_20_khz_2_us_and_no_warning(void)
 
 void test_duties_load_at_the_start_of_the_next_period(void)
 {
-    power_up();
-    run(3);
+    start(3);
     set_duties(600, 1000, 1400);
     run(1); /* the handler of this period writes them */
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
@@ -44,31 +33,23 @@ static void change_duty_in_third_call(void)
     }
 }
 
-void test_a_handler_that_ends_before_the_load_acts_in_the_next_period(void)
+void test_a_handler_acts_in_the_next_period_a_late_one_a_period_later(void)
 {
-    fake_adc_hook = change_duty_in_third_call;
-    power_up();
-    run(3);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
-    run(1);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, get("pwm.duty1"));
-}
-
-void test_a_late_handler_misses_the_load_and_acts_a_period_later(void)
-{
-    fake_adc_hook = change_duty_in_third_call;
-    set("cpu.isr_us", 30.0); /* trigger at 25 us, conversion 3.6 us */
-    power_up();
-    run(4);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
-    run(1);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, get("pwm.duty1"));
+    static const double isr_us[] = { 13.0, 30.0 }; /* trigger at 25 us, conversion 3.6 us */
+    for (unsigned late = 0; late < 2; late++) {
+        fake_restart();
+        fake_adc_hook = change_duty_in_third_call;
+        set("cpu.isr_us", isr_us[late]);
+        start(3 + late);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, get("pwm.duty1"));
+        run(1);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, get("pwm.duty1"));
+    }
 }
 
 void test_udis_holds_the_duties_back(void)
 {
-    power_up();
-    run(3);
+    start(3);
     set("reg.PWM1CON2", 1.0);
     set_duties(600, 1000, 1400);
     run(300);
@@ -90,8 +71,7 @@ void test_the_handler_sees_the_counter_on_its_way_down(void)
 {
     fake_adc_hook = note_counter;
     set("cpu.isr_us", 10.0);
-    power_up();
-    run(2);
+    start(2);
     /* trigger at 25.025 us, 48 TAD of 75 ns, 10 us: 38.625 us = 1545 counts up and down again */
     TEST_ASSERT_TRUE((seen_counter & 0x8000u) != 0);
     TEST_ASSERT_UINT_WITHIN(1, 2000u - 1545u, seen_counter & 0x7FFFu);
@@ -100,43 +80,33 @@ void test_the_handler_sees_the_counter_on_its_way_down(void)
 void test_mean_terminal_voltage_follows_the_duties(void)
 {
     make_ideal();
-    fake_init_hook = no_dead_time;
-    set("load.locked", 1.0);
-    set_duties(1500, 500, 500);
-    power_up();
-    run(5);
+    at_init("P1DTCON1", 0); /* no dead time */
+    run_blocked(5, 1500, 500, 500);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 24.0 * 0.5 * 2.0 / 3.0, get("plant.v_d")); /* rotor on phase A */
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, get("plant.v_q"));
 }
 
-void test_full_and_zero_duty_never_switch(void)
+void test_short_pulses_meet_the_dead_time(void)
 {
-    set_duties(2000, 0, 2400);
-    power_up();
-    run(3);
-    TEST_ASSERT_EQUAL_HEX(0x26, (unsigned)get("pwm.outputs_seen"));
-}
-
-void test_pulses_shorter_than_the_dead_time_disappear(void)
-{
-    set_duties(60, 1000, 1000); /* 1.5 us */
-    power_up();
-    run(5);
-    TEST_ASSERT_EQUAL_HEX(0x3D, (unsigned)get("pwm.outputs_seen"));
-}
-
-void test_a_dead_time_that_spans_the_start_of_a_period_is_kept(void)
-{
-    set_duties(100, 1000, 1000); /* 2.5 us around the start of the period: on 2.1 us after its begin, off 0.15 us after its end */
-    power_up();
-    run(5);
-    TEST_ASSERT_EQUAL_HEX(0x3F, (unsigned)get("pwm.outputs_seen"));
+    static const struct {
+        uint16_t duty[3];
+        unsigned seen;
+    } row[] = {
+        { { 2000, 0, 2400 }, 0x26 },   /* full and zero duty never switch */
+        { { 60, 1000, 1000 }, 0x3D },  /* 1.5 us, shorter than the dead time */
+        { { 100, 1000, 1000 }, 0x3F }, /* 2.5 us around the start of the period: on 2.1 us after its begin, off 0.15 us after its end */
+    };
+    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+        fake_restart();
+        set_duties(row[n].duty[0], row[n].duty[1], row[n].duty[2]);
+        start(5);
+        TEST_ASSERT_EQUAL_HEX(row[n].seen, (unsigned)get("pwm.outputs_seen"));
+    }
 }
 
 void test_override_switches_everything_off_within_the_period(void)
 {
-    power_up();
-    run(5);
+    start(5);
     set("reg.P1OVDCON", 0.0);
     run(2);
     TEST_ASSERT_EQUAL_HEX(0, (unsigned)get("pwm.outputs_on"));
@@ -150,8 +120,7 @@ static void stop_in_handler(void)
 
 void test_override_written_by_the_handler_acts_at_that_instant(void)
 {
-    power_up();
-    run(5);
+    start(5);
     fake_adc_hook = stop_in_handler;
     run(1);
     TEST_ASSERT_EQUAL_HEX(0, (unsigned)get("pwm.outputs_on"));
@@ -170,37 +139,20 @@ void test_synchronised_override_waits_for_the_next_period(void)
     TEST_ASSERT_EQUAL_HEX(0, (unsigned)get("pwm.outputs_on"));
 }
 
-void test_all_low_sides_on_for_the_bootstrap_capacitors(void)
-{
-    fake_override = 0x0015;
-    power_up();
-    run(2);
-    TEST_ASSERT_EQUAL_HEX(ALL_LOW, (unsigned)get("pwm.outputs_on"));
-    TEST_ASSERT_EQUAL_HEX(ALL_LOW, (unsigned)get("pwm.outputs_seen"));
-}
-
 void test_no_dead_time_shoots_through_trips_the_comparator_and_is_named(void)
 {
-    fake_init_hook = no_dead_time;
-    power_up();
-    run(20);
+    at_init("P1DTCON1", 0); /* no dead time */
+    start(20);
     TEST_ASSERT_TRUE(warned_about("P1DTCON1"));
     TEST_ASSERT_TRUE(get("inverter.trip_count") > 0.0);
-}
-
-void test_shoot_through_draws_current_from_the_bus(void)
-{
-    fake_init_hook = no_dead_time;
     set("inverter.trip_a", 0.0);
-    power_up();
-    run(20);
+    start(20);
     TEST_ASSERT_TRUE(get("bus.current_a") > 1.0);
 }
 
 void test_fault_input_stops_the_outputs_and_lets_them_go_on_cycle_by_cycle(void)
 {
-    power_up();
-    run(5);
+    start(5);
     set("input.flta", 1.0);
     run(2);
     TEST_ASSERT_EQUAL_HEX(0, (unsigned)get("pwm.outputs_seen"));
@@ -212,16 +164,10 @@ void test_fault_input_stops_the_outputs_and_lets_them_go_on_cycle_by_cycle(void)
     TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RB8"));
 }
 
-static void latched_fault(void)
-{
-    P1FLTACON = 0x0007;
-}
-
 void test_latched_fault_holds_the_outputs_until_the_flag_is_cleared(void)
 {
-    fake_init_hook = latched_fault;
-    power_up();
-    run(5);
+    at_init("P1FLTACON", 0x0007);
+    start(5);
     set("input.flta", 1.0);
     run(2);
     set("input.flta", 0.0);
@@ -232,16 +178,10 @@ void test_latched_fault_holds_the_outputs_until_the_flag_is_cleared(void)
     TEST_ASSERT_TRUE(get("pwm.outputs_seen") > 0.0);
 }
 
-static void fault_interrupt_on(void)
-{
-    IEC3bits.FLTA1IE = 1;
-}
-
 void test_fault_interrupt_is_served_once_per_edge(void)
 {
-    fake_init_hook = fault_interrupt_on;
-    power_up();
-    run(5);
+    at_init("IEC3", 0x8000); /* FLTA1IE */
+    start(5);
     set("input.flta", 1.0);
     run(10);
     TEST_ASSERT_EQUAL_UINT(1, fake_fault_calls);
@@ -252,14 +192,9 @@ void test_fault_interrupt_is_served_once_per_edge(void)
     TEST_ASSERT_EQUAL_UINT(2, fake_fault_calls);
 }
 
-static void fault_disabled(void)
-{
-    P1FLTACON = 0;
-}
-
 void test_a_disabled_fault_input_does_nothing_and_is_named(void)
 {
-    fake_init_hook = fault_disabled;
+    at_init("P1FLTACON", 0);
     power_up();
     set("input.flta", 1.0);
     run(5);
@@ -279,11 +214,6 @@ void test_over_current_trips_within_the_period_and_ends_the_current(void)
     TEST_ASSERT_TRUE(get("stat.i_peak_a") < 3.2);
 }
 
-static void immediate_updates(void)
-{
-    PWM1CON2 = 0x0004;
-}
-
 static void start_high(void)
 {
     fake_duty[0] = 2000;
@@ -298,16 +228,12 @@ void test_a_write_that_changes_nothing_does_not_disturb_the_edges(void)
 {
     double i_a[2];
     for (int k = 0; k < 2; k++) {
-        if (k == 1) {
-            fake_teardown();
-            fake_setup();
-            fake_adc_hook = touch_fault_settings;
-        }
+        fake_restart();
+        fake_adc_hook = k == 1 ? touch_fault_settings : NULL;
         set("cpu.isr_us", 10.1); /* with two of the duties this falls into a dead time */
         set("load.locked", 1.0);
         set_duties(900, 880, 500);
-        power_up();
-        run(200);
+        start(200);
         i_a[k] = get("plant.i_a");
     }
     TEST_ASSERT_EQUAL_DOUBLE(i_a[0], i_a[1]);
@@ -315,50 +241,29 @@ void test_a_write_that_changes_nothing_does_not_disturb_the_edges(void)
 
 void test_legs_at_the_same_duty_leave_a_resting_motor_without_current(void)
 {
-    power_up();
-    run(200); /* in every dead time all three terminals float at zero current */
+    start(200); /* in every dead time all three terminals float at zero current */
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, get("stat.i_peak_a"));
 }
 
 void test_immediate_updates_act_in_the_same_period(void)
 {
-    fake_init_hook = immediate_updates;
+    at_init("PWM1CON2", 0x0004);
     set("cpu.isr_us", 0.0);
     set_duties(400, 400, 400);
-    power_up();
-    run(5);
+    start(5);
     fake_adc_hook = start_high; /* at 28.6 us, while every low side is on */
     run(1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, get("pwm.duty1"));
 }
 
-static void double_updates(void)
-{
-    P1TCON = 0x8003;
-}
-
 void test_double_update_mode_loads_in_the_middle_of_the_period_too(void)
 {
-    fake_init_hook = double_updates;
+    at_init("P1TCON", 0x8003);
     set("cpu.isr_us", 0.0);
     set_duties(400, 400, 400);
-    power_up();
-    run(5);
+    start(5);
     set("reg.P1DC1", 1600.0);
     run(1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.8, get("pwm.duty1"));
     TEST_ASSERT_TRUE(warned_about("P1TCON"));
-}
-
-static void every_other_event(void)
-{
-    PWM1CON2 = 0x0100;
-}
-
-void test_the_special_event_postscaler_skips_triggers(void)
-{
-    fake_init_hook = every_other_event;
-    power_up();
-    run(100);
-    TEST_ASSERT_EQUAL_UINT(50, fake_adc_calls);
 }

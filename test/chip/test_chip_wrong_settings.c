@@ -1,5 +1,8 @@
-/* Settings that are wrong: the effect that they have on silicon, and the register that is named for it. */
+/* Settings: the effect that they have on silicon, and the registers that are named for wrong ones. */
 #include "fake_firmware.inc"
+
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
 
 typedef struct {
     const char *what;
@@ -37,32 +40,18 @@ static const wrong_t rows[] = {
     { "two sequences", { { "AD1CON2", 0x0204 } }, 10, { "AD1CON2" }, { { "calls", 5.0, 0.0 }, { "reg.ADC1BUF4", 0xC000, 0.0 } } },
     { "sequential sampling", { { "AD1CON1", 0x8364 } }, 2, { "AD1CON1" }, { { NULL, 0.0, 0.0 } } },
     { "conversions longer than the period", { { "AD1CON3", 63 } }, 100, { "AD1CON3" }, { { "calls", 50.0, 1.0 } } },
+    { "all low sides on", { { "P1OVDCON", 0x0015 } }, 2, { NULL }, { { "pwm.outputs_on", 0x15, 0.0 }, { "pwm.outputs_seen", 0x15, 0.0 } } },
+    { "special event postscaler", { { "PWM1CON2", 0x0100 } }, 100, { NULL }, { { "calls", 50.0, 0.0 } } },
     { "conversion clock too fast", { { "AD1CON3", 0 } }, 2, { "AD1CON3" }, { { NULL, 0.0, 0.0 } } },
 };
 
-static const wrong_t *row;
-
-static void set_registers(void)
-{
-    for (unsigned n = 0; n < 2 && row->set[n].name != NULL; n++) {
-        *host_sfr_find(row->set[n].name) = row->set[n].value;
-    }
-}
-
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
-
 void test_each_has_its_effect_and_is_named(void)
 {
-    for (row = rows; row < rows + sizeof rows / sizeof rows[0]; row++) {
-        fake_setup();
-        fake_init_hook = set_registers;
+    for (const wrong_t *row = rows; row < rows + sizeof rows / sizeof rows[0]; row++) {
+        fake_restart();
+        for (unsigned n = 0; n < 2 && row->set[n].name != NULL; n++) {
+            at_init(row->set[n].name, row->set[n].value);
+        }
         set("adc.noise_lsb", 0.0);
         set("input.pot", 0.25);
         power_up();
@@ -75,6 +64,5 @@ void test_each_has_its_effect_and_is_named(void)
             TEST_ASSERT_TRUE_MESSAGE(warned_about(row->named[n]), row->what);
         }
         TEST_ASSERT_FALSE_MESSAGE(warned_about("AD1CHS0"), row->what); /* which nobody has touched */
-        fake_teardown();
     }
 }

@@ -2,20 +2,12 @@
  * test/cpu_33f/test_peripherals.py. */
 #include "fake_firmware.inc"
 
-void setUp(void)
-{
-    fake_setup();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
 
 void test_buttons_pull_their_pins_low(void)
 {
-    power_up();
-    run(1);
+    start(1);
     TEST_ASSERT_EQUAL_UINT(1, PORTAbits.RA8);
     TEST_ASSERT_EQUAL_UINT(1, PORTBbits.RB4);
     set("input.s2", 1.0);
@@ -39,41 +31,28 @@ static void write_port(void)
 
 void test_writing_a_port_reaches_the_latch_and_is_named(void)
 {
-    power_up();
-    run(1);
+    start(1);
     fake_background_hook = write_port;
     run(8);
     TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RC6"));
     TEST_ASSERT_TRUE(warned_about("PORTC"));
 }
 
-static void millisecond_timer(void)
-{
-    PR1 = 4999; /* 40 MHz / 8 / 5000 */
-    T1CON = 0x8010;
-    IEC0bits.T1IE = 1;
-}
-
 void test_timer_1_interrupts_every_millisecond(void)
 {
-    fake_init_hook = millisecond_timer;
-    power_up();
-    run(20000);
+    at_init("PR1", 4999); /* 40 MHz / 8 / 5000 */
+    at_init("T1CON", 0x8010);
+    at_init("IEC0", 0x2008);
+    start(20000);
     TEST_ASSERT_UINT_WITHIN(1, 1000, fake_timer_calls);
     TEST_ASSERT_TRUE(TMR1 <= PR1);
 }
 
-static void polled_timer(void)
-{
-    PR1 = 4999;
-    T1CON = 0x8010;
-}
-
 void test_a_polled_timer_sets_its_flag(void)
 {
-    fake_init_hook = polled_timer;
-    power_up();
-    run(19);
+    at_init("PR1", 4999);
+    at_init("T1CON", 0x8010);
+    start(19);
     TEST_ASSERT_EQUAL_UINT(0, IFS0bits.T1IF);
     run(2);
     TEST_ASSERT_EQUAL_UINT(1, IFS0bits.T1IF);
@@ -91,33 +70,25 @@ static void send_text(void)
 
 static void uart_on(void)
 {
-    RPOR9bits.RP19R = 3;
-    RPINR18bits.U1RXR = 20;
-    U1MODEbits.BRGH = 1;
-    U1BRG = 86; /* 114943 baud */
-    U1MODEbits.UARTEN = 1;
-    U1STAbits.UTXEN = 1;
+    at_init("RPOR9", 0x0300);
+    at_init("RPINR18", 0x1F14);
+    at_init("U1BRG", 86); /* 114943 baud */
+    at_init("U1MODE", 0x8008);
+    at_init("U1STA", 0x0510);
 }
 
 void test_sent_characters_arrive_in_order_at_the_baud_rate(void)
 {
     char out[64] = { 0 };
     text = "state run\r\n";
-    fake_init_hook = uart_on;
+    uart_on();
     fake_background_hook = send_text;
-    power_up();
-    run(400);
+    start(400);
     TEST_ASSERT_EQUAL_UINT(11, vb_uart_read(board, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING("state run\r\n", out);
     TEST_ASSERT_DOUBLE_WITHIN(1.0, 40e6 / 4.0 / 87.0, get("uart.baud"));
     TEST_ASSERT_EQUAL_UINT(1, U1STAbits.TRMT);
     TEST_ASSERT_EQUAL_UINT(0, vb_uart_read(board, out, sizeof out));
-}
-
-static void transmit_interrupt_on(void)
-{
-    uart_on();
-    IEC0bits.U1TXIE = 1;
 }
 
 void _U1TXInterrupt(void)
@@ -130,9 +101,9 @@ void test_the_transmit_interrupt_starts_with_the_transmitter_and_goes_on_with_ea
 {
     char out[16] = { 0 };
     text = "interrupt";
-    fake_init_hook = transmit_interrupt_on;
-    power_up();
-    run(200);
+    uart_on();
+    at_init("IEC0", 0x3000); /* with U1TXIE */
+    start(200);
     TEST_ASSERT_EQUAL_UINT(9, vb_uart_read(board, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING("interrupt", out);
 }
@@ -151,7 +122,7 @@ void test_received_characters_are_seen_once_each(void)
 {
     memset(received, 0, sizeof received);
     received_count = 0;
-    fake_init_hook = uart_on;
+    uart_on();
     fake_background_hook = poll_receiver;
     power_up();
     TEST_ASSERT_EQUAL_UINT(5, vb_uart_write(board, "hello", 5));
@@ -160,15 +131,10 @@ void test_received_characters_are_seen_once_each(void)
     TEST_ASSERT_EQUAL_STRING("hello", received);
 }
 
-static void uart_interrupt_on(void)
-{
-    uart_on();
-    IEC0bits.U1RXIE = 1;
-}
-
 void test_received_characters_interrupt(void)
 {
-    fake_init_hook = uart_interrupt_on;
+    uart_on();
+    at_init("IEC0", 0x2800); /* with U1RXIE */
     power_up();
     TEST_ASSERT_EQUAL_UINT(3, vb_uart_write(board, "abc", 3));
     run(400);

@@ -1,15 +1,13 @@
 /* The host's device header: start values, bit views, the clock switch, look-up by name. */
+#define FAKE_OWN_SETUP
 #include "fake_firmware.inc"
+
+void tearDown(void);
 
 void setUp(void)
 {
     fake_setup();
     host_registers_reset();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
 }
 
 void test_start_values_let_an_initialisation_pass_its_waits(void)
@@ -26,39 +24,30 @@ void test_start_values_let_an_initialisation_pass_its_waits(void)
     TEST_ASSERT_EQUAL_HEX16(0x0003, RCON);
 }
 
+#define EXPECT_VIEW(name, field, value, expected) \
+    name##bits.field = (value); \
+    TEST_ASSERT_EQUAL_HEX16_MESSAGE(expected, name, #name "bits." #field)
+
 void test_bit_views_sit_where_the_device_has_the_bits(void)
 {
-    P1TCONbits.PTEN = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x8000, P1TCON);
-    PWM1CON1bits.PEN3H = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x0040, PWM1CON1);
-    AD1CON1bits.FORM = 3;
-    AD1CON1bits.SSRC = 3;
-    AD1CON1bits.SIMSAM = 1;
-    AD1CON1bits.ASAM = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x036C, AD1CON1);
-    IFS0bits.AD1IF = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x2000, IFS0);
-    IFS3bits.FLTA1IF = 1;
-    IFS3bits.PWM1IF = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x8200, IFS3);
-    IPC3bits.AD1IP = 6;
-    TEST_ASSERT_EQUAL_HEX16(0x0064, IPC3);
-    IPC15bits.FLTA1IP = 7;
-    TEST_ASSERT_EQUAL_HEX16(0x7000, IPC15);
-    P1OVDCONbits.POVD3H = 0;
-    P1OVDCONbits.POUT1L = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x1F01, P1OVDCON);
-    P1FLTACONbits.FLTAM = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x0080, P1FLTACON);
-    P1SECMPbits.SEVTDIR = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x8000, P1SECMP);
-    RPOR9bits.RP19R = 3;
-    TEST_ASSERT_EQUAL_HEX16(0x0300, RPOR9);
-    U1STAbits.UTXEN = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x0510, U1STA);
-    CORCONbits.SATA = 1;
-    TEST_ASSERT_EQUAL_HEX16(0x00A0, CORCON);
+    EXPECT_VIEW(P1TCON, PTEN, 1, 0x8000);
+    EXPECT_VIEW(PWM1CON1, PEN3H, 1, 0x0040);
+    EXPECT_VIEW(AD1CON1, FORM, 3, 0x0300);
+    EXPECT_VIEW(AD1CON1, SSRC, 3, 0x0360);
+    EXPECT_VIEW(AD1CON1, SIMSAM, 1, 0x0368);
+    EXPECT_VIEW(AD1CON1, ASAM, 1, 0x036C);
+    EXPECT_VIEW(IFS0, AD1IF, 1, 0x2000);
+    EXPECT_VIEW(IFS3, FLTA1IF, 1, 0x8000);
+    EXPECT_VIEW(IFS3, PWM1IF, 1, 0x8200);
+    EXPECT_VIEW(IPC3, AD1IP, 6, 0x0064);
+    EXPECT_VIEW(IPC15, FLTA1IP, 7, 0x7000);
+    EXPECT_VIEW(P1OVDCON, POVD3H, 0, 0x1F00);
+    EXPECT_VIEW(P1OVDCON, POUT1L, 1, 0x1F01);
+    EXPECT_VIEW(P1FLTACON, FLTAM, 1, 0x0080);
+    EXPECT_VIEW(P1SECMP, SEVTDIR, 1, 0x8000);
+    EXPECT_VIEW(RPOR9, RP19R, 3, 0x0300);
+    EXPECT_VIEW(U1STA, UTXEN, 1, 0x0510);
+    EXPECT_VIEW(CORCON, SATA, 1, 0x00A0);
 }
 
 void test_a_clock_switch_completes_when_it_is_requested(void)
@@ -113,17 +102,11 @@ void test_reset_restores_every_register(void)
     }
 }
 
-static void fast_pll(void)
-{
-    PLLFBD = 58;
-}
-
 void test_a_clock_above_the_devices_limit_is_named(void)
 {
-    fake_init_hook = fast_pll;
+    at_init("PLLFBD", 58);
     set("expect.fcy_hz", 0.0);
-    power_up();
-    run(1);
+    start(1);
     TEST_ASSERT_DOUBLE_WITHIN(1.0, 60e6, get("cpu.fcy_hz"));
     TEST_ASSERT_TRUE(warned_about("PLLFBD"));
 }

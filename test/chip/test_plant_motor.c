@@ -1,21 +1,14 @@
 /* The plant against closed-form answers: currents, torque, friction, short circuit, rectifier, energy. */
 #include "fake_firmware.inc"
 
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
+
 #define PI 3.14159265358979323846
 #define PSI 7.983e-3
 #define POLES 5.0
 #define R 2.67
 #define L 1.92e-3
-
-void setUp(void)
-{
-    fake_setup();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
 
 static double omega_e(double rpm)
 {
@@ -29,11 +22,32 @@ static void drive_shaft(double rpm)
     set("state.speed_rpm", rpm);
 }
 
+/* What a key shows, within a part of the expected value. */
+static void expect_part(double part, double expected, const char *key)
+{
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(part * fabs(expected), expected, get(key), key);
+}
+
+static void no_friction(void)
+{
+    set("mech.viscous_nms", 0.0);
+    set("mech.coulomb_nm", 0.0);
+    set("mech.stiction_nm", 0.0);
+}
+
+/* A shaft that coasts with this speed, all outputs off. */
+static void coast(double rpm)
+{
+    fake_override = 0x0000;
+    power_up();
+    set("state.speed_rpm", rpm);
+}
+
 /* A blocked rotor in a bridge without losses and dead time, under a tenth of the bus voltage along phase A. */
 static void hold_vector(void)
 {
     make_ideal();
-    fake_init_hook = no_dead_time;
+    at_init("P1DTCON1", 0); /* no dead time */
     set("load.locked", 1.0);
     set_duties(1100, 900, 900);
     power_up();
@@ -44,7 +58,7 @@ void test_dc_current_of_a_blocked_rotor_is_voltage_over_resistance(void)
     hold_vector();
     run(400);
     double v_alpha = 24.0 * 0.1 * 2.0 / 3.0;
-    TEST_ASSERT_DOUBLE_WITHIN(0.001 * v_alpha / R, v_alpha / R, get("plant.i_a"));
+    expect_part(0.001, v_alpha / R, "plant.i_a");
     TEST_ASSERT_DOUBLE_WITHIN(0.001, -0.5 * v_alpha / R, get("plant.i_b"));
     TEST_ASSERT_DOUBLE_WITHIN(0.001, -0.5 * v_alpha / R, get("plant.i_c"));
 }
@@ -56,35 +70,27 @@ void test_current_rises_with_the_time_constant_of_the_winding(void)
     set("reg.AD1CON1", 0.0); /* without the ADC the plant is latched at the end of a period, where the ripple is zero */
     run(1);
     double v_alpha = 24.0 * 0.1 * 2.0 / 3.0;
-    double expected = v_alpha / R * (1.0 - exp(-0.55e-3 * R / L));
-    TEST_ASSERT_DOUBLE_WITHIN(0.005 * expected, expected, get("plant.i_a"));
+    expect_part(0.005, v_alpha / R * (1.0 - exp(-0.55e-3 * R / L)), "plant.i_a");
 }
 
-void test_dead_time_costs_each_leg_its_share_of_the_bus_against_the_current(void)
+/* Td/Ts * Vdc; legs B and C carry the opposite sign. */
+static void expect_dead_time_current(double dead_us)
+{
+    run_blocked(400, 1400, 600, 600);
+    double leg_error = 24.0 * dead_us / 50.0;
+    expect_part(0.003, (24.0 * 0.4 * 2.0 / 3.0 - leg_error * 4.0 / 3.0) / R, "plant.i_a");
+    TEST_ASSERT_DOUBLE_WITHIN(0.003, 2.0, get("pwm.dead_time_us"));
+}
+
+void test_dead_time_and_switching_delays_cost_each_leg_their_share_of_the_bus_against_the_current(void)
 {
     make_ideal();
-    set("load.locked", 1.0);
-    set_duties(1400, 600, 600);
-    power_up();
-    run(400);
-    double leg_error = 24.0 * 2.0 / 50.0; /* Td/Ts * Vdc, legs B and C carry the opposite sign */
-    double v_alpha = 24.0 * 0.4 * 2.0 / 3.0 - leg_error * 4.0 / 3.0;
-    TEST_ASSERT_DOUBLE_WITHIN(0.003, 2.0, get("pwm.dead_time_us"));
-    TEST_ASSERT_DOUBLE_WITHIN(0.003 * v_alpha / R, v_alpha / R, get("plant.i_a"));
-}
-
-void test_switching_delays_shorten_or_lengthen_the_dead_time(void)
-{
+    expect_dead_time_current(2.0);
+    fake_restart();
     make_ideal();
     set("inverter.turn_on_s", 2e-7);
     set("inverter.turn_off_s", 6e-7);
-    set("load.locked", 1.0);
-    set_duties(1400, 600, 600);
-    power_up();
-    run(400);
-    double leg_error = 24.0 * 1.6 / 50.0;
-    double v_alpha = 24.0 * 0.4 * 2.0 / 3.0 - leg_error * 4.0 / 3.0;
-    TEST_ASSERT_DOUBLE_WITHIN(0.003 * v_alpha / R, v_alpha / R, get("plant.i_a"));
+    expect_dead_time_current(1.6);
 }
 
 void test_transistor_and_shunt_drops_act_like_added_resistance(void)
@@ -92,8 +98,7 @@ void test_transistor_and_shunt_drops_act_like_added_resistance(void)
     hold_vector();
     set("inverter.rds_on_ohm", 0.3);
     run(400);
-    double expected = 24.0 * 0.1 * 2.0 / 3.0 / (R + 0.3);
-    TEST_ASSERT_DOUBLE_WITHIN(0.002 * expected, expected, get("plant.i_a"));
+    expect_part(0.002, 24.0 * 0.1 * 2.0 / 3.0 / (R + 0.3), "plant.i_a");
 }
 
 void test_temperature_changes_resistance_and_flux(void)
@@ -103,7 +108,7 @@ void test_temperature_changes_resistance_and_flux(void)
     set("state.theta_e_deg", -90.0);
     run(600);
     double i = 24.0 * 0.1 * 2.0 / 3.0 / (R * 1.39);
-    TEST_ASSERT_DOUBLE_WITHIN(0.002 * i, i, get("plant.i_q"));
+    expect_part(0.002, i, "plant.i_q");
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.5 * POLES * PSI * 0.8 * i, get("plant.torque_nm"));
 }
 
@@ -132,10 +137,10 @@ void test_saliency_adds_reluctance_torque(void)
     double torque = 1.5 * POLES * (PSI * i + (1.5e-3 - 3.0e-3) * -i * i);
     TEST_ASSERT_DOUBLE_WITHIN(0.002, -i, get("plant.i_d"));
     TEST_ASSERT_DOUBLE_WITHIN(0.002, i, get("plant.i_q"));
-    TEST_ASSERT_DOUBLE_WITHIN(0.002 * torque, torque, get("plant.torque_nm"));
+    expect_part(0.002, torque, "plant.torque_nm");
     set("stat.reset", 1.0);
     run(10);
-    TEST_ASSERT_DOUBLE_WITHIN(0.002 * torque, torque, get("stat.torque_mean_nm"));
+    expect_part(0.002, torque, "stat.torque_mean_nm");
 }
 
 void test_a_saturated_winding_has_the_remaining_inductance(void)
@@ -149,8 +154,7 @@ void test_a_saturated_winding_has_the_remaining_inductance(void)
     run(1);
     double final = 24.0 * 0.1 * 2.0 / 3.0 / R;
     /* six periods; the first one starts without current and has the full inductance, which counts half */
-    double expected = final * (1.0 - exp(-0.275e-3 * R / (0.5 * L)));
-    TEST_ASSERT_DOUBLE_WITHIN(0.01 * expected, expected, get("plant.i_a"));
+    expect_part(0.01, final * (1.0 - exp(-0.275e-3 * R / (0.5 * L))), "plant.i_a");
 }
 
 void test_short_circuited_windings_carry_the_current_of_the_phasor_diagram(void)
@@ -200,12 +204,10 @@ void test_a_rotor_that_swings_in_a_fixed_field_loses_what_its_back_emf_takes_and
     const double swing = sqrt(POLES * 1.5 * POLES * psi * volts / R / inertia); /* 250 rad/s */
     const double damping = 1.5 * POLES * POLES * psi * psi * R / (R * R + swing * swing * L * L);
     make_ideal();
-    fake_init_hook = no_dead_time;
+    at_init("P1DTCON1", 0); /* no dead time */
     set("motor.psi_vs", psi);
     set("mech.inertia_kgm2", inertia);
-    set("mech.viscous_nms", 0.0);
-    set("mech.coulomb_nm", 0.0);
-    set("mech.stiction_nm", 0.0);
+    no_friction();
     set_duties(1500, 500, 500);
     power_up();
     set("state.theta_e_deg", 20.0);
@@ -221,10 +223,8 @@ void test_a_rotor_that_swings_in_a_fixed_field_loses_what_its_back_emf_takes_and
 void test_a_power_up_forgets_the_torque_of_the_period_before(void)
 {
     make_ideal();
-    fake_init_hook = no_dead_time;
-    set("mech.viscous_nms", 0.0);
-    set("mech.coulomb_nm", 0.0);
-    set("mech.stiction_nm", 0.0);
+    at_init("P1DTCON1", 0); /* no dead time */
+    no_friction();
     set_duties(1500, 500, 500);
     power_up();
     set("state.theta_e_deg", 270.0);
@@ -232,8 +232,7 @@ void test_a_power_up_forgets_the_torque_of_the_period_before(void)
     TEST_ASSERT_TRUE(fabs(get("plant.torque_nm")) > 0.01);
     fake_override = 0x0000;
     set("state.speed_rpm", 100.0);
-    power_up();
-    run(2);
+    start(2);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 100.0, get("plant.speed_rpm"));
 }
 
@@ -292,17 +291,12 @@ static void compare_floating_terminal(void)
     }
 }
 
-static void sample_terminals(void)
-{
-    AD1CHS123 = 1; /* AN3..5: the terminals through the bus divider */
-    AD1PCFGL = 0x0000;
-}
-
 void test_a_floating_terminal_shows_the_back_emf_while_the_others_carry_current(void)
 {
     make_ideal();
     fake_override = 0x0005;
-    fake_init_hook = sample_terminals;
+    at_init("AD1CHS123", 1); /* AN3..5: the terminals through the bus divider */
+    at_init("AD1PCFGL", 0x0000);
     fake_adc_hook = compare_floating_terminal;
     worst_float_error = 0.0;
     float_samples = 0;
@@ -380,8 +374,7 @@ static double braking_bus_v(double sinks)
 void test_braking_a_spinning_motor_raises_a_bus_whose_supply_cannot_sink(void)
 {
     double rising_v = braking_bus_v(0.0);
-    fake_teardown();
-    fake_setup();
+    fake_restart();
     double held_v = braking_bus_v(1.0);
     TEST_ASSERT_TRUE(rising_v > 26.0);
     TEST_ASSERT_TRUE(held_v < 24.2);
@@ -412,7 +405,7 @@ void test_shaft_work_is_torque_times_speed(void)
     run(20000);
     double w = 1000.0 * PI / 30.0;
     double friction = 0.004 + 15.3e-6 * w;
-    TEST_ASSERT_DOUBLE_WITHIN(0.01 * friction, friction, get("stat.torque_mean_nm"));
+    expect_part(0.01, friction, "stat.torque_mean_nm");
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * friction * w, friction * w, get("stat.energy_shaft_j"));
 }
 
@@ -432,8 +425,7 @@ static void compare_steps(double lq_h)
 {
     double coarse[5], fine[5];
     record_run(1.0, lq_h, coarse);
-    fake_teardown();
-    fake_setup();
+    fake_restart();
     record_run(2e-7, lq_h, fine);
     for (int k = 0; k < 5; k++) {
         TEST_ASSERT_DOUBLE_WITHIN(0.001 * fabs(fine[k]) + 1e-4, fine[k], coarse[k]);
@@ -443,19 +435,14 @@ static void compare_steps(double lq_h)
 void test_results_do_not_depend_on_the_integration_step(void)
 {
     compare_steps(L);
-}
-
-void test_results_of_a_salient_motor_do_not_depend_on_the_integration_step(void)
-{
-    compare_steps(1.5 * L);
+    fake_restart();
+    compare_steps(1.5 * L); /* a salient motor */
 }
 
 void test_dry_friction_slows_the_shaft_at_a_constant_rate_and_holds_it(void)
 {
-    fake_override = 0x0000;
     set("mech.viscous_nms", 0.0);
-    power_up();
-    set("state.speed_rpm", 1000.0);
+    coast(1000.0);
     run(1000); /* 50 ms */
     double expected = 1000.0 - 0.004 / 5.5e-6 * 0.05 * 30.0 / PI;
     TEST_ASSERT_DOUBLE_WITHIN(0.5, expected, get("state.speed_rpm"));
@@ -465,22 +452,17 @@ void test_dry_friction_slows_the_shaft_at_a_constant_rate_and_holds_it(void)
 
 void test_viscous_friction_slows_the_shaft_exponentially(void)
 {
-    fake_override = 0x0000;
     set("mech.coulomb_nm", 0.0);
-    power_up();
-    set("state.speed_rpm", 1000.0);
+    coast(1000.0);
     run(4000);
     TEST_ASSERT_DOUBLE_WITHIN(1.0, 1000.0 * exp(-0.2 * 15.3e-6 / 5.5e-6), get("state.speed_rpm"));
 }
 
 void test_quadratic_load_slows_with_the_square_of_speed(void)
 {
-    fake_override = 0x0000;
-    set("mech.coulomb_nm", 0.0);
-    set("mech.viscous_nms", 0.0);
+    no_friction();
     set("load.quadratic_nms2", 1e-6);
-    power_up();
-    set("state.speed_rpm", 1000.0);
+    coast(1000.0);
     run(2000);
     double w0 = 1000.0 * PI / 30.0;
     double w = w0 / (1.0 + w0 * 1e-6 / 5.5e-6 * 0.1);
@@ -505,10 +487,8 @@ void test_stiction_holds_until_it_is_exceeded(void)
 
 void test_a_brake_load_never_turns_the_shaft_backwards(void)
 {
-    fake_override = 0x0000;
     set("load.constant_nm", 0.1);
-    power_up();
-    set("state.speed_rpm", -500.0);
+    coast(-500.0);
     set("stat.reset", 1.0);
     run(1000);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, get("state.speed_rpm"));
@@ -539,10 +519,7 @@ void test_an_open_phase_carries_nothing_and_the_others_carry_the_same_current(vo
 
 void test_current_in_the_diodes_dies_out_after_the_outputs_go_off(void)
 {
-    set("load.locked", 1.0);
-    set_duties(1400, 700, 700);
-    power_up();
-    run(400);
+    run_blocked(400, 1400, 700, 700);
     TEST_ASSERT_TRUE(get("plant.i_a") > 1.0);
     set("reg.P1OVDCON", 0.0);
     run(4);

@@ -2,15 +2,8 @@
 #include "fake_firmware.inc"
 #include "vb_cpu.h"
 
-void setUp(void)
-{
-    fake_setup();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
 
 void test_every_listed_key_can_be_used_as_its_flags_say(void)
 {
@@ -61,8 +54,7 @@ void test_running_before_power_up_is_refused(void)
 
 void test_power_up_resets_registers_but_keeps_the_shaft_turning(void)
 {
-    power_up();
-    run(10);
+    start(10);
     set("reg.LATC", 0x55);
     set("state.speed_rpm", 1234.0);
     set("supply.voltage_v", 20.0);
@@ -72,23 +64,13 @@ void test_power_up_resets_registers_but_keeps_the_shaft_turning(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, get("bus.voltage_v"));
 }
 
-static unsigned background_passes;
-
-static void count_background(void)
-{
-    background_passes++;
-}
-
 void test_the_background_runs_every_few_periods(void)
 {
-    fake_background_hook = count_background;
-    background_passes = 0;
-    power_up();
-    run(400);
-    TEST_ASSERT_EQUAL_UINT(100, background_passes);
+    start(400);
+    TEST_ASSERT_EQUAL_UINT(100, fake_background_calls);
     set("cpu.background_periods", 20.0);
     run(400);
-    TEST_ASSERT_UINT_WITHIN(1, 120, background_passes);
+    TEST_ASSERT_UINT_WITHIN(1, 120, fake_background_calls);
 }
 
 void test_trace_has_a_row_each_period_with_the_values_of_the_sample(void)
@@ -124,15 +106,10 @@ void test_trace_decimation_keeps_every_nth_row(void)
     TEST_ASSERT_TRUE(data[0] > 0.49f);
 }
 
-static void stop_the_pwm(void)
-{
-    P1TCON = 0;
-}
-
 void test_trace_goes_on_without_interrupts(void)
 {
     size_t rows, cols;
-    fake_init_hook = stop_the_pwm;
+    at_init("P1TCON", 0);
     power_up();
     TEST_ASSERT_EQUAL_INT(0, vb_trace_config(board, "plant.speed_rpm", 1));
     run(10);
@@ -146,23 +123,16 @@ void test_trace_refuses_unknown_names_and_keeps_nothing(void)
     TEST_ASSERT_EQUAL_INT(-1, vb_trace_config(board, "time_s,plant.speed", 1));
     TEST_ASSERT_EQUAL_STRING("plant.speed: unknown key", vb_error(board));
     TEST_ASSERT_EQUAL_INT(-1, vb_trace_config(board, "time_s", 0));
-    power_up();
-    run(5);
+    start(5);
     (void)vb_trace_data(board, &rows, &cols);
     TEST_ASSERT_EQUAL_UINT(0, rows);
 }
 
-static void break_things(void)
-{
-    P1FLTACON = 0;
-    P1SECMP = 0;
-}
-
 void test_each_problem_is_reported_once(void)
 {
-    fake_init_hook = break_things;
-    power_up();
-    run(100);
+    at_init("P1FLTACON", 0);
+    at_init("P1SECMP", 0);
+    start(100);
     unsigned count = vb_warning_count(board);
     TEST_ASSERT_EQUAL_UINT(2, count);
     set("reg.LATB", 1.0); /* another decoding pass */
@@ -173,8 +143,7 @@ void test_each_problem_is_reported_once(void)
 
 void test_statistics_start_anew(void)
 {
-    power_up();
-    run(10);
+    start(10);
     TEST_ASSERT_EQUAL_DOUBLE(10.0, get("stat.periods"));
     set("stat.reset", 1.0);
     run(5);
@@ -185,10 +154,7 @@ void test_a_run_is_repeatable(void)
 {
     double angle[2];
     for (int k = 0; k < 2; k++) {
-        if (k == 1) {
-            fake_teardown();
-            fake_setup();
-        }
+        fake_restart();
         set_duties(1200, 900, 900);
         power_up();
         set("state.theta_e_deg", 40.0);
@@ -256,13 +222,12 @@ static void own_end(void *context, double length_s)
 void test_another_cpu_can_sit_on_the_board(void)
 {
     static const chip_cpu_t cpu = { .reg = own_register, .reset = own_reset, .cycles = own_cycles,
-                                    .raised = own_raised, .begin = own_nothing, .end = own_end, .destroy = own_nothing };
+                                    .raised = own_raised, .end = own_end, .destroy = own_nothing };
     vb_destroy(board);
     board = vb_create_with_cpu(&cpu);
     TEST_ASSERT_NOT_NULL(board);
     own_interrupts = 0;
-    power_up();
-    run(25);
+    start(25);
     TEST_ASSERT_EQUAL_UINT(25, own_interrupts);
     TEST_ASSERT_EQUAL_HEX16(0, P1TCON);
 }

@@ -2,6 +2,9 @@
 #include "fake_firmware.inc"
 #include "probe.h"
 
+void setUp(void); /* both in fake_firmware.inc */
+void tearDown(void);
+
 static double counted_calls(void)
 {
     return (double)fake_adc_calls;
@@ -30,20 +33,9 @@ const char *probe_state_name(int state)
     return state == 1 ? "lock" : "";
 }
 
-void setUp(void)
-{
-    fake_setup();
-}
-
-void tearDown(void)
-{
-    fake_teardown();
-}
-
 void test_signals_are_readable_under_one_prefix(void)
 {
-    power_up();
-    run(7);
+    start(7);
     TEST_ASSERT_EQUAL_DOUBLE(7.0, get("fw.calls"));
     TEST_ASSERT_EQUAL_DOUBLE(-2.5, get("fw.constant_a"));
     TEST_ASSERT_EQUAL_INT(-1, vb_set(board, "fw.calls", 1.0));

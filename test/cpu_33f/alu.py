@@ -10,6 +10,8 @@ from asm33 import Row
 C, Z, OV, N, RA, DC, DA, SAB, OAB, SB, SA, OB, OA = 0, 1, 2, 3, 4, 8, 9, 10, 11, 12, 13, 14, 15
 FLAG_NAMES = {"C": C, "Z": Z, "OV": OV, "N": N, "RA": RA, "DC": DC, "DA": DA, "SAB": SAB, "OAB": OAB, "SB": SB, "SA": SA, "OB": OB, "OA": OA}
 
+BITS = {"bset": lambda value, bit: value | bit, "bclr": lambda value, bit: value & ~bit, "btg": lambda value, bit: value ^ bit}
+
 
 def signed(value: int, bits: int) -> int:
     """The value of a two's complement word."""
@@ -166,6 +168,9 @@ class Alu:
     def execute(self) -> None:
         """Runs the instruction."""
         name = self.row.mnemonic.split(".")[0]
+        if name in BITS:
+            self._bit(BITS[name])
+            return
         special = getattr(self, f"_{self.row.mnemonic.replace('.', '_')}", None) or getattr(self, f"_{name}", None)
         if special:
             special()
@@ -326,15 +331,6 @@ class Alu:
             self.state.store(place, result, self.bits)
         return value >> bit & 1
 
-    def _bset(self) -> None:
-        self._bit(lambda value, bit: value | bit)
-
-    def _bclr(self) -> None:
-        self._bit(lambda value, bit: value & ~bit)
-
-    def _btg(self) -> None:
-        self._bit(lambda value, bit: value ^ bit)
-
     def _bsw(self) -> None:
         new = self.state.flag(C) if self.row.mnemonic == "bsw.c" else 1 - self.state.flag(Z)
         self._bit(lambda value, bit: value | bit if new else value & ~bit)
@@ -350,14 +346,6 @@ class Alu:
             self.state.set_flag(C, bit)
         else:
             self.state.set_flag(Z, not bit)
-
-    def _push(self) -> None:
-        self.state.store(self.state.w[15], self.state.load(self.fields["f"] << 1, 16), 16)
-        self.state.w[15] += 2
-
-    def _pop(self) -> None:
-        self.state.w[15] -= 2
-        self.state.store(self.fields["f"] << 1, self.state.load(self.state.w[15], 16), 16)
 
     def _div(self) -> None:
         """The result of REPEAT #17 and the division; OV leaves W0 and W1 open, which is not looked at then."""
@@ -384,13 +372,3 @@ class Alu:
             state.w[0], state.w[1] = quotient & 0xFFFF, rest & 0xFFFF
             state.set_flag(Z, rest == 0)
             state.set_flag(N, rest < 0)
-
-    def _lnk(self) -> None:
-        state = self.state
-        state.store(state.w[15], state.w[14], 16)
-        state.w[14] = state.w[15] + 2 & 0xFFFF
-        state.w[15] = state.w[14] + 2 * self.fields["k"] & 0xFFFF
-
-    def _ulnk(self) -> None:
-        state = self.state
-        state.w[14], state.w[15] = state.load(state.w[14] - 2, 16), state.w[14] - 2 & 0xFFFF

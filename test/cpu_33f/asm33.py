@@ -11,217 +11,111 @@ significant bit first. Operands:
     ,WREG          optional: the result goes to W0 (field D)    label          branch target, words relative to the next word (n)
     Acc            A or B (field A)                             X Y AWB ...    operands of the DSP engine, see _dsp
 
-A mnemonic that ends in * takes .b (field B); without it, it works on words. Written from the Programmer's Reference Manual
-(DS70157, "16-bit MCU and DSC Programmer's Reference Manual"), chapter 5 and table 6.
+A mnemonic that ends in * takes .b (field B); without it, it works on words. Names between bars share a row: their number, from 0, is in
+the bits @; a name of "-" leaves a number out. Written from the Programmer's Reference Manual (DS70157, "16-bit MCU and DSC Programmer's
+Reference Manual"), chapter 5 and table 6.
 """
 
 import re
 from dataclasses import dataclass, field
 
 ROWS_TEXT = """
-add*      f,WREG          1011 0100 0BDf ffff ffff ffff
-add*      #k,Wd           1011 0000 0Bkk kkkk kkkk dddd
-add*      Wb,#k,{Wd}      0100 0www wBqq qddd d11k kkkk
-add*      Wb,{Ws},{Wd}    0100 0www wBqq qddd dppp ssss
-add       Acc             1100 1011 A000 0000 0000 0000
-add       {Ws+},#±r,Acc   1100 1001 Awww wrrr rggg ssss
-addc*     f,WREG          1011 0100 1BDf ffff ffff ffff
-addc*     #k,Wd           1011 0000 1Bkk kkkk kkkk dddd
-addc*     Wb,#k,{Wd}      0100 1www wBqq qddd d11k kkkk
-addc*     Wb,{Ws},{Wd}    0100 1www wBqq qddd dppp ssss
-and*      f,WREG          1011 0110 0BDf ffff ffff ffff
-and*      #k,Wd           1011 0010 0Bkk kkkk kkkk dddd
-and*      Wb,#k,{Wd}      0110 0www wBqq qddd d11k kkkk
-and*      Wb,{Ws},{Wd}    0110 0www wBqq qddd dppp ssss
-asr*      f,WREG          1101 0101 1BDf ffff ffff ffff
-asr*      {Ws},{Wd}       1101 0001 1Bqq qddd dppp ssss
-asr       Wb,#k,Wd        1101 1110 1www wddd d100 kkkk
-asr       Wb,Ws,Wd        1101 1110 1www wddd d000 ssss
-bclr*     {Ws},#b         1010 0001 bbbb 0B00 0ppp ssss
-bclr*     f.bit           1010 1001 bbbf ffff ffff ffff
-bra       label           0011 0111 nnnn nnnn nnnn nnnn
-bra       Ws              0000 0001 0110 0000 0000 ssss
-bra       ov,label        0011 0000 nnnn nnnn nnnn nnnn
-bra       c,label         0011 0001 nnnn nnnn nnnn nnnn
-bra       z,label         0011 0010 nnnn nnnn nnnn nnnn
-bra       n,label         0011 0011 nnnn nnnn nnnn nnnn
-bra       le,label        0011 0100 nnnn nnnn nnnn nnnn
-bra       lt,label        0011 0101 nnnn nnnn nnnn nnnn
-bra       leu,label       0011 0110 nnnn nnnn nnnn nnnn
-bra       nov,label       0011 1000 nnnn nnnn nnnn nnnn
-bra       nc,label        0011 1001 nnnn nnnn nnnn nnnn
-bra       nz,label        0011 1010 nnnn nnnn nnnn nnnn
-bra       nn,label        0011 1011 nnnn nnnn nnnn nnnn
-bra       gt,label        0011 1100 nnnn nnnn nnnn nnnn
-bra       ge,label        0011 1101 nnnn nnnn nnnn nnnn
-bra       gtu,label       0011 1110 nnnn nnnn nnnn nnnn
-bra       oa,label        0000 1100 nnnn nnnn nnnn nnnn
-bra       ob,label        0000 1101 nnnn nnnn nnnn nnnn
-bra       sa,label        0000 1110 nnnn nnnn nnnn nnnn
-bra       sb,label        0000 1111 nnnn nnnn nnnn nnnn
-bset*     {Ws},#b         1010 0000 bbbb 0B00 0ppp ssss
-bset*     f.bit           1010 1000 bbbf ffff ffff ffff
-bsw.c     {Ws},Wb         1010 1101 0www w000 0ppp ssss
-bsw.z     {Ws},Wb         1010 1101 1www w000 0ppp ssss
-btg*      {Ws},#b         1010 0010 bbbb 0B00 0ppp ssss
-btg*      f.bit           1010 1010 bbbf ffff ffff ffff
-btsc      {Ws},#b         1010 0111 bbbb 0000 0ppp ssss
-btsc*     f.bit           1010 1111 bbbf ffff ffff ffff
-btss      {Ws},#b         1010 0110 bbbb 0000 0ppp ssss
-btss*     f.bit           1010 1110 bbbf ffff ffff ffff
-btst*     f.bit           1010 1011 bbbf ffff ffff ffff
-btst.c    {Ws},#b         1010 0011 bbbb 0000 0ppp ssss
-btst.z    {Ws},#b         1010 0011 bbbb 1000 0ppp ssss
-btst.c    {Ws},Wb         1010 0101 0www w000 0ppp ssss
-btst.z    {Ws},Wb         1010 0101 1www w000 0ppp ssss
-btsts*    f.bit           1010 1100 bbbf ffff ffff ffff
-btsts.c   {Ws},#b         1010 0100 bbbb 0000 0ppp ssss
-btsts.z   {Ws},#b         1010 0100 bbbb 1000 0ppp ssss
-call      target          0000 0010 nnnn nnnn nnnn nnn0 | 0000 0000 0000 0000 0nnn nnnn
-call      Ws              0000 0001 0000 0000 0000 ssss
-clr*      f               1110 1111 0B1f ffff ffff ffff
-clr*      WREG            1110 1111 0B00 0000 0000 0000
-clr*      {Wd}            1110 1011 0Bqq qddd d000 0000
-clr       Acc,X,Y,AWB     1100 0011 A0xx yyii iijj jjaa
-clrwdt    -               1111 1110 0110 0000 0000 0000
-com*      f,WREG          1110 1110 1BDf ffff ffff ffff
-com*      {Ws},{Wd}       1110 1010 1Bqq qddd dppp ssss
-cp*       f               1110 0011 0B0f ffff ffff ffff
-cp*       Wb,#k           1110 0001 0www wB00 011k kkkk
-cp*       Wb,{Ws}         1110 0001 0www wB00 0ppp ssss
-cp0*      f               1110 0010 0B0f ffff ffff ffff
-cp0*      {Ws}            1110 0000 0000 0B00 0ppp ssss
-cpb*      f               1110 0011 1B0f ffff ffff ffff
-cpb*      Wb,#k           1110 0001 1www wB00 011k kkkk
-cpb*      Wb,{Ws}         1110 0001 1www wB00 0ppp ssss
-cpseq*    Wb,Ws           1110 0111 1www wB00 0000 ssss
-cpsgt*    Wb,Ws           1110 0110 0www wB00 0000 ssss
-cpslt*    Wb,Ws           1110 0110 1www wB00 0000 ssss
-cpsne*    Wb,Ws           1110 0111 0www wB00 0000 ssss
-daw.b     Ws              1111 1101 0100 0000 0000 ssss
-dec*      f,WREG          1110 1101 0BDf ffff ffff ffff
-dec*      {Ws},{Wd}       1110 1001 0Bqq qddd dppp ssss
-dec2*     f,WREG          1110 1101 1BDf ffff ffff ffff
-dec2*     {Ws},{Wd}       1110 1001 1Bqq qddd dppp ssss
-disi      #k              1111 1100 00kk kkkk kkkk kkkk
-div.s     Wm,Ws           1101 1000 0000 0mmm m000 ssss
-div.sd    Wm:,Ws          1101 1000 0ttt tmmm m100 ssss
-div.u     Wm,Ws           1101 1000 1000 0mmm m000 ssss
-div.ud    Wm:,Ws          1101 1000 1ttt tmmm m100 ssss
-divf      Wm,Ws           1101 1001 0mmm m000 0000 ssss
-do        #k,label        0000 1000 00kk kkkk kkkk kkkk | 0000 0000 nnnn nnnn nnnn nnnn
-do        Ws,label        0000 1000 1000 0000 0000 ssss | 0000 0000 nnnn nnnn nnnn nnnn
-ed        Wm*Wm,Acc,X-Y   1111 00mm A1xx 00ii iijj jj11
-edac      Wm*Wm,Acc,X-Y   1111 00mm A1xx 00ii iijj jj10
-exch      Ws,Wd           1111 1101 0000 0ddd d000 ssss
-fbcl      {Ws},Wd         1101 1111 0000 0ddd dppp ssss
-ff1l      {Ws},Wd         1100 1111 1000 0ddd dppp ssss
-ff1r      {Ws},Wd         1100 1111 0000 0ddd dppp ssss
-goto      target          0000 0100 nnnn nnnn nnnn nnn0 | 0000 0000 0000 0000 0nnn nnnn
-goto      Ws              0000 0001 0100 0000 0000 ssss
-inc*      f,WREG          1110 1100 0BDf ffff ffff ffff
-inc*      {Ws},{Wd}       1110 1000 0Bqq qddd dppp ssss
-inc2*     f,WREG          1110 1100 1BDf ffff ffff ffff
-inc2*     {Ws},{Wd}       1110 1000 1Bqq qddd dppp ssss
-ior*      f,WREG          1011 0111 0BDf ffff ffff ffff
-ior*      #k,Wd           1011 0011 0Bkk kkkk kkkk dddd
-ior*      Wb,#k,{Wd}      0111 0www wBqq qddd d11k kkkk
-ior*      Wb,{Ws},{Wd}    0111 0www wBqq qddd dppp ssss
-lac       {Ws+},#±r,Acc   1100 1010 Awww wrrr rggg ssss
-lnk       #k0             1111 1010 00kk kkkk kkkk kkk0
-lsr*      f,WREG          1101 0101 0BDf ffff ffff ffff
-lsr*      {Ws},{Wd}       1101 0001 0Bqq qddd dppp ssss
-lsr       Wb,#k,Wd        1101 1110 0www wddd d100 kkkk
-lsr       Wb,Ws,Wd        1101 1110 0www wddd d000 ssss
-mac       Wm*Wn,Acc,X,Y,AWB 1100 0mmm A0xx yyii iijj jjaa
-mac       Wm*Wm,Acc,X,Y   1111 00mm A0xx yyii iijj jj00
-mov*      f,WREG          1011 1111 1BDf ffff ffff ffff
-mov*      WREG,f          1011 0111 1B1f ffff ffff ffff
-mov       f,Wd            1000 0fff ffff ffff ffff dddd
-mov       Ws,f            1000 1fff ffff ffff ffff ssss
-mov.b     #k,Wd           1011 0011 1100 kkkk kkkk dddd
-mov       #k,Wd           0010 kkkk kkkk kkkk kkkk dddd
-mov*      [Ws+k],Wd       1001 0kkk kBkk kddd dkkk ssss
-mov*      Ws,[Wd+k]       1001 1kkk kBkk kddd dkkk ssss
-mov*      {Ws+},{Wd+}     0111 1www wBhh hddd dggg ssss
-mov.d     {Ws:},Wd:       1011 1110 0000 0ddd dppp ssss
-mov.d     Ws:,[Wd]        1011 1110 10qq qddd d000 ssss
-movsac    Acc,X,Y,AWB     1100 0111 A0xx yyii iijj jjaa
-mpy       Wm*Wn,Acc,X,Y   1100 0mmm A0xx yyii iijj jj11
-mpy       Wm*Wm,Acc,X,Y   1111 00mm A0xx yyii iijj jj01
-mpy.n     Wm*Wn,Acc,X,Y   1100 0mmm A1xx yyii iijj jj11
-msc       Wm*Wn,Acc,X,Y,AWB 1100 0mmm A1xx yyii iijj jjaa
-mul*      f               1011 1100 0B0f ffff ffff ffff
-mul.ss    Wb,{Ws},Wd:     1011 1001 1www wddd dppp ssss
-mul.su    Wb,#k,Wd:       1011 1001 0www wddd d11k kkkk
-mul.su    Wb,{Ws},Wd:     1011 1001 0www wddd dppp ssss
-mul.us    Wb,{Ws},Wd:     1011 1000 1www wddd dppp ssss
-mul.uu    Wb,#k,Wd:       1011 1000 0www wddd d11k kkkk
-mul.uu    Wb,{Ws},Wd:     1011 1000 0www wddd dppp ssss
-neg*      f,WREG          1110 1110 0BDf ffff ffff ffff
-neg*      {Ws},{Wd}       1110 1010 0Bqq qddd dppp ssss
-neg       Acc             1100 1011 A001 0000 0000 0000
-nop       -               0000 0000 .... .... .... ....
-nopr      -               1111 1111 .... .... .... ....
-pop       f               1111 1001 ffff ffff ffff fff0
-pop.s     -               1111 1110 1000 0000 0000 0000
-push      f               1111 1000 ffff ffff ffff fff0
-push.s    -               1111 1110 1010 0000 0000 0000
-pwrsav    #k              1111 1110 0100 0000 0000 000k
-rcall     label           0000 0111 nnnn nnnn nnnn nnnn
-rcall     Ws              0000 0001 0010 0000 0000 ssss
-repeat    #k              0000 1001 00kk kkkk kkkk kkkk
-repeat    Ws              0000 1001 1000 0000 0000 ssss
-reset     -               1111 1110 0000 0000 0000 0000
-retfie    -               0000 0110 0100 0000 0000 0000
-retlw*    #k,Wd           0000 0101 0Bkk kkkk kkkk dddd
-return    -               0000 0110 0000 0000 0000 0000
-rlc*      f,WREG          1101 0110 1BDf ffff ffff ffff
-rlc*      {Ws},{Wd}       1101 0010 1Bqq qddd dppp ssss
-rlnc*     f,WREG          1101 0110 0BDf ffff ffff ffff
-rlnc*     {Ws},{Wd}       1101 0010 0Bqq qddd dppp ssss
-rrc*      f,WREG          1101 0111 1BDf ffff ffff ffff
-rrc*      {Ws},{Wd}       1101 0011 1Bqq qddd dppp ssss
-rrnc*     f,WREG          1101 0111 0BDf ffff ffff ffff
-rrnc*     {Ws},{Wd}       1101 0011 0Bqq qddd dppp ssss
-sac       Acc,#±r,{Wd+}   1100 1100 Awww wrrr rhhh dddd
-sac.r     Acc,#±r,{Wd+}   1100 1101 Awww wrrr rhhh dddd
-se        {Ws},Wd         1111 1011 0000 0ddd dppp ssss
-setm*     f               1110 1111 1B1f ffff ffff ffff
-setm*     WREG            1110 1111 1B00 0000 0000 0000
-setm*     {Wd}            1110 1011 1Bqq qddd d000 0000
-sftac     Acc,#±k         1100 1000 A000 0000 01kk kkkk
-sftac     Acc,Ws          1100 1000 A000 0000 0000 ssss
-sl*       f,WREG          1101 0100 0BDf ffff ffff ffff
-sl*       {Ws},{Wd}       1101 0000 0Bqq qddd dppp ssss
-sl        Wb,#k,Wd        1101 1101 0www wddd d100 kkkk
-sl        Wb,Ws,Wd        1101 1101 0www wddd d000 ssss
-sub*      f,WREG          1011 0101 0BDf ffff ffff ffff
-sub*      #k,Wd           1011 0001 0Bkk kkkk kkkk dddd
-sub*      Wb,#k,{Wd}      0101 0www wBqq qddd d11k kkkk
-sub*      Wb,{Ws},{Wd}    0101 0www wBqq qddd dppp ssss
-sub       Acc             1100 1011 A011 0000 0000 0000
-subb*     f,WREG          1011 0101 1BDf ffff ffff ffff
-subb*     #k,Wd           1011 0001 1Bkk kkkk kkkk dddd
-subb*     Wb,#k,{Wd}      0101 1www wBqq qddd d11k kkkk
-subb*     Wb,{Ws},{Wd}    0101 1www wBqq qddd dppp ssss
-subbr*    f,WREG          1011 1101 1BDf ffff ffff ffff
-subbr*    Wb,#k,{Wd}      0001 1www wBqq qddd d11k kkkk
-subbr*    Wb,{Ws},{Wd}    0001 1www wBqq qddd dppp ssss
-subr*     f,WREG          1011 1101 0BDf ffff ffff ffff
-subr*     Wb,#k,{Wd}      0001 0www wBqq qddd d11k kkkk
-subr*     Wb,{Ws},{Wd}    0001 0www wBqq qddd dppp ssss
-swap*     Ws              1111 1101 1B00 0000 0000 ssss
-tblrdh*   [Ws],{Wd}       1011 1010 1Bqq qddd dppp ssss
-tblrdl*   [Ws],{Wd}       1011 1010 0Bqq qddd dppp ssss
-tblwth*   {Ws},[Wd]       1011 1011 1Bqq qddd dppp ssss
-tblwtl*   {Ws},[Wd]       1011 1011 0Bqq qddd dppp ssss
-ulnk      -               1111 1010 1000 0000 0000 0000
-xor*      f,WREG          1011 0110 1BDf ffff ffff ffff
-xor*      #k,Wd           1011 0010 1Bkk kkkk kkkk dddd
-xor*      Wb,#k,{Wd}      0110 1www wBqq qddd d11k kkkk
-xor*      Wb,{Ws},{Wd}    0110 1www wBqq qddd dppp ssss
-ze        {Ws},Wd         1111 1011 1000 0ddd dppp ssss
+add                               {Ws+},#±r,Acc     1100 1001 Awww wrrr rggg ssss
+add|addc|sub|subb|and|xor|ior|-*  f,WREG            1011 01@@ @BDf ffff ffff ffff
+add|addc|sub|subb|and|xor|ior|-*  #k,Wd             1011 00@@ @Bkk kkkk kkkk dddd
+add|addc|sub|subb|and|xor|ior|-*  Wb,#k,{Wd}        01@@ @www wBqq qddd d11k kkkk
+add|addc|sub|subb|and|xor|ior|-*  Wb,{Ws},{Wd}      01@@ @www wBqq qddd dppp ssss
+add|neg|-|sub                     Acc               1100 1011 A0@@ 0000 0000 0000
+bra                               ov|c|z|n|le|lt|leu|-,label 0011 0@@@ nnnn nnnn nnnn nnnn
+bra                               nov|nc|nz|nn|gt|ge|gtu|-,label 0011 1@@@ nnnn nnnn nnnn nnnn
+bra                               oa|ob|sa|sb,label 0000 11@@ nnnn nnnn nnnn nnnn
+bra                               label             0011 0111 nnnn nnnn nnnn nnnn
+bset|bclr|btg|-*                  {Ws},#b           1010 00@@ bbbb 0B00 0ppp ssss
+bset|bclr|btg|-*                  f.bit             1010 10@@ bbbf ffff ffff ffff
+bsw.c|bsw.z                       {Ws},Wb           1010 1101 @www w000 0ppp ssss
+btss|btsc                         {Ws},#b           1010 011@ bbbb 0000 0ppp ssss
+btss|btsc*                        f.bit             1010 111@ bbbf ffff ffff ffff
+btst*                             f.bit             1010 1011 bbbf ffff ffff ffff
+btst.c|btst.z                     {Ws},Wb           1010 0101 @www w000 0ppp ssss
+btst.c|btst.z                     {Ws},#b           1010 0011 bbbb @000 0ppp ssss
+btsts*                            f.bit             1010 1100 bbbf ffff ffff ffff
+btsts.c|btsts.z                   {Ws},#b           1010 0100 bbbb @000 0ppp ssss
+call                              target            0000 0010 nnnn nnnn nnnn nnn0 | 0000 0000 0000 0000 0nnn nnnn
+call|goto                         Ws                0000 0001 0@00 0000 0000 ssss
+clrwdt                            -                 1111 1110 0110 0000 0000 0000
+clr|movsac                        Acc,X,Y,AWB       1100 0@11 A0xx yyii iijj jjaa
+clr|setm*                         f                 1110 1111 @B1f ffff ffff ffff
+clr|setm*                         WREG              1110 1111 @B00 0000 0000 0000
+clr|setm*                         {Wd}              1110 1011 @Bqq qddd d000 0000
+cp0*                              f                 1110 0010 0B0f ffff ffff ffff
+cp0*                              {Ws}              1110 0000 0000 0B00 0ppp ssss
+cpsgt|cpslt|cpsne|cpseq*          Wb,Ws             1110 011@ @www wB00 0000 ssss
+cp|cpb*                           f                 1110 0011 @B0f ffff ffff ffff
+cp|cpb*                           Wb,#k             1110 0001 @www wB00 011k kkkk
+cp|cpb*                           Wb,{Ws}           1110 0001 @www wB00 0ppp ssss
+daw.b                             Ws                1111 1101 0100 0000 0000 ssss
+disi                              #k                1111 1100 00kk kkkk kkkk kkkk
+div.sd|div.ud                     Wm:,Ws            1101 1000 @ttt tmmm m100 ssss
+div.s|div.u                       Wm,Ws             1101 1000 @000 0mmm m000 ssss
+divf                              Wm,Ws             1101 1001 0mmm m000 0000 ssss
+do                                #k,label          0000 1000 00kk kkkk kkkk kkkk | 0000 0000 nnnn nnnn nnnn nnnn
+do                                Ws,label          0000 1000 1000 0000 0000 ssss | 0000 0000 nnnn nnnn nnnn nnnn
+edac|ed                           Wm*Wm,Acc,X-Y     1111 00mm A1xx 00ii iijj jj1@
+exch                              Ws,Wd             1111 1101 0000 0ddd d000 ssss
+fbcl                              {Ws},Wd           1101 1111 0000 0ddd dppp ssss
+ff1r|ff1l                         {Ws},Wd           1100 1111 @000 0ddd dppp ssss
+goto                              target            0000 0100 nnnn nnnn nnnn nnn0 | 0000 0000 0000 0000 0nnn nnnn
+inc|inc2|dec|dec2|neg|com|-|-*    f,WREG            1110 11@@ @BDf ffff ffff ffff
+inc|inc2|dec|dec2|neg|com|-|-*    {Ws},{Wd}         1110 10@@ @Bqq qddd dppp ssss
+lac                               {Ws+},#±r,Acc     1100 1010 Awww wrrr rggg ssss
+lnk                               #k0               1111 1010 00kk kkkk kkkk kkk0
+lsr|asr                           Wb,#k,Wd          1101 1110 @www wddd d100 kkkk
+lsr|asr                           Wb,Ws,Wd          1101 1110 @www wddd d000 ssss
+mac|mpy                           Wm*Wm,Acc,X,Y     1111 00mm A0xx yyii iijj jj0@
+mac|msc                           Wm*Wn,Acc,X,Y,AWB 1100 0mmm A@xx yyii iijj jjaa
+mov                               f,Wd              1000 0fff ffff ffff ffff dddd
+mov                               Ws,f              1000 1fff ffff ffff ffff ssss
+mov                               #k,Wd             0010 kkkk kkkk kkkk kkkk dddd
+mov*                              f,WREG            1011 1111 1BDf ffff ffff ffff
+mov*                              WREG,f            1011 0111 1B1f ffff ffff ffff
+mov*                              [Ws+k],Wd         1001 0kkk kBkk kddd dkkk ssss
+mov*                              Ws,[Wd+k]         1001 1kkk kBkk kddd dkkk ssss
+mov*                              {Ws+},{Wd+}       0111 1www wBhh hddd dggg ssss
+mov.b                             #k,Wd             1011 0011 1100 kkkk kkkk dddd
+mov.d                             {Ws:},Wd:         1011 1110 0000 0ddd dppp ssss
+mov.d                             Ws:,[Wd]          1011 1110 10qq qddd d000 ssss
+mpy|mpy.n                         Wm*Wn,Acc,X,Y     1100 0mmm A@xx yyii iijj jj11
+mul*                              f                 1011 1100 0B0f ffff ffff ffff
+mul.uu|mul.su                     Wb,#k,Wd:         1011 100@ 0www wddd d11k kkkk
+mul.uu|mul.us|mul.su|mul.ss       Wb,{Ws},Wd:       1011 100@ @www wddd dppp ssss
+nop                               -                 0000 0000 .... .... .... ....
+nopr                              -                 1111 1111 .... .... .... ....
+pop.s                             -                 1111 1110 1000 0000 0000 0000
+push.s                            -                 1111 1110 1010 0000 0000 0000
+push|pop                          f                 1111 100@ ffff ffff ffff fff0
+pwrsav                            #k                1111 1110 0100 0000 0000 000k
+rcall                             label             0000 0111 nnnn nnnn nnnn nnnn
+rcall|bra                         Ws                0000 0001 0@10 0000 0000 ssss
+repeat                            #k                0000 1001 00kk kkkk kkkk kkkk
+repeat                            Ws                0000 1001 1000 0000 0000 ssss
+reset                             -                 1111 1110 0000 0000 0000 0000
+retlw*                            #k,Wd             0000 0101 0Bkk kkkk kkkk dddd
+return|retfie                     -                 0000 0110 0@00 0000 0000 0000
+sac|sac.r                         Acc,#±r,{Wd+}     1100 110@ Awww wrrr rhhh dddd
+se|ze                             {Ws},Wd           1111 1011 @000 0ddd dppp ssss
+sftac                             Acc,#±k           1100 1000 A000 0000 01kk kkkk
+sftac                             Acc,Ws            1100 1000 A000 0000 0000 ssss
+sl                                Wb,#k,Wd          1101 1101 0www wddd d100 kkkk
+sl                                Wb,Ws,Wd          1101 1101 0www wddd d000 ssss
+sl|-|lsr|asr|rlnc|rlc|rrnc|rrc*   f,WREG            1101 01@@ @BDf ffff ffff ffff
+sl|-|lsr|asr|rlnc|rlc|rrnc|rrc*   {Ws},{Wd}         1101 00@@ @Bqq qddd dppp ssss
+subr|subbr*                       f,WREG            1011 1101 @BDf ffff ffff ffff
+subr|subbr*                       Wb,#k,{Wd}        0001 @www wBqq qddd d11k kkkk
+subr|subbr*                       Wb,{Ws},{Wd}      0001 @www wBqq qddd dppp ssss
+swap*                             Ws                1111 1101 1B00 0000 0000 ssss
+tblrdl|tblrdh*                    [Ws],{Wd}         1011 1010 @Bqq qddd dppp ssss
+tblwtl|tblwth*                    {Ws},[Wd]         1011 1011 @Bqq qddd dppp ssss
+ulnk                              -                 1111 1010 1000 0000 0000 0000
 """
 
 # Second names of the same words.
@@ -296,9 +190,19 @@ class Row:
         return self.words[::-1] if self._low_half_first() else self.words
 
 
+def _single(line: str) -> list[str]:
+    """A line of the table as one for each of its names."""
+    names = re.search(r"[\w.-]+(\|[\w.-]+)+", line)
+    if not names:
+        return [line]
+    bits = [iter(f"{number:0{line.count('@')}b}") for number in range(names[0].count("|") + 1)]
+    return [re.sub("@", lambda _: next(number), line.replace(names[0], name))
+            for name, number in zip(names[0].split("|"), bits) if name != "-"]
+
+
 def _read_rows() -> list[Row]:
     rows = []
-    for line in ROWS_TEXT.strip().splitlines():
+    for line in (single for line in ROWS_TEXT.strip().splitlines() for single in _single(line)):
         mnemonic, operands, pattern = line.split(maxsplit=2)
         words = [word.replace(" ", "") for word in pattern.split("|")]
         assert all(len(word) == 24 for word in words), line

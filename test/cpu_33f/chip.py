@@ -29,10 +29,14 @@ def _registers() -> dict[str, int]:
 
 REGISTERS = _registers()
 
+
+# The unlock sequence of OSCCON's low byte, and a value for it.
+UNLOCK = "mov #0x742, w1; mov #0x46, w2; mov #0x57, w3; mov #{value}, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n"
+
+
 def switch(source: int) -> str:
     """OSCCON's two unlock sequences: NOSC, then OSWEN."""
-    return (f"mov #0x743, w1; mov #0x78, w2; mov #0x9A, w3; mov #{source}, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n"
-            "mov #0x742, w1; mov #0x46, w2; mov #0x57, w3; mov #1, w0; mov.b w2, [w1]; mov.b w3, [w1]; mov.b w0, [w1]\n")
+    return UNLOCK.replace("0x742", "0x743").replace("0x46", "0x78").replace("0x57", "0x9A").format(value=source) + UNLOCK.format(value=1)
 
 
 PLL = "mov #38, w0; mov w0, pllfbd; clr clkdiv\n" + switch(3) + """

@@ -6,12 +6,23 @@ OA (OB) tells that the guard bits are in use. SA and SB stay set. SATDW saturate
 """
 
 from alu import OA, OAB, OB, SA, SAB, SB, Alu, State, signed
+from asm33 import Row
+
+NAMES = {"mac", "msc", "mpy", "mpy.n", "movsac", "ed", "edac", "lac", "sac", "sac.r", "sftac"}
 
 US, SATA, SATB, SATDW, ACCSAT, RND, IF = 12, 7, 6, 5, 4, 1, 0
 STEPS = {0: 0, 1: 2, 2: 4, 3: 6, 5: -6, 6: -4, 7: -2}
 PAIRS = {0: (4, 5), 1: (4, 6), 2: (4, 7), 4: (5, 6), 5: (5, 7), 6: (6, 7)}
 UNUSED = 4
 INDEXED = 12
+# What the accumulator becomes; None leaves it.
+CHANGES = {"mac": lambda acc, product: acc + product, "msc": lambda acc, product: acc - product, "mpy": lambda acc, product: product,
+           "mpy.n": lambda acc, product: -product, "movsac": lambda acc, product: None}
+
+
+def is_dsp(row: Row) -> bool:
+    """Whether an instruction belongs to the DSP engine."""
+    return row.mnemonic in NAMES or "Acc" in row.operands
 
 
 class DspState(State):
@@ -110,20 +121,12 @@ class Dsp(Alu):
         self._prefetch()
         self._write_back(other)
 
-    def _mac(self) -> None:
-        self._mac_class(lambda acc, product: acc + product)
-
-    def _msc(self) -> None:
-        self._mac_class(lambda acc, product: acc - product)
-
-    def _mpy(self) -> None:
-        self._mac_class(lambda acc, product: product)
-
-    def _mpy_n(self) -> None:
-        self._mac_class(lambda acc, product: -product)
-
-    def _movsac(self) -> None:
-        self._mac_class(lambda acc, product: None)
+    def execute(self) -> None:
+        """Runs the instruction."""
+        if self.row.mnemonic in CHANGES:
+            self._mac_class(CHANGES[self.row.mnemonic])
+        else:
+            super().execute()
 
     def _clr(self) -> None:
         """CLR Acc; its flags are cleared with it, SA and SB too."""

@@ -25,20 +25,6 @@ typedef struct {
     uint64_t cycles;
 } registers_t;
 
-machine_t *machine_create(void);
-iss_t *machine_core(machine_t *machine);
-void machine_load(machine_t *machine, unsigned count, const uint32_t *words);
-void machine_set(machine_t *machine, const registers_t *to, const uint8_t *ram, unsigned count, const uint32_t *registers);
-const char *machine_run(machine_t *machine, uint64_t until);
-void machine_get(machine_t *machine, registers_t *now);
-void machine_ram(machine_t *machine, uint8_t *ram);
-unsigned machine_peek(machine_t *machine, unsigned address);
-void machine_poke(machine_t *machine, unsigned address, unsigned value);
-void machine_forget(machine_t *machine, unsigned address, unsigned bytes);
-void machine_irq_changed(machine_t *machine);
-void machine_forget_w(machine_t *machine, unsigned known);
-const char *machine_disassemble(machine_t *machine, uint32_t word, uint32_t next, uint32_t pc);
-
 machine_t *machine_create(void)
 {
     machine_t *machine = calloc(1, sizeof *machine);

@@ -16,6 +16,16 @@ RAM = 0x800
 RAM_NAMES = [f"[{address:x}]" for address in range(RAM, RAM + 0x800, 2)]
 
 
+_P, _U, _U32, _TEXT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint32, ctypes.c_char_p
+SIGNATURES = { # of machine.c: the result, the arguments
+    "machine_create": (_P,), "machine_core": (_P, _P), "machine_run": (_TEXT, _P, ctypes.c_uint64), "machine_load": (None, _P, _U, _P),
+    "machine_set": (None, _P, _P, _TEXT, _U, _P), "machine_get": (None, _P, _P), "machine_ram": (None, _P, _TEXT),
+    "machine_peek": (_U, _P, _U),
+    "machine_poke": (None, _P, _U, _U), "machine_forget": (None, _P, _U, _U), "machine_forget_w": (None, _P, _U),
+    "machine_disassemble": (_TEXT, _P, _U32, _U32, _U32), "machine_irq_changed": (None, _P),
+}
+
+
 class _Assumption(ctypes.Structure):
     _fields_ = [("id", ctypes.c_char_p), ("value", ctypes.c_int), ("meaning", ctypes.c_char_p), ("used_in", ctypes.c_char_p)]
 
@@ -43,24 +53,9 @@ class Machine:
 
     def __init__(self) -> None:
         library = ctypes.CDLL(str(LIBRARY))
-        library.machine_create.restype = ctypes.c_void_p
-        library.machine_run.restype = ctypes.c_char_p
-        library.machine_run.argtypes = [ctypes.c_void_p, ctypes.c_uint64]
-        library.machine_load.argtypes = [ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p]
-        library.machine_set.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint, ctypes.c_void_p]
-        library.machine_get.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-        library.machine_ram.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
-        library.machine_peek.argtypes = [ctypes.c_void_p, ctypes.c_uint]
-        library.machine_peek.restype = ctypes.c_uint
-        library.machine_poke.argtypes = [ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint]
-        library.machine_forget.argtypes = [ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint]
-        library.machine_forget_w.argtypes = [ctypes.c_void_p, ctypes.c_uint]
-        library.machine_disassemble.argtypes = [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32]
-        library.machine_disassemble.restype = ctypes.c_char_p
-        library.machine_irq_changed.argtypes = [ctypes.c_void_p]
+        for name, (result, *arguments) in SIGNATURES.items():
+            getattr(library, name).restype, getattr(library, name).argtypes = result, arguments
         library.iss_assumption.restype = ctypes.c_bool
-        library.machine_core.argtypes = [ctypes.c_void_p]
-        library.machine_core.restype = ctypes.c_void_p
         self._core = ctypes.c_void_p(library.machine_create())
         self.core = ctypes.c_void_p(library.machine_core(self._core))
         self.library = library

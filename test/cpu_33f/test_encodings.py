@@ -145,7 +145,3 @@ class CrossCheck(unittest.TestCase):
             if ours != words:
                 wrong.append(f"{words[0]:06x} reads {text} to XC16, which is {ours[0]:06x} here")
         self.assertEqual(wrong[:20], [])
-
-
-if __name__ == "__main__":
-    unittest.main()

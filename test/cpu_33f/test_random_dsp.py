@@ -1,14 +1,14 @@
 """Random DSP instructions in random modes: the simulator against the exact reference in dsp.py, all flags and both accumulators."""
 
 import random
-import unittest
+
+import pytest
 
 import asm33
 from alu import FLAG_NAMES, OA, OAB, OB, SA, SAB, SB
-from dsp import INDEXED, UNUSED, Dsp, DspState, signed
+from dsp import INDEXED, UNUSED, Dsp, DspState, is_dsp, signed
 from machine import PROGRAM, RAM, Machine
 from operands import Sampler
-from test_references import is_dsp
 
 ROUNDS = 1000
 CHAINS = 400
@@ -114,59 +114,51 @@ def compare(machine: Machine, state: DspState) -> list[str]:
     return found
 
 
-class RandomDsp(unittest.TestCase):
-    machine: Machine
-
-    @classmethod
-    def setUpClass(cls) -> None:
-        cls.machine = Machine()
-
-    def test_every_instruction_does_what_the_reference_does(self) -> None:
-        chance, sampler = Chance(40), Sampler(41)
-        count = 0
-        for row in ROWS:
-            wrong = []
-            for turn in range(ROUNDS):
-                memory = ram(chance) if turn % 50 == 0 else memory
-                text, word, fields = sample(sampler, row)
-                state = begin(chance, memory)
-                reach(chance.random, state, row, fields)
-                self.machine.load({PROGRAM: word})
-                self.machine.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, memory, PROGRAM)
-                before = f"{text}: A {state.acc[0] & 0xFFFFFFFFFF:010x} B {state.acc[1] & 0xFFFFFFFFFF:010x} CORCON {state.corcon:04x} SR {state.sr:04x}"
-                stop = self.machine.run(1)
-                Dsp(state, row, fields).execute()
-                found = compare(self.machine, state)
-                cycles = self.machine.registers().cycles
-                found += [f"{cycles} cycles"] if cycles != 1 else []
-                found += [f"stopped: {stop}"] if stop else []
-                count += 1
-                if found:
-                    wrong.append(f"{before}: {'; '.join(found)}")
-            with self.subTest(row.text):
-                self.assertEqual(wrong[:3], [], f"{len(wrong)} of {ROUNDS}")
-        self.assertGreaterEqual(count, 19000)
-
-    def test_chains_of_instructions_end_in_the_same_state(self) -> None:
-        chance, sampler = Chance(42), Sampler(43)
-        rows = [row for row in ROWS if "i" in row.extract([0])]
-        wrong = []
-        memory = ram(chance)
-        for _ in range(CHAINS):
-            state = begin(chance, memory)
-            chain = [sample(sampler, row) + (row,) for row in (chance.random.choice(rows) for _ in range(12))]
-            chain = [part for part in chain if part[2].get("a") != 1 and INDEXED not in (part[2]["i"], part[2]["j"])]
-            state.w[8:12] = 0x9C0, 0xA80, 0xD80, 0xE80
-            self.machine.load({PROGRAM + 2 * index: part[1] for index, part in enumerate(chain)})
-            self.machine.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, memory, PROGRAM)
-            stop = self.machine.run(len(chain))
-            for _, _, fields, row in chain:
-                Dsp(state, row, fields).execute()
-            found = compare(self.machine, state) + ([f"stopped: {stop}"] if stop else [])
-            if found:
-                wrong.append(f"{'; '.join(part[0] for part in chain)}: {'; '.join(found)}")
-        self.assertEqual(wrong[:3], [], f"{len(wrong)} of {CHAINS}")
+def start(machine: Machine, state: DspState, memory: bytes, *words: int) -> None:
+    """Puts the machine before a program, in the reference's state."""
+    machine.load({PROGRAM + 2 * index: word for index, word in enumerate(words)})
+    machine.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, memory, PROGRAM)
 
 
-if __name__ == "__main__":
-    unittest.main()
+@pytest.mark.parametrize("number", range(len(ROWS)), ids=[" ".join(row.text.split()[:2]) for row in ROWS])
+def test_every_instruction_does_what_the_reference_does(machine: Machine, number: int) -> None:
+    row, chance, sampler, wrong, memory = ROWS[number], Chance(40 + number), Sampler(41 + number), [], b""
+    for turn in range(ROUNDS):
+        memory = ram(chance) if turn % 50 == 0 else memory
+        text, word, fields = sample(sampler, row)
+        state = begin(chance, memory)
+        reach(chance.random, state, row, fields)
+        start(machine, state, memory, word)
+        acc = " ".join(f"{value & 0xFFFFFFFFFF:010x}" for value in state.acc)
+        before = f"{text}: A, B {acc} CORCON {state.corcon:04x} SR {state.sr:04x}"
+        stop = machine.run(1)
+        Dsp(state, row, fields).execute()
+        cycles = machine.registers().cycles
+        found = compare(machine, state) + ([f"{cycles} cycles"] if cycles != 1 else []) + ([f"stopped: {stop}"] if stop else [])
+        if found:
+            wrong.append(f"{before}: {'; '.join(found)}")
+    assert wrong[:3] == [], f"{len(wrong)} of {ROUNDS}"
+
+
+def test_enough_instructions_are_tried() -> None:
+    assert ROUNDS * len(ROWS) >= 19000
+
+
+def test_chains_of_instructions_end_in_the_same_state(machine: Machine) -> None:
+    chance, sampler = Chance(42), Sampler(43)
+    rows = [row for row in ROWS if "i" in row.extract([0])]
+    wrong = []
+    memory = ram(chance)
+    for _ in range(CHAINS):
+        state = begin(chance, memory)
+        chain = [sample(sampler, row) + (row,) for row in (chance.random.choice(rows) for _ in range(12))]
+        chain = [part for part in chain if part[2].get("a") != 1 and INDEXED not in (part[2]["i"], part[2]["j"])]
+        state.w[8:12] = 0x9C0, 0xA80, 0xD80, 0xE80
+        start(machine, state, memory, *(part[1] for part in chain))
+        stop = machine.run(len(chain))
+        for _, _, fields, row in chain:
+            Dsp(state, row, fields).execute()
+        found = compare(machine, state) + ([f"stopped: {stop}"] if stop else [])
+        if found:
+            wrong.append(f"{'; '.join(part[0] for part in chain)}: {'; '.join(found)}")
+    assert wrong[:3] == [], f"{len(wrong)} of {CHAINS}"

@@ -1,6 +1,8 @@
 """Address register dependencies: every kind of write of a register before every kind of use, and the one cycle that some pairs cost more."""
 
-import unittest
+import math
+
+import pytest
 
 import asm33
 from machine import PROGRAM, RAM, Machine
@@ -30,65 +32,43 @@ def cycles(text: str) -> int:
     return sum(2 if part.strip().startswith(TWO_CYCLES) else 1 for part in text.split(";"))
 
 
-class Stalls(unittest.TestCase):
-    machine: Machine
-
-    @classmethod
-    def setUpClass(cls) -> None:
-        cls.machine = Machine()
-
-    def measured(self, first: str, second: str, registers: dict[int, int] | None = None) -> int:
-        """Cycles of the pair; `registers`: other values of W registers."""
-        words, labels = asm33.assemble(f"{first}; {second}", PROGRAM)
-        w = [0x900, 0xA00, 0x480, 0, 0, 0, 0, 0, START.get(first, 0x900), 0x900, 0, 0x900, 0, 0, 0, 0xE02]
-        for register, value in (registers or {}).items():
-            w[register] = value
-        ram = bytearray(0x800)
-        for address in (0xA00, 0xE00):
-            ram[address - RAM:address - RAM + 2] = b"\0\x09"
-        self.machine.load(words | {0x900: 0})
-        self.machine.set_state(w, 0, [0x09000000, 0], {0x20: 0x0F00, 0x44: 0}, bytes(ram), PROGRAM)
-        while self.machine.registers().pc != labels["end"]:
-            before = self.machine.registers().cycles
-            self.assertEqual(self.machine.run(before + 1), "", f"{first}; {second}")
-            self.assertLess(before, 12, f"{first}; {second}")
-        return self.machine.registers().cycles
-
-    def check(self, first: list[str], second: list[str], stall: int) -> None:
-        """Every pair costs this much more than its instructions."""
-        wrong = []
-        for one in first:
-            for two in second:
-                more = self.measured(one, two) - cycles(one) - cycles(two)
-                if more != stall:
-                    wrong.append(f"{one}; {two}: {more} more, not {stall}")
-        self.assertEqual(wrong[:20], [], len(wrong))
-
-    def test_a_written_register_that_addresses_the_next_source_costs_one(self) -> None:
-        self.check(WRITES, SOURCES, self.machine.assumption("RAW_STALL_CYCLES"))
-
-    def test_a_changed_destination_pointer_that_addresses_the_next_source_costs_one(self) -> None:
-        self.check(POINTERS, SOURCES, self.machine.assumption("RAW_STALL_CYCLES") * self.machine.assumption("RAW_STALL_POINTER"))
-
-    def test_a_register_that_was_only_read_costs_nothing(self) -> None:
-        self.check(OTHERS, SOURCES, 0)
-
-    def test_a_register_that_the_next_uses_otherwise_costs_nothing(self) -> None:
-        self.check(WRITES + POINTERS + OTHERS, PLAIN, 0)
-
-    def test_an_instruction_between_hides_the_write(self) -> None:
-        self.check([f"{write}; nop" for write in WRITES], SOURCES, 0)
-
-    def test_the_dsp_engine_writes_what_it_fetches_and_no_more(self) -> None:
-        for first, second, stall in (
-                ("mac w4*w5,a", "mov [w4],w9", 0), ("clr a", "mov [w4],w9", 0), ("clr a,[w8],w5", "mov [w5],w9", 1),
-                ("clr a,[w8],w5", "mov [w4],w9", 0), ("clr a,[w10],w6", "mov [w6],w9", 1), ("clr a,[w10],w6", "mov [w4],w9", 0),
-                ("ed w4*w4,a,[w8],[w10],w5", "mov [w5],w9", 1), ("ed w4*w4,a,[w8],[w10],w5", "mov [w4],w9", 0),
-                ("clr a,w13", "mov [w13],w9", 1), ("clr a,[w13]+=2", "mov [w13],w9", 1), ("mac w4*w5,a", "mov [w13],w9", 0)):
-            with self.subTest(f"{first}; {second}"):
-                registers = {4: 0x900, 5: 0x900, 6: 0x900, 10: 0xE00, 13: 0x8FE if "+=" in first else 0xB00}
-                self.assertEqual(2 + stall, self.measured(first, second, registers))
+def measured(machine: Machine, first: str, second: str, registers: dict[int, int] | None = None) -> int:
+    """Cycles of the pair; `registers`: other values of W registers."""
+    words, labels = asm33.assemble(f"{first}; {second}", PROGRAM)
+    w = [0x900, 0xA00, 0x480, 0, 0, 0, 0, 0, START.get(first, 0x900), 0x900, 0, 0x900, 0, 0, 0, 0xE02]
+    for register, value in (registers or {}).items():
+        w[register] = value
+    ram = bytearray(0x800)
+    for address in (0xA00, 0xE00):
+        ram[address - RAM:address - RAM + 2] = b"\0\x09"
+    machine.load(words | {0x900: 0})
+    machine.set_state(w, 0, [0x09000000, 0], {0x20: 0x0F00, 0x44: 0}, bytes(ram), PROGRAM)
+    while machine.registers().pc != labels["end"]:
+        before = machine.registers().cycles
+        assert machine.run(before + 1) == "", f"{first}; {second}"
+        assert before < 12, f"{first}; {second}"
+    return machine.registers().cycles
 
 
-if __name__ == "__main__":
-    unittest.main()
+@pytest.mark.parametrize("first, second, assumptions", [
+    (WRITES, SOURCES, ["RAW_STALL_CYCLES"]), (POINTERS, SOURCES, ["RAW_STALL_CYCLES", "RAW_STALL_POINTER"]), (OTHERS, SOURCES, []),
+    (WRITES + POINTERS + OTHERS, PLAIN, []), ([f"{write}; nop" for write in WRITES], SOURCES, [])],
+    ids=["a written register that addresses the next source costs one",
+         "a changed destination pointer that addresses the next source costs one",
+         "a register that was only read costs nothing", "a register that the next uses otherwise costs nothing",
+         "an instruction between hides the write"])
+def test_every_pair_costs_as_much_more_than_its_instructions(machine: Machine, first: list[str], second: list[str],
+                                                             assumptions: list[str]) -> None:
+    stall = math.prod(machine.assumption(name) for name in assumptions) if assumptions else 0
+    found = {f"{one}; {two}": measured(machine, one, two) - cycles(one) - cycles(two) for one in first for two in second}
+    assert {pair: more for pair, more in found.items() if more != stall} == {}, stall
+
+
+@pytest.mark.parametrize("first, second, stall", [
+    ("mac w4*w5,a", "mov [w4],w9", 0), ("clr a", "mov [w4],w9", 0), ("clr a,[w8],w5", "mov [w5],w9", 1),
+    ("clr a,[w8],w5", "mov [w4],w9", 0), ("clr a,[w10],w6", "mov [w6],w9", 1), ("clr a,[w10],w6", "mov [w4],w9", 0),
+    ("ed w4*w4,a,[w8],[w10],w5", "mov [w5],w9", 1), ("ed w4*w4,a,[w8],[w10],w5", "mov [w4],w9", 0),
+    ("clr a,w13", "mov [w13],w9", 1), ("clr a,[w13]+=2", "mov [w13],w9", 1), ("mac w4*w5,a", "mov [w13],w9", 0)])
+def test_the_dsp_engine_writes_what_it_fetches_and_no_more(machine: Machine, first: str, second: str, stall: int) -> None:
+    registers = {4: 0x900, 5: 0x900, 6: 0x900, 10: 0xE00, 13: 0x8FE if "+=" in first else 0xB00}
+    assert measured(machine, first, second, registers) == 2 + stall

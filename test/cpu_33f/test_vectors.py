@@ -1,13 +1,13 @@
 """The simulator against the hand-derived vectors of test/cpu_33f/vectors (form of a line: vectors.py): registers, memory, flags, cycles."""
 
 import random
-import unittest
-from pathlib import Path
+
+import pytest
 
 import asm33
 from alu import FLAG_NAMES
 from machine import PROGRAM, RAM, Machine
-from vectors import FLAGS, FOLDER, REGISTERS, Vector, read
+from vectors import FLAGS, REGISTERS, Vector, read_all
 
 SPLIM = 0x0FD0
 BACKGROUND = random.Random(33).randbytes(0x800)
@@ -70,34 +70,15 @@ def _text(name: str, value: int | None) -> str:
     return str(value) if name == "cycles" or value is None else f"{value:04x}"
 
 
-class Vectors(unittest.TestCase):
-    machine: Machine
-
-    @classmethod
-    def setUpClass(cls) -> None:
-        cls.machine = Machine()
-
-    def check(self, vectors: list[Vector]) -> None:
-        """Runs vectors with all open flags clear and with all set."""
-        wrong = [f"{vector}\n    {'; '.join(found)}" for vector in vectors for flags in (0, 1)
-                 if (found := differences(vector, self.machine, flags))]
-        self.assertEqual(wrong, [], "\n" + "\n".join(wrong[:30]))
+GROUPS: dict[str, list[Vector]] = {}
+for one in read_all():
+    GROUPS.setdefault(f"{one.place.split('.')[0]} {one.group}", []).append(one)
 
 
-def _add_tests() -> None:
-    """One test for each group of each file."""
-    for path in sorted(Path(FOLDER).glob("*.txt")):
-        groups: dict[str, list[Vector]] = {}
-        for vector in read(path):
-            groups.setdefault(vector.group, []).append(vector)
-        for group, vectors in groups.items():
-            def test(self: Vectors, vectors: list[Vector] = vectors) -> None:
-                self.check(vectors)
-            name = "".join(letter if letter.isalnum() else "_" for letter in f"{path.stem} {group}".lower())
-            setattr(Vectors, f"test_{name}", test)
-
-
-_add_tests()
-
-if __name__ == "__main__":
-    unittest.main()
+@pytest.mark.parametrize("group", GROUPS)
+def test_group(machine: Machine, group: str) -> None:
+    """With all open flags clear and with all set."""
+    wrong = [f"{vector}\n    {'; '.join(found)}" for vector in GROUPS[group] for flags in (0,
+                                                                                           1) if (found := differences(vector, machine,
+                                                                                                                       flags))]
+    assert wrong == [], "\n" + "\n".join(wrong[:30])

@@ -39,7 +39,7 @@ enum { CHIP_FBS = 0, CHIP_FGS = 2, CHIP_FOSCSEL = 3, CHIP_FOSC = 4, CHIP_FWDT = 
  *   attend         something is due before the cycle chip_t.limit, to which the processor runs; NULL: it never runs ahead
  *   clock          the instruction clock has changed; NULL: of no concern
  *   wake           the watchdog's time is over: true if that has woken it from sleep
- *   begin, end     a PWM period starts, is over
+ *   begin, end     a PWM period starts (NULL: of no concern), is over
  *   run            go on to `until_s`, or to an instant before at which the board must follow; returns it. NULL: handlers take no time
  *   follow         the plant has reached the time that run() returned
  *   destroy        the board is going away */
@@ -309,7 +309,6 @@ void chip_watchdog_reset(chip_t *chip);
 void chip_watchdog_event(chip_t *chip);
 void chip_watchdog_clear(void *chip);
 void chip_watchdog_reschedule(chip_t *chip);
-uint16_t chip_watchdog_cause(chip_reset_t cause);
 
 /* chip_ports.c */
 void chip_ports_hooks(chip_t *chip);

@@ -58,14 +58,10 @@ static uint16_t format_result(unsigned form, unsigned code, unsigned bits)
 {
     unsigned half = 1u << (bits - 1u);
     switch (form) {
-    case 0:
-        return (uint16_t)code;
-    case 1:
-        return (uint16_t)(code - half);
-    case 2:
-        return (uint16_t)(code << (16u - bits));
-    default:
-        return (uint16_t)((code << (16u - bits)) ^ 0x8000u);
+    case 0: return (uint16_t)code;
+    case 1: return (uint16_t)(code - half);
+    case 2: return (uint16_t)(code << (16u - bits));
+    default: return (uint16_t)((code << (16u - bits)) ^ 0x8000u);
     }
 }
 

@@ -18,7 +18,7 @@ static void reset_registers(chip_t *chip, chip_reset_t cause)
     if ((chip->config[CHIP_FPOR] & FPOR_PWMPIN) == 0) {
         chip_put(chip, SFR_PWM1CON1, 0x0077); /* the PWM module owns its pins from the reset on */
     }
-    chip_put(chip, SFR_RCON, cause == CHIP_RESET_POR ? 3u : chip_get(chip, SFR_RCON) | chip_watchdog_cause(cause));
+    chip_put(chip, SFR_RCON, cause == CHIP_RESET_POR ? 3u : chip_get(chip, SFR_RCON) | chip_reset_rcon(cause));
 }
 
 void chip_reset(chip_t *chip, chip_reset_t cause)

@@ -15,6 +15,16 @@ typedef enum {
     CHIP_RESET_ILLEGAL /* illegal opcode or uninitialised W register (RCON.IOPUWR) */
 } chip_reset_t;
 
+/* The bits of RCON that tell of a reset. */
+static inline uint16_t chip_reset_rcon(chip_reset_t cause)
+{
+    static const uint16_t bits[] = {
+        [CHIP_RESET_POR] = 0x0003, [CHIP_RESET_BOR] = 0x0002, [CHIP_RESET_MCLR] = 0x0080, [CHIP_RESET_SOFTWARE] = 0x0040,
+        [CHIP_RESET_WATCHDOG] = 0x0010, [CHIP_RESET_TRAP] = 0x8000, [CHIP_RESET_ILLEGAL] = 0x4000,
+    };
+    return bits[cause];
+}
+
 /* An interrupt and its priority; priority 0: none. */
 typedef struct {
     unsigned priority, number;

@@ -105,11 +105,6 @@ static void plan_leg(chip_t *chip, chip_leg_t *leg, double from_s, double until_
     emit_edges(chip, leg, until_s);
 }
 
-static double period_of(const chip_pwm_t *pwm)
-{
-    return pwm->length_s;
-}
-
 static void decode_duty(chip_pwm_t *pwm)
 {
     for (unsigned k = 0; k < 3; k++) {
@@ -321,7 +316,7 @@ static void plan_rest(chip_t *chip)
             leg->state.stage = 2;
         }
         leg->saved = leg->state;
-        plan_leg(chip, leg, chip->plant->now_s, period_of(pwm));
+        plan_leg(chip, leg, chip->plant->now_s, pwm->length_s);
         if (chip->plant->inverter.gate[k] != (plant_gate_t)leg->saved.gate) {
             plant_inverter_gate(chip->plant, k, (plant_gate_t)leg->saved.gate);
         }
@@ -448,7 +443,7 @@ void chip_pwm_half(chip_t *chip)
 void chip_pwm_end(chip_t *chip)
 {
     chip_pwm_t *pwm = &chip->pwm;
-    double period_s = period_of(pwm);
+    double period_s = pwm->length_s;
     pwm->planned_from_s = 0.0;
     for (unsigned k = 0; k < 3; k++) {
         pwm->leg[k].state.change_s -= period_s;

@@ -64,20 +64,11 @@ static void match(chip_t *chip, unsigned n)
     (void)chip_irq_raise(chip, place[n].irq);
 }
 
-void chip_timer_1(chip_t *chip)
-{
-    match(chip, 0);
-}
-
-void chip_timer_2(chip_t *chip)
-{
-    match(chip, 1);
-}
-
-void chip_timer_3(chip_t *chip)
-{
-    match(chip, 2);
-}
+#define MATCH(name, n) \
+    void name(chip_t *chip) { match(chip, n); }
+MATCH(chip_timer_1, 0)
+MATCH(chip_timer_2, 1)
+MATCH(chip_timer_3, 2)
 
 static uint16_t read_timer(void *context, uint16_t address)
 {

@@ -22,20 +22,6 @@ static double period_s(const chip_t *chip)
     return prescaler * (double)(1u << (fwdt & WDTPOST)) / chip->clock.lprc_hz;
 }
 
-uint16_t chip_watchdog_cause(chip_reset_t cause)
-{
-    switch (cause) {
-    case CHIP_RESET_POR: return 0x0003;
-    case CHIP_RESET_BOR: return 0x0002;
-    case CHIP_RESET_WATCHDOG: return 0x0010;
-    case CHIP_RESET_SOFTWARE: return 0x0040;
-    case CHIP_RESET_MCLR: return 0x0080;
-    case CHIP_RESET_ILLEGAL: return 0x4000;
-    case CHIP_RESET_TRAP: return 0x8000;
-    default: return 0;
-    }
-}
-
 /* The end of the period in cycles of the clock as it is now. */
 void chip_watchdog_reschedule(chip_t *chip)
 {

@@ -2,7 +2,7 @@
  *
  * Registers are memory, as in the chip: iss_data() holds W0..W15, SR, CORCON and all others at their addresses; peripherals are hooks on
  * addresses below 0x0800. Only the accumulators, the PC and DISICNT live elsewhere while instructions run; iss_run() and iss_sync() put them
- * into data memory, iss_set_acc() and iss_set_pc() change them. All program addresses are PC addresses (two per instruction word).
+ * into data memory, iss_set_acc() and iss_restart() change them. All program addresses are PC addresses (two per instruction word).
  */
 #ifndef FOC33_CPU_33F_ISS_H
 #define FOC33_CPU_33F_ISS_H
@@ -85,7 +85,6 @@ void iss_ram_known(iss_t *iss, uint16_t address, unsigned bytes, bool known);
 /* ---- registers that are not in data memory while instructions run ---- */
 
 uint32_t iss_pc(const iss_t *iss);
-void iss_set_pc(iss_t *iss, uint32_t pc);
 
 /* Accumulator 0 (A) or 1 (B), sign-extended from 40 bits. */
 int64_t iss_acc(const iss_t *iss, unsigned which);
@@ -169,16 +168,6 @@ void iss_stack_clear(iss_t *iss);
 
 /* Disassemble the word at a PC address; `next` is the word behind it. Words used: 1 or 2, 0 if it is no instruction (".word24 0x..."). */
 unsigned iss_disassemble(uint32_t word, uint32_t next, uint32_t pc, char *buffer, size_t size);
-
-/* One encoding of the decoder's table, for tests; false behind the last. A word belongs to the first row with (word & mask) == value whose operands exist. */
-typedef struct {
-    const char *mnemonic;
-    char syntax[48];
-    uint32_t mask, value;
-    uint32_t byte_bit; /* the bit that chooses byte operands (mnemonic with .b); 0: there is no such choice */
-    unsigned words;
-} iss_encoding_t;
-bool iss_encoding(size_t row, iss_encoding_t *encoding);
 
 /* ---- assumptions ---- */
 

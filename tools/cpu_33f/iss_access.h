@@ -161,4 +161,28 @@ static inline unsigned pop16(iss_t *m)
     return load16(m, address);
 }
 
+/* ---- instructions: their functions, and rows of the decoder's table ---- */
+
+/* An instruction that is one expression of the core `m` and its operands `i`. */
+#define OP(name, expression) \
+    static void name(iss_t *m, const insn_t *i) \
+    { \
+        (void)m; \
+        (void)i; \
+        expression; \
+    }
+
+#define BOTH(form, name) form(name, w, 16) form(name, b, 8)
+#define W_B(name) name##_w, name##_b
+
+/* One operand `a`: from f to f or WREG, from Ws to Wd. The expression gives the result and sets the flags. */
+#define ALU1(name, expression) \
+    static inline unsigned alu_##name(iss_t *m, unsigned a, unsigned bits) { return (expression); } \
+    BOTH(ALU1_FORMS, name)
+#define ALU1_FORMS(name, suffix, bits) \
+    OP(name##_f_##suffix, to_file_or_wreg(m, i, alu_##name(m, load(m, i->k, bits), bits), bits)) \
+    OP(name##_w_##suffix, destination(m, i, alu_##name(m, source(m, i, bits), bits), bits))
+#define ALU1_ROWS(name, f, w) \
+    {#name, {FILE_WREG}, f, 0xFF8000, W_B(name##_f), .cycles = 1}, {#name, {MS, MD}, w, 0xFF8000, W_B(name##_w), .cycles = 1}
+
 #endif

@@ -1,8 +1,6 @@
 /* Shifts, rotations, single bits, bit searches. */
 #include "iss_access.h"
 
-#define W_B(name) name##_w, name##_b
-
 /* ---- shifts and rotations by one ---- */
 
 static inline unsigned shifted(iss_t *m, unsigned result, unsigned out, unsigned bits)
@@ -19,20 +17,13 @@ static inline unsigned rotated(iss_t *m, unsigned result, unsigned bits)
     return result & ones(bits);
 }
 
-#define SHIFT1(name, expression) \
-    static inline unsigned shift_##name(iss_t *m, unsigned a, unsigned bits) { return (expression); } \
-    static void name##_f_w(iss_t *m, const insn_t *i) { to_file_or_wreg(m, i, shift_##name(m, load16(m, i->k), 16), 16); } \
-    static void name##_f_b(iss_t *m, const insn_t *i) { to_file_or_wreg(m, i, shift_##name(m, load8(m, i->k), 8), 8); } \
-    static void name##_w_w(iss_t *m, const insn_t *i) { destination(m, i, shift_##name(m, source(m, i, 16), 16), 16); } \
-    static void name##_w_b(iss_t *m, const insn_t *i) { destination(m, i, shift_##name(m, source(m, i, 8), 8), 8); }
-
-SHIFT1(sl, shifted(m, a << 1, a >> (bits - 1u), bits))
-SHIFT1(lsr, shifted(m, a >> 1, a, bits))
-SHIFT1(asr, shifted(m, a >> 1 | (a & 1u << (bits - 1u)), a, bits))
-SHIFT1(rlc, shifted(m, a << 1 | carry_of(m), a >> (bits - 1u), bits))
-SHIFT1(rrc, shifted(m, a >> 1 | carry_of(m) << (bits - 1u), a, bits))
-SHIFT1(rlnc, rotated(m, a << 1 | a >> (bits - 1u), bits))
-SHIFT1(rrnc, rotated(m, a >> 1 | (a & 1u) << (bits - 1u), bits))
+ALU1(sl, shifted(m, a << 1, a >> (bits - 1u), bits))
+ALU1(lsr, shifted(m, a >> 1, a, bits))
+ALU1(asr, shifted(m, a >> 1 | (a & 1u << (bits - 1u)), a, bits))
+ALU1(rlc, shifted(m, a << 1 | carry_of(m), a >> (bits - 1u), bits))
+ALU1(rrc, shifted(m, a >> 1 | carry_of(m) << (bits - 1u), a, bits))
+ALU1(rlnc, rotated(m, a << 1 | a >> (bits - 1u), bits))
+ALU1(rrnc, rotated(m, a >> 1 | (a & 1u) << (bits - 1u), bits))
 
 /* ---- shifts by many: Wb by a literal or by the low five bits of Ws ---- */
 
@@ -108,17 +99,14 @@ BIT_CHANGE(btsts_z, (bit_to_z(m, old & bit), old | bit))
         } \
     }
 /* A file register is looked at bytewise; its address tells the byte. */
-#define CHANGE_F(name) \
-    static void name##_f(iss_t *m, const insn_t *i) { store8(m, i->k, bit_##name(m, load8(m, i->k), 1u << i->b)); }
+#define CHANGE_F(name) OP(name##_f, store8(m, i->k, bit_##name(m, load8(m, i->k), 1u << i->b)))
 
-CHANGE_W(bset, w, 16, i->b)
-CHANGE_W(bset, b, 8, i->b)
-CHANGE_W(bclr, w, 16, i->b)
-CHANGE_W(bclr, b, 8, i->b)
-CHANGE_W(btg, w, 16, i->b)
-CHANGE_W(btg, b, 8, i->b)
-CHANGE_W(btsts_c, w, 16, i->b)
-CHANGE_W(btsts_z, w, 16, i->b)
+#define CHANGE_BIT(name, suffix, bits) CHANGE_W(name, suffix, bits, i->b)
+BOTH(CHANGE_BIT, bset)
+BOTH(CHANGE_BIT, bclr)
+BOTH(CHANGE_BIT, btg)
+CHANGE_BIT(btsts_c, w, 16)
+CHANGE_BIT(btsts_z, w, 16)
 CHANGE_W(bsw_c, w, 16, m->data[i->w] & 15u)
 CHANGE_W(bsw_z, w, 16, m->data[i->w] & 15u)
 CHANGE_F(bset)
@@ -126,32 +114,19 @@ CHANGE_F(bclr)
 CHANGE_F(btg)
 CHANGE_F(btsts_z)
 
-static void btst_f(iss_t *m, const insn_t *i)
-{
-    bit_to_z(m, load8(m, i->k) >> i->b & 1u);
-}
+OP(btst_f, bit_to_z(m, load8(m, i->k) >> i->b & 1u))
+OP(btst_c, bit_to_c(m, source(m, i, 16) >> i->b & 1u))
+OP(btst_z, bit_to_z(m, source(m, i, 16) >> i->b & 1u))
 
-static void btst_c(iss_t *m, const insn_t *i)
-{
-    bit_to_c(m, source(m, i, 16) >> i->b & 1u);
-}
-
-static void btst_z(iss_t *m, const insn_t *i)
-{
-    bit_to_z(m, source(m, i, 16) >> i->b & 1u);
-}
-
-static void btst_c_by_w(iss_t *m, const insn_t *i)
+/* Wb is read before the pointer of Ws moves. */
+static inline unsigned bit_by_w(iss_t *m, const insn_t *i)
 {
     unsigned number = m->data[i->w] & 15u;
-    bit_to_c(m, source(m, i, 16) >> number & 1u);
+    return source(m, i, 16) >> number & 1u;
 }
 
-static void btst_z_by_w(iss_t *m, const insn_t *i)
-{
-    unsigned number = m->data[i->w] & 15u;
-    bit_to_z(m, source(m, i, 16) >> number & 1u);
-}
+OP(btst_c_by_w, bit_to_c(m, bit_by_w(m, i)))
+OP(btst_z_by_w, bit_to_z(m, bit_by_w(m, i)))
 
 /* ---- searches; C tells that nothing was found ---- */
 
@@ -192,26 +167,19 @@ static void fbcl(iss_t *m, const insn_t *i)
 }
 
 const row_t iss_rows_bit[] = {
-    {"sl", {FILE_WREG}, 0xD40000, 0xFF8000, W_B(sl_f), .cycles = 1},
-    {"sl", {MS, MD}, 0xD00000, 0xFF8000, W_B(sl_w), .cycles = 1},
+    ALU1_ROWS(sl, 0xD40000, 0xD00000),
     {"sl", {WC, K4, WD}, 0xDD0040, 0xFF8070, sl_by_k, NULL, .cycles = 1},
     {"sl", {WC, WS, WD}, 0xDD0000, 0xFF8070, sl_by_w, NULL, .cycles = 1},
-    {"lsr", {FILE_WREG}, 0xD50000, 0xFF8000, W_B(lsr_f), .cycles = 1},
-    {"lsr", {MS, MD}, 0xD10000, 0xFF8000, W_B(lsr_w), .cycles = 1},
+    ALU1_ROWS(lsr, 0xD50000, 0xD10000),
     {"lsr", {WC, K4, WD}, 0xDE0040, 0xFF8070, lsr_by_k, NULL, .cycles = 1},
     {"lsr", {WC, WS, WD}, 0xDE0000, 0xFF8070, lsr_by_w, NULL, .cycles = 1},
-    {"asr", {FILE_WREG}, 0xD58000, 0xFF8000, W_B(asr_f), .cycles = 1},
-    {"asr", {MS, MD}, 0xD18000, 0xFF8000, W_B(asr_w), .cycles = 1},
+    ALU1_ROWS(asr, 0xD58000, 0xD18000),
     {"asr", {WC, K4, WD}, 0xDE8040, 0xFF8070, asr_by_k, NULL, .cycles = 1},
     {"asr", {WC, WS, WD}, 0xDE8000, 0xFF8070, asr_by_w, NULL, .cycles = 1},
-    {"rlc", {FILE_WREG}, 0xD68000, 0xFF8000, W_B(rlc_f), .cycles = 1},
-    {"rlc", {MS, MD}, 0xD28000, 0xFF8000, W_B(rlc_w), .cycles = 1},
-    {"rlnc", {FILE_WREG}, 0xD60000, 0xFF8000, W_B(rlnc_f), .cycles = 1},
-    {"rlnc", {MS, MD}, 0xD20000, 0xFF8000, W_B(rlnc_w), .cycles = 1},
-    {"rrc", {FILE_WREG}, 0xD78000, 0xFF8000, W_B(rrc_f), .cycles = 1},
-    {"rrc", {MS, MD}, 0xD38000, 0xFF8000, W_B(rrc_w), .cycles = 1},
-    {"rrnc", {FILE_WREG}, 0xD70000, 0xFF8000, W_B(rrnc_f), .cycles = 1},
-    {"rrnc", {MS, MD}, 0xD30000, 0xFF8000, W_B(rrnc_w), .cycles = 1},
+    ALU1_ROWS(rlc, 0xD68000, 0xD28000),
+    ALU1_ROWS(rlnc, 0xD60000, 0xD20000),
+    ALU1_ROWS(rrc, 0xD78000, 0xD38000),
+    ALU1_ROWS(rrnc, 0xD70000, 0xD30000),
     {"bset", {MC, BIT_NUMBER}, 0xA00000, 0xFF0B80, W_B(bset), .cycles = 1, .byte_bit = 0x400},
     {"bset.b", {FILE_BIT}, 0xA80000, 0xFF0000, bset_f, NULL, .cycles = 1},
     {"bclr", {MC, BIT_NUMBER}, 0xA10000, 0xFF0B80, W_B(bclr), .cycles = 1, .byte_bit = 0x400},

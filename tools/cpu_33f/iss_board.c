@@ -57,21 +57,13 @@ static uint16_t core_counter(iss_cpu_t *cpu)
     return counter;
 }
 
-static void count_range(double value, double *min, double *max, double *sum, double *count)
+static void measured(vb_range_t *range, uint64_t cycles)
 {
-    *min = *count == 0.0 ? value : plant_min(*min, value);
-    *max = plant_max(*max, value);
-    *sum += value;
-    *count += 1.0;
-}
-
-static void duty_written(iss_board_t *b)
-{
-    vb_counts_t *c = vb_counts(b->vb);
-    if (b->in_handler) {
-        c->latency_last = (double)(now_cycle(b) - b->trigger_cycle);
-        count_range(c->latency_last, &c->latency_min, &c->latency_max, &c->latency_sum, &c->latency_count);
-    }
+    range->last = (double)cycles;
+    range->min = range->count == 0.0 ? range->last : plant_min(range->min, range->last);
+    range->max = plant_max(range->max, range->last);
+    range->sum += range->last;
+    range->count += 1.0;
 }
 
 /* The board has to look at what was written when its plant has come to the core's present time. */
@@ -79,8 +71,8 @@ static void core_written(iss_cpu_t *cpu, uint16_t address)
 {
     iss_board_t *b = (iss_board_t *)cpu;
     bool duty = address == SFR_P1DC1 || address == SFR_P1DC2 || address == SFR_P1DC3;
-    if (address == SFR_P1DC3) {
-        duty_written(b);
+    if (address == SFR_P1DC3 && b->in_handler) {
+        measured(&vb_counts(b->vb)->latency, now_cycle(b) - b->trigger_cycle);
     }
     if (!duty || (CHIP_REG(cpu->chip, PWM1CON2) & IUE) != 0) {
         b->written = true;
@@ -115,13 +107,11 @@ static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
 static void leave_interrupt(void *context, unsigned vector, uint64_t cycle)
 {
     iss_board_t *b = context;
-    vb_counts_t *c = vb_counts(b->vb);
     if (vector != ADC1_VECTOR || !b->in_handler) {
         return;
     }
     b->in_handler = false;
-    c->isr_last = (double)(cycle - b->entry_cycle);
-    count_range(c->isr_last, &c->isr_min, &c->isr_max, &c->isr_sum, &c->isr_count);
+    measured(&vb_counts(b->vb)->isr, cycle - b->entry_cycle);
     iss_shadow_compare(b);
     b->handled = true;
     iss_cpu_break(&b->cpu);
@@ -210,11 +200,6 @@ static bool live_raised(void *context, unsigned irq)
         b->trigger_cycle = cycle_of(b, vb_sampled_at(b->vb));
     }
     return b->core_raised(context, irq);
-}
-
-static void live_begin(void *context)
-{
-    (void)context;
 }
 
 /* The chip runs on another clock from now on. */
@@ -344,7 +329,7 @@ static int find_signals(iss_board_t *b, char *error, size_t size)
 
 static int build(iss_board_t *b, const char *image, char *error, size_t size)
 {
-    chip_cpu_t cpu = {.own_isr_us = USUAL_ISR_US, .start_periods = START_PERIODS, .reset = live_reset, .begin = live_begin, .run = live_run,
+    chip_cpu_t cpu = {.own_isr_us = USUAL_ISR_US, .start_periods = START_PERIODS, .reset = live_reset, .run = live_run,
                       .follow = live_follow, .end = live_end, .destroy = live_destroy};
     if (iss_image_parse(&b->image, image) != 0) {
         return failed(error, size, "the image's text is damaged, vb_create_iss: make it by tools/image/load.py");

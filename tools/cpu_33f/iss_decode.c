@@ -4,26 +4,9 @@
 static const row_t *const groups[] = {iss_rows_alu, iss_rows_bit, iss_rows_move, iss_rows_multiply, iss_rows_flow, iss_rows_dsp};
 enum { GROUPS = (int)(sizeof groups / sizeof groups[0]), USUAL_BYTE_BIT = 0x4000 };
 
-const row_t *iss_row(size_t n)
-{
-    for (size_t g = 0; g < GROUPS; g++) {
-        for (const row_t *row = groups[g]; row->name != NULL; row++) {
-            if (n-- == 0) {
-                return row;
-            }
-        }
-    }
-    return NULL;
-}
-
-uint32_t iss_row_byte_bit(const row_t *row)
-{
-    return row->byte == NULL ? 0u : row->byte_bit != 0 ? row->byte_bit : USUAL_BYTE_BIT;
-}
-
 bool iss_row_is_byte(const row_t *row, uint32_t word)
 {
-    return (word & iss_row_byte_bit(row)) != 0;
+    return row->byte != NULL && (word & (row->byte_bit != 0 ? row->byte_bit : USUAL_BYTE_BIT)) != 0;
 }
 
 static unsigned bits(uint32_t word, unsigned high, unsigned low)
@@ -268,7 +251,7 @@ static bool fill_operand(insn_t *i, operand_t operand, const row_t *row, uint32_
     return operand <= TARGET ? target_operand(i, operand, word, next, index) : dsp_operand(i, operand, word);
 }
 
-bool iss_row_has_two_words(const row_t *row)
+static bool has_two_words(const row_t *row)
 {
     return row->operand[0] == TARGET || row->operand[1] == RELATIVE_2;
 }
@@ -276,7 +259,7 @@ bool iss_row_has_two_words(const row_t *row)
 static bool fill(insn_t *i, const row_t *row, uint32_t word, uint32_t next, uint32_t index)
 {
     *i = (insn_t){.run = iss_row_is_byte(row, word) ? row->byte : row->word, .writes = row->writes, .points = row->points | row->reads, .stall = row->reads,
-                  .cycles = row->cycles, .words = iss_row_has_two_words(row) ? 2 : 1};
+                  .cycles = row->cycles, .words = has_two_words(row) ? 2 : 1};
     for (unsigned n = 0; n < OPERANDS && row->operand[n] != NO_OPERAND; n++) {
         if (!fill_operand(i, row->operand[n], row, word, next, index)) {
             return false;

@@ -27,25 +27,6 @@ __attribute__((format(printf, 2, 3))) static void add(text_t *t, const char *for
 
 /* ---- how operands are written ---- */
 
-static const char *const operand_names[] = {
-    [WB] = "Wb", [WC] = "Wb", [WS] = "Ws", [WD] = "Wd", [WN] = "Wn", [WM] = "Wm", [WM_PAIR] = "Wm:", [WM_HIGH] = "Wm", [WS_PAIR] = "Ws:",
-    [WD_PAIR] = "Wd:", [W_SWAP] = "Wd", [MS] = "{Ws}", [MC] = "{Ws}", [MD] = "{Wd}", [IS] = "[Ws]", [ID] = "[Wd]", [MS_PAIR] = "{Ws:}",
-    [ID_PAIR] = "[Wd]", [XS] = "{Ws+}", [XD] = "{Wd+}", [XS_ACC] = "{Ws+}", [XD_ACC] = "{Wd+}", [S_OFFSET] = "[Ws+k]", [D_OFFSET] = "[Wd+k]",
-    [FILE_WREG] = "f,WREG", [FILE_ONLY] = "f", [FILE_BIT] = "f,#b", [FILE_64K] = "f", [FILE_STACK] = "f", [WREG] = "WREG", [K1] = "#k",
-    [K4] = "#k", [K5] = "#k", [K6_SIGNED] = "#k", [K8] = "#k", [K10] = "#k", [K14] = "#k", [K14_EVEN] = "#k", [K16] = "#k",
-    [SHIFT_ACC] = "#r", [BIT_NUMBER] = "#b", [RELATIVE] = "label", [RELATIVE_2] = "label", [TARGET] = "target", [ACC] = "Acc",
-    [PRODUCT] = "Wm*Wn", [SQUARE] = "Wm*Wm", [PREFETCH] = "X,Y", [PREFETCH_AWB] = "X,Y,AWB", [DISTANCE] = "X,Y,Wx",
-};
-
-void iss_syntax(const row_t *row, char *buffer, size_t size)
-{
-    text_t t = {buffer, size, 0};
-    add(&t, "%s", "");
-    for (unsigned n = 0; n < OPERANDS && row->operand[n] != NO_OPERAND; n++) {
-        add(&t, "%s%s", n > 0 ? "," : "", operand_names[row->operand[n]]);
-    }
-}
-
 static void in_mode(text_t *t, unsigned mode, unsigned reg, unsigned index)
 {
     static const char *const before[8] = {"", "[", "[", "[", "[--", "[++", "[", "["}, *const behind[8] = {"", "]", "--]", "++]", "]", "]", "", ""};
@@ -175,19 +156,4 @@ unsigned iss_disassemble(uint32_t word, uint32_t next, uint32_t pc, char *buffer
         operand_text(&t, row->operand[n], &i, word, next, pc);
     }
     return i.words;
-}
-
-bool iss_encoding(size_t n, iss_encoding_t *encoding)
-{
-    const row_t *row = iss_row(n);
-    if (row == NULL) {
-        return false;
-    }
-    encoding->mnemonic = row->name;
-    encoding->mask = row->mask & ~iss_row_byte_bit(row);
-    encoding->value = row->value;
-    encoding->byte_bit = iss_row_byte_bit(row);
-    encoding->words = iss_row_has_two_words(row) ? 2 : 1;
-    iss_syntax(row, encoding->syntax, sizeof encoding->syntax);
-    return true;
 }

@@ -173,15 +173,8 @@ static void distance(iss_t *m, const insn_t *i, int64_t before)
     m->data[i->x] = (uint16_t)(a - b);
 }
 
-static void ed(iss_t *m, const insn_t *i)
-{
-    distance(m, i, 0);
-}
-
-static void edac(iss_t *m, const insn_t *i)
-{
-    distance(m, i, m->acc[i->b]);
-}
+OP(ed, distance(m, i, 0))
+OP(edac, distance(m, i, m->acc[i->b]))
 
 /* ---- accumulator and shifter; k is the shift, positive to the right ---- */
 
@@ -190,10 +183,7 @@ static inline int64_t shifted_source(iss_t *m, const insn_t *i)
     return shifted((int64_t)as_int16(source(m, i, 16)) * 65536, as_int16(i->k));
 }
 
-static void lac(iss_t *m, const insn_t *i)
-{
-    result(m, i->b, shifted_source(m, i));
-}
+OP(lac, result(m, i->b, shifted_source(m, i)))
 
 static void add_source(iss_t *m, const insn_t *i)
 {
@@ -201,20 +191,9 @@ static void add_source(iss_t *m, const insn_t *i)
     result(m, i->b, m->acc[i->b] + value);
 }
 
-static void add_acc(iss_t *m, const insn_t *i)
-{
-    result(m, i->b, m->acc[0] + m->acc[1]);
-}
-
-static void sub_acc(iss_t *m, const insn_t *i)
-{
-    result(m, i->b, m->acc[i->b] - m->acc[i->b ^ 1u]);
-}
-
-static void neg_acc(iss_t *m, const insn_t *i)
-{
-    result(m, i->b, -m->acc[i->b]);
-}
+OP(add_acc, result(m, i->b, m->acc[0] + m->acc[1]))
+OP(sub_acc, result(m, i->b, m->acc[i->b] - m->acc[i->b ^ 1u]))
+OP(neg_acc, result(m, i->b, -m->acc[i->b]))
 
 static void shift_acc(iss_t *m, unsigned which, int shift)
 {
@@ -226,30 +205,16 @@ static void shift_acc(iss_t *m, unsigned which, int shift)
     result(m, which, shifted(m->acc[which], shift));
 }
 
-static void sftac_k(iss_t *m, const insn_t *i)
-{
-    shift_acc(m, i->b, as_int16(i->k));
-}
-
-static void sftac_w(iss_t *m, const insn_t *i)
-{
-    shift_acc(m, i->b, as_int16(m->data[i->s]));
-}
+OP(sftac_k, shift_acc(m, i->b, as_int16(i->k)))
+OP(sftac_w, shift_acc(m, i->b, as_int16(m->data[i->s])))
 
 static inline int64_t shifted_acc(const iss_t *m, const insn_t *i)
 {
     return wrap40(shifted(m->acc[i->b], as_int16(i->k)));
 }
 
-static void sac(iss_t *m, const insn_t *i)
-{
-    destination(m, i, out(m, shifted_acc(m, i), false), 16);
-}
-
-static void sac_r(iss_t *m, const insn_t *i)
-{
-    destination(m, i, out(m, shifted_acc(m, i), true), 16);
-}
+OP(sac, destination(m, i, out(m, shifted_acc(m, i), false), 16))
+OP(sac_r, destination(m, i, out(m, shifted_acc(m, i), true), 16))
 
 const row_t iss_rows_dsp[] = {
     {"clr", {ACC, PREFETCH_AWB}, 0xC30000, 0xFF4000, clr_acc, NULL, .cycles = 1},

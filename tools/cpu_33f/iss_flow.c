@@ -24,8 +24,6 @@ void iss_op_outside(iss_t *m, const insn_t *i)
     iss_raise_trap(m, INTCON1_ADDRERR);
 }
 
-#define W_B(name) name##_w, name##_b
-
 /* ---- branches; a taken one costs a second cycle ---- */
 
 static inline void take(iss_t *m, const insn_t *i)
@@ -72,10 +70,7 @@ BRANCH(ob, (sr & SR_OB) != 0)
 BRANCH(sa, (sr & SR_SA) != 0)
 BRANCH(sb, (sr & SR_SB) != 0)
 
-static void bra_w(iss_t *m, const insn_t *i)
-{
-    jump(m, 2u * m->pc + 2u * (uint32_t)as_int16(m->data[i->s]));
-}
+OP(bra_w, jump(m, 2u * m->pc + 2u * (uint32_t)as_int16(m->data[i->s])))
 
 /* The target's 23 bits are in both words of the instruction. */
 static uint32_t far_target(const iss_t *m)
@@ -93,10 +88,7 @@ static void goto_far(iss_t *m, const insn_t *i)
     }
 }
 
-static void goto_w(iss_t *m, const insn_t *i)
-{
-    jump(m, m->data[i->s]);
-}
+OP(goto_w, jump(m, m->data[i->s]))
 
 /* ---- calls ---- */
 
@@ -181,30 +173,15 @@ static inline void skip(iss_t *m, bool condition)
     }
 }
 
-static void btsc(iss_t *m, const insn_t *i)
-{
-    skip(m, (source(m, i, 16) >> i->b & 1u) == 0);
-}
-
-static void btss(iss_t *m, const insn_t *i)
-{
-    skip(m, (source(m, i, 16) >> i->b & 1u) != 0);
-}
-
-static void btsc_f(iss_t *m, const insn_t *i)
-{
-    skip(m, (load8(m, i->k) >> i->b & 1u) == 0);
-}
-
-static void btss_f(iss_t *m, const insn_t *i)
-{
-    skip(m, (load8(m, i->k) >> i->b & 1u) != 0);
-}
+OP(btsc, skip(m, (source(m, i, 16) >> i->b & 1u) == 0))
+OP(btss, skip(m, (source(m, i, 16) >> i->b & 1u) != 0))
+OP(btsc_f, skip(m, (load8(m, i->k) >> i->b & 1u) == 0))
+OP(btss_f, skip(m, (load8(m, i->k) >> i->b & 1u) != 0))
 
 /* Signed comparisons. */
 #define COMPARE_SKIP(name, relation) \
-    static void name##_w(iss_t *m, const insn_t *i) { skip(m, as_int16(m->data[i->w]) relation as_int16(m->data[i->s])); } \
-    static void name##_b(iss_t *m, const insn_t *i) { skip(m, as_int8(m->data[i->w]) relation as_int8(m->data[i->s])); }
+    OP(name##_w, skip(m, as_int16(m->data[i->w]) relation as_int16(m->data[i->s]))) \
+    OP(name##_b, skip(m, as_int8(m->data[i->w]) relation as_int8(m->data[i->s])))
 
 static inline int as_int8(unsigned value)
 {
@@ -231,15 +208,8 @@ static void start_repeat(iss_t *m, unsigned count)
     }
 }
 
-static void repeat_k(iss_t *m, const insn_t *i)
-{
-    start_repeat(m, i->k);
-}
-
-static void repeat_w(iss_t *m, const insn_t *i)
-{
-    start_repeat(m, m->data[i->s] & 0x3FFFu);
-}
+OP(repeat_k, start_repeat(m, i->k))
+OP(repeat_w, start_repeat(m, m->data[i->s] & 0x3FFFu))
 
 /* ---- DO ---- */
 
@@ -260,15 +230,8 @@ static void start_do(iss_t *m, unsigned count, unsigned words)
     iss_refresh_do(m);
 }
 
-static void do_k(iss_t *m, const insn_t *i)
-{
-    start_do(m, i->k, m->program[m->pc - 1u] & 0xFFFFu);
-}
-
-static void do_w(iss_t *m, const insn_t *i)
-{
-    start_do(m, m->data[i->s] & 0x3FFFu, m->program[m->pc - 1u] & 0xFFFFu);
-}
+OP(do_k, start_do(m, i->k, m->program[m->pc - 1u] & 0xFFFFu))
+OP(do_w, start_do(m, m->data[i->s] & 0x3FFFu, m->program[m->pc - 1u] & 0xFFFFu))
 
 /* ---- the core as a whole ---- */
 
@@ -293,11 +256,7 @@ static void pwrsav(iss_t *m, const insn_t *i)
     iss_attend(m);
 }
 
-static void reset(iss_t *m, const insn_t *i)
-{
-    (void)i;
-    iss_demand_reset(m, CHIP_RESET_SOFTWARE);
-}
+OP(reset, iss_demand_reset(m, CHIP_RESET_SOFTWARE))
 
 static void disi(iss_t *m, const insn_t *i)
 {
@@ -307,6 +266,7 @@ static void disi(iss_t *m, const insn_t *i)
 
 #define SP (1u << 15)
 #define BRA(name, code) {"bra " #name, {RELATIVE}, (uint32_t)(code) << 16, 0xFF0000, bra_##name, NULL, .cycles = 1}
+#define COMPARE_SKIP_ROW(name, value) {#name, {WC, WS}, value, 0xFF83F0, W_B(name), .cycles = 1, .byte_bit = 0x400}
 
 const row_t iss_rows_flow[] = {
     {"bra", {RELATIVE}, 0x370000, 0xFF0000, bra_always, NULL, .cycles = 1},
@@ -327,10 +287,8 @@ const row_t iss_rows_flow[] = {
     {"btss", {MS, BIT_NUMBER}, 0xA60000, 0xFF0F80, btss, NULL, .cycles = 1},
     {"btsc.b", {FILE_BIT}, 0xAF0000, 0xFF0000, btsc_f, NULL, .cycles = 1},
     {"btss.b", {FILE_BIT}, 0xAE0000, 0xFF0000, btss_f, NULL, .cycles = 1},
-    {"cpseq", {WC, WS}, 0xE78000, 0xFF83F0, W_B(cpseq), .cycles = 1, .byte_bit = 0x400},
-    {"cpsne", {WC, WS}, 0xE70000, 0xFF83F0, W_B(cpsne), .cycles = 1, .byte_bit = 0x400},
-    {"cpsgt", {WC, WS}, 0xE60000, 0xFF83F0, W_B(cpsgt), .cycles = 1, .byte_bit = 0x400},
-    {"cpslt", {WC, WS}, 0xE68000, 0xFF83F0, W_B(cpslt), .cycles = 1, .byte_bit = 0x400},
+    COMPARE_SKIP_ROW(cpseq, 0xE78000), COMPARE_SKIP_ROW(cpsne, 0xE70000),
+    COMPARE_SKIP_ROW(cpsgt, 0xE60000), COMPARE_SKIP_ROW(cpslt, 0xE68000),
     {"repeat", {K14}, 0x090000, 0xFFC000, repeat_k, NULL, .cycles = 1},
     {"repeat", {WS}, 0x098000, 0xFFFFF0, repeat_w, NULL, .cycles = 1},
     {"do", {K14, RELATIVE_2}, 0x080000, 0xFFC000, do_k, NULL, .cycles = 2},

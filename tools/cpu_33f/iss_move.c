@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-#define W_B(name) name##_w, name##_b
-
 /* ---- MOV ---- */
 
 #define MOVES(suffix, bits) \
@@ -38,15 +36,8 @@ static inline unsigned with_offset(iss_t *m, unsigned reg, unsigned offset)
 MOVES(w, 16)
 MOVES(b, 8)
 
-static void mov_from_64k(iss_t *m, const insn_t *i)
-{
-    set_w(m, i->d, load16(m, i->k));
-}
-
-static void mov_to_64k(iss_t *m, const insn_t *i)
-{
-    store16(m, i->k, m->data[i->s]);
-}
+OP(mov_from_64k, set_w(m, i->d, load16(m, i->k)))
+OP(mov_to_64k, store16(m, i->k, m->data[i->s]))
 
 static void mov_literal(iss_t *m, const insn_t *i)
 {
@@ -57,10 +48,7 @@ static void mov_literal(iss_t *m, const insn_t *i)
     }
 }
 
-static void mov_literal8(iss_t *m, const insn_t *i)
-{
-    set_w8(m, i->d, i->k);
-}
+OP(mov_literal8, set_w8(m, i->d, i->k))
 
 /* ---- MOV.D: the even register is the low word ---- */
 
@@ -92,10 +80,7 @@ static void mov_d_to(iss_t *m, const insn_t *i)
 
 /* ---- stack ---- */
 
-static void push_f(iss_t *m, const insn_t *i)
-{
-    push16(m, load16(m, i->k));
-}
+OP(push_f, push16(m, load16(m, i->k)))
 
 static void pop_f(iss_t *m, const insn_t *i)
 {

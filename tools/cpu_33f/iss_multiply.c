@@ -1,8 +1,6 @@
 /* Multiplication and division of integers. */
 #include "iss_access.h"
 
-#define W_B(name) name##_w, name##_b
-
 /* ---- MUL: no flags ---- */
 
 static inline void product_to_pair(iss_t *m, unsigned n, uint32_t product)
@@ -27,25 +25,10 @@ MULTIPLY(mul_su, signed_word, (uint32_t))
 MULTIPLY(mul_us, (uint32_t), signed_word)
 MULTIPLY(mul_uu, (uint32_t), (uint32_t))
 
-static void mul_su_short(iss_t *m, const insn_t *i)
-{
-    product_to_pair(m, i->d, signed_word(m->data[i->w]) * i->k);
-}
-
-static void mul_uu_short(iss_t *m, const insn_t *i)
-{
-    product_to_pair(m, i->d, (uint32_t)m->data[i->w] * i->k);
-}
-
-static void mul_f_w(iss_t *m, const insn_t *i)
-{
-    product_to_pair(m, 2, (uint32_t)load16(m, i->k) * m->data[0]);
-}
-
-static void mul_f_b(iss_t *m, const insn_t *i)
-{
-    set_w(m, 2, load8(m, i->k) * (m->data[0] & 0xFFu));
-}
+OP(mul_su_short, product_to_pair(m, i->d, signed_word(m->data[i->w]) * i->k))
+OP(mul_uu_short, product_to_pair(m, i->d, (uint32_t)m->data[i->w] * i->k))
+OP(mul_f_w, product_to_pair(m, 2, (uint32_t)load16(m, i->k) * m->data[0]))
+OP(mul_f_b, set_w(m, 2, load8(m, i->k) * (m->data[0] & 0xFFu)))
 
 /* ---- DIV: 18 turns of REPEAT. The quotient appears with the last one (ASSUME_DIVIDE_LAST_TURN); a divisor of 0 traps in the first. ---- */
 
@@ -81,40 +64,18 @@ static inline uint32_t dividend_pair(const iss_t *m, const insn_t *i)
     return (uint32_t)m->data[i->w] << 16 | m->data[i->d];
 }
 
-static void div_s(iss_t *m, const insn_t *i)
-{
-    if (in_last_turn(m, m->data[i->s])) {
-        divide(m, as_int16(m->data[i->d]), as_int16(m->data[i->s]), -32768, 32767);
+#define DIVIDE(name, dividend, divisor, low, high) \
+    static void name(iss_t *m, const insn_t *i) \
+    { \
+        if (in_last_turn(m, m->data[i->s])) { \
+            divide(m, dividend, divisor, low, high); \
+        } \
     }
-}
-
-static void div_sd(iss_t *m, const insn_t *i)
-{
-    if (in_last_turn(m, m->data[i->s])) {
-        divide(m, (int32_t)dividend_pair(m, i), as_int16(m->data[i->s]), -32768, 32767);
-    }
-}
-
-static void div_u(iss_t *m, const insn_t *i)
-{
-    if (in_last_turn(m, m->data[i->s])) {
-        divide(m, m->data[i->d], m->data[i->s], 0, 65535);
-    }
-}
-
-static void div_ud(iss_t *m, const insn_t *i)
-{
-    if (in_last_turn(m, m->data[i->s])) {
-        divide(m, dividend_pair(m, i), m->data[i->s], 0, 65535);
-    }
-}
-
-static void divf(iss_t *m, const insn_t *i)
-{
-    if (in_last_turn(m, m->data[i->s])) {
-        divide(m, (int64_t)as_int16(m->data[i->w]) * 32768, as_int16(m->data[i->s]), -32768, 32767);
-    }
-}
+DIVIDE(div_s, as_int16(m->data[i->d]), as_int16(m->data[i->s]), -32768, 32767)
+DIVIDE(div_sd, (int32_t)dividend_pair(m, i), as_int16(m->data[i->s]), -32768, 32767)
+DIVIDE(div_u, m->data[i->d], m->data[i->s], 0, 65535)
+DIVIDE(div_ud, dividend_pair(m, i), m->data[i->s], 0, 65535)
+DIVIDE(divf, (int64_t)as_int16(m->data[i->w]) * 32768, as_int16(m->data[i->s]), -32768, 32767)
 
 bool iss_is_divide(const insn_t *i)
 {

@@ -56,29 +56,23 @@ void iss_restart(iss_t *m, uint32_t pc)
     forget_pipeline(m);
     m->cycle = 0;
     m->profile_mark = 0;
-    iss_set_pc(m, pc);
+    jump(m, pc);
 }
 
 /* The core demands a reset: the hook does it later; without one it happens here. */
 void iss_demand_reset(iss_t *m, chip_reset_t cause)
 {
-    static const uint16_t rcon_bits[] = {0x0003, 0x0002, 0x0080, 0x0040, 0x0010, 0x8000, 0x4000};
     if (m->on_reset != NULL) {
         m->on_reset(m->reset_context, cause);
         return;
     }
     iss_reset(m, cause);
-    m->data[R_RCON] = (uint16_t)(m->data[R_RCON] | rcon_bits[cause]);
+    m->data[R_RCON] = (uint16_t)(m->data[R_RCON] | chip_reset_rcon(cause));
 }
 
 uint32_t iss_pc(const iss_t *m)
 {
     return m->pc == CODE_OUTSIDE ? m->lost_pc : 2u * m->pc;
-}
-
-void iss_set_pc(iss_t *m, uint32_t pc)
-{
-    jump(m, pc);
 }
 
 int64_t iss_acc(const iss_t *m, unsigned which)

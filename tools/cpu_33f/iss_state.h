@@ -218,14 +218,8 @@ const char *iss_place(const iss_t *m, bool data, uint32_t address, char *buffer,
 
 /* iss_decode.c */
 void iss_decode(iss_t *m, uint32_t index);
-const row_t *iss_row(size_t n);
 const row_t *iss_fill(insn_t *i, uint32_t word, uint32_t next, uint32_t index);
 bool iss_row_is_byte(const row_t *row, uint32_t word);
-bool iss_row_has_two_words(const row_t *row);
-uint32_t iss_row_byte_bit(const row_t *row);
-
-/* iss_decode_text.c */
-void iss_syntax(const row_t *row, char *buffer, size_t size);
 
 /* iss_multiply.c */
 bool iss_is_divide(const insn_t *i);

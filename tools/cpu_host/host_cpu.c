@@ -8,14 +8,13 @@
 void firmware_init(void);
 void firmware_background(void);
 
-/* A firmware need not have all of these. */
-extern void _FLTA1Interrupt(void) __attribute__((weak));
-extern void _MPWM1Interrupt(void) __attribute__((weak));
-extern void _T1Interrupt(void) __attribute__((weak));
-extern void _T2Interrupt(void) __attribute__((weak));
-extern void _T3Interrupt(void) __attribute__((weak));
-extern void _U1RXInterrupt(void) __attribute__((weak));
-extern void _U1TXInterrupt(void) __attribute__((weak));
+/* X(interrupt, its handler, its flag without IF). A firmware need not have all of the handlers. */
+#define HANDLERS(X) \
+    X(CHIP_IRQ_ADC1, _ADC1Interrupt, AD1) X(CHIP_IRQ_FLTA1, _FLTA1Interrupt, FLTA1) X(CHIP_IRQ_PWM1, _MPWM1Interrupt, PWM1) \
+    X(CHIP_IRQ_T1, _T1Interrupt, T1) X(CHIP_IRQ_T2, _T2Interrupt, T2) X(CHIP_IRQ_T3, _T3Interrupt, T3) \
+    X(CHIP_IRQ_U1RX, _U1RXInterrupt, U1RX) X(CHIP_IRQ_U1TX, _U1TXInterrupt, U1TX)
+#define DECLARE_WEAK(irq, handler, flag) extern void handler(void) __attribute__((weak));
+HANDLERS(DECLARE_WEAK)
 
 /* Registers whose writes mean more than storing. Nothing tells of a write here: after each piece of firmware they are looked through. */
 static const uint16_t watched[] = {
@@ -88,15 +87,8 @@ typedef struct {
 
 static const handler_t *handler_of(unsigned irq)
 {
-    static const handler_t handlers[] = {
-        {CHIP_IRQ_ADC1, _ADC1Interrupt, "_ADC1Interrupt", "AD1IF", "AD1IE"},
-        {CHIP_IRQ_FLTA1, _FLTA1Interrupt, "_FLTA1Interrupt", "FLTA1IF", "FLTA1IE"},
-        {CHIP_IRQ_PWM1, _MPWM1Interrupt, "_MPWM1Interrupt", "PWM1IF", "PWM1IE"},
-        {CHIP_IRQ_T1, _T1Interrupt, "_T1Interrupt", "T1IF", "T1IE"},
-        {CHIP_IRQ_T2, _T2Interrupt, "_T2Interrupt", "T2IF", "T2IE"}, {CHIP_IRQ_T3, _T3Interrupt, "_T3Interrupt", "T3IF", "T3IE"},
-        {CHIP_IRQ_U1RX, _U1RXInterrupt, "_U1RXInterrupt", "U1RXIF", "U1RXIE"},
-        {CHIP_IRQ_U1TX, _U1TXInterrupt, "_U1TXInterrupt", "U1TXIF", "U1TXIE"},
-    };
+#define HANDLER_ROW(irq, handler, flag) {irq, handler, #handler, #flag "IF", #flag "IE"},
+    static const handler_t handlers[] = {HANDLERS(HANDLER_ROW)};
     for (size_t n = 0; n < sizeof handlers / sizeof handlers[0]; n++) {
         if (handlers[n].irq == irq) {
             return &handlers[n];

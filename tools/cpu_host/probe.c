@@ -17,96 +17,66 @@
 #define SPEED_RPM(erpm) ((double)(erpm) / (double)(NOPOLESPAIRS))
 #define BUS_V(q15) ((double)(q15) / 32768.0 * (double)PARAM_F(BUS_FULL_SCALE_V))
 
-#define SIGNAL(function, expression) \
-    static double function(void) \
+/* X(id, name, unit, meaning, value): the signals of the drive `d`. */
+#define DRIVE_SIGNALS(X) \
+    X(state, "fw.state", "", "drive state (drive_state_t)", (double)d->state) \
+    X(fault, "fw.fault", "", "fault code (drive_fault_t)", (double)d->fault) \
+    X(running, "fw.run", "", "1 while the bridge switches", (double)drive_is_running(d)) \
+    X(calibrated, "fw.calibrated", "", "1 after the offset calibration", (double)d->calibration.done) \
+    X(theta_est, "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", \
+      ANGLE_DEG(estimator_next_angle(&d->run.estimator)) - (double)d->run.estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC)) \
+    X(theta_ctrl, "fw.theta_ctrl_deg", "deg", "control angle of the next sample", ANGLE_DEG(d->angle)) \
+    X(speed_est, "fw.speed_est_rpm", "rpm", "filtered estimated speed", SPEED_RPM(estimator_speed(&d->run.estimator))) \
+    X(speed_raw, "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", SPEED_RPM(d->run.estimator.omega_erpm)) \
+    X(speed_ref, "fw.speed_ref_rpm", "rpm", "ramped speed reference", SPEED_RPM(d->run.control.reference_erpm)) \
+    X(speed_target, "fw.speed_target_rpm", "rpm", "speed target", SPEED_RPM(d->command.target_erpm)) \
+    X(i_a, "fw.i_a_a", "A", "measured current of phase A", CURRENT_A(d->i_a_q13)) \
+    X(i_b, "fw.i_b_a", "A", "measured current of phase B", CURRENT_A(d->i_b_q13)) \
+    X(i_d, "fw.i_d_a", "A", "measured d current", CURRENT_A(d->run.control.i_q13.d)) \
+    X(i_q, "fw.i_q_a", "A", "measured q current", CURRENT_A(d->run.control.i_q13.q)) \
+    X(id_ref, "fw.id_ref_a", "A", "d current reference", CURRENT_A(d->run.control.ref_q13.d)) \
+    X(iq_ref, "fw.iq_ref_a", "A", "q current reference", CURRENT_A(d->run.control.ref_q13.q)) \
+    X(iq_limit, "fw.iq_limit_a", "A", "q current limit", CURRENT_A(d->run.control.iq_limit_q13)) \
+    X(id_trim, "fw.id_trim_a", "A", "d current of the voltage feedback", CURRENT_A(d->run.fieldweak.trim_q13)) \
+    X(brake_limit, "fw.brake_limit_a", "A", "limit of the braking current", CURRENT_A(d->run.control.brake_limit_q13)) \
+    X(v_d, "fw.v_d_v", "V", "commanded d voltage", VOLTAGE_V(d->run.control.v_q14.d)) \
+    X(v_q, "fw.v_q_v", "V", "commanded q voltage", VOLTAGE_V(d->run.control.v_q14.q)) \
+    X(v_limit, "fw.v_limit_v", "V", "radius of the voltage circle", VOLTAGE_V(d->circle.limit_q14)) \
+    X(vq_limit, "fw.vq_limit_v", "V", "q voltage limit", VOLTAGE_V(d->run.control.vq_limit_q14)) \
+    X(bus, "fw.bus_v", "V", "filtered bus voltage", BUS_V(qm_hi(d->bus_q31))) \
+    X(fw_index, "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", (double)d->run.fieldweak.index) \
+    X(inv_kphi, "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", (double)d->run.model.inv_kfi) \
+    X(ls_ratio, "fw.ls_ratio", "", "Ls/(2 Ls0) in use", (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0) \
+    X(offset, "fw.offset_deg", "deg", "hand-over angle offset that is left", ANGLE_DEG(d->run.handover.offset)) \
+    X(e_d, "fw.e_d_v", "V", "filtered d back-EMF", EMF_V(estimator_emf(&d->run.estimator).d)) \
+    X(e_q, "fw.e_q_v", "V", "filtered q back-EMF", EMF_V(estimator_emf(&d->run.estimator).q)) \
+    X(offset_a, "fw.offset_a_a", "A", "calibrated offset of phase A", CURRENT_A(d->calibration.offset_a_q13)) \
+    X(offset_b, "fw.offset_b_a", "A", "calibrated offset of phase B", CURRENT_A(d->calibration.offset_b_q13))
+
+#ifdef SNAPSHOT
+#define SNAPSHOT_SIGNALS(X) \
+    X(snap_done, "fw.snap_done", "", "SnapDone", (double)(SnapDone)) \
+    X(snap_rows, "fw.snap_rows", "rows", "rows recorded so far", (double)(board_snapshot.row)) \
+    X(snap1_last, "fw.snap1_last", "Q15", "last row of SnapBuf1, phase current a", (double)(SnapBuf1[DATA_BUFFER_SIZE - 1])) \
+    X(snap2_last, "fw.snap2_last", "Q15", "last row of SnapBuf2, q current", (double)(SnapBuf2[DATA_BUFFER_SIZE - 1])) \
+    X(snap3_last, "fw.snap3_last", "erpm", "last row of SnapBuf3, speed", (double)(SnapBuf3[DATA_BUFFER_SIZE - 1])) \
+    X(snap4_last, "fw.snap4_last", "1/65536 turn", "last row of SnapBuf4, angle", (double)(SnapBuf4[DATA_BUFFER_SIZE - 1]))
+#else
+#define SNAPSHOT_SIGNALS(X)
+#endif
+
+#define SIGNAL_FUNCTION(id, name, unit, meaning, value) \
+    static double read_##id(void) \
     { \
         const drive_t *d = &board_drive; \
-        return (expression); \
+        (void)d; \
+        return (value); \
     }
+DRIVE_SIGNALS(SIGNAL_FUNCTION)
+SNAPSHOT_SIGNALS(SIGNAL_FUNCTION)
 
-SIGNAL(read_state, (double)d->state)
-SIGNAL(read_fault, (double)d->fault)
-SIGNAL(read_running, (double)drive_is_running(d))
-SIGNAL(read_calibrated, (double)d->calibration.done)
-SIGNAL(read_theta_est, ANGLE_DEG(estimator_next_angle(&d->run.estimator)) - (double)d->run.estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC))
-SIGNAL(read_theta_ctrl, ANGLE_DEG(d->angle))
-SIGNAL(read_speed_est, SPEED_RPM(estimator_speed(&d->run.estimator)))
-SIGNAL(read_speed_raw, SPEED_RPM(d->run.estimator.omega_erpm))
-SIGNAL(read_speed_ref, SPEED_RPM(d->run.control.reference_erpm))
-SIGNAL(read_speed_target, SPEED_RPM(d->command.target_erpm))
-SIGNAL(read_i_a, CURRENT_A(d->i_a_q13))
-SIGNAL(read_i_b, CURRENT_A(d->i_b_q13))
-SIGNAL(read_i_d, CURRENT_A(d->run.control.i_q13.d))
-SIGNAL(read_i_q, CURRENT_A(d->run.control.i_q13.q))
-SIGNAL(read_id_ref, CURRENT_A(d->run.control.ref_q13.d))
-SIGNAL(read_iq_ref, CURRENT_A(d->run.control.ref_q13.q))
-SIGNAL(read_iq_limit, CURRENT_A(d->run.control.iq_limit_q13))
-SIGNAL(read_id_trim, CURRENT_A(d->run.fieldweak.trim_q13))
-SIGNAL(read_brake_limit, CURRENT_A(d->run.control.brake_limit_q13))
-SIGNAL(read_v_d, VOLTAGE_V(d->run.control.v_q14.d))
-SIGNAL(read_v_q, VOLTAGE_V(d->run.control.v_q14.q))
-SIGNAL(read_v_limit, VOLTAGE_V(d->circle.limit_q14))
-SIGNAL(read_vq_limit, VOLTAGE_V(d->run.control.vq_limit_q14))
-SIGNAL(read_bus, BUS_V(qm_hi(d->bus_q31)))
-SIGNAL(read_fw_index, (double)d->run.fieldweak.index)
-SIGNAL(read_inv_kphi, (double)d->run.model.inv_kfi)
-SIGNAL(read_ls_ratio, (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0)
-SIGNAL(read_offset, ANGLE_DEG(d->run.handover.offset))
-SIGNAL(read_e_d, EMF_V(estimator_emf(&d->run.estimator).d))
-SIGNAL(read_e_q, EMF_V(estimator_emf(&d->run.estimator).q))
-SIGNAL(read_offset_a, CURRENT_A(d->calibration.offset_a_q13))
-SIGNAL(read_offset_b, CURRENT_A(d->calibration.offset_b_q13))
-#ifdef SNAPSHOT
-SIGNAL(read_snap_done, ((void)d, (double)SnapDone))
-SIGNAL(read_snap_rows, ((void)d, (double)board_snapshot.row))
-SIGNAL(read_snap1_last, ((void)d, (double)SnapBuf1[DATA_BUFFER_SIZE - 1]))
-SIGNAL(read_snap2_last, ((void)d, (double)SnapBuf2[DATA_BUFFER_SIZE - 1]))
-SIGNAL(read_snap3_last, ((void)d, (double)SnapBuf3[DATA_BUFFER_SIZE - 1]))
-SIGNAL(read_snap4_last, ((void)d, (double)SnapBuf4[DATA_BUFFER_SIZE - 1]))
-#endif
-
-const probe_signal_t probe_signals[] = {
-    { "fw.state", "", "drive state (drive_state_t)", read_state },
-    { "fw.fault", "", "fault code (drive_fault_t)", read_fault },
-    { "fw.run", "", "1 while the bridge switches", read_running },
-    { "fw.calibrated", "", "1 after the offset calibration", read_calibrated },
-    { "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", read_theta_est },
-    { "fw.theta_ctrl_deg", "deg", "control angle of the next sample", read_theta_ctrl },
-    { "fw.speed_est_rpm", "rpm", "filtered estimated speed", read_speed_est },
-    { "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", read_speed_raw },
-    { "fw.speed_ref_rpm", "rpm", "ramped speed reference", read_speed_ref },
-    { "fw.speed_target_rpm", "rpm", "speed target", read_speed_target },
-    { "fw.i_a_a", "A", "measured current of phase A", read_i_a },
-    { "fw.i_b_a", "A", "measured current of phase B", read_i_b },
-    { "fw.i_d_a", "A", "measured d current", read_i_d },
-    { "fw.i_q_a", "A", "measured q current", read_i_q },
-    { "fw.id_ref_a", "A", "d current reference", read_id_ref },
-    { "fw.iq_ref_a", "A", "q current reference", read_iq_ref },
-    { "fw.iq_limit_a", "A", "q current limit", read_iq_limit },
-    { "fw.id_trim_a", "A", "d current of the voltage feedback", read_id_trim },
-    { "fw.brake_limit_a", "A", "limit of the braking current", read_brake_limit },
-    { "fw.v_d_v", "V", "commanded d voltage", read_v_d },
-    { "fw.v_q_v", "V", "commanded q voltage", read_v_q },
-    { "fw.v_limit_v", "V", "radius of the voltage circle", read_v_limit },
-    { "fw.vq_limit_v", "V", "q voltage limit", read_vq_limit },
-    { "fw.bus_v", "V", "filtered bus voltage", read_bus },
-    { "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", read_fw_index },
-    { "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", read_inv_kphi },
-    { "fw.ls_ratio", "", "Ls/(2 Ls0) in use", read_ls_ratio },
-    { "fw.offset_deg", "deg", "hand-over angle offset that is left", read_offset },
-    { "fw.e_d_v", "V", "filtered d back-EMF", read_e_d },
-    { "fw.e_q_v", "V", "filtered q back-EMF", read_e_q },
-    { "fw.offset_a_a", "A", "calibrated offset of phase A", read_offset_a },
-    { "fw.offset_b_a", "A", "calibrated offset of phase B", read_offset_b },
-#ifdef SNAPSHOT
-    { "fw.snap_done", "", "SnapDone", read_snap_done },
-    { "fw.snap_rows", "rows", "rows recorded so far", read_snap_rows },
-    { "fw.snap1_last", "Q15", "last row of SnapBuf1, phase current a", read_snap1_last },
-    { "fw.snap2_last", "Q15", "last row of SnapBuf2, q current", read_snap2_last },
-    { "fw.snap3_last", "erpm", "last row of SnapBuf3, speed", read_snap3_last },
-    { "fw.snap4_last", "1/65536 turn", "last row of SnapBuf4, angle", read_snap4_last },
-#endif
-};
+#define SIGNAL_ROW(id, name, unit, meaning, value) { name, unit, meaning, read_##id },
+const probe_signal_t probe_signals[] = { DRIVE_SIGNALS(SIGNAL_ROW) SNAPSHOT_SIGNALS(SIGNAL_ROW) };
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
 
 #define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },

@@ -17,25 +17,14 @@ static void set_equation(plant_t *plant, unsigned leg)
     plant_leg_equation_t *eq = &plant->inverter.equation[leg];
     *eq = (plant_leg_equation_t){0.0, 0.0, 0.0, 0.0, 0.0};
     switch (inv->cond[leg]) {
-    case PLANT_COND_HIGH:
-        *eq = (plant_leg_equation_t){1.0, 0.0, inv->rds_on_ohm, 1.0, 0.0};
-        break;
-    case PLANT_COND_LOW:
-        eq->ohm = inv->rds_on_ohm + inv->shunt_ohm;
-        break;
-    case PLANT_COND_DIODE_LOW:
-        eq->fixed_v = -inv->diode_v;
-        eq->ohm = inv->diode_ohm + inv->shunt_ohm;
-        break;
-    case PLANT_COND_DIODE_HIGH:
-        *eq = (plant_leg_equation_t){1.0, inv->diode_v, inv->diode_ohm, 1.0, 0.0};
-        break;
+    case PLANT_COND_HIGH: *eq = (plant_leg_equation_t){1.0, 0.0, inv->rds_on_ohm, 1.0, 0.0}; break;
+    case PLANT_COND_LOW: eq->ohm = inv->rds_on_ohm + inv->shunt_ohm; break;
+    case PLANT_COND_DIODE_LOW: *eq = (plant_leg_equation_t){0.0, -inv->diode_v, inv->diode_ohm + inv->shunt_ohm, 0.0, 0.0}; break;
+    case PLANT_COND_DIODE_HIGH: *eq = (plant_leg_equation_t){1.0, inv->diode_v, inv->diode_ohm, 1.0, 0.0}; break;
     case PLANT_COND_SHOOT:
         *eq = (plant_leg_equation_t){0.5, 0.0, 0.5 * inv->rds_on_ohm, 0.5, 1.0 / (2.0 * inv->rds_on_ohm + inv->shunt_ohm)};
         break;
-    case PLANT_COND_FLOAT:
-    default:
-        break;
+    default: break;
     }
 }
 
@@ -133,17 +122,12 @@ static inline double terminal_voltage(const plant_t *plant, unsigned leg)
 }
 
 /* Current from the bus into the bridge at this instant. */
-static inline double bus_current(const plant_t *plant)
+double plant_inverter_bus_a(const plant_t *plant)
 {
     const plant_leg_equation_t *eq = plant->inverter.equation;
     const double *i = plant->inverter.i;
     return eq[0].from_bus * i[0] + eq[1].from_bus * i[1] + eq[2].from_bus * i[2]
            + (eq[0].shoot_s + eq[1].shoot_s + eq[2].shoot_s) * plant->supply.bus_v;
-}
-
-double plant_inverter_bus_a(const plant_t *plant)
-{
-    return bus_current(plant);
 }
 
 /* Let a floating leg conduct through the diode that its open-circuit voltage `v` forward-biases. */
@@ -283,7 +267,7 @@ bool plant_inverter_run(plant_t *plant, double until_s, double trip_a)
     plant_inverter_t *inv = &plant->inverter;
     bool hold = false; /* a diode that was found not to conduct stays off for one step */
     while (plant->now_s < until_s) {
-        double bus_before = bus_current(plant);
+        double bus_before = plant_inverter_bus_a(plant);
         if (bus_before > trip_a) {
             return false;
         }
@@ -309,7 +293,7 @@ bool plant_inverter_run(plant_t *plant, double until_s, double trip_a)
             passed = step_with_off_legs(plant, h);
         }
         hold = passed < NO_PROGRESS_S;
-        inv->bus_as += 0.5 * (bus_before + bus_current(plant)) * passed;
+        inv->bus_as += 0.5 * (bus_before + plant_inverter_bus_a(plant)) * passed;
         plant->now_s = passed < until_s - plant->now_s ? plant->now_s + passed : until_s;
     }
     return true;

@@ -157,7 +157,9 @@ static void run_period(vb_t *vb)
     chip_pwm_begin(chip);
     chip_adc_begin(chip);
     plant_motor_prepare(&plant->motor);
-    chip->cpu.begin(chip->cpu.context);
+    if (chip->cpu.begin != NULL) {
+        chip->cpu.begin(chip->cpu.context);
+    }
     double samples = chip->adc.samples;
     run_events(vb);
     double period_s = chip->pwm.length_s;

@@ -58,18 +58,13 @@ static double input_voltage(void *context, unsigned input)
     vb_t *vb = context;
     switch (input) {
     case 0:
-    case 1:
-        return current_voltage(vb, input);
-    case 2:
-        return vb->plant.supply.bus_v / vb->analogue.vbus_ratio;
+    case 1: return current_voltage(vb, input);
+    case 2: return vb->plant.supply.bus_v / vb->analogue.vbus_ratio;
     case 3:
     case 4:
-    case 5:
-        return vb->plant.inverter.v[input - 3] / vb->analogue.vbus_ratio;
-    case 8:
-        return vb->controls.pot * REFERENCE_V;
-    default:
-        return 0.0;
+    case 5: return vb->plant.inverter.v[input - 3] / vb->analogue.vbus_ratio;
+    case 8: return vb->controls.pot * REFERENCE_V;
+    default: return 0.0;
     }
 }
 

@@ -6,10 +6,14 @@
 #include "probe.h"
 #include "vboard.h"
 
+/* A quantity that was measured `count` times. */
+typedef struct {
+    double count, min, max, sum, last;
+} vb_range_t;
+
 /* What a processor with a time of its own has counted; zeroes for the host. Latency: from the trigger to the write of the third duty. */
 typedef struct {
-    double isr_count, isr_min, isr_max, isr_sum, isr_last;
-    double latency_min, latency_max, latency_sum, latency_count, latency_last;
+    vb_range_t isr, latency;
     double stack_bytes, instructions, cycles, resets, errors;
     double ticks, differences;
 } vb_counts_t;

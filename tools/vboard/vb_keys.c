@@ -57,11 +57,9 @@ static double get_v_rms(const vb_t *vb) { return sqrt(mean(vb, vb->stat.v2_sum))
 static double get_speed_mean(const vb_t *vb) { return mean(vb, vb->stat.speed_sum); }
 static double get_torque_mean(const vb_t *vb) { return mean(vb, vb->stat.torque_sum); }
 
-static double get_isr_mean(const vb_t *vb) { return vb->count.isr_count > 0.0 ? vb->count.isr_sum / vb->count.isr_count : 0.0; }
-static double get_latency_mean(const vb_t *vb)
-{
-    return vb->count.latency_count > 0.0 ? vb->count.latency_sum / vb->count.latency_count : 0.0;
-}
+static double mean_of(const vb_range_t *range) { return range->count > 0.0 ? range->sum / range->count : 0.0; }
+static double get_isr_mean(const vb_t *vb) { return mean_of(&vb->count.isr); }
+static double get_latency_mean(const vb_t *vb) { return mean_of(&vb->count.latency); }
 
 static void set_theta(vb_t *vb, double deg)
 {
@@ -89,10 +87,9 @@ static void set_stat_reset(vb_t *vb, double value)
 
 static void set_isr_reset(vb_t *vb, double value)
 {
-    vb_counts_t *c = &vb->count;
     (void)value;
-    c->isr_count = c->isr_min = c->isr_max = c->isr_sum = 0.0;
-    c->latency_count = c->latency_min = c->latency_max = c->latency_sum = 0.0;
+    vb->count.isr = (vb_range_t){.last = vb->count.isr.last};
+    vb->count.latency = (vb_range_t){.last = vb->count.latency.last};
 }
 
 #define AT(field) offsetof(struct vb, field)
@@ -182,14 +179,14 @@ static const key_entry_t table[] = {
     P("cpu.crystal_hz", chip.clock.crystal_hz, 8e6, 1e5, 64e6, "Hz", "crystal"),
     R("cpu.fcy_hz", chip.clock.fcy_hz, "Hz", "instruction clock"),
     W("cpu.isr_reset", set_isr_reset, "", "any value starts the measurement of the control interrupt anew"),
-    R("cpu.isr_cycles", count.isr_last, "cycles", "the last control interrupt, entry to return"),
-    R("cpu.latency_cycles", count.latency_last, "cycles", "the last control interrupt's write of the third duty after its trigger"),
-    R("cpu.isr_count", count.isr_count, "", "control interrupts measured; 0 = the CPU is the host, which has no cycles"),
-    R("cpu.isr_cycles_min", count.isr_min, "cycles", "shortest control interrupt, entry to return"),
-    R("cpu.isr_cycles_max", count.isr_max, "cycles", "longest control interrupt"),
+    R("cpu.isr_cycles", count.isr.last, "cycles", "the last control interrupt, entry to return"),
+    R("cpu.latency_cycles", count.latency.last, "cycles", "the last control interrupt's write of the third duty after its trigger"),
+    R("cpu.isr_count", count.isr.count, "", "control interrupts measured; 0 = the CPU is the host, which has no cycles"),
+    R("cpu.isr_cycles_min", count.isr.min, "cycles", "shortest control interrupt, entry to return"),
+    R("cpu.isr_cycles_max", count.isr.max, "cycles", "longest control interrupt"),
     G("cpu.isr_cycles_mean", get_isr_mean, "cycles", "mean control interrupt"),
-    R("cpu.latency_cycles_min", count.latency_min, "cycles", "shortest time from the trigger to the write of the third duty"),
-    R("cpu.latency_cycles_max", count.latency_max, "cycles", "longest time from the trigger to the write of the third duty"),
+    R("cpu.latency_cycles_min", count.latency.min, "cycles", "shortest time from the trigger to the write of the third duty"),
+    R("cpu.latency_cycles_max", count.latency.max, "cycles", "longest time from the trigger to the write of the third duty"),
     G("cpu.latency_cycles_mean", get_latency_mean, "cycles", "mean time from the trigger to the write of the third duty"),
     R("cpu.cycles", count.cycles, "cycles", "instruction cycles since power-up"),
     R("cpu.instructions", count.instructions, "", "instructions since power-up"),
@@ -342,17 +339,11 @@ int vb_keys_find(vb_t *vb, const char *name, vb_access_t *access)
 double vb_keys_read(const vb_t *vb, const vb_access_t *access)
 {
     switch (access->kind) {
-    case KIND_GET:
-        return access->get(vb);
-    case KIND_PROBE:
-        return access->probe();
-    case KIND_REG:
-        return (double)*access->reg;
-    case KIND_PIN:
-        return (double)chip_ports_pin(&vb->chip, access->pin >> 4, access->pin & 15u);
-    case KIND_FIELD:
-    default:
-        return *(const double *)((const char *)vb + access->offset);
+    case KIND_GET: return access->get(vb);
+    case KIND_PROBE: return access->probe();
+    case KIND_REG: return (double)*access->reg;
+    case KIND_PIN: return (double)chip_ports_pin(&vb->chip, access->pin >> 4, access->pin & 15u);
+    default: return *(const double *)((const char *)vb + access->offset);
     }
 }
 
@@ -368,14 +359,14 @@ int vb_get(vb_t *vb, const char *key, double *value)
 
 static int set_register(vb_t *vb, const char *key, double value)
 {
-    volatile uint16_t *reg = vb->chip.cpu.reg(vb->chip.cpu.context, key + 4);
-    if (reg == NULL) {
-        return vb_fail(vb, "%s: the device has no register %s", key, key + 4);
+    vb_access_t access;
+    if (vb_keys_find(vb, key, &access) != 0) {
+        return -1;
     }
     if (!(value >= 0.0 && value <= 65535.0)) {
         return vb_fail(vb, "%s: %g is outside 0..65535", key, value);
     }
-    *reg = (uint16_t)value;
+    *access.reg = (uint16_t)value;
     return 0;
 }
 

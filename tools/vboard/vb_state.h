@@ -34,7 +34,7 @@ typedef struct {
     size_t offset;
     double (*get)(const vb_t *vb);
     double (*probe)(void);
-    const volatile uint16_t *reg;
+    volatile uint16_t *reg;
     unsigned pin;
 } vb_access_t;
 
