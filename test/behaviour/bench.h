@@ -177,7 +177,7 @@ static inline double seconds_to_fault(double limit)
     return get("time_s") - begin;
 }
 
-static inline void bench_set_up(void)
+void setUp(void)
 {
     bench = vb_create();
     TEST_ASSERT_NOT_NULL(bench);
@@ -201,7 +201,7 @@ static inline void supply_v(double volts)
     set("bus.voltage_v", volts);
 }
 
-static inline void bench_tear_down(void)
+void tearDown(void)
 {
     vb_destroy(bench);
     bench = NULL;

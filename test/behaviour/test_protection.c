@@ -1,16 +1,6 @@
 /* Each fault: outputs off within a period, its code kept until S2, and no start by the same press. */
 #include "bench.h"
 
-void setUp(void)
-{
-    bench_set_up();
-}
-
-void tearDown(void)
-{
-    bench_tear_down();
-}
-
 static void cause_away_fault_stays_until_s2(drive_fault_t fault)
 {
     wait_s(0.3);

@@ -1,16 +1,6 @@
 /* The motor runs below base speed: speed, angle, current, load steps, a wrong motor file. */
 #include "bench.h"
 
-void setUp(void)
-{
-    bench_set_up();
-}
-
-void tearDown(void)
-{
-    bench_tear_down();
-}
-
 void test_holds_every_speed_to_half_a_percent(void)
 {
     static const double speeds[] = { 500.0, 750.0, 1000.0, 1500.0, 2000.0, 2500.0, 2800.0 };

@@ -1,16 +1,6 @@
 /* The motor starts: from any angle, under load, and not when it must not. */
 #include "bench.h"
 
-void setUp(void)
-{
-    bench_set_up();
-}
-
-void tearDown(void)
-{
-    bench_tear_down();
-}
-
 static void start_from(double degrees, double load_nm)
 {
     char what[48];

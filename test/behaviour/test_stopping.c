@@ -1,16 +1,6 @@
 /* The motor stops in order at any speed, and the bus stays in its range. */
 #include "bench.h"
 
-void setUp(void)
-{
-    bench_set_up();
-}
-
-void tearDown(void)
-{
-    bench_tear_down();
-}
-
 static void stops_in_order_from(double rpm, double limit_s)
 {
     double begin;

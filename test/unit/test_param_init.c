@@ -2,14 +2,6 @@
 #include "drive_rig.h"
 #include "unity.h"
 
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
-
 void test_gains_and_offsets_of_the_samples(void)
 {
     TEST_ASSERT_EQUAL_INT16(1024, params.offset_max_q13);

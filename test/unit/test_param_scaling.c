@@ -9,14 +9,6 @@
 #undef KFILTER_ESDQ_FW /* AN1292's */
 #define KFILTER_ESDQ_FW 164
 
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
-
 /** The estimator's part against the reference in float64. */
 static void expect_estimator(const estimator_params_t *p, uint16_t rs_q16, uint16_t rs_exp, uint16_t ls_exp, int16_t limit_ls,
                              int16_t limit_hs)
