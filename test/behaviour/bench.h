@@ -177,8 +177,10 @@ static inline double seconds_to_fault(double limit)
     return get("time_s") - begin;
 }
 
-void setUp(void)
+/** A new board; the last test's goes. */
+static inline void bench_set_up(void)
 {
+    vb_destroy(bench);
     bench = vb_create();
     TEST_ASSERT_NOT_NULL(bench);
     bench_fast = 0;
@@ -199,12 +201,6 @@ static inline void supply_v(double volts)
 {
     set("supply.voltage_v", volts);
     set("bus.voltage_v", volts);
-}
-
-void tearDown(void)
-{
-    vb_destroy(bench);
-    bench = NULL;
 }
 
 #endif

@@ -12,6 +12,11 @@ static double place_in_table(double rpm)
     return (rpm - FW_START_SPEED_RPM) * NOPOLESPAIRS / 1024.0;
 }
 
+void setUp(void)
+{
+    bench_set_up();
+}
+
 void test_reaches_5500_rpm_without_load(void)
 {
     run_at(5500.0);

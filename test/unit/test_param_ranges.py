@@ -7,6 +7,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 from c_compiler import CFLAGS, ROOT, compiler
 
 USERPARAMS = (ROOT / "userparams.h").read_text(encoding="utf-8")
@@ -72,6 +73,11 @@ def build(values: dict[str, str], extra: tuple[str, ...] = ()) -> tuple[int, str
         return done.returncode, done.stderr.replace("\\'", "'")
 
 
+def defines(values: dict[str, str]) -> list[str]:
+    """Lines that give the names other values from here on."""
+    return [line for name, value in values.items() for line in (f"#undef {name}", f"#define {name} {value}")]
+
+
 def output_of(source: list[str]) -> list[str]:
     """Lines that a C program prints. -O1 removes the inline functions that nothing calls, and with them their use of trig.c."""
     with tempfile.TemporaryDirectory() as folder:
@@ -86,15 +92,10 @@ def test_the_values_in_use_are_accepted() -> None:
     assert code == 0 and not messages, messages
 
 
-def test_each_value_below_its_range_is_refused_by_name_value_and_range() -> None:
-    code, messages = build({p.name: p.below() for p in PARAMETERS})
-    missing = [p.refusal(p.below()) for p in PARAMETERS if p.refusal(p.below()) not in messages]
-    assert code != 0 and not missing, missing
-
-
-def test_each_value_above_its_range_is_refused_by_name_value_and_range() -> None:
-    code, messages = build({p.name: p.above() for p in PARAMETERS})
-    missing = [p.refusal(p.above()) for p in PARAMETERS if p.refusal(p.above()) not in messages]
+@pytest.mark.parametrize("beyond", [Parameter.below, Parameter.above], ids=["below", "above"])
+def test_each_value_outside_its_range_is_refused_by_name_value_and_range(beyond) -> None:
+    code, messages = build({p.name: beyond(p) for p in PARAMETERS})
+    missing = [p.refusal(beyond(p)) for p in PARAMETERS if p.refusal(beyond(p)) not in messages]
     assert code != 0 and not missing, missing
 
 
@@ -179,15 +180,12 @@ def test_every_relation_has_a_case() -> None:
 def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     """One program says for each case which relations hold: the macros take the values that they find at the place of use."""
     tried = [(message, values, holds) for message, pairs in RELATIONS.items() for pair in pairs for values, holds in zip(pair, (False, True), strict=True)]
-    source = ["#include <stdio.h>", "#define USERPARAMS_H", *(f"#define {name} {value}" for name, value in BASE.items()),
+    source = ["#include <stdio.h>", "#define USERPARAMS_H", *defines(BASE),
               '#include "drive/param_init.h"', '#include "drive/param_table.h"', "#define HOLDS(condition, message) putchar((condition) ? '1' : '0');",
               "int main(void)", "{"]
     for _, values, _ in tried:
-        for name, value in values.items():
-            source += [f"#undef {name}", f"#define {name} {value}"]
-        source += ["    PARAM_RELATION_TABLE(HOLDS)", "    puts(\"\");"]
-        for name in values:
-            source += [f"#undef {name}", f"#define {name} {BASE.get(name) or DERIVED[name]}"]
+        source += [*defines(values), "    PARAM_RELATION_TABLE(HOLDS)", "    puts(\"\");",
+                   *defines({name: BASE.get(name) or DERIVED[name] for name in values})]
     source += ["    return 0;", "}"]
     in_table = relations()
     wrong = []
@@ -198,40 +196,47 @@ def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_a_broken_relation_stops_the_build_with_its_message() -> None:
-    for values, message in (({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM"),
-                            ({"MOTOR_KPHI_V_PER_KRPM": "1.7"}, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format"),
-                            ({"IDREF_SPEED3": "-2.76"}, "IDREF_SPEED3 must not exceed MAXIMUM_CURRENT_A")):
-        code, messages = build(BASE | values)
-        first = next(line for line in messages.splitlines() if "error:" in line)
-        assert code != 0 and f"userparams.h: {message}" in first, messages
+@pytest.mark.parametrize("values, message", [
+    ({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM"),
+    ({"MOTOR_KPHI_V_PER_KRPM": "1.7"}, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format"),
+    ({"IDREF_SPEED3": "-2.76"}, "IDREF_SPEED3 must not exceed MAXIMUM_CURRENT_A"),
+    # beyond 17.6 A, where Q13 ends, the counts wrap around
+    ({"IDREF_SPEED0": "-18.0"}, "IDREF_SPEED0 must not exceed MAXIMUM_CURRENT_A"),
+    ({"IDREF_SPEED17": "-18.0"}, "IDREF_SPEED17 must not exceed MAXIMUM_CURRENT_A"),
+    ({"FW_TRIM_CURRENT_A": "18.0"}, "FW_TRIM_CURRENT_A must not exceed MAXIMUM_CURRENT_A"),
+])
+def test_a_broken_relation_stops_the_build_with_its_message(values: dict[str, str], message: str) -> None:
+    code, messages = build(BASE | values)
+    first = next(line for line in messages.splitlines() if "error:" in line)
+    assert code != 0 and f"userparams.h: {message}" in first, messages
 
 
-def test_the_check_for_the_targets_old_compiler_refuses_the_same() -> None:
+@pytest.mark.parametrize("values, message", [
+    ({"KFILTER_ESDQ": "9"}, "KFILTER_ESDQ = 9 is outside 10 .. 8000 Q15"),
+    ({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM")])
+def test_the_check_for_the_targets_old_compiler_refuses_the_same(values: dict[str, str], message: str) -> None:
     old = ("-O2", "-U__GNUC__", "-D__GNUC__=4", "-Wno-builtin-macro-redefined", "-w")
     code, messages = build({}, old)
     assert code == 0, messages
-    code, messages = build({"KFILTER_ESDQ": "9"}, old)
-    assert code != 0 and "KFILTER_ESDQ = 9 is outside 10 .. 8000 Q15" in messages, messages
-    code, messages = build({"END_SPEED_RPM": "2801"}, old)
-    assert code != 0 and "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM" in messages, messages
+    code, messages = build(values, old)
+    assert code != 0 and message in messages, messages
+
+
+MODES = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
+BOARD_INCLUDES = ["-Itools/vboard", "-Itools/chip", "-Itools/plant"]
 
 
 def test_every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
-    modes = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
-    assert sorted(modes) == ["BIDIRECTIONAL_SPEED", "IDENTIFY", "OPEN_LOOP_FUNCTIONING", "PARAMS_IN_RAM", "SNAPSHOT", "TORQUE_MODE", "TUNING"], modes
+    assert sorted(MODES) == ["BIDIRECTIONAL_SPEED", "IDENTIFY", "OPEN_LOOP_FUNCTIONING", "PARAMS_IN_RAM", "SNAPSHOT", "TORQUE_MODE", "TUNING"], MODES
     sources = "".join(f.read_text(encoding="utf-8") for room in ("firmware", "include") for f in (ROOT / room).rglob("*.[ch]"))
-    unused = [mode for mode in modes if not re.search(rf"#if.*\b{mode}\b|#elif.*\b{mode}\b", sources)]
+    unused = [mode for mode in MODES if not re.search(rf"#if.*\b{mode}\b|#elif.*\b{mode}\b", sources)]
     assert not unused, unused
-
-
-BOARD_INCLUDES = ["-Itools/vboard", "-Itools/chip", "-Itools/plant"]
 
 
 def test_a_mode_means_the_same_in_userparams_and_on_the_command_line() -> None:
     files = [str(f) for room in ("firmware", "tools/cpu_host") for f in sorted((ROOT / room).rglob("*.c"))]
     with tempfile.TemporaryDirectory() as folder:
-        for mode in re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE):
+        for mode in MODES:
             text = USERPARAMS.replace(f"/* #define {mode} */", f"#define {mode}")
             (Path(folder) / "userparams.h").write_text(text, encoding="utf-8")
             seen = [compiler([flag, *CFLAGS, "-Itools/cpu_host", *BOARD_INCLUDES, "-Iinclude", "-I.", "-E", "-P", *files]) for flag in (f"-I{folder}", f"-D{mode}")]
@@ -267,7 +272,8 @@ def cases() -> list[dict[str, str]]:
     table_middle = re.compile(r"_SPEED([1-9]|1[0-6])$")
     scalars = [p for p in PARAMETERS if not table_middle.search(p.name)]
     found = [{p.name: value} for p in scalars for value in (p.low, p.high)]
-    found += [{"LOOPTIME_SEC": "0.00014", "UNDER_VOLTAGE_V": "15"}, {"MAXIMUM_CURRENT_A": "0.2773", "FW_TRIM_CURRENT_A": "0", "Q_CURRENT_REF_OPENLOOP": "0.2"} | FLAT, {"NOMINAL_SPEED_RPM": "5400", "END_SPEED_RPM": "5000"},
+    found += [{"LOOPTIME_SEC": "0.00014", "UNDER_VOLTAGE_V": "15"}, {"NOMINAL_SPEED_RPM": "5400", "END_SPEED_RPM": "5000"},
+              {"MAXIMUM_CURRENT_A": "0.2773", "FW_TRIM_CURRENT_A": "0", "Q_CURRENT_REF_OPENLOOP": "0.2"} | FLAT,
               {"NOPOLESPAIRS": "1", "MAXIMUM_SPEED_RPM": "30000", "NOMINAL_SPEED_RPM": "20000"}]
     dice = random.Random(1)
     for _ in range(100):
@@ -292,19 +298,13 @@ def numbers_in_counts(wide: bool) -> tuple[list[str], list[list[str]]]:
     source = ["#include <stdint.h>", "#include <stdio.h>"]
     if wide:
         source += [f"#define {name}_t int64_t" for name in ("int16", "uint16", "int32", "uint32")]
-    source += ["#define USERPARAMS_H", *(f"#define {name} {value}" for name, value in BASE.items())]
-    source += ['#include "drive/param_init.h"', '#include "drive/param_table.h"', "#define AND(condition, message) && (condition)",
+    source += ["#define USERPARAMS_H", *defines(BASE), '#include "drive/param_init.h"', '#include "drive/param_table.h"', "#define AND(condition, message) && (condition)",
                "static void show(int accepted, const drive_params_t *p)", "{", '    printf("%d", accepted);',
                *(f'    printf(" %lld", (long long)p->{path});' for path in paths), '    puts("");', "}"]
     for n, values in enumerate(cases()):
-        for name, value in values.items():
-            source += [f"#undef {name}", f"#define {name} {value}"]
-        source += [f"static void case_{n}(void)", "{", "    static const drive_params_t p = DRIVE_PARAMS_INIT;",
-                   "    show(1 PARAM_RELATION_TABLE(AND), &p);", "}"]
-        for name in values:
-            source += [f"#undef {name}", f"#define {name} {BASE[name]}"]
-    source += ["int main(void)", "{", *(f"    case_{n}();" for n in range(len(cases())))]
-    source += ["    return 0;", "}"]
+        source += [*defines(values), f"static void case_{n}(void)", "{", "    static const drive_params_t p = DRIVE_PARAMS_INIT;",
+                   "    show(1 PARAM_RELATION_TABLE(AND), &p);", "}", *defines({name: BASE[name] for name in values})]
+    source += ["int main(void)", "{", *(f"    case_{n}();" for n in range(len(cases()))), "    return 0;", "}"]
     return paths, [line.split() for line in output_of(source)]
 
 
@@ -319,9 +319,3 @@ def test_every_accepted_parameter_set_fits_the_drives_number_formats() -> None:
                       for path, is_, should in zip(paths, real[1:], ideal[1:], strict=True) if is_ != should]
     assert accepted > 60, f"only {accepted} sets were accepted"
     assert not wrong, "\n".join(wrong)
-
-
-def test_d_currents_beyond_the_largest_current_are_refused() -> None:
-    for name, value in (("IDREF_SPEED0", "-18.0"), ("IDREF_SPEED17", "-18.0"), ("FW_TRIM_CURRENT_A", "18.0")):
-        code, _ = build(BASE | {name: value})
-        assert code != 0, f"{name} = {value} is accepted: in counts it wraps around (Q13 ends at 17.6 A), and it is above MAXIMUM_CURRENT_A"
