@@ -4,56 +4,34 @@ import random
 import re
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from c_compiler import CFLAGS, ROOT, compiler
 
+from tools.common.param_rows import FOLLOWS, Parameter, modes, parameters
+from tools.common.x_macro import rows
+
 USERPARAMS = (ROOT / "userparams.h").read_text(encoding="utf-8")
+PARAMETERS = list(parameters().values())
+MODES = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
 
 
-@dataclass
-class Parameter:
-    name: str
-    unit: str
-    low: str
-    high: str
-    default: str
-
-    def below(self) -> str:
-        return f"{float(self.low) - 0.01 * self.size(self.low):.9g}"
-
-    def above(self) -> str:
-        return f"{float(self.high) + 0.01 * self.size(self.high):.9g}"
-
-    def size(self, end: str) -> float:
-        return abs(float(end)) or float(self.high) - float(self.low)
-
-    def refusal(self, value: str) -> str:
-        return f"userparams.h: {self.name} = {value} is outside {self.low} .. {self.high} {self.unit}"
+def below(p: Parameter) -> str:
+    return f"{float(p.low) - 0.01 * (abs(float(p.low)) or float(p.high)):.9g}"
 
 
-def rows(macro: str) -> list[list[str]]:
-    """The rows of an X-macro table of param_table.h, each as its arguments in C spelling."""
-    source = f'#include "drive/param_table.h"\n#define ROW(a, ...) @@ #a @ __VA_ARGS__\n{macro}(ROW)\n'
-    text = compiler(["-E", "-P", "-Iinclude", "-xc", "-"], source).stdout.replace("\n", " ")
-    return [row.strip().split(" @ ", 1) for row in text.split("@@")[1:]]
+def above(p: Parameter) -> str:
+    return f"{float(p.high) + 0.01 * (abs(float(p.high)) or -float(p.low)):.9g}"
 
 
-def parameters() -> list[Parameter]:
-    found = []
-    for name, rest in rows("PARAM_TABLE"):
-        unit, low, high, default = re.fullmatch(r'"([^"]*)" ?, ?(\S+) ?, ?(\S+) ?, ?(\S+) ?, .*', rest.strip()).groups()
-        found.append(Parameter(name.strip('"'), unit, low.replace(" ", ""), high, low if default.startswith("FROM_") else default))
-    return found
+def refusal(p: Parameter, value: str) -> str:
+    return f"userparams.h: {p.name} = {value} is outside {p.low} .. {p.high} {p.unit}"
 
 
 def relations() -> list[str]:
-    return ["".join(re.findall(r'"((?:[^"\\]|\\.)*)"', rest)) for _, rest in rows("PARAM_RELATION_TABLE")]
-
-
-PARAMETERS = parameters()
+    """The messages of the relations between parameters."""
+    return [message for _, message in rows("include", "drive/param_table.h", "PARAM_RELATION_TABLE", "#condition message")]
 
 
 def with_values(values: dict[str, str]) -> str:
@@ -92,10 +70,10 @@ def test_the_values_in_use_are_accepted() -> None:
     assert code == 0 and not messages, messages
 
 
-@pytest.mark.parametrize("beyond", [Parameter.below, Parameter.above], ids=["below", "above"])
+@pytest.mark.parametrize("beyond", [below, above])
 def test_each_value_outside_its_range_is_refused_by_name_value_and_range(beyond) -> None:
     code, messages = build({p.name: beyond(p) for p in PARAMETERS})
-    missing = [p.refusal(beyond(p)) for p in PARAMETERS if p.refusal(beyond(p)) not in messages]
+    missing = [refusal(p, beyond(p)) for p in PARAMETERS if refusal(p, beyond(p)) not in messages]
     assert code != 0 and not missing, missing
 
 
@@ -107,10 +85,10 @@ def test_the_ends_of_every_range_are_inside_it() -> None:
 
 def test_one_wrong_value_alone_stops_the_build_with_one_message() -> None:
     for name in ("TUNING_DELAY_RAMPUP", "KFILTER_VELESTIM", "KFILTER_ESDQ", "INVKFI_SPEED9", "LS_OVER2LS0_SPEED17", "DATA_BUFFER_SIZE", "SNAPDELAY"):
-        parameter = next(p for p in PARAMETERS if p.name == name)
-        for value in (parameter.below(), parameter.above()):
+        parameter = parameters()[name]
+        for value in (below(parameter), above(parameter)):
             code, messages = build({name: value})
-            assert code != 0 and messages.count("error:") == 1 and parameter.refusal(value) in messages, f"{name} = {value}: {messages}"
+            assert code != 0 and messages.count("error:") == 1 and refusal(parameter, value) in messages, f"{name} = {value}: {messages}"
 
 
 # For each relation a set of values that breaks it, and one just inside. R, L and Kphi scale with 24 V, 50 us and 4.4 A.
@@ -161,7 +139,7 @@ RELATIONS = {
     "the speed integral rounds to zero": [({"SPEEDCNTR_ITERM": "0.00003"}, {"SPEEDCNTR_ITERM": "0.00004"})],
 }
 # The values that the cases above start from, so that a user's own userparams.h does not change what they mean.
-BASE = {p.name: p.default for p in PARAMETERS} | dict(
+BASE = {p.name: p.low if p.default in FOLLOWS else p.default for p in PARAMETERS} | dict(
     re.findall(r"^#define (\w+) (\S+)$", (ROOT / "test/unit/support/hurst_params.h").read_text(encoding="utf-8"), re.MULTILINE))
 
 
@@ -222,12 +200,11 @@ def test_the_check_for_the_targets_old_compiler_refuses_the_same(values: dict[st
     assert code != 0 and message in messages, messages
 
 
-MODES = re.findall(r"^/\* #define (\w+) \*/", USERPARAMS, re.MULTILINE)
 BOARD_INCLUDES = ["-Itools/vboard", "-Itools/chip", "-Itools/plant"]
 
 
 def test_every_mode_of_userparams_is_off_and_used_by_the_firmware() -> None:
-    assert sorted(MODES) == ["BIDIRECTIONAL_SPEED", "IDENTIFY", "OPEN_LOOP_FUNCTIONING", "PARAMS_IN_RAM", "SNAPSHOT", "TORQUE_MODE", "TUNING"], MODES
+    assert sorted(MODES) == sorted(modes()), MODES
     sources = "".join(f.read_text(encoding="utf-8") for room in ("firmware", "include") for f in (ROOT / room).rglob("*.[ch]"))
     unused = [mode for mode in MODES if not re.search(rf"#if.*\b{mode}\b|#elif.*\b{mode}\b", sources)]
     assert not unused, unused
