@@ -51,9 +51,8 @@ def parse(argv):
 def all_mutants(root, wanted):
     """@return {file: mutants}"""
     paths = sorted(str(p.relative_to(root)) for pattern in FILES for p in root.glob(pattern))
-    structs = mutants.struct_types((root / p).read_text() for p in paths)
     chosen = [p for p in paths if p not in NOT_MUTATED and (not wanted or any(w in p for w in wanted))]
-    found = {p: mutants.of_file(p, (root / p).read_text(), structs) for p in chosen}
+    found = {p: mutants.of_file(p, (root / p).read_text()) for p in chosen}
     return {p: m for p, m in found.items() if m}
 
 
