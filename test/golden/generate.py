@@ -47,7 +47,7 @@ class Vectors:
         if self.real:
             db = self.ratio_db()
             if db < self.least_db:
-                raise ValueError(f"{self.name}: the integer model has {db:.1f} dB against float64, at least {self.least_db} dB are asserted")
+                raise ValueError(f"{self.name}: the integer model has {db:.1f} dB against float64, at least {self.least_db} are asserted")
             ratio = f"{db:.1f} dB of the exact integers against float64, at least {self.least_db:g} dB"
         lines = [f"# {self.what}", f"# format: {self.format}", "# tolerance: 0 LSB", f"# signal to noise: {ratio}",
                  *(f"# constant {name} = {value}" for name, value in self.constants.items())]
@@ -318,9 +318,9 @@ def profile(points):
     return out + [points[-1][1]]
 
 
-ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); rows from closed_from on in the frame of "
-                    "estimator_next_angle(); omega electrical rpm; rho upper word after the tick; the ratio is that of omega and of the "
-                    "angle in steady state")
+ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); rows from closed_from on in the "
+                    "frame of estimator_next_angle(); omega electrical rpm; rho upper word after the tick; the ratio is that of omega "
+                    "and of the angle in steady state")
 ESTIMATOR_COLUMNS = "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16"
 
 
@@ -499,7 +499,8 @@ def params(v, _):
         v.constants |= {f"{key}_{name}": value for name, value in m.estimator().items()}
     m = MACHINE
     v.constants |= {"norm_deltat": ref.nearest(m.turns_per_erpm * 2 ** 31), "norm_invkfi": ref.nearest(m.inv_kfi * 16384),
-                    "norm_current_141_at_121": ref.q15(1.41 / 0.000121 / 32768), "end_speed_q10": round(1000 * 5 * 50e-6 / 60 * 65536 * 1024),
+                    "norm_current_141_at_121": ref.q15(1.41 / 0.000121 / 32768),
+                    "end_speed_q10": round(1000 * 5 * 50e-6 / 60 * 65536 * 1024),
                     **{f"svm_{name}": value for name, value in m.modulator().items()},
                     "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
                     "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}

@@ -15,8 +15,8 @@ FAST = ["-O0", "-g0", "-w", "-Dalways_inline=unused", "-DUNITY_TEST_ABORT()=_Exi
 LONG = ["-O1", "-g0", "-w"]           # those that run longer than this:
 LONG_SECONDS = 0.2
 SHIPPED = ["-O2", "-g0", "-w"]        # the firmware, to see whether a change reaches it at all
-SOURCES = ("include", "firmware", "tools/common", "tools/plant", "tools/chip", "tools/vboard", "tools/cpu_host", "test/unit", "test/behaviour", "test/chip",
-           "docs", "tuning")
+SOURCES = ("include", "firmware", "tools/common", "tools/plant", "tools/chip", "tools/vboard", "tools/cpu_host", "test/unit",
+           "test/behaviour", "test/chip", "docs", "tuning")
 DEFINES = re.compile(r"/\* defines: (.*?) \*/")
 FAILED_TEST = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):FAIL", re.M)
 

@@ -128,8 +128,8 @@ void test_exponents_change_where_a_word_ends_and_scaled_constants_are_rounded(vo
 {
     const value_t values[] = {
         EXACT(PARAM_EXP(65534.0F), 0), EXACT(PARAM_EXP(65536.0F), 1), EXACT(PARAM_EXP(131070.0F), 1), EXACT(PARAM_EXP(131072.0F), 2),
-        EXACT(PARAM_EXP(262142.0F), 2), EXACT(PARAM_EXP(262144.0F), 3),
-        EXACT(PARAM_SCALED(10.4F, 0), 10), EXACT(PARAM_SCALED(10.6F, 0), 11), EXACT(PARAM_SCALED(42.4F, 2), 11), EXACT(PARAM_SCALED(41.6F, 2), 10),
+        EXACT(PARAM_EXP(262142.0F), 2), EXACT(PARAM_EXP(262144.0F), 3), EXACT(PARAM_SCALED(10.4F, 0), 10),
+        EXACT(PARAM_SCALED(10.6F, 0), 11), EXACT(PARAM_SCALED(42.4F, 2), 11), EXACT(PARAM_SCALED(41.6F, 2), 10),
     };
     EXPECT(values);
 }
