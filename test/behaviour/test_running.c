@@ -120,9 +120,14 @@ void test_tolerates_a_motor_and_a_board_that_differ_from_what_it_assumes(void)
         const char *key;
         double times, nm, angle_limit_deg;
     } cases[] = {
-        { "motor.rs_ohm", 0.7, 0.03, 12.0 }, { "motor.rs_ohm", 1.3, 0.03, 12.0 }, { "motor.lq_h", 0.7, 0.03, 8.0 },
-        { "motor.lq_h", 1.3, 0.03, 8.0 }, { "motor.psi_vs", 0.85, 0.03, 16.0 }, { "motor.psi_vs", 1.15, 0.03, 16.0 },
-        { "adc.noise_lsb", 3.0, 0.0, 5.0 }, { "motor.temp_c", 4.0, 0.04, 20.0 }, /* 100 degrees */
+        { "motor.rs_ohm", 0.7, 0.03, 12.0 },
+        { "motor.rs_ohm", 1.3, 0.03, 12.0 },
+        { "motor.lq_h", 0.7, 0.03, 8.0 },
+        { "motor.lq_h", 1.3, 0.03, 8.0 },
+        { "motor.psi_vs", 0.85, 0.03, 16.0 },
+        { "motor.psi_vs", 1.15, 0.03, 16.0 },
+        { "adc.noise_lsb", 3.0, 0.0, 5.0 },
+        { "motor.temp_c", 4.0, 0.04, 20.0 }, /* 100 degrees */
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char what[64];

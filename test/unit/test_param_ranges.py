@@ -96,6 +96,7 @@ def case(name: str, breaks: str, keeps: str, **others: str) -> tuple[dict[str, s
     return {name: breaks} | others, {name: keeps} | others
 
 
+LOOPS = ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR")
 # For each relation a value that breaks it, and one just inside. R, L and Kphi scale with 24 V, 50 us and 4.4 A.
 RELATIONS = {
     "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM": [case("MINIMUM_SPEED_RPM", "2800", "2799")],
@@ -115,8 +116,8 @@ RELATIONS = {
     "MAXIMUM_CURRENT_A must be at least 6.3 %": [case("MAXIMUM_CURRENT_A", "0.277", "0.278")],
     "FW_TRIM_CURRENT_A must not exceed MAXIMUM_CURRENT_A": [case("FW_TRIM_CURRENT_A", "2.76", "2.75")],
     **{f"{loop}_CTERM must be 0.9 .. 0.9999": [case(f"{loop}_CTERM", "0.89", "0.9"), case(f"{loop}_CTERM", "1.0", "0.9999")]
-       for loop in ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR")},
-    "the controllers' PTERMs must be positive": [case(f"{loop}_PTERM", "0.0", "0.001") for loop in ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR")],
+       for loop in LOOPS},
+    "the controllers' PTERMs must be positive": [case(f"{loop}_PTERM", "0.0", "0.001") for loop in LOOPS],
     "the current controllers' ITERMs must not be negative": [
         case("D_CURRCNTR_ITERM", "-0.001", "0.0"), case("Q_CURRCNTR_ITERM", "-0.001", "0.0")],
     "the back-EMF's format overflows": [case("MOTOR_RS_OHM", "3.45", "3.35")],

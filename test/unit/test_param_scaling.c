@@ -9,36 +9,25 @@
 #undef KFILTER_ESDQ_FW /* AN1292's */
 #define KFILTER_ESDQ_FW 164
 
-/** A value, what it must be, and by how much it may miss that. */
-typedef struct {
-    const char *what;
-    int32_t value, expected, miss;
-} value_t;
-
-#define EXACT(value, expected) { #value, value, expected, 0 }
-#define NEAR(value, expected, miss) { #value, value, expected, miss }
-#define EXPECT(table) expect_values(table, sizeof(table) / sizeof(table)[0])
-
-static void expect_values(const value_t *values, size_t count)
-{
-    for (size_t n = 0; n < count; n++) {
-        TEST_ASSERT_INT32_WITHIN_MESSAGE(values[n].miss, values[n].expected, values[n].value, values[n].what);
-    }
-}
+/* A value, what it must be, and by how much it may miss that. */
+#define NEAR(value, expected, miss) TEST_ASSERT_INT32_WITHIN_MESSAGE(miss, expected, value, #value)
+#define EXACT(value, expected) NEAR(value, expected, 0)
 
 /** The estimator's part against the reference in float64, at a full scale of the current. */
-#define EXPECT_ESTIMATOR(p, fw, scale) do { \
-    const value_t estimator[] = { \
-        EXACT((p).rs_q16, GOLDEN_PARAMS_##scale##_RS_Q16), EXACT((p).rs_exp, GOLDEN_PARAMS_##scale##_RS_EXP), \
-        EXACT((fw).ls_base_q16, GOLDEN_PARAMS_##scale##_LS_Q16), EXACT((p).ls_exp, GOLDEN_PARAMS_##scale##_LS_EXP), \
-        EXACT((p).d_ilimit_ls_q14, GOLDEN_PARAMS_##scale##_D_ILIMIT_LS_Q14), \
-        EXACT((p).d_ilimit_hs_q14, GOLDEN_PARAMS_##scale##_D_ILIMIT_HS_Q14), EXACT((p).deltat_q32, GOLDEN_PARAMS_##scale##_DELTAT_Q32), \
-        EXACT((p).half_step_q16_rad, GOLDEN_PARAMS_##scale##_HALF_STEP_Q16_RAD), \
-        EXACT((p).kfilter_velestim_q16, GOLDEN_PARAMS_##scale##_KFILTER_VELESTIM_Q16), \
-        EXACT((p).nominal_erpm, GOLDEN_PARAMS_##scale##_NOMINAL_ERPM), EXACT((p).decimate_erpm, GOLDEN_PARAMS_##scale##_DECIMATE_ERPM), \
-    }; \
-    EXPECT(estimator); \
-} while (0)
+#define EXPECT_ESTIMATOR(p, fw, scale) \
+    do { \
+        EXACT((p).rs_q16, GOLDEN_PARAMS_##scale##_RS_Q16); \
+        EXACT((p).rs_exp, GOLDEN_PARAMS_##scale##_RS_EXP); \
+        EXACT((fw).ls_base_q16, GOLDEN_PARAMS_##scale##_LS_Q16); \
+        EXACT((p).ls_exp, GOLDEN_PARAMS_##scale##_LS_EXP); \
+        EXACT((p).d_ilimit_ls_q14, GOLDEN_PARAMS_##scale##_D_ILIMIT_LS_Q14); \
+        EXACT((p).d_ilimit_hs_q14, GOLDEN_PARAMS_##scale##_D_ILIMIT_HS_Q14); \
+        EXACT((p).deltat_q32, GOLDEN_PARAMS_##scale##_DELTAT_Q32); \
+        EXACT((p).half_step_q16_rad, GOLDEN_PARAMS_##scale##_HALF_STEP_Q16_RAD); \
+        EXACT((p).kfilter_velestim_q16, GOLDEN_PARAMS_##scale##_KFILTER_VELESTIM_Q16); \
+        EXACT((p).nominal_erpm, GOLDEN_PARAMS_##scale##_NOMINAL_ERPM); \
+        EXACT((p).decimate_erpm, GOLDEN_PARAMS_##scale##_DECIMATE_ERPM); \
+    } while (0)
 
 /* ---- 3.95 A of full scale: the constants of 2012 ---- */
 #undef NORM_CURRENT_CONST
@@ -48,10 +37,10 @@ void test_constants_at_3_95_A_are_12990_1460_7956_and_1790(void)
 {
     static const estimator_params_t p = PARAM_ESTIMATOR_INIT;
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    const value_t values[] = {
-        NEAR(NORM_RS, 12990, 1), NEAR(NORM_LSDTBASE, 1460, 1), NEAR(NORM_INVKFIBASE, 7956, 1), EXACT(NORM_DELTAT, 1790)
-    };
-    EXPECT(values);
+    NEAR(NORM_RS, 12990, 1);
+    NEAR(NORM_LSDTBASE, 1460, 1);
+    NEAR(NORM_INVKFIBASE, 7956, 1);
+    EXACT(NORM_DELTAT, 1790);
     EXPECT_ESTIMATOR(p, fw, C395);
 }
 
@@ -105,8 +94,9 @@ void test_constants_at_7_09_A_are_23316_and_2620(void)
 {
     static const estimator_params_t p = PARAM_ESTIMATOR_INIT;
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    const value_t values[] = { NEAR(NORM_RS, 23316, 1), NEAR(NORM_LSDTBASE, 2620, 1), NEAR(NORM_INVKFIBASE, 7956, 1) };
-    EXPECT(values);
+    NEAR(NORM_RS, 23316, 1);
+    NEAR(NORM_LSDTBASE, 2620, 1);
+    NEAR(NORM_INVKFIBASE, 7956, 1);
     EXPECT_ESTIMATOR(p, fw, C709);
 }
 
@@ -126,26 +116,37 @@ void test_constants_at_22_A_get_exponents_and_keep_their_size(void)
 
 void test_exponents_change_where_a_word_ends_and_scaled_constants_are_rounded(void)
 {
-    const value_t values[] = {
-        EXACT(PARAM_EXP(65534.0F), 0), EXACT(PARAM_EXP(65536.0F), 1), EXACT(PARAM_EXP(131070.0F), 1), EXACT(PARAM_EXP(131072.0F), 2),
-        EXACT(PARAM_EXP(262142.0F), 2), EXACT(PARAM_EXP(262144.0F), 3), EXACT(PARAM_SCALED(10.4F, 0), 10),
-        EXACT(PARAM_SCALED(10.6F, 0), 11), EXACT(PARAM_SCALED(42.4F, 2), 11), EXACT(PARAM_SCALED(41.6F, 2), 10),
-    };
-    EXPECT(values);
+    EXACT(PARAM_EXP(65534.0F), 0);
+    EXACT(PARAM_EXP(65536.0F), 1);
+    EXACT(PARAM_EXP(131070.0F), 1);
+    EXACT(PARAM_EXP(131072.0F), 2);
+    EXACT(PARAM_EXP(262142.0F), 2);
+    EXACT(PARAM_EXP(262144.0F), 3);
+    EXACT(PARAM_SCALED(10.4F, 0), 10);
+    EXACT(PARAM_SCALED(10.6F, 0), 11);
+    EXACT(PARAM_SCALED(42.4F, 2), 11);
+    EXACT(PARAM_SCALED(41.6F, 2), 10);
 }
 
-/* ---- 0.000121 A a count: the note's NORM_CURRENT ---- */
+/* ---- 0.000121 A a count: AN1292's NORM_CURRENT ---- */
 #undef NORM_CURRENT_CONST
 #define NORM_CURRENT_CONST 0.000121
 
 void test_NORM_CURRENT_of_1_41_A_is_11653_and_Q15_rounds_as_AN1292_does(void)
 {
-    const value_t values[] = {
-        EXACT(NORM_CURRENT(1.41), 11653), NEAR(NORM_CURRENT(-1.41), -11653, 1), EXACT(Q15(1.0), 32767), EXACT(Q15(-1.0), -32768),
-        EXACT(Q15(0.5), 16384), EXACT(Q15(-0.5), -16384), EXACT(Q15(0.00001), 0), EXACT(Q15(0.00003), 1), EXACT(Q15(-0.00003), -1),
-        EXACT(PARAM_ROUND(1.5F), 2), EXACT(PARAM_ROUND(1.4F), 1), EXACT(PARAM_ROUND(-1.5F), -2), EXACT(PARAM_ROUND(-1.4F), -1),
-    };
-    EXPECT(values);
+    EXACT(NORM_CURRENT(1.41), 11653);
+    NEAR(NORM_CURRENT(-1.41), -11653, 1);
+    EXACT(Q15(1.0), 32767);
+    EXACT(Q15(-1.0), -32768);
+    EXACT(Q15(0.5), 16384);
+    EXACT(Q15(-0.5), -16384);
+    EXACT(Q15(0.00001), 0);
+    EXACT(Q15(0.00003), 1);
+    EXACT(Q15(-0.00003), -1);
+    EXACT(PARAM_ROUND(1.5F), 2);
+    EXACT(PARAM_ROUND(1.4F), 1);
+    EXACT(PARAM_ROUND(-1.5F), -2);
+    EXACT(PARAM_ROUND(-1.4F), -1);
 }
 
 /* ---- 4.4 A: shunt and amplifier in theory; the rest of the file ---- */
@@ -170,8 +171,10 @@ static int32_t radius(int16_t bus_q15)
 void test_constants_at_4_4_A_are_14470_and_1626(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
-    const value_t values[] = { EXACT(NORM_RS, 14470), EXACT(NORM_LSDTBASE, 1626), EXACT(NORM_INVKFIBASE, 7956), EXACT(NORM_DELTAT, 1790) };
-    EXPECT(values);
+    EXACT(NORM_RS, 14470);
+    EXACT(NORM_LSDTBASE, 1626);
+    EXACT(NORM_INVKFIBASE, 7956);
+    EXACT(NORM_DELTAT, 1790);
     EXPECT_ESTIMATOR(p.estimator, p.fieldweak, C440);
     TEST_ASSERT_FLOAT_WITHIN(1e-9F, 4.05949e-4F, NORM_VOLTAGE_CONST);
     TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
@@ -180,41 +183,53 @@ void test_constants_at_4_4_A_are_14470_and_1626(void)
 void test_currents_voltages_and_modulator(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
-    const value_t values[] = {
-        EXACT(CURRENT_Q13(4.4), 8192), EXACT(CURRENT_Q13(-2.2), -4096), EXACT(p.open_loop_q13, 2625), EXACT(p.current_max_q13, 5120),
-        EXACT(p.overcurrent_q13, 7075), EXACT(p.current_max_reciprocal, 6554), /* 2^25 / 5120 */
-        EXACT(p.kcurr_a, -16384), EXACT(p.kcurr_b, -16384), EXACT(p.offset_max_q13, 1024),
-        NEAR(VOLTAGE_Q14(13.3021), 16384, 1),
-        EXACT(p.bus_nominal_q15, 14895), /* 24 / 52.8 * 32768 */
-        EXACT(p.bus_regen_q15, 16756), EXACT(p.bus_over_q15, 21101), EXACT(p.bus_under_q15, 7447),
-        EXACT(p.brake_per_bus_q8, 1056), /* 5120 counts in the 1241 counts of 2 V, times 256 */
-        EXACT(p.svm.full, GOLDEN_PARAMS_SVM_FULL), EXACT(p.svm.top, GOLDEN_PARAMS_SVM_TOP),
-        EXACT(p.svm.dead_time, GOLDEN_PARAMS_SVM_DEAD_TIME), EXACT(p.svm.knee_q13, GOLDEN_PARAMS_SVM_KNEE_Q13),
-        EXACT(p.svm.dead_slope_q16, GOLDEN_PARAMS_SVM_DEAD_SLOPE_Q16), EXACT(p.svm.turn_q13, GOLDEN_PARAMS_SVM_TURN_Q13),
-        NEAR(duty_per_volt(BUS_Q15(24.0)), GOLDEN_PARAMS_DUTY_PER_VOLT_24, 1),
-        NEAR(duty_per_volt(BUS_Q15(12.0)), GOLDEN_PARAMS_DUTY_PER_VOLT_12, 2),
-        NEAR(radius(BUS_Q15(24.0)), GOLDEN_PARAMS_RADIUS_24, 1), NEAR(radius(BUS_Q15(34.0)), GOLDEN_PARAMS_RADIUS_34, 1),
-    };
-    EXPECT(values);
+    EXACT(CURRENT_Q13(4.4), 8192);
+    EXACT(CURRENT_Q13(-2.2), -4096);
+    EXACT(p.open_loop_q13, 2625);
+    EXACT(p.current_max_q13, 5120);
+    EXACT(p.overcurrent_q13, 7075);
+    EXACT(p.current_max_reciprocal, 6554); /* 2^25 / 5120 */
+    EXACT(p.kcurr_a, -16384);
+    EXACT(p.kcurr_b, -16384);
+    EXACT(p.offset_max_q13, 1024);
+    NEAR(VOLTAGE_Q14(13.3021), 16384, 1);
+    EXACT(p.bus_nominal_q15, 14895); /* 24 / 52.8 * 32768 */
+    EXACT(p.bus_regen_q15, 16756);
+    EXACT(p.bus_over_q15, 21101);
+    EXACT(p.bus_under_q15, 7447);
+    EXACT(p.brake_per_bus_q8, 1056); /* 5120 counts in the 1241 counts of 2 V, times 256 */
+    EXACT(p.svm.full, GOLDEN_PARAMS_SVM_FULL);
+    EXACT(p.svm.top, GOLDEN_PARAMS_SVM_TOP);
+    EXACT(p.svm.dead_time, GOLDEN_PARAMS_SVM_DEAD_TIME);
+    EXACT(p.svm.knee_q13, GOLDEN_PARAMS_SVM_KNEE_Q13);
+    EXACT(p.svm.dead_slope_q16, GOLDEN_PARAMS_SVM_DEAD_SLOPE_Q16);
+    EXACT(p.svm.turn_q13, GOLDEN_PARAMS_SVM_TURN_Q13);
+    NEAR(duty_per_volt(BUS_Q15(24.0)), GOLDEN_PARAMS_DUTY_PER_VOLT_24, 1);
+    NEAR(duty_per_volt(BUS_Q15(12.0)), GOLDEN_PARAMS_DUTY_PER_VOLT_12, 2);
+    NEAR(radius(BUS_Q15(24.0)), GOLDEN_PARAMS_RADIUS_24, 1);
+    NEAR(radius(BUS_Q15(34.0)), GOLDEN_PARAMS_RADIUS_34, 1);
 }
 
 void test_speeds_and_times(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
-    const value_t values[] = {
-        EXACT(p.minimum_erpm, 2500), EXACT(p.nominal_erpm, 14000), EXACT(p.maximum_erpm, 27500), EXACT(p.end_erpm, 5000),
-        EXACT(p.fieldweak.on_speed_erpm, 13000), EXACT(p.forced.end_speed_q10, 279620), EXACT(p.forced.increase_rate_q10, 10),
-        EXACT(SPEEDREFRAMP, 8),              /* 4000 rpm a second */
-        EXACT(p.ramp_hold_erpm, 1750),       /* an eighth of nominal speed */
-        EXACT(TUNING_STEP_Q16, 32768),       /* one electrical rpm every 16 periods: half of one in eight */
-        EXACT(p.bootstrap_periods, 200),     /* 10 ms */
-        EXACT(p.lock_periods, 4000), EXACT((int32_t)p.lock_sweep_q32, 0x40000000 / 2000), /* a quarter turn in half the time */
-        EXACT(p.ready_slots, 50),            /* 20 ms */
-        EXACT(p.ready_timeout_slots, 500),   /* 200 ms */
-        EXACT(p.stall_slots, 750),           /* 0.3 s */
-        EXACT(p.lost_lock_slots, 125),       /* 50 ms */
-    };
-    EXPECT(values);
+    EXACT(p.minimum_erpm, 2500);
+    EXACT(p.nominal_erpm, 14000);
+    EXACT(p.maximum_erpm, 27500);
+    EXACT(p.end_erpm, 5000);
+    EXACT(p.fieldweak.on_speed_erpm, 13000);
+    EXACT(p.forced.end_speed_q10, 279620);
+    EXACT(p.forced.increase_rate_q10, 10);
+    EXACT(SPEEDREFRAMP, 8);          /* 4000 rpm a second */
+    EXACT(p.ramp_hold_erpm, 1750);   /* an eighth of nominal speed */
+    EXACT(TUNING_STEP_Q16, 32768);   /* one electrical rpm every 16 periods: half of one in eight */
+    EXACT(p.bootstrap_periods, 200); /* 10 ms */
+    EXACT(p.lock_periods, 4000);
+    EXACT((int32_t)p.lock_sweep_q32, 0x40000000 / 2000); /* a quarter turn in half the time */
+    EXACT(p.ready_slots, 50);                            /* 20 ms */
+    EXACT(p.ready_timeout_slots, 500);                   /* 200 ms */
+    EXACT(p.stall_slots, 750);                           /* 0.3 s */
+    EXACT(p.lost_lock_slots, 125);                       /* 50 ms */
 }
 
 void test_controllers(void)
@@ -223,34 +238,40 @@ void test_controllers(void)
 #define GIVEN_ITERM 0.002
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     static const pi_gains_t given = PARAM_PI_INIT(GIVEN_PTERM, PARAM_CURRENT_KI(GIVEN_ITERM), 0.999, CURRENT_PI_SHIFT);
-    const value_t values[] = {
-        /* 2 pi 800 L = 9.651 V/A is 3.1923 full scales, 2 pi 800 R Ts = 0.6710 V/A is 0.22196; both times 2^11 */
-        EXACT(p.pi_d.kp, 6538), EXACT(p.pi_q.kp, 6538), EXACT(p.pi_d.ki, 455), EXACT(p.pi_q.ki, 455),
-        EXACT(p.pi_d.kc, 32734), EXACT(p.pi_q.kc, 32734), /* 0.999 */
-        EXACT(p.pi_d.shift, 10), EXACT(p.pi_q.shift, 10),
-        /* Kp = 2 pi 25 J/Kt = 0.014429 A s/rad = 0.56265 counts Q13 per electrical rpm, times 2^13; Ki = Kp 2 pi 25/3 400 us */
-        NEAR(p.pi_speed.kp, 4609, 2), NEAR(p.pi_speed.ki, 96, 1), EXACT(p.pi_speed.shift, 13),
-        EXACT(given.kp, 655), /* 16 * 0.02 of full scale: 0.64 Q14 counts per Q13 count, times 2^10 */
-        EXACT(given.ki, 4),
-        EXACT(PARAM_SPEED_KI(0.01), 164), /* eight periods a step */
-    };
-    EXPECT(values);
+    /* 2 pi 800 L = 9.651 V/A is 3.1923 full scales, 2 pi 800 R Ts = 0.6710 V/A is 0.22196; both times 2^11 */
+    EXACT(p.pi_d.kp, 6538);
+    EXACT(p.pi_q.kp, 6538);
+    EXACT(p.pi_d.ki, 455);
+    EXACT(p.pi_q.ki, 455);
+    EXACT(p.pi_d.kc, 32734);
+    EXACT(p.pi_q.kc, 32734); /* 0.999 */
+    EXACT(p.pi_d.shift, 10);
+    EXACT(p.pi_q.shift, 10);
+    /* Kp = 2 pi 25 J/Kt = 0.014429 A s/rad = 0.56265 counts Q13 per electrical rpm, times 2^13; Ki = Kp 2 pi 25/3 400 us */
+    NEAR(p.pi_speed.kp, 4609, 2);
+    NEAR(p.pi_speed.ki, 96, 1);
+    EXACT(p.pi_speed.shift, 13);
+    EXACT(given.kp, 655); /* 16 * 0.02 of full scale: 0.64 Q14 counts per Q13 count, times 2^10 */
+    EXACT(given.ki, 4);
+    EXACT(PARAM_SPEED_KI(0.01), 164); /* eight periods a step */
 }
 
 void test_field_weakening(void)
 {
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    const value_t values[] = {
-        EXACT(fw.trim_step_q13, 2),      /* 2.7 A a second: 1.07 mA in 400 us */
-        EXACT(fw.trim_max_q13, 1489),    /* 0.8 A */
-        NEAR(fw.margin_q14, 296, 1),     /* a hundredth of the bus */
-        EXACT(fw.trim_speed_erpm, 7800), /* 60 % of the start speed */
-        EXACT(fw.kfilter_esdq_q16, 2400), EXACT(fw.kfilter_esdq_fw_q16, 328), /* twice AN1292's Q15 */
-        EXACT(fw.idref_q13[0], 0), EXACT(fw.idref_q13[7], CURRENT_Q13(IDREF_SPEED7)), EXACT(fw.idref_q13[17], CURRENT_Q13(IDREF_SPEED17)),
-        EXACT(fw.inv_kfi[0], NORM_INVKFIBASE), EXACT(fw.inv_kfi[17], NORM_INVKFIBASE),
-        EXACT(fw.ls_over2ls0_q15[0], 16384), EXACT(fw.ls_over2ls0_q15[17], 16384),
-    };
-    EXPECT(values);
+    EXACT(fw.trim_step_q13, 2);      /* 2.7 A a second: 1.07 mA in 400 us */
+    EXACT(fw.trim_max_q13, 1489);    /* 0.8 A */
+    NEAR(fw.margin_q14, 296, 1);     /* a hundredth of the bus */
+    EXACT(fw.trim_speed_erpm, 7800); /* 60 % of the start speed */
+    EXACT(fw.kfilter_esdq_q16, 2400);
+    EXACT(fw.kfilter_esdq_fw_q16, 328); /* twice AN1292's Q15 */
+    EXACT(fw.idref_q13[0], 0);
+    EXACT(fw.idref_q13[7], CURRENT_Q13(IDREF_SPEED7));
+    EXACT(fw.idref_q13[17], CURRENT_Q13(IDREF_SPEED17));
+    EXACT(fw.inv_kfi[0], NORM_INVKFIBASE);
+    EXACT(fw.inv_kfi[17], NORM_INVKFIBASE);
+    EXACT(fw.ls_over2ls0_q15[0], 16384);
+    EXACT(fw.ls_over2ls0_q15[17], 16384);
 }
 
 /* ---- tables ---- */
@@ -283,11 +304,13 @@ void test_every_table_entry_has_its_own_parameter(void)
 void test_loop_time_scales_every_time_and_duty(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
-    const value_t values[] = {
-        EXACT(p.bootstrap_periods, 100), EXACT(p.stall_slots, 375), EXACT(p.svm.full, 4000), EXACT(p.svm.dead_time, 80), /* the same 2 us */
-        EXACT(p.svm.top, 3872), EXACT(p.estimator.deltat_q32, 7158), EXACT(p.speed_ramp_erpm, 16),
-    };
-    EXPECT(values);
+    EXACT(p.bootstrap_periods, 100);
+    EXACT(p.stall_slots, 375);
+    EXACT(p.svm.full, 4000);
+    EXACT(p.svm.dead_time, 80); /* the same 2 us */
+    EXACT(p.svm.top, 3872);
+    EXACT(p.estimator.deltat_q32, 7158);
+    EXACT(p.speed_ramp_erpm, 16);
 }
 
 /* ---- another motor: 4 pole pairs, 15 kHz, 48 V ---- */
@@ -304,12 +327,11 @@ void test_constants_follow_period_bus_and_pole_pairs(void)
 {
     /* U0 = 48 V / sqrt(3) * (1 - 1/66.667) / 32768 */
     TEST_ASSERT_FLOAT_WITHIN(2e-9F, 8.330420e-4F, NORM_VOLTAGE_CONST);
-    const value_t values[] = {
-        NEAR(NORM_DELTAT, 2386, 1),
-        NEAR(NORM_RS, 7051, 1),          /* 2.67 * I0/U0 * 2^14 */
-        NEAR(NORM_LSDTBASE, 594, 1),     /* 1.92 mH / 66.667 us * I0/U0 * 2^7 */
-        NEAR(NORM_INVKFIBASE, 13061, 1), /* sqrt(3) * 4000 * U0 / 7.24 * 2^14 */
-        EXACT(PWM_FULL_DUTY, 2667), EXACT(DEAD_TIME_DUTY, 40), EXACT(NOMINAL_SPEED_ERPM, 11200),
-    };
-    EXPECT(values);
+    NEAR(NORM_DELTAT, 2386, 1);
+    NEAR(NORM_RS, 7051, 1);          /* 2.67 * I0/U0 * 2^14 */
+    NEAR(NORM_LSDTBASE, 594, 1);     /* 1.92 mH / 66.667 us * I0/U0 * 2^7 */
+    NEAR(NORM_INVKFIBASE, 13061, 1); /* sqrt(3) * 4000 * U0 / 7.24 * 2^14 */
+    EXACT(PWM_FULL_DUTY, 2667);
+    EXACT(DEAD_TIME_DUTY, 40);
+    EXACT(NOMINAL_SPEED_ERPM, 11200);
 }

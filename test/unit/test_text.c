@@ -19,8 +19,7 @@ void test_texts_and_numbers_end_where_the_next_one_begins(void)
         const char *text;
         int32_t number;
     } cases[] = {
-        { "0", 0 }, { "7", 7 }, { "10", 10 }, { "909", 909 }, { "1234", 1234 }, { "32767", 32767 }, { "65535", 65535 },
-        { "-1", -1 }, { "-6553", -6553 }
+        { "0", 0 }, { "7", 7 }, { "10", 10 }, { "909", 909 }, { "1234", 1234 }, { "32767", 32767 }, { "65535", 65535 }, { "-1", -1 }
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         char buffer[8] = "#######";
