@@ -11,7 +11,7 @@
 
 /* A value, what it must be, and by how much it may miss that. */
 #define NEAR(value, expected, miss) TEST_ASSERT_INT32_WITHIN_MESSAGE(miss, expected, value, #value)
-#define EXACT(value, expected) NEAR(value, expected, 0)
+#define EXACT(value, expected) TEST_ASSERT_EQUAL_INT32_MESSAGE(expected, value, #value)
 
 /** The estimator's part against the reference in float64, at a full scale of the current. */
 #define EXPECT_ESTIMATOR(p, fw, scale) \
