@@ -16,10 +16,10 @@ static int bench_fast;
 
 /** What a measurement over some time gives. */
 typedef struct {
-    double rpm, rpm_min, rpm_max;        /**< true speed */
+    double rpm, rpm_min, rpm_max;           /**< true speed */
     double i_rms_a, i_d_a, i_q_a, i_peak_a; /**< true phase current (RMS), d and q current (means), longest current vector */
-    double angle_mean_deg, angle_rms_deg; /**< estimated minus true rotor angle */
-    double bus_max_v, v_max_share;       /**< highest bus; longest commanded vector over the voltage circle */
+    double angle_mean_deg, angle_rms_deg;   /**< estimated minus true rotor angle */
+    double bus_max_v, v_max_share;          /**< highest bus; longest commanded vector over the voltage circle */
 } measured_t;
 
 static inline void set(const char *key, double value)
@@ -104,7 +104,8 @@ static inline measured_t measure(double seconds)
     size_t rows, cols;
     double angle2 = 0.0;
     TEST_ASSERT_EQUAL_INT(0, vb_trace_config(bench, "plant.speed_rpm plant.i_d plant.i_q plant.theta_e_deg fw.theta_est_deg "
-                                                    "bus.voltage_v fw.v_d_v fw.v_q_v fw.v_limit_v", 3));
+                                                    "bus.voltage_v fw.v_d_v fw.v_q_v fw.v_limit_v",
+                                             3));
     wait_s(seconds);
     const float *row = vb_trace_data(bench, &rows, &cols);
     TEST_ASSERT_EQUAL_UINT(9, cols);
@@ -177,8 +178,10 @@ static inline double seconds_to_fault(double limit)
     return get("time_s") - begin;
 }
 
+/** A new board; the last test's goes. */
 static inline void bench_set_up(void)
 {
+    vb_destroy(bench);
     bench = vb_create();
     TEST_ASSERT_NOT_NULL(bench);
     bench_fast = 0;
@@ -199,12 +202,6 @@ static inline void supply_v(double volts)
 {
     set("supply.voltage_v", volts);
     set("bus.voltage_v", volts);
-}
-
-static inline void bench_tear_down(void)
-{
-    vb_destroy(bench);
-    bench = NULL;
 }
 
 #endif

@@ -17,11 +17,6 @@ void setUp(void)
     bench_set_up();
 }
 
-void tearDown(void)
-{
-    bench_tear_down();
-}
-
 void test_reaches_5500_rpm_without_load(void)
 {
     run_at(5500.0);

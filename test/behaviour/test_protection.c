@@ -6,61 +6,40 @@ void setUp(void)
     bench_set_up();
 }
 
-void tearDown(void)
+void test_each_cause_trips_in_time_and_its_fault_stays_until_s2(void)
 {
-    bench_tear_down();
-}
-
-static void cause_away_fault_stays_until_s2(drive_fault_t fault)
-{
-    wait_s(0.3);
-    assert_fault(fault);
-    set("state.speed_rpm", 0.0);
-    press("input.s2");
-    TEST_ASSERT_EQUAL_INT(FAULT_NONE, board_drive.fault);
-    wait_s(0.3);
-    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
-    assert_outputs_off();
-}
-
-/** At a speed, a cause makes its fault in time; the fault stays when the cause is gone, until S2. */
-static void trips(double rpm, const char *cause, double value, double limit_s, drive_fault_t fault)
-{
-    run_at(rpm);
-    double before = get(cause);
-    set(cause, value);
-    TEST_ASSERT_TRUE(seconds_to_fault(2.0 * limit_s) < limit_s);
-    assert_fault(fault);
-    set(cause, before);
-    set("bus.voltage_v", 24.0);
-    cause_away_fault_stays_until_s2(fault);
-}
-
-void test_fault_input_switches_off_within_a_period(void)
-{
-    trips(1500.0, "input.flta", 1.0, 0.00006, FAULT_OVERCURRENT_HW);
-}
-
-void test_phase_current_above_the_threshold_trips_in_software(void)
-{
-    set("load.constant_nm", 0.05);
-    set("inverter.trip_a", 0.0);
-    trips(1500.0, "shunt.gain_v_per_a", 0.375 * 5.0, 0.015, FAULT_OVERCURRENT_SW); /* the amplifier shows five times the current */
-}
-
-void test_over_voltage_trips(void)
-{
-    trips(1500.0, "supply.voltage_v", OVER_VOLTAGE_V + 2.0, 0.05, FAULT_OVERVOLTAGE);
-}
-
-void test_under_voltage_trips_while_running(void)
-{
-    trips(800.0, "supply.voltage_v", UNDER_VOLTAGE_V - 2.0, 0.4, FAULT_UNDERVOLTAGE);
-}
-
-void test_late_interrupt_trips(void)
-{
-    trips(1500.0, "cpu.isr_us", 24.0, 0.0005, FAULT_ISR_OVERRUN);
+    static const struct {
+        const char *cause;
+        double rpm, value, limit_s;
+        drive_fault_t fault;
+    } cases[] = {
+        { "input.flta", 1500.0, 1.0, 0.00006, FAULT_OVERCURRENT_HW }, /* within a period */
+        { "supply.voltage_v", 1500.0, OVER_VOLTAGE_V + 2.0, 0.05, FAULT_OVERVOLTAGE },
+        { "supply.voltage_v", 800.0, UNDER_VOLTAGE_V - 2.0, 0.4, FAULT_UNDERVOLTAGE },
+        { "cpu.isr_us", 1500.0, 24.0, 0.0005, FAULT_ISR_OVERRUN },
+        { "shunt.gain_v_per_a", 1500.0, 0.375 * 5.0, 0.015, FAULT_OVERCURRENT_SW }, /* the amplifier shows five times the current */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        if (cases[i].fault == FAULT_OVERCURRENT_SW) {
+            set("load.constant_nm", 0.05);
+            set("inverter.trip_a", 0.0);
+        }
+        run_at(cases[i].rpm);
+        double before = get(cases[i].cause);
+        set(cases[i].cause, cases[i].value);
+        TEST_ASSERT_TRUE_MESSAGE(seconds_to_fault(2.0 * cases[i].limit_s) < cases[i].limit_s, cases[i].cause);
+        assert_fault(cases[i].fault);
+        set(cases[i].cause, before);
+        set("bus.voltage_v", 24.0);
+        wait_s(0.3);
+        assert_fault(cases[i].fault);
+        set("state.speed_rpm", 0.0);
+        press("input.s2");
+        TEST_ASSERT_EQUAL_INT_MESSAGE(FAULT_NONE, board_drive.fault, cases[i].cause);
+        wait_s(0.3);
+        TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
+        assert_outputs_off();
+    }
 }
 
 void test_under_voltage_at_rest_is_no_fault(void)
@@ -71,21 +50,16 @@ void test_under_voltage_at_rest_is_no_fault(void)
     TEST_ASSERT_EQUAL_INT(FAULT_NONE, board_drive.fault);
 }
 
-void test_shaft_blocked_while_running_faults_as_stall_or_lost_lock(void)
+void test_shaft_blocked_while_running_and_in_field_weakening_faults_as_stall_or_lost_lock(void)
 {
-    run_at(2000.0);
-    set("load.locked", 1.0);
-    TEST_ASSERT_TRUE(seconds_to_fault(1.0) < 0.5);
-    TEST_ASSERT_TRUE(board_drive.fault == FAULT_STALL || board_drive.fault == FAULT_LOST_LOCK);
-    assert_outputs_off();
-}
-
-void test_shaft_blocked_in_field_weakening_faults(void)
-{
-    run_at(5000.0);
-    set("load.locked", 1.0);
-    TEST_ASSERT_TRUE(seconds_to_fault(1.0) < 0.5);
-    assert_outputs_off();
+    for (double rpm = 2000.0; rpm <= 5000.0; rpm += 3000.0) {
+        run_at(rpm);
+        set("load.locked", 1.0);
+        TEST_ASSERT_TRUE(seconds_to_fault(1.0) < 0.5);
+        TEST_ASSERT_TRUE(rpm > 2000.0 || board_drive.fault == FAULT_STALL || board_drive.fault == FAULT_LOST_LOCK);
+        assert_outputs_off();
+        set("load.locked", 0.0);
+    }
 }
 
 void test_interrupt_that_stays_away_switches_off(void)

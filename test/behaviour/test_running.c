@@ -6,11 +6,6 @@ void setUp(void)
     bench_set_up();
 }
 
-void tearDown(void)
-{
-    bench_tear_down();
-}
-
 void test_holds_every_speed_to_half_a_percent(void)
 {
     static const double speeds[] = { 500.0, 750.0, 1000.0, 1500.0, 2000.0, 2500.0, 2800.0 };
@@ -119,43 +114,29 @@ void test_ripple_on_the_bus_does_not_reach_the_speed(void)
     (void)assert_holds(2000.0, 0.2);
 }
 
-/** Holds 1400 rpm under a load with another value of the plant. */
-static void runs_with(const char *key, double value, double nm, double angle_limit_deg)
+void test_tolerates_a_motor_and_a_board_that_differ_from_what_it_assumes(void)
 {
-    char what[64];
-    double nominal = get(key);
-    set(key, value);
-    (void)snprintf(what, sizeof what, "%s = %g", key, value);
-    TEST_ASSERT_TRUE_MESSAGE(assert_holds_under_load(1400.0, nm).angle_rms_deg < angle_limit_deg, what);
-    set(key, nominal);
-}
-
-void test_tolerates_a_resistance_wrong_by_30_percent(void)
-{
-    runs_with("motor.rs_ohm", 0.7 * get("motor.rs_ohm"), 0.03, 12.0);
-    runs_with("motor.rs_ohm", 1.3 * get("motor.rs_ohm"), 0.03, 12.0);
-}
-
-void test_tolerates_an_inductance_wrong_by_30_percent(void)
-{
-    runs_with("motor.lq_h", 0.7 * get("motor.lq_h"), 0.03, 8.0);
-    runs_with("motor.lq_h", 1.3 * get("motor.lq_h"), 0.03, 8.0);
-}
-
-void test_tolerates_a_flux_wrong_by_15_percent(void)
-{
-    runs_with("motor.psi_vs", 0.85 * get("motor.psi_vs"), 0.03, 16.0);
-    runs_with("motor.psi_vs", 1.15 * get("motor.psi_vs"), 0.03, 16.0);
-}
-
-void test_runs_with_three_times_the_noise(void)
-{
-    runs_with("adc.noise_lsb", 1.5, 0.0, 5.0);
-}
-
-void test_runs_hot(void)
-{
-    runs_with("motor.temp_c", 100.0, 0.04, 20.0);
+    static const struct {
+        const char *key;
+        double times, nm, angle_limit_deg;
+    } cases[] = {
+        { "motor.rs_ohm", 0.7, 0.03, 12.0 },
+        { "motor.rs_ohm", 1.3, 0.03, 12.0 },
+        { "motor.lq_h", 0.7, 0.03, 8.0 },
+        { "motor.lq_h", 1.3, 0.03, 8.0 },
+        { "motor.psi_vs", 0.85, 0.03, 16.0 },
+        { "motor.psi_vs", 1.15, 0.03, 16.0 },
+        { "adc.noise_lsb", 3.0, 0.0, 5.0 },
+        { "motor.temp_c", 4.0, 0.04, 20.0 }, /* 100 degrees */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char what[64];
+        double nominal = get(cases[i].key);
+        set(cases[i].key, nominal * cases[i].times);
+        (void)snprintf(what, sizeof what, "%s = %g", cases[i].key, nominal * cases[i].times);
+        TEST_ASSERT_TRUE_MESSAGE(assert_holds_under_load(1400.0, cases[i].nm).angle_rms_deg < cases[i].angle_limit_deg, what);
+        set(cases[i].key, nominal);
+    }
 }
 
 void test_wrong_kphi_turns_the_angle_by_the_law(void)

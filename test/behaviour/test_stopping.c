@@ -6,43 +6,25 @@ void setUp(void)
     bench_set_up();
 }
 
-void tearDown(void)
+void test_stops_in_order_from_every_speed(void)
 {
-    bench_tear_down();
-}
-
-static void stops_in_order_from(double rpm, double limit_s)
-{
-    double begin;
-    run_at(rpm);
-    set("stat.reset", 1.0);
-    begin = get("time_s");
-    press("input.s2");
-    while (board_drive.state != DRIVE_STOPPED && get("time_s") < begin + limit_s) {
-        wait_s(0.0005);
+    static const double cases[][2] = { { 600.0, 0.5 }, { 2800.0, 1.0 }, { 5500.0, 2.0 } }; /* rpm, seconds at most */
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        run_at(cases[i][0]);
+        set("stat.reset", 1.0);
+        double begin = get("time_s");
+        press("input.s2");
+        while (board_drive.state != DRIVE_STOPPED && get("time_s") < begin + cases[i][1]) {
+            wait_s(0.0005);
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(FAULT_NONE, board_drive.fault, vb_fault_name((int)board_drive.fault));
+        TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
+        TEST_ASSERT_TRUE(get("state.speed_rpm") < MINIMUM_SPEED_RPM * 1.1); /* slow enough to let go */
+        assert_outputs_off();
+        wait_s(0.3);
+        TEST_ASSERT_TRUE(get("stat.bus_max_v") < 30.0);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, get("state.speed_rpm"));
     }
-    TEST_ASSERT_EQUAL_INT_MESSAGE(FAULT_NONE, board_drive.fault, vb_fault_name((int)board_drive.fault));
-    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
-    TEST_ASSERT_TRUE(get("state.speed_rpm") < MINIMUM_SPEED_RPM * 1.1); /* slow enough to let go */
-    assert_outputs_off();
-    wait_s(0.3);
-    TEST_ASSERT_TRUE(get("stat.bus_max_v") < 30.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, get("state.speed_rpm"));
-}
-
-void test_stops_in_order_from_low_speed(void)
-{
-    stops_in_order_from(600.0, 0.5);
-}
-
-void test_stops_in_order_from_nominal_speed(void)
-{
-    stops_in_order_from(2800.0, 1.0);
-}
-
-void test_stops_in_order_from_field_weakening(void)
-{
-    stops_in_order_from(5500.0, 2.0);
 }
 
 void test_braking_a_heavy_rotor_keeps_the_bus_below_30_V(void)

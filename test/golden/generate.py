@@ -33,27 +33,24 @@ class Vectors:
         self.real += list(real)
         self.model += list(model)
 
-    def add(self, arguments, out, real):
-        """A row: arguments and the model's results; the results in float64 are compared."""
+    def add(self, arguments, out, real, compared=None):
+        """A row: arguments and the model's results; they, or what is compared of them, against float64."""
         self.rows.append([*arguments, *out])
-        self.compare(real, out)
+        self.compare(real, out if compared is None else compared)
 
     def ratio_db(self):
         noise = math.fsum((r - m) ** 2 for r, m in zip(self.real, self.model))
         return 10 * math.log10(math.fsum(r * r for r in self.real) / noise) if noise else math.inf
 
     def text(self):
-        lines = [f"# {self.what}", f"# format: {self.format}", "# tolerance: 0 LSB"]
+        ratio = "not applicable, exact by definition"
         if self.real:
             db = self.ratio_db()
             if db < self.least_db:
-                raise ValueError(f"{self.name}: the integer model has {db:.1f} dB against float64, "
-                                 f"at least {self.least_db} dB are asserted")
-            lines.append(f"# signal to noise: {db:.1f} dB of the exact integers against float64, "
-                         f"at least {self.least_db:g} dB")
-        else:
-            lines.append("# signal to noise: not applicable, exact by definition")
-        lines += [f"# constant {name} = {value}" for name, value in self.constants.items()]
+                raise ValueError(f"{self.name}: the integer model has {db:.1f} dB against float64, at least {self.least_db} are asserted")
+            ratio = f"{db:.1f} dB of the exact integers against float64, at least {self.least_db:g} dB"
+        lines = [f"# {self.what}", f"# format: {self.format}", "# tolerance: 0 LSB", f"# signal to noise: {ratio}",
+                 *(f"# constant {name} = {value}" for name, value in self.constants.items())]
         if self.rows:
             lines.append(f"# columns: {self.columns}")
             lines += [" ".join(str(x) for x in row) for row in self.rows]
@@ -127,8 +124,7 @@ def lowpass(v, rng):
         xs = [32767] * 60 + [-32768] * 60 + [0] * 30 + [1] * 10 + [-1] * 10 + dither(rng, -20000, 20000, 50)
         for n, x in enumerate(xs):
             y, real = ref.lowpass(y, x, k), ref.lowpass_real(real, x, k / 65536)
-            v.rows.append([int(n == 0), k, x, y])
-            v.compare([real], [y / 65536])
+            v.add([int(n == 0), k, x], [y], [real], [y / 65536])
 
 
 # ---- sine, circle, transformations ----------------------------------------------------------------------------------
@@ -226,8 +222,7 @@ def svm(v, rng):
                     currents.append(-sum(currents))
                 a, b, c = ref.svm(p, alpha, beta, gain, currents)
                 ra, rb, rc = ref.svm_real(p, alpha, beta, gain, currents)
-                v.rows.append([alpha, beta, gain, *currents, a, b, c])
-                v.compare([ra - rb, rb - rc], [a - b, b - c])
+                v.add([alpha, beta, gain, *currents], [a, b, c], [ra - rb, rb - rc], [a - b, b - c])
 
 
 # ---- controllers ----------------------------------------------------------------------------------------------------
@@ -295,8 +290,7 @@ def current_control(v, rng):
             out = ref.current_control(pi_d, pi_q, (ref_d, ref_q), meas, radius)
             v_d = real_d.tick(ref_d - meas[0], ref.vd_limit(radius))
             limit = ref.vq_limit_real(radius, v_d)
-            v.compare([v_d, real_q.tick(ref_q - meas[1], limit), limit], out)
-            v.rows.append([ref_d, ref_q, *meas, radius, *out])
+            v.add([ref_d, ref_q, *meas, radius], out, [v_d, real_q.tick(ref_q - meas[1], limit), limit])
             d += 0.02 * out[0] - 0.07 * d       # a plant of first order that cannot follow everything
             q += 0.02 * (out[1] - 9000) - 0.07 * q
 
@@ -324,11 +318,9 @@ def profile(points):
     return out + [points[-1][1]]
 
 
-ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); rows from closed_from on "
-                    "in the frame of estimator_next_angle(); omega electrical rpm; rho upper word after the tick; the ratio is "
-                    "that of omega and of the angle in steady state")
-
-
+ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulator after this tick); rows from closed_from on in the "
+                    "frame of estimator_next_angle(); omega electrical rpm; rho upper word after the tick; the ratio is that of omega "
+                    "and of the angle in steady state")
 ESTIMATOR_COLUMNS = "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16"
 
 
@@ -441,8 +433,7 @@ def fieldweak(v, rng):
         if x > 32767:
             continue
         out = ref.fieldweak(PUBLISHED, on_speed, ls_base, x)
-        v.rows.append([x, *out])
-        v.compare(ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[4]])
+        v.add([x], out, ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[4]])
 
 
 @block("start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, every 499th period",
@@ -459,8 +450,8 @@ def forced_angle(v, _):
             exact_speed = min(exact_speed + rate, exact_end)
             exact += exact_speed / 1024
             if tick % 499 == 1 or 27960 <= tick <= 27964:
-                v.rows.append([direction, tick, speed, angle, at_end])
-                v.compare([exact], [exact + ref.wrap16(round(direction * angle / 65536 - exact) % 65536)])
+                nearest = exact + ref.wrap16(round(direction * angle / 65536 - exact) % 65536)
+                v.add([direction, tick], [speed, angle, at_end], [exact], [nearest])
 
 
 @block("reference ramp: far, nearer than two steps (snap), exactly two steps, across zero, at the ends of the range",
@@ -488,8 +479,7 @@ def hand_over(v, rng):
         u = cmath.rect(rng.uniform(500, 15000), rng.uniform(0, 6.3))
         args = (forced, (forced - offset) % 65536, (round(u.real), round(u.imag)), rng.choice((-2625, 2625)))
         out = ref.hand_over(*args)
-        v.rows.append([args[0], args[1], *args[2], args[3], *out])
-        v.compare(ref.hand_over_real(*args), out[1:])
+        v.add([args[0], args[1], *args[2], args[3]], out, ref.hand_over_real(*args), out[1:])
 
 
 @block("constants of Equations 5 to 8 for the note's motor with four current ranges (A * 100 in the name)",
@@ -506,32 +496,21 @@ def params(v, _):
             if any(abs(a - b) > 1 for a, b in zip(rounded, published[key])):
                 raise ValueError(f"params: {rounded} are not the published {published[key]}")
             v.constants[f"{key}_norm_rs"], v.constants[f"{key}_norm_ls"] = published[key]
-        for name, value in m.estimator().items():
-            v.constants[f"{key}_{name}"] = value
+        v.constants |= {f"{key}_{name}": value for name, value in m.estimator().items()}
     m = MACHINE
-    v.constants["norm_deltat"] = ref.nearest(m.turns_per_erpm * 2 ** 31)
-    v.constants["norm_invkfi"] = ref.nearest(m.inv_kfi * 16384)
-    v.constants["norm_current_141_at_121"] = ref.q15(1.41 / 0.000121 / 32768)
-    v.constants["end_speed_q10"] = round(1000 * 5 * 50e-6 / 60 * 65536 * 1024)
-    for name, value in m.modulator().items():
-        v.constants[f"svm_{name}"] = value
-    v.constants["duty_per_volt_24"] = m.duty_per_volt_q16(24.0)
-    v.constants["duty_per_volt_12"] = m.duty_per_volt_q16(12.0)
-    v.constants["radius_24"] = m.circle_radius_q14(24.0)
-    v.constants["radius_34"] = m.circle_radius_q14(34.0)
+    v.constants |= {"norm_deltat": ref.nearest(m.turns_per_erpm * 2 ** 31), "norm_invkfi": ref.nearest(m.inv_kfi * 16384),
+                    "norm_current_141_at_121": ref.q15(1.41 / 0.000121 / 32768),
+                    "end_speed_q10": round(1000 * 5 * 50e-6 / 60 * 65536 * 1024),
+                    **{f"svm_{name}": value for name, value in m.modulator().items()},
+                    "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
+                    "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="compare with the committed files instead of writing them")
-    parser.add_argument("--ratios", action="store_true", help="print the signal-to-noise table")
     options = parser.parse_args()
-    vectors = [make() for make in BLOCKS]
-    texts = {f"{v.name}.txt": v.text() for v in vectors}
-    if options.ratios:
-        for v in vectors:
-            ratio = f"{v.ratio_db():6.1f} dB, at least {v.least_db:g}" if v.real else "exact by definition"
-            print(f"{v.name:20s} {len(v.rows):5d} rows  {ratio}")
+    texts = {f"{v.name}.txt": v.text() for v in (make() for make in BLOCKS)}
     folder = HERE / "vectors"
     folder.mkdir(exist_ok=True)
     committed = {p.name: p.read_text(encoding="ascii") for p in folder.glob("*.txt")}

@@ -6,6 +6,7 @@ is floor(product / 65536), and every intermediate result is checked against the 
 where a format says so (angles). Equation numbers are AN1292's in their corrected form, see docs/architecture.md.
 """
 
+import cmath
 import math
 from dataclasses import dataclass, field
 
@@ -487,14 +488,14 @@ class EstimatorReal:
             limit = m.current_step(m.nominal_rpm, 8) * m.i0
             change = i - self.history[0]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
-            change *= _unit(clamp(3.5 * step * rad, -0.5, 0.5))
+            change *= cmath.rect(1.0, clamp(3.5 * step * rad, -0.5, 0.5))
         else:
             limit = m.current_step(m.maximum_rpm) * m.i0
             change = i - self.history[-1]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit))
         e = sum(self.v) / 2 - m.rs_ohm * (i + self.history[-1]) / 2 - m.ls_h / m.period_s * change
         self.history = self.history[1:] + [i]
-        e_dq = e * _unit(-rad * ((self.frame - step / 2) if closed else self.rho))
+        e_dq = e * cmath.rect(1.0, -rad * ((self.frame - step / 2) if closed else self.rho))
         self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
         decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
         total = self.e_dq.imag - self.e_dq.real if decides >= 0 else self.e_dq.imag + self.e_dq.real
@@ -508,10 +509,6 @@ class EstimatorReal:
         self.v = [self.v[1], v]
 
 
-def _unit(a):
-    return complex(math.cos(a), math.sin(a))
-
-
 def synthetic_motor(m, speed_erpm, current_dq):
     """Samples of a motor whose speed and d-q current are given for every sample: the current vector, the vector that
     the drive commands (it acts for the period centred on the next sample), and the rotor's angle in turns.
@@ -522,13 +519,12 @@ def synthetic_motor(m, speed_erpm, current_dq):
     rad, ts = 2 * math.pi, m.period_s
     theta, i, v = [0.0], [], []
     for n in range(len(speed_erpm) - 1):
-        theta.append(theta[-1] + (speed_erpm[n] + speed_erpm[n + 1]) / 2 * m.turns_per_erpm)
-    for n in range(len(speed_erpm) - 1):
         nxt = n + 1
+        theta.append(theta[n] + (speed_erpm[n] + speed_erpm[nxt]) / 2 * m.turns_per_erpm)
         omega = speed_erpm[nxt] / 60 * rad
         slope = (current_dq[min(nxt + 1, len(current_dq) - 1)] - current_dq[n]) / (2 * ts)
-        frame = _unit(rad * theta[nxt])
-        i.append(current_dq[n] * _unit(rad * theta[n]))
+        frame = cmath.rect(1.0, rad * theta[nxt])
+        i.append(current_dq[n] * cmath.rect(1.0, rad * theta[n]))
         v.append((m.rs_ohm * current_dq[nxt] + m.ls_h * (slope + 1j * omega * current_dq[nxt]) + 1j * omega * m.psi) * frame)
     return i, v, theta[:-1]
 
@@ -595,6 +591,6 @@ def hand_over(forced, estimated, v_dq, i_q):
 
 def hand_over_real(forced, estimated, v_dq, i_q):
     a = 2 * math.pi * (forced - estimated) / WORD
-    v = complex(*v_dq) * _unit(a)
-    i = 1j * i_q * _unit(a)
+    v = complex(*v_dq) * cmath.rect(1.0, a)
+    i = 1j * i_q * cmath.rect(1.0, a)
     return v.real, v.imag, i.real, i.imag

@@ -93,9 +93,8 @@ def _other_numbers(text):
 class _Region:
     """A run of tokens that belong together: a function's body, an initialiser or a macro."""
 
-    def __init__(self, file, text, name, kind, tokens, returns_scalar=True):
+    def __init__(self, file, text, name, kind, tokens):
         self.file, self.text, self.name, self.kind, self.tokens = file, text, name, kind, tokens
-        self.returns_scalar = returns_scalar
         self.partner = _partners(tokens)
         self.found = []
         self.declared_dimension = set()
@@ -270,12 +269,12 @@ class _Region:
         tokens = self.tokens
         start, end = tokens[first].start, tokens[semicolon].end
         if tokens[first].text == "return":
-            if semicolon > first + 1 and self.returns_scalar:
+            if semicolon > first + 1: # what returns a structure does not compile, and does not count
                 value = " ".join(self.text[tokens[first + 1].start:tokens[semicolon].start].split())
                 self.add("return", tokens[first + 1].start, tokens[semicolon].start, "1" if value == "0" else "0")
                 if _number(value) is None:
                     self.add("return", tokens[first + 1].start, tokens[semicolon].start, f"({value}) + 1")
-            elif semicolon == first + 1:
+            else:
                 self.add("statement", start, end, ";")
         elif _is_type(tokens[first]):
             for i in range(first, semicolon - 1):
@@ -296,7 +295,7 @@ class _Region:
         return self.found
 
 
-def _regions(file, text, struct_names):
+def _regions(file, text):
     tokens, macros = c_tokens.split(text)
     partner = _partners(tokens)
     i, begin = 0, 0
@@ -306,9 +305,7 @@ def _regions(file, text, struct_names):
             close = partner[i]
             before = tokens[i - 1].text if i else ""
             if before == ")":
-                opening = partner[i - 1]
-                returned = {t.text for t in tokens[begin:opening - 1]}
-                yield _Region(file, text, tokens[opening - 1].text, "function", tokens[i + 1:close], not returned & struct_names)
+                yield _Region(file, text, tokens[partner[i - 1] - 1].text, "function", tokens[i + 1:close])
                 begin = close + 1
             elif before == "=":
                 name = next(t.text for t in tokens[begin:i] if t.kind == "id" and not _is_type(t))
@@ -324,18 +321,10 @@ def _regions(file, text, struct_names):
                 yield _Region(file, text, name, "macro", body)
 
 
-def struct_types(texts):
-    """Names of the structures that are declared in the given sources: what they name is not a number."""
-    names = set()
-    for text in texts:
-        names.update(re.findall(r"^\}\s*(\w+);", text, re.M))
-    return names
-
-
-def of_file(file, text, struct_names):
+def of_file(file, text):
     """All mutants of one file, in the order of the text; a change that appears twice is listed once."""
     found = []
-    for region in _regions(file, text, struct_names):
+    for region in _regions(file, text):
         found.extend(region.mutants())
     found.sort(key=lambda m: (m.start, m.end, m.operator, m.new))
     unique, seen, counts = [], set(), {}

@@ -10,7 +10,6 @@ import random
 import re
 import shutil
 import sys
-import threading
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +23,7 @@ FILES = ("include/*/**/*.h", "firmware/**/*.c")
 NOT_MUTATED = ("include/drive/param_table.h", "include/drive/faults.h", "firmware/drive/param_check.c", "firmware/board/config.c")
 PARAMETER_FILES = ("include/drive/param_scaling.h", "include/drive/param_init.h")
 UNIT_SHARE, CLOSED_LOOP_SHARE = 85.0, 90.0
-COUNTED = ("killed", "timeout", "survived")
+KILLED = ("killed", "timeout")
 
 
 def fail(what, where, remedy):
@@ -52,9 +51,8 @@ def parse(argv):
 def all_mutants(root, wanted):
     """@return {file: mutants}"""
     paths = sorted(str(p.relative_to(root)) for pattern in FILES for p in root.glob(pattern))
-    structs = mutants.struct_types((root / p).read_text() for p in paths)
     chosen = [p for p in paths if p not in NOT_MUTATED and (not wanted or any(w in p for w in wanted))]
-    found = {p: mutants.of_file(p, (root / p).read_text(), structs) for p in chosen}
+    found = {p: mutants.of_file(p, (root / p).read_text()) for p in chosen}
     return {p: m for p, m in found.items() if m}
 
 
@@ -85,21 +83,6 @@ def read_equivalent(path):
     if keys:
         fail(f"no reason for {keys[0]}", str(path), "add an indented line that says why the change has no effect")
     return entries
-
-
-class Progress:
-    """A line every tenth of the way."""
-
-    def __init__(self, total):
-        self.total, self.done, self.killed, self.begin, self.lock = total, 0, 0, time.monotonic(), threading.Lock()
-
-    def step(self, result):
-        with self.lock:
-            self.done += 1
-            self.killed += result in ("killed", "timeout")
-            if 10 * self.done // self.total != 10 * (self.done - 1) // self.total:
-                seconds = time.monotonic() - self.begin
-                print(f"{self.done}/{self.total} mutants, {self.killed} killed, {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 class Runner:
@@ -135,14 +118,16 @@ class Runner:
             self.trees.put(tree)
 
     def run(self, chosen, stages, jobs):
-        progress = Progress(len(chosen))
-
-        def one(mutant):
-            result = self.attempt(mutant, stages)
-            progress.step(result[0])
-            return result
+        """@return results in the order of the mutants; a line every tenth of the way"""
+        begin, results = time.monotonic(), []
         with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(one, chosen))
+            for result in pool.map(lambda mutant: self.attempt(mutant, stages), chosen):
+                results.append(result)
+                done, total = len(results), len(chosen)
+                if 10 * done // total != 10 * (done - 1) // total:
+                    killed = sum(kind in KILLED for kind, _ in results)
+                    print(f"{done}/{total} mutants, {killed} killed, {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)
+        return results
 
 
 def percent(killed, counted):
@@ -153,7 +138,7 @@ def table(rows, title="file"):
     """@param rows [(name, Counter)]"""
     lines = [f"{title:34}{'mutants':>8}{'killed':>8}{'survived':>9}{'score':>8}   not counted"]
     for name, count in rows:
-        killed, survived = count["killed"] + count["timeout"], count["survived"]
+        killed, survived = sum(count[kind] for kind in KILLED), count["survived"]
         rest = ", ".join(f"{count[k]} {text}" for k, text in (("equivalent", "listed"), ("same", "no effect"), ("broken", "do not compile"))
                          if count[k])
         lines.append(f"{name:34}{killed + survived:8}{killed:8}{survived:9}{percent(killed, killed + survived):7.1f}%   {rest}".rstrip())
@@ -167,8 +152,9 @@ def report(results, required, arguments, seconds):
         by_file.setdefault(mutant.file, Counter())[result] += 1
         by_operator.setdefault(mutant.operator, Counter())[result] += 1
     total = sum(by_file.values(), Counter())
-    counted = sum(total[k] for k in COUNTED)
-    score = percent(counted - total["survived"], counted)
+    killed = sum(total[kind] for kind in KILLED)
+    counted = killed + total["survived"]
+    score = percent(killed, counted)
     survivors = [m for m, result, _ in results if result == "survived"]
     lines = table([*by_file.items(), ("all", total)]) + [""]
     lines += table(sorted(by_operator.items()), "change")
@@ -181,10 +167,9 @@ def report(results, required, arguments, seconds):
         else f"sample, seed {arguments.seed}"
     lines += ["", f"{how}: {len(results)} tried in {seconds:.0f} s",
               f"{score:.1f} % of {counted} mutants killed by the {tests}, {required:.0f} % required: {'PASS' if passed else 'FAIL'}"]
-    alone = sum(result in ("killed", "timeout") and by.startswith("behaviour/") for _, result, by in results)
     if arguments.closed_loop:
-        unit = percent(counted - total["survived"] - alone, counted)
-        lines.insert(-1, f"{unit:.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
+        alone = sum(result in KILLED and by.startswith("behaviour/") for _, result, by in results)
+        lines.insert(-1, f"{percent(killed - alone, counted):.1f} % by the unit tests, {alone} mutants by the closed-loop tests alone")
     data = {"score": round(score, 2), "required": required, "passed": passed, "tests": tests, "full": arguments.full,
             "seed": arguments.seed, "seconds": round(seconds, 1), "files": {f: dict(c) for f, c in by_file.items()},
             "mutants": [{"file": m.file, "line": m.line, "function": m.function, "operator": m.operator, "diff": m.diff,

@@ -15,7 +15,8 @@ FAST = ["-O0", "-g0", "-w", "-Dalways_inline=unused", "-DUNITY_TEST_ABORT()=_Exi
 LONG = ["-O1", "-g0", "-w"]           # those that run longer than this:
 LONG_SECONDS = 0.2
 SHIPPED = ["-O2", "-g0", "-w"]        # the firmware, to see whether a change reaches it at all
-SOURCES = ("include", "firmware", "tools/plant", "tools/chip", "tools/vboard", "tools/cpu_host", "test/unit", "test/behaviour", "test/chip", "docs", "tuning")
+SOURCES = ("include", "firmware", "tools/common", "tools/plant", "tools/chip", "tools/vboard", "tools/cpu_host", "test/unit",
+           "test/behaviour", "test/chip", "docs", "tuning")
 DEFINES = re.compile(r"/\* defines: (.*?) \*/")
 FAILED_TEST = re.compile(r"^[^:\n]*:\d+:(\w+(?:\([^\n]*?\))?):FAIL", re.M)
 
@@ -64,20 +65,15 @@ def listed(deps):
 
 def copy_sources(root, tree):
     """The sources that a build reads, and what was generated for it, so that edits during a run do no harm."""
-    if tree.exists():
-        shutil.rmtree(tree)
     for folder in SOURCES:
-        if (root / folder).is_dir():
-            shutil.copytree(root / folder, tree / folder, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(root / folder, tree / folder, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy2(root / "userparams.h", tree)
     for path in sorted((root / "build").rglob("*")):
         where = path.relative_to(root)
         if path.suffix in (".c", ".h", ".inc") and where.parts[1] not in ("gems", "mutate", "setup", "coverage", "avr", "host"):
             (tree / where).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(path, tree / where)
-    (tree / "build").mkdir(exist_ok=True)
-    if (root / "build/gems").exists():
-        os.symlink((root / "build/gems").resolve(), tree / "build/gems")
+    os.symlink((root / "build/gems").resolve(), tree / "build/gems")
 
 
 class Suite:
@@ -198,14 +194,11 @@ class Suite:
                 continue
             objects, changed = [], False
             for unit in test.units:
-                path = f"../base/{unit.object}"
-                if file in unit.deps:
-                    state = self.compile_changed(tree, unit, memory)
-                    if state == "broken":
-                        return "broken", unit.source
-                    if state == "changed":
-                        path, changed = unit.object, True
-                objects.append(path)
+                state = self.compile_changed(tree, unit, memory) if file in unit.deps else "same"
+                if state == "broken":
+                    return "broken", unit.source
+                changed |= state == "changed"
+                objects.append(unit.object if state == "changed" else f"../base/{unit.object}")
             if not changed:
                 continue
             fixed = [f"../base/{path}" for path in test.fixed]
@@ -223,11 +216,8 @@ class Suite:
     def compile_changed(self, tree, unit, memory):
         if unit.object not in memory:
             code, _ = run(unit.command + [unit.object], tree)
-            if code != 0:
-                memory[unit.object] = "broken"
-            else:
-                same = (tree / unit.object).read_bytes() == unit.content
-                memory[unit.object] = "same" if same else "changed"
+            same = code == 0 and (tree / unit.object).read_bytes() == unit.content
+            memory[unit.object] = "same" if same else "changed" if code == 0 else "broken"
         return memory[unit.object]
 
     def shipped_base(self, unit, mode):

@@ -2,14 +2,6 @@
 #include "control/root.h"
 #include "unity.h"
 
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
-
 void test_square_roots_are_exact(void)
 {
     TEST_ASSERT_EQUAL_UINT16(0, root_of(0));

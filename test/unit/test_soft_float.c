@@ -2,14 +2,6 @@
 #include "control/soft_float.h"
 #include "unity.h"
 
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
-
 static void expect_number(uint16_t m, int16_t e, soft_float_t n)
 {
     TEST_ASSERT_EQUAL_UINT16(m, n.m);
@@ -21,6 +13,7 @@ void test_number_keeps_the_upper_16_bits(void)
     expect_number(0, 0, soft_float_of(0));
     expect_number(32768u, -15, soft_float_of(1));
     expect_number(65535u, 0, soft_float_of(65535u));
+    expect_number(65535u, 15, soft_float_of(0x7FFFFFFFul));
     expect_number(32768u, 1, soft_float_of(65536ul));
     expect_number(65535u, 16, soft_float_of(0xFFFFFFFFul));
     expect_number(40000u, -3 - 4, soft_float_scaled(5000u, 4));
@@ -65,8 +58,11 @@ void test_signed_products(void)
 {
     TEST_ASSERT_EQUAL_INT32(-100000l, soft_float_times(-40000l, soft_float_scaled(5, 1)));
     TEST_ASSERT_EQUAL_INT32(100000l, soft_float_times(40000l, soft_float_scaled(5, 1)));
+    TEST_ASSERT_EQUAL_INT32(-5, soft_float_times(-1, soft_float_of(5)));
     TEST_ASSERT_EQUAL_INT32(0, soft_float_times(0, soft_float_of(5)));
     TEST_ASSERT_EQUAL_INT32(0, soft_float_times(3, soft_float_scaled(1, 20)));
+    TEST_ASSERT_EQUAL_INT32(0x3FFFFFFFl, soft_float_times(32768l, soft_float_of(32768u))); /* from 2^30 on: limited */
+    TEST_ASSERT_EQUAL_INT32(0x3FFFFFFFl, soft_float_times(65536l, soft_float_of(32768u)));
     TEST_ASSERT_EQUAL_INT32(0x3FFFFFFFl, soft_float_times(0x3FFFFFFFl, soft_float_of(65535u)));
     TEST_ASSERT_INT32_WITHIN(20000l, 1000000000l, soft_float_times(1000000l, soft_float_of(1000)));
 }

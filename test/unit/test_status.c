@@ -62,10 +62,6 @@ void test_line_tells_state_fault_and_mechanical_speed(void)
     expect_line(DRIVE_FAULT, FAULT_TRAP, 0, "state 7 fault 12 speed 0 rpm\r\n");
     expect_line(DRIVE_CLOSED, FAULT_NONE, -27500, "state 5 fault 0 speed -5500 rpm\r\n");
     expect_line(DRIVE_STOPPED, FAULT_ADC_LOST, 49, "state 1 fault 10 speed 9 rpm\r\n");
-}
-
-void test_longest_line_fits_its_buffer(void)
-{
     expect_line(DRIVE_FAULT, FAULT_TRAP, -32768, "state 7 fault 12 speed -6553 rpm\r\n");
     TEST_ASSERT_TRUE(sizeof line > strlen("state 32767 fault 32767 speed -32767 rpm\r\n"));
 }

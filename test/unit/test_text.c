@@ -1,0 +1,36 @@
+/* Text and decimal numbers: every number of digits, both signs, the ends of the words, and nothing written behind the text. */
+#include "board/text.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+/** The text that ends at `end`, up to which `buffer` was written. */
+static void expect_text(const char *text, const char *buffer, const char *end)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(strlen(text), end - buffer, text);
+    TEST_ASSERT_EQUAL_STRING_LEN(text, buffer, strlen(text));
+    TEST_ASSERT_EQUAL_CHAR_MESSAGE('#', *end, text);
+}
+
+void test_texts_and_numbers_end_where_the_next_one_begins(void)
+{
+    static const struct {
+        const char *text;
+        int32_t number;
+    } cases[] = {
+        { "0", 0 }, { "7", 7 }, { "10", 10 }, { "909", 909 }, { "1234", 1234 }, { "32767", 32767 }, { "65535", 65535 }, { "-1", -1 }
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        char buffer[8] = "#######";
+        expect_text(cases[n].text, buffer, text_put(buffer, cases[n].text));
+        memset(buffer, '#', sizeof buffer);
+        if (cases[n].number >= 0) {
+            expect_text(cases[n].text, buffer, text_put_unsigned(buffer, (uint16_t)cases[n].number));
+            memset(buffer, '#', sizeof buffer);
+        }
+        if (cases[n].number <= INT16_MAX) {
+            expect_text(cases[n].text, buffer, text_put_signed(buffer, (int16_t)cases[n].number));
+        }
+    }
+}
