@@ -45,7 +45,7 @@
 #define SPEEDREFRAMP_RPM_PER_S 4000 /* [rpm/s]         1 .. 60000     slope of the speed reference */
 #define TUNING_DELAY_RAMPUP 0xF     /* [periods]       0 .. 4095      TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods */
 
-/* ---- Start: lock, ramp, hand-over --------------------------------------------------------------------------------- */
+/* ---- Start: align, ramp, hand-over -------------------------------------------------------------------------------- */
 #define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each): 0.2 s */
 #define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
@@ -184,12 +184,12 @@
  * start
  *   forced.end_speed_q10                 1000 rpm            279620  Q10 angle counts a period   -0.000 %  end of the ramp
  *   forced.increase_rate_q10           715.26 rpm/s              10  Q10 counts/period^2            exact  acceleration
- *   lock_periods                          0.2 s                4000  periods                        exact  lock
- *   lock_sweep_q32                        900 deg/s          536870  Q32 of a turn a period         exact  first half of the lock
+ *   align_periods                         0.2 s                4000  periods                        exact  lock
+ *   align_sweep_q32                       900 deg/s          536870  Q32 of a turn a period         exact  first half of the lock
  *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
  *   bootstrap_periods                    0.01 s                 200  periods                        exact  low sides on before the start
- *   ready_slots                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
- *   ready_timeout_slots                   0.2 s                 500  8 periods                      exact  and how long it may take
+ *   agree_steps                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
+ *   wait_steps                            0.2 s                 500  8 periods                      exact  and how long it may take
  *
  * limits
  *   current_max_q13                      2.75 A                5120  Q13 A                       -0.000 %  current vector that is asked for
@@ -201,8 +201,8 @@
  *   bus_regen_q15                          27 V               16756  Q15 of full scale           -0.002 %  braking is reduced from here
  *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
- *   stall_slots                           0.3 s                 750  8 periods                      exact  stall
- *   lost_lock_slots                      0.05 s                 125  8 periods                      exact  lost lock
+ *   stall_steps                           0.3 s                 750  8 periods                      exact  stall
+ *   lost_lock_steps                      0.05 s                 125  8 periods                      exact  lost lock
  *
  * modulator and bus
  *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %

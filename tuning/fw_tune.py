@@ -188,7 +188,7 @@ class _Work:
                 "current_limit_a": goal.limit_a}
 
     def check(self, tables: Tables) -> Check:
-        """The new tables in the firmware that a user gets: to the maximum speed, to the highest speed found, and an orderly stop."""
+        """The new tables in the firmware that a user gets: to the maximum speed, to the highest speed found, and a controlled stop."""
         wanted = self.job.goal.maximum_rpm
         top = math.floor(tables.maximum_speed_rpm)
         values = {**tables.parameters(), "MAXIMUM_SPEED_RPM": f"{max(top, round(self.params['NOMINAL_SPEED_RPM']) + 1):.0f}"}

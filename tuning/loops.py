@@ -33,7 +33,7 @@ integral alone, error = dT/dt / (J (2 pi f)^2 / ZERO_RATIO)."""
 ZERO_RATIO = 3.0
 """The speed controller's zero lies at the bandwidth / 3 (SPEEDCNTR_ITERM in param_scaling.h): the integral is what holds a load that grows, and a
 lower bandwidth with more of it is calmer at low speed than the other way round."""
-SLOTS = 8
+SLOW_PHASES = 8
 CURRENT_TOP = 1.0 / 12.0
 """Taken above the cap only for a motor whose rotation at top speed would cost the margin below it."""
 CURRENT_NEARLY_DEG = 5.0
@@ -139,7 +139,7 @@ def estimator(hz: np.ndarray, gains: Gains, omega_e: float, strength: float = 1.
 def speed_loop(hz: np.ndarray, true: Plant, assumed: Plant, gains: Gains, omega_e: float) -> np.ndarray:
     """Open speed loop of a motor `true` with controllers made for `assumed`."""
     ts, s = gains.period_s, 2j * np.pi * hz
-    slow = SLOTS * ts
+    slow = SLOW_PHASES * ts
     controller = (gains.speed_kp + gains.speed_ki / (np.exp(s * slow) - 1.0)) * (1.0 - np.exp(-s * slow)) / (s * slow)
     inner = current_loop(hz, true, gains, 0.0)
     shaft = true.kt * true.pole_pairs / (true.inertia * s + true.viscous)
@@ -222,7 +222,7 @@ def speed_gains(plant: Plant, bandwidth_hz: float, base: Gains) -> Gains:
     """Kp = 2 pi f J/Kt per mechanical, i.e. / P per electrical rad/s; zero at f/3."""
     w = 2.0 * np.pi * bandwidth_hz
     kp = w * plant.inertia / plant.kt / plant.pole_pairs
-    return replace(base, speed_kp=kp, speed_ki=kp * w / ZERO_RATIO * SLOTS * base.period_s)
+    return replace(base, speed_kp=kp, speed_ki=kp * w / ZERO_RATIO * SLOW_PHASES * base.period_s)
 
 
 def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: Gains, top_rad_s: float, largest_hz: float, least_hz: float,
@@ -274,7 +274,7 @@ def least_speed_bandwidth(torque_nm_s: float, inertia: float, lowest_rad_s: floa
 def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gains, speeds_rad_s: dict[str, float], largest_hz: float,
                  least_hz: float, fixed_hz: float | None = None) -> LoopDesign:
     """Bandwidth of the speed loop: the largest with enough margin at every speed of `speeds_rad_s` (name: electrical rad/s)."""
-    grid = np.geomspace(0.05, 0.45 / (SLOTS * base.period_s), 400)
+    grid = np.geomspace(0.05, 0.45 / (SLOW_PHASES * base.period_s), 400)
     cases = {f"{name}, {at}": (p, w) for name, p in corners(plant, spread) for at, w in speeds_rad_s.items()}
 
     def worst_of(bandwidth_hz: float, stop: bool) -> tuple[Margins, str]:

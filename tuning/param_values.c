@@ -103,12 +103,12 @@ static void start(void)
     FIELD(forced.end_speed_q10, END_SPEED_RPM, "rpm", erpm * 60.0 / period / 67108864.0, "Q10 angle counts a period", "end of the ramp");
     FIELD(forced.increase_rate_q10, OPENLOOP_RAMPSPEED_INCREASERATE / 67108864.0 / (period * period) * 60.0 / pairs, "rpm/s", 0.0,
           "Q10 counts/period^2", "acceleration");
-    FIELD(lock_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
-    FIELD(lock_sweep_q32, 90.0 / (LOCK_TIME / 2.0 * period), "deg/s", 0.0, "Q32 of a turn a period", "first half of the lock");
+    FIELD(align_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
+    FIELD(align_sweep_q32, 90.0 / (LOCK_TIME / 2.0 * period), "deg/s", 0.0, "Q32 of a turn a period", "first half of the lock");
     FIELD(open_loop_q13, Q_CURRENT_REF_OPENLOOP, "A", q13_a, "Q13 A", "current of lock and ramp");
     FIELD(bootstrap_periods, 0.010, "s", period, "periods", "low sides on before the start");
-    FIELD(ready_slots, 0.02, "s", slots, "8 periods", "agreement before the hand-over");
-    FIELD(ready_timeout_slots, 0.2, "s", slots, "8 periods", "and how long it may take");
+    FIELD(agree_steps, 0.02, "s", slots, "8 periods", "agreement before the hand-over");
+    FIELD(wait_steps, 0.2, "s", slots, "8 periods", "and how long it may take");
 }
 
 static void limits(void)
@@ -124,8 +124,8 @@ static void limits(void)
     FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
-    FIELD(stall_slots, 0.3, "s", slots, "8 periods", "stall");
-    FIELD(lost_lock_slots, 0.05, "s", slots, "8 periods", "lost lock");
+    FIELD(stall_steps, 0.3, "s", slots, "8 periods", "stall");
+    FIELD(lost_lock_steps, 0.05, "s", slots, "8 periods", "lost lock");
 }
 
 static void modulator(void)

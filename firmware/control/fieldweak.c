@@ -1,16 +1,16 @@
 /* The look-up of field weakening: called, so that start and interrupt share one copy. */
 #include "control/fieldweak.h"
 
-void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, estimator_tuning_t *tuning, speed_erpm_t ref_erpm)
+void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm)
 {
     int16_t above = (int16_t)(qm_abs(ref_erpm) - p->on_speed_erpm);
     uint16_t index = 0, fraction_q16 = 0;
 
-    tuning->kfilter_esdq_q16 = p->kfilter_esdq_q16;
+    model->kfilter_esdq_q16 = p->kfilter_esdq_q16;
     if (above > 0) {
         index = (uint16_t)above >> SPEED_INDEX_CONST;
         fraction_q16 = (uint16_t)((uint16_t)above << (16 - SPEED_INDEX_CONST));
-        tuning->kfilter_esdq_q16 = p->kfilter_esdq_fw_q16;
+        model->kfilter_esdq_q16 = p->kfilter_esdq_fw_q16;
         if (index > FIELDWEAK_ENTRIES - 2) {
             index = FIELDWEAK_ENTRIES - 2;
             fraction_q16 = 65535u;
@@ -18,8 +18,8 @@ void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, estimator_tuni
     }
     fw->index = index;
     fw->table_q13 = fieldweak_between(p->idref_q13, index, fraction_q16);
-    tuning->inv_kfi = fieldweak_between(p->inv_kfi, index, fraction_q16);
+    model->inv_kfi = fieldweak_between(p->inv_kfi, index, fraction_q16);
     /* quotient at most 32767 because inv_kfi >= 2048, see the parameter checks */
-    tuning->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)tuning->inv_kfi);
-    tuning->ls_q16 = (uint16_t)(qm_muluu(p->ls_base_q16, (uint16_t)fieldweak_between(p->ls_over2ls0_q15, index, fraction_q16)) >> 14);
+    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)model->inv_kfi);
+    model->ls_q16 = (uint16_t)(qm_muluu(p->ls_base_q16, (uint16_t)fieldweak_between(p->ls_over2ls0_q15, index, fraction_q16)) >> 14);
 }

@@ -26,7 +26,7 @@ typedef struct {
     int16_t inv_kfi;          /**< InvKFi in AN1292's format: 1/Kphi / 2 in Q15 */
     int16_t emf_sum_max_q12;  /**< 32767 * 2048 / inv_kfi: keeps the speed in 16 bits */
     int16_t kfilter_esdq_q16; /**< back-EMF filter, 2 * KFILTER_ESDQ or 2 * KFILTER_ESDQ_FW */
-} estimator_tuning_t;
+} motor_model_t;
 
 /** State. Everything zero is a valid start at standstill. */
 typedef struct {
@@ -75,7 +75,7 @@ QM_INLINE alphabeta_t estimator_turn(alphabeta_t x, int16_t a_q16_rad)
 
 /** Voltage of the inductance, Q13. Below nominal speed over eight samples, which is four samples old and therefore
  *  turned forward by 3.5 steps to the middle of the last period; above over one sample. */
-QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t,
+QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const motor_model_t *t,
                                           alphabeta_t now, alphabeta_t previous, alphabeta_t oldest)
 {
     alphabeta_t v;
@@ -98,7 +98,7 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
  *
  *  The delay constant: a vector computed at sample n is loaded at the next PWM boundary, half a period later, and acts
  *  for one period; so the mean voltage between samples n-1 and n is the mean of the last two vectors. */
-QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14)
+QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
     alphabeta_t previous = e->history_q14[e->newest];
     uint16_t newest = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
@@ -117,7 +117,7 @@ QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, c
 
 /** Equations 1, 2 and 7: filtered Ed and Eq give the speed, the speed gives the angle.
  *  Lock is stable where cos(error) + sin(error) = K'/K: a wrong Kphi turns the angle, not the speed. */
-QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, dq_t e_q12)
+QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, dq_t e_q12)
 {
     int16_t e_d = qm_lowpass(&e->e_d_q28, e_q12.d, t->kfilter_esdq_q16);
     int16_t e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
@@ -151,7 +151,7 @@ QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, sincos_t frame)
 
 /** One period. @param frame of the control
  *  @param forced nonzero while the forced angle drives the motor (lock and ramp): the estimator runs along in a frame of its own */
-QM_INLINE void estimator_tick(estimator_t *e, const estimator_params_t *p, const estimator_tuning_t *t, alphabeta_t i_q14,
+QM_INLINE void estimator_tick(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14,
                               sincos_t frame, uint16_t forced)
 {
     dq_t e_q12;

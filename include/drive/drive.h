@@ -43,9 +43,9 @@ typedef struct {
     q15_t kcurr_a, kcurr_b; /**< gain of the samples; Q15 sample to Q13 current by the high word */
     int16_t offset_max_q13; /**< largest plausible offset */
     uint16_t bootstrap_periods;
-    uint16_t lock_periods;
-    uint16_t ready_slots, ready_timeout_slots; /**< agreement needed at the end of the ramp, and how long it may take */
-    uint32_t lock_sweep_q32;                   /**< angle step while the first half of the lock turns by 90 degrees */
+    uint16_t align_periods;
+    uint16_t agree_steps, wait_steps; /**< agreement needed at the end of the ramp, and how long it may take */
+    uint32_t align_sweep_q32;         /**< angle step while the first half of the lock turns by 90 degrees */
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
@@ -62,7 +62,7 @@ typedef struct {
     int16_t speed_ramp_erpm; /**< reference step per slow step */
     int32_t tuning_step_q16; /**< the same in TUNING */
     int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
-    uint16_t stall_slots, lost_lock_slots;
+    uint16_t stall_steps, lost_lock_steps;
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
 
@@ -109,7 +109,7 @@ typedef struct {
 /** What a start begins anew: all of it is cleared. */
 typedef struct {
     estimator_t estimator;
-    estimator_tuning_t model; /**< the motor's constants, as field weakening adapts them */
+    motor_model_t model; /**< the motor's constants, as field weakening adapts them */
     fieldweak_t fieldweak;
     handover_t handover;
     drive_control_t control;

@@ -10,13 +10,13 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
     int16_t miss;
-    if (!mode_hands_over() || (d->ticks & (SLOTS - 1u)) != 0u) {
+    if (!mode_hands_over() || (d->ticks & (SLOW_PHASES - 1u)) != 0u) {
         return;
     }
     miss = qm_abs(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), p->end_erpm));
     h->waited_steps = (uint16_t)(h->waited_steps + 1u);
     h->agreed_steps = (uint16_t)((miss < (p->end_erpm >> 2)) ? h->agreed_steps + 1u : 0u);
-    if (h->agreed_steps < p->ready_slots && h->waited_steps >= p->ready_timeout_slots) {
+    if (h->agreed_steps < p->agree_steps && h->waited_steps >= p->wait_steps) {
         drive_raise(d, FAULT_START_FAILED);
     }
 }
@@ -54,7 +54,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
 /** In RAMP, every eighth period: hands over once the estimator has agreed long enough. */
 QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->run.handover.agreed_steps >= p->ready_slots) {
+    if (d->run.handover.agreed_steps >= p->agree_steps) {
         handover_now(d, p);
     }
 }
@@ -77,10 +77,10 @@ QM_INLINE void handover_decay(drive_t *d, const drive_params_t *p)
     if (offset == 0) {
         return;
     }
-    if (offset > -2 * SLOTS && offset < 2 * SLOTS) {
+    if (offset > -2 * SLOW_PHASES && offset < 2 * SLOW_PHASES) {
         offset = 0;
     } else {
-        offset = (int16_t)((offset > 0) ? offset - SLOTS : offset + SLOTS);
+        offset = (int16_t)((offset > 0) ? offset - SLOW_PHASES : offset + SLOW_PHASES);
     }
     h->offset = offset;
     h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(along_direction(d, p->open_loop_q13), trig_sincos((angle_t)offset).sin));

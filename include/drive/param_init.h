@@ -72,10 +72,10 @@
         .kcurr_b = Q15(KCURRB), \
         .offset_max_q13 = 1024, /* an eighth of full scale: 0.2 V at the converter */ \
             .bootstrap_periods = PARAM_PERIODS(0.010F), \
-        .lock_periods = LOCK_TIME, \
-        .lock_sweep_q32 = 0x40000000ul / (LOCK_TIME / 2), \
-        .ready_slots = PARAM_SLOTS(0.02F), \
-        .ready_timeout_slots = PARAM_SLOTS(0.2F), \
+        .align_periods = LOCK_TIME, \
+        .align_sweep_q32 = 0x40000000ul / (LOCK_TIME / 2), \
+        .agree_steps = PARAM_SLOW_STEPS(0.02F), \
+        .wait_steps = PARAM_SLOW_STEPS(0.2F), \
         .open_loop_q13 = CURRENT_Q13(Q_CURRENT_REF_OPENLOOP), \
         .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
         .current_max_reciprocal = (uint16_t)(33554432.0F / (PARAM_F(MAXIMUM_CURRENT_A) / PARAM_F(NORM_CURRENT_CONST) / 4.0F) + 0.5F), \
@@ -94,8 +94,8 @@
         .speed_ramp_erpm = SPEEDREFRAMP, \
         .tuning_step_q16 = TUNING_STEP_Q16, \
         .ramp_hold_erpm = (int16_t)PARAM_ROUND(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F), \
-        .stall_slots = PARAM_SLOTS(0.3F), \
-        .lost_lock_slots = PARAM_SLOTS(0.05F), \
+        .stall_steps = PARAM_SLOW_STEPS(0.3F), \
+        .lost_lock_steps = PARAM_SLOW_STEPS(0.05F), \
         .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 1.25F, 32700.0F)) \
     }
 

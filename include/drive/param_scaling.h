@@ -124,12 +124,12 @@
 /** duty counts per Q13 voltage count * 65536 = this / bus in Q16 of full scale. */
 #define DUTY_PER_VOLT_NUMERATOR ((uint32_t)(PARAM_F(PWM_FULL_DUTY) * 4.0F * NORM_VOLTAGE_CONST / PARAM_F(BUS_FULL_SCALE_V) * 4294967296.0F))
 
-/* ---- Slow steps: each of the eight slots comes every eighth period ---- */
-#define SLOTS 8
-#define SLOTS_PER_SEC (1.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
-#define PARAM_SLOTS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOTS_PER_SEC))
+/* ---- Slow steps: each of the eight phases comes every eighth period ---- */
+#define SLOW_PHASES 8
+#define SLOW_STEPS_PER_SEC (1.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
+#define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
-#define SPEEDREFRAMP ((int16_t)PARAM_ROUND(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS) / SLOTS_PER_SEC + 0.49F))
+#define SPEEDREFRAMP ((int16_t)PARAM_ROUND(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS) / SLOW_STEPS_PER_SEC + 0.49F))
 /** TUNING's ramp: Q16 electrical rpm per slow step. */
 #define TUNING_STEP_Q16 (PARAM_ROUND(8.0F * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 

@@ -35,7 +35,7 @@
     X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000, FROM_TUNER, "slope of the speed reference") \
     X(TUNING_DELAY_RAMPUP, "periods", 0, 4095, 0xF, "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods")
 
-#define PARAM_START(X) /* Start: lock, ramp, hand-over */ \
+#define PARAM_START(X) /* Start: align, ramp, hand-over */ \
     X(LOCK_TIME, "periods", 200, 32000, FROM_TUNER, "rotor held at a fixed angle (two directions, half the time each)") \
     X(END_SPEED_RPM, "rpm", 50, 5000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
     X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000, FROM_TUNER, "acceleration of the ramp") \

@@ -40,8 +40,8 @@ QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
     }
     run->stall_steps = (uint16_t)((speed < least) ? run->stall_steps + 1u : 0u);
     run->lost_lock_steps = (uint16_t)((qm_abs(emf.d) > qm_abs(emf.q) || speed > p->overspeed_erpm) ? run->lost_lock_steps + 1u : 0u);
-    if (run->stall_steps > p->stall_slots || run->lost_lock_steps > p->lost_lock_slots) {
-        drive_raise(d, (run->stall_steps > p->stall_slots) ? FAULT_STALL : FAULT_LOST_LOCK);
+    if (run->stall_steps > p->stall_steps || run->lost_lock_steps > p->lost_lock_steps) {
+        drive_raise(d, (run->stall_steps > p->stall_steps) ? FAULT_STALL : FAULT_LOST_LOCK);
     }
 }
 

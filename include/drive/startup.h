@@ -19,8 +19,8 @@ QM_INLINE drive_state_t startup_bootstrap(drive_t *d, const drive_params_t *p)
 /** The vector turns by 90 degrees during the first half of ALIGN, so that no rotor position is a dead point. */
 QM_INLINE void startup_sweep(drive_t *d, const drive_params_t *p)
 {
-    d->forced.angle_q32 = (d->direction >= 0) ? qm_turn_add(d->forced.angle_q32, p->lock_sweep_q32)
-                                              : qm_turn_sub(d->forced.angle_q32, p->lock_sweep_q32);
+    d->forced.angle_q32 = (d->direction >= 0) ? qm_turn_add(d->forced.angle_q32, p->align_sweep_q32)
+                                              : qm_turn_sub(d->forced.angle_q32, p->align_sweep_q32);
 }
 
 /** The forced angle while the rotor is aligned and accelerated. */
@@ -28,9 +28,9 @@ QM_INLINE void startup_forced_step(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_ALIGN) {
         d->periods++;
-        if (d->periods <= (p->lock_periods >> 1)) {
+        if (d->periods <= (p->align_periods >> 1)) {
             startup_sweep(d, p);
-        } else if (d->periods >= p->lock_periods) {
+        } else if (d->periods >= p->align_periods) {
             drive_enter(d, DRIVE_RAMP);
         }
         d->angle = forced_angle(&d->forced);

@@ -66,7 +66,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
     drive_run_t *run = &d->run;
 
-    switch (d->ticks & (SLOTS - 1u)) {
+    switch (d->ticks & (SLOW_PHASES - 1u)) {
     case 0:
         if (drive_is_closed(d)) {
             speed_step(d, p);

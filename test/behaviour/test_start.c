@@ -37,7 +37,7 @@ void test_starts_under_load_from_any_angle(void)
 
 void test_closes_the_loop_at_the_time_that_the_parameters_say(void)
 {
-    /* S2's 30 ms of debouncing, 10 ms bootstrap, lock, ramp, 20 ms of agreement */
+    /* S2's 30 ms of debouncing, 10 ms bootstrap, align, ramp, 20 ms of agreement */
     double ramp_s = END_SPEED_RPM * NOPOLESPAIRS * LOOPTIME_SEC / 60.0 * 67108864.0 / OPENLOOP_RAMPSPEED_INCREASERATE * LOOPTIME_SEC;
     power_on();
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.03 + 0.010 + LOCK_TIME * LOOPTIME_SEC + ramp_s + 0.02, start());

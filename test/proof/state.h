@@ -39,8 +39,8 @@ static void any_drive(uint16_t state, uint16_t slot)
 #ifdef TUNING
     drive.run.tuning_q16 = ANYU16();
 #endif
-    drive.run.stall_steps = any_u(0, params.stall_slots);
-    drive.run.lost_lock_steps = any_u(0, params.lost_lock_slots);
+    drive.run.stall_steps = any_u(0, params.stall_steps);
+    drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);
 }
 
 static void any_estimator(estimator_t *e)
@@ -118,7 +118,7 @@ static void bounds_hold_again(void)
     //@ check sum_speed: -SUM_MAX <= c->pi_speed.sum <= SUM_MAX;
     //@ check trim: -params.fieldweak.trim_max_q13 <= drive.run.fieldweak.trim_q13 <= 0;
     //@ check table: drive.run.fieldweak.index < FIELDWEAK_ENTRIES;
-    //@ check counts: drive.run.stall_steps <= params.stall_slots + 1 && drive.run.lost_lock_steps <= params.lost_lock_slots + 1;
+    //@ check counts: drive.run.stall_steps <= params.stall_steps + 1 && drive.run.lost_lock_steps <= params.lost_lock_steps + 1;
 }
 
 #endif

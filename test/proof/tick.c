@@ -170,8 +170,8 @@ void proof_tick(void)
     set_bounds();
     //@ loop unroll DRIVE_STATE_COUNT;
     for (uint16_t state = DRIVE_STOPPED; state <= DRIVE_FAULT; state++) {
-        //@ loop unroll SLOTS;
-        for (uint16_t slot = 0; slot < SLOTS; slot++) {
+        //@ loop unroll SLOW_PHASES;
+        for (uint16_t slot = 0; slot < SLOW_PHASES; slot++) {
             tick_in(state, slot);
         }
     }

@@ -8,7 +8,7 @@ import sys
 from fnmatch import fnmatch
 from pathlib import Path
 
-C_FILES = ("firmware/**/*.[ch]", "include/**/*.[ch]", "examples/**/*.[ch]", "test/**/*.[ch]")  # those of tools/ are full of tables
+C_FILES = ("firmware/**/*.[ch]", "include/**/*.[ch]", "examples/**/*.[ch]")  # tools/ and test/ are full of tables
 MADE = ("*/vectors/*", "*.xlsx", "*.png", "firmware.X/*")  # written by programs
 
 

@@ -83,7 +83,7 @@ def test_the_fields_are_read_with_their_names_sizes_and_signs(tmp_path):
     found = {path: (size, signed, value) for path, size, signed, value in host_values(ROOT / "userparams.h", tmp_path)}
     text = (ROOT / "userparams.h").read_text(encoding="utf-8")
     numbers = {name: float(number) for name, number in re.findall(r"^#define +(\w+) +(-?[\d.]+)\b", text, re.MULTILINE)}
-    assert found["board_params.lock_periods"] == (2, False, numbers["LOCK_TIME"])
+    assert found["board_params.align_periods"] == (2, False, numbers["LOCK_TIME"])
     assert found["board_params.kcurr_a"] == (2, True, round(numbers["KCURRA"] * 32768))
     assert found["board_params.maximum_erpm"] == (2, True, numbers["MAXIMUM_SPEED_RPM"] * numbers["NOPOLESPAIRS"])
     assert found["board_params.duty_per_volt_numerator"][:2] == (4, False)

@@ -18,7 +18,7 @@ PI2 = 2.0 * math.pi
 
 def golden(rs: float, ls_mh: float, kphi: float, pairs: int, amperes: float, most_a: float, speeds: tuple[float, float], hz: float) -> dict[str, float]:
     """AN1292's Equations 5, 6 and 8 in their corrected form at 24 V, 50 us and 2 us; a sine's steepest slope; gains 2 pi f L and 2 pi f R.
-    Written here once more, from the note, without the project's headers."""
+    Written here once more, from AN1292, without the project's headers."""
     ratio = amperes / (24.0 / math.sqrt(3.0) * 0.96)
     slope = [PI2 * rpm / 60.0 * pairs * 50e-6 * most_a / amperes * 16384.0 for rpm in speeds]
     return {"NORM_RS": rs * ratio * 16384.0, "NORM_LSDTBASE": ls_mh * 1e-3 / 50e-6 * ratio * 128.0, "NORM_DELTAT": 50e-6 / 60.0 * 2.0 ** 31,

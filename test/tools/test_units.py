@@ -7,7 +7,7 @@ from support import document, refusal
 
 from tools.common import units
 
-# One motor in every form: 5 pole pairs, 7.24 V peak line to line at 1000 rpm. Worked out by hand from the note's Table 1.
+# One motor in every form: 5 pole pairs, 7.24 V peak line to line at 1000 rpm. Worked out by hand from AN1292's Table 1.
 SAME_KPHI = {"V peak line-to-line/krpm": 7.24, "V rms line-to-line/krpm": 5.119453, "V dc/krpm": 6.913691, "V peak phase/krpm": 4.180016,
              "V rms phase/krpm": 2.955717, "V s/rad": 7.983242e-3, "mV s/rad": 7.983242, "V s/rad line-to-line": 0.06913691,
              "N m/A peak": 0.05987432, "N m/A rms": 0.08467507, "N m/A dc": 0.06602088, "mN m/A peak": 59.87432, "mN m/A rms": 84.67507,

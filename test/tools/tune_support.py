@@ -1,4 +1,4 @@
-"""What the tuner's tests share: a motor file to change, the note's motor, and calls of the command line."""
+"""What the tuner's tests share: a motor file to change, AN1292's motor, and calls of the command line."""
 
 import contextlib
 import functools

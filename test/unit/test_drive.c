@@ -1,4 +1,4 @@
-/* The whole drive: power-up, one slow block a period, orderly stop, both directions alike, and the closed loop on the ideal motor. */
+/* The whole drive: power-up, one slow block a period, controlled stop, both directions alike, and the closed loop on the ideal motor. */
 #include "ideal_motor.h"
 
 void setUp(void)

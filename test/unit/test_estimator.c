@@ -5,7 +5,7 @@
 
 /** Round numbers: Rs and Ls take 1/2 and 1/4 of their current. */
 static estimator_params_t params;
-static estimator_tuning_t tuning;
+static motor_model_t tuning;
 static estimator_t e;
 
 void setUp(void)
@@ -14,7 +14,7 @@ void setUp(void)
         .rs_q16 = 32768u, .rs_exp = 0, .ls_exp = 0, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
         .half_step_q16_rad = 11244, .kfilter_velestim_q16 = 1496, .nominal_erpm = 14000, .decimate_erpm = 1400
     };
-    static const estimator_tuning_t t = { .ls_q16 = 16384u, .inv_kfi = 7956, .emf_sum_max_q12 = 8434, .kfilter_esdq_q16 = 2400 };
+    static const motor_model_t t = { .ls_q16 = 16384u, .inv_kfi = 7956, .emf_sum_max_q12 = 8434, .kfilter_esdq_q16 = 2400 };
     static const estimator_t zero;
     params = p;
     tuning = t;

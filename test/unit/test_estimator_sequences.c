@@ -25,7 +25,7 @@ static const estimator_params_t params = {
     .nominal_erpm = GOLDEN_ESTIMATOR_START_NOMINAL_ERPM,
     .decimate_erpm = GOLDEN_ESTIMATOR_START_DECIMATE_ERPM
 };
-static estimator_tuning_t tuning;
+static motor_model_t tuning;
 static runner_t ahead, mirror;
 
 static void reset(runner_t *r)

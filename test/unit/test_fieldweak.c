@@ -6,7 +6,7 @@
 #include "unity.h"
 
 static fieldweak_params_t params;
-static estimator_tuning_t tuning;
+static motor_model_t tuning;
 static fieldweak_t fw;
 
 void setUp(void)

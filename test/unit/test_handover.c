@@ -77,11 +77,11 @@ void test_agreement_must_be_without_a_gap(void)
 void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_one_only(void)
 {
     uint16_t n;
-    drive.run.handover.agreed_steps = (uint16_t)(params.ready_slots - 1u);
+    drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
     for (n = 1; n <= 8u; n++) {
         drive.ticks = n;
         handover_wait(&drive, &params);
-        TEST_ASSERT_EQUAL_UINT16(params.ready_slots - (n < 8u), drive.run.handover.agreed_steps);
+        TEST_ASSERT_EQUAL_UINT16(params.agree_steps - (n < 8u), drive.run.handover.agreed_steps);
         TEST_ASSERT_EQUAL_UINT16(n == 8u, drive.run.handover.waited_steps);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */
     }
@@ -96,7 +96,7 @@ void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_on
 void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(void)
 {
     static const drive_state_t states[] = { DRIVE_STOPPED, DRIVE_FAULT, DRIVE_ALIGN };
-    drive.run.handover.agreed_steps = params.ready_slots;
+    drive.run.handover.agreed_steps = params.agree_steps;
     EACH(n, states) {
         drive.state = (uint16_t)states[n];
         slow(1);

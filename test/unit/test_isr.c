@@ -280,7 +280,7 @@ void test_trap_in_the_middle_of_the_hand_over_is_not_overwritten(void)
     trap_comes_in_the_hand_over = 1;
     for (n = 0; n < 16u && trap_comes_in_the_hand_over; n++) {
         board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
-        board_drive.run.handover.agreed_steps = board_params.ready_slots;
+        board_drive.run.handover.agreed_steps = board_params.agree_steps;
         control_interrupts(1);
     }
     TEST_ASSERT_EQUAL_UINT16(0, trap_comes_in_the_hand_over);

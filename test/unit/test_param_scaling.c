@@ -224,12 +224,12 @@ void test_speeds_and_times(void)
     EXACT(p.ramp_hold_erpm, 1750);   /* an eighth of nominal speed */
     EXACT(TUNING_STEP_Q16, 32768);   /* one electrical rpm every 16 periods: half of one in eight */
     EXACT(p.bootstrap_periods, 200); /* 10 ms */
-    EXACT(p.lock_periods, 4000);
-    EXACT((int32_t)p.lock_sweep_q32, 0x40000000 / 2000); /* a quarter turn in half the time */
-    EXACT(p.ready_slots, 50);                            /* 20 ms */
-    EXACT(p.ready_timeout_slots, 500);                   /* 200 ms */
-    EXACT(p.stall_slots, 750);                           /* 0.3 s */
-    EXACT(p.lost_lock_slots, 125);                       /* 50 ms */
+    EXACT(p.align_periods, 4000);
+    EXACT((int32_t)p.align_sweep_q32, 0x40000000 / 2000); /* a quarter turn in half the time */
+    EXACT(p.agree_steps, 50);                            /* 20 ms */
+    EXACT(p.wait_steps, 500);                   /* 200 ms */
+    EXACT(p.stall_steps, 750);                           /* 0.3 s */
+    EXACT(p.lost_lock_steps, 125);                       /* 50 ms */
 }
 
 void test_controllers(void)
@@ -305,7 +305,7 @@ void test_loop_time_scales_every_time_and_duty(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     EXACT(p.bootstrap_periods, 100);
-    EXACT(p.stall_slots, 375);
+    EXACT(p.stall_steps, 375);
     EXACT(p.svm.full, 4000);
     EXACT(p.svm.dead_time, 80); /* the same 2 us */
     EXACT(p.svm.top, 3872);

@@ -27,7 +27,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--no-plots", action="store_true", help="write summary and trace only")
     run.set_defaults(command=_run)
 
-    loads = commands.add_parser("table2", help="the eight rows of the note's Table 2 beside ours")
+    loads = commands.add_parser("table2", help="the eight rows of AN1292's Table 2 beside ours")
     loads.set_defaults(command=table2.command)
 
     angles = commands.add_parser("starts", help="start from every rotor angle under several loads")

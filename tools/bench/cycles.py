@@ -225,7 +225,7 @@ def text(report: Report) -> str:
     """The whole report, as printed."""
     found, shape = report.found, report.profile
     head = (f"{'control interrupt':<26}{'number':>10}{'min':>8}{'mean':>9}{'max':>7}{'min us':>10}{'mean':>8}{'max':>8}{'load':>10}"
-            "   the note's us")
+            "   AN1292's us")
     where: dict[str, list[str]] = {}
     for name, (cycles, at_s, state) in sorted(found.longest.items(), key=lambda item: -item[1][0]):
         where.setdefault(f"{cycles} in {state} at {at_s:.4f} s", []).append(name)

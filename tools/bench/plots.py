@@ -132,7 +132,7 @@ def _weakens(run: Run) -> bool:
 
 
 def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
-    """As the note's Figure 8: d current and 1/Kphi as functions of speed."""
+    """As AN1292's Figure 8: d current and 1/Kphi as functions of speed."""
     closed = _closed(run, thin)
     speed = np.abs(thin.column("plant.speed_rpm"))[closed]
     other = axes.twinx()
@@ -147,7 +147,7 @@ def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
 
 
 def write_table2(rows: list[dict], folder: Path) -> list[str]:
-    """Speed and current of Table 2: the note's and ours over the reference speed."""
+    """Speed and current of Table 2: AN1292's and ours over the reference speed."""
     figure, (left, right) = plt.subplots(1, 2, layout="constrained")
     reference = [row["reference_rpm"] for row in rows]
     left.plot(reference, reference, color="black", linewidth=0.7, label="reference")

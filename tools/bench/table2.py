@@ -1,4 +1,4 @@
-"""`table2`: the eight rows of the note's Table 2 beside ours. The rows are data in tools/bench/scenarios/tables/table2.toml."""
+"""`table2`: the eight rows of AN1292's Table 2 beside ours. The rows are data in tools/bench/scenarios/tables/table2.toml."""
 
 import argparse
 from collections.abc import Callable
@@ -26,7 +26,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Row:
-    """One row of the note's table, and what must hold for it."""
+    """One row of AN1292's table, and what must hold for it."""
 
     reference_rpm: float
     torque_nm: float
@@ -108,7 +108,7 @@ def _job(table: Table, row: Row, library: Library, motor: Part, board: Part) -> 
 
 
 def _result(row: Row, result: dict[str, Any]) -> dict[str, Any]:
-    """A row of the printed table: the note's numbers and ours."""
+    """A row of the printed table: AN1292's numbers and ours."""
     return {"name": f"{row.reference_rpm:.0f} rpm", "reference_rpm": row.reference_rpm, "torque_nm_set": row.torque_nm,
             "note_rpm": row.note_rpm, "note_current_a": row.note_current_a, **result, "limit": limit_text(result)}
 
@@ -123,7 +123,7 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     if row.no_more_current:
         current = result["current_rms_a"]
         outcomes.append(Outcome(f"{name}: current", current is not None and current <= row.note_current_a,
-                                "nothing" if current is None else f"{current:.3f} A RMS", f"at most the note's {row.note_current_a:g} A"))
+                                "nothing" if current is None else f"{current:.3f} A RMS", f"at most AN1292's {row.note_current_a:g} A"))
     return outcomes
 
 

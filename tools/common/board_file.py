@@ -64,7 +64,7 @@ class BoardFile:
     current_full_scale_a: float
     """Phase current at the end of the converter's range; divided by 32768 it is NORM_CURRENT_CONST."""
     current_gain: float
-    """KCURRA and KCURRB of the note: 0.5 is gain 1; negative if the amplifier's output falls with current into the motor."""
+    """KCURRA and KCURRB of AN1292: 0.5 is gain 1; negative if the amplifier's output falls with current into the motor."""
     rds_on_ohm: float
     shunt_ohm: float
     over_voltage_v: float

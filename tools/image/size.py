@@ -91,7 +91,7 @@ def rows(now: Shares, before: Shares | None, budget: Budget) -> list[Row]:
             total = _sum("group", title, title, [row for row in inside if row.kind == "module"], note=group.note_flash if group else None)
             totals.append((total, group))
             result += [total, *inside]
-    # what is not assigned counts as the note's until somebody says otherwise
+    # what is not assigned counts as AN1292's until somebody says otherwise
     as_note = [row for row, group in totals if group is None or group.note_flash is not None]
     known = [group.note_flash for group in budget.groups if group.note_flash is not None]
     result.append(_sum("total", NOTE_TITLE, "", as_note, note=sum(known), budget=budget.note.flash, note_ram=budget.note.ram,
@@ -160,7 +160,7 @@ def text(report: Report) -> str:
         lines += [f"changed since {report.base_name}", *(_line(row) for row in changed), ""]
     lines += [HEAD, *(_line(row) for row in report.rows if row.kind != "function")]
     lines.append(f"{'stack':<44}{'':>7}{'':>7}{'':>8}{'':>8}{report.stack.depth:>7}{report.budget.image.stack:>8}")
-    lines.append("bytes; flash is 3 bytes a word, vector tables and configuration words not counted; the note is at its -O3")
+    lines.append("bytes; flash is 3 bytes a word, vector tables and configuration words not counted; AN1292 is at its -O3")
     lines.append(f"change: since {report.base_name}" if report.base_name else f"no column for the change: {report.no_base}")
     return "\n".join(lines)
 
