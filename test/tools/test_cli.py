@@ -145,8 +145,8 @@ def test_the_report_tells_motor_and_header_and_says_if_they_do_not_belong_togeth
     finally:
         shutil.rmtree(paths.ROOT / "build" / f"host-{build.variant_name([], own)}", ignore_errors=True)
     assert (code, error) == (0, "")
-    assert f"\nheader  {own}/userparams.h\nnote    the header is for another motor: MOTOR_RS_OHM is 2 ohm" in out
-    assert (place.summary()["header"], place.summary()["motor"]) == (f"{own}/userparams.h", "tuning/motors/hurst_dmb0224c10002.toml")
+    assert f"\nheader  {paths.shown(own)}/userparams.h\nnote    the header is for another motor: MOTOR_RS_OHM is 2 ohm" in out
+    assert (place.summary()["header"], place.summary()["motor"]) == (f"{paths.shown(own)}/userparams.h", "tuning/motors/hurst_dmb0224c10002.toml")
     assert "\nheader  userparams.h\n\n" in command(*arguments)[1]
 
 

@@ -22,4 +22,4 @@ def test_a_folder_that_is_not_there_or_cannot_be_read_is_named(tmp_path, monkeyp
     monkeypatch.setattr(Path, "is_file", denied)
     for call in (lambda: paths.find("motor", "a", tmp_path), lambda: paths.find("motor", str(tmp_path / "a.toml"), tmp_path),
                  lambda: paths.names(tmp_path)):
-        refusal(call, f"cannot read the folder (Permission denied), {tmp_path}: make it readable")
+        refusal(call, f"cannot read the folder (Permission denied), {paths.shown(tmp_path)}: make it readable")
