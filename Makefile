@@ -188,9 +188,10 @@ modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_t
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
 slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust image_build examples),$(bench_py))
-longest := $(addprefix behaviour/test_,identify_motors fw_search) $(slow_suites)
+sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
+longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
-all_suites := $(tools_py) $(longest) $(filter-out $(longest),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
+all_suites := $(tools_py) $(longest) $(filter-out $(longest) $(sweep_suites),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
 
 # Every chosen suite runs anew. make leaves a stamp for each that it could build; one without has failed.
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
@@ -204,9 +205,12 @@ run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unkn
     PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
     --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
-.PHONY: test test-quick setup-test setup-checks
-test: setup-test setup-checks ## [tests] every test; the last line is "N passed, N failed" [ONLY="test_pi ..."]
-	$(call run_suites,$(all_suites),$(if $(ONLY),,--summary $T/summary.json))
+.PHONY: test test-quick test-sweeps setup-test setup-checks
+test: setup-test setup-checks ## [tests] every test but the sweeps; the last line is "N passed, N failed" [ONLY="test_pi ..."]
+	$(call run_suites,$(all_suites) $(if $(ONLY),$(sweep_suites)),$(if $(ONLY),,--summary $T/summary.json))
+
+test-sweeps: setup-test ## [tests] identification of every motor, and the field-weakening search
+	$(call run_suites,$(sweep_suites))
 
 test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ..."]
 	$(call run_suites,$(quick_suites))
