@@ -201,7 +201,7 @@ mode_stamps := $(addprefix $T/made/modes/,default $(modes))
 stamps = $(addprefix $T/made/,$1) $(if $(filter static/test_modes,$1),$(mode_stamps))
 run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unknown_suites,$1)'$(comma) make $@: make test runs them all and shows their names" >&2; \
     exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
-    rm -rf $T/made $T/summary.json; $(MAKE) -k $(call stamps,$(call chosen,$1)) || true; \
+    rm -rf $T/made $(if $2,$T/summary.json); $(MAKE) -k $(call stamps,$(call chosen,$1)) || true; \
     PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
     --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
