@@ -26,6 +26,21 @@ void test_each_side_spans_its_direction_and_the_middle_keeps_the_one_there_is(vo
     }
 }
 
+void test_travel_is_twice_the_distance_from_the_middle_and_its_first_three_per_cent_keep_the_direction(void)
+{
+    static const struct {
+        uint16_t pot_q16, travel_q16;
+        int16_t direction;
+    } cases[] = {
+        { 0xC000u, 0x8000u, 1 }, { 0x4000u, 0x8000u, -1 }, { 0x8401u, 2050u, 1 }, { 0x7BFFu, 2050u, -1 }, { 0x8400u, 2048u, 7 }, { 0x7C00u, 2048u, 7 },
+    };
+    EACH(n, cases) {
+        int16_t direction = 7; /* whatever there is */
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].travel_q16, mode_pot_split(cases[n].pot_q16, &direction), golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].direction, direction, golden_row(n));
+    }
+}
+
 void test_target_is_at_least_minimum_speed_everywhere(void)
 {
     int32_t pot;

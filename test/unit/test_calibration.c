@@ -104,3 +104,16 @@ void test_a_fault_after_calibration_keeps_the_offsets(void)
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "cleared");
     TEST_ASSERT_EQUAL_INT16(200, drive.calibration.offset_a_q13);
 }
+
+void test_a_cleared_fault_begins_both_sums_anew(void)
+{
+    rig_power_up();
+    rig_currents(100, -100);
+    rig_tick(10);
+    drive_raise(&drive, FAULT_OVERVOLTAGE);
+    drive.command.clear_fault = 1;
+    rig_tick(1);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
+    TEST_ASSERT_EQUAL_INT32(0, drive.calibration.sum_a);
+    TEST_ASSERT_EQUAL_INT32(0, drive.calibration.sum_b);
+}
