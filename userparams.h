@@ -49,7 +49,7 @@
 #define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each): 0.2 s */
 #define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
-#define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of lock and ramp: pull-out torque 0.0844 N m */
+#define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of align and ramp: pull-out torque 0.0844 N m */
 
 /* ---- Limits and protections --------------------------------------------------------------------------------------- */
 #define MAXIMUM_CURRENT_A 2.75      /* [A peak]        0.1 .. 20      length of the current vector that the drive may ask for */

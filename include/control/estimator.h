@@ -150,7 +150,7 @@ QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, sincos_t frame)
 }
 
 /** One period. @param frame of the control
- *  @param forced nonzero while the forced angle drives the motor (lock and ramp): the estimator runs along in a frame of its own */
+ *  @param forced nonzero while the forced angle drives the motor (ALIGN and RAMP): the estimator runs along in a frame of its own */
 QM_INLINE void estimator_tick(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14,
                               sincos_t frame, uint16_t forced)
 {

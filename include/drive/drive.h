@@ -45,7 +45,7 @@ typedef struct {
     uint16_t bootstrap_periods;
     uint16_t align_periods;
     uint16_t agree_steps, wait_steps; /**< agreement needed at the end of the ramp, and how long it may take */
-    uint32_t align_sweep_q32;         /**< angle step while the first half of the lock turns by 90 degrees */
+    uint32_t align_sweep_q32;         /**< angle step while the first half of ALIGN turns by 90 degrees */
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */

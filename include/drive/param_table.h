@@ -39,7 +39,7 @@
     X(LOCK_TIME, "periods", 200, 32000, FROM_TUNER, "rotor held at a fixed angle (two directions, half the time each)") \
     X(END_SPEED_RPM, "rpm", 50, 5000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
     X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000, FROM_TUNER, "acceleration of the ramp") \
-    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of lock and ramp")
+    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of align and ramp")
 
 #define PARAM_LIMITS(X) /* Limits and protections */ \
     X(MAXIMUM_CURRENT_A, "A peak", 0.1, 20, FROM_MOTOR, "length of the current vector that the drive may ask for") \

@@ -39,7 +39,7 @@ QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
     return svm(&p->svm, v, d->duty_per_volt_q16, d->i_a_q13, d->i_b_q13, d->i_c_q13);
 }
 
-/** One PWM period up to the duties; then drive_outputs(), and last drive_slow(), which has no deadline.
+/** One PWM period up to the duties; then drive_outputs(), drive_slow(), which has no deadline, and last drive_settle().
  *  @param raw the converter's results at the centre of the low sides' conduction
  *  @return duties; the board must load them before the next PWM boundary */
 QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
