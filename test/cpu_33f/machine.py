@@ -1,4 +1,4 @@
-"""The simulator as the tests see it: a state goes in, some cycles run, the state comes out. The library is machine.c with the core."""
+"""The simulator as the tests see it: a state goes in, some cycles run, the state comes out. The library is the core alone."""
 
 import ctypes
 import os
@@ -6,35 +6,31 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from alu import FLAG_NAMES
+from alu import FLAG_NAMES, signed
 from vectors import REGISTERS
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = Path(os.environ.get("ISS_LIBRARY", ROOT / "build" / "iss" / "libmachine.so"))
 PROGRAM = 0x200
 RAM = 0x800
+SR = 0x42
 RAM_NAMES = [f"[{address:x}]" for address in range(RAM, RAM + 0x800, 2)]
 
 
-_P, _U, _U32, _TEXT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint32, ctypes.c_char_p
-SIGNATURES = { # of machine.c: the result, the arguments
-    "machine_create": (_P,), "machine_core": (_P, _P), "machine_run": (_TEXT, _P, ctypes.c_uint64), "machine_load": (None, _P, _U, _P),
-    "machine_set": (None, _P, _P, _TEXT, _U, _P), "machine_get": (None, _P, _P), "machine_ram": (None, _P, _TEXT),
-    "machine_peek": (_U, _P, _U),
-    "machine_poke": (None, _P, _U, _U), "machine_forget": (None, _P, _U, _U), "machine_forget_w": (None, _P, _U),
-    "machine_disassemble": (_TEXT, _P, _U32, _U32, _U32), "machine_irq_changed": (None, _P),
+_P, _U, _U16, _U32, _TEXT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint16, ctypes.c_uint32, ctypes.c_char_p
+SIGNATURES = { # of iss.h: the result, the arguments
+    "iss_create": (_P,), "iss_reset": (None, _P, ctypes.c_int), "iss_restart": (None, _P, _U32), "iss_run": (ctypes.c_int, _P, ctypes.c_uint64),
+    "iss_error": (_TEXT, _P), "iss_write_program": (ctypes.c_bool, _P, _U32, _U32), "iss_data": (_P, _P), "iss_peek": (_U16, _P, _U16),
+    "iss_poke": (None, _P, _U16, _U16), "iss_ram_known": (None, _P, _U16, _U, ctypes.c_bool), "iss_set_w_known": (None, _P, _U16),
+    "iss_pc": (_U32, _P), "iss_cycles": (ctypes.c_uint64, _P), "iss_acc": (ctypes.c_int64, _P, _U),
+    "iss_set_acc": (None, _P, _U, ctypes.c_int64), "iss_sync": (None, _P), "iss_irq_changed": (None, _P),
+    "iss_disassemble": (_U, _U32, _U32, _U32, _TEXT, ctypes.c_size_t),
 }
+ERASED, ACC_MASK = 0xFFFFFF, 0xFFFFFFFFFF
 
 
 class _Assumption(ctypes.Structure):
     _fields_ = [("id", ctypes.c_char_p), ("value", ctypes.c_int), ("meaning", ctypes.c_char_p), ("used_in", ctypes.c_char_p)]
-
-
-class Registers(ctypes.Structure):
-    """What machine_get() fills in; the order is machine.c's."""
-
-    _fields_ = [("w", ctypes.c_uint16 * 16), ("sr", ctypes.c_uint16), ("corcon", ctypes.c_uint16), ("acc", ctypes.c_uint64 * 2),
-                ("pc", ctypes.c_uint32), ("cycles", ctypes.c_uint64)]
 
 
 @dataclass
@@ -56,11 +52,10 @@ class Machine:
         for name, (result, *arguments) in SIGNATURES.items():
             getattr(library, name).restype, getattr(library, name).argtypes = result, arguments
         library.iss_assumption.restype = ctypes.c_bool
-        self._core = ctypes.c_void_p(library.machine_create())
-        self.core = ctypes.c_void_p(library.machine_core(self._core))
+        self.core = ctypes.c_void_p(library.iss_create())
         self.library = library
-        self._registers = Registers()
-        self._ram = ctypes.create_string_buffer(0x800)
+        self._data = library.iss_data(self.core)
+        self._loaded: list[int] = []
 
     def assumption(self, name: str) -> int:
         """A value of tools/cpu_33f/iss_assumptions.h."""
@@ -73,32 +68,40 @@ class Machine:
 
     def load(self, words: dict[int, int]) -> None:
         """Erases the last program and writes this one, by address."""
-        flat = [number for pair in words.items() for number in pair]
-        self.library.machine_load(self._core, len(words), (ctypes.c_uint32 * len(flat))(*flat))
+        for address, word in [*((address, ERASED) for address in self._loaded), *words.items()]:
+            self.library.iss_write_program(self.core, address, word)
+        self._loaded = list(words)
 
     def set_state(self, w: list[int], sr: int, acc: list[int], registers: dict[int, int], ram: bytes, pc: int) -> None:
         """Resets the core, then sets registers, core registers by address, and RAM, all of which counts as written."""
-        state = self._registers
-        state.w[:] = w
-        state.sr, state.pc = sr, pc
-        state.acc[:] = [value & 0xFFFFFFFFFF for value in acc]
-        flat = [number for pair in registers.items() for number in pair]
-        self.library.machine_set(self._core, ctypes.byref(state), ram, len(registers), (ctypes.c_uint32 * len(flat))(*flat))
+        library, core = self.library, self.core
+        library.iss_reset(core, 0)
+        library.iss_restart(core, pc)
+        for address, value in [*((2 * index, value) for index, value in enumerate(w)), *registers.items(), (SR, sr)]:
+            library.iss_poke(core, address, value)
+        library.iss_set_w_known(core, 0xFFFF)
+        ctypes.memmove(self._data + RAM, ram, 0x800)
+        library.iss_ram_known(core, RAM, 0x800, True)
+        for which, value in enumerate(acc):
+            library.iss_set_acc(core, which, signed(value, 40))
+        library.iss_irq_changed(core)
 
     def run(self, until: int) -> str:
         """Runs to at least this cycle after set_state(); the text of what stopped it before, or ""."""
-        return self.library.machine_run(self._core, until).decode()
+        stopped = self.library.iss_run(self.core, until)
+        assert stopped in (0, 2), "a stop without an error"
+        return self.library.iss_error(self.core).decode() if stopped else ""
 
     def registers(self) -> Snapshot:
         """Registers, program counter and cycles since set_state()."""
-        state = self._registers
-        self.library.machine_get(self._core, ctypes.byref(state))
-        return Snapshot(list(state.w), state.sr, list(state.acc), state.pc, state.cycles)
+        library, core = self.library, self.core
+        words = struct.unpack("<34H", ctypes.string_at(self._data, SR + 2))
+        return Snapshot(list(words[:16]), words[-1], [library.iss_acc(core, which) & ACC_MASK for which in (0, 1)], library.iss_pc(core),
+                        library.iss_cycles(core))
 
     def memory(self) -> bytes:
         """All of RAM."""
-        self.library.machine_ram(self._core, self._ram)
-        return self._ram.raw
+        return ctypes.string_at(self._data + RAM, 0x800)
 
     def state(self) -> dict[str, int]:
         """Everything by name, as the vectors call it."""
@@ -111,24 +114,26 @@ class Machine:
 
     def peek(self, address: int) -> int:
         """A word of data memory or a register."""
-        return self.library.machine_peek(self._core, address)
+        self.library.iss_sync(self.core)
+        return self.library.iss_peek(self.core, address)
 
     def poke(self, address: int, value: int) -> None:
         """Writes a word of data memory as a peripheral does."""
-        self.library.machine_poke(self._core, address, value)
+        self.library.iss_poke(self.core, address, value)
 
     def forget(self, address: int) -> None:
         """Lets a word of RAM count as never written."""
-        self.library.machine_forget(self._core, address, 2)
+        self.library.iss_ram_known(self.core, address, 2, False)
 
     def forget_w(self, register: int) -> None:
         """Lets a W register count as never written."""
-        self.library.machine_forget_w(self._core, 0xFFFF & ~(1 << register))
+        self.library.iss_set_w_known(self.core, 0xFFFF & ~(1 << register))
 
     def disassemble(self, word: int, following: int, address: int) -> str:
         """An instruction as text, "" if it is none."""
-        return self.library.machine_disassemble(self._core, word, following, address).decode()
+        text = ctypes.create_string_buffer(400)
+        return text.value.decode() if self.library.iss_disassemble(word, following, address, text, len(text)) else ""
 
     def irq_changed(self) -> None:
         """Tells the core that interrupt flags were set from outside."""
-        self.library.machine_irq_changed(self._core)
+        self.library.iss_irq_changed(self.core)

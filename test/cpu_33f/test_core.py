@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from machine import PROGRAM
+from machine import ERASED, PROGRAM
 from test_interrupts import ENTRY, INT0, MAIN, STACK_AT, Chip, first, requested
 from test_vectors import differences
 from vectors import FOLDER, read
@@ -209,9 +209,8 @@ def test_program_written_through_the_pointer_is_decoded_when_told() -> None:
                                              (0xF80018, False)])
 def test_program_memory_ends_where_the_chips_does(address: int, exists: bool) -> None:
     chip = Chip()
-    chip.machine.library.iss_write_program.restype = ctypes.c_bool
-    assert core(chip, "iss_write_program", ctypes.c_uint32(address), ctypes.c_uint32(0x123456)) == exists
-    core(chip, "iss_write_program", ctypes.c_uint32(address), ctypes.c_uint32(0xFFFFFF))
+    assert core(chip, "iss_write_program", address, 0x123456) == exists
+    core(chip, "iss_write_program", address, ERASED)
 
 
 def test_changed_program_memory_is_decoded_anew() -> None:
