@@ -1,6 +1,5 @@
 /* The library's surface: keys and their ranges, errors, trace, warnings, power-up. */
 #include "fake_firmware.inc"
-#include "vb_cpu.h"
 
 void setUp(void); /* both in fake_firmware.inc */
 void tearDown(void);
@@ -162,72 +161,4 @@ void test_a_run_is_repeatable(void)
         angle[k] = get("state.theta_e_deg");
     }
     TEST_ASSERT_EQUAL_DOUBLE(angle[0], angle[1]);
-}
-
-/* A CPU of its own: registers in an array, no host globals. */
-static uint16_t cells[256];
-static unsigned own_interrupts;
-
-static volatile uint16_t *own_register(void *context, const char *name)
-{
-    (void)context;
-    for (size_t n = 0; n < host_sfr_count; n++) {
-        if (strcmp(host_sfr_table[n].name, name) == 0) {
-            return &cells[n];
-        }
-    }
-    return NULL;
-}
-
-static int own_reset(void *context)
-{
-    (void)context;
-    for (size_t n = 0; n < host_sfr_count; n++) {
-        cells[n] = host_sfr_table[n].reset;
-    }
-    firmware_init(); /* to have its settings */
-    for (size_t n = 0; n < host_sfr_count; n++) {
-        cells[n] = *host_sfr_table[n].pointer;
-    }
-    host_registers_reset();
-    return 0;
-}
-
-static uint64_t own_cycles(void *context)
-{
-    (void)context;
-    return 0;
-}
-
-static bool own_raised(void *context, unsigned irq)
-{
-    (void)context;
-    own_interrupts += irq == CHIP_IRQ_ADC1 ? 1u : 0u;
-    volatile uint16_t *ifs0 = own_register(NULL, "IFS0");
-    *ifs0 = (uint16_t)(*ifs0 & ~0x2000u);
-    return false;
-}
-
-static void own_nothing(void *context)
-{
-    (void)context;
-}
-
-static void own_end(void *context, double length_s)
-{
-    (void)context;
-    (void)length_s;
-}
-
-void test_another_cpu_can_sit_on_the_board(void)
-{
-    static const chip_cpu_t cpu = { .reg = own_register, .reset = own_reset, .cycles = own_cycles,
-                                    .raised = own_raised, .end = own_end, .destroy = own_nothing };
-    vb_destroy(board);
-    board = vb_create_with_cpu(&cpu);
-    TEST_ASSERT_NOT_NULL(board);
-    own_interrupts = 0;
-    start(25);
-    TEST_ASSERT_EQUAL_UINT(25, own_interrupts);
-    TEST_ASSERT_EQUAL_HEX16(0, P1TCON);
 }
