@@ -129,16 +129,6 @@ def lowpass(v, rng):
 
 # ---- sine, circle, transformations ----------------------------------------------------------------------------------
 
-@block("every entry of the sine table", "sin(2 pi i / 128) * 32757, nearest", "value:s16")
-def sine_table(v, _):
-    v.rows = [[x] for x in ref.sine_table()]
-
-
-@block("every entry of the circle table", "sqrt(1 - (i/64)^2) * 32767, rounded down", "value:s16")
-def circle_table(v, _):
-    v.rows = [[x] for x in ref.circle_table()]
-
-
 @block("sine and cosine: table points, their neighbours, the borders between them, a random sample",
        "angle 65536 = one turn; sin, cos Q15; checksum s = 31 s + word over sin, cos of all 65536 angles",
        "angle:u16 sin:s16 cos:s16", least_db=72.0)

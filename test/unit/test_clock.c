@@ -40,18 +40,6 @@ void setUp(void)
     written_high = 0xFFFF;
 }
 
-void test_pll_makes_80_MHz_of_8(void)
-{
-    static const register_value_t expected[] = {
-        { "PLLFBD", 38 },       /* times 40 */
-        { "CLKDIV", 0x0000 },   /* by 2 before and 2 after, no doze */
-        { "OSCTUN", 0x0000 },
-    };
-    OSCTUN = 0x003F;
-    (void)clock_init();
-    EXPECT_REGISTERS(expected);
-}
-
 void test_switches_to_the_crystal_with_pll_and_reports_success(void)
 {
     TEST_ASSERT_EQUAL_UINT16(0, clock_init());

@@ -187,21 +187,3 @@ void test_speed_and_angle_hold_with_and_without_load_in_both_directions(void)
         TEST_ASSERT_TRUE(direction * drive.run.control.i_q13.q > 1300); /* (0.05 + 0.004) / 0.0599 A = 1678 counts */
     }
 }
-
-void test_field_weakening_doubles_the_base_speed(void)
-{
-    run_at(1, 10000);
-    drive.command.target_erpm = 27500;
-    ideal_motor_run(30000);
-    EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "at top speed");
-    TEST_ASSERT_FLOAT_WITHIN(140.0F, 27500.0F, ideal_motor_erpm());
-    TEST_ASSERT_EQUAL_UINT16(14, drive.run.fieldweak.index);
-}
-
-void test_blocked_shaft_in_closed_loop_ends_in_a_fault_within_a_second(void)
-{
-    run_at(1, 8000);
-    motor.blocked = 1;
-    TEST_ASSERT_LESS_THAN_UINT32(20000, ideal_motor_run_until(DRIVE_FAULT, 30000));
-    EXPECT_DRIVE(DRIVE_FAULT, (drive.fault == (uint16_t)FAULT_STALL) ? FAULT_STALL : FAULT_LOST_LOCK, "blocked");
-}

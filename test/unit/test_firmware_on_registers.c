@@ -59,48 +59,60 @@ static void expect(drive_state_t state, drive_fault_t fault, uint16_t override)
     TEST_ASSERT_EQUAL_HEX16(override, P1OVDCON);
 }
 
-/* Every register that the start changes, with its value from the device facts; the rest stays as it was. */
+/* Every register that the start writes, with its value from the device facts; the rest stays as it was. */
 static const struct {
     const char *name;
-    uint16_t value;
+    uint16_t value, whole; /* 1: all of it is written, whatever was there */
 } expected[] = {
-    { "CORCON", 0x0024 }, /* fractional, unsaturated; PSV: constants are read from flash */
-    { "RCON", 0x0000 },   /* read once and cleared: the next reset has its own cause */
-    { "OSCCON", 0x3360 }, /* crystal with PLL, locked; pin selection locked */
-    { "PLLFBD", 38 },
-    { "CLKDIV", 0x0000 },
-    { "P1TCON", 0x8002 },
-    { "P1TPER", 999 },
-    { "P1SECMP", 0x8000 | 939 },
-    { "PWM1CON1", 0x0077 },
-    { "P1DTCON1", 0x0068 },
-    { "P1FLTACON", 0x0087 },
-    { "P1OVDCON", 0x0000 },
-    { "AD1CON1", 0x836C },
-    { "AD1CON2", 0x0200 },
-    { "AD1CON3", 0x0002 },
-    { "AD1CHS0", 0x0008 },
-    { "AD1PCFGL", 0xFEF8 },
-    { "RPINR12", 0x0008 }, /* FLTA1 on RP8 */
-    { "RPINR18", 0x1F14 }, /* U1RX on RP20 */
-    { "RPOR9", 0x0300 },   /* U1TX on RP19 */
-    { "TRISA", 0xFFFF },
-    { "TRISB", 0xFFFF },
-    { "TRISC", 0xFF37 },
-    { "IEC0", 0x2000 },    /* AD1IE */
-    { "IEC3", 0x8000 },    /* FLTA1IE */
-    { "IPC3", 0x0054 },    /* AD1IP 5 */
-    { "IPC15", 0x5000 },   /* FLTA1IP 5 */
-    { "T1CON", 0x8000 },
-    { "PR1", 39999u },
-    { "U1MODE", 0x8008 },
-    { "U1STA", 0x0510 },   /* UTXEN */
-    { "U1BRG", 86 },
+    { "CORCON", 0x0024, 1 },   /* fractional, unsaturated; PSV: constants are read from flash */
+    { "RCON", 0x0000, 0 },     /* read once and cleared: the next reset has its own cause */
+    { "OSCCON", 0x3360, 0 },   /* crystal with PLL, locked; pin selection locked */
+    { "PLLFBD", 38, 1 },       /* times 40 */
+    { "CLKDIV", 0x0000, 1 },   /* by 2 before and 2 after, no doze */
+    { "OSCTUN", 0x0000, 1 },
+    { "P1TCON", 0x8002, 1 },   /* on, centre-aligned */
+    { "P1TPER", 999, 1 },      /* 20 kHz */
+    { "P1SECMP", 0x8000 | 939, 1 }, /* the trigger is 1.5 us after the peak, counting down */
+    { "PWM1CON1", 0x0077, 1 }, /* three complementary pairs */
+    { "PWM1CON2", 0x0000, 1 },
+    { "P1DTCON1", 0x0068, 1 }, /* 2 us: 40 counts of two clocks */
+    { "P1DTCON2", 0x0000, 1 }, /* unit A everywhere */
+    { "P1FLTACON", 0x0087, 1 }, /* the fault input switches all pairs inactive, every cycle */
+    { "P1OVDCON", 0x0000, 1 }, { "P1DC1", 0, 1 }, { "P1DC2", 0, 1 }, { "P1DC3", 0, 1 },
+    { "AD1CON1", 0x836C, 1 },  /* ADON, FORM 3: signed fractional, SSRC 3: started by the PWM, SIMSAM, ASAM: all channels at once */
+    { "AD1CON2", 0x0200, 1 },  /* CHPS 2: four channels, SMPI 0: an interrupt after each conversion, supply as reference */
+    { "AD1CON3", 0x0002, 1 },  /* 75 ns */
+    { "AD1CHS0", 0x0008, 1 },  /* CH0 = AN8, the potentiometer */
+    { "AD1CHS123", 0x0000, 1 }, /* CH1..3 = AN0..2, currents and bus, against ground */
+    { "AD1CSSL", 0x0000, 1 },
+    { "AD1PCFGL", 0xFEF8, 1 }, /* analogue: AN0, AN1, AN2, AN8, currents, bus and potentiometer */
+    { "RPINR12", 0x0008, 0 },  /* FLTA1 on RP8 */
+    { "RPINR18", 0x1F14, 0 },  /* U1RX on RP20 */
+    { "RPOR9", 0x0300, 0 },    /* U1TX on RP19 */
+    { "LATA", 0, 1 }, { "LATB", 0, 1 }, { "LATC", 0, 1 },
+    { "TRISA", 0xFFFF, 1 }, { "TRISB", 0xFFFF, 1 }, { "TRISC", 0xFF37, 1 }, /* outputs: RC3 transmits, RC6 and RC7 are LEDs */
+    { "IEC0", 0x2000, 0 },     /* AD1IE */
+    { "IEC3", 0x8000, 0 },     /* FLTA1IE */
+    { "IPC3", 0x0054, 0 },     /* AD1IP 5 */
+    { "IPC15", 0x5000, 0 },    /* FLTA1IP 5 */
+    { "T1CON", 0x8000, 1 },    /* on, internal clock, no prescaler: a millisecond at 40 MIPS */
+    { "PR1", 39999u, 1 }, { "TMR1", 0, 1 },
+    { "U1MODE", 0x8008, 1 },
+    { "U1STA", 0x0510, 0 },    /* UTXEN */
+    { "U1BRG", 86, 1 },
 };
 
 void test_every_register_after_the_start(void)
 {
     size_t n, k;
+    host_registers_reset();
+    bus_volts(24.0F);
+    for (k = 0; k < sizeof expected / sizeof expected[0]; k++) {
+        if (expected[k].whole) {
+            *host_sfr_find(expected[k].name) = 0x5555;
+        }
+    }
+    firmware_init();
     for (n = 0; n < host_sfr_count; n++) {
         uint16_t value = host_sfr_table[n].reset;
         for (k = 0; k < sizeof expected / sizeof expected[0]; k++) {
@@ -130,6 +142,11 @@ void test_S2_leads_over_bootstrap_to_pwm_and_stops_and_nothing_else_does(void)
     }
     TEST_ASSERT_UINT16_WITHIN(1, 11, bootstrap_ms);
     TEST_ASSERT_TRUE(P1DC1 != 0u || P1DC2 != 0u || P1DC3 != 0u);
+    PORTBbits.RB4 = 0; /* S3 changes the range of a running motor */
+    board_ms(29);
+    TEST_ASSERT_EQUAL_INT16(0, board_panel.fast_range);
+    board_ms(1);
+    TEST_ASSERT_EQUAL_INT16(1, board_panel.fast_range);
     PORTAbits.RA8 = 0; /* and S2 again stops */
     board_ms(31);
     expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);

@@ -1,4 +1,4 @@
-/* Pins: what is analogue, what is driven, and which peripheral reaches which pin. */
+/* Pins: the lock of the pin selection, and the buttons. */
 #include "registers.h"
 
 /* Each write of the lock bit, and what the pin selection held then: only between unlock and lock does the chip take a write. */
@@ -21,24 +21,9 @@ static void write_lock(uint16_t value)
 void setUp(void)
 {
     host_registers_reset();
-    LATA = LATB = LATC = 0xFFFF;
-    TRISA = TRISB = TRISC = 0;
     OSCCON = 0x3363; /* locked pin selection, running on crystal and PLL, a switch under way */
     lock_writes = 0;
     pins_init();
-}
-
-void test_registers_hold_the_boards_pins(void)
-{
-    static const register_value_t expected[] = {
-        { "AD1PCFGL", 0xFEF8 }, /* analogue: AN0, AN1, AN2, AN8, currents, bus and potentiometer */
-        { "TRISA", 0xFFFF }, { "TRISB", 0xFFFF }, { "TRISC", 0xFF37 }, /* outputs: RC3 transmits, RC6 and RC7 are LEDs */
-        { "LATA", 0 }, { "LATB", 0 }, { "LATC", 0 },
-        { "RPINR12", 0x0008 },  /* the fault input is RP8 */
-        { "RPOR9", 0x0300 },    /* U1TX on RP19 */
-    };
-    EXPECT_REGISTERS(expected);
-    TEST_ASSERT_EQUAL_UINT16(20, RPINR18bits.U1RXR);
 }
 
 void test_pin_selection_is_unlocked_written_and_locked_again(void)

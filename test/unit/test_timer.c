@@ -8,18 +8,9 @@
 void setUp(void)
 {
     host_registers_reset();
-    TMR1 = 1234;
     T1CON = 0xFFFF;
     IFS0bits.T1IF = 1;
     timer_init();
-}
-
-void test_period_is_one_millisecond_at_40_MIPS_without_an_interrupt(void)
-{
-    static const register_value_t expected[] = {
-        { "PR1", 39999u }, { "T1CON", 0x8000 }, /* on, internal clock, no prescaler */ { "TMR1", 0 }, { "IEC0", 0 }
-    };
-    EXPECT_REGISTERS(expected);
 }
 
 void test_is_switched_on_last(void)

@@ -1,28 +1,9 @@
-/* Sine, cosine and the circle limit: every table entry, every angle, and the errors that the header promises. */
+/* Sine, cosine and the circle limit: every angle, every table entry among them, and the errors that the header promises. */
 #include "control/trig.h"
 #include "golden.h"
 #include "golden_circle.h"
-#include "golden_circle_table.h"
 #include "golden_sincos.h"
-#include "golden_sine_table.h"
 #include "unity.h"
-
-void test_every_entry_of_the_sine_table(void)
-{
-    TEST_ASSERT_EQUAL_UINT32(TRIG_SIN_STEPS, GOLDEN_SINE_TABLE_ROWS);
-    GOLDEN_EACH(sine_table, v) {
-        int16_t entry = (int16_t)((n < TRIG_SIN_ENTRIES) ? trig_sin_table[n] : -trig_sin_table[n - TRIG_SIN_STEPS / 2]);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.value, entry, golden_row(n));
-    }
-}
-
-void test_every_entry_of_the_circle_table(void)
-{
-    TEST_ASSERT_EQUAL_UINT32(TRIG_CIRCLE_STEPS + 1, GOLDEN_CIRCLE_TABLE_ROWS);
-    GOLDEN_EACH(circle_table, v) {
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.value, trig_circle_table[n], golden_row(n));
-    }
-}
 
 void test_sine_and_cosine_equal_the_reference(void)
 {

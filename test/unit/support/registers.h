@@ -1,4 +1,4 @@
-/* Registers by name for the tests of the board's modules: what they must hold, and what they held at one moment. */
+/* For the tests of the board's modules: what every register held at one moment. What each holds after the start: test_firmware_on_registers.c. */
 #ifndef TEST_REGISTERS_H
 #define TEST_REGISTERS_H
 
@@ -9,12 +9,6 @@
 #include "unity.h"
 
 enum { REGISTERS_MOST = 1024 }; /* words of the chip's register space */
-
-/** A register and its value. */
-typedef struct {
-    const char *name;
-    uint16_t value;
-} register_value_t;
 
 static uint16_t registers_then[REGISTERS_MOST];
 static uint16_t registers_accesses;
@@ -40,15 +34,5 @@ static inline uint16_t register_then(const char *name)
     TEST_FAIL_MESSAGE(name);
     return 0;
 }
-
-static inline void registers_expect(const register_value_t *values, size_t count)
-{
-    for (size_t n = 0; n < count; n++) {
-        TEST_ASSERT_EQUAL_HEX16_MESSAGE(values[n].value, *host_sfr_find(values[n].name), values[n].name);
-    }
-}
-
-/** The registers of a table hold its values. */
-#define EXPECT_REGISTERS(table) registers_expect(table, sizeof(table) / sizeof(table)[0])
 
 #endif
