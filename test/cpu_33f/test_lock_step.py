@@ -1,16 +1,17 @@
 """The target image on the virtual board against the host's firmware. Needs XC16: the image is what `make firmware` builds."""
 
 import ctypes
+import io
 import json
 import os
 import re
 import shutil
-import struct
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from elftools.elf.elffile import ELFFile
 
 from chip import RAM, REGISTERS, ROOT, STOP, image, library, pass_ms
 from tools.bench import pil_command
@@ -22,17 +23,10 @@ XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.ge
 IMAGE = ROOT / "build" / "target" / "foc33.elf"
 
 
-def symbol_at(elf: bytes, name: bytes) -> int:
+def symbol_at(elf: bytes, name: str) -> int:
     """Offset of the symbol table's entry with this name."""
-    sections, count = int.from_bytes(elf[32:36], "little"), int.from_bytes(elf[48:50], "little")
-    headers = [struct.unpack_from("<10I", elf, sections + 40 * n) for n in range(count)]
-    table = next(header for header in headers if header[1] == 2)
-    strings = headers[table[6]][4]
-    for at in range(table[4], table[4] + table[5], 16):
-        text = strings + int.from_bytes(elf[at:at + 4], "little")
-        if elf[text:text + len(name)] == name:
-            return at
-    raise ValueError(name)
+    table = ELFFile(io.BytesIO(elf)).get_section_by_name(".symtab")
+    return table["sh_offset"] + table["sh_entsize"] * next(n for n, symbol in enumerate(table.iter_symbols()) if symbol.name == name)
 
 
 def start(chip: PilBoard) -> None:
@@ -186,7 +180,7 @@ def test_a_hex_file_alone_has_no_signals(firmware: Path, tmp_path: Path) -> None
 
 def test_an_image_of_other_settings_is_refused(firmware: Path, tmp_path: Path) -> None:
     data = bytearray(firmware.read_bytes())
-    at = symbol_at(data, b"_board_drive\0")
+    at = symbol_at(data, "_board_drive")
     data[at + 8:at + 12] = (int.from_bytes(data[at + 8:at + 12], "little") + 2).to_bytes(4, "little")
     (tmp_path / "other.elf").write_bytes(data)
     with pytest.raises(UserError, match="same DEFINES"):

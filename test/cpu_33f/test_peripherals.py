@@ -390,10 +390,6 @@ def test_on_a_pseudo_terminal() -> None:
 
 # ---- resets --------------------------------------------------------------------------------------------------------------
 
-def test_software_can_enable_the_watchdog() -> None:
-    assert run("bset rcon, #5\n" + STOP, 10, FWDT=0x40).get("cpu.resets") > 0
-
-
 @pytest.mark.parametrize("cause, bit", [(".word24 0xFD8010", 0x4000), ("mov [w9], w0", 0x4000),
                                         ("mov #0x900, w15; bset 0x80, #1; nop; nop\nbra done", 0x8000)],
                                         ids=["opcode", "address", "conflict"])
