@@ -100,13 +100,6 @@ void test_a_trigger_under_the_high_sides_reads_no_current_and_is_named(void)
     TEST_ASSERT_TRUE(warned_about("P1SECMP"));
 }
 
-void test_samples_are_valid_while_the_low_side_has_conducted_long_enough(void)
-{
-    hold_current(250);
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("adc.ia_invalid_count"));
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("adc.ib_invalid_count"));
-}
-
 void test_a_high_duty_closes_the_window_of_its_shunt(void)
 {
     set("inverter.trip_a", 0.0);

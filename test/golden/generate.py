@@ -342,13 +342,12 @@ def estimator_sequence(v, speed, current, closed_from, inv_kfi, compare_from):
 
 
 def require_lock(v, turns, speed, n, expected_deg, within_deg):
-    """@param n sample, -1 the last one @return angle of the rotor half a period after it, in counts"""
+    """The estimated angle after sample n (-1: the last one) lags the rotor's by what it should."""
     n = n % len(v.rows)
     true = round((turns[n] + speed[n] * MACHINE.turns_per_erpm / 2) * 65536)
     error_deg = ref.wrap16(true - v.rows[n][5]) * 360 / 65536
     if abs(error_deg - expected_deg) > within_deg:
         raise ValueError(f"{v.name}: the angle error is {error_deg:.2f} deg, expected {expected_deg:.2f}")
-    return true % 65536
 
 
 def locked_sequence(v, speed, current, closed_from, compare_from, within_deg):
@@ -389,9 +388,7 @@ def estimator_kphi(v, _):
     speed = [7500.0] * 2301
     turns = estimator_sequence(v, speed, [0.8j] * 2301, 0, ratios, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
     for end in (500, 900, 1500, 2300):
-        expected = ref.lock_error_deg(1 / ratios[end - 1]) # K'/K is a ratio of Kphi, inv_kfi is its inverse
-        true = require_lock(v, turns, speed, end - 1, expected, 0.5)
-        v.constants |= {f"error_counts_{end}": ref.nearest(expected / 360 * 65536), f"true_rho_{end}": true}
+        require_lock(v, turns, speed, end - 1, ref.lock_error_deg(1 / ratios[end - 1]), 0.5) # K'/K is a ratio of Kphi, inv_kfi its inverse
 
 
 # ---- field weakening, start, drive ----------------------------------------------------------------------------------
@@ -472,26 +469,15 @@ def hand_over(v, rng):
         v.add([args[0], args[1], *args[2], args[3]], out, ref.hand_over_real(*args), out[1:])
 
 
-@block("constants of Equations 5 to 8 for the note's motor with four current ranges (A * 100 in the name)",
-       "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; rs, ls, inv_kfi, deltat in the note's format, pre-divided by "
-       "2, 256, 2, 1; the rest in the drive's formats")
+@block("constants of Equations 5 to 8 for the motor of AN1292 with four current ranges (A * 100 in the name)",
+       "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; in the drive's formats")
 def params(v, _):
-    """Published constants of the motor of AN1292 and, in float64, what include/drive/param_scaling.h must give to 1 count."""
-    published = {"c395": (12990, 1460), "c709": (23316, 2620), "c440": (14470, 1626)}
+    """What include/drive/param_scaling.h must give to 1 count, in float64."""
     for amperes in (3.95, 7.09, 4.4, 22.0):
-        m = ref.Machine(peak_current_a=amperes)
-        key = f"c{round(amperes * 100)}"
-        rounded = (ref.nearest(m.rs * 16384), ref.nearest(m.ls * 128))
-        if key in published:
-            if any(abs(a - b) > 1 for a, b in zip(rounded, published[key])):
-                raise ValueError(f"params: {rounded} are not the published {published[key]}")
-            v.constants[f"{key}_norm_rs"], v.constants[f"{key}_norm_ls"] = published[key]
-        v.constants |= {f"{key}_{name}": value for name, value in m.estimator().items()}
+        machine = ref.Machine(peak_current_a=amperes)
+        v.constants |= {f"c{round(amperes * 100)}_{name}": value for name, value in machine.estimator().items()}
     m = MACHINE
-    v.constants |= {"norm_deltat": ref.nearest(m.turns_per_erpm * 2 ** 31), "norm_invkfi": ref.nearest(m.inv_kfi * 16384),
-                    "norm_current_141_at_121": ref.q15(1.41 / 0.000121 / 32768),
-                    "end_speed_q10": round(1000 * 5 * 50e-6 / 60 * 65536 * 1024),
-                    **{f"svm_{name}": value for name, value in m.modulator().items()},
+    v.constants |= {**{f"svm_{name}": value for name, value in m.modulator().items()},
                     "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
                     "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}
 

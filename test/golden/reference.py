@@ -181,7 +181,6 @@ class Machine:
     kphi: float = 7.24              # V peak line to line per 1000 rpm
     pole_pairs: int = 5
     bus_v: float = 24.0
-    bus_full_scale_v: float = 52.8
     period_s: float = 50e-6
     dead_time_s: float = 2e-6
     window_s: float = 1.6e-6
@@ -189,7 +188,6 @@ class Machine:
     maximum_current_a: float = 2.75
     nominal_rpm: float = 2800.0
     maximum_rpm: float = 5500.0
-    end_rpm: float = 1000.0
     kfilter_velestim: int = 748
 
     @property

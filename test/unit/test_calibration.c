@@ -92,6 +92,7 @@ void test_a_fault_during_calibration_calibrates_anew_when_cleared(void)
     clear_and_calibrate(100, 50);
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "calibrated");
     TEST_ASSERT_EQUAL_INT16(100, drive.calibration.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(50, drive.calibration.offset_b_q13);
 }
 
 void test_a_fault_after_calibration_keeps_the_offsets(void)
@@ -103,17 +104,4 @@ void test_a_fault_after_calibration_keeps_the_offsets(void)
     rig_tick(1);
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "cleared");
     TEST_ASSERT_EQUAL_INT16(200, drive.calibration.offset_a_q13);
-}
-
-void test_a_cleared_fault_begins_both_sums_anew(void)
-{
-    rig_power_up();
-    rig_currents(100, -100);
-    rig_tick(10);
-    drive_raise(&drive, FAULT_OVERVOLTAGE);
-    drive.command.clear_fault = 1;
-    rig_tick(1);
-    TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
-    TEST_ASSERT_EQUAL_INT32(0, drive.calibration.sum_a);
-    TEST_ASSERT_EQUAL_INT32(0, drive.calibration.sum_b);
 }

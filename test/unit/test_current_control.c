@@ -101,16 +101,3 @@ void test_sequence_equals_the_reference(void)
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.limit_q, limit_q, golden_row(n));
     }
 }
-
-void test_d_axis_comes_first_and_q_gets_the_rest(void)
-{
-    dq_t v = control(20000, 20000, -8000, -8000, 16000);
-    TEST_ASSERT_EQUAL_INT16(15500, v.d);
-    TEST_ASSERT_EQUAL_INT16(limit_q, v.q);
-    TEST_ASSERT_INT16_WITHIN(70, 3969, v.q); /* sqrt(16000^2 - 15500^2), a chord */
-    setUp();
-    v = control(0, -20000, 0, 8000, 16000);
-    TEST_ASSERT_EQUAL_INT16(0, v.d);
-    TEST_ASSERT_EQUAL_INT16(-limit_q, v.q);
-    TEST_ASSERT_TRUE(limit_q > 15990);
-}

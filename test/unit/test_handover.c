@@ -143,23 +143,6 @@ void test_vectors_equal_the_reference_and_all_three_controllers_go_on_from_them(
     }
 }
 
-void test_voltage_and_current_keep_their_place_in_the_stator(void)
-{
-    uint32_t estimated;
-    for (estimated = 0; estimated < UINT32_C(65536); estimated += 3001u) {
-        sincos_t forced_frame = trig_sincos(12345), frame = trig_sincos((angle_t)estimated);
-        dq_t v = { -3000, 9000 }, i = { 0, params.open_loop_q13 };
-        alphabeta_t v_before = inverse_park(v, forced_frame), i_before = inverse_park(i, forced_frame), v_after, i_after;
-        hand_over(12345, (angle_t)estimated, v.d, v.q, 1);
-        v_after = inverse_park(drive.run.control.v_q14, frame);
-        i_after = inverse_park(drive.run.control.ref_q13, frame);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(6, v_before.alpha, v_after.alpha, golden_row(estimated));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(6, v_before.beta, v_after.beta, golden_row(estimated));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, i_before.alpha, i_after.alpha, golden_row(estimated));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(4, i_before.beta, i_after.beta, golden_row(estimated));
-    }
-}
-
 void test_estimated_angle_of_the_next_sample_takes_over_with_its_frame(void)
 {
     sincos_t frame;

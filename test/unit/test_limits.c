@@ -119,3 +119,23 @@ void test_brake_limit_does_not_wind_the_speed_controller_up(void)
     speed_step(&drive, &params);
     TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
 }
+
+/* ---- braking for every current range: from here on the parameters are others ---- */
+#undef MAXIMUM_CURRENT_A
+#define MAXIMUM_CURRENT_A 1.0
+static const drive_params_t at_1_A = DRIVE_PARAMS_INIT;
+#undef MAXIMUM_CURRENT_A
+#define MAXIMUM_CURRENT_A 0.6
+static const drive_params_t at_600_mA = DRIVE_PARAMS_INIT;
+
+void test_braking_current_ends_2_V_above_REGEN_LIMIT_for_every_current_range(void)
+{
+    static const drive_params_t *const ranges[] = { &params, &at_1_A, &at_600_mA };
+    EACH(n, ranges) {
+        int16_t above_v, full = ranges[n]->current_max_q13;
+        for (above_v = 0; above_v <= 2; above_v++) {
+            limits_braking(&drive.run, ranges[n], (int16_t)((PARAM_F(REGEN_LIMIT_V) + (float)above_v) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
+            TEST_ASSERT_INT16_WITHIN(full / 20, full - above_v * full / 2, drive.run.control.brake_limit_q13);
+        }
+    }
+}

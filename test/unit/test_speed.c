@@ -40,18 +40,6 @@ void test_reference_waits_while_the_motor_is_350_rpm_behind_or_ahead(void)
     }
 }
 
-void test_reference_ramps_at_4000_rpm_per_second(void)
-{
-    uint16_t n;
-    rig_closed(1, 5000);
-    drive.command.target_erpm = 10000;
-    rig_speed(7000);
-    for (n = 1; n <= 100u; n++) {
-        speed_reference_step(&drive, &params);
-        TEST_ASSERT_EQUAL_INT16(5000 + 8 * (int16_t)n, drive.run.control.reference_erpm);
-    }
-}
-
 /* ---- the controller ---- */
 
 void test_speed_below_the_reference_asks_for_driving_current_up_to_its_limit(void)
@@ -91,13 +79,4 @@ void test_stop_ends_when_speed_and_reference_are_below_the_minimum(void)
         speed_step(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].to, drive.state, golden_row(n));
     }
-}
-
-void test_stop_ramps_down_whatever_the_target(void)
-{
-    rig_closed(1, 8000);
-    drive.command.target_erpm = 20000;
-    drive.state = (uint16_t)DRIVE_STOPPING;
-    speed_reference_step(&drive, &params);
-    TEST_ASSERT_EQUAL_INT16(7992, drive.run.control.reference_erpm);
 }
