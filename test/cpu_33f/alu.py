@@ -19,11 +19,13 @@ def signed(value: int, bits: int) -> int:
 
 
 class State:
-    """Registers W0..W15, status register and data memory up to the end of RAM (little-endian)."""
+    """Registers W0..W15, SR, accumulators A and B (signed integers within 40 bits), CORCON, and data memory up to the end of RAM."""
 
     def __init__(self, ram: bytes = bytes(0x800)) -> None:
         self.w = [0] * 16
         self.sr = 0
+        self.acc = [0, 0]
+        self.corcon = 0x20
         self.memory = bytearray(0x800) + ram
 
     def flag(self, bit: int) -> int:
@@ -33,6 +35,10 @@ class State:
     def set_flag(self, bit: int, value: object) -> None:
         """Sets or clears a status bit."""
         self.sr = self.sr | 1 << bit if value else self.sr & ~(1 << bit)
+
+    def mode(self, bit: int) -> int:
+        """A bit of CORCON."""
+        return self.corcon >> bit & 1
 
     def load(self, address: int, bits: int) -> int:
         """A little-endian number in memory."""

@@ -5,7 +5,7 @@ with SATA set and ACCSAT clear it saturates at bit 31, guard bits stay a sign an
 OA (OB) tells that the guard bits are in use. SA and SB stay set. SATDW saturates what is written to data memory or a register.
 """
 
-from alu import OA, OAB, OB, SA, SAB, SB, Alu, State, signed
+from alu import OA, OAB, OB, SA, SAB, SB, Alu, signed
 from asm33 import Row
 
 NAMES = {"mac", "msc", "mpy", "mpy.n", "movsac", "ed", "edac", "lac", "sac", "sac.r", "sftac"}
@@ -25,23 +25,8 @@ def is_dsp(row: Row) -> bool:
     return row.mnemonic in NAMES or "Acc" in row.operands
 
 
-class DspState(State):
-    """A state with accumulators A and B (signed integers within 40 bits) and CORCON."""
-
-    def __init__(self, ram: bytes = bytes(0x800)) -> None:
-        super().__init__(ram)
-        self.acc = [0, 0]
-        self.corcon = 0
-
-    def mode(self, bit: int) -> int:
-        """A bit of CORCON."""
-        return self.corcon >> bit & 1
-
-
 class Dsp(Alu):
     """Executes one DSP instruction."""
-
-    state: DspState
 
     # ---- accumulators ------------------------------------------------------------------------------------------------
     def result(self, which: int, exact: int) -> None:

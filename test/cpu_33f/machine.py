@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from alu import FLAG_NAMES, signed
+from alu import FLAG_NAMES, State, signed
 from vectors import REGISTERS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -91,6 +91,25 @@ class Machine:
         stopped = self.library.iss_run(self.core, until)
         assert stopped in (0, 2), "a stop without an error"
         return self.library.iss_error(self.core).decode() if stopped else ""
+
+    def start(self, words: list[int], state: State) -> None:
+        """Puts the machine before a program, in a reference's state."""
+        self.load({PROGRAM + 2 * index: word for index, word in enumerate(words)})
+        self.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, bytes(state.memory[RAM:]), PROGRAM)
+
+    def differences(self, state: State, stopped: str, sr_mask: int = 0xFFFF, w_from: int = 0) -> list[str]:
+        """What it has otherwise than the reference, in the bits of SR and from the W register that count, and what stopped it."""
+        after, memory, wanted = self.registers(), self.memory(), state.memory[RAM:]
+        found = [f"w{index} is {after.w[index]:04x}, not {value:04x}" for index, value in enumerate(state.w)
+                 if after.w[index] != value and index >= w_from]
+        found += [f"{name} is {is_:010x}, not {value & ACC_MASK:010x}" for name, is_, value in zip("AB", after.acc, state.acc)
+                  if is_ != value & ACC_MASK]
+        if (after.sr ^ state.sr) & sr_mask:
+            found.append(f"SR is {after.sr:04x}, not {state.sr:04x}")
+        if memory != wanted:
+            at = next(index for index in range(0x800) if memory[index] != wanted[index])
+            found.append(f"[{RAM + at:04x}] is {memory[at]:02x}, not {wanted[at]:02x}")
+        return found + ([f"stopped: {stopped}"] if stopped else [])
 
     def registers(self) -> Snapshot:
         """Registers, program counter and cycles since set_state()."""

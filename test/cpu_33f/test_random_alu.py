@@ -5,7 +5,7 @@ import random
 import pytest
 
 import asm33
-from alu import FLAG_NAMES, RA, Alu, State
+from alu import FLAG_NAMES, OV, RA, Alu, C, State
 from dsp import is_dsp
 from machine import PROGRAM, RAM, Machine
 from operands import Sampler
@@ -98,30 +98,20 @@ class Case:
 def run_case(machine: Machine, case: Case) -> list[str]:
     """Differences between simulator and reference after one instruction."""
     division = case.row.mnemonic.startswith("div")
-    words = {PROGRAM: 0x090011, PROGRAM + 2: case.word} if division else {PROGRAM: case.word}
-    machine.load(words)
+    words = [0x090011, case.word] if division else [case.word]
     state = case.state
-    machine.set_state(state.w, state.sr, [0, 0], {0x20: 0x0FD0, 0x44: 0x20}, case.memory, PROGRAM)
+    machine.start(words, state)
     cycles = 19 if division else 2 if case.row.mnemonic == "mov.d" else 1
-    stop = machine.run(cycles)
-    before = state.sr
+    stopped = machine.run(cycles)
     Alu(state, case.row, case.fields).execute()
-    after = machine.registers()
-    found = [f"w{index} is {after.w[index]:04x}, not {value:04x}" for index, value in enumerate(state.w)
-             if after.w[index] != value and not (division and state.flag(FLAG_NAMES["OV"]) and index < 2)]
-    mask = 0xFFFF & ~(1 << RA)
+    mask, overflow = 0xFFFF & ~(1 << RA), division and state.flag(OV)
     if division:
-        mask &= ~(1 << FLAG_NAMES["C"]) & (~0xA if state.flag(FLAG_NAMES["OV"]) else ~0)
-    if (after.sr ^ state.sr) & mask:
-        found.append(f"SR is {after.sr:04x}, not {state.sr:04x} (before {before:04x})")
-    memory = machine.memory()
-    wanted = state.memory[RAM:]
-    if memory != wanted:
-        at = next(index for index in range(0x800) if memory[index] != wanted[index])
-        found.append(f"[{RAM + at:04x}] is {memory[at]:02x}, not {wanted[at]:02x}")
+        mask &= ~(1 << C | (0xA if overflow else 0))
+    found = machine.differences(state, stopped, mask, 2 if overflow else 0)
+    after = machine.registers()
     if after.cycles != cycles or after.pc != PROGRAM + 2 * len(words):
         found.append(f"{after.cycles} cycles to {after.pc:04x}, not {cycles}")
-    return found + ([f"stopped: {stop}"] if stop else [])
+    return found
 
 
 @pytest.mark.parametrize("number", range(len(ROWS)), ids=[" ".join(row.text.split()[:2]) for row in ROWS])

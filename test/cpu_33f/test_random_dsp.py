@@ -5,9 +5,9 @@ import random
 import pytest
 
 import asm33
-from alu import FLAG_NAMES, OA, OAB, OB, SA, SAB, SB
-from dsp import INDEXED, UNUSED, Dsp, DspState, is_dsp, signed
-from machine import PROGRAM, RAM, Machine
+from alu import FLAG_NAMES, OA, OAB, OB, SA, SAB, SB, State, signed
+from dsp import INDEXED, UNUSED, Dsp, is_dsp
+from machine import Machine
 from operands import Sampler
 
 ROUNDS = 1000
@@ -40,7 +40,7 @@ class Chance:
         return sum(self.random.getrandbits(1) << bit for bit in MODES)
 
 
-def reach(chance: random.Random, state: DspState, row: asm33.Row, fields: dict[str, int]) -> None:
+def reach(chance: random.Random, state: State, row: asm33.Row, fields: dict[str, int]) -> None:
     """Lets the addresses of the instruction lie in RAM: X space for W8, W9, Y space for W10, W11."""
     w = state.w
     if "i" in fields:
@@ -86,9 +86,9 @@ def ram(chance: Chance) -> bytes:
     return b"".join(chance.word().to_bytes(2, "little") for _ in range(0x400))
 
 
-def begin(chance: Chance, memory: bytes) -> DspState:
+def begin(chance: Chance, memory: bytes) -> State:
     """A random state, in the reference."""
-    state = DspState(memory)
+    state = State(memory)
     state.w = [chance.word() for _ in range(14)] + [0x5A5A, 0x0F80]
     state.corcon = chance.corcon()
     state.acc = [chance.accumulator(), chance.accumulator()]
@@ -101,25 +101,6 @@ def begin(chance: Chance, memory: bytes) -> DspState:
     return state
 
 
-def compare(machine: Machine, state: DspState) -> list[str]:
-    """What the simulator has otherwise."""
-    after = machine.registers()
-    found = [f"w{index} is {after.w[index]:04x}, not {value:04x}" for index, value in enumerate(state.w) if after.w[index] != value]
-    found += [f"{name} is {after.acc[index]:010x}, not {state.acc[index] & 0xFFFFFFFFFF:010x}"
-              for index, name in enumerate("AB") if after.acc[index] != state.acc[index] & 0xFFFFFFFFFF]
-    if after.sr != state.sr:
-        found.append("SR " + " ".join(f"{name} is {after.sr >> bit & 1}" for name, bit in FLAG_NAMES.items() if (after.sr ^ state.sr) >> bit & 1))
-    if machine.memory() != state.memory[RAM:]:
-        found.append("memory differs")
-    return found
-
-
-def start(machine: Machine, state: DspState, memory: bytes, *words: int) -> None:
-    """Puts the machine before a program, in the reference's state."""
-    machine.load({PROGRAM + 2 * index: word for index, word in enumerate(words)})
-    machine.set_state(state.w, state.sr, state.acc, {0x20: 0x0FD0, 0x44: state.corcon}, memory, PROGRAM)
-
-
 @pytest.mark.parametrize("number", range(len(ROWS)), ids=[" ".join(row.text.split()[:2]) for row in ROWS])
 def test_every_instruction_does_what_the_reference_does(machine: Machine, number: int) -> None:
     row, chance, sampler, wrong, memory = ROWS[number], Chance(40 + number), Sampler(41 + number), [], b""
@@ -128,14 +109,13 @@ def test_every_instruction_does_what_the_reference_does(machine: Machine, number
         text, word, fields = sample(sampler, row)
         state = begin(chance, memory)
         reach(chance.random, state, row, fields)
-        start(machine, state, memory, word)
+        machine.start([word], state)
         acc = " ".join(f"{value & 0xFFFFFFFFFF:010x}" for value in state.acc)
         before = f"{text}: A, B {acc} CORCON {state.corcon:04x} SR {state.sr:04x}"
-        stop = machine.run(1)
+        stopped = machine.run(1)
         Dsp(state, row, fields).execute()
         cycles = machine.registers().cycles
-        found = compare(machine, state) + ([f"{cycles} cycles"] if cycles != 1 else []) + ([f"stopped: {stop}"] if stop else [])
-        if found:
+        if found := machine.differences(state, stopped) + ([f"{cycles} cycles"] if cycles != 1 else []):
             wrong.append(f"{before}: {'; '.join(found)}")
     assert wrong[:3] == [], f"{len(wrong)} of {ROUNDS}"
 
@@ -154,11 +134,10 @@ def test_chains_of_instructions_end_in_the_same_state(machine: Machine) -> None:
         chain = [sample(sampler, row) + (row,) for row in (chance.random.choice(rows) for _ in range(12))]
         chain = [part for part in chain if part[2].get("a") != 1 and INDEXED not in (part[2]["i"], part[2]["j"])]
         state.w[8:12] = 0x9C0, 0xA80, 0xD80, 0xE80
-        start(machine, state, memory, *(part[1] for part in chain))
-        stop = machine.run(len(chain))
+        machine.start([part[1] for part in chain], state)
+        stopped = machine.run(len(chain))
         for _, _, fields, row in chain:
             Dsp(state, row, fields).execute()
-        found = compare(machine, state) + ([f"stopped: {stop}"] if stop else [])
-        if found:
+        if found := machine.differences(state, stopped):
             wrong.append(f"{'; '.join(part[0] for part in chain)}: {'; '.join(found)}")
     assert wrong[:3] == [], f"{len(wrong)} of {CHAINS}"
