@@ -1,4 +1,4 @@
-/* PWM1: switched on last and with its outputs off, the place of its trigger, its fault interrupt. */
+/* PWM1: switched on last and with its outputs off, and the place of its trigger. */
 #include "registers.h"
 
 /* The moment when the pairs take their pins; what all registers hold when the module is switched on is part of the contract, too. */
@@ -22,7 +22,6 @@ void setUp(void)
     host_registers_reset();
     P1TCON = 0xFFFF;
     P1OVDCON = 0x3F15;
-    IFS3bits.FLTA1IF = 1;
     registers_accesses = 0;
     pwm_init();
 }
@@ -47,11 +46,4 @@ void test_sample_lies_inside_the_low_sides_conduction_at_the_highest_duty(void)
     int16_t low_on = (int16_t)(PWM_TOP_DUTY / 2 + 80), low_off = (int16_t)(2 * 999 - PWM_TOP_DUTY / 2);
     TEST_ASSERT_GREATER_OR_EQUAL_INT16(40, sample - low_on);
     TEST_ASSERT_GREATER_OR_EQUAL_INT16(0, low_off - sample);
-}
-
-void test_fault_interrupt_is_armed_with_the_control_interrupts_priority(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(0, IFS3bits.FLTA1IF);
-    TEST_ASSERT_EQUAL_UINT16(1, IEC3bits.FLTA1IE);
-    TEST_ASSERT_EQUAL_UINT16(5, IPC15bits.FLTA1IP);
 }

@@ -9,7 +9,6 @@ void setUp(void)
 {
     host_registers_reset();
     T1CON = 0xFFFF;
-    IFS0bits.T1IF = 1;
     timer_init();
 }
 
