@@ -19,9 +19,10 @@ RAM_NAMES = [f"[{address:x}]" for address in range(RAM, RAM + 0x800, 2)]
 
 _P, _U, _U16, _U32, _TEXT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint16, ctypes.c_uint32, ctypes.c_char_p
 SIGNATURES = { # of iss.h: the result, the arguments
-    "iss_create": (_P,), "iss_reset": (None, _P, ctypes.c_int), "iss_restart": (None, _P, _U32), "iss_run": (ctypes.c_int, _P, ctypes.c_uint64),
-    "iss_error": (_TEXT, _P), "iss_write_program": (ctypes.c_bool, _P, _U32, _U32), "iss_data": (_P, _P), "iss_peek": (_U16, _P, _U16),
-    "iss_poke": (None, _P, _U16, _U16), "iss_ram_known": (None, _P, _U16, _U, ctypes.c_bool), "iss_set_w_known": (None, _P, _U16),
+    "iss_create": (_P,), "iss_reset": (None, _P, ctypes.c_int), "iss_restart": (None, _P, _U32), "iss_error": (_TEXT, _P),
+    "iss_run": (ctypes.c_int, _P, ctypes.c_uint64), "iss_write_program": (ctypes.c_bool, _P, _U32, _U32), "iss_data": (_P, _P),
+    "iss_peek": (_U16, _P, _U16), "iss_poke": (None, _P, _U16, _U16), "iss_set_w_known": (None, _P, _U16),
+    "iss_ram_known": (None, _P, _U16, _U, ctypes.c_bool),
     "iss_pc": (_U32, _P), "iss_cycles": (ctypes.c_uint64, _P), "iss_acc": (ctypes.c_int64, _P, _U),
     "iss_set_acc": (None, _P, _U, ctypes.c_int64), "iss_sync": (None, _P), "iss_irq_changed": (None, _P),
     "iss_disassemble": (_U, _U32, _U32, _U32, _TEXT, ctypes.c_size_t),

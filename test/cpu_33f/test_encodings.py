@@ -107,7 +107,8 @@ def test_xc16s_assembler_gives_the_same_words(tmp_path: Path) -> None:
             lines += [text, "nop"]  # nothing follows a REPEAT that may not
     ours, _ = asm33.assemble("\n".join(lines), origin=0)
     got = assembled(tmp_path, lines)
-    wrong = [f"{address:06x}: XC16 {word:06x} ({listing}), here {ours[address]:06x}" for address, word, listing in got if word != ours[address]]
+    wrong = [f"{address:06x}: XC16 {word:06x} ({listing}), here {ours[address]:06x}"
+             for address, word, listing in got if word != ours[address]]
     assert (wrong[:20], len(got)) == ([], len(ours))
 
 

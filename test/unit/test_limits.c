@@ -134,7 +134,8 @@ void test_braking_current_ends_2_V_above_REGEN_LIMIT_for_every_current_range(voi
     EACH(n, ranges) {
         int16_t above_v, full = ranges[n]->current_max_q13;
         for (above_v = 0; above_v <= 2; above_v++) {
-            limits_braking(&drive.run, ranges[n], (int16_t)((PARAM_F(REGEN_LIMIT_V) + (float)above_v) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
+            float bus_v = PARAM_F(REGEN_LIMIT_V) + (float)above_v;
+            limits_braking(&drive.run, ranges[n], (int16_t)(bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
             TEST_ASSERT_INT16_WITHIN(full / 20, full - above_v * full / 2, drive.run.control.brake_limit_q13);
         }
     }

@@ -1,4 +1,4 @@
-/* For the tests of the board's modules: what every register held at one moment. What each holds after the start: test_firmware_on_registers.c. */
+/* What every register held at one moment, for the tests of the board's modules. After the start: test_firmware_on_registers.c. */
 #ifndef TEST_REGISTERS_H
 #define TEST_REGISTERS_H
 
