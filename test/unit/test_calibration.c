@@ -19,6 +19,8 @@ static void clear_and_calibrate(int16_t a_q13, int16_t b_q13)
     drive.command.clear_fault = 1;
     rig_tick(1);
     EXPECT_DRIVE(DRIVE_CALIBRATE, FAULT_NONE, "cleared");
+    TEST_ASSERT_EQUAL_INT32(0, drive.calibration.sum_a);
+    TEST_ASSERT_EQUAL_INT32(0, drive.calibration.sum_b);
     rig_tick(1023);
     EXPECT_DRIVE(DRIVE_CALIBRATE, FAULT_NONE, "1023 samples");
     rig_tick(1);
