@@ -5,9 +5,7 @@ import re
 import pytest
 from sample_image import CONFIG, LIBRARY, RETFIE, good_image, record, take_ram
 
-from tools.common import paths
 from tools.image import device, image
-from tools.image.budget import Budget
 
 CALL, RCALL = 0x020000, 0x070000
 BUDGET = """with_caller = []
@@ -274,27 +272,15 @@ def test_a_stack_that_is_deeper_than_its_budget_or_than_what_is_free_is_a_line(b
     bench.fails("stack: up to 401 bytes of 400; make size", "stack: f: calls through a pointer", more=("--objdump", "x", *budget))
 
 
-@pytest.mark.parametrize("text", ["", "[budget.image]\nflash_bytes = 1\n", "[budget]\nnote = 3\n", "not toml"])
-def test_a_budget_file_without_budgets_is_one_line(bench, text):
-    path = bench.folder / "budget.toml"
-    path.write_text(text, encoding="utf-8")
-    status, _, lines = bench.check("--budget", str(path))
-    assert (status, len(lines)) == (2, 1) and "budget.toml" in lines[0]
-
-
-def test_the_projects_budget_is_read():
-    limits = Budget.read(paths.ROOT / "firmware" / "budget.toml").image
-    assert (limits.flash, limits.ram) == (12288, 768)
-
-
 # ---- files ---------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name, data, words", [
     ("a.elf", None, "No such file"), ("a.hex", None, "No such file"), ("a.map", None, "No such file"), ("a.elf", b"\x7fELF", ""),
                                                ("a.elf", b"text\n" * 40, ""),
-    ("a.hex", record(0, 2, b"\0\0\0\0").encode(), ""), ("a.map", b"\xff\xfe nothing", "not a map file")])
+    ("a.hex", record(0, 2, b"\0\0\0\0").encode(), ""), ("a.map", b"\xff\xfe nothing", "not a map file"),
+    *(("budget.toml", text, "") for text in (b"", b"[budget.image]\nflash_bytes = 1\n", b"[budget]\nnote = 3\n", b"not toml"))])
 def test_a_file_that_is_missing_or_another_is_one_line(bench, name, data, words):
-    arguments = bench.image.write(bench.folder)
+    arguments = [*bench.image.write(bench.folder), *bench.budget(1, 1, 1)]
     (bench.folder / name).unlink() if data is None else (bench.folder / name).write_bytes(data)
     status, out, lines = bench.run(arguments)
     assert (status, out, len(lines)) == (2, "", 1)
-    assert re.search(rf"^foc33: .*{words}.*{name}: (build it|check)", lines[0]), lines
+    assert re.search(rf"^foc33: .*{words}.*{name}( line 1)?: (build it|check|add it|expected '=')", lines[0]), lines

@@ -19,7 +19,7 @@ def close(root) -> None:
 
 # Text of the file, what is asked of it, and what the refusal must say.
 REFUSED = [
-    ("a = 1\nb = = 2\n", None, "TOML syntax", "line 2"),
+    ("a = 1\nb = = 2\n", None, "TOML syntax", "line 2"), ("a = 1\na = 2\n", None, "TOML syntax", "line 2"),
     ("[a.b]\nx = 1\n[a.b]\n", None, "cannot declare [a.b] twice", "line 3"),
     ("[a]\nx = 1\n[a]\n", None, "cannot declare [a] twice", "line 3"),
     ("a = 1\nb = \"x", None, "TOML syntax", "line 2"),

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from unittest import mock
 
 import pytest
+from support import refused
 from tune_support import FOR_ANOTHER_BOARD, HURST, command, motor_path
 
 from tools.bench import rating_sweep
@@ -72,11 +73,6 @@ def several(tmp_path, monkeypatch, out):
     return folder
 
 
-def refused(*arguments: str, says: str) -> None:
-    code, text, error = command(*arguments)
-    assert (code, text, error.count("\n")) == (2, "", 1) and error.startswith("foc33: ") and says in error, error
-
-
 def test_a_motor_by_its_name_or_path_and_the_command_that_makes_the_result_again(out):
     with motor_path() as path:
         for motor in (HURST, str(path)):
@@ -107,14 +103,14 @@ def test_a_refusal_writes_nothing_and_keeps_an_older_result(out, older):
         command("tune", HURST, "--out", str(out), "--brief")
     before = sorted(out.parent.rglob("*"))
     with motor_path(("value = 2500", "value = 4000")) as path:
-        refused("tune", str(path), "--out", str(out), says="are too low for 4000 rpm")
+        refused(command("tune", str(path), "--out", str(out)), "are too low for 4000 rpm")
     assert sorted(out.parent.rglob("*")) == before and out.exists() == older
 
 
 def test_a_folder_that_is_something_else_is_not_replaced(out):
     out.mkdir()
     (out / "precious").write_text("mine", encoding="utf-8")
-    refused("tune", HURST, "--out", str(out), says="is not a result folder")
+    refused(command("tune", HURST, "--out", str(out)), "is not a result folder")
     assert (out / "precious").is_file()
 
 
@@ -124,7 +120,7 @@ def test_a_folder_that_is_something_else_is_not_replaced(out):
     (("tune", "--all", "--out", "x"), "one folder for several motors"), (("tun",), "command line"),
     (("tune", "--all", "--board", "mclw"), "mclv"), (("motors", "--board", "mclw"), "mclv")])
 def test_mistakes_on_the_command_line(arguments, says):
-    refused(*arguments, says=says)
+    refused(command(*arguments), says)
 
 
 @pytest.mark.parametrize("more", [(), ("--brief",)])
@@ -150,7 +146,7 @@ def test_without_any_motor_that_fits_nothing_runs(several):
     for name in ("a_first", "c_last"):
         (several / f"{name}.toml").unlink()
     with mock.patch.object(rating_sweep, "command") as runs:
-        refused("motors", says="half the rated torque needs")
+        refused(command("motors"), "half the rated torque needs")
     runs.assert_not_called()
 
 

@@ -2,12 +2,13 @@
 
 import contextlib
 import functools
-import io
 import os
 import shlex
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+
+import support
 
 from tools.common import board_file, motor_file, paths
 from tuning import cli
@@ -43,6 +44,8 @@ FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value =
                      ("value = 1.92", "value = 0.2"))
 """Changes of MOTOR that make it a motor for ten times the current."""
 
+command = functools.partial(support.command, main=cli.main)
+
 
 def motors() -> list[str]:
     return paths.names(paths.MOTORS)
@@ -71,11 +74,3 @@ def designed(*changes: tuple[str, str], more: str = "", board: str = "mclv") -> 
 def of(name: str) -> Design:
     """The design of one of the project's motors; shared, not to be changed."""
     return design(motor_file.load(name), board_file.load("mclv"))
-
-
-def command(*arguments: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of a command line."""
-    out, error = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
-        code = cli.main(list(arguments))
-    return code, out.getvalue(), error.getvalue()

@@ -31,29 +31,18 @@ def command(ipecmd: str, tool: str, hex_file: Path) -> list[str]:
 
 def in_folder(folder: Path) -> str | None:
     """ipecmd in a folder of MPLAB IPE or MPLAB X."""
-    for inside in INSIDE:
-        for name in NAMES:
-            if (folder / inside / name).is_file():
-                return str(folder / inside / name)
-    return None
-
-
-def version(folder: Path) -> list[int]:
-    return [int(number) for number in re.findall(r"\d+", folder.name)]
+    return next((str(folder / inside / name) for inside in INSIDE for name in NAMES if (folder / inside / name).is_file()), None)
 
 
 def find(ipe: Path | None, usual: tuple[str, ...] = USUAL) -> str | None:
     """ipecmd in the folder that the user names, else on PATH, else the newest in the usual places."""
     if ipe is not None:
-        found = in_folder(ipe)
-        if found is None:
-            raise UserError(f"not programmed: no {NAMES[0]} in IPE={ipe}", "", "name the folder of MPLAB X or of MPLAB IPE that has it")
-        return found
-    for name in NAMES:
-        if found := shutil.which(name):
+        if found := in_folder(ipe):
             return found
+        raise UserError(f"not programmed: no {NAMES[0]} in IPE={ipe}", "", "name the folder of MPLAB X or of MPLAB IPE that has it")
     folders = [folder for place in usual if Path(place).is_dir() for folder in Path(place).iterdir() if folder.is_dir()]
-    return next(filter(None, map(in_folder, sorted(folders, key=version, reverse=True))), None)
+    folders.sort(key=lambda folder: [int(number) for number in re.findall(r"\d+", folder.name)], reverse=True) # the newest first
+    return next(filter(None, (*map(shutil.which, NAMES), *map(in_folder, folders))), None)
 
 
 def checked(hex_file: Path, elf_file: Path) -> list[str]:
