@@ -283,4 +283,4 @@ def test_a_file_that_is_missing_or_another_is_one_line(bench, name, data, words)
     (bench.folder / name).unlink() if data is None else (bench.folder / name).write_bytes(data)
     status, out, lines = bench.run(arguments)
     assert (status, out, len(lines)) == (2, "", 1)
-    assert re.search(rf"^foc33: .*{words}.*{name}( line 1)?: (build it|check|add it|expected '=')", lines[0]), lines
+    assert re.search(rf"^foc33: .*{words}.*{name}( line \d)?: (build it|check|add it|write \[|expected '=')", lines[0]), lines

@@ -113,12 +113,8 @@ def test_variables_are_written_and_read():
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------------
-def square(job, report):
-    report(1.0)
-    return job * job
-
-
 def late_for_small(job, report):
+    report(1.0)
     time.sleep(0.05 if job == 0 else 0.0)
     return job
 
@@ -136,24 +132,16 @@ def own_process(job, report):
     return os.getpid()
 
 
-def ignore(seconds: float) -> None:
-    """Nobody looks at the progress."""
-
-
-def test_results_come_in_the_order_of_the_jobs():
-    assert workers.run_all([0, 1, 2, 3], late_for_small, ignore) == [0, 1, 2, 3]
-
-
-def test_progress_of_all_processes_arrives():
+def test_results_come_in_the_order_of_the_jobs_and_the_progress_of_all_arrives():
     seconds = []
-    workers.run_all([1, 2, 3], square, seconds.append, processes=2)
-    assert seconds == [1.0, 1.0, 1.0]
+    assert workers.run_all([0, 1, 2, 3], late_for_small, seconds.append, processes=2) == [0, 1, 2, 3]
+    assert seconds == [1.0] * 4
 
 
 def test_every_job_has_a_process_of_its_own():
-    assert len({os.getpid(), *workers.run_all([0] * 5, own_process, ignore, processes=2)}) == 6
+    assert len({os.getpid(), *workers.run_all([0] * 5, own_process, print, processes=2)}) == 6
 
 
 @pytest.mark.parametrize("work, line", [(refuse, "no such thing, job 1: think again"), (crash, "the simulation ended by itself, exit code -6")])
 def test_a_refusal_or_a_crash_in_a_process_is_one_line_here_and_no_endless_wait(work, line):
-    refusal(lambda: workers.run_all([1], work, ignore), line)
+    refusal(lambda: workers.run_all([1], work, print), line)
