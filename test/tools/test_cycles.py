@@ -145,34 +145,20 @@ def test_what_cycles_cannot_do_is_one_line(word, expected):
     assert expected in our_lines(done)[0] and "No such file" not in done.stderr
 
 
-@pytest.fixture
-def refused(tmp_path, capsys):
-    """A command is refused with one line; {} stands for the file's path."""
-    def of(command: str, *arguments: str) -> str:
-        status = (cycles if command == "cycles" else pil_command).main([word.format(tmp_path) for word in arguments])
-        lines = capsys.readouterr().err.splitlines()
-        assert (status, len(lines)) == (2, 1), lines
-        return lines[0]
-
+@pytest.mark.parametrize("room, arguments, words", [
+    *((room, ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there")
+      for room in (cycles, pil_command)), *((room, ["--nonsense"], "--nonsense") for room in (cycles, pil_command)),
+    (cycles, ["--image", "{}/text.elf"], "text.elf"), (cycles, ["--image", "{}/alone.hex"], "name the ELF file"),
+    (cycles, ["--image", "{}/huge.elf"], "cannot be read"),
+    (pil_command, ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
+    (pil_command, ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), (pil_command, ["demo", "smoke", "--out", "{}"], "--out")])
+def test_bad_input_is_one_line(tmp_path, room, arguments, words):
     (tmp_path / "text.elf").write_text("hello", encoding="utf-8")
     (tmp_path / "alone.hex").write_text(hex_text(WORDS), encoding="utf-8")
     with (tmp_path / "huge.elf").open("wb") as file:
         file.write(b"\x7fELF")
         file.truncate(5 << 30)
-    return of
-
-
-@pytest.mark.parametrize("command, arguments, words", [
-    ("cycles", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
-    ("pil", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
-    ("cycles", ["--image", "{}/text.elf"], "text.elf"), ("cycles", ["--image", "{}/alone.hex"], "name the ELF file"),
-    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"),
-    ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
-    ("pil", ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), ("pil", ["--nonsense"], "--nonsense"),
-    ("cycles", ["--nonsense"], "--nonsense"),
-    ("pil", ["demo", "smoke", "--out", "{}"], "--out")])
-def test_bad_input_is_one_line(tmp_path, refused, command, arguments, words):
-    assert words in refused(command, *arguments)
+    support.refused(support.command(*(word.format(tmp_path) for word in arguments), main=room.main), words)
     assert not (tmp_path / "out").exists()
 
 

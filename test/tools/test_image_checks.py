@@ -4,6 +4,7 @@ import re
 
 import pytest
 from sample_image import CONFIG, LIBRARY, RETFIE, good_image, record, take_ram
+from support import command
 
 from tools.image import device, image
 
@@ -18,17 +19,13 @@ stack = {{ calls_nothing = [] }}
 class Bench:
     """An image to break, and the command that checks it."""
 
-    def __init__(self, folder, capsys):
-        self.folder, self.capsys, self.image = folder, capsys, good_image()
+    def __init__(self, folder):
+        self.folder, self.image = folder, good_image()
 
-    def run(self, arguments: list[str]) -> tuple[int, str, list[str]]:
+    def check(self, *more: str, arguments: list[str] | None = None) -> tuple[int, str, list[str]]:
         """Exit status, stdout, lines of stderr."""
-        status = image.main(arguments)
-        out, error = self.capsys.readouterr()
+        status, out, error = command(*(arguments or self.image.write(self.folder)), *more, main=image.main)
         return status, out, error.splitlines()
-
-    def check(self, *more: str) -> tuple[int, str, list[str]]:
-        return self.run([*self.image.write(self.folder), *more])
 
     def fails(self, *patterns: str, more: tuple[str, ...] = ()) -> None:
         """The image fails with exactly these lines."""
@@ -53,8 +50,8 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path, capsys):
-    return Bench(tmp_path, capsys)
+def bench(tmp_path):
+    return Bench(tmp_path)
 
 
 # ---- the whole -----------------------------------------------------------------------------------------------------------
@@ -197,7 +194,7 @@ def test_sources_that_set_what_the_board_cannot_have_are_refused(bench, old, new
     arguments = bench.image.write(bench.folder)
     path = bench.folder / "config.c"
     path.write_text(path.read_text().replace(old, new, 1))
-    status, _, lines = bench.run(arguments)
+    status, _, lines = bench.check(arguments=arguments)
     assert status == 1 and expected in lines[0]
 
 
@@ -281,6 +278,6 @@ def test_a_stack_that_is_deeper_than_its_budget_or_than_what_is_free_is_a_line(b
 def test_a_file_that_is_missing_or_another_is_one_line(bench, name, data, words):
     arguments = [*bench.image.write(bench.folder), *bench.budget(1, 1, 1)]
     (bench.folder / name).unlink() if data is None else (bench.folder / name).write_bytes(data)
-    status, out, lines = bench.run(arguments)
+    status, out, lines = bench.check(arguments=arguments)
     assert (status, out, len(lines)) == (2, "", 1)
     assert re.search(rf"^foc33: .*{words}.*{name}( line \d)?: (build it|check|add it|write \[|expected '=')", lines[0]), lines

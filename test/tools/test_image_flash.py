@@ -4,6 +4,7 @@ import re
 
 import pytest
 from sample_image import good_image
+from support import command
 
 from tools.image import flash, image
 
@@ -33,11 +34,10 @@ def install(folder):
 
 
 @pytest.fixture
-def run(folder, capsys):
+def run(folder):
     """The command: exit status, stdout, lines of stderr."""
     def with_options(*more: str) -> tuple[int, str, list[str]]:
-        status = flash.main([str(folder / "a.hex"), "--elf", str(folder / "a.elf"), *more])
-        out, error = capsys.readouterr()
+        status, out, error = command(str(folder / "a.hex"), "--elf", str(folder / "a.elf"), *more, main=flash.main)
         assert ("programmed and verified" in out) == (status == 0)
         return status, out, error.splitlines()
     return with_options

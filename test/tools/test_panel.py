@@ -152,7 +152,8 @@ def test_torque_is_a_brake_in_per_cent_of_the_rated_one():
 # ---- actions -------------------------------------------------------------------------------------------------------------
 def test_a_press_is_released_after_its_time_and_actions_come_in_order():
     found = actions((0.5, "press = \"S2\"\nhold_s = 0.25"), (0.7, "pot = 0.1"))
-    assert [(action.at_s, action.keys) for action in found] == [(0.5, {"input.s2": 1.0}), (0.7, {"input.pot": 0.1}), (0.75, {"input.s2": 0.0})]
+    assert [(action.at_s, action.keys) for action in found] == [
+        (0.5, {"input.s2": 1.0}), (0.7, {"input.pot": 0.1}), (0.75, {"input.s2": 0.0})]
 
 
 def test_a_ramp_starts_at_the_present_value_ends_exactly_at_the_goal_and_is_one_line_of_the_protocol():

@@ -103,12 +103,9 @@ def test_a_value_outside_its_range_and_a_broken_relation_are_told_in_the_build_s
     assert "outside" not in words or len(messages) == 1
 
 
-def test_a_kphi_that_does_not_fit_is_told_once():
+def test_a_kphi_that_does_not_fit_is_told_once_and_a_missing_parameter_is_named():
     messages = constants.header(of(HURST).params | {"MOTOR_KPHI_V_PER_KRPM": "1.7"}).wrong
     assert messages[0].startswith("MOTOR_KPHI_V_PER_KRPM does not fit") and not [message for message in messages if "INVKFI" in message]
-
-
-def test_a_missing_parameter_is_named():
     params = {name: text for name, text in of(HURST).params.items() if name != "LOCK_TIME"}
     assert constants.header(params).wrong == ["LOCK_TIME is missing"]
 

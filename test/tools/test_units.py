@@ -106,18 +106,13 @@ def kphi(value: float, unit: str) -> float:
     return units.kphi("Y", 4).units[unit](value)
 
 
-def test_torque_constants_are_those_of_a_commutated_motor_and_of_sinusoidal_currents():
+def test_torque_constants_are_those_of_a_commutated_motor_and_of_sinusoidal_currents_and_both_currents_give_the_same_torque():
     assert kphi(six_step(4, 5.4e-3, 1.0), "N m/A dc") == pytest.approx(kphi(5.4e-3, "V s/rad"), abs=5e-7)
     assert kphi(sine(4, 5.4e-3, 1.0), "N m/A peak") == pytest.approx(kphi(5.4e-3, "V s/rad"), abs=5e-10)
-
-
-def test_a_dc_current_and_its_peak_give_the_same_torque():
     peak_a = entry(units.CURRENT, 2.3, "A dc").value_si
     assert sine(4, 5.4e-3, peak_a) / six_step(4, 5.4e-3, 2.3) == pytest.approx(1.0, abs=5e-8)
     assert peak_a == pytest.approx(2.536, abs=5e-4)
-
-
-def test_the_two_constants_of_a_flat_motor_s_sheet_agree():
+    # the two constants of a flat motor's sheet agree
     assert kphi(187.0, "rpm/V") / kphi(51.0, "mN m/A dc") == pytest.approx(1.0, abs=5e-3)
 
 
