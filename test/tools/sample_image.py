@@ -2,9 +2,12 @@
 
 Four bytes of the ELF file hold a program word, two hold a byte of data, and every byte of the debugging sections is followed by a zero."""
 
+import io
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import intelhex
 
 from tools.image import device
 
@@ -217,16 +220,12 @@ def record(kind: int, address: int, data: bytes) -> str:
 
 
 def hex_text(words: dict[int, int]) -> str:
-    """Words as a HEX file, up to four a record."""
-    text, page = "", -1
-    for start, run in runs(words):
-        for number in range(0, len(run), 4):
-            address = 2 * start + 4 * number
-            if address >> 16 != page:
-                page = address >> 16
-                text += record(4, 0, page.to_bytes(2, "big"))
-            text += record(0, address & 0xFFFF, b"".join(map(four, run[number:number + 4])))
-    return text + END
+    """Words as a HEX file."""
+    file, text = intelhex.IntelHex(), io.StringIO()
+    for address, word in words.items():
+        file.puts(2 * address, four(word))
+    file.write_hex_file(text)
+    return text.getvalue()
 
 
 # ---- DWARF 2 -------------------------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def test_every_mistake_in_a_scenario_is_one_line_and_leaves_no_result(place, tex
 
 
 @pytest.mark.parametrize("arguments, parts", [
-    (["run", "no_such"], ["no scenario 'no_such'"]), (["run", "no/such.toml"], ["no scenario file 'no/such.toml'"]),
+    (["run", "dmeo"], ["no scenario 'dmeo'", "did you mean 'demo'"]), (["run", "no/such.toml"], ["no scenario file 'no/such.toml'"]),
     (["run", "demo", "--library", "no.so"], ["no library 'no.so'"]),
     (["run", "demo", "--library", "{}/wrong.so"], ["cannot load the virtual board"]),
     (["walk"], ["invalid choice: 'walk'"]), (["run", "--speed"], ["unrecognized arguments: --speed"]),

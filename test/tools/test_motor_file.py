@@ -286,10 +286,6 @@ def test_every_mistake_in_a_board_file_is_one_line_with_its_place_and_remedy(loa
 MOTORS = [motor_file.load(name) for name in paths.names(paths.MOTORS)]
 
 
-def test_there_are_at_least_six_motors_and_one_is_salient():
-    assert len(MOTORS) >= 6 and [motor.name for motor in MOTORS if motor.salient] == ["linix_45zwn24_40"]
-
-
 def test_the_motor_of_an1292_has_its_values():
     motor = motor_file.load("hurst_dmb0224c10002")
     shows(motor, {"rs_ohm": 2.67, "lq_h": 1.92e-3, "pole_pairs": 5, "kphi_v_per_krpm": 7.24, "inertia_kgm2": 5.5e-6}, 1e-12)
@@ -317,7 +313,8 @@ def test_the_virtual_board_accepts_every_motor_and_board(item, key):
     assert key in resolve([item.plant_values()], Library(LIBRARY).keys)
 
 
-def test_the_listing_has_a_line_for_every_motor():
+def test_there_are_at_least_six_motors_one_is_salient_and_the_listing_has_a_line_for_each():
+    assert len(MOTORS) >= 6 and [motor.name for motor in MOTORS if motor.salient] == ["linix_45zwn24_40"]
     lines = {line.split()[0]: line for line in motor_file.listing(MOTORS).splitlines()}
     assert {motor.name for motor in MOTORS} <= set(lines)
     assert re.search(r" Y +5 +2\.670 +1\.920 +7\.240 +0\.0599 +24 V, 2800 rpm, 0\.08 N m, 1\.53 A +5500 rpm, 2\.75 A +\d+ of \d+\Z",

@@ -81,6 +81,8 @@ def test_a_start_turns_the_potentiometer_before_power_up_and_presses_s2():
     short = scenario("[[event]]\nat_s = 0.2\nstart_rpm = 1000\n").events
     assert [(event.at_s, event.kind, event.value, event.button, event.hold_s) for event in short] == [
         (0.0, "speed_rpm", 1000.0, "", 0.0), (0.2, "press", 0.0, "S2", 0.1)]
+    # and events come in order of time
+    assert [event.at_s for event in scenario("[[event]]\nat_s = 1.5\npot = 1\n[[event]]\nat_s = 0.5\npot = 0\n").events] == [0.5, 1.5]
 
 
 PERCENT = """
@@ -125,12 +127,9 @@ def test_only_per_cents_need_a_rating(text, asks):
     assert asks_for_rating(scenario(text)) == asks
 
 
-def test_a_scenario_in_numbers_stays_as_it_is():
+def test_a_scenario_in_numbers_stays_as_it_is_and_a_header_that_does_not_tell_its_speeds_is_refused():
     item = scenario(MEASURE + "reference_rpm = 1000\n" + EVENT + "speed_rpm = 1000\n")
     assert in_numbers(item, None, {}) == item
-
-
-def test_a_header_that_does_not_tell_its_speeds_is_refused():
     refusal(lambda: in_numbers(scenario(PERCENT), Rating(2500.0, 0.08), {}), "does not tell MAXIMUM_SPEED_RPM")
 
 
@@ -148,14 +147,6 @@ def test_a_measure_is_called_by_its_reference_and_the_speed_is_checked_in_all_th
     item = scenario(MEASURE + MEASURE.replace('name = "m"', "reference_rpm = 1500") + MEASURE.replace('"m"', '"n"\nreference = "nominal"')
                     + "[[expect]]\nkind = \"speed\"\n")
     assert [measure.name for measure in item.measures] == ["m", "1500 rpm", "n"] and item.expectations[0].measures == ["1500 rpm", "n"]
-
-
-def test_events_come_in_order_of_time():
-    assert [event.at_s for event in scenario("[[event]]\nat_s = 1.5\npot = 1\n[[event]]\nat_s = 0.5\npot = 0\n").events] == [0.5, 1.5]
-
-
-def test_an_unknown_scenario_gets_the_nearest_name():
-    refusal(lambda: load("dmeo"), "no scenario 'dmeo', ", ": did you mean 'demo'")
 
 
 @pytest.mark.parametrize("name", paths.names(paths.SCENARIOS))

@@ -39,9 +39,6 @@ def test_the_page_needs_nothing_else_and_shows_everything(result):
     cells = (f'<td class="n">{cell}</td>' for cell in ("7.24 V peak line-to-line/krpm", "2.67 ohm", "2800 rpm", "24 V"))
     for words in ("Current loop", "Speed loop", "Start", "Parameters", "Constants", "Inputs", "NORM_RS", "AN1292", *cells):
         assert words in result.page
-
-
-def test_kphi_is_told_in_the_forms_that_sheets_give(result):
     for words in ("= 0.06914 V s/rad line-to-line =", "= 0.05987 N m/A peak = 0.08468 N m/A rms ="):
         assert words in result.out and words in result.page
 

@@ -77,6 +77,7 @@ WARNED = {
                                       ("slow for so quick a rotor", "or add inertia$")),
     "speed loop that is slow by choice": ({"more": "[tune]\nSPEED_BANDWIDTH_HZ = 4\n"},
                                           ("the speed loop's 4 Hz are slow (", "or remove SPEED_BANDWIDTH_HZ from [tune]$")),
+    "speed loop that is quick by choice": ({"more": "[tune]\nSPEED_BANDWIDTH_HZ = 40\n"}, ("SPEED_BANDWIDTH_HZ = 40: the speed loop has",)),
     "reference slope that the counts cannot express": ({"more": "[tune]\nSPEEDREFRAMP_RPM_PER_S = 700\n"},
                                                        ("SPEEDREFRAMP_RPM_PER_S = 700 becomes 1000 rpm/s",)),
     "derivative limit that clips": (

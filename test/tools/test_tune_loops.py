@@ -195,12 +195,6 @@ def test_the_speed_loop_is_as_slow_as_rotation_asks_but_fast_enough_for_a_load_t
     assert 0.08 / per_second == approx(0.18 * 300 * math.pi / 30, abs=0.1)
 
 
-def test_a_bandwidth_in_tune_is_kept_and_warned_about():
-    d = designed(more="[tune]\nSPEED_BANDWIDTH_HZ = 40\n")
-    assert d.value("SPEED_BANDWIDTH_HZ") == 40.0
-    assert any("SPEED_BANDWIDTH_HZ = 40: the speed loop has" in warning for warning in d.warnings), d.warnings
-
-
 def test_the_current_loop_stays_below_its_cap_unless_rotation_asks_for_more():
     assert of(HURST).value("CURRENT_BANDWIDTH_HZ") == 1000.0 < of("maxon_ec45flat_30w_24v").value("CURRENT_BANDWIDTH_HZ")
 

@@ -4,6 +4,7 @@ import contextlib
 import functools
 import os
 import shlex
+import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +17,8 @@ from tuning.design import Design, design
 
 COMPILER = shlex.split(os.environ.get("CC") or "gcc")
 INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
+WARNINGS = ["-std=gnu99", "-ftrack-macro-expansion=0", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+CHECK = ("-fsyntax-only", "firmware/drive/param_check.c")
 HURST = "hurst_dmb0224c10002"
 
 MOTOR = """title = "a motor"
@@ -74,3 +77,11 @@ def designed(*changes: tuple[str, str], more: str = "", board: str = "mclv") -> 
 def of(name: str) -> Design:
     """The design of one of the project's motors; shared, not to be changed."""
     return design(motor_file.load(name), board_file.load("mclv"))
+
+
+def build(text: str, *arguments: str, includes: list[str] = INCLUDES) -> str:
+    """What the compiler says with this userparams.h."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "userparams.h").write_text(text, encoding="utf-8")
+        compile_ = [*COMPILER, *WARNINGS, f"-I{folder}", *includes, "-c", *arguments]
+        return subprocess.run(compile_, cwd=paths.ROOT, capture_output=True, text=True, check=False).stderr
