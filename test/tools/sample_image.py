@@ -298,7 +298,8 @@ def _debug(sample: Sample) -> dict[str, bytes]:
     info.append(0)
     info[:4] = struct.pack("<I", len(info) - 4)
 
-    steps = b"".join(b"\0\5\2" + struct.pack("<I", at) + b"\4" + bytes([file(name)]) + b"\3" + _signed(line - before) + b"\1"
+    steps = b"".join(b"\0\5\2" + struct.pack("<IBBB", at, 4, file(name), 3)
+                     + bytes([0x80 | line - before & 0x7F, line - before >> 7 & 0x7F, 1]) # SLEB128 of a small number
                      for (at, name, line), before in zip(sample.lines, [1, *(line for _, _, line in sample.lines)]))
     if sample.lines:
         steps += b"\0\5\2" + struct.pack("<I", sample.lines_end) + b"\0\1\1"
@@ -311,8 +312,3 @@ def _debug(sample: Sample) -> dict[str, bytes]:
 
 def _size(members: object) -> int:
     return members if isinstance(members, int) else sum(_size(inner) for inner in members.values())
-
-
-def _signed(value: int) -> bytes:
-    """SLEB128 of a small number."""
-    return bytes([0x80 | value & 0x7F, value >> 7 & 0x7F])

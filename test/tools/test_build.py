@@ -51,24 +51,19 @@ def test_a_header_is_found_by_its_folder_or_by_itself_and_the_project_s_own_is_t
     (tmp_path / "userparams.h").touch()
     for folder, found in ((tmp_path, tmp_path.resolve()), (paths.ROOT, None)):
         assert build.header_folder(folder) == build.header_folder(folder / "userparams.h") == found
-
-
-def test_a_folder_without_a_header_or_with_a_name_that_make_cannot_take_is_refused(tmp_path):
+    # one without a header, or with a name that make cannot take, is refused
     odd = tmp_path / "two words"
     odd.mkdir()
     (odd / "userparams.h").touch()
-    refusal(lambda: build.header_folder(tmp_path), "no userparams.h in ", "--userparams: name the folder")
+    refusal(lambda: build.header_folder(paths.TABLES), "no userparams.h in ", "--userparams: name the folder")
     refusal(lambda: build.header_folder(odd), "two words' cannot be given to make")
 
 
 # ---- make ----------------------------------------------------------------------------------------------------------------
-def test_two_builds_of_one_folder_take_turns(fake, tmp_path):
+def test_two_builds_of_one_folder_take_turns_and_the_flags_of_a_surrounding_make_are_not_inherited(fake, tmp_path):
     fake(f"mkdir {tmp_path}/busy || exit 1\nsleep 0.2\nrmdir {tmp_path}/busy", ["TURNS"])
     with concurrent.futures.ThreadPoolExecutor() as pool:
         assert len(list(pool.map(build.library, [["TURNS"]] * 3))) == 3
-
-
-def test_the_flags_of_a_surrounding_make_are_not_inherited(fake):
     assert fake("echo \"flags=$MAKEFLAGS\" > $RESULT")[1].strip() == "flags="
 
 

@@ -173,9 +173,11 @@ def test_an_ended_run_leaves_neither_results_nor_processes(place):
 
 
 # ---- lists ---------------------------------------------------------------------------------------------------------------
-def test_the_list_of_scenarios_has_a_line_for_each():
+def test_the_list_of_scenarios_has_a_line_for_each_and_keys_has_unit_and_range_of_the_board_s_keys():
     code, out, _ = command("scenarios")
     assert (code, [line.split()[0] for line in out.splitlines()]) == (0, paths.names(paths.SCENARIOS))
+    code, out, _ = command("keys", "--library", str(LIBRARY))
+    assert code == 0 and re.search(r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w", out)
 
 
 @pytest.mark.parametrize("name", ["run", "table2", "starts", "rated", "robust", "scenarios", "motors", "keys"])
@@ -183,11 +185,6 @@ def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([name, "--help"])
     assert (ended.value.code, "usage:" in capsys.readouterr().out) == (0, True)
-
-
-def test_keys_lists_unit_and_range_of_the_board_s_keys():
-    code, out, _ = command("keys", "--library", str(LIBRARY))
-    assert code == 0 and re.search(r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w", out)
 
 
 # ---- a header for another motor ------------------------------------------------------------------------------------------

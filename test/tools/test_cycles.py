@@ -56,14 +56,11 @@ def classes(states: list[int], reference: list[float]) -> dict[str, list[bool]]:
     return {name: which.tolist() for name, which in cycles.classes(np.array(states), support.STATES, np.array(reference), 2640.0).items()}
 
 
-def test_every_interrupt_belongs_to_one_state_and_bridge_off_to_neither_figure():
+def test_every_interrupt_belongs_to_one_state_bridge_off_to_neither_figure_and_field_weakening_is_closed_loop_above_its_first_speed():
     result = classes(list(range(8)), [0.0] * 8)
     assert all(result[name] == [i == number for i in range(8)] for number, name in support.STATES.items())
     off = classes([0, 1, 2, 7], [3000.0] * 4)
     assert not any(off[cycles.WITH] + off[cycles.WITHOUT])
-
-
-def test_field_weakening_is_closed_loop_above_its_first_speed_either_way():
     result = classes([4, 5, 5, 5, 6, 6], [4000.0, 2600.0, 2640.0, -5500.0, 3000.0, 900.0])
     assert result[cycles.WITH] == [False, False, True, True, True, False]
     assert result[cycles.WITHOUT] == [True, True, False, False, False, True]

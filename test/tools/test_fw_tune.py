@@ -298,6 +298,10 @@ def test_what_is_written_is_read(path):
     found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, path.parent)
     assert (found is None, reason) == (False, "")
     assert fw_tables.load_for("nobody", PARAMS, path.parent) == (None, "")
+    # header names keep the base value by name
+    values = TABLES.parameters()
+    assert (values["INVKFI_SPEED3"], values["INVKFI_SPEED4"]) == ("NORM_INVKFIBASE", "7966")
+    assert (values["IDREF_SPEED0"], values["IDREF_SPEED17"], len(values)) == ("0.00", "-1.70", 3 * ENTRIES + 1)
 
 
 @pytest.mark.parametrize("name", fw_tables.FINGERPRINT)
@@ -334,12 +338,6 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_search(path, place
     expected = f"cannot write the tables {reason}, {paths.shown(place)}: make the folder writable" if reason else "the search began"
     assert told == (2, "", f"foc33: {expected}\n")
     assert sorted(file.name for file in path.parent.iterdir()) == ["folder.toml", path.name]
-
-
-def test_header_names_keep_the_base_value_by_name():
-    values = TABLES.parameters()
-    assert (values["INVKFI_SPEED3"], values["INVKFI_SPEED4"]) == ("NORM_INVKFIBASE", "7966")
-    assert (values["IDREF_SPEED0"], values["IDREF_SPEED17"], len(values)) == ("0.00", "-1.70", 3 * ENTRIES + 1)
 
 
 # ---- the header ------------------------------------------------------------------------------------------------------------

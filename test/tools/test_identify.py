@@ -95,9 +95,7 @@ def test_the_lines_to_paste_are_a_motor_file(run, tmp_path):
     for name in ("rs_ohm", "ld_h", "kphi_v_per_krpm"):
         assert getattr(found, name) == approx(getattr(MOTOR, name), rel=0.01)
     assert not found.salient
-
-
-def test_plots_and_header_are_there(run):
+    # plots and header are there
     assert all((run.folder / f"{name}.png").stat().st_size > 10000 for name in ("resistance", "inductance", "back_emf"))
     assert "#define NOPOLESPAIRS 5\n" in (run.folder / "userparams.h").read_text(encoding="utf-8")
 

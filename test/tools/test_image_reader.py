@@ -53,13 +53,11 @@ def test_elf_gives_words_names_and_memory_and_hex_the_same_words(image):
         ("main", 0x200, 0, True, CODE), ("ram", 0x800, 40, False, DATA)]
 
 
-def test_constants_are_programmed_where_their_window_shows_them(image):
+def test_constants_are_programmed_where_their_window_shows_them_and_start_values_are_memory(image):
     elf = image(sample(constants=[("_table", 4, (0x1234, 0x5678))]).elf())
     assert [elf.words[CONSTANTS - 0x8000 + at] for at in (0, 2)] == [0x1234, 0x5678]
     assert [(item.name, item.address, item.section.memory) for item in elf.names if item.section][-1] == ("table", CONSTANTS, CONST)
-
-
-def test_start_values_of_variables_are_memory_and_no_program(image):
+    # start values of variables are memory and no program
     elf = image(sample(sections=[Section(".ndata", 0x900, four(1) + four(2), WRITE),
                                    Section(".pbss", 0xA00, b"", PERSISTENT, NOBITS, 8)]).elf())
     assert elf.words == WORDS

@@ -57,9 +57,7 @@ def test_the_position_is_the_middle_of_the_converter_step_that_is_nearest_to_the
     ranges = Ranges.of(PARAMS, [])
     for rpm in range(500, 2801, 7):
         assert abs(500 + ranges.pot_for_speed(rpm, False) * 2300 - rpm) <= 2300 * STEP * 0.5 + 1e-9, rpm
-
-
-def test_bidirectional_minimum_speed_keeps_its_direction():
+    # bidirectional, the minimum speed keeps its direction
     forward, backward = pots(actions((0, "speed_rpm = 500"), (0.1, "speed_rpm = -500"), defines=BOTH))
     assert forward > 0.515 and backward < 0.485
 
@@ -116,9 +114,7 @@ def test_a_slow_turn_back_goes_down_in_both_ranges():
     after = [pot for time, pot in turned(found) if time > at_s]
     assert after == sorted(after, reverse=True)
     assert (after[0], after[-1]) == pytest.approx((1.0, 500.0 / 2300.0), abs=STEP)
-
-
-def test_a_button_that_is_still_down_is_let_go_before_it_is_pressed_again():
+    # a button that is still down is let go before it is pressed again
     first, second = s3(percent((0.5, "speed_percent = 160"), (0.52, "speed_percent = 40")))
     assert second >= first + HOLD_S + DEBOUNCE_S
 

@@ -22,10 +22,9 @@ TIMES = SimpleNamespace(start_s=0.1, settle_s=1.0, torque_over_s=0.5, where="her
 
 
 def row(**more):
-    values = {"motor": "m", "row": "50 %", "fault": None, "closed_after_s": 1.6, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
-              "current_of_maximum_percent": 50.0, "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0, "voltage_percent": 60.0,
-              "reference_rpm": 1400.0, "highest_rpm": 1402.0}
-    return values | more
+    return {"motor": "m", "row": "50 %", "fault": None, "closed_after_s": 1.6, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
+            "current_of_maximum_percent": 50.0, "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0, "voltage_percent": 60.0,
+            "reference_rpm": 1400.0, "highest_rpm": 1402.0} | more
 
 
 # ---- what is asked -------------------------------------------------------------------------------------------------------
@@ -50,15 +49,11 @@ def test_each_way_to_fail_is_named(values, text):
     assert rating_sweep.check(TABLE, row(verdict=text))[0].ok == (text == "ok")
 
 
-def test_a_failed_row_names_motor_row_and_numbers():
+def test_a_failed_row_names_motor_row_and_numbers_and_what_was_reached_without_load_is_told():
+    for rpm, text in ((5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"), (None, "no closed loop without load")):
+        assert rating_sweep.highest_text([row(highest_rpm=rpm, reference_rpm=5500.0)]) == text
     outcome = rating_sweep.check(TABLE, row(verdict="angle", angle_error_rms_deg=12.0))[0]
     assert outcome.row == "m at 50 %" and "angle error 12.0 deg" in outcome.got and "angle error 10 deg" in outcome.allowed
-
-
-@pytest.mark.parametrize("rpm, text", [(5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"),
-                                       (None, "no closed loop without load")])
-def test_what_was_reached_without_load_is_told(rpm, text):
-    assert rating_sweep.highest_text([row(highest_rpm=rpm, reference_rpm=5500.0)]) == text
 
 
 # ---- when it happens -----------------------------------------------------------------------------------------------------

@@ -48,12 +48,9 @@ def test_the_protocol_tells_when_the_loop_closed_and_of_a_fault_and_its_end():
     assert {"fault STALL", "fault cleared"} <= set(lines)
 
 
-def test_failed_expectations_are_marked():
+def test_failed_expectations_are_marked_and_warnings_of_the_board_are_printed():
     line = report.outcomes_text(report.check(example()))
     assert line.startswith("FAIL  hand-over: closed loop  0.700 s  (allowed: at most 0.5 s after S2)")
-
-
-def test_warnings_of_the_board_are_printed():
     item = example()
     item.warnings = ["P1DTCON1: dead time is 0"]
     assert "warning of the board: P1DTCON1: dead time is 0" in report.text(item, [], report.summary(item, [], "", ""))

@@ -20,9 +20,8 @@ ALONE = {(1.0, 1.0, 1.0), (0.7, 1.0, 1.0), (1.3, 1.0, 1.0), (1.0, 0.7, 1.0), (1.
 
 
 def row(**more):
-    values = {"closed_after_s": 1.6, "fault": None, "fault_s": None, "speed_error_percent": 0.1, "voltage_at_limit_percent": 0.0,
-              "current_at_limit_percent": 0.0}
-    return values | more
+    return {"closed_after_s": 1.6, "fault": None, "fault_s": None, "speed_error_percent": 0.1, "voltage_at_limit_percent": 0.0,
+            "current_at_limit_percent": 0.0} | more
 
 
 # ---- deviations ----------------------------------------------------------------------------------------------------------
@@ -100,13 +99,11 @@ def margins(down: float, up: float) -> Margins:
     return result
 
 
-def test_the_ladder_goes_from_the_lowest_to_the_highest_factor_through_1():
+def test_the_ladder_goes_from_the_lowest_to_the_highest_factor_through_1_and_a_margin_lies_between_its_steps():
     steps = [b / a for a, b in zip(LADDER, LADDER[1:])]
     assert (LADDER[0], LADDER[-1], 1.0 in LADDER) == (0.3, 3.0, True)
     assert 1.0 < min(steps) and max(steps) <= robust.LADDER + 1e-9
-
-
-def test_a_margin_lies_between_the_last_that_holds_and_the_first_that_does_not():
+    # between the last that holds and the first that does not
     up, down = searched(1.4, True, LADDER), searched(0.6, False, LADDER)
     assert up.good < 1.4 < up.bad and down.bad < 0.6 < down.good
     assert up.next(0.02) == pytest.approx(math.sqrt(up.good * up.bad))
@@ -132,13 +129,9 @@ def test_the_search_ends_at_its_resolution_and_comes_that_close():
     assert (search.good, search.bad, search.next(0.02)) == (3.0, None, None)
 
 
-@pytest.mark.parametrize("ends, text", [((0.0, 99.0), r"<0\.30 \.\. >3\.00"), ((0.6, 1.5), r"0\.6\d \.\. 1\.[34]\d"),
-                                        ((1.0, 1.0), "not at all")])
-def test_the_printed_margin_marks_an_end_that_is_only_the_search_s(ends, text):
-    assert re.fullmatch(text, margins(*ends).cell("R", "runs, loaded"))
-
-
-def test_the_printed_table_tells_what_happens_beyond():
+def test_the_printed_margin_marks_an_end_that_is_only_the_search_s_and_the_table_tells_what_happens_beyond():
+    for ends, text in (((0.0, 99.0), r"<0\.30 \.\. >3\.00"), ((0.6, 1.5), r"0\.6\d \.\. 1\.[34]\d"), ((1.0, 1.0), "not at all")):
+        assert re.fullmatch(text, margins(*ends).cell("R", "runs, loaded")), ends
     text = robust.margins_text(TABLE, margins(0.0, 1.5))
     assert re.search(r"(?m)^R x1\.\d\d: no \[starts, no load; runs, no load; starts, loaded; runs, loaded\]$",
                      text) and "0.85 .. 1.15" in text

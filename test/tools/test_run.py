@@ -68,13 +68,10 @@ def test_there_is_no_overshoot(state, reference, speed):
     assert item.hand_overs()[0].overshoot_percent == pytest.approx(0.0, abs=1e-3)
 
 
-def test_fault_and_state_changes_carry_names_and_an_unknown_code_its_number():
+def test_fault_and_state_changes_carry_names_and_an_unknown_code_its_number_and_speed_factor_is_motor_time_per_wall_time():
     item = run(fw__state=step((0, 1), (1.0, 7)), fw__fault=step((0, 0), (1.0, 3), (1.5, 99)))
     assert [name for _, _, name in item.state_changes()] == ["STOPPED", "FAULT"]
     assert [name for _, _, name in item.fault_changes()] == ["NONE", "OVERVOLTAGE", "code 99"]
-
-
-def test_speed_factor_is_motor_time_per_wall_time():
     assert run().speed_factor == pytest.approx(20.0)
 
 

@@ -149,13 +149,9 @@ def test_a_measure_is_called_by_its_reference_and_the_speed_is_checked_in_all_th
     assert [measure.name for measure in item.measures] == ["m", "1500 rpm", "n"] and item.expectations[0].measures == ["1500 rpm", "n"]
 
 
-@pytest.mark.parametrize("name", paths.names(paths.SCENARIOS))
-def test_every_scenario_of_the_project_is_valid_and_expects_something(name):
-    assert load(name).expectations
-
-
-def test_there_is_a_scenario_for_each_mode_and_each_fault():
+def test_every_scenario_of_the_project_is_valid_and_expects_something_and_there_is_one_for_each_mode_and_each_fault():
     items = [load(name) for name in paths.names(paths.SCENARIOS)]
+    assert [item.title for item in items if not item.expectations] == []
     assert {define for item in items for define in item.defines} == {"OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE",
                                                                      "BIDIRECTIONAL_SPEED", "SNAPSHOT"}
     faults = {expectation.name for item in items for expectation in item.expectations if type(expectation).__name__ == "FaultExpectation"}

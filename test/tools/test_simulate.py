@@ -80,15 +80,11 @@ def test_events_happen_at_their_period_and_are_in_the_protocol_once():
     assert result.actions == [(0.0, "power-up"), (0.5, "S2 pressed")]
 
 
-def test_events_at_zero_are_in_place_before_power_up():
+def test_events_at_zero_are_in_place_before_power_up_and_the_shaft_starts_where_the_scenario_says_and_the_bus_at_the_supply():
     board = FakeBoard()
     simulated("[[event]]\nat_s = 0.0\npot = 0.25\n[[event]]\nat_s = 0.1\npot = 0.5\n", board)
     calls = [call for call in board.calls if call[1] in ("input.pot", "power_up")]
     assert calls == [(0.0, "input.pot", 0.25), (0.0, "power_up"), (0.1, "input.pot", 0.5)]
-
-
-def test_the_shaft_starts_where_the_scenario_says_and_the_bus_at_the_supply():
-    board = FakeBoard()
     simulated("[start]\nrotor_deg = 75\nspeed_rpm = -300\n", board, {"supply.voltage_v": 20.0})
     assert [board.values[key] for key in ("state.theta_e_deg", "state.speed_rpm", "bus.voltage_v")] == [75.0, -300.0, 20.0]
 

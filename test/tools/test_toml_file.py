@@ -60,12 +60,8 @@ def test_what_is_no_file_is_refused(path, parts):
     refusal(lambda: Document(Path(path)), *parts)
 
 
-def test_the_mark_that_some_editors_begin_a_file_with_is_read_over():
-    assert document("\ufeffx = 1\n").root.number("x") == 1.0
-
-
-def test_both_ends_of_a_range_are_allowed():
-    root = document("a = 0\nb = 2").root
+def test_the_mark_that_some_editors_begin_a_file_with_is_read_over_and_both_ends_of_a_range_are_allowed():
+    root = document("\ufeffa = 0\nb = 2").root
     assert (root.number("a", minimum=0, maximum=2), root.number("b", minimum=0, maximum=2)) == (0.0, 2.0)
 
 

@@ -42,8 +42,6 @@ def sine(pole_pairs: int, psi_vs: float, peak_a: float) -> float:
 Y, DELTA = units.kphi("Y", 5), units.kphi("delta", 5)
 R, L, R_DELTA, L_DELTA = units.resistance("Y"), units.inductance("Y"), units.resistance("delta"), units.inductance("delta")
 TERMINALS = 1.2 * 2.4 / (1.2 + 2.4) # one delta winding of 1.2 ohm parallel to the two others
-
-
 EXACT = [
     (R, 5.34, "ohm line-to-line", 2.67), (R_DELTA, 5.34, "ohm line-to-line", 2.67), # two star phases whatever the connection
     (L, 3.84, "mH line-to-line", 1.92e-3), (L_DELTA, 3.84, "mH line-to-line", 1.92e-3),

@@ -186,10 +186,7 @@ def write_json(data: dict, folder: Path, name: str) -> Path:
 
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
-    def cell(value: int | None) -> str:
-        return "" if value is None else str(value)
-    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]),
-             cell(row["ram_budget"])]
+    body = [[row["name"], *(_number(row[key], 0) for key in ("note", "flash", "budget", "note_ram", "ram", "ram_budget"))]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
     return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
