@@ -100,14 +100,12 @@ def test_budget_file_has_the_limits():
 
 
 # ---- output --------------------------------------------------------------------------------------------------------------
-def test_table_has_cycles_us_load_and_the_notes_figures():
+def test_table_has_cycles_us_load_and_the_notes_figures(tmp_path):
     lines = cycles.text(report(found("demo", [400, 600], [500]))).splitlines()
     row = next(line for line in lines if line.startswith(cycles.WITHOUT))
     assert row.split() == "without field weakening 2 400 500.0 600 10.00 12.50 15.00 25.0 % 14.725 / 20.8 / 21.4".split()
     assert any("ENTRY" in line and "cycles of an entry" in line for line in lines)
-
-
-def test_the_file_is_written_and_the_readme_table_follows_from_them(tmp_path):
+    # the README's table follows from the file
     head, rows = cycles.readme_table(json.loads(write_json(cycles.summary(report(found("demo", [400], [440, 480]))), tmp_path,
                                                            "cycles").read_text()))
     assert all(len(row) == len(head) for row in rows)

@@ -45,6 +45,9 @@ def test_the_header_knows_pole_pairs_current_and_speed_of_the_rating_and_nothing
     values = defines(Known.of(MOTOR, BOARD))
     assert [values[name] for name in ("NOPOLESPAIRS", "Q_CURRENT_REF_OPENLOOP", "END_SPEED_RPM")] == ["5", "1.53", "1120"]
     assert not {"2.67", "1.92", "7.24", "5.5e-06"} & set(defines(Known(5, 1.0, 1000.0)).values())
+    # a bus below the rating lowers the speed, and current and speed can be given
+    assert Known.of(replace(MOTOR, rated_voltage_v=48.0), BOARD).speed_rpm == approx(560.0, abs=5e-8)
+    assert Known.of(MOTOR, BOARD, 0.7, 800.0) == Known(5, 0.7, 800.0)
 
 
 @pytest.mark.parametrize("full_scale_a", [33.0, 46.0])
@@ -59,11 +62,6 @@ def test_a_board_for_large_currents_builds_too(full_scale_a):
 def test_current_stays_below_the_boards_trip(name):
     known = Known.of(motor_file.load(name), BOARD)
     assert 1.2 * known.current_a < float(defines(known)["OVER_CURRENT_THRESHOLD_A"])
-
-
-def test_a_bus_below_the_rating_lowers_the_speed_and_current_and_speed_can_be_given():
-    assert Known.of(replace(MOTOR, rated_voltage_v=48.0), BOARD).speed_rpm == approx(560.0, abs=5e-8)
-    assert Known.of(MOTOR, BOARD, 0.7, 800.0) == Known(5, 0.7, 800.0)
 
 
 # ---- one run ---------------------------------------------------------------------------------------------------------------

@@ -317,11 +317,6 @@ def test_the_projects_budget_names_what_is_there_and_is_the_note_s():
     assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682, 444, 12288, 768)
 
 
-def test_the_levels_of_the_interrupts_are_in_the_board_s_sources():
-    levels = stack.priorities("".join(path.read_text(encoding="utf-8") for path in sorted(size.BOARD.glob("*.c"))))
-    assert [levels[name] for name in ("_ADC1Interrupt", "_FLTA1Interrupt")] == [5, 5]
-
-
 # ---- bad input -----------------------------------------------------------------------------------------------------------
 GOOD, BARE, OTHER = program((0x200, 1), functions=[tick(0x202)]), program((0x200, 1)), program((0x200, 1), machine=62)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.image import stack
+from tools.image import size, stack
 
 WIDE = ("call 0x", "goto 0x", "call {", "goto {", "do ") # instructions of two words
 
@@ -152,9 +152,11 @@ def analyse(levels: dict[str, int], handlers: list[str]) -> stack.Result:
     return stack.analyse(listing(SYSTEM), 0x200, handlers, levels)
 
 
-def test_the_levels_of_the_sources_are_read_by_register_field():
+def test_the_levels_of_the_sources_are_read_by_register_field_and_the_board_s_two_are_the_same():
     source = "IPC3bits.AD1IP = 5;\n    IPC15bits.FLTA1IP  =  6; IPC0bits.T1IP = 2; IFS0bits.AD1IF = 0;"
     assert stack.priorities(source) == {ADC1: 5, FLTA1: 6, T1: 2}
+    levels = stack.priorities("".join(path.read_text(encoding="utf-8") for path in sorted(size.BOARD.glob("*.c"))))
+    assert (levels[ADC1], levels[FLTA1]) == (5, 5)
 
 
 @pytest.mark.parametrize("levels, handlers, priorities, depth", [

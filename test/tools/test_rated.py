@@ -57,11 +57,12 @@ def test_a_failed_row_names_motor_row_and_numbers_and_what_was_reached_without_l
 
 
 # ---- when it happens -----------------------------------------------------------------------------------------------------
-def test_the_start_takes_lock_and_ramp_and_a_slower_header_is_given_more_time():
+def test_the_start_takes_lock_and_ramp_a_slower_header_is_given_more_time_and_one_that_hides_a_parameter_is_refused():
     took = sweep.start_time_s(PARAMS)
     assert took == pytest.approx(0.2 + 1.398 + sweep.START_MARGIN_S, abs=1e-3)
     for change in ({"LOCK_TIME": 8000.0}, {"OPENLOOP_RAMPSPEED_INCREASERATE": 5.0}, {"END_SPEED_RPM": 1500.0}):
         assert sweep.start_time_s(PARAMS | change) > took + 0.19, change
+    refusal(lambda: sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")
 
 
 def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it():
@@ -76,10 +77,6 @@ def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it
 def test_the_potentiometer_waits_inside_its_normal_range_until_the_loop_is_closed(rpm, first):
     speeds = [(event.at_s, event.value) for event in sweep.loaded_run(PARAMS, rpm, TIMES, "x")[0] if event.kind == "speed_rpm"]
     assert [speed for _, speed in speeds] == [first, rpm] and speeds[1][0] > 1.6
-
-
-def test_a_firmware_that_hides_a_parameter_is_refused():
-    refusal(lambda: sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")
 
 
 @pytest.mark.parametrize("signals, rpm", [

@@ -126,9 +126,7 @@ def test_an_unstable_loop_is_called_so_and_has_no_margins():
 def test_a_choice_in_tune_replaces_the_tuner_s_and_what_follows_from_it():
     d = designed(more="[tune]\nEND_SPEED_RPM = 700\nIDREF_SPEED3 = -0.5\n")
     assert [d.params[name] for name in ("END_SPEED_RPM", "MINIMUM_SPEED_RPM", "IDREF_SPEED3")] == ["700", "500", "-0.5"]
-
-
-def test_inertia_includes_the_load_and_a_salient_motor_is_estimated_with_lq():
+    # inertia includes the load, and a salient motor is estimated with Lq
     assert designed(more=INERTIA % "1e-5").params["MOTOR_INERTIA_KGM2"] == "1.55e-5"
     d = of("linix_45zwn24_40")
     assert d.value("MOTOR_LS_MH") == approx(d.motor.lq_h * 1e3, abs=1e-9)

@@ -92,9 +92,7 @@ def test_every_form_of_the_same_motor_gives_the_same_kphi(unit, value):
     assert entry(Y, value, unit).value_si == pytest.approx(7.24, rel=5e-6)
     only_flux = 2.0 if unit in ("V s/rad", "mV s/rad") else 1.0 # depends on the pole pairs
     assert units.kphi("Y", 10).units[unit](1.0) / Y.units[unit](1.0) == pytest.approx(only_flux)
-
-
-def test_every_unit_of_kphi_is_among_the_tested_ones():
+    # every unit of Kphi is among the tested ones
     assert set(Y.units) == set(SAME_KPHI)
     assert set(DELTA.units) == {unit for unit in SAME_KPHI if " phase/" not in unit}
 

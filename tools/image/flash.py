@@ -51,15 +51,6 @@ def checked(hex_file: Path, elf_file: Path) -> list[str]:
     return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), None)
 
 
-def parser() -> argparse.ArgumentParser:
-    result = command_line.Parser(prog="python3 -m tools.image.flash", description=__doc__.splitlines()[0])
-    result.add_argument("hex", type=Path)
-    result.add_argument("--elf", type=Path, required=True, help="the program that the HEX was made of, for the checks")
-    result.add_argument("--tool", default="PK4", help=f"{', '.join(TOOLS)} (PK4)")
-    result.add_argument("--ipe", type=Path, help="folder of MPLAB X or MPLAB IPE")
-    return result
-
-
 def program(options: argparse.Namespace) -> int:
     tool = options.tool.upper()
     if tool not in TOOLS:
@@ -90,7 +81,12 @@ def program(options: argparse.Namespace) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return command_line.run(lambda: program(parser().parse_args(arguments)))
+    parser = command_line.Parser(prog="python3 -m tools.image.flash", description=__doc__.splitlines()[0])
+    parser.add_argument("hex", type=Path)
+    parser.add_argument("--elf", type=Path, required=True, help="the program that the HEX was made of, for the checks")
+    parser.add_argument("--tool", default="PK4", help=f"{', '.join(TOOLS)} (PK4)")
+    parser.add_argument("--ipe", type=Path, help="folder of MPLAB X or MPLAB IPE")
+    return command_line.run(lambda: program(parser.parse_args(arguments)))
 
 
 if __name__ == "__main__":

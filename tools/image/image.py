@@ -178,20 +178,16 @@ def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, 
             *check_budget(words, elf, limits, deepest)]
 
 
-def parser() -> argparse.ArgumentParser:
-    result = command_line.Parser(prog="python3 -m tools.image.image", description=__doc__.splitlines()[0])
-    result.add_argument("elf", type=Path)
-    result.add_argument("hex", type=Path)
-    result.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
-    result.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
-    result.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
-    result.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
-    result.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")
-    return result
-
-
 def main(arguments: list[str] | None = None) -> int:
-    return command_line.run(lambda: _run(parser().parse_args(arguments)))
+    parser = command_line.Parser(prog="python3 -m tools.image.image", description=__doc__.splitlines()[0])
+    parser.add_argument("elf", type=Path)
+    parser.add_argument("hex", type=Path)
+    parser.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
+    parser.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
+    parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
+    parser.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
+    parser.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")
+    return command_line.run(lambda: _run(parser.parse_args(arguments)))
 
 
 def _run(options: argparse.Namespace) -> int:

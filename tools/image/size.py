@@ -214,16 +214,14 @@ def disassemble(objdump: str, elf: Path) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    def work() -> int:
-        parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
-        parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
-        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json")
-        parser.add_argument("--objdump", default="xc16-objdump")
-        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
-                            help="compare with the last commit's image, built by make with these variables")
-        parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
-        return _run(parser.parse_args(arguments))
-    return command_line.run(work)
+    parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
+    parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json")
+    parser.add_argument("--objdump", default="xc16-objdump")
+    parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
+                        help="compare with the last commit's image, built by make with these variables")
+    parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
+    return command_line.run(lambda: _run(parser.parse_args(arguments)))
 
 
 def _run(options: argparse.Namespace) -> int:
