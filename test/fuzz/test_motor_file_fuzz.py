@@ -1,11 +1,11 @@
 """Fuzzing of the motor and board file loaders: whatever stands in a file, the result is a sane motor or exactly one line, never a traceback."""
 
+import json
 import math
 import random
 import re
 import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -134,20 +134,16 @@ def spoil_types(text: str, dice: random.Random) -> bytes:
                 continue
             node[key] = dice.choice((0, -1, 3, 2.5, math.nan, math.inf, True, "", "ohm", [], [1.0, 2.0], ["a"], {}, {"value": 1.0}, {"a": {"b": {}}}, 10 ** 400))
             break
-    return "".join(f"{quoted(key)} = {written(value)}\n" for key, value in tree.items()).encode()
-
-
-def quoted(text: str) -> str:
-    return "\"" + text.replace("\\", "\\\\").replace("\"", "\\\"") + "\""
+    return "".join(f"{json.dumps(key)} = {written(value)}\n" for key, value in tree.items()).encode()
 
 
 def written(value: Any) -> str:
     """A value as TOML, tables inline."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{quoted(key)} = {written(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{json.dumps(key)} = {written(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(map(written, value)) + "]"
-    return quoted(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+    return json.dumps(value) if isinstance(value, str) else str(value).lower()
 
 
 @pytest.fixture

@@ -168,12 +168,10 @@ class _Region:
 
     def signs(self):
         """A minus before each product that is used as a value."""
-        for i, token in enumerate(self.tokens):
-            before = self.tokens[i - 1] if i > 0 else None
-            if token.kind == "id" and PRODUCTS.match(token.text) and before is not None and self.tokens[i + 1].text == "(" \
-                    and before.text not in ("+", "-", "+=", "-="):
-                if before.text != ")" or self.is_cast(i - 1):
-                    self.add("sign", token.start, token.start, "-")
+        for i, (before, token) in enumerate(zip(self.tokens, self.tokens[1:]), 1):
+            if token.kind == "id" and PRODUCTS.match(token.text) and self.tokens[i + 1].text == "(" \
+                    and before.text not in ("+", "-", "+=", "-=") and (before.text != ")" or self.is_cast(i - 1)):
+                self.add("sign", token.start, token.start, "-")
 
     def constants(self):
         table = set()
@@ -193,14 +191,11 @@ class _Region:
 
     def components(self):
         """The other axis or phase, where a value is read."""
-        for i, token in enumerate(self.tokens):
-            before = self.tokens[i - 1] if i > 0 else None
-            if token.kind != "id" or before is None or before.text not in (".", "->") or token.text not in COMPONENT:
-                continue
+        for i, (before, token) in enumerate(zip(self.tokens, self.tokens[1:]), 1):
             following = self.tokens[i + 1].text if i + 1 < len(self.tokens) else ";"
-            if before.text == "." and i > 1 and self.tokens[i - 2].text in (",", "{"):
-                continue # a designated initialiser
-            if following not in ("=", "+=", "-=", "[", "("):
+            initialiser = before.text == "." and i > 1 and self.tokens[i - 2].text in (",", "{") # a designated one
+            if token.kind == "id" and before.text in (".", "->") and token.text in COMPONENT and not initialiser \
+                    and following not in ("=", "+=", "-=", "[", "("):
                 self.add("component", token.start, token.end, COMPONENT[token.text])
 
     def clamps(self):

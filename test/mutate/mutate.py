@@ -42,7 +42,6 @@ def parse(argv):
     parser.add_argument("--sample", type=int, default=600, help="how many mutants to try (default 600)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default 1)")
     parser.add_argument("--files", nargs="*", default=[], metavar="text", help="every mutant of the files whose path contains a text")
-    parser.add_argument("--list", action="store_true", help="list the chosen mutants, run nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--out", default="build/mutate")
     return parser.parse_args(argv)
@@ -192,11 +191,6 @@ def main(argv=None):
              "the code has changed; look at the entry again or remove it")
     chosen = by_file if arguments.full or arguments.files else sample(by_file, arguments.sample, arguments.seed)
     chosen = [m for found in chosen.values() for m in found]
-    if arguments.list:
-        for m in chosen:
-            print(f"{m.line}: {m.operator}: {m.key}")
-        return 0
-
     begin = time.monotonic()
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)

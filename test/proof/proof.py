@@ -48,16 +48,12 @@ def read_proofs(file: Path) -> list[Proof]:
     return proofs
 
 
-def include_path(userparams: str) -> str:
-    return " ".join(f"-I{folder}" for folder in [str(HERE), *([userparams] if userparams else []), "include", "tools/cpu_host", "."])
-
-
-def run(proof: Proof, userparams: str) -> tuple[list[str], float]:
+def run(proof: Proof) -> tuple[list[str], float]:
     """What is wrong with the proof, and the seconds it took."""
     report = BUILD / f"{proof.name}.csv"
     report.unlink(missing_ok=True)
     # A register or flag that an interrupt may change is any value at the start of a proof, and constant during a tick.
-    cpp = f"{include_path(userparams)} -Dvolatile= {'-D' + proof.mode if proof.mode else ''}"
+    cpp = f"-I{HERE} -Iinclude -Itools/cpu_host -I. -Dvolatile= {'-D' + proof.mode if proof.mode else ''}"
     command = ["frama-c", *KERNEL, *proof.options, f"-cpp-extra-args={cpp}", "-main", proof.function, str(proof.file), *proof.sources,
                "-then", "-report-csv", str(report)]
     start = time.monotonic()
@@ -94,21 +90,16 @@ def judge(proof: Proof, report: str, log: str) -> list[str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("only", nargs="*", help="names of proofs (all)")
-    parser.add_argument("--userparams", default="", help="folder with another userparams.h")
-    parser.add_argument("--list", action="store_true", help="print the names")
     options = parser.parse_args()
-    proofs = [proof for file in sorted(HERE.glob("*.c")) for proof in read_proofs(file)]
-    proofs = [proof for proof in proofs if not options.only or proof.name in options.only]
+    known = [proof for file in sorted(HERE.glob("*.c")) for proof in read_proofs(file)]
+    proofs = [proof for proof in known if not options.only or proof.name in options.only]
     if not proofs:
-        print(f"foc33: proofs, {' '.join(options.only)}: no such proof; --list shows the names", file=sys.stderr)
+        print(f"foc33: no such proof, {' '.join(options.only)}: use one of {' '.join(proof.name for proof in known)}", file=sys.stderr)
         return 2
-    if options.list:
-        print("\n".join(proof.name for proof in proofs))
-        return 0
     BUILD.mkdir(parents=True, exist_ok=True)
     passed = failed = 0
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for proof, (wrong, seconds) in zip(proofs, pool.map(lambda proof: run(proof, options.userparams), proofs)):
+        for proof, (wrong, seconds) in zip(proofs, pool.map(run, proofs)):
             for line in wrong:
                 print(f"  {line}")
             print(f"{proof.name}: " + (f"FAIL: {len(wrong)} alarms" if wrong else "PASS") + f" ({seconds:.0f} s)", flush=True)

@@ -4,7 +4,6 @@ A finding passes only if docs/deviations.md lists it, with the check's name, the
 any more fails too, so the page stays true. Environment: CC, CLANG, CLANG_TIDY, CPPCHECK (the tools to use).
 """
 
-import argparse
 import os
 import re
 import subprocess
@@ -117,40 +116,23 @@ def cppcheck(sources: list[str]) -> list[Finding]:
         output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
                       f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--force", "--inconclusive",
                       "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", *INCLUDES, *sources])
-    findings = set()
-    for line in output.splitlines():
-        match = re.fullmatch(r"([^:]+):(\d+):([\w.-]+):(.*)", line)
-        if not match:
-            continue
-        file, number, check, text = match.groups()
-        is_misra = check.startswith("misra-c2012-")
-        if file.startswith("tools/"):
-            continue
-        name = f"misra {check.removeprefix('misra-c2012-')}" if is_misra else f"cppcheck {check}"
-        findings.add(Finding(name, file, int(number), text))
+    findings = {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), file, int(number), text)
+                for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
     return sorted(findings, key=lambda f: (f.check, f.file, f.line))
 
 
 def clang_tidy(sources: list[str]) -> list[Finding]:
     def one(job: tuple[str, list[str]]) -> set[Finding]:
-        found = set()
         output = run([os.environ.get("CLANG_TIDY", "clang-tidy-14"), "--quiet", f"--config-file={HERE}/clang-tidy.yaml",
                       "--header-filter=(include|firmware)/.*", job[0], "--", *CLANG_16_BIT, *INCLUDES, *job[1]])
-        for line in output.splitlines():
-            match = re.fullmatch(r"(.+?):(\d+):\d+: (?:warning|error): (.*) \[([\w.,-]+)\]", line)
-            if match:
-                file, number, text, checks = match.groups()
-                found |= {Finding(f"tidy {check}", relative(file), int(number), text) for check in checks.split(",")}
-        return found
+        found = re.findall(r"^(.+?):(\d+):\d+: (?:warning|error): (.*) \[([\w.,-]+)\]$", output, re.M)
+        return {Finding(f"tidy {check}", relative(file), int(number), text)
+                for file, number, text, checks in found for check in checks.split(",")}
 
     return sorted(set().union(*each(one, distinct([CLANG, *CLANG_16_BIT], sources))), key=lambda f: (f.check, f.file, f.line))
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--all", action="store_true", help="print the listed findings too")
-    parser.add_argument("--only", help="name of one check")
-    options = parser.parse_args()
     sources = sorted(str(path) for path in Path("firmware").rglob("*.c"))
     if not sources:
         print("foc33: firmware/, static checks: no sources here; run from the project's folder", file=sys.stderr)
@@ -165,7 +147,6 @@ def main() -> int:
         "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], sources),
         "gcc": lambda: compiler("gcc", gcc, sources),
     }
-    checks = {name: check for name, check in checks.items() if options.only in (None, name)}
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):
         unlisted = []
@@ -175,19 +156,17 @@ def main() -> int:
                 row.used += 1
             else:
                 unlisted.append(finding)
-            if options.all or not row:
                 print(f"  {finding.file}:{finding.line}: [{finding.check}] {finding.text}")
         if unlisted:
             print(f"{name}: FAIL: {len(unlisted)} findings that {PAGE} does not list")
         else:
             print(f"{name}: PASS" + (f" ({len(findings)} findings, all listed)" if findings else ""))
         passed, failed = passed + (not unlisted), failed + bool(unlisted)
-    if not options.only:
-        stale = [d for d in deviations if not d.used]
-        for d in stale:
-            print(f"  {PAGE}: `{d.check}` at {' '.join(d.places)} is listed, but nothing reports it any more: delete the line")
-        print("deviations_are_needed: " + (f"FAIL: {len(stale)} lines of {PAGE} are stale" if stale else "PASS"))
-        passed, failed = passed + (not stale), failed + bool(stale)
+    stale = [d for d in deviations if not d.used]
+    for d in stale:
+        print(f"  {PAGE}: `{d.check}` at {' '.join(d.places)} is listed, but nothing reports it any more: delete the line")
+    print("deviations_are_needed: " + (f"FAIL: {len(stale)} lines of {PAGE} are stale" if stale else "PASS"))
+    passed, failed = passed + (not stale), failed + bool(stale)
     print(f"{passed} passed, {failed} failed")
     return int(failed != 0)
 

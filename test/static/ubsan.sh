@@ -1,8 +1,6 @@
 #!/bin/sh
 # Runs the unit tests on a firmware built with clang's undefined, integer and implicit-conversion sanitizers: any wrap-around, shift,
 # or narrowing in firmware/ and include/ that is not marked as intended is a failure.
-#
-#   test/static/ubsan.sh         from the project's folder
 set -u
 
 sanitize=-fsanitize=undefined,integer,implicit-conversion

@@ -2,9 +2,12 @@
 
 Four bytes of the ELF file hold a program word, two hold a byte of data, and every byte of the debugging sections is followed by a zero."""
 
+import io
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import intelhex
 
 from tools.image import device
 
@@ -217,16 +220,12 @@ def record(kind: int, address: int, data: bytes) -> str:
 
 
 def hex_text(words: dict[int, int]) -> str:
-    """Words as a HEX file, up to four a record."""
-    text, page = "", -1
-    for start, run in runs(words):
-        for number in range(0, len(run), 4):
-            address = 2 * start + 4 * number
-            if address >> 16 != page:
-                page = address >> 16
-                text += record(4, 0, page.to_bytes(2, "big"))
-            text += record(0, address & 0xFFFF, b"".join(map(four, run[number:number + 4])))
-    return text + END
+    """Words as a HEX file."""
+    file, text = intelhex.IntelHex(), io.StringIO()
+    for address, word in words.items():
+        file.puts(2 * address, four(word))
+    file.write_hex_file(text)
+    return text.getvalue()
 
 
 # ---- DWARF 2 -------------------------------------------------------------------------------------------------------------
@@ -299,7 +298,8 @@ def _debug(sample: Sample) -> dict[str, bytes]:
     info.append(0)
     info[:4] = struct.pack("<I", len(info) - 4)
 
-    steps = b"".join(b"\0\5\2" + struct.pack("<I", at) + b"\4" + bytes([file(name)]) + b"\3" + _signed(line - before) + b"\1"
+    steps = b"".join(b"\0\5\2" + struct.pack("<IBBB", at, 4, file(name), 3)
+                     + bytes([0x80 | line - before & 0x7F, line - before >> 7 & 0x7F, 1]) # SLEB128 of a small number
                      for (at, name, line), before in zip(sample.lines, [1, *(line for _, _, line in sample.lines)]))
     if sample.lines:
         steps += b"\0\5\2" + struct.pack("<I", sample.lines_end) + b"\0\1\1"
@@ -312,8 +312,3 @@ def _debug(sample: Sample) -> dict[str, bytes]:
 
 def _size(members: object) -> int:
     return members if isinstance(members, int) else sum(_size(inner) for inner in members.values())
-
-
-def _signed(value: int) -> bytes:
-    """SLEB128 of a small number."""
-    return bytes([0x80 | value & 0x7F, value >> 7 & 0x7F])

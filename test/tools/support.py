@@ -70,11 +70,11 @@ def run(more: str = "", recorded: Trace | None = None, **signals) -> Run:
                wall_s=0.1, motor_s=2.0)
 
 
-def command(*arguments: str) -> tuple[int, str, str]:
+def command(*arguments: str, main=cli.main) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of a command line."""
     out, error = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
-        code = cli.main(list(arguments))
+        code = main(list(arguments))
     return code, out.getvalue(), error.getvalue()
 
 

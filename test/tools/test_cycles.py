@@ -56,14 +56,11 @@ def classes(states: list[int], reference: list[float]) -> dict[str, list[bool]]:
     return {name: which.tolist() for name, which in cycles.classes(np.array(states), support.STATES, np.array(reference), 2640.0).items()}
 
 
-def test_every_interrupt_belongs_to_one_state_and_bridge_off_to_neither_figure():
+def test_every_interrupt_belongs_to_one_state_bridge_off_to_neither_figure_and_field_weakening_is_closed_loop_above_its_first_speed():
     result = classes(list(range(8)), [0.0] * 8)
     assert all(result[name] == [i == number for i in range(8)] for number, name in support.STATES.items())
     off = classes([0, 1, 2, 7], [3000.0] * 4)
     assert not any(off[cycles.WITH] + off[cycles.WITHOUT])
-
-
-def test_field_weakening_is_closed_loop_above_its_first_speed_either_way():
     result = classes([4, 5, 5, 5, 6, 6], [4000.0, 2600.0, 2640.0, -5500.0, 3000.0, 900.0])
     assert result[cycles.WITH] == [False, False, True, True, True, False]
     assert result[cycles.WITHOUT] == [True, True, False, False, False, True]
@@ -103,14 +100,12 @@ def test_budget_file_has_the_limits():
 
 
 # ---- output --------------------------------------------------------------------------------------------------------------
-def test_table_has_cycles_us_load_and_the_notes_figures():
+def test_table_has_cycles_us_load_and_the_notes_figures(tmp_path):
     lines = cycles.text(report(found("demo", [400, 600], [500]))).splitlines()
     row = next(line for line in lines if line.startswith(cycles.WITHOUT))
     assert row.split() == "without field weakening 2 400 500.0 600 10.00 12.50 15.00 25.0 % 14.725 / 20.8 / 21.4".split()
     assert any("ENTRY" in line and "cycles of an entry" in line for line in lines)
-
-
-def test_the_file_is_written_and_the_readme_table_follows_from_them(tmp_path):
+    # the README's table follows from the file
     head, rows = cycles.readme_table(json.loads(write_json(cycles.summary(report(found("demo", [400], [440, 480]))), tmp_path,
                                                            "cycles").read_text()))
     assert all(len(row) == len(head) for row in rows)
@@ -145,34 +140,20 @@ def test_what_cycles_cannot_do_is_one_line(word, expected):
     assert expected in our_lines(done)[0] and "No such file" not in done.stderr
 
 
-@pytest.fixture
-def refused(tmp_path, capsys):
-    """A command is refused with one line; {} stands for the file's path."""
-    def of(command: str, *arguments: str) -> str:
-        status = (cycles if command == "cycles" else pil_command).main([word.format(tmp_path) for word in arguments])
-        lines = capsys.readouterr().err.splitlines()
-        assert (status, len(lines)) == (2, 1), lines
-        return lines[0]
-
+@pytest.mark.parametrize("room, arguments, words", [
+    *((room, ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there")
+      for room in (cycles, pil_command)), *((room, ["--nonsense"], "--nonsense") for room in (cycles, pil_command)),
+    (cycles, ["--image", "{}/text.elf"], "text.elf"), (cycles, ["--image", "{}/alone.hex"], "name the ELF file"),
+    (cycles, ["--image", "{}/huge.elf"], "cannot be read"),
+    (pil_command, ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
+    (pil_command, ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), (pil_command, ["demo", "smoke", "--out", "{}"], "--out")])
+def test_bad_input_is_one_line(tmp_path, room, arguments, words):
     (tmp_path / "text.elf").write_text("hello", encoding="utf-8")
     (tmp_path / "alone.hex").write_text(hex_text(WORDS), encoding="utf-8")
     with (tmp_path / "huge.elf").open("wb") as file:
         file.write(b"\x7fELF")
         file.truncate(5 << 30)
-    return of
-
-
-@pytest.mark.parametrize("command, arguments, words", [
-    ("cycles", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
-    ("pil", ["--image", "/no/such.elf"], "no image '/no/such.elf', --image: build one with make firmware, or name a file that is there"),
-    ("cycles", ["--image", "{}/text.elf"], "text.elf"), ("cycles", ["--image", "{}/alone.hex"], "name the ELF file"),
-    ("cycles", ["--image", "{}/huge.elf"], "cannot be read"),
-    ("pil", ["--image", "{}/huge.elf", "smoke", "--out", "{}/out"], "cannot be read"),
-    ("pil", ["demmo", "--image", "{}/text.elf"], "did you mean 'demo'?"), ("pil", ["--nonsense"], "--nonsense"),
-    ("cycles", ["--nonsense"], "--nonsense"),
-    ("pil", ["demo", "smoke", "--out", "{}"], "--out")])
-def test_bad_input_is_one_line(tmp_path, refused, command, arguments, words):
-    assert words in refused(command, *arguments)
+    support.refused(support.command(*(word.format(tmp_path) for word in arguments), main=room.main), words)
     assert not (tmp_path / "out").exists()
 
 

@@ -51,9 +51,7 @@ def test_peak_finds_the_top_of_a_hill_or_a_line_and_uses_what_is_known():
     asked = []
     assert peak(lambda n: asked.append(n) or 0.0, {n: -abs(n - 100.0) for n in range(0, 201, 4)}, 0, 200) == 100
     assert asked == []
-
-
-def test_largest_halves_towards_the_threshold():
+    # largest halves towards the threshold
     assert largest(lambda x: x <= 0.3, 1.0, 10) == approx(0.3, abs=1.0 / 1024)
     assert (largest(lambda x: True, 0.2, 8), largest(lambda x: False, 0.2, 8)) == (0.2, 0.0)
 
@@ -89,11 +87,8 @@ def test_means_and_an_angle_error_taken_around_the_circle():
     assert (point.use, point.current_rms_a, point.angle_deg) == approx((0.8, math.sqrt(0.5), 2.0), abs=5e-8)
     assert (point.id_a, point.iq_a, point.trim_a, point.bus_v) == (-0.6, 0.8, -0.1, 23.9)
     assert measured(plant__theta_e_deg=2.0).angle_deg == approx(-1.0, abs=5e-8)
-
-
-@pytest.mark.parametrize("rpm, held", [(2985.5, True), (3014.5, True), (2984.5, False), (3015.5, False)])
-def test_a_speed_is_held_within_half_a_per_cent(rpm, held):
-    assert measured(plant__speed_rpm=rpm).held == held
+    # a speed is held within half a per cent
+    assert [measured(plant__speed_rpm=rpm).held for rpm in (2984.5, 2985.5, 3014.5, 3015.5)] == [False, True, True, False]
 
 
 def started(closes_after_s: float, fault: str = "", risks: str = "") -> float:
@@ -207,16 +202,13 @@ def search(goal: Goal = GOAL, entries: int = ENTRIES, **motor) -> tuple[fw_searc
     return Search(made, goal, entries=entries).run(), made
 
 
-def test_every_entry_has_the_least_current_with_the_margin():
+def test_every_entry_has_the_least_current_with_the_margin_and_field_weakening_starts_where_the_voltage_asks_for_it():
     result, motor = search()
     assert len(result.found) > 10
     for before, found in zip(result.found, result.found[1:]):
         assert found.entry.idref_a == before.entry.idref_a or motor.needs(found, found.load_nm), found.index
         motor.rpm, motor.load_nm = found.rpm, found.load_nm
         assert motor.use(found.entry)[0] <= 0.97 + 1e-9
-
-
-def test_field_weakening_starts_where_the_voltage_asks_for_it():
     result, motor = search(entries=2)
     motor.rpm, motor.load_nm = result.start_rpm, GOAL.load_nm(result.start_rpm)
     assert motor.use(Entry())[0] <= 0.97
@@ -302,12 +294,14 @@ def test_what_is_written_is_read(path):
     assert path.read_text(encoding="utf-8") == GOOD
     assert fw_tables.load(path) == TABLES
     assert fw_tables.load(path).mismatch(PARAMS) == ""
-
-
-def test_the_rounding_of_single_precision_is_no_difference_and_no_file_no_complaint(path):
+    # the rounding of single precision is no difference, and no file no complaint
     found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, path.parent)
     assert (found is None, reason) == (False, "")
     assert fw_tables.load_for("nobody", PARAMS, path.parent) == (None, "")
+    # header names keep the base value by name
+    values = TABLES.parameters()
+    assert (values["INVKFI_SPEED3"], values["INVKFI_SPEED4"]) == ("NORM_INVKFIBASE", "7966")
+    assert (values["IDREF_SPEED0"], values["IDREF_SPEED17"], len(values)) == ("0.00", "-1.70", 3 * ENTRIES + 1)
 
 
 @pytest.mark.parametrize("name", fw_tables.FINGERPRINT)
@@ -346,12 +340,6 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_search(path, place
     assert sorted(file.name for file in path.parent.iterdir()) == ["folder.toml", path.name]
 
 
-def test_header_names_keep_the_base_value_by_name():
-    values = TABLES.parameters()
-    assert (values["INVKFI_SPEED3"], values["INVKFI_SPEED4"]) == ("NORM_INVKFIBASE", "7966")
-    assert (values["IDREF_SPEED0"], values["IDREF_SPEED17"], len(values)) == ("0.00", "-1.70", 3 * ENTRIES + 1)
-
-
 # ---- the header ------------------------------------------------------------------------------------------------------------
 KNOWN = fw_tune.defines(HEADER)
 
@@ -364,12 +352,9 @@ def test_values_change_and_comments_stay():
         fw_tables.with_values(HEADER, {"NO_SUCH_NAME": "1"})
 
 
-def test_numbers_are_read():
+def test_numbers_are_read_and_the_highest_speed_is_where_the_format_of_speeds_or_of_the_back_emf_ends():
     text = "#define A 1.5 /* x */\n  # define B 0xF\n#define C (-2)\n#define D OTHER\n/* #define E 3 */\n"
     assert fw_tune.defines(text) == {"A": 1.5, "B": 15.0, "C": -2.0}
-
-
-def test_highest_speed_is_where_the_format_of_speeds_or_of_the_back_emf_ends():
     assert fw_tune.highest_speed(KNOWN) == 6400.0
     assert fw_tune.highest_speed({**KNOWN, "OVER_CURRENT_THRESHOLD_A": 3.81, "MOTOR_LS_MH": 2.2}) < 6400.0
 

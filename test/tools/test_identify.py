@@ -8,10 +8,10 @@ from types import SimpleNamespace
 
 import pytest
 from pytest import approx
+from support import refused
 from tune_support import HURST, command, motors
 
-from tools.common import board_file, board_keys, motor_file, paths
-from tools.common.errors import UserError
+from tools.common import board_file, motor_file, paths
 from tuning import constants, identify, identify_result
 from tuning.identify_result import Known
 
@@ -41,9 +41,13 @@ def defines(known: Known, board=BOARD) -> dict[str, str]:
     return dict(re.findall(r"^#define (\w+) (\S+)$", identify.header(known, board), re.MULTILINE))
 
 
-def test_the_header_knows_pole_pairs_current_and_speed_of_the_rating():
+def test_the_header_knows_pole_pairs_current_and_speed_of_the_rating_and_nothing_of_what_is_to_be_measured():
     values = defines(Known.of(MOTOR, BOARD))
     assert [values[name] for name in ("NOPOLESPAIRS", "Q_CURRENT_REF_OPENLOOP", "END_SPEED_RPM")] == ["5", "1.53", "1120"]
+    assert not {"2.67", "1.92", "7.24", "5.5e-06"} & set(defines(Known(5, 1.0, 1000.0)).values())
+    # a bus below the rating lowers the speed, and current and speed can be given
+    assert Known.of(replace(MOTOR, rated_voltage_v=48.0), BOARD).speed_rpm == approx(560.0, abs=5e-8)
+    assert Known.of(MOTOR, BOARD, 0.7, 800.0) == Known(5, 0.7, 800.0)
 
 
 @pytest.mark.parametrize("full_scale_a", [33.0, 46.0])
@@ -54,19 +58,10 @@ def test_a_board_for_large_currents_builds_too(full_scale_a):
     assert defines(Known(4, 1.0, 1400.0))["MOTOR_RS_OHM"] == "1"
 
 
-def test_the_header_knows_nothing_of_what_is_to_be_measured():
-    assert not {"2.67", "1.92", "7.24", "5.5e-06"} & set(defines(Known(5, 1.0, 1000.0)).values())
-
-
 @pytest.mark.parametrize("name", motors())
 def test_current_stays_below_the_boards_trip(name):
     known = Known.of(motor_file.load(name), BOARD)
     assert 1.2 * known.current_a < float(defines(known)["OVER_CURRENT_THRESHOLD_A"])
-
-
-def test_a_bus_below_the_rating_lowers_the_speed_and_current_and_speed_can_be_given():
-    assert Known.of(replace(MOTOR, rated_voltage_v=48.0), BOARD).speed_rpm == approx(560.0, abs=5e-8)
-    assert Known.of(MOTOR, BOARD, 0.7, 800.0) == Known(5, 0.7, 800.0)
 
 
 # ---- one run ---------------------------------------------------------------------------------------------------------------
@@ -98,9 +93,7 @@ def test_the_lines_to_paste_are_a_motor_file(run, tmp_path):
     for name in ("rs_ohm", "ld_h", "kphi_v_per_krpm"):
         assert getattr(found, name) == approx(getattr(MOTOR, name), rel=0.01)
     assert not found.salient
-
-
-def test_plots_and_header_are_there(run):
+    # plots and header are there
     assert all((run.folder / f"{name}.png").stat().st_size > 10000 for name in ("resistance", "inductance", "back_emf"))
     assert "#define NOPOLESPAIRS 5\n" in (run.folder / "userparams.h").read_text(encoding="utf-8")
 
@@ -135,11 +128,11 @@ def test_the_lines_to_paste_suit_a_star_and_a_delta(tmp_path, connection, watch)
     assert (motor.rs_ohm, motor.ld_h) == (approx(2.6695, abs=1e-3), approx(1.92e-3, abs=1e-6))
 
 
-@pytest.mark.parametrize("told, words", [({"result": 9}, ("VOLTAGE_LIMIT", "lower END_SPEED_RPM")),
-                                         ({"result": 3, "fault": "OVERCURRENT_SW"}, ("fault OVERCURRENT_SW",))])
-def test_another_end_is_one_line_with_the_remedy(told, words):
-    (line,) = item(**told).problems()
-    assert all(word in line for word in words)
+def test_another_end_is_one_line_with_the_remedy():
+    for told, words in (({"result": 9}, "VOLTAGE_LIMIT.*lower END_SPEED_RPM"),
+                        ({"result": 3, "fault": "OVERCURRENT_SW"}, "fault OVERCURRENT_SW")):
+        (line,) = item(**told).problems()
+        assert re.search(words, line), line
 
 
 # ---- refusals --------------------------------------------------------------------------------------------------------------
@@ -149,10 +142,4 @@ def test_another_end_is_one_line_with_the_remedy(told, words):
     (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'"),
     ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
 def test_mistakes_on_the_command_line(arguments, says):
-    code, out, error = command("identify", *arguments)
-    assert (code, out, error.count("\n")) == (2, "", 1) and says in error, error
-
-
-def test_an_unknown_key_is_refused():
-    with pytest.raises(UserError):
-        identify.identify([MOTOR], "mclv", board_keys.Values({"no.key": 1.0}, {}))
+    refused(command("identify", *arguments), says)

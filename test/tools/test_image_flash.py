@@ -4,6 +4,7 @@ import re
 
 import pytest
 from sample_image import good_image
+from support import command
 
 from tools.image import flash, image
 
@@ -33,11 +34,10 @@ def install(folder):
 
 
 @pytest.fixture
-def run(folder, capsys):
+def run(folder):
     """The command: exit status, stdout, lines of stderr."""
     def with_options(*more: str) -> tuple[int, str, list[str]]:
-        status = flash.main([str(folder / "a.hex"), "--elf", str(folder / "a.elf"), *more])
-        out, error = capsys.readouterr()
+        status, out, error = command(str(folder / "a.hex"), "--elf", str(folder / "a.elf"), *more, main=flash.main)
         assert ("programmed and verified" in out) == (status == 0)
         return status, out, error.splitlines()
     return with_options
@@ -59,18 +59,15 @@ def test_without_ipecmd_the_exact_command_is_printed_and_nothing_is_claimed(fold
     assert re.search("^foc33: not programmed: .*install MPLAB X", lines[0])
 
 
-def test_the_folder_that_the_user_names_comes_first(folder, install, run):
-    install("path/ipecmd.sh")
+def test_of_the_usual_places_the_newest_is_taken_but_the_folder_that_the_user_names_comes_first(folder, install, run):
+    for version in ("v5.50", "v6.9", "v6.20"):
+        install(f"usual/{version}/mplab_platform/mplab_ipe/ipecmd.sh")
+    assert "usual/v6.20/" in run()[1]
+    assert install("path/ipecmd.sh") in run()[1]
     named = install("x/v6.20/mplab_platform/mplab_ipe/ipecmd.sh")
     assert named in run("--ipe", str(folder / "x/v6.20"))[1]
     status, _, lines = run("--ipe", str(folder / "nowhere"))
     assert (status, len(lines)) == (2, 1) and "no ipecmd.sh in IPE=" in lines[0]
-
-
-def test_of_the_usual_places_the_newest_is_taken(install, run):
-    for version in ("v5.50", "v6.9", "v6.20"):
-        install(f"usual/{version}/mplab_platform/mplab_ipe/ipecmd.sh")
-    assert "usual/v6.20/" in run()[1]
 
 
 def test_a_failed_programming_is_told(install, run, monkeypatch):

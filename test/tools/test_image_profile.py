@@ -46,11 +46,8 @@ def test_a_helper_is_counted_with_what_it_is_inlined_into():
     assert found.inlined["pi"] == 30 and "qm_clamp" not in found.inlined
 
 
-def test_words_that_never_ran_are_told_by_function():
+def test_words_that_never_ran_are_told_by_function_and_the_second_word_of_a_call_is_no_instruction():
     assert profile(*INTERRUPT, Counts({0x200: 1}, {0x200: 1})).executed == {"_ADC1Interrupt": (1, 5), "slow": (0, 2), "deep": (0, 1)}
-
-
-def test_second_word_of_a_call_is_no_instruction():
     found = profile(*made(("_ADC1Interrupt", 0x200, [CALL | 0x300, 0, NOP]), ("far", 0x300, [NOP])),
                     Counts({0x200: 1, 0x204: 1, 0x300: 1}, {0x200: 2, 0x204: 1, 0x300: 1}))
     assert found.executed == {"_ADC1Interrupt": (2, 2), "far": (1, 1)}

@@ -3,8 +3,7 @@
 import random
 
 import pytest
-from sample_image import (CONSTANTS, END, NOBITS, PERSISTENT, WRITE, Function, Sample, Section, four, hex_text, program, record,
-                          take_ram)
+from sample_image import (CONSTANTS, END, NOBITS, PERSISTENT, WRITE, Function, Sample, Section, four, hex_text, record, take_ram)
 
 from tools.common.errors import UserError
 from tools.image import attribution, device
@@ -43,28 +42,22 @@ def refused(image):
     return of
 
 
-def test_elf_gives_words_names_and_memory(image):
+def test_elf_gives_words_names_and_memory_and_hex_the_same_words(image):
     found = sample()
     take_ram(found, 40)
     elf = image(found.elf())
-    assert elf.words == WORDS
+    assert elf.words == image(found.hex()).words == WORDS
     assert (elf.ram_bytes, elf.devices, elf.entry) == (40, {device.NAME}, 0x200)
     assert elf.function_at(0x202) == "main"
     assert [(item.name, item.address, item.size, item.function, item.section.memory) for item in elf.names if item.section] == [
         ("main", 0x200, 0, True, CODE), ("ram", 0x800, 40, False, DATA)]
 
 
-def test_hex_gives_the_same_words(image):
-    assert image(sample().hex()).words == WORDS
-
-
-def test_constants_are_programmed_where_their_window_shows_them(image):
+def test_constants_are_programmed_where_their_window_shows_them_and_start_values_are_memory(image):
     elf = image(sample(constants=[("_table", 4, (0x1234, 0x5678))]).elf())
     assert [elf.words[CONSTANTS - 0x8000 + at] for at in (0, 2)] == [0x1234, 0x5678]
     assert [(item.name, item.address, item.section.memory) for item in elf.names if item.section][-1] == ("table", CONSTANTS, CONST)
-
-
-def test_start_values_of_variables_are_memory_and_no_program(image):
+    # start values of variables are memory and no program
     elf = image(sample(sections=[Section(".ndata", 0x900, four(1) + four(2), WRITE),
                                    Section(".pbss", 0xA00, b"", PERSISTENT, NOBITS, 8)]).elf())
     assert elf.words == WORDS
@@ -132,13 +125,6 @@ def test_files_that_cannot_be_read(tmp_path):
         for read in (load, read_elf, read_hex, attribution.read):
             with pytest.raises(UserError, match=words):
                 read(path)
-
-
-def test_no_debugging_information_is_said(tmp_path):
-    path = tmp_path / "x.elf"
-    path.write_bytes(program((0x200, 1)).elf())
-    with pytest.raises(UserError, match="compile with -g"):
-        attribution.read(path)
 
 
 def mutate(data: bytearray, rng: random.Random) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from sample_image import Function, Sample, program
+from support import command, refused
 
 from tools.common.errors import UserError
 from tools.image import attribution, base, size, stack
@@ -143,12 +144,9 @@ def test_flash(counted, sample, expected):
     assert counted(sample) == expected
 
 
-def test_each_copy_counts(image, budget):
+def test_each_copy_counts_and_vectors_are_the_handlers_and_do_not(image, budget):
     share = shares(image(program((0x200, 5), functions=[tick(0x20A, guard(0x200, 0x202), guard(0x206, 0x20A))])), budget)["guard", "guard"]
     assert (share.flash, len(share.copies)) == (9, 2)
-
-
-def test_vectors_are_the_handlers_and_not_counted(image):
     found = image(Sample({0x200: 0, 4: 0x200, 6: 0x300}, functions=[tick(0x202)]))
     assert (found.handlers, found.flash_bytes) == ([0x200, 0x300], 3)
 
@@ -206,11 +204,8 @@ def test_a_broken_budget_is_a_line_that_says_how_much(report, given, broken):
     assert report(**given).broken == broken
 
 
-def test_what_no_module_claims_counts_as_the_note_s(report):
+def test_what_no_module_claims_counts_as_the_note_s_and_a_module_with_a_budget_of_its_own_is_held_to_it(report, tmp_path):
     assert next(row.ram for row in report(1, new=4).rows if row.name == size.NOTE_TITLE) == 4
-
-
-def test_a_module_with_a_budget_of_its_own_is_held_to_it(report, tmp_path):
     held = budget_in(tmp_path, 'name = "guard"\n', 'name = "guard"\nflash_bytes = 6\n')
     assert report(1, 2, held=held).broken == []
     assert report(1, 3, held=held).broken == ["flash, guard: 9 bytes, 3 over the budget of 6"]
@@ -322,27 +317,19 @@ def test_the_projects_budget_names_what_is_there_and_is_the_note_s():
     assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682, 444, 12288, 768)
 
 
-def test_the_levels_of_the_interrupts_are_in_the_board_s_sources():
-    text = "".join(path.read_text(encoding="utf-8") for path in sorted(size.BOARD.glob("*.c")))
-    assert [stack.priorities(text).get(name) for name in ("_ADC1Interrupt", "_FLTA1Interrupt")] == [5, 5]
-
-
 # ---- bad input -----------------------------------------------------------------------------------------------------------
 GOOD, BARE, OTHER = program((0x200, 1), functions=[tick(0x202)]), program((0x200, 1)), program((0x200, 1), machine=62)
 
 
 @pytest.mark.parametrize("sample, arguments, words", [
     (None, (), ("No such file", "make firmware")), (GOOD, ("--objdump", "no-such-objdump"), ("no no-such-objdump", "XC16")),
-    (OTHER, (), ("not a linked program for a dsPIC",)), (BARE, (), ("compile with -g",)), (BARE, ("--objdump", r"printf '\351'"),
-    ("compile with -g",)),
+    (OTHER, (), ("not a linked program for a dsPIC",)), (BARE, (), ("compile with -g",)),
+    (BARE, ("--objdump", r"printf '\351'"), ("compile with -g",)),
     (None, ("--wrong",), ("--help",))])
-def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, sample, arguments, words):
+def test_bad_input_is_one_line_and_writes_nothing(tmp_path, sample, arguments, words):
     if sample is not None:
         (tmp_path / "bad.elf").write_bytes(sample.elf())
-    status = size.main([str(tmp_path / "bad.elf"), "--out", str(tmp_path / "out"), "--objdump", "true", *arguments])
-    out, error = capsys.readouterr()
-    assert (status, error.count("\n"), out) == (2, 1, "") and error.startswith("foc33: ")
-    assert all(word in error for word in words), error
+    refused(command(str(tmp_path / "bad.elf"), "--out", str(tmp_path / "out"), "--objdump", "true", *arguments, main=size.main), *words)
     assert not (tmp_path / "out").exists()
 
 

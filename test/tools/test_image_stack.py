@@ -2,7 +2,7 @@
 
 import pytest
 
-from tools.image import stack
+from tools.image import size, stack
 
 WIDE = ("call 0x", "goto 0x", "call {", "goto {", "do ") # instructions of two words
 
@@ -102,11 +102,8 @@ def test_calls_that_cannot_be_followed_are_errors(source, error):
     assert len(errors) == 1 and error in errors[0]
 
 
-def test_a_call_through_a_pointer_that_is_known_to_be_harmless_is_none():
+def test_a_call_through_a_pointer_that_is_known_to_be_harmless_is_none_and_a_clone_has_the_name_of_the_function():
     assert program("__f:\ncall w2\nreturn", ("_f",))[1] == []
-
-
-def test_a_clone_has_the_name_of_the_function():
     assert [stack.plain(name) for name in ("_drive_idle.clone.10.clone.17", "__ADC1Interrupt")] == ["drive_idle", "_ADC1Interrupt"]
 
 
@@ -155,9 +152,11 @@ def analyse(levels: dict[str, int], handlers: list[str]) -> stack.Result:
     return stack.analyse(listing(SYSTEM), 0x200, handlers, levels)
 
 
-def test_the_levels_of_the_sources_are_read_by_register_field():
+def test_the_levels_of_the_sources_are_read_by_register_field_and_the_board_s_two_are_the_same():
     source = "IPC3bits.AD1IP = 5;\n    IPC15bits.FLTA1IP  =  6; IPC0bits.T1IP = 2; IFS0bits.AD1IF = 0;"
     assert stack.priorities(source) == {ADC1: 5, FLTA1: 6, T1: 2}
+    levels = stack.priorities("".join(path.read_text(encoding="utf-8") for path in sorted(size.BOARD.glob("*.c"))))
+    assert (levels[ADC1], levels[FLTA1]) == (5, 5)
 
 
 @pytest.mark.parametrize("levels, handlers, priorities, depth", [
@@ -170,14 +169,11 @@ def test_interrupts_stand_on_the_background_and_on_lower_levels(levels, handlers
     assert ([level.priority for level in result.levels], result.depth) == (priorities, depth)
 
 
-def test_the_table_ends_at_the_depth_and_names_what_was_not_deepest():
+def test_the_table_ends_at_the_depth_and_names_what_was_not_deepest_and_a_missing_handler_is_an_error():
     result = analyse({ADC1: 5, FLTA1: 5}, HANDLERS)
     lines = stack.table(result)
     assert int([line for line in lines if not line.strip().startswith("(")][-1].split()[-1]) == result.depth
     assert "background" in lines[0] and any("(instead of _FLTA1Interrupt 6)" in line for line in lines)
-
-
-def test_a_handler_that_is_missing_is_an_error():
     assert analyse({}, ["_U1TXInterrupt"]).errors == ["_U1TXInterrupt: no such function"]
 
 

@@ -42,9 +42,13 @@ exit $bad
 
 
 # ---- vectors -------------------------------------------------------------------------------------------------------------
-def test_a_row_is_words_low_word_first_without_gaps():
+def test_a_row_is_words_low_word_first_without_gaps_and_tables_hold_every_row_of_the_vectors(tmp_path):
     columns = [("a", "s16"), ("b", "s32"), ("c", "u16"), ("d", "u32")]
     assert golden_words.words(columns, ["-1", "-2", "65535", "65536"]) == [0xFFFF, 0xFFFE, 0xFFFF, 0xFFFF, 0, 1]
+    tables = golden_words.write(ROOT / "test/golden/vectors", tmp_path)
+    sizes = {table.stem: table.stat().st_size for table in tables}
+    assert (sizes["sincos"], sizes["multiply"]) == (700 * 6, 301 * 22)
+    assert f"golden_fetch({list(sizes).index('sincos')}, " in (tmp_path / "golden_sincos.h").read_text()
 
 
 def test_header_keeps_type_rows_and_constants_and_fetches_rows():
@@ -55,13 +59,6 @@ def test_header_keeps_type_rows_and_constants_and_fetches_rows():
     assert "golden_x[" not in text
     constants = golden_words.header("x", 7, [], {"k": "5"}, []) # a file with constants only stays as it is
     assert "#define GOLDEN_X_K 5" in constants and "golden_fetch" not in constants
-
-
-def test_tables_hold_every_row_of_the_vectors(tmp_path):
-    tables = golden_words.write(ROOT / "test/golden/vectors", tmp_path)
-    sizes = {table.stem: table.stat().st_size for table in tables}
-    assert (sizes["sincos"], sizes["multiply"]) == (700 * 6, 301 * 22)
-    assert f"golden_fetch({list(sizes).index('sincos')}, " in (tmp_path / "golden_sincos.h").read_text()
 
 
 # ---- images: a test file made of names, through a made-up tool chain -------------------------------------------------------

@@ -37,18 +37,13 @@ UNITS = {"R": "\"ohm line-to-line\"", "L": "\"mH line-to-line\"", "KPHI": "\"V p
 BAD = {
     # the text as such
     "TOML syntax": ("[mechanical]", "[mechanical", "TOML syntax", "line 10"),
-    "a key twice": ("\n[mechanical]", "resistance = 1\n[mechanical]", "TOML syntax", "line 9"),
     # tables and keys
     "no title": ("title = \"a motor\"", "", "'title' is missing"),
-    "title is a number": ("title = \"a motor\"", "title = 3", "'title' is not a text", "line 1"),
     "no connection": ("connection = \"Y\"", "", "'connection' is missing"),
     "connection unknown": ("\"Y\"", "\"star\"", "'star' is no connection", "line 2", "use one of Y, delta"),
     "connection is no text": ("\"Y\"", "[1]", "is no connection", "line 2"),
     "table missing": ("[mechanical]\ninertia = { value = 24, unit = \"g cm2\", source = \"s\" }", "", "the table [mechanical] is missing"),
     "table misspelt": ("[mechanical]", "[mechanic]", "unknown key 'mechanic'", "line 10", "did you mean 'mechanical'?"),
-    "table is a number": ("\n[electrical]", "rating = 3\n[electrical]", "TOML syntax"),
-    "table is a list": ("[mechanical]", "[[mechanical]]", "'mechanical' is not a table", "line 10", "write [mechanical]"),
-    "key missing": (R, "", "TOML syntax"),
     "no resistance": ("resistance = { value = 1.8, unit = \"ohm line-to-line\", source = \"s\" }", "", "'resistance' is missing", "line 4",
                       "write resistance = { value = ..., unit = \"ohm line-to-line\", source = \"...\" }"),
     "no maximum speed": ("maximum_speed = { value = 6000, unit = \"rpm\", source = \"s\" }", "", "'maximum_speed' is missing", "line 13"),
@@ -66,12 +61,8 @@ BAD = {
     "unit is a number": (UNITS["J"], "2", "'unit' is not a text", "line 11"),
     # values
     "text": ("value = 1.8", "value = \"1.8\"", "'resistance' is not a number", "line 6"),
-    "truth": ("value = 1.8", "value = true", "'resistance' is not a number", "line 6"),
-    "nan": ("value = 1.8", "value = nan", "'resistance' is not a number", "line 6"),
     "infinite": ("value = 1.8", "value = -inf", "'resistance' = -inf ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
     "beyond a double": ("value = 1.8", "value = 1" + "0" * 400, "'resistance' = inf ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80 ohm"),
-    "beyond all": ("value = 1.8", "value = 1" + "0" * 5000, "a number too long"),
-    "too deep": ("value = 1.8", "value = " + "[" * 5000, "tables too deep"),
     "negative resistance": ("value = 1.8", "value = -1.8", "'resistance' = -1.8 ohm line-to-line is impossible", "line 6", "choose 0.02 .. 80"),
     "zero inductance": ("value = 2.6", "value = 0", "'inductance' = 0 mH line-to-line is impossible", "line 7", "choose 0.02 .. 60 mH"),
     "megohms": ("value = 1.8", "value = 1.8e6", "'resistance' = 1.8e+06 ohm line-to-line is impossible", "line 6"),
@@ -127,8 +118,6 @@ BAD = {
     "plant key misspelt": ("", "[plant]\n\"motor.sat_lq_ration\" = 0.2", "unknown key 'motor.sat_lq_ration'", "line 20", "did you mean 'motor.sat_lq_ratio'?"),
     "plant key out of range": ("", "[plant]\n\"motor.temp_c\" = 300", "'motor.temp_c' = 300 is impossible", "line 20", "choose -60 .. 250 degC"),
     "plant key in words": ("", "[plant]\n\"mech.stiction_nm\" = \"x\"", "'mech.stiction_nm' is not a number", "line 20"),
-    "plant key of a thousand dots": ("", "[plant]\n" + "a." * 3000 + "a = 1", "tables too deep"),
-    "plant key far too long": ("", "[plant]\n\"mech.stiction_nm\" = 1" + "0" * 400, "'mech.stiction_nm' is out of range", "line 20"),
 }
 
 
@@ -238,10 +227,12 @@ def test_files_that_are_no_text_are_refused(load, data, part):
     refusal(lambda: load(data), "file.toml", part)
 
 
-@pytest.mark.parametrize("name, parts", [("hurst_dmb0224", ["no motor 'hurst_dmb0224'", "--motor", "did you mean 'hurst_dmb0224c10002'?"]),
-                                         ("no/such.toml", ["no motor file 'no/such.toml'"]), (f"{paths.MOTORS}/", ["no motor file"])])
-def test_a_name_that_is_no_motor_gets_the_nearest_one(name, parts):
-    refusal(lambda: motor_file.load(name, "--motor"), *parts)
+@pytest.mark.parametrize("room, name, parts", [
+    (motor_file, "hurst_dmb0224", ["no motor 'hurst_dmb0224'", "--motor", "did you mean 'hurst_dmb0224c10002'?"]),
+    (motor_file, "no/such.toml", ["no motor file 'no/such.toml'"]), (motor_file, f"{paths.MOTORS}/", ["no motor file"]),
+    (board_file, "mclv2", ["no board 'mclv2'", "--motor", "did you mean 'mclv'"])])
+def test_a_name_that_is_no_motor_or_board_gets_the_nearest_one(room, name, parts):
+    refusal(lambda: room.load(name, "--motor"), *parts)
 
 
 def test_every_choice_that_is_refused_as_a_fact_is_a_parameter():
@@ -261,9 +252,6 @@ def test_ranges_follow_from_the_parts(load):
                   "pwm_period_s": 50e-6, "dead_time_s": 2e-6, "sample_window_s": 1.6e-6, "over_voltage_v": 34.0, "regen_limit_v": 27.0,
                   "under_voltage_v": 12.0})
     assert board.plant_values().values["shunt.gain_v_per_a"] == pytest.approx(0.375)
-
-
-def test_an_amplifier_that_does_not_invert_has_a_positive_gain(load):
     assert load(changed("inverted = true", "inverted = false", MCLV), board_file).current_gain == 0.5
 
 
@@ -286,7 +274,6 @@ BAD_BOARDS = {
     "bus beyond the converter": ("bus_divider = { value = 16", "bus_divider = { value = 10", "do not rise in this order"),
     "derived key": ("", "[plant]\n\"shunt.gain_v_per_a\" = 1", "'shunt.gain_v_per_a' stands in another table"),
     "motor's key": ("", "[plant]\n\"motor.rs_ohm\" = 1", "'motor.rs_ohm' is no key of a board"),
-    "huge number": ("value = 24.0", "value = 1" + "0" * 5000, "a number too long"),
 }
 
 
@@ -299,15 +286,13 @@ def test_every_mistake_in_a_board_file_is_one_line_with_its_place_and_remedy(loa
 MOTORS = [motor_file.load(name) for name in paths.names(paths.MOTORS)]
 
 
-def test_there_are_at_least_six_motors_and_one_is_salient():
-    assert len(MOTORS) >= 6 and [motor.name for motor in MOTORS if motor.salient] == ["linix_45zwn24_40"]
-
-
 def test_the_motor_of_an1292_has_its_values():
     motor = motor_file.load("hurst_dmb0224c10002")
     shows(motor, {"rs_ohm": 2.67, "lq_h": 1.92e-3, "pole_pairs": 5, "kphi_v_per_krpm": 7.24, "inertia_kgm2": 5.5e-6}, 1e-12)
     assert (motor.psi_vs, motor.kt_nm_per_a) == (pytest.approx(7.983e-3, abs=5e-7), pytest.approx(0.0599, abs=5e-5))
     assert set(motor.spread) == {"rs_ohm", "ls_h", "kphi_v_per_krpm"}
+    part = motor_file.part(motor.name)
+    assert (part.title, part.path.name, part.values.values["motor.pole_pairs"]) == ("Hurst DMB0224C10002", f"{motor.name}.toml", 5.0)
 
 
 @pytest.mark.parametrize("motor", MOTORS, ids=lambda motor: motor.name)
@@ -328,7 +313,8 @@ def test_the_virtual_board_accepts_every_motor_and_board(item, key):
     assert key in resolve([item.plant_values()], Library(LIBRARY).keys)
 
 
-def test_the_listing_has_a_line_for_every_motor():
+def test_there_are_at_least_six_motors_one_is_salient_and_the_listing_has_a_line_for_each():
+    assert len(MOTORS) >= 6 and [motor.name for motor in MOTORS if motor.salient] == ["linix_45zwn24_40"]
     lines = {line.split()[0]: line for line in motor_file.listing(MOTORS).splitlines()}
     assert {motor.name for motor in MOTORS} <= set(lines)
     assert re.search(r" Y +5 +2\.670 +1\.920 +7\.240 +0\.0599 +24 V, 2800 rpm, 0\.08 N m, 1\.53 A +5500 rpm, 2\.75 A +\d+ of \d+\Z",

@@ -70,20 +70,14 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_a_summary_refuses_what_is_no_json(tmp_path):
+def test_a_summary_refuses_what_is_no_json_a_trace_has_a_line_a_row_and_a_table_quotes_what_would_break_its_columns(tmp_path):
     with pytest.raises(ValueError):
         write_summary(tmp_path, {"x": float("nan")})
     write_summary(tmp_path, {"x": None})
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == {"x": None}
-
-
-def test_a_trace_file_has_a_heading_and_a_line_a_row(tmp_path):
     write_trace(tmp_path / "trace.csv", trace(0.001, plant__speed_rpm=1234.5))
     rows = [line.split(",") for line in (tmp_path / "trace.csv").read_text(encoding="utf-8").splitlines()]
     assert (len(rows), len(rows[1])) == (21, len(rows[0]))
     assert (rows[0][:2], rows[1][:2]) == (["time_s", "plant.speed_rpm"], ["0.00005", "1234.5"])
-
-
-def test_a_table_file_quotes_what_would_break_its_columns_and_leaves_unknown_cells_empty(tmp_path):
     write_csv(tmp_path / "t.csv", ["a", "b"], [["one, two", 'say "x"'], [1, None]])
     assert (tmp_path / "t.csv").read_text(encoding="utf-8") == 'a,b\n"one, two","say ""x"""\n1,\n'

@@ -57,9 +57,7 @@ def test_the_position_is_the_middle_of_the_converter_step_that_is_nearest_to_the
     ranges = Ranges.of(PARAMS, [])
     for rpm in range(500, 2801, 7):
         assert abs(500 + ranges.pot_for_speed(rpm, False) * 2300 - rpm) <= 2300 * STEP * 0.5 + 1e-9, rpm
-
-
-def test_bidirectional_minimum_speed_keeps_its_direction():
+    # bidirectional, the minimum speed keeps its direction
     forward, backward = pots(actions((0, "speed_rpm = 500"), (0.1, "speed_rpm = -500"), defines=BOTH))
     assert forward > 0.515 and backward < 0.485
 
@@ -73,11 +71,8 @@ def test_what_the_potentiometer_does_not_cover_is_refused(pairs, defines, parts)
     refusal(lambda: actions(*pairs, defines=defines), *parts)
 
 
-def test_a_speed_beyond_every_range_does_not_ask_for_s3():
+def test_a_speed_beyond_every_range_does_not_ask_for_s3_and_a_firmware_that_hides_its_ranges_is_refused():
     assert "S3" not in refusal(lambda: actions((0, "speed_rpm = 9000")))
-
-
-def test_a_firmware_that_hides_its_ranges_is_refused():
     refusal(lambda: Ranges.of({"MINIMUM_SPEED_RPM": 500.0}, []), "NOMINAL_SPEED_RPM")
 
 
@@ -119,9 +114,7 @@ def test_a_slow_turn_back_goes_down_in_both_ranges():
     after = [pot for time, pot in turned(found) if time > at_s]
     assert after == sorted(after, reverse=True)
     assert (after[0], after[-1]) == pytest.approx((1.0, 500.0 / 2300.0), abs=STEP)
-
-
-def test_a_button_that_is_still_down_is_let_go_before_it_is_pressed_again():
+    # a button that is still down is let go before it is pressed again
     first, second = s3(percent((0.5, "speed_percent = 160"), (0.52, "speed_percent = 40")))
     assert second >= first + HOLD_S + DEBOUNCE_S
 
@@ -140,11 +133,8 @@ def test_a_speed_that_the_header_does_not_allow_is_refused_with_its_rpm_and_its_
     refusal(lambda: percent((0.5, f"speed_percent = {share}"), defines=defines, params={"MAXIMUM_SPEED_RPM": maximum_rpm}), *parts)
 
 
-def test_a_header_without_a_fast_range_has_its_end_at_the_nominal_speed():
+def test_without_a_fast_range_the_end_is_the_nominal_speed_and_where_the_potentiometer_has_a_middle_backwards_is_possible():
     assert s3(percent((0.5, "speed = \"maximum\""), params={"MAXIMUM_SPEED_RPM": 2800.0})) == []
-
-
-def test_backwards_is_possible_where_the_potentiometer_has_a_middle():
     assert pots(percent((0.5, "speed_percent = 66"), (1.0, "speed_percent = -66"), defines=BOTH)) == pytest.approx([0.75, 0.25])
 
 
@@ -155,15 +145,11 @@ def test_torque_is_a_brake_in_per_cent_of_the_rated_one():
     assert "brake to 50 % of the rated torque: 0.04 N m" in [action.text for action in found]
 
 
-def test_the_protocol_tells_speed_and_button():
-    texts = [action.text for action in percent((0.5, "speed_percent = 160\nover_s = 0.5")) if action.text]
-    assert texts == ["S2 pressed", "potentiometer to 4000 rpm", "S3 pressed"]
-
-
 # ---- actions -------------------------------------------------------------------------------------------------------------
-def test_a_press_is_released_after_its_time():
-    found = actions((0.5, "press = \"S2\"\nhold_s = 0.25"))
-    assert [(action.at_s, action.keys) for action in found] == [(0.5, {"input.s2": 1.0}), (0.75, {"input.s2": 0.0})]
+def test_a_press_is_released_after_its_time_and_actions_come_in_order():
+    found = actions((0.5, "press = \"S2\"\nhold_s = 0.25"), (0.7, "pot = 0.1"))
+    assert [(action.at_s, action.keys) for action in found] == [
+        (0.5, {"input.s2": 1.0}), (0.7, {"input.pot": 0.1}), (0.75, {"input.s2": 0.0})]
 
 
 def test_a_ramp_starts_at_the_present_value_ends_exactly_at_the_goal_and_is_one_line_of_the_protocol():
@@ -173,10 +159,8 @@ def test_a_ramp_starts_at_the_present_value_ends_exactly_at_the_goal_and_is_one_
     assert 0.01 < values[0] < 0.012 and sum(bool(action.text) for action in found) == 1
 
 
-def test_a_note_replaces_the_protocol_text_and_variables_are_written_as_given():
+def test_the_protocol_tells_speed_and_button_a_note_replaces_its_text_and_variables_are_written_as_given():
+    texts = [action.text for action in percent((0.5, "speed_percent = 160\nover_s = 0.5")) if action.text]
+    assert texts == ["S2 pressed", "potentiometer to 4000 rpm", "S3 pressed"]
     assert actions((0, "pot = 0.5\nnote = \"left\""))[0].text == "left"
     assert actions((0, "debug = { SnapStart = 1 }"))[0].variables == {"SnapStart": 1}
-
-
-def test_actions_come_in_order_of_time():
-    assert [action.at_s for action in actions((0.5, "press = \"S2\"\nhold_s = 1.0"), (0.7, "pot = 0.1"))] == [0.5, 0.7, 1.5]

@@ -22,18 +22,14 @@ TIMES = SimpleNamespace(start_s=0.1, settle_s=1.0, torque_over_s=0.5, where="her
 
 
 def row(**more):
-    values = {"motor": "m", "row": "50 %", "fault": None, "closed_after_s": 1.6, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
-              "current_of_maximum_percent": 50.0, "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0, "voltage_percent": 60.0,
-              "reference_rpm": 1400.0, "highest_rpm": 1402.0}
-    return values | more
+    return {"motor": "m", "row": "50 %", "fault": None, "closed_after_s": 1.6, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
+            "current_of_maximum_percent": 50.0, "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0, "voltage_percent": 60.0,
+            "reference_rpm": 1400.0, "highest_rpm": 1402.0} | more
 
 
 # ---- what is asked -------------------------------------------------------------------------------------------------------
-def test_the_table_asks_for_20_50_and_100_per_cent_within_half_a_per_cent_at_half_torque():
+def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_torque_of_the_rating_and_the_header_s_maximum():
     assert (TABLE.speeds_percent, TABLE.torque_percent, TABLE.error_percent) == ([20.0, 50.0, 100.0], 50.0, 0.5)
-
-
-def test_a_motor_s_rows_follow_from_its_rating_and_its_header():
     motor = motor_file.load(HURST)
     rows = rating_sweep.rows_of(TABLE, Candidate(motor, None, "", SimpleNamespace(params=PARAMS)))
     half, rated_rpm = 0.5 * motor.rated_torque_nm, pytest.approx(motor.rated_speed_rpm)
@@ -53,23 +49,20 @@ def test_each_way_to_fail_is_named(values, text):
     assert rating_sweep.check(TABLE, row(verdict=text))[0].ok == (text == "ok")
 
 
-def test_a_failed_row_names_motor_row_and_numbers():
+def test_a_failed_row_names_motor_row_and_numbers_and_what_was_reached_without_load_is_told():
+    for rpm, text in ((5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"), (None, "no closed loop without load")):
+        assert rating_sweep.highest_text([row(highest_rpm=rpm, reference_rpm=5500.0)]) == text
     outcome = rating_sweep.check(TABLE, row(verdict="angle", angle_error_rms_deg=12.0))[0]
     assert outcome.row == "m at 50 %" and "angle error 12.0 deg" in outcome.got and "angle error 10 deg" in outcome.allowed
 
 
-@pytest.mark.parametrize("rpm, text", [(5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"),
-                                       (None, "no closed loop without load")])
-def test_what_was_reached_without_load_is_told(rpm, text):
-    assert rating_sweep.highest_text([row(highest_rpm=rpm, reference_rpm=5500.0)]) == text
-
-
 # ---- when it happens -----------------------------------------------------------------------------------------------------
-def test_the_start_takes_lock_and_ramp_and_a_slower_header_is_given_more_time():
+def test_the_start_takes_lock_and_ramp_a_slower_header_is_given_more_time_and_one_that_hides_a_parameter_is_refused():
     took = sweep.start_time_s(PARAMS)
     assert took == pytest.approx(0.2 + 1.398 + sweep.START_MARGIN_S, abs=1e-3)
     for change in ({"LOCK_TIME": 8000.0}, {"OPENLOOP_RAMPSPEED_INCREASERATE": 5.0}, {"END_SPEED_RPM": 1500.0}):
         assert sweep.start_time_s(PARAMS | change) > took + 0.19, change
+    refusal(lambda: sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")
 
 
 def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it():
@@ -86,10 +79,6 @@ def test_the_potentiometer_waits_inside_its_normal_range_until_the_loop_is_close
     assert [speed for _, speed in speeds] == [first, rpm] and speeds[1][0] > 1.6
 
 
-def test_a_firmware_that_hides_a_parameter_is_refused():
-    refusal(lambda: sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")
-
-
 @pytest.mark.parametrize("signals, rpm", [
     ({"fw__state": step((0, 4), (0.5, 5), (1.5, 1)), "plant__speed_rpm": step((0, 9000), (0.5, 1000), (1.0, 3000), (1.005, 2000),
                                                                               (1.5, 8000))},
@@ -100,16 +89,6 @@ def test_the_highest_speed(signals, rpm):
 
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("old, new, said", [
-    ("settle_s = 1.5", "settle_s = 0", "'settle_s' = 0 is impossible"),
-    ("speeds_percent = [20, 50, 100]", "speeds_percent = []", "not a list of numbers"),
-    ("error_percent", "eror_percent", "'error_percent' is missing"), ("start_s", "more = 1\nstart_s", "unknown key 'more'")])
-def test_a_mistake_in_the_table_is_one_line(tmp_path, old, new, said):
-    text = (paths.TABLES / "rated.toml").read_text(encoding="utf-8")
-    (tmp_path / "rated.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
-    refusal(lambda: Table.read(tmp_path / "rated.toml"), said)
-
-
 def test_one_motor_in_full(tmp_path):
     folder = tmp_path / "out"
     code, out, error = command("rated", "--motor", HURST, "--userparams", str(paths.ROOT), "--out", str(folder), "--quiet")

@@ -15,8 +15,9 @@ def values(**signals):
     return measure_values(trace(**{"pwm__outputs_seen": 63} | signals).part(ROW.from_s, ROW.to_s), ROW)
 
 
-def test_every_value_is_described():
+def test_every_value_is_described_and_none_is_known_of_an_empty_window():
     assert set(values()) == set(MEASURE_VALUES)
+    assert set(measure_values(trace(0.1).part(1.0, 1.5), ROW).values()) == {None}
 
 
 @pytest.mark.parametrize("signals, expected, within", [
@@ -43,10 +44,6 @@ def test_backward_speed_that_is_too_fast_is_a_positive_error():
     assert found["speed_error_percent"] == pytest.approx(1.0)
 
 
-def test_an_empty_window_has_no_values():
-    assert set(measure_values(trace(0.1).part(1.0, 1.5), ROW).values()) == {None}
-
-
 @pytest.mark.parametrize("params, percent", [({}, None), ({"MAXIMUM_CURRENT_A": 2.0}, pytest.approx(50.0, abs=1e-3))])
 def test_current_is_compared_with_the_header_s_maximum_by_its_amplitude(params, percent):
     item = run("[[measure]]\nname = \"row\"\nfrom_s = 0.5\nto_s = 1.0\n", plant__i_d=-0.6, plant__i_q=0.8)
@@ -71,22 +68,16 @@ def test_there_is_no_overshoot(state, reference, speed):
     assert item.hand_overs()[0].overshoot_percent == pytest.approx(0.0, abs=1e-3)
 
 
-def test_fault_and_state_changes_carry_names_and_an_unknown_code_its_number():
+def test_fault_and_state_changes_carry_names_and_an_unknown_code_its_number_and_speed_factor_is_motor_time_per_wall_time():
     item = run(fw__state=step((0, 1), (1.0, 7)), fw__fault=step((0, 0), (1.0, 3), (1.5, 99)))
     assert [name for _, _, name in item.state_changes()] == ["STOPPED", "FAULT"]
     assert [name for _, _, name in item.fault_changes()] == ["NONE", "OVERVOLTAGE", "code 99"]
-
-
-def test_speed_factor_is_motor_time_per_wall_time():
     assert run().speed_factor == pytest.approx(20.0)
 
 
-def test_a_part_includes_its_start_and_not_its_end():
+def test_a_part_includes_its_start_and_not_its_end_and_thinning_keeps_every_nth_row():
     part = trace(1.0).part(0.1, 0.2)
     assert (len(part), float(part.time_s[0])) == (2000, pytest.approx(0.1))
-
-
-def test_thinning_keeps_every_nth_row():
     assert list(trace(1.0, fw__i_q_a=lambda t: np.arange(len(t))).thinned(10).column("fw.i_q_a")[:3]) == [0, 10, 20]
 
 

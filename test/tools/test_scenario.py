@@ -81,6 +81,8 @@ def test_a_start_turns_the_potentiometer_before_power_up_and_presses_s2():
     short = scenario("[[event]]\nat_s = 0.2\nstart_rpm = 1000\n").events
     assert [(event.at_s, event.kind, event.value, event.button, event.hold_s) for event in short] == [
         (0.0, "speed_rpm", 1000.0, "", 0.0), (0.2, "press", 0.0, "S2", 0.1)]
+    # and events come in order of time
+    assert [event.at_s for event in scenario("[[event]]\nat_s = 1.5\npot = 1\n[[event]]\nat_s = 0.5\npot = 0\n").events] == [0.5, 1.5]
 
 
 PERCENT = """
@@ -125,12 +127,9 @@ def test_only_per_cents_need_a_rating(text, asks):
     assert asks_for_rating(scenario(text)) == asks
 
 
-def test_a_scenario_in_numbers_stays_as_it_is():
+def test_a_scenario_in_numbers_stays_as_it_is_and_a_header_that_does_not_tell_its_speeds_is_refused():
     item = scenario(MEASURE + "reference_rpm = 1000\n" + EVENT + "speed_rpm = 1000\n")
     assert in_numbers(item, None, {}) == item
-
-
-def test_a_header_that_does_not_tell_its_speeds_is_refused():
     refusal(lambda: in_numbers(scenario(PERCENT), Rating(2500.0, 0.08), {}), "does not tell MAXIMUM_SPEED_RPM")
 
 
@@ -150,21 +149,9 @@ def test_a_measure_is_called_by_its_reference_and_the_speed_is_checked_in_all_th
     assert [measure.name for measure in item.measures] == ["m", "1500 rpm", "n"] and item.expectations[0].measures == ["1500 rpm", "n"]
 
 
-def test_events_come_in_order_of_time():
-    assert [event.at_s for event in scenario("[[event]]\nat_s = 1.5\npot = 1\n[[event]]\nat_s = 0.5\npot = 0\n").events] == [0.5, 1.5]
-
-
-def test_an_unknown_scenario_gets_the_nearest_name():
-    refusal(lambda: load("dmeo"), "no scenario 'dmeo', ", ": did you mean 'demo'")
-
-
-@pytest.mark.parametrize("name", paths.names(paths.SCENARIOS))
-def test_every_scenario_of_the_project_is_valid_and_expects_something(name):
-    assert load(name).expectations
-
-
-def test_there_is_a_scenario_for_each_mode_and_each_fault():
+def test_every_scenario_of_the_project_is_valid_and_expects_something_and_there_is_one_for_each_mode_and_each_fault():
     items = [load(name) for name in paths.names(paths.SCENARIOS)]
+    assert [item.title for item in items if not item.expectations] == []
     assert {define for item in items for define in item.defines} == {"OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE",
                                                                      "BIDIRECTIONAL_SPEED", "SNAPSHOT"}
     faults = {expectation.name for item in items for expectation in item.expectations if type(expectation).__name__ == "FaultExpectation"}

@@ -80,15 +80,11 @@ def test_events_happen_at_their_period_and_are_in_the_protocol_once():
     assert result.actions == [(0.0, "power-up"), (0.5, "S2 pressed")]
 
 
-def test_events_at_zero_are_in_place_before_power_up():
+def test_events_at_zero_are_in_place_before_power_up_and_the_shaft_starts_where_the_scenario_says_and_the_bus_at_the_supply():
     board = FakeBoard()
     simulated("[[event]]\nat_s = 0.0\npot = 0.25\n[[event]]\nat_s = 0.1\npot = 0.5\n", board)
     calls = [call for call in board.calls if call[1] in ("input.pot", "power_up")]
     assert calls == [(0.0, "input.pot", 0.25), (0.0, "power_up"), (0.1, "input.pot", 0.5)]
-
-
-def test_the_shaft_starts_where_the_scenario_says_and_the_bus_at_the_supply():
-    board = FakeBoard()
     simulated("[start]\nrotor_deg = 75\nspeed_rpm = -300\n", board, {"supply.voltage_v": 20.0})
     assert [board.values[key] for key in ("state.theta_e_deg", "state.speed_rpm", "bus.voltage_v")] == [75.0, -300.0, 20.0]
 
@@ -113,12 +109,8 @@ def test_variables_are_written_and_read():
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------------
-def square(job, report):
-    report(1.0)
-    return job * job
-
-
 def late_for_small(job, report):
+    report(1.0)
     time.sleep(0.05 if job == 0 else 0.0)
     return job
 
@@ -136,24 +128,16 @@ def own_process(job, report):
     return os.getpid()
 
 
-def ignore(seconds: float) -> None:
-    """Nobody looks at the progress."""
-
-
-def test_results_come_in_the_order_of_the_jobs():
-    assert workers.run_all([0, 1, 2, 3], late_for_small, ignore) == [0, 1, 2, 3]
-
-
-def test_progress_of_all_processes_arrives():
+def test_results_come_in_the_order_of_the_jobs_and_the_progress_of_all_arrives():
     seconds = []
-    workers.run_all([1, 2, 3], square, seconds.append, processes=2)
-    assert seconds == [1.0, 1.0, 1.0]
+    assert workers.run_all([0, 1, 2, 3], late_for_small, seconds.append, processes=2) == [0, 1, 2, 3]
+    assert seconds == [1.0] * 4
 
 
 def test_every_job_has_a_process_of_its_own():
-    assert len({os.getpid(), *workers.run_all([0] * 5, own_process, ignore, processes=2)}) == 6
+    assert len({os.getpid(), *workers.run_all([0] * 5, own_process, print, processes=2)}) == 6
 
 
 @pytest.mark.parametrize("work, line", [(refuse, "no such thing, job 1: think again"), (crash, "the simulation ended by itself, exit code -6")])
 def test_a_refusal_or_a_crash_in_a_process_is_one_line_here_and_no_endless_wait(work, line):
-    refusal(lambda: workers.run_all([1], work, ignore), line)
+    refusal(lambda: workers.run_all([1], work, print), line)

@@ -12,9 +12,8 @@ import openpyxl
 import pytest
 from openpyxl.utils import column_index_from_string
 from pytest import approx
-from tune_support import COMPILER, HURST, INCLUDES, motors, of
+from tune_support import CHECK, HURST, INCLUDES, build, motors, of
 
-from tools.common import paths
 from tuning import constants, spreadsheet
 
 PUBLISHED = {3.95: {"NORM_RS": 12990, "NORM_LSDTBASE": 1460, "NORM_INVKFIBASE": 7956, "NORM_DELTAT": 1790, "D_ILIMIT_HS": 1502, "D_ILIMIT_LS": 6117},
@@ -143,12 +142,9 @@ def test_formulas_and_names_are_what_every_spreadsheet_takes(book):
 
 # ---- against the command ---------------------------------------------------------------------------------------------------
 @every_motor
-def test_the_lines_of_every_motor_are_the_tuners_and_the_build_accepts_them(tmp_path, name):
+def test_the_lines_of_every_motor_are_the_tuners_and_the_build_accepts_them(name):
     assert numbers(recalculated()[name].params) == numbers(of(name).params)
-    (tmp_path / "userparams.h").write_text("\n".join(recalculated()[name].lines) + "\n", encoding="utf-8")
-    build = subprocess.run([*COMPILER, "-std=gnu99", "-fsyntax-only", f"-I{tmp_path}", *INCLUDES[:2], "firmware/drive/param_check.c"],
-                           cwd=paths.ROOT, capture_output=True, text=True, check=False)
-    assert build.stderr == ""
+    assert build("\n".join(recalculated()[name].lines) + "\n", *CHECK, includes=INCLUDES[:2]) == ""
 
 
 @every_motor

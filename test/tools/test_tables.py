@@ -3,7 +3,7 @@
 import pytest
 from support import refusal
 
-from tools.bench import report, start_sweep, table2
+from tools.bench import rating_sweep, report, robust, start_sweep, table2
 from tools.common import motor_file, paths
 
 NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083, 1.513), 2000: (1900, 0.062, 1.117),
@@ -23,6 +23,10 @@ def result(**more):
 def test_the_file_holds_the_note_s_eight_rows_and_half_a_per_cent_and_the_note_s_current_for_all_but_the_first():
     assert {row.reference_rpm: (row.note_rpm, row.torque_nm, row.note_current_a) for row in ROWS} == NOTE
     assert [(row.error_percent, row.no_more_current) for row in ROWS] == [(0.5, False)] + [(0.5, True)] * 7
+    assert len(table2.check(ROWS[0], result(current_rms_a=9.0))) == 1
+    # the printed table has AN1292's columns
+    assert {"note_rpm", "note_current_a", "speed_rpm", "current_rms_a"} <= {key for key, _, _ in table2.COLUMNS}
+    assert "limited by" in report.table([{"name": "x"}], table2.COLUMNS)
 
 
 @pytest.mark.parametrize("which, values, ok, row, got", [
@@ -36,10 +40,6 @@ def test_a_row_fails_beyond_half_a_per_cent_above_the_note_s_current_and_with_a_
     assert (outcome.ok, outcome.row) == (ok, row) and got in outcome.got
 
 
-def test_the_first_row_may_take_more_current():
-    assert len(table2.check(ROWS[0], result(current_rms_a=9.0))) == 1
-
-
 @pytest.mark.parametrize("error, voltage, current, text", [
     (-3.0, 100.0, 0.0, "voltage 100 % of the time"), (-3.0, 0.4, 80.0, "current 80 % of the time"), (-0.4, 100.0, 0.0, ""),
     (-3.0, 0.0, 0.0, "neither voltage nor current")])
@@ -47,15 +47,17 @@ def test_a_shortfall_is_explained_by_a_number(error, voltage, current, text):
     assert table2.limit_text(result(speed_error_percent=error, voltage_at_limit_percent=voltage, current_at_limit_percent=current)) == text
 
 
-def test_times_in_the_wrong_order_are_refused(tmp_path):
-    text = (paths.TABLES / "table2.toml").read_text(encoding="utf-8").replace("measure_from_s = 4.5", "measure_from_s = 1.0")
-    (tmp_path / "t.toml").write_text(text, encoding="utf-8")
-    refusal(lambda: table2.Table.read(tmp_path / "t.toml"), "times are not in order")
-
-
-def test_columns_of_the_note_are_in_the_table():
-    assert {"note_rpm", "note_current_a", "speed_rpm", "current_rms_a"} <= {key for key, _, _ in table2.COLUMNS}
-    assert "limited by" in report.table([{"name": "x"}], table2.COLUMNS)
+@pytest.mark.parametrize("room, name, old, new, said", [
+    (table2, "table2", "measure_from_s = 4.5", "measure_from_s = 1.0", "times are not in order"),
+    (robust, "robust", "lowest_factor = 0.3", "lowest_factor = 1.5", "'lowest_factor' = 1.5 is impossible, "),
+    (rating_sweep, "rated", "settle_s = 1.5", "settle_s = 0", "'settle_s' = 0 is impossible"),
+    (rating_sweep, "rated", "speeds_percent = [20, 50, 100]", "speeds_percent = []", "not a list of numbers"),
+    (rating_sweep, "rated", "error_percent", "eror_percent", "'error_percent' is missing"),
+    (rating_sweep, "rated", "start_s", "more = 1\nstart_s", "unknown key 'more'")])
+def test_a_mistake_in_a_table_is_one_line_with_its_place(tmp_path, room, name, old, new, said):
+    text = (paths.TABLES / f"{name}.toml").read_text(encoding="utf-8")
+    (tmp_path / "t.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    refusal(lambda: room.Table.read(tmp_path / "t.toml"), said, "t.toml")
 
 
 # ---- starts --------------------------------------------------------------------------------------------------------------
@@ -69,11 +71,8 @@ def other(**params):
     return STARTS.for_motor(motor_file.load("linix_45zwn24_40"), LINIX | params)
 
 
-def test_the_matrix_is_every_15_degrees_with_three_loads_within_two_seconds():
+def test_the_matrix_is_every_15_degrees_and_another_motor_gets_shares_of_its_own_ratings_and_its_header_s_time():
     assert (STARTS.every_deg, STARTS.loads_nm, STARTS.within_s) == (15.0, [0.0, 0.03, 0.06], 2.0)
-
-
-def test_another_motor_gets_shares_of_its_own_ratings_and_its_header_s_time():
     table = other()
     assert (table.motor, table.speed_rpm, table.loads_nm) == ("linix_45zwn24_40", 1600.0, [0.0, 0.0115, 0.0231])
     assert table.within_s == pytest.approx(1.6 + 800 / 536.4 + 0.5, abs=0.01)
@@ -81,14 +80,11 @@ def test_another_motor_gets_shares_of_its_own_ratings_and_its_header_s_time():
     assert table.measure_to_s - table.measure_from_s == pytest.approx(STARTS.measure_to_s - STARTS.measure_from_s)
 
 
-def test_a_speed_loop_made_slow_by_its_load_gets_time_to_settle():
+def test_a_speed_loop_made_slow_by_its_load_gets_time_to_settle_and_the_speed_is_not_below_the_hand_over():
     quick, slow = (other(SPEED_BANDWIDTH_HZ=hz) for hz in (20.0, 1.0))
     assert quick.within_s == slow.within_s
     assert slow.measure_from_s - slow.start_s - slow.within_s == pytest.approx(5.0)
     assert slow.measure_to_s - slow.measure_from_s == pytest.approx(quick.measure_to_s - quick.measure_from_s)
-
-
-def test_the_speed_is_not_below_the_hand_over():
     assert other(END_SPEED_RPM=1900.0, OPENLOOP_RAMPSPEED_INCREASERATE=8.0, LOCK_TIME=9000.0).speed_rpm == 1900.0
 
 

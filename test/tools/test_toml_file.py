@@ -19,7 +19,7 @@ def close(root) -> None:
 
 # Text of the file, what is asked of it, and what the refusal must say.
 REFUSED = [
-    ("a = 1\nb = = 2\n", None, "TOML syntax", "line 2"),
+    ("a = 1\nb = = 2\n", None, "TOML syntax", "line 2"), ("a = 1\na = 2\n", None, "TOML syntax", "line 2"),
     ("[a.b]\nx = 1\n[a.b]\n", None, "cannot declare [a.b] twice", "line 3"),
     ("[a]\nx = 1\n[a]\n", None, "cannot declare [a] twice", "line 3"),
     ("a = 1\nb = \"x", None, "TOML syntax", "line 2"),
@@ -60,12 +60,8 @@ def test_what_is_no_file_is_refused(path, parts):
     refusal(lambda: Document(Path(path)), *parts)
 
 
-def test_the_mark_that_some_editors_begin_a_file_with_is_read_over():
-    assert document("\ufeffx = 1\n").root.number("x") == 1.0
-
-
-def test_both_ends_of_a_range_are_allowed():
-    root = document("a = 0\nb = 2").root
+def test_the_mark_that_some_editors_begin_a_file_with_is_read_over_and_both_ends_of_a_range_are_allowed():
+    root = document("\ufeffa = 0\nb = 2").root
     assert (root.number("a", minimum=0, maximum=2), root.number("b", minimum=0, maximum=2)) == (0.0, 2.0)
 
 

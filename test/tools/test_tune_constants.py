@@ -103,24 +103,18 @@ def test_a_value_outside_its_range_and_a_broken_relation_are_told_in_the_build_s
     assert "outside" not in words or len(messages) == 1
 
 
-def test_a_kphi_that_does_not_fit_is_told_once():
+def test_a_kphi_that_does_not_fit_is_told_once_and_a_missing_parameter_is_named():
     messages = constants.header(of(HURST).params | {"MOTOR_KPHI_V_PER_KRPM": "1.7"}).wrong
     assert messages[0].startswith("MOTOR_KPHI_V_PER_KRPM does not fit") and not [message for message in messages if "INVKFI" in message]
-
-
-def test_a_missing_parameter_is_named():
     params = {name: text for name, text in of(HURST).params.items() if name != "LOCK_TIME"}
     assert constants.header(params).wrong == ["LOCK_TIME is missing"]
 
 
-def test_no_compiler_and_a_bad_number_end_in_one_line(monkeypatch):
+def test_a_number_is_read_as_in_c_and_no_compiler_and_a_bad_number_end_in_one_line(monkeypatch):
+    assert [number_of(text) for text in ("0xF", "-0.5", "5.5e-6", 3)] == [15.0, -0.5, 5.5e-6, 3.0]
+    assert number_of(parameters()["TUNING_DELAY_RAMPUP"].default) == 15.0
     with pytest.raises(UserError, match="do not compile: .*five"):
         constants.evaluate({"NOPOLESPAIRS": "five"}, "NOPOLESPAIRS")
     monkeypatch.setenv("CC", "/no/such/cc")
     with pytest.raises(UserError, match="the compiler does not run .*/no/such/cc: install gcc"):
         constants.evaluate({"NOPOLESPAIRS": "5", "MOTOR_RS_OHM": "0.123456789"}, "NOPOLESPAIRS + 7")
-
-
-def test_a_number_is_read_as_in_c():
-    assert [number_of(text) for text in ("0xF", "-0.5", "5.5e-6", 3)] == [15.0, -0.5, 5.5e-6, 3.0]
-    assert number_of(parameters()["TUNING_DELAY_RAMPUP"].default) == 15.0

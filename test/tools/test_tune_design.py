@@ -77,6 +77,7 @@ WARNED = {
                                       ("slow for so quick a rotor", "or add inertia$")),
     "speed loop that is slow by choice": ({"more": "[tune]\nSPEED_BANDWIDTH_HZ = 4\n"},
                                           ("the speed loop's 4 Hz are slow (", "or remove SPEED_BANDWIDTH_HZ from [tune]$")),
+    "speed loop that is quick by choice": ({"more": "[tune]\nSPEED_BANDWIDTH_HZ = 40\n"}, ("SPEED_BANDWIDTH_HZ = 40: the speed loop has",)),
     "reference slope that the counts cannot express": ({"more": "[tune]\nSPEEDREFRAMP_RPM_PER_S = 700\n"},
                                                        ("SPEEDREFRAMP_RPM_PER_S = 700 becomes 1000 rpm/s",)),
     "derivative limit that clips": (
@@ -125,9 +126,7 @@ def test_an_unstable_loop_is_called_so_and_has_no_margins():
 def test_a_choice_in_tune_replaces_the_tuner_s_and_what_follows_from_it():
     d = designed(more="[tune]\nEND_SPEED_RPM = 700\nIDREF_SPEED3 = -0.5\n")
     assert [d.params[name] for name in ("END_SPEED_RPM", "MINIMUM_SPEED_RPM", "IDREF_SPEED3")] == ["700", "500", "-0.5"]
-
-
-def test_inertia_includes_the_load_and_a_salient_motor_is_estimated_with_lq():
+    # inertia includes the load, and a salient motor is estimated with Lq
     assert designed(more=INERTIA % "1e-5").params["MOTOR_INERTIA_KGM2"] == "1.55e-5"
     d = of("linix_45zwn24_40")
     assert d.value("MOTOR_LS_MH") == approx(d.motor.lq_h * 1e3, abs=1e-9)
@@ -148,12 +147,9 @@ def test_the_trip_level_then_the_largest_current_is_lowered_until_the_back_emf_f
     assert any("leave the back-EMF's number format" in warning for warning in d.warnings), d.warnings
 
 
-def test_filters_keep_their_corner_at_another_period():
-    assert made(board={"pwm_period_s": 100e-6}).value("KFILTER_ESDQ") == approx(2357, abs=2.9)
-
-
-def test_a_quick_rotor_gets_a_quicker_speed_filter_and_loop():
+def test_filters_keep_their_corner_at_another_period_and_a_quick_rotor_gets_a_quicker_speed_filter_and_loop():
     """Otherwise a load takes its speed before the loop reacts."""
+    assert made(board={"pwm_period_s": 100e-6}).value("KFILTER_ESDQ") == approx(2357, abs=2.9)
     usual, quick = designed(), designed(("value = 5.5e-6", "value = 1.0e-6"))
     assert usual.value("KFILTER_VELESTIM") == 748.0 and 2.5 * 748.0 < quick.value("KFILTER_VELESTIM") <= 4.0 * 748.0
     assert quick.speed_loop.worst.phase_deg >= 60.0
@@ -187,9 +183,7 @@ def test_the_least_d_current_lies_on_the_circle_and_less_does_not_fit():
     assert ENVELOPE.least_id(9000.0, 0.0, 0.95) is None, "far above"
     stiff = changed(ld_h=8e-3, lq_h=8e-3)
     assert stiff.deepest_id(0.0) == approx(-HURST_MOTOR.psi_vs / 8e-3, abs=1e-9), "the characteristic current"
-
-
-def test_torque_falls_to_nothing_at_the_highest_speed():
+    # torque falls to nothing at the highest speed
     top = ENVELOPE.highest_speed(0.0, 0.98)
     assert ENVELOPE.torque(0.97 * top, 0.98) > 0.0 == ENVELOPE.torque(1.01 * top, 0.98)
 

@@ -115,12 +115,9 @@ def test_far_above_the_filters_the_phase_is_that_of_all_delays():
     assert found == approx(shaft - 360.0 * 60.0 * (4.0 + 1.5) * TS, abs=0.05)
 
 
-def test_the_bandwidth_is_the_crossover():
+def test_the_bandwidth_is_the_crossover_and_gains_are_those_of_the_header():
     loop = speed_loop(SPEED_GRID, MOTOR, MOTOR, speed_gains(MOTOR, 5.0, AT_1000_HZ), erpm(2800.0))
     assert margins(SPEED_GRID, loop).crossover_hz == approx(5.1, abs=0.2)
-
-
-def test_gains_are_those_of_the_header():
     d = of(HURST)
     gains = speed_gains(MOTOR, d.value("SPEED_BANDWIDTH_HZ"), AT_1000_HZ)
     electrical = 5 * 2 * math.pi / 60 # rad/s per rpm
@@ -142,15 +139,12 @@ def delayed(crossover_hz: float) -> loops.Margins:
     return margins(grid, 2 * np.pi * crossover_hz / s * np.exp(-s * 0.01))
 
 
-def test_an_integrator_with_a_delay_and_an_unstable_loop():
+def test_an_integrator_with_a_delay_an_unstable_loop_and_the_least_of_several_crossovers():
     found = delayed(10.0)
     assert found.crossover_hz == approx(10.0, abs=0.01)
     assert found.phase_deg == approx(90.0 - 36.0, abs=0.1)
     assert found.gain_db == approx(20 * math.log10(2.5), abs=0.05)
     assert delayed(40.0).phase_deg < 0.0 and not delayed(40.0).enough
-
-
-def test_the_least_of_several_crossovers_counts():
     grid = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     response = np.array([2.0, 0.5, 2.0, 0.5, 0.1]) * np.exp(-1j * np.radians([90.0, 90.0, 150.0, 150.0, 150.0]))
     assert margins(grid, response).phase_deg == approx(30.0, abs=1.0)
@@ -195,13 +189,9 @@ def test_the_speed_loop_is_as_slow_as_rotation_asks_but_fast_enough_for_a_load_t
     assert 0.08 / per_second == approx(0.18 * 300 * math.pi / 30, abs=0.1)
 
 
-def test_a_bandwidth_in_tune_is_kept_and_warned_about():
-    d = designed(more="[tune]\nSPEED_BANDWIDTH_HZ = 40\n")
-    assert d.value("SPEED_BANDWIDTH_HZ") == 40.0
-    assert any("SPEED_BANDWIDTH_HZ = 40: the speed loop has" in warning for warning in d.warnings), d.warnings
-
-
-def test_the_current_loop_stays_below_its_cap_unless_rotation_asks_for_more():
+def test_the_current_loop_stays_below_its_cap_unless_rotation_asks_for_more_and_each_axis_of_a_salient_motor_has_its_gain():
+    d = of("linix_45zwn24_40")
+    assert d.value("D_CURRCNTR_PTERM") / d.value("Q_CURRCNTR_PTERM") == approx(d.motor.ld_h / d.motor.lq_h, abs=1e-4)
     assert of(HURST).value("CURRENT_BANDWIDTH_HZ") == 1000.0 < of("maxon_ec45flat_30w_24v").value("CURRENT_BANDWIDTH_HZ")
 
 
@@ -213,8 +203,3 @@ def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_
                  ("speed = { value = 2500", "speed = { value = 4000"), ("value = 5000", "value = 5500"), ("value = 2.75", "value = 1.5"))
     assert d.value("CURRENT_BANDWIDTH_HZ") == 1000.0 and d.speed_loop.reached
     assert any("CURRENT_BANDWIDTH_HZ = 1000: the current loop has 5" in warning for warning in d.warnings), d.warnings
-
-
-def test_each_axis_of_a_salient_motor_has_its_own_gain():
-    d = of("linix_45zwn24_40")
-    assert d.value("D_CURRCNTR_PTERM") / d.value("Q_CURRCNTR_PTERM") == approx(d.motor.ld_h / d.motor.lq_h, abs=1e-4)

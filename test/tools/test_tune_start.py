@@ -30,9 +30,6 @@ def test_current_carries_the_load_at_50_degrees():
 @pytest.mark.parametrize("needed, current", [(0.05, 3.8 / 1.3), (3.1 * STRONG.kt_nm_per_a * 0.77, 3.1)])
 def test_current_leaves_room_to_the_trip_level_for_a_rotor_that_swings_into_the_lock_but_a_load_may_use_it(needed, current):
     assert start.start_current(STRONG, 3.4, 3.8, needed) == approx(current, abs=0.005)
-
-
-def test_current_stays_below_the_largest():
     assert start.start_current(MOTOR, 0.9, 1.3, 0.5) < 0.9
 
 
@@ -57,6 +54,10 @@ def test_numbers_of_the_rules():
     s = of(HURST).start_up
     assert s.acceleration_rpm_s == approx(10 / 1024 / 65536 / 50e-6 ** 2 * 60 / 5, abs=1e-6)
     assert s.ramp_s == approx(1000 / s.acceleration_rpm_s, abs=1e-9)
+    # the sample's delay is the board's
+    text = (paths.ROOT / "include" / "board" / "mclv.h").read_text(encoding="utf-8")
+    clocks = int(re.search(r"BOARD_SAMPLE_DELAY_CLOCKS (\d+)u", text)[1])
+    assert clocks / 40e6 == approx(start.SAMPLE_AFTER_MEAN_S, abs=5e-8)
 
 
 def test_more_inertia_means_a_longer_lock_and_a_slower_ramp():
@@ -92,23 +93,14 @@ def test_the_rotor_that_begins_against_the_current_swings_most_as_on_the_virtual
     assert trial.labels[int(early.argmin())] == "0 deg, 0 N m"
 
 
-def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau():
+def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau_and_the_lock_lengthened_until_the_rotor_is_calm():
     free = replace(MOTOR, coulomb_nm=0.0, viscous_nms=0.0, start_torque_nm=0.0)
     endless = start.try_start(free, 5.5e-6, 1e-5, 1.41, 0.2, 715.0, 1000.0, angles=12)
     assert endless.followed.all() and endless.swing_rpm > 200.0
     assert tried().swing_rpm < 10.0
-
-
-def test_the_lock_is_lengthened_until_the_rotor_is_calm_at_the_hand_over():
     bare = designed(("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0")).start_up
     assert bare.lock_s > 1.4 * designed().start_up.lock_s
     assert bare.trial.swing_rpm <= start.CALM_SHARE * bare.end_speed_rpm
-
-
-def test_the_sample_s_delay_is_the_board_s():
-    text = (paths.ROOT / "include" / "board" / "mclv.h").read_text(encoding="utf-8")
-    clocks = int(re.search(r"BOARD_SAMPLE_DELAY_CLOCKS (\d+)u", text)[1])
-    assert clocks / 40e6 == approx(start.SAMPLE_AFTER_MEAN_S, abs=5e-8)
 
 
 # ---- warnings --------------------------------------------------------------------------------------------------------------

@@ -42,8 +42,6 @@ def sine(pole_pairs: int, psi_vs: float, peak_a: float) -> float:
 Y, DELTA = units.kphi("Y", 5), units.kphi("delta", 5)
 R, L, R_DELTA, L_DELTA = units.resistance("Y"), units.inductance("Y"), units.resistance("delta"), units.inductance("delta")
 TERMINALS = 1.2 * 2.4 / (1.2 + 2.4) # one delta winding of 1.2 ohm parallel to the two others
-
-
 EXACT = [
     (R, 5.34, "ohm line-to-line", 2.67), (R_DELTA, 5.34, "ohm line-to-line", 2.67), # two star phases whatever the connection
     (L, 3.84, "mH line-to-line", 1.92e-3), (L_DELTA, 3.84, "mH line-to-line", 1.92e-3),
@@ -94,9 +92,7 @@ def test_every_form_of_the_same_motor_gives_the_same_kphi(unit, value):
     assert entry(Y, value, unit).value_si == pytest.approx(7.24, rel=5e-6)
     only_flux = 2.0 if unit in ("V s/rad", "mV s/rad") else 1.0 # depends on the pole pairs
     assert units.kphi("Y", 10).units[unit](1.0) / Y.units[unit](1.0) == pytest.approx(only_flux)
-
-
-def test_every_unit_of_kphi_is_among_the_tested_ones():
+    # every unit of Kphi is among the tested ones
     assert set(Y.units) == set(SAME_KPHI)
     assert set(DELTA.units) == {unit for unit in SAME_KPHI if " phase/" not in unit}
 
@@ -106,18 +102,13 @@ def kphi(value: float, unit: str) -> float:
     return units.kphi("Y", 4).units[unit](value)
 
 
-def test_torque_constants_are_those_of_a_commutated_motor_and_of_sinusoidal_currents():
+def test_torque_constants_are_those_of_a_commutated_motor_and_of_sinusoidal_currents_and_both_currents_give_the_same_torque():
     assert kphi(six_step(4, 5.4e-3, 1.0), "N m/A dc") == pytest.approx(kphi(5.4e-3, "V s/rad"), abs=5e-7)
     assert kphi(sine(4, 5.4e-3, 1.0), "N m/A peak") == pytest.approx(kphi(5.4e-3, "V s/rad"), abs=5e-10)
-
-
-def test_a_dc_current_and_its_peak_give_the_same_torque():
     peak_a = entry(units.CURRENT, 2.3, "A dc").value_si
     assert sine(4, 5.4e-3, peak_a) / six_step(4, 5.4e-3, 2.3) == pytest.approx(1.0, abs=5e-8)
     assert peak_a == pytest.approx(2.536, abs=5e-4)
-
-
-def test_the_two_constants_of_a_flat_motor_s_sheet_agree():
+    # the two constants of a flat motor's sheet agree
     assert kphi(187.0, "rpm/V") / kphi(51.0, "mN m/A dc") == pytest.approx(1.0, abs=5e-3)
 
 

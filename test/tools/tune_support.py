@@ -2,12 +2,14 @@
 
 import contextlib
 import functools
-import io
 import os
 import shlex
+import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+
+import support
 
 from tools.common import board_file, motor_file, paths
 from tuning import cli
@@ -15,6 +17,8 @@ from tuning.design import Design, design
 
 COMPILER = shlex.split(os.environ.get("CC") or "gcc")
 INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
+WARNINGS = ["-std=gnu99", "-ftrack-macro-expansion=0", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+CHECK = ("-fsyntax-only", "firmware/drive/param_check.c")
 HURST = "hurst_dmb0224c10002"
 
 MOTOR = """title = "a motor"
@@ -42,6 +46,8 @@ maximum_current = { value = 2.75, unit = "A peak", source = "test" }
 FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value = 0.8"), ("value = 2.75", "value = 18"), ("value = 2.67", "value = 0.3"),
                      ("value = 1.92", "value = 0.2"))
 """Changes of MOTOR that make it a motor for ten times the current."""
+
+command = functools.partial(support.command, main=cli.main)
 
 
 def motors() -> list[str]:
@@ -73,9 +79,9 @@ def of(name: str) -> Design:
     return design(motor_file.load(name), board_file.load("mclv"))
 
 
-def command(*arguments: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of a command line."""
-    out, error = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
-        code = cli.main(list(arguments))
-    return code, out.getvalue(), error.getvalue()
+def build(text: str, *arguments: str, includes: list[str] = INCLUDES) -> str:
+    """What the compiler says with this userparams.h."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "userparams.h").write_text(text, encoding="utf-8")
+        compile_ = [*COMPILER, *WARNINGS, f"-I{folder}", *includes, "-c", *arguments]
+        return subprocess.run(compile_, cwd=paths.ROOT, capture_output=True, text=True, check=False).stderr

@@ -287,11 +287,9 @@ def _size(die) -> int:
 
 def _file_names(top, program) -> dict[int, str]:
     """The line program's files, relative to the folder that was compiled in; a file of the compiler by its name in <>."""
-    folder = _text(top, "DW_AT_comp_dir")
-    own = _text(top, "DW_AT_name")
-    names = {}
     if program is None:
-        return {1: own}
+        return {1: _text(top, "DW_AT_name")}
+    folder, names = _text(top, "DW_AT_comp_dir"), {}
     directories = [text.decode(errors="replace") for text in program["include_directory"]]
     for number, entry in enumerate(program["file_entry"], 1):
         directory = directories[entry.dir_index - 1] if entry.dir_index else ""
@@ -315,10 +313,8 @@ def _sequences(program):
 
 
 def _range(die) -> tuple[int, int]:
-    attributes = die.attributes
-    if "DW_AT_low_pc" not in attributes or "DW_AT_high_pc" not in attributes:
-        return 0, 0
-    return attributes["DW_AT_low_pc"].value, attributes["DW_AT_high_pc"].value
+    low, high = die.attributes.get("DW_AT_low_pc"), die.attributes.get("DW_AT_high_pc")
+    return (low.value, high.value) if low and high else (0, 0)
 
 
 def _frame(die, files: dict[int, str]) -> Frame:

@@ -31,44 +31,24 @@ def command(ipecmd: str, tool: str, hex_file: Path) -> list[str]:
 
 def in_folder(folder: Path) -> str | None:
     """ipecmd in a folder of MPLAB IPE or MPLAB X."""
-    for inside in INSIDE:
-        for name in NAMES:
-            if (folder / inside / name).is_file():
-                return str(folder / inside / name)
-    return None
-
-
-def version(folder: Path) -> list[int]:
-    return [int(number) for number in re.findall(r"\d+", folder.name)]
+    return next((str(folder / inside / name) for inside in INSIDE for name in NAMES if (folder / inside / name).is_file()), None)
 
 
 def find(ipe: Path | None, usual: tuple[str, ...] = USUAL) -> str | None:
     """ipecmd in the folder that the user names, else on PATH, else the newest in the usual places."""
     if ipe is not None:
-        found = in_folder(ipe)
-        if found is None:
-            raise UserError(f"not programmed: no {NAMES[0]} in IPE={ipe}", "", "name the folder of MPLAB X or of MPLAB IPE that has it")
-        return found
-    for name in NAMES:
-        if found := shutil.which(name):
+        if found := in_folder(ipe):
             return found
+        raise UserError(f"not programmed: no {NAMES[0]} in IPE={ipe}", "", "name the folder of MPLAB X or of MPLAB IPE that has it")
     folders = [folder for place in usual if Path(place).is_dir() for folder in Path(place).iterdir() if folder.is_dir()]
-    return next(filter(None, map(in_folder, sorted(folders, key=version, reverse=True))), None)
+    folders.sort(key=lambda folder: [int(number) for number in re.findall(r"\d+", folder.name)], reverse=True) # the newest first
+    return next(filter(None, (*map(shutil.which, NAMES), *map(in_folder, folders))), None)
 
 
 def checked(hex_file: Path, elf_file: Path) -> list[str]:
     """Failures of the image that is about to be programmed."""
     elf, words = image.read_elf(elf_file), image.read_hex(hex_file)
     return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), None)
-
-
-def parser() -> argparse.ArgumentParser:
-    result = command_line.Parser(prog="python3 -m tools.image.flash", description=__doc__.splitlines()[0])
-    result.add_argument("hex", type=Path)
-    result.add_argument("--elf", type=Path, required=True, help="the program that the HEX was made of, for the checks")
-    result.add_argument("--tool", default="PK4", help=f"{', '.join(TOOLS)} (PK4)")
-    result.add_argument("--ipe", type=Path, help="folder of MPLAB X or MPLAB IPE")
-    return result
 
 
 def program(options: argparse.Namespace) -> int:
@@ -101,7 +81,12 @@ def program(options: argparse.Namespace) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return command_line.run(lambda: program(parser().parse_args(arguments)))
+    parser = command_line.Parser(prog="python3 -m tools.image.flash", description=__doc__.splitlines()[0])
+    parser.add_argument("hex", type=Path)
+    parser.add_argument("--elf", type=Path, required=True, help="the program that the HEX was made of, for the checks")
+    parser.add_argument("--tool", default="PK4", help=f"{', '.join(TOOLS)} (PK4)")
+    parser.add_argument("--ipe", type=Path, help="folder of MPLAB X or MPLAB IPE")
+    return command_line.run(lambda: program(parser.parse_args(arguments)))
 
 
 if __name__ == "__main__":

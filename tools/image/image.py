@@ -19,7 +19,6 @@ from .program import Elf, Words, read_elf, read_hex, reset_target
 
 CONFIG_C = paths.ROOT / "firmware" / "board" / "config.c"
 PRAGMA = re.compile(r"^\s*#\s*pragma\s+config\s+(\w+)\s*=\s*(\w+)\s*$", re.MULTILINE)
-BYTES_PER_WORD = 3 # as data sheets count
 
 
 def check_device(elf: Elf) -> list[str]:
@@ -71,10 +70,8 @@ def check_vectors(words: Words, elf: Elf, pieces: list[Piece] | None) -> list[st
     default = elf.symbols.get("_" + device.DEFAULT_VECTOR)
     if default is None:
         return [f"vectors: the image has no {device.DEFAULT_VECTOR}"]
-    failures = []
-    for name in device.REQUIRED:
-        if "_" + name not in elf.symbols:
-            failures.append(f"vectors: the image has no {name}: a misspelt name in the sources, or a file that is not linked")
+    failures = [f"vectors: the image has no {name}: a misspelt name in the sources, or a file that is not linked"
+                for name in device.REQUIRED if "_" + name not in elf.symbols]
     for symbol in sorted(elf.symbols):
         name = symbol.removeprefix("_")
         if re.fullmatch(r"_[A-Z]\w*(Interrupt|Error|Fail|Trap\d)", name) and elf.symbols[symbol] in device.PROGRAM \
@@ -105,11 +102,8 @@ def wanted_fields(text: str) -> dict[str, str]:
 
 def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
     """Every field of the configuration words as config.c and the board want it; a field that neither names is left alone."""
-    failures = []
-    for name, value in device.BOARD_NEEDS.items():
-        if config.get(name, value) != value:
-            failures.append(f"configuration: {name} = {config[name]} in config.c, but the board needs {value} "
-                            f"({device.FIELDS[name].values[value][1]})")
+    failures = [f"configuration: {name} = {config[name]} in config.c, but the board needs {value} ({device.FIELDS[name].values[value][1]})"
+                for name, value in device.BOARD_NEEDS.items() if config.get(name, value) != value]
     for name, value in {**device.BOARD_NEEDS, **config}.items():
         field = device.FIELDS.get(name)
         if field is None or value not in field.values:
@@ -127,16 +121,13 @@ def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
 
 def configuration_table(words: Words) -> list[str]:
     """Each field of the configuration words in the image, with its meaning."""
-    lines = []
-    for name, field in device.FIELDS.items():
-        word = words.get(field.word, device.ERASED)
-        lines.append(f"{device.WORDS[field.word]:8} 0x{word & 0xFF:02X}  {name:9} {field.meaning(word)}")
-    return lines
+    return [f"{device.WORDS[field.word]:8} 0x{word & 0xFF:02X}  {name:9} {field.meaning(word)}"
+            for name, field in device.FIELDS.items() for word in [words.get(field.word, device.ERASED)]]
 
 
 def flash_bytes(words: Words) -> int:
     """Program memory above the vectors, as the linker's report and data sheets count it."""
-    return BYTES_PER_WORD * sum(address in device.PROGRAM for address in words)
+    return attribution.BYTES_PER_WORD * sum(address in device.PROGRAM for address in words)
 
 
 def stack_space(elf: Elf) -> int | None:
@@ -172,7 +163,7 @@ def check_budget(words: Words, elf: Elf, limits: Limits | None, deepest: int | N
 def summary(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None) -> str:
     """What the image takes of its budget, or of the chip where there is none."""
     flash, ram = ((f"{limits.flash} bytes", f"{limits.ram} bytes") if limits else
-                  (f"{len(device.PROGRAM) * BYTES_PER_WORD} bytes of the chip", f"{len(device.RAM)} bytes of the chip"))
+                  (f"{len(device.PROGRAM) * attribution.BYTES_PER_WORD} bytes of the chip", f"{len(device.RAM)} bytes of the chip"))
     stack = stack_space(elf)
     return (f"flash {flash_bytes(words)} of {flash}, RAM {elf.ram_bytes} of {ram}, "
             + ("" if deepest is None else f"stack at most {deepest}{f' of {limits.stack}' if limits else ''} bytes, ")
@@ -187,20 +178,16 @@ def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, 
             *check_budget(words, elf, limits, deepest)]
 
 
-def parser() -> argparse.ArgumentParser:
-    result = command_line.Parser(prog="python3 -m tools.image.image", description=__doc__.splitlines()[0])
-    result.add_argument("elf", type=Path)
-    result.add_argument("hex", type=Path)
-    result.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
-    result.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
-    result.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
-    result.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
-    result.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")
-    return result
-
-
 def main(arguments: list[str] | None = None) -> int:
-    return command_line.run(lambda: _run(parser().parse_args(arguments)))
+    parser = command_line.Parser(prog="python3 -m tools.image.image", description=__doc__.splitlines()[0])
+    parser.add_argument("elf", type=Path)
+    parser.add_argument("hex", type=Path)
+    parser.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
+    parser.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
+    parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
+    parser.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
+    parser.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")
+    return command_line.run(lambda: _run(parser.parse_args(arguments)))
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -9,16 +9,10 @@ from tools.common.errors import UserError
 from . import device
 from .program import Elf, Words
 
-#: What may be in the image besides our own objects, by the file that the map names: the compiler's start-up code and what its linker
-#: makes. Names of the product seen in published maps of versions 1.35 and 1.50; those of 2.10 are taken to be the same [?].
-ALLOWED = (
-    (re.compile(r"\(crt0[_a-z0-9]*\.\w+\)$"), "reset: stack, PSV page, main (crt0_standard.o, crt0_extended.o)"),
-    (re.compile(r"\(crt1[_a-z0-9]*\.\w+\)$"), "the same without start values (crt1_standard.o)"),
-    (re.compile(r"\(data_init[_a-z0-9]*\.\w+\)$"), "copies start values, clears the rest (data_init_standard.o)"),
-    (re.compile(r"\(crt_start_mode[_a-z0-9]*\.\w+\)$"), "hook of the start (crt_start_mode_normal.Leo), one word"),
-    (re.compile(r"^data_init$"), "the linker's list of start values (.dinit)"),
-    (re.compile(r"^default_isr$"), "the linker's own _DefaultInterrupt; image.py refuses it with reasons of its own"),
-)
+#: What may be in the image besides our own objects, by the file that the map names: the compiler's start-up code (crt1: without start
+#: values), the linker's list of start values and its own _DefaultInterrupt, which image.py refuses with reasons of its own. Names of the
+#: product seen in published maps of versions 1.35 and 1.50; those of 2.10 are taken to be the same [?].
+ALLOWED = re.compile(r"\((crt[01]|data_init|crt_start_mode)[_a-z0-9]*\.\w+\)$|^data_init$|^default_isr$")
 
 #: what to write instead of a helper, by a part of its C name or of its archive member's
 ADVICE = (
@@ -75,10 +69,6 @@ def is_own(piece: Piece) -> bool:
     return piece.file.endswith(".o")
 
 
-def allowed(piece: Piece) -> bool:
-    return is_own(piece) or any(pattern.search(piece.file) for pattern, _ in ALLOWED)
-
-
 def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
     """A line for every function of a library, and for words of the program that the map does not explain."""
     explained = {address for piece in pieces for address in range(piece.start, piece.end, 2)}
@@ -87,7 +77,7 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
     if unknown:
         failures.append(f"{len(unknown)} words from 0x{unknown[0]:04X} on come from no file that the map names: "
                         "the map is of another build, or the linker made them for a pointer to a function")
-    foreign = [piece for piece in pieces if not allowed(piece)]
+    foreign = [piece for piece in pieces if not is_own(piece) and not ALLOWED.search(piece.file)]
     called = {piece: calls_into(elf, piece) for piece in foreign}
     # What only another helper needs goes when that one goes; a piece that nothing calls is told if there is no other.
     roots = [piece for piece in foreign if any(not any(f.start <= place < f.end for f in foreign) for place in called[piece])]
@@ -112,11 +102,8 @@ def member(piece: Piece) -> str:
 
 
 def advice(helpers: str, where: str) -> str:
-    for text in (*re.findall(r"\w+", helpers), *re.findall(r"\((\w+)", where)):
-        for pattern, words in ADVICE:
-            if pattern.search(text):
-                return words
-    return "write it without the library"
+    names = (*re.findall(r"\w+", helpers), *re.findall(r"\((\w+)", where))
+    return next((words for name in names for pattern, words in ADVICE if pattern.search(name)), "write it without the library")
 
 
 def divisions(elf: Elf, pieces: list[Piece]) -> list[str]:
@@ -153,5 +140,5 @@ def branch_target(words: Words, address: int) -> int | None:
 
 
 def default_handler_is_ours(elf: Elf, pieces: list[Piece]) -> bool:
-    address = elf.symbols.get("_" + device.DEFAULT_VECTOR)
-    return any(is_own(piece) and piece.start <= address < piece.end for piece in pieces) if address is not None else False
+    address = elf.symbols.get("_" + device.DEFAULT_VECTOR, -1)
+    return any(is_own(piece) and piece.start <= address < piece.end for piece in pieces)

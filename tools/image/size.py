@@ -186,10 +186,7 @@ def write_json(data: dict, folder: Path, name: str) -> Path:
 
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
-    def cell(value: int | None) -> str:
-        return "" if value is None else str(value)
-    body = [[row["name"], cell(row["note"]), str(row["flash"]), cell(row["budget"]), cell(row["note_ram"]), str(row["ram"]),
-             cell(row["ram_budget"])]
+    body = [[row["name"], *(_number(row[key], 0) for key in ("note", "flash", "budget", "note_ram", "ram", "ram_budget"))]
             for row in data["rows"] if row["kind"] in ("group", "total")]
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
     return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
@@ -217,16 +214,14 @@ def disassemble(objdump: str, elf: Path) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    def work() -> int:
-        parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
-        parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
-        parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json")
-        parser.add_argument("--objdump", default="xc16-objdump")
-        parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
-                            help="compare with the last commit's image, built by make with these variables")
-        parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
-        return _run(parser.parse_args(arguments))
-    return command_line.run(work)
+    parser = command_line.Parser(prog="python3 -m tools.image.size", description=__doc__.splitlines()[0])
+    parser.add_argument("elf", type=Path, nargs="?", default=OUT / "foc33.elf")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for size.json")
+    parser.add_argument("--objdump", default="xc16-objdump")
+    parser.add_argument("--base", nargs="*", metavar="NAME=VALUE",
+                        help="compare with the last commit's image, built by make with these variables")
+    parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
+    return command_line.run(lambda: _run(parser.parse_args(arguments)))
 
 
 def _run(options: argparse.Namespace) -> int:

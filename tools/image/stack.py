@@ -1,7 +1,7 @@
 """The deepest stack that the image can need, from its disassembly: frames, calls, and interrupts on top of each other."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 ENTRY_BYTES = 4     # of a call, an interrupt and a trap: return address, and for the latter the status
 TRAP_LEVELS = {"_MathError": 11, "_StackError": 12, "_AddressError": 13, "_OscillatorFail": 14}
@@ -69,33 +69,22 @@ class Result:
 def parse(listing: str) -> list[Function]:
     """Functions of a disassembly by xc16-objdump -d; a label that starts with a dot is no function."""
     functions: list[Function] = []
-    current: Function | None = None
-    lines = []
+    into: list[Instruction] = []
     for line in listing.splitlines():
-        label = _LABEL.match(line)
-        if label:
-            lines.append((int(label[1], 16), label[2]))
+        if (label := _LABEL.match(line)) and not label[2].startswith("."):
+            into = []
+            functions.append(Function(label[2], into))
+        if not functions or not (found := _LINE.match(line)):
             continue
-        found = _LINE.match(line)
-        if found:
-            lines.append((int(found[1], 16), None, (found[3] or "").strip()))
-    for index, item in enumerate(lines):
-        if item[1] is not None:
-            if not item[1].startswith("."):
-                current = Function(item[1], [])
-                functions.append(current)
+        address, text = int(found[1], 16), (found[3] or "").strip()
+        if not text: # the second word of the instruction before
+            into[-1:] = [replace(last, size=4) for last in into[-1:]]
             continue
-        if current is not None and current.instructions and item[2]:
-            last = current.instructions[-1]
-            if item[0] != last.address + last.size: # another section, without a label
-                current = None
-        if current is None or not item[2]:
-            continue
-        double_word = index + 1 < len(lines) and lines[index + 1][1] is None and not lines[index + 1][2]
-        head, _, operands = item[2].partition(" ")
+        if into and address != into[-1].address + into[-1].size: # another section, without a label
+            into = []
+        head, _, operands = text.partition(" ")
         mnemonic, _, width = head.lower().partition(".")
-        current.instructions.append(Instruction(item[0], mnemonic, operands.strip(), " ".join(item[2].split()), width == "d",
-                                                4 if double_word else 2))
+        into.append(Instruction(address, mnemonic, operands.strip(), " ".join(text.split()), width == "d", 2))
     return [function for function in functions if function.instructions]
 
 
@@ -233,13 +222,11 @@ def _effect(instruction: Instruction, depth: int, frames: tuple[int, ...]) -> tu
         return depth + 2 + int(_LITERAL.search(operands)[1], 16), (*frames, depth), ""
     if mnemonic == "ulnk":
         return (frames[-1], frames[:-1], "") if frames else (depth, frames, "a frame is closed that is not open")
-    if mnemonic == "push" and operands:
-        return depth + (4 if instruction.double else 2), frames, ""
-    if mnemonic == "pop" and operands:
-        return depth - (4 if instruction.double else 2), frames, ""
+    moved = 4 if instruction.double else 2
+    if mnemonic in ("push", "pop") and operands:
+        return depth + (moved if mnemonic == "push" else -moved), frames, ""
     if not _POINTER.search(operands):
         return depth, frames, ""
-    moved = 4 if instruction.double else 2
     depth += moved * len(re.findall(r"\[(?:w15|sp)\+\+\]|\[\+\+(?:w15|sp)\]", operands))
     depth -= moved * len(re.findall(r"\[(?:w15|sp)--\]|\[--(?:w15|sp)\]", operands))
     # the last operand is the destination; a comparison has none
