@@ -113,8 +113,8 @@ def _table2(options: argparse.Namespace) -> int:
     library = pil.library([], folder)
     runs: list[pil.PilRun] = []
 
-    def cases(jobs: list[simulate.Job], progress: Callable[[float], None]) -> list[dict[str, Any]]:
-        runs.extend(workers.run_all(jobs, functools.partial(work, image), progress))
+    def cases(title: str, jobs: list[simulate.Job], quiet: bool) -> list[dict[str, Any]]:
+        runs.extend(sweep.run_cases(title, jobs, quiet, functools.partial(work, image)))
         return [sweep.reduced(run.run) for run in runs]
 
     options = argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": options.out or paths.RESULTS / "pil-table2"})

@@ -1,13 +1,16 @@
 """Many runs of one kind: builds a scenario for each case, runs them in parallel and keeps what the tables need."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tools.common import workers
-from . import simulate
+from . import command_common, simulate
 from tools.common.errors import UserError
+from tools.common.toml_file import Document
 from .metrics import Measure
 from .run import Run
 from .scenario import BRAKE, Event, Scenario
@@ -18,6 +21,36 @@ HIGHEST_OVER_S = 0.1
 """The highest speed of a run is a mean over this time."""
 START_MARGIN_S = 0.4
 """Debouncing, charging of the drivers and waiting for the estimator's agreement, at most."""
+
+
+def within(minimum: float, maximum: float = float("inf")) -> Any:
+    """A number of a Table, or a list of numbers, between these bounds."""
+    return field(metadata={"minimum": minimum, "maximum": maximum})
+
+
+@dataclass(kw_only=True)
+class Table:
+    """What a sweep asks for, from scenarios/tables/NAME.toml. Every field is a key there, but those that end with "where": they tell
+    where the others were read."""
+
+    title: str
+    board: str
+    where: str
+    board_where: str
+
+    @classmethod
+    def read(cls, path: Path) -> Any:
+        """Check the whole file and return what it says."""
+        document = Document(path)
+        root, values = document.root, {"where": document.label}
+        for item in fields(cls):
+            if item.name.endswith("_where"):
+                values[item.name] = root.where(item.name.removesuffix("_where"))
+            elif item.name != "where":
+                read = {str: root.text, float: root.number}.get(item.type, root.numbers)
+                values[item.name] = read(item.name, **item.metadata)
+        root.close()
+        return cls(**values)
 
 
 def start_events(start_s: float, speed_rpm: float, nominal_rpm: float, where: str) -> list[Event]:
@@ -73,13 +106,14 @@ def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torq
     return events, at_speed_s + times.torque_over_s + times.settle_s
 
 
-def run_cases(jobs: list[simulate.Job], progress: Callable[[float], None]) -> list[dict[str, Any]]:
-    """The reduced results of all jobs, in order."""
-    return workers.run_all(jobs, _work, progress)
-
-
 def _work(job: simulate.Job, report: Callable[[float], None]) -> dict[str, Any]:
     return reduced(simulate.simulate(job, report))
+
+
+def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any] = _work) -> list[Any]:
+    """The results of all jobs, in order; reduced, if `work` does not make something else of a job."""
+    with command_common.Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
+        return workers.run_all(jobs, work, progress)
 
 
 def reduced(run: Run) -> dict[str, Any]:
