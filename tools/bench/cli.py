@@ -10,10 +10,7 @@ from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    def work() -> int:
-        options = _parser().parse_args(arguments)
-        return options.command(options)
-    return command_line.run(work)
+    return command_line.main(_parser, arguments)
 
 
 def _parser() -> argparse.ArgumentParser:

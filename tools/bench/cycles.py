@@ -321,17 +321,20 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget
     return report
 
 
+def _parser() -> argparse.ArgumentParser:
+    parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
+    parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
+    parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
+    parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
+    parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
+    parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.set_defaults(command=_run)
+    return parser
+
+
 def main(arguments: list[str] | None = None) -> int:
-    def work() -> int:
-        parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
-        parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
-        parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
-        parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-        parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
-        parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
-        parser.add_argument("--quiet", action="store_true", help="no progress bar")
-        return _run(parser.parse_args(arguments))
-    return command_line.run(work)
+    return command_line.main(_parser, arguments)
 
 
 def _run(options: argparse.Namespace) -> int:

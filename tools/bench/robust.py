@@ -200,20 +200,9 @@ class Search:
             return None
         return math.sqrt(self.good * self.bad)
 
-    def at_bound(self) -> bool:
-        return self.bad is None
 
-
-def _starts(row: dict[str, Any]) -> bool:
-    return row["started"]
-
-
-def _runs(row: dict[str, Any]) -> bool:
-    return row["verdict"] == "ok"
-
-
-CRITERIA = (("starts, no load", False, _starts), ("runs, no load", False, _runs), ("starts, loaded", True, _starts),
-            ("runs, loaded", True, _runs))
+CRITERIA = tuple((f"{what}, {load}", loaded, holds) for load, loaded in (("no load", False), ("loaded", True)) for what, holds in (
+    ("starts", lambda row: row["started"]), ("runs", lambda row: row["verdict"] == "ok")))
 """What a margin is looked for: name, loaded, what must hold."""
 
 
@@ -230,7 +219,7 @@ class Margins:
         down, up = (self.searches[parameter, criterion, upwards] for upwards in (False, True))
         if down.bad == 1.0 or up.bad == 1.0:
             return "not at all"
-        return f"{'<' if down.at_bound() else ''}{down.good:.2f} .. {'>' if up.at_bound() else ''}{up.good:.2f}"
+        return f"{'<' if down.bad is None else ''}{down.good:.2f} .. {'>' if up.bad is None else ''}{up.good:.2f}"
 
 
 def find_margins(bench: Bench, quiet: bool) -> Margins:
@@ -323,8 +312,7 @@ def margins_text(table: Table, margins: Margins) -> str:
 
 def _write(folder: Path, bench: Bench, rows: list[dict[str, Any]], margins: Margins | None, outcomes: list[Outcome],
            used: dict[str, Any]) -> None:
-    head = {"title": bench.table.title, **used, "board": str(paths.shown(bench.board.path)), "speed_rpm": bench.rpm,
-            "torque_nm": bench.torque_nm(True), "start_torque_nm": bench.motor.start_torque_nm}
+    head = {"title": bench.table.title, **used, "speed_rpm": bench.rpm, "torque_nm": bench.torque_nm(True), "start_torque_nm": bench.motor.start_torque_nm}
     more: dict[str, Any] = {}
     if margins is not None:
         from . import plots

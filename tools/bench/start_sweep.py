@@ -75,7 +75,7 @@ def command(options: argparse.Namespace) -> int:
         results = sweep.run_cases("starts", jobs, options.quiet)
         rows = [{"load_nm": load, "rotor_deg": angle, **result} for (load, angle), result in zip(cases, results)]
         outcomes = [check(table, row) for row in rows]
-        _write(folder.work, table, rows, outcomes, used, board)
+        _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}: {len(rows)} starts\n\n{report.used_text(used)}\n")
     print(text(table, rows))
     print(f"\nresults in {paths.shown(target)}/")
@@ -124,8 +124,7 @@ def _cell(row: dict[str, Any]) -> str:
     return f"{row['closed_after_s']:.2f} s {row['overshoot_percent']:5.1f} % {row['speed_error_percent']:+5.2f} %"
 
 
-def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
     keys = ["load_nm", "rotor_deg", "closed_after_s", "overshoot_percent", "speed_error_percent", "angle_error_rms_deg", "fault"]
     from . import plots
-    report.write_table(folder, "starts", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
-                       {"plots": plots.write_starts(rows, folder)})
+    report.write_table(folder, "starts", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_starts(rows, folder)})

@@ -74,7 +74,7 @@ def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str,
         results = run_cases("table2", jobs, options.quiet)
         rows = [_result(row, result) for row, result in zip(table.rows, results)]
         outcomes = [outcome for row, result in zip(table.rows, rows) for outcome in check(row, result)]
-        _write(folder.work, table, rows, outcomes, used, board)
+        _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
@@ -112,8 +112,7 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     return outcomes
 
 
-def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
     keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
     from . import plots
-    report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
-                       {"plots": plots.write_table2(rows, folder)})
+    report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_table2(rows, folder)})
