@@ -17,15 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from tools.common import board_file, command_line, motor_file, paths, workers
+from tools.common import board_file, command_line, motor_file, paths
 from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
 from tools.image.profile import Counts, Profile, profile
 from tools.image.size import write_json
 
-from . import build, pil, pil_command, scenario_file, simulate
-from .command_common import Progress
+from . import build, pil, pil_command, scenario_file, simulate, sweep
 
 FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
@@ -313,8 +312,7 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget
     elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
     code, source = program.read_elf(elf), attribution.read(elf)
     jobs = jobs_of(names or budget.cycles.scenarios, library)
-    with Progress("cycles", sum(job.scenario.duration_s for job in jobs), quiet) as progress:
-        found = merged(workers.run_all(jobs, functools.partial(work, image), progress))
+    found = merged(sweep.run_cases("cycles", jobs, quiet, functools.partial(work, image)))
     report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, budget.counted_at), budget if limits else None,
                     assumptions(library))
     report.broken = broken(report)

@@ -9,11 +9,10 @@ import numpy as np
 
 from tools.common import workers
 from . import command_common, simulate
-from tools.common.errors import UserError
 from tools.common.toml_file import Document
 from .metrics import Measure
 from .run import Run
-from .scenario import BRAKE, Event, Scenario
+from .scenario import BRAKE, Event, Scenario, param
 
 MEASURE = "measured"
 S3_DEBOUNCE_S = 0.03
@@ -72,21 +71,15 @@ def scenario(name: str, title: str, events: list[Event], reference_rpm: float, f
 
 def start_time_s(params: dict[str, float]) -> float:
     """How long a header's start takes from S2 to closed loop: lock, ramp and what is around them."""
-    period_s, pairs = _param(params, "LOOPTIME_SEC"), _param(params, "NOPOLESPAIRS")
-    end_count = _param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
-    ramp_periods = end_count / _param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")
-    return (_param(params, "LOCK_TIME") + ramp_periods) * period_s + START_MARGIN_S
+    period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
+    end_count = param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
+    ramp_periods = end_count / param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")
+    return (param(params, "LOCK_TIME") + ramp_periods) * period_s + START_MARGIN_S
 
 
 def ramp_time_s(params: dict[str, float], rpm: float) -> float:
     """How long the reference takes from the end of the start to a speed."""
-    return abs(rpm - _param(params, "END_SPEED_RPM")) / _param(params, "SPEEDREFRAMP_RPM_PER_S")
-
-
-def _param(params: dict[str, float], name: str) -> float:
-    if name not in params:
-        raise UserError(f"the firmware does not tell {name}", "tools/cpu_host/probe.c", "rebuild with make vboard")
-    return params[name]
+    return abs(rpm - param(params, "END_SPEED_RPM")) / param(params, "SPEEDREFRAMP_RPM_PER_S")
 
 
 def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torque_nm: float = 0.0,
@@ -96,7 +89,7 @@ def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torq
     where = times.where
     closed_s = times.start_s + start_time_s(params)
     at_speed_s = closed_s + ramp_time_s(params, rpm) + times.settle_s
-    first = min(max(rpm, _param(params, "MINIMUM_SPEED_RPM")), _param(params, "NOMINAL_SPEED_RPM"))
+    first = min(max(rpm, param(params, "MINIMUM_SPEED_RPM")), param(params, "NOMINAL_SPEED_RPM"))
     events = [Event(0.0, "set", where, keys={BRAKE: start_torque_nm}), Event(0.0, "speed_rpm", where, value=first),
               Event(times.start_s, "press", where, button="S2", hold_s=0.1),
               Event(closed_s, "speed_rpm", where, value=rpm, finds_range=True, written=name)]
