@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tools.common import command_line, paths
-from tools.common.errors import UserError
 
 from . import fw_tune, identify, spreadsheet
 
@@ -18,10 +17,7 @@ if TYPE_CHECKING:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    def work() -> int:
-        options = _parser().parse_args(arguments)
-        return options.command(options)
-    return command_line.run(work)
+    return command_line.main(_parser, arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -57,11 +53,8 @@ def _design(motor: str, board: "BoardFile") -> "Design":
 
 
 def _tune(options: argparse.Namespace) -> int:
-    if options.all == (options.motor is not None):
-        raise UserError("which motor?", "command line", "name one, or write --all" if not options.all else "write either a motor or --all")
-    if options.all and options.out is not None:
-        raise UserError("one folder for several motors", "--out", "leave it out, or name one motor")
-    return _tune_each(paths.names(paths.MOTORS) if options.all else [options.motor], _board(options), options.out, options.brief)[1]
+    names = command_line.one_or_all(options, paths.names(paths.MOTORS))
+    return _tune_each(names, _board(options), options.out, options.brief)[1]
 
 
 def _tune_each(names: list[str], board: "BoardFile", out: Path | None, brief: bool) -> tuple[list[str], int]:

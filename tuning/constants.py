@@ -5,7 +5,6 @@ import functools
 import hashlib
 import math
 import os
-import shlex
 import subprocess
 import tempfile
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ from pathlib import Path
 from tools.common import paths
 from tools.common.errors import UserError
 from tools.common.param_rows import parameters
+from tools.common.x_macro import run_compiler
 
 SOURCE = paths.ROOT / "tuning" / "param_values.c"
 INCLUDE = paths.ROOT / "include"
@@ -115,14 +115,9 @@ def _headers() -> str:
 
 
 def _compiled(source: str, userparams: str) -> str:
-    compiler = shlex.split(os.environ.get("CC") or "gcc")
     with tempfile.TemporaryDirectory() as name:
         (Path(name) / "userparams.h").write_text(userparams, encoding="utf-8")
-        command = [*compiler, "-std=gnu99", "-O0", "-w", f"-I{name}", f"-I{INCLUDE}", "-xc", "-", "-o", f"{name}/program", "-lm"]
-        try:
-            done = subprocess.run(command, input=source, capture_output=True, text=True, check=False)
-        except OSError as error:
-            raise UserError(f"the compiler does not run ({error.strerror})", compiler[0], "install gcc (Debian package: gcc), or name another by CC=") from None
+        done = run_compiler(["-std=gnu99", "-O0", "-w", f"-I{name}", f"-I{INCLUDE}", "-o", f"{name}/program", "-lm"], source)
         if done.returncode:
             said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:200])
             raise UserError(f"the parameters do not compile: {said}", "include/drive", "change the parameter that is named")

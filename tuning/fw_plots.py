@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.bench import plots # noqa: F401  chooses the backend and the style
+from tools.bench import plots # chooses the backend and the style
 
 import matplotlib.pyplot as plt # noqa: E402, I001  after the backend
 
@@ -20,9 +20,7 @@ def write_all(tables: Tables, motor: Any, folder: Path) -> list[str]:
 def _write(folder: Path, name: str, size: tuple[float, float], draw: Any, tables: Tables, motor: Any) -> str:
     figure = plt.figure(figsize=size, layout="constrained")
     draw(figure, tables, motor)
-    figure.savefig(folder / f"{name}.png")
-    plt.close(figure)
-    return f"{name}.png"
+    return plots.saved(figure, folder, name)
 
 
 def _marks(axes: plt.Axes, tables: Tables, motor: Any) -> None:

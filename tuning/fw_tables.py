@@ -174,7 +174,7 @@ def text(tables: Tables) -> str:
         lines += ["", "[goal]"] + [f"{name} = {value:.6g}" for name, value in tables.goal.items()]
     if tables.rows:
         lines += ["", "[entries]          # what was measured at each entry"]
-        lines += [f"{name} = " + _list(_number(row[name]) for row in tables.rows) for name in tables.rows[0]]
+        lines += [f"{name} = " + _list(_number(row[name]) for row in tables.rows) for name in tables.rows[0] if name not in vars(Entry())]
     return "\n".join(lines) + "\n"
 
 

@@ -173,9 +173,9 @@ def add_command(commands: Any) -> None:
 
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code: 1 if a value is outside its limit or the identification did not end with DONE."""
+    names = command_line.one_or_all(options, paths.names(paths.MOTORS))
     _check(options)
-    motors, code = command_line.each(paths.names(paths.MOTORS) if options.all else [options.motor],
-                                     lambda name: motor_file.load(name, "command line"))
+    motors, code = command_line.each(names, lambda name: motor_file.load(name, "command line"))
     if not motors:
         return code
     found = identify(motors, options.board, command_common.changes(options.changes), options.current, options.speed, options.quiet)
@@ -193,10 +193,6 @@ def command(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    if options.all == (options.motor is not None):
-        raise UserError("which motor?", "command line", "name one, or write --all" if not options.all else "write either a motor or --all")
-    if options.all and options.out is not None:
-        raise UserError("one folder for several motors", "--out", "leave it out, or name one motor")
     for name, low, high in (("current", 0.05, 20.0), ("speed", 50.0, 5000.0)):
         value = getattr(options, name)
         if value is not None and not low <= value <= high:

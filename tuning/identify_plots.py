@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tools.bench import plots # noqa: F401  chooses the backend and the style
+from tools.bench import plots # chooses the backend and the style
 from tools.common.trace import Trace
 
 import matplotlib.pyplot as plt # noqa: E402, I001  after the backend
@@ -24,9 +24,7 @@ def write_all(item: Identified, names: list[str], folder: Path) -> list[str]:
         if need in spans:
             figure, axes = plt.subplots(2, 1, figsize=(10, 8), layout="constrained")
             draw(item, spans, axes)
-            figure.savefig(folder / f"{name}.png")
-            plt.close(figure)
-            files.append(f"{name}.png")
+            files.append(plots.saved(figure, folder, name))
     return files
 
 

@@ -9,6 +9,7 @@ from tools.common import paths
 
 EVENT = "[[event]]\nat_s = 1.0\n"
 MEASURE = "[[measure]]\nname = \"m\"\nfrom_s = 0.5\nto_s = 1.0\n"
+FAULT = "[fault]\nrpm = 1000\ncause = { x = 1 }\nmended = { x = 0 }\nwithin_s = 0.1\nname = \"STALL\"\n"
 EXPECT = MEASURE + "[[expect]]\nkind = \"measure\"\nmeasure = "
 
 MISTAKES = {
@@ -56,6 +57,10 @@ MISTAKES = {
     "measure of an unknown speed": (MEASURE + "reference = \"top\"", ["'top' is no reference"]),
     "define that is no macro": ("[firmware]\ndefines = [\"TUNING; rm\"]", ["'TUNING; rm' is no macro"]),
     "define that is no text": ("[firmware]\ndefines = \"TUNING\"", ["'defines' is not a list of texts"]),
+    "fault without its cause": (FAULT.replace("cause", "curse"), ["'cause' is missing"]),
+    "fault with a key of an expectation": (FAULT + "after_s = 1", ["unknown key 'after_s'"]),
+    "fault of no name": (FAULT.replace("name", "note"), ["'name' is missing"]),
+    "fault after the end": (FAULT, ["at_s = 3 is after the end"]),
     "unknown key of [start]": ("[start]\nrotor = 1", ["unknown key 'rotor'", "did you mean 'rotor_deg'?"]),
 }
 

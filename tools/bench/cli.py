@@ -3,17 +3,14 @@
 import argparse
 from pathlib import Path
 
-from tools.common import command_line, motor_file, output, paths, workers
-from . import command_common, rating_sweep, report, robust, scenario_file, simulate, start_sweep, table2
+from tools.common import command_line, motor_file, output, paths
+from . import command_common, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    def work() -> int:
-        options = _parser().parse_args(arguments)
-        return options.command(options)
-    return command_line.run(work)
+    return command_line.main(_parser, arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,8 +68,7 @@ def _run(options: argparse.Namespace) -> int:
     job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
     target = options.out or paths.RESULTS / item.name
     with output.ResultFolder(target) as folder:
-        with command_common.Progress(item.name, item.duration_s, options.quiet) as progress:
-            run = workers.run_all([job], simulate.simulate, progress)[0]
+        run = sweep.run_cases(item.name, [job], options.quiet, simulate.simulate)[0]
         outcomes = report.check(run)
         data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
         _write_traces(run, folder.work)

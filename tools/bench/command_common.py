@@ -53,7 +53,8 @@ def set_up(item: Any, options: argparse.Namespace, defines: list[str], userparam
     """Motor and board, the firmware, and what the report tells of them (used())."""
     motor, board = parts_of(item, options)
     library = library_for(defines, options.library, userparams)
-    return motor, board, library, used(motor, library, header_name(options.library, userparams))
+    told = used(motor, library, header_name(options.library, userparams)) | {"board": str(paths.shown(board.path))}
+    return motor, board, library, told
 
 
 def used(motor: board_keys.Part, library: Library, header: str) -> dict[str, Any]:

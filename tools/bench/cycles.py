@@ -17,15 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from tools.common import board_file, command_line, motor_file, paths, workers
+from tools.common import board_file, command_line, motor_file, paths
 from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
 from tools.image.profile import Counts, Profile, profile
 from tools.image.size import write_json
 
-from . import build, pil, pil_command, scenario_file, simulate
-from .command_common import Progress
+from . import build, pil, pil_command, scenario_file, simulate, sweep
 
 FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
@@ -313,25 +312,27 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget
     elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
     code, source = program.read_elf(elf), attribution.read(elf)
     jobs = jobs_of(names or budget.cycles.scenarios, library)
-    with Progress("cycles", sum(job.scenario.duration_s for job in jobs), quiet) as progress:
-        found = merged(workers.run_all(jobs, functools.partial(work, image), progress))
+    found = merged(sweep.run_cases("cycles", jobs, quiet, functools.partial(work, image)))
     report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, budget.counted_at), budget if limits else None,
                     assumptions(library))
     report.broken = broken(report)
     return report
 
 
+def _parser() -> argparse.ArgumentParser:
+    parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
+    parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
+    parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
+    parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
+    parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
+    parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.set_defaults(command=_run)
+    return parser
+
+
 def main(arguments: list[str] | None = None) -> int:
-    def work() -> int:
-        parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
-        parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
-        parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
-        parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-        parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
-        parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
-        parser.add_argument("--quiet", action="store_true", help="no progress bar")
-        return _run(parser.parse_args(arguments))
-    return command_line.run(work)
+    return command_line.main(_parser, arguments)
 
 
 def _run(options: argparse.Namespace) -> int:

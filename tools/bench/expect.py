@@ -300,15 +300,11 @@ class StateExpectation(Expectation):
         part = run.trace.part(self.from_s, max(self.to_s, self.from_s + 1.5 * run.trace.period_s))
         there = part.column("fw.state") == run.state_number(self.name)
         when = f"at {self.from_s:g} s" if self.from_s == self.to_s else _window_text(self.from_s, self.to_s)
-        seen = [name for _, _, name in _named_changes(part, run.states)]
+        seen = [run.states.get(int(value), "?") for _, value in part.changes("fw.state")]
         got = " ".join(dict.fromkeys(seen)) or "nothing"
         if self.never:
             return [Outcome(f"state never {self.name} {when}", len(part) > 0 and not np.any(there), got, f"not {self.name}")]
         return [Outcome(f"state {when}", len(part) > 0 and bool(np.all(there)), got, self.name)]
-
-
-def _named_changes(part: Any, names: dict[int, str]) -> list[tuple[int, float, str]]:
-    return [(row, float(part.time_s[row]), names.get(int(value), "?")) for row, value in part.changes("fw.state")]
 
 
 @dataclass(frozen=True)

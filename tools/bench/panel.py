@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, field
 
 from tools.common.errors import UserError
-from .scenario import Event, Scenario
+from .scenario import Event, Scenario, param
 
 ADC_STEPS = 1024
 RAMP_STEP_S = 0.002
@@ -42,12 +42,8 @@ class Ranges:
     @classmethod
     def of(cls, params: dict[str, float], defines: list[str]) -> "Ranges":
         names = {define.split("=")[0] for define in defines}
-        try:
-            return cls(params["MINIMUM_SPEED_RPM"], params["NOMINAL_SPEED_RPM"], params["MAXIMUM_SPEED_RPM"],
-                       params["MAXIMUM_CURRENT_A"], "TORQUE_MODE" in names, "BIDIRECTIONAL_SPEED" in names)
-        except KeyError as missing:
-            raise UserError(f"the firmware does not tell {missing.args[0]}", "tools/cpu_host/probe.c",
-                            "rebuild with make vboard") from None
+        told = (param(params, name) for name in ("MINIMUM_SPEED_RPM", "NOMINAL_SPEED_RPM", "MAXIMUM_SPEED_RPM", "MAXIMUM_CURRENT_A"))
+        return cls(*told, "TORQUE_MODE" in names, "BIDIRECTIONAL_SPEED" in names)
 
     def pot_for_speed(self, rpm: float, fast: bool) -> float:
         """Position 0..1 for a speed; raises ValueError with the remedy if the range does not hold it."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tools.common import command_line, output, paths, workers
+from tools.common import command_line, output, paths
 from . import build, command_common, pil, report, scenario_file, simulate, sweep, table2
 from tools.common.errors import UserError
 from .expect import Outcome
@@ -87,8 +87,7 @@ def _scenario(name: str, options: argparse.Namespace) -> int:
     job = simulate.prepare(item, library, motor, board)
     target = options.out or paths.RESULTS / f"pil-{item.name}"
     with output.ResultFolder(target) as result:
-        with command_common.Progress(f"{item.name} on the target", item.duration_s, options.quiet) as progress:
-            found = workers.run_all([job], functools.partial(work, image), progress)[0]
+        found = sweep.run_cases(f"{item.name} on the target", [job], options.quiet, functools.partial(work, image))[0]
         run = found.run
         outcomes = [*checked(found), comparison(found)]
         data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
@@ -113,8 +112,8 @@ def _table2(options: argparse.Namespace) -> int:
     library = pil.library([], folder)
     runs: list[pil.PilRun] = []
 
-    def cases(jobs: list[simulate.Job], progress: Callable[[float], None]) -> list[dict[str, Any]]:
-        runs.extend(workers.run_all(jobs, functools.partial(work, image), progress))
+    def cases(title: str, jobs: list[simulate.Job], quiet: bool) -> list[dict[str, Any]]:
+        runs.extend(sweep.run_cases(title, jobs, quiet, functools.partial(work, image)))
         return [sweep.reduced(run.run) for run in runs]
 
     options = argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": options.out or paths.RESULTS / "pil-table2"})

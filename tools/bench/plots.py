@@ -40,10 +40,11 @@ def write_all(run: Run, folder: Path) -> list[str]:
 def _write(folder: Path, name: str, run: Run, thin: Trace, draw: Callable) -> str:
     figure, axes = plt.subplots(layout="constrained")
     draw(run, thin, axes)
-    return _saved(figure, folder, name)
+    return saved(figure, folder, name)
 
 
-def _saved(figure: plt.Figure, folder: Path, name: str) -> str:
+def saved(figure: plt.Figure, folder: Path, name: str) -> str:
+    """Writes NAME.png and returns that name."""
     figure.savefig(folder / f"{name}.png")
     plt.close(figure)
     return f"{name}.png"
@@ -156,7 +157,7 @@ def write_table2(rows: list[dict], folder: Path) -> list[str]:
         axes.plot(reference, [row[note] for row in rows], "s--", color="tab:grey", label="note")
         axes.plot(reference, [row[ours] for row in rows], "o-", color="tab:blue", label="foc33")
         _finish(axes, f"Table 2: {title}", label, "reference speed [rpm]")
-    return [_saved(figure, folder, "table2")]
+    return [saved(figure, folder, "table2")]
 
 
 def write_starts(rows: list[dict], folder: Path) -> list[str]:
@@ -167,7 +168,7 @@ def write_starts(rows: list[dict], folder: Path) -> list[str]:
         axes.plot([x for x, _ in points], [np.nan if y is None else y for _, y in points], "o-", label=f"{load:g} N m")
     _finish(axes, "starts: time from S2 to closed loop", "time [s]", "electrical angle of the rotor at power-up [deg]")
     axes.set_ylim(bottom=0)
-    return [_saved(figure, folder, "starts")]
+    return [saved(figure, folder, "starts")]
 
 
 def write_rated(rows: list[dict], limits: dict, folder: Path) -> list[str]:
@@ -191,7 +192,7 @@ def write_rated(rows: list[dict], limits: dict, folder: Path) -> list[str]:
     panels[0].set(yticks=range(len(motors)), yticklabels=motors, ylim=(len(motors) - 0.5, -0.5))
     figure.suptitle("speeds in per cent of rated, under load; maximum speed without load; dashed: allowed", fontsize=11)
     panels[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
-    return [_saved(figure, folder, "rated")]
+    return [saved(figure, folder, "rated")]
 
 
 def write_robust(margins: list[dict], runs: list[dict], promised: dict[str, float], law: Callable, folder: Path) -> list[str]:
@@ -223,7 +224,7 @@ def _margins(margins: list[dict], promised: dict[str, float], folder: Path) -> s
     axes.set(title="how far the motor may be off (arrow: the search ended there)", xlabel="true value / the header's",
              yticks=range(len(promised)), yticklabels=list(promised), ylim=(len(promised) - 0.5, -0.5))
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return _saved(figure, folder, "margins")
+    return saved(figure, folder, "margins")
 
 
 def _angle_over_factor(runs: list[dict], law: Callable, folder: Path) -> str:
@@ -245,4 +246,4 @@ def _angle_over_factor(runs: list[dict], law: Callable, folder: Path) -> str:
         axes.set_xticks([0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0], ["0.3", "0.5", "0.7", "1", "1.5", "2", "3"])
         axes.minorticks_off()
         _finish(axes, name, "estimated less true angle [deg]" if name == names[0] else "", "true value / the header's")
-    return _saved(figure, folder, "angle_error")
+    return saved(figure, folder, "angle_error")

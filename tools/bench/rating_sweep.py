@@ -12,7 +12,6 @@ from .board import Library
 from tools.common.errors import UserError
 from .expect import Outcome
 from tools.common.motor_file import Motor
-from tools.common.toml_file import Document
 
 COLUMNS = (
     ("torque_nm_set", "brake\nN m", "{:.4f}"), ("reference_rpm", "reference\nrpm", "{:.0f}"), ("speed_rpm", "true\nrpm", "{:.1f}"),
@@ -25,37 +24,20 @@ KEYS = ("motor", "row", "torque_nm_set", "reference_rpm", "speed_rpm", "speed_er
         "fault", "verdict")
 
 
-@dataclass
-class Table:
+@dataclass(kw_only=True)
+class Table(sweep.Table):
     """tables/rated.toml."""
 
-    title: str
-    board: str
-    speeds_percent: list[float]
-    torque_percent: float
-    start_s: float
-    within_s: float
-    settle_s: float
-    torque_over_s: float
-    measure_s: float
-    error_percent: float
-    angle_error_deg: float
-    current_percent: float
-    board_where: str = ""
-    where: str = ""
-
-    @classmethod
-    def read(cls, path: Path) -> "Table":
-        document = Document(path)
-        root = document.root
-        title, board = root.text("title"), root.text("board")
-        speeds = root.numbers("speeds_percent", minimum=1.0, maximum=1000.0)
-        torque = root.number("torque_percent", minimum=0.0, maximum=1000.0)
-        times = [root.number(key, minimum=0.01, maximum=60.0) for key in ("start_s", "within_s", "settle_s", "torque_over_s", "measure_s")]
-        limits = [root.number(key, minimum=0.0) for key in ("error_percent", "angle_error_deg", "current_percent")]
-        table = cls(title, board, speeds, torque, *times, *limits, root.where("board"), document.label)
-        root.close()
-        return table
+    speeds_percent: list[float] = sweep.within(1.0, 1000.0)
+    torque_percent: float = sweep.within(0.0, 1000.0)
+    start_s: float = sweep.within(0.01, 60.0)
+    within_s: float = sweep.within(0.01, 60.0)
+    settle_s: float = sweep.within(0.01, 60.0)
+    torque_over_s: float = sweep.within(0.01, 60.0)
+    measure_s: float = sweep.within(0.01, 60.0)
+    error_percent: float = sweep.within(0.0)
+    angle_error_deg: float = sweep.within(0.0)
+    current_percent: float = sweep.within(0.0)
 
 
 @dataclass(frozen=True)
@@ -96,8 +78,7 @@ def command(options: argparse.Namespace) -> int:
         candidates = _candidates(ready, options)
         cases = [(item, row) for item in candidates for row in rows_of(table, item)]
         jobs = [_job(table, item, row, board) for item, row in cases]
-        with command_common.Progress("rated", sum(job.scenario.duration_s for job in jobs), options.quiet) as progress:
-            results = sweep.run_cases(jobs, progress)
+        results = sweep.run_cases("rated", jobs, options.quiet)
         rows = [_result(table, item, row, result) for (item, row), result in zip(cases, results)]
         outcomes = [outcome for row in rows for outcome in check(table, row)]
         _write(folder.work, table, candidates, rows, outcomes, board)

@@ -14,7 +14,6 @@ from . import command_common, report, simulate, sweep
 from .board import Library
 from .expect import Outcome
 from tools.common.motor_file import Motor
-from tools.common.toml_file import Document
 
 PARAMETERS = {"R": ("motor.rs_ohm",), "L": ("motor.ld_h", "motor.lq_h"), "Kphi": ("motor.psi_vs",)}
 """What can be off, and the plant's keys of it."""
@@ -34,44 +33,32 @@ KEYS = ("case", "load", "R", "L", "Kphi", "temperature_degc", "promised", "close
         "law_deg", "angle_error_rms_deg", "current_rms_a", "current_of_maximum_percent", "voltage_percent", "fault", "verdict")
 
 
-@dataclass
-class Table:
+@dataclass(kw_only=True)
+class Table(sweep.Table):
     """tables/robust.toml."""
 
-    title: str
     motor: str
-    board: str
-    promised: dict[str, float]
-    temperatures_degc: list[float]
-    speed_percent: float
-    torque_percent: float
-    error_percent: float
-    lowest_factor: float
-    highest_factor: float
-    resolution_percent: float
-    start_s: float
-    settle_s: float
-    torque_over_s: float
-    measure_s: float
-    motor_where: str = ""
-    board_where: str = ""
-    where: str = ""
+    motor_where: str
+    resistance_percent: float = sweep.within(0.0, 90.0)
+    inductance_percent: float = sweep.within(0.0, 90.0)
+    kphi_percent: float = sweep.within(0.0, 90.0)
+    temperatures_degc: list[float] = sweep.within(-60.0, 250.0)
+    speed_percent: float = sweep.within(1.0, 1000.0)
+    torque_percent: float = sweep.within(0.0, 1000.0)
+    error_percent: float = sweep.within(0.0, 100.0)
+    lowest_factor: float = sweep.within(0.01, 0.99)
+    highest_factor: float = sweep.within(1.01, 100.0)
+    resolution_percent: float = sweep.within(0.1, 20.0)
+    start_s: float = sweep.within(0.06, 10.0)
+    settle_s: float = sweep.within(0.01, 60.0)
+    torque_over_s: float = sweep.within(0.01, 60.0)
+    measure_s: float = sweep.within(0.01, 60.0)
 
-    @classmethod
-    def read(cls, path: Path) -> "Table":
-        document = Document(path)
-        root = document.root
-        texts = [root.text(key) for key in ("title", "motor", "board")]
-        promised = {name: root.number(f"{word}_percent", minimum=0.0, maximum=90.0) / 100.0
-                    for name, word in (("R", "resistance"), ("L", "inductance"), ("Kphi", "kphi"))}
-        temperatures = root.numbers("temperatures_degc", minimum=-60.0, maximum=250.0)
-        numbers = [root.number(key, minimum=low, maximum=high) for key, low, high in (
-            ("speed_percent", 1.0, 1000.0), ("torque_percent", 0.0, 1000.0), ("error_percent", 0.0, 100.0), ("lowest_factor", 0.01, 0.99),
-            ("highest_factor", 1.01, 100.0), ("resolution_percent", 0.1, 20.0), ("start_s", 0.06, 10.0), ("settle_s", 0.01, 60.0),
-            ("torque_over_s", 0.01, 60.0), ("measure_s", 0.01, 60.0))]
-        table = cls(*texts, promised, temperatures, *numbers, root.where("motor"), root.where("board"), document.label)
-        root.close()
-        return table
+    @property
+    def promised(self) -> dict[str, float]:
+        """How far each of PARAMETERS may be off, as a share."""
+        percents = (self.resistance_percent, self.inductance_percent, self.kphi_percent)
+        return {name: percent / 100.0 for name, percent in zip(PARAMETERS, percents)}
 
 
 @dataclass(frozen=True)
@@ -124,9 +111,7 @@ class Bench:
 
     def run(self, cases: list[tuple[Deviation, bool]], title: str, quiet: bool) -> list[dict[str, Any]]:
         """The reduced results of all cases, in order."""
-        jobs = [self.job(deviation, loaded) for deviation, loaded in cases]
-        with command_common.Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
-            results = sweep.run_cases(jobs, progress)
+        results = sweep.run_cases(title, [self.job(deviation, loaded) for deviation, loaded in cases], quiet)
         return [self._row(deviation, loaded, result) for (deviation, loaded), result in zip(cases, results)]
 
     def _row(self, deviation: Deviation, loaded: bool, result: dict[str, Any]) -> dict[str, Any]:
@@ -215,20 +200,9 @@ class Search:
             return None
         return math.sqrt(self.good * self.bad)
 
-    def at_bound(self) -> bool:
-        return self.bad is None
 
-
-def _starts(row: dict[str, Any]) -> bool:
-    return row["started"]
-
-
-def _runs(row: dict[str, Any]) -> bool:
-    return row["verdict"] == "ok"
-
-
-CRITERIA = (("starts, no load", False, _starts), ("runs, no load", False, _runs), ("starts, loaded", True, _starts),
-            ("runs, loaded", True, _runs))
+CRITERIA = tuple((f"{what}, {load}", loaded, holds) for load, loaded in (("no load", False), ("loaded", True)) for what, holds in (
+    ("starts", lambda row: row["started"]), ("runs", lambda row: row["verdict"] == "ok")))
 """What a margin is looked for: name, loaded, what must hold."""
 
 
@@ -245,7 +219,7 @@ class Margins:
         down, up = (self.searches[parameter, criterion, upwards] for upwards in (False, True))
         if down.bad == 1.0 or up.bad == 1.0:
             return "not at all"
-        return f"{'<' if down.at_bound() else ''}{down.good:.2f} .. {'>' if up.at_bound() else ''}{up.good:.2f}"
+        return f"{'<' if down.bad is None else ''}{down.good:.2f} .. {'>' if up.bad is None else ''}{up.good:.2f}"
 
 
 def find_margins(bench: Bench, quiet: bool) -> Margins:
@@ -338,8 +312,7 @@ def margins_text(table: Table, margins: Margins) -> str:
 
 def _write(folder: Path, bench: Bench, rows: list[dict[str, Any]], margins: Margins | None, outcomes: list[Outcome],
            used: dict[str, Any]) -> None:
-    head = {"title": bench.table.title, **used, "board": str(paths.shown(bench.board.path)), "speed_rpm": bench.rpm,
-            "torque_nm": bench.torque_nm(True), "start_torque_nm": bench.motor.start_torque_nm}
+    head = {"title": bench.table.title, **used, "speed_rpm": bench.rpm, "torque_nm": bench.torque_nm(True), "start_torque_nm": bench.motor.start_torque_nm}
     more: dict[str, Any] = {}
     if margins is not None:
         from . import plots

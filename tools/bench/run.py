@@ -54,17 +54,16 @@ class Run:
 
     def fault_changes(self) -> list[tuple[int, float, str]]:
         """(row, time, name) whenever the fault code changes, the start included."""
-        return [(row, float(self.trace.time_s[row]), self.faults.get(int(code), f"code {int(code)}"))
-                for row, code in self._firmware_changes("fw.fault")]
-
-    def _firmware_changes(self, name: str) -> list[tuple[int, float]]:
-        """A target image without names leaves no such signals behind."""
-        return self.trace.changes(name) if name in self.trace else []
+        return self._changes("fw.fault", self.faults, "code")
 
     def state_changes(self) -> list[tuple[int, float, str]]:
         """(row, time, name) whenever the drive's state changes, the start included."""
-        return [(row, float(self.trace.time_s[row]), self.states.get(int(code), f"state {int(code)}"))
-                for row, code in self._firmware_changes("fw.state")]
+        return self._changes("fw.state", self.states, "state")
+
+    def _changes(self, signal: str, names: dict[int, str], kind: str) -> list[tuple[int, float, str]]:
+        """A target image without names leaves no such signals behind."""
+        return [(row, float(self.trace.time_s[row]), names.get(int(code), f"{kind} {int(code)}"))
+                for row, code in (self.trace.changes(signal) if signal in self.trace else [])]
 
     def press_times(self, button: str) -> list[float]:
         return [event.at_s for event in self.scenario.events if event.kind == "press" and event.button == button]

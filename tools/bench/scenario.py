@@ -1,5 +1,6 @@
 """A scenario: what happens to the board over time, what to measure and what to expect. scenario_file.py reads it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -97,8 +98,12 @@ def _measure_in_numbers(measure: Measure, rating: Rating | None, params: dict[st
     return measure
 
 
-def _named_speed(name: str, params: dict[str, float]) -> float:
-    parameter = f"{name.upper()}_SPEED_RPM"
-    if parameter not in params:
-        raise UserError(f"the firmware does not tell {parameter}", "tools/cpu_host/probe.c", "rebuild with make vboard")
-    return params[parameter]
+def _named_speed(name: str, params: Mapping[str, float]) -> float:
+    return param(params, f"{name.upper()}_SPEED_RPM")
+
+
+def param(params: Mapping[str, float], name: str) -> float:
+    """A parameter of the firmware, which an old library may not tell."""
+    if name not in params:
+        raise UserError(f"the firmware does not tell {name}", "tools/cpu_host/probe.c", "rebuild with make vboard")
+    return params[name]

@@ -31,6 +31,13 @@
     debug = { SnapStart = 1 }        writes a 16-bit firmware variable, as a debugger would
     note = "..."
 
+    [fault]                          optional: at rpm something breaks after 3 s and is mended at 4 s, S2 follows at 4.2 s: the fault must
+    rpm = 2000                       come, switch off, stay until S2 and leave the drive stopped; no fault before
+    cause = { "cpu.isr_us" = 30 }    what breaks; over_s makes it a ramp, note is for the protocol
+    mended = { "cpu.isr_us" = 13 }   mended_note likewise
+    name = "ISR_OVERRUN"             this and within_s, from_cause, kept_to_s: as kind = "fault" in expect.py has them
+    within_s = 0.001
+
     [[measure]]                      a row of the summary table
     name = "1000 rpm"                its reference_rpm if not given
     from_s = 3.0
@@ -40,6 +47,8 @@
     [[expect]]                       what must hold; kinds are described in expect.py
     kind = "measure"
 """
+
+from typing import Any
 
 from tools.common import paths
 from tools.common.board_keys import Values
@@ -67,11 +76,12 @@ def read(document: Document) -> Scenario:
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))
     _read_start(root.section("start"), scenario)
-    scenario.events = [event for section in root.sections("event") for event in _read_event(section, scenario.duration_s)]
+    fault = _fault_tables(root.section("fault"))
+    scenario.events = [event for section in fault["event"] + root.sections("event") for event in _read_event(section, scenario.duration_s)]
     scenario.events.sort(key=lambda event: event.at_s)
-    _read_measures(root.sections("measure"), scenario)
+    _read_measures(fault["measure"] + root.sections("measure"), scenario)
     measures = {measure.name: measure.has_reference for measure in scenario.measures}
-    for section in root.sections("expect"):
+    for section in fault["expect"] + root.sections("expect"):
         found = read_expectations(section, measures, scenario.duration_s)
         scenario.expectations += found
         scenario.expectations_where += [section.where("kind")] * len(found)
@@ -96,6 +106,28 @@ def _read_start(section: Section | None, scenario: Scenario) -> None:
     scenario.rotor_deg = section.number("rotor_deg", 0.0, -360.0, 360.0)
     scenario.speed_rpm = section.number("speed_rpm", 0.0, -10000.0, 10000.0)
     section.close()
+
+
+def _fault_tables(section: Section | None) -> dict[str, list[Section]]:
+    """The tables of events, measures and expectations that [fault] stands for."""
+    if section is None:
+        return {"event": [], "measure": [], "expect": []}
+    rpm, name, within_s = section.number("rpm"), section.text("name"), section.number("within_s", minimum=0.0)
+    cause, mended = section.values("cause"), section.values("mended")
+    section.close({"over_s", "note", "mended_note", "from_cause", "kept_to_s"})
+
+    def given(**keys: str) -> dict[str, Any]:
+        return {new: section.data[key] for new, key in keys.items() if key in section}
+
+    tables = {
+        "event": [{"at_s": 0.2, "start_rpm": rpm}, {"at_s": 3.0, "set": cause, **given(over_s="over_s", note="note")},
+                  {"at_s": 4.0, "set": mended, **given(note="mended_note")}, {"at_s": 4.2, "press": "S2"}],
+        "measure": [{"name": "before", "from_s": 2.5, "to_s": 3.0, "reference_rpm": rpm}],
+        "expect": [{"kind": "hand_over"}, {"kind": "no_fault", "to_s": 3.0},
+                   {"kind": "fault", "name": name, "after_s": 3.0, "within_s": within_s, "kept_to_s": 4.2, "cleared_from_s": 4.3,
+                    **given(from_cause="from_cause", kept_to_s="kept_to_s")},
+                   {"kind": "state", "name": "STOPPED", "from_s": 4.3}, {"kind": "outputs_off", "from_s": round(3.01 + within_s, 2)}]}
+    return {key: [Section(section.document, row, section.path) for row in rows] for key, rows in tables.items()}
 
 
 def _read_event(section: Section, duration_s: float) -> list[Event]:

@@ -18,7 +18,6 @@ from .board import Library
 from tools.common.errors import UserError
 from .expect import Outcome
 from tools.common.board_keys import Part, Values
-from tools.common.toml_file import Document
 
 
 MARGIN_S = 0.1
@@ -27,42 +26,27 @@ SETTLE_PERIODS = 5.0
 """Of the speed loop's bandwidth, which a heavy load makes small: what the speed gets to settle, at least the table's own time."""
 
 
-@dataclass
-class Table:
+@dataclass(kw_only=True)
+class Table(sweep.Table):
     """tables/starts.toml."""
 
-    title: str
     motor: str
-    board: str
-    every_deg: float
-    speed_rpm: float
-    start_s: float
-    within_s: float
-    measure_from_s: float
-    measure_to_s: float
-    error_percent: float
-    overshoot_percent: float
-    loads_nm: list[float]
-    other_loads_percent: list[float]
-    other_speed_percent: float
-    motor_where: str = ""
-    board_where: str = ""
-    where: str = ""
+    motor_where: str
+    every_deg: float = sweep.within(1.0, 360.0)
+    speed_rpm: float = sweep.within(0.0)
+    start_s: float = sweep.within(0.0)
+    within_s: float = sweep.within(0.0)
+    measure_from_s: float = sweep.within(0.0)
+    measure_to_s: float = sweep.within(0.0)
+    error_percent: float = sweep.within(0.0)
+    overshoot_percent: float = sweep.within(0.0)
+    loads_nm: list[float] = sweep.within(0.0)
+    other_loads_percent: list[float] = sweep.within(0.0, 100.0)
+    other_speed_percent: float = sweep.within(1.0, 100.0)
 
-    @classmethod
-    def read(cls, path: Path) -> "Table":
-        document = Document(path)
-        root = document.root
-        texts = [root.text(key) for key in ("title", "motor", "board")]
-        numbers = [root.number("every_deg", minimum=1.0, maximum=360.0)]
-        numbers += [root.number(key, minimum=0.0) for key in
-                    ("speed_rpm", "start_s", "within_s", "measure_from_s", "measure_to_s", "error_percent", "overshoot_percent")]
-        table = cls(*texts, *numbers, root.numbers("loads_nm", minimum=0.0), root.numbers("other_loads_percent", 0.0, 100.0),
-                    root.number("other_speed_percent", minimum=1.0, maximum=100.0), root.where("motor"), root.where("board"), document.label)
-        root.close()
-        if not table.start_s + table.within_s < table.measure_from_s < table.measure_to_s:
-            raise UserError("the times are not in order", document.label, "start_s + within_s < measure_from_s < measure_to_s")
-        return table
+    def __post_init__(self) -> None:
+        if not self.start_s + self.within_s < self.measure_from_s < self.measure_to_s:
+            raise UserError("the times are not in order", self.where, "start_s + within_s < measure_from_s < measure_to_s")
 
     def for_motor(self, motor: motor_file.Motor, params: Mapping[str, float]) -> "Table":
         """The table for another motor than its own, with that motor's header."""
@@ -88,11 +72,10 @@ def command(options: argparse.Namespace) -> int:
     jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]
     target = options.out or paths.RESULTS / "starts"
     with output.ResultFolder(target) as folder:
-        with command_common.Progress("starts", table.measure_to_s * len(jobs), options.quiet) as progress:
-            results = sweep.run_cases(jobs, progress)
+        results = sweep.run_cases("starts", jobs, options.quiet)
         rows = [{"load_nm": load, "rotor_deg": angle, **result} for (load, angle), result in zip(cases, results)]
         outcomes = [check(table, row) for row in rows]
-        _write(folder.work, table, rows, outcomes, used, board)
+        _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}: {len(rows)} starts\n\n{report.used_text(used)}\n")
     print(text(table, rows))
     print(f"\nresults in {paths.shown(target)}/")
@@ -141,8 +124,7 @@ def _cell(row: dict[str, Any]) -> str:
     return f"{row['closed_after_s']:.2f} s {row['overshoot_percent']:5.1f} % {row['speed_error_percent']:+5.2f} %"
 
 
-def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
     keys = ["load_nm", "rotor_deg", "closed_after_s", "overshoot_percent", "speed_error_percent", "angle_error_rms_deg", "fault"]
     from . import plots
-    report.write_table(folder, "starts", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
-                       {"plots": plots.write_starts(rows, folder)})
+    report.write_table(folder, "starts", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_starts(rows, folder)})

@@ -1,16 +1,18 @@
 """Many runs of one kind: builds a scenario for each case, runs them in parallel and keeps what the tables need."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tools.common import workers
-from . import simulate
-from tools.common.errors import UserError
+from . import command_common, simulate
+from tools.common.toml_file import Document
 from .metrics import Measure
 from .run import Run
-from .scenario import BRAKE, Event, Scenario
+from .scenario import BRAKE, Event, Scenario, param
 
 MEASURE = "measured"
 S3_DEBOUNCE_S = 0.03
@@ -18,6 +20,36 @@ HIGHEST_OVER_S = 0.1
 """The highest speed of a run is a mean over this time."""
 START_MARGIN_S = 0.4
 """Debouncing, charging of the drivers and waiting for the estimator's agreement, at most."""
+
+
+def within(minimum: float, maximum: float = float("inf")) -> Any:
+    """A number of a Table, or a list of numbers, between these bounds."""
+    return field(metadata={"minimum": minimum, "maximum": maximum})
+
+
+@dataclass(kw_only=True)
+class Table:
+    """What a sweep asks for, from scenarios/tables/NAME.toml. Every field is a key there, but those that end with "where": they tell
+    where the others were read."""
+
+    title: str
+    board: str
+    where: str
+    board_where: str
+
+    @classmethod
+    def read(cls, path: Path) -> Any:
+        """Check the whole file and return what it says."""
+        document = Document(path)
+        root, values = document.root, {"where": document.label}
+        for item in fields(cls):
+            if item.name.endswith("_where"):
+                values[item.name] = root.where(item.name.removesuffix("_where"))
+            elif item.name != "where":
+                read = {str: root.text, float: root.number}.get(item.type, root.numbers)
+                values[item.name] = read(item.name, **item.metadata)
+        root.close()
+        return cls(**values)
 
 
 def start_events(start_s: float, speed_rpm: float, nominal_rpm: float, where: str) -> list[Event]:
@@ -39,21 +71,15 @@ def scenario(name: str, title: str, events: list[Event], reference_rpm: float, f
 
 def start_time_s(params: dict[str, float]) -> float:
     """How long a header's start takes from S2 to closed loop: lock, ramp and what is around them."""
-    period_s, pairs = _param(params, "LOOPTIME_SEC"), _param(params, "NOPOLESPAIRS")
-    end_count = _param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
-    ramp_periods = end_count / _param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")
-    return (_param(params, "LOCK_TIME") + ramp_periods) * period_s + START_MARGIN_S
+    period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
+    end_count = param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
+    ramp_periods = end_count / param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")
+    return (param(params, "LOCK_TIME") + ramp_periods) * period_s + START_MARGIN_S
 
 
 def ramp_time_s(params: dict[str, float], rpm: float) -> float:
     """How long the reference takes from the end of the start to a speed."""
-    return abs(rpm - _param(params, "END_SPEED_RPM")) / _param(params, "SPEEDREFRAMP_RPM_PER_S")
-
-
-def _param(params: dict[str, float], name: str) -> float:
-    if name not in params:
-        raise UserError(f"the firmware does not tell {name}", "tools/cpu_host/probe.c", "rebuild with make vboard")
-    return params[name]
+    return abs(rpm - param(params, "END_SPEED_RPM")) / param(params, "SPEEDREFRAMP_RPM_PER_S")
 
 
 def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torque_nm: float = 0.0,
@@ -63,7 +89,7 @@ def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torq
     where = times.where
     closed_s = times.start_s + start_time_s(params)
     at_speed_s = closed_s + ramp_time_s(params, rpm) + times.settle_s
-    first = min(max(rpm, _param(params, "MINIMUM_SPEED_RPM")), _param(params, "NOMINAL_SPEED_RPM"))
+    first = min(max(rpm, param(params, "MINIMUM_SPEED_RPM")), param(params, "NOMINAL_SPEED_RPM"))
     events = [Event(0.0, "set", where, keys={BRAKE: start_torque_nm}), Event(0.0, "speed_rpm", where, value=first),
               Event(times.start_s, "press", where, button="S2", hold_s=0.1),
               Event(closed_s, "speed_rpm", where, value=rpm, finds_range=True, written=name)]
@@ -73,13 +99,14 @@ def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torq
     return events, at_speed_s + times.torque_over_s + times.settle_s
 
 
-def run_cases(jobs: list[simulate.Job], progress: Callable[[float], None]) -> list[dict[str, Any]]:
-    """The reduced results of all jobs, in order."""
-    return workers.run_all(jobs, _work, progress)
-
-
 def _work(job: simulate.Job, report: Callable[[float], None]) -> dict[str, Any]:
     return reduced(simulate.simulate(job, report))
+
+
+def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any] = _work) -> list[Any]:
+    """The results of all jobs, in order; reduced, if `work` does not make something else of a job."""
+    with command_common.Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
+        return workers.run_all(jobs, work, progress)
 
 
 def reduced(run: Run) -> dict[str, Any]:

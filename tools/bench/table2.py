@@ -14,7 +14,6 @@ from .expect import Outcome
 from .sweep import limit_text
 from tools.common.board_keys import Part
 from .scenario import Event
-from tools.common.toml_file import Document, Section
 
 COLUMNS = (
     ("torque_nm_set", "torque\nN m", "{:.3f}"), ("note_rpm", "note\nrpm", "{:.0f}"), ("speed_rpm", "ours\nrpm", "{:.1f}"),
@@ -34,48 +33,35 @@ class Row:
     note_current_a: float
     error_percent: float
     no_more_current: bool
-    where: str
-
-    @classmethod
-    def read(cls, section: Section, error_percent: float) -> "Row":
-        row = cls(section.number("reference_rpm", minimum=1.0), section.number("torque_nm", minimum=0.0),
-                  section.number("note_rpm", minimum=0.0), section.number("note_current_a", minimum=0.0),
-                  error_percent, section.flag("no_more_current", True), section.where("reference_rpm"))
-        section.close()
-        return row
 
 
-@dataclass
-class Table:
-    """tables/table2.toml."""
+@dataclass(kw_only=True)
+class Table(sweep.Table):
+    """tables/table2.toml, with its columns as rows."""
 
-    title: str
     motor: str
-    board: str
-    start_s: float
-    torque_from_s: float
-    torque_over_s: float
-    measure_from_s: float
-    measure_to_s: float
-    rows: list[Row]
-    motor_where: str = ""
-    board_where: str = ""
+    motor_where: str
+    reference_rpm_where: str
+    start_s: float = sweep.within(0.0)
+    torque_from_s: float = sweep.within(0.0)
+    torque_over_s: float = sweep.within(0.0)
+    measure_from_s: float = sweep.within(0.0)
+    measure_to_s: float = sweep.within(0.0)
+    error_percent: float = sweep.within(0.0)
+    reference_rpm: list[float] = sweep.within(1.0)
+    torque_nm: list[float] = sweep.within(0.0)
+    note_rpm: list[float] = sweep.within(0.0)
+    note_current_a: list[float] = sweep.within(0.0)
+    more_current_rpm: list[float] = sweep.within(0.0)
 
-    @classmethod
-    def read(cls, path: Path) -> "Table":
-        document = Document(path)
-        root = document.root
-        error_percent = root.number("error_percent", minimum=0.0)
-        numbers = [root.number(key, minimum=0.0) for key in
-                   ("start_s", "torque_from_s", "torque_over_s", "measure_from_s", "measure_to_s")]
-        table = cls(root.text("title"), root.text("motor"), root.text("board"), *numbers,
-                    [Row.read(section, error_percent) for section in root.sections("row")], root.where("motor"), root.where("board"))
-        root.close()
-        if not table.start_s < table.torque_from_s < table.measure_from_s < table.measure_to_s:
-            raise UserError("the times are not in order", document.label, "start_s < torque_from_s < measure_from_s < measure_to_s")
-        if not table.rows:
-            raise UserError("no rows", document.label, "add [[row]]")
-        return table
+    def __post_init__(self) -> None:
+        if not self.start_s < self.torque_from_s < self.measure_from_s < self.measure_to_s:
+            raise UserError("the times are not in order", self.where, "start_s < torque_from_s < measure_from_s < measure_to_s")
+        columns = (self.reference_rpm, self.torque_nm, self.note_rpm, self.note_current_a)
+        if len(set(map(len, columns))) > 1:
+            raise UserError("columns of different lengths", self.reference_rpm_where,
+                            "give reference_rpm, torque_nm, note_rpm and note_current_a a number for each row")
+        self.rows = [Row(*cells, self.error_percent, cells[0] not in self.more_current_rpm) for cells in zip(*columns)]
 
 
 def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = sweep.run_cases) -> int:
@@ -85,11 +71,10 @@ def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str,
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
     target = options.out or paths.RESULTS / "table2"
     with output.ResultFolder(target) as folder:
-        with command_common.Progress("table2", table.measure_to_s * len(jobs), options.quiet) as progress:
-            results = run_cases(jobs, progress)
+        results = run_cases("table2", jobs, options.quiet)
         rows = [_result(row, result) for row, result in zip(table.rows, results)]
         outcomes = [outcome for row, result in zip(table.rows, rows) for outcome in check(row, result)]
-        _write(folder.work, table, rows, outcomes, used, board)
+        _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
@@ -99,8 +84,8 @@ def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str,
 
 def _job(table: Table, row: Row, library: Library, motor: Part, board: Part) -> simulate.Job:
     nominal = library.params.get("NOMINAL_SPEED_RPM", 0.0)
-    events = sweep.start_events(table.start_s, row.reference_rpm, nominal, row.where)
-    events.append(Event(table.torque_from_s, "set", row.where, keys={"load.constant_nm": row.torque_nm},
+    events = sweep.start_events(table.start_s, row.reference_rpm, nominal, table.reference_rpm_where)
+    events.append(Event(table.torque_from_s, "set", table.reference_rpm_where, keys={"load.constant_nm": row.torque_nm},
                         over_s=table.torque_over_s))
     scenario = sweep.scenario(f"{row.reference_rpm:g} rpm", table.title, events, row.reference_rpm, table.measure_from_s,
                                table.measure_to_s)
@@ -127,8 +112,7 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
     return outcomes
 
 
-def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any], board: Part) -> None:
+def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
     keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
     from . import plots
-    report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used, "board": str(paths.shown(board.path))},
-                       {"plots": plots.write_table2(rows, folder)})
+    report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_table2(rows, folder)})

@@ -30,6 +30,23 @@ def each(items: Iterable[Item], work: Callable[[Item], Made]) -> tuple[list[Made
     return made, code
 
 
+def one_or_all(options: argparse.Namespace, known: list[str]) -> list[str]:
+    """The motors that a command is for: the one that is named, or with --all those that are known."""
+    if options.all == (options.motor is not None):
+        raise UserError("which motor?", "command line", "name one, or write --all" if not options.all else "write either a motor or --all")
+    if options.all and options.out is not None:
+        raise UserError("one folder for several motors", "--out", "leave it out, or name one motor")
+    return known if options.all else [options.motor]
+
+
+def main(parser: Callable[[], argparse.ArgumentParser], arguments: list[str] | None) -> int:
+    """Exit code of the command that the arguments choose: the parser sets it as `command`."""
+    def work() -> int:
+        options = parser().parse_args(arguments)
+        return options.command(options)
+    return run(work)
+
+
 def run(work: Callable[[], int]) -> int:
     """Exit code of `work`; 2 after bad input, 130 after Ctrl-C, 141 when the reader of the output went away."""
     try:

@@ -98,15 +98,22 @@ static inline unsigned source(iss_t *m, const insn_t *i, unsigned bits)
     return load(m, indirect(m, i->s, i->p, i->w, bits / 8u, false), bits);
 }
 
+static inline void to_register(iss_t *m, unsigned n, unsigned result, unsigned bits)
+{
+    if (bits == 8) {
+        set_w8(m, n, result);
+    } else {
+        set_w(m, n, result);
+    }
+}
+
 /* Write the result to destination operand Wd in whatever mode. */
 static inline void destination(iss_t *m, const insn_t *i, unsigned value, unsigned bits)
 {
     if (i->q != 0) {
         store(m, indirect(m, i->d, i->q, i->w, bits / 8u, true), value, bits);
-    } else if (bits == 8) {
-        set_w8(m, i->d, value);
     } else {
-        set_w(m, i->d, value);
+        to_register(m, i->d, value, bits);
     }
 }
 
@@ -115,19 +122,8 @@ static inline void to_file_or_wreg(iss_t *m, const insn_t *i, unsigned result, u
 {
     if (i->d != 0) {
         store(m, i->k, result, bits);
-    } else if (bits == 8) {
-        set_w8(m, 0, result);
     } else {
-        set_w(m, 0, result);
-    }
-}
-
-static inline void to_register(iss_t *m, unsigned n, unsigned result, unsigned bits)
-{
-    if (bits == 8) {
-        set_w8(m, n, result);
-    } else {
-        set_w(m, n, result);
+        to_register(m, 0, result, bits);
     }
 }
 
@@ -143,6 +139,13 @@ static inline void flags_nz(iss_t *m, unsigned result, unsigned bits)
     sr |= ((result >> (bits - 1u)) & 1u) << 3;
     sr |= (unsigned)((result & ones(bits)) == 0) << 1;
     m->data[R_SR] = (uint16_t)sr;
+}
+
+/* The result of an operation that sets N and Z alone. */
+static inline unsigned logic(iss_t *m, unsigned result, unsigned bits)
+{
+    flags_nz(m, result, bits);
+    return result & ones(bits);
 }
 
 static inline void push16(iss_t *m, unsigned value)

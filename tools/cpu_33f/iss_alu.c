@@ -18,12 +18,6 @@ static inline unsigned sum(iss_t *m, unsigned a, unsigned b, unsigned carry, uns
     return result;
 }
 
-static inline unsigned logic(iss_t *m, unsigned result, unsigned bits)
-{
-    flags_nz(m, result, bits);
-    return result;
-}
-
 /* Two operands: a is Wb, f or Wn, b is Ws, WREG or the literal. */
 #define ALU2(name, expression) \
     static inline unsigned alu_##name(iss_t *m, unsigned a, unsigned b, unsigned bits) { return (expression); }
@@ -115,17 +109,14 @@ static void daw(iss_t *m, const insn_t *i)
 
 static void se(iss_t *m, const insn_t *i)
 {
-    unsigned value = source(m, i, 8), result = (value ^ 0x80u) - 0x80u;
-    set_w(m, i->d, result);
-    flags_nz(m, result, 16);
+    unsigned value = source(m, i, 8);
+    set_w(m, i->d, logic(m, (value ^ 0x80u) - 0x80u, 16));
     flag(m, SR_C, (value & 0x80u) == 0);
 }
 
 static void ze(iss_t *m, const insn_t *i)
 {
-    unsigned value = source(m, i, 8);
-    set_w(m, i->d, value);
-    flags_nz(m, value, 16);
+    set_w(m, i->d, logic(m, source(m, i, 8), 16));
     flag(m, SR_C, true);
 }
 

@@ -5,16 +5,8 @@
 
 static inline unsigned shifted(iss_t *m, unsigned result, unsigned out, unsigned bits)
 {
-    flags_nz(m, result, bits);
     m->data[R_SR] = (uint16_t)((m->data[R_SR] & ~(unsigned)SR_C) | (out & 1u));
-    return result & ones(bits);
-}
-
-/* The rotations that leave C alone. */
-static inline unsigned rotated(iss_t *m, unsigned result, unsigned bits)
-{
-    flags_nz(m, result, bits);
-    return result & ones(bits);
+    return logic(m, result, bits);
 }
 
 ALU1(sl, shifted(m, a << 1, a >> (bits - 1u), bits))
@@ -22,8 +14,8 @@ ALU1(lsr, shifted(m, a >> 1, a, bits))
 ALU1(asr, shifted(m, a >> 1 | (a & 1u << (bits - 1u)), a, bits))
 ALU1(rlc, shifted(m, a << 1 | carry_of(m), a >> (bits - 1u), bits))
 ALU1(rrc, shifted(m, a >> 1 | carry_of(m) << (bits - 1u), a, bits))
-ALU1(rlnc, rotated(m, a << 1 | a >> (bits - 1u), bits))
-ALU1(rrnc, rotated(m, a >> 1 | (a & 1u) << (bits - 1u), bits))
+ALU1(rlnc, logic(m, a << 1 | a >> (bits - 1u), bits))
+ALU1(rrnc, logic(m, a >> 1 | (a & 1u) << (bits - 1u), bits))
 
 /* ---- shifts by many: Wb by a literal or by the low five bits of Ws ---- */
 
@@ -47,9 +39,7 @@ static inline unsigned asr_value(unsigned value, unsigned count)
 #define SHIFT_MANY(name) \
     static void name##_many(iss_t *m, const insn_t *i, unsigned count) \
     { \
-        unsigned result = name##_value(m->data[i->w], count); \
-        set_w(m, i->d, result); \
-        flags_nz(m, result, 16); \
+        set_w(m, i->d, logic(m, name##_value(m->data[i->w], count), 16)); \
     } \
     static void name##_by_k(iss_t *m, const insn_t *i) { name##_many(m, i, i->k); } \
     static void name##_by_w(iss_t *m, const insn_t *i) { name##_many(m, i, m->data[i->s] & 31u); }

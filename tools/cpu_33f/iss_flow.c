@@ -235,11 +235,7 @@ OP(do_w, start_do(m, m->data[i->s] & 0x3FFFu, m->program[m->pc - 1u] & 0xFFFFu))
 
 /* ---- the core as a whole ---- */
 
-static void nop(iss_t *m, const insn_t *i)
-{
-    (void)m;
-    (void)i;
-}
+OP(nop, (void)0)
 
 static void clrwdt(iss_t *m, const insn_t *i)
 {

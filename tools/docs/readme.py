@@ -1,5 +1,6 @@
 """Fills the tables of README.md from the results in build/run/: `make readme` runs what they need first."""
 
+import importlib
 import json
 import re
 import shutil
@@ -84,22 +85,12 @@ def guarantees() -> str:
     return table(["guarantee", "measured", "command"], rows)
 
 
-def size() -> str | None:
-    """What `make size` left in build/target; None without a compiler for the target."""
-    path = ROOT / "build/target/size.json"
+def of_target(name: str, module: str) -> str | None:
+    """What `make size` or `make cycles` left in build/target; None without a compiler for the target."""
+    path = ROOT / f"build/target/{name}.json"
     if not path.exists():
         return None
-    from tools.image.size import readme_table
-    return table(*readme_table(json.loads(path.read_text())))
-
-
-def cycles() -> str | None:
-    """What `make cycles` left in build/target; None without a compiler for the target."""
-    path = ROOT / "build/target/cycles.json"
-    if not path.exists():
-        return None
-    from tools.bench.cycles import readme_table
-    return table(*readme_table(json.loads(path.read_text())))
+    return table(*importlib.import_module(module).readme_table(json.loads(path.read_text())))
 
 
 def tests() -> str | None:
@@ -127,7 +118,9 @@ def main() -> None:
         if not (ROOT / "build" / source).exists():
             sys.exit(f"foc33: no picture, build/{source}: run `make readme`, which makes it")
     text = README.read_text()
-    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors), ("size", size), ("cycles", cycles), ("tests", tests)):
+    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors),
+                       ("size", lambda: of_target("size", "tools.image.size")), ("cycles", lambda: of_target("cycles", "tools.bench.cycles")),
+                       ("tests", tests)):
         block = make()
         text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
                               lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)

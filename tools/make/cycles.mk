@@ -14,7 +14,7 @@ pil: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the image turns the mo
 	@$(alone) $(python) -m tools.bench.pil_command $(pil_scenario) $(pil_image) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) \
 	    $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
 
-cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the control interrupt in cycles, load, latency, stack, flame graph [SCENARIO= IMAGE=file.elf OUT=]
+cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the control interrupt in cycles, load, latency, stack [SCENARIO= IMAGE=file.elf OUT=]
 	@$(if $(MOTOR)$(BOARD),echo foc33: make cycles has no MOTOR and no BOARD: it takes those of its scenarios$(comma) use make pil MOTOR=name >&2; exit 2)
 	$(target_setup)
 	@$(alone) $(python) -m tools.bench.cycles $(pil_scenario) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
