@@ -77,7 +77,7 @@ board = $(if $(BOARD),--board $(call quoted,$(BOARD)))
 options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
 ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief),$(MAKE) vboard)
 
-.PHONY: run scenarios list-motors table2 starts motors robust setup-run
+.PHONY: run scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= OUT=folder]
 	@+$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
@@ -102,6 +102,14 @@ motors: setup-run ## [your motor] every motor with its own header: 20, 50, 100 %
 robust: setup-run ## [run] how far R, L and Kphi may be off before a start fails [MOTOR= OUT=]
 	@+$(ready)
 	@$(front_end) robust $(options)
+
+loadsteps: setup-run ## [run] the brake closes and opens at once: dips, and the time back [MOTOR= OUT=]
+	@+$(ready)
+	@$(front_end) loadsteps $(options)
+
+lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MOTOR= OUT=]
+	@+$(ready)
+	@$(front_end) lowspeed $(options)
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
@@ -131,7 +139,8 @@ setup-tune:
 
 .PHONY: readme bench
 readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
-	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all"; do \
+	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
+	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)"); do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
 	@if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
 	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done; fi
@@ -187,7 +196,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust image_build examples),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)

@@ -39,7 +39,7 @@
 #define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004 low sides on for this long on each side of the sample's centre */
 
 /* ---- Speeds ------------------------------------------------------------------------------------------------------- */
-#define MINIMUM_SPEED_RPM 500       /* [rpm]           50 .. 10000    potentiometer at zero */
+#define MINIMUM_SPEED_RPM 150       /* [rpm]           50 .. 10000    potentiometer at zero */
 #define NOMINAL_SPEED_RPM 2800      /* [rpm]           100 .. 20000   potentiometer at full scale, S3 off; the estimator's derivative changes here */
 #define MAXIMUM_SPEED_RPM 5500      /* [rpm]           100 .. 30000   potentiometer at full scale, S3 on */
 #define SPEEDREFRAMP_RPM_PER_S 4000 /* [rpm/s]         1 .. 60000     slope of the speed reference */
@@ -60,16 +60,17 @@
 
 /* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
-#define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 60 degrees, 60 over the parameter set */
+#define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 52 degrees, 51 over the parameter set */
+#define LOAD_BANDWIDTH_HZ 110       /* [Hz]            1 .. 200       load observer after a load step; under load 0.43 of it, without load 1.22 SPEED_BANDWIDTH_HZ: phase margin 17 degrees after a load step, 42 under load */
 
 /* ---- Filters, Equation 7: K in Q15 per period --------------------------------------------------------------------- */
-#define KFILTER_ESDQ 1200           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM: 119 Hz */
-#define KFILTER_ESDQ_FW 1200        /* [Q15]           10 .. 8000     back-EMF above: 119 Hz */
-#define KFILTER_VELESTIM 748        /* [Q15]           10 .. 8000     speed for loop, thresholds and display: 74 Hz */
+#define KFILTER_ESDQ 2000           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM: 200 Hz */
+#define KFILTER_ESDQ_FW 2000        /* [Q15]           10 .. 8000     back-EMF above: 200 Hz */
+#define KFILTER_VELESTIM 748        /* [Q15]           10 .. 8000     speed for thresholds and display: 74 Hz */
 
 /* ---- Field weakening: a table entry every 1024 electrical rpm of speed reference, 204.8 rpm with 5 pole pairs ----- */
 #define FW_START_SPEED_RPM 2640     /* [rpm]           100 .. 20000   speed reference of entry 0 */
-#define FW_TRIM_CURRENT_A 1.0       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
+#define FW_TRIM_CURRENT_A 1.5       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
 
 #define IDREF_SPEED0   0.00               /* [A]             -20 .. 0       d current of each entry */
 #define IDREF_SPEED1  -0.28
@@ -141,8 +142,9 @@
  *   NORM_LSDTBASE                        1.92 mH               1626  Q15 / 256                   +0.011 %  Equation 5, AN1292's constant, at most 32767
  *   NORM_INVKFIBASE                      7.24 V/krpm           7956  Q15 / 2, 1/Kphi             +0.002 %  Equation 6
  *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, AN1292's constant
- *   estimator.rs_q16                     2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
+ *   adaptation.rs_base_q16               2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
  *   estimator.rs_exp                        1 1                   0  count                          exact  the product is shifted left by it
+ *   estimator.resistive_max            11.716 V                7215  Q13 V                       +0.001 %  largest R i, at the trip level
  *   fieldweak.ls_base_q16                1.92 mH              52026  Q16 / 1                     -0.000 %  L of the estimator, eight samples
  *   estimator.ls_exp                        1 1                   0  count                          exact  the product is shifted left by it
  *
@@ -153,12 +155,12 @@
  *   estimator.d_ilimit_hs_q14         0.39597 A                1474  Q14 A                       -0.031 %  D_ILIMIT_HS: change in a period
  *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in AN1292's format
  *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in AN1292's format
- *   fieldweak.kfilter_esdq_q16         118.76 Hz               2400  Q16 a period                   exact  Equation 7
- *   fieldweak.kfilter_esdq_fw_q16      118.76 Hz               2400  Q16 a period                   exact  Equation 7
+ *   fieldweak.kfilter_esdq_q16         200.46 Hz               4000  Q16 a period                   exact  Equation 7
+ *   fieldweak.kfilter_esdq_fw_q16      200.46 Hz               4000  Q16 a period                   exact  Equation 7
  *   estimator.kfilter_velestim_q16     73.503 Hz               1496  Q16 a period                   exact  Equation 7
  *
  * speeds
- *   minimum_erpm                          500 rpm              2500  erpm                           exact  potentiometer at zero
+ *   minimum_erpm                          150 rpm               750  erpm                           exact  potentiometer at zero
  *   nominal_erpm                         2800 rpm             14000  erpm                           exact  potentiometer at full scale, S3 off
  *   maximum_erpm                         5500 rpm             27500  erpm                           exact  potentiometer at full scale, S3 on
  *   end_erpm                             1000 rpm              5000  erpm                           exact  end of the ramp
@@ -177,9 +179,34 @@
  *   pi_q.kp                            12.064 V/A              8172  Q15 / 16                    -0.003 %  proportional gain
  *   pi_q.ki                             16776 V/(A s)           568  Q11 a period                -0.040 %  integral gain
  *   pi_q.kc                             0.999 1               32734  Q15                         -0.004 %  anti-windup
- *   pi_speed.kp                    0.00078573 A/rpm            2397  Q15 / 16                    +0.008 %  proportional gain
- *   pi_speed.ki                      0.021393 A/(rpm s)          26  Q14 in 8 periods            -0.395 %  integral gain
- *   pi_speed.kc                         0.999 1               32734  Q15                         -0.004 %  anti-windup
+ *   speed_kp_q13                   0.00078573 A/rpm            2397  Q15 / 16                    +0.008 %  proportional gain
+ *   speed_kp_quick_q13              0.0014143 A/rpm            4314  Q15 / 16                    -0.005 %  after a large innovation
+ *
+ * load observer, adaptation and low speed
+ *   observer.deltat_q32                 5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
+ *   observer.per_turn_q12             0.45776 rpm              9375  Q12 erpm                       exact  2^16 counts of the angle in a step
+ *   observer.shift                          3 1                   3  count                          exact  2^this of its units of acceleration are an erpm a step
+ *   observer.per_current_q16       1.0396e+05 rpm/s/A         58548  Q16 unit/Q13 A              +0.000 %  Kt/J
+ *   observer.per_unit_q15          9.6195e-06 A s/rpm         36679  Q15 Q13 A/unit              -0.000 %  J/Kt
+ *   observer.innovation_max            3276.6 rpm             16383  erpm                           exact  innovation counts up to here
+ *   observer.load_max                    2.75 A                4574  units                          exact  largest load
+ *   observer.quiet_q16                  15.86 Hz               2612  Q16 a step                  -0.011 %  rate without load
+ *   observer.loaded_q16                    33 Hz               5435  Q16 a step                  -0.008 %  rate under load
+ *   observer.quick_q16                    110 Hz              18118  Q16 a step                  -0.001 %  rate after a large innovation
+ *   observer.full_erpm                 488.89 rpm              2444  erpm                        -0.018 %  speed reference from which rates and gain are these
+ *   observer.load_from                    0.1 A                 166  units                       -0.198 %  load that begins to count
+ *   observer.load_width                   0.1 A                 166  units                       -0.198 %  over what more it counts
+ *   observer.load_slope_q15                10 1/A               197  Q15 a unit                  -0.000 %  one over it
+ *   observer.large_erpm                29.856 rpm               149  erpm                        -0.189 %  large innovation without load
+ *   observer.large_loaded_erpm         6.8899 rpm                34  erpm                        -1.305 %  and under load
+ *   adaptation.rate_q16                     6 1/s               157  Q16 a step                  -0.182 %  flux and R follow
+ *   adaptation.kfi_least                 -0.3 1               -9830  Q15                         -0.004 %  least change of 1/Kphi
+ *   adaptation.kfi_most                  0.35 1               11468  Q15                         -0.007 %  largest
+ *   adaptation.rs_least                  -0.4 1              -13107  Q15                         -0.002 %  least change of R
+ *   adaptation.rs_most                    0.6 1               19660  Q15                         -0.004 %  largest
+ *   adaptation.emf_least_q12            0.192 V                  59  Q12 V                       -0.204 %  back-EMF from which it learns
+ *   sample_shift_q16               3.2656e-06 A/rpm              80  Q16 Q13 A/erpm              +0.386 %  q current that the sample misses
+ *   fieldweak.esdq_per_erpm_q13       0.41667 Hz/rpm          14055  Q13 of Q16                  -0.002 %  corner of the back-EMF filter at low speed
  *
  * start
  *   forced.end_speed_q10                 1000 rpm            279620  Q10 angle counts a period   -0.000 %  end of the ramp
@@ -194,7 +221,7 @@
  * limits
  *   current_max_q13                      2.75 A                5120  Q13 A                       -0.000 %  current vector that is asked for
  *   overcurrent_q13                       3.8 A                7075  Q13 A                       +0.001 %  phase current that trips
- *   fieldweak.trim_max_q13                  1 A                1862  Q13 A                       +0.010 %  most that the voltage feedback adds
+ *   fieldweak.trim_max_q13                1.5 A                2793  Q13 A                       +0.010 %  most that the voltage feedback adds
  *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal
  *   bus_over_q15                           34 V               21101  Q15 of full scale           +0.002 %  trips
  *   bus_under_q15                          12 V                7447  Q15 of full scale           -0.004 %  trips
@@ -208,8 +235,8 @@
  *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %
  *   svm.top                              93.6 %                1872  duty                           exact  highest duty: sampling window
  *   svm.dead_time                           2 us                 80  25 ns                          exact  dead-time compensation
- *   svm.knee_q13                     0.047266 A                  88  Q13 A                          exact  current from which it is full
- *   svm.dead_slope_q16                0.90909 1               59578  Q16                            exact  duty per current
+ *   svm.knee_q13                    0.0032227 A                   6  Q13 A                          exact  current from which it is full
+ *   svm.dead_slope_q8                  13.333 1                3413  Q8                          -0.010 %  duty per current
  *   svm.turn_q13                      0.39597 A                 737  Q13 A                          exact  most that a current turns in a period
  *   voltage_limit_per_bus_q16          0.5404 V/V             35143  Q14 V per Q16 bus           -0.002 %  voltage circle
  *   duty_per_volt_numerator              52.8 V           264172656  Q32                         +0.000 %  duty per volt at bus 1
@@ -217,7 +244,6 @@
  *   kcurr_b                              -0.5 1              -16384  Q15                            exact  gain of the samples
  *
  * field weakening
- *   fieldweak.margin_q14                 0.24 V                 296  Q14 V                       +0.134 %  voltage kept free before the feedback acts
  *   fieldweak.trim_speed_erpm            1584 rpm              7920  erpm                           exact  speed from which it acts
  */
 

@@ -48,7 +48,7 @@ int main(void)
     for (int n = 0; n <= 80000; n++) { /* four seconds */
         double s = n * 50e-6;
         PORTAbits.RA8 = !(s > 0.2 && s < 0.3);     /* S2 pressed for 0.1 s */
-        ADC1BUF0 = converter(0.5);                 /* potentiometer: between 500 and 2800 rpm */
+        ADC1BUF0 = converter(0.5);                 /* potentiometer: between 150 and 2800 rpm */
         ADC1BUF1 = converter(0.5 - i_alpha / 8.8); /* shunts in the low legs: inverted, 4.4 A full scale */
         ADC1BUF2 = converter(0.5 - (-0.5 * i_alpha + 0.866 * i_beta) / 8.8);
         ADC1BUF3 = converter(BUS_V / 52.8);
@@ -64,5 +64,5 @@ int main(void)
             printf("%.1f s  %6.1f rpm  %5.2f A  duties %4u %4u %4u\n", s, rpm, hypot(i_alpha, i_beta), acting[0], acting[1], acting[2]);
         }
     }
-    return fabs(rpm - 1650.0) < 10.0 ? 0 : 1; /* the middle of 500 .. 2800 rpm */
+    return fabs(rpm - 1475.0) < 10.0 ? 0 : 1; /* the middle of 150 .. 2800 rpm */
 }

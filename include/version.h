@@ -2,6 +2,6 @@
 #ifndef VERSION_H
 #define VERSION_H
 
-#define FOC33_VERSION "0.9.0"
+#define FOC33_VERSION "0.10.0"
 
 #endif

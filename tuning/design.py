@@ -15,20 +15,23 @@ from . import constants, fw_tables, limits, loops, start
 from .constants import Constant, number_of
 from .limits import RPM, Envelope
 
-ESDQ_HZ = 118.76
+ESDQ_HZ = 200.49
+"""2000 at 50 us. AN1292's 1200, 119 Hz, is older than a load step allows."""
 VELESTIM_HZ = 73.5
-"""AN1292's 1200 and 748 at 50 us."""
+"""AN1292's 748 at 50 us."""
 QUICK_ROTOR_S = 0.015
-"""A rotor that rated torque brings to rated speed in less than this loses its speed to a load before a loop with AN1292's speed filter
-reacts: the filter's corner rises in proportion, up to four times. Its speed gain is small (it goes with J), so noise stays small too."""
-HEAVY_S = 0.1
-"""A slow speed loop is the inertia's doing, not a quick rotor's, where rated torque needs longer than this to rated speed."""
+"""The speed filter's corner rises for a rotor that rated torque brings to rated speed in less than this, up to four times: otherwise the
+thresholds see its speed too late."""
 REFERENCE_RISE_S = 0.7
 """The speed reference goes from 0 to rated speed in this time, unless inertia asks for more."""
 REFERENCE_TORQUE_SHARE = 0.3
 TRIM_SHARE = 0.3
+TRIM_SPEED_SHARE = 0.9
+"""The voltage feedback's d current allows the rated torque up to this share of rated speed, where the current limit does."""
+TRIM_WEAK_FLUX = 0.8
+"""Flux over the header's at which the voltage feedback must still help: the adaptation's tolerance."""
 ROUNDING_LIMIT_PERCENT = 0.1
-MOTOR_CONSTANTS = {"estimator.rs_q16": "MOTOR_RS_OHM", "fieldweak.ls_base_q16": "MOTOR_LS_MH", "NORM_INVKFIBASE": "MOTOR_KPHI_V_PER_KRPM"}
+MOTOR_CONSTANTS = {"adaptation.rs_base_q16": "MOTOR_RS_OHM", "fieldweak.ls_base_q16": "MOTOR_LS_MH", "NORM_INVKFIBASE": "MOTOR_KPHI_V_PER_KRPM"}
 """Constants that the estimator computes with: their rounding is an error of the motor's values."""
 ROUNDING_REMEDY = {"MOTOR_RS_OHM": "a larger current range (smaller shunt or gain) gives it more counts",
                    "MOTOR_LS_MH": "a larger current range or a shorter PWM period gives it more counts",
@@ -76,8 +79,8 @@ class Design:
     tables_from: str = ""
     """where the field-weakening tables come from"""
     tuned_by_machine: bool = False
-    loaded_hz: float = 0.0
-    """speed bandwidth that holds half the rated torque put on in half a second at minimum speed"""
+    calm_hz: float = 0.0
+    """speed bandwidth that the lowest speed and the load observer allow"""
 
     @functools.cached_property
     def scales(self) -> Scales:
@@ -239,7 +242,7 @@ def _board(d: Design) -> None:
                        ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
                        ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
         d.put(name, text, "board file")
-    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period, AN1292's corner")
+    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period; at low speed the firmware lowers it")
     d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
           "the same: AN1292's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
     rise_s = _rise_s(d.motor)
@@ -282,11 +285,13 @@ def _currents(d: Design, currents: limits.Currents) -> None:
     d.put("OVER_CURRENT_THRESHOLD_A", plain(currents.trip_a), f"{limits.TRIP_OVER_MAXIMUM:g} times the largest current, at most "
           f"{limits.TRIP_SHARE:.1%} of the converter's {d.board.current_full_scale_a:.3g} A" + (
           "; lowered until the back-EMF's number format holds voltage + R I + L dI/dt at the trip level" if lowered else ""))
-    base = limits.table(d.envelope, limits.fw_start_rpm(d.envelope, d.value("MAXIMUM_SPEED_RPM")))[0]
-    half = d.envelope.least_id(m.rated_speed_rpm, 0.5 * m.rated_torque_nm, limits.TABLE_SHARE)
-    needed = -(half if half is not None else d.envelope.deepest_id(d.envelope.iq(m.rated_speed_rpm, 0.5 * m.rated_torque_nm))) + base
-    trim = limits.digits_down(max(TRIM_SHARE * maximum, min(1.2 * needed, 0.8 * maximum)), 1)
-    d.put("FW_TRIM_CURRENT_A", real(trim), f"{TRIM_SHARE:.0%} of the largest current, or what rated speed needs at half the rated torque")
+    full = d.envelope.id_for(TRIM_SPEED_SHARE * m.rated_speed_rpm, m.rated_torque_nm)
+    half = d.envelope.id_for(m.rated_speed_rpm, 0.5 * m.rated_torque_nm)
+    useful = d.envelope.least_voltage_id(TRIM_SPEED_SHARE * m.rated_speed_rpm) * TRIM_WEAK_FLUX
+    trim = limits.digits_down(max(TRIM_SHARE * maximum, min(max(-full, -half), -useful)), 2)
+    d.put("FW_TRIM_CURRENT_A", real(trim), f"{TRIM_SHARE:.0%} of the largest current, or what rated torque needs at {TRIM_SPEED_SHARE:.0%} of rated speed "
+          f"({abs(full):.2f} A) or half of it at rated speed ({abs(half):.2f} A), as far as the largest current allows; "
+          f"no more than {abs(useful):.2f} A, beyond which d current asks for more voltage than it saves with {1.0 - TRIM_WEAK_FLUX:.0%} less flux")
 
 
 def _fit_emf(motor: Motor, board: BoardFile, wanted: limits.Currents) -> limits.Currents:
@@ -328,7 +333,7 @@ def _spread(motor: Motor) -> dict[str, tuple[float, float]]:
 def _loops_and_start(d: Design) -> None:
     m, period = d.motor, d.board.pwm_period_s
     plant = loops.Plant(m.rs_ohm, m.ld_h, m.lq_h, m.psi_vs, m.pole_pairs, m.inertia_kgm2 + m.load_inertia_kgm2, m.viscous_nms)
-    base = loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, d.value("KFILTER_ESDQ") / 32768.0, d.value("KFILTER_VELESTIM") / 32768.0, period)
+    base = loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, d.value("KFILTER_ESDQ") / 32768.0, period)
     low, high = _range("CURRENT_BANDWIDTH_HZ")
     largest = min(high, 0.98 / d.scales.pterm_per_hz, 15.7 / d.scales.iterm_per_hz)
     d.current_loop = loops.design_current(plant, _spread(m), base, d.envelope.omega(d.value("MAXIMUM_SPEED_RPM")), largest, low,
@@ -345,15 +350,22 @@ def _loops_and_start(d: Design) -> None:
     _refuse_inertia(d, d.scales.speed_pterm_per_hz)
     gains = loops.current_gains(plant, bandwidth, base)
     _start(d, plant, gains)
-    speeds = {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
-    low, high = _range("SPEED_BANDWIDTH_HZ")
-    calm = limits.digits_down(loops.SPEED_CAP * d.value("MINIMUM_SPEED_RPM") * m.pole_pairs / 60.0, 3)
-    d.loaded_hz = limits.digits_down(loops.least_speed_bandwidth(m.rated_torque_nm, plant.inertia, d.value("MINIMUM_SPEED_RPM") * RPM), 3)
-    d.speed_loop = loops.design_speed(plant, _spread(m), gains, {label: d.envelope.omega(d.value(name)) for label, name in speeds.items()},
-                                      max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz, max(calm, d.loaded_hz))), low, m.tune.get("SPEED_BANDWIDTH_HZ"))
-    d.put("SPEED_BANDWIDTH_HZ", plain(d.speed_loop.bandwidth_hz), f"the largest with {loops.PHASE_MARGIN_DEG:.0f} degrees of phase margin over the "
-          f"parameter set from the minimum to the maximum speed, at most {loops.SPEED_CAP:g} of the electrical frequency at minimum speed ({calm:g} Hz: "
-          f"above, the dead time may make an unloaded motor hunt) or what loads ask for ({d.loaded_hz:g} Hz)")
+    _speed_loop(d, plant, gains)
+
+
+def _speed_loop(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
+    m, names = d.motor, {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
+    speeds = {label: d.envelope.omega(d.value(name)) for label, name in names.items()}
+    (low, high), (least_load, most_load) = _range("SPEED_BANDWIDTH_HZ"), _range("LOAD_BANDWIDTH_HZ")
+    quickest = loops.load_bandwidth(gains, constants.filter_hz(d.value("KFILTER_ESDQ"), gains.period_s), d.value("CURRENT_BANDWIDTH_HZ"))
+    loop = loops.design_speed(plant, _spread(m), gains, speeds, max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz)),
+                              max(least_load, min(most_load, limits.digits_down(quickest, 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"))
+    d.speed_loop, d.calm_hz = loop, loops.calm_bandwidth(loop.load_hz, min(speeds.values()))
+    asked = ", ".join(f"{degrees:.0f} degrees {mode}" for mode, (degrees, _) in loops.SPEED_MARGINS.items())
+    d.put("LOAD_BANDWIDTH_HZ", plain(loop.load_hz), f"as quick as back-EMF filter, current loop and slow step let it be ({quickest:.0f} Hz), lowered until the "
+          f"speed loop has its phase margins from the minimum to the maximum speed ({asked})")
+    d.put("SPEED_BANDWIDTH_HZ", plain(loop.bandwidth_hz), f"{loops.SPEED_CAP:g} of the electrical frequency from which it is in full ({d.calm_hz:.3g} Hz: above, the "
+          "dead time may make an unloaded motor hunt), or what the gain's format holds")
 
 
 def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:
@@ -376,7 +388,8 @@ def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
           f"pull-out torque {s.pull_out_nm:.3g} N m for {s.needed_nm:.3g} N m")
     d.put("END_SPEED_RPM", plain(s.end_speed_rpm), f"back-EMF {s.emf_v:.2f} V: its error, {s.error_v:.2f} V (R {start.R_ERROR:.0%} wrong, "
           f"{start.DEAD_TIME_ERROR:.0%} of the dead time, one converter step), turns the angle by 20 degrees")
-    d.put("MINIMUM_SPEED_RPM", plain(s.minimum_speed_rpm), "20 % of rated speed, at most END_SPEED_RPM")
+    d.put("MINIMUM_SPEED_RPM", plain(s.minimum_speed_rpm), f"the rotor is held from {s.lowest_speed_rpm:.0f} rpm: back-EMF "
+          f"{start.LOWEST_SHARE:g} of the dead-time voltage")
     d.put("LOCK_TIME", str(2 * round(s.lock_s / d.board.pwm_period_s / 2.0)), f"{start.LOCK_SWINGS:.0f} swings of the locked rotor "
           f"({s.natural_hz:.0f} Hz, damping {s.damping:.3f}), at least {start.LEAST_LOCK_S:g} s")
     d.put("OPENLOOP_RAMPSPEED_INCREASERATE", str(s.rate), f"{s.ramp_s:.1f} s to END_SPEED_RPM; J dw/dt at most {start.RAMP_TORQUE_SHARE:.0%} of the pull-out torque")
@@ -465,10 +478,6 @@ def _warn_numbers(d: Design) -> None:
     if ramp.error_percent > 30.0:
         d.warnings.append(f"SPEEDREFRAMP_RPM_PER_S = {d.choices['SPEEDREFRAMP_RPM_PER_S'].text} becomes {ramp.value * (1 + ramp.error_percent / 100):.0f} rpm/s: one "
                           "electrical rpm in 8 periods is the slowest; turn the potentiometer slowly with this inertia")
-    integral = d.constant("pi_speed.ki")
-    if abs(integral.error_percent) > 10.0:
-        d.warnings.append(f"the speed controller's integral is rounded by {integral.error_percent:+.0f} % (pi_speed.ki = {integral.q_value}): the zero moves; "
-                          "a smaller current range gives it more counts")
 
 
 def _warn_loops(d: Design) -> None:
@@ -481,22 +490,23 @@ def _margin_warnings(d: Design) -> list[str]:
     found = []
     for what, loop, name in (("current", d.current_loop, "CURRENT_BANDWIDTH_HZ"), ("speed", d.speed_loop, "SPEED_BANDWIDTH_HZ")):
         if loop and not loop.reached:
+            name, value = ("LOAD_BANDWIDTH_HZ", loop.load_hz) if what == "speed" and "LOAD_BANDWIDTH_HZ" in d.motor.tune else (name, loop.bandwidth_hz)
             left = f"has {loop.worst.phase_deg:.0f} degrees and {loop.worst.gain_db:.0f} dB of margin" if loop.worst.stable else "is unstable"
-            found.append(f"{name} = {loop.bandwidth_hz:g}: the {what} loop {left} at worst ({loop.worst_case}), {loops.PHASE_MARGIN_DEG:.0f} degrees and "
-                         f"{loops.GAIN_MARGIN_DB:.0f} dB are asked for; "
+            found.append(f"{name} = {value:g}: the {what} loop {left} at worst ({loop.worst_case}), {loop.worst.asked_deg:.0f} degrees and "
+                         f"{loop.worst.asked_db:.0f} dB are asked for; "
                          + ("remove it from [tune]" if name in d.motor.tune else "a lower maximum_speed or a shorter PWM period helps" if what == "current"
                             else "a smaller load inertia helps"))
     return found
 
 
 def _slow_loop_warnings(d: Design) -> list[str]:
-    if not d.speed_loop or not d.speed_loop.reached or d.speed_loop.bandwidth_hz >= 0.8 * d.loaded_hz:
+    if not d.speed_loop or not d.speed_loop.reached or d.speed_loop.bandwidth_hz >= 0.5 * d.calm_hz:
         return []
-    kind, remedy = (" for so quick a rotor", "add inertia") if _rise_s(d.motor) < HEAVY_S else (" with so much inertia", "lower the load's inertia")
+    kind, remedy = " with so much inertia", "lower the load's inertia, or use a board with a larger current range"
     if "SPEED_BANDWIDTH_HZ" in d.motor.tune:
         kind, remedy = "", "remove SPEED_BANDWIDTH_HZ from [tune]"
-    return [f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow{kind} ({d.loaded_hz:.2g} Hz would hold half the rated torque put on in half a "
-            f"second at minimum speed): put loads on slowly, or at a higher speed, or {remedy}"]
+    return [f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow{kind} ({d.calm_hz:.2g} Hz would be calm): after a load step the speed comes back in "
+            f"{1.0 / d.speed_loop.bandwidth_hz:.2g} s; {remedy}"]
 
 
 def _start_warnings(d: Design) -> list[str]:

@@ -13,6 +13,7 @@ from tools.common.param_rows import Parameter, modes, parameters
 from .constants import Constant, filter_hz
 from .design import Design
 from .fw_tables import STEP_ERPM
+from .loops import Margins
 
 INVKFI_FLAT = """/* 1/Kphi of each entry, in AN1292's counts. The back-EMF keeps its size above base speed here (it has the range), so a
  * constant Kphi is the right start; AN1292's rising table made up for a clipped one. More turns the control angle ahead. */"""
@@ -85,10 +86,18 @@ def _facts(design: Design) -> dict[str, str]:
                   "Q_CURRENT_REF_OPENLOOP": f": pull-out torque {s.pull_out_nm:.3g} N m"}
     for name, loop in (("CURRENT_BANDWIDTH_HZ", d.current_loop), ("SPEED_BANDWIDTH_HZ", d.speed_loop)):
         if loop:
-            nominal = f"phase margin {math.floor(loop.nominal.phase_deg)} degrees" if loop.nominal.stable else "unstable"
-            worst = f"{math.floor(loop.worst.phase_deg)}" if loop.worst.stable else "unstable"
-            facts[name] = f": {nominal}, {worst} over the parameter set"
+            least = loop.at_rates.get("quiet", (loop.worst, ""))[0]
+            facts[name] = f": {_degrees(loop.nominal)}, {_degrees(least, False)} over the parameter set"
+    if d.speed_loop:
+        loaded, quick = (d.speed_loop.at_rates[mode][0] for mode in ("loaded", "quick"))
+        facts["LOAD_BANDWIDTH_HZ"] = f": {_degrees(quick)} after a load step, {_degrees(loaded, False)} under load"
     return facts
+
+
+def _degrees(margins: Margins, named: bool = True) -> str:
+    if not margins.stable:
+        return "unstable"
+    return f"phase margin {math.floor(margins.phase_deg)} degrees" if named else f"{math.floor(margins.phase_deg)}"
 
 
 def _left(name: str, design: Design) -> str:

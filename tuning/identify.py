@@ -55,11 +55,12 @@ def header(known: Known, board: BoardFile) -> str:
             "BUS_FULL_SCALE_V": board.bus_full_scale_v, "SAMPLE_WINDOW_SEC": board.sample_window_s, "OVER_VOLTAGE_V": board.over_voltage_v,
             "UNDER_VOLTAGE_V": board.under_voltage_v, "REGEN_LIMIT_V": board.regen_limit_v},
         "Without meaning here": {
-            "MOTOR_RS_OHM": idle_ohm, "MOTOR_LS_MH": idle_ohm, "MOTOR_KPHI_V_PER_KRPM": 1.5 * known.pole_pairs, "MOTOR_INERTIA_KGM2": 1e-5,
-            "MINIMUM_SPEED_RPM": max(50.0, 0.5 * known.speed_rpm), "NOMINAL_SPEED_RPM": max(100.0, known.speed_rpm * 1.1),
+            "MOTOR_RS_OHM": idle_ohm, "MOTOR_LS_MH": idle_ohm, "MOTOR_KPHI_V_PER_KRPM": min(0.2 * known.pole_pairs * board.nominal_bus_v, 200.0),
+            "MOTOR_INERTIA_KGM2": 1e-5 * known.pole_pairs ** 2, "MINIMUM_SPEED_RPM": max(50.0, known.speed_rpm),
+            "NOMINAL_SPEED_RPM": max(100.0, known.speed_rpm * 1.1),
             "MAXIMUM_SPEED_RPM": max(120.0, top_rpm), "FW_START_SPEED_RPM": max(100.0, known.speed_rpm), "SPEEDREFRAMP_RPM_PER_S": 1000,
-            "LOCK_TIME": 4000, "CURRENT_BANDWIDTH_HZ": 200, "SPEED_BANDWIDTH_HZ": 10, "SPEEDCNTR_PTERM": 0.1,
-            "SPEEDCNTR_ITERM": 0.001, "KFILTER_ESDQ": 1200, "KFILTER_ESDQ_FW": 1200, "KFILTER_VELESTIM": 748, "FW_TRIM_CURRENT_A": 0,
+            "LOCK_TIME": 4000, "CURRENT_BANDWIDTH_HZ": 200, "SPEED_BANDWIDTH_HZ": 1, "LOAD_BANDWIDTH_HZ": 10,
+            "SPEEDCNTR_PTERM": 0.1, "KFILTER_ESDQ": 1200, "KFILTER_ESDQ_FW": 1200, "KFILTER_VELESTIM": 748, "FW_TRIM_CURRENT_A": 0,
             **{name: 0 if row.stem == "IDREF_SPEED" else row.default for name, row in parameters().items()
                if row.stem == "IDREF_SPEED" or row.default not in FOLLOWS}}}
     lines = ["/* Parameters for a motor of which nobody knows R, L and Kphi: build with IDENTIFY. */", "#ifndef USERPARAMS_H", "#define USERPARAMS_H"]

@@ -111,6 +111,18 @@ class Envelope:
             return None
         return halved(lambda i_d: self.voltage(rpm, i_d, i_q) <= limit, deepest, 0.0, 50)
 
+    def id_for(self, rpm: float, load_nm: float) -> float:
+        """The d current that a load needs; where none is enough, the one with the least voltage that the current limit allows."""
+        least = self.least_id(rpm, load_nm, FULL_SHARE)
+        if least is not None:
+            return least
+        return max(self.deepest_id(self.iq(rpm, load_nm)), self.least_voltage_id(rpm))
+
+    def least_voltage_id(self, rpm: float) -> float:
+        """The d current of the smallest voltage, d|V|^2/di_d = 0, whatever the q current (but for Lq - Ld)."""
+        x = self.omega(rpm) * self.motor.ld_h
+        return -self.motor.psi_vs / self.motor.ld_h * x * x / (self.motor.rs_ohm ** 2 + x * x)
+
     def base_speed(self, load_nm: float) -> float:
         """Speed at which the motor without d current needs the whole circle."""
         return self._highest(lambda rpm: self.voltage(rpm, 0.0, self.iq(rpm, load_nm)) <= self.circle_v)

@@ -42,8 +42,10 @@ static void motor(void)
     MACRO(NORM_LSDTBASE, ls, "mH", ls / at_most(ls / one_ls * 128.0, 32767.0), "Q15 / 256", "Equation 5, AN1292's constant, at most 32767");
     MACRO(NORM_INVKFIBASE, kphi, "V/krpm", kphi * kphi / (sqrt(3.0) * 1000.0 * pairs * volt * 16384.0), "Q15 / 2, 1/Kphi", "Equation 6");
     MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
-    FIELD(estimator.rs_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
+    FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
     FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
+    FIELD(estimator.resistive_max, 2.0 / sqrt(3.0) * OVER_CURRENT_THRESHOLD_A * rs, "V", 4.0 * volt * (1 << p.estimator.rs_exp), "Q13 V",
+          "largest R i, at the trip level");
     FIELD(fieldweak.ls_base_q16, ls, "mH", one_ls / 4096.0 * (1 << p.estimator.ls_exp), q16_divided[p.estimator.ls_exp],
           "L of the estimator, eight samples");
     FIELD(estimator.ls_exp, 1 << p.estimator.ls_exp, "1", 0.0, "count", "the product is shifted left by it");
@@ -91,10 +93,44 @@ static void controllers(void)
     FIELD(pi.kc, AXIS##_CURRCNTR_CTERM, "1", 1.0 / 32768.0, "Q15", "anti-windup")
     CURRENT_LOOP(pi_d, D);
     CURRENT_LOOP(pi_q, Q);
-    FIELD(pi_speed.kp, SPEEDCNTR_PTERM * 16.0 * ampere * pairs, "A/rpm", q15_16 * ampere * pairs, "Q15 / 16", "proportional gain");
-    FIELD(pi_speed.ki, SPEEDCNTR_ITERM * ampere * pairs / period, "A/(rpm s)", ampere * pairs / period / 16384.0, "Q14 in 8 periods",
-          "integral gain");
-    FIELD(pi_speed.kc, SPEEDCNTR_CTERM, "1", 1.0 / 32768.0, "Q15", "anti-windup");
+    FIELD(speed_kp_q13, SPEEDCNTR_PTERM * 16.0 * ampere * pairs, "A/rpm", q15_16 * ampere * pairs, "Q15 / 16", "proportional gain");
+    FIELD(speed_kp_quick_q13, at_most(SPEEDCNTR_PTERM * PARAM_QUICK_GAIN, 32767.0 / 32768.0) * 16.0 * ampere * pairs, "A/rpm",
+          q15_16 * ampere * pairs, "Q15 / 16", "after a large innovation");
+}
+
+static void observer(void)
+{
+    double unit = 1.0 / (1 << p.observer.shift), lost = PARAM_LOST_CURRENT_Q13;
+    double rate = 1.0 / (2.0 * PI * slots * 65536.0), learns = 1.0 / (slots * 65536.0);
+    GROUP("load observer, adaptation and low speed");
+    FIELD(observer.deltat_q32, period, "s", 60.0 / 4294967296.0, "Q32 of a turn/erpm", "angle a period");
+    FIELD(observer.per_turn_q12, 65536.0 / 4294967296.0 * 60.0 / slots / pairs, "rpm", erpm / 4096.0, "Q12 erpm", "2^16 counts of the angle in a step");
+    FIELD(observer.shift, p.observer.shift, "1", 0.0, "count", "2^this of its units of acceleration are an erpm a step");
+    FIELD(observer.per_current_q16, PARAM_ACCEL * erpm / slots / q13_a, "rpm/s/A", unit * erpm / slots / q13_a / 65536.0, "Q16 unit/Q13 A", "Kt/J");
+    FIELD(observer.per_unit_q15, 1.0 / (PARAM_ACCEL * erpm / slots / q13_a), "A s/rpm", slots * q13_a / (unit * erpm) / 32768.0, "Q15 Q13 A/unit",
+          "J/Kt");
+    FIELD(observer.innovation_max, p.observer.innovation_max * erpm, "rpm", 0.0, "erpm", "innovation counts up to here");
+    FIELD(observer.load_max, p.observer.load_max / PARAM_ACCEL_UNITS * q13_a, "A", 0.0, "units", "largest load");
+    FIELD(observer.quiet_q16, PARAM_MIN(PARAM_QUIET_RATIO * SPEED_BANDWIDTH_HZ, PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ), "Hz", rate, "Q16 a step",
+          "rate without load");
+    FIELD(observer.loaded_q16, PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate under load");
+    FIELD(observer.quick_q16, LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate after a large innovation");
+    FIELD(observer.full_erpm, 60.0 / PARAM_FULL_RATIO * LOAD_BANDWIDTH_HZ / pairs, "rpm", erpm, "erpm", "speed reference from which rates and gain are these");
+    FIELD(observer.load_from, 8.0 * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "load that begins to count");
+    FIELD(observer.load_width, 8.0 * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "over what more it counts");
+    FIELD(observer.load_slope_q15, 1.0 / (8.0 * lost * q13_a), "1/A", PARAM_ACCEL_UNITS / q13_a / 32767.0, "Q15 a unit", "one over it");
+    FIELD(observer.large_erpm, PARAM_LARGE_ERPM * erpm, "rpm", erpm, "erpm", "large innovation without load");
+    FIELD(observer.large_loaded_erpm, PARAM_LARGE_LOADED_ERPM * erpm, "rpm", erpm, "erpm", "and under load");
+    FIELD(adaptation.rate_q16, 6.0, "1/s", learns, "Q16 a step", "flux and R follow");
+    FIELD(adaptation.kfi_least, -0.30, "1", 1.0 / 32768.0, "Q15", "least change of 1/Kphi");
+    FIELD(adaptation.kfi_most, 0.35, "1", 1.0 / 32768.0, "Q15", "largest");
+    FIELD(adaptation.rs_least, -0.4, "1", 1.0 / 32768.0, "Q15", "least change of R");
+    FIELD(adaptation.rs_most, 0.6, "1", 1.0 / 32768.0, "Q15", "largest");
+    FIELD(adaptation.emf_least_q12, 0.2 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "back-EMF from which it learns");
+    FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a * pairs / 65536.0, "Q16 Q13 A/erpm",
+          "q current that the sample misses");
+    FIELD(fieldweak.esdq_per_erpm_q13, PARAM_ESDQ_RATIO / 60.0 * pairs, "Hz/rpm", 1.0 / (2.0 * PI * period * 65536.0 * 8192.0) * pairs, "Q13 of Q16",
+          "corner of the back-EMF filter at low speed");
 }
 
 static void start(void)
@@ -136,7 +172,7 @@ static void modulator(void)
     FIELD(svm.top, 100.0 * top, "%", 0.0, "duty", "highest duty: sampling window");
     FIELD(svm.dead_time, DEADTIME_SEC * 1e6, "us", 0.025, "25 ns", "dead-time compensation");
     FIELD(svm.knee_q13, p.svm.knee_q13 * q13_a, "A", 0.0, "Q13 A", "current from which it is full");
-    FIELD(svm.dead_slope_q16, (double)p.svm.dead_time / p.svm.knee_q13, "1", 0.0, "Q16", "duty per current");
+    FIELD(svm.dead_slope_q8, (double)p.svm.dead_time / p.svm.knee_q13, "1", 1.0 / 256.0, "Q8", "duty per current");
     FIELD(svm.turn_q13, PARAM_DI(MAXIMUM_SPEED_RPM) * 2.0 * ampere, "A", 0.0, "Q13 A", "most that a current turns in a period");
     FIELD(voltage_limit_per_bus_q16, top / sqrt(3.0), "V/V", 2.0 * volt / BUS_FULL_SCALE_V, "Q14 V per Q16 bus", "voltage circle");
     FIELD(duty_per_volt_numerator, BUS_FULL_SCALE_V, "V", BUS_FULL_SCALE_V / (p.svm.full * 4.0 * volt / BUS_FULL_SCALE_V * 4294967296.0), "Q32",
@@ -149,7 +185,6 @@ static void field_weakening(void)
 {
     double kphi = MOTOR_KPHI_V_PER_KRPM * PARAM_INVKFI;
     GROUP("field weakening");
-    FIELD(fieldweak.margin_q14, NOMINAL_BUS_V * 0.01, "V", 2.0 * volt, "Q14 V", "voltage kept free before the feedback acts");
     FIELD(fieldweak.trim_speed_erpm, FW_START_SPEED_RPM * 0.6, "rpm", erpm, "erpm", "speed from which it acts");
 #define ENTRY(i) \
     FIELD(fieldweak.idref_q13[i], IDREF_SPEED##i, "A", q13_a, "Q13 A", "d current"); \
@@ -173,6 +208,7 @@ int main(void)
     estimator();
     speeds();
     controllers();
+    observer();
     start();
     limits();
     modulator();

@@ -14,7 +14,7 @@ from tools.common.param_rows import ENTRIES # noqa: E402
 from . import limits # noqa: E402
 from .design import Design # noqa: E402
 from .fw_tables import STEP_ERPM # noqa: E402
-from .loops import PHASE_MARGIN_DEG, Curve, LoopDesign # noqa: E402
+from .loops import Curve, LoopDesign # noqa: E402
 
 STYLE = {"axes.grid": True, "grid.alpha": 0.3, "lines.linewidth": 1.2, "legend.fontsize": 8, "axes.titlesize": 10, "font.size": 9,
          "svg.fonttype": "path", "svg.hashsalt": "foc33", "path.simplify_threshold": 0.5}
@@ -43,8 +43,9 @@ def _bode(loop: LoopDesign | None, title: str) -> str:
     size.axhline(0.0, color="black", linewidth=0.8)
     size.set(title=f"{title}, {loop.bandwidth_hz if loop else 0:g} Hz: open loop", ylabel="gain [dB]", ylim=(-50, 50))
     phase.axhline(-180.0, color="black", linewidth=0.8)
-    phase.axhline(PHASE_MARGIN_DEG - 180.0, color="black", linewidth=0.8, linestyle=":")
-    phase.annotate(f"{PHASE_MARGIN_DEG:.0f}° margin", (0.01, PHASE_MARGIN_DEG - 178.0), xycoords=("axes fraction", "data"), fontsize=8)
+    asked = loop.worst.asked_deg if loop else 0.0
+    phase.axhline(asked - 180.0, color="black", linewidth=0.8, linestyle=":")
+    phase.annotate(f"{asked:.0f}° margin", (0.01, asked - 178.0), xycoords=("axes fraction", "data"), fontsize=8)
     phase.set(xlabel="frequency [Hz]", ylabel="phase [°]", ylim=(-270, 0), yticks=range(-270, 1, 30))
     size.legend()
     return _text(figure)

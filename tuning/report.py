@@ -12,7 +12,7 @@ from tools.common import output, paths, units
 from . import header
 from .constants import Constant
 from .design import Design
-from .loops import GAIN_MARGIN_DB, PHASE_MARGIN_DEG, LoopDesign
+from .loops import LoopDesign
 from .start import CALM_SHARE
 
 HEADER = "userparams.h"
@@ -31,7 +31,7 @@ def text(design: Design) -> str:
             ("Kphi", units.kphi_forms(m.kphi_v_per_krpm, m.pole_pairs)),
             ("rated", f"{m.rated_torque_nm:.3g} N m at {m.rated_speed_rpm:g} rpm and {m.rated_current_a:.3g} A peak ({d.board.title})"),
             ("speeds", f"{value('MINIMUM_SPEED_RPM'):g} .. {value('NOMINAL_SPEED_RPM'):g} rpm, up to {value('MAXIMUM_SPEED_RPM'):g} rpm with S3"),
-            ("current loop", _margin_text(d.current_loop)), ("speed loop", _margin_text(d.speed_loop))]
+            ("current loop", _margin_text(d.current_loop)), ("speed loop", _margin_text(d.speed_loop) + (f"; load observer {d.speed_loop.load_hz:g} Hz" if d.speed_loop else ""))]
     if s:
         rows += [("start", f"{s.current_a:g} A, lock {value('LOCK_TIME') * d.board.pwm_period_s:.2g} s, {s.acceleration_rpm_s:.0f} rpm/s to {s.end_speed_rpm:g} rpm; "
                            f"pull-out torque {s.pull_out_nm:.3g} N m, needed {s.needed_nm:.3g} N m")]
@@ -104,7 +104,8 @@ def data(design: Design) -> dict[str, Any]:
     loop = {}
     for name, item in (("current", d.current_loop), ("speed", d.speed_loop)):
         if item:
-            loop[name] = {"bandwidth_hz": item.bandwidth_hz, "nominal": _margins(item.nominal), "worst": _margins(item.worst), "worst_case": item.worst_case}
+            loop[name] = {"bandwidth_hz": item.bandwidth_hz, "nominal": _margins(item.nominal), "worst": _margins(item.worst), "worst_case": item.worst_case,
+                          "rates": {rate: _margins(worst) for rate, (worst, _) in item.at_rates.items()}}
     s = d.start_up
     return {"title": d.motor.title, "motor": str(paths.shown(d.motor.path)), "board": str(paths.shown(d.board.path)), "params": d.params,
             "why": {name: choice.why for name, choice in d.choices.items()}, "loops": loop, "warnings": d.warnings, "tables_from": d.tables_from,
@@ -140,9 +141,10 @@ def _page(design: Design, plots: dict[str, str]) -> str:
               "<h2>Current loop</h2>", _loop_text(d.current_loop, "Kp = 2&pi;f L, Ki = 2&pi;f R; the controller's zero cancels the winding's pole. A vector "
                                                   "acts from half a period after its sample for one period. Dashed: negative frequencies, which differ when the rotor turns."),
               plots["current_loop"],
-              "<h2>Speed loop</h2>", _loop_text(d.speed_loop, "Kp = 2&pi;f J/Kt, zero at f/3. In the loop: hold over 8 periods, closed current loop, inertia, back-EMF filter with "
-                                                "the estimator's own feedback (it is as fast as the motor turns), speed filter, computing. R and L that the "
-                                                "estimator has wrong reach the speed through the q current: that is the worst case."),
+              "<h2>Speed loop</h2>", _loop_text(d.speed_loop, "Kp = 2&pi;f J/Kt on the observed speed, and the observed load, at each rate of the load observer: quiet, loaded, quick after a load "
+                                                "step. In the loop, opened at the estimated speed: hold over 8 periods, closed current loop, inertia, back-EMF filter with "
+                                                "the estimator's own feedback (it is as fast as the motor turns), computing. R and L that the estimator has wrong reach "
+                                                "the speed through the q current: that is the worst case."),
               plots["speed_loop"], "<h2>Start</h2>", _start_text(d), plots["start"],
               "<h2>Parameters</h2>", _table(("parameter", "value", "why"), ((f"<code>{c.name}</code>", c.text, html.escape(c.why)) for c in d.choices.values()
                                                                           if not _is_later_entry(c.name)), numbers=(1,)),
@@ -166,10 +168,11 @@ def _loop_text(loop: LoopDesign | None, how: str) -> str:
     if loop is None:
         return ""
     verdict = "" if loop.reached else ' class="bad"'
-    rows = [("nominal", loop.nominal, ""), ("worst of the parameter set", loop.worst, loop.worst_case)]
+    rows = [("nominal", loop.nominal, ""), *((f"worst, {rate}", *found) for rate, found in loop.at_rates.items())]
+    rows += [] if loop.at_rates else [("worst of the parameter set", loop.worst, loop.worst_case)]
     table = _table(("case", "phase margin", "gain margin", "crossover", ""),
                    ((name, f"{x.phase_deg:.1f}&deg;" if x.stable else "unstable", f"{x.gain_db:.1f} dB" if x.stable else "&ndash;", f"{x.crossover_hz:.4g} Hz", html.escape(case)) for name, x, case in rows), numbers=(1, 2, 3))
-    return (f"<p>{how}</p><p{verdict}>Bandwidth {loop.bandwidth_hz:g} Hz; asked for are {PHASE_MARGIN_DEG:.0f}&deg; and {GAIN_MARGIN_DB:.0f} dB over the parameter set "
+    return (f"<p>{how}</p><p{verdict}>Bandwidth {loop.bandwidth_hz:g} Hz; asked for are {loop.worst.asked_deg:.0f}&deg; and {loop.worst.asked_db:.0f} dB in the worst case of the parameter set "
             f"(R &minus;10 .. +30 %, L &plusmn;20 %, flux &plusmn;10 %, and the published spread if that is wider).</p>{table}")
 
 

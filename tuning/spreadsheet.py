@@ -98,11 +98,10 @@ CONSTANTS = {
     "Currents": tuple((field, f"{name}/NORM_CURRENT_CONST/4", "Q13 A", meaning) for field, name, meaning in (
         ("open_loop_q13", "Q_CURRENT_REF_OPENLOOP", "current of lock and ramp"), ("current_max_q13", "MAXIMUM_CURRENT_A", "largest current vector"),
         ("overcurrent_q13", "OVER_CURRENT_THRESHOLD_A", "phase current that trips"))),
-    "Controllers: Kp = 2 pi f L, Ki = 2 pi f R; speed Kp = 2 pi f J/Kt, its zero at f/3": (
+    "Controllers: Kp = 2 pi f L, Ki = 2 pi f R; speed Kp = 2 pi f J/Kt": (
         ("pi_d.kp", f"{_pterm('D')}*32768", "Q15 / 16", "D_CURRCNTR_PTERM"), ("pi_q.kp", f"{_pterm('Q')}*32768", "Q15 / 16", "Q_CURRCNTR_PTERM"),
         ("pi_d.ki", f"{ITERM}*2048", "Q11 a period", "D_CURRCNTR_ITERM"), ("pi_q.ki", f"{ITERM}*2048", "Q11 a period", "Q_CURRCNTR_ITERM"),
-        ("pi_speed.kp", f"{SPEED_PTERM}*32768", "Q15 / 16", "SPEEDCNTR_PTERM"),
-        ("pi_speed.ki", f"{SPEED_PTERM}*32/3*PI()*SPEED_BANDWIDTH_HZ*LOOPTIME_SEC*16384", "Q14 in 8 periods", "SPEEDCNTR_ITERM"))}
+        ("speed_kp_q13", f"{SPEED_PTERM}*32768", "Q15 / 16", "SPEEDCNTR_PTERM"))}
 """The firmware's: name as in make tune's table, formula, format, meaning."""
 
 READ_ME = (

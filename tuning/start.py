@@ -10,6 +10,7 @@ import numpy as np
 
 from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
+from tools.common.param_rows import number
 
 from .limits import RPM, digits_down
 from .loops import Gains, Plant, current_loop
@@ -35,9 +36,10 @@ LOCK_SWINGS = 8.0
 """The lock lasts so many periods of the rotor's swing at least."""
 LARGEST_RATE = 2000
 SAMPLE_AFTER_MEAN_S = 1.5e-6
-"""BOARD_SAMPLE_DELAY_CLOCKS of include/board/mclv.h: between the two the back-EMF takes E t/L off the current, which the loop then adds."""
+"""SAMPLE_DELAY_CLOCKS of include/drive/param_scaling.h: between the two the back-EMF takes E t/L off the current, which the loop then adds."""
 CALM_SHARE = 0.03
 """Share of the hand-over speed by which the rotor may still swing about it without a longer lock: the hand-over overshoots by several times that."""
+LOWEST_SHARE = number("PARAM_LOWEST_SHARE")
 LOUD_SHARE = 0.1
 """Share beyond which starts fail from some angles."""
 
@@ -48,6 +50,8 @@ class StartDesign:
 
     current_a: float
     end_speed_rpm: float
+    lowest_speed_rpm: float
+    """at which this motor can be held"""
     minimum_speed_rpm: float
     lock_s: float
     rate: int
@@ -115,9 +119,14 @@ def end_speed(motor: Motor, board: BoardFile, current_a: float, nominal_rpm: flo
     return min(max(math.ceil(wanted / step - 1e-9) * step, 50.0), digits_down(0.5 * nominal_rpm, 2), 5000.0)
 
 
-def minimum_speed(motor: Motor, end_rpm: float) -> float:
-    """A fifth of rated speed, and not above the hand-over speed: below it the speed loop would have to be slower still (loops.SPEED_CAP)."""
-    return max(digits_down(min(end_rpm, 0.2 * motor.rated_speed_rpm), 2), 50.0)
+def lowest_speed(motor: Motor, board: BoardFile) -> float:
+    """Back-EMF LOWEST_SHARE of the dead-time voltage: below, what compensation leaves takes the estimator's lock from a rotor under load."""
+    return LOWEST_SHARE * board.nominal_bus_v * board.dead_time_s / board.pwm_period_s / emf_v(motor, 1.0)
+
+
+def minimum_speed(motor: Motor, board: BoardFile) -> float:
+    """The lowest speed, rounded up to 10 rpm."""
+    return max(math.ceil(lowest_speed(motor, board) / 10.0 - 1e-3) * 10.0, 50.0)
 
 
 def natural_rad_s(motor: Motor, current_a: float, inertia: float) -> float:
@@ -201,7 +210,7 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
     first = needed_torque(motor, 0.3 * nominal_rpm)
     current = fixed.get("Q_CURRENT_REF_OPENLOOP") or start_current(motor, maximum_a, trip_a, first)
     end = fixed.get("END_SPEED_RPM") or end_speed(motor, board, current, nominal_rpm)
-    minimum = fixed.get("MINIMUM_SPEED_RPM") or minimum_speed(motor, end)
+    minimum = fixed.get("MINIMUM_SPEED_RPM") or minimum_speed(motor, board)
     rate = int(fixed.get("OPENLOOP_RAMPSPEED_INCREASERATE", 0)) or ramp_rate(motor, board, current, end, inertia)
     omega = natural_rad_s(motor, current, inertia)
     damping = damping_nms(motor, plant, gains, omega)
@@ -221,6 +230,6 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
         else:
             break
     needed = needed_torque(motor, end) + inertia * acceleration * RPM
-    return StartDesign(current, end, minimum, lock, rate, acceleration, end / acceleration, motor.kt_nm_per_a * current, needed,
+    return StartDesign(current, end, lowest_speed(motor, board), minimum, lock, rate, acceleration, end / acceleration, motor.kt_nm_per_a * current, needed,
                        omega / (2.0 * math.pi), damping / (2.0 * inertia * omega), emf_error_v(motor, board, current), emf_v(motor, end),
                        follows, trial)

@@ -6,6 +6,8 @@ tMotorEstimParm MotorEstimParm;
 tEstimParm EstimParm;
 tParkParm ParkParm;
 tCtrlParm CtrlParm;
+tLoadParm LoadParm;
+tAdaptParm AdaptParm;
 
 /** x * 2^bits, limited to 16 bits. */
 static int16_t watch_scaled(int16_t x, uint16_t bits)
@@ -24,7 +26,7 @@ void watch_refresh(void)
     FdWeakParm.qIndex = (int16_t)run->fieldweak.index;
     FdWeakParm.qIdRef = watch_scaled(run->control.ref_q13.d, 2);
     FdWeakParm.qFwOnSpeed = board_params.fieldweak.on_speed_erpm;
-    MotorEstimParm.qRs = (motor->rs_exp == 0u) ? (int16_t)(motor->rs_q16 >> 1) : INT16_MAX; /* the exponent begins where NORM_RS ends */
+    MotorEstimParm.qRs = (motor->rs_exp == 0u) ? (int16_t)(run->model.rs_q16 >> 1) : INT16_MAX; /* the exponent begins where NORM_RS ends */
     MotorEstimParm.qLsDt = (int16_t)qm_mulhi_uu(run->model.ls_q16, (uint16_t)(2048u << motor->ls_exp));
     MotorEstimParm.qInvKFi = run->model.inv_kfi;
     MotorEstimParm.qDeltaT = (int16_t)((motor->deltat_q32 + 1) >> 1);
@@ -33,8 +35,8 @@ void watch_refresh(void)
     EstimParm.qOmegaMr = run->estimator.omega_erpm;
     EstimParm.qEsdf = watch_scaled(emf.d, 1);
     EstimParm.qEsqf = watch_scaled(emf.q, 1);
-    ParkParm.qIa = watch_scaled(d->i_a_q13, 2);
-    ParkParm.qIb = watch_scaled(d->i_b_q13, 2);
+    ParkParm.qIa = watch_scaled(d->phases_q13.a, 2);
+    ParkParm.qIb = watch_scaled(d->phases_q13.b, 2);
     ParkParm.qId = watch_scaled(run->control.i_q13.d, 2);
     ParkParm.qIq = watch_scaled(run->control.i_q13.q, 2);
     ParkParm.qVd = watch_scaled(run->control.v_q14.d, 1);
@@ -43,5 +45,9 @@ void watch_refresh(void)
     CtrlParm.qVelRef = run->control.reference_erpm;
     CtrlParm.qVdRef = watch_scaled(run->control.ref_q13.d, 2);
     CtrlParm.qVqRef = watch_scaled(run->control.ref_q13.q, 2);
+    LoadParm.qVel = observer_speed(&run->observer);
+    LoadParm.qLoad = watch_scaled(observer_load(&run->observer, &board_params.observer), 2);
+    AdaptParm.qInvKFi = qm_hi(run->adaptation.kfi_q31);
+    AdaptParm.qRs = qm_hi(run->adaptation.rs_q31);
     mode_watch(d);
 }

@@ -3,7 +3,7 @@
 
 void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm)
 {
-    int16_t above = (int16_t)(qm_abs(ref_erpm) - p->on_speed_erpm);
+    int16_t speed = qm_abs(ref_erpm), above = (int16_t)(speed - p->on_speed_erpm), filter;
     uint16_t index = 0, fraction_q16 = 0;
 
     model->kfilter_esdq_q16 = p->kfilter_esdq_q16;
@@ -16,10 +16,12 @@ void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t 
             fraction_q16 = 65535u;
         }
     }
+    filter = (int16_t)qm_mulhi_uu((uint16_t)speed, p->esdq_per_erpm_q13);
+    if (filter < (int16_t)(model->kfilter_esdq_q16 >> 3)) {
+        model->kfilter_esdq_q16 = (int16_t)(8 * ((filter > FIELDWEAK_FILTER_LEAST / 8) ? filter : FIELDWEAK_FILTER_LEAST / 8));
+    }
     fw->index = index;
     fw->table_q13 = fieldweak_between(p->idref_q13, index, fraction_q16);
     model->inv_kfi = fieldweak_between(p->inv_kfi, index, fraction_q16);
-    /* quotient at most 32767 because inv_kfi >= 2048, see the parameter checks */
-    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)model->inv_kfi);
     model->ls_q16 = (uint16_t)(qm_muluu(p->ls_base_q16, (uint16_t)fieldweak_between(p->ls_over2ls0_q15, index, fraction_q16)) >> 14);
 }

@@ -16,14 +16,20 @@ NOINLINE void drive_zero(void *object, uint16_t size)
     }
 }
 
+void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
+{
+    fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, ref_erpm);
+    adaptation_apply(&run->adaptation, &p->adaptation, &run->model);
+}
+
 void drive_init(drive_t *d, const drive_params_t *p)
 {
     drive_zero(d, sizeof *d);
     d->direction = 1;
     d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
-    bus_update_gain(d, p);
+    bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);
-    fieldweak_tick(&d->run.fieldweak, &p->fieldweak, &d->run.model, 0);
+    drive_update_model(&d->run, p, p->end_erpm);
     drive_enter(d, DRIVE_CALIBRATE);
 }
 
@@ -35,7 +41,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     }
     drive_zero(run, sizeof *run);
     d->direction = direction;
-    fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, 0);
+    drive_update_model(run, p, p->end_erpm);
     run->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
     run->control.iq_limit_q13 = p->current_max_q13;
     run->control.brake_limit_q13 = p->current_max_q13;

@@ -2,6 +2,10 @@
 #include "drive/param_scaling.h"
 #include "drive/param_table.h"
 
+#if defined(SPEEDCNTR_ITERM) || defined(SPEEDCNTR_CTERM)
+#error userparams.h: SPEEDCNTR_ITERM and SPEEDCNTR_CTERM mean nothing: the load observer (LOAD_BANDWIDTH_HZ) takes the place of the integral, remove them
+#endif
+
 #define CHECK_TEXT_(x) #x
 #define CHECK_TEXT(x) CHECK_TEXT_(x)
 #define CHECK_RANGE(name, unit, min, max, value, meaning) \

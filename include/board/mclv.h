@@ -36,10 +36,9 @@
 #define BOARD_OUTPUTS_OFF 0x0000u
 #define BOARD_OUTPUTS_BOOTSTRAP 0x0015u /* all low sides on */
 #define BOARD_OUTPUTS_PWM 0x3F00u
-/* Special event 1.5 us (60 clocks) after the counter's peak, counting down: the low sides have then been on for
+/* Special event 1.5 us (SAMPLE_DELAY_CLOCKS) after the counter's peak, counting down: the low sides have then been on for
  * SAMPLE_WINDOW_SEC + 1.5 us - dead time, and stay on for SAMPLE_WINDOW_SEC - 1.5 us, at the highest duty. */
-#define BOARD_SAMPLE_DELAY_CLOCKS 60u
-#define BOARD_P1SECMP ((uint16_t)(0x8000u | (BOARD_P1TPER - BOARD_SAMPLE_DELAY_CLOCKS)))
+#define BOARD_P1SECMP ((uint16_t)(0x8000u | (BOARD_P1TPER - SAMPLE_DELAY_CLOCKS)))
 
 /* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 75 ns = 3.6 us ---- */
 #define BOARD_AD1CON1 0x036Cu               /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/** The first line, version and cause of the last reset: "foc33 0.9.0 reset BOR POR". */
+/** The first line, version and cause of the last reset: "foc33 0.10.0 reset BOR POR". */
 void status_init(void);
 
 /** Composes the next line when it is due: "state 5 fault 0 speed 1000 rpm"; in IDENTIFY "step 11 BUSY fault 0 R 2692 mohm

@@ -1,4 +1,4 @@
-/* Variables under AN1292's names and in its formats; refreshed in the background. */
+/* Variables under AN1292's names and in its formats, and what it does not have; refreshed in the background. */
 #ifndef BOARD_WATCH_H
 #define BOARD_WATCH_H
 
@@ -30,11 +30,24 @@ typedef struct {
     int16_t qVelRef, qVdRef, qVqRef;
 } tCtrlParm;
 
+/** Load observer: speed (electrical rpm), and the q current that holds the load (Q15 of full-scale current, signed like the current). */
+typedef struct {
+    int16_t qVel, qLoad;
+} tLoadParm;
+
+/** What the running motor has shown against the header, Q15 of it, cleared by a start: the changes of 1/Kphi (the magnets' temperature: a
+ *  weaker magnet makes it positive) and of Rs (the winding's). */
+typedef struct {
+    int16_t qInvKFi, qRs;
+} tAdaptParm;
+
 extern tFdWeakParm FdWeakParm;
 extern tMotorEstimParm MotorEstimParm;
 extern tEstimParm EstimParm;
 extern tParkParm ParkParm;
 extern tCtrlParm CtrlParm;
+extern tLoadParm LoadParm;
+extern tAdaptParm AdaptParm;
 
 /** Copies the drive's state to the variables above. Background. */
 void watch_refresh(void);

@@ -8,9 +8,9 @@
 
 /** Motor and filter constants that do not change while the motor runs. */
 typedef struct {
-    uint16_t rs_q16;              /**< Rs I0 / (2 U0) * 65536 >> rs_exp: Q14 current to Q13 voltage */
     uint16_t rs_exp;              /**< 0..3, for motors whose Rs does not fit */
     uint16_t ls_exp;              /**< 0..3, the same for Ls */
+    int16_t resistive_max;        /**< limit of Rs i of an axis before rs_exp: what the header's Rs gives at the trip level */
     int16_t d_ilimit_ls_q14;      /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
     int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
     int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
@@ -20,8 +20,9 @@ typedef struct {
     speed_erpm_t decimate_erpm;   /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
 } estimator_params_t;
 
-/** Constants that field weakening adapts while the motor runs. */
+/** Constants that field weakening and the adaptation change while the motor runs. */
 typedef struct {
+    uint16_t rs_q16;          /**< Rs I0 / (2 U0) * 65536 >> rs_exp: Q14 current to Q13 voltage */
     uint16_t ls_q16;          /**< Ls/(8 Ts) I0/(2 U0) * 65536 >> ls_exp: Q14 eight-sample difference to Q13 voltage */
     int16_t inv_kfi;          /**< InvKFi in AN1292's format: 1/Kphi / 2 in Q15 */
     int16_t emf_sum_max_q12;  /**< 32767 * 2048 / inv_kfi: keeps the speed in 16 bits */
@@ -101,11 +102,12 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
 QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
     alphabeta_t previous = e->history_q14[e->newest];
+    const int16_t most = p->resistive_max; /* the adaptation may raise Rs, but not the format's end */
     uint16_t newest = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
     alphabeta_t *slot = &e->history_q14[newest]; /* of the oldest, which makes room */
     alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, *slot);
-    int16_t resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), p->rs_q16);
-    int16_t resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), p->rs_q16);
+    int16_t resistive_alpha = qm_clamp(qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), t->rs_q16), (int16_t)-most, most);
+    int16_t resistive_beta = qm_clamp(qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), t->rs_q16), (int16_t)-most, most);
 
     e->e_q13.alpha = (int16_t)(((e->v_last_q13.alpha + e->v_before_q13.alpha) >> 1)
                                - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
@@ -113,6 +115,12 @@ QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, c
                               - resistive_beta * (1 << p->rs_exp) - inductive.beta);
     *slot = i_q14;
     e->newest = newest;
+}
+
+/** Equation 2: speed from Eq and Ed. @param sum_max limit of their sum, 32767 * 2048 / inv_kfi @return within 16 bits */
+QM_INLINE speed_erpm_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi)
+{
+    return (int16_t)(qm_mulss(qm_clamp(sum, (int16_t)-sum_max, sum_max), inv_kfi) >> 11);
 }
 
 /** Equations 1, 2 and 7: filtered Ed and Eq give the speed, the speed gives the angle.
@@ -124,9 +132,7 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
     speed_erpm_t speed = estimator_speed(e);
     int16_t sign = (qm_abs(speed) > p->decimate_erpm) ? e_q : speed;
     int16_t sum = (int16_t)((sign >= 0) ? e_q - e_d : e_q + e_d);
-
-    sum = qm_clamp(sum, (int16_t)-t->emf_sum_max_q12, t->emf_sum_max_q12);
-    e->omega_erpm = (int16_t)(qm_mulss(sum, t->inv_kfi) >> 11);
+    e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
     e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32));
     e->half_step_q16_rad = qm_mulhi(e->omega_erpm, p->half_step_q16_rad);
     (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);

@@ -5,7 +5,10 @@
 #include "control/estimator.h"
 
 #define FIELDWEAK_ENTRIES 18
-#define SPEED_INDEX_CONST 10 /**< one table step is 2^10 electrical rpm */
+#define FIELDWEAK_TRIM_SHIFT 4 /**< d current of the voltage feedback: counts a step per 16 counts of missing voltage */
+#define FIELDWEAK_TRIM_MOST 12
+#define FIELDWEAK_FILTER_LEAST 256 /**< K of the slowest back-EMF filter, Q16 */
+#define SPEED_INDEX_CONST 10       /**< one table step is 2^10 electrical rpm */
 
 /** The three tables of AN1292 and what frames them. */
 typedef struct {
@@ -16,9 +19,9 @@ typedef struct {
     uint16_t ls_base_q16;                       /**< estimator's ls_q16 at index 0 */
     int16_t kfilter_esdq_q16;                   /**< back-EMF filter up to the start speed */
     int16_t kfilter_esdq_fw_q16;                /**< and above */
+    uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per erpm */
     int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
     int16_t trim_step_q13;                      /**< its change per step (2^3 periods) */
-    int16_t margin_q14;                         /**< voltage kept free for the q axis before the trim acts */
     speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */
 } fieldweak_params_t;
 
@@ -35,7 +38,7 @@ QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16
     return (int16_t)(table[index] - qm_mulhi_su((int16_t)(table[index] - table[index + 1u]), fraction_q16));
 }
 
-/** Looks up the three tables for a speed reference (not the estimated speed) and adapts the estimator.
+/** Looks up the three tables for a speed reference (not the estimated speed); with the back-EMF's filter they go to the estimator.
  *  Entries above the last are never read: at and beyond index 17 the last entry holds, to one count.
  *  @param ref_erpm speed reference, any value and sign */
 void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm);
@@ -46,11 +49,11 @@ void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t 
  *  @param speed_erpm filtered estimated speed */
 QM_INLINE void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, voltage_q14_t free_q14, speed_erpm_t speed_erpm)
 {
-    if (free_q14 < p->margin_q14 && qm_abs(speed_erpm) > p->trim_speed_erpm) {
-        fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 - p->trim_step_q13), (int16_t)-p->trim_max_q13, 0);
-    } else {
-        fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 + p->trim_step_q13), (int16_t)-p->trim_max_q13, 0);
+    int16_t step = p->trim_step_q13;
+    if (qm_abs(speed_erpm) > p->trim_speed_erpm) {
+        step = qm_clamp((int16_t)(free_q14 >> FIELDWEAK_TRIM_SHIFT), (int16_t)-FIELDWEAK_TRIM_MOST, p->trim_step_q13);
     }
+    fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 + step), (int16_t)-p->trim_max_q13, 0);
 }
 
 #endif

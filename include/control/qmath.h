@@ -85,8 +85,14 @@ QM_INLINE uint16_t qm_divud(uint32_t numerator, uint16_t denominator)
 #endif
 }
 
+/** part / whole, for part < whole. @return Q15 */
+QM_INLINE q15_t qm_share(uint16_t part, uint16_t whole)
+{
+    return (q15_t)(qm_divud((uint32_t)part << 16, whole) >> 1);
+}
+
 #ifdef __clang__
-#define QM_WRAPS __attribute__((no_sanitize("unsigned-integer-overflow")))
+#define QM_WRAPS __attribute__((no_sanitize("unsigned-integer-overflow", "unsigned-shift-base")))
 #else
 #define QM_WRAPS
 #endif
@@ -111,6 +117,16 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
     return (x < low) ? low : x;
 }
 
+/** x limited to low..high, its upper word. */
+QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
+{
+    int32_t least = (int32_t)low * 65536, most = (int32_t)high * 65536;
+    if (x > most) {
+        return most;
+    }
+    return (x < least) ? least : x;
+}
+
 /** Magnitude; -32768 gives 32767. */
 QM_INLINE int16_t qm_abs(int16_t x)
 {
@@ -128,6 +144,12 @@ QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
         return 16383;
     }
     return (int16_t)((difference < -16383) ? -16383 : difference);
+}
+
+/** x * 2^bits; the caller proves that it fits. @param bits 0..15 */
+QM_INLINE QM_WRAPS int32_t qm_shift(int32_t x, uint16_t bits)
+{
+    return (int32_t)((uint32_t)x << bits);
 }
 
 /** First-order low-pass, Equation 7: y += K (x - y), K in Q16, y kept in 32 bits with 16 fraction bits.

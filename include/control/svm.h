@@ -6,12 +6,12 @@
 
 /** Constants of the modulator, in duty counts. */
 typedef struct {
-    int16_t full;            /**< duty of 100 %: 2 (PTPER + 1) */
-    int16_t top;             /**< highest duty before dead-time compensation: keeps the low sides on around the sample */
-    int16_t dead_time;       /**< duty that dead time takes from a leg: Td / Ts * full */
-    int16_t knee_q13;        /**< current at which dead-time compensation is full; linear below, to stay calm at zero */
-    uint16_t dead_slope_q16; /**< dead_time / knee_q13 * 65536 */
-    int16_t turn_q13;        /**< most that a phase current changes in a period */
+    int16_t full;          /**< duty of 100 %: 2 (PTPER + 1) */
+    int16_t top;           /**< highest duty before dead-time compensation: keeps the low sides on around the sample */
+    int16_t dead_time;     /**< duty that dead time takes from a leg: Td / Ts * full */
+    int16_t knee_q13;      /**< current at which dead-time compensation is full; linear below */
+    int16_t dead_slope_q8; /**< dead_time / knee_q13 * 256; times knee_q13 it fits a word */
+    int16_t turn_q13;      /**< most that a phase current changes in a period */
 } svm_params_t;
 
 /** The three duties. */
@@ -20,15 +20,15 @@ typedef struct {
 } duties_t;
 
 /** Duty that restores what dead time takes: the leg loses Td for a positive current and gains it for a negative one. */
-QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t i_q13)
+QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t asked_q13)
 {
-    return qm_mulhi_su(qm_clamp(i_q13, (int16_t)-p->knee_q13, p->knee_q13), p->dead_slope_q16);
+    return (int16_t)((int16_t)(qm_clamp(asked_q13, (int16_t)-p->knee_q13, p->knee_q13) * p->dead_slope_q8) >> 8);
 }
 
-QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t i_q13)
+QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q13, current_q13_t i_q13)
 {
     /* below zero only by rounding; the sum is bounded by full + dead_time */
-    int16_t duty = (int16_t)(qm_clamp(u, 0, p->top) + svm_dead_time(p, i_q13));
+    int16_t duty = (int16_t)(qm_clamp(u, 0, p->top) + svm_dead_time(p, asked_q13));
     /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
      * is open longer by it; otherwise the compensation must not close the window. */
     return (duty_t)qm_clamp(duty, 0, (i_q13 > p->turn_q13) ? p->full : p->top);
@@ -39,9 +39,10 @@ QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t i_q13)
  *  vector 000, less of 111, the same line voltages.
  *  @param v voltage vector, Q13
  *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see bus_update_gain())
- *  @param i_a,i_b,i_c phase currents, Q13, for dead-time compensation */
-QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16,
-                       current_q13_t i_a, current_q13_t i_b, current_q13_t i_c)
+ *  @param asked phase currents that the controllers ask for at the centre of the pulse: dead time is compensated for them. The measured
+ *         ones are a period older and carry the converter's steps; compensation that follows them makes a current stick at zero
+ *  @param i measured phase currents, for the sampling window */
+QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, phases_t asked, phases_t i)
 {
     int16_t a = qm_mulhi_su(v.alpha, duty_per_volt_q16);
     int16_t t = qm_mulhi_su(qm_mulhi_su(v.beta, duty_per_volt_q16), 56756u); /* sqrt(3)/2 */
@@ -65,9 +66,9 @@ QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_v
     if ((int16_t)(max + shift) > p->top) {
         shift = (int16_t)(p->top - max);
     }
-    d.a = svm_leg(p, (int16_t)(a + shift), i_a);
-    d.b = svm_leg(p, (int16_t)(b + shift), i_b);
-    d.c = svm_leg(p, (int16_t)(c + shift), i_c);
+    d.a = svm_leg(p, (int16_t)(a + shift), asked.a, i.a);
+    d.b = svm_leg(p, (int16_t)(b + shift), asked.b, i.b);
+    d.c = svm_leg(p, (int16_t)(c + shift), asked.c, i.c);
     return d;
 }
 

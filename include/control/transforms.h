@@ -16,6 +16,11 @@ typedef struct {
     int16_t q;
 } dq_t;
 
+/** A current of each phase. */
+typedef struct {
+    current_q13_t a, b, c;
+} phases_t;
+
 /** Clarke: alpha = a, beta = (a + 2 b)/sqrt(3), for a + b + c = 0.
  *  @param a_q13,b_q13 phase currents, |a|, |b| and |a + b| <= 10240 (full scale and offset), so that all fits 16 bits
  *  @return the current vector in Q14 */
@@ -45,6 +50,20 @@ QM_INLINE alphabeta_t inverse_park(dq_t x, sincos_t sc)
     r.alpha = qm_hi(qm_mulss(x.d, sc.cos) - qm_mulss(x.q, sc.sin));
     r.beta = qm_hi(qm_mulss(x.d, sc.sin) + qm_mulss(x.q, sc.cos));
     return r;
+}
+
+/** The phase currents of a current vector: inverse Park, then a = alpha, b = (sqrt(3) beta - alpha)/2, c = -a - b.
+ *  Rounded to the nearest: an offset of one phase would be a direct voltage where dead time is compensated for these currents.
+ *  @param x_q13 |x| at most 11585 @return Q13, to a count and 1/3000; their sum is 0 */
+QM_INLINE phases_t phases_of(dq_t x_q13, sincos_t sc)
+{
+    int16_t alpha = qm_hi(2 * (qm_mulss(x_q13.d, sc.cos) - qm_mulss(x_q13.q, sc.sin)) + 32768);
+    int16_t beta = qm_hi(2 * (qm_mulss(x_q13.d, sc.sin) + qm_mulss(x_q13.q, sc.cos)) + 32768);
+    phases_t i;
+    i.a = alpha;
+    i.b = (int16_t)(qm_hi(qm_mulsu(beta, 56756u) + 32768) - (alpha >> 1)); /* sqrt(3)/2 */
+    i.c = (int16_t)(-i.a - i.b);
+    return i;
 }
 
 #endif

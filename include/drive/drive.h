@@ -2,10 +2,12 @@
 #ifndef DRIVE_DRIVE_H
 #define DRIVE_DRIVE_H
 
+#include "control/adaptation.h"
 #include "control/current_control.h"
 #include "control/estimator.h"
 #include "control/fieldweak.h"
 #include "control/forced_angle.h"
+#include "control/observer.h"
 #include "control/speed_ramp.h"
 #include "control/svm.h"
 #include "drive/faults.h"
@@ -38,7 +40,12 @@ typedef struct {
     fieldweak_params_t fieldweak;
     forced_angle_params_t forced;
     svm_params_t svm;
-    pi_gains_t pi_d, pi_q, pi_speed;
+    pi_gains_t pi_d, pi_q;
+    adaptation_params_t adaptation;
+    observer_params_t observer;
+    int16_t speed_kp_q13, speed_kp_quick_q13; /**< q current counts * 8192 per erpm: as a rule, and after a large innovation */
+    int16_t sample_shift_q16;                 /**< q current that a sample after the centre of the low sides' conduction misses, counts
+                                                   * 65536 per erpm: delay * psi / L */
 
     q15_t kcurr_a, kcurr_b; /**< gain of the samples; Q15 sample to Q13 current by the high word */
     int16_t offset_max_q13; /**< largest plausible offset */
@@ -94,14 +101,16 @@ typedef struct {
     dq_t i_q13;                    /**< measured currents in the control frame */
     dq_t v_q14;                    /**< commanded voltages in the control frame */
     voltage_q14_t vq_limit_q14;
-    pi_t pi_d, pi_q, pi_speed;
+    pi_t pi_d, pi_q;
+    int16_t speed_kp_q13;           /**< the speed controller's gain in use */
+    current_q13_t sample_shift_q13; /**< q current that the sample misses at this speed */
 } drive_control_t;
 
 /** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
 typedef struct {
     uint16_t waited_steps;    /**< at the end of the ramp */
     uint16_t agreed_steps;    /**< of them, the last ones in which the estimator agreed with the forced speed */
-    uint16_t speed_is_preset; /**< 1 from six periods after the hand-over on */
+    uint16_t speed_is_preset; /**< 1 from six periods after the hand-over on: the observer runs */
     int16_t offset;           /**< angle that is left of the change of frame, angle counts */
     current_q13_t id_q13;     /**< d current that goes with it */
 } handover_t;
@@ -109,8 +118,10 @@ typedef struct {
 /** What a start begins anew: all of it is cleared. */
 typedef struct {
     estimator_t estimator;
-    motor_model_t model; /**< the motor's constants, as field weakening adapts them */
+    motor_model_t model; /**< the motor's constants, from the tables and the adaptation */
     fieldweak_t fieldweak;
+    adaptation_t adaptation;
+    observer_t observer;
     handover_t handover;
     drive_control_t control;
     uint16_t stall_steps, lost_lock_steps; /**< how long each condition has lasted, slow steps */
@@ -127,7 +138,7 @@ typedef struct {
     int16_t direction;       /**< +1 or -1, fixed from start to stop */
 
     calibration_t calibration;
-    current_q13_t i_a_q13, i_b_q13, i_c_q13;
+    phases_t phases_q13;     /**< measured */
     int32_t bus_q31;         /**< filtered bus, upper word Q15 of full scale */
     voltage_circle_t circle; /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
@@ -142,6 +153,9 @@ typedef struct {
 
 /** Brings the object to CALIBRATE; every field gets its start value. */
 void drive_init(drive_t *d, const drive_params_t *p);
+
+/** The motor's constants for a speed reference: the tables, and what the motor has shown. */
+void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm);
 
 /** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
  *  @param direction +1 or -1 */

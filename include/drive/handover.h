@@ -59,13 +59,16 @@ QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Six periods after the hand-over, whose own period has enough to do: the speed controller, which comes next, goes on from its q current. */
-QM_INLINE void handover_preset_speed(drive_run_t *run, const drive_params_t *p)
+/** The observer's step. Its first one, six periods after the hand-over, whose own period has enough to do, begins with the hand-over's q
+ *  current, so that the speed controller, which comes next, goes on from it. */
+QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 {
-    drive_control_t *c = &run->control;
-    if (!run->handover.speed_is_preset) {
+    const drive_control_t *c = &run->control;
+    if (run->handover.speed_is_preset) {
+        observer_step(&run->observer, &p->observer, run->estimator.rho_q32, c->i_q13.q);
+    } else {
         run->handover.speed_is_preset = 1;
-        pi_preset(&c->pi_speed, &p->pi_speed, qm_sub_limited(c->reference_erpm, estimator_speed(&run->estimator)), c->ref_q13.q);
+        observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, estimator_speed(&run->estimator), c->ref_q13.q);
     }
 }
 

@@ -5,6 +5,17 @@
 
 #include "drive/drive.h"
 
+#define LIMITS_MISSING_Q14 4 /**< voltage counts that a count of missing q current asks for */
+#define LIMITS_MISSING_MOST_Q13 64
+
+/** Voltage that the q axis has left, less what the missing q current asks for: a limit that is only touched now and then takes no more d
+ *  current than it must, and one that costs speed takes what it needs. */
+QM_INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c)
+{
+    int16_t missing = (int16_t)((c->ref_q13.q >= 0) ? c->ref_q13.q - c->i_q13.q : c->i_q13.q - c->ref_q13.q);
+    return (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
+}
+
 /** d current: what is left of the hand-over, the table and its trim; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
@@ -12,7 +23,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     int16_t id_max = (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
     uint32_t ratio;
 
-    fieldweak_trim(&run->fieldweak, &p->fieldweak, (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q)), estimator_speed(&run->estimator));
+    fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
     c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13), (int16_t)-id_max, id_max);
     ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
@@ -31,16 +42,13 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
     run->control.brake_limit_q13 = most;
 }
 
-/** Limits braking current to what the bus absorbs; presets the speed controller's integrator to match.
- *  @param err of the speed controller @param iq_q13 its output @return the q current */
-QM_INLINE current_q13_t limits_apply_braking(drive_control_t *c, const drive_params_t *p, speed_erpm_t speed, int16_t err, current_q13_t iq_q13)
+/** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
+QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    current_q13_t limited = iq_q13;
     if ((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13) {
-        limited = (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
-        pi_preset(&c->pi_speed, &p->pi_speed, err, limited);
+        return (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
     }
-    return limited;
+    return iq_q13;
 }
 
 #endif

@@ -15,9 +15,11 @@
 
 #define PARAM_ESTIMATOR_INIT \
     { \
-        .rs_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP), \
         .rs_exp = PARAM_RS_EXP, \
         .ls_exp = PARAM_LS_EXP, \
+        .resistive_max = (int16_t)(2.0F / PARAM_SQRT3 * CURRENT_Q14_F(OVER_CURRENT_THRESHOLD_A) \
+                                       * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) / 65536.0F \
+                                   + 0.5F), \
         .d_ilimit_ls_q14 = D_ILIMIT_LS_Q14, \
         .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F), \
@@ -36,9 +38,9 @@
         .ls_base_q16 = PARAM_SCALED(PARAM_LS_FULL, PARAM_LS_EXP), \
         .kfilter_esdq_q16 = 2 * (KFILTER_ESDQ), \
         .kfilter_esdq_fw_q16 = 2 * (KFILTER_ESDQ_FW), \
+        .esdq_per_erpm_q13 = (uint16_t)(PARAM_ESDQ_PER_ERPM * 8192.0F + 0.5F), \
         .trim_max_q13 = CURRENT_Q13(FW_TRIM_CURRENT_A), \
         .trim_step_q13 = 2, \
-        .margin_q14 = VOLTAGE_Q14(PARAM_F(NOMINAL_BUS_V) * 0.01F), \
         .trim_speed_erpm = (int16_t)PARAM_ROUND(PARAM_F(FW_START_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 0.6F) \
     }
 
@@ -48,8 +50,32 @@
         .top = PWM_TOP_DUTY, \
         .dead_time = DEAD_TIME_DUTY, \
         .knee_q13 = DEAD_TIME_KNEE_Q13, \
-        .dead_slope_q16 = DEAD_TIME_SLOPE_Q16, \
+        .dead_slope_q8 = DEAD_TIME_SLOPE_Q8, \
         .turn_q13 = (int16_t)(PARAM_DI(MAXIMUM_SPEED_RPM) / 2.0F) \
+    }
+
+#define PARAM_ADAPTATION_INIT \
+    { \
+        .rate_q16 = (int16_t)(6.0F * PARAM_STEP_SEC * 65536.0F + 0.5F), /* 6/s, less where a part of the voltage is R i */ \
+            .kfi_least = Q15(-0.30), .kfi_most = Q15(0.35), .rs_least = Q15(-0.4), .rs_most = Q15(0.6), \
+        .emf_least_q12 = (int16_t)(0.2F * PARAM_DEAD_TIME_V / NORM_VOLTAGE_CONST / 8.0F), \
+        .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
+    }
+
+#define PARAM_OBSERVER_INIT \
+    { \
+        .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F), \
+        .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / (8.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F) + 0.5F), \
+        .shift = PARAM_ACCEL_SHIFT, \
+        .per_current_q16 = (uint16_t)PARAM_MIN(PARAM_ACCEL_UNITS * 65536.0F + 0.5F, 65535.0F), \
+        .per_unit_q15 = (uint16_t)PARAM_MIN(32768.0F / PARAM_ACCEL_UNITS + 0.5F, 65535.0F), \
+        .innovation_max = (int16_t)PARAM_INNOVATION_MAX, \
+        .load_max = (int16_t)(PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) * PARAM_ACCEL_UNITS), \
+        .quiet_q16 = (int16_t)PARAM_QUIET_Q16, .loaded_q16 = (int16_t)PARAM_LOADED_Q16, .quick_q16 = (int16_t)PARAM_QUICK_Q16, \
+        .full_erpm = (int16_t)PARAM_FULL_ERPM, .load_from = (int16_t)PARAM_LOAD_FROM, \
+        .load_width = (int16_t)PARAM_LOAD_FROM, .load_slope_q15 = (int16_t)(32767.0F / PARAM_LOAD_FROM), \
+        .large_erpm = (int16_t)PARAM_LARGE_ERPM, \
+        .large_loaded_erpm = (int16_t)PARAM_LARGE_LOADED_ERPM \
     }
 
 #define PARAM_PI_INIT(p, i, c, s) \
@@ -67,7 +93,11 @@
         .svm = PARAM_SVM_INIT, \
         .pi_d = PARAM_PI_INIT(D_CURRCNTR_PTERM, PARAM_CURRENT_KI(D_CURRCNTR_ITERM), D_CURRCNTR_CTERM, CURRENT_PI_SHIFT), \
         .pi_q = PARAM_PI_INIT(Q_CURRCNTR_PTERM, PARAM_CURRENT_KI(Q_CURRCNTR_ITERM), Q_CURRCNTR_CTERM, CURRENT_PI_SHIFT), \
-        .pi_speed = PARAM_PI_INIT(SPEEDCNTR_PTERM, PARAM_SPEED_KI(SPEEDCNTR_ITERM), SPEEDCNTR_CTERM, SPEED_PI_SHIFT), \
+        .adaptation = PARAM_ADAPTATION_INIT, \
+        .observer = PARAM_OBSERVER_INIT, \
+        .speed_kp_q13 = PARAM_KP(SPEEDCNTR_PTERM), \
+        .speed_kp_quick_q13 = (int16_t)PARAM_MIN(PARAM_F(PARAM_QUICK_GAIN) * 32768.0F * PARAM_F(SPEEDCNTR_PTERM), 32767.0F), \
+        .sample_shift_q16 = (int16_t)PARAM_MIN(PARAM_SAMPLE_SHIFT_Q16 + 0.5F, 32767.0F), \
         .kcurr_a = Q15(KCURRA), \
         .kcurr_b = Q15(KCURRB), \
         .offset_max_q13 = 1024, /* an eighth of full scale: 0.2 V at the converter */ \

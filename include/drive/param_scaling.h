@@ -72,7 +72,7 @@
                                * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
 /* ---- Controllers: gains in AN1292's units (gain/16 and per-period integral, in full scales) from bandwidths.
- *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, zero at f/3.
+ *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, and the load observer.
  *      Any of them may be defined in userparams.h instead. ---- */
 #define PARAM_KT (1.5F * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / PARAM_SQRT3 * 60.0F / (2000.0F * PARAM_PI)) /* N m per A peak */
 #ifndef D_CURRCNTR_PTERM
@@ -97,27 +97,22 @@
 #define SPEEDCNTR_PTERM (2.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(MOTOR_INERTIA_KGM2) / PARAM_KT \
                          * (2.0F * PARAM_PI / 60.0F) / PARAM_F(NOPOLESPAIRS) / PARAM_F(NORM_CURRENT_CONST) / 16.0F)
 #endif
-#ifndef SPEEDCNTR_ITERM /* the zero at f/3: Ki per period = 16 Kp 2 pi f/3 Ts; a slow loop needs its integral for load steps */
-#define SPEEDCNTR_ITERM (PARAM_F(SPEEDCNTR_PTERM) * 32.0F / 3.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(LOOPTIME_SEC))
-#endif
-#ifndef SPEEDCNTR_CTERM
-#define SPEEDCNTR_CTERM 0.999
-#endif
 #define CURRENT_PI_SHIFT 10u
-#define SPEED_PI_SHIFT 13u
 #define PARAM_KP(pterm) ((int16_t)PARAM_ROUND(PARAM_F(pterm) * 32768.0F))
 #define PARAM_CURRENT_KI(iterm) ((int16_t)PARAM_ROUND(PARAM_F(iterm) * 2048.0F))
-#define PARAM_SPEED_KI(iterm) ((int16_t)PARAM_ROUND(PARAM_F(iterm) * 16384.0F)) /* one speed step is eight periods */
 
 /* ---- Modulator and bus ---- */
 #define PWM_TICK_SEC 0.000000025F /* one PWM clock at 40 MIPS; two duty counts */
 #define PWM_FULL_DUTY ((int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / PWM_TICK_SEC))
 #define PWM_TOP_DUTY ((int16_t)(PWM_FULL_DUTY - 2 * PARAM_ROUND(PARAM_F(SAMPLE_WINDOW_SEC) / PWM_TICK_SEC)))
 #define DEAD_TIME_DUTY ((int16_t)PARAM_ROUND(PARAM_F(DEADTIME_SEC) / PWM_TICK_SEC))
-/* Below this current (47 mA, five steps of the converter) dead-time compensation is linear: steeper and its noise turns into
- * torque, flatter and the estimated angle leads at small currents (at 1000 rpm without load 3 degrees here, 9 at thrice it). */
-#define DEAD_TIME_KNEE_Q13 ((int16_t)(1.1F * PARAM_F(DEAD_TIME_DUTY)))
-#define DEAD_TIME_SLOPE_Q16 ((uint16_t)PARAM_ROUND(PARAM_F(DEAD_TIME_DUTY) / PARAM_F(DEAD_TIME_KNEE_Q13) * 65536.0F))
+/* A phase current below Vbus/2 Td/L ends within the dead time, and the voltage that is lost falls with it. Compensation is linear below a
+ * quarter of that: a little too much at small currents looks like a resistance that damps, too little like one that drives. */
+#define PARAM_LOST_CURRENT_Q13 (PARAM_F(NOMINAL_BUS_V) / 2.0F * PARAM_F(DEADTIME_SEC) / (PARAM_F(MOTOR_LS_MH) * 0.001F) / PARAM_F(NORM_CURRENT_CONST) / 4.0F)
+#define DEAD_TIME_KNEE_Q13 ((int16_t)PARAM_MAX(PARAM_LOST_CURRENT_Q13 / 4.0F + 0.5F, 2.0F))
+#define DEAD_TIME_SLOPE_Q8 ((int16_t)(DEAD_TIME_DUTY * 256 / DEAD_TIME_KNEE_Q13))
+#define PARAM_DEAD_TIME_V (PARAM_F(NOMINAL_BUS_V) * PARAM_F(DEADTIME_SEC) / PARAM_F(LOOPTIME_SEC))        /* what it takes from a leg */
+#define PARAM_ERPM_PER_V (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) / PARAM_F(MOTOR_KPHI_V_PER_KRPM)) /* speed of a phase back-EMF */
 /** Circle inside the usable hexagon, in Q14 voltage per Q16 bus: top duty / sqrt(3). */
 #define PARAM_VOLTAGE_PER_BUS (PARAM_F(PWM_TOP_DUTY) / PARAM_F(PWM_FULL_DUTY) / PARAM_SQRT3 * PARAM_F(BUS_FULL_SCALE_V) / NORM_VOLTAGE_CONST / 2.0F)
 #define VOLTAGE_LIMIT_PER_BUS_Q16 ((uint16_t)PARAM_VOLTAGE_PER_BUS)
@@ -129,7 +124,56 @@
 #define SLOW_STEPS_PER_SEC (1.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
+#define PARAM_STEP_SEC (8.0F * PARAM_F(LOOPTIME_SEC))
 #define SPEEDREFRAMP ((int16_t)PARAM_ROUND(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS) / SLOW_STEPS_PER_SEC + 0.49F))
+/* ---- Load observer (control/observer.h), adaptation, low speed. Rates in rad/s times the slow step. The tuner reads the ratios. ---- */
+#define PARAM_QUIET_RATIO 1.22  /* rate without load over SPEED_BANDWIDTH_HZ */
+#define PARAM_LOADED_SHARE 0.3  /* rate under load over LOAD_BANDWIDTH_HZ */
+#define PARAM_QUICK_GAIN 1.8    /* of the speed controller after a large innovation */
+#define PARAM_FULL_RATIO 2.7    /* LOAD_BANDWIDTH_HZ over the electrical frequency from which rates and gain are in full */
+#define PARAM_ESDQ_RATIO 5      /* corner of the back-EMF filter at low speed over the electrical frequency */
+#define PARAM_LOWEST_SHARE 0.65 /* back-EMF over dead-time voltage at the lowest speed at which a rotor is held; times 1732 in a message of the table */
+#define PARAM_CALM_SHARE 0.4    /* most of SPEED_BANDWIDTH_HZ over the electrical frequency: beyond it the speed hunts without load; over 2.7 in a message */
+/** Acceleration of a count of q current, erpm a step; 2^PARAM_ACCEL_SHIFT of the observer's units are an erpm a step. */
+#define PARAM_ACCEL (PARAM_KT / PARAM_F(MOTOR_INERTIA_KGM2) * PARAM_F(NOPOLESPAIRS) * 60.0F / (2.0F * PARAM_PI) * 4.0F * PARAM_F(NORM_CURRENT_CONST) \
+                     * PARAM_STEP_SEC)
+#define PARAM_ACCEL_SHIFT ((uint16_t)(PARAM_ACCEL >= 0.25F             ? 1 \
+                                      : PARAM_ACCEL >= 0.125F          ? 2 \
+                                      : PARAM_ACCEL >= 0.0625F         ? 3 \
+                                      : PARAM_ACCEL >= 0.03125F        ? 4 \
+                                      : PARAM_ACCEL >= 1.5625e-2F      ? 5 \
+                                      : PARAM_ACCEL >= 7.8125e-3F      ? 6 \
+                                      : PARAM_ACCEL >= 3.90625e-3F     ? 7 \
+                                      : PARAM_ACCEL >= 1.953125e-3F    ? 8 \
+                                      : PARAM_ACCEL >= 9.765625e-4F    ? 9 \
+                                      : PARAM_ACCEL >= 4.8828125e-4F   ? 10 \
+                                      : PARAM_ACCEL >= 2.44140625e-4F  ? 11 \
+                                      : PARAM_ACCEL >= 1.220703125e-4F ? 12 \
+                                                                       : 13))
+#define PARAM_ACCEL_UNITS (PARAM_ACCEL * (float)(1 << PARAM_ACCEL_SHIFT)) /* 0.5 .. 1 a count */
+#define PARAM_RATE_Q16(hz) (2.0F * PARAM_PI * (hz)*PARAM_STEP_SEC * 65536.0F)
+#define PARAM_QUICK_Q16 PARAM_RATE_Q16(PARAM_F(LOAD_BANDWIDTH_HZ))
+#define PARAM_LOADED_Q16 (PARAM_F(PARAM_LOADED_SHARE) * PARAM_QUICK_Q16)
+#define PARAM_QUIET_Q16 PARAM_MIN(PARAM_RATE_Q16(PARAM_F(PARAM_QUIET_RATIO) * PARAM_F(SPEED_BANDWIDTH_HZ)), PARAM_LOADED_Q16)
+/** In full the rates need an estimator that is as quick: electrical speed in rad/s above the quick one / 2.7. */
+#define PARAM_FULL_ERPM (60.0F / PARAM_F(PARAM_FULL_RATIO) * PARAM_F(LOAD_BANDWIDTH_HZ))
+/** Below, the voltage that dead time's compensation leaves takes the estimator's lock from a rotor under load. */
+#define PARAM_LOWEST_ERPM (PARAM_F(PARAM_LOWEST_SHARE) * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
+/** Largest bandwidth of the speed loop, which falls with the speed as the rates do. */
+#define PARAM_CALM_HZ (PARAM_F(PARAM_CALM_SHARE) / 60.0F * PARAM_MAX(PARAM_FULL_ERPM, PARAM_F(MINIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS)))
+/** Where the load's current is clear of what dead time leaves; within what the observer's schedule divides by. */
+#define PARAM_LOAD_FROM PARAM_MIN(PARAM_MAX(8.0F * PARAM_LOST_CURRENT_Q13 * PARAM_ACCEL_UNITS, 1.0F), 16000.0F)
+/** A large innovation: without load above what dead time's compensation leaves. */
+#define PARAM_LARGE_ERPM (0.13F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
+#define PARAM_LARGE_LOADED_ERPM (0.03F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
+#define PARAM_INNOVATION_MAX PARAM_MIN(16383.0F, 16000.0F * 65536.0F * 65536.0F / (PARAM_QUICK_Q16 * PARAM_QUICK_Q16) / (float)(1 << PARAM_ACCEL_SHIFT))
+/** q current that a sample misses which is taken this long after the centre of the low sides' conduction: delay psi w/L. */
+#define SAMPLE_DELAY_CLOCKS 60
+#define PARAM_SAMPLE_SHIFT_Q16 (PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC / PARAM_ERPM_PER_V / (PARAM_F(MOTOR_LS_MH) * 0.001F) \
+                                / PARAM_F(NORM_CURRENT_CONST) / 4.0F * 65536.0F)
+/** The back-EMF filter's corner at low speed is five times the electrical frequency: K per erpm. */
+#define PARAM_ESDQ_PER_ERPM (65536.0F * 2.0F * PARAM_PI * PARAM_F(PARAM_ESDQ_RATIO) / 60.0F * PARAM_F(LOOPTIME_SEC))
+
 /** TUNING's ramp: Q16 electrical rpm per slow step. */
 #define TUNING_STEP_Q16 (PARAM_ROUND(8.0F * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 

@@ -50,12 +50,13 @@
 
 #define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
     X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
-    X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60, FROM_TUNER, "speed loop")
+    X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60, FROM_TUNER, "speed loop") \
+    X(LOAD_BANDWIDTH_HZ, "Hz", 1, 200, FROM_TUNER, "load observer after a load step; under load 0.43 of it, without load 1.22 SPEED_BANDWIDTH_HZ")
 
 #define PARAM_FILTERS(X) /* Filters, Equation 7: K in Q15 per period */ \
     X(KFILTER_ESDQ, "Q15", 10, 8000, FROM_TUNER, "back-EMF up to FW_START_SPEED_RPM") \
     X(KFILTER_ESDQ_FW, "Q15", 10, 8000, FROM_TUNER, "back-EMF above") \
-    X(KFILTER_VELESTIM, "Q15", 10, 8000, FROM_TUNER, "speed for loop, thresholds and display")
+    X(KFILTER_VELESTIM, "Q15", 10, 8000, FROM_TUNER, "speed for thresholds and display")
 
 #define PARAM_FIELD_WEAKENING(X) /* Field weakening: a table entry every 1024 electrical rpm of speed reference */ \
     X(FW_START_SPEED_RPM, "rpm", 100, 20000, FROM_TUNER, "speed reference of entry 0") \
@@ -79,6 +80,14 @@
 #define PARAM_LARGEST_ERPM 32000
 #define PARAM_LARGEST_NOMINAL_ERPM 27000
 #define PARAM_TRIP_SHARE 0.865
+
+/** A parameter's value for a message, where a userparams.h is in use: " = 150". */
+#ifdef USERPARAMS_H
+#define PARAM_IS(value) " = " PARAM_TEXT(value)
+#define PARAM_TEXT(value) #value
+#else
+#define PARAM_IS(value)
+#endif
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */
 #define PARAM_RELATION_TABLE(X) \
@@ -108,8 +117,6 @@
       "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
     X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \
       "Q_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(SPEEDCNTR_CTERM) >= 0.9F && PARAM_F(SPEEDCNTR_CTERM) < 1.0F, \
-      "SPEEDCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
     X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, \
       "the controllers' PTERMs must be positive") \
     X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F && PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F, "the current controllers' ITERMs must not be negative") \
@@ -139,11 +146,20 @@
     X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, \
       "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \
-    X(PARAM_SPEED_KI(SPEEDCNTR_ITERM) >= 1, \
-      "the speed integral rounds to zero: raise SPEED_BANDWIDTH_HZ; or the inertia is too low " \
-      "(MOTOR_INERTIA_KGM2; of a motor file, [mechanical] or [load] inertia)")
+    X(PARAM_ACCEL < 0.5F && PARAM_ACCEL >= 6.103515625e-5F, \
+      "MOTOR_INERTIA_KGM2 does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): check its unit") \
+    X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074: the observer's step is eight periods") \
+    PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
+    X(PARAM_F(SPEED_BANDWIDTH_HZ) <= PARAM_CALM_HZ, \
+      "SPEED_BANDWIDTH_HZ" PARAM_IS(SPEED_BANDWIDTH_HZ) " must be at most 0.148 * LOAD_BANDWIDTH_HZ, or 0.4 of the electrical frequency at " \
+      "MINIMUM_SPEED_RPM if that is more: lower it, or the speed hunts without load")
 
 #define PARAM_RELATION_IDREF(X, i) \
     X(PARAM_F(IDREF_SPEED##i) >= -PARAM_F(MAXIMUM_CURRENT_A), "IDREF_SPEED" #i " must not exceed MAXIMUM_CURRENT_A")
+
+#define PARAM_RELATION_HELD(X, name) \
+    X(PARAM_F(name) * PARAM_F(NOPOLESPAIRS) >= PARAM_LOWEST_ERPM, \
+      #name PARAM_IS(name) " must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI_V_PER_KRPM: raise it, below " \
+      "the rotor is not held against what dead time leaves")
 
 #endif

@@ -8,7 +8,7 @@
 QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
 {
     const int16_t limit = p->overcurrent_q13;
-    if (qm_abs(d->i_a_q13) > limit || qm_abs(d->i_b_q13) > limit || qm_abs(d->i_c_q13) > limit) {
+    if (qm_abs(d->phases_q13.a) > limit || qm_abs(d->phases_q13.b) > limit || qm_abs(d->phases_q13.c) > limit) {
         drive_raise(d, FAULT_OVERCURRENT_SW);
     }
 }
@@ -31,15 +31,22 @@ QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    int16_t speed = qm_abs(estimator_speed(&run->estimator));
+    int16_t speed = qm_abs(estimator_speed(&run->estimator)), standing = (int16_t)(p->minimum_erpm >> 1);
     int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1);
     dq_t emf = estimator_emf(&run->estimator);
+    uint16_t lost = (uint16_t)(speed >= standing && qm_abs(emf.d) > qm_abs(emf.q)); /* of a standing rotor its direction says nothing */
 
-    if (least < (p->minimum_erpm >> 1)) {
-        least = (int16_t)(p->minimum_erpm >> 1);
+    if (least < standing) {
+        least = standing;
     }
     run->stall_steps = (uint16_t)((speed < least) ? run->stall_steps + 1u : 0u);
-    run->lost_lock_steps = (uint16_t)((qm_abs(emf.d) > qm_abs(emf.q) || speed > p->overspeed_erpm) ? run->lost_lock_steps + 1u : 0u);
+    if (lost || speed > p->overspeed_erpm) {
+        run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
+    } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */
+        run->lost_lock_steps--;
+    } else {
+        /* in lock */
+    }
     if (run->stall_steps > p->stall_steps || run->lost_lock_steps > p->lost_lock_steps) {
         drive_raise(d, (run->stall_steps > p->stall_steps) ? FAULT_STALL : FAULT_LOST_LOCK);
     }

@@ -4,14 +4,15 @@
 
 #include "drive/bus.h"
 #include "drive/idle.h"
+#include "drive/model.h"
 #include "drive/speed.h"
 
 /** Phase currents from the samples: gain, then the calibrated offset. */
 QM_INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    d->i_a_q13 = (int16_t)(qm_mulhi(raw->i_a, p->kcurr_a) - d->calibration.offset_a_q13);
-    d->i_b_q13 = (int16_t)(qm_mulhi(raw->i_b, p->kcurr_b) - d->calibration.offset_b_q13);
-    d->i_c_q13 = (int16_t)(-d->i_a_q13 - d->i_b_q13);
+    d->phases_q13.a = (int16_t)(qm_mulhi(raw->i_a, p->kcurr_a) - d->calibration.offset_a_q13);
+    d->phases_q13.b = (int16_t)(qm_mulhi(raw->i_b, p->kcurr_b) - d->calibration.offset_b_q13);
+    d->phases_q13.c = (int16_t)(-d->phases_q13.a - d->phases_q13.b);
 }
 
 /** A period with the bridge switching. */
@@ -19,10 +20,11 @@ QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
-    alphabeta_t i = clarke(d->i_a_q13, d->i_b_q13), v;
+    alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), v;
     uint16_t forced = (uint16_t)(d->state <= (uint16_t)DRIVE_RAMP); /* ALIGN or RAMP */
 
     c->i_q13 = park(i, d->frame);
+    c->i_q13.q = (int16_t)(c->i_q13.q + c->sample_shift_q13);
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
     estimator_tick(&run->estimator, &p->estimator, &run->model, i, d->frame, forced);
     if (forced) {
@@ -36,7 +38,7 @@ QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
     d->frame = trig_sincos(d->angle);
     v = inverse_park(c->v_q14, d->frame);
     estimator_commanded(&run->estimator, v);
-    return svm(&p->svm, v, d->duty_per_volt_q16, d->i_a_q13, d->i_b_q13, d->i_c_q13);
+    return svm(&p->svm, v, d->duty_per_volt_q16, phases_of(c->ref_q13, d->frame), d->phases_q13);
 }
 
 /** One PWM period up to the duties; then drive_outputs(), drive_slow(), which has no deadline, and last drive_settle().
@@ -75,10 +77,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 1:
         if (d->state == (uint16_t)DRIVE_RAMP) {
             handover_step(d, p);
-        } else if (drive_is_closed(d)) {
-            fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, run->control.reference_erpm);
         } else {
-            /* nothing to weaken */
+            model_update(d, p);
         }
         break;
     case 2:
@@ -95,6 +95,9 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 5:
         if (drive_is_closed(d)) {
             protection_check_rotor(d, p);
+            speed_follow(run, p);
+        } else {
+            model_update_in_ramp(d, p);
         }
         break;
     case 6:
@@ -102,10 +105,11 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
             handover_decay(d, p);
             limits_braking(run, p, qm_hi(d->bus_q31));
         }
+        model_learn_step(d, p);
         break;
     default: /* 7 */
         if (drive_is_closed(d)) {
-            handover_preset_speed(run, p);
+            handover_observe(run, p);
         }
         break;
     }

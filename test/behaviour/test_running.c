@@ -38,7 +38,7 @@ void test_phase_currents_are_sinusoidal_enough_to_hold_the_torque(void)
     ramp_load(0.06);
     wait_s(0.5);
     measured_t m = measure(0.3);
-    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, m.i_d_a + 0.02);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, m.i_d_a); /* the angle is right */
     TEST_ASSERT_DOUBLE_WITHIN(0.03, (0.06 + 0.004 + 15.3e-6 * 157.1) / 0.0599, m.i_q_a);
     TEST_ASSERT_DOUBLE_WITHIN(10.0, 0.0, m.rpm_max - m.rpm_min);
 }
@@ -139,20 +139,40 @@ void test_tolerates_a_motor_and_a_board_that_differ_from_what_it_assumes(void)
     }
 }
 
-void test_wrong_kphi_turns_the_angle_by_the_law(void)
+void test_wrong_kphi_is_learnt_and_the_angle_comes_back(void)
 {
-    /* sqrt(2) sin(lag + 45 deg) = K'/K, K' what the firmware assumes, K the motor's */
-    static const double ratio[] = { 0.9, 1.1, 1.2 };
-    for (size_t i = 0; i < 3; i++) {
-        set("motor.psi_vs", 7.983e-3);
-        run_at(2500.0);
-        measured_t exact = measure(0.2);
+    static const double ratio[] = { 0.8, 0.9, 1.1, 1.2 };
+    for (size_t i = 0; i < sizeof ratio / sizeof ratio[0]; i++) {
         set("motor.psi_vs", 7.983e-3 * ratio[i]);
-        run_at(2500.0);
-        measured_t wrong = measure(0.2);
-        TEST_ASSERT_DOUBLE_WITHIN(1.5, 45.0 - asin(1.0 / (sqrt(2.0) * ratio[i])) * 180.0 / M_PI,
-                                  wrong.angle_mean_deg - exact.angle_mean_deg);
+        measured_t m = assert_holds_under_load(2000.0, 0.03);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, m.angle_rms_deg);
+        TEST_ASSERT_DOUBLE_WITHIN(3.0, 100.0 * (ratio[i] - 1.0), get("fw.kphi_change_percent"));
     }
+}
+
+void test_wrong_resistance_is_learnt_where_a_load_shows_it(void)
+{
+    static const double ratio[] = { 0.7, 1.5 };
+    double rs = get("motor.rs_ohm");
+    for (size_t i = 0; i < sizeof ratio / sizeof ratio[0]; i++) {
+        set("motor.rs_ohm", rs * ratio[i]);
+        (void)assert_holds_under_load(500.0, 0.06);
+        wait_s(1.0);
+        TEST_ASSERT_DOUBLE_WITHIN(2.0, 0.0, measure(0.3).angle_rms_deg);
+        TEST_ASSERT_TRUE(get("fw.rs_change_percent") * (ratio[i] - 1.0) > 0.0);
+    }
+}
+
+void test_load_observer_shows_speed_and_load_without_delay_of_an_integral(void)
+{
+    run_at(1500.0);
+    measured_t unloaded = measure(0.2);
+    set("load.constant_nm", 0.05);
+    wait_s(0.05);
+    measured_t m = measure(0.2);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, m.i_q_a, get("fw.load_a"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.08, unloaded.i_q_a + 0.05 / 0.0599, m.i_q_a);
+    TEST_ASSERT_DOUBLE_WITHIN(30.0, get("state.speed_rpm"), get("fw.speed_obs_rpm"));
 }
 
 void test_shunts_see_the_current_at_full_voltage(void)

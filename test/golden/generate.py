@@ -188,13 +188,19 @@ def inverse_park(v, rng):
     rotate(v, rotations(rng, 23170) + [(30350, 0, a) for a in (0, 5000, 20000)], ref.inverse_park, ref.inverse_park_real)
 
 
+@block("phase currents of a current vector: the largest vectors in 24 directions, a random sample",
+       "d, q, phase currents Q13; angle 65536 = one turn", "d:s16 q:s16 angle:u16 a:s16 b:s16 c:s16", least_db=71.0)
+def phases(v, rng):
+    rotate(v, [*rotations(rng, 8192), (0, 8195, 0)], ref.phases_of, ref.phases_of_real)
+
+
 # ---- modulator ------------------------------------------------------------------------------------------------------
 
 @block("modulator at five bus voltages: every sector, its borders and their neighbours, up to and beyond "
        "the voltage circle, every second row with dead-time compensation",
-       "alpha, beta Q13 volts; gain duty per volt count * 65536; currents Q13; a, b, c duty counts; "
+       "alpha, beta Q13 volts; gain duty per volt count * 65536; currents asked for and measured Q13; a, b, c duty counts; "
        "the ratio is that of the line voltages",
-       "alpha:s16 beta:s16 gain:u16 i_a:s16 i_b:s16 i_c:s16 a:u16 b:u16 c:u16", least_db=56.0)
+       "alpha:s16 beta:s16 gain:u16 asked_a:s16 asked_b:s16 asked_c:s16 i_a:s16 i_b:s16 i_c:s16 a:u16 b:u16 c:u16", least_db=56.0)
 def svm(v, rng):
     p = MACHINE.modulator()
     v.constants = dict(p)
@@ -206,13 +212,14 @@ def svm(v, rng):
             for n, angle in enumerate(degrees):
                 vector = cmath.rect(part * radius, math.radians(angle))
                 alpha, beta = round(vector.real), round(vector.imag)
-                currents = [0, 0, 0]
-                if n % 2:
-                    currents = dither(rng, -400, 400, 2) if n % 4 == 1 else dither(rng, -1500, 1500, 2)
+                asked, currents = [0, 0, 0], [0, 0, 0]
+                if n % 2: # around the knee, and as large as those measured, with which they have nothing to do
+                    asked, currents = (dither(rng, -most, most, 2) for most in ((8, 400) if n % 4 == 1 else (1500, 1500)))
+                    asked.append(-sum(asked))
                     currents.append(-sum(currents))
-                a, b, c = ref.svm(p, alpha, beta, gain, currents)
-                ra, rb, rc = ref.svm_real(p, alpha, beta, gain, currents)
-                v.add([alpha, beta, gain, *currents], [a, b, c], [ra - rb, rb - rc], [a - b, b - c])
+                a, b, c = ref.svm(p, alpha, beta, gain, asked, currents)
+                ra, rb, rc = ref.svm_real(p, alpha, beta, gain, asked, currents)
+                v.add([alpha, beta, gain, *asked, *currents], [a, b, c], [ra - rb, rb - rc], [a - b, b - c])
 
 
 # ---- controllers ----------------------------------------------------------------------------------------------------
@@ -409,8 +416,8 @@ def fieldweak_tables(v, _):
 
 
 @block("table look-up: below and at the start speed, every index with its borders and inside, the end, beyond the end",
-       "ref electrical rpm; id Q13; emf_max Q12; ls_q16; above 1 = the filter of field weakening",
-       "ref:s16 index:u16 idref:s16 inv_kfi:s16 emf_max:s16 ls_q16:u16 above:u16", least_db=86.0)
+       "ref electrical rpm; id Q13; ls_q16; above 1 = the filter of field weakening",
+       "ref:s16 index:u16 idref:s16 inv_kfi:s16 ls_q16:u16 above:u16", least_db=86.0)
 def fieldweak(v, rng):
     on_speed, ls_base = 13000, MACHINE.estimator()["ls_q16"]
     v.constants = {"on_speed": on_speed, "ls_base": ls_base}
@@ -420,7 +427,139 @@ def fieldweak(v, rng):
         if x > 32767:
             continue
         out = ref.fieldweak(PUBLISHED, on_speed, ls_base, x)
-        v.add([x], out, ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[4]])
+        v.add([x], out, ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[3]])
+
+
+@block("the back-EMF filter over the speed: its floor, the slope, the full value",
+       "ref electrical rpm; K Q16; per_erpm K per electrical rpm Q13",
+       "k:s16 per_erpm:u16 ref:s16 filter:s16", least_db=62.0)
+def emf_filter(v, rng):
+    for k, period_s in ((4000, 50e-6), (2406, 100e-6), (16000, 140e-6)):
+        corner = 5 * 2 * math.pi / 60 * period_s * 65536 # five times the electrical frequency
+        steep, full = ref.nearest(corner * 8192), int(k / corner)
+        floor = int(ref.FILTER_LEAST / corner)
+        speeds = [0, 1, floor - 8, floor, floor + 8, full // 2, full - 8, full, full + 8, 32767, -32768]
+        speeds.append(-(k // 8 * 65536 // -steep)) # the first to have it in full
+        for x in [*speeds, *(-s for s in speeds[:9]), *dither(rng, floor, full, 12)]:
+            v.add([k, steep, x], [ref.emf_filter(k, steep, x)], [ref.emf_filter_real(k, corner, x)])
+
+
+# ---- adaptation and load observer -----------------------------------------------------------------------------------
+
+def lock(m, model, kphi, resistance, erpm, iq):
+    """What the estimator sees in lock where the motor has `kphi` times the header's Kphi and `resistance` times its R: Ed, Eq, R i_q."""
+    inv_kfi = m.inv_kfi * 16384
+    kfi, rs, _ = model.apply(round(inv_kfi))
+    emf, missing = erpm * 2048 / inv_kfi * kphi, (resistance * model.p["rs_base_q16"] - rs) * iq / 65536
+    ahead = math.asin((erpm * 2048 / kfi - missing) / emf / math.sqrt(2)) - math.pi / 4
+    return (ref.nearest(-abs(emf) * math.sin(ahead)), ref.nearest(emf * math.cos(ahead) + missing), iq * rs // 65536)
+
+
+ADAPTATION_FORMAT = "back-EMF and R i_q Q12; changes kfi, rs Q31; inv_kfi of the table and of the model; the ratio is that of the changes"
+
+
+@block("adaptation to Kphi x0.8 with R x1.5, x1.2 with x0.7, backwards, braking: flux where the speed prevails, R where the current does",
+       ADAPTATION_FORMAT + "; from cleared states", "start:u16 e_d:s16 e_q:s16 ri:s16 kfi:s32 rs:s32", least_db=60.0)
+def adaptation(v, _):
+    p = MACHINE.adaptation() | {"rate_q16": 8192} # the largest, for a fiftieth of the rows
+    v.constants = dict(p)
+    cases = ((0.8, 1.5, 1, 1), (1.2, 0.7, 1, 1), (1.2, 1.5, -1, 1), (0.8, 1.5, 1, -1), (1.2, 0.7, -1, -1))
+    for kphi, resistance, direction, braking in cases:
+        model, real = ref.Adaptation(p), ref.AdaptationReal(p)
+        for n in range(600):
+            erpm, iq = ((5000, 300), (2500, 2000), (8000, 500), (2500, 2000 if braking > 0 else -1000))[n // 20 % 4]
+            seen = lock(MACHINE, model, kphi, resistance, direction * erpm, direction * iq)
+            model.learn(*seen)
+            real.learn(*seen)
+            v.add([int(n == 0), *seen], [model.kfi, model.rs], [real.kfi, real.rs], [model.kfi / 2 ** 31, model.rs / 2 ** 31])
+        missed = [model.kfi / 2 ** 31 - (1 / kphi - 1), model.rs / 2 ** 31 - (resistance - 1)]
+        if max(map(abs, missed)) > 0.01:
+            raise ValueError(f"adaptation: {missed} off after Kphi x{kphi}, R x{resistance}")
+
+
+@block("single steps of the adaptation: ends of the formats, bounds, no information, a random sample",
+       ADAPTATION_FORMAT, "kfi0:s32 rs0:s32 e_d:s16 e_q:s16 ri:s16 inv_kfi0:s16 kfi:s32 rs:s32 inv_kfi:s16 rs_q16:u16 emf_max:s16",
+       least_db=35.0)
+def adaptation_step(v, rng):
+    p = MACHINE.adaptation()
+    v.constants = dict(p)
+    ends = [(p[f"{x}_least"] * 65536, p[f"{x}_most"] * 65536) for x in ("kfi", "rs")]
+    least, big = p["emf_least_q12"], (-32768, 32767)
+    seen = [(d, q, ri) for d in (*big, 0, 1, -1) for q in (*big, least, -least) for ri in (*big, 0, 1, -1)]
+    seen += [(d, q, ri) for d in (50, -50) for q in (least - 1, 1 - least, 0) for ri in (500, -500)]
+    seen += [(*dither(rng, -3000, 3000, 2), *dither(rng, -2000, 2000, 1)) for _ in range(150)]
+    for n, (d, q, ri) in enumerate(seen):
+        model, real = ref.Adaptation(p, *(rng.choice((*e, 0, rng.randrange(*e))) for e in ends)), ref.AdaptationReal(p)
+        before, inv_kfi = (model.kfi, model.rs), rng.choice((2048, 7956, 32767, rng.randrange(2048, 32768)))
+        real.kfi, real.rs = (x / 2 ** 31 for x in before)
+        model.learn(d, q, ri)
+        real.learn(d, q, ri)
+        v.add([*before, d, q, ri, inv_kfi], [model.kfi, model.rs, *model.apply(inv_kfi)],
+              [real.kfi - before[0] / 2 ** 31, real.rs - before[1] / 2 ** 31],
+              [(model.kfi - before[0]) / 2 ** 31, (model.rs - before[1]) / 2 ** 31])
+
+
+OBSERVER_FORMAT = ("op 0 schedule by ref and step, 1 preset to speed ref; heavy 1 = the constants h_; ref electrical rpm; rho 2^-32 turns; "
+                   "iq Q13; omega, load 16 fraction bits; load_q26 Q13 current with 13 fraction bits; the ratio is that of speed and load")
+OBSERVER_COLUMNS = ("op:u16 heavy:u16 ref:s16 rho:u32 iq:s16 omega:s32 load:s32 rate:s16 large:s16 quick:s16 part:s16 load_q26:s32")
+OBSERVED = (MACHINE.observer(), ref.Machine(inertia_kgm2=8e-4, speed_hz=1.5, load_hz=30.0).observer())
+
+
+def observe(v, model, op, heavy, reference, rho, iq, real=None):
+    for each in filter(None, (model, real)):
+        if op:
+            each.preset(rho, reference, iq)
+        else:
+            each.schedule(reference)
+            each.step(rho, iq)
+    m = model
+    v.rows.append([op, heavy, reference, rho, iq, m.omega, m.load, m.rate, m.large, m.quick, m.part, m.load_q26()])
+    if real:
+        v.compare([real.omega, real.load], [model.omega / 65536, model.load / 65536])
+
+
+@block("observer in a loop around a shaft: preset, load on and off at 500 rpm both ways, at 150 rpm, a speed step, a heavy rotor",
+       OBSERVER_FORMAT, OBSERVER_COLUMNS, least_db=58.0)
+def observer(v, rng):
+    v.constants = {f"{prefix}{k}": x for prefix, p in zip(("", "h_"), OBSERVED) for k, x in p.items()}
+    for heavy, erpm, load, on in ((0, 2500, 1555, 200), (0, -2500, 930, 200), (0, 750, 560, 400), (1, 2500, 1000, 250)):
+        p, off = OBSERVED[heavy], on + 200 + 200 * heavy
+        model, real = ref.Observer(p), ref.ObserverReal(p)
+        unit = p["per_current_q16"] / 65536
+        gain = (0.012, 0.003)[heavy] * 2 ** p["shift"] / unit # counts of current per electrical rpm
+        speed, turns, wanted = float(erpm), 0.3, erpm
+        observe(v, model, 1, heavy, erpm, round(turns * 2 ** 32) % 2 ** 32, 40, real)
+        for n in range(off + 150):
+            if n == off + 75:
+                wanted = erpm + (200 if erpm > 0 else -200)
+            iq = round(ref.clamp(gain * model.part / 32768 * (wanted - model.speed) + model.load_q26() / 8192, -5120, 5120))
+            torque = (load if on <= n < off else 25) * (1 if speed > 0 else -1)
+            before = speed
+            speed += (iq - torque) * unit / 2 ** p["shift"]
+            turns += (before + speed) / 2 * 8 * MACHINE.turns_per_erpm
+            seen = turns + rng.uniform(-0.0001, 0.0001) # what dead time leaves on the angle
+            observe(v, model, 0, heavy, wanted, round(seen * 2 ** 32) % 2 ** 32, iq + rng.randrange(-8, 9), real)
+            missed = abs(model.load_q26() / 8192 - torque)
+            if n in (on - 1, off - 1) and (abs(model.speed - speed) > 10 or missed > 30 + 0.03 * abs(torque)):
+                raise ValueError(f"observer: {model.speed} erpm, not {speed:.0f}, load {missed:.0f} counts off")
+
+
+@block("observer at the ends of its formats: fastest speed, largest load, current and innovation of either sign; random inputs",
+       OBSERVER_FORMAT, OBSERVER_COLUMNS)
+def observer_ends(v, rng):
+    v.constants = {f"{prefix}{k}": x for prefix, p in zip(("", "h_"), OBSERVED) for k, x in p.items()}
+    for heavy, p in enumerate(OBSERVED):
+        for sign in (1, -1):
+            model = ref.Observer(p)
+            observe(v, model, 1, heavy, sign * 32700, 0, sign * 8191)
+            for n in range(24):
+                observe(v, model, 0, heavy, sign * 32767, (n * 0x55555555 * sign) % 2 ** 32, sign * 10240)
+            for n in range(24): # every step says half a turn
+                observe(v, model, 0, heavy, -32768, n % 2 << 31, -sign * 10240)
+            for part in (0, p["full_erpm"] // 4, p["full_erpm"] // 2, p["full_erpm"]): # where the shares of the rates bend, under load
+                observe(v, model, 0, heavy, sign * part, 0, 0)
+        for _ in range(40):
+            observe(v, model, 0, heavy, rng.randrange(-32768, 32768), rng.randrange(2 ** 32), rng.randrange(-10240, 10241))
 
 
 @block("start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, every 499th period",
@@ -478,6 +617,8 @@ def params(v, _):
         v.constants |= {f"c{round(amperes * 100)}_{name}": value for name, value in machine.estimator().items()}
     m = MACHINE
     v.constants |= {**{f"svm_{name}": value for name, value in m.modulator().items()},
+                    **{f"observer_{name}": value for name, value in m.observer().items()},
+                    **{f"adaptation_{name}": value for name, value in m.adaptation().items()},
                     "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
                     "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}
 

@@ -140,6 +140,7 @@ def circle_real(x):
 
 # ---- transformations ------------------------------------------------------------------------------------------------
 
+_HALF_SQRT3 = nearest(SQRT3 / 2 * WORD)
 _CLARKE_EXCESS = nearest((2 / SQRT3 - 1) * WORD)
 
 
@@ -171,6 +172,19 @@ def inverse_park_real(d, q, a):
     return (d * math.cos(a) - q * math.sin(a)) / 2, (d * math.sin(a) + q * math.cos(a)) / 2
 
 
+def phases_of(d, q, sine, cosine):
+    """Inverse Park and a = alpha, b = (sqrt(3) beta - alpha)/2, c = -a - b; full counts, rounded to the nearest."""
+    alpha = upper(s32(2 * (d * cosine - q * sine)) + 32768)
+    beta = upper(s32(2 * (d * sine + q * cosine)) + 32768)
+    b = s16(upper(s32(beta * _HALF_SQRT3) + 32768) - alpha // 2)
+    return alpha, b, s16(-alpha - b)
+
+
+def phases_of_real(d, q, a):
+    alpha, beta = (2 * x for x in inverse_park_real(d, q, a))
+    return alpha, (SQRT3 * beta - alpha) / 2, (-SQRT3 * beta - alpha) / 2
+
+
 # ---- the machine: engineering values and what follows from them -----------------------------------------------------
 
 @dataclass(frozen=True)
@@ -189,6 +203,9 @@ class Machine:
     nominal_rpm: float = 2800.0
     maximum_rpm: float = 5500.0
     kfilter_velestim: int = 748
+    inertia_kgm2: float = 5.5e-6
+    speed_hz: float = 13.0
+    load_hz: float = 110.0
 
     @property
     def u0(self):
@@ -224,6 +241,22 @@ class Machine:
         """Flux of the rotor in V s per electrical radian: phase back-EMF per electrical speed."""
         return self.kphi / SQRT3 / (1000 * 2 * math.pi / 60) / self.pole_pairs
 
+    @property
+    def lost_current(self):
+        """Phase current (Q13) that half the bus takes back within the dead time: below it less voltage is lost."""
+        return self.bus_v / 2 * self.dead_time_s / self.ls_h / self.i0 / 4
+
+    @property
+    def dead_time_erpm(self):
+        """What dead time takes from a leg, as the speed of that back-EMF."""
+        return self.bus_v * self.dead_time_s / self.period_s * SQRT3 * 1000 * self.pole_pairs / self.kphi
+
+    @property
+    def acceleration(self):
+        """Of a count of q current (Q13): electrical rpm in a slow step."""
+        torque_per_a = 1.5 * self.pole_pairs * self.psi
+        return torque_per_a / self.inertia_kgm2 * self.pole_pairs * 60 / (2 * math.pi) * 4 * self.i0 * 8 * self.period_s
+
     def current_step(self, rpm, periods=1):
         """Largest change of a sine of the maximum current in some periods: 2 pi f Ts I; in counts of I0."""
         frequency = rpm / 60 * self.pole_pairs
@@ -249,14 +282,41 @@ class Machine:
             "inv_kfi": nearest(self.inv_kfi * 16384),
         }
 
+    def observer(self):
+        """A step is eight periods; the unit of acceleration is 2^-shift electrical rpm a step, half to one a count of current."""
+        shift = min(13, next(s for s in range(1, 14) if s == 13 or self.acceleration >= 2.0 ** (-1 - s)))
+        units = self.acceleration * 2 ** shift
+        quick = 2 * math.pi * self.load_hz * 8 * self.period_s * WORD
+        load_from = clamp(8 * self.lost_current * units, 1, 16000)
+        return {
+            "deltat_q32": nearest(self.turns_per_erpm * 2 ** 32),
+            "per_turn_q12": nearest(WORD * 4096 / (8 * self.turns_per_erpm * 2 ** 32)),
+            "shift": shift, "per_current_q16": min(nearest(units * WORD), 65535), "per_unit_q15": min(nearest(32768 / units), 65535),
+            "innovation_max": int(min(16383, 16000 * WORD * WORD / quick ** 2 / 2 ** shift)),
+            "load_max": int(nearest(self.maximum_current_a / self.i0 / 4) * units),
+            "quiet_q16": int(min(1.22 * self.speed_hz / self.load_hz, 0.3) * quick),
+            "loaded_q16": int(0.3 * quick), "quick_q16": int(quick),
+            "full_erpm": int(60 / 2.7 * self.load_hz), "load_from": int(load_from), "load_width": int(load_from),
+            "load_slope_q15": int(32767 / load_from),
+            "large_erpm": int(0.13 * self.dead_time_erpm), "large_loaded_erpm": int(0.03 * self.dead_time_erpm),
+        }
+
+    def adaptation(self):
+        e = self.estimator()
+        return {
+            "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
+            "rs_most": q15(0.6), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
+            "rs_base_q16": e["rs_q16"],
+        }
+
     def modulator(self):
         """Duty counts: 2 per PWM clock of 25 ns, 100 % = period / 25 ns."""
         clock = 25e-9
         full = nearest(self.period_s / clock)
         dead = nearest(self.dead_time_s / clock)
-        knee = int(1.1 * dead)
+        knee = max(2, nearest(self.lost_current / 4))
         return {"full": full, "top": full - 2 * nearest(self.window_s / clock), "dead_time": dead, "knee_q13": knee,
-                "dead_slope_q16": nearest(dead / knee * WORD), "turn_q13": int(self.current_step(self.maximum_rpm) / 4)}
+                "dead_slope_q8": dead * 256 // knee, "turn_q13": int(self.current_step(self.maximum_rpm) / 4)}
 
     def duty_per_volt_q16(self, bus_v):
         """Duty counts per Q13 voltage count * 65536 for a measured bus."""
@@ -270,36 +330,35 @@ class Machine:
 
 # ---- modulator ------------------------------------------------------------------------------------------------------
 
-_HALF_SQRT3 = nearest(SQRT3 / 2 * WORD)
-
 
 def dead_time(p, i_q13):
     """What dead time takes from a leg, linear up to the knee."""
-    return share(clamp(i_q13, -p["knee_q13"], p["knee_q13"]), p["dead_slope_q16"])
+    return s16(clamp(i_q13, -p["knee_q13"], p["knee_q13"]) * p["dead_slope_q8"]) // 256
 
 
-def svm(p, alpha, beta, duty_per_volt, currents):
-    """Phase voltages in duty counts, centred by min-max injection, moved down to leave the window, then dead time."""
+def svm(p, alpha, beta, duty_per_volt, asked, currents):
+    """Phase voltages in duty counts, centred by min-max injection, moved down to leave the window, then the dead time of the currents
+    asked for, as far as the measured ones allow."""
     a = share(alpha, duty_per_volt)
     t = share(share(beta, duty_per_volt), _HALF_SQRT3)
     phases = [a, s16(t - a // 2), s16(-t - a // 2)]
     shift = s16(p["full"] - max(phases) - min(phases)) // 2
     shift = min(shift, p["top"] - max(phases))
-    return [leg(p, s16(u + shift), i) for u, i in zip(phases, currents)]
+    return [leg(p, s16(u + shift), *both) for u, *both in zip(phases, asked, currents)]
 
 
-def leg(p, u, i_q13):
+def leg(p, u, asked_q13, i_q13):
     """Inside the window; its dead time may go beyond only where the current surely keeps its sign to the next sample."""
-    return clamp(clamp(u, 0, p["top"]) + dead_time(p, i_q13), 0, p["full"] if i_q13 > p["turn_q13"] else p["top"])
+    return clamp(clamp(u, 0, p["top"]) + dead_time(p, asked_q13), 0, p["full"] if i_q13 > p["turn_q13"] else p["top"])
 
 
-def svm_real(p, alpha, beta, duty_per_volt, currents):
+def svm_real(p, alpha, beta, duty_per_volt, asked, currents):
     k = duty_per_volt / WORD
     phases = [k * alpha, k * (-alpha + SQRT3 * beta) / 2, k * (-alpha - SQRT3 * beta) / 2]
     shift = (p["full"] - max(phases) - min(phases)) / 2
     shift = min(shift, p["top"] - max(phases))
     knee = p["knee_q13"]
-    legs = [clamp(u + shift, 0, p["top"]) + p["dead_time"] * clamp(i / knee, -1, 1) for u, i in zip(phases, currents)]
+    legs = [clamp(u + shift, 0, p["top"]) + p["dead_time"] * clamp(i / knee, -1, 1) for u, i in zip(phases, asked)]
     return [clamp(u, 0, p["full"] if i > p["turn_q13"] else p["top"]) for u, i in zip(legs, currents)]
 
 
@@ -542,8 +601,21 @@ def between(table, index, fraction_q16):
     return s16(table[index] - (table[index] - table[index + 1]) * fraction_q16 // WORD)
 
 
+FILTER_LEAST = 256
+
+
+def emf_filter(k_q16, per_erpm_q13, ref):
+    """The back-EMF filter's K in Q16: in proportion to the speed, in eighths, from the least up to the parameter."""
+    slow = magnitude(ref) * per_erpm_q13 // WORD
+    return k_q16 if slow >= k_q16 // 8 else 8 * max(slow, FILTER_LEAST // 8)
+
+
+def emf_filter_real(k_q16, per_erpm, ref):
+    return min(k_q16, max(abs(ref) * per_erpm, FILTER_LEAST))
+
+
 def fieldweak(tables, on_speed, ls_base, ref):
-    """Index, Id, 1/Kphi, its EMF limit and Ls for a speed reference; the last interval ends 1/65536 before the end."""
+    """Index, Id, 1/Kphi and Ls for a speed reference; the last interval ends 1/65536 before the end."""
     above = magnitude(ref) - on_speed
     index, rest = divmod(above, FIELDWEAK_STEP) if above > 0 else (0, 0)
     fraction = rest * (WORD // FIELDWEAK_STEP)
@@ -551,7 +623,7 @@ def fieldweak(tables, on_speed, ls_base, ref):
     if index > last:
         index, fraction = last, WORD - 1
     i_d, inv_kfi, ratio = (between(tables[n], index, fraction) for n in ("idref", "inv_kfi", "ls"))
-    return index, i_d, inv_kfi, emf_sum_max(inv_kfi), u16(ls_base * ratio // 2 ** 14), int(above > 0)
+    return index, i_d, inv_kfi, u16(ls_base * ratio // 2 ** 14), int(above > 0)
 
 
 def fieldweak_real(tables, on_speed, ls_base, ref):
@@ -559,6 +631,143 @@ def fieldweak_real(tables, on_speed, ls_base, ref):
     i = min(int(x), len(tables["idref"]) - 2)
     i_d, inv_kfi, ratio = (t[i] + (t[i + 1] - t[i]) * (x - i) for t in (tables["idref"], tables["inv_kfi"], tables["ls"]))
     return i_d, inv_kfi, ls_base * ratio / 2 ** 14
+
+
+# ---- adaptation -----------------------------------------------------------------------------------------------------
+
+@dataclass
+class Adaptation:
+    """Changes of 1/Kphi and R against the header, Q31; p is Machine.adaptation()."""
+    p: dict
+    kfi: int = 0
+    rs: int = 0
+
+    @staticmethod
+    def bounded(x, low, high):
+        return high * WORD if upper(x) >= high else low * WORD if upper(x) < low else x
+
+    def learn(self, e_d, e_q, ri):
+        """An error, Q15 of the voltage, is taken back by the flux and by R at rates that share out the voltage."""
+        p, total = self.p, u16(magnitude(e_q) + magnitude(ri))
+        if magnitude(e_q) < p["emf_least_q12"]:
+            return
+        error = s16(min(magnitude(e_d), total - 1) * 32768 // total) * (-1 if e_d < 0 else 1)
+        by_flux = magnitude(e_q) * 32768 // u16(total + 1)
+        flux_rate = upper(2 * s16(by_flux) * p["rate_q16"] + 32768)
+        self.kfi = self.bounded(self.kfi - error * flux_rate, p["kfi_least"], p["kfi_most"])
+        along = -error if (ri < 0) != (e_q < 0) else error
+        self.rs = self.bounded(self.rs + along * (p["rate_q16"] - flux_rate), p["rs_least"], p["rs_most"])
+
+    def apply(self, inv_kfi):
+        """@param inv_kfi of the table @return 1/Kphi, R and the EMF limit"""
+        kfi = clamp(inv_kfi + 2 * share(inv_kfi, upper(self.kfi)), 2048, 32767)
+        rs = min(self.p["rs_base_q16"] + 2 * share(upper(self.rs), self.p["rs_base_q16"]), 65535)
+        return kfi, u16(rs), emf_sum_max(kfi)
+
+
+class AdaptationReal(Adaptation):
+    """The same in float64; the changes are fractions."""
+
+    def learn(self, e_d, e_q, ri):
+        p, total = self.p, abs(e_q) + abs(ri)
+        if abs(e_q) < p["emf_least_q12"]:
+            return
+        step = min(abs(e_d) / total, 1) * p["rate_q16"] / WORD * (-1 if e_d < 0 else 1)
+        self.kfi = clamp(self.kfi - step * abs(e_q) / total, p["kfi_least"] / 32768, p["kfi_most"] / 32768)
+        self.rs = clamp(self.rs + step * ri / total * (1 if e_q >= 0 else -1), p["rs_least"] / 32768, p["rs_most"] / 32768)
+
+    def apply(self, inv_kfi):
+        kfi = clamp(inv_kfi * (1 + self.kfi), 2048, 32767)
+        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), 65535), 32767 * 2048 / kfi
+
+
+# ---- load observer --------------------------------------------------------------------------------------------------
+
+FASTEST = 32700 * WORD
+
+
+def toward(a, b, share_q15):
+    """a + (b - a) share"""
+    return s16(a + upper(2 * s32(s16(b - a) * share_q15)))
+
+
+@dataclass
+class Observer:
+    """Speed (erpm, 16 fraction bits) and load (units, the same) of the shaft; p is Machine.observer()."""
+    p: dict
+    omega: int = 0
+    load: int = 0
+    rho: int = 0
+    rate: int = 0
+    large: int = 0
+    quick: int = 0
+    part: int = 0
+
+    @property
+    def speed(self):
+        return upper(self.omega)
+
+    def load_q26(self):
+        """The q current that holds the load, Q13 with 13 fraction bits."""
+        return s32(upper(self.load + 32768) * self.p["per_unit_q15"]) // 4
+
+    def preset(self, rho, speed, iq):
+        self.rho, self.omega, self.load, self.quick = rho, speed * WORD, share(iq, self.p["per_current_q16"]) * WORD, 0
+
+    def schedule(self, ref):
+        p, speed = self.p, magnitude(ref)
+        loaded = s16(clamp(s16(magnitude(upper(self.load)) - p["load_from"]), 0, p["load_width"]) * p["load_slope_q15"])
+        slow = speed * 32768 // p["full_erpm"] if speed < p["full_erpm"] else 32767
+        self.part = toward(slow, 2 * slow if slow < 16384 else 32767, loaded)
+        rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
+        self.rate = toward(rate, toward(0, p["quick_q16"], self.part), self.quick)
+        self.large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
+
+    def innovation(self, rho, middle):
+        """By how much the angle turned further than the speed says, rounded to counts of 2^-16 turns, then to electrical rpm."""
+        p = self.p
+        more = upper((rho - self.rho - 8 * middle * p["deltat_q32"] + 32768 + (1 << 31)) % (1 << 32) - (1 << 31))
+        self.rho = rho
+        return clamp(s16((clamp(more, -8192, 8191) * p["per_turn_q12"] + 2048) // 4096), -p["innovation_max"], p["innovation_max"])
+
+    def step(self, rho, iq):
+        p, before = self.p, self.omega
+        self.omega = self.sum(before, s32(s32(iq * p["per_current_q16"]) - self.load) // 2 ** p["shift"])
+        innovation = self.innovation(rho, upper(before // 2 + self.omega // 2))
+        self.omega = self.sum(self.omega, s32(2 * innovation * self.rate))
+        load = s32(self.load - s32((innovation * self.rate ** 2 // WORD) << p["shift"]))
+        self.load = clamp(load, -p["load_max"] * WORD, p["load_max"] * WORD)
+        self.quick = 32767 if abs(innovation) > self.large else self.quick - (self.quick >> 5)
+
+    @staticmethod
+    def sum(omega, change):
+        return s32(clamp(omega + s32(change), -FASTEST, FASTEST))
+
+
+class ObserverReal(Observer):
+    """The same in float64, speed and load in their units, angles in 2^-32 turns; no limits but the load's."""
+
+    def preset(self, rho, speed, iq):
+        self.rho, self.omega, self.load, self.quick = rho, float(speed), iq * self.p["per_current_q16"] / WORD, 0.0
+
+    def schedule(self, ref):
+        p = self.p
+        loaded = clamp((abs(self.load) - p["load_from"]) / p["load_width"], 0, 1)
+        slow = min(abs(ref) / p["full_erpm"], 1)
+        self.part = slow + (min(2 * slow, 1) - slow) * loaded
+        rate = p["quiet_q16"] * slow * (1 - loaded) + p["loaded_q16"] * self.part * loaded
+        self.rate = (rate + (p["quick_q16"] * self.part - rate) * self.quick) / WORD
+        self.large = p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32
+
+    def step(self, rho, iq):
+        p, before = self.p, self.omega
+        self.omega += (iq * p["per_current_q16"] / WORD - self.load) / 2 ** p["shift"]
+        turned = (rho - self.rho + (1 << 31)) % (1 << 32) - (1 << 31)
+        innovation = turned / 8 / p["deltat_q32"] - (before + self.omega) / 2
+        self.rho = rho
+        self.omega += 2 * innovation * self.rate
+        self.load = clamp(self.load - innovation * self.rate ** 2 * 2 ** p["shift"], -p["load_max"], p["load_max"])
+        self.quick = 1.0 if abs(innovation) > self.large else self.quick * 31 / 32
 
 
 # ---- start ----------------------------------------------------------------------------------------------------------

@@ -4,10 +4,12 @@
  * options: -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40 */
 #include "any.h"
 
+#include "control/adaptation.h"
 #include "control/current_control.h"
 #include "control/estimator.h"
 #include "control/fieldweak.h"
 #include "control/forced_angle.h"
+#include "control/observer.h"
 #include "control/speed_ramp.h"
 #include "control/svm.h"
 #include "drive/param_scaling.h"
@@ -26,10 +28,78 @@ void proof_qmath(void)
     (void)qm_mulhi_su(a, u);
     (void)qm_mulhi_uu(u, ANYU16());
     (void)qm_clamp(a, low, b);
+    b = qm_share(u, any_u(1, UINT16_MAX));
+    //@ check 0 <= b;
     a = qm_abs(a);
     //@ check 0 <= a <= 32767;
     a = qm_sub_limited(ANY16(), ANY16());
     //@ check -16383 <= a <= 16383;
+}
+
+static void clamp_hi_between(int16_t low, int16_t high)
+{
+    int32_t x = qm_clamp_hi(any_l(INT32_MIN, INT32_MAX), low, high);
+    //@ check limited: low * 65536 <= x <= high * 65536;
+}
+
+/** qm_clamp_hi: the limits that the build gives it, and the widest; qm_shift: a number that fits keeps its sign. */
+void proof_qmath_long(void)
+{
+    set_bounds();
+    clamp_hi_between(params.adaptation.kfi_least, params.adaptation.kfi_most);
+    clamp_hi_between(params.adaptation.rs_least, params.adaptation.rs_most);
+    clamp_hi_between((int16_t)-params.observer.load_max, params.observer.load_max);
+    clamp_hi_between(INT16_MIN, INT16_MAX);
+    //@ loop unroll 16;
+    for (uint16_t bits = 0; bits < 16; bits++) {
+        int32_t most = (int32_t)(INT32_MAX >> bits), y = qm_shift(any_l(0, most), bits), z = qm_shift(any_l(-most, -1), bits);
+        //@ check sign: 0 <= y && z < 0;
+    }
+}
+
+/** 256 values from `low` on, each alone; the analyser keeps loops of that length apart quickly. */
+#define EACH_OF_256(x, low) for (uint16_t x = (uint16_t)(low), end = (uint16_t)((low) + 255u), more = 1; more; more = (uint16_t)(x++ != end))
+
+static void between_from(uint16_t low)
+{
+    //@ loop unroll 256;
+    EACH_OF_256(apart, low) {
+        int16_t up = observer_between(0, (int16_t)apart, any(0, 32767)), down = observer_between((int16_t)apart, 0, any(0, 32767));
+        //@ check between: 0 <= up <= apart && 0 <= down <= apart;
+    }
+}
+
+/** observer_between: for numbers that are not negative, the result is between them, whatever their difference. */
+void proof_between(void)
+{
+    //@ loop unroll 128;
+    for (uint16_t low = 0; low <= 32512u; low = (uint16_t)(low + 256u)) {
+        between_from(low);
+    }
+}
+
+static void omega_from(uint16_t low)
+{
+    static const adaptation_params_t p;
+    static const adaptation_t a;
+    //@ loop unroll 256;
+    EACH_OF_256(inv_kfi, low) {
+        motor_model_t model;
+        int16_t omega;
+        model.inv_kfi = (int16_t)inv_kfi;
+        adaptation_apply(&a, &p, &model);
+        omega = estimator_omega(ANY16(), model.emf_sum_max_q12, model.inv_kfi);
+        //@ check speed: -32767 <= omega <= 32767;
+    }
+}
+
+/** estimator_omega: every 1/Kphi, with the limit that adaptation_apply() leaves beside it, keeps the speed in 16 bits. */
+void proof_omega(void)
+{
+    //@ loop unroll 128;
+    for (uint16_t low = 2048; low <= 32512u; low = (uint16_t)(low + 256u)) {
+        omega_from(low);
+    }
 }
 
 /** trig.h: every angle and every x; sine, cosine and chord stay within Q15. */
@@ -88,28 +158,19 @@ static void pi_pieces(int16_t shift, int16_t error_max, int16_t limit_low, int16
     }
 }
 
-/** pi.h, current controllers: the integrator keeps its bound for all gains, errors and limits. */
-void proof_pi_current(void)
+/** pi.h: the integrator keeps its bound for all gains, errors and limits. */
+void proof_pi(void)
 {
     pi_pieces(CURRENT_PI_SHIFT, PI_ERROR_MAX, 0, INT16_MAX);
 }
 
-/** pi.h, speed controller. */
-void proof_pi_speed(void)
-{
-    pi_pieces(SPEED_PI_SHIFT, 16383, 0, 8192);
-}
-
-/** Presetting an integrator for any output and error stays within its bound. */
+/** Presetting an integrator for any output stays within its bound. */
 void proof_pi_preset(void)
 {
     pi_gains_t gains = { any(0, INT16_MAX), 0, 0, CURRENT_PI_SHIFT };
     pi_t pi;
     pi_preset(&pi, &gains, 0, ANY16());
     //@ check current: -SUM_MAX <= pi.sum <= SUM_MAX;
-    gains.shift = SPEED_PI_SHIFT;
-    pi_preset(&pi, &gains, any(-16383, 16383), any(-8192, 8192));
-    //@ check speed: -SUM_MAX <= pi.sum <= SUM_MAX;
 }
 
 #define SVM_PIECES 24
@@ -123,21 +184,51 @@ static int16_t nearest(int16_t k)
     return (low > 0) ? low : (high < 0) ? (int16_t)-high : 0;
 }
 
+static void dead_time_from(uint16_t low)
+{
+    svm_params_t p;
+    //@ loop unroll 256;
+    EACH_OF_256(knee, low) {
+        int16_t duty;
+        p.knee_q13 = (int16_t)knee;
+        p.dead_time = any(20, 120);
+        p.dead_slope_q8 = (int16_t)(p.dead_time * 256 / knee);
+        duty = svm_dead_time(&p, ANY16());
+        //@ check most: -120 <= duty <= 120;
+    }
+}
+
+/** svm_dead_time: every knee; what is given back is at most what dead time takes. */
+void proof_dead_time(void)
+{
+    //@ loop unroll 32;
+    for (uint16_t low = 2; low <= 8192u; low = (uint16_t)(low + 256u)) {
+        dead_time_from(low);
+    }
+}
+
 static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
 {
     svm_params_t p;
     alphabeta_t v;
+    phases_t asked, measured;
     duties_t d;
 
     p.full = any(1600, 5600);
     p.top = any(1280, 5480);
     p.dead_time = any(20, 120);
-    p.knee_q13 = any(20, 240);
-    p.dead_slope_q16 = ANYU16();
+    p.knee_q13 = 20;
+    p.dead_slope_q8 = any(256, 1536); /* each knee: see proof_dead_time */
     p.turn_q13 = any(0, 8192);
     v.alpha = PIECE(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, alpha, SVM_PIECES);
     v.beta = PIECE(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, beta, SVM_PIECES);
-    d = svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), any(-8192, 8192), any(-8192, 8192), any(-16384, 16384));
+    asked.a = ANY16();
+    asked.b = ANY16();
+    asked.c = ANY16();
+    measured.a = ANY16();
+    measured.b = ANY16();
+    measured.c = ANY16();
+    d = svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), asked, measured);
     //@ check duties: d.a <= 5600 && d.b <= 5600 && d.c <= 5600;
 }
 
@@ -192,10 +283,9 @@ void proof_fieldweak_trim(void)
     fieldweak_t fw;
     p.trim_max_q13 = any(0, 8192);
     p.trim_step_q13 = any(1, 16);
-    p.margin_q14 = any(0, 4096);
     p.trim_speed_erpm = any(0, INT16_MAX);
     fw.trim_q13 = any(-8192, 0);
-    fieldweak_trim(&fw, &p, ANY16(), ANY16());
+    fieldweak_trim(&fw, &p, any(-28000, 28000), ANY16());
     //@ check trim: -8192 <= fw.trim_q13 <= 0;
 }
 

@@ -15,12 +15,17 @@ static int16_t voltage_max; /**< alpha or beta voltage of a vector in that circl
 static int16_t emf_dq_max;  /**< d or q back-EMF, Q12 */
 static int16_t erpm_max;    /**< speed command */
 static int16_t current_max; /**< d and q reference, Q13 */
+static int16_t sample_shift_max; /**< q current that a sample misses, Q13 */
+static uint16_t rs_max;     /**< R with the adaptation's largest change */
 
-/** Largest integrator of the current and of the speed controllers. */
+/** Largest integrator of the current controllers. */
+#define RATE_MOST_Q16 24576 /* LOAD_BANDWIDTH_HZ's relation in param_table.h */
 #define SUM_MAX 1350000000l
 /** Inputs of the controllers for which that is proved. */
 #define PI_ERROR_MAX 22400
 #define PI_KC_MIN 29491 /* 0.9 */
+/** Measured q current with what the sample misses, Q13. */
+#define IQ_MAX 22000
 
 /** Largest ls_q16 that field weakening can set. */
 static uint16_t largest_ls(void)
@@ -34,11 +39,19 @@ static uint16_t largest_ls(void)
     return (uint16_t)(qm_muluu(params.fieldweak.ls_base_q16, (uint16_t)most) >> 14);
 }
 
+/** Largest rs_q16 that the adaptation can set. */
+static uint16_t largest_rs(void)
+{
+    const adaptation_params_t *a = &params.adaptation;
+    int32_t rs = a->rs_base_q16 + 2 * (int32_t)qm_mulhi_su(a->rs_most, a->rs_base_q16);
+    return (uint16_t)((rs > 65535) ? 65535 : rs);
+}
+
 /** Length of Equation 4's vector in Q13: circle, resistance, and an inductance with both axes at their limit. */
 static int32_t longest_emf(void)
 {
     const estimator_params_t *e = &params.estimator;
-    int32_t resistive = ((int32_t)qm_mulhi_su(beta_max, e->rs_q16) + 1) * (1 << e->rs_exp);
+    int32_t resistive = (int32_t)(e->resistive_max + 1) * (1 << e->rs_exp);
     int32_t fast = (int32_t)qm_mulhi_su((int16_t)(8 * e->d_ilimit_hs_q14), largest_ls()) * (1 << e->ls_exp);
     int32_t slow = (int32_t)qm_mulhi_su(e->d_ilimit_ls_q14, largest_ls()) * (1 << e->ls_exp) * 9 / 8; /* turned: sqrt(1 + 0.5^2) */
     int32_t inductive = (fast > slow) ? fast : slow;
@@ -53,12 +66,14 @@ static void set_bounds(void)
     alpha_max = (int16_t)(2 * params.overcurrent_q13);
     beta_max = (int16_t)(((int32_t)params.overcurrent_q13 * 18919 >> 13) + 8);
     radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_over_q15 << 1), params.voltage_limit_per_bus_q16);
+    rs_max = largest_rs();
     voltage_max = (int16_t)(radius_max / 2 + radius_max / 64 + 8);
     /* Park halves it; the turn by half a step h to the middle of the period lengthens it by sqrt(1 + h^2) < 1 + h^2 / 2 */
     half_step = qm_mulhi(32767, params.estimator.half_step_q16_rad) + 1;
     emf_dq_max = (int16_t)(longest_emf() / 2 + (longest_emf() * (half_step * half_step / 65536) >> 18) + 4);
     erpm_max = params.maximum_erpm;
     current_max = params.current_max_q13;
+    sample_shift_max = (int16_t)(qm_mulhi(32767, params.sample_shift_q16) + 1);
 }
 
 #endif

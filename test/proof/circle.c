@@ -125,3 +125,43 @@ void proof_circle(void)
         }
     }
 }
+
+/** One filter of the back-EMF with y in low..high and any x. */
+static void lowpass_piece(int16_t k, int16_t low, int16_t high)
+{
+    int32_t y = any_l(low * 65536l, high * 65536l + 65535);
+    (void)qm_lowpass(&y, any((int16_t)-emf_dq_max, emf_dq_max), k);
+    //@ check y: emf_dq_max * -65536 <= y <= emf_dq_max * 65536 + 65535;
+}
+
+/** Pieces of y that shrink towards its ends; the pieces from both ends meet. */
+static void lowpass_with(int16_t k)
+{
+    static const int16_t widths[] = { -1, 0, 4, 20, 84, 340, 1364, 5460, 20000 };
+    //@ loop unroll 8;
+    for (int16_t i = 1; i < 9; i++) {
+        lowpass_piece(k, (int16_t)(widths[i - 1] + 1 - emf_dq_max), (int16_t)(widths[i] - emf_dq_max));
+        lowpass_piece(k, (int16_t)(emf_dq_max - widths[i]), (int16_t)(emf_dq_max - widths[i - 1] - 1));
+    }
+}
+
+static void lowpass_from(int16_t k)
+{
+    //@ loop unroll 16;
+    for (int16_t n = 0; n < 16; n++) {
+        lowpass_with((int16_t)(k + 8 * n));
+    }
+}
+
+/** The filtered back-EMF stays in the range of the back-EMF, with every filter that fieldweak_tick() can choose. */
+void proof_lowpass(void)
+{
+    set_bounds();
+    //@ check met: 2 * emf_dq_max <= 40000;
+    lowpass_with(params.fieldweak.kfilter_esdq_q16);
+    lowpass_with(params.fieldweak.kfilter_esdq_fw_q16);
+    //@ loop unroll 128;
+    for (int16_t k = FIELDWEAK_FILTER_LEAST; k < params.fieldweak.kfilter_esdq_q16 || k < params.fieldweak.kfilter_esdq_fw_q16; k += 128) {
+        lowpass_from(k);
+    }
+}

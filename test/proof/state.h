@@ -64,27 +64,48 @@ static void any_estimator(estimator_t *e)
     e->half_step_q16_rad = qm_mulhi(e->omega_erpm, params.estimator.half_step_q16_rad);
 }
 
+static void any_observer_state(observer_t *o)
+{
+    o->omega_q16 = any_l(-32767 * 65536l, 32767 * 65536l);
+    o->load_q16 = any_l((params.observer.load_max + 1) * -65536l, params.observer.load_max * 65536l);
+    o->rho_q32 = any_ul(0, UINT32_MAX);
+    o->rate_q16 = any(0, params.observer.quick_q16);
+    o->large_erpm = any(0, (int16_t)(params.observer.large_erpm + 1024));
+    o->quick_q15 = any(0, 32767);
+    o->unrest_steps = ANYU16();
+    o->share_q15 = any(0, 32767);
+}
+
+static void any_adaptation(adaptation_t *a)
+{
+    a->kfi_q31 = any_l(params.adaptation.kfi_least * 65536l, params.adaptation.kfi_most * 65536l);
+    a->rs_q31 = any_l(params.adaptation.rs_least * 65536l, params.adaptation.rs_most * 65536l);
+}
+
 static void any_control(drive_control_t *c)
 {
-    c->reference_erpm = any(-32767, 32767); /* TORQUE_MODE: the estimated speed */
+    c->reference_erpm = any(-32767, 32767); /* TORQUE_MODE: the observed speed */
     c->ref_q13.d = any((int16_t)-current_max, current_max);
     c->ref_q13.q = any((int16_t)-current_max, current_max);
     c->iq_limit_q13 = any(0, current_max);
     c->brake_limit_q13 = any(0, current_max);
     c->i_q13.d = ANY16();
-    c->i_q13.q = ANY16();
+    c->i_q13.q = any(-IQ_MAX, IQ_MAX);
     c->v_q14.d = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
     c->v_q14.q = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
     c->vq_limit_q14 = any(0, radius_max);
     c->pi_d.sum = any_l(-SUM_MAX, SUM_MAX);
     c->pi_q.sum = any_l(-SUM_MAX, SUM_MAX);
-    c->pi_speed.sum = any_l(-SUM_MAX, SUM_MAX);
+    c->speed_kp_q13 = any(0, params.speed_kp_quick_q13);
+    c->sample_shift_q13 = any((int16_t)-sample_shift_max, sample_shift_max);
 }
 
 static void bounds_hold_again(void)
 {
     const estimator_t *e = &drive.run.estimator;
     const drive_control_t *c = &drive.run.control;
+    const observer_t *o = &drive.run.observer;
+    const adaptation_t *a = &drive.run.adaptation;
     //@ check state: drive.state <= DRIVE_FAULT && drive.fault < FAULT_COUNT;
     //@ check direction: drive.direction == 1 || drive.direction == -1;
     //@ check command: 0 <= drive.command.run <= 1 && -erpm_max <= drive.command.target_erpm <= erpm_max;
@@ -110,10 +131,20 @@ static void bounds_hold_again(void)
     //@ check v: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max && -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;
     //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;
     //@ check sums: -SUM_MAX <= c->pi_d.sum <= SUM_MAX && -SUM_MAX <= c->pi_q.sum <= SUM_MAX;
-    //@ check sum_speed: -SUM_MAX <= c->pi_speed.sum <= SUM_MAX;
+    //@ check measured: -IQ_MAX <= c->i_q13.q <= IQ_MAX;
+    //@ check gain: 0 <= c->speed_kp_q13 <= params.speed_kp_quick_q13;
+    //@ check sample_shift: -sample_shift_max <= c->sample_shift_q13 <= sample_shift_max;
+    //@ check observed_speed: -32767 * 65536 <= o->omega_q16 <= 32767 * 65536;
+    //@ check observed_load: (params.observer.load_max + 1) * -65536 <= o->load_q16 <= params.observer.load_max * 65536;
+    //@ check rate: 0 <= o->rate_q16 <= params.observer.quick_q16;
+    //@ check large: 0 <= o->large_erpm <= params.observer.large_erpm + 1024;
+    //@ check quick: 0 <= o->quick_q15 && 0 <= o->share_q15;
+    //@ check learnt_kfi: params.adaptation.kfi_least * 65536 <= a->kfi_q31 <= params.adaptation.kfi_most * 65536;
+    //@ check learnt_rs: params.adaptation.rs_least * 65536 <= a->rs_q31 <= params.adaptation.rs_most * 65536;
+    //@ check model_rs: drive.run.model.rs_q16 <= rs_max;
     //@ check trim: -params.fieldweak.trim_max_q13 <= drive.run.fieldweak.trim_q13 <= 0;
     //@ check table: drive.run.fieldweak.index < FIELDWEAK_ENTRIES;
-    //@ check counts: drive.run.stall_steps <= params.stall_steps + 1 && drive.run.lost_lock_steps <= params.lost_lock_steps + 1;
+    //@ check counts: drive.run.stall_steps <= params.stall_steps + 1 && drive.run.lost_lock_steps <= params.lost_lock_steps + 2;
 }
 
 #endif

@@ -2,7 +2,7 @@
  *
  * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
- * options: -eva-domains equality,symbolic-locations -eva-subdivide-non-linear-function vd_limit:100
+ * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between -eva-subdivide-non-linear-function vd_limit:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
  *     -eva-slevel-function drive_tick:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
  *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20 */
@@ -16,6 +16,14 @@ static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16
 static inline alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13);
 static inline alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc);
 static inline int16_t speed_ramp_in_pieces(int16_t reference, int16_t target, int16_t step_erpm);
+
+/*@ assigns \result \from sum, sum_max, inv_kfi;
+    admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: adaptation_apply() alone writes the last two */
+static inline int16_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi);
+
+/*@ assigns \result \from a, b, share;
+    admit ensures between: a <= \result <= b || b <= \result <= a; */ /* blocks.c, proof_between */
+static inline int16_t observer_between(int16_t a, int16_t b, q15_t share);
 
 /* In the drive, a call of a block that was proved alone (blocks.c, circle.c) goes through what was proved of it. */
 #include "control/pi.h"
@@ -33,6 +41,12 @@ static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t
 static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
                                            dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q);
 #define current_control current_control_bounded
+#include "control/adaptation.h"
+#include "control/observer.h"
+static inline void observer_step_bounded(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13);
+static inline void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12);
+#define observer_step observer_step_bounded
+#define adaptation_learn adaptation_learn_bounded
 #include "drive/tick.h"
 #undef trig_sincos
 #undef trig_sincos_called
@@ -43,6 +57,8 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 #undef speed_ramp
 #undef pi_tick
 #undef current_control
+#undef observer_step
+#undef adaptation_learn
 
 static drive_t drive;
 
@@ -63,6 +79,17 @@ static inline q15_t circle_bounded(q15_t x)
     return any(0, 32767);
 }
 
+/** circle.c, proof_lowpass: the back-EMF, whose filter follows the speed. */
+static inline int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
+{
+    const fieldweak_params_t *p = &params.fieldweak;
+    //@ admit length_of_the_back_emf: -emf_dq_max <= x <= emf_dq_max;
+    //@ check filter: (FIELDWEAK_FILTER_LEAST <= k_q16 && k_q16 % 8 == 0) || k_q16 == p->kfilter_esdq_q16 || k_q16 == p->kfilter_esdq_fw_q16;
+    //@ check largest: k_q16 <= p->kfilter_esdq_q16 || k_q16 <= p->kfilter_esdq_fw_q16;
+    *y_q16 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535);
+    return qm_hi(*y_q16);
+}
+
 /** y += K (x - y) stays in the range of x, but only because y is near x at its ends: pieces that shrink towards them. */
 static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16)
 {
@@ -71,9 +98,7 @@ static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16
     if (y_q16 == &drive.bus_q31) {
         low = 0;
     } else if (y_q16 != &drive.run.estimator.omega_filtered_q16) {
-        low = (int16_t)-emf_dq_max;
-        high = emf_dq_max;
-        //@ admit length_of_the_back_emf: low <= x <= high;
+        return lowpass_bounded(y_q16, x, k_q16);
     }
     //@ check input: low <= x <= high;
     for (int i = 0; i < 8; i++) {
@@ -138,13 +163,42 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
     return v;
 }
 
+/** observer.c, proof_observer_step: speed and load stay in their formats for these parameters and this current. */
+static inline void observer_step_bounded(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
+{
+    int32_t square = qm_mulss(p->quick_q16, p->quick_q16) >> 10;
+    int64_t largest = (int64_t)p->innovation_max * square << p->shift;
+    //@ check formats: 1 <= p->shift <= 13 && 32768 <= p->per_current_q16 && 0 < p->load_max <= 8192;
+    //@ check angle: 2863 <= p->deltat_q32 <= 10023 && 3347 <= p->per_turn_q12 <= 11719;
+    //@ check rate: 0 <= o->rate_q16 <= p->quick_q16 <= RATE_MOST_Q16;
+    //@ check innovation: 0 < p->innovation_max <= 16383 && largest <= 16000 * 4194304;
+    //@ check current: -IQ_MAX <= iq_q13 <= IQ_MAX;
+    o->omega_q16 = any_l(-32767 * 65536l, 32767 * 65536l);
+    o->load_q16 = any_l(p->load_max * -65536l, p->load_max * 65536l);
+    o->rho_q32 = rho_q32;
+    o->quick_q15 = any(0, 32767);
+    o->unrest_steps = ANYU16();
+}
+
+/** observer.c, proof_adaptation_learn. */
+static inline void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
+{
+    (void)emf_q12;
+    (void)ri_q12;
+    //@ check rate: 0 <= p->rate_q16 <= 8192 && 1 <= p->emf_least_q12;
+    //@ check limits: -16384 <= p->kfi_least <= 0 <= p->kfi_most <= 16384 && -16384 <= p->rs_least <= 0 <= p->rs_most <= 24576;
+    any_adaptation(a);
+}
+
 static void any_state(uint16_t state, uint16_t slot)
 {
     any_drive(state, slot);
     any_estimator(&drive.run.estimator);
     any_control(&drive.run.control);
     drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
-    fieldweak_tick(&drive.run.fieldweak, &params.fieldweak, &drive.run.model, any(-32767, 32767));
+    any_observer_state(&drive.run.observer);
+    any_adaptation(&drive.run.adaptation);
+    drive_update_model(&drive.run, &params, any(-32767, 32767));
 }
 
 static void tick(void)

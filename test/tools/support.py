@@ -67,7 +67,7 @@ def step(*pairs: tuple[float, float]):
 def run(more: str = "", recorded: Trace | None = None, **signals) -> Run:
     """A finished run of scenario(more) with a made-up trace."""
     return Run(scenario(more), trace(**signals) if recorded is None else recorded, [(0.0, "power-up")], [], STATES, FAULTS,
-               wall_s=0.1, motor_s=2.0)
+               params={"MAXIMUM_CURRENT_A": 2.75}, wall_s=0.1, motor_s=2.0)
 
 
 def command(*arguments: str, main=cli.main) -> tuple[int, str, str]:

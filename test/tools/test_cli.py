@@ -51,7 +51,7 @@ BAD = {
                       "did you mean 'OVERVOLTAGE'?"),
     "unknown state": ("[[expect]]\nkind = \"state\"\nname = \"CLOSE\"\nat_s = 1\n", "no state 'CLOSE'", "did you mean 'CLOSED'?"),
     "speed in per cent beyond the header's": ("[[event]]\nat_s = 0.5\nspeed_percent = 5\n", "speed_percent = 5 (140 rpm) is impossible",
-                                              "the header's speeds are 500 .. 5500 rpm"),
+                                              "the header's speeds are 150 .. 5500 rpm"),
 }
 
 
@@ -180,7 +180,7 @@ def test_the_list_of_scenarios_has_a_line_for_each_and_keys_has_unit_and_range_o
     assert code == 0 and re.search(r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w", out)
 
 
-@pytest.mark.parametrize("name", ["run", "table2", "starts", "rated", "robust", "scenarios", "motors", "keys"])
+@pytest.mark.parametrize("name", ["run", "table2", "starts", "rated", "loadsteps", "lowspeed", "robust", "scenarios", "motors", "keys"])
 def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([name, "--help"])

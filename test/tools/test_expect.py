@@ -35,6 +35,11 @@ OVERSHOOT = S2 + expect("hand_over", within_s=0.8, overshoot_percent=10)
 NO_REVERSE = S2 + expect("hand_over", within_s=0.8, no_reverse_motion=True)
 SLOW_STOP = expect("stop", after_s=1.0, within_s=0.5, speed_max_rpm=600)
 STOP = expect("stop", after_s=1.0, within_s=0.3)
+GENTLE_STOP = expect("stop", after_s=1.0, within_s=0.5, brake_max_a=0.5)
+AGAIN = expect("stop", after_s=0.5, to_s=1.0, within_s=0.3)
+BACKWARDS = {sign: off_from(1.2) | {"plant__speed_rpm": step((0, sign * 900), (1.1, sign * -3), (1.15, 0))} for sign in (1, -1)}
+BRAKED = {sign: off_from(1.2) | {"plant__speed_rpm": sign * 900, "plant__i_q": step((0, sign * -9), (0.99, sign * -2.8), (1.15, sign * 9))}
+          for sign in (1, -1)}
 OFF = expect("outputs_off", from_s=1.0, to_s=2.0)
 BUS = expect("bus_voltage", min=20, max=30)
 PEAK = {"fw__i_q_a": step((0, 0), (1.5, 7), (1.6, 0))}
@@ -55,6 +60,9 @@ HOLDS = {
     "hand-over within two seconds if nothing is said": (S2 + expect("hand_over"), CLOSED),
     "overshoot a second after the hand-over": (OVERSHOOT, CLOSED | {"plant__speed_rpm": step((0, 1000), (1.9, 1120))}),
     "stop in time and slow enough": (SLOW_STOP, off_from(1.4) | {"plant__speed_rpm": step((0, 1000), (1.3, 400))}),
+    "stop that counts to its end": (AGAIN, {name: step((0, on), (0.7, 0), (1.1, on))
+                                           for name, on in (("pwm__outputs_on", 21), ("pwm__outputs_seen", 63))}),
+    "stop with the allowed speed and current": (GENTLE_STOP + "lowest_rpm = -3\n", BACKWARDS[1] | {"plant__i_q": -0.5}),
     "outputs off": (OFF, {"pwm__outputs_seen": step((0, 63), (0.9, 0))}),
     "bus voltage": (BUS, {"bus__voltage_v": 24}),
     "signal outside its bounds after the window": (expect("signal", signal="fw.i_q_a", statistic="max", max=5, to_s=1.5), PEAK),
@@ -93,6 +101,9 @@ FAILS = [
     (OVERSHOOT, "hand-over: overshoot", "12.0 %", CLOSED | {"plant__speed_rpm": step((0, 1000), (1.0, 1120), (1.01, 1000))}),
     *((NO_REVERSE, "hand-over: no reverse motion", "-30 rpm", signals) for signals in REVERSED.values()),
     (SLOW_STOP, "stop: speed when the outputs go off", "1000 rpm", off_from(1.4) | {"plant__speed_rpm": 1000}),
+    *((STOP, "stop: lowest speed", "-3.0 rpm", signals) for signals in BACKWARDS.values()),
+    *((STOP, "stop: braking current", "2.80 A", signals) for signals in BRAKED.values()),
+    (GENTLE_STOP, "stop: braking current", "0.60 A", off_from(1.2) | {"plant__i_q": -0.6}),
     (STOP, "stop: outputs off", "0.400 s", off_from(1.4)),
     (STOP, "stop: outputs off", "never", ON),
     (STOP, "stop: outputs off", "on again later", {"pwm__outputs_on": step((0, 21), (1.2, 0), (1.5, 21)),

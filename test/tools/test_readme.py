@@ -40,3 +40,32 @@ def test_a_missing_picture_is_one_line_and_nothing_is_written(result, tmp_path, 
     with pytest.raises(SystemExit, match=r"^foc33: no picture, build/run/demo/speed.png: run `make readme`"):
         readme.main()
     assert (tmp_path / "README.md").read_text() == "as it was"
+
+
+STEP = {"reference_rpm": 500.0, "torque_nm": 0.05, "kphi": 1.0, "dip_percent": 47.6, "on_back_s": 0.03, "off_back_s": 0.04, "beyond": "",
+        "angle_error_max_deg": 5.2}
+
+
+def left(tmp_path, name: str, motor: str, rows: list[dict], **more) -> None:
+    (tmp_path / "build/run" / name).mkdir(parents=True)
+    data = {"motor": f"tuning/motors/{motor}.toml", "rows": rows, "expectations": [{"ok": row.get("ok", True)} for row in rows], **more}
+    (tmp_path / "build/run" / name / "summary.json").write_text(json.dumps(data))
+
+
+@pytest.mark.parametrize("changes, cells", [
+    ({}, "48 % | 0.030 s | 0.040 s | 5°"), ({"on_back_s": None}, "48 % | never | 0.040 s | 5°"),
+    ({"beyond": "needs 14 V", "on_back_s": None}, "48 % (out of reach) | out of reach | 0.040 s | 5°")])
+def test_a_load_step_is_told_with_its_dip_and_its_return(result, tmp_path, changes, cells):
+    left(tmp_path, "loadsteps", "own", [STEP | changes])
+    assert f"| 500 rpm | 0.05 N·m | {cells} |" in readme.loadsteps()
+
+
+def test_every_motor_has_its_line_of_load_steps_and_low_speeds(result, tmp_path):
+    (tmp_path / "tuning/motors").mkdir(parents=True)
+    lowest = [{"lowest_rpm": 120.4}, {"lowest_rpm": None}]
+    for motor, end in (("own", ""), ("other", "-other")):
+        (tmp_path / f"tuning/motors/{motor}.toml").touch()
+        left(tmp_path, f"loadsteps{end}", motor, [STEP, STEP | {"kphi": 0.8, "dip_percent": 90.0, "off_back_s": 0.2, "ok": not end}])
+        left(tmp_path, f"lowspeed{end}", motor, [{"asked_rpm": 151.2}], lowest=lowest)
+    lines = readme.stiffness().splitlines()
+    assert lines[2:] == ["| other | 1 of 2 | 48 % | 0.200 s | 1 of 1 | 151 | 120 / - |", "| own | 2 of 2 | 48 % | 0.200 s | 1 of 1 | 151 | 120 / - |"]

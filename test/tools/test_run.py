@@ -47,7 +47,7 @@ def test_backward_speed_that_is_too_fast_is_a_positive_error():
 @pytest.mark.parametrize("params, percent", [({}, None), ({"MAXIMUM_CURRENT_A": 2.0}, pytest.approx(50.0, abs=1e-3))])
 def test_current_is_compared_with_the_header_s_maximum_by_its_amplitude(params, percent):
     item = run("[[measure]]\nname = \"row\"\nfrom_s = 0.5\nto_s = 1.0\n", plant__i_d=-0.6, plant__i_q=0.8)
-    item.params.update(params)
+    item.params = params
     assert item.measures["row"]["current_of_maximum_percent"] == percent
 
 

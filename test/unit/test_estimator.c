@@ -11,10 +11,12 @@ static estimator_t e;
 void setUp(void)
 {
     static const estimator_params_t p = {
-        .rs_q16 = 32768u, .rs_exp = 0, .ls_exp = 0, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
+        .rs_exp = 0, .ls_exp = 0, .resistive_max = INT16_MAX, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
         .half_step_q16_rad = 11244, .kfilter_velestim_q16 = 1496, .nominal_erpm = 14000, .decimate_erpm = 1400
     };
-    static const motor_model_t t = { .ls_q16 = 16384u, .inv_kfi = 7956, .emf_sum_max_q12 = 8434, .kfilter_esdq_q16 = 2400 };
+    static const motor_model_t t = {
+        .rs_q16 = 32768u, .ls_q16 = 16384u, .inv_kfi = 7956, .emf_sum_max_q12 = 8434, .kfilter_esdq_q16 = 2400
+    };
     static const estimator_t zero;
     params = p;
     tuning = t;
@@ -60,6 +62,21 @@ void test_acting_voltage_is_the_mean_of_the_last_two_vectors(void)
     expect_emf(2000, -800);
 }
 
+void test_resistive_drop_ends_at_its_limit_on_each_axis_and_sign(void)
+{
+    tuning.ls_q16 = 0;
+    params.resistive_max = 1500;
+    back_emf(2000, -4000);
+    back_emf(2000, -4000); /* half of it: 1000 and -2000 */
+    expect_emf(-1000, 1500);
+    back_emf(-4000, 2996);
+    back_emf(-4000, 2996);
+    expect_emf(1500, -1498);
+    params.rs_exp = 1; /* the limit is in the format before it */
+    back_emf(-4000, 2996);
+    expect_emf(3000, -2996);
+}
+
 void test_resistive_drop_is_that_of_the_mean_of_two_currents(void)
 {
     tuning.ls_q16 = 0;
@@ -71,9 +88,34 @@ void test_resistive_drop_is_that_of_the_mean_of_two_currents(void)
     back_emf(4000, -2000);
     expect_emf(-8000, 4000);
     params.rs_exp = 0;
-    params.rs_q16 = 49152u; /* unsigned */
+    tuning.rs_q16 = 49152u; /* unsigned */
     back_emf(4000, -2000);
     expect_emf(-3000, 1500);
+}
+
+void test_resistive_drop_ends_at_what_the_headers_resistance_gives_at_the_trip_level(void)
+{
+    static const struct {
+        const char *what;
+        int16_t i_alpha, i_beta, e_alpha, e_beta;
+    } cases[] = {
+        { "up to the limit", 6000, -6000, -3000, 3000 },
+        { "beyond", 6004, -12000, -3000, 3000 },
+        { "each axis alone, either sign", -12000, 1000, 3000, -500 },
+        { "beta", 1000, 12000, -500, -3000 },
+    };
+    tuning.ls_q16 = 0;
+    params.resistive_max = 3000;
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        back_emf(cases[n].i_alpha, cases[n].i_beta);
+        back_emf(cases[n].i_alpha, cases[n].i_beta); /* the mean of two */
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e.e_q13.alpha, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e.e_q13.beta, cases[n].what);
+    }
+    params.rs_exp = 1; /* the limit is before the doubling */
+    back_emf(12000, -12000);
+    back_emf(12000, -12000);
+    expect_emf(-6000, 6000);
 }
 
 /* ---- Equation 4: inductance ---- */
@@ -104,7 +146,7 @@ void test_step_of_the_current_shows_in_one_span_as_inductive_voltage(void)
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         uint16_t periods = 0;
         setUp();
-        params.rs_q16 = 0;
+        tuning.rs_q16 = 0;
         params.ls_exp = cases[n].ls_exp;
         params.d_ilimit_hs_q14 = cases[n].limit_hs;
         filtered_speed(cases[n].speed);
@@ -122,7 +164,7 @@ void test_step_of_the_current_shows_in_one_span_as_inductive_voltage(void)
 void test_both_derivatives_agree_on_a_slope_and_the_history_is_a_ring_of_eight(void)
 {
     int16_t n;
-    params.rs_q16 = 0;
+    tuning.rs_q16 = 0;
     for (n = 1; n <= 20; n++) {
         back_emf((int16_t)(100 * n), (int16_t)(-60 * n));
         TEST_ASSERT_EQUAL_UINT16((uint16_t)n & 7u, e.newest);
@@ -152,7 +194,7 @@ void test_eight_sample_voltage_is_turned_forward_by_three_and_a_half_steps(void)
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         setUp();
-        params.rs_q16 = 0;
+        tuning.rs_q16 = 0;
         tuning.ls_q16 = cases[n].ls_q16;
         e.half_step_q16_rad = cases[n].half_step;
         filtered_speed(cases[n].speed);

@@ -14,9 +14,9 @@ typedef struct {
 } runner_t;
 
 static const estimator_params_t params = {
-    .rs_q16 = GOLDEN_ESTIMATOR_START_RS_Q16,
     .rs_exp = GOLDEN_ESTIMATOR_START_RS_EXP,
     .ls_exp = GOLDEN_ESTIMATOR_START_LS_EXP,
+    .resistive_max = INT16_MAX,
     .d_ilimit_ls_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_LS_Q14,
     .d_ilimit_hs_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_HS_Q14,
     .deltat_q32 = GOLDEN_ESTIMATOR_START_DELTAT_Q32,
@@ -37,6 +37,7 @@ static void reset(runner_t *r)
 
 void setUp(void)
 {
+    tuning.rs_q16 = GOLDEN_ESTIMATOR_START_RS_Q16;
     tuning.ls_q16 = (uint16_t)GOLDEN_ESTIMATOR_START_LS_Q16;
     tuning.kfilter_esdq_q16 = GOLDEN_ESTIMATOR_START_KFILTER_ESDQ_Q16;
     reset(&ahead);

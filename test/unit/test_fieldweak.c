@@ -1,6 +1,7 @@
-/* Field weakening by table: start speed, every index, interpolation, the end and beyond, and the voltage trim. */
+/* Field weakening by table: start speed, every index, interpolation, the end and beyond, the back-EMF's filter, and the voltage trim. */
 #include "control/fieldweak.h"
 #include "golden.h"
+#include "golden_emf_filter.h"
 #include "golden_fieldweak.h"
 #include "golden_fieldweak_tables.h"
 #include "unity.h"
@@ -21,9 +22,9 @@ void setUp(void)
     params.ls_base_q16 = (uint16_t)GOLDEN_FIELDWEAK_LS_BASE;
     params.kfilter_esdq_q16 = 2400;
     params.kfilter_esdq_fw_q16 = 328;
+    params.esdq_per_erpm_q13 = 14055u; /* 50 us */
     params.trim_max_q13 = 101;
     params.trim_step_q13 = 2;
-    params.margin_q14 = 300;
     params.trim_speed_erpm = 8000;
     fw = zero;
 }
@@ -43,9 +44,10 @@ void test_look_ups_equal_the_reference_in_both_directions(void)
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.index, fw.index, golden_row(n));
             TEST_ASSERT_EQUAL_INT16_MESSAGE(v.idref, fw.table_q13, golden_row(n));
             TEST_ASSERT_EQUAL_INT16_MESSAGE(v.inv_kfi, tuning.inv_kfi, golden_row(n));
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(v.emf_max, tuning.emf_sum_max_q12, golden_row(n));
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.ls_q16, tuning.ls_q16, golden_row(n));
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(v.above ? 328 : 2400, tuning.kfilter_esdq_q16, golden_row(n));
+            if (v.above) {
+                TEST_ASSERT_EQUAL_INT16_MESSAGE(328, tuning.kfilter_esdq_q16, golden_row(n));
+            }
         }
     }
 }
@@ -66,6 +68,43 @@ void test_beyond_the_end_nothing_is_read_and_the_last_entry_holds_to_one_count(v
     }
 }
 
+/* ---- the back-EMF's filter ---- */
+
+void test_filters_equal_the_reference(void)
+{
+    params.on_speed_erpm = 32767;
+    GOLDEN_EACH(emf_filter, v) {
+        params.kfilter_esdq_q16 = v.k;
+        params.esdq_per_erpm_q13 = v.per_erpm;
+        look_up(v.ref);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.filter, tuning.kfilter_esdq_q16, golden_row(n));
+    }
+}
+
+void test_filter_is_as_quick_as_the_rotor_turns_between_its_floor_and_the_parameter(void)
+{
+    static const struct {
+        const char *what;
+        int16_t ref_erpm, filter;
+    } cases[] = {
+        { "the floor at standstill", 0, 256 },
+        { "and up to 149 electrical rpm", 153, 256 },
+        { "then in proportion, in eighths", 154, 264 },
+        { "five times the electrical frequency: 62.5 Hz at 750", 750, 1280 },
+        { "nearly all", 1398, 2392 },
+        { "all of it", 1400, 2400 },
+        { "at any speed above", 13000, 2400 },
+        { "that of field weakening", 13001, 328 },
+        { "whatever the speed", 32767, 328 },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        look_up(cases[n].ref_erpm);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].filter, tuning.kfilter_esdq_q16, cases[n].what);
+        look_up((int16_t)-cases[n].ref_erpm);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].filter, tuning.kfilter_esdq_q16, cases[n].what);
+    }
+}
+
 /* ---- voltage trim ---- */
 
 void test_trim_asks_for_more_d_current_where_voltage_is_short_and_gives_it_back(void)
@@ -74,15 +113,23 @@ void test_trim_asks_for_more_d_current_where_voltage_is_short_and_gives_it_back(
         const char *what;
         int16_t before, free_q14, speed_erpm, after;
     } cases[] = {
-        { "short of voltage", 0, 299, 8001, -2 },
-        { "outside the circle, backwards", -2, -50, -8001, -4 },
-        { "at its limit", -101, 0, 20000, -101 },
-        { "nearly at its limit", -100, 0, 20000, -101 },
-        { "voltage is free", -10, 300, 20000, -8 },
-        { "speed is low", -10, 0, 8000, -8 },
-        { "speed is low, backwards", -10, 0, -8000, -8 },
-        { "nearly nothing is left", -1, 1000, 20000, 0 },
-        { "nothing is left", 0, 1000, 20000, 0 },
+        { "a little short of voltage", 0, -1, 8001, -1 },
+        { "by 16 counts", -2, -16, 8001, -3 },
+        { "by 17", -2, -17, 8001, -4 },
+        { "backwards", -2, -17, -8001, -4 },
+        { "by 192: the most in a step", -2, -192, 8001, -14 },
+        { "outside the circle, backwards", -2, -800, -8001, -14 },
+        { "at its limit", -101, -300, 20000, -101 },
+        { "nearly at its limit", -100, -300, 20000, -101 },
+        { "just enough", -10, 0, 20000, -10 },
+        { "and up to 15 counts more", -10, 15, 20000, -10 },
+        { "16 counts more", -10, 16, 20000, -9 },
+        { "voltage is free", -10, 32, 20000, -8 },
+        { "and plenty", -10, 15700, 20000, -8 },
+        { "speed is low", -10, -300, 8000, -8 },
+        { "speed is low, backwards", -10, -300, -8000, -8 },
+        { "nearly nothing is left", -1, 700, 20000, 0 },
+        { "nothing is left", 0, 700, 20000, 0 },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         fw.trim_q13 = cases[n].before;

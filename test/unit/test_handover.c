@@ -122,7 +122,14 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     slow(7);
 }
 
-void test_vectors_equal_the_reference_and_all_three_controllers_go_on_from_them(void)
+/** q current that keeps the observed speed. */
+static int16_t held_current(void)
+{
+    drive.run.control.iq_limit_q13 = 5120;
+    return speed_current(&drive.run, &params, observer_speed(&drive.run.observer));
+}
+
+void test_vectors_equal_the_reference_and_controllers_and_observer_go_on_from_them(void)
 {
     GOLDEN_EACH(hand_over, v) {
         drive_control_t *c = &drive.run.control;
@@ -138,8 +145,9 @@ void test_vectors_equal_the_reference_and_all_three_controllers_go_on_from_them(
         TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * 5000, c->reference_erpm, golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_d, pi_tick(&c->pi_d, &params.pi_d, 0, 32767), golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_q, pi_tick(&c->pi_q, &params.pi_q, 0, 32767), golden_row(n));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_i_q, pi_tick(&c->pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120),
-                                         golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, v.new_i_q, held_current(), golden_row(n)); /* a unit of load */
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * 4800, observer_speed(&drive.run.observer), golden_row(n));
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE((uint32_t)v.estimated << 16, drive.run.observer.rho_q32, golden_row(n));
     }
 }
 
@@ -158,17 +166,34 @@ void test_estimated_angle_of_the_next_sample_takes_over_with_its_frame(void)
     TEST_ASSERT_EQUAL_INT16(frame.cos, drive.frame.cos);
 }
 
-void test_speed_controller_is_preset_once_and_before_its_first_step(void)
+void test_observer_is_preset_once_and_before_the_first_step_of_the_speed_controller(void)
 {
     handover_now(&drive, &params);
-    drive.run.control.pi_speed.sum = 12345;
+    drive.run.observer.omega_q16 = 12345;
     slow(6);
-    TEST_ASSERT_EQUAL_INT32(12345, drive.run.control.pi_speed.sum);
+    TEST_ASSERT_EQUAL_INT32(12345, drive.run.observer.omega_q16);
     slow(7);
-    TEST_ASSERT_NOT_EQUAL_INT32(12345, drive.run.control.pi_speed.sum);
-    drive.run.control.pi_speed.sum = 0;
+    TEST_ASSERT_EQUAL_INT32(4800L * 65536, drive.run.observer.omega_q16);
+    rig_speed(3000); /* the estimator and the observer: from here on the observer only follows the angle, which stands */
     slow(15);
-    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_speed.sum);
+    TEST_ASSERT_LESS_THAN_INT32(3000L * 65536, drive.run.observer.omega_q16);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.run.observer.omega_q16);
+}
+
+void test_observer_steps_by_the_estimators_angle_and_the_measured_q_current(void)
+{
+    observer_t expected;
+    handover_now(&drive, &params);
+    slow(7);
+    speed_schedule(&drive.run, &params);
+    expected = drive.run.observer;
+    drive.run.estimator.rho_q32 += 0x0B000000ul; /* 48 degrees: faster than the 42 of 4800 erpm in 8 periods */
+    drive.run.control.i_q13.q = 700;
+    observer_step(&expected, &params.observer, drive.run.estimator.rho_q32, 700);
+    slow(15);
+    TEST_ASSERT_EQUAL_INT32(expected.omega_q16, drive.run.observer.omega_q16);
+    TEST_ASSERT_EQUAL_INT32(expected.load_q16, drive.run.observer.load_q16);
+    TEST_ASSERT_GREATER_THAN_INT16(4800, observer_speed(&drive.run.observer));
 }
 
 void test_stop_right_after_the_hand_over_goes_on_from_its_q_current_too(void)
@@ -178,8 +203,7 @@ void test_stop_right_after_the_hand_over_goes_on_from_its_q_current_too(void)
         handover_now(&drive, &params);
         drive.state = (uint16_t)DRIVE_STOPPING; /* the very next period */
         slow(7);
-        TEST_ASSERT_INT16_WITHIN(1, drive.run.control.ref_q13.q,
-                                 pi_tick(&drive.run.control.pi_speed, &params.pi_speed, (int16_t)(direction * 200), 5120));
+        TEST_ASSERT_INT16_WITHIN(2, drive.run.control.ref_q13.q, held_current());
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
     }
 }

@@ -191,8 +191,8 @@ static uint16_t coil(int16_t duties, int16_t di_q13, uint16_t on_q)
         int16_t sign;
         i_q13 = (int16_t)(i_q13 + di_q13 * (id->sign + before) / 2);
         before = id->sign;
-        drive.i_a_q13 = (int16_t)(on_q ? 0 : i_q13);
-        drive.i_b_q13 = (int16_t)(on_q ? i_q13 / 2 : 0);
+        drive.phases_q13.a = (int16_t)(on_q ? 0 : i_q13);
+        drive.phases_q13.b = (int16_t)(on_q ? i_q13 / 2 : 0);
         identify_record(&drive, &params, 1);
         sign = identify_square(id);
         id->sign_before = id->sign;
@@ -552,7 +552,7 @@ void test_sums_begin_after_the_wait_and_only_while_settled(void)
     static const int16_t sums[] = { 0, 0, 0, 7, 14, 14 }; /* three periods of waiting, two of sums, and no more */
     id->mode = (uint16_t)IDENTIFY_CURRENT;
     go(id, IDENTIFY_CONNECT, 3, 2);
-    drive.i_a_q13 = 7;
+    drive.phases_q13.a = 7;
     identify_record(&drive, &params, 0);
     TEST_ASSERT_EQUAL_UINT16(3, id->wait);
     EACH(n, sums) {

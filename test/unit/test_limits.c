@@ -55,12 +55,32 @@ void test_trim_sees_the_voltage_that_q_leaves_unused_in_both_directions(void)
 {
     EACH_DIRECTION(direction) {
         rig_speed((int16_t)(direction * 20000));
-        drive.run.control.v_q14.q = (int16_t)(direction * (16000 - params.fieldweak.margin_q14 + 1));
+        drive.run.control.v_q14.q = (int16_t)(direction * (16000 + 32));
         limits_current(&drive.run, &params);
-        TEST_ASSERT_EQUAL_INT16(-params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
-        drive.run.control.v_q14.q = (int16_t)(direction * (16000 - params.fieldweak.margin_q14));
+        TEST_ASSERT_EQUAL_INT16(-2, drive.run.control.ref_q13.d);
+        drive.run.control.v_q14.q = (int16_t)(direction * (16000 - 32));
         limits_current(&drive.run, &params);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.d);
+    }
+}
+
+void test_missing_q_current_asks_for_voltage_and_current_to_spare_gives_it_back(void)
+{
+    static const struct {
+        int16_t ref_q13, i_q13, free_q14;
+    } cases[] = {
+        { 1000, 1000, 1000 }, { 1000, 990, 960 }, { 1000, 1010, 1040 }, { 1000, 936, 744 }, { 1000, 0, 744 }, { 1000, 1064, 1256 },
+        { 1000, 3000, 1256 }, { 0, -10, 960 }, { 0, 10, 1040 },
+    };
+    EACH(n, cases) {
+        EACH_DIRECTION(direction) {
+            if (cases[n].ref_q13 != 0 || direction > 0) { /* without a reference the sign is the positive direction's */
+                drive.run.control.v_q14.q = (int16_t)(direction * 15000);
+                drive.run.control.ref_q13.q = (int16_t)(direction * cases[n].ref_q13);
+                drive.run.control.i_q13.q = (int16_t)(direction * cases[n].i_q13);
+                TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].free_q14, limits_free_voltage(&drive.run.control), golden_row(n));
+            }
+        }
     }
 }
 
@@ -104,7 +124,7 @@ void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)
     }
 }
 
-void test_brake_limit_does_not_wind_the_speed_controller_up(void)
+void test_braking_that_was_limited_leaves_nothing_behind(void)
 {
     uint16_t n;
     rig_closed(1, 5000);
@@ -115,7 +135,6 @@ void test_brake_limit_does_not_wind_the_speed_controller_up(void)
     }
     TEST_ASSERT_EQUAL_INT16(-300, drive.run.control.ref_q13.q);
     rig_speed(4990); /* just below: the current must turn at once */
-    speed_step(&drive, &params);
     speed_step(&drive, &params);
     TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
 }

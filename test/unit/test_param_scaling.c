@@ -14,9 +14,9 @@
 #define EXACT(value, expected) TEST_ASSERT_EQUAL_INT32_MESSAGE(expected, value, #value)
 
 /** The estimator's part against the reference in float64, at a full scale of the current. */
-#define EXPECT_ESTIMATOR(p, fw, scale) \
+#define EXPECT_ESTIMATOR(p, fw, learns, scale) \
     do { \
-        EXACT((p).rs_q16, GOLDEN_PARAMS_##scale##_RS_Q16); \
+        EXACT((learns).rs_base_q16, GOLDEN_PARAMS_##scale##_RS_Q16); \
         EXACT((p).rs_exp, GOLDEN_PARAMS_##scale##_RS_EXP); \
         EXACT((fw).ls_base_q16, GOLDEN_PARAMS_##scale##_LS_Q16); \
         EXACT((p).ls_exp, GOLDEN_PARAMS_##scale##_LS_EXP); \
@@ -37,11 +37,12 @@ void test_constants_at_3_95_A_are_12990_1460_7956_and_1790(void)
 {
     static const estimator_params_t p = PARAM_ESTIMATOR_INIT;
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
+    static const adaptation_params_t learns = PARAM_ADAPTATION_INIT;
     NEAR(NORM_RS, 12990, 1);
     NEAR(NORM_LSDTBASE, 1460, 1);
     NEAR(NORM_INVKFIBASE, 7956, 1);
     EXACT(NORM_DELTAT, 1790);
-    EXPECT_ESTIMATOR(p, fw, C395);
+    EXPECT_ESTIMATOR(p, fw, learns, C395);
 }
 
 /* AN1292's limits 1502 and 6117 are 2 f Ts of the whole scale. Ours are 2 pi f Ts of the largest current, so that a sine
@@ -94,10 +95,11 @@ void test_constants_at_7_09_A_are_23316_and_2620(void)
 {
     static const estimator_params_t p = PARAM_ESTIMATOR_INIT;
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
+    static const adaptation_params_t learns = PARAM_ADAPTATION_INIT;
     NEAR(NORM_RS, 23316, 1);
     NEAR(NORM_LSDTBASE, 2620, 1);
     NEAR(NORM_INVKFIBASE, 7956, 1);
-    EXPECT_ESTIMATOR(p, fw, C709);
+    EXPECT_ESTIMATOR(p, fw, learns, C709);
 }
 
 /* ---- 22 A: beyond a word, so with exponents ---- */
@@ -108,9 +110,10 @@ void test_constants_at_22_A_get_exponents_and_keep_their_size(void)
 {
     static const estimator_params_t p = PARAM_ESTIMATOR_INIT;
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    EXPECT_ESTIMATOR(p, fw, C2200);
+    static const adaptation_params_t learns = PARAM_ADAPTATION_INIT;
+    EXPECT_ESTIMATOR(p, fw, learns, C2200);
     /* published 9044 * 16 and 8129 * 256 in Q15 */
-    TEST_ASSERT_INT32_WITHIN(20, INT32_C(9044) * 16, (int32_t)p.rs_q16 << p.rs_exp);
+    TEST_ASSERT_INT32_WITHIN(20, INT32_C(9044) * 16, (int32_t)learns.rs_base_q16 << p.rs_exp);
     TEST_ASSERT_INT32_WITHIN(20, INT32_C(8129) * 256 / 8, (int32_t)fw.ls_base_q16 << p.ls_exp);
 }
 
@@ -175,7 +178,8 @@ void test_constants_at_4_4_A_are_14470_and_1626(void)
     EXACT(NORM_LSDTBASE, 1626);
     EXACT(NORM_INVKFIBASE, 7956);
     EXACT(NORM_DELTAT, 1790);
-    EXPECT_ESTIMATOR(p.estimator, p.fieldweak, C440);
+    EXPECT_ESTIMATOR(p.estimator, p.fieldweak, p.adaptation, C440);
+    EXACT(p.estimator.resistive_max, 7215); /* 2/sqrt(3) * 3.8 A * R */
     TEST_ASSERT_FLOAT_WITHIN(1e-9F, 4.05949e-4F, NORM_VOLTAGE_CONST);
     TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
 }
@@ -202,7 +206,7 @@ void test_currents_voltages_and_modulator(void)
     EXACT(p.svm.top, GOLDEN_PARAMS_SVM_TOP);
     EXACT(p.svm.dead_time, GOLDEN_PARAMS_SVM_DEAD_TIME);
     EXACT(p.svm.knee_q13, GOLDEN_PARAMS_SVM_KNEE_Q13);
-    EXACT(p.svm.dead_slope_q16, GOLDEN_PARAMS_SVM_DEAD_SLOPE_Q16);
+    EXACT(p.svm.dead_slope_q8, GOLDEN_PARAMS_SVM_DEAD_SLOPE_Q8);
     EXACT(p.svm.turn_q13, GOLDEN_PARAMS_SVM_TURN_Q13);
     NEAR(duty_per_volt(BUS_Q15(24.0)), GOLDEN_PARAMS_DUTY_PER_VOLT_24, 1);
     NEAR(duty_per_volt(BUS_Q15(12.0)), GOLDEN_PARAMS_DUTY_PER_VOLT_12, 2);
@@ -247,13 +251,67 @@ void test_controllers(void)
     EXACT(p.pi_q.kc, 32734); /* 0.999 */
     EXACT(p.pi_d.shift, 10);
     EXACT(p.pi_q.shift, 10);
-    /* Kp = 2 pi 25 J/Kt = 0.014429 A s/rad = 0.56265 counts Q13 per electrical rpm, times 2^13; Ki = Kp 2 pi 25/3 400 us */
-    NEAR(p.pi_speed.kp, 4609, 2);
-    NEAR(p.pi_speed.ki, 96, 1);
-    EXACT(p.pi_speed.shift, 13);
+    /* Kp = 2 pi 13 J/Kt = 0.0075031 A s/rad = 0.29258 counts Q13 per electrical rpm, times 2^13; 1.8 times that after a load step */
+    NEAR(p.speed_kp_q13, 2397, 1);
+    NEAR(p.speed_kp_quick_q13, 4314, 1);
     EXACT(given.kp, 655); /* 16 * 0.02 of full scale: 0.64 Q14 counts per Q13 count, times 2^10 */
     EXACT(given.ki, 4);
-    EXACT(PARAM_SPEED_KI(0.01), 164); /* eight periods a step */
+}
+
+/* AN1292's motor: 0.89337 erpm a step and Q13 count are 0.11167 * 2^3; 33 Hz of 110 Hz under load; 1.22 * 13 Hz without. */
+void test_load_observer_and_what_belongs_to_low_speed(void)
+{
+    static const drive_params_t p = DRIVE_PARAMS_INIT;
+#define OBSERVER(field, FIELD) EXACT(p.observer.field, GOLDEN_PARAMS_OBSERVER_##FIELD)
+    OBSERVER(deltat_q32, DELTAT_Q32);
+    OBSERVER(per_turn_q12, PER_TURN_Q12);
+    OBSERVER(shift, SHIFT);
+    OBSERVER(per_current_q16, PER_CURRENT_Q16);
+    OBSERVER(per_unit_q15, PER_UNIT_Q15);
+    OBSERVER(innovation_max, INNOVATION_MAX);
+    OBSERVER(load_max, LOAD_MAX);
+    OBSERVER(quiet_q16, QUIET_Q16);
+    OBSERVER(loaded_q16, LOADED_Q16);
+    OBSERVER(quick_q16, QUICK_Q16);
+    OBSERVER(full_erpm, FULL_ERPM);
+    OBSERVER(load_from, LOAD_FROM);
+    OBSERVER(load_width, LOAD_WIDTH);
+    OBSERVER(load_slope_q15, LOAD_SLOPE_Q15);
+    NEAR(p.observer.large_erpm, 149, 1); /* 0.13 of the dead time's 0.96 V at 1196 erpm a volt */
+    NEAR(p.observer.large_loaded_erpm, 34, 1);
+    NEAR(p.sample_shift_q16, 80, 0);                  /* 1.5 us * 7.983 mV s/1.92 mH, in counts per erpm */
+    NEAR(p.fieldweak.esdq_per_erpm_q13, 14055, 1);    /* 2 pi 5/60 * 50 us * 2^29 */
+    EXACT(p.svm.dead_time, 80);
+    TEST_ASSERT_FLOAT_WITHIN(0.5F, 746.4F, PARAM_LOWEST_ERPM); /* 149.3 rpm */
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 16.67F, PARAM_CALM_HZ);   /* 0.4 of 500 rpm, for that is more than of 489 */
+}
+
+/* The loop's bandwidth and the load's scale with the slow step; a small motor's acceleration changes the observer's unit. */
+void test_the_observer_s_unit_keeps_a_count_of_current_between_a_half_and_one(void)
+{
+    EXACT(PARAM_ACCEL_SHIFT, 3);
+    TEST_ASSERT_FLOAT_WITHIN(0.0002F, 0.8934F, PARAM_ACCEL_UNITS);
+#undef MOTOR_INERTIA_KGM2
+#define MOTOR_INERTIA_KGM2 1.3e-6
+    EXACT(PARAM_ACCEL_SHIFT, 1);
+    TEST_ASSERT_FLOAT_WITHIN(0.0005F, 0.9449F, PARAM_ACCEL_UNITS);
+#undef MOTOR_INERTIA_KGM2
+#define MOTOR_INERTIA_KGM2 5.5e-3
+    EXACT(PARAM_ACCEL_SHIFT, 13);
+    TEST_ASSERT_FLOAT_WITHIN(0.0005F, 0.9148F, PARAM_ACCEL_UNITS);
+#undef MOTOR_INERTIA_KGM2
+#define MOTOR_INERTIA_KGM2 5.5e-6
+}
+
+void test_adaptation(void)
+{
+    static const adaptation_params_t p = PARAM_ADAPTATION_INIT;
+    EXACT(p.rate_q16, GOLDEN_PARAMS_ADAPTATION_RATE_Q16);
+    EXACT(p.kfi_least, GOLDEN_PARAMS_ADAPTATION_KFI_LEAST);
+    EXACT(p.kfi_most, GOLDEN_PARAMS_ADAPTATION_KFI_MOST);
+    EXACT(p.rs_least, GOLDEN_PARAMS_ADAPTATION_RS_LEAST);
+    EXACT(p.rs_most, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
+    EXACT(p.emf_least_q12, GOLDEN_PARAMS_ADAPTATION_EMF_LEAST_Q12);
 }
 
 void test_field_weakening(void)
@@ -261,7 +319,6 @@ void test_field_weakening(void)
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
     EXACT(fw.trim_step_q13, 2);      /* 2.7 A a second: 1.07 mA in 400 us */
     EXACT(fw.trim_max_q13, 1489);    /* 0.8 A */
-    NEAR(fw.margin_q14, 296, 1);     /* a hundredth of the bus */
     EXACT(fw.trim_speed_erpm, 7800); /* 60 % of the start speed */
     EXACT(fw.kfilter_esdq_q16, 2400);
     EXACT(fw.kfilter_esdq_fw_q16, 328); /* twice AN1292's Q15 */

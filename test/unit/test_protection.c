@@ -129,7 +129,7 @@ void test_undervoltage_waits_for_a_start_and_comes_before_the_first_pulse(void)
 
 void test_stall_and_lost_lock_are_faults_when_they_last(void)
 {
-    enum { NEVER = 2000, STALL = 751, LOST_LOCK = 126 }; /* 300 ms, 50 ms */
+    enum { NEVER = 2000, STALL = 751, LOST_LOCK = 63 }; /* 300 ms, 25 ms */
     static const struct {
         const char *what;
         int16_t reference_erpm, speed_erpm, e_d, e_q;
@@ -147,6 +147,8 @@ void test_stall_and_lost_lock_are_faults_when_they_last(void)
         { "d EMF above q EMF", 10000, 10000, 1001, 1000, LOST_LOCK },
         { "negative d EMF", 10000, 10000, -1001, 1000, LOST_LOCK },
         { "negative q EMF", -10000, -10000, 1001, -1000, LOST_LOCK },
+        { "of a standing rotor the d EMF says nothing: it stalls", 10000, 1249, 1001, 1000, STALL },
+        { "d EMF above q EMF at half the minimum speed", 2000, 1250, 1001, 1000, LOST_LOCK },
         { "d EMF as large as q EMF", 10000, 10000, 1000, 1000, NEVER },
         { "negative d EMF as large", 10000, 10000, -1000, 1000, NEVER },
         { "d EMF as large as a negative q EMF", -10000, -10000, 1000, -1000, NEVER },
@@ -188,8 +190,25 @@ void test_short_dips_of_speed_and_short_losses_of_lock_ride_through(void)
     for (n = 0; n < 3u; n++) {
         steps(750, 1000, 0);
         steps(1, 6000, 0);
-        steps(125, 10000, 2000);
-        steps(1, 10000, 0);
+        steps(62, 10000, 2000);
+        steps(124, 10000, 0);
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+}
+
+void test_estimator_that_slips_past_the_rotor_has_lost_it_though_each_loss_is_short(void)
+{
+    static const struct {
+        uint16_t lost, held; /* steps, in turn */
+        drive_state_t state;
+    } cases[] = { { 1, 1, DRIVE_FAULT }, { 20, 20, DRIVE_FAULT }, { 3, 5, DRIVE_FAULT }, { 1, 2, DRIVE_CLOSED }, { 20, 40, DRIVE_CLOSED } };
+    EACH(n, cases) {
+        uint16_t turn;
+        rig_closed(1, 10000);
+        for (turn = 0; turn < 2000u; turn++) {
+            steps(cases[n].lost, 10000, 2000);
+            steps(cases[n].held, 10000, 0);
+        }
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
+    }
 }

@@ -60,3 +60,39 @@ void test_low_pass_settles_exactly_on_its_input(void)
         }
     }
 }
+
+void test_shift_multiplies_by_a_power_of_two_with_either_sign(void)
+{
+    static const struct {
+        int32_t x, shifted;
+        uint16_t bits;
+    } cases[] = {
+        { 0, 0, 15 }, { 1, 1, 0 }, { -1, -1, 0 }, { 1, 32768, 15 }, { -1, -32768, 15 }, { -3, -24, 3 }, { 65535, INT32_C(2147450880), 15 },
+        { -65536, INT32_MIN, 15 }, { INT32_C(1073741823), INT32_C(2147483646), 1 }, { INT32_MIN, INT32_MIN, 0 },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(cases[n].shifted, qm_shift(cases[n].x, cases[n].bits), golden_row(n));
+    }
+}
+
+void test_share_is_part_over_whole_in_Q15_rounded_down(void)
+{
+    static const uint16_t cases[][3] = {
+        { 0, 1, 0 }, { 1, 2, 16384 }, { 1, 3, 10922 }, { 2, 3, 21845 }, { 499, 1000, 16351 },
+        { 65534u, 65535u, 32767 }, { 1, 65535u, 0 }, { 2, 65535u, 1 }, { 32767, 32768u, 32767 },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][2], qm_share(cases[n][0], cases[n][1]), golden_row(n));
+    }
+}
+
+void test_limits_of_the_upper_word_keep_the_lower_one_within(void)
+{
+    static const int32_t cases[][2] = { { INT32_C(65536) * 5, INT32_C(65536) * 5 }, { INT32_C(65536) * 5 - 1, INT32_C(65536) * 5 - 1 },
+                                        { INT32_C(65536) * 5 + 1, INT32_C(65536) * 5 }, { INT32_MAX, INT32_C(65536) * 5 },
+                                        { -INT32_C(65536) * 3, -INT32_C(65536) * 3 }, { 1 - INT32_C(65536) * 3, 1 - INT32_C(65536) * 3 },
+                                        { -1 - INT32_C(65536) * 3, -INT32_C(65536) * 3 }, { INT32_MIN, -INT32_C(65536) * 3 }, { 7, 7 } };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(cases[n][1], qm_clamp_hi(cases[n][0], -3, 5), golden_row(n));
+    }
+}

@@ -28,7 +28,7 @@ static void record(uint16_t periods)
 {
     while (periods-- != 0u) {
         period++;
-        board_drive.i_a_q13 = (int16_t)period;
+        board_drive.phases_q13.a = (int16_t)period;
         board_drive.run.control.i_q13.q = (int16_t)-period;
         board_drive.run.estimator.omega_filtered_q16 = (int32_t)(10 * period) * 65536;
         board_drive.run.estimator.rho_q32 = (uint32_t)(100u * period) << 16;
@@ -76,7 +76,7 @@ void test_currents_beyond_AN1292s_format_are_limited_not_wrapped(void)
         uint16_t n;
         board_snapshot.row = 0;
         SnapStart = 1;
-        board_drive.i_a_q13 = (int16_t)(sign * 12000);
+        board_drive.phases_q13.a = (int16_t)(sign * 12000);
         board_drive.run.control.i_q13.q = (int16_t)(sign * 8200);
         for (n = 0; n < 5u; n++) {
             mode_record();

@@ -1,4 +1,4 @@
-/* Speed: the reference's ramp that waits for the motor, the controller within its limit, and the end of a stop. */
+/* Speed: the reference's ramp that waits for the motor, the law and its gain, what a sample misses, and the end of a stop. */
 #include "drive_rig.h"
 
 void setUp(void)
@@ -40,22 +40,123 @@ void test_reference_waits_while_the_motor_is_350_rpm_behind_or_ahead(void)
     }
 }
 
-/* ---- the controller ---- */
+/* ---- the law ---- */
 
-void test_speed_below_the_reference_asks_for_driving_current_up_to_its_limit(void)
+/** q current for a target, at an observed speed and load. */
+static int16_t current(int16_t target_erpm, int16_t speed_erpm, int16_t load_q13)
+{
+    rig_speed(speed_erpm);
+    drive.run.observer.load_q16 = qm_mulsu(load_q13, params.observer.per_current_q16);
+    return speed_current(&drive.run, &params, target_erpm);
+}
+
+void test_current_is_the_gain_times_the_missing_speed_and_the_observed_load(void)
+{
+    static const struct {
+        int16_t target_erpm, speed_erpm, load_q13, kp_q13, iq_q13;
+    } cases[] = {
+        { 10000, 10000, 0, 2048, 0 }, { 10000, 9000, 0, 2048, 250 }, { 10000, 11000, 0, 2048, -250 }, { 10000, 9000, 0, 4096, 500 },
+        { 10000, 10000, 700, 2048, 700 }, { 10000, 9000, 700, 2048, 950 }, { 10000, 11000, 700, 2048, 450 },
+        { 10000, 12000, -700, 2048, -1200 }, { 32000, -32000, 0, 2048, 4096 /* the difference ends at 16383 */ },
+    };
+    rig_closed(1, 10000);
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            drive.run.control.speed_kp_q13 = cases[n].kp_q13;
+            TEST_ASSERT_INT16_WITHIN_MESSAGE(2, (int16_t)(direction * cases[n].iq_q13),
+                                             current((int16_t)(direction * cases[n].target_erpm), (int16_t)(direction * cases[n].speed_erpm),
+                                                     (int16_t)(direction * cases[n].load_q13)),
+                                             golden_row(n));
+        }
+    }
+}
+
+void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.iq_limit_q13 = 1234;
+    drive.run.control.speed_kp_q13 = 8192; /* a count an erpm */
+    EACH_DIRECTION(direction) {
+        TEST_ASSERT_EQUAL_INT16(direction * 1233, current((int16_t)(direction * 10000), (int16_t)(direction * 8767), 0));
+        TEST_ASSERT_EQUAL_INT16(direction * 1234, current((int16_t)(direction * 10000), (int16_t)(direction * 8765), 0));
+        TEST_ASSERT_EQUAL_INT16(direction * 1234, current((int16_t)(direction * 10000), 0, (int16_t)(direction * 3000)));
+        TEST_ASSERT_EQUAL_INT16(0, current((int16_t)(direction * 10000), (int16_t)(direction * 10000), 0));
+    }
+    drive.run.control.iq_limit_q13 = 0;
+    TEST_ASSERT_EQUAL_INT16(0, current(10000, 9000, 500));
+    TEST_ASSERT_EQUAL_INT16(0, current(10000, 11000, -500));
+}
+
+void test_gain_follows_the_reference_at_low_speed_and_rises_after_a_large_innovation(void)
+{
+    int16_t full = params.observer.full_erpm, half = (int16_t)(full / 2), kp = params.speed_kp_q13, quick = params.speed_kp_quick_q13;
+    const struct {
+        int16_t reference_erpm, quick_q15, kp_q13;
+    } cases[] = {
+        { full, 0, kp }, { 32000, 0, kp }, { half, 0, (int16_t)(kp / 2) }, { (int16_t)-full, 0, kp }, { (int16_t)-half, 0, (int16_t)(kp / 2) },
+        { 0, 0, 0 }, { full, 32767, quick }, { half, 32767, (int16_t)(quick / 2) }, { full, 16384, (int16_t)((kp + quick) / 2) },
+    };
+    EACH(n, cases) {
+        rig_closed(1, 10000);
+        drive.run.control.reference_erpm = cases[n].reference_erpm;
+        drive.run.observer.quick_q15 = cases[n].quick_q15;
+        speed_schedule(&drive.run, &params);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(3, cases[n].kp_q13, drive.run.control.speed_kp_q13, golden_row(n));
+    }
+    TEST_ASSERT_GREATER_THAN_INT16(kp + kp / 2, quick);
+}
+
+void test_stop_never_asks_for_a_speed_without_a_gain(void)
 {
     EACH_DIRECTION(direction) {
         uint16_t n;
-        rig_closed(direction, (int16_t)(direction * 10000));
-        drive.run.control.iq_limit_q13 = 1234;
-        rig_speed((int16_t)(direction * 8500));
-        for (n = 0; n < 200u; n++) {
+        rig_closed(direction, (int16_t)(direction * 4000));
+        drive.state = (uint16_t)DRIVE_STOPPING;
+        for (n = 0; n < 1000u; n++) {
+            rig_speed((int16_t)(direction * 2600)); /* a load that drives keeps it above the minimum */
             speed_step(&drive, &params);
-            TEST_ASSERT_TRUE(direction * drive.run.control.ref_q13.q > 0);
-            TEST_ASSERT_TRUE(direction * drive.run.control.ref_q13.q <= 1234);
+            TEST_ASSERT_TRUE(direction * drive.run.control.reference_erpm >= 1875);
         }
-        TEST_ASSERT_EQUAL_INT16(direction * 1234, drive.run.control.ref_q13.q);
+        speed_follow(&drive.run, &params);
+        TEST_ASSERT_GREATER_THAN_INT16(params.speed_kp_q13 / 2, drive.run.control.speed_kp_q13);
+        TEST_ASSERT_TRUE(direction * drive.run.control.ref_q13.q < 0); /* it goes on braking */
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
     }
+}
+
+/* ---- the sample's delay ---- */
+
+void test_q_current_is_raised_by_what_the_back_emf_took_before_the_sample(void)
+{
+    /* delay psi w / L: 1.5 us * 5.5 mWb * 1885 rad/s / 1.92 mH = 8.1 mA at 18000 erpm */
+    float missed = 1.5e-6F * (PARAM_F(MOTOR_KPHI_V_PER_KRPM) / PARAM_SQRT3 / 1000.0F * 3600.0F) / (PARAM_F(MOTOR_LS_MH) * 0.001F);
+    int16_t shift_q13 = (int16_t)(missed / PARAM_F(NORM_CURRENT_CONST) / 4.0F);
+    TEST_ASSERT_GREATER_THAN_INT16(15, shift_q13);
+    EACH_DIRECTION(direction) {
+        rig_closed(direction, (int16_t)(direction * 18000));
+        TEST_ASSERT_INT16_WITHIN(1, (int16_t)(direction * shift_q13), drive.run.control.sample_shift_q13);
+        rig_tick(1); /* no current at all */
+        TEST_ASSERT_INT16_WITHIN(1, (int16_t)(direction * shift_q13), drive.run.control.i_q13.q);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.i_q13.d);
+    }
+}
+
+void test_schedule_of_the_speed_comes_every_eighth_period_in_closed_loop_only(void)
+{
+    rig_closed(1, 18000);
+    for (uint16_t slot = 0; slot < 8u; slot++) {
+        drive.run.control.sample_shift_q13 = 0;
+        drive.run.control.speed_kp_q13 = 0;
+        drive.ticks = slot;
+        drive_slow(&drive, &params, samples.v_bus);
+        TEST_ASSERT_EQUAL_INT16(slot == 5u, drive.run.control.sample_shift_q13 > 0);
+        TEST_ASSERT_EQUAL_INT16(slot == 5u, drive.run.control.speed_kp_q13 > 0);
+    }
+    drive.run.control.sample_shift_q13 = 0;
+    drive.state = (uint16_t)DRIVE_RAMP;
+    drive.ticks = 5;
+    drive_slow(&drive, &params, samples.v_bus);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.sample_shift_q13);
 }
 
 /* ---- the end of a stop ---- */

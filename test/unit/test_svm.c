@@ -7,15 +7,16 @@
 #define GAIN_24V 8868u   /* duty per Q13 voltage count * 65536 at 24 V */
 
 static const svm_params_t params = {
-    GOLDEN_SVM_FULL, GOLDEN_SVM_TOP, GOLDEN_SVM_DEAD_TIME, GOLDEN_SVM_KNEE_Q13,
-    (uint16_t)GOLDEN_SVM_DEAD_SLOPE_Q16, GOLDEN_SVM_TURN_Q13
+    GOLDEN_SVM_FULL, GOLDEN_SVM_TOP, GOLDEN_SVM_DEAD_TIME, GOLDEN_SVM_KNEE_Q13, GOLDEN_SVM_DEAD_SLOPE_Q8, GOLDEN_SVM_TURN_Q13
 };
+static const phases_t no_current;
 
 void test_duties_equal_the_reference(void)
 {
     GOLDEN_EACH(svm, r) {
         alphabeta_t v = { r.alpha, r.beta };
-        duties_t d = svm(&params, v, r.gain, r.i_a, r.i_b, r.i_c);
+        phases_t asked = { r.asked_a, r.asked_b, r.asked_c }, i = { r.i_a, r.i_b, r.i_c };
+        duties_t d = svm(&params, v, r.gain, asked, i);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.a, d.a, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.b, d.b, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.c, d.c, golden_row(n));
@@ -26,19 +27,20 @@ void test_directions_of_voltage_and_dead_time(void)
 {
     static const struct {
         const char *what;
-        int16_t alpha, beta, i_a, i_b, i_c;
+        int16_t alpha, beta;
+        phases_t asked;
         duty_t a, b, c;
     } cases[] = {
-        { "zero voltage: half duty on every leg", 0, 0, 0, 0, 0, 1000, 1000, 1000 },
-        { "along alpha: A over B and C", 4000, 0, 0, 0, 0, 1406, 594, 594 }, /* 541 duty counts */
-        { "along beta: B over C, A between", 0, 4000, 0, 0, 0, 1000, 1468, 532 },
-        { "a current into the motor at A gets the dead time back", 0, 0, 1000, -400, -600, 1080, 920, 920 },
-        { "at B", 0, 0, 0, 500, -500, 1000, 1080, 920 },
-        { "at C", 0, 0, -500, 0, 500, 920, 1000, 1080 },
+        { "zero voltage: half duty on every leg", 0, 0, { 0, 0, 0 }, 1000, 1000, 1000 },
+        { "along alpha: A over B and C", 4000, 0, { 0, 0, 0 }, 1406, 594, 594 }, /* 541 duty counts */
+        { "along beta: B over C, A between", 0, 4000, { 0, 0, 0 }, 1000, 1468, 532 },
+        { "a current into the motor asked for at A gets the dead time back", 0, 0, { 1000, -400, -600 }, 1080, 920, 920 },
+        { "at B", 0, 0, { 0, 500, -500 }, 1000, 1080, 920 },
+        { "at C", 0, 0, { -500, 0, 500 }, 920, 1000, 1080 },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         alphabeta_t v = { cases[n].alpha, cases[n].beta };
-        duties_t d = svm(&params, v, GAIN_24V, cases[n].i_a, cases[n].i_b, cases[n].i_c);
+        duties_t d = svm(&params, v, GAIN_24V, cases[n].asked, no_current);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].a, d.a, cases[n].what);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].b, d.b, cases[n].what);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].c, d.c, cases[n].what);
@@ -50,7 +52,8 @@ void test_directions_of_voltage_and_dead_time(void)
 static duties_t duties_at(int16_t radius, angle_t angle)
 {
     dq_t v = { radius, 0 };
-    return svm(&params, inverse_park(v, trig_sincos(angle)), 2u * GAIN_24V, 0, 0, 0); /* the transformation's halving is undone */
+    /* twice the gain: undoes the transformation's halving */
+    return svm(&params, inverse_park(v, trig_sincos(angle)), 2u * GAIN_24V, no_current, no_current);
 }
 
 static duty_t highest(duties_t d)
@@ -86,27 +89,47 @@ void test_legs_are_centred_then_moved_out_of_the_window_then_limited_to_it(void)
 
 void test_compensation_is_linear_up_to_the_knee_and_full_from_there_on(void)
 {
-    static const int16_t cases[][2] = { { 0, 0 }, { 44, 40 }, { 80, 72 }, { 88, 80 }, { 89, 80 }, { 10000, 80 } };
+    static const int16_t cases[][2] = { { 0, 0 }, { 1, 13 }, { 3, 40 }, { 5, 67 }, { 6, 80 }, { 7, 80 }, { 10000, 80 }, { 32767, 80 } };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, cases[n][1], svm_dead_time(&params, cases[n][0]), golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, -cases[n][1], svm_dead_time(&params, (int16_t)-cases[n][0]), golden_row(n));
     }
-    TEST_ASSERT_EQUAL_INT16(svm_dead_time(&params, 88), svm_dead_time(&params, 10000));
-    TEST_ASSERT_EQUAL_INT16(svm_dead_time(&params, -88), svm_dead_time(&params, -10000));
+    TEST_ASSERT_EQUAL_INT16(svm_dead_time(&params, 6), svm_dead_time(&params, 10000));
+    TEST_ASSERT_EQUAL_INT16(svm_dead_time(&params, -6), svm_dead_time(&params, -10000));
 }
 
-void test_compensation_passes_the_window_only_where_the_current_stays_positive_and_never_the_period(void)
+void test_compensation_is_for_the_currents_asked_for_and_the_window_for_those_measured(void)
 {
-    int16_t full = svm_dead_time(&params, 1000);
+    static const struct {
+        const char *what;
+        int16_t u, asked, measured;
+        duty_t leg;
+    } cases[] = {
+        { "the current is sure to stay positive: beyond the window", 1872, 1000, 738, 1872 + 79 },
+        { "it may turn negative in a period of the top speed", 1872, 1000, 737, 1872 },
+        { "asked for is not enough", 1872, 32767, -1, 1872 },
+        { "measured alone gets nothing back", 1872, 0, 1000, 1872 },
+        { "the window leaves room", 1800, 400, 0, 1872 },
+        { "the voltage ends at the window first", 1900, 1000, 1000, 1872 + 79 },
+        { "a current out of the motor, against the one measured", 1900, -1000, 1000, 1872 - 80 },
+        { "below zero", -5, 1000, 0, 79 },
+        { "near zero", 100, -1000, 1000, 20 },
+        { "not below zero", 50, -1000, 1000, 0 },
+    };
     svm_params_t wide = params;
     wide.top = 1960;
-    TEST_ASSERT_EQUAL_UINT16(1872 + full, svm_leg(&params, 1872, 738));
-    TEST_ASSERT_EQUAL_UINT16(1872, svm_leg(&params, 1872, 737)); /* may turn negative in a period of the top speed */
-    TEST_ASSERT_EQUAL_UINT16(1872, svm_leg(&params, 1800, 400));
-    TEST_ASSERT_EQUAL_UINT16(1872 + full, svm_leg(&params, 1900, 1000));
-    TEST_ASSERT_EQUAL_UINT16(1872 - 80, svm_leg(&params, 1900, -1000));
-    TEST_ASSERT_EQUAL_UINT16(full, svm_leg(&params, -5, 1000));
-    TEST_ASSERT_EQUAL_UINT16(20, svm_leg(&params, 100, -1000));
-    TEST_ASSERT_EQUAL_UINT16(0, svm_leg(&params, 50, -1000));
-    TEST_ASSERT_EQUAL_UINT16(2000, svm_leg(&wide, 1960, 1000));
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].leg, svm_leg(&params, cases[n].u, cases[n].asked, cases[n].measured), cases[n].what);
+    }
+    TEST_ASSERT_EQUAL_UINT16(2000, svm_leg(&wide, 1960, 1000, 1000)); /* never beyond the period */
+}
+
+void test_measured_currents_alone_do_not_move_the_duties(void)
+{
+    static const phases_t i = { 700, -300, -400 };
+    static const alphabeta_t v = { 1000, -2000 };
+    duties_t without = svm(&params, v, GAIN_24V, no_current, no_current), with = svm(&params, v, GAIN_24V, no_current, i);
+    TEST_ASSERT_EQUAL_UINT16(without.a, with.a);
+    TEST_ASSERT_EQUAL_UINT16(without.b, with.b);
+    TEST_ASSERT_EQUAL_UINT16(without.c, with.c);
 }

@@ -20,8 +20,10 @@ static int16_t torque(int16_t direction, int16_t command_q13, int16_t speed_erpm
     drive.run.control.iq_limit_q13 = limit_q13;
     while (steps-- != 0u) {
         speed_step(&drive, &params);
+        speed_follow(&drive.run, &params);
     }
-    TEST_ASSERT_EQUAL_INT16(direction * speed_erpm, drive.run.control.reference_erpm); /* field weakening follows the speed */
+    /* field weakening and the rates follow the speed, but not below the minimum: without a gain nothing would hold the motor */
+    TEST_ASSERT_EQUAL_INT16(direction * ((speed_erpm > 2500) ? speed_erpm : 2500), drive.run.control.reference_erpm);
     return (int16_t)(direction * drive.run.control.ref_q13.q);
 }
 
@@ -40,7 +42,7 @@ void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_b
         { "limited by the circle", 5000, 10000, 2000, 1, 2000, 2000 },
         { "nothing that drives above maximum speed", 3000, 28000, 5120, 400, -5120, 0 },
         { "below minimum speed it holds the motor without a command", 0, 1500, 5120, 400, 1, 5120 },
-        { "within the circle", 0, 0, 700, 1, 700, 700 },
+        { "within the circle", 0, 1000, 100, 1, 100, 100 },
     };
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
@@ -48,6 +50,84 @@ void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_b
             TEST_ASSERT_TRUE_MESSAGE(iq >= cases[n].least && iq <= cases[n].most, cases[n].what);
         }
         TEST_ASSERT_TRUE(torque(direction, 0, 1000, 5120, 400) > torque(direction, 0, 1500, 5120, 400));
+    }
+}
+
+/** q current of a step, in the direction of rotation. @param load_q13 as observed, in that direction too */
+static int16_t step(int16_t direction, int16_t command_q13, int16_t speed_erpm, int16_t load_q13)
+{
+    rig_closed(direction, (int16_t)(direction * speed_erpm));
+    drive.command.target_erpm = command_q13;
+    drive.run.observer.load_q16 = qm_mulsu((int16_t)(direction * load_q13), params.observer.per_current_q16);
+    speed_step(&drive, &params);
+    return (int16_t)(direction * drive.run.control.ref_q13.q);
+}
+
+/** The same of the speed controller with this target. */
+static int16_t law(int16_t direction, int16_t target_erpm)
+{
+    return (int16_t)(direction * speed_current(&drive.run, &params, (int16_t)(direction * target_erpm)));
+}
+
+void test_command_gives_way_to_the_speed_law_at_both_speed_limits_and_only_there(void)
+{
+    static const struct {
+        const char *what;
+        int16_t command_q13, speed_erpm, load_q13, limit_erpm; /* 0: as commanded */
+    } cases[] = {
+        { "a load that the command does not hold, at minimum speed", 500, 2500, 1500, 2500 },
+        { "the same below it", 500, 2300, 1500, 2500 },
+        { "the same where the law for the minimum asks for less", 500, 8000, 1500, 0 },
+        { "a command above the load, at maximum speed", 1500, 27500, 300, 27500 },
+        { "the same above it", 1500, 27700, 300, 27500 },
+        { "the same where the law for the maximum allows it", 1500, 18000, 300, 0 },
+        { "the command that just holds the load, at maximum speed", 300, 27500, 300, 27500 },
+    };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            int16_t iq = step(direction, cases[n].command_q13, cases[n].speed_erpm, cases[n].load_q13);
+            TEST_ASSERT_INT16_WITHIN_MESSAGE(1, (cases[n].limit_erpm != 0) ? law(direction, cases[n].limit_erpm) : cases[n].command_q13, iq,
+                                             cases[n].what);
+        }
+        TEST_ASSERT_INT16_WITHIN(2, 1500, step(direction, 500, 2500, 1500)); /* at a limit: what holds the load */
+        TEST_ASSERT_INT16_WITHIN(2, 300, step(direction, 1500, 27500, 300));
+    }
+}
+
+void test_limit_is_left_as_it_was_met_however_long_it_held(void)
+{
+    EACH_DIRECTION(direction) {
+        (void)torque(direction, 3000, 27600, 5120, 2500);
+        rig_speed((int16_t)(direction * 12000));
+        speed_step(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(direction * 3000, drive.run.control.ref_q13.q);
+        (void)torque(direction, 0, 2000, 5120, 2500);
+        rig_speed((int16_t)(direction * 10000));
+        speed_step(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.q);
+    }
+}
+
+void test_stop_while_torque_is_on_ramps_down_from_the_speed_and_the_load_that_are_there(void)
+{
+    EACH_DIRECTION(direction) {
+        int16_t before = 1000, n;
+        TEST_ASSERT_EQUAL_INT16(1000, step(direction, 1000, 10000, 900));
+        drive.command.run = 0;
+        rig_next_slot(1);
+        rig_tick(1);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
+        rig_speed((int16_t)(direction * 10000));
+        for (n = 1; n <= 20; n++) { /* the speed stands still meanwhile */
+            int16_t iq;
+            speed_step(&drive, &params);
+            iq = (int16_t)(direction * drive.run.control.ref_q13.q);
+            TEST_ASSERT_EQUAL_INT16(direction * (10000 - 8 * n), drive.run.control.reference_erpm);
+            TEST_ASSERT_INT16_WITHIN(2, law(direction, (int16_t)(10000 - 8 * n)), iq);
+            TEST_ASSERT_TRUE(before - iq >= 0 && before - iq < 110); /* from the command to the load, then 8 erpm a step: no jump */
+            before = iq;
+        }
+        TEST_ASSERT_GREATER_THAN_INT16(0, before); /* it has not begun to brake: the load does */
     }
 }
 

@@ -20,8 +20,8 @@ void setUp(void)
 void test_currents_are_Q15_of_full_scale_and_limited_to_it(void)
 {
     drive_control_t *c = &board_drive.run.control;
-    board_drive.i_a_q13 = CURRENT_Q13(1.41);
-    board_drive.i_b_q13 = CURRENT_Q13(-1.41);
+    board_drive.phases_q13.a = CURRENT_Q13(1.41);
+    board_drive.phases_q13.b = CURRENT_Q13(-1.41);
     c->i_q13.d = CURRENT_Q13(-0.5);
     c->i_q13.q = CURRENT_Q13(2.0);
     c->ref_q13.d = CURRENT_Q13(-1.0);
@@ -35,8 +35,8 @@ void test_currents_are_Q15_of_full_scale_and_limited_to_it(void)
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-1.0), CtrlParm.qVdRef);
     TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.5), CtrlParm.qVqRef);
     TEST_ASSERT_EQUAL_INT16(CtrlParm.qVdRef, FdWeakParm.qIdRef);
-    board_drive.i_a_q13 = 9000;
-    board_drive.i_b_q13 = -9000;
+    board_drive.phases_q13.a = 9000;
+    board_drive.phases_q13.b = -9000;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(32764, ParkParm.qIa);
     TEST_ASSERT_EQUAL_INT16(-32764, ParkParm.qIb);
@@ -85,7 +85,7 @@ void test_motor_constants_are_shown_as_adaptation_and_a_debugger_left_them(void)
     TEST_ASSERT_EQUAL_INT16(1790, MotorEstimParm.qDeltaT);
     board_drive.run.model.ls_q16 = (uint16_t)(board_drive.run.model.ls_q16 / 2u);
     board_drive.run.model.inv_kfi = 12345;
-    board_params.estimator.rs_q16 = 20001;
+    board_drive.run.model.rs_q16 = 20001;
     board_params.estimator.deltat_q32 = 1234;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(10000, MotorEstimParm.qRs);
@@ -96,11 +96,36 @@ void test_motor_constants_are_shown_as_adaptation_and_a_debugger_left_them(void)
 
 void test_resistance_beyond_AN1292s_format_reads_32767(void)
 {
-    board_params.estimator.rs_q16 = 65535u;
+    board_drive.run.model.rs_q16 = 65535u;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(32767, MotorEstimParm.qRs);
-    board_params.estimator.rs_q16 = 32768u;
+    board_drive.run.model.rs_q16 = 32768u;
     board_params.estimator.rs_exp = 1;
     watch_refresh();
     TEST_ASSERT_EQUAL_INT16(32767, MotorEstimParm.qRs);
+}
+
+void test_load_observer_shows_its_speed_and_the_current_that_holds_the_load(void)
+{
+    static const float loads_a[] = { 0.5F, -0.5F, 2.0F, 0.0F };
+    for (uint16_t n = 0; n < 4u; n++) {
+        int16_t load_q13 = (int16_t)(loads_a[n] / PARAM_F(NORM_CURRENT_CONST) / 4.0F);
+        board_drive.run.observer.omega_q16 = -12345 * 65536L;
+        board_drive.run.observer.load_q16 = qm_mulsu(load_q13, board_params.observer.per_current_q16);
+        watch_refresh();
+        TEST_ASSERT_EQUAL_INT16(-12345, LoadParm.qVel);
+        TEST_ASSERT_INT16_WITHIN(8, NORM_CURRENT(loads_a[n]), LoadParm.qLoad);
+    }
+}
+
+void test_changes_of_flux_and_resistance_are_Q15_of_the_header_s(void)
+{
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(0, AdaptParm.qInvKFi);
+    TEST_ASSERT_EQUAL_INT16(0, AdaptParm.qRs);
+    board_drive.run.adaptation.kfi_q31 = -0x10000000l; /* 1/8 less: the magnets are colder */
+    board_drive.run.adaptation.rs_q31 = 0x20000000l;   /* 1/4 more */
+    watch_refresh();
+    TEST_ASSERT_EQUAL_INT16(-4096, AdaptParm.qInvKFi);
+    TEST_ASSERT_EQUAL_INT16(8192, AdaptParm.qRs);
 }

@@ -87,7 +87,7 @@ class Library:
 class Board:
     """A virtual board with the firmware in it. The firmware is one set of globals: make one Board per process."""
 
-    FIXED_IN = "this firmware: build it with PARAMS_IN_RAM; only the field-weakening tables can"
+    FIXED_IN = "this firmware: build it with PARAMS_IN_RAM; only the field-weakening tables and MINIMUM_SPEED_RPM can"
 
     def __init__(self, library: Library) -> None:
         self.library = library
@@ -162,7 +162,7 @@ class Board:
         return self._parameter("get", name, ctypes.c_double())
 
     def write_parameter(self, name: str, value: float) -> None:
-        """Change a field-weakening parameter of userparams.h while the motor turns; needs PARAMS_IN_RAM."""
+        """Change a field-weakening parameter or MINIMUM_SPEED_RPM of userparams.h while the motor turns; needs PARAMS_IN_RAM."""
         self._parameter("set", name, ctypes.c_double(value))
 
     def write_variable(self, name: str, value: int) -> None:

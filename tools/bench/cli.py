@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
-from . import command_common, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
+from . import command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -35,13 +35,20 @@ def _parser() -> argparse.ArgumentParser:
     rating.add_argument("--motor", nargs="+", metavar="NAME", help="these motors only: names in tuning/motors or paths")
     rating.set_defaults(command=rating_sweep.command)
 
+    steps = commands.add_parser("loadsteps", help="the brake closes and opens at once: dips, and how soon the speed is back")
+    steps.set_defaults(command=loadsteps.command)
+
+    slow = commands.add_parser("lowspeed", help="low speeds held under load, and how low it goes")
+    slow.set_defaults(command=lowspeed.command)
+
     margins = commands.add_parser("robust", help="how far the motor's true R, L and Kphi may be off what the header says")
     margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
     margins.set_defaults(command=robust.command)
 
     own, tuned = "the project's own", "build/tune/NAME, written by make tune MOTOR=NAME"
+    either = tuned + "; without --motor " + own
     for command, folder, header in ((run, "SCENARIO", own), (loads, "table2", own), (angles, "starts", own), (rating, "rated", tuned),
-                                    (margins, "robust", tuned + "; without --motor " + own)):
+                                    (steps, "loadsteps", either), (slow, "lowspeed", either), (margins, "robust", either)):
         command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}")
         if command is not rating:
             command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")

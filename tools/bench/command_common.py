@@ -48,6 +48,18 @@ def tuned_header(motor: Path) -> Path:
     return folder
 
 
+def header_for(options: argparse.Namespace) -> str | Path | None:
+    """The folder of the header that was asked for; that of a named motor is the tuner's."""
+    if options.userparams is None and options.library is None and options.motor:
+        return tuned_header(motor_file.part(options.motor, "--motor").path)
+    return options.userparams
+
+
+def results(name: str, motor: board_keys.Part, own: str, given: Path | None) -> Path:
+    """The folder of a table's results: NAME for the table's own motor, NAME-MOTOR for another one, or the one that was asked for."""
+    return given or paths.RESULTS / (name if motor.path.stem == own else f"{name}-{motor.path.stem}")
+
+
 def set_up(item: Any, options: argparse.Namespace, defines: list[str], userparams: str | Path | None) \
         -> tuple[board_keys.Part, board_keys.Part, Library, dict[str, Any]]:
     """Motor and board, the firmware, and what the report tells of them (used())."""

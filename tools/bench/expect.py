@@ -4,7 +4,8 @@
                            (values: metrics.MEASURE_VALUES)
     kind = "speed"         measure (all with a reference if not given): its true mean speed holds the reference to percent = 0.5
     kind = "hand_over"     within_s = 2.0 of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
-    kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to the end
+    kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to to_s (the
+                           end); from S2 on not backwards (lowest_rpm = 0), braking current at most brake_max_a = MAXIMUM_CURRENT_A
     kind = "outputs_off"   from_s, to_s
     kind = "bus_voltage"   min and/or max, from_s, to_s; percent = true: in % of NOMINAL_BUS_V
     kind = "signal"        signal, statistic = mean min max rms peak span last, min and/or max, from_s, to_s
@@ -27,6 +28,8 @@ import numpy as np
 from tools.common.toml_file import REQUIRED, Section
 from .metrics import MEASURE_VALUES, MEASURED_BY_FIRMWARE
 from .run import Run
+from .scenario import param
+from tools.common.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -170,43 +173,57 @@ class HandOverExpectation(Expectation):
         return outcomes
 
 
-def _off_row(run: Run, from_row: int) -> int | None:
+def _off_row(trace: Trace, from_row: int = 0) -> int | None:
     """First row from `from_row` on with all six outputs off."""
-    off = np.flatnonzero(run.trace.column("pwm.outputs_on")[from_row:] == 0)
+    off = np.flatnonzero(trace.column("pwm.outputs_on")[from_row:] == 0)
     return None if len(off) == 0 else from_row + int(off[0])
 
 
-def _stays_off(run: Run, off_row: int, to_row: int | None = None) -> bool:
+def _stays_off(trace: Trace, off_row: int, to_row: int | None = None) -> bool:
     """No output is on after `off_row`. "pwm.outputs_seen" tells of the whole period before its row."""
-    return not np.any(run.trace.column("pwm.outputs_seen")[off_row + 2:to_row])
+    return not np.any(trace.column("pwm.outputs_seen")[off_row + 2:to_row])
 
 
 @dataclass(frozen=True)
 class StopExpectation(Expectation):
     after_s: float
     within_s: float
+    to_s: float
     speed_max_rpm: float | None
+    lowest_rpm: float
+    brake_max_a: float | None
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StopExpectation":
-        return cls(section.number("after_s", REQUIRED, 0.0, duration_s), section.number("within_s", REQUIRED, 0.0),
-                   section.number("speed_max_rpm", None, 0.0))
+        after_s = section.number("after_s", REQUIRED, 0.0, duration_s)
+        return cls(after_s, section.number("within_s", REQUIRED, 0.0), section.number("to_s", duration_s, after_s, duration_s),
+                   section.number("speed_max_rpm", None, 0.0), section.number("lowest_rpm", 0.0), section.number("brake_max_a", None, 0.0))
 
     def check(self, run: Run) -> list[Outcome]:
-        first = int(np.searchsorted(run.trace.time_s, self.after_s))
-        row = _off_row(run, first)
-        allowed = f"at most {self.within_s:g} s after {self.after_s:g} s, and to the end"
+        part = run.trace.part(self.after_s, self.to_s)
+        row = _off_row(part)
+        allowed = f"at most {self.within_s:g} s after {self.after_s:g} s, and to " + \
+            ("the end" if self.to_s >= run.scenario.duration_s else f"{self.to_s:g} s")
         if row is None:
-            return [Outcome("stop: outputs off", False, "never", allowed)]
-        took = float(run.trace.time_s[row]) - self.after_s
-        stays = _stays_off(run, row)
+            return [Outcome("stop: outputs off", False, "never", allowed), *self._on_the_way(run, part)]
+        took = float(part.time_s[row]) - self.after_s
+        stays = _stays_off(part, row)
         got = f"{took:.3f} s" + ("" if stays else ", on again later")
         outcomes = [Outcome("stop: outputs off", took <= self.within_s and stays, got, allowed)]
         if self.speed_max_rpm is not None:
-            speed = abs(float(run.trace.column("plant.speed_rpm")[row]))
+            speed = abs(float(part.column("plant.speed_rpm")[row]))
             outcomes.append(Outcome("stop: speed when the outputs go off", speed <= self.speed_max_rpm, f"{speed:.0f} rpm",
                                     f"at most {self.speed_max_rpm:g} rpm"))
-        return outcomes
+        return outcomes + self._on_the_way(run, part)
+
+    def _on_the_way(self, run: Run, part: Trace) -> list[Outcome]:
+        """Lowest speed and largest braking current, both in the direction that the shaft had at S2."""
+        speed, i_q = part.column("plant.speed_rpm"), part.column("plant.i_q")
+        direction = -1.0 if speed[0] < 0.0 else 1.0
+        lowest, brake = float(np.min(direction * speed)) + 0.0, float(np.max(-direction * i_q)) + 0.0
+        most = param(run.params, "MAXIMUM_CURRENT_A") if self.brake_max_a is None else self.brake_max_a
+        return [Outcome("stop: lowest speed", lowest >= self.lowest_rpm, f"{lowest:.1f} rpm", f"at least {self.lowest_rpm:g} rpm"),
+                Outcome("stop: braking current", brake <= most, f"{brake:.2f} A", f"at most {most:g} A")]
 
 
 @dataclass(frozen=True)
@@ -346,9 +363,9 @@ class FaultExpectation(Expectation):
     def _outputs(self, run: Run, title: str, fault_row: int) -> Outcome:
         """The row after `first` is one period later."""
         first = int(np.searchsorted(run.trace.time_s, self.after_s)) if self.from_cause else fault_row
-        off = _off_row(run, first)
+        off = _off_row(run.trace, first)
         periods = None if off is None else off - first
-        kept = off is not None and _stays_off(run, off, self._kept_row(run))
+        kept = off is not None and _stays_off(run.trace, off, self._kept_row(run))
         got = "never" if periods is None else f"{periods} periods" + ("" if kept else ", on again later")
         origin = "cause" if self.from_cause else "fault"
         return Outcome(f"{title}: outputs off", kept and periods is not None and periods <= self.outputs_off_within_periods, got,

@@ -39,20 +39,23 @@ class Job:
     actions: list[panel.Action]
     signals: list[str]
     variables: dict[str, int] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
+    """of userparams.h, changed at power-up; needs PARAMS_IN_RAM"""
 
 
-def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board: board_keys.Part, extra: board_keys.Values | None = None) -> Job:
+def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board: board_keys.Part, extra: board_keys.Values | None = None,
+            parameters: dict[str, float] | None = None) -> Job:
     """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
-    keys = library.keys
+    keys, params = library.keys, library.params | (parameters or {})
     rating = rating_of(motor) if scenarios.asks_for_rating(scenario) else None
-    scenario = scenarios.in_numbers(scenario, rating, library.params)
+    scenario = scenarios.in_numbers(scenario, rating, params)
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
     values = board_keys.resolve(layers, keys)
     for event in scenario.events:
         for key, value in event.keys.items():
             board_keys.check(key, value, keys, event.where)
     start = {key: values.get(key, 0.0) for event in scenario.events for key in event.keys}
-    actions = panel.plan(scenario, panel.Ranges.of(library.params, scenario.defines), start)
+    actions = panel.plan(scenario, panel.Ranges.of(params, scenario.defines), start)
     variables: dict[str, int] = {}
     signals = list(SIGNALS)
     for expectation, where in zip(scenario.expectations, scenario.expectations_where):
@@ -61,7 +64,7 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
         for name, count in expectation.variables().items():
             variables[name] = max(count, variables.get(name, 0))
     _check_signals(signals, library, scenario)
-    return Job(scenario, library.path, values, actions, signals, variables)
+    return Job(scenario, library.path, values, actions, signals, variables, parameters or {})
 
 
 def rating_of(motor: board_keys.Part) -> scenarios.Rating:
@@ -119,6 +122,8 @@ def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float]
     while pending and pending[0].at_s <= 0.0: # in place before the firmware looks at its pins
         _act(board, pending.pop(0), done)
     board.power_up()
+    for name, value in job.parameters.items():
+        board.write_parameter(name, value)
     started, cpu_started = time.perf_counter(), time.process_time()
     while pending:
         recorder.run_to(pending[0].at_s)
@@ -126,8 +131,8 @@ def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float]
     recorder.run_to(scenario.duration_s)
     wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
     variables = {name: board.variable(name, count) for name, count in job.variables.items()}
-    return Run(scenario, recorder.trace(), done, board.warnings(), library.states, library.faults, variables, library.params,
-               wall_s, cpu_s, board.get("time_s"))
+    return Run(scenario, recorder.trace(), done, board.warnings(), library.states, library.faults, variables,
+               library.params | job.parameters, wall_s, cpu_s, board.get("time_s"))
 
 
 def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> None:

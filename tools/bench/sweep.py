@@ -1,5 +1,6 @@
 """Many runs of one kind: builds a scenario for each case, runs them in parallel and keeps what the tables need."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tools.common import workers
+from tools.common import motor_file, workers
 from . import command_common, simulate
 from tools.common.toml_file import Document
 from .metrics import Measure
@@ -52,6 +53,37 @@ class Table:
         return cls(**values)
 
 
+@dataclass
+class Search:
+    """How far something may go in one direction from `start`: `good` still does, `bad` is the first that does not, `why` says what happens
+    there. No `bad`: all that were tried do. What works again beyond the first failure does not count."""
+
+    upwards: bool
+    holds: Callable[[dict[str, Any]], bool]
+    start: float
+    tried: dict[float, tuple[bool, str]] = field(default_factory=dict, kw_only=True)
+    good: float = field(init=False, default=0.0)
+    bad: float | None = field(init=False, default=None)
+    why: str = field(init=False, default="")
+
+    def narrow(self, value: float, row: dict[str, Any]) -> None:
+        """Learn from one run."""
+        self.tried[value] = (self.holds(row), row["verdict"])
+        self.good, self.bad, self.why = self.start, None, ""
+        for known in sorted(self.tried, reverse=not self.upwards):
+            holds, verdict = self.tried[known]
+            if not holds:
+                self.bad, self.why = known, verdict
+                return
+            self.good = known
+
+    def next(self, resolution: float) -> float | None:
+        """The value to try next; None when it is known well enough."""
+        if self.bad is None or max(self.good, self.bad) / min(self.good, self.bad) <= 1.0 + resolution:
+            return None
+        return math.sqrt(self.good * self.bad)
+
+
 def start_events(start_s: float, speed_rpm: float, nominal_rpm: float, where: str) -> list[Event]:
     """Potentiometer and buttons for a start at speed_rpm; above the nominal speed S3 follows after the hand-over."""
     press = {"kind": "press", "hold_s": 0.1, "where": where}
@@ -80,6 +112,23 @@ def start_time_s(params: dict[str, float]) -> float:
 def ramp_time_s(params: dict[str, float], rpm: float) -> float:
     """How long the reference takes from the end of the start to a speed."""
     return abs(rpm - param(params, "END_SPEED_RPM")) / param(params, "SPEEDREFRAMP_RPM_PER_S")
+
+
+def shares(table_motor: str, motor: motor_file.Motor, speeds_rpm: list[float], torques_nm: list[float]) -> tuple[list[float], list[float]]:
+    """A table's speeds and torques for another motor than the table's own: the same shares of its rating, to three digits."""
+    own = motor_file.load(table_motor)
+    by_speed, by_torque = motor.rated_speed_rpm / own.rated_speed_rpm, motor.rated_torque_nm / own.rated_torque_nm
+    return [three_digits(rpm * by_speed) for rpm in speeds_rpm], [three_digits(torque * by_torque) for torque in torques_nm]
+
+
+def three_digits(value: float) -> float:
+    """The value as it is printed."""
+    return float(f"{value:.3g}")
+
+
+def within_header(params: dict[str, float], rpm: float) -> float:
+    """The speed nearest to this one that the header allows."""
+    return min(max(rpm, param(params, "MINIMUM_SPEED_RPM")), param(params, "MAXIMUM_SPEED_RPM"))
 
 
 def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torque_nm: float = 0.0,

@@ -9,6 +9,7 @@ from .errors import UserError
 from .x_macro import rows
 
 TABLE = paths.ROOT / "include" / "drive" / "param_table.h"
+SCALING = TABLE.with_name("param_scaling.h")
 ENTRIES = 18
 """Parameters of a field-weakening table: stem0 .. stem17."""
 FOLLOWS = {"FROM_MOTOR": "motor file", "FROM_BOARD": "board file", "FROM_TUNER": "tuner"}
@@ -34,10 +35,10 @@ class Parameter:
 
 
 def number(name: str) -> float:
-    """A limit of the table's relations that is a macro of its own."""
-    found = re.search(rf"^#define {name} ([\d.]+)$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
+    """A limit of the table's relations, or a ratio of param_scaling.h, that is a macro of its own."""
+    found = re.search(rf"^#define {name} ([\d.]+)(?= |$)", TABLE.read_text(encoding="utf-8") + SCALING.read_text(encoding="utf-8"), re.MULTILINE)
     if found is None:
-        raise UserError(f"{name} cannot be read", str(paths.shown(TABLE)), f"write #define {name} and its number")
+        raise UserError(f"{name} cannot be read", str(paths.shown(TABLE)), f"write #define {name} and its number, there or in {SCALING.name}")
     return float(found[1])
 
 

@@ -30,8 +30,8 @@
     X(speed_raw, "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", SPEED_RPM(d->run.estimator.omega_erpm)) \
     X(speed_ref, "fw.speed_ref_rpm", "rpm", "ramped speed reference", SPEED_RPM(d->run.control.reference_erpm)) \
     X(speed_target, "fw.speed_target_rpm", "rpm", "speed target", SPEED_RPM(d->command.target_erpm)) \
-    X(i_a, "fw.i_a_a", "A", "measured current of phase A", CURRENT_A(d->i_a_q13)) \
-    X(i_b, "fw.i_b_a", "A", "measured current of phase B", CURRENT_A(d->i_b_q13)) \
+    X(i_a, "fw.i_a_a", "A", "measured current of phase A", CURRENT_A(d->phases_q13.a)) \
+    X(i_b, "fw.i_b_a", "A", "measured current of phase B", CURRENT_A(d->phases_q13.b)) \
     X(i_d, "fw.i_d_a", "A", "measured d current", CURRENT_A(d->run.control.i_q13.d)) \
     X(i_q, "fw.i_q_a", "A", "measured q current", CURRENT_A(d->run.control.i_q13.q)) \
     X(id_ref, "fw.id_ref_a", "A", "d current reference", CURRENT_A(d->run.control.ref_q13.d)) \
@@ -48,6 +48,12 @@
     X(inv_kphi, "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", (double)d->run.model.inv_kfi) \
     X(ls_ratio, "fw.ls_ratio", "", "Ls/(2 Ls0) in use", (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0) \
     X(offset, "fw.offset_deg", "deg", "hand-over angle offset that is left", ANGLE_DEG(d->run.handover.offset)) \
+    X(speed_obs, "fw.speed_obs_rpm", "rpm", "speed of the load observer", SPEED_RPM(observer_speed(&d->run.observer))) \
+    X(load, "fw.load_a", "A", "q current that holds the observed load", CURRENT_A(observer_load(&d->run.observer, &board_params.observer))) \
+    X(kphi_change, "fw.kphi_change_percent", "%", "flux that the motor has shown against the header's Kphi: the magnets' temperature", \
+      100.0 / (1.0 + (double)d->run.adaptation.kfi_q31 / 2147483648.0) - 100.0) \
+    X(rs_change, "fw.rs_change_percent", "%", "resistance that the motor has shown against the header's", \
+      (double)d->run.adaptation.rs_q31 / 21474836.48) \
     X(e_d, "fw.e_d_v", "V", "filtered d back-EMF", EMF_V(estimator_emf(&d->run.estimator).d)) \
     X(e_q, "fw.e_q_v", "V", "filtered q back-EMF", EMF_V(estimator_emf(&d->run.estimator).q)) \
     X(offset_a, "fw.offset_a_a", "A", "calibrated offset of phase A", CURRENT_A(d->calibration.offset_a_q13)) \
@@ -93,22 +99,23 @@ typedef struct {
 } tunable_t;
 
 #if defined(TUNING) || defined(PARAMS_IN_RAM)
-#define TUNABLE(name, field, per_count) { name, 0, &board_params.fieldweak.field, per_count },
-#define TUNABLE_TABLE(stem, field, per_count) { stem, FIELDWEAK_ENTRIES, board_params.fieldweak.field, per_count },
+#define TUNABLE(name, field, per_count) { name, 0, &board_params.field, per_count },
+#define TUNABLE_TABLE(stem, field, per_count) { stem, FIELDWEAK_ENTRIES, board_params.field, per_count },
 #else
 #define TUNABLE(name, field, per_count)
 #define TUNABLE_TABLE(stem, field, per_count)
 #endif
 
 static const tunable_t tunables[] = {
-    TUNABLE_TABLE("IDREF_SPEED", idref_q13, CURRENT_A(1))
-    TUNABLE_TABLE("INVKFI_SPEED", inv_kfi, 1.0)
-    TUNABLE_TABLE("LS_OVER2LS0_SPEED", ls_over2ls0_q15, 1.0 / 32768.0)
-    TUNABLE("FW_START_SPEED_RPM", on_speed_erpm, SPEED_RPM(1))
-    TUNABLE("FW_START_SPEED_RPM", trim_speed_erpm, SPEED_RPM(1) / 0.6)
-    TUNABLE("FW_TRIM_CURRENT_A", trim_max_q13, CURRENT_A(1))
-    TUNABLE("KFILTER_ESDQ", kfilter_esdq_q16, 0.5)
-    TUNABLE("KFILTER_ESDQ_FW", kfilter_esdq_fw_q16, 0.5)
+    TUNABLE_TABLE("IDREF_SPEED", fieldweak.idref_q13, CURRENT_A(1))
+    TUNABLE_TABLE("INVKFI_SPEED", fieldweak.inv_kfi, 1.0)
+    TUNABLE_TABLE("LS_OVER2LS0_SPEED", fieldweak.ls_over2ls0_q15, 1.0 / 32768.0)
+    TUNABLE("FW_START_SPEED_RPM", fieldweak.on_speed_erpm, SPEED_RPM(1))
+    TUNABLE("FW_START_SPEED_RPM", fieldweak.trim_speed_erpm, SPEED_RPM(1) / 0.6)
+    TUNABLE("FW_TRIM_CURRENT_A", fieldweak.trim_max_q13, CURRENT_A(1))
+    TUNABLE("KFILTER_ESDQ", fieldweak.kfilter_esdq_q16, 0.5)
+    TUNABLE("KFILTER_ESDQ_FW", fieldweak.kfilter_esdq_fw_q16, 0.5)
+    TUNABLE("MINIMUM_SPEED_RPM", minimum_erpm, SPEED_RPM(1))
     { NULL, 0, NULL, 0.0 }
 };
 

@@ -24,7 +24,7 @@ QM_INLINE uint16_t identify_bus(const drive_t *d)
 /** Current along the axis of the square voltage, in counts that both axes share: phase A, or A + 2 B = sqrt(3) beta. */
 QM_INLINE int16_t identify_current(const drive_t *d)
 {
-    return (int16_t)(d->run.identify.on_q ? d->i_a_q13 + 2 * d->i_b_q13 : d->i_a_q13);
+    return (int16_t)(d->run.identify.on_q ? d->phases_q13.a + 2 * d->phases_q13.b : d->phases_q13.a);
 }
 
 /** Duties along the same axis: three times the alpha voltage, or sqrt(3) times three times the beta voltage, over the bus. */
@@ -120,7 +120,7 @@ QM_INLINE void identify_add(drive_t *d, const drive_params_t *p)
     } else if (id->mode != (uint16_t)IDENTIFY_INJECT) {
         id->sum[0] += id->duty - 4 * p->svm.dead_time;
         id->sum[1] += i_q13;
-        id->sum[2] += d->i_b_q13;
+        id->sum[2] += d->phases_q13.b;
         id->sum[3] += identify_bus(d);
     } else if (id->sign == id->sign_before) {
         int16_t s = id->sign;
@@ -161,10 +161,8 @@ QM_INLINE void identify_record(drive_t *d, const drive_params_t *p, uint16_t set
  *  costs up to 0.3 V across the current, which is where the back-EMF is; standing, the first current would come with a jump. */
 QM_INLINE duties_t identify_duties(const drive_t *d, const drive_params_t *p)
 {
-    alphabeta_t i_q12 = inverse_park(d->run.control.ref_q13, d->frame);
-    int16_t t = (int16_t)(2 * qm_mulhi_su(i_q12.beta, 56756u)); /* sqrt(3)/2 */
-    return svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16,
-               (int16_t)(2 * i_q12.alpha), (int16_t)(t - i_q12.alpha), (int16_t)(-t - i_q12.alpha));
+    phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
+    return svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16, asked, asked);
 }
 
 /** A period with the bridge switching; S2 stops at once. */
@@ -175,7 +173,7 @@ NOINLINE duties_t identify_run(drive_t *d, const drive_params_t *p)
     int16_t sign;
     duties_t duty;
 
-    c->i_q13 = park(clarke(d->i_a_q13, d->i_b_q13), d->frame);
+    c->i_q13 = park(clarke(d->phases_q13.a, d->phases_q13.b), d->frame);
     identify_record(d, p, identify_turn(d, p));
     sign = identify_square(id);
     c->v_q14 = identify_voltage(d, sign);

@@ -23,7 +23,7 @@ QM_INLINE void snapshot_tick(snapshot_t *s, const drive_t *d)
     }
     s->wait = 0;
     *s->done = 0;
-    s->column[0][row] = (int16_t)(4 * qm_clamp(d->i_a_q13, -8191, 8191));
+    s->column[0][row] = (int16_t)(4 * qm_clamp(d->phases_q13.a, -8191, 8191));
     s->column[1][row] = (int16_t)(4 * qm_clamp(d->run.control.i_q13.q, -8191, 8191));
     s->column[2][row] = estimator_speed(&d->run.estimator);
     s->column[3][row] = (int16_t)(d->run.estimator.rho_q32 >> 16);

@@ -3,6 +3,7 @@
 #define DRIVE_MODES_TORQUE_H
 
 #include "drive/modes/bidirectional.h"
+#include "drive/speed_law.h"
 
 /** Ends of the potentiometer's travel: electrical rpm, or q current in Q13. */
 typedef struct {
@@ -25,32 +26,29 @@ QM_INLINE mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_r
     return range;
 }
 
-/** The q current in CLOSED: as commanded; the speed controller keeps it below the maximum speed, and below the minimum speed,
- *  where the estimator would lose the rotor, a proportional share holds against it. @return 1 if the mode has taken the step */
-QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, speed_erpm_t speed)
+/** The q current in CLOSED: as commanded, between what would hold the minimum speed, below which the estimator would lose the rotor, and
+ *  what holds the maximum speed. Both come from the speed controller's own law, which has no memory: limits are met and left without
+ *  a bounce, and a stop goes on from what is there. @param iq_q13 the result @return 1 if the mode has taken the step */
+QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, current_q13_t *iq_q13)
 {
 #ifdef TORQUE_MODE
-    drive_control_t *c = &d->run.control;
-    int16_t torque = qm_abs(d->command.target_erpm);
-    int16_t limit = (torque < c->iq_limit_q13) ? torque : c->iq_limit_q13;
-    int16_t iq;
-    int32_t hold;
+    drive_run_t *run = &d->run;
+    int16_t iq, speed = along_direction(d, observer_speed(&run->observer));
 
+    *iq_q13 = 0;
     if (d->state != (uint16_t)DRIVE_CLOSED) {
         return 0;
     }
-    iq = pi_tick(&c->pi_speed, &p->pi_speed, qm_sub_limited(along_direction(d, p->maximum_erpm), speed), limit);
-    hold = qm_mulss(qm_sub_limited(p->minimum_erpm, along_direction(d, speed)), p->pi_speed.kp) >> p->pi_speed.shift;
-    c->reference_erpm = speed; /* field weakening and a controlled stop start from it */
-    if (hold > c->iq_limit_q13) {
-        hold = c->iq_limit_q13;
-    }
-    c->ref_q13.q = (hold > along_direction(d, iq)) ? along_direction(d, (int16_t)hold) : iq;
+    /* field weakening, the rates and a controlled stop start from it */
+    run->control.reference_erpm = along_direction(d, (speed > p->minimum_erpm) ? speed : p->minimum_erpm);
+    iq = qm_clamp(qm_abs(d->command.target_erpm), along_direction(d, speed_current(run, p, along_direction(d, p->minimum_erpm))),
+                  along_direction(d, speed_current(run, p, along_direction(d, p->maximum_erpm))));
+    *iq_q13 = along_direction(d, iq);
     return 1;
 #else
     (void)d;
     (void)p;
-    (void)speed;
+    *iq_q13 = 0;
     return 0;
 #endif
 }

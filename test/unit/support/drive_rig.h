@@ -111,9 +111,10 @@ static inline void rig_lock(int16_t direction)
     (void)rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u);
 }
 
-/** The estimator's filtered speed. */
+/** The speed, as the estimator's filter and the observer see it. */
 static inline void rig_speed(int16_t speed_erpm)
 {
+    drive.run.observer.omega_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
 }
 
@@ -128,6 +129,8 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     drive.run.control.ref_q13.q = 0;
     rig_speed(speed_erpm);
     drive.run.estimator.omega_erpm = speed_erpm;
+    drive.run.handover.speed_is_preset = 1;
+    speed_follow(&drive.run, &params);
 }
 
 /** Counter of the slow steps brought to a value, so that the next tick runs the block of `slot`. */

@@ -1,0 +1,71 @@
+/* Flux and resistance from the running motor.
+ *
+ * In lock the filtered Ed is zero if 1/Kphi and R are right. An angle that leads makes it positive in both directions of rotation (see
+ * estimator_pll()): 1/Kphi is too large, or R too small for a motor that drives. A step down the gradient corrects each by its own share of
+ * the voltage, so that the flux learns where the back-EMF prevails and the resistance where the current does. The tables of field
+ * weakening stay the feed-forward; the flux is the magnets' temperature, the resistance the winding's. */
+#ifndef CONTROL_ADAPTATION_H
+#define CONTROL_ADAPTATION_H
+
+#include "control/estimator.h"
+
+/** Constants. */
+typedef struct {
+    int16_t rate_q16;          /**< share of an error that a step takes back, 0..8192 */
+    q15_t kfi_least, kfi_most; /**< bounds of the change of 1/Kphi */
+    q15_t rs_least, rs_most;   /**< and of R, above -1 */
+    int16_t emf_least_q12;     /**< no information below, at least 1 */
+    uint16_t rs_base_q16;      /**< R of the header, see motor_model_t */
+} adaptation_params_t;
+
+/** State: changes against the header, Q31. */
+typedef struct {
+    int32_t kfi_q31; /**< of 1/Kphi: negative where the flux is stronger */
+    int32_t rs_q31;
+} adaptation_t;
+
+/** One step. @param emf_q12 filtered back-EMF in the estimator's frame @param ri_q12 R i_q of the model, signed */
+QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
+{
+    uint16_t emf = (uint16_t)qm_abs(emf_q12.q), ri = (uint16_t)qm_abs(ri_q12), wrong = (uint16_t)qm_abs(emf_q12.d), sum = emf + ri;
+    int16_t error, flux_rate;
+    if (emf < (uint16_t)p->emf_least_q12) {
+        return;
+    }
+    if (wrong >= sum) {
+        wrong = (uint16_t)(sum - 1u);
+    }
+    error = qm_share(wrong, sum);
+    if (emf_q12.d < 0) {
+        error = (int16_t)-error;
+    }
+    /* The rate is shared out, not the error: an error's rounding would turn its noise into a drift of R where no current holds it. */
+    flux_rate = qm_hi(2 * qm_mulss(qm_share(emf, (uint16_t)(sum + 1u)), p->rate_q16) + 32768);
+    a->kfi_q31 = qm_clamp_hi(a->kfi_q31 - qm_mulss(error, flux_rate), p->kfi_least, p->kfi_most);
+    if ((ri_q12 ^ emf_q12.q) < 0) {
+        error = (int16_t)-error;
+    }
+    a->rs_q31 = qm_clamp_hi(a->rs_q31 + qm_mulss(error, (int16_t)(p->rate_q16 - flux_rate)), p->rs_least, p->rs_most);
+}
+
+/** 1/Kphi within its format, 2048 .. 32767. */
+QM_INLINE int16_t adaptation_kfi(int32_t kfi)
+{
+    if (kfi > 32767) {
+        return 32767;
+    }
+    return (int16_t)((kfi < 2048) ? 2048 : kfi);
+}
+
+/** The model with what was learnt: 1/Kphi comes from the table anew in every step, R from the header. */
+QM_INLINE void adaptation_apply(const adaptation_t *a, const adaptation_params_t *p, motor_model_t *model)
+{
+    int32_t kfi = (int32_t)model->inv_kfi + 2 * (int32_t)qm_mulhi(model->inv_kfi, qm_hi(a->kfi_q31));
+    int32_t rs = (int32_t)p->rs_base_q16 + 2 * (int32_t)qm_mulhi_su(qm_hi(a->rs_q31), p->rs_base_q16);
+    model->inv_kfi = adaptation_kfi(kfi);
+    model->rs_q16 = (uint16_t)((rs > 65535) ? 65535 : rs);
+    /* quotient at most 32767 because inv_kfi >= 2048 */
+    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)model->inv_kfi);
+}
+
+#endif

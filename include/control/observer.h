@@ -1,0 +1,161 @@
+/* The load observer: from the speed that the estimator sees and the q current, the rotor's speed and the load on it.
+ *
+ * The shaft obeys J dw/dt = Kt (i_q - i_load). The observer runs this model beside the motor and corrects it by what the estimated
+ * speed w^ says, with both poles at the rate r:
+ *
+ *     dw/dt = Kt/J (i_q - i_load) + 2 r (w^ - w),    d i_load/dt = -r^2 J/Kt (w^ - w)
+ *
+ * i_load goes to the controller as it is, so the loop is stiff without waiting for an integral. The rate follows what is known: slow
+ * without load, where dead time disturbs the back-EMF most; quicker under load; quickest for a while after a large innovation
+ * w^ - w; and all in proportion to the speed at low speed, for the estimator's own lock is as quick as the rotor turns. */
+#ifndef CONTROL_OBSERVER_H
+#define CONTROL_OBSERVER_H
+
+#include "control/qmath.h"
+
+#define OBSERVER_UNREST_STEPS 1000 /**< a load step is over in a tenth of a second; what goes on longer is the loop's own */
+#define OBSERVER_CALM_SHIFT 5      /**< after a large innovation the quick rate fades by 1/32 a step */
+
+/** Constants. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a
+ *  count of current gives 1/2 to 1 of it. */
+typedef struct {
+    int16_t deltat_q32;                       /**< angle per period and erpm, see estimator_params_t */
+    int16_t per_turn_q12;                     /**< speed that turns 2^16 counts of the angle's 2^32 further in a step, erpm * 4096 */
+    uint16_t shift;                           /**< 1..15 */
+    uint16_t per_current_q16;                 /**< units a count of q current, 32768..65535 */
+    uint16_t per_unit_q15;                    /**< counts of q current a unit: 2^31 / per_current_q16 */
+    int16_t innovation_max;                   /**< |w^ - w| counts up to here, erpm: keeps a step of the load in its word */
+    int16_t load_max;                         /**< largest |load|, units */
+    int16_t quiet_q16, loaded_q16, quick_q16; /**< rate * step: without load, under load, after a large innovation */
+    speed_erpm_t full_erpm;                   /**< speed reference from which the rates are these; below in proportion */
+    int16_t load_from, load_width;            /**< the load that begins to count, and over what more it counts, units */
+    int16_t load_slope_q15;                   /**< 32767 / load_width */
+    int16_t large_erpm, large_loaded_erpm;    /**< what a large innovation is: without and under load, and 1/32 of the speed more */
+} observer_params_t;
+
+/** State. */
+typedef struct {
+    int32_t omega_q16;     /**< speed, erpm with 16 fraction bits */
+    int32_t load_q16;      /**< acceleration that the load takes, units with 16 fraction bits */
+    uint32_t rho_q32;      /**< the estimator's angle a step ago */
+    int16_t rate_q16;      /**< rate * step in use */
+    int16_t large_erpm;    /**< a large innovation begins here */
+    q15_t quick_q15;       /**< 1 = a large innovation was just seen */
+    uint16_t unrest_steps; /**< four for each step that was not calm, less one for each that was */
+    q15_t share_q15;       /**< of the full rates, by the speed */
+} observer_t;
+
+/** Speed, electrical rpm. */
+QM_INLINE speed_erpm_t observer_speed(const observer_t *o)
+{
+    return qm_hi(o->omega_q16);
+}
+
+/** The q current that holds the load, with 13 fraction bits. */
+QM_INLINE int32_t observer_load_q26(const observer_t *o, const observer_params_t *p)
+{
+    return qm_mulsu(qm_hi(o->load_q16 + 32768), p->per_unit_q15) >> 2;
+}
+
+/** The same in whole counts. */
+QM_INLINE current_q13_t observer_load(const observer_t *o, const observer_params_t *p)
+{
+    return (int16_t)((observer_load_q26(o, p) + 4096) >> 13);
+}
+
+/** 1 while nothing changes fast: the innovation has been small for some 30 ms. */
+QM_INLINE uint16_t observer_is_calm(const observer_t *o)
+{
+    return (uint16_t)(o->quick_q15 < 4096);
+}
+
+/** a + (b - a) * share; b - a fits a word. */
+QM_INLINE int16_t observer_between(int16_t a, int16_t b, q15_t share)
+{
+    return (int16_t)(a + qm_hi(2 * qm_mulss((int16_t)(b - a), share)));
+}
+
+#define OBSERVER_FASTEST_Q16 (32700l * 65536)
+
+/** The speed and a change of it, within the format. @param change at most 2^30 */
+QM_INLINE int32_t observer_sum(int32_t omega_q16, int32_t change)
+{
+    if (change >= 0) {
+        return (omega_q16 > OBSERVER_FASTEST_Q16 - change) ? OBSERVER_FASTEST_Q16 : omega_q16 + change;
+    }
+    return (omega_q16 < -OBSERVER_FASTEST_Q16 - change) ? -OBSERVER_FASTEST_Q16 : omega_q16 + change;
+}
+
+/** Begins at a known angle and speed with a known q current, calm. @param speed_erpm at most 32700 */
+QM_INLINE void observer_preset(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t speed_erpm, current_q13_t iq_q13)
+{
+    o->rho_q32 = rho_q32;
+    o->omega_q16 = (int32_t)speed_erpm * 65536;
+    o->load_q16 = (int32_t)qm_mulhi_su(iq_q13, p->per_current_q16) * 65536;
+    o->quick_q15 = 0;
+    o->unrest_steps = 0;
+}
+
+/** The rate for the next step. @param ref_erpm speed reference, any */
+QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm)
+{
+    int16_t speed = qm_abs(ref_erpm), load = (int16_t)(qm_abs(qm_hi(o->load_q16)) - p->load_from), rate;
+    q15_t loaded = (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
+
+    o->share_q15 = 32767;
+    if (speed < p->full_erpm) {
+        o->share_q15 = (int16_t)qm_divud((uint32_t)(uint16_t)speed << 15, (uint16_t)p->full_erpm);
+    }
+    rate = observer_between(0, p->quiet_q16, o->share_q15);
+    /* under load the back-EMF is clean, and half the speed is enough */
+    o->share_q15 = observer_between(o->share_q15, (int16_t)(o->share_q15 < 16384 ? 2 * o->share_q15 : 32767), loaded);
+    rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
+    o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
+    o->large_erpm = (int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5));
+}
+
+/** By how much the angle has turned further in a step than the speed says, as a speed.
+ *  The mean over the step, not a sample: a step of current gives the back-EMF a pulse and, over the derivative's eight samples, its
+ *  opposite, which cancel over eight periods. The difference wraps with the angle, so no speed is too high.
+ *  @param rho_q32 the estimator's angle @param omega_erpm speed in the middle of the step */
+QM_INLINE QM_WRAPS int16_t observer_innovation(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t omega_erpm)
+{
+    uint32_t turned = qm_turn_sub(rho_q32, o->rho_q32), expected = (uint32_t)qm_mulss(omega_erpm, p->deltat_q32);
+    /* rounded: a count of `more` is 2 erpm, so that half of one would be an offset of the speed */
+    int16_t more = qm_clamp(qm_hi((int32_t)qm_turn_add(qm_turn_sub(turned, 8u * expected), 32768u)), -8192, 8191);
+    o->rho_q32 = rho_q32;
+    return qm_clamp((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), (int16_t)-p->innovation_max, p->innovation_max);
+}
+
+/** By how much the load's estimate falls: innovation * rate^2 in all its bits, for a slow rate's square is below a word's last. */
+QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovation, int16_t rate_q16)
+{
+    int32_t square_q32 = qm_mulss(rate_q16, rate_q16);
+    return qm_shift(qm_mulss(innovation, qm_hi(square_q32)) + (qm_mulsu(innovation, (uint16_t)square_q32) >> 16), p->shift);
+}
+
+/** One step. @param rho_q32 the estimator's angle @param iq_q13 measured q current */
+QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
+{
+    int16_t innovation;
+    int32_t before_q16 = o->omega_q16;
+
+    o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
+    innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
+    o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
+    o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
+    if (!observer_is_calm(o)) {
+        o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
+    } else if (o->unrest_steps != 0u) {
+        o->unrest_steps--;
+    } else {
+        /* calm for long */
+    }
+    if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
+        o->quick_q15 = 32767;
+    } else {
+        o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
+    }
+}
+
+#endif

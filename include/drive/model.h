@@ -1,0 +1,61 @@
+/* What the running motor teaches about itself, and when it may. */
+#ifndef DRIVE_MODEL_H
+#define DRIVE_MODEL_H
+
+#include "drive/state.h"
+
+/** R i_q in the format of the filtered back-EMF. */
+QM_INLINE voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p)
+{
+    return (int16_t)(qm_mulhi_su(run->control.i_q13.q, run->model.rs_q16) * (1 << p->estimator.rs_exp));
+}
+
+/** At the end of the ramp, while the estimator is waited for: with flux, R and L all off it may need a truer flux before it can lock. The current
+ *  is nearly all d current there and says nothing of R. */
+QM_INLINE void model_learn_flux(drive_run_t *run, const drive_params_t *p)
+{
+    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), 0);
+}
+
+/** A step of the adaptation, every eighth period in closed loop. It rests until the observer runs, while the speed changes fast, and at the
+ *  limits of current and voltage. It does not wait for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock
+ *  needs it before; what dR i_d puts into Ed passes with that current. */
+QM_INLINE void model_learn(drive_run_t *run, const drive_params_t *p)
+{
+    const drive_control_t *c = &run->control;
+    if (!run->handover.speed_is_preset || !observer_is_calm(&run->observer)
+        || qm_abs(c->v_q14.q) >= c->vq_limit_q14 || qm_abs(c->ref_q13.q) >= c->iq_limit_q13) {
+        return;
+    }
+    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), model_ri(run, p));
+}
+
+/** What is learnt in this state. Every eighth period. */
+QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
+{
+    if (drive_is_closed(d)) {
+        model_learn(&d->run, p);
+    } else if (d->state == (uint16_t)DRIVE_RAMP && d->run.handover.waited_steps != 0u) {
+        model_learn_flux(&d->run, p);
+    } else {
+        /* nothing turns that the estimator could see */
+    }
+}
+
+/** The motor's constants follow the speed reference, and what was learnt. Every eighth period in closed loop. */
+QM_INLINE void model_update(drive_t *d, const drive_params_t *p)
+{
+    if (drive_is_closed(d)) {
+        drive_update_model(&d->run, p, d->run.control.reference_erpm);
+    }
+}
+
+/** The same in RAMP, in a period that has no hand-over. */
+QM_INLINE void model_update_in_ramp(drive_t *d, const drive_params_t *p)
+{
+    if (d->state == (uint16_t)DRIVE_RAMP) {
+        drive_update_model(&d->run, p, p->end_erpm);
+    }
+}
+
+#endif
