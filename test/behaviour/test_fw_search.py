@@ -40,15 +40,14 @@ def test_two_entries_of_the_hurst(path, places):
     assert path.read_text(encoding="utf-8") == text
 
 
-def test_a_motor_that_saturates_gets_another_ls(path, places):
+def test_a_motor_that_saturates_keeps_its_angle(path, places):
+    """The adaptation takes back what a falling L does to the angle, so the search has no Ls to change."""
     changes = ("motor.sat_ld_ratio=0.35", "motor.sat_lq_ratio=0.35", "motor.sat_current_a=1.5")
     options = [word for change in changes for word in ("--set", change)]
     assert command("tune-fw", HURST, "--entries", "6", "--no-plots", "--torque-share", "0.1", *places, *options)[0] == 1
     found = fw_tables.load(path)
-    entry = found.entries[found.last_index]
-    assert entry.ls_ratio < 0.47
-    assert entry.ls_ratio == approx(0.5 * (1.0 - 0.35 * min(1.0, (entry.idref_a / 1.5) ** 2)), abs=0.06)
-    assert all(abs(row["angle_free_deg"]) <= 3.3 for row in found.rows[1:])
+    assert found.entries[found.last_index].idref_a < -1.5
+    assert all(abs(row["angle_free_deg"]) <= 2.5 for row in found.rows[1:])
 
 
 @pytest.mark.parametrize("options, told", [
