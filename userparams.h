@@ -61,7 +61,7 @@
 /* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
 #define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 52 degrees, 51 over the parameter set */
-#define LOAD_BANDWIDTH_HZ 110       /* [Hz]            1 .. 200       load observer after a load step; under load 0.43 of it, without load 1.22 SPEED_BANDWIDTH_HZ: phase margin 17 degrees after a load step, 42 under load */
+#define LOAD_BANDWIDTH_HZ 110       /* [Hz]            1 .. 200       load observer after a load step; slower under a steady load, slowest without one: phase margin 17 degrees after a load step, 42 under load */
 
 /* ---- Filters, Equation 7: K in Q15 per period --------------------------------------------------------------------- */
 #define KFILTER_ESDQ 2000           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM: 200 Hz */
@@ -144,7 +144,7 @@
  *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, AN1292's constant
  *   adaptation.rs_base_q16               2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
  *   estimator.rs_exp                        1 1                   0  count                          exact  the product is shifted left by it
- *   estimator.resistive_max            11.716 V                7215  Q13 V                       +0.001 %  largest R i, at the trip level
+ *   estimator.resistive_max_q13        11.716 V                7215  Q13 V                       +0.001 %  largest R i, at the trip level
  *   fieldweak.ls_base_q16                1.92 mH              52026  Q16 / 1                     -0.000 %  L of the estimator, eight samples
  *   estimator.ls_exp                        1 1                   0  count                          exact  the product is shifted left by it
  *
@@ -188,7 +188,7 @@
  *   observer.shift                          3 1                   3  count                          exact  2^this of its units of acceleration are an erpm a step
  *   observer.per_current_q16       1.0396e+05 rpm/s/A         58548  Q16 unit/Q13 A              +0.000 %  Kt/J
  *   observer.per_unit_q15          9.6195e-06 A s/rpm         36679  Q15 Q13 A/unit              -0.000 %  J/Kt
- *   observer.innovation_max            3276.6 rpm             16383  erpm                           exact  innovation counts up to here
+ *   observer.innovation_max_erpm       3276.6 rpm             16383  erpm                           exact  innovation counts up to here
  *   observer.load_max                    2.75 A                4574  units                          exact  largest load
  *   observer.quiet_q16                  15.86 Hz               2612  Q16 a step                  -0.011 %  rate without load
  *   observer.loaded_q16                    33 Hz               5435  Q16 a step                  -0.008 %  rate under load

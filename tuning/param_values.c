@@ -44,7 +44,7 @@ static void motor(void)
     MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
     FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
     FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
-    FIELD(estimator.resistive_max, 2.0 / sqrt(3.0) * OVER_CURRENT_THRESHOLD_A * rs, "V", 4.0 * volt * (1 << p.estimator.rs_exp), "Q13 V",
+    FIELD(estimator.resistive_max_q13, 2.0 / sqrt(3.0) * OVER_CURRENT_THRESHOLD_A * rs, "V", 4.0 * volt * (1 << p.estimator.rs_exp), "Q13 V",
           "largest R i, at the trip level");
     FIELD(fieldweak.ls_base_q16, ls, "mH", one_ls / 4096.0 * (1 << p.estimator.ls_exp), q16_divided[p.estimator.ls_exp],
           "L of the estimator, eight samples");
@@ -109,7 +109,7 @@ static void observer(void)
     FIELD(observer.per_current_q16, PARAM_ACCEL * erpm / slots / q13_a, "rpm/s/A", unit * erpm / slots / q13_a / 65536.0, "Q16 unit/Q13 A", "Kt/J");
     FIELD(observer.per_unit_q15, 1.0 / (PARAM_ACCEL * erpm / slots / q13_a), "A s/rpm", slots * q13_a / (unit * erpm) / 32768.0, "Q15 Q13 A/unit",
           "J/Kt");
-    FIELD(observer.innovation_max, p.observer.innovation_max * erpm, "rpm", 0.0, "erpm", "innovation counts up to here");
+    FIELD(observer.innovation_max_erpm, p.observer.innovation_max_erpm * erpm, "rpm", 0.0, "erpm", "innovation counts up to here");
     FIELD(observer.load_max, p.observer.load_max / PARAM_ACCEL_UNITS * q13_a, "A", 0.0, "units", "largest load");
     FIELD(observer.quiet_q16, PARAM_MIN(PARAM_QUIET_RATIO * SPEED_BANDWIDTH_HZ, PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ), "Hz", rate, "Q16 a step",
           "rate without load");

@@ -1,4 +1,4 @@
-/* What follows the filtered bus: called, so that the start and the interrupt share one copy. */
+/* What follows the bus: called, so that the start and the interrupt share one copy. */
 #include "drive/bus.h"
 
 void bus_update_gain(drive_t *d, const drive_params_t *p, int16_t bus_q15)

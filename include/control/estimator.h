@@ -10,7 +10,7 @@
 typedef struct {
     uint16_t rs_exp;              /**< 0..3, for motors whose Rs does not fit */
     uint16_t ls_exp;              /**< 0..3, the same for Ls */
-    int16_t resistive_max;        /**< limit of Rs i of an axis before rs_exp: what the header's Rs gives at the trip level */
+    int16_t resistive_max_q13;    /**< limit of Rs i of an axis, Q13 voltage >> rs_exp: what the header's Rs gives at the trip level */
     int16_t d_ilimit_ls_q14;      /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
     int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
     int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
@@ -102,7 +102,7 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
 QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
     alphabeta_t previous = e->history_q14[e->newest];
-    const int16_t most = p->resistive_max; /* the adaptation may raise Rs, but not the format's end */
+    const int16_t most = p->resistive_max_q13; /* the adaptation may raise Rs, but not the format's end */
     uint16_t newest = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
     alphabeta_t *slot = &e->history_q14[newest]; /* of the oldest, which makes room */
     alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, *slot);

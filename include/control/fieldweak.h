@@ -5,8 +5,8 @@
 #include "control/estimator.h"
 
 #define FIELDWEAK_ENTRIES 18
-#define FIELDWEAK_TRIM_SHIFT 4 /**< d current of the voltage feedback: counts a step per 16 counts of missing voltage */
-#define FIELDWEAK_TRIM_MOST 12
+#define FIELDWEAK_TRIM_SHIFT 4     /**< d current of the voltage feedback: counts a step per 16 counts of missing voltage */
+#define FIELDWEAK_TRIM_MOST 12     /**< d current that a step adds at most, Q13 counts */
 #define FIELDWEAK_FILTER_LEAST 256 /**< K of the slowest back-EMF filter, Q16 */
 #define SPEED_INDEX_CONST 10       /**< one table step is 2^10 electrical rpm */
 

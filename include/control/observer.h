@@ -21,10 +21,10 @@
 typedef struct {
     int16_t deltat_q32;                       /**< angle per period and erpm, see estimator_params_t */
     int16_t per_turn_q12;                     /**< speed that turns 2^16 counts of the angle's 2^32 further in a step, erpm * 4096 */
-    uint16_t shift;                           /**< 1..15 */
+    uint16_t shift;                           /**< 1..13 */
     uint16_t per_current_q16;                 /**< units a count of q current, 32768..65535 */
     uint16_t per_unit_q15;                    /**< counts of q current a unit: 2^31 / per_current_q16 */
-    int16_t innovation_max;                   /**< |w^ - w| counts up to here, erpm: keeps a step of the load in its word */
+    int16_t innovation_max_erpm;              /**< |w^ - w| counts up to here, erpm: keeps a step of the load in its word */
     int16_t load_max;                         /**< largest |load|, units */
     int16_t quiet_q16, loaded_q16, quick_q16; /**< rate * step: without load, under load, after a large innovation */
     speed_erpm_t full_erpm;                   /**< speed reference from which the rates are these; below in proportion */
@@ -117,17 +117,18 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
 /** By how much the angle has turned further in a step than the speed says, as a speed.
  *  The mean over the step, not a sample: a step of current gives the back-EMF a pulse and, over the derivative's eight samples, its
  *  opposite, which cancel over eight periods. The difference wraps with the angle, so no speed is too high.
- *  @param rho_q32 the estimator's angle @param omega_erpm speed in the middle of the step */
+ *  @param rho_q32 the estimator's angle @param omega_erpm speed in the middle of the step @return erpm, within innovation_max_erpm */
 QM_INLINE QM_WRAPS int16_t observer_innovation(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t omega_erpm)
 {
     uint32_t turned = qm_turn_sub(rho_q32, o->rho_q32), expected = (uint32_t)qm_mulss(omega_erpm, p->deltat_q32);
     /* rounded: a count of `more` is 2 erpm, so that half of one would be an offset of the speed */
     int16_t more = qm_clamp(qm_hi((int32_t)qm_turn_add(qm_turn_sub(turned, 8u * expected), 32768u)), -8192, 8191);
     o->rho_q32 = rho_q32;
-    return qm_clamp((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), (int16_t)-p->innovation_max, p->innovation_max);
+    return qm_clamp((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), (int16_t)-p->innovation_max_erpm, p->innovation_max_erpm);
 }
 
-/** By how much the load's estimate falls: innovation * rate^2 in all its bits, for a slow rate's square is below a word's last. */
+/** By how much the load's estimate falls: innovation * rate^2 in all its bits, for a slow rate's square is below a word's last.
+ *  @param innovation erpm @param rate_q16 rate * step @return the observer's units, 16 fraction bits */
 QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovation, int16_t rate_q16)
 {
     int32_t square_q32 = qm_mulss(rate_q16, rate_q16);

@@ -124,7 +124,8 @@ typedef struct {
     observer_t observer;
     handover_t handover;
     drive_control_t control;
-    uint16_t stall_steps, lost_lock_steps; /**< how long each condition has lasted, slow steps */
+    uint16_t stall_steps;     /**< how long the stall has lasted, slow steps */
+    uint16_t lost_lock_steps; /**< two for each slow step out of lock, less one for each in lock */
     MODE_STATE
 } drive_run_t;
 

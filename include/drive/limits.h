@@ -5,8 +5,8 @@
 
 #include "drive/drive.h"
 
-#define LIMITS_MISSING_Q14 4 /**< voltage counts that a count of missing q current asks for */
-#define LIMITS_MISSING_MOST_Q13 64
+#define LIMITS_MISSING_Q14 4       /**< voltage counts that a count of missing q current asks for */
+#define LIMITS_MISSING_MOST_Q13 64 /**< missing q current that counts at most */
 
 /** Voltage that the q axis has left, less what the missing q current asks for: a limit that is only touched now and then takes no more d
  *  current than it must, and one that costs speed takes what it needs. */

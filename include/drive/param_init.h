@@ -17,12 +17,12 @@
     { \
         .rs_exp = PARAM_RS_EXP, \
         .ls_exp = PARAM_LS_EXP, \
-        .resistive_max = (int16_t)(2.0F / PARAM_SQRT3 * CURRENT_Q14_F(OVER_CURRENT_THRESHOLD_A) \
-                                       * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) / 65536.0F \
-                                   + 0.5F), \
+        .resistive_max_q13 = (int16_t)(2.0F / PARAM_SQRT3 * CURRENT_Q14_F(OVER_CURRENT_THRESHOLD_A) \
+                                           * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) / 65536.0F \
+                                       + 0.5F), \
         .d_ilimit_ls_q14 = D_ILIMIT_LS_Q14, \
         .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
-        .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F), \
+        .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
         .half_step_q16_rad = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F), \
         .kfilter_velestim_q16 = 2 * (KFILTER_VELESTIM), \
         .nominal_erpm = (int16_t)NOMINAL_SPEED_ERPM, \
@@ -64,12 +64,12 @@
 
 #define PARAM_OBSERVER_INIT \
     { \
-        .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F), \
-        .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / (8.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F) + 0.5F), \
+        .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
+        .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / (8.0F * PARAM_DELTAT_Q32) + 0.5F), \
         .shift = PARAM_ACCEL_SHIFT, \
         .per_current_q16 = (uint16_t)PARAM_MIN(PARAM_ACCEL_UNITS * 65536.0F + 0.5F, 65535.0F), \
         .per_unit_q15 = (uint16_t)PARAM_MIN(32768.0F / PARAM_ACCEL_UNITS + 0.5F, 65535.0F), \
-        .innovation_max = (int16_t)PARAM_INNOVATION_MAX, \
+        .innovation_max_erpm = (int16_t)PARAM_INNOVATION_MAX, \
         .load_max = (int16_t)(PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) * PARAM_ACCEL_UNITS), \
         .quiet_q16 = (int16_t)PARAM_QUIET_Q16, .loaded_q16 = (int16_t)PARAM_LOADED_Q16, .quick_q16 = (int16_t)PARAM_QUICK_Q16, \
         .full_erpm = (int16_t)PARAM_FULL_ERPM, .load_from = (int16_t)PARAM_LOAD_FROM, \

@@ -48,6 +48,8 @@
 #define BUS_Q15(voltage_v) ((int16_t)PARAM_ROUND(PARAM_F(voltage_v) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F))
 
 /* ---- Estimator ---- */
+/** Angle per period and electrical rpm, 2^32 a turn (NORM_DELTAT, unrounded). */
+#define PARAM_DELTAT_Q32 (PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F)
 #define PARAM_EXP(x) ((uint16_t)(((x) < 65535.0F) ? 0 : ((x) < 131071.0F) ? 1 \
                                                     : ((x) < 262143.0F)   ? 2 \
                                                                           : 3))
@@ -166,6 +168,7 @@
 /** A large innovation: without load above what dead time's compensation leaves. */
 #define PARAM_LARGE_ERPM (0.13F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 #define PARAM_LARGE_LOADED_ERPM (0.03F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
+/** Innovation at which the load changes by 16000 units in a step. */
 #define PARAM_INNOVATION_MAX PARAM_MIN(16383.0F, 16000.0F * 65536.0F * 65536.0F / (PARAM_QUICK_Q16 * PARAM_QUICK_Q16) / (float)(1 << PARAM_ACCEL_SHIFT))
 /** q current that a sample misses which is taken this long after the centre of the low sides' conduction: delay psi w/L. */
 #define SAMPLE_DELAY_CLOCKS 60

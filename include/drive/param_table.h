@@ -2,6 +2,10 @@
 #ifndef DRIVE_PARAM_TABLE_H
 #define DRIVE_PARAM_TABLE_H
 
+#if defined(USERPARAMS_H) && !defined(LOAD_BANDWIDTH_HZ)
+#error userparams.h: LOAD_BANDWIDTH_HZ is missing, a parameter since 0.10.0: write #define LOAD_BANDWIDTH_HZ 110, or make the header anew with make tune
+#endif
+
 /* Rows on lines of their own: clang-format would stagger them. */
 /* clang-format off */
 
@@ -51,7 +55,7 @@
 #define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
     X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
     X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60, FROM_TUNER, "speed loop") \
-    X(LOAD_BANDWIDTH_HZ, "Hz", 1, 200, FROM_TUNER, "load observer after a load step; under load 0.43 of it, without load 1.22 SPEED_BANDWIDTH_HZ")
+    X(LOAD_BANDWIDTH_HZ, "Hz", 1, 200, FROM_TUNER, "load observer after a load step; slower under a steady load, slowest without one")
 
 #define PARAM_FILTERS(X) /* Filters, Equation 7: K in Q15 per period */ \
     X(KFILTER_ESDQ, "Q15", 10, 8000, FROM_TUNER, "back-EMF up to FW_START_SPEED_RPM") \

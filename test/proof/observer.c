@@ -46,7 +46,7 @@ static void any_observer(observer_params_t *p, int16_t quick, uint16_t shift)
     p->per_turn_q12 = any(3347, 11719);
     p->shift = shift;
     p->per_current_q16 = any_u(32768, 65535);
-    p->innovation_max = any(1, (int16_t)((innovation > 16383) ? 16383 : innovation));
+    p->innovation_max_erpm = any(1, (int16_t)((innovation > 16383) ? 16383 : innovation));
     p->load_max = any(1, 8192);
 }
 

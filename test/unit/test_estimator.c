@@ -11,7 +11,7 @@ static estimator_t e;
 void setUp(void)
 {
     static const estimator_params_t p = {
-        .rs_exp = 0, .ls_exp = 0, .resistive_max = INT16_MAX, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
+        .rs_exp = 0, .ls_exp = 0, .resistive_max_q13 = INT16_MAX, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
         .half_step_q16_rad = 11244, .kfilter_velestim_q16 = 1496, .nominal_erpm = 14000, .decimate_erpm = 1400
     };
     static const motor_model_t t = {
@@ -65,7 +65,7 @@ void test_acting_voltage_is_the_mean_of_the_last_two_vectors(void)
 void test_resistive_drop_ends_at_its_limit_on_each_axis_and_sign(void)
 {
     tuning.ls_q16 = 0;
-    params.resistive_max = 1500;
+    params.resistive_max_q13 = 1500;
     back_emf(2000, -4000);
     back_emf(2000, -4000); /* half of it: 1000 and -2000 */
     expect_emf(-1000, 1500);
@@ -105,7 +105,7 @@ void test_resistive_drop_ends_at_what_the_headers_resistance_gives_at_the_trip_l
         { "beta", 1000, 12000, -500, -3000 },
     };
     tuning.ls_q16 = 0;
-    params.resistive_max = 3000;
+    params.resistive_max_q13 = 3000;
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         back_emf(cases[n].i_alpha, cases[n].i_beta);
         back_emf(cases[n].i_alpha, cases[n].i_beta); /* the mean of two */

@@ -16,7 +16,7 @@ typedef struct {
 static const estimator_params_t params = {
     .rs_exp = GOLDEN_ESTIMATOR_START_RS_EXP,
     .ls_exp = GOLDEN_ESTIMATOR_START_LS_EXP,
-    .resistive_max = INT16_MAX,
+    .resistive_max_q13 = INT16_MAX,
     .d_ilimit_ls_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_LS_Q14,
     .d_ilimit_hs_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_HS_Q14,
     .deltat_q32 = GOLDEN_ESTIMATOR_START_DELTAT_Q32,

@@ -95,6 +95,32 @@ void test_it_learns_every_eighth_period_of_the_closed_loop_only(void)
     }
 }
 
+void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void)
+{
+    for (uint16_t waited = 0; waited < 2u; waited++) {
+        teachable(1);
+        drive.state = (uint16_t)DRIVE_RAMP;
+        drive.run.handover.waited_steps = waited;
+        drive.ticks = 6;
+        drive_slow(&drive, &params, samples.v_bus);
+        TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    }
+}
+
+/** Field weakening off, the back-EMF's filter in full, and what was learnt: nothing waits for the hand-over. */
+void test_in_the_ramp_the_model_is_that_of_the_end_speed_with_what_was_learnt(void)
+{
+    teachable(1);
+    drive.state = (uint16_t)DRIVE_RAMP;
+    drive.run.adaptation.kfi_q31 = 3277l * 65536; /* a tenth */
+    drive.run.model.kfilter_esdq_q16 = 0;
+    drive.ticks = 5;
+    drive_slow(&drive, &params, samples.v_bus);
+    TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.run.model.kfilter_esdq_q16);
+    TEST_ASSERT_INT16_WITHIN(2, (int16_t)(1.1F * (float)params.fieldweak.inv_kfi[0]), drive.run.model.inv_kfi);
+}
+
 /* ---- what ---- */
 
 void test_resistive_voltage_is_that_of_the_learnt_resistance_and_the_measured_current(void)

@@ -43,10 +43,10 @@ def with_values(values: dict[str, str]) -> str:
     return text
 
 
-def build(values: dict[str, str], extra: tuple[str, ...] = ()) -> tuple[int, str]:
-    """Compiles param_check.c with these values: exit code and messages."""
+def build(values: dict[str, str], extra: tuple[str, ...] = (), after: str = "") -> tuple[int, str]:
+    """Compiles param_check.c with these values and what comes `after` them in the header: exit code and messages."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "userparams.h").write_text(with_values(values), encoding="utf-8")
+        (Path(folder) / "userparams.h").write_text(with_values(values) + after, encoding="utf-8")
         done = compiler([*CFLAGS, f"-I{folder}", "-Iinclude", "-I.", *extra, "-c", "firmware/drive/param_check.c", "-o", f"{folder}/out.o"])
         return done.returncode, done.stderr.replace("\\'", "'")
 
@@ -207,6 +207,12 @@ def test_a_broken_relation_stops_the_build_with_its_message(values: dict[str, st
 def test_a_header_with_the_speed_integral_is_refused_in_one_line(name: str) -> None:
     code, messages = build({name: "0.001"})
     assert code != 0 and messages.count("error:") == 1 and "takes the place of the integral, remove them" in messages, messages
+
+
+def test_a_header_from_before_the_load_observer_is_told_what_it_lacks() -> None:
+    code, messages = build({}, after="\n#undef LOAD_BANDWIDTH_HZ\n")
+    first = next(line for line in messages.splitlines() if "error:" in line)
+    assert code != 0 and "userparams.h: LOAD_BANDWIDTH_HZ is missing" in first, messages
 
 
 def test_the_numbers_in_messages_are_those_of_the_header() -> None:

@@ -179,7 +179,7 @@ void test_constants_at_4_4_A_are_14470_and_1626(void)
     EXACT(NORM_INVKFIBASE, 7956);
     EXACT(NORM_DELTAT, 1790);
     EXPECT_ESTIMATOR(p.estimator, p.fieldweak, p.adaptation, C440);
-    EXACT(p.estimator.resistive_max, 7215); /* 2/sqrt(3) * 3.8 A * R */
+    EXACT(p.estimator.resistive_max_q13, 7215); /* 2/sqrt(3) * 3.8 A * R */
     TEST_ASSERT_FLOAT_WITHIN(1e-9F, 4.05949e-4F, NORM_VOLTAGE_CONST);
     TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
 }
@@ -268,7 +268,7 @@ void test_load_observer_and_what_belongs_to_low_speed(void)
     OBSERVER(shift, SHIFT);
     OBSERVER(per_current_q16, PER_CURRENT_Q16);
     OBSERVER(per_unit_q15, PER_UNIT_Q15);
-    OBSERVER(innovation_max, INNOVATION_MAX);
+    OBSERVER(innovation_max_erpm, INNOVATION_MAX);
     OBSERVER(load_max, LOAD_MAX);
     OBSERVER(quiet_q16, QUIET_Q16);
     OBSERVER(loaded_q16, LOADED_Q16);

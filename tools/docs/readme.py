@@ -117,9 +117,10 @@ def guarantees() -> str:
         ["holds the reference in all rows of AN1292's Table 2; rows 2 to 8 take less current",
          f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
         ["twice the base speed, unloaded", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
-        ["angle within 2° RMS loaded, 4° unloaded with Kphi ±20 % or R -30 .. +50 %, within 1° of the law with L ±30 %, within 10° in every corner",
+        ["angle within 2° RMS loaded, 4° unloaded with Kphi ±20 % or R -30 .. +50 %, within 1° of the law with L ±30 % or with R and field weakening's d current, "
+         "within 10° in every corner",
          held(robust), "`make robust`"],
-        ["0.03, 0.05 and 0.08 N·m at once on and off the bare rotor at 500, 1190, 2500 rpm, Kphi ±20 %: never backwards, back within 2 % in 0.3 s",
+        ["0.03, 0.05 and 0.08 N·m at once on and off the bare rotor at 500, 1190, 2500 rpm, Kphi ±20 %: never backwards; back within 2 % in 0.3 s where the voltage allows the load",
          held(result("loadsteps")), "`make loadsteps`"],
         ["150 rpm and up held for 10 s with 0, 0.03 and 0.08 N·m: speed within 1 %, angle within 8° RMS", held(result("lowspeed")), "`make lowspeed`"],
         ["controlled stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
