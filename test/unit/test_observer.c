@@ -193,6 +193,19 @@ void test_a_large_innovation_is_smaller_under_load_and_larger_at_speed(void)
     }
 }
 
+/** Else a loop that the quick rate makes swing would go on swinging: with an L far from the header's, say. */
+void test_the_longer_large_innovations_go_on_the_larger_they_must_be(void)
+{
+    static const uint16_t cases[][2] = { { 0, 149 }, { 4, 149 }, { 512, 223 }, { 1024, 298 }, { 4000, 731 } };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        o.unrest_steps = cases[n][0];
+        (void)rate_at(0, 0, 0);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][1], o.large_erpm, golden_row(n));
+    }
+    TEST_ASSERT_EQUAL_INT16(32767, observer_large(20000, 1024));
+    TEST_ASSERT_EQUAL_INT16(32766, observer_large(16383, 1024));
+}
+
 void test_is_quick_after_a_large_innovation_and_calm_30_ms_later(void)
 {
     EACH_DIRECTION(direction) {
