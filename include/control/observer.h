@@ -15,7 +15,8 @@
 #include "control/qmath.h"
 
 #define OBSERVER_UNREST_STEPS 1000 /**< a load step is over in a tenth of a second; what goes on longer is the loop's own */
-#define OBSERVER_UNREST_SHIFT 10   /**< after 1024 / 4 steps that were not calm, a large innovation is twice as large */
+#define OBSERVER_UNREST_SHIFT 8    /**< after 256 / 4 steps that were not calm, a large innovation is twice as large */
+#define OBSERVER_START_UNREST 768  /**< at the hand-over it is four times as large: d current and wrong constants shake the estimate */
 #define OBSERVER_CALM_SHIFT 5      /**< after a large innovation the quick rate fades by 1/32 a step */
 
 /** Constants. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a
@@ -95,10 +96,10 @@ QM_INLINE void observer_preset(observer_t *o, const observer_params_t *p, uint32
     o->omega_q16 = (int32_t)speed_erpm * 65536;
     o->load_q16 = (int32_t)qm_mulhi_su(iq_q13, p->per_current_q16) * 65536;
     o->quick_q15 = 0;
-    o->unrest_steps = 0;
+    o->unrest_steps = OBSERVER_START_UNREST;
 }
 
-/** What counts as a large innovation after so much unrest: up to five times as much. @param calm_erpm 0..32767 */
+/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 */
 QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
 {
     int32_t large = calm_erpm + (qm_mulsu(calm_erpm, unrest_steps) >> OBSERVER_UNREST_SHIFT);

@@ -10,9 +10,6 @@ QM_INLINE void speed_schedule(drive_run_t *run, const drive_params_t *p)
     observer_t *o = &run->observer;
     int16_t gain;
     observer_schedule(o, &p->observer, run->control.reference_erpm);
-    if (run->handover.id_q13 != 0) {
-        o->large_erpm = 32767; /* the d current of the start still holds the rotor, and its torque is not in the observer's model */
-    }
     gain = observer_between(p->speed_kp_q13, p->speed_kp_quick_q13, o->quick_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, o->share_q15);
 }

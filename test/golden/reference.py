@@ -726,7 +726,7 @@ class Observer:
 
     def preset(self, rho, speed, iq):
         self.rho, self.omega, self.load, self.quick = rho, speed * WORD, share(iq, self.p["per_current_q16"]) * WORD, 0
-        self.unrest = 0
+        self.unrest = 768
 
     def schedule(self, ref):
         p, speed = self.p, magnitude(ref)
@@ -736,7 +736,7 @@ class Observer:
         rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
         self.rate = toward(rate, toward(0, p["quick_q16"], self.part), self.quick)
         large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
-        self.large = min(large + large * self.unrest // 1024, 32767)
+        self.large = min(large + large * self.unrest // 256, 32767)
 
     def innovation(self, rho, middle):
         """By how much the angle turned further than the speed says, rounded to counts of 2^-16 turns, then to electrical rpm."""
@@ -768,7 +768,7 @@ class ObserverReal(Observer):
 
     def preset(self, rho, speed, iq):
         self.rho, self.omega, self.load, self.quick = rho, float(speed), iq * self.p["per_current_q16"] / WORD, 0.0
-        self.unrest = 0
+        self.unrest = 768
 
     def schedule(self, ref):
         p = self.p
@@ -777,7 +777,7 @@ class ObserverReal(Observer):
         self.part = slow + (min(2 * slow, 1) - slow) * loaded
         rate = p["quiet_q16"] * slow * (1 - loaded) + p["loaded_q16"] * self.part * loaded
         self.rate = (rate + (p["quick_q16"] * self.part - rate) * self.quick) / WORD
-        self.large = (p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 1024)
+        self.large = (p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 256)
 
     def step(self, rho, iq):
         p, before = self.p, self.omega

@@ -106,18 +106,6 @@ void test_gain_follows_the_reference_at_low_speed_and_rises_after_a_large_innova
     TEST_ASSERT_GREATER_THAN_INT16(kp + kp / 2, quick);
 }
 
-/** Its torque is not in the observer's model: with a wrong L, the quick rate has shaken the rotor off. */
-void test_nothing_is_quick_while_the_start_s_d_current_lasts(void)
-{
-    rig_closed(1, 10000);
-    drive.run.handover.id_q13 = 1;
-    speed_schedule(&drive.run, &params);
-    TEST_ASSERT_EQUAL_INT16(32767, drive.run.observer.large_erpm);
-    drive.run.handover.id_q13 = 0;
-    speed_schedule(&drive.run, &params);
-    TEST_ASSERT_INT16_WITHIN(2, params.observer.large_erpm + (10000 >> 5), drive.run.observer.large_erpm);
-}
-
 void test_stop_never_asks_for_a_speed_without_a_gain(void)
 {
     EACH_DIRECTION(direction) {
