@@ -8,8 +8,8 @@
 QM_INLINE void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
-    int16_t gain;
-    observer_schedule(o, &p->observer, run->control.reference_erpm);
+    int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
+    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference);
     gain = observer_between(p->speed_kp_q13, p->speed_kp_quick_q13, o->quick_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, o->share_q15);
 }
@@ -25,7 +25,7 @@ QM_INLINE current_q13_t speed_current(const drive_run_t *run, const drive_params
     if (iq_q26 > limit_q26) {
         return c->iq_limit_q13;
     }
-    return (int16_t)((iq_q26 < -limit_q26) ? -c->iq_limit_q13 : (int16_t)(iq_q26 >> 13));
+    return (int16_t)((iq_q26 < -limit_q26) ? -c->iq_limit_q13 : (int16_t)((iq_q26 + 4096) >> 13));
 }
 
 #endif
