@@ -25,38 +25,38 @@
 #define NOPOLESPAIRS 5              /* [pairs]         1 .. 50        pole pairs */
 #define MOTOR_RS_OHM 2.67           /* [ohm]           0.01 .. 40     phase resistance: half of line to line */
 #define MOTOR_LS_MH 1.92            /* [mH]            0.01 .. 30     phase inductance: half of line to line */
-#define MOTOR_KPHI_V_PER_KRPM 7.24  /* [V peak/krpm]   0.2 .. 200     line-to-line back-EMF per 1000 mechanical rpm */
-#define MOTOR_INERTIA_KGM2 5.5e-6   /* [kg m2]         1e-8 .. 0.1    rotor and whatever turns with it; scales the speed loop */
+#define MOTOR_KPHI_V_PER_KRPM 7.24  /* [V peak/krpm]   0.2 .. 2000    line-to-line back-EMF per 1000 mechanical rpm */
+#define MOTOR_INERTIA_KGM2 5.5e-6   /* [kg m2]         1e-8 .. 10     rotor and whatever turns with it; scales the speed loop */
 
 /* ---- Supply and board: dsPICDEM MCLV, 24 V supply ----------------------------------------------------------------- */
-#define NOMINAL_BUS_V 24.0          /* [V]             10 .. 48       supply; the unit of voltage follows from it */
+#define NOMINAL_BUS_V 24.0          /* [V]             8 .. 60        supply; the unit of voltage follows from it */
 #define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.00014 PWM and control period */
 #define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003 dead time of the bridge */
-#define NORM_CURRENT_CONST 0.0001342773 /* [A/count]       0.00001 .. 0.002 current of one count, full scale / 32768; calibrate with a probe: 4.4 A full scale */
+#define NORM_CURRENT_CONST 0.0001342773 /* [A/count]       0.000001 .. 0.01 current of one count, full scale / 32768; calibrate with a probe: 4.4 A full scale */
 #define KCURRA -0.5                 /* [1]             -0.6 .. 0.6    gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
 #define KCURRB -0.5                 /* [1]             -0.6 .. 0.6    gain of phase B's current */
-#define BUS_FULL_SCALE_V 52.8       /* [V]             20 .. 200      bus voltage that gives full scale at the converter */
+#define BUS_FULL_SCALE_V 52.8       /* [V]             10 .. 330      bus voltage that gives full scale at the converter */
 #define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004 low sides on for this long on each side of the sample's centre */
 
 /* ---- Speeds ------------------------------------------------------------------------------------------------------- */
-#define MINIMUM_SPEED_RPM 150       /* [rpm]           50 .. 10000    potentiometer at zero */
-#define NOMINAL_SPEED_RPM 2800      /* [rpm]           100 .. 20000   potentiometer at full scale, S3 off; the estimator's derivative changes here */
-#define MAXIMUM_SPEED_RPM 5500      /* [rpm]           100 .. 30000   potentiometer at full scale, S3 on */
+#define MINIMUM_SPEED_RPM 150       /* [rpm]           2 .. 10000     potentiometer at zero */
+#define NOMINAL_SPEED_RPM 2800      /* [rpm]           20 .. 30000    potentiometer at full scale, S3 off; the estimator's derivative changes here */
+#define MAXIMUM_SPEED_RPM 5500      /* [rpm]           20 .. 32000    potentiometer at full scale, S3 on */
 #define SPEEDREFRAMP_RPM_PER_S 4000 /* [rpm/s]         1 .. 60000     slope of the speed reference */
 #define TUNING_DELAY_RAMPUP 0xF     /* [periods]       0 .. 4095      TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods */
 
 /* ---- Start: align, ramp, hand-over -------------------------------------------------------------------------------- */
 #define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each): 0.2 s */
-#define END_SPEED_RPM 1000          /* [rpm]           50 .. 5000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
+#define END_SPEED_RPM 1000          /* [rpm]           2 .. 10000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
 #define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of align and ramp: pull-out torque 0.0844 N m */
 
 /* ---- Limits and protections --------------------------------------------------------------------------------------- */
 #define MAXIMUM_CURRENT_A 2.75      /* [A peak]        0.1 .. 20      length of the current vector that the drive may ask for */
 #define OVER_CURRENT_THRESHOLD_A 3.8 /* [A peak]        0.1 .. 40      any phase above trips at once; must lie inside the converter's range */
-#define OVER_VOLTAGE_V 34.0         /* [V]             12 .. 100      bus above trips */
-#define UNDER_VOLTAGE_V 12.0        /* [V]             5 .. 45        bus below trips while running */
-#define REGEN_LIMIT_V 27.0          /* [V]             11 .. 90       braking current is reduced from here, to nothing 2 V higher */
+#define OVER_VOLTAGE_V 34.0         /* [V]             9 .. 100       bus above trips */
+#define UNDER_VOLTAGE_V 12.0        /* [V]             3 .. 55        bus below trips while running */
+#define REGEN_LIMIT_V 27.0          /* [V]             8 .. 90        braking current is reduced from here, to nothing 2 V higher */
 
 /* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 61 over the parameter set */
@@ -69,7 +69,7 @@
 #define KFILTER_VELESTIM 748        /* [Q15]           10 .. 8000     speed for thresholds and display: 74 Hz */
 
 /* ---- Field weakening: a table entry every 1024 electrical rpm of speed reference, 204.8 rpm with 5 pole pairs ----- */
-#define FW_START_SPEED_RPM 2640     /* [rpm]           100 .. 20000   speed reference of entry 0 */
+#define FW_START_SPEED_RPM 2640     /* [rpm]           20 .. 30000    speed reference of entry 0 */
 #define FW_TRIM_CURRENT_A 1.5       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
 
 #define IDREF_SPEED0   0.00               /* [A]             -20 .. 0       d current of each entry */
@@ -92,7 +92,7 @@
 #define IDREF_SPEED17 -2.66
 
 /* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */
-#define INVKFI_SPEED0  NORM_INVKFIBASE    /* [Q15/2]         2048 .. 32767  1/Kphi of each entry */
+#define INVKFI_SPEED0  NORM_INVKFIBASE    /* [Q15/2]         512 .. 32767   1/Kphi of each entry */
 #define INVKFI_SPEED1  NORM_INVKFIBASE
 #define INVKFI_SPEED2  NORM_INVKFIBASE
 #define INVKFI_SPEED3  NORM_INVKFIBASE
@@ -167,7 +167,7 @@
  *   fieldweak.on_speed_erpm              2640 rpm             13200  erpm                           exact  field weakening starts
  *   estimator.nominal_erpm               2800 rpm             14000  erpm                           exact  one-sample derivative above
  *   estimator.decimate_erpm               280 rpm              1400  erpm                           exact  sign of Equation 2 from the filtered speed below
- *   speed_ramp_erpm                      4000 rpm/s               8  erpm in 8 periods              exact  slope of the reference, rounded up
+ *   speed_ramp_q16                       4000 rpm/s          524288  Q16 erpm in 8 periods          exact  slope of the reference
  *   tuning_step_q16                        15 periods         32768  Q16 erpm in 8 periods          exact  slope in TUNING
  *   ramp_hold_erpm                        350 rpm              1750  erpm                           exact  the ramp waits when the motor is further behind
  *   overspeed_erpm                       6540 rpm             32700  erpm                           exact  lost lock above

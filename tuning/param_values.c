@@ -76,7 +76,7 @@ static void speeds(void)
     FIELD(fieldweak.on_speed_erpm, FW_START_SPEED_RPM, "rpm", erpm, "erpm", "field weakening starts");
     FIELD(estimator.nominal_erpm, NOMINAL_SPEED_RPM, "rpm", erpm, "erpm", "one-sample derivative above");
     FIELD(estimator.decimate_erpm, NOMINAL_SPEED_RPM / 10.0, "rpm", erpm, "erpm", "sign of Equation 2 from the filtered speed below");
-    FIELD(speed_ramp_erpm, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots, "erpm in 8 periods", "slope of the reference, rounded up");
+    FIELD(speed_ramp_q16, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm in 8 periods", "slope of the reference");
     FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (524288.0 / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm in 8 periods",
           "slope in TUNING");
     FIELD(ramp_hold_erpm, NOMINAL_SPEED_RPM / 8.0, "rpm", erpm, "erpm", "the ramp waits when the motor is further behind");
@@ -174,7 +174,8 @@ static void modulator(void)
     FIELD(svm.knee_q13, p.svm.knee_q13 * q13_a, "A", 0.0, "Q13 A", "current from which it is full");
     FIELD(svm.dead_slope_q8, (double)p.svm.dead_time / p.svm.knee_q13, "1", 1.0 / 256.0, "Q8", "duty per current");
     FIELD(svm.turn_q13, PARAM_DI(MAXIMUM_SPEED_RPM) * 2.0 * ampere, "A", 0.0, "Q13 A", "most that a current turns in a period");
-    FIELD(voltage_limit_per_bus_q16, top / sqrt(3.0), "V/V", 2.0 * volt / BUS_FULL_SCALE_V, "Q14 V per Q16 bus", "voltage circle");
+    FIELD(bus_shift, 1 << p.bus_shift, "1", 0.0, "count", "the bus is shifted left by it");
+    FIELD(voltage_limit_per_bus_q16, top / sqrt(3.0), "V/V", volt * (1 << p.bus_shift) / BUS_FULL_SCALE_V, "Q14 V per Q16 bus", "voltage circle");
     FIELD(duty_per_volt_numerator, BUS_FULL_SCALE_V, "V", BUS_FULL_SCALE_V / (p.svm.full * 4.0 * volt / BUS_FULL_SCALE_V * 4294967296.0), "Q32",
           "duty per volt at bus 1");
     FIELD(kcurr_a, KCURRA, "1", 1.0 / 32768.0, "Q15", "gain of the samples");

@@ -9,6 +9,8 @@
 
 #include "control/estimator.h"
 
+#define ADAPTATION_KFI_LEAST 1024 /**< 2048 erpm at full voltage: a count is 0.1 % */
+
 /** Constants. */
 typedef struct {
     int16_t rate_q16;          /**< share of an error that a step takes back, 0..8192 */
@@ -48,13 +50,13 @@ QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, d
     a->rs_q31 = qm_clamp_hi(a->rs_q31 + qm_mulss(error, (int16_t)(p->rate_q16 - flux_rate)), p->rs_least, p->rs_most);
 }
 
-/** 1/Kphi within its format, 2048 .. 32767. */
+/** 1/Kphi within its format, ADAPTATION_KFI_LEAST .. 32767. */
 QM_INLINE int16_t adaptation_kfi(int32_t kfi)
 {
     if (kfi > 32767) {
         return 32767;
     }
-    return (int16_t)((kfi < 2048) ? 2048 : kfi);
+    return (int16_t)((kfi < ADAPTATION_KFI_LEAST) ? ADAPTATION_KFI_LEAST : kfi);
 }
 
 /** The model with what was learnt: 1/Kphi comes from the table anew in every step, R from the header. */
@@ -64,8 +66,8 @@ QM_INLINE void adaptation_apply(const adaptation_t *a, const adaptation_params_t
     int32_t rs = (int32_t)p->rs_base_q16 + 2 * (int32_t)qm_mulhi_su(qm_hi(a->rs_q31), p->rs_base_q16);
     model->inv_kfi = adaptation_kfi(kfi);
     model->rs_q16 = (uint16_t)((rs > 65535) ? 65535 : rs);
-    /* quotient at most 32767 because inv_kfi >= 2048 */
-    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)model->inv_kfi);
+    /* below 2048 no sum is too large: 1/Kphi of a slow motor */
+    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)((model->inv_kfi < 2048) ? 2048 : model->inv_kfi));
 }
 
 #endif

@@ -24,7 +24,7 @@
 typedef struct {
     int16_t deltat_q32;                       /**< angle per period and erpm, see estimator_params_t */
     int16_t per_turn_q12;                     /**< speed that turns 2^16 counts of the angle's 2^32 further in a step, erpm * 4096 */
-    uint16_t shift;                           /**< 1..13 */
+    uint16_t shift;                           /**< 0..15 */
     uint16_t per_current_q16;                 /**< units a count of q current, 32768..65535 */
     uint16_t per_unit_q15;                    /**< counts of q current a unit: 2^31 / per_current_q16 */
     int16_t innovation_max_erpm;              /**< |w^ - w| counts up to here, erpm: keeps a step of the load in its word */

@@ -58,6 +58,7 @@ typedef struct {
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
     uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
+    uint16_t bus_shift;                 /**< 1..3: bus_q15 shifted by it fills a word */
     uint16_t voltage_limit_per_bus_q16; /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
     int16_t bus_over_q15, bus_under_q15; /**< trip levels */
@@ -66,7 +67,7 @@ typedef struct {
     int16_t bus_nominal_q15;             /**< start value of the bus filter */
 
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
-    int16_t speed_ramp_erpm; /**< reference step per slow step */
+    int32_t speed_ramp_q16;  /**< reference step per slow step, electrical rpm with 16 fraction bits */
     int32_t tuning_step_q16; /**< the same in TUNING */
     int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
     uint16_t stall_steps, lost_lock_steps;
@@ -95,6 +96,7 @@ typedef struct {
 /** Controller variables of the closed loop. */
 typedef struct {
     speed_erpm_t reference_erpm;   /**< ramped speed reference */
+    uint16_t ramp_q16;             /**< what its last step left below a whole electrical rpm */
     dq_t ref_q13;                  /**< current references */
     current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2) */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */

@@ -110,6 +110,7 @@
         .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
         .current_max_reciprocal = (uint16_t)(33554432.0F / (PARAM_F(MAXIMUM_CURRENT_A) / PARAM_F(NORM_CURRENT_CONST) / 4.0F) + 0.5F), \
         .overcurrent_q13 = CURRENT_Q13(OVER_CURRENT_THRESHOLD_A), \
+        .bus_shift = BUS_SHIFT, \
         .voltage_limit_per_bus_q16 = VOLTAGE_LIMIT_PER_BUS_Q16, \
         .duty_per_volt_numerator = DUTY_PER_VOLT_NUMERATOR, \
         .bus_over_q15 = BUS_Q15(OVER_VOLTAGE_V), \
@@ -121,7 +122,7 @@
         .nominal_erpm = (int16_t)NOMINAL_SPEED_ERPM, \
         .maximum_erpm = (int16_t)MAXIMUMSPEED_ELECTR, \
         .end_erpm = (int16_t)ENDSPEED_ELECTR, \
-        .speed_ramp_erpm = SPEEDREFRAMP, \
+        .speed_ramp_q16 = SPEEDREFRAMP, \
         .tuning_step_q16 = TUNING_STEP_Q16, \
         .ramp_hold_erpm = (int16_t)PARAM_ROUND(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F), \
         .stall_steps = PARAM_SLOW_STEPS(0.3F), \

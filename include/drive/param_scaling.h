@@ -117,7 +117,10 @@
 #define PARAM_ERPM_PER_V (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) / PARAM_F(MOTOR_KPHI_V_PER_KRPM)) /* speed of a phase back-EMF */
 /** Circle inside the usable hexagon, in Q14 voltage per Q16 bus: top duty / sqrt(3). */
 #define PARAM_VOLTAGE_PER_BUS (PARAM_F(PWM_TOP_DUTY) / PARAM_F(PWM_FULL_DUTY) / PARAM_SQRT3 * PARAM_F(BUS_FULL_SCALE_V) / NORM_VOLTAGE_CONST / 2.0F)
-#define VOLTAGE_LIMIT_PER_BUS_Q16 ((uint16_t)PARAM_VOLTAGE_PER_BUS)
+/* The supply may be a sixteenth of the bus range: the bus is shifted left to fill its word. */
+#define BUS_SHIFT ((uint16_t)((PARAM_VOLTAGE_PER_BUS < 65535.0F) ? 1 : (PARAM_VOLTAGE_PER_BUS < 131070.0F) ? 2 \
+                                                                                                           : 3))
+#define VOLTAGE_LIMIT_PER_BUS_Q16 ((uint16_t)(PARAM_VOLTAGE_PER_BUS * 2.0F / (float)(1 << BUS_SHIFT)))
 /** duty counts per Q13 voltage count * 65536 = this / bus in Q16 of full scale. */
 #define DUTY_PER_VOLT_NUMERATOR ((uint32_t)(PARAM_F(PWM_FULL_DUTY) * 4.0F * NORM_VOLTAGE_CONST / PARAM_F(BUS_FULL_SCALE_V) * 4294967296.0F))
 
@@ -127,7 +130,7 @@
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC (8.0F * PARAM_F(LOOPTIME_SEC))
-#define SPEEDREFRAMP ((int16_t)PARAM_ROUND(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS) / SLOW_STEPS_PER_SEC + 0.49F))
+#define SPEEDREFRAMP PARAM_ROUND(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS) / SLOW_STEPS_PER_SEC * 65536.0F)
 /* ---- Load observer (control/observer.h), adaptation, low speed. Rates in rad/s times the slow step. The tuner reads the ratios. ---- */
 #define PARAM_QUIET_RATIO 1.22  /* rate without load over SPEED_BANDWIDTH_HZ */
 #define PARAM_LOADED_SHARE 0.3  /* rate under load over LOAD_BANDWIDTH_HZ */
@@ -139,20 +142,23 @@
 /** Acceleration of a count of q current, erpm a step; 2^PARAM_ACCEL_SHIFT of the observer's units are an erpm a step. */
 #define PARAM_ACCEL (PARAM_KT / PARAM_F(MOTOR_INERTIA_KGM2) * PARAM_F(NOPOLESPAIRS) * 60.0F / (2.0F * PARAM_PI) * 4.0F * PARAM_F(NORM_CURRENT_CONST) \
                      * PARAM_STEP_SEC)
-#define PARAM_ACCEL_SHIFT ((uint16_t)(PARAM_ACCEL >= 0.25F             ? 1 \
-                                      : PARAM_ACCEL >= 0.125F          ? 2 \
-                                      : PARAM_ACCEL >= 0.0625F         ? 3 \
-                                      : PARAM_ACCEL >= 0.03125F        ? 4 \
-                                      : PARAM_ACCEL >= 1.5625e-2F      ? 5 \
-                                      : PARAM_ACCEL >= 7.8125e-3F      ? 6 \
-                                      : PARAM_ACCEL >= 3.90625e-3F     ? 7 \
-                                      : PARAM_ACCEL >= 1.953125e-3F    ? 8 \
-                                      : PARAM_ACCEL >= 9.765625e-4F    ? 9 \
-                                      : PARAM_ACCEL >= 4.8828125e-4F   ? 10 \
-                                      : PARAM_ACCEL >= 2.44140625e-4F  ? 11 \
-                                      : PARAM_ACCEL >= 1.220703125e-4F ? 12 \
-                                                                       : 13))
-#define PARAM_ACCEL_UNITS (PARAM_ACCEL * (float)(1 << PARAM_ACCEL_SHIFT)) /* 0.5 .. 1 a count */
+#define PARAM_ACCEL_SHIFT ((uint16_t)(PARAM_ACCEL >= 0.5F               ? 0 \
+                                      : PARAM_ACCEL >= 0.25F            ? 1 \
+                                      : PARAM_ACCEL >= 0.125F           ? 2 \
+                                      : PARAM_ACCEL >= 0.0625F          ? 3 \
+                                      : PARAM_ACCEL >= 0.03125F         ? 4 \
+                                      : PARAM_ACCEL >= 1.5625e-2F       ? 5 \
+                                      : PARAM_ACCEL >= 7.8125e-3F       ? 6 \
+                                      : PARAM_ACCEL >= 3.90625e-3F      ? 7 \
+                                      : PARAM_ACCEL >= 1.953125e-3F     ? 8 \
+                                      : PARAM_ACCEL >= 9.765625e-4F     ? 9 \
+                                      : PARAM_ACCEL >= 4.8828125e-4F    ? 10 \
+                                      : PARAM_ACCEL >= 2.44140625e-4F   ? 11 \
+                                      : PARAM_ACCEL >= 1.220703125e-4F  ? 12 \
+                                      : PARAM_ACCEL >= 6.103515625e-5F  ? 13 \
+                                      : PARAM_ACCEL >= 3.0517578125e-5F ? 14 \
+                                                                        : 15))
+#define PARAM_ACCEL_UNITS (PARAM_ACCEL * (float)(1L << PARAM_ACCEL_SHIFT)) /* 0.5 .. 1 a count */
 #define PARAM_RATE_Q16(hz) (2.0F * PARAM_PI * (hz)*PARAM_STEP_SEC * 65536.0F)
 #define PARAM_QUICK_Q16 PARAM_RATE_Q16(PARAM_F(LOAD_BANDWIDTH_HZ))
 #define PARAM_LOADED_Q16 (PARAM_F(PARAM_LOADED_SHARE) * PARAM_QUICK_Q16)
@@ -169,7 +175,7 @@
 #define PARAM_LARGE_ERPM (0.13F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 #define PARAM_LARGE_LOADED_ERPM (0.03F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 /** Innovation at which the load changes by 16000 units in a step. */
-#define PARAM_INNOVATION_MAX PARAM_MIN(16383.0F, 16000.0F * 65536.0F * 65536.0F / (PARAM_QUICK_Q16 * PARAM_QUICK_Q16) / (float)(1 << PARAM_ACCEL_SHIFT))
+#define PARAM_INNOVATION_MAX PARAM_MIN(16383.0F, 16000.0F * 65536.0F * 65536.0F / (PARAM_QUICK_Q16 * PARAM_QUICK_Q16) / (float)(1L << PARAM_ACCEL_SHIFT))
 /** q current that a sample misses which is taken this long after the centre of the low sides' conduction: delay psi w/L. */
 #define SAMPLE_DELAY_CLOCKS 60
 #define PARAM_SAMPLE_SHIFT_Q16 (PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC / PARAM_ERPM_PER_V / (PARAM_F(MOTOR_LS_MH) * 0.001F) \

@@ -19,38 +19,38 @@
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
     X(MOTOR_RS_OHM, "ohm", 0.01, 40, FROM_MOTOR, "phase resistance: half of line to line") \
     X(MOTOR_LS_MH, "mH", 0.01, 30, FROM_MOTOR, "phase inductance: half of line to line") \
-    X(MOTOR_KPHI_V_PER_KRPM, "V peak/krpm", 0.2, 200, FROM_MOTOR, "line-to-line back-EMF per 1000 mechanical rpm") \
-    X(MOTOR_INERTIA_KGM2, "kg m2", 1e-8, 0.1, FROM_MOTOR, "rotor and whatever turns with it; scales the speed loop")
+    X(MOTOR_KPHI_V_PER_KRPM, "V peak/krpm", 0.2, 2000, FROM_MOTOR, "line-to-line back-EMF per 1000 mechanical rpm") \
+    X(MOTOR_INERTIA_KGM2, "kg m2", 1e-8, 10, FROM_MOTOR, "rotor and whatever turns with it; scales the speed loop")
 
 #define PARAM_BOARD(X) /* Supply and board */ \
-    X(NOMINAL_BUS_V, "V", 10, 48, FROM_BOARD, "supply; the unit of voltage follows from it") \
+    X(NOMINAL_BUS_V, "V", 8, 60, FROM_BOARD, "supply; the unit of voltage follows from it") \
     X(LOOPTIME_SEC, "s", 0.00004, 0.00014, FROM_BOARD, "PWM and control period") \
     X(DEADTIME_SEC, "s", 0.0000005, 0.000003, FROM_BOARD, "dead time of the bridge") \
-    X(NORM_CURRENT_CONST, "A/count", 0.00001, 0.002, FROM_BOARD, "current of one count, full scale / 32768; calibrate with a probe") \
+    X(NORM_CURRENT_CONST, "A/count", 0.000001, 0.01, FROM_BOARD, "current of one count, full scale / 32768; calibrate with a probe") \
     X(KCURRA, "1", -0.6, 0.6, FROM_BOARD, "gain of phase A's current, 0.5 = 1; negative: shunt in the low leg") \
     X(KCURRB, "1", -0.6, 0.6, FROM_BOARD, "gain of phase B's current") \
-    X(BUS_FULL_SCALE_V, "V", 20, 200, FROM_BOARD, "bus voltage that gives full scale at the converter") \
+    X(BUS_FULL_SCALE_V, "V", 10, 330, FROM_BOARD, "bus voltage that gives full scale at the converter") \
     X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004, FROM_BOARD, "low sides on for this long on each side of the sample's centre")
 
 #define PARAM_SPEEDS(X) /* Speeds */ \
-    X(MINIMUM_SPEED_RPM, "rpm", 50, 10000, FROM_TUNER, "potentiometer at zero") \
-    X(NOMINAL_SPEED_RPM, "rpm", 100, 20000, FROM_TUNER, "potentiometer at full scale, S3 off; the estimator's derivative changes here") \
-    X(MAXIMUM_SPEED_RPM, "rpm", 100, 30000, FROM_MOTOR, "potentiometer at full scale, S3 on") \
+    X(MINIMUM_SPEED_RPM, "rpm", 2, 10000, FROM_TUNER, "potentiometer at zero") \
+    X(NOMINAL_SPEED_RPM, "rpm", 20, 30000, FROM_TUNER, "potentiometer at full scale, S3 off; the estimator's derivative changes here") \
+    X(MAXIMUM_SPEED_RPM, "rpm", 20, 32000, FROM_MOTOR, "potentiometer at full scale, S3 on") \
     X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000, FROM_TUNER, "slope of the speed reference") \
     X(TUNING_DELAY_RAMPUP, "periods", 0, 4095, 0xF, "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods")
 
 #define PARAM_START(X) /* Start: align, ramp, hand-over */ \
     X(LOCK_TIME, "periods", 200, 32000, FROM_TUNER, "rotor held at a fixed angle (two directions, half the time each)") \
-    X(END_SPEED_RPM, "rpm", 50, 5000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
+    X(END_SPEED_RPM, "rpm", 2, 10000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
     X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000, FROM_TUNER, "acceleration of the ramp") \
     X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of align and ramp")
 
 #define PARAM_LIMITS(X) /* Limits and protections */ \
     X(MAXIMUM_CURRENT_A, "A peak", 0.1, 20, FROM_MOTOR, "length of the current vector that the drive may ask for") \
     X(OVER_CURRENT_THRESHOLD_A, "A peak", 0.1, 40, FROM_TUNER, "any phase above trips at once; must lie inside the converter's range") \
-    X(OVER_VOLTAGE_V, "V", 12, 100, FROM_BOARD, "bus above trips") \
-    X(UNDER_VOLTAGE_V, "V", 5, 45, FROM_BOARD, "bus below trips while running") \
-    X(REGEN_LIMIT_V, "V", 11, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher")
+    X(OVER_VOLTAGE_V, "V", 9, 100, FROM_BOARD, "bus above trips") \
+    X(UNDER_VOLTAGE_V, "V", 3, 55, FROM_BOARD, "bus below trips while running") \
+    X(REGEN_LIMIT_V, "V", 8, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher")
 
 #define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
     X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
@@ -63,10 +63,10 @@
     X(KFILTER_VELESTIM, "Q15", 10, 8000, FROM_TUNER, "speed for thresholds and display")
 
 #define PARAM_FIELD_WEAKENING(X) /* Field weakening: a table entry every 1024 electrical rpm of speed reference */ \
-    X(FW_START_SPEED_RPM, "rpm", 100, 20000, FROM_TUNER, "speed reference of entry 0") \
+    X(FW_START_SPEED_RPM, "rpm", 20, 30000, FROM_TUNER, "speed reference of entry 0") \
     X(FW_TRIM_CURRENT_A, "A", 0, 20, FROM_TUNER, "most that the voltage feedback may add to the table's d current") \
     PARAM_ENTRIES(X, IDREF_SPEED, "A", -20, 0, FROM_TUNER, "d current of each entry") \
-    PARAM_ENTRIES(X, INVKFI_SPEED, "Q15/2", 2048, 32767, NORM_INVKFIBASE, "1/Kphi of each entry") \
+    PARAM_ENTRIES(X, INVKFI_SPEED, "Q15/2", 1024, 32767, NORM_INVKFIBASE, "1/Kphi of each entry") \
     PARAM_ENTRIES(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.6, 0.5, "Ls / (2 Ls0) of each entry; 0.5 = no change")
 
 #define PARAM_SNAPSHOT(X) /* Snapshot */ \
@@ -80,10 +80,12 @@
     X(stem##10, __VA_ARGS__) X(stem##11, __VA_ARGS__) X(stem##12, __VA_ARGS__) X(stem##13, __VA_ARGS__) X(stem##14, __VA_ARGS__) \
     X(stem##15, __VA_ARGS__) X(stem##16, __VA_ARGS__) X(stem##17, __VA_ARGS__)
 
-/* Ends of number formats that the tuner keeps to as well: electrical rpm, and the trip level's share of the current range. */
+/* Ends of number formats that the tuner keeps to as well: electrical rpm, the trip level's share of the current range, and what a count of current accelerates. */
 #define PARAM_LARGEST_ERPM 32000
 #define PARAM_LARGEST_NOMINAL_ERPM 27000
 #define PARAM_TRIP_SHARE 0.865
+#define PARAM_ACCEL_MOST 1.0
+#define PARAM_ACCEL_LEAST 0.0000152587890625
 
 /** A parameter's value for a message, where a userparams.h is in use: " = 150". */
 #ifdef USERPARAMS_H
@@ -108,8 +110,8 @@
     X(PARAM_LS_FULL * 1.2F < 524287.0F, \
       "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
     X(PARAM_RS_FULL >= 100.0F, "MOTOR_RS_OHM rounds by more than 0.5 %: the current range is too small for this motor") \
-    X(PARAM_INVKFI >= 2048.0F && PARAM_INVKFI < 32767.0F, \
-      "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (2048 .. 32767): check its unit, V peak line to line per 1000 rpm") \
+    X(PARAM_INVKFI >= 1024.0F && PARAM_INVKFI < 32767.0F, \
+      "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (1024 .. 32767): check its unit, V peak line to line per 1000 rpm") \
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A") \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A") \
     X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= PARAM_F(PARAM_TRIP_SHARE) * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
@@ -131,7 +133,7 @@
     PARAM_RELATION_IDREF(X, 8) PARAM_RELATION_IDREF(X, 9) PARAM_RELATION_IDREF(X, 10) PARAM_RELATION_IDREF(X, 11) \
     PARAM_RELATION_IDREF(X, 12) PARAM_RELATION_IDREF(X, 13) PARAM_RELATION_IDREF(X, 14) PARAM_RELATION_IDREF(X, 15) \
     PARAM_RELATION_IDREF(X, 16) PARAM_RELATION_IDREF(X, 17) \
-    X(PARAM_VOLTAGE_PER_BUS < 65535.0F, "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V: their ratio must be at most 4") \
+    X(PARAM_VOLTAGE_PER_BUS < 4.0F * 65535.0F, "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V: their ratio must be at most 16") \
     X(OVER_VOLTAGE_V > NOMINAL_BUS_V, "OVER_VOLTAGE_V must be above NOMINAL_BUS_V") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V, or it never trips") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), \
@@ -150,7 +152,7 @@
     X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, \
       "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
     X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \
-    X(PARAM_ACCEL < 0.5F && PARAM_ACCEL >= 6.103515625e-5F, \
+    X(PARAM_ACCEL < PARAM_F(PARAM_ACCEL_MOST) && PARAM_ACCEL >= PARAM_F(PARAM_ACCEL_LEAST), \
       "MOTOR_INERTIA_KGM2 does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): check its unit") \
     X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074: the observer's step is eight periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \

@@ -12,12 +12,14 @@ QM_INLINE int16_t reference_may_move(const drive_t *d, const drive_params_t *p, 
     return (int16_t)((along_direction(d, target) > reference) ? ahead > -p->ramp_hold_erpm : ahead < p->ramp_hold_erpm);
 }
 
-/** One step of the reference towards the target. @param step_erpm 0 or more */
-QM_INLINE void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t target, int16_t step_erpm)
+/** One step of the reference towards the target; what a step has below a whole electrical rpm counts in the next. @param step_q16 0 or more */
+QM_INLINE void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t target, int32_t step_q16)
 {
     drive_control_t *c = &d->run.control;
+    int32_t step = step_q16 + (int32_t)c->ramp_q16;
+    c->ramp_q16 = (uint16_t)step;
     if (reference_may_move(d, p, target)) {
-        c->reference_erpm = speed_ramp(c->reference_erpm, target, step_erpm);
+        c->reference_erpm = speed_ramp(c->reference_erpm, target, qm_hi(step));
     }
 }
 

@@ -16,7 +16,7 @@ QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
     } else if (mode_reference_step(d, p)) {
         return;
     }
-    reference_step(d, p, target, p->speed_ramp_erpm);
+    reference_step(d, p, target, p->speed_ramp_q16);
 }
 
 /** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every eighth period in closed loop. */

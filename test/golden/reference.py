@@ -441,7 +441,7 @@ def current_control(pi_d, pi_q, ref, meas, radius):
 
 def emf_sum_max(inv_kfi):
     """Largest Eq -+ Ed (Q12) whose speed fits a word: E * inv_kfi / 2^11 <= 32767."""
-    return s16(32767 * 2048 // inv_kfi)
+    return s16(32767 * 2048 // max(inv_kfi, 2048))
 
 
 def turn_small(x, y, a_q16_rad):
@@ -660,7 +660,7 @@ class Adaptation:
 
     def apply(self, inv_kfi):
         """@param inv_kfi of the table @return 1/Kphi, R and the EMF limit"""
-        kfi = clamp(inv_kfi + 2 * share(inv_kfi, upper(self.kfi)), 2048, 32767)
+        kfi = clamp(inv_kfi + 2 * share(inv_kfi, upper(self.kfi)), 1024, 32767)
         rs = min(self.p["rs_base_q16"] + 2 * share(upper(self.rs), self.p["rs_base_q16"]), 65535)
         return kfi, u16(rs), emf_sum_max(kfi)
 
@@ -677,8 +677,8 @@ class AdaptationReal(Adaptation):
         self.rs = clamp(self.rs + step * ri / total * (1 if e_q >= 0 else -1), p["rs_least"] / 32768, p["rs_most"] / 32768)
 
     def apply(self, inv_kfi):
-        kfi = clamp(inv_kfi * (1 + self.kfi), 2048, 32767)
-        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), 65535), 32767 * 2048 / kfi
+        kfi = clamp(inv_kfi * (1 + self.kfi), 1024, 32767)
+        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), 65535), 32767 * 2048 / max(kfi, 2048)
 
 
 # ---- load observer --------------------------------------------------------------------------------------------------

@@ -97,7 +97,7 @@ static void omega_from(uint16_t low)
 void proof_omega(void)
 {
     //@ loop unroll 128;
-    for (uint16_t low = 2048; low <= 32512u; low = (uint16_t)(low + 256u)) {
+    for (uint16_t low = 1024; low <= 32512u; low = (uint16_t)(low + 256u)) {
         omega_from(low);
     }
 }

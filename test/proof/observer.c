@@ -71,8 +71,8 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
 /** Every rate and every inertia: no step of speed or load leaves its format. */
 void proof_observer_step(void)
 {
-    //@ loop unroll 13;
-    for (uint16_t shift = 1; shift <= 13; shift++) {
+    //@ loop unroll 16;
+    for (uint16_t shift = 0; shift <= 15; shift++) {
         //@ loop unroll 100;
         for (int16_t quick = 128; quick < RATE_MOST_Q16; quick = (int16_t)(quick + quick / 8)) {
             observer_piece(quick, (int16_t)(quick + quick / 8), shift, 16384, 32767);
@@ -119,6 +119,6 @@ void proof_adaptation_apply(void)
     a.rs_q31 = any_l(-16384 * 65536l, 24576 * 65536l);
     model.inv_kfi = any(0, INT16_MAX);
     adaptation_apply(&a, &p, &model);
-    //@ check kfi: 2048 <= model.inv_kfi;
+    //@ check kfi: ADAPTATION_KFI_LEAST <= model.inv_kfi;
     //@ check limit: 2048 <= model.emf_sum_max_q12 <= 32767;
 }

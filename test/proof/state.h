@@ -37,7 +37,7 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.run.handover.offset = ANY16();
     drive.run.handover.id_q13 = any((int16_t)-current_max, current_max);
 #ifdef TUNING
-    drive.run.tuning_q16 = ANYU16();
+    drive.run.control.ramp_q16 = ANYU16();
 #endif
     drive.run.stall_steps = any_u(0, params.stall_steps);
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);

@@ -78,3 +78,23 @@ void test_bus_beyond_the_trip_levels_keeps_circle_and_gain_in_their_formats(void
     settle(0.0F);
     TEST_ASSERT_UINT16_WITHIN(gain_at_12 / 200u, gain_at_12, drive.duty_per_volt_q16);
 }
+
+#undef NOMINAL_BUS_V
+#define NOMINAL_BUS_V 8.0
+#undef OVER_VOLTAGE_V
+#define OVER_VOLTAGE_V 15.0
+
+/** The circle on a supply of 8 V, whose trip level is below a third of the range: the bus is shifted up to fill its word. */
+void test_circle_of_a_supply_that_is_a_seventh_of_the_bus_range(void)
+{
+    static const drive_params_t small = DRIVE_PARAMS_INIT;
+    static const struct {
+        float bus_v, circle_v;
+    } cases[] = { { 8.0F, 4.323F }, { 6.0F, 3.243F }, { 12.0F, 6.485F }, { 15.0F, 8.106F }, { 30.0F, 8.106F /* the trip level's */ } };
+    TEST_ASSERT_EQUAL_UINT16(2u, small.bus_shift);
+    EACH(n, cases) {
+        drive.bus_q31 = (int32_t)BUS_Q15(cases[n].bus_v) * 65536;
+        bus_update_voltage_limit(&drive, &small);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(20, VOLTAGE_Q14(cases[n].circle_v), drive.circle.limit_q14, golden_row(n));
+    }
+}

@@ -109,7 +109,7 @@ RELATIONS = {
     "MOTOR_LS_MH does not fit its Q format": [case("MOTOR_LS_MH", "16.2", "16.0")],
     "MOTOR_RS_OHM rounds by more than 0.5 %": [case("MOTOR_RS_OHM", "0.0123", "0.0125", NORM_CURRENT_CONST="0.0001")],
     "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format": [
-        case("MOTOR_KPHI_V_PER_KRPM", "1.7", "1.8"), case("MOTOR_KPHI_V_PER_KRPM", "28.2", "28.1")],
+        case("MOTOR_KPHI_V_PER_KRPM", "1.7", "1.8"), case("MOTOR_KPHI_V_PER_KRPM", "56.5", "56.1", SPEED_BANDWIDTH_HZ="4")],
     "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A": [case("Q_CURRENT_REF_OPENLOOP", "2.76", "2.75")],
     "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A": [case("MAXIMUM_CURRENT_A", "3.8", "3.79")],
     "OVER_CURRENT_THRESHOLD_A must be at most 86.5 %": [case("OVER_CURRENT_THRESHOLD_A", "3.81", "3.8")],
@@ -132,7 +132,7 @@ RELATIONS = {
     "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us": [
         case("DEADTIME_SEC", "0.00000213", "0.0000021"),
         case("SAMPLE_WINDOW_SEC", "0.00000248", "0.0000025", DEADTIME_SEC="0.000003")],
-    "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V": [case("BUS_FULL_SCALE_V", "99", "98")],
+    "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V": [case("BUS_FULL_SCALE_V", "329.9", "326", NOMINAL_BUS_V="20", OVER_CURRENT_THRESHOLD_A="3")],
     **{f"IDREF_SPEED{i} must not exceed MAXIMUM_CURRENT_A": [case(f"IDREF_SPEED{i}", "-2.76", "-2.75")] for i in range(18)},
     "the current gain exceeds its Q format": [
         case("D_CURRCNTR_PTERM", "1.0", "0.99"), case("Q_CURRCNTR_PTERM", "1.0", "0.99"),
@@ -140,7 +140,7 @@ RELATIONS = {
     "the current integral exceeds its Q format": [case("D_CURRCNTR_ITERM", "15.95", "15.85"), case("Q_CURRCNTR_ITERM", "15.95", "15.85")],
     "the speed gain exceeds its Q format": [case("SPEEDCNTR_PTERM", "1.0", "0.99")],
     "MOTOR_INERTIA_KGM2 does not fit the load observer's format": [
-        case("MOTOR_INERTIA_KGM2", "1.2e-6", "1.3e-6"), case("MOTOR_INERTIA_KGM2", "1.02e-2", "1.0e-2", SPEED_BANDWIDTH_HZ="0.2")],
+        case("MOTOR_INERTIA_KGM2", "6.1e-7", "6.2e-7"), case("MOTOR_INERTIA_KGM2", "4.1e-2", "4.0e-2", SPEED_BANDWIDTH_HZ="0.2")],
     "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074": [
         case("LOAD_BANDWIDTH_HZ", "150", "148"), case("LOAD_BANDWIDTH_HZ", "75", "74", LOOPTIME_SEC="0.0001")],
     # 1126 * 24 * 2 us / 50 us / 7.24 = 149.3

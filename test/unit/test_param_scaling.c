@@ -224,7 +224,7 @@ void test_speeds_and_times(void)
     EXACT(p.fieldweak.on_speed_erpm, 13000);
     EXACT(p.forced.end_speed_q10, 279620);
     EXACT(p.forced.increase_rate_q10, 10);
-    EXACT(SPEEDREFRAMP, 8);          /* 4000 rpm a second */
+    EXACT(SPEEDREFRAMP, 524288);     /* 4000 rpm a second: 8 erpm in 400 us, 16 fraction bits */
     EXACT(p.ramp_hold_erpm, 1750);   /* an eighth of nominal speed */
     EXACT(TUNING_STEP_Q16, 32768);   /* one electrical rpm every 16 periods: half of one in eight */
     EXACT(p.bootstrap_periods, 200); /* 10 ms */
@@ -367,7 +367,7 @@ void test_loop_time_scales_every_time_and_duty(void)
     EXACT(p.svm.dead_time, 80); /* the same 2 us */
     EXACT(p.svm.top, 3872);
     EXACT(p.estimator.deltat_q32, 7158);
-    EXACT(p.speed_ramp_erpm, 16);
+    EXACT(p.speed_ramp_q16, 16 * 65536);
 }
 
 /* ---- another motor: 4 pole pairs, 15 kHz, 48 V ---- */

@@ -71,6 +71,18 @@ void test_current_is_the_gain_times_the_missing_speed_and_the_observed_load(void
     }
 }
 
+/* Rounded down, the mean current would be half a count short, which a slow motor's small gain turns into per cents of speed. */
+void test_current_is_rounded_to_the_nearest_count(void)
+{
+    static const int16_t cases[][2] = { /* missing speed, current: 1024 is an eighth of a count an erpm */
+                                        { 3, 0 }, { 4, 1 }, { 11, 1 }, { 12, 2 }, { -3, 0 }, { -5, -1 }, { -11, -1 }, { -13, -2 } };
+    rig_closed(1, 10000);
+    drive.run.control.speed_kp_q13 = 1024;
+    EACH(n, cases) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], current((int16_t)(10000 + cases[n][0]), 10000, 0), golden_row(n));
+    }
+}
+
 void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
 {
     rig_closed(1, 10000);
@@ -87,17 +99,19 @@ void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
     TEST_ASSERT_EQUAL_INT16(0, current(10000, 11000, -500));
 }
 
-void test_gain_follows_the_reference_at_low_speed_and_rises_after_a_large_innovation(void)
+void test_gain_follows_reference_or_speed_whichever_is_more_and_rises_after_a_large_innovation(void)
 {
     int16_t full = params.observer.full_erpm, half = (int16_t)(full / 2), kp = params.speed_kp_q13, quick = params.speed_kp_quick_q13;
     const struct {
-        int16_t reference_erpm, quick_q15, kp_q13;
+        int16_t reference_erpm, quick_q15, kp_q13, speed_erpm;
     } cases[] = {
-        { full, 0, kp }, { 32000, 0, kp }, { half, 0, (int16_t)(kp / 2) }, { (int16_t)-full, 0, kp }, { (int16_t)-half, 0, (int16_t)(kp / 2) },
-        { 0, 0, 0 }, { full, 32767, quick }, { half, 32767, (int16_t)(quick / 2) }, { full, 16384, (int16_t)((kp + quick) / 2) },
+        { full, 0, kp, 0 }, { 32000, 0, kp, 0 }, { half, 0, (int16_t)(kp / 2), 0 }, { (int16_t)-full, 0, kp, 0 }, { (int16_t)-half, 0, (int16_t)(kp / 2), 0 },
+        { 0, 0, 0, 0 }, { full, 32767, quick, 0 }, { half, 32767, (int16_t)(quick / 2), 0 }, { full, 16384, (int16_t)((kp + quick) / 2), 0 },
+        { 0, 0, (int16_t)(kp / 2), half }, { (int16_t)-half, 0, (int16_t)(kp / 2), 100 }, { 100, 0, (int16_t)(kp / 2), (int16_t)-half }, { 32000, 0, kp, half },
     };
     EACH(n, cases) {
         rig_closed(1, 10000);
+        rig_speed(cases[n].speed_erpm);
         drive.run.control.reference_erpm = cases[n].reference_erpm;
         drive.run.observer.quick_q15 = cases[n].quick_q15;
         speed_schedule(&drive.run, &params);
@@ -179,5 +193,23 @@ void test_stop_ends_when_speed_and_reference_are_below_the_minimum(void)
         rig_speed(cases[n].speed_erpm);
         speed_step(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].to, drive.state, golden_row(n));
+    }
+}
+
+/* A slow motor's slope is less than an electrical rpm a step. */
+void test_reference_keeps_the_fraction_of_a_slow_ramp(void)
+{
+    drive_params_t slow = params;
+    int16_t step;
+    slow.speed_ramp_q16 = 65536 * 3 / 8;
+    EACH_DIRECTION(direction) {
+        rig_closed(direction, (int16_t)(direction * 5000));
+        drive.run.control.ramp_q16 = 0;
+        drive.command.target_erpm = (int16_t)(direction * 6000);
+        for (step = 0; step < 800; step++) {
+            rig_speed(drive.run.control.reference_erpm);
+            speed_reference_step(&drive, &slow);
+        }
+        TEST_ASSERT_EQUAL_INT16(direction * 5300, drive.run.control.reference_erpm);
     }
 }

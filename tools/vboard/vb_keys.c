@@ -152,7 +152,7 @@ static const key_entry_t table[] = {
     I("fault.open_phase", plant.inverter.open_phase, 0.0, 0.0, 3.0, "", "1..3 = the wire of phase A..C is open, 0 = none"),
     /* measurement */
     P("shunt.ohm", plant.inverter.shunt_ohm, 0.005, 0.0, 10.0, "ohm", "shunt in the low leg"),
-    P("shunt.gain_v_per_a", analogue.gain_v_per_a, 0.375, 1e-3, 100.0, "V/A", "amplifier output per ampere; the output falls with current into the motor"),
+    P("shunt.gain_v_per_a", analogue.gain_v_per_a, 0.375, -100.0, 100.0, "V/A", "by how much the amplifier's output falls per ampere into the motor; negative: it rises"),
     P("shunt.reference_v", analogue.offset_v, 1.65, 0.0, 3.3, "V", "amplifier output at no current"),
     P("shunt.offset_a_v", analogue.shunt_offset_v[0], 0.0, -3.3, 3.3, "V", "error of that for phase A"),
     P("shunt.offset_b_v", analogue.shunt_offset_v[1], 0.0, -3.3, 3.3, "V", "error of that for phase B"),

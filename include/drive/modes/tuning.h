@@ -8,9 +8,7 @@
 QM_INLINE uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
 {
 #ifdef TUNING
-    int32_t sum = (int32_t)d->run.tuning_q16 + p->tuning_step_q16;
-    d->run.tuning_q16 = (uint16_t)sum;
-    reference_step(d, p, along_direction(d, p->maximum_erpm), qm_hi(sum));
+    reference_step(d, p, along_direction(d, p->maximum_erpm), p->tuning_step_q16);
     return 1;
 #else
     (void)d;
