@@ -2,14 +2,15 @@
 
 import functools
 import math
+import re
 from dataclasses import dataclass, field
 from decimal import Decimal
 
 from tools.common import paths
 from tools.common.board_file import BoardFile
-from tools.common.errors import UserError
+from tools.common.errors import Problems, UserError
 from tools.common.motor_file import FACTS, Motor
-from tools.common.param_rows import FOLLOWS, parameters
+from tools.common.param_rows import FOLLOWS, number, parameters
 
 from . import constants, fw_tables, limits, loops, start
 from .constants import Constant, number_of
@@ -37,6 +38,11 @@ ROUNDING_REMEDY = {"MOTOR_RS_OHM": "a larger current range (smaller shunt or gai
                    "MOTOR_LS_MH": "a larger current range or a shorter PWM period gives it more counts",
                    "MOTOR_KPHI_V_PER_KRPM": "a higher bus voltage gives it more counts"}
 L_FREQUENCY_RATIO = 10.0
+BOARD_KEYS = {"NOMINAL_BUS_V": "supply.voltage", "LOOPTIME_SEC": "pwm.period", "DEADTIME_SEC": "pwm.dead_time", "SAMPLE_WINDOW_SEC": "pwm.sample_window",
+              "NORM_CURRENT_CONST": "shunt.amplifier_gain", "BUS_FULL_SCALE_V": "adc.bus_divider", "OVER_VOLTAGE_V": "limits.over_voltage",
+              "UNDER_VOLTAGE_V": "limits.under_voltage", "REGEN_LIMIT_V": "limits.regen"}
+"""Parameters that the board file alone decides, with the key that they come from."""
+ACCEL_MOST, ACCEL_LEAST = number("PARAM_ACCEL_MOST"), number("PARAM_ACCEL_LEAST")
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,8 @@ class Scales:
     pterm_per_hz: float
     iterm_per_hz: float
     speed_pterm_per_hz: float
+    acceleration: float
+    """of a count of current, electrical rpm in eight periods"""
 
 
 @dataclass
@@ -86,7 +94,7 @@ class Design:
     def scales(self) -> Scales:
         """What the header makes of motor and board; asked for when their parameters are chosen."""
         return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1"}, "PARAM_INVKFI", "PARAM_IU",
-                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM"))
+                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL"))
 
     @property
     def params(self) -> dict[str, str]:
@@ -131,11 +139,13 @@ def short(value: float, digits: int = 4) -> str:
 
 def design(motor: Motor, board: BoardFile) -> Design:
     """Everything. Refuses by UserError what cannot work; what works with a cost is in `.warnings`."""
+    problems = Problems()
     currents = _fit_emf(motor, board, limits.currents(motor, board))
     d = Design(motor, board, Envelope(motor, limits.circle_v(board), currents.maximum_a))
     _motor(d)
     _board(d)
-    _refuse_impossible(d, currents)
+    _refuse_impossible(d, currents, problems)
+    problems.tell()
     _speeds(d)
     _currents(d, currents)
     _loops_and_start(d)
@@ -152,21 +162,27 @@ def design(motor: Motor, board: BoardFile) -> Design:
 
 # ---- what cannot work ------------------------------------------------------------------------------------------------------
 
-def _refuse_impossible(d: Design, currents: limits.Currents) -> None:
+def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems) -> None:
+    """All that motor and board cannot do together; the voltage only where the other numbers are right."""
     m, e = d.motor, d.envelope
+
+    def refuse(what: str, where: str, remedy: str) -> None:
+        problems.found.append(UserError(what, where, remedy))
+
     rated_erpm = m.rated_speed_rpm * m.pole_pairs
     if rated_erpm > limits.LARGEST_ERPM:
-        raise UserError(f"rated speed {m.rated_speed_rpm:g} rpm with {m.pole_pairs} pole pairs is {rated_erpm:.0f} electrical rpm", d.where("speed"),
+        refuse(f"rated speed {m.rated_speed_rpm:g} rpm with {m.pole_pairs} pole pairs is {rated_erpm:.0f} electrical rpm", d.where("speed"),
                         f"the firmware's speeds end at {limits.LARGEST_ERPM:.0f}; a speed of {math.floor(limits.LARGEST_ERPM / m.pole_pairs)} rpm is possible")
-    _refuse_kphi(d)
+    problems.attempt(lambda: _refuse_kphi(d))
+    problems.attempt(lambda: _refuse_light(d))
     half = 0.5 * m.rated_torque_nm
     needed_a = e.iq(m.rated_speed_rpm, half)
     if needed_a > currents.maximum_a:
-        raise UserError(f"half the rated torque needs {needed_a:.2f} A peak, {currents.maximum_a:.2f} A are allowed", d.where("torque"),
-                        _current_remedy(d, currents, needed_a))
-    if e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
+        refuse(f"half the rated torque needs {needed_a:.2f} A peak, {currents.maximum_a:.2f} A are allowed", d.where("torque"),
+               _current_remedy(d, currents, needed_a))
+    if not problems.found and e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
         reachable = e.highest_speed(half, limits.FULL_SHARE)
-        raise UserError(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
+        refuse(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
                         f"raise the supply voltage in {paths.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
 
 
@@ -188,14 +204,29 @@ def _change_maximum_current(motor: Motor, how: str) -> str:
 
 
 def _refuse_kphi(d: Design) -> None:
-    """1/Kphi has 16 bits: the electrical speed at full voltage must be 4096 .. 65534 rpm."""
+    """1/Kphi has 16 bits: the electrical speed at full voltage must be 2048 .. 65534 rpm."""
     counts = d.scales.invkfi
-    if counts < 2048.0:
-        raise UserError(f"1/Kphi has only {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs, 2048 is the least",
-                        d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {math.ceil(d.board.nominal_bus_v * 2048.0 / counts)} V")
+    least = _range("INVKFI_SPEED0")[0]
+    if counts < least:
+        raise UserError(f"1/Kphi has only {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs, {least:g} is the least",
+                        d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {math.ceil(d.board.nominal_bus_v * least / counts)} V")
     if counts >= 32767.0:
         raise UserError(f"1/Kphi does not fit 16 bits: {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs",
                         d.where("kphi"), f"the motor is too fast for {d.board.nominal_bus_v:g} V: use at most {math.floor(d.board.nominal_bus_v * 32766.0 / counts)} V")
+
+
+def _refuse_light(d: Design) -> None:
+    """A count of current must accelerate the rotor by a number that the load observer holds."""
+    if "MOTOR_INERTIA_KGM2" in d.motor.tune:
+        return
+    accel, inertia = d.scales.acceleration, d.value("MOTOR_INERTIA_KGM2")
+    if accel >= ACCEL_MOST:
+        raise UserError(f"the load observer cannot count the acceleration of {inertia:.3g} kg m2 by {d.board.current_full_scale_a:.3g} A", d.where("inertia"),
+                        f"add at least {limits.digits_up(inertia * (accel / ACCEL_MOST - 1.0) * 1.001 + 1e-12, 2):g} kg m2 of [load] inertia, or use a board with at most "
+                        f"{limits.digits_down(0.999 * d.board.current_full_scale_a * ACCEL_MOST / accel, 2):g} A of current range")
+    if accel < ACCEL_LEAST:
+        raise UserError(f"the load observer cannot count the acceleration of {inertia:.3g} kg m2 by {d.board.current_full_scale_a:.3g} A", d.where("inertia"),
+                        f"{limits.digits_down(0.999 * inertia * accel / ACCEL_LEAST, 2):g} kg m2 of rotor and load are possible")
 
 
 def motor_current_above(d: Design, currents: limits.Currents) -> bool:
@@ -203,12 +234,16 @@ def motor_current_above(d: Design, currents: limits.Currents) -> bool:
 
 
 def _check(d: Design, wrong: list[str]) -> None:
-    """Ranges and relations of the build, in its own words."""
-    if wrong:
-        tuned = [name for name in d.motor.tune if any(name in message for message in wrong)]
-        where = f"{paths.shown(d.motor.path)} [tune]" if tuned else str(paths.shown(d.motor.path))
-        what, _, remedy = wrong[0].partition(": ")
-        raise UserError(what, where, remedy or _range_remedy(d, what.partition(" ")[0]))
+    """Ranges and relations of the build, in its own words, each with the file that it is about."""
+    problems = Problems()
+    for message in wrong:
+        what, _, remedy = message.partition(": ")
+        names = re.findall(r"[A-Z][A-Z0-9_]{3,}", what)
+        tuned = any(name in d.motor.tune for name in names)
+        on_board = next((d.board.quantities[BOARD_KEYS[name]].where for name in names[:1] if name in BOARD_KEYS), "")
+        where = f"{paths.shown(d.motor.path)} [tune]" if tuned else on_board or str(paths.shown(d.motor.path))
+        problems.found.append(UserError(what, where, remedy or _range_remedy(d, what.partition(" ")[0])))
+    problems.tell()
 
 
 def _range_remedy(d: Design, name: str) -> str:
@@ -263,7 +298,7 @@ def _speeds(d: Design) -> None:
     most_rpm = math.floor(limits.LARGEST_ERPM / m.pole_pairs)
     nominal = min(m.rated_speed_rpm, math.floor(limits.LARGEST_NOMINAL_ERPM / m.pole_pairs))
     d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else ", lowered to 27000 electrical rpm"))
-    reachable = limits.digits_down(e.highest_speed(0.0, limits.FULL_SHARE), 3)
+    reachable = limits.digits_down(e.highest_speed(0.0, limits.REACH_SHARE), 3)
     maximum = min(m.maximum_speed_rpm, most_rpm, max(reachable, m.rated_speed_rpm))
     d.put("MAXIMUM_SPEED_RPM", plain(math.floor(maximum)), "motor file's maximum_speed" if maximum == m.maximum_speed_rpm else
           "electrical speed's end" if maximum == most_rpm else "what field weakening reaches without load")
@@ -474,10 +509,6 @@ def _warn_numbers(d: Design) -> None:
         if wanted > 1.02 * limit:
             d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "
                               "high current; lower MAXIMUM_CURRENT_A or the speed")
-    ramp = d.constant("speed_ramp_erpm")
-    if ramp.error_percent > 30.0:
-        d.warnings.append(f"SPEEDREFRAMP_RPM_PER_S = {d.choices['SPEEDREFRAMP_RPM_PER_S'].text} becomes {ramp.value * (1 + ramp.error_percent / 100):.0f} rpm/s: one "
-                          "electrical rpm in 8 periods is the slowest; turn the potentiometer slowly with this inertia")
 
 
 def _warn_loops(d: Design) -> None:

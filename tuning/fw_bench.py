@@ -27,7 +27,7 @@ START_S = 8.0
 REMEDY = {"START_FAILED": "the motor does not follow the ramp: raise Q_CURRENT_REF_OPENLOOP, or lower OPENLOOP_RAMPSPEED_INCREASERATE",
           "STALL": "raise Q_CURRENT_REF_OPENLOOP or END_SPEED_RPM",
           "LOST_LOCK": "check MOTOR_RS_OHM, MOTOR_LS_MH and MOTOR_KPHI_V_PER_KRPM",
-          "OVERCURRENT_SW": "lower CURRENT_BANDWIDTH_HZ, or raise OVER_CURRENT_THRESHOLD_A",
+          "OVERCURRENT_SW": "lower CURRENT_BANDWIDTH_HZ in [tune]; the trip level follows [rating] maximum_current and the board's range",
           "OVERCURRENT_HW": "lower CURRENT_BANDWIDTH_HZ, or raise inverter.trip_a of the board file",
           "UNDERVOLTAGE": "check the supply in the board file", "OVERVOLTAGE": "lower REGEN_LIMIT_V or SPEEDREFRAMP_RPM_PER_S"}
 

@@ -22,6 +22,8 @@ TRIP_OVER_MAXIMUM = 1.4
 LEAST_TRIP_OVER_MAXIMUM = 1.1
 TABLE_SHARE = 0.95
 """Share of the circle that the table leaves to the motor without load; the rest is for control, and loads bring the voltage feedback."""
+REACH_SHARE = 0.94
+"""And at the highest speed: control needs the rest."""
 FULL_SHARE = 0.98
 """Share of the circle that a loaded motor may use in steady state."""
 D_SHARE = 0.96
@@ -60,13 +62,13 @@ class Currents:
     trip_a: float
     maximum_a: float
     board_a: float
-    """largest current that this board leaves, given its range"""
+    """largest current that this board leaves, given its range, and the firmware's parameter"""
 
 
 def currents(motor: Motor, board: BoardFile) -> Currents:
     """The trip level lies below the range's end, the largest current below the trip level."""
     highest_trip = down(TRIP_SHARE * board.current_full_scale_a, 0.05 if board.current_full_scale_a > 1.0 else 0.005)
-    board_a = digits_down(highest_trip / LEAST_TRIP_OVER_MAXIMUM, 3)
+    board_a = min(digits_down(highest_trip / LEAST_TRIP_OVER_MAXIMUM, 3), float(parameters()["MAXIMUM_CURRENT_A"].high))
     maximum_a = min(float(f"{motor.maximum_current_a:.3g}"), board_a)
     return Currents(float(f"{min(digits_down(TRIP_OVER_MAXIMUM * maximum_a, 3), highest_trip):.6g}"), maximum_a, board_a)
 
@@ -155,10 +157,11 @@ def circle_v(board: BoardFile) -> float:
 def fw_start_rpm(envelope: Envelope, maximum_rpm: float) -> float:
     """Where entry 0 lies: seven eighths of the no-load base speed (the last eighth belongs to loads and a sagging supply), but so that the
     18 entries still reach the maximum speed, below the maximum speed, and within the parameter's range."""
-    start = down(0.875 * envelope.base_speed(0.0), 50.0)
+    step = 50.0 if maximum_rpm >= 1000.0 else 1.0
+    start = down(0.875 * envelope.base_speed(0.0), step)
     reach = maximum_rpm - (ENTRIES - 1) * STEP_ERPM / envelope.motor.pole_pairs
     row = parameters()["FW_START_SPEED_RPM"]
-    return max(min(max(start, math.ceil(reach / 50.0) * 50.0), down(0.95 * maximum_rpm, 50.0), float(row.high)), float(row.low))
+    return max(min(max(start, math.ceil(reach / step) * step), down(0.95 * maximum_rpm, step), float(row.high)), float(row.low))
 
 
 def table(envelope: Envelope, start_rpm: float) -> list[float]:

@@ -12,7 +12,7 @@ from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
 from tools.common.param_rows import number
 
-from .limits import RPM, digits_down
+from .limits import RPM, digits_down, digits_up
 from .loops import Gains, Plant, current_loop
 
 CURRENT_SHARE = 0.92
@@ -35,6 +35,9 @@ LEAST_LOCK_S = 0.2
 LOCK_SWINGS = 8.0
 """The lock lasts so many periods of the rotor's swing at least."""
 LARGEST_RATE = 2000
+LARGEST_END_RPM = 10000.0
+LEAST_ERPM = 100.0
+"""Speeds are whole electrical rpm: less would be coarser than a hundredth."""
 SAMPLE_AFTER_MEAN_S = 1.5e-6
 """SAMPLE_DELAY_CLOCKS of include/drive/param_scaling.h: between the two the back-EMF takes E t/L off the current, which the loop then adds."""
 CALM_SHARE = 0.03
@@ -115,8 +118,8 @@ def end_speed(motor: Motor, board: BoardFile, current_a: float, nominal_rpm: flo
     """Hand-over speed: back-EMF = error / sin(20 degrees), at least a fifth of nominal speed (twice the speed where Equation 2 takes its
     sign from Eq), at most half of it."""
     wanted = max(emf_error_v(motor, board, current_a) / HAND_OVER_SINE / emf_v(motor, 1.0), 0.2 * nominal_rpm)
-    step = 50.0 if wanted > 300.0 else 10.0
-    return min(max(math.ceil(wanted / step - 1e-9) * step, 50.0), digits_down(0.5 * nominal_rpm, 2), 5000.0)
+    step = 50.0 if wanted > 300.0 else 10.0 if wanted > 50.0 else 1.0
+    return min(math.ceil(wanted / step - 1e-9) * step, digits_down(0.5 * nominal_rpm, 2), LARGEST_END_RPM)
 
 
 def lowest_speed(motor: Motor, board: BoardFile) -> float:
@@ -125,8 +128,11 @@ def lowest_speed(motor: Motor, board: BoardFile) -> float:
 
 
 def minimum_speed(motor: Motor, board: BoardFile) -> float:
-    """The lowest speed, rounded up to 10 rpm."""
-    return max(math.ceil(lowest_speed(motor, board) / 10.0 - 1e-3) * 10.0, 50.0)
+    """The lowest speed, rounded up to 10 rpm, or to 1 rpm below 50; nothing asks for less than 50 rpm of a motor that turns at 500."""
+    lowest = lowest_speed(motor, board)
+    step = 10.0 if lowest > 50.0 else 1.0
+    quiet = max(digits_up(0.1 * motor.rated_speed_rpm, 2), math.ceil(LEAST_ERPM / motor.pole_pairs))
+    return max(math.ceil(lowest / step - 1e-3) * step, min(50.0, quiet))
 
 
 def natural_rad_s(motor: Motor, current_a: float, inertia: float) -> float:

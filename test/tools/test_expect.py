@@ -134,10 +134,10 @@ def test_one_row_fails_with_its_name_and_number(text, row, got, signals):
     assert [outcome.row for outcome in failed] == [row] and got in failed[0].got, failed
 
 
-@pytest.mark.parametrize("nominal_v, ok", [(24.0, False), (25.0, True)])
-def test_bus_voltage_in_percent_is_of_the_headers_nominal_bus(nominal_v, ok):
-    item = run(expect("bus_voltage", percent=True, max=125), bus__voltage_v=step((0, 24), (1.0, 30.5), (1.0001, 24)))
-    item.params["NOMINAL_BUS_V"] = nominal_v
+@pytest.mark.parametrize("nominal_v, ok", [(12.0, False), (24.0, False), (30.0, True)])
+def test_bus_voltage_above_regen_counts_from_the_headers_limit_in_proportion_above_24_v(nominal_v, ok):
+    item = run(expect("bus_voltage", above_regen=True, max=3), bus__voltage_v=step((0, 24), (1.0, 30.5), (1.0001, 24)))
+    item.params |= {"NOMINAL_BUS_V": nominal_v, "REGEN_LIMIT_V": 27.0}
     assert report.check(item)[0].ok == ok
 
 

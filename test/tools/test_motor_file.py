@@ -81,7 +81,7 @@ BAD = {
     "d and q": ("inductance = { value = 2.6, unit = \"mH line-to-line\", source = \"s\" }",
                 "inductance_d = { value = 0.2, unit = \"mH phase\", source = \"s\" }\n"
                 "inductance_q = { value = 2.0, unit = \"mH phase\", source = \"s\" }", "Lq/Ld = 10 is implausible", "line 8"),
-    "rpm/V taken for V/krpm": ("value = 4.0", "value = 250", "'kphi' = 250 V peak line-to-line/krpm is impossible", "line 8"),
+    "rpm/V taken for V/krpm": ("value = 4.0", "value = 2500", "'kphi' = 2500 V peak line-to-line/krpm is impossible", "line 8"),
     "volts per 1000 rpm twice": ("value = 4.0", "value = 14.0", "back-EMF at rated speed, 56 V peak line to line, does not suit 24 V", "line 8"),
     "torque constant in mN m": (KPHI + ", unit = " + UNITS["KPHI"], "kphi = { value = 3.6, unit = \"mN m/A dc\"",
                                 "back-EMF at rated speed", "line 8", "check the units of kphi, speed and voltage"),
@@ -110,7 +110,7 @@ BAD = {
     "spread beside the value": ("", "[spread]\nresistance = { values = [1, 2], unit = \"ohm phase\", source = \"s\" }",
                                 "'resistance' is outside its own [spread] 1 .. 2", "line 6"),
     "unknown choice": ("", "[tune]\nEND_SPED_RPM = 1000", "'END_SPED_RPM' is no parameter of userparams.h", "line 20", "did you mean 'END_SPEED_RPM'?"),
-    "choice out of range": ("", "[tune]\nEND_SPEED_RPM = 1", "'END_SPEED_RPM' = 1 is impossible", "line 20", "choose 50 .. 5000"),
+    "choice out of range": ("", "[tune]\nEND_SPEED_RPM = 1", "'END_SPEED_RPM' = 1 is impossible", "line 20", "choose 2 .. 10000"),
     "choice in words": ("", "[tune]\nEND_SPEED_RPM = \"slow\"", "'END_SPEED_RPM' is not a number", "line 20"),
     "choice that is a fact": ("", "[tune]\nMOTOR_RS_OHM = 1", "'MOTOR_RS_OHM' is no choice", "line 20", "[electrical] resistance"),
     "plant key that is derived": ("", "[plant]\n\"motor.rs_ohm\" = 1", "'motor.rs_ohm' stands in another table", "line 20"),
@@ -239,7 +239,7 @@ def test_every_choice_that_is_refused_as_a_fact_is_a_parameter():
     rows = param_rows.parameters()
     assert set(motor_file.FACTS) <= set(rows)
     shows(rows["LS_OVER2LS0_SPEED17"], {"unit": "1", "low": "0.1", "high": "0.6", "default": "0.5", "stem": "LS_OVER2LS0_SPEED"})
-    shows(rows["MOTOR_INERTIA_KGM2"], {"unit": "kg m2", "low": "1e-8", "high": "0.1", "default": "FROM_MOTOR"})
+    shows(rows["MOTOR_INERTIA_KGM2"], {"unit": "kg m2", "low": "1e-8", "high": "10", "default": "FROM_MOTOR"})
 
 
 # ---- boards --------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from support import command, refusal, refused, run, step
 
-from tools.bench import plots, rating_sweep, sweep
+from tools.bench import plots, rating_sweep, scenario, sweep
 from tools.bench.rating_sweep import Candidate, Table
 from tools.common import motor_file, paths
 from tools.common.errors import UserError
@@ -59,7 +59,7 @@ def test_a_failed_row_names_motor_row_and_numbers_and_what_was_reached_without_l
 # ---- when it happens -----------------------------------------------------------------------------------------------------
 def test_the_start_takes_lock_and_ramp_a_slower_header_is_given_more_time_and_one_that_hides_a_parameter_is_refused():
     took = sweep.start_time_s(PARAMS)
-    assert took == pytest.approx(0.2 + 1.398 + sweep.START_MARGIN_S, abs=1e-3)
+    assert took == pytest.approx(0.2 + 1.398 + scenario.START_MARGIN_S, abs=1e-3)
     for change in ({"LOCK_TIME": 8000.0}, {"OPENLOOP_RAMPSPEED_INCREASERATE": 5.0}, {"END_SPEED_RPM": 1500.0}):
         assert sweep.start_time_s(PARAMS | change) > took + 0.19, change
     refusal(lambda: sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")

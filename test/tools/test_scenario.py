@@ -138,6 +138,44 @@ def test_a_scenario_in_numbers_stays_as_it_is_and_a_header_that_does_not_tell_it
     refusal(lambda: in_numbers(scenario(PERCENT), Rating(2500.0, 0.08), {}), "does not tell MAXIMUM_SPEED_RPM")
 
 
+HEADER = {"MINIMUM_SPEED_RPM": 150.0, "NOMINAL_SPEED_RPM": 2500.0, "MAXIMUM_SPEED_RPM": 5000.0, "NOPOLESPAIRS": 5.0, "LOOPTIME_SEC": 50e-6,
+          "END_SPEED_RPM": 500.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 10.0, "LOCK_TIME": 4000.0, "SPEEDREFRAMP_RPM_PER_S": 4000.0,
+          "SPEED_BANDWIDTH_HZ": 12.7, "LOAD_BANDWIDTH_HZ": 107.0}
+
+
+def test_a_scenario_that_follows_the_header_keeps_its_times_for_a_quick_motor():
+    item = load("rated")
+    found = in_numbers(item, Rating(2500.0, 0.08), HEADER)
+    assert found.duration_s == pytest.approx(item.duration_s, abs=0.5)
+    assert [event.at_s for event in found.events] == pytest.approx([event.at_s for event in item.events], abs=0.5)
+
+
+def test_a_slow_start_shifts_what_comes_after_and_may_take_its_time():
+    slow = HEADER | {"OPENLOOP_RAMPSPEED_INCREASERATE": 1.0, "LOCK_TIME": 32000.0, "END_SPEED_RPM": 1200.0}
+    item, found = load("rated"), in_numbers(load("rated"), Rating(2500.0, 0.08), slow)
+    start_s = 1.6 + 1200.0 * 5 / 60 * 50e-6 * 65536 * 1024 * 50e-6 + 0.4
+    assert start_s > 9.0 and found.expectations[0].within_s == pytest.approx(start_s, rel=1e-3)
+    later = found.events[2].at_s - item.events[2].at_s
+    assert (found.events[1].at_s, later) == (0.2, pytest.approx(start_s - 5.0, abs=0.3))
+    assert found.measures[0].from_s - item.measures[0].from_s == pytest.approx(later)
+
+
+def test_a_heavy_rotor_gets_its_ramps_its_coasting_and_its_slow_loop():
+    heavy = HEADER | {"SPEEDREFRAMP_RPM_PER_S": 200.0, "SPEED_BANDWIDTH_HZ": 1.0}
+    item, found = load("rated"), in_numbers(load("rated"), Rating(2500.0, 0.08, coast_s_per_rpm=0.01), heavy)
+    gaps, wider = ([b.at_s - a.at_s for a, b in zip(x.events, x.events[1:])] for x in (item, found))
+    assert wider[3] - gaps[3] > (1250.0 - 500.0) / 200.0 - 1.0 and wider[4] - gaps[4] > (2500.0 - 500.0) / 200.0 - 1.0
+    assert wider[7] - gaps[7] > (5000.0 - 1250.0) * 0.01 - 1.0 # no load: friction alone slows it down
+    stop = next(item for item in found.expectations if hasattr(item, "lowest_rpm"))
+    assert stop.after_s == found.events[-1].at_s and stop.within_s > 1250.0 * 0.01
+
+
+def test_a_share_of_the_rated_speed_below_the_headers_minimum_becomes_the_minimum_where_the_scenario_follows_it():
+    found = in_numbers(load("rated"), Rating(2500.0, 0.08), HEADER | {"MINIMUM_SPEED_RPM": 700.0})
+    assert [event.value for event in found.events if event.kind == "speed_rpm"] == [1250.0, 700.0, 2500.0, 5000.0, 1250.0]
+    assert [measure.reference_rpm for measure in found.measures] == [1250.0, 700.0, 2500.0, 5000.0]
+
+
 def test_the_rated_scenario_asks_for_20_50_and_100_per_cent_at_half_torque():
     item = load("rated")
     torque, at = 0.0, {}

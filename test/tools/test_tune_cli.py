@@ -129,6 +129,34 @@ def test_one_motor_that_is_for_another_board_does_not_stop_the_others(several, m
 
 
 @pytest.mark.parametrize("result, refuses, expected", [(0, True, 2), (1, True, 2), (1, False, 1)])
+def test_all_problems_of_a_motor_and_its_board_come_in_one_run_each_with_its_file_and_line(tmp_path):
+    changes = (("value = 5, source", "value = 5.5, source"), ("ohm phase", "ohms"), ("value = 2500", "value = 9e9"))
+    with motor_path(*changes) as path:
+        code, _, error = command("tune", str(path), "--brief")
+        lines = error.splitlines()
+    assert code == 2 and len(lines) == 3 and all(line.startswith("foc33: ") and "a_motor.toml line " in line for line in lines), error
+    assert [word in line for word, line in zip(("pole_pairs", "'ohms'", "'speed'"), lines)] == [True] * 3
+    text = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+    board = tmp_path / "two_slips.toml"
+    board.write_text(text.replace("value = 24.0", "value = 7").replace("value = 75", "value = 750"), encoding="utf-8")
+    code, _, error = command("tune", "hurst_dmb0224c10002", "--board", str(board), "--brief")
+    assert code == 2 and [key in line for key, line in zip(("'voltage' = 7 V", "'amplifier_gain' = 750"), error.splitlines())] == [True, True], error
+
+
+def test_what_the_build_refuses_of_a_boards_numbers_names_the_board_file_and_a_motor_that_cannot_turn_has_all_its_reasons(tmp_path):
+    text = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+    board = tmp_path / "late.toml"
+    board.write_text(text.replace("over_voltage = { value = 34", "over_voltage = { value = 47").replace("under_voltage = { value = 12", "under_voltage = { value = 7"),
+                     encoding="utf-8")
+    code, _, error = command("tune", "hurst_dmb0224c10002", "--board", str(board), "--brief")
+    lines = error.splitlines()
+    assert code == 2 and all("late.toml line " in line for line in lines), error
+    assert {line.split(" must be ")[0] for line in lines} == {"foc33: OVER_VOLTAGE_V", "foc33: UNDER_VOLTAGE_V"}
+    with motor_path(("value = 5, source", "value = 16, source"), ("value = 5.5e-6", "value = 2e-7")) as path:
+        code, _, error = command("tune", str(path), "--brief")
+    assert code == 2 and [word in error for word in ("electrical rpm", "load observer")] == [True, True], error
+
+
 def test_make_motors_runs_those_that_got_a_header(several, out, result, refuses, expected):
     if not refuses:
         (several / "b_large.toml").unlink()

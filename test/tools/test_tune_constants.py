@@ -27,7 +27,7 @@ def golden(rs: float, ls_mh: float, kphi: float, pairs: int, amperes: float, mos
             "pi_q.kp": PI2 * hz * ls_mh * 1e-3 * ratio / 16.0 * 32768.0, "pi_q.ki": PI2 * hz * rs * 50e-6 * ratio * 2048.0}
 
 
-CUT_OFF = ("speed_ramp_erpm", "voltage_limit_per_bus_q16", "duty_per_volt_numerator", "speed_kp_quick_q13", "adaptation.emf_least_q12",
+CUT_OFF = ("voltage_limit_per_bus_q16", "duty_per_volt_numerator", "speed_kp_quick_q13", "adaptation.emf_least_q12",
            "svm.dead_slope_q8")
 """Constants that the firmware cuts off; those of the observer are others."""
 
@@ -74,8 +74,7 @@ def test_all_numbers_of_the_drive_s_parameters_are_listed():
 
 
 def test_each_count_stands_for_its_value_in_its_format():
-    """Count times the format's unit is the value; what is left is rounding: half a count, one where the firmware cuts off, 0.49 more for
-    the ramp."""
+    """Count times the format's unit is the value; what is left is rounding: half a count, one where the firmware cuts off."""
     odd = designed(("2.67", "2.6183"), ("1.92", "1.8391"), ("7.24", "6.9937"), ("value = 5,", "value = 7,"),
                    ("value = 2500", "value = 2213"), ("value = 5000", "value = 4100"))
     for d in (*map(of, motors()), odd):

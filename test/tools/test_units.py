@@ -48,6 +48,8 @@ EXACT = [
     (R_DELTA, 1.2, "ohm winding", 0.4), (L_DELTA, 900, "uH winding", 300e-6), (R_DELTA, TERMINALS, "ohm line-to-line", 0.4),
     (R, 1.2, "ohm winding", 1.2), (R, 1.2, "ohm phase", 1.2), (R, 570, "mohm line-to-line", 0.285), (L, 400, "uH phase", 0.4e-3),
     (L, 0.0026, "H line-to-line", 1.3e-3), (R, 80, "ohm line-to-line", 40.0), (R_DELTA, 0.03, "ohm winding", 0.01),
+    (units.TORQUE, 2, "Nm", 2.0), (units.TORQUE, 2, "N·m", 2.0), (units.TORQUE, 2, "mN*m", 2e-3), (units.INERTIA, 3, "kg·m²", 3.0),
+    (units.INERTIA, 3, "kgm^2", 3.0), (R, 2.0, "Ω line-to-line", 1.0), (L, 400, "µH phase", 0.4e-3), (Y, 1.0, "V s/rad  line-to-line", 104.71975511966),
     (units.SPEED, 100, "  rpm ", 100.0), (units.CURRENT, 1.2, "A peak", 1.2)]
 ROUNDED = [
     (units.INERTIA, 24, "g cm2", 24e-7), (units.INERTIA, 6.8e-4, "oz in s2", 4.802e-6), (units.INERTIA, 0.055, "kg cm2", 5.5e-6),
@@ -74,7 +76,7 @@ def test_a_number_becomes_si(kind, value, unit, si, within):
         (DELTA, "V line-to-line/krpm", "V peak line-to-line/krpm or V rms line-to-line/krpm"),
         (units.CURRENT, "A", "A peak or A rms or A dc"))),
     (R, 5.34e6, "ohm line-to-line", ["'x' = 5.34e+06 ohm line-to-line is impossible, ", "line 2: choose 0.02 .. 80 ohm line-to-line"]),
-    (Y, 0, "rpm/V", ["'x' = 0 rpm/V is impossible, ", ": choose 5.23599 .. 5235.99 rpm/V"])])
+    (Y, 0, "rpm/V", ["'x' = 0 rpm/V is impossible, ", ": choose 0.523599 .. 5235.99 rpm/V"])])
 def test_what_is_no_unit_or_impossible_in_it_is_refused(kind, value, unit, parts):
     line = refusal(lambda: entry(kind, value, unit), *parts)
     assert line.endswith(parts[-1]) or "use one of" in line or len(parts) == 1

@@ -7,7 +7,7 @@
     kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to to_s (the
                            end); from S2 on not backwards (lowest_rpm = 0), braking current at most brake_max_a = MAXIMUM_CURRENT_A
     kind = "outputs_off"   from_s, to_s
-    kind = "bus_voltage"   min and/or max, from_s, to_s; percent = true: in % of NOMINAL_BUS_V
+    kind = "bus_voltage"   min and/or max, from_s, to_s; above_regen = true: max counts from REGEN_LIMIT_V, at 24 V or in proportion
     kind = "signal"        signal, statistic = mean min max rms peak span last, min and/or max, from_s, to_s
     kind = "state"         name, at_s or from_s and to_s; never = true: must not occur
     kind = "fault"         name, after_s (its cause), within_s, outputs_off_within_periods of the fault (of the cause with
@@ -274,16 +274,18 @@ class SignalExpectation(Expectation):
 class BusVoltageExpectation(SignalExpectation):
     """Shorthand: lowest and highest bus voltage."""
 
-    percent: bool
+    above_regen: bool
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "BusVoltageExpectation":
-        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s), section.flag("percent", False))
+        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s), section.flag("above_regen", False))
 
     def check(self, run: Run) -> list[Outcome]:
         column = run.trace.part(self.from_s, self.to_s).column(self.signal)
-        unit = run.params["NOMINAL_BUS_V"] / 100.0 if self.percent else 1.0
-        bounds = Bounds(self.bounds.minimum * unit, self.bounds.maximum * unit)
+        bounds = self.bounds
+        if self.above_regen: # the controllers are as quick on any supply: what overshoots is in proportion to it
+            scale = max(run.params["NOMINAL_BUS_V"] / 24.0, 1.0)
+            bounds = Bounds(bounds.minimum, run.params["REGEN_LIMIT_V"] + scale * bounds.maximum)
         if not len(column):
             return [Outcome(self.row, False, "nothing", bounds.text() + " V")]
         low, high = float(column.min()), float(column.max())

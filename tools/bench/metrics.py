@@ -24,6 +24,8 @@ class Measure:
     reference_percent: float | None = None
     reference: str = ""
     """which of SPEEDS"""
+    step_rpm: float = 0.0
+    """of the potentiometer: where the firmware's reference is that near to reference_rpm, the speed is held against it"""
 
     @property
     def has_reference(self) -> bool:
@@ -67,7 +69,7 @@ def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:
         put("speed_min_rpm", speed.min())
         put("speed_max_rpm", speed.max())
         if measure.reference_rpm is not None:
-            put("speed_error_percent", 100.0 * (speed.mean() / measure.reference_rpm - 1.0))
+            put("speed_error_percent", 100.0 * (speed.mean() / _reference(column("fw.speed_ref_rpm"), measure) - 1.0))
     if estimated is not None:
         put("estimated_rpm", estimated.mean())
         if speed is not None and abs(speed.mean()) > 1.0:
@@ -80,6 +82,13 @@ def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:
         _angle(column, put)
         _voltage(column, put)
     return values
+
+
+def _reference(own: np.ndarray | None, measure: Measure) -> float:
+    """What the speed is held against: what was asked for, as exactly as the potentiometer gives it."""
+    asked = float(measure.reference_rpm or 0.0)
+    given = asked if own is None else float(np.mean(own))
+    return given if abs(given - asked) <= measure.step_rpm else asked
 
 
 def _currents(column: Any, put: Any) -> None:

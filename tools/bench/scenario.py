@@ -1,14 +1,23 @@
 """A scenario: what happens to the board over time, what to measure and what to expect. scenario_file.py reads it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tools.common.errors import UserError
 from tools.common.board_keys import Values
+from tools.common.param_rows import number
 from .metrics import Measure
 
 BRAKE = "load.constant_nm"
+POT_STEPS = 1024
+START_MARGIN_S = 0.4
+"""Debouncing, charging of the drivers and waiting for the estimator's agreement, at most."""
+RAMP_S, SETTLE_S = 1.0, 1.0
+"""What a scenario with `follows_header` leaves for a ramp of the speed reference, and for the speed to settle."""
+SETTLE_PERIODS, SLOW_PERIODS, LONGEST_SETTLE_S = 5.0, 3.0, 20.0
+"""Of the speed loop's bandwidth, and of what is left of it at low speed, where it falls with the speed."""
+FULL_RATIO = number("PARAM_FULL_RATIO")
 
 
 @dataclass(frozen=True)
@@ -39,6 +48,8 @@ class Rating:
 
     speed_rpm: float
     torque_nm: float
+    coast_s_per_rpm: float = 0.0
+    """how long the motor's own friction takes where the supply takes nothing back"""
 
 
 @dataclass
@@ -51,6 +62,8 @@ class Scenario:
     motor: str
     board: str
     duration_s: float
+    follows_header: bool = False
+    """a start or a ramp that takes longer than the file leaves for it shifts what comes after"""
     defines: list[str] = field(default_factory=list)
     plant: Values = field(default_factory=Values)
     rotor_deg: float = 0.0
@@ -72,16 +85,71 @@ def asks_for_rating(scenario: Scenario) -> bool:
 
 def in_numbers(scenario: Scenario, rating: Rating | None, params: dict[str, float]) -> Scenario:
     """The scenario with every per cent and every named speed replaced by its number; `rating` is needed if asks_for_rating()."""
-    return replace(scenario, events=[_event_in_numbers(event, rating, params) for event in scenario.events],
-                   measures=[_measure_in_numbers(measure, rating, params) for measure in scenario.measures])
+    least_rpm = param(params, "MINIMUM_SPEED_RPM") if scenario.follows_header else 0.0
+    found = replace(scenario, events=[_event_in_numbers(event, rating, params, least_rpm) for event in scenario.events],
+                    measures=[_measure_in_numbers(measure, rating, params, least_rpm) for measure in scenario.measures])
+    return stretched(found, params, rating.coast_s_per_rpm if rating else 0.0) if scenario.follows_header else found
 
 
-def _event_in_numbers(event: Event, rating: Rating | None, params: dict[str, float]) -> Event:
+def start_time_s(params: Mapping[str, float]) -> float:
+    """How long a header's start takes from S2 to closed loop: lock, ramp and what is around them."""
+    period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
+    end_count = param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
+    ramp_periods = end_count / param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")
+    return (param(params, "LOCK_TIME") + ramp_periods) * period_s + START_MARGIN_S
+
+
+def stretched(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float = 0.0) -> Scenario:
+    """The scenario with the time that this header takes for the start and for each change of speed, where that is more than the file leaves."""
+    delays = list(_delays(scenario, params, coast_s_per_rpm))
+
+    def later(at_s: float) -> float:
+        return at_s + sum(extra_s for after_s, extra_s in delays if after_s < at_s)
+
+    def moved(item: Any) -> Any:
+        times = {name: later(getattr(item, name)) for name in ("at_s", "from_s", "to_s", "after_s") if getattr(item, name, None) is not None}
+        within = getattr(item, "within_s", None)
+        if within is not None: # the start itself, or the stop's ramp
+            times["within_s"] = within + sum(extra_s for after_s, extra_s in delays if after_s == getattr(item, "after_s", delays[0][0]))
+        return replace(item, **times) if times else item
+
+    if not delays:
+        return scenario
+    return replace(scenario, duration_s=later(scenario.duration_s), events=[moved(event) for event in scenario.events],
+                   measures=[moved(measure) for measure in scenario.measures], expectations=[moved(item) for item in scenario.expectations])
+
+
+def _delays(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float) -> Iterator[tuple[float, float]]:
+    """When something takes longer than the file leaves for it, and by how much; the first is the start."""
+    slope, now, coasting = param(params, "SPEEDREFRAMP_RPM_PER_S"), 0.0, coast_s_per_rpm
+
+    def settle_s(rpm: float) -> float:
+        hz, full_hz = param(params, "SPEED_BANDWIDTH_HZ"), param(params, "LOAD_BANDWIDTH_HZ") / FULL_RATIO
+        share = min(1.0, max(rpm, 1.0) * param(params, "NOPOLESPAIRS") / 60.0 / full_hz)
+        return min(max(SETTLE_PERIODS / hz, SLOW_PERIODS / hz / share, SETTLE_S) - SETTLE_S, LONGEST_SETTLE_S)
+
+    presses = [event.at_s for event in scenario.events if event.kind == "press" and event.button == "S2"]
+    for event in scenario.events:
+        if event.kind == "speed_rpm":
+            before, now = now, event.value
+            if presses and event.at_s > presses[0]:
+                yield event.at_s, max(abs(now - before) / slope - RAMP_S, (before - now) * coasting - RAMP_S, 0.0) + settle_s(now)
+        elif event.at_s in presses[:1]:
+            allowed = next((item.within_s for item in scenario.expectations if hasattr(item, "overshoot_percent")), 0.0)
+            to_speed_s = max(now - param(params, "END_SPEED_RPM"), 0.0) / slope
+            yield event.at_s, max(start_time_s(params) - allowed, 0.0) + max(to_speed_s - RAMP_S, 0.0) + settle_s(now)
+        elif event.at_s in presses:
+            yield event.at_s, max(now / slope - RAMP_S, now * coasting - RAMP_S, 0.0) + 2.0 * settle_s(now)
+        elif event.kind == "set" and BRAKE in event.keys:
+            coasting = 0.0 if event.keys[BRAKE] else coast_s_per_rpm
+
+
+def _event_in_numbers(event: Event, rating: Rating | None, params: dict[str, float], least_rpm: float) -> Event:
     if event.kind == "speed":
         rpm = _named_speed(event.text, params)
         return replace(event, kind="speed_rpm", value=rpm, written=f"speed = \"{event.text}\" ({rpm:g} rpm)", finds_range=True)
     if event.kind == "speed_percent":
-        rpm = event.value / 100.0 * rating.speed_rpm
+        rpm = _share(event.value, rating, least_rpm)
         return replace(event, kind="speed_rpm", value=rpm, written=f"speed_percent = {event.value:g} ({rpm:g} rpm)", finds_range=True)
     if event.kind == "torque_percent":
         torque_nm = event.value / 100.0 * rating.torque_nm
@@ -90,12 +158,22 @@ def _event_in_numbers(event: Event, rating: Rating | None, params: dict[str, flo
     return event
 
 
-def _measure_in_numbers(measure: Measure, rating: Rating | None, params: dict[str, float]) -> Measure:
+def _measure_in_numbers(measure: Measure, rating: Rating | None, params: dict[str, float], least_rpm: float) -> Measure:
     if measure.reference:
         return replace(measure, reference_rpm=_named_speed(measure.reference, params))
     if measure.reference_percent is not None:
-        return replace(measure, reference_rpm=measure.reference_percent / 100.0 * rating.speed_rpm)
+        rpm = _share(measure.reference_percent, rating, least_rpm)
+        if least_rpm == 0.0:
+            return replace(measure, reference_rpm=rpm)
+        step_rpm = (param(params, "NOMINAL_SPEED_RPM") - least_rpm) / POT_STEPS + 1.0 / param(params, "NOPOLESPAIRS")
+        return replace(measure, reference_rpm=rpm, step_rpm=step_rpm)
     return measure
+
+
+def _share(percent: float, rating: Rating, least_rpm: float) -> float:
+    """A part of the rated speed; the header's minimum where that is more, and the scenario follows it: the potentiometer goes no lower."""
+    rpm = percent / 100.0 * rating.speed_rpm
+    return max(rpm, least_rpm) if least_rpm else rpm
 
 
 def _named_speed(name: str, params: Mapping[str, float]) -> float:

@@ -5,6 +5,7 @@
     motor = "hurst_dmb0224c10002"    tuning/motors/NAME.toml or a path; this one if not given
     board = "mclv"                   tuning/boards/NAME.toml or a path; this one if not given
     duration_s = 10.0
+    follows_header = true            optional: a start or a ramp that takes longer with this header shifts what comes after
 
     [firmware]                       optional
     defines = ["TUNING"]             builds this variant of the firmware with -DTUNING
@@ -71,7 +72,7 @@ def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
     scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor", MOTOR),
-                        root.text("board", BOARD), root.number("duration_s", minimum=0.01, maximum=120.0))
+                        root.text("board", BOARD), root.number("duration_s", minimum=0.01, maximum=120.0), root.flag("follows_header", False))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))

@@ -20,6 +20,8 @@ from .scenario import Scenario
 from tools.common.trace import Trace
 
 CHUNK_PERIODS = 2000
+LONGEST_COAST_S = 60.0
+"""From rated speed: braking takes the rest."""
 
 SIGNALS = (
     "plant.speed_rpm", "plant.theta_e_deg", "plant.i_a", "plant.i_b", "plant.i_c", "plant.i_d", "plant.i_q", "plant.torque_nm",
@@ -47,7 +49,7 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
             parameters: dict[str, float] | None = None) -> Job:
     """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
     keys, params = library.keys, library.params | (parameters or {})
-    rating = rating_of(motor) if scenarios.asks_for_rating(scenario) else None
+    rating = rating_of(motor, board) if scenarios.asks_for_rating(scenario) else None
     scenario = scenarios.in_numbers(scenario, rating, params)
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
     values = board_keys.resolve(layers, keys)
@@ -67,10 +69,12 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
     return Job(scenario, library.path, values, actions, signals, variables, parameters or {})
 
 
-def rating_of(motor: board_keys.Part) -> scenarios.Rating:
-    """What a hundred per cent are for this motor."""
+def rating_of(motor: board_keys.Part, board: board_keys.Part) -> scenarios.Rating:
+    """What a hundred per cent are for this motor, and how it coasts on this supply."""
     data = motor_file.load(str(motor.path))
-    return scenarios.Rating(data.rated_speed_rpm, data.rated_torque_nm)
+    coasts = data.coulomb_nm > 0.0 and not board.values.values.get("supply.sinks", 0.0)
+    seconds = (data.inertia_kgm2 + data.load_inertia_kgm2) * math.pi / 30.0 / data.coulomb_nm if coasts else 0.0
+    return scenarios.Rating(data.rated_speed_rpm, data.rated_torque_nm, min(seconds, LONGEST_COAST_S / data.rated_speed_rpm))
 
 
 def _check_names(names: dict[str, str], library: Library, where: str) -> None:

@@ -13,14 +13,12 @@ from . import command_common, simulate
 from tools.common.toml_file import Document
 from .metrics import Measure
 from .run import Run
-from .scenario import BRAKE, Event, Scenario, param
+from .scenario import BRAKE, Event, Scenario, param, start_time_s
 
 MEASURE = "measured"
 S3_DEBOUNCE_S = 0.03
 HIGHEST_OVER_S = 0.1
 """The highest speed of a run is a mean over this time."""
-START_MARGIN_S = 0.4
-"""Debouncing, charging of the drivers and waiting for the estimator's agreement, at most."""
 
 
 def within(minimum: float, maximum: float = float("inf")) -> Any:
@@ -99,14 +97,6 @@ def scenario(name: str, title: str, events: list[Event], reference_rpm: float, f
     """A scenario that ends with its only measure."""
     return Scenario(name, title, "", "", "", to_s, events=sorted(events, key=lambda event: event.at_s),
                     measures=[Measure(MEASURE, from_s, to_s, reference_rpm)], **more)
-
-
-def start_time_s(params: dict[str, float]) -> float:
-    """How long a header's start takes from S2 to closed loop: lock, ramp and what is around them."""
-    period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
-    end_count = param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
-    ramp_periods = end_count / param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")
-    return (param(params, "LOCK_TIME") + ramp_periods) * period_s + START_MARGIN_S
 
 
 def ramp_time_s(params: dict[str, float], rpm: float) -> float:

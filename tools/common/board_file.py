@@ -14,7 +14,7 @@ from pathlib import Path
 
 from . import paths, units
 from .board_keys import Part, Values
-from .errors import UserError
+from .errors import Problems, UserError
 from .motor_file import read_safely
 from .toml_file import Section, flatten
 from .units import Conversion, Kind, Quantity
@@ -26,7 +26,7 @@ _AMPERE = {"A": Conversion(1.0), "mA": Conversion(1e-3)}
 _ONE = {"1": Conversion(1.0)}
 
 TABLES: dict[str, dict[str, tuple[str, Kind]]] = {
-    "supply": {"voltage": ("supply.voltage_v", Kind("V", 6.0, 60.0, _VOLT)),
+    "supply": {"voltage": ("supply.voltage_v", Kind("V", 8.0, 60.0, _VOLT)),
                "resistance": ("supply.resistance_ohm", Kind("ohm", 0.001, 10.0, _OHM))},
     "bus": {"capacitance": ("bus.capacitance_f", Kind("F", 1e-6, 1.0, {"F": Conversion(1.0), "mF": Conversion(1e-3), "uF": Conversion(1e-6)})),
             "load": ("bus.load_a", Kind("A", 0.0, 10.0, _AMPERE))},
@@ -96,30 +96,36 @@ def _read(root: Section) -> BoardFile:
     title = root.text("title")
     found: dict[str, Quantity] = {}
     values = Values()
-    inverted = False
+    inverted, problems = False, Problems()
     for table, keys in TABLES.items():
         section = root.section(table)
         if section is None:
-            raise UserError(f"the table [{table}] is missing", root.document.label, "add it with " + ", ".join(keys))
-        section.close({*keys, *OTHERS.get(table, ())})
-        _read_table(section, table, keys, found, values)
+            problems.found.append(UserError(f"the table [{table}] is missing", root.document.label, "add it with " + ", ".join(keys)))
+            continue
+        problems.attempt(lambda section=section, names={*keys, *OTHERS.get(table, ())}: section.close(names))
+        _read_table(section, table, keys, found, values, problems)
         if table == "supply":
-            values.add("supply.sinks", float(section.flag("sinks")), section.where("sinks"))
+            values.add("supply.sinks", float(problems.attempt(lambda section=section: section.flag("sinks"), False)), section.where("sinks"))
         if table == "shunt":
-            inverted = section.flag("inverted")
+            inverted = problems.attempt(lambda section=section: section.flag("inverted"), False)
         if table == "adc":
-            found["adc.bits"] = units.read_count(section, "bits", 8, 16, "bits")
+            found["adc.bits"] = problems.attempt(lambda section=section: units.read_count(section, "bits", 8, 16, "bits"))
+    problems.tell()
     volts_per_ampere = found["shunt.resistance"].value_si * found["shunt.amplifier_gain"].value_si
-    values.add("shunt.gain_v_per_a", volts_per_ampere, found["shunt.amplifier_gain"].where)
+    values.add("shunt.gain_v_per_a", volts_per_ampere if inverted else -volts_per_ampere, found["shunt.amplifier_gain"].where)
+    values.add("expect.pwm_hz", 1.0 / found["pwm.period"].value_si, found["pwm.period"].where)
     _read_plant(root.section("plant"), values)
     board = _board(root.document.path, title, found, values, inverted, volts_per_ampere)
     _check(board)
     return board
 
 
-def _read_table(section: Section, table: str, keys: dict[str, tuple[str, Kind]], found: dict[str, Quantity], values: Values) -> None:
+def _read_table(section: Section, table: str, keys: dict[str, tuple[str, Kind]], found: dict[str, Quantity], values: Values,
+                problems: Problems) -> None:
     for key, (plant_key, kind) in keys.items():
-        quantity = units.read(section, key, kind)
+        quantity = problems.attempt(lambda key=key, kind=kind: units.read(section, key, kind))
+        if quantity is None:
+            continue
         found[f"{table}.{key}"] = quantity
         if plant_key:
             values.add(plant_key, quantity.value_si, quantity.where)
@@ -148,13 +154,15 @@ def _board(path: Path, title: str, found: dict[str, Quantity], values: Values, i
 
 
 def _check(board: BoardFile) -> None:
+    problems = Problems()
     where = {name: quantity.where for name, quantity in board.quantities.items()}
     full_scale_v = board.quantities["adc.full_scale"].value_si
     reference_v = board.quantities["shunt.reference"].value_si
     if not 0.45 <= reference_v / full_scale_v <= 0.55:
-        raise UserError(f"reference = {reference_v:g} V is not the middle of the converter's {full_scale_v:g} V", where["shunt.reference"],
-                        "a current in both directions needs the middle")
+        problems.found.append(UserError(f"reference = {reference_v:g} V is not the middle of the converter's {full_scale_v:g} V", where["shunt.reference"],
+                                        "a current in both directions needs the middle"))
     if not board.under_voltage_v < board.nominal_bus_v < board.regen_limit_v < board.over_voltage_v < board.bus_full_scale_v:
-        raise UserError("under_voltage, supply voltage, regen, over_voltage and the converter's bus range do not rise in this order",
+        problems.found.append(UserError("under_voltage, supply voltage, regen, over_voltage and the converter's bus range do not rise in this order",
                         where["limits.over_voltage"], f"they are {board.under_voltage_v:g}, {board.nominal_bus_v:g}, {board.regen_limit_v:g}, "
-                        f"{board.over_voltage_v:g} and {board.bus_full_scale_v:g} V")
+                        f"{board.over_voltage_v:g} and {board.bus_full_scale_v:g} V"))
+    problems.tell()

@@ -25,9 +25,14 @@ def each(items: Iterable[Item], work: Callable[[Item], Made]) -> tuple[list[Made
         try:
             made.append(work(item))
         except UserError as error:
-            print(f"foc33: {error}", file=sys.stderr, flush=True)
+            _tell(error)
             code = 2
     return made, code
+
+
+def _tell(error: UserError) -> None:
+    for line in error.lines:
+        print(f"foc33: {line}", file=sys.stderr, flush=True)
 
 
 def one_or_all(options: argparse.Namespace, known: list[str]) -> list[str]:
@@ -52,7 +57,7 @@ def run(work: Callable[[], int]) -> int:
     try:
         return work()
     except UserError as error:
-        print(f"foc33: {error}", file=sys.stderr)
+        _tell(error)
         return 2
     except KeyboardInterrupt:
         print("foc33: interrupted, nothing was written", file=sys.stderr)

@@ -29,6 +29,7 @@
 """
 
 import functools
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,7 +38,7 @@ from typing import Any
 
 from . import param_rows, paths, units
 from .board_keys import Part, Values
-from .errors import UserError, suggestion
+from .errors import Problems, UserError, suggestion
 from .toml_file import Document, Section, flatten
 from .units import Quantity
 
@@ -161,10 +162,14 @@ class _Reader:
 
     def __init__(self) -> None:
         self.found: dict[str, Quantity] = {}
+        self.problems = Problems()
 
     def need(self, section: Section, key: str, kind: units.Kind, extra: tuple[str, ...] = ()) -> float:
-        self.found[key] = units.read(section, key, kind, extra=extra)
-        return self.found[key].value_si
+        """Not a number where it is refused; the refusal is kept."""
+        def read() -> float:
+            self.found[key] = units.read(section, key, kind, extra=extra)
+            return self.found[key].value_si
+        return self.problems.attempt(read, math.nan)
 
     def may(self, section: Section, key: str, kind: units.Kind, default: float) -> float:
         return self.need(section, key, kind) if key in section else default
@@ -172,14 +177,16 @@ class _Reader:
 
 def _tables(root: Section) -> dict[str, Section | None]:
     """All tables, present or not; unknown tables and keys come first, for a slip of the pen makes another one missing."""
-    root.close({"title", "connection", *TABLES})
+    problems = Problems()
+    problems.attempt(lambda: root.close({"title", "connection", *TABLES}))
     sections = {name: root.section(name) for name in TABLES}
     for name, section in sections.items():
         keys = TABLES[name]
         if section is not None and keys is not None:
-            section.close(set(keys))
+            problems.attempt(lambda section=section, keys=keys: section.close(set(keys)))
         elif section is None and name in ("electrical", "mechanical", "rating"):
-            raise UserError(f"the table [{name}] is missing", root.document.label, "add it with " + ", ".join(keys or ()))
+            problems.found.append(UserError(f"the table [{name}] is missing", root.document.label, "add it with " + ", ".join(keys or ())))
+    problems.tell()
     return sections
 
 
@@ -189,29 +196,33 @@ def _read(root: Section) -> Motor:
     electrical, mechanical, rating = (tables[name] for name in ("electrical", "mechanical", "rating"))
     assert electrical and mechanical and rating
     reader = _Reader()
+    problems = reader.problems
     values = _read_electrical(electrical, connection, reader)
     values["inertia_kgm2"] = reader.need(mechanical, "inertia", units.INERTIA)
     values["viscous_nms"] = reader.may(mechanical, "viscous_friction", units.VISCOUS, 0.0)
     values["coulomb_nm"] = reader.may(mechanical, "coulomb_friction", units.FRICTION, 0.0)
     values |= _read_rating(rating, reader)
-    values |= _read_load(tables["load"], values["rated_torque_nm"], reader)
+    values |= problems.attempt(lambda: _read_load(tables["load"], values["rated_torque_nm"], reader), {})
+    spread = problems.attempt(lambda: _read_spread(tables["spread"], connection, values["pole_pairs"]), {})
+    tune, plant = problems.attempt(lambda: _read_tune(tables["tune"])), problems.attempt(lambda: _read_plant(tables["plant"]))
+    problems.tell()
     path = root.document.path
     motor = Motor(name=path.stem, path=path, title=title, connection=connection, quantities=reader.found,
-                  spread=_read_spread(tables["spread"], connection, values["pole_pairs"]), tune=_read_tune(tables["tune"]),
-                  plant_extra=_read_plant(tables["plant"]), **values)
+                  spread=spread, tune=tune, plant_extra=plant, **values)
     _check(motor)
     return motor
 
 
 def _read_electrical(section: Section, connection: str, reader: _Reader) -> dict[str, Any]:
-    reader.found["pole_pairs"] = units.read_count(section, "pole_pairs", 1, 50, "pole pairs")
-    pole_pairs = int(reader.found["pole_pairs"].value_si)
+    count = reader.problems.attempt(lambda: units.read_count(section, "pole_pairs", 1, 50, "pole pairs"))
+    pole_pairs = int(count.value_si) if count else 1
+    reader.found |= {"pole_pairs": count} if count else {}
     r_tempco = reader.may(section, "resistance_tempco", units.RESISTANCE_TEMPCO, COPPER_PER_K)
     psi_tempco = reader.may(section, "kphi_tempco", units.KPHI_TEMPCO, FERRITE_PER_K)
     rs_ohm = reader.need(section, "resistance", units.resistance(connection), extra=("at_degc",))
-    rs_ohm /= 1.0 + r_tempco * _above_25(section, "resistance")
+    rs_ohm /= 1.0 + r_tempco * _above_25(section, "resistance", reader)
     kphi = reader.need(section, "kphi", units.kphi(connection, pole_pairs), extra=("at_degc",))
-    kphi /= 1.0 + psi_tempco * _above_25(section, "kphi")
+    kphi /= 1.0 + psi_tempco * _above_25(section, "kphi", reader)
     ld_h, lq_h, frequency_hz = _read_inductance(section, connection, reader)
     return {"pole_pairs": pole_pairs, "rs_ohm": rs_ohm, "ld_h": ld_h, "lq_h": lq_h, "inductance_frequency_hz": frequency_hz,
             "kphi_v_per_krpm": kphi, "psi_vs": kphi / (units.SQRT3 * units.KRPM * pole_pairs),
@@ -225,11 +236,14 @@ def _read_inductance(section: Section, connection: str, reader: _Reader) -> tupl
     kind = units.inductance(connection)
     keys = ("inductance_d", "inductance_q") if both else ("inductance",)
     found = [reader.need(section, key, kind, extra=("frequency_hz",)) for key in keys]
-    return found[0], found[-1], units.detail(section, keys[0], "frequency_hz", None, 1.0, 1e6)
+    frequency_hz = reader.problems.attempt(lambda: units.detail(section, keys[0], "frequency_hz", None, 1.0, 1e6)) if keys[0] in reader.found else None
+    return found[0], found[-1], frequency_hz
 
 
-def _above_25(section: Section, key: str) -> float:
-    at_degc = units.detail(section, key, "at_degc", units.REFERENCE_DEGC, -40.0, 155.0)
+def _above_25(section: Section, key: str, reader: _Reader) -> float:
+    if key not in reader.found:
+        return 0.0
+    at_degc = reader.problems.attempt(lambda: units.detail(section, key, "at_degc", units.REFERENCE_DEGC, -40.0, 155.0))
     return (at_degc or 0.0) - units.REFERENCE_DEGC
 
 
@@ -308,55 +322,58 @@ def _read_plant(section: Section | None) -> Values:
 def _check(motor: Motor) -> None:
     """Numbers that do not fit each other are nearly always a wrong unit or a slipped power of ten."""
 
-    def fail(key: str, what: str, remedy: str) -> UserError:
+    problems = Problems()
+
+    def fail(key: str, what: str, remedy: str) -> None:
         quantity = motor.quantities.get(key) or motor.quantities.get("inductance_q")
-        return UserError(what, quantity.where if quantity else str(paths.shown(motor.path)), remedy)
+        problems.found.append(UserError(what, quantity.where if quantity else str(paths.shown(motor.path)), remedy))
 
     rated_rad_s = motor.rated_speed_rpm * units.RPM
     time_constant_s = motor.lq_h / motor.rs_ohm
     if not 2e-5 <= time_constant_s <= 0.05:
-        raise fail("inductance", f"L/R = {time_constant_s * 1e3:.3g} ms is implausible", "0.02 .. 50 ms are usual; check both units")
+        fail("inductance", f"L/R = {time_constant_s * 1e3:.3g} ms is implausible", "0.02 .. 50 ms are usual; check both units")
     if not 0.5 <= motor.lq_h / motor.ld_h <= 5.0:
-        raise fail("inductance_q", f"Lq/Ld = {motor.lq_h / motor.ld_h:.3g} is implausible", "0.5 .. 5 are usual; check both units")
+        fail("inductance_q", f"Lq/Ld = {motor.lq_h / motor.ld_h:.3g} is implausible", "0.5 .. 5 are usual; check both units")
     emf_v = motor.kphi_v_per_krpm * motor.rated_speed_rpm / 1000.0
     if not 0.25 <= emf_v / motor.rated_voltage_v <= 1.25:
-        raise fail("kphi", f"the back-EMF at rated speed, {emf_v:.3g} V peak line to line, does not suit {motor.rated_voltage_v:g} V",
+        fail("kphi", f"the back-EMF at rated speed, {emf_v:.3g} V peak line to line, does not suit {motor.rated_voltage_v:g} V",
                    "0.25 .. 1.25 of it are usual; check the units of kphi, speed and voltage")
     torque_nm = motor.kt_nm_per_a * motor.rated_current_a
     if not 0.5 <= torque_nm / motor.rated_torque_nm <= 2.0:
-        raise fail("torque", f"rated torque is {motor.rated_torque_nm:.3g} N m, but kphi and rated current give {torque_nm:.3g} N m",
+        fail("torque", f"rated torque is {motor.rated_torque_nm:.3g} N m, but kphi and rated current give {torque_nm:.3g} N m",
                    "probably a wrong unit of torque, current or kphi")
     drop_v = units.SQRT3 * motor.rs_ohm * motor.rated_current_a
     if drop_v > motor.rated_voltage_v:
-        raise fail("resistance", f"the rated current needs {drop_v:.3g} V for the resistance alone",
+        fail("resistance", f"the rated current needs {drop_v:.3g} V for the resistance alone",
                    f"that is more than the rated {motor.rated_voltage_v:g} V; check the units of resistance and current")
     friction_nm = motor.coulomb_nm + motor.viscous_nms * rated_rad_s
     if friction_nm > motor.rated_torque_nm:
         key = "coulomb_friction" if motor.coulomb_nm > motor.rated_torque_nm / 2.0 else "viscous_friction"
-        raise fail(key, f"friction at rated speed, {friction_nm:.3g} N m, exceeds the rated torque", "check the unit of friction")
+        fail(key, f"friction at rated speed, {friction_nm:.3g} N m, exceeds the rated torque", "check the unit of friction")
     acceleration_s = motor.inertia_kgm2 * rated_rad_s / motor.rated_torque_nm
     if not 1e-3 <= acceleration_s <= 5.0:
-        raise fail("inertia", f"rated torque would bring the bare rotor to rated speed in {acceleration_s:.3g} s",
+        fail("inertia", f"rated torque would bring the bare rotor to rated speed in {acceleration_s:.3g} s",
                    "0.001 .. 5 s are usual; check the unit of inertia")
     _check_limits(motor, fail)
+    problems.tell()
 
 
-def _check_limits(motor: Motor, fail: Callable[[str, str, str], UserError]) -> None:
+def _check_limits(motor: Motor, fail: Callable[[str, str, str], None]) -> None:
     if motor.maximum_speed_rpm < motor.rated_speed_rpm:
-        raise fail("maximum_speed", f"maximum_speed = {motor.maximum_speed_rpm:g} rpm is below the rated {motor.rated_speed_rpm:g} rpm",
+        fail("maximum_speed", f"maximum_speed = {motor.maximum_speed_rpm:g} rpm is below the rated {motor.rated_speed_rpm:g} rpm",
                    "raise it, or lower speed")
     if not 0.2 * motor.rated_current_a <= motor.maximum_current_a <= 10.0 * motor.rated_current_a:
-        raise fail("maximum_current", f"maximum_current = {motor.maximum_current_a:.3g} A peak beside a rated {motor.rated_current_a:.3g} A peak",
+        fail("maximum_current", f"maximum_current = {motor.maximum_current_a:.3g} A peak beside a rated {motor.rated_current_a:.3g} A peak",
                    "choose 0.2 .. 10 times the rated current; check both units")
     most_nm = motor.kt_nm_per_a * motor.maximum_current_a
     if motor.start_torque_nm > most_nm:
-        raise fail("start_torque", f"start_torque = {motor.start_torque_nm:.3g} N m is more than maximum_current gives, {most_nm:.3g} N m",
+        fail("start_torque", f"start_torque = {motor.start_torque_nm:.3g} N m is more than maximum_current gives, {most_nm:.3g} N m",
                    "lower it, or raise maximum_current")
     for key, name, value in (("rs_ohm", "resistance", motor.rs_ohm), ("ls_h", "inductance", motor.lq_h),
                              ("kphi_v_per_krpm", "kphi", motor.kphi_v_per_krpm)):
         low, high = motor.spread.get(key, (value, value))
         if not 0.999 * low <= value <= 1.001 * high:
-            raise fail(name, f"'{name}' is outside its own [spread] {low:.4g} .. {high:.4g}", "widen the spread, or check the units")
+            fail(name, f"'{name}' is outside its own [spread] {low:.4g} .. {high:.4g}", "widen the spread, or check the units")
 
 
 def listing(motors: list[Motor]) -> str:

@@ -115,7 +115,7 @@ def kphi(connection: str, pole_pairs: int) -> Kind:
         torque[f"{unit} dc"] = scale / SIX_STEP_MEAN * KRPM
     factors = line_to_line | phase | {"V s/rad": flux, "mV s/rad": flux * 1e-3, "V s/rad line-to-line": KRPM} | torque
     units = {name: Conversion(factor) for name, factor in factors.items()}
-    return Kind("V peak line-to-line/krpm", 0.2, 200.0, units | {"rpm/V": Conversion(1000.0 / SIX_STEP_MEAN, reciprocal=True)})
+    return Kind("V peak line-to-line/krpm", 0.2, 2000.0, units | {"rpm/V": Conversion(1000.0 / SIX_STEP_MEAN, reciprocal=True)})
 
 
 KPHI_FORMS = ("V peak line-to-line/krpm", "V rms line-to-line/krpm", "V s/rad line-to-line", "V s/rad", "N m/A peak", "N m/A rms", "N m/A dc", "rpm/V")
@@ -129,14 +129,14 @@ def kphi_forms(v_per_krpm: float, pole_pairs: int) -> str:
 
 RESISTANCE_TEMPCO = Kind("1/K", 0.0, 0.01, {"%/K": Conversion(0.01), "1/K": Conversion(1.0), "ppm/K": Conversion(1e-6)})
 KPHI_TEMPCO = Kind("1/K", -0.004, 0.0, RESISTANCE_TEMPCO.units)
-INERTIA = Kind("kg m2", 1e-8, 0.1, _scaled(kg_m2=1.0, g_cm2=1e-7, kg_cm2=1e-4, g_m2=1e-3, oz_in_s2=OUNCE_INCH_NM))
-LOAD_INERTIA = Kind("kg m2", 0.0, 0.1, INERTIA.units)
+INERTIA = Kind("kg m2", 1e-8, 10.0, _scaled(kg_m2=1.0, g_cm2=1e-7, kg_cm2=1e-4, g_m2=1e-3, oz_in_s2=OUNCE_INCH_NM))
+LOAD_INERTIA = Kind("kg m2", 0.0, 10.0, INERTIA.units)
 TORQUE_UNITS = _scaled(N_m=1.0, mN_m=1e-3, N_cm=1e-2, oz_in=OUNCE_INCH_NM)
 TORQUE = Kind("N m", 1e-4, 100.0, TORQUE_UNITS)
 FRICTION = Kind("N m", 0.0, 10.0, TORQUE_UNITS)
-VISCOUS = Kind("N m s", 0.0, 0.1, _scaled(N_m_s=1.0, mN_m_s=1e-3, uN_m_s=1e-6, N_m__krpm=1.0 / KRPM, mN_m__krpm=1e-3 / KRPM,
+VISCOUS = Kind("N m s", 0.0, 10.0, _scaled(N_m_s=1.0, mN_m_s=1e-3, uN_m_s=1e-6, N_m__krpm=1.0 / KRPM, mN_m__krpm=1e-3 / KRPM,
                                          oz_in__krpm=OUNCE_INCH_NM / KRPM))
-SPEED = Kind("rpm", 50.0, 30000.0, {"rpm": Conversion(1.0), "rad/s": Conversion(1.0 / RPM)})
+SPEED = Kind("rpm", 50.0, 32000.0, {"rpm": Conversion(1.0), "rad/s": Conversion(1.0 / RPM)})
 VOLTAGE = Kind("V", 3.0, 400.0, {"V": Conversion(1.0)})
 CURRENT = Kind("A peak", 0.02, 100.0, {"A peak": Conversion(1.0), "A rms": Conversion(SQRT2), "A dc": Conversion(PEAK_PER_DC)})
 
@@ -226,13 +226,22 @@ def _unit(inner: Section, key: str, kind: Kind) -> str:
     unit = inner.text("unit", None)
     if unit is None:
         raise UserError(f"'{key}' has no unit", inner.where(), "add unit = one of " + ", ".join(kind.units))
-    unit = " ".join(unit.split())
+    unit = _canonical(unit, kind)
     meant = _of_which(unit, kind)
     if unit not in kind.units and meant:
         raise inner.fail("unit", f"'{unit}' does not say which {key}", "write " + " or ".join(meant))
     if unit not in kind.units:
         raise inner.fail("unit", f"'{unit}' is no unit of {key}", "use one of " + ", ".join(kind.units))
     return unit
+
+
+def _canonical(unit: str, kind: Kind) -> str:
+    """The unit as the table has it, however it is spaced or printed: Nm, N*m and N·m are N m."""
+    def bare(text: str) -> str:
+        for printed, plain in (("·", " "), ("*", " "), ("²", "2"), ("^2", "2"), ("µ", "u"), ("μ", "u"), ("Ω", "ohm"), ("Ω", "ohm")):
+            text = text.replace(printed, plain)
+        return "".join(text.split())
+    return next((name for name in kind.units if bare(name) == bare(unit)), " ".join(unit.split()))
 
 
 def _of_which(unit: str, kind: Kind) -> list[str]:
