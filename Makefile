@@ -77,7 +77,7 @@ board = $(if $(BOARD),--board $(call quoted,$(BOARD)))
 options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
 ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief),$(MAKE) vboard)
 
-.PHONY: run scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
+.PHONY: anymotor run scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= OUT=folder]
 	@+$(ready)
 	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
@@ -98,6 +98,9 @@ starts: setup-run ## [run] starts from every rotor angle under several loads [MO
 
 motors: setup-run ## [your motor] every motor with its own header: 20, 50, 100 % of rated speed at half torque [BOARD= OUT=]
 	@$(tuner) motors $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
+
+anymotor: setup-run ## [your motor] drawn motors and boards: each tuned and turning, or refused in one line [N=300 SEED=1 CASE=number OUT=]
+	@$(tuner) anymotor $(if $(N),--count $(call quoted,$(N))) $(if $(SEED),--seed $(call quoted,$(SEED))) $(if $(CASE),--case $(call quoted,$(CASE))) $(out)
 
 robust: setup-run ## [run] how far R, L and Kphi may be off before a start fails [MOTOR= OUT=]
 	@+$(ready)
@@ -196,7 +199,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
