@@ -22,7 +22,7 @@ build/avr/sim: test/sixteen_bit/sim_avr.c test/sixteen_bit/run_image.h test/sixt
 .PHONY: test-avr
 test-avr: setup-test ## [tests] the unit tests of the control law with a 16-bit int, in an AVR simulator
 	@test/static/need.sh avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev
-	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(law_tests))) build/avr/liblaw.a build/avr/sim
+	@$(still) 'building the tests' $(MAKE) -s $(addprefix $T/,$(call chosen,$(law_tests))) build/avr/liblaw.a build/avr/sim
 	$(sixteen_bit) --out build/avr --library build/avr/liblaw.a --simulator build/avr/sim --compile $(call quoted,$(avr_compile)) \
 	    --link 'avr-gcc -mmcu=atmega2560 -Wl,--gc-sections -o {elf} {objects} -lm' $(call chosen,$(law_tests))
 
