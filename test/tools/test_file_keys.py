@@ -1,4 +1,4 @@
-"""docs/files.md: every key that a loader asks for, with the loader's own range and default; the virtual board's keys as the board has them."""
+"""docs/files.md: every key that a loader asks for, with its range and default; the virtual board's keys as the board has them."""
 
 import re
 from dataclasses import replace
@@ -21,20 +21,24 @@ def found() -> dict[str, dict[str, file_keys.Asked]]:
 
 def cells(name: str) -> list[str]:
     """The first row of the page that begins with this key."""
-    return next([cell.strip() for cell in line.split("|")[1:-1]] for line in tables.page("files").splitlines() if line.startswith(f"| `{name}` |"))
+    line = next(line for line in tables.page("files").splitlines() if line.startswith(f"| `{name}` |"))
+    return [cell.strip() for cell in line.split("|")[1:-1]]
 
 
 def test_no_key_of_the_loaders_own_tables_is_left_out(found):
     assert {f"{table}.{key}" for table, keys in motor_file.TABLES.items() for key in keys or ()} <= set(found["motor"])
-    assert {f"{table}.{key}" for table, keys in board_file.TABLES.items() for key in (*keys, *board_file.OTHERS.get(table, ()))} <= set(found["board"])
+    board = {table: (*keys, *board_file.OTHERS.get(table, ())) for table, keys in board_file.TABLES.items()}
+    assert {f"{table}.{key}" for table, keys in board.items() for key in keys} <= set(found["board"])
     assert {f"event.{kind}" for kind in scenario_file.EVENT_KINDS} <= set(found["scenario"])
     keyless = {"no_warnings", "clean", "no_fault", "outputs_off"}
     assert set(expect.KINDS) - keyless <= {item.table.removeprefix("expect ") for item in found["scenario"].values()}
 
 
 @pytest.mark.parametrize("row", [
-    ["`dead_time`", "s", "5e-07 .. 3e-06", "must be given"], ["`pole_pairs`", "pairs", "1 .. 50", "must be given"], ["`coulomb_friction`", "N m", "0 .. 10", "0"],
-    ["`rotor_deg`", "deg", "-360 .. 360", "0"], ["`sinks`", "", "true or false", "must be given"], ["`torque_percent`", "%", "0 .. 1000", "one of these"],
+    ["`dead_time`", "s", "5e-07 .. 3e-06", "must be given"], ["`pole_pairs`", "pairs", "1 .. 50", "must be given"],
+    ["`coulomb_friction`", "N m", "0 .. 10", "0"],
+    ["`rotor_deg`", "deg", "-360 .. 360", "0"], ["`sinks`", "", "true or false", "must be given"],
+    ["`torque_percent`", "%", "0 .. 1000", "one of these"],
     ["`overshoot_percent`", "%", "from 0", ""], ["`hold_s`", "s", "0.001 .. duration_s", ""], ["`press`", "", "`S2`, `S3`", "one of these"]])
 def test_unit_range_and_default_are_the_loader_s(row):
     assert cells(row[0].strip("`"))[:4] == row
@@ -60,8 +64,9 @@ def test_listening_leaves_the_loaders_as_they_were():
 
 
 @pytest.mark.parametrize("key, expected", [
-    ("resistance_tempco", {"resistance_tempco_per_k": 0.0039}), ("kphi_tempco", {"kphi_tempco_per_k": -0.002}), ("viscous_friction", {"viscous_nms": 0.0}),
-    ("coulomb_friction", {"coulomb_nm": 0.0}), ("maximum_current", {"maximum_current_a": 1.5 * 1.9 * 2.0 ** 0.5}), ("start_torque", {"start_torque_nm": 0.025})])
+    ("resistance_tempco", {"resistance_tempco_per_k": 0.0039}), ("kphi_tempco", {"kphi_tempco_per_k": -0.002}),
+    ("viscous_friction", {"viscous_nms": 0.0}), ("coulomb_friction", {"coulomb_nm": 0.0}),
+    ("maximum_current", {"maximum_current_a": 1.5 * 1.9 * 2.0 ** 0.5}), ("start_torque", {"start_torque_nm": 0.025})])
 def test_what_stands_in_for_a_quantity_is_what_the_page_says(tmp_path, key, expected):
     (tmp_path / "m.toml").write_text(re.sub(rf"(?m)^{key} = .*\n", "", MOTOR.read_text(encoding="utf-8")), encoding="utf-8")
     motor = motor_file.load(str(tmp_path / "m.toml"))

@@ -77,11 +77,13 @@ def test_on_a_terminal_it_is_one_line_that_goes_away():
 def test_make_s_jobs_reach_a_wrapped_make(tmp_path):
     (tmp_path / "Makefile").write_text("all:\n\t+@PYTHONPATH=$(ROOT) $(PY) -m tools.common.progress x $(MAKE) -f inner\n", encoding="utf-8")
     (tmp_path / "inner").write_text("all: a b\na b:\n\t@echo $@\n", encoding="utf-8")
-    done = subprocess.run(["make", "-s", "-j2", f"ROOT={paths.ROOT}", f"PY={sys.executable}"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(["make", "-s", "-j2", f"ROOT={paths.ROOT}", f"PY={sys.executable}"], cwd=tmp_path, capture_output=True,
+                          text=True, check=False)
     assert (done.returncode, sorted(done.stdout.split()), done.stderr) == (0, ["a", "b"], "")
 
 
-@pytest.mark.parametrize("arguments, said", [(["proof"], "no command"), (["proof", "no-such-command"], "cannot run no-such-command (No such file or directory), proof")])
+@pytest.mark.parametrize("arguments, said", [
+    (["proof"], "no command"), (["proof", "no-such-command"], "cannot run no-such-command (No such file or directory), proof")])
 def test_what_cannot_be_run_is_one_line(capfd, arguments, said):
     code = command_line.run(lambda: progress._run(arguments))
     refused((code, *capfd.readouterr()), said)
@@ -99,7 +101,8 @@ def test_every_long_step_of_make_is_wrapped(file, program):
 
 
 @pytest.mark.parametrize("module, arguments, titles", [
-    ("tools.bench", ["run", "smoke", "--library", str(LIBRARY)], ["smoke", "plots"]), ("tools.bench", ["table2", "--library", str(LIBRARY)], ["table2"]),
+    ("tools.bench", ["run", "smoke", "--library", str(LIBRARY)], ["smoke", "plots"]),
+    ("tools.bench", ["table2", "--library", str(LIBRARY)], ["table2"]),
     ("tools.bench", ["rated", "--motor", "hurst_dmb0224c10002", "--userparams", "."], ["building vboard", "firmware", "rated"]),
     ("tuning", ["tune", "hurst_dmb0224c10002"], ["tuning hurst_dmb0224c10002"])])
 def test_every_long_step_of_a_command_tells_how_far_it_is(tmp_path, module, arguments, titles):

@@ -93,8 +93,9 @@ def test_modules_in_the_project_s_own_environment_are_found_first_and_need_no_ro
     assert machine.run() == (0, "") and machine.read("build/setup/python") == "build/setup/venv/bin/python\n"
 
 
-@pytest.mark.parametrize("line, title", [("tools/setup/prepare.sh run", "installing packages"), ("test/static/need.sh cppcheck=cppcheck", "installing packages"),
-                                         ("tools/setup/gems.sh 1.2.1 stamp", "installing the gem")])
+@pytest.mark.parametrize("line, title", [
+    ("tools/setup/prepare.sh run", "installing packages"), ("test/static/need.sh cppcheck=cppcheck", "installing packages"),
+    ("tools/setup/gems.sh 1.2.1 stamp", "installing the gem")])
 def test_a_long_installation_says_now_and_then_what_it_does(machine, line, title):
     machine.program("apt-get", "echo Fetched $2; case $* in *install*) sleep 2.5; ln -sf /bin/true $BIN/python3;; esac")
     machine.program("gem", "echo Fetched ceedling; sleep 2.5")

@@ -15,7 +15,8 @@ from tools.common import board_file, motor_file, paths, units
 from tools.common.errors import UserError
 from tools.common.toml_file import REQUIRED, Document, Section
 
-EXAMPLES = {"motor": [paths.ROOT / "examples/my_motor.toml", paths.MOTORS / "hurst_dmb0224c10002.toml"], "board": [paths.ROOT / "examples/my_board.toml"],
+EXAMPLES = {"motor": [paths.ROOT / "examples/my_motor.toml", paths.MOTORS / "hurst_dmb0224c10002.toml"],
+            "board": [paths.ROOT / "examples/my_board.toml"],
             "scenario": [paths.ROOT / "examples/my_scenario.toml", *sorted(paths.SCENARIOS.glob("*.toml"))]}
 """Files that use every key at least once."""
 LOADERS: dict[str, Callable[[str], Any]] = {"motor": motor_file.load, "board": board_file.load, "scenario": scenario_file.load}
@@ -34,33 +35,35 @@ MEANINGS: dict[str, dict[str, str]] = {
         "electrical.inductance_q": "largest inductance over the rotor's angle",
         "electrical.kphi": "motor constant in any of its forms; `at_degc` of the magnets",
         "electrical.resistance_tempco": "change of R with temperature; copper if not given",
-        "electrical.kphi_tempco": "change of Kphi with temperature; ferrite magnets if not given",
-        "mechanical.inertia": "rotor alone", "mechanical.viscous_friction": "torque proportional to speed",
+        "electrical.kphi_tempco": "change of Kphi with temperature; ferrite magnets if not given", "mechanical.inertia": "rotor alone",
+        "mechanical.viscous_friction": "torque proportional to speed",
         "mechanical.coulomb_friction": "torque that does not depend on speed; give at least an estimate: without it a start is harder",
-        "rating.voltage": "rated voltage", "rating.current": "rated current", "rating.torque": "rated torque", "rating.speed": "rated speed",
-        "rating.maximum_speed": "speed to reach, by field weakening if need be", "rating.maximum_current": "what the winding withstands for a while",
-        "spread.resistance": "smallest and largest value of other sheets and measurements; the loops hold over it", "spread.inductance": "the same",
-        "spread.kphi": "the same",
-        "load.inertia": "what turns with the rotor", "load.start_torque": "what the shaft carries while it starts, the motor's friction not included"},
+        "rating.voltage": "rated voltage", "rating.current": "rated current", "rating.torque": "rated torque",
+        "rating.speed": "rated speed", "rating.maximum_speed": "speed to reach, by field weakening if need be",
+        "rating.maximum_current": "what the winding withstands for a while",
+        "spread.resistance": "smallest and largest value of other sheets and measurements; the loops hold over it",
+        "spread.inductance": "the same", "spread.kphi": "the same", "load.inertia": "what turns with the rotor",
+        "load.start_torque": "what the shaft carries while it starts, the motor's friction not included"},
     "board": {
-        "title": "one line for tables and reports",
-        "supply.voltage": "nominal bus", "supply.resistance": "of the supply and its cable", "supply.sinks": "true: the supply takes braking current back",
-        "bus.capacitance": "bus capacitors", "bus.load": "what the board itself draws",
-        "inverter.rds_on": "on-resistance of a transistor", "inverter.diode_voltage": "forward voltage of its diode",
+        "title": "one line for tables and reports", "supply.voltage": "nominal bus", "supply.resistance": "of the supply and its cable",
+        "supply.sinks": "true: the supply takes braking current back", "bus.capacitance": "bus capacitors",
+        "bus.load": "what the board itself draws", "inverter.rds_on": "on-resistance of a transistor",
+        "inverter.diode_voltage": "forward voltage of its diode",
         "inverter.trip_current": "bus current at which the comparator pulls FLTA1; 0: no comparator",
         "shunt.resistance": "shunt in the low leg of a phase", "shunt.amplifier_gain": "of the shunt's amplifier",
         "shunt.reference": "amplifier's output without current", "shunt.settle": "time until the amplifier shows the current",
-        "shunt.inverted": "true: the output falls with current into the motor",
-        "adc.bits": "resolution of the converter", "adc.full_scale": "voltage of the converter's full scale", "adc.bus_divider": "bus voltage over the pin's voltage",
-        "adc.noise": "standard deviation of a conversion",
-        "pwm.period": "PWM and control period", "pwm.dead_time": "between the transistors of a leg", "pwm.sample_window": "low sides on, on each side of the sample",
-        "limits.over_voltage": "bus above it trips", "limits.under_voltage": "bus below it trips while running", "limits.regen": "braking current falls from here"},
+        "shunt.inverted": "true: the output falls with current into the motor", "adc.bits": "resolution of the converter",
+        "adc.full_scale": "voltage of the converter's full scale", "adc.bus_divider": "bus voltage over the pin's voltage",
+        "adc.noise": "standard deviation of a conversion", "pwm.period": "PWM and control period",
+        "pwm.dead_time": "between the transistors of a leg", "pwm.sample_window": "low sides on, on each side of the sample",
+        "limits.over_voltage": "bus above it trips", "limits.under_voltage": "bus below it trips while running",
+        "limits.regen": "braking current falls from here"},
     "scenario": {
-        "title": "one line for the list of scenarios", "description": "longer text", "motor": "name in tuning/motors or a path", "board": "name in tuning/boards or a path",
-        "duration_s": "motor time of the run", "firmware.defines": "modes or macros of this build, without -D",
-        "start.rotor_deg": "electrical angle of the rotor at power-up", "start.speed_rpm": "speed of the shaft at power-up",
-        "event.at_s": "when it happens", "event.note": "text for the protocol", "event.hold_s": "how long the button is held",
-        "event.over_s": "how long the change takes, in a straight line",
+        "title": "one line for the list of scenarios", "description": "longer text", "motor": "name in tuning/motors or a path",
+        "board": "name in tuning/boards or a path", "duration_s": "motor time of the run",
+        "firmware.defines": "modes or macros of this build, without -D", "start.rotor_deg": "electrical angle of the rotor at power-up",
+        "start.speed_rpm": "speed of the shaft at power-up", "event.at_s": "when it happens", "event.note": "text for the protocol",
+        "event.hold_s": "how long the button is held", "event.over_s": "how long the change takes, in a straight line",
         "event.start_rpm": "S2, with the potentiometer at this speed since power-up", "event.press": "a button",
         "event.speed_rpm": "potentiometer to this speed, in the range that S3 has chosen",
         "event.speed_percent": "potentiometer to this share of the rated speed, with S3 where it takes that",
@@ -69,39 +72,46 @@ MEANINGS: dict[str, dict[str, str]] = {
         "event.set": "keys of the virtual board with their new values: `{ \"load.constant_nm\" = 0.05 }`",
         "event.torque_percent": "the brake `load.constant_nm` to this share of the rated torque",
         "event.debug": "writes 16-bit variables of the firmware, as a debugger would: `{ SnapStart = 1 }`",
-        "fault.rpm": "speed at which something breaks after 3 s; it is mended at 4 s, S2 follows at 4.2 s", "fault.cause": "keys that break it",
-        "fault.mended": "keys that mend it", "fault.name": "fault that must come, stay until S2 and be gone after it", "fault.within_s": "how soon after the cause",
-        "fault.over_s": "how long the cause takes", "fault.note": "text for the protocol", "fault.mended_note": "the same for the mending",
-        "fault.from_cause": "as in expect fault", "fault.kept_to_s": "as in expect fault",
-        "measure.name": "the row's name; reference_rpm if not given", "measure.from_s": "begin", "measure.to_s": "end",
-        "measure.reference_rpm": "speed that the error is told against; one of the three at most", "measure.reference_percent": "the same as a share of the rated speed",
-        "measure.reference": "the same by the header's name",
-        "expect.kind": "what must hold; each has its keys below",
-        "expect measure": "values of rows of the table", "expect measure.measure": "name, or a list of names", "expect measure.value": "column, see below",
+        "fault.rpm": "speed at which something breaks after 3 s; it is mended at 4 s, S2 follows at 4.2 s",
+        "fault.cause": "keys that break it", "fault.mended": "keys that mend it",
+        "fault.name": "fault that must come, stay until S2 and be gone after it", "fault.within_s": "how soon after the cause",
+        "fault.over_s": "how long the cause takes", "fault.note": "text for the protocol",
+        "fault.mended_note": "the same for the mending", "fault.from_cause": "as in expect fault",
+        "fault.kept_to_s": "as in expect fault", "measure.name": "the row's name; reference_rpm if not given", "measure.from_s": "begin",
+        "measure.to_s": "end", "measure.reference_rpm": "speed that the error is told against; one of the three at most",
+        "measure.reference_percent": "the same as a share of the rated speed", "measure.reference": "the same by the header's name",
+        "expect.kind": "what must hold; each has its keys below", "expect measure": "values of rows of the table",
+        "expect measure.measure": "name, or a list of names", "expect measure.value": "column, see below",
         "expect speed": "the true mean speed holds the reference", "expect speed.measure": "name, or a list of names",
-        "expect speed.percent": "at most this error",
-        "expect hand_over": "closed loop after S2", "expect hand_over.press": "which press of S2", "expect hand_over.within_s": "how soon",
+        "expect speed.percent": "at most this error", "expect hand_over": "closed loop after S2",
+        "expect hand_over.press": "which press of S2", "expect hand_over.within_s": "how soon",
         "expect hand_over.overshoot_percent": "at most", "expect hand_over.no_reverse_motion": "true: never backwards",
-        "expect stop": "outputs off after S2, and off to the end", "expect stop.after_s": "when S2 was pressed", "expect stop.within_s": "how soon",
-        "expect stop.to_s": "until when they stay off", "expect stop.speed_max_rpm": "no faster when they go off", "expect stop.lowest_rpm": "no slower on the way",
+        "expect stop": "outputs off after S2, and off to the end", "expect stop.after_s": "when S2 was pressed",
+        "expect stop.within_s": "how soon", "expect stop.to_s": "until when they stay off",
+        "expect stop.speed_max_rpm": "no faster when they go off", "expect stop.lowest_rpm": "no slower on the way",
         "expect stop.brake_max_a": "braking current at most; MAXIMUM_CURRENT_A if not given",
         "expect outputs_off": "all six outputs off", "expect bus_voltage": "lowest and highest bus voltage",
         "expect bus_voltage.percent": "true: in % of NOMINAL_BUS_V",
-        "expect signal": "a signal of the trace: a readable key below or of `python3 -m tools.bench keys`", "expect signal.signal": "its name", "expect signal.statistic": "what of it",
-        "expect state": "the drive's state", "expect state.name": "state, as in docs/flashing.md", "expect state.at_s": "then; or from_s and to_s",
-        "expect state.never": "true: it must not occur",
-        "expect fault": "a fault", "expect fault.name": "as in docs/faults.md", "expect fault.after_s": "when its cause begins", "expect fault.within_s": "how soon it comes",
-        "expect fault.outputs_off_within_periods": "PWM periods from the fault to the outputs off", "expect fault.from_cause": "true: from the cause",
-        "expect fault.kept_to_s": "the code stays until then", "expect fault.cleared_from_s": "no fault from then on",
-        "expect no_fault": "no fault", "expect no_warnings": "the virtual board found nothing wrong with the firmware's settings",
-        "expect clean": "no fault and no warnings",
-        "expect variable": "a firmware variable at the end", "expect variable.name": "its name, as a debugger knows it", "expect variable.count": "16-bit elements",
-        "expect variable.statistic": "what of them",
-        "*.min": "at least; min, max or both", "*.max": "at most", "*.from_s": "begin", "*.to_s": "end"}}
-DEFAULTS = {"electrical.resistance_tempco": f"{100.0 * motor_file.COPPER_PER_K:g} %/K", "electrical.kphi_tempco": f"{100.0 * motor_file.FERRITE_PER_K:g} %/K",
-            "mechanical.viscous_friction": "0", "mechanical.coulomb_friction": "0", "rating.maximum_current": "1.5 times current", "load.inertia": "0",
-            "load.start_torque": "a quarter of the rated torque",
-            "measure.name": "reference_rpm as text", "expect speed.measure": "all with a reference", "electrical.inductance": "this, or d and q", "electrical.inductance_d": "with q, or inductance", "electrical.inductance_q": "with d, or inductance"}
+        "expect signal": "a signal of the trace: a readable key below or of `python3 -m tools.bench keys`",
+        "expect signal.signal": "its name", "expect signal.statistic": "what of it", "expect state": "the drive's state",
+        "expect state.name": "state, as in docs/flashing.md", "expect state.at_s": "then; or from_s and to_s",
+        "expect state.never": "true: it must not occur", "expect fault": "a fault", "expect fault.name": "as in docs/faults.md",
+        "expect fault.after_s": "when its cause begins", "expect fault.within_s": "how soon it comes",
+        "expect fault.outputs_off_within_periods": "PWM periods from the fault to the outputs off",
+        "expect fault.from_cause": "true: from the cause", "expect fault.kept_to_s": "the code stays until then",
+        "expect fault.cleared_from_s": "no fault from then on", "expect no_fault": "no fault",
+        "expect no_warnings": "the virtual board found nothing wrong with the firmware's settings",
+        "expect clean": "no fault and no warnings", "expect variable": "a firmware variable at the end",
+        "expect variable.name": "its name, as a debugger knows it", "expect variable.count": "16-bit elements",
+        "expect variable.statistic": "what of them", "*.min": "at least; min, max or both", "*.max": "at most", "*.from_s": "begin",
+        "*.to_s": "end"}}
+DEFAULTS = {"electrical.resistance_tempco": f"{100.0 * motor_file.COPPER_PER_K:g} %/K",
+            "electrical.kphi_tempco": f"{100.0 * motor_file.FERRITE_PER_K:g} %/K",
+            "mechanical.viscous_friction": "0", "mechanical.coulomb_friction": "0", "rating.maximum_current": "1.5 times current",
+            "load.inertia": "0", "load.start_torque": "a quarter of the rated torque",
+            "measure.name": "reference_rpm as text", "expect speed.measure": "all with a reference",
+            "electrical.inductance": "this, or d and q", "electrical.inductance_d": "with q, or inductance",
+            "electrical.inductance_q": "with d, or inductance"}
 """What stands in for a key that the file leaves out, where the loader does not say it."""
 
 
@@ -174,8 +184,8 @@ class Listener:
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
         own = {"text": self._value("text"), "flag": self._value("true or false"), "texts": self._value("list of texts"),
-               "number": self._number("number"), "integer": self._number("whole number"), "choice": self._choice("text"), "choices": self._choice("text or list of texts"),
-               "values": self._value("table of keys")}
+               "number": self._number("number"), "integer": self._number("whole number"), "choice": self._choice("text"),
+               "choices": self._choice("text or list of texts"), "values": self._value("table of keys")}
         quantities = {"read": self._quantity("quantity"), "read_pair": self._quantity(PAIR), "read_count": self._count, "detail": self._detail}
         with contextlib.ExitStack() as stack:
             for owner, calls in ((Section, own), (units, quantities)):
@@ -228,7 +238,8 @@ class Listener:
     def _detail(self, call: Callable) -> Callable:
         def ask(section: Section, key: str, part: str, default: float | None, minimum: float, maximum: float) -> Any:
             name = f"{_table(section)}.{key}"
-            self.found[name] = replace(self.found[name], more=f"`{part}` {minimum:g} .. {maximum:g}" + ("" if default is None else f", {default:g} if not given"))
+            stands_in = "" if default is None else f", {default:g} if not given"
+            self.found[name] = replace(self.found[name], more=f"`{part}` {minimum:g} .. {maximum:g}{stands_in}")
             return call(section, key, part, default, minimum, maximum)
         return ask
 
@@ -241,18 +252,21 @@ def listen(kind: str) -> dict[str, Asked]:
             LOADERS[kind](str(path))
     found = listener.found
     if kind == "scenario": # what [fault] hands on to other tables
-        for key, like in (("over_s", "event.over_s"), ("note", "event.note"), ("mended_note", "event.note"), ("from_cause", "expect fault.from_cause"),
-                          ("kept_to_s", "expect fault.kept_to_s")):
+        for key, like in (("over_s", "event.over_s"), ("note", "event.note"), ("mended_note", "event.note"),
+                          ("from_cause", "expect fault.from_cause"), ("kept_to_s", "expect fault.kept_to_s")):
             found[f"fault.{key}"] = replace(found[like], table="fault", key=key)
     else:
-        found = {name: asked if asked.default is not REQUIRED or _is_required(kind, asked) else replace(asked, default=None) for name, asked in found.items()}
-    order = list(MEANINGS[kind])
-    return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else order.index(_last_of(order, item[1].table))))
+        for name, asked in found.items():
+            if asked.default is REQUIRED and not _is_required(kind, asked):
+                found[name] = replace(asked, default=None)
+    return dict(sorted(found.items(), key=lambda item: _place(list(MEANINGS[kind]), item[1])))
 
 
-def _last_of(order: list[str], table: str) -> str:
-    """The last meaning of a table: what every table has alike comes after it."""
-    return next((name for name in reversed(order) if name == table or name.startswith(f"{table}.")), order[-1])
+def _place(order: list[str], asked: Asked) -> int:
+    """Keys stand as their meanings do; what every table has alike comes last in its table."""
+    name = asked.name if asked.name in order else next(
+        (name for name in reversed(order) if name == asked.table or name.startswith(f"{asked.table}.")), order[-1])
+    return order.index(name)
 
 
 def _is_required(kind: str, asked: Asked) -> bool:
@@ -353,7 +367,8 @@ def of_file(kind: str, table: Callable) -> str:
     for name, group in itertools.groupby(found.values(), key=lambda item: item.table):
         if name.startswith("expect "):
             continue
-        head = "At the top of the file" if not name else f"[[{name}]], any number" if name in ("event", "measure", "expect") else f"[{name}]"
+        many = name in ("event", "measure", "expect")
+        head = f"[[{name}]], any number" if many else f"[{name}]" if name else "At the top of the file"
         text += f"### {kind}: {head}\n\n" + table(HEAD, ALIGN, _rows(kind, list(group))) + "\n"
     if kind == "scenario":
         return text + _expectations(found, table)
@@ -366,7 +381,8 @@ def _expectations(found: dict[str, Asked], table: Callable) -> str:
         rows.append([f"**`{name}`**", "", "", "", MEANINGS["scenario"][f"expect {name}"]])
         rows += _rows("scenario", [item for item in found.values() if item.table == f"expect {name}"])
     text = "### scenario: kinds of [[expect]]\n\n" + table("kind and keys, unit, range, default, meaning", ALIGN, rows)
-    text += "\nColumns of a row (`value`):\n\n" + table("value, meaning", "ll", [[f"`{name}`", told] for name, told in metrics.MEASURE_VALUES.items()])
+    columns = [[f"`{name}`", told] for name, told in metrics.MEASURE_VALUES.items()]
+    text += "\nColumns of a row (`value`):\n\n" + table("value, meaning", "ll", columns)
     statistics = found["expect signal.statistic"].options
     return text + "\n`statistic` is one of " + ", ".join(f"`{name}`" for name in statistics) + ".\n\n"
 
@@ -375,7 +391,8 @@ def plant_keys() -> list[list[str]]:
     """The virtual board's keys from its source: name, unit, range, default, meaning; a key that can only be read has no range."""
     folder = paths.ROOT / "tools" / "vboard"
     constants = dict(re.findall(r"#define (VB_\w+) ([\d.]+)", (folder / "vb_state.h").read_text(encoding="utf-8")))
-    found = re.findall(r'^    (P|I|R|G|S|SF|W)\("([\w.]+)", (.*), "([^"]*)", "([^"]*)"\),$', (folder / "vb_keys.c").read_text(encoding="utf-8"), re.MULTILINE)
+    source = (folder / "vb_keys.c").read_text(encoding="utf-8")
+    found = re.findall(r'^    (P|I|R|G|S|SF|W)\("([\w.]+)", (.*), "([^"]*)", "([^"]*)"\),$', source, re.MULTILINE)
     rows = []
     for macro, name, middle, measured_in, told in found:
         if macro in "RG":

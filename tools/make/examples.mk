@@ -14,5 +14,6 @@ $(turn_motor): examples/turn_motor.c $B/libfirmware.a
 	$(call say,cc,$<)$(compile) -MMD -MP -o $@ $^ -lm
 
 $T/tools.test_examples.txt $T/made/tools/test_examples: $(turn_motor) # built before the test, not by it
+$T/made/tools/test_bench_pages: $B/libfirmware.a
 
 -include $(turn_motor).d

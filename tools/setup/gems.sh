@@ -10,7 +10,8 @@ stamp=$2
 log=build/gems/install.log
 
 mkdir -p build/gems
-[ "${INSTALL:-yes}" != no ] || give_up "set-up, missing: the ceedling gem $version: leave INSTALL=no away, it goes into build/gems and needs no root"
+[ "${INSTALL:-yes}" != no ] || \
+    give_up "set-up, missing: the ceedling gem $version: leave INSTALL=no away, it goes into build/gems and needs no root"
 echo "foc33: installing the ceedling gem $version (Unity and CMock) into build/gems; no root is needed"
 : >"$log"
 if ! logged "$log" "installing the gem" gem install --install-dir build/gems --no-user-install --ignore-dependencies --no-document \

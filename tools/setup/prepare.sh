@@ -7,7 +7,8 @@
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby), INSTALL=no (install nothing, say what is missing).
-# Result: build/setup/python holds the interpreter's command. Without root, Python's modules may be in build/setup/venv: it is looked for first.
+# Result: build/setup/python holds the interpreter's command. Without root, Python's modules may be
+# in build/setup/venv: it is looked for first.
 set -u
 . tools/setup/install.sh
 
