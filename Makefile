@@ -1,7 +1,7 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
 # Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
-# ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing), V=1 (show the commands).
+# ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing), FOC33_QUIET=1 (no progress), V=1 (show the commands).
 
 SCENARIO ?= $(if $(MOTOR),rated,demo)
 RUBY ?= ruby

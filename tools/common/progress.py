@@ -17,18 +17,20 @@ from . import command_line
 from .errors import UserError
 
 FIRST_S, EVERY_S = 3.0, 10.0
-"""Where nobody looks: the first line after this time, and the next ones."""
+"""Where nobody looks: the first line so long after the program's start, and the next ones."""
 BEAT_S = 0.5
 
 
 class Progress:
     """Counts up to `total` of a unit; without a total only time passes. Call it with what has been done since the last call."""
 
+    next_s = time.monotonic() + FIRST_S
+    """When the next line is due; one clock for all steps of a program, for short ones add up."""
+
     def __init__(self, title: str, total: float | None, quiet: bool = False, unit: str = "s of motor time") -> None:
         self.title, self.total, self.unit = title, total, unit
         self.done = 0.0
         self.begin_s = time.monotonic()
-        self.next_s = self.begin_s + FIRST_S
         self.silent = quiet or bool(os.environ.get("FOC33_QUIET"))
         self.bar: Any = None if self.silent else self._bar()
 
@@ -55,8 +57,8 @@ class Progress:
             self.bar.n = self.done
             self.bar.set_description_str(self.title, refresh=False)
             self.bar.refresh() if self.total is None else self.bar.update(0)
-        elif not self.silent and time.monotonic() >= self.next_s:
-            self.next_s = time.monotonic() + EVERY_S
+        elif not self.silent and time.monotonic() >= Progress.next_s:
+            Progress.next_s = time.monotonic() + EVERY_S
             print(f"  {self.line()}", file=sys.stderr, flush=True)
 
     def line(self) -> str:
