@@ -41,7 +41,7 @@ def test_every_sum_on_a_page_is_right_to_its_last_digit(page, left, right):
 
 
 def test_the_pages_that_calculate_have_their_sums_here():
-    assert {"docs/wiring.md", "docs/calibration.md", "docs/mplabx.md"} <= {page for page, _, _ in SUMS} and len(SUMS) >= 12
+    assert {"docs/wiring.md", "docs/calibration.md", "docs/mplabx.md"} <= {page for page, _, _ in SUMS} and len(SUMS) >= 10
 
 
 def test_every_variable_that_a_page_names_is_one_that_a_debugger_finds():
