@@ -1,14 +1,14 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
 # Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
-# ONLY (names of test suites), PYTHON RUBY CC (tools to use), V=1 (show the commands).
+# ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing), FOC33_QUIET=1 (no progress), V=1 (show the commands).
 
 SCENARIO ?= $(if $(MOTOR),rated,demo)
 RUBY ?= ruby
 ifeq ($(origin CC),default)
 CC := gcc
 endif
-export CC PYTHON RUBY
+export CC PYTHON RUBY INSTALL
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -66,6 +66,8 @@ help: ## [upkeep] this list
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
 alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES
 python = "$$(cat build/setup/python)"
+# Says now and then that a silent command still runs: $(still) title command
+still = python3 -m tools.common.progress
 front_end = $(alone) $(python) -m tools.bench
 out = $(if $(OUT),--out $(call quoted,$(OUT)))
 
@@ -137,13 +139,16 @@ spreadsheet: setup-tune ## [upkeep] write tuning/tuning_params.xlsx
 setup-tune:
 	@tools/setup/prepare.sh tune
 
+logged_step = echo "  make $$step"; $(still) "make $$step" sh -c '$(MAKE) -s "$$@" OUT= >build/readme.log 2>&1' sh $$step || { \
+    tail -n 3 build/readme.log >&2; exit 1; }
+
 .PHONY: readme bench
 readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
-	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
+	@+for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
 	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)"); do \
-	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
-	@if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
-	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done; fi
+	    $(logged_step); done
+	@+if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
+	    $(logged_step); done; fi
 	@$(python) tools/docs/readme.py
 
 bench: vboard ## [simulator] motor seconds that the virtual board simulates in one second of one core
@@ -196,7 +201,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)

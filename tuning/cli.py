@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tools.common import command_line, paths
+from tools.common.progress import waiting
 
 from . import fw_tune, identify, spreadsheet
 
@@ -60,15 +61,17 @@ def _tune(options: argparse.Namespace) -> int:
 def _tune_each(names: list[str], board: "BoardFile", out: Path | None, brief: bool) -> tuple[list[str], int]:
     """The motors that have got a header, and the exit code: one that is made for another board does not stop the rest."""
     def tune(name: str) -> str:
-        _tune_one(_design(name, board), out, brief)
+        _tune_one(name, board, out, brief)
         return name
     return command_line.each(names, tune)
 
 
-def _tune_one(design: "Design", out: Path | None, brief: bool) -> None:
-    from . import report
-    target = out or paths.TUNED / design.motor.name
-    report.write(design, target, anew=not brief)
+def _tune_one(name: str, board: "BoardFile", out: Path | None, brief: bool) -> None:
+    with waiting(f"tuning {Path(name).stem}"):
+        from . import report
+        design = _design(name, board)
+        target = out or paths.TUNED / design.motor.name
+        report.write(design, target, anew=not brief)
     print(report.brief(design) if brief else report.text(design))
     if not brief:
         print(f"\nresults in {paths.shown(target)}/: userparams.h, report.html")

@@ -26,6 +26,7 @@ from tools.bench import build, command_common, report
 from tools.common import board_file, board_keys, motor_file, output, paths, workers
 from tools.bench.board import Library
 from tools.common.errors import UserError
+from tools.common.progress import Progress, waiting
 
 from . import fw_tables
 from .fw_bench import Bench, Fault, built
@@ -149,9 +150,9 @@ class _Work:
         """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
         return Library(built(FIRMWARE / f"{self.motor.name}-{use}", header, defines_))
 
-    def _run(self, jobs: list[_Job], work: Callable, title: str, total: int = 1, unit: str = "") -> list[Any]:
+    def _run(self, jobs: list[_Job], work: Callable, title: str, total: int | None = None, unit: str = "") -> list[Any]:
         """The jobs' results, with a bar that says where they are; what goes wrong in one says of which motor."""
-        with command_common.Progress(title, total, self.quiet, unit) as progress:
+        with Progress(title, total, self.quiet, unit) as progress:
             def tell(news: Any) -> None:
                 index, place = 0, ""
                 if isinstance(news, tuple):
@@ -159,10 +160,7 @@ class _Work:
                     place = f"{rpm:.0f} rpm, {text}"
                 else:
                     self.motor_s += news
-                if progress.bar is not None:
-                    progress.bar.n = max(progress.bar.n, min(index, total))
-                    progress.bar.set_description_str(f"{title}: {place or f'{self.motor_s:.0f} s of motor time'}", refresh=False)
-                    progress(0.0)
+                progress.reach(max(progress.done, index), f"{title}: {place or f'{self.motor_s:.0f} s of motor time'}")
             try:
                 return workers.run_all(jobs, work, tell)
             except UserError as error:
@@ -348,8 +346,9 @@ def _write(folder: Path, tables: Tables, rows: list[dict[str, Any]], check: Chec
             "stopped": tables.stopped, "maximum_speed_rpm": tables.maximum_speed_rpm, "goal": tables.goal, "entries": rows,
             "check": check.rows, "problems": check.problems, "plots": []}
     if not options.no_plots:
-        from . import fw_plots
-        data["plots"] = fw_plots.write_all(tables, motor, folder)
+        with waiting("plots", options.quiet):
+            from . import fw_plots
+            data["plots"] = fw_plots.write_all(tables, motor, folder)
     output.write_summary(folder, report.clean(data))
     return data
 

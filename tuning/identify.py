@@ -21,6 +21,7 @@ from tools.common.board_file import BoardFile
 from tools.common.errors import UserError
 from tools.common.motor_file import Motor
 from tools.common.param_rows import FOLLOWS, parameters
+from tools.common.progress import Progress
 from tools.common.trace import Trace
 
 from .fw_bench import built
@@ -137,7 +138,7 @@ def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, c
     keys = workers.run_all(libraries[:1], _keys, lambda seconds: None)[0]
     values = [_plant(motor, board, changes, keys) for motor in motors]
     jobs = [Job(library, value) for library, value in zip(libraries, values)]
-    with command_common.Progress("identify", 8.5 * len(jobs), quiet) as progress:
+    with Progress("identify", 8.5 * len(jobs), quiet) as progress:
         measured = workers.run_all(jobs, measure, progress)
     return [Identified(*item) for item in zip(motors, [board] * len(motors), known, headers, values, measured)]
 

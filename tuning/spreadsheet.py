@@ -15,6 +15,7 @@ from typing import Any
 from tools.common import board_file, motor_file, paths
 from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
+from tools.common.progress import waiting
 
 from .design import Design, design
 
@@ -130,7 +131,8 @@ def add_command(commands: Any) -> None:
 
 
 def _command(_: argparse.Namespace) -> int:
-    write(FILE)
+    with waiting("spreadsheet"):
+        write(FILE)
     print(f"wrote {paths.shown(FILE)}")
     return 0
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tools.common import paths
 from tools.common.errors import UserError
+from tools.common.progress import waiting
 
 HEADER = "userparams.h"
 
@@ -62,8 +63,9 @@ def make(target: str, defines: list[str], userparams: Path | None) -> subprocess
         command.append(f"USERPARAMS={paths.shown(userparams)}")
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     try:
-        return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
-                              check=False)
+        with waiting(f"building {' '.join([target, variant]).strip()}"):
+            return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+                                  check=False)
     except OSError as error:
         raise UserError("cannot run make", "", error.strerror or str(error)) from None
 

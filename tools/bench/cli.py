@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
+from tools.common.progress import waiting
 from . import command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
@@ -80,8 +81,9 @@ def _run(options: argparse.Namespace) -> int:
         data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
         _write_traces(run, folder.work)
         if not options.no_plots:
-            from . import plots
-            data["plots"] = plots.write_all(run, folder.work)
+            with waiting("plots", options.quiet):
+                from . import plots
+                data["plots"] = plots.write_all(run, folder.work)
         output.write_summary(folder.work, data)
     print(report.text(run, outcomes, data))
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "

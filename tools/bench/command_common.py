@@ -1,4 +1,4 @@
-"""Steps that all running commands share: which library and plant, a progress bar, the verdict."""
+"""Steps that all running commands share: which library and plant, the verdict."""
 
 import argparse
 import math
@@ -91,33 +91,6 @@ def header_note(values: Mapping[str, Any], params: Mapping[str, float]) -> str:
         if name in params and not (1.0 - SAME_MOTOR) * low <= params[name] <= (1.0 + SAME_MOTOR) * high:
             differ.append(f"{name} is {params[name]:.4g} {unit}, the motor's is {(low + high) / 2.0:.4g}")
     return f"the header is for another motor: {'; '.join(differ)}" if differ else ""
-
-
-class Progress:
-    """A bar over motor time, or over something else; silent when asked to be or when nobody looks."""
-
-    def __init__(self, title: str, total_s: float, quiet: bool, unit: str = "s of motor time") -> None:
-        self.bar = None
-        if quiet or not sys.stderr.isatty():
-            return
-        try:
-            from tqdm import tqdm
-        except ImportError:
-            return
-        tqdm.monitor_interval = 0
-        self.bar = tqdm(total=total_s, desc=title, unit="s", leave=False, ncols=90,
-                        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} " + unit)
-
-    def __call__(self, seconds: float) -> None:
-        if self.bar is not None:
-            self.bar.update(min(seconds, max(0.0, self.bar.total - self.bar.n)))
-
-    def __enter__(self) -> "Progress":
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        if self.bar is not None:
-            self.bar.close()
 
 
 def changes(texts: list[str]) -> board_keys.Values:

@@ -13,6 +13,7 @@ from typing import Any
 from tools.common import command_line, output, paths
 from . import build, command_common, pil, report, scenario_file, simulate, sweep, table2
 from tools.common.errors import UserError
+from tools.common.progress import waiting
 from .expect import Outcome
 
 DEFAULT = ("demo", "table2")
@@ -95,8 +96,9 @@ def _scenario(name: str, options: argparse.Namespace) -> int:
         output.write_trace(result.work / "trace.csv", run.trace.thinned(10))
         (result.work / "uart.txt").write_text(found.sent, encoding="latin-1", newline="")
         if not options.no_plots:
-            from . import plots
-            data["plots"] = plots.write_all(run, result.work)
+            with waiting("plots", options.quiet):
+                from . import plots
+                data["plots"] = plots.write_all(run, result.work)
         output.write_summary(result.work, data)
     print(report.text(run, outcomes, data))
     print(f"\nimage               {paths.shown(image)}\n{core_text(found)}")

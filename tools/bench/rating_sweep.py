@@ -12,6 +12,7 @@ from .board import Library
 from tools.common.errors import UserError
 from .expect import Outcome
 from tools.common.motor_file import Motor
+from tools.common.progress import Progress
 
 COLUMNS = (
     ("torque_nm_set", "brake\nN m", "{:.4f}"), ("reference_rpm", "reference\nrpm", "{:.0f}"), ("speed_rpm", "true\nrpm", "{:.1f}"),
@@ -96,7 +97,7 @@ def _with_header(name: str, options: argparse.Namespace) -> tuple[Motor, Path]:
 def _candidates(ready: list[tuple[Motor, Path]], options: argparse.Namespace) -> list[Candidate]:
     """Every motor's firmware, built."""
     result = []
-    with command_common.Progress("firmware", len(ready), options.quiet, "headers built") as progress:
+    with Progress("firmware", len(ready), options.quiet, "headers built") as progress:
         for motor, header in ready:
             library = command_common.library_for([], None, header)
             result.append(Candidate(motor, motor_file.part(str(motor.path)), command_common.header_name(None, header), library))

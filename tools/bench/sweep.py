@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from tools.common import motor_file, workers
-from . import command_common, simulate
+from tools.common.progress import Progress
+from . import simulate
 from tools.common.toml_file import Document
 from .metrics import Measure
 from .run import Run
@@ -154,7 +155,7 @@ def _work(job: simulate.Job, report: Callable[[float], None]) -> dict[str, Any]:
 
 def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any] = _work) -> list[Any]:
     """The results of all jobs, in order; reduced, if `work` does not make something else of a job."""
-    with command_common.Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
+    with Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         return workers.run_all(jobs, work, progress)
 
 

@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ that are made from headers: faults, parameters, the simulator's assumptions.
+"""Writes the tables of docs/ that are made from headers and loaders: faults, parameters, keys of files, the simulator's assumptions.
 
     python3 -m tools.docs.tables                  writes the pages
     python3 -m tools.docs.tables --print faults   prints one page instead
@@ -45,7 +45,12 @@ def params() -> str:
         f"- {message.replace('SPEED0', 'SPEED0 .. 17')}\n" for message in relations if not re.match(r"IDREF_SPEED[1-9]", message))
 
 
-PAGES: dict[str, Callable[[], str]] = {"faults": faults, "parameters": params, "simulator": simulator}
+def files() -> str:
+    from . import file_keys # needs numpy, which the other pages do without
+    return file_keys.page(table)
+
+
+PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "parameters": params, "simulator": simulator}
 
 
 def page(name: str) -> str:

@@ -1,10 +1,13 @@
 # The image for the dsPIC33FJ32MC204, built by XC16: make firmware, flash, project. Uses the variables of the main Makefile.
 #
-# Variables: OPT (-O2, the best of the free licence; -O1, -O3), XC16 (folder of the compiler, if it is not on PATH), DFP (device pack, if the
+# Variables: OPT (-O2, the best of the free licence; -O1, -O3), XC16 (folder of the compiler, XC16 or XC-DSC, if it is not on PATH), DFP (device pack, if the
 # compiler has no support files for the part), DEFINES USERPARAMS VARIANT as for the PC, TOOL IPE (make flash).
 
 OPT ?= -O2
-xc16 = $(if $(XC16),$(call quoted,$(XC16)/bin/xc16-),xc16-)
+# XC16, or its successor XC-DSC: its programs have other names, and it need not call itself __XC16__.
+xc_names := $(or $(shell for name in xc16- xc-dsc-; do command -v $(call quoted,$(if $(XC16),$(XC16)/bin/))$${name}gcc >/dev/null && echo $$name && \
+    break; done),xc16-)
+xc16 = $(if $(XC16),$(call quoted,$(XC16)/bin/$(xc_names)),$(xc_names))
 target_device := 33FJ32MC204
 
 target_opt_suffix := $(subst $() ,,$(filter-out -O2,$(OPT)))
@@ -17,7 +20,7 @@ target_includes = $(if $(USERPARAMS),-I$(USERPARAMS)) -Iinclude -I.
 target_warnings := -Wall -Wextra -Werror -pedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align \
     -Wstrict-prototypes -Wmissing-prototypes -Wredundant-decls -Wswitch-enum -Wswitch-default -Wfloat-equal -Wdouble-promotion -Wlogical-op \
     -Wvla -Winline -Wtype-limits -Wframe-larger-than=128
-target_part = -mcpu=$(target_device) -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16))
+target_part = -mcpu=$(target_device) -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16)) $(if $(filter xc-dsc-,$(xc_names)),-U__XC16__ -D__XC16__)
 target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(target_includes) $(DEFINES)
 target_link_options := --gc-sections,--report-mem
 target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
@@ -32,7 +35,7 @@ firmware: $X/checked ## [your board] the image for the dsPIC by XC16: build/targ
 find-xc16:
 	@command -v $(xc16)gcc >/dev/null || { \
 	    echo "foc33: no xc16-gcc," $(call quoted,$(if $(XC16),XC16=$(XC16) has no bin/xc16-gcc,not on PATH)): install \
-	        "Microchip's MPLAB XC16 compiler (the free licence will do; XC compilers page at microchip.com)" \
+	        "Microchip's MPLAB XC16 compiler or its successor XC-DSC (the free licence will do; XC compilers page at microchip.com)" \
 	        "and name its folder, e.g. XC16=/opt/microchip/xc16/v2.10" >&2; exit 2; }
 
 # What the compiler would answer with lines of its own about every file.
