@@ -4,13 +4,24 @@
 
 #include "drive/reference.h"
 
+/** The speed that the reference goes to in CLOSED. */
+QM_INLINE speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p)
+{
+#ifdef TUNING
+    return along_direction(d, p->maximum_erpm);
+#else
+    (void)p;
+    return d->command.target_erpm;
+#endif
+}
+
 /** One step of the reference in closed loop. @return 1 if the mode has taken it */
 QM_INLINE uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
 {
 #ifdef TUNING
     int32_t sum = (int32_t)d->run.tuning_q16 + p->tuning_step_q16;
     d->run.tuning_q16 = (uint16_t)sum;
-    reference_step(d, p, along_direction(d, p->maximum_erpm), qm_hi(sum));
+    reference_step(d, p, mode_speed_target(d, p), qm_hi(sum));
     return 1;
 #else
     (void)d;
