@@ -5,10 +5,10 @@
 #include "drive/reference.h"
 #include "drive/speed.h"
 
-/** 1 from 1/64 below the limit on: a controller that is held there by another one stays a little below. @param limit 0 or more */
+/** 1 from 1/32 below the limit on: field weakening's trim keeps the voltage a little below it. @param limit 0 or more */
 static uint16_t at_limit(int16_t x, int16_t limit)
 {
-    return (uint16_t)(qm_abs(x) >= (int16_t)(limit - (limit >> 6)));
+    return (uint16_t)(qm_abs(x) >= (int16_t)(limit - (limit >> 5)));
 }
 
 /** The q current is held by the bus. With no braking current at all its reference is 0, which has no sign. */

@@ -41,10 +41,10 @@ def test_the_table_has_an_aligned_row_for_each_measure_and_dashes_for_what_is_un
 
 
 def test_the_protocol_tells_when_the_loop_closed_and_of_a_fault_and_its_end():
-    entries = [(round(at_s, 3), line) for at_s, line in report.protocol(example())]
+    entries = [(round(at_s, 3), line) for at_s, line in example().protocol()]
     assert (0.8, "closed loop 0.70 s after S2, overshoot 0.1 %") in entries
     assert not [line for _, line in entries if "fault" in line]
-    lines = [line for _, line in report.protocol(example(fw__fault=step((0, 0), (1.0, 6), (1.5, 0))))]
+    lines = [line for _, line in example(fw__fault=step((0, 0), (1.0, 6), (1.5, 0))).protocol()]
     assert {"fault STALL", "fault cleared"} <= set(lines)
 
 

@@ -53,30 +53,30 @@ void test_drive_that_has_what_it_asks_for_has_no_reason(void)
     }
 }
 
-void test_voltage_is_the_reason_from_one_64th_below_the_circle_on_each_axis(void)
+void test_voltage_is_the_reason_from_one_32nd_below_the_circle_on_each_axis(void)
 {
     EACH_FREE {
-        drive.run.control.v_q14.q = (int16_t)(way * 12599);
+        drive.run.control.v_q14.q = (int16_t)(way * 12399);
         expect(LIMIT_NONE, "q below");
-        drive.run.control.v_q14.q = (int16_t)(way * 12600);
+        drive.run.control.v_q14.q = (int16_t)(way * 12400);
         expect(LIMIT_VOLTAGE, "q at");
         drive.run.control.v_q14.q = 0;
-        drive.run.control.v_q14.d = (int16_t)(way * 12206); /* 63/64 of 31/32 of the circle, less one */
+        drive.run.control.v_q14.d = (int16_t)(way * 12012); /* 31/32 of 31/32 of the circle, less one */
         expect(LIMIT_NONE, "d below");
-        drive.run.control.v_q14.d = (int16_t)(way * 12207);
+        drive.run.control.v_q14.d = (int16_t)(way * 12013);
         expect(LIMIT_VOLTAGE, "d at");
     }
 }
 
-void test_current_is_the_reason_from_one_64th_below_its_limit(void)
+void test_current_is_the_reason_from_one_32nd_below_its_limit(void)
 {
     EACH_FREE {
         drive.run.control.iq_limit_q13 = 3200;
-        drive.run.control.ref_q13.q = (int16_t)(way * 3149);
+        drive.run.control.ref_q13.q = (int16_t)(way * 3099);
         expect(LIMIT_NONE, "below");
-        drive.run.control.ref_q13.q = (int16_t)(way * 3150);
+        drive.run.control.ref_q13.q = (int16_t)(way * 3100);
         expect(LIMIT_CURRENT, "driving");
-        drive.run.control.ref_q13.q = (int16_t)(way * -3150);
+        drive.run.control.ref_q13.q = (int16_t)(way * -3100);
         expect(LIMIT_CURRENT, "braking, and the bus would take more");
         drive.run.control.brake_limit_q13 = 3200;
         expect(LIMIT_CURRENT, "the bus takes as much");
@@ -87,9 +87,9 @@ void test_bus_is_the_reason_while_it_holds_the_braking_current_also_at_none(void
 {
     EACH_FREE {
         drive.run.control.brake_limit_q13 = 640;
-        drive.run.control.ref_q13.q = (int16_t)(way * -629);
+        drive.run.control.ref_q13.q = (int16_t)(way * -619);
         expect(LIMIT_NONE, "below");
-        drive.run.control.ref_q13.q = (int16_t)(way * -630);
+        drive.run.control.ref_q13.q = (int16_t)(way * -620);
         expect(LIMIT_BRAKE, "at");
         drive.run.control.ref_q13.q = (int16_t)(way * 640);
         expect(LIMIT_NONE, "driving");

@@ -14,7 +14,7 @@ from tools.common import motor_file, output, paths
 from tools.common.board_keys import Part, Values
 from tools.common.errors import UserError
 from tools.common.trace import wrapped_deg
-from . import command_common, reach, report, simulate, sweep
+from . import command_common, picture, reach, report, simulate, sweep
 from .board import Library
 from .expect import Outcome
 from .run import Run
@@ -146,7 +146,7 @@ def measured(item: Case, run: Run) -> dict[str, Any]:
     loaded = trace.part(item.off_s - 0.2 * table.hold_s, item.off_s)
     every = trace.part(item.on_s - 0.1 * table.hold_s, end_s)
     return {
-        "ramped_rpm": reference, "unloaded_min_rpm": float(speeds[0].min()), "unloaded_max_rpm": float(speeds[0].max()),
+        "picture": picture.of(run, picture.SWEEP_STRETCHES), "ramped_rpm": reference, "unloaded_min_rpm": float(speeds[0].min()), "unloaded_max_rpm": float(speeds[0].max()),
         "lowest_rpm": float(speeds[3].min()), "highest_rpm": float(speeds[2].max()),
         "dip_percent": 100.0 * (1.0 - float(speeds[3].min()) / reference),
         "rise_percent": 100.0 * (float(speeds[2].max()) / reference - 1.0),

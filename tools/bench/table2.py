@@ -113,6 +113,6 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
 
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
-    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
+    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "fault"]
     from . import plots
     report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_table2(rows, folder)})
