@@ -78,6 +78,11 @@ def write(folder: Path, page: Page, folders: tuple[Path, ...] = LIBRARY_FOLDERS)
                                encoding="utf-8")
 
 
+def draws(folders: tuple[Path, ...] = LIBRARY_FOLDERS) -> bool:
+    """Whether a page will have curves."""
+    return any((folder / LIBRARY).is_file() for folder in folders)
+
+
 def _library(folders: tuple[Path, ...]) -> str:
     """The plotting library and its style, or "" where it is not installed."""
     for folder in folders:

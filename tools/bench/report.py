@@ -87,7 +87,7 @@ def write_page(folder: Path, run: Run, outcomes: list[Outcome], data: dict[str, 
         f"{run.scenario.name}: {run.scenario.title}", data["passed"], outcomes_count(outcomes),
         used_lines(data) + [f"warning of the board: {line}" for line in run.warnings],
         [*faults_table(run), *([measures] if rows else []), outcomes_table(outcomes)], [shown], [*limits_table(run), events],
-        [name for name in data.get("plots", []) if name in EXTRA_PLOTS], sorted(file.name for file in folder.iterdir())))
+        [name for name in data.get("plots", []) if name in EXTRA_PLOTS or not page.draws()], sorted(file.name for file in folder.iterdir())))
 
 
 def faults_table(run: Run) -> list[page.Table]:
