@@ -185,7 +185,8 @@
       strokeWidth: style === "thin" ? 0.7 : 1.3, strokePattern: style === "dashed" ? [5, 3] : null }]));
     const graph = graphOf(panel, rows(lines, ...view), {
       labels: ["s", ...lines.map(({ name }) => name)], colors: lines.map(({ color }) => color), series, labelsDiv: names,
-      underlayCallback: underlay, ylabel: `${title} [${unit}]`, axes: { y: { axisLabelWidth: LABELS, pixelsPerLabel: 25, axisLabelFormatter: (v) => String(Number(v.toPrecision(6))) } } });
+      underlayCallback: underlay, ylabel: `${title} [${unit}]`,
+      axes: { y: { axisLabelWidth: LABELS, pixelsPerLabel: 25, axisLabelFormatter: (v) => String(Number(v.toPrecision(6))) } } });
     graph.lines = lines;
     graphs.push({ graph, lines });
   }

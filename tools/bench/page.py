@@ -13,8 +13,8 @@ NAME = "index.html"
 LIBRARY = "dygraph.min.js"
 LIBRARY_FOLDERS = (Path("/usr/share/javascript/dygraphs"), paths.ROOT / "build" / "setup" / "node_modules" / "dygraphs" / "dist")
 """Debian's libjs-dygraphs, or npm's dygraphs."""
-NO_LIBRARY = "The curves need dygraphs: install Debian's libjs-dygraphs, or run npm install --prefix build/setup dygraphs@2.2.1, and run again."
-MOST_CURVES = 2_000_000
+NO_LIBRARY = "The curves need dygraphs: install Debian's libjs-dygraphs, or npm install --prefix build/setup dygraphs@2.2.1, and run again."
+MOST_CURVES = 1_600_000
 """Bytes of all pictures of a page together; bad rows have theirs first."""
 
 
@@ -70,11 +70,11 @@ def write(folder: Path, page: Page, folders: tuple[Path, ...] = LIBRARY_FOLDERS)
     parts += [_image(folder / name) for name in page.images]
     parts += ["<h2>Files</h2><p>" + " ".join(f'<a href="{_text(name)}">{_text(name)}</a>' for name in page.files) + "</p>"] * bool(page.files)
     if library and any(pictures):
-        data = [None if picture is None else {"head": picture.head, "curves": base64.b64encode(picture.curves).decode()} for picture in pictures]
+        data = [picture and {"head": picture.head, "curves": base64.b64encode(picture.curves).decode()} for picture in pictures]
         parts += [f'<script type="application/json" id="pictures">{_json(data)}</script>',
                   f"<script>{library}</script>", f'<script>{(here / "page.js").read_text(encoding="utf-8")}</script>']
-    (folder / NAME).write_text(f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{_text(page.title)}</title>\n'
-                               f'<style>{(here / "page.css").read_text(encoding="utf-8")}</style></head>\n<body>\n' + "\n".join(parts) + "\n</body></html>\n",
+    head = f'<meta charset="utf-8"><title>{_text(page.title)}</title>\n<style>{(here / "page.css").read_text(encoding="utf-8")}</style>'
+    (folder / NAME).write_text(f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(parts) + "\n</body></html>\n",
                                encoding="utf-8")
 
 

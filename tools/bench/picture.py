@@ -14,7 +14,7 @@ from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 RUN_STRETCHES = 12000
 """Of a run that has the page for itself; what happens around a hand-over and a fault is there in full."""
-SWEEP_STRETCHES = 300
+SWEEP_STRETCHES = 250
 """Of a run that shares the page with many."""
 AROUND_FAULT_S = (0.04, 0.01)
 MISSING = -32768

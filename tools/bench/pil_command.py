@@ -103,7 +103,7 @@ def _scenario(name: str, options: argparse.Namespace) -> int:
     print(f"\nimage               {paths.shown(image)}\n{core_text(found)}")
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core ({run.cpu_s:.2f} s of processor time): {run.speed_factor:.2f} times real time, "
           f"{instructions_per_second(found) / 1e6:.0f} million instructions a second")
-    print(f"results in {paths.shown(target)}/")
+    print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
 
 

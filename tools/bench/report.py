@@ -68,17 +68,19 @@ def write_table(folder: Path, name: str, keys: Sequence[str], rows: list[dict[st
             "expectations": [vars(outcome) for outcome in outcomes], **more}
     output.write_summary(folder, clean(data))
     used = head.get("motors", [head] if "header" in head else [])
-    shown = page.Table("Runs", [_heading(key) for key in keys], [
-        page.Row([_number(row[key]) for key in keys], bool(row.get("fault")) or row.get("verdict", "ok") not in FINE, number if pictures[number] else None)
+    shown = page.Table("Runs", [*(_heading(key) for key in keys), "limited by"], [
+        page.Row([*(_number(row[key]) for key in keys), limits_text(row.get("limited_percent", {})) or "-"],
+                 bool(row.get("fault")) or row.get("verdict", "ok") not in FINE, number if pictures[number] else None)
         for number, row in enumerate(rows)])
-    page.write(folder, page.Page(f"{name}: {head['title']}", data["passed"], outcomes_count(outcomes), [line for item in used for line in used_lines(item)],
-                                 [shown], pictures, [outcomes_table(outcomes)], more.get("plots", []), [f"{name}.csv", output.SUMMARY]))
+    page.write(folder, page.Page(f"{name}: {head['title']}", data["passed"], outcomes_count(outcomes),
+                                 [line for item in used for line in used_lines(item)], [shown], pictures, [outcomes_table(outcomes)],
+                                 more.get("plots", []), [f"{name}.csv", output.SUMMARY]))
 
 
 def write_page(folder: Path, run: Run, outcomes: list[Outcome], data: dict[str, Any]) -> None:
     """The page of a single run, with all that summary() and used() tell of it."""
     shown = picture.of(run, picture.RUN_STRETCHES)
-    rows = [page.Row([measure["name"], *(_cell(measure.get(key), form) for key, _, form in COLUMNS)], at_s=None) for measure in data["measures"]]
+    rows = [page.Row([measure["name"], *(_cell(measure.get(key), form) for key, _, form in COLUMNS)]) for measure in data["measures"]]
     measures = page.Table("Measured", ["", *(" ".join(heading.split("\n")) for _, heading, _ in COLUMNS)], rows)
     events = page.Table("What happened", ["", "s", ""], [
         page.Row([str(number), f"{at_s:.4f}", text], at_s=at_s, bad=text.startswith("fault ") and text != "fault cleared")
@@ -93,7 +95,7 @@ def write_page(folder: Path, run: Run, outcomes: list[Outcome], data: dict[str, 
 def faults_table(run: Run) -> list[page.Table]:
     """The faults of a run, with cause and remedy."""
     known = {row.name: row for row in drive_tables.faults()}
-    rows = [page.Row([f"{at_s:.4f}", name, known[name].cause, known[name].remedy] if name in known else [f"{at_s:.4f}", name, "", ""], True, at_s=at_s)
+    rows = [page.Row([f"{at_s:.4f}", name, *((known[name].cause, known[name].remedy) if name in known else ("", ""))], True, at_s=at_s)
             for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
     return [page.Table("Faults", ["s", "fault", "cause", "remedy"], rows)] if rows else []
 
@@ -103,7 +105,7 @@ def limits_table(run: Run) -> list[page.Table]:
     if "fw.limits" not in run.trace:
         return []
     shares = limited_percent(run.trace)
-    rows = [page.Row([row.name, f"{shares[row.name]:.1f} %", row.cause, row.remedy]) for row in drive_tables.limits() if shares.get(row.name)]
+    rows = [page.Row([row.name, f"{shares[row.name]:.1f} %", row.cause, row.remedy]) for row in drive_tables.limits() if row.name in shares]
     return [page.Table("Why the output was limited", ["reason", "of the time with the bridge on", "cause", "remedy"], rows)]
 
 

@@ -162,7 +162,8 @@ def reduced(run: Run) -> dict[str, Any]:
     """What a table needs of a run."""
     hand_overs = run.hand_overs()
     faults = [(at_s, name) for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
-    return {"picture": picture.of(run, picture.SWEEP_STRETCHES), **run.measures[MEASURE], "closed_after_s": hand_overs[0].after_s2_s if hand_overs else None,
+    return {"picture": picture.of(run, picture.SWEEP_STRETCHES), **run.measures[MEASURE],
+            "closed_after_s": hand_overs[0].after_s2_s if hand_overs else None,
             "overshoot_percent": hand_overs[0].overshoot_percent if hand_overs else None, "fault": faults[0][1] if faults else None,
             "fault_s": faults[0][0] if faults else None,
             "highest_rpm": highest_rpm(run), "warnings": run.warnings, "motor_s": run.motor_s, "wall_s": run.wall_s}

@@ -78,7 +78,7 @@ def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str,
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("table2", outcomes)
 
 
