@@ -3,7 +3,7 @@
 
 #include "drive/modes/modes.h"
 #include "drive/reference.h"
-#include "drive/speed.h"
+#include "drive/state.h"
 
 /** 1 from 1/32 below the limit on: field weakening's trim keeps the voltage a little below it. @param limit 0 or more */
 static uint16_t at_limit(int16_t x, int16_t limit)
@@ -21,7 +21,7 @@ static uint16_t brakes_at_limit(const drive_control_t *c, speed_erpm_t speed)
 /** What holds the speed reference. A rest that the next step takes is no ramp. */
 static uint16_t ramp_reasons(const drive_t *d, const drive_params_t *p)
 {
-    speed_erpm_t target = speed_target(d, p);
+    speed_erpm_t target = mode_speed_target(d, p);
     int16_t left = qm_abs(qm_sub_limited(target, d->run.control.reference_erpm));
     uint16_t waits = (uint16_t)(left != 0 && !reference_may_move(d, p, target));
 

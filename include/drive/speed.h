@@ -7,21 +7,11 @@
 #include "drive/reference.h"
 #include "drive/state.h"
 
-/** The speed that the reference goes to. STOPPING ramps to three quarters of the minimum speed, where it ends: the rates follow the
- *  reference. */
-QM_INLINE speed_erpm_t speed_target(const drive_t *d, const drive_params_t *p)
-{
-    if (d->state == (uint16_t)DRIVE_STOPPING) {
-        return along_direction(d, (int16_t)(p->minimum_erpm - (p->minimum_erpm >> 2)));
-    }
-    return mode_speed_target(d, p);
-}
-
 /** The next speed reference. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_STOPPING || !mode_reference_step(d, p)) {
-        reference_step(d, p, speed_target(d, p), p->speed_ramp_erpm);
+        reference_step(d, p, mode_speed_target(d, p), p->speed_ramp_erpm);
     }
 }
 

@@ -4,13 +4,16 @@
 
 #include "drive/reference.h"
 
-/** The speed that the reference goes to in CLOSED. */
+/** The speed that the reference goes to. STOPPING ramps to three quarters of the minimum speed, where it ends: the rates follow the
+ *  reference. */
 QM_INLINE speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p)
 {
+    if (d->state == (uint16_t)DRIVE_STOPPING) {
+        return along_direction(d, (int16_t)(p->minimum_erpm - (p->minimum_erpm >> 2)));
+    }
 #ifdef TUNING
     return along_direction(d, p->maximum_erpm);
 #else
-    (void)p;
     return d->command.target_erpm;
 #endif
 }
