@@ -23,7 +23,7 @@ TIMES = SimpleNamespace(start_s=0.1, settle_s=1.0, torque_over_s=0.5, where="her
 
 def row(**more):
     return {"motor": "m", "row": "50 %", "fault": None, "closed_after_s": 1.6, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
-            "current_of_maximum_percent": 50.0, "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0, "voltage_percent": 60.0,
+            "current_of_maximum_percent": 50.0, "limited_percent": {}, "voltage_percent": 60.0,
             "reference_rpm": 1400.0, "highest_rpm": 1402.0} | more
 
 
@@ -43,7 +43,7 @@ def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_tor
     ({"closed_after_s": 5.1}, "closed loop after 5.10 s"), ({"speed_error_percent": 0.51}, "speed +0.5 %"),
     ({"speed_error_percent": None}, "no speed"), ({"angle_error_rms_deg": 10.1}, "angle"),
     ({"current_of_maximum_percent": 100.1}, "current"),
-    ({"speed_error_percent": -2.0, "voltage_at_limit_percent": 100.0}, "speed -2.0 % (voltage 100 % of the time)")])
+    ({"speed_error_percent": -2.0, "limited_percent": {"VOLTAGE": 100.0}}, "speed -2.0 % (VOLTAGE 100 %)")])
 def test_each_way_to_fail_is_named(values, text):
     assert rating_sweep.verdict(TABLE, row(**values)) == text
     assert rating_sweep.check(TABLE, row(verdict=text))[0].ok == (text == "ok")
@@ -98,7 +98,7 @@ def test_one_motor_in_full(tmp_path):
         assert [item["row"] for item in csv.DictReader(file)] == ["20 %", "50 %", "100 %", "maximum"]
     data = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert (data["passed"], [item["header"] for item in data["motors"]]) == (True, ["userparams.h"])
-    assert {path.name for path in folder.iterdir()} == {"summary.json", "rated.csv", "rated.png"}
+    assert {path.name for path in folder.iterdir()} == {"index.html", "summary.json", "rated.csv", "rated.png"}
 
 
 def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_path, monkeypatch):

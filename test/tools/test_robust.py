@@ -21,8 +21,8 @@ ALONE = {(1.0, 1.0, 1.0): "none", (0.7, 1.0, 1.0): "R", (1.5, 1.0, 1.0): "R", (1
 
 
 def row(**more):
-    return {"closed_after_s": 1.6, "fault": None, "fault_s": None, "speed_error_percent": 0.1, "voltage_at_limit_percent": 0.0,
-            "current_at_limit_percent": 0.0, "angle_error_rms_deg": 1.0, "angle_limit_deg": 2.0, "beyond": ""} | more
+    return {"closed_after_s": 1.6, "fault": None, "fault_s": None, "speed_error_percent": 0.1, "limited_percent": {},
+            "angle_error_rms_deg": 1.0, "angle_limit_deg": 2.0, "beyond": ""} | more
 
 
 # ---- deviations ----------------------------------------------------------------------------------------------------------

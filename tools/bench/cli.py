@@ -85,10 +85,11 @@ def _run(options: argparse.Namespace) -> int:
                 from . import plots
                 data["plots"] = plots.write_all(run, folder.work)
         output.write_summary(folder.work, data)
+        report.write_page(folder.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
           f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time")
-    print(f"results in {paths.shown(target)}/")
+    print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
 
 

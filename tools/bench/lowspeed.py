@@ -172,5 +172,5 @@ def command(options: argparse.Namespace) -> int:
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + lowest_text(searches))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("lowspeed", outcomes)

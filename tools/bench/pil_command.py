@@ -100,11 +100,12 @@ def _scenario(name: str, options: argparse.Namespace) -> int:
                 from . import plots
                 data["plots"] = plots.write_all(run, result.work)
         output.write_summary(result.work, data)
+        report.write_page(result.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
     print(f"\nimage               {paths.shown(image)}\n{core_text(found)}")
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core ({run.cpu_s:.2f} s of processor time): {run.speed_factor:.2f} times real time, "
           f"{instructions_per_second(found) / 1e6:.0f} million instructions a second")
-    print(f"results in {paths.shown(target)}/")
+    print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
 
 

@@ -84,7 +84,7 @@ def command(options: argparse.Namespace) -> int:
         outcomes = [outcome for row in rows for outcome in check(table, row)]
         _write(folder.work, table, candidates, rows, outcomes, board)
     print(text(table, candidates, rows))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return max(code, command_common.verdict("rated", outcomes))
 
 

@@ -307,7 +307,7 @@ def command(options: argparse.Namespace) -> int:
     print(text(bench, rows))
     if margins is not None:
         print("\n" + margins_text(table, margins))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("robust", outcomes)
 
 

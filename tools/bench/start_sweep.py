@@ -78,7 +78,7 @@ def command(options: argparse.Namespace) -> int:
         _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}: {len(rows)} starts\n\n{report.used_text(used)}\n")
     print(text(table, rows))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("starts", outcomes)
 
 

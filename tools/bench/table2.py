@@ -78,7 +78,7 @@ def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str,
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("table2", outcomes)
 
 
@@ -113,6 +113,6 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
 
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
-    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
+    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "fault"]
     from . import plots
     report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_table2(rows, folder)})

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
 #
-#   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib
+#   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib; if it can be had, dygraphs for the curves of a run's page
 #   tools/setup/prepare.sh tune    the same, and openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
@@ -41,6 +41,14 @@ find_python() {
                 return 0
             fi
         done
+    done
+    return 1
+}
+
+# As tools/bench/page.py looks for it.
+has_dygraphs() {
+    for file in /usr/share/javascript/dygraphs/dygraph.min.js $state/node_modules/dygraphs/dist/dygraph.min.js; do
+        [ -f "$file" ] && return 0
     done
     return 1
 }
@@ -111,5 +119,14 @@ if [ -n "$packages" ]; then
     debian "$log" "$lacking" "$packages" "$(without_root)"
     look
     [ -z "$packages" ] || give_up "set-up, still missing after the installation: $lacking: install it by hand and try again"
+fi
+# Tried once: without it a run's page has its tables only, and says what to do.
+if ! has_dygraphs && [ ! -e $state/no-dygraphs ] && can_install; then
+    echo "foc33: installing the Debian package libjs-dygraphs, for the curves of a run's page (log: $log)"
+    apt update
+    apt install --no-install-recommends libjs-dygraphs || {
+        touch $state/no-dygraphs
+        echo "foc33: set-up, libjs-dygraphs: cannot be installed, see $log; pages show no curves" >&2
+    }
 fi
 [ "$(cat $state/python 2>/dev/null)" = "$python" ] || echo "$python" >$state/python
