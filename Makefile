@@ -169,9 +169,15 @@ $B/flags: FORCE
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
 
+# Nothing is compiled with a userparams.h that cannot work.
+params = @tools/make/userparams.sh $@
+params_source := firmware/drive/param_text.c firmware/drive/param_check.c tools/make/userparams.sh
+$B/params: $B/flags $(params_source)
+	$(params) $(compile)
+
 $(board_objects): private INCLUDES += $(board_includes)
 
-$B/%.o: %.c $B/flags
+$B/%.o: %.c $B/flags | $B/params
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
@@ -265,7 +271,7 @@ test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes)
 $T/flags: FORCE
 	$(call remember,$(test_compile))
 
-$T/%.o: test/%.c $T/flags | $(gem_stamp) $(golden_stamp)
+$T/%.o: test/%.c $T/flags | $B/params $(gem_stamp) $(golden_stamp)
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(test_compile) $(warnings) -Werror $(call own_defines,$<) -MMD -MP -c $< -o $@
 
@@ -338,4 +344,4 @@ sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCEN
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
 	@rm -rf build/host* build/test* build/target* build/size build/golden build/run
 
--include $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)
+-include $B/params.d $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)
