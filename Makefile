@@ -202,7 +202,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples userparams),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)

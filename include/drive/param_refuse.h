@@ -11,9 +11,9 @@
     void function(void)
 
 /** A block that refuses; `function` is a name that nothing else has. */
-#define PARAM_REFUSE(function, message) \
+#define PARAM_REFUSE(function, ...) \
     { \
-        extern void function(void) __attribute__((error("userparams.h: " message))); \
+        extern void function(void) __attribute__((error("userparams.h: " __VA_ARGS__))); \
         function(); \
     }
 
