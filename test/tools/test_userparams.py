@@ -145,7 +145,7 @@ NAMES = {
     "a mode": (HEADER.replace(MODE, "#define TUNNING"), "TUNNING is no parameter: did you mean TUNING?"),
     "a gain": (HEADER.replace(RS, RS + "#define D_CURCNTR_PTERM 0.2\n"), "D_CURCNTR_PTERM is no parameter: did you mean D_CURRCNTR_PTERM?"),
     "twice": (HEADER.replace(RS, RS + "#define MOTOR_RS_OHM 2.7\n"),
-              f"MOTOR_RS_OHM = 2.7 is its second value, the first stands in {place(HEADER, 'MOTOR_RS_OHM')}: keep one of the two"),
+              f"MOTOR_RS_OHM = 2.7 is the second definition, the first stands in {place(HEADER, 'MOTOR_RS_OHM')}: keep one of the two"),
 }
 
 
@@ -159,10 +159,11 @@ def test_a_name_that_cannot_be_meant_is_one_line_with_its_place(tmp_path, mistak
     assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: userparams.h:{number}: {told}"), lines
 
 
-def test_a_mode_in_the_header_and_another_value_of_it_in_defines_is_told(tmp_path):
+def test_a_mode_that_the_header_and_the_command_line_switch_on_is_one_line(tmp_path):
     text = HEADER.replace(MODE, "#define TUNING")
     code, lines = checked(tmp_path, [*PC, "-DTUNING"], text)
-    assert code == 2 and lines == [f"foc33: {place(text, 'TUNING')}: TUNING =  is its second value, the first stands in DEFINES: keep one of the two"]
+    assert code == 2 and lines == [
+        f"foc33: {place(text, 'TUNING')}: TUNING is the second definition, the first stands in DEFINES or the scenario: keep one of the two"]
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -182,7 +183,7 @@ LEGAL = {
         "2.67 // and one", "2.67 \\\n", "+2.67", "(1 ? 2.67 : 3)", "(2.67 > 0) * 2.67", "((2.0) + (0.67))", "2*1.335")},
     "a negative expression": value("KCURRA", "-(0.25 + 0.25)"),
     "names of one's own": HEADER.replace(RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),
-    "one of one's own that resembles a parameter": HEADER.replace(RS, "#define MOTOR_RS_OHMS 2.67\n#define MOTOR_RS_OHM MOTOR_RS_OHMS\n"),
+    "one of one's own that resembles a parameter": HEADER.replace(RS, RS + "#define Q_CURRCNTR_PTERMS 0.2\n#define D_CURRCNTR_PTERM Q_CURRCNTR_PTERMS\n"),
     "one that nothing uses": HEADER.replace(RS, RS + "#define MY_NOTE 1\n#define MOTOR_RS_OHM_HOT 3.1\n"),
     "blocks": HEADER.replace(RS, "#define WARM\n#ifdef WARM\n#  define  MOTOR_RS_OHM\t2.67\n#else\n#define MOTOR_RS_OHM 2.2\n#endif\n"),
     "a value taken back": HEADER.replace(RS, "#define MOTOR_RS_OHM 2.2\n#undef MOTOR_RS_OHM\n" + RS),

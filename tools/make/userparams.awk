@@ -25,6 +25,7 @@ function refuse(what) {
     wrong = 1
 }
 
+BEGIN { option = "DEFINES or the scenario" }
 FNR == NR {
     rows = rows $0
     next
@@ -45,9 +46,9 @@ $1 == "#define" && counts {
     name = $2
     sub(/\(.*/, "", name)
     text = substr($0, length("#define " name) + 2)
-    here = by_option ? "DEFINES" : file ":" line
+    here = by_option ? option : file ":" line
     if (name in value && value[name] != text)
-        refuse(here ": " name " = " text " is its second value, the first stands in " place[name] ": keep one of the two")
+        refuse(here ": " name (text == "" ? "" : " = " text) " is the second definition, the first stands in " place[name] ": keep one of the two")
     value[name] = text
     place[name] = here
     used = used " " text
@@ -65,7 +66,7 @@ END {
     for (name in value) {
         if (name in known)
             print name "\t" place[name] "\t" known[name] >places
-        else if (place[name] != "DEFINES" && !index(used, " " name " ")) { # what another macro uses is the user's own
+        else if (place[name] != option && !index(used, " " name " ")) { # what another macro uses is the user's own
             near = ""
             close_to = least(2, int(length(name) / 4)) + 1
             for (word in known)
