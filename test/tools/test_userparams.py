@@ -40,8 +40,8 @@ def compiled(folder: Path, compiler: list[str], text: str) -> str:
     """The first error of the compiler alone, which is what a user of MPLAB X sees; "" if there is none."""
     (folder / "userparams.h").write_text(text, encoding="utf-8")
     for source in CHECKS:
-        done = subprocess.run([*compiler, *flags(folder), "-c", source, "-o", folder / "out.o"], cwd=paths.ROOT, capture_output=True, text=True,
-                              env=os.environ | {"LC_ALL": "C"}, check=False)
+        done = subprocess.run([*compiler, *flags(folder), "-c", source, "-o", folder / "out.o"], cwd=paths.ROOT, capture_output=True,
+                              text=True, env=os.environ | {"LC_ALL": "C"}, check=False)
         if errors := [line for line in done.stderr.splitlines() if ": error: " in line]:
             return errors[0]
         assert done.returncode == 0, done.stderr
@@ -77,29 +77,36 @@ assert MODE in HEADER
 # What is typed, the parameter it is about, and what the build and the compiler say of it.
 MISTAKES = {
     **{f"no number {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM", f"MOTOR_RS_OHM = {text} is no number: {NUMBER}") for text in (
-        "2,67", "(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "2.67;", "= 2.67", "-two", "[2.67]", "2.67 1", "24V", "(24 V)", "2.67\N{GREEK CAPITAL LETTER OMEGA}")},
+        "2,67", "(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "2.67;", "= 2.67",
+        "-two", "[2.67]", "2.67 1", "24V", "(24 V)", "2.67\N{GREEK CAPITAL LETTER OMEGA}")},
     "a comma within the range": (value("MOTOR_KPHI_V_PER_KRPM", "7,24"), "MOTOR_KPHI_V_PER_KRPM",
                                  f"MOTOR_KPHI_V_PER_KRPM = 7,24 is no number: write one, {range_of('MOTOR_KPHI_V_PER_KRPM')}"),
     "a gain that is no number": (HEADER.replace(RS, RS + "#define SPEEDCNTR_PTERM 0,1\n"), "SPEEDCNTR_PTERM",
                                  "SPEEDCNTR_PTERM = 0,1 is no number: remove the line, or write a number"),
     "nothing": (value("MOTOR_RS_OHM", ""), "MOTOR_RS_OHM", f"MOTOR_RS_OHM has no value: write a number, {range_of('MOTOR_RS_OHM')}"),
-    **{f"removed {name}": (HEADER.replace(line_of(name), ""), "", f"{name} is missing: add #define {name} and a number, {range_of(name)}, or make tune")
+    **{f"removed {name}": (HEADER.replace(line_of(name), ""), "",
+                           f"{name} is missing: add #define {name} and a number, {range_of(name)}, or make tune")
        for name in ("MOTOR_RS_OHM", "LOAD_BANDWIDTH_HZ", "IDREF_SPEED7")},
     **{f"part of {name}": (value(name, text), name, f"{name} = {text} must be a whole number, {range_of(name)}")
        for name, text in (("NOPOLESPAIRS", "5.5"), ("LOCK_TIME", "4000.5"), ("KFILTER_ESDQ", "2000.1"), ("DATA_BUFFER_SIZE", "49.9"))},
     "no gain": (value("KCURRA", "0"), "KCURRA", "KCURRA = 0 must be 0.1 .. 0.6 or -0.6 .. -0.1: 0.5 is a gain of 1"),
-    "a mode = 0": (HEADER.replace(MODE, "#define TUNING 0"), "TUNING", "TUNING = 0 switches the mode on: write #define TUNING, or nothing for off"),
+    "a mode = 0": (HEADER.replace(MODE, "#define TUNING 0"), "TUNING",
+                   "TUNING = 0 switches the mode on: write #define TUNING, or nothing for off"),
     "a mode = off": (HEADER.replace(MODE, "#define TUNING off"), "TUNING", "TUNING = off switches the mode on"),
     "a period the PWM cannot divide": (value("LOOPTIME_SEC", "0.0000501234"), "LOOPTIME_SEC",
                                        "LOOPTIME_SEC = 0.0000501234 must be a multiple of 50 ns, as 0.00005 is"),
-    "whole numbers divided": (value("LOOPTIME_SEC", "(1/20000)"), "LOOPTIME_SEC", f"LOOPTIME_SEC = (1/20000) is outside {range_of('LOOPTIME_SEC')}"),
+    "whole numbers divided": (value("LOOPTIME_SEC", "(1/20000)"), "LOOPTIME_SEC",
+                              f"LOOPTIME_SEC = (1/20000) is outside {range_of('LOOPTIME_SEC')}"),
     # these break relations, too, and the formulas of other files
     **{f"{name} out of range": (value(name, text), name, f"{name} = {text} is outside {range_of(name)}: correct it") for name, text in (
-        ("MOTOR_RS_OHM", "99"), ("MAXIMUM_SPEED_RPM", "50000"), ("MOTOR_KPHI_V_PER_KRPM", "0.1"), ("NOPOLESPAIRS", "0"), ("NORM_CURRENT_CONST", "1e-6"))},
-    "an L that overflows": (value("MOTOR_LS_MH", "25"), "MOTOR_LS_MH", "MOTOR_LS_MH = 25 does not fit its Q format: use a smaller current range"),
+        ("MOTOR_RS_OHM", "99"), ("MAXIMUM_SPEED_RPM", "50000"), ("MOTOR_KPHI_V_PER_KRPM", "0.1"), ("NOPOLESPAIRS", "0"),
+        ("NORM_CURRENT_CONST", "1e-6"))},
+    "an L that overflows": (value("MOTOR_LS_MH", "25"), "MOTOR_LS_MH",
+                              "MOTOR_LS_MH = 25 does not fit its Q format: use a smaller current range"),
     "a Kphi that overflows": (value("MOTOR_KPHI_V_PER_KRPM", "0.5"), "MOTOR_KPHI_V_PER_KRPM",
                               "MOTOR_KPHI_V_PER_KRPM = 0.5 does not fit 1/Kphi's Q format (2048 .. 32767): check its unit"),
-    "a relation": (value("MINIMUM_SPEED_RPM", "2900"), "MINIMUM_SPEED_RPM", "NOMINAL_SPEED_RPM = 2800 must be above MINIMUM_SPEED_RPM = 2900"),
+    "a relation": (value("MINIMUM_SPEED_RPM", "2900"), "MINIMUM_SPEED_RPM",
+                   "NOMINAL_SPEED_RPM = 2800 must be above MINIMUM_SPEED_RPM = 2900"),
 }
 
 
@@ -138,9 +145,12 @@ def test_what_only_the_compiler_finds_is_told_with_the_parameter(tmp_path, compi
 
 # ---- names ---------------------------------------------------------------------------------------------------------------
 NAMES = {
-    "misspelt": (HEADER.replace("MOTOR_RS_OHM 2.67", "MOTOR_RS_OHMS 2.67"), "MOTOR_RS_OHMS is no parameter: did you mean MOTOR_RS_OHM, 0.01 .. 40 ohm?"),
-    "letters exchanged": (HEADER.replace("#define KCURRA", "#define KCRURA"), "KCRURA is no parameter: did you mean KCURRA, -0.6 .. 0.6 1?"),
-    "small letters": (HEADER.replace("MOTOR_RS_OHM 2.67", "motor_rs_ohm 2.67"), "motor_rs_ohm is no parameter: did you mean MOTOR_RS_OHM, "),
+    "misspelt": (HEADER.replace("MOTOR_RS_OHM 2.67", "MOTOR_RS_OHMS 2.67"),
+                 "MOTOR_RS_OHMS is no parameter: did you mean MOTOR_RS_OHM, 0.01 .. 40 ohm?"),
+    "letters exchanged": (HEADER.replace("#define KCURRA", "#define KCRURA"),
+                          "KCRURA is no parameter: did you mean KCURRA, -0.6 .. 0.6 1?"),
+    "small letters": (HEADER.replace("MOTOR_RS_OHM 2.67", "motor_rs_ohm 2.67"),
+                      "motor_rs_ohm is no parameter: did you mean MOTOR_RS_OHM, "),
     "no blank": (HEADER.replace("MOTOR_RS_OHM 2.67", "MOTOR_RS_OHM2.67"), "MOTOR_RS_OHM2 is no parameter: did you mean MOTOR_RS_OHM, "),
     "a mode": (HEADER.replace(MODE, "#define TUNNING"), "TUNNING is no parameter: did you mean TUNING?"),
     "a gain": (HEADER.replace(RS, RS + "#define D_CURCNTR_PTERM 0.2\n"), "D_CURCNTR_PTERM is no parameter: did you mean D_CURRCNTR_PTERM?"),
@@ -154,8 +164,8 @@ NAMES = {
 def test_a_name_that_cannot_be_meant_is_one_line_with_its_place(tmp_path, mistake, compiler):
     text, told = NAMES[mistake]
     code, lines = checked(tmp_path, compiler, text)
-    number = len(HEADER[:HEADER.index(MODE if mistake == "a mode" else line_of("KCURRA") if "exchanged" in mistake else RS)].splitlines()) + 1
-    number += mistake in ("a gain", "twice")
+    changed = {"a mode": MODE, "letters exchanged": line_of("KCURRA")}.get(mistake, RS)
+    number = HEADER.count("\n", 0, HEADER.index(changed)) + 1 + (mistake in ("a gain", "twice"))
     assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: userparams.h:{number}: {told}"), lines
 
 
@@ -163,11 +173,13 @@ def test_a_mode_that_the_header_and_the_command_line_switch_on_is_one_line(tmp_p
     text = HEADER.replace(MODE, "#define TUNING")
     code, lines = checked(tmp_path, [*PC, "-DTUNING"], text)
     assert code == 2 and lines == [
-        f"foc33: {place(text, 'TUNING')}: TUNING is the second definition, the first stands in DEFINES or the scenario: keep one of the two"]
+        f"foc33: {place(text, 'TUNING')}: TUNING is the second definition, the first stands in DEFINES or the scenario: "
+        "keep one of the two"]
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("line, told", [("#defin A 1", "userparams.h:.*#defin.*: correct it"), ("MOTOR 2.67", "userparams.h:.*: correct it"),
+@pytest.mark.parametrize("line, told", [("#defin A 1", "userparams.h:.*#defin.*: correct it"),
+                                        ("MOTOR 2.67", "userparams.h:.*: correct it"),
                                         ("#error not for this motor", "userparams.h:.*not for this motor: correct it"),
                                         ("/* open", "userparams.h:.*unterminated.*: correct it")])
 def test_what_is_no_header_is_the_compiler_s_first_line(tmp_path, compiler, line, told):
@@ -179,18 +191,22 @@ def test_what_is_no_header_is_the_compiler_s_first_line(tmp_path, compiler, line
 LEGAL = {
     "as it is": HEADER,
     **{f"MOTOR_RS_OHM {text}": value("MOTOR_RS_OHM", text) for text in (
-        "2.67f", "2.67F", "(2.67)", "267e-2", ".5", "3.", "3", "0x3", "3u", "(5.34 / 2)", "5.34/2.", "(float)2.67", "(float)(5.34 / 2)", "2.67 /* a comment, with a comma */",
-        "2.67 // and one", "2.67 \\\n", "+2.67", "(1 ? 2.67 : 3)", "(2.67 > 0) * 2.67", "((2.0) + (0.67))", "2*1.335")},
+        "2.67f", "2.67F", "(2.67)", "267e-2", ".5", "3.", "3", "0x3", "3u", "(5.34 / 2)", "5.34/2.", "(float)2.67", "(float)(5.34 / 2)",
+        "2.67 /* a comment, with a comma */", "2.67 // and one", "2.67 \\\n", "+2.67", "(1 ? 2.67 : 3)", "(2.67 > 0) * 2.67",
+        "((2.0) + (0.67))", "2*1.335")},
     "a negative expression": value("KCURRA", "-(0.25 + 0.25)"),
-    "names of one's own": HEADER.replace(RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),
-    "one of one's own that resembles a parameter": HEADER.replace(RS, RS + "#define Q_CURRCNTR_PTERMS 0.2\n#define D_CURRCNTR_PTERM Q_CURRCNTR_PTERMS\n"),
+    "names of one's own": HEADER.replace(
+        RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),
+    "one of one's own that resembles a parameter": HEADER.replace(
+        RS, RS + "#define Q_CURRCNTR_PTERMS 0.2\n#define D_CURRCNTR_PTERM Q_CURRCNTR_PTERMS\n"),
     "one that nothing uses": HEADER.replace(RS, RS + "#define MY_NOTE 1\n#define MOTOR_RS_OHM_HOT 3.1\n"),
     "blocks": HEADER.replace(RS, "#define WARM\n#ifdef WARM\n#  define  MOTOR_RS_OHM\t2.67\n#else\n#define MOTOR_RS_OHM 2.2\n#endif\n"),
     "a value taken back": HEADER.replace(RS, "#define MOTOR_RS_OHM 2.2\n#undef MOTOR_RS_OHM\n" + RS),
     "twice the same": HEADER.replace(RS, RS + RS),
     "modes on": HEADER.replace(MODE, "#define TUNING\n#define SNAPSHOT 1"),
     "gains": HEADER.replace(RS, RS + "#define D_CURRCNTR_PTERM 0.2\n#define SPEEDCNTR_PTERM (0.1 / 2)\n"),
-    "1/Kphi changed": value("INVKFI_SPEED3", "(NORM_INVKFIBASE + 100)").replace(line_of("INVKFI_SPEED4"), "#define INVKFI_SPEED4 NORM_INVKFIBASE - 100\n"),
+    "1/Kphi changed": value("INVKFI_SPEED3", "(NORM_INVKFIBASE + 100)").replace(
+        line_of("INVKFI_SPEED4"), "#define INVKFI_SPEED4 NORM_INVKFIBASE - 100\n"),
     "no guard": re.sub(r"#(ifndef|define) USERPARAMS_H\n", "", HEADER).replace("\n#endif", ""),
     "another file": '#include "more.h"\n' + HEADER.replace(RS, ""),
     "a header of the compiler": "#include <stdint.h>\n" + HEADER,
@@ -222,7 +238,8 @@ def test_the_checks_cost_the_image_nothing():
 
 # ---- the build -----------------------------------------------------------------------------------------------------------
 def make(*words: str) -> subprocess.CompletedProcess:
-    environment = {name: text for name, text in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DEFINES", "USERPARAMS", "VARIANT")}
+    own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DEFINES", "USERPARAMS", "VARIANT")
+    environment = {name: text for name, text in os.environ.items() if name not in own}
     return subprocess.run(["make", *words], cwd=paths.ROOT, env=environment, capture_output=True, text=True, check=False)
 
 

@@ -48,7 +48,8 @@ $1 == "#define" && counts {
     text = substr($0, length("#define " name) + 2)
     here = by_option ? option : file ":" line
     if (name in value && value[name] != text)
-        refuse(here ": " name (text == "" ? "" : " = " text) " is the second definition, the first stands in " place[name] ": keep one of the two")
+        refuse(here ": " name (text == "" ? "" : " = " text) " is the second definition, the first stands in " place[name] \
+               ": keep one of the two")
     value[name] = text
     place[name] = here
     used = used " " text
