@@ -174,9 +174,15 @@ $B/flags: FORCE
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
 
+# Nothing is compiled with a userparams.h that cannot work.
+params = @tools/make/userparams.sh $@
+params_source := firmware/drive/param_text.c firmware/drive/param_check.c tools/make/userparams.sh
+$B/params: $B/flags $(params_source)
+	$(params) $(compile)
+
 $(board_objects): private INCLUDES += $(board_includes)
 
-$B/%.o: %.c $B/flags
+$B/%.o: %.c $B/flags | $B/params
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
@@ -201,7 +207,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
@@ -270,7 +276,7 @@ test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes)
 $T/flags: FORCE
 	$(call remember,$(test_compile))
 
-$T/%.o: test/%.c $T/flags | $(gem_stamp) $(golden_stamp)
+$T/%.o: test/%.c $T/flags | $B/params $(gem_stamp) $(golden_stamp)
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(test_compile) $(warnings) -Werror $(call own_defines,$<) -MMD -MP -c $< -o $@
 
@@ -343,4 +349,4 @@ sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCEN
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
 	@rm -rf build/host* build/test* build/target* build/size build/golden build/run
 
--include $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)
+-include $B/params.d $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)

@@ -49,7 +49,7 @@ REFUSED = {
         {"changes": (*OTHER, HEAVIER, ("value = 2.75", "value = 24")), "board": {"current_full_scale_a": 60.0}},
         ("MAXIMUM_CURRENT_A = 24 is outside", "change [rating] maximum_current to 0.1 .. 20 A peak")),
     "inertia below the load observer's format": ({"changes": (("value = 5.5e-6", "value = 1.0e-6"),)},
-                                                 ("MOTOR_INERTIA_KGM2 does not fit the load observer's format", "check its unit")),
+                                                 ("MOTOR_INERTIA_KGM2 = 1e-6 does not fit the load observer's format", "check its unit")),
     "speed loop that hunts without load": ({"more": "[tune]\nSPEED_BANDWIDTH_HZ = 17\n"},
                                            ("[tune]", "SPEED_BANDWIDTH_HZ = 17 must be at most 0.148 * LOAD_BANDWIDTH_HZ", "lower it")),
     "lowest speed at which the rotor is not held": ({"more": "[tune]\nMINIMUM_SPEED_RPM = 140\n"},
@@ -59,9 +59,9 @@ REFUSED = {
     "Kphi too small for its format": ({"kphi_v_per_krpm": 1.2, "rated_speed_rpm": 2000.0}, ("1/Kphi does not fit", "too fast for 24 V: use at most")),
     "resistance too large for its exponent": ({**SMALL, "board": {"current_full_scale_a": 8.0}}, ("MOTOR_RS_OHM", "smaller current range")),
     "motor too small for the board": ({"maximum_current_a": 0.2, "rated_current_a": 0.13, "rated_torque_nm": 0.007},
-                                      ("MAXIMUM_CURRENT_A must be at least 6.3 %",)),
+                                      ("MAXIMUM_CURRENT_A = 0.2 must be at least 6.3 %",)),
     "choice in [tune] that breaks a relation": ({"more": "[tune]\nEND_SPEED_RPM = 2700\n"},
-                                                ("[tune]", "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM"))}
+                                                ("[tune]", "END_SPEED_RPM = 2700 must be at most NOMINAL_SPEED_RPM = 2500"))}
 WARNED = {
     "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "larger current range")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),

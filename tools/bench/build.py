@@ -49,6 +49,8 @@ def library(defines: list[str], userparams: Path | None = None, target: str = "v
     with _one_at_a_time(folder):
         result = make(target, defines, userparams)
     if result.returncode != 0:
+        if told := re.search(r"^foc33: (.*)", result.stderr, re.MULTILINE):
+            raise UserError(told[1])
         raise UserError("the firmware does not build", _what(variant, result.args, userparams), _reason(result.stderr))
     return paths.ROOT / "build" / folder / "libvboard.so"
 
@@ -88,8 +90,8 @@ def _what(variant: str, command: list[str], userparams: Path | None) -> str:
 
 def _reason(text: str) -> str:
     """The line of the compiler's output that a user needs."""
-    for pattern in (r'static assertion failed: "(.*)"', r"(.*\berror: .*)", r"(.*\S.*)"):
+    for pattern in (r"(.*\berror: .*)", r"(.*\S.*)"):
         found = re.search(pattern, text)
         if found:
-            return found[1].replace("\\'", "'")
+            return found[1]
     return "run make vboard to see why"

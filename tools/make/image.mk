@@ -58,7 +58,10 @@ $X/flags: FORCE | target-input
 $X/contents: FORCE | target-input
 	$(call remember,$(target_objects))
 
-$X/%.o: %.c $X/flags
+$X/params: $X/flags $(params_source)
+	$(params) $(target_compile)
+
+$X/%.o: %.c $X/flags | $X/params
 	@mkdir -p $(@D)
 	$(call say,xc16,$<)$(target_compile) -MMD -MP -c $< -o $@
 
@@ -102,4 +105,4 @@ project: ## [your board] write the MPLAB X project firmware.X
 project-facts:
 	@printf '%s\n' $(target_facts)
 
--include $(target_objects:.o=.d)
+-include $X/params.d $(target_objects:.o=.d)
