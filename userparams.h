@@ -59,7 +59,7 @@
 #define REGEN_LIMIT_V 27.0          /* [V]             11 .. 90       braking current is reduced from here, to nothing 2 V higher */
 
 /* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
-#define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
+#define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 61 over the parameter set */
 #define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 52 degrees, 51 over the parameter set */
 #define LOAD_BANDWIDTH_HZ 110       /* [Hz]            1 .. 200       load observer after a load step; slower under a steady load, slowest without one: phase margin 17 degrees after a load step, 42 under load */
 

@@ -127,19 +127,19 @@ def _measure(job: Job, library: Library, board: Board, report_s: Callable[[float
 
 
 # ---- several motors at once -------------------------------------------------------------------------------------------------
-def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, current_a: float | None = None, speed_rpm: float | None = None,
+def identify(motors: list[Motor], board_name: str | None, changes: board_keys.Values, current_a: float | None = None, speed_rpm: float | None = None,
              quiet: bool = True) -> list[Identified]:
-    """Identifies the motors, side by side."""
-    board = board_file.load(board_name, "--board")
-    known = [Known.of(motor, board, current_a, speed_rpm) for motor in motors]
-    headers = [header(item, board) for item in known]
+    """Identifies the motors, side by side; each on its own board if none is named."""
+    boards = [board_file.load(*board_file.named(motor, board_name)) for motor in motors]
+    known = [Known.of(motor, board, current_a, speed_rpm) for motor, board in zip(motors, boards)]
+    headers = [header(item, board) for item, board in zip(known, boards)]
     libraries = [built(HEADERS / motor.name, text, [MODE]) for motor, text in zip(motors, headers)]
     keys = workers.run_all(libraries[:1], _keys, lambda seconds: None)[0]
-    values = [_plant(motor, board, changes, keys) for motor in motors]
+    values = [_plant(motor, board, changes, keys) for motor, board in zip(motors, boards)]
     jobs = [Job(library, value) for library, value in zip(libraries, values)]
     with command_common.Progress("identify", 8.5 * len(jobs), quiet) as progress:
         measured = workers.run_all(jobs, measure, progress)
-    return [Identified(*item) for item in zip(motors, [board] * len(motors), known, headers, values, measured)]
+    return [Identified(*item) for item in zip(motors, boards, known, headers, values, measured)]
 
 
 def _keys(library: Path, report_s: Callable[[float], None]) -> dict[str, board_keys.Key]:
@@ -162,7 +162,7 @@ def add_command(commands: Any) -> None:
     parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
-    parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
+    parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--current", type=float, metavar="A", help="Q_CURRENT_REF_OPENLOOP; default: from the rating")
     parser.add_argument("--speed", type=float, metavar="RPM", help="END_SPEED_RPM; default: 40 %% of the rating")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",

@@ -15,7 +15,7 @@ from pathlib import Path
 from . import paths, units
 from .board_keys import Part, Values
 from .errors import UserError
-from .motor_file import read_safely
+from .motor_file import Motor, read_safely
 from .toml_file import Section, flatten
 from .units import Conversion, Kind, Quantity
 
@@ -78,6 +78,17 @@ class BoardFile:
     def plant_values(self) -> Values:
         """Keys of the virtual board; each `where` is the line of the number."""
         return self.values
+
+
+DEFAULT = "mclv"
+"""Where nobody names a board."""
+
+
+def named(motor: Motor | Part, chosen: str | None = None, where: str = "--board") -> tuple[str, str]:
+    """What load() and part() want: the board that was chosen, else the motor file's, else the default; and who asked for it."""
+    if chosen:
+        return chosen, where
+    return (motor.board, motor.board_where) if motor.board else (DEFAULT, "")
 
 
 def load(name_or_path: str, where: str = "") -> BoardFile:
