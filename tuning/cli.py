@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tools.common import command_line, paths
 
-from . import fw_tune, identify, spreadsheet
+from . import board, fw_tune, identify, spreadsheet
 
 if TYPE_CHECKING:
     from tools.common.board_file import BoardFile
@@ -35,7 +35,7 @@ def _parser() -> argparse.ArgumentParser:
     motors.set_defaults(command=_motors)
     for command in (tune, motors):
         command.add_argument("--board", help="a name in tuning/boards or a path; default: the one in the motor file, else mclv")
-    for module in (fw_tune, spreadsheet, identify):
+    for module in (fw_tune, spreadsheet, identify, board):
         module.add_command(commands)
     return parser
 

@@ -23,10 +23,10 @@
 #define BOARD_PIN_UART_RX C, 4   /* serial line, receives; one other program for this board, its board unknown [?] */
 #define BOARD_PIN_LED_ALIVE C, 6 /* LED: alive, fault code; [?] a free pin until it is known */
 #define BOARD_PIN_LED_RUN C, 7   /* LED: running; [?] a free pin until it is known */
-/* The chip fixes the PWM's pins. */
-#define BOARD_PIN_PWM_A B, 14 /* phase A (M1), high side; its low side is the next bit; published code */
-#define BOARD_PIN_PWM_B B, 12 /* phase B (M2), likewise; published code */
-#define BOARD_PIN_PWM_C B, 10 /* phase C (M3), likewise; published code */
+/* The chip fixes the PWM pins; a low side is one bit above its high side. */
+#define BOARD_PIN_PWM_A B, 14 /* PWM of phase A (M1), high side; published code */
+#define BOARD_PIN_PWM_B B, 12 /* PWM of phase B (M2), high side; published code */
+#define BOARD_PIN_PWM_C B, 10 /* PWM of phase C (M3), high side; published code */
 
 PIN_NEEDS(currents_and_bus_are_AN0_to_2_or_AN3_to_5,
           (PIN_AN(BOARD_PIN_CURRENT_A) == 0 || PIN_AN(BOARD_PIN_CURRENT_A) == 3) && PIN_AN(BOARD_PIN_CURRENT_B) == PIN_AN(BOARD_PIN_CURRENT_A) + 1

@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ that are made from headers: faults, parameters, the simulator's assumptions.
+"""Writes the tables of docs/ that are made from headers: faults, parameters, pins, the simulator's assumptions.
 
     python3 -m tools.docs.tables                  writes the pages
     python3 -m tools.docs.tables --print faults   prints one page instead
@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Callable
 
+from tools.common import pins as chip_pins
 from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.paths import ROOT
@@ -45,7 +46,11 @@ def params() -> str:
         f"- {message.replace('SPEED0', 'SPEED0 .. 17')}\n" for message in relations if not re.match(r"IDREF_SPEED[1-9]", message))
 
 
-PAGES: dict[str, Callable[[], str]] = {"faults": faults, "parameters": params, "simulator": simulator}
+def pins() -> str:
+    return table("pin, port, analogue, remappable, also, on the MCLV, known from", "rllllll", chip_pins.page())
+
+
+PAGES: dict[str, Callable[[], str]] = {"faults": faults, "parameters": params, "pins": pins, "simulator": simulator}
 
 
 def page(name: str) -> str:
