@@ -14,7 +14,7 @@ HURST = "hurst_dmb0224c10002"
 def run(name: str = HURST, current_a: float | None = None, speed_rpm: float | None = None, **changes: float) -> identify_result.Identified:
     """One identification with changes to the plant; dots of keys are written as "__"."""
     values = board_keys.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
-    return identify.identify([motor_file.load(name)], "mclv", values, current_a, speed_rpm)[0]
+    return identify.identify([identify.prepared(motor_file.load(name), "mclv", current_a, speed_rpm)], values)[0]
 
 
 def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float) -> identify_result.Identified:
@@ -31,7 +31,7 @@ def ends(item: identify_result.Identified, result: str) -> bool:
 
 # ---- values ----------------------------------------------------------------------------------------------------------------
 def test_every_motor_is_within_its_limits():
-    items = identify.identify([motor_file.load(name) for name in MOTORS], None, board_keys.Values())
+    items = identify.identify([identify.prepared(motor_file.load(name), None, None, None) for name in MOTORS], board_keys.Values())
     assert {item.motor.name: item.problems() for item in items} == {name: [] for name in MOTORS}
 
 

@@ -144,3 +144,11 @@ def test_another_end_is_one_line_with_the_remedy():
     ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
 def test_mistakes_on_the_command_line(arguments, says):
     refused(command("identify", *arguments), says)
+
+
+def test_with_all_every_file_that_cannot_be_used_gets_its_line(tmp_path, monkeypatch):
+    (tmp_path / "broken.toml").write_text("x = = 1", encoding="utf-8")
+    (tmp_path / "no_board.toml").write_text('board = "no_such"\n' + FILE, encoding="utf-8")
+    monkeypatch.setattr(paths, "MOTORS", tmp_path)
+    code, out, error = command("identify", "--all")
+    assert (code, out) == (2, "") and re.fullmatch(r"foc33: TOML syntax, .*broken\.toml line 1.*\nfoc33: no board 'no_such', .*no_board\.toml line 1.*\n", error)
