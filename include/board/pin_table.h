@@ -51,13 +51,13 @@ enum { CHIP_PIN_TABLE(PIN_NUMBERS) PIN_PORT_A = 0,
 #define PIN_LOW_OF(port, bit) ((uint16_t)(PORT##port##bits.R##port##bit == 0u))
 #define PIN_LATCH_OF(port, bit) LAT##port##bits.LAT##port##bit
 #define PIN_MASK_OF(port, bit, wanted) ((PIN_PORT_##port == PIN_PORT_##wanted) ? 1u << (bit) : 0u)
-#define PIN_AN(pin) PIN_AN_OF(pin)
-#define PIN_RP(pin) PIN_RP_OF(pin)
-#define PIN_LOW(pin) PIN_LOW_OF(pin)
-#define PIN_LATCH(pin) PIN_LATCH_OF(pin)
-/** The pin's bit in its port's registers; 0 in the registers of another port. */
-#define PIN_MASK(pin, port) PIN_MASK_OF(pin, port)
-#define PIN_AN_MASK(pin) (1u << PIN_AN_OF(pin))
+#define PIN_AN(...) PIN_AN_OF(__VA_ARGS__)
+#define PIN_RP(...) PIN_RP_OF(__VA_ARGS__)
+#define PIN_LOW(...) PIN_LOW_OF(__VA_ARGS__)
+#define PIN_LATCH(...) PIN_LATCH_OF(__VA_ARGS__)
+/** PIN_MASK(pin, port): the pin's bit in a port's registers; 0 if it is on another port. */
+#define PIN_MASK(...) PIN_MASK_OF(__VA_ARGS__)
+#define PIN_AN_MASK(...) (1u << PIN_AN_OF(__VA_ARGS__))
 /** Refuses a build: a declaration of a negative size names what does not hold. */
 #define PIN_NEEDS(name, condition) typedef char name[(condition) ? 1 : -1]
 
