@@ -18,8 +18,8 @@ from tools.common.units import Kind
 
 from . import limits
 
-SHORT = {"shunt": "shunt.resistance", "gain": "shunt.amplifier_gain", "offset": "shunt.reference", "divider": "adc.bus_divider", "supply": "supply.voltage",
-         "trip": "inverter.trip_current", "range": "adc.full_scale", "cable": "supply.resistance"}
+SHORT = {"shunt": "shunt.resistance", "gain": "shunt.amplifier_gain", "offset": "shunt.reference", "divider": "adc.bus_divider",
+         "supply": "supply.voltage", "cable": "supply.resistance", "trip": "inverter.trip_current", "range": "adc.full_scale"}
 """Short names of keys."""
 FLAGS = {"inverted": "shunt.inverted", "sinks": "supply.sinks"}
 OF_SUPPLY = {"limits.over_voltage": 1.4, "limits.under_voltage": 0.5, "limits.regen": 1.125}
