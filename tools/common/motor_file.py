@@ -200,8 +200,8 @@ def _read(root: Section) -> Motor:
     values |= _read_rating(rating, reader)
     values |= _read_load(tables["load"], values["rated_torque_nm"], reader)
     path = root.document.path
-    motor = Motor(name=path.stem, path=path, title=title, connection=connection, quantities=reader.found,
-                  board=_board(root), board_where=root.where("board"), spread=_read_spread(tables["spread"], connection, values["pole_pairs"]), tune=_read_tune(tables["tune"]),
+    motor = Motor(name=path.stem, path=path, title=title, connection=connection, board=_board(root), board_where=root.where("board"),
+                  quantities=reader.found, spread=_read_spread(tables["spread"], connection, values["pole_pairs"]), tune=_read_tune(tables["tune"]),
                   plant_extra=_read_plant(tables["plant"]), **values)
     _check(motor)
     return motor

@@ -123,6 +123,6 @@ def page() -> list[list[str]]:
     result = []
     for pin in chip().values():
         signal = by_pin.get(pin.name, Signal(pin.name, "", ""))
-        result.append([str(pin.number), pin.name, "" if pin.an is None else f"AN{pin.an}", "" if pin.rp is None else f"RP{pin.rp}", pin.others, signal.what,
-                       signal.known_from])
+        result.append([str(pin.number), pin.name, "" if pin.an is None else f"AN{pin.an}", "" if pin.rp is None else f"RP{pin.rp}", pin.others,
+                       signal.what, signal.known_from])
     return result
