@@ -1,6 +1,6 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
-# Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
+# Variables: SCENARIO MOTOR BOARD SET OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
 # ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing), FOC33_QUIET=1 (no progress), V=1 (show the commands).
 
 SCENARIO ?= $(if $(MOTOR),rated,demo)
@@ -115,7 +115,7 @@ lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MO
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
-.PHONY: tune tune-fw identify spreadsheet userparams setup-tune
+.PHONY: tune tune-fw identify board spreadsheet userparams setup-tune
 tune: setup-run ## [your motor] data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD= OUT=]
 	@$(tuner) tune $(tune_motor) $(board) $(out)
 
@@ -132,6 +132,9 @@ userparams: setup-run ## [your motor] install the tuned header; yours is kept as
 	old=userparams.h.old; n=1; while test -e $$old; do n=$$((n + 1)); old=userparams.h.old$$n; done; \
 	if test -e userparams.h; then cp userparams.h $$old || exit; echo "yours is kept as $$old"; fi; \
 	cp "$$new" userparams.h && echo "userparams.h written"
+
+board: setup-run ## [your board] what a board measures; with SET: write the file of an inverter of your own [BOARD=mclv SET="shunt=10mohm gain=20 ..."]
+	@$(tuner) board $(call quoted,$(or $(BOARD),mclv)) $(foreach word,$(SET),$(call quoted,$(word)))
 
 spreadsheet: setup-tune ## [upkeep] write tuning/tuning_params.xlsx
 	@$(tuner) spreadsheet

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tools.common import command_line, paths
 from tools.common.progress import waiting
 
-from . import fw_tune, identify, spreadsheet
+from . import board, fw_tune, identify, spreadsheet
 
 if TYPE_CHECKING:
     from tools.common.board_file import BoardFile
@@ -35,38 +35,33 @@ def _parser() -> argparse.ArgumentParser:
     motors.add_argument("--quiet", action="store_true", help="no progress bar")
     motors.set_defaults(command=_motors)
     for command in (tune, motors):
-        command.add_argument("--board", default="mclv", help="a name in tuning/boards or a path; default mclv")
-    for module in (fw_tune, spreadsheet, identify):
+        command.add_argument("--board", help="a name in tuning/boards or a path; default: the one in the motor file, else mclv")
+    for module in (fw_tune, spreadsheet, identify, board):
         module.add_command(commands)
     return parser
 
 
-def _board(options: argparse.Namespace) -> "BoardFile":
+def _board(options: argparse.Namespace) -> "BoardFile | None":
+    """The board that was asked for; None: each motor's own."""
     from tools.common import board_file
-    return board_file.load(options.board, "--board")
+    return board_file.load(options.board, "--board") if options.board else None
 
 
-def _design(motor: str, board: "BoardFile") -> "Design":
-    from tools.common import motor_file
+def _design(motor: str, board: "BoardFile | None") -> "Design":
+    from tools.common import board_file, motor_file
 
     from .design import design
-    return design(motor_file.load(motor, "command line"), board)
+    loaded = motor_file.load(motor, "command line")
+    return design(loaded, board or board_file.load(*board_file.named(loaded)))
 
 
 def _tune(options: argparse.Namespace) -> int:
     names = command_line.one_or_all(options, paths.names(paths.MOTORS))
-    return _tune_each(names, _board(options), options.out, options.brief)[1]
+    board = _board(options)
+    return command_line.each(names, lambda name: _tune_one(name, board, options.out, options.brief))[1]
 
 
-def _tune_each(names: list[str], board: "BoardFile", out: Path | None, brief: bool) -> tuple[list[str], int]:
-    """The motors that have got a header, and the exit code: one that is made for another board does not stop the rest."""
-    def tune(name: str) -> str:
-        _tune_one(name, board, out, brief)
-        return name
-    return command_line.each(names, tune)
-
-
-def _tune_one(name: str, board: "BoardFile", out: Path | None, brief: bool) -> None:
+def _tune_one(name: str, board: "BoardFile | None", out: Path | None, brief: bool) -> None:
     with waiting(f"tuning {Path(name).stem}"):
         from . import report
         design = _design(name, board)
@@ -79,8 +74,12 @@ def _tune_one(name: str, board: "BoardFile", out: Path | None, brief: bool) -> N
 
 
 def _motors(options: argparse.Namespace) -> int:
+    """A motor that its board cannot turn does not stop the rest: the table has a row with the reason."""
     from tools.bench import rating_sweep
-    tuned, code = _tune_each(paths.names(paths.MOTORS), _board(options), None, True)
-    if not tuned:
-        return code
-    return max(code, rating_sweep.command(argparse.Namespace(**vars(options) | {"motor": tuned, "userparams": None})))
+    board, refused = _board(options), {}
+
+    def tune(name: str) -> str:
+        _tune_one(name, board, None, True)
+        return name
+    tuned, _ = command_line.each(paths.names(paths.MOTORS), tune, lambda name, error: refused.update({name: str(error)}))
+    return rating_sweep.command(argparse.Namespace(**vars(options) | {"motor": tuned, "refused": refused, "userparams": None}))

@@ -54,7 +54,7 @@ def add_command(commands: Any) -> None:
     """Adds `tune-fw` to a command line's commands."""
     parser = commands.add_parser("tune-fw", help="field-weakening tables of a motor, found on the virtual board")
     parser.add_argument("motor", help="a name in tuning/motors, or a motor file")
-    parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
+    parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--tables", type=Path, help="where the tables go; default tuning/tables/MOTOR.toml")
     parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/MOTOR")
     parser.add_argument("--torque-share", type=float, default=TORQUE_SHARE, metavar="X",
@@ -71,7 +71,8 @@ def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     _check(options)
     started = time.perf_counter()
-    motor, board = motor_file.load(options.motor, "tune-fw"), board_file.load(options.board, "--board")
+    motor = motor_file.load(options.motor, "tune-fw")
+    board = board_file.load(*board_file.named(motor, options.board))
     header, risks = _header(motor, board)
     target = options.out or RESULTS / motor.name
     path = options.tables or fw_tables.path_of(motor.name)

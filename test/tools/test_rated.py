@@ -6,7 +6,7 @@ import re
 from types import SimpleNamespace
 
 import pytest
-from support import command, refusal, refused, run, step
+from support import MOTORS, command, refusal, refused, run, step
 
 from tools.bench import plots, rating_sweep, sweep
 from tools.bench.rating_sweep import Candidate, Table
@@ -31,7 +31,7 @@ def row(**more):
 def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_torque_of_the_rating_and_the_header_s_maximum():
     assert (TABLE.speeds_percent, TABLE.torque_percent, TABLE.error_percent) == ([20.0, 50.0, 100.0], 50.0, 0.5)
     motor = motor_file.load(HURST)
-    rows = rating_sweep.rows_of(TABLE, Candidate(motor, None, "", SimpleNamespace(params=PARAMS)))
+    rows = rating_sweep.rows_of(TABLE, Candidate(motor, None, None, "", SimpleNamespace(params=PARAMS)))
     half, rated_rpm = 0.5 * motor.rated_torque_nm, pytest.approx(motor.rated_speed_rpm)
     assert [(item.name, item.torque_nm) for item in rows] == [("20 %", half), ("50 %", half), ("100 %", half), ("maximum", 0.0)]
     assert [rows[0].rpm / 0.2, rows[1].rpm / 0.5, rows[2].rpm, rows[3].rpm] == [rated_rpm, rated_rpm, rated_rpm, 5500.0]
@@ -105,7 +105,7 @@ def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_pa
     ready = []
 
     def build(found, options):
-        ready.extend(motor.name for motor, _ in found)
+        ready.extend(motor.name for motor, *_ in found)
         raise UserError("that is enough")
     monkeypatch.setattr(paths, "TUNED", tmp_path)
     monkeypatch.setattr(rating_sweep, "_candidates", build)
@@ -119,7 +119,7 @@ def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_pa
 
 
 @pytest.mark.parametrize("arguments, parts", [
-    (["hurst"], ["no motor 'hurst'", "--motor"]), ([HURST, HURST, "--userparams", "."], ["one header for several motors"]),
+    (["no_such"], ["no motor 'no_such'", "--motor"]), ([HURST, HURST, "--userparams", "."], ["one header for several motors"]),
     ([HURST, "--userparams", "no/where"], ["no userparams.h in 'no/where'"])])
 def test_wrong_motors_and_headers_are_refused(tmp_path, arguments, parts):
     refused(command("rated", "--motor", *arguments, "--out", str(tmp_path / "out")), *parts)
@@ -127,11 +127,12 @@ def test_wrong_motors_and_headers_are_refused(tmp_path, arguments, parts):
 
 
 def test_the_list_of_motors_has_a_line_for_each_and_names_a_file_that_cannot_be_read(tmp_path, monkeypatch):
-    code, out, _ = command("motors")
-    assert (code, [name for name in paths.names(paths.MOTORS) if f"\n{name} " not in f"\n{out}"]) == (0, [])
-    (tmp_path / f"{HURST}.toml").write_bytes((paths.MOTORS / f"{HURST}.toml").read_bytes())
-    (tmp_path / "broken.toml").write_text("x = = 1", encoding="utf-8")
+    for name in MOTORS:
+        (tmp_path / f"{name}.toml").write_bytes((paths.MOTORS / f"{name}.toml").read_bytes())
     monkeypatch.setattr(paths, "MOTORS", tmp_path)
+    code, out, _ = command("motors")
+    assert (code, [name for name in MOTORS if f"\n{name} " not in f"\n{out}"]) == (0, [])
+    (tmp_path / "broken.toml").write_text("x = = 1", encoding="utf-8")
     code, out, error = command("motors")
     assert code == 2 and f"\n{HURST} " in out and re.fullmatch(r"foc33: TOML syntax, .*broken\.toml line 1.*\n", error)
 

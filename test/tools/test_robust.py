@@ -212,7 +212,7 @@ def test_the_promised_deviations_in_full(tmp_path):
 
 
 @pytest.mark.parametrize("arguments, part", [
-    (["--motor", "hurst"], "no motor 'hurst'"), (["--userparams", "no/where"], "no userparams.h in 'no/where'"),
+    (["--motor", "no_such"], "no motor 'no_such'"), (["--userparams", "no/where"], "no userparams.h in 'no/where'"),
     (["--library", str(LIBRARY), "--userparams", "."], "leave out --library or --userparams")])
 def test_a_mistake_is_one_line(tmp_path, arguments, part):
     refused(command("robust", *arguments, "--out", str(tmp_path / "out")), part)

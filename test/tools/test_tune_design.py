@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 from pytest import approx
-from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, motors, of
+from support import MOTORS
+from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, of
 
 from tools.common import board_file, motor_file
 from tools.common.errors import UserError
@@ -139,7 +140,7 @@ def test_a_choice_in_tune_replaces_the_tuner_s_and_what_follows_from_it():
     assert d.value("MOTOR_LS_MH") == approx(d.motor.lq_h * 1e3, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", motors())
+@pytest.mark.parametrize("name", MOTORS)
 def test_currents_keep_their_order(name):
     d = of(name)
     start_a, most, trip = (d.value(x) for x in ("Q_CURRENT_REF_OPENLOOP", "MAXIMUM_CURRENT_A", "OVER_CURRENT_THRESHOLD_A"))

@@ -50,10 +50,6 @@ FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value =
 command = functools.partial(support.command, main=cli.main)
 
 
-def motors() -> list[str]:
-    return paths.names(paths.MOTORS)
-
-
 @contextlib.contextmanager
 def motor_path(*changes: tuple[str, str], more: str = "") -> Iterator[Path]:
     """A motor file: MOTOR with texts replaced, and more lines at its end."""

@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
         if command is not rating:
             command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
             command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
-        command.add_argument("--board", help="board file instead of the scenario's: a name in tuning/boards or a path")
+        command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
         command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
         command.add_argument("--quiet", action="store_true", help="no progress bar")
 

@@ -111,10 +111,16 @@ def changes(texts: list[str]) -> board_keys.Values:
 
 
 def parts_of(item: Any, options: argparse.Namespace) -> tuple[board_keys.Part, board_keys.Part]:
-    """Motor and board: from the command line, else from the scenario or table."""
+    """Motor and board: from the command line, else from the scenario or table. A motor of the command line brings its file's board."""
     motor = motor_file.part(options.motor, "--motor") if options.motor else motor_file.part(item.motor, item.motor_where)
-    board = board_file.part(options.board, "--board") if options.board else board_file.part(item.board, item.board_where)
-    return motor, board
+    return motor, board_of(motor, item, options.board, bool(options.motor))
+
+
+def board_of(motor: Any, item: Any, chosen: str | None, motors_first: bool) -> board_keys.Part:
+    """The chosen board, else the one of the scenario or table, else the one that the motor file names; `motors_first` swaps these two."""
+    if chosen or motors_first and motor.board:
+        return board_file.part(*board_file.named(motor, chosen))
+    return board_file.part(*board_file.named(motor, item.board, item.board_where))
 
 
 def verdict(name: str, outcomes: list[Outcome]) -> int:

@@ -12,7 +12,7 @@ from .metrics import SPEEDS, Measure
 from .panel import HOLD_S
 from .scenario import Event, Scenario
 
-MOTOR, BOARD = "hurst_dmb0224c10002", "mclv"
+MOTOR = "hurst_dmb0224c10002"
 EVENT_KINDS = ("start_rpm", "press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
 
 
@@ -25,7 +25,7 @@ def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
     scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor", MOTOR),
-                        root.text("board", BOARD), root.number("duration_s", minimum=0.01, maximum=120.0))
+                        root.text("board", ""), root.number("duration_s", minimum=0.01, maximum=120.0))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))

@@ -18,14 +18,18 @@ class Parser(argparse.ArgumentParser):
         raise UserError(message, "command line", f"see {self.prog} --help")
 
 
-def each(items: Iterable[Item], work: Callable[[Item], Made]) -> tuple[list[Made], int]:
+def _tell(_: object, error: UserError) -> None:
+    print(f"foc33: {error}", file=sys.stderr, flush=True)
+
+
+def each(items: Iterable[Item], work: Callable[[Item], Made], refuse: Callable[[Item, UserError], None] = _tell) -> tuple[list[Made], int]:
     """What `work` makes of every item, and the exit code: an item that is refused gets its line and code 2, the others go on."""
     made, code = [], 0
     for item in items:
         try:
             made.append(work(item))
         except UserError as error:
-            print(f"foc33: {error}", file=sys.stderr, flush=True)
+            refuse(item, error)
             code = 2
     return made, code
 

@@ -15,7 +15,7 @@ TUNED = ROOT / "build" / "tune"
 
 def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
     """The TOML file for a plain name (folder/NAME.toml) or a path."""
-    by_path = "/" in name or name.endswith(".toml")
+    by_path = is_path(name)
     path = Path(name) if by_path else folder / f"{name}.toml"
     try:
         found = path.is_file()
@@ -26,6 +26,11 @@ def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
     if not found:
         raise UserError(f"no {kind} '{name}'", where or str(shown(folder)), suggestion(name, names(folder)))
     return path
+
+
+def is_path(name: str) -> bool:
+    """Whether a name on the command line or in a file is that of a file, not one of a folder's stems."""
+    return "/" in name or name.endswith(".toml")
 
 
 def names(folder: Path) -> list[str]:

@@ -20,7 +20,7 @@ EXAMPLES = {"motor": [paths.ROOT / "examples/my_motor.toml", paths.MOTORS / "hur
             "scenario": [paths.ROOT / "examples/my_scenario.toml", *sorted(paths.SCENARIOS.glob("*.toml"))]}
 """Files that use every key at least once."""
 LOADERS: dict[str, Callable[[str], Any]] = {"motor": motor_file.load, "board": board_file.load, "scenario": scenario_file.load}
-FREE = ("plant", "tune")
+FREE = ("plant", "tune", "pins")
 """Tables whose keys are listed elsewhere."""
 UNITS = {"_s": "s", "_rpm": "rpm", "_deg": "deg", "_percent": "%", "_a": "A"}
 PAIR = "pair of values"
@@ -28,6 +28,7 @@ PAIR = "pair of values"
 MEANINGS: dict[str, dict[str, str]] = {
     "motor": {
         "title": "one line for tables and reports", "connection": "`Y` (star) or `delta`; counts only for values per `winding`",
+        "board": "the board that turns it: a name in tuning/boards or a path; `BOARD=` overrides it",
         "electrical.pole_pairs": "pole pairs: half the number of poles",
         "electrical.resistance": "winding; `at_degc` is the temperature of the value",
         "electrical.inductance": "of a motor whose d and q axes do not differ; `frequency_hz` of the LCR meter",
@@ -105,7 +106,7 @@ MEANINGS: dict[str, dict[str, str]] = {
         "expect variable.name": "its name, as a debugger knows it", "expect variable.count": "16-bit elements",
         "expect variable.statistic": "what of them", "*.min": "at least; min, max or both", "*.max": "at most", "*.from_s": "begin",
         "*.to_s": "end"}}
-DEFAULTS = {"electrical.resistance_tempco": f"{100.0 * motor_file.COPPER_PER_K:g} %/K",
+DEFAULTS = {"board": "`mclv`", "electrical.resistance_tempco": f"{100.0 * motor_file.COPPER_PER_K:g} %/K",
             "electrical.kphi_tempco": f"{100.0 * motor_file.FERRITE_PER_K:g} %/K",
             "mechanical.viscous_friction": "0", "mechanical.coulomb_friction": "0", "rating.maximum_current": "1.5 times current",
             "load.inertia": "0", "load.start_torque": "a quarter of the rated torque",

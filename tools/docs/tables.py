@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, keys of files, the simulator's assumptions.
+"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, the simulator's assumptions.
 
     python3 -m tools.docs.tables                  writes the pages
     python3 -m tools.docs.tables --print faults   prints one page instead
@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 
 from tools.common import drive_tables
+from tools.common import pins as chip_pins
 from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.paths import ROOT
@@ -54,7 +55,12 @@ def files() -> str:
     return file_keys.page(table)
 
 
-PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "limits": limits, "parameters": params, "simulator": simulator}
+def pins() -> str:
+    return table("pin, port, analogue, remappable, also, on the MCLV, known from", "rllllll", chip_pins.page())
+
+
+PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "limits": limits, "parameters": params,
+                                         "pins": pins, "simulator": simulator}
 
 
 def page(name: str) -> str:
