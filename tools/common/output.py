@@ -1,6 +1,8 @@
 """Result folders: written under a temporary name and moved into place when complete, so that nothing half-done looks finished."""
 
 import atexit
+import ctypes
+import errno
 import json
 import os
 import shutil
@@ -11,6 +13,8 @@ from .errors import UserError
 from .trace import Trace
 
 SUMMARY = "summary.json"
+AT_FDCWD, RENAME_EXCHANGE = -100, 2 # of Linux's renameat2, which Python does not have
+_renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
 
 
 class ResultFolder:
@@ -51,11 +55,25 @@ class ResultFolder:
             raise _unwritable(self.target, failure, "choose a folder that can be written") from None
 
     def _move(self) -> None:
+        """Who looks finds a complete result, the older or the new one; of two runs that end at once the later one's stays."""
         old = self.work.with_name(self.work.name + "-old")
-        if self.target.exists():
-            self.target.rename(old)
-        self.work.rename(self.target)
+        while not _exchanged(self.work, self.target):
+            try:
+                if self.target.exists(): # and the file system cannot exchange
+                    shutil.rmtree(old, ignore_errors=True)
+                    self.target.rename(old)
+                self.work.rename(self.target)
+                break
+            except OSError as error:
+                if error.errno not in (errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST) or not self.work.exists():
+                    raise # else another run has just moved its result there, or away
+        shutil.rmtree(self.work, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Whether two folders could change places in one step."""
+    return bool(_renameat2) and _renameat2(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other), RENAME_EXCHANGE) == 0
 
 
 def _replaceable(folder: Path) -> bool:
