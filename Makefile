@@ -1,7 +1,7 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
-# Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
-# ONLY (names of test suites), PYTHON RUBY CC (tools to use), V=1 (show the commands).
+# Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), DEFINES USERPARAMS (which firmware), VARIANT SAN (a build in
+# a folder of its own), ONLY (names of test suites), PYTHON RUBY CC (tools to use), V=1 (show the commands).
 
 RUBY ?= ruby
 ifeq ($(origin CC),default)
@@ -354,8 +354,7 @@ sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCEN
 	@library=$$($(front_end) prepare $(scenario) $(what) --sanitized) || exit; \
 	LD_PRELOAD="$$($(CC) -print-file-name=libasan.so) $$($(CC) -print-file-name=libubsan.so)" \
 	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-	    $(front_end) run $(scenario) --library "$$library" --no-plots \
-	    --out $(call quoted,$(or $(OUT),build/run/sanitize))
+	    $(front_end) run $(scenario) --library "$$library" --no-plots $(out)
 
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
 	@rm -rf build/host* build/test* build/target* build/size build/golden build/run

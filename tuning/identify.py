@@ -133,7 +133,7 @@ def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, c
     board = board_file.load(board_name, "--board")
     known = [Known.of(motor, board, current_a, speed_rpm) for motor in motors]
     headers = [header(item, board) for item in known]
-    libraries = [built(HEADERS / motor.name, text, [MODE]) for motor, text in zip(motors, headers)]
+    libraries = [built(HEADERS / paths.name_of(motor.path, paths.MOTORS), text, [MODE]) for motor, text in zip(motors, headers)]
     keys = workers.run_all(libraries[:1], _keys, lambda seconds: None)[0]
     values = [_plant(motor, board, changes, keys) for motor in motors]
     jobs = [Job(library, value) for library, value in zip(libraries, values)]
@@ -162,12 +162,12 @@ def add_command(commands: Any) -> None:
     parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
-    parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
+    parser.add_argument("--board", help="a name in tuning/boards, or a board file; default mclv")
     parser.add_argument("--current", type=float, metavar="A", help="Q_CURRENT_REF_OPENLOOP; default: from the rating")
     parser.add_argument("--speed", type=float, metavar="RPM", help="END_SPEED_RPM; default: 40 %% of the rating")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
                         help="change a key of the virtual board, e.g. load.locked=1; may be repeated")
-    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/MOTOR")
+    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/NAME")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(command=command)
 
@@ -179,9 +179,11 @@ def command(options: argparse.Namespace) -> int:
     motors, code = command_line.each(names, lambda name: motor_file.load(name, "command line"))
     if not motors:
         return code
-    found = identify(motors, options.board, command_common.changes(options.changes), options.current, options.speed, options.quiet)
+    board = options.board and paths.find("board", options.board, paths.BOARDS, "--board")
+    with output.in_turn("identify"):
+        found = identify(motors, options.board or "mclv", command_common.changes(options.changes), options.current, options.speed, options.quiet)
     for item in found:
-        target = options.out or RESULTS / item.motor.name
+        target = options.out or RESULTS / paths.pair_name(item.motor.path, board)
         _write(item, target)
         print(item.text() if not options.all else _brief(item))
         if not options.all:

@@ -100,9 +100,10 @@ def results(name: str, own: str, options: argparse.Namespace, defines: Sequence[
     if options.out is not None:
         return options.out
     motor, board = options.motor and paths.find("motor", options.motor, paths.MOTORS, "--motor"), board_asked_for(options)
-    header = None if options.userparams is None else build.header_folder(options.userparams)
+    header, library = options.userparams and build.header_folder(options.userparams), getattr(options, "library", None)
+    firmware = library.parent.name.removeprefix("host").strip("-") if library else build.variant_name(list(defines), header)
     parts = [name, paths.name_of(motor, paths.MOTORS) if motor and motor.resolve() != paths.find("motor", own, paths.MOTORS).resolve() else "",
-             paths.name_of(board, paths.BOARDS) if board else "", build.variant_name(list(defines), header)]
+             paths.name_of(board, paths.BOARDS) if board else "", firmware]
     return paths.RESULTS / "-".join(part for part in parts if part)
 
 

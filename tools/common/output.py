@@ -1,15 +1,19 @@
 """Result folders: written under a temporary name and moved into place when complete, so that nothing half-done looks finished."""
 
 import atexit
+import contextlib
 import ctypes
 import errno
+import fcntl
 import json
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from .errors import UserError
+from .paths import ROOT
 from .trace import Trace
 
 SUMMARY = "summary.json"
@@ -69,6 +73,24 @@ class ResultFolder:
                     raise # else another run has just moved its result there, or away
         shutil.rmtree(self.work, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def in_turn(name: str) -> Iterator[None]:
+    """Waits for another program of this tree that does the same."""
+    path = ROOT / "build" / f"{name}.lock"
+    try:
+        path.parent.mkdir(exist_ok=True)
+        lock = path.open("w", encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"cannot write '{path}' ({error.strerror})", "", "make build/ writable") from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print(f"waiting for another {name}", flush=True)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def _exchanged(one: Path, other: Path) -> bool:
