@@ -68,6 +68,10 @@ endef
 known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) $(filter-out %=1,$(filter $(modes:%=-D%=%),$(DEFINES))) \
     $(filter-out $(modes:%=-D%) -U%,$(foreach word,$(DEFINES),$(if $(findstring =,$(word)),,$(word))))), \
     echo foc33: $(call quoted,no mode $(word)$(comma) DEFINES=$(DEFINES)): 'use $(modes:%=-D%) or -DNAME=value' >&2; exit 2)
+# The header would win over a parameter's -D.
+no_parameters = @for word in $(foreach word,$(filter -D%,$(DEFINES)),$(call quoted,$(patsubst -D%,%,$(word)))); do name="$${word%%=*}"; \
+    test "$$name" = "$$word" || ! grep -q "^ *\# *define  *$$name[ (]" $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
+    echo "foc33: $$name is a parameter," $(call quoted,DEFINES=$(DEFINES)): set it in userparams.h >&2; exit 2; }; done
 
 # Both libraries of a build's folder.
 libraries = $(addprefix $1/,libfirmware.a libvboard.so)
@@ -187,6 +191,7 @@ endif
 $B/flags: FORCE $(if $(USERPARAMS),$B/header/userparams.h)
 	$(need_header)
 	$(call known_defines)
+	$(no_parameters)
 	$(call remember,$(compile))
 
 $B/contents: FORCE

@@ -135,7 +135,7 @@ def test_make_motors_runs_those_that_got_a_header(several, out, result, refuses,
     with mock.patch.object(rating_sweep, "command", return_value=result) as runs:
         code, _, error = command("motors", "--out", str(out), "--quiet")
     (options,) = runs.call_args.args
-    assert (code, options.motor, options.out, options.board) == (expected, ["a_first", "c_last"], out, "mclv")
+    assert (code, options.motor, options.out, options.board) == (expected, ["a_first", "c_last"], out, None)
     assert error.count("\n") == refuses
 
 

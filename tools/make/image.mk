@@ -43,6 +43,7 @@ find-xc16:
 .PHONY: target-input
 target-input: find-xc16
 	$(call known_defines)
+	$(no_parameters)
 	@case $(call quoted,$(OPT)) in -O[123]) ;; *) \
 	    echo foc33: no such level, $(call quoted,OPT=$(OPT)): use -O1, -O2 or -O3 >&2; exit 2;; esac
 	@test -z $(call quoted,$(DFP)) || test -f $(call quoted,$(DFP)/xc16/bin/c30_device.info) || { \
