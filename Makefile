@@ -224,7 +224,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,spreadsheet tune_% fw_tune identify robust loadsteps image_build examples make_%),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
@@ -300,7 +300,7 @@ $T/%_runner.c: test/%.c test/unit/support/cmock.yml | $(gem_stamp)
 	@mkdir -p $(@D)
 	$(quiet)$(RUBY) $(unity)/auto/generate_test_runner.rb test/unit/support/cmock.yml $< $@ >$@.log 2>&1 || { head -n 1 $@.log >&2; exit 1; }
 
-$T/%_runner.o: $T/%_runner.c $T/flags
+$T/%_runner.o: $T/%_runner.c $T/flags | $(golden_stamp)
 	$(quiet)$(test_compile) -w -Itest/$(*D) $(call own_defines,test/$*.c) -MMD -MP -c $< -o $@
 
 $T/unity.o: $T/flags | $(gem_stamp)

@@ -99,7 +99,12 @@ def _exchanged(one: Path, other: Path) -> bool:
 
 
 def _replaceable(folder: Path) -> bool:
-    return folder.is_dir() and (not any(folder.iterdir()) or (folder / SUMMARY).is_file())
+    try:
+        return (folder / SUMMARY).is_file() or not any(folder.iterdir())
+    except FileNotFoundError: # another run is just replacing it
+        return True
+    except NotADirectoryError:
+        return False
 
 
 def _unwritable(place: Path, error: OSError, remedy: str) -> UserError:
