@@ -47,9 +47,12 @@ quoted = '$(subst ','\'',$1)'
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@
 
-# Whoever compiles holds build/lock, so that two makes in this tree take turns; what such a make starts holds it, too.
-lock = $(if $(FOC33_LOCK),,mkdir -p build; exec 9>build/lock; flock -n 9 || { echo "waiting for another make"; flock 9; }; export FOC33_LOCK=1;)
+# Whoever compiles holds build/lock or its variant's, so that two makes in this tree take turns; what such a make starts holds it, too.
+lock_file = $(if $(FOC33_LOCK),,mkdir -p build; exec 9>$1; flock -n 9 || { echo "waiting for another make"; flock 9; }; export FOC33_LOCK=1;)
+lock = $(call lock_file,build/lock$(suffix))
 build = +@$(lock) $(MAKE) $1
+# What the variants share is made before: under one lock for all.
+shared = ($(call lock_file,build/lock) $(MAKE) -s VARIANT= SAN= $(golden_stamp) build/iss/libiss33f.a) &&
 # The rest of the line runs alone among all makes of this tree with the same target.
 in_turn = mkdir -p build; flock build/$@.lock
 
@@ -238,7 +241,7 @@ mode_stamps := $(addprefix $T/made/modes/,default $(modes))
 stamps = $(addprefix $T/made/,$1) $(if $(filter static/test_modes,$1),$(mode_stamps))
 run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unknown_suites,$1)'$(comma) make $@: make test runs them all and shows their names" >&2; \
     exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
-    rm -rf $T/made $(if $2,$T/summary.json); ($(lock) $(MAKE) -k $(call stamps,$(call chosen,$1))) || true; \
+    rm -rf $T/made $(if $2,$T/summary.json); ($(if $(suffix),$(shared)) $(lock) $(MAKE) -k $(call stamps,$(call chosen,$1))) || true; \
     PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
     --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 

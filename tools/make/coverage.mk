@@ -6,7 +6,7 @@ coverage_flags = -std=gnu99 -O0 -g -fkeep-inline-functions -Dalways_inline=unuse
 .PHONY: coverage
 coverage: setup-test ## [tests] the control law by the unit tests: 100 % of lines and branches required [build/coverage/index.html]
 	@test/static/need.sh gcovr=gcovr
-	+@$(lock) rm -rf build/coverage build/host-coverage build/test-coverage; mkdir -p build/coverage; \
+	+@$(shared) $(call lock_file,build/lock-coverage) rm -rf build/coverage build/host-coverage build/test-coverage; mkdir -p build/coverage; \
 	$(MAKE) -s VARIANT=coverage SAN= warnings=-w CC=$(call quoted,$(CC) --coverage) CFLAGS=$(call quoted,$(coverage_flags)) \
 	    $(unit_c:%=build/test-coverage/%) || exit; \
 	for test in $(unit_c); do build/test-coverage/$$test >build/coverage/output.txt 2>&1 || { \

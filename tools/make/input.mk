@@ -9,7 +9,7 @@ typed := $(foreach name,$(.VARIABLES),$(if $(filter command,$(call given,$(name)
 $(if $(typed),$(call good,awk -v typed='$(typed)' -v goals=$(call quoted,$(goals)) -f tools/make/input.awk Makefile $(part_makefiles)))
 
 # A tool that was asked for; the usual ones are installed.
-$(foreach tool,CC RUBY,$(if $(call given,$(tool)),$(call good,set -- $($(tool)); command -v "$$1" >/dev/null || \
+$(foreach tool,CC RUBY,$(if $(filter-out gcc ruby,$(firstword $($(tool)))),$(call good,set -- $($(tool)); command -v "$$1" >/dev/null || \
     { printf 'foc33: no command %s$(comma) %s: name one that is there\n' "$$1" $(call quoted,$(tool)=$($(tool))); exit 1; })))
 
 # build/ and the folders in it, which may be from another user's make.
