@@ -59,9 +59,9 @@
 #define REGEN_LIMIT_V 27.0          /* [V]             11 .. 90       braking current is reduced from here, to nothing 2 V higher */
 
 /* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
-#define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 62 over the parameter set */
-#define SPEED_BANDWIDTH_HZ 13       /* [Hz]            0.2 .. 60      speed loop: phase margin 52 degrees, 51 over the parameter set */
-#define LOAD_BANDWIDTH_HZ 110       /* [Hz]            1 .. 200       load observer after a load step; slower under a steady load, slowest without one: phase margin 17 degrees after a load step, 42 under load */
+#define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 61 over the parameter set */
+#define SPEED_BANDWIDTH_HZ 12.6     /* [Hz]            0.2 .. 60      speed loop: phase margin 52 degrees, 51 over the parameter set */
+#define LOAD_BANDWIDTH_HZ 107       /* [Hz]            1 .. 200       load observer after a load step; slower under a steady load, slowest without one: phase margin 18 degrees after a load step, 42 under load */
 
 /* ---- Filters, Equation 7: K in Q15 per period --------------------------------------------------------------------- */
 #define KFILTER_ESDQ 2000           /* [Q15]           10 .. 8000     back-EMF up to FW_START_SPEED_RPM: 200 Hz */
@@ -179,8 +179,8 @@
  *   pi_q.kp                            12.064 V/A              8172  Q15 / 16                    -0.003 %  proportional gain
  *   pi_q.ki                             16776 V/(A s)           568  Q11 a period                -0.040 %  integral gain
  *   pi_q.kc                             0.999 1               32734  Q15                         -0.004 %  anti-windup
- *   speed_kp_q13                   0.00078573 A/rpm            2397  Q15 / 16                    +0.008 %  proportional gain
- *   speed_kp_quick_q13              0.0014143 A/rpm            4314  Q15 / 16                    -0.005 %  after a large innovation
+ *   speed_kp_q13                   0.00076155 A/rpm            2323  Q15 / 16                    -0.002 %  proportional gain
+ *   speed_kp_quick_q13              0.0013708 A/rpm            4181  Q15 / 16                    -0.012 %  after a large innovation
  *
  * load observer, adaptation and low speed
  *   observer.deltat_q32                 5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
@@ -190,10 +190,10 @@
  *   observer.per_unit_q15          9.6195e-06 A s/rpm         36679  Q15 Q13 A/unit              -0.000 %  J/Kt
  *   observer.innovation_max_erpm       3276.6 rpm             16383  erpm                           exact  innovation counts up to here
  *   observer.load_max                    2.75 A                4574  units                          exact  largest load
- *   observer.quiet_q16                  15.86 Hz               2612  Q16 a step                  -0.011 %  rate without load
- *   observer.loaded_q16                    33 Hz               5435  Q16 a step                  -0.008 %  rate under load
- *   observer.quick_q16                    110 Hz              18118  Q16 a step                  -0.001 %  rate after a large innovation
- *   observer.full_erpm                 488.89 rpm              2444  erpm                        -0.018 %  speed reference from which rates and gain are these
+ *   observer.quiet_q16                 15.372 Hz               2531  Q16 a step                  -0.036 %  rate without load
+ *   observer.loaded_q16                  32.1 Hz               5287  Q16 a step                  -0.004 %  rate under load
+ *   observer.quick_q16                    107 Hz              17623  Q16 a step                  -0.005 %  rate after a large innovation
+ *   observer.full_erpm                 475.56 rpm              2377  erpm                        -0.033 %  speed reference from which rates and gain are these
  *   observer.load_from                    0.1 A                 166  units                       -0.198 %  load that begins to count
  *   observer.load_width                   0.1 A                 166  units                       -0.198 %  over what more it counts
  *   observer.load_slope_q15                10 1/A               197  Q15 a unit                  -0.000 %  one over it

@@ -40,10 +40,10 @@
  * SAMPLE_WINDOW_SEC + 1.5 us - dead time, and stay on for SAMPLE_WINDOW_SEC - 1.5 us, at the highest duty. */
 #define BOARD_P1SECMP ((uint16_t)(0x8000u | (BOARD_P1TPER - SAMPLE_DELAY_CLOCKS)))
 
-/* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 75 ns = 3.6 us ---- */
+/* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 100 ns = 4.8 us ---- */
 #define BOARD_AD1CON1 0x036Cu               /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */
 #define BOARD_AD1CON2 0x0200u               /* CHPS 2: CH0..CH3 */
-#define BOARD_AD1CON3 0x0002u               /* TAD = 3 Tcy = 75 ns, as published; the data sheet may ask for 76 [?]: 3u costs 1.2 us */
+#define BOARD_AD1CON3 0x0003u               /* TAD = 4 Tcy = 100 ns; the converter needs 76 ns */
 #define BOARD_AD1CHS0 0x0008u               /* CH0: AN8, potentiometer (RC2) */
 #define BOARD_AD1CHS123 0x0000u             /* CH1: AN0 I_A (RA0), CH2: AN1 I_B (RA1), CH3: AN2 bus (RB0) */
 #define BOARD_AD1PCFGL ((uint16_t)~0x0107u) /* analogue: AN0, AN1, AN2, AN8 */

@@ -7,13 +7,16 @@
  *
  * i_load goes to the controller as it is, so the loop is stiff without waiting for an integral. The rate follows what is known: slow
  * without load, where dead time disturbs the back-EMF most; quicker under load; quickest for a while after a large innovation
- * w^ - w; and all in proportion to the speed at low speed, for the estimator's own lock is as quick as the rotor turns. */
+ * w^ - w; and all in proportion to the speed at low speed, for the estimator's own lock is as quick as the rotor turns. What counts as
+ * large grows while large ones go on: a step of the load stands out from the calm before it, the loop's own swing does not. */
 #ifndef CONTROL_OBSERVER_H
 #define CONTROL_OBSERVER_H
 
 #include "control/qmath.h"
 
 #define OBSERVER_UNREST_STEPS 1000 /**< a load step is over in a tenth of a second; what goes on longer is the loop's own */
+#define OBSERVER_UNREST_SHIFT 8    /**< after 256 / 4 steps that were not calm, a large innovation is twice as large */
+#define OBSERVER_START_UNREST 768  /**< at the hand-over it is four times as large: d current and wrong constants shake the estimate */
 #define OBSERVER_CALM_SHIFT 5      /**< after a large innovation the quick rate fades by 1/32 a step */
 
 /** Constants. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a
@@ -93,7 +96,14 @@ QM_INLINE void observer_preset(observer_t *o, const observer_params_t *p, uint32
     o->omega_q16 = (int32_t)speed_erpm * 65536;
     o->load_q16 = (int32_t)qm_mulhi_su(iq_q13, p->per_current_q16) * 65536;
     o->quick_q15 = 0;
-    o->unrest_steps = 0;
+    o->unrest_steps = OBSERVER_START_UNREST;
+}
+
+/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 */
+QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
+{
+    int32_t large = calm_erpm + (qm_mulsu(calm_erpm, unrest_steps) >> OBSERVER_UNREST_SHIFT);
+    return (int16_t)((large > 32767) ? 32767 : large);
 }
 
 /** The rate for the next step. @param ref_erpm speed reference, any */
@@ -111,7 +121,7 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
     o->share_q15 = observer_between(o->share_q15, (int16_t)(o->share_q15 < 16384 ? 2 * o->share_q15 : 32767), loaded);
     rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
     o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
-    o->large_erpm = (int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5));
+    o->large_erpm = observer_large((int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5)), o->unrest_steps);
 }
 
 /** By how much the angle has turned further in a step than the speed says, as a speed.

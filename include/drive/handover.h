@@ -5,12 +5,12 @@
 #include "drive/modes/modes.h"
 #include "drive/state.h"
 
-/** At the end of the ramp, every eighth period: counts how long the estimator agrees with the forced speed, or gives up by name. */
+/** In RAMP, every eighth period: at its end counts how long the estimator agrees with the forced speed, or gives up by name. */
 QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
     int16_t miss;
-    if (!mode_hands_over() || (d->ticks & (SLOW_PHASES - 1u)) != 0u) {
+    if (!mode_hands_over() || d->forced.speed_q10 < p->forced.end_speed_q10) {
         return;
     }
     miss = qm_abs(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), p->end_erpm));

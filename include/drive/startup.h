@@ -35,16 +35,13 @@ QM_INLINE void startup_forced_step(drive_t *d, const drive_params_t *p)
         }
         d->angle = forced_angle(&d->forced);
     } else {
-        int16_t at_end = forced_angle_tick(&d->forced, &p->forced, d->direction);
+        (void)forced_angle_tick(&d->forced, &p->forced, d->direction);
         d->angle = forced_angle(&d->forced);
-        if (at_end) {
-            handover_wait(d, p);
-        }
     }
 }
 
 /** A period of ALIGN or RAMP, after the estimator. Letting go is harmless at these speeds. */
-NOINLINE void startup_step(drive_t *d, const drive_params_t *p)
+QM_INLINE void startup_step(drive_t *d, const drive_params_t *p)
 {
     startup_forced_step(d, p);
     if (!d->command.run) {

@@ -35,7 +35,7 @@ static void change_duty_in_third_call(void)
 
 void test_a_handler_acts_in_the_next_period_a_late_one_a_period_later(void)
 {
-    static const double isr_us[] = { 13.0, 30.0 }; /* trigger at 25 us, conversion 3.6 us */
+    static const double isr_us[] = { 13.0, 30.0 }; /* trigger at 25 us, conversion 4.8 us */
     for (unsigned late = 0; late < 2; late++) {
         fake_restart();
         fake_adc_hook = change_duty_in_third_call;
@@ -72,9 +72,9 @@ void test_the_handler_sees_the_counter_on_its_way_down(void)
     fake_adc_hook = note_counter;
     set("cpu.isr_us", 10.0);
     start(2);
-    /* trigger at 25.025 us, 48 TAD of 75 ns, 10 us: 38.625 us = 1545 counts up and down again */
+    /* trigger at 25.025 us, 48 TAD of 100 ns, 10 us: 39.825 us = 1593 counts up and down again */
     TEST_ASSERT_TRUE((seen_counter & 0x8000u) != 0);
-    TEST_ASSERT_UINT_WITHIN(1, 2000u - 1545u, seen_counter & 0x7FFFu);
+    TEST_ASSERT_UINT_WITHIN(1, 2000u - 1593u, seen_counter & 0x7FFFu);
 }
 
 void test_mean_terminal_voltage_follows_the_duties(void)

@@ -42,7 +42,7 @@ static const wrong_t rows[] = {
     { "conversions longer than the period", { { "AD1CON3", 63 } }, 100, { "AD1CON3" }, { { "calls", 50.0, 1.0 } } },
     { "all low sides on", { { "P1OVDCON", 0x0015 } }, 2, { NULL }, { { "pwm.outputs_on", 0x15, 0.0 }, { "pwm.outputs_seen", 0x15, 0.0 } } },
     { "special event postscaler", { { "PWM1CON2", 0x0100 } }, 100, { NULL }, { { "calls", 50.0, 0.0 } } },
-    { "conversion clock too fast", { { "AD1CON3", 0 } }, 2, { "AD1CON3" }, { { NULL, 0.0, 0.0 } } },
+    { "conversion clock too fast", { { "AD1CON3", 2 } }, 2, { "AD1CON3" }, { { NULL, 0.0, 0.0 } } },
 };
 
 void test_each_has_its_effect_and_is_named(void)

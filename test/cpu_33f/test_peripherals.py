@@ -425,15 +425,15 @@ def test_override_acts_at_once_and_within_a_period() -> None:
 
 # ---- ADC -----------------------------------------------------------------------------------------------------------------
 
-SETUP = START.replace("mov #0x8002, w0;", """mov #0x836C, w0; mov #0x0200, w1; mov #2, w2; mov #8, w3; mov w1, ad1con2; mov w2, ad1con3
+SETUP = START.replace("mov #0x8002, w0;", """mov #0x836C, w0; mov #0x0200, w1; mov #3, w2; mov #8, w3; mov w1, ad1con2; mov w2, ad1con3
     mov w3, ad1chs0; mov #0xFEF8, w3; mov w3, ad1pcfgl; mov w0, ad1con1
     mov #{trigger}, w0; mov w0, p1secmp; bclr ifs0, #13; mov #0x8002, w0;""")
 WAIT = f"wait: btss ifs0, #13; bra wait; mov tmr1, w0; mov w0, {RAM}; mov adc1buf0, w0; mov w0, {RAM + 2}\n" + STOP
 
 
 @pytest.mark.parametrize("trigger, isr_us, at, warning", [
-    (400, 13, 400 + 4 * 12 * 3, False), (0x8000 | 400, 13, 2000 - 400 + 144, False), (400, 13 + 20, 400 + 144 + 800, False),
-    (400, 13 + 60, 400 + 144 + 2400, True)], ids=["four conversions take 144 cycles", "counting down", "held up",
+    (400, 13, 400 + 4 * 12 * 4, False), (0x8000 | 400, 13, 2000 - 400 + 192, False), (400, 13 + 20, 400 + 192 + 800, False),
+    (400, 13 + 60, 400 + 192 + 2400, True)], ids=["four conversions take 192 cycles", "counting down", "held up",
                                                   "held up beyond a period"])
 def test_the_conversions_end(trigger: int, isr_us: float, at: int, warning: bool) -> None:
     chip = board(SETUP.format(trigger=trigger) + WAIT)

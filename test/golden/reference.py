@@ -702,6 +702,19 @@ class Observer:
     large: int = 0
     quick: int = 0
     part: int = 0
+    unrest: int = 0
+
+    @property
+    def calm(self):
+        return self.quick < 4096
+
+    def follow_unrest(self, innovation):
+        """Four more for a step that is not calm, one less for one that is; from 1000 on, a large innovation counts in the calm only."""
+        if not self.calm:
+            self.unrest += 4 if self.unrest < 4000 else 0
+        else:
+            self.unrest -= 1 if self.unrest else 0
+        return abs(innovation) > self.large and (self.unrest < 1000 or self.calm)
 
     @property
     def speed(self):
@@ -713,6 +726,7 @@ class Observer:
 
     def preset(self, rho, speed, iq):
         self.rho, self.omega, self.load, self.quick = rho, speed * WORD, share(iq, self.p["per_current_q16"]) * WORD, 0
+        self.unrest = 768
 
     def schedule(self, ref):
         p, speed = self.p, magnitude(ref)
@@ -721,7 +735,8 @@ class Observer:
         self.part = toward(slow, 2 * slow if slow < 16384 else 32767, loaded)
         rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
         self.rate = toward(rate, toward(0, p["quick_q16"], self.part), self.quick)
-        self.large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
+        large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
+        self.large = min(large + large * self.unrest // 256, 32767)
 
     def innovation(self, rho, middle):
         """By how much the angle turned further than the speed says, rounded to counts of 2^-16 turns, then to electrical rpm."""
@@ -737,7 +752,7 @@ class Observer:
         self.omega = self.sum(self.omega, s32(2 * innovation * self.rate))
         load = s32(self.load - s32((innovation * self.rate ** 2 // WORD) << p["shift"]))
         self.load = clamp(load, -p["load_max"] * WORD, p["load_max"] * WORD)
-        self.quick = 32767 if abs(innovation) > self.large else self.quick - (self.quick >> 5)
+        self.quick = 32767 if self.follow_unrest(innovation) else self.quick - (self.quick >> 5)
 
     @staticmethod
     def sum(omega, change):
@@ -747,8 +762,13 @@ class Observer:
 class ObserverReal(Observer):
     """The same in float64, speed and load in their units, angles in 2^-32 turns; no limits but the load's."""
 
+    @property
+    def calm(self):
+        return self.quick < 0.125
+
     def preset(self, rho, speed, iq):
         self.rho, self.omega, self.load, self.quick = rho, float(speed), iq * self.p["per_current_q16"] / WORD, 0.0
+        self.unrest = 768
 
     def schedule(self, ref):
         p = self.p
@@ -757,7 +777,7 @@ class ObserverReal(Observer):
         self.part = slow + (min(2 * slow, 1) - slow) * loaded
         rate = p["quiet_q16"] * slow * (1 - loaded) + p["loaded_q16"] * self.part * loaded
         self.rate = (rate + (p["quick_q16"] * self.part - rate) * self.quick) / WORD
-        self.large = p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32
+        self.large = (p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 256)
 
     def step(self, rho, iq):
         p, before = self.p, self.omega
@@ -767,7 +787,7 @@ class ObserverReal(Observer):
         self.rho = rho
         self.omega += 2 * innovation * self.rate
         self.load = clamp(self.load - innovation * self.rate ** 2 * 2 ** p["shift"], -p["load_max"], p["load_max"])
-        self.quick = 1.0 if abs(innovation) > self.large else self.quick * 31 / 32
+        self.quick = 1.0 if self.follow_unrest(innovation) else self.quick * 31 / 32
 
 
 # ---- start ----------------------------------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ static void any_observer_state(observer_t *o)
     o->load_q16 = any_l((params.observer.load_max + 1) * -65536l, params.observer.load_max * 65536l);
     o->rho_q32 = any_ul(0, UINT32_MAX);
     o->rate_q16 = any(0, params.observer.quick_q16);
-    o->large_erpm = any(0, (int16_t)(params.observer.large_erpm + 1024));
+    o->large_erpm = any(0, 32767);
     o->quick_q15 = any(0, 32767);
     o->unrest_steps = ANYU16();
     o->share_q15 = any(0, 32767);
@@ -137,7 +137,7 @@ static void bounds_hold_again(void)
     //@ check observed_speed: -32767 * 65536 <= o->omega_q16 <= 32767 * 65536;
     //@ check observed_load: (params.observer.load_max + 1) * -65536 <= o->load_q16 <= params.observer.load_max * 65536;
     //@ check rate: 0 <= o->rate_q16 <= params.observer.quick_q16;
-    //@ check large: 0 <= o->large_erpm <= params.observer.large_erpm + 1024;
+    //@ check large: 0 <= o->large_erpm;
     //@ check quick: 0 <= o->quick_q15 && 0 <= o->share_q15;
     //@ check learnt_kfi: params.adaptation.kfi_least * 65536 <= a->kfi_q31 <= params.adaptation.kfi_most * 65536;
     //@ check learnt_rs: params.adaptation.rs_least * 65536 <= a->rs_q31 <= params.adaptation.rs_most * 65536;

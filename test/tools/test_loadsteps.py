@@ -45,6 +45,16 @@ def test_what_is_out_of_reach_is_said_with_its_number(rpm, torque_nm, limit_v, t
     assert found.startswith(text) and (found == "") == (text == ""), found
 
 
+def test_a_load_that_stops_the_rotor_before_the_drive_can_answer_is_too_quick():
+    """2.4e-6 kg m2 from 714 rpm under 0.0625 N m and friction; 0.8 ms of filter, 0.16 of current loop, 0.4 a step, 1.52 of observer."""
+    values = {"mech.inertia_kgm2": 2.4e-6, "mech.coulomb_nm": 0.002, "mech.viscous_nms": 0.0}
+    params = {"LOOPTIME_SEC": 50e-6, "KFILTER_ESDQ": 2000.0, "CURRENT_BANDWIDTH_HZ": 1000.0, "LOAD_BANDWIDTH_HZ": 105.0}
+    stops, answers = reach.stops_s(values, 714.0, 0.0625), reach.answer_s(params)
+    assert (stops, answers) == pytest.approx((2.782e-3, 2.869e-3), abs=2e-6)
+    assert reach.too_quick(stops, answers) == "the load stops the rotor in 2.78 ms, the drive answers in 2.87 ms"
+    assert reach.too_quick(answers, stops) == "" == reach.too_quick(reach.stops_s(values | {"mech.coulomb_nm": 0.0}, 714.0, 0.0), answers)
+
+
 # ---- load steps ----------------------------------------------------------------------------------------------------------
 def test_27_steps_are_asked_for_and_another_motor_gets_the_same_shares_of_its_rating_within_its_header():
     assert (STEPS.speeds_rpm, STEPS.torques_nm, STEPS.kphi_factors) == ([500.0, 1190.0, 2500.0], [0.03, 0.05, 0.08], [0.8, 1.0, 1.2])
@@ -93,7 +103,7 @@ def test_dip_rise_and_angle_are_read_from_the_run():
 
 def step_row(**more):
     return {"name": "x", "reference_rpm": 1190.0, "ramped_rpm": 1190.0, "torque_nm": 0.08, "kphi": 1.0, "fault": None, "closed": True,
-            "beyond": "", "unloaded_min_rpm": 1188.0, "unloaded_max_rpm": 1192.0, "lowest_rpm": 830.0, "highest_rpm": 1500.0,
+            "beyond": "", "too_quick": "", "unloaded_min_rpm": 1188.0, "unloaded_max_rpm": 1192.0, "lowest_rpm": 830.0, "highest_rpm": 1500.0,
             "on_back_s": 0.1, "off_back_s": 0.1, "dip_percent": 30.0} | more
 
 
@@ -107,7 +117,9 @@ FIVE = {"reference_rpm": 500.0, "ramped_rpm": 500.0, "torque_nm": 0.05, "unloade
     ({"dip_percent": 35.1}, "dip above 35 %"), ({"dip_percent": 60.0, "kphi": 0.8}, "ok"), ({"dip_percent": 60.0, "torque_nm": 0.05}, "ok"),
     (FIVE, "ok"), (FIVE | {"dip_percent": 50.1}, "dip above 50 %"), (FIVE | {"unloaded_max_rpm": 511.0}, "wanders by 2.2 % without load"),
     ({"beyond": "needs", "on_back_s": None}, "out of reach"), ({"beyond": "needs", "off_back_s": None}, "step off: not back in 0.3 s"),
-    ({"beyond": "needs", "lowest_rpm": -9.0}, "backwards, -9 rpm"), ({"beyond": "needs", "fault": "STALL"}, "fault STALL")])
+    ({"beyond": "needs", "lowest_rpm": -9.0}, "backwards, -9 rpm"), ({"beyond": "needs", "fault": "STALL"}, "fault STALL"),
+    ({"too_quick": "stops"}, "ok"), ({"too_quick": "stops", "lowest_rpm": -9.0}, "out of reach"),
+    ({"too_quick": "stops", "lowest_rpm": -9.0, "on_back_s": 0.31}, "step on: not back in 0.3 s")])
 def test_each_way_to_fail_is_named_and_what_is_out_of_reach_must_still_come_back(values, text):
     row = step_row(**values)
     row["verdict"] = loadsteps.verdict(STEPS, row)
@@ -123,6 +135,14 @@ def test_the_table_ends_with_the_numbers_of_what_is_out_of_reach():
 
 
 # ---- low speed -----------------------------------------------------------------------------------------------------------
+def test_another_motor_gets_the_same_shares_of_its_rating_and_no_speed_below_its_header_s():
+    hurst, linix = motor_file.load(HURST), motor_file.load(LINIX)
+    ratio = linix.rated_speed_rpm / hurst.rated_speed_rpm
+    other = SLOW.for_motor(linix, {"MINIMUM_SPEED_RPM": 290.0 * ratio})
+    assert other.speeds_rpm == pytest.approx([rpm * ratio for rpm in (290.0, 300.0, 400.0, 500.0)], rel=0.005)
+    assert SLOW.for_motor(linix, {"MINIMUM_SPEED_RPM": 50.0}).speeds_rpm == pytest.approx([rpm * ratio for rpm in SLOW.speeds_rpm], rel=0.005)
+
+
 def slow_bench(defines=()):
     return lowspeed.Bench(SLOW, motor_file.part(HURST), board_file.part("mclv"), Library(library(list(defines)) if defines else LIBRARY))
 

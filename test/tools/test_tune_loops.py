@@ -129,17 +129,19 @@ def test_the_observer_and_its_controller_are_those_of_the_equations():
 
 
 def test_rates_and_gain_are_those_of_the_header_and_fall_with_the_speed():
-    d, full = of(HURST), rates(13.0, 110.0, 2800.0)
+    d = of(HURST)
+    speed_hz, load_hz = d.value("SPEED_BANDWIDTH_HZ"), d.value("LOAD_BANDWIDTH_HZ")
+    full = rates(speed_hz, load_hz, 2800.0)
     electrical = 5 * 2 * math.pi / 60 # rad/s per rpm
     assert d.constant("speed_kp_q13").value == approx(full["quiet"].speed_kp * electrical, rel=1e-4)
     assert d.constant("speed_kp_quick_q13").value == approx(full["quick"].speed_kp * electrical, rel=1e-4)
     for name, gains in full.items():
         assert gains.rate * 65536 == approx(d.constant(f"observer.{name}_q16").q_value, abs=1.0), name
-    assert d.constant("observer.full_erpm").value * electrical == approx(full_rad_s(110.0), rel=1e-6)
-    half = rates(13.0, 110.0, 0.25 * full_rad_s(110.0) / electrical)
+    assert d.constant("observer.full_erpm").value * electrical == approx(full_rad_s(load_hz), rel=1e-6)
+    half = rates(speed_hz, load_hz, 0.25 * full_rad_s(load_hz) / electrical)
     assert [half[name].rate / full[name].rate for name in full] == approx([0.25, 0.5, 0.5])
     assert [half[name].speed_kp / full[name].speed_kp for name in full] == approx([0.25, 0.5, 0.5])
-    assert half["quiet"].esdq == approx(d.constant("fieldweak.esdq_per_erpm_q13").q_value / 8192 / 65536 * 0.25 * 60 / 2.7 * 110, rel=1e-3)
+    assert half["quiet"].esdq == approx(d.constant("fieldweak.esdq_per_erpm_q13").q_value / 8192 / 65536 * 0.25 * 60 / 2.7 * load_hz, rel=1e-3)
 
 
 def test_an_error_of_the_estimator_s_resistance_costs_gain_margin_at_low_speed():
@@ -194,12 +196,12 @@ def test_the_worst_case_is_no_better_than_any_corner_and_the_published_spread_is
 
 
 def test_the_load_observer_is_as_quick_as_filter_current_loop_and_margins_allow():
-    """Time constants of 119 Hz, 1000 Hz and 0.4 ms together are those of 84 Hz; with 200 Hz, of 118 Hz."""
+    """Time constants of 119 Hz, 1000 Hz and 0.4 ms together are those of 84 Hz; with 200 Hz, of 118 Hz, and an L that is 30 % off takes some."""
     slow = designed(more="[tune]\nKFILTER_ESDQ = 1200\n")
-    assert (slow.value("LOAD_BANDWIDTH_HZ"), designed().value("LOAD_BANDWIDTH_HZ")) == (83.0, 110.0)
+    assert (slow.value("LOAD_BANDWIDTH_HZ"), designed().value("LOAD_BANDWIDTH_HZ")) == (83.0, 105.0)
     assert slow.value("SPEED_BANDWIDTH_HZ") == approx(0.32 * 83.0 / 2.7, abs=0.01)
     more = designed(more="[tune]\nLOAD_BANDWIDTH_HZ = 135\n")
-    assert not more.speed_loop.reached and more.speed_loop.worst.asked_deg == 15.0
+    assert not more.speed_loop.reached and "quick" in more.speed_loop.worst_case
     longer = made_with_period(100e-6)
     assert longer.value("LOAD_BANDWIDTH_HZ") * 100e-6 <= 0.0074 and longer.speed_loop.reached
 

@@ -81,7 +81,7 @@ static const struct {
     { "P1OVDCON", 0x0000, 1 }, { "P1DC1", 0, 1 }, { "P1DC2", 0, 1 }, { "P1DC3", 0, 1 },
     { "AD1CON1", 0x836C, 1 },  /* ADON, FORM 3: signed fractional, SSRC 3: started by the PWM, SIMSAM, ASAM: all channels at once */
     { "AD1CON2", 0x0200, 1 },  /* CHPS 2: four channels, SMPI 0: an interrupt after each conversion, supply as reference */
-    { "AD1CON3", 0x0002, 1 },  /* 75 ns */
+    { "AD1CON3", 0x0003, 1 },  /* 100 ns */
     { "AD1CHS0", 0x0008, 1 },  /* CH0 = AN8, the potentiometer */
     { "AD1CHS123", 0x0000, 1 }, /* CH1..3 = AN0..2, currents and bus, against ground */
     { "AD1CSSL", 0x0000, 1 },

@@ -33,8 +33,7 @@ static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
     uint16_t steps = 0;
     while (drive.state == (uint16_t)DRIVE_RAMP && steps < most) {
         rig_speed(speed_erpm);
-        drive.ticks = 8;
-        handover_wait(&drive, &params);
+        slow(8);
         slow(9); /* the next period carries it out */
         steps++;
     }
@@ -79,8 +78,7 @@ void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_on
     uint16_t n;
     drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
     for (n = 1; n <= 8u; n++) {
-        drive.ticks = n;
-        handover_wait(&drive, &params);
+        slow(n);
         TEST_ASSERT_EQUAL_UINT16(params.agree_steps - (n < 8u), drive.run.handover.agreed_steps);
         TEST_ASSERT_EQUAL_UINT16(n == 8u, drive.run.handover.waited_steps);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */

@@ -193,6 +193,19 @@ void test_a_large_innovation_is_smaller_under_load_and_larger_at_speed(void)
     }
 }
 
+/** Else a loop that the quick rate makes swing would go on swinging: with an L far from the header's, say. */
+void test_the_longer_large_innovations_go_on_the_larger_they_must_be(void)
+{
+    static const uint16_t cases[][2] = { { 0, 149 }, { 4, 151 }, { 128, 223 }, { 256, 298 }, { 4000, 2477 } };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        o.unrest_steps = cases[n][0];
+        (void)rate_at(0, 0, 0);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][1], o.large_erpm, golden_row(n));
+    }
+    TEST_ASSERT_EQUAL_INT16(32767, observer_large(20000, 256));
+    TEST_ASSERT_EQUAL_INT16(32766, observer_large(16383, 256));
+}
+
 void test_is_quick_after_a_large_innovation_and_calm_30_ms_later(void)
 {
     EACH_DIRECTION(direction) {
@@ -202,6 +215,10 @@ void test_is_quick_after_a_large_innovation_and_calm_30_ms_later(void)
         run(1, 2500, 0, 0);
         TEST_ASSERT_EQUAL_INT16(0, o.quick_q15);
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500 + 400), 0);
+        run(1, 2500, 0, 0);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(0, o.quick_q15, "the start is unrest");
+        observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500 + 400), 0);
+        o.unrest_steps = 0;
         run(1, 2500, 0, 0);
         TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
         TEST_ASSERT_FALSE(observer_is_calm(&o));

@@ -30,7 +30,7 @@ COLUMNS = (
     ("off_back_s", "back\nafter s", "{:.3f}"), ("angle_error_max_deg", "angle err\nmax deg", "{:.1f}"), ("verdict", "\nverdict", "{}"))
 KEYS = ("reference_rpm", "torque_nm", "kphi", "unloaded_min_rpm", "unloaded_max_rpm", "lowest_rpm", "dip_percent", "on_back_s",
         "highest_rpm", "rise_percent", "off_back_s", "angle_error_max_deg", "need_voltage_v", "voltage_limit_v", "need_current_a", "beyond",
-        "fault", "verdict")
+        "too_quick", "fault", "verdict")
 
 
 @dataclass(kw_only=True)
@@ -81,6 +81,7 @@ class Case:
     torque_nm: float
     kphi: float
     current_max_a: float
+    answer_s: float
     job: simulate.Job
     on_s: float
     off_s: float
@@ -127,7 +128,7 @@ def case(table: Table, rpm: float, torque_nm: float, kphi: float, library: Libra
     events += [Event(on_s, "set", table.where, keys={BRAKE: torque_nm}), Event(off_s, "set", table.where, keys={BRAKE: 0.0})]
     scenario = sweep.scenario(name, table.title, events, rpm, on_s, off_s + table.hold_s)
     job = simulate.prepare(scenario, library, motor, board, plant)
-    return Case(table, rpm, torque_nm, kphi, current_max_a, job, on_s, off_s)
+    return Case(table, rpm, torque_nm, kphi, current_max_a, reach.answer_s(library.params), job, on_s, off_s)
 
 
 def _work(item: Case, progress: Callable[[float], None]) -> dict[str, Any]:
@@ -171,7 +172,8 @@ def row_of(item: Case, result: dict[str, Any]) -> dict[str, Any]:
     row = {"name": f"{item.rpm:.0f} rpm, {item.torque_nm:.3g} N m", "reference_rpm": item.rpm, "torque_nm": item.torque_nm,
            "kphi": item.kphi, **result, "unloaded": f"{result['unloaded_min_rpm']:.0f} .. {result['unloaded_max_rpm']:.0f}",
            "need_voltage_v": need.voltage_v, "need_current_a": need.current_a,
-           "beyond": reach.out_of_reach(need, item.current_max_a, result["voltage_limit_v"])}
+           "beyond": reach.out_of_reach(need, item.current_max_a, result["voltage_limit_v"]),
+           "too_quick": reach.too_quick(reach.stops_s(item.job.values, item.rpm, item.torque_nm), item.answer_s)}
     return row | {"verdict": verdict(item.table, row)}
 
 
@@ -181,7 +183,8 @@ def verdict(table: Table, row: dict[str, Any]) -> str:
     dip_limit = table.dip_limit(row)
     if row["fault"] or not row["closed"]:
         return f"fault {row['fault']}" if row["fault"] else "never in closed loop"
-    if row["lowest_rpm"] < BACKWARDS_RPM:
+    backwards = row["lowest_rpm"] < BACKWARDS_RPM
+    if backwards and not row["too_quick"]:
         return f"backwards, {row['lowest_rpm']:.0f} rpm"
     for edge, key in (("on", "on_back_s"), ("off", "off_back_s")):
         back_s = row[key]
@@ -191,12 +194,12 @@ def verdict(table: Table, row: dict[str, Any]) -> str:
         return f"wanders by {wander:.1f} % without load"
     if dip_limit is not None and row["dip_percent"] > dip_limit:
         return f"dip above {dip_limit:g} %"
-    return reach.BEYOND if row["beyond"] else "ok"
+    return reach.BEYOND if row["beyond"] or backwards else "ok"
 
 
 def text(rows: list[dict[str, Any]]) -> str:
     """The table as printed, and by which numbers a load is out of reach."""
-    lines = [f"{row['name']}, Kphi x{row['kphi']:g}: {row['beyond']}" for row in rows if row["beyond"]]
+    lines = [f"{row['name']}, Kphi x{row['kphi']:g}: {row['beyond'] or row['too_quick']}" for row in rows if row["verdict"] == reach.BEYOND]
     return "\n".join([report.table(rows, COLUMNS)] + ["", f"{reach.BEYOND}, friction included:", *lines] * bool(lines))
 
 

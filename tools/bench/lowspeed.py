@@ -44,10 +44,11 @@ class Table(sweep.Table):
     ratio: float = sweep.within(1.01, 10.0)
     resolution_percent: float = sweep.within(0.1, 20.0)
 
-    def for_motor(self, motor: motor_file.Motor) -> "Table":
-        """The table for another motor than its own: the same shares of its rating."""
+    def for_motor(self, motor: motor_file.Motor, params: dict[str, float]) -> "Table":
+        """The table for another motor than its own: the same shares of its rating, but no speed below the one from which its header holds it."""
         speeds, torques = sweep.shares(self.motor, motor, self.speeds_rpm, self.torques_nm)
-        return replace(self, motor=motor.name, speeds_rpm=[max(rpm, self.lowest_rpm) for rpm in speeds], torques_nm=torques)
+        possible = dict.fromkeys(max(rpm, param(params, "MINIMUM_SPEED_RPM")) for rpm in speeds)
+        return replace(self, motor=motor.name, speeds_rpm=list(possible), torques_nm=torques)
 
     def below(self) -> list[float]:
         """The speeds that are tried below the table's own, downwards."""
@@ -159,7 +160,7 @@ def command(options: argparse.Namespace) -> int:
     motor, board, library, used = command_common.set_up(table, options, ["PARAMS_IN_RAM"])
     target = command_common.results("lowspeed", table.motor, options)
     if motor.path.stem != table.motor:
-        table = table.for_motor(motor_file.load(str(motor.path)))
+        table = table.for_motor(motor_file.load(str(motor.path)), library.params)
     bench = Bench(table, motor, board, library)
     with output.ResultFolder(target) as folder:
         rows = bench.run(list(itertools.product(table.speeds_rpm, table.torques_nm)), "lowspeed", options.quiet)

@@ -1,4 +1,4 @@
-"""What a motor can do at best: the voltage and the current that a torque at a speed needs, from the plant's values."""
+"""What a motor can do at best: the voltage and the current that a torque at a speed needs, and how soon a load stops it, from the plant's values."""
 
 import math
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 ID_STEPS = 2001
+SLOW_PHASES = 8
 BEYOND = "out of reach"
 """The verdict where a limit forbids what was asked."""
 
@@ -53,3 +54,22 @@ def out_of_reach(need: Need, current_max_a: float, voltage_v: float | None) -> s
     if voltage_v is not None and need.voltage_v > voltage_v:
         return f"needs {need.voltage_v:.2f} V of {voltage_v:.2f} V (Id {need.id_a:.2f} A, Iq {need.iq_a:.2f} A)"
     return ""
+
+
+def stops_s(values: Mapping[str, float], rpm: float, torque_nm: float) -> float:
+    """How soon a load alone stops the rotor from a speed, with the friction that it has on the way."""
+    omega_m = rpm * math.pi / 30.0
+    torque = torque_nm + values.get("mech.coulomb_nm", 0.0) + 0.5 * values.get("mech.viscous_nms", 0.0) * omega_m
+    return values["mech.inertia_kgm2"] * omega_m / torque if torque > 0.0 else math.inf
+
+
+def answer_s(params: Mapping[str, float]) -> float:
+    """Time constants of what lies between a load and the current that holds it: back-EMF filter, current loop, slow step, load observer."""
+    filter_s = -params["LOOPTIME_SEC"] / math.log(1.0 - params["KFILTER_ESDQ"] / 32768.0)
+    loops_s = sum(1.0 / (2.0 * math.pi * params[name]) for name in ("CURRENT_BANDWIDTH_HZ", "LOAD_BANDWIDTH_HZ"))
+    return filter_s + loops_s + SLOW_PHASES * params["LOOPTIME_SEC"]
+
+
+def too_quick(stops: float, answers: float) -> str:
+    """Why no drive with these loops keeps the rotor from stopping; "" if it could."""
+    return f"the load stops the rotor in {1e3 * stops:.2f} ms, the drive answers in {1e3 * answers:.2f} ms" if stops < answers else ""

@@ -19,7 +19,7 @@ enum {
 };
 
 #define REFERENCE_V 3.3
-#define TAD_MIN_S 75e-9
+#define TAD_MIN_S 76e-9 /* AD50, 10 bits */
 #define TAD_PER_CONVERSION 12.0
 #define RC_TAD_S 250e-9
 

@@ -7,7 +7,7 @@
 /** 1 if the end of the ramp leads to closed loop. */
 QM_INLINE uint16_t mode_hands_over(void)
 {
-#ifdef OPEN_LOOP_FUNCTIONING
+#if defined OPEN_LOOP_FUNCTIONING || defined IDENTIFY /* IDENTIFY has ramps of its own */
     return 0;
 #else
     return 1;
