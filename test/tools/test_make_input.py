@@ -25,7 +25,7 @@ def copy(root: Path) -> Path:
     for name in SOURCES:
         source, target = ROOT / name, root / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__")) if source.is_dir() else shutil.copy(source, target)
+        shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__", ".*")) if source.is_dir() else shutil.copy(source, target)
     return root
 
 
