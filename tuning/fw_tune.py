@@ -56,7 +56,7 @@ def add_command(commands: Any) -> None:
     parser.add_argument("motor", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--tables", type=Path, help="where the tables go; default tuning/tables/MOTOR.toml")
-    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/MOTOR")
+    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/NAME")
     parser.add_argument("--torque-share", type=float, default=TORQUE_SHARE, metavar="X",
                         help=f"load that the tables carry, as a share of the rated torque; default {TORQUE_SHARE:g}")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
@@ -74,10 +74,11 @@ def command(options: argparse.Namespace) -> int:
     motor = motor_file.load(options.motor, "tune-fw")
     board = board_file.load(*board_file.named(motor, options.board))
     header, risks = _header(motor, board)
-    target = options.out or RESULTS / motor.name
+    name = paths.name_of(motor.path, paths.MOTORS)
+    target = options.out or RESULTS / name
     path = options.tables or fw_tables.path_of(motor.name)
     fw_tables.check_place(path)
-    with output.ResultFolder(target) as folder:
+    with output.in_turn(f"tune-fw-{name}"), output.ResultFolder(target) as folder:
         work = _Work(motor, header, risks, [motor.plant_values(), board.plant_values(), command_common.changes(options.changes)], options)
         tables, rows = work.search()
         check = work.check(tables)
@@ -149,7 +150,7 @@ class _Work:
 
     def _library(self, use: str, header: str, defines_: list[str]) -> Library:
         """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
-        return Library(built(FIRMWARE / f"{self.motor.name}-{use}", header, defines_))
+        return Library(built(FIRMWARE / f"{paths.name_of(self.motor.path, paths.MOTORS)}-{use}", header, defines_))
 
     def _run(self, jobs: list[_Job], work: Callable, title: str, total: int | None = None, unit: str = "") -> list[Any]:
         """The jobs' results, with a bar that says where they are; what goes wrong in one says of which motor."""

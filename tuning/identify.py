@@ -144,7 +144,7 @@ def prepared(motor: Motor, board_name: str | None, current_a: float | None, spee
     board = board_file.load(*board_file.named(motor, board_name))
     known = Known.of(motor, board, current_a, speed_rpm)
     text = header(known, board)
-    return Prepared(motor, board, known, text, built(HEADERS / motor.name, text, [MODE]))
+    return Prepared(motor, board, known, text, built(HEADERS / paths.name_of(motor.path, paths.MOTORS), text, [MODE]))
 
 
 def identify(items: list[Prepared], changes: board_keys.Values, quiet: bool = True) -> list[Identified]:
@@ -182,7 +182,7 @@ def add_command(commands: Any) -> None:
     parser.add_argument("--speed", type=float, metavar="RPM", help="END_SPEED_RPM; default: 40 %% of the rating")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
                         help="change a key of the virtual board, e.g. load.locked=1; may be repeated")
-    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/MOTOR")
+    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/NAME")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(command=command)
 
@@ -192,12 +192,14 @@ def command(options: argparse.Namespace) -> int:
     names = command_line.one_or_all(options, paths.names(paths.MOTORS))
     _check(options)
     changes = command_common.changes(options.changes)
-    ready, code = command_line.each(names, lambda name: prepared(motor_file.load(name, "command line"), options.board, options.current, options.speed))
-    if not ready:
-        return code
-    found = identify(ready, changes, options.quiet)
+    board = options.board and paths.find("board", options.board, paths.BOARDS, "--board")
+    with output.in_turn("identify"):
+        ready, code = command_line.each(names, lambda name: prepared(motor_file.load(name, "command line"), options.board, options.current, options.speed))
+        if not ready:
+            return code
+        found = identify(ready, changes, options.quiet)
     for item in found:
-        target = options.out or RESULTS / item.motor.name
+        target = options.out or RESULTS / paths.pair_name(item.motor.path, board)
         _write(item, target)
         print(item.text() if not options.all else _brief(item))
         if not options.all:

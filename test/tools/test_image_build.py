@@ -15,7 +15,7 @@ ROOT = paths.ROOT
 MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
 TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/common", "tools/image", "tools/make", "tools/setup")
 NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname",
-          "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr")
+          "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr", "awk", "find", "flock")
 
 
 def xc16() -> str | None:

@@ -95,8 +95,8 @@ class Case:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(paths.TABLES / "loadsteps.toml")
-    motor, board, library, used = command_common.set_up(table, options, [], command_common.header_for(options))
-    target = command_common.results("loadsteps", motor, table.motor, options.out)
+    motor, board, library, used = command_common.set_up(table, options, [])
+    target = command_common.results("loadsteps", table.motor, options)
     if motor.path.stem != table.motor:
         table = table.for_motor(motor_file.load(str(motor.path)), library.params)
     asked = itertools.product(table.speeds_rpm, table.torques_nm, table.kphi_factors)

@@ -75,7 +75,7 @@ def command(options: argparse.Namespace) -> int:
     ready, code = command_line.each(names, lambda name: _with_header(name, options, table))
     if not ready and not refused:
         return code
-    target = options.out or paths.RESULTS / "rated"
+    target = options.out or results("rated", names[0] if len(names) == 1 else None, command_common.board_asked_for(options))
     with output.ResultFolder(target) as folder:
         candidates = _candidates(ready, options)
         cases = [(item, row) for item in candidates for row in rows_of(table, item)]
@@ -90,11 +90,17 @@ def command(options: argparse.Namespace) -> int:
     return max(code, command_common.verdict("rated", outcomes))
 
 
+def results(name: str, motor: str | None, board: Path | None) -> Path:
+    """The folder of the results; its name tells the motor, if it is one, and the board that was asked for."""
+    parts = [name, motor and paths.name_of(paths.find("motor", motor, paths.MOTORS, "--motor"), paths.MOTORS), board and paths.name_of(board, paths.BOARDS)]
+    return paths.RESULTS / "-".join(part for part in parts if part)
+
+
 def _with_header(name: str, options: argparse.Namespace, table: Table) -> tuple[Motor, board_keys.Part, Path]:
     """A motor, its board and the folder of its header. Files are looked at before anything is built."""
     motor = motor_file.load(name, "--motor")
     board = command_common.board_of(motor, table, options.board, True)
-    return motor, board, Path(options.userparams) if options.userparams else command_common.tuned_header(motor.path)
+    return motor, board, Path(options.userparams) if options.userparams else command_common.tuned_header(motor.path, command_common.board_asked_for(options))
 
 
 def _candidates(ready: list[tuple[Motor, board_keys.Part, Path]], options: argparse.Namespace) -> list[Candidate]:

@@ -67,9 +67,9 @@ class Table(sweep.Table):
 def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = sweep.run_cases) -> int:
     """The whole command; returns the exit code. `run_cases` runs the jobs."""
     table = Table.read(paths.TABLES / "table2.toml")
-    motor, board, library, used = command_common.set_up(table, options, [], options.userparams)
+    motor, board, library, used = command_common.set_up(table, options, [])
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
-    target = options.out or paths.RESULTS / "table2"
+    target = command_common.results("table2", table.motor, options)
     with output.ResultFolder(target) as folder:
         results = run_cases("table2", jobs, options.quiet)
         rows = [_result(row, result) for row, result in zip(table.rows, results)]

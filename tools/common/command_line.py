@@ -18,11 +18,11 @@ class Parser(argparse.ArgumentParser):
         raise UserError(message, "command line", f"see {self.prog} --help")
 
 
-def _tell(_: object, error: UserError) -> None:
+def tell(_: object, error: UserError) -> None:
     print(f"foc33: {error}", file=sys.stderr, flush=True)
 
 
-def each(items: Iterable[Item], work: Callable[[Item], Made], refuse: Callable[[Item, UserError], None] = _tell) -> tuple[list[Made], int]:
+def each(items: Iterable[Item], work: Callable[[Item], Made], refuse: Callable[[Item, UserError], None] = tell) -> tuple[list[Made], int]:
     """What `work` makes of every item, and the exit code: an item that is refused gets its line and code 2, the others go on."""
     made, code = [], 0
     for item in items:

@@ -2,7 +2,8 @@
 turn_motor := $B/examples/turn_motor
 
 .PHONY: examples
-examples: setup-run $(turn_motor) $B/libvboard.so ## [tests] compile and run examples/
+examples: setup-run ## [tests] compile and run examples/
+	$(call build,$(turn_motor) $B/libvboard.so)
 	@$(turn_motor)
 	@$(front_end) run examples/my_scenario.toml --out build/run/my_scenario --no-plots
 	@$(tuner) tune examples/my_motor.toml --brief --out build/tune/my_motor

@@ -15,7 +15,7 @@ X := build/target$(target_opt_suffix)$(if $(VARIANT),-$(VARIANT))
 
 # -fno-reorder-blocks and -fno-gcse: a fifth less flash in the interrupt at the same worst case.
 target_flags = -std=gnu99 $(OPT) -g -fno-reorder-blocks -fno-gcse -fno-inline-small-functions -ffunction-sections
-target_includes = $(if $(USERPARAMS),-I$(USERPARAMS)) -Iinclude -I.
+target_includes = $(if $(USERPARAMS),-I$X/header) -Iinclude -I.
 # All that XC16's compiler knows and -Wall -Wextra leave out.
 target_warnings := -Wall -Wextra -Werror -pedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align \
     -Wstrict-prototypes -Wmissing-prototypes -Wredundant-decls -Wswitch-enum -Wswitch-default -Wfloat-equal -Wdouble-promotion -Wlogical-op \
@@ -28,9 +28,13 @@ target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 target_sources := $(wildcard firmware/*/*.c firmware/*/*/*.c)
 target_objects := $(target_sources:%.c=$X/%.o)
 
-.PHONY: firmware flash project find-xc16
-firmware: $X/checked ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
-	@cat $<
+.PHONY: firmware image flash project find-xc16
+firmware: find-xc16 ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
+	$(call build,$X/checked)
+	@cat $X/checked
+
+image: find-xc16
+	$(call build,$X/foc33.elf)
 
 find-xc16:
 	@command -v $(xc16)gcc >/dev/null || { \
@@ -42,6 +46,7 @@ find-xc16:
 .PHONY: target-input
 target-input: find-xc16
 	$(call known_defines)
+	$(no_parameters)
 	@case $(call quoted,$(OPT)) in -O[123]) ;; *) \
 	    echo foc33: no such level, $(call quoted,OPT=$(OPT)): use -O1, -O2 or -O3 >&2; exit 2;; esac
 	@test -z $(call quoted,$(DFP)) || test -f $(call quoted,$(DFP)/xc16/bin/c30_device.info) || { \
@@ -50,9 +55,13 @@ target-input: find-xc16
 # Python with what reads ELF and HEX.
 target_setup = @tools/setup/prepare.sh target
 
-$X/flags: FORCE | target-input
-	@test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
-	    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
+ifneq ($(USERPARAMS),)
+$X/header/userparams.h: FORCE | target-input
+	$(copy_header)
+endif
+
+$X/flags: FORCE $(if $(USERPARAMS),$X/header/userparams.h) | target-input
+	$(need_header)
 	$(call remember,$(target_compile) $(target_link_options))
 
 $X/contents: FORCE | target-input

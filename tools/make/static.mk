@@ -12,4 +12,4 @@ format: ## [upkeep] write the C files in the style of .clang-format
 
 .PHONY: ubsan
 ubsan: setup-test ## [tests] the unit tests under clang's undefined, integer and implicit-conversion sanitizers
-	+@$(still) ubsan test/static/ubsan.sh
+	+@$(in_turn) $(still) ubsan test/static/ubsan.sh
