@@ -30,7 +30,7 @@ sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-fr
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
 CFLAGS := -std=gnu99 -O2 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
-INCLUDES := $(if $(USERPARAMS),-I$B/header) -Itools/cpu_host -Iinclude -I.
+INCLUDES = $(if $(USERPARAMS),-I$B/header -I$(call quoted,$(USERPARAMS))) -Itools/cpu_host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
 
 # The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.

@@ -141,7 +141,7 @@ def test_another_end_is_one_line_with_the_remedy():
     ((), "which motor?"), ((HURST, "--all"), "which motor?"), (("no_such",), "no motor 'no_such'"),
     ((HURST, "--current", "0.01"), "current = 0.01 is impossible"), ((HURST, "--speed", "9000"), "speed = 9000 is impossible"),
     (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'"),
-    ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
+    ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A = 4.2 must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
 def test_mistakes_on_the_command_line(arguments, says):
     refused(command("identify", *arguments), says)
 

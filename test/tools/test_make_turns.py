@@ -54,7 +54,7 @@ def test_two_makes_do_not_compile_at_the_same_time(tree, tmp_path):
 @pytest.mark.parametrize("goal", ["lib", "vboard", "pil-library", "iss", "bench", "run SCENARIO=smoke", "test-quick ONLY=test_pi"])
 def test_what_compiles_waits_for_another_make_and_says_so(tree, goal):
     for name in ("test", "build/gems"):
-        if goal.startswith("test") and not (tree / name).exists():
+        if goal.startswith(("test", "bench")) and not (tree / name).exists():
             shutil.copytree(paths.ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__", ".*")) # suites write there meanwhile
     environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN}
     (tree / "build").mkdir(exist_ok=True)
@@ -76,7 +76,7 @@ def test_two_motors_and_two_equal_runs_at_once_end_well_and_share_no_folder(tree
     assert [item.returncode for item in done] == [0] * 3, [item.stderr for item in done]
     folders = [tree / f"build/run/rated-{name}" for name in names]
     for name, item, folder in zip(names, done, folders):
-        assert f"results in build/run/rated-{name}/\n" in item.stdout
+        assert f"results in build/run/rated-{name}/: index.html\n" in item.stdout
         data = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         assert (Path(data["motor"]).stem, data["header"]) == (name, f"build/tune/{name}/userparams.h")
     assert sorted(path.name for path in (tree / "build/run").glob("rated*")) == sorted({folder.name for folder in folders})

@@ -98,15 +98,16 @@ def test_what_cannot_be_run_is_one_line(capfd, arguments, said):
     refused((code, *capfd.readouterr()), said)
 
 
-WRAPPED = {"proof.mk": "proof.py", "mutate.mk": "mutate.py", "static.mk": "static.py|ubsan.sh", "coverage.mk": "MAKE", "test-avr.mk": "MAKE",
-           "test-target.mk": "MAKE"}
+WRAPPED = {"proof.mk": "proof.py", "mutate.mk": "mutate.py", "static.mk": "static.py|ubsan.sh", "coverage.mk": "MAKE", "test-avr.mk": "call build",
+           "test-target.mk": "call build"}
 
 
 @pytest.mark.parametrize("file, program", WRAPPED.items(), ids=WRAPPED)
 def test_every_long_step_of_make_is_wrapped(file, program):
     lines = [line for line in (paths.ROOT / "tools/make" / file).read_text(encoding="utf-8").splitlines()
              if line.startswith("\t") and re.search(program, line) and "need.sh" not in line and "format.py" not in line]
-    assert lines and all("$(still) " in line for line in lines)
+    assert lines and all("$(still) " in line or line.startswith("\t$(call build,") and line.endswith(",building the tests)") for line in lines)
+    assert "$(if $2,$(still) '$2') $(MAKE)" in (paths.ROOT / "Makefile").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("module, arguments, titles", [

@@ -166,10 +166,11 @@ def bus_v(name: str) -> float:
     return float(re.search(r"^#define NOMINAL_BUS_V (\S+)", (paths.TUNED / name / "userparams.h").read_text(encoding="utf-8"), re.MULTILINE)[1])
 
 
-@pytest.mark.parametrize("more, a_first, c_last", [((), 30.0, 24.0), (("--board", "mclv"), 24.0, 24.0)])
-def test_a_motor_is_tuned_for_the_board_that_its_file_names_unless_another_one_is_asked_for(own_board, more, a_first, c_last):
+@pytest.mark.parametrize("more, folders, volts", [
+    ((), ("a_first", "c_last"), (30.0, 24.0)), (("--board", "mclv"), ("a_first-mclv", "c_last-mclv"), (24.0, 24.0))])
+def test_a_motor_is_tuned_for_the_board_that_its_file_names_unless_another_one_is_asked_for(own_board, more, folders, volts):
     assert command("tune", "--all", "--brief", *more)[0] == 0
-    assert (bus_v("a_first"), bus_v("c_last")) == (a_first, c_last)
+    assert tuple(bus_v(folder) for folder in folders) == volts
 
 
 def test_make_motors_runs_each_motor_on_its_board(own_board, out):

@@ -15,7 +15,7 @@ X := build/target$(target_opt_suffix)$(if $(VARIANT),-$(VARIANT))
 
 # -fno-reorder-blocks and -fno-gcse: a fifth less flash in the interrupt at the same worst case.
 target_flags = -std=gnu99 $(OPT) -g -fno-reorder-blocks -fno-gcse -fno-inline-small-functions -ffunction-sections
-target_includes = $(if $(USERPARAMS),-I$X/header) -Iinclude -I.
+target_includes = $(if $(USERPARAMS),-I$X/header -I$(call quoted,$(USERPARAMS))) -Iinclude -I.
 # All that XC16's compiler knows and -Wall -Wextra leave out.
 target_warnings := -Wall -Wextra -Werror -pedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align \
     -Wstrict-prototypes -Wmissing-prototypes -Wredundant-decls -Wswitch-enum -Wswitch-default -Wfloat-equal -Wdouble-promotion -Wlogical-op \
