@@ -100,7 +100,8 @@ def _exchanged(one: Path, other: Path) -> bool:
 
 def _replaceable(folder: Path) -> bool:
     try:
-        return (folder / SUMMARY).is_file() or not any(folder.iterdir())
+        summary = folder / SUMMARY
+        return summary.is_file() or not any(folder.iterdir()) or summary.is_file() # between the looks another run may have replaced it
     except FileNotFoundError: # another run is just replacing it
         return True
     except NotADirectoryError:
