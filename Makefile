@@ -1,14 +1,14 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
-# Variables: SCENARIO MOTOR BOARD OUT (what to run, on which board, where to write), VARIANT DEFINES USERPARAMS SAN (a build in a folder of its own),
-# ONLY (names of test suites), PYTHON RUBY CC (tools to use), V=1 (show the commands).
+# Variables: SCENARIO MOTOR BOARD SET OUT (what to run, on which board, where to write), DEFINES USERPARAMS (which firmware), VARIANT SAN (a build in
+# a folder of its own), ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing),
+# FOC33_QUIET=1 (no progress), V=1 (show the commands).
 
-SCENARIO ?= $(if $(MOTOR),rated,demo)
 RUBY ?= ruby
 ifeq ($(origin CC),default)
 CC := gcc
 endif
-export CC PYTHON RUBY
+export CC PYTHON RUBY INSTALL
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -30,7 +30,7 @@ sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-fr
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
 CFLAGS := -std=gnu99 -O2 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
-INCLUDES := $(if $(USERPARAMS),-I$(USERPARAMS)) -Itools/cpu_host -Iinclude -I.
+INCLUDES = $(if $(USERPARAMS),-I$B/header -I$(call quoted,$(USERPARAMS))) -Itools/cpu_host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
 
 # The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.
@@ -48,10 +48,37 @@ quoted = '$(subst ','\'',$1)'
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@
 
+# Whoever compiles holds build/lock or its variant's, so that two makes in this tree take turns; what such a make starts holds it, too.
+lock_file = $(if $(FOC33_LOCK),,mkdir -p build; exec 9>$1; flock -n 9 || { echo "waiting for another make"; flock 9; }; export FOC33_LOCK=1;)
+lock = $(call lock_file,build/lock$(suffix))
+build = +@$(lock) $(if $2,$(still) '$2') $(MAKE) $1
+# What the variants share is made before: under one lock for all.
+shared = ($(call lock_file,build/lock) $(MAKE) -s VARIANT= SAN= $(golden_stamp) build/iss/libiss33f.a) &&
+# The rest of the line runs alone among all makes of this tree with the same target.
+in_turn = mkdir -p build; flock build/$@.lock
+
+need_header = @test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
+    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
+
+# The header of the folder USERPARAMS: a copy, because make cannot read the names of files whose path has blanks, and because a build keeps
+# what it began with. #line tells the compiler, and so the user, where the text is from.
+define copy_header
+$(need_header)
+@mkdir -p $(@D); { printf '#line 1 "%s"\n' "$$(printf %s $(call quoted,$(USERPARAMS)/userparams.h) | sed 's/[\\"]/\\&/g')"; \
+    cat $(call quoted,$(USERPARAMS)/userparams.h); } >$@.new && { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
+endef
+
 # A misspelt mode would give the drive without it, and -DTUNING=0 the drive with it.
 known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) $(filter-out %=1,$(filter $(modes:%=-D%=%),$(DEFINES))) \
     $(filter-out $(modes:%=-D%) -U%,$(foreach word,$(DEFINES),$(if $(findstring =,$(word)),,$(word))))), \
     echo foc33: $(call quoted,no mode $(word)$(comma) DEFINES=$(DEFINES)): 'use $(modes:%=-D%) or -DNAME=value' >&2; exit 2)
+# The header would win over a parameter's -D.
+no_parameters = @for word in $(foreach word,$(filter -D%,$(DEFINES)),$(call quoted,$(patsubst -D%,%,$(word)))); do name="$${word%%=*}"; \
+    test "$$name" = "$$word" || ! grep -q "^ *\# *define  *$$name[ (]" $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
+    echo "foc33: $$name is a parameter," $(call quoted,DEFINES=$(DEFINES)): set it in userparams.h >&2; exit 2; }; done
+
+# Both libraries of a build's folder.
+libraries = $(addprefix $1/,libfirmware.a libvboard.so)
 
 # ---- help ----------------------------------------------------------------------------------------------------------------
 # A target's line: "## [group] what it does [variables]".
@@ -66,21 +93,24 @@ help: ## [upkeep] this list
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
 alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES
 python = "$$(cat build/setup/python)"
+# Says now and then that a silent command still runs: $(still) title command
+still = python3 -m tools.common.progress
 front_end = $(alone) $(python) -m tools.bench
 out = $(if $(OUT),--out $(call quoted,$(OUT)))
 
 # A motor runs with the userparams.h that the tuner writes for it, unless USERPARAMS names another folder.
 tuner = $(alone) $(python) -m tuning
-tuned = build/tune/$(basename $(notdir $(MOTOR)))
-parameters = $(or $(USERPARAMS),$(if $(MOTOR),$(tuned)))
 board = $(if $(BOARD),--board $(call quoted,$(BOARD)))
-options = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(parameters),--userparams $(call quoted,$(parameters))) $(out)
-ready = $(if $(parameters),$(if $(USERPARAMS),:,$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief),$(MAKE) vboard)
+what = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS)))
+options = $(what) $(out)
+scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
+ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
 .PHONY: anymotor run scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
-run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= OUT=folder]
+run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
+	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
-	@$(front_end) run $(call quoted,$(SCENARIO)) $(options)
+	@$(front_end) run $(scenario) $(options)
 
 scenarios: setup-run ## [run] list the scenarios of make run SCENARIO=name
 	@$(front_end) scenarios
@@ -88,35 +118,35 @@ scenarios: setup-run ## [run] list the scenarios of make run SCENARIO=name
 list-motors: setup-run ## [your motor] the motor files of tuning/motors: data and rating
 	@$(front_end) motors
 
-table2: setup-run ## [run] the eight rows of AN1292's Table 2 beside ours [MOTOR= OUT=]
+table2: setup-run ## [run] the eight rows of AN1292's Table 2 beside ours [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) table2 $(options)
 
-starts: setup-run ## [run] starts from every rotor angle under several loads [MOTOR= OUT=]
+starts: setup-run ## [run] starts from every rotor angle under several loads [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) starts $(options)
 
 motors: setup-run ## [your motor] every motor with its own header: 20, 50, 100 % of rated speed at half torque [BOARD= OUT=]
-	@$(tuner) motors $(board) --out $(call quoted,$(or $(OUT),build/run/motors))
+	@$(tuner) motors $(board) $(out)
 
 anymotor: setup-run ## [your motor] drawn motors and boards: each tuned and turning, or refused in one line [N=300 SEED=1 CASE=number OUT=]
 	@$(tuner) anymotor $(if $(N),--count $(call quoted,$(N))) $(if $(SEED),--seed $(call quoted,$(SEED))) $(if $(CASE),--case $(call quoted,$(CASE))) $(out)
 
-robust: setup-run ## [run] how far R, L and Kphi may be off before a start fails [MOTOR= OUT=]
+robust: setup-run ## [run] how far R, L and Kphi may be off before a start fails [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) robust $(options)
 
-loadsteps: setup-run ## [run] the brake closes and opens at once: dips, and the time back [MOTOR= OUT=]
+loadsteps: setup-run ## [run] the brake closes and opens at once: dips, and the time back [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) loadsteps $(options)
 
-lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MOTOR= OUT=]
+lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) lowspeed $(options)
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
-.PHONY: tune tune-fw identify spreadsheet userparams setup-tune
+.PHONY: tune tune-fw identify board spreadsheet userparams setup-tune
 tune: setup-run ## [your motor] data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD= OUT=]
 	@$(tuner) tune $(tune_motor) $(board) $(out)
 
@@ -127,12 +157,10 @@ identify: setup-run ## [your motor] R, L and Kphi as the IDENTIFY firmware measu
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
 
 userparams: setup-run ## [your motor] install the tuned header; yours is kept as userparams.h.old [MOTOR= BOARD=]
-	@$(tuner) tune $(tune_motor) $(board) --brief
-	@new=$(call quoted,build/tune/$(basename $(notdir $(or $(MOTOR),hurst_dmb0224c10002)))/userparams.h); \
-	if cmp -s "$$new" userparams.h; then echo "userparams.h is up to date"; exit; fi; \
-	old=userparams.h.old; n=1; while test -e $$old; do n=$$((n + 1)); old=userparams.h.old$$n; done; \
-	if test -e userparams.h; then cp userparams.h $$old || exit; echo "yours is kept as $$old"; fi; \
-	cp "$$new" userparams.h && echo "userparams.h written"
+	@$(tuner) tune $(tune_motor) $(board) --brief --install
+
+board: setup-run ## [your board] what a board measures; with SET: write the file of an inverter of your own [BOARD=mclv SET="shunt=10mohm gain=20 ..."]
+	@$(tuner) board $(call quoted,$(or $(BOARD),mclv)) $(foreach word,$(SET),$(call quoted,$(word)))
 
 spreadsheet: setup-tune ## [upkeep] write tuning/tuning_params.xlsx
 	@$(tuner) spreadsheet
@@ -140,41 +168,59 @@ spreadsheet: setup-tune ## [upkeep] write tuning/tuning_params.xlsx
 setup-tune:
 	@tools/setup/prepare.sh tune
 
+logged_step = echo "  make $$step"; $(still) "make $$step" sh -c '$(MAKE) -s "$$@" OUT= >build/readme.log 2>&1' sh $$step || { \
+    tail -n 3 build/readme.log >&2; exit 1; }
+
 .PHONY: readme bench
 readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
-	@for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
+	@+for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
 	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)"); do \
-	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done
-	@if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
-	    echo "  make $$step"; $(MAKE) -s $$step OUT= >build/readme.log 2>&1 || { tail -n 3 build/readme.log >&2; exit 1; }; done; fi
+	    $(logged_step); done
+	@+if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
+	    $(logged_step); done; fi
 	@$(python) tools/docs/readme.py
 
-bench: vboard ## [simulator] motor seconds that the virtual board simulates in one second of one core
-	@$(compile) $(board_includes) -o $B/bench test/chip/bench.c $B/libvboard.so -Wl$(comma)-rpath$(comma)'$(CURDIR)/$B' && $B/bench
+bench: ## [simulator] motor seconds that the virtual board simulates in one second of one core
+	$(call build,$B/bench)
+	@$B/bench
+
+$B/bench: test/chip/bench.c $B/libvboard.so
+	@$(compile) $(board_includes) -o $@.new $^ && mv $@.new $@
 
 setup-run:
 	@tools/setup/prepare.sh run
 
 # ---- firmware and virtual board on the PC --------------------------------------------------------------------------------
 .PHONY: lib vboard FORCE
-lib: $B/libfirmware.a ## [run] build/host/libfirmware.a: the firmware as a PC library [DEFINES=-D... USERPARAMS=folder VARIANT= SAN=1]
-	@:
+lib: ## [run] build/host/libfirmware.a: the firmware as a PC library [DEFINES=-D... USERPARAMS=folder VARIANT= SAN=1]
+	$(call build,$B/libfirmware.a)
 
-vboard: $B/libvboard.so ## [run] build/host/libvboard.so: the virtual board with the firmware in it [as lib]
-	@:
+vboard: ## [run] build/host/libvboard.so: the virtual board with the firmware in it [as lib]
+	$(call build,$B/libvboard.so)
 
-$B/flags: FORCE
-	@test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
-	    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
+ifneq ($(USERPARAMS),)
+$B/header/userparams.h: FORCE
+	$(copy_header)
+endif
+
+$B/flags: FORCE $(if $(USERPARAMS),$B/header/userparams.h)
+	$(need_header)
 	$(call known_defines)
+	$(no_parameters)
 	$(call remember,$(compile))
 
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
 
+# Nothing is compiled with a userparams.h that cannot work.
+params = @tools/make/userparams.sh $@
+params_source := firmware/drive/param_text.c firmware/drive/param_check.c tools/make/userparams.sh
+$B/params: $B/flags $(params_source)
+	$(params) $(compile)
+
 $(board_objects): private INCLUDES += $(board_includes)
 
-$B/%.o: %.c $B/flags
+$B/%.o: %.c $B/flags | $B/params
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
@@ -183,8 +229,8 @@ $B/libfirmware.a: $(firmware_objects) $B/contents
 	$(call say,ar,$@)ar rcs $@.new $(firmware_objects) && mv -f $@.new $@
 
 $B/libvboard.so: $(board_objects) $(firmware_objects) $B/contents
-	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@ \
-	    $(board_objects) $(filter-out %/main.o,$(firmware_objects)) -lm
+	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@.new \
+	    $(board_objects) $(filter-out %/main.o,$(firmware_objects)) -lm && mv -f $@.new $@
 
 # ---- tests: pytest runs the Python tests and the Unity executables, after make has built what they need ----------------------
 c_tests = $(patsubst test/%.c,%,$(wildcard test/$1/test_*.c))
@@ -199,7 +245,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams make_%),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
@@ -213,7 +259,7 @@ mode_stamps := $(addprefix $T/made/modes/,default $(modes))
 stamps = $(addprefix $T/made/,$1) $(if $(filter static/test_modes,$1),$(mode_stamps))
 run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unknown_suites,$1)'$(comma) make $@: make test runs them all and shows their names" >&2; \
     exit 2;) mkdir -p $T; exec 9>$T/lock; flock -n 9 || { echo "waiting for another make test"; flock 9; }; \
-    rm -rf $T/made $(if $2,$T/summary.json); $(MAKE) -k $(call stamps,$(call chosen,$1)) || true; \
+    rm -rf $T/made $(if $2,$T/summary.json); ($(if $(suffix),$(shared)) $(lock) $(MAKE) -k $(call stamps,$(call chosen,$1))) || true; \
     PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
     --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
@@ -234,7 +280,7 @@ setup-checks: setup-test
 
 setup-test:
 	@tools/setup/prepare.sh test
-	@$(MAKE) gems
+	$(if $(wildcard $(gem_stamp)),,$(call build,$(gem_stamp)))
 
 # Unity and CMock are the copies that the ceedling gem carries.
 ceedling := 1.2.1
@@ -243,8 +289,7 @@ unity := build/gems/gems/ceedling-$(ceedling)/vendor/unity
 cmock := build/gems/gems/ceedling-$(ceedling)/vendor/cmock
 
 .PHONY: gems
-gems: $(gem_stamp)
-	@:
+gems: setup-test
 
 $(gem_stamp):
 	@tools/setup/gems.sh $(ceedling) $@
@@ -265,10 +310,10 @@ own_defines = $$(sed -n '1,5s@.*/\* defines: \(.*\) \*/.*@\1@p' $1)
 test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes) $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
     -isystem $(unity)/src -isystem $(cmock)/src -DUNITY_INCLUDE_CONFIG_H $(DEFINES)
 
-$T/flags: FORCE
+$T/flags: FORCE | $B/flags
 	$(call remember,$(test_compile))
 
-$T/%.o: test/%.c $T/flags | $(gem_stamp) $(golden_stamp)
+$T/%.o: test/%.c $T/flags | $B/params $(gem_stamp) $(golden_stamp)
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(test_compile) $(warnings) -Werror $(call own_defines,$<) -MMD -MP -c $< -o $@
 
@@ -276,7 +321,7 @@ $T/%_runner.c: test/%.c test/unit/support/cmock.yml | $(gem_stamp)
 	@mkdir -p $(@D)
 	$(quiet)$(RUBY) $(unity)/auto/generate_test_runner.rb test/unit/support/cmock.yml $< $@ >$@.log 2>&1 || { head -n 1 $@.log >&2; exit 1; }
 
-$T/%_runner.o: $T/%_runner.c $T/flags
+$T/%_runner.o: $T/%_runner.c $T/flags | $(golden_stamp)
 	$(quiet)$(test_compile) -w -Itest/$(*D) $(call own_defines,test/$*.c) -MMD -MP -c $< -o $@
 
 $T/unity.o: $T/flags | $(gem_stamp)
@@ -319,7 +364,7 @@ $(addprefix $T/made/,$(unit_c) $(board_c) $(behaviour_c)): $T/made/%: $T/%
 $(addprefix $T/made/,$(bench_py)): $B/libvboard.so
 
 $(mode_stamps): $T/made/modes/%:
-	@+$(MAKE) -s WERROR=1 SAN= VARIANT=warnings-$* DEFINES=$(if $(filter-out default,$*),-D$*) lib vboard
+	@+$(MAKE) -s WERROR=1 SAN= VARIANT=warnings-$* DEFINES=$(if $(filter-out default,$*),-D$*) $(call libraries,build/host-warnings-$*)
 	@mkdir -p $(@D) && touch $@
 
 # Further checks, each with its own rules; they may add suites to all_suites.
@@ -328,17 +373,16 @@ include $(part_makefiles)
 # ---- checks and cleaning -------------------------------------------------------------------------------------------------
 .PHONY: warnings sanitize clean
 warnings: ## [tests] compile every mode with warnings as errors
-	@for mode in "" $(modes:%=-D%); do \
-	    $(MAKE) WERROR=1 SAN= VARIANT=warnings-"$${mode:-default}" DEFINES="$$mode" lib vboard || exit 1; done
+	@+$(lock) for mode in "" $(modes:%=-D%); do folder=warnings-"$${mode:-default}"; \
+	    $(MAKE) WERROR=1 SAN= VARIANT="$$folder" DEFINES="$$mode" $(call libraries,"build/host-$$folder") || exit 1; done
 
-sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCENARIO=demo]
-	@$(MAKE) SAN=1 vboard
-	@LD_PRELOAD="$$($(CC) -print-file-name=libasan.so) $$($(CC) -print-file-name=libubsan.so)" \
+sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCENARIO=demo DEFINES= USERPARAMS= OUT=]
+	@library=$$($(front_end) prepare $(scenario) $(what) --sanitized) || exit; \
+	LD_PRELOAD="$$($(CC) -print-file-name=libasan.so) $$($(CC) -print-file-name=libubsan.so)" \
 	    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-	    $(front_end) run $(call quoted,$(SCENARIO)) --library build/host-san/libvboard.so --no-plots \
-	    --out $(call quoted,$(or $(OUT),build/run/sanitize))
+	    $(front_end) run $(scenario) --library "$$library" --no-plots $(out)
 
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
 	@rm -rf build/host* build/test* build/target* build/size build/golden build/run
 
--include $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)
+-include $B/params.d $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)

@@ -92,7 +92,7 @@
 #define IDREF_SPEED17 -2.66
 
 /* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */
-#define INVKFI_SPEED0  NORM_INVKFIBASE    /* [Q15/2]         512 .. 32767   1/Kphi of each entry */
+#define INVKFI_SPEED0  NORM_INVKFIBASE    /* [Q15/2]         1024 .. 32767  1/Kphi of each entry */
 #define INVKFI_SPEED1  NORM_INVKFIBASE
 #define INVKFI_SPEED2  NORM_INVKFIBASE
 #define INVKFI_SPEED3  NORM_INVKFIBASE
@@ -238,6 +238,7 @@
  *   svm.knee_q13                    0.0032227 A                   6  Q13 A                          exact  current from which it is full
  *   svm.dead_slope_q8                  13.333 1                3413  Q8                          -0.010 %  duty per current
  *   svm.turn_q13                      0.39597 A                 737  Q13 A                          exact  most that a current turns in a period
+ *   bus_shift                               2 1                   1  count                          exact  the bus is shifted left by it
  *   voltage_limit_per_bus_q16          0.5404 V/V             35143  Q14 V per Q16 bus           -0.002 %  voltage circle
  *   duty_per_volt_numerator              52.8 V           264172656  Q32                         +0.000 %  duty per volt at bus 1
  *   kcurr_a                              -0.5 1              -16384  Q15                            exact  gain of the samples

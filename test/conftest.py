@@ -1,8 +1,11 @@
 """What pytest knows beyond Python tests: Unity executables (unity_suites.py) and suites side by side, as make test shows them (side_by_side.py)."""
 
+import os
 import subprocess
 
 import pytest
+
+os.environ["FOC33_QUIET"] = "1" # what a command says on stderr does not depend on how long it takes
 
 pytest_plugins = ["unity_suites", "side_by_side"]
 

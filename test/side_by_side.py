@@ -19,6 +19,7 @@ def pytest_addoption(parser) -> None:
     group = parser.getgroup("foc33")
     group.addoption("--jobs", type=int, default=0, help="suites at the same time, each in its own process")
     group.addoption("--time-limit", type=float, default=600, metavar="SECONDS", help="how long a suite may take")
+    group.addoption("--told-every", type=float, default=10, metavar="SECONDS", help="how long it may be silent while suites run")
     group.addoption("--made", metavar="FOLDER", help="stamps of make: a suite without one could not be built")
     group.addoption("--summary", metavar="FILE", help="where to write the numbers of a whole run, for the README")
 
@@ -113,6 +114,7 @@ class SideBySide:
         self.counts: dict[str, Counter] = {}
         self.ignored: list[str] = []
         self.failed: list[str] = []
+        self.told_s = time.monotonic()
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -148,6 +150,14 @@ class SideBySide:
             for key in selector.get_map().values():
                 if time.monotonic() > key.data.start + self.limit_s:
                     key.data.stop()
+            self.still([key.data for key in selector.get_map().values()])
+
+    def still(self, running: list[Child]) -> None:
+        """Says which suites run when no line has come for a while."""
+        now_s = time.monotonic()
+        if running and now_s >= self.told_s + self.config.option.told_every:
+            self.told_s = now_s
+            print("  still: " + ", ".join(f"{child.suite} {now_s - child.start:.0f} s" for child in running), flush=True)
 
     def take(self, child: Child, report: pytest.TestReport) -> None:
         """Counts one report: a test passes with its call and fails with any phase."""
@@ -178,7 +188,7 @@ class SideBySide:
         self.show(child.suite, seconds)
 
     def show(self, suite: str, seconds: float = 0) -> None:
-        counts = self.counts[suite]
+        counts, self.told_s = self.counts[suite], time.monotonic()
         verdict = f"{counts['passed']:4} passed" + (f", {counts['failed']} FAILED" if counts["failed"] else "")
         print(f"  test {suite:44} {verdict}  ({seconds:.1f} s)", flush=True)
 

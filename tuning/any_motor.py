@@ -14,6 +14,7 @@ from tools.bench.build import HEADER
 from tools.bench.expect import Outcome
 from tools.common import board_file, motor_file, output, paths, workers
 from tools.common.errors import UserError
+from tools.common.progress import Progress
 
 from . import drawn
 
@@ -57,7 +58,7 @@ def command(options: argparse.Namespace) -> int:
     target = options.out or RESULTS / (f"seed-{options.seed}" + (f"-case-{numbers[0]}" if options.case else ""))
     with output.ResultFolder(target) as folder:
         jobs = [Job(drawn.draw(options.seed, number), number, folder.work / "cases", alone) for number in numbers]
-        with command_common.Progress("anymotor", len(jobs), options.quiet, "cases") as progress:
+        with Progress("anymotor", len(jobs), options.quiet, "cases") as progress:
             rows = workers.run_all(jobs, lambda job, tell: _one(job, firmware, tell), progress)
         output.write_csv(folder.work / "cases.csv", list(KEYS), [[row[key] for key in KEYS] for row in rows])
         output.write_summary(folder.work, {"seed": options.seed, "rows": [{key: row[key] for key in KEYS} for row in rows]})

@@ -3,7 +3,7 @@
 import functools
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
 from tools.common import paths
@@ -29,8 +29,8 @@ REFERENCE_TORQUE_SHARE = 0.3
 TRIM_SHARE = 0.3
 TRIM_SPEED_SHARE = 0.9
 """The voltage feedback's d current allows the rated torque up to this share of rated speed, where the current limit does."""
-TRIM_WEAK_FLUX = 0.8
-"""Flux over the header's at which the voltage feedback must still help: the adaptation's tolerance."""
+TRIM_WEAK_FLUX, TRIM_STRONG_FLUX = 0.8, 1.2
+"""Flux over the header's at which the voltage feedback must still help, and for which it must be enough: the adaptation's tolerance."""
 ROUNDING_LIMIT_PERCENT = 0.1
 MOTOR_CONSTANTS = {"adaptation.rs_base_q16": "MOTOR_RS_OHM", "fieldweak.ls_base_q16": "MOTOR_LS_MH", "NORM_INVKFIBASE": "MOTOR_KPHI_V_PER_KRPM"}
 """Constants that the estimator computes with: their rounding is an error of the motor's values."""
@@ -321,11 +321,12 @@ def _currents(d: Design, currents: limits.Currents) -> None:
           f"{limits.TRIP_SHARE:.1%} of the converter's {d.board.current_full_scale_a:.3g} A" + (
           "; lowered until the back-EMF's number format holds voltage + R I + L dI/dt at the trip level" if lowered else ""))
     full = d.envelope.id_for(TRIM_SPEED_SHARE * m.rated_speed_rpm, m.rated_torque_nm)
-    half = d.envelope.id_for(m.rated_speed_rpm, 0.5 * m.rated_torque_nm)
+    strong = replace(d.envelope, motor=replace(m, psi_vs=TRIM_STRONG_FLUX * m.psi_vs))
+    half = strong.id_for(m.rated_speed_rpm, 0.5 * m.rated_torque_nm)
     useful = d.envelope.least_voltage_id(TRIM_SPEED_SHARE * m.rated_speed_rpm) * TRIM_WEAK_FLUX
     trim = limits.digits_down(max(TRIM_SHARE * maximum, min(max(-full, -half), -useful)), 2)
     d.put("FW_TRIM_CURRENT_A", real(trim), f"{TRIM_SHARE:.0%} of the largest current, or what rated torque needs at {TRIM_SPEED_SHARE:.0%} of rated speed "
-          f"({abs(full):.2f} A) or half of it at rated speed ({abs(half):.2f} A), as far as the largest current allows; "
+          f"({abs(full):.2f} A) or half of it at rated speed with {TRIM_STRONG_FLUX - 1.0:.0%} more flux ({abs(half):.2f} A), as far as the largest current allows; "
           f"no more than {abs(useful):.2f} A, beyond which d current asks for more voltage than it saves with {1.0 - TRIM_WEAK_FLUX:.0%} less flux")
 
 

@@ -19,7 +19,7 @@ STEP_A = 0.01
 """Resolution of a d current in the table."""
 LOAD_SHARES = tuple(step / 10.0 for step in range(10, -1, -1))
 START_STEP_RPM = 10.0
-LS_RANGE, KFI_RANGE = (0.1, 0.6), (2048.0, 32767.0)
+LS_RANGE, KFI_RANGE = (0.1, 0.6), (1024.0, 32767.0)
 RETRIES, ROUNDS = 4, 3
 LOST_DEG = 90.0
 

@@ -85,8 +85,8 @@ def path_of(motor: str) -> Path:
 def load(path: Path) -> Tables:
     """Reads and checks a tables file; a wrong one is a user error with its line."""
     root = Document(path).root
-    base = root.number("inv_kfi_base", minimum=2048, maximum=32767)
-    columns = [root.numbers("idref_a", -20.0, 0.0), root.numbers("inv_kfi", 2048.0, 32767.0), root.numbers("ls_ratio", 0.1, 0.6)]
+    base = root.number("inv_kfi_base", minimum=1024, maximum=32767)
+    columns = [root.numbers("idref_a", -20.0, 0.0), root.numbers("inv_kfi", 1024.0, 32767.0), root.numbers("ls_ratio", 0.1, 0.6)]
     for name, column in zip(("idref_a", "inv_kfi", "ls_ratio"), columns):
         if len(column) != ENTRIES:
             raise root.fail(name, f"'{name}' has {len(column)} values", f"it needs {ENTRIES}; make tune-fw writes the file anew")

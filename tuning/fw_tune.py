@@ -26,6 +26,7 @@ from tools.bench import build, command_common, report
 from tools.common import board_file, board_keys, motor_file, output, paths, workers
 from tools.bench.board import Library
 from tools.common.errors import UserError
+from tools.common.progress import Progress, waiting
 
 from . import fw_tables
 from .fw_bench import Bench, Fault, built
@@ -53,9 +54,9 @@ def add_command(commands: Any) -> None:
     """Adds `tune-fw` to a command line's commands."""
     parser = commands.add_parser("tune-fw", help="field-weakening tables of a motor, found on the virtual board")
     parser.add_argument("motor", help="a name in tuning/motors, or a motor file")
-    parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
+    parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--tables", type=Path, help="where the tables go; default tuning/tables/MOTOR.toml")
-    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/MOTOR")
+    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/tune-fw/NAME")
     parser.add_argument("--torque-share", type=float, default=TORQUE_SHARE, metavar="X",
                         help=f"load that the tables carry, as a share of the rated torque; default {TORQUE_SHARE:g}")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
@@ -70,12 +71,14 @@ def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     _check(options)
     started = time.perf_counter()
-    motor, board = motor_file.load(options.motor, "tune-fw"), board_file.load(options.board, "--board")
+    motor = motor_file.load(options.motor, "tune-fw")
+    board = board_file.load(*board_file.named(motor, options.board))
     header, risks = _header(motor, board)
-    target = options.out or RESULTS / motor.name
+    name = paths.name_of(motor.path, paths.MOTORS)
+    target = options.out or RESULTS / name
     path = options.tables or fw_tables.path_of(motor.name)
     fw_tables.check_place(path)
-    with output.ResultFolder(target) as folder:
+    with output.in_turn(f"tune-fw-{name}"), output.ResultFolder(target) as folder:
         work = _Work(motor, header, risks, [motor.plant_values(), board.plant_values(), command_common.changes(options.changes)], options)
         tables, rows = work.search()
         check = work.check(tables)
@@ -147,11 +150,11 @@ class _Work:
 
     def _library(self, use: str, header: str, defines_: list[str]) -> Library:
         """Builds the firmware for a header text; the folder's name is the same each time, so that make builds only what has changed."""
-        return Library(built(FIRMWARE / f"{self.motor.name}-{use}", header, defines_))
+        return Library(built(FIRMWARE / f"{paths.name_of(self.motor.path, paths.MOTORS)}-{use}", header, defines_))
 
-    def _run(self, jobs: list[_Job], work: Callable, title: str, total: int = 1, unit: str = "") -> list[Any]:
+    def _run(self, jobs: list[_Job], work: Callable, title: str, total: int | None = None, unit: str = "") -> list[Any]:
         """The jobs' results, with a bar that says where they are; what goes wrong in one says of which motor."""
-        with command_common.Progress(title, total, self.quiet, unit) as progress:
+        with Progress(title, total, self.quiet, unit) as progress:
             def tell(news: Any) -> None:
                 index, place = 0, ""
                 if isinstance(news, tuple):
@@ -159,10 +162,7 @@ class _Work:
                     place = f"{rpm:.0f} rpm, {text}"
                 else:
                     self.motor_s += news
-                if progress.bar is not None:
-                    progress.bar.n = max(progress.bar.n, min(index, total))
-                    progress.bar.set_description_str(f"{title}: {place or f'{self.motor_s:.0f} s of motor time'}", refresh=False)
-                    progress(0.0)
+                progress.reach(max(progress.done, index), f"{title}: {place or f'{self.motor_s:.0f} s of motor time'}")
             try:
                 return workers.run_all(jobs, work, tell)
             except UserError as error:
@@ -348,8 +348,9 @@ def _write(folder: Path, tables: Tables, rows: list[dict[str, Any]], check: Chec
             "stopped": tables.stopped, "maximum_speed_rpm": tables.maximum_speed_rpm, "goal": tables.goal, "entries": rows,
             "check": check.rows, "problems": check.problems, "plots": []}
     if not options.no_plots:
-        from . import fw_plots
-        data["plots"] = fw_plots.write_all(tables, motor, folder)
+        with waiting("plots", options.quiet):
+            from . import fw_plots
+            data["plots"] = fw_plots.write_all(tables, motor, folder)
     output.write_summary(folder, report.clean(data))
     return data
 

@@ -3,6 +3,7 @@
 import itertools
 import math
 import re
+import shlex
 import textwrap
 from collections.abc import Iterator
 
@@ -41,8 +42,8 @@ def _safe(text: str) -> str:
 
 
 def wanted(motor: Motor) -> str:
-    """What MOTOR= finds a motor by."""
-    return motor.name if motor.path.parent.resolve() == paths.MOTORS.resolve() else str(paths.shown(motor.path))
+    """What MOTOR= finds a motor by, for a shell."""
+    return shlex.quote(motor.name if motor.path.parent.resolve() == paths.MOTORS.resolve() else str(paths.shown(motor.path)))
 
 
 def _head(design: Design) -> list[str]:

@@ -21,6 +21,7 @@ from tools.common.board_file import BoardFile
 from tools.common.errors import UserError
 from tools.common.motor_file import Motor
 from tools.common.param_rows import FOLLOWS, parameters
+from tools.common.progress import Progress
 from tools.common.trace import Trace
 
 from .fw_bench import built
@@ -127,19 +128,33 @@ def _measure(job: Job, library: Library, board: Board, report_s: Callable[[float
 
 
 # ---- several motors at once -------------------------------------------------------------------------------------------------
-def identify(motors: list[Motor], board_name: str, changes: board_keys.Values, current_a: float | None = None, speed_rpm: float | None = None,
-             quiet: bool = True) -> list[Identified]:
+@dataclass(frozen=True)
+class Prepared:
+    """A motor with its board and the firmware that measures it."""
+
+    motor: Motor
+    board: BoardFile
+    known: Known
+    header: str
+    library: Path
+
+
+def prepared(motor: Motor, board_name: str | None, current_a: float | None, speed_rpm: float | None) -> Prepared:
+    """Builds the firmware for a motor; on its own board if none is named."""
+    board = board_file.load(*board_file.named(motor, board_name))
+    known = Known.of(motor, board, current_a, speed_rpm)
+    text = header(known, board)
+    return Prepared(motor, board, known, text, built(HEADERS / paths.name_of(motor.path, paths.MOTORS), text, [MODE]))
+
+
+def identify(items: list[Prepared], changes: board_keys.Values, quiet: bool = True) -> list[Identified]:
     """Identifies the motors, side by side."""
-    board = board_file.load(board_name, "--board")
-    known = [Known.of(motor, board, current_a, speed_rpm) for motor in motors]
-    headers = [header(item, board) for item in known]
-    libraries = [built(HEADERS / motor.name, text, [MODE]) for motor, text in zip(motors, headers)]
-    keys = workers.run_all(libraries[:1], _keys, lambda seconds: None)[0]
-    values = [_plant(motor, board, changes, keys) for motor in motors]
-    jobs = [Job(library, value) for library, value in zip(libraries, values)]
-    with command_common.Progress("identify", 8.5 * len(jobs), quiet) as progress:
+    keys = workers.run_all([items[0].library], _keys, lambda seconds: None)[0]
+    values = [_plant(item.motor, item.board, changes, keys) for item in items]
+    jobs = [Job(item.library, value) for item, value in zip(items, values)]
+    with Progress("identify", 8.5 * len(jobs), quiet) as progress:
         measured = workers.run_all(jobs, measure, progress)
-    return [Identified(*item) for item in zip(motors, [board] * len(motors), known, headers, values, measured)]
+    return [Identified(item.motor, item.board, item.known, item.header, *found) for item, *found in zip(items, values, measured)]
 
 
 def _keys(library: Path, report_s: Callable[[float], None]) -> dict[str, board_keys.Key]:
@@ -162,12 +177,12 @@ def add_command(commands: Any) -> None:
     parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
-    parser.add_argument("--board", default="mclv", help="a name in tuning/boards, or a board file; default mclv")
+    parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--current", type=float, metavar="A", help="Q_CURRENT_REF_OPENLOOP; default: from the rating")
     parser.add_argument("--speed", type=float, metavar="RPM", help="END_SPEED_RPM; default: 40 %% of the rating")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
                         help="change a key of the virtual board, e.g. load.locked=1; may be repeated")
-    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/MOTOR")
+    parser.add_argument("--out", type=Path, help="folder for plots and numbers; default build/identify/NAME")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(command=command)
 
@@ -176,12 +191,15 @@ def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code: 1 if a value is outside its limit or the identification did not end with DONE."""
     names = command_line.one_or_all(options, paths.names(paths.MOTORS))
     _check(options)
-    motors, code = command_line.each(names, lambda name: motor_file.load(name, "command line"))
-    if not motors:
-        return code
-    found = identify(motors, options.board, command_common.changes(options.changes), options.current, options.speed, options.quiet)
+    changes = command_common.changes(options.changes)
+    board = options.board and paths.find("board", options.board, paths.BOARDS, "--board")
+    with output.in_turn("identify"):
+        ready, code = command_line.each(names, lambda name: prepared(motor_file.load(name, "command line"), options.board, options.current, options.speed))
+        if not ready:
+            return code
+        found = identify(ready, changes, options.quiet)
     for item in found:
-        target = options.out or RESULTS / item.motor.name
+        target = options.out or RESULTS / paths.pair_name(item.motor.path, board)
         _write(item, target)
         print(item.text() if not options.all else _brief(item))
         if not options.all:

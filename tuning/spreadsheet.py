@@ -8,19 +8,20 @@ import argparse
 import itertools
 import re
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, command_line, motor_file, paths
 from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
+from tools.common.progress import waiting
 
 from .design import Design, design
 
 FILE = paths.ROOT / "tuning" / "tuning_params.xlsx"
 DEFAULT_MOTOR = "hurst_dmb0224c10002"
-DEFAULT_BOARD = "mclv"
 OWN = "own motor"
 GAINS = ("D_CURRCNTR_PTERM", "Q_CURRCNTR_PTERM")
 """Parameters without a row: the tuner gives them to motors whose Ld and Lq differ."""
@@ -130,20 +131,21 @@ def add_command(commands: Any) -> None:
 
 
 def _command(_: argparse.Namespace) -> int:
-    write(FILE)
+    with waiting("spreadsheet"):
+        code = write(FILE)
     print(f"wrote {paths.shown(FILE)}")
-    return 0
+    return code
 
 
-def write(path: Path) -> None:
-    """Builds the workbook from the motor files and the table of parameters; the same files give the same bytes."""
+def write(path: Path, names: Sequence[str] | None = None) -> int:
+    """Builds the workbook from the motor files (all, if none are named) and the table of parameters; the same files give the same bytes.
+    Returns the exit code: a motor that its board cannot turn gets its line and no column."""
     try:
         from .workbook import Book
     except ImportError:
         raise UserError("Python's openpyxl is missing", "python3 -m tuning spreadsheet",
                         "install it (Debian package: python3-openpyxl; or pip install openpyxl)") from None
-    board = board_file.load(DEFAULT_BOARD)
-    designs = [design(motor_file.load(name), board) for name in paths.names(paths.MOTORS)]
+    designs, code = command_line.each(names or paths.names(paths.MOTORS), _design)
     book = Book()
     _read_me(book)
     _motor(book, len(designs))
@@ -158,6 +160,12 @@ def write(path: Path) -> None:
         _without_dates(path)
     except OSError as error:
         raise UserError(f"cannot write ({error.strerror})", str(paths.shown(path)), "choose a folder that can be written") from None
+    return code
+
+
+def _design(name: str) -> Design:
+    motor = motor_file.load(name)
+    return design(motor, board_file.load(*board_file.named(motor)))
 
 
 def _without_dates(path: Path) -> None:
@@ -188,7 +196,7 @@ def _picked(name: str) -> str:
 def _motor(book: Any, count: int) -> None:
     page = book.page("Motor", [52, 18, 18, 18, 10, 44], "Choose a motor. Yellow cells are yours: a number there replaces the value beside it.")
     row = page.line(("Motor", "label"), (DEFAULT_MOTOR, "input"))
-    page.choose(f"B{row}", f"'Motors'!$B$4:${chr(ord('B') + count)}$4")
+    page.choose(f"B{row}", f"'Motors'!$B$4:${book.letter(count + 2)}$4")
     book.name("motor_name", "Motor", f"B{row}")
     row = page.line(("column of the sheet Motors", "label"), ("=MATCH(motor_name,motor_names,0)", "value"))
     book.name("motor_column", "Motor", f"B{row}")
@@ -266,14 +274,15 @@ def _paste(book: Any) -> None:
 
 
 def _motors(book: Any, designs: list[Design]) -> None:
-    page = book.page("Motors", [40, *[26 for _ in designs], 26], "What make tune writes for each motor of tuning/motors on the board " + DEFAULT_BOARD + ".")
+    page = book.page("Motors", [40, *[26 for _ in designs], 26], "What make tune writes for each motor of tuning/motors on its board.")
     row = page.heads("Parameter", *[d.motor.name for d in designs], OWN)
-    last = chr(ord("A") + len(designs) + 1)
+    last = book.letter(len(designs) + 2)
+    usual = max(range(len(designs)), key=lambda i: designs[i].motor.name == DEFAULT_MOTOR) # the board of one's own motor
     book.name("motor_names", "Motors", f"B{row}:{last}{row}")
     for name in [*parameters(), *GAINS]:
         values = [_cell(d.params.get(name)) for d in designs]
         default = parameters()[name].default if name in parameters() else ""
-        own = values[0] if default == "FROM_BOARD" else _cell(default) if default and default not in FOLLOWS else None
+        own = values[usual] if default == "FROM_BOARD" else _cell(default) if default and default not in FOLLOWS else None
         row = page.line((name, "code"), *((value, "value") for value in [*values, own]))
         book.name(f"given_{name}", "Motors", f"B{row}:{last}{row}")
     book.count_red()

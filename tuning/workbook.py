@@ -115,6 +115,8 @@ class Page:
 class Book:
     """The workbook, its named cells and its checks (cells that say "ok")."""
 
+    letter = staticmethod(get_column_letter)
+
     def __init__(self) -> None:
         self.wb = Workbook()
         self.wb.remove(self.wb.active)

@@ -8,9 +8,9 @@ void pins_init(void)
     LATA = 0;
     LATB = 0;
     LATC = 0;
-    TRISA = 0xFFFFu;
-    TRISB = 0xFFFFu; /* the PWM module takes its pins when it is enabled */
-    TRISC = (uint16_t)~BOARD_TRISC_OUTPUTS;
+    TRISA = BOARD_TRIS(A);
+    TRISB = BOARD_TRIS(B);
+    TRISC = BOARD_TRIS(C);
 
     __builtin_write_OSCCONL(OSCCON & ~0x0040u); /* unlock the pin selection */
     RPINR12bits.FLTA1R = BOARD_FLTA_RP;

@@ -6,13 +6,31 @@
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "board/text.h"
+#include "board/watch.h"
+#include "drive/limit_reasons.h"
 #include "version.h"
 
 #define STATUS_PERIOD_MS 500u
 
-static char line[STATUS_LINE_BYTES];
-static uint16_t next; /* index of the next character; a zero byte ends the line */
+static char line[128]; /* all reasons in one line */
+static uint16_t next;  /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
+
+/** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". @return the text's end */
+static char *put_limits(char *at)
+{
+    char *end = at;
+    if (LimitParm.seen != 0u) {
+        end = text_put(end, " limit");
+    }
+#define PUT_REASON(bit, name, cause, remedy) \
+    if ((LimitParm.seen & (uint16_t)LIMIT_##name) != 0u) { \
+        end = text_put(end, " " #name); \
+    }
+    DRIVE_LIMIT_TABLE(PUT_REASON)
+    LimitParm.seen = 0;
+    return end;
+}
 
 /** The line's text. @return its end */
 static char *put_line(void)
@@ -22,7 +40,7 @@ static char *put_line(void)
         at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
         at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
         at = text_put_signed(text_put(at, " speed "), (int16_t)(estimator_speed(&board_drive.run.estimator) / NOPOLESPAIRS));
-        at = text_put(at, " rpm\r\n");
+        at = text_put(put_limits(text_put(at, " rpm")), "\r\n");
     }
     return at;
 }

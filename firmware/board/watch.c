@@ -1,6 +1,8 @@
 /* AN1292's watch variables, copied from the drive in the background. */
 #include "board/watch.h"
 
+#include "drive/limits.h"
+
 tFdWeakParm FdWeakParm;
 tMotorEstimParm MotorEstimParm;
 tEstimParm EstimParm;
@@ -8,6 +10,7 @@ tParkParm ParkParm;
 tCtrlParm CtrlParm;
 tLoadParm LoadParm;
 tAdaptParm AdaptParm;
+tLimitParm LimitParm;
 
 /** x * 2^bits, limited to 16 bits. */
 static int16_t watch_scaled(int16_t x, uint16_t bits)
@@ -49,5 +52,7 @@ void watch_refresh(void)
     LoadParm.qLoad = watch_scaled(observer_load(&run->observer, &board_params.observer), 2);
     AdaptParm.qInvKFi = qm_hi(run->adaptation.kfi_q31);
     AdaptParm.qRs = qm_hi(run->adaptation.rs_q31);
+    LimitParm.now = limits_reasons(d, &board_params);
+    LimitParm.seen |= LimitParm.now;
     mode_watch(d);
 }

@@ -1,4 +1,5 @@
 /* Refuses a userparams.h that cannot work: every value against its range, and the values against each other, by name. */
+#include "drive/param_refuse.h"
 #include "drive/param_scaling.h"
 #include "drive/param_table.h"
 
@@ -6,32 +7,34 @@
 #error userparams.h: SPEEDCNTR_ITERM and SPEEDCNTR_CTERM mean nothing: the load observer (LOAD_BANDWIDTH_HZ) takes the place of the integral, remove them
 #endif
 
-#define CHECK_TEXT_(x) #x
-#define CHECK_TEXT(x) CHECK_TEXT_(x)
-#define CHECK_RANGE(name, unit, min, max, value, meaning) \
-    CHECK(PARAM_F(name) >= PARAM_F(min) && PARAM_F(name) <= PARAM_F(max), \
-          "userparams.h: " #name " = " CHECK_TEXT(name) " is outside " #min " .. " #max " " unit)
-#define CHECK_RELATION(condition, message) CHECK(condition, "userparams.h: " message)
+#pragma GCC diagnostic ignored "-Woverflow" /* what a value out of range does to the formulas of the relations */
 
-#if __GNUC__ >= 5
-#define CHECK(condition, message) _Static_assert(condition, message);
-PARAM_RELATION_TABLE(CHECK_RELATION) /* first: one wrong value can put several others outside their ranges */
-PARAM_TABLE(CHECK_RANGE)
-#else
-/* gcc 4.5 has no _Static_assert: a call that is left after constant folding stops the build with the message. */
-#define CHECK(condition, message) CHECK_N(__COUNTER__, condition, message)
-#define CHECK_N(n, condition, message) CHECK_N_(n, condition, message)
-#define CHECK_N_(n, condition, message) \
+/* The motor's own 1/Kphi in a table: its relation says once if it does not fit. */
+#define FOLLOWS_KPHI(name) (__builtin_strcmp(PARAM_TEXT(name), PARAM_TEXT(NORM_INVKFIBASE)) == 0)
+#define IN_RANGE(name, min, max) ((PARAM_F(name) >= PARAM_F(min) && PARAM_F(name) <= PARAM_F(max)) || FOLLOWS_KPHI(name))
+#define IS_WHOLE(name) (PARAM_F(name) <= (float)(int32_t)PARAM_F(name))
+
+#define CHECK_RANGE(name, unit, min, max, value, meaning) \
+    PARAM_CHECK(range_of_##name) \
     { \
-        extern void param_check_##n(void) __attribute__((error(message))); \
-        if (!(condition)) { \
-            param_check_##n(); \
-        } \
+        if (!IN_RANGE(name, min, max)) \
+            PARAM_REFUSE(outside_##name, #name " = " PARAM_TEXT(name) " is outside " PARAM_RANGE(unit, min, max, meaning) ": correct it") \
+        else if (PARAM_COUNTED(unit) && !IS_WHOLE(name)) \
+            PARAM_REFUSE(part_##name, #name " = " PARAM_TEXT(name) " must be a whole number, " PARAM_RANGE(unit, min, max, meaning)) \
     }
-void param_check(void);
-void param_check(void)
+PARAM_TABLE(CHECK_RANGE)
+
+/* One wrong value breaks several relations: they are asked only when each value alone is right, and the first that fails ends it. */
+#define RANGE_HOLDS(name, unit, min, max, value, meaning) \
+    &&IN_RANGE(name, min, max) && (!PARAM_COUNTED(unit) || IS_WHOLE(name))
+#define CHECK_RELATION(condition, message) CHECK_RELATION_N(__COUNTER__, condition, message)
+#define CHECK_RELATION_N(n, condition, message) CHECK_RELATION_N_(n, condition, message)
+#define CHECK_RELATION_N_(n, condition, message) \
+    else if (!(condition)) \
+        PARAM_REFUSE(relation_##n, message)
+PARAM_CHECK(relations)
 {
+    if (!(1 PARAM_TABLE(RANGE_HOLDS))) {
+    }
     PARAM_RELATION_TABLE(CHECK_RELATION)
-    PARAM_TABLE(CHECK_RANGE)
 }
-#endif

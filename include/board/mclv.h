@@ -1,14 +1,39 @@
 /* The dsPICDEM MCLV with a dsPIC33FJ32MC204: its pins, channels and the values of their registers in one place.
  *
- * [?] marks what no published source confirms; check it against your board's schematic before you rely on it. Two such facts are used
- * elsewhere: the bus divider of 16 [?, known for the MCLV-2 only] in userparams.h's BUS_FULL_SCALE_V = 16 * 3.3 V, and the
- * debugger's pins PGC3/PGD3 [?] in config.c. */
+ * [?] marks what no published source confirms; check it against your board's schematic before you rely on it. One such fact is used
+ * elsewhere: the bus divider of 16 [?, known for the MCLV-2 only] in userparams.h's BUS_FULL_SCALE_V = 16 * 3.3 V. */
 #ifndef BOARD_MCLV_H
 #define BOARD_MCLV_H
 
 #include <xc.h>
 
+#include "board/pin_table.h"
 #include "drive/param_scaling.h"
+
+/* ---- Pins, as port and bit: the only place that chooses them. "what; known from" feeds docs/pins.md ----
+ * currents and bus: AN0..2 or AN3..5 in this order, which the converter samples at once; FAULT and UART: a pin with an RP number. */
+#define BOARD_PIN_CURRENT_A A, 0 /* current of phase A, 0.375 V/A around 1.65 V; AN1292 and published code for this board */
+#define BOARD_PIN_CURRENT_B A, 1 /* current of phase B; AN1292 and published code */
+#define BOARD_PIN_BUS B, 0       /* bus voltage / 16; published code, the divider is known for the MCLV-2 only [?] */
+#define BOARD_PIN_POT C, 2       /* potentiometer; published code */
+#define BOARD_PIN_S2 A, 8        /* S2, low when pressed; published code */
+#define BOARD_PIN_S3 B, 4        /* S3, low when pressed; published code */
+#define BOARD_PIN_FAULT B, 8     /* FLTA1, the over-current comparator, low on a fault; published code */
+#define BOARD_PIN_UART_TX C, 3   /* serial line, transmits at 115200 baud; [?] try C, 5 (RP21) first if no line comes */
+#define BOARD_PIN_UART_RX C, 4   /* serial line, receives; one other program for this board, its board unknown [?] */
+#define BOARD_PIN_LED_ALIVE C, 6 /* LED: alive, fault code; [?] a free pin until it is known */
+#define BOARD_PIN_LED_RUN C, 7   /* LED: running; [?] a free pin until it is known */
+/* The chip fixes the PWM pins; a low side is one bit above its high side. */
+#define BOARD_PIN_PWM_A B, 14 /* PWM of phase A (M1), high side; published code */
+#define BOARD_PIN_PWM_B B, 12 /* PWM of phase B (M2), high side; published code */
+#define BOARD_PIN_PWM_C B, 10 /* PWM of phase C (M3), high side; published code */
+
+PIN_NEEDS(currents_and_bus_are_AN0_to_2_or_AN3_to_5,
+          (PIN_AN(BOARD_PIN_CURRENT_A) == 0 || PIN_AN(BOARD_PIN_CURRENT_A) == 3) && PIN_AN(BOARD_PIN_CURRENT_B) == PIN_AN(BOARD_PIN_CURRENT_A) + 1
+              && PIN_AN(BOARD_PIN_BUS) == PIN_AN(BOARD_PIN_CURRENT_A) + 2);
+PIN_NEEDS(potentiometer_has_an_AN_number, PIN_AN(BOARD_PIN_POT) >= 0);
+PIN_NEEDS(fault_input_has_an_RP_number, PIN_RP(BOARD_PIN_FAULT) >= 0);
+PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(BOARD_PIN_UART_RX) >= 0);
 
 #ifdef __XC16__
 #define BOARD_ISR __attribute__((interrupt, no_auto_psv))
@@ -25,14 +50,14 @@
 #define BOARD_OSCCON_LOCK 0x0020u
 #define BOARD_WAIT_LOOPS 60000u /* bound of every wait on the oscillator, far above its 2 ms */
 
-/* ---- PWM1: centre-aligned, 20 kHz, three complementary pairs; M1 = RB14/15, M2 = RB12/13, M3 = RB10/11 ---- */
+/* ---- PWM1: centre-aligned, 20 kHz, three complementary pairs ---- */
 #define BOARD_P1TPER ((uint16_t)(PWM_FULL_DUTY / 2 - 1))
 #define BOARD_P1TCON 0x8002u                                                  /* on, up/down counting */
 #define BOARD_PWM1CON1 0x0077u                                                /* pairs 1-3 enabled, complementary */
 #define BOARD_P1DTCON1 ((uint16_t)(0x0040u | (uint16_t)(DEAD_TIME_DUTY / 2))) /* unit A, two clocks a count */
 #define BOARD_P1FLTACON 0x0087u                                               /* FLTA: pairs 1-3 inactive, cycle by cycle */
-#define BOARD_FLTA_RP 8u                                                      /* FLTA1 on RP8/RB8 */
-#define BOARD_FLTA_LOW() ((uint16_t)(PORTBbits.RB8 == 0u))                    /* the comparator holds the outputs off */
+#define BOARD_FLTA_RP ((uint16_t)PIN_RP(BOARD_PIN_FAULT))
+#define BOARD_FLTA_LOW() PIN_LOW(BOARD_PIN_FAULT) /* the comparator holds the outputs off */
 #define BOARD_OUTPUTS_OFF 0x0000u
 #define BOARD_OUTPUTS_BOOTSTRAP 0x0015u /* all low sides on */
 #define BOARD_OUTPUTS_PWM 0x3F00u
@@ -41,26 +66,29 @@
 #define BOARD_P1SECMP ((uint16_t)(0x8000u | (BOARD_P1TPER - SAMPLE_DELAY_CLOCKS)))
 
 /* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 100 ns = 4.8 us ---- */
-#define BOARD_AD1CON1 0x036Cu               /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */
-#define BOARD_AD1CON2 0x0200u               /* CHPS 2: CH0..CH3 */
-#define BOARD_AD1CON3 0x0003u               /* TAD = 4 Tcy = 100 ns; the converter needs 76 ns */
-#define BOARD_AD1CHS0 0x0008u               /* CH0: AN8, potentiometer (RC2) */
-#define BOARD_AD1CHS123 0x0000u             /* CH1: AN0 I_A (RA0), CH2: AN1 I_B (RA1), CH3: AN2 bus (RB0) */
-#define BOARD_AD1PCFGL ((uint16_t)~0x0107u) /* analogue: AN0, AN1, AN2, AN8 */
+#define BOARD_AD1CON1 0x036Cu                                                    /* FORM 3, SSRC 3 (PWM), SIMSAM, ASAM; ADON separately */
+#define BOARD_AD1CON2 0x0200u                                                    /* CHPS 2: CH0..CH3 */
+#define BOARD_AD1CON3 0x0003u                                                    /* TAD = 4 Tcy = 100 ns; the converter needs 76 ns */
+#define BOARD_AD1CHS0 ((uint16_t)PIN_AN(BOARD_PIN_POT))                          /* CH0 */
+#define BOARD_AD1CHS123 ((uint16_t)((PIN_AN(BOARD_PIN_CURRENT_A) == 0) ? 0 : 1)) /* CH1: I_A, CH2: I_B, CH3: bus */
+#define BOARD_AD1PCFGL ((uint16_t) ~(PIN_AN_MASK(BOARD_PIN_CURRENT_A) | PIN_AN_MASK(BOARD_PIN_CURRENT_B) | PIN_AN_MASK(BOARD_PIN_BUS) \
+                                     | PIN_AN_MASK(BOARD_PIN_POT))) /* 0 is analogue */
 
 /* ---- Buttons, active low ---- */
-#define BOARD_S2_DOWN() ((uint16_t)(PORTAbits.RA8 == 0u)) /* start, stop, clear a fault */
-#define BOARD_S3_DOWN() ((uint16_t)(PORTBbits.RB4 == 0u)) /* speed range */
+#define BOARD_S2_DOWN() PIN_LOW(BOARD_PIN_S2) /* start, stop, clear a fault */
+#define BOARD_S3_DOWN() PIN_LOW(BOARD_PIN_S3) /* speed range */
 
-/* ---- UART1: 115200 8N1, status lines. RP19/RC3 transmits, RP20/RC4 receives [?] ---- */
-#define BOARD_U1BRG 86u /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
-#define BOARD_UART_TX_PIN RPOR9bits.RP19R
-#define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
-#define BOARD_UART_RX_RP 20u
+/* ---- UART1: 115200 8N1, status lines ---- */
+#define BOARD_U1BRG 86u                   /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
+#define BOARD_UART_TX_PIN RPOR9bits.RP19R /* the RP number of BOARD_PIN_UART_TX; RP21: RPOR10bits.RP21R */
+#define BOARD_UART_TX_FUNCTION 3u         /* RPnR code of U1TX */
+#define BOARD_UART_RX_RP ((uint16_t)PIN_RP(BOARD_PIN_UART_RX))
 
-/* ---- LEDs [?]: pins are not confirmed for this board; free pins until they are ---- */
-#define BOARD_LED_ALIVE LATCbits.LATC6
-#define BOARD_LED_RUN LATCbits.LATC7
-#define BOARD_TRISC_OUTPUTS ((uint16_t)((1u << 6) | (1u << 7) | (1u << 3))) /* LEDs and U1TX */
+/* ---- LEDs ---- */
+#define BOARD_LED_ALIVE PIN_LATCH(BOARD_PIN_LED_ALIVE)
+#define BOARD_LED_RUN PIN_LATCH(BOARD_PIN_LED_RUN)
+/** Directions of a port: its outputs are the LEDs and U1TX; the PWM module takes its pins when it is enabled. */
+#define BOARD_TRIS(port) \
+    ((uint16_t) ~(PIN_MASK(BOARD_PIN_LED_ALIVE, port) | PIN_MASK(BOARD_PIN_LED_RUN, port) | PIN_MASK(BOARD_PIN_UART_TX, port)))
 
 #endif

@@ -10,7 +10,8 @@ typedef struct {
     int16_t qIndex, qIdRef, qFwOnSpeed;
 } tFdWeakParm;
 
-/** Estimator's motor constants in AN1292's pre-divided formats. */
+/** Estimator's motor constants in AN1292's pre-divided formats. 1/Kphi in rpm/V (peak, line to line) is
+ *  qInvKFi / NORM_INVKFIBASE * 1000 / MOTOR_KPHI_V_PER_KRPM. */
 typedef struct {
     int16_t qRs, qLsDt, qInvKFi, qDeltaT;
 } tMotorEstimParm;
@@ -41,6 +42,11 @@ typedef struct {
     int16_t qInvKFi, qRs;
 } tAdaptParm;
 
+/** Why the drive gives less than it is asked for, sums of limit_reason_t (drive/limit_reasons.h): now, and since the last status line. */
+typedef struct {
+    uint16_t now, seen;
+} tLimitParm;
+
 extern tFdWeakParm FdWeakParm;
 extern tMotorEstimParm MotorEstimParm;
 extern tEstimParm EstimParm;
@@ -48,6 +54,7 @@ extern tParkParm ParkParm;
 extern tCtrlParm CtrlParm;
 extern tLoadParm LoadParm;
 extern tAdaptParm AdaptParm;
+extern tLimitParm LimitParm;
 
 /** Copies the drive's state to the variables above. Background. */
 void watch_refresh(void);

@@ -10,7 +10,7 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
     int16_t miss;
-    if (!mode_hands_over() || d->forced.speed_q10 < p->forced.end_speed_q10) {
+    if (!mode_hands_over() || d->state != (uint16_t)DRIVE_RAMP || d->forced.speed_q10 < p->forced.end_speed_q10) {
         return;
     }
     miss = qm_abs(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), p->end_erpm));

@@ -104,7 +104,9 @@
 #define PARAM_CURRENT_KI(iterm) ((int16_t)PARAM_ROUND(PARAM_F(iterm) * 2048.0F))
 
 /* ---- Modulator and bus ---- */
-#define PWM_TICK_SEC 0.000000025F /* one PWM clock at 40 MIPS; two duty counts */
+#define PWM_TICK_SEC 0.000000025F                                         /* one PWM clock at 40 MIPS; two duty counts */
+#define PARAM_PWM_PERIODS (PARAM_F(LOOPTIME_SEC) / (2.0F * PWM_TICK_SEC)) /* the counter's way, up or down */
+#define PARAM_PWM_REST PARAM_MAX(PARAM_PWM_PERIODS - PARAM_F(PARAM_ROUND(PARAM_PWM_PERIODS)), PARAM_F(PARAM_ROUND(PARAM_PWM_PERIODS)) - PARAM_PWM_PERIODS)
 #define PWM_FULL_DUTY ((int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / PWM_TICK_SEC))
 #define PWM_TOP_DUTY ((int16_t)(PWM_FULL_DUTY - 2 * PARAM_ROUND(PARAM_F(SAMPLE_WINDOW_SEC) / PWM_TICK_SEC)))
 #define DEAD_TIME_DUTY ((int16_t)PARAM_ROUND(PARAM_F(DEADTIME_SEC) / PWM_TICK_SEC))

@@ -2,10 +2,6 @@
 #ifndef DRIVE_PARAM_TABLE_H
 #define DRIVE_PARAM_TABLE_H
 
-#if defined(USERPARAMS_H) && !defined(LOAD_BANDWIDTH_HZ)
-#error userparams.h: LOAD_BANDWIDTH_HZ is missing, a parameter since 0.10.0: write #define LOAD_BANDWIDTH_HZ 110, or make the header anew with make tune
-#endif
-
 /* Rows on lines of their own: clang-format would stagger them. */
 /* clang-format off */
 
@@ -88,37 +84,56 @@
 #define PARAM_ACCEL_LEAST 0.0000152587890625
 
 /** A parameter's value for a message, where a userparams.h is in use: " = 150". */
-#ifdef USERPARAMS_H
+#ifdef DRIVE_PARAM_SCALING_H
 #define PARAM_IS(value) " = " PARAM_TEXT(value)
-#define PARAM_TEXT(value) #value
 #else
 #define PARAM_IS(value)
 #endif
+#define PARAM_TEXT(...) PARAM_TEXT_(__VA_ARGS__) /* of the value, also if it has a comma */
+#define PARAM_TEXT_(...) #__VA_ARGS__
+/** A parameter and its value, in a message: "NOPOLESPAIRS = 5". */
+#define PARAM_NAMED(name) #name PARAM_IS(name)
+
+/** X(name): what userparams.h may define, too; otherwise drive/param_scaling.h computes it. */
+#define PARAM_OPTIONAL(X) \
+    X(D_CURRCNTR_PTERM) X(D_CURRCNTR_ITERM) X(D_CURRCNTR_CTERM) \
+    X(Q_CURRCNTR_PTERM) X(Q_CURRCNTR_ITERM) X(Q_CURRCNTR_CTERM) X(SPEEDCNTR_PTERM)
+
+/** Parameters in these units are whole numbers. */
+#define PARAM_COUNTED(unit) \
+    (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 \
+     || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */
 #define PARAM_RELATION_TABLE(X) \
-    X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM") \
-    X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM") \
-    X(FW_START_SPEED_RPM < MAXIMUM_SPEED_RPM, "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM") \
+    X(PARAM_PWM_REST < 0.01F, \
+      PARAM_NAMED(LOOPTIME_SEC) " must be a multiple of 50 ns, as 0.00005 is: the PWM counts up and down in steps of 25 ns") \
+    PARAM_RELATION_GAIN(X, KCURRA) PARAM_RELATION_GAIN(X, KCURRB) \
+    X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, PARAM_NAMED(NOMINAL_SPEED_RPM) " must be above " PARAM_NAMED(MINIMUM_SPEED_RPM)) \
+    X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, PARAM_NAMED(MAXIMUM_SPEED_RPM) " must be at least " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
+    X(FW_START_SPEED_RPM < MAXIMUM_SPEED_RPM, PARAM_NAMED(FW_START_SPEED_RPM) " must be below " PARAM_NAMED(MAXIMUM_SPEED_RPM)) \
     X(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_ERPM), \
       "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000: speeds are 16-bit electrical rpm") \
     X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_NOMINAL_ERPM), \
       "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000: lower NOMINAL_SPEED_RPM, the one-sample derivative then starts earlier") \
-    X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM") \
+    X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, PARAM_NAMED(END_SPEED_RPM) " must be at most " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
     X(PARAM_RS_FULL < 524287.0F, \
-      "MOTOR_RS_OHM does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
+      PARAM_NAMED(MOTOR_RS_OHM) " does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
     X(PARAM_LS_FULL * 1.2F < 524287.0F, \
-      "MOTOR_LS_MH does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
-    X(PARAM_RS_FULL >= 100.0F, "MOTOR_RS_OHM rounds by more than 0.5 %: the current range is too small for this motor") \
+      PARAM_NAMED(MOTOR_LS_MH) " does not fit its Q format: use a smaller current range (NORM_CURRENT_CONST) or a longer LOOPTIME_SEC") \
+    X(PARAM_RS_FULL >= 100.0F, PARAM_NAMED(MOTOR_RS_OHM) " rounds by more than 0.5 %: the current range is too small for this motor") \
     X(PARAM_INVKFI >= 1024.0F && PARAM_INVKFI < 32767.0F, \
-      "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format (1024 .. 32767): check its unit, V peak line to line per 1000 rpm") \
-    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A") \
-    X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A") \
+      PARAM_NAMED(MOTOR_KPHI_V_PER_KRPM) " does not fit 1/Kphi's Q format (1024 .. 32767): check its unit, V peak line to line per " \
+      "1000 rpm") \
+    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
+    X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
+      PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \
     X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= PARAM_F(PARAM_TRIP_SHARE) * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
-      "OVER_CURRENT_THRESHOLD_A must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
+      PARAM_NAMED(OVER_CURRENT_THRESHOLD_A) " must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
     X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.063F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
-      "MAXIMUM_CURRENT_A must be at least 6.3 % of the range NORM_CURRENT_CONST * 32768") \
-    X(PARAM_F(FW_TRIM_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), "FW_TRIM_CURRENT_A must not exceed MAXIMUM_CURRENT_A") \
+      PARAM_NAMED(MAXIMUM_CURRENT_A) " must be at least 6.3 % of the range NORM_CURRENT_CONST * 32768") \
+    X(PARAM_F(FW_TRIM_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
+      PARAM_NAMED(FW_TRIM_CURRENT_A) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \
       "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
     X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \
@@ -133,39 +148,47 @@
     PARAM_RELATION_IDREF(X, 8) PARAM_RELATION_IDREF(X, 9) PARAM_RELATION_IDREF(X, 10) PARAM_RELATION_IDREF(X, 11) \
     PARAM_RELATION_IDREF(X, 12) PARAM_RELATION_IDREF(X, 13) PARAM_RELATION_IDREF(X, 14) PARAM_RELATION_IDREF(X, 15) \
     PARAM_RELATION_IDREF(X, 16) PARAM_RELATION_IDREF(X, 17) \
-    X(PARAM_VOLTAGE_PER_BUS < 4.0F * 65535.0F, "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V: their ratio must be at most 16") \
-    X(OVER_VOLTAGE_V > NOMINAL_BUS_V, "OVER_VOLTAGE_V must be above NOMINAL_BUS_V") \
-    X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V, or it never trips") \
+    X(PARAM_VOLTAGE_PER_BUS < 4.0F * 65535.0F, PARAM_NAMED(BUS_FULL_SCALE_V) " is too large for NOMINAL_BUS_V: their ratio must be at most 16") \
+    X(OVER_VOLTAGE_V > NOMINAL_BUS_V, PARAM_NAMED(OVER_VOLTAGE_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
+    X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), \
+      PARAM_NAMED(OVER_VOLTAGE_V) " must be inside BUS_FULL_SCALE_V, or it never trips") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), \
-      "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
-    X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, "UNDER_VOLTAGE_V must be below NOMINAL_BUS_V") \
+      PARAM_NAMED(OVER_VOLTAGE_V) " must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
+    X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, PARAM_NAMED(UNDER_VOLTAGE_V) " must be below " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(PARAM_F(UNDER_VOLTAGE_V) >= 0.3F * PARAM_F(NOMINAL_BUS_V), \
-      "UNDER_VOLTAGE_V must be at least 0.3 * NOMINAL_BUS_V: the voltage circle's reciprocal ends there") \
-    X(REGEN_LIMIT_V > NOMINAL_BUS_V, "REGEN_LIMIT_V must be above NOMINAL_BUS_V") \
-    X(PARAM_F(REGEN_LIMIT_V) + 2.0F <= PARAM_F(OVER_VOLTAGE_V), "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V") \
+      PARAM_NAMED(UNDER_VOLTAGE_V) " must be at least 0.3 * NOMINAL_BUS_V: the voltage circle's reciprocal ends there") \
+    X(REGEN_LIMIT_V > NOMINAL_BUS_V, PARAM_NAMED(REGEN_LIMIT_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
+    X(PARAM_F(REGEN_LIMIT_V) + 2.0F <= PARAM_F(OVER_VOLTAGE_V), \
+      PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V)) \
     X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, \
-      "UNDER_VOLTAGE_V is too low for the modulator's division") \
+      PARAM_NAMED(UNDER_VOLTAGE_V) " is too low for the modulator's division") \
     X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000501F >= PARAM_F(DEADTIME_SEC), \
-      "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us: the low sides then conduct for 1 us before the sample") \
+      PARAM_NAMED(SAMPLE_WINDOW_SEC) " must be at least DEADTIME_SEC - 0.5 us: the low sides then conduct for 1 us before the sample") \
     X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, \
-      "the current gain exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
+      "the current gain exceeds its Q format: lower " PARAM_NAMED(CURRENT_BANDWIDTH_HZ)) \
     X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, \
-      "the current integral exceeds its Q format: lower CURRENT_BANDWIDTH_HZ") \
-    X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower SPEED_BANDWIDTH_HZ") \
+      "the current integral exceeds its Q format: lower " PARAM_NAMED(CURRENT_BANDWIDTH_HZ)) \
+    X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower " PARAM_NAMED(SPEED_BANDWIDTH_HZ)) \
     X(PARAM_ACCEL < PARAM_F(PARAM_ACCEL_MOST) && PARAM_ACCEL >= PARAM_F(PARAM_ACCEL_LEAST), \
-      "MOTOR_INERTIA_KGM2 does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): check its unit") \
+      PARAM_NAMED(MOTOR_INERTIA_KGM2) " does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): " \
+      "check its unit") \
     X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074: the observer's step is eight periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
     X(PARAM_F(SPEED_BANDWIDTH_HZ) <= PARAM_CALM_HZ, \
-      "SPEED_BANDWIDTH_HZ" PARAM_IS(SPEED_BANDWIDTH_HZ) " must be at most 0.148 * LOAD_BANDWIDTH_HZ, or 0.4 of the electrical frequency at " \
-      "MINIMUM_SPEED_RPM if that is more: lower it, or the speed hunts without load")
+      PARAM_NAMED(SPEED_BANDWIDTH_HZ) " must be at most 0.148 * LOAD_BANDWIDTH_HZ, or 0.4 of the electrical frequency at " \
+      PARAM_NAMED(MINIMUM_SPEED_RPM) " if that is more: lower it, or the speed hunts without load")
 
 #define PARAM_RELATION_IDREF(X, i) \
-    X(PARAM_F(IDREF_SPEED##i) >= -PARAM_F(MAXIMUM_CURRENT_A), "IDREF_SPEED" #i " must not exceed MAXIMUM_CURRENT_A")
+    X(PARAM_F(IDREF_SPEED##i) >= -PARAM_F(MAXIMUM_CURRENT_A), \
+      PARAM_NAMED(IDREF_SPEED##i) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A))
+
+#define PARAM_RELATION_GAIN(X, name) \
+    X(PARAM_F(name) >= 0.1F || PARAM_F(name) <= -0.1F, \
+      #name PARAM_IS(name) " must be 0.1 .. 0.6 or -0.6 .. -0.1: 0.5 is a gain of 1, and without one no current is measured")
 
 #define PARAM_RELATION_HELD(X, name) \
     X(PARAM_F(name) * PARAM_F(NOPOLESPAIRS) >= PARAM_LOWEST_ERPM, \
-      #name PARAM_IS(name) " must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI_V_PER_KRPM: raise it, below " \
-      "the rotor is not held against what dead time leaves")
+      #name PARAM_IS(name) " must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI_V_PER_KRPM: raise it, " \
+      "below the rotor is not held against what dead time leaves")
 
 #endif

@@ -7,16 +7,12 @@
 #include "drive/reference.h"
 #include "drive/state.h"
 
-/** The next speed reference. STOPPING ramps to three quarters of the minimum speed, where it ends: the rates follow the reference. */
+/** The next speed reference. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
 {
-    speed_erpm_t target = d->command.target_erpm;
-    if (d->state == (uint16_t)DRIVE_STOPPING) {
-        target = along_direction(d, (int16_t)(p->minimum_erpm - (p->minimum_erpm >> 2)));
-    } else if (mode_reference_step(d, p)) {
-        return;
+    if (d->state == (uint16_t)DRIVE_STOPPING || !mode_reference_step(d, p)) {
+        reference_step(d, p, mode_speed_target(d, p), p->speed_ramp_q16);
     }
-    reference_step(d, p, target, p->speed_ramp_q16);
 }
 
 /** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every eighth period in closed loop. */

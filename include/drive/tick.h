@@ -72,11 +72,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 0:
         if (drive_is_closed(d)) {
             speed_step(d, p);
-        } else if (d->state == (uint16_t)DRIVE_RAMP) {
-            handover_wait(d, p);
-        } else {
-            /* off, or aligning */
         }
+        handover_wait(d, p);
         break;
     case 1:
         if (d->state == (uint16_t)DRIVE_RAMP) {

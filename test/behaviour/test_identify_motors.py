@@ -2,6 +2,7 @@
 
 import pytest
 from pytest import approx
+from support import MOTORS
 
 from tools.bench import build
 from tools.common import board_keys, motor_file, paths, workers
@@ -13,7 +14,7 @@ HURST = "hurst_dmb0224c10002"
 def run(name: str = HURST, current_a: float | None = None, speed_rpm: float | None = None, **changes: float) -> identify_result.Identified:
     """One identification with changes to the plant; dots of keys are written as "__"."""
     values = board_keys.Values({key.replace("__", "."): value for key, value in changes.items()}, {})
-    return identify.identify([motor_file.load(name)], "mclv", values, current_a, speed_rpm)[0]
+    return identify.identify([identify.prepared(motor_file.load(name), "mclv", current_a, speed_rpm)], values)[0]
 
 
 def made_up(rs_ohm: float, ld_h: float, lq_h: float, kphi: float, current_a: float, speed_rpm: float) -> identify_result.Identified:
@@ -30,9 +31,8 @@ def ends(item: identify_result.Identified, result: str) -> bool:
 
 # ---- values ----------------------------------------------------------------------------------------------------------------
 def test_every_motor_is_within_its_limits():
-    names = paths.names(paths.MOTORS)
-    items = identify.identify([motor_file.load(name) for name in names], "mclv", board_keys.Values())
-    assert len(names) >= 6 and {item.motor.name: item.problems() for item in items} == {name: [] for name in names}
+    items = identify.identify([identify.prepared(motor_file.load(name), None, None, None) for name in MOTORS], board_keys.Values())
+    assert {item.motor.name: item.problems() for item in items} == {name: [] for name in MOTORS}
 
 
 @pytest.mark.parametrize("motor", [

@@ -459,6 +459,6 @@ def test_an_interrupt_is_entered_and_counted() -> None:
     assert chip.peek(RAM + 4) > 100
     assert chip.get("cpu.isr_count") == approx(chip.peek(RAM + 4), abs=1)
     assert chip.get("cpu.isr_cycles_max") < 20
-    assert chip.get("cpu.latency_cycles_mean") == approx(144 + 10, abs=8)
+    assert chip.get("cpu.latency_cycles_mean") == approx(192 + 10, abs=8)
     chip.set("cpu.isr_reset", 1)
     assert chip.get("cpu.isr_count") == 0

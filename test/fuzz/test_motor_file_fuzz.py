@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from support import MOTORS
 
 from tools.common import board_file, motor_file, paths
 from tools.common.errors import UserError
@@ -63,7 +64,7 @@ SPANS = (re.compile(r"(?<![\w\"])-?\d[\d.e+-]*"), re.compile(r"(?<=\")[^\"\n]*(?
 
 def texts() -> list[str]:
     """The good files that are spoilt."""
-    return [path.read_text(encoding="utf-8") for path in sorted(paths.MOTORS.glob("*.toml"))] + [EVERYTHING]
+    return [(paths.MOTORS / f"{name}.toml").read_text(encoding="utf-8") for name in MOTORS] + [EVERYTHING]
 
 
 def spoil_bytes(text: str, dice: random.Random) -> bytes:

@@ -1,6 +1,6 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
- * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c
+ * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c firmware/drive/limits.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
  * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between -eva-subdivide-non-linear-function vd_limit:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
@@ -276,4 +276,17 @@ void proof_start(void)
     any_state(DRIVE_STOPPED, 0);
     drive_start(&drive, &params, any(0, 1) ? 1 : -1);
     bounds_hold_again();
+}
+
+/** The reasons why the output is limited, for every state. */
+void proof_limits_reasons(void)
+{
+    set_bounds();
+    //@ loop unroll DRIVE_STATE_COUNT;
+    for (uint16_t state = DRIVE_CALIBRATE; state <= DRIVE_FAULT; state++) {
+        uint16_t reasons;
+        any_state(state, 0);
+        reasons = limits_reasons(&drive, &params);
+        //@ check known: reasons <= 127;
+    }
 }

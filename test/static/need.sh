@@ -3,6 +3,7 @@
 #
 #   test/static/need.sh <command>=<package>...
 set -u
+. tools/setup/install.sh
 
 packages=""
 for pair in "$@"; do
@@ -10,16 +11,6 @@ for pair in "$@"; do
 done
 [ -n "$packages" ] || exit 0
 
-as_root=""
-[ "$(id -u)" -eq 0 ] || as_root=sudo
-log=build/setup/apt-checks.log
 mkdir -p build/setup
-echo "foc33: installing Debian packages:$packages (log: $log)"
-install() {
-    $as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=300 "$@" >>"$log" 2>&1
-}
-# shellcheck disable=SC2086
-if ! { install update && install install --no-install-recommends $packages; }; then
-    echo "foc33: set-up, apt-get install$packages: failed; see $log, install them by hand" >&2
-    exit 2
-fi
+packages=$(echo $packages)
+debian build/setup/apt-checks.log "tools of the checks" "$packages" "make test-quick, which needs none of them"

@@ -1,10 +1,13 @@
 """The plant: motor and board files, overrides, and the check against the virtual board's keys."""
 
+from types import SimpleNamespace
+
 import pytest
 from support import LIBRARY, refusal
 
+from tools.bench import command_common
 from tools.bench.board import Library
-from tools.common import motor_file
+from tools.common import motor_file, paths
 from tools.common.board_keys import Key, Values, resolve
 
 KEYS = {"motor.rs_ohm": Key("motor.rs_ohm", "ohm", "", 0.001, 100.0, True, True),
@@ -39,3 +42,21 @@ def test_a_motor_file_knows_the_ranges_of_the_motor_s_keys_before_anything_is_bu
     keys = {name: (key.unit, key.minimum, key.maximum) for name, key in Library(LIBRARY).keys.items()
             if key.writable and name.startswith(motor_file.PLANT_TABLES)}
     assert motor_file.plant_ranges() == keys and "mech.stiction_nm" in keys
+
+
+# ---- which board -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("chosen, asked_for, motors, scenarios, expected", [
+    ("chosen", True, "motors", "scenarios", "chosen"), (None, True, "motors", "scenarios", "motors"), (None, True, "", "scenarios", "scenarios"),
+    (None, False, "motors", "scenarios", "scenarios"), (None, False, "motors", "", "motors"), (None, False, "", "", "mclv")])
+def test_the_board_is_the_chosen_one_then_that_of_a_motor_that_was_asked_for_then_the_scenarios_then_its_motors(
+        tmp_path, monkeypatch, chosen, asked_for, motors, scenarios, expected):
+    text = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+    for name in ("chosen", "motors", "scenarios", "mclv"):
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    motor = (paths.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8")
+    (tmp_path / "a_motor.toml").write_text((f'board = "{motors}"\n' if motors else "") + motor, encoding="utf-8")
+    for folder in ("BOARDS", "MOTORS"):
+        monkeypatch.setattr(paths, folder, tmp_path)
+    item = SimpleNamespace(motor="a_motor", motor_where="", board=scenarios, board_where="")
+    options = SimpleNamespace(motor="a_motor" if asked_for else None, board=chosen)
+    assert command_common.parts_of(item, options)[1].path.stem == expected

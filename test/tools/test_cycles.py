@@ -127,7 +127,7 @@ def test_comparison_with_the_pc(ticks, differences, first, defines, has_names, o
 # ---- for the user --------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("target", ["pil", "cycles", "test-target"])
 def test_without_the_compiler_each_command_says_so_in_one_line(tmp_path, target):
-    done = make(target, "VARIANT=none", path=compiler_free_path(tmp_path, "ruby", "gem", "dpkg", "date", "tr", "ld", "as"))
+    done = make(target, path=compiler_free_path(tmp_path, "ruby", "gem", "dpkg", "date", "tr", "ld", "as"))
     assert (done.returncode, len(our_lines(done))) == (2, 1), done.stderr
     assert "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16" in our_lines(done)[0]
 

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import pytest
 from pytest import approx
 from support import refused
-from tune_support import HURST, command, motors
+from support import MOTORS
+from tune_support import HURST, command
 
 from tools.common import board_file, motor_file, paths
 from tuning import constants, identify, identify_result
@@ -58,7 +59,7 @@ def test_a_board_for_large_currents_builds_too(full_scale_a):
     assert defines(Known(4, 1.0, 1400.0))["MOTOR_RS_OHM"] == "1"
 
 
-@pytest.mark.parametrize("name", motors())
+@pytest.mark.parametrize("name", MOTORS)
 def test_current_stays_below_the_boards_trip(name):
     known = Known.of(motor_file.load(name), BOARD)
     assert 1.2 * known.current_a < float(defines(known)["OVER_CURRENT_THRESHOLD_A"])
@@ -137,9 +138,17 @@ def test_another_end_is_one_line_with_the_remedy():
 
 # ---- refusals --------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("arguments, says", [
-    ((), "which motor?"), ((HURST, "--all"), "which motor?"), (("hurst",), "no motor 'hurst'"),
+    ((), "which motor?"), ((HURST, "--all"), "which motor?"), (("no_such",), "no motor 'no_such'"),
     ((HURST, "--current", "0.01"), "current = 0.01 is impossible"), ((HURST, "--speed", "9000"), "speed = 9000 is impossible"),
     (("--all", "--out", "x"), "one folder"), ((HURST, "--set", "load.lock=1"), "unknown key 'load.lock'"),
-    ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
+    ((HURST, "--current", "4.2"), "MAXIMUM_CURRENT_A = 4.2 must be below OVER_CURRENT_THRESHOLD_A")]) # by the build
 def test_mistakes_on_the_command_line(arguments, says):
     refused(command("identify", *arguments), says)
+
+
+def test_with_all_every_file_that_cannot_be_used_gets_its_line(tmp_path, monkeypatch):
+    (tmp_path / "broken.toml").write_text("x = = 1", encoding="utf-8")
+    (tmp_path / "no_board.toml").write_text('board = "no_such"\n' + FILE, encoding="utf-8")
+    monkeypatch.setattr(paths, "MOTORS", tmp_path)
+    code, out, error = command("identify", "--all")
+    assert (code, out) == (2, "") and re.fullmatch(r"foc33: TOML syntax, .*broken\.toml line 1.*\nfoc33: no board 'no_such', .*no_board\.toml line 1.*\n", error)

@@ -15,7 +15,7 @@ ROOT = paths.ROOT
 MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
 TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/common", "tools/image", "tools/make", "tools/setup")
 NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname",
-          "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr")
+          "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr", "awk", "find", "flock")
 
 
 def xc16() -> str | None:
@@ -72,6 +72,21 @@ def test_a_misspelt_mode_is_refused_on_the_pc_too():
     assert (done.returncode, len(our_lines(done))) == (2, 1) and "no mode -DTUNNING" in our_lines(done)[0]
 
 
+@pytest.mark.parametrize("names, called, defined", [(["xc-dsc-gcc"], "xc-dsc-gcc", True), (["xc16-gcc", "xc-dsc-gcc"], "xc16-gcc", False)])
+@pytest.mark.parametrize("folder", [False, True])
+def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(tmp_path, names, called, defined, folder):
+    path = compiler_free_path(tmp_path)
+    place = tmp_path / "a folder/bin" if folder else tmp_path
+    place.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        (place / name).write_text(f'#!/bin/sh\necho {name} "$@" >>"{tmp_path}/calls"\nexit 1\n', encoding="utf-8")
+        (place / name).chmod(0o755)
+    assert make("firmware", "VARIANT=none", *([f"XC16={place.parent}"] if folder else []), path=path).returncode == 2
+    calls = (tmp_path / "calls").read_text(encoding="utf-8").splitlines()
+    assert {call.split()[0] for call in calls} == {called}
+    assert all(("-U__XC16__ -D__XC16__" in call) == defined for call in calls)
+
+
 # ---- with it -------------------------------------------------------------------------------------------------------------
 with_compiler = pytest.mark.skipif(not xc16(), reason="xc16-gcc is not on PATH; give XC16=folder")
 MODES = ("OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT", "IDENTIFY", "PARAMS_IN_RAM")
@@ -98,6 +113,18 @@ def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
     for address, mask, value in ((0xF80006, 0x07, 0), (0xF80008, 0xE7, 0x45), (0xF8000A, 0xDF, 0xC4), (0xF8000C, 0xE7, 0xE7),
                                  (0xF8000E, 0x23, 0x01)):
         assert words[address] & mask == value
+
+
+@with_compiler
+def test_a_compiler_under_xc_dsc_s_names_makes_the_same_image(tmp_path):
+    real = Path(xc16()).parent
+    (tmp_path / "bin").mkdir()
+    for program in ("gcc", "bin2hex", "objdump", "ar"):
+        (tmp_path / f"bin/xc-dsc-{program}").write_text(f'#!/bin/sh\nexec {real}/xc16-{program} "$@"\n', encoding="utf-8")
+        (tmp_path / f"bin/xc-dsc-{program}").chmod(0o755)
+    for words in (["VARIANT=check"], ["VARIANT=check-dsc", f"XC16={tmp_path}"]):
+        assert make("firmware", *words).returncode == 0
+    assert (ROOT / "build/target-check-dsc/foc33.hex").read_bytes() == (ROOT / "build/target-check/foc33.hex").read_bytes()
 
 
 @with_compiler
@@ -157,7 +184,7 @@ DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some
     ("spoil_ram[board_drive.ticks & 255u] = 1;", "static volatile int16_t spoil_ram[256];", "RAM: [0-9]+ bytes of a budget of 768"),
     ("board_drive.ticks = spoil_flash[board_drive.ticks & 1023u];",
      "extern const uint16_t spoil_flash[1024];\nconst uint16_t spoil_flash[1024] = { 1 };",
-     "flash: [0-9]+ bytes of a budget of 12288"),
+     "flash: [0-9]+ bytes of a budget of [0-9]+"),
     ("spoil(board_drive.ticks);", RECURSIVE, "stack: recursion: spoil -> spoil"),
     ("spoil_pointer();", "extern void (*volatile spoil_pointer)(void);\nvoid (*volatile spoil_pointer)(void) = pwm_outputs_off;",
      "stack: firmware_background: call through a pointer"),

@@ -33,6 +33,11 @@ def test_it_has_every_source_and_header_of_the_firmware_and_no_other():
     assert roots == {element.text for element in TREE.iter("Elem")}
 
 
+def test_the_checks_of_userparams_h_come_first():
+    sources = [item.text for item in TREE.find(".//logicalFolder[@name='SourceFiles']").iter("itemPath")]
+    assert sources[:2] == ["../firmware/drive/param_text.c", "../firmware/drive/param_check.c"]
+
+
 def test_device_folders_and_flags_are_those_of_make_firmware():
     assert TREE.findtext(".//targetDevice") == "dsPIC33FJ32MC204"
     assert boxes(TREE, "C30")["optimization-level"] == "2" and boxes(TREE, "C30-LD")["remove-unused-sections"] == "true"

@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import shlex
 import sys
 from pathlib import Path
 
@@ -83,8 +84,8 @@ def judge(tmp_path, monkeypatch):
         host.write_text("#!/bin/sh\ncat <<END\n" + "".join(f"test/unit/test_x.c:1:{name}:{text}\n" for name, text in results.items())
                         + "END\n")
         host.chmod(0o755)
-        options = argparse.Namespace(out=f"{tmp_path}/out", unity="unity", runners="runners", compile=f"{tmp_path}/cc",
-                                     link=f"{tmp_path}/ld {{elf}} {{objects}}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1,
+        options = argparse.Namespace(out=f"{tmp_path}/out", unity="unity", runners="runners", compile=shlex.quote(f"{tmp_path}/cc"),
+                                     link=shlex.quote(f"{tmp_path}/ld") + " {elf} {objects}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1,
                                      flat=False)
         builder = target_run.Builder(options)
         builder.shared()

@@ -179,7 +179,7 @@ def _minimum(job, report):
 
 def slow_row(**more):
     return {"name": "x", "closed_after_s": 1.6, "fault": None, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
-            "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0} | more
+            "limited_percent": {}} | more
 
 
 @pytest.mark.parametrize("values, text", [

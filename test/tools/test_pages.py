@@ -36,7 +36,7 @@ NAMED = {
     "path": (rf"(?<![\w/.-])((?:{TOPS})/[\w./*<>-]*[\w/*>])", is_there),
     "make target": (r"(?:`|^|\| )make ([a-z][\w-]*)", set(re.findall(r"^([a-z0-9-]+):", makefiles(), re.MULTILINE)).__contains__),
     "scenario": (r"SCENARIO=([a-z]\w*)\b(?!/)", lambda name: name == "name" or is_there(f"tools/bench/scenarios/**/{name}.toml")),
-    "motor": (r"MOTOR=([a-z]\w*)", lambda name: name in ("name", "all", "my_motor") or is_there(f"tuning/motors/{name}.toml")),
+    "motor": (r"MOTOR=([a-z]\w*)\b(?!/)", lambda name: name in ("name", "all", "my_motor") or is_there(f"tuning/motors/{name}.toml")),
     "AN1292 by its name": (r"\b([Tt]he note(?:'s)?)\b", lambda name: False),
 }
 

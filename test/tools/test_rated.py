@@ -6,7 +6,7 @@ import re
 from types import SimpleNamespace
 
 import pytest
-from support import command, refusal, refused, run, step
+from support import MOTORS, command, refusal, refused, run, step
 
 from tools.bench import plots, rating_sweep, scenario, sweep
 from tools.bench.rating_sweep import Candidate, Table
@@ -23,7 +23,7 @@ TIMES = SimpleNamespace(start_s=0.1, settle_s=1.0, torque_over_s=0.5, where="her
 
 def row(**more):
     return {"motor": "m", "row": "50 %", "fault": None, "closed_after_s": 1.6, "speed_error_percent": 0.1, "angle_error_rms_deg": 2.0,
-            "current_of_maximum_percent": 50.0, "voltage_at_limit_percent": 0.0, "current_at_limit_percent": 0.0, "voltage_percent": 60.0,
+            "current_of_maximum_percent": 50.0, "limited_percent": {}, "voltage_percent": 60.0,
             "reference_rpm": 1400.0, "highest_rpm": 1402.0} | more
 
 
@@ -31,7 +31,7 @@ def row(**more):
 def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_torque_of_the_rating_and_the_header_s_maximum():
     assert (TABLE.speeds_percent, TABLE.torque_percent, TABLE.error_percent) == ([20.0, 50.0, 100.0], 50.0, 0.5)
     motor = motor_file.load(HURST)
-    rows = rating_sweep.rows_of(TABLE, Candidate(motor, None, "", SimpleNamespace(params=PARAMS)))
+    rows = rating_sweep.rows_of(TABLE, Candidate(motor, None, None, "", SimpleNamespace(params=PARAMS)))
     half, rated_rpm = 0.5 * motor.rated_torque_nm, pytest.approx(motor.rated_speed_rpm)
     assert [(item.name, item.torque_nm) for item in rows] == [("20 %", half), ("50 %", half), ("100 %", half), ("maximum", 0.0)]
     assert [rows[0].rpm / 0.2, rows[1].rpm / 0.5, rows[2].rpm, rows[3].rpm] == [rated_rpm, rated_rpm, rated_rpm, 5500.0]
@@ -43,7 +43,7 @@ def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_tor
     ({"closed_after_s": 5.1}, "closed loop after 5.10 s"), ({"speed_error_percent": 0.51}, "speed +0.5 %"),
     ({"speed_error_percent": None}, "no speed"), ({"angle_error_rms_deg": 10.1}, "angle"),
     ({"current_of_maximum_percent": 100.1}, "current"),
-    ({"speed_error_percent": -2.0, "voltage_at_limit_percent": 100.0}, "speed -2.0 % (voltage 100 % of the time)")])
+    ({"speed_error_percent": -2.0, "limited_percent": {"VOLTAGE": 100.0}}, "speed -2.0 % (VOLTAGE 100 %)")])
 def test_each_way_to_fail_is_named(values, text):
     assert rating_sweep.verdict(TABLE, row(**values)) == text
     assert rating_sweep.check(TABLE, row(verdict=text))[0].ok == (text == "ok")
@@ -98,14 +98,14 @@ def test_one_motor_in_full(tmp_path):
         assert [item["row"] for item in csv.DictReader(file)] == ["20 %", "50 %", "100 %", "maximum"]
     data = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert (data["passed"], [item["header"] for item in data["motors"]]) == (True, ["userparams.h"])
-    assert {path.name for path in folder.iterdir()} == {"summary.json", "rated.csv", "rated.png"}
+    assert {path.name for path in folder.iterdir()} == {"index.html", "summary.json", "rated.csv", "rated.png"}
 
 
 def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_path, monkeypatch):
     ready = []
 
     def build(found, options):
-        ready.extend(motor.name for motor, _ in found)
+        ready.extend(motor.name for motor, *_ in found)
         raise UserError("that is enough")
     monkeypatch.setattr(paths, "TUNED", tmp_path)
     monkeypatch.setattr(rating_sweep, "_candidates", build)
@@ -119,7 +119,7 @@ def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_pa
 
 
 @pytest.mark.parametrize("arguments, parts", [
-    (["hurst"], ["no motor 'hurst'", "--motor"]), ([HURST, HURST, "--userparams", "."], ["one header for several motors"]),
+    (["no_such"], ["no motor 'no_such'", "--motor"]), ([HURST, HURST, "--userparams", "."], ["one header for several motors"]),
     ([HURST, "--userparams", "no/where"], ["no userparams.h in 'no/where'"])])
 def test_wrong_motors_and_headers_are_refused(tmp_path, arguments, parts):
     refused(command("rated", "--motor", *arguments, "--out", str(tmp_path / "out")), *parts)
@@ -127,11 +127,12 @@ def test_wrong_motors_and_headers_are_refused(tmp_path, arguments, parts):
 
 
 def test_the_list_of_motors_has_a_line_for_each_and_names_a_file_that_cannot_be_read(tmp_path, monkeypatch):
-    code, out, _ = command("motors")
-    assert (code, [name for name in paths.names(paths.MOTORS) if f"\n{name} " not in f"\n{out}"]) == (0, [])
-    (tmp_path / f"{HURST}.toml").write_bytes((paths.MOTORS / f"{HURST}.toml").read_bytes())
-    (tmp_path / "broken.toml").write_text("x = = 1", encoding="utf-8")
+    for name in MOTORS:
+        (tmp_path / f"{name}.toml").write_bytes((paths.MOTORS / f"{name}.toml").read_bytes())
     monkeypatch.setattr(paths, "MOTORS", tmp_path)
+    code, out, _ = command("motors")
+    assert (code, [name for name in MOTORS if f"\n{name} " not in f"\n{out}"]) == (0, [])
+    (tmp_path / "broken.toml").write_text("x = = 1", encoding="utf-8")
     code, out, error = command("motors")
     assert code == 2 and f"\n{HURST} " in out and re.fullmatch(r"foc33: TOML syntax, .*broken\.toml line 1.*\n", error)
 

@@ -21,8 +21,8 @@ ALONE = {(1.0, 1.0, 1.0): "none", (0.7, 1.0, 1.0): "R", (1.5, 1.0, 1.0): "R", (1
 
 
 def row(**more):
-    return {"closed_after_s": 1.6, "fault": None, "fault_s": None, "speed_error_percent": 0.1, "voltage_at_limit_percent": 0.0,
-            "current_at_limit_percent": 0.0, "angle_error_rms_deg": 1.0, "angle_limit_deg": 2.0, "beyond": ""} | more
+    return {"closed_after_s": 1.6, "fault": None, "fault_s": None, "speed_error_percent": 0.1, "limited_percent": {},
+            "angle_error_rms_deg": 1.0, "angle_limit_deg": 2.0, "beyond": ""} | more
 
 
 # ---- deviations ----------------------------------------------------------------------------------------------------------
@@ -212,7 +212,7 @@ def test_the_promised_deviations_in_full(tmp_path):
 
 
 @pytest.mark.parametrize("arguments, part", [
-    (["--motor", "hurst"], "no motor 'hurst'"), (["--userparams", "no/where"], "no userparams.h in 'no/where'"),
+    (["--motor", "no_such"], "no motor 'no_such'"), (["--userparams", "no/where"], "no userparams.h in 'no/where'"),
     (["--library", str(LIBRARY), "--userparams", "."], "leave out --library or --userparams")])
 def test_a_mistake_is_one_line(tmp_path, arguments, part):
     refused(command("robust", *arguments, "--out", str(tmp_path / "out")), part)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import PERIOD_S, run, step, trace
 
-from tools.bench.metrics import MEASURE_VALUES, Measure, measure_values
+from tools.bench.metrics import MEASURE_VALUES, Measure, limited_percent, measure_values
 from tools.common.trace import wrapped_deg
 
 ROW = Measure("row", 0.5, 1.5, 1000.0)
@@ -29,14 +29,21 @@ def test_every_value_is_described_and_none_is_known_of_an_empty_window():
     ({"fw__theta_est_deg": lambda t: np.where(np.arange(len(t)) % 2, 10.0, 350.0)}, # the RMS includes what the mean hides
      {"angle_error_mean_deg": 0.0, "angle_error_rms_deg": 10.0}, 1e-3),
     ({"fw__v_d_v": -3, "fw__v_q_v": 4, "fw__v_limit_v": step((0, 10), (1.0, 5))},
-     {"voltage_v": 5.0, "voltage_percent": 75.0, "voltage_at_limit_percent": 50.0}, 0.1),
-    ({"fw__iq_ref_a": step((0, 2), (0.75, -2), (1.0, 1.9)), "fw__iq_limit_a": 2}, {"current_at_limit_percent": 50.0}, 0.1), # both signs
+     {"voltage_v": 5.0, "voltage_percent": 75.0}, 0.1),
+    ({"fw__inv_kphi_rpm_per_v": step((0, 140), (1.0, 130))}, {"inv_kphi_rpm_per_v": 135.0}, 0.1),
     ({"fw__speed_est_rpm": 1000, "pwm__outputs_seen": 0}, # a bridge that is off has no estimate
      {"estimated_rpm": None, "angle_error_rms_deg": None, "voltage_v": None, "speed_rpm": 0.0}, 0.0)])
 def test_measures(signals, expected, within):
     found = values(**signals)
     for name, value in expected.items():
         assert found[name] == (None if value is None else pytest.approx(value, abs=within)), name
+
+
+def test_each_reason_for_a_limit_counts_for_its_share_of_the_time_with_the_bridge_on():
+    part = trace(fw__limits=step((0, 3), (0.5, 8), (1.0, 1), (1.5, 0)), pwm__outputs_seen=step((0, 63), (1.0, 0), (1.5, 63)))
+    assert limited_percent(part) == pytest.approx({"VOLTAGE": 100 / 3, "CURRENT": 100 / 3, "RAMP": 100 / 3}, abs=0.1)
+    assert limited_percent(trace(fw__limits=3)) == {} # the bridge was never on
+    assert limited_percent(trace(0.1).part(1.0, 1.5)) == {}
 
 
 def test_backward_speed_that_is_too_fast_is_a_positive_error():

@@ -79,7 +79,7 @@ def test_a_title_and_a_possible_duration_are_required(old, new, part):
 
 def test_what_a_scenario_leaves_out_has_defaults():
     item = read(document("title = \"t\"\nduration_s = 1.0\n" + EVENT + "press = \"S2\""))
-    assert (item.motor, item.board, item.events[0].hold_s) == ("hurst_dmb0224c10002", "mclv", 0.1)
+    assert (item.motor, item.board, item.events[0].hold_s) == ("hurst_dmb0224c10002", "", 0.1)
 
 
 def test_a_start_turns_the_potentiometer_before_power_up_and_presses_s2():

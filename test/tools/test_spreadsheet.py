@@ -12,7 +12,8 @@ import openpyxl
 import pytest
 from openpyxl.utils import column_index_from_string
 from pytest import approx
-from tune_support import CHECK, HURST, INCLUDES, build, motors, of
+from support import MOTORS
+from tune_support import CHECK, HURST, INCLUDES, build, of
 
 from tuning import constants, spreadsheet
 
@@ -28,7 +29,7 @@ COMMA = """<?xml version="1.0" encoding="UTF-8"?>
 Place = tuple[str, str]
 """The yellow cell of a row: sheet, beginning of the row's label."""
 CASES: dict[str, tuple[str, dict[Place, Any]]] = {
-    **{name: (name, {}) for name in motors()}, "empty": (spreadsheet.OWN, {}),
+    **{name: (name, {}) for name in MOTORS}, "empty": (spreadsheet.OWN, {}),
     "own": (spreadsheet.OWN, {("Motor", x.label): constants.number_of(of(HURST).params[x.parameter]) * x.factor
                               for rows in spreadsheet.DATA.values() for x in rows}
             | {("Parameters", name): 15 if text == "0xF" else text if text.startswith("NORM") else float(text)
@@ -96,13 +97,18 @@ def numbers(params: dict[str, str]) -> dict[str, Any]:
     return {name: text if text.startswith("NORM") else constants.number_of(text) for name, text in params.items()}
 
 
-every_motor = pytest.mark.parametrize("name", motors())
+every_motor = pytest.mark.parametrize("name", MOTORS)
 
 
 # ---- the file --------------------------------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def book() -> openpyxl.Workbook:
     return openpyxl.load_workbook(spreadsheet.FILE)
+
+
+def chosen(book: openpyxl.Workbook) -> list[str]:
+    """The motors of a workbook: the project's, and what a user has added to it."""
+    return [cell.value for cell in book["Motors"][4]][1:-1]
 
 
 def contents(book: openpyxl.Workbook) -> dict[str, Any]:
@@ -114,15 +120,15 @@ def contents(book: openpyxl.Workbook) -> dict[str, Any]:
 
 def test_the_committed_file_is_what_the_script_writes_and_writing_twice_gives_the_same_bytes(tmp_path, book):
     new, again = tmp_path / "new.xlsx", tmp_path / "again.xlsx"
-    spreadsheet.write(new)
-    spreadsheet.write(again)
+    for path in (new, again):
+        assert spreadsheet.write(path, chosen(book)) == 0
     assert new.read_bytes() == again.read_bytes()
     written = openpyxl.load_workbook(new)
     assert written.sheetnames == book.sheetnames and contents(written) == contents(book), "run: make spreadsheet"
 
 
 def test_every_motor_can_be_chosen_and_every_input_refuses_what_is_impossible(book):
-    assert [cell.value for cell in book["Motors"][4]][1:] == [*motors(), spreadsheet.OWN]
+    assert set(MOTORS) <= set(chosen(book)) and book["Motors"][4][-1].value == spreadsheet.OWN
     for sheet in book.worksheets[1:]:
         rules = sheet.data_validations.dataValidation
         inputs = {cell.coordinate for row in sheet for cell in row if cell.fill.start_color.rgb == "00FFF2B3"}
@@ -168,7 +174,7 @@ def test_no_formula_fails_and_no_check_is_red(name):
 
 def test_a_motor_of_ones_own_needs_its_numbers_and_then_gets_the_same_lines():
     empty, own = recalculated()["empty"], recalculated()["own"]
-    assert "#error MOTOR_RS_OHM needs a value" in empty.lines and empty["motor_column"] > len(motors()) and empty.red() > 30
+    assert "#error MOTOR_RS_OHM needs a value" in empty.lines and empty["motor_column"] > len(MOTORS) and empty.red() > 30
     assert numbers(own.params) == numbers(of(HURST).params) and own.red() == 0
 
 

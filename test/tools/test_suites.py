@@ -100,3 +100,12 @@ def test_at_the_time_limit_a_suite_ends_with_all_that_it_has_started(tmp_path):
     assert "FAILED unit/test_hangs: no end after 1 s, at test_a" in output
     time.sleep(max(0.0, begin + 3.5 - time.monotonic()))
     assert not (tmp_path / "left").exists()
+
+
+def test_while_no_suite_ends_it_says_which_ones_run(tmp_path):
+    (tmp_path / "test/unit").mkdir(parents=True)
+    (tmp_path / "test/pytest.ini").write_text("[pytest]\n")
+    (tmp_path / "test/unit/test_slow.py").write_text("import time\ndef test_a(): time.sleep(2.6)\n")
+    code, output = run(tmp_path, "--told-every", "1")
+    assert (code, re.findall(r"(?m)^  still: unit/test_slow (\d) s$", output)[:1]) == (0, ["1"]), output
+    assert "still" not in run(tmp_path)[1]

@@ -15,8 +15,7 @@ LINIX = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 800.0, "OP
 
 
 def result(**more):
-    return {"speed_rpm": 1500.0, "current_rms_a": 0.5, "speed_error_percent": 0.0, "fault": None, "voltage_at_limit_percent": 0.0,
-            "current_at_limit_percent": 0.0} | more
+    return {"speed_rpm": 1500.0, "current_rms_a": 0.5, "speed_error_percent": 0.0, "fault": None, "limited_percent": {}} | more
 
 
 # ---- Table 2 -------------------------------------------------------------------------------------------------------------
@@ -40,11 +39,11 @@ def test_a_row_fails_beyond_half_a_per_cent_above_the_note_s_current_and_with_a_
     assert (outcome.ok, outcome.row) == (ok, row) and got in outcome.got
 
 
-@pytest.mark.parametrize("error, voltage, current, text", [
-    (-3.0, 100.0, 0.0, "voltage 100 % of the time"), (-3.0, 0.4, 80.0, "current 80 % of the time"), (-0.4, 100.0, 0.0, ""),
-    (-3.0, 0.0, 0.0, "neither voltage nor current")])
-def test_a_shortfall_is_explained_by_a_number(error, voltage, current, text):
-    assert table2.limit_text(result(speed_error_percent=error, voltage_at_limit_percent=voltage, current_at_limit_percent=current)) == text
+@pytest.mark.parametrize("error, shares, text", [
+    (-3.0, {"VOLTAGE": 100.0, "CURRENT": 0.4}, "VOLTAGE 100 %"), (-3.0, {"CURRENT": 80.0, "RAMP": 1.0}, "CURRENT 80 %, RAMP 1 %"),
+    (-0.4, {"VOLTAGE": 100.0}, ""), (-3.0, {}, "not limited")])
+def test_a_shortfall_is_explained_by_what_limited_the_output_and_for_how_long(error, shares, text):
+    assert table2.limit_text(result(speed_error_percent=error, limited_percent=shares)) == text
 
 
 @pytest.mark.parametrize("room, name, old, new, said", [

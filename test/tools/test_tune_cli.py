@@ -15,6 +15,7 @@ from tune_support import FOR_ANOTHER_BOARD, HURST, command, motor_path
 
 from tools.bench import rating_sweep
 from tools.common import paths
+from tools.common.errors import UserError
 
 
 # ---- the whole result of one motor, plots included -------------------------------------------------------------------------
@@ -112,10 +113,10 @@ def test_a_folder_that_is_something_else_is_not_replaced(out):
 
 
 @pytest.mark.parametrize("arguments, says", [
-    (("tune", "hurst"), "no motor 'hurst'"), (("tune", "nowhere/motor.toml"), "no motor file"),
-    (("tune", HURST, "--board", "mclw"), "mclv"), (("tune",), "name one, or write --all"), (("tune", HURST, "--all"), "either a motor or --all"),
+    (("tune", "no_such"), "no motor 'no_such'"), (("tune", "nowhere/motor.toml"), "no motor file"),
+    (("tune", HURST, "--board", "no_such"), "no board 'no_such'"), (("tune",), "name one, or write --all"), (("tune", HURST, "--all"), "either a motor or --all"),
     (("tune", "--all", "--out", "x"), "one folder for several motors"), (("tun",), "command line"),
-    (("tune", "--all", "--board", "mclw"), "mclv"), (("motors", "--board", "mclw"), "mclv")])
+    (("tune", "--all", "--board", "no_such"), "no board 'no_such'"), (("motors", "--board", "no_such"), "no board 'no_such'")])
 def test_mistakes_on_the_command_line(arguments, says):
     refused(command(*arguments), says)
 
@@ -128,7 +129,6 @@ def test_one_motor_that_is_for_another_board_does_not_stop_the_others(several, m
     assert not (paths.TUNED / "b_large").exists()
 
 
-@pytest.mark.parametrize("result, refuses, expected", [(0, True, 2), (1, True, 2), (1, False, 1)])
 def test_all_problems_of_a_motor_and_its_board_come_in_one_run_each_with_its_file_and_line(tmp_path):
     changes = (("value = 5, source", "value = 5.5, source"), ("ohm phase", "ohms"), ("value = 2500", "value = 9e9"))
     with motor_path(*changes) as path:
@@ -157,22 +157,64 @@ def test_what_the_build_refuses_of_a_boards_numbers_names_the_board_file_and_a_m
     assert code == 2 and [word in error for word in ("electrical rpm", "load observer")] == [True, True], error
 
 
-def test_make_motors_runs_those_that_got_a_header(several, out, result, refuses, expected):
+@pytest.mark.parametrize("refuses", [True, False])
+def test_make_motors_runs_those_that_got_a_header_and_hands_on_why_the_others_did_not(several, out, refuses):
     if not refuses:
         (several / "b_large.toml").unlink()
-    with mock.patch.object(rating_sweep, "command", return_value=result) as runs:
+    with mock.patch.object(rating_sweep, "command", return_value=1) as runs:
         code, _, error = command("motors", "--out", str(out), "--quiet")
     (options,) = runs.call_args.args
-    assert (code, options.motor, options.out, options.board) == (expected, ["a_first", "c_last"], out, "mclv")
-    assert error.count("\n") == refuses
+    assert (code, error, options.motor, options.out, options.board) == (1, "", ["a_first", "c_last"], out, None)
+    assert [name for name, why in options.refused.items() if why.startswith("half the rated torque needs")] == ["b_large"] * refuses
 
 
-def test_without_any_motor_that_fits_nothing_runs(several):
+def test_a_motor_that_its_board_cannot_turn_is_a_row_with_its_reason_and_the_summary_says_that_not_all_holds(several, out):
     for name in ("a_first", "c_last"):
         (several / f"{name}.toml").unlink()
-    with mock.patch.object(rating_sweep, "command") as runs:
-        refused(command("motors"), "half the rated torque needs")
-    runs.assert_not_called()
+    code, text, error = command("motors", "--out", str(out), "--quiet")
+    assert code == 1 and re.search(r"^b_large: not run: half the rated torque needs .*b_large\.toml", text, re.MULTILINE)
+    assert "0 of 1 expectations hold" in text and re.fullmatch(r"foc33: rated: b_large: got half the rated torque needs .*\n", error)
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert not summary["passed"] and list(summary["refused"]) == ["b_large"]
+
+
+# ---- a motor's own board ---------------------------------------------------------------------------------------------------
+@pytest.fixture
+def own_board(several):
+    """a_first names a board of 30 V beside it, c_last names none."""
+    text = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8").replace("value = 24.0", "value = 30").replace("value = 27,", "value = 32,")
+    (several.parent / "my_board.toml").write_text(text, encoding="utf-8")
+    motor = several / "a_first.toml"
+    motor.write_text("board = \"../my_board.toml\"\n" + motor.read_text(encoding="utf-8"), encoding="utf-8")
+    (several / "b_large.toml").unlink()
+    return several.parent / "my_board.toml"
+
+
+def bus_v(name: str) -> float:
+    return float(re.search(r"^#define NOMINAL_BUS_V (\S+)", (paths.TUNED / name / "userparams.h").read_text(encoding="utf-8"), re.MULTILINE)[1])
+
+
+@pytest.mark.parametrize("more, folders, volts", [
+    ((), ("a_first", "c_last"), (30.0, 24.0)), (("--board", "mclv"), ("a_first-mclv", "c_last-mclv"), (24.0, 24.0))])
+def test_a_motor_is_tuned_for_the_board_that_its_file_names_unless_another_one_is_asked_for(own_board, more, folders, volts):
+    assert command("tune", "--all", "--brief", *more)[0] == 0
+    assert tuple(bus_v(folder) for folder in folders) == volts
+
+
+def test_make_motors_runs_each_motor_on_its_board(own_board, out):
+    taken = {}
+
+    def stop(found, options):
+        taken.update({motor.name: board.path.stem for motor, board, _ in found})
+        raise UserError("that is enough")
+    with mock.patch.object(rating_sweep, "_candidates", stop):
+        refused((*command("motors", "--out", str(out), "--quiet")[:1], "", "foc33: that is enough\n"))
+    assert taken == {"a_first": "my_board", "c_last": "mclv"}
+
+
+def test_a_board_that_is_not_there_is_told_with_the_line_of_the_motor_file(several):
+    with motor_path(('title = "a motor"', 'title = "a motor"\nboard = "no_such"')) as path:
+        refused(command("tune", str(path)), "no board 'no_such'", "a_motor.toml line 2")
 
 
 def test_make_help_names_the_motor_that_is_taken_without_motor():

@@ -5,7 +5,8 @@ import re
 
 import pytest
 from pytest import approx
-from tune_support import HURST, designed, motors, of
+from support import MOTORS
+from tune_support import HURST, designed, of
 
 from tools.common import paths
 from tools.common.errors import UserError
@@ -77,7 +78,7 @@ def test_each_count_stands_for_its_value_in_its_format():
     """Count times the format's unit is the value; what is left is rounding: half a count, one where the firmware cuts off."""
     odd = designed(("2.67", "2.6183"), ("1.92", "1.8391"), ("7.24", "6.9937"), ("value = 5,", "value = 7,"),
                    ("value = 2500", "value = 2213"), ("value = 5000", "value = 4100"))
-    for d in (*map(of, motors()), odd):
+    for d in (*map(of, MOTORS), odd):
         for item in d.constants:
             counts = 1.0 if item.name in CUT_OFF or item.name.startswith("observer.") else 0.51
             counts += 1.01 if item.q_format == "Q15" and item.value > 0.0 else 0.0 # Q15() takes positive numbers times 32767

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 from pytest import approx
-from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, motors, of
+from support import MOTORS
+from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, of
 
 from tools.common import board_file, motor_file
 from tools.common.errors import UserError
@@ -54,9 +55,9 @@ REFUSED = {
     "Kphi too small for its format": ({"kphi_v_per_krpm": 1.2, "rated_speed_rpm": 2000.0}, ("1/Kphi does not fit", "too fast for 24 V: use at most")),
     "resistance too large for its exponent": ({**SMALL, "board": {"current_full_scale_a": 8.0}}, ("MOTOR_RS_OHM", "smaller current range")),
     "motor too small for the board": ({"maximum_current_a": 0.2, "rated_current_a": 0.13, "rated_torque_nm": 0.007},
-                                      ("MAXIMUM_CURRENT_A must be at least 6.3 %",)),
+                                      ("MAXIMUM_CURRENT_A = 0.2 must be at least 6.3 %",)),
     "choice in [tune] that breaks a relation": ({"more": "[tune]\nEND_SPEED_RPM = 2700\n"},
-                                                ("[tune]", "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM"))}
+                                                ("[tune]", "END_SPEED_RPM = 2700 must be at most NOMINAL_SPEED_RPM = 2500"))}
 WARNED = {
     "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "larger current range")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),
@@ -135,7 +136,7 @@ def test_a_choice_in_tune_replaces_the_tuner_s_and_what_follows_from_it():
     assert d.value("MOTOR_LS_MH") == approx(d.motor.lq_h * 1e3, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", motors())
+@pytest.mark.parametrize("name", MOTORS)
 def test_currents_keep_their_order(name):
     d = of(name)
     start_a, most, trip = (d.value(x) for x in ("Q_CURRENT_REF_OPENLOOP", "MAXIMUM_CURRENT_A", "OVER_CURRENT_THRESHOLD_A"))

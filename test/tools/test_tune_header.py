@@ -6,7 +6,8 @@ import shutil
 
 import openpyxl
 import pytest
-from tune_support import CHECK, HURST, build, designed, motor_path, motors, of
+from support import MOTORS
+from tune_support import CHECK, HURST, build, designed, motor_path, of
 
 from tools.common import motor_file, param_rows, paths
 from tools.common.errors import UserError
@@ -15,7 +16,7 @@ from tools.docs import tables
 from tuning import constants, header, spreadsheet
 
 DEFINE = re.compile(r"^#define (\w+)[ \t]+(\S+)[ \t]*(?:/\* \[([^\]]*)\][ \t]+(\S+) \.\. (\S+)[ \t]+(\S.*?) \*/)?", re.MULTILINE)
-every_motor = pytest.mark.parametrize("name", motors())
+every_motor = pytest.mark.parametrize("name", MOTORS)
 
 
 @functools.cache
@@ -64,9 +65,9 @@ def test_every_mode_is_there_and_off():
     assert re.findall(r"^/\* #define (\w+) \*/", written(HURST), re.MULTILINE) == list(param_rows.modes())
 
 
-@pytest.mark.parametrize("name", [*motors(), "bad */ title"])
+@pytest.mark.parametrize("name", [*MOTORS, "bad */ title"])
 def test_comments_end_where_they_should_and_a_title_cannot_end_one(name):
-    text = written(name) if name in motors() else header.write(designed(('title = "a motor"', f'title = "{name}"')))
+    text = written(name) if name in MOTORS else header.write(designed(('title = "a motor"', f'title = "{name}"')))
     assert text.count("/*") == text.count("*/") and not re.search(r"/\*(?:(?!\*/)[\s\S])*/\*", text)
 
 
@@ -131,4 +132,4 @@ def test_every_assumption_of_the_simulator_and_every_relation_has_a_row():
     files = (paths.ROOT / "tools" / name for name in ("cpu_33f/iss_assumptions.h", "chip/chip_assumptions.h"))
     assert tables.simulator().count("\n| `") == "".join(path.read_text(encoding="utf-8") for path in files).count("    X(")
     rows = param_rows.TABLE.read_text(encoding="utf-8").partition("#define PARAM_RELATION_TABLE")[2]
-    assert tables.params().count("\n- ") == rows.partition("#define PARAM_RELATION_IDREF")[0].count("    X(") + 3
+    assert tables.params().count("\n- ") == rows.partition("#define PARAM_RELATION_IDREF")[0].count("    X(") + 5

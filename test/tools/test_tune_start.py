@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import pytest
 from pytest import approx
-from tune_support import HURST, designed, motors, of
+from support import MOTORS
+from tune_support import HURST, designed, of
 
 from tools.common import board_file, motor_file, paths
 from tuning import start
 
 BOARD, MOTOR = board_file.load("mclv"), motor_file.load(HURST)
 STRONG = replace(MOTOR, rated_current_a=3.4)
-every_motor = pytest.mark.parametrize("name", motors())
+every_motor = pytest.mark.parametrize("name", MOTORS)
 
 
 def test_the_note_s_motor_gets_the_note_s_start():

@@ -18,7 +18,7 @@ from tuning.design import Design, design
 COMPILER = shlex.split(os.environ.get("CC") or "gcc")
 INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 WARNINGS = ["-std=gnu99", "-ftrack-macro-expansion=0", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
-CHECK = ("-fsyntax-only", "firmware/drive/param_check.c")
+CHECK = ("-o", os.devnull, "firmware/drive/param_check.c")
 HURST = "hurst_dmb0224c10002"
 
 MOTOR = """title = "a motor"
@@ -48,10 +48,6 @@ FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value =
 """Changes of MOTOR that make it a motor for ten times the current."""
 
 command = functools.partial(support.command, main=cli.main)
-
-
-def motors() -> list[str]:
-    return paths.names(paths.MOTORS)
 
 
 @contextlib.contextmanager

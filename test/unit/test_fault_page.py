@@ -1,19 +1,24 @@
-"""The table of faults, from which docs/faults.md is made: its codes count up, and what a remedy names exists."""
+"""The tables of faults and of reasons for a limit, from which docs/ is made: their codes count up, and what a remedy names exists."""
 
 import re
 
+import pytest
+
 from c_compiler import ROOT
 
-from tools.common.x_macro import rows
-
-FAULTS = rows("include", "drive/faults.h", "DRIVE_FAULT_TABLE", "#code #name cause remedy")
+from tools.common.drive_tables import faults, limits
 
 
-def test_the_codes_count_up_from_none() -> None:
-    assert [code for code, *_ in FAULTS] == [str(n) for n in range(len(FAULTS))] and len(FAULTS) > 12
+def test_codes_of_faults_count_up_from_none() -> None:
+    assert [row.code for row in faults()] == list(range(len(faults()))) and faults()[0].name == "NONE" and len(faults()) > 12
 
 
-def test_every_parameter_that_a_fault_names_exists() -> None:
-    known = (ROOT / "userparams.h").read_text(encoding="utf-8") + " ".join(name for _, name, *_ in FAULTS)
-    words = re.findall(r"\b[A-Z]+(?:_[A-Z0-9]+)+\b", " ".join(f"{cause} {remedy}" for _, _, cause, remedy in FAULTS))
+def test_reasons_for_a_limit_are_bits_of_their_own() -> None:
+    assert [row.code for row in limits()] == [1 << n for n in range(len(limits()))] and len(limits()) > 4
+
+
+@pytest.mark.parametrize("table", [faults, limits])
+def test_every_parameter_that_a_row_names_exists(table) -> None:
+    known = (ROOT / "userparams.h").read_text(encoding="utf-8") + " ".join(row.name for row in table())
+    words = re.findall(r"\b[A-Z]+(?:_[A-Z0-9]+)+\b", " ".join(f"{row.cause} {row.remedy}" for row in table()))
     assert words and not [word for word in words if word not in known], words

@@ -43,12 +43,12 @@ def with_values(values: dict[str, str]) -> str:
     return text
 
 
-def build(values: dict[str, str], extra: tuple[str, ...] = (), after: str = "") -> tuple[int, str]:
-    """Compiles param_check.c with these values and what comes `after` them in the header: exit code and messages."""
+def build(values: dict[str, str]) -> tuple[int, str]:
+    """Compiles param_check.c with these values: exit code and messages."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "userparams.h").write_text(with_values(values) + after, encoding="utf-8")
-        done = compiler([*CFLAGS, f"-I{folder}", "-Iinclude", "-I.", *extra, "-c", "firmware/drive/param_check.c", "-o", f"{folder}/out.o"])
-        return done.returncode, done.stderr.replace("\\'", "'")
+        (Path(folder) / "userparams.h").write_text(with_values(values), encoding="utf-8")
+        done = compiler([*CFLAGS, f"-I{folder}", "-Iinclude", "-I.", "-c", "firmware/drive/param_check.c", "-o", f"{folder}/out.o"])
+        return done.returncode, done.stderr
 
 
 def defines(values: dict[str, str]) -> list[str]:
@@ -89,7 +89,7 @@ def test_one_wrong_value_alone_stops_the_build_with_one_message() -> None:
         parameter = parameters()[name]
         for value in (below(parameter), above(parameter)):
             code, messages = build({name: value})
-            assert code != 0 and messages.count("error:") == 1 and refusal(parameter, value) in messages, f"{name} = {value}: {messages}"
+            assert code != 0 and messages.count(": error:") == 1 and refusal(parameter, value) in messages, f"{name} = {value}: {messages}"
 
 
 def case(name: str, breaks: str, keeps: str, **others: str) -> tuple[dict[str, str], dict[str, str]]:
@@ -99,6 +99,10 @@ def case(name: str, breaks: str, keeps: str, **others: str) -> tuple[dict[str, s
 LOOPS = ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR")
 # For each relation a value that breaks it, and one just inside. R, L and Kphi scale with 24 V, 50 us and 4.4 A.
 RELATIONS = {
+    "LOOPTIME_SEC must be a multiple of 50 ns": [
+        case("LOOPTIME_SEC", "0.00005001", "0.00005"), case("LOOPTIME_SEC", "0.000050025", "0.00005005"), case("LOOPTIME_SEC", "0.00013993", "0.00013995")],
+    **{f"{gain} must be 0.1 .. 0.6 or -0.6 .. -0.1": [case(gain, "0", "0.1"), case(gain, "-0.09", "-0.1"), case(gain, "0.09", "0.6")]
+       for gain in ("KCURRA", "KCURRB")},
     "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM": [case("MINIMUM_SPEED_RPM", "2800", "2799")],
     "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM": [case("MAXIMUM_SPEED_RPM", "2799", "2800")],
     "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM": [case("FW_START_SPEED_RPM", "5500", "5499")],
@@ -187,13 +191,13 @@ def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
 
 
 @pytest.mark.parametrize("values, message", [
-    ({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM"),
-    ({"MOTOR_KPHI_V_PER_KRPM": "1.7"}, "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format"),
-    ({"IDREF_SPEED3": "-2.76"}, "IDREF_SPEED3 must not exceed MAXIMUM_CURRENT_A"),
+    ({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM = 2801 must be at most NOMINAL_SPEED_RPM = 2800"),
+    ({"MOTOR_KPHI_V_PER_KRPM": "1.7"}, "MOTOR_KPHI_V_PER_KRPM = 1.7 does not fit 1/Kphi's Q format"),
+    ({"IDREF_SPEED3": "-2.76"}, "IDREF_SPEED3 = -2.76 must not exceed MAXIMUM_CURRENT_A = 2.75"),
     # beyond 17.6 A, where Q13 ends, the counts wrap around
-    ({"IDREF_SPEED0": "-18.0"}, "IDREF_SPEED0 must not exceed MAXIMUM_CURRENT_A"),
-    ({"IDREF_SPEED17": "-18.0"}, "IDREF_SPEED17 must not exceed MAXIMUM_CURRENT_A"),
-    ({"FW_TRIM_CURRENT_A": "18.0"}, "FW_TRIM_CURRENT_A must not exceed MAXIMUM_CURRENT_A"),
+    ({"IDREF_SPEED0": "-18.0"}, "IDREF_SPEED0 = -18.0 must not exceed MAXIMUM_CURRENT_A = 2.75"),
+    ({"IDREF_SPEED17": "-18.0"}, "IDREF_SPEED17 = -18.0 must not exceed MAXIMUM_CURRENT_A = 2.75"),
+    ({"FW_TRIM_CURRENT_A": "18.0"}, "FW_TRIM_CURRENT_A = 18.0 must not exceed MAXIMUM_CURRENT_A = 2.75"),
     ({"MINIMUM_SPEED_RPM": "149"}, "MINIMUM_SPEED_RPM = 149 must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI"),
     ({"SPEED_BANDWIDTH_HZ": "17"}, "SPEED_BANDWIDTH_HZ = 17 must be at most 0.148 * LOAD_BANDWIDTH_HZ"),
 ])
@@ -206,13 +210,7 @@ def test_a_broken_relation_stops_the_build_with_its_message(values: dict[str, st
 @pytest.mark.parametrize("name", ["SPEEDCNTR_ITERM", "SPEEDCNTR_CTERM"])
 def test_a_header_with_the_speed_integral_is_refused_in_one_line(name: str) -> None:
     code, messages = build({name: "0.001"})
-    assert code != 0 and messages.count("error:") == 1 and "takes the place of the integral, remove them" in messages, messages
-
-
-def test_a_header_from_before_the_load_observer_is_told_what_it_lacks() -> None:
-    code, messages = build({}, after="\n#undef LOAD_BANDWIDTH_HZ\n")
-    first = next(line for line in messages.splitlines() if "error:" in line)
-    assert code != 0 and "userparams.h: LOAD_BANDWIDTH_HZ is missing" in first, messages
+    assert code != 0 and messages.count(": error:") == 1 and "takes the place of the integral, remove them" in messages, messages
 
 
 def test_the_numbers_in_messages_are_those_of_the_header() -> None:
@@ -222,17 +220,6 @@ def test_the_numbers_in_messages_are_those_of_the_header() -> None:
                        "{", print_, "return 0;", "}"])[0]
     lowest, calm = found.split()
     assert text.count(f"at least {lowest} * NOMINAL_BUS_V") == 2 and f"at most {calm} * LOAD_BANDWIDTH_HZ" in text, found
-
-
-@pytest.mark.parametrize("values, message", [
-    ({"KFILTER_ESDQ": "9"}, "KFILTER_ESDQ = 9 is outside 10 .. 8000 Q15"),
-    ({"END_SPEED_RPM": "2801"}, "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM")])
-def test_the_check_for_the_targets_old_compiler_refuses_the_same(values: dict[str, str], message: str) -> None:
-    old = ("-O2", "-U__GNUC__", "-D__GNUC__=4", "-Wno-builtin-macro-redefined", "-w")
-    code, messages = build({}, old)
-    assert code == 0, messages
-    code, messages = build(values, old)
-    assert code != 0 and message in messages, messages
 
 
 BOARD_INCLUDES = ["-Itools/vboard", "-Itools/chip", "-Itools/plant"]

@@ -10,6 +10,7 @@
 
 drive_t board_drive;
 volatile uint16_t board_reset_cause;
+tLimitParm LimitParm;
 
 static char sent[128];
 static uint16_t sent_count, room;
@@ -34,6 +35,7 @@ void setUp(void)
     sent[0] = '\0';
     room = 1000;
     uart_send_Stub(take);
+    LimitParm.seen = 0;
     board_reset_cause = 0;
     status_init();
 }
@@ -63,7 +65,22 @@ void test_line_tells_state_fault_and_mechanical_speed(void)
     expect_line(DRIVE_CLOSED, FAULT_NONE, -27500, "state 5 fault 0 speed -5500 rpm\r\n");
     expect_line(DRIVE_STOPPED, FAULT_ADC_LOST, 49, "state 1 fault 10 speed 9 rpm\r\n");
     expect_line(DRIVE_FAULT, FAULT_TRAP, -32768, "state 7 fault 12 speed -6553 rpm\r\n");
-    TEST_ASSERT_TRUE(sizeof line > strlen("state 32767 fault 32767 speed -32767 rpm\r\n"));
+}
+
+void test_line_tells_why_the_drive_was_limited_since_the_line_before(void)
+{
+#define ALL_NAMES(bit, name, cause, remedy) " " #name
+    static const char longest[] = "state 32767 fault 32767 speed -32767 rpm limit" DRIVE_LIMIT_TABLE(ALL_NAMES) "\r\n";
+    status_tick(0);
+    LimitParm.seen = LIMIT_CURRENT | LIMIT_RAMP;
+    status_tick(500);
+    send_passes(100);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm limit CURRENT RAMP\r\n", sent);
+    sent_count = 0;
+    status_tick(500);
+    send_passes(100);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+    TEST_ASSERT_TRUE(sizeof line >= sizeof longest);
 }
 
 static void expect_first_line(uint16_t rcon, const char *text)

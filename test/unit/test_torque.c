@@ -3,6 +3,7 @@
 #include "ideal_motor.h"
 #include "panel_rig.h"
 
+#include "firmware/drive/limits.c"
 #include "firmware/drive/panel.c"
 
 void setUp(void)
@@ -180,4 +181,32 @@ void test_pot_at_zero_still_starts_forward(void)
     press_s2(50);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
+}
+
+void test_speed_range_is_the_reason_while_it_and_no_other_limit_holds_the_command(void)
+{
+    static const struct {
+        const char *what;
+        int16_t command_q13, given_q13, limit_q13;
+        uint16_t reasons;
+    } cases[] = {
+        { "as commanded", 1000, 1000, 5120, LIMIT_NONE }, { "its sign has no say", -1000, 1000, 5120, LIMIT_NONE },
+        { "within 1/64 of the largest current", 1000, 920, 5120, LIMIT_NONE }, { "less, at the highest speed", 1000, 919, 5120, LIMIT_SPEED_RANGE },
+        { "braking, above it", 1000, -500, 5120, LIMIT_SPEED_RANGE }, { "more, at the lowest speed", 0, 300, 5120, LIMIT_SPEED_RANGE },
+        { "the circle", 4000, 2000, 2000, LIMIT_CURRENT },
+    };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            rig_closed(direction, (int16_t)(direction * 10000));
+            drive.command.target_erpm = cases[n].command_q13;
+            drive.run.control.ref_q13.q = (int16_t)(direction * cases[n].given_q13);
+            drive.run.control.iq_limit_q13 = cases[n].limit_q13;
+            drive.run.control.vq_limit_q14 = 10000;
+            drive.run.control.v_q14.q = 0;
+            TEST_ASSERT_EQUAL_HEX16_MESSAGE(cases[n].reasons, limits_reasons(&drive, &params), cases[n].what);
+        }
+    }
+    drive.state = (uint16_t)DRIVE_STOPPING;
+    drive.run.control.iq_limit_q13 = 5120;
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_RAMP, limits_reasons(&drive, &params));
 }

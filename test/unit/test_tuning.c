@@ -3,6 +3,7 @@
 #include "ideal_motor.h"
 
 #include "firmware/drive/drive.c"
+#include "firmware/drive/limits.c"
 
 void setUp(void)
 {
@@ -51,4 +52,16 @@ void test_motor_follows_at_250_rpm_per_second_from_END_SPEED(void)
     ideal_motor_run(20000);
     TEST_ASSERT_INT16_WITHIN(10, 5000 + 1250, drive.run.control.reference_erpm);
     TEST_ASSERT_FLOAT_WITHIN(60.0F, 6250.0F, ideal_motor_erpm());
+}
+
+void test_ramp_to_maximum_speed_is_the_reason_whatever_the_potentiometer_says(void)
+{
+    EACH_DIRECTION(direction) {
+        rig_closed(direction, (int16_t)(direction * 8000));
+        drive.run.control.vq_limit_q14 = 10000;
+        drive.run.control.v_q14.q = 0;
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_RAMP, limits_reasons(&drive, &params));
+        drive.run.control.reference_erpm = (int16_t)(direction * 27500);
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_NONE, limits_reasons(&drive, &params));
+    }
 }

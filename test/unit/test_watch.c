@@ -129,3 +129,31 @@ void test_changes_of_flux_and_resistance_are_Q15_of_the_header_s(void)
     TEST_ASSERT_EQUAL_INT16(-4096, AdaptParm.qInvKFi);
     TEST_ASSERT_EQUAL_INT16(8192, AdaptParm.qRs);
 }
+
+void test_1_over_Kphi_is_in_rpm_per_volt_by_the_formula_of_its_comment(void)
+{
+    float rpm_per_v;
+    watch_refresh();
+    rpm_per_v = (float)MotorEstimParm.qInvKFi / (float)NORM_INVKFIBASE * 1000.0F / PARAM_F(MOTOR_KPHI_V_PER_KRPM);
+    TEST_ASSERT_FLOAT_WITHIN(0.02F, 138.12F, rpm_per_v);
+}
+
+void test_reasons_of_a_limit_are_those_of_now_and_those_seen_since_the_status_line_took_them(void)
+{
+    drive_control_t *c = &board_drive.run.control;
+    LimitParm.seen = 0;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_HEX16(0, LimitParm.now);
+    board_drive.state = (uint16_t)DRIVE_CLOSED;
+    c->iq_limit_q13 = 1000;
+    c->brake_limit_q13 = 1000;
+    c->ref_q13.q = 1000;
+    c->vq_limit_q14 = 1000;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_CURRENT, LimitParm.now);
+    c->ref_q13.q = 0;
+    c->v_q14.q = 1000;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_VOLTAGE, LimitParm.now);
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_CURRENT | LIMIT_VOLTAGE, LimitParm.seen);
+}

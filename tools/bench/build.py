@@ -1,15 +1,13 @@
 """Building the firmware variant that a scenario needs, through the project's Makefile."""
 
-import contextlib
-import fcntl
 import os
 import re
 import subprocess
-import zlib
 from pathlib import Path
 
 from tools.common import paths
 from tools.common.errors import UserError
+from tools.common.progress import waiting
 
 HEADER = "userparams.h"
 
@@ -22,9 +20,7 @@ def variant_name(defines: list[str], userparams: Path | None = None) -> str:
 
 def _header_name(folder: Path) -> str:
     """The motor's name for a tuned header; for any other folder its own name and a number that tells it from its namesakes."""
-    folder = folder.resolve()
-    name = re.sub(r"[^A-Za-z0-9_]+", "-", folder.name).strip("-")
-    return name if folder.parent == paths.TUNED.resolve() else f"{name}-{zlib.crc32(str(folder).encode()):08x}"
+    return paths.name_of(folder, paths.TUNED)
 
 
 def header_folder(text: str | Path, where: str = "--userparams") -> Path | None:
@@ -35,47 +31,38 @@ def header_folder(text: str | Path, where: str = "--userparams") -> Path | None:
     if not (folder / HEADER).is_file():
         raise UserError(f"no {HEADER} in '{text}'", where, "name the folder that holds it; make tune MOTOR=name writes one")
     folder = folder.resolve()
-    if re.search(r"[\s'\"$#:\\]", str(folder)):
-        raise UserError(f"'{folder}' cannot be given to make", where, "use a folder whose path has no blanks, quotes, '$', '#', ':' or '\\'")
     return None if folder == paths.ROOT else folder
 
 
-def library(defines: list[str], userparams: Path | None = None, target: str = "vboard") -> Path:
+def library(defines: list[str], userparams: Path | None = None, target: str = "vboard", sanitized: bool = False) -> Path:
     """Builds build/host[-variant]/libvboard.so if needed and returns its path. `userparams`: folder of the header, None for the root's.
-    `target`: what make shall make, if there is to be more in that folder."""
+    `target`: what make shall make, if there is to be more in that folder. Builds take turns: the Makefile sees to it."""
     variant = variant_name(defines, userparams)
-    folder = f"host-{variant}" if variant else "host"
-    with _one_at_a_time(folder):
-        result = make(target, defines, userparams)
+    result = make(target, defines, userparams, sanitized)
     if result.returncode != 0:
+        if told := re.search(r"^foc33: (.*)", result.stderr, re.MULTILINE):
+            raise UserError(told[1])
         raise UserError("the firmware does not build", _what(variant, result.args, userparams), _reason(result.stderr))
-    return paths.ROOT / "build" / folder / "libvboard.so"
+    return paths.ROOT / "build" / "-".join(part for part in ("host", variant, "san" if sanitized else "") if part) / "libvboard.so"
 
 
-def make(target: str, defines: list[str], userparams: Path | None) -> subprocess.CompletedProcess:
+def make(target: str, defines: list[str], userparams: Path | None, sanitized: bool = False) -> subprocess.CompletedProcess:
     """What make says when it makes the target in the folder of these settings."""
     variant = variant_name(defines, userparams)
     command = ["make", "-s", "-C", str(paths.ROOT), target]
     if variant:
         command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines)]
     if userparams is not None:
-        command.append(f"USERPARAMS={paths.shown(userparams)}")
+        command.append(f"USERPARAMS={paths.shown(userparams)}".replace("$", "$$"))
+    if sanitized:
+        command.append("SAN=1")
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     try:
-        return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
-                              check=False)
+        with waiting(f"building {' '.join([target, variant]).strip()}"):
+            return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+                                  check=False)
     except OSError as error:
         raise UserError("cannot run make", "", error.strerror or str(error)) from None
-
-
-@contextlib.contextmanager
-def _one_at_a_time(name: str):
-    """Two programs that build in the same folder would read each other's half-written files."""
-    folder = paths.ROOT / "build"
-    folder.mkdir(exist_ok=True)
-    with open(folder / f"{name}.lock", "w", encoding="utf-8") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
 
 
 def _what(variant: str, command: list[str], userparams: Path | None) -> str:
@@ -86,8 +73,8 @@ def _what(variant: str, command: list[str], userparams: Path | None) -> str:
 
 def _reason(text: str) -> str:
     """The line of the compiler's output that a user needs."""
-    for pattern in (r'static assertion failed: "(.*)"', r"(.*\berror: .*)", r"(.*\S.*)"):
+    for pattern in (r"(.*\berror: .*)", r"(.*\S.*)"):
         found = re.search(pattern, text)
         if found:
-            return found[1].replace("\\'", "'")
+            return found[1]
     return "run make vboard to see why"

@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
-from . import command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
+from tools.common.progress import waiting
+from . import build, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -18,11 +19,17 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="command", parser_class=command_line.Parser)
 
     run = commands.add_parser("run", help="run a scenario: table, protocol, expectations, plots")
-    run.add_argument("scenario", nargs="?", default="demo", help="name (see `scenarios`) or TOML file; default demo")
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="changes",
                      help="change a plant key; KEY=x0.5 multiplies it (see `keys`); may be repeated")
     run.add_argument("--no-plots", action="store_true", help="write summary and trace only")
     run.set_defaults(command=_run)
+
+    prepare = commands.add_parser("prepare", help="look at the files of a run, as `run` would, and say nothing if they are good")
+    prepare.add_argument("--sanitized", action="store_true", help="then build its firmware with sanitizers and print the library's path")
+    prepare.set_defaults(command=_prepare, library=None)
+    for command in (run, prepare):
+        command.add_argument("scenario", nargs="?", help="name (see `scenarios`) or TOML file; default demo, rated with --motor")
+        command.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
 
     loads = commands.add_parser("table2", help="the eight rows of AN1292's Table 2 beside ours")
     loads.set_defaults(command=table2.command)
@@ -45,16 +52,19 @@ def _parser() -> argparse.ArgumentParser:
     margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
     margins.set_defaults(command=robust.command)
 
-    own, tuned = "the project's own", "build/tune/NAME, written by make tune MOTOR=NAME"
-    either = tuned + "; without --motor " + own
-    for command, folder, header in ((run, "SCENARIO", own), (loads, "table2", own), (angles, "starts", own), (rating, "rated", tuned),
-                                    (steps, "loadsteps", either), (slow, "lowspeed", either), (margins, "robust", either)):
-        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}")
+    for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
+                            (slow, "lowspeed"), (margins, "robust")):
+        header = "build/tune/NAME, written by make tune MOTOR=NAME" + ("" if command is rating else "; without --motor the project's own")
+        command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
+        command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
         if command is not rating:
             command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
+        if command is prepare:
+            continue
+        if command is not rating:
             command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
-        command.add_argument("--board", help="board file instead of the scenario's: a name in tuning/boards or a path")
-        command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
+        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}, with the names "
+                             "of another motor, board or header")
         command.add_argument("--quiet", action="store_true", help="no progress bar")
 
     listing = commands.add_parser("scenarios", help="list the scenarios")
@@ -70,24 +80,35 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    item = scenario_file.load(options.scenario)
-    motor, board, library, used = command_common.set_up(item, options, item.defines, options.userparams)
+    item, asked = command_common.scenario_for(options)
+    motor, board, library, used = command_common.set_up(item, options, item.defines)
     job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
-    target = options.out or paths.RESULTS / item.name
+    target = command_common.results(item.name, item.motor, options, asked)
     with output.ResultFolder(target) as folder:
         run = sweep.run_cases(item.name, [job], options.quiet, simulate.simulate)[0]
         outcomes = report.check(run)
         data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
         _write_traces(run, folder.work)
         if not options.no_plots:
-            from . import plots
-            data["plots"] = plots.write_all(run, folder.work)
+            with waiting("plots", options.quiet):
+                from . import plots
+                data["plots"] = plots.write_all(run, folder.work)
         output.write_summary(folder.work, data)
+        report.write_page(folder.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
           f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time")
-    print(f"results in {paths.shown(target)}/")
+    print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
+
+
+def _prepare(options: argparse.Namespace) -> int:
+    item, _ = command_common.scenario_for(options)
+    command_common.parts_of(item, options)
+    if options.sanitized:
+        userparams = command_common.header_for(options)
+        print(build.library(item.defines, userparams and build.header_folder(userparams), sanitized=True))
+    return 0
 
 
 def _write_traces(run: Run, folder: Path) -> None:

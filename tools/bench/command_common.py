@@ -1,17 +1,20 @@
-"""Steps that all running commands share: which library and plant, a progress bar, the verdict."""
+"""Steps that all running commands share: which library and plant, the verdict."""
 
 import argparse
 import math
+import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from tools.common import board_file, board_keys, motor_file, paths
-from . import build
+from tools.common.errors import UserError, suggestion
+from tools.common.param_rows import modes, parameters
+from . import build, scenario_file
 from .board import Library
-from tools.common.errors import UserError
 from .expect import Outcome
+from .scenario import Scenario
 
 
 HEADER_VALUES = (("NOPOLESPAIRS", "pairs"), ("MOTOR_RS_OHM", "ohm"), ("MOTOR_LS_MH", "mH"), ("MOTOR_KPHI_V_PER_KRPM", "V peak/krpm"))
@@ -38,32 +41,78 @@ def header_name(given: Path | None, userparams: str | Path | None) -> str:
     return build.HEADER if folder is None else str(paths.shown(folder / build.HEADER))
 
 
-def tuned_header(motor: Path) -> Path:
-    """The folder with the header that the tuner has written for a motor file."""
-    folder = paths.TUNED / motor.stem
+def tuned_header(motor: Path, board: Path | None) -> Path:
+    """The folder with the header that the tuner has written for a motor file, on the board that was asked for."""
+    folder = paths.TUNED / paths.pair_name(motor, board)
     if not (folder / build.HEADER).is_file():
         known = motor.parent.resolve() == paths.MOTORS.resolve()
-        name = motor.stem if known else motor
-        raise UserError(f"no {build.HEADER} for motor '{motor.stem}'", str(paths.shown(folder)), f"make it with make tune MOTOR={name}")
+        words = {"MOTOR": motor.stem if known else motor} | ({"BOARD": board} if board else {})
+        raise UserError(f"no {build.HEADER} for motor '{motor.stem}'", str(paths.shown(folder)),
+                        "make it with make tune " + " ".join(shlex.quote(f"{name}={word}") for name, word in words.items()))
     return folder
 
 
 def header_for(options: argparse.Namespace) -> str | Path | None:
     """The folder of the header that was asked for; that of a named motor is the tuner's."""
-    if options.userparams is None and options.library is None and options.motor:
-        return tuned_header(motor_file.part(options.motor, "--motor").path)
+    if options.userparams is None and getattr(options, "library", None) is None and options.motor:
+        return tuned_header(paths.find("motor", options.motor, paths.MOTORS, "--motor"), board_asked_for(options))
     return options.userparams
 
 
-def results(name: str, motor: board_keys.Part, own: str, given: Path | None) -> Path:
-    """The folder of a table's results: NAME for the table's own motor, NAME-MOTOR for another one, or the one that was asked for."""
-    return given or paths.RESULTS / (name if motor.path.stem == own else f"{name}-{motor.path.stem}")
+def scenario_for(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
+    """The scenario that was asked for, or else the one for the mode that was, or else the usual one; and the macros that it does not have itself."""
+    defines = macros(options.defines)
+    asked = {define.partition("=")[0] for define in defines} & set(modes()) - {"PARAMS_IN_RAM"}
+    name = options.scenario
+    if name is None and asked:
+        fitting = [item for item in map(scenario_file.load, paths.names(paths.SCENARIOS)) if set(item.defines) == asked]
+        if not fitting:
+            raise UserError(f"no scenario is for {' with '.join(sorted(asked))}", "DEFINES",
+                            "make identify runs IDENTIFY" if "IDENTIFY" in asked else "name the one to run, SCENARIO=name")
+        name = next((item.name for item in fitting if item.name.upper() in asked), fitting[0].name)
+    item = scenario_file.load(name or ("rated" if options.motor else "demo"))
+    more = [define for define in defines if define not in item.defines]
+    item.defines += more
+    return item, more
 
 
-def set_up(item: Any, options: argparse.Namespace, defines: list[str], userparams: str | Path | None) \
-        -> tuple[board_keys.Part, board_keys.Part, Library, dict[str, Any]]:
+def macros(text: str) -> list[str]:
+    """NAME or NAME=value of each -DNAME and -DNAME=value."""
+    result = []
+    for word in text.split():
+        name, sign, value = word.removeprefix("-D").partition("=")
+        if not word.startswith("-D") or not name.isidentifier() or (name in modes() and sign and value != "1"):
+            raise UserError(f"no mode '{word}'", "DEFINES", f"use {' '.join(f'-D{mode}' for mode in modes())} or -DNAME=value")
+        if name not in modes() and not sign:
+            raise UserError(f"no mode '{name}'", "DEFINES", suggestion(name, modes()))
+        if name in parameters():
+            raise UserError(f"{name} is a parameter", "DEFINES", "set it in userparams.h, or name a folder with another one, USERPARAMS=folder")
+        result.append(name if name in modes() else f"{name}={value}")
+    return result
+
+
+def board_asked_for(options: argparse.Namespace) -> Path | None:
+    """The board file of --board, if there is one."""
+    return paths.find("board", options.board, paths.BOARDS, "--board") if options.board else None
+
+
+def results(name: str, own: str, options: argparse.Namespace, defines: Sequence[str] = ()) -> Path:
+    """The folder of a run's results: the one that was asked for, else NAME; with another motor than its own, another board, header or
+    firmware its name tells them, so that two that run at once have each their own."""
+    if options.out is not None:
+        return options.out
+    motor, board = options.motor and paths.find("motor", options.motor, paths.MOTORS, "--motor"), board_asked_for(options)
+    header, library = options.userparams and build.header_folder(options.userparams), getattr(options, "library", None)
+    firmware = library.parent.name.removeprefix("host").strip("-") if library else build.variant_name(list(defines), header)
+    parts = [name, paths.name_of(motor, paths.MOTORS) if motor and motor.resolve() != paths.find("motor", own, paths.MOTORS).resolve() else "",
+             paths.name_of(board, paths.BOARDS) if board else "", firmware]
+    return paths.RESULTS / "-".join(part for part in parts if part)
+
+
+def set_up(item: Any, options: argparse.Namespace, defines: list[str]) -> tuple[board_keys.Part, board_keys.Part, Library, dict[str, Any]]:
     """Motor and board, the firmware, and what the report tells of them (used())."""
     motor, board = parts_of(item, options)
+    userparams = header_for(options)
     library = library_for(defines, options.library, userparams)
     told = used(motor, library, header_name(options.library, userparams)) | {"board": str(paths.shown(board.path))}
     return motor, board, library, told
@@ -93,33 +142,6 @@ def header_note(values: Mapping[str, Any], params: Mapping[str, float]) -> str:
     return f"the header is for another motor: {'; '.join(differ)}" if differ else ""
 
 
-class Progress:
-    """A bar over motor time, or over something else; silent when asked to be or when nobody looks."""
-
-    def __init__(self, title: str, total_s: float, quiet: bool, unit: str = "s of motor time") -> None:
-        self.bar = None
-        if quiet or not sys.stderr.isatty():
-            return
-        try:
-            from tqdm import tqdm
-        except ImportError:
-            return
-        tqdm.monitor_interval = 0
-        self.bar = tqdm(total=total_s, desc=title, unit="s", leave=False, ncols=90,
-                        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} " + unit)
-
-    def __call__(self, seconds: float) -> None:
-        if self.bar is not None:
-            self.bar.update(min(seconds, max(0.0, self.bar.total - self.bar.n)))
-
-    def __enter__(self) -> "Progress":
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        if self.bar is not None:
-            self.bar.close()
-
-
 def changes(texts: list[str]) -> board_keys.Values:
     """Plant changes written as KEY=NUMBER or KEY=xFACTOR."""
     result = board_keys.Values()
@@ -138,10 +160,16 @@ def changes(texts: list[str]) -> board_keys.Values:
 
 
 def parts_of(item: Any, options: argparse.Namespace) -> tuple[board_keys.Part, board_keys.Part]:
-    """Motor and board: from the command line, else from the scenario or table."""
+    """Motor and board: from the command line, else from the scenario or table. A motor of the command line brings its file's board."""
     motor = motor_file.part(options.motor, "--motor") if options.motor else motor_file.part(item.motor, item.motor_where)
-    board = board_file.part(options.board, "--board") if options.board else board_file.part(item.board, item.board_where)
-    return motor, board
+    return motor, board_of(motor, item, options.board, bool(options.motor))
+
+
+def board_of(motor: Any, item: Any, chosen: str | None, motors_first: bool) -> board_keys.Part:
+    """The chosen board, else the one of the scenario or table, else the one that the motor file names; `motors_first` swaps these two."""
+    if chosen or motors_first and motor.board:
+        return board_file.part(*board_file.named(motor, chosen))
+    return board_file.part(*board_file.named(motor, item.board, item.board_where))
 
 
 def verdict(name: str, outcomes: list[Outcome]) -> int:

@@ -297,8 +297,8 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
         if item.defines:
             raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
                             "measure scenarios of the firmware as it is delivered")
-        job = simulate.prepare(item, library, motor_file.part(item.motor, item.motor_where),
-                               board_file.part(item.board, item.board_where))
+        motor = motor_file.part(item.motor, item.motor_where)
+        job = simulate.prepare(item, library, motor, board_file.part(*board_file.named(motor, item.board, item.board_where)))
         job.signals += [signal for signal in SIGNALS if signal not in job.signals]
         jobs.append(job)
     return jobs

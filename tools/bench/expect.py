@@ -1,22 +1,6 @@
 """Expectations: what a scenario says must hold, each kind read from [[expect]] and checked against the finished run.
 
-    kind = "measure"       measure = "1000 rpm" or ["1000 rpm", "2500 rpm"], value = "speed_error_percent", min and/or max
-                           (values: metrics.MEASURE_VALUES)
-    kind = "speed"         measure (all with a reference if not given): its true mean speed holds the reference to percent = 0.5
-    kind = "hand_over"     within_s = 2.0 of S2, overshoot_percent, no_reverse_motion = true; press = 1 is the first start
-    kind = "stop"          after_s, within_s, speed_max_rpm: outputs off that soon after S2, the shaft no faster then; off to to_s (the
-                           end); from S2 on not backwards (lowest_rpm = 0), braking current at most brake_max_a = MAXIMUM_CURRENT_A
-    kind = "outputs_off"   from_s, to_s
-    kind = "bus_voltage"   min and/or max, from_s, to_s; above_regen = true: max counts from REGEN_LIMIT_V, at 24 V or in proportion
-    kind = "signal"        signal, statistic = mean min max rms peak span last, min and/or max, from_s, to_s
-    kind = "state"         name, at_s or from_s and to_s; never = true: must not occur
-    kind = "fault"         name, after_s (its cause), within_s, outputs_off_within_periods of the fault (of the cause with
-                           from_cause = true), kept_to_s, cleared_from_s
-    kind = "no_fault"      from_s, to_s
-    kind = "no_warnings"   the virtual board found nothing wrong with the configuration
-    kind = "clean"         no fault and no warnings, from power-up to the end
-    kind = "variable"      name, count, statistic = min max mean span distinct, min and/or max: a firmware variable at the end
-"""
+docs/files.md lists the kinds with their keys."""
 
 import math
 from collections.abc import Callable

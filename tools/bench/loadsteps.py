@@ -14,9 +14,10 @@ from tools.common import motor_file, output, paths
 from tools.common.board_keys import Part, Values
 from tools.common.errors import UserError
 from tools.common.trace import wrapped_deg
-from . import command_common, reach, report, simulate, sweep
+from . import command_common, picture, reach, report, simulate, sweep
 from .board import Library
 from .expect import Outcome
+from .metrics import limited_percent
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, param
 
@@ -94,8 +95,8 @@ class Case:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(paths.TABLES / "loadsteps.toml")
-    motor, board, library, used = command_common.set_up(table, options, [], command_common.header_for(options))
-    target = command_common.results("loadsteps", motor, table.motor, options.out)
+    motor, board, library, used = command_common.set_up(table, options, [])
+    target = command_common.results("loadsteps", table.motor, options)
     if motor.path.stem != table.motor:
         table = table.for_motor(motor_file.load(str(motor.path)), library.params)
     asked = itertools.product(table.speeds_rpm, table.torques_nm, table.kphi_factors)
@@ -110,7 +111,7 @@ def command(options: argparse.Namespace) -> int:
                            {"plots": plots.write_loadsteps(rows, drawn, table.hold_s, folder.work)})
     print(f"{table.title}: {len(rows)} rows\n\n{report.used_text(used)}\n")
     print(text(rows))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("loadsteps", outcomes)
 
 
@@ -147,6 +148,7 @@ def measured(item: Case, run: Run) -> dict[str, Any]:
     loaded = trace.part(item.off_s - 0.2 * table.hold_s, item.off_s)
     every = trace.part(item.on_s - 0.1 * table.hold_s, end_s)
     return {
+        "picture": picture.of(run, picture.SWEEP_STRETCHES), "limited_percent": limited_percent(loaded),
         "ramped_rpm": reference, "unloaded_min_rpm": float(speeds[0].min()), "unloaded_max_rpm": float(speeds[0].max()),
         "lowest_rpm": float(speeds[3].min()), "highest_rpm": float(speeds[2].max()),
         "dip_percent": 100.0 * (1.0 - float(speeds[3].min()) / reference),

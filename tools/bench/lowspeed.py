@@ -157,8 +157,8 @@ def lowest_text(searches: dict[float, sweep.Search]) -> str:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(paths.TABLES / "lowspeed.toml")
-    motor, board, library, used = command_common.set_up(table, options, ["PARAMS_IN_RAM"], command_common.header_for(options))
-    target = command_common.results("lowspeed", motor, table.motor, options.out)
+    motor, board, library, used = command_common.set_up(table, options, ["PARAMS_IN_RAM"])
+    target = command_common.results("lowspeed", table.motor, options)
     if motor.path.stem != table.motor:
         table = table.for_motor(motor_file.load(str(motor.path)), library.params)
     bench = Bench(table, motor, board, library)
@@ -172,5 +172,5 @@ def command(options: argparse.Namespace) -> int:
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + lowest_text(searches))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("lowspeed", outcomes)

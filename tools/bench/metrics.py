@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from tools.common import drive_tables
 from tools.common.trace import Trace, wrapped_deg
 
 SPEEDS = ("minimum", "nominal", "maximum")
 """Speeds of the header by name."""
-AT_LIMIT = 0.985
-"""A quantity counts as "at its limit" from this share of it."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +39,11 @@ MEASURE_VALUES = {
     "id_a": "mean d current", "iq_a": "mean q current", "torque_nm": "mean electrical torque",
     "angle_error_mean_deg": "mean electrical angle error, estimated less true", "angle_error_rms_deg": "RMS of the angle error",
     "angle_error_max_deg": "largest angle error", "voltage_v": "mean length of the commanded voltage vector",
-    "voltage_percent": "the same in per cent of its limit", "voltage_at_limit_percent": "share of time at the voltage limit",
-    "current_at_limit_percent": "share of time with the q current reference at its limit", "bus_v": "mean bus voltage",
+    "voltage_percent": "the same in per cent of its limit", "inv_kphi_rpm_per_v": "mean 1/Kphi in use", "bus_v": "mean bus voltage",
     "bus_max_v": "highest bus voltage"}
 """What a row of the table can hold, with the meaning."""
 MEASURED_BY_FIRMWARE = {"estimated_rpm", "estimate_error_percent", "angle_error_mean_deg", "angle_error_rms_deg", "angle_error_max_deg", "voltage_v",
-                        "voltage_percent", "voltage_at_limit_percent", "current_at_limit_percent"}
+                        "voltage_percent", "inv_kphi_rpm_per_v"}
 """Those that need the firmware's variables; the others are the plant's."""
 
 
@@ -81,6 +79,8 @@ def measure_values(part: Trace, measure: Measure) -> dict[str, Any]:
     if switching:
         _angle(column, put)
         _voltage(column, put)
+        if column("fw.inv_kphi_rpm_per_v") is not None:
+            put("inv_kphi_rpm_per_v", column("fw.inv_kphi_rpm_per_v").mean())
     return values
 
 
@@ -91,6 +91,14 @@ def _reference(own: np.ndarray | None, measure: Measure) -> float:
     return given if abs(given - asked) <= measure.step_rpm else asked
 
 
+def limited_percent(part: Trace) -> dict[str, float]:
+    """Share of the time with the bridge on in which each reason limited the output; those that did not are left out."""
+    if "fw.limits" not in part or "pwm.outputs_seen" not in part:
+        return {}
+    reasons = part.column("fw.limits")[part.column("pwm.outputs_seen") != 0].astype(np.int32)
+    return {row.name: float(100.0 * np.mean((reasons & row.code) != 0)) for row in drive_tables.limits() if np.any(reasons & row.code)}
+
+
 def _currents(column: Any, put: Any) -> None:
     i_d, i_q, torque = column("plant.i_d"), column("plant.i_q"), column("plant.torque_nm")
     if i_d is not None and i_q is not None:
@@ -99,9 +107,6 @@ def _currents(column: Any, put: Any) -> None:
         put("iq_a", i_q.mean())
     if torque is not None:
         put("torque_nm", torque.mean())
-    reference, limit = column("fw.iq_ref_a"), column("fw.iq_limit_a")
-    if reference is not None and limit is not None:
-        put("current_at_limit_percent", 100.0 * np.mean((np.abs(reference) >= AT_LIMIT * limit) & (limit > 0.0)))
 
 
 def _angle(column: Any, put: Any) -> None:
@@ -122,4 +127,3 @@ def _voltage(column: Any, put: Any) -> None:
         put("voltage_v", length.mean())
         if limit is not None and np.all(limit > 0.0):
             put("voltage_percent", 100.0 * np.mean(length / limit))
-            put("voltage_at_limit_percent", 100.0 * np.mean(length >= AT_LIMIT * limit))

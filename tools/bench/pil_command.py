@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from tools.common import command_line, output, paths
-from . import build, command_common, pil, report, scenario_file, simulate, sweep, table2
+from . import build, command_common, pil, report, simulate, sweep, table2
 from tools.common.errors import UserError
+from tools.common.progress import waiting
 from .expect import Outcome
 
 DEFAULT = ("demo", "table2")
@@ -77,15 +78,16 @@ def core_text(run: pil.PilRun) -> str:
             f"deepest stack       {c.stack_bytes:.0f} bytes" + (f"\nresets              {c.resets:.0f}" if c.resets else ""))
 
 
-def _scenario(name: str, options: argparse.Namespace) -> int:
-    item = scenario_file.load(name)
+def _scenario(name: str | None, options: argparse.Namespace) -> int:
+    item, asked = command_common.scenario_for(argparse.Namespace(**vars(options) | {"scenario": name}))
     motor, board = command_common.parts_of(item, options)
-    folder = None if options.userparams is None else build.header_folder(options.userparams)
+    header = command_common.header_for(options)
+    folder = None if header is None else build.header_folder(header)
     image = image_for(item.defines, folder, options.image)
     library = pil.library(item.defines, folder)
-    used = command_common.used(motor, library, command_common.header_name(None, options.userparams))
+    used = command_common.used(motor, library, command_common.header_name(None, header))
     job = simulate.prepare(item, library, motor, board)
-    target = options.out or paths.RESULTS / f"pil-{item.name}"
+    target = command_common.results(f"pil-{item.name}", item.motor, options, asked)
     with output.ResultFolder(target) as result:
         found = sweep.run_cases(f"{item.name} on the target", [job], options.quiet, functools.partial(work, image))[0]
         run = found.run
@@ -95,29 +97,32 @@ def _scenario(name: str, options: argparse.Namespace) -> int:
         output.write_trace(result.work / "trace.csv", run.trace.thinned(10))
         (result.work / "uart.txt").write_text(found.sent, encoding="latin-1", newline="")
         if not options.no_plots:
-            from . import plots
-            data["plots"] = plots.write_all(run, result.work)
+            with waiting("plots", options.quiet):
+                from . import plots
+                data["plots"] = plots.write_all(run, result.work)
         output.write_summary(result.work, data)
+        report.write_page(result.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
     print(f"\nimage               {paths.shown(image)}\n{core_text(found)}")
     print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core ({run.cpu_s:.2f} s of processor time): {run.speed_factor:.2f} times real time, "
           f"{instructions_per_second(found) / 1e6:.0f} million instructions a second")
-    print(f"results in {paths.shown(target)}/")
+    print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
 
 
 def _table2(options: argparse.Namespace) -> int:
-    folder = None if options.userparams is None else build.header_folder(options.userparams)
-    image = image_for([], folder, options.image)
-    library = pil.library([], folder)
+    defines, header = command_common.macros(options.defines), command_common.header_for(options)
+    folder = None if header is None else build.header_folder(header)
+    image = image_for(defines, folder, options.image)
+    library = pil.library(defines, folder)
     runs: list[pil.PilRun] = []
 
     def cases(title: str, jobs: list[simulate.Job], quiet: bool) -> list[dict[str, Any]]:
         runs.extend(sweep.run_cases(title, jobs, quiet, functools.partial(work, image)))
         return [sweep.reduced(run.run) for run in runs]
 
-    options = argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": options.out or paths.RESULTS / "pil-table2"})
-    status = table2.command(options, cases)
+    out = command_common.results("pil-table2", table2.Table.read(paths.TABLES / "table2.toml").motor, options, defines)
+    status = table2.command(argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": out}), cases)
     outcomes = [comparison(run) for run in runs]
     print()
     for outcome in outcomes:
@@ -127,7 +132,8 @@ def _table2(options: argparse.Namespace) -> int:
 
 def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser = command_line.Parser(prog="python3 -m tools.bench.pil_command", description=__doc__.splitlines()[0])
-    parser.add_argument("scenarios", nargs="*", default=list(DEFAULT), help="names, TOML files, or table2; default demo table2")
+    parser.add_argument("scenarios", nargs="*", help="names, TOML files, or table2; default demo table2, or the one for the mode of --defines")
+    parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--image", type=Path, help="ELF or HEX file; default: built with XC16")
     parser.add_argument("--motor", help="motor file instead of the scenario's")
     parser.add_argument("--board", help="board file instead of the scenario's")
@@ -145,10 +151,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """All scenarios, one after the other; the worst of their exit codes."""
-    if options.out is not None and len(options.scenarios) > 1:
+    names = options.scenarios or ([None] if options.defines else DEFAULT)
+    if options.out is not None and len(names) > 1:
         raise UserError("one result folder for several scenarios", "--out", "run them one by one")
     status = 0
-    for number, name in enumerate(options.scenarios):
+    for number, name in enumerate(names):
         if number:
             print(f"\n{'=' * 100}\n")
         status = max(status, _table2(options) if name == "table2" else _scenario(name, options))

@@ -138,8 +138,8 @@ def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
     speed = np.abs(thin.column("plant.speed_rpm"))[closed]
     other = axes.twinx()
     axes.plot(speed, thin.column("fw.id_ref_a")[closed], ".", markersize=2, color="tab:blue", label="Id reference")
-    other.plot(speed, thin.column("fw.inv_kphi")[closed], ".", markersize=2, color="tab:red", label="1/Kphi")
-    other.set_ylabel("1/Kphi [counts, Q15/2]")
+    other.plot(speed, thin.column("fw.inv_kphi_rpm_per_v")[closed], ".", markersize=2, color="tab:red", label="1/Kphi")
+    other.set_ylabel("1/Kphi [rpm/V peak, line to line]")
     other.set_ylim(bottom=0)
     other.grid(False)
     axes.set(title=f"{run.scenario.name}: d current and 1/Kphi over speed (Figure 8)", xlabel="speed [rpm]", ylabel="Id [A peak]")

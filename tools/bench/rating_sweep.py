@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tools.common import board_file, board_keys, command_line, motor_file, output, paths
+from tools.common import board_keys, command_line, motor_file, output, paths
 from . import command_common, report, simulate, sweep
 from .board import Library
 from tools.common.errors import UserError
 from .expect import Outcome
 from tools.common.motor_file import Motor
+from tools.common.progress import Progress
 
 COLUMNS = (
     ("torque_nm_set", "brake\nN m", "{:.4f}"), ("reference_rpm", "reference\nrpm", "{:.0f}"), ("speed_rpm", "true\nrpm", "{:.1f}"),
@@ -46,6 +47,7 @@ class Candidate:
 
     motor: Motor
     part: board_keys.Part
+    board: board_keys.Part
     header: str
     library: Library
 
@@ -66,40 +68,48 @@ class Row:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(paths.TABLES / "rated.toml")
-    names = options.motor or paths.names(paths.MOTORS)
+    names = paths.names(paths.MOTORS) if options.motor is None else options.motor
     if options.userparams is not None and len(names) != 1:
         raise UserError("one header for several motors", "--userparams", "name one motor with --motor")
-    board = board_file.part(options.board, "--board") if options.board else board_file.part(table.board, table.board_where)
-    ready, code = command_line.each(names, lambda name: _with_header(name, options))
-    if not ready:
+    refused: dict[str, str] = getattr(options, "refused", {})
+    ready, code = command_line.each(names, lambda name: _with_header(name, options, table))
+    if not ready and not refused:
         return code
-    target = options.out or paths.RESULTS / "rated"
+    target = options.out or results("rated", names[0] if len(names) == 1 else None, command_common.board_asked_for(options))
     with output.ResultFolder(target) as folder:
         candidates = _candidates(ready, options)
         cases = [(item, row) for item in candidates for row in rows_of(table, item)]
-        jobs = [_job(table, item, row, board) for item, row in cases]
+        jobs = [_job(table, item, row) for item, row in cases]
         results = sweep.run_cases("rated", jobs, options.quiet)
         rows = [_result(table, item, row, result) for (item, row), result in zip(cases, results)]
         outcomes = [outcome for row in rows for outcome in check(table, row)]
-        _write(folder.work, table, candidates, rows, outcomes, board)
-    print(text(table, candidates, rows))
-    print(f"\nresults in {paths.shown(target)}/")
+        outcomes += [Outcome(name, False, why, "a motor that its board can turn") for name, why in refused.items()]
+        _write(folder.work, table, candidates, rows, outcomes, refused)
+    print(text(table, candidates, rows, refused))
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return max(code, command_common.verdict("rated", outcomes))
 
 
-def _with_header(name: str, options: argparse.Namespace) -> tuple[Motor, Path]:
-    """A motor and the folder of its header. Files are looked at before anything is built."""
+def results(name: str, motor: str | None, board: Path | None) -> Path:
+    """The folder of the results; its name tells the motor, if it is one, and the board that was asked for."""
+    parts = [name, motor and paths.name_of(paths.find("motor", motor, paths.MOTORS, "--motor"), paths.MOTORS), board and paths.name_of(board, paths.BOARDS)]
+    return paths.RESULTS / "-".join(part for part in parts if part)
+
+
+def _with_header(name: str, options: argparse.Namespace, table: Table) -> tuple[Motor, board_keys.Part, Path]:
+    """A motor, its board and the folder of its header. Files are looked at before anything is built."""
     motor = motor_file.load(name, "--motor")
-    return motor, Path(options.userparams) if options.userparams else command_common.tuned_header(motor.path)
+    board = command_common.board_of(motor, table, options.board, True)
+    return motor, board, Path(options.userparams) if options.userparams else command_common.tuned_header(motor.path, command_common.board_asked_for(options))
 
 
-def _candidates(ready: list[tuple[Motor, Path]], options: argparse.Namespace) -> list[Candidate]:
+def _candidates(ready: list[tuple[Motor, board_keys.Part, Path]], options: argparse.Namespace) -> list[Candidate]:
     """Every motor's firmware, built."""
     result = []
-    with command_common.Progress("firmware", len(ready), options.quiet, "headers built") as progress:
-        for motor, header in ready:
+    with Progress("firmware", len(ready), options.quiet, "headers built") as progress:
+        for motor, board, header in ready:
             library = command_common.library_for([], None, header)
-            result.append(Candidate(motor, motor_file.part(str(motor.path)), command_common.header_name(None, header), library))
+            result.append(Candidate(motor, motor_file.part(str(motor.path)), board, command_common.header_name(None, header), library))
             progress(1.0)
     return result
 
@@ -111,11 +121,11 @@ def rows_of(table: Table, item: Candidate) -> list[Row]:
     return [*rows, Row("maximum", item.params["MAXIMUM_SPEED_RPM"], 0.0)]
 
 
-def _job(table: Table, item: Candidate, row: Row, board: board_keys.Part) -> simulate.Job:
+def _job(table: Table, item: Candidate, row: Row) -> simulate.Job:
     asked = f"{item.motor.name}: {row.name} ({row.rpm:g} rpm)"
     events, settled_s = sweep.loaded_run(item.params, row.rpm, table, asked, row.torque_nm)
     scenario = sweep.scenario(asked, table.title, events, row.rpm, settled_s, settled_s + table.measure_s)
-    return simulate.prepare(scenario, item.library, item.part, board)
+    return simulate.prepare(scenario, item.library, item.part, item.board)
 
 
 def _result(table: Table, item: Candidate, row: Row, result: dict[str, Any]) -> dict[str, Any]:
@@ -161,25 +171,26 @@ def highest_text(rows: list[dict[str, Any]]) -> str:
     return f"without load up to {row['highest_rpm']:.0f} rpm (MAXIMUM_SPEED_RPM {row['reference_rpm']:.0f})"
 
 
-def text(table: Table, candidates: list[Candidate], rows: list[dict[str, Any]]) -> str:
-    """The table as printed: a heading for each motor, then its rows."""
+def text(table: Table, candidates: list[Candidate], rows: list[dict[str, Any]], refused: dict[str, str]) -> str:
+    """The table as printed: a heading for each motor, then its rows; last a row for each motor that cannot run, with its reason."""
     lines = report.table(rows, COLUMNS).splitlines()
     parts = [f"{table.title}: {table.torque_percent:g} % of the rated torque", "", *lines[:3]]
-    per_motor = len(rows) // len(candidates)
+    per_motor = len(rows) // max(len(candidates), 1)
     for number, item in enumerate(candidates):
         part = slice(number * per_motor, (number + 1) * per_motor)
-        rating = f"{item.motor.rated_speed_rpm:g} rpm, {item.motor.rated_torque_nm:.3g} N m"
+        rating = f"{item.motor.rated_speed_rpm:g} rpm, {item.motor.rated_torque_nm:.3g} N m, board {item.board.path.stem}"
         parts += [f"{item.motor.name} ({rating}), {item.header}: {highest_text(rows[part])}", *lines[3:][part]]
         note = command_common.header_note(item.part.values.values, item.params)
         parts += [f"  note: {note}"] if note else []
-    return "\n".join(parts)
+    return "\n".join([*parts, *(f"{name}: not run: {why}" for name, why in refused.items())])
 
 
 def _write(folder: Path, table: Table, candidates: list[Candidate], rows: list[dict[str, Any]], outcomes: list[Outcome],
-           board: board_keys.Part) -> None:
+           refused: dict[str, str]) -> None:
     from . import plots
-    motors = [command_common.used(item.part, item.library, item.header) | {"name": item.motor.name, "rated_speed_rpm": item.motor.rated_speed_rpm,
-                                                                   "rated_torque_nm": item.motor.rated_torque_nm} for item in candidates]
+    motors = [command_common.used(item.part, item.library, item.header)
+              | {"name": item.motor.name, "board": str(paths.shown(item.board.path)), "rated_speed_rpm": item.motor.rated_speed_rpm,
+                 "rated_torque_nm": item.motor.rated_torque_nm} for item in candidates]
     report.write_table(folder, "rated", KEYS, rows, outcomes,
-                       {"title": table.title, "board": str(paths.shown(board.path)), "motors": motors},
+                       {"title": table.title, "motors": motors, "refused": refused},
                        {"plots": plots.write_rated(rows, vars(table), folder)})

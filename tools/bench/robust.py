@@ -293,9 +293,9 @@ def deviation_of(parameter: str, factor: float) -> Deviation:
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     table = Table.read(paths.TABLES / "robust.toml")
-    part, board, library, used = command_common.set_up(table, options, [], command_common.header_for(options))
+    part, board, library, used = command_common.set_up(table, options, [])
     bench = Bench(table, motor_file.load(str(part.path)), part, board, library)
-    target = options.out or paths.RESULTS / "robust"
+    target = command_common.results("robust", table.motor, options)
     with output.ResultFolder(target) as folder:
         cases = list(itertools.product(deviations(table), (False, True), table.speeds_percent))
         cases.sort(key=lambda item: (item[1], item[2]))
@@ -307,7 +307,7 @@ def command(options: argparse.Namespace) -> int:
     print(text(bench, rows))
     if margins is not None:
         print("\n" + margins_text(table, margins))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("robust", outcomes)
 
 

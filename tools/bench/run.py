@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .metrics import measure_values
+from .metrics import limited_percent, measure_values
 from .scenario import Scenario
 from tools.common.trace import Trace
 
@@ -89,10 +89,26 @@ class Run:
         around = self.trace.part(at_s - 0.05, at_s + 1.0).column("plant.speed_rpm") * direction
         return HandOver(at_s, row, after_s2_s, float(overshoot), float(np.min(around)))
 
+    def protocol(self) -> list[tuple[float, str]]:
+        """What happened and when: the operator's actions, the drive's states, faults."""
+        entries = list(self.actions)
+        hand_overs = {item.row: item for item in self.hand_overs()}
+        for row, at_s, name in self.state_changes():
+            text = f"state {name}"
+            if row in hand_overs:
+                item = hand_overs[row]
+                text = f"closed loop {item.after_s2_s:.2f} s after S2, overshoot {item.overshoot_percent:.1f} %"
+            entries.append((at_s, text))
+        faults = self.fault_changes()
+        entries += [(at_s, f"fault {name}" if code else "fault cleared") for (row, at_s, name), code in
+                    zip(faults, (self.trace.column("fw.fault")[row] for row, _, _ in faults)) if row > 0 or code]
+        return sorted(entries, key=lambda entry: entry[0])
+
     @cached_property
     def measures(self) -> dict[str, dict[str, Any]]:
         """The values of every [[measure]], by name."""
-        result = {measure.name: measure_values(self.trace.part(measure.from_s, measure.to_s), measure)
+        parts = {measure.name: self.trace.part(measure.from_s, measure.to_s) for measure in self.scenario.measures}
+        result = {measure.name: measure_values(parts[measure.name], measure) | {"limited_percent": limited_percent(parts[measure.name])}
                   for measure in self.scenario.measures}
         most = self.params.get("MAXIMUM_CURRENT_A")
         for values in result.values():

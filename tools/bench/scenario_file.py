@@ -1,53 +1,6 @@
 """Scenario files: what happens to the board over time, what to measure and what to expect, read from TOML. Unknown keys are refused.
 
-    title = "..."                    one line for the list of scenarios
-    description = "..."              optional, longer
-    motor = "hurst_dmb0224c10002"    tuning/motors/NAME.toml or a path; this one if not given
-    board = "mclv"                   tuning/boards/NAME.toml or a path; this one if not given
-    duration_s = 10.0
-    follows_header = true            optional: a start or a ramp that takes longer with this header shifts what comes after
-
-    [firmware]                       optional
-    defines = ["TUNING"]             builds this variant of the firmware with -DTUNING
-
-    [plant]                          optional: changes to motor and board, by key of the virtual board (`foc33 keys` lists them)
-    "motor.psi_vs" = { factor = 0.9 }
-    "load.constant_nm" = 0.03
-
-    [start]                          optional: the shaft at power-up
-    rotor_deg = 90                   electrical angle
-    speed_rpm = 0
-
-    [[event]]                        any number; at_s, one action, optionally a note for the protocol
-    at_s = 0.5
-    start_rpm = 1000                 S2, with the potentiometer at this speed since power-up
-    press = "S2"                     or "S3"; hold_s = 0.1
-    speed_rpm = 1000                 potentiometer to this speed, in the range that S3 has chosen; over_s turns it slowly
-    speed_percent = 50               to this part of the motor's rated speed; the operator presses S3 by himself where it takes that
-    speed = "maximum"                to MINIMUM_, NOMINAL_ or MAXIMUM_SPEED_RPM of the header, likewise with S3 where it takes that
-    current_a = 0.5                  the same in TORQUE_MODE
-    pot = 0.25                       potentiometer to this position, 0 .. 1; over_s
-    set = { "load.constant_nm" = 0.05 }   any writable key; over_s makes it a ramp
-    torque_percent = 50              the brake "load.constant_nm" to this part of the motor's rated torque; over_s
-    debug = { SnapStart = 1 }        writes a 16-bit firmware variable, as a debugger would
-    note = "..."
-
-    [fault]                          optional: at rpm something breaks after 3 s and is mended at 4 s, S2 follows at 4.2 s: the fault must
-    rpm = 2000                       come, switch off, stay until S2 and leave the drive stopped; no fault before
-    cause = { "cpu.isr_us" = 30 }    what breaks; over_s makes it a ramp, note is for the protocol
-    mended = { "cpu.isr_us" = 13 }   mended_note likewise
-    name = "ISR_OVERRUN"             this and within_s, from_cause, kept_to_s: as kind = "fault" in expect.py has them
-    within_s = 0.001
-
-    [[measure]]                      a row of the summary table
-    name = "1000 rpm"                its reference_rpm if not given
-    from_s = 3.0
-    to_s = 4.0
-    reference_rpm = 1000             optional: for the speed error; or reference_percent = 50, or reference = "maximum"
-
-    [[expect]]                       what must hold; kinds are described in expect.py
-    kind = "measure"
-"""
+docs/scenarios.md says how to write one; docs/files.md lists every key."""
 
 from typing import Any
 
@@ -59,7 +12,7 @@ from .metrics import SPEEDS, Measure
 from .panel import HOLD_S
 from .scenario import Event, Scenario
 
-MOTOR, BOARD = "hurst_dmb0224c10002", "mclv"
+MOTOR = "hurst_dmb0224c10002"
 EVENT_KINDS = ("start_rpm", "press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
 
 
@@ -72,7 +25,7 @@ def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
     scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor", MOTOR),
-                        root.text("board", BOARD), root.number("duration_s", minimum=0.01, maximum=120.0), root.flag("follows_header", False))
+                        root.text("board", ""), root.number("duration_s", minimum=0.01, maximum=120.0), root.flag("follows_header", False))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))

@@ -27,7 +27,8 @@ SIGNALS = (
     "plant.speed_rpm", "plant.theta_e_deg", "plant.i_a", "plant.i_b", "plant.i_c", "plant.i_d", "plant.i_q", "plant.torque_nm",
     "bus.voltage_v", "pwm.outputs_on", "pwm.outputs_seen",
     "fw.state", "fw.fault", "fw.speed_ref_rpm", "fw.speed_est_rpm", "fw.theta_est_deg", "fw.i_d_a", "fw.i_q_a", "fw.id_ref_a",
-    "fw.iq_ref_a", "fw.iq_limit_a", "fw.v_d_v", "fw.v_q_v", "fw.v_limit_v", "fw.fw_index", "fw.inv_kphi", "fw.offset_deg")
+    "fw.iq_ref_a", "fw.iq_limit_a", "fw.v_d_v", "fw.v_q_v", "fw.v_limit_v", "fw.fw_index", "fw.inv_kphi_rpm_per_v", "fw.offset_deg",
+    "fw.limits")
 """What every run records."""
 
 

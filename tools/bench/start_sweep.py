@@ -65,12 +65,12 @@ def command(options: argparse.Namespace) -> int:
         if not 1.0 <= options.every_deg <= 360.0:
             raise UserError(f"every-deg = {options.every_deg:g} is impossible", "--every-deg", "choose 1 .. 360")
         table.every_deg = options.every_deg
-    motor, board, library, used = command_common.set_up(table, options, [], options.userparams)
+    motor, board, library, used = command_common.set_up(table, options, [])
+    target = command_common.results("starts", table.motor, options)
     if motor.path.stem != table.motor:
         table = table.for_motor(motor_file.load(str(motor.path)), library.params)
     cases = [(load, angle) for load in table.loads_nm for angle in np.arange(0.0, 360.0, table.every_deg).tolist()]
     jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]
-    target = options.out or paths.RESULTS / "starts"
     with output.ResultFolder(target) as folder:
         results = sweep.run_cases("starts", jobs, options.quiet)
         rows = [{"load_nm": load, "rotor_deg": angle, **result} for (load, angle), result in zip(cases, results)]
@@ -78,7 +78,7 @@ def command(options: argparse.Namespace) -> int:
         _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}: {len(rows)} starts\n\n{report.used_text(used)}\n")
     print(text(table, rows))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("starts", outcomes)
 
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from tools.common import motor_file, workers
-from . import command_common, simulate
+from tools.common.progress import Progress
 from tools.common.toml_file import Document
+from . import command_common, picture, report, simulate
 from .metrics import Measure
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, param, start_time_s
@@ -144,7 +145,7 @@ def _work(job: simulate.Job, report: Callable[[float], None]) -> dict[str, Any]:
 
 def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any] = _work) -> list[Any]:
     """The results of all jobs, in order; reduced, if `work` does not make something else of a job."""
-    with command_common.Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
+    with Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         return workers.run_all(jobs, work, progress)
 
 
@@ -152,22 +153,21 @@ def reduced(run: Run) -> dict[str, Any]:
     """What a table needs of a run."""
     hand_overs = run.hand_overs()
     faults = [(at_s, name) for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
-    return {**run.measures[MEASURE], "closed_after_s": hand_overs[0].after_s2_s if hand_overs else None,
+    return {"picture": picture.of(run, picture.SWEEP_STRETCHES), **run.measures[MEASURE],
+            "closed_after_s": hand_overs[0].after_s2_s if hand_overs else None,
             "overshoot_percent": hand_overs[0].overshoot_percent if hand_overs else None, "fault": faults[0][1] if faults else None,
             "fault_s": faults[0][0] if faults else None,
             "highest_rpm": highest_rpm(run), "warnings": run.warnings, "motor_s": run.motor_s, "wall_s": run.wall_s}
 
 
 def limit_text(result: dict[str, Any]) -> str:
-    """The number that explains a shortfall of more than 0.5 %; "" where there is none."""
+    """What explains a shortfall of more than 0.5 %, and for which share of the time; "" where there is none."""
     if result["fault"]:
         return f"fault {result['fault']}"
     error = result["speed_error_percent"]
     if error is None or error >= -0.5:
         return ""
-    parts = [f"{name} {result[key]:.0f} % of the time" for name, key in
-             (("voltage", "voltage_at_limit_percent"), ("current", "current_at_limit_percent")) if (result[key] or 0.0) >= 1.0]
-    return ", ".join(parts) or "neither voltage nor current"
+    return report.limits_text(result["limited_percent"]) or "not limited"
 
 
 def speed_verdict(row: dict[str, Any], error_percent: float) -> str:

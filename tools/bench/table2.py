@@ -67,9 +67,9 @@ class Table(sweep.Table):
 def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str, Any]]] = sweep.run_cases) -> int:
     """The whole command; returns the exit code. `run_cases` runs the jobs."""
     table = Table.read(paths.TABLES / "table2.toml")
-    motor, board, library, used = command_common.set_up(table, options, [], options.userparams)
+    motor, board, library, used = command_common.set_up(table, options, [])
     jobs = [_job(table, row, library, motor, board) for row in table.rows]
-    target = options.out or paths.RESULTS / "table2"
+    target = command_common.results("table2", table.motor, options)
     with output.ResultFolder(target) as folder:
         results = run_cases("table2", jobs, options.quiet)
         rows = [_result(row, result) for row, result in zip(table.rows, results)]
@@ -78,7 +78,7 @@ def command(options: argparse.Namespace, run_cases: Callable[..., list[dict[str,
     print(f"{table.title}\n\n{report.used_text(used)}\n")
     print(report.table(rows, COLUMNS))
     print("\n" + report.outcomes_text(outcomes))
-    print(f"\nresults in {paths.shown(target)}/")
+    print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("table2", outcomes)
 
 
@@ -113,6 +113,6 @@ def check(row: Row, result: dict[str, Any]) -> list[Outcome]:
 
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
-    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "voltage_at_limit_percent", "current_at_limit_percent", "fault"]
+    keys = ["reference_rpm", *(key for key, _, _ in COLUMNS), "fault"]
     from . import plots
     report.write_table(folder, "table2", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_table2(rows, folder)})

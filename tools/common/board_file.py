@@ -5,6 +5,8 @@
     [inverter] rds_on, diode_voltage, trip_current   [shunt] resistance, amplifier_gain, reference, settle, inverted = true
     [adc] bits, full_scale, bus_divider, noise       [pwm] period, dead_time, sample_window
     [limits] over_voltage, under_voltage, regen      [plant] further keys of the virtual board, by key
+    [pins] current_a, current_b, bus, pot, fault, uart_tx, uart_rx, s2, s3, led_alive, led_run, pwm_a, pwm_b, pwm_c: optional, "RB8", "RP8" or "AN0";
+           those of the MCLV where nothing is said
 
 Every number is { value = ..., unit = "...", source = "..." }. Nothing is said twice: the current at the end of the converter's range
 is reference / (resistance * gain), the bus voltage there is full_scale * divider."""
@@ -12,11 +14,11 @@ is reference / (resistance * gain), the bus voltage there is full_scale * divide
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import paths, units
+from . import paths, pins, units
 from .board_keys import Part, Values
 from .errors import Problems, UserError
-from .motor_file import read_safely
-from .toml_file import Section, flatten
+from .motor_file import Motor, read_safely
+from .toml_file import Document, Section, flatten
 from .units import Conversion, Kind, Quantity
 
 _VOLT = {"V": Conversion(1.0), "mV": Conversion(1e-3)}
@@ -73,11 +75,24 @@ class BoardFile:
     adc_bits: int
     quantities: dict[str, Quantity]
     """Every number of the file by table and key, e.g. "pwm.period"."""
+    pins: dict[str, str]
+    """[pins], as names of ports."""
     values: Values
 
     def plant_values(self) -> Values:
         """Keys of the virtual board; each `where` is the line of the number."""
         return self.values
+
+
+DEFAULT = "mclv"
+"""Where nobody names a board."""
+
+
+def named(motor: Motor | Part, chosen: str | None = None, where: str = "--board") -> tuple[str, str]:
+    """What load() and part() want: the board that was chosen, else the motor file's, else the default; and who asked for it."""
+    if chosen:
+        return chosen, where
+    return (motor.board, motor.board_where) if motor.board else (DEFAULT, "")
 
 
 def load(name_or_path: str, where: str = "") -> BoardFile:
@@ -91,8 +106,13 @@ def part(name_or_path: str, where: str = "") -> Part:
     return Part(board.path, board.title, board.plant_values())
 
 
+def read(document: Document) -> BoardFile:
+    """Checks a whole document and returns what it says."""
+    return _read(document.root)
+
+
 def _read(root: Section) -> BoardFile:
-    root.close({"title", "plant", *TABLES})
+    root.close({"title", "pins", "plant", *TABLES})
     title = root.text("title")
     found: dict[str, Quantity] = {}
     values = Values()
@@ -115,7 +135,7 @@ def _read(root: Section) -> BoardFile:
     values.add("shunt.gain_v_per_a", volts_per_ampere if inverted else -volts_per_ampere, found["shunt.amplifier_gain"].where)
     values.add("expect.pwm_hz", 1.0 / found["pwm.period"].value_si, found["pwm.period"].where)
     _read_plant(root.section("plant"), values)
-    board = _board(root.document.path, title, found, values, inverted, volts_per_ampere)
+    board = _board(root, title, found, values, inverted, volts_per_ampere)
     _check(board)
     return board
 
@@ -142,15 +162,15 @@ def _read_plant(section: Section | None, values: Values) -> None:
         values.add(key, value, section.where(key))
 
 
-def _board(path: Path, title: str, found: dict[str, Quantity], values: Values, inverted: bool, volts_per_ampere: float) -> BoardFile:
+def _board(root: Section, title: str, found: dict[str, Quantity], values: Values, inverted: bool, volts_per_ampere: float) -> BoardFile:
     si = {name: quantity.value_si for name, quantity in found.items()}
     return BoardFile(
-        name=path.stem, path=path, title=title, pwm_period_s=si["pwm.period"], dead_time_s=si["pwm.dead_time"],
+        name=root.document.path.stem, path=root.document.path, title=title, pwm_period_s=si["pwm.period"], dead_time_s=si["pwm.dead_time"],
         sample_window_s=si["pwm.sample_window"], nominal_bus_v=si["supply.voltage"],
         bus_full_scale_v=si["adc.full_scale"] * si["adc.bus_divider"], current_full_scale_a=si["shunt.reference"] / volts_per_ampere,
         current_gain=-0.5 if inverted else 0.5, rds_on_ohm=si["inverter.rds_on"], shunt_ohm=si["shunt.resistance"],
         over_voltage_v=si["limits.over_voltage"], under_voltage_v=si["limits.under_voltage"], regen_limit_v=si["limits.regen"],
-        adc_bits=int(si["adc.bits"]), quantities=found, values=values)
+        adc_bits=int(si["adc.bits"]), quantities=found, pins=pins.read(root.section("pins")), values=values)
 
 
 def _check(board: BoardFile) -> None:

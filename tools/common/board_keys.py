@@ -52,6 +52,9 @@ class Part:
     path: Path
     title: str
     values: Values
+    board: str = ""
+    """The board that a motor file names."""
+    board_where: str = ""
 
 
 def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:

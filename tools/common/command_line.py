@@ -18,21 +18,21 @@ class Parser(argparse.ArgumentParser):
         raise UserError(message, "command line", f"see {self.prog} --help")
 
 
-def each(items: Iterable[Item], work: Callable[[Item], Made]) -> tuple[list[Made], int]:
+def tell(_: object, error: UserError) -> None:
+    for line in error.lines:
+        print(f"foc33: {line}", file=sys.stderr, flush=True)
+
+
+def each(items: Iterable[Item], work: Callable[[Item], Made], refuse: Callable[[Item, UserError], None] = tell) -> tuple[list[Made], int]:
     """What `work` makes of every item, and the exit code: an item that is refused gets its line and code 2, the others go on."""
     made, code = [], 0
     for item in items:
         try:
             made.append(work(item))
         except UserError as error:
-            _tell(error)
+            refuse(item, error)
             code = 2
     return made, code
-
-
-def _tell(error: UserError) -> None:
-    for line in error.lines:
-        print(f"foc33: {line}", file=sys.stderr, flush=True)
 
 
 def one_or_all(options: argparse.Namespace, known: list[str]) -> list[str]:
@@ -57,7 +57,7 @@ def run(work: Callable[[], int]) -> int:
     try:
         return work()
     except UserError as error:
-        _tell(error)
+        tell(None, error)
         return 2
     except KeyboardInterrupt:
         print("foc33: interrupted, nothing was written", file=sys.stderr)

@@ -2,6 +2,7 @@
 
     title = "Hurst DMB0224C10002"
     connection = "Y"                 or "delta": counts for values "winding"
+    board = "mclv"                   optional: a name in tuning/boards, or a path seen from this file; BOARD= overrides it
 
     [electrical]                     every number: { value = ..., unit = "...", source = "..." }; units.py lists the units
     pole_pairs = { value = 5, source = "..." }
@@ -73,6 +74,9 @@ class Motor:
     path: Path
     title: str
     connection: str
+    board: str
+    """The board that the file names, by name or path; "" for none."""
+    board_where: str
     pole_pairs: int
     rs_ohm: float
     ld_h: float
@@ -141,7 +145,7 @@ def load(name_or_path: str, where: str = "") -> Motor:
 def part(name_or_path: str, where: str = "") -> Part:
     """The same as keys of the virtual board."""
     motor = load(name_or_path, where)
-    return Part(motor.path, motor.title, motor.plant_values())
+    return Part(motor.path, motor.title, motor.plant_values(), motor.board, motor.board_where)
 
 
 def read_safely(path: Path, reader: Callable[[Section], Any]) -> Any:
@@ -178,7 +182,7 @@ class _Reader:
 def _tables(root: Section) -> dict[str, Section | None]:
     """All tables, present or not; unknown tables and keys come first, for a slip of the pen makes another one missing."""
     problems = Problems()
-    problems.attempt(lambda: root.close({"title", "connection", *TABLES}))
+    problems.attempt(lambda: root.close({"title", "connection", "board", *TABLES}))
     sections = {name: root.section(name) for name in TABLES}
     for name, section in sections.items():
         keys = TABLES[name]
@@ -207,10 +211,16 @@ def _read(root: Section) -> Motor:
     tune, plant = problems.attempt(lambda: _read_tune(tables["tune"])), problems.attempt(lambda: _read_plant(tables["plant"]))
     problems.tell()
     path = root.document.path
-    motor = Motor(name=path.stem, path=path, title=title, connection=connection, quantities=reader.found,
-                  spread=spread, tune=tune, plant_extra=plant, **values)
+    motor = Motor(name=path.stem, path=path, title=title, connection=connection, board=_board(root), board_where=root.where("board"),
+                  quantities=reader.found, spread=spread, tune=tune, plant_extra=plant, **values)
     _check(motor)
     return motor
+
+
+def _board(root: Section) -> str:
+    """Name or path of the board; a path is seen from the motor file's folder."""
+    name = root.text("board", "")
+    return str(root.document.path.parent / name) if paths.is_path(name) else name
 
 
 def _read_electrical(section: Section, connection: str, reader: _Reader) -> dict[str, Any]:

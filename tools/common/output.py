@@ -1,16 +1,24 @@
 """Result folders: written under a temporary name and moved into place when complete, so that nothing half-done looks finished."""
 
 import atexit
+import contextlib
+import ctypes
+import errno
+import fcntl
 import json
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from .errors import UserError
+from .paths import ROOT
 from .trace import Trace
 
 SUMMARY = "summary.json"
+AT_FDCWD, RENAME_EXCHANGE = -100, 2 # of Linux's renameat2, which Python does not have
+_renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
 
 
 class ResultFolder:
@@ -51,15 +59,53 @@ class ResultFolder:
             raise _unwritable(self.target, failure, "choose a folder that can be written") from None
 
     def _move(self) -> None:
+        """Who looks finds a complete result, the older or the new one; of two runs that end at once the later one's stays."""
         old = self.work.with_name(self.work.name + "-old")
-        if self.target.exists():
-            self.target.rename(old)
-        self.work.rename(self.target)
+        while not _exchanged(self.work, self.target):
+            try:
+                if self.target.exists(): # and the file system cannot exchange
+                    shutil.rmtree(old, ignore_errors=True)
+                    self.target.rename(old)
+                self.work.rename(self.target)
+                break
+            except OSError as error:
+                if error.errno not in (errno.ENOENT, errno.ENOTEMPTY, errno.EEXIST) or not self.work.exists():
+                    raise # else another run has just moved its result there, or away
+        shutil.rmtree(self.work, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)
 
 
+@contextlib.contextmanager
+def in_turn(name: str) -> Iterator[None]:
+    """Waits for another program of this tree that does the same."""
+    path = ROOT / "build" / f"{name}.lock"
+    try:
+        path.parent.mkdir(exist_ok=True)
+        lock = path.open("w", encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"cannot write '{path}' ({error.strerror})", "", "make build/ writable") from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print(f"waiting for another {name}", flush=True)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Whether two folders could change places in one step."""
+    return bool(_renameat2) and _renameat2(AT_FDCWD, os.fsencode(one), AT_FDCWD, os.fsencode(other), RENAME_EXCHANGE) == 0
+
+
 def _replaceable(folder: Path) -> bool:
-    return folder.is_dir() and (not any(folder.iterdir()) or (folder / SUMMARY).is_file())
+    try:
+        summary = folder / SUMMARY
+        return summary.is_file() or not any(folder.iterdir()) or summary.is_file() # between the looks another run may have replaced it
+    except FileNotFoundError: # another run is just replacing it
+        return True
+    except NotADirectoryError:
+        return False
 
 
 def _unwritable(place: Path, error: OSError, remedy: str) -> UserError:

@@ -1,5 +1,7 @@
 """Where things are in the project, and how a name on the command line becomes a file."""
 
+import re
+import zlib
 from pathlib import Path
 
 from .errors import UserError, suggestion
@@ -15,7 +17,7 @@ TUNED = ROOT / "build" / "tune"
 
 def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
     """The TOML file for a plain name (folder/NAME.toml) or a path."""
-    by_path = "/" in name or name.endswith(".toml")
+    by_path = is_path(name)
     path = Path(name) if by_path else folder / f"{name}.toml"
     try:
         found = path.is_file()
@@ -28,12 +30,31 @@ def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
     return path
 
 
+def is_path(name: str) -> bool:
+    """Whether a name on the command line or in a file is that of a file, not one of a folder's stems."""
+    return "/" in name or name.endswith(".toml")
+
+
 def names(folder: Path) -> list[str]:
     """Names of the TOML files in a folder."""
     try:
         return sorted(path.stem for path in folder.iterdir() if path.suffix == ".toml")
     except OSError as error:
         raise _unreadable(folder, error) from None
+
+
+def name_of(path: Path, home: Path | None = None) -> str:
+    """A name for what is made of a file or folder: its own in the project's folder `home`; elsewhere with a number, so that namesakes share
+    nothing. Plain, whatever the path is."""
+    path = path.resolve()
+    name = path.name.removesuffix(".toml")
+    plain = re.sub(r"[^A-Za-z0-9_.]+", "-", name).strip("-") or "unnamed"
+    return name if home is not None and path.parent == home.resolve() and name == plain else f"{plain}-{zlib.crc32(str(path).encode()):08x}"
+
+
+def pair_name(motor: Path, board: Path | None) -> str:
+    """Name of a motor file, and of the board file where one was asked for: what is made of them has a folder of its own."""
+    return name_of(motor, MOTORS) + (f"-{name_of(board, BOARDS)}" if board else "")
 
 
 def _unreadable(folder: Path, error: OSError) -> UserError:

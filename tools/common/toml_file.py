@@ -13,13 +13,13 @@ REQUIRED: Any = object()
 
 
 class Document:
-    """A TOML file: its data, and where in the text a key stands."""
+    """A TOML file: its data, and where in the text a key stands. `text`: what is going to be written there."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, text: str | None = None) -> None:
         self.path = path
         self.label = str(paths.shown(path))
         try:
-            self.text = path.read_text(encoding="utf-8-sig") # some editors begin a file with a mark
+            self.text = path.read_text(encoding="utf-8-sig") if text is None else text # some editors begin a file with a mark
         except FileNotFoundError:
             raise UserError("no such file", self.label,
                             "check the name; `python3 -m tools.bench scenarios` lists the scenarios") from None

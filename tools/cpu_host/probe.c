@@ -3,6 +3,7 @@
 
 #include "board/firmware.h"
 #include "board/watch.h"
+#include "drive/limits.h"
 #include "drive/param_table.h"
 #include "drive/param_scaling.h"
 
@@ -45,7 +46,9 @@
     X(vq_limit, "fw.vq_limit_v", "V", "q voltage limit", VOLTAGE_V(d->run.control.vq_limit_q14)) \
     X(bus, "fw.bus_v", "V", "filtered bus voltage", BUS_V(qm_hi(d->bus_q31))) \
     X(fw_index, "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", (double)d->run.fieldweak.index) \
-    X(inv_kphi, "fw.inv_kphi", "Q15/2", "1/Kphi in use (MotorEstimParm.qInvKFi)", (double)d->run.model.inv_kfi) \
+    X(limits, "fw.limits", "", "why the output is limited, a sum of limit_reason_t (LimitParm.now)", (double)limits_reasons(d, &board_params)) \
+    X(inv_kphi, "fw.inv_kphi_rpm_per_v", "rpm/V", "1/Kphi in use, V peak line to line (MotorEstimParm.qInvKFi)", \
+      (double)d->run.model.inv_kfi / (sqrt(3.0) * 16384.0 * (double)(NOPOLESPAIRS) * (double)NORM_VOLTAGE_CONST)) \
     X(ls_ratio, "fw.ls_ratio", "", "Ls/(2 Ls0) in use", (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0) \
     X(offset, "fw.offset_deg", "deg", "hand-over angle offset that is left", ANGLE_DEG(d->run.handover.offset)) \
     X(speed_obs, "fw.speed_obs_rpm", "rpm", "speed of the load observer", SPEED_RPM(observer_speed(&d->run.observer))) \

@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ that are made from headers: faults, parameters, the simulator's assumptions.
+"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, the simulator's assumptions.
 
     python3 -m tools.docs.tables                  writes the pages
     python3 -m tools.docs.tables --print faults   prints one page instead
@@ -10,6 +10,8 @@ import re
 import sys
 from collections.abc import Callable
 
+from tools.common import drive_tables
+from tools.common import pins as chip_pins
 from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.paths import ROOT
@@ -25,8 +27,11 @@ def table(head: str, align: str, lines: list[list[str]]) -> str:
 
 
 def faults() -> str:
-    found = rows("include", "drive/faults.h", "DRIVE_FAULT_TABLE", "#code #name cause remedy")
-    return table("code, name, cause, remedy", "llll", [row for row in found if row[0] != "0"])
+    return table("code, name, cause, remedy", "llll", [[str(row.code), row.name, row.cause, row.remedy] for row in drive_tables.faults()[1:]])
+
+
+def limits() -> str:
+    return table("bit, name, cause, remedy", "rlll", [[str(row.code), row.name, row.cause, row.remedy] for row in drive_tables.limits()])
 
 
 def simulator() -> str:
@@ -45,7 +50,17 @@ def params() -> str:
         f"- {message.replace('SPEED0', 'SPEED0 .. 17')}\n" for message in relations if not re.match(r"IDREF_SPEED[1-9]", message))
 
 
-PAGES: dict[str, Callable[[], str]] = {"faults": faults, "parameters": params, "simulator": simulator}
+def files() -> str:
+    from . import file_keys # needs numpy, which the other pages do without
+    return file_keys.page(table)
+
+
+def pins() -> str:
+    return table("pin, port, analogue, remappable, also, on the MCLV, known from", "rllllll", chip_pins.page())
+
+
+PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "limits": limits, "parameters": params,
+                                         "pins": pins, "simulator": simulator}
 
 
 def page(name: str) -> str:

@@ -9,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 
 from tools.common import paths
+from tools.common.progress import waiting
 
 SOURCES = ("Makefile", "tools/make", "firmware", "include", "userparams.h")
 CHANGED = (":(glob)firmware/**/*.[ch]", ":(glob)include/**/*.h", "userparams.h")
@@ -50,8 +51,9 @@ def build(commit_id: str, variables: list[str], root: Path = paths.ROOT) -> Path
     with tarfile.open(fileobj=BytesIO(archive.stdout)) as tar:
         tar.extractall(source)
     environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN}
-    done = subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "target-elf", *variables], cwd=source, env=environment,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
+    with waiting(f"building commit {commit_id[:7]}, to compare with"):
+        done = subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "target-elf", *variables], cwd=source, env=environment,
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0 or not done.stdout.strip():
         raise NoBase(f"commit {commit_id[:7]} does not build with these settings")
     (source / done.stdout.split()[-1]).rename(elf)

@@ -19,6 +19,9 @@ BOXES = {
     "-O0": ("optimization-level", "0"), "-O1": ("optimization-level", "1"), "-O2": ("optimization-level", "2"),
     "-O3": ("optimization-level", "3"),
 }
+#: MPLAB X builds in the order of the project and stops at the first file with an error: these say what is wrong with userparams.h
+FIRST = ["firmware/drive/param_text.c", "firmware/drive/param_check.c"]
+FIRST_FOLDER = "(first) userparams.h"
 LINKER_BOXES = {"--gc-sections": ("remove-unused-sections", "true"), "--report-mem": ("report-memory-usage", "true")}
 
 
@@ -45,18 +48,22 @@ def updated(text: str, facts: dict[str, list[str]]) -> str:
     root = ET.fromstring(text)
     root.find(".//targetDevice").text = f"dsPIC{facts['device'][0]}"
     for name, ending in (("HeaderFiles", ".h"), ("SourceFiles", ".c")):
-        _fill(root.find(f".//logicalFolder[@name='{name}']"), sorted(file for file in facts["file"] if file.endswith(ending)))
+        _fill(root.find(f".//logicalFolder[@name='{name}']"), sorted((file for file in facts["file"] if file.endswith(ending)), key=_order))
     _set(root.find(".//C30"), BOXES, facts["flag"], {"extra-include-directories": ";".join(above(path) for path in facts["include"])})
     _set(root.find(".//C30-LD"), LINKER_BOXES, facts["link"], {})
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
+def _order(file: str) -> tuple[int, str]:
+    return FIRST.index(file) if file in FIRST else len(FIRST), file
+
+
 def _fill(folder: ET.Element, files: list[str]) -> None:
     """MPLAB X's folder of files, with one folder inside for each folder of the sources."""
     folder[:] = []
-    inside = {file: "/".join(Path(file).parent.parts[1:]) for file in files}
-    for number, group in enumerate(sorted(set(inside.values()), key=lambda name: (not name, name)), 1):
+    inside = {file: FIRST_FOLDER if file in FIRST else "/".join(Path(file).parent.parts[1:]) for file in files}
+    for number, group in enumerate(sorted(set(inside.values()), key=lambda name: (name != FIRST_FOLDER, not name, name)), 1):
         into = ET.SubElement(folder, "logicalFolder", name=f"f{number}", displayName=group, projectFiles="true") if group else folder
         for file in files:
             if inside[file] == group:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from tools.common import command_line, paths
 from tools.common.errors import UserError
+from tools.common.progress import waiting
 
 from . import attribution, base, stack
 from .budget import UNASSIGNED, Budget, Share, Shares, shares
@@ -226,10 +227,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     budget = Budget.read()
-    listing = disassemble(options.objdump, options.elf)
-    image = attribution.read(options.elf)
+    with waiting("reading the image"):
+        listing, image = disassemble(options.objdump, options.elf), attribution.read(options.elf)
     before, name, reason = (None, "", "not asked for (--base)") if options.base is None else compare(options.base, budget)
-    report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
+    with waiting("measuring the image"):
+        report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
     path = write_json(summary(report), options.out, "size")

@@ -6,11 +6,11 @@ coverage_flags = -std=gnu99 -O0 -g -fkeep-inline-functions -Dalways_inline=unuse
 .PHONY: coverage
 coverage: setup-test ## [tests] the control law by the unit tests: 100 % of lines and branches required [build/coverage/index.html]
 	@test/static/need.sh gcovr=gcovr
-	@rm -rf build/coverage build/host-coverage build/test-coverage; mkdir -p build/coverage
-	@$(MAKE) -s VARIANT=coverage SAN= warnings=-w CC=$(call quoted,$(CC) --coverage) CFLAGS=$(call quoted,$(coverage_flags)) \
-	    $(unit_c:%=build/test-coverage/%)
-	@for test in $(unit_c); do build/test-coverage/$$test >build/coverage/output.txt 2>&1 || { \
-	    cat build/coverage/output.txt; echo "$$test fails: coverage of failing tests means nothing"; exit 1; }; done
-	@gcovr --root . --object-directory . --filter include/control/ --filter firmware/control/ --fail-under-line 100 --fail-under-branch 100 \
+	+@$(shared) $(call lock_file,build/lock-coverage) rm -rf build/coverage build/host-coverage build/test-coverage; mkdir -p build/coverage; \
+	$(still) 'building the tests' $(MAKE) -s VARIANT=coverage SAN= warnings=-w CC=$(call quoted,$(CC) --coverage) CFLAGS=$(call quoted,$(coverage_flags)) \
+	    $(unit_c:%=build/test-coverage/%) || exit; \
+	$(still) 'unit tests' sh -c 'for test; do build/test-coverage/$$test >build/coverage/output.txt 2>&1 || { \
+	    cat build/coverage/output.txt; echo "$$test fails: coverage of failing tests means nothing"; exit 1; }; done' sh $(unit_c) || exit; \
+	$(still) gcovr gcovr --root . --object-directory . --filter include/control/ --filter firmware/control/ --fail-under-line 100 --fail-under-branch 100 \
 	    --html-details build/coverage/index.html --html-title "foc33 control law" --json-summary build/coverage/summary.json \
 	    --txt build/coverage/report.txt --print-summary build/host-coverage build/test-coverage

@@ -1,10 +1,13 @@
 # The image for the dsPIC33FJ32MC204, built by XC16: make firmware, flash, project. Uses the variables of the main Makefile.
 #
-# Variables: OPT (-O2, the best of the free licence; -O1, -O3), XC16 (folder of the compiler, if it is not on PATH), DFP (device pack, if the
+# Variables: OPT (-O2, the best of the free licence; -O1, -O3), XC16 (folder of the compiler, XC16 or XC-DSC, if it is not on PATH), DFP (device pack, if the
 # compiler has no support files for the part), DEFINES USERPARAMS VARIANT as for the PC, TOOL IPE (make flash).
 
 OPT ?= -O2
-xc16 = $(if $(XC16),$(call quoted,$(XC16)/bin/xc16-),xc16-)
+# XC16, or its successor XC-DSC: its programs have other names, and it need not call itself __XC16__.
+xc_names := $(or $(shell for name in xc16- xc-dsc-; do command -v $(call quoted,$(if $(XC16),$(XC16)/bin/))$${name}gcc >/dev/null && echo $$name && \
+    break; done),xc16-)
+xc16 = $(if $(XC16),$(call quoted,$(XC16)/bin/$(xc_names)),$(xc_names))
 target_device := 33FJ32MC204
 
 target_opt_suffix := $(subst $() ,,$(filter-out -O2,$(OPT)))
@@ -12,12 +15,12 @@ X := build/target$(target_opt_suffix)$(if $(VARIANT),-$(VARIANT))
 
 # -fno-reorder-blocks and -fno-gcse: a fifth less flash in the interrupt at the same worst case.
 target_flags = -std=gnu99 $(OPT) -g -fno-reorder-blocks -fno-gcse -fno-inline-small-functions -ffunction-sections
-target_includes = $(if $(USERPARAMS),-I$(USERPARAMS)) -Iinclude -I.
+target_includes = $(if $(USERPARAMS),-I$X/header -I$(call quoted,$(USERPARAMS))) -Iinclude -I.
 # All that XC16's compiler knows and -Wall -Wextra leave out.
 target_warnings := -Wall -Wextra -Werror -pedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align \
     -Wstrict-prototypes -Wmissing-prototypes -Wredundant-decls -Wswitch-enum -Wswitch-default -Wfloat-equal -Wdouble-promotion -Wlogical-op \
     -Wvla -Winline -Wtype-limits -Wframe-larger-than=128
-target_part = -mcpu=$(target_device) -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16))
+target_part = -mcpu=$(target_device) -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16)) $(if $(filter xc-dsc-,$(xc_names)),-U__XC16__ -D__XC16__)
 target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(target_includes) $(DEFINES)
 target_link_options := --gc-sections,--report-mem
 target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
@@ -25,20 +28,25 @@ target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 target_sources := $(wildcard firmware/*/*.c firmware/*/*/*.c)
 target_objects := $(target_sources:%.c=$X/%.o)
 
-.PHONY: firmware flash project find-xc16
-firmware: $X/checked ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
-	@cat $<
+.PHONY: firmware image flash project find-xc16
+firmware: find-xc16 ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
+	$(call build,$X/checked)
+	@cat $X/checked
+
+image: find-xc16
+	$(call build,$X/foc33.elf)
 
 find-xc16:
 	@command -v $(xc16)gcc >/dev/null || { \
 	    echo "foc33: no xc16-gcc," $(call quoted,$(if $(XC16),XC16=$(XC16) has no bin/xc16-gcc,not on PATH)): install \
-	        "Microchip's MPLAB XC16 compiler (the free licence will do; XC compilers page at microchip.com)" \
+	        "Microchip's MPLAB XC16 compiler or its successor XC-DSC (the free licence will do; XC compilers page at microchip.com)" \
 	        "and name its folder, e.g. XC16=/opt/microchip/xc16/v2.10" >&2; exit 2; }
 
 # What the compiler would answer with lines of its own about every file.
 .PHONY: target-input
 target-input: find-xc16
 	$(call known_defines)
+	$(no_parameters)
 	@case $(call quoted,$(OPT)) in -O[123]) ;; *) \
 	    echo foc33: no such level, $(call quoted,OPT=$(OPT)): use -O1, -O2 or -O3 >&2; exit 2;; esac
 	@test -z $(call quoted,$(DFP)) || test -f $(call quoted,$(DFP)/xc16/bin/c30_device.info) || { \
@@ -47,15 +55,22 @@ target-input: find-xc16
 # Python with what reads ELF and HEX.
 target_setup = @tools/setup/prepare.sh target
 
-$X/flags: FORCE | target-input
-	@test -f $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
-	    echo foc33: no userparams.h, $(call quoted,USERPARAMS=$(USERPARAMS)): name a folder that has one >&2; exit 2; }
+ifneq ($(USERPARAMS),)
+$X/header/userparams.h: FORCE | target-input
+	$(copy_header)
+endif
+
+$X/flags: FORCE $(if $(USERPARAMS),$X/header/userparams.h) | target-input
+	$(need_header)
 	$(call remember,$(target_compile) $(target_link_options))
 
 $X/contents: FORCE | target-input
 	$(call remember,$(target_objects))
 
-$X/%.o: %.c $X/flags
+$X/params: $X/flags $(params_source)
+	$(params) $(target_compile)
+
+$X/%.o: %.c $X/flags | $X/params
 	@mkdir -p $(@D)
 	$(call say,xc16,$<)$(target_compile) -MMD -MP -c $< -o $@
 
@@ -99,4 +114,4 @@ project: ## [your board] write the MPLAB X project firmware.X
 project-facts:
 	@printf '%s\n' $(target_facts)
 
--include $(target_objects:.o=.d)
+-include $X/params.d $(target_objects:.o=.d)

@@ -2,4 +2,4 @@
 .PHONY: proof
 proof: ## [tests] Frama-C, 16-bit int: no run-time error and no overflow for any input [ONLY="tick ..."]
 	@test/static/need.sh frama-c=frama-c-base
-	@python3 test/proof/proof.py $(ONLY)
+	@$(in_turn) $(still) proof python3 test/proof/proof.py $(ONLY)

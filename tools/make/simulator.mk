@@ -6,8 +6,8 @@ iss_includes := -Itools/chip -Itools/cpu_33f
 iss_compile = $(CC) -std=c11 -O2 -g -fPIC $(sanitizer) $(warnings) -Werror $(iss_includes)
 
 .PHONY: iss iss-bench
-iss: $(iss_folder)/libiss33f.a ## [simulator] build/iss/libiss33f.a: the dsPIC33F's core without a board [SAN=1]
-	@:
+iss: ## [simulator] build/iss/libiss33f.a: the dsPIC33F's core without a board [SAN=1]
+	$(call build,$(iss_folder)/libiss33f.a)
 
 $(iss_folder)/flags: FORCE
 	$(call remember,$(iss_compile) $(iss_objects))
@@ -17,10 +17,11 @@ $(iss_folder)/%.o: tools/%.c $(iss_folder)/flags
 	$(call say,cc,$<)$(iss_compile) -MMD -MP -c $< -o $@
 
 $(iss_folder)/libiss33f.a: $(iss_objects)
-	@rm -f $@
-	$(call say,ar,$@)ar rcs $@ $^
+	@rm -f $@.new
+	$(call say,ar,$@)ar rcs $@.new $^ && mv -f $@.new $@
 
-iss-bench: setup-run build/iss/libmachine.so ## [simulator] instruction cycles per second that the simulator executes on one core
+iss-bench: setup-run ## [simulator] instruction cycles per second that the simulator executes on one core
+	$(call build,build/iss/libmachine.so)
 	@$(python) test/cpu_33f/bench.py
 
 -include $(iss_objects:.o=.d)

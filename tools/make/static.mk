@@ -3,7 +3,7 @@
 static: ## [tests] compiler warnings in every mode, cppcheck, MISRA, clang-tidy, format [docs/deviations.md]
 	@test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 clang-format-14=clang-format-14
 	@python3 test/static/format.py
-	@python3 test/static/static.py
+	@$(still) 'static checks' python3 test/static/static.py
 
 .PHONY: format
 format: ## [upkeep] write the C files in the style of .clang-format
@@ -12,4 +12,4 @@ format: ## [upkeep] write the C files in the style of .clang-format
 
 .PHONY: ubsan
 ubsan: setup-test ## [tests] the unit tests under clang's undefined, integer and implicit-conversion sanitizers
-	@test/static/ubsan.sh
+	+@$(in_turn) $(still) ubsan test/static/ubsan.sh

@@ -6,4 +6,4 @@ all_suites += $(iss_tests)
 $(addprefix $T/made/,$(iss_tests)): build/iss/libmachine.so
 
 build/iss/libmachine.so: build/iss/libiss33f.a
-	$(call say,ld,$@)$(CC) -shared -o $@ -Wl$(comma)--whole-archive $< -Wl$(comma)--no-whole-archive -lm
+	$(call say,ld,$@)$(CC) -shared -o $@.new -Wl$(comma)--whole-archive $< -Wl$(comma)--no-whole-archive -lm && mv -f $@.new $@

@@ -9,12 +9,14 @@ $(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/run_imag
 	@mkdir -p $(@D)
 	$(call say,cc,$@)$(iss_compile) -o $@ $(filter %.c %.a,$^) -lm
 
+$X/test/liblaw.a: $$(target_test_law)
+	@mkdir -p $(@D); rm -f $@; $(xc16)ar rcs $@ $^
+
 .PHONY: test-target
-test-target: setup-test find-xc16 $$(target_test_law) $(target_test_simulator) ## [tests] the unit tests of the control law as target code, in the simulator [ONLY="test_pi ..."]
+test-target: setup-test find-xc16 ## [tests] the unit tests of the control law as target code, in the simulator [ONLY="test_pi ..."]
 	@$(if $(call chosen,$(law_tests)),:,echo foc33: no unit test of the control law, ONLY=$(call quoted,$(ONLY)): use \
 	    $(call quoted,$(sort $(notdir $(law_tests)))) >&2; exit 2)
-	@$(MAKE) -s $(addprefix $T/,$(call chosen,$(law_tests)))
-	@mkdir -p $X/test; rm -f $X/test/liblaw.a; $(xc16)ar rcs $X/test/liblaw.a $(target_test_law)
+	$(call build,-s $X/test/liblaw.a $(target_test_simulator) $(addprefix $T/,$(call chosen,$(law_tests))),building the tests)
 	$(sixteen_bit) --out $X/test --library $X/test/liblaw.a --simulator $(target_test_simulator) --flat \
 	    --compile $(call quoted,$(xc16)gcc $(target_part) $(target_flags) $(target_includes) $(DEFINES)) \
 	    --link $(call quoted,$(target_link) -o {elf} {objects} -Wl$(comma)-Map={map}$(comma)$(target_link_options)) $(call chosen,$(law_tests))

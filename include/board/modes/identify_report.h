@@ -13,15 +13,11 @@ typedef struct {
 
 extern tIdentifyParm IdentifyParm;
 
-#define STATUS_LINE_BYTES 128
-
 /** "step 11 BUSY fault 0 R 2692 mohm Ld 1919 uH Lq 1920 uH Kphi 0 mV/krpm" in one line. @return its end */
 char *identify_status_line(char *line, const drive_t *d);
 
 /** Copies what has been measured to IdentifyParm. */
 void identify_watch(const drive_t *d);
-#else
-#define STATUS_LINE_BYTES 64
 #endif
 
 /** The mode's status line. @return its end; the line itself without the mode */

@@ -5,7 +5,9 @@
  * mode_start            IDENTIFY               the end of drive_start()
  * mode_background       IDENTIFY               a pass of the background
  * mode_reference_step   TUNING                 the speed reference in closed loop
+ * mode_speed_target     TUNING                 the speed that the reference goes to
  * mode_current_step     TORQUE_MODE            the speed controller in closed loop
+ * mode_limit_reasons    TORQUE_MODE            why the commanded current is not given
  * mode_target_range     TORQUE_MODE            what the potentiometer's travel means
  * mode_pot_split        BIDIRECTIONAL_SPEED    the potentiometer's direction
  * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over

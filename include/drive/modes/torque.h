@@ -3,6 +3,7 @@
 #define DRIVE_MODES_TORQUE_H
 
 #include "drive/modes/bidirectional.h"
+#include "drive/limit_reasons.h"
 #include "drive/speed_law.h"
 
 /** Ends of the potentiometer's travel: electrical rpm, or q current in Q13. */
@@ -49,6 +50,23 @@ QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, curren
     (void)d;
     (void)p;
     *iq_q13 = 0;
+    return 0;
+#endif
+}
+
+/** Why the commanded current is not given. @param reasons the result @return 1 if the mode, and no speed reference, is in command */
+QM_INLINE uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t *reasons)
+{
+#ifdef TORQUE_MODE
+    int16_t asked = qm_clamp(qm_abs(d->command.target_erpm), 0, d->run.control.iq_limit_q13);
+    int16_t missing = qm_sub_limited(asked, along_direction(d, d->run.control.ref_q13.q));
+
+    *reasons = (uint16_t)((qm_abs(missing) > (p->current_max_q13 >> 6)) ? LIMIT_SPEED_RANGE : LIMIT_NONE);
+    return (uint16_t)(d->state == (uint16_t)DRIVE_CLOSED);
+#else
+    (void)d;
+    (void)p;
+    *reasons = (uint16_t)LIMIT_NONE;
     return 0;
 #endif
 }

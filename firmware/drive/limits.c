@@ -1,0 +1,69 @@
+/* Why the drive gives less than it is asked for, read off its variables. */
+#include "drive/limits.h"
+
+#include "drive/modes/modes.h"
+#include "drive/reference.h"
+#include "drive/state.h"
+
+/** 1 from 1/32 below the limit on: field weakening's trim keeps the voltage a little below it. @param limit 0 or more */
+static uint16_t at_limit(int16_t x, int16_t limit)
+{
+    return (uint16_t)(qm_abs(x) >= (int16_t)(limit - (limit >> 5)));
+}
+
+/** The q current is held by the bus. With no braking current at all its reference is 0, which has no sign. */
+static uint16_t brakes_at_limit(const drive_control_t *c, speed_erpm_t speed)
+{
+    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && at_limit(c->ref_q13.q, c->brake_limit_q13)
+                      && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0));
+}
+
+/** What holds the speed reference. A rest that the next step takes is no ramp. */
+static uint16_t ramp_reasons(const drive_t *d, const drive_params_t *p)
+{
+    speed_erpm_t target = mode_speed_target(d, p);
+    int16_t left = qm_abs(qm_sub_limited(target, d->run.control.reference_erpm));
+    uint16_t waits = (uint16_t)(left != 0 && !reference_may_move(d, p, target));
+
+    return (uint16_t)((waits || left > qm_hi(2 * p->speed_ramp_q16) ? (uint16_t)LIMIT_RAMP : 0u) | (waits ? (uint16_t)LIMIT_RAMP_WAITS : 0u));
+}
+
+/** What holds the current's references in closed loop. */
+static uint16_t closed_loop_reasons(const drive_t *d, const drive_params_t *p)
+{
+    const drive_run_t *run = &d->run;
+    const drive_control_t *c = &run->control;
+    uint16_t found;
+
+    if (!mode_limit_reasons(d, p, &found)) {
+        found = ramp_reasons(d, p);
+    }
+    if (brakes_at_limit(c, observer_speed(&run->observer))) {
+        found |= (uint16_t)LIMIT_BRAKE;
+    } else if (at_limit(c->ref_q13.q, c->iq_limit_q13)) {
+        found |= (uint16_t)LIMIT_CURRENT;
+    } else {
+        /* the q current is what it was asked to be */
+    }
+    if (run->fieldweak.table_q13 + run->fieldweak.trim_q13 < 0) {
+        found |= (uint16_t)LIMIT_FIELD_WEAKENING;
+    }
+    return found;
+}
+
+uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
+{
+    const drive_control_t *c = &d->run.control;
+    uint16_t found = 0;
+
+    if (!drive_is_running(d)) {
+        return 0;
+    }
+    if (at_limit(c->v_q14.q, c->vq_limit_q14) || at_limit(c->v_q14.d, vd_limit(&d->circle))) {
+        found = (uint16_t)LIMIT_VOLTAGE;
+    }
+    if (drive_is_closed(d)) {
+        found |= closed_loop_reasons(d, p);
+    }
+    return found;
+}

@@ -1,0 +1,58 @@
+/* Refuses a userparams.h by its text: a parameter that is missing, empty or no number (2,67; two; 2.67 ohm), and a mode with = 0.
+ *
+ * Only the text is looked at, for as an expression such a value gives messages about formulas, in every file that uses it; this file
+ * therefore comes first in the build. Without optimisation (-O0) the compiler does not evaluate the texts, and they are not looked at. */
+#include "drive/modes/mode_table.h"
+#include "drive/param_refuse.h"
+#include "drive/param_scaling.h"
+#include "drive/param_table.h"
+
+#ifdef __OPTIMIZE__
+#define IS_EMPTY(text) (sizeof(text) == 1)
+#define HAS(characters, character) (__builtin_strchr(characters, character) != 0)
+#define IS_DEFINED(word, text) (__builtin_strcmp(word, text) != 0) /* else the preprocessor leaves the name as it is */
+
+/* A number or an expression of constants: it begins as one, and a number in front is followed by the end, an operator or a suffix. */
+#define DIGITS ".0123456789"
+#define OPERATORS ")+-*/%<>=&|^!?:"
+#define ALLOWED DIGITS OPERATORS "(~ _abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+#define FIRST(text) __builtin_strspn(text, "+-~! ")
+#define NUMBER(text) __builtin_strspn(text, "+-~!( ")
+#define BEHIND(text) (NUMBER(text) + __builtin_strspn((text) + NUMBER(text), DIGITS))
+#define BLANKS(text) __builtin_strspn((text) + BEHIND(text), " ")
+#define ENDS(text) HAS((BLANKS(text) > 0) ? OPERATORS : OPERATORS "xXeEfFlLuU", (text)[BEHIND(text) + BLANKS(text)])
+#define IS_COMPUTED(text) (sizeof(text) > 80) /* from other parameters, whose own texts are looked at */
+#define IS_NUMBER(text) \
+    (IS_COMPUTED(text) \
+     || (__builtin_strspn(text, ALLOWED) == sizeof(text) - 1 && HAS("(" DIGITS, (text)[FIRST(text)]) \
+         && (BEHIND(text) == NUMBER(text) || ENDS(text))))
+
+#define ANEW ", or make tune"
+#define HOW ", with a decimal point and without a unit"
+#define CHECK_TEXT(name, unit, min, max, value, meaning) \
+    PARAM_CHECK(text_of_##name) \
+    { \
+        if (!IS_DEFINED(#name, PARAM_TEXT(name))) \
+            PARAM_REFUSE(gone_##name, #name " is missing: add #define " #name " and a number, " PARAM_RANGE(unit, min, max, meaning) ANEW) \
+        else if (IS_EMPTY(PARAM_TEXT(name))) \
+            PARAM_REFUSE(empty_##name, #name " has no value: write a number, " PARAM_RANGE(unit, min, max, meaning)) \
+        else if (!IS_NUMBER(PARAM_TEXT(name))) \
+            PARAM_REFUSE(not_##name, #name " = " PARAM_TEXT(name) " is no number: write one, " PARAM_RANGE(unit, min, max, meaning) HOW) \
+    }
+#define CHECK_OPTIONAL(name) \
+    PARAM_CHECK(text_of_##name) \
+    { \
+        if (!IS_NUMBER(PARAM_TEXT(name))) \
+            PARAM_REFUSE(not_##name, #name " = " PARAM_TEXT(name) " is no number: remove the line, or write a number" HOW) \
+    }
+#define CHECK_MODE(name, meaning) \
+    PARAM_CHECK(text_of_##name) \
+    { \
+        if (IS_DEFINED(#name, PARAM_TEXT(name)) && !IS_EMPTY(PARAM_TEXT(name)) && __builtin_strcmp(PARAM_TEXT(name), "1") != 0) \
+            PARAM_REFUSE(mode_##name, #name " = " PARAM_TEXT(name) " switches the mode on: write #define " #name ", or nothing for off") \
+    }
+
+PARAM_TABLE(CHECK_TEXT)
+PARAM_OPTIONAL(CHECK_OPTIONAL)
+MODE_TABLE(CHECK_MODE)
+#endif

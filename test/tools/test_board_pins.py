@@ -1,0 +1,112 @@
+"""The chip's pins: the table against the virtual chip, the firmware's choice, a board file's [pins], and builds with other pins."""
+
+import re
+import subprocess
+
+import pytest
+from tune_support import COMPILER
+from support import refusal
+
+from tools.common import board_file, paths, pins
+
+MCLV = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+HEADER = pins.SOURCE.read_text(encoding="utf-8")
+
+
+# ---- the table ---------------------------------------------------------------------------------------------------------------
+def test_the_table_has_the_pins_that_the_virtual_chip_has():
+    text = (paths.ROOT / "tools/chip/chip_ports.c").read_text(encoding="utf-8")
+    bits = {port: sum(1 << int(name[2:]) for name in pins.chip() if name[1] == port) for port in "ABC"}
+    implemented = re.search(r"implemented\[3\] = \{(.*?)\}", text)[1]
+    assert list(bits.values()) == [int(mask, 16) for mask in implemented.split(",")]
+    shifts, masks = (re.search(rf"{name}\[3\] = \{{(.*?)\}}", text)[1].split(",") for name in ("shift", "mask"))
+    for port, shift, mask in zip("ABC", shifts, masks):
+        analogue = {pin.an: int(name[2:]) for name, pin in pins.chip().items() if name[1] == port and pin.an is not None}
+        assert analogue == {int(shift) + bit: bit for bit in range(16) if int(mask, 16) >> bit & 1}
+    assert {pin.rp: name for name, pin in pins.chip().items() if pin.rp is not None} == {
+        rp: f"RB{rp}" if rp < 16 else f"RC{rp - 16}" for rp in range(26)}
+
+
+def test_no_pin_is_there_twice_and_the_pwm_s_are_rb10_to_15():
+    numbers = [pin.number for pin in pins.chip().values()]
+    assert len(set(numbers)) == len(numbers) == 35 and max(numbers) == 44
+    found = {match[0]: name for name, pin in pins.chip().items() if (match := re.search(r"PWM1[HL]\d", pin.others))}
+    assert found == {"PWM1H1": "RB14", "PWM1L1": "RB15", "PWM1H2": "RB12", "PWM1L2": "RB13", "PWM1H3": "RB10", "PWM1L3": "RB11"}
+
+
+def test_the_firmware_s_pins_are_all_told_and_the_transmitter_s_register_is_that_of_its_pin():
+    assert len(pins.firmware()) == len(re.findall(r"^#define BOARD_PIN_", HEADER, re.MULTILINE)) == 14
+    assert (pins.firmware()["fault"].pin, pins.firmware()["fault"].known_from) == ("RB8", "published code")
+    rp = pins.chip()[pins.firmware()["uart_tx"].pin].rp
+    assert re.search(r"#define BOARD_UART_TX_PIN (\S+)", HEADER)[1] == f"RPOR{rp // 2}bits.RP{rp}R"
+
+
+def test_the_page_tells_what_the_board_has_on_a_pin_and_on_the_low_side_of_its_bridge():
+    told = {row[1]: row[5] for row in pins.page()}
+    assert told["RB15"] == "PWM of phase A (M1), low side" and told["RC2"] == "potentiometer" and told["RB9"] == ""
+
+
+# ---- a board file's pins -------------------------------------------------------------------------------------------------------
+@pytest.fixture
+def load(tmp_path):
+    def of(lines: str) -> board_file.BoardFile:
+        path = tmp_path / "file.toml"
+        path.write_text(f"{MCLV}[pins]\n{lines}\n", encoding="utf-8")
+        return board_file.load(str(path))
+    return of
+
+
+def test_a_pin_may_be_told_by_any_of_its_names_and_what_differs_is_a_line_of_mclv_h(load):
+    found = load('fault = "RP9"\ncurrent_a = "AN3"\ncurrent_b = "RB2"\nbus = "AN5"\nuart_tx = "RC5"\ns2 = "RA8"\npwm_a = "PWM1H1"').pins
+    assert found == {"fault": "RB9", "current_a": "RB1", "current_b": "RB2", "bus": "RB3", "uart_tx": "RC5", "s2": "RA8", "pwm_a": "RB14"}
+    assert pins.differences(found) == ["#define BOARD_PIN_FAULT B, 9", "#define BOARD_PIN_CURRENT_A B, 1", "#define BOARD_PIN_CURRENT_B B, 2",
+                                       "#define BOARD_PIN_BUS B, 3", "#define BOARD_PIN_UART_TX C, 5", "#define BOARD_UART_TX_PIN RPOR10bits.RP21R"]
+
+
+@pytest.mark.parametrize("line, parts", [
+    ('falt = "RB9"', ["unknown key 'falt'", "did you mean 'fault'?"]), ('fault = 8', ["'fault' is not a text"]), ('fault = "RD1"', ["'RD1' is no pin"]),
+    ('fault = "RA8"', ["fault cannot be on RA8", "a pin with an RP number: RB9,"]), ('uart_rx = "RA9"', ["a pin with an RP number"]),
+    ('pot = "RB8"', ["pot cannot be on RB8", "an analogue input: RA0,"]), ('s2 = "RA2"', ["the crystal is there"]),
+    ('led_run = "RB15"', ["the PWM module drives this pin"]), ('pwm_b = "RB14"', ["the chip fixes its PWM pins"]),
+    ('fault = "RA0"', ["an RP number"]), ('pot = "RA0"', ["pot and current_a are both on RA0"]), ('s2 = "RB4"', ["s2 and s3 are both on RB4"]),
+    ('bus = "AN3"', ["current_a, current_b and bus are on RA0, RA1, RB1", "in this order"]),
+    ('current_a = "AN1"\ncurrent_b = "AN0"', ["current_a, current_b and bus are on RA1, RA0, RB0"])])
+def test_a_pin_that_cannot_do_it_is_refused_with_its_line(load, line, parts):
+    refusal(lambda: load(line), "file.toml line 4", *parts)
+
+
+# ---- builds --------------------------------------------------------------------------------------------------------------------
+def built(folder, *changes: tuple[str, str], holds: str = "1") -> str:
+    """What the compiler says to the firmware's pins with lines of mclv.h replaced, and to a condition on its registers."""
+    text = HEADER
+    for name, value in changes:
+        text, count = re.subn(rf"^#define {name} .*$", f"#define {name} {value}", text, flags=re.MULTILINE)
+        assert count == 1
+    (folder / "board").mkdir(exist_ok=True)
+    (folder / "board" / "mclv.h").write_text(text, encoding="utf-8")
+    arguments = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude", "-I.", "firmware/board/pins.c",
+                 "firmware/board/adc.c", "-xc", "-"]
+    source = f'#include "board/mclv.h"\nPIN_NEEDS(registers, {holds});\n'
+    return subprocess.run([*COMPILER, *arguments], input=source, cwd=paths.ROOT, capture_output=True, text=True, check=False).stderr
+
+
+@pytest.mark.parametrize("changes, named", [
+    ((("BOARD_PIN_FAULT", "B, 9"), ("BOARD_PIN_POT", "C, 0"), ("BOARD_PIN_LED_RUN", "A, 4")), ""),
+    ((("BOARD_PIN_CURRENT_A", "B, 1"), ("BOARD_PIN_CURRENT_B", "B, 2"), ("BOARD_PIN_BUS", "B, 3")), ""),
+    ((("BOARD_PIN_FAULT", "A, 8"),), "fault_input_has_an_RP_number"), ((("BOARD_PIN_UART_RX", "A, 9"),), "serial_line_has_RP_numbers"),
+    ((("BOARD_PIN_POT", "B, 8"),), "potentiometer_has_an_AN_number"), ((("BOARD_PIN_BUS", "B, 1"),), "currents_and_bus_are_AN0_to_2_or_AN3_to_5"),
+    ((("BOARD_PIN_FAULT", "D, 1"),), "PIN_D1_RP")])
+def test_firmware_for_other_pins_builds_and_what_the_chip_cannot_do_fails_by_name(tmp_path, changes, named):
+    error = built(tmp_path, *changes)
+    assert named in error and bool(error) == bool(named), error
+
+
+@pytest.mark.parametrize("changes, registers", [
+    ((), "BOARD_FLTA_RP == 8 && BOARD_UART_RX_RP == 20 && BOARD_AD1CHS0 == 8 && BOARD_AD1CHS123 == 0 && BOARD_AD1PCFGL == 0xFEF8"
+         " && BOARD_TRIS(A) == 0xFFFF && BOARD_TRIS(B) == 0xFFFF && BOARD_TRIS(C) == 0xFF37"),
+    ((("BOARD_PIN_CURRENT_A", "B, 1"), ("BOARD_PIN_CURRENT_B", "B, 2"), ("BOARD_PIN_BUS", "B, 3"), ("BOARD_PIN_POT", "A, 0"), ("BOARD_PIN_FAULT", "C, 9"),
+      ("BOARD_PIN_LED_RUN", "A, 4")),
+     "BOARD_FLTA_RP == 25 && BOARD_AD1CHS0 == 0 && BOARD_AD1CHS123 == 1 && BOARD_AD1PCFGL == 0xFFC6 && BOARD_TRIS(A) == 0xFFEF && BOARD_TRIS(C) == 0xFFB7")])
+def test_the_registers_follow_from_the_pins(tmp_path, changes, registers):
+    assert built(tmp_path, *changes, holds=registers) == ""
+    assert "registers" in built(tmp_path, *changes, holds=f"!({registers})")

@@ -1,0 +1,269 @@
+"""A mistake in userparams.h is one line with the parameter, its value, the range and what to do: by the build and by the compiler alone,
+on the PC and for the chip. What C allows in a header is not refused."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tools.common import paths
+from tools.common.param_rows import modes, parameters
+from tools.common.x_macro import rows
+from tools.image import image
+
+HEADER = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
+PC = [*shlex.split(os.environ.get("CC") or "gcc"), "-O2", "-ftrack-macro-expansion=0"]
+XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
+CHIP = [XC16 or "", "-mcpu=33FJ32MC204", "-omf=elf", "-O2", "-Werror", "-pedantic", "-Wconversion"]
+COMPILERS = [pytest.param(PC, id="pc"), *[pytest.param(CHIP, id="chip")] * bool(XC16)]
+CHECKS = ("firmware/drive/param_text.c", "firmware/drive/param_check.c")
+
+
+def flags(folder: Path) -> list[str]:
+    return ["-std=gnu99", "-Wall", "-Wextra", "-Wshadow", f"-I{folder}", "-Iinclude", "-I."]
+
+
+def checked(folder: Path, compiler: list[str], text: str) -> tuple[int, list[str]]:
+    """What the build says of a userparams.h with this text: exit code and lines."""
+    (folder / "userparams.h").write_text(text, encoding="utf-8")
+    done = subprocess.run(["tools/make/userparams.sh", folder / "stamp", *compiler, *flags(folder)], cwd=paths.ROOT, capture_output=True,
+                          text=True, check=False)
+    assert done.stdout == "" and (folder / "stamp").exists() == (done.returncode == 0)
+    return done.returncode, [line.replace(f"{folder}/", "") for line in done.stderr.splitlines()]
+
+
+def compiled(folder: Path, compiler: list[str], text: str) -> str:
+    """The first error of the compiler alone, which is what a user of MPLAB X sees; "" if there is none."""
+    (folder / "userparams.h").write_text(text, encoding="utf-8")
+    for source in CHECKS:
+        done = subprocess.run([*compiler, *flags(folder), "-c", source, "-o", folder / "out.o"], cwd=paths.ROOT, capture_output=True,
+                              text=True, env=os.environ | {"LC_ALL": "C"}, check=False)
+        if errors := [line for line in done.stderr.splitlines() if ": error: " in line]:
+            return errors[0]
+        assert done.returncode == 0, done.stderr
+    return ""
+
+
+def line_of(name: str) -> str:
+    found = re.search(rf"^#define {name}\b.*\n", HEADER, re.MULTILINE)
+    assert found, name
+    return found[0]
+
+
+def value(name: str, text: str) -> str:
+    """userparams.h with another value."""
+    return HEADER.replace(line_of(name), f"#define {name} {text}\n")
+
+
+def range_of(name: str) -> str:
+    p = parameters()[name]
+    return f"{p.low} .. {p.high} {p.unit} ({p.meaning})"
+
+
+def place(text: str, name: str) -> str:
+    found = re.search(rf"^#define {name}\b", text, re.MULTILINE)
+    assert found, name
+    return f"userparams.h:{text.count(chr(10), 0, found.start()) + 1}"
+
+
+NUMBER = f"write one, {range_of('MOTOR_RS_OHM')}, with a decimal point and without a unit"
+RS = line_of("MOTOR_RS_OHM")
+MODE = "/* #define TUNING */"
+assert MODE in HEADER
+# What is typed, the parameter it is about, and what the build and the compiler say of it.
+MISTAKES = {
+    **{f"no number {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM", f"MOTOR_RS_OHM = {text} is no number: {NUMBER}") for text in (
+        "2,67", "(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "2.67;", "= 2.67",
+        "-two", "[2.67]", "2.67 1", "24V", "(24 V)", "2.67\N{GREEK CAPITAL LETTER OMEGA}")},
+    "a comma within the range": (value("MOTOR_KPHI_V_PER_KRPM", "7,24"), "MOTOR_KPHI_V_PER_KRPM",
+                                 f"MOTOR_KPHI_V_PER_KRPM = 7,24 is no number: write one, {range_of('MOTOR_KPHI_V_PER_KRPM')}"),
+    "a gain that is no number": (HEADER.replace(RS, RS + "#define SPEEDCNTR_PTERM 0,1\n"), "SPEEDCNTR_PTERM",
+                                 "SPEEDCNTR_PTERM = 0,1 is no number: remove the line, or write a number"),
+    "nothing": (value("MOTOR_RS_OHM", ""), "MOTOR_RS_OHM", f"MOTOR_RS_OHM has no value: write a number, {range_of('MOTOR_RS_OHM')}"),
+    **{f"removed {name}": (HEADER.replace(line_of(name), ""), "",
+                           f"{name} is missing: add #define {name} and a number, {range_of(name)}, or make tune")
+       for name in ("MOTOR_RS_OHM", "LOAD_BANDWIDTH_HZ", "IDREF_SPEED7")},
+    **{f"part of {name}": (value(name, text), name, f"{name} = {text} must be a whole number, {range_of(name)}")
+       for name, text in (("NOPOLESPAIRS", "5.5"), ("LOCK_TIME", "4000.5"), ("KFILTER_ESDQ", "2000.1"), ("DATA_BUFFER_SIZE", "49.9"))},
+    "no gain": (value("KCURRA", "0"), "KCURRA", "KCURRA = 0 must be 0.1 .. 0.6 or -0.6 .. -0.1: 0.5 is a gain of 1"),
+    "a mode = 0": (HEADER.replace(MODE, "#define TUNING 0"), "TUNING",
+                   "TUNING = 0 switches the mode on: write #define TUNING, or nothing for off"),
+    "a mode = off": (HEADER.replace(MODE, "#define TUNING off"), "TUNING", "TUNING = off switches the mode on"),
+    "a period the PWM cannot divide": (value("LOOPTIME_SEC", "0.0000501234"), "LOOPTIME_SEC",
+                                       "LOOPTIME_SEC = 0.0000501234 must be a multiple of 50 ns, as 0.00005 is"),
+    "whole numbers divided": (value("LOOPTIME_SEC", "(1/20000)"), "LOOPTIME_SEC",
+                              f"LOOPTIME_SEC = (1/20000) is outside {range_of('LOOPTIME_SEC')}"),
+    # these break relations, too, and the formulas of other files
+    **{f"{name} out of range": (value(name, text), name, f"{name} = {text} is outside {range_of(name)}: correct it") for name, text in (
+        ("MOTOR_RS_OHM", "99"), ("MAXIMUM_SPEED_RPM", "50000"), ("MOTOR_KPHI_V_PER_KRPM", "0.1"), ("NOPOLESPAIRS", "0"),
+        ("NORM_CURRENT_CONST", "1e-6"))},
+    "an L that overflows": (value("MOTOR_LS_MH", "25"), "MOTOR_LS_MH",
+                              "MOTOR_LS_MH = 25 does not fit its Q format: use a smaller current range"),
+    "a Kphi that overflows": (value("MOTOR_KPHI_V_PER_KRPM", "0.5"), "MOTOR_KPHI_V_PER_KRPM",
+                              "MOTOR_KPHI_V_PER_KRPM = 0.5 does not fit 1/Kphi's Q format (1024 .. 32767): check its unit"),
+    "a relation": (value("MINIMUM_SPEED_RPM", "2900"), "MINIMUM_SPEED_RPM",
+                   "NOMINAL_SPEED_RPM = 2800 must be above MINIMUM_SPEED_RPM = 2900"),
+}
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_of_the_build_with_its_place(tmp_path, mistake, compiler):
+    text, name, told = MISTAKES[mistake]
+    where = place(text, told.split()[0]) if name else "userparams.h"
+    code, lines = checked(tmp_path, compiler, text)
+    assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: {where}: {told}"), lines
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_the_compiler_alone_says_the_same_first(tmp_path, mistake, compiler):
+    assert f": userparams.h: {MISTAKES[mistake][2]}" in compiled(tmp_path, compiler, MISTAKES[mistake][0])
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_several_mistakes_of_a_kind_are_a_line_each(tmp_path, compiler):
+    text = value("MOTOR_RS_OHM", "99").replace(line_of("KFILTER_ESDQ"), "#define KFILTER_ESDQ 9\n")
+    code, lines = checked(tmp_path, compiler, text)
+    assert code == 2 and [line.split(" is outside ")[0] for line in lines] == [
+        f"foc33: {place(text, 'MOTOR_RS_OHM')}: MOTOR_RS_OHM = 99", f"foc33: {place(text, 'KFILTER_ESDQ')}: KFILTER_ESDQ = 9"]
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("text, told", [
+    ("(two)", r"MOTOR_RS_OHM is no number \('two' undeclared.*\): write one, 0.01 \.\. 40 ohm"),
+    ("2.6.7", r"MOTOR_RS_OHM is no number \(too many decimal points in number\): write one, 0.01 \.\. 40 ohm"),
+    ("(2.67", r"MOTOR_RS_OHM is no number \(.*\): write one, 0.01 \.\. 40 ohm"), ("2 +", r"MOTOR_RS_OHM is no number \(.*\): write one")])
+def test_what_only_the_compiler_finds_is_told_with_the_parameter(tmp_path, compiler, text, told):
+    code, lines = checked(tmp_path, compiler, value("MOTOR_RS_OHM", text))
+    assert code == 2 and len(lines) == 1 and re.match(f"foc33: {place(HEADER, 'MOTOR_RS_OHM')}: {told}", lines[0]), lines
+
+
+# ---- names ---------------------------------------------------------------------------------------------------------------
+NAMES = {
+    "misspelt": (HEADER.replace("MOTOR_RS_OHM 2.67", "MOTOR_RS_OHMS 2.67"),
+                 "MOTOR_RS_OHMS is no parameter: did you mean MOTOR_RS_OHM, 0.01 .. 40 ohm?"),
+    "letters exchanged": (HEADER.replace("#define KCURRA", "#define KCRURA"),
+                          "KCRURA is no parameter: did you mean KCURRA, -0.6 .. 0.6 1?"),
+    "small letters": (HEADER.replace("MOTOR_RS_OHM 2.67", "motor_rs_ohm 2.67"),
+                      "motor_rs_ohm is no parameter: did you mean MOTOR_RS_OHM, "),
+    "no blank": (HEADER.replace("MOTOR_RS_OHM 2.67", "MOTOR_RS_OHM2.67"), "MOTOR_RS_OHM2 is no parameter: did you mean MOTOR_RS_OHM, "),
+    "a mode": (HEADER.replace(MODE, "#define TUNNING"), "TUNNING is no parameter: did you mean TUNING?"),
+    "a gain": (HEADER.replace(RS, RS + "#define D_CURCNTR_PTERM 0.2\n"), "D_CURCNTR_PTERM is no parameter: did you mean D_CURRCNTR_PTERM?"),
+    "twice": (HEADER.replace(RS, RS + "#define MOTOR_RS_OHM 2.7\n"),
+              f"MOTOR_RS_OHM = 2.7 is the second definition, the first stands in {place(HEADER, 'MOTOR_RS_OHM')}: keep one of the two"),
+}
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("mistake", NAMES)
+def test_a_name_that_cannot_be_meant_is_one_line_with_its_place(tmp_path, mistake, compiler):
+    text, told = NAMES[mistake]
+    code, lines = checked(tmp_path, compiler, text)
+    changed = {"a mode": MODE, "letters exchanged": line_of("KCURRA")}.get(mistake, RS)
+    number = HEADER.count("\n", 0, HEADER.index(changed)) + 1 + (mistake in ("a gain", "twice"))
+    assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: userparams.h:{number}: {told}"), lines
+
+
+def test_a_mode_that_the_header_and_the_command_line_switch_on_is_one_line(tmp_path):
+    text = HEADER.replace(MODE, "#define TUNING")
+    code, lines = checked(tmp_path, [*PC, "-DTUNING"], text)
+    assert code == 2 and lines == [
+        f"foc33: {place(text, 'TUNING')}: TUNING is the second definition, the first stands in DEFINES or the scenario: "
+        "keep one of the two"]
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("line, told", [("#defin A 1", "userparams.h:.*#defin.*: correct it"),
+                                        ("MOTOR 2.67", "userparams.h:.*: correct it"),
+                                        ("#error not for this motor", "userparams.h:.*not for this motor: correct it"),
+                                        ("/* open", "userparams.h:.*unterminated.*: correct it")])
+def test_what_is_no_header_is_the_compiler_s_first_line(tmp_path, compiler, line, told):
+    code, lines = checked(tmp_path, compiler, HEADER + line + "\n")
+    assert code == 2 and len(lines) == 1 and re.match(f"foc33: {told}", lines[0]), lines
+
+
+# ---- what C allows -------------------------------------------------------------------------------------------------------
+LEGAL = {
+    "as it is": HEADER,
+    **{f"MOTOR_RS_OHM {text}": value("MOTOR_RS_OHM", text) for text in (
+        "2.67f", "2.67F", "(2.67)", "267e-2", ".5", "3.", "3", "0x3", "3u", "(5.34 / 2)", "5.34/2.", "(float)2.67", "(float)(5.34 / 2)",
+        "2.67 /* a comment, with a comma */", "2.67 // and one", "2.67 \\\n", "+2.67", "(1 ? 2.67 : 3)", "(2.67 > 0) * 2.67",
+        "((2.0) + (0.67))", "2*1.335")},
+    "a negative expression": value("KCURRA", "-(0.25 + 0.25)"),
+    "names of one's own": HEADER.replace(
+        RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),
+    "one of one's own that resembles a parameter": HEADER.replace(
+        RS, RS + "#define Q_CURRCNTR_PTERMS 0.2\n#define D_CURRCNTR_PTERM Q_CURRCNTR_PTERMS\n"),
+    "one that nothing uses": HEADER.replace(RS, RS + "#define MY_NOTE 1\n#define MOTOR_RS_OHM_HOT 3.1\n"),
+    "blocks": HEADER.replace(RS, "#define WARM\n#ifdef WARM\n#  define  MOTOR_RS_OHM\t2.67\n#else\n#define MOTOR_RS_OHM 2.2\n#endif\n"),
+    "a value taken back": HEADER.replace(RS, "#define MOTOR_RS_OHM 2.2\n#undef MOTOR_RS_OHM\n" + RS),
+    "twice the same": HEADER.replace(RS, RS + RS),
+    "modes on": HEADER.replace(MODE, "#define TUNING\n#define SNAPSHOT 1"),
+    "gains": HEADER.replace(RS, RS + "#define D_CURRCNTR_PTERM 0.2\n#define SPEEDCNTR_PTERM (0.1 / 2)\n"),
+    "1/Kphi changed": value("INVKFI_SPEED3", "(NORM_INVKFIBASE + 100)").replace(
+        line_of("INVKFI_SPEED4"), "#define INVKFI_SPEED4 NORM_INVKFIBASE - 100\n"),
+    "no guard": re.sub(r"#(ifndef|define) USERPARAMS_H\n", "", HEADER).replace("\n#endif", ""),
+    "another file": '#include "more.h"\n' + HEADER.replace(RS, ""),
+    "a header of the compiler": "#include <stdint.h>\n" + HEADER,
+    "DOS line ends": HEADER.replace("\n", "\r\n"),
+}
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("style", LEGAL)
+def test_what_c_allows_is_not_refused(tmp_path, style, compiler):
+    (tmp_path / "more.h").write_text(RS, encoding="utf-8")
+    assert checked(tmp_path, compiler, LEGAL[style]) == (0, [])
+    assert compiled(tmp_path, compiler, LEGAL[style]) == ""
+
+
+def test_a_build_without_optimisation_refuses_nothing_more(tmp_path):
+    assert compiled(tmp_path, [*PC, "-O0"], HEADER) == ""
+
+
+@pytest.mark.skipif(not XC16, reason="xc16-gcc is not on PATH; give XC16=folder")
+def test_the_checks_cost_the_image_nothing():
+    done = subprocess.run(["make", "-s", "target-elf", "VARIANT=check"], cwd=paths.ROOT, capture_output=True, text=True, check=False,
+                          env={name: text for name, text in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")})
+    assert done.returncode == 0, done.stderr
+    folder = paths.ROOT / "build/target-check"
+    names = subprocess.run([XC16.removesuffix("gcc") + "nm", folder / CHECKS[1].replace(".c", ".o")], capture_output=True, text=True,
+                           check=True)
+    assert "_range_of_MOTOR_RS_OHM" in names.stdout
+    assert not [name for name in image.read_elf(folder / "foc33.elf").symbols if re.match(r"_(text_of|range_of|relations)", name)]
+
+
+# ---- the build -----------------------------------------------------------------------------------------------------------
+def make(*words: str) -> subprocess.CompletedProcess:
+    own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DEFINES", "USERPARAMS", "VARIANT")
+    environment = {name: text for name, text in os.environ.items() if name not in own}
+    return subprocess.run(["make", *words], cwd=paths.ROOT, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("words", [["lib"], pytest.param(["target-elf"], marks=pytest.mark.skipif(not XC16, reason="no xc16-gcc"))])
+def test_nothing_is_compiled_with_a_header_that_is_refused_and_a_mended_one_is_looked_at_again(tmp_path, words):
+    words = [*words, "VARIANT=refused", f"USERPARAMS={tmp_path}"]
+    for kind in ("host", "target"):
+        shutil.rmtree(paths.ROOT / f"build/{kind}-refused", ignore_errors=True)
+    (tmp_path / "more.h").write_text("#define MOTOR_RS_OHM 99\n", encoding="utf-8")
+    (tmp_path / "userparams.h").write_text(LEGAL["another file"], encoding="utf-8")
+    for _ in range(2): # and again, for it is not forgotten
+        done = make(*words)
+        assert done.returncode == 2 and done.stdout == "", done.stdout
+        assert [line for line in done.stderr.splitlines() if not line.startswith("make")] == [
+            f"foc33: {tmp_path}/more.h:1: MOTOR_RS_OHM = 99 is outside {range_of('MOTOR_RS_OHM')}: correct it"]
+    (tmp_path / "more.h").write_text(RS, encoding="utf-8")
+    assert make(*words).returncode == 0
+    (tmp_path / "more.h").write_text("#define MOTOR_RS_OHM two\n", encoding="utf-8")
+    assert "MOTOR_RS_OHM = two is no number" in make(*words).stderr
+
+
+def test_the_optional_gains_are_those_that_have_a_default():
+    scaling = (paths.ROOT / "include/drive/param_scaling.h").read_text(encoding="utf-8")
+    listed = [name for name, in rows("include", "drive/param_table.h", "PARAM_OPTIONAL", "#name")]
+    assert listed == re.findall(r"^#ifndef (\w+?)(?<!_H)\b", scaling, re.MULTILINE) and not set(listed) & (set(parameters()) | set(modes()))

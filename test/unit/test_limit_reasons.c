@@ -1,0 +1,178 @@
+/* Why the drive gives less than it is asked for: each reason alone, at its edge, in both directions. */
+#include "drive_rig.h"
+
+#include "firmware/drive/limits.c"
+
+static int16_t way;
+
+/** In closed loop at 10000 erpm with current, voltage and d current to spare. */
+static void set_free(int16_t direction)
+{
+    drive_control_t *c = &drive.run.control;
+    way = direction;
+    rig_closed(direction, (int16_t)(direction * 10000));
+    drive.circle.limit_q14 = 12800;
+    c->v_q14.d = 0;
+    c->v_q14.q = (int16_t)(direction * 6000);
+    c->vq_limit_q14 = 12800;
+    c->ref_q13.q = (int16_t)(direction * 1000);
+    c->iq_limit_q13 = 5120;
+    c->brake_limit_q13 = 5120;
+    drive.run.fieldweak.table_q13 = 0;
+    drive.run.fieldweak.trim_q13 = 0;
+}
+
+void setUp(void)
+{
+    set_free(1);
+}
+
+static void expect(uint16_t reasons, const char *what)
+{
+    TEST_ASSERT_EQUAL_HEX16_MESSAGE(reasons, limits_reasons(&drive, &params), what);
+}
+
+/** Both directions, each anew. */
+#define EACH_FREE for (int16_t way_ = -1; way_ <= 1 && (set_free(way_), 1); way_ = (int16_t)(way_ + 2))
+
+void test_reasons_are_bits_of_their_own(void)
+{
+    uint16_t all = 0;
+#define ADD(bit, name, cause, remedy) \
+    TEST_ASSERT_EQUAL_HEX16(0, all & (bit)); \
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_##name, (bit)); \
+    all |= (bit);
+    DRIVE_LIMIT_TABLE(ADD)
+    TEST_ASSERT_EQUAL_HEX16(127, all);
+}
+
+void test_drive_that_has_what_it_asks_for_has_no_reason(void)
+{
+    EACH_FREE {
+        expect(LIMIT_NONE, "closed loop");
+    }
+}
+
+void test_voltage_is_the_reason_from_one_32nd_below_the_circle_on_each_axis(void)
+{
+    EACH_FREE {
+        drive.run.control.v_q14.q = (int16_t)(way * 12399);
+        expect(LIMIT_NONE, "q below");
+        drive.run.control.v_q14.q = (int16_t)(way * 12400);
+        expect(LIMIT_VOLTAGE, "q at");
+        drive.run.control.v_q14.q = 0;
+        drive.run.control.v_q14.d = (int16_t)(way * 12012); /* 31/32 of 31/32 of the circle, less one */
+        expect(LIMIT_NONE, "d below");
+        drive.run.control.v_q14.d = (int16_t)(way * 12013);
+        expect(LIMIT_VOLTAGE, "d at");
+    }
+}
+
+void test_current_is_the_reason_from_one_32nd_below_its_limit(void)
+{
+    EACH_FREE {
+        drive.run.control.iq_limit_q13 = 3200;
+        drive.run.control.ref_q13.q = (int16_t)(way * 3099);
+        expect(LIMIT_NONE, "below");
+        drive.run.control.ref_q13.q = (int16_t)(way * 3100);
+        expect(LIMIT_CURRENT, "driving");
+        drive.run.control.ref_q13.q = (int16_t)(way * -3100);
+        expect(LIMIT_CURRENT, "braking, and the bus would take more");
+        drive.run.control.brake_limit_q13 = 3200;
+        expect(LIMIT_CURRENT, "the bus takes as much");
+    }
+}
+
+void test_bus_is_the_reason_while_it_holds_the_braking_current_also_at_none(void)
+{
+    EACH_FREE {
+        drive.run.control.brake_limit_q13 = 640;
+        drive.run.control.ref_q13.q = (int16_t)(way * -619);
+        expect(LIMIT_NONE, "below");
+        drive.run.control.ref_q13.q = (int16_t)(way * -620);
+        expect(LIMIT_BRAKE, "at");
+        drive.run.control.ref_q13.q = (int16_t)(way * 640);
+        expect(LIMIT_NONE, "driving");
+        drive.run.control.brake_limit_q13 = 0;
+        drive.run.control.ref_q13.q = 0;
+        expect(LIMIT_BRAKE, "no braking current at all");
+        drive.run.control.ref_q13.q = (int16_t)way;
+        expect(LIMIT_NONE, "it drives a little");
+        drive.run.control.brake_limit_q13 = 640;
+        drive.run.control.ref_q13.q = 0;
+        expect(LIMIT_NONE, "no current with one to spare");
+    }
+}
+
+void test_ramp_is_the_reason_while_the_reference_is_two_steps_or_more_from_its_target(void)
+{
+    EACH_FREE {
+        drive.command.target_erpm = (int16_t)(way * (10000 + 15));
+        expect(LIMIT_NONE, "the next step reaches it");
+        drive.command.target_erpm = (int16_t)(way * (10000 + 16));
+        expect(LIMIT_RAMP, "up");
+        drive.command.target_erpm = (int16_t)(way * (10000 - 16));
+        expect(LIMIT_RAMP, "down");
+        drive.command.target_erpm = (int16_t)(way * 10000);
+        drive.state = (uint16_t)DRIVE_STOPPING;
+        expect(LIMIT_RAMP, "a stop");
+        drive.run.control.reference_erpm = (int16_t)(way * 1875);
+        rig_speed((int16_t)(way * 1875));
+        expect(LIMIT_NONE, "the stop's end");
+    }
+}
+
+void test_ramp_waits_for_the_motor_at_any_distance_and_at_its_target_it_does_not_wait(void)
+{
+    EACH_FREE {
+        rig_speed((int16_t)(way * 8000));
+        expect(LIMIT_NONE, "behind at the target");
+        drive.command.target_erpm = (int16_t)(way * (10000 + 1));
+        expect(LIMIT_RAMP | LIMIT_RAMP_WAITS, "behind");
+        drive.command.target_erpm = (int16_t)(way * 5000);
+        expect(LIMIT_RAMP, "behind on the way down");
+        rig_speed((int16_t)(way * 12000));
+        expect(LIMIT_RAMP | LIMIT_RAMP_WAITS, "ahead on the way down");
+    }
+}
+
+void test_field_weakening_is_the_reason_with_a_d_current_of_table_or_trim(void)
+{
+    EACH_FREE {
+        drive.run.fieldweak.table_q13 = -1;
+        expect(LIMIT_FIELD_WEAKENING, "table");
+        drive.run.fieldweak.table_q13 = 0;
+        drive.run.fieldweak.trim_q13 = -1;
+        expect(LIMIT_FIELD_WEAKENING, "trim");
+        drive.run.control.ref_q13.q = (int16_t)(way * 5120);
+        drive.run.control.v_q14.q = (int16_t)(way * 12800);
+        drive.command.target_erpm = (int16_t)(way * 20000);
+        rig_speed(0);
+        expect(LIMIT_VOLTAGE | LIMIT_CURRENT | LIMIT_RAMP | LIMIT_RAMP_WAITS | LIMIT_FIELD_WEAKENING, "several at once");
+    }
+}
+
+void test_bridge_that_is_off_has_no_reason_and_a_forced_angle_only_the_voltage(void)
+{
+    static const struct {
+        drive_state_t state;
+        uint16_t reasons;
+    } cases[] = {
+        { DRIVE_CALIBRATE, 0 }, { DRIVE_STOPPED, 0 }, { DRIVE_BOOTSTRAP, 0 }, { DRIVE_FAULT, 0 }, { DRIVE_ALIGN, LIMIT_VOLTAGE },
+        { DRIVE_RAMP, LIMIT_VOLTAGE }, { DRIVE_CLOSED, LIMIT_VOLTAGE | LIMIT_CURRENT | LIMIT_RAMP },
+    };
+    drive.run.control.v_q14.q = 12800;
+    drive.run.control.ref_q13.q = 5120;
+    drive.command.target_erpm = 11000;
+    EACH(n, cases) {
+        drive.state = (uint16_t)cases[n].state;
+        expect(cases[n].reasons, golden_row(n));
+    }
+}
+
+void test_asking_changes_nothing(void)
+{
+    drive_t before = drive;
+    (void)limits_reasons(&drive, &params);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &drive, sizeof drive);
+}

@@ -1,0 +1,79 @@
+# Reads the list of targets in the makefiles and says in one line what is wrong with the variables on make's command line: a name that
+# nothing reads, or one that none of the goals reads. Says nothing if all is well.
+#
+#   awk -v typed="MOTER OUT" -v goals="run" -f input.awk Makefile tools/make/*.mk
+#
+# What a target reads is in the brackets of its line in the list. Beside that:
+BEGIN {
+    names("V INSTALL FOC33_QUIET CC PYTHON RUBY SHELL MAKE MAKEFLAGS GNUMAKEFLAGS XC16 DFP", everywhere)
+    names("lib vboard bench iss examples test test-quick test-sweeps test-target firmware flash size", compiles)
+    names("VARIANT SAN DEFINES USERPARAMS WERROR OPT CFLAGS warnings sanitizer", compilation)
+}
+
+/^[a-z0-9-]+:.*## \[/ {
+    goal = substr($0, 1, index($0, ":") - 1)
+    listed[goal] = 1
+    rest = $0
+    while (match(rest, /[A-Z][A-Z0-9]*=/)) { # only the brackets have such words
+        name = substr(rest, RSTART, RLENGTH - 1)
+        known[name] = reads[goal, name] = 1
+        takes[goal] = takes[goal] " " name
+        rest = substr(rest, RSTART + RLENGTH)
+    }
+}
+
+END {
+    for (name in everywhere) known[name] = 1
+    for (name in compilation) known[name] = 1
+    goal_count = split(goals, goal_list, " ")
+    typed_count = split(typed, typed_list, " ")
+    for (i = 1; i <= typed_count; i++) {
+        name = typed_list[i]
+        if (!(name in known)) {
+            print "foc33: no variable " name ", make's command line: did you mean " nearest(name) "?"
+            exit 1
+        }
+        if (!(name in everywhere) && !read_by_a_goal(name)) {
+            goal = goal_list[1]
+            print "foc33: make " goal " has no " name ", make's command line: " \
+                (takes[goal] == "" ? "leave it out" : "it takes" takes[goal])
+            exit 1
+        }
+    }
+}
+
+function names(text, set,   count, list, i) {
+    count = split(text, list, " ")
+    for (i = 1; i <= count; i++) set[list[i]] = 1
+}
+
+function read_by_a_goal(name,   i) {
+    for (i = 1; i <= goal_count; i++)
+        if (!(goal_list[i] in listed) || (goal_list[i], name) in reads || goal_list[i] in compiles && name in compilation) return 1
+    return 0
+}
+
+function nearest(word,   name, best, steps, least) {
+    least = 1e9
+    for (name in known) {
+        steps = distance(toupper(word), toupper(name))
+        if (steps < least || steps == least && name < best) {
+            best = name
+            least = steps
+        }
+    }
+    return best
+}
+
+# Letters to change, insert, leave out or swap.
+function distance(a, b,   i, j, d, least) {
+    for (i = 0; i <= length(a); i++)
+        for (j = 0; j <= length(b); j++) {
+            least = i == 0 ? j : j == 0 ? i : d[i - 1, j - 1] + (substr(a, i, 1) != substr(b, j, 1))
+            if (i && d[i - 1, j] + 1 < least) least = d[i - 1, j] + 1
+            if (j && d[i, j - 1] + 1 < least) least = d[i, j - 1] + 1
+            if (i > 1 && j > 1 && substr(a, i - 1, 2) == substr(b, j, 1) substr(b, j - 1, 1) && d[i - 2, j - 2] + 1 < least) least = d[i - 2, j - 2] + 1
+            d[i, j] = least
+        }
+    return d[length(a), length(b)]
+}
