@@ -60,17 +60,20 @@ def command(options: argparse.Namespace) -> int:
         jobs = [Job(drawn.draw(options.seed, number), number, folder.work / "cases", alone) for number in numbers]
         with Progress("anymotor", len(jobs), options.quiet, "cases") as progress:
             rows = workers.run_all(jobs, lambda job, tell: _one(job, firmware, tell), progress)
-        output.write_csv(folder.work / "cases.csv", list(KEYS), [[row[key] for key in KEYS] for row in rows])
-        output.write_summary(folder.work, {"seed": options.seed, "rows": [{key: row[key] for key in KEYS} for row in rows]})
-    for row in rows:
-        if row["report"]:
-            print(row["report"])
+        outcomes = [Outcome(row["name"], row["verdict"] != FAILS, ": ".join(filter(None, (row["verdict"], row["why"]))), "turns, or refused by the tuner")
+                    for row in rows]
+        texts = [row.pop("report") for row in rows]
+        report.write_table(folder.work, "cases", KEYS, rows, outcomes,
+                           {"title": f"drawn motors and boards, seed {options.seed}", "seed": options.seed}, {}, (TURNS, REFUSED))
+    for row, text in zip(rows, texts):
+        if text:
+            print(text)
         if alone or row["verdict"] == FAILS:
-            print(f"{row['name']}: {row['verdict']}{': ' if row['why'] else ''}{row['why']}")
+            print(": ".join(filter(None, (row["name"], row["verdict"], row["why"]))))
     for verdict in (TURNS, REFUSED, FAILS):
         count = sum(row["verdict"] == verdict for row in rows)
         print(f"{verdict}: {count} of {len(rows)}, {count / len(rows):.0%}")
-    print(f"results in {paths.shown(target)}/")
+    print(f"results in {paths.shown(target)}/: index.html")
     return 1 if any(row["verdict"] == FAILS for row in rows) else 0
 
 
@@ -97,10 +100,11 @@ def shared_firmware() -> Firmware:
     """The objects of the default build."""
     library = command_common.library_for([], None) # up to date
     folder = library.path.parent
-    with_header = {path.with_suffix("") for path in folder.rglob("*.d") if HEADER in path.read_text(encoding="utf-8")}
-    objects = [path for path in folder.rglob("*.o") if path.with_suffix("") not in with_header]
+    objects = [paths.ROOT / name for name in (folder / "contents").read_text(encoding="utf-8").split() if not name.endswith("/main.o")]
+    with_header = [path for path in objects if HEADER in path.with_suffix(".d").read_text(encoding="utf-8")]
     flags = shlex.split((folder / "flags").read_text(encoding="utf-8")) + [f"-Itools/{room}" for room in ("plant", "chip", "vboard", "cpu_host")]
-    return Firmware(flags, [f"{path.relative_to(folder)}.c" for path in sorted(with_header) if path.name != "main"], [str(path) for path in sorted(objects)])
+    sources = [f"{path.relative_to(folder).with_suffix('.c')}" for path in with_header]
+    return Firmware(flags, sources, [str(path) for path in objects if path not in with_header])
 
 
 def row_of(job: Job) -> dict[str, Any]:

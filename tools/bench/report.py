@@ -59,9 +59,9 @@ def clean(value: Any) -> Any:
 
 
 def write_table(folder: Path, name: str, keys: Sequence[str], rows: list[dict[str, Any]], outcomes: list[Outcome], head: dict[str, Any],
-                more: dict[str, Any]) -> None:
+                more: dict[str, Any], fine: tuple[str, ...] = FINE) -> None:
     """What a table of many runs leaves: NAME.csv with the keys of each row, all of it in the summary, and the page, with the "picture" that
-    a row may have; it is taken out of the row."""
+    a row may have; it is taken out of the row. `fine`: verdicts of rows in which nothing is wrong."""
     pictures = [row.pop("picture", None) for row in rows]
     output.write_csv(folder / f"{name}.csv", list(keys), [[row[key] for key in keys] for row in rows])
     data = {**head, "passed": all(outcome.ok for outcome in outcomes), "rows": rows,
@@ -70,7 +70,7 @@ def write_table(folder: Path, name: str, keys: Sequence[str], rows: list[dict[st
     used = head.get("motors", [head] if "header" in head else [])
     shown = page.Table("Runs", [*(_heading(key) for key in keys), "limited by"], [
         page.Row([*(_number(row[key]) for key in keys), limits_text(row.get("limited_percent", {})) or "-"],
-                 bool(row.get("fault")) or row.get("verdict", "ok") not in FINE, number if pictures[number] else None)
+                 bool(row.get("fault")) or row.get("verdict", fine[0]) not in fine, number if pictures[number] else None)
         for number, row in enumerate(rows)])
     page.write(folder, page.Page(f"{name}: {head['title']}", data["passed"], outcomes_count(outcomes),
                                  [line for item in used for line in used_lines(item)], [shown], pictures, [outcomes_table(outcomes)],
