@@ -67,6 +67,10 @@ class Scales:
     speed_pterm_per_hz: float
     acceleration: float
     """of a count of current, electrical rpm in eight periods"""
+    large_erpm: float
+    """innovation that the load observer calls large"""
+    count_a: float
+    """a count of current"""
 
 
 @dataclass
@@ -94,7 +98,7 @@ class Design:
     def scales(self) -> Scales:
         """What the header makes of motor and board; asked for when their parameters are chosen."""
         return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1"}, "PARAM_INVKFI", "PARAM_IU",
-                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL"))
+                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL", "PARAM_LARGE_ERPM", "4.0F * PARAM_F(NORM_CURRENT_CONST)"))
 
     @property
     def params(self) -> dict[str, str]:
@@ -394,11 +398,12 @@ def _speed_loop(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
     speeds = {label: d.envelope.omega(d.value(name)) for label, name in names.items()}
     (low, high), (least_load, most_load) = _range("SPEED_BANDWIDTH_HZ"), _range("LOAD_BANDWIDTH_HZ")
     quickest = loops.load_bandwidth(gains, constants.filter_hz(d.value("KFILTER_ESDQ"), gains.period_s), d.value("CURRENT_BANDWIDTH_HZ"))
+    calm = loops.calm_load_bandwidth(d.scales.large_erpm, d.scales.acceleration, d.value("MAXIMUM_CURRENT_A") / d.scales.count_a, gains.period_s)
     loop = loops.design_speed(plant, _spread(m), gains, speeds, max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz)),
-                              max(least_load, min(most_load, limits.digits_down(quickest, 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"))
+                              max(least_load, min(most_load, limits.digits_down(min(quickest, calm), 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"))
     d.speed_loop, d.calm_hz = loop, loops.calm_bandwidth(loop.load_hz, min(speeds.values()))
     asked = ", ".join(f"{degrees:.0f} degrees {mode}" for mode, (degrees, _) in loops.SPEED_MARGINS.items())
-    d.put("LOAD_BANDWIDTH_HZ", plain(loop.load_hz), f"as quick as back-EMF filter, current loop and slow step let it be ({quickest:.0f} Hz), lowered until the "
+    d.put("LOAD_BANDWIDTH_HZ", plain(loop.load_hz), f"as quick as back-EMF filter, current loop and slow step let it be ({quickest:.0f} Hz), and the inertia ({calm:.0f} Hz), lowered until the "
           f"speed loop has its phase margins from the minimum to the maximum speed ({asked})")
     d.put("SPEED_BANDWIDTH_HZ", plain(loop.bandwidth_hz), f"{loops.SPEED_CAP:g} of the electrical frequency from which it is in full ({d.calm_hz:.3g} Hz: above, the "
           "dead time may make an unloaded motor hunt), or what the gain's format holds")

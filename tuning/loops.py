@@ -16,6 +16,7 @@ linearised at the electrical speed w0, the estimated speed is F (1 + w0 I)/(1 + 
 estimator's R and L adds F/(1 + F w0 I) (dR + s dL)/psi times the q current, which is what makes a slow motor hunt.
 """
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -42,6 +43,10 @@ SPEED_CAP = 0.32
 only linear; the voltage that is missing there looks like back-EMF, and the estimator rejects it no faster than the motor turns."""
 QUIET_RATIO, LOADED_SHARE, QUICK_GAIN = (number(f"PARAM_{name}") for name in ("QUIET_RATIO", "LOADED_SHARE", "QUICK_GAIN"))
 FULL_RATIO, ESDQ_RATIO = (number(f"PARAM_{name}") for name in ("FULL_RATIO", "ESDQ_RATIO"))
+HEAVY_SHARE = 0.75
+"""What an innovation that is just large may ask for until the estimator answers, of the largest current. The heavier the rotor, the more current an
+innovation is worth; the step of current shakes the estimate, and that is the next innovation. On the virtual board motors with 0.69 are calm; with
+1.1 some swing between both limits. A heavy rotor needs no quick observer: a load slows it slowly."""
 RATE_MOST = 0.374
 """OBSERVER_RATE_MOST_Q16 of control/observer.h"""
 SLOW_PHASES = 8
@@ -316,6 +321,12 @@ def load_bandwidth(base: Gains, esdq_hz: float, current_hz: float) -> float:
     its rate times the step keeps within its format."""
     step = 2.0 * np.pi * SLOW_PHASES * base.period_s
     return min(1.0 / (1.0 / esdq_hz + 1.0 / current_hz + step), RATE_MOST / step)
+
+
+def calm_load_bandwidth(large_erpm: float, acceleration: float, largest_counts: float, period_s: float) -> float:
+    """Bandwidth of the load observer at which a large innovation asks for HEAVY_SHARE of the largest current, at the lowest speed of the full
+    rates. `acceleration`: of a count of current, erpm in a slow step."""
+    return HEAVY_SHARE * largest_counts * acceleration / (FULL_RATIO * large_erpm) / (2.0 * math.pi * SLOW_PHASES * period_s)
 
 
 def calm_bandwidth(load_hz: float, lowest_rad_s: float) -> float:
