@@ -105,6 +105,7 @@ typedef struct {
     voltage_q14_t vq_limit_q14;
     pi_t pi_d, pi_q;
     int16_t speed_kp_q13;           /**< the speed controller's gain in use */
+    int16_t iq_rest_q26;            /**< what its last step left below a whole count of q current */
     current_q13_t sample_shift_q13; /**< q current that the sample misses at this speed */
 } drive_control_t;
 

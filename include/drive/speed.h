@@ -31,7 +31,7 @@ NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
 
     if (!mode_current_step(d, p, &iq_q13)) {
         speed_reference_step(d, p);
-        iq_q13 = speed_current(&d->run, p, c->reference_erpm);
+        iq_q13 = speed_current_step(&d->run, p, c->reference_erpm);
     }
     c->ref_q13.q = limits_apply_braking(c, speed, iq_q13);
     if (d->state == (uint16_t)DRIVE_STOPPING && qm_abs(speed) < p->minimum_erpm && qm_abs(c->reference_erpm) < p->minimum_erpm) {

@@ -15,17 +15,31 @@ QM_INLINE void speed_schedule(drive_run_t *run, const drive_params_t *p)
 }
 
 /** No integral: the load's estimate is one that never winds up, for it is made from the current that flows.
- *  @param target_erpm speed to be held @return q current within iq_limit_q13 */
-QM_INLINE current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm)
+ *  @param target_erpm speed to be held @return q current within iq_limit_q13, with 13 fraction bits */
+QM_INLINE int32_t speed_current_q26(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm)
 {
     const drive_control_t *c = &run->control;
+    int32_t limit_q26 = qm_mulss(c->iq_limit_q13, 8192);
     int32_t iq_q26 = qm_mulss(qm_sub_limited(target_erpm, observer_speed(&run->observer)), c->speed_kp_q13)
                      + observer_load_q26(&run->observer, &p->observer);
-    int32_t limit_q26 = qm_mulss(c->iq_limit_q13, 8192);
     if (iq_q26 > limit_q26) {
-        return c->iq_limit_q13;
+        return limit_q26;
     }
-    return (int16_t)((iq_q26 < -limit_q26) ? -c->iq_limit_q13 : (int16_t)((iq_q26 + 4096) >> 13));
+    return (iq_q26 < -limit_q26) ? -limit_q26 : iq_q26;
+}
+
+/** The same in whole counts. */
+QM_INLINE current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm)
+{
+    return (int16_t)((speed_current_q26(run, p, target_erpm) + 4096) >> 13);
+}
+
+/** The same step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */
+QM_INLINE current_q13_t speed_current_step(drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm)
+{
+    int32_t iq_q26 = speed_current_q26(run, p, target_erpm) + run->control.iq_rest_q26;
+    run->control.iq_rest_q26 = (int16_t)(iq_q26 & 8191);
+    return (int16_t)(iq_q26 >> 13);
 }
 
 #endif

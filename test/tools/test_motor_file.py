@@ -255,7 +255,12 @@ def test_ranges_follow_from_the_parts(load):
                   "pwm_period_s": 50e-6, "dead_time_s": 2e-6, "sample_window_s": 1.6e-6, "over_voltage_v": 34.0, "regen_limit_v": 27.0,
                   "under_voltage_v": 12.0})
     assert board.plant_values().values["shunt.gain_v_per_a"] == pytest.approx(0.375)
-    assert load(changed("inverted = true", "inverted = false", MCLV), board_file).current_gain == 0.5
+
+
+def test_an_amplifier_whose_output_rises_has_the_other_sign_in_header_and_plant(load):
+    rising = load(changed("inverted = true", "inverted = false", MCLV), board_file)
+    assert rising.current_gain == 0.5 and rising.current_full_scale_a == pytest.approx(4.4)
+    assert rising.plant_values().values["shunt.gain_v_per_a"] == pytest.approx(-0.375)
 
 
 def test_plant_keys_reach_the_virtual_board_with_their_line(load):

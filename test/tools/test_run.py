@@ -46,6 +46,12 @@ def test_each_reason_for_a_limit_counts_for_its_share_of_the_time_with_the_bridg
     assert limited_percent(trace(0.1).part(1.0, 1.5)) == {}
 
 
+@pytest.mark.parametrize("step_rpm, reference, percent", [(0.0, 1004.0, 1.0), (5.0, 1004.0, 0.598), (5.0, 1006.0, 1.0), (5.0, 996.0, 1.406)])
+def test_the_potentiometers_step_is_no_error_of_the_speed_and_a_reference_further_off_is_one(step_rpm, reference, percent):
+    found = measure_values(trace(plant__speed_rpm=1010, fw__speed_ref_rpm=reference), Measure("row", 0.0, 2.0, 1000.0, step_rpm=step_rpm))
+    assert found["speed_error_percent"] == pytest.approx(percent, abs=1e-3)
+
+
 def test_backward_speed_that_is_too_fast_is_a_positive_error():
     found = measure_values(trace(plant__speed_rpm=-1010), Measure("row", 0.0, 2.0, -1000.0))
     assert found["speed_error_percent"] == pytest.approx(1.0)

@@ -83,6 +83,27 @@ void test_current_is_rounded_to_the_nearest_count(void)
     }
 }
 
+/* A count of current turns a light rotor out of its speed: the mean of the steps is finer than a count. */
+void test_steps_hand_on_what_is_below_a_count_and_never_pass_the_limit(void)
+{
+    static const int16_t cases[][2] = { /* missing speed, eight steps: 1024 is an eighth of a count an erpm */
+                                        { 1, 1 }, { 3, 3 }, { 8, 8 }, { -1, -1 }, { -3, -3 }, { -13, -13 } };
+    int16_t step, sum;
+    EACH(n, cases) {
+        rig_closed(1, 10000);
+        drive.run.control.speed_kp_q13 = 1024;
+        (void)current(10000, 10000, 0);
+        for (step = sum = 0; step < 8; step++) {
+            sum = (int16_t)(sum + speed_current_step(&drive.run, &params, (int16_t)(10000 + cases[n][0])));
+        }
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], sum, golden_row(n));
+    }
+    drive.run.control.iq_rest_q26 = 8191;
+    drive.run.control.speed_kp_q13 = 32767;
+    TEST_ASSERT_EQUAL_INT16(drive.run.control.iq_limit_q13, speed_current_step(&drive.run, &params, 32000));
+    TEST_ASSERT_EQUAL_INT16(-drive.run.control.iq_limit_q13, speed_current_step(&drive.run, &params, -32000));
+}
+
 void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
 {
     rig_closed(1, 10000);
