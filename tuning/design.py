@@ -71,6 +71,8 @@ class Scales:
     """innovation that the load observer calls large"""
     count_a: float
     """a count of current"""
+    lost_counts: float
+    """current that dead time loses"""
 
 
 @dataclass
@@ -98,7 +100,8 @@ class Design:
     def scales(self) -> Scales:
         """What the header makes of motor and board; asked for when their parameters are chosen."""
         return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1"}, "PARAM_INVKFI", "PARAM_IU",
-                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL", "PARAM_LARGE_ERPM", "4.0F * PARAM_F(NORM_CURRENT_CONST)"))
+                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL", "PARAM_LARGE_ERPM", "4.0F * PARAM_F(NORM_CURRENT_CONST)",
+                                          "PARAM_LOST_CURRENT_Q13"))
 
     @property
     def params(self) -> dict[str, str]:
@@ -179,6 +182,7 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
                         f"the firmware's speeds end at {limits.LARGEST_ERPM:.0f}; a speed of {math.floor(limits.LARGEST_ERPM / m.pole_pairs)} rpm is possible")
     problems.attempt(lambda: _refuse_kphi(d))
     problems.attempt(lambda: _refuse_light(d))
+    problems.attempt(lambda: _refuse_dead_time(d))
     half = 0.5 * m.rated_torque_nm
     needed_a = e.iq(m.rated_speed_rpm, half)
     if needed_a > currents.maximum_a:
@@ -231,6 +235,19 @@ def _refuse_light(d: Design) -> None:
     if accel < ACCEL_LEAST:
         raise UserError(f"the load observer cannot count the acceleration of {inertia:.3g} kg m2 by {d.board.current_full_scale_a:.3g} A", d.where("inertia"),
                         f"{limits.digits_down(0.999 * inertia * accel / ACCEL_LEAST, 2):g} kg m2 of rotor and load are possible")
+
+
+def _refuse_dead_time(d: Design) -> None:
+    """What turns without load must show in the current; a file that tells no friction is believed."""
+    ratio, lost_a = _friction_over_lost(d), d.scales.lost_counts * d.scales.count_a
+    if ratio == 0.0 or ratio >= loops.HIDDEN_IN_DEAD_TIME:
+        return
+    share = ratio / loops.HIDDEN_IN_DEAD_TIME
+    shorter_s, least_s = limits.digits_down(0.999 * share * d.board.dead_time_s, 2), _range("DEADTIME_SEC")[0]
+    remedy = f"shorten it to {shorter_s * 1e6:g} us" if shorter_s >= least_s else \
+        f"chokes would help: {limits.digits_up(1.001 * d.motor.lq_h / share * 1e3, 2):g} mH per phase with the winding"
+    raise UserError(f"dead time loses {lost_a:.2g} A, friction takes only {ratio * lost_a:.2g} A: the speed without load would wander",
+                    d.board.quantities["pwm.dead_time"].where, remedy)
 
 
 def motor_current_above(d: Design, currents: limits.Currents) -> bool:
@@ -399,14 +416,22 @@ def _speed_loop(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
     (low, high), (least_load, most_load) = _range("SPEED_BANDWIDTH_HZ"), _range("LOAD_BANDWIDTH_HZ")
     quickest = loops.load_bandwidth(gains, constants.filter_hz(d.value("KFILTER_ESDQ"), gains.period_s), d.value("CURRENT_BANDWIDTH_HZ"))
     calm = loops.calm_load_bandwidth(d.scales.large_erpm, d.scales.acceleration, d.value("MAXIMUM_CURRENT_A") / d.scales.count_a, gains.period_s)
+    cap = loops.speed_cap(_friction_over_lost(d))
     loop = loops.design_speed(plant, _spread(m), gains, speeds, max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz)),
-                              max(least_load, min(most_load, limits.digits_down(min(quickest, calm), 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"))
-    d.speed_loop, d.calm_hz = loop, loops.calm_bandwidth(loop.load_hz, min(speeds.values()))
+                              max(least_load, min(most_load, limits.digits_down(min(quickest, calm), 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"), cap)
+    d.speed_loop, d.calm_hz = loop, loops.calm_bandwidth(loop.load_hz, min(speeds.values()), cap)
     asked = ", ".join(f"{degrees:.0f} degrees {mode}" for mode, (degrees, _) in loops.SPEED_MARGINS.items())
     d.put("LOAD_BANDWIDTH_HZ", plain(loop.load_hz), f"as quick as back-EMF filter, current loop and slow step let it be ({quickest:.0f} Hz), and the inertia ({calm:.0f} Hz), lowered until the "
           f"speed loop has its phase margins from the minimum to the maximum speed ({asked})")
-    d.put("SPEED_BANDWIDTH_HZ", plain(loop.bandwidth_hz), f"{loops.SPEED_CAP:g} of the electrical frequency from which it is in full ({d.calm_hz:.3g} Hz: above, the "
+    d.put("SPEED_BANDWIDTH_HZ", plain(loop.bandwidth_hz), f"{cap:.2g} of the electrical frequency from which it is in full ({d.calm_hz:.3g} Hz: above, the "
           "dead time may make an unloaded motor hunt), or what the gain's format holds")
+
+
+def _friction_over_lost(d: Design) -> float:
+    """Current that friction takes at half the rated speed, over what dead time loses of a current."""
+    m = d.motor
+    friction_a = (m.coulomb_nm + m.viscous_nms * 0.5 * m.rated_speed_rpm * limits.RPM) / (1.5 * m.pole_pairs * m.psi_vs)
+    return friction_a / (d.scales.lost_counts * d.scales.count_a)
 
 
 def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:

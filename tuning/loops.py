@@ -41,6 +41,11 @@ On the virtual board slower observers are no calmer, and 0.08 N m stops the Hurs
 SPEED_CAP = 0.32
 """Highest bandwidth of the speed loop over the electrical frequency. Without load the currents lie where the dead time's compensation is
 only linear; the voltage that is missing there looks like back-EMF, and the estimator rejects it no faster than the motor turns."""
+CLEAR_OF_DEAD_TIME, LEAST_SPEED_SHARE = 1.9, 0.25
+"""Friction's current over what dead time loses of a current, from which SPEED_CAP holds; below it falls with the square, no further than this share.
+Where friction takes less current the compensation knows little of an unloaded motor's, and a quick loop follows what it sees."""
+HIDDEN_IN_DEAD_TIME = 0.72
+"""Below this the speed of an unloaded motor wanders by tens of per cent on the virtual board, with quick and slow loops."""
 QUIET_RATIO, LOADED_SHARE, QUICK_GAIN = (number(f"PARAM_{name}") for name in ("QUIET_RATIO", "LOADED_SHARE", "QUICK_GAIN"))
 FULL_RATIO, ESDQ_RATIO = (number(f"PARAM_{name}") for name in ("FULL_RATIO", "ESDQ_RATIO"))
 HEAVY_SHARE = 0.75
@@ -329,13 +334,18 @@ def calm_load_bandwidth(large_erpm: float, acceleration: float, largest_counts: 
     return HEAVY_SHARE * largest_counts * acceleration / (FULL_RATIO * large_erpm) / (2.0 * math.pi * SLOW_PHASES * period_s)
 
 
-def calm_bandwidth(load_hz: float, lowest_rad_s: float) -> float:
-    """Largest bandwidth of the speed loop: SPEED_CAP of the electrical frequency from which it is in full, or of the lowest one."""
-    return SPEED_CAP * max(load_hz / FULL_RATIO, lowest_rad_s / (2.0 * np.pi))
+def speed_cap(friction_over_lost: float) -> float:
+    """SPEED_CAP, or what is left of it where an unloaded motor's current hides in dead time."""
+    return SPEED_CAP * min(1.0, max(LEAST_SPEED_SHARE, (friction_over_lost / CLEAR_OF_DEAD_TIME) ** 2))
+
+
+def calm_bandwidth(load_hz: float, lowest_rad_s: float, cap: float = SPEED_CAP) -> float:
+    """Largest bandwidth of the speed loop: `cap` of the electrical frequency from which it is in full, or of the lowest one."""
+    return cap * max(load_hz / FULL_RATIO, lowest_rad_s / (2.0 * np.pi))
 
 
 def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gains, speeds_rad_s: dict[str, float], largest_hz: float,
-                 load_hz: float, fixed_hz: float | None = None, fixed_load_hz: float | None = None) -> LoopDesign:
+                 load_hz: float, fixed_hz: float | None = None, fixed_load_hz: float | None = None, cap: float = SPEED_CAP) -> LoopDesign:
     """Bandwidth of the load observer, the largest up to `load_hz` with enough margin at every speed of `speeds_rad_s` (name: electrical
     rad/s) and every rate, and of the speed loop that goes with it: up to `largest_hz` and what is calm at the lowest speed."""
     grid = np.geomspace(0.05, 0.45 / (SLOW_PHASES * base.period_s), 400)
@@ -344,7 +354,7 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
             "quick, L wrong": [(f"L x{factor:g}", replace(plant, ld=plant.ld * factor, lq=plant.lq * factor)) for factor in WRONG_L]}
 
     def speed_hz(load: float) -> float:
-        return fixed_hz or digits_down(min(largest_hz, calm_bandwidth(load, lowest)), 3)
+        return fixed_hz or digits_down(min(largest_hz, calm_bandwidth(load, lowest, cap)), 3)
 
     def cases(load: float) -> Iterable[tuple[str, Plant, Gains, float, tuple[float, float]]]:
         full = {"full rates": full_rad_s(load), "full rates under load": 0.5 * full_rad_s(load)}
