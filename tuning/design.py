@@ -182,7 +182,6 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
                         f"the firmware's speeds end at {limits.LARGEST_ERPM:.0f}; a speed of {math.floor(limits.LARGEST_ERPM / m.pole_pairs)} rpm is possible")
     problems.attempt(lambda: _refuse_kphi(d))
     problems.attempt(lambda: _refuse_light(d))
-    problems.attempt(lambda: _refuse_dead_time(d))
     half = 0.5 * m.rated_torque_nm
     needed_a = e.iq(m.rated_speed_rpm, half)
     if needed_a > currents.maximum_a:
@@ -235,19 +234,6 @@ def _refuse_light(d: Design) -> None:
     if accel < ACCEL_LEAST:
         raise UserError(f"the load observer cannot count the acceleration of {inertia:.3g} kg m2 by {d.board.current_full_scale_a:.3g} A", d.where("inertia"),
                         f"{limits.digits_down(0.999 * inertia * accel / ACCEL_LEAST, 2):g} kg m2 of rotor and load are possible")
-
-
-def _refuse_dead_time(d: Design) -> None:
-    """What turns without load must show in the current; a file that tells no friction is believed."""
-    ratio, lost_a = _friction_over_lost(d), d.scales.lost_counts * d.scales.count_a
-    if ratio == 0.0 or ratio >= loops.HIDDEN_IN_DEAD_TIME:
-        return
-    share = ratio / loops.HIDDEN_IN_DEAD_TIME
-    shorter_s, least_s = limits.digits_down(0.999 * share * d.board.dead_time_s, 2), _range("DEADTIME_SEC")[0]
-    remedy = f"shorten it to {shorter_s * 1e6:g} us" if shorter_s >= least_s else \
-        f"chokes would help: {limits.digits_up(1.001 * d.motor.lq_h / share * 1e3, 2):g} mH per phase with the winding"
-    raise UserError(f"dead time loses {lost_a:.2g} A, friction takes only {ratio * lost_a:.2g} A: the speed without load would wander",
-                    d.board.quantities["pwm.dead_time"].where, remedy)
 
 
 def motor_current_above(d: Design, currents: limits.Currents) -> bool:
@@ -490,6 +476,7 @@ def _warn(d: Design, currents: limits.Currents) -> None:
     _warn_speeds(d)
     _warn_numbers(d)
     _warn_loops(d)
+    _warn_dead_time(d)
 
 
 def _warn_currents(d: Design, currents: limits.Currents) -> None:
@@ -540,6 +527,14 @@ def _warn_numbers(d: Design) -> None:
         if wanted > 1.02 * limit:
             d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "
                               "high current; lower MAXIMUM_CURRENT_A or the speed")
+
+
+def _warn_dead_time(d: Design) -> None:
+    """What turns without load must show in the current; a file that tells no friction is believed."""
+    ratio, lost_a = _friction_over_lost(d), d.scales.lost_counts * d.scales.count_a
+    if 0.0 < ratio < loops.HIDDEN_IN_DEAD_TIME:
+        d.warnings.append(f"dead time loses {lost_a:.2g} A, friction takes only {ratio * lost_a:.2g} A: without load the speed may wander; "
+                          f"[pwm] dead_time of {limits.digits_down(0.999 * d.board.dead_time_s * ratio / loops.HIDDEN_IN_DEAD_TIME, 2) * 1e6:g} us would do, or chokes")
 
 
 def _warn_loops(d: Design) -> None:
