@@ -41,9 +41,9 @@
     X(44, B, 8, -1, 8, "SCL1")
 
 #define PIN_NUMBERS(number, port, bit, an, rp, others) PIN_##port##bit##_AN = (an), PIN_##port##bit##_RP = (rp),
-enum chip_pin_number { CHIP_PIN_TABLE(PIN_NUMBERS) PIN_PORT_A = 0,
-                       PIN_PORT_B = 1,
-                       PIN_PORT_C = 2 };
+enum { CHIP_PIN_TABLE(PIN_NUMBERS) PIN_PORT_A = 0,
+       PIN_PORT_B = 1,
+       PIN_PORT_C = 2 };
 
 /* What follows from a pin that is written as "port, bit": #define BOARD_PIN_S2 A, 8. */
 #define PIN_AN_OF(port, bit) PIN_##port##bit##_AN

@@ -93,8 +93,8 @@ def main() -> int:
     options = parser.parse_args()
     known = [proof for file in sorted(HERE.glob("*.c")) for proof in read_proofs(file)]
     proofs = [proof for proof in known if not options.only or proof.name in options.only]
-    if not proofs:
-        print(f"foc33: no such proof, {' '.join(options.only)}: use one of {' '.join(proof.name for proof in known)}", file=sys.stderr)
+    if wrong_names := [name for name in options.only if name not in {proof.name for proof in known}]:
+        print(f"foc33: no such proof, {' '.join(wrong_names)}: use one of {' '.join(proof.name for proof in known)}", file=sys.stderr)
         return 2
     BUILD.mkdir(parents=True, exist_ok=True)
     passed = failed = 0

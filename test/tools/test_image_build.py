@@ -15,7 +15,7 @@ ROOT = paths.ROOT
 MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
 TREE = ("Makefile", "userparams.h", "firmware", "include", "tools/__init__.py", "tools/common", "tools/image", "tools/make", "tools/setup")
 NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname",
-          "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr", "awk", "find", "flock")
+          "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr", "awk", "find", "flock", "mktemp", "cp")
 
 
 def xc16() -> str | None:
@@ -81,7 +81,8 @@ def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(t
     for name in names:
         (place / name).write_text(f'#!/bin/sh\necho {name} "$@" >>"{tmp_path}/calls"\nexit 1\n', encoding="utf-8")
         (place / name).chmod(0o755)
-    assert make("firmware", "VARIANT=none", *([f"XC16={place.parent}"] if folder else []), path=path).returncode == 2
+    done = make("firmware", "VARIANT=none", *([f"XC16={place.parent}"] if folder else []), path=path)
+    assert done.returncode == 2 and re.fullmatch(r"foc33: the compiler cannot read userparams.h, .*gcc: .*", our_lines(done)[0]), done.stderr
     calls = (tmp_path / "calls").read_text(encoding="utf-8").splitlines()
     assert {call.split()[0] for call in calls} == {called}
     assert all(("-U__XC16__ -D__XC16__" in call) == defined for call in calls)

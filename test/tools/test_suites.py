@@ -109,3 +109,8 @@ def test_while_no_suite_ends_it_says_which_ones_run(tmp_path):
     code, output = run(tmp_path, "--told-every", "1")
     assert (code, re.findall(r"(?m)^  still: unit/test_slow (\d) s$", output)[:1]) == (0, ["1"]), output
     assert "still" not in run(tmp_path)[1]
+
+
+def test_a_proof_that_does_not_exist_is_named_even_beside_one_that_does():
+    done = subprocess.run([sys.executable, TEST / "proof/proof.py", "tick", "nix"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stdout == "" and done.stderr.startswith("foc33: no such proof, nix: use one of ")

@@ -100,7 +100,7 @@ def test_engineering_values_are_the_parameters():
 @pytest.mark.parametrize("name, value, words", [
     ("KFILTER_ESDQ", "9", "^KFILTER_ESDQ = 9 is outside 10 .. 8000 Q15$"),
     ("SNAPDELAY", "32001", "^SNAPDELAY = 32001 is outside 1 .. 32000 periods$"),
-    ("MAXIMUM_SPEED_RPM", "6500", "at most 32000"), ("IDREF_SPEED7", "-3", "IDREF_SPEED7 must not exceed"),
+    ("MAXIMUM_SPEED_RPM", "6500", "at most 32000"), ("IDREF_SPEED7", "-3", "IDREF_SPEED7 = -3 must not exceed"),
     ("OVER_CURRENT_THRESHOLD_A", "3.9", "86.5 %"), ("D_CURRCNTR_CTERM", "0.5", "D_CURRCNTR_CTERM must be")])
 def test_a_value_outside_its_range_and_a_broken_relation_are_told_in_the_build_s_words(name, value, words):
     messages = constants.header(of(HURST).params | {name: value}).wrong
@@ -110,7 +110,7 @@ def test_a_value_outside_its_range_and_a_broken_relation_are_told_in_the_build_s
 
 def test_a_kphi_that_does_not_fit_is_told_once_and_a_missing_parameter_is_named():
     messages = constants.header(of(HURST).params | {"MOTOR_KPHI_V_PER_KRPM": "1.7"}).wrong
-    assert messages[0].startswith("MOTOR_KPHI_V_PER_KRPM does not fit") and not [message for message in messages if "INVKFI" in message]
+    assert messages[0].startswith("MOTOR_KPHI_V_PER_KRPM = 1.7 does not fit") and not [message for message in messages if "INVKFI" in message]
     params = {name: text for name, text in of(HURST).params.items() if name != "LOCK_TIME"}
     assert constants.header(params).wrong == ["LOCK_TIME is missing"]
 

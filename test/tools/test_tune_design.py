@@ -200,9 +200,10 @@ def test_the_d_current_for_a_load_is_the_least_that_fits_or_the_one_of_the_small
 
 
 def test_the_voltage_feedback_allows_what_the_rated_torque_needs_and_helps_with_less_flux():
-    """0.8 of 1.97 A, for with a fifth less flux the smallest voltage lies there; without need 30 % of the largest current."""
+    """0.8 of 1.97 A, for with a fifth less flux the smallest voltage lies there; half the torque at rated speed with a fifth more; without need 30 % of the largest current."""
     assert of(HURST).value("FW_TRIM_CURRENT_A") == 1.5
-    assert of("linix_45zwn24_40").value("FW_TRIM_CURRENT_A") == 1.0
+    assert of("linix_45zwn24_40").value("FW_TRIM_CURRENT_A") == 3.0
+    assert of("anaheim_bly172s_24v_4000").value("FW_TRIM_CURRENT_A") == 1.0
 
 
 def test_the_table_follows_the_voltage_equation_and_never_returns():

@@ -21,7 +21,7 @@ compiler() {
 
 # Ends with the messages of the header's own checks; without one, with the compiler's first error and the parameter that it was met in.
 refuse() {
-    awk -F '\t' -v header="$header" '
+    awk -F '\t' -v header="$header" -v compiler="$1" '
         FILENAME ~ /places$/ { place[$1] = $2; range[$1] = $3; next }
         match($0, /In function .(range|text)_of_[A-Z0-9_]+/) {
             name = substr($0, RSTART, RLENGTH)
@@ -42,7 +42,10 @@ refuse() {
             } else
                 other = other ": correct it"
         }
-        END { if (!checked) print "foc33: " other }' "$work/places" "$work/messages" >&2
+        END {
+            if (!checked)
+                print "foc33: " (other != "" ? other : "the compiler cannot read " header ", " compiler ": it ended without a message, try it by hand")
+        }' "$work/places" "$work/messages" >&2
     exit 2
 }
 
@@ -53,12 +56,12 @@ known='#include "drive/param_table.h"
 #define PARAMETER(name, unit, min, max, ...) @parameter@#name@#min .. #max unit@
 #define OTHER(name, ...) @other@#name@@
 PARAM_TABLE(PARAMETER) PARAM_OPTIONAL(OTHER) MODE_TABLE(OTHER)'
-echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || refuse
-echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || refuse
+echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || refuse "$1"
+echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || refuse "$1"
 header=$(sed -n 's|^# 1 "\(\./\)\{0,1\}\(.*userparams\.h\)".*|\2|p' "$work/defined" | head -n 1)
 awk -v places="$work/places" -f tools/make/userparams.awk "$work/known" "$work/defined" >&2 || exit 2
 
 for source in param_text param_check; do
-    compiler "$@" -w -MMD -MP -MF "$work/depends" -MT "$stamp" -c "firmware/drive/$source.c" -o "$work/object.o" || refuse
+    compiler "$@" -w -MMD -MP -MF "$work/depends" -MT "$stamp" -c "firmware/drive/$source.c" -o "$work/object.o" || refuse "$1"
 done
 cp "$work/depends" "$stamp.d" && : >"$stamp"
