@@ -225,3 +225,15 @@ def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_
                  ("speed = { value = 2500", "speed = { value = 4000"), ("value = 5000", "value = 5500"), ("value = 2.75", "value = 1.5"))
     assert d.value("CURRENT_BANDWIDTH_HZ") == 1000.0
     assert any("CURRENT_BANDWIDTH_HZ = 1000: the current loop has 5" in warning for warning in d.warnings), d.warnings
+
+
+def test_a_heavy_rotor_gets_a_slower_load_observer_and_a_large_innovation_asks_for_the_same_share_of_the_current():
+    light, heavy = (loops.calm_load_bandwidth(100.0, acceleration, 5000.0, 50e-6) for acceleration in (0.1, 0.01))
+    assert light == pytest.approx(10.0 * heavy)
+    step = 2.0 * np.pi * heavy * loops.SLOW_PHASES * 50e-6
+    assert loops.FULL_RATIO * 100.0 * step / 0.01 == pytest.approx(loops.HEAVY_SHARE * 5000.0)
+
+
+@pytest.mark.parametrize("ratio, share", [(10.0, 1.0), (1.9, 1.0), (1.9 / np.sqrt(2.0), 0.5), (0.5, 0.25), (0.0, 0.25)])
+def test_the_speed_loop_is_slower_where_dead_time_hides_the_current_of_an_unloaded_motor(ratio, share):
+    assert loops.speed_cap(ratio) == pytest.approx(share * loops.SPEED_CAP)
