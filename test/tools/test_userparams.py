@@ -100,7 +100,7 @@ MISTAKES = {
     # these break relations, too, and the formulas of other files
     **{f"{name} out of range": (value(name, text), name, f"{name} = {text} is outside {range_of(name)}: correct it") for name, text in (
         ("MOTOR_RS_OHM", "99"), ("MAXIMUM_SPEED_RPM", "50000"), ("MOTOR_KPHI_V_PER_KRPM", "0.1"), ("NOPOLESPAIRS", "0"),
-        ("NORM_CURRENT_CONST", "1e-6"))},
+        ("NORM_CURRENT_CONST", "1e-7"))},
     "an L that overflows": (value("MOTOR_LS_MH", "25"), "MOTOR_LS_MH",
                               "MOTOR_LS_MH = 25 does not fit its Q format: use a smaller current range"),
     "a Kphi that overflows": (value("MOTOR_KPHI_V_PER_KRPM", "0.5"), "MOTOR_KPHI_V_PER_KRPM",
