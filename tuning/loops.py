@@ -41,7 +41,7 @@ On the virtual board slower observers are no calmer, and 0.08 N m stops the Hurs
 SPEED_CAP = 0.32
 """Highest bandwidth of the speed loop over the electrical frequency. Without load the currents lie where the dead time's compensation is
 only linear; the voltage that is missing there looks like back-EMF, and the estimator rejects it no faster than the motor turns."""
-CLEAR_OF_DEAD_TIME, LEAST_SPEED_SHARE = 1.9, 0.25
+CLEAR_OF_DEAD_TIME, LEAST_SPEED_SHARE = 1.9, 0.5
 """Friction's current over what dead time loses of a current, from which SPEED_CAP holds; below it falls with the square, no further than this share.
 Where friction takes less current the compensation knows little of an unloaded motor's, and a quick loop follows what it sees."""
 HIDDEN_IN_DEAD_TIME = 0.72

@@ -234,6 +234,6 @@ def test_a_heavy_rotor_gets_a_slower_load_observer_and_a_large_innovation_asks_f
     assert loops.FULL_RATIO * 100.0 * step / 0.01 == pytest.approx(loops.HEAVY_SHARE * 5000.0)
 
 
-@pytest.mark.parametrize("ratio, share", [(10.0, 1.0), (1.9, 1.0), (1.9 / np.sqrt(2.0), 0.5), (0.5, 0.25), (0.0, 0.25)])
+@pytest.mark.parametrize("ratio, share", [(10.0, 1.0), (1.9, 1.0), (1.9 * np.sqrt(0.75), 0.75), (0.5, 0.5), (0.0, 0.5)])
 def test_the_speed_loop_is_slower_where_dead_time_hides_the_current_of_an_unloaded_motor(ratio, share):
     assert loops.speed_cap(ratio) == pytest.approx(share * loops.SPEED_CAP)
