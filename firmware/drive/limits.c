@@ -25,7 +25,7 @@ static uint16_t ramp_reasons(const drive_t *d, const drive_params_t *p)
     int16_t left = qm_abs(qm_sub_limited(target, d->run.control.reference_erpm));
     uint16_t waits = (uint16_t)(left != 0 && !reference_may_move(d, p, target));
 
-    return (uint16_t)((waits || left > qm_hi(2 * p->speed_ramp_q16) ? (uint16_t)LIMIT_RAMP : 0u) | (waits ? (uint16_t)LIMIT_RAMP_WAITS : 0u));
+    return (uint16_t)((waits || left >= qm_hi(2 * p->speed_ramp_q16 + 65535) ? (uint16_t)LIMIT_RAMP : 0u) | (waits ? (uint16_t)LIMIT_RAMP_WAITS : 0u));
 }
 
 /** What holds the current's references in closed loop. */

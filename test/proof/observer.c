@@ -74,8 +74,10 @@ void proof_observer_step(void)
     //@ loop unroll 16;
     for (uint16_t shift = 0; shift <= 15; shift++) {
         //@ loop unroll 100;
-        for (int16_t quick = 128; quick < RATE_MOST_Q16; quick = (int16_t)(quick + quick / 8)) {
-            observer_piece(quick, (int16_t)(quick + quick / 8), shift, 16384, 32767);
+        for (int16_t quick = 128, next; quick < RATE_MOST_Q16; quick = next) {
+            /* a small square's high word alone is coarse: finer pieces where the shift makes much of it */
+            next = (int16_t)(quick + quick / ((shift > 13u && quick < 1024) ? 32 : 8));
+            observer_piece(quick, next, shift, 16384, 32767);
         }
     }
 }

@@ -76,7 +76,7 @@ def test_an_existing_file_stays_as_it_is(path):
     (("shunt=1.2.3",), ["'1.2.3' is not a number"]), (("shunt=nan",), ["is not a number"]), (("gian=3",), ["unknown key 'gian'", "did you mean 'gain'?"]),
     (("shunt",), ["'shunt' is no key=value"]), (("gain=",), ["'gain=' is no key=value"]), (("gain=1", "amplifier_gain=2"), ["'amplifier_gain' is given twice"]),
     (("divider=2k/30k",), ["do not rise in this order", "3.52 V"]), (("divider=30k/0",), ["the lower resistor of '30k/0' is 0"]),
-    (("offset=2.5",), ["reference = 2.5 V is not the middle of the converter's 3.3 V"]), (("supply=70",), ["supply.voltage = 70 V", "choose 6 .. 60 V"]),
+    (("offset=2.5",), ["reference = 2.5 V is not the middle of the converter's 3.3 V"]), (("supply=70",), ["supply.voltage = 70 V", "choose 8 .. 60 V"]),
     (("supply=48",), ["do not rise in this order", "67.2 and 52.8 V"]), (("inverted=true",), ["'inverted' = 'true' is neither yes nor no"]),
     (("fault=RA8",), ["fault cannot be on RA8"]), (("from=no_such",), ["no board 'no_such'", "SET"])])
 def test_nonsense_is_one_line_and_writes_nothing(path, words, parts):
