@@ -163,10 +163,10 @@ def outcome(tmp_path):
     return of
 
 
-LIMITS = {"pole_pairs": (1, 50), "rs_ohm": (0.005, 120.0), "ld_h": (1e-5, 0.03), "lq_h": (1e-5, 0.03), "psi_vs": (1e-6, 2.0),
-          "kphi_v_per_krpm": (0.15, 600.0), "inertia_kgm2": (1e-8, 0.1), "viscous_nms": (0.0, 0.1), "coulomb_nm": (0.0, 10.0),
-          "rated_voltage_v": (3.0, 400.0), "rated_current_a": (0.01, 200.0), "rated_torque_nm": (1e-4, 100.0), "rated_speed_rpm": (49.0, 30001.0),
-          "maximum_speed_rpm": (49.0, 30001.0), "maximum_current_a": (0.01, 2000.0), "load_inertia_kgm2": (0.0, 0.1),
+LIMITS = {"pole_pairs": (1, 50), "rs_ohm": (0.005, 120.0), "ld_h": (1e-5, 0.03), "lq_h": (1e-5, 0.03), "psi_vs": (1e-6, 20.0),
+          "kphi_v_per_krpm": (0.15, 6000.0), "inertia_kgm2": (1e-8, 10.0), "viscous_nms": (0.0, 10.0), "coulomb_nm": (0.0, 10.0),
+          "rated_voltage_v": (3.0, 400.0), "rated_current_a": (0.01, 200.0), "rated_torque_nm": (1e-4, 100.0), "rated_speed_rpm": (49.0, 32001.0),
+          "maximum_speed_rpm": (49.0, 32001.0), "maximum_current_a": (0.01, 2000.0), "load_inertia_kgm2": (0.0, 10.0),
           "start_torque_nm": (0.0, 100.0), "resistance_tempco_per_k": (0.0, 0.01), "kphi_tempco_per_k": (-0.004, 0.0)}
 
 
