@@ -73,21 +73,21 @@
 #define FW_TRIM_CURRENT_A 1.5       /* [A]             0 .. 20        most that the voltage feedback may add to the table's d current */
 
 #define IDREF_SPEED0   0.00               /* [A]             -20 .. 0       d current of each entry */
-#define IDREF_SPEED1  -0.28
-#define IDREF_SPEED2  -0.52
-#define IDREF_SPEED3  -0.78
-#define IDREF_SPEED4  -1.03
-#define IDREF_SPEED5  -1.25
-#define IDREF_SPEED6  -1.47
+#define IDREF_SPEED1  -0.29
+#define IDREF_SPEED2  -0.55
+#define IDREF_SPEED3  -0.81
+#define IDREF_SPEED4  -1.05
+#define IDREF_SPEED5  -1.28
+#define IDREF_SPEED6  -1.51
 #define IDREF_SPEED7  -1.53
-#define IDREF_SPEED8  -1.59
-#define IDREF_SPEED9  -1.76
-#define IDREF_SPEED10 -1.92
-#define IDREF_SPEED11 -2.07
-#define IDREF_SPEED12 -2.22
-#define IDREF_SPEED13 -2.35
-#define IDREF_SPEED14 -2.48
-#define IDREF_SPEED15 -2.60
+#define IDREF_SPEED8  -1.62
+#define IDREF_SPEED9  -1.78
+#define IDREF_SPEED10 -1.95
+#define IDREF_SPEED11 -2.10
+#define IDREF_SPEED12 -2.25
+#define IDREF_SPEED13 -2.39
+#define IDREF_SPEED14 -2.52
+#define IDREF_SPEED15 -2.63
 #define IDREF_SPEED16 -2.66
 #define IDREF_SPEED17 -2.66
 
