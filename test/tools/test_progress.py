@@ -84,7 +84,7 @@ def test_on_a_terminal_it_is_one_line_that_goes_away():
 
 
 def test_make_s_jobs_reach_a_wrapped_make(tmp_path):
-    (tmp_path / "Makefile").write_text("all:\n\t+@PYTHONPATH=$(ROOT) $(PY) -m tools.common.progress x $(MAKE) -f inner\n", encoding="utf-8")
+    (tmp_path / "Makefile").write_text("all:\n\t+@PYTHONPATH='$(ROOT)' '$(PY)' -m tools.common.progress x $(MAKE) -f inner\n", encoding="utf-8")
     (tmp_path / "inner").write_text("all: a b\na b:\n\t@echo $@\n", encoding="utf-8")
     done = subprocess.run(["make", "-s", "-j2", f"ROOT={paths.ROOT}", f"PY={sys.executable}"], cwd=tmp_path, capture_output=True,
                           text=True, check=False)

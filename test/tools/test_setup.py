@@ -32,7 +32,7 @@ class Machine:
         self.program("id", "echo 0")
         self.program("apt-get", f"""
             echo "$@" >>calls; cp out seen; echo "Unpacking $2"
-            case $* in *install*) ln -sf {shutil.which('true')} {self.bin}/python3; ln -sf {shutil.which('true')} {self.bin}/cppcheck;; esac""")
+            case $* in *install*) ln -sf {shutil.which('true')} '{self.bin}/python3'; ln -sf {shutil.which('true')} '{self.bin}/cppcheck';; esac""")
 
     def program(self, name: str, body: str) -> None:
         path = self.bin / name
@@ -97,7 +97,7 @@ def test_modules_in_the_project_s_own_environment_are_found_first_and_need_no_ro
     ("tools/setup/prepare.sh run", "installing packages"), ("test/static/need.sh cppcheck=cppcheck", "installing packages"),
     ("tools/setup/gems.sh 1.2.1 stamp", "installing the gem")])
 def test_a_long_installation_says_now_and_then_what_it_does(machine, line, title):
-    machine.program("apt-get", "echo Fetched $2; case $* in *install*) sleep 2.5; ln -sf /bin/true $BIN/python3;; esac")
+    machine.program("apt-get", "echo Fetched $2; case $* in *install*) sleep 2.5; ln -sf /bin/true \"$BIN/python3\";; esac")
     machine.program("gem", "echo Fetched ceedling; sleep 2.5")
     code, said = machine.run(line, FOC33_BEAT_S="1", BIN=str(machine.bin))
     assert code == 0 and re.findall(rf"(?m)^  {title}: (\d) s, Fetched \S+$", said) == ["1", "2"], said
