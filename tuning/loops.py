@@ -23,6 +23,8 @@ from itertools import product
 
 import numpy as np
 
+from tools.bench import robust
+from tools.common import paths
 from tools.common.param_rows import number
 
 from .limits import digits_down
@@ -54,7 +56,7 @@ innovation is worth; the step of current shakes the estimate, and that is the ne
 1.1 some swing between both limits. A heavy rotor needs no quick observer: a load slows it slowly."""
 RATE_MOST = 0.374
 """OBSERVER_RATE_MOST_Q16 of control/observer.h"""
-SLOW_PHASES = 8
+SLOW_PHASES = int(number("SLOW_PHASES"))
 CURRENT_TOP = 1.0 / 12.0
 """Taken above the cap only for a motor whose rotation at top speed would cost the margin below it."""
 CURRENT_NEARLY_DEG = 5.0
@@ -62,7 +64,8 @@ CURRENT_NEARLY_DEG = 5.0
 margin then, and a loop twenty times slower would gain three degrees and leave the speed loop nothing to stand on."""
 TOLERANCE = {"rs": (0.9, 1.3), "ls": (0.8, 1.2), "psi": (0.9, 1.1)}
 """Parameter set of every motor, as factors: R 10 % below the sheet up to copper at 100 degC, L and flux as sheets leave them open."""
-WRONG_L = (0.7, 1.3)
+WRONG_L = robust.Table.read(paths.TABLES / "robust.toml").promised["L"]
+"""How far L may be off, as factors: what `make robust` promises."""
 
 
 @dataclass(frozen=True)

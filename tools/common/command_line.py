@@ -19,6 +19,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def tell(_: object, error: UserError) -> None:
+    """The lines of a refused item, on standard error."""
     for line in error.lines:
         print(f"foc33: {line}", file=sys.stderr, flush=True)
 
