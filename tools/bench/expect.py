@@ -98,6 +98,8 @@ def _window_text(from_s: float, to_s: float) -> str:
 
 @dataclass(frozen=True)
 class MeasureExpectation(Expectation):
+    """kind `measure` or `speed`: a value of rows of the table."""
+
     measures: list[str]
     value: str
     bounds: Bounds
@@ -124,6 +126,8 @@ class MeasureExpectation(Expectation):
 
 @dataclass(frozen=True)
 class HandOverExpectation(Expectation):
+    """kind `hand_over`: closed loop in time, without much overshoot."""
+
     press: int
     within_s: float
     overshoot_percent: float | None
@@ -170,6 +174,8 @@ def _stays_off(trace: Trace, off_row: int, to_row: int | None = None) -> bool:
 
 @dataclass(frozen=True)
 class StopExpectation(Expectation):
+    """kind `stop`: outputs off in time, slow and without much braking current."""
+
     after_s: float
     within_s: float
     to_s: float
@@ -223,6 +229,8 @@ class WindowExpectation(Expectation):
 
 
 class OutputsOffExpectation(WindowExpectation):
+    """kind `outputs_off`: no output is driven."""
+
     def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.from_s, self.to_s)
         on = np.flatnonzero(part.column("pwm.outputs_seen"))
@@ -232,6 +240,8 @@ class OutputsOffExpectation(WindowExpectation):
 
 @dataclass(frozen=True)
 class SignalExpectation(Expectation):
+    """kind `signal`: lowest and highest value of a signal."""
+
     row: str
     signal: str
     statistic: str
@@ -284,6 +294,8 @@ _STATISTICS: dict[str, Callable[[np.ndarray], Any]] = {
 
 @dataclass(frozen=True)
 class StateExpectation(Expectation):
+    """kind `state`: the only state of the drive in its time."""
+
     name: str
     from_s: float
     to_s: float
@@ -312,6 +324,8 @@ class StateExpectation(Expectation):
 
 @dataclass(frozen=True)
 class FaultExpectation(Expectation):
+    """kind `fault`: the named fault comes in time, switches off and stays until S2."""
+
     name: str
     after_s: float
     within_s: float
@@ -370,6 +384,8 @@ class FaultExpectation(Expectation):
 
 
 class NoFaultExpectation(WindowExpectation):
+    """kind `no_fault`: none in its time."""
+
     def reads_firmware(self) -> bool:
         return True
 
@@ -381,12 +397,16 @@ class NoFaultExpectation(WindowExpectation):
 
 
 class NoWarningsExpectation(Expectation):
+    """kind `no_warnings`: the virtual board has nothing to say."""
+
     def check(self, run: Run) -> list[Outcome]:
         return [Outcome("no warnings of the board", not run.warnings, run.warnings[0] if run.warnings else "none", "none")]
 
 
 @dataclass(frozen=True)
 class VariableExpectation(Expectation):
+    """kind `variable`: a firmware variable at the end of the run."""
+
     name: str
     count: int
     statistic: str
