@@ -9,6 +9,8 @@
 #include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
+#define COUNT_MS 100u
+#define LEAST_TICKS PARAM_PERIODS(0.097F) /* of a tenth of a second: 3 % less */
 
 drive_t board_drive;
 panel_t board_panel;
@@ -16,6 +18,7 @@ panel_t board_panel;
 static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick; /* drive ticks at the last check */
 static uint16_t silent_ms;       /* timer 1 milliseconds without a control interrupt */
+static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
 
 void firmware_trip(drive_fault_t fault)
 {
@@ -32,6 +35,8 @@ void firmware_init(void)
     last_ms_tick = 0;
     supervised_tick = 0;
     silent_ms = 0;
+    counted_tick = 0;
+    counted_ms = 0;
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
@@ -54,12 +59,27 @@ void firmware_init(void)
     ClrWdt();
 }
 
+/** Control interrupts are as many as the timer says. A background pass that takes longer than a millisecond loses one of the timer's, never of
+ *  the interrupts': only too few are a fault. Every millisecond. */
+static void firmware_count_interrupts(void)
+{
+    if (++counted_ms < COUNT_MS) {
+        return;
+    }
+    if ((uint16_t)(board_drive.ticks - counted_tick) < LEAST_TICKS) {
+        firmware_trip(FAULT_INTERRUPT_RATE);
+    }
+    counted_tick = board_drive.ticks;
+    counted_ms = 0;
+}
+
 /** A control interrupt that stays away for 2 ms leaves the bridge without control. */
 static void firmware_watch_interrupt(void)
 {
     if (!timer_ms_passed()) {
         return;
     }
+    firmware_count_interrupts();
     if (board_drive.ticks != supervised_tick) {
         supervised_tick = board_drive.ticks;
         silent_ms = 0;

@@ -71,6 +71,9 @@ typedef struct {
     int32_t tuning_step_q16; /**< the same in TUNING */
     int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
     uint16_t stall_steps, lost_lock_steps;
+    uint16_t wrong_steps;      /**< voltages and currents do not fit the motor */
+    uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
+    q15_t kfi_impossible;      /**< change of 1/Kphi that asks for a flux which no magnet has */
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
 
@@ -130,7 +133,9 @@ typedef struct {
     handover_t handover;
     drive_control_t control;
     uint16_t stall_steps;     /**< how long the stall has lasted, slow steps */
-    uint16_t lost_lock_steps; /**< two for each slow step out of lock, less one for each in lock */
+    uint16_t phase_sums[3];    /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
+    uint16_t impossible_steps; /**< how long flux or resistance has been impossible */
+    uint16_t lost_lock_steps;  /**< two for each slow step out of lock, less one for each in lock */
     MODE_STATE
 } drive_run_t;
 

@@ -30,7 +30,17 @@
     X(12, TRAP, "the processor took a trap or an unexpected interrupt", \
       "read board_trap_intcon1, the copy of INTCON1 that says which trap it was") \
     X(13, WATCHDOG, "the watchdog reset the processor: the background or the control interrupt stood still", \
-      "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it")
+      "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it") \
+    X(14, CURRENT_SENSOR, "voltages and currents did not fit the turning motor for a tenth of a second: a current signal is wrong", \
+      "check AN0 and AN1, the shunts and their amplifiers; with the motor at rest both must read the middle; check MOTOR_LS_MH") \
+    X(15, BUS_SENSOR, "the voltage that the motor takes asks for a flux that no magnet has: the bus signal is wrong", \
+      "measure the bus and compare it with the drive's; check the divider, BUS_FULL_SCALE_V and MOTOR_KPHI_V_PER_KRPM") \
+    X(16, OPEN_PHASE, "voltages and currents did not fit the motor, and one phase carried much less current than the others", \
+      "check the motor's wires, the transistors of that phase and its current signal") \
+    X(18, INTERRUPT_RATE, "too few control interrupts in a tenth of a second", \
+      "look for what holds interrupts up; check the PWM and ADC set-up") \
+    X(19, OVERTEMPERATURE, "the winding's resistance rose to the end of what the drive believes: 180 degrees Celsius if the header's is right at 25", \
+      "let the motor cool down, lower the load; check MOTOR_RS_OHM and the wires' contacts")
 
 #define DRIVE_FAULT_ENUM(code, name, cause, remedy) FAULT_##name = (code),
 /** Fault codes. */

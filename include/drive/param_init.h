@@ -127,6 +127,9 @@
         .ramp_hold_erpm = (int16_t)PARAM_ROUND(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F), \
         .stall_steps = PARAM_SLOW_STEPS(0.3F), \
         .lost_lock_steps = PARAM_SLOW_STEPS(0.05F), \
+        .wrong_steps = PARAM_SLOW_STEPS(0.1F), \
+        .impossible_steps = PARAM_SLOW_STEPS(0.25F), \
+        .kfi_impossible = Q15(-0.25), \
         .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 1.25F, 32700.0F)) \
     }
 

@@ -27,6 +27,51 @@ QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t
     drive_raise(d, found);
 }
 
+#define PROTECTION_PHASE_SHIFT 6 /* 250 sums of a current above the trip level fit a word */
+#define PROTECTION_OPEN_SHIFT 2  /* a phase with less than a quarter of the largest current is open */
+
+/** Which signal is wrong: currents that do not fit the motor, with or without a phase that carries hardly any. */
+QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
+{
+    uint16_t most = 0, least = 0xFFFFu, n;
+    for (n = 0; n < 3u; n++) {
+        most = (run->phase_sums[n] > most) ? run->phase_sums[n] : most;
+        least = (run->phase_sums[n] < least) ? run->phase_sums[n] : least;
+    }
+    return (least < (most >> PROTECTION_OPEN_SHIFT)) ? FAULT_OPEN_PHASE : FAULT_CURRENT_SENSOR;
+}
+
+/** Innovations of the load observer that no load explains, for they do not end: the voltage equation does not hold with what is measured.
+ *  Every eighth period in closed loop. */
+QM_INLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    uint16_t a = (uint16_t)qm_abs(d->phases_q13.a), b = (uint16_t)qm_abs(d->phases_q13.b), c = (uint16_t)qm_abs(d->phases_q13.c);
+    if (run->observer.wrong_steps == 0u) {
+        run->phase_sums[0] = run->phase_sums[1] = run->phase_sums[2] = 0;
+        return;
+    }
+    run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));
+    run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + (b >> PROTECTION_PHASE_SHIFT));
+    run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + (c >> PROTECTION_PHASE_SHIFT));
+    if (run->observer.wrong_steps > p->wrong_steps) {
+        drive_raise(d, protection_wrong_signal(run));
+    }
+}
+
+/** What the motor has shown against the header must be possible: magnets do not gain a third of flux, and a winding that has gained 60 % of its
+ *  resistance is too hot. Every eighth period in closed loop. */
+QM_INLINE void protection_check_model(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    uint16_t strong = (uint16_t)(qm_hi(run->adaptation.kfi_q31) < p->kfi_impossible);
+    uint16_t hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->adaptation.rs_most);
+    run->impossible_steps = (uint16_t)((strong || hot) ? run->impossible_steps + 1u : 0u);
+    if (run->impossible_steps > p->impossible_steps) {
+        drive_raise(d, strong ? FAULT_BUS_SENSOR : FAULT_OVERTEMPERATURE);
+    }
+}
+
 /** Stall and lost lock: conditions that must not last. Every eighth period in closed loop. */
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {

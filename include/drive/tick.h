@@ -90,6 +90,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 4:
         if (drive_is_closed(d)) {
+            protection_check_signals(d, p);
             limits_current(run, p);
         }
         break;
@@ -103,6 +104,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 6:
         if (drive_is_closed(d)) {
+            protection_check_model(d, p);
             handover_decay(d);
             limits_braking(run, p, qm_hi(d->bus_q31));
         }

@@ -52,6 +52,7 @@
     X(ls_ratio, "fw.ls_ratio", "", "Ls/(2 Ls0) in use", (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0) \
     X(offset, "fw.offset_deg", "deg", "hand-over angle offset that is left", ANGLE_DEG(d->run.handover.offset)) \
     X(speed_obs, "fw.speed_obs_rpm", "rpm", "speed of the load observer", SPEED_RPM(observer_speed(&d->run.observer))) \
+    X(wrong_steps, "fw.wrong_steps", "", "slow steps", (double)d->run.observer.wrong_steps) \
     X(load, "fw.load_a", "A", "q current that holds the observed load", CURRENT_A(observer_load(&d->run.observer, &board_params.observer))) \
     X(kphi_change, "fw.kphi_change_percent", "%", "flux that the motor has shown against the header's Kphi: the magnets' temperature", \
       100.0 / (1.0 + (double)d->run.adaptation.kfi_q31 / 2147483648.0) - 100.0) \
