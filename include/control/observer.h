@@ -42,10 +42,10 @@ typedef struct {
     int32_t load_q16;      /**< acceleration that the load takes, units with 16 fraction bits */
     uint32_t rho_q32;      /**< the estimator's angle a step ago */
     int16_t rate_q16;      /**< rate * step in use */
-    int16_t calm_erpm;     /**< larger innovations are none of a calm motor */
+    int16_t wrong_erpm;    /**< larger innovations are none of a motor without load, whose dead time disturbs most */
     int16_t large_erpm;    /**< a large innovation begins here */
     q15_t quick_q15;       /**< 1 = a large innovation was just seen */
-    uint16_t wrong_steps;  /**< steps with an innovation above calm_erpm, less those without */
+    uint16_t wrong_steps;  /**< steps with an innovation above wrong_erpm, less those without */
     uint16_t unrest_steps; /**< four for each step that was not calm, less one for each that was */
     q15_t share_q15;       /**< of the full rates, by the speed */
 } observer_t;
@@ -123,8 +123,8 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
     o->share_q15 = observer_between(o->share_q15, (int16_t)(o->share_q15 < 16384 ? 2 * o->share_q15 : 32767), loaded);
     rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
     o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
-    o->calm_erpm = (int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5));
-    o->large_erpm = observer_large(o->calm_erpm, o->unrest_steps);
+    o->wrong_erpm = (int16_t)(p->large_erpm + (speed >> 5));
+    o->large_erpm = observer_large((int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5)), o->unrest_steps);
 }
 
 /** By how much the angle has turned further in a step than the speed says, as a speed.
@@ -158,7 +158,7 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
     innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
     o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
     o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
-    if (qm_abs(innovation) > o->calm_erpm) {
+    if (qm_abs(innovation) > o->wrong_erpm) {
         o->wrong_steps++;
     } else if (o->wrong_steps != 0u) {
         o->wrong_steps--;

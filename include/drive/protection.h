@@ -2,7 +2,7 @@
 #ifndef DRIVE_PROTECTION_H
 #define DRIVE_PROTECTION_H
 
-#include "drive/state.h"
+#include "drive/model.h"
 
 /** Over-current of any phase, every period with the bridge on. */
 QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
@@ -59,12 +59,13 @@ QM_INLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** What the motor has shown against the header must be possible: magnets do not gain a third of flux, and a winding that has gained 60 % of its
- *  resistance is too hot. Every eighth period in closed loop. */
+/** What the motor has shown against the header must be possible: magnets do not gain a third of flux, which counts where no resistance is mistaken
+ *  for it, and a winding that has gained 60 % of its resistance is too hot. Every eighth period in closed loop. */
 QM_INLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    uint16_t strong = (uint16_t)(qm_hi(run->adaptation.kfi_q31) < p->kfi_impossible);
+    uint16_t strong = (uint16_t)(qm_hi(run->adaptation.kfi_q31) < p->kfi_impossible
+                                 && qm_abs(model_ri(run, p)) < (qm_abs(estimator_emf(&run->estimator).q) >> 1));
     uint16_t hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->adaptation.rs_most);
     run->impossible_steps = (uint16_t)((strong || hot) ? run->impossible_steps + 1u : 0u);
     if (run->impossible_steps > p->impossible_steps) {
