@@ -44,6 +44,7 @@
 #define MAXIMUM_SPEED_RPM 5500      /* [rpm]           20 .. 32000    potentiometer at full scale, S3 on */
 #define SPEEDREFRAMP_RPM_PER_S 4000 /* [rpm/s]         1 .. 60000     slope of the speed reference */
 #define TUNING_DELAY_RAMPUP 0xF     /* [periods]       0 .. 4095      TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods */
+#define POT_LIVE_ZERO 0.0           /* [1]             0 .. 0.2       dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none */
 
 /* ---- Start: align, ramp, hand-over -------------------------------------------------------------------------------- */
 #define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each): 0.2 s */
@@ -161,6 +162,8 @@
  *
  * speeds
  *   minimum_erpm                          150 rpm               750  erpm                           exact  potentiometer at zero
+ *   pot_zero_q16                            0 1                   0  Q16                            exact  dead end of its travel
+ *   pot_scale_q15                           1 1               32768  Q15                            exact  what is left of it is all
  *   nominal_erpm                         2800 rpm             14000  erpm                           exact  potentiometer at full scale, S3 off
  *   maximum_erpm                         5500 rpm             27500  erpm                           exact  potentiometer at full scale, S3 on
  *   end_erpm                             1000 rpm              5000  erpm                           exact  end of the ramp
@@ -194,9 +197,9 @@
  *   observer.loaded_q16                  32.1 Hz               5287  Q16 a step                  -0.004 %  rate under load
  *   observer.quick_q16                    107 Hz              17623  Q16 a step                  -0.005 %  rate after a large innovation
  *   observer.full_erpm                 475.56 rpm              2377  erpm                        -0.033 %  speed reference from which rates and gain are these
- *   observer.load_from                    0.1 A                 103  units                      -38.075 %  load that begins to count
- *   observer.load_width                   0.1 A                 103  units                      -38.075 %  over what more it counts
- *   observer.load_slope_q15                10 1/A               315  Q15 a unit                 +59.898 %  one over it
+ *   observer.load_from                 0.0625 A                 103  units                       -0.920 %  load that begins to count
+ *   observer.load_width                0.0625 A                 103  units                       -0.920 %  over what more it counts
+ *   observer.load_slope_q15                16 1/A               315  Q15 a unit                  -0.064 %  one over it
  *   observer.large_erpm                29.856 rpm               149  erpm                        -0.189 %  large innovation without load
  *   observer.large_loaded_erpm         6.8899 rpm                34  erpm                        -1.305 %  and under load
  *   adaptation.rate_q16                     6 1/s               157  Q16 a step                  -0.182 %  flux and R follow
@@ -230,6 +233,9 @@
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
  *   stall_steps                           0.3 s                 750  8 periods                      exact  stall
  *   lost_lock_steps                      0.05 s                 125  8 periods                      exact  lost lock
+ *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
+ *   impossible_steps                     0.25 s                 625  8 periods                      exact  flux or resistance impossible
+ *   kfi_impossible                      -0.25 1               -8192  Q15                            exact  change of 1/Kphi that no magnet gives
  *
  * modulator and bus
  *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %

@@ -70,6 +70,8 @@ static void speeds(void)
 {
     GROUP("speeds");
     FIELD(minimum_erpm, MINIMUM_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at zero");
+    FIELD(pot_zero_q16, POT_LIVE_ZERO, "1", 1.0 / 65536.0, "Q16", "dead end of its travel");
+    FIELD(pot_scale_q15, 1.0 / (1.0 - 2.0 * POT_LIVE_ZERO), "1", 1.0 / 32768.0, "Q15", "what is left of it is all");
     FIELD(nominal_erpm, NOMINAL_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at full scale, S3 off");
     FIELD(maximum_erpm, MAXIMUM_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at full scale, S3 on");
     FIELD(end_erpm, END_SPEED_RPM, "rpm", erpm, "erpm", "end of the ramp");

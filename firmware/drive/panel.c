@@ -6,6 +6,7 @@
 #define BLINK_MS 250u
 #define PAUSE_MS 1500u
 #define POT_STEP_Q15 32 /* half a step of the converter */
+#define POT_BROKEN_MS 100u
 
 void panel_init(panel_t *panel)
 {
@@ -16,6 +17,7 @@ void panel_init(panel_t *panel)
     panel->pot_q15 = INT16_MIN;
     panel->pot_q31 = INT32_MIN;
     panel->pot_used_q15 = INT16_MIN;
+    panel->pot_broken_ms = 0;
     panel->blink_ms = 0;
 }
 
@@ -36,12 +38,38 @@ static int16_t between(int16_t low, int16_t high, uint16_t fraction_q16)
     return (int16_t)(low + (int16_t)qm_mulhi_uu((uint16_t)(high - low), fraction_q16));
 }
 
+/** Share of the travel between its dead ends, Q16. */
+static uint16_t panel_travel(const drive_params_t *p, uint16_t pot_q16)
+{
+    uint16_t most_q16 = (uint16_t)(65535u - 2u * p->pot_zero_q16), above = 0;
+    if (pot_q16 > p->pot_zero_q16) {
+        above = (uint16_t)(pot_q16 - p->pot_zero_q16);
+    }
+    return (uint16_t)(qm_muluu((above > most_q16) ? most_q16 : above, p->pot_scale_q15) >> 15);
+}
+
+/** A wire of the potentiometer is broken: its signal stays in the outer half of a dead end. */
+static void panel_check_pot(panel_t *panel, drive_t *d, const drive_params_t *p, uint16_t elapsed_ms)
+{
+    uint16_t pot_q16 = (uint16_t)((uint16_t)panel->pot_q15 ^ 0x8000u), half = (uint16_t)(p->pot_zero_q16 >> 1);
+    uint16_t top_q16 = (uint16_t)(65535u - half);
+    if (half == 0u || (pot_q16 >= half && pot_q16 <= top_q16)) {
+        panel->pot_broken_ms = 0;
+        return;
+    }
+    panel->pot_broken_ms = (uint16_t)(panel->pot_broken_ms + elapsed_ms);
+    if (panel->pot_broken_ms >= POT_BROKEN_MS) {
+        panel->pot_broken_ms = POT_BROKEN_MS;
+        drive_raise(d, FAULT_POTENTIOMETER);
+    }
+}
+
 int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction)
 {
     /* the middle of the converter's step, so that the upper end is reached to half a step */
     uint16_t pot_q16 = (uint16_t)(((uint16_t)pot_q15 ^ 0x8000u) | 0x20u);
     int16_t towards = direction;
-    uint16_t travel_q16 = mode_pot_split(pot_q16, &towards);
+    uint16_t travel_q16 = mode_pot_split(panel_travel(p, pot_q16), &towards);
     mode_range_t range = mode_target_range(p, fast_range);
     return (int16_t)(towards * between(range.low, range.high, travel_q16));
 }
@@ -101,6 +129,7 @@ static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t el
 panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in)
 {
     int16_t target;
+    panel_check_pot(panel, d, p, in->elapsed_ms);
     panel_buttons(panel, d, in);
     target = panel_target(p, panel_pot(panel), panel->fast_range, d->direction);
     d->command.target_erpm = target;

@@ -17,8 +17,8 @@
 #define OBSERVER_UNREST_STEPS 1000 /**< a load step is over in a tenth of a second; what goes on longer is the loop's own */
 #define OBSERVER_UNREST_SHIFT 8    /**< after 256 / 4 steps that were not calm, a large innovation is twice as large */
 #define OBSERVER_START_UNREST 768  /**< at the hand-over it is four times as large: d current and wrong constants shake the estimate */
-#define OBSERVER_HALF_Q15 12288       /**< so quick up to one and a half of what is large: dead time may be behind it */
-#define OBSERVER_CALM_SHIFT 6         /**< after a large innovation the quick rate fades by 1/64 a step */
+#define OBSERVER_HALF_Q15 12288    /**< so quick up to one and a half of what is large: dead time may be behind it */
+#define OBSERVER_CALM_SHIFT 6      /**< after a large innovation the quick rate fades by 1/64 a step */
 
 /** Constants. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a
  *  count of current gives 1/2 to 1 of it. */

@@ -67,6 +67,8 @@ typedef struct {
     int16_t bus_nominal_q15;             /**< start value of the bus filter */
 
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
+    uint16_t pot_zero_q16;   /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
+    uint16_t pot_scale_q15;  /**< 1 / (1 - 2 POT_LIVE_ZERO) */
     int32_t speed_ramp_q16;  /**< reference step per slow step, electrical rpm with 16 fraction bits */
     int32_t tuning_step_q16; /**< the same in TUNING */
     int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
@@ -132,7 +134,7 @@ typedef struct {
     observer_t observer;
     handover_t handover;
     drive_control_t control;
-    uint16_t stall_steps;     /**< how long the stall has lasted, slow steps */
+    uint16_t stall_steps;      /**< how long the stall has lasted, slow steps */
     uint16_t phase_sums[3];    /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
     uint16_t impossible_steps; /**< how long flux or resistance has been impossible */
     uint16_t lost_lock_steps;  /**< two for each slow step out of lock, less one for each in lock */

@@ -37,6 +37,8 @@
       "measure the bus and compare it with the drive's; check the divider, BUS_FULL_SCALE_V and MOTOR_KPHI_V_PER_KRPM") \
     X(16, OPEN_PHASE, "voltages and currents did not fit the motor, and one phase carried much less current than the others", \
       "check the motor's wires, the transistors of that phase and its current signal") \
+    X(17, POTENTIOMETER, "the potentiometer's signal was in the dead ends of POT_LIVE_ZERO, where no position of it is", \
+      "check its three wires") \
     X(18, INTERRUPT_RATE, "too few control interrupts in a tenth of a second", \
       "look for what holds interrupts up; check the PWM and ADC set-up") \
     X(19, OVERTEMPERATURE, "the winding's resistance rose to the end of what the drive believes: 180 degrees Celsius if the header's is right at 25", \

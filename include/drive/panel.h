@@ -31,6 +31,7 @@ typedef struct {
     volatile int16_t pot_q15; /**< last sample of the potentiometer, signed fractional; the control interrupt writes it */
     int32_t pot_q31;          /**< filtered potentiometer */
     int16_t pot_used_q15;     /**< the value in use: follows the filtered one with half a converter step of hysteresis */
+    uint16_t pot_broken_ms;   /**< how long its signal has been where no position is */
     uint16_t blink_ms;
 } panel_t;
 

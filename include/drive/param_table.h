@@ -33,7 +33,8 @@
     X(NOMINAL_SPEED_RPM, "rpm", 20, 30000, FROM_TUNER, "potentiometer at full scale, S3 off; the estimator's derivative changes here") \
     X(MAXIMUM_SPEED_RPM, "rpm", 20, 32000, FROM_MOTOR, "potentiometer at full scale, S3 on") \
     X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000, FROM_TUNER, "slope of the speed reference") \
-    X(TUNING_DELAY_RAMPUP, "periods", 0, 4095, 0xF, "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods")
+    X(TUNING_DELAY_RAMPUP, "periods", 0, 4095, 0xF, "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods") \
+    X(POT_LIVE_ZERO, "1", 0, 0.2, 0.0, "dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none")
 
 #define PARAM_START(X) /* Start: align, ramp, hand-over */ \
     X(LOCK_TIME, "periods", 200, 32000, FROM_TUNER, "rotor held at a fixed angle (two directions, half the time each)") \

@@ -310,7 +310,7 @@ void test_outputs_are_held_off_for_ever_while_the_interrupt_stays_away(void)
     for (n = 0; n < 70000u; n++) {
         firmware_background();
     }
-    TEST_ASSERT_EQUAL_UINT32(70000u, times_off);
+    TEST_ASSERT_EQUAL_UINT32(70000u + 700u, times_off); /* and every tenth of a second, for too few interrupts */
 }
 
 void test_one_silent_millisecond_is_forgiven_and_passes_without_one_do_not_count(void)

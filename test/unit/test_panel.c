@@ -284,3 +284,58 @@ void test_fault_LED_blinks_the_code_and_then_pauses(void)
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(1, code, watch_led(cycle_ms).flashes, "the next cycle");
     }
 }
+
+/* ---- dead ends of the travel ---- */
+
+static drive_params_t dead_ends(void)
+{
+    drive_params_t with = params;
+    with.pot_zero_q16 = 6554;  /* POT_LIVE_ZERO 0.1 */
+    with.pot_scale_q15 = 40960; /* 1 / 0.8 */
+    return with;
+}
+
+void test_travel_between_its_dead_ends_is_the_whole_range(void)
+{
+    static const struct {
+        float share;
+        int16_t target_erpm;
+    } cases[] = { { 0.0F, 2500 }, { 0.1F, 2500 }, { 0.3F, 2500 + 11500 / 4 }, { 0.5F, 2500 + 11500 / 2 }, { 0.9F, 14000 }, { 1.0F, 14000 } };
+    drive_params_t with = dead_ends();
+    EACH(n, cases) {
+        int16_t pot_q15 = (int16_t)((cases[n].share - 0.5F) * 65535.0F);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(15, cases[n].target_erpm, panel_target(&with, pot_q15, 0, 1), golden_row(n));
+    }
+}
+
+void test_signal_in_the_outer_half_of_a_dead_end_is_a_broken_wire_after_100_ms(void)
+{
+    static const struct {
+        float share;
+        uint16_t ms; /* until the fault, 0: never */
+    } cases[] = { { 0.0F, 100 }, { 0.049F, 100 }, { 0.051F, 0 }, { 0.5F, 0 }, { 0.949F, 0 }, { 0.951F, 100 }, { 1.0F, 100 } };
+    static const panel_inputs_t nothing = { 0, 0, 1 };
+    drive_params_t with = dead_ends();
+    EACH(n, cases) {
+        uint16_t ms;
+        panel_reset();
+        rig_ready();
+        the_panel.pot_q15 = (int16_t)((cases[n].share - 0.5F) * 65535.0F);
+        for (ms = 1; ms < 1000u; ms++) {
+            (void)panel_tick(&the_panel, &drive, &with, &nothing);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].ms != 0u && ms >= cases[n].ms) ? FAULT_POTENTIOMETER : FAULT_NONE, drive.fault, golden_row(n));
+        }
+        drive.fault = (uint16_t)FAULT_NONE;
+    }
+}
+
+void test_without_dead_ends_no_position_is_a_fault(void)
+{
+    static const panel_inputs_t nothing = { 0, 0, 500 };
+    TEST_ASSERT_EQUAL_UINT16(0, params.pot_zero_q16); /* the MCLV's potentiometer reaches both rails */
+    the_panel.pot_q15 = INT16_MIN;
+    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    the_panel.pot_q15 = INT16_MAX;
+    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}

@@ -212,3 +212,105 @@ void test_estimator_that_slips_past_the_rotor_has_lost_it_though_each_loss_is_sh
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
     }
 }
+
+/* ---- signals that do not fit the motor ---- */
+
+/** Slow steps with these phase currents and innovations that do not end, until a fault. @return steps */
+static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13)
+{
+    uint16_t steps = 0;
+    rig_closed(1, 10000);
+    while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
+        drive.phases_q13.a = a_q13;
+        drive.phases_q13.b = b_q13;
+        drive.phases_q13.c = (int16_t)(-a_q13 - b_q13);
+        drive.run.observer.wrong_steps++;
+        protection_check_signals(&drive, &params);
+        steps++;
+    }
+    return steps;
+}
+
+void test_innovations_that_do_not_end_are_a_sensor_or_an_open_phase_after_100_ms(void)
+{
+    static const struct {
+        int16_t a_q13, b_q13;
+        drive_fault_t fault;
+    } cases[] = {
+        { 1000, -500, FAULT_CURRENT_SENSOR }, { -1000, 500, FAULT_CURRENT_SENSOR }, { 1000, -700, FAULT_CURRENT_SENSOR },
+        { 10, 1000, FAULT_OPEN_PHASE }, { 1000, -10, FAULT_OPEN_PHASE }, { -1000, 990, FAULT_OPEN_PHASE }, { 7000, 70, FAULT_OPEN_PHASE },
+        { 7000, -7000, FAULT_OPEN_PHASE }, { 0, 0, FAULT_CURRENT_SENSOR },
+    };
+    EACH(n, cases) {
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(251, wrong_until_fault(cases[n].a_q13, cases[n].b_q13), golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16(cases[n].fault, drive.fault);
+        drive.fault = (uint16_t)FAULT_NONE;
+    }
+}
+
+void test_phase_currents_are_summed_anew_when_the_innovations_have_ended(void)
+{
+    rig_closed(1, 10000);
+    drive.run.phase_sums[1] = 77;
+    protection_check_signals(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.phase_sums[1]);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
+/* ---- what a motor cannot have ---- */
+
+/** Steps until a fault with these changes of 1/Kphi and R, and q current. */
+static uint16_t impossible_until_fault(float kfi, float rs, int16_t iq_q13, uint16_t most)
+{
+    uint16_t steps = 0;
+    rig_closed(1, 10000);
+    drive.run.adaptation.kfi_q31 = (int32_t)(kfi * 2147483647.0);
+    drive.run.adaptation.rs_q31 = (int32_t)(rs * 2147483647.0);
+    drive.run.estimator.e_q_q28 = 4000L * 65536;
+    drive.run.control.i_q13.q = iq_q13;
+    while (drive.fault == (uint16_t)FAULT_NONE && steps < most) {
+        protection_check_model(&drive, &params);
+        steps++;
+    }
+    return steps;
+}
+
+void test_flux_that_no_magnet_has_and_a_winding_too_hot_are_faults_after_a_quarter_of_a_second(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(1000, impossible_until_fault(-0.249F, 0.0F, 100, 1000)); /* a third more flux */
+    TEST_ASSERT_EQUAL_UINT16(626, impossible_until_fault(-0.251F, 0.0F, 100, 1000));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_BUS_SENSOR, drive.fault);
+    drive.fault = (uint16_t)FAULT_NONE;
+    TEST_ASSERT_EQUAL_UINT16(1000, impossible_until_fault(0.0F, 0.599F, 100, 1000));
+    TEST_ASSERT_EQUAL_UINT16(626, impossible_until_fault(0.0F, 0.6F, 100, 1000));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERTEMPERATURE, drive.fault);
+    drive.fault = (uint16_t)FAULT_NONE;
+    TEST_ASSERT_EQUAL_UINT16(1000, impossible_until_fault(-0.251F, 0.0F, 5000, 1000)); /* R may be mistaken for flux there */
+    TEST_ASSERT_EQUAL_UINT16(600, impossible_until_fault(-0.251F, 0.0F, 100, 600));
+    drive.run.adaptation.kfi_q31 = 0;
+    protection_check_model(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.impossible_steps); /* without a gap */
+}
+
+void test_signals_and_model_are_checked_in_slow_steps_of_closed_loop_only(void)
+{
+    uint16_t slot;
+    for (slot = 0; slot < 8u; slot++) {
+        rig_closed(1, 10000);
+        drive.run.observer.wrong_steps = 1000;
+        drive.run.impossible_steps = 1000;
+        drive.run.adaptation.rs_q31 = INT32_MAX;
+        drive.ticks = slot;
+        drive_slow(&drive, &params, rig_raw_bus(24.0F));
+        TEST_ASSERT_EQUAL_UINT16((slot == 4u) ? FAULT_CURRENT_SENSOR : (slot == 6u) ? FAULT_OVERTEMPERATURE : FAULT_NONE, drive.fault);
+        drive.fault = (uint16_t)FAULT_NONE;
+    }
+    rig_lock(1);
+    drive.run.observer.wrong_steps = 1000;
+    drive.run.impossible_steps = 1000;
+    for (slot = 0; slot < 8u; slot++) {
+        drive.ticks = slot;
+        drive_slow(&drive, &params, rig_raw_bus(24.0F));
+    }
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault); /* no estimate is used yet */
+}

@@ -110,6 +110,7 @@ void test_steps_hand_on_what_is_below_a_count_and_never_pass_the_limit(void)
 static int16_t trim_after(uint16_t steps, int16_t estimated_erpm)
 {
     drive.run.control.speed_kp_q13 = 8192; /* a count an erpm */
+    drive.run.control.vq_limit_q14 = 30000;
     while (steps-- != 0u) {
         drive.run.estimator.omega_filtered_q16 = estimated_erpm * 65536L;
         speed_trim(&drive.run, &params, drive.run.control.reference_erpm, 0);
@@ -143,9 +144,11 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
         const char *what;
         int16_t before_erpm, estimated_erpm, iq_q13;
         q15_t quick;
+        int16_t v_q_q14;
     } cases[] = {
-        { "reference moves", 9992, 9990, 0, 0 },         { "far behind", 10000, 8749, 0, 0 }, { "far ahead", 10000, 11251, 0, 0 },
-        { "after a large innovation", 10000, 9990, 0, 32767 }, { "at the current limit", 10000, 9990, 5120, 0 }, { "while braking at it", 10000, 9990, -5120, 0 },
+        { "at the voltage limit", 10000, 9990, 0, 0, 20000 },
+        { "reference moves", 9992, 9990, 0, 0, 0 },         { "far behind", 10000, 8749, 0, 0, 0 }, { "far ahead", 10000, 11251, 0, 0, 0 },
+        { "after a large innovation", 10000, 9990, 0, 32767, 0 }, { "at the current limit", 10000, 9990, 5120, 0, 0 }, { "while braking at it", 10000, 9990, -5120, 0, 0 },
     };
     EACH(n, cases) {
         rig_closed(1, 10000);
@@ -153,6 +156,8 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
         drive.run.control.iq_limit_q13 = 5120;
         drive.run.control.iq_trim_q26 = 256L * 8192;
         drive.run.observer.quick_q15 = cases[n].quick;
+        drive.run.control.vq_limit_q14 = 20000;
+        drive.run.control.v_q14.q = cases[n].v_q_q14;
         speed_trim(&drive.run, &params, cases[n].before_erpm, cases[n].iq_q13);
         TEST_ASSERT_EQUAL_INT32_MESSAGE(255L * 8192, drive.run.control.iq_trim_q26, cases[n].what);
     }

@@ -73,7 +73,7 @@ static double input_voltage(void *context, unsigned input)
     case 3:
     case 4:
     case 5: return vb->plant.inverter.v[input - 3] / vb->analogue.vbus_ratio;
-    case 8: return sensed(vb, &vb->analogue.pot, vb->controls.pot, REFERENCE_V, 0.0);
+    case 8: return sensed(vb, &vb->analogue.pot, vb->controls.pot_zero + vb->controls.pot * (1.0 - 2.0 * vb->controls.pot_zero), REFERENCE_V, 0.0);
     default: return 0.0;
     }
 }

@@ -203,6 +203,7 @@ static const key_entry_t table[] = {
     I("input.s2", controls.s2, 0.0, 0.0, 1.0, "", "button S2, 1 = pressed"),
     I("input.s3", controls.s3, 0.0, 0.0, 1.0, "", "button S3, 1 = pressed"),
     P("input.pot", controls.pot, 0.0, 0.0, 1.0, "", "potentiometer, 0 left to 1 right"),
+    P("input.pot_live_zero", controls.pot_zero, 0.0, 0.0, 0.4, "", "share of its range that the potentiometer's signal keeps from each rail; a scenario takes the header's POT_LIVE_ZERO"),
     I("input.flta", controls.flta, 0.0, 0.0, 1.0, "", "1 = an external circuit holds FLTA1 active"),
     /* CPU */
     P("cpu.isr_us", chip.adc.hold_us, VB_ISR_US, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act; on a target image what exceeds 13 holds the interrupt up"),

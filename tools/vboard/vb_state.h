@@ -10,7 +10,7 @@ enum { VB_UART_TX = 4096, VB_UART_RX = 256, VB_WARNINGS = 48, VB_TEXT = 200 };
 
 /* Buttons, potentiometer, and who pulls the fault pin (vb_circuit.c). */
 typedef struct {
-    double s2, s3, pot, flta;
+    double s2, s3, pot, pot_zero, flta;
     bool comparator; /* the over-current comparator */
     double trips;
 } vb_controls_t;
