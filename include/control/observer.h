@@ -153,6 +153,7 @@ QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovat
 QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
 {
     int16_t innovation;
+    q15_t level = 0;
     int32_t before_q16 = o->omega_q16;
 
     o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
@@ -173,10 +174,12 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
     } else {
         /* calm for long */
     }
-    o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
     if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
-        q15_t level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
-        o->quick_q15 = (int16_t)((o->quick_q15 > level) ? o->quick_q15 : level);
+        level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
+    }
+    o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
+    if (o->quick_q15 < level) {
+        o->quick_q15 = level;
     }
 }
 
