@@ -27,6 +27,7 @@ RESULTS = paths.ROOT / "build" / "campaign"
 KEYS = ("case", "kind", "size", "place", "scene", "state", "phase", "motor", "load", "over_s", "lasts_s", "at_s", "class", "code", "after_s",
         "speed_error_percent", "current_peak_a", "why")
 CASES, PART_FILE, IDENTITY = "cases.csv", "cases.csv", "identity.json"
+BAD = (judge.SILENT, judge.VOID)
 WORST = 24
 """Cases whose curves the page has."""
 MOST_CASES = 1_000_000
@@ -71,10 +72,10 @@ def command(options: argparse.Namespace) -> int:
     part.remove()
     print(text(rows))
     print(f"results in {paths.shown(target)}/: index.html")
-    silent = [row for row in rows if row["class"] == judge.SILENT]
-    for row in silent[:WORST]:
-        print(f"wrong and silent: {line(row)}")
-    return 1 if silent else 0
+    bad = [row for row in rows if row["class"] in BAD]
+    for row in bad[:WORST]:
+        print(f"{row['class']}: {line(row)}")
+    return 1 if bad else 0
 
 
 def numbers_of(options: argparse.Namespace) -> list[int]:
@@ -157,7 +158,7 @@ def _alone(case: injection.Case, bench: Bench, target: Path) -> int:
     print(data["text"])
     print(f"\n{data['row']['class']}: {line(data['row'])}")
     print(f"results in {paths.shown(target)}/: index.html, without/index.html")
-    return 1 if data["row"]["class"] == judge.SILENT else 0
+    return 1 if data["row"]["class"] in BAD else 0
 
 
 def _report(case: injection.Case, bench: Bench, folder: Path) -> dict[str, Any]:
@@ -184,7 +185,7 @@ def _picture(cases: list[injection.Case], row: dict[str, Any], benches: dict[str
 
 def worst(rows: list[dict[str, Any]], most: int = WORST) -> list[dict[str, Any]]:
     """The silent ones, one of each kind first; then the slowest stops."""
-    silent = [row for row in rows if row["class"] == judge.SILENT]
+    silent = [row for row in rows if row["class"] in BAD]
     seen: Counter[str] = Counter()
     ranked = []
     for row in silent:
@@ -229,16 +230,16 @@ def write(folder: Path, rows: list[dict[str, Any]], seed: int, draw: Callable[[d
     """The table, the summary and the page."""
     output.write_csv(folder / CASES, list(KEYS), [[row[key] for key in KEYS] for row in rows])
     counts = Counter(row["class"] for row in rows)
-    output.write_summary(folder, report.clean({"title": f"{len(rows)} injected faults, seed {seed}", "passed": not counts[judge.SILENT],
+    output.write_summary(folder, report.clean({"title": f"{len(rows)} injected faults, seed {seed}", "passed": not any(counts[name] for name in BAD),
                                                "classes": {name: counts[name] for name in judge.CLASSES}, "by_kind": [dict(zip(HEAD, cells)) for cells in shares(rows)]}))
     shown = worst(rows)
     pictures = [draw(row) for row in shown]
     by_kind = page.Table("How they ended", list(HEAD), [page.Row(cells, cells[2 + judge.CLASSES.index(judge.SILENT)] != "0") for cells in shares(rows)])
     by_scene = page.Table("By what the drive was doing", ["scene", *HEAD[1:]], [
         page.Row(_share(scene, [row for row in rows if row["scene"] == scene])) for scene in injection.SCENES if any(row["scene"] == scene for row in rows)])
-    cells = [page.Row([str(row[key] if row[key] is not None else "-") for key in KEYS], row["class"] == judge.SILENT, number if pictures[number] else None)
+    cells = [page.Row([str(row[key] if row[key] is not None else "-") for key in KEYS], row["class"] in BAD, number if pictures[number] else None)
              for number, row in enumerate(shown)]
-    page.write(folder, page.Page(f"campaign: {len(rows)} injected faults, seed {seed}", not counts[judge.SILENT],
-                                 "; ".join(f"{counts[name]} {name}" for name in judge.CLASSES),
+    page.write(folder, page.Page(f"campaign: {len(rows)} injected faults, seed {seed}", not any(counts[name] for name in BAD),
+                                 "; ".join(f"{counts[name]} {name}" for name in (*judge.CLASSES, *([judge.VOID] if counts[judge.VOID] else []))),
                                  ["make campaign CASE=number runs one of them again, with its whole report."],
                                  [by_kind, page.Table("The worst", list(KEYS), cells)], pictures, [by_scene], [], [CASES, output.SUMMARY]))

@@ -4,13 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tools.common import drive_tables
 from tools.common.trace import Trace
 
 NO_EFFECT, RIDDEN, RIGHT, ANOTHER, SILENT = "no effect", "ridden through", "stopped, right code", "stopped, another code", "wrong and silent"
 CLASSES = (NO_EFFECT, RIDDEN, RIGHT, ANOTHER, SILENT)
+VOID = "no comparison"
+"""The run without the fault does not do what the scene asks for."""
 SETTLE_S, JUDGE_S = 1.0, 0.5
 """A ride-through has this time to be back within limits, and must then stay there for that time."""
-BAND_OF_SPEED, BAND_OF_RATED = 0.02, 0.015
+BAND_OF_SPEED, BAND_OF_RATED = 0.03, 0.02
 """How far the speed may be off that of the run without the fault."""
 CURRENT_MARGIN = 1.1
 """Of the most that the header allows, or of what the run without the fault takes."""
@@ -18,6 +21,8 @@ MEAN_S, CURRENT_S = 0.01, 0.005
 """The speed is judged as a mean over the first; more current than allowed counts when it lasts for the second."""
 BACKWARDS = 0.05
 """Of the rated speed: what a motor may turn against its direction."""
+HOLDS_BACK = ("VOLTAGE", "CURRENT", "BRAKE", "RAMP_WAITS")
+"""Reasons for a speed that is not the reference."""
 SAME_SPEED, SAME_CURRENT = 0.003, 0.05
 """Of rated speed and most current: smaller differences are no effect."""
 
@@ -58,6 +63,8 @@ def judge(with_fault: Trace, without: Trace, limits: Limits) -> Verdict:
     after, reference = _first(after, rows), _first(reference, rows)
     error_percent = _speed_error_percent(after, reference, limits)
     peak_a = float(np.max(_amplitude(after), initial=0.0))
+    if own := _first_code(without, limits)[0]:
+        return Verdict(VOID, own, None, f"without the fault it ends in {own}", error_percent, peak_a)
     code, after_s = _first_code(with_fault, limits)
     if code:
         why = _still_on(after, reference)
@@ -106,7 +113,7 @@ def _wrong(after: Trace, reference: Trace, limits: Limits) -> str:
     judged = after.time_s >= limits.settled_s
     off_rpm = np.abs(speed - expected)[judged]
     band_rpm = np.maximum(BAND_OF_SPEED * np.abs(expected), BAND_OF_RATED * limits.rated_rpm)[judged]
-    if last_expected and np.any(off_rpm > band_rpm) and not (limits.limited_is_right and _limited(after, judged)):
+    if last_expected and np.any(off_rpm > band_rpm) and not (limits.limited_is_right and limited(after, judged) > 0.5):
         return f"speed off by up to {np.max(off_rpm):.0f} rpm"
     return ""
 
@@ -126,9 +133,12 @@ def _too_much_current(after: Trace, reference: Trace, limits: Limits) -> bool:
     return len(over) >= rows and bool(np.max(np.convolve(over, np.ones(rows), "valid")) >= rows)
 
 
-def _limited(after: Trace, rows: np.ndarray) -> bool:
-    """Whether the drive names a limit for most of the time."""
-    return "fw.limits" in after and bool(np.mean(after.column("fw.limits")[rows] != 0.0) > 0.5)
+def limited(trace: Trace, rows: np.ndarray) -> float:
+    """The share of the rows in which the drive names a limit that holds the speed back."""
+    if "fw.limits" not in trace or not np.any(rows):
+        return 0.0
+    mask = sum(row.code for row in drive_tables.limits() if row.name in HOLDS_BACK)
+    return float(np.mean((trace.column("fw.limits")[rows].astype(np.int32) & mask) != 0))
 
 
 def _on_at_end(trace: Trace) -> bool:
