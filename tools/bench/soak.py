@@ -6,6 +6,7 @@ The hours are cut into segments, each drawn by its number. An interrupted soak g
 import argparse
 import math
 import random
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,6 +43,8 @@ SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 SAGS, WARM_R, WARM_PSI = (0.87, 1.0), (0.85, 1.4), (0.85, 1.05)
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
 BIDIRECTIONAL = "BIDIRECTIONAL_SPEED"
+MODES = ("", "", BIDIRECTIONAL)
+"""One of these in a segment."""
 MOST_HOURS = 10000.0
 WHERE = "soak"
 OK = "ok"
@@ -77,7 +80,7 @@ def prepared(names: list[str]) -> dict[tuple[str, str], Bench]:
     for name in names:
         motor = motor_file.load(name, "--motor")
         header = command_common.tuned_header(motor.path, None)
-        for mode in ("", BIDIRECTIONAL):
+        for mode in sorted(set(MODES)):
             library = command_common.library_for([mode] if mode else [], None, header)
             result[motor.name, mode] = Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), library, [])
     return result
@@ -117,7 +120,6 @@ def command(options: argparse.Namespace) -> int:
 
 
 def _identity(seed: int, benches: dict[tuple[str, str], Bench]) -> dict[str, Any]:
-    import zlib
     files = [paths.ROOT / "tools" / "bench" / "soak.py", *(benches[key].library.path for key in sorted(benches))]
     return {"seed": seed, "motors": [list(key) for key in sorted(benches)], "files": [zlib.crc32(path.read_bytes()) for path in files]}
 
@@ -125,7 +127,7 @@ def _identity(seed: int, benches: dict[tuple[str, str], Bench]) -> dict[str, Any
 def draw(seed: int, number: int, benches: dict[tuple[str, str], Bench]) -> Segment:
     """The segment with this number: always the same."""
     r = random.Random(f"soak/{seed}/{number}")
-    name, mode = r.choice(sorted({name for name, _ in benches})), r.choice(("", "", BIDIRECTIONAL))
+    name, mode = r.choice(sorted({name for name, _ in benches})), r.choice(MODES)
     return _Drawing(r, number, name, mode, benches[name, mode]).segment()
 
 
@@ -254,11 +256,12 @@ class _Drawing:
 
 
 def _one(segment: Segment, benches: dict[tuple[str, str], Bench], part: Part, tell: Callable[[float], None]) -> None:
-    run = _run(segment, benches, lambda seconds: tell(seconds / 3600.0))
-    part.add(row_of(segment, run, motor_file.load(str(benches[segment.motor, segment.mode].motor.path)).rated_speed_rpm))
+    found = run(segment, benches, lambda seconds: tell(seconds / 3600.0))
+    part.add(row_of(segment, found, motor_file.load(str(benches[segment.motor, segment.mode].motor.path)).rated_speed_rpm))
 
 
-def _run(segment: Segment, benches: dict[tuple[str, str], Bench], tell: Callable[[float], None]) -> Run:
+def run(segment: Segment, benches: dict[tuple[str, str], Bench], tell: Callable[[float], None]) -> Run:
+    """The segment in this process, which can run no other board afterwards."""
     bench = benches[segment.motor, segment.mode]
     job = simulate.prepare(segment.scenario, bench.library, bench.motor, bench.board)
     with simulate.using(Board(bench.library), job) as board:
@@ -267,14 +270,14 @@ def _run(segment: Segment, benches: dict[tuple[str, str], Bench], tell: Callable
         return session.run()
 
 
-def row_of(segment: Segment, run: Run, rated_rpm: float) -> dict[str, Any]:
+def row_of(segment: Segment, found: Run, rated_rpm: float) -> dict[str, Any]:
     """The segment's line: what was worst, and the first thing that is wrong."""
-    trace = run.trace
+    trace = found.trace
     errors = [error for rest in segment.rests if (error := _speed_error(trace, rest, rated_rpm)) is not None]
-    angle_deg = _angle_error_deg(run)
-    return {"segment": segment.number, "motor": segment.motor, "mode": segment.mode, "motor_s": round(run.motor_s, 2), "starts": segment.starts,
+    angle_deg = _angle_error_deg(found)
+    return {"segment": segment.number, "motor": segment.motor, "mode": segment.mode, "motor_s": round(found.motor_s, 2), "starts": segment.starts,
             "stretches": len(errors), "worst_speed_error_percent": round(max((abs(error) for _, error, _ in errors), default=0.0), 3),
-            "worst_angle_error_deg": round(angle_deg, 1), "verdict": verdict(run, errors, angle_deg)}
+            "worst_angle_error_deg": round(angle_deg, 1), "verdict": verdict(found, errors, angle_deg)}
 
 
 def verdict(run: Run, errors: list[tuple[float, float, float]], angle_deg: float) -> str:
@@ -324,11 +327,11 @@ def _alone(segment: Segment, benches: dict[tuple[str, str], Bench], target: Path
 
 def _report(segment: Segment, benches: dict[tuple[str, str], Bench], folder: Path) -> tuple[dict[str, Any], str]:
     bench = benches[segment.motor, segment.mode]
-    run = _run(segment, benches, lambda seconds: None)
-    data = report.summary(run, [], str(bench.motor.path), str(bench.board.path))
-    output.write_trace(folder / "trace.csv", run.trace)
-    report.write_page(folder, run, [], data)
-    return row_of(segment, run, motor_file.load(str(bench.motor.path)).rated_speed_rpm), report.text(run, [], data)
+    found = run(segment, benches, lambda seconds: None)
+    data = report.summary(found, [], str(bench.motor.path), str(bench.board.path))
+    output.write_trace(folder / "trace.csv", found.trace)
+    report.write_page(folder, found, [], data)
+    return row_of(segment, found, motor_file.load(str(bench.motor.path)).rated_speed_rpm), report.text(found, [], data)
 
 
 def _text(rows: list[dict[str, Any]]) -> str:
@@ -349,7 +352,7 @@ def _write(folder: Path, rows: list[dict[str, Any]], segments: list[Segment], be
     output.write_summary(folder, report.clean({"title": f"{hours:.3f} motor hours, seed {seed}", "passed": not bad, "motor_hours": hours, "wrong": len(bad)}))
     shown = (bad + sorted((row for row in rows if row["verdict"] == OK), key=lambda row: -row["worst_speed_error_percent"]))[:12]
     by_number = {segment.number: segment for segment in segments}
-    pictures = [workers.run_all([by_number[row["segment"]]], lambda item, tell: picture.of(_run(item, benches, tell), 4 * picture.SWEEP_STRETCHES),
+    pictures = [workers.run_all([by_number[row["segment"]]], lambda item, tell: picture.of(run(item, benches, tell), 4 * picture.SWEEP_STRETCHES),
                                 lambda seconds: None)[0] for row in shown]
     table = page.Table("The worst segments", list(KEYS), [page.Row([str(row[key]) for key in KEYS], row["verdict"] != OK, number)
                                                           for number, row in enumerate(shown)])
