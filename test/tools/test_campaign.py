@@ -145,6 +145,13 @@ def test_a_moment_of_more_current_is_allowed_and_more_than_a_moment_is_not():
     assert verdict(plant__i_q=peak(0.006)).why == "too much current"
 
 
+def test_a_recoil_of_a_part_of_a_turn_is_no_turning_backwards():
+    back = lambda for_s: lambda time_s: np.where((time_s > 0.6) & (time_s < 0.6 + for_s), -600.0, 1000.0) # noqa: E731
+    assert verdict(plant__speed_rpm=back(0.04)).outcome == judge.RIDDEN # 0.4 turns
+    assert verdict(plant__speed_rpm=back(0.06)).why == "turns backwards"
+    assert verdict(plant__speed_rpm=back(0.06), fw__state=3.0).outcome == judge.RIDDEN # while it is aligned it may
+
+
 def test_a_comparison_that_trips_by_itself_is_none():
     found = judge.judge(running(), running(fw__fault=after(0.8, 6.0)), LIMITS)
     assert found.outcome == judge.VOID and "STALL" in found.why

@@ -19,8 +19,8 @@ CURRENT_MARGIN = 1.1
 """Of the most that the header allows, or of what the run without the fault takes."""
 MEAN_S, CURRENT_S = 0.01, 0.005
 """The speed is judged as a mean over the first; more current than allowed counts when it lasts for the second."""
-BACKWARDS = 0.05
-"""Of the rated speed: what a motor may turn against its direction."""
+BACKWARDS_TURNS = 0.5
+"""Mechanical turns against its direction that a motor may make: a rotor recoils when a block lets it go."""
 HOLDS_BACK = ("VOLTAGE", "CURRENT", "BRAKE", "RAMP_WAITS")
 """Reasons for a speed that is not the reference."""
 SAME_SPEED, SAME_CURRENT = 0.003, 0.05
@@ -101,12 +101,11 @@ def _wrong(after: Trace, reference: Trace, limits: Limits) -> str:
     """What is wrong with a run that has raised no fault; "" if nothing is."""
     speed, expected = _smooth(after, "plant.speed_rpm"), _smooth(reference, "plant.speed_rpm")
     last, last_expected = _on_at_end(after), _on_at_end(reference)
-    in_loop = np.isin(after.column("fw.state"), limits.closed)
     if last_expected and not last:
         return "stops without a code"
     if last and not last_expected:
         return "runs where it should stand"
-    if _backwards(speed[in_loop], expected, limits):
+    if _backwards(after, reference, limits):
         return "turns backwards"
     if _too_much_current(after, reference, limits):
         return "too much current"
@@ -118,12 +117,16 @@ def _wrong(after: Trace, reference: Trace, limits: Limits) -> str:
     return ""
 
 
-def _backwards(speed: np.ndarray, expected: np.ndarray, limits: Limits) -> bool:
-    """Against the direction in which the motor without the fault turns, and further than that one ever does."""
+def _backwards(after: Trace, reference: Trace, limits: Limits) -> bool:
+    """In closed loop, against the direction in which the motor without the fault turns, and further than that one does."""
+    speed, expected = after.column("plant.speed_rpm"), reference.column("plant.speed_rpm")
     if not len(speed):
         return False
     direction = 1.0 if expected[np.argmax(np.abs(expected))] >= 0.0 else -1.0
-    return bool(np.min(direction * speed) < min(np.min(direction * expected), 0.0) - BACKWARDS * limits.rated_rpm)
+    in_loop = np.isin(after.column("fw.state"), limits.closed)
+    turns = -np.minimum(direction * speed[in_loop], 0.0).sum() * after.period_s / 60.0
+    own_turns = -np.minimum(direction * expected, 0.0).sum() * after.period_s / 60.0
+    return bool(turns > own_turns + BACKWARDS_TURNS)
 
 
 def _too_much_current(after: Trace, reference: Trace, limits: Limits) -> bool:
