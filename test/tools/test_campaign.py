@@ -65,7 +65,7 @@ def test_every_fault_sets_keys_of_the_board_or_hits_memory_or_a_register(bench):
             known = bench.library.keys[key]
             assert known.writable and known.minimum <= value <= known.maximum, case
         room = case.kind.partition(":")[0]
-        assert injection.keys_of(case, rating) or room in ("RAM", "registers")
+        assert injection.keys_of(case, rating) or room in ("RAM", "registers", injection.IMAGE)
     assert {case.place for case in CASES if case.kind.startswith("registers")} <= {name for names in injection.REGISTERS.values() for name in names}
 
 
@@ -195,6 +195,55 @@ def test_every_bit_of_the_firmwares_memory_has_a_name_and_flips_once(bench):
             "names = [memory.flip(library, area, (bit + 0.5) / (8 * size)) for bit in range(8 * size)]; "
             "assert len(set(names)) == 8 * size and bytes(view) == bytes(255 - byte for byte in before)")
     assert subprocess.run([sys.executable, "-c", code, str(LIBRARY)], check=False, cwd=Path(__file__).parents[2]).returncode == 0
+
+
+class FakeCore:
+    """The simulator's memory, as memory.Core asks for it."""
+
+    def __init__(self):
+        self.words, self.data = [memory.ERASED] * memory.FLASH_WORDS, dict.fromkeys(range(0, 0x1000, 2), 0)
+        self.words[0x100:0x104] = [0x040000, 0x123456, 0x0F0F0F, 0x111111]
+        self.library, self.c, self._vb = self, self, None
+
+    def declare(self, *rows):
+        assert all(hasattr(self, name) for name, _, _ in rows)
+
+    def vb_iss_core(self, board):
+        return self
+
+    def iss_program(self, core):
+        return self.words
+
+    def iss_write_program(self, core, address, word):
+        self.words[address // 2] = word
+        return True
+
+    def iss_peek(self, core, address):
+        return self.data[address]
+
+    def iss_poke(self, core, address, value):
+        self.data[address] = value
+
+
+def test_every_programmed_bit_of_flash_and_every_bit_of_used_ram_can_be_hit_once():
+    fake = FakeCore()
+    core, before = memory.Core(fake, 0x0900), list(fake.words)
+    names = [core.flip_flash((bit + 0.5) / 96.0) for bit in range(96)]
+    assert len(set(names)) == 96 and names[0] == "flash 0x0200 bit 0" and names[-1] == "flash 0x0206 bit 23"
+    assert sum((one ^ other).bit_count() for one, other in zip(before, fake.words)) == 96
+    fake.data[memory.STACK_POINTER] = 0x0910
+    for stack, start in ((True, 0x0900), (False, memory.RAM_START)):
+        bits = 8 * (0x0910 - start)
+        assert len({core.flip_ram((bit + 0.5) / bits, stack) for bit in range(bits)}) == bits
+        assert {address for address, value in fake.data.items() if value == 0xFFFF} == set(range(start, 0x0910, 2)) - (
+            set() if stack else set(range(0x0900, 0x0910, 2))) # what both hit is as it was
+
+
+def test_cases_of_the_image_are_left_out_in_one_line_without_a_compiler(hurst, tmp_path, monkeypatch):
+    monkeypatch.setattr(campaign, "worst", lambda rows: [])
+    numbers = [n for n in range(1, 200) if injection.draw(1, n, [HURST]).what.room == injection.IMAGE][:2]
+    code, out, _ = call("--case", *map(str, numbers), "--out", str(tmp_path / "out"))
+    assert code == 0 and out.count("left out, there is no XC16") == 1 and rows_of(tmp_path / "out") == []
 
 
 def test_a_firmware_that_crashes_is_silent_and_one_that_hangs_is_left_to_the_watchdog(monkeypatch):

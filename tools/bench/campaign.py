@@ -19,8 +19,9 @@ from typing import Any
 from tools.common import board_file, motor_file, output, paths, workers
 from tools.common.errors import UserError
 from tools.common.progress import Progress
+from tools.image import load
 
-from . import command_common, injection, judge, memory, page, picture, report, trial
+from . import build, command_common, injection, judge, memory, page, picture, pil, pil_command, report, trial
 from .trial import Bench
 
 RESULTS = paths.ROOT / "build" / "campaign"
@@ -50,14 +51,18 @@ def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code."""
     numbers = numbers_of(options)
     benches = prepared(options.motor or paths.names(paths.MOTORS))
-    cases = [injection.draw(options.seed, number, sorted(benches)) for number in numbers]
+    motors = sorted(name for name in benches if name != injection.IMAGE)
+    cases = [injection.draw(options.seed, number, motors) for number in numbers]
     cases = [case for case in cases if not options.kind or options.kind in case.kind]
     if not cases:
-        raise UserError(f"no case has '{options.kind}' in its kind", "--kind", "write a part of: " + "; ".join(injection.BY_NAME))
+        raise UserError(f"no case has '{options.kind}' in its kind", "--kind", "write a part of one, as " + ", ".join(dict.fromkeys(kind.room for kind in injection.KINDS)))
+    if left_out := [case for case in cases if case.what.room == injection.IMAGE and injection.IMAGE not in benches]:
+        print(f"{len(left_out)} of {len(cases)} cases hit flash, stack and RAM of the image: left out, there is no XC16 (make firmware says how to get it)")
+        cases = [case for case in cases if case not in left_out]
     target = options.out or RESULTS / (f"seed-{options.seed}" + (f"-case-{numbers[0]}" if options.case else ""))
     if options.case and len(cases) == 1:
-        return _alone(cases[0], benches[cases[0].motor], target)
-    part = Part(target, identity(benches, options.seed, sorted(benches)))
+        return _alone(cases[0], bench_of(cases[0], benches), target)
+    part = Part(target, identity(benches, options.seed))
     known = part.rows()
     missing = [case for case in cases if case.number not in known]
     if len(missing) < len(cases):
@@ -93,14 +98,29 @@ def prepared(names: list[str]) -> dict[str, Bench]:
         motor = motor_file.load(name, "--motor")
         library = command_common.library_for([], None, command_common.tuned_header(motor.path, None))
         result[motor.name] = Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), library, memory.variables(library))
+    if build.make("find-xc16", [], None).returncode == 0:
+        result[injection.IMAGE] = _with_image()
     return result
 
 
-def identity(benches: dict[str, Bench], seed: int, motors: list[str]) -> dict[str, Any]:
+def _with_image() -> Bench:
+    """The project's own image in the simulator."""
+    image = pil_command.image_for([], None, None)
+    motor = motor_file.load(injection.IMAGE_MOTOR)
+    return Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), pil.library([]), [], image,
+                 memory.stack_start(load.load(image)))
+
+
+def bench_of(case: injection.Case, benches: dict[str, Bench]) -> Bench:
+    """What a case runs on."""
+    return benches[injection.IMAGE if case.what.room == injection.IMAGE else case.motor]
+
+
+def identity(benches: dict[str, Bench], seed: int) -> dict[str, Any]:
     """What the lines of an unfinished campaign must have been made with: firmware, tools and draw."""
-    tools = (paths.ROOT / "tools" / "bench" / f"{name}.py" for name in ("injection", "judge", "trial"))
-    return {"seed": seed, "motors": motors, "tools": [zlib.crc32(path.read_bytes()) for path in tools],
-            "firmware": [zlib.crc32(benches[name].library.path.read_bytes()) for name in motors]}
+    tools = (paths.ROOT / "tools" / "bench" / f"{name}.py" for name in ("injection", "judge", "trial", "memory"))
+    firmware = {name: [zlib.crc32(path.read_bytes()) for path in (bench.library.path, bench.image) if path] for name, bench in sorted(benches.items())}
+    return {"seed": seed, "tools": [zlib.crc32(path.read_bytes()) for path in tools], "firmware": firmware}
 
 
 @dataclass
@@ -146,7 +166,7 @@ class Part:
 
 
 def _one(case: injection.Case, benches: dict[str, Bench], part: Part, tell: Callable[[float], None]) -> None:
-    part.add(trial.run(case, benches[case.motor]).row())
+    part.add(trial.run(case, bench_of(case, benches)).row())
     tell(1.0)
 
 
@@ -178,7 +198,7 @@ def _picture(cases: list[injection.Case], row: dict[str, Any], benches: dict[str
     case = next(case for case in cases if case.number == row["case"])
 
     def work(case: injection.Case, tell: Callable[[float], None]) -> picture.Picture | None:
-        run = trial.run(case, benches[case.motor]).with_fault
+        run = trial.run(case, bench_of(case, benches)).with_fault
         return run and picture.of(run, 4 * picture.SWEEP_STRETCHES)
     return workers.run_all([case], work, lambda seconds: None)[0]
 

@@ -81,7 +81,13 @@ def _mask(place: str) -> float:
 
 SENSOR = ("CURRENT_SENSOR", *OVERCURRENT, "OFFSET")
 BRIDGE = ("OPEN_PHASE", *OVERCURRENT)
+IMAGE = "image"
+"""The room of what only the image in the simulator has: XC16 makes it."""
+IMAGE_MOTOR = "hurst_dmb0224c10002"
+"""The motor of the project's own header."""
+STOPPED_CORE = ("SELFTEST", "TRAP", "WATCHDOG")
 DRIVE_RAM, OTHER_RAM = "the drive", "the rest"
+FLASH, STACK, RAM = "flash", "stack", "RAM"
 REGISTERS = {
     "PWM": ("P1TCON", "P1TPER", "P1SECMP", "PWM1CON1", "PWM1CON2", "P1DTCON1", "P1FLTACON", "P1OVDCON", "P1DC1", "P1DC2", "P1DC3"),
     "ADC": ("AD1CON1", "AD1CON2", "AD1CON3", "AD1CHS0", "AD1CHS123", "AD1PCFGL"),
@@ -137,6 +143,7 @@ KINDS = (
     Kind("RAM", "a bit of the drive's state", ("SELFTEST",), _bits((DRIVE_RAM,)), weight=6.0),
     Kind("RAM", "a bit of other variables", ("SELFTEST",), _bits((OTHER_RAM,)), weight=2.0),
     _register_kind("PWM", 2.0), _register_kind("ADC", 1.5), _register_kind("ports", 1.0), _register_kind("interrupts", 0.5), _register_kind("clock", 0.5),
+    *(Kind(IMAGE, f"a bit of the {area}", STOPPED_CORE, _bits((area,)), weight=weight) for area, weight in ((FLASH, 1.0), (STACK, 0.5), (RAM, 0.5))),
 )
 BY_NAME = {f"{kind.room}: {kind.name}": kind for kind in KINDS}
 
@@ -178,7 +185,8 @@ def draw(seed: int, number: int, motors: list[str], scenes: tuple[str, ...] = tu
     scene = r.choices(scenes, [SCENES[name] for name in scenes])[0]
     kind = BY_NAME[name]
     size, place = kind.draw(r)
-    return Case(number, name, float(f"{size:.4g}"), place, scene, r.random(), r.randrange(SLOW_PHASES), r.choice(motors),
+    motor = r.choice(motors)
+    return Case(number, name, float(f"{size:.4g}"), place, scene, r.random(), r.randrange(SLOW_PHASES), IMAGE_MOTOR if kind.room == IMAGE else motor,
                 r.choice((0.0, 0.25, 0.5, 0.75)), round(r.uniform(*kind.over_s), 3), round(r.uniform(*PASSES_S), 3) if r.random() < kind.passes else 0.0,
                 float(r.randrange(360)), r.randrange(1, 2**31))
 

@@ -1,4 +1,5 @@
-"""The firmware's variables inside a running virtual board, byte by byte, as a hit by radiation finds them."""
+"""The firmware's memory inside a running virtual board, bit by bit, as a hit by radiation finds it: variables on the PC; flash, RAM and stack of an
+image in the simulator."""
 
 import ctypes
 import re
@@ -7,8 +8,10 @@ from dataclasses import dataclass
 
 from tools.common import paths
 from tools.common.errors import UserError
+from tools.image import program
 
 from .board import Library
+from .pil import PilBoard
 
 DRIVE = "board_drive"
 
@@ -60,3 +63,43 @@ def flip(library: Library, area: list[Variable], share: float) -> str:
     place = ctypes.c_uint8.from_address(base + item.offset + at)
     place.value ^= 1 << number
     return f"{item.name}+{at} bit {number}"
+
+
+RAM_START, RAM_BYTES, STACK_POINTER, ERASED, FLASH_WORDS = 0x0800, 0x0800, 0x001E, 0xFFFFFF, 0x2C00
+"""Of the dsPIC33FJ32MC204: addresses of data memory, and 24-bit words."""
+
+
+class Core:
+    """Flash and RAM of the simulator under a board. `stack_start`: the first address behind the variables."""
+
+    def __init__(self, board: PilBoard, stack_start: int) -> None:
+        c, core = board.library.c, ctypes.c_void_p
+        board.library.declare(("vb_iss_core", core, [core]), ("iss_peek", ctypes.c_uint16, [core, ctypes.c_uint16]),
+                              ("iss_poke", None, [core, ctypes.c_uint16, ctypes.c_uint16]), ("iss_program", ctypes.POINTER(ctypes.c_uint32), [core]),
+                              ("iss_write_program", ctypes.c_bool, [core, ctypes.c_uint32, ctypes.c_uint32]))
+        self._c, self._core, self._stack_start = c, c.vb_iss_core(board._vb), stack_start # pylint: disable=protected-access
+
+    def flip_flash(self, share: float) -> str:
+        """Turns the bit at this share of all bits of programmed flash; returns its name."""
+        words = self._c.iss_program(self._core)
+        used = [word for word in range(FLASH_WORDS) if words[word] != ERASED]
+        bit = min(int(share * 24 * len(used)), 24 * len(used) - 1)
+        word, number = used[bit // 24], bit % 24
+        self._c.iss_write_program(self._core, 2 * word, words[word] ^ 1 << number)
+        return f"flash 0x{2 * word:04X} bit {number}"
+
+    def flip_ram(self, share: float, stack: bool) -> str:
+        """The same of RAM from its start to the end of the stack in use, or of that stack alone."""
+        end = max(self._c.iss_peek(self._core, STACK_POINTER), self._stack_start + 2)
+        start = self._stack_start if stack else RAM_START
+        bit = min(int(share * 8 * (end - start)), 8 * (end - start) - 1)
+        address, number = start + bit // 16 * 2, bit % 16
+        self._c.iss_poke(self._core, address, self._c.iss_peek(self._core, address) ^ 1 << number)
+        return f"RAM 0x{address:04X} bit {number}"
+
+
+def stack_start(image: program.Elf) -> int:
+    """The first even address behind an image's variables."""
+    ends = [symbol.address + symbol.size for symbol in image.names if symbol.section is not None and symbol.section.memory == program.DATA
+            and RAM_START <= symbol.address < RAM_START + RAM_BYTES]
+    return max(ends, default=RAM_START) + 1 & ~1

@@ -41,6 +41,8 @@ REST_S = 0.4
 SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 """Of the rated torque: the largest that motor and supply can hold is drawn from."""
 SAGS, WARM_R, WARM_PSI = (0.87, 1.0), (0.85, 1.4), (0.85, 1.05)
+MIDDLE = 0.05
+"""Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
 BIDIRECTIONAL = "BIDIRECTIONAL_SPEED"
 MODES = ("", "", BIDIRECTIONAL)
@@ -140,6 +142,7 @@ class _Drawing:
         self.plant = {**bench.board.values.values, **bench.motor.values.values}
         self.bus_v = float(self.plant["supply.voltage_v"])
         self.slow, self.nominal, self.most = (param(self.params, f"{what}_SPEED_RPM") for what in ("MINIMUM", "NOMINAL", "MAXIMUM"))
+        self.slow += MIDDLE * (self.nominal - self.slow) if mode else 0.0
         self.slope = param(self.params, "SPEEDREFRAMP_RPM_PER_S")
         self.settle_s = max(8.0 / param(self.params, "SPEED_BANDWIDTH_HZ"), 0.7)
         self.events: list[Event] = []

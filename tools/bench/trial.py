@@ -6,12 +6,13 @@ import pickle
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from tools.common import motor_file
 from tools.common.board_keys import Part, Values
 
-from . import injection, judge, memory, simulate
+from . import injection, judge, memory, pil, simulate
 from .board import Board, Library
 from .injection import Case
 from .panel import Action
@@ -30,7 +31,7 @@ LOAD_OVER_S = 0.1
 CLEAR_S, AGAIN_S = 0.3, 0.3
 """From a fault to the S2 that clears it, and on to the one that starts again."""
 RAMP_STEP_S = 0.005
-HANG_S = 120
+HANG_S = 300
 WHERE = "campaign"
 HUNG = "WATCHDOG"
 """What ends a firmware that hangs; the virtual board has no watchdog."""
@@ -38,12 +39,22 @@ HUNG = "WATCHDOG"
 
 @dataclass(frozen=True)
 class Bench:
-    """A motor with its header's firmware."""
+    """A motor with its header's firmware: on the PC, or as an image in the simulator."""
 
     motor: Part
     board: Part
     library: Library
     memory: list[memory.Variable]
+    image: Path | None = None
+    stack_start: int = 0
+
+    def new_board(self) -> Board:
+        """One for this process."""
+        if self.image is None:
+            return Board(self.library)
+        board = pil.PilBoard(self.library, self.image)
+        board.lock_step(False)
+        return board
 
 
 @dataclass(frozen=True)
@@ -130,7 +141,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
     """The whole case, in this process, which can run no other board afterwards."""
     way = scene(case, bench)
     job = simulate.prepare(way.scenario, bench.library, bench.motor, bench.board)
-    with simulate.using(Board(bench.library), job) as board:
+    with simulate.using(bench.new_board(), job) as board:
         session = simulate.Session(job, bench.library, board, tell, EVERY)
         _to_the_moment(session, way, case)
         injected_s = session.now_s
@@ -179,6 +190,9 @@ def _inject(session: simulate.Session, case: Case, rating: injection.Rating, ben
     if name == "RAM":
         area = bench.memory[:1] if case.place == injection.DRIVE_RAM else bench.memory[1:]
         return memory.flip(bench.library, area, case.size)
+    if name == injection.IMAGE:
+        core = memory.Core(board, bench.stack_start)
+        return core.flip_flash(case.size) if case.place == injection.FLASH else core.flip_ram(case.size, case.place == injection.STACK)
     if name == "registers":
         bit = min(int(case.size * 16.0), 15)
         board.set(f"reg.{case.place}", float(int(board.get(f"reg.{case.place}")) ^ 1 << bit))
