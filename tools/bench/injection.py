@@ -148,8 +148,8 @@ KINDS = (
 BY_NAME = {f"{kind.room}: {kind.name}": kind for kind in KINDS}
 
 SCENES = {"CALIBRATE": 0.6, "STOPPED": 0.6, "BOOTSTRAP": 0.6, "ALIGN": 1.0, "RAMP": 1.2, "low speed": 2.0, "half speed": 2.5, "rated speed": 2.5,
-          "accelerating": 1.2, "braking": 1.5, "field weakening": 2.0, "STOPPING": 1.0, "FAULT": 0.8}
-"""When it happens, and how often: a state of the drive, or what it does in closed loop."""
+          "accelerating": 1.2, "braking": 1.5, "field weakening": 2.0, "STOPPING": 1.0, "FAULT": 0.8, "retry": 0.8}
+"""When it happens, and how often: a state of the drive, or what it does in closed loop; "retry" is the pause after a stall."""
 SLOW_PHASES = 8
 PASSES_S = (0.02, 0.3)
 

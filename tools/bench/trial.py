@@ -30,6 +30,8 @@ STEADY_S = 0.2
 LOAD_OVER_S = 0.1
 CLEAR_S, AGAIN_S = 0.3, 0.3
 """From a fault to the S2 that clears it, and on to the one that starts again."""
+BLOCKED_S, RETRY_PAUSE_S, RETRY_STATES = 0.8, 3.0, ("RETRY", "FAULT")
+"""The shaft is blocked for the first; a drive that tries again by itself may wait for the second, in one of these states."""
 RAMP_STEP_S = 0.005
 HANG_S = 300
 WHERE = "campaign"
@@ -59,12 +61,12 @@ class Bench:
 
 @dataclass(frozen=True)
 class Scene:
-    """The way to the moment. `state`: wait for it from from_s on; the moment lies within the next `within_s`."""
+    """The way to the moment. `states`: wait for one of them from from_s on; the moment lies within the next `within_s`."""
 
     scenario: Scenario
     from_s: float
     within_s: float
-    state: str
+    states: tuple[str, ...]
     end_s: float
     """not before this: a start is over and has settled"""
 
@@ -88,11 +90,11 @@ def scene(case: Case, bench: Bench) -> Scene:
         events.append(_event(speed_s, "speed_rpm", value=second, finds_range=True))
     ramp_s = abs(second - first) / slope
     end_s = closed_s + judge.SETTLE_S
-    begin = {"CALIBRATE": (0.0, 0.045, ""), "STOPPED": (0.06, START_S - 0.06, ""), "BOOTSTRAP": (START_S, 0.009, "BOOTSTRAP"),
-             "ALIGN": (START_S, 0.95 * lock_s, "ALIGN"), "RAMP": (START_S + lock_s, 0.95 * (closed_s - START_S - lock_s - 0.4), "RAMP"),
-             "accelerating": (speed_s + 0.02, 0.9 * ramp_s, ""), "braking": (speed_s + 0.02, 0.9 * ramp_s, ""),
-             "field weakening": (speed_s + 0.1 + ramp_s + SETTLE_S, STEADY_S, ""), "STOPPING": (speed_s, 0.5 * first / slope, "STOPPING"),
-             "FAULT": (speed_s, 0.5 * CLEAR_S, "FAULT")}.get(case.scene, (speed_s, STEADY_S, ""))
+    begin = {"CALIBRATE": (0.0, 0.045, ()), "STOPPED": (0.06, START_S - 0.06, ()), "BOOTSTRAP": (START_S, 0.009, ("BOOTSTRAP",)),
+             "ALIGN": (START_S, 0.95 * lock_s, ("ALIGN",)), "RAMP": (START_S + lock_s, 0.95 * (closed_s - START_S - lock_s - 0.4), ("RAMP",)),
+             "accelerating": (speed_s + 0.02, 0.9 * ramp_s, ()), "braking": (speed_s + 0.02, 0.9 * ramp_s, ()),
+             "field weakening": (speed_s + 0.1 + ramp_s + SETTLE_S, STEADY_S, ()), "STOPPING": (speed_s, 0.5 * first / slope, ("STOPPING",)),
+             "FAULT": (speed_s, 0.5 * CLEAR_S, ("FAULT",)), "retry": (speed_s, CLEAR_S, RETRY_STATES)}.get(case.scene, (speed_s, STEADY_S, ()))
     if case.scene == "STOPPING":
         events += _press(speed_s)
     if case.scene == "FAULT":
@@ -100,6 +102,9 @@ def scene(case: Case, bench: Bench) -> Scene:
         events += [_event(speed_s, "set", keys={"input.flta": 1.0}), _event(speed_s + 0.005, "set", keys={"input.flta": 0.0}),
                    *_press(speed_s + CLEAR_S), *_press(again_s)]
         end_s = again_s + start_time_s(params) + judge.SETTLE_S
+    if case.scene == "retry":
+        events += [_event(speed_s, "set", keys={"load.locked": 1.0}), _event(speed_s + BLOCKED_S, "set", keys={"load.locked": 0.0})]
+        end_s = speed_s + BLOCKED_S + RETRY_PAUSE_S + start_time_s(params) + judge.SETTLE_S
     text = f"{case.kind} {case.size:g} {case.place}".strip()
     scenario = Scenario(f"case {case.number}", f"{text}, {case.scene}", "", "", "", 60.0, events=sorted(events, key=lambda event: event.at_s),
                         rotor_deg=case.rotor_deg, plant=Values({"rng.seed": float(case.noise)}, {"rng.seed": WHERE}))
@@ -170,9 +175,9 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
 def _to_the_moment(session: simulate.Session, way: Scene, case: Case) -> None:
     """To the scene's state, a drawn part into it, and to the drawn slow phase."""
     session.run_to(way.from_s)
-    wanted = next((number for number, name in session.library.states.items() if name == way.state), None)
-    for _ in range(4000 if way.state else 0):
-        if session.board.get("fw.state") == wanted:
+    wanted = [number for number, name in session.library.states.items() if name in way.states]
+    for _ in range(4000 if way.states else 0):
+        if session.board.get("fw.state") in wanted:
             break
         session.run_to(session.now_s + WAIT_STEP_S)
     session.run_to(session.now_s + case.part * way.within_s)
