@@ -14,6 +14,7 @@ SIDES = ("a", "b")
 TRANSISTORS = ("A low", "A high", "B low", "B high", "C low", "C high")
 OVERCURRENT = ("OVERCURRENT_SW", "OVERCURRENT_HW")
 NO_TURN = ("STALL", "LOST_LOCK", "START_FAILED")
+"""A shaft that stops within a period drives the current over its limit, so an over-current names a block as well."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ KINDS = (
     Kind("supply", "lost", ("UNDERVOLTAGE",), _one_of(1000.0), lambda size, place, rating: {"supply.resistance_ohm": size}, passes=0.5, limits=True),
     Kind("supply", "bad contact", ("UNDERVOLTAGE",), _size(0.5, 20.0), lambda size, place, rating: {"supply.resistance_ohm": size}, limits=True),
     Kind("supply", "too high", ("OVERVOLTAGE",), _size(1.05, 1.6), lambda size, place, rating: {"supply.voltage_v": size * rating.bus_v}, passes=0.5, limits=True),
-    Kind("shaft", "blocked", NO_TURN, _one_of(1.0), lambda size, place, rating: {"load.locked": size}, passes=0.2, weight=2.0),
+    Kind("shaft", "blocked", (*NO_TURN, *OVERCURRENT), _one_of(1.0), lambda size, place, rating: {"load.locked": size}, passes=0.2, weight=2.0),
     Kind("shaft", "load step", (*NO_TURN, "OVERTEMPERATURE"), _size(0.1, 3.0), lambda size, place, rating: {BRAKE: size * rating.torque_nm}, passes=0.5,
          limits=True),
     Kind("shaft", "driven by the load", (*NO_TURN, "OVERVOLTAGE"), _size(0.1, 1.0, True), lambda size, place, rating: {"load.active_nm": size * rating.torque_nm},

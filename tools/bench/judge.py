@@ -70,6 +70,8 @@ def judge(with_fault: Trace, without: Trace, limits: Limits) -> Verdict:
         why = _still_on(after, reference)
         outcome = SILENT if why else RIGHT if code in limits.codes else ANOTHER
         return Verdict(outcome, code, after_s, why, error_percent, peak_a)
+    if (code := _kept_code(after, limits)) and not _kept_code(reference, limits):
+        return Verdict(ANOTHER, code, None, "still stopped by the fault before", error_percent, peak_a)
     why = _wrong(after, reference, limits)
     outcome = SILENT if why else NO_EFFECT if _same(after, reference, limits) else RIDDEN
     return Verdict(outcome, "", None, why, error_percent, peak_a)
@@ -89,6 +91,12 @@ def _first_code(trace: Trace, limits: Limits) -> tuple[str, float | None]:
             return limits.faults.get(int(code), f"{int(code)}"), at_s - limits.injected_s
         known = code
     return "", None
+
+
+def _kept_code(after: Trace, limits: Limits) -> str:
+    """A fault that the drive had before and cannot leave: it says so, and nothing turns."""
+    stays = len(after) > 0 and after.column("fw.fault")[-1] != 0.0 and not _on_at_end(after)
+    return limits.faults.get(int(after.column("fw.fault")[-1]), "") if stays else ""
 
 
 def _still_on(after: Trace, reference: Trace) -> str:

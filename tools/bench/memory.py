@@ -2,9 +2,13 @@
 image in the simulator."""
 
 import ctypes
+import functools
+import io
 import re
 import subprocess
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from tools.common import paths
 from tools.common.errors import UserError
@@ -50,6 +54,39 @@ def _symbols(*files: str) -> list[tuple[str, int, int]]:
     return [(name, int(size, 16), int(at, 16)) for at, size, name in rows]
 
 
+@functools.cache
+def _types(path: Path) -> dict[str, Any]:
+    """The types of a library's variables by name, as the compiler noted them; none where nothing here reads that."""
+    try:
+        from elftools.elf.elffile import ELFFile
+    except ImportError:
+        return {}
+    found = {}
+    for unit in ELFFile(io.BytesIO(path.read_bytes())).get_dwarf_info().iter_CUs():
+        for entry in unit.get_top_DIE().iter_children():
+            if entry.tag == "DW_TAG_variable" and {"DW_AT_type", "DW_AT_name"} <= entry.attributes.keys():
+                found[entry.attributes["DW_AT_name"].value.decode()] = entry.get_DIE_from_attribute("DW_AT_type")
+    return found
+
+
+def _field(library: Library, name: str, byte: int) -> str:
+    """The part of a variable that has this byte: ".run.control.ref_q13.d"."""
+    kind = _types(library.path).get(name)
+    return (_member(kind, byte) if kind is not None else "") or f"+{byte}"
+
+
+def _member(kind: Any, byte: int) -> str:
+    while kind.tag in ("DW_TAG_typedef", "DW_TAG_volatile_type", "DW_TAG_const_type"):
+        kind = kind.get_DIE_from_attribute("DW_AT_type")
+    members = [entry for entry in kind.iter_children() if entry.tag == "DW_TAG_member"] if kind.tag == "DW_TAG_structure_type" else []
+    inside = [entry for entry in members if entry.attributes["DW_AT_data_member_location"].value <= byte]
+    if not inside:
+        return f"+{byte}" if byte else ""
+    last = inside[-1]
+    at = last.attributes["DW_AT_data_member_location"].value
+    return f".{last.attributes['DW_AT_name'].value.decode()}" + _member(last.get_DIE_from_attribute("DW_AT_type"), byte - at)
+
+
 def flip(library: Library, area: list[Variable], share: float) -> str:
     """Turns the bit at this share, 0..1, of all bits of the area; returns its name."""
     total = sum(item.size for item in area)
@@ -62,7 +99,7 @@ def flip(library: Library, area: list[Variable], share: float) -> str:
     base = ctypes.addressof(ctypes.c_uint8.in_dll(library.c, DRIVE))
     place = ctypes.c_uint8.from_address(base + item.offset + at)
     place.value ^= 1 << number
-    return f"{item.name}+{at} bit {number}"
+    return f"{item.name}{_field(library, item.name, at)} bit {number}"
 
 
 RAM_START, RAM_BYTES, STACK_POINTER, ERASED, FLASH_WORDS = 0x0800, 0x0800, 0x001E, 0xFFFFFF, 0x2C00

@@ -25,7 +25,7 @@ from .board import Board
 from .campaign import Part
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, param, start_time_s
-from .trial import Bench
+from .trial import Bench, coast_s
 
 RESULTS = paths.ROOT / "build" / "soak"
 SEGMENTS = "segments.csv"
@@ -211,9 +211,7 @@ class _Drawing:
 
     def _stop_s(self, rpm: float) -> float:
         """How long a stop takes, also where the supply takes nothing back and friction alone brakes."""
-        friction_nm = max(self.motor.coulomb_nm, 1e-6)
-        inertia = self.motor.inertia_kgm2 + self.motor.load_inertia_kgm2
-        return max(abs(rpm) / self.slope, inertia * abs(rpm) * math.pi / 30.0 / friction_nm) + 0.5
+        return max(abs(rpm) / self.slope, coast_s(self.motor, rpm)) + 0.5
 
     def _most_nm(self, rpm: float) -> float:
         """The largest drawn load that a warm motor holds at a sagging supply."""

@@ -1,6 +1,7 @@
 """One injected fault: the motor is brought to the moment, then goes on twice, with the fault and without it. Both begin from the same bit."""
 
 import contextlib
+import math
 import os
 import pickle
 import signal
@@ -29,7 +30,7 @@ STEADY_S = 0.2
 """The stretch of a steady speed in which it comes."""
 LOAD_OVER_S = 0.1
 CLEAR_S, AGAIN_S = 0.3, 0.3
-"""From a fault to the S2 that clears it, and on to the one that starts again."""
+"""From a fault to the S2 that clears it, and on to the one that starts again; in between the rotor coasts to a stop."""
 BLOCKED_S, RETRY_PAUSE_S, RETRY_STATES = 0.8, 3.0, ("RETRY", "FAULT")
 """The shaft is blocked for the first; a drive that tries again by itself may wait for the second, in one of these states."""
 RAMP_STEP_S = 0.005
@@ -76,7 +77,7 @@ def scene(case: Case, bench: Bench) -> Scene:
     params, motor = bench.library.params, motor_file.load(str(bench.motor.path))
     slow, nominal, most = (param(params, f"{name}_SPEED_RPM") for name in ("MINIMUM", "NOMINAL", "MAXIMUM"))
     top = min(0.97 * nominal, 0.97 * motor.rated_speed_rpm)
-    first = {"low speed": 1.4 * slow, "accelerating": 1.4 * slow, "half speed": 0.5 * top, "RAMP": 0.5 * top}.get(case.scene, top)
+    first = {"low speed": 1.4 * slow, "accelerating": 1.4 * slow, "half speed": 0.5 * top, "RAMP": 0.5 * top, "FAULT": 0.5 * top}.get(case.scene, top)
     second = {"accelerating": top, "braking": 1.4 * slow, "field weakening": nominal + 0.5 * (most - nominal)}.get(case.scene, 0.0)
     load_nm = case.load * motor.rated_torque_nm * (0.2 if case.scene == "field weakening" else 0.7)
     period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
@@ -98,7 +99,7 @@ def scene(case: Case, bench: Bench) -> Scene:
     if case.scene == "STOPPING":
         events += _press(speed_s)
     if case.scene == "FAULT":
-        again_s = speed_s + CLEAR_S + AGAIN_S
+        again_s = speed_s + CLEAR_S + AGAIN_S + coast_s(motor, first)
         events += [_event(speed_s, "set", keys={"input.flta": 1.0}), _event(speed_s + 0.005, "set", keys={"input.flta": 0.0}),
                    *_press(speed_s + CLEAR_S), *_press(again_s)]
         end_s = again_s + start_time_s(params) + judge.SETTLE_S
@@ -109,6 +110,11 @@ def scene(case: Case, bench: Bench) -> Scene:
     scenario = Scenario(f"case {case.number}", f"{text}, {case.scene}", "", "", "", 60.0, events=sorted(events, key=lambda event: event.at_s),
                         rotor_deg=case.rotor_deg, plant=Values({"rng.seed": float(case.noise)}, {"rng.seed": WHERE}))
     return Scene(scenario, *begin, end_s)
+
+
+def coast_s(motor: motor_file.Motor, rpm: float) -> float:
+    """How long friction alone takes to stop the rotor."""
+    return (motor.inertia_kgm2 + motor.load_inertia_kgm2) * abs(rpm) * math.pi / 30.0 / max(motor.coulomb_nm, 1e-6)
 
 
 def _event(at_s: float, kind: str, **more: Any) -> Event:
