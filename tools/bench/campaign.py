@@ -250,8 +250,9 @@ def write(folder: Path, rows: list[dict[str, Any]], seed: int, draw: Callable[[d
     """The table, the summary and the page."""
     output.write_csv(folder / CASES, list(KEYS), [[row[key] for key in KEYS] for row in rows])
     counts = Counter(row["class"] for row in rows)
-    output.write_summary(folder, report.clean({"title": f"{len(rows)} injected faults, seed {seed}", "passed": not any(counts[name] for name in BAD),
-                                               "classes": {name: counts[name] for name in judge.CLASSES}, "by_kind": [dict(zip(HEAD, cells)) for cells in shares(rows)]}))
+    passed, title = not any(counts[name] for name in BAD), f"{len(rows)} injected faults, seed {seed}"
+    output.write_summary(folder, report.clean({"title": title, "passed": passed, "classes": {name: counts[name] for name in judge.CLASSES},
+                                               "by_kind": [dict(zip(HEAD, cells)) for cells in shares(rows)]}))
     shown = worst(rows)
     pictures = [draw(row) for row in shown]
     by_kind = page.Table("How they ended", list(HEAD), [page.Row(cells, cells[2 + judge.CLASSES.index(judge.SILENT)] != "0") for cells in shares(rows)])
@@ -259,7 +260,7 @@ def write(folder: Path, rows: list[dict[str, Any]], seed: int, draw: Callable[[d
         page.Row(_share(scene, [row for row in rows if row["scene"] == scene])) for scene in injection.SCENES if any(row["scene"] == scene for row in rows)])
     cells = [page.Row([str(row[key] if row[key] is not None else "-") for key in KEYS], row["class"] in BAD, number if pictures[number] else None)
              for number, row in enumerate(shown)]
-    page.write(folder, page.Page(f"campaign: {len(rows)} injected faults, seed {seed}", not any(counts[name] for name in BAD),
+    page.write(folder, page.Page(f"campaign: {title}", passed,
                                  "; ".join(f"{counts[name]} {name}" for name in (*judge.CLASSES, *([judge.VOID] if counts[judge.VOID] else []))),
                                  ["make campaign CASE=number runs one of them again, with its whole report."],
                                  [by_kind, page.Table("The worst", list(KEYS), cells)], pictures, [by_scene], [], [CASES, output.SUMMARY]))

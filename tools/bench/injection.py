@@ -67,8 +67,10 @@ def _stuck(*states: float) -> Callable[[random.Random], tuple[float, str]]:
     return lambda r: (r.choice(states), r.choice(SIDES))
 
 
-def _place(names: tuple[str, ...]) -> Callable[[random.Random], tuple[float, str]]:
-    return lambda r: (1.0, r.choice(names))
+def _transistor(r: random.Random) -> tuple[float, str]:
+    """One of the six: its bit, and its name."""
+    number = r.randrange(len(TRANSISTORS))
+    return float(1 << number), TRANSISTORS[number]
 
 
 def _bits(first: tuple[str, ...]) -> Callable[[random.Random], tuple[float, str]]:
@@ -76,11 +78,13 @@ def _bits(first: tuple[str, ...]) -> Callable[[random.Random], tuple[float, str]
     return lambda r: (r.random(), r.choice(first))
 
 
-def _mask(place: str) -> float:
-    return float(1 << TRANSISTORS.index(place))
+def _sets(key: str, of: str = "") -> Callable[[float, str, Rating], Keys]:
+    """The size goes to a key of the board, or that share of what the rating says; {} is the place."""
+    return lambda size, place, rating: {key.format(place): size * (getattr(rating, of) if of else 1.0)}
 
 
 SENSOR = ("CURRENT_SENSOR", *OVERCURRENT, "OFFSET")
+BUS = ("BUS_SENSOR", "UNDERVOLTAGE", "OVERVOLTAGE")
 BRIDGE = ("OPEN_PHASE", *OVERCURRENT)
 IMAGE = "image"
 """The room of what only the image in the simulator has: XC16 makes it."""
@@ -102,49 +106,50 @@ def _register_kind(group: str, weight: float) -> Kind:
 
 
 KINDS = (
-    Kind("sensors", "current stuck at its value", SENSOR, _stuck(1.0), lambda size, place, rating: {f"fault.i{place}_stuck": size}, passes=0.2),
-    Kind("sensors", "current reads zero", SENSOR, _stuck(4.0), lambda size, place, rating: {f"fault.i{place}_stuck": size}, passes=0.2),
-    Kind("sensors", "current stuck at a rail", SENSOR, _stuck(2.0, 3.0), lambda size, place, rating: {f"fault.i{place}_stuck": size}, passes=0.2),
-    Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), lambda size, place, rating: {f"fault.i{place}_error_a": size * rating.current_a}),
-    Kind("sensors", "current offset drifts", SENSOR, _side(0.02, 0.6, True), lambda size, place, rating: {f"fault.i{place}_error_a": size * rating.current_a},
+    Kind("sensors", "current stuck at its value", SENSOR, _stuck(1.0), _sets("fault.i{}_stuck"), passes=0.2),
+    Kind("sensors", "current reads zero", SENSOR, _stuck(4.0), _sets("fault.i{}_stuck"), passes=0.2),
+    Kind("sensors", "current stuck at a rail", SENSOR, _stuck(2.0, 3.0), _sets("fault.i{}_stuck"), passes=0.2),
+    Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a")),
+    Kind("sensors", "current offset drifts", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
          over_s=(0.3, 1.0)),
     Kind("sensors", "current gain", SENSOR, lambda r: (r.choice((r.uniform(0.0, 0.9), r.uniform(1.1, 2.5))), r.choice(SIDES)),
-         lambda size, place, rating: {f"fault.i{place}_gain": size}),
-    Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), lambda size, place, rating: {f"fault.i{place}_noise_a": size * rating.current_a}),
-    Kind("sensors", "bus stuck at its value", ("BUS_SENSOR",), _one_of(1.0), lambda size, place, rating: {"fault.vbus_stuck": size}, weight=0.5),
-    Kind("sensors", "bus stuck at a rail", ("BUS_SENSOR", "UNDERVOLTAGE", "OVERVOLTAGE"), _one_of(2.0, 3.0), lambda size, place, rating: {"fault.vbus_stuck": size}),
-    Kind("sensors", "bus gain", ("BUS_SENSOR", "UNDERVOLTAGE", "OVERVOLTAGE"), lambda r: (r.choice((0.5, r.uniform(0.2, 0.95), r.uniform(1.05, 2.0))), ""),
-         lambda size, place, rating: {"fault.vbus_gain": size}),
-    Kind("sensors", "bus offset", ("BUS_SENSOR", "UNDERVOLTAGE", "OVERVOLTAGE"), _size(0.02, 0.5, True),
-         lambda size, place, rating: {"fault.vbus_error_v": size * rating.bus_v}),
-    Kind("sensors", "potentiometer wire", ("POTENTIOMETER",), _one_of(2.0, 3.0), lambda size, place, rating: {"fault.pot_stuck": size}, passes=0.2),
-    Kind("power stage", "phase wire open", ("OPEN_PHASE",), _one_of(1.0, 2.0, 3.0), lambda size, place, rating: {"fault.open_phase": size}, weight=2.0),
-    Kind("power stage", "transistor never turns on", ("OPEN_PHASE",), _place(TRANSISTORS), lambda size, place, rating: {"fault.never_on": _mask(place)},
-         weight=2.0),
-    Kind("power stage", "transistor never turns off", BRIDGE, _place(TRANSISTORS), lambda size, place, rating: {"fault.never_off": _mask(place)}),
-    Kind("supply", "sag", ("UNDERVOLTAGE",), _size(0.3, 0.9), lambda size, place, rating: {"supply.voltage_v": size * rating.bus_v}, passes=0.5, limits=True),
-    Kind("supply", "lost", ("UNDERVOLTAGE",), _one_of(1000.0), lambda size, place, rating: {"supply.resistance_ohm": size}, passes=0.5, limits=True),
-    Kind("supply", "bad contact", ("UNDERVOLTAGE",), _size(0.5, 20.0), lambda size, place, rating: {"supply.resistance_ohm": size}, limits=True),
-    Kind("supply", "too high", ("OVERVOLTAGE",), _size(1.05, 1.6), lambda size, place, rating: {"supply.voltage_v": size * rating.bus_v}, passes=0.5, limits=True),
-    Kind("shaft", "blocked", (*NO_TURN, *OVERCURRENT), _one_of(1.0), lambda size, place, rating: {"load.locked": size}, passes=0.2, weight=2.0),
-    Kind("shaft", "load step", (*NO_TURN, "OVERTEMPERATURE"), _size(0.1, 3.0), lambda size, place, rating: {BRAKE: size * rating.torque_nm}, passes=0.5,
+         _sets("fault.i{}_gain")),
+    Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), _sets("fault.i{}_noise_a", "current_a")),
+    Kind("sensors", "bus stuck at its value", ("BUS_SENSOR",), _one_of(1.0), _sets("fault.vbus_stuck"), weight=0.5),
+    Kind("sensors", "bus stuck at a rail", BUS, _one_of(2.0, 3.0), _sets("fault.vbus_stuck")),
+    Kind("sensors", "bus gain", BUS, lambda r: (r.choice((0.5, r.uniform(0.2, 0.95), r.uniform(1.05, 2.0))), ""),
+         _sets("fault.vbus_gain")),
+    Kind("sensors", "bus offset", BUS, _size(0.02, 0.5, True),
+         _sets("fault.vbus_error_v", "bus_v")),
+    Kind("sensors", "potentiometer wire", ("POTENTIOMETER",), _one_of(2.0, 3.0), _sets("fault.pot_stuck"), passes=0.2),
+    Kind("power stage", "phase wire open", ("OPEN_PHASE",), _one_of(1.0, 2.0, 3.0), _sets("fault.open_phase"), weight=2.0),
+    Kind("power stage", "transistor never turns on", ("OPEN_PHASE",), _transistor, _sets("fault.never_on"), weight=2.0),
+    Kind("power stage", "transistor never turns off", BRIDGE, _transistor, _sets("fault.never_off")),
+    Kind("supply", "sag", ("UNDERVOLTAGE",), _size(0.3, 0.9), _sets("supply.voltage_v", "bus_v"), passes=0.5, limits=True),
+    Kind("supply", "lost", ("UNDERVOLTAGE",), _one_of(1000.0), _sets("supply.resistance_ohm"), passes=0.5, limits=True),
+    Kind("supply", "bad contact", ("UNDERVOLTAGE",), _size(0.5, 20.0), _sets("supply.resistance_ohm"), limits=True),
+    Kind("supply", "too high", ("OVERVOLTAGE",), _size(1.05, 1.6), _sets("supply.voltage_v", "bus_v"), passes=0.5, limits=True),
+    Kind("shaft", "blocked", (*NO_TURN, *OVERCURRENT), _one_of(1.0), _sets("load.locked"), passes=0.2, weight=2.0),
+    Kind("shaft", "load step", (*NO_TURN, "OVERTEMPERATURE"), _size(0.1, 3.0), _sets(BRAKE, "torque_nm"), passes=0.5,
          limits=True),
-    Kind("shaft", "driven by the load", (*NO_TURN, "OVERVOLTAGE"), _size(0.1, 1.0, True), lambda size, place, rating: {"load.active_nm": size * rating.torque_nm},
+    Kind("shaft", "driven by the load", (*NO_TURN, "OVERVOLTAGE"), _size(0.1, 1.0, True), _sets("load.active_nm", "torque_nm"),
          passes=0.5, limits=True),
-    Kind("temperature", "warm winding", ("OVERTEMPERATURE",), _size(1.05, 1.6), lambda size, place, rating: {"motor.rs_ohm": size * rating.rs_ohm},
+    Kind("temperature", "warm winding", ("OVERTEMPERATURE",), _size(1.05, 1.6), _sets("motor.rs_ohm", "rs_ohm"),
          over_s=(0.3, 1.0), limits=True),
-    Kind("temperature", "warm magnets", ("OVERTEMPERATURE",), _size(0.8, 0.99), lambda size, place, rating: {"motor.psi_vs": size * rating.psi_vs},
+    Kind("temperature", "warm magnets", ("OVERTEMPERATURE",), _size(0.8, 0.99), _sets("motor.psi_vs", "psi_vs"),
          over_s=(0.3, 1.0), limits=True),
-    Kind("clock", "crystal off frequency", ("CLOCK", "INTERRUPT_RATE"), _size(0.005, 0.3, True), lambda size, place, rating: {"cpu.crystal_hz": rating.crystal_hz * (1.0 + size)}),
-    Kind("interrupts", "some lost", ("INTERRUPT_RATE", "ADC_LOST", "ISR_OVERRUN"), _size(0.002, 0.6), lambda size, place, rating: {"fault.isr_lost_share": size},
+    Kind("clock", "crystal off frequency", ("CLOCK", "INTERRUPT_RATE"), lambda r: (1.0 + _size(0.005, 0.3, True)(r)[0], ""),
+         _sets("cpu.crystal_hz", "crystal_hz")),
+    Kind("interrupts", "some lost", ("INTERRUPT_RATE", "ADC_LOST", "ISR_OVERRUN"), _size(0.002, 0.6), _sets("fault.isr_lost_share"),
          passes=0.3, weight=2.0),
-    Kind("interrupts", "all lost", ("INTERRUPT_RATE", "ADC_LOST"), _one_of(1.0), lambda size, place, rating: {"cpu.isr_dropped": size}, passes=0.3, weight=0.5),
+    Kind("interrupts", "all lost", ("INTERRUPT_RATE", "ADC_LOST"), _one_of(1.0), _sets("cpu.isr_dropped"), passes=0.3, weight=0.5),
     Kind("interrupts", "late", ("INTERRUPT_RATE", "ISR_OVERRUN", "ADC_LOST"), _size(1.0, 45.0),
          lambda size, place, rating: {"fault.isr_late_us": size, "fault.isr_late_share": 0.02 if size > 20.0 else 0.3}, passes=0.3),
     Kind("RAM", "a bit of the drive's state", ("SELFTEST",), _bits((DRIVE_RAM,)), weight=6.0),
     Kind("RAM", "a bit of other variables", ("SELFTEST",), _bits((OTHER_RAM,)), weight=2.0),
-    _register_kind("PWM", 2.0), _register_kind("ADC", 1.5), _register_kind("ports", 1.0), _register_kind("interrupts", 0.5), _register_kind("clock", 0.5),
-    *(Kind(IMAGE, f"a bit of the {area}", STOPPED_CORE, _bits((area,)), weight=weight) for area, weight in ((FLASH, 1.0), (STACK, 0.5), (RAM, 0.5))),
+    *(_register_kind(group, weight) for group, weight in (("PWM", 2.0), ("ADC", 1.5), ("ports", 1.0), ("interrupts", 0.5), ("clock", 0.5))),
+    *(Kind(IMAGE, f"a bit of the {area}", STOPPED_CORE, _bits((area,)), weight=weight)
+      for area, weight in ((FLASH, 1.0), (STACK, 0.5), (RAM, 0.5))),
 )
 BY_NAME = {f"{kind.room}: {kind.name}": kind for kind in KINDS}
 

@@ -91,11 +91,13 @@ def scene(case: Case, bench: Bench) -> Scene:
         events.append(_event(speed_s, "speed_rpm", value=second, finds_range=True))
     ramp_s = abs(second - first) / slope
     end_s = closed_s + judge.SETTLE_S
+    ramping = 0.95 * (closed_s - START_S - lock_s - 0.4)
     begin = {"CALIBRATE": (0.0, 0.045, ()), "STOPPED": (0.06, START_S - 0.06, ()), "BOOTSTRAP": (START_S, 0.009, ("BOOTSTRAP",)),
-             "ALIGN": (START_S, 0.95 * lock_s, ("ALIGN",)), "RAMP": (START_S + lock_s, 0.95 * (closed_s - START_S - lock_s - 0.4), ("RAMP",)),
+             "ALIGN": (START_S, 0.95 * lock_s, ("ALIGN",)), "RAMP": (START_S + lock_s, ramping, ("RAMP",)),
              "accelerating": (speed_s + 0.02, 0.9 * ramp_s, ()), "braking": (speed_s + 0.02, 0.9 * ramp_s, ()),
-             "field weakening": (speed_s + 0.1 + ramp_s + SETTLE_S, STEADY_S, ()), "STOPPING": (speed_s, 0.5 * first / slope, ("STOPPING",)),
-             "FAULT": (speed_s, 0.5 * CLEAR_S, ("FAULT",)), "retry": (speed_s, CLEAR_S, RETRY_STATES)}.get(case.scene, (speed_s, STEADY_S, ()))
+             "field weakening": (speed_s + 0.1 + ramp_s + SETTLE_S, STEADY_S, ()),
+             "STOPPING": (speed_s, 0.5 * first / slope, ("STOPPING",)), "FAULT": (speed_s, 0.5 * CLEAR_S, ("FAULT",)),
+             "retry": (speed_s, CLEAR_S, RETRY_STATES)}.get(case.scene, (speed_s, STEADY_S, ()))
     if case.scene == "STOPPING":
         events += _press(speed_s)
     if case.scene == "FAULT":
