@@ -113,6 +113,14 @@ def test_a_code_before_the_injection_is_none():
     assert judge.judge(running(**cleared), running(**cleared), LIMITS).outcome == judge.NO_EFFECT
 
 
+def test_a_drive_that_cannot_leave_an_earlier_fault_says_so_and_is_not_silent():
+    cleared = {"fw__fault": lambda time_s: np.where(time_s < 0.8, 6.0, 0.0), "fw__state": after(0.8, 5.0, 7.0), "pwm__outputs_seen": after(0.8, 63.0)}
+    kept = {"fw__fault": 6.0, "fw__state": 7.0, "pwm__outputs_seen": 0.0, "plant__speed_rpm": 0.0}
+    found = judge.judge(running(**kept), running(**cleared), LIMITS)
+    assert (found.outcome, found.code, found.after_s) == (judge.ANOTHER, "STALL", None)
+    assert judge.judge(running(**kept), running(**kept), LIMITS).outcome == judge.NO_EFFECT
+
+
 @pytest.mark.parametrize("signals, why", [
     ({"pwm__outputs_seen": after(1.0, 0.0, 63.0)}, "stops without a code"),
     ({"plant__speed_rpm": after(0.6, -300.0, 1000.0)}, "turns backwards"),
