@@ -144,6 +144,18 @@ lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MO
 	@+$(ready)
 	@$(front_end) lowspeed $(options)
 
+# Each motor with the header that the tuner writes for it.
+drawn_from = $(tuner) tune --all --brief >/dev/null
+drawn = $(if $(SEED),--seed $(call quoted,$(SEED))) $(if $(CASE),--case $(call quoted,$(CASE))) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(out)
+.PHONY: campaign soak
+campaign: setup-run ## [tests] injected faults: ridden through, stopped by name, or wrong and silent [N=2000 SEED=1 CASE=number KIND="bus gain" MOTOR= OUT=]
+	@$(drawn_from)
+	@$(front_end) campaign $(if $(N),--count $(call quoted,$(N))) $(if $(KIND),--kind $(call quoted,$(KIND))) $(drawn)
+
+soak: setup-run ## [tests] motor hours of random commands, loads, temperatures, sags, noise: nothing may trip [HOURS=24 SEED=1 CASE=number MOTOR= OUT=]
+	@$(drawn_from)
+	@$(front_end) soak $(if $(HOURS),--hours $(call quoted,$(HOURS))) $(drawn)
+
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
 .PHONY: tune tune-fw identify board spreadsheet userparams setup-tune

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import build, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
+from . import build, campaign, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -66,6 +66,9 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}, with the names "
                              "of another motor, board or header")
         command.add_argument("--quiet", action="store_true", help="no progress bar")
+
+    campaign.add_command(commands)
+    soak.add_command(commands)
 
     listing = commands.add_parser("scenarios", help="list the scenarios")
     listing.set_defaults(command=_scenarios)

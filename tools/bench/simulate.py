@@ -114,30 +114,59 @@ def using(board: Any, job: Job) -> Iterator[Any]:
 
 def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
     """Run a job on a board that the caller has made and closes."""
-    scenario = job.scenario
-    for key, value in job.values.items():
-        board.set(key, value)
-    board.set("state.theta_e_deg", scenario.rotor_deg)
-    board.set("state.speed_rpm", scenario.speed_rpm)
-    if "bus.voltage_v" not in job.values:
-        board.set("bus.voltage_v", board.get("supply.voltage_v"))
-    recorder = _Recorder(board, job.signals, report)
-    done: list[tuple[float, str]] = [(0.0, "power-up")]
-    pending = list(job.actions)
-    while pending and pending[0].at_s <= 0.0: # in place before the firmware looks at its pins
-        _act(board, pending.pop(0), done)
-    board.power_up()
-    for name, value in job.parameters.items():
-        board.write_parameter(name, value)
-    started, cpu_started = time.perf_counter(), time.process_time()
-    while pending:
-        recorder.run_to(pending[0].at_s)
-        _act(board, pending.pop(0), done)
-    recorder.run_to(scenario.duration_s)
-    wall_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu_started
-    variables = {name: board.variable(name, count) for name, count in job.variables.items()}
-    return Run(scenario, recorder.trace(), done, board.warnings(), library.states, library.faults, variables,
-               library.params | job.parameters, wall_s, cpu_s, board.get("time_s"))
+    session = Session(job, library, board, report)
+    session.run_to(max([job.scenario.duration_s, *(action.at_s for action in job.actions)]))
+    return session.run()
+
+
+class Session:
+    """A job on a board, from power-up on, as far as it was taken. A row of the trace every `every` periods."""
+
+    def __init__(self, job: Job, library: Library, board: Any, report: Callable[[float], None], every: int = 1) -> None:
+        self.job, self.library, self.board = job, library, board
+        for key, value in job.values.items():
+            board.set(key, value)
+        board.set("state.theta_e_deg", job.scenario.rotor_deg)
+        board.set("state.speed_rpm", job.scenario.speed_rpm)
+        if "bus.voltage_v" not in job.values:
+            board.set("bus.voltage_v", board.get("supply.voltage_v"))
+        self.recorder = _Recorder(board, job.signals, report, every)
+        self.done: list[tuple[float, str]] = [(0.0, "power-up")]
+        self.pending = list(job.actions)
+        self._act_until(0.0) # in place before the firmware looks at its pins
+        board.power_up()
+        for name, value in job.parameters.items():
+            board.write_parameter(name, value)
+        self.wall_s, self.cpu_s = 0.0, 0.0
+
+    @property
+    def now_s(self) -> float:
+        return self.recorder.now_s
+
+    def run_to(self, until_s: float) -> None:
+        """Goes on to this time; what happens after it stays pending."""
+        started, cpu_started = time.perf_counter(), time.process_time()
+        while self.pending and self.pending[0].at_s <= until_s:
+            self.recorder.run_to(self.pending[0].at_s)
+            self._act_until(self.pending[0].at_s)
+        self.recorder.run_to(until_s)
+        self.wall_s += time.perf_counter() - started
+        self.cpu_s += time.process_time() - cpu_started
+
+    def _act_until(self, at_s: float) -> None:
+        while self.pending and self.pending[0].at_s <= at_s:
+            _act(self.board, self.pending.pop(0), self.done)
+
+    def plan(self, actions: list[panel.Action]) -> None:
+        """More that is to happen."""
+        self.pending = sorted(self.pending + actions, key=lambda action: action.at_s)
+
+    def run(self) -> Run:
+        """What has happened so far."""
+        job, library = self.job, self.library
+        variables = {name: self.board.variable(name, count) for name, count in job.variables.items()}
+        return Run(job.scenario, self.recorder.trace(), list(self.done), self.board.warnings(), library.states, library.faults, variables,
+                   library.params | job.parameters, self.wall_s, self.cpu_s, self.board.get("time_s"))
 
 
 def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> None:
@@ -152,7 +181,7 @@ def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> Non
 class _Recorder:
     """Lets the board run and collects its trace, a chunk at a time."""
 
-    def __init__(self, board: Any, signals: list[str], report: Callable[[float], None]) -> None:
+    def __init__(self, board: Any, signals: list[str], report: Callable[[float], None], every: int = 1) -> None:
         self.board = board
         self.signals = signals
         self.report = report
@@ -160,7 +189,7 @@ class _Recorder:
         self.period_s = 50e-6
         self.rows: list[np.ndarray] = []
         self.times: list[np.ndarray] = []
-        self.board.trace_start(signals, 1)
+        self.board.trace_start(signals, every)
 
     def run_to(self, until_s: float) -> None:
         while (periods := math.ceil((until_s - self.now_s) / self.period_s - 1e-6)) > 0:

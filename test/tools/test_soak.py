@@ -1,0 +1,114 @@
+"""The soak: what is drawn stays within what a motor can do, and what counts as a trip, a drift and a lost lock."""
+
+import numpy as np
+import pytest
+from support import FAULTS, LIBRARY, STATES, command, refused, trace
+
+from tools.bench import soak, trial
+from tools.bench.board import Library
+from tools.bench.run import Run
+from tools.common import board_file, motor_file
+
+HURST = "hurst_dmb0224c10002"
+
+
+@pytest.fixture(name="benches", scope="module")
+def _benches():
+    """The one-way firmware stands for both modes: the draw alone is looked at."""
+    bench = trial.Bench(motor_file.part(HURST), board_file.part("mclv"), Library(LIBRARY), [])
+    return {(HURST, ""): bench, (HURST, soak.BIDIRECTIONAL): bench}
+
+
+def test_a_number_always_draws_the_same_segment_and_another_number_or_seed_another(benches):
+    assert soak.draw(1, 3, benches) == soak.draw(1, 3, benches)
+    assert soak.draw(1, 3, benches) != soak.draw(1, 4, benches) and soak.draw(1, 3, benches).scenario != soak.draw(2, 3, benches).scenario
+
+
+def test_the_segments_have_all_that_may_happen_and_stay_within_the_rating(benches):
+    segments = [soak.draw(1, number, benches) for number in range(1, 41)]
+    events = [event for segment in segments for event in segment.scenario.events]
+    keys = {key for event in events for key in event.keys}
+    assert keys == {"load.constant_nm", "supply.voltage_v", "motor.rs_ohm", "motor.psi_vs"} and {event.kind for event in events} == {"set", "speed_rpm", "press"}
+    params = benches[HURST, ""].library.params
+    speeds = [event.value for event in events if event.kind == "speed_rpm"]
+    assert max(speeds) > params["NOMINAL_SPEED_RPM"] and min(speeds) < 0.0 # field weakening, and the other direction where the mode has it
+    assert all(params["MINIMUM_SPEED_RPM"] <= abs(rpm) <= params["MAXIMUM_SPEED_RPM"] for rpm in speeds)
+    loads = [event.keys["load.constant_nm"] for event in events if "load.constant_nm" in event.keys]
+    assert min(loads) >= 0.0 and 0.03 < max(loads) <= 0.6 * motor_file.load(HURST).rated_torque_nm
+    assert sum(segment.starts for segment in segments) > 60 and sum(len(segment.rests) for segment in segments) > 200
+
+
+def test_nothing_changes_in_a_stretch_that_is_judged(benches):
+    for number in range(1, 21):
+        segment = soak.draw(1, number, benches)
+        for from_s, to_s, _ in segment.rests:
+            assert to_s - from_s >= soak.REST_S - 1e-3
+            assert not [event for event in segment.scenario.events if from_s - 0.05 < event.at_s < to_s - 0.11], (number, from_s)
+
+
+# ---- what counts as wrong --------------------------------------------------------------------------------------------------
+def found(rests, **signals):
+    recorded = trace(2.0, **{"plant__speed_rpm": 1000.0, "fw__state": 5.0, "pwm__outputs_seen": 63.0} | signals)
+    segment = soak.Segment(1, HURST, "", None, rests)
+    return soak.row_of(segment, Run(None, recorded, states=STATES, faults=FAULTS, motor_s=2.0), 2800.0)
+
+
+REST = [(1.0, 1.5, 1000.0)]
+
+
+def test_a_run_at_its_reference_is_fine():
+    row = found(REST)
+    assert row["verdict"] == soak.OK and row["stretches"] == 1
+
+
+def test_a_trip_is_named_with_its_time():
+    assert found(REST, fw__fault=lambda time_s: np.where(time_s > 1.2, 6.0, 0.0))["verdict"] == "trips: STALL at 1.200 s"
+
+
+def test_a_drift_is_wrong_unless_the_drive_names_a_limit():
+    slow = {"plant__speed_rpm": 985.0}
+    assert "speed -1.50 % off" in found(REST, **slow)["verdict"]
+    limited = found(REST, fw__limits=1.0, **slow)
+    assert limited["verdict"] == soak.OK and limited["stretches"] == 0
+    assert found([], **slow)["verdict"] == soak.OK # between the stretches the speed is on its way
+
+
+def test_a_lost_lock_is_an_angle_that_stays_off_in_closed_loop():
+    off = lambda for_s: lambda time_s: np.where((time_s > 1.2) & (time_s < 1.2 + for_s), 90.0, 0.0) # noqa: E731
+    assert "loses its lock" in found(REST, fw__theta_est_deg=off(0.06))["verdict"]
+    assert found(REST, fw__theta_est_deg=off(0.04))["verdict"] == soak.OK
+    assert found(REST, fw__theta_est_deg=off(0.06), fw__state=4.0)["verdict"] == soak.OK
+
+
+# ---- the command -------------------------------------------------------------------------------------------------------------
+def test_one_segment_alone_gives_its_whole_report(benches, monkeypatch, tmp_path):
+    monkeypatch.setattr(soak, "prepared", lambda names: {(HURST, ""): benches[HURST, ""]})
+    monkeypatch.setattr(soak, "MODES", ("",))
+    monkeypatch.setattr(soak, "SEGMENT_S", 4.0)
+    code, out, error = command("soak", "--case", "3", "--quiet", "--out", str(tmp_path / "out"))
+    assert code == 0 and "segment 3" in out and "closed loop" in out, error
+    assert (tmp_path / "out" / "index.html").is_file() and (tmp_path / "out" / "trace.csv").is_file()
+
+
+def test_an_interrupted_soak_goes_on_with_the_segments_that_are_missing(benches, monkeypatch, tmp_path):
+    monkeypatch.setattr(soak, "prepared", lambda names: {(HURST, ""): benches[HURST, ""]})
+    monkeypatch.setattr(soak, "MODES", ("",))
+    monkeypatch.setattr(soak, "SEGMENT_S", 3.0)
+    whole = soak.run
+
+    def broken(segment, benches, tell):
+        if segment.number == 4:
+            raise soak.UserError("interrupted", "test")
+        return whole(segment, benches, tell)
+    arguments = ("soak", "--case", "1", "2", "3", "4", "--quiet", "--out", str(tmp_path / "out"))
+    monkeypatch.setattr(soak, "run", broken)
+    assert command(*arguments)[0] == 2 and not (tmp_path / "out").exists()
+    monkeypatch.setattr(soak, "run", whole)
+    code, out, _ = command(*arguments)
+    assert code == 0 and "of 4 segments are there already" in out and "4 of 4" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("arguments, says", [(["--hours", "0"], "--hours"), (["--hours", "nan"], "--hours"), (["--case", "0"], "--case"),
+                                             (["--hours", "long"], "--hours"), (["--motor", "nosuch"], "nosuch")])
+def test_bad_input_is_refused_in_one_line(arguments, says):
+    refused(command("soak", *arguments), says)

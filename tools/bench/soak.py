@@ -1,0 +1,362 @@
+"""`soak`: motor hours of random commands, loads, temperatures, sags and noise over all motors, within what each can do. Nothing is broken, so nothing
+may trip, drift or lose its lock.
+
+The hours are cut into segments, each drawn by its number. An interrupted soak goes on where it was."""
+
+import argparse
+import math
+import random
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.common import board_file, motor_file, output, paths, workers
+from tools.common.board_keys import Values
+from tools.common.errors import UserError
+from tools.common.progress import Progress
+from tools.common.trace import wrapped_deg
+
+from . import command_common, judge, page, picture, reach, report, simulate
+from .board import Board
+from .campaign import Part
+from .run import Run
+from .scenario import BRAKE, Event, Scenario, param, start_time_s
+from .trial import Bench, coast_s
+
+RESULTS = paths.ROOT / "build" / "soak"
+SEGMENTS = "segments.csv"
+KEYS = ("segment", "motor", "mode", "motor_s", "starts", "stretches", "worst_speed_error_percent", "worst_angle_error_deg", "verdict")
+SEGMENT_S = 40.0
+"""Of motor time, about."""
+EVERY = 20
+"""Periods to a row of the trace."""
+SPEED_ERROR = 0.01
+"""Of the reference, in a stretch without change; of the rated speed a fifth of it where that is more."""
+LOST_LOCK_DEG, LOST_LOCK_S = 60.0, 0.05
+REST_S = 0.4
+SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
+"""Of the rated torque: the largest that motor and supply can hold is drawn from."""
+SAGS, WARM_R, WARM_PSI = (0.87, 1.0), (0.85, 1.4), (0.85, 1.05)
+MIDDLE = 0.05
+"""Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
+VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
+BIDIRECTIONAL = "BIDIRECTIONAL_SPEED"
+MODES = ("", "", BIDIRECTIONAL)
+"""One of these in a segment."""
+MOST_HOURS = 10000.0
+WHERE = "soak"
+OK = "ok"
+
+
+@dataclass
+class Segment:
+    """What happens in one segment, and the stretches in which nothing changes: from, to, reference in rpm."""
+
+    number: int
+    motor: str
+    mode: str
+    scenario: Scenario
+    rests: list[tuple[float, float, float]] = field(default_factory=list)
+    starts: int = 1
+
+
+def add_command(commands: Any) -> None:
+    """Adds `soak` to a command line's commands."""
+    parser = commands.add_parser("soak", help="motor hours of random commands, loads, temperatures, sags, noise: nothing may trip")
+    parser.add_argument("--hours", type=float, default=24.0, help="motor hours, simulated; default 24")
+    parser.add_argument("--seed", type=int, default=1, help="of the draw; default 1")
+    parser.add_argument("--case", type=int, nargs="+", metavar="NUMBER", help="these segments alone; of a single one the whole report")
+    parser.add_argument("--motor", nargs="+", metavar="NAME", help="motors to draw from; default: all of tuning/motors")
+    parser.add_argument("--out", type=Path, help="result folder, replaced when complete; default build/soak/seed-SEED")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.set_defaults(command=command)
+
+
+def prepared(names: list[str]) -> dict[tuple[str, str], Bench]:
+    """Every motor with the firmware of its own header, in one direction and in both; by motor and mode."""
+    result = {}
+    for name in names:
+        motor = motor_file.load(name, "--motor")
+        header = command_common.tuned_header(motor.path, None)
+        for mode in sorted(set(MODES)):
+            library = command_common.library_for([mode] if mode else [], None, header)
+            result[motor.name, mode] = Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), library, [])
+    return result
+
+
+def command(options: argparse.Namespace) -> int:
+    """The whole command; returns the exit code."""
+    if not 0.0 < options.hours <= MOST_HOURS:
+        raise UserError(f"{options.hours:g} motor hours are impossible", "--hours", f"choose more than 0, at most {MOST_HOURS:g}")
+    if min(options.case or [1]) < 1:
+        raise UserError(f"{min(options.case)} is no number of a segment", "--case", "choose 1 or more")
+    benches = prepared(options.motor or paths.names(paths.MOTORS))
+    numbers = sorted(set(options.case)) if options.case else list(range(1, math.ceil(3600.0 * options.hours / SEGMENT_S) + 1))
+    segments = [draw(options.seed, number, benches) for number in numbers]
+    target = options.out or RESULTS / (f"seed-{options.seed}" + (f"-case-{numbers[0]}" if options.case else ""))
+    if options.case and len(segments) == 1:
+        return _alone(segments[0], benches, target)
+    part = Part(target, _identity(options.seed, benches), KEYS, "segment")
+    known = part.rows()
+    missing = [segment for segment in segments if segment.number not in known]
+    if len(missing) < len(segments):
+        print(f"{len(segments) - len(missing)} of {len(segments)} segments are there already, {paths.shown(part.folder)}")
+    with Progress("soak", sum(segment.scenario.duration_s for segment in segments) / 3600.0, options.quiet, "motor hours") as progress:
+        progress(sum(segment.scenario.duration_s for segment in segments if segment.number in known) / 3600.0)
+        workers.run_all(missing, lambda segment, tell: _one(segment, benches, part, tell), progress)
+    found = part.rows()
+    rows = [found[segment.number] for segment in segments]
+    with output.ResultFolder(target) as folder:
+        _write(folder.work, rows, segments, benches, options.seed)
+    part.remove()
+    print(_text(rows))
+    print(f"results in {paths.shown(target)}/: index.html")
+    bad = [row for row in rows if row["verdict"] != OK]
+    for row in bad[:20]:
+        print(f"segment {row['segment']}, {row['motor']}{', ' + row['mode'] if row['mode'] else ''}: {row['verdict']}")
+    return 1 if bad else 0
+
+
+def _identity(seed: int, benches: dict[tuple[str, str], Bench]) -> dict[str, Any]:
+    files = [paths.ROOT / "tools" / "bench" / "soak.py", *(benches[key].library.path for key in sorted(benches))]
+    return {"seed": seed, "motors": [list(key) for key in sorted(benches)], "files": [zlib.crc32(path.read_bytes()) for path in files]}
+
+
+def draw(seed: int, number: int, benches: dict[tuple[str, str], Bench]) -> Segment:
+    """The segment with this number: always the same."""
+    r = random.Random(f"soak/{seed}/{number}")
+    name, mode = r.choice(sorted({name for name, _ in benches})), r.choice(MODES)
+    return _Drawing(r, number, name, mode, benches[name, mode]).segment()
+
+
+class _Drawing:
+    """The operator of one segment while he makes up his mind."""
+
+    def __init__(self, r: random.Random, number: int, name: str, mode: str, bench: Bench) -> None:
+        self.r, self.number, self.name, self.mode = r, number, name, mode
+        self.params, self.motor = bench.library.params, motor_file.load(str(bench.motor.path))
+        self.plant = {**bench.board.values.values, **bench.motor.values.values}
+        self.bus_v = float(self.plant["supply.voltage_v"])
+        self.slow, self.nominal, self.most = (param(self.params, f"{what}_SPEED_RPM") for what in ("MINIMUM", "NOMINAL", "MAXIMUM"))
+        self.slow += MIDDLE * (self.nominal - self.slow) if mode else 0.0
+        self.slope = param(self.params, "SPEEDREFRAMP_RPM_PER_S")
+        self.settle_s = max(8.0 / param(self.params, "SPEED_BANDWIDTH_HZ"), 0.7)
+        self.events: list[Event] = []
+        self.rests: list[tuple[float, float, float]] = []
+        self.rpm, self.load_nm, self.starts, self.now_s = 0.0, 0.0, 0, 0.2
+
+    def segment(self) -> Segment:
+        values = {"rng.seed": float(self.r.randrange(1, 2**31)), "adc.noise_lsb": self.r.uniform(0.3, 1.5),
+                  "shunt.offset_a_v": self.r.uniform(-0.02, 0.02), "shunt.offset_b_v": self.r.uniform(-0.02, 0.02),
+                  "supply.resistance_ohm": float(self.plant.get("supply.resistance_ohm", 0.1)) * self.r.uniform(0.5, 2.0),
+                  **{key: value * self.r.uniform(*span) for key, value, span in self._warm()}}
+        self._load(self.r.uniform(0.0, 0.5) * self.motor.start_torque_nm, 0.0, 0.0)
+        self._start()
+        while self.now_s < SEGMENT_S:
+            self.r.choices((self._speed, self._new_load, self._again, self._sag, self._temperature), (45, 25, 8, 12, 10))[0]()
+        scenario = Scenario(f"segment {self.number}", f"{self.name} {self.mode}".strip(), "", "", "", round(self.now_s, 3), defines=[self.mode] if self.mode else [],
+                            events=sorted(self.events, key=lambda event: event.at_s), rotor_deg=float(self.r.randrange(360)),
+                            plant=Values(values, {key: WHERE for key in values}))
+        return Segment(self.number, self.name, self.mode, scenario, self.rests, self.starts)
+
+    def _warm(self) -> list[tuple[str, float, tuple[float, float]]]:
+        return [("motor.rs_ohm", float(self.plant["motor.rs_ohm"]), WARM_R), ("motor.psi_vs", float(self.plant["motor.psi_vs"]), WARM_PSI)]
+
+    def _event(self, at_s: float, kind: str, **more: Any) -> None:
+        self.events.append(Event(round(at_s, 4), kind, WHERE, **more))
+
+    def _set(self, keys: dict[str, float], over_s: float = 0.0, at_s: float | None = None) -> None:
+        self._event(self.now_s if at_s is None else at_s, "set", keys=keys, over_s=over_s)
+
+    def _start(self) -> None:
+        self.rpm = self.r.uniform(self.slow, self.nominal) * self._direction()
+        self._event(max(self.now_s - 0.1, 0.0), "speed_rpm", value=self.rpm, finds_range=True)
+        self._event(self.now_s, "press", button="S2", hold_s=0.1)
+        self.starts += 1
+        self.now_s += start_time_s(self.params)
+        self._rest(abs(abs(self.rpm) - param(self.params, "END_SPEED_RPM")))
+
+    def _direction(self) -> float:
+        return self.r.choice((1.0, -1.0)) if self.mode else 1.0
+
+    def _rest(self, change_rpm: float, more_s: float = 0.0) -> None:
+        """Long enough to settle and be judged, or not."""
+        if self.r.random() < 0.35:
+            self.now_s += more_s + self.r.uniform(0.05, 0.6)
+            return
+        settled_s = self.now_s + more_s + change_rpm / self.slope + self.settle_s * (1.0 + self.nominal / max(abs(self.rpm), self.slow) * 0.1)
+        self.now_s = settled_s + REST_S + self.r.uniform(0.0, 1.0)
+        self.rests.append((round(settled_s, 4), round(self.now_s, 4), self.rpm))
+
+    def _speed(self) -> None:
+        before = self.rpm
+        top = self.nominal if self.mode or self.r.random() < 0.7 else self.most
+        self.rpm = self.r.uniform(self.slow, top) * (self._direction() if self.r.random() < 0.3 else math.copysign(1.0, before))
+        if self._most_nm(self.rpm) < self.load_nm:
+            self._load(self.r.random() * self._most_nm(self.rpm), 0.2)
+        over_s = self.r.choice((0.0, self.r.uniform(0.0, 1.5)))
+        self._event(self.now_s, "speed_rpm", value=self.rpm, finds_range=True, over_s=over_s)
+        turns = self.rpm * before < 0.0
+        coast_s = self._stop_s(before) + start_time_s(self.params) + 1.0 if turns else 0.0
+        if turns:
+            self._load(min(self.load_nm, 0.5 * self.motor.start_torque_nm), 0.1)
+            self.starts += 1
+        if coast_s: # a stop, and a start the other way
+            self.now_s += over_s + coast_s
+        self._rest(abs(self.rpm - before), 0.0 if turns else over_s)
+
+    def _stop_s(self, rpm: float) -> float:
+        """How long a stop takes, also where the supply takes nothing back and friction alone brakes."""
+        return max(abs(rpm) / self.slope, coast_s(self.motor, rpm)) + 0.5
+
+    def _most_nm(self, rpm: float) -> float:
+        """The largest drawn load that a warm motor holds at a sagging supply."""
+        values = {key: float(value) for key, value in self.plant.items() if not isinstance(value, tuple)}
+        values["motor.rs_ohm"] *= WARM_R[1]
+        values["motor.psi_vs"] *= WARM_PSI[1]
+        most_a = CURRENT_SHARE * param(self.params, "MAXIMUM_CURRENT_A")
+        for share in SHARES:
+            need = reach.least(values, abs(rpm), share * self.motor.rated_torque_nm, most_a)
+            if need.voltage_v is not None and need.voltage_v <= VOLTAGE_SHARE * SAGS[0] * self.bus_v / math.sqrt(3.0):
+                return share * self.motor.rated_torque_nm
+        return 0.0
+
+    def _load(self, torque_nm: float, over_s: float, at_s: float | None = None) -> None:
+        self.load_nm = torque_nm
+        self._set({BRAKE: torque_nm}, over_s, at_s)
+        self.now_s += over_s
+
+    def _new_load(self) -> None:
+        self._load(self.r.random() * self._most_nm(self.rpm), self.r.choice((0.05, self.r.uniform(0.05, 1.0))))
+        self._rest(0.0)
+
+    def _again(self) -> None:
+        """A stop, and a start some time later."""
+        self._event(self.now_s, "press", button="S2", hold_s=0.1)
+        self.now_s += 0.2 + self._stop_s(self.rpm)
+        self._load(self.r.uniform(0.0, 0.5) * self.motor.start_torque_nm, 0.05)
+        self.now_s += 0.5 + self.r.random()
+        self._start()
+
+    def _sag(self) -> None:
+        over_s, lasts_s = self.r.choice((0.0, 0.02)), self.r.uniform(0.05, 1.0)
+        self._set({"supply.voltage_v": self.bus_v * self.r.uniform(*SAGS)}, over_s)
+        self._set({"supply.voltage_v": self.bus_v}, 0.0, self.now_s + over_s + lasts_s)
+        self.now_s += over_s + lasts_s
+        self._rest(0.0)
+
+    def _temperature(self) -> None:
+        over_s = self.r.uniform(1.0, 5.0)
+        self._set({key: value * self.r.uniform(*span) for key, value, span in self._warm()}, over_s)
+        self.now_s += over_s
+        self._rest(0.0)
+
+
+def _one(segment: Segment, benches: dict[tuple[str, str], Bench], part: Part, tell: Callable[[float], None]) -> None:
+    found = run(segment, benches, lambda seconds: tell(seconds / 3600.0))
+    part.add(row_of(segment, found, motor_file.load(str(benches[segment.motor, segment.mode].motor.path)).rated_speed_rpm))
+
+
+def run(segment: Segment, benches: dict[tuple[str, str], Bench], tell: Callable[[float], None]) -> Run:
+    """The segment in this process, which can run no other board afterwards."""
+    bench = benches[segment.motor, segment.mode]
+    job = simulate.prepare(segment.scenario, bench.library, bench.motor, bench.board)
+    with simulate.using(Board(bench.library), job) as board:
+        session = simulate.Session(job, bench.library, board, tell, EVERY)
+        session.run_to(segment.scenario.duration_s)
+        return session.run()
+
+
+def row_of(segment: Segment, found: Run, rated_rpm: float) -> dict[str, Any]:
+    """The segment's line: what was worst, and the first thing that is wrong."""
+    trace = found.trace
+    errors = [error for rest in segment.rests if (error := _speed_error(trace, rest, rated_rpm)) is not None]
+    angle_deg = _angle_error_deg(found)
+    return {"segment": segment.number, "motor": segment.motor, "mode": segment.mode, "motor_s": round(found.motor_s, 2), "starts": segment.starts,
+            "stretches": len(errors), "worst_speed_error_percent": round(max((abs(error) for _, error, _ in errors), default=0.0), 3),
+            "worst_angle_error_deg": round(angle_deg, 1), "verdict": verdict(found, errors, angle_deg)}
+
+
+def verdict(run: Run, errors: list[tuple[float, float, float]], angle_deg: float) -> str:
+    """The first thing that is wrong; OK if nothing is."""
+    for _, at_s, name in run.fault_changes():
+        if name != run.faults.get(0, "NONE"):
+            return f"trips: {name} at {at_s:.3f} s"
+    for at_s, error_percent, allowed_percent in errors:
+        if abs(error_percent) > allowed_percent:
+            return f"speed {error_percent:+.2f} % off at {at_s:.2f} s, allowed {allowed_percent:.2f} %"
+    return f"loses its lock: angle off by {angle_deg:.0f} deg" if angle_deg > LOST_LOCK_DEG else OK
+
+
+def _speed_error(trace: Any, rest: tuple[float, float, float], rated_rpm: float) -> tuple[float, float, float] | None:
+    """When, error and allowed error in per cent of a stretch's reference; None where the drive says which limit holds the speed back."""
+    from_s, to_s, rpm = rest
+    part = trace.part(from_s, to_s)
+    everywhere = np.ones(len(part), dtype=bool)
+    if not len(part) or judge.limited(part, everywhere) > 0.02:
+        return None
+    mean_rpm = float(np.mean(part.column("plant.speed_rpm").astype(np.float64)))
+    allowed_rpm = max(SPEED_ERROR * abs(rpm), 0.2 * SPEED_ERROR * rated_rpm)
+    return from_s, 100.0 * (mean_rpm - rpm) / abs(rpm), 100.0 * allowed_rpm / abs(rpm)
+
+
+def _angle_error_deg(run: Run) -> float:
+    """The largest error that lasts for LOST_LOCK_S in closed loop; the sign may change."""
+    trace = run.trace
+    closed = (trace.column("fw.state") == run.state_number("CLOSED")) | (trace.column("fw.state") == run.state_number("STOPPING"))
+    error = np.where(closed, np.abs(wrapped_deg(trace.column("fw.theta_est_deg") - trace.column("plant.theta_e_deg"))), 0.0)
+    rows = max(1, round(LOST_LOCK_S / max(trace.period_s, 1e-6)))
+    if len(error) < rows:
+        return 0.0
+    return float(np.max(np.min(np.lib.stride_tricks.sliding_window_view(error, rows), axis=1)))
+
+
+def _alone(segment: Segment, benches: dict[tuple[str, str], Bench], target: Path) -> int:
+    bench = benches[segment.motor, segment.mode]
+    with output.ResultFolder(target) as folder:
+        row, text = workers.run_all([segment], lambda item, tell: _report(item, benches, folder.work), lambda seconds: None)[0]
+        output.write_summary(folder.work, report.clean({"title": segment.scenario.title, "passed": row["verdict"] == OK, "row": row}))
+    print(text)
+    print(f"\nsegment {segment.number}, {segment.motor}, header of {paths.shown(bench.motor.path)}: {row['verdict']}")
+    print(f"results in {paths.shown(target)}/: index.html")
+    return 0 if row["verdict"] == OK else 1
+
+
+def _report(segment: Segment, benches: dict[tuple[str, str], Bench], folder: Path) -> tuple[dict[str, Any], str]:
+    bench = benches[segment.motor, segment.mode]
+    found = run(segment, benches, lambda seconds: None)
+    data = report.summary(found, [], str(bench.motor.path), str(bench.board.path))
+    output.write_trace(folder / "trace.csv", found.trace)
+    report.write_page(folder, found, [], data)
+    return row_of(segment, found, motor_file.load(str(bench.motor.path)).rated_speed_rpm), report.text(found, [], data)
+
+
+def _text(rows: list[dict[str, Any]]) -> str:
+    """What was run and what went wrong, by motor."""
+    lines = []
+    for name in sorted({row["motor"] for row in rows}):
+        own = [row for row in rows if row["motor"] == name]
+        lines.append(f"{name:28} {sum(row['motor_s'] for row in own) / 3600.0:8.3f} h {sum(row['starts'] for row in own):6d} starts "
+                     f"{sum(row['stretches'] for row in own):6d} stretches, worst speed error {max(row['worst_speed_error_percent'] for row in own):.2f} %, "
+                     f"{sum(row['verdict'] != OK for row in own)} wrong")
+    return "\n".join(lines)
+
+
+def _write(folder: Path, rows: list[dict[str, Any]], segments: list[Segment], benches: dict[tuple[str, str], Bench], seed: int) -> None:
+    output.write_csv(folder / SEGMENTS, list(KEYS), [[row[key] for key in KEYS] for row in rows])
+    bad = [row for row in rows if row["verdict"] != OK]
+    hours = sum(row["motor_s"] for row in rows) / 3600.0
+    output.write_summary(folder, report.clean({"title": f"{hours:.3f} motor hours, seed {seed}", "passed": not bad, "motor_hours": hours, "wrong": len(bad)}))
+    shown = (bad + sorted((row for row in rows if row["verdict"] == OK), key=lambda row: -row["worst_speed_error_percent"]))[:12]
+    by_number = {segment.number: segment for segment in segments}
+    pictures = [workers.run_all([by_number[row["segment"]]], lambda item, tell: picture.of(run(item, benches, tell), 4 * picture.SWEEP_STRETCHES),
+                                lambda seconds: None)[0] for row in shown]
+    table = page.Table("The worst segments", list(KEYS), [page.Row([str(row[key]) for key in KEYS], row["verdict"] != OK, number)
+                                                          for number, row in enumerate(shown)])
+    page.write(folder, page.Page(f"soak: {hours:.3f} motor hours, seed {seed}", not bad, f"{len(rows) - len(bad)} of {len(rows)} segments without a fault",
+                                 [*_text(rows).splitlines(), "make soak CASE=number runs one segment again, with its whole report."], [table], pictures, [], [],
+                                 [SEGMENTS, output.SUMMARY]))
