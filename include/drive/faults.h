@@ -30,7 +30,9 @@
     X(12, TRAP, "the processor took a trap or an unexpected interrupt", \
       "read board_trap_intcon1, the copy of INTCON1 that says which trap it was") \
     X(13, WATCHDOG, "the watchdog reset the processor: the background or the control interrupt stood still", \
-      "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it")
+      "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it") \
+    X(20, SELFTEST, "a self-test failed: memory, processor, clock, program flow or a register is not as it must be", \
+      "see board_selftest_failed or the status line for the test, docs/selftest.md for its meaning, then reset: S2 does not clear this one")
 
 #define DRIVE_FAULT_ENUM(code, name, cause, remedy) FAULT_##name = (code),
 /** Fault codes. */

@@ -1,0 +1,35 @@
+/* What the self-tests add to the drive: critical variables kept twice, and the marks of the slow phases. Nothing with SELFTEST_OFF. */
+#ifndef DRIVE_SELFTEST_STATE_H
+#define DRIVE_SELFTEST_STATE_H
+
+#include "control/qmath.h"
+#include "drive/param_scaling.h" /* userparams.h may define SELFTEST_OFF */
+
+#ifndef SELFTEST_OFF
+
+/** Complements of the drive's fields of the same name, and the last four slow phases, four bits each. */
+typedef struct {
+    uint16_t state, fault, direction, offset_a, offset_b;
+    uint16_t marks;
+} selftest_state_t;
+
+/** Member of drive_t. */
+#define SELFTEST_STATE selftest_state_t selftest;
+
+/** Goes with every write of a field that is kept twice. */
+#define SELFTEST_KEEP(d, field, value) ((d)->selftest.field = (uint16_t) ~(uint16_t)(value))
+
+/** A slow phase has come to its end. */
+#define SELFTEST_MARK(d, phase) ((d)->selftest.marks = (uint16_t)((uint16_t)((d)->selftest.marks << 4) | (phase)))
+
+/** The marks before the first period: phases 5, 6, 7, 0. */
+#define SELFTEST_NO_MARKS(d) ((d)->selftest.marks = 0x5670u)
+
+#else
+#define SELFTEST_STATE
+#define SELFTEST_KEEP(d, field, value) ((void)0)
+#define SELFTEST_MARK(d, phase) ((void)(phase))
+#define SELFTEST_NO_MARKS(d) ((void)0)
+#endif
+
+#endif
