@@ -21,8 +21,8 @@
     ((((SELFTEST_PART_SUPERVISE * 8u + SELFTEST_PART_PANEL) * 8u) + SELFTEST_PART_WATCH) * 8u + SELFTEST_PART_STATUS)
 
 volatile uint16_t board_selftest_failed BOARD_PERSISTENT;
+uint16_t board_selftest_parts;
 
-static uint16_t parts;    /* of the background, three bits each */
 static uint16_t owed_ms;  /* how long the tests between two interrupts have waited */
 static uint16_t stepped;  /* drive ticks at the last selftest_ms() */
 static uint16_t ms;       /* counts on */
@@ -112,7 +112,7 @@ static uint16_t outputs_hold(void)
 
 static uint16_t flash_at;
 static uint16_t flash_without_crc; /* erased words in its place: linked without tools/image/crc.py */
-static uint16_t flash_crc = SELFTEST_CRC_START;
+static uint16_t flash_crc;
 
 uint16_t selftest_flash(void)
 {
@@ -120,6 +120,9 @@ uint16_t selftest_flash(void)
     TBLPAG = 0;
     for (left = FLASH_WORDS; left != 0u; left--) {
         uint16_t low = (uint16_t)__builtin_tblrdl(flash_at), high = (uint16_t)__builtin_tblrdh(flash_at);
+        if (flash_at == 0u) {
+            flash_crc = SELFTEST_CRC_START;
+        }
         flash_crc = selftest_crc(selftest_crc(selftest_crc(flash_crc, low & 0xFFu), low >> 8), high & 0xFFu);
         flash_at = (uint16_t)(flash_at + 2u);
         if (flash_at == BOARD_FLASH_CRC_AT) {
@@ -130,7 +133,6 @@ uint16_t selftest_flash(void)
                 selftest_fail(SELFTEST_FLASH);
             }
             flash_at = 0;
-            flash_crc = SELFTEST_CRC_START;
             return 1;
         }
     }
@@ -148,8 +150,8 @@ const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLAS
 static void test_ram_slice(void)
 {
     static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
-    static volatile uint16_t *at = BOARD_RAM;
-    static uint16_t n;
+    static uint16_t from, n; /* word of the RAM, background */
+    volatile uint16_t *at = BOARD_RAM + from;
     uint16_t words = (uint16_t)(BOARD_RAM_END - at);
 
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
@@ -158,9 +160,9 @@ static void test_ram_slice(void)
         if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
             selftest_fail(SELFTEST_RAM);
         }
-        at += words - 1u;
+        from = (uint16_t)(from + words - 1u);
     } else {
-        at = BOARD_RAM;
+        from = 0;
         n = (uint16_t)((n + 1u < SELFTEST_BACKGROUNDS) ? n + 1u : 0u);
         if (!board_cpu_holds()) {
             selftest_fail(SELFTEST_CPU);
@@ -213,11 +215,6 @@ static void end_adc(void)
 
 /* ---- program flow ---- */
 
-void selftest_part(uint16_t part)
-{
-    parts = (uint16_t)((part == (uint16_t)SELFTEST_PART_SUPERVISE) ? part : (uint16_t)(parts << 3) | part);
-}
-
 void selftest_pass(void)
 {
     uint16_t level;
@@ -227,7 +224,7 @@ void selftest_pass(void)
     if ((uint16_t)(board_drive.ticks - stepped) > PARAM_PERIODS(OWED_MS * 0.001F)) {
         selftest_fail(SELFTEST_FLOW);
     }
-    selftest_part(SELFTEST_PART_SUPERVISE);
+    board_selftest_parts = SELFTEST_PART_SUPERVISE;
     end_adc();
     if (owed_ms != 0u && BOARD_QUIET()) {
         SET_AND_SAVE_CPU_IPL(level, 7);
@@ -242,7 +239,7 @@ void selftest_ms(void)
     ms++;
     owed_ms++;
     stepped = board_drive.ticks;
-    if (parts != PARTS_IN_ORDER || owed_ms > OWED_MS) {
+    if (board_selftest_parts != PARTS_IN_ORDER || owed_ms > OWED_MS) {
         selftest_fail(SELFTEST_FLOW);
     }
     if (STACK_GUARD[0] != STACK_PATTERN || STACK_GUARD[1] != STACK_PATTERN || SPLIM != (uint16_t)(uintptr_t)BOARD_STACK_LIMIT) {

@@ -25,8 +25,14 @@ void selftest_start(drive_fault_t kept);
 /** First of all in a pass of the background. */
 void selftest_pass(void);
 
+/** The background's parts that have come to their end, three bits each. */
+extern uint16_t board_selftest_parts;
+
 /** A part of the background has come to its end. */
-void selftest_part(uint16_t part);
+QM_INLINE void selftest_part(uint16_t part)
+{
+    board_selftest_parts = (uint16_t)((uint16_t)(board_selftest_parts << 3) | part);
+}
 
 /** At the end of a millisecond's work. */
 void selftest_ms(void);

@@ -16,11 +16,23 @@ typedef struct {
 /** Member of drive_t. */
 #define SELFTEST_STATE selftest_state_t selftest;
 
+/** The complement of what is written. */
+QM_INLINE uint16_t selftest_complement(uint16_t value)
+{
+    return (uint16_t)~value;
+}
+
+/** The last four phases with one more. */
+QM_INLINE uint16_t selftest_marked(uint16_t marks, uint16_t phase)
+{
+    return (uint16_t)((uint16_t)(marks << 4) | phase);
+}
+
 /** Goes with every write of a field that is kept twice. */
-#define SELFTEST_KEEP(d, field, value) ((d)->selftest.field = (uint16_t) ~(uint16_t)(value))
+#define SELFTEST_KEEP(d, field, value) ((d)->selftest.field = selftest_complement((uint16_t)(value)))
 
 /** A slow phase has come to its end. */
-#define SELFTEST_MARK(d, phase) ((d)->selftest.marks = (uint16_t)((uint16_t)((d)->selftest.marks << 4) | (phase)))
+#define SELFTEST_MARK(d, phase) ((d)->selftest.marks = selftest_marked((d)->selftest.marks, phase))
 
 /** The marks before the first period: phases 5, 6, 7, 0. */
 #define SELFTEST_NO_MARKS(d) ((d)->selftest.marks = 0x5670u)
