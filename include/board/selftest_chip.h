@@ -61,8 +61,8 @@ NOINLINE uint16_t board_cpu_holds_pattern(uint16_t pattern_value, uint16_t flags
 }
 #define board_cpu_holds() (board_cpu_holds_pattern(0x5555u, 0x01E5u) && board_cpu_holds_pattern(0xAAAAu, 0x00EAu))
 
-/** 1 while no control interrupt can come for 400 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. */
-#define BOARD_QUIET() (P1TMR < (uint16_t)(BOARD_P1TPER - 150u))
+/** 1 while no control interrupt can come for 600 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. */
+#define BOARD_QUIET() (P1TMR < (uint16_t)(BOARD_P1TPER - 350u))
 
 /** A pass of waiting for the watchdog's reset. @return 0: the reset leaves no time for another answer */
 #define BOARD_WATCHDOG_BITES() 0u

@@ -2,11 +2,8 @@
 #ifndef BOARD_SELFTEST_RUN_H
 #define BOARD_SELFTEST_RUN_H
 
+#include "board/selftest_flow.h"
 #include "drive/faults.h"
-#include "drive/selftest.h"
-
-/** The background's parts, which come in this order. */
-enum { SELFTEST_PART_SUPERVISE = 1, SELFTEST_PART_PANEL, SELFTEST_PART_WATCH, SELFTEST_PART_STATUS };
 
 #ifndef SELFTEST_OFF
 
@@ -24,15 +21,6 @@ void selftest_start(drive_fault_t kept);
 
 /** First of all in a pass of the background. */
 void selftest_pass(void);
-
-/** The background's parts that have come to their end, three bits each. */
-extern uint16_t board_selftest_parts;
-
-/** A part of the background has come to its end. */
-QM_INLINE void selftest_part(uint16_t part)
-{
-    board_selftest_parts = (uint16_t)((uint16_t)(board_selftest_parts << 3) | part);
-}
 
 /** At the end of a millisecond's work. */
 void selftest_ms(void);
@@ -53,7 +41,6 @@ char *selftest_put_marked(char *at);
 #define selftest_reset_cause(rcon) (rcon)
 #define selftest_start(kept) ((void)(kept))
 #define selftest_pass() ((void)0)
-#define selftest_part(part) ((void)0)
 #define selftest_ms() ((void)0)
 #define selftest_put(at) (at)
 #define selftest_put_marked(at) (at)
