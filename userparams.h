@@ -194,9 +194,9 @@
  *   observer.loaded_q16                  32.1 Hz               5287  Q16 a step                  -0.004 %  rate under load
  *   observer.quick_q16                    107 Hz              17623  Q16 a step                  -0.005 %  rate after a large innovation
  *   observer.full_erpm                 475.56 rpm              2377  erpm                        -0.033 %  speed reference from which rates and gain are these
- *   observer.load_from                    0.1 A                 166  units                       -0.198 %  load that begins to count
- *   observer.load_width                   0.1 A                 166  units                       -0.198 %  over what more it counts
- *   observer.load_slope_q15                10 1/A               197  Q15 a unit                  -0.000 %  one over it
+ *   observer.load_from                    0.1 A                 103  units                      -38.075 %  load that begins to count
+ *   observer.load_width                   0.1 A                 103  units                      -38.075 %  over what more it counts
+ *   observer.load_slope_q15                10 1/A               315  Q15 a unit                 +59.898 %  one over it
  *   observer.large_erpm                29.856 rpm               149  erpm                        -0.189 %  large innovation without load
  *   observer.large_loaded_erpm         6.8899 rpm                34  erpm                        -1.305 %  and under load
  *   adaptation.rate_q16                     6 1/s               157  Q16 a step                  -0.182 %  flux and R follow

@@ -391,6 +391,10 @@ def _loops_and_start(d: Design) -> None:
         d.put("D_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.ld_h * d.scales.ampere_per_volt / 16.0, 5), "2 pi f Ld: the d axis has its own inductance")
         d.put("Q_CURRCNTR_PTERM", plain(2.0 * math.pi * bandwidth * m.lq_h * d.scales.ampere_per_volt / 16.0, 5), "2 pi f Lq")
     _refuse_inertia(d, d.scales.speed_pterm_per_hz)
+    problems = Problems()
+    problems.attempt(lambda: _refuse_hidden(d))
+    problems.attempt(lambda: _refuse_coarse(d))
+    problems.tell()
     gains = loops.current_gains(plant, bandwidth, base)
     _start(d, plant, gains)
     _speed_loop(d, plant, gains)
@@ -418,6 +422,31 @@ def _friction_over_lost(d: Design) -> float:
     m = d.motor
     friction_a = (m.coulomb_nm + m.viscous_nms * 0.5 * m.rated_speed_rpm * limits.RPM) / (1.5 * m.pole_pairs * m.psi_vs)
     return friction_a / (d.scales.lost_counts * d.scales.count_a)
+
+
+def _slow_hz(d: Design) -> float:
+    return loops.SLOW_SHARE * d.motor.rated_speed_rpm * d.motor.pole_pairs / 60.0
+
+
+def _refuse_hidden(d: Design) -> None:
+    """What turns without load must show in the current; a file that tells no friction is believed."""
+    ratio, least, lost_a = _friction_over_lost(d), loops.hidden_limit(_slow_hz(d)), d.scales.lost_counts * d.scales.count_a
+    if not 0.0 < ratio < least:
+        return
+    dead_s, chokes_mh = 0.999 * d.board.dead_time_s * ratio / least, d.motor.lq_h * 1e3 * (least / ratio - 1.0)
+    shorter = f"[pwm] dead_time of {limits.digits_down(dead_s, 2) * 1e6:g} us, or " if dead_s >= _range("DEADTIME_SEC")[0] else ""
+    raise UserError(f"dead time loses {lost_a:.2g} A, friction takes only {ratio * lost_a:.2g} A: without load the speed would wander", d.board.quantities["pwm.dead_time"].where,
+                    f"{shorter}chokes of {limits.digits_up(1.001 * chokes_mh, 2):g} mH in each phase, added to the motor's inductance")
+
+
+def _refuse_coarse(d: Design) -> None:
+    """A step of the converter must not turn the rotor off its speed."""
+    m, step_a = d.motor, 2.0 * d.board.current_full_scale_a / 2 ** d.board.adc_bits
+    rpm_s = m.kt_nm_per_a * 0.5 * step_a / (m.inertia_kgm2 + m.load_inertia_kgm2) / limits.RPM
+    share = rpm_s / (2.0 * math.pi * _slow_hz(d)) / (loops.SLOW_SHARE * m.rated_speed_rpm)
+    if share > loops.STEP_SHARE_MOST:
+        raise UserError(f"half a step of the converter, {0.5 * step_a:.2g} A, turns the rotor {share:.0%} off its speed at {loops.SLOW_SHARE:.0%} of the rated one", d.where("inertia"),
+                        f"use a board with at most {limits.digits_down(d.board.current_full_scale_a * loops.STEP_SHARE_MOST / share, 2):g} A of current range")
 
 
 def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:
@@ -476,7 +505,6 @@ def _warn(d: Design, currents: limits.Currents) -> None:
     _warn_speeds(d)
     _warn_numbers(d)
     _warn_loops(d)
-    _warn_dead_time(d)
 
 
 def _warn_currents(d: Design, currents: limits.Currents) -> None:
@@ -527,14 +555,6 @@ def _warn_numbers(d: Design) -> None:
         if wanted > 1.02 * limit:
             d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "
                               "high current; lower MAXIMUM_CURRENT_A or the speed")
-
-
-def _warn_dead_time(d: Design) -> None:
-    """What turns without load must show in the current; a file that tells no friction is believed."""
-    ratio, lost_a = _friction_over_lost(d), d.scales.lost_counts * d.scales.count_a
-    if 0.0 < ratio < loops.HIDDEN_IN_DEAD_TIME:
-        d.warnings.append(f"dead time loses {lost_a:.2g} A, friction takes only {ratio * lost_a:.2g} A: without load the speed may wander; "
-                          f"[pwm] dead_time of {limits.digits_down(0.999 * d.board.dead_time_s * ratio / loops.HIDDEN_IN_DEAD_TIME, 2) * 1e6:g} us would do, or chokes")
 
 
 def _warn_loops(d: Design) -> None:

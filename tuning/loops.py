@@ -46,8 +46,14 @@ only linear; the voltage that is missing there looks like back-EMF, and the esti
 CLEAR_OF_DEAD_TIME, LEAST_SPEED_SHARE = 1.9, 0.5
 """Friction's current over what dead time loses of a current, from which SPEED_CAP holds; below it falls with the square, no further than this share.
 Where friction takes less current the compensation knows little of an unloaded motor's, and a quick loop follows what it sees."""
-HIDDEN_IN_DEAD_TIME = 0.72
-"""Below this the speed of an unloaded motor wanders by tens of per cent on the virtual board, with quick and slow loops."""
+HIDDEN_HZ, HIDDEN_LEAST, HIDDEN_MOST = 13.0, 0.57, 1.3
+"""Friction's current over what dead time loses of a current, which the speed of an unloaded motor needs: HIDDEN_HZ over the electrical frequency
+at SLOW_SHARE of the rated speed, within these bounds. With less it wanders by tens of per cent on the virtual board, with quick and slow loops,
+the slower the motor turns the more: what compensation leaves has the longer time."""
+SLOW_SHARE = 0.2
+STEP_SHARE_MOST = 0.25
+"""Of SLOW_SHARE of the rated speed, most that half a step of the converter may turn the rotor off its speed in an electrical turn. Motors with 0.15
+hold their speed on the virtual board, one with 0.4 does not."""
 QUIET_RATIO, LOADED_SHARE, QUICK_GAIN = (number(f"PARAM_{name}") for name in ("QUIET_RATIO", "LOADED_SHARE", "QUICK_GAIN"))
 FULL_RATIO, ESDQ_RATIO = (number(f"PARAM_{name}") for name in ("FULL_RATIO", "ESDQ_RATIO"))
 HEAVY_SHARE = 0.75
@@ -298,7 +304,7 @@ def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: G
 
     cap = min(CURRENT_CAP / base.period_s, largest_hz)
     above = [f for f in _steps(min(CURRENT_TOP / base.period_s, largest_hz), cap, 0.95) if f > cap][::-1]
-    candidates = [fixed_hz] if fixed_hz else _steps(cap, max(least_hz, cap / 20.0), 0.95) + above
+    candidates = [fixed_hz] if fixed_hz else _steps(cap, max(least_hz, cap / 8.0), 0.95) + above
     chosen, worst, label = _largest(candidates, worst_of, CURRENT_NEARLY_DEG)
     gains = current_gains(plant, chosen, base)
     shown = dict.fromkeys([*list(cases)[:2 * len(axes)], label])
@@ -340,6 +346,11 @@ def calm_load_bandwidth(large_erpm: float, acceleration: float, largest_counts: 
 def speed_cap(friction_over_lost: float) -> float:
     """SPEED_CAP, or what is left of it where an unloaded motor's current hides in dead time."""
     return SPEED_CAP * min(1.0, max(LEAST_SPEED_SHARE, (friction_over_lost / CLEAR_OF_DEAD_TIME) ** 2))
+
+
+def hidden_limit(slow_hz: float) -> float:
+    """Least current of friction over what dead time loses. `slow_hz`: electrical frequency at SLOW_SHARE of the rated speed."""
+    return min(HIDDEN_MOST, max(HIDDEN_LEAST, HIDDEN_HZ / slow_hz))
 
 
 def calm_bandwidth(load_hz: float, lowest_rad_s: float, cap: float = SPEED_CAP) -> float:

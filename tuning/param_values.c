@@ -53,7 +53,7 @@ static void motor(void)
 
 static void estimator(void)
 {
-    double least = at_most(8.0 * PARAM_DI(NOMINAL_SPEED_RPM), 16383.0), most = at_most(PARAM_DI(MAXIMUM_SPEED_RPM), 4095.0), q14_a = 2.0 * ampere;
+    double least = at_most(8.0 * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)), 16383.0), most = at_most(PARAM_DI(MAXIMUM_SPEED_RPM), 4095.0), q14_a = 2.0 * ampere;
     GROUP("estimator");
     FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0, "Q32 of a turn/erpm", "angle a period");
     FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0, "Q16 rad/erpm", "half of it");
@@ -74,7 +74,7 @@ static void speeds(void)
     FIELD(maximum_erpm, MAXIMUM_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at full scale, S3 on");
     FIELD(end_erpm, END_SPEED_RPM, "rpm", erpm, "erpm", "end of the ramp");
     FIELD(fieldweak.on_speed_erpm, FW_START_SPEED_RPM, "rpm", erpm, "erpm", "field weakening starts");
-    FIELD(estimator.nominal_erpm, NOMINAL_SPEED_RPM, "rpm", erpm, "erpm", "one-sample derivative above");
+    FIELD(estimator.nominal_erpm, EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS), "rpm", erpm, "erpm", "one-sample derivative above");
     FIELD(estimator.decimate_erpm, NOMINAL_SPEED_RPM / 10.0, "rpm", erpm, "erpm", "sign of Equation 2 from the filtered speed below");
     FIELD(speed_ramp_q16, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm in 8 periods", "slope of the reference");
     FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (524288.0 / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm in 8 periods",
@@ -116,9 +116,9 @@ static void observer(void)
     FIELD(observer.loaded_q16, PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate under load");
     FIELD(observer.quick_q16, LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate after a large innovation");
     FIELD(observer.full_erpm, 60.0 / PARAM_FULL_RATIO * LOAD_BANDWIDTH_HZ / pairs, "rpm", erpm, "erpm", "speed reference from which rates and gain are these");
-    FIELD(observer.load_from, 8.0 * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "load that begins to count");
-    FIELD(observer.load_width, 8.0 * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "over what more it counts");
-    FIELD(observer.load_slope_q15, 1.0 / (8.0 * lost * q13_a), "1/A", PARAM_ACCEL_UNITS / q13_a / 32767.0, "Q15 a unit", "one over it");
+    FIELD(observer.load_from, PARAM_LOAD_FROM_LOST * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "load that begins to count");
+    FIELD(observer.load_width, PARAM_LOAD_FROM_LOST * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "over what more it counts");
+    FIELD(observer.load_slope_q15, 1.0 / (PARAM_LOAD_FROM_LOST * lost * q13_a), "1/A", PARAM_ACCEL_UNITS / q13_a / 32767.0, "Q15 a unit", "one over it");
     FIELD(observer.large_erpm, PARAM_LARGE_ERPM * erpm, "rpm", erpm, "erpm", "large innovation without load");
     FIELD(observer.large_loaded_erpm, PARAM_LARGE_LOADED_ERPM * erpm, "rpm", erpm, "erpm", "and under load");
     FIELD(adaptation.rate_q16, 6.0, "1/s", learns, "Q16 a step", "flux and R follow");

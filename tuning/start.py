@@ -114,10 +114,13 @@ def needed_torque(motor: Motor, end_rpm: float) -> float:
     return motor.start_torque_nm + motor.coulomb_nm + motor.viscous_nms * end_rpm * RPM
 
 
+QUICK_HZ = 20.0
+
+
 def end_speed(motor: Motor, board: BoardFile, current_a: float, nominal_rpm: float) -> float:
     """Hand-over speed: back-EMF = error / sin(20 degrees), at least a fifth of nominal speed (twice the speed where Equation 2 takes its
-    sign from Eq), at most half of it."""
-    wanted = max(emf_error_v(motor, board, current_a) / HAND_OVER_SINE / emf_v(motor, 1.0), 0.2 * nominal_rpm)
+    sign from Eq) and QUICK_HZ, where the load observer is quick enough to catch the rotor; at most half of nominal speed."""
+    wanted = max(emf_error_v(motor, board, current_a) / HAND_OVER_SINE / emf_v(motor, 1.0), 0.2 * nominal_rpm, 60.0 * QUICK_HZ / motor.pole_pairs)
     step = 50.0 if wanted > 300.0 else 10.0 if wanted > 50.0 else 1.0
     return min(math.ceil(wanted / step - 1e-9) * step, digits_down(0.5 * nominal_rpm, 2), LARGEST_END_RPM)
 

@@ -2,6 +2,7 @@
 #include "drive/drive.h"
 
 #include "drive/bus.h"
+#include "drive/limits.h"
 #include "drive/modes/modes.h"
 #include "drive/state.h"
 
@@ -50,7 +51,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     drive_update_model(run, p, p->end_erpm);
     run->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
     run->control.iq_limit_q13 = p->current_max_q13;
-    run->control.brake_limit_q13 = p->current_max_q13;
+    run->control.brake_limit_q13 = limits_asked_most(p);
     d->forced.speed_q10 = 0;
     d->forced.angle_q32 = (direction >= 0) ? 0xC0000000ul : 0x40000000ul; /* ALIGN sweeps it to zero */
     d->angle = forced_angle(&d->forced);

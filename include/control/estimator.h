@@ -16,7 +16,7 @@ typedef struct {
     int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
     int16_t half_step_q16_rad;    /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per erpm, as high-word factor */
     int16_t kfilter_velestim_q16; /**< speed filter, 2 * KFILTER_VELESTIM */
-    speed_erpm_t nominal_erpm;    /**< NOMINAL_SPEED_RPM * P: above, the derivative spans one sample instead of eight */
+    speed_erpm_t nominal_erpm;    /**< EIGHT_SAMPLES_ERPM: above, the derivative spans one sample instead of eight */
     speed_erpm_t decimate_erpm;   /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
 } estimator_params_t;
 

@@ -142,7 +142,7 @@ QM_INLINE QM_WRAPS int16_t observer_innovation(observer_t *o, const observer_par
 QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovation, int16_t rate_q16)
 {
     int32_t square_q32 = qm_mulss(rate_q16, rate_q16);
-    return qm_shift(qm_mulss(innovation, qm_hi(square_q32)) + (qm_mulsu(innovation, (uint16_t)square_q32) >> 16), p->shift);
+    return qm_shift(qm_mulss(innovation, qm_hi(square_q32)), p->shift) + (qm_mulsu(innovation, (uint16_t)square_q32) >> (16u - p->shift));
 }
 
 /** One step. @param rho_q32 the estimator's angle @param iq_q13 measured q current */

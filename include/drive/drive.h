@@ -106,17 +106,19 @@ typedef struct {
     voltage_q14_t vq_limit_q14;
     pi_t pi_d, pi_q;
     int16_t speed_kp_q13;           /**< the speed controller's gain in use */
+    int32_t iq_trim_q26;            /**< what its load's estimate misses at rest */
     int16_t iq_rest_q26;            /**< what its last step left below a whole count of q current */
     current_q13_t sample_shift_q13; /**< q current that the sample misses at this speed */
 } drive_control_t;
 
 /** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
 typedef struct {
-    uint16_t waited_steps;    /**< at the end of the ramp */
-    uint16_t agreed_steps;    /**< of them, the last ones in which the estimator agreed with the forced speed */
-    uint16_t speed_is_preset; /**< 1 from six periods after the hand-over on: the observer runs */
-    int16_t offset;           /**< angle that is left of the change of frame, angle counts */
-    current_q13_t id_q13;     /**< d current that goes with it */
+    uint16_t waited_steps;     /**< at the end of the ramp */
+    uint16_t agreed_steps;     /**< of them, the last ones in which the estimator agreed with the forced speed */
+    uint16_t speed_is_preset;  /**< 1 from six periods after the hand-over on: the observer runs */
+    int16_t offset;            /**< angle that is left of the change of frame, angle counts */
+    current_q13_t current_q13; /**< of the ramp, at the hand-over */
+    current_q13_t id_q13;      /**< d current that goes with the offset */
 } handover_t;
 
 /** What a start begins anew: all of it is cleared. */

@@ -5,6 +5,19 @@
 #include "drive/modes/modes.h"
 #include "drive/state.h"
 
+#define HANDOVER_FALL_SHIFT 6       /**< the current that has brought the rotor up falls by 1/64 a step */
+#define HANDOVER_FLOOR_SHIFT 3      /**< to an eighth at least */
+#define HANDOVER_MOST_OFFSET 0x2000 /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
+
+/** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
+ *  error of the estimator's angle into torque. */
+QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
+{
+    int16_t current = qm_abs(d->run.control.ref_q13.q), least = (int16_t)(p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT);
+    current = (int16_t)(current - (current >> HANDOVER_FALL_SHIFT) - 1);
+    d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
+}
+
 /** In RAMP, every eighth period: at its end counts how long the estimator agrees with the forced speed, or gives up by name. */
 QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
@@ -16,7 +29,12 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     miss = qm_abs(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), p->end_erpm));
     h->waited_steps = (uint16_t)(h->waited_steps + 1u);
     h->agreed_steps = (uint16_t)((miss < (p->end_erpm >> 2)) ? h->agreed_steps + 1u : 0u);
-    if (h->agreed_steps < p->agree_steps && h->waited_steps >= p->wait_steps) {
+    if (h->agreed_steps >= p->agree_steps) {
+        handover_release(d, p);
+        return;
+    }
+    d->run.control.ref_q13.q = along_direction(d, p->open_loop_q13);
+    if (h->waited_steps >= p->wait_steps) {
         drive_raise(d, FAULT_START_FAILED);
     }
 }
@@ -38,7 +56,8 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     c->v_q14.d = (int16_t)(2 * y.alpha);
     c->v_q14.q = (int16_t)(2 * y.beta);
     x.d = 0;
-    x.q = along_direction(d, p->open_loop_q13);
+    x.q = c->ref_q13.q;
+    h->current_q13 = x.q;
     y = inverse_park(x, turn);
     c->ref_q13.d = (int16_t)(2 * y.alpha);
     c->ref_q13.q = (int16_t)(2 * y.beta);
@@ -51,10 +70,12 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     drive_enter(d, DRIVE_CLOSED);
 }
 
-/** In RAMP, every eighth period: hands over once the estimator has agreed long enough. */
+/** In RAMP, every eighth period: hands over once the estimator has agreed long enough and the current pulls the rotor, or cannot fall further. */
 QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->run.handover.agreed_steps >= p->agree_steps) {
+    int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
+    if (d->run.handover.agreed_steps >= p->agree_steps
+        && (qm_abs(offset) <= HANDOVER_MOST_OFFSET || qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT))) {
         handover_now(d, p);
     }
 }
@@ -73,7 +94,7 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 }
 
 /** What is left of the angle offset falls by one count a period, every eighth period by eight; its d current follows. */
-QM_INLINE void handover_decay(drive_t *d, const drive_params_t *p)
+QM_INLINE void handover_decay(drive_t *d)
 {
     handover_t *h = &d->run.handover;
     int16_t offset = h->offset;
@@ -86,7 +107,7 @@ QM_INLINE void handover_decay(drive_t *d, const drive_params_t *p)
         offset = (int16_t)((offset > 0) ? offset - SLOW_PHASES : offset + SLOW_PHASES);
     }
     h->offset = offset;
-    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(along_direction(d, p->open_loop_q13), trig_sincos((angle_t)offset).sin));
+    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(h->current_q13, trig_sincos((angle_t)offset).sin));
 }
 
 #endif

@@ -17,11 +17,17 @@ QM_INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c)
     return (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
 }
 
+/** Most that the d axis and braking ask for: what the current controllers overshoot stays within MAXIMUM_CURRENT_A. */
+QM_INLINE current_q13_t limits_asked_most(const drive_params_t *p)
+{
+    return (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
+}
+
 /** d current: what is left of the hand-over, the table and its trim; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
-    int16_t id_max = (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
+    int16_t id_max = limits_asked_most(p);
     uint32_t ratio;
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
@@ -34,11 +40,11 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15)
 {
     int16_t over = (int16_t)(bus_q15 - p->bus_regen_q15);
-    int16_t most = p->current_max_q13;
+    int16_t most = limits_asked_most(p);
 
     if (over > 0) {
         int32_t less = qm_mulss(over, p->brake_per_bus_q8) >> 8;
-        most = (int16_t)((less > p->current_max_q13) ? 0 : p->current_max_q13 - less);
+        most = (int16_t)((less > most) ? 0 : most - less);
     }
     run->control.brake_limit_q13 = most;
 }

@@ -25,7 +25,7 @@
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
         .half_step_q16_rad = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F), \
         .kfilter_velestim_q16 = 2 * (KFILTER_VELESTIM), \
-        .nominal_erpm = (int16_t)NOMINAL_SPEED_ERPM, \
+        .nominal_erpm = (int16_t)EIGHT_SAMPLES_ERPM, \
         .decimate_erpm = (int16_t)DECIMATE_NOMINAL_SPEED \
     }
 

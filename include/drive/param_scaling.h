@@ -62,7 +62,10 @@
 #define PARAM_DI(rpm) (2.0F * PARAM_PI * PARAM_F(rpm) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(LOOPTIME_SEC) * CURRENT_Q14_F(MAXIMUM_CURRENT_A))
 #define PARAM_MIN(a, b) (((a) < (b)) ? (a) : (b))
 #define PARAM_MAX(a, b) (((a) > (b)) ? (a) : (b))
-#define D_ILIMIT_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_DI(NOMINAL_SPEED_RPM) + 0.5F, 16383.0F))
+/** Below it the derivative spans eight samples, in which the current turns by 43 degrees at most: AN1292's nominal speed, or less with a long period. */
+#define EIGHT_SAMPLES_ERPM PARAM_MIN(NOMINAL_SPEED_ERPM, PARAM_F(PARAM_EIGHT_TURN) * 60.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
+#define PARAM_EIGHT_TURN 0.12
+#define D_ILIMIT_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)) + 0.5F, 16383.0F))
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
 #define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in AN1292's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
@@ -171,8 +174,9 @@
 #define PARAM_LOWEST_ERPM (PARAM_F(PARAM_LOWEST_SHARE) * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 /** Largest bandwidth of the speed loop, which falls with the speed as the rates do. */
 #define PARAM_CALM_HZ (PARAM_F(PARAM_CALM_SHARE) / 60.0F * PARAM_MAX(PARAM_FULL_ERPM, PARAM_F(MINIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS)))
+#define PARAM_LOAD_FROM_LOST 5 /* times the current that dead time loses */
 /** Where the load's current is clear of what dead time leaves; within what the observer's schedule divides by. */
-#define PARAM_LOAD_FROM PARAM_MIN(PARAM_MAX(8.0F * PARAM_LOST_CURRENT_Q13 * PARAM_ACCEL_UNITS, 1.0F), 16000.0F)
+#define PARAM_LOAD_FROM PARAM_MIN(PARAM_MAX(PARAM_F(PARAM_LOAD_FROM_LOST) * PARAM_LOST_CURRENT_Q13 * PARAM_ACCEL_UNITS, 1.0F), 16000.0F)
 /** A large innovation: without load above what dead time's compensation leaves. */
 #define PARAM_LARGE_ERPM (0.13F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 #define PARAM_LARGE_LOADED_ERPM (0.03F * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)

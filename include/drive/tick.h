@@ -110,7 +110,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 6:
         if (drive_is_closed(d)) {
-            handover_decay(d, p);
+            handover_decay(d);
             limits_braking(run, p, qm_hi(d->bus_q31));
         }
         model_learn_step(d, p);

@@ -519,7 +519,7 @@ def observe(v, model, op, heavy, reference, rho, iq, real=None):
 
 
 @block("observer in a loop around a shaft: preset, load on and off at 500 rpm both ways, at 150 rpm, a speed step, a heavy rotor",
-       OBSERVER_FORMAT, OBSERVER_COLUMNS, least_db=58.0)
+       OBSERVER_FORMAT, OBSERVER_COLUMNS, least_db=55.0)
 def observer(v, rng):
     v.constants = {f"{prefix}{k}": x for prefix, p in zip(("", "h_"), OBSERVED) for k, x in p.items()}
     for heavy, erpm, load, on in ((0, 2500, 1555, 200), (0, -2500, 930, 200), (0, 750, 560, 400), (1, 2500, 1000, 250)):

@@ -247,6 +247,11 @@ class Machine:
         return self.bus_v / 2 * self.dead_time_s / self.ls_h / self.i0 / 4
 
     @property
+    def eight_samples_erpm(self):
+        """Up to here the derivative spans eight samples: nominal speed, or what turns by 0.12 in eight periods."""
+        return min(self.nominal_rpm * self.pole_pairs, 0.12 / 8 / self.turns_per_erpm)
+
+    @property
     def dead_time_erpm(self):
         """What dead time takes from a leg, as the speed of that back-EMF."""
         return self.bus_v * self.dead_time_s / self.period_s * SQRT3 * 1000 * self.pole_pairs / self.kphi
@@ -272,12 +277,12 @@ class Machine:
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
-            "d_ilimit_ls_q14": min(nearest(self.current_step(self.nominal_rpm, 8) / 2), 16383),
+            "d_ilimit_ls_q14": min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
             "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
             "deltat_q32": nearest(self.turns_per_erpm * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * math.pi * 2 ** 32),
             "kfilter_velestim_q16": 2 * self.kfilter_velestim,
-            "nominal_erpm": nearest(self.nominal_rpm * self.pole_pairs),
+            "nominal_erpm": int(self.eight_samples_erpm),
             "decimate_erpm": nearest(self.nominal_rpm * self.pole_pairs / 10),
             "inv_kfi": nearest(self.inv_kfi * 16384),
         }
@@ -287,7 +292,7 @@ class Machine:
         shift = min(13, next(s for s in range(1, 14) if s == 13 or self.acceleration >= 2.0 ** (-1 - s)))
         units = self.acceleration * 2 ** shift
         quick = 2 * math.pi * self.load_hz * 8 * self.period_s * WORD
-        load_from = clamp(8 * self.lost_current * units, 1, 16000)
+        load_from = clamp(5 * self.lost_current * units, 1, 16000)
         return {
             "deltat_q32": nearest(self.turns_per_erpm * 2 ** 32),
             "per_turn_q12": nearest(WORD * 4096 / (8 * self.turns_per_erpm * 2 ** 32)),
@@ -541,8 +546,8 @@ class EstimatorReal:
     def tick(self, i, inv_kphi_ratio, closed):
         m, rad = self.m, 2 * math.pi
         step = self.omega * m.turns_per_erpm  # turns a period
-        if abs(self.filtered) < round(m.nominal_rpm * m.pole_pairs):
-            limit = m.current_step(m.nominal_rpm, 8) * m.i0
+        if abs(self.filtered) < m.eight_samples_erpm:
+            limit = m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
             change = i - self.history[0]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
             change *= cmath.rect(1.0, clamp(3.5 * step * rad, -0.5, 0.5))
@@ -750,7 +755,7 @@ class Observer:
         self.omega = self.sum(before, s32(s32(iq * p["per_current_q16"]) - self.load) // 2 ** p["shift"])
         innovation = self.innovation(rho, upper(before // 2 + self.omega // 2))
         self.omega = self.sum(self.omega, s32(2 * innovation * self.rate))
-        load = s32(self.load - s32((innovation * self.rate ** 2 // WORD) << p["shift"]))
+        load = s32(self.load - s32(innovation * self.rate ** 2 * 2 ** p["shift"] // WORD))
         self.load = clamp(load, -p["load_max"] * WORD, p["load_max"] * WORD)
         self.quick = 32767 if self.follow_unrest(innovation) else self.quick - (self.quick >> 5)
 

@@ -50,6 +50,12 @@ REFUSED = {
                                            ("[tune]", "SPEED_BANDWIDTH_HZ = 17 must be at most 0.148 * LOAD_BANDWIDTH_HZ", "lower it")),
     "lowest speed at which the rotor is not held": ({"more": "[tune]\nMINIMUM_SPEED_RPM = 140\n"},
                                                     ("[tune]", "MINIMUM_SPEED_RPM = 140 must be at least 1126 * NOMINAL_BUS_V", "raise it")),
+    "friction that dead time hides": ({"coulomb_nm": 1e-4, "viscous_nms": 0.0},
+                                      ("line 33: chokes of 6.3 mH in each phase, added to the motor's inductance", "without load the speed would wander")),
+    "friction that a shorter dead time shows": ({"coulomb_nm": 2.5e-4, "viscous_nms": 0.0}, ("without load the speed would wander", "dead_time of 1.1 us, or chokes of 1.4 mH")),
+    "friction that is enough for a quicker motor": ({"coulomb_nm": 8e-4, "viscous_nms": 0.0, "rated_speed_rpm": 600.0}, ("without load the speed would wander",)),
+    "a range so wide that a step of the converter shakes the rotor": ({"rated_speed_rpm": 500.0, "coulomb_nm": 5e-3, "board": {"current_full_scale_a": 24.0}},
+                                                                      ("half a step of the converter, 0.023 A, turns the rotor", "a board with at most")),
     "inertia beyond the speed gain's format": ({"more": INERTIA % "5e-3"}, ("speed gain exceeds its Q format with 0.00501 kg m2",)),
     "Kphi too large for its format": ({"pole_pairs": 1, "kphi_v_per_krpm": 12.0, "rated_speed_rpm": 500.0}, ("1/Kphi has only", "too slow for 24 V: use at least")),
     "Kphi too small for its format": ({"kphi_v_per_krpm": 1.2, "rated_speed_rpm": 2000.0}, ("1/Kphi does not fit", "too fast for 24 V: use at most")),
@@ -59,7 +65,6 @@ REFUSED = {
     "choice in [tune] that breaks a relation": ({"more": "[tune]\nEND_SPEED_RPM = 2700\n"},
                                                 ("[tune]", "END_SPEED_RPM = 2700 must be at most NOMINAL_SPEED_RPM = 2500"))}
 WARNED = {
-    "friction that dead time hides": ({"coulomb_nm": 1e-4, "viscous_nms": 0.0}, ("without load the speed may wander", "dead_time of 0.37 us would do, or chokes")),
     "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "larger current range")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),
     "maximum current beyond the firmware's range": (
@@ -88,6 +93,17 @@ WARNED = {
         {"pole_pairs": 9, "psi_vs": 7.983e-3 * 5 / 9, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2600.0, "board": {"pwm_period_s": 125e-6},
          "inertia_kgm2": 2e-5},
         ("D_ILIMIT_LS ends at",))}
+
+
+def test_remedies_for_a_speed_that_would_wander_are_enough_and_hardly_more():
+    hidden = {"coulomb_nm": 2.5e-4, "viscous_nms": 0.0}
+    with pytest.raises(UserError) as caught:
+        made(**hidden)
+    dead_us, chokes_mh = (float(number) for number in re.search(r"dead_time of ([\d.]+) us, or chokes of ([\d.]+) mH", str(caught.value)).groups())
+    made(**hidden, board={"dead_time_s": dead_us * 1e-6})
+    made(**hidden, ld_h=1.92e-3 + 1e-3 * chokes_mh, lq_h=1.92e-3 + 1e-3 * chokes_mh)
+    with pytest.raises(UserError):
+        made(**hidden, board={"dead_time_s": 1.1 * dead_us * 1e-6})
 
 
 @pytest.mark.parametrize("motor, says", REFUSED.values(), ids=REFUSED)

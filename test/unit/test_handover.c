@@ -27,12 +27,21 @@ static void slow(uint16_t slot)
 
 /* ---- readiness ---- */
 
-/** Slow steps of the readiness check with this estimated speed, until the state changes. */
+/** The forced angle ahead of the estimated one by this: at 90 degrees the current has no torque. */
+static void forced_ahead(int16_t offset)
+{
+    drive.run.estimator.half_step_q16_rad = 0;
+    drive.run.estimator.rho_q32 = 0;
+    drive.angle = (angle_t)offset;
+}
+
+/** Slow steps of the readiness check with this estimated speed, until the state changes. The current pulls the rotor. */
 static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
 {
     uint16_t steps = 0;
     while (drive.state == (uint16_t)DRIVE_RAMP && steps < most) {
         rig_speed(speed_erpm);
+        forced_ahead(0x2000);
         slow(8);
         slow(9); /* the next period carries it out */
         steps++;
@@ -77,6 +86,7 @@ void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_on
 {
     uint16_t n;
     drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
+    forced_ahead(0);
     for (n = 1; n <= 8u; n++) {
         slow(n);
         TEST_ASSERT_EQUAL_UINT16(params.agree_steps - (n < 8u), drive.run.handover.agreed_steps);
@@ -102,6 +112,76 @@ void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(voi
     }
 }
 
+/* ---- the fall of the ramp's current ---- */
+
+/** Periods of RAMP from the moment the estimator agrees, with this angle between forced and estimated frame; the current at the end. */
+static uint16_t fall(int16_t direction, int16_t offset, int16_t *current_q13)
+{
+    uint16_t steps = 0;
+    rig_power_up();
+    at_the_end_of_the_ramp(direction);
+    drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
+    while (drive.state == (uint16_t)DRIVE_RAMP && steps < 1000u) {
+        rig_speed((int16_t)(direction * 5000));
+        forced_ahead(offset);
+        *current_q13 = (int16_t)(direction * drive.run.control.ref_q13.q);
+        slow(8);
+        slow(9);
+        steps++;
+    }
+    return steps;
+}
+
+/* 1/64 a step: a quarter is left after 87 steps, an eighth after 127 */
+void test_current_falls_until_it_pulls_the_rotor_or_is_an_eighth(void)
+{
+    static const struct {
+        int16_t offset;
+        uint16_t steps, current_q13;
+    } cases[] = { { 0x2000, 1, 2625 }, { -0x2000, 1, 2625 }, { 0, 1, 2625 }, { 0x2001, 128, 328 }, { -0x2001, 128, 328 }, { 0x3FFF, 128, 328 } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            int16_t current_q13 = 0;
+            TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].steps, fall(direction, cases[n].offset, &current_q13), golden_row(n));
+            TEST_ASSERT_INT16_WITHIN_MESSAGE(8, (int16_t)cases[n].current_q13, current_q13, golden_row(n));
+        }
+    }
+}
+
+void test_rotor_that_falls_back_is_handed_over_with_the_current_that_is_left(void)
+{
+    uint16_t n;
+    drive.run.handover.agreed_steps = params.agree_steps;
+    for (n = 0; n < 40u; n++) {
+        rig_speed(5000);
+        forced_ahead(0x3800);
+        slow(8);
+        slow(9);
+    }
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+    TEST_ASSERT_INT16_WITHIN(20, 1388, drive.run.control.ref_q13.q); /* 2625 (63/64)^40, and a count a step */
+    forced_ahead(0x1800);
+    slow(9);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+    TEST_ASSERT_INT16_WITHIN(20, 1388, drive.run.handover.current_q13);
+    TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1388 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
+}
+
+void test_current_is_whole_again_when_the_agreement_ends(void)
+{
+    EACH_DIRECTION(direction) {
+        int16_t current_q13;
+        (void)fall(direction, 0x3000, &current_q13);
+        at_the_end_of_the_ramp(direction);
+        drive.run.control.ref_q13.q = (int16_t)(direction * 500);
+        drive.run.handover.agreed_steps = params.agree_steps;
+        rig_speed(0);
+        slow(8);
+        TEST_ASSERT_EQUAL_INT16(direction * params.open_loop_q13, drive.run.control.ref_q13.q);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+    }
+}
+
 /* ---- the change of frame ---- */
 
 /** @param forced,estimated angles @param v_d,v_q voltages in the forced frame */
@@ -113,6 +193,7 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.run.estimator.rho_q32 = (uint32_t)estimated << 16;
     drive.run.estimator.half_step_q16_rad = 0;
     rig_speed((int16_t)(direction * 4800));
+    drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
     drive.run.control.v_q14.d = v_d;
     drive.run.control.v_q14.q = v_q;
     drive.run.handover.speed_is_preset = 0; /* as the start has left it */
@@ -215,15 +296,15 @@ void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(voi
         for (odd = 0; odd <= 3; odd = (int16_t)(odd + 3)) {
             drive.run.handover.offset = (int16_t)(sign * (1000 + odd));
             for (n = 1; n <= 124; n++) {
-                handover_decay(&drive, &params); /* every eighth period */
+                handover_decay(&drive); /* every eighth period */
                 TEST_ASSERT_EQUAL_INT16(sign * (1000 + odd - 8 * n), drive.run.handover.offset);
             }
-            handover_decay(&drive, &params);
+            handover_decay(&drive);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
         }
         drive.run.handover.offset = sign;
-        handover_decay(&drive, &params);
+        handover_decay(&drive);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
     }
 }
@@ -231,12 +312,12 @@ void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(voi
 void test_current_follows_its_offset(void)
 {
     EACH_DIRECTION(direction) { /* d = -Iq sin(offset), at 45 degrees after the step */
-        drive.direction = direction;
+        drive.run.handover.current_q13 = (int16_t)(direction * params.open_loop_q13);
         drive.run.handover.offset = 8192 + 8;
-        handover_decay(&drive, &params);
+        handover_decay(&drive);
         TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * -1856), drive.run.handover.id_q13);
         drive.run.handover.offset = -8192 - 8;
-        handover_decay(&drive, &params);
+        handover_decay(&drive);
         TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * 1856), drive.run.handover.id_q13);
     }
 }

@@ -281,6 +281,7 @@ void test_trap_in_the_middle_of_the_hand_over_is_not_overwritten(void)
     for (n = 0; n < 16u && trap_comes_in_the_hand_over; n++) {
         board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536;
         board_drive.run.handover.agreed_steps = board_params.agree_steps;
+        board_drive.run.control.ref_q13.q = 0; /* the current has fallen */
         control_interrupts(1);
     }
     TEST_ASSERT_EQUAL_UINT16(0, trap_comes_in_the_hand_over);

@@ -92,15 +92,15 @@ void test_braking_current_fades_between_27_and_29_volts(void)
         float bus_v;
         int16_t limit_q13, tolerance;
     } cases[] = {
-        { 24.0F, 5120, 0 }, { 27.0F, 5120, 0 }, { 27.1F, 4864, 20 }, { 28.0F, 2560, 20 }, { 29.0F, 0, 20 }, { 29.2F, 0, 0 },
-        { 52.0F, 0, 0 }, { 26.0F, 5120, 0 },
+        { 24.0F, 4960, 0 }, { 27.0F, 4960, 0 }, { 27.1F, 4704, 20 }, { 28.0F, 2400, 20 }, { 29.0F, 0, 20 }, { 29.2F, 0, 0 },
+        { 52.0F, 0, 0 }, { 26.0F, 4960, 0 }, /* 31/32 of MAXIMUM_CURRENT_A: the controllers overshoot it */
     };
     EACH(n, cases) {
         limits_braking(&drive.run, &params, (int16_t)(cases[n].bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(cases[n].tolerance, cases[n].limit_q13, drive.run.control.brake_limit_q13, golden_row(n));
     }
     limits_braking(&drive.run, &params, (int16_t)(params.bus_regen_q15 + 1));
-    TEST_ASSERT_LESS_THAN_INT16(5120, drive.run.control.brake_limit_q13);
+    TEST_ASSERT_LESS_THAN_INT16(4960, drive.run.control.brake_limit_q13);
 }
 
 void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)

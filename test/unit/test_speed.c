@@ -104,6 +104,60 @@ void test_steps_hand_on_what_is_below_a_count_and_never_pass_the_limit(void)
     TEST_ASSERT_EQUAL_INT16(-drive.run.control.iq_limit_q13, speed_current_step(&drive.run, &params, -32000));
 }
 
+/* ---- the trim ---- */
+
+/** Trim after so many steps with this estimated speed, in whole counts; reference, observer and load rest at 10000. */
+static int16_t trim_after(uint16_t steps, int16_t estimated_erpm)
+{
+    drive.run.control.speed_kp_q13 = 8192; /* a count an erpm */
+    while (steps-- != 0u) {
+        drive.run.estimator.omega_filtered_q16 = estimated_erpm * 65536L;
+        speed_trim(&drive.run, &params, drive.run.control.reference_erpm, 0);
+    }
+    return (int16_t)(drive.run.control.iq_trim_q26 / 8192);
+}
+
+void test_trim_takes_up_what_the_speed_lacks_at_rest_and_ends_at_an_eighth_of_the_current(void)
+{
+    EACH_DIRECTION(sign) {
+        rig_closed(1, 10000);
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after(1024, (int16_t)(10000 - sign * 100))); /* 1/1024 a step */
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 200), trim_after(1024, (int16_t)(10000 - sign * 100)));
+        TEST_ASSERT_EQUAL_INT16(sign * 640, trim_after(20000, (int16_t)(10000 - sign * 1000)));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 540), trim_after(1024, (int16_t)(10000 + sign * 100)));
+    }
+}
+
+void test_trim_is_in_the_current_and_within_its_limit(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.iq_trim_q26 = 300L * 8192;
+    TEST_ASSERT_INT16_WITHIN(1, 300, current(10000, 10000, 0));
+    drive.run.control.iq_limit_q13 = 200;
+    TEST_ASSERT_EQUAL_INT16(200, current(10000, 10000, 0));
+}
+
+void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
+{
+    static const struct {
+        const char *what;
+        int16_t before_erpm, estimated_erpm, iq_q13;
+        q15_t quick;
+    } cases[] = {
+        { "reference moves", 9992, 9990, 0, 0 },         { "far behind", 10000, 8749, 0, 0 }, { "far ahead", 10000, 11251, 0, 0 },
+        { "after a large innovation", 10000, 9990, 0, 32767 }, { "at the current limit", 10000, 9990, 5120, 0 }, { "while braking at it", 10000, 9990, -5120, 0 },
+    };
+    EACH(n, cases) {
+        rig_closed(1, 10000);
+        drive.run.estimator.omega_filtered_q16 = cases[n].estimated_erpm * 65536L;
+        drive.run.control.iq_limit_q13 = 5120;
+        drive.run.control.iq_trim_q26 = 256L * 8192;
+        drive.run.observer.quick_q15 = cases[n].quick;
+        speed_trim(&drive.run, &params, cases[n].before_erpm, cases[n].iq_q13);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(255L * 8192, drive.run.control.iq_trim_q26, cases[n].what);
+    }
+}
+
 void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
 {
     rig_closed(1, 10000);
@@ -148,7 +202,7 @@ void test_stop_never_asks_for_a_speed_without_a_gain(void)
         rig_closed(direction, (int16_t)(direction * 4000));
         drive.state = (uint16_t)DRIVE_STOPPING;
         for (n = 0; n < 1000u; n++) {
-            rig_speed((int16_t)(direction * 2600)); /* a load that drives keeps it above the minimum */
+            rig_speed((int16_t)(direction * 3800)); /* a load that drives keeps it above the minimum */
             speed_step(&drive, &params);
             TEST_ASSERT_TRUE(direction * drive.run.control.reference_erpm >= 1875);
         }
@@ -196,14 +250,14 @@ void test_schedule_of_the_speed_comes_every_eighth_period_in_closed_loop_only(vo
 
 /* ---- the end of a stop ---- */
 
-void test_stop_ends_when_speed_and_reference_are_below_the_minimum(void)
+void test_stop_ends_when_the_reference_is_below_the_minimum_and_the_speed_near_it(void)
 {
     static const struct {
         drive_state_t from, to;
         int16_t speed_erpm, reference_erpm;
     } cases[] = {
-        { DRIVE_STOPPING, DRIVE_STOPPED, 2499, 2499 }, { DRIVE_STOPPING, DRIVE_STOPPED, -2499, -2499 },
-        { DRIVE_STOPPING, DRIVE_STOPPING, 2500, 2400 }, { DRIVE_STOPPING, DRIVE_STOPPING, -2500, 2400 },
+        { DRIVE_STOPPING, DRIVE_STOPPED, 3749, 2499 }, { DRIVE_STOPPING, DRIVE_STOPPED, -3749, -2499 },
+        { DRIVE_STOPPING, DRIVE_STOPPING, 3750, 2400 }, { DRIVE_STOPPING, DRIVE_STOPPING, -3750, 2400 },
         { DRIVE_STOPPING, DRIVE_STOPPING, 2400, 2600 }, { DRIVE_STOPPING, DRIVE_STOPPING, 2400, -2600 },
         { DRIVE_STOPPING, DRIVE_STOPPING, 2400, 2508 }, /* a step from there is the minimum */
         { DRIVE_CLOSED, DRIVE_CLOSED, 2000, 2000 }, /* low speed alone */

@@ -137,7 +137,7 @@ void test_motor_accelerates_with_the_command_and_stops_in_order(void)
     rig_start(1);
     drive.command.target_erpm = 800;
     (void)ideal_motor_run_until(DRIVE_CLOSED, 40000);
-    ideal_motor_run(4000);
+    ideal_motor_run(2000);
     EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "accelerating");
     TEST_ASSERT_INT16_WITHIN(20, 800, drive.run.control.ref_q13.q);
     drive.command.run = 0;

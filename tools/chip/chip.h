@@ -184,6 +184,9 @@ typedef struct {
     double seed;
     double hold_us;              /* from the end of a conversion to its interrupt, with what the handler takes */
     double dropped;              /* 1: the interrupt does not come */
+    double lost_share, late_share, late_us; /* of the interrupts, evenly spread: never come, come so much later */
+    double lost_debt, late_debt; /* what of the next one is due to the shares so far */
+    double lost;                 /* interrupts that were due and never came */
     bool withheld;               /* one has not come */
     /* decoded */
     uint16_t seen[7];
@@ -347,6 +350,7 @@ void chip_pwm_fault(chip_t *chip, bool period_start);
 void chip_adc_reset(chip_t *chip);
 void chip_adc_begin(chip_t *chip);
 void chip_adc_seed(chip_adc_t *adc);
+double chip_adc_noise(chip_adc_t *adc);
 void chip_adc_trigger(chip_t *chip);
 void chip_adc_done(chip_t *chip);
 double chip_adc_next_trigger(const chip_t *chip, double after_s);

@@ -38,7 +38,7 @@ void chip_adc_seed(chip_adc_t *adc)
 }
 
 /* Near-Gaussian noise of standard deviation 1: the sum of four 16-bit uniform numbers, each of variance 1/12. */
-static double noise(chip_adc_t *adc)
+double chip_adc_noise(chip_adc_t *adc)
 {
     uint64_t r = next_random(&adc->rng);
     uint64_t sum = (r & 0xFFFFu) + ((r >> 16) & 0xFFFFu) + ((r >> 32) & 0xFFFFu) + (r >> 48);
@@ -70,7 +70,7 @@ static uint16_t convert(chip_t *chip, unsigned input)
     chip_adc_t *adc = &chip->adc;
     unsigned bits = adc->twelve_bit ? 12u : 10u;
     double full = (double)(1u << bits);
-    double lsb = input_voltage(chip, input) * (full / REFERENCE_V) * (1.0 + adc->gain_error) + adc->noise_lsb * noise(adc);
+    double lsb = input_voltage(chip, input) * (full / REFERENCE_V) * (1.0 + adc->gain_error) + adc->noise_lsb * chip_adc_noise(adc);
     double limited = plant_min(plant_max(floor(lsb + 0.5), 0.0), full - 1.0);
     if (input < 2) {
         adc->volts[input] = limited * (REFERENCE_V / full);
@@ -215,6 +215,17 @@ static bool fill_buffers(chip_t *chip)
     return true;
 }
 
+/* Whether it is the next one's turn where a share of all has to be hit, evenly spread. */
+static bool hit(double share, double *debt)
+{
+    *debt = share > 0.0 ? *debt + share : 0.0;
+    if (*debt < 1.0 - 1e-9) {
+        return false;
+    }
+    *debt -= 1.0;
+    return true;
+}
+
 /* A conversion has begun whose results are due at its end, or later where something holds the interrupt up. */
 static void deliver(chip_t *chip, const uint16_t *result, unsigned count)
 {
@@ -222,7 +233,8 @@ static void deliver(chip_t *chip, const uint16_t *result, unsigned count)
     bool interrupts = adc->sequence + 1u >= adc->sequence_length;
     memcpy(adc->result, result, count * sizeof *result);
     adc->result_count = count;
-    double held_s = interrupts ? plant_max(0.0, adc->hold_us - chip->cpu.own_isr_us) * 1e-6 : 0.0;
+    double hold_us = adc->hold_us + (interrupts && hit(adc->late_share, &adc->late_debt) ? adc->late_us : 0.0);
+    double held_s = interrupts ? plant_max(0.0, hold_us - chip->cpu.own_isr_us) * 1e-6 : 0.0;
     adc->due_s = plant_max(adc->conversion_end_s, chip->plant->now_s) + held_s;
     CHIP_REG(chip, AD1CON1) = (uint16_t)(CHIP_REG(chip, AD1CON1) & ~(unsigned)DONE);
 }
@@ -283,7 +295,9 @@ static void interrupt(chip_t *chip)
         chip->adc.overruns += 1.0;
         chip_warn(chip, "IFS0: AD1IF is still set when the next conversion ends, the handler was late or never came");
     }
-    if (chip->adc.dropped == 0.0) {
+    if (hit(chip->adc.lost_share, &chip->adc.lost_debt)) {
+        chip->adc.lost += 1.0;
+    } else if (chip->adc.dropped == 0.0) {
         to_come = chip_irq_raise(chip, CHIP_IRQ_ADC1);
     } else {
         chip->adc.withheld = true;

@@ -394,7 +394,7 @@ def plant_keys() -> list[list[str]]:
     folder = paths.ROOT / "tools" / "vboard"
     constants = dict(re.findall(r"#define (VB_\w+) ([\d.]+)", (folder / "vb_state.h").read_text(encoding="utf-8")))
     source = (folder / "vb_keys.c").read_text(encoding="utf-8")
-    found = re.findall(r'^    (P|I|R|G|S|SF|W)\("([\w.]+)", (.*), "([^"]*)", "([^"]*)"\),$', source, re.MULTILINE)
+    found = re.findall(r'^    (P|I|R|G|S|SF|SP|W)\("([\w.]+)", (.*), "([^"]*)", "([^"]*)"\),$', source, re.MULTILINE)
     rows = []
     for macro, name, middle, measured_in, told in found:
         if macro in "RG":

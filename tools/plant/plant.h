@@ -43,7 +43,8 @@ typedef struct {
 typedef struct {
     double rds_on_ohm, diode_v, diode_ohm, turn_on_s, turn_off_s, trip_a, open_phase;
     double shunt_ohm;
-    plant_gate_t gate[3];
+    double never_on, never_off; /* broken transistors: masks of bits 1L, 1H, 2L, 2H, 3L, 3H; one that is in both never turns off */
+    plant_gate_t gate[3];       /* what the drivers ask for */
     plant_cond_t cond[3];
     bool low_path[3];        /* the low transistor or its diode carries the leg */
     double low_since_s[3];   /* when low_path last changed, absolute time */
@@ -54,6 +55,7 @@ typedef struct {
     double max_step_s;       /* upper bound of an integration step */
     unsigned off_mask, float_mask; /* legs (bit k) with both transistors off, and those of them that carry nothing */
     unsigned open_mask;      /* the open phase, as a mask, that the conduction states stand for */
+    unsigned dead_mask, stuck_mask; /* never_on and never_off that they stand for */
 } plant_inverter_t;
 
 /* ---- supply and bus capacitor (plant_supply.c) ---- */

@@ -62,13 +62,21 @@ static void set_floating(plant_t *plant, unsigned leg)
     }
 }
 
-/* New state of a leg's transistors. With both off the current chooses the diode. */
+/* What the transistors of a leg do when the drivers ask for `gate`: a broken one does as it likes. */
+static plant_gate_t transistors(const plant_inverter_t *inv, unsigned leg, plant_gate_t gate)
+{
+    unsigned dead = inv->dead_mask >> 2u * leg & 3u, stuck = inv->stuck_mask >> 2u * leg & 3u;
+    return (plant_gate_t)(((unsigned)gate & ~dead) | stuck);
+}
+
+/* The drivers of a leg ask for something new. With both transistors off the current chooses the diode. */
 void plant_inverter_gate(plant_t *plant, unsigned leg, plant_gate_t gate)
 {
     static const plant_cond_t on[4] = {PLANT_COND_FLOAT, PLANT_COND_LOW, PLANT_COND_HIGH, PLANT_COND_SHOOT};
     plant_inverter_t *inv = &plant->inverter;
     unsigned bit = 1u << leg;
     inv->gate[leg] = gate;
+    gate = transistors(inv, leg, gate);
     if ((inv->open_mask & bit) != 0) {
         inv->off_mask |= bit;
         set_floating(plant, leg);
@@ -85,7 +93,8 @@ void plant_inverter_gate(plant_t *plant, unsigned leg, plant_gate_t gate)
 void plant_inverter_reset(plant_t *plant)
 {
     plant_inverter_t *inv = &plant->inverter;
-    inv->open_mask = 0;
+    inv->open_mask = inv->dead_mask = inv->stuck_mask = 0;
+    plant->motor.derived_stale = true; /* what is broken acts from the first period on */
     inv->off_mask = 0;
     plant_motor_set_alpha_beta(&plant->motor, 0.0, 0.0);
     for (unsigned k = 0; k < 3; k++) {
@@ -97,7 +106,7 @@ void plant_inverter_reset(plant_t *plant)
     inv->bus_as = 0.0;
 }
 
-/* Start of a period: follow changed drops, and a phase wire that was opened or closed. */
+/* Start of a period: follow changed drops, and wires and transistors that have broken or are whole again. */
 void plant_inverter_prepare(plant_t *plant)
 {
     plant_inverter_t *inv = &plant->inverter;
@@ -105,10 +114,14 @@ void plant_inverter_prepare(plant_t *plant)
         return;
     }
     unsigned open = inv->open_phase > 0.0 ? 1u << ((unsigned)inv->open_phase - 1u) : 0u;
-    unsigned changed = open ^ inv->open_mask;
+    unsigned opened = open ^ inv->open_mask;
+    unsigned dead = (unsigned)inv->never_on, stuck = (unsigned)inv->never_off;
+    unsigned broken = (dead ^ inv->dead_mask) | (stuck ^ inv->stuck_mask);
     inv->open_mask = open;
+    inv->dead_mask = dead;
+    inv->stuck_mask = stuck;
     for (unsigned k = 0; k < 3; k++) {
-        if ((changed & (1u << k)) != 0) {
+        if ((opened >> k & 1u) != 0 || (broken >> 2u * k & 3u) != 0) {
             plant_inverter_gate(plant, k, inv->gate[k]);
         }
         set_equation(plant, k);

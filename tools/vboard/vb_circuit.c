@@ -42,6 +42,15 @@ static double shunt_current(const vb_t *vb, unsigned leg, bool *valid)
     return part * i;
 }
 
+/* Voltage at the pin for a quantity that gives `volts` per unit from `zero_v` on, after all that may be wrong on the way. */
+static double sensed(vb_t *vb, vb_sense_t *sense, double quantity, double volts, double zero_v)
+{
+    double shown = sense->gain * quantity + sense->error + (sense->noise > 0.0 ? sense->noise * chip_adc_noise(&vb->chip.adc) : 0.0);
+    const double stuck_v[VB_SENSES] = {zero_v + volts * shown, sense->last_v, 0.0, REFERENCE_V, 0.5 * REFERENCE_V};
+    sense->last_v = stuck_v[(unsigned)sense->stuck];
+    return sense->last_v;
+}
+
 static double current_voltage(vb_t *vb, unsigned leg)
 {
     bool valid = false;
@@ -49,7 +58,8 @@ static double current_voltage(vb_t *vb, unsigned leg)
     if (!valid) {
         *(leg == 0 ? &vb->analogue.ia_invalid : &vb->analogue.ib_invalid) += 1.0;
     }
-    return vb->analogue.offset_v + vb->analogue.shunt_offset_v[leg] - vb->analogue.gain_v_per_a * i;
+    double zero_v = vb->analogue.offset_v + vb->analogue.shunt_offset_v[leg];
+    return sensed(vb, &vb->analogue.current[leg], i, -vb->analogue.gain_v_per_a, zero_v);
 }
 
 /* Voltage at the analogue input AN<input>. */
@@ -59,11 +69,11 @@ static double input_voltage(void *context, unsigned input)
     switch (input) {
     case 0:
     case 1: return current_voltage(vb, input);
-    case 2: return vb->plant.supply.bus_v / vb->analogue.vbus_ratio;
+    case 2: return sensed(vb, &vb->analogue.bus, vb->plant.supply.bus_v, 1.0 / vb->analogue.vbus_ratio, 0.0);
     case 3:
     case 4:
     case 5: return vb->plant.inverter.v[input - 3] / vb->analogue.vbus_ratio;
-    case 8: return vb->controls.pot * REFERENCE_V;
+    case 8: return sensed(vb, &vb->analogue.pot, vb->controls.pot, REFERENCE_V, 0.0);
     default: return 0.0;
     }
 }

@@ -73,6 +73,14 @@ static void set_theta(vb_t *vb, double deg)
 
 static void set_speed(vb_t *vb, double rpm) { vb->plant.motor.omega = rpm / PLANT_RPM_PER_RAD_S * vb->plant.motor.pole_pairs; }
 
+/* The clock changes at the next period: what was decoded with the old one counts no more. */
+static void set_crystal(vb_t *vb, double hz)
+{
+    vb->chip.clock.crystal_hz = hz;
+    memset(vb->chip.pwm.seen, 0xA5, sizeof vb->chip.pwm.seen);
+    memset(vb->chip.adc.seen, 0xA5, sizeof vb->chip.adc.seen);
+}
+
 static void set_seed(vb_t *vb, double seed)
 {
     vb->chip.adc.seed = seed;
@@ -104,6 +112,8 @@ static void set_isr_reset(vb_t *vb, double value)
     {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, 0, function, setter}
 #define SF(name, field, setter, start, min, max, unit, meaning) \
     {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE | VB_KEY_WHOLE}, start, AT(field), NULL, setter}
+#define SP(name, field, setter, start, min, max, unit, meaning) \
+    {{name, unit, meaning, min, max, VB_KEY_READ | VB_KEY_WRITE}, start, AT(field), NULL, setter}
 #define W(name, setter, unit, meaning) {{name, unit, meaning, 0.0, 1.0, VB_KEY_WRITE}, 0.0, 0, NULL, setter}
 
 static const key_entry_t table[] = {
@@ -150,6 +160,28 @@ static const key_entry_t table[] = {
     P("inverter.trip_a", plant.inverter.trip_a, 7.0, 0.0, 1000.0, "A", "bus current at which the comparator pulls FLTA1, 0 = no comparator"),
     R("inverter.trip_count", controls.trips, "", "how often it did"),
     I("fault.open_phase", plant.inverter.open_phase, 0.0, 0.0, 3.0, "", "1..3 = the wire of phase A..C is open, 0 = none"),
+    I("fault.never_on", plant.inverter.never_on, 0.0, 0.0, 63.0, "mask", "transistors that never turn on, bits as in P1OVDCON (1L, 1H, 2L, 2H, 3L, 3H)"),
+    I("fault.never_off", plant.inverter.never_off, 0.0, 0.0, 63.0, "mask", "transistors that never turn off"),
+    I("fault.ia_stuck", analogue.current[0].stuck, 0.0, 0.0, 4.0, "", "signal of phase A's current: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
+    P("fault.ia_gain", analogue.current[0].gain, 1.0, 0.0, 10.0, "", "factor of the reading of phase A's current"),
+    P("fault.ia_error_a", analogue.current[0].error, 0.0, -1000.0, 1000.0, "A", "by how much the reading of phase A's current is too high"),
+    P("fault.ia_noise_a", analogue.current[0].noise, 0.0, 0.0, 1000.0, "A", "standard deviation of the noise on the reading of phase A's current"),
+    I("fault.ib_stuck", analogue.current[1].stuck, 0.0, 0.0, 4.0, "", "signal of phase B's current: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
+    P("fault.ib_gain", analogue.current[1].gain, 1.0, 0.0, 10.0, "", "factor of the reading of phase B's current"),
+    P("fault.ib_error_a", analogue.current[1].error, 0.0, -1000.0, 1000.0, "A", "by how much the reading of phase B's current is too high"),
+    P("fault.ib_noise_a", analogue.current[1].noise, 0.0, 0.0, 1000.0, "A", "standard deviation of the noise on the reading of phase B's current"),
+    I("fault.vbus_stuck", analogue.bus.stuck, 0.0, 0.0, 4.0, "", "signal of the bus: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
+    P("fault.vbus_gain", analogue.bus.gain, 1.0, 0.0, 10.0, "", "factor of the reading of the bus"),
+    P("fault.vbus_error_v", analogue.bus.error, 0.0, -1000.0, 1000.0, "V", "by how much the reading of the bus is too high"),
+    P("fault.vbus_noise_v", analogue.bus.noise, 0.0, 0.0, 1000.0, "V", "standard deviation of the noise on the reading of the bus"),
+    I("fault.pot_stuck", analogue.pot.stuck, 0.0, 0.0, 4.0, "", "signal of the potentiometer: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
+    P("fault.pot_gain", analogue.pot.gain, 1.0, 0.0, 10.0, "", "factor of the reading of the potentiometer"),
+    P("fault.pot_error", analogue.pot.error, 0.0, -1000.0, 1000.0, "", "by how much the reading of the potentiometer is too high"),
+    P("fault.pot_noise", analogue.pot.noise, 0.0, 0.0, 1000.0, "", "standard deviation of the noise on the reading of the potentiometer"),
+    P("fault.isr_lost_share", chip.adc.lost_share, 0.0, 0.0, 1.0, "", "share of the control interrupts that never come; 0.1 = every tenth"),
+    P("fault.isr_late_share", chip.adc.late_share, 0.0, 0.0, 1.0, "", "share of the control interrupts that come late"),
+    P("fault.isr_late_us", chip.adc.late_us, 0.0, 0.0, 1000.0, "us", "by how much these are late"),
+    R("fault.isr_lost_count", chip.adc.lost, "", "control interrupts that never came"),
     /* measurement */
     P("shunt.ohm", plant.inverter.shunt_ohm, 0.005, 0.0, 10.0, "ohm", "shunt in the low leg"),
     P("shunt.gain_v_per_a", analogue.gain_v_per_a, 0.375, -100.0, 100.0, "V/A", "by how much the amplifier's output falls per ampere into the motor; negative: it rises"),
@@ -176,7 +208,7 @@ static const key_entry_t table[] = {
     P("cpu.isr_us", chip.adc.hold_us, VB_ISR_US, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act; on a target image what exceeds 13 holds the interrupt up"),
     I("cpu.isr_dropped", chip.adc.dropped, 0.0, 0.0, 1.0, "", "1 = the ADC handler is not called any more"),
     I("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
-    P("cpu.crystal_hz", chip.clock.crystal_hz, 8e6, 1e5, 64e6, "Hz", "crystal"),
+    SP("cpu.crystal_hz", chip.clock.crystal_hz, set_crystal, 8e6, 1e5, 64e6, "Hz", "crystal"),
     R("cpu.fcy_hz", chip.clock.fcy_hz, "Hz", "instruction clock"),
     W("cpu.isr_reset", set_isr_reset, "", "any value starts the measurement of the control interrupt anew"),
     R("cpu.isr_cycles", count.isr.last, "cycles", "the last control interrupt, entry to return"),

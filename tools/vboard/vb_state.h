@@ -15,10 +15,20 @@ typedef struct {
     double trips;
 } vb_controls_t;
 
+/* What a measured signal does instead of following its quantity (vb_circuit.c). */
+typedef enum { VB_SENSE_WORKS, VB_SENSE_HOLDS, VB_SENSE_GROUND, VB_SENSE_SUPPLY, VB_SENSE_MIDDLE, VB_SENSES } vb_sense_state_t;
+
+typedef struct {
+    double stuck;           /* vb_sense_state_t */
+    double gain, error, noise; /* of the quantity, as the ADC would show it */
+    double last_v;          /* at the pin, at the last conversion */
+} vb_sense_t;
+
 /* Amplifiers and dividers before the ADC (vb_circuit.c). */
 typedef struct {
     double vbus_ratio, offset_v, gain_v_per_a, shunt_offset_v[2], settle_s;
     double ia_invalid, ib_invalid;
+    vb_sense_t current[2], bus, pot;
 } vb_analogue_t;
 
 /* The serial line (vb_serial.c). */
