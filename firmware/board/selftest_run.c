@@ -25,7 +25,7 @@ uint16_t board_selftest_parts;
 
 static uint16_t owed_ms;  /* how long the tests between two interrupts have waited */
 static uint16_t stepped;  /* drive ticks at the last selftest_ms() */
-static uint16_t ms;       /* counts on */
+static uint16_t run_ms;   /* counts on */
 
 void selftest_fail(selftest_t test)
 {
@@ -236,7 +236,7 @@ void selftest_pass(void)
 
 void selftest_ms(void)
 {
-    ms++;
+    run_ms++;
     owed_ms++;
     stepped = board_drive.ticks;
     if (board_selftest_parts != PARTS_IN_ORDER || owed_ms > OWED_MS) {
@@ -247,7 +247,7 @@ void selftest_ms(void)
     }
     test_registers();
     (void)selftest_flash();
-    if (ms % ADC_EVERY_MS == 0u) {
+    if (run_ms % ADC_EVERY_MS == 0u) {
         start_adc();
     }
 }

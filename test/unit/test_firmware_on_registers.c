@@ -7,6 +7,8 @@
 #include "firmware/board/isr.c"
 #include "firmware/board/pins.c"
 #include "firmware/board/pwm.c"
+#include "firmware/board/selftest_run.c"
+#include "firmware/board/selftest_start.c"
 #include "firmware/board/status.c"
 #include "firmware/board/timer.c"
 #include "firmware/board/uart.c"
@@ -34,6 +36,7 @@ static void board_ms(uint16_t ms)
     while (ms-- != 0u) {
         uint16_t n;
         for (n = 0; n < 20u; n++) {
+            ADC1BUF0 = (AD1CHS0 == 8u) ? 0x0000u : 0x8000u; /* the potentiometer in its middle; an input that is switched off */
             _ADC1Interrupt();
         }
         IFS0bits.T1IF = 1;
@@ -54,6 +57,7 @@ static void press_s2(void)
 /** State, fault and override: 0 all off, 0x0015 the low sides, 0x3F00 PWM. */
 static void expect(drive_state_t state, drive_fault_t fault, uint16_t override)
 {
+    TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
     TEST_ASSERT_EQUAL_UINT16(state, board_drive.state);
     TEST_ASSERT_EQUAL_UINT16(fault, board_drive.fault);
     TEST_ASSERT_EQUAL_HEX16(override, P1OVDCON);

@@ -78,6 +78,9 @@ __attribute__((constructor)) static void prepare(void)
                 host_sfr_table[i].reset = ready[k].start;
             }
         }
+        if (host_sfr_table[i].pointer == &SPLIM) { /* as the start-up code leaves it */
+            host_sfr_table[i].reset = (uint16_t)(uintptr_t)(host_stack + HOST_STACK_WORDS);
+        }
     }
     host_registers_reset();
 }
