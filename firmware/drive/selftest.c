@@ -67,8 +67,8 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte)
 
 uint16_t selftest_flow_holds(const drive_t *d)
 {
-    uint16_t marks = d->selftest.marks, next = (uint16_t)(((marks >> 4) + 0x0111u) & 0x0777u);
-    return (uint16_t)((marks & 0x8FFFu) == next && ((marks ^ d->ticks) & (SLOW_PHASES - 1u)) == 0u);
+    uint16_t marks = d->selftest.marks, expected = (uint16_t)(((marks >> 4) + 0x0111u) & 0x0777u);
+    return (uint16_t)((marks & 0x8FFFu) == expected && ((marks ^ d->ticks) & (SLOW_PHASES - 1u)) == 0u);
 }
 
 uint16_t selftest_variables_hold(const drive_t *d)
