@@ -164,7 +164,8 @@ static void test_ram_slice(void)
     } else {
         from = 0;
         n = (uint16_t)((n + 1u < SELFTEST_BACKGROUNDS) ? n + 1u : 0u);
-        if (!board_cpu_holds()) {
+        board_cpu_test();
+        if (board_cpu_holds == 0u) {
             selftest_fail(SELFTEST_CPU);
         }
     }

@@ -89,6 +89,11 @@ void selftest_start(drive_fault_t kept)
     } else {
         /* once each power-up */
     }
+    board_cpu_test();
+    if (board_cpu_holds == 0u) {
+        selftest_fail(SELFTEST_CPU);
+    }
+    SET_CPU_IPL(0); /* no interrupt is enabled yet */
     test_ram();
     STACK_GUARD[0] = STACK_PATTERN;
     STACK_GUARD[1] = STACK_PATTERN;

@@ -31,7 +31,6 @@ void drive_init(drive_t *d, const drive_params_t *p)
     SELFTEST_KEEP(d, fault, FAULT_NONE);
     SELFTEST_KEEP(d, offset_a, 0);
     SELFTEST_KEEP(d, offset_b, 0);
-    SELFTEST_NO_MARKS(d);
     d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
     bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);

@@ -67,8 +67,9 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte)
 
 uint16_t selftest_flow_holds(const drive_t *d)
 {
-    uint16_t marks = d->selftest.marks, expected = (uint16_t)(((marks >> 4) + 0x0111u) & 0x0777u);
-    return (uint16_t)((marks & 0x8FFFu) == expected && ((marks ^ d->ticks) & (SLOW_PHASES - 1u)) == 0u);
+    uint16_t ticks = d->ticks, rest = (uint16_t)(ticks & (SLOW_PHASES - 1u));
+    uint16_t expected = (uint16_t)((ticks / SLOW_PHASES) * (SLOW_PHASES * (SLOW_PHASES - 1u) / 2u) + rest * (rest + 1u) / 2u);
+    return (uint16_t)(((d->selftest.phases ^ expected) & 0x7FFFu) == 0u); /* the sum of all 65536 ticks is a multiple of 0x8000 */
 }
 
 uint16_t selftest_variables_hold(const drive_t *d)

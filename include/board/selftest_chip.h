@@ -1,4 +1,4 @@
-/* What the self-tests need of the processor itself: its registers, the place of RAM, stack and flash's CRC. The only file with assembler. */
+/* What the self-tests need of the processor itself: its registers, the place of RAM, stack and flash's CRC. */
 #ifndef BOARD_SELFTEST_CHIP_H
 #define BOARD_SELFTEST_CHIP_H
 
@@ -23,43 +23,14 @@ PIN_NEEDS(an_input_is_free_for_the_converters_test, (BOARD_AD1PCFGL & 0x00C0u) !
 extern uint16_t _SPLIM_init; /* the linker's: its address is the stack's limit */
 #define BOARD_STACK_LIMIT (&_SPLIM_init)
 
-/** First word of RAM that neither holds a variable nor is the stack of this call and of what it calls. Clears what lies between. */
-static inline volatile uint16_t *board_free_ram(void)
-{
-    volatile uint16_t *at, *end;
-    __asm__ volatile("mov w15, %0" : "=r"(at));
-    end = at + 24;
-    for (; at != end; at++) {
-        *at = 0;
-    }
-    return end;
-}
+/** First word of RAM that neither holds a variable nor is the stack of this call and of what it calls. What lies between is cleared. */
+volatile uint16_t *board_free_ram(void);
 
-/* A chain of all W registers but the stack pointer: a bit that is stuck reaches the end. Two registers are compared with it, so that not
- * one of them hides its own. Leaves with anything wrong. */
-#define CPU_CHAIN \
-    "mov %1,w0\n mov w0,w1\n mov w1,w2\n mov w2,w3\n mov w3,w4\n mov w4,w5\n mov w5,w6\n mov w6,w7\n mov w7,w8\n mov w8,w9\n" \
-    "mov w9,w10\n mov w10,w11\n mov w11,w12\n mov w12,w13\n mov w13,w14\n mov %1,w0\n mov %1,w1\n" \
-    "cp w0,w14\n bra nz,.Lwrong%=\n cp w1,w14\n bra nz,.Lwrong%=\n"
-/* The stack pointer (0x001E), whose bit 0 is always 0. Nothing uses the stack meanwhile: interrupts are off. */
-#define CPU_STACK_POINTER "mov 0x001E,w2\n mov w0,0x001E\n mov 0x001E,w1\n mov w2,0x001E\n bclr w0,#0\n cp w0,w1\n bra nz,.Lwrong%=\n"
-/* C, Z, OV, N and DC of SR (0x0042), level 7 stays: 0x01E5 or 0x00EA. None of these instructions changes a flag but CP. */
-#define CPU_FLAGS "mov %2,w0\n mov w0,0x0042\n mov 0x0042,w1\n cp w0,w1\n bra nz,.Lwrong%=\n"
+/** Do W0 to W15 and the flags hold a pattern and its complement? With interrupts off; leaves level 7. */
+void board_cpu_test(void);
 
-/** Not 0 if the registers of the processor hold a pattern. With interrupts off. @param pattern and flags: 0x5555, 0x01E5; 0xAAAA, 0x00EA */
-NOINLINE uint16_t board_cpu_holds_pattern(uint16_t pattern_value, uint16_t flags_value)
-{
-    static volatile uint16_t pattern, flags, passed; /* no register says so: it could be the one that is wrong */
-    pattern = pattern_value;
-    flags = flags_value;
-    passed = 0;
-    __asm__ volatile("push w14\n" CPU_CHAIN CPU_STACK_POINTER CPU_FLAGS "setm %0\n.Lwrong%=: pop w14\n"
-                     : "=T"(passed)
-                     : "T"(pattern), "T"(flags)
-                     : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "w8", "w9", "w10", "w11", "w12", "w13", "cc");
-    return passed;
-}
-#define board_cpu_holds() (board_cpu_holds_pattern(0x5555u, 0x01E5u) && board_cpu_holds_pattern(0xAAAAu, 0x00EAu))
+/** Not 0: they do. In memory, because it could be the register of a function's value that is wrong. */
+extern volatile uint16_t board_cpu_holds;
 
 /** 1 while no control interrupt can come for 600 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. */
 #define BOARD_QUIET() (P1TMR < (uint16_t)(BOARD_P1TPER - 350u))
@@ -77,7 +48,8 @@ NOINLINE uint16_t board_cpu_holds_pattern(uint16_t pattern_value, uint16_t flags
 #define board_free_ram() host_free_ram
 #define BOARD_USED_END(free_ram) BOARD_RAM_END
 #define BOARD_FREE_END (host_free_ram + HOST_FREE_WORDS)
-#define board_cpu_holds() host_cpu_holds()
+#define board_cpu_holds host_cpu_holds
+#define board_cpu_test() host_cpu_test()
 #define BOARD_QUIET() 1u
 #define BOARD_WATCHDOG_BITES() host_watchdog_bites()
 

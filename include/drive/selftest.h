@@ -36,7 +36,7 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte);
 #define SELFTEST_CRC_START 0xFFFFu
 
 #ifndef SELFTEST_OFF
-/** 1 if the last four slow phases came in their order and the last of them is that of the last period. Between two periods. */
+/** 1 if the sum of the slow phases is the one that belongs to the ticks: each came in its turn, ever since the start. Between two periods. */
 uint16_t selftest_flow_holds(const drive_t *d);
 
 /** 1 if what is kept twice agrees. Between two periods. */

@@ -7,10 +7,10 @@
 
 #ifndef SELFTEST_OFF
 
-/** Complements of the drive's fields of the same name, and the last four slow phases, four bits each. */
+/** Complements of the drive's fields of the same name, and the sum of the slow phases that came to their end. */
 typedef struct {
     uint16_t state, fault, direction, offset_a, offset_b;
-    uint16_t marks;
+    uint16_t phases;
 } selftest_state_t;
 
 /** Member of drive_t. */
@@ -22,26 +22,22 @@ QM_INLINE uint16_t selftest_complement(uint16_t value)
     return (uint16_t)~value;
 }
 
-/** The last four phases with one more. */
-QM_INLINE uint16_t selftest_marked(uint16_t marks, uint16_t phase)
+/** The sum with one phase more. */
+QM_INLINE uint16_t selftest_marked(uint16_t sum, uint16_t phase)
 {
-    return (uint16_t)((uint16_t)(marks << 4) | phase);
+    return (uint16_t)(sum + phase);
 }
 
 /** Goes with every write of a field that is kept twice. */
 #define SELFTEST_KEEP(d, field, value) ((d)->selftest.field = selftest_complement((uint16_t)(value)))
 
 /** A slow phase has come to its end. */
-#define SELFTEST_MARK(d, phase) ((d)->selftest.marks = selftest_marked((d)->selftest.marks, phase))
-
-/** The marks before the first period: phases 5, 6, 7, 0. */
-#define SELFTEST_NO_MARKS(d) ((d)->selftest.marks = 0x5670u)
+#define SELFTEST_MARK(d, phase) ((d)->selftest.phases = selftest_marked((d)->selftest.phases, phase))
 
 #else
 #define SELFTEST_STATE
 #define SELFTEST_KEEP(d, field, value) ((void)0)
 #define SELFTEST_MARK(d, phase) ((void)(phase))
-#define SELFTEST_NO_MARKS(d) ((void)0)
 #endif
 
 #endif

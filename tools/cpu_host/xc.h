@@ -71,7 +71,8 @@ extern uint32_t host_flash[HOST_FLASH_WORDS];
 extern volatile uint16_t host_free_ram[HOST_FREE_WORDS], host_stack[HOST_STACK_WORDS];
 extern uint16_t host_w_stuck_at_1[HOST_W_REGISTERS], host_w_stuck_at_0[HOST_W_REGISTERS];
 extern uint16_t host_watchdog_counts; /* of timer 1 until it resets; 0: it never does */
-uint16_t host_cpu_holds(void);
+extern volatile uint16_t host_cpu_holds;
+void host_cpu_test(void);
 uint16_t host_watchdog_bites(void);
 #define __builtin_tblrdl(offset) ((uint16_t)host_flash[(offset) / 2u])
 #define __builtin_tblrdh(offset) ((uint16_t)(host_flash[(offset) / 2u] >> 16))
