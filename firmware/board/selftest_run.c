@@ -21,10 +21,9 @@
     ((((SELFTEST_PART_SUPERVISE * 8u + SELFTEST_PART_PANEL) * 8u) + SELFTEST_PART_WATCH) * 8u + SELFTEST_PART_STATUS)
 
 volatile uint16_t board_selftest_failed BOARD_PERSISTENT;
-uint16_t board_selftest_parts;
+uint16_t board_selftest_parts, board_selftest_stepped;
 
 static uint16_t owed_ms;  /* how long the tests between two interrupts have waited */
-static uint16_t stepped;  /* drive ticks at the last selftest_ms() */
 static uint16_t run_ms;   /* counts on */
 
 void selftest_fail(selftest_t test)
@@ -74,9 +73,7 @@ static const written_t written[] = {
     { &PMD1, 0xFFFF, 0 },
     /* interrupts: only the control interrupt and the fault input; the core */
     { &IEC0, 0xFFFF, 0x2000 },
-    { &IEC1, 0xFFFF, 0 },
     { &IEC3, 0xFFFF, 0x8000 },
-    { &IEC4, 0xFFFF, 0 },
     { &IPC3, 0x0070, 0x0050 },
     { &IPC15, 0x7000, 0x5000 },
     { &INTCON1, 0x8000, 0 },
@@ -222,7 +219,7 @@ void selftest_pass(void)
     if (board_selftest_failed != (uint16_t)SELFTEST_NONE) {
         firmware_trip(FAULT_SELFTEST); /* S2 must not clear it */
     }
-    if ((uint16_t)(board_drive.ticks - stepped) > PARAM_PERIODS(OWED_MS * 0.001F)) {
+    if ((uint16_t)(board_drive.ticks - board_selftest_stepped) > PARAM_PERIODS(OWED_MS * 0.001F)) {
         selftest_fail(SELFTEST_FLOW);
     }
     board_selftest_parts = SELFTEST_PART_SUPERVISE;
@@ -239,7 +236,7 @@ void selftest_ms(void)
 {
     run_ms++;
     owed_ms++;
-    stepped = board_drive.ticks;
+    board_selftest_stepped = board_drive.ticks;
     if (board_selftest_parts != PARTS_IN_ORDER || owed_ms > OWED_MS) {
         selftest_fail(SELFTEST_FLOW);
     }
@@ -251,13 +248,6 @@ void selftest_ms(void)
     if (run_ms % ADC_EVERY_MS == 0u) {
         start_adc();
     }
-}
-
-void selftest_run_init(void)
-{
-    adc_busy = 0;
-    owed_ms = 0;
-    stepped = board_drive.ticks;
 }
 
 /* ---- messages ---- */

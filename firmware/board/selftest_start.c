@@ -100,7 +100,7 @@ void selftest_start(drive_fault_t kept)
     while (!selftest_flash()) {
         ClrWdt();
     }
-    selftest_run_init();
+    board_selftest_stepped = board_drive.ticks;
 }
 
 #endif

@@ -10,6 +10,9 @@
 /** The self-test that failed first (selftest_t), 0: none. From then on to the next reset by power-up or MCLR nothing may run. */
 extern volatile uint16_t board_selftest_failed;
 
+/** Drive ticks at the last selftest_ms(). */
+extern uint16_t board_selftest_stepped;
+
 /** Notes a failure and trips. Any context but the control interrupt. */
 void selftest_fail(selftest_t test);
 
@@ -24,9 +27,6 @@ void selftest_pass(void);
 
 /** At the end of a millisecond's work. */
 void selftest_ms(void);
-
-/** After all other tests of the start. */
-void selftest_run_init(void);
 
 /** One slice of the flash's CRC. @return 1 at the flash's end */
 uint16_t selftest_flash(void);
