@@ -6,6 +6,7 @@ CRC-16 of CCITT over every word below the last two of the flash, low byte first;
 and its complement, so nothing else may be there. A program without self-tests stays as it is."""
 
 import argparse
+import binascii
 import sys
 from io import BytesIO
 from pathlib import Path
@@ -23,18 +24,13 @@ except ImportError:
 
 PLACE = device.FLASH[-2]            # BOARD_FLASH_CRC_AT of include/board/selftest_chip.h
 SELF_TESTS, VARIABLE = "board_selftest_failed", "board_flash_crc"
-POLYNOMIAL = 0x1021
+START = 0xFFFF
 
 
 def crc(words: Words) -> int:
     """Of all words before PLACE."""
-    value = 0xFFFF
-    for address in range(0, PLACE, 2):
-        for byte in words.get(address, device.ERASED).to_bytes(3, "little"):
-            value ^= byte << 8
-            for _ in range(8):
-                value = (value << 1 ^ (POLYNOMIAL if value & 0x8000 else 0)) & 0xFFFF
-    return value
+    data = b"".join(words.get(address, device.ERASED).to_bytes(3, "little") for address in range(0, PLACE, 2))
+    return binascii.crc_hqx(data, START)
 
 
 def expected(words: Words) -> tuple[int, int]:
@@ -64,9 +60,11 @@ def place(path: Path) -> bool:
 
 def check(words: Words, elf: Elf) -> list[str]:
     """A line if the program has self-tests and its CRC is not right."""
+    if not has_self_tests(elf):
+        return []
     wanted = expected(words)
     found = (words.get(PLACE, device.ERASED), words.get(PLACE + 2, device.ERASED))
-    if not has_self_tests(elf) or found == wanted:
+    if found == wanted:
         return []
     return [f"flash's CRC at 0x{PLACE:04X}: 0x{found[0]:06X} 0x{found[1]:06X}, must be 0x{wanted[0]:06X} 0x{wanted[1]:06X}: {REMEDY}"]
 
