@@ -10,7 +10,8 @@
 volatile uint16_t *board_free_ram(void)
 {
     volatile uint16_t *at, *end;
-    __asm__ volatile("mov w15, %0" : "=r"(at));
+    __asm__ volatile("mov w15, %0"
+                     : "=r"(at));
     end = at + WORDS_BELOW;
     for (; at != end; at++) {
         *at = 0;

@@ -10,10 +10,10 @@
 #include "board/text.h"
 #include "drive/state.h"
 
-#define SLICE_WORDS 4u     /* of RAM; two slices overlap by one, so that faults between neighbours show */
-#define FLASH_WORDS 32u    /* of flash in a millisecond */
+#define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
+#define FLASH_WORDS 32u /* of flash in a millisecond */
 #define REGISTERS_AT_ONCE 4u
-#define OWED_MS 50u        /* in this time the tests get their turn */
+#define OWED_MS 50u /* in this time the tests get their turn */
 #define ADC_EVERY_MS 512u
 #define ADC_ZERO_MOST (INT16_MIN + 16 * 64) /* 16 counts of the converter: its offset error is 7 at most [?] */
 
@@ -23,8 +23,8 @@
 volatile uint16_t board_selftest_failed BOARD_PERSISTENT;
 uint16_t board_selftest_parts, board_selftest_stepped;
 
-static uint16_t owed_ms;  /* how long the tests between two interrupts have waited */
-static uint16_t run_ms;   /* counts on */
+static uint16_t owed_ms; /* how long the tests between two interrupts have waited */
+static uint16_t run_ms;  /* counts on */
 
 void selftest_fail(selftest_t test)
 {
@@ -147,7 +147,7 @@ const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLAS
 static void test_ram_slice(void)
 {
     static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
-    static uint16_t from, n; /* word of the RAM, background */
+    static uint16_t from, n;                         /* word of the RAM, background */
     volatile uint16_t *at = BOARD_RAM + from;
     uint16_t words = (uint16_t)(BOARD_RAM_END - at);
 
@@ -184,13 +184,12 @@ static void test_in_silence(void)
 
 /* ---- converter: an input that is switched off reads AVSS ---- */
 
-static uint16_t adc_busy, adc_since;
+static uint16_t adc_since;
 static int16_t adc_pot_q15;
 
 static void start_adc(void)
 {
     if (board_drive.state == (uint16_t)DRIVE_STOPPED && !board_drive.command.run) {
-        adc_busy = 1;
         adc_since = board_drive.ticks;
         adc_pot_q15 = board_panel.pot_q15;
         AD1CHS0 = BOARD_AN_OFF;
@@ -201,10 +200,9 @@ static void start_adc(void)
 static void end_adc(void)
 {
     int16_t zero_q15 = board_panel.pot_q15;
-    if (adc_busy && (uint16_t)(board_drive.ticks - adc_since) >= 3u) {
+    if (AD1CHS0 == BOARD_AN_OFF && (uint16_t)(board_drive.ticks - adc_since) >= 3u) {
         AD1CHS0 = BOARD_AD1CHS0;
         board_panel.pot_q15 = adc_pot_q15;
-        adc_busy = 0;
         if (zero_q15 > ADC_ZERO_MOST) {
             selftest_fail(SELFTEST_ADC);
         }

@@ -15,7 +15,9 @@
 #define WATCHDOG_MOST 14500u
 #define WATCHDOG_NEVER 20000u
 
-static enum { WATCHDOG_NO_TEST, WATCHDOG_DUE, WATCHDOG_BITTEN } watchdog_test;
+static enum { WATCHDOG_NO_TEST,
+              WATCHDOG_DUE,
+              WATCHDOG_BITTEN } watchdog_test;
 static volatile uint16_t waited_counts BOARD_PERSISTENT;
 
 /* Power-up clears WDTO, and its own bits stay until the firmware clears them: both together are the reset that the test has waited for. */

@@ -5,7 +5,10 @@
 #include "drive/selftest.h"
 
 /** The background's parts, which come in this order. */
-enum { SELFTEST_PART_SUPERVISE = 1, SELFTEST_PART_PANEL, SELFTEST_PART_WATCH, SELFTEST_PART_STATUS };
+enum { SELFTEST_PART_SUPERVISE = 1,
+       SELFTEST_PART_PANEL,
+       SELFTEST_PART_WATCH,
+       SELFTEST_PART_STATUS };
 
 #ifndef SELFTEST_OFF
 

@@ -19,7 +19,8 @@
 
 #define SELFTEST_ENUM(code, name, clause, what) SELFTEST_##name = (code),
 /** Which test has failed. */
-typedef enum { SELFTEST_NONE = 0, SELFTEST_TABLE(SELFTEST_ENUM) SELFTEST_COUNT } selftest_t;
+typedef enum { SELFTEST_NONE = 0,
+               SELFTEST_TABLE(SELFTEST_ENUM) SELFTEST_COUNT } selftest_t;
 
 #define SELFTEST_BACKGROUNDS 5u
 /** Words for selftest_march(): any two bits of a word differ in at least one of them. */

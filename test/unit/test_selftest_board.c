@@ -57,6 +57,7 @@ void setUp(void)
     memset(host_w_stuck_at_0, 0, sizeof host_w_stuck_at_0);
     memset(sent, 0, sizeof sent);
     sent_count = 0;
+    owed_ms = 0; /* as after every start of the chip */
     power_up();
 }
 
@@ -300,6 +301,18 @@ void test_a_converter_that_does_not_read_ground_is_found_in_STOPPED_only(void)
     board_ms(1200); /* the potentiometer is needed */
     TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
     TEST_ASSERT_EQUAL_HEX16(BOARD_AD1CHS0, AD1CHS0);
+}
+
+void test_a_start_in_the_middle_of_the_converters_test_forgets_it(void)
+{
+    uint16_t n;
+    for (n = 0; n < 2000u && AD1CHS0 == BOARD_AD1CHS0; n++) {
+        board_ms(1);
+    }
+    TEST_ASSERT_EQUAL_HEX16(BOARD_AN_OFF, AD1CHS0);
+    power_up();
+    board_ms(1100);
+    TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
 }
 
 void test_the_panel_never_sees_the_converters_test(void)
