@@ -11,7 +11,6 @@
 
 /** An analogue input that AD1PCFGL switches off: the multiplexer gives AVSS. */
 #define BOARD_AN_OFF ((uint16_t)((BOARD_AD1PCFGL & 0x0040u) ? 6 : 7))
-PIN_NEEDS(an_input_is_free_for_the_converters_test, (BOARD_AD1PCFGL & 0x00C0u) != 0u);
 
 #ifdef __XC16__
 
@@ -32,8 +31,8 @@ void board_cpu_test(void);
 /** Not 0: they do. In memory, because it could be the register of a function's value that is wrong. */
 extern volatile uint16_t board_cpu_holds;
 
-/** 1 while no control interrupt can come for 600 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. */
-#define BOARD_QUIET() (P1TMR < (uint16_t)(BOARD_P1TPER - 350u))
+/** 1 while no control interrupt can come for 400 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. */
+#define BOARD_QUIET() (P1TMR < (uint16_t)(BOARD_P1TPER - 150u))
 
 /** A pass of waiting for the watchdog's reset. @return 0: the reset leaves no time for another answer */
 #define BOARD_WATCHDOG_BITES() 0u
