@@ -13,8 +13,9 @@ volatile uint16_t *board_free_ram(void)
     __asm__ volatile("mov w15, %0"
                      : "=r"(at));
     end = at + WORDS_BELOW;
-    for (; at != end; at++) {
+    while (at != end) {
         *at = 0;
+        at++;
     }
     return end;
 }

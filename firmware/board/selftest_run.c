@@ -43,43 +43,43 @@ typedef struct {
 
 static const written_t written[] = {
     /* PWM */
-    { &P1TCON, 0xA0FF, BOARD_P1TCON },
-    { &P1TPER, 0x7FFF, BOARD_P1TPER },
-    { &P1SECMP, 0xFFFF, BOARD_P1SECMP },
-    { &PWM1CON1, 0x0777, BOARD_PWM1CON1 },
-    { &PWM1CON2, 0x0F07, 0 },
-    { &P1DTCON1, 0xFFFF, BOARD_P1DTCON1 },
-    { &P1DTCON2, 0x003F, 0 },
-    { &P1FLTACON, 0x3F87, BOARD_P1FLTACON },
+    { &P1TCON, 0xA0FFu, BOARD_P1TCON },
+    { &P1TPER, 0x7FFFu, BOARD_P1TPER },
+    { &P1SECMP, 0xFFFFu, BOARD_P1SECMP },
+    { &PWM1CON1, 0x0777u, BOARD_PWM1CON1 },
+    { &PWM1CON2, 0x0F07u, 0u },
+    { &P1DTCON1, 0xFFFFu, BOARD_P1DTCON1 },
+    { &P1DTCON2, 0x003Fu, 0u },
+    { &P1FLTACON, 0x3F87u, BOARD_P1FLTACON },
     /* ADC; SAMP and DONE change */
-    { &AD1CON1, 0xA7EC, BOARD_AD1CON1 | 0x8000u },
-    { &AD1CON2, 0xE77F, BOARD_AD1CON2 },
-    { &AD1CON3, 0x9FFF, BOARD_AD1CON3 },
-    { &AD1CHS0, 0x9F9F, BOARD_AD1CHS0 },
-    { &AD1CHS123, 0x0707, BOARD_AD1CHS123 },
-    { &AD1PCFGL, 0x01FF, BOARD_AD1PCFGL & 0x01FFu },
+    { &AD1CON1, 0xA7ECu, BOARD_AD1CON1 | 0x8000u },
+    { &AD1CON2, 0xE77Fu, BOARD_AD1CON2 },
+    { &AD1CON3, 0x9FFFu, BOARD_AD1CON3 },
+    { &AD1CHS0, 0x9F9Fu, BOARD_AD1CHS0 },
+    { &AD1CHS123, 0x0707u, BOARD_AD1CHS123 },
+    { &AD1PCFGL, 0x01FFu, BOARD_AD1PCFGL & 0x01FFu },
     /* pins */
-    { &TRISA, 0x079F, BOARD_TRIS(A) & 0x079Fu },
-    { &TRISB, 0xFFFF, BOARD_TRIS(B) },
-    { &TRISC, 0x03FF, BOARD_TRIS(C) & 0x03FFu },
-    { &RPINR12, 0x001F, BOARD_FLTA_RP },
+    { &TRISA, 0x079Fu, BOARD_TRIS(A) & 0x079Fu },
+    { &TRISB, 0xFFFFu, BOARD_TRIS(B) },
+    { &TRISC, 0x03FFu, BOARD_TRIS(C) & 0x03FFu },
+    { &RPINR12, 0x001Fu, BOARD_FLTA_RP },
     /* clock, timer, power of the peripherals */
-    { &OSCCON, 0x7060, 0x3060 }, /* the crystal with the PLL, locked; pin selection locked */
-    { &PLLFBD, 0x01FF, BOARD_PLLFBD },
-    { &CLKDIV, 0xFFDF, BOARD_CLKDIV },
-    { &OSCTUN, 0x003F, 0 },
-    { &T1CON, 0xA076, 0x8000 },
-    { &PR1, 0xFFFF, BOARD_FCY_HZ / 1000ul - 1ul },
-    { &PMD1, 0xFFFF, 0 },
+    { &OSCCON, 0x7060u, 0x3060u }, /* the crystal with the PLL, locked; pin selection locked */
+    { &PLLFBD, 0x01FFu, BOARD_PLLFBD },
+    { &CLKDIV, 0xFFDFu, BOARD_CLKDIV },
+    { &OSCTUN, 0x003Fu, 0u },
+    { &T1CON, 0xA076u, 0x8000u },
+    { &PR1, 0xFFFFu, BOARD_FCY_HZ / 1000ul - 1ul },
+    { &PMD1, 0xFFFFu, 0u },
     /* interrupts: only the control interrupt and the fault input; the core */
-    { &IEC0, 0xFFFF, 0x2000 },
-    { &IEC3, 0xFFFF, 0x8000 },
-    { &IPC3, 0x0070, 0x0050 },
-    { &IPC15, 0x7000, 0x5000 },
-    { &INTCON1, 0x8000, 0 },
-    { &INTCON2, 0x8000, 0 },
-    { &CORCON, 0x10F7, 0x0024 },
-    { &MODCON, 0xC000, 0 },
+    { &IEC0, 0xFFFFu, 0x2000u },
+    { &IEC3, 0xFFFFu, 0x8000u },
+    { &IPC3, 0x0070u, 0x0050u },
+    { &IPC15, 0x7000u, 0x5000u },
+    { &INTCON1, 0x8000u, 0u },
+    { &INTCON2, 0x8000u, 0u },
+    { &CORCON, 0x10F7u, 0x0024u },
+    { &MODCON, 0xC000u, 0u },
 };
 
 static void test_registers(void)
@@ -146,13 +146,13 @@ const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLAS
 /** Four words of RAM; at its end the processor's registers, and another background. With interrupts off. */
 static void test_ram_slice(void)
 {
-    static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
-    static uint16_t from, n;                         /* word of the RAM, background */
+    static uint16_t from, n; /* word of the RAM, background */
     volatile uint16_t *at = BOARD_RAM + from;
     uint16_t words = (uint16_t)(BOARD_RAM_END - at);
 
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
     if (words > 1u) {
+        static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
         volatile uint16_t *spare = (at < keep + SLICE_WORDS && at + SLICE_WORDS > keep) ? keep + 2u * SLICE_WORDS : keep;
         if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
             selftest_fail(SELFTEST_RAM);
@@ -213,7 +213,6 @@ static void end_adc(void)
 
 void selftest_pass(void)
 {
-    uint16_t level;
     if (board_selftest_failed != (uint16_t)SELFTEST_NONE) {
         firmware_trip(FAULT_SELFTEST); /* S2 must not clear it */
     }
@@ -223,6 +222,7 @@ void selftest_pass(void)
     board_selftest_parts = SELFTEST_PART_SUPERVISE;
     end_adc();
     if (owed_ms != 0u && BOARD_QUIET()) {
+        uint16_t level;
         SET_AND_SAVE_CPU_IPL(level, 7);
         test_in_silence();
         RESTORE_CPU_IPL(level & 7u);

@@ -8,9 +8,8 @@
 #include "board/reset.h"
 #include "board/selftest_chip.h"
 
-/* The watchdog's time in counts of timer 1 at 64 cycles: 512 periods of 32 kHz. An oscillator that is 30 % off passes [?], a clock of twice or
+/* The watchdog's time in counts of timer 1 at 64 cycles: 10000 for 512 periods of 32 kHz. An oscillator that is 30 % off passes [?], a clock of twice or
  * half its frequency does not. */
-#define WATCHDOG_COUNTS 10000u
 #define WATCHDOG_LEAST 7500u
 #define WATCHDOG_MOST 14500u
 #define WATCHDOG_NEVER 20000u

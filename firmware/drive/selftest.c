@@ -16,7 +16,8 @@ uint16_t selftest_march(volatile uint16_t *first, uint16_t words, uint16_t backg
 
     for (left = words; left != 0u; left--) { /* XC16's comparison of two variables writes to the stack, that with 0 does not */
         if (spare) {
-            *kept++ = SELFTEST_READ(at);
+            *kept = SELFTEST_READ(at);
+            kept++;
         }
         SELFTEST_WRITE(at, background);
         at++;
@@ -38,13 +39,13 @@ uint16_t selftest_march(volatile uint16_t *first, uint16_t words, uint16_t backg
         wrong |= (uint16_t)(SELFTEST_READ(at) ^ background);
         SELFTEST_WRITE(at, inverse);
     }
-    at = first + words;
+    at = &first[words];
     for (left = words; left != 0u; left--) {
         at--;
         wrong |= (uint16_t)(SELFTEST_READ(at) ^ inverse);
         SELFTEST_WRITE(at, background);
     }
-    at = first + words;
+    at = &first[words];
     for (left = words; left != 0u; left--) {
         at--;
         wrong |= (uint16_t)(SELFTEST_READ(at) ^ background);

@@ -2,6 +2,7 @@
 #ifndef BOARD_SELFTEST_CHIP_H
 #define BOARD_SELFTEST_CHIP_H
 
+#include "board/firmware.h"
 #include "board/mclv.h"
 
 #define BOARD_FLASH_CRC_AT 0x57FCu /* the last two words of the flash: CRC of all before them, and its complement; tools/image/crc.py writes them */
@@ -38,8 +39,6 @@ extern volatile uint16_t board_cpu_holds;
 #define BOARD_WATCHDOG_BITES() 0u
 
 #else /* the PC: registers are variables (tools/cpu_host), nothing interrupts the background */
-
-#include "board/firmware.h"
 
 #define BOARD_RAM ((volatile uint16_t *)(void *)&board_drive)
 #define BOARD_RAM_END (BOARD_RAM + sizeof board_drive / sizeof *BOARD_RAM)
