@@ -46,7 +46,7 @@ only linear; the voltage that is missing there looks like back-EMF, and the esti
 CLEAR_OF_DEAD_TIME, LEAST_SPEED_SHARE = 1.9, 0.5
 """Friction's current over what dead time loses of a current, from which SPEED_CAP holds; below it falls with the square, no further than this share.
 Where friction takes less current the compensation knows little of an unloaded motor's, and a quick loop follows what it sees."""
-HIDDEN_HZ, HIDDEN_LEAST, HIDDEN_MOST = 13.0, 0.57, 1.3
+HIDDEN_HZ, HIDDEN_LEAST, HIDDEN_MOST = 9.0, 0.57, 1.4
 """Friction's current over what dead time loses of a current, which the speed of an unloaded motor needs: HIDDEN_HZ over the electrical frequency
 at SLOW_SHARE of the rated speed, within these bounds. With less it wanders by tens of per cent on the virtual board, with quick and slow loops,
 the slower the motor turns the more: what compensation leaves has the longer time."""

@@ -17,7 +17,8 @@
 #define OBSERVER_UNREST_STEPS 1000 /**< a load step is over in a tenth of a second; what goes on longer is the loop's own */
 #define OBSERVER_UNREST_SHIFT 8    /**< after 256 / 4 steps that were not calm, a large innovation is twice as large */
 #define OBSERVER_START_UNREST 768  /**< at the hand-over it is four times as large: d current and wrong constants shake the estimate */
-#define OBSERVER_CALM_SHIFT 5      /**< after a large innovation the quick rate fades by 1/32 a step */
+#define OBSERVER_HALF_Q15 12288       /**< so quick up to one and a half of what is large: dead time may be behind it */
+#define OBSERVER_CALM_SHIFT 6         /**< after a large innovation the quick rate fades by 1/64 a step */
 
 /** Constants. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a
  *  count of current gives 1/2 to 1 of it. */
@@ -66,7 +67,7 @@ QM_INLINE current_q13_t observer_load(const observer_t *o, const observer_params
     return (int16_t)((observer_load_q26(o, p) + 4096) >> 13);
 }
 
-/** 1 while nothing changes fast: the innovation has been small for some 30 ms. */
+/** 1 while nothing changes fast: the innovation has been small for some 50 ms. */
 QM_INLINE uint16_t observer_is_calm(const observer_t *o)
 {
     return (uint16_t)(o->quick_q15 < 4096);
@@ -162,10 +163,10 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
     } else {
         /* calm for long */
     }
+    o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
     if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
-        o->quick_q15 = 32767;
-    } else {
-        o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
+        q15_t level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
+        o->quick_q15 = (int16_t)((o->quick_q15 > level) ? o->quick_q15 : level);
     }
 }
 

@@ -522,7 +522,7 @@ def observe(v, model, op, heavy, reference, rho, iq, real=None):
        OBSERVER_FORMAT, OBSERVER_COLUMNS, least_db=55.0)
 def observer(v, rng):
     v.constants = {f"{prefix}{k}": x for prefix, p in zip(("", "h_"), OBSERVED) for k, x in p.items()}
-    for heavy, erpm, load, on in ((0, 2500, 1555, 200), (0, -2500, 930, 200), (0, 750, 560, 400), (1, 2500, 1000, 250)):
+    for heavy, erpm, load, on in ((0, 2500, 1500, 200), (0, -2500, 900, 200), (0, 750, 500, 800), (1, 2500, 1000, 250)):
         p, off = OBSERVED[heavy], on + 200 + 200 * heavy
         model, real = ref.Observer(p), ref.ObserverReal(p)
         unit = p["per_current_q16"] / 65536

@@ -721,6 +721,11 @@ class Observer:
             self.unrest -= 1 if self.unrest else 0
         return abs(innovation) > self.large and (self.unrest < 1000 or self.calm)
 
+    def follow_quick(self, innovation, one, half, large, faded):
+        """In full from one and a half of what is large, less below it."""
+        level = (one if abs(innovation) > large else half) if self.follow_unrest(innovation) else 0
+        self.quick = max(faded, level)
+
     @property
     def speed(self):
         return upper(self.omega)
@@ -757,7 +762,7 @@ class Observer:
         self.omega = self.sum(self.omega, s32(2 * innovation * self.rate))
         load = s32(self.load - s32(innovation * self.rate ** 2 * 2 ** p["shift"] // WORD))
         self.load = clamp(load, -p["load_max"] * WORD, p["load_max"] * WORD)
-        self.quick = 32767 if self.follow_unrest(innovation) else self.quick - (self.quick >> 5)
+        self.follow_quick(innovation, 32767, 12288, self.large + self.large // 2, self.quick - (self.quick >> 6))
 
     @staticmethod
     def sum(omega, change):
@@ -792,7 +797,7 @@ class ObserverReal(Observer):
         self.rho = rho
         self.omega += 2 * innovation * self.rate
         self.load = clamp(self.load - innovation * self.rate ** 2 * 2 ** p["shift"], -p["load_max"], p["load_max"])
-        self.quick = 1.0 if self.follow_unrest(innovation) else self.quick * 31 / 32
+        self.follow_quick(innovation, 1.0, 0.375, 1.5 * self.large, self.quick * 63 / 64)
 
 
 # ---- start ----------------------------------------------------------------------------------------------------------
