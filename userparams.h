@@ -20,6 +20,7 @@
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
 /* #define IDENTIFY */              /* measure R, L and Kphi of the motor instead of running it (docs/tuning.md) */
 /* #define PARAMS_IN_RAM */         /* a debugger can change every parameter while the motor turns; TUNING does it too */
+/* #define SELFTEST_OFF */          /* leave out the self-tests in the manner of IEC 60730 Class B (docs/selftest.md) */
 
 /* ---- Motor, values per phase of the star: Hurst DMB0224C10002, star ----------------------------------------------- */
 #define NOPOLESPAIRS 5              /* [pairs]         1 .. 50        pole pairs */

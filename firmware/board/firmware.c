@@ -4,6 +4,7 @@
 #include "board/mclv.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
+#include "board/selftest_run.h"
 #include "board/status.h"
 #include "board/watch.h"
 #include "drive/state.h"
@@ -41,11 +42,12 @@ void firmware_init(void)
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
     drive_init(&board_drive, &board_params); /* before anything can trap */
-    status_init();
     board_clock_failed = 0;
     if (clock_init()) { /* the trap may have said so before */
         board_clock_failed = 1;
     }
+    selftest_start(kept);
+    status_init();
     pins_init();
     uart_init();
     timer_init();
@@ -99,6 +101,7 @@ QM_INLINE void firmware_supervise(void)
     if (BOARD_FLTA_LOW()) { /* its interrupt comes once: S2 must not clear a fault that is still there */
         firmware_trip(FAULT_OVERCURRENT_HW);
     }
+    selftest_pass();
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
 }
@@ -118,8 +121,12 @@ void firmware_background(void)
         lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
         BOARD_LED_ALIVE = lights.led_alive & 1u;
         BOARD_LED_RUN = lights.led_run & 1u;
+        selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
+        selftest_part(SELFTEST_PART_WATCH);
         status_tick(elapsed_ms);
+        selftest_part(SELFTEST_PART_STATUS);
+        selftest_ms();
     }
     status_send();
 }

@@ -2,13 +2,7 @@
 #include "board/reset.h"
 
 #include "board/mclv.h"
-
-/* Neither cleared nor set by the start-up code. */
-#ifdef __XC16__
-#define BOARD_PERSISTENT __attribute__((persistent))
-#else
-#define BOARD_PERSISTENT
-#endif
+#include "board/selftest_run.h"
 
 volatile uint16_t board_reset_cause;
 volatile uint16_t board_trap_intcon1 BOARD_PERSISTENT;
@@ -26,7 +20,7 @@ void reset_keep(uint16_t fault)
 
 drive_fault_t reset_take(void)
 {
-    uint16_t cause = RCON;
+    uint16_t cause = selftest_reset_cause(RCON);
     uint16_t fault;
 
     RCON = 0;

@@ -5,6 +5,7 @@
 #include "board/modes/identify_report.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
+#include "board/selftest_run.h"
 #include "board/text.h"
 #include "board/watch.h"
 #include "drive/limit_reasons.h"
@@ -40,7 +41,8 @@ static char *put_line(void)
         at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
         at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
         at = text_put_signed(text_put(at, " speed "), (int16_t)(estimator_speed(&board_drive.run.estimator) / NOPOLESPAIRS));
-        at = text_put(put_limits(text_put(at, " rpm")), "\r\n");
+        at = put_limits(text_put(at, " rpm"));
+        at = text_put(selftest_put(at), "\r\n");
     }
     return at;
 }
@@ -54,7 +56,7 @@ static char *put_reset(void)
         at = text_put(at, " " #name); \
     }
     RESET_CAUSE_TABLE(PUT_CAUSE)
-    return text_put(at, "\r\n");
+    return text_put(selftest_put_marked(at), "\r\n");
 }
 
 void status_init(void)

@@ -27,6 +27,10 @@ void drive_init(drive_t *d, const drive_params_t *p)
 {
     drive_zero(d, sizeof *d);
     d->direction = 1;
+    SELFTEST_KEEP(d, direction, 1);
+    SELFTEST_KEEP(d, fault, FAULT_NONE);
+    SELFTEST_KEEP(d, offset_a, 0);
+    SELFTEST_KEEP(d, offset_b, 0);
     d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
     bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);
@@ -42,6 +46,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     }
     drive_zero(run, sizeof *run);
     d->direction = direction;
+    SELFTEST_KEEP(d, direction, direction);
     drive_update_model(run, p, p->end_erpm);
     run->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
     run->control.iq_limit_q13 = p->current_max_q13;

@@ -17,6 +17,13 @@
     X(1, BOR, "supply dipped") \
     X(0, POR, "power-up")
 
+/** Neither cleared nor set by the start-up code. */
+#ifdef __XC16__
+#define BOARD_PERSISTENT __attribute__((persistent))
+#else
+#define BOARD_PERSISTENT
+#endif
+
 #define RESET_BIT(bit, name, meaning) RESET_##name = (bit),
 /** Bit numbers in RCON. */
 enum { RESET_CAUSE_TABLE(RESET_BIT) };

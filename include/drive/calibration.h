@@ -19,6 +19,8 @@ QM_INLINE drive_state_t calibration_step(drive_t *d, const drive_params_t *p, co
         } else {
             c->offset_a_q13 = a_q13;
             c->offset_b_q13 = b_q13;
+            SELFTEST_KEEP(d, offset_a, a_q13);
+            SELFTEST_KEEP(d, offset_b, b_q13);
             c->done = 1;
             return DRIVE_STOPPED;
         }

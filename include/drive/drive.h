@@ -12,6 +12,7 @@
 #include "control/svm.h"
 #include "drive/faults.h"
 #include "drive/modes/mode_state.h"
+#include "drive/selftest_state.h"
 
 /** X(name, meaning): what the drive is doing. */
 #define DRIVE_STATE_TABLE(X) \
@@ -160,6 +161,7 @@ typedef struct {
     angle_t angle;  /**< control angle of the next sample */
     sincos_t frame; /**< its sine and cosine */
     drive_run_t run;
+    SELFTEST_STATE
 } drive_t;
 
 #define CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */

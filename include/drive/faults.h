@@ -42,7 +42,9 @@
     X(18, INTERRUPT_RATE, "too few control interrupts in a tenth of a second", \
       "look for what holds interrupts up; check the PWM and ADC set-up") \
     X(19, OVERTEMPERATURE, "the winding's resistance rose to the end of what the drive believes: 180 degrees Celsius if the header's is right at 25", \
-      "let the motor cool down, lower the load; check MOTOR_RS_OHM and the wires' contacts")
+      "let the motor cool down, lower the load; check MOTOR_RS_OHM and the wires' contacts") \
+    X(20, SELFTEST, "a self-test failed: memory, processor, clock, program flow or a register is not as it must be", \
+      "see board_selftest_failed or the status line for the test, docs/selftest.md for its meaning, then reset: S2 does not clear this one")
 
 #define DRIVE_FAULT_ENUM(code, name, cause, remedy) FAULT_##name = (code),
 /** Fault codes. */

@@ -63,7 +63,7 @@
 #define PARAM_MIN(a, b) (((a) < (b)) ? (a) : (b))
 #define PARAM_MAX(a, b) (((a) > (b)) ? (a) : (b))
 /** Below it the derivative spans eight samples, in which the current turns by 43 degrees at most: AN1292's nominal speed, or less with a long period. */
-#define EIGHT_SAMPLES_ERPM PARAM_MIN(NOMINAL_SPEED_ERPM, PARAM_F(PARAM_EIGHT_TURN) * 60.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
+#define EIGHT_SAMPLES_ERPM PARAM_MIN(PARAM_F(NOMINAL_SPEED_ERPM), PARAM_F(PARAM_EIGHT_TURN) * 60.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
 #define PARAM_EIGHT_TURN 0.12
 #define D_ILIMIT_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)) + 0.5F, 16383.0F))
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))

@@ -7,7 +7,9 @@
 /** Enters a state; its clock begins anew. While a fault is kept, every way leads to FAULT: only drive_clear_fault() opens it. */
 QM_INLINE void drive_enter(drive_t *d, drive_state_t next)
 {
-    d->state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
+    uint16_t state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
+    d->state = state;
+    SELFTEST_KEEP(d, state, state);
     d->periods = 0;
 }
 
@@ -28,6 +30,7 @@ QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
     d->command.run = 0;
     if (d->fault == (uint16_t)FAULT_NONE) {
         d->fault = (uint16_t)fault;
+        SELFTEST_KEEP(d, fault, fault);
     }
     drive_enter(d, DRIVE_FAULT);
 }
@@ -36,6 +39,7 @@ QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
 QM_INLINE drive_state_t drive_clear_fault(drive_t *d)
 {
     d->fault = (uint16_t)FAULT_NONE;
+    SELFTEST_KEEP(d, fault, FAULT_NONE);
     return d->calibration.done ? DRIVE_STOPPED : DRIVE_CALIBRATE;
 }
 

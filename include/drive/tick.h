@@ -67,6 +67,7 @@ QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
 NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
     drive_run_t *run = &d->run;
+    uint16_t done;
 
     switch (d->ticks & (SLOW_PHASES - 1u)) {
     case 0:
@@ -74,6 +75,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
             speed_step(d, p);
         }
         handover_wait(d, p);
+        done = 0;
         break;
     case 1:
         if (d->state == (uint16_t)DRIVE_RAMP) {
@@ -81,18 +83,22 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         } else {
             model_update(d, p);
         }
+        done = 1;
         break;
     case 2:
         bus_step(d, p, v_bus_raw);
+        done = 2;
         break;
     case 3:
         bus_update_voltage_limit(d, p);
+        done = 3;
         break;
     case 4:
         if (drive_is_closed(d)) {
             protection_check_signals(d, p);
             limits_current(run, p);
         }
+        done = 4;
         break;
     case 5:
         if (drive_is_closed(d)) {
@@ -101,6 +107,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         } else {
             model_update_in_ramp(d, p);
         }
+        done = 5;
         break;
     case 6:
         if (drive_is_closed(d)) {
@@ -109,13 +116,16 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
             limits_braking(run, p, qm_hi(d->bus_q31));
         }
         model_learn_step(d, p);
+        done = 6;
         break;
     default: /* 7 */
         if (drive_is_closed(d)) {
             handover_observe(run, p);
         }
+        done = 7;
         break;
     }
+    SELFTEST_MARK(d, done);
 }
 
 #endif

@@ -229,3 +229,24 @@ void test_a_free_running_converter_ignores_the_pwm_and_is_named(void)
     TEST_ASSERT_TRUE(fake_adc_calls > 500);
     TEST_ASSERT_TRUE(warned_about("AD1CON1"));
 }
+
+/* A test of the converter: an input that is switched off reads AVSS. For a few periods that is meant, for longer it is a mistake. */
+void test_an_input_that_is_switched_off_reads_ground_and_is_a_warning_after_a_while(void)
+{
+    set("input.pot", 0.75);
+    start(10);
+    TEST_ASSERT_EQUAL_HEX16(0x4000, buffer[0]);
+    AD1CHS0 = 6;
+    run(3);
+    TEST_ASSERT_EQUAL_HEX16(0x8000, buffer[0]);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, buffer[1]);
+    AD1CHS0 = 8;
+    run(10);
+    TEST_ASSERT_EQUAL_HEX16(0x4000, buffer[0]);
+    TEST_ASSERT_FALSE(warned_about("AD1CHS0"));
+    TEST_ASSERT_FALSE(warned_about("AD1PCFGL"));
+    AD1CHS0 = 6;
+    run(10);
+    TEST_ASSERT_TRUE(warned_about("AD1CHS0"));
+    TEST_ASSERT_TRUE(warned_about("AD1PCFGL"));
+}

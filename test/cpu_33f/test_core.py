@@ -74,6 +74,30 @@ def test_hooks_see_a_read_and_a_write_of_an_instruction_that_changes_bits(text: 
     assert (kind, name, address, 0x1234 & ~mask | new) == ("read", "write", AT, wanted)
 
 
+# ---- damage --------------------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("address, at_1, at_0, expected", [
+    (0x0A00, 0x0001, 0, 0x1235), (0x0A00, 0, 0x0030, 0x1204), (0x0A00, 0x8000, 0x0004, 0x9230), (0x0A02, 0xFFFF, 0, 0x1234),
+    (0x0004, 0x0100, 0, 0x1334)]) # the last: W2, through which the value comes
+def test_bits_that_are_stuck_stay_so_whatever_is_written(address: int, at_1: int, at_0: int, expected: int) -> None:
+    chip = Chip("mov w2,0x0A00\nmov 0x0A00,w3\n" + MAIN, w={2: 0x1234})
+    core(chip, "iss_stick", ctypes.c_uint16(address), ctypes.c_uint16(at_1), ctypes.c_uint16(at_0))
+    chip.run(2)
+    core(chip, "iss_stick", *3 * [ctypes.c_uint16(0)])
+    assert core(chip, "iss_peek", ctypes.c_uint16(6)) == expected
+
+
+def test_a_repeated_instruction_meets_the_damage_in_each_turn_and_a_mended_word_holds_again() -> None:
+    chip = Chip("repeat #3\ninc 0x0A00\nclr 0x0A00\ninc 0x0A00\n" + MAIN)
+    core(chip, "iss_poke", ctypes.c_uint16(0x0A00), ctypes.c_uint16(0))
+    core(chip, "iss_stick", ctypes.c_uint16(0x0A00), ctypes.c_uint16(0), ctypes.c_uint16(0x0002))
+    chip.run(5)
+    assert core(chip, "iss_peek", ctypes.c_uint16(0x0A00)) == 0 # 1, 0, 1, 0
+    core(chip, "iss_stick", *3 * [ctypes.c_uint16(0)])
+    core(chip, "iss_poke", ctypes.c_uint16(0x0A00), ctypes.c_uint16(2))
+    assert core(chip, "iss_peek", ctypes.c_uint16(0x0A00)) == 2
+
+
 # ---- resets --------------------------------------------------------------------------------------------------------------
 
 def test_reset_instruction_starts_at_0_and_is_told_in_rcon() -> None:

@@ -17,7 +17,7 @@ from tools.common.paths import ROOT
 
 SOURCES = ("Makefile", "userparams.h", "firmware", "include", "tools", "tuning", "examples", "build/setup")
 HELP = re.findall(r"^  make (\S+) .*?((?: \[.*\])?)$", make().stdout, re.MULTILINE)
-MODES = [mode for mode in modes() if mode not in ("IDENTIFY", "PARAMS_IN_RAM")]
+MODES = [mode for mode in modes() if mode not in ("IDENTIFY", "PARAMS_IN_RAM", "SELFTEST_OFF")]
 
 
 def copy(root: Path) -> Path:

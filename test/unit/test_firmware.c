@@ -5,11 +5,33 @@
 
 #include "board/watch.h"
 #include "mock_peripherals.h"
+#include "mock_selftest_run.h"
 #include "unity.h"
+
+volatile uint16_t board_selftest_failed;
+uint16_t board_selftest_parts;
+
+static uint16_t same_cause(uint16_t rcon, int calls)
+{
+    (void)calls;
+    return rcon;
+}
+
+static char *nothing_more(char *at, int calls)
+{
+    (void)calls;
+    return at;
+}
 
 void setUp(void)
 {
     host_registers_reset();
+    selftest_reset_cause_Stub(same_cause); /* its own test: test_selftest_board.c */
+    selftest_start_Ignore();
+    selftest_pass_Ignore();
+    selftest_ms_Ignore();
+    selftest_put_Stub(nothing_more);
+    selftest_put_marked_Stub(nothing_more);
 }
 
 /** A start, in its order. */

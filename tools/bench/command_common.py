@@ -62,7 +62,7 @@ def header_for(options: argparse.Namespace) -> str | Path | None:
 def scenario_for(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
     """The scenario that was asked for, or else the one for the mode that was, or else the usual one; and the macros that it does not have itself."""
     defines = macros(options.defines)
-    asked = {define.partition("=")[0] for define in defines} & set(modes()) - {"PARAMS_IN_RAM"}
+    asked = {define.partition("=")[0] for define in defines} & set(modes()) - {"PARAMS_IN_RAM", "SELFTEST_OFF"}
     name = options.scenario
     if name is None and asked:
         fitting = [item for item in map(scenario_file.load, paths.names(paths.SCENARIOS)) if set(item.defines) == asked]

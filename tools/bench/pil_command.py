@@ -75,7 +75,7 @@ def core_text(run: pil.PilRun) -> str:
     c = run.cycles
     return (f"control interrupt   {c.isr_cycles_min:.0f} / {c.isr_cycles_mean:.1f} / {c.isr_cycles_max:.0f} cycles (min / mean / max), {c.isr_count:.0f} times\n"
             f"trigger to duties   {c.latency_cycles_min:.0f} / {c.latency_cycles_mean:.1f} / {c.latency_cycles_max:.0f} cycles\n"
-            f"deepest stack       {c.stack_bytes:.0f} bytes" + (f"\nresets              {c.resets:.0f}" if c.resets else ""))
+            f"deepest stack       {c.stack_bytes:.0f} bytes" + (f"\nresets              {c.resets:.0f}, with that of the watchdog's self-test at power-up" if c.resets else ""))
 
 
 def _scenario(name: str | None, options: argparse.Namespace) -> int:

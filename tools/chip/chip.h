@@ -193,6 +193,7 @@ typedef struct {
     bool on, twelve_bit;
     unsigned channels, form, sequence_length;
     double tad_s, conversion_s;
+    uint32_t judge_in;           /* periods until the selected inputs are judged; 0: done */
     uint32_t deaf_periods;       /* of a running PWM without the ADC */
     /* progress, times relative to the period */
     double conversion_end_s, due_s;

@@ -15,6 +15,7 @@ enum {
     AD1IF = 0x2000,      /* in IFS0; the enable bit has the same place in IEC0 */
     SSRC_PWM = 3,
     SSRC_AUTO = 7,
+    INPUT_PATIENCE = 4, /* periods of a selection of inputs before it is judged: a test of the converter lasts two */
     DEAF_PATIENCE = 200 /* periods of a running PWM without the ADC before they are mentioned */
 };
 
@@ -167,6 +168,9 @@ void chip_adc_begin(chip_t *chip)
     uint16_t now[7] = {con1, CHIP_REG(chip, AD1CON2), CHIP_REG(chip, AD1CON3), CHIP_REG(chip, AD1CHS0),
                        CHIP_REG(chip, AD1CHS123), CHIP_REG(chip, AD1PCFGL), CHIP_REG(chip, PMD1)};
     if (memcmp(now, adc->seen, sizeof now) == 0) {
+        if (adc->judge_in != 0 && --adc->judge_in == 0) {
+            warn_inputs(chip);
+        }
         return;
     }
     memcpy(adc->seen, now, sizeof now);
@@ -181,7 +185,7 @@ void chip_adc_begin(chip_t *chip)
     adc->conversion_s = (adc->twelve_bit ? 14.0 : TAD_PER_CONVERSION) * adc->tad_s;
     if (adc->on) {
         warn_settings(chip, con1, CHIP_REG(chip, AD1CON2));
-        warn_inputs(chip);
+        adc->judge_in = INPUT_PATIENCE;
         warn_timing(chip);
     }
 }
@@ -190,6 +194,7 @@ void chip_adc_reset(chip_t *chip)
 {
     chip_adc_t *adc = &chip->adc;
     memset(adc->seen, 0xA5, sizeof adc->seen);
+    adc->judge_in = 0;
     adc->conversion_end_s = 0.0;
     adc->due_s = PLANT_NEVER;
     adc->queued = false;

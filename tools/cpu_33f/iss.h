@@ -164,6 +164,12 @@ const uint64_t *iss_profile_cycles(const iss_t *iss);
 unsigned iss_stack_bytes(const iss_t *iss);
 void iss_stack_clear(iss_t *iss);
 
+/* ---- damage ---- */
+
+/* From now on bits of the word at an even address of data memory (a W register, RAM, a register) are stuck; one word at a time, 0 and 0
+ * mend it. */
+void iss_stick(iss_t *iss, uint16_t address, uint16_t at_1, uint16_t at_0);
+
 /* ---- instructions as text ---- */
 
 /* Disassemble the word at a PC address; `next` is the word behind it. Words used: 1 or 2, 0 if it is no instruction (".word24 0x..."). */

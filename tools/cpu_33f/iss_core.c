@@ -204,6 +204,36 @@ static void run_profiled(iss_t *m)
     }
 }
 
+static void hold_stuck(iss_t *m)
+{
+    if (m->stuck) {
+        uint16_t *word = &m->data[m->stuck_address / 2u];
+        *word = (uint16_t)((*word | m->stuck_at_1) & ~m->stuck_at_0);
+    }
+}
+
+void iss_stick(iss_t *m, uint16_t address, uint16_t at_1, uint16_t at_0)
+{
+    m->stuck = (at_1 | at_0) != 0;
+    m->stuck_address = address;
+    m->stuck_at_1 = at_1;
+    m->stuck_at_0 = at_0;
+    hold_stuck(m);
+}
+
+/* The same with a word that is damaged. */
+static void run_damaged(iss_t *m)
+{
+    while (m->cycle < m->limit) {
+        const insn_t *i = &m->code[m->pc];
+        step(m, i);
+        hold_stuck(m);
+        if (i == m->do_end) {
+            end_turn(m);
+        }
+    }
+}
+
 /* The turns of the instruction behind REPEAT. */
 static void run_repeated(iss_t *m)
 {
@@ -212,6 +242,7 @@ static void run_repeated(iss_t *m)
     while (m->cycle < m->limit) {
         m->pc = pc;
         step(m, i);
+        hold_stuck(m);
         count_instruction(m, pc);
         if (m->data[R_RCOUNT] == 0 || (m->data[R_SR] & SR_RA) == 0) {
             m->data[R_SR] &= (uint16_t)~(unsigned)SR_RA;
@@ -244,6 +275,8 @@ static void run_on(iss_t *m)
         run_repeated(m);
     } else if (m->profiling) {
         run_profiled(m);
+    } else if (m->stuck) {
+        run_damaged(m);
     } else {
         run_fast(m);
     }

@@ -151,6 +151,8 @@ struct iss {
 
     uint64_t until, wake_at, disi_end, trap_at;
     iss_stop_t stop;
+    bool stuck;         /* a word of data memory is damaged: stuck_at holds after every instruction */
+    uint16_t stuck_address, stuck_at_1, stuck_at_0;
     iss_power_t power;
     uint32_t lost_pc;   /* where outside the flash */
     do_shadow_t do_shadow;

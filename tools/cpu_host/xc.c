@@ -16,14 +16,73 @@ static const struct { volatile uint16_t *pointer; uint16_t start; } ready[] = {
     {&OSCCON, 0x3320}, {&PORTA, 0x079F}, {&PORTB, 0xFFFF}, {&PORTC, 0x03FF}, {&P1TMR, 0x81F4}, {&U1TXREG, HOST_U1TXREG_EMPTY},
 };
 
+/* ---- self-tests ---- */
+
+uint32_t host_flash[HOST_FLASH_WORDS];
+volatile uint16_t host_free_ram[HOST_FREE_WORDS], host_stack[HOST_STACK_WORDS];
+uint16_t host_w_stuck_at_1[HOST_W_REGISTERS], host_w_stuck_at_0[HOST_W_REGISTERS];
+uint16_t host_watchdog_counts = 10000;
+
+/* Any words, and as tools/image/crc.py does: CRC-16 of CCITT, bit by bit, over all but the last two. */
+static void fill_flash(void)
+{
+    uint32_t crc = 0xFFFF;
+    for (uint32_t n = 0; n < HOST_FLASH_WORDS - 2; n++) {
+        host_flash[n] = (n * 0x9E3779B1u) >> 8;
+        for (unsigned bit = 0; bit < 24; bit++) { /* the low byte first, of each the highest bit */
+            uint32_t next = (host_flash[n] >> (8u * (bit / 8u) + 7u - bit % 8u)) & 1u;
+            crc = ((crc << 1) ^ ((((crc >> 15) & 1u) ^ next) != 0 ? 0x1021u : 0u)) & 0xFFFFu;
+        }
+    }
+    host_flash[HOST_FLASH_WORDS - 2] = crc;
+    host_flash[HOST_FLASH_WORDS - 1] = crc ^ 0xFFFFu;
+}
+
+/* The chain of firmware/board/selftest_cpu.c, and its two comparisons. */
+volatile uint16_t host_cpu_holds;
+
+void host_cpu_test(void)
+{
+    host_cpu_holds = 0;
+    for (unsigned pattern = 0x5555; pattern <= 0xAAAA; pattern += 0x5555) {
+        uint16_t chain = (uint16_t)pattern, first[2] = {(uint16_t)pattern, (uint16_t)pattern};
+        for (unsigned n = 0; n < HOST_W_REGISTERS; n++) {
+            chain = (uint16_t)((chain | host_w_stuck_at_1[n]) & ~host_w_stuck_at_0[n]);
+        }
+        for (unsigned n = 0; n < 2; n++) {
+            first[n] = (uint16_t)((first[n] | host_w_stuck_at_1[n]) & ~host_w_stuck_at_0[n]);
+        }
+        if (chain != first[0] || chain != first[1]) {
+            host_cpu_holds = 0;
+            return;
+        }
+        host_cpu_holds++;
+    }
+}
+
+uint16_t host_watchdog_bites(void)
+{
+    enum { WDTO = 0x0010 };
+    TMR1 = (uint16_t)(TMR1 + 100u);
+    if (host_watchdog_counts == 0 || TMR1 < host_watchdog_counts) {
+        return 0;
+    }
+    RCON = (uint16_t)(RCON | WDTO);
+    return 1;
+}
+
 /* The start values stand there before main(). */
 __attribute__((constructor)) static void prepare(void)
 {
+    fill_flash();
     for (size_t i = 0; i < host_sfr_count; i++) {
         for (size_t k = 0; k < sizeof ready / sizeof ready[0]; k++) {
             if (host_sfr_table[i].pointer == ready[k].pointer) {
                 host_sfr_table[i].reset = ready[k].start;
             }
+        }
+        if (host_sfr_table[i].pointer == &SPLIM) { /* as the start-up code leaves it */
+            host_sfr_table[i].reset = (uint16_t)(uintptr_t)(host_stack + HOST_STACK_WORDS);
         }
     }
     host_registers_reset();

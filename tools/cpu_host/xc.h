@@ -64,6 +64,19 @@ void _DefaultInterrupt(void);
 extern volatile uint16_t host_watchdog_serves;
 void host_clear_watchdog(void);
 
+/* For the firmware's self-tests: a flash of made-up words with its CRC in the last two, RAM that nothing else uses, the place of a stack,
+ * processor registers whose bits can be stuck, and a watchdog whose time passes only while it is waited for. A test plants faults here. */
+enum { HOST_FLASH_WORDS = 0x5800 / 2, HOST_FREE_WORDS = 64, HOST_STACK_WORDS = 16, HOST_W_REGISTERS = 16 };
+extern uint32_t host_flash[HOST_FLASH_WORDS];
+extern volatile uint16_t host_free_ram[HOST_FREE_WORDS], host_stack[HOST_STACK_WORDS];
+extern uint16_t host_w_stuck_at_1[HOST_W_REGISTERS], host_w_stuck_at_0[HOST_W_REGISTERS];
+extern uint16_t host_watchdog_counts; /* of timer 1 until it resets; 0: it never does */
+extern volatile uint16_t host_cpu_holds;
+void host_cpu_test(void);
+uint16_t host_watchdog_bites(void);
+#define __builtin_tblrdl(offset) ((uint16_t)host_flash[(offset) / 2u])
+#define __builtin_tblrdh(offset) ((uint16_t)(host_flash[(offset) / 2u] >> 16))
+
 /* What XC16 builds in, and the instructions with no effect on a PC. */
 #define __builtin_write_OSCCONL(value) host_write_oscconl((unsigned)(value))
 #define __builtin_write_OSCCONH(value) host_write_oscconh((unsigned)(value))

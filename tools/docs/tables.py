@@ -1,4 +1,5 @@
-"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, the simulator's assumptions.
+"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, self-tests, the simulator's
+assumptions.
 
     python3 -m tools.docs.tables                  writes the pages
     python3 -m tools.docs.tables --print faults   prints one page instead
@@ -34,6 +35,11 @@ def limits() -> str:
     return table("bit, name, cause, remedy", "rlll", [[str(row.code), row.name, row.cause, row.remedy] for row in drive_tables.limits()])
 
 
+def selftest() -> str:
+    found = rows("include", "drive/selftest.h", "SELFTEST_TABLE", "#code #name clause what")
+    return table("code, name, clause of table H.1, what is tested", "rlll", [[code, name, clause, what] for code, name, clause, what in found])
+
+
 def simulator() -> str:
     found = rows("tools/cpu_33f", "iss_assumptions.h", "ASSUMPTIONS", "#name #value meaning place", also="tools/chip")
     return table("name, value, meaning, where", "lrll", [[f"`{name}`", *rest] for name, *rest in found])
@@ -60,7 +66,7 @@ def pins() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "limits": limits, "parameters": params,
-                                         "pins": pins, "simulator": simulator}
+                                         "pins": pins, "selftest": selftest, "simulator": simulator}
 
 
 def page(name: str) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 from tools.common import command_line, paths
 from tools.common.errors import UserError
 
-from . import attribution, device, size
+from . import attribution, crc, device, size
 from .budget import Budget, Limits
 from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
 from .program import Elf, Words, read_elf, read_hex, reset_target
@@ -174,7 +174,7 @@ def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, 
           deepest: int | None = None) -> list[str]:
     """Every failure of an image; `pieces` None when there is no map, `deepest` None when nobody has looked for the deepest stack."""
     return [*check_device(elf), *check_memory(words), *check_same(words, elf), *check_reset(words, elf), *check_vectors(words, elf, pieces),
-            *check_configuration(words, config), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []),
+            *check_configuration(words, config), *crc.check(words, elf), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []),
             *check_budget(words, elf, limits, deepest)]
 
 

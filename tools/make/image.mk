@@ -74,10 +74,12 @@ $X/%.o: %.c $X/flags | $X/params
 	@mkdir -p $(@D)
 	$(call say,xc16,$<)$(target_compile) -MMD -MP -c $< -o $@
 
-$X/foc33.elf: $(target_objects) $X/contents
+$X/foc33.elf: $(target_objects) $X/contents tools/image/crc.py
 	$(call say,ld,$@)$(target_link) -o $@ $(target_objects) -Wl,-Map=$X/foc33.map,$(target_link_options) >$X/foc33.memory 2>&1 || \
 	    { cat $X/foc33.memory >&2; rm -f $@; exit 1; }
 	@! grep -i warning $X/foc33.memory >&2 || { rm -f $@; exit 1; }
+	$(target_setup)
+	@$(python) -m tools.image.crc $@ || { rm -f $@; exit 1; }
 
 $X/foc33.hex: $X/foc33.elf
 	$(quiet)$(xc16)bin2hex $< -a -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16)) >$X/foc33.bin2hex 2>&1 || \

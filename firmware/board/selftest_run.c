@@ -1,0 +1,263 @@
+/* Self-tests while the program runs, in the background: a slice each millisecond, what needs silence between two control interrupts. */
+#include "board/selftest_run.h"
+
+#ifndef SELFTEST_OFF
+
+#include "board/firmware.h"
+#include "board/peripherals.h"
+#include "board/reset.h"
+#include "board/selftest_chip.h"
+#include "board/text.h"
+#include "drive/state.h"
+
+#define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
+#define FLASH_WORDS 32u /* of flash in a millisecond */
+#define REGISTERS_AT_ONCE 4u
+#define OWED_MS 50u /* in this time the tests get their turn */
+#define ADC_EVERY_MS 512u
+#define ADC_ZERO_MOST (INT16_MIN + 16 * 64) /* 16 counts of the converter: its offset error is 7 at most [?] */
+
+#define PARTS_IN_ORDER \
+    ((((SELFTEST_PART_SUPERVISE * 8u + SELFTEST_PART_PANEL) * 8u) + SELFTEST_PART_WATCH) * 8u + SELFTEST_PART_STATUS)
+
+volatile uint16_t board_selftest_failed BOARD_PERSISTENT;
+uint16_t board_selftest_parts, board_selftest_stepped;
+
+static uint16_t owed_ms; /* how long the tests between two interrupts have waited */
+static uint16_t run_ms;  /* counts on */
+
+void selftest_fail(selftest_t test)
+{
+    if (board_selftest_failed == (uint16_t)SELFTEST_NONE) {
+        board_selftest_failed = (uint16_t)test;
+    }
+    firmware_trip(FAULT_SELFTEST);
+}
+
+/* ---- registers, as the start wrote them ---- */
+
+typedef struct {
+    volatile uint16_t *place;
+    uint16_t mask, value; /* the mask leaves out what the chip itself changes or does not have */
+} written_t;
+
+static const written_t written[] = {
+    /* PWM */
+    { &P1TCON, 0xA0FFu, BOARD_P1TCON },
+    { &P1TPER, 0x7FFFu, BOARD_P1TPER },
+    { &P1SECMP, 0xFFFFu, BOARD_P1SECMP },
+    { &PWM1CON1, 0x0777u, BOARD_PWM1CON1 },
+    { &PWM1CON2, 0x0F07u, 0u },
+    { &P1DTCON1, 0xFFFFu, BOARD_P1DTCON1 },
+    { &P1DTCON2, 0x003Fu, 0u },
+    { &P1FLTACON, 0x3F87u, BOARD_P1FLTACON },
+    /* ADC; SAMP and DONE change */
+    { &AD1CON1, 0xA7ECu, BOARD_AD1CON1 | 0x8000u },
+    { &AD1CON2, 0xE77Fu, BOARD_AD1CON2 },
+    { &AD1CON3, 0x9FFFu, BOARD_AD1CON3 },
+    { &AD1CHS0, 0x9F9Fu, BOARD_AD1CHS0 },
+    { &AD1CHS123, 0x0707u, BOARD_AD1CHS123 },
+    { &AD1PCFGL, 0x01FFu, BOARD_AD1PCFGL & 0x01FFu },
+    /* pins */
+    { &TRISA, 0x079Fu, BOARD_TRIS(A) & 0x079Fu },
+    { &TRISB, 0xFFFFu, BOARD_TRIS(B) },
+    { &TRISC, 0x03FFu, BOARD_TRIS(C) & 0x03FFu },
+    { &RPINR12, 0x001Fu, BOARD_FLTA_RP },
+    /* clock, timer, power of the peripherals */
+    { &OSCCON, 0x7060u, 0x3060u }, /* the crystal with the PLL, locked; pin selection locked */
+    { &PLLFBD, 0x01FFu, BOARD_PLLFBD },
+    { &CLKDIV, 0xFFDFu, BOARD_CLKDIV },
+    { &OSCTUN, 0x003Fu, 0u },
+    { &T1CON, 0xA076u, 0x8000u },
+    { &PR1, 0xFFFFu, BOARD_FCY_HZ / 1000ul - 1ul },
+    { &PMD1, 0xFFFFu, 0u },
+    /* interrupts: only the control interrupt and the fault input; the core */
+    { &IEC0, 0xFFFFu, 0x2000u },
+    { &IEC3, 0xFFFFu, 0x8000u },
+    { &IPC3, 0x0070u, 0x0050u },
+    { &IPC15, 0x7000u, 0x5000u },
+    { &INTCON1, 0x8000u, 0u },
+    { &INTCON2, 0x8000u, 0u },
+    { &CORCON, 0x10F7u, 0x0024u },
+    { &MODCON, 0xC000u, 0u },
+};
+
+static void test_registers(void)
+{
+    static uint16_t row;
+    uint16_t left;
+    for (left = REGISTERS_AT_ONCE; left != 0u; left--) {
+        const written_t *w = &written[row];
+        if ((*w->place & w->mask) != w->value) {
+            selftest_fail(SELFTEST_REGISTERS);
+        }
+        row = (uint16_t)((row + 1u < sizeof written / sizeof written[0]) ? row + 1u : 0u);
+    }
+    if (PSVPAG != 0u) { /* 8 bits in the device header */
+        selftest_fail(SELFTEST_REGISTERS);
+    }
+}
+
+/** The override as the interrupt's last words have left it: as the state asks, or off. */
+static uint16_t outputs_hold(void)
+{
+    uint16_t outputs = drive_outputs(&board_drive), now = P1OVDCON;
+    return (uint16_t)(now == BOARD_OUTPUTS_OFF || (outputs != 0u && now == (outputs == OUTPUTS_PWM ? BOARD_OUTPUTS_PWM : BOARD_OUTPUTS_BOOTSTRAP)));
+}
+
+/* ---- flash ---- */
+
+static uint16_t flash_at;
+static uint16_t flash_without_crc; /* erased words in its place: linked without tools/image/crc.py */
+static uint16_t flash_crc;
+
+uint16_t selftest_flash(void)
+{
+    uint16_t left, stored, inverse;
+    TBLPAG = 0;
+    for (left = FLASH_WORDS; left != 0u; left--) {
+        uint16_t low = (uint16_t)__builtin_tblrdl(flash_at), high = (uint16_t)__builtin_tblrdh(flash_at);
+        if (flash_at == 0u) {
+            flash_crc = SELFTEST_CRC_START;
+        }
+        flash_crc = selftest_crc(selftest_crc(selftest_crc(flash_crc, low & 0xFFu), low >> 8), high & 0xFFu);
+        flash_at = (uint16_t)(flash_at + 2u);
+        if (flash_at == BOARD_FLASH_CRC_AT) {
+            stored = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT);
+            inverse = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT + 2u);
+            flash_without_crc = (uint16_t)((stored & inverse) == 0xFFFFu);
+            if (!flash_without_crc && (stored != flash_crc || (uint16_t)(inverse ^ flash_crc) != 0xFFFFu)) {
+                selftest_fail(SELFTEST_FLASH);
+            }
+            flash_at = 0;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+#ifdef __XC16__
+/** Here tools/image/crc.py writes. */
+const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLASH_CRC_AT), keep)) = { 0xFFFFu, 0xFFFFu };
+#endif
+
+/* ---- between two control interrupts ---- */
+
+/** Four words of RAM; at its end the processor's registers, and another background. With interrupts off. */
+static void test_ram_slice(void)
+{
+    static uint16_t from, n; /* word of the RAM, background */
+    volatile uint16_t *at = BOARD_RAM + from;
+    uint16_t words = (uint16_t)(BOARD_RAM_END - at);
+
+    words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
+    if (words > 1u) {
+        static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
+        volatile uint16_t *spare = (at < keep + SLICE_WORDS && at + SLICE_WORDS > keep) ? keep + 2u * SLICE_WORDS : keep;
+        if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
+            selftest_fail(SELFTEST_RAM);
+        }
+        from = (uint16_t)(from + words - 1u);
+    } else {
+        from = 0;
+        n = (uint16_t)((n + 1u < SELFTEST_BACKGROUNDS) ? n + 1u : 0u);
+        board_cpu_test();
+        if (board_cpu_holds == 0u) {
+            selftest_fail(SELFTEST_CPU);
+        }
+    }
+}
+
+static void test_in_silence(void)
+{
+    if (!selftest_variables_hold(&board_drive)) {
+        selftest_fail(SELFTEST_VARIABLES);
+    }
+    if (!selftest_flow_holds(&board_drive)) {
+        selftest_fail(SELFTEST_FLOW);
+    }
+    if (!outputs_hold()) {
+        selftest_fail(SELFTEST_REGISTERS);
+    }
+    test_ram_slice();
+}
+
+/* ---- converter: an input that is switched off reads AVSS ---- */
+
+static uint16_t adc_since;
+static int16_t adc_pot_q15;
+
+static void start_adc(void)
+{
+    if (board_drive.state == (uint16_t)DRIVE_STOPPED && !board_drive.command.run) {
+        adc_since = board_drive.ticks;
+        adc_pot_q15 = board_panel.pot_q15;
+        AD1CHS0 = BOARD_AN_OFF;
+    }
+}
+
+/** The second sample after the change is AVSS for sure; the panel gets the potentiometer's sample from before. */
+static void end_adc(void)
+{
+    int16_t zero_q15 = board_panel.pot_q15;
+    if (AD1CHS0 == BOARD_AN_OFF && (uint16_t)(board_drive.ticks - adc_since) >= 3u) {
+        AD1CHS0 = BOARD_AD1CHS0;
+        board_panel.pot_q15 = adc_pot_q15;
+        if (zero_q15 > ADC_ZERO_MOST) {
+            selftest_fail(SELFTEST_ADC);
+        }
+    }
+}
+
+/* ---- program flow ---- */
+
+void selftest_pass(void)
+{
+    if (board_selftest_failed != (uint16_t)SELFTEST_NONE) {
+        firmware_trip(FAULT_SELFTEST); /* S2 must not clear it */
+    }
+    if ((uint16_t)(board_drive.ticks - board_selftest_stepped) > PARAM_PERIODS(OWED_MS * 0.001F)) {
+        selftest_fail(SELFTEST_FLOW);
+    }
+    board_selftest_parts = SELFTEST_PART_SUPERVISE;
+    end_adc();
+    if (owed_ms != 0u && BOARD_QUIET()) {
+        uint16_t level;
+        SET_AND_SAVE_CPU_IPL(level, 7);
+        test_in_silence();
+        RESTORE_CPU_IPL(level & 7u);
+        owed_ms = 0;
+    }
+}
+
+void selftest_ms(void)
+{
+    run_ms++;
+    owed_ms++;
+    board_selftest_stepped = board_drive.ticks;
+    if (board_selftest_parts != PARTS_IN_ORDER || owed_ms > OWED_MS) {
+        selftest_fail(SELFTEST_FLOW);
+    }
+    if (STACK_GUARD[0] != STACK_PATTERN || STACK_GUARD[1] != STACK_PATTERN || SPLIM != (uint16_t)(uintptr_t)BOARD_STACK_LIMIT) {
+        selftest_fail(SELFTEST_STACK);
+    }
+    test_registers();
+    (void)selftest_flash();
+    if (run_ms % ADC_EVERY_MS == 0u) {
+        start_adc();
+    }
+}
+
+/* ---- messages ---- */
+
+char *selftest_put(char *at)
+{
+    return board_selftest_failed ? text_put_unsigned(text_put(at, " selftest "), board_selftest_failed) : at;
+}
+
+char *selftest_put_marked(char *at)
+{
+    return flash_without_crc ? text_put(at, " flash without CRC") : at;
+}
+
+#endif
