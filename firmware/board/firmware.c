@@ -3,6 +3,7 @@
 
 #include "board/mclv.h"
 #include "board/peripherals.h"
+#include "board/record.h"
 #include "board/reset.h"
 #include "board/status.h"
 #include "board/watch.h"
@@ -29,6 +30,7 @@ void firmware_init(void)
 
     pwm_outputs_off();
     kept = reset_take();
+    record_init(kept);
     last_ms_tick = 0;
     supervised_tick = 0;
     silent_ms = 0;
@@ -81,6 +83,7 @@ QM_INLINE void firmware_supervise(void)
     }
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
+    record_tick();
 }
 
 void firmware_background(void)

@@ -3,13 +3,6 @@
 
 #include "board/mclv.h"
 
-/* Neither cleared nor set by the start-up code. */
-#ifdef __XC16__
-#define BOARD_PERSISTENT __attribute__((persistent))
-#else
-#define BOARD_PERSISTENT
-#endif
-
 volatile uint16_t board_reset_cause;
 volatile uint16_t board_trap_intcon1 BOARD_PERSISTENT;
 
@@ -32,7 +25,7 @@ drive_fault_t reset_take(void)
     RCON = 0;
     board_reset_cause = cause;
     served_tick = 0;
-    if (RESET_WAS(POR, cause) || RESET_WAS(BOR, cause)) {
+    if (RESET_LOST_RAM) {
         board_trap_intcon1 = 0;
         return FAULT_NONE; /* what is kept holds anything now: it is not even read */
     }

@@ -4,6 +4,7 @@
 #include "board/firmware.h"
 #include "board/modes/identify_report.h"
 #include "board/peripherals.h"
+#include "board/record.h"
 #include "board/reset.h"
 #include "board/text.h"
 #include "board/watch.h"
@@ -77,6 +78,10 @@ void status_tick(uint16_t elapsed_ms)
 
 void status_send(void)
 {
+    if (line[next] == '\0') {
+        *record_line(line) = '\0';
+        next = 0;
+    }
     if (line[next] != '\0' && uart_send(line[next])) {
         next++;
     }

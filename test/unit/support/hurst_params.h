@@ -95,5 +95,6 @@
 #define LS_OVER2LS0_SPEED17 0.5
 #define SNAPDELAY 5
 #define DATA_BUFFER_SIZE 50
+#define RECORDER_PERIODS 1
 
 #endif
