@@ -4,31 +4,32 @@
 #include "board/reset.h"
 #include "board/text.h"
 
-#define NOTHING_TO_SEND 0xFFFFu
-
 recorder_t board_recorder BOARD_PERSISTENT;
 
-static uint16_t next_line; /* of the record: 0 is its head */
-static uint16_t seen_left; /* rows still to come at the last look: at its end a record is to be sent */
+static uint16_t lines_left; /* of the record: its head is the first */
+static uint16_t is_told;    /* 1 from the end of a record to the next start */
 
 void record_init(drive_fault_t kept)
 {
     recorder_restart(&board_recorder, RESET_LOST_RAM, kept);
-    next_line = NOTHING_TO_SEND;
-    seen_left = 1; /* one that was kept is sent, too */
+    lines_left = 0;
+    is_told = 0;
 }
 
 void record_tick(void)
 {
+    uint16_t rows;
     recorder_background(&board_recorder, &board_drive);
-    if (board_recorder.left != 0u) {
-        next_line = NOTHING_TO_SEND; /* of rows that are written nothing can be told */
-    } else if (seen_left != 0u) {
-        next_line = 0;
+    rows = recorder_rows(&board_recorder);
+    if (rows == 0u) {
+        lines_left = 0; /* it has begun anew */
+        is_told = 0;
+    } else if (!is_told) {
+        lines_left = (uint16_t)(rows + 1u);
+        is_told = 1;
     } else {
-        /* it has been told */
+        /* once is enough */
     }
-    seen_left = board_recorder.left;
 }
 
 static char *put_head(char *line, uint16_t rows)
@@ -54,11 +55,10 @@ char *record_line(char *line)
     uint16_t rows = recorder_rows(&board_recorder);
     char *at;
 
-    if (next_line > rows) { /* also with nothing to send */
-        next_line = NOTHING_TO_SEND;
+    if (lines_left == 0u) {
         return line;
     }
-    at = (next_line == 0u) ? put_head(line, rows) : put_row(line, recorder_place(&board_recorder, (uint16_t)(next_line - 1u)));
-    next_line++;
+    lines_left--;
+    at = (lines_left == rows) ? put_head(line, rows) : put_row(line, recorder_place(&board_recorder, (uint16_t)(rows - 1u - lines_left)));
     return text_put(at, "\r\n");
 }

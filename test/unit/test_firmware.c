@@ -10,6 +10,7 @@
 void setUp(void)
 {
     host_registers_reset();
+    board_recorder.check = 0; /* what RAM may hold */
 }
 
 /** A start, in its order. */

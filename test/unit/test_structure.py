@@ -99,10 +99,10 @@ def test_there_is_no_inline_assembly() -> None:
 
 
 def test_what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
-    text = sources()["firmware/board/reset.c"]
-    assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text
-    kept = re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", text, re.MULTILINE)
-    assert kept == ["board_trap_intcon1", "kept_fault", "kept_inverse"], kept
+    text = sources("board")
+    assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text["include/board/reset.h"]
+    kept = {path: re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", code, re.MULTILINE) for path, code in text.items() if " BOARD_PERSISTENT;" in code}
+    assert kept == {"firmware/board/reset.c": ["board_trap_intcon1", "kept_fault", "kept_inverse"], "firmware/board/record.c": ["board_recorder"]}
 
 
 def test_the_state_is_written_in_one_place() -> None:
