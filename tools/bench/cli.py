@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import build, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
+from . import build, command_common, loadsteps, lowspeed, rating_sweep, recorder, report, robust, scenario_file, simulate, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -52,8 +52,12 @@ def _parser() -> argparse.ArgumentParser:
     margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
     margins.set_defaults(command=robust.command)
 
+    record = commands.add_parser("recorder", help="draw what the fault recorder has sent: a log of the UART")
+    record.add_argument("log", nargs="?", help="default: what the last run that ended in a fault has sent")
+    record.set_defaults(command=recorder.command)
+
     for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
-                            (slow, "lowspeed"), (margins, "robust")):
+                            (slow, "lowspeed"), (margins, "robust"), (record, "recorder")):
         header = "build/tune/NAME, written by make tune MOTOR=NAME" + ("" if command is rating else "; without --motor the project's own")
         command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
         command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
@@ -92,7 +96,7 @@ def _run(options: argparse.Namespace) -> int:
         if not options.no_plots:
             with waiting("plots", options.quiet):
                 from . import plots
-                data["plots"] = plots.write_all(run, folder.work)
+                data["plots"] = plots.write_all(run, folder.work) + _write_records(run, folder.work)
         output.write_summary(folder.work, data)
         report.write_page(folder.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
@@ -109,6 +113,14 @@ def _prepare(options: argparse.Namespace) -> int:
         userparams = command_common.header_for(options)
         print(build.library(item.defines, userparams and build.header_folder(userparams), sanitized=True))
     return 0
+
+
+def _write_records(run: Run, folder: Path) -> list[str]:
+    """What the fault recorder has sent, if anything: the text and its pictures."""
+    records = recorder.of_text(run.sent)
+    if records:
+        (folder / recorder.LOG).write_text(run.sent, encoding="latin-1", newline="")
+    return recorder.write(records, run.params, run.states, folder)
 
 
 def _write_traces(run: Run, folder: Path) -> None:

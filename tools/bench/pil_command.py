@@ -95,7 +95,7 @@ def _scenario(name: str | None, options: argparse.Namespace) -> int:
         data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
         data |= {"image": str(paths.shown(image)), "target": report.clean(figures(found))}
         output.write_trace(result.work / "trace.csv", run.trace.thinned(10))
-        (result.work / "uart.txt").write_text(found.sent, encoding="latin-1", newline="")
+        (result.work / "uart.txt").write_text(run.sent, encoding="latin-1", newline="")
         if not options.no_plots:
             with waiting("plots", options.quiet):
                 from . import plots
