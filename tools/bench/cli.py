@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import build, command_common, loadsteps, lowspeed, rating_sweep, recorder, report, robust, scenario_file, simulate, start_sweep, sweep, table2
+from . import build, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
 
     record = commands.add_parser("recorder", help="draw what the fault recorder has sent: a log of the UART")
     record.add_argument("log", nargs="?", help="default: what the last run that ended in a fault has sent")
-    record.set_defaults(command=recorder.command)
+    record.set_defaults(command=_recorder)
 
     for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
                             (slow, "lowspeed"), (margins, "robust"), (record, "recorder")):
@@ -95,8 +95,8 @@ def _run(options: argparse.Namespace) -> int:
         _write_traces(run, folder.work)
         if not options.no_plots:
             with waiting("plots", options.quiet):
-                from . import plots
-                data["plots"] = plots.write_all(run, folder.work) + _write_records(run, folder.work)
+                from . import plots, recorder_command
+                data["plots"] = plots.write_all(run, folder.work) + recorder_command.of_run(run, folder.work)
         output.write_summary(folder.work, data)
         report.write_page(folder.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
@@ -115,19 +115,16 @@ def _prepare(options: argparse.Namespace) -> int:
     return 0
 
 
-def _write_records(run: Run, folder: Path) -> list[str]:
-    """What the fault recorder has sent, if anything: the text and its pictures."""
-    records = recorder.of_text(run.sent)
-    if records:
-        (folder / recorder.LOG).write_text(run.sent, encoding="latin-1", newline="")
-    return recorder.write(records, run.params, run.states, folder)
-
-
 def _write_traces(run: Run, folder: Path) -> None:
     """The whole run at a tenth of the rate, and the first hand-over at the full rate."""
     output.write_trace(folder / "trace.csv", run.trace.thinned(10))
     for item in run.hand_overs()[:1]:
         output.write_trace(folder / "hand_over.csv", run.trace.part(item.at_s - HAND_OVER_BEFORE_S, item.at_s + HAND_OVER_AFTER_S))
+
+
+def _recorder(options: argparse.Namespace) -> int:
+    from . import recorder_command # needs matplotlib, which takes its time
+    return recorder_command.command(options)
 
 
 def _scenarios(options: argparse.Namespace) -> int:

@@ -98,8 +98,8 @@ def _scenario(name: str | None, options: argparse.Namespace) -> int:
         (result.work / "uart.txt").write_text(run.sent, encoding="latin-1", newline="")
         if not options.no_plots:
             with waiting("plots", options.quiet):
-                from . import plots
-                data["plots"] = plots.write_all(run, result.work)
+                from . import plots, recorder_command
+                data["plots"] = plots.write_all(run, result.work) + recorder_command.of_run(run, result.work)
         output.write_summary(result.work, data)
         report.write_page(result.work, run, outcomes, data)
     print(report.text(run, outcomes, data))

@@ -1,22 +1,16 @@
-"""The fault recorder's rows (include/drive/recorder.h): out of the text that the firmware sends, in engineering units, as table and picture."""
+"""The fault recorder's rows (include/drive/recorder.h): out of the text that the firmware sends, in engineering units."""
 
-import argparse
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from tools.common import drive_tables, output, paths
+from tools.common import drive_tables
 from tools.common.errors import UserError
-from . import command_common, page
 from .scenario import param
 
 RING_ROWS, AFTER_ROWS, WORDS, STATE_BITS = 80, 16, 6, 7
-LOG = "uart.txt"
-"""What a run's board has sent, in the run's folder."""
 HEAD = re.compile(r"record fault (\d+) rows (\d+) every (\d+)$")
 ROW = re.compile(r"row (\d+)((?: -?\d+){%d})$" % WORDS)
 AGAIN = "log it again: after a reset by its pin the board sends the record once more"
@@ -144,63 +138,8 @@ def scaled(record: Record, params: Mapping[str, float], states: Mapping[int, str
                 [states.get(number, f"state {number}") for number in record.states])
 
 
-CSV = ("time_ms", "i_a_a", "i_b_a", "i_c_a", "v_d_v", "v_q_v", "angle_deg", "bus_v", "speed_rpm", "state")
-
-
-def write(records: list[Record], params: Mapping[str, float], states: Mapping[int, str], folder: Path) -> list[str]:
-    """recorder.csv and recorder.png of the last record, recorder_1 ... of those before it; the names of the pictures."""
-    from . import plots
-    pictures = []
-    for number, record in enumerate(records, 1):
-        name = "recorder" if number == len(records) else f"recorder_{number}"
-        rows = scaled(record, params, states)
-        columns = (rows.time_ms, rows.i_a, rows.i_b, rows.i_c, rows.v_d, rows.v_q, rows.angle_deg, rows.bus_v, rows.speed_rpm)
-        output.write_csv(folder / f"{name}.csv", list(CSV), [["" if np.isnan(value) else f"{value:.6g}" for value in line] + [state]
-                                                             for *line, state in zip(*columns, rows.state)])
-        pictures.append(plots.write_record(rows, title(record, rows), folder, name))
-    return pictures
-
-
 def title(record: Record, rows: Rows) -> str:
     """What is shown, in one line."""
     name = next(row.name for row in drive_tables.faults() if row.code == record.fault)
     before = int(np.sum(rows.time_ms < 0.0))
     return f"{name}: {before} rows before it, {len(rows.state) - before} from it on, {record.every} period{'s' if record.every > 1 else ''} apart"
-
-
-def command(options: argparse.Namespace) -> int:
-    """Draws the records of a log."""
-    path = Path(options.log) if options.log else _newest()
-    try:
-        text = path.read_bytes().decode("latin-1").replace("\0", "")
-    except OSError as error:
-        raise UserError(f"cannot read '{path}' ({error.strerror})", "LOG", "name the file that a terminal program has logged") from None
-    records = parse(text, str(paths.shown(path)))
-    userparams = command_common.header_for(options)
-    library = command_common.library_for([], options.library, userparams)
-    target = options.out or paths.RESULTS / "recorder"
-    with output.ResultFolder(target) as folder:
-        pictures = write(records, library.params, library.states, folder.work)
-        data = {"log": str(paths.shown(path)), "header": command_common.header_name(options.library, userparams), "plots": pictures}
-        data["records"] = [title(record, scaled(record, library.params, library.states)) for record in records]
-        output.write_summary(folder.work, data)
-        _write_page(folder.work, records, data)
-    print("\n".join([f"log     {data['log']}", f"header  {data['header']}", *data["records"]]))
-    print(f"results in {paths.shown(target)}/: index.html")
-    return 0
-
-
-def _newest() -> Path:
-    """What the last run's board has sent, of those that ended in a fault."""
-    logs = sorted(paths.RESULTS.glob(f"*/{LOG}"), key=lambda path: path.stat().st_mtime)
-    if not logs:
-        raise UserError("no run has left a record", "LOG", "make run SCENARIO=fault_stall makes one; LOG=file draws what your board has sent")
-    return logs[-1]
-
-
-def _write_page(folder: Path, records: list[Record], data: dict[str, Any]) -> None:
-    known = {row.code: row for row in drive_tables.faults()}
-    rows = [page.Row([known[record.fault].name, known[record.fault].cause, known[record.fault].remedy], True) for record in records]
-    files = sorted(file.name for file in folder.iterdir())
-    page.write(folder, page.Page("fault recorder", True, "; ".join(data["records"]), [f"log {data['log']}", f"header {data['header']}"],
-                                 [page.Table("Faults", ["fault", "cause", "remedy"], rows)], images=data["plots"], files=files))
