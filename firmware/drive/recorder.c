@@ -20,7 +20,7 @@ static void recorder_begin(recorder_t *r)
 static uint16_t recorder_is_valid(const recorder_t *r)
 {
     return (uint16_t)(r->check == RECORDER_CHECK && r->left <= RECORDER_AFTER + 1u && r->full <= 1u && r->fault < (uint16_t)FAULT_COUNT
-                      && (uint16_t)r->next <= (uint16_t)RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_WORDS == 0u);
+                      && r->next >= 0 && r->next <= RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_WORDS == 0u);
 }
 
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
@@ -54,7 +54,7 @@ void recorder_background(recorder_t *r, const drive_t *d)
 
 uint16_t recorder_rows(const recorder_t *r)
 {
-    if (RECORDER_EVERY == 0u || r->left != 0u) {
+    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
         return 0;
     }
     return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_FIRST - r->next) / RECORDER_WORDS);

@@ -6,17 +6,17 @@
 #include "drive/modes/recorder_room.h"
 #include "drive/param_scaling.h"
 
-#define RECORDER_ROWS 80 /* 80 rows of 12 bytes are 960 of the part's 2048 bytes; a seventh word would leave the stack too little */
+#define RECORDER_ROWS 80  /* 12 bytes each: 960 of the part's 2048; a seventh word would be 160 more, and the stack needs 512 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */
 
 /** The words of a row. The bus and the speed take turns in the last one: both change slowly. */
 enum {
-    RECORDER_I_A,   /**< measured, Q13 */
+    RECORDER_I_A, /**< measured, Q13 */
     RECORDER_I_B,
-    RECORDER_V_D,   /**< commanded, Q14 */
+    RECORDER_V_D, /**< commanded, Q14 */
     RECORDER_V_Q,
     RECORDER_ANGLE, /**< control angle of the next sample; its lowest three bits are the state */
-    RECORDER_SLOW,  /**< in even rows of the ring the bus, unfiltered, Q15 of full scale; in odd ones the estimated speed, electrical rpm */
+    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed, electrical rpm */
     RECORDER_WORDS  /**< of a row: 12 bytes */
 };
 #define RECORDER_STATE_BITS 7u
@@ -79,12 +79,12 @@ QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t v_bus_raw)
     if (((uint16_t)at & 2u) != 0u) { /* six words a row: set in every other one */
         slow = estimator_speed(&d->run.estimator);
     }
-    *row++ = d->phases_q13.a;
-    *row++ = d->phases_q13.b;
-    *row++ = d->run.control.v_q14.d;
-    *row++ = d->run.control.v_q14.q;
-    *row++ = (int16_t)((d->angle & (uint16_t)~RECORDER_STATE_BITS) | d->state);
-    *row = slow;
+    row[RECORDER_I_A] = d->phases_q13.a;
+    row[RECORDER_I_B] = d->phases_q13.b;
+    row[RECORDER_V_D] = d->run.control.v_q14.d;
+    row[RECORDER_V_Q] = d->run.control.v_q14.q;
+    row[RECORDER_ANGLE] = (int16_t)((d->angle & (uint16_t)~RECORDER_STATE_BITS) | d->state);
+    row[RECORDER_SLOW] = slow;
     at = (int16_t)(at - (int16_t)RECORDER_WORDS);
     if (at < 0) {
         at = RECORDER_FIRST;
