@@ -13,6 +13,7 @@
 
 drive_t board_drive;
 panel_t board_panel;
+retry_t board_retry;
 
 static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick; /* drive ticks at the last check */
@@ -37,6 +38,7 @@ void firmware_init(void)
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
+    retry_init(&board_retry);
     drive_init(&board_drive, &board_params); /* before anything can trap */
     status_init();
     board_clock_failed = 0;
@@ -99,6 +101,7 @@ void firmware_background(void)
         in.s3_down = BOARD_S3_DOWN();
         in.elapsed_ms = elapsed_ms;
         lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
+        retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         BOARD_LED_ALIVE = lights.led_alive & 1u;
         BOARD_LED_RUN = lights.led_run & 1u;
         watch_refresh();

@@ -179,7 +179,7 @@ int probe_param_set(const char *name, double value)
 
 const char *probe_fault_name(int code)
 {
-#define FAULT_NAME(number, name, cause, remedy) \
+#define FAULT_NAME(number, name, passes, cause, remedy) \
     if (code == (number)) { \
         return #name; \
     }
