@@ -7,13 +7,8 @@
 
 static recorder_t recorder;
 
-/* Of the row of a tick: what the drive knew at its end. */
-static struct {
-    int16_t i_a, i_b, v_d, v_q, bus, speed;
-    uint16_t angle, state;
-} seen[400];
-
 static uint16_t ticks;
+static uint8_t state_of[400]; /* of a tick: at its end */
 
 void setUp(void)
 {
@@ -23,12 +18,27 @@ void setUp(void)
     ticks = 0;
 }
 
+/* What the row of a tick has. */
+static int16_t i_a(uint16_t tick)
+{
+    return (int16_t)(-16 * (int16_t)(tick % 100u));
+}
+
+static int16_t i_b(uint16_t tick)
+{
+    return (int16_t)(16 * (int16_t)(tick % 90u));
+}
+
+static int16_t v_bus(uint16_t tick)
+{
+    return rig_raw_bus(PARAM_F(NOMINAL_BUS_V) + 0.1F * (float)(tick % 20u));
+}
+
 /** A period as the board's interrupt has it; every quantity moves. */
 static void period(void)
 {
-    samples.i_a = (int16_t)(64 * (ticks % 100u));
-    samples.i_b = (int16_t)(-64 * (int16_t)(ticks % 90u));
-    rig_bus(PARAM_F(NOMINAL_BUS_V) + 0.1F * (float)(ticks % 20u));
+    rig_currents(i_a(ticks), i_b(ticks));
+    samples.v_bus = v_bus(ticks);
     drive.run.control.v_q14.d = (int16_t)(100 + ticks);
     drive.run.control.v_q14.q = (int16_t)-ticks;
     drive.angle = (uint16_t)(977u * ticks);
@@ -38,15 +48,8 @@ static void period(void)
         recorder_in_fault(&recorder, &drive);
     }
     recorder_tick(&recorder, &drive, samples.v_bus);
-    TEST_ASSERT_TRUE(ticks < 400u);
-    seen[ticks].i_a = drive.phases_q13.a;
-    seen[ticks].i_b = drive.phases_q13.b;
-    seen[ticks].v_d = drive.run.control.v_q14.d;
-    seen[ticks].v_q = drive.run.control.v_q14.q;
-    seen[ticks].bus = samples.v_bus;
-    seen[ticks].speed = (int16_t)(3 * ticks);
-    seen[ticks].angle = drive.angle;
-    seen[ticks].state = drive.state;
+    TEST_ASSERT_TRUE(ticks < sizeof state_of);
+    state_of[ticks] = (uint8_t)drive.state;
     ticks++;
 }
 
@@ -66,12 +69,12 @@ static void expect_rows(uint16_t rows, uint16_t end)
         uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(end - rows + n);
         const int16_t *word = &recorder.word[place * RECORDER_WORDS];
         TEST_ASSERT_TRUE(place < RECORDER_ROWS);
-        TEST_ASSERT_EQUAL_INT16(seen[tick].i_a, word[RECORDER_I_A]);
-        TEST_ASSERT_EQUAL_INT16(seen[tick].i_b, word[RECORDER_I_B]);
-        TEST_ASSERT_EQUAL_INT16(seen[tick].v_d, word[RECORDER_V_D]);
-        TEST_ASSERT_EQUAL_INT16(seen[tick].v_q, word[RECORDER_V_Q]);
-        TEST_ASSERT_EQUAL_HEX16((seen[tick].angle & 0xFFF8u) | seen[tick].state, word[RECORDER_ANGLE]);
-        TEST_ASSERT_EQUAL_INT16((place % 2u) ? seen[tick].speed : seen[tick].bus, word[RECORDER_SLOW]);
+        TEST_ASSERT_EQUAL_INT16(i_a(tick), word[RECORDER_I_A]);
+        TEST_ASSERT_EQUAL_INT16(i_b(tick), word[RECORDER_I_B]);
+        TEST_ASSERT_EQUAL_INT16(100 + tick, word[RECORDER_V_D]);
+        TEST_ASSERT_EQUAL_INT16(-(int16_t)tick, word[RECORDER_V_Q]);
+        TEST_ASSERT_EQUAL_HEX16(((uint16_t)(977u * tick) & 0xFFF8u) | state_of[tick], word[RECORDER_ANGLE]);
+        TEST_ASSERT_EQUAL_INT16((place % 2u) ? (int16_t)(3 * tick) : v_bus(tick), word[RECORDER_SLOW]);
     }
 }
 
