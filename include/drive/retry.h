@@ -19,7 +19,4 @@ void retry_init(retry_t *r);
 /** A pass of the background, after panel_tick(): it clears a fault and wishes a run as S2 would. RETRY_COUNT 0: never. */
 void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
 
-/** 1 for a fault that may pass by itself (drive/faults.h). */
-uint16_t retry_may_pass(uint16_t fault);
-
 #endif
