@@ -106,11 +106,15 @@ options = $(what) $(out)
 scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
 ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
-.PHONY: anymotor run scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
+.PHONY: anymotor run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
 	@$(front_end) run $(scenario) $(options)
+
+recorder: setup-run ## [run] draw what the fault recorder has sent: a log of your board's UART, or the last run's [LOG=file MOTOR= BOARD= USERPARAMS= OUT=]
+	@+$(ready)
+	@$(front_end) recorder $(if $(LOG),$(call quoted,$(LOG))) $(options)
 
 scenarios: setup-run ## [run] list the scenarios of make run SCENARIO=name
 	@$(front_end) scenarios

@@ -136,6 +136,14 @@
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
 
+/* ---- Fault recorder: 64 rows before a fault, 16 after it ---------------------------------------------------------- */
+#define RECORDER_PERIODS 1          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
+
+/* ---- Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it - */
+#define RETRY_COUNT 0               /* [times]         0 .. 20        retries before a fault stays; 0: never, appliances usually have 3 */
+#define RETRY_PAUSE_SEC 2           /* [s]             0.5 .. 600     outputs off before each retry; S2 ends it */
+#define RETRY_FORGET_SEC 10         /* [s]             1 .. 3600      in closed loop without a fault gives the retries back */
+
 /* ---- What the firmware makes of these numbers: engineering value, its count, and how much rounding changes it -----
  * U0 = 0.000405949 V and I0 = 0.000134277 A per count of Q15 (full scale 13.3 V, 4.4 A)
  *

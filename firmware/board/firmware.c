@@ -3,6 +3,7 @@
 
 #include "board/mclv.h"
 #include "board/peripherals.h"
+#include "board/record.h"
 #include "board/reset.h"
 #include "board/selftest_run.h"
 #include "board/status.h"
@@ -15,6 +16,7 @@
 
 drive_t board_drive;
 panel_t board_panel;
+retry_t board_retry;
 
 static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;          /* drive ticks at the last check */
@@ -33,6 +35,7 @@ void firmware_init(void)
 
     pwm_outputs_off();
     kept = reset_take();
+    record_init(kept);
     last_ms_tick = 0;
     supervised_tick = 0;
     silent_ms = 0;
@@ -41,6 +44,7 @@ void firmware_init(void)
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
+    retry_init(&board_retry);
     drive_init(&board_drive, &board_params); /* before anything can trap */
     board_clock_failed = 0;
     if (clock_init()) { /* the trap may have said so before */
@@ -104,6 +108,7 @@ QM_INLINE void firmware_supervise(void)
     selftest_pass();
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
+    record_tick();
 }
 
 void firmware_background(void)
@@ -119,6 +124,7 @@ void firmware_background(void)
         in.s3_down = BOARD_S3_DOWN();
         in.elapsed_ms = elapsed_ms;
         lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
+        retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         BOARD_LED_ALIVE = lights.led_alive & 1u;
         BOARD_LED_RUN = lights.led_run & 1u;
         selftest_part(SELFTEST_PART_PANEL);

@@ -2,6 +2,7 @@
 #include "board/firmware.h"
 #include "board/mclv.h"
 #include "board/peripherals.h"
+#include "board/record.h"
 #include "board/reset.h"
 #include "board/watch.h"
 #include "drive/param_init.h"
@@ -56,7 +57,9 @@ void BOARD_ISR _ADC1Interrupt(void)
     drive_slow(&board_drive, &board_params, raw.v_bus);
     if (drive_settle(&board_drive)) {
         pwm_outputs_off();
+        recorder_in_fault(&board_recorder, &board_drive);
     }
+    recorder_tick(&board_recorder, &board_drive, (int16_t)ADC1BUF3);
     mode_record();
 }
 

@@ -26,7 +26,7 @@ drive_fault_t reset_take(void)
     RCON = 0;
     board_reset_cause = cause;
     served_tick = 0;
-    if (RESET_WAS(POR, cause) || RESET_WAS(BOR, cause)) {
+    if (RESET_LOST_RAM) {
         board_trap_intcon1 = 0;
         return FAULT_NONE; /* what is kept holds anything now: it is not even read */
     }

@@ -4,6 +4,7 @@
 #include "board/firmware.h"
 #include "board/modes/identify_report.h"
 #include "board/peripherals.h"
+#include "board/record.h"
 #include "board/reset.h"
 #include "board/selftest_run.h"
 #include "board/text.h"
@@ -33,6 +34,15 @@ static char *put_limits(char *at)
     return end;
 }
 
+/** How far the retries are: " retries 2 first 6". @return the text's end */
+static char *put_retry(char *at)
+{
+    if (RETRY_COUNT == 0 || board_retry.first == (uint16_t)FAULT_NONE) {
+        return at;
+    }
+    return text_put_unsigned(text_put(text_put_unsigned(text_put(at, " retries "), board_retry.left), " first "), board_retry.first);
+}
+
 /** The line's text. @return its end */
 static char *put_line(void)
 {
@@ -41,7 +51,7 @@ static char *put_line(void)
         at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
         at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
         at = text_put_signed(text_put(at, " speed "), (int16_t)(estimator_speed(&board_drive.run.estimator) / NOPOLESPAIRS));
-        at = put_limits(text_put(at, " rpm"));
+        at = put_limits(put_retry(text_put(at, " rpm")));
         at = text_put(selftest_put(at), "\r\n");
     }
     return at;
@@ -79,6 +89,10 @@ void status_tick(uint16_t elapsed_ms)
 
 void status_send(void)
 {
+    if (line[next] == '\0') {
+        *record_line(line) = '\0';
+        next = 0;
+    }
     if (line[next] != '\0' && uart_send(line[next])) {
         next++;
     }

@@ -11,6 +11,7 @@ tCtrlParm CtrlParm;
 tLoadParm LoadParm;
 tAdaptParm AdaptParm;
 tLimitParm LimitParm;
+tRetryParm RetryParm;
 
 /** x * 2^bits, limited to 16 bits. */
 static int16_t watch_scaled(int16_t x, uint16_t bits)
@@ -54,5 +55,7 @@ void watch_refresh(void)
     AdaptParm.qRs = qm_hi(run->adaptation.rs_q31);
     LimitParm.now = limits_reasons(d, &board_params);
     LimitParm.seen |= LimitParm.now;
+    RetryParm.left = board_retry.left;
+    RetryParm.first = board_retry.first;
     mode_watch(d);
 }

@@ -13,6 +13,7 @@ void panel_init(panel_t *panel)
     panel->s2.down_ms = 0;
     panel->s3.down_ms = 0;
     panel->wish_run = 0;
+    panel->interrupted = 0;
     panel->fast_range = 0;
     panel->pot_q15 = INT16_MIN;
     panel->pot_q31 = INT32_MIN;
@@ -89,6 +90,9 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
     if (button_pressed(&panel->s2, in->s2_down, in->elapsed_ms)) {
         if (d->fault != (uint16_t)FAULT_NONE) {
             d->command.clear_fault = 1;
+            panel->interrupted = 0;
+        } else if (panel->interrupted) {
+            panel->interrupted = 0; /* a moment before the retry */
         } else {
             panel->wish_run = (int16_t)!panel->wish_run;
         }
@@ -97,8 +101,9 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
     if (button_pressed(&panel->s3, in->s3_down, in->elapsed_ms) && panel->wish_run) {
         panel->fast_range = (int16_t)!panel->fast_range;
     }
-    if (d->fault != (uint16_t)FAULT_NONE) {
+    if (d->fault != (uint16_t)FAULT_NONE && panel->wish_run) {
         panel->wish_run = 0;
+        panel->interrupted = 1;
     }
 }
 

@@ -6,6 +6,7 @@
 #include "drive/modes/params_in_ram.h"
 #include "drive/panel.h"
 #include "drive/param_scaling.h"
+#include "drive/retry.h"
 
 /** The drive's parameters, from userparams.h. */
 extern MODE_PARAMS_PLACE drive_params_t board_params;
@@ -15,6 +16,9 @@ extern drive_t board_drive;
 
 /** Buttons, potentiometer, lights. */
 extern panel_t board_panel;
+
+/** What is left of the retries, and what began them. */
+extern retry_t board_retry;
 
 /** Not 0 from a failure of the clock to the next reset: on a wrong clock nothing may run, whatever the user presses. */
 extern volatile uint16_t board_clock_failed;

@@ -6,6 +6,13 @@
 
 #include <stdint.h>
 
+/** Of a variable: neither cleared nor set by the start-up code. */
+#ifdef __XC16__
+#define BOARD_PERSISTENT __attribute__((persistent))
+#else
+#define BOARD_PERSISTENT
+#endif
+
 /** X(bit, name): the flags of RCON that say why the processor started. */
 #define RESET_CAUSE_TABLE(X) \
     X(15, TRAPR, "trap conflict") \
@@ -32,6 +39,8 @@ enum { RESET_CAUSE_TABLE(RESET_BIT) };
 
 /** RCON as it was found at the start: bits of RESET_CAUSE_TABLE. */
 extern volatile uint16_t board_reset_cause;
+/** 1 if RAM holds anything: after power-up, or a supply that dipped. */
+#define RESET_LOST_RAM (RESET_WAS(POR, board_reset_cause) || RESET_WAS(BOR, board_reset_cause))
 
 /** INTCON1 at the last trap (FAULT_TRAP): its bits name the trap. Kept over every reset but power-up. */
 extern volatile uint16_t board_trap_intcon1;

@@ -47,6 +47,11 @@ typedef struct {
     uint16_t now, seen;
 } tLimitParm;
 
+/** Retries left before a fault stays, and the fault that began them (drive_fault_t; 0: none). */
+typedef struct {
+    uint16_t left, first;
+} tRetryParm;
+
 extern tFdWeakParm FdWeakParm;
 extern tMotorEstimParm MotorEstimParm;
 extern tEstimParm EstimParm;
@@ -55,6 +60,7 @@ extern tCtrlParm CtrlParm;
 extern tLoadParm LoadParm;
 extern tAdaptParm AdaptParm;
 extern tLimitParm LimitParm;
+extern tRetryParm RetryParm;
 
 /** Copies the drive's state to the variables above. Background. */
 void watch_refresh(void);

@@ -9,7 +9,7 @@
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
 #define PARAM_TABLE(X) PARAM_MOTOR(X) PARAM_BOARD(X) PARAM_SPEEDS(X) PARAM_START(X) PARAM_LIMITS(X) PARAM_LOOPS(X) PARAM_FILTERS(X) \
-    PARAM_FIELD_WEAKENING(X) PARAM_SNAPSHOT(X)
+    PARAM_FIELD_WEAKENING(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_RETRY(X)
 
 #define PARAM_MOTOR(X) /* Motor, values per phase of the star */ \
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
@@ -70,6 +70,14 @@
     X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
 
+#define PARAM_RECORDER(X) /* Fault recorder: 64 rows before a fault, 16 after it */ \
+    X(RECORDER_PERIODS, "periods", 0, 64, 1, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
+
+#define PARAM_RETRY(X) /* Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it */ \
+    X(RETRY_COUNT, "times", 0, 20, 0, "retries before a fault stays; 0: never, appliances usually have 3") \
+    X(RETRY_PAUSE_SEC, "s", 0.5, 600, 2, "outputs off before each retry; S2 ends it") \
+    X(RETRY_FORGET_SEC, "s", 1, 3600, 10, "in closed loop without a fault gives the retries back")
+
 /** The 18 parameters of a table: stem0 .. stem17. */
 #define PARAM_ENTRIES(X, stem, ...) \
     X(stem##0, __VA_ARGS__) X(stem##1, __VA_ARGS__) X(stem##2, __VA_ARGS__) X(stem##3, __VA_ARGS__) X(stem##4, __VA_ARGS__) \
@@ -102,7 +110,7 @@
 
 /** Parameters in these units are whole numbers. */
 #define PARAM_COUNTED(unit) \
-    (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 \
+    (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 || __builtin_strcmp(unit, "times") == 0 \
      || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */
@@ -175,6 +183,8 @@
       "check its unit") \
     X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074: the observer's step is eight periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
+    X(((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
+      PARAM_NAMED(RECORDER_PERIODS) " must be 0, 1, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
     X(PARAM_F(SPEED_BANDWIDTH_HZ) <= PARAM_CALM_HZ, \
       PARAM_NAMED(SPEED_BANDWIDTH_HZ) " must be at most 0.148 * LOAD_BANDWIDTH_HZ, or 0.4 of the electrical frequency at " \
       PARAM_NAMED(MINIMUM_SPEED_RPM) " if that is more: lower it, or the speed hunts without load")

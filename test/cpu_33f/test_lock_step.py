@@ -14,7 +14,7 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from chip import RAM, REGISTERS, ROOT, STOP, image, library, pass_ms
-from tools.bench import pil_command
+from tools.bench import pil_command, recorder
 from tools.bench.board import BoardError
 from tools.bench.pil import PilBoard
 from tools.common.errors import UserError
@@ -210,6 +210,25 @@ def test_the_fault_input_is_a_named_fault_in_both(board: PilBoard) -> None:
     assert board.get("pwm.outputs_on") == 0
 
 
+def test_the_fault_recorder_sends_the_trace_to_the_count(board: PilBoard) -> None:
+    start(board)
+    board.trace_start(["fw.fault", "fw.i_a_a", "fw.i_b_a", "fw.v_d_v", "fw.v_q_v", "fw.theta_ctrl_deg", "fw.state"], 1)
+    pass_ms(board, 100)
+    board.uart_take()
+    board.set("input.flta", 1)
+    pass_ms(board, 400)
+    record, = recorder.parse(board.uart_take(), "")
+    assert (record.fault, record.every, len(record.words), record.fault_row(7)) == (1, 1, 80, 64)
+    rows, trace = recorder.scaled(record, library.params, library.states), board.trace_take()
+    at = int((trace[:, 0] != 0).argmax())
+    part = trace[at - 64:at + 16]
+    for column, values, count in ((1, rows.i_a, "CURRENT_A"), (2, rows.i_b, "CURRENT_A"), (3, rows.v_d, "VOLTAGE_V"), (4, rows.v_q, "VOLTAGE_V")):
+        assert (part[:, column] / library.params[f"COUNT_{count}"]).round().tolist() == (values / library.params[f"COUNT_{count}"]).round().tolist()
+    assert ((part[:, 5] * 65536 / 360).round() // 8 * 8).tolist() == (rows.angle_deg * 65536 / 360).round().tolist()
+    assert part[:, 6].tolist() == record.states
+    assert rows.bus_v[rows.bus_v > 0] == pytest.approx(24.0, abs=0.5)
+
+
 def test_a_fault_is_shown_without_a_gap_while_the_watchdog_resets(board: PilBoard) -> None:
     start(board)
     board.set("cpu.isr_dropped", 1)
@@ -266,7 +285,10 @@ def test_outputs_go_off_and_the_fault_outlives_the_watchdogs_reset(running: PilB
     off_within_ms(running, off_ms)
     pass_ms(running, 700)
     assert running.get("cpu.resets") == 2
-    assert re.search(rf"reset WDTO\r\n(.*\n)*state 7 fault {fault} speed", running.uart_take())
+    sent = running.uart_take()
+    assert re.search(rf"reset WDTO\r\n(.*\n)*state 7 fault {fault} speed", sent)
+    record = recorder.parse(sent.partition("reset WDTO")[2], "")[0]
+    assert record.fault == fault and len(record.words) == 80 and set(record.states) <= {3, 7}, "what came before it outlives the reset, too"
     assert running.get("pwm.outputs_on") == 0
     assert [text for text in running.warnings() if "PLL" in text] == [], "the old clock goes on over this reset"
 
@@ -277,6 +299,7 @@ def test_a_stack_that_overflows(running: PilBoard) -> None:
     pass_ms(running, 700)
     assert running.get("fw.fault") == 12
     assert running.variable("board_trap_intcon1", 1)[0] & STKERR == STKERR
+    assert recorder.parse(running.uart_take(), "")[-1].fault == 12
 
 
 def test_power_on_forgets_it_all(running: PilBoard) -> None:
@@ -284,4 +307,6 @@ def test_power_on_forgets_it_all(running: PilBoard) -> None:
     pass_ms(running, 40)
     running.power_up()
     pass_ms(running, 700)
-    assert re.search(r"reset BOR POR\r\n(.*\n)*state 1 fault 0 speed", running.uart_take())
+    sent = running.uart_take().rpartition("reset BOR POR")[2]
+    assert re.search(r"^\r\n(.*\n)*state 1 fault 0 speed", sent)
+    assert "record" not in sent

@@ -51,6 +51,9 @@ class FakeBoard:
         self.traced = self.periods
         return np.repeat(rows[:, None], self.columns, axis=1)
 
+    def uart_take(self):
+        return ""
+
     def write_variable(self, name, value):
         self.calls.append((self.now(), name, value))
 

@@ -12,6 +12,7 @@
 #include "unity.h"
 
 drive_t board_drive;
+retry_t board_retry;
 const drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 static char sent[256];

@@ -150,6 +150,7 @@ RELATIONS = {
     # 1126 * 24 * 2 us / 50 us / 7.24 = 149.3
     "END_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("END_SPEED_RPM", "149", "150")],
     "MINIMUM_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("MINIMUM_SPEED_RPM", "149", "150")],
+    "RECORDER_PERIODS must be 0, 1, 2, 4": [case("RECORDER_PERIODS", "3", "4"), case("RECORDER_PERIODS", "63", "64"), case("RECORDER_PERIODS", "5", "0")],
     "SPEED_BANDWIDTH_HZ must be at most 0.148 * LOAD_BANDWIDTH_HZ": [
         case("SPEED_BANDWIDTH_HZ", "16.4", "16.2", MINIMUM_SPEED_RPM="150"), case("SPEED_BANDWIDTH_HZ", "33.5", "33.2", MINIMUM_SPEED_RPM="1000")],
 }

@@ -17,7 +17,7 @@ static void put_in(uint16_t state)
 
 /* ---- the table of faults ---- */
 
-#define FAULT_ROW(code, name, cause, remedy) { (code), FAULT_##name, #name, cause, remedy },
+#define FAULT_ROW(code, name, passes, cause, remedy) { (code), FAULT_##name, #name, cause, remedy },
 static const struct {
     int16_t code, constant;
     const char *name, *cause, *remedy;

@@ -10,6 +10,7 @@
 drive_t board_drive;
 static const drive_params_t fresh = DRIVE_PARAMS_INIT;
 drive_params_t board_params = DRIVE_PARAMS_INIT;
+retry_t board_retry;
 
 void setUp(void)
 {
@@ -156,4 +157,13 @@ void test_reasons_of_a_limit_are_those_of_now_and_those_seen_since_the_status_li
     watch_refresh();
     TEST_ASSERT_EQUAL_HEX16(LIMIT_VOLTAGE, LimitParm.now);
     TEST_ASSERT_EQUAL_HEX16(LIMIT_CURRENT | LIMIT_VOLTAGE, LimitParm.seen);
+}
+
+void test_retries_left_and_what_began_them(void)
+{
+    board_retry.left = 2;
+    board_retry.first = (uint16_t)FAULT_STALL;
+    watch_refresh();
+    TEST_ASSERT_EQUAL_UINT16(2, RetryParm.left);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, RetryParm.first);
 }

@@ -44,7 +44,7 @@ class Library:
                 ("vb_key_info", out(_KeyInfo), [ctypes.c_uint]), ("vb_power_up", ctypes.c_int, [board]),
                 ("vb_run", ctypes.c_int, [board, ctypes.c_uint32]), ("vb_trace_config", ctypes.c_int, [board, text, ctypes.c_uint]),
                 ("vb_trace_data", out(ctypes.c_float), [board, size, size]), ("vb_trace_clear", None, [board]),
-                ("vb_warning_count", ctypes.c_uint, [board]), ("vb_warning", text, [board, ctypes.c_uint]),
+                ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]), ("vb_warning_count", ctypes.c_uint, [board]), ("vb_warning", text, [board, ctypes.c_uint]),
                 ("vb_param", ctypes.c_int, [ctypes.c_uint, out(text), out(number), out(text)]),
                 ("vb_fault_name", text, [ctypes.c_int]), ("vb_state_name", text, [ctypes.c_int]))
 
@@ -131,6 +131,12 @@ class Board:
         result = np.ctypeslib.as_array(data, shape=(rows.value, columns.value)).copy()
         self._c.vb_trace_clear(self._vb)
         return result
+
+    def uart_take(self) -> str:
+        """What the firmware has sent since the last call."""
+        text = ctypes.create_string_buffer(4096)
+        count = self._c.vb_uart_read(self._vb, text, len(text))
+        return text.raw[:count].decode("latin-1")
 
     def warnings(self) -> list[str]:
         return [self._c.vb_warning(self._vb, i).decode() for i in range(self._c.vb_warning_count(self._vb))]

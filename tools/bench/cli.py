@@ -52,8 +52,12 @@ def _parser() -> argparse.ArgumentParser:
     margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
     margins.set_defaults(command=robust.command)
 
+    record = commands.add_parser("recorder", help="draw what the fault recorder has sent: a log of the UART")
+    record.add_argument("log", nargs="?", help="default: what the last run that ended in a fault has sent")
+    record.set_defaults(command=_recorder)
+
     for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
-                            (slow, "lowspeed"), (margins, "robust")):
+                            (slow, "lowspeed"), (margins, "robust"), (record, "recorder")):
         header = "build/tune/NAME, written by make tune MOTOR=NAME" + ("" if command is rating else "; without --motor the project's own")
         command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
         command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
@@ -94,8 +98,8 @@ def _run(options: argparse.Namespace) -> int:
         _write_traces(run, folder.work)
         if not options.no_plots:
             with waiting("plots", options.quiet):
-                from . import plots
-                data["plots"] = plots.write_all(run, folder.work)
+                from . import plots, recorder_command
+                data["plots"] = plots.write_all(run, folder.work) + recorder_command.of_run(run, folder.work)
         output.write_summary(folder.work, data)
         report.write_page(folder.work, run, outcomes, data)
     print(report.text(run, outcomes, data))
@@ -119,6 +123,11 @@ def _write_traces(run: Run, folder: Path) -> None:
     output.write_trace(folder / "trace.csv", run.trace.thinned(10))
     for item in run.hand_overs()[:1]:
         output.write_trace(folder / "hand_over.csv", run.trace.part(item.at_s - HAND_OVER_BEFORE_S, item.at_s + HAND_OVER_AFTER_S))
+
+
+def _recorder(options: argparse.Namespace) -> int:
+    from . import recorder_command # needs matplotlib, which takes its time
+    return recorder_command.command(options)
 
 
 def _scenarios(options: argparse.Namespace) -> int:

@@ -34,7 +34,6 @@ class PilLibrary(Library):
                 ("vb_iss_write", ctypes.c_int, [board, text, words, ctypes.c_uint]),
                 ("vb_iss_param_get", ctypes.c_int, [board, text, number]), ("vb_iss_param_set", ctypes.c_int, [board, text, ctypes.c_double]),
                 ("vb_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]),
-                ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]),
                 ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t]))
 
 
@@ -72,12 +71,6 @@ class PilBoard(Board):
     def peek(self, address: int) -> int:
         """The 16-bit word at an address of data memory."""
         return self._c.vb_iss_peek(self._vb, address)
-
-    def uart_take(self) -> str:
-        """What the target has sent since the last call."""
-        text = ctypes.create_string_buffer(4096)
-        count = self._c.vb_uart_read(self._vb, text, len(text))
-        return text.raw[:count].decode("latin-1")
 
     def uart_send(self, text: str) -> None:
         self._c.vb_uart_write(self._vb, text.encode("latin-1"), len(text))
@@ -129,8 +122,6 @@ class PilRun:
     """tick, signal and values; "" if target and host agreed in all ticks"""
     has_names: bool = True
     """whether the image said where the drive's variables are"""
-    sent: str = ""
-    """what left UART1, up to 4096 characters"""
 
 
 def check_image(pil: PilLibrary, image: Path) -> bool:
@@ -151,4 +142,4 @@ def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilR
         result = simulate.simulate_on(job if board.has_names else without_names(job), pil, board, report)
         cycles = Cycles(**{name: board.get(f"cpu.{name}") for name in Cycles.__dataclass_fields__})
         return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference(),
-                      board.has_names, board.uart_take())
+                      board.has_names)

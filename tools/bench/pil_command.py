@@ -95,11 +95,11 @@ def _scenario(name: str | None, options: argparse.Namespace) -> int:
         data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
         data |= {"image": str(paths.shown(image)), "target": report.clean(figures(found))}
         output.write_trace(result.work / "trace.csv", run.trace.thinned(10))
-        (result.work / "uart.txt").write_text(found.sent, encoding="latin-1", newline="")
+        (result.work / "uart.txt").write_text(run.sent, encoding="latin-1", newline="")
         if not options.no_plots:
             with waiting("plots", options.quiet):
-                from . import plots
-                data["plots"] = plots.write_all(run, result.work)
+                from . import plots, recorder_command
+                data["plots"] = plots.write_all(run, result.work) + recorder_command.of_run(run, result.work)
         output.write_summary(result.work, data)
         report.write_page(result.work, run, outcomes, data)
     print(report.text(run, outcomes, data))

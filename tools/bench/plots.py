@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt # noqa: E402  the backend must be chosen first
 import numpy as np # noqa: E402
 
+from .recorder import Rows # noqa: E402
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run # noqa: E402
 from tools.common.trace import Trace, wrapped_deg # noqa: E402
 
@@ -145,6 +146,37 @@ def _field_weakening(run: Run, thin: Trace, axes: plt.Axes) -> None:
     axes.set(title=f"{run.scenario.name}: d current and 1/Kphi over speed (Figure 8)", xlabel="speed [rpm]", ylabel="Id [A peak]")
     handles = [line for side in (axes, other) for line in side.get_lines()]
     axes.legend(handles, [line.get_label() for line in handles], markerscale=4)
+
+
+def write_record(rows: Rows, title: str, folder: Path, name: str) -> str:
+    """The fault recorder's rows, a panel for each kind, from the fault on in red."""
+    figure, panels = plt.subplots(4, 1, sharex=True, layout="constrained", figsize=(10, 10))
+    currents, voltages, angle, slow = panels
+    for values, label in ((rows.i_a, "Ia"), (rows.i_b, "Ib"), (rows.i_c, "Ic = -Ia - Ib")):
+        currents.plot(rows.time_ms, values, ".-", markersize=3, label=label)
+    for values, label in ((rows.v_d, "Vd"), (rows.v_q, "Vq")):
+        voltages.plot(rows.time_ms, values, ".-", markersize=3, label=label)
+    angle.plot(rows.time_ms, rows.angle_deg, ".", markersize=3, label="control angle of the next sample")
+    has_bus, speed = ~np.isnan(rows.bus_v), slow.twinx()
+    lines = slow.plot(rows.time_ms[has_bus], rows.bus_v[has_bus], ".-", markersize=3, color="C0", label="bus")
+    lines += speed.plot(rows.time_ms[~has_bus], rows.speed_rpm[~has_bus], ".-", markersize=3, color="C1", label="estimated speed")
+    speed.set_ylabel("speed [rpm]")
+    speed.grid(False)
+    for axes, label in zip(panels, ("current [A]", "voltage [V peak, phase]", "angle [deg]", "bus [V]")):
+        axes.set_ylabel(label)
+        axes.axvspan(0.0, max(0.0, float(rows.time_ms[-1])), color="tab:red", alpha=0.12)
+        axes.axvline(0.0, color="tab:red", linewidth=1.2, label="fault")
+        axes.legend(loc="upper left")
+    slow.legend(lines, [line.get_label() for line in lines], loc="upper left")
+    slow.set_xlabel("time from the fault on [ms]; " + _states_of(rows))
+    figure.suptitle(f"fault recorder, {title}")
+    return saved(figure, folder, name)
+
+
+def _states_of(rows: Rows) -> str:
+    """The states in their order."""
+    changes = [state for before, state in zip(["", *rows.state], rows.state) if state != before]
+    return "states: " + ", ".join(changes)
 
 
 def write_table2(rows: list[dict], folder: Path) -> list[str]:

@@ -22,8 +22,8 @@ COLUMNS = (
 UNITS = {"rpm": "rpm", "percent": "%", "a": "A", "v": "V", "nm": "N·m", "deg": "°", "s": "s", "degc": "°C"}
 FINE = ("ok", reach.BEYOND)
 """Verdicts of rows in which nothing is wrong."""
-EXTRA_PLOTS = ("field_weakening.png", "variables.png")
-"""Plots of a run that its page's curves do not show."""
+EXTRA_PLOTS = ("field_weakening.", "variables.", "recorder.", "recorder_")
+"""Plots of a run that its page's curves do not show: how their names begin."""
 
 
 def check(run: Run) -> list[Outcome]:
@@ -89,7 +89,7 @@ def write_page(folder: Path, run: Run, outcomes: list[Outcome], data: dict[str, 
         f"{run.scenario.name}: {run.scenario.title}", data["passed"], outcomes_count(outcomes),
         used_lines(data) + [f"warning of the board: {line}" for line in run.warnings],
         [*faults_table(run), *([measures] if rows else []), outcomes_table(outcomes)], [shown], [*limits_table(run), events],
-        [name for name in data.get("plots", []) if name in EXTRA_PLOTS or not page.draws()], sorted(file.name for file in folder.iterdir())))
+        [name for name in data.get("plots", []) if name.startswith(EXTRA_PLOTS) or not page.draws()], sorted(file.name for file in folder.iterdir())))
 
 
 def faults_table(run: Run) -> list[page.Table]:

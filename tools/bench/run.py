@@ -39,6 +39,8 @@ class Run:
     faults: dict[int, str] = field(default_factory=dict)
     variables: dict[str, list[int]] = field(default_factory=dict)
     params: dict[str, float] = field(default_factory=dict)
+    sent: str = ""
+    """what left UART1"""
     wall_s: float = 0.0
     cpu_s: float = 0.0
     motor_s: float = 0.0

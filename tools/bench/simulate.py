@@ -15,11 +15,13 @@ from . import panel
 from . import scenario as scenarios
 from .board import Board, BoardError, Library
 from tools.common.errors import UserError, suggestion
+from .recorder import under_way
 from .run import Run
 from .scenario import Scenario
 from tools.common.trace import Trace
 
 CHUNK_PERIODS = 2000
+LONGEST_RECORD_CHUNKS = 10
 LONGEST_COAST_S = 60.0
 """From rated speed: braking takes the rest."""
 
@@ -165,8 +167,22 @@ class Session:
         """What has happened so far."""
         job, library = self.job, self.library
         variables = {name: self.board.variable(name, count) for name, count in job.variables.items()}
-        return Run(job.scenario, self.recorder.trace(), list(self.done), self.board.warnings(), library.states, library.faults, variables,
-                   library.params | job.parameters, self.wall_s, self.cpu_s, self.board.get("time_s"))
+        motor_s, trace, warnings = self.board.get("time_s"), self.recorder.trace(), self.board.warnings()
+        if "fw.fault" in trace and len(trace) and trace.column("fw.fault")[-1] != 0:
+            self.recorder.sent += _rest_of_record(self.board, self.recorder.sent)
+        return Run(job.scenario, trace, list(self.done), warnings, library.states, library.faults, variables, library.params | job.parameters,
+                   self.recorder.sent, self.wall_s, self.cpu_s, motor_s)
+
+
+def _rest_of_record(board: Any, sent: str) -> str:
+    """The fault recorder's lines that were not out when the scenario ended in a fault."""
+    text = ""
+    for chunk in range(LONGEST_RECORD_CHUNKS):
+        if chunk > 0 and not under_way(sent + text):
+            break
+        board.run(CHUNK_PERIODS)
+        text += board.uart_take()
+    return text
 
 
 def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> None:
@@ -189,6 +205,7 @@ class _Recorder:
         self.period_s = 50e-6
         self.rows: list[np.ndarray] = []
         self.times: list[np.ndarray] = []
+        self.sent = ""
         self.board.trace_start(signals, every)
 
     def run_to(self, until_s: float) -> None:
@@ -197,6 +214,7 @@ class _Recorder:
             self.board.run(periods)
             now_s = self.board.get("time_s")
             rows = self.board.trace_take()
+            self.sent += self.board.uart_take()
             if len(rows):
                 self.rows.append(rows)
                 self.times.append(self.now_s + (now_s - self.now_s) / len(rows) * np.arange(1, len(rows) + 1))

@@ -14,19 +14,18 @@ class Row:
     name: str
     cause: str
     remedy: str
+    passes: bool = False
+    """of a fault: it may pass by itself"""
 
 
 @cache
 def faults() -> tuple[Row, ...]:
     """Why the drive has stopped; the first is that of no fault."""
-    return _read("drive/faults.h", "DRIVE_FAULT_TABLE")
+    table = rows("include", "drive/faults.h", "DRIVE_FAULT_TABLE", "#code #name #passes cause remedy")
+    return tuple(Row(int(code), name, cause, remedy, passes == "1") for code, name, passes, cause, remedy in table)
 
 
 @cache
 def limits() -> tuple[Row, ...]:
     """Why the drive gives less than it is asked for."""
-    return _read("drive/limit_reasons.h", "DRIVE_LIMIT_TABLE")
-
-
-def _read(header: str, macro: str) -> tuple[Row, ...]:
-    return tuple(Row(int(code), *texts) for code, *texts in rows("include", header, macro, "#code #name cause remedy"))
+    return tuple(Row(int(code), *texts) for code, *texts in rows("include", "drive/limit_reasons.h", "DRIVE_LIMIT_TABLE", "#code #name cause remedy"))

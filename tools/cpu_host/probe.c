@@ -91,7 +91,10 @@ const probe_signal_t probe_signals[] = { DRIVE_SIGNALS(SIGNAL_ROW) SNAPSHOT_SIGN
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
 
 #define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },
-const probe_param_t probe_params[] = { PARAM_TABLE(PARAM_ENTRY) };
+/* Behind the parameters the scales of what the fault recorder sends. */
+const probe_param_t probe_params[] = {
+    PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }
+};
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 
 /* What may change while the motor turns: the name of userparams.h (or its stem, for the 18 entries of a table), where the firmware
@@ -178,7 +181,7 @@ int probe_param_set(const char *name, double value)
 
 const char *probe_fault_name(int code)
 {
-#define FAULT_NAME(number, name, cause, remedy) \
+#define FAULT_NAME(number, name, passes, cause, remedy) \
     if (code == (number)) { \
         return #name; \
     }

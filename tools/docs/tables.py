@@ -28,7 +28,8 @@ def table(head: str, align: str, lines: list[list[str]]) -> str:
 
 
 def faults() -> str:
-    return table("code, name, cause, remedy", "llll", [[str(row.code), row.name, row.cause, row.remedy] for row in drive_tables.faults()[1:]])
+    return table("code, name, may pass, cause, remedy", "lllll", [
+        [str(row.code), row.name, "yes" if row.passes else "", row.cause, row.remedy] for row in drive_tables.faults()[1:]])
 
 
 def limits() -> str:

@@ -96,5 +96,9 @@
 #define LS_OVER2LS0_SPEED17 0.5
 #define SNAPDELAY 5
 #define DATA_BUFFER_SIZE 50
+#define RECORDER_PERIODS 1
+#define RETRY_COUNT 0
+#define RETRY_PAUSE_SEC 2
+#define RETRY_FORGET_SEC 10
 
 #endif

@@ -1,0 +1,67 @@
+/* The fault recorder's slow side: what is kept over a reset, when it begins anew, and the order of its rows. */
+#include "drive/recorder.h"
+
+#ifdef MODE_WITHOUT_RECORDER
+#pragma message(MODE_WITHOUT_RECORDER " takes the RAM of the fault recorder: this build has no recorder, whatever RECORDER_PERIODS says")
+#endif
+
+#define RECORDER_CHECK 0x5EC0u
+
+static void recorder_begin(recorder_t *r)
+{
+    r->check = RECORDER_CHECK;
+    r->next = RECORDER_FIRST;
+    r->full = 0;
+    r->fault = (uint16_t)FAULT_NONE;
+    r->left = RECORDER_AFTER + 1u; /* last: from now on the control interrupt writes */
+}
+
+/** Whether a reset has left a recorder and no chance content of RAM. */
+static uint16_t recorder_is_valid(const recorder_t *r)
+{
+    return (uint16_t)(r->check == RECORDER_CHECK && r->left <= RECORDER_AFTER + 1u && r->full <= 1u && r->fault < (uint16_t)FAULT_COUNT
+                      && r->next >= 0 && r->next <= RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_WORDS == 0u);
+}
+
+void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
+{
+    uint16_t first;
+    if (powered_up || !recorder_is_valid(r)) {
+        recorder_begin(r);
+        return;
+    }
+    first = (r->fault != (uint16_t)FAULT_NONE) ? r->fault : (uint16_t)fault;
+    if (first == (uint16_t)FAULT_NONE) {
+        recorder_begin(r);
+        return;
+    }
+    r->fault = first;
+    r->left = 0;
+}
+
+void recorder_background(recorder_t *r, const drive_t *d)
+{
+    if (r->left == 0u) {
+        if (d->command.run) {
+            recorder_begin(r);
+        }
+    } else if (r->left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
+        r->left = 0; /* cleared before the last row: what comes now is no part of it */
+    } else {
+        /* it records */
+    }
+}
+
+uint16_t recorder_rows(const recorder_t *r)
+{
+    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
+        return 0;
+    }
+    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_FIRST - r->next) / RECORDER_WORDS);
+}
+
+uint16_t recorder_place(const recorder_t *r, uint16_t n)
+{
+    int16_t place = (int16_t)((r->full ? r->next : RECORDER_FIRST) / RECORDER_WORDS - (int16_t)n);
+    return (uint16_t)((place >= 0) ? place : place + (int16_t)RECORDER_ROWS);
+}

@@ -1,0 +1,129 @@
+/* The fault recorder on the virtual board: its rows are the trace's, to the count, and outlast all but a power-up and a start. */
+#include "bench.h"
+
+#include "board/record.h"
+
+enum { I_A, I_B, V_D, V_Q, ANGLE, STATE, BUS, SPEED, FAULT, COLUMNS };
+
+static const float *trace;
+static size_t fault_row;
+
+void setUp(void)
+{
+    bench_set_up();
+}
+
+/** Counts of a value of the trace. */
+static long counts(size_t row, int column, double per_count)
+{
+    return lround((double)trace[row * COLUMNS + (size_t)column] / per_count);
+}
+
+static void trace_from_here(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, vb_trace_config(bench, "fw.i_a_a fw.i_b_a fw.v_d_v fw.v_q_v fw.theta_ctrl_deg fw.state reg.ADC1BUF3 fw.speed_est_rpm "
+                                                    "fw.fault",
+                                             1));
+}
+
+/** Lets the record be completed, and finds the fault in the trace. */
+static void find_fault(drive_fault_t fault)
+{
+    size_t rows, columns;
+    wait_s(0.002);
+    TEST_ASSERT_EQUAL_INT(fault, board_drive.fault);
+    trace = vb_trace_data(bench, &rows, &columns);
+    TEST_ASSERT_EQUAL_UINT(COLUMNS, columns);
+    for (fault_row = 0; fault_row < rows && counts(fault_row, FAULT, 1.0) == FAULT_NONE; fault_row++) {
+    }
+    TEST_ASSERT_TRUE(fault_row >= RECORDER_ROWS && fault_row + RECORDER_AFTER < rows);
+}
+
+static void expect_trace(void)
+{
+    const double amperes = 4.0 * (double)PARAM_F(NORM_CURRENT_CONST), volts = 2.0 * (double)NORM_VOLTAGE_CONST;
+    TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&board_recorder));
+    for (uint16_t n = 0; n < RECORDER_ROWS; n++) {
+        uint16_t place = recorder_place(&board_recorder, n);
+        size_t row = fault_row - (RECORDER_ROWS - RECORDER_AFTER) + n;
+        const int16_t *word = &board_recorder.word[place * RECORDER_WORDS];
+        TEST_ASSERT_EQUAL_INT(counts(row, I_A, amperes), word[RECORDER_I_A]);
+        TEST_ASSERT_EQUAL_INT(counts(row, I_B, amperes), word[RECORDER_I_B]);
+        TEST_ASSERT_EQUAL_INT(counts(row, V_D, volts), word[RECORDER_V_D]);
+        TEST_ASSERT_EQUAL_INT(counts(row, V_Q, volts), word[RECORDER_V_Q]);
+        TEST_ASSERT_EQUAL_HEX16(counts(row, ANGLE, 360.0 / 65536.0) & 0xFFF8, (uint16_t)word[RECORDER_ANGLE] & ~RECORDER_STATE_BITS);
+        TEST_ASSERT_EQUAL_INT(counts(row, STATE, 1.0), (uint16_t)word[RECORDER_ANGLE] & RECORDER_STATE_BITS);
+        if (place % 2u) {
+            TEST_ASSERT_EQUAL_INT(counts(row, SPEED, 1.0 / NOPOLESPAIRS), word[RECORDER_SLOW]);
+        } else {
+            TEST_ASSERT_EQUAL_HEX16(counts(row, BUS, 1.0), (uint16_t)word[RECORDER_SLOW]);
+        }
+    }
+}
+
+void test_rows_of_an_overcurrent_are_those_of_the_trace(void)
+{
+    run_at(2000.0);
+    trace_from_here();
+    wait_s(0.004);
+    set("motor.ld_h", 4e-5);
+    set("motor.lq_h", 4e-5);
+    set("motor.rs_ohm", 0.2);
+    (void)seconds_to_fault(0.02);
+    find_fault(FAULT_OVERCURRENT_SW);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, board_recorder.fault);
+    expect_trace();
+}
+
+void test_rows_of_a_stall_are_those_of_the_trace(void)
+{
+    run_at(1500.0);
+    set("load.constant_nm", 0.4);
+    trace_from_here();
+    (void)seconds_to_fault(1.0);
+    find_fault(FAULT_STALL);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, board_recorder.fault);
+    expect_trace();
+}
+
+void test_a_fault_that_the_background_finds_is_recorded_as_well(void)
+{
+    run_at(1500.0);
+    trace_from_here();
+    wait_s(0.006);
+    board_clock_failed = 1;
+    find_fault(FAULT_CLOCK);
+    expect_trace();
+}
+
+void test_record_stays_over_s2_and_goes_with_the_next_start(void)
+{
+    run_at(1500.0);
+    set("input.flta", 1.0);
+    wait_s(0.001);
+    set("input.flta", 0.0);
+    wait_s(0.3);
+    TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&board_recorder));
+    press("input.s2");
+    TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
+    TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&board_recorder));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, board_recorder.fault);
+    set("state.speed_rpm", 0.0);
+    wait_s(0.1);
+    press("input.s2");
+    TEST_ASSERT_EQUAL_INT(DRIVE_ALIGN, board_drive.state);
+    TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&board_recorder));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_recorder.fault);
+}
+
+void test_power_up_forgets_the_record(void)
+{
+    run_at(1500.0);
+    set("input.flta", 1.0);
+    wait_s(0.01);
+    set("input.flta", 0.0);
+    TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&board_recorder));
+    power_on();
+    TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&board_recorder));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_recorder.fault);
+}

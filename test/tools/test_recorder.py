@@ -1,0 +1,189 @@
+"""The fault recorder's text: read back, refused where it is damaged, in engineering units, and equal to the trace of the run that it is from."""
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import LIBRARY, STATES, command, refused
+
+from tools.bench import recorder, simulate
+from tools.bench.recorder_command import LOG
+from tools.bench.board import Board, Library
+from tools.common import paths
+from tools.common.errors import UserError
+
+PARAMS = {"LOOPTIME_SEC": 5e-5, "COUNT_CURRENT_A": 0.001, "COUNT_VOLTAGE_V": 0.002, "BUS_FULL_SCALE_V": 50.0, "NOPOLESPAIRS": 5.0}
+STATUS = "state 7 fault 6 speed 0 rpm\r\n"
+
+
+def lines(count: int = 4, sent: int | None = None, fault: int = 6, first: int = 1, every: int = 1) -> str:
+    """A record as the firmware sends it; the last two rows are in the fault."""
+    rows = [f"row {(first - n) % 80} {n} {-n} {10 * n} -1 {8 * n + (7 if n >= count - 2 else 5)} {-20000 + n}\r\n" for n in range(count)]
+    return f"record fault {fault} rows {count} every {every}\r\n" + "".join(rows[:sent])
+
+
+def test_a_record_among_other_lines_is_read_from_the_oldest_row_on() -> None:
+    text = "foc33 0.10.0 reset BOR POR\r\n" + STATUS + lines().replace("row 0", STATUS + "row 0") + STATUS
+    found = recorder.parse(text, "log")
+    assert found == [recorder.Record(6, 1, (1, 0, 79, 78), ((0, 0, 0, -1, 5, -20000), (1, -1, 10, -1, 13, -19999), (2, -2, 20, -1, 23, -19998),
+                                                            (3, -3, 30, -1, 31, -19997)))]
+    assert found[0].states == [5, 5, 7, 7] and found[0].fault_row(7) == 2
+
+
+def test_of_two_records_both_are_read_and_one_that_is_sent_again_once() -> None:
+    assert [record.fault for record in recorder.parse(lines() + lines() + lines(fault=3), "")] == [6, 3]
+
+
+def test_one_that_is_cut_is_forgotten_where_a_whole_one_is_there() -> None:
+    assert len(recorder.parse(lines(sent=2) + "foc33 0.10.0 reset EXTR\r\n" + lines(), "")) == 1
+    assert len(recorder.parse(lines() + lines(fault=2, sent=3), "")) == 1
+
+
+@pytest.mark.parametrize("text, line", [
+    ("", "no record of a fault, log: log the board's UART"), (STATUS, "no record of a fault, log"),
+    (lines(sent=3), "the record ends after 3 of 4 rows, log line 1: log it again"),
+    (lines(sent=0), "the record ends after 0 of 4 rows"),
+    (lines().replace("row 79 2", "row 79"), "no row of a record: 'row 79 -2 20 -1 23 -19998', log line 4"),
+    (lines().replace("row 79", "row 99"), "no row of a record: 'row 99 2"), (lines().replace("-19998", "-40000"), "no row of a record: 'row 79 2"),
+    (lines().replace("row 79", "row 78"), "row 79 is missing after row 0, log line 4"),
+    (lines().replace("row 0 1 -1 10 -1 13 -19999\r\n", ""), "row 0 is missing after row 1, log line 3"),
+    (lines(fault=99), "no head of a record: 'record fault 99 rows 4 every 1', log line 1"),
+    (lines().replace("rows 4", "rows 81"), "no head of a record"), (lines(every=0), "no head of a record")])
+def test_a_bad_log_is_one_line_that_says_where(text: str, line: str) -> None:
+    with pytest.raises(UserError) as error:
+        recorder.parse(text, "log")
+    assert str(error.value).startswith(line)
+    assert recorder.of_text(text) == []
+
+
+def test_a_record_is_under_way_until_its_last_line_is_out() -> None:
+    assert not recorder.under_way("") and not recorder.under_way(STATUS) and not recorder.under_way(lines())
+    assert all(recorder.under_way(lines(sent=n)) for n in range(4))
+    assert recorder.under_way(lines()[:-2]) and recorder.under_way("record fault 6 rows 4")
+    assert recorder.under_way(lines() + lines(sent=1)), "the second"
+
+
+def test_counts_become_engineering_units_and_the_fault_is_at_zero() -> None:
+    rows = recorder.scaled(recorder.parse(lines(every=2), "")[0], PARAMS, STATES)
+    assert rows.time_ms == pytest.approx([-0.2, -0.1, 0.0, 0.1])
+    assert rows.i_a == pytest.approx([0.0, 0.001, 0.002, 0.003]) and rows.i_c == pytest.approx([0.0] * 4)
+    assert rows.v_d == pytest.approx([0.0, 0.02, 0.04, 0.06]) and rows.v_q == pytest.approx([-0.002] * 4)
+    assert rows.angle_deg == pytest.approx(np.arange(4) * 8 * 360.0 / 65536.0)
+    assert rows.bus_v == pytest.approx([np.nan, 12769 / 65536 * 50, np.nan, 12771 / 65536 * 50], nan_ok=True)
+    assert rows.speed_rpm == pytest.approx([-4000.0, np.nan, -3999.6, np.nan], nan_ok=True)
+    assert rows.state == ["CLOSED", "CLOSED", "FAULT", "FAULT"]
+
+
+def test_rows_without_a_fault_end_in_the_reset_that_was_one() -> None:
+    text = re.sub(r"(row \d+ (?:-?\d+ ){4})(\d+)", lambda found: found[1] + str(int(found[2]) // 8 * 8 + 5), lines(fault=13))
+    rows = recorder.scaled(recorder.parse(text, "")[0], PARAMS, STATES)
+    assert rows.time_ms == pytest.approx([-0.2, -0.15, -0.1, -0.05])
+
+
+# ---- the firmware on the virtual board -------------------------------------------------------------------------------------------
+
+SIGNALS = ("fw.fault", "fw.i_a_a", "fw.i_b_a", "fw.v_d_v", "fw.v_q_v", "fw.theta_ctrl_deg", "reg.ADC1BUF3", "fw.speed_est_rpm", "fw.state")
+
+
+def faulted(causes: dict[str, float], at_s: float) -> tuple[str, np.ndarray, Library]:
+    """A motor at 1000 rpm to which something happens: what was sent until the record was out, and the trace from the cause on."""
+    library = Library(LIBRARY)
+    board = Board(library)
+    board.power_up()
+    board.set("input.pot", 0.4)
+    for key, value, periods in (("input.s2", 0, 4000), ("input.s2", 1, 2000), ("input.s2", 0, 50000)):
+        board.set(key, value)
+        board.run(periods)
+    board.trace_start(list(SIGNALS), 1)
+    board.run(200)
+    for key, value in causes.items():
+        board.set(key, value)
+    board.run(round(at_s * 20000))
+    sent = board.uart_take()
+    trace = board.trace_take()
+    for _ in range(10):
+        board.run(1000)
+        sent += board.uart_take()
+    board.close()
+    return sent, trace, library
+
+
+@pytest.mark.parametrize("causes, fault", [({"load.constant_nm": 0.4}, 6), ({"motor.ld_h": 4e-5, "motor.lq_h": 4e-5, "motor.rs_ohm": 0.2}, 1)],
+                         ids=["STALL", "OVERCURRENT_HW"])
+def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float], fault: int) -> None:
+    sent, trace, library = faulted(causes, 0.5)
+    record, = recorder.parse(sent, "")
+    assert record.fault == fault and record.every == 1 and len(record.words) == 80
+    rows = recorder.scaled(record, library.params, library.states)
+    at = int(np.flatnonzero(trace[:, 0])[0])
+    assert record.fault_row(7) == 64
+    part = {name: trace[at - 64:at + 16, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
+    for name, values in (("fw.i_a_a", rows.i_a), ("fw.i_b_a", rows.i_b), ("fw.v_d_v", rows.v_d), ("fw.v_q_v", rows.v_q)):
+        scale = library.params["COUNT_CURRENT_A" if name.endswith("_a") else "COUNT_VOLTAGE_V"]
+        assert np.round(part[name] / scale).tolist() == np.round(values / scale).tolist(), name
+    assert (np.round(part["fw.theta_ctrl_deg"] * 65536 / 360).astype(int) // 8).tolist() == np.round(rows.angle_deg * 8192 / 360).astype(int).tolist()
+    assert part["fw.state"].astype(int).tolist() == record.states
+    has_bus = ~np.isnan(rows.bus_v)
+    assert has_bus.tolist() == [place % 2 == 0 for place in record.places] == np.isnan(rows.speed_rpm).tolist()
+    slow = np.array([row[5] for row in record.words])
+    assert (slow[has_bus] & 0xFFFF).tolist() == part["reg.ADC1BUF3"][has_bus].astype(int).tolist()
+    assert slow[~has_bus].tolist() == np.round(part["fw.speed_est_rpm"][~has_bus] * library.params["NOPOLESPAIRS"]).astype(int).tolist()
+    assert rows.bus_v[has_bus] == pytest.approx(24.0, abs=1.0), "and of the right size"
+
+
+FAULT_AT_THE_END = """
+title = "a fault at the end of the run"
+motor = "hurst_dmb0224c10002"
+board = "mclv"
+duration_s = 1.002
+[[event]]
+at_s = 0.2
+press = "S2"
+[[event]]
+at_s = 1.0
+set = { "input.flta" = 1 }
+"""
+
+
+def test_a_run_that_ends_in_a_fault_shows_its_record_and_make_recorder_the_same(tmp_path: Path) -> None:
+    (tmp_path / "late.toml").write_text(FAULT_AT_THE_END, encoding="utf-8")
+    code, out, _ = command("run", str(tmp_path / "late.toml"), "--library", str(LIBRARY), "--out", str(tmp_path / "run"), "--quiet")
+    assert code == 0, out
+    page = (tmp_path / "run" / "index.html").read_text(encoding="utf-8")
+    assert 'alt="recorder"' in page and "recorder.csv" in page and LOG in page
+    assert "simulated 1.00 s" in out, "what is run on for the record is no part of the run"
+    code, out, _ = command("recorder", str(tmp_path / "run" / LOG), "--library", str(LIBRARY), "--out", str(tmp_path / "again"))
+    assert code == 0 and "OVERCURRENT_HW: 64 rows before it, 16 from it on, 1 period apart" in out
+    assert 'alt="recorder"' in (tmp_path / "again" / "index.html").read_text(encoding="utf-8")
+    tables = [list(csv.DictReader((tmp_path / name / "recorder.csv").open(encoding="utf-8"))) for name in ("run", "again")]
+    assert tables[0] == tables[1] and len(tables[0]) == 80 and tables[0][64]["state"] == "FAULT" and float(tables[0][64]["time_ms"]) == 0.0
+
+
+def test_a_run_without_a_fault_has_no_record(tmp_path: Path) -> None:
+    (tmp_path / "fine.toml").write_text(FAULT_AT_THE_END.partition("[[event]]")[0].replace("1.002", "0.1"), encoding="utf-8")
+    code, _, _ = command("run", str(tmp_path / "fine.toml"), "--library", str(LIBRARY), "--out", str(tmp_path / "run"), "--quiet")
+    assert code == 0 and not [path for path in (tmp_path / "run").iterdir() if "recorder" in path.name or path.name == LOG]
+
+
+def test_without_a_log_the_newest_run_s_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paths, "RESULTS", tmp_path)
+    code, _, error = command("recorder", "--library", str(LIBRARY))
+    assert code == 2 and error.startswith("foc33: no run has left a record, LOG: make run SCENARIO=fault_stall makes one")
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / LOG).write_text(lines(), encoding="utf-8")
+    code, out, _ = command("recorder", "--library", str(LIBRARY))
+    assert code == 0 and "STALL: 2 rows before it, 2 from it on" in out
+    assert (tmp_path / "recorder" / "recorder.png").is_file()
+
+
+def test_a_log_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+    for path, text in ((tmp_path / "none.txt", "No such file"), (tmp_path, "Is a directory")):
+        code, _, error = command("recorder", str(path), "--library", str(LIBRARY))
+        assert code == 2 and text in error and error.count("\n") == 1
+
+
+def test_the_longest_record_is_sent_in_the_time_that_a_run_waits_for_it() -> None:
+    longest = len("record fault 13 rows 80 every 64\r\n") + 80 * len("row 79" + 6 * " -32768" + "\r\n") + 10 * 80
+    assert longest / 11520 < 0.05e-3 * simulate.CHUNK_PERIODS * simulate.LONGEST_RECORD_CHUNKS

@@ -1,0 +1,249 @@
+/* The fault recorder: which rows it holds, in which order, how long it keeps them, and when it begins anew. */
+#include "drive_rig.h"
+
+#include "drive/recorder.h"
+
+#include <string.h>
+
+static recorder_t recorder;
+
+static uint16_t ticks;
+static uint8_t state_of[400]; /* of a tick: at its end */
+
+void setUp(void)
+{
+    rig_ready();
+    memset(&recorder, 0x5A, sizeof recorder); /* what RAM may hold */
+    recorder_restart(&recorder, 1, FAULT_NONE);
+    ticks = 0;
+}
+
+/* What the row of a tick has. */
+static int16_t i_a(uint16_t tick)
+{
+    return (int16_t)(-16 * (int16_t)(tick % 100u));
+}
+
+static int16_t i_b(uint16_t tick)
+{
+    return (int16_t)(16 * (int16_t)(tick % 90u));
+}
+
+static int16_t v_bus(uint16_t tick)
+{
+    return rig_raw_bus(PARAM_F(NOMINAL_BUS_V) + 0.1F * (float)(tick % 20u));
+}
+
+/** A period as the board's interrupt has it; every quantity moves. */
+static void period(void)
+{
+    rig_currents(i_a(ticks), i_b(ticks));
+    samples.v_bus = v_bus(ticks);
+    drive.run.control.v_q14.d = (int16_t)(100 + ticks);
+    drive.run.control.v_q14.q = (int16_t)-ticks;
+    drive.angle = (uint16_t)(977u * ticks);
+    rig_tick(1);
+    rig_speed((int16_t)(3 * ticks));
+    if (drive.fault != (uint16_t)FAULT_NONE) {
+        recorder_in_fault(&recorder, &drive);
+    }
+    recorder_tick(&recorder, &drive, samples.v_bus);
+    TEST_ASSERT_TRUE(ticks < sizeof state_of);
+    state_of[ticks] = (uint8_t)drive.state;
+    ticks++;
+}
+
+static void periods(uint16_t count)
+{
+    while (count-- != 0u) {
+        period();
+    }
+}
+
+/** The record is complete, and its rows are those of the ticks before `end`. */
+static void expect_rows(uint16_t rows, uint16_t end)
+{
+    uint16_t n;
+    TEST_ASSERT_EQUAL_UINT16(rows, recorder_rows(&recorder));
+    for (n = 0; n < rows; n++) {
+        uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(end - rows + n);
+        const int16_t *word = &recorder.word[place * RECORDER_WORDS];
+        TEST_ASSERT_TRUE(place < RECORDER_ROWS);
+        TEST_ASSERT_EQUAL_INT16(i_a(tick), word[RECORDER_I_A]);
+        TEST_ASSERT_EQUAL_INT16(i_b(tick), word[RECORDER_I_B]);
+        TEST_ASSERT_EQUAL_INT16(100 + tick, word[RECORDER_V_D]);
+        TEST_ASSERT_EQUAL_INT16(-(int16_t)tick, word[RECORDER_V_Q]);
+        TEST_ASSERT_EQUAL_HEX16(((uint16_t)(977u * tick) & 0xFFF8u) | state_of[tick], word[RECORDER_ANGLE]);
+        TEST_ASSERT_EQUAL_INT16((place % 2u) ? (int16_t)(3 * tick) : v_bus(tick), word[RECORDER_SLOW]);
+    }
+}
+
+void test_sixty_four_rows_before_a_fault_and_sixteen_from_it_on_wherever_the_ring_stands(void)
+{
+    uint16_t before;
+    for (before = RECORDER_ROWS - RECORDER_AFTER; before < 2 * RECORDER_ROWS + 8; before++) {
+        setUp();
+        periods(before);
+        TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
+        drive_raise(&drive, FAULT_TRAP);
+        periods(RECORDER_AFTER + 20);
+        expect_rows(RECORDER_ROWS, (uint16_t)(before + RECORDER_AFTER));
+        TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, recorder.fault);
+    }
+}
+
+void test_a_fault_soon_after_the_beginning_has_fewer_rows_before_it(void)
+{
+    uint16_t before;
+    for (before = 0; before < RECORDER_ROWS - RECORDER_AFTER; before++) {
+        setUp();
+        periods(before);
+        drive_raise(&drive, FAULT_STALL);
+        periods(RECORDER_AFTER + 3);
+        expect_rows((uint16_t)(before + RECORDER_AFTER), (uint16_t)(before + RECORDER_AFTER));
+    }
+}
+
+void test_first_row_in_state_fault_is_the_fault_s_own(void)
+{
+    uint16_t n;
+    periods(100);
+    rig_currents(0, 0);
+    drive_raise(&drive, FAULT_OVERCURRENT_HW);
+    periods(40);
+    for (n = 0; n < RECORDER_ROWS; n++) {
+        uint16_t state = (uint16_t)recorder.word[recorder_place(&recorder, n) * RECORDER_WORDS + RECORDER_ANGLE] & RECORDER_STATE_BITS;
+        TEST_ASSERT_EQUAL_UINT16((n < RECORDER_ROWS - RECORDER_AFTER) ? DRIVE_STOPPED : DRIVE_FAULT, state);
+    }
+}
+
+static void clear_fault(void)
+{
+    drive.command.clear_fault = 1;
+    period();
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
+void test_a_cleared_fault_s_record_stays_until_the_next_start(void)
+{
+    periods(100);
+    drive_raise(&drive, FAULT_OVERVOLTAGE);
+    periods(30);
+    clear_fault();
+    recorder_background(&recorder, &drive);
+    drive_raise(&drive, FAULT_UNDERVOLTAGE); /* a second fault, without a start between */
+    periods(30);
+    recorder_background(&recorder, &drive);
+    expect_rows(RECORDER_ROWS, 100 + RECORDER_AFTER);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, recorder.fault);
+    clear_fault();
+    while (drive.state != (uint16_t)DRIVE_STOPPED) {
+        rig_tick(1);
+    }
+    drive_start(&drive, &params, 1);
+    recorder_background(&recorder, &drive);
+    TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
+    ticks = 0;
+    periods(5);
+    drive_raise(&drive, FAULT_OVERCURRENT_HW);
+    periods(30);
+    expect_rows(5 + RECORDER_AFTER, 5 + RECORDER_AFTER);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, recorder.fault);
+}
+
+void test_of_two_faults_at_once_the_first_is_told(void)
+{
+    periods(90);
+    drive_raise(&drive, FAULT_LOST_LOCK);
+    periods(3);
+    drive_raise(&drive, FAULT_OVERVOLTAGE);
+    periods(30);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_LOST_LOCK, recorder.fault);
+    expect_rows(RECORDER_ROWS, 90 + RECORDER_AFTER);
+}
+
+void test_a_fault_cleared_within_its_sixteen_rows_ends_the_record(void)
+{
+    periods(90);
+    drive_raise(&drive, FAULT_LOST_LOCK);
+    periods(7);
+    recorder_background(&recorder, &drive);
+    TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
+    clear_fault();
+    recorder_background(&recorder, &drive);
+    expect_rows(RECORDER_ROWS, 98);
+    periods(30);
+    expect_rows(RECORDER_ROWS, 98);
+}
+
+void test_a_reset_keeps_the_record_of_a_fault_and_power_up_does_not(void)
+{
+    periods(100);
+    drive_raise(&drive, FAULT_STALL);
+    periods(30);
+    recorder_restart(&recorder, 0, FAULT_NONE);
+    expect_rows(RECORDER_ROWS, 100 + RECORDER_AFTER);
+    recorder_restart(&recorder, 0, FAULT_WATCHDOG); /* the first stays the first */
+    TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, recorder.fault);
+    recorder_restart(&recorder, 1, FAULT_NONE);
+    TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, recorder.fault);
+}
+
+void test_a_reset_that_is_a_fault_itself_keeps_what_came_before_it(void)
+{
+    periods(100);
+    recorder_restart(&recorder, 0, FAULT_WATCHDOG);
+    expect_rows(RECORDER_ROWS, 100);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_WATCHDOG, recorder.fault);
+    setUp();
+    periods(33);
+    drive_raise(&drive, FAULT_TRAP);
+    periods(4);
+    recorder_restart(&recorder, 0, FAULT_TRAP); /* in the middle of the last rows */
+    expect_rows(37, 37);
+}
+
+void test_a_reset_of_a_healthy_drive_begins_anew(void)
+{
+    periods(100);
+    recorder_restart(&recorder, 0, FAULT_NONE);
+    TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
+    ticks = 0;
+    periods(3);
+    drive_raise(&drive, FAULT_STALL);
+    periods(20);
+    expect_rows(3 + RECORDER_AFTER, 3 + RECORDER_AFTER);
+}
+
+void test_what_ram_happens_to_hold_is_no_record(void)
+{
+    static const struct {
+        const char *what;
+        uint16_t left, next, full, fault, check_off;
+    } cases[] = {
+        { "check word", 0, 0, 1, FAULT_STALL, 1 },
+        { "rows to come", RECORDER_AFTER + 2, 0, 1, FAULT_STALL, 0 },
+        { "next row behind the last", 0, RECORDER_ROWS * RECORDER_WORDS, 1, FAULT_STALL, 0 },
+        { "next row before the first", 0, (uint16_t)-RECORDER_WORDS, 1, FAULT_STALL, 0 },
+        { "next row within a row", 0, 3, 1, FAULT_STALL, 0 },
+        { "neither full nor not", 0, 0, 2, FAULT_STALL, 0 },
+        { "no such fault", 0, 0, 1, FAULT_COUNT, 0 },
+    };
+    periods(100);
+    EACH(n, cases) {
+        recorder.left = cases[n].left;
+        recorder.next = (int16_t)cases[n].next;
+        recorder.full = cases[n].full;
+        recorder.fault = cases[n].fault;
+        recorder.check = (uint16_t)(recorder.check + cases[n].check_off);
+        recorder_restart(&recorder, 0, FAULT_STALL);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, recorder_rows(&recorder), cases[n].what);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(RECORDER_AFTER + 1, recorder.left, cases[n].what);
+    }
+    recorder.left = 0; /* and the same with nothing wrong is one */
+    recorder.full = 1;
+    recorder.fault = FAULT_STALL;
+    recorder_restart(&recorder, 0, FAULT_NONE);
+    TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&recorder));
+}

@@ -1,0 +1,52 @@
+/* The fault recorder with a row every fourth period. */
+#include "hurst_params.h"
+
+#undef RECORDER_PERIODS
+#define RECORDER_PERIODS 4
+
+#include "drive_rig.h"
+
+#include "drive/recorder.h"
+
+static recorder_t recorder;
+
+void setUp(void)
+{
+}
+
+static void period(void)
+{
+    drive.ticks++;
+    drive.run.control.v_q14.d = (int16_t)drive.ticks;
+    rig_speed((int16_t)(2u * drive.ticks));
+    if (drive.fault != (uint16_t)FAULT_NONE) {
+        recorder_in_fault(&recorder, &drive);
+    }
+    recorder_tick(&recorder, &drive, (int16_t)(3u * drive.ticks));
+}
+
+void test_every_fourth_period_has_a_row_and_sixteen_of_them_follow_the_fault_in_any_phase(void)
+{
+    uint16_t phase, n;
+    for (phase = 0; phase < 4u; phase++) {
+        uint16_t first_after;
+        drive_init(&drive, &params);
+        recorder_restart(&recorder, 1, FAULT_NONE);
+        for (n = 0; n < 4u * 100u + phase; n++) {
+            period();
+        }
+        drive_raise(&drive, FAULT_STALL);
+        first_after = (uint16_t)((drive.ticks | 3u) + 1u);
+        for (n = 0; n < 100u; n++) {
+            period();
+        }
+        TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&recorder));
+        for (n = 0; n < RECORDER_ROWS; n++) {
+            uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(first_after + 4u * (n - (RECORDER_ROWS - RECORDER_AFTER)));
+            const int16_t *word = &recorder.word[place * RECORDER_WORDS];
+            TEST_ASSERT_EQUAL_INT16(tick, word[RECORDER_V_D]);
+            TEST_ASSERT_EQUAL_INT16((place % 2u) ? 2u * tick : 3u * tick, word[RECORDER_SLOW]);
+            TEST_ASSERT_EQUAL_UINT16((tick < first_after) ? DRIVE_CALIBRATE : DRIVE_FAULT, (uint16_t)word[RECORDER_ANGLE] & RECORDER_STATE_BITS);
+        }
+    }
+}

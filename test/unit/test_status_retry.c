@@ -1,0 +1,48 @@
+/* The status line with retries: how many are left, and the first cause, as long as there is one. */
+#include "hurst_params.h"
+
+#undef RETRY_COUNT
+#define RETRY_COUNT 3
+
+#include "firmware/board/status.c"
+
+#include <string.h>
+
+#include "mock_peripherals.h"
+#include "unity.h"
+
+drive_t board_drive;
+volatile uint16_t board_reset_cause;
+tLimitParm LimitParm;
+retry_t board_retry;
+
+void setUp(void)
+{
+    LimitParm.seen = 0;
+}
+
+static void expect_line(uint16_t left, uint16_t first, const char *text)
+{
+    board_drive.state = (uint16_t)DRIVE_FAULT;
+    board_drive.fault = (uint16_t)FAULT_START_FAILED;
+    board_retry.left = left;
+    board_retry.first = first;
+    *put_line() = '\0';
+    TEST_ASSERT_EQUAL_STRING(text, line);
+}
+
+void test_line_tells_retries_and_first_cause(void)
+{
+    expect_line(2, FAULT_STALL, "state 7 fault 5 speed 0 rpm retries 2 first 6\r\n");
+    expect_line(0, FAULT_STALL, "state 7 fault 5 speed 0 rpm retries 0 first 6\r\n");
+    expect_line(3, FAULT_NONE, "state 7 fault 5 speed 0 rpm\r\n");
+    LimitParm.seen = LIMIT_CURRENT;
+    expect_line(2, FAULT_STALL, "state 7 fault 5 speed 0 rpm retries 2 first 6 limit CURRENT\r\n");
+}
+
+void test_the_longest_line_has_room(void)
+{
+#define ALL_NAMES(bit, name, cause, remedy) " " #name
+    static const char longest[] = "state 7 fault 31 speed -32767 rpm retries 20 first 31 limit" DRIVE_LIMIT_TABLE(ALL_NAMES) "\r\n";
+    TEST_ASSERT_TRUE(sizeof line >= sizeof longest);
+}
