@@ -110,12 +110,12 @@ def faulted(causes: dict[str, float], at_s: float) -> tuple[str, np.ndarray, Lib
     return sent, trace, library
 
 
-@pytest.mark.parametrize("causes, fault", [({"load.constant_nm": 0.4}, 6), ({"motor.ld_h": 4e-5, "motor.lq_h": 4e-5, "motor.rs_ohm": 0.2}, 1)],
-                         ids=["STALL", "OVERCURRENT_HW"])
-def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float], fault: int) -> None:
+@pytest.mark.parametrize("causes, fault", [({"load.constant_nm": 0.4}, {6}), ({"motor.ld_h": 4e-5, "motor.lq_h": 4e-5, "motor.rs_ohm": 0.2}, {1, 2})],
+                         ids=["STALL", "OVERCURRENT"])
+def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float], fault: set[int]) -> None:
     sent, trace, library = faulted(causes, 0.5)
     record, = recorder.parse(sent, "")
-    assert record.fault == fault and record.every == 1 and len(record.words) == 80
+    assert record.fault in fault and record.every == 1 and len(record.words) == 80
     rows = recorder.scaled(record, library.params, library.states)
     at = int(np.flatnonzero(trace[:, 0])[0])
     assert record.fault_row(7) == 64

@@ -28,7 +28,7 @@ void test_codes_never_change_their_meaning(void)
     static const char *const names[] = {
         "NONE", "OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
         "ISR_OVERRUN", "OFFSET", "ADC_LOST", "CLOCK", "TRAP", "WATCHDOG",
-        "CURRENT_SENSOR", "BUS_SENSOR", "OPEN_PHASE", "POTENTIOMETER", "INTERRUPT_RATE", "OVERTEMPERATURE"
+        "CURRENT_SENSOR", "BUS_SENSOR", "OPEN_PHASE", "POTENTIOMETER", "INTERRUPT_RATE", "OVERTEMPERATURE", "SELFTEST"
     };
     TEST_ASSERT_EQUAL_INT(FAULT_COUNT, sizeof rows / sizeof rows[0]);
     EACH(n, names) {

@@ -104,7 +104,8 @@ def test_what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
     assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text["include/board/reset.h"]
     kept = {path: re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", code, re.MULTILINE) for path, code in text.items() if " BOARD_PERSISTENT;" in code}
     assert kept == {"firmware/board/reset.c": ["board_trap_intcon1", "kept_fault", "kept_inverse"], "firmware/board/record.c": ["board_recorder"],
-                    "firmware/board/selftest_run.c": ["board_selftest_failed", "waited_counts"]}
+                    "firmware/board/selftest_run.c": ["board_selftest_failed"],
+                    "firmware/board/selftest_start.c": ["waited_counts"]}
 
 
 def test_the_state_is_written_in_one_place() -> None:
