@@ -232,7 +232,7 @@ void selftest_pass(void)
 
 void selftest_ms(void)
 {
-    run_ms++;
+    run_ms = (uint16_t)(run_ms + 1u);
     owed_ms++;
     board_selftest_stepped = board_drive.ticks;
     if (board_selftest_parts != PARTS_IN_ORDER || owed_ms > OWED_MS) {
