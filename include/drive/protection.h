@@ -48,7 +48,9 @@ QM_INLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     uint16_t a = (uint16_t)qm_abs(d->phases_q13.a), b = (uint16_t)qm_abs(d->phases_q13.b), c = (uint16_t)qm_abs(d->phases_q13.c);
     if (run->observer.wrong_steps == 0u) {
-        run->phase_sums[0] = run->phase_sums[1] = run->phase_sums[2] = 0;
+        run->phase_sums[0] = 0;
+        run->phase_sums[1] = 0;
+        run->phase_sums[2] = 0;
         return;
     }
     run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));

@@ -13,6 +13,8 @@
 
 drive_t board_drive;
 retry_t board_retry;
+volatile uint16_t board_reset_cause;
+uint16_t board_selftest_parts;
 const drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 static char sent[256];

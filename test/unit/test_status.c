@@ -10,6 +10,7 @@
 #include "unity.h"
 
 drive_t board_drive;
+uint16_t board_selftest_parts;
 volatile uint16_t board_reset_cause;
 tLimitParm LimitParm;
 

@@ -14,6 +14,7 @@
 
 drive_t board_drive;
 volatile uint16_t board_reset_cause;
+uint16_t board_selftest_parts;
 tLimitParm LimitParm;
 retry_t board_retry;
 
