@@ -60,6 +60,8 @@ REFUSED = {
                                                 ("[tune]", "END_SPEED_RPM = 2700 must be at most NOMINAL_SPEED_RPM = 2500"))}
 WARNED = {
     "friction that dead time hides": ({"coulomb_nm": 1e-4, "viscous_nms": 0.0}, ("without load the speed may wander", "dead_time of 0.37 us would do, or chokes")),
+    "as much of viscous friction at half the rated speed": ({"coulomb_nm": 0.0, "viscous_nms": 1e-4 / (0.5 * 2500.0 * math.pi / 30.0)},
+                                                            ("friction takes only 0.0017 A", "dead_time of 0.37 us would do, or chokes")),
     "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "larger current range")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),
     "maximum current beyond the firmware's range": (
