@@ -72,7 +72,7 @@ class Scales:
     count_a: float
     """a count of current"""
     lost_counts: float
-    """current that dead time loses"""
+    """current that dead time loses, in counts of count_a"""
 
 
 @dataclass

@@ -53,6 +53,8 @@ REFUSED = {
     "friction that dead time hides": ({"coulomb_nm": 1e-4, "viscous_nms": 0.0},
                                       ("line 33: chokes of 6.3 mH in each phase, added to the motor's inductance", "without load the speed would wander")),
     "friction that a shorter dead time shows": ({"coulomb_nm": 2.5e-4, "viscous_nms": 0.0}, ("without load the speed would wander", "dead_time of 1.1 us, or chokes of 1.4 mH")),
+    "as much of viscous friction at half the rated speed": ({"coulomb_nm": 0.0, "viscous_nms": 2.5e-4 / (0.5 * 2500.0 * math.pi / 30.0)},
+                                                            ("without load the speed would wander", "dead_time of 1.1 us, or chokes of 1.4 mH")),
     "friction that is enough for a quicker motor": ({"coulomb_nm": 8e-4, "viscous_nms": 0.0, "rated_speed_rpm": 600.0}, ("without load the speed would wander",)),
     "a range so wide that a step of the converter shakes the rotor": ({"rated_speed_rpm": 500.0, "coulomb_nm": 5e-3, "board": {"current_full_scale_a": 24.0}},
                                                                       ("half a step of the converter, 0.023 A, turns the rotor", "a board with at most")),
