@@ -108,10 +108,10 @@ def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau_and_the_loc
 
 
 # ---- warnings --------------------------------------------------------------------------------------------------------------
-NO_FRICTION = (("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 1e-9"),
+NO_FRICTION = (("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 0.0"),
                ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0"))
 SMALL = (("pole_pairs = { value = 5", "pole_pairs = { value = 1"), ("value = 2.67", "value = 1.5"), ("value = 7.24", "value = 2.084"),
-         ("value = 5.5e-6", "value = 5e-7"), ("value = 15.3e-6", "value = 1e-9"), ("value = 0.004", "value = 0.001"),
+         ("value = 5.5e-6", "value = 5e-7"), ("value = 15.3e-6", "value = 1e-9"), ("value = 0.004", "value = 0.0024"),
          ("value = 1.53", "value = 1.32"), ("value = 0.08", "value = 0.022"), ("speed = { value = 2500", "speed = { value = 8000"),
          ("value = 5000", "value = 10000"), ("value = 2.75", "value = 1.98"))
 
