@@ -550,7 +550,7 @@ def _warn_numbers(d: Design) -> None:
             d.warnings.append(f"{parameter} = {d.choices[parameter].text} is rounded by {item.error_percent:+.2f} % ({name} = {item.q_value}): "
                               f"{ROUNDING_REMEDY[parameter]}")
     fast = d.constant("svm.turn_q13").value / (2.0 * d.value("NORM_CURRENT_CONST"))
-    slow = fast * d.value("NOMINAL_SPEED_RPM") / d.value("MAXIMUM_SPEED_RPM")
+    slow = fast * d.constant("estimator.nominal_erpm").value / d.value("MAXIMUM_SPEED_RPM")
     for name, wanted, limit in (("D_ILIMIT_LS", 8.0 * slow, 16383.0), ("D_ILIMIT_HS", fast, 4095.0)):
         if wanted > 1.02 * limit:
             d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "

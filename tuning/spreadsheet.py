@@ -87,8 +87,8 @@ CONSTANTS = {
         ("NORM_DELTAT", "LOOPTIME_SEC/60*2147483648", "Q15 of a turn/erpm", "Equation 1")),
     "Derivative limits: a sine of the largest current, 2 pi (n/60) P Ts Imax": (
         ("estimator.d_ilimit_hs_q14", f"MIN(2*PI()*MAXIMUM_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC*{LARGEST_CURRENT}/2,4095)", "Q14 A", "in a period"),
-        ("estimator.d_ilimit_ls_q14", f"MIN(8*2*PI()*NOMINAL_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC*{LARGEST_CURRENT}/2,16383)", "Q14 A",
-         "in eight periods")),
+        ("estimator.d_ilimit_ls_q14", f"MIN(8*2*PI()*MIN(NOMINAL_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC,0.12/8)*{LARGEST_CURRENT}/2,16383)", "Q14 A",
+         "in eight periods, of 0.12 turns at most")),
     "Speeds": tuple((field, f"{name}*NOPOLESPAIRS{part}", "erpm", meaning) for field, name, part, meaning in (
         ("minimum_erpm", "MINIMUM_SPEED_RPM", "", "potentiometer at zero"),
         ("nominal_erpm", "NOMINAL_SPEED_RPM", "", "potentiometer at full scale, S3 off"),

@@ -5,7 +5,7 @@
 #include "drive/modes/modes.h"
 #include "drive/state.h"
 
-#define HANDOVER_FALL_SHIFT 6       /**< the current that has brought the rotor up falls by 1/64 a step */
+#define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 a step */
 #define HANDOVER_FLOOR_SHIFT 3      /**< to an eighth at least */
 #define HANDOVER_MOST_OFFSET 0x2000 /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 

@@ -19,7 +19,7 @@ void test_stops_in_order_from_every_speed(void)
         }
         TEST_ASSERT_EQUAL_INT_MESSAGE(FAULT_NONE, board_drive.fault, vb_fault_name((int)board_drive.fault));
         TEST_ASSERT_EQUAL_INT(DRIVE_STOPPED, board_drive.state);
-        TEST_ASSERT_TRUE(get("state.speed_rpm") < MINIMUM_SPEED_RPM * 1.1); /* slow enough to let go */
+        TEST_ASSERT_TRUE(get("state.speed_rpm") < MINIMUM_SPEED_RPM * 1.6); /* slow enough to let go: the reference is below the minimum, the rotor near it */
         assert_outputs_off();
         wait_s(0.3);
         TEST_ASSERT_TRUE(get("stat.bus_max_v") < 30.0);

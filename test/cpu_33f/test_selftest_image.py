@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import pathlib
 import re
 import shutil
 import subprocess
@@ -81,6 +82,12 @@ def finds(chip: PilBoard, test: str, most_ms: float) -> float:
     pass_ms(chip, 1)
     assert chip.get("fw.fault") == SELFTEST and chip.get("pwm.outputs_on") == 0
     return ms
+
+
+def test_each_self_test_is_shown_to_fail_below() -> None:
+    """Also without the compiler: CPU by its function alone, the others by their code."""
+    text = pathlib.Path(__file__).read_text(encoding="utf-8")
+    assert {name for name in TESTS if f'"{name}"' not in text} == {"CPU"} and len(TESTS) == 10 and 'symbols["_board_cpu_test"]' in text
 
 
 def test_a_healthy_chip_passes_all_of_them_and_the_core_meets_nothing_wrong(elf: program.Elf, board: PilBoard) -> None:

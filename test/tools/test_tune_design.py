@@ -55,7 +55,7 @@ REFUSED = {
     "friction that a shorter dead time shows": ({"coulomb_nm": 2.5e-4, "viscous_nms": 0.0}, ("without load the speed would wander", "dead_time of 1.1 us, or chokes of 1.4 mH")),
     "as much of viscous friction at half the rated speed": ({"coulomb_nm": 0.0, "viscous_nms": 2.5e-4 / (0.5 * 2500.0 * math.pi / 30.0)},
                                                             ("without load the speed would wander", "dead_time of 1.1 us, or chokes of 1.4 mH")),
-    "friction that is enough for a quicker motor": ({"coulomb_nm": 8e-4, "viscous_nms": 0.0, "rated_speed_rpm": 600.0}, ("without load the speed would wander",)),
+    "friction that is enough for a quicker motor": ({"coulomb_nm": 8e-4, "viscous_nms": 0.0, "rated_speed_rpm": 450.0}, ("without load the speed would wander",)),
     "a range so wide that a step of the converter shakes the rotor": ({"rated_speed_rpm": 500.0, "coulomb_nm": 5e-3, "board": {"current_full_scale_a": 24.0}},
                                                                       ("half a step of the converter, 0.023 A, turns the rotor", "a board with at most")),
     "inertia beyond the speed gain's format": ({"more": INERTIA % "5e-3"}, ("speed gain exceeds its Q format with 0.00501 kg m2",)),
@@ -92,9 +92,9 @@ WARNED = {
     "load observer that is quick by choice": ({"more": "[tune]\nLOAD_BANDWIDTH_HZ = 135\n"},
                                               ("LOAD_BANDWIDTH_HZ = 135: the speed loop has", "15 degrees and 4 dB are asked for; remove it from [tune]$")),
     "derivative limit that clips": (
-        {"pole_pairs": 9, "psi_vs": 7.983e-3 * 5 / 9, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2600.0, "board": {"pwm_period_s": 125e-6},
+        {"pole_pairs": 12, "psi_vs": 7.983e-3 * 5 / 12, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2660.0, "board": {"pwm_period_s": 125e-6},
          "inertia_kgm2": 2e-5},
-        ("D_ILIMIT_LS ends at",))}
+        ("D_ILIMIT_HS ends at",))}
 
 
 def test_remedies_for_a_speed_that_would_wander_are_enough_and_hardly_more():

@@ -91,7 +91,7 @@ void test_after_the_stated_number_the_fault_stays_and_the_first_cause_is_told(vo
         TEST_ASSERT_TRUE(ms_to_restart(5000) < 5000u);
         fault(later[n]);
     }
-    all_ms(20000);
+    all_ms(7000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
     TEST_ASSERT_EQUAL_UINT16(FAULT_START_FAILED, drive.fault);
     TEST_ASSERT_EQUAL_UINT16(0, retry.left);
@@ -131,7 +131,7 @@ void test_a_staying_fault_after_a_passing_one_ends_it(void)
     fault(FAULT_STALL);
     (void)ms_to_restart(5000);
     fault(FAULT_OVERCURRENT_HW);
-    all_ms(20000);
+    all_ms(7000);
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, drive.fault);
     TEST_ASSERT_EQUAL_UINT16(2, retry.left);
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, retry.first);
@@ -146,7 +146,7 @@ void test_s2_in_the_pause_ends_it_and_gives_the_retries_back(void)
     all_ms(1000);
     press();
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
-    all_ms(20000);
+    all_ms(7000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
     TEST_ASSERT_EQUAL_UINT16(3, retry.left);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, retry.first);
@@ -189,7 +189,7 @@ void test_a_fault_at_rest_starts_nothing(void)
 {
     all_ms(100);
     fault(FAULT_OVERVOLTAGE);
-    all_ms(20000);
+    all_ms(7000);
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, drive.fault);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, retry.first);
 }
@@ -200,7 +200,7 @@ void test_a_fault_that_somebody_else_clears_is_not_tried_again(void)
     fault(FAULT_STALL);
     all_ms(100);
     drive.command.clear_fault = 1;
-    all_ms(20000);
+    all_ms(7000);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
 }
 
@@ -208,7 +208,7 @@ void test_a_voltage_that_stays_wrong_uses_up_the_retries(void)
 {
     run();
     rig_bus(PARAM_F(OVER_VOLTAGE_V) + 1.0F);
-    all_ms(20000);
+    all_ms(7000);
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, drive.fault);
     TEST_ASSERT_EQUAL_UINT16(0, retry.left);
 }
@@ -219,7 +219,7 @@ void test_the_time_without_a_fault_gives_the_retries_back_in_closed_loop_only(vo
     run();
     fault(FAULT_STALL);
     (void)ms_to_restart(5000);
-    retry_tick(&retry, &the_panel, &drive, 20000); /* the start is no proof */
+    retry_tick(&retry, &the_panel, &drive, 7000); /* the start is no proof */
     TEST_ASSERT_EQUAL_UINT16(2, retry.left);
     drive.state = (uint16_t)DRIVE_CLOSED;
     for (ms = 0; ms < 9999u; ms++) {

@@ -40,6 +40,7 @@
     X(iq_ref, "fw.iq_ref_a", "A", "q current reference", CURRENT_A(d->run.control.ref_q13.q)) \
     X(iq_limit, "fw.iq_limit_a", "A", "q current limit", CURRENT_A(d->run.control.iq_limit_q13)) \
     X(id_trim, "fw.id_trim_a", "A", "d current of the voltage feedback", CURRENT_A(d->run.fieldweak.trim_q13)) \
+    X(iq_trim, "fw.iq_trim_a", "A", "q current of the slow trim of the speed", CURRENT_A((double)d->run.control.iq_trim_q26 / 8192.0)) \
     X(brake_limit, "fw.brake_limit_a", "A", "limit of the braking current", CURRENT_A(d->run.control.brake_limit_q13)) \
     X(v_d, "fw.v_d_v", "V", "commanded d voltage", VOLTAGE_V(d->run.control.v_q14.d)) \
     X(v_q, "fw.v_q_v", "V", "commanded q voltage", VOLTAGE_V(d->run.control.v_q14.q)) \
