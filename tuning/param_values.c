@@ -166,7 +166,10 @@ static void limits(void)
     FIELD(lost_lock_steps, 0.05, "s", slots, "8 periods", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "8 periods", "voltages and currents do not fit the motor");
     FIELD(impossible_steps, 0.25, "s", slots, "8 periods", "flux or resistance impossible");
-    FIELD(kfi_impossible, -0.25, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
+    FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
+    FIELD(rs_off_least, PARAM_R_LEAST - 1.0, "1", 1.0 / 32768.0, "Q15", "so far may R be off");
+    FIELD(rs_off_most, PARAM_R_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "upwards");
+    FIELD(ls_off, PARAM_L_OFF, "1", 1.0 / 32768.0, "Q15", "and L");
 }
 
 static void modulator(void)

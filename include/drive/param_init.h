@@ -131,7 +131,10 @@
         .pot_scale_q15 = (uint16_t)(32768.0F / (1.0F - 2.0F * PARAM_F(POT_LIVE_ZERO)) + 0.5F), \
         .wrong_steps = PARAM_SLOW_STEPS(0.1F), \
         .impossible_steps = PARAM_SLOW_STEPS(0.25F), \
-        .kfi_impossible = Q15(-0.25), \
+        .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
+        .rs_off_least = Q15(PARAM_R_LEAST - 1.0), \
+        .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
+        .ls_off = Q15(PARAM_L_OFF), \
         .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 1.25F, 32700.0F)) \
     }
 

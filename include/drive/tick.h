@@ -91,6 +91,9 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 3:
         bus_update_voltage_limit(d, p);
+        if (drive_is_closed(d)) {
+            protection_check_model(d, p);
+        }
         done = 3;
         break;
     case 4:
@@ -111,7 +114,6 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 6:
         if (drive_is_closed(d)) {
-            protection_check_model(d, p);
             handover_decay(d);
             limits_braking(run, p, qm_hi(d->bus_q31));
         }

@@ -35,6 +35,14 @@ def test_each_deviation_alone_and_every_corner_are_promised_and_a_cold_and_a_hot
     assert min(degc) < 0.0 and max(degc) > 80.0
 
 
+def test_the_protections_allow_for_what_is_promised():
+    """Where voltages and currents ask for an impossible flux, the header may be as wrong as this table promises."""
+    text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
+    r_least, r_most, l_off, flux_most = (float(re.search(rf"#define PARAM_{name} ([0-9.]+)", text)[1]) for name in ("R_LEAST", "R_MOST", "L_OFF", "FLUX_MOST"))
+    assert [r_least, r_most] == TABLE.promised["R"] and [1.0 - l_off, 1.0 + l_off] == TABLE.promised["L"]
+    assert TABLE.promised["Kphi"][1] < flux_most < 1.1 * TABLE.promised["Kphi"][1]
+
+
 def test_the_plant_of_a_job_is_changed_and_its_header_is_not():
     library, motor = Library(LIBRARY), motor_file.load(HURST)
     bench = Bench(TABLE, motor, motor_file.part(HURST), board_file.part("mclv"), library)

@@ -46,12 +46,12 @@ def variables(library: Library) -> list[Variable]:
 
 
 def _symbols(*files: str) -> list[tuple[str, int, int]]:
-    """Name, size and address of what can be written."""
-    done = subprocess.run(["nm", "-S", "--defined-only", *files], cwd=paths.ROOT, capture_output=True, text=True, check=False)
+    """Name, size and address of what can be written; .data.rel.ro are constants with addresses in them, flash on the chip."""
+    done = subprocess.run(["nm", "-S", "-f", "sysv", "--defined-only", *files], cwd=paths.ROOT, capture_output=True, text=True, check=False)
     if done.returncode:
         raise UserError("nm cannot list the firmware's variables", files[0], (done.stderr.splitlines() or ["install binutils"])[0])
-    rows = re.findall(r"^([0-9a-f]+) ([0-9a-f]+) [bBdD] (\S+)$", done.stdout, re.MULTILINE)
-    return [(name, int(size, 16), int(at, 16)) for at, size, name in rows]
+    rows = re.findall(r"^(\S+) *\|([0-9a-f]+)\| *[bBdD] *\|[^|]*\|([0-9a-f]+)\|[^|]*\|\.(?!data\.rel\.ro)", done.stdout, re.MULTILINE)
+    return [(name, int(size, 16), int(at, 16)) for name, at, size in rows]
 
 
 @functools.cache
