@@ -244,7 +244,11 @@
  *   lost_lock_steps                      0.05 s                 125  8 periods                      exact  lost lock
  *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
  *   impossible_steps                     0.25 s                 625  8 periods                      exact  flux or resistance impossible
- *   kfi_impossible                      -0.25 1               -8192  Q15                            exact  change of 1/Kphi that no magnet gives
+ *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
+ *   rs_off_least                         -0.3 1               -9830  Q15                         -0.004 %  so far may R be off
+ *   rs_off_most                           0.5 1               16384  Q15                            exact  upwards
+ *   ls_off                                0.3 1                9830  Q15                         -0.004 %  and L
+ *   dead_emf_q12                         1.92 V                 591  Q12 V                       -0.035 %  what dead time may put into the back-EMF
  *
  * modulator and bus
  *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %

@@ -43,7 +43,7 @@ typedef struct {
     int32_t load_q16;      /**< acceleration that the load takes, units with 16 fraction bits */
     uint32_t rho_q32;      /**< the estimator's angle a step ago */
     int16_t rate_q16;      /**< rate * step in use */
-    int16_t wrong_erpm;    /**< larger innovations are none of a motor without load, whose dead time disturbs most */
+    int16_t wrong_erpm;    /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
     int16_t large_erpm;    /**< a large innovation begins here */
     q15_t quick_q15;       /**< 1 = a large innovation was just seen */
     uint16_t wrong_steps;  /**< steps with an innovation above wrong_erpm, less those without */
@@ -112,7 +112,7 @@ QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
 /** The rate for the next step. @param ref_erpm speed reference, any */
 QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm)
 {
-    int16_t speed = qm_abs(ref_erpm), load = (int16_t)(qm_abs(qm_hi(o->load_q16)) - p->load_from), rate;
+    int16_t speed = qm_abs(ref_erpm), load = (int16_t)(qm_abs(qm_hi(o->load_q16)) - p->load_from), rate, wrong;
     q15_t loaded = (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
 
     o->share_q15 = 32767;
@@ -124,7 +124,9 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
     o->share_q15 = observer_between(o->share_q15, (int16_t)(o->share_q15 < 16384 ? 2 * o->share_q15 : 32767), loaded);
     rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
     o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
-    o->wrong_erpm = (int16_t)(p->large_erpm + (speed >> 5));
+    /* without load dead time may make a light rotor hunt for long: twice as much is not wrong then */
+    wrong = qm_clamp((int16_t)(p->large_erpm + (speed >> 5)), 0, 16383);
+    o->wrong_erpm = observer_between((int16_t)(2 * wrong), wrong, loaded);
     o->large_erpm = observer_large((int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5)), o->unrest_steps);
 }
 

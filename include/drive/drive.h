@@ -74,10 +74,11 @@ typedef struct {
     int32_t tuning_step_q16; /**< the same in TUNING */
     int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
     uint16_t stall_steps, lost_lock_steps;
-    uint16_t wrong_steps;      /**< voltages and currents do not fit the motor */
-    uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
-    q15_t kfi_impossible;      /**< change of 1/Kphi that asks for more flux than the header's may be off */
+    uint16_t wrong_steps;                    /**< voltages and currents do not fit the motor */
+    uint16_t impossible_steps;               /**< flux or resistance beyond what a motor can have */
+    q15_t kfi_impossible;                    /**< change of 1/Kphi that asks for more flux than the header's may be off */
     q15_t rs_off_least, rs_off_most, ls_off; /**< and how far its R and L may be */
+    int16_t dead_emf_q12;                    /**< what dead time may put into the back-EMF at most: by its compensation, and without it */
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
 

@@ -63,13 +63,13 @@ QM_INLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 
 #define PROTECTION_TURN_SHIFT 4 /* the angle step of a period to that of eight: ls_q16 is L of eight samples */
 
-/** 1 where no flux within the header's tolerances explains the q back-EMF: what R and L within theirs may put into it is taken off first.
+/** 1 where no flux within the header's tolerances explains the q back-EMF: what dead time, and R and L within theirs, may put into it is taken off first.
  *  With E = Eq as the model sees it, k the change of 1/Kphi and F the most flux: E - (R's part) - (L's part) > F E (1 + k), here divided by F,
  *  with a fifth more of the two parts. Where the motor brakes R i lowers the voltage, and the least R counts. */
 QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
-    int16_t e_q12 = qm_abs(emf.q), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
+    int16_t e_q12 = qm_clamp(qm_sub_limited(qm_abs(emf.q), p->dead_emf_q12), 0, 32767), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
     int16_t r_more = (int16_t)(((i.q ^ emf.q) >= 0) ? p->rs_off_most - rs : rs - p->rs_off_least);
     int16_t ri_q12 = (int16_t)(qm_mulhi_su(qm_abs(i.q), p->adaptation.rs_base_q16) * (1 << p->estimator.rs_exp));
     uint16_t turned_q13 = (uint16_t)((uint16_t)qm_abs(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);

@@ -261,7 +261,7 @@ void test_phase_currents_are_summed_anew_when_the_innovations_have_ended(void)
 
 #define EMF_Q12 4000
 
-/** Steps until a fault at this back-EMF with these changes of 1/Kphi and R, and header's R i_q and w L i_d in shares of it. */
+/** Steps until a fault at this back-EMF, and what dead time may put into it, with these changes of 1/Kphi and R, and header's R i_q and w L i_d in shares of it. */
 static uint16_t impossible_until_fault(float kfi, float rs, float ri, float li, uint16_t most)
 {
     enum { HALF_STEP = 2000 }; /* 0.06 rad a period */
@@ -269,7 +269,7 @@ static uint16_t impossible_until_fault(float kfi, float rs, float ri, float li, 
     rig_closed(1, 10000);
     drive.run.adaptation.kfi_q31 = (int32_t)(kfi * 2147483647.0);
     drive.run.adaptation.rs_q31 = (int32_t)(rs * 2147483647.0);
-    drive.run.estimator.e_q_q28 = EMF_Q12 * 65536;
+    drive.run.estimator.e_q_q28 = (EMF_Q12 + params.dead_emf_q12) * 65536L;
     drive.run.estimator.half_step_q16_rad = HALF_STEP;
     drive.run.model.ls_q16 = params.fieldweak.ls_base_q16;
     drive.run.control.i_q13.q = (int16_t)(ri * EMF_Q12 * 65536.0F / (float)params.adaptation.rs_base_q16 / (float)(1 << params.estimator.rs_exp));
@@ -307,6 +307,18 @@ void test_flux_is_impossible_where_no_R_and_L_within_the_headers_tolerance_expla
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault ? 626 : 1000, steps, cases[n].what); /* 250 ms */
         drive.fault = (uint16_t)FAULT_NONE;
     }
+}
+
+void test_no_flux_is_impossible_within_what_dead_time_puts_into_the_back_emf(void)
+{
+    (void)impossible_until_fault(-0.5F, 0.0F, 0.0F, 0.0F, 1);
+    drive.run.estimator.e_q_q28 = (int32_t)params.dead_emf_q12 * 65536;
+    TEST_ASSERT_EQUAL_UINT16(0, protection_flux_is_impossible(&drive.run, &params));
+    drive.run.estimator.e_q_q28 = (params.dead_emf_q12 + 10) * 65536L;
+    TEST_ASSERT_EQUAL_UINT16(1, protection_flux_is_impossible(&drive.run, &params));
+    drive.run.adaptation.kfi_q31 = INT32_C(0x40000000); /* less flux than the header's, and next to no back-EMF */
+    drive.run.estimator.e_q_q28 = 0;
+    TEST_ASSERT_EQUAL_UINT16(0, protection_flux_is_impossible(&drive.run, &params));
 }
 
 void test_flux_is_impossible_in_both_directions(void)

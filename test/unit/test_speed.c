@@ -106,13 +106,19 @@ void test_steps_hand_on_what_is_below_a_count_and_never_pass_the_limit(void)
 
 /* ---- the trim ---- */
 
-/** Trim after so many steps with this estimated speed, in whole counts; reference, observer and load rest at 10000. */
-static int16_t trim_after(uint16_t steps, int16_t estimated_erpm)
+static void turn_at(int16_t observed_erpm, int16_t estimated_erpm)
+{
+    drive.run.observer.omega_q16 = observed_erpm * 65536L;
+    drive.run.estimator.omega_filtered_q16 = estimated_erpm * 65536L;
+}
+
+/** Trim after so many steps with this observed speed and an estimated one that is so much higher, in whole counts; the reference rests at 10000. */
+static int16_t trim_after(uint16_t steps, int16_t observed_erpm, int16_t ahead_erpm)
 {
     drive.run.control.speed_kp_q13 = 8192; /* a count an erpm */
     drive.run.control.vq_limit_q14 = 30000;
     while (steps-- != 0u) {
-        drive.run.estimator.omega_filtered_q16 = estimated_erpm * 65536L;
+        turn_at(observed_erpm, (int16_t)(observed_erpm + ahead_erpm));
         speed_trim(&drive.run, &params, drive.run.control.reference_erpm, 0);
     }
     return (int16_t)(drive.run.control.iq_trim_q26 / 8192);
@@ -122,10 +128,20 @@ void test_trim_takes_up_what_the_speed_lacks_at_rest_and_ends_at_an_eighth_of_th
 {
     EACH_DIRECTION(sign) {
         rig_closed(1, 10000);
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after(1024, (int16_t)(10000 - sign * 100))); /* 1/1024 a step */
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 200), trim_after(1024, (int16_t)(10000 - sign * 100)));
-        TEST_ASSERT_EQUAL_INT16(sign * 640, trim_after(20000, (int16_t)(10000 - sign * 1000)));
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 540), trim_after(1024, (int16_t)(10000 + sign * 100)));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after(512, (int16_t)(10000 - sign * 100), 0)); /* 1/512 a step */
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 200), trim_after(512, (int16_t)(10000 - sign * 100), (int16_t)(sign * 7)));
+        TEST_ASSERT_EQUAL_INT16(sign * 640, trim_after(20000, (int16_t)(10000 - sign * 1000), 0));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 540), trim_after(512, (int16_t)(10000 + sign * 100), 0));
+    }
+}
+
+void test_trim_waits_while_the_load_s_estimate_moves_against_the_error(void)
+{
+    EACH_DIRECTION(sign) {
+        rig_closed(1, 10000);
+        TEST_ASSERT_EQUAL_INT16(0, trim_after(2000, (int16_t)(10000 - sign * 100), (int16_t)-sign));
+        TEST_ASSERT_TRUE(sign * trim_after(512, (int16_t)(10000 - sign * 100), (int16_t)sign) > 90);
+        TEST_ASSERT_TRUE(sign * trim_after(512, (int16_t)(10000 - sign * 100), (int16_t)-sign) > 90); /* it is kept */
     }
 }
 
@@ -142,7 +158,7 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
 {
     static const struct {
         const char *what;
-        int16_t before_erpm, estimated_erpm, iq_q13;
+        int16_t before_erpm, observed_erpm, iq_q13;
         q15_t quick;
         int16_t v_q_q14;
     } cases[] = {
@@ -152,7 +168,7 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
     };
     EACH(n, cases) {
         rig_closed(1, 10000);
-        drive.run.estimator.omega_filtered_q16 = cases[n].estimated_erpm * 65536L;
+        turn_at(cases[n].observed_erpm, cases[n].observed_erpm);
         drive.run.control.iq_limit_q13 = 5120;
         drive.run.control.iq_trim_q26 = 256L * 8192;
         drive.run.observer.quick_q15 = cases[n].quick;
