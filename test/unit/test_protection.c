@@ -340,54 +340,54 @@ static int16_t probe(uint16_t count, int16_t d_q12, int16_t q_q12)
     return most;
 }
 
-/** Closed loop at the reference with a q current whose R i is that share of a back-EMF of 4000. */
+/** Closed loop at the reference with a q current whose R i is that share of a back-EMF of 400. */
 static void loaded(float ri)
 {
     rig_closed(1, 10000);
-    drive.run.control.i_q13.q = current_of_ri(ri);
+    drive.run.control.i_q13.q = current_of_ri(0.1F * ri);
     drive.run.control.ref_q13.q = drive.run.control.i_q13.q;
 }
 
 void test_rotor_is_probed_where_half_more_resistance_and_dead_time_would_explain_the_back_emf(void)
 {
-    const float dead = (float)params.adaptation.emf_least_q12 / 4000.0F;
+    const float dead = (float)params.adaptation.emf_least_q12 / 400.0F;
     loaded(2.0F * (1.0F - dead) - 0.02F);
-    TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 4000));
+    TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 400));
     loaded(2.0F * (1.0F - dead) + 0.02F);
-    TEST_ASSERT_EQUAL_INT16(0, probe(50, 0, 4000)); /* it seems to turn for 20 ms */
-    TEST_ASSERT_EQUAL_INT16(drive.run.control.ref_q13.q, probe(60, 0, 4000));
-    TEST_ASSERT_EQUAL_INT16(0, (probe(80, 0, 4000), drive.run.probe_id_q13)); /* 40 ms and the slope */
+    TEST_ASSERT_EQUAL_INT16(0, probe(50, 0, 400)); /* it seems to turn for 20 ms */
+    TEST_ASSERT_EQUAL_INT16(drive.run.control.ref_q13.q, probe(60, 0, 400));
+    TEST_ASSERT_EQUAL_INT16(0, (probe(80, 0, 400), drive.run.probe_id_q13)); /* 40 ms and the slope */
     loaded(2.2F);
     drive.run.adaptation.rs_q31 = INT32_MAX / 5; /* known: a fifth more */
-    TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 4000));
+    TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 400));
     loaded(2.2F);
     drive.run.handover.id_q13 = 100; /* the hand-over's d current would do the same */
-    TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 4000));
+    TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 400));
 }
 
 void test_probe_of_a_standing_rotor_stays_until_the_stall_and_that_of_a_turning_one_ends(void)
 {
     loaded(2.2F);
-    (void)probe(60, 0, 4000);
+    (void)probe(60, 0, 400);
     rig_speed(1000);
-    TEST_ASSERT_GREATER_THAN_INT16(0, (probe(800, 300, 1000), drive.run.probe_id_q13)); /* E has the current's direction */
+    TEST_ASSERT_GREATER_THAN_INT16(0, (probe(800, 30, 100), drive.run.probe_id_q13)); /* E has the current's direction */
     loaded(2.2F);
-    (void)probe(60, 0, 4000);
+    (void)probe(60, 0, 400);
     rig_speed(1000);
-    TEST_ASSERT_EQUAL_INT16(0, (probe(200, 200, 1000), drive.run.probe_id_q13)); /* slow, but it turns */
+    TEST_ASSERT_EQUAL_INT16(0, (probe(200, 20, 100), drive.run.probe_id_q13)); /* slow, but it turns */
 }
 
 void test_probe_comes_again_after_five_seconds_or_a_dip_of_10_ms(void)
 {
     loaded(2.2F);
-    (void)probe(200, 0, 4000);
-    TEST_ASSERT_EQUAL_INT16(0, probe(12300, 0, 4000));
-    TEST_ASSERT_GREATER_THAN_INT16(0, probe(200, 0, 4000));
+    (void)probe(200, 0, 400);
+    TEST_ASSERT_EQUAL_INT16(0, probe(12300, 0, 400));
+    TEST_ASSERT_GREATER_THAN_INT16(0, probe(200, 0, 400));
     rig_speed(7400);
-    TEST_ASSERT_EQUAL_INT16(0, (probe(24, 0, 4000), rig_speed(10000), probe(1000, 0, 4000)));
+    TEST_ASSERT_EQUAL_INT16(0, (probe(24, 0, 400), rig_speed(10000), probe(1000, 0, 400)));
     rig_speed(7400);
-    (void)probe(26, 0, 4000);
-    TEST_ASSERT_GREATER_THAN_INT16(0, probe(100, 0, 4000));
+    (void)probe(26, 0, 400);
+    TEST_ASSERT_GREATER_THAN_INT16(0, probe(100, 0, 400));
 }
 
 void test_probe_leaves_the_q_current_that_flows_but_for_a_tenth(void)
