@@ -162,7 +162,7 @@ static void limits(void)
     FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
-    FIELD(stall_steps, 0.3, "s", slots, "8 periods", "stall");
+    FIELD(stall_steps, PARAM_STALL_SEC, "s", slots, "8 periods", "stall");
     FIELD(lost_lock_steps, 0.05, "s", slots, "8 periods", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "8 periods", "voltages and currents do not fit the motor");
     FIELD(impossible_steps, 0.25, "s", slots, "8 periods", "flux or resistance impossible");

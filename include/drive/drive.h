@@ -137,10 +137,13 @@ typedef struct {
     observer_t observer;
     handover_t handover;
     drive_control_t control;
-    uint16_t stall_steps;      /**< how long the stall has lasted, slow steps */
-    uint16_t phase_sums[3];    /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
-    uint16_t impossible_steps; /**< how long flux or resistance has been impossible */
-    uint16_t lost_lock_steps;  /**< two for each slow step out of lock, less one for each in lock */
+    uint16_t stall_steps;                       /**< slow steps below half the reference, less four for each above */
+    uint16_t probe_steps;                       /**< of the probe whether the rotor turns, and of the pause after it */
+    uint16_t dip_steps;                         /**< how long the speed has been a quarter below the reference */
+    current_q13_t probe_id_q13, probe_most_q13; /**< its d current, and the most of it */
+    uint16_t phase_sums[3];                     /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
+    uint16_t impossible_steps;                  /**< how long flux or resistance has been impossible */
+    uint16_t lost_lock_steps;                   /**< two for each slow step out of lock, less one for each in lock */
     MODE_STATE
 } drive_run_t;
 

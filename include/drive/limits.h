@@ -23,7 +23,7 @@ QM_INLINE current_q13_t limits_asked_most(const drive_params_t *p)
     return (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
 }
 
-/** d current: what is left of the hand-over, the table and its trim; the q current gets the rest of the circle. */
+/** d current: what is left of the hand-over, the table and its trim, the rotor's probe; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
@@ -31,7 +31,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     uint32_t ratio;
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
-    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13), (int16_t)-id_max, id_max);
+    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13 + run->probe_id_q13), (int16_t)-id_max, id_max);
     ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
 }

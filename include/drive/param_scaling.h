@@ -195,6 +195,8 @@
 #define PARAM_L_OFF 0.3      /* of the header's, to either side */
 #define PARAM_FLUX_MOST 1.25 /* 1.2, and what dead time leaves */
 
+#define PARAM_STALL_SEC 0.23 /* below half the reference; until a standing rotor shows takes up to 0.08 s more */
+
 /** TUNING's ramp: Q16 electrical rpm per slow step. */
 #define TUNING_STEP_Q16 (PARAM_ROUND(8.0F * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 

@@ -41,12 +41,33 @@ QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
     return (least < (most >> PROTECTION_OPEN_SHIFT)) ? FAULT_OPEN_PHASE : FAULT_CURRENT_SENSOR;
 }
 
-/** Innovations of the load observer that no load explains, for they do not end: the voltage equation does not hold with what is measured.
- *  Every eighth period in closed loop. */
-QM_INLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
+#define PROTECTION_DEAD_TIMES 5   /* emf_least_q12 is a fifth of what dead time takes */
+#define PROTECTION_UNEXPLAINED 2u /* as many wrong innovations */
+
+/** R of the header times a current, Q12. @param i_q13 not negative */
+QM_INLINE voltage_q12_t protection_ri(const drive_params_t *p, int16_t i_q13)
+{
+    return (int16_t)(qm_mulhi_su(i_q13, p->adaptation.rs_base_q16) * (1 << p->estimator.rs_exp));
+}
+
+/** 1 where neither a back-EMF in its direction nor R off by all of it nor dead time explains the voltage: one is commanded that drives no current. */
+QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, const drive_params_t *p)
+{
+    dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
+    int32_t explained_q12 = (int32_t)qm_abs(emf.q) + protection_ri(p, qm_abs(i.d)) + protection_ri(p, qm_abs(i.q))
+                            + PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12;
+    return (uint16_t)(qm_abs(emf.d) > explained_q12);
+}
+
+/** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
+ *  with what is measured. Every eighth period in closed loop. */
+NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     uint16_t a = (uint16_t)qm_abs(d->phases_q13.a), b = (uint16_t)qm_abs(d->phases_q13.b), c = (uint16_t)qm_abs(d->phases_q13.c);
+    if (protection_voltage_is_unexplained(run, p)) {
+        run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + PROTECTION_UNEXPLAINED);
+    }
     if (run->observer.wrong_steps == 0u) {
         run->phase_sums[0] = 0;
         run->phase_sums[1] = 0;
@@ -71,7 +92,7 @@ QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const d
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
     int16_t e_q12 = qm_clamp(qm_sub_limited(qm_abs(emf.q), p->dead_emf_q12), 0, 32767), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
     int16_t r_more = (int16_t)(((i.q ^ emf.q) >= 0) ? p->rs_off_most - rs : rs - p->rs_off_least);
-    int16_t ri_q12 = (int16_t)(qm_mulhi_su(qm_abs(i.q), p->adaptation.rs_base_q16) * (1 << p->estimator.rs_exp));
+    int16_t ri_q12 = protection_ri(p, qm_abs(i.q));
     uint16_t turned_q13 = (uint16_t)((uint16_t)qm_abs(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);
     int16_t li_q12 = (int16_t)((qm_muluu(turned_q13, run->model.ls_q16) >> 16) << p->estimator.ls_exp);
     return (uint16_t)(qm_mulss(e_q12, more) > qm_mulss(ri_q12, r_more) + qm_mulss(li_q12, p->ls_off));
@@ -79,7 +100,7 @@ QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const d
 
 /** What the motor has shown against the header must be possible: the flux within its tolerance, and a winding that has gained 60 % of its
  *  resistance is too hot. Every eighth period in closed loop. */
-QM_INLINE void protection_check_model(drive_t *d, const drive_params_t *p)
+NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     uint16_t strong = protection_flux_is_impossible(run, p);
@@ -90,19 +111,81 @@ QM_INLINE void protection_check_model(drive_t *d, const drive_params_t *p)
     }
 }
 
+#define STALL_FALL 4u /* steps that a fast one takes back */
+
+#define PROBE_WAIT_STEPS 50     /* the rotor seems to turn for 20 ms before a probe */
+#define PROBE_STEPS 100         /* a probe takes 40 ms: more than the estimator's filters at the lowest speed */
+#define PROBE_DIP_STEPS 25      /* or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long */
+#define PROBE_PAUSE_STEPS 12500 /* five seconds from one to the next */
+#define PROBE_SLOPE_SHIFT 5     /* the largest current takes 32 steps, so that the estimate does not jump */
+#define PROBE_MOST_Q15 22528    /* of the largest current, so that as much q current is left */
+#define PROBE_LEAST_Q15 14648   /* 1/sqrt(5): takes a tenth of the largest q current, and half of a standing rotor's estimate */
+
+/** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand, for a voltage in phase
+ *  with the current is both. */
+QM_INLINE uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
+{
+    int16_t r_more = (int16_t)(p->rs_off_most - qm_hi(run->adaptation.rs_q31));
+    int16_t less_q12 = (int16_t)(qm_abs(estimator_emf(&run->estimator).q) - p->adaptation.emf_least_q12);
+    return (uint16_t)(less_q12 <= qm_hi(2 * qm_mulss(protection_ri(p, qm_abs(run->control.i_q13.q)), r_more)));
+}
+
+/** The most d current of a probe: it leaves the q current that flows, but for a tenth of the largest. */
+QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p)
+{
+    uint32_t ratio = qm_muluu((uint16_t)qm_abs(run->control.ref_q13.q), p->current_max_reciprocal) >> 10;
+    int16_t rest = trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio));
+    return qm_hi(2 * qm_mulss(p->current_max_q13, qm_clamp(rest, PROBE_LEAST_Q15, PROBE_MOST_Q15)));
+}
+
+/** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
+QM_INLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
+{
+    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
+    return (least < standing) ? standing : least;
+}
+
+/** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to nothing and is
+ *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
+ *  again: soon after a dip of the speed.
+ *  Every eighth period in closed loop. */
+NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_abs(run->control.reference_erpm);
+    uint16_t doubtful = (uint16_t)(run->handover.id_q13 == 0 && protection_rotor_is_doubtful(run, p));
+    uint16_t seems_to_turn = (uint16_t)(along >= protection_least_speed(run, p));
+    dq_t emf = estimator_emf(&run->estimator);
+    uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2)), steps = run->probe_steps;
+    int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
+
+    if (steps < PROBE_WAIT_STEPS) {
+        steps = (uint16_t)((doubtful && seems_to_turn) ? steps + 1u : 0u);
+        run->probe_most_q13 = protection_probe_most(run, p);
+    } else if (steps < PROBE_WAIT_STEPS + PROBE_STEPS) {
+        id_q13 = qm_clamp(qm_abs(run->control.ref_q13.q), 0, run->probe_most_q13);
+        steps = (uint16_t)(doubtful ? steps + turns : PROBE_WAIT_STEPS + PROBE_STEPS);
+    } else {
+        run->dip_steps = (uint16_t)((along < reference - (reference >> 2)) ? run->dip_steps + 1u : 0u);
+        steps = (uint16_t)((steps < PROBE_PAUSE_STEPS && run->dip_steps < PROBE_DIP_STEPS) ? steps + 1u : 0u);
+    }
+    run->probe_steps = steps;
+    run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
+}
+
 /** Stall and lost lock: conditions that must not last. Every eighth period in closed loop. */
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    int16_t speed = qm_abs(estimator_speed(&run->estimator)), standing = (int16_t)(p->minimum_erpm >> 1);
-    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1);
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_abs(along), standing = (int16_t)(p->minimum_erpm >> 1);
     dq_t emf = estimator_emf(&run->estimator);
     uint16_t lost = (uint16_t)(speed >= standing && qm_abs(emf.d) > qm_abs(emf.q)); /* of a standing rotor its direction says nothing */
 
-    if (least < standing) {
-        least = standing;
+    if (along < protection_least_speed(run, p)) {
+        run->stall_steps++;
+    } else { /* of a rotor that only jerks the estimate is fast now and then */
+        run->stall_steps = (uint16_t)((run->stall_steps > STALL_FALL) ? run->stall_steps - STALL_FALL : 0u);
     }
-    run->stall_steps = (uint16_t)((speed < least) ? run->stall_steps + 1u : 0u);
     if (lost || speed > p->overspeed_erpm) {
         run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
     } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */

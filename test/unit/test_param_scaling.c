@@ -232,7 +232,7 @@ void test_speeds_and_times(void)
     EXACT((int32_t)p.align_sweep_q32, 0x40000000 / 2000); /* a quarter turn in half the time */
     EXACT(p.agree_steps, 50);                            /* 20 ms */
     EXACT(p.wait_steps, 500);                   /* 200 ms */
-    EXACT(p.stall_steps, 750);                           /* 0.3 s */
+    EXACT(p.stall_steps, 575);                           /* 0.23 s */
     EXACT(p.lost_lock_steps, 125);                       /* 50 ms */
 }
 
@@ -362,7 +362,7 @@ void test_loop_time_scales_every_time_and_duty(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     EXACT(p.bootstrap_periods, 100);
-    EXACT(p.stall_steps, 375);
+    EXACT(p.stall_steps, 288);
     EXACT(p.svm.full, 4000);
     EXACT(p.svm.dead_time, 80); /* the same 2 us */
     EXACT(p.svm.top, 3872);
