@@ -240,7 +240,7 @@
  *   bus_regen_q15                          27 V               16756  Q15 of full scale           -0.002 %  braking is reduced from here
  *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
- *   stall_steps                           0.3 s                 750  8 periods                      exact  stall
+ *   stall_steps                          0.23 s                 575  8 periods                      exact  stall
  *   lost_lock_steps                      0.05 s                 125  8 periods                      exact  lost lock
  *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
  *   impossible_steps                     0.25 s                 625  8 periods                      exact  flux or resistance impossible
