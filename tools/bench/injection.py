@@ -45,6 +45,8 @@ class Kind:
     """share of the cases in which it is over soon"""
     limits: bool = False
     weight: float = 1.0
+    unseen: Callable[[float, Rating], tuple[float, float]] = lambda size, rating: (1.0, 0.0)
+    """what no firmware can know of it: how many times as high the speed is, and how many rpm it is off; docs/campaign.md has the calculation"""
 
 
 def _side(low: float, high: float, both_signs: bool = False) -> Callable[[random.Random], tuple[float, str]]:
@@ -139,7 +141,7 @@ KINDS = (
     Kind("temperature", "warm magnets", ("OVERTEMPERATURE",), _size(0.8, 0.99), _sets("motor.psi_vs", "psi_vs"),
          over_s=(0.3, 1.0), limits=True),
     Kind("clock", "crystal off frequency", ("CLOCK", "INTERRUPT_RATE"), lambda r: (1.0 + _size(0.005, 0.3, True)(r)[0], ""),
-         _sets("cpu.crystal_hz", "crystal_hz")),
+         _sets("cpu.crystal_hz", "crystal_hz"), unseen=lambda size, rating: (size, 0.0)),
     Kind("interrupts", "some lost", ("INTERRUPT_RATE", "ADC_LOST", "ISR_OVERRUN"), _size(0.002, 0.6), _sets("fault.isr_lost_share"),
          passes=0.3, weight=2.0),
     Kind("interrupts", "all lost", ("INTERRUPT_RATE", "ADC_LOST"), _one_of(1.0), _sets("cpu.isr_dropped"), passes=0.3, weight=0.5),

@@ -174,7 +174,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         without = session.run()
     closed = tuple(number for number, name in bench.library.states.items() if name in ("CLOSED", "STOPPING"))
     limits = judge.Limits(injected_s, settled_s, motor_file.load(str(bench.motor.path)).rated_speed_rpm, rating.current_a, case.what.ends,
-                          bench.library.faults, closed, case.what.limits)
+                          bench.library.faults, closed, case.what.limits, case.what.unseen(case.size, rating))
     with_fault, target = result or (None, "")
     verdict = _ended(ending) if with_fault is None else judge.judge(with_fault.trace, without.trace, limits)
     return Trial(case, with_fault, without, injected_s, state, target, verdict)
