@@ -147,6 +147,37 @@ def test_too_little_speed_is_right_where_the_drive_names_the_limit_and_the_kind_
     assert verdict(allowed, **slow).outcome == judge.SILENT
 
 
+def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_its_own():
+    clock = replace(LIMITS, unseen=(1.1, 0.0))
+    assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE
+    for rpm in (1200.0, 900.0): # more than the clock is off, and to the other side
+        assert verdict(clock, plant__speed_rpm=after(0.6, rpm, 1000.0)).outcome == judge.SILENT
+    assert verdict(clock).outcome == judge.NO_EFFECT
+    assert verdict(clock, plant__speed_rpm=after(0.6, -1100.0, 1000.0)).why == "turns backwards"
+    assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0), plant__i_q=after(0.6, 8.0, 1.0)).outcome == judge.SILENT
+    more = replace(LIMITS, unseen=(1.0, 50.0))
+    assert verdict(more, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE # 56 + 50 rpm
+    assert verdict(more, plant__speed_rpm=after(0.6, 1110.0, 1000.0)).outcome == judge.SILENT
+
+
+def test_only_a_wrong_clock_has_a_bound_of_what_cannot_be_known():
+    rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6)
+    assert {name for name, kind in injection.BY_NAME.items() if kind.unseen(1.2, rating) != (1.0, 0.0)} == {"clock: crystal off frequency"}
+    assert injection.BY_NAME["clock: crystal off frequency"].unseen(1.2, rating) == (1.2, 0.0)
+
+
+def test_the_campaigns_header_is_the_tuners_with_a_potentiometer_that_has_live_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(campaign, "RESULTS", tmp_path / "results")
+    header = tmp_path / "motor"
+    header.mkdir()
+    (header / "userparams.h").write_text("#define OTHER 1\n#define POT_LIVE_ZERO 0.0 /* [1] */\n", encoding="utf-8")
+    copy = campaign.with_live_zero(header) / "userparams.h"
+    assert copy.read_text(encoding="utf-8") == "#define OTHER 1\n#define POT_LIVE_ZERO 0.05 /* [1] */\n"
+    (header / "userparams.h").write_text("#define OTHER 1\n", encoding="utf-8")
+    with pytest.raises(campaign.UserError, match="POT_LIVE_ZERO is missing"):
+        campaign.with_live_zero(header)
+
+
 def test_a_moment_of_more_current_is_allowed_and_more_than_a_moment_is_not():
     peak = lambda width_s: lambda time_s: np.where((time_s > 0.6) & (time_s < 0.6 + width_s), 8.0, 1.0) # noqa: E731
     assert verdict(plant__i_q=peak(0.004)).outcome == judge.RIDDEN

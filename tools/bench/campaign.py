@@ -100,14 +100,14 @@ def prepared(names: list[str]) -> dict[str, Bench]:
     result = {}
     for name in names:
         motor = motor_file.load(name, "--motor")
-        library = command_common.library_for([], None, _with_live_zero(command_common.tuned_header(motor.path, None)))
+        library = command_common.library_for([], None, with_live_zero(command_common.tuned_header(motor.path, None)))
         result[motor.name] = Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), library, memory.variables(library))
     if build.make("find-xc16", [], None).returncode == 0:
         result[injection.IMAGE] = _with_image()
     return result
 
 
-def _with_live_zero(header: Path) -> Path:
+def with_live_zero(header: Path) -> Path:
     """A copy of a header whose potentiometer has dead ends."""
     text, found = re.subn(r"(?m)^(#define POT_LIVE_ZERO +)\S+", rf"\g<1>{LIVE_ZERO}", (header / build.HEADER).read_text(encoding="utf-8"))
     if not found:
