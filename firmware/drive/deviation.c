@@ -5,7 +5,7 @@
 #include "drive/state.h"
 
 #define MEAN_SHIFT 9 /* 512 ms */
-#define ID_SHIFT 5   /* a 32nd of the largest current: no healthy sensor is so noisy */
+#define ID_SHIFT 4   /* a 16th of the largest current: dead time makes half of it in a winding of little inductance, noise less */
 #define MOST_TIMES 2 /* a deviation counts as twice its limit at most: then it may last 0.35 s */
 #define HELD_BACK ((uint16_t)LIMIT_VOLTAGE | (uint16_t)LIMIT_CURRENT | (uint16_t)LIMIT_BRAKE | (uint16_t)LIMIT_RAMP | (uint16_t)LIMIT_RAMP_WAITS \
                    | (uint16_t)LIMIT_SPEED_RANGE)

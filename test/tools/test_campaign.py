@@ -16,7 +16,7 @@ from support import FAULTS, LIBRARY, MOTORS, command, trace
 
 from tools.bench import campaign, injection, judge, memory, trial
 from tools.bench.board import Library
-from tools.common import board_file, motor_file
+from tools.common import board_file, motor_file, paths
 
 HURST = "hurst_dmb0224c10002"
 CASES = [injection.draw(1, number, list(MOTORS)) for number in range(1, 1001)]
@@ -160,10 +160,14 @@ def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_it
     assert verdict(more, plant__speed_rpm=after(0.6, 1110.0, 1000.0)).outcome == judge.SILENT
 
 
-def test_only_a_wrong_clock_has_a_bound_of_what_cannot_be_known():
-    rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6)
-    assert {name for name, kind in injection.BY_NAME.items() if kind.unseen(1.2, rating) != (1.0, 0.0)} == {"clock: crystal off frequency"}
-    assert injection.BY_NAME["clock: crystal off frequency"].unseen(1.2, rating) == (1.2, 0.0)
+def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_it(bench):
+    rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6, dead_rpm=trial.dead_rpm(bench.library.params))
+    assert rating.dead_rpm == pytest.approx(0.13 * 24.0 * 2.0 / 50.0 * 3.0 ** 0.5 * 1000.0 / 7.24, rel=1e-3)
+    unseen = {name: kind.unseen(1.2, rating) for name, kind in injection.BY_NAME.items() if kind.unseen(1.2, rating) != (1.0, 0.0)}
+    ripple = dict.fromkeys((f"sensors: current {name}" for name in ("offset", "offset drifts", "gain", "noise")), (1.0, 0.5 * np.pi * rating.dead_rpm))
+    assert unseen == ripple | {"clock: crystal off frequency": (1.2, 0.0)}
+    text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
+    assert f"#define PARAM_LARGE_ERPM ({trial.DEAD_SHARE}F * PARAM_DEAD_TIME_V" in text
 
 
 def test_the_campaigns_header_is_the_tuners_with_a_potentiometer_that_has_live_ends(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 A kind's size is a share of what the motor at hand is rated for; its keys are the virtual board's. `ends` are the faults of the drive that name
 it rightly: any of them, or riding through, is a good end."""
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,6 +28,8 @@ class Rating:
     rs_ohm: float
     psi_vs: float
     crystal_hz: float
+    dead_rpm: float = 0.0
+    """from which deviation of the speed on dead time cannot be behind it (PARAM_LARGE_ERPM)"""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,11 @@ def _sets(key: str, of: str = "") -> Callable[[float, str, Rating], Keys]:
     return lambda size, place, rating: {key.format(place): size * (getattr(rating, of) if of else 1.0)}
 
 
+def _as_dead_time(size: float, rating: Rating) -> tuple[float, float]:
+    """A ripple of the speed whose mean size is what dead time makes in a healthy motor."""
+    return 1.0, math.pi / 2.0 * rating.dead_rpm
+
+
 SENSOR = ("CURRENT_SENSOR", *OVERCURRENT, "OFFSET")
 BUS = ("BUS_SENSOR", "UNDERVOLTAGE", "OVERVOLTAGE")
 BRIDGE = ("OPEN_PHASE", *OVERCURRENT)
@@ -111,12 +119,13 @@ KINDS = (
     Kind("sensors", "current stuck at its value", SENSOR, _stuck(1.0), _sets("fault.i{}_stuck"), passes=0.2),
     Kind("sensors", "current reads zero", SENSOR, _stuck(4.0), _sets("fault.i{}_stuck"), passes=0.2),
     Kind("sensors", "current stuck at a rail", SENSOR, _stuck(2.0, 3.0), _sets("fault.i{}_stuck"), passes=0.2),
-    Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a")),
+    Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
+         unseen=_as_dead_time),
     Kind("sensors", "current offset drifts", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
-         over_s=(0.3, 1.0)),
+         over_s=(0.3, 1.0), unseen=_as_dead_time),
     Kind("sensors", "current gain", SENSOR, lambda r: (r.choice((r.uniform(0.0, 0.9), r.uniform(1.1, 2.5))), r.choice(SIDES)),
-         _sets("fault.i{}_gain")),
-    Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), _sets("fault.i{}_noise_a", "current_a")),
+         _sets("fault.i{}_gain"), unseen=_as_dead_time),
+    Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), _sets("fault.i{}_noise_a", "current_a"), unseen=_as_dead_time),
     Kind("sensors", "bus stuck at its value", ("BUS_SENSOR",), _one_of(1.0), _sets("fault.vbus_stuck"), weight=0.5),
     Kind("sensors", "bus stuck at a rail", BUS, _one_of(2.0, 3.0), _sets("fault.vbus_stuck")),
     Kind("sensors", "bus gain", BUS, lambda r: (r.choice((0.5, r.uniform(0.2, 0.95), r.uniform(1.05, 2.0))), ""),
