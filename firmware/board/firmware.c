@@ -8,6 +8,7 @@
 #include "board/selftest_run.h"
 #include "board/status.h"
 #include "board/watch.h"
+#include "drive/deviation.h"
 #include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
@@ -18,9 +19,10 @@ drive_t board_drive;
 panel_t board_panel;
 retry_t board_retry;
 
-static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
-static uint16_t supervised_tick;          /* drive ticks at the last check */
-static uint16_t silent_ms;                /* timer 1 milliseconds without a control interrupt */
+static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
+static uint16_t supervised_tick; /* drive ticks at the last check */
+static uint16_t silent_ms;       /* timer 1 milliseconds without a control interrupt */
+static deviation_t deviation;
 static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
 
 void firmware_trip(drive_fault_t fault)
@@ -129,6 +131,9 @@ void firmware_background(void)
         BOARD_LED_RUN = lights.led_run & 1u;
         selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
+        if (deviation_tick(&deviation, &board_drive, &board_params, LimitParm.now)) {
+            firmware_trip(FAULT_CURRENT_SENSOR);
+        }
         selftest_part(SELFTEST_PART_WATCH);
         status_tick(elapsed_ms);
         selftest_part(SELFTEST_PART_STATUS);

@@ -20,7 +20,7 @@
       "check the supply, its cable and current limit") \
     X(5, START_FAILED, FAULT_PASSES, "at the end of the ramp the estimator did not see the ramp's speed: shaft blocked or load too high", \
       "free the shaft; raise Q_CURRENT_REF_OPENLOOP or LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
-    X(6, STALL, FAULT_PASSES, "the estimated speed stayed below half the reference", \
+    X(6, STALL, FAULT_PASSES, "the estimated speed stayed below half the reference, or backwards; or a probe found the rotor standing", \
       "remove the overload; in field weakening see FdWeakParm.qIndex and raise that IDREF_SPEED entry") \
     X(7, LOST_LOCK, FAULT_PASSES, "the estimator's d-axis back-EMF exceeded the q-axis one, or its speed left the possible range", \
       "check MOTOR_KPHI_V_PER_KRPM, MOTOR_RS_OHM and MOTOR_LS_MH; accelerate more gently") \
@@ -36,9 +36,9 @@
       "read board_trap_intcon1, the copy of INTCON1 that says which trap it was") \
     X(13, WATCHDOG, FAULT_STAYS, "the watchdog reset the processor: the background or the control interrupt stood still", \
       "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it") \
-    X(14, CURRENT_SENSOR, FAULT_STAYS, "voltages and currents did not fit the turning motor for a tenth of a second: a current signal is wrong", \
+    X(14, CURRENT_SENSOR, FAULT_STAYS, "voltages and currents did not fit the motor for a tenth of a second, or speed or d current stayed off though no limit held them: a current signal is wrong", \
       "check AN0 and AN1, the shunts and their amplifiers; with the motor at rest both must read the middle; check MOTOR_LS_MH") \
-    X(15, BUS_SENSOR, FAULT_STAYS, "the voltage that the motor takes asks for a flux that no magnet has: the bus signal is wrong", \
+    X(15, BUS_SENSOR, FAULT_STAYS, "the voltage that the motor takes asks for more flux than R, L and Kphi within their tolerances explain: the bus signal is wrong", \
       "measure the bus and compare it with the drive's; check the divider, BUS_FULL_SCALE_V and MOTOR_KPHI_V_PER_KRPM") \
     X(16, OPEN_PHASE, FAULT_STAYS, "voltages and currents did not fit the motor, and one phase carried much less current than the others", \
       "check the motor's wires, the transistors of that phase and its current signal") \

@@ -16,7 +16,7 @@ from support import FAULTS, LIBRARY, MOTORS, command, trace
 
 from tools.bench import campaign, injection, judge, memory, trial
 from tools.bench.board import Library
-from tools.common import board_file, motor_file
+from tools.common import board_file, motor_file, paths
 
 HURST = "hurst_dmb0224c10002"
 CASES = [injection.draw(1, number, list(MOTORS)) for number in range(1, 1001)]
@@ -145,6 +145,41 @@ def test_too_little_speed_is_right_where_the_drive_names_the_limit_and_the_kind_
     assert verdict(LIMITS, fw__limits=1.0, **slow).outcome == judge.SILENT
     assert verdict(allowed, fw__limits=32.0, **slow).outcome == judge.SILENT # field weakening alone holds nothing back
     assert verdict(allowed, **slow).outcome == judge.SILENT
+
+
+def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_its_own():
+    clock = replace(LIMITS, unseen=(1.1, 0.0))
+    assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE
+    for rpm in (1200.0, 900.0): # more than the clock is off, and to the other side
+        assert verdict(clock, plant__speed_rpm=after(0.6, rpm, 1000.0)).outcome == judge.SILENT
+    assert verdict(clock).outcome == judge.NO_EFFECT
+    assert verdict(clock, plant__speed_rpm=after(0.6, -1100.0, 1000.0)).why == "turns backwards"
+    assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0), plant__i_q=after(0.6, 8.0, 1.0)).outcome == judge.SILENT
+    more = replace(LIMITS, unseen=(1.0, 50.0))
+    assert verdict(more, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE # 56 + 50 rpm
+    assert verdict(more, plant__speed_rpm=after(0.6, 1110.0, 1000.0)).outcome == judge.SILENT
+
+
+def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_it(bench):
+    rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6, dead_rpm=trial.dead_rpm(bench.library.params))
+    assert rating.dead_rpm == pytest.approx(0.13 * 24.0 * 2.0 / 50.0 * 3.0 ** 0.5 * 1000.0 / 7.24, rel=1e-3)
+    unseen = {name: kind.unseen(1.2, rating) for name, kind in injection.BY_NAME.items() if kind.unseen(1.2, rating) != (1.0, 0.0)}
+    ripple = dict.fromkeys((f"sensors: current {name}" for name in ("offset", "offset drifts", "gain", "noise")), (1.0, 0.5 * np.pi * rating.dead_rpm))
+    assert unseen == ripple | {"clock: crystal off frequency": (1.2, 0.0)}
+    text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
+    assert f"#define PARAM_LARGE_ERPM ({trial.DEAD_SHARE}F * PARAM_DEAD_TIME_V" in text
+
+
+def test_the_campaigns_header_is_the_tuners_with_a_potentiometer_that_has_live_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(campaign, "RESULTS", tmp_path / "results")
+    header = tmp_path / "motor"
+    header.mkdir()
+    (header / "userparams.h").write_text("#define OTHER 1\n#define POT_LIVE_ZERO 0.0 /* [1] */\n", encoding="utf-8")
+    copy = campaign.with_live_zero(header) / "userparams.h"
+    assert copy.read_text(encoding="utf-8") == "#define OTHER 1\n#define POT_LIVE_ZERO 0.05 /* [1] */\n"
+    (header / "userparams.h").write_text("#define OTHER 1\n", encoding="utf-8")
+    with pytest.raises(campaign.UserError, match="POT_LIVE_ZERO is missing"):
+        campaign.with_live_zero(header)
 
 
 def test_a_moment_of_more_current_is_allowed_and_more_than_a_moment_is_not():

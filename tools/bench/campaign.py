@@ -7,6 +7,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import shutil
 import statistics
 import zlib
@@ -32,6 +33,8 @@ BAD = (judge.SILENT, judge.VOID)
 WORST = 24
 """Cases whose curves the page has."""
 MOST_CASES = 1_000_000
+LIVE_ZERO = 0.05
+"""POT_LIVE_ZERO of all cases but those of the image."""
 
 
 def add_command(commands: Any) -> None:
@@ -92,15 +95,28 @@ def numbers_of(options: argparse.Namespace) -> list[int]:
 
 
 def prepared(names: list[str]) -> dict[str, Bench]:
-    """Every motor with the firmware of its own header, by name."""
+    """Every motor with the firmware of its own header, by name. The potentiometer has live ends: of one that goes from rail to rail no firmware can tell
+    a broken wire from a turned knob."""
     result = {}
     for name in names:
         motor = motor_file.load(name, "--motor")
-        library = command_common.library_for([], None, command_common.tuned_header(motor.path, None))
+        library = command_common.library_for([], None, with_live_zero(command_common.tuned_header(motor.path, None)))
         result[motor.name] = Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), library, memory.variables(library))
     if build.make("find-xc16", [], None).returncode == 0:
         result[injection.IMAGE] = _with_image()
     return result
+
+
+def with_live_zero(header: Path) -> Path:
+    """A copy of a header whose potentiometer has dead ends."""
+    text, found = re.subn(r"(?m)^(#define POT_LIVE_ZERO +)\S+", rf"\g<1>{LIVE_ZERO}", (header / build.HEADER).read_text(encoding="utf-8"))
+    if not found:
+        raise UserError("POT_LIVE_ZERO is missing", str(paths.shown(header / build.HEADER)), "write it anew with make tune")
+    copy = RESULTS / "headers" / header.name / build.HEADER
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    if not copy.is_file() or copy.read_text(encoding="utf-8") != text:
+        copy.write_text(text, encoding="utf-8")
+    return copy.parent
 
 
 def _with_image() -> Bench:

@@ -3,6 +3,7 @@
 A kind's size is a share of what the motor at hand is rated for; its keys are the virtual board's. `ends` are the faults of the drive that name
 it rightly: any of them, or riding through, is a good end."""
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,6 +28,8 @@ class Rating:
     rs_ohm: float
     psi_vs: float
     crystal_hz: float
+    dead_rpm: float = 0.0
+    """from which deviation of the speed on dead time cannot be behind it (PARAM_LARGE_ERPM)"""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Kind:
     """share of the cases in which it is over soon"""
     limits: bool = False
     weight: float = 1.0
+    unseen: Callable[[float, Rating], tuple[float, float]] = lambda size, rating: (1.0, 0.0)
+    """what no firmware can know of it: how many times as high the speed is, and how many rpm it is off; docs/campaign.md has the calculation"""
 
 
 def _side(low: float, high: float, both_signs: bool = False) -> Callable[[random.Random], tuple[float, str]]:
@@ -83,6 +88,11 @@ def _sets(key: str, of: str = "") -> Callable[[float, str, Rating], Keys]:
     return lambda size, place, rating: {key.format(place): size * (getattr(rating, of) if of else 1.0)}
 
 
+def _as_dead_time(size: float, rating: Rating) -> tuple[float, float]:
+    """A ripple of the speed whose mean size is what dead time makes in a healthy motor."""
+    return 1.0, math.pi / 2.0 * rating.dead_rpm
+
+
 SENSOR = ("CURRENT_SENSOR", *OVERCURRENT, "OFFSET")
 BUS = ("BUS_SENSOR", "UNDERVOLTAGE", "OVERVOLTAGE")
 BRIDGE = ("OPEN_PHASE", *OVERCURRENT)
@@ -109,12 +119,13 @@ KINDS = (
     Kind("sensors", "current stuck at its value", SENSOR, _stuck(1.0), _sets("fault.i{}_stuck"), passes=0.2),
     Kind("sensors", "current reads zero", SENSOR, _stuck(4.0), _sets("fault.i{}_stuck"), passes=0.2),
     Kind("sensors", "current stuck at a rail", SENSOR, _stuck(2.0, 3.0), _sets("fault.i{}_stuck"), passes=0.2),
-    Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a")),
+    Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
+         unseen=_as_dead_time),
     Kind("sensors", "current offset drifts", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
-         over_s=(0.3, 1.0)),
+         over_s=(0.3, 1.0), unseen=_as_dead_time),
     Kind("sensors", "current gain", SENSOR, lambda r: (r.choice((r.uniform(0.0, 0.9), r.uniform(1.1, 2.5))), r.choice(SIDES)),
-         _sets("fault.i{}_gain")),
-    Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), _sets("fault.i{}_noise_a", "current_a")),
+         _sets("fault.i{}_gain"), unseen=_as_dead_time),
+    Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), _sets("fault.i{}_noise_a", "current_a"), unseen=_as_dead_time),
     Kind("sensors", "bus stuck at its value", ("BUS_SENSOR",), _one_of(1.0), _sets("fault.vbus_stuck"), weight=0.5),
     Kind("sensors", "bus stuck at a rail", BUS, _one_of(2.0, 3.0), _sets("fault.vbus_stuck")),
     Kind("sensors", "bus gain", BUS, lambda r: (r.choice((0.5, r.uniform(0.2, 0.95), r.uniform(1.05, 2.0))), ""),
@@ -139,7 +150,7 @@ KINDS = (
     Kind("temperature", "warm magnets", ("OVERTEMPERATURE",), _size(0.8, 0.99), _sets("motor.psi_vs", "psi_vs"),
          over_s=(0.3, 1.0), limits=True),
     Kind("clock", "crystal off frequency", ("CLOCK", "INTERRUPT_RATE"), lambda r: (1.0 + _size(0.005, 0.3, True)(r)[0], ""),
-         _sets("cpu.crystal_hz", "crystal_hz")),
+         _sets("cpu.crystal_hz", "crystal_hz"), unseen=lambda size, rating: (size, 0.0)),
     Kind("interrupts", "some lost", ("INTERRUPT_RATE", "ADC_LOST", "ISR_OVERRUN"), _size(0.002, 0.6), _sets("fault.isr_lost_share"),
          passes=0.3, weight=2.0),
     Kind("interrupts", "all lost", ("INTERRUPT_RATE", "ADC_LOST"), _one_of(1.0), _sets("cpu.isr_dropped"), passes=0.3, weight=0.5),

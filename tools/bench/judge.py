@@ -7,8 +7,9 @@ import numpy as np
 from tools.common import drive_tables
 from tools.common.trace import Trace
 
-NO_EFFECT, RIDDEN, RIGHT, ANOTHER, SILENT = "no effect", "ridden through", "stopped, right code", "stopped, another code", "wrong and silent"
-CLASSES = (NO_EFFECT, RIDDEN, RIGHT, ANOTHER, SILENT)
+NO_EFFECT, RIDDEN, RIGHT, ANOTHER = "no effect", "ridden through", "stopped, right code", "stopped, another code"
+UNKNOWABLE, SILENT = "cannot be known", "wrong and silent"
+CLASSES = (NO_EFFECT, RIDDEN, RIGHT, ANOTHER, UNKNOWABLE, SILENT)
 VOID = "no comparison"
 """The run without the fault does not do what the scene asks for."""
 SETTLE_S, JUDGE_S = 1.0, 0.5
@@ -41,6 +42,8 @@ class Limits:
     closed: tuple[int, ...]
     """numbers of the states in closed loop; before, a rotor swings while it is aligned"""
     limited_is_right: bool = False
+    unseen: tuple[float, float] = (1.0, 0.0)
+    """what no firmware can know: the speed is so many times as high, and so many rpm off"""
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ def judge(with_fault: Trace, without: Trace, limits: Limits) -> Verdict:
     if (code := _kept_code(after, limits)) and not _kept_code(reference, limits):
         return Verdict(ANOTHER, code, None, "still stopped by the fault before", error_percent, peak_a)
     why = _wrong(after, reference, limits)
+    if why and limits.unseen != (1.0, 0.0) and not _wrong(after, reference, limits, *limits.unseen):
+        return Verdict(UNKNOWABLE, "", None, why, error_percent, peak_a)
     outcome = SILENT if why else NO_EFFECT if _same(after, reference, limits) else RIDDEN
     return Verdict(outcome, "", None, why, error_percent, peak_a)
 
@@ -105,9 +110,9 @@ def _still_on(after: Trace, reference: Trace) -> str:
     return "the outputs stay on" if len(fault) and fault[-1] != 0.0 and on[-1] != 0.0 else ""
 
 
-def _wrong(after: Trace, reference: Trace, limits: Limits) -> str:
-    """What is wrong with a run that has raised no fault; "" if nothing is."""
-    speed, expected = _smooth(after, "plant.speed_rpm"), _smooth(reference, "plant.speed_rpm")
+def _wrong(after: Trace, reference: Trace, limits: Limits, clock: float = 1.0, more_rpm: float = 0.0) -> str:
+    """What is wrong with a run that has raised no fault; "" if nothing is. The speed may be `clock` times as high, and `more_rpm` further off."""
+    speed, expected = _smooth(after, "plant.speed_rpm"), clock * _smooth(reference, "plant.speed_rpm")
     last, last_expected = _on_at_end(after), _on_at_end(reference)
     if last_expected and not last:
         return "stops without a code"
@@ -119,7 +124,7 @@ def _wrong(after: Trace, reference: Trace, limits: Limits) -> str:
         return "too much current"
     judged = after.time_s >= limits.settled_s
     off_rpm = np.abs(speed - expected)[judged]
-    band_rpm = np.maximum(BAND_OF_SPEED * np.abs(expected), BAND_OF_RATED * limits.rated_rpm)[judged]
+    band_rpm = np.maximum(BAND_OF_SPEED * np.abs(expected), BAND_OF_RATED * limits.rated_rpm)[judged] + more_rpm
     if last_expected and np.any(off_rpm > band_rpm) and not (limits.limited_is_right and limited(after, judged) > 0.5):
         return f"speed off by up to {np.max(off_rpm):.0f} rpm"
     return ""

@@ -34,6 +34,8 @@ CLEAR_S, AGAIN_S = 0.3, 0.3
 BLOCKED_S, RETRY_PAUSE_S, RETRY_STATES = 0.8, 3.0, ("RETRY", "FAULT")
 """The shaft is blocked for the first; a drive that tries again by itself may wait for the second, in one of these states."""
 RAMP_STEP_S = 0.005
+DEAD_SHARE = 0.13
+"""Of dead time's voltage: what its compensation leaves may move the speed (include/drive/param_scaling.h)."""
 HANG_S = 300
 WHERE = "campaign"
 HUNG = "WATCHDOG"
@@ -160,7 +162,8 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         injected_s = session.now_s
         state = bench.library.states.get(int(board.get("fw.state")), "?")
         rating = injection.Rating(param(bench.library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(bench.motor.path)).rated_torque_nm,
-                                  *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")))
+                                  *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
+                                  dead_rpm=dead_rpm(bench.library.params))
         settled_s = max(injected_s + case.over_s + case.lasts_s + judge.SETTLE_S, way.end_s)
         end_s = settled_s + judge.JUDGE_S
 
@@ -174,10 +177,16 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         without = session.run()
     closed = tuple(number for number, name in bench.library.states.items() if name in ("CLOSED", "STOPPING"))
     limits = judge.Limits(injected_s, settled_s, motor_file.load(str(bench.motor.path)).rated_speed_rpm, rating.current_a, case.what.ends,
-                          bench.library.faults, closed, case.what.limits)
+                          bench.library.faults, closed, case.what.limits, case.what.unseen(case.size, rating))
     with_fault, target = result or (None, "")
     verdict = _ended(ending) if with_fault is None else judge.judge(with_fault.trace, without.trace, limits)
     return Trial(case, with_fault, without, injected_s, state, target, verdict)
+
+
+def dead_rpm(params: dict[str, float]) -> float:
+    """The firmware's PARAM_LARGE_ERPM as a speed of the shaft."""
+    dead_v = param(params, "NOMINAL_BUS_V") * param(params, "DEADTIME_SEC") / param(params, "LOOPTIME_SEC")
+    return DEAD_SHARE * dead_v * math.sqrt(3.0) * 1000.0 / param(params, "MOTOR_KPHI_V_PER_KRPM")
 
 
 def _to_the_moment(session: simulate.Session, way: Scene, case: Case) -> None:

@@ -22,7 +22,7 @@ class Row:
 def faults() -> tuple[Row, ...]:
     """Why the drive has stopped; the first is that of no fault."""
     table = rows("include", "drive/faults.h", "DRIVE_FAULT_TABLE", "#code #name #passes cause remedy")
-    return tuple(Row(int(code), name, cause, remedy, passes == "1") for code, name, passes, cause, remedy in table)
+    return tuple(Row(int(code), name, cause, remedy, passes == "FAULT_PASSES") for code, name, passes, cause, remedy in table)
 
 
 @cache
