@@ -19,10 +19,9 @@ drive_t board_drive;
 panel_t board_panel;
 retry_t board_retry;
 
-static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
-static uint16_t supervised_tick; /* drive ticks at the last check */
-static uint16_t silent_ms;       /* timer 1 milliseconds without a control interrupt */
-static deviation_t deviation;
+static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
+static uint16_t supervised_tick;          /* drive ticks at the last check */
+static uint16_t silent_ms;                /* timer 1 milliseconds without a control interrupt */
 static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
 
 void firmware_trip(drive_fault_t fault)
@@ -115,6 +114,7 @@ QM_INLINE void firmware_supervise(void)
 
 void firmware_background(void)
 {
+    static deviation_t deviation;
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
 
     firmware_supervise();

@@ -5,7 +5,6 @@
 #include "drive/state.h"
 
 #define MEAN_SHIFT 9 /* 512 ms */
-#define ID_SHIFT 4   /* a 16th of the largest current: dead time makes half of it in a winding of little inductance, noise less */
 #define MOST_TIMES 2 /* a deviation counts as twice its limit at most: then it may last 0.35 s */
 #define HELD_BACK ((uint16_t)LIMIT_VOLTAGE | (uint16_t)LIMIT_CURRENT | (uint16_t)LIMIT_BRAKE | (uint16_t)LIMIT_RAMP | (uint16_t)LIMIT_RAMP_WAITS \
                    | (uint16_t)LIMIT_SPEED_RANGE)
@@ -35,5 +34,5 @@ uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_params_t *
     if (qm_abs(c->reference_erpm) >= p->observer.full_erpm) { /* below, the speed controller is slow */
         found = takes(&v->speed_q16, qm_sub_limited(c->reference_erpm, estimator_speed(&run->estimator)), qm_clamp(run->observer.wrong_erpm, 1, 16383));
     }
-    return (uint16_t)(found | takes(&v->id_q16, (int16_t)(c->ref_q13.d - c->i_q13.d), (int16_t)(p->current_max_q13 >> ID_SHIFT)));
+    return (uint16_t)(found | takes(&v->id_q16, (int16_t)(c->ref_q13.d - c->i_q13.d), p->id_off_q13));
 }

@@ -132,6 +132,7 @@
         .wrong_steps = PARAM_SLOW_STEPS(0.1F), \
         .impossible_steps = PARAM_SLOW_STEPS(0.25F), \
         .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
+        .id_off_q13 = CURRENT_Q13(PARAM_ID_OFF), \
         .rs_off_least = Q15(PARAM_R_LEAST - 1.0), \
         .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
         .ls_off = Q15(PARAM_L_OFF), \

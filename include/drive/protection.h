@@ -55,7 +55,7 @@ QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, con
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
     int32_t explained_q12 = (int32_t)qm_abs(emf.q) + protection_ri(p, qm_abs(i.d)) + protection_ri(p, qm_abs(i.q))
-                            + PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12;
+                            + (int32_t)PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12;
     return (uint16_t)(qm_abs(emf.d) > explained_q12);
 }
 
@@ -103,8 +103,12 @@ QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const d
 NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    uint16_t strong = protection_flux_is_impossible(run, p);
-    uint16_t hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->adaptation.rs_most);
+    uint16_t strong, hot;
+    if (!drive_is_closed(d)) {
+        return;
+    }
+    strong = protection_flux_is_impossible(run, p);
+    hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->adaptation.rs_most);
     run->impossible_steps = (uint16_t)((strong || hot) ? run->impossible_steps + 1u : 0u);
     if (run->impossible_steps > p->impossible_steps) {
         drive_raise(d, strong ? FAULT_BUS_SENSOR : FAULT_OVERTEMPERATURE);
@@ -159,6 +163,9 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2)), steps = run->probe_steps;
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
 
+    if (!drive_is_closed(d)) {
+        return;
+    }
     if (steps < PROBE_WAIT_STEPS) {
         steps = (uint16_t)((doubtful && seems_to_turn) ? steps + 1u : 0u);
         run->probe_most_q13 = protection_probe_most(run, p);

@@ -87,16 +87,12 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 2:
         bus_step(d, p, v_bus_raw);
-        if (drive_is_closed(d)) {
-            protection_check_model(d, p);
-        }
+        protection_check_model(d, p);
         done = 2;
         break;
     case 3:
         bus_update_voltage_limit(d, p);
-        if (drive_is_closed(d)) {
-            protection_probe_rotor(d, p);
-        }
+        protection_probe_rotor(d, p);
         done = 3;
         break;
     case 4:

@@ -41,9 +41,9 @@ void test_speed_that_stays_further_off_than_dead_time_and_a_32nd_is_found_in_a_t
     }
 }
 
-void test_d_current_that_stays_a_16th_of_the_largest_off_is_found_whatever_its_sign(void)
+void test_d_current_that_stays_further_off_than_noise_and_dead_time_is_found_whatever_its_sign(void)
 {
-    const int16_t limit = (int16_t)(params.current_max_q13 / 16);
+    const int16_t limit = params.id_off_q13;
     uint16_t ms = 0;
     drive.run.control.i_q13.d = limit;
     TEST_ASSERT_EQUAL_UINT16(3000, ms_until_found(0));
