@@ -26,9 +26,9 @@ static uint16_t ms_until_found(uint16_t reasons)
     return ms;
 }
 
-void test_speed_that_stays_further_off_than_dead_time_and_a_32nd_is_found_in_a_third_of_a_second(void)
+void test_speed_that_stays_further_off_than_twice_dead_time_and_a_32nd_is_found_in_a_third_of_a_second(void)
 {
-    const int16_t limit = (int16_t)(params.observer.large_erpm + 10000 / 32);
+    const int16_t limit = (int16_t)(2 * (params.observer.large_erpm + 10000 / 32)); /* without load */
     EACH_DIRECTION(sign) {
         setUp();
         rig_speed((int16_t)(10000 + sign * limit));
