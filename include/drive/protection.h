@@ -163,9 +163,6 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2)), steps = run->probe_steps;
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
 
-    if (!drive_is_closed(d)) {
-        return;
-    }
     if (steps < PROBE_WAIT_STEPS) {
         steps = (uint16_t)((doubtful && seems_to_turn) ? steps + 1u : 0u);
         run->probe_most_q13 = protection_probe_most(run, p);

@@ -66,8 +66,8 @@ void test_rows_of_an_overcurrent_are_those_of_the_trace(void)
     run_at(2000.0);
     trace_from_here();
     wait_s(0.004);
-    set("motor.ld_h", 4e-5);
-    set("motor.lq_h", 4e-5);
+    set("motor.ld_h", 8e-5);
+    set("motor.lq_h", 8e-5);
     set("motor.rs_ohm", 0.2);
     (void)seconds_to_fault(0.02);
     find_fault(FAULT_OVERCURRENT_SW);
