@@ -64,11 +64,10 @@ static void expect_trace(void)
 void test_rows_of_an_overcurrent_are_those_of_the_trace(void)
 {
     run_at(2000.0);
+    ramp_load(0.06);
     trace_from_here();
     wait_s(0.004);
-    set("motor.ld_h", 8e-5);
-    set("motor.lq_h", 8e-5);
-    set("motor.rs_ohm", 0.2);
+    set("shunt.gain_v_per_a", 0.375 * 5.0); /* the amplifier shows five times the current */
     (void)seconds_to_fault(0.02);
     find_fault(FAULT_OVERCURRENT_SW);
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, board_recorder.fault);
