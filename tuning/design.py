@@ -18,6 +18,9 @@ from .limits import RPM, Envelope
 
 ESDQ_HZ = 200.49
 """2000 at 50 us. AN1292's 1200, 119 Hz, is older than a load step allows."""
+ESDQ_SHARE = 0.37
+"""Least of the filter's corner over the top electrical frequency: the estimator's lock swings with sqrt(corner frequency) and a damping of half the
+root of their ratio, 0.3. On the virtual board 200 Hz let the angle of a motor of 1167 Hz swing up when its speed changed."""
 VELESTIM_HZ = 73.5
 """AN1292's 748 at 50 us."""
 QUICK_ROTOR_S = 0.015
@@ -292,8 +295,10 @@ def _board(d: Design) -> None:
                        ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
                        ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
         d.put(name, text, "board file")
-    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period; at low speed the firmware lowers it")
-    d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
+    esdq_hz = max(ESDQ_HZ, ESDQ_SHARE * _maximum_speed(d)[0] * d.motor.pole_pairs / 60.0)
+    d.put("KFILTER_ESDQ", str(constants.filter_k(esdq_hz, b.pwm_period_s)), f"{esdq_hz:.0f} Hz at this PWM period" + (
+        "" if esdq_hz == ESDQ_HZ else f", {ESDQ_SHARE:g} of the top electrical frequency") + "; at low speed the firmware lowers it")
+    d.put("KFILTER_ESDQ_FW", str(constants.filter_k(esdq_hz, b.pwm_period_s)),
           "the same: AN1292's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
     rise_s = _rise_s(d.motor)
     faster = min(max(QUICK_ROTOR_S / rise_s, 1.0), 4.0)
