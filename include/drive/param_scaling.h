@@ -18,7 +18,7 @@
 #define SPEED_UNIT_ERPM 32000 /* most with one electrical rpm a count; the tuner reads it */
 #define PARAM_TOP_ERPM (PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS))
 #define SPEED_UNIT ((PARAM_TOP_ERPM <= PARAM_F(SPEED_UNIT_ERPM)) ? 1 : (PARAM_TOP_ERPM <= 2.0F * PARAM_F(SPEED_UNIT_ERPM)) ? 2 \
-                                                                                                                          : 4)
+                                                                                                                           : 4)
 /** Counts of so many electrical rpm, as a float. */
 #define SPEED_COUNTS(erpm) (PARAM_F(erpm) / PARAM_F(SPEED_UNIT))
 
@@ -198,7 +198,7 @@
 #define PARAM_ESDQ_PER_COUNT (65536.0F * 2.0F * PARAM_PI * PARAM_F(PARAM_ESDQ_RATIO) / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT))
 
 /* ---- How far the header may be off, as make robust promises (tools/bench/scenarios/tables/robust.toml) ---- */
-#define PARAM_R_LEAST 0.7    /* true R over the header's */
+#define PARAM_R_LEAST 0.7 /* true R over the header's */
 #define PARAM_R_MOST 1.5
 #define PARAM_L_OFF 0.3      /* of the header's, to either side */
 #define PARAM_FLUX_MOST 1.25 /* 1.2, and what dead time leaves */
