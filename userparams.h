@@ -170,6 +170,7 @@
  *   estimator.kfilter_velestim_q16     73.503 Hz               1496  Q16 a period                   exact  Equation 7
  *
  * speeds
+ *   SPEED_UNIT                              1 1                   1  count                          exact  electrical rpm of a count of speed: of what `erpm` stands for in this table
  *   minimum_erpm                          150 rpm               750  erpm                           exact  potentiometer at zero
  *   pot_zero_q16                            0 1                   0  Q16                            exact  dead end of its travel
  *   pot_scale_q15                           1 1               32768  Q15                            exact  what is left of it is all
@@ -244,7 +245,10 @@
  *   lost_lock_steps                      0.05 s                 125  8 periods                      exact  lost lock
  *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
  *   impossible_steps                     0.25 s                 625  8 periods                      exact  flux or resistance impossible
- *   kfi_impossible                      -0.25 1               -8192  Q15                            exact  change of 1/Kphi that no magnet gives
+ *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
+ *   rs_off_least                         -0.3 1               -9830  Q15                         -0.004 %  so far may R be off
+ *   rs_off_most                           0.5 1               16384  Q15                            exact  upwards
+ *   ls_off                                0.3 1                9830  Q15                         -0.004 %  and L
  *
  * modulator and bus
  *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %
@@ -260,6 +264,7 @@
  *   kcurr_b                              -0.5 1              -16384  Q15                            exact  gain of the samples
  *
  * field weakening
+ *   fieldweak.index_per_count_q16       204.8 rpm                64  Q16 entries/erpm               exact  entries are so far apart
  *   fieldweak.trim_speed_erpm            1584 rpm              7920  erpm                           exact  speed from which it acts
  */
 

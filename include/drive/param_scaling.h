@@ -198,7 +198,7 @@
 #define PARAM_ESDQ_PER_COUNT (65536.0F * 2.0F * PARAM_PI * PARAM_F(PARAM_ESDQ_RATIO) / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT))
 
 /* ---- How far the header may be off, as make robust promises (tools/bench/scenarios/tables/robust.toml) ---- */
-#define PARAM_R_LEAST 0.7 /* true R over the header's */
+#define PARAM_R_LEAST 0.7    /* true R over the header's */
 #define PARAM_R_MOST 1.5
 #define PARAM_L_OFF 0.3      /* of the header's, to either side */
 #define PARAM_FLUX_MOST 1.25 /* 1.2, and what dead time leaves */

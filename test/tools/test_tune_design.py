@@ -32,7 +32,9 @@ SMALL = {"rs_ohm": 39.0, "rated_current_a": 0.05, "rated_torque_nm": 0.003, "rat
          "start_torque_nm": 0.0}
 MAXIMUM = next(line for line in MOTOR.splitlines() if line.startswith("maximum_current"))
 REFUSED = {
-    "rated speed beyond the speed format": ({"pole_pairs": 14}, ("electrical rpm", "32000", "a speed of 2285 rpm is possible", "a_motor.toml")),
+    "rated speed beyond the speed format": ({"pole_pairs": 31}, ("77500 electrical rpm", "75000; a speed of 2419 rpm is possible", "a_motor.toml")),
+    "rated speed beyond a sixteenth of a turn a period": ({"pole_pairs": 14, "board": {"pwm_period_s": 125e-6}},
+                                                          ("35000 electrical rpm", "32000 with this PWM period; a speed of 2285 rpm is possible")),
     "voltage too low for the rated speed": (
         {"board": {"nominal_bus_v": 12.0, "under_voltage_v": 7.0}},
         ("12 V are too low for 2500 rpm at half the rated torque", "raise the supply voltage", "or lower the rated speed to")),
@@ -77,11 +79,11 @@ WARNED = {
     "rated current beyond the board": ({"rated_current_a": 3.6, "maximum_current_a": 3.4}, ("rated current 3.6 A peak is above MAXIMUM_CURRENT_A",)),
     "maximum speed beyond field weakening": ({"changes": (("value = 5000", "value = 6300"),)}, ("maximum_speed 6300 rpm is not reachable",)),
     "maximum speed beyond the speed format": (
-        {"changes": (("value = 5000", "value = 9000"),), "ld_h": 6e-3, "lq_h": 6e-3, "maximum_current_a": 3.4},
-        ("maximum_speed 9000 rpm is not reachable", "32000 electrical rpm")),
+        {"changes": (("value = 5000", "value = 9000"),), "ld_h": 6e-3, "lq_h": 6e-3, "maximum_current_a": 3.4, "board": {"pwm_period_s": 125e-6}},
+        ("maximum_speed 9000 rpm is not reachable", "32000 electrical rpm are the firmware's end with this PWM period")),
     "rated speed that only S3 reaches": (
-        {"changes": (("value = 2500", "value = 2000"),), "pole_pairs": 14, "psi_vs": 7.983e-3 * 5 / 14, "ld_h": 3e-4, "lq_h": 3e-4},
-        ("use S3 for the rest",)),
+        {"changes": (("value = 2500", "value = 2000"),), "pole_pairs": 14, "psi_vs": 7.983e-3 * 5 / 14, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2280.0},
+        ("is above 27000 electrical rpm", "use S3 for the rest",)),
     "inductance measured far from the motor's frequency": ({"changes": (("frequency_hz = 1000", "frequency_hz = 10000"),)},
                                                            ("was measured at 10000 Hz, the motor turns at 208 Hz",)),
     "heavy load's slow speed loop": (

@@ -106,8 +106,13 @@ RELATIONS = {
     "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM": [case("MINIMUM_SPEED_RPM", "2800", "2799")],
     "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM": [case("MAXIMUM_SPEED_RPM", "2799", "2800")],
     "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM": [case("FW_START_SPEED_RPM", "5500", "5499")],
-    "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000": [case("MAXIMUM_SPEED_RPM", "6401", "6400")],
-    "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000": [case("NOMINAL_SPEED_RPM", "5401", "5400")],
+    "MAXIMUM_SPEED_RPM times NOPOLESPAIRS must be at most 75000 electrical rpm": [
+        case("MAXIMUM_SPEED_RPM", "15001", "15000"), case("NOPOLESPAIRS", "8", "7", MAXIMUM_SPEED_RPM="10500")],
+    "MAXIMUM_SPEED_RPM times NOPOLESPAIRS must be at most 3.75 / LOOPTIME_SEC": [
+        case("MAXIMUM_SPEED_RPM", "7501", "7500", LOOPTIME_SEC="0.0001"), case("MAXIMUM_SPEED_RPM", "6401", "6400", LOOPTIME_SEC="0.00014"),
+        case("LOOPTIME_SEC", "0.00005005", "0.00005", MAXIMUM_SPEED_RPM="15000")],
+    "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000": [
+        case("NOMINAL_SPEED_RPM", "5401", "5400"), case("NOMINAL_SPEED_RPM", "10801", "10800", MAXIMUM_SPEED_RPM="12000")],
     "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM": [case("END_SPEED_RPM", "2801", "2800")],
     "MOTOR_RS_OHM does not fit its Q format": [case("MOTOR_RS_OHM", "33", "32", NORM_CURRENT_CONST="0.0002")],
     "MOTOR_LS_MH does not fit its Q format": [case("MOTOR_LS_MH", "16.2", "16.0")],
