@@ -140,6 +140,9 @@
     X(PARAM_INVKFI >= 1024.0F && PARAM_INVKFI < 32767.0F, \
       PARAM_NAMED(MOTOR_KPHI_V_PER_KRPM) " does not fit 1/Kphi's Q format (1024 .. 32767): check its unit, V peak line to line per " \
       "1000 rpm") \
+    X(PARAM_INVKFI >= 32767.0F || (PARAM_F(INVKFI_SPEED0) >= 0.6F * PARAM_INVKFI && PARAM_F(INVKFI_SPEED0) <= 1.6F * PARAM_INVKFI), \
+      PARAM_NAMED(INVKFI_SPEED0) " must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that; a table for another motor, or for another side of 32000 or " \
+      "64000 electrical rpm of MAXIMUM_SPEED_RPM, counts otherwise") \
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
       PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \

@@ -119,6 +119,8 @@ RELATIONS = {
     "MOTOR_RS_OHM rounds by more than 0.5 %": [case("MOTOR_RS_OHM", "0.0123", "0.0125", NORM_CURRENT_CONST="0.0001")],
     "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format": [
         case("MOTOR_KPHI_V_PER_KRPM", "1.7", "1.8"), case("MOTOR_KPHI_V_PER_KRPM", "56.5", "56.1", SPEED_BANDWIDTH_HZ="4")],
+    "INVKFI_SPEED0 must be 0.6 .. 1.6 of NORM_INVKFIBASE": [
+        case("INVKFI_SPEED0", "4770", "4780"), case("INVKFI_SPEED0", "12740", "12720"), case("MAXIMUM_SPEED_RPM", "6401", "6400", INVKFI_SPEED0="7956")],
     "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A": [case("Q_CURRENT_REF_OPENLOOP", "2.76", "2.75")],
     "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A": [case("MAXIMUM_CURRENT_A", "3.8", "3.79")],
     "OVER_CURRENT_THRESHOLD_A must be at most 86.5 %": [case("OVER_CURRENT_THRESHOLD_A", "3.81", "3.8")],
