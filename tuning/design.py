@@ -29,6 +29,9 @@ thresholds see its speed too late."""
 REFERENCE_RISE_S = 0.7
 """The speed reference goes from 0 to rated speed in this time, unless inertia asks for more."""
 REFERENCE_TORQUE_SHARE = 0.3
+BRAKE_SHARE = 0.4
+"""Beyond limits.UNIT_ERPM the reference falls with this share of what friction alone would do: with a q current near zero dead time takes from the
+quick lock more than it can bear, on the virtual board, and a supply that takes nothing back allows no larger braking current."""
 TRIM_SHARE = 0.3
 TRIM_SPEED_SHARE = 0.9
 """The voltage feedback's d current allows the rated torque up to this share of rated speed, where the current limit does."""
@@ -336,8 +339,11 @@ def _speeds(d: Design) -> None:
     d.put("MAXIMUM_SPEED_RPM", plain(maximum), why)
     inertia = m.inertia_kgm2 + m.load_inertia_kgm2
     slope = min(m.rated_speed_rpm / REFERENCE_RISE_S, REFERENCE_TORQUE_SHARE * m.rated_torque_nm / inertia / RPM, 60000.0)
-    d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(slope, 1.0), 2)),
-          f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque")
+    friction = BRAKE_SHARE * d.envelope.friction_nm(0.5 * m.rated_speed_rpm) / inertia / RPM
+    quick = maximum * m.pole_pairs > limits.UNIT_ERPM and 0.0 < friction < slope
+    d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(friction if quick else slope, 1.0), 2)), (
+        f"{BRAKE_SHARE:.0%} of what friction alone slows it: a quick motor must not be without q current" if quick else
+        f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque"))
 
 
 def _currents(d: Design, currents: limits.Currents) -> None:
