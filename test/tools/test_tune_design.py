@@ -11,7 +11,7 @@ from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, 
 
 from tools.common import board_file, motor_file
 from tools.common.errors import UserError
-from tuning import header, limits, report
+from tuning import constants, header, limits, report
 from tuning.design import Design, design, plain, real, short
 from tuning.limits import Envelope
 
@@ -97,6 +97,17 @@ WARNED = {
         {"pole_pairs": 12, "psi_vs": 7.983e-3 * 5 / 12, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2660.0, "board": {"pwm_period_s": 125e-6},
          "inertia_kgm2": 2e-5},
         ("D_ILIMIT_HS ends at",))}
+
+
+def test_beyond_32000_electrical_rpm_the_back_emf_s_filter_follows_the_frequency_and_friction_brakes():
+    quick = design(motor_file.load("spindle_7pp_24v_10000"), BOARD)
+    corner_hz = constants.filter_hz(quick.value("KFILTER_ESDQ"), BOARD.pwm_period_s)
+    assert corner_hz == approx(0.37 * 1225.0, rel=1e-3) and quick.value("KFILTER_ESDQ_FW") == quick.value("KFILTER_ESDQ")
+    friction_rpm_s = quick.envelope.friction_nm(5000.0) / 2.5e-6 / limits.RPM
+    assert 0.38 * friction_rpm_s < quick.value("SPEEDREFRAMP_RPM_PER_S") <= 0.4 * friction_rpm_s
+    assert quick.scales.speed_unit == 4.0 and quick.value("NOMINAL_SPEED_RPM") == 10000.0
+    slow = design(motor_file.load("maxon_ec45flat_30w_24v"), BOARD) # 507 Hz
+    assert slow.scales.speed_unit == 1.0 and slow.value("KFILTER_ESDQ") == 2000.0 and slow.value("SPEEDREFRAMP_RPM_PER_S") > 1000.0
 
 
 def test_remedies_for_a_speed_that_would_wander_are_enough_and_hardly_more():
