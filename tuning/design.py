@@ -18,6 +18,9 @@ from .limits import RPM, Envelope
 
 ESDQ_HZ = 200.49
 """2000 at 50 us. AN1292's 1200, 119 Hz, is older than a load step allows."""
+ESDQ_SHARE = 0.37
+"""Least of the filter's corner over the top electrical frequency: the estimator's lock swings with sqrt(corner frequency) and a damping of half the
+root of their ratio, 0.3. On the virtual board 200 Hz let the angle of a motor of 1167 Hz swing up when its speed changed."""
 VELESTIM_HZ = 73.5
 """AN1292's 748 at 50 us."""
 QUICK_ROTOR_S = 0.015
@@ -26,6 +29,9 @@ thresholds see its speed too late."""
 REFERENCE_RISE_S = 0.7
 """The speed reference goes from 0 to rated speed in this time, unless inertia asks for more."""
 REFERENCE_TORQUE_SHARE = 0.3
+BRAKE_SHARE = 0.4
+"""Beyond limits.UNIT_ERPM the reference falls with this share of what friction alone would do: with a q current near zero dead time takes from the
+quick lock more than it can bear, on the virtual board, and a supply that takes nothing back allows no larger braking current."""
 TRIM_SHARE = 0.3
 TRIM_SPEED_SHARE = 0.9
 """The voltage feedback's d current allows the rated torque up to this share of rated speed, where the current limit does."""
@@ -66,13 +72,15 @@ class Scales:
     iterm_per_hz: float
     speed_pterm_per_hz: float
     acceleration: float
-    """of a count of current, electrical rpm in eight periods"""
-    large_erpm: float
-    """innovation that the load observer calls large"""
+    """of a count of current, counts of speed in eight periods"""
+    large_counts: float
+    """innovation that the load observer calls large, counts of speed"""
     count_a: float
     """a count of current"""
     lost_counts: float
     """current that dead time loses, in counts of count_a"""
+    speed_unit: float
+    """electrical rpm of a count of speed"""
 
 
 @dataclass
@@ -99,9 +107,10 @@ class Design:
     @functools.cached_property
     def scales(self) -> Scales:
         """What the header makes of motor and board; asked for when their parameters are chosen."""
-        return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1"}, "PARAM_INVKFI", "PARAM_IU",
-                                          "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL", "PARAM_LARGE_ERPM", "4.0F * PARAM_F(NORM_CURRENT_CONST)",
-                                          "PARAM_LOST_CURRENT_Q13"))
+        top_rpm = self.motor.tune.get("MAXIMUM_SPEED_RPM", _maximum_speed(self)[0])
+        return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1", "MAXIMUM_SPEED_RPM": plain(top_rpm)},
+                                          "PARAM_INVKFI", "PARAM_IU", "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL",
+                                          "SPEED_COUNTS(PARAM_LARGE_ERPM)", "4.0F * PARAM_F(NORM_CURRENT_CONST)", "PARAM_LOST_CURRENT_Q13", "SPEED_UNIT"))
 
     @property
     def params(self) -> dict[str, str]:
@@ -176,10 +185,10 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
     def refuse(what: str, where: str, remedy: str) -> None:
         problems.found.append(UserError(what, where, remedy))
 
-    rated_erpm = m.rated_speed_rpm * m.pole_pairs
-    if rated_erpm > limits.LARGEST_ERPM:
+    rated_erpm, largest_erpm = m.rated_speed_rpm * m.pole_pairs, limits.largest_erpm(d.board.pwm_period_s)
+    if rated_erpm > largest_erpm:
         refuse(f"rated speed {m.rated_speed_rpm:g} rpm with {m.pole_pairs} pole pairs is {rated_erpm:.0f} electrical rpm", d.where("speed"),
-                        f"the firmware's speeds end at {limits.LARGEST_ERPM:.0f}; a speed of {math.floor(limits.LARGEST_ERPM / m.pole_pairs)} rpm is possible")
+                        f"the firmware's speeds end at {largest_erpm:.0f}{_of_period(largest_erpm)}; a speed of {math.floor(largest_erpm / m.pole_pairs)} rpm is possible")
     problems.attempt(lambda: _refuse_kphi(d))
     problems.attempt(lambda: _refuse_light(d))
     half = 0.5 * m.rated_torque_nm
@@ -191,6 +200,11 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
         reachable = e.highest_speed(half, limits.FULL_SHARE)
         refuse(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
                         f"raise the supply voltage in {paths.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
+
+
+def _of_period(largest_erpm: float) -> str:
+    """A shorter PWM period would allow more."""
+    return " with this PWM period" if largest_erpm < limits.LARGEST_ERPM else ""
 
 
 def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> str:
@@ -211,7 +225,7 @@ def _change_maximum_current(motor: Motor, how: str) -> str:
 
 
 def _refuse_kphi(d: Design) -> None:
-    """1/Kphi has 16 bits: the electrical speed at full voltage must be 2048 .. 65534 rpm."""
+    """1/Kphi has 16 bits: the electrical speed at full voltage must be 2048 .. 65534 counts."""
     counts = d.scales.invkfi
     least = _range("INVKFI_SPEED0")[0]
     if counts < least:
@@ -284,8 +298,10 @@ def _board(d: Design) -> None:
                        ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
                        ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
         d.put(name, text, "board file")
-    d.put("KFILTER_ESDQ", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)), f"{ESDQ_HZ:.0f} Hz at this PWM period; at low speed the firmware lowers it")
-    d.put("KFILTER_ESDQ_FW", str(constants.filter_k(ESDQ_HZ, b.pwm_period_s)),
+    esdq_hz = max(ESDQ_HZ, ESDQ_SHARE * _maximum_speed(d)[0] * d.motor.pole_pairs / 60.0)
+    d.put("KFILTER_ESDQ", str(constants.filter_k(esdq_hz, b.pwm_period_s)), f"{esdq_hz:.0f} Hz at this PWM period" + (
+        "" if esdq_hz == ESDQ_HZ else f", {ESDQ_SHARE:g} of the top electrical frequency") + "; at low speed the firmware lowers it")
+    d.put("KFILTER_ESDQ_FW", str(constants.filter_k(esdq_hz, b.pwm_period_s)),
           "the same: AN1292's 16 Hz would let the angle swing, and it is not needed since the back-EMF has range enough")
     rise_s = _rise_s(d.motor)
     faster = min(max(QUICK_ROTOR_S / rise_s, 1.0), 4.0)
@@ -300,19 +316,34 @@ def _rise_s(m: Motor) -> float:
 
 # ---- speeds and currents -------------------------------------------------------------------------------------------------------
 
-def _speeds(d: Design) -> None:
-    m, e = d.motor, d.envelope
-    most_rpm = math.floor(limits.LARGEST_ERPM / m.pole_pairs)
-    nominal = min(m.rated_speed_rpm, math.floor(limits.LARGEST_NOMINAL_ERPM / m.pole_pairs))
-    d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else ", lowered to 27000 electrical rpm"))
-    reachable = limits.digits_down(e.highest_speed(0.0, limits.REACH_SHARE), 3)
+def _maximum_speed(d: Design) -> tuple[float, str]:
+    """MAXIMUM_SPEED_RPM, and why."""
+    m = d.motor
+    most_rpm = math.floor(limits.largest_erpm(d.board.pwm_period_s) / m.pole_pairs)
+    reachable = limits.digits_down(max(d.envelope.highest_speed(0.0, limits.REACH_SHARE), 1.0), 3)
     maximum = min(m.maximum_speed_rpm, most_rpm, max(reachable, m.rated_speed_rpm))
-    d.put("MAXIMUM_SPEED_RPM", plain(math.floor(maximum)), "motor file's maximum_speed" if maximum == m.maximum_speed_rpm else
-          "electrical speed's end" if maximum == most_rpm else "what field weakening reaches without load")
+    return math.floor(maximum), ("motor file's maximum_speed" if maximum == m.maximum_speed_rpm else
+                                 "electrical speed's end" if maximum == most_rpm else "what field weakening reaches without load")
+
+
+def _nominal_erpm(d: Design) -> float:
+    """Where NOMINAL_SPEED_RPM ends."""
+    return limits.LARGEST_NOMINAL_ERPM * d.scales.speed_unit
+
+
+def _speeds(d: Design) -> None:
+    m = d.motor
+    nominal = min(m.rated_speed_rpm, math.floor(_nominal_erpm(d) / m.pole_pairs))
+    d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else f", lowered to {_nominal_erpm(d):.0f} electrical rpm"))
+    maximum, why = _maximum_speed(d)
+    d.put("MAXIMUM_SPEED_RPM", plain(maximum), why)
     inertia = m.inertia_kgm2 + m.load_inertia_kgm2
     slope = min(m.rated_speed_rpm / REFERENCE_RISE_S, REFERENCE_TORQUE_SHARE * m.rated_torque_nm / inertia / RPM, 60000.0)
-    d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(slope, 1.0), 2)),
-          f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque")
+    friction = BRAKE_SHARE * d.envelope.friction_nm(0.5 * m.rated_speed_rpm) / inertia / RPM
+    quick = maximum * m.pole_pairs > limits.UNIT_ERPM and 0.0 < friction < slope
+    d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(friction if quick else slope, 1.0), 2)), (
+        f"{BRAKE_SHARE:.0%} of what friction alone slows it: a quick motor must not be without q current" if quick else
+        f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque"))
 
 
 def _currents(d: Design, currents: limits.Currents) -> None:
@@ -340,7 +371,7 @@ def _currents(d: Design, currents: limits.Currents) -> None:
 def _fit_emf(motor: Motor, board: BoardFile, wanted: limits.Currents) -> limits.Currents:
     """Lowers first the trip level, then the largest current, until Equation 4 stays inside its format (a relation of param_table.h).
     Gives up at half the rated current; the relation's own message tells then."""
-    fastest = max(min(motor.maximum_speed_rpm, limits.LARGEST_ERPM / motor.pole_pairs), 1.5 * motor.rated_speed_rpm) * RPM * motor.pole_pairs
+    fastest = max(min(motor.maximum_speed_rpm, limits.largest_erpm(board.pwm_period_s) / motor.pole_pairs), 1.5 * motor.rated_speed_rpm) * RPM * motor.pole_pairs
     room_v = 0.985 * 4.0 * board.nominal_bus_v / math.sqrt(3.0) * (1.0 - board.dead_time_s / board.pwm_period_s) - board.over_voltage_v / math.sqrt(3.0)
 
     def fits(trip_a: float, maximum_a: float) -> bool:
@@ -405,7 +436,7 @@ def _speed_loop(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
     speeds = {label: d.envelope.omega(d.value(name)) for label, name in names.items()}
     (low, high), (least_load, most_load) = _range("SPEED_BANDWIDTH_HZ"), _range("LOAD_BANDWIDTH_HZ")
     quickest = loops.load_bandwidth(gains, constants.filter_hz(d.value("KFILTER_ESDQ"), gains.period_s), d.value("CURRENT_BANDWIDTH_HZ"))
-    calm = loops.calm_load_bandwidth(d.scales.large_erpm, d.scales.acceleration, d.value("MAXIMUM_CURRENT_A") / d.scales.count_a, gains.period_s)
+    calm = loops.calm_load_bandwidth(d.scales.large_counts, d.scales.acceleration, d.value("MAXIMUM_CURRENT_A") / d.scales.count_a, gains.period_s)
     cap = loops.speed_cap(_friction_over_lost(d))
     loop = loops.design_speed(plant, _spread(m), gains, speeds, max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz)),
                               max(least_load, min(most_load, limits.digits_down(min(quickest, calm), 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"), cap)
@@ -483,7 +514,7 @@ def _field_weakening(d: Design) -> None:
     d.put("FW_START_SPEED_RPM", plain(start_rpm), f"7/8 of the no-load base speed {d.envelope.base_speed(0.0):.0f} rpm, but at most 95 % of the maximum speed, and 18 "
           "entries reach that")
     known = {name: number_of(text) for name, text in d.params.items() if text != "NORM_INVKFIBASE"}
-    tables, reason = fw_tables.load_for(d.motor.name, known)
+    tables, reason = fw_tables.load_for(d.motor.name, known | {"NORM_INVKFIBASE": d.scales.invkfi})
     if reason:
         d.warnings.append(reason)
     rows = {f"IDREF_SPEED{i}": f"{i_d:.2f}" for i, i_d in enumerate(limits.table(d.envelope, d.value("FW_START_SPEED_RPM")))}
@@ -528,13 +559,14 @@ def _warn_speeds(d: Design) -> None:
                           f"{m.rated_speed_rpm:g} rpm; raise the supply voltage, or lower the rated speed to {limits.digits_down(max(e.highest_speed(m.rated_torque_nm, limits.FULL_SHARE), 1.0), 2):g} rpm")
     most = d.value("MAXIMUM_SPEED_RPM")
     if most < math.floor(m.maximum_speed_rpm):
-        if most * m.pole_pairs >= limits.LARGEST_ERPM - m.pole_pairs:
-            why = f"{limits.LARGEST_ERPM:.0f} electrical rpm are the firmware's end"
+        largest_erpm = limits.largest_erpm(d.board.pwm_period_s)
+        if most * m.pole_pairs >= largest_erpm - m.pole_pairs:
+            why = f"{largest_erpm:.0f} electrical rpm are the firmware's end{_of_period(largest_erpm)}"
         else:
             why = f"{d.board.nominal_bus_v:g} V and {e.maximum_a:g} A reach no more; raise the supply voltage or maximum_current"
         d.warnings.append(f"maximum_speed {m.maximum_speed_rpm:g} rpm is not reachable, MAXIMUM_SPEED_RPM is {most:g}: {why}")
     if d.value("NOMINAL_SPEED_RPM") < m.rated_speed_rpm:
-        d.warnings.append(f"rated speed {m.rated_speed_rpm:g} rpm is above {limits.LARGEST_NOMINAL_ERPM:.0f} electrical rpm: NOMINAL_SPEED_RPM is "
+        d.warnings.append(f"rated speed {m.rated_speed_rpm:g} rpm is above {_nominal_erpm(d):.0f} electrical rpm: NOMINAL_SPEED_RPM is "
                           f"{d.value('NOMINAL_SPEED_RPM'):g}, use S3 for the rest")
     electrical_hz = m.rated_speed_rpm * m.pole_pairs / 60.0
     measured = m.inductance_frequency_hz

@@ -10,7 +10,7 @@ import random
 from dataclasses import dataclass
 from pathlib import Path
 
-from .limits import LARGEST_ERPM, RPM, digits_down
+from .limits import RPM, UNIT_ERPM, digits_down
 
 SQRT3 = math.sqrt(3.0)
 SUPPLY_V = (8.0, 60.0)
@@ -63,7 +63,7 @@ def draw(seed: int, number: int) -> Case:
 def _motor(r: random.Random) -> dict[str, float] | None:
     """A motor in SI, star phase, peak values; None where the draw left what is promised."""
     volt, pairs = float(r.choice(SUPPLIES_V)), r.choice(POLE_PAIRS)
-    erpm = _log(r, max(600.0, SPEED_RPM[0] * pairs), LARGEST_ERPM * 0.95)
+    erpm = _log(r, max(600.0, SPEED_RPM[0] * pairs), UNIT_ERPM * 0.95)
     rpm = digits_down(erpm / pairs, 2)
     drop = _log(r, 0.04, 0.3) # of the voltage, for the resistance at rated current
     ohm = _log(r, *R_OHM)

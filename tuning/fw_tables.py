@@ -60,6 +60,9 @@ class Tables:
         for name, known in self.fingerprint.items():
             if not math.isclose(known, params[name], rel_tol=NEARLY):
                 return f"they are for {name} = {known:g}, the motor has {params[name]:g}"
+        now = params.get("NORM_INVKFIBASE", self.inv_kfi_base)
+        if not math.isclose(self.inv_kfi_base, now, rel_tol=0.1): # it follows from the fingerprint, and from the unit of speed
+            return f"they count 1/Kphi for another SPEED_UNIT (NORM_INVKFIBASE = {self.inv_kfi_base:g}, now {now:.0f})"
         return ""
 
     def parameters(self) -> dict[str, str]:

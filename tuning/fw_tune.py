@@ -28,11 +28,11 @@ from tools.bench.board import Library
 from tools.common.errors import UserError
 from tools.common.progress import Progress, waiting
 
-from . import fw_tables
+from . import constants, fw_tables
 from .fw_bench import Bench, Fault, built
 from .fw_search import Found, Goal, Result, Search, largest, least, model_use, torque_per_ampere
 from .fw_tables import ENTRIES, STEP_ERPM, Tables
-from .limits import LARGEST_ERPM
+from .limits import UNIT_ERPM, largest_erpm
 
 RESULTS = paths.ROOT / "build" / "tune-fw"
 FIRMWARE = paths.ROOT / "build" / "tune-fw-firmware"
@@ -319,7 +319,10 @@ def highest_speed(known: dict[str, float]) -> float:
         free_v = 0.9895 * 131068.0 * u0 - known["OVER_VOLTAGE_V"] / math.sqrt(3.0) \
             - 2.0 / math.sqrt(3.0) * known["OVER_CURRENT_THRESHOLD_A"] * known["MOTOR_RS_OHM"]
         by_emf = free_v / (2.0 * math.pi / 60.0 * pairs * 1.2 * known["MOTOR_LS_MH"] * 1e-3 * known["MAXIMUM_CURRENT_A"])
-        return max(known["MAXIMUM_SPEED_RPM"], math.floor(min(ends, by_emf, LARGEST_ERPM / pairs, 30000.0)))
+        # in the header's unit of speed, which 1/Kphi is counted in
+        unit = constants.evaluate({name: f"{known[name]:g}" for name in ("NOPOLESPAIRS", "MAXIMUM_SPEED_RPM")}, "SPEED_UNIT")[0]
+        by_format = min(UNIT_ERPM * unit, largest_erpm(known["LOOPTIME_SEC"])) / pairs
+        return max(known["MAXIMUM_SPEED_RPM"], math.floor(min(ends, by_emf, by_format, 30000.0)))
     except KeyError as missing:
         raise UserError(f"{missing.args[0]} is no number", build.HEADER, "give a complete userparams.h") from None
 

@@ -13,8 +13,10 @@ from tools.common.param_rows import ENTRIES, number, parameters
 
 from .fw_tables import STEP_ERPM
 
-LARGEST_ERPM = number("PARAM_LARGEST_ERPM")
+LARGEST_ERPM, LARGEST_TURN = number("PARAM_LARGEST_ERPM"), number("PARAM_LARGEST_TURN")
+UNIT_ERPM = number("SPEED_UNIT_ERPM")
 LARGEST_NOMINAL_ERPM = number("PARAM_LARGEST_NOMINAL_ERPM")
+"""Of a nominal speed where a count of speed is one electrical rpm."""
 TRIP_SHARE = number("PARAM_TRIP_SHARE")
 """Largest over-current threshold as a share of the converter's range."""
 TRIP_OVER_MAXIMUM = 1.4
@@ -145,8 +147,13 @@ class Envelope:
         return 1.2 * self.motor.kt_nm_per_a * self.maximum_a
 
     def _highest(self, holds: Callable[[float], bool]) -> float:
-        highest = 65535.0 / self.motor.pole_pairs
+        highest = 2.0 * 65535.0 / self.motor.pole_pairs
         return highest if holds(highest) else halved(holds, 0.0, highest, 50)
+
+
+def largest_erpm(period_s: float) -> float:
+    """Where the firmware's speeds end with this PWM period."""
+    return min(LARGEST_ERPM, max(UNIT_ERPM, LARGEST_TURN / period_s * (1.0 + 1e-6)))
 
 
 def circle_v(board: BoardFile) -> float:

@@ -337,10 +337,10 @@ def load_bandwidth(base: Gains, esdq_hz: float, current_hz: float) -> float:
     return min(1.0 / (1.0 / esdq_hz + 1.0 / current_hz + step), RATE_MOST / step)
 
 
-def calm_load_bandwidth(large_erpm: float, acceleration: float, largest_counts: float, period_s: float) -> float:
+def calm_load_bandwidth(innovation_counts: float, acceleration: float, largest_counts: float, period_s: float) -> float:
     """Bandwidth of the load observer at which a large innovation asks for HEAVY_SHARE of the largest current, at the lowest speed of the full
-    rates. `acceleration`: of a count of current, erpm in a slow step."""
-    return HEAVY_SHARE * largest_counts * acceleration / (FULL_RATIO * large_erpm) / (2.0 * math.pi * SLOW_PHASES * period_s)
+    rates. `acceleration`: of a count of current, counts of speed in a slow step."""
+    return HEAVY_SHARE * largest_counts * acceleration / (FULL_RATIO * innovation_counts) / (2.0 * math.pi * SLOW_PHASES * period_s)
 
 
 def speed_cap(friction_over_lost: float) -> float:

@@ -21,7 +21,7 @@ static void constant(const char *name, long long count, double value, const char
 
 /* The worth of one count, in double precision */
 static const double ampere = NORM_CURRENT_CONST, period = LOOPTIME_SEC, pairs = NOPOLESPAIRS;
-static double volt, ohm, q13_a, erpm, slots;
+static double volt, ohm, q13_a, erpm, slots; /* erpm: mechanical rpm of a count of speed */
 static const char *const q16_divided[] = { "Q16 / 1", "Q16 / 2", "Q16 / 4", "Q16 / 8" };
 
 static double at_most(double value, double largest)
@@ -40,8 +40,8 @@ static void motor(void)
     GROUP("motor");
     MACRO(NORM_RS, rs, "ohm", rs / at_most(rs / ohm * 16384.0, 32767.0), "Q15 / 2", "Equation 5, AN1292's constant, at most 32767");
     MACRO(NORM_LSDTBASE, ls, "mH", ls / at_most(ls / one_ls * 128.0, 32767.0), "Q15 / 256", "Equation 5, AN1292's constant, at most 32767");
-    MACRO(NORM_INVKFIBASE, kphi, "V/krpm", kphi * kphi / (sqrt(3.0) * 1000.0 * pairs * volt * 16384.0), "Q15 / 2, 1/Kphi", "Equation 6");
-    MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
+    MACRO(NORM_INVKFIBASE, kphi, "V/krpm", kphi * kphi / (sqrt(3.0) * 1000.0 * pairs * volt * 16384.0) * SPEED_UNIT, "Q15 / 2, 1/Kphi", "Equation 6");
+    MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0 / SPEED_UNIT, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
     FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
     FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
     FIELD(estimator.resistive_max_q13, 2.0 / sqrt(3.0) * OVER_CURRENT_THRESHOLD_A * rs, "V", 4.0 * volt * (1 << p.estimator.rs_exp), "Q13 V",
@@ -55,8 +55,8 @@ static void estimator(void)
 {
     double least = at_most(8.0 * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)), 16383.0), most = at_most(PARAM_DI(MAXIMUM_SPEED_RPM), 4095.0), q14_a = 2.0 * ampere;
     GROUP("estimator");
-    FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0, "Q32 of a turn/erpm", "angle a period");
-    FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0, "Q16 rad/erpm", "half of it");
+    FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle a period");
+    FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0 / SPEED_UNIT, "Q16 rad/erpm", "half of it");
     FIELD(estimator.d_ilimit_ls_q14, least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A", "D_ILIMIT_LS: change in eight periods");
     FIELD(estimator.d_ilimit_hs_q14, most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A", "D_ILIMIT_HS: change in a period");
     MACRO(D_ILIMIT_LS, least * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
@@ -69,6 +69,7 @@ static void estimator(void)
 static void speeds(void)
 {
     GROUP("speeds");
+    MACRO(SPEED_UNIT, SPEED_UNIT, "1", 0.0, "count", "electrical rpm of a count of speed: of what `erpm` stands for in this table");
     FIELD(minimum_erpm, MINIMUM_SPEED_RPM, "rpm", erpm, "erpm", "potentiometer at zero");
     FIELD(pot_zero_q16, POT_LIVE_ZERO, "1", 1.0 / 65536.0, "Q16", "dead end of its travel");
     FIELD(pot_scale_q15, 1.0 / (1.0 - 2.0 * POT_LIVE_ZERO), "1", 1.0 / 32768.0, "Q15", "what is left of it is all");
@@ -79,10 +80,10 @@ static void speeds(void)
     FIELD(estimator.nominal_erpm, EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS), "rpm", erpm, "erpm", "one-sample derivative above");
     FIELD(estimator.decimate_erpm, NOMINAL_SPEED_RPM / 10.0, "rpm", erpm, "erpm", "sign of Equation 2 from the filtered speed below");
     FIELD(speed_ramp_q16, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm in 8 periods", "slope of the reference");
-    FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (524288.0 / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm in 8 periods",
+    FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (524288.0 / SPEED_UNIT / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm in 8 periods",
           "slope in TUNING");
     FIELD(ramp_hold_erpm, NOMINAL_SPEED_RPM / 8.0, "rpm", erpm, "erpm", "the ramp waits when the motor is further behind");
-    FIELD(overspeed_erpm, at_most(MAXIMUM_SPEED_RPM * 1.25, 32700.0 / pairs), "rpm", erpm, "erpm", "lost lock above");
+    FIELD(overspeed_erpm, at_most(MAXIMUM_SPEED_RPM * 1.25, 32700.0 * erpm), "rpm", erpm, "erpm", "lost lock above");
 }
 
 static void controllers(void)
@@ -95,9 +96,9 @@ static void controllers(void)
     FIELD(pi.kc, AXIS##_CURRCNTR_CTERM, "1", 1.0 / 32768.0, "Q15", "anti-windup")
     CURRENT_LOOP(pi_d, D);
     CURRENT_LOOP(pi_q, Q);
-    FIELD(speed_kp_q13, SPEEDCNTR_PTERM * 16.0 * ampere * pairs, "A/rpm", q15_16 * ampere * pairs, "Q15 / 16", "proportional gain");
-    FIELD(speed_kp_quick_q13, at_most(SPEEDCNTR_PTERM * PARAM_QUICK_GAIN, 32767.0 / 32768.0) * 16.0 * ampere * pairs, "A/rpm",
-          q15_16 * ampere * pairs, "Q15 / 16", "after a large innovation");
+    FIELD(speed_kp_q13, SPEEDCNTR_PTERM * 16.0 * ampere / erpm, "A/rpm", q15_16 * ampere / erpm, "Q15 / 16", "proportional gain");
+    FIELD(speed_kp_quick_q13, at_most(SPEEDCNTR_PTERM * PARAM_QUICK_GAIN, 32767.0 / 32768.0) * 16.0 * ampere / erpm, "A/rpm",
+          q15_16 * ampere / erpm, "Q15 / 16", "after a large innovation");
 }
 
 static void observer(void)
@@ -105,7 +106,7 @@ static void observer(void)
     double unit = 1.0 / (1 << p.observer.shift), lost = PARAM_LOST_CURRENT_Q13;
     double rate = 1.0 / (2.0 * PI * slots * 65536.0), learns = 1.0 / (slots * 65536.0);
     GROUP("load observer, adaptation and low speed");
-    FIELD(observer.deltat_q32, period, "s", 60.0 / 4294967296.0, "Q32 of a turn/erpm", "angle a period");
+    FIELD(observer.deltat_q32, period, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle a period");
     FIELD(observer.per_turn_q12, 65536.0 / 4294967296.0 * 60.0 / slots / pairs, "rpm", erpm / 4096.0, "Q12 erpm", "2^16 counts of the angle in a step");
     FIELD(observer.shift, p.observer.shift, "1", 0.0, "count", "2^this of its units of acceleration are an erpm a step");
     FIELD(observer.per_current_q16, PARAM_ACCEL * erpm / slots / q13_a, "rpm/s/A", unit * erpm / slots / q13_a / 65536.0, "Q16 unit/Q13 A", "Kt/J");
@@ -121,24 +122,24 @@ static void observer(void)
     FIELD(observer.load_from, PARAM_LOAD_FROM_LOST * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "load that begins to count");
     FIELD(observer.load_width, PARAM_LOAD_FROM_LOST * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "over what more it counts");
     FIELD(observer.load_slope_q15, 1.0 / (PARAM_LOAD_FROM_LOST * lost * q13_a), "1/A", PARAM_ACCEL_UNITS / q13_a / 32767.0, "Q15 a unit", "one over it");
-    FIELD(observer.large_erpm, PARAM_LARGE_ERPM * erpm, "rpm", erpm, "erpm", "large innovation without load");
-    FIELD(observer.large_loaded_erpm, PARAM_LARGE_LOADED_ERPM * erpm, "rpm", erpm, "erpm", "and under load");
+    FIELD(observer.large_erpm, PARAM_LARGE_ERPM / pairs, "rpm", erpm, "erpm", "large innovation without load");
+    FIELD(observer.large_loaded_erpm, PARAM_LARGE_LOADED_ERPM / pairs, "rpm", erpm, "erpm", "and under load");
     FIELD(adaptation.rate_q16, 6.0, "1/s", learns, "Q16 a step", "flux and R follow");
     FIELD(adaptation.kfi_least, -0.30, "1", 1.0 / 32768.0, "Q15", "least change of 1/Kphi");
     FIELD(adaptation.kfi_most, 0.35, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.rs_least, -0.4, "1", 1.0 / 32768.0, "Q15", "least change of R");
     FIELD(adaptation.rs_most, 0.6, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.emf_least_q12, 0.2 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "back-EMF from which it learns");
-    FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a * pairs / 65536.0, "Q16 Q13 A/erpm",
+    FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a / erpm / 65536.0, "Q16 Q13 A/erpm",
           "q current that the sample misses");
-    FIELD(fieldweak.esdq_per_erpm_q13, PARAM_ESDQ_RATIO / 60.0 * pairs, "Hz/rpm", 1.0 / (2.0 * PI * period * 65536.0 * 8192.0) * pairs, "Q13 of Q16",
+    FIELD(fieldweak.esdq_per_erpm_q13, PARAM_ESDQ_RATIO / 60.0 * pairs, "Hz/rpm", 1.0 / (2.0 * PI * period * 65536.0 * 8192.0) / erpm, "Q13 of Q16",
           "corner of the back-EMF filter at low speed");
 }
 
 static void start(void)
 {
     GROUP("start");
-    FIELD(forced.end_speed_q10, END_SPEED_RPM, "rpm", erpm * 60.0 / period / 67108864.0, "Q10 angle counts a period", "end of the ramp");
+    FIELD(forced.end_speed_q10, END_SPEED_RPM, "rpm", 60.0 / pairs / period / 67108864.0, "Q10 angle counts a period", "end of the ramp");
     FIELD(forced.increase_rate_q10, OPENLOOP_RAMPSPEED_INCREASERATE / 67108864.0 / (period * period) * 60.0 / pairs, "rpm/s", 0.0,
           "Q10 counts/period^2", "acceleration");
     FIELD(align_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
@@ -196,6 +197,7 @@ static void field_weakening(void)
 {
     double kphi = MOTOR_KPHI_V_PER_KRPM * PARAM_INVKFI;
     GROUP("field weakening");
+    FIELD(fieldweak.index_per_count_q16, 1024.0 / pairs, "rpm", 0.0, "Q16 entries/erpm", "entries are so far apart");
     FIELD(fieldweak.trim_speed_erpm, FW_START_SPEED_RPM * 0.6, "rpm", erpm, "erpm", "speed from which it acts");
 #define ENTRY(i) \
     FIELD(fieldweak.idref_q13[i], IDREF_SPEED##i, "A", q13_a, "Q13 A", "d current"); \
@@ -213,7 +215,7 @@ int main(void)
     volt = NOMINAL_BUS_V / sqrt(3.0) * (1.0 - DEADTIME_SEC / LOOPTIME_SEC) / 32768.0;
     ohm = volt / ampere;
     q13_a = 4.0 * ampere;
-    erpm = 1.0 / pairs;
+    erpm = SPEED_UNIT / pairs;
     slots = 8.0 * period;
     motor();
     estimator();

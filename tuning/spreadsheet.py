@@ -19,6 +19,7 @@ from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.progress import waiting
 
 from .design import Design, design
+from .limits import UNIT_ERPM
 
 FILE = paths.ROOT / "tuning" / "tuning_params.xlsx"
 DEFAULT_MOTOR = "hurst_dmb0224c10002"
@@ -60,6 +61,7 @@ DATA = {
 FORMULAS = {x.parameter: f'IF({x.name}="","",{x.formula})' for rows in DATA.values() for x in rows}
 
 IU = "(I0_a/U0_v)"
+TOP_ERPM = "MAXIMUM_SPEED_RPM*NOPOLESPAIRS"
 LARGEST_CURRENT = "MAXIMUM_CURRENT_A/NORM_CURRENT_CONST"
 SCALED = (("NORM_RS", "MOTOR_RS_OHM*I0_a/U0_v*32768", "Rs I0/U0 2^15 (Equation 5)", 1, "phase resistance"),
           ("NORM_LSDTBASE", "MOTOR_LS_MH/1000/LOOPTIME_SEC*I0_a/U0_v*32768", "(Ls/Ts) I0/U0 2^15 (Equation 5)", 8,
@@ -78,18 +80,18 @@ def _pterm(axis: str) -> str:
 
 ITERM = f"2*PI()*CURRENT_BANDWIDTH_HZ*MOTOR_RS_OHM*LOOPTIME_SEC*{IU}"
 KT = "(1.5*MOTOR_KPHI_V_PER_KRPM/SQRT(3)*60/(2000*PI()))"
-SPEED_PTERM = f"2*PI()*SPEED_BANDWIDTH_HZ*MOTOR_INERTIA_KGM2/{KT}*(2*PI()/60)/NOPOLESPAIRS/NORM_CURRENT_CONST/16"
+SPEED_PTERM = f"2*PI()*SPEED_BANDWIDTH_HZ*MOTOR_INERTIA_KGM2/{KT}*(2*PI()/60)/NOPOLESPAIRS/NORM_CURRENT_CONST/16*SPEED_UNIT"
 CONSTANTS = {
     "Motor, in the firmware's formats": (
         ("NORM_RS", f"MIN(MOTOR_RS_OHM*{IU}*16384,32767)", "Q15 / 2", "Equation 5, at most 32767"),
         ("NORM_LSDTBASE", f"MIN(MOTOR_LS_MH/1000/LOOPTIME_SEC*{IU}*128,32767)", "Q15 / 256", "Equation 5, at most 32767"),
-        ("NORM_INVKFIBASE", "SQRT(3)*1000*NOPOLESPAIRS*U0_v/MOTOR_KPHI_V_PER_KRPM*16384", "Q15 / 2", "Equation 6"),
-        ("NORM_DELTAT", "LOOPTIME_SEC/60*2147483648", "Q15 of a turn/erpm", "Equation 1")),
+        ("NORM_INVKFIBASE", "SQRT(3)*1000*NOPOLESPAIRS*U0_v/MOTOR_KPHI_V_PER_KRPM*16384/SPEED_UNIT", "Q15 / 2", "Equation 6"),
+        ("NORM_DELTAT", "LOOPTIME_SEC/60*2147483648*SPEED_UNIT", "Q15 of a turn/erpm", "Equation 1")),
     "Derivative limits: a sine of the largest current, 2 pi (n/60) P Ts Imax": (
         ("estimator.d_ilimit_hs_q14", f"MIN(2*PI()*MAXIMUM_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC*{LARGEST_CURRENT}/2,4095)", "Q14 A", "in a period"),
         ("estimator.d_ilimit_ls_q14", f"MIN(8*2*PI()*MIN(NOMINAL_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC,0.12/8)*{LARGEST_CURRENT}/2,16383)", "Q14 A",
          "in eight periods, of 0.12 turns at most")),
-    "Speeds": tuple((field, f"{name}*NOPOLESPAIRS{part}", "erpm", meaning) for field, name, part, meaning in (
+    "Speeds": tuple((field, f"{name}*NOPOLESPAIRS{part}/SPEED_UNIT", "erpm", meaning) for field, name, part, meaning in (
         ("minimum_erpm", "MINIMUM_SPEED_RPM", "", "potentiometer at zero"),
         ("nominal_erpm", "NOMINAL_SPEED_RPM", "", "potentiometer at full scale, S3 off"),
         ("maximum_erpm", "MAXIMUM_SPEED_RPM", "", "potentiometer at full scale, S3 on"),
@@ -239,7 +241,9 @@ def _constants(book: Any) -> None:
     page.heads("Constant", "Formula", "Before division", "2^", "Yours", "Stored", "Error %", "Product >>", "Check", "Meaning")
     page.section("Base quantities")
     for name, formula, text in (("U0_v", "NOMINAL_BUS_V/SQRT(3)*(1-DEADTIME_SEC/LOOPTIME_SEC)/32768", "Vdc/sqrt(3) (1 - Td/Ts) / 2^15, V per count"),
-                                ("I0_a", "NORM_CURRENT_CONST", "Ipeak / 2^15 (Equation 8), A per count")):
+                                ("I0_a", "NORM_CURRENT_CONST", "Ipeak / 2^15 (Equation 8), A per count"),
+                                ("SPEED_UNIT", f"IF({TOP_ERPM}<={UNIT_ERPM:.0f},1,IF({TOP_ERPM}<={2 * UNIT_ERPM:.0f},2,4))",
+                                 "electrical rpm of a count of the firmware's speeds")):
         row = page.line((name, "code"), (text, "label"), (f"={formula}", "result"))
         book.name(name, "Constants", f"C{row}")
     page.section("AN1292's constants, for its own software; foc33 derives its own from userparams.h")

@@ -43,6 +43,20 @@ static char *put_retry(char *at)
     return text_put_unsigned(text_put(text_put_unsigned(text_put(at, " retries "), board_retry.left), " first "), board_retry.first);
 }
 
+/** Mechanical rpm; what a lost estimator sees may be more than a word holds. */
+static int16_t speed_rpm(speed_erpm_t speed)
+{
+    int32_t rpm;
+    if (SPEED_UNIT == 1) {
+        return (int16_t)(speed / NOPOLESPAIRS);
+    }
+    rpm = (int32_t)speed * SPEED_UNIT / NOPOLESPAIRS;
+    if (rpm > INT16_MAX) {
+        return INT16_MAX;
+    }
+    return (int16_t)((rpm < -INT16_MAX) ? -INT16_MAX : rpm);
+}
+
 /** The line's text. @return its end */
 static char *put_line(void)
 {
@@ -50,7 +64,7 @@ static char *put_line(void)
     if (at == line) {
         at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
         at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
-        at = text_put_signed(text_put(at, " speed "), (int16_t)(estimator_speed(&board_drive.run.estimator) / NOPOLESPAIRS));
+        at = text_put_signed(text_put(at, " speed "), speed_rpm(estimator_speed(&board_drive.run.estimator)));
         at = put_limits(put_retry(text_put(at, " rpm")));
         at = text_put(selftest_put(at), "\r\n");
     }

@@ -8,8 +8,9 @@ void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t 
 
     model->kfilter_esdq_q16 = p->kfilter_esdq_q16;
     if (above > 0) {
-        index = (uint16_t)above >> SPEED_INDEX_CONST;
-        fraction_q16 = (uint16_t)((uint16_t)above << (16 - SPEED_INDEX_CONST));
+        uint32_t place_q16 = qm_muluu((uint16_t)above, p->index_per_count_q16);
+        index = (uint16_t)(place_q16 >> 16);
+        fraction_q16 = (uint16_t)place_q16;
         model->kfilter_esdq_q16 = p->kfilter_esdq_fw_q16;
         if (index > FIELDWEAK_ENTRIES - 2) {
             index = FIELDWEAK_ENTRIES - 2;

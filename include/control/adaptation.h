@@ -9,7 +9,7 @@
 
 #include "control/estimator.h"
 
-#define ADAPTATION_KFI_LEAST 1024 /**< 2048 erpm at full voltage: a count is 0.1 % */
+#define ADAPTATION_KFI_LEAST 1024 /**< a speed of 2048 counts at full voltage: a count is 0.1 % */
 
 /** Constants. */
 typedef struct {

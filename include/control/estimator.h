@@ -13,8 +13,8 @@ typedef struct {
     int16_t resistive_max_q13;    /**< limit of Rs i of an axis, Q13 voltage >> rs_exp: what the header's Rs gives at the trip level */
     int16_t d_ilimit_ls_q14;      /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
     int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
-    int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and electrical rpm (NORM_DELTAT, unrounded) */
-    int16_t half_step_q16_rad;    /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per erpm, as high-word factor */
+    int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and count of speed (NORM_DELTAT, unrounded) */
+    uint16_t half_step_q16_rad;   /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per count of speed, as high-word factor */
     int16_t kfilter_velestim_q16; /**< speed filter, 2 * KFILTER_VELESTIM */
     speed_erpm_t nominal_erpm;    /**< EIGHT_SAMPLES_ERPM: above, the derivative spans one sample instead of eight */
     speed_erpm_t decimate_erpm;   /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
@@ -43,7 +43,7 @@ typedef struct {
     int16_t half_step_q16_rad;                  /**< half the angle step of a period, radians * 65536 */
 } estimator_t;
 
-/** Filtered speed in electrical rpm. */
+/** Filtered speed. */
 QM_INLINE speed_erpm_t estimator_speed(const estimator_t *e)
 {
     return qm_hi(e->omega_filtered_q16);
@@ -134,7 +134,7 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
     int16_t sum = (int16_t)((sign >= 0) ? e_q - e_d : e_q + e_d);
     e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
     e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32));
-    e->half_step_q16_rad = qm_mulhi(e->omega_erpm, p->half_step_q16_rad);
+    e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, p->half_step_q16_rad);
     (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
 }
 

@@ -16,10 +16,11 @@ typedef struct {
     int16_t inv_kfi[FIELDWEAK_ENTRIES];         /**< INVKFI_SPEED0..17: 1/Kphi, AN1292's format */
     int16_t ls_over2ls0_q15[FIELDWEAK_ENTRIES]; /**< LS_OVER2LS0_SPEED0..17: Ls/(2 Ls0), Q15, 16384 = no change */
     speed_erpm_t on_speed_erpm;                 /**< speed reference where field weakening starts (qFwOnSpeed) */
+    uint16_t index_per_count_q16;               /**< table steps a count of speed: 2^(16 - SPEED_INDEX_CONST) where it is an electrical rpm */
     uint16_t ls_base_q16;                       /**< estimator's ls_q16 at index 0 */
     int16_t kfilter_esdq_q16;                   /**< back-EMF filter up to the start speed */
     int16_t kfilter_esdq_fw_q16;                /**< and above */
-    uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per erpm */
+    uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per count of speed */
     int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
     int16_t trim_step_q13;                      /**< its change per step (2^3 periods) */
     speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */

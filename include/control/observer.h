@@ -20,8 +20,8 @@
 #define OBSERVER_HALF_Q15 12288    /**< so quick up to one and a half of what is large: dead time may be behind it */
 #define OBSERVER_CALM_SHIFT 6      /**< after a large innovation the quick rate fades by 1/64 a step */
 
-/** Constants. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a
- *  count of current gives 1/2 to 1 of it. */
+/** Constants; `erpm` stands for counts of speed_erpm_t. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per
+ *  step / 2^shift, chosen so that a count of current gives 1/2 to 1 of it. */
 typedef struct {
     int16_t deltat_q32;                       /**< angle per period and erpm, see estimator_params_t */
     int16_t per_turn_q12;                     /**< speed that turns 2^16 counts of the angle's 2^32 further in a step, erpm * 4096 */
@@ -137,7 +137,7 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
 QM_INLINE QM_WRAPS int16_t observer_innovation(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t omega_erpm)
 {
     uint32_t turned = qm_turn_sub(rho_q32, o->rho_q32), expected = (uint32_t)qm_mulss(omega_erpm, p->deltat_q32);
-    /* rounded: a count of `more` is 2 erpm, so that half of one would be an offset of the speed */
+    /* rounded: a count of `more` is 2 electrical rpm, so that half of one would be an offset of the speed */
     int16_t more = qm_clamp(qm_hi((int32_t)qm_turn_add(qm_turn_sub(turned, 8u * expected), 32768u)), -8192, 8191);
     o->rho_q32 = rho_q32;
     return qm_clamp((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), (int16_t)-p->innovation_max_erpm, p->innovation_max_erpm);

@@ -17,7 +17,7 @@ typedef int16_t current_q14_t; /**< alpha and beta currents: 16384 = full-scale 
 typedef int16_t voltage_q14_t; /**< d and q voltages: 16384 = full-scale voltage */
 typedef int16_t voltage_q13_t; /**< alpha and beta voltages and back-EMF: 8192 = full-scale voltage */
 typedef int16_t voltage_q12_t; /**< d and q back-EMF: 4096 = full-scale voltage (4 times the range of Q14) */
-typedef int16_t speed_erpm_t;  /**< electrical revolutions per minute, AN1292's speed unit */
+typedef int16_t speed_erpm_t;  /**< counts of electrical revolutions per minute, AN1292's speed unit: 1, or SPEED_UNIT (drive/param_scaling.h) of a quick motor */
 typedef uint16_t angle_t;      /**< 65536 = one electrical turn; wraps on purpose */
 typedef int16_t q15_t;         /**< fraction, 32768 = 1 */
 typedef uint16_t duty_t;       /**< PWM on-time of the high side, 2000 = 100 % at 20 kHz */

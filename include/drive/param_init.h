@@ -23,10 +23,10 @@
         .d_ilimit_ls_q14 = D_ILIMIT_LS_Q14, \
         .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
-        .half_step_q16_rad = (int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F), \
+        .half_step_q16_rad = (uint16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F * PARAM_F(SPEED_UNIT)), \
         .kfilter_velestim_q16 = 2 * (KFILTER_VELESTIM), \
-        .nominal_erpm = (int16_t)EIGHT_SAMPLES_ERPM, \
-        .decimate_erpm = (int16_t)DECIMATE_NOMINAL_SPEED \
+        .nominal_erpm = (int16_t)SPEED_COUNTS(EIGHT_SAMPLES_ERPM), \
+        .decimate_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(DECIMATE_NOMINAL_SPEED)) \
     }
 
 #define PARAM_FIELDWEAK_INIT \
@@ -34,14 +34,15 @@
         .idref_q13 = PARAM_18(PARAM_IDREF), \
         .inv_kfi = PARAM_18(PARAM_INVKFI_ENTRY), \
         .ls_over2ls0_q15 = PARAM_18(PARAM_LS_ENTRY), \
-        .on_speed_erpm = (int16_t)FW_START_SPEED_ERPM, \
+        .on_speed_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(FW_START_SPEED_ERPM)), \
+        .index_per_count_q16 = (uint16_t)(SPEED_UNIT * (65536l >> SPEED_INDEX_CONST)), \
         .ls_base_q16 = PARAM_SCALED(PARAM_LS_FULL, PARAM_LS_EXP), \
         .kfilter_esdq_q16 = 2 * (KFILTER_ESDQ), \
         .kfilter_esdq_fw_q16 = 2 * (KFILTER_ESDQ_FW), \
-        .esdq_per_erpm_q13 = (uint16_t)(PARAM_ESDQ_PER_ERPM * 8192.0F + 0.5F), \
+        .esdq_per_erpm_q13 = (uint16_t)PARAM_MIN(PARAM_ESDQ_PER_COUNT * 8192.0F + 0.5F, 65535.0F), \
         .trim_max_q13 = CURRENT_Q13(FW_TRIM_CURRENT_A), \
         .trim_step_q13 = 2, \
-        .trim_speed_erpm = (int16_t)PARAM_ROUND(PARAM_F(FW_START_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 0.6F) \
+        .trim_speed_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(FW_START_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 0.6F)) \
     }
 
 #define PARAM_SVM_INIT \
@@ -72,10 +73,10 @@
         .innovation_max_erpm = (int16_t)PARAM_INNOVATION_MAX, \
         .load_max = (int16_t)(PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) * PARAM_ACCEL_UNITS), \
         .quiet_q16 = (int16_t)PARAM_QUIET_Q16, .loaded_q16 = (int16_t)PARAM_LOADED_Q16, .quick_q16 = (int16_t)PARAM_QUICK_Q16, \
-        .full_erpm = (int16_t)PARAM_FULL_ERPM, .load_from = (int16_t)PARAM_LOAD_FROM, \
+        .full_erpm = (int16_t)SPEED_COUNTS(PARAM_FULL_ERPM), .load_from = (int16_t)PARAM_LOAD_FROM, \
         .load_width = (int16_t)PARAM_LOAD_FROM, .load_slope_q15 = (int16_t)(32767.0F / PARAM_LOAD_FROM), \
-        .large_erpm = (int16_t)PARAM_LARGE_ERPM, \
-        .large_loaded_erpm = (int16_t)PARAM_LARGE_LOADED_ERPM \
+        .large_erpm = (int16_t)SPEED_COUNTS(PARAM_LARGE_ERPM), \
+        .large_loaded_erpm = (int16_t)SPEED_COUNTS(PARAM_LARGE_LOADED_ERPM) \
     }
 
 #define PARAM_PI_INIT(p, i, c, s) \
@@ -118,13 +119,13 @@
         .bus_regen_q15 = BUS_Q15(REGEN_LIMIT_V), \
         .brake_per_bus_q8 = (int16_t)(256.0F * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(2.0F)) + 0.5F), /* to nothing in 2 V */ \
             .bus_nominal_q15 = BUS_Q15(NOMINAL_BUS_V), \
-        .minimum_erpm = (int16_t)MINIMUM_SPEED_ERPM, \
-        .nominal_erpm = (int16_t)NOMINAL_SPEED_ERPM, \
-        .maximum_erpm = (int16_t)MAXIMUMSPEED_ELECTR, \
-        .end_erpm = (int16_t)ENDSPEED_ELECTR, \
+        .minimum_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(MINIMUM_SPEED_ERPM)), \
+        .nominal_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(NOMINAL_SPEED_ERPM)), \
+        .maximum_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(MAXIMUMSPEED_ELECTR)), \
+        .end_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(ENDSPEED_ELECTR)), \
         .speed_ramp_q16 = SPEEDREFRAMP, \
         .tuning_step_q16 = TUNING_STEP_Q16, \
-        .ramp_hold_erpm = (int16_t)PARAM_ROUND(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F), \
+        .ramp_hold_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F)), \
         .stall_steps = PARAM_SLOW_STEPS(PARAM_F(PARAM_STALL_SEC)), \
         .lost_lock_steps = PARAM_SLOW_STEPS(0.05F), \
         .pot_zero_q16 = (uint16_t)(PARAM_F(POT_LIVE_ZERO) * 65536.0F + 0.5F), \
@@ -137,7 +138,7 @@
         .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
         .ls_off = Q15(PARAM_L_OFF), \
         .dead_emf_q12 = (int16_t)(VOLTAGE_Q14(2.0F * PARAM_DEAD_TIME_V) / 4), \
-        .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 1.25F, 32700.0F)) \
+        .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(SPEED_COUNTS(PARAM_TOP_ERPM * 1.25F), 32700.0F)) \
     }
 
 #endif

@@ -14,6 +14,14 @@
 #define PARAM_PI 3.14159265F
 #define PARAM_SQRT3 1.73205081F
 
+/* ---- The unit of speed: a count of a speed_erpm_t is so many electrical rpm that the maximum speed, with what it may overshoot, fits a word ---- */
+#define SPEED_UNIT_ERPM 32000 /* most with one electrical rpm a count; the tuner reads it */
+#define PARAM_TOP_ERPM (PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS))
+#define SPEED_UNIT ((PARAM_TOP_ERPM <= PARAM_F(SPEED_UNIT_ERPM)) ? 1 : (PARAM_TOP_ERPM <= 2.0F * PARAM_F(SPEED_UNIT_ERPM)) ? 2 \
+                                                                                                                           : 4)
+/** Counts of so many electrical rpm, as a float. */
+#define SPEED_COUNTS(erpm) (PARAM_F(erpm) / PARAM_F(SPEED_UNIT))
+
 /** Q15 of a fraction, rounded as AN1292 does: positive * 32767, negative * 32768. */
 #define Q15(x) ((int16_t)((PARAM_F(x) < 0.0F) ? PARAM_F(x) * 32768.0F - 0.5F : PARAM_F(x) * 32767.0F + 0.5F))
 /** Counts of a current in AN1292's format (Q15 of full scale): NORM_CURRENT(1.41) = 11653 at 0.000121 A/count. */
@@ -28,11 +36,11 @@
 #define PARAM_AN1292(x) ((int16_t)PARAM_ROUND(((x) < 32767.0F) ? (x) : 32767.0F))
 #define NORM_RS PARAM_AN1292(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F)
 #define NORM_LSDTBASE PARAM_AN1292(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F)
-#define PARAM_INVKFI (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) * NORM_VOLTAGE_CONST / PARAM_F(MOTOR_KPHI_V_PER_KRPM) * 16384.0F)
+#define PARAM_INVKFI (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) * NORM_VOLTAGE_CONST / PARAM_F(MOTOR_KPHI_V_PER_KRPM) * 16384.0F / PARAM_F(SPEED_UNIT))
 #define NORM_INVKFIBASE ((int16_t)PARAM_ROUND(PARAM_INVKFI))
-#define NORM_DELTAT ((int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 2147483648.0F))
+#define NORM_DELTAT ((int16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) / 60.0F * 2147483648.0F * PARAM_F(SPEED_UNIT)))
 
-/* ---- Speeds in electrical rpm ---- */
+/* ---- Speeds in electrical rpm; param_init.h makes counts of them ---- */
 #define PARAM_ERPM(rpm) PARAM_ROUND(PARAM_F(rpm) * PARAM_F(NOPOLESPAIRS))
 #define MINIMUM_SPEED_ERPM PARAM_ERPM(MINIMUM_SPEED_RPM)
 #define NOMINAL_SPEED_ERPM PARAM_ERPM(NOMINAL_SPEED_RPM)
@@ -48,8 +56,8 @@
 #define BUS_Q15(voltage_v) ((int16_t)PARAM_ROUND(PARAM_F(voltage_v) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F))
 
 /* ---- Estimator ---- */
-/** Angle per period and electrical rpm, 2^32 a turn (NORM_DELTAT, unrounded). */
-#define PARAM_DELTAT_Q32 (PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F)
+/** Angle per period and count of speed, 2^32 a turn (NORM_DELTAT, unrounded). */
+#define PARAM_DELTAT_Q32 (PARAM_F(LOOPTIME_SEC) / 60.0F * 4294967296.0F * PARAM_F(SPEED_UNIT))
 #define PARAM_EXP(x) ((uint16_t)(((x) < 65535.0F) ? 0 : ((x) < 131071.0F) ? 1 \
                                                     : ((x) < 262143.0F)   ? 2 \
                                                                           : 3))
@@ -98,9 +106,9 @@
 #ifndef Q_CURRCNTR_CTERM
 #define Q_CURRCNTR_CTERM 0.999
 #endif
-#ifndef SPEEDCNTR_PTERM /* 2 pi f J/Kt, in A per electrical rpm, over I0 (Q15 counts), /16 */
+#ifndef SPEEDCNTR_PTERM /* 2 pi f J/Kt, in A per count of speed, over I0 (Q15 counts), /16 */
 #define SPEEDCNTR_PTERM (2.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(MOTOR_INERTIA_KGM2) / PARAM_KT \
-                         * (2.0F * PARAM_PI / 60.0F) / PARAM_F(NOPOLESPAIRS) / PARAM_F(NORM_CURRENT_CONST) / 16.0F)
+                         * (2.0F * PARAM_PI / 60.0F) / PARAM_F(NOPOLESPAIRS) / PARAM_F(NORM_CURRENT_CONST) / 16.0F * PARAM_F(SPEED_UNIT))
 #endif
 #define CURRENT_PI_SHIFT 10u
 #define PARAM_KP(pterm) ((int16_t)PARAM_ROUND(PARAM_F(pterm) * 32768.0F))
@@ -135,7 +143,7 @@
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC (8.0F * PARAM_F(LOOPTIME_SEC))
-#define SPEEDREFRAMP PARAM_ROUND(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS) / SLOW_STEPS_PER_SEC * 65536.0F)
+#define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)
 /* ---- Load observer (control/observer.h), adaptation, low speed. Rates in rad/s times the slow step. The tuner reads the ratios. ---- */
 #define PARAM_QUIET_RATIO 1.22  /* rate without load over SPEED_BANDWIDTH_HZ */
 #define PARAM_LOADED_SHARE 0.3  /* rate under load over LOAD_BANDWIDTH_HZ */
@@ -144,9 +152,9 @@
 #define PARAM_ESDQ_RATIO 5      /* corner of the back-EMF filter at low speed over the electrical frequency */
 #define PARAM_LOWEST_SHARE 0.65 /* back-EMF over dead-time voltage at the lowest speed at which a rotor is held; times 1732 in a message of the table */
 #define PARAM_CALM_SHARE 0.4    /* most of SPEED_BANDWIDTH_HZ over the electrical frequency: beyond it the speed hunts without load; over 2.7 in a message */
-/** Acceleration of a count of q current, erpm a step; 2^PARAM_ACCEL_SHIFT of the observer's units are an erpm a step. */
+/** Acceleration of a count of q current, counts of speed a step; 2^PARAM_ACCEL_SHIFT of the observer's units are one of them. */
 #define PARAM_ACCEL (PARAM_KT / PARAM_F(MOTOR_INERTIA_KGM2) * PARAM_F(NOPOLESPAIRS) * 60.0F / (2.0F * PARAM_PI) * 4.0F * PARAM_F(NORM_CURRENT_CONST) \
-                     * PARAM_STEP_SEC)
+                     * PARAM_STEP_SEC / PARAM_F(SPEED_UNIT))
 #define PARAM_ACCEL_SHIFT ((uint16_t)(PARAM_ACCEL >= 0.5F               ? 0 \
                                       : PARAM_ACCEL >= 0.25F            ? 1 \
                                       : PARAM_ACCEL >= 0.125F           ? 2 \
@@ -185,9 +193,9 @@
 /** q current that a sample misses which is taken this long after the centre of the low sides' conduction: delay psi w/L. */
 #define SAMPLE_DELAY_CLOCKS 60
 #define PARAM_SAMPLE_SHIFT_Q16 (PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC / PARAM_ERPM_PER_V / (PARAM_F(MOTOR_LS_MH) * 0.001F) \
-                                / PARAM_F(NORM_CURRENT_CONST) / 4.0F * 65536.0F)
-/** The back-EMF filter's corner at low speed is five times the electrical frequency: K per erpm. */
-#define PARAM_ESDQ_PER_ERPM (65536.0F * 2.0F * PARAM_PI * PARAM_F(PARAM_ESDQ_RATIO) / 60.0F * PARAM_F(LOOPTIME_SEC))
+                                / PARAM_F(NORM_CURRENT_CONST) / 4.0F * 65536.0F * PARAM_F(SPEED_UNIT))
+/** The back-EMF filter's corner at low speed is five times the electrical frequency: K per count of speed. */
+#define PARAM_ESDQ_PER_COUNT (65536.0F * 2.0F * PARAM_PI * PARAM_F(PARAM_ESDQ_RATIO) / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT))
 
 /* ---- How far the header may be off, as make robust promises (tools/bench/scenarios/tables/robust.toml) ---- */
 #define PARAM_R_LEAST 0.7 /* true R over the header's */
@@ -199,7 +207,7 @@
 #define PARAM_ID_OFF (PARAM_F(MAXIMUM_CURRENT_A) / 32.0F + 0.2F * PARAM_DEAD_TIME_V * PARAM_IU / (16.0F * PARAM_F(D_CURRCNTR_PTERM)))
 #define PARAM_STALL_SEC 0.23 /* below half the reference; until a standing rotor shows takes up to 0.08 s more */
 
-/** TUNING's ramp: Q16 electrical rpm per slow step. */
-#define TUNING_STEP_Q16 (PARAM_ROUND(8.0F * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
+/** TUNING's ramp: Q16 of a count per slow step. */
+#define TUNING_STEP_Q16 (PARAM_ROUND(SPEED_COUNTS(8.0F) * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 
 #endif

@@ -85,8 +85,10 @@
     X(stem##10, __VA_ARGS__) X(stem##11, __VA_ARGS__) X(stem##12, __VA_ARGS__) X(stem##13, __VA_ARGS__) X(stem##14, __VA_ARGS__) \
     X(stem##15, __VA_ARGS__) X(stem##16, __VA_ARGS__) X(stem##17, __VA_ARGS__)
 
-/* Ends of number formats that the tuner keeps to as well: electrical rpm, the trip level's share of the current range, and what a count of current accelerates. */
-#define PARAM_LARGEST_ERPM 32000
+/* Ends that the tuner keeps to as well: electrical rpm, beyond SPEED_UNIT_ERPM also turns a period * 60; rated ones a count of SPEED_UNIT; the trip level's
+ * share of the current range; what a count of current accelerates. */
+#define PARAM_LARGEST_ERPM 75000
+#define PARAM_LARGEST_TURN 3.75
 #define PARAM_LARGEST_NOMINAL_ERPM 27000
 #define PARAM_TRIP_SHARE 0.865
 #define PARAM_ACCEL_MOST 1.0
@@ -121,10 +123,14 @@
     X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, PARAM_NAMED(NOMINAL_SPEED_RPM) " must be above " PARAM_NAMED(MINIMUM_SPEED_RPM)) \
     X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, PARAM_NAMED(MAXIMUM_SPEED_RPM) " must be at least " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
     X(FW_START_SPEED_RPM < MAXIMUM_SPEED_RPM, PARAM_NAMED(FW_START_SPEED_RPM) " must be below " PARAM_NAMED(MAXIMUM_SPEED_RPM)) \
-    X(PARAM_F(MAXIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_ERPM), \
-      "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000: speeds are 16-bit electrical rpm") \
-    X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_NOMINAL_ERPM), \
-      "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000: lower NOMINAL_SPEED_RPM, the one-sample derivative then starts earlier") \
+    X(PARAM_TOP_ERPM <= PARAM_F(PARAM_LARGEST_ERPM), \
+      PARAM_NAMED(MAXIMUM_SPEED_RPM) " times " PARAM_NAMED(NOPOLESPAIRS) " must be at most 75000 electrical rpm: lower MAXIMUM_SPEED_RPM") \
+    X(PARAM_TOP_ERPM <= PARAM_F(SPEED_UNIT_ERPM) || PARAM_TOP_ERPM * PARAM_F(LOOPTIME_SEC) <= 1.0001F * PARAM_F(PARAM_LARGEST_TURN), \
+      PARAM_NAMED(MAXIMUM_SPEED_RPM) " times NOPOLESPAIRS must be at most 3.75 / LOOPTIME_SEC above 32000 electrical rpm, a sixteenth of a turn " \
+      "a period: lower it, or shorten LOOPTIME_SEC") \
+    X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_NOMINAL_ERPM) * PARAM_F(SPEED_UNIT), \
+      "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000 (54000 where MAXIMUM_SPEED_RPM is above 32000 electrical rpm): lower NOMINAL_SPEED_RPM, " \
+      "the one-sample derivative then starts earlier") \
     X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, PARAM_NAMED(END_SPEED_RPM) " must be at most " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
     X(PARAM_RS_FULL < 524287.0F, \
       PARAM_NAMED(MOTOR_RS_OHM) " does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
@@ -134,6 +140,9 @@
     X(PARAM_INVKFI >= 1024.0F && PARAM_INVKFI < 32767.0F, \
       PARAM_NAMED(MOTOR_KPHI_V_PER_KRPM) " does not fit 1/Kphi's Q format (1024 .. 32767): check its unit, V peak line to line per " \
       "1000 rpm") \
+    X(PARAM_INVKFI >= 32767.0F || (PARAM_F(INVKFI_SPEED0) >= 0.6F * PARAM_INVKFI && PARAM_F(INVKFI_SPEED0) <= 1.6F * PARAM_INVKFI), \
+      PARAM_NAMED(INVKFI_SPEED0) " must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that; a table for another motor, or for another side of 32000 or " \
+      "64000 electrical rpm of MAXIMUM_SPEED_RPM, counts otherwise") \
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
       PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \

@@ -16,7 +16,7 @@ enum {
     RECORDER_V_D, /**< commanded, Q14 */
     RECORDER_V_Q,
     RECORDER_ANGLE, /**< control angle of the next sample; its lowest three bits are the state */
-    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed, electrical rpm */
+    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed */
     RECORDER_WORDS  /**< of a row: 12 bytes */
 };
 #define RECORDER_STATE_BITS 7u

@@ -14,6 +14,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 SEED = 1292
 EDGES = [-32768, -32767, -16384, -256, -1, 0, 1, 2, 255, 16384, 32767]
 MACHINE = ref.Machine()
+QUICK = ref.Machine(rs_ohm=0.45, ls_h=0.3e-3, kphi=1.8, pole_pairs=7, maximum_current_a=2.6, nominal_rpm=10000.0, maximum_rpm=10500.0,
+                    inertia_kgm2=2.5e-6, speed_hz=23.0, load_hz=54.0) # 1225 Hz: a count of speed is 4 electrical rpm
 
 
 @dataclass
@@ -321,12 +323,12 @@ ESTIMATOR_FORMAT = ("currents Q14, voltages Q13 (the vector given to the modulat
 ESTIMATOR_COLUMNS = "i_alpha:s16 i_beta:s16 v_alpha:s16 v_beta:s16 omega:s16 rho:u16"
 
 
-def estimator_sequence(v, speed, current, closed_from, inv_kfi, compare_from):
-    """@param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio
+def estimator_sequence(v, speed, current, closed_from, inv_kfi, compare_from, m=MACHINE, kfilter_esdq=1200):
+    """@param speed electrical rpm @param inv_kfi ratio to the true one, a value for every sample @param compare_from samples that count for the ratio
     @return angle of the rotor in turns for every sample"""
-    m, p = MACHINE, MACHINE.estimator()
-    v.constants = dict(p, kfilter_esdq_q16=2400, closed_from=closed_from)
-    model, real = ref.Estimator(p), ref.EstimatorReal(m)
+    p = m.estimator()
+    v.constants = dict(p, kfilter_esdq_q16=2 * kfilter_esdq, closed_from=closed_from)
+    model, real = ref.Estimator(p, 2 * kfilter_esdq), ref.EstimatorReal(m, kfilter_esdq / 32768)
     amperes, volts, turns = ref.synthetic_motor(m, speed, current)
     frame = ref.sincos(0)
     for n, (i, u) in enumerate(zip(amperes, volts)):
@@ -338,13 +340,13 @@ def estimator_sequence(v, speed, current, closed_from, inv_kfi, compare_from):
             model.tick_closed(now, p["ls_q16"], kfi, frame)
         else:
             model.tick_free(now, p["ls_q16"], kfi)
-        real.tick(complex(*now) * 2 * m.i0, kfi / 16384 / m.inv_kfi, closed)
+        real.tick(complex(*now) * 2 * m.i0, kfi * m.speed_unit / 16384 / m.inv_kfi, closed)
         frame = ref.sincos(model.next_angle())
         model.commanded(command)
         real.commanded(complex(*command) * 4 * m.u0)
         v.rows.append([*now, *command, model.omega, model.rho >> 16] + ([kfi] if "inv_kfi" in v.columns else []))
         if n in compare_from:
-            v.compare([real.omega, 0.0], [model.omega, ref.wrap16(model.rho // 65536 - round(real.rho * 65536))])
+            v.compare([real.omega, 0.0], [model.omega * m.speed_unit, ref.wrap16(model.rho // 65536 - round(real.rho * 65536))])
     return turns
 
 
@@ -357,9 +359,9 @@ def require_lock(v, turns, speed, n, expected_deg, within_deg):
         raise ValueError(f"{v.name}: the angle error is {error_deg:.2f} deg, expected {expected_deg:.2f}")
 
 
-def locked_sequence(v, speed, current, closed_from, compare_from, within_deg):
+def locked_sequence(v, speed, current, closed_from, compare_from, within_deg, *more):
     """A sequence with the right Kphi that ends on the rotor's angle."""
-    turns = estimator_sequence(v, speed, current, closed_from, [1.0] * len(speed), compare_from)
+    turns = estimator_sequence(v, speed, current, closed_from, [1.0] * len(speed), compare_from, *more)
     require_lock(v, turns, speed, -1, 0.0, within_deg)
 
 
@@ -378,6 +380,14 @@ def estimator_speed(v, _):
     current = profile([(0, 0.5j), (500, 0.5j), (520, 2j), (1000, 1j), (1900, -2.2 + 0.4j), (2100, -2.2 + 0.4j),
                        (2110, -2.2 + 1.0j), (2500, -2.2 + 1.0j)])
     locked_sequence(v, speed, current, 0, range(500, 2500), 1.5)
+
+
+@block("estimator of a motor whose count of speed is 4 electrical rpm: lock, load step, across eight samples' end, 1225 Hz with load",
+       ESTIMATOR_FORMAT.replace("omega electrical rpm", "omega 4 electrical rpm"), ESTIMATOR_COLUMNS, 50.0)
+def estimator_quick(v, _):
+    speed = profile([(0, 14000.0), (400, 14000.0), (700, 22000.0), (2000, 73500.0), (2800, 73500.0)])
+    current = profile([(0, 0.3j), (300, 0.3j), (320, 1.9j), (2300, 1.9j), (2310, 0.3j), (2500, 0.3j), (2510, -1.5 + 1.5j), (2800, -1.5 + 1.5j)])
+    locked_sequence(v, speed, current, 0, range(300, 2800), 2.0, QUICK, 4348)
 
 
 @block("estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
@@ -428,6 +438,19 @@ def fieldweak(v, rng):
             continue
         out = ref.fieldweak(PUBLISHED, on_speed, ls_base, x)
         v.add([x], out, ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x), [out[1], out[2], out[3]])
+
+
+@block("table look-up where a count of speed is 2 or 4 electrical rpm: an entry is still 1024 electrical rpm wide",
+       "ref counts; id Q13; ls_q16", "unit:u16 ref:s16 index:u16 idref:s16 inv_kfi:s16 ls_q16:u16 above:u16", least_db=86.0)
+def fieldweak_quick(v, rng):
+    on_speed, ls_base = 13000, MACHINE.estimator()["ls_q16"]
+    v.constants = {"on_speed": on_speed, "ls_base": ls_base}
+    for unit in (2, 4):
+        wide = 1024 // unit
+        speeds = [0, 12999] + [on_speed + wide * i + d for i in range(18) for d in (-1, 0, 1, wide // 2 - 1, wide - 1)]
+        for x in [*speeds, 32000, 32767, -32767, *dither(rng, 13000, 13000 + 18 * wide, 20)]:
+            out = ref.fieldweak(PUBLISHED, on_speed, ls_base, x, unit)
+            v.add([unit, x], out, ref.fieldweak_real(PUBLISHED, on_speed, ls_base, x, unit), [out[1], out[2], out[3]])
 
 
 @block("the back-EMF filter over the speed: its floor, the slope, the full value",
@@ -523,25 +546,38 @@ def observe(v, model, op, heavy, reference, rho, iq, real=None):
 def observer(v, rng):
     v.constants = {f"{prefix}{k}": x for prefix, p in zip(("", "h_"), OBSERVED) for k, x in p.items()}
     for heavy, erpm, load, on in ((0, 2500, 1500, 200), (0, -2500, 900, 200), (0, 750, 500, 800), (1, 2500, 1000, 250)):
-        p, off = OBSERVED[heavy], on + 200 + 200 * heavy
-        model, real = ref.Observer(p), ref.ObserverReal(p)
-        unit = p["per_current_q16"] / 65536
-        gain = (0.012, 0.003)[heavy] * 2 ** p["shift"] / unit # counts of current per electrical rpm
-        speed, turns, wanted = float(erpm), 0.3, erpm
-        observe(v, model, 1, heavy, erpm, round(turns * 2 ** 32) % 2 ** 32, 40, real)
-        for n in range(off + 150):
-            if n == off + 75:
-                wanted = erpm + (200 if erpm > 0 else -200)
-            iq = round(ref.clamp(gain * model.part / 32768 * (wanted - model.speed) + model.load_q26() / 8192, -5120, 5120))
-            torque = (load if on <= n < off else 25) * (1 if speed > 0 else -1)
-            before = speed
-            speed += (iq - torque) * unit / 2 ** p["shift"]
-            turns += (before + speed) / 2 * 8 * MACHINE.turns_per_erpm
-            seen = turns + rng.uniform(-0.0001, 0.0001) # what dead time leaves on the angle
-            observe(v, model, 0, heavy, wanted, round(seen * 2 ** 32) % 2 ** 32, iq + rng.randrange(-8, 9), real)
-            missed = abs(model.load_q26() / 8192 - torque)
-            if n in (on - 1, off - 1) and (abs(model.speed - speed) > 10 or missed > 30 + 0.03 * abs(torque)):
-                raise ValueError(f"observer: {model.speed} erpm, not {speed:.0f}, load {missed:.0f} counts off")
+        observed_shaft(v, rng, (heavy, OBSERVED[heavy], (0.012, 0.003)[heavy]), erpm, load, on, on + 200 + 200 * heavy)
+
+
+@block("observer where a count of speed is 4 electrical rpm: load on and off at 1167 Hz both ways, half a turn in a step, and at 140 Hz",
+       OBSERVER_FORMAT.replace("ref electrical rpm", "ref 4 electrical rpm").replace("heavy 1 = the constants h_", "heavy 2"), OBSERVER_COLUMNS, least_db=55.0)
+def observer_quick(v, rng):
+    v.constants = QUICK.observer()
+    for counts, load in ((17500, 1500), (-17500, 900), (2100, 900)):
+        observed_shaft(v, rng, (2, QUICK.observer(), 0.012), counts, load, 250, 450, QUICK.speed_unit)
+
+
+def observed_shaft(v, rng, rotor, erpm, load, on, off, speed_unit=1):
+    """@param rotor its number in the rows, its constants, and by how much of an error of the speed its controller corrects it in a step"""
+    heavy, p, share = rotor
+    model, real = ref.Observer(p), ref.ObserverReal(p)
+    unit = p["per_current_q16"] / 65536
+    gain = share * 2 ** p["shift"] / unit # counts of current per count of speed
+    speed, turns, wanted = float(erpm), 0.3, erpm
+    observe(v, model, 1, heavy, erpm, round(turns * 2 ** 32) % 2 ** 32, 40, real)
+    for n in range(off + 150):
+        if n == off + 75:
+            wanted = erpm + (200 if erpm > 0 else -200)
+        iq = round(ref.clamp(gain * model.part / 32768 * (wanted - model.speed) + model.load_q26() / 8192, -5120, 5120))
+        torque = (load if on <= n < off else 25) * (1 if speed > 0 else -1)
+        before = speed
+        speed += (iq - torque) * unit / 2 ** p["shift"]
+        turns += (before + speed) / 2 * 8 * MACHINE.turns_per_erpm * speed_unit
+        seen = turns + rng.uniform(-0.0001, 0.0001) # what dead time leaves on the angle
+        observe(v, model, 0, heavy, wanted, round(seen * 2 ** 32) % 2 ** 32, iq + rng.randrange(-8, 9), real)
+        missed = abs(model.load_q26() / 8192 - torque)
+        if n in (on - 1, off - 1) and (abs(model.speed - speed) > 10 or missed > 30 + 0.03 * abs(torque)):
+            raise ValueError(f"observer: {model.speed} counts, not {speed:.0f}, load {missed:.0f} counts off")
 
 
 @block("observer at the ends of its formats: fastest speed, largest load, current and innovation of either sign; random inputs",
@@ -621,6 +657,14 @@ def params(v, _):
                     **{f"adaptation_{name}": value for name, value in m.adaptation().items()},
                     "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
                     "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}
+
+
+@block("constants of motors whose speeds are counted in 2 and 4 electrical rpm", "u2: the motor of AN1292 for 7500 rpm at 100 us; u4: a spindle for 10500 rpm")
+def params_quick(v, _):
+    """As params()."""
+    for name, m in (("u2", ref.Machine(maximum_rpm=7500.0, period_s=100e-6, speed_hz=8.0, load_hz=60.0)), ("u4", QUICK)):
+        v.constants |= {f"{name}_unit": m.speed_unit, **{f"{name}_{key}": value for key, value in m.estimator().items()},
+                        **{f"{name}_observer_{key}": value for key, value in m.observer().items()}}
 
 
 def main():

@@ -227,8 +227,13 @@ class Machine:
         return self.ls_h / self.period_s * self.i0 / self.u0
 
     @property
+    def speed_unit(self):
+        """Electrical rpm of a count of speed: the maximum speed is at most 32000 counts."""
+        return next(unit for unit in (1, 2, 4) if unit == 4 or self.maximum_rpm * self.pole_pairs <= 32000 * unit)
+
+    @property
     def inv_kfi(self):
-        """Equation 6: speed counts (electrical rpm) per voltage count; Kphi is line to line, hence sqrt(3)."""
+        """Equation 6: electrical rpm per voltage count; Kphi is line to line, hence sqrt(3)."""
         return SQRT3 * 1000 * self.pole_pairs * self.u0 / self.kphi
 
     @property
@@ -258,9 +263,9 @@ class Machine:
 
     @property
     def acceleration(self):
-        """Of a count of q current (Q13): electrical rpm in a slow step."""
+        """Of a count of q current (Q13): counts of speed in a slow step."""
         torque_per_a = 1.5 * self.pole_pairs * self.psi
-        return torque_per_a / self.inertia_kgm2 * self.pole_pairs * 60 / (2 * math.pi) * 4 * self.i0 * 8 * self.period_s
+        return torque_per_a / self.inertia_kgm2 * self.pole_pairs * 60 / (2 * math.pi) * 4 * self.i0 * 8 * self.period_s / self.speed_unit
 
     def current_step(self, rpm, periods=1):
         """Largest change of a sine of the maximum current in some periods: 2 pi f Ts I; in counts of I0."""
@@ -273,37 +278,38 @@ class Machine:
 
     def estimator(self):
         rs, ls = self.rs * 32768, self.ls * 4096
-        rs_exp, ls_exp = self.exponent(rs), self.exponent(1.2 * ls)
+        rs_exp, ls_exp, unit = self.exponent(rs), self.exponent(1.2 * ls), self.speed_unit
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
             "d_ilimit_ls_q14": min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
             "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
-            "deltat_q32": nearest(self.turns_per_erpm * 2 ** 32),
-            "half_step_q16_rad": nearest(self.turns_per_erpm * math.pi * 2 ** 32),
+            "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
+            "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
             "kfilter_velestim_q16": 2 * self.kfilter_velestim,
-            "nominal_erpm": int(self.eight_samples_erpm),
-            "decimate_erpm": nearest(self.nominal_rpm * self.pole_pairs / 10),
-            "inv_kfi": nearest(self.inv_kfi * 16384),
+            "nominal_erpm": int(self.eight_samples_erpm / unit),
+            "decimate_erpm": nearest(self.nominal_rpm * self.pole_pairs / 10 / unit),
+            "inv_kfi": nearest(self.inv_kfi * 16384 / unit),
         }
 
     def observer(self):
-        """A step is eight periods; the unit of acceleration is 2^-shift electrical rpm a step, half to one a count of current."""
+        """A step is eight periods; the unit of acceleration is 2^-shift counts of speed a step, half to one a count of current."""
+        unit = self.speed_unit
         shift = min(13, next(s for s in range(1, 14) if s == 13 or self.acceleration >= 2.0 ** (-1 - s)))
         units = self.acceleration * 2 ** shift
         quick = 2 * math.pi * self.load_hz * 8 * self.period_s * WORD
         load_from = clamp(5 * self.lost_current * units, 1, 16000)
         return {
-            "deltat_q32": nearest(self.turns_per_erpm * 2 ** 32),
-            "per_turn_q12": nearest(WORD * 4096 / (8 * self.turns_per_erpm * 2 ** 32)),
+            "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
+            "per_turn_q12": nearest(WORD * 4096 / (8 * self.turns_per_erpm * unit * 2 ** 32)),
             "shift": shift, "per_current_q16": min(nearest(units * WORD), 65535), "per_unit_q15": min(nearest(32768 / units), 65535),
             "innovation_max": int(min(16383, 16000 * WORD * WORD / quick ** 2 / 2 ** shift)),
             "load_max": int(nearest(self.maximum_current_a / self.i0 / 4) * units),
             "quiet_q16": int(min(1.22 * self.speed_hz / self.load_hz, 0.3) * quick),
             "loaded_q16": int(0.3 * quick), "quick_q16": int(quick),
-            "full_erpm": int(60 / 2.7 * self.load_hz), "load_from": int(load_from), "load_width": int(load_from),
+            "full_erpm": int(60 / 2.7 * self.load_hz / unit), "load_from": int(load_from), "load_width": int(load_from),
             "load_slope_q15": int(32767 / load_from),
-            "large_erpm": int(0.13 * self.dead_time_erpm), "large_loaded_erpm": int(0.03 * self.dead_time_erpm),
+            "large_erpm": int(0.13 * self.dead_time_erpm / unit), "large_loaded_erpm": int(0.03 * self.dead_time_erpm / unit),
         }
 
     def adaptation(self):
@@ -562,7 +568,7 @@ class EstimatorReal:
         decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
         total = self.e_dq.imag - self.e_dq.real if decides >= 0 else self.e_dq.imag + self.e_dq.real
         per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
-        self.omega = clamp(total * per_volt, -32767.0, 32767.0)
+        self.omega = clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
         self.rho += self.omega * m.turns_per_erpm
         self.filtered += m.kfilter_velestim / 32768 * (self.omega - self.filtered)
         self.frame = self.rho + self.omega * m.turns_per_erpm / 2
@@ -619,11 +625,11 @@ def emf_filter_real(k_q16, per_erpm, ref):
     return min(k_q16, max(abs(ref) * per_erpm, FILTER_LEAST))
 
 
-def fieldweak(tables, on_speed, ls_base, ref):
-    """Index, Id, 1/Kphi and Ls for a speed reference; the last interval ends 1/65536 before the end."""
-    above = magnitude(ref) - on_speed
-    index, rest = divmod(above, FIELDWEAK_STEP) if above > 0 else (0, 0)
-    fraction = rest * (WORD // FIELDWEAK_STEP)
+def fieldweak(tables, on_speed, ls_base, ref, unit=1):
+    """Index, Id, 1/Kphi and Ls for a speed reference in counts; the last interval ends 1/65536 before the end."""
+    above, step = magnitude(ref) - on_speed, FIELDWEAK_STEP // unit
+    index, rest = divmod(above, step) if above > 0 else (0, 0)
+    fraction = rest * (WORD // step)
     last = len(tables["idref"]) - 2
     if index > last:
         index, fraction = last, WORD - 1
@@ -631,8 +637,8 @@ def fieldweak(tables, on_speed, ls_base, ref):
     return index, i_d, inv_kfi, u16(ls_base * ratio // 2 ** 14), int(above > 0)
 
 
-def fieldweak_real(tables, on_speed, ls_base, ref):
-    x = clamp((abs(ref) - on_speed) / FIELDWEAK_STEP, 0, len(tables["idref"]) - 1)
+def fieldweak_real(tables, on_speed, ls_base, ref, unit=1):
+    x = clamp((abs(ref) - on_speed) * unit / FIELDWEAK_STEP, 0, len(tables["idref"]) - 1)
     i = min(int(x), len(tables["idref"]) - 2)
     i_d, inv_kfi, ratio = (t[i] + (t[i + 1] - t[i]) * (x - i) for t in (tables["idref"], tables["inv_kfi"], tables["ls"]))
     return i_d, inv_kfi, ls_base * ratio / 2 ** 14

@@ -69,7 +69,7 @@ static void set_bounds(void)
     rs_max = largest_rs();
     voltage_max = (int16_t)(radius_max / 2 + radius_max / 64 + 8);
     /* Park halves it; the turn by half a step h to the middle of the period lengthens it by sqrt(1 + h^2) < 1 + h^2 / 2 */
-    half_step = qm_mulhi(32767, params.estimator.half_step_q16_rad) + 1;
+    half_step = qm_mulhi_su(32767, params.estimator.half_step_q16_rad) + 1;
     emf_dq_max = (int16_t)(longest_emf() / 2 + (longest_emf() * (half_step * half_step / 65536) >> 18) + 4);
     erpm_max = params.maximum_erpm;
     current_max = params.current_max_q13;

@@ -42,8 +42,8 @@ static inline q15_t share_bounded(uint16_t part, uint16_t whole)
 static void any_observer(observer_params_t *p, int16_t quick, uint16_t shift)
 {
     int64_t innovation = (16000ll << 32) / qm_mulss(quick, quick) >> shift;
-    p->deltat_q32 = any(2863, 10023); /* LOOPTIME_SEC of 40 to 140 us */
-    p->per_turn_q12 = any(3347, 11719);
+    p->deltat_q32 = any(2863, 16780); /* LOOPTIME_SEC of 40 to 140 us, a sixteenth of a turn a period at most */
+    p->per_turn_q12 = any(1999, 11719);
     p->shift = shift;
     p->per_current_q16 = any_u(32768, 65535);
     p->innovation_max_erpm = any(1, (int16_t)((innovation > 16383) ? 16383 : innovation));
@@ -60,6 +60,8 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     o.rho_q32 = any_ul(0, UINT32_MAX);
     o.rate_q16 = any(0, next);
     o.large_erpm = ANY16();
+    o.wrong_erpm = ANY16();
+    o.wrong_steps = any_u(0, 65534); /* a fault ends the run long before */
     o.unrest_steps = ANYU16();
     o.quick_q15 = any(calm_low, calm_high);
     observer_step(&o, &p, any_ul(0, UINT32_MAX), any(-IQ_MAX, IQ_MAX));

@@ -61,7 +61,7 @@ static void any_estimator(estimator_t *e)
     e->omega_erpm = any(-32767, 32767);
     e->omega_filtered_q16 = any_l(-32767 * 65536l, INT32_MAX);
     e->rho_q32 = any_ul(0, UINT32_MAX);
-    e->half_step_q16_rad = qm_mulhi(e->omega_erpm, params.estimator.half_step_q16_rad);
+    e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, params.estimator.half_step_q16_rad);
 }
 
 static void any_observer_state(observer_t *o)

@@ -169,7 +169,7 @@ static inline void observer_step_bounded(observer_t *o, const observer_params_t 
     int32_t square = qm_mulss(p->quick_q16, p->quick_q16) >> 10;
     int64_t largest = (int64_t)p->innovation_max_erpm * square << p->shift;
     //@ check formats: 1 <= p->shift <= 13 && 32768 <= p->per_current_q16 && 0 < p->load_max <= 8192;
-    //@ check angle: 2863 <= p->deltat_q32 <= 10023 && 3347 <= p->per_turn_q12 <= 11719;
+    //@ check angle: 2863 <= p->deltat_q32 <= 16780 && 1999 <= p->per_turn_q12 <= 11719;
     //@ check rate: 0 <= o->rate_q16 <= p->quick_q16 <= RATE_MOST_Q16;
     //@ check innovation: 0 < p->innovation_max_erpm <= 16383 && largest <= 16000 * 4194304;
     //@ check current: -IQ_MAX <= iq_q13 <= IQ_MAX;

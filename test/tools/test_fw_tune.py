@@ -310,6 +310,12 @@ def test_tables_of_another_motor_value_are_not_used_and_the_line_says_which(path
     assert found is None and name in reason and f"make tune-fw MOTOR={HURST}" in reason and "\n" not in reason
 
 
+def test_tables_whose_1_over_Kphi_counts_another_unit_of_speed_are_not_used(path):
+    found, reason = fw_tables.load_for(HURST, {**PARAMS, "NORM_INVKFIBASE": TABLES.inv_kfi_base / 2.0}, path.parent)
+    assert found is None and "another SPEED_UNIT" in reason and f"make tune-fw MOTOR={HURST}" in reason
+    assert fw_tables.load_for(HURST, {**PARAMS, "NORM_INVKFIBASE": TABLES.inv_kfi_base + 0.4}, path.parent)[1] == ""
+
+
 @pytest.mark.parametrize("wrong, word", [
     (GOOD.replace("idref_a = [0.00, ", "idref_a = ["), "17 values"), (GOOD.replace("[fingerprint]", "[finger]"), "finger"),
     (GOOD.replace("idref_a = [0.00", "idref_a = [0.50"), "impossible"), (GOOD.replace("MOTOR_RS_OHM", "MOTOR_OHM"), "MOTOR_"),

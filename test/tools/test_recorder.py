@@ -14,7 +14,7 @@ from tools.bench.board import Board, Library
 from tools.common import paths
 from tools.common.errors import UserError
 
-PARAMS = {"LOOPTIME_SEC": 5e-5, "COUNT_CURRENT_A": 0.001, "COUNT_VOLTAGE_V": 0.002, "BUS_FULL_SCALE_V": 50.0, "NOPOLESPAIRS": 5.0}
+PARAMS = {"LOOPTIME_SEC": 5e-5, "COUNT_CURRENT_A": 0.001, "COUNT_VOLTAGE_V": 0.002, "BUS_FULL_SCALE_V": 50.0, "COUNT_SPEED_RPM": 0.2}
 STATUS = "state 7 fault 6 speed 0 rpm\r\n"
 
 
@@ -129,7 +129,7 @@ def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float]
     assert has_bus.tolist() == [place % 2 == 0 for place in record.places] == np.isnan(rows.speed_rpm).tolist()
     slow = np.array([row[5] for row in record.words])
     assert (slow[has_bus] & 0xFFFF).tolist() == part["reg.ADC1BUF3"][has_bus].astype(int).tolist()
-    assert slow[~has_bus].tolist() == np.round(part["fw.speed_est_rpm"][~has_bus] * library.params["NOPOLESPAIRS"]).astype(int).tolist()
+    assert slow[~has_bus].tolist() == np.round(part["fw.speed_est_rpm"][~has_bus] / library.params["COUNT_SPEED_RPM"]).astype(int).tolist()
     assert rows.bus_v[has_bus] == pytest.approx(24.0, abs=1.0), "and of the right size"
 
 

@@ -11,7 +11,7 @@ from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, 
 
 from tools.common import board_file, motor_file
 from tools.common.errors import UserError
-from tuning import header, limits, report
+from tuning import constants, header, limits, report
 from tuning.design import Design, design, plain, real, short
 from tuning.limits import Envelope
 
@@ -32,7 +32,9 @@ SMALL = {"rs_ohm": 39.0, "rated_current_a": 0.05, "rated_torque_nm": 0.003, "rat
          "start_torque_nm": 0.0}
 MAXIMUM = next(line for line in MOTOR.splitlines() if line.startswith("maximum_current"))
 REFUSED = {
-    "rated speed beyond the speed format": ({"pole_pairs": 14}, ("electrical rpm", "32000", "a speed of 2285 rpm is possible", "a_motor.toml")),
+    "rated speed beyond the speed format": ({"pole_pairs": 31}, ("77500 electrical rpm", "75000; a speed of 2419 rpm is possible", "a_motor.toml")),
+    "rated speed beyond a sixteenth of a turn a period": ({"pole_pairs": 14, "board": {"pwm_period_s": 125e-6}},
+                                                          ("35000 electrical rpm", "32000 with this PWM period; a speed of 2285 rpm is possible")),
     "voltage too low for the rated speed": (
         {"board": {"nominal_bus_v": 12.0, "under_voltage_v": 7.0}},
         ("12 V are too low for 2500 rpm at half the rated torque", "raise the supply voltage", "or lower the rated speed to")),
@@ -77,11 +79,11 @@ WARNED = {
     "rated current beyond the board": ({"rated_current_a": 3.6, "maximum_current_a": 3.4}, ("rated current 3.6 A peak is above MAXIMUM_CURRENT_A",)),
     "maximum speed beyond field weakening": ({"changes": (("value = 5000", "value = 6300"),)}, ("maximum_speed 6300 rpm is not reachable",)),
     "maximum speed beyond the speed format": (
-        {"changes": (("value = 5000", "value = 9000"),), "ld_h": 6e-3, "lq_h": 6e-3, "maximum_current_a": 3.4},
-        ("maximum_speed 9000 rpm is not reachable", "32000 electrical rpm")),
+        {"changes": (("value = 5000", "value = 9000"),), "ld_h": 6e-3, "lq_h": 6e-3, "maximum_current_a": 3.4, "board": {"pwm_period_s": 125e-6}},
+        ("maximum_speed 9000 rpm is not reachable", "32000 electrical rpm are the firmware's end with this PWM period")),
     "rated speed that only S3 reaches": (
-        {"changes": (("value = 2500", "value = 2000"),), "pole_pairs": 14, "psi_vs": 7.983e-3 * 5 / 14, "ld_h": 3e-4, "lq_h": 3e-4},
-        ("use S3 for the rest",)),
+        {"changes": (("value = 2500", "value = 2000"),), "pole_pairs": 14, "psi_vs": 7.983e-3 * 5 / 14, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2280.0},
+        ("is above 27000 electrical rpm", "use S3 for the rest",)),
     "inductance measured far from the motor's frequency": ({"changes": (("frequency_hz = 1000", "frequency_hz = 10000"),)},
                                                            ("was measured at 10000 Hz, the motor turns at 208 Hz",)),
     "heavy load's slow speed loop": (
@@ -95,6 +97,17 @@ WARNED = {
         {"pole_pairs": 12, "psi_vs": 7.983e-3 * 5 / 12, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2660.0, "board": {"pwm_period_s": 125e-6},
          "inertia_kgm2": 2e-5},
         ("D_ILIMIT_HS ends at",))}
+
+
+def test_beyond_32000_electrical_rpm_the_back_emf_s_filter_follows_the_frequency_and_friction_brakes():
+    quick = design(motor_file.load("spindle_7pp_24v_10000"), BOARD)
+    corner_hz = constants.filter_hz(quick.value("KFILTER_ESDQ"), BOARD.pwm_period_s)
+    assert corner_hz == approx(0.37 * 1225.0, rel=1e-3) and quick.value("KFILTER_ESDQ_FW") == quick.value("KFILTER_ESDQ")
+    friction_rpm_s = quick.envelope.friction_nm(5000.0) / 2.5e-6 / limits.RPM
+    assert 0.38 * friction_rpm_s < quick.value("SPEEDREFRAMP_RPM_PER_S") <= 0.4 * friction_rpm_s
+    assert quick.scales.speed_unit == 4.0 and quick.value("NOMINAL_SPEED_RPM") == 10000.0
+    slow = design(motor_file.load("maxon_ec45flat_30w_24v"), BOARD) # 507 Hz
+    assert slow.scales.speed_unit == 1.0 and slow.value("KFILTER_ESDQ") == 2000.0 and slow.value("SPEEDREFRAMP_RPM_PER_S") > 1000.0
 
 
 def test_remedies_for_a_speed_that_would_wander_are_enough_and_hardly_more():

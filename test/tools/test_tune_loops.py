@@ -175,7 +175,9 @@ def test_an_integrator_with_a_delay_an_unstable_loop_and_the_least_of_several_cr
 @pytest.mark.parametrize("name", MOTORS)
 def test_every_motor_keeps_its_margins_and_a_loop_slower_than_the_slowest_rotation(name):
     d = of(name)
-    assert d.current_loop.worst.phase_deg >= 60.0 and d.current_loop.worst.gain_db >= 6.0, d.current_loop.worst_case
+    turns_a_period = d.envelope.omega(d.value("MAXIMUM_SPEED_RPM")) * d.board.pwm_period_s / (2.0 * math.pi)
+    least_deg = 60.0 if turns_a_period < 0.03 else 40.0 # beyond, rotation takes the rest, and the tuner warns
+    assert d.current_loop.worst.phase_deg >= least_deg and d.current_loop.worst.gain_db >= 6.0, d.current_loop.worst_case
     for rate, (asked_deg, asked_db) in SPEED_MARGINS.items():
         worst, label = d.speed_loop.at_rates[rate]
         assert worst.phase_deg >= asked_deg and worst.gain_db >= asked_db, label

@@ -2,6 +2,7 @@
 #include "control/estimator.h"
 #include "golden.h"
 #include "golden_estimator_kphi.h"
+#include "golden_estimator_quick.h"
 #include "golden_estimator_reversal.h"
 #include "golden_estimator_speed.h"
 #include "golden_estimator_start.h"
@@ -13,18 +14,16 @@ typedef struct {
     sincos_t frame;
 } runner_t;
 
-static const estimator_params_t params = {
-    .rs_exp = GOLDEN_ESTIMATOR_START_RS_EXP,
-    .ls_exp = GOLDEN_ESTIMATOR_START_LS_EXP,
-    .resistive_max_q13 = INT16_MAX,
-    .d_ilimit_ls_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_LS_Q14,
-    .d_ilimit_hs_q14 = GOLDEN_ESTIMATOR_START_D_ILIMIT_HS_Q14,
-    .deltat_q32 = GOLDEN_ESTIMATOR_START_DELTAT_Q32,
-    .half_step_q16_rad = GOLDEN_ESTIMATOR_START_HALF_STEP_Q16_RAD,
-    .kfilter_velestim_q16 = GOLDEN_ESTIMATOR_START_KFILTER_VELESTIM_Q16,
-    .nominal_erpm = GOLDEN_ESTIMATOR_START_NOMINAL_ERPM,
-    .decimate_erpm = GOLDEN_ESTIMATOR_START_DECIMATE_ERPM
-};
+#define PARAMS(name) \
+    { \
+        .rs_exp = GOLDEN_##name##_RS_EXP, .ls_exp = GOLDEN_##name##_LS_EXP, .resistive_max_q13 = INT16_MAX, \
+        .d_ilimit_ls_q14 = GOLDEN_##name##_D_ILIMIT_LS_Q14, .d_ilimit_hs_q14 = GOLDEN_##name##_D_ILIMIT_HS_Q14, \
+        .deltat_q32 = GOLDEN_##name##_DELTAT_Q32, .half_step_q16_rad = (uint16_t)GOLDEN_##name##_HALF_STEP_Q16_RAD, \
+        .kfilter_velestim_q16 = GOLDEN_##name##_KFILTER_VELESTIM_Q16, .nominal_erpm = GOLDEN_##name##_NOMINAL_ERPM, \
+        .decimate_erpm = GOLDEN_##name##_DECIMATE_ERPM \
+    }
+static const estimator_params_t hurst = PARAMS(ESTIMATOR_START), quick = PARAMS(ESTIMATOR_QUICK);
+static const estimator_params_t *params;
 static motor_model_t tuning;
 static runner_t ahead, mirror;
 
@@ -37,6 +36,7 @@ static void reset(runner_t *r)
 
 void setUp(void)
 {
+    params = &hurst;
     tuning.rs_q16 = GOLDEN_ESTIMATOR_START_RS_Q16;
     tuning.ls_q16 = (uint16_t)GOLDEN_ESTIMATOR_START_LS_Q16;
     tuning.kfilter_esdq_q16 = GOLDEN_ESTIMATOR_START_KFILTER_ESDQ_Q16;
@@ -49,7 +49,7 @@ static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, i
 {
     tuning.inv_kfi = inv_kfi;
     tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
-    estimator_tick(&r->e, &params, &tuning, i, r->frame, !closed);
+    estimator_tick(&r->e, params, &tuning, i, r->frame, !closed);
     r->frame = trig_sincos(estimator_next_angle(&r->e));
     estimator_commanded(&r->e, v);
 }
@@ -88,6 +88,15 @@ void test_reversal_through_standstill_equals_the_reference(void)
 void test_wrong_Kphi_equals_the_reference(void)
 {
     CHECK_SEQUENCE(estimator_kphi, GOLDEN_ESTIMATOR_KPHI_CLOSED_FROM, row.inv_kfi)
+}
+
+void test_1225_Hz_in_counts_of_4_electrical_rpm_equal_the_reference(void)
+{
+    params = &quick;
+    tuning.rs_q16 = GOLDEN_ESTIMATOR_QUICK_RS_Q16;
+    tuning.ls_q16 = (uint16_t)GOLDEN_ESTIMATOR_QUICK_LS_Q16;
+    tuning.kfilter_esdq_q16 = GOLDEN_ESTIMATOR_QUICK_KFILTER_ESDQ_Q16;
+    CHECK_SEQUENCE(estimator_quick, GOLDEN_ESTIMATOR_QUICK_CLOSED_FROM, GOLDEN_ESTIMATOR_QUICK_INV_KFI)
 }
 
 /** With beta negated it must turn the other way; rounding toward minus infinity leaves a few counts. */

@@ -3,6 +3,7 @@
 #include "golden.h"
 #include "golden_emf_filter.h"
 #include "golden_fieldweak.h"
+#include "golden_fieldweak_quick.h"
 #include "golden_fieldweak_tables.h"
 #include "unity.h"
 
@@ -19,6 +20,7 @@ void setUp(void)
         params.ls_over2ls0_q15[n] = v.ls;
     }
     params.on_speed_erpm = GOLDEN_FIELDWEAK_ON_SPEED;
+    params.index_per_count_q16 = 65536u >> SPEED_INDEX_CONST;
     params.ls_base_q16 = (uint16_t)GOLDEN_FIELDWEAK_LS_BASE;
     params.kfilter_esdq_q16 = 2400;
     params.kfilter_esdq_fw_q16 = 328;
@@ -48,6 +50,21 @@ void test_look_ups_equal_the_reference_in_both_directions(void)
             if (v.above) {
                 TEST_ASSERT_EQUAL_INT16_MESSAGE(328, tuning.kfilter_esdq_q16, golden_row(n));
             }
+        }
+    }
+}
+
+void test_a_step_of_the_table_stays_1024_electrical_rpm_where_a_count_of_speed_is_more_than_one(void)
+{
+    GOLDEN_EACH(fieldweak_quick, v) {
+        params.index_per_count_q16 = (uint16_t)(v.unit * (65536u >> SPEED_INDEX_CONST));
+        look_up(v.ref);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.index, fw.index, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.idref, fw.table_q13, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.inv_kfi, tuning.inv_kfi, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.ls_q16, tuning.ls_q16, golden_row(n));
+        if (v.above) {
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(328, tuning.kfilter_esdq_q16, golden_row(n));
         }
     }
 }

@@ -3,6 +3,7 @@
 #include "golden.h"
 #include "golden_observer.h"
 #include "golden_observer_ends.h"
+#include "golden_observer_quick.h"
 #include "unity.h"
 
 #define OBSERVER(which) { \
@@ -15,8 +16,8 @@
 }
 #define EACH_DIRECTION(direction) for (int16_t direction = -1; direction <= 1; direction = (int16_t)(direction + 2))
 
-/** The Hurst motor with its bare rotor, and a rotor 150 times as heavy with slow loops. */
-static const observer_params_t rotors[] = { OBSERVER(), OBSERVER(H_) };
+/** The Hurst motor with its bare rotor, a rotor 150 times as heavy with slow loops, and a motor whose count of speed is 4 electrical rpm. */
+static const observer_params_t rotors[] = { OBSERVER(), OBSERVER(H_), OBSERVER(QUICK_) };
 static const observer_params_t *p;
 static observer_t o;
 
@@ -56,6 +57,11 @@ void setUp(void)
 void test_sequences_equal_the_reference(void)
 {
     EXPECT_ROWS(observer)
+}
+
+void test_speeds_in_counts_of_4_electrical_rpm_and_half_a_turn_in_a_step_equal_the_reference(void)
+{
+    EXPECT_ROWS(observer_quick)
 }
 
 void test_ends_of_the_formats_equal_the_reference(void)

@@ -106,14 +106,21 @@ RELATIONS = {
     "NOMINAL_SPEED_RPM must be above MINIMUM_SPEED_RPM": [case("MINIMUM_SPEED_RPM", "2800", "2799")],
     "MAXIMUM_SPEED_RPM must be at least NOMINAL_SPEED_RPM": [case("MAXIMUM_SPEED_RPM", "2799", "2800")],
     "FW_START_SPEED_RPM must be below MAXIMUM_SPEED_RPM": [case("FW_START_SPEED_RPM", "5500", "5499")],
-    "MAXIMUM_SPEED_RPM * NOPOLESPAIRS must be at most 32000": [case("MAXIMUM_SPEED_RPM", "6401", "6400")],
-    "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000": [case("NOMINAL_SPEED_RPM", "5401", "5400")],
+    "MAXIMUM_SPEED_RPM times NOPOLESPAIRS must be at most 75000 electrical rpm": [
+        case("MAXIMUM_SPEED_RPM", "15001", "15000"), case("NOPOLESPAIRS", "8", "7", MAXIMUM_SPEED_RPM="10500")],
+    "MAXIMUM_SPEED_RPM times NOPOLESPAIRS must be at most 3.75 / LOOPTIME_SEC": [
+        case("MAXIMUM_SPEED_RPM", "7501", "7500", LOOPTIME_SEC="0.0001"), case("MAXIMUM_SPEED_RPM", "6401", "6400", LOOPTIME_SEC="0.00014"),
+        case("LOOPTIME_SEC", "0.00005005", "0.00005", MAXIMUM_SPEED_RPM="15000")],
+    "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000": [
+        case("NOMINAL_SPEED_RPM", "5401", "5400"), case("NOMINAL_SPEED_RPM", "10801", "10800", MAXIMUM_SPEED_RPM="12000")],
     "END_SPEED_RPM must be at most NOMINAL_SPEED_RPM": [case("END_SPEED_RPM", "2801", "2800")],
     "MOTOR_RS_OHM does not fit its Q format": [case("MOTOR_RS_OHM", "33", "32", NORM_CURRENT_CONST="0.0002")],
     "MOTOR_LS_MH does not fit its Q format": [case("MOTOR_LS_MH", "16.2", "16.0")],
     "MOTOR_RS_OHM rounds by more than 0.5 %": [case("MOTOR_RS_OHM", "0.0123", "0.0125", NORM_CURRENT_CONST="0.0001")],
     "MOTOR_KPHI_V_PER_KRPM does not fit 1/Kphi's Q format": [
         case("MOTOR_KPHI_V_PER_KRPM", "1.7", "1.8"), case("MOTOR_KPHI_V_PER_KRPM", "56.5", "56.1", SPEED_BANDWIDTH_HZ="4")],
+    "INVKFI_SPEED0 must be 0.6 .. 1.6 of NORM_INVKFIBASE": [
+        case("INVKFI_SPEED0", "4770", "4780"), case("INVKFI_SPEED0", "12740", "12720"), case("MAXIMUM_SPEED_RPM", "6401", "6400", INVKFI_SPEED0="7956")],
     "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A": [case("Q_CURRENT_REF_OPENLOOP", "2.76", "2.75")],
     "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A": [case("MAXIMUM_CURRENT_A", "3.8", "3.79")],
     "OVER_CURRENT_THRESHOLD_A must be at most 86.5 %": [case("OVER_CURRENT_THRESHOLD_A", "3.81", "3.8")],

@@ -134,7 +134,7 @@ def scaled(record: Record, params: Mapping[str, float], states: Mapping[int, str
                 *(words[:, column] * param(params, "COUNT_VOLTAGE_V") for column in (2, 3)),
                 (words[:, 4].astype(np.int64) & 0xFFFF & ~STATE_BITS) * 360.0 / 65536.0,
                 np.where(has_bus, (words[:, 5] + 32768.0) / 65536.0 * param(params, "BUS_FULL_SCALE_V"), np.nan),
-                np.where(has_bus, np.nan, words[:, 5] / param(params, "NOPOLESPAIRS")),
+                np.where(has_bus, np.nan, words[:, 5] * param(params, "COUNT_SPEED_RPM")),
                 [states.get(number, f"state {number}") for number in record.states])
 
 

@@ -15,7 +15,7 @@
 #define VOLTAGE_V(q14) ((double)(q14) * 2.0 * (double)NORM_VOLTAGE_CONST)
 #define EMF_V(q12) ((double)(q12) * 8.0 * (double)NORM_VOLTAGE_CONST)
 #define ANGLE_DEG(counts) ((double)(counts) * 360.0 / 65536.0)
-#define SPEED_RPM(erpm) ((double)(erpm) / (double)(NOPOLESPAIRS))
+#define SPEED_RPM(counts) ((double)(counts) * (double)SPEED_UNIT / (double)(NOPOLESPAIRS))
 #define BUS_V(q15) ((double)(q15) / 32768.0 * (double)PARAM_F(BUS_FULL_SCALE_V))
 
 /* X(id, name, unit, meaning, value): the signals of the drive `d`. */
@@ -26,7 +26,7 @@
     X(running, "fw.run", "", "1 while the bridge switches", (double)drive_is_running(d)) \
     X(calibrated, "fw.calibrated", "", "1 after the offset calibration", (double)d->calibration.done) \
     X(theta_est, "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", \
-      ANGLE_DEG(estimator_next_angle(&d->run.estimator)) - (double)d->run.estimator.omega_erpm * 6.0 * (double)PARAM_F(LOOPTIME_SEC)) \
+      ANGLE_DEG(estimator_next_angle(&d->run.estimator)) - (double)d->run.estimator.omega_erpm * SPEED_UNIT * 6.0 * (double)PARAM_F(LOOPTIME_SEC)) \
     X(theta_ctrl, "fw.theta_ctrl_deg", "deg", "control angle of the next sample", ANGLE_DEG(d->angle)) \
     X(speed_est, "fw.speed_est_rpm", "rpm", "filtered estimated speed", SPEED_RPM(estimator_speed(&d->run.estimator))) \
     X(speed_raw, "fw.speed_raw_rpm", "rpm", "estimated speed before its filter", SPEED_RPM(d->run.estimator.omega_erpm)) \
@@ -50,7 +50,7 @@
     X(fw_index, "fw.fw_index", "", "field-weakening table index (FdWeakParm.qIndex)", (double)d->run.fieldweak.index) \
     X(limits, "fw.limits", "", "why the output is limited, a sum of limit_reason_t (LimitParm.now)", (double)limits_reasons(d, &board_params)) \
     X(inv_kphi, "fw.inv_kphi_rpm_per_v", "rpm/V", "1/Kphi in use, V peak line to line (MotorEstimParm.qInvKFi)", \
-      (double)d->run.model.inv_kfi / (sqrt(3.0) * 16384.0 * (double)(NOPOLESPAIRS) * (double)NORM_VOLTAGE_CONST)) \
+      (double)d->run.model.inv_kfi * SPEED_UNIT / (sqrt(3.0) * 16384.0 * (double)(NOPOLESPAIRS) * (double)NORM_VOLTAGE_CONST)) \
     X(ls_ratio, "fw.ls_ratio", "", "Ls/(2 Ls0) in use", (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0) \
     X(offset, "fw.offset_deg", "deg", "hand-over angle offset that is left", ANGLE_DEG(d->run.handover.offset)) \
     X(speed_obs, "fw.speed_obs_rpm", "rpm", "speed of the load observer", SPEED_RPM(observer_speed(&d->run.observer))) \
@@ -94,7 +94,7 @@ const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[
 #define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },
 /* Behind the parameters the scales of what the fault recorder sends. */
 const probe_param_t probe_params[] = {
-    PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }
+    PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }, { "COUNT_SPEED_RPM", SPEED_RPM(1), "rpm" }
 };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 

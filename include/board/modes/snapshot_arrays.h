@@ -7,7 +7,7 @@
 
 #ifdef SNAPSHOT
 /** Set SnapStart to 1; SnapDone becomes 1 when the arrays are full. Columns: phase current a, q current (Q15 of full
- *  scale), filtered estimated speed (electrical rpm), estimated angle. */
+ *  scale), filtered estimated speed (as EstimParm.qVelEstim), estimated angle. */
 extern int16_t SnapBuf1[DATA_BUFFER_SIZE], SnapBuf2[DATA_BUFFER_SIZE], SnapBuf3[DATA_BUFFER_SIZE], SnapBuf4[DATA_BUFFER_SIZE];
 extern volatile uint16_t SnapStart, SnapDone;
 extern snapshot_t board_snapshot;

@@ -6,7 +6,7 @@
 #include "drive/limit_reasons.h"
 #include "drive/speed_law.h"
 
-/** Ends of the potentiometer's travel: electrical rpm, or q current in Q13. */
+/** Ends of the potentiometer's travel: speeds, or q currents in Q13. */
 typedef struct {
     int16_t low, high;
 } mode_range_t;
