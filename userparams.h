@@ -52,6 +52,7 @@
 #define END_SPEED_RPM 1000          /* [rpm]           2 .. 10000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
 #define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of align and ramp: pull-out torque 0.0844 N m */
+#define FLYING_START 1              /* [switch]        0 .. 1         1: a rotor that turns is caught at its speed; 0: every start aligns it */
 
 /* ---- Limits and protections --------------------------------------------------------------------------------------- */
 #define MAXIMUM_CURRENT_A 2.75      /* [A peak]        0.1 .. 20      length of the current vector that the drive may ask for */

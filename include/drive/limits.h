@@ -7,6 +7,7 @@
 #include "drive/limit_reasons.h"
 
 #define LIMITS_MISSING_Q14 4       /**< voltage counts that a count of missing q current asks for */
+#define LIMITS_BURN_STEP_Q13 32    /**< a step of the d current that burns: MAXIMUM_CURRENT_A takes a twentieth of a second */
 #define LIMITS_MISSING_MOST_Q13 64 /**< missing q current that counts at most */
 
 /** Voltage that the q axis has left, less what the missing q current asks for: a limit that is only touched now and then takes no more d
@@ -23,7 +24,15 @@ QM_INLINE current_q13_t limits_asked_most(const drive_params_t *p)
     return (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
 }
 
-/** d current: what is left of the hand-over, the table and its trim; the q current gets the rest of the circle. */
+/** The d current that burns the rotor's energy in the winding: more while the bus holds the braking current back, less while the circle does or
+ *  nothing. Where both do alike, the vector is as long as it may be and the bus takes nothing. */
+QM_INLINE void limits_burn(drive_control_t *c, const drive_params_t *p, uint16_t bus_limits)
+{
+    int16_t step = (int16_t)((bus_limits && c->brake_limit_q13 < c->iq_limit_q13) ? LIMITS_BURN_STEP_Q13 : -LIMITS_BURN_STEP_Q13);
+    c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, limits_asked_most(p));
+}
+
+/** d current: what is left of the hand-over, the table with its trim or what is burnt; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
@@ -31,7 +40,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     uint32_t ratio;
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
-    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13), (int16_t)-id_max, id_max);
+    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13 - c->burn_q13), (int16_t)-id_max, id_max);
     ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
 }
@@ -49,10 +58,12 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
     run->control.brake_limit_q13 = most;
 }
 
-/** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
-QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
+/** Limits braking current to what the bus absorbs, and burns what it does not. @param iq_q13 the speed controller's output @return the q current */
+QM_INLINE current_q13_t limits_apply_braking(drive_control_t *c, const drive_params_t *p, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    if ((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13) {
+    uint16_t bus_limits = (uint16_t)((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13);
+    limits_burn(c, p, bus_limits);
+    if (bus_limits) {
         return (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
     }
     return iq_q13;

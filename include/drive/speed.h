@@ -5,7 +5,7 @@
 #include "drive/limits.h"
 #include "drive/modes/modes.h"
 #include "drive/reference.h"
-#include "drive/state.h"
+#include "drive/startup.h"
 
 /** The next speed reference. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
@@ -22,6 +22,31 @@ QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
     run->control.sample_shift_q13 = qm_mulhi(observer_speed(&run->observer), p->sample_shift_q16);
 }
 
+/** Whether the run goes on or slows down: a target in the other direction slows it down to be reversed, a new wish to run goes on from the present
+ *  speed. */
+QM_INLINE void speed_choose_state(drive_t *d)
+{
+    uint16_t other = (uint16_t)((d->command.target_erpm ^ d->direction) < 0);
+    if (d->state == (uint16_t)DRIVE_CLOSED && other) {
+        drive_enter(d, DRIVE_STOPPING);
+    } else if (d->state == (uint16_t)DRIVE_STOPPING && d->command.run && !other) {
+        drive_enter(d, DRIVE_CLOSED);
+    } else {
+        /* it stays */
+    }
+}
+
+/** The end of STOPPING: the outputs go off, or the ramp takes the rotor through zero into the other direction. */
+QM_INLINE void speed_end_stop(drive_t *d, const drive_params_t *p)
+{
+    if (d->command.run) {
+        drive_turns(d, (int16_t)-d->direction);
+        startup_ramp_from_here(d, p);
+    } else {
+        drive_enter(d, DRIVE_STOPPED);
+    }
+}
+
 /** One step of the controller, every eighth period in closed loop. STOPPING ends when the reference has come below the minimum speed and the rotor
  *  near it: what the observer does not see of an unloaded motor's current can hold it just above. */
 NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
@@ -30,15 +55,16 @@ NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
     speed_erpm_t speed = observer_speed(&d->run.observer);
     current_q13_t iq_q13;
 
+    speed_choose_state(d);
     if (!mode_current_step(d, p, &iq_q13)) {
         speed_erpm_t before = c->reference_erpm;
         speed_reference_step(d, p);
         iq_q13 = speed_current_step(&d->run, p, c->reference_erpm);
         speed_trim(&d->run, p, before, iq_q13);
     }
-    c->ref_q13.q = limits_apply_braking(c, speed, iq_q13);
+    c->ref_q13.q = limits_apply_braking(c, p, speed, iq_q13);
     if (d->state == (uint16_t)DRIVE_STOPPING && qm_abs(speed) < p->minimum_erpm + (p->minimum_erpm >> 1) && qm_abs(c->reference_erpm) < p->minimum_erpm) {
-        drive_enter(d, DRIVE_STOPPED);
+        speed_end_stop(d, p);
     }
 }
 

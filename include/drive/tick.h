@@ -80,6 +80,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 1:
         if (d->state == (uint16_t)DRIVE_RAMP) {
             handover_step(d, p);
+        } else if (d->state == (uint16_t)DRIVE_CATCH) {
+            catch_step(d, p);
         } else {
             model_update(d, p);
         }
