@@ -166,6 +166,7 @@ void test_a_rotor_that_is_too_fast_is_waited_for_with_the_outputs_off_and_then_c
     motor.omega *= 0.8F; /* 24000 erpm: below MAXIMUM_SPEED_RPM */
     motor.bus_v = 32.0F;
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(1300, ideal_motor_run_until(DRIVE_CLOSED, 1300));
+    ideal_motor_run(2000);
     EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "caught");
     TEST_ASSERT_TRUE(motor.highest_a < MOST_A);
 }
