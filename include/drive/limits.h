@@ -24,11 +24,18 @@ QM_INLINE current_q13_t limits_asked_most(const drive_params_t *p)
     return (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
 }
 
-/** The d current that burns the rotor's energy in the winding: more while the bus holds the braking current back, less while the circle does or
- *  nothing. Where both do alike, the vector is as long as it may be and the bus takes nothing. */
-QM_INLINE void limits_burn(drive_control_t *c, const drive_params_t *p, uint16_t bus_limits)
+/** 1 while the bus, and not the circle, holds the q current. With no braking current at all its reference is 0, which has no sign. */
+QM_INLINE uint16_t limits_bus_holds(const drive_control_t *c, speed_erpm_t speed)
 {
-    int16_t step = (int16_t)((bus_limits && c->brake_limit_q13 < c->iq_limit_q13) ? LIMITS_BURN_STEP_Q13 : -LIMITS_BURN_STEP_Q13);
+    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && qm_abs(c->ref_q13.q) == c->brake_limit_q13 && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0));
+}
+
+/** The d current that burns the rotor's energy in the winding: more while the bus holds the braking current back, less while the circle does or
+ *  nothing. Where both do alike, the vector is as long as it may be and the bus takes nothing. Before the next limits_braking(). */
+QM_INLINE void limits_burn(drive_run_t *run, const drive_params_t *p)
+{
+    drive_control_t *c = &run->control;
+    int16_t step = (int16_t)(limits_bus_holds(c, observer_speed(&run->observer)) ? LIMITS_BURN_STEP_Q13 : -LIMITS_BURN_STEP_Q13);
     c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, limits_asked_most(p));
 }
 
@@ -58,12 +65,10 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
     run->control.brake_limit_q13 = most;
 }
 
-/** Limits braking current to what the bus absorbs, and burns what it does not. @param iq_q13 the speed controller's output @return the q current */
-QM_INLINE current_q13_t limits_apply_braking(drive_control_t *c, const drive_params_t *p, speed_erpm_t speed, current_q13_t iq_q13)
+/** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
+QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    uint16_t bus_limits = (uint16_t)((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13);
-    limits_burn(c, p, bus_limits);
-    if (bus_limits) {
+    if ((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13) {
         return (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
     }
     return iq_q13;

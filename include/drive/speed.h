@@ -22,24 +22,35 @@ QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
     run->control.sample_shift_q13 = qm_mulhi(observer_speed(&run->observer), p->sample_shift_q16);
 }
 
-/** Whether the run goes on or slows down: a target in the other direction slows it down to be reversed, a new wish to run goes on from the present
- *  speed. */
-QM_INLINE void speed_choose_state(drive_t *d)
+/** 1 while the target lies in the other direction. */
+QM_INLINE uint16_t speed_is_to_turn(const drive_t *d)
 {
-    uint16_t other = (uint16_t)((d->command.target_erpm ^ d->direction) < 0);
-    if (d->state == (uint16_t)DRIVE_CLOSED && other) {
-        drive_enter(d, DRIVE_STOPPING);
-    } else if (d->state == (uint16_t)DRIVE_STOPPING && d->command.run && !other) {
-        drive_enter(d, DRIVE_CLOSED);
-    } else {
-        /* it stays */
-    }
+    return (uint16_t)((d->command.target_erpm ^ d->direction) < 0);
 }
 
-/** The end of STOPPING: the outputs go off, or the ramp takes the rotor through zero into the other direction. */
-QM_INLINE void speed_end_stop(drive_t *d, const drive_params_t *p)
+/** 1 when a stop has come to its end: the reference below the minimum speed and the rotor near it, for what the observer does not see of an
+ *  unloaded motor's current can hold it just above. */
+QM_INLINE uint16_t speed_has_stopped(const drive_t *d, const drive_params_t *p)
 {
-    if (d->command.run) {
+    return (uint16_t)(qm_abs(observer_speed(&d->run.observer)) < p->minimum_erpm + (p->minimum_erpm >> 1)
+                      && qm_abs(d->run.control.reference_erpm) < p->minimum_erpm);
+}
+
+/** Whether the run goes on or slows down: a target in the other direction slows it down until the ramp takes the rotor through zero; a new wish
+ *  to run goes on from the present speed. Every eighth period in closed loop. */
+NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
+{
+    uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
+
+    if (!stops) {
+        if (other) {
+            drive_enter(d, DRIVE_STOPPING);
+        }
+    } else if (d->command.run && !other) {
+        drive_enter(d, DRIVE_CLOSED);
+    } else if (!speed_has_stopped(d, p)) {
+        /* on its way */
+    } else if (d->command.run) {
         drive_turns(d, (int16_t)-d->direction);
         startup_ramp_from_here(d, p);
     } else {
@@ -47,25 +58,20 @@ QM_INLINE void speed_end_stop(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** One step of the controller, every eighth period in closed loop. STOPPING ends when the reference has come below the minimum speed and the rotor
- *  near it: what the observer does not see of an unloaded motor's current can hold it just above. */
+/** One step of the controller, every eighth period in closed loop. */
 NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
     speed_erpm_t speed = observer_speed(&d->run.observer);
     current_q13_t iq_q13;
 
-    speed_choose_state(d);
     if (!mode_current_step(d, p, &iq_q13)) {
         speed_erpm_t before = c->reference_erpm;
         speed_reference_step(d, p);
         iq_q13 = speed_current_step(&d->run, p, c->reference_erpm);
         speed_trim(&d->run, p, before, iq_q13);
     }
-    c->ref_q13.q = limits_apply_braking(c, p, speed, iq_q13);
-    if (d->state == (uint16_t)DRIVE_STOPPING && qm_abs(speed) < p->minimum_erpm + (p->minimum_erpm >> 1) && qm_abs(c->reference_erpm) < p->minimum_erpm) {
-        speed_end_stop(d, p);
-    }
+    c->ref_q13.q = limits_apply_braking(c, speed, iq_q13);
 }
 
 #endif

@@ -224,14 +224,16 @@ void test_a_stop_goes_on_from_the_present_speed_and_a_target_the_other_way_slows
         rig_closed(direction, (int16_t)(direction * 10000));
         drive.state = (uint16_t)DRIVE_STOPPING;
         drive.command.run = 0;
-        speed_step(&drive, &params);
+        speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         drive.command.run = 1;
-        speed_step(&drive, &params);
+        rig_next_slot(3);
+        rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
         TEST_ASSERT_INT16_WITHIN(20, (int16_t)(direction * 10000), drive.run.control.reference_erpm);
         drive.command.target_erpm = (int16_t)(direction * -10000);
-        speed_step(&drive, &params);
+        rig_next_slot(3);
+        rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
         TEST_ASSERT_EQUAL_INT16(direction, drive.direction);
@@ -246,7 +248,7 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         drive.command.target_erpm = (int16_t)(direction * -6000);
         drive.run.handover.agreed_steps = 99; /* of the start long ago */
         drive.run.estimator.rho_q32 = 0x12340000ul;
-        speed_step(&drive, &params);
+        speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
         TEST_ASSERT_EQUAL_INT16(-direction, drive.direction);
         TEST_ASSERT_INT32_WITHIN(100, -2400L * 3579 / 64, drive.forced.speed_q10);

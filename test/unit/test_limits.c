@@ -144,9 +144,11 @@ void test_braking_that_was_limited_leaves_nothing_behind(void)
 static current_q13_t burnt_after(uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)
 {
     drive_control_t *c = &drive.run.control;
+    rig_speed(10000);
     c->brake_limit_q13 = brake_limit_q13;
+    c->ref_q13.q = limits_apply_braking(c, 10000, iq_q13);
     while (steps-- != 0u) {
-        (void)limits_apply_braking(c, &params, 10000, iq_q13);
+        limits_burn(&drive.run, &params);
     }
     return c->burn_q13;
 }
@@ -154,9 +156,10 @@ static current_q13_t burnt_after(uint16_t steps, int16_t brake_limit_q13, int16_
 void test_d_current_grows_while_the_bus_holds_braking_back_and_goes_when_it_does_not(void)
 {
     drive.run.control.iq_limit_q13 = 5120;
-    TEST_ASSERT_EQUAL_INT16(0, burnt_after(100, 700, -700));    /* at the limit, and not above it */
-    TEST_ASSERT_EQUAL_INT16(0, burnt_after(100, 700, 4000));    /* it drives */
-    TEST_ASSERT_EQUAL_INT16(3200, burnt_after(100, 700, -701));
+    TEST_ASSERT_EQUAL_INT16(0, burnt_after(100, 700, -699));
+    TEST_ASSERT_EQUAL_INT16(0, burnt_after(100, 700, 700));     /* it drives */
+    TEST_ASSERT_EQUAL_INT16(1600, burnt_after(50, 0, -500));    /* no braking current at all */
+    TEST_ASSERT_EQUAL_INT16(3200, burnt_after(50, 700, -701));
     TEST_ASSERT_EQUAL_INT16(4960, burnt_after(200, 700, -5120)); /* 31/32 of MAXIMUM_CURRENT_A */
     TEST_ASSERT_EQUAL_INT16(4640, burnt_after(10, 700, -600));
     TEST_ASSERT_EQUAL_INT16(0, burnt_after(150, 700, 0));

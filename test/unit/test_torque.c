@@ -120,11 +120,12 @@ void test_command_in_the_other_direction_slows_down_first(void)
         (void)step(direction, 1000, 10000, 0);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
         drive.command.target_erpm = (int16_t)(direction * -1000);
-        speed_step(&drive, &params);
+        speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
+        speed_step(&drive, &params);
         TEST_ASSERT_TRUE(direction * drive.run.control.reference_erpm < 10000);
         drive.command.target_erpm = (int16_t)(direction * 1000);
-        speed_step(&drive, &params);
+        speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
     }
 }
