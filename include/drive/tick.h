@@ -119,7 +119,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         if (drive_is_closed(d)) {
             protection_check_model(d, p);
             handover_decay(d);
-            limits_braking(run, p, qm_hi(d->bus_q31));
+            limits_braking(run, p, bus_sample(v_bus_raw));
         }
         model_learn_step(d, p);
         done = 6;
