@@ -22,20 +22,22 @@ from .scenario import Event, param
 
 DEBOUNCED_S = 0.028
 """From S2 to the rotor's speed: the button counts a little later, and a light rotor has no time to coast down."""
-DRIVEN, ALIGNED = ("RAMP", "CLOSED", "STOPPING"), "ALIGN"
-LOOK_S = 0.005
-"""The angle is looked at so long after the drive has taken over."""
+FORCED, ALIGNED = "RAMP", "ALIGN"
+DRIVEN = (FORCED, "CLOSED", "STOPPING")
+LOOK_S = 0.02
+"""Over which the angle is looked at, up to within_s."""
 STOP_SETTLE_S, STOP_LONGEST_S = 2.0, 8.0
 INERTIA = "mech.inertia_kgm2"
 
 COLUMNS = (
     ("rpm", "rotor\nrpm", "{:.0f}"), ("rotor_deg", "angle\ndeg", "{:.0f}"), ("inertia", "inertia\nfactor", "{:g}"), ("how", "taken\nover by", "{}"),
-    ("control_s", "after\ns", "{:.3f}"), ("speed_then_rpm", "speed\nthen rpm", "{:.0f}"), ("angle_error_deg", "angle err\nthen deg", "{:.1f}"),
-    ("current_max_a", "current\nmax A", "{:.2f}"), ("bus_max_v", "bus\nmax V", "{:.1f}"), ("verdict", "\nverdict", "{}"))
+    ("control_s", "after\ns", "{:.3f}"), ("speed_then_rpm", "speed\nthen rpm", "{:.0f}"), ("angle_error_deg", "angle err\nat last deg", "{:.1f}"),
+    ("pull_deg", "pull at\nlast deg", "{:.0f}"), ("current_max_a", "current\nmax A", "{:.2f}"), ("bus_max_v", "bus\nmax V", "{:.1f}"),
+    ("verdict", "\nverdict", "{}"))
 STOP_COLUMNS = (
     ("rpm", "from\nrpm", "{:.0f}"), ("inertia", "inertia\nfactor", "{:g}"), ("stop_s", "stop\ns", "{:.2f}"), ("current_max_a", "current\nmax A", "{:.2f}"),
     ("copper_max_w", "winding\nmax W", "{:.1f}"), ("bus_max_v", "bus\nmax V", "{:.1f}"), ("verdict", "\nverdict", "{}"))
-KEYS = ("name", "rpm", "rotor_deg", "inertia", "how", "control_s", "speed_then_rpm", "angle_error_deg", "speed_error_percent", "stop_s", "copper_max_w",
+KEYS = ("name", "rpm", "rotor_deg", "inertia", "how", "control_s", "speed_then_rpm", "angle_error_deg", "pull_deg", "speed_error_percent", "stop_s", "copper_max_w",
         "current_max_a", "bus_max_v", "fault", "verdict")
 
 
@@ -55,6 +57,7 @@ class Table(sweep.Table):
     start_s: float = sweep.within(0.06, 60.0)
     within_s: float = sweep.within(0.0, 60.0)
     angle_error_deg: float = sweep.within(0.0, 180.0)
+    pull_deg: float = sweep.within(0.0, 180.0)
     standing_rpm: float = sweep.within(0.0)
     settle_s: float = sweep.within(0.01, 60.0)
     measure_s: float = sweep.within(0.01, 60.0)
@@ -147,26 +150,29 @@ def measured(item: Case, run: Run) -> dict[str, Any]:
     faults = [name for _, _, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
     current = np.hypot(trace.column("plant.i_d").astype(np.float64), trace.column("plant.i_q").astype(np.float64))
     row = {"name": item.name, "rpm": item.rpm, "rotor_deg": item.rotor_deg, "inertia": item.inertia, "how": None, "control_s": None,
-           "speed_then_rpm": None, "angle_error_deg": None, "stop_s": None, "speed_error_percent": run.measures[sweep.MEASURE]["speed_error_percent"],
+           "speed_then_rpm": None, "angle_error_deg": None, "pull_deg": None, "stop_s": None, "speed_error_percent": run.measures[sweep.MEASURE]["speed_error_percent"],
            "current_max_a": float(current.max()), "bus_max_v": float(trace.column("bus.voltage_v").max()),
            "copper_max_w": 1.5 * item.job.values["motor.rs_ohm"] * float(current.max()) ** 2, "fault": faults[0] if faults else None,
            "limited_percent": limited_percent(trace), "picture": picture.of(run, picture.SWEEP_STRETCHES)}
-    row |= stopped(trace, run, item.s2_s) if item.rotor_deg is None else taken_over(trace, run, item.s2_s)
+    row |= stopped(trace, run, item.s2_s) if item.rotor_deg is None else taken_over(trace, run, item.s2_s, item.table.within_s)
     return row | {"verdict": verdict(item, row)}
 
 
-def taken_over(trace: Trace, run: Run, s2_s: float) -> dict[str, Any]:
-    """When the drive has the rotor, in which state, at which speed and with which error of its angle."""
+def taken_over(trace: Trace, run: Run, s2_s: float, within_s: float) -> dict[str, Any]:
+    """When the drive has the rotor, in which state and at which speed; and when it must be in control the error of its angle, or on a forced angle
+    how far the current pulls ahead of the rotor's flux."""
     state = trace.column("fw.state")
     numbers = {run.state_number(name): name for name in (*DRIVEN, ALIGNED)}
     rows = np.flatnonzero(np.isin(state, list(numbers)))
     if not len(rows):
         return {}
     then = trace.time_s[rows[0]]
-    angle = trace.part(then + LOOK_S, then + 2.0 * LOOK_S)
-    error = wrapped_deg(angle.column("fw.theta_est_deg").astype(np.float64) - angle.column("plant.theta_e_deg"))
+    angle = trace.part(s2_s + within_s - LOOK_S, s2_s + within_s)
+    error = np.abs(wrapped_deg(angle.column("fw.theta_est_deg").astype(np.float64) - angle.column("plant.theta_e_deg")))
+    pull = np.abs(np.degrees(np.arctan2(angle.column("plant.i_q").astype(np.float64), angle.column("plant.i_d"))))
+    forced = angle.column("fw.state") == run.state_number(FORCED)
     return {"how": numbers[int(state[rows[0]])], "control_s": float(then - s2_s), "speed_then_rpm": float(trace.column("plant.speed_rpm")[rows[0]]),
-            "angle_error_deg": float(np.abs(error).mean())}
+            "angle_error_deg": float(error[~forced].mean()) if not forced.all() else None, "pull_deg": float(pull[forced].max()) if forced.any() else None}
 
 
 def stopped(trace: Trace, run: Run, s2_s: float) -> dict[str, Any]:
@@ -192,7 +198,7 @@ def verdict(item: Case, row: dict[str, Any]) -> str:
         return "never in control" if row["control_s"] is None else "late"
     if row["how"] == ALIGNED and abs(row["speed_then_rpm"]) > table.standing_rpm:
         return "aligned while it turned"
-    if row["how"] != ALIGNED and row["angle_error_deg"] > table.angle_error_deg:
+    if row["how"] != ALIGNED and ((row["angle_error_deg"] or 0.0) > table.angle_error_deg or (row["pull_deg"] or 0.0) > table.pull_deg):
         return "angle"
     error = row["speed_error_percent"]
     return "ok" if error is not None and abs(error) <= table.error_percent else "speed"
@@ -206,7 +212,8 @@ def check(item: Case, row: dict[str, Any]) -> Outcome:
         took = "never" if row["stop_s"] is None else f"{row['stop_s']:.2f} s"
         most = f", {item.stop_s:g} s" if item.stop_s else ""
         return Outcome(item.name, verdict_text == "ok", f"{verdict_text}; {took}, {both}", f"no fault, {item.most_a:.2f} A, bus {item.bus_v:g} V{most}")
-    then = "never" if row["control_s"] is None else f"{row['how']} after {row['control_s']:.3f} s, angle error {row['angle_error_deg']:.1f} deg"
+    angles = ", ".join(f"{text} {row[key]:.1f} deg" for key, text in (("angle_error_deg", "angle error"), ("pull_deg", "pull")) if row[key] is not None)
+    then = "never" if row["control_s"] is None else f"{row['how']} after {row['control_s']:.3f} s, {angles}"
     return Outcome(item.name, verdict_text == "ok", f"{verdict_text}; {then}, {both}",
                    f"no fault, {table.within_s:g} s, {table.angle_error_deg:g} deg, {item.most_a:.2f} A, bus {item.bus_v:g} V, speed {table.error_percent:g} %")
 
