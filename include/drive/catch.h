@@ -10,7 +10,7 @@
 #include "drive/startup.h"
 
 #define CATCH_LOOK_PERIODS 32u    /**< of a look at a slow rotor */
-#define CATCH_STANDS_Q14 128      /**< a current below it is none: four steps of the converter */
+#define CATCH_STANDS_Q11 256      /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
 #define CATCH_PAUSE_TURN 13653u   /**< 75 degrees: less than half a turn, even where a look and a wrong Kphi make them twice as many */
 #define CATCH_PAUSE_LEAST 4u      /**< periods */
 #define CATCH_PAUSE_MOST 1000u    /**< periods: 50 ms; in them a rotor turns a tenth of a right angle, or it stands */
@@ -102,7 +102,7 @@ NOINLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
     flux.alpha = catch_flux_q11(&d->run, &p->estimator, i.alpha, c->sum_q11.alpha);
     flux.beta = catch_flux_q11(&d->run, &p->estimator, i.beta, c->sum_q11.beta);
     direction = trig_direction((int16_t)-flux.alpha, (int16_t)-flux.beta);
-    turns = (uint16_t)(alpha >= CATCH_STANDS_Q14 || beta >= CATCH_STANDS_Q14);
+    turns = (uint16_t)(samples < CATCH_LOOK_PERIODS || qm_abs(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_abs(c->sum_q11.beta) >= CATCH_STANDS_Q11);
     if (turns && c->step == (uint16_t)CATCH_FIRST_LOOK) {
         c->pause = catch_pause(&d->run, p, flux, samples);
         c->half_periods = (uint16_t)(samples + 2u * c->pause);

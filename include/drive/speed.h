@@ -36,6 +36,18 @@ QM_INLINE uint16_t speed_has_stopped(const drive_t *d, const drive_params_t *p)
                       && qm_abs(d->run.control.reference_erpm) < p->minimum_erpm);
 }
 
+/** A stop goes on as a run, from the rotor's speed. What drove the rotor in the observer's eyes was its inertia, if there is more of it than the
+ *  header says: it is forgotten, or the braking would go on for a while. */
+QM_INLINE void speed_go_on(drive_t *d)
+{
+    observer_t *o = &d->run.observer;
+    d->run.control.reference_erpm = observer_speed(o);
+    if (along_direction(d, qm_hi(o->load_q16)) < 0) {
+        o->load_q16 = 0;
+    }
+    drive_enter(d, DRIVE_CLOSED);
+}
+
 /** Whether the run goes on or slows down: a target in the other direction slows it down until the ramp takes the rotor through zero; a new wish
  *  to run goes on from the present speed. Every eighth period in closed loop. */
 NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
@@ -47,7 +59,7 @@ NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
             drive_enter(d, DRIVE_STOPPING);
         }
     } else if (d->command.run && !other) {
-        drive_enter(d, DRIVE_CLOSED);
+        speed_go_on(d);
     } else if (!speed_has_stopped(d, p)) {
         /* on its way */
     } else if (d->command.run) {

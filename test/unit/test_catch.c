@@ -240,6 +240,23 @@ void test_a_stop_goes_on_from_the_present_speed_and_a_target_the_other_way_slows
     }
 }
 
+void test_a_stop_that_goes_on_forgets_a_load_that_drives_and_keeps_one_that_brakes(void)
+{
+    EACH_DIRECTION(direction) {
+        static const int16_t loads[] = { 300, -300 };
+        EACH(n, loads) {
+            rig_closed(direction, (int16_t)(direction * 10000));
+            drive.run.control.reference_erpm = (int16_t)(direction * 7000); /* far ahead of the rotor */
+            drive.run.observer.load_q16 = (int32_t)direction * loads[n] * 65536;
+            drive.state = (uint16_t)DRIVE_STOPPING;
+            speed_choose_state(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+            TEST_ASSERT_EQUAL_INT16(direction * 10000, drive.run.control.reference_erpm);
+            TEST_ASSERT_EQUAL_INT32((loads[n] > 0) ? (int32_t)direction * loads[n] * 65536 : 0, drive.run.observer.load_q16);
+        }
+    }
+}
+
 void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(void)
 {
     EACH_DIRECTION(direction) {
