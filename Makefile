@@ -194,7 +194,7 @@ logged_step = echo "  make $$step"; $(still) "make $$step" sh -c '$(MAKE) -s "$$
 .PHONY: readme bench
 readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
 	@+for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
-	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)"); do \
+	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)" "catch MOTOR=$(name)"); do \
 	    $(logged_step); done
 	@+if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
 	    $(logged_step); done; fi

@@ -24,7 +24,7 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     drive_control_t *c = &run->control;
     angle_t quarter = (angle_t)along_direction(d, 0x4000), estimated = estimator_next_angle(&run->estimator);
     angle_t forced = (angle_t)(estimated - quarter);
-    alphabeta_t v = inverse_park(c->v_q14, trig_sincos_called(quarter));
+    dq_t v = c->v_q14;
 
     run->handover.waited_steps = 0;
     run->handover.agreed_steps = 0;
@@ -32,10 +32,10 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     run->handover.offset = 0;
     run->handover.id_q13 = 0;
     c->burn_q13 = 0;
-    d->forced.speed_q10 = qm_mulss(along_direction(d, run->estimator.omega_erpm), p->estimator.deltat_q32) / 64;
+    d->forced.speed_q10 = qm_mulss(along_direction(d, run->estimator.omega_erpm), p->estimator.deltat_q32) >> 6;
     d->forced.angle_q32 = (uint32_t)forced << 16;
-    c->v_q14.d = (int16_t)(2 * v.alpha);
-    c->v_q14.q = (int16_t)(2 * v.beta);
+    c->v_q14.d = along_direction(d, (int16_t)-v.q); /* the same vector in a frame a quarter turn behind */
+    c->v_q14.q = along_direction(d, v.d);
     c->ref_q13.d = 0;
     c->ref_q13.q = along_direction(d, p->open_loop_q13);
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
