@@ -106,7 +106,7 @@ options = $(what) $(out)
 scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
 ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
-.PHONY: anymotor run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed setup-run
+.PHONY: anymotor run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
@@ -147,6 +147,10 @@ loadsteps: setup-run ## [run] the brake closes and opens at once: dips, and the 
 lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) lowspeed $(options)
+
+catch: setup-run ## [run] S2 while the rotor turns at any speed, and stops on a supply that cannot sink [MOTOR= BOARD= USERPARAMS= OUT=]
+	@+$(ready)
+	@$(front_end) catch $(options)
 
 # Each motor with the header that the tuner writes for it.
 drawn_from = $(tuner) tune --all --brief >/dev/null
@@ -190,7 +194,7 @@ logged_step = echo "  make $$step"; $(still) "make $$step" sh -c '$(MAKE) -s "$$
 .PHONY: readme bench
 readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
 	@+for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
-	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)"); do \
+	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)" "catch MOTOR=$(name)"); do \
 	    $(logged_step); done
 	@+if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
 	    $(logged_step); done; fi

@@ -52,6 +52,7 @@
 #define END_SPEED_RPM 1000          /* [rpm]           2 .. 10000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
 #define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of align and ramp: pull-out torque 0.0844 N m */
+#define FLYING_START 1              /* [switch]        0 .. 1         1: a rotor that turns is caught at its speed; 0: every start aligns it */
 
 /* ---- Limits and protections --------------------------------------------------------------------------------------- */
 #define MAXIMUM_CURRENT_A 2.75      /* [A peak]        0.1 .. 20      length of the current vector that the drive may ask for */
@@ -170,6 +171,7 @@
  *   estimator.kfilter_velestim_q16     73.503 Hz               1496  Q16 a period                   exact  Equation 7
  *
  * speeds
+ *   SPEED_UNIT                              1 1                   1  count                          exact  electrical rpm of a count of speed: of what `erpm` stands for in this table
  *   minimum_erpm                          150 rpm               750  erpm                           exact  potentiometer at zero
  *   pot_zero_q16                            0 1                   0  Q16                            exact  dead end of its travel
  *   pot_scale_q15                           1 1               32768  Q15                            exact  what is left of it is all
@@ -265,6 +267,7 @@
  *   kcurr_b                              -0.5 1              -16384  Q15                            exact  gain of the samples
  *
  * field weakening
+ *   fieldweak.index_per_count_q16       204.8 rpm                64  Q16 entries/erpm               exact  entries are so far apart
  *   fieldweak.trim_speed_erpm            1584 rpm              7920  erpm                           exact  speed from which it acts
  */
 

@@ -25,3 +25,21 @@ sincos_t trig_sincos_called(angle_t angle)
 {
     return trig_sincos(angle);
 }
+
+angle_t trig_direction(int16_t x, int16_t y)
+{
+    uint16_t across = (uint16_t)qm_abs(x), up = (uint16_t)qm_abs(y), steep = (uint16_t)(up > across);
+    uint16_t least = steep ? across : up, most = steep ? up : across;
+    q15_t r;
+    angle_t angle;
+
+    if (most == 0u) {
+        return 0;
+    }
+    /* atan r = r pi/4 + 0.273 r (1 - r), within 0.22 degrees */
+    r = (least == most) ? 32767 : qm_share(least, most);
+    angle = (angle_t)(((uint16_t)r >> 2) + (uint16_t)qm_hi(2 * qm_mulss(qm_hi(2 * qm_mulss(r, (int16_t)(32767 - r))), 2847)));
+    angle = steep ? (angle_t)(0x4000u - angle) : angle;
+    angle = (x < 0) ? (angle_t)(0x8000u - angle) : angle;
+    return (y < 0) ? (angle_t)~angle : angle; /* to a count */
+}

@@ -45,8 +45,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
         return;
     }
     drive_zero(run, sizeof *run);
-    d->direction = direction;
-    SELFTEST_KEEP(d, direction, direction);
+    drive_turns(d, direction);
     drive_update_model(run, p, p->end_erpm);
     run->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
     run->control.iq_limit_q13 = p->current_max_q13;
@@ -55,6 +54,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     d->forced.angle_q32 = (direction >= 0) ? 0xC0000000ul : 0x40000000ul; /* ALIGN sweeps it to zero */
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos_called(d->angle);
+    run->catching.step = (uint16_t)((p->flying_start && mode_hands_over()) ? CATCH_FIRST_LOOK : CATCH_NO_LOOK);
     mode_start(d, p);
     d->command.run = 1;
 }

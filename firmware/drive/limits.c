@@ -45,6 +45,9 @@ static uint16_t closed_loop_reasons(const drive_t *d, const drive_params_t *p)
     } else {
         /* the q current is what it was asked to be */
     }
+    if (c->burn_q13 > 0) {
+        found |= (uint16_t)LIMIT_BURN;
+    }
     if (run->fieldweak.table_q13 + run->fieldweak.trim_q13 < 0) {
         found |= (uint16_t)LIMIT_FIELD_WEAKENING;
     }
@@ -57,7 +60,7 @@ uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
     uint16_t found = 0;
 
     if (!drive_is_running(d)) {
-        return 0;
+        return (uint16_t)((d->state == (uint16_t)DRIVE_CATCH && d->run.catching.step <= (uint16_t)CATCH_FIRST_LOOK) ? LIMIT_TOO_FAST : LIMIT_NONE);
     }
     if (at_limit(c->v_q14.q, c->vq_limit_q14) || at_limit(c->v_q14.d, vd_limit(&d->circle))) {
         found = (uint16_t)LIMIT_VOLTAGE;

@@ -142,8 +142,12 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
         d->command.run = 0;
     } else if (d->state == (uint16_t)DRIVE_STOPPED) {
         drive_start(d, p, (int16_t)((target >= 0) ? 1 : -1));
+    } else if (drive_is_closed(d)) {
+        d->command.run = 1; /* a stop under way goes on from the present speed; the drive itself turns to the target's direction */
     } else if ((target ^ d->direction) < 0) {
-        d->command.run = 0; /* the other direction: stop in order, then start again */
+        d->command.run = 0; /* not caught yet: let go, and start again in the other direction */
+    } else {
+        /* it starts */
     }
     if (mode_background(d, p)) {
         panel->wish_run = 0;

@@ -12,7 +12,7 @@ typedef struct {
 
 /** State. */
 typedef struct {
-    int32_t speed_q10;  /**< magnitude, 1/1024 angle counts per period */
+    int32_t speed_q10;  /**< along the direction, 1/1024 angle counts per period; negative while the rotor still turns against it */
     uint32_t angle_q32; /**< the fraction below one count is kept, so the speed is exact */
 } forced_angle_t;
 
@@ -26,7 +26,7 @@ QM_INLINE int16_t forced_angle_tick(forced_angle_t *f, const forced_angle_params
         f->speed_q10 = p->end_speed_q10;
         at_end = 1;
     }
-    step_q32 = (uint32_t)f->speed_q10 << 6;
+    step_q32 = (uint32_t)qm_shift(f->speed_q10, 6);
     f->angle_q32 = (direction >= 0) ? qm_turn_add(f->angle_q32, step_q32) : qm_turn_sub(f->angle_q32, step_q32);
     return at_end;
 }

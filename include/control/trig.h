@@ -43,6 +43,9 @@ QM_INLINE sincos_t trig_sincos(angle_t angle)
 /** The same as one called copy, for where it runs rarely. */
 sincos_t trig_sincos_called(angle_t angle);
 
+/** Direction of the vector (x, y), to a quarter of a degree; 0 of a vector that has none. @param x,y -32767 .. 32767 */
+angle_t trig_direction(int16_t x, int16_t y);
+
 /** sqrt(1 - x^2) for 0 <= x <= 1 in Q15, linear between table entries: a chord, so above the circle by a tenth of a count at most. */
 QM_INLINE q15_t trig_circle(q15_t x)
 {

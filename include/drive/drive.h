@@ -18,12 +18,13 @@
 #define DRIVE_STATE_TABLE(X) \
     X(CALIBRATE, "outputs off, current offsets are averaged") \
     X(STOPPED, "outputs off, ready") \
-    X(BOOTSTRAP, "low sides on, high-side drivers charge") \
+    X(BOOTSTRAP, "low sides on: high-side drivers charge, the short circuit's current tells of a rotor that turns") \
     X(ALIGN, "current in a fixed direction aligns the rotor") \
     X(RAMP, "forced angle accelerates; the estimator runs along") \
     X(CLOSED, "the estimator's angle drives the motor") \
     X(STOPPING, "closed loop, ramping down to a speed where the outputs can go off") \
-    X(FAULT, "outputs off until S2 clears the fault")
+    X(FAULT, "outputs off until S2 clears the fault") \
+    X(CATCH, "outputs off: between two looks at a rotor that turns, or while it is too fast")
 
 #define DRIVE_STATE_ENUM(name, meaning) DRIVE_##name,
 typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_state_t;
@@ -51,6 +52,7 @@ typedef struct {
     q15_t kcurr_a, kcurr_b; /**< gain of the samples; Q15 sample to Q13 current by the high word */
     int16_t offset_max_q13; /**< largest plausible offset */
     uint16_t bootstrap_periods;
+    uint16_t flying_start; /**< FLYING_START */
     uint16_t align_periods;
     uint16_t agree_steps, wait_steps; /**< agreement needed at the end of the ramp, and how long it may take */
     uint32_t align_sweep_q32;         /**< angle step while the first half of ALIGN turns by 90 degrees */
@@ -109,6 +111,7 @@ typedef struct {
     dq_t ref_q13;                  /**< current references */
     current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2) */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */
+    current_q13_t burn_q13;        /**< d current that burns what the bus does not take, 0 or more */
     dq_t i_q13;                    /**< measured currents in the control frame */
     dq_t v_q14;                    /**< commanded voltages in the control frame */
     voltage_q14_t vq_limit_q14;
@@ -129,6 +132,23 @@ typedef struct {
     current_q13_t id_q13;      /**< d current that goes with the offset */
 } handover_t;
 
+/** What a look at the rotor is for. */
+typedef enum {
+    CATCH_NO_LOOK, /**< it stands, or nobody wants to know */
+    CATCH_FIRST_LOOK,
+    CATCH_SECOND_LOOK,
+    CATCH_SEEN /**< angle and speed are known */
+} catch_step_t;
+
+/** A rotor that turns at the start (drive/catch.h). */
+typedef struct {
+    uint16_t step;         /**< catch_step_t: the look that goes on, or comes after the pause */
+    alphabeta_t sum_q11;   /**< currents of this look */
+    angle_t direction;     /**< of the back-EMF in the middle of the last look */
+    uint16_t pause;        /**< with the outputs off, periods */
+    uint16_t half_periods; /**< from the middle of the last look to its end; between two looks, to the next one's begin */
+} catch_t;
+
 /** What a start begins anew: all of it is cleared. */
 typedef struct {
     estimator_t estimator;
@@ -137,6 +157,7 @@ typedef struct {
     adaptation_t adaptation;
     observer_t observer;
     handover_t handover;
+    catch_t catching;
     drive_control_t control;
     uint16_t stall_steps;                       /**< slow steps below half the reference, less four for each above */
     uint16_t probe_steps;                       /**< of the probe whether the rotor turns, and of the pause after it */
@@ -154,8 +175,8 @@ typedef struct {
     volatile uint16_t state; /**< drive_state_t; written by drive_enter() only */
     volatile uint16_t fault; /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
     volatile uint16_t ticks; /**< periods since power-up, wraps; the background's time base */
-    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP and ALIGN count it */
-    int16_t direction;       /**< +1 or -1, fixed from start to stop */
+    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP, CATCH and ALIGN count it */
+    int16_t direction;       /**< +1 or -1, of the run; of a rotor that was caught backwards until it is reversed */
 
     calibration_t calibration;
     phases_t phases_q13;     /**< measured */

@@ -3,7 +3,7 @@
 #define DRIVE_IDLE_H
 
 #include "drive/calibration.h"
-#include "drive/startup.h"
+#include "drive/catch.h"
 
 /** A period with the bridge off or charging its drivers: each state says which comes next, the gate lets it in or not. */
 NOINLINE void idle_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
@@ -17,11 +17,17 @@ NOINLINE void idle_step(drive_t *d, const drive_params_t *p, const drive_samples
         d->run.estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
         d->run.control.reference_erpm = 0;
         if (d->command.run) {
-            next = (uint16_t)DRIVE_BOOTSTRAP;
+            next = (uint16_t)(catch_bus_is_high(d, p) ? DRIVE_CATCH : DRIVE_BOOTSTRAP);
         }
         break;
     case DRIVE_BOOTSTRAP:
         next = (uint16_t)startup_bootstrap(d, p);
+        if (next == (uint16_t)DRIVE_BOOTSTRAP && d->run.catching.step != (uint16_t)CATCH_NO_LOOK && catch_look(d, p)) {
+            next = (uint16_t)DRIVE_CATCH;
+        }
+        break;
+    case DRIVE_CATCH:
+        next = (uint16_t)catch_pass(d, p);
         break;
     default: /* FAULT; without a fault when the background raised one while it was cleared here */
         if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) {

@@ -7,6 +7,7 @@
 #include "drive/limit_reasons.h"
 
 #define LIMITS_MISSING_Q14 4       /**< voltage counts that a count of missing q current asks for */
+#define LIMITS_BURN_STEP_Q13 32    /**< a step of the d current that burns: MAXIMUM_CURRENT_A takes a twentieth of a second */
 #define LIMITS_MISSING_MOST_Q13 64 /**< missing q current that counts at most */
 
 /** Voltage that the q axis has left, less what the missing q current asks for: a limit that is only touched now and then takes no more d
@@ -23,7 +24,22 @@ QM_INLINE current_q13_t limits_asked_most(const drive_params_t *p)
     return (int16_t)(p->current_max_q13 - (p->current_max_q13 >> 5));
 }
 
-/** d current: what is left of the hand-over, the table and its trim, the rotor's probe; the q current gets the rest of the circle. */
+/** 1 while the bus, and not the circle, holds the q current. With no braking current at all its reference is 0, which has no sign. */
+QM_INLINE uint16_t limits_bus_holds(const drive_control_t *c, speed_erpm_t speed)
+{
+    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && qm_abs(c->ref_q13.q) == c->brake_limit_q13 && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0));
+}
+
+/** The d current that burns the rotor's energy in the winding: more while the bus holds the braking current back, less while the circle does or
+ *  nothing. Where both do alike, the vector is as long as it may be and the bus takes nothing. Before the next limits_braking(). */
+QM_INLINE void limits_burn(drive_run_t *run, const drive_params_t *p)
+{
+    drive_control_t *c = &run->control;
+    int16_t step = (int16_t)(limits_bus_holds(c, observer_speed(&run->observer)) ? LIMITS_BURN_STEP_Q13 : -LIMITS_BURN_STEP_Q13);
+    c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, limits_asked_most(p));
+}
+
+/** d current: what is left of the hand-over, the table with its trim or what is burnt, the rotor's probe; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
@@ -31,12 +47,13 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     uint32_t ratio;
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
-    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13 + run->probe_id_q13), (int16_t)-id_max, id_max);
+    c->ref_q13.d = qm_clamp((int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13), (int16_t)-id_max, id_max);
     ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
 }
 
-/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 filtered */
+/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: a filter's lag would let the bus
+ *  capacitor and this limit swing */
 QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15)
 {
     int16_t over = (int16_t)(bus_q15 - p->bus_regen_q15);

@@ -40,7 +40,8 @@
     X(LOCK_TIME, "periods", 200, 32000, FROM_TUNER, "rotor held at a fixed angle (two directions, half the time each)") \
     X(END_SPEED_RPM, "rpm", 2, 10000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
     X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000, FROM_TUNER, "acceleration of the ramp") \
-    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of align and ramp")
+    X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of align and ramp") \
+    X(FLYING_START, "switch", 0, 1, 1, "1: a rotor that turns is caught at its speed; 0: every start aligns it")
 
 #define PARAM_LIMITS(X) /* Limits and protections */ \
     X(MAXIMUM_CURRENT_A, "A peak", 0.1, 20, FROM_MOTOR, "length of the current vector that the drive may ask for") \
@@ -112,7 +113,7 @@
 
 /** Parameters in these units are whole numbers. */
 #define PARAM_COUNTED(unit) \
-    (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 || __builtin_strcmp(unit, "times") == 0 \
+    (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 || __builtin_strcmp(unit, "times") == 0 || __builtin_strcmp(unit, "switch") == 0 \
      || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */

@@ -13,13 +13,16 @@ QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Over-voltage at once, under-voltage while anything is on, every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
+/** Over-voltage at once, under-voltage filtered, both while anything is on: at rest a rotor may charge the bus. Every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
 QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
     drive_fault_t found;
+    if (drive_outputs(d) == (uint16_t)OUTPUTS_OFF) {
+        return;
+    }
     if (now_q15 > p->bus_over_q15) {
         found = FAULT_OVERVOLTAGE;
-    } else if (bus_q15 < p->bus_under_q15 && d->state != (uint16_t)DRIVE_STOPPED && d->state != (uint16_t)DRIVE_CALIBRATE) {
+    } else if (bus_q15 < p->bus_under_q15) {
         found = FAULT_UNDERVOLTAGE;
     } else {
         return;

@@ -15,11 +15,11 @@ enum {
     RECORDER_I_B,
     RECORDER_V_D, /**< commanded, Q14 */
     RECORDER_V_Q,
-    RECORDER_ANGLE, /**< control angle of the next sample; its lowest three bits are the state */
-    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed */
+    RECORDER_ANGLE, /**< control angle of the next sample; its lowest four bits are the state */
+    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed, electrical rpm */
     RECORDER_WORDS  /**< of a row: 12 bytes */
 };
-#define RECORDER_STATE_BITS 7u
+#define RECORDER_STATE_BITS 15u
 
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)

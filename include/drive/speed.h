@@ -5,7 +5,7 @@
 #include "drive/limits.h"
 #include "drive/modes/modes.h"
 #include "drive/reference.h"
-#include "drive/state.h"
+#include "drive/startup.h"
 
 /** The next speed reference. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
@@ -22,8 +22,55 @@ QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
     run->control.sample_shift_q13 = qm_mulhi(observer_speed(&run->observer), p->sample_shift_q16);
 }
 
-/** One step of the controller, every eighth period in closed loop. STOPPING ends when the reference has come below the minimum speed and the rotor
- *  near it: what the observer does not see of an unloaded motor's current can hold it just above. */
+/** 1 while the target lies in the other direction. */
+QM_INLINE uint16_t speed_is_to_turn(const drive_t *d)
+{
+    return (uint16_t)((d->command.target_erpm ^ d->direction) < 0);
+}
+
+/** 1 when a stop has come to its end: the reference below the minimum speed and the rotor near it, for what the observer does not see of an
+ *  unloaded motor's current can hold it just above. */
+QM_INLINE uint16_t speed_has_stopped(const drive_t *d, const drive_params_t *p)
+{
+    return (uint16_t)(qm_abs(observer_speed(&d->run.observer)) < p->minimum_erpm + (p->minimum_erpm >> 1)
+                      && qm_abs(d->run.control.reference_erpm) < p->minimum_erpm);
+}
+
+/** A stop goes on as a run, from the rotor's speed. What drove the rotor in the observer's eyes was its inertia, if there is more of it than the
+ *  header says: it is forgotten, or the braking would go on for a while. */
+QM_INLINE void speed_go_on(drive_t *d)
+{
+    observer_t *o = &d->run.observer;
+    d->run.control.reference_erpm = observer_speed(o);
+    if (along_direction(d, qm_hi(o->load_q16)) < 0) {
+        o->load_q16 = 0;
+    }
+    drive_enter(d, DRIVE_CLOSED);
+}
+
+/** Whether the run goes on or slows down: a target in the other direction slows it down until the ramp takes the rotor through zero; a new wish
+ *  to run goes on from the present speed. Every eighth period in closed loop. */
+NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
+{
+    uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
+
+    if (!stops) {
+        if (other) {
+            drive_enter(d, DRIVE_STOPPING);
+        }
+    } else if (d->command.run && !other) {
+        speed_go_on(d);
+    } else if (!speed_has_stopped(d, p)) {
+        /* on its way */
+    } else if (d->command.run) {
+        drive_turns(d, (int16_t)-d->direction);
+        startup_ramp_from_here(d, p);
+    } else {
+        drive_enter(d, DRIVE_STOPPED);
+    }
+}
+
+/** One step of the controller, every eighth period in closed loop. */
 NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
@@ -37,9 +84,6 @@ NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
         speed_trim(&d->run, p, before, iq_q13);
     }
     c->ref_q13.q = limits_apply_braking(c, speed, iq_q13);
-    if (d->state == (uint16_t)DRIVE_STOPPING && qm_abs(speed) < p->minimum_erpm + (p->minimum_erpm >> 1) && qm_abs(c->reference_erpm) < p->minimum_erpm) {
-        drive_enter(d, DRIVE_STOPPED);
-    }
 }
 
 #endif

@@ -16,6 +16,35 @@ QM_INLINE drive_state_t startup_bootstrap(drive_t *d, const drive_params_t *p)
     return (d->periods >= p->bootstrap_periods) ? DRIVE_ALIGN : DRIVE_BOOTSTRAP;
 }
 
+/** The forced angle goes on where the estimator is, at its speed, against the direction too: the current lies along the rotor's flux and pulls no
+ *  further than it turns. */
+NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    drive_control_t *c = &run->control;
+    angle_t quarter = (angle_t)along_direction(d, 0x4000), estimated = estimator_next_angle(&run->estimator);
+    angle_t forced = (angle_t)(estimated - quarter);
+    dq_t v = c->v_q14;
+
+    run->handover.waited_steps = 0;
+    run->handover.agreed_steps = 0;
+    run->handover.speed_is_preset = 0;
+    run->handover.offset = 0;
+    run->handover.id_q13 = 0;
+    c->burn_q13 = 0;
+    d->forced.speed_q10 = qm_mulss(along_direction(d, run->estimator.omega_erpm), p->estimator.deltat_q32) >> 6;
+    d->forced.angle_q32 = (uint32_t)forced << 16;
+    c->v_q14.d = along_direction(d, (int16_t)-v.q); /* the same vector in a frame a quarter turn behind */
+    c->v_q14.q = along_direction(d, v.d);
+    c->ref_q13.d = 0;
+    c->ref_q13.q = along_direction(d, p->open_loop_q13);
+    pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
+    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
+    d->angle = forced;
+    d->frame = trig_sincos_called(forced);
+    drive_enter(d, DRIVE_RAMP);
+}
+
 /** The vector turns by 90 degrees during the first half of ALIGN, so that no rotor position is a dead point. */
 QM_INLINE void startup_sweep(drive_t *d, const drive_params_t *p)
 {

@@ -43,6 +43,13 @@ QM_INLINE drive_state_t drive_clear_fault(drive_t *d)
     return d->calibration.done ? DRIVE_STOPPED : DRIVE_CALIBRATE;
 }
 
+/** The direction of the run: of the target, or of the rotor that was caught. */
+QM_INLINE void drive_turns(drive_t *d, int16_t direction)
+{
+    d->direction = direction;
+    SELFTEST_KEEP(d, direction, direction);
+}
+
 /** 1 while the bridge switches under the law's control: ALIGN to STOPPING, in one comparison. */
 QM_INLINE uint16_t drive_is_running(const drive_t *d)
 {

@@ -80,6 +80,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 1:
         if (d->state == (uint16_t)DRIVE_RAMP) {
             handover_step(d, p);
+        } else if (d->state == (uint16_t)DRIVE_CATCH) {
+            catch_step(d, p);
         } else {
             model_update(d, p);
         }
@@ -94,6 +96,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         bus_update_voltage_limit(d, p);
         if (drive_is_closed(d)) {
             protection_probe_rotor(d, p);
+            limits_burn(run, p);
+            speed_choose_state(d, p);
         }
         done = 3;
         break;
@@ -116,7 +120,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 6:
         if (drive_is_closed(d)) {
             handover_decay(d);
-            limits_braking(run, p, qm_hi(d->bus_q31));
+            limits_braking(run, p, bus_sample(v_bus_raw));
         }
         model_learn_step(d, p);
         done = 6;

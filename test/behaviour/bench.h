@@ -81,6 +81,7 @@ static inline void run_at(double rpm)
 {
     power_on();
     (void)start();
+    TEST_ASSERT_EQUAL_INT_MESSAGE(FAULT_NONE, board_drive.fault, "did not start");
     TEST_ASSERT_EQUAL_INT_MESSAGE(DRIVE_CLOSED, board_drive.state, "did not start");
     wait_s(0.5);
     if (rpm > NOMINAL_SPEED_RPM) {

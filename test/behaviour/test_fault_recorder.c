@@ -51,7 +51,7 @@ static void expect_trace(void)
         TEST_ASSERT_EQUAL_INT(counts(row, I_B, amperes), word[RECORDER_I_B]);
         TEST_ASSERT_EQUAL_INT(counts(row, V_D, volts), word[RECORDER_V_D]);
         TEST_ASSERT_EQUAL_INT(counts(row, V_Q, volts), word[RECORDER_V_Q]);
-        TEST_ASSERT_EQUAL_HEX16(counts(row, ANGLE, 360.0 / 65536.0) & 0xFFF8, (uint16_t)word[RECORDER_ANGLE] & ~RECORDER_STATE_BITS);
+        TEST_ASSERT_EQUAL_HEX16(counts(row, ANGLE, 360.0 / 65536.0) & 0xFFF0, (uint16_t)word[RECORDER_ANGLE] & ~RECORDER_STATE_BITS);
         TEST_ASSERT_EQUAL_INT(counts(row, STATE, 1.0), (uint16_t)word[RECORDER_ANGLE] & RECORDER_STATE_BITS);
         if (place % 2u) {
             TEST_ASSERT_EQUAL_INT(counts(row, SPEED, 1.0 / NOPOLESPAIRS), word[RECORDER_SLOW]);

@@ -69,3 +69,12 @@ def test_every_motor_has_its_line_of_load_steps_and_low_speeds(result, tmp_path)
         left(tmp_path, f"lowspeed{end}", motor, [{"asked_rpm": 151.2}], lowest=lowest)
     lines = readme.stiffness().splitlines()
     assert lines[2:] == ["| other | 1 of 2 | 48 % | 0.200 s | 1 of 1 | 151 | 120 / - |", "| own | 2 of 2 | 48 % | 0.200 s | 1 of 1 | 151 | 120 / - |"]
+
+
+def test_every_motor_has_its_line_of_flying_starts_and_stops(result, tmp_path):
+    (tmp_path / "tuning/motors").mkdir(parents=True)
+    (tmp_path / "tuning/motors/own.toml").touch()
+    start = {"rpm": -2000.0, "rotor_deg": 10.0, "verdict": "ok", "control_s": 0.03, "current_max_a": 2.5, "bus_max_v": 33.0, "stop_s": None}
+    stop = {"rpm": 5500.0, "rotor_deg": None, "verdict": "ok", "control_s": None, "current_max_a": 2.8, "bus_max_v": 28.6, "stop_s": 1.39}
+    left(tmp_path, "catch", "own", [start, start | {"rpm": 3400.0, "control_s": 0.061, "verdict": "angle"}, stop, stop | {"stop_s": None}])
+    assert readme.catches().splitlines()[2:] == ["| own | -2000 .. 3400 | 1 of 2 | 0.061 s | 2.80 A | 5500 rpm | 1.39 / never s | 28.6 V |"]

@@ -20,15 +20,15 @@ STATUS = "state 7 fault 6 speed 0 rpm\r\n"
 
 def lines(count: int = 4, sent: int | None = None, fault: int = 6, first: int = 1, every: int = 1) -> str:
     """A record as the firmware sends it; the last two rows are in the fault."""
-    rows = [f"row {(first - n) % 80} {n} {-n} {10 * n} -1 {8 * n + (7 if n >= count - 2 else 5)} {-20000 + n}\r\n" for n in range(count)]
+    rows = [f"row {(first - n) % 80} {n} {-n} {10 * n} -1 {16 * n + (7 if n >= count - 2 else 5)} {-20000 + n}\r\n" for n in range(count)]
     return f"record fault {fault} rows {count} every {every}\r\n" + "".join(rows[:sent])
 
 
 def test_a_record_among_other_lines_is_read_from_the_oldest_row_on() -> None:
     text = "foc33 0.10.0 reset BOR POR\r\n" + STATUS + lines().replace("row 0", STATUS + "row 0") + STATUS
     found = recorder.parse(text, "log")
-    assert found == [recorder.Record(6, 1, (1, 0, 79, 78), ((0, 0, 0, -1, 5, -20000), (1, -1, 10, -1, 13, -19999), (2, -2, 20, -1, 23, -19998),
-                                                            (3, -3, 30, -1, 31, -19997)))]
+    assert found == [recorder.Record(6, 1, (1, 0, 79, 78), ((0, 0, 0, -1, 5, -20000), (1, -1, 10, -1, 21, -19999), (2, -2, 20, -1, 39, -19998),
+                                                            (3, -3, 30, -1, 55, -19997)))]
     assert found[0].states == [5, 5, 7, 7] and found[0].fault_row(7) == 2
 
 
@@ -45,10 +45,10 @@ def test_one_that_is_cut_is_forgotten_where_a_whole_one_is_there() -> None:
     ("", "no record of a fault, log: log the board's UART"), (STATUS, "no record of a fault, log"),
     (lines(sent=3), "the record ends after 3 of 4 rows, log line 1: log it again"),
     (lines(sent=0), "the record ends after 0 of 4 rows"),
-    (lines().replace("row 79 2", "row 79"), "no row of a record: 'row 79 -2 20 -1 23 -19998', log line 4"),
+    (lines().replace("row 79 2", "row 79"), "no row of a record: 'row 79 -2 20 -1 39 -19998', log line 4"),
     (lines().replace("row 79", "row 99"), "no row of a record: 'row 99 2"), (lines().replace("-19998", "-40000"), "no row of a record: 'row 79 2"),
     (lines().replace("row 79", "row 78"), "row 79 is missing after row 0, log line 4"),
-    (lines().replace("row 0 1 -1 10 -1 13 -19999\r\n", ""), "row 0 is missing after row 1, log line 3"),
+    (lines().replace("row 0 1 -1 10 -1 21 -19999\r\n", ""), "row 0 is missing after row 1, log line 3"),
     (lines(fault=99), "no head of a record: 'record fault 99 rows 4 every 1', log line 1"),
     (lines().replace("rows 4", "rows 81"), "no head of a record"), (lines(every=0), "no head of a record")])
 def test_a_bad_log_is_one_line_that_says_where(text: str, line: str) -> None:
@@ -70,7 +70,7 @@ def test_counts_become_engineering_units_and_the_fault_is_at_zero() -> None:
     assert rows.time_ms == pytest.approx([-0.2, -0.1, 0.0, 0.1])
     assert rows.i_a == pytest.approx([0.0, 0.001, 0.002, 0.003]) and rows.i_c == pytest.approx([0.0] * 4)
     assert rows.v_d == pytest.approx([0.0, 0.02, 0.04, 0.06]) and rows.v_q == pytest.approx([-0.002] * 4)
-    assert rows.angle_deg == pytest.approx(np.arange(4) * 8 * 360.0 / 65536.0)
+    assert rows.angle_deg == pytest.approx(np.arange(4) * 16 * 360.0 / 65536.0)
     assert rows.bus_v == pytest.approx([np.nan, 12769 / 65536 * 50, np.nan, 12771 / 65536 * 50], nan_ok=True)
     assert rows.speed_rpm == pytest.approx([-4000.0, np.nan, -3999.6, np.nan], nan_ok=True)
     assert rows.state == ["CLOSED", "CLOSED", "FAULT", "FAULT"]
@@ -123,7 +123,7 @@ def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float]
     for name, values in (("fw.i_a_a", rows.i_a), ("fw.i_b_a", rows.i_b), ("fw.v_d_v", rows.v_d), ("fw.v_q_v", rows.v_q)):
         scale = library.params["COUNT_CURRENT_A" if name.endswith("_a") else "COUNT_VOLTAGE_V"]
         assert np.round(part[name] / scale).tolist() == np.round(values / scale).tolist(), name
-    assert (np.round(part["fw.theta_ctrl_deg"] * 65536 / 360).astype(int) // 8).tolist() == np.round(rows.angle_deg * 8192 / 360).astype(int).tolist()
+    assert (np.round(part["fw.theta_ctrl_deg"] * 65536 / 360).astype(int) // 16).tolist() == np.round(rows.angle_deg * 4096 / 360).astype(int).tolist()
     assert part["fw.state"].astype(int).tolist() == record.states
     has_bus = ~np.isnan(rows.bus_v)
     assert has_bus.tolist() == [place % 2 == 0 for place in record.places] == np.isnan(rows.speed_rpm).tolist()

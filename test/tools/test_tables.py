@@ -3,7 +3,7 @@
 import pytest
 from support import refusal
 
-from tools.bench import loadsteps, lowspeed, rating_sweep, report, robust, start_sweep, table2
+from tools.bench import catch_sweep, loadsteps, lowspeed, rating_sweep, report, robust, start_sweep, table2
 from tools.common import motor_file, paths
 
 NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083, 1.513), 2000: (1900, 0.062, 1.117),
@@ -51,6 +51,7 @@ def test_a_shortfall_is_explained_by_what_limited_the_output_and_for_how_long(er
     (robust, "robust", "lowest_factor = 0.3", "lowest_factor = 1.5", "'lowest_factor' = 1.5 is impossible, "),
     (robust, "robust", "kphi_percent = [-20, 20]", "kphi_percent = [20]", "kphi_percent has 1 numbers"),
     (loadsteps, "loadsteps", "dip_rpm = [1190, 500]", "dip_rpm = [1190]", "columns of different lengths"),
+    (catch_sweep, "catch", "stop_s = [1.66, 1.66, 1.66]", "stop_s = [1.66]", "columns of different lengths"),
     (lowspeed, "lowspeed", "lowest_rpm = 50", "lowest_rpm = 40", "'lowest_rpm' = 40 is impossible"),
     (rating_sweep, "rated", "settle_s = 1.5", "settle_s = 0", "'settle_s' = 0 is impossible"),
     (rating_sweep, "rated", "speeds_percent = [20, 50, 100]", "speeds_percent = []", "not a list of numbers"),

@@ -43,7 +43,7 @@ void test_reasons_are_bits_of_their_own(void)
     TEST_ASSERT_EQUAL_HEX16(LIMIT_##name, (bit)); \
     all |= (bit);
     DRIVE_LIMIT_TABLE(ADD)
-    TEST_ASSERT_EQUAL_HEX16(127, all);
+    TEST_ASSERT_EQUAL_HEX16(511, all);
 }
 
 void test_drive_that_has_what_it_asks_for_has_no_reason(void)
@@ -167,6 +167,29 @@ void test_bridge_that_is_off_has_no_reason_and_a_forced_angle_only_the_voltage(v
     EACH(n, cases) {
         drive.state = (uint16_t)cases[n].state;
         expect(cases[n].reasons, golden_row(n));
+    }
+}
+
+void test_a_start_that_waits_for_a_fast_rotor_or_a_high_bus_says_so_and_a_pause_between_two_looks_does_not(void)
+{
+    static const struct {
+        catch_step_t step;
+        uint16_t reasons;
+    } cases[] = { { CATCH_NO_LOOK, LIMIT_TOO_FAST }, { CATCH_FIRST_LOOK, LIMIT_TOO_FAST }, { CATCH_SECOND_LOOK, 0 }, { CATCH_SEEN, 0 } };
+    drive.state = (uint16_t)DRIVE_CATCH;
+    EACH(n, cases) {
+        drive.run.catching.step = (uint16_t)cases[n].step;
+        expect(cases[n].reasons, golden_row(n));
+    }
+}
+
+void test_d_current_that_burns_the_rotors_energy_is_a_reason(void)
+{
+    EACH_FREE {
+        drive.run.control.burn_q13 = 1;
+        expect(LIMIT_BURN, "burns");
+        drive.run.control.burn_q13 = 0;
+        expect(LIMIT_NONE, "does not");
     }
 }
 

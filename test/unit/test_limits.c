@@ -139,6 +139,52 @@ void test_braking_that_was_limited_leaves_nothing_behind(void)
     TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
 }
 
+/* ---- what the bus does not take ---- */
+
+static current_q13_t burnt_after(uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)
+{
+    drive_control_t *c = &drive.run.control;
+    rig_speed(10000);
+    c->brake_limit_q13 = brake_limit_q13;
+    c->ref_q13.q = limits_apply_braking(c, 10000, iq_q13);
+    while (steps-- != 0u) {
+        limits_burn(&drive.run, &params);
+    }
+    return c->burn_q13;
+}
+
+void test_d_current_grows_while_the_bus_holds_braking_back_and_goes_when_it_does_not(void)
+{
+    drive.run.control.iq_limit_q13 = 5120;
+    TEST_ASSERT_EQUAL_INT16(0, burnt_after(100, 700, -699));
+    TEST_ASSERT_EQUAL_INT16(0, burnt_after(100, 700, 700));     /* it drives */
+    TEST_ASSERT_EQUAL_INT16(1600, burnt_after(50, 0, -500));    /* no braking current at all */
+    TEST_ASSERT_EQUAL_INT16(3200, burnt_after(50, 700, -701));
+    TEST_ASSERT_EQUAL_INT16(4960, burnt_after(200, 700, -5120)); /* 31/32 of MAXIMUM_CURRENT_A */
+    TEST_ASSERT_EQUAL_INT16(4640, burnt_after(10, 700, -600));
+    TEST_ASSERT_EQUAL_INT16(0, burnt_after(150, 700, 0));
+}
+
+void test_d_current_gives_way_where_the_circle_and_not_the_bus_holds_braking_back(void)
+{
+    drive.run.control.iq_limit_q13 = 2000;
+    drive.run.control.burn_q13 = 4000;
+    TEST_ASSERT_EQUAL_INT16(3968, burnt_after(1, 2000, -5120));
+    TEST_ASSERT_EQUAL_INT16(4000, burnt_after(1, 1999, -5120));
+}
+
+void test_what_is_burnt_and_field_weakening_share_the_largest_current(void)
+{
+    drive.run.control.burn_q13 = 3000;
+    drive.run.fieldweak.table_q13 = -1000;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(-4000, drive.run.control.ref_q13.d);
+    TEST_ASSERT_INT16_WITHIN(20, 3196, drive.run.control.iq_limit_q13); /* sqrt(5120^2 - 4000^2) */
+    drive.run.control.burn_q13 = 4960;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(-4960, drive.run.control.ref_q13.d);
+}
+
 /* ---- braking for every current range: from here on the parameters are others ---- */
 #undef MAXIMUM_CURRENT_A
 #define MAXIMUM_CURRENT_A 1.0

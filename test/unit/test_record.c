@@ -34,7 +34,7 @@ static void rows(uint16_t count, int16_t first)
         board_drive.phases_q13.b = (int16_t)-x;
         board_drive.run.control.v_q14.d = (int16_t)(x + 1000);
         board_drive.run.control.v_q14.q = (int16_t)(-x - 1000);
-        board_drive.angle = (uint16_t)(8u * (uint16_t)x);
+        board_drive.angle = (uint16_t)(16u * (uint16_t)x);
         board_drive.run.estimator.omega_filtered_q16 = x * 65536;
         if (board_drive.fault != (uint16_t)FAULT_NONE) {
             recorder_in_fault(&board_recorder, &board_drive);
@@ -74,8 +74,8 @@ void test_lines_tell_head_and_rows_from_the_oldest_on(void)
     record_tick();
     expect_line("record fault 6 rows 18 every 1\r\n");
     expect_line("row 79 0 0 1000 -1000 5 0\r\n");    /* odd: the speed */
-    expect_line("row 78 1 -1 1001 -1001 13 3\r\n");  /* even: the bus */
-    expect_line("row 77 500 -500 1500 -1500 4007 500\r\n");
+    expect_line("row 78 1 -1 1001 -1001 21 3\r\n");  /* even: the bus */
+    expect_line("row 77 500 -500 1500 -1500 8007 500\r\n");
     TEST_ASSERT_EQUAL_UINT16(15, lines());
     expect_line("");
 }

@@ -73,7 +73,7 @@ static void expect_rows(uint16_t rows, uint16_t end)
         TEST_ASSERT_EQUAL_INT16(i_b(tick), word[RECORDER_I_B]);
         TEST_ASSERT_EQUAL_INT16(100 + tick, word[RECORDER_V_D]);
         TEST_ASSERT_EQUAL_INT16(-(int16_t)tick, word[RECORDER_V_Q]);
-        TEST_ASSERT_EQUAL_HEX16(((uint16_t)(977u * tick) & 0xFFF8u) | state_of[tick], word[RECORDER_ANGLE]);
+        TEST_ASSERT_EQUAL_HEX16(((uint16_t)(977u * tick) & 0xFFF0u) | state_of[tick], word[RECORDER_ANGLE]);
         TEST_ASSERT_EQUAL_INT16((place % 2u) ? (int16_t)(3 * tick) : v_bus(tick), word[RECORDER_SLOW]);
     }
 }

@@ -207,9 +207,9 @@ void test_a_fault_that_somebody_else_clears_is_not_tried_again(void)
 void test_a_voltage_that_stays_wrong_uses_up_the_retries(void)
 {
     run();
-    rig_bus(PARAM_F(OVER_VOLTAGE_V) + 1.0F);
+    rig_bus(PARAM_F(UNDER_VOLTAGE_V) - 1.0F);
     all_ms(7000);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_UNDERVOLTAGE, drive.fault);
     TEST_ASSERT_EQUAL_UINT16(0, retry.left);
 }
 

@@ -222,9 +222,11 @@ void test_stop_never_asks_for_a_speed_without_a_gain(void)
         uint16_t n;
         rig_closed(direction, (int16_t)(direction * 4000));
         drive.state = (uint16_t)DRIVE_STOPPING;
+        drive.command.run = 0;
         for (n = 0; n < 1000u; n++) {
             rig_speed((int16_t)(direction * 3800)); /* a load that drives keeps it above the minimum */
             speed_step(&drive, &params);
+            speed_choose_state(&drive, &params);
             TEST_ASSERT_TRUE(direction * drive.run.control.reference_erpm >= 1875);
         }
         speed_follow(&drive.run, &params);
@@ -286,8 +288,10 @@ void test_stop_ends_when_the_reference_is_below_the_minimum_and_the_speed_near_i
     EACH(n, cases) {
         rig_closed(1, cases[n].reference_erpm);
         drive.state = (uint16_t)cases[n].from;
+        drive.command.run = (int16_t)(cases[n].from == DRIVE_CLOSED);
         rig_speed(cases[n].speed_erpm);
         speed_step(&drive, &params);
+        speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].to, drive.state, golden_row(n));
     }
 }

@@ -131,6 +131,7 @@ void test_align_and_ramp_carry_the_open_loop_current(void)
 {
     EACH_DIRECTION(direction) {
         static const uint16_t periods[] = { 3000, 10000 };
+        ideal_motor_reset(1.0F, 0.0F);
         rig_start(direction);
         (void)ideal_motor_run_until(DRIVE_ALIGN, 300);
         EACH(n, periods) {

@@ -14,7 +14,7 @@ uint16_t board_selftest_parts;
 volatile uint16_t board_reset_cause;
 tLimitParm LimitParm;
 
-static char sent[128];
+static char sent[144];
 static uint16_t sent_count, room;
 
 static uint16_t take(char c, int calls)

@@ -13,11 +13,17 @@ void setUp(void)
     ideal_motor_reset(1.0F, 0.0F);
 }
 
+/** A command in a direction; none has one, too. */
+static int16_t forward(int16_t direction, int16_t command_q13)
+{
+    return (int16_t)((direction > 0 || command_q13 != 0) ? direction * command_q13 : -1);
+}
+
 /** q current after a while at a speed, in the direction of rotation. @param steps of the controller */
 static int16_t torque(int16_t direction, int16_t command_q13, int16_t speed_erpm, int16_t limit_q13, uint16_t steps)
 {
     rig_closed(direction, (int16_t)(direction * speed_erpm));
-    drive.command.target_erpm = command_q13;
+    drive.command.target_erpm = forward(direction, command_q13);
     drive.run.control.iq_limit_q13 = limit_q13;
     while (steps-- != 0u) {
         speed_step(&drive, &params);
@@ -37,9 +43,8 @@ void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_b
         int16_t least, most; /* in the direction of rotation */
     } cases[] = {
         { "as commanded", 1000, 10000, 5120, 400, 1000, 1000 },
-        { "its sign has no say: the direction is fixed", -1000, 10000, 5120, 400, 1000, 1000 },
         { "large", 3000, 10000, 5120, 400, 3000, 3000 },
-        { "none", 0, 10000, 5120, 400, 0, 0 },
+        { "none", 0, 10000, 5120, 400, 0, 1 },
         { "limited by the circle", 5000, 10000, 2000, 1, 2000, 2000 },
         { "nothing that drives above maximum speed", 3000, 28000, 5120, 400, -5120, 0 },
         { "below minimum speed it holds the motor without a command", 0, 1500, 5120, 400, 1, 5120 },
@@ -58,7 +63,7 @@ void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_b
 static int16_t step(int16_t direction, int16_t command_q13, int16_t speed_erpm, int16_t load_q13)
 {
     rig_closed(direction, (int16_t)(direction * speed_erpm));
-    drive.command.target_erpm = command_q13;
+    drive.command.target_erpm = forward(direction, command_q13);
     drive.run.observer.load_q16 = qm_mulsu((int16_t)(direction * load_q13), params.observer.per_current_q16);
     speed_step(&drive, &params);
     return (int16_t)(direction * drive.run.control.ref_q13.q);
@@ -105,7 +110,23 @@ void test_limit_is_left_as_it_was_met_however_long_it_held(void)
         (void)torque(direction, 0, 2000, 5120, 2500);
         rig_speed((int16_t)(direction * 10000));
         speed_step(&drive, &params);
-        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.q);
+        TEST_ASSERT_INT16_WITHIN(1, 0, drive.run.control.ref_q13.q);
+    }
+}
+
+void test_command_in_the_other_direction_slows_down_first(void)
+{
+    EACH_DIRECTION(direction) {
+        (void)step(direction, 1000, 10000, 0);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+        drive.command.target_erpm = (int16_t)(direction * -1000);
+        speed_choose_state(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
+        speed_step(&drive, &params);
+        TEST_ASSERT_TRUE(direction * drive.run.control.reference_erpm < 10000);
+        drive.command.target_erpm = (int16_t)(direction * 1000);
+        speed_choose_state(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
     }
 }
 

@@ -35,6 +35,35 @@ void test_sine_squared_plus_cosine_squared_is_one_at_every_angle(void)
     }
 }
 
+void test_direction_is_that_of_the_vector_to_a_quarter_of_a_degree(void)
+{
+    static const int16_t lengths[] = { 32767, 1000 };
+    uint32_t a;
+    for (a = 0; a < UINT32_C(65536); a += 37u) {
+        sincos_t sc = trig_sincos((angle_t)a);
+        uint16_t n;
+        for (n = 0; n < 2u; n++) {
+            int16_t x = qm_hi(2 * qm_mulss(sc.cos, lengths[n])), y = qm_hi(2 * qm_mulss(sc.sin, lengths[n]));
+            TEST_ASSERT_INT16_WITHIN_MESSAGE((n == 0u) ? 46 : 60, 0, (int16_t)(angle_t)(trig_direction(x, y) - a), golden_row(a));
+        }
+    }
+}
+
+void test_direction_of_axes_and_diagonals_and_of_no_vector(void)
+{
+    static const struct {
+        int16_t x, y;
+        angle_t angle;
+    } cases[] = {
+        { 0, 0, 0 }, { 5, 0, 0 }, { 0, 5, 0x4000 }, { -5, 0, 0x8000 }, { 0, -5, 0xC000 }, { 7, 7, 0x2000 }, { -7, 7, 0x6000 }, { -7, -7, 0xA000 },
+        { 7, -7, 0xE000 }, { 32767, -32767, 0xE000 },
+    };
+    uint16_t n;
+    for (n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, 0, (int16_t)(angle_t)(trig_direction(cases[n].x, cases[n].y) - cases[n].angle), golden_row(n));
+    }
+}
+
 void test_circle_equals_the_reference(void)
 {
     GOLDEN_EACH(circle, v) {

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import build, campaign, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
+from . import build, campaign, catch_sweep, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -48,6 +48,9 @@ def _parser() -> argparse.ArgumentParser:
     slow = commands.add_parser("lowspeed", help="low speeds held under load, and how low it goes")
     slow.set_defaults(command=lowspeed.command)
 
+    catches = commands.add_parser("catch", help="S2 while the rotor turns at any speed, and stops on a supply that cannot sink")
+    catches.set_defaults(command=catch_sweep.command)
+
     margins = commands.add_parser("robust", help="how far the motor's true R, L and Kphi may be off what the header says")
     margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
     margins.set_defaults(command=robust.command)
@@ -57,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     record.set_defaults(command=_recorder)
 
     for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
-                            (slow, "lowspeed"), (margins, "robust"), (record, "recorder")):
+                            (slow, "lowspeed"), (catches, "catch"), (margins, "robust"), (record, "recorder")):
         header = "build/tune/NAME, written by make tune MOTOR=NAME" + ("" if command is rating else "; without --motor the project's own")
         command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
         command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")

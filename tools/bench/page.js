@@ -1,7 +1,7 @@
 // Draws the curves of a run: lanes for states, faults and reasons for a limit, and a panel for each quantity, all on one time axis.
 (async () => {
   "use strict";
-  const STATES = { CALIBRATE: "#e8e8e8", BOOTSTRAP: "#e3d9f0", ALIGN: "#fde7c3", RAMP: "#fff4b8", CLOSED: "#e0f3e0", STOPPING: "#d9e8f7",
+  const STATES = { CALIBRATE: "#e8e8e8", BOOTSTRAP: "#e3d9f0", CATCH: "#cdeaf0", ALIGN: "#fde7c3", RAMP: "#fff4b8", CLOSED: "#e0f3e0", STOPPING: "#d9e8f7",
                    FAULT: "#f9d3d3" };
   const LANE = 18, LABELS = 110, POINTS = 1500; // px, px, pairs of points drawn at most
   const place = document.getElementById("curves");

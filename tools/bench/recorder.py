@@ -10,7 +10,7 @@ from tools.common import drive_tables
 from tools.common.errors import UserError
 from .scenario import param
 
-RING_ROWS, AFTER_ROWS, WORDS, STATE_BITS = 80, 16, 6, 7
+RING_ROWS, AFTER_ROWS, WORDS, STATE_BITS, FAULT_STATE = 80, 16, 6, 15, 7
 HEAD = re.compile(r"record fault (\d+) rows (\d+) every (\d+)$")
 ROW = re.compile(r"row (\d+)((?: -?\d+){%d})$" % WORDS)
 AGAIN = "log it again: after a reset by its pin the board sends the record once more"
@@ -127,7 +127,7 @@ class Rows:
 def scaled(record: Record, params: Mapping[str, float], states: Mapping[int, str]) -> Rows:
     """With the scales of the firmware that has the record."""
     words = np.array(record.words, dtype=np.float64).reshape(-1, WORDS)
-    fault_state = next((number for number, name in states.items() if name == "FAULT"), STATE_BITS)
+    fault_state = next((number for number, name in states.items() if name == "FAULT"), FAULT_STATE)
     time = (np.arange(len(words)) - record.fault_row(fault_state)) * record.every * param(params, "LOOPTIME_SEC")
     has_bus = np.array(record.places) % 2 == 0
     return Rows(1e3 * time, *(words[:, column] * param(params, "COUNT_CURRENT_A") for column in (0, 1)),

@@ -80,7 +80,11 @@ static inline void ideal_motor_half_period(duties_t duty, uint16_t outputs)
         float v_alpha = (2.0F * v_a - v_b - v_c) / 3.0F, v_beta = (v_b - v_c) / PARAM_SQRT3;
         float i_d = motor.i_alpha * c + motor.i_beta * s, i_q = motor.i_beta * c - motor.i_alpha * s;
         float v_d = v_alpha * c + v_beta * s, v_q = v_beta * c - v_alpha * s, torque;
-        if (outputs != (uint16_t)OUTPUTS_PWM) {
+        if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) { /* a short circuit */
+            v_d = 0.0F;
+            v_q = 0.0F;
+        }
+        if (outputs == (uint16_t)OUTPUTS_OFF) {
             i_d = 0.0F;
             i_q = 0.0F;
         } else {

@@ -1,0 +1,197 @@
+/* The catch of a rotor that turns at the start: what the short circuit of the bootstrap tells of its angle and speed.
+ *
+ * With all low sides on the back-EMF alone drives the current, free of dead time and of the bus:  L i + R int(i dt) = -int(E dt).  A look ends as
+ * soon as the current is a tenth of its maximum, so it costs the rotor next to nothing. Its direction is the back-EMF's; the pause before
+ * the second look is meant to be 75 degrees, and the turn from look to look is the speed with its sign, whatever Kphi is. */
+#ifndef DRIVE_CATCH_H
+#define DRIVE_CATCH_H
+
+#include "drive/modes/modes.h"
+#include "drive/startup.h"
+
+#define CATCH_LOOK_PERIODS 32u    /**< of a look at a slow rotor */
+#define CATCH_STANDS_Q11 256      /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
+#define CATCH_PAUSE_TURN 13653u   /**< 75 degrees: less than half a turn, even where a look and a wrong Kphi make them twice as many */
+#define CATCH_PAUSE_LEAST 4u      /**< periods */
+#define CATCH_PAUSE_MOST 1000u    /**< periods: 50 ms; in them a rotor turns a tenth of a right angle, or it stands */
+#define CATCH_LEAST_TURN 1638     /**< 9 degrees */
+#define CATCH_BUS_SHIFT 5         /**< a start waits for a bus 1/32 below its trip */
+#define CATCH_MOST_FLUX_Q11 24000 /**< flux of a look that its format holds */
+
+/** An axis of L i + R int(i dt), voltage times periods. @param i_q14 at the end @param sum_q11 of all samples */
+QM_INLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t *p, int16_t i_q14, int16_t sum_q11)
+{
+    int32_t inductive = (qm_mulsu(i_q14, run->model.ls_q16) >> 15) * (1 << p->ls_exp);
+    int32_t resistive = (qm_mulsu((int16_t)(sum_q11 - (i_q14 >> 4)), run->model.rs_q16) >> 15) * (1 << p->rs_exp);
+    int32_t flux = inductive + resistive;
+    if (flux > CATCH_MOST_FLUX_Q11) {
+        return CATCH_MOST_FLUX_Q11;
+    }
+    return (int16_t)((flux < -CATCH_MOST_FLUX_Q11) ? -CATCH_MOST_FLUX_Q11 : flux);
+}
+
+/** How long a rotor takes for CATCH_PAUSE_TURN. @param flux_q11 of a look @param samples that it took, the first of a part of a period */
+QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)
+{
+    int16_t alpha = qm_abs(flux_q11.alpha), beta = qm_abs(flux_q11.beta);
+    int16_t length = (int16_t)((alpha > beta) ? alpha + (beta >> 2) : beta + (alpha >> 2)); /* to 11 per cent */
+    uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u));
+    int16_t emf_q12 = (int16_t)((half_emf_q12 > 16383u) ? 32767 : (int16_t)(2u * half_emf_q12));
+    speed_erpm_t speed = estimator_omega(emf_q12, run->model.emf_sum_max_q12, run->model.inv_kfi);
+    uint16_t step = (uint16_t)qm_mulhi(speed, p->estimator.deltat_q32), pause = CATCH_PAUSE_MOST;
+
+    if (step != 0u) {
+        pause = (uint16_t)(CATCH_PAUSE_TURN / step);
+    }
+    if (pause > CATCH_PAUSE_MOST) {
+        return CATCH_PAUSE_MOST;
+    }
+    return (pause < CATCH_PAUSE_LEAST) ? CATCH_PAUSE_LEAST : pause;
+}
+
+/** Speed from a turn. @return within 16 bits */
+QM_INLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t turn, uint16_t half_periods)
+{
+    /* turn 2^16 / (half_periods / 2) / deltat, with what divides brought into a word */
+    uint32_t part = (uint32_t)(uint16_t)qm_abs(turn) << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
+    int16_t speed = INT16_MAX;
+    while (whole > 65535ul) {
+        whole >>= 1;
+        part >>= 1;
+    }
+    if ((part >> 15) < whole) {
+        speed = (int16_t)qm_divud(part, (uint16_t)whole);
+    }
+    return (int16_t)((turn < 0) ? -speed : speed);
+}
+
+/** The second look has ended: the turn since the first one. @return 1 if the rotor turns */
+QM_INLINE uint16_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
+{
+    drive_run_t *run = &d->run;
+    catch_t *c = &run->catching;
+    int16_t turn = (int16_t)(angle_t)(direction - c->direction);
+
+    if (qm_abs(turn) < CATCH_LEAST_TURN) {
+        return 0;
+    }
+    run->estimator.omega_erpm = catch_speed(p, turn, (uint16_t)(c->half_periods + samples));
+    c->pause = 0;
+    c->step = (uint16_t)CATCH_SEEN;
+    if (qm_abs(run->estimator.omega_erpm) > p->maximum_erpm) { /* it is waited for */
+        c->pause = CATCH_PAUSE_MOST;
+        c->step = (uint16_t)CATCH_FIRST_LOOK;
+    }
+    return 1;
+}
+
+/** A period of a look. @return 1 when it has ended and the rotor turns: the outputs go off */
+NOINLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
+{
+    catch_t *c = &d->run.catching;
+    alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), flux;
+    int16_t most = (int16_t)(p->current_max_q13 / 5), alpha = qm_abs(i.alpha), beta = qm_abs(i.beta);
+    uint16_t samples = d->periods, turns;
+    angle_t direction;
+
+    c->sum_q11.alpha = (int16_t)(c->sum_q11.alpha + (i.alpha >> 3));
+    c->sum_q11.beta = (int16_t)(c->sum_q11.beta + (i.beta >> 3));
+    if (samples < CATCH_LOOK_PERIODS && alpha < most && beta < most) {
+        return 0;
+    }
+    flux.alpha = catch_flux_q11(&d->run, &p->estimator, i.alpha, c->sum_q11.alpha);
+    flux.beta = catch_flux_q11(&d->run, &p->estimator, i.beta, c->sum_q11.beta);
+    direction = trig_direction((int16_t)-flux.alpha, (int16_t)-flux.beta);
+    turns = (uint16_t)(samples < CATCH_LOOK_PERIODS || qm_abs(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_abs(c->sum_q11.beta) >= CATCH_STANDS_Q11);
+    if (turns && c->step == (uint16_t)CATCH_FIRST_LOOK) {
+        c->pause = catch_pause(&d->run, p, flux, samples);
+        c->half_periods = (uint16_t)(samples + 2u * c->pause);
+        c->step = (uint16_t)CATCH_SECOND_LOOK;
+    } else if (turns) {
+        turns = catch_see(d, p, direction, samples);
+        c->half_periods = samples;
+    } else {
+        /* it stands */
+    }
+    if (!turns) {
+        c->step = (uint16_t)CATCH_NO_LOOK;
+    }
+    c->direction = direction;
+    c->sum_q11.alpha = 0;
+    c->sum_q11.beta = 0;
+    return turns;
+}
+
+/** 1 with the bus so high that switching anything on would trip: a very fast rotor holds it there through the diodes. */
+QM_INLINE uint16_t catch_bus_is_high(const drive_t *d, const drive_params_t *p)
+{
+    return (uint16_t)(qm_hi(d->bus_q31) > (int16_t)(p->bus_over_q15 - (p->bus_over_q15 >> CATCH_BUS_SHIFT)));
+}
+
+/** A period with the outputs off. @return the next state */
+QM_INLINE drive_state_t catch_pass(drive_t *d, const drive_params_t *p)
+{
+    const catch_t *c = &d->run.catching;
+    if (!d->command.run) {
+        return DRIVE_STOPPED;
+    }
+    d->periods = (uint16_t)(d->periods + 1u); /* wraps where the bus is waited for: the pause begins anew */
+    if (c->step == (uint16_t)CATCH_SEEN || d->periods < c->pause || catch_bus_is_high(d, p)) {
+        return DRIVE_CATCH;
+    }
+    return DRIVE_BOOTSTRAP;
+}
+
+/** The estimator as if it had turned with the rotor: half a period after this one's sample. */
+QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    estimator_t *e = &run->estimator;
+    const catch_t *c = &run->catching;
+    int16_t ahead = (int16_t)((e->omega_erpm >= 0) ? 0x4000 : -0x4000), emf;
+    int32_t half_step_q32 = qm_mulss(e->omega_erpm, p->estimator.deltat_q32) / 2;
+
+    e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
+                 + (uint32_t)half_step_q32 * (uint32_t)(uint16_t)(c->half_periods + 2u * d->periods + 1u);
+    e->half_step_q16_rad = qm_mulhi(e->omega_erpm, p->estimator.half_step_q16_rad);
+    e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
+    drive_update_model(run, p, e->omega_erpm);
+    emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_abs(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
+    e->e_q_q28 = (int32_t)((ahead >= 0) ? emf : -emf) * 65536;
+    run->control.v_q14.q = qm_clamp((int16_t)(4 * qm_clamp((int16_t)((ahead >= 0) ? emf : -emf), -8191, 8191)), (int16_t)-d->circle.limit_q14, d->circle.limit_q14);
+}
+
+/** In closed loop from the next period on, at the rotor's speed and without torque. */
+QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    drive_control_t *c = &run->control;
+
+    drive_turns(d, (int16_t)((run->estimator.omega_erpm >= 0) ? 1 : -1));
+    c->reference_erpm = run->estimator.omega_erpm;
+    c->ref_q13.d = run->fieldweak.table_q13;
+    c->ref_q13.q = 0;
+    pi_preset(&c->pi_d, &p->pi_d, 0, 0);
+    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
+    d->angle = estimator_next_angle(&run->estimator);
+    d->frame = trig_sincos_called(d->angle);
+    run->estimator.v_last_q13 = inverse_park(c->v_q14, d->frame);
+    run->estimator.v_before_q13 = run->estimator.v_last_q13;
+    drive_enter(d, DRIVE_CLOSED);
+}
+
+/** In CATCH, every eighth period: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
+NOINLINE void catch_step(drive_t *d, const drive_params_t *p)
+{
+    if (d->run.catching.step != (uint16_t)CATCH_SEEN || d->periods < CATCH_PAUSE_LEAST) { /* the look's current goes first */
+        return;
+    }
+    catch_preset_estimator(d, p);
+    if (qm_abs(d->run.estimator.omega_erpm) >= p->minimum_erpm) {
+        catch_close(d, p);
+    } else {
+        startup_ramp_from_here(d, p);
+    }
+}
+
+#endif
