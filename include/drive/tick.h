@@ -92,9 +92,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 3:
         bus_update_voltage_limit(d, p);
-        if (drive_is_closed(d)) {
-            protection_probe_rotor(d, p);
-        }
+        protection_probe_step(d, p);
         done = 3;
         break;
     case 4:
