@@ -153,7 +153,7 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
 
     e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
                  + (uint32_t)half_step_q32 * (uint32_t)(uint16_t)(c->half_periods + 2u * d->periods + 1u);
-    e->half_step_q16_rad = qm_mulhi(e->omega_erpm, p->estimator.half_step_q16_rad);
+    e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, p->estimator.half_step_q16_rad);
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
     drive_update_model(run, p, e->omega_erpm);
     emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_abs(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);

@@ -180,6 +180,14 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
 }
 
+/** The same where it can be: in closed loop. */
+QM_INLINE void protection_probe_step(drive_t *d, const drive_params_t *p)
+{
+    if (drive_is_closed(d)) {
+        protection_probe_rotor(d, p);
+    }
+}
+
 /** Stall and lost lock: conditions that must not last. Every eighth period in closed loop. */
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {

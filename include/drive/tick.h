@@ -94,8 +94,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     case 3:
         bus_update_voltage_limit(d, p);
+        protection_probe_step(d, p);
         if (drive_is_closed(d)) {
-            protection_probe_rotor(d, p);
             limits_burn(run, p);
             speed_choose_state(d, p);
         }
