@@ -3,6 +3,7 @@
 import json
 
 import pytest
+import tune_support
 from support import command
 
 from tools.common import motor_file
@@ -72,7 +73,9 @@ def run(tmp_path_factory):
     """The finished run's folder; what it printed is shown where something fails."""
     folder = tmp_path_factory.mktemp("quick")
     (folder / "quick.toml").write_text(SCENARIO, encoding="utf-8")
-    code, out, error = command("run", str(folder / "quick.toml"), "--motor", SPINDLE, "--out", str(folder / "out"), "--no-plots", "--quiet")
+    code, out, error = tune_support.command("tune", SPINDLE, "--out", str(folder / "tune"), "--brief")
+    assert code == 0, out + error
+    code, out, error = command("run", str(folder / "quick.toml"), "--motor", SPINDLE, "--userparams", str(folder / "tune"), "--out", str(folder / "out"), "--no-plots", "--quiet")
     assert code == 0, out + error
     return folder / "out"
 
