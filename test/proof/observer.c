@@ -60,6 +60,8 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     o.rho_q32 = any_ul(0, UINT32_MAX);
     o.rate_q16 = any(0, next);
     o.large_erpm = ANY16();
+    o.wrong_erpm = ANY16();
+    o.wrong_steps = any_u(0, 65534); /* a fault ends the run long before */
     o.unrest_steps = ANYU16();
     o.quick_q15 = any(calm_low, calm_high);
     observer_step(&o, &p, any_ul(0, UINT32_MAX), any(-IQ_MAX, IQ_MAX));
