@@ -97,8 +97,8 @@ QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const d
     int16_t r_more = (int16_t)(((i.q ^ emf.q) >= 0) ? p->rs_off_most - rs : rs - p->rs_off_least);
     int16_t ri_q12 = protection_ri(p, qm_abs(i.q));
     uint16_t turned_q13 = (uint16_t)((uint16_t)qm_abs(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);
-    int16_t li_q12 = (int16_t)((qm_muluu(turned_q13, run->model.ls_q16) >> 16) << p->estimator.ls_exp);
-    return (uint16_t)(qm_mulss(e_q12, more) > qm_mulss(ri_q12, r_more) + qm_mulss(li_q12, p->ls_off));
+    uint32_t li_q12 = (qm_muluu(turned_q13, run->model.ls_q16) >> 16) << p->estimator.ls_exp;
+    return (uint16_t)(qm_mulss(e_q12, more) > qm_mulss(ri_q12, r_more) + qm_mulss((int16_t)((li_q12 > 32767ul) ? 32767ul : li_q12), p->ls_off));
 }
 
 /** What the motor has shown against the header must be possible: the flux within its tolerance, and a winding that has gained 60 % of its
