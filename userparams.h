@@ -251,7 +251,7 @@
  *   rs_off_least                         -0.3 1               -9830  Q15                         -0.004 %  so far may R be off
  *   rs_off_most                           0.5 1               16384  Q15                            exact  upwards
  *   ls_off                                0.3 1                9830  Q15                         -0.004 %  and L
- *   dead_emf_q12                         1.92 V                 591  Q12 V                       -0.035 %  what dead time may put into the back-EMF
+ *   dead_emf_q12                         0.96 V                 296  Q12 V                       +0.134 %  what dead time may put into the back-EMF
  *
  * modulator and bus
  *   svm.full                               50 us               2000  25 ns                          exact  duty of 100 %

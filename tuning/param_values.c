@@ -172,7 +172,7 @@ static void limits(void)
     FIELD(rs_off_least, PARAM_R_LEAST - 1.0, "1", 1.0 / 32768.0, "Q15", "so far may R be off");
     FIELD(rs_off_most, PARAM_R_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "upwards");
     FIELD(ls_off, PARAM_L_OFF, "1", 1.0 / 32768.0, "Q15", "and L");
-    FIELD(dead_emf_q12, 2.0 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "what dead time may put into the back-EMF");
+    FIELD(dead_emf_q12, PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "what dead time may put into the back-EMF");
 }
 
 static void modulator(void)

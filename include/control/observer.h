@@ -8,7 +8,8 @@
  * i_load goes to the controller as it is, so the loop is stiff without waiting for an integral. The rate follows what is known: slow
  * without load, where dead time disturbs the back-EMF most; quicker under load; quickest for a while after a large innovation
  * w^ - w; and all in proportion to the speed at low speed, for the estimator's own lock is as quick as the rotor turns. What counts as
- * large grows while large ones go on: a step of the load stands out from the calm before it, the loop's own swing does not. */
+ * large grows while large ones go on, and one that turns back ends the answer: a step of the load stands out from the calm before it and
+ * has one direction, the loop's own swing does not. */
 #ifndef CONTROL_OBSERVER_H
 #define CONTROL_OBSERVER_H
 
@@ -47,6 +48,7 @@ typedef struct {
     int16_t large_erpm;    /**< a large innovation begins here */
     q15_t quick_q15;       /**< 1 = a large innovation was just seen */
     uint16_t wrong_steps;  /**< steps with an innovation above wrong_erpm, less those without */
+    int16_t large_last;    /**< the last large innovation, erpm */
     uint16_t unrest_steps; /**< four for each step that was not calm, less one for each that was */
     q15_t share_q15;       /**< of the full rates, by the speed */
 } observer_t;
@@ -177,6 +179,10 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
         /* calm for long */
     }
     if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
+        if ((innovation ^ o->large_last) < 0 && !observer_is_calm(o)) {
+            o->unrest_steps = OBSERVER_UNREST_STEPS;
+        }
+        o->large_last = innovation;
         level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
     }
     o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));

@@ -81,7 +81,7 @@ typedef struct {
     q15_t kfi_impossible;                    /**< change of 1/Kphi that asks for more flux than the header's may be off */
     current_q13_t id_off_q13;                /**< d current's mean deviation that noise and dead time make at most */
     q15_t rs_off_least, rs_off_most, ls_off; /**< and how far its R and L may be */
-    int16_t dead_emf_q12;                    /**< what dead time may put into the back-EMF at most: by its compensation, and without it */
+    int16_t dead_emf_q12;                    /**< and what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
 

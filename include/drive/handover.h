@@ -5,7 +5,7 @@
 #include "drive/modes/modes.h"
 #include "drive/state.h"
 
-#define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 a step */
+#define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
 #define HANDOVER_FLOOR_SHIFT 3      /**< to an eighth at least */
 #define HANDOVER_MOST_OFFSET 0x2000 /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
@@ -14,7 +14,7 @@
 QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
 {
     int16_t current = qm_abs(d->run.control.ref_q13.q), least = (int16_t)(p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT);
-    current = (int16_t)(current - (current >> HANDOVER_FALL_SHIFT) - 1);
+    current = (int16_t)(current - (current >> HANDOVER_FALL_SHIFT) - (current >> (HANDOVER_FALL_SHIFT + 1)) - 1);
     d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
 }
 

@@ -138,7 +138,7 @@
         .rs_off_least = Q15(PARAM_R_LEAST - 1.0), \
         .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
         .ls_off = Q15(PARAM_L_OFF), \
-        .dead_emf_q12 = (int16_t)(VOLTAGE_Q14(2.0F * PARAM_DEAD_TIME_V) / 4), \
+        .dead_emf_q12 = (int16_t)((VOLTAGE_Q14(PARAM_DEAD_TIME_V) + 2) / 4), \
         .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(SPEED_COUNTS(PARAM_TOP_ERPM * 1.25F), 32700.0F)) \
     }
 

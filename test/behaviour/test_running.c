@@ -163,6 +163,23 @@ void test_wrong_resistance_is_learnt_where_a_load_shows_it(void)
     }
 }
 
+/* A resistance that is too high by 43 % lets a growing load swing the loop once it is quick: what turns back must not be answered quickly again. */
+void test_load_that_grows_on_a_winding_with_less_resistance_never_stalls_it(void)
+{
+    set("motor.rs_ohm", 0.7 * get("motor.rs_ohm"));
+    for (int phase = 0; phase < 4; phase++) {
+        run_at(500.0);
+        wait_s(0.07 * phase);
+        for (int i = 1; i <= 200; i++) {
+            set("load.constant_nm", 0.06 * fmin(i / 100.0, 1.0));
+            wait_s(0.01);
+            TEST_ASSERT_TRUE_MESSAGE(get("state.speed_rpm") > 250.0, "half the speed");
+        }
+        assert_running();
+        set("load.constant_nm", 0.0);
+    }
+}
+
 void test_load_observer_shows_speed_and_load_without_delay_of_an_integral(void)
 {
     run_at(1500.0);

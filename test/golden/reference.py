@@ -714,18 +714,24 @@ class Observer:
     quick: int = 0
     part: int = 0
     unrest: int = 0
+    large_last: int = 0
 
     @property
     def calm(self):
         return self.quick < 4096
 
     def follow_unrest(self, innovation):
-        """Four more for a step that is not calm, one less for one that is; from 1000 on, a large innovation counts in the calm only."""
+        """Four more for a step that is not calm, one less for one that is; from 1000 on, a large innovation counts in the calm only. Large ones to
+        both sides with no calm between them are as much unrest as that."""
         if not self.calm:
             self.unrest += 4 if self.unrest < 4000 else 0
         else:
             self.unrest -= 1 if self.unrest else 0
-        return abs(innovation) > self.large and (self.unrest < 1000 or self.calm)
+        counts = abs(innovation) > self.large and (self.unrest < 1000 or self.calm)
+        if counts:
+            turned, self.large_last = (innovation < 0) != (self.large_last < 0), innovation
+            self.unrest = 1000 if turned and not self.calm else self.unrest
+        return counts
 
     def follow_quick(self, innovation, one, half, large, faded):
         """In full from one and a half of what is large, less below it."""

@@ -132,13 +132,13 @@ static uint16_t fall(int16_t direction, int16_t offset, int16_t *current_q13)
     return steps;
 }
 
-/* 1/128 a step: an eighth is left after 247 */
+/* 1/128 + 1/256 a step, and a count: an eighth is left after 177 */
 void test_current_falls_until_it_pulls_the_rotor_or_is_an_eighth(void)
 {
     static const struct {
         int16_t offset;
         uint16_t steps, current_q13;
-    } cases[] = { { 0x2000, 1, 2625 }, { -0x2000, 1, 2625 }, { 0, 1, 2625 }, { 0x2001, 248, 328 }, { -0x2001, 248, 328 }, { 0x3FFF, 248, 328 } };
+    } cases[] = { { 0x2000, 1, 2625 }, { -0x2000, 1, 2625 }, { 0, 1, 2625 }, { 0x2001, 178, 328 }, { -0x2001, 178, 328 }, { 0x3FFF, 178, 328 } };
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             int16_t current_q13 = 0;
@@ -159,12 +159,12 @@ void test_rotor_that_falls_back_is_handed_over_with_the_current_that_is_left(voi
         slow(9);
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
-    TEST_ASSERT_INT16_WITHIN(20, 1371, drive.run.control.ref_q13.q); /* 2625 (127/128)^80, and a count a step */
+    TEST_ASSERT_INT16_WITHIN(20, 1021, drive.run.control.ref_q13.q); /* 2625 (253/256)^80, and a count a step */
     forced_ahead(0x1800);
     slow(9);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-    TEST_ASSERT_INT16_WITHIN(20, 1371, drive.run.handover.current_q13);
-    TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1371 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
+    TEST_ASSERT_INT16_WITHIN(20, 1021, drive.run.handover.current_q13);
+    TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1021 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
 }
 
 void test_current_is_whole_again_when_the_agreement_ends(void)

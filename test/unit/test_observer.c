@@ -327,6 +327,53 @@ void test_large_innovations_for_long_are_answered_only_from_calm(void)
     TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
 }
 
+/** A step at standstill that turns by so many counts. */
+static void turned_by(int16_t counts)
+{
+    o.omega_q16 = 0;
+    observer_step(&o, p, qm_turn_add(o.rho_q32, (uint32_t)((int32_t)counts * 65536)), 0);
+}
+
+/** After a large innovation to one side, one to the other, and a calm until the quick rate has faded to this; then a large one again. */
+void test_large_innovations_to_both_sides_are_answered_only_from_calm(void)
+{
+    EACH_DIRECTION(direction) {
+        begin(0);
+        observer_schedule(&o, p, 0);
+        o.unrest_steps = 0;
+        o.large_erpm = 100;
+        turned_by((int16_t)(direction * 400));
+        turned_by((int16_t)(direction * 400));
+        TEST_ASSERT_EQUAL_UINT16(4, o.unrest_steps); /* to one side: a step of the load */
+        turned_by((int16_t)(direction * -400));
+        TEST_ASSERT_EQUAL_UINT16(OBSERVER_UNREST_STEPS, o.unrest_steps);
+        TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15); /* the first one back is answered still */
+        turned_by((int16_t)(direction * 400));
+        TEST_ASSERT_EQUAL_INT16(32767 - 511, o.quick_q15);
+        while (!observer_is_calm(&o)) {
+            turned_by(0);
+        }
+        turned_by((int16_t)(direction * 400));
+        TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
+        TEST_ASSERT_UINT16_WITHIN(600, 1500, o.unrest_steps);
+    }
+}
+
+void test_one_side_after_the_other_with_calm_between_is_no_unrest(void)
+{
+    begin(0);
+    observer_schedule(&o, p, 0);
+    o.unrest_steps = 0;
+    o.large_erpm = 100;
+    turned_by(400);
+    while (!observer_is_calm(&o)) {
+        turned_by(0);
+    }
+    turned_by(-400);
+    TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
+    TEST_ASSERT_UINT16_WITHIN(8, 4 * 132, o.unrest_steps);
+}
+
 static int16_t innovation(uint32_t from_q32, uint32_t to_q32, int16_t erpm)
 {
     o.rho_q32 = from_q32;

@@ -219,7 +219,7 @@ void test_the_time_without_a_fault_gives_the_retries_back_in_closed_loop_only(vo
     run();
     fault(FAULT_STALL);
     (void)ms_to_restart(5000);
-    retry_tick(&retry, &the_panel, &drive, 7000); /* the start is no proof */
+    retry_tick(&retry, &the_panel, &drive, 20000); /* the start is no proof */
     TEST_ASSERT_EQUAL_UINT16(2, retry.left);
     drive.state = (uint16_t)DRIVE_CLOSED;
     for (ms = 0; ms < 9999u; ms++) {

@@ -163,8 +163,8 @@ void test_start_is_BOOTSTRAP_ALIGN_RAMP_CLOSED_in_the_times_of_the_parameters(vo
     ideal_motor_run(100);
     TEST_ASSERT_INT32_WITHIN(1, 279620, drive.forced.speed_q10);
     EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "at the end of the ramp");
-    /* 50 agreeing slow steps on a grid of eight periods; nothing loads this motor, so the current falls to its end in 246 more */
-    TEST_ASSERT_UINT32_WITHIN(8, (50u + 246u) * 8u - 100u, ideal_motor_run_until(DRIVE_CLOSED, 60000));
+    /* 50 agreeing slow steps on a grid of eight periods; nothing loads this motor, so the current falls to its end in 177 more */
+    TEST_ASSERT_UINT32_WITHIN(8, (50u + 177u) * 8u - 100u, ideal_motor_run_until(DRIVE_CLOSED, 60000));
     EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "handed over");
 }
 
