@@ -13,7 +13,9 @@ from tools.common.motor_file import Motor
 from tools.common.trace import Trace
 
 MODE = "IDENTIFY"
-LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0}
+LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0, "J": 10.0, "friction": 10.0}
+LEAST_FRICTION = 0.005
+"""Friction below this share of the torque of the current that was told counts as this much: it loads nothing."""
 SALIENT = 0.03
 """Inductances that differ by less are one."""
 COLUMNS = (("measured", "measured\n", "{}"), ("true", "true\n", "{}"), ("error_percent", "error\n%", "{:+.2f}"), ("limit_percent", "limit\n%", "{:g}"),
@@ -120,7 +122,22 @@ class Identified:
             _row("R winding [mohm]", f"{1e3 * self.winding_ohm:.1f}", f"{1e3 * rs_ohm:.1f}", self.winding_ohm / rs_ohm, "R"),
             _row("Ld [uH]", f"{watch['Ld_uH']}", f"{1e6 * plant_now['motor.ld_h']:.1f}", 1e-6 * watch["Ld_uH"] / plant_now["motor.ld_h"], "Ld"),
             _row("Lq [uH]", f"{watch['Lq_uH']}", f"{1e6 * plant_now['motor.lq_h']:.1f}", 1e-6 * watch["Lq_uH"] / plant_now["motor.lq_h"], "Lq"),
-            _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi")]
+            _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi"),
+            _row("J [1e-8 kg m2]", f"{watch['J_1e8_kgm2']}", f"{1e8 * plant_now['mech.inertia_kgm2']:.1f}",
+                 1e-8 * watch["J_1e8_kgm2"] / plant_now["mech.inertia_kgm2"], "J"),
+            *(self._friction_row(share, kphi) for share in (0.5, 1.0))]
+
+    def _friction_row(self, share: float, kphi: float) -> dict[str, Any]:
+        """Friction at a share of the rated speed."""
+        watch, plant_now = self.measured.watch, self.values
+        speed_rad_s = share * self.motor.rated_speed_rpm * np.pi / 30.0
+        true_nm = plant_now["mech.coulomb_nm"] + plant_now.get("load.constant_nm", 0.0)
+        true_nm += speed_rad_s * (plant_now["mech.viscous_nms"] + plant_now.get("load.viscous_nms", 0.0))
+        found_nm = 1e-6 * watch["Coulomb_uNm"] + 1e-9 * watch["Viscous_nNms"] * speed_rad_s
+        least_nm = LEAST_FRICTION * self.known.current_a * kphi * 1.5 / (3.0 ** 0.5 * 1000.0 * np.pi / 30.0)
+        name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of it"
+        return _row(f"friction at {name} [uN m]", f"{1e6 * found_nm:.0f}", f"{1e6 * true_nm:.0f}",
+                    1.0 + (found_nm - true_nm) / max(true_nm, least_nm), "friction")
 
     def problems(self) -> list[str]:
         """What is wrong, one line each."""
@@ -144,6 +161,9 @@ class Identified:
             lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
         lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
                      f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
+        lines += ["", "[mechanical]", f'inertia = {{ value = {1e-8 * watch["J_1e8_kgm2"]:.4g}, unit = "kg m2", source = "{source}" }}',
+                  f'viscous_friction = {{ value = {1e-9 * watch["Viscous_nNms"]:.4g}, unit = "N m s", source = "{source}" }}',
+                  f'coulomb_friction = {{ value = {1e-3 * watch["Coulomb_uNm"]:.4g}, unit = "mN m", source = "{source}" }}']
         return "\n".join(lines)
 
     def text(self) -> str:

@@ -14,7 +14,7 @@
 
 #define STATUS_PERIOD_MS 500u
 
-static char line[128]; /* all reasons in one line */
+static char line[MODE_LINE_SIZE];
 static uint16_t next;  /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
