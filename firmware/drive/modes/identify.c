@@ -20,10 +20,10 @@
 #define BLOCK_LOG2 5  /* periods of a stretch of back-EMF: short against the rotor's swinging */
 #define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
-#define FOLLOW_LOG2 6               /* periods of a stretch while accelerating and coasting */
-#define FOLLOW_SETTLE 256u          /* periods after a change of current: the frame's angle changes by what dead time takes */
-#define PUSH_BLOCKS 500u            /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
-#define COAST_BLOCKS 2500u          /* some 10 s: a rotor without friction coasts for ever */
+#define FOLLOW_LOG2 5               /* periods of a stretch while accelerating and coasting */
+#define FOLLOW_SETTLE 5u            /* stretches after a change of current: the frame's angle changes by what dead time takes */
+#define PUSH_BLOCKS 1000u           /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
+#define COAST_BLOCKS 5000u          /* some 10 s: a rotor without friction coasts for ever */
 #define CYCLES_LEAST 4u
 #define CYCLES_MOST 12u
 #define COAST_PERIODS PARAM_PERIODS(1.0F) /* enough, with CYCLES_LEAST */
@@ -364,14 +364,13 @@ static uint16_t coherent(const identify_t *id)
 
 enum { PART_PUSH, PART_FAST, PART_SLOW };
 
-/** Another q current; sums begin when it stands. */
+/** Another q current. */
 static void mechanics_current(drive_t *d, current_q13_t iq_q13)
 {
     identify_t *id = &d->run.identify;
     d->run.control.ref_q13.q = iq_q13;
     id->phase_blocks = 0;
     id->part = 0;
-    id->wait = FOLLOW_SETTLE;
 }
 
 /** What the q current takes of the voltage is not the rotor's. */
@@ -394,7 +393,8 @@ static void forget_parts(identify_t *id)
     id->cycles = 0;
 }
 
-/** The current leaves the d axis, and the frame follows the rotor: a sixteenth of the current pushes, then more. Up to twice END_SPEED_RPM as far
+/** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is seen in the
+ *  back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far
  *  as seven eighths of the voltage allow it with half of the current. */
 static void mechanics_start(drive_t *d, const drive_params_t *p)
 {
@@ -404,6 +404,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     int32_t ohmic = soft_float_times(p->open_loop_q13 >> 1, soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC));
     int32_t most = d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - ohmic;
     uint32_t per_emf_q5 = (speed << 5) / emf_q14;
+    int16_t lag_q12;
     id->speed_per_emf_q5 = (uint16_t)((per_emf_q5 > 65535u) ? 65535u : per_emf_q5);
     id->emf_q22 = (int32_t)emf_q14 * 256;
     id->top_q10 = (int32_t)(qm_muluu((uint16_t)((most > (int32_t)emf_q14) ? most : emf_q14), id->speed_per_emf_q5) >> 5);
@@ -413,13 +414,15 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     if (id->top_q10 > FASTEST_Q10) {
         id->top_q10 = FASTEST_Q10;
     }
-    id->push_q13 = (int16_t)(p->open_loop_q13 >> 4);
+    lag_q12 = qm_clamp((int16_t)((id->emf_d_sum >> BLOCKS_LOG2) * 4096 / (int32_t)emf_q14), 0, 3840);
+    id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
+    id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q); /* the back-EMF falls fast while the rotor coasts */
     forget_parts(id);
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
     mechanics_drops(d, (int32_t)speed);
     id->mode = (uint16_t)IDENTIFY_FOLLOW;
-    go(id, IDENTIFY_MECHANICS, id->wait, 1u << FOLLOW_LOG2);
+    go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
 }
 
 /** Adds a stretch to a part. @param direction +1 accelerating, -1 coasting */
@@ -432,7 +435,7 @@ static void part_add(identify_t *id, uint16_t part, int32_t speed_q10, int16_t d
     }
     to->blocks++;
     to->current += id->sum[1];
-    to->speed += id->sum[0] >> 10;
+    to->speed += id->sum[0] >> (FOLLOW_LOG2 + 4);
     id->part = (uint16_t)(part + 1u);
     id->before_q10 = speed_q10;
     id->before_at = id->at;
@@ -517,13 +520,16 @@ static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
     identify_t *id = &d->run.identify;
     int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
     uint16_t last = (uint16_t)(id->push_q13 >= p->open_loop_q13);
-    if (speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
+    if (id->phase_blocks == 1u) {
+        id->first_q10 = speed_q10 - (speed_q10 >> 3);
+    }
+    if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
         part_add(id, PART_PUSH, speed_q10, 1);
     }
     if (speed_q10 > id->top_q10 + (id->top_q10 >> 5)) {
         id->coasting = 1;
         mechanics_current(d, 0);
-    } else if (speed_q10 < bottom_q10 - (bottom_q10 >> 3) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {
+    } else if ((id->phase_blocks > FOLLOW_SETTLE && speed_q10 < id->first_q10) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {
         if (last || speed_q10 < (bottom_q10 >> 1)) {
             finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
             return;
@@ -543,7 +549,7 @@ static void coast_block(drive_t *d, int32_t speed_q10)
     int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
     int32_t middle_q10 = (id->top_q10 + bottom_q10) >> 1;
     uint16_t late = (uint16_t)(id->phase_blocks > COAST_BLOCKS);
-    if (speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
+    if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10) {
         part_add(id, (speed_q10 > middle_q10) ? PART_FAST : PART_SLOW, speed_q10, -1);
     }
     if (speed_q10 < bottom_q10 || late) {
@@ -563,7 +569,6 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
     identify_t *id = &d->run.identify;
     int32_t speed_q10 = id->sum[0] >> FOLLOW_LOG2;
     id->phase_blocks++;
-    id->wait = 0;
     if (id->coasting) {
         coast_block(d, speed_q10);
     } else {
@@ -571,7 +576,7 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
     }
     if (id->step == (uint16_t)IDENTIFY_MECHANICS) {
         mechanics_drops(d, speed_q10);
-        go(id, IDENTIFY_MECHANICS, id->wait, 1u << FOLLOW_LOG2);
+        go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
     }
 }
 

@@ -78,7 +78,7 @@ typedef struct {
 typedef struct {
     uint16_t blocks;    /**< stretches */
     int32_t current;    /**< of their sums of q current */
-    int32_t speed;      /**< of their sums of speed / 1024 */
+    int32_t speed;      /**< of their speeds / 16 */
     int32_t change;     /**< of speed, from one stretch to the next, in the direction that the part has */
     int32_t periods;    /**< that took it */
 } identify_part_t;
@@ -124,6 +124,7 @@ typedef struct {
     uint16_t kphi_half;                     /**< mV per 1000 rpm at half speed */
     int32_t top_q10;                        /**< MECHANICS: up to this speed, and down to 3/8 of it */
     current_q13_t push_q13;                 /**< q current that accelerates */
+    int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
     uint16_t coasting, cycles, phase_blocks;
     uint16_t part, before_at;               /**< where the stretch before belongs (0 = nowhere), and when it ended */
     int32_t before_q10;                     /**< its speed */
