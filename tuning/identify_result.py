@@ -110,6 +110,11 @@ class Identified:
     def winding_ohm(self) -> float:
         return 1e-3 * self.measured.watch["Rs_mohm"] - self.bridge_ohm
 
+    @property
+    def inertia_kgm2(self) -> float:
+        """Of all that turns."""
+        return 1e-8 * self.measured.watch["J_1e8_kgm2"]
+
     def rows(self) -> list[dict[str, Any]]:
         """Measured and true values with the limits of the errors. The truth is the plant's, changes and temperature included."""
         watch, plant_now = self.measured.watch, self.values
@@ -124,7 +129,7 @@ class Identified:
             _row("Lq [uH]", f"{watch['Lq_uH']}", f"{1e6 * plant_now['motor.lq_h']:.1f}", 1e-6 * watch["Lq_uH"] / plant_now["motor.lq_h"], "Lq"),
             _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi"),
             _row("J [1e-8 kg m2]", f"{watch['J_1e8_kgm2']}", f"{1e8 * plant_now['mech.inertia_kgm2']:.1f}",
-                 1e-8 * watch["J_1e8_kgm2"] / plant_now["mech.inertia_kgm2"], "J"),
+                 self.inertia_kgm2 / plant_now["mech.inertia_kgm2"], "J"),
             *(self._friction_row(share, kphi) for share in (0.5, 1.0))]
 
     def _friction_row(self, share: float, kphi: float) -> dict[str, Any]:
@@ -135,7 +140,7 @@ class Identified:
         true_nm += speed_rad_s * (plant_now["mech.viscous_nms"] + plant_now.get("load.viscous_nms", 0.0))
         found_nm = 1e-6 * watch["Coulomb_uNm"] + 1e-9 * watch["Viscous_nNms"] * speed_rad_s
         least_nm = LEAST_FRICTION * self.known.current_a * kphi * 1.5 / (3.0 ** 0.5 * 1000.0 * np.pi / 30.0)
-        name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of it"
+        name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of rated speed"
         return _row(f"friction at {name} [uN m]", f"{1e6 * found_nm:.0f}", f"{1e6 * true_nm:.0f}",
                     1.0 + (found_nm - true_nm) / max(true_nm, least_nm), "friction")
 
@@ -161,7 +166,7 @@ class Identified:
             lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
         lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
                      f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
-        lines += ["", "[mechanical]", f'inertia = {{ value = {1e-8 * watch["J_1e8_kgm2"]:.4g}, unit = "kg m2", source = "{source}" }}',
+        lines += ["", "[mechanical]", f'inertia = {{ value = {self.inertia_kgm2:.4g}, unit = "kg m2", source = "{source}" }}',
                   f'viscous_friction = {{ value = {1e-9 * watch["Viscous_nNms"]:.4g}, unit = "N m s", source = "{source}" }}',
                   f'coulomb_friction = {{ value = {1e-3 * watch["Coulomb_uNm"]:.4g}, unit = "mN m", source = "{source}" }}']
         return "\n".join(lines)
@@ -174,7 +179,8 @@ class Identified:
                  f"bridge of {self.board.name}: {1e3 * self.bridge_ohm:.1f} mohm (transistor, half of the shunt)",
                  "\n".join(f"{at_s:9.4f} s  {step_names()[number]}" for at_s, number in self.measured.steps[1:])]
         if self.done:
-            parts += [report.table(self.rows(), COLUMNS), "For the motor file (R without the bridge; note the winding's temperature):\n\n" + self.paste()]
+            parts += [report.table(self.rows(), COLUMNS), f"For userparams.h, without a load's inertia:\n\n#define MOTOR_INERTIA_KGM2 {self.inertia_kgm2:.4g}",
+                      "For the motor file (R without the bridge; note the winding's temperature):\n\n" + self.paste()]
         return "\n\n".join(parts)
 
     def data(self) -> dict[str, Any]:

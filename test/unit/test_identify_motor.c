@@ -34,11 +34,12 @@ void test_measures_motors_of_every_kind(void)
     };
     EACH(n, cases) {
         unknown_set(cases[n].rs, cases[n].ld_mh, cases[n].lq_mh, cases[n].kphi);
-        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_DONE, unknown_identify(), golden_row(n));
         TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].rs + 0.0005F, cases[n].rs, (float)values->rs_mohm * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].ld_mh, cases[n].ld_mh, (float)values->ld_uh * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].lq_mh, cases[n].lq_mh, (float)values->lq_uh * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].kphi, cases[n].kphi, (float)values->kphi_mv_per_krpm * 0.001F);
+        TEST_ASSERT_UINT16_WITHIN(55, 550, values->inertia_1e8_kgm2);
         expect_off();
         TEST_ASSERT_TRUE(motor.highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
     }

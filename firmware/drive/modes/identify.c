@@ -21,9 +21,10 @@
 #define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
 #define FOLLOW_LOG2 5               /* periods of a stretch while accelerating and coasting */
-#define FOLLOW_SETTLE 5u            /* stretches after a change of current: the frame's angle changes by what dead time takes */
+#define FOLLOW_SETTLE 6u            /* stretches after a change of current: the frame's angle changes by what dead time takes */
 #define PUSH_BLOCKS 1000u           /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
 #define COAST_BLOCKS 5000u          /* some 10 s: a rotor without friction coasts for ever */
+#define PASSAGE_MOST 64u             /* stretches of one line: its sums fit into 32 bits */
 #define CYCLES_LEAST 4u
 #define CYCLES_MOST 12u
 #define COAST_PERIODS PARAM_PERIODS(1.0F) /* enough, with CYCLES_LEAST */
@@ -364,13 +365,27 @@ static uint16_t coherent(const identify_t *id)
 
 enum { PART_PUSH, PART_FAST, PART_SLOW };
 
+/** The least-squares line through a passage: its slope times its weight, so that passages can be added. */
+static void passage_end(identify_t *id)
+{
+    if (id->part != 0u && id->passed > 1u) {
+        identify_part_t *to = &id->parts[id->part - 1u];
+        int32_t n = (int32_t)id->passed;
+        to->slope += 2 * id->rise_moment - (n - 1) * id->rise;
+        to->weight += n * (n * n - 1) / 6;
+        to->steps += n - 1;
+        to->periods += (uint16_t)(id->ended_at - id->began_at);
+    }
+    id->part = 0;
+}
+
 /** Another q current. */
 static void mechanics_current(drive_t *d, current_q13_t iq_q13)
 {
     identify_t *id = &d->run.identify;
     d->run.control.ref_q13.q = iq_q13;
     id->phase_blocks = 0;
-    id->part = 0;
+    passage_end(id);
 }
 
 /** What the q current takes of the voltage is not the rotor's. */
@@ -425,25 +440,33 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
 }
 
-/** Adds a stretch to a part. @param direction +1 accelerating, -1 coasting */
-static void part_add(identify_t *id, uint16_t part, int32_t speed_q10, int16_t direction)
+/** Adds a stretch to a part. */
+static void part_add(identify_t *id, uint16_t part, int32_t speed_q10)
 {
     identify_part_t *to = &id->parts[part];
-    if (id->part == part + 1u) {
-        to->change += direction * (speed_q10 - id->before_q10);
-        to->periods += (uint16_t)(id->at - id->before_at);
+    int32_t rise;
+    if (id->part != part + 1u || id->passed == PASSAGE_MOST) {
+        passage_end(id);
+        id->part = (uint16_t)(part + 1u);
+        id->passed = 0;
+        id->began_at = id->at;
+        id->from_q10 = speed_q10;
+        id->rise = 0;
+        id->rise_moment = 0;
     }
+    rise = (speed_q10 - id->from_q10) >> 4;
+    id->rise += rise;
+    id->rise_moment += rise * (int32_t)id->passed;
+    id->passed++;
+    id->ended_at = id->at;
     to->blocks++;
     to->current += id->sum[1];
-    to->speed += id->sum[0] >> (FOLLOW_LOG2 + 4);
-    id->part = (uint16_t)(part + 1u);
-    id->before_q10 = speed_q10;
-    id->before_at = id->at;
+    to->speed += speed_q10 >> 4;
 }
 
 static int32_t part_speed(const identify_part_t *part)
 {
-    return part->speed / (int32_t)part->blocks;
+    return part->speed / part->blocks;
 }
 
 /** Mean q current, with what the samples miss: they are taken after the centre of the low sides' conduction, when the back-EMF has taken
@@ -453,19 +476,23 @@ static int32_t part_current(const identify_t *id, uint16_t part)
     const identify_part_t *of = &id->parts[part];
     soft_float_t missed = (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING;
     missed = soft_float_mul(missed, soft_float_div(soft_float_of(id->values.kphi_mv_per_krpm), soft_float_of(id->values.lq_uh)));
-    return of->current / (int32_t)of->blocks + soft_float_times(part_speed(of), missed);
+    return of->current / of->blocks + soft_float_times(part_speed(of), missed);
 }
 
+/** Change of speed, counts a period * 128. */
 static int32_t part_rate(const identify_part_t *part)
 {
-    return part->change * 128 / part->periods;
+    uint32_t slope = (uint32_t)((part->slope < 0) ? -part->slope : part->slope);
+    soft_float_t rate = soft_float_div(soft_float_mul(soft_float_of(slope), soft_float_of((uint32_t)part->steps)),
+                                       soft_float_mul(soft_float_of((uint32_t)part->weight), soft_float_of((uint32_t)part->periods)));
+    return soft_float_times((part->slope < 0) ? -16 * 128 : 16 * 128, rate);
 }
 
 /** J dw/dt = Kt i - friction, accelerating and coasting at the same mean speed. @return 1 when J can be */
 static uint16_t inertia(identify_t *id, int32_t share_q12)
 {
     const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
-    int32_t rate = part_rate(push) + part_rate(slow) + (((part_rate(fast) - part_rate(slow)) * share_q12) >> 12);
+    int32_t rate = part_rate(push) - part_rate(slow) - (((part_rate(fast) - part_rate(slow)) * share_q12) >> 12);
     int32_t slow_current = part_current(id, PART_SLOW);
     int32_t current = part_current(id, PART_PUSH) - slow_current - (((part_current(id, PART_FAST) - slow_current) * share_q12) >> 12);
     soft_float_t j;
@@ -480,7 +507,7 @@ static uint16_t inertia(identify_t *id, int32_t share_q12)
 /** Torque that brakes a coasting rotor, uN m. */
 static int32_t drag(const identify_t *id, uint16_t part)
 {
-    int32_t braked = soft_float_times(part_rate(&id->parts[part]), soft_float_mul(soft_float_of(id->values.inertia_1e8_kgm2), C_DRAG));
+    int32_t braked = -soft_float_times(part_rate(&id->parts[part]), soft_float_mul(soft_float_of(id->values.inertia_1e8_kgm2), C_DRAG));
     return braked + soft_float_times(part_current(id, part), soft_float_mul(soft_float_of(id->values.kphi_mv_per_krpm), C_TORQUE));
 }
 
@@ -494,6 +521,7 @@ static void mechanics_done(drive_t *d)
     identify_t *id = &d->run.identify;
     const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
     int32_t fast_unm, slow_unm, apart, viscous;
+    passage_end(id);
     if (slow->periods == 0) { /* it coasts too long: the friction counts as constant */
         id->parts[PART_SLOW] = *fast;
     }
@@ -524,7 +552,7 @@ static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
         id->first_q10 = speed_q10 - (speed_q10 >> 3);
     }
     if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
-        part_add(id, PART_PUSH, speed_q10, 1);
+        part_add(id, PART_PUSH, speed_q10);
     }
     if (speed_q10 > id->top_q10 + (id->top_q10 >> 5)) {
         id->coasting = 1;
@@ -550,7 +578,7 @@ static void coast_block(drive_t *d, int32_t speed_q10)
     int32_t middle_q10 = (id->top_q10 + bottom_q10) >> 1;
     uint16_t late = (uint16_t)(id->phase_blocks > COAST_BLOCKS);
     if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10) {
-        part_add(id, (speed_q10 > middle_q10) ? PART_FAST : PART_SLOW, speed_q10, -1);
+        part_add(id, (speed_q10 > middle_q10) ? PART_FAST : PART_SLOW, speed_q10);
     }
     if (speed_q10 < bottom_q10 || late) {
         id->cycles++;

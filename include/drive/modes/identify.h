@@ -74,13 +74,15 @@ typedef struct {
     uint16_t viscous_nnms;     /**< and what it grows by, nN m s */
 } identify_values_t;
 
-/** Sums over a part of the rotor's speeds, accelerating or coasting. */
+/** Sums over a part of the rotor's speeds, accelerating or coasting; a line is laid through the speeds of each passage. */
 typedef struct {
-    uint16_t blocks;    /**< stretches */
-    int32_t current;    /**< of their sums of q current */
-    int32_t speed;      /**< of their speeds / 16 */
-    int32_t change;     /**< of speed, from one stretch to the next, in the direction that the part has */
-    int32_t periods;    /**< that took it */
+    int32_t blocks;  /**< stretches */
+    int32_t current; /**< of their sums of q current */
+    int32_t speed;   /**< of their speeds / 16 */
+    int32_t slope;   /**< of the passages' slopes, each times its weight */
+    int32_t weight;  /**< n (n^2 - 1) / 6 of a passage of n stretches */
+    int32_t steps;   /**< from stretch to stretch */
+    int32_t periods; /**< that they took */
 } identify_part_t;
 
 /** State. */
@@ -126,8 +128,10 @@ typedef struct {
     current_q13_t push_q13;                 /**< q current that accelerates */
     int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
     uint16_t coasting, cycles, phase_blocks;
-    uint16_t part, before_at;               /**< where the stretch before belongs (0 = nowhere), and when it ended */
-    int32_t before_q10;                     /**< its speed */
+    uint16_t part;                          /**< where the passage belongs that is under way, counted from 1; 0 = none is */
+    uint16_t passed, began_at, ended_at;    /**< its stretches, and when the first and the last one ended */
+    int32_t from_q10;                       /**< speed of the first one */
+    int32_t rise, rise_moment;              /**< sums of the others' differences from it / 16, and of those times the number of the stretch */
     identify_part_t parts[3];               /**< accelerating, coasting above the middle, coasting below it */
 } identify_t;
 
