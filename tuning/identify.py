@@ -230,7 +230,7 @@ def _write(item: Identified, target: Path) -> None:
     with output.ResultFolder(target) as folder:
         data = item.data()
         (folder.work / build.HEADER).write_text(item.header, encoding="utf-8")
-        if item.done:
+        if item.has_electrical:
             (folder.work / "motor.toml").write_text(item.paste() + "\n", encoding="utf-8")
         from . import identify_plots
         data["plots"] = identify_plots.write_all(item, step_names(), folder.work)

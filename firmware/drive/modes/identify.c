@@ -20,14 +20,16 @@
 #define BLOCK_LOG2 5  /* periods of a stretch of back-EMF: short against the rotor's swinging */
 #define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
-#define FOLLOW_LOG2 5               /* periods of a stretch while accelerating and coasting */
-#define FOLLOW_SETTLE 6u            /* stretches after a change of current: the frame's angle changes by what dead time takes */
-#define PUSH_BLOCKS 1000u           /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
-#define COAST_BLOCKS 5000u          /* some 10 s: a rotor without friction coasts for ever */
-#define PASSAGE_MOST 64u             /* stretches of one line: its sums fit into 32 bits */
+#define FOLLOW_LOG2 5      /* periods of a stretch while accelerating and coasting */
+#define FOLLOW_SETTLE 6u   /* stretches after a change of current: the frame's angle changes by what dead time takes */
+#define PUSH_BLOCKS 1000u  /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
+#define PUSH_LEAST 20u     /* fewer, and less current pushes the next time */
+#define GENTLER_MOST 16u   /* times: to a hundredth of the current */
+#define COAST_BLOCKS 5000u /* some 10 s: a rotor without friction coasts for ever */
+#define PASSAGE_MOST 64u   /* stretches of one line: its sums fit into 32 bits */
 #define CYCLES_LEAST 4u
 #define CYCLES_MOST 12u
-#define COAST_PERIODS PARAM_PERIODS(1.0F) /* enough, with CYCLES_LEAST */
+#define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST */
 #define FASTEST_Q10 ((int32_t)(30000.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 67108864.0F)) /* electrical rpm that every format holds */
 
 /* ---- Constants from the board's parameters ---- */
@@ -363,7 +365,9 @@ static uint16_t coherent(const identify_t *id)
 
 /* ---- Inertia and friction ---- */
 
-enum { PART_PUSH, PART_FAST, PART_SLOW };
+enum { PART_PUSH,
+       PART_FAST,
+       PART_SLOW };
 
 /** The least-squares line through a passage: its slope times its weight, so that passages can be added. */
 static void passage_end(identify_t *id)
@@ -409,8 +413,7 @@ static void forget_parts(identify_t *id)
 }
 
 /** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is seen in the
- *  back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far
- *  as seven eighths of the voltage allow it with half of the current. */
+ *  back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with half of the current. */
 static void mechanics_start(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
@@ -431,7 +434,11 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     }
     lag_q12 = qm_clamp((int16_t)((id->emf_d_sum >> BLOCKS_LOG2) * 4096 / (int32_t)emf_q14), 0, 3840);
     id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
-    id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q); /* the back-EMF falls fast while the rotor coasts */
+    /* The back-EMF falls fast while the rotor coasts: four times what cancels R/L, and what damps with 0.5 where R is small. */
+    id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q);
+    if (id->ki_q < (id->kp_q >> 4)) {
+        id->ki_q = (int16_t)(id->kp_q >> 4);
+    }
     forget_parts(id);
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
@@ -513,7 +520,8 @@ static int32_t drag(const identify_t *id, uint16_t part)
 
 static uint16_t not_negative(int32_t x)
 {
-    return (uint16_t)((x < 0) ? 0 : (x > 65535) ? 65535 : x);
+    return (uint16_t)((x < 0) ? 0 : (x > 65535) ? 65535
+                                                : x);
 }
 
 static void mechanics_done(drive_t *d)
@@ -555,6 +563,11 @@ static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
         part_add(id, PART_PUSH, speed_q10);
     }
     if (speed_q10 > id->top_q10 + (id->top_q10 >> 5)) {
+        if (id->phase_blocks < PUSH_LEAST && id->gentler < GENTLER_MOST) { /* too quick to be seen: it counts no more */
+            id->push_q13 = (int16_t)(id->push_q13 - (id->push_q13 >> 2));
+            id->gentler++;
+            forget_parts(id);
+        }
         id->coasting = 1;
         mechanics_current(d, 0);
     } else if ((id->phase_blocks > FOLLOW_SETTLE && speed_q10 < id->first_q10) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {

@@ -127,12 +127,13 @@ typedef struct {
     int32_t top_q10;                        /**< MECHANICS: up to this speed, and down to 3/8 of it */
     current_q13_t push_q13;                 /**< q current that accelerates */
     int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
+    uint16_t gentler;                       /**< times that the push was too quick */
     uint16_t coasting, cycles, phase_blocks;
-    uint16_t part;                          /**< where the passage belongs that is under way, counted from 1; 0 = none is */
-    uint16_t passed, began_at, ended_at;    /**< its stretches, and when the first and the last one ended */
-    int32_t from_q10;                       /**< speed of the first one */
-    int32_t rise, rise_moment;              /**< sums of the others' differences from it / 16, and of those times the number of the stretch */
-    identify_part_t parts[3];               /**< accelerating, coasting above the middle, coasting below it */
+    uint16_t part;                       /**< where the passage belongs that is under way, counted from 1; 0 = none is */
+    uint16_t passed, began_at, ended_at; /**< its stretches, and when the first and the last one ended */
+    int32_t from_q10;                    /**< speed of the first one */
+    int32_t rise, rise_moment;           /**< sums of the others' differences from it / 16, and of those times the number of the stretch */
+    identify_part_t parts[3];            /**< accelerating, coasting above the middle, coasting below it */
 } identify_t;
 
 #define IDENTIFY_STATE identify_t identify;

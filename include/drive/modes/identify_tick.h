@@ -42,7 +42,8 @@ QM_INLINE void identify_follow(drive_t *d)
     int32_t emf = (int32_t)d->run.control.v_q14.q - id->drop_q_q14 - d->run.control.v_q14.d - id->drop_d_q14;
     id->emf_q22 += (emf * 256 - id->emf_q22) >> 2; /* 0.9 kHz */
     emf = id->emf_q22 >> 8;
-    emf = (emf < 0) ? 0 : (emf > 32767) ? 32767 : emf;
+    emf = (emf < 0) ? 0 : (emf > 32767) ? 32767
+                                        : emf;
     d->forced.speed_q10 = (int32_t)(qm_muluu((uint16_t)emf, id->speed_per_emf_q5) >> 5);
     d->forced.angle_q32 = qm_turn_add(d->forced.angle_q32, (uint32_t)d->forced.speed_q10 << 6);
 }
