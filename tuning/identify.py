@@ -1,4 +1,6 @@
-"""`identify`: the IDENTIFY firmware measures R, Ld, Lq, Kphi, inertia and friction of a motor on the virtual board, and the result is compared with the truth.
+"""`identify`: the IDENTIFY firmware measures R, Ld, Lq, Kphi, inertia and friction of a motor on the virtual board.
+
+The result is compared with the truth.
 
 The firmware gets a neutral userparams.h: pole pairs, a current and a speed from the motor file's rating, and the board file; nothing of
 R, L, Kphi, inertia or friction. What it measures is the loop: winding, transistors and shunt. The winding is that less the bridge's
@@ -174,7 +176,7 @@ def _plant(motor: Motor, board: BoardFile, changes: board_keys.Values, keys: Any
 # ---- the command -----------------------------------------------------------------------------------------------------------
 def add_command(commands: Any) -> None:
     """Adds `identify` to a command line's commands."""
-    parser = commands.add_parser("identify", help="R, L, Kphi, inertia and friction as the IDENTIFY firmware measures them on the virtual board")
+    parser = commands.add_parser("identify", help="R, L, Kphi, inertia, friction as IDENTIFY measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
     parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")

@@ -603,7 +603,8 @@ void test_top_speed_is_twice_END_SPEED_RPM_within_seven_eighths_of_the_voltage(v
     begin_spin(IDENTIFY_SPIN_FULL, 267, 1920);
     drive.circle.limit_q14 = 8000; /* 7000 less R i of half the current */
     stretches(256, 0, 5148, 0, 0);
-    TEST_ASSERT_INT32_WITHIN(twice / 100, (int32_t)((float)params.forced.end_speed_q10 * (7000.0F - 0.0527F * 0.5F * (float)params.open_loop_q13 * 3.353F) / 5148.0F), id->top_q10);
+    TEST_ASSERT_INT32_WITHIN(twice / 100, (int32_t)((float)params.forced.end_speed_q10
+                                                   * (7000.0F - 0.0527F * 0.5F * (float)params.open_loop_q13 * 3.353F) / 5148.0F), id->top_q10);
 }
 
 void test_the_frame_follows_the_rotor_by_its_back_emf(void)

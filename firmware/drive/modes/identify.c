@@ -56,12 +56,14 @@
 #define RAD_S_PER_COUNT (2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) / PARAM_F(NOPOLESPAIRS))
 /* Currents are means * 2^FOLLOW_LOG2, accelerations counts a period * 128, speeds / 16. */
 #define C_TORQUE soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 1099511627776.0F), 40)
-#define C_INERTIA soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 100.0F * 128.0F * PARAM_F(LOOPTIME_SEC) / RAD_S_PER_COUNT * 65536.0F), 16)
+#define C_INERTIA soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 12800.0F * PARAM_F(LOOPTIME_SEC) \
+                                               / RAD_S_PER_COUNT * 65536.0F), 16)
 #define C_DRAG soft_float_scaled((uint32_t)(RAD_S_PER_COUNT / PARAM_F(LOOPTIME_SEC) / 128.0F / 100.0F * 4294967296.0F), 32)
 #define C_VISCOUS soft_float_scaled((uint32_t)(1000.0F / (16.0F * RAD_S_PER_COUNT) * 256.0F), 8)
 /* Sums of current over a stretch for a back-EMF of 1 mV/krpm, a speed / 16 and 1/uH that a sample misses which is taken so much late. */
 #define MISSED(late_sec) \
-    ((float)(16u << FOLLOW_LOG2) * RAD_S_PER_COUNT * 60000.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * (late_sec) / (4.0F * PARAM_F(NORM_CURRENT_CONST)))
+    ((float)(16u << FOLLOW_LOG2) * RAD_S_PER_COUNT * 60000.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * (late_sec) \
+     / (4.0F * PARAM_F(NORM_CURRENT_CONST)))
 #define SAMPLE_LATE_SEC (PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC)
 #define C_MISSED_COASTING soft_float_scaled((uint32_t)(MISSED(SAMPLE_LATE_SEC) * 16777216.0F), 24)
 /* With current, dead time delays one edge of every pulse, whatever the current's sign: its centre moves towards the sample. */
@@ -369,6 +371,12 @@ enum { PART_PUSH,
        PART_FAST,
        PART_SLOW };
 
+/** x * part / whole, within 2^30. */
+static int32_t share_of(int32_t x, int32_t part, int32_t whole)
+{
+    return soft_float_times(x, soft_float_div(soft_float_of((uint32_t)part), soft_float_of((uint32_t)whole)));
+}
+
 /** The least-squares line through a passage: its slope times its weight, so that passages can be added. */
 static void passage_end(identify_t *id)
 {
@@ -376,7 +384,7 @@ static void passage_end(identify_t *id)
         identify_part_t *to = &id->parts[id->part - 1u];
         int32_t n = (int32_t)id->passed;
         to->slope += 2 * id->rise_moment - (n - 1) * id->rise;
-        to->weight += n * (n * n - 1) / 6;
+        to->weight += n * (n * n - 1);
         to->steps += n - 1;
         to->periods += (uint16_t)(id->ended_at - id->began_at);
     }
@@ -412,8 +420,9 @@ static void forget_parts(identify_t *id)
     id->cycles = 0;
 }
 
-/** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is seen in the
- *  back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with half of the current. */
+/** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is
+ *  seen in the back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with
+ *  half of the current. */
 static void mechanics_start(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
@@ -421,9 +430,8 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     uint16_t emf_q14 = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
     int32_t ohmic = soft_float_times(p->open_loop_q13 >> 1, soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC));
     int32_t most = d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - ohmic;
-    uint32_t per_emf_q5 = (speed << 5) / emf_q14;
     int16_t lag_q12;
-    id->speed_per_emf_q5 = (uint16_t)((per_emf_q5 > 65535u) ? 65535u : per_emf_q5);
+    id->speed_per_emf_q5 = soft_float_to_uint16(soft_float_div(soft_float_of(speed << 5), soft_float_of(emf_q14)));
     id->emf_q22 = (int32_t)emf_q14 * 256;
     id->top_q10 = (int32_t)(qm_muluu((uint16_t)((most > (int32_t)emf_q14) ? most : emf_q14), id->speed_per_emf_q5) >> 5);
     if (id->top_q10 > (int32_t)(2u * speed)) {
@@ -432,7 +440,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     if (id->top_q10 > FASTEST_Q10) {
         id->top_q10 = FASTEST_Q10;
     }
-    lag_q12 = qm_clamp((int16_t)((id->emf_d_sum >> BLOCKS_LOG2) * 4096 / (int32_t)emf_q14), 0, 3840);
+    lag_q12 = qm_clamp((int16_t)share_of(id->emf_d_sum >> BLOCKS_LOG2, 4096, (int32_t)emf_q14), 0, 3840);
     id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
     /* The back-EMF falls fast while the rotor coasts: four times what cancels R/L, and what damps with 0.5 where R is small. */
     id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q);
@@ -473,7 +481,7 @@ static void part_add(identify_t *id, uint16_t part, int32_t speed_q10)
 
 static int32_t part_speed(const identify_part_t *part)
 {
-    return part->speed / part->blocks;
+    return share_of(part->speed, 1, part->blocks);
 }
 
 /** Mean q current, with what the samples miss: they are taken after the centre of the low sides' conduction, when the back-EMF has taken
@@ -483,7 +491,7 @@ static int32_t part_current(const identify_t *id, uint16_t part)
     const identify_part_t *of = &id->parts[part];
     soft_float_t missed = (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING;
     missed = soft_float_mul(missed, soft_float_div(soft_float_of(id->values.kphi_mv_per_krpm), soft_float_of(id->values.lq_uh)));
-    return of->current / of->blocks + soft_float_times(part_speed(of), missed);
+    return share_of(of->current, 1, of->blocks) + soft_float_times(part_speed(of), missed);
 }
 
 /** Change of speed, counts a period * 128. */
@@ -492,7 +500,7 @@ static int32_t part_rate(const identify_part_t *part)
     uint32_t slope = (uint32_t)((part->slope < 0) ? -part->slope : part->slope);
     soft_float_t rate = soft_float_div(soft_float_mul(soft_float_of(slope), soft_float_of((uint32_t)part->steps)),
                                        soft_float_mul(soft_float_of((uint32_t)part->weight), soft_float_of((uint32_t)part->periods)));
-    return soft_float_times((part->slope < 0) ? -16 * 128 : 16 * 128, rate);
+    return soft_float_times((part->slope < 0) ? -6 * 16 * 128 : 6 * 16 * 128, rate);
 }
 
 /** J dw/dt = Kt i - friction, accelerating and coasting at the same mean speed. @return 1 when J can be */
@@ -538,14 +546,14 @@ static void mechanics_done(drive_t *d)
         return;
     }
     apart = part_speed(fast) - part_speed(slow);
-    if (!inertia(id, (apart > 0) ? (part_speed(push) - part_speed(slow)) * 4096 / apart : 0)) {
+    if (!inertia(id, (apart > 0) ? share_of(part_speed(push) - part_speed(slow), 4096, apart) : 0)) {
         finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
         return;
     }
     fast_unm = drag(id, PART_FAST);
     slow_unm = drag(id, PART_SLOW);
     viscous = (apart > 0) ? soft_float_times(fast_unm - slow_unm, soft_float_div(C_VISCOUS, soft_float_of((uint32_t)apart))) : 0;
-    id->values.coulomb_unm = not_negative(slow_unm - ((apart > 0) ? (fast_unm - slow_unm) * part_speed(slow) / apart : 0));
+    id->values.coulomb_unm = not_negative(slow_unm - ((apart > 0) ? share_of(fast_unm - slow_unm, part_speed(slow), apart) : 0));
     id->values.viscous_nnms = not_negative(viscous);
     finish(d, IDENTIFY_RESULT_DONE);
 }

@@ -1,8 +1,8 @@
 /* IDENTIFY: the drive measures R, Ld, Lq, Kphi, inertia and friction of an unknown motor.
  *
  * The control interrupt is the instrument (identify_tick.h): it holds a current, superposes a square voltage, turns a current vector
- * or lets it follow the rotor, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks for the next step.
- * `ready` names the owner; the other side must not access the guarded fields. */
+ * or lets it follow the rotor, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks
+ * for the next step. `ready` names the owner; the other side must not access the guarded fields. */
 #ifndef DRIVE_MODES_IDENTIFY_H
 #define DRIVE_MODES_IDENTIFY_H
 
@@ -42,7 +42,7 @@
       "free the shaft and take the load off; raise Q_CURRENT_REF_OPENLOOP, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
     X(9, VOLTAGE_LIMIT, "the bus voltage is too low for END_SPEED_RPM", "lower END_SPEED_RPM") \
     X(10, KPHI_RANGE, "Kphi is above 65 V per 1000 rpm", "check NOPOLESPAIRS") \
-    X(11, NOT_ACCELERATING, "Q_CURRENT_REF_OPENLOOP does not accelerate the rotor to twice END_SPEED_RPM within four seconds, or the rotor is lost", \
+    X(11, NOT_ACCELERATING, "Q_CURRENT_REF_OPENLOOP does not accelerate the rotor to twice END_SPEED_RPM in four seconds, or loses it", \
       "take the load off; raise Q_CURRENT_REF_OPENLOOP or lower END_SPEED_RPM; R, L and Kphi are valid")
 
 #define IDENTIFY_RESULT_NAME(code, name, cause, remedy) #name,
@@ -80,7 +80,7 @@ typedef struct {
     int32_t current; /**< of their sums of q current */
     int32_t speed;   /**< of their speeds / 16 */
     int32_t slope;   /**< of the passages' slopes, each times its weight */
-    int32_t weight;  /**< n (n^2 - 1) / 6 of a passage of n stretches */
+    int32_t weight;  /**< n (n^2 - 1) of a passage of n stretches, six times what belongs to the slopes */
     int32_t steps;   /**< from stretch to stretch */
     int32_t periods; /**< that they took */
 } identify_part_t;
