@@ -173,7 +173,7 @@ tune: setup-run ## [your motor] data sheet to build/tune/NAME/userparams.h and a
 tune-fw: setup-run ## [your motor] search the field-weakening tables, into tuning/tables/NAME.toml [MOTOR= BOARD= OUT=]
 	@$(tuner) tune-fw $(tune_motor) $(board) $(out)
 
-identify: setup-run ## [your motor] R, L and Kphi as the IDENTIFY firmware measures them [MOTOR=name or all, BOARD= OUT=]
+identify: setup-run ## [your motor] R, L, Kphi, inertia and friction as the IDENTIFY firmware measures them [MOTOR=name or all, BOARD= OUT=]
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
 
 userparams: setup-run ## [your motor] install the tuned header; yours is kept as userparams.h.old [MOTOR= BOARD=]

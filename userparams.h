@@ -18,7 +18,7 @@
 /* #define TORQUE_MODE */           /* the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed */
 /* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
-/* #define IDENTIFY */              /* measure R, L and Kphi of the motor instead of running it (docs/tuning.md) */
+/* #define IDENTIFY */              /* measure R, L, Kphi, inertia and friction of the motor instead of running it (docs/tuning.md) */
 /* #define PARAMS_IN_RAM */         /* a debugger can change every parameter while the motor turns; TUNING does it too */
 /* #define SELFTEST_OFF */          /* leave out the self-tests in the manner of IEC 60730 Class B (docs/selftest.md) */
 

@@ -1,4 +1,6 @@
-"""`identify`: the IDENTIFY firmware measures R, Ld, Lq and Kphi of a motor on the virtual board, and the result is compared with the truth.
+"""`identify`: the IDENTIFY firmware measures R, Ld, Lq, Kphi, inertia and friction of a motor on the virtual board.
+
+The result is compared with the truth.
 
 The firmware gets a neutral userparams.h: pole pairs, a current and a speed from the motor file's rating, and the board file; nothing of
 R, L, Kphi, inertia or friction. What it measures is the loop: winding, transistors and shunt. The winding is that less the bridge's
@@ -29,12 +31,12 @@ from .identify_result import MODE, Identified, Known, Measured, step_names, trip
 
 RESULTS = paths.ROOT / "build" / "identify"
 HEADERS = RESULTS / "headers"
-LONGEST_S = 20.0
+LONGEST_S = 60.0
 POWER_UP_S = 0.1
 PRESS_S = 0.1
 PERIODS_A_LOOK = 20
 SIGNALS = ("plant.i_a", "plant.i_b", "plant.speed_rpm", "fw.i_d_a", "fw.i_q_a", "fw.v_d_v", "fw.v_q_v")
-WATCH = ("step", "result", "Rs_mohm", "Ld_uH", "Lq_uH", "Kphi_mV_per_krpm")
+WATCH = ("step", "result", "Rs_mohm", "Ld_uH", "Lq_uH", "Kphi_mV_per_krpm", "J_1e8_kgm2", "Coulomb_uNm", "Viscous_nNms")
 """Members of IdentifyParm in include/board/watch.h."""
 
 
@@ -152,7 +154,7 @@ def identify(items: list[Prepared], changes: board_keys.Values, quiet: bool = Tr
     keys = workers.run_all([items[0].library], _keys, lambda seconds: None)[0]
     values = [_plant(item.motor, item.board, changes, keys) for item in items]
     jobs = [Job(item.library, value) for item, value in zip(items, values)]
-    with Progress("identify", 8.5 * len(jobs), quiet) as progress:
+    with Progress("identify", 12.0 * len(jobs), quiet) as progress:
         measured = workers.run_all(jobs, measure, progress)
     return [Identified(item.motor, item.board, item.known, item.header, *found) for item, *found in zip(items, values, measured)]
 
@@ -174,7 +176,7 @@ def _plant(motor: Motor, board: BoardFile, changes: board_keys.Values, keys: Any
 # ---- the command -----------------------------------------------------------------------------------------------------------
 def add_command(commands: Any) -> None:
     """Adds `identify` to a command line's commands."""
-    parser = commands.add_parser("identify", help="R, L and Kphi as the IDENTIFY firmware measures them on the virtual board")
+    parser = commands.add_parser("identify", help="R, L, Kphi, inertia, friction as IDENTIFY measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
     parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
@@ -230,8 +232,8 @@ def _write(item: Identified, target: Path) -> None:
     with output.ResultFolder(target) as folder:
         data = item.data()
         (folder.work / build.HEADER).write_text(item.header, encoding="utf-8")
-        if item.done:
-            (folder.work / "electrical.toml").write_text(item.paste() + "\n", encoding="utf-8")
+        if item.has_electrical:
+            (folder.work / "motor.toml").write_text(item.paste() + "\n", encoding="utf-8")
         from . import identify_plots
         data["plots"] = identify_plots.write_all(item, step_names(), folder.work)
         output.write_summary(folder.work, data)

@@ -13,7 +13,11 @@ from tools.common.motor_file import Motor
 from tools.common.trace import Trace
 
 MODE = "IDENTIFY"
-LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0}
+LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0, "J": 10.0, "friction": 10.0}
+LEAST_FRICTION_STEPS = 5.0
+"""Friction that takes less current than so many steps of the converter counts as that much: the limit is half a step."""
+CONVERTER_STEPS = 512
+"""In the current's full scale."""
 SALIENT = 0.03
 """Inductances that differ by less are one."""
 COLUMNS = (("measured", "measured\n", "{}"), ("true", "true\n", "{}"), ("error_percent", "error\n%", "{:+.2f}"), ("limit_percent", "limit\n%", "{:g}"),
@@ -100,6 +104,11 @@ class Identified:
         return self.result.name == "DONE"
 
     @property
+    def has_electrical(self) -> bool:
+        """R, L and Kphi are valid, whether or not inertia and friction could be measured."""
+        return self.result.name in ("DONE", "NOT_ACCELERATING")
+
+    @property
     def bridge_ohm(self) -> float:
         """What transistors and shunt add to a phase."""
         return self.board.rds_on_ohm + 0.5 * self.board.shunt_ohm
@@ -108,6 +117,11 @@ class Identified:
     def winding_ohm(self) -> float:
         return 1e-3 * self.measured.watch["Rs_mohm"] - self.bridge_ohm
 
+    @property
+    def inertia_kgm2(self) -> float:
+        """Of all that turns."""
+        return 1e-8 * self.measured.watch["J_1e8_kgm2"]
+
     def rows(self) -> list[dict[str, Any]]:
         """Measured and true values with the limits of the errors. The truth is the plant's, changes and temperature included."""
         watch, plant_now = self.measured.watch, self.values
@@ -115,19 +129,40 @@ class Identified:
         rs_ohm = plant_now["motor.rs_ohm"] * (1.0 + plant_now["motor.r_tempco"] * degrees)
         kphi = 3.0 ** 0.5 * plant_now["motor.psi_vs"] * plant_now["motor.pole_pairs"] * 1000.0 * 2.0 * np.pi / 60.0
         kphi *= 1.0 + plant_now["motor.psi_tempco"] * degrees
-        return [
+        rows = [
             _row("R loop [mohm]", f"{watch['Rs_mohm']}", f"{1e3 * (rs_ohm + self.bridge_ohm):.1f}"),
             _row("R winding [mohm]", f"{1e3 * self.winding_ohm:.1f}", f"{1e3 * rs_ohm:.1f}", self.winding_ohm / rs_ohm, "R"),
             _row("Ld [uH]", f"{watch['Ld_uH']}", f"{1e6 * plant_now['motor.ld_h']:.1f}", 1e-6 * watch["Ld_uH"] / plant_now["motor.ld_h"], "Ld"),
             _row("Lq [uH]", f"{watch['Lq_uH']}", f"{1e6 * plant_now['motor.lq_h']:.1f}", 1e-6 * watch["Lq_uH"] / plant_now["motor.lq_h"], "Lq"),
             _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi")]
+        if self.done:
+            rows.append(_row("J [1e-8 kg m2]", f"{watch['J_1e8_kgm2']}", f"{1e8 * plant_now['mech.inertia_kgm2']:.1f}",
+                             self.inertia_kgm2 / plant_now["mech.inertia_kgm2"], "J"))
+            rows += [self._friction_row(share, kphi) for share in (0.5, 1.0)]
+        return rows
+
+    def _friction_row(self, share: float, kphi: float) -> dict[str, Any]:
+        """Friction at a share of the rated speed."""
+        watch, plant_now = self.measured.watch, self.values
+        speed_rad_s = share * self.motor.rated_speed_rpm * np.pi / 30.0
+        true_nm = plant_now["mech.coulomb_nm"] + plant_now.get("load.constant_nm", 0.0)
+        true_nm += speed_rad_s * (plant_now["mech.viscous_nms"] + plant_now.get("load.viscous_nms", 0.0))
+        found_nm = 1e-6 * watch["Coulomb_uNm"] + 1e-9 * watch["Viscous_nNms"] * speed_rad_s
+        kt_nm_per_a = kphi * 1.5 / (3.0 ** 0.5 * 1000.0 * np.pi / 30.0)
+        least_nm = LEAST_FRICTION_STEPS * self.board.current_full_scale_a / CONVERTER_STEPS * kt_nm_per_a
+        name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of rated speed"
+        return _row(f"friction at {name} [uN m]", f"{1e6 * found_nm:.0f}", f"{1e6 * true_nm:.0f}",
+                    1.0 + (found_nm - true_nm) / max(true_nm, least_nm), "friction")
 
     def problems(self) -> list[str]:
         """What is wrong, one line each."""
+        problems = []
         if not self.done:
             fault = f" (fault {self.measured.fault})" if self.measured.fault != "NONE" else ""
-            return [f"{self.result.name}{fault}: {self.result.cause}: {self.result.remedy}"]
-        return [f"{row['name']} is off by {row['error_percent']:+.2f} %, allowed are {row['limit_percent']:g} %"
+            problems = [f"{self.result.name}{fault}: {self.result.cause}: {self.result.remedy}"]
+        if not self.has_electrical:
+            return problems
+        return problems + [f"{row['name']} is off by {row['error_percent']:+.2f} %, allowed are {row['limit_percent']:g} %"
                 for row in self.rows() if row["verdict"] == "FAIL"]
 
     def paste(self) -> str:
@@ -144,6 +179,10 @@ class Identified:
             lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
         lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
                      f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
+        if self.done:
+            lines += ["", "[mechanical]", f'inertia = {{ value = {self.inertia_kgm2:.4g}, unit = "kg m2", source = "{source}" }}',
+                      f'viscous_friction = {{ value = {1e-9 * watch["Viscous_nNms"]:.4g}, unit = "N m s", source = "{source}" }}',
+                      f'coulomb_friction = {{ value = {1e-3 * watch["Coulomb_uNm"]:.4g}, unit = "mN m", source = "{source}" }}']
         return "\n".join(lines)
 
     def text(self) -> str:
@@ -153,14 +192,16 @@ class Identified:
                  f"told: {known.pole_pairs} pole pairs, {known.current_a:.3g} A, {known.speed_rpm:.4g} rpm; "
                  f"bridge of {self.board.name}: {1e3 * self.bridge_ohm:.1f} mohm (transistor, half of the shunt)",
                  "\n".join(f"{at_s:9.4f} s  {step_names()[number]}" for at_s, number in self.measured.steps[1:])]
-        if self.done:
+        if self.has_electrical:
             parts += [report.table(self.rows(), COLUMNS), "For the motor file (R without the bridge; note the winding's temperature):\n\n" + self.paste()]
+        if self.done:
+            parts.append(f"For userparams.h, a load's inertia comes on top:\n\n#define MOTOR_INERTIA_KGM2 {self.inertia_kgm2:.4g}")
         return "\n\n".join(parts)
 
     def data(self) -> dict[str, Any]:
         names = step_names()
         return {"motor": str(paths.shown(self.motor.path)), "board": str(paths.shown(self.board.path)), "result": self.result.name,
-                "fault": self.measured.fault, "watch": self.measured.watch, "bridge_ohm": self.bridge_ohm, "rows": self.rows() if self.done else [],
+                "fault": self.measured.fault, "watch": self.measured.watch, "bridge_ohm": self.bridge_ohm, "rows": self.rows() if self.has_electrical else [],
                 "steps": [{"at_s": round(at_s, 4), "step": names[number]} for at_s, number in self.measured.steps],
                 "told": {"pole_pairs": self.known.pole_pairs, "current_a": self.known.current_a, "speed_rpm": self.known.speed_rpm}}
 

@@ -14,8 +14,8 @@
 
 #define STATUS_PERIOD_MS 500u
 
-static char line[144]; /* all reasons in one line */
-static uint16_t next;  /* index of the next character; a zero byte ends the line */
+static char line[MODE_LINE_SIZE];
+static uint16_t next; /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
 /** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". @return the text's end */

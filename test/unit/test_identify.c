@@ -1,4 +1,4 @@
-/* The identification's bookkeeping with exact data: sums, timing of the square voltage, results. */
+/* The identification's bookkeeping with exact data: sums, timing of the square voltage, inertia and friction, results. */
 /* defines: -DIDENTIFY */
 #include "panel_rig.h"
 
@@ -393,7 +393,7 @@ void test_back_emf_is_the_voltage_less_R_L_and_dead_time(void)
         begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
         id->dead_q13 = cases[n].dead_q13;
         stretches(256, cases[n].v_d, cases[n].v_q, cases[n].i_d, cases[n].i_q);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_DONE, id->result, cases[n].what);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_BUSY, id->result, cases[n].what);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(4, 7240, id->values.kphi_mv_per_krpm, cases[n].what);
     }
     TEST_ASSERT_INT32_WITHIN(256l * 4, 0, id->emf_d_sum);
@@ -412,10 +412,10 @@ void test_half_speed_is_followed_by_full_speed(void)
 
 void test_stretches_agree_when_they_lie_within_41_degrees_to_both_sides_and_swinging_does_not_shorten_the_mean(void)
 {
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, swing(1760, 4838, -1760, 4838)); /* 20 degrees */
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, swing(1760, 4838, -1760, 4838)); /* 20 degrees */
     TEST_ASSERT_UINT16_WITHIN(4, 7240, id->values.kphi_mv_per_krpm);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, swing(3944, 3309, 3944, -3309)); /* 40 degrees */
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, swing(3309, 3944, -3309, 3944));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, swing(3944, 3309, 3944, -3309)); /* 40 degrees */
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, swing(3309, 3944, -3309, 3944));
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, swing(3765, 3511, 3765, -3511)); /* 43 degrees */
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, swing(3511, 3765, -3511, 3765));
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, swing(5148, 0, -5148, 0)); /* it slips */
@@ -431,7 +431,7 @@ void test_each_stretch_is_followed_by_the_next_until_there_are_256(void)
     TEST_ASSERT_EQUAL_UINT16(32, id->left);
     TEST_ASSERT_EQUAL_INT32(0, id->sum[1]);
     stretches(1, 0, 5148, 0, 0);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, id->result);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_MECHANICS, id->step);
 }
 
 void test_half_and_full_speed_agree_within_an_eighth(void)
@@ -439,8 +439,8 @@ void test_half_and_full_speed_agree_within_an_eighth(void)
     static const struct {
         int16_t half_more;
         identify_result_t expected;
-    } cases[] = { { 904, IDENTIFY_RESULT_DONE }, { 905, IDENTIFY_RESULT_NOT_TURNING },
-                  { -904, IDENTIFY_RESULT_DONE }, { -905, IDENTIFY_RESULT_NOT_TURNING } };
+    } cases[] = { { 904, IDENTIFY_RESULT_BUSY }, { 905, IDENTIFY_RESULT_NOT_TURNING },
+                  { -904, IDENTIFY_RESULT_BUSY }, { -905, IDENTIFY_RESULT_NOT_TURNING } };
     EACH(n, cases) {
         begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
         id->kphi_half = (uint16_t)(7239 + cases[n].half_more); /* an eighth is 904 */
@@ -497,6 +497,136 @@ void test_mean_of_a_stretch_is_limited_to_what_can_be_squared_in_31_bits(void)
     stretches(256, 0, 0, 8191, -8191);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_IDLE, id->step);
     TEST_ASSERT_EQUAL_INT32(-23170l * 256, id->emf_d_sum);
+}
+
+/* ---- Inertia and friction ---- */
+
+typedef struct {
+    float inertia, coulomb_nm, viscous_nms, speed;
+    int16_t most_q13, brakes;
+} shaft_t;
+
+#define RAD_S_TO_Q10 (5.0F / 6.2831853F * 67108864.0F * 0.00005F)
+#define NM_PER_COUNT (1.5F * 7.24F / 1.7320508F / 104.71976F * 4.0F * 0.000134F) /* 7.24 V/krpm */
+
+/** SPIN_FULL has found 7.24 V/krpm at the header's speed. */
+static void begin_mechanics(int16_t v_d)
+{
+    begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+    id->values.lq_uh = 60000u; /* so large that the samples miss nothing worth a count */
+    id->ki_q = 100;
+    stretches(256, v_d, 5148, 0, 0);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_MECHANICS, id->step);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_FOLLOW, id->mode);
+    TEST_ASSERT_EQUAL_INT16(0, control->ref_q13.d);
+    TEST_ASSERT_EQUAL_INT16(id->push_q13, control->ref_q13.q);
+}
+
+/** A shaft answers the q current, a stretch and eight periods for the background at a time. @return stretches until the end */
+static uint16_t turn_shaft(shaft_t *shaft)
+{
+    uint16_t n = 0, began = 0;
+    while (id->step == (uint16_t)IDENTIFY_MECHANICS && n < 20000u) {
+        float torque = NM_PER_COUNT * (float)control->ref_q13.q - shaft->coulomb_nm - shaft->viscous_nms * shaft->speed;
+        shaft->speed += torque / shaft->inertia * 0.00005F * 40.0F;
+        shaft->most_q13 = (control->ref_q13.q > shaft->most_q13) ? control->ref_q13.q : shaft->most_q13;
+        shaft->brakes = (int16_t)(shaft->brakes | (control->ref_q13.q < 0));
+        began = (uint16_t)(began + 40u);
+        id->at = began;
+        set_sums((int32_t)(shaft->speed * RAD_S_TO_Q10) * 32, (int32_t)control->ref_q13.q * 32, 0, 0);
+        id->ready = 1;
+        (void)identify_background(&drive, &params);
+        n++;
+    }
+    return n;
+}
+
+void test_inertia_and_friction_of_an_exact_shaft(void)
+{
+    static const shaft_t cases[] = {
+        { 5.5e-6F, 0.004F, 15.3e-6F, 105.0F, 0, 0 }, { 2e-4F, 0.004F, 15.3e-6F, 105.0F, 0, 0 }, { 1.8e-6F, 0.002F, 0.0F, 105.0F, 0, 0 },
+        { 2e-5F, 0.0F, 30e-6F, 105.0F, 0, 0 }, { 5.5e-6F, 0.02F, 0.0F, 105.0F, 0, 0 },
+    };
+    EACH(n, cases) {
+        shaft_t shaft = cases[n];
+        begin_mechanics((int16_t)(n * 100));
+        (void)turn_shaft(&shaft);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_DONE, id->result, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.02F * shaft.inertia + 1e-8F, shaft.inertia, (float)id->values.inertia_1e8_kgm2 * 1e-8F, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03F * shaft.coulomb_nm + 1.2e-4F, shaft.coulomb_nm, (float)id->values.coulomb_unm * 1e-6F, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03F * shaft.viscous_nms + 2.5e-6F, shaft.viscous_nms, (float)id->values.viscous_nnms * 1e-9F, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(0, shaft.brakes, "it never brakes");
+        TEST_ASSERT_TRUE(shaft.most_q13 <= params.open_loop_q13);
+    }
+}
+
+void test_a_shaft_without_friction_coasts_for_ten_seconds_and_has_an_inertia(void)
+{
+    shaft_t shaft = { 5.5e-6F, 0.0F, 0.0F, 105.0F, 0, 0 };
+    begin_mechanics(0);
+    TEST_ASSERT_UINT16_WITHIN(300, 5300, turn_shaft(&shaft));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, id->result);
+    TEST_ASSERT_UINT16_WITHIN(12, 550, id->values.inertia_1e8_kgm2);
+    TEST_ASSERT_UINT16_WITHIN(40, 0, id->values.coulomb_unm);
+    TEST_ASSERT_EQUAL_UINT16(0, id->values.viscous_nnms);
+}
+
+void test_a_shaft_that_does_not_accelerate_gets_more_current_up_to_all_of_it_and_then_its_name(void)
+{
+    static const shaft_t cases[] = { { 5e-2F, 0.004F, 0.0F, 105.0F, 0, 0 }, { 1e-4F, 0.1F, 0.0F, 105.0F, 0, 0 } };
+    EACH(n, cases) {
+        shaft_t shaft = cases[n];
+        begin_mechanics(0);
+        (void)turn_shaft(&shaft);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_NOT_ACCELERATING, id->result, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(params.open_loop_q13, shaft.most_q13, golden_row(n));
+        TEST_ASSERT_UINT16_WITHIN(4, 7240, id->values.kphi_mv_per_krpm);
+        TEST_ASSERT_EQUAL_UINT16(0, id->values.inertia_1e8_kgm2);
+    }
+}
+
+void test_the_first_push_is_what_friction_takes_and_a_sixteenth(void)
+{
+    begin_mechanics(0);
+    TEST_ASSERT_EQUAL_INT16(params.open_loop_q13 >> 4, id->push_q13);
+    begin_mechanics(1287); /* a quarter of Eq: 14 degrees, 0.2425 of the length */
+    TEST_ASSERT_INT16_WITHIN(3, (int16_t)((float)params.open_loop_q13 * (0.2425F + 0.0625F)), id->push_q13);
+    begin_mechanics(-1287);
+    TEST_ASSERT_EQUAL_INT16(params.open_loop_q13 >> 4, id->push_q13);
+}
+
+void test_top_speed_is_twice_END_SPEED_RPM_within_seven_eighths_of_the_voltage(void)
+{
+    int32_t twice = 2 * params.forced.end_speed_q10;
+    begin_mechanics(0);
+    TEST_ASSERT_INT32_WITHIN(twice / 100, twice - twice / 40, id->top_q10 - twice / 40);
+    begin_spin(IDENTIFY_SPIN_FULL, 267, 1920);
+    drive.circle.limit_q14 = 8000; /* 7000 less R i of half the current */
+    stretches(256, 0, 5148, 0, 0);
+    TEST_ASSERT_INT32_WITHIN(twice / 100, (int32_t)((float)params.forced.end_speed_q10
+                                                   * (7000.0F - 0.0527F * 0.5F * (float)params.open_loop_q13 * 3.353F) / 5148.0F), id->top_q10);
+}
+
+void test_the_frame_follows_the_rotor_by_its_back_emf(void)
+{
+    uint32_t before;
+    id->speed_per_emf_q5 = 1760; /* 55 */
+    id->emf_q22 = 5000l * 256;
+    control->v_q14.q = 5400;
+    control->v_q14.d = -150;
+    id->drop_q_q14 = 300;
+    id->drop_d_q14 = 250; /* 5400 - 300 + 150 - 250 = 5000 */
+    before = drive.forced.angle_q32;
+    identify_follow(&drive);
+    TEST_ASSERT_EQUAL_INT32(275000l, drive.forced.speed_q10);
+    TEST_ASSERT_EQUAL_HEX32(before + (275000ul << 6), drive.forced.angle_q32);
+    control->v_q14.d = 250; /* it leads: slower, a quarter of the way */
+    identify_follow(&drive);
+    TEST_ASSERT_EQUAL_INT32(4900l * 55, drive.forced.speed_q10);
+    control->v_q14.q = -16384;
+    id->emf_q22 = 0;
+    identify_follow(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, drive.forced.speed_q10);
 }
 
 /* ---- Gains ---- */

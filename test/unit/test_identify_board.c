@@ -58,23 +58,24 @@ static void expect_line(const char *text)
 
 void test_line_before_the_first_measurement(void)
 {
-    expect_line("step 0 NONE fault 0 R 0 mohm Ld 0 uH Lq 0 uH Kphi 0 mV/krpm\r\n");
+    expect_line("step 0 NONE fault 0 R 0 mohm Ld 0 uH Lq 0 uH Kphi 0 mV/krpm J 0e-8 kgm2 friction 0 uNm + 0 nNms\r\n");
 }
 
 void test_line_with_the_largest_numbers_fits(void)
 {
-    identify_values_t all = { 65535u, 65535u, 65535u, 65535u };
-    board_drive.run.identify.step = IDENTIFY_SPIN_FULL;
+    identify_values_t all = { 65535u, 65535u, 65535u, 65535u, 65535u, 65535u, 65535u };
+    board_drive.run.identify.step = IDENTIFY_MECHANICS;
     board_drive.run.identify.result = IDENTIFY_RESULT_CURRENT_NOT_REACHED;
     board_drive.run.identify.values = all;
     board_drive.fault = FAULT_TRAP;
-    expect_line("step 11 CURRENT_NOT_REACHED fault 12 R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm\r\n");
+    expect_line("step 12 CURRENT_NOT_REACHED fault 12 R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm"
+                " J 65535e-8 kgm2 friction 65535 uNm + 65535 nNms\r\n");
     TEST_ASSERT_TRUE(sent_count < sizeof line);
 }
 
 void test_watch_variable_shows_all_of_it(void)
 {
-    identify_values_t all = { 2692, 1919, 1920, 40000u };
+    identify_values_t all = { 2692, 1919, 1920, 40000u, 550, 4000, 15300 };
     board_drive.run.identify.step = IDENTIFY_INDUCTANCE_Q;
     board_drive.run.identify.result = IDENTIFY_RESULT_BUSY;
     board_drive.run.identify.values = all;
@@ -85,4 +86,7 @@ void test_watch_variable_shows_all_of_it(void)
     TEST_ASSERT_EQUAL_UINT16(1919, IdentifyParm.Ld_uH);
     TEST_ASSERT_EQUAL_UINT16(1920, IdentifyParm.Lq_uH);
     TEST_ASSERT_EQUAL_UINT16(40000u, IdentifyParm.Kphi_mV_per_krpm);
+    TEST_ASSERT_EQUAL_UINT16(550, IdentifyParm.J_1e8_kgm2);
+    TEST_ASSERT_EQUAL_UINT16(4000, IdentifyParm.Coulomb_uNm);
+    TEST_ASSERT_EQUAL_UINT16(15300, IdentifyParm.Viscous_nNms);
 }

@@ -24,21 +24,23 @@ void test_measures_motors_of_every_kind(void)
 {
     static const struct {
         float rs, ld_mh, lq_mh, kphi;
+        identify_result_t result;
     } cases[] = {
-        { 2.67F, 1.92F, 1.92F, 7.24F }, /* AN1292's */
-        { 0.3F, 0.1F, 0.1F, 2.0F },
-        { 4.0F, 5.0F, 5.0F, 6.0F },
-        { 0.1F, 1.0F, 1.0F, 5.0F },     /* rings for long */
-        { 1.0F, 0.8F, 1.6F, 6.0F },     /* salient */
-        { 1.0F, 1.6F, 1.2F, 6.0F },
+        { 2.67F, 1.92F, 1.92F, 7.24F, IDENTIFY_RESULT_DONE },       /* AN1292's */
+        { 0.3F, 0.1F, 0.1F, 2.0F, IDENTIFY_RESULT_NOT_ACCELERATING }, /* less back-EMF than dead time takes */
+        { 4.0F, 5.0F, 5.0F, 6.0F, IDENTIFY_RESULT_DONE },
+        { 0.1F, 1.0F, 1.0F, 5.0F, IDENTIFY_RESULT_DONE },           /* rings for long */
+        { 1.0F, 0.8F, 1.6F, 6.0F, IDENTIFY_RESULT_DONE },           /* salient */
+        { 1.0F, 1.6F, 1.2F, 6.0F, IDENTIFY_RESULT_DONE },
     };
     EACH(n, cases) {
         unknown_set(cases[n].rs, cases[n].ld_mh, cases[n].lq_mh, cases[n].kphi);
-        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, unknown_identify(), golden_row(n));
         TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].rs + 0.0005F, cases[n].rs, (float)values->rs_mohm * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].ld_mh, cases[n].ld_mh, (float)values->ld_uh * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].lq_mh, cases[n].lq_mh, (float)values->lq_uh * 0.001F);
         TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].kphi, cases[n].kphi, (float)values->kphi_mv_per_krpm * 0.001F);
+        TEST_ASSERT_UINT16_WITHIN_MESSAGE(55, (cases[n].result == IDENTIFY_RESULT_DONE) ? 550 : 0, values->inertia_1e8_kgm2, golden_row(n));
         expect_off();
         TEST_ASSERT_TRUE(motor.highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
     }

@@ -53,9 +53,9 @@ def motors() -> str:
         found = {row["name"].split(" [")[0]: row["error_percent"] for row in result(motor, "identify")["rows"]}
         rows.append([motor, " / ".join(f"{case['speed_rpm']:.0f}" for case in held), f"{max(abs(case['speed_error_percent']) for case in held):.2f} %",
                      f"{max(case['angle_error_rms_deg'] for case in held):.1f}°", f"{max(case['speed_rpm'] for case in cases):.0f}",
-                     " / ".join(f"{found[name]:+.1f}" for name in ("R winding", "Ld", "Lq", "Kphi"))])
+                     " / ".join(f"{found[name]:+.1f}" for name in ("R winding", "Ld", "Lq", "Kphi", "J", "friction at rated speed"))])
     return table(["motor", "rpm at 20 / 50 / 100 % of rated speed, half the rated torque", "worst speed error", "worst angle error RMS", "top rpm, no load",
-                  "IDENTIFY: error of R / Ld / Lq / Kphi in %"], rows)
+                  "IDENTIFY: error of R / Ld / Lq / Kphi / J / friction in %"], rows)
 
 
 def of_motor(name: str, motor: str) -> dict:

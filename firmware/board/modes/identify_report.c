@@ -17,7 +17,10 @@ char *identify_status_line(char *line, const drive_t *d)
     at = text_put(text_put_unsigned(at, id->values.rs_mohm), " mohm Ld ");
     at = text_put(text_put_unsigned(at, id->values.ld_uh), " uH Lq ");
     at = text_put(text_put_unsigned(at, id->values.lq_uh), " uH Kphi ");
-    return text_put(text_put_unsigned(at, id->values.kphi_mv_per_krpm), " mV/krpm\r\n");
+    at = text_put(text_put_unsigned(at, id->values.kphi_mv_per_krpm), " mV/krpm J ");
+    at = text_put(text_put_unsigned(at, id->values.inertia_1e8_kgm2), "e-8 kgm2 friction ");
+    at = text_put(text_put_unsigned(at, id->values.coulomb_unm), " uNm + ");
+    return text_put(text_put_unsigned(at, id->values.viscous_nnms), " nNms\r\n");
 }
 
 void identify_watch(const drive_t *d)
@@ -29,6 +32,9 @@ void identify_watch(const drive_t *d)
     IdentifyParm.Ld_uH = id->values.ld_uh;
     IdentifyParm.Lq_uH = id->values.lq_uh;
     IdentifyParm.Kphi_mV_per_krpm = id->values.kphi_mv_per_krpm;
+    IdentifyParm.J_1e8_kgm2 = id->values.inertia_1e8_kgm2;
+    IdentifyParm.Coulomb_uNm = id->values.coulomb_unm;
+    IdentifyParm.Viscous_nNms = id->values.viscous_nnms;
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* IDENTIFY, the background's part: takes the interrupt's sums, computes R, L and Kphi, and asks for the next step. */
+/* IDENTIFY, the background's part: takes the interrupt's sums, computes R, L, Kphi, inertia and friction, and asks for the next step. */
 #include "drive/modes/identify_tick.h"
 
 #ifdef IDENTIFY
@@ -20,6 +20,17 @@
 #define BLOCK_LOG2 5  /* periods of a stretch of back-EMF: short against the rotor's swinging */
 #define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
+#define FOLLOW_LOG2 5      /* periods of a stretch while accelerating and coasting */
+#define FOLLOW_SETTLE 6u   /* stretches after a change of current: the frame's angle changes by what dead time takes */
+#define PUSH_BLOCKS 1000u  /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
+#define PUSH_LEAST 20u     /* fewer, and less current pushes the next time */
+#define GENTLER_MOST 16u   /* times: to a hundredth of the current */
+#define COAST_BLOCKS 5000u /* some 10 s: a rotor without friction coasts for ever */
+#define PASSAGE_MOST 64u   /* stretches of one line: its sums fit into 32 bits */
+#define CYCLES_LEAST 4u
+#define CYCLES_MOST 12u
+#define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST */
+#define FASTEST_Q10 ((int32_t)(30000.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 67108864.0F)) /* electrical rpm that every format holds */
 
 /* ---- Constants from the board's parameters ---- */
 #define TS_US (PARAM_F(LOOPTIME_SEC) * 1000000.0F)
@@ -38,6 +49,25 @@
 #define C_KPHI soft_float_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
                                             * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), \
                                  6)
+
+/* Torque of one count of q current for a Kphi of 1 mV/krpm, uN m: 3/2 psi P i. */
+#define UNM_PER_COUNT (1000.0F * 1.5F * 60.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * 4.0F * PARAM_F(NORM_CURRENT_CONST))
+/* Mechanical rad/s of 1/1024 angle count a period. */
+#define RAD_S_PER_COUNT (2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) / PARAM_F(NOPOLESPAIRS))
+/* Currents are means * 2^FOLLOW_LOG2, accelerations counts a period * 128, speeds / 16. */
+#define C_TORQUE soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 1099511627776.0F), 40)
+#define C_INERTIA soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 12800.0F * PARAM_F(LOOPTIME_SEC) \
+                                               / RAD_S_PER_COUNT * 65536.0F), 16)
+#define C_DRAG soft_float_scaled((uint32_t)(RAD_S_PER_COUNT / PARAM_F(LOOPTIME_SEC) / 128.0F / 100.0F * 4294967296.0F), 32)
+#define C_VISCOUS soft_float_scaled((uint32_t)(1000.0F / (16.0F * RAD_S_PER_COUNT) * 256.0F), 8)
+/* Sums of current over a stretch for a back-EMF of 1 mV/krpm, a speed / 16 and 1/uH that a sample misses which is taken so much late. */
+#define MISSED(late_sec) \
+    ((float)(16u << FOLLOW_LOG2) * RAD_S_PER_COUNT * 60000.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * (late_sec) \
+     / (4.0F * PARAM_F(NORM_CURRENT_CONST)))
+#define SAMPLE_LATE_SEC (PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC)
+#define C_MISSED_COASTING soft_float_scaled((uint32_t)(MISSED(SAMPLE_LATE_SEC) * 16777216.0F), 24)
+/* With current, dead time delays one edge of every pulse, whatever the current's sign: its centre moves towards the sample. */
+#define C_MISSED_PUSHING soft_float_scaled((uint32_t)(MISSED(PARAM_MAX(SAMPLE_LATE_SEC - 0.5F * PARAM_F(DEADTIME_SEC), 0.0F)) * 16777216.0F), 24)
 
 /* ---- Requests to the interrupt ---- */
 
@@ -335,6 +365,270 @@ static uint16_t coherent(const identify_t *id)
     return (uint16_t)(root_length((int16_t)(id->emf_d_sum >> BLOCKS_LOG2), (int16_t)(id->emf_q_sum >> BLOCKS_LOG2)) > mean - (mean >> 2));
 }
 
+/* ---- Inertia and friction ---- */
+
+enum { PART_PUSH,
+       PART_FAST,
+       PART_SLOW };
+
+/** x * part / whole, within 2^30. */
+static int32_t share_of(int32_t x, int32_t part, int32_t whole)
+{
+    return soft_float_times(x, soft_float_div(soft_float_of((uint32_t)part), soft_float_of((uint32_t)whole)));
+}
+
+/** The least-squares line through a passage: its slope times its weight, so that passages can be added. */
+static void passage_end(identify_t *id)
+{
+    if (id->part != 0u && id->passed > 1u) {
+        identify_part_t *to = &id->parts[id->part - 1u];
+        int32_t n = (int32_t)id->passed;
+        to->slope += 2 * id->rise_moment - (n - 1) * id->rise;
+        to->weight += n * (n * n - 1);
+        to->steps += n - 1;
+        to->periods += (uint16_t)(id->ended_at - id->began_at);
+    }
+    id->part = 0;
+}
+
+/** Another q current. */
+static void mechanics_current(drive_t *d, current_q13_t iq_q13)
+{
+    identify_t *id = &d->run.identify;
+    d->run.control.ref_q13.q = iq_q13;
+    id->phase_blocks = 0;
+    passage_end(id);
+}
+
+/** What the q current takes of the voltage is not the rotor's. */
+static void mechanics_drops(drive_t *d, int32_t speed_q10)
+{
+    identify_t *id = &d->run.identify;
+    int16_t iq_q13 = d->run.control.ref_q13.q;
+    soft_float_t w = soft_float_of((uint32_t)speed_q10);
+    id->drop_q_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC));
+    id->drop_d_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_mul(soft_float_of(id->values.lq_uh), w), C_REACTIVE));
+}
+
+static void forget_parts(identify_t *id)
+{
+    static const identify_part_t nothing;
+    int16_t n;
+    for (n = 0; n < 3; n++) {
+        id->parts[n] = nothing;
+    }
+    id->cycles = 0;
+}
+
+/** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is
+ *  seen in the back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with
+ *  half of the current. */
+static void mechanics_start(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    uint32_t speed = turn_speed(d, p);
+    uint16_t emf_q14 = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
+    int32_t ohmic = soft_float_times(p->open_loop_q13 >> 1, soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC));
+    int32_t most = d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - ohmic;
+    int16_t lag_q12;
+    id->speed_per_emf_q5 = soft_float_to_uint16(soft_float_div(soft_float_of(speed << 5), soft_float_of(emf_q14)));
+    id->emf_q22 = (int32_t)emf_q14 * 256;
+    id->top_q10 = (int32_t)(qm_muluu((uint16_t)((most > (int32_t)emf_q14) ? most : emf_q14), id->speed_per_emf_q5) >> 5);
+    if (id->top_q10 > (int32_t)(2u * speed)) {
+        id->top_q10 = (int32_t)(2u * speed);
+    }
+    if (id->top_q10 > FASTEST_Q10) {
+        id->top_q10 = FASTEST_Q10;
+    }
+    lag_q12 = qm_clamp((int16_t)share_of(id->emf_d_sum >> BLOCKS_LOG2, 4096, (int32_t)emf_q14), 0, 3840);
+    id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
+    /* The back-EMF falls fast while the rotor coasts: four times what cancels R/L, and what damps with 0.5 where R is small. */
+    id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q);
+    if (id->ki_q < (id->kp_q >> 4)) {
+        id->ki_q = (int16_t)(id->kp_q >> 4);
+    }
+    forget_parts(id);
+    d->run.control.ref_q13.d = 0;
+    mechanics_current(d, id->push_q13);
+    mechanics_drops(d, (int32_t)speed);
+    id->mode = (uint16_t)IDENTIFY_FOLLOW;
+    go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
+}
+
+/** Adds a stretch to a part. */
+static void part_add(identify_t *id, uint16_t part, int32_t speed_q10)
+{
+    identify_part_t *to = &id->parts[part];
+    int32_t rise;
+    if (id->part != part + 1u || id->passed == PASSAGE_MOST) {
+        passage_end(id);
+        id->part = (uint16_t)(part + 1u);
+        id->passed = 0;
+        id->began_at = id->at;
+        id->from_q10 = speed_q10;
+        id->rise = 0;
+        id->rise_moment = 0;
+    }
+    rise = (speed_q10 - id->from_q10) >> 4;
+    id->rise += rise;
+    id->rise_moment += rise * (int32_t)id->passed;
+    id->passed++;
+    id->ended_at = id->at;
+    to->blocks++;
+    to->current += id->sum[1];
+    to->speed += speed_q10 >> 4;
+}
+
+static int32_t part_speed(const identify_part_t *part)
+{
+    return share_of(part->speed, 1, part->blocks);
+}
+
+/** Mean q current, with what the samples miss: they are taken after the centre of the low sides' conduction, when the back-EMF has taken
+ *  some of it off. */
+static int32_t part_current(const identify_t *id, uint16_t part)
+{
+    const identify_part_t *of = &id->parts[part];
+    soft_float_t missed = (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING;
+    missed = soft_float_mul(missed, soft_float_div(soft_float_of(id->values.kphi_mv_per_krpm), soft_float_of(id->values.lq_uh)));
+    return share_of(of->current, 1, of->blocks) + soft_float_times(part_speed(of), missed);
+}
+
+/** Change of speed, counts a period * 128. */
+static int32_t part_rate(const identify_part_t *part)
+{
+    uint32_t slope = (uint32_t)((part->slope < 0) ? -part->slope : part->slope);
+    soft_float_t rate = soft_float_div(soft_float_mul(soft_float_of(slope), soft_float_of((uint32_t)part->steps)),
+                                       soft_float_mul(soft_float_of((uint32_t)part->weight), soft_float_of((uint32_t)part->periods)));
+    return soft_float_times((part->slope < 0) ? -6 * 16 * 128 : 6 * 16 * 128, rate);
+}
+
+/** J dw/dt = Kt i - friction, accelerating and coasting at the same mean speed. @return 1 when J can be */
+static uint16_t inertia(identify_t *id, int32_t share_q12)
+{
+    const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
+    int32_t rate = part_rate(push) - part_rate(slow) - (((part_rate(fast) - part_rate(slow)) * share_q12) >> 12);
+    int32_t slow_current = part_current(id, PART_SLOW);
+    int32_t current = part_current(id, PART_PUSH) - slow_current - (((part_current(id, PART_FAST) - slow_current) * share_q12) >> 12);
+    soft_float_t j;
+    if (rate <= 0 || current <= 0) {
+        return 0;
+    }
+    j = soft_float_mul(soft_float_mul(soft_float_of((uint32_t)current), soft_float_of(id->values.kphi_mv_per_krpm)), C_INERTIA);
+    id->values.inertia_1e8_kgm2 = soft_float_to_uint16(soft_float_div(j, soft_float_of((uint32_t)rate)));
+    return 1;
+}
+
+/** Torque that brakes a coasting rotor, uN m. */
+static int32_t drag(const identify_t *id, uint16_t part)
+{
+    int32_t braked = -soft_float_times(part_rate(&id->parts[part]), soft_float_mul(soft_float_of(id->values.inertia_1e8_kgm2), C_DRAG));
+    return braked + soft_float_times(part_current(id, part), soft_float_mul(soft_float_of(id->values.kphi_mv_per_krpm), C_TORQUE));
+}
+
+static uint16_t not_negative(int32_t x)
+{
+    return (uint16_t)((x < 0) ? 0 : (x > 65535) ? 65535
+                                                : x);
+}
+
+static void mechanics_done(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
+    int32_t fast_unm, slow_unm, apart, viscous;
+    passage_end(id);
+    if (slow->periods == 0) { /* it coasts too long: the friction counts as constant */
+        id->parts[PART_SLOW] = *fast;
+    }
+    if (push->periods == 0 || fast->periods == 0) {
+        finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
+        return;
+    }
+    apart = part_speed(fast) - part_speed(slow);
+    if (!inertia(id, (apart > 0) ? share_of(part_speed(push) - part_speed(slow), 4096, apart) : 0)) {
+        finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
+        return;
+    }
+    fast_unm = drag(id, PART_FAST);
+    slow_unm = drag(id, PART_SLOW);
+    viscous = (apart > 0) ? soft_float_times(fast_unm - slow_unm, soft_float_div(C_VISCOUS, soft_float_of((uint32_t)apart))) : 0;
+    id->values.coulomb_unm = not_negative(slow_unm - ((apart > 0) ? share_of(fast_unm - slow_unm, part_speed(slow), apart) : 0));
+    id->values.viscous_nnms = not_negative(viscous);
+    finish(d, IDENTIFY_RESULT_DONE);
+}
+
+/** A stretch with current. */
+static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
+{
+    identify_t *id = &d->run.identify;
+    int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
+    uint16_t last = (uint16_t)(id->push_q13 >= p->open_loop_q13);
+    if (id->phase_blocks == 1u) {
+        id->first_q10 = speed_q10 - (speed_q10 >> 3);
+    }
+    if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
+        part_add(id, PART_PUSH, speed_q10);
+    }
+    if (speed_q10 > id->top_q10 + (id->top_q10 >> 5)) {
+        if (id->phase_blocks < PUSH_LEAST && id->gentler < GENTLER_MOST) { /* too quick to be seen: it counts no more */
+            id->push_q13 = (int16_t)(id->push_q13 - (id->push_q13 >> 2));
+            id->gentler++;
+            forget_parts(id);
+        }
+        id->coasting = 1;
+        mechanics_current(d, 0);
+    } else if ((id->phase_blocks > FOLLOW_SETTLE && speed_q10 < id->first_q10) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {
+        if (last || speed_q10 < (bottom_q10 >> 1)) {
+            finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
+            return;
+        }
+        forget_parts(id);
+        id->push_q13 = (int16_t)((id->push_q13 > (p->open_loop_q13 >> 1)) ? p->open_loop_q13 : 2 * id->push_q13);
+        mechanics_current(d, id->push_q13);
+    } else {
+        /* it accelerates */
+    }
+}
+
+/** A stretch without. */
+static void coast_block(drive_t *d, int32_t speed_q10)
+{
+    identify_t *id = &d->run.identify;
+    int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
+    int32_t middle_q10 = (id->top_q10 + bottom_q10) >> 1;
+    uint16_t late = (uint16_t)(id->phase_blocks > COAST_BLOCKS);
+    if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10) {
+        part_add(id, (speed_q10 > middle_q10) ? PART_FAST : PART_SLOW, speed_q10);
+    }
+    if (speed_q10 < bottom_q10 || late) {
+        id->cycles++;
+        if (late || id->cycles >= CYCLES_MOST
+            || (id->cycles >= CYCLES_LEAST && id->parts[PART_FAST].periods + id->parts[PART_SLOW].periods > (int32_t)COAST_PERIODS)) {
+            mechanics_done(d);
+            return;
+        }
+        id->coasting = 0;
+        mechanics_current(d, id->push_q13);
+    }
+}
+
+static void mechanics_block(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    int32_t speed_q10 = id->sum[0] >> FOLLOW_LOG2;
+    id->phase_blocks++;
+    if (id->coasting) {
+        coast_block(d, speed_q10);
+    } else {
+        push_block(d, p, speed_q10);
+    }
+    if (id->step == (uint16_t)IDENTIFY_MECHANICS) {
+        mechanics_drops(d, speed_q10);
+        go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
+    }
+}
+
 static void spin_done(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
@@ -365,7 +659,7 @@ static void spin_done(drive_t *d, const drive_params_t *p)
         finish(d, IDENTIFY_RESULT_NOT_TURNING);
     } else {
         id->values.kphi_mv_per_krpm = result_mv;
-        finish(d, IDENTIFY_RESULT_DONE);
+        mechanics_start(d, p);
     }
 }
 
@@ -386,6 +680,7 @@ uint16_t identify_background(drive_t *d, const drive_params_t *p)
         case IDENTIFY_INDUCTANCE_D: inductance_d_done(d); break;
         case IDENTIFY_TRY_Q: try_done(d, p, IDENTIFY_INDUCTANCE_Q); break;
         case IDENTIFY_INDUCTANCE_Q: inductance_q_done(d, p); break;
+        case IDENTIFY_MECHANICS: mechanics_block(d, p); break;
         default: spin_done(d, p); break;
         }
     }

@@ -1,8 +1,8 @@
-/* IDENTIFY: the drive measures R, Ld, Lq and Kphi of an unknown motor.
+/* IDENTIFY: the drive measures R, Ld, Lq, Kphi, inertia and friction of an unknown motor.
  *
- * The control interrupt is the instrument (identify_tick.h): it holds a current, superposes a square voltage or turns a current
- * vector, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks for the next step.
- * `ready` names the owner; the other side must not access the guarded fields. */
+ * The control interrupt is the instrument (identify_tick.h): it holds a current, superposes a square voltage, turns a current vector
+ * or lets it follow the rotor, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks
+ * for the next step. `ready` names the owner; the other side must not access the guarded fields. */
 #ifndef DRIVE_MODES_IDENTIFY_H
 #define DRIVE_MODES_IDENTIFY_H
 
@@ -23,13 +23,14 @@
     X(TRY_Q, "the same on the q axis") \
     X(INDUCTANCE_Q, "Lq") \
     X(SPIN_HALF, "the vector turns at half of END_SPEED_RPM: back-EMF, for comparison") \
-    X(SPIN_FULL, "the vector turns at END_SPEED_RPM: Kphi")
+    X(SPIN_FULL, "the vector turns at END_SPEED_RPM: Kphi") \
+    X(MECHANICS, "q current accelerates the rotor to twice END_SPEED_RPM, then it coasts, again and again: inertia and friction")
 
 /** X(code, name, cause, remedy): how it went. Codes never change their meaning. */
 #define IDENTIFY_RESULT_TABLE(X) \
     X(0, NONE, "nothing has been measured yet", "press S2") \
-    X(1, BUSY, "the measurement is running", "wait; it takes about eight seconds") \
-    X(2, DONE, "R, L and Kphi have been measured", "write them into the motor file") \
+    X(1, BUSY, "the measurement is running", "wait; it takes about twelve seconds, longer with a heavy rotor") \
+    X(2, DONE, "all of it has been measured", "write them into the motor file") \
     X(3, STOPPED, "S2 or a fault ended it", "see the fault, if there is one; press S2 to begin anew") \
     X(4, NO_CURRENT, "current does not flow through all three phases: motor not connected, or a phase open", "check the three wires") \
     X(5, CURRENT_NOT_REACHED, "the bus voltage cannot drive Q_CURRENT_REF_OPENLOOP through the winding", \
@@ -40,7 +41,9 @@
     X(8, NOT_TURNING, "the rotor did not follow: its back-EMF is missing, slips, or is not proportional to speed", \
       "free the shaft and take the load off; raise Q_CURRENT_REF_OPENLOOP, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
     X(9, VOLTAGE_LIMIT, "the bus voltage is too low for END_SPEED_RPM", "lower END_SPEED_RPM") \
-    X(10, KPHI_RANGE, "Kphi is above 65 V per 1000 rpm", "check NOPOLESPAIRS")
+    X(10, KPHI_RANGE, "Kphi is above 65 V per 1000 rpm", "check NOPOLESPAIRS") \
+    X(11, NOT_ACCELERATING, "Q_CURRENT_REF_OPENLOOP does not accelerate the rotor to twice END_SPEED_RPM in four seconds, or loses it", \
+      "take the load off; raise Q_CURRENT_REF_OPENLOOP or lower END_SPEED_RPM; R, L and Kphi are valid")
 
 #define IDENTIFY_RESULT_NAME(code, name, cause, remedy) #name,
 
@@ -57,7 +60,8 @@ typedef enum {
     IDENTIFY_CURRENT, /**< d current by its controller, q voltage likewise; gains 0 hold the voltage */
     IDENTIFY_GROW,    /**< the same, and the d voltage grows by 1/128 every 16 periods until ready */
     IDENTIFY_INJECT,  /**< fixed voltage and a square one */
-    IDENTIFY_TURN     /**< currents controlled while the frame turns */
+    IDENTIFY_TURN,    /**< currents controlled while the frame turns */
+    IDENTIFY_FOLLOW   /**< the same while it follows the rotor by its back-EMF */
 } identify_mode_t;
 
 /** What has been measured, in engineering units; 0 = not yet. Loop values: winding, bridge and wires together. */
@@ -65,7 +69,21 @@ typedef struct {
     uint16_t rs_mohm;          /**< phase resistance, mohm */
     uint16_t ld_uh, lq_uh;     /**< phase inductances, uH */
     uint16_t kphi_mv_per_krpm; /**< back-EMF, mV peak line to line per 1000 mechanical rpm */
+    uint16_t inertia_1e8_kgm2; /**< of all that turns, 10^-8 kg m2 */
+    uint16_t coulomb_unm;      /**< friction at standstill, taken from two speeds, uN m */
+    uint16_t viscous_nnms;     /**< and what it grows by, nN m s */
 } identify_values_t;
+
+/** Sums over a part of the rotor's speeds, accelerating or coasting; a line is laid through the speeds of each passage. */
+typedef struct {
+    int32_t blocks;  /**< stretches */
+    int32_t current; /**< of their sums of q current */
+    int32_t speed;   /**< of their speeds / 16 */
+    int32_t slope;   /**< of the passages' slopes, each times its weight */
+    int32_t weight;  /**< n (n^2 - 1) of a passage of n stretches, six times what belongs to the slopes */
+    int32_t steps;   /**< from stretch to stretch */
+    int32_t periods; /**< that they took */
+} identify_part_t;
 
 /** State. */
 typedef struct {
@@ -82,7 +100,11 @@ typedef struct {
     volatile int16_t square_q14;             /**< amplitude of the square voltage */
     volatile uint16_t on_q;                  /**< 1: it is on the q axis */
     volatile uint16_t half;                  /**< periods of one half of it */
-    volatile int32_t sum[4];                 /**< see identify_record() */
+    volatile int16_t drop_d_q14, drop_q_q14; /**< IDENTIFY_FOLLOW: what the q current takes of the voltage: w Lq i_q, and R i_q */
+    volatile uint16_t speed_per_emf_q5;      /**< 1/1024 angle counts a period per count of back-EMF, * 32 */
+    volatile int32_t emf_q22;                /**< filtered back-EMF */
+    volatile int32_t sum[4];                 /**< see identify_add() */
+    volatile uint16_t at;                    /**< drive_t.ticks when the sums were complete */
     volatile uint16_t bus_q16;               /**< bus when the sums were complete, Q16 of full scale */
 
     /* The interrupt's own. */
@@ -102,6 +124,16 @@ typedef struct {
     uint32_t emf_sum;                       /**< their lengths */
     int32_t emf_d_sum, emf_q_sum;           /**< and their components */
     uint16_t kphi_half;                     /**< mV per 1000 rpm at half speed */
+    int32_t top_q10;                        /**< MECHANICS: up to this speed, and down to 3/8 of it */
+    current_q13_t push_q13;                 /**< q current that accelerates */
+    int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
+    uint16_t gentler;                       /**< times that the push was too quick */
+    uint16_t coasting, cycles, phase_blocks;
+    uint16_t part;                       /**< where the passage belongs that is under way, counted from 1; 0 = none is */
+    uint16_t passed, began_at, ended_at; /**< its stretches, and when the first and the last one ended */
+    int32_t from_q10;                    /**< speed of the first one */
+    int32_t rise, rise_moment;           /**< sums of the others' differences from it / 16, and of those times the number of the stretch */
+    identify_part_t parts[3];            /**< accelerating, coasting above the middle, coasting below it */
 } identify_t;
 
 #define IDENTIFY_STATE identify_t identify;

@@ -1,4 +1,4 @@
-/* IDENTIFY, the interrupt's part: one PWM period of holding, injecting or turning a vector, and of adding up. */
+/* IDENTIFY, the interrupt's part: one PWM period of holding, injecting or turning a vector, or of following the rotor, and of adding up. */
 #ifndef DRIVE_MODES_IDENTIFY_TICK_H
 #define DRIVE_MODES_IDENTIFY_TICK_H
 
@@ -34,6 +34,20 @@ QM_INLINE int16_t identify_duty(const identify_t *id, duties_t duty)
     return (int16_t)(id->on_q ? 3 * (b - c) : 2 * (int16_t)duty.a - b - c);
 }
 
+/** Moves the frame along with the rotor. As in the estimator (Equation 2), the sum of both components is the speed; a frame that leads has
+ *  a negative speed of its own. The voltage that was commanded a period ago is centred on this sample, whose frame this still is. */
+QM_INLINE void identify_follow(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    int32_t emf = (int32_t)d->run.control.v_q14.q - id->drop_q_q14 - d->run.control.v_q14.d - id->drop_d_q14;
+    id->emf_q22 += (emf * 256 - id->emf_q22) >> 2; /* 0.9 kHz */
+    emf = id->emf_q22 >> 8;
+    emf = (emf < 0) ? 0 : (emf > 32767) ? 32767
+                                        : emf;
+    d->forced.speed_q10 = (int32_t)(qm_muluu((uint16_t)emf, id->speed_per_emf_q5) >> 5);
+    d->forced.angle_q32 = qm_turn_add(d->forced.angle_q32, (uint32_t)d->forced.speed_q10 << 6);
+}
+
 /** Moves the frame. @return 1 when it stands or has reached its speed */
 QM_INLINE uint16_t identify_turn(drive_t *d, const drive_params_t *p)
 {
@@ -46,6 +60,8 @@ QM_INLINE uint16_t identify_turn(drive_t *d, const drive_params_t *p)
             drive_enter(d, DRIVE_RAMP);
         }
         settled = (uint16_t)forced_angle_tick(&d->forced, &to, 1);
+    } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
+        identify_follow(d);
     } else if (id->sweep) {
         d->forced.angle_q32 = qm_turn_add(d->forced.angle_q32, IDENTIFY_SWEEP_Q32);
         settled = 0;
@@ -107,7 +123,8 @@ QM_INLINE dq_t identify_voltage(drive_t *d, int16_t sign)
  *  one period from the boundary after it, half of it before sample n+1 and half after; so between the last two samples acted
  *  the mean of the vectors commanded one and two periods before this one; where their signs differ it says nothing, else both are
  *  alike.
- *  Turning: voltage d and q (centred on the sample, as commanded a period ago), current d and q. */
+ *  Turning: voltage d and q (centred on the sample, as commanded a period ago), current d and q.
+ *  Following: speed, q current. */
 QM_INLINE void identify_add(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
@@ -117,6 +134,9 @@ QM_INLINE void identify_add(drive_t *d, const drive_params_t *p)
         id->sum[1] += d->run.control.v_q14.q;
         id->sum[2] += d->run.control.i_q13.d;
         id->sum[3] += d->run.control.i_q13.q;
+    } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
+        id->sum[0] += d->forced.speed_q10;
+        id->sum[1] += d->run.control.i_q13.q;
     } else if (id->mode != (uint16_t)IDENTIFY_INJECT) {
         id->sum[0] += id->duty - 4 * p->svm.dead_time;
         id->sum[1] += i_q13;
@@ -152,6 +172,7 @@ QM_INLINE void identify_record(drive_t *d, const drive_params_t *p, uint16_t set
     }
     if (done) {
         id->bus_q16 = identify_bus(d);
+        id->at = d->ticks;
         id->ready = 1;
     }
 }

@@ -9,7 +9,7 @@
     X(TORQUE_MODE, "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed") \
     X(BIDIRECTIONAL_SPEED, "the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function") \
     X(SNAPSHOT, "record SnapBuf1..4") \
-    X(IDENTIFY, "measure R, L and Kphi of the motor instead of running it (docs/tuning.md)") \
+    X(IDENTIFY, "measure R, L, Kphi, inertia and friction of the motor instead of running it (docs/tuning.md)") \
     X(PARAMS_IN_RAM, "a debugger can change every parameter while the motor turns; TUNING does it too") \
     X(SELFTEST_OFF, "leave out the self-tests in the manner of IEC 60730 Class B (docs/selftest.md)")
 
