@@ -57,7 +57,8 @@
 /* Currents are means * 2^FOLLOW_LOG2, accelerations counts a period * 128, speeds / 16. */
 #define C_TORQUE soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 1099511627776.0F), 40)
 #define C_INERTIA soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 12800.0F * PARAM_F(LOOPTIME_SEC) \
-                                               / RAD_S_PER_COUNT * 65536.0F), 16)
+                                               / RAD_S_PER_COUNT * 65536.0F), \
+                                    16)
 #define C_DRAG soft_float_scaled((uint32_t)(RAD_S_PER_COUNT / PARAM_F(LOOPTIME_SEC) / 128.0F / 100.0F * 4294967296.0F), 32)
 #define C_VISCOUS soft_float_scaled((uint32_t)(1000.0F / (16.0F * RAD_S_PER_COUNT) * 256.0F), 8)
 /* Sums of current over a stretch for a back-EMF of 1 mV/krpm, a speed / 16 and 1/uH that a sample misses which is taken so much late. */
