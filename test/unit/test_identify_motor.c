@@ -46,6 +46,20 @@ void test_measures_motors_of_every_kind(void)
     }
 }
 
+void test_follows_rotors_of_little_resistance(void)
+{
+    static const float cases[][4] = { /* ohm, mH, V/krpm, N m */
+        { 0.1F, 1.0F, 4.0F, 0.002F }, { 0.1F, 1.0F, 7.0F, 0.005F }, { 0.1F, 0.6F, 5.0F, 0.002F },
+        { 0.2F, 1.0F, 5.0F, 0.005F }, { 0.2F, 0.6F, 4.0F, 0.002F }, { 0.2F, 2.0F, 7.0F, 0.002F }
+    };
+    EACH(n, cases) {
+        unknown_set(cases[n][0], cases[n][1], cases[n][1], cases[n][2]);
+        motor.friction_nm = cases[n][3];
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_DONE, unknown_identify(), golden_row(n));
+        TEST_ASSERT_UINT16_WITHIN_MESSAGE(55, 550, values->inertia_1e8_kgm2, golden_row(n));
+    }
+}
+
 void test_finds_the_rotor_wherever_it_stands(void)
 {
     static const float at[4][2] = { { 1.0F, 0.0F }, { -1.0F, 0.0F }, { -0.5F, 0.8660254F }, { 0.5F, -0.8660254F } };

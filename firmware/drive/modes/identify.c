@@ -421,6 +421,11 @@ static void forget_parts(identify_t *id)
     id->cycles = 0;
 }
 
+static int16_t at_least(int16_t x, int16_t least)
+{
+    return (int16_t)((x < least) ? least : x);
+}
+
 /** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is
  *  seen in the back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with
  *  half of the current. */
@@ -443,11 +448,10 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     }
     lag_q12 = qm_clamp((int16_t)share_of(id->emf_d_sum >> BLOCKS_LOG2, 4096, (int32_t)emf_q14), 0, 3840);
     id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
-    /* The back-EMF falls fast while the rotor coasts: four times what cancels R/L, and what damps with 0.5 where R is small. */
+    /* The back-EMF falls fast while the rotor coasts: four times what cancels R/L. And on both axes what damps with 0.5 where R is small. */
     id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q);
-    if (id->ki_q < (id->kp_q >> 4)) {
-        id->ki_q = (int16_t)(id->kp_q >> 4);
-    }
+    id->ki_q = at_least(id->ki_q, (int16_t)(id->kp_q >> 4));
+    id->ki_d = at_least(id->ki_d, (int16_t)(id->kp_d >> 4));
     forget_parts(id);
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
