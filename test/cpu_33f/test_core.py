@@ -3,7 +3,8 @@
 import contextlib
 import ctypes
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ RCON = 0x740
 SWR = 1 << 6
 IDLE, SLEEP = 1, 2
 AT = 0x2C0
+PROFILE_OFF, PROFILE_ALL, PROFILE_HANDLERS = range(3)
 READ = ctypes.CFUNCTYPE(ctypes.c_uint16, ctypes.c_void_p, ctypes.c_uint16)
 WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint16, ctypes.c_uint16, ctypes.c_uint16)
 RESET = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int)
@@ -161,17 +163,33 @@ def test_sleep_is_told_and_ends_when_somebody_wakes_it() -> None:
 
 # ---- observation ---------------------------------------------------------------------------------------------------------
 
-def test_the_profile_counts_instructions_and_cycles_of_each_address() -> None:
-    chip = Chip("mov #5,w5\n l: dec w5,w5\n b: bra nz,l\n" + MAIN, w={5: 0})
+def profiled(chip: Chip, what: int, run: Callable[[], object]) -> tuple[Any, Any]:
+    """Executions and cycles by address / 2 of what runs."""
     library = chip.machine.library
     library.iss_profile_counts.restype = ctypes.POINTER(ctypes.c_uint32)
     library.iss_profile_cycles.restype = ctypes.POINTER(ctypes.c_uint64)
-    assert core(chip, "iss_profile", True) & 1
-    chip.run(1 + 5 + 9)
+    assert core(chip, "iss_profile", what) & 1
+    run()
+    return core(chip, "iss_profile_counts"), core(chip, "iss_profile_cycles")
+
+
+def test_the_profile_counts_instructions_and_cycles_of_each_address() -> None:
+    chip = Chip("mov #5,w5\n l: dec w5,w5\n b: bra nz,l\n" + MAIN, w={5: 0})
+    counts, cycles = profiled(chip, PROFILE_ALL, lambda: chip.run(1 + 5 + 9))
     at = chip.labels["b"] // 2
-    counts, cycles = core(chip, "iss_profile_counts"), core(chip, "iss_profile_cycles")
     assert (counts[at - 1], cycles[at - 1], counts[at], cycles[at], counts[at + 1]) == (5, 5, 5, 9, 0)
-    core(chip, "iss_profile", False)
+    core(chip, "iss_profile", PROFILE_OFF)
+
+
+@pytest.mark.parametrize("what, background", [(PROFILE_ALL, 1), (PROFILE_HANDLERS, 0)])
+def test_a_profile_of_handlers_leaves_out_what_the_background_executes(what: int, background: int) -> None:
+    chip = first(text="rcall both\n" + MAIN.replace("first: inc", "first: rcall both\n inc") + ".org 0x3C0\nboth: inc w6,w6\n return\n")
+    counts, cycles = profiled(chip, what, lambda: requested(chip, 10, 40))
+    both, handler, loop = (chip.labels[name] // 2 for name in ("both", "first", "loop"))
+    assert (counts[both], cycles[both], cycles[both + 1]) == (1 + background, 1 + background, 3 * (1 + background))
+    assert [cycles[handler + n] for n in range(4)] == [ENTRY + 2, 1, 1, 3] # its call, its count, bclr, retfie
+    assert (counts[loop] > 0) == bool(background)
+    core(chip, "iss_profile", PROFILE_OFF)
 
 
 def test_hooks_tell_of_interrupts() -> None:
@@ -193,10 +211,10 @@ def test_clrwdt_is_told_and_pwrsav_clears_the_watchdog_too(text: str, cycles: li
 
 def test_nothing_changes_while_the_profile_is_on() -> None:
     chip = Chip()
-    core(chip, "iss_profile", True)
+    core(chip, "iss_profile", PROFILE_ALL)
     wrong = [f"{vector}: {found}" for name in ("flow.txt", "cycles.txt") for vector in read(FOLDER / name)
              if (found := differences(vector, chip.machine, 0))]
-    core(chip, "iss_profile", False)
+    core(chip, "iss_profile", PROFILE_OFF)
     assert wrong == []
 
 

@@ -522,6 +522,27 @@ static void begin_mechanics(int16_t v_d)
     TEST_ASSERT_EQUAL_INT16(id->push_q13, control->ref_q13.q);
 }
 
+void test_the_frame_follows_with_controllers_twice_as_fast_and_no_less_integral_than_damps(void)
+{
+    static const struct {
+        int16_t kp, ki, follow_kp, ki_d, ki_q;
+    } cases[] = {
+        { 1600, 110, 3200, 400, 440 }, { 800, 4, 1600, 200, 200 }, { 800, 300, 1600, 300, 1200 }, { 20000, 20000, 32767, 20000, 32767 }
+    };
+    EACH(n, cases) {
+        begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+        id->kp_d = cases[n].kp;
+        id->kp_q = cases[n].kp;
+        id->ki_d = cases[n].ki;
+        id->ki_q = cases[n].ki;
+        stretches(256, 0, 5148, 0, 0);
+        TEST_ASSERT_EQUAL_INT16(cases[n].follow_kp, id->kp_d);
+        TEST_ASSERT_EQUAL_INT16(cases[n].follow_kp, id->kp_q);
+        TEST_ASSERT_EQUAL_INT16(cases[n].ki_d, id->ki_d);
+        TEST_ASSERT_EQUAL_INT16(cases[n].ki_q, id->ki_q);
+    }
+}
+
 /** A shaft answers the q current, a stretch and eight periods for the background at a time. @return stretches until the end */
 static uint16_t turn_shaft(shaft_t *shaft)
 {

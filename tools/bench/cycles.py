@@ -30,7 +30,8 @@ FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
 P1SECMP = 0x01C6    # the counter's value at the trigger; it counts down to zero from there, and the duties load
 MOST_EXPENSIVE = 10
-MISSED = 0.002      # share of the cycles by which the profile may be off: the background executes some of the interrupt's functions
+MISSED = 0.0001     # share of the cycles by which the profile may be off: other handlers call some of the interrupt's functions
+PROFILE_HANDLERS = 2 # iss_profile_t: what runs in handlers
 WITHOUT, WITH = "without field weakening", "with field weakening"
 NOTE_US = {WITHOUT: (14.725, 20.8, 21.4), WITH: (14.975, 23.325, 23.65)}
 MEANING = {WITHOUT: "bridge on, speed reference below FW_START_SPEED_RPM", WITH: "bridge on, speed reference above it"}
@@ -164,11 +165,11 @@ class _Core:
     def __init__(self, board: pil.PilBoard) -> None:
         c = board.library.c
         board.library.declare(("vb_iss_core", ctypes.c_void_p, [ctypes.c_void_p]),
-                              ("iss_profile", ctypes.c_bool, [ctypes.c_void_p, ctypes.c_bool]),
+                              ("iss_profile", ctypes.c_bool, [ctypes.c_void_p, ctypes.c_int]),
                               ("iss_profile_counts", ctypes.POINTER(ctypes.c_uint32), [ctypes.c_void_p]),
                               ("iss_profile_cycles", ctypes.POINTER(ctypes.c_uint64), [ctypes.c_void_p]))
         self._c, self._core = c, c.vb_iss_core(board._vb) # pylint: disable=protected-access
-        if not c.iss_profile(self._core, True):
+        if not c.iss_profile(self._core, PROFILE_HANDLERS):
             raise UserError("no memory for the profile", "make cycles", "free some")
 
     def counts(self) -> Counts:

@@ -154,9 +154,11 @@ void iss_on_reset(iss_t *iss, void (*reset)(void *context, chip_reset_t cause), 
 void iss_on_interrupt(iss_t *iss, void (*enter)(void *context, unsigned vector, uint64_t cycle),
                       void (*leave)(void *context, unsigned vector, uint64_t cycle), void *context);
 
-/* Count executions and cycles of every address (off at first). The arrays have ISS_PROGRAM_WORDS elements, index = PC / 2; cycles of an interrupt's
- * entry belong to its first instruction. Switching on clears them. NULL if never switched on. */
-bool iss_profile(iss_t *iss, bool on);
+typedef enum { ISS_PROFILE_OFF, ISS_PROFILE_ALL, ISS_PROFILE_HANDLERS } iss_profile_t;
+
+/* Count executions and cycles of every address (off at first), of all that runs or of what runs in handlers. The arrays have ISS_PROGRAM_WORDS
+ * elements, index = PC / 2; cycles of an interrupt's entry belong to its first instruction. Switching on clears them. NULL if never switched on. */
+bool iss_profile(iss_t *iss, iss_profile_t what);
 const uint32_t *iss_profile_counts(const iss_t *iss);
 const uint64_t *iss_profile_cycles(const iss_t *iss);
 

@@ -181,13 +181,17 @@ static void run_fast(iss_t *m)
     }
 }
 
-static void count_instruction(iss_t *m, uint32_t pc)
+/* @param handlers how many were entered before the instruction: RETFIE belongs to the one that it ends */
+static void count_instruction(iss_t *m, uint32_t pc, unsigned handlers)
 {
-    if (m->profiling) {
+    if (m->profiling == ISS_PROFILE_OFF) {
+        return;
+    }
+    if (m->profiling == ISS_PROFILE_ALL || handlers != 0) {
         m->profile_counts[pc]++;
         m->profile_cycles[pc] += m->cycle - m->profile_mark;
-        m->profile_mark = m->cycle;
     }
+    m->profile_mark = m->cycle;
 }
 
 /* The same with the profile. */
@@ -195,12 +199,13 @@ static void run_profiled(iss_t *m)
 {
     while (m->cycle < m->limit) {
         uint32_t pc = m->pc;
+        unsigned handlers = m->nested;
         const insn_t *i = &m->code[pc];
         step(m, i);
         if (i == m->do_end) {
             end_turn(m);
         }
-        count_instruction(m, pc);
+        count_instruction(m, pc, handlers);
     }
 }
 
@@ -243,7 +248,7 @@ static void run_repeated(iss_t *m)
         m->pc = pc;
         step(m, i);
         hold_stuck(m);
-        count_instruction(m, pc);
+        count_instruction(m, pc, m->nested);
         if (m->data[R_RCOUNT] == 0 || (m->data[R_SR] & SR_RA) == 0) {
             m->data[R_SR] &= (uint16_t)~(unsigned)SR_RA;
             if (i == m->do_end) {
@@ -273,7 +278,7 @@ static void run_on(iss_t *m)
         run_asleep(m);
     } else if ((m->data[R_SR] & SR_RA) != 0) {
         run_repeated(m);
-    } else if (m->profiling) {
+    } else if (m->profiling != ISS_PROFILE_OFF) {
         run_profiled(m);
     } else if (m->stuck) {
         run_damaged(m);

@@ -87,23 +87,23 @@ void iss_on_interrupt(iss_t *m, void (*enter)(void *, unsigned, uint64_t), void 
 
 /* ---- profile ---- */
 
-bool iss_profile(iss_t *m, bool on)
+bool iss_profile(iss_t *m, iss_profile_t what)
 {
     enum { PLACES = ISS_PROGRAM_WORDS + 1 };
-    if (on && m->profile_counts == NULL) {
+    if (what != ISS_PROFILE_OFF && m->profile_counts == NULL) {
         m->profile_counts = calloc(PLACES, sizeof *m->profile_counts);
     }
-    if (on && m->profile_cycles == NULL) {
+    if (what != ISS_PROFILE_OFF && m->profile_cycles == NULL) {
         m->profile_cycles = calloc(PLACES, sizeof *m->profile_cycles);
     }
-    if (on && (m->profile_counts == NULL || m->profile_cycles == NULL)) {
+    if (what != ISS_PROFILE_OFF && (m->profile_counts == NULL || m->profile_cycles == NULL)) {
         return false;
     }
-    if (on) {
+    if (what != ISS_PROFILE_OFF) {
         memset(m->profile_counts, 0, PLACES * sizeof *m->profile_counts);
         memset(m->profile_cycles, 0, PLACES * sizeof *m->profile_cycles);
     }
-    m->profiling = on;
+    m->profiling = what;
     m->profile_mark = m->cycle;
     m->limit = 0;
     return true;

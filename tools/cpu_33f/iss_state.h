@@ -165,7 +165,7 @@ struct iss {
     uint32_t *profile_counts;
     uint64_t *profile_cycles;
     uint64_t profile_mark;
-    bool profiling;
+    iss_profile_t profiling;
 
     void (*on_report)(void *, iss_error_t, uint32_t, const char *);
     void *report_context;

@@ -1,6 +1,7 @@
 """Cycles of the control interrupt by function, as linked and as written.
 
-A function that the interrupt can reach is counted wholly with it: what little the background executes of such a function, too."""
+The counts are those of handlers alone: the background executes some of the interrupt's functions. What other handlers execute of them is
+counted with it, too; that is little."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -16,7 +17,7 @@ INTERRUPT = "_ADC1Interrupt"
 
 @dataclass(frozen=True)
 class Counts:
-    """What the core counted, by address of the instruction; entering an interrupt counts with its first one."""
+    """What the core counted in handlers, by address of the instruction; entering an interrupt counts with its first one."""
 
     executions: dict[int, int]
     cycles: dict[int, int]

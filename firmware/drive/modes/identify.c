@@ -421,9 +421,24 @@ static void forget_parts(identify_t *id)
     id->cycles = 0;
 }
 
-static int16_t at_least(int16_t x, int16_t least)
+static int16_t twice(int16_t gain)
 {
-    return (int16_t)((x < least) ? least : x);
+    return (int16_t)((gain > 16383) ? 32767 : 2 * gain);
+}
+
+/** Twice as fast on both axes, for the frame follows the rotor by these controllers' voltage, and what damps with 0.5 where R is small. The
+ *  back-EMF falls fast while the rotor coasts: four times what cancels R/L. */
+static void follow_gains(identify_t *id)
+{
+    id->kp_d = twice(id->kp_d);
+    id->kp_q = twice(id->kp_q);
+    id->ki_q = twice(twice(id->ki_q));
+    if (id->ki_q < (id->kp_q >> 3)) {
+        id->ki_q = (int16_t)(id->kp_q >> 3);
+    }
+    if (id->ki_d < (id->kp_d >> 3)) {
+        id->ki_d = (int16_t)(id->kp_d >> 3);
+    }
 }
 
 /** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is
@@ -448,10 +463,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     }
     lag_q12 = qm_clamp((int16_t)share_of(id->emf_d_sum >> BLOCKS_LOG2, 4096, (int32_t)emf_q14), 0, 3840);
     id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
-    /* The back-EMF falls fast while the rotor coasts: four times what cancels R/L. And on both axes what damps with 0.5 where R is small. */
-    id->ki_q = (int16_t)((id->ki_q > 8191) ? 32767 : 4 * id->ki_q);
-    id->ki_q = at_least(id->ki_q, (int16_t)(id->kp_q >> 4));
-    id->ki_d = at_least(id->ki_d, (int16_t)(id->kp_d >> 4));
+    follow_gains(id);
     forget_parts(id);
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
