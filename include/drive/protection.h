@@ -13,11 +13,14 @@ QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Over-voltage at once, under-voltage filtered, both while anything is on: at rest a rotor may charge the bus. Every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
+#define PROTECTION_BUS_END_Q15 32640 /* the converter's last steps: more cannot be told from a broken signal */
+
+/** Over-voltage at once, under-voltage filtered, both while anything is on: at rest a rotor may charge the bus, but no further than what can be
+ *  measured. Every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
 QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
     drive_fault_t found;
-    if (drive_outputs(d) == (uint16_t)OUTPUTS_OFF) {
+    if (drive_outputs(d) == (uint16_t)OUTPUTS_OFF && now_q15 < PROTECTION_BUS_END_Q15) {
         return;
     }
     if (now_q15 > p->bus_over_q15) {

@@ -48,8 +48,8 @@ QM_INLINE void speed_go_on(drive_t *d)
     drive_enter(d, DRIVE_CLOSED);
 }
 
-/** Whether the run goes on or slows down: a target in the other direction slows it down until the ramp takes the rotor through zero; a new wish
- *  to run goes on from the present speed. Every eighth period in closed loop. */
+/** Whether the run goes on or slows down: a target in the other direction slows it down; a new wish to run goes on from the present speed.
+ *  Every eighth period in closed loop. */
 NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
@@ -58,16 +58,28 @@ NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
         if (other) {
             drive_enter(d, DRIVE_STOPPING);
         }
-    } else if (d->command.run && !other) {
-        speed_go_on(d);
-    } else if (!speed_has_stopped(d, p)) {
-        /* on its way */
     } else if (d->command.run) {
-        drive_turns(d, (int16_t)-d->direction);
-        startup_ramp_from_here(d, p);
-    } else {
+        if (!other) {
+            speed_go_on(d);
+        }
+    } else if (speed_has_stopped(d, p)) {
         drive_enter(d, DRIVE_STOPPED);
+    } else {
+        /* on its way */
     }
+}
+
+/** 1 when the rotor has slowed down for a target in the other direction. */
+QM_INLINE uint16_t speed_turns_round(const drive_t *d, const drive_params_t *p)
+{
+    return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p));
+}
+
+/** The ramp takes the rotor through zero. */
+QM_INLINE void speed_turn_round(drive_t *d, const drive_params_t *p)
+{
+    drive_turns(d, (int16_t)-d->direction);
+    startup_ramp_from_here(d, p);
 }
 
 /** One step of the controller, every eighth period in closed loop. */

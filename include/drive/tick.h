@@ -82,6 +82,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
             handover_step(d, p);
         } else if (d->state == (uint16_t)DRIVE_CATCH) {
             catch_step(d, p);
+        } else if (speed_turns_round(d, p)) {
+            speed_turn_round(d, p);
         } else {
             model_update(d, p);
         }
@@ -90,6 +92,9 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 2:
         bus_step(d, p, v_bus_raw);
         protection_check_model(d, p);
+        if (drive_is_closed(d)) {
+            speed_choose_state(d, p);
+        }
         done = 2;
         break;
     case 3:
@@ -97,7 +102,6 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         protection_probe_step(d, p);
         if (drive_is_closed(d)) {
             limits_burn(run, p);
-            speed_choose_state(d, p);
         }
         done = 3;
         break;

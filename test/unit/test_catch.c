@@ -227,12 +227,12 @@ void test_a_stop_goes_on_from_the_present_speed_and_a_target_the_other_way_slows
         speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         drive.command.run = 1;
-        rig_next_slot(3);
+        rig_next_slot(2);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
         TEST_ASSERT_INT16_WITHIN(20, (int16_t)(direction * 10000), drive.run.control.reference_erpm);
         drive.command.target_erpm = (int16_t)(direction * -10000);
-        rig_next_slot(3);
+        rig_next_slot(2);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
@@ -257,6 +257,37 @@ void test_a_stop_that_goes_on_forgets_a_load_that_drives_and_keeps_one_that_brak
     }
 }
 
+/** A block of the slow work alone. */
+static void slow_block(uint16_t block)
+{
+    drive.ticks = block;
+    drive_slow(&drive, &params, samples.v_bus);
+}
+
+void test_a_stop_turns_round_only_at_its_end_for_a_target_the_other_way_while_the_run_is_wished(void)
+{
+    static const struct {
+        int16_t speed, reference, target, run;
+        drive_state_t after;
+    } cases[] = {
+        { 4000, 2400, -6000, 1, DRIVE_STOPPING }, { 2400, 2600, -6000, 1, DRIVE_STOPPING },
+        { 2400, 2400, -6000, 0, DRIVE_STOPPED }, { 2400, 2400, 6000, 1, DRIVE_CLOSED }
+    };
+    EACH(n, cases) {
+        EACH_DIRECTION(direction) {
+            rig_closed(direction, (int16_t)(direction * cases[n].speed));
+            drive.run.control.reference_erpm = (int16_t)(direction * cases[n].reference);
+            drive.state = (uint16_t)DRIVE_STOPPING;
+            drive.command.target_erpm = (int16_t)(direction * cases[n].target);
+            drive.command.run = cases[n].run;
+            slow_block(1);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(DRIVE_STOPPING, drive.state, golden_row(n));
+            slow_block(2);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].after, drive.state, golden_row(n));
+        }
+    }
+}
+
 void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(void)
 {
     EACH_DIRECTION(direction) {
@@ -265,7 +296,9 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         drive.command.target_erpm = (int16_t)(direction * -6000);
         drive.run.handover.agreed_steps = 99; /* of the start long ago */
         drive.run.estimator.rho_q32 = 0x12340000ul;
-        speed_choose_state(&drive, &params);
+        slow_block(2);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state); /* a block with more time turns it round */
+        slow_block(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
         TEST_ASSERT_EQUAL_INT16(-direction, drive.direction);
         TEST_ASSERT_INT32_WITHIN(100, -2400L * 3579 / 64, drive.forced.speed_q10);

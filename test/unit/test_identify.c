@@ -522,20 +522,22 @@ static void begin_mechanics(int16_t v_d)
     TEST_ASSERT_EQUAL_INT16(id->push_q13, control->ref_q13.q);
 }
 
-void test_the_frame_follows_with_controllers_twice_as_fast_and_no_less_integral_than_damps(void)
+void test_the_frame_follows_a_quick_rotor_with_controllers_twice_as_fast_and_no_less_integral_than_damps(void)
 {
+    enum { LOOP = 671088 }; /* 200 Hz, as the current controllers: 0.01 turns a period */
     static const struct {
+        uint32_t speed;
         int16_t kp, ki, follow_kp, ki_d, ki_q;
     } cases[] = {
-        { 1600, 110, 3200, 400, 440 }, { 800, 4, 1600, 200, 200 }, { 800, 300, 1600, 300, 1200 }, { 20000, 20000, 32767, 20000, 32767 }
+        { LOOP - 10, 1600, 110, 1600, 110, 440 }, { LOOP - 10, 800, 4, 800, 50, 50 }, { LOOP + 10, 1600, 110, 3200, 400, 440 },
+        { LOOP + 10, 800, 300, 1600, 300, 1200 }, { LOOP + 10, 20000, 20000, 32767, 20000, 32767 }
     };
     EACH(n, cases) {
-        begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
         id->kp_d = cases[n].kp;
         id->kp_q = cases[n].kp;
         id->ki_d = cases[n].ki;
         id->ki_q = cases[n].ki;
-        stretches(256, 0, 5148, 0, 0);
+        follow_gains(id, cases[n].speed);
         TEST_ASSERT_EQUAL_INT16(cases[n].follow_kp, id->kp_d);
         TEST_ASSERT_EQUAL_INT16(cases[n].follow_kp, id->kp_q);
         TEST_ASSERT_EQUAL_INT16(cases[n].ki_d, id->ki_d);

@@ -27,7 +27,7 @@ void test_measures_motors_of_every_kind(void)
         identify_result_t result;
     } cases[] = {
         { 2.67F, 1.92F, 1.92F, 7.24F, IDENTIFY_RESULT_DONE },       /* AN1292's */
-        { 0.3F, 0.1F, 0.1F, 2.0F, IDENTIFY_RESULT_DONE },           /* hardly more back-EMF than dead time takes */
+        { 0.3F, 0.1F, 0.1F, 2.0F, IDENTIFY_RESULT_NOT_ACCELERATING }, /* less back-EMF than dead time takes */
         { 4.0F, 5.0F, 5.0F, 6.0F, IDENTIFY_RESULT_DONE },
         { 0.1F, 1.0F, 1.0F, 5.0F, IDENTIFY_RESULT_DONE },           /* rings for long */
         { 1.0F, 0.8F, 1.6F, 6.0F, IDENTIFY_RESULT_DONE },           /* salient */

@@ -95,6 +95,12 @@ void test_overvoltage_trips_on_one_sample_in_every_state_that_has_something_on(v
     samples.v_bus = raw_bus_q15(21102);
     rig_tick(800);
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "at rest there is nothing to switch off");
+    samples.v_bus = raw_bus_q15(32639);
+    rig_tick(800);
+    EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "nor below the end of what can be measured");
+    samples.v_bus = raw_bus_q15(32640);
+    rig_tick(8);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERVOLTAGE, "at its end");
     bus_in_state(DRIVE_ALIGN, 21101, 800);
     EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "at the level");
 }

@@ -100,7 +100,10 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
     library = pil.PilLibrary(job.library)
     with simulate.using(pil.PilBoard(library, image), job) as board:
         core = _Core(board)
-        run = simulate.simulate_on(job, library, board, progress)
+        session = simulate.Session(job, library, board, progress)
+        session.run_to_end()
+        counts = core.counts() # of what the trace shows, and no more
+        run = session.run()
         trace = run.trace
         isr, state = trace.column("cpu.isr_cycles"), trace.column("fw.state").astype(int)
         known = isr > 0
@@ -109,7 +112,7 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
         worst = int(np.argmax(isr))
         where = (int(isr[worst]), float(trace.time_s[worst]), run.states.get(int(state[worst]), "?"))
         latency = trace.column("cpu.latency_cycles")
-        return Found(spreads, Spread.of(latency[latency > 0]), core.counts(), int(board.get("cpu.stack_bytes")),
+        return Found(spreads, Spread.of(latency[latency > 0]), counts, int(board.get("cpu.stack_bytes")),
                      int(board.get("pil.differences")),
                      int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, board.peek(P1SECMP) & 0x7FFF,
                      run.motor_s, run.cpu_s, board.get("cpu.instructions"))

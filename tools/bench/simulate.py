@@ -117,7 +117,7 @@ def using(board: Any, job: Job) -> Iterator[Any]:
 def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float], None]) -> Run:
     """Run a job on a board that the caller has made and closes."""
     session = Session(job, library, board, report)
-    session.run_to(max([job.scenario.duration_s, *(action.at_s for action in job.actions)]))
+    session.run_to_end()
     return session.run()
 
 
@@ -155,6 +155,10 @@ class Session:
         self.wall_s += time.perf_counter() - started
         self.cpu_s += time.process_time() - cpu_started
 
+    def run_to_end(self) -> None:
+        """To the end of the scenario, or its last action."""
+        self.run_to(max([self.job.scenario.duration_s, *(action.at_s for action in self.job.actions)]))
+
     def _act_until(self, at_s: float) -> None:
         while self.pending and self.pending[0].at_s <= at_s:
             _act(self.board, self.pending.pop(0), self.done)
@@ -164,7 +168,7 @@ class Session:
         self.pending = sorted(self.pending + actions, key=lambda action: action.at_s)
 
     def run(self) -> Run:
-        """What has happened so far."""
+        """What has happened so far. After a fault the board runs on, without a trace, until the fault recorder's lines are out."""
         job, library = self.job, self.library
         variables = {name: self.board.variable(name, count) for name, count in job.variables.items()}
         motor_s, trace, warnings = self.board.get("time_s"), self.recorder.trace(), self.board.warnings()

@@ -10,7 +10,8 @@
 #define SLOW_LOOP_RAD_S 25.0F              /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
 #define LEAST_CURRENT_Q13 64               /* of the division by a current: above the factor 25 rad/s LOOPTIME 2^14, which is below 58 */
 #define SLOW_SHIFT 14u
-#define LOOP_RAD_S (2.0F * PARAM_PI * 200.0F) /* current loops while turning */
+#define LOOP_RAD_S (2.0F * PARAM_PI * 200.0F)                                                       /* current loops while turning */
+#define LOOP_Q10 ((uint32_t)(LOOP_RAD_S / (2.0F * PARAM_PI) * PARAM_F(LOOPTIME_SEC) * 67108864.0F)) /* as speed, 1/1024 angle counts a period */
 #define LOOP_SHIFT 10u
 #define MEAN_LOG2 12 /* periods of a mean at standstill */
 #define TRY_HALVES 64u
@@ -426,18 +427,22 @@ static int16_t twice(int16_t gain)
     return (int16_t)((gain > 16383) ? 32767 : 2 * gain);
 }
 
-/** Twice as fast on both axes, for the frame follows the rotor by these controllers' voltage, and what damps with 0.5 where R is small. The
- *  back-EMF falls fast while the rotor coasts: four times what cancels R/L. */
-static void follow_gains(identify_t *id)
+/** What damps with 0.5 where R is small. A rotor that turns as fast as the controllers are needs them twice as fast, for the frame follows it by
+ *  their voltage. The back-EMF falls fast while the rotor coasts: four times what cancels R/L. */
+static void follow_gains(identify_t *id, uint32_t speed_q10)
 {
-    id->kp_d = twice(id->kp_d);
-    id->kp_q = twice(id->kp_q);
-    id->ki_q = twice(twice(id->ki_q));
-    if (id->ki_q < (id->kp_q >> 3)) {
-        id->ki_q = (int16_t)(id->kp_q >> 3);
+    uint16_t damps = 4;
+    if (speed_q10 > LOOP_Q10) {
+        id->kp_d = twice(id->kp_d);
+        id->kp_q = twice(id->kp_q);
+        damps = 3;
     }
-    if (id->ki_d < (id->kp_d >> 3)) {
-        id->ki_d = (int16_t)(id->kp_d >> 3);
+    id->ki_q = twice(twice(id->ki_q));
+    if (id->ki_q < (id->kp_q >> damps)) {
+        id->ki_q = (int16_t)(id->kp_q >> damps);
+    }
+    if (id->ki_d < (id->kp_d >> damps)) {
+        id->ki_d = (int16_t)(id->kp_d >> damps);
     }
 }
 
@@ -463,7 +468,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     }
     lag_q12 = qm_clamp((int16_t)share_of(id->emf_d_sum >> BLOCKS_LOG2, 4096, (int32_t)emf_q14), 0, 3840);
     id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
-    follow_gains(id);
+    follow_gains(id, speed);
     forget_parts(id);
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
