@@ -41,7 +41,7 @@ QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, 
     uint16_t step = (uint16_t)qm_mulhi(speed, p->estimator.deltat_q32), pause = CATCH_PAUSE_MOST;
 
     if (step != 0u) {
-        pause = (uint16_t)(CATCH_PAUSE_TURN / step);
+        pause = qm_divud(CATCH_PAUSE_TURN, step);
     }
     if (pause > CATCH_PAUSE_MOST) {
         return CATCH_PAUSE_MOST;

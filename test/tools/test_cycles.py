@@ -91,6 +91,11 @@ def test_a_profile_that_misses_cycles_is_an_error():
     item = found("demo", [400], [400])
     item.counts.cycles[0x200] = 700
     assert "the profile has 700 cycles, the interrupts took 800" in report(item, None).broken[0]
+    long = found("demo", [400000], [400000])
+    long.counts.cycles[0x200] += 75 # one interrupt is still under way at the end
+    assert report(long, None).broken == []
+    long.counts.cycles[0x200] += 25 # what the background executes is none of the interrupt's
+    assert "the profile has 800100 cycles, the interrupts took 800000" in report(long, None).broken[0]
 
 
 def test_budget_file_has_the_limits():

@@ -189,7 +189,7 @@ DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some
     ("spoil(board_drive.ticks);", RECURSIVE, "stack: recursion: spoil -> spoil"),
     ("spoil_pointer();", "extern void (*volatile spoil_pointer)(void);\nvoid (*volatile spoil_pointer)(void) = pwm_outputs_off;",
      "stack: firmware_background: call through a pointer"),
-    ("spoil();", DEEP, "stack: up to [0-9]+ bytes of 480")])
+    ("spoil();", DEEP, "stack: up to [0-9]+ bytes of 448")])
 def test_code_that_fails_the_build_is_told_with_its_place(tree, body, before, told):
     assert re.search(told, " ".join(tree.spoil("firmware/board/firmware.c", HEAD, f"{before}\n{HEAD}    {body}\n").splitlines()))
 
