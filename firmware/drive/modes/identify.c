@@ -422,9 +422,9 @@ static void forget_parts(identify_t *id)
     id->cycles = 0;
 }
 
-static int16_t twice(int16_t gain)
+static int16_t twice(int16_t x)
 {
-    return (int16_t)((gain > 16383) ? 32767 : 2 * gain);
+    return (int16_t)((x > 16383) ? 32767 : 2 * x);
 }
 
 /** What damps with 0.5 where R is small. A rotor that turns as fast as the controllers are needs them twice as fast, for the frame follows it by
