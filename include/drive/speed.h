@@ -69,17 +69,16 @@ NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** 1 when the rotor has slowed down for a target in the other direction. */
-QM_INLINE uint16_t speed_turns_round(const drive_t *d, const drive_params_t *p)
+/** In STOPPING, every eighth period: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
+ *  @return 1 then */
+NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
 {
-    return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p));
-}
-
-/** The ramp takes the rotor through zero. */
-QM_INLINE void speed_turn_round(drive_t *d, const drive_params_t *p)
-{
-    drive_turns(d, (int16_t)-d->direction);
-    startup_ramp_from_here(d, p);
+    uint16_t turns = (uint16_t)(d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p));
+    if (turns) {
+        drive_turns(d, (int16_t)-d->direction);
+        startup_ramp_from_here(d, p);
+    }
+    return turns;
 }
 
 /** One step of the controller, every eighth period in closed loop. */

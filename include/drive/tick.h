@@ -82,10 +82,10 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
             handover_step(d, p);
         } else if (d->state == (uint16_t)DRIVE_CATCH) {
             catch_step(d, p);
-        } else if (speed_turns_round(d, p)) {
-            speed_turn_round(d, p);
-        } else {
+        } else if (d->state != (uint16_t)DRIVE_STOPPING || !speed_turn_round(d, p)) {
             model_update(d, p);
+        } else {
+            /* what the ramp needs of the model comes in block 5 */
         }
         done = 1;
         break;
