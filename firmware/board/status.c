@@ -46,15 +46,9 @@ static char *put_retry(char *at)
 /** Mechanical rpm; what a lost estimator sees may be more than a word holds. */
 static int16_t speed_rpm(speed_erpm_t speed)
 {
-    int32_t rpm;
-    if (SPEED_UNIT == 1) {
-        return (int16_t)(speed / NOPOLESPAIRS);
-    }
-    rpm = (int32_t)speed * SPEED_UNIT / NOPOLESPAIRS;
-    if (rpm > INT16_MAX) {
-        return INT16_MAX;
-    }
-    return (int16_t)((rpm < -INT16_MAX) ? -INT16_MAX : rpm);
+    uint32_t erpm = qm_muluu((uint16_t)qm_abs(speed), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
+    int16_t rpm = (int16_t)qm_divud((erpm < most) ? erpm : most, NOPOLESPAIRS);
+    return (int16_t)((speed < 0) ? -rpm : rpm);
 }
 
 /** The line's text. @return its end */

@@ -16,6 +16,7 @@ static int16_t emf_dq_max;  /**< d or q back-EMF, Q12 */
 static int16_t erpm_max;    /**< speed command */
 static int16_t current_max; /**< d and q reference, Q13 */
 static int16_t sample_shift_max; /**< q current that a sample misses, Q13 */
+static int32_t forced_max;  /**< speed of the forced angle: the ramp's end, or a rotor's that the ramp takes over, 1/1024 angle counts a period */
 static uint16_t rs_max;     /**< R with the adaptation's largest change */
 
 /** Largest integrator of the current controllers. */
@@ -74,6 +75,8 @@ static void set_bounds(void)
     erpm_max = params.maximum_erpm;
     current_max = params.current_max_q13;
     sample_shift_max = (int16_t)(qm_mulhi(32767, params.sample_shift_q16) + 1);
+    forced_max = (qm_mulss(32767, params.estimator.deltat_q32) >> 6) + 1;
+    forced_max = (params.forced.end_speed_q10 > forced_max) ? params.forced.end_speed_q10 : forced_max;
 }
 
 #endif

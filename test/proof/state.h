@@ -29,7 +29,7 @@ static void any_drive(uint16_t state, uint16_t slot)
     drive.angle = ANYU16();
     drive.frame.sin = any(-32767, 32767);
     drive.frame.cos = any(-32767, 32767);
-    drive.forced.speed_q10 = any_l(0, params.forced.end_speed_q10);
+    drive.forced.speed_q10 = any_l(-forced_max, forced_max);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
     drive.run.handover.waited_steps = ANYU16();
     drive.run.handover.agreed_steps = ANYU16();
@@ -107,14 +107,14 @@ static void bounds_hold_again(void)
     const drive_control_t *c = &drive.run.control;
     const observer_t *o = &drive.run.observer;
     const adaptation_t *a = &drive.run.adaptation;
-    //@ check state: drive.state <= DRIVE_FAULT && drive.fault < FAULT_COUNT;
+    //@ check state: drive.state < DRIVE_STATE_COUNT && drive.fault < FAULT_COUNT;
     //@ check direction: drive.direction == 1 || drive.direction == -1;
     //@ check command: 0 <= drive.command.run <= 1 && -erpm_max <= drive.command.target_erpm <= erpm_max;
     //@ check offset_a: -params.offset_max_q13 <= drive.calibration.offset_a_q13 <= params.offset_max_q13;
     //@ check offset_b: -params.offset_max_q13 <= drive.calibration.offset_b_q13 <= params.offset_max_q13;
     //@ check bus: 0 <= drive.bus_q31;
     //@ check circle: 0 <= drive.circle.limit_q14 <= radius_max;
-    //@ check forced: 0 <= drive.forced.speed_q10 <= params.forced.end_speed_q10;
+    //@ check forced: -forced_max <= drive.forced.speed_q10 <= forced_max;
     //@ check newest: e->newest < ESTIMATOR_HISTORY;
     //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
     //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
