@@ -59,6 +59,8 @@ typedef struct {
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
     uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
+    int32_t i2t_most_q25;               /**< square of I2T_CURRENT_A; 0: no I2t */
+    uint16_t i2t_rate_q16;              /**< OVERLOAD_STEP_MS / I2T_TIME_SEC */
     uint16_t bus_shift;                 /**< 1..3: bus_q15 shifted by it fills a word */
     uint16_t voltage_limit_per_bus_q16; /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
