@@ -21,12 +21,13 @@ static int32_t part_of(int32_t a, uint16_t rate_q16)
 uint16_t overload_tick(overload_t *o, const drive_t *d, const drive_params_t *p, uint16_t ms)
 {
     const uint32_t square = square_of_current(d) >> SUM_SHIFT;
+    uint16_t rest = ms;
     if (p->i2t_most_q25 == 0) {
         return 0;
     }
-    while (ms != 0u) {
-        uint16_t left = (uint16_t)(OVERLOAD_STEP_MS - o->ms), part = (ms < left) ? ms : left;
-        ms = (uint16_t)(ms - part);
+    while (rest != 0u) {
+        uint16_t left = (uint16_t)(OVERLOAD_STEP_MS - o->ms), part = (rest < left) ? rest : left;
+        rest = (uint16_t)(rest - part);
         o->ms = (uint16_t)(o->ms + part);
         o->sum += square * part;
         if (o->ms == OVERLOAD_STEP_MS) {

@@ -153,24 +153,10 @@ QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovat
     return qm_shift(qm_mulss(innovation, qm_hi(square_q32)), p->shift) + (qm_mulsu(innovation, (uint16_t)square_q32) >> (16u - p->shift));
 }
 
-/** One step. @param rho_q32 the estimator's angle @param iq_q13 measured q current */
-QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
+/** What a step's innovation calls for: in full from one and a half of what is large; none while it is the loop's own swing. */
+QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
 {
-    int16_t innovation;
     q15_t level = 0;
-    int32_t before_q16 = o->omega_q16;
-
-    o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
-    innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
-    o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
-    o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
-    if (qm_abs(innovation) > o->wrong_erpm) {
-        o->wrong_steps++;
-    } else if (o->wrong_steps != 0u) {
-        o->wrong_steps--;
-    } else {
-        /* right for long */
-    }
     if (!observer_is_calm(o)) {
         o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
     } else if (o->unrest_steps != 0u) {
@@ -189,6 +175,26 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
     if (o->quick_q15 < level) {
         o->quick_q15 = level;
     }
+}
+
+/** One step. @param rho_q32 the estimator's angle @param iq_q13 measured q current */
+QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
+{
+    int16_t innovation;
+    int32_t before_q16 = o->omega_q16;
+
+    o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
+    innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
+    o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
+    o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
+    if (qm_abs(innovation) > o->wrong_erpm) {
+        o->wrong_steps++;
+    } else if (o->wrong_steps != 0u) {
+        o->wrong_steps--;
+    } else {
+        /* right for long */
+    }
+    observer_answer(o, innovation);
 }
 
 #endif
