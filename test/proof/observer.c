@@ -1,7 +1,7 @@
 /* The load observer and the adaptation, each with all inputs and all parameters that the build accepts.
  *
  * sources: firmware/control/trig.c
- * options: -eva-slevel-function qm_abs:5,qm_clamp:5,observer_step:200,observer_sum:10,adaptation_learn:100
+ * options: -eva-slevel-function qm_abs:5,qm_clamp:5,observer_step:200,observer_answer:200,observer_sum:10,adaptation_learn:100
  *     -eva-domains octagon,equality,symbolic-locations -eva-octagon-through-calls -inline-calls qm_hi,qm_abs,shift_in_pieces */
 #include "any.h"
 
