@@ -41,7 +41,7 @@ def test_the_segments_have_all_that_may_happen_and_stay_within_the_rating(benche
 def test_loads_at_low_speed_leave_an_estimator_something_to_see(benches):
     """Half of E = P w psi for what R may be off, and half of w for what a load takes in an electrical period; of the Hurst, by hand."""
     seen = 0
-    for number in range(1, 201):
+    for number in range(1, 401):
         rpm, load_nm = 0.0, 0.0
         for event in soak.draw(1, number, benches).scenario.events:
             rpm = abs(event.value) if event.kind == "speed_rpm" else rpm
