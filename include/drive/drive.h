@@ -70,18 +70,21 @@ typedef struct {
     int16_t bus_nominal_q15;             /**< start value of the bus filter */
 
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
-    uint16_t pot_zero_q16;   /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
-    uint16_t pot_scale_q15;  /**< 1 / (1 - 2 POT_LIVE_ZERO) */
-    int32_t speed_ramp_q16;  /**< reference step per slow step, electrical rpm with 16 fraction bits */
-    int32_t tuning_step_q16; /**< the same in TUNING */
-    int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
-    uint16_t stall_steps, lost_lock_steps;
-    uint16_t wrong_steps;                    /**< voltages and currents do not fit the motor */
-    uint16_t impossible_steps;               /**< flux or resistance beyond what a motor can have */
-    q15_t kfi_impossible;                    /**< change of 1/Kphi that asks for more flux than the header's may be off */
-    current_q13_t id_off_q13;                /**< d current's mean deviation that noise and dead time make at most */
-    q15_t rs_off_least, rs_off_most, ls_off; /**< and how far its R and L may be */
-    int16_t dead_emf_q12;                    /**< and what dead time may put into the back-EMF */
+    uint16_t pot_zero_q16;     /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
+    uint16_t pot_scale_q15;    /**< 1 / (1 - 2 POT_LIVE_ZERO) */
+    int32_t speed_ramp_q16;    /**< reference step per slow step, electrical rpm with 16 fraction bits */
+    int32_t tuning_step_q16;   /**< the same in TUNING */
+    int16_t ramp_hold_erpm;    /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
+    uint16_t stall_steps;      /**< slow steps below half the reference that are a stall */
+    uint16_t lost_lock_steps;  /**< and out of lock that are a lost one */
+    uint16_t wrong_steps;      /**< voltages and currents do not fit the motor */
+    uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
+    q15_t kfi_impossible;      /**< change of 1/Kphi that asks for more flux than the header's may be off */
+    current_q13_t id_off_q13;  /**< d current's mean deviation that noise and dead time make at most */
+    q15_t rs_off_least;        /**< how far R may be below the header's, as a share of it: negative */
+    q15_t rs_off_most;         /**< and above */
+    q15_t ls_off;              /**< how far L may be off, to either side */
+    int16_t dead_emf_q12;      /**< what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
 
@@ -140,13 +143,14 @@ typedef struct {
     observer_t observer;
     handover_t handover;
     drive_control_t control;
-    uint16_t stall_steps;                       /**< slow steps below half the reference, less four for each above */
-    uint16_t probe_steps;                       /**< of the probe whether the rotor turns, and of the pause after it */
-    uint16_t dip_steps;                         /**< how long the speed has been a quarter below the reference */
-    current_q13_t probe_id_q13, probe_most_q13; /**< its d current, and the most of it */
-    uint16_t phase_sums[3];                     /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
-    uint16_t impossible_steps;                  /**< how long flux or resistance has been impossible */
-    uint16_t lost_lock_steps;                   /**< two for each slow step out of lock, less one for each in lock */
+    uint16_t stall_steps;         /**< slow steps below half the reference, less four for each above */
+    uint16_t probe_steps;         /**< of the probe whether the rotor turns, and of the pause after it */
+    uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference */
+    current_q13_t probe_id_q13;   /**< its d current */
+    current_q13_t probe_most_q13; /**< and the most of it */
+    uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
+    uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
+    uint16_t lost_lock_steps;     /**< two for each slow step out of lock, less one for each in lock */
     MODE_STATE
 } drive_run_t;
 
