@@ -522,7 +522,9 @@ void test_what_L_may_explain_ends_at_its_format(void)
     drive.run.control.i_q13.d = -16000;
     drive.run.estimator.half_step_q16_rad = 8000;
     drive.run.model.ls_q16 = 65535;
+    exact.estimator.ls_exp = 3;
     TEST_ASSERT_EQUAL_UINT16(0, protection_flux_is_impossible(&drive.run, &exact));
+    exact.estimator.ls_exp = params.estimator.ls_exp;
 }
 
 void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
