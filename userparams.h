@@ -84,14 +84,14 @@
 #define IDREF_SPEED5  -1.28
 #define IDREF_SPEED6  -1.51
 #define IDREF_SPEED7  -1.53
-#define IDREF_SPEED8  -1.62
-#define IDREF_SPEED9  -1.78
+#define IDREF_SPEED8  -1.61
+#define IDREF_SPEED9  -1.79
 #define IDREF_SPEED10 -1.95
 #define IDREF_SPEED11 -2.10
 #define IDREF_SPEED12 -2.25
 #define IDREF_SPEED13 -2.39
 #define IDREF_SPEED14 -2.52
-#define IDREF_SPEED15 -2.63
+#define IDREF_SPEED15 -2.64
 #define IDREF_SPEED16 -2.66
 #define IDREF_SPEED17 -2.66
 
@@ -249,7 +249,7 @@
  *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
  *   impossible_steps                     0.25 s                 625  8 periods                      exact  flux or resistance impossible
  *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
- *   id_off_q13                       0.058884 A                 110  Q13 A                       +0.336 %  d current's mean deviation
+ *   id_off_q13                        0.10185 A                 190  Q13 A                       +0.194 %  d current's mean deviation
  *   rs_off_least                         -0.3 1               -9830  Q15                         -0.004 %  so far may R be off
  *   rs_off_most                           0.5 1               16384  Q15                            exact  upwards
  *   ls_off                                0.3 1                9830  Q15                         -0.004 %  and L

@@ -169,7 +169,7 @@ static void limits(void)
     FIELD(wrong_steps, 0.1, "s", slots, "8 periods", "voltages and currents do not fit the motor");
     FIELD(impossible_steps, 0.25, "s", slots, "8 periods", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
-    FIELD(id_off_q13, most / 64.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
+    FIELD(id_off_q13, most / 32.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
     FIELD(rs_off_least, PARAM_R_LEAST - 1.0, "1", 1.0 / 32768.0, "Q15", "so far may R be off");
     FIELD(rs_off_most, PARAM_R_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "upwards");
     FIELD(ls_off, PARAM_L_OFF, "1", 1.0 / 32768.0, "Q15", "and L");

@@ -195,8 +195,8 @@
 #define PARAM_L_OFF 0.3      /* of the header's, to either side */
 #define PARAM_FLUX_MOST 1.25 /* 1.2, and what dead time leaves */
 
-/** The d current's mean deviation: a 64th of the largest current for noise, and what a fifth of dead time's voltage drives against the controller. */
-#define PARAM_ID_OFF (PARAM_F(MAXIMUM_CURRENT_A) / 64.0F + 0.2F * PARAM_DEAD_TIME_V * PARAM_IU / (16.0F * PARAM_F(D_CURRCNTR_PTERM)))
+/** The d current's mean deviation: a 32nd of the largest current for noise, and what a fifth of dead time's voltage drives against the controller. */
+#define PARAM_ID_OFF (PARAM_F(MAXIMUM_CURRENT_A) / 32.0F + 0.2F * PARAM_DEAD_TIME_V * PARAM_IU / (16.0F * PARAM_F(D_CURRCNTR_PTERM)))
 #define PARAM_STALL_SEC 0.23 /* below half the reference; until a standing rotor shows takes up to 0.08 s more */
 
 /** TUNING's ramp: Q16 electrical rpm per slow step. */

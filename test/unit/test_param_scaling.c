@@ -232,7 +232,7 @@ void test_speeds_and_times(void)
     EXACT((int32_t)p.align_sweep_q32, 0x40000000 / 2000); /* a quarter turn in half the time */
     EXACT(p.agree_steps, 50);                            /* 20 ms */
     EXACT(p.wait_steps, 500);                   /* 200 ms */
-    EXACT(p.id_off_q13, 117);                            /* 2.75 A / 64 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
+    EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
     EXACT(p.stall_steps, 575);                           /* 0.23 s */
     EXACT(p.lost_lock_steps, 125);                       /* 50 ms */
 }
