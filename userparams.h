@@ -84,14 +84,14 @@
 #define IDREF_SPEED5  -1.28
 #define IDREF_SPEED6  -1.51
 #define IDREF_SPEED7  -1.53
-#define IDREF_SPEED8  -1.61
-#define IDREF_SPEED9  -1.79
+#define IDREF_SPEED8  -1.62
+#define IDREF_SPEED9  -1.78
 #define IDREF_SPEED10 -1.95
 #define IDREF_SPEED11 -2.10
 #define IDREF_SPEED12 -2.25
 #define IDREF_SPEED13 -2.39
 #define IDREF_SPEED14 -2.52
-#define IDREF_SPEED15 -2.64
+#define IDREF_SPEED15 -2.63
 #define IDREF_SPEED16 -2.66
 #define IDREF_SPEED17 -2.66
 
