@@ -40,17 +40,17 @@ typedef struct {
 
 /** State. */
 typedef struct {
-    int32_t omega_q16;     /**< speed, erpm with 16 fraction bits */
-    int32_t load_q16;      /**< acceleration that the load takes, units with 16 fraction bits */
-    uint32_t rho_q32;      /**< the estimator's angle a step ago */
-    int16_t rate_q16;      /**< rate * step in use */
-    int16_t wrong_erpm;    /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
-    int16_t large_erpm;    /**< a large innovation begins here */
-    q15_t quick_q15;       /**< 1 = a large innovation was just seen */
-    uint16_t wrong_steps;  /**< steps with an innovation above wrong_erpm, less those without */
-    int16_t large_last;    /**< the last large innovation, erpm */
-    uint16_t unrest_steps; /**< four for each step that was not calm, less one for each that was */
-    q15_t share_q15;       /**< of the full rates, by the speed */
+    int32_t omega_q16;       /**< speed, erpm with 16 fraction bits */
+    int32_t load_q16;        /**< acceleration that the load takes, units with 16 fraction bits */
+    uint32_t rho_q32;        /**< the estimator's angle a step ago */
+    int16_t rate_q16;        /**< rate * step in use */
+    int16_t wrong_erpm;      /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
+    int16_t large_erpm;      /**< a large innovation begins here */
+    q15_t quick_q15;         /**< 1 = a large innovation was just seen */
+    uint16_t wrong_steps;    /**< steps with an innovation above wrong_erpm, less those without */
+    int16_t large_last_erpm; /**< the last large innovation */
+    uint16_t unrest_steps;   /**< four for each step that was not calm, less one for each that was */
+    q15_t share_q15;         /**< of the full rates, by the speed */
 } observer_t;
 
 /** Speed, electrical rpm. */
@@ -165,10 +165,10 @@ QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
         /* calm for long */
     }
     if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
-        if ((innovation ^ o->large_last) < 0 && !observer_is_calm(o)) {
+        if ((innovation ^ o->large_last_erpm) < 0 && !observer_is_calm(o)) {
             o->unrest_steps = OBSERVER_UNREST_STEPS;
         }
-        o->large_last = innovation;
+        o->large_last_erpm = innovation;
         level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
     }
     o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));

@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -168,6 +169,12 @@ def test_a_start_with_as_much_current_as_an_unknown_resistance_hides_cannot_be_k
     assert verdict(start, **much).outcome == judge.SILENT and verdict(start, fw__state=4.0, plant__i_q=after(0.6, 7.0, 1.0)).outcome == judge.SILENT
 
 
+@pytest.mark.parametrize("clock, way_end_s, at_s", [(1.0, 3.0, 3.0), (0.75, 3.0, 3.667), (1.25, 3.0, 3.0), (0.75, 0.5, 2.6)])
+def test_a_slow_clock_is_judged_when_its_longer_way_is_over(clock, way_end_s, at_s):
+    case = SimpleNamespace(over_s=0.2, lasts_s=0.4)
+    assert judge.SETTLE_S == 1.0 and trial.settled(case, way_end_s, 1.0, clock) == pytest.approx(at_s, abs=1e-3)
+
+
 def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_it(bench):
     rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6, dead_rpm=trial.dead_rpm(bench.library.params))
     assert rating.dead_rpm == pytest.approx(0.13 * 24.0 * 2.0 / 50.0 * 3.0 ** 0.5 * 1000.0 / 7.24, rel=1e-3)
@@ -175,6 +182,8 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
     kinds = ("sensors: current reads zero", "sensors: current offset", "sensors: current offset drifts", "sensors: current gain", "sensors: current noise",
              "power stage: transistor never turns on")
     assert unseen == dict.fromkeys(kinds, judge.Unseen(more_rpm=0.5 * np.pi * rating.dead_rpm)) | {"clock: crystal off frequency": judge.Unseen(clock=1.2)}
+    init = (paths.ROOT / "include" / "drive" / "param_init.h").read_text(encoding="utf-8")
+    assert f".rs_most = Q15({injection.MOST_RESISTANCE - 1.0:.1f})" in init
     gain = injection.BY_NAME["sensors: current gain"]
     assert [gain.unseen(size, rating).start_current for size in (1.5, 0.8, 0.625, 0.3)] == pytest.approx([1.0, 1.25, 1.6, 1.6])
     text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")

@@ -94,7 +94,7 @@ def _as_dead_time(size: float, rating: Rating) -> Unseen:
 
 
 def _as_warm_winding(size: float, rating: Rating) -> Unseen:
-    """The same; and as long as the rotor gives no back-EMF, a signal that is too small looks like a resistance that is larger than the header's."""
+    """The same; and without a back-EMF, a signal that is too small looks like a resistance that is larger than the header's."""
     return replace(_as_dead_time(size, rating), start_current=1.0 / min(max(size, 1.0 / MOST_RESISTANCE), 1.0))
 
 
@@ -143,7 +143,8 @@ KINDS = (
          _sets("fault.vbus_error_v", "bus_v")),
     Kind("sensors", "potentiometer wire", ("POTENTIOMETER",), _one_of(2.0, 3.0), _sets("fault.pot_stuck"), passes=0.2),
     Kind("power stage", "phase wire open", ("OPEN_PHASE",), _one_of(1.0, 2.0, 3.0), _sets("fault.open_phase"), weight=2.0),
-    Kind("power stage", "transistor never turns on", ("OPEN_PHASE",), _transistor, _sets("fault.never_on"), weight=2.0, unseen=_as_dead_time),
+    Kind("power stage", "transistor never turns on", ("OPEN_PHASE",), _transistor, _sets("fault.never_on"), weight=2.0,
+         unseen=_as_dead_time),
     Kind("power stage", "transistor never turns off", BRIDGE, _transistor, _sets("fault.never_off")),
     Kind("supply", "sag", ("UNDERVOLTAGE",), _size(0.3, 0.9), _sets("supply.voltage_v", "bus_v"), passes=0.5, limits=True),
     Kind("supply", "lost", ("UNDERVOLTAGE",), _one_of(1000.0), _sets("supply.resistance_ohm"), passes=0.5, limits=True),

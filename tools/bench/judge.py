@@ -156,7 +156,8 @@ def _backwards(after: Trace, reference: Trace, limits: Limits) -> bool:
 
 def _too_much_current(after: Trace, reference: Trace, limits: Limits, start_current: float) -> bool:
     in_loop = np.isin(after.column("fw.state"), limits.closed)
-    allowed_a = CURRENT_MARGIN * max(limits.most_current_a, float(np.max(_amplitude(reference), initial=0.0))) * np.where(in_loop, 1.0, start_current)
+    most_a = max(limits.most_current_a, float(np.max(_amplitude(reference), initial=0.0)))
+    allowed_a = CURRENT_MARGIN * most_a * np.where(in_loop, 1.0, start_current)
     over = _amplitude(after) > allowed_a
     rows = max(1, round(CURRENT_S / max(after.period_s, 1e-6)))
     return len(over) >= rows and bool(np.max(np.convolve(over, np.ones(rows), "valid")) >= rows)
