@@ -358,6 +358,9 @@ def _currents(d: Design, currents: limits.Currents) -> None:
     d.put("OVER_CURRENT_THRESHOLD_A", plain(currents.trip_a), f"{limits.TRIP_OVER_MAXIMUM:g} times the largest current, at most "
           f"{limits.TRIP_SHARE:.1%} of the converter's {d.board.current_full_scale_a:.3g} A" + (
           "; lowered until the back-EMF's number format holds voltage + R I + L dI/dt at the trip level" if lowered else ""))
+    told = m.thermal_time_s > 0.0
+    d.put("I2T_CURRENT_A", plain(min(m.rated_current_a, maximum)) if told else "0", "rated current" if told else "the motor file gives no thermal_time")
+    d.put("I2T_TIME_SEC", plain(m.thermal_time_s) if told else "60", "motor file's thermal_time" if told else "not used")
     full = d.envelope.id_for(TRIM_SPEED_SHARE * m.rated_speed_rpm, m.rated_torque_nm)
     strong = replace(d.envelope, motor=replace(m, psi_vs=TRIM_STRONG_FLUX * m.psi_vs))
     half = strong.id_for(m.rated_speed_rpm, 0.5 * m.rated_torque_nm)

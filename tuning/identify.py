@@ -64,6 +64,7 @@ def header(known: Known, board: BoardFile) -> str:
             "MAXIMUM_SPEED_RPM": max(120.0, top_rpm), "FW_START_SPEED_RPM": max(100.0, known.speed_rpm), "SPEEDREFRAMP_RPM_PER_S": 1000,
             "LOCK_TIME": 4000, "CURRENT_BANDWIDTH_HZ": 200, "SPEED_BANDWIDTH_HZ": 1, "LOAD_BANDWIDTH_HZ": 10,
             "SPEEDCNTR_PTERM": 0.1, "KFILTER_ESDQ": 1200, "KFILTER_ESDQ_FW": 1200, "KFILTER_VELESTIM": 748, "FW_TRIM_CURRENT_A": 0,
+            "I2T_CURRENT_A": 0, "I2T_TIME_SEC": 60,
             **{name: 0 if row.stem == "IDREF_SPEED" else row.default for name, row in parameters().items()
                if row.stem == "IDREF_SPEED" or row.default not in FOLLOWS}}}
     lines = ["/* Parameters for a motor of which nobody knows R, L and Kphi: build with IDENTIFY. */", "#ifndef USERPARAMS_H", "#define USERPARAMS_H"]

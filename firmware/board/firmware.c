@@ -9,6 +9,7 @@
 #include "board/status.h"
 #include "board/watch.h"
 #include "drive/deviation.h"
+#include "drive/overload.h"
 #include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
@@ -115,6 +116,7 @@ QM_INLINE void firmware_supervise(void)
 void firmware_background(void)
 {
     static deviation_t deviation;
+    static overload_t overload;
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
 
     firmware_supervise();
@@ -133,6 +135,9 @@ void firmware_background(void)
         watch_refresh();
         if (deviation_tick(&deviation, &board_drive, &board_params, LimitParm.now)) {
             firmware_trip(FAULT_CURRENT_SENSOR);
+        }
+        if (overload_tick(&overload, &board_drive, &board_params, elapsed_ms)) {
+            firmware_trip(FAULT_OVERTEMPERATURE);
         }
         selftest_part(SELFTEST_PART_WATCH);
         status_tick(elapsed_ms);

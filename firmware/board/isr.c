@@ -41,7 +41,6 @@ void BOARD_ISR _ADC1Interrupt(void)
     duties_t duty;
 
     IFS0bits.AD1IF = 0;
-    board_panel.pot_q15 = (int16_t)ADC1BUF0;
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
@@ -53,6 +52,7 @@ void BOARD_ISR _ADC1Interrupt(void)
     if ((P1TMR & 0x8000u) == 0u || IFS0bits.AD1IF) {
         drive_raise(&board_drive, FAULT_ISR_OVERRUN);
     }
+    board_panel.pot_q15 = (int16_t)ADC1BUF0;
     board_set_outputs(drive_outputs(&board_drive));
     drive_slow(&board_drive, &board_params, raw.v_bus);
     if (drive_settle(&board_drive)) {

@@ -26,6 +26,12 @@ static uint16_t recorder_is_valid(const recorder_t *r)
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
 {
     uint16_t first;
+    if (powered_up) { /* the test of the RAM reads it all */
+        uint16_t n;
+        for (n = 0; n < sizeof r->word / sizeof r->word[0]; n++) {
+            r->word[n] = 0;
+        }
+    }
     if (powered_up || !recorder_is_valid(r)) {
         recorder_begin(r);
         return;

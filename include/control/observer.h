@@ -40,17 +40,17 @@ typedef struct {
 
 /** State. */
 typedef struct {
-    int32_t omega_q16;     /**< speed, erpm with 16 fraction bits */
-    int32_t load_q16;      /**< acceleration that the load takes, units with 16 fraction bits */
-    uint32_t rho_q32;      /**< the estimator's angle a step ago */
-    int16_t rate_q16;      /**< rate * step in use */
-    int16_t wrong_erpm;    /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
-    int16_t large_erpm;    /**< a large innovation begins here */
-    q15_t quick_q15;       /**< 1 = a large innovation was just seen */
-    uint16_t wrong_steps;  /**< steps with an innovation above wrong_erpm, less those without */
-    int16_t large_last;    /**< the last large innovation, erpm */
-    uint16_t unrest_steps; /**< four for each step that was not calm, less one for each that was */
-    q15_t share_q15;       /**< of the full rates, by the speed */
+    int32_t omega_q16;       /**< speed, erpm with 16 fraction bits */
+    int32_t load_q16;        /**< acceleration that the load takes, units with 16 fraction bits */
+    uint32_t rho_q32;        /**< the estimator's angle a step ago */
+    int16_t rate_q16;        /**< rate * step in use */
+    int16_t wrong_erpm;      /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
+    int16_t large_erpm;      /**< a large innovation begins here */
+    q15_t quick_q15;         /**< 1 = a large innovation was just seen */
+    uint16_t wrong_steps;    /**< steps with an innovation above wrong_erpm, less those without */
+    int16_t large_last_erpm; /**< the last large innovation */
+    uint16_t unrest_steps;   /**< four for each step that was not calm, less one for each that was */
+    q15_t share_q15;         /**< of the full rates, by the speed */
 } observer_t;
 
 /** Speed, electrical rpm. */
@@ -153,11 +153,34 @@ QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovat
     return qm_shift(qm_mulss(innovation, qm_hi(square_q32)), p->shift) + (qm_mulsu(innovation, (uint16_t)square_q32) >> (16u - p->shift));
 }
 
+/** What a step's innovation calls for: in full from one and a half of what is large; none while it is the loop's own swing. */
+QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
+{
+    q15_t level = 0;
+    if (!observer_is_calm(o)) {
+        o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
+    } else if (o->unrest_steps != 0u) {
+        o->unrest_steps--;
+    } else {
+        /* calm for long */
+    }
+    if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
+        if ((innovation ^ o->large_last_erpm) < 0 && !observer_is_calm(o)) {
+            o->unrest_steps = OBSERVER_UNREST_STEPS;
+        }
+        o->large_last_erpm = innovation;
+        level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
+    }
+    o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
+    if (o->quick_q15 < level) {
+        o->quick_q15 = level;
+    }
+}
+
 /** One step. @param rho_q32 the estimator's angle @param iq_q13 measured q current */
 QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
 {
     int16_t innovation;
-    q15_t level = 0;
     int32_t before_q16 = o->omega_q16;
 
     o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
@@ -171,24 +194,7 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
     } else {
         /* right for long */
     }
-    if (!observer_is_calm(o)) {
-        o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
-    } else if (o->unrest_steps != 0u) {
-        o->unrest_steps--;
-    } else {
-        /* calm for long */
-    }
-    if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
-        if ((innovation ^ o->large_last) < 0 && !observer_is_calm(o)) {
-            o->unrest_steps = OBSERVER_UNREST_STEPS;
-        }
-        o->large_last = innovation;
-        level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
-    }
-    o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
-    if (o->quick_q15 < level) {
-        o->quick_q15 = level;
-    }
+    observer_answer(o, innovation);
 }
 
 #endif

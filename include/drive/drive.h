@@ -61,6 +61,8 @@ typedef struct {
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
     uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
+    int32_t i2t_most_q25;               /**< square of I2T_CURRENT_A; 0: no I2t */
+    uint16_t i2t_rate_q16;              /**< OVERLOAD_STEP_MS / I2T_TIME_SEC */
     uint16_t bus_shift;                 /**< 1..3: bus_q15 shifted by it fills a word */
     uint16_t voltage_limit_per_bus_q16; /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
@@ -70,18 +72,21 @@ typedef struct {
     int16_t bus_nominal_q15;             /**< start value of the bus filter */
 
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
-    uint16_t pot_zero_q16;   /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
-    uint16_t pot_scale_q15;  /**< 1 / (1 - 2 POT_LIVE_ZERO) */
-    int32_t speed_ramp_q16;  /**< reference step per slow step, electrical rpm with 16 fraction bits */
-    int32_t tuning_step_q16; /**< the same in TUNING */
-    int16_t ramp_hold_erpm;  /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
-    uint16_t stall_steps, lost_lock_steps;
-    uint16_t wrong_steps;                    /**< voltages and currents do not fit the motor */
-    uint16_t impossible_steps;               /**< flux or resistance beyond what a motor can have */
-    q15_t kfi_impossible;                    /**< change of 1/Kphi that asks for more flux than the header's may be off */
-    current_q13_t id_off_q13;                /**< d current's mean deviation that noise and dead time make at most */
-    q15_t rs_off_least, rs_off_most, ls_off; /**< and how far its R and L may be */
-    int16_t dead_emf_q12;                    /**< and what dead time may put into the back-EMF */
+    uint16_t pot_zero_q16;     /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
+    uint16_t pot_scale_q15;    /**< 1 / (1 - 2 POT_LIVE_ZERO) */
+    int32_t speed_ramp_q16;    /**< reference step per slow step, electrical rpm with 16 fraction bits */
+    int32_t tuning_step_q16;   /**< the same in TUNING */
+    int16_t ramp_hold_erpm;    /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
+    uint16_t stall_steps;      /**< slow steps below half the reference that are a stall */
+    uint16_t lost_lock_steps;  /**< and out of lock that are a lost one */
+    uint16_t wrong_steps;      /**< voltages and currents do not fit the motor */
+    uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
+    q15_t kfi_impossible;      /**< change of 1/Kphi that asks for more flux than the header's may be off */
+    current_q13_t id_off_q13;  /**< d current's mean deviation that noise and dead time make at most */
+    q15_t rs_off_least;        /**< how far R may be below the header's, as a share of it: negative */
+    q15_t rs_off_most;         /**< and above */
+    q15_t ls_off;              /**< how far L may be off, to either side */
+    int16_t dead_emf_q12;      /**< what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
 } drive_params_t;
 
@@ -159,13 +164,14 @@ typedef struct {
     handover_t handover;
     catch_t catching;
     drive_control_t control;
-    uint16_t stall_steps;                       /**< slow steps below half the reference, less four for each above */
-    uint16_t probe_steps;                       /**< of the probe whether the rotor turns, and of the pause after it */
-    uint16_t dip_steps;                         /**< how long the speed has been a quarter below the reference */
-    current_q13_t probe_id_q13, probe_most_q13; /**< its d current, and the most of it */
-    uint16_t phase_sums[3];                     /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
-    uint16_t impossible_steps;                  /**< how long flux or resistance has been impossible */
-    uint16_t lost_lock_steps;                   /**< two for each slow step out of lock, less one for each in lock */
+    uint16_t stall_steps;         /**< slow steps below half the reference, less four for each above */
+    uint16_t probe_steps;         /**< of the probe whether the rotor turns, and of the pause after it */
+    uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference */
+    current_q13_t probe_id_q13;   /**< its d current */
+    current_q13_t probe_most_q13; /**< and the most of it */
+    uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
+    uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
+    uint16_t lost_lock_steps;     /**< two for each slow step out of lock, less one for each in lock */
     MODE_STATE
 } drive_run_t;
 

@@ -46,8 +46,8 @@
       "check its three wires") \
     X(18, INTERRUPT_RATE, FAULT_STAYS, "too few control interrupts in a tenth of a second", \
       "look for what holds interrupts up; check the PWM and ADC set-up") \
-    X(19, OVERTEMPERATURE, FAULT_STAYS, "the winding's resistance rose to the end of what the drive believes: 180 degrees Celsius if the header's is right at 25", \
-      "let the motor cool down, lower the load; check MOTOR_RS_OHM and the wires' contacts") \
+    X(19, OVERTEMPERATURE, FAULT_STAYS, "the winding's resistance rose to the end of what the drive believes: 180 degrees Celsius if the header's is right at 25; or more than I2T_CURRENT_A flowed for too long", \
+      "let the motor cool down, lower the load; check MOTOR_RS_OHM, the wires' contacts and I2T_TIME_SEC") \
     X(20, SELFTEST, FAULT_STAYS, "a self-test failed: memory, processor, clock, program flow or a register is not as it must be", \
       "see board_selftest_failed or the status line for the test, docs/selftest.md for its meaning, then reset: S2 does not clear this one")
 

@@ -3,6 +3,7 @@
 #define DRIVE_PARAM_INIT_H
 
 #include "drive/drive.h"
+#include "drive/overload.h"
 #include "drive/param_scaling.h"
 
 #define PARAM_18(f) \
@@ -112,6 +113,8 @@
         .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
         .current_max_reciprocal = (uint16_t)(33554432.0F / (PARAM_F(MAXIMUM_CURRENT_A) / PARAM_F(NORM_CURRENT_CONST) / 4.0F) + 0.5F), \
         .overcurrent_q13 = CURRENT_Q13(OVER_CURRENT_THRESHOLD_A), \
+        .i2t_most_q25 = (int32_t)CURRENT_Q13(I2T_CURRENT_A) * CURRENT_Q13(I2T_CURRENT_A) / 2, \
+        .i2t_rate_q16 = (uint16_t)((float)OVERLOAD_STEP_MS * 65.536F / PARAM_F(I2T_TIME_SEC) + 0.5F), \
         .bus_shift = BUS_SHIFT, \
         .voltage_limit_per_bus_q16 = VOLTAGE_LIMIT_PER_BUS_Q16, \
         .duty_per_volt_numerator = DUTY_PER_VOLT_NUMERATOR, \

@@ -48,7 +48,9 @@
     X(OVER_CURRENT_THRESHOLD_A, "A peak", 0.1, 40, FROM_TUNER, "any phase above trips at once; must lie inside the converter's range") \
     X(OVER_VOLTAGE_V, "V", 9, 100, FROM_BOARD, "bus above trips") \
     X(UNDER_VOLTAGE_V, "V", 3, 55, FROM_BOARD, "bus below trips while running") \
-    X(REGEN_LIMIT_V, "V", 8, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher")
+    X(REGEN_LIMIT_V, "V", 8, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher") \
+    X(I2T_CURRENT_A, "A peak", 0, 20, FROM_MOTOR, "current that the winding stands for ever; more only for a while; 0: no I2t") \
+    X(I2T_TIME_SEC, "s", 2, 1000, FROM_MOTOR, "the winding's thermal time constant")
 
 #define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
     X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
@@ -147,6 +149,8 @@
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
       PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \
+    X(PARAM_F(I2T_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
+      PARAM_NAMED(I2T_CURRENT_A) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A) ": a larger one never trips; 0: no I2t") \
     X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= PARAM_F(PARAM_TRIP_SHARE) * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
       PARAM_NAMED(OVER_CURRENT_THRESHOLD_A) " must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
     X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.063F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \

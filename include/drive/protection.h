@@ -91,8 +91,9 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 #define PROTECTION_TURN_SHIFT 4 /* the angle step of a period to that of eight: ls_q16 is L of eight samples */
 
 /** 1 where no flux within the header's tolerances explains the q back-EMF: what dead time, and R and L within theirs, may put into it is taken off first.
- *  With E = Eq as the model sees it, k the change of 1/Kphi and F the most flux: E - (R's part) - (L's part) > F E (1 + k), here divided by F,
- *  with a fifth more of the two parts. Where the motor brakes R i lowers the voltage, and the least R counts. */
+ *  With E = Eq as the model sees it, k the change of 1/Kphi, F the most flux and V_dead what dead time makes of it:
+ *  E - V_dead - (R's part) - (L's part) > F E (1 + k), here divided by F, with a fifth more of the three parts.
+ *  Where the motor brakes R i lowers the voltage, and the least R counts. */
 QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);

@@ -52,11 +52,11 @@ QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
     drive_measure(d, p, raw);
     if (drive_is_running(d)) {
         protection_check_current(d, p); /* before the law: its formats end above the trip level */
+        if (drive_is_running(d)) {
+            duty = MODE_RUN(d, p);
+        }
     } else {
-        idle_step(d, p, raw);
-    }
-    if (drive_is_running(d)) {
-        duty = MODE_RUN(d, p);
+        idle_step(d, p, raw); /* the period in which it begins to run has no time for both: the low sides stay on */
     }
     return duty;
 }

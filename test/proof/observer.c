@@ -1,7 +1,7 @@
 /* The load observer and the adaptation, each with all inputs and all parameters that the build accepts.
  *
  * sources: firmware/control/trig.c
- * options: -eva-slevel-function qm_abs:5,qm_clamp:5,observer_step:200,observer_sum:10,adaptation_learn:100
+ * options: -eva-slevel-function qm_abs:5,qm_clamp:5,observer_step:200,observer_answer:200,observer_sum:10,adaptation_learn:100
  *     -eva-domains octagon,equality,symbolic-locations -eva-octagon-through-calls -inline-calls qm_hi,qm_abs,shift_in_pieces */
 #include "any.h"
 
@@ -63,7 +63,7 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     o.wrong_erpm = ANY16();
     o.wrong_steps = any_u(0, 65534); /* a fault ends the run long before */
     o.unrest_steps = ANYU16();
-    o.large_last = ANY16();
+    o.large_last_erpm = ANY16();
     o.quick_q15 = any(calm_low, calm_high);
     observer_step(&o, &p, any_ul(0, UINT32_MAX), any(-IQ_MAX, IQ_MAX));
     //@ check speed: -32767 * 65536 <= o.omega_q16 <= 32767 * 65536;

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-HERE = Path(__file__).parent
+HERE = Path(os.path.relpath(Path(__file__).parent)) # Frama-C cannot tell a blank in a path from the next argument
 BUILD = Path("build/proof")
 KERNEL = """-machdep gcc_x86_16 -warn-signed-overflow -no-warn-left-shift-negative -kernel-warn-key parser:decimal-float=inactive
     -eva -eva-warn-signed-converted-downcast -eva-no-show-progress -report-unclassified-warning NONE""".split()

@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -148,24 +149,43 @@ def test_too_little_speed_is_right_where_the_drive_names_the_limit_and_the_kind_
 
 
 def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_its_own():
-    clock = replace(LIMITS, unseen=(1.1, 0.0))
+    clock = replace(LIMITS, unseen=judge.Unseen(clock=1.1))
     assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE
+    assert verdict(clock, plant__speed_rpm=after(0.6, 1070.0, 1000.0)).outcome == judge.UNKNOWABLE # a limit holds some of it back
     for rpm in (1200.0, 900.0): # more than the clock is off, and to the other side
         assert verdict(clock, plant__speed_rpm=after(0.6, rpm, 1000.0)).outcome == judge.SILENT
     assert verdict(clock).outcome == judge.NO_EFFECT
     assert verdict(clock, plant__speed_rpm=after(0.6, -1100.0, 1000.0)).why == "turns backwards"
     assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0), plant__i_q=after(0.6, 8.0, 1.0)).outcome == judge.SILENT
-    more = replace(LIMITS, unseen=(1.0, 50.0))
+    more = replace(LIMITS, unseen=judge.Unseen(more_rpm=50.0))
     assert verdict(more, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE # 56 + 50 rpm
     assert verdict(more, plant__speed_rpm=after(0.6, 1110.0, 1000.0)).outcome == judge.SILENT
+
+
+def test_a_start_with_as_much_current_as_an_unknown_resistance_hides_cannot_be_known_and_closed_loop_can():
+    start = replace(LIMITS, unseen=judge.Unseen(start_current=1.5))
+    much = {"plant__i_q": after(0.6, 6.0, 1.0)}
+    assert verdict(start, fw__state=4.0, **much).outcome == judge.UNKNOWABLE
+    assert verdict(start, **much).outcome == judge.SILENT and verdict(start, fw__state=4.0, plant__i_q=after(0.6, 7.0, 1.0)).outcome == judge.SILENT
+
+
+@pytest.mark.parametrize("clock, way_end_s, at_s", [(1.0, 3.0, 3.0), (0.75, 3.0, 3.667), (1.25, 3.0, 3.0), (0.75, 0.5, 2.6)])
+def test_a_slow_clock_is_judged_when_its_longer_way_is_over(clock, way_end_s, at_s):
+    case = SimpleNamespace(over_s=0.2, lasts_s=0.4)
+    assert judge.SETTLE_S == 1.0 and trial.settled(case, way_end_s, 1.0, clock) == pytest.approx(at_s, abs=1e-3)
 
 
 def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_it(bench):
     rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6, dead_rpm=trial.dead_rpm(bench.library.params))
     assert rating.dead_rpm == pytest.approx(0.13 * 24.0 * 2.0 / 50.0 * 3.0 ** 0.5 * 1000.0 / 7.24, rel=1e-3)
-    unseen = {name: kind.unseen(1.2, rating) for name, kind in injection.BY_NAME.items() if kind.unseen(1.2, rating) != (1.0, 0.0)}
-    ripple = dict.fromkeys((f"sensors: current {name}" for name in ("offset", "offset drifts", "gain", "noise")), (1.0, 0.5 * np.pi * rating.dead_rpm))
-    assert unseen == ripple | {"clock: crystal off frequency": (1.2, 0.0)}
+    unseen = {name: kind.unseen(1.2, rating) for name, kind in injection.BY_NAME.items() if kind.unseen(1.2, rating) != judge.Unseen()}
+    kinds = ("sensors: current reads zero", "sensors: current offset", "sensors: current offset drifts", "sensors: current gain", "sensors: current noise",
+             "power stage: transistor never turns on")
+    assert unseen == dict.fromkeys(kinds, judge.Unseen(more_rpm=0.5 * np.pi * rating.dead_rpm)) | {"clock: crystal off frequency": judge.Unseen(clock=1.2)}
+    init = (paths.ROOT / "include" / "drive" / "param_init.h").read_text(encoding="utf-8")
+    assert f".rs_most = Q15({injection.MOST_RESISTANCE - 1.0:.1f})" in init
+    gain = injection.BY_NAME["sensors: current gain"]
+    assert [gain.unseen(size, rating).start_current for size in (1.5, 0.8, 0.625, 0.3)] == pytest.approx([1.0, 1.25, 1.6, 1.6])
     text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
     assert f"#define PARAM_LARGE_ERPM ({trial.DEAD_SHARE}F * PARAM_DEAD_TIME_V" in text
 

@@ -163,3 +163,12 @@ def test_an_empty_window_never_holds(text):
     item = run(text)
     item.trace = item.trace.part(0.0, 1.0)
     assert not report.check(item)[0].ok
+
+
+@pytest.mark.parametrize("order_rows, ok", [(0, False), (1, True)])
+def test_an_order_that_takes_a_row_longer_is_not_outputs_on_again(order_rows, ok):
+    later = {"pwm__outputs_on": step((0, 21), (1.2, 0)), "pwm__outputs_seen": step((0, 63), (1.2 + 3 * PERIOD_S, 0))}
+    item = run(STOP, **later)
+    item.order_rows = order_rows
+    found = next(outcome for outcome in report.check(item) if outcome.row == "stop: outputs off")
+    assert (found.ok, "on again later" in found.got) == (ok, not ok)

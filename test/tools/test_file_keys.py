@@ -66,12 +66,13 @@ def test_listening_leaves_the_loaders_as_they_were():
 @pytest.mark.parametrize("key, expected", [
     ("resistance_tempco", {"resistance_tempco_per_k": 0.0039}), ("kphi_tempco", {"kphi_tempco_per_k": -0.002}),
     ("viscous_friction", {"viscous_nms": 0.0}), ("coulomb_friction", {"coulomb_nm": 0.0}),
-    ("maximum_current", {"maximum_current_a": 1.5 * 1.9 * 2.0 ** 0.5}), ("start_torque", {"start_torque_nm": 0.025})])
+    ("maximum_current", {"maximum_current_a": 1.5 * 1.9 * 2.0 ** 0.5}), ("start_torque", {"start_torque_nm": 0.025}),
+    ("thermal_time", {"thermal_time_s": 0.0})])
 def test_what_stands_in_for_a_quantity_is_what_the_page_says(tmp_path, key, expected):
     (tmp_path / "m.toml").write_text(re.sub(rf"(?m)^{key} = .*\n", "", MOTOR.read_text(encoding="utf-8")), encoding="utf-8")
     motor = motor_file.load(str(tmp_path / "m.toml"))
     assert {name: getattr(motor, name) for name in expected} == pytest.approx(expected)
-    assert cells(key)[3] in ("0.39 %/K", "-0.2 %/K", "0", "1.5 times current", "a quarter of the rated torque")
+    assert cells(key)[3] in ("0.39 %/K", "-0.2 %/K", "0", "1.5 times current", "no I2t", "a quarter of the rated torque")
 
 
 def test_the_virtual_board_has_the_keys_of_the_page_with_these_units_ranges_defaults_and_meanings():

@@ -102,6 +102,7 @@ BAD = {
                                    "'kphi_tempco' = 0.1 %/K is impossible", "line 10"),
     "maximum current": ("", "maximum_current = { value = 25, unit = \"A peak\", source = \"s\" }", "maximum_current = 25 A peak beside", "line 19"),
     # optional tables
+    "thermal time": ("", "thermal_time = { value = 20, unit = \"min\", source = \"s\" }", "'thermal_time' = 20 min is impossible", "line 19"),
     "start torque": ("", "[load]\nstart_torque = { value = 0.1, unit = \"N m\" }", "start_torque = 0.1 N m is more than maximum_current gives", "line 20"),
     "load key": ("", "[load]\ntorque = { value = 0.1, unit = \"N m\" }", "unknown key 'torque'", "line 20"),
     "spread of one": ("", "[spread]\nresistance = { values = [1], unit = \"ohm phase\", source = \"s\" }", "'resistance' has no pair of values", "line 20"),
@@ -155,19 +156,20 @@ def test_values_are_those_of_a_star_phase_in_si_and_what_a_file_leaves_out_has_d
                   "rated_current_a": 1.9, "rated_torque_nm": 0.0625, "rated_speed_rpm": 4000.0, "maximum_speed_rpm": 6000.0,
                   "salient": False}, 1e-6)
     shows(motor, {"viscous_nms": 0.0, "coulomb_nm": 0.0, "load_inertia_kgm2": 0.0, "inductance_frequency_hz": None,
-                  "maximum_current_a": 2.85,
+                  "maximum_current_a": 2.85, "thermal_time_s": 0.0,
                   "start_torque_nm": 0.015625, "resistance_tempco_per_k": 0.0039, "kphi_tempco_per_k": -0.002, "tune": {}, "spread": {}})
     assert motor.plant_extra.values == {}
 
 
 def test_optional_tables_are_read(load):
     motor = load(MOTOR + "maximum_current = { value = 2.0, unit = \"A rms\", source = \"s\" }\n"
+                 "thermal_time = { value = 0.5, unit = \"min\", source = \"s\" }\n"
                  "[load]\ninertia = { value = 10, unit = \"g cm2\" }\nstart_torque = { value = 30, unit = \"mN m\", source = \"fan\" }\n"
                  "[spread]\nresistance = { values = [2.0, 1.6], unit = \"ohm line-to-line\", source = \"s\" }\n"
                  "inductance = { values = [1.2, 1.4], unit = \"mH phase\", source = \"s\" }\n"
                  "kphi = { values = [270, 230], unit = \"rpm/V\", source = \"s\" }\n"
                  "[tune]\nEND_SPEED_RPM = 700\nIDREF_SPEED17 = -1.5\n[plant]\n\"motor.sat_lq_ratio\" = 0.2\nmech.stiction_nm = 0.01\n")
-    shows(motor, {"maximum_current_a": 8.0 ** 0.5, "load_inertia_kgm2": 1e-6, "start_torque_nm": 0.03,
+    shows(motor, {"maximum_current_a": 8.0 ** 0.5, "thermal_time_s": 30.0, "load_inertia_kgm2": 1e-6, "start_torque_nm": 0.03,
                   "tune": {"END_SPEED_RPM": 700.0, "IDREF_SPEED17": -1.5}})
     assert motor.spread == {"rs_ohm": pytest.approx((0.8, 1.0)), "ls_h": pytest.approx((0.0012, 0.0014)),
                             "kphi_v_per_krpm": pytest.approx((3.8785, 4.553), abs=5e-5)}

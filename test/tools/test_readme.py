@@ -78,3 +78,31 @@ def test_every_motor_has_its_line_of_flying_starts_and_stops(result, tmp_path):
     stop = {"rpm": 5500.0, "rotor_deg": None, "verdict": "ok", "control_s": None, "current_max_a": 2.8, "bus_max_v": 28.6, "stop_s": 1.39}
     left(tmp_path, "catch", "own", [start, start | {"rpm": 3400.0, "control_s": 0.061, "verdict": "angle"}, stop, stop | {"stop_s": None}])
     assert readme.catches().splitlines()[2:] == ["| own | -2000 .. 3400 | 1 of 2 | 0.061 s | 2.80 A | 5500 rpm | 1.39 / never s | 28.6 V |"]
+
+
+@pytest.fixture
+def long_draws(result, tmp_path):
+    """What a campaign and a soak leave, with numbers changed."""
+    def write(cases: int = 1990, hours: float = 24.2) -> None:
+        for folder, data in (("campaign", {"classes": {"no effect": cases, "ridden through": 10, "wrong and silent": 0}}),
+                             ("soak", {"motor_hours": hours, "wrong": 0})):
+            (tmp_path / "build" / folder / "seed-1").mkdir(parents=True)
+            (tmp_path / "build" / folder / "seed-1/summary.json").write_text(json.dumps(data))
+    return write
+
+
+def test_the_long_draws_are_told_with_their_shares(long_draws):
+    long_draws()
+    assert [cells[1] for cells in readme.drawn()] == ["1990 no effect; 10 ridden through", "0 wrong in 24.2 h"]
+
+
+@pytest.mark.parametrize("less", [{"cases": 1989}, {"hours": 23.9}])
+def test_less_than_the_readme_promises_is_refused(long_draws, less):
+    long_draws(**less)
+    with pytest.raises(SystemExit, match=r"less than the README promises: run `make campaign` and `make soak`"):
+        readme.drawn()
+
+
+def test_a_long_draw_that_was_not_made_is_one_line_with_its_command(result):
+    with pytest.raises(SystemExit, match=r"^foc33: no results, build/campaign/seed-1/summary.json: run `make campaign`"):
+        readme.drawn()

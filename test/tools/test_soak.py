@@ -38,6 +38,24 @@ def test_the_segments_have_all_that_may_happen_and_stay_within_the_rating(benche
     assert sum(segment.starts for segment in segments) > 60 and sum(len(segment.rests) for segment in segments) > 200
 
 
+def test_loads_at_low_speed_leave_an_estimator_something_to_see(benches):
+    """Half of E = P w psi for what R may be off, and half of w for what a load takes in an electrical period; of the Hurst, by hand."""
+    seen = 0
+    for number in range(1, 401):
+        rpm, load_nm = 0.0, 0.0
+        for event in soak.draw(1, number, benches).scenario.events:
+            rpm = abs(event.value) if event.kind == "speed_rpm" else rpm
+            if "load.constant_nm" in event.keys:
+                change_nm, load_nm = event.keys["load.constant_nm"] - load_nm, event.keys["load.constant_nm"]
+                omega = rpm * 2.0 * np.pi / 60.0
+                if event.at_s > 5.0 and 0.0 < omega < 40.0 and change_nm > 0.005 and event.over_s > 0.05:
+                    current_a = (load_nm + 0.004 + 15.3e-6 * omega) / 0.05987
+                    seen += 1
+                    assert 2.67 * 0.4 * current_a <= 0.51 * 5.0 * omega * 7.983e-3 * 0.85
+                    assert change_nm / event.over_s / (2.0 * 5.5e-6 * (5.0 * rpm / 60.0) ** 2) <= 0.51 * omega
+    assert seen > 20
+
+
 def test_nothing_changes_in_a_stretch_that_is_judged(benches):
     for number in range(1, 21):
         segment = soak.draw(1, number, benches)

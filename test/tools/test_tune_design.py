@@ -168,6 +168,15 @@ def test_a_choice_in_tune_replaces_the_tuner_s_and_what_follows_from_it():
     assert d.value("MOTOR_LS_MH") == approx(d.motor.lq_h * 1e3, abs=1e-9)
 
 
+def test_a_thermal_time_gives_the_header_its_i2t_and_without_one_there_is_none():
+    without = made()
+    assert without.value("I2T_CURRENT_A") == 0.0
+    known = made(thermal_time_s=17.0)
+    assert known.value("I2T_TIME_SEC") == 17.0 and known.value("I2T_CURRENT_A") == known.motor.rated_current_a < known.value("MAXIMUM_CURRENT_A")
+    small = made(thermal_time_s=17.0, rated_current_a=3.0, board={"current_full_scale_a": 2.2})
+    assert small.value("I2T_CURRENT_A") == small.value("MAXIMUM_CURRENT_A") < 3.0
+
+
 @pytest.mark.parametrize("name", MOTORS)
 def test_currents_keep_their_order(name):
     d = of(name)

@@ -56,6 +56,15 @@ void test_deviations_are_no_fault_where_a_limit_holds_the_drive_back_or_the_star
     TEST_ASSERT_UINT16_WITHIN(10, 355, ms_until_found(0)); /* anew */
 }
 
+void test_d_current_that_follows_its_reference_is_none_however_large(void)
+{
+    drive.run.control.ref_q13.d = (int16_t)(-4 * params.id_off_q13);
+    drive.run.control.i_q13.d = drive.run.control.ref_q13.d;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_found(0));
+    drive.run.control.i_q13.d = 0;
+    TEST_ASSERT_UINT16_WITHIN(10, 355, ms_until_found(0));
+}
+
 void test_deviations_of_a_quarter_of_a_second_ride_through(void)
 {
     uint16_t n, ms;

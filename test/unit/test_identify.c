@@ -67,6 +67,7 @@ void test_voltage_grows_by_a_128th_every_16_periods_while_the_current_rises(void
 {
     int16_t n;
     (void)rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u);
+    rig_tick(1);
     TEST_ASSERT_EQUAL_INT16(16, control->v_q14.d);
     control->pi_d.sum = 128l << 14;
     for (n = 0; n < 31; n++) {

@@ -42,13 +42,14 @@ void test_current_vector_fills_its_circle_and_never_leaves_it(void)
     }
 }
 
-void test_d_reference_is_the_sum_of_hand_over_table_and_trim(void)
+void test_d_reference_is_the_sum_of_hand_over_table_trim_and_probe(void)
 {
+    drive.run.probe_id_q13 = 700;
     drive.run.handover.id_q13 = 500;
     drive.run.fieldweak.table_q13 = -900;
     drive.run.fieldweak.trim_q13 = -100;
     limits_current(&drive.run, &params); /* the trim goes back by one step */
-    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
+    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + 700 + params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
 }
 
 void test_trim_sees_the_voltage_that_q_leaves_unused_in_both_directions(void)

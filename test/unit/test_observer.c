@@ -275,6 +275,7 @@ static uint16_t wrong_after(uint16_t steps, uint32_t counts)
 
 void test_steps_with_more_than_dead_time_and_a_32nd_of_the_speed_are_counted_and_taken_back(void)
 {
+    observer_params_t large_at_20000 = *p;
     observer_schedule(&o, p, 3200);
     TEST_ASSERT_INT16_WITHIN(2, 2 * (149 + 100), o.wrong_erpm); /* without load dead time may make a light rotor hunt */
     o.load_q16 = 4000L * 65536;
@@ -285,6 +286,10 @@ void test_steps_with_more_than_dead_time_and_a_32nd_of_the_speed_are_counted_and
     TEST_ASSERT_EQUAL_UINT16(20, wrong_after(10, 60)); /* 137 */
     TEST_ASSERT_EQUAL_UINT16(0, wrong_after(25, 0));
     TEST_ASSERT_EQUAL_UINT16(10, wrong_after(10, 400));
+    o.load_q16 = 0;
+    large_at_20000.large_erpm = 20000;
+    observer_schedule(&o, &large_at_20000, 3200);
+    TEST_ASSERT_INT16_WITHIN(2, 32766, o.wrong_erpm); /* the end of its format */
 }
 
 /* ---- the innovation: how much further the angle turned ---- */

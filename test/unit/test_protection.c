@@ -387,6 +387,21 @@ void test_probe_of_a_standing_rotor_stays_until_the_stall_and_that_of_a_turning_
     TEST_ASSERT_EQUAL_INT16(0, (probe(200, 20, 100), drive.run.probe_id_q13)); /* slow, but it turns */
 }
 
+void test_d_current_of_a_probe_rises_and_falls_by_a_32nd_of_the_largest_a_step(void)
+{
+    const int16_t slope = (int16_t)(params.current_max_q13 >> 5);
+    int16_t most;
+    loaded(2.2F);
+    TEST_ASSERT_EQUAL_INT16(0, probe(50, 0, 400));
+    most = drive.run.control.ref_q13.q;
+    TEST_ASSERT_GREATER_THAN_INT16(4 * slope, most);
+    TEST_ASSERT_EQUAL_INT16(slope, probe(1, 0, 400));
+    TEST_ASSERT_EQUAL_INT16(3 * slope, probe(2, 0, 400));
+    TEST_ASSERT_EQUAL_INT16(most, probe(97, 0, 400));
+    (void)probe(2, 0, 400);
+    TEST_ASSERT_INT16_WITHIN(slope, most - 2 * slope, drive.run.probe_id_q13);
+}
+
 void test_probe_comes_again_after_five_seconds_or_a_dip_of_10_ms(void)
 {
     loaded(2.2F);
@@ -499,6 +514,45 @@ void test_a_winding_too_hot_is_a_fault_after_a_quarter_of_a_second_without_a_gap
     drive.run.adaptation.kfi_q31 = 0;
     protection_check_model(&drive, &params);
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.impossible_steps);
+}
+
+void test_both_at_once_are_a_wrong_bus_signal(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(626, impossible_until_fault(-0.3F, 0.7F, 0.0F, 0.0F, 1000)); /* which makes R seem larger, too */
+    TEST_ASSERT_EQUAL_UINT16(FAULT_BUS_SENSOR, drive.fault);
+    drive.fault = (uint16_t)FAULT_NONE;
+}
+
+/* Much L i at once: the part ends at its format and does not come round. */
+void test_what_L_may_explain_ends_at_its_format(void)
+{
+    (void)impossible_until_fault(-0.3F, 0.0F, 0.0F, 0.0F, 1);
+    exact.dead_emf_q12 = 0;
+    drive.run.estimator.e_q_q28 = 32000L * 65536L;
+    drive.run.control.i_q13.d = -16000;
+    drive.run.estimator.half_step_q16_rad = 8000;
+    drive.run.model.ls_q16 = 65535;
+    exact.estimator.ls_exp = 3;
+    TEST_ASSERT_EQUAL_UINT16(0, protection_flux_is_impossible(&drive.run, &exact));
+    exact.estimator.ls_exp = params.estimator.ls_exp;
+}
+
+void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
+{
+    (void)impossible_until_fault(-0.3F, 0.0F, 0.0F, 0.0F, 600);
+    drive.state = (uint16_t)DRIVE_RAMP;
+    for (uint16_t n = 0; n < 100u; n++) {
+        protection_check_model(&drive, &exact);
+    }
+    TEST_ASSERT_EQUAL_UINT16(600, drive.run.impossible_steps);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+    loaded(2.2F);
+    emf(0, 400);
+    drive.state = (uint16_t)DRIVE_RAMP;
+    for (uint16_t n = 0; n < 200u; n++) {
+        protection_probe_step(&drive, &params);
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.probe_steps);
 }
 
 void test_signals_and_model_are_checked_in_slow_steps_of_closed_loop_only(void)

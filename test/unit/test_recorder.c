@@ -18,6 +18,13 @@ void setUp(void)
     ticks = 0;
 }
 
+void test_power_up_leaves_no_word_as_it_was(void)
+{
+    for (uint16_t n = 0; n < sizeof recorder.word / sizeof recorder.word[0]; n++) {
+        TEST_ASSERT_EQUAL_INT16(0, recorder.word[n]);
+    }
+}
+
 /* What the row of a tick has. */
 static int16_t i_a(uint16_t tick)
 {

@@ -90,7 +90,11 @@ void test_bootstrap_charges_all_low_sides_for_ten_milliseconds(void)
     }
     rig_tick(1);
     EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "charged");
-    TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.a); /* the first period already has the duties of the law */
+    TEST_ASSERT_EQUAL_UINT16(0, out.duty.a); /* the period of the change has no time for the law: the low sides stay on */
+    TEST_ASSERT_EQUAL_UINT16(0, out.duty.b);
+    TEST_ASSERT_EQUAL_UINT16(0, out.duty.c);
+    rig_tick(1);
+    TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.a);
     TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.b);
 }
 
@@ -153,7 +157,7 @@ void test_start_is_BOOTSTRAP_ALIGN_RAMP_CLOSED_in_the_times_of_the_parameters(vo
     ideal_motor_run(1);
     EXPECT_DRIVE(DRIVE_BOOTSTRAP, FAULT_NONE, "started");
     TEST_ASSERT_EQUAL_UINT32(200, ideal_motor_run_until(DRIVE_ALIGN, 60000));
-    TEST_ASSERT_EQUAL_UINT32(LOCK_PERIODS - 1u, ideal_motor_run_until(DRIVE_RAMP, 60000));
+    TEST_ASSERT_EQUAL_UINT32(LOCK_PERIODS, ideal_motor_run_until(DRIVE_RAMP, 60000));
     for (n = 1; n < RAMP_PERIODS; n++) {
         ideal_motor_run(1);
         TEST_ASSERT_TRUE(drive.forced.speed_q10 < 279620);

@@ -167,9 +167,9 @@ def _off_row(trace: Trace, from_row: int = 0) -> int | None:
     return None if len(off) == 0 else from_row + int(off[0])
 
 
-def _stays_off(trace: Trace, off_row: int, to_row: int | None = None) -> bool:
+def _stays_off(run: Run, trace: Trace, off_row: int, to_row: int | None = None) -> bool:
     """No output is on after `off_row`. "pwm.outputs_seen" tells of the whole period before its row."""
-    return not np.any(trace.column("pwm.outputs_seen")[off_row + 2:to_row])
+    return not np.any(trace.column("pwm.outputs_seen")[off_row + 2 + run.order_rows:to_row])
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class StopExpectation(Expectation):
         if row is None:
             return [Outcome("stop: outputs off", False, "never", allowed), *self._on_the_way(run, part)]
         took = float(part.time_s[row]) - self.after_s
-        stays = _stays_off(part, row)
+        stays = _stays_off(run, part, row)
         got = f"{took:.3f} s" + ("" if stays else ", on again later")
         outcomes = [Outcome("stop: outputs off", took <= self.within_s and stays, got, allowed)]
         if self.speed_max_rpm is not None:
@@ -365,7 +365,7 @@ class FaultExpectation(Expectation):
         first = int(np.searchsorted(run.trace.time_s, self.after_s)) if self.from_cause else fault_row
         off = _off_row(run.trace, first)
         periods = None if off is None else off - first
-        kept = off is not None and _stays_off(run.trace, off, self._kept_row(run))
+        kept = off is not None and _stays_off(run, run.trace, off, self._kept_row(run))
         got = "never" if periods is None else f"{periods} periods" + ("" if kept else ", on again later")
         origin = "cause" if self.from_cause else "fault"
         return Outcome(f"{title}: outputs off", kept and periods is not None and periods <= self.outputs_off_within_periods, got,

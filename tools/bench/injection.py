@@ -6,8 +6,9 @@ it rightly: any of them, or riding through, is a good end."""
 import math
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from .judge import Unseen
 from .scenario import BRAKE
 
 Keys = dict[str, float]
@@ -48,8 +49,7 @@ class Kind:
     """share of the cases in which it is over soon"""
     limits: bool = False
     weight: float = 1.0
-    unseen: Callable[[float, Rating], tuple[float, float]] = lambda size, rating: (1.0, 0.0)
-    """what no firmware can know of it: how many times as high the speed is, and how many rpm it is off; docs/campaign.md has the calculation"""
+    unseen: Callable[[float, Rating], Unseen] = lambda size, rating: Unseen()
 
 
 def _side(low: float, high: float, both_signs: bool = False) -> Callable[[random.Random], tuple[float, str]]:
@@ -88,9 +88,18 @@ def _sets(key: str, of: str = "") -> Callable[[float, str, Rating], Keys]:
     return lambda size, place, rating: {key.format(place): size * (getattr(rating, of) if of else 1.0)}
 
 
-def _as_dead_time(size: float, rating: Rating) -> tuple[float, float]:
+def _as_dead_time(size: float, rating: Rating) -> Unseen:
     """A ripple of the speed whose mean size is what dead time makes in a healthy motor."""
-    return 1.0, math.pi / 2.0 * rating.dead_rpm
+    return Unseen(more_rpm=math.pi / 2.0 * rating.dead_rpm)
+
+
+def _as_warm_winding(size: float, rating: Rating) -> Unseen:
+    """The same; and without a back-EMF, a signal that is too small looks like a resistance that is larger than the header's."""
+    return replace(_as_dead_time(size, rating), start_current=1.0 / min(max(size, 1.0 / MOST_RESISTANCE), 1.0))
+
+
+MOST_RESISTANCE = 1.6
+"""Times the header's, where OVERTEMPERATURE begins."""
 
 
 SENSOR = ("CURRENT_SENSOR", *OVERCURRENT, "OFFSET")
@@ -117,14 +126,14 @@ def _register_kind(group: str, weight: float) -> Kind:
 
 KINDS = (
     Kind("sensors", "current stuck at its value", SENSOR, _stuck(1.0), _sets("fault.i{}_stuck"), passes=0.2),
-    Kind("sensors", "current reads zero", SENSOR, _stuck(4.0), _sets("fault.i{}_stuck"), passes=0.2),
+    Kind("sensors", "current reads zero", SENSOR, _stuck(4.0), _sets("fault.i{}_stuck"), passes=0.2, unseen=_as_dead_time),
     Kind("sensors", "current stuck at a rail", SENSOR, _stuck(2.0, 3.0), _sets("fault.i{}_stuck"), passes=0.2),
     Kind("sensors", "current offset", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
          unseen=_as_dead_time),
     Kind("sensors", "current offset drifts", SENSOR, _side(0.02, 0.6, True), _sets("fault.i{}_error_a", "current_a"),
          over_s=(0.3, 1.0), unseen=_as_dead_time),
     Kind("sensors", "current gain", SENSOR, lambda r: (r.choice((r.uniform(0.0, 0.9), r.uniform(1.1, 2.5))), r.choice(SIDES)),
-         _sets("fault.i{}_gain"), unseen=_as_dead_time),
+         _sets("fault.i{}_gain"), unseen=_as_warm_winding),
     Kind("sensors", "current noise", SENSOR, _side(0.02, 0.5), _sets("fault.i{}_noise_a", "current_a"), unseen=_as_dead_time),
     Kind("sensors", "bus stuck at its value", ("BUS_SENSOR",), _one_of(1.0), _sets("fault.vbus_stuck"), weight=0.5),
     Kind("sensors", "bus stuck at a rail", BUS, _one_of(2.0, 3.0), _sets("fault.vbus_stuck")),
@@ -134,7 +143,8 @@ KINDS = (
          _sets("fault.vbus_error_v", "bus_v")),
     Kind("sensors", "potentiometer wire", ("POTENTIOMETER",), _one_of(2.0, 3.0), _sets("fault.pot_stuck"), passes=0.2),
     Kind("power stage", "phase wire open", ("OPEN_PHASE",), _one_of(1.0, 2.0, 3.0), _sets("fault.open_phase"), weight=2.0),
-    Kind("power stage", "transistor never turns on", ("OPEN_PHASE",), _transistor, _sets("fault.never_on"), weight=2.0),
+    Kind("power stage", "transistor never turns on", ("OPEN_PHASE",), _transistor, _sets("fault.never_on"), weight=2.0,
+         unseen=_as_dead_time),
     Kind("power stage", "transistor never turns off", BRIDGE, _transistor, _sets("fault.never_off")),
     Kind("supply", "sag", ("UNDERVOLTAGE",), _size(0.3, 0.9), _sets("supply.voltage_v", "bus_v"), passes=0.5, limits=True),
     Kind("supply", "lost", ("UNDERVOLTAGE",), _one_of(1000.0), _sets("supply.resistance_ohm"), passes=0.5, limits=True),
@@ -150,7 +160,7 @@ KINDS = (
     Kind("temperature", "warm magnets", ("OVERTEMPERATURE",), _size(0.8, 0.99), _sets("motor.psi_vs", "psi_vs"),
          over_s=(0.3, 1.0), limits=True),
     Kind("clock", "crystal off frequency", ("CLOCK", "INTERRUPT_RATE"), lambda r: (1.0 + _size(0.005, 0.3, True)(r)[0], ""),
-         _sets("cpu.crystal_hz", "crystal_hz"), unseen=lambda size, rating: (size, 0.0)),
+         _sets("cpu.crystal_hz", "crystal_hz"), unseen=lambda size, rating: Unseen(clock=size)),
     Kind("interrupts", "some lost", ("INTERRUPT_RATE", "ADC_LOST", "ISR_OVERRUN"), _size(0.002, 0.6), _sets("fault.isr_lost_share"),
          passes=0.3, weight=2.0),
     Kind("interrupts", "all lost", ("INTERRUPT_RATE", "ADC_LOST"), _one_of(1.0), _sets("cpu.isr_dropped"), passes=0.3, weight=0.5),

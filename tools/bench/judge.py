@@ -29,6 +29,18 @@ SAME_SPEED, SAME_CURRENT = 0.003, 0.05
 
 
 @dataclass(frozen=True)
+class Unseen:
+    """What no firmware can know of a fault; docs/faults.md has the calculations."""
+
+    clock: float = 1.0
+    """the speed is as many times as high, or less of it where a limit holds it back"""
+    more_rpm: float = 0.0
+    """and so many rpm off"""
+    start_current: float = 1.0
+    """before closed loop the current is as many times as large"""
+
+
+@dataclass(frozen=True)
 class Limits:
     """What a verdict needs to know of the case. `codes`: names of the faults that fit; `faults`: names by number."""
 
@@ -42,8 +54,7 @@ class Limits:
     closed: tuple[int, ...]
     """numbers of the states in closed loop; before, a rotor swings while it is aligned"""
     limited_is_right: bool = False
-    unseen: tuple[float, float] = (1.0, 0.0)
-    """what no firmware can know: the speed is so many times as high, and so many rpm off"""
+    unseen: Unseen = Unseen()
 
 
 @dataclass(frozen=True)
@@ -76,7 +87,7 @@ def judge(with_fault: Trace, without: Trace, limits: Limits) -> Verdict:
     if (code := _kept_code(after, limits)) and not _kept_code(reference, limits):
         return Verdict(ANOTHER, code, None, "still stopped by the fault before", error_percent, peak_a)
     why = _wrong(after, reference, limits)
-    if why and limits.unseen != (1.0, 0.0) and not _wrong(after, reference, limits, *limits.unseen):
+    if why and not _wrong(after, reference, limits, limits.unseen):
         return Verdict(UNKNOWABLE, "", None, why, error_percent, peak_a)
     outcome = SILENT if why else NO_EFFECT if _same(after, reference, limits) else RIDDEN
     return Verdict(outcome, "", None, why, error_percent, peak_a)
@@ -110,9 +121,10 @@ def _still_on(after: Trace, reference: Trace) -> str:
     return "the outputs stay on" if len(fault) and fault[-1] != 0.0 and on[-1] != 0.0 else ""
 
 
-def _wrong(after: Trace, reference: Trace, limits: Limits, clock: float = 1.0, more_rpm: float = 0.0) -> str:
-    """What is wrong with a run that has raised no fault; "" if nothing is. The speed may be `clock` times as high, and `more_rpm` further off."""
-    speed, expected = _smooth(after, "plant.speed_rpm"), clock * _smooth(reference, "plant.speed_rpm")
+def _wrong(after: Trace, reference: Trace, limits: Limits, unseen: Unseen = Unseen()) -> str:
+    """What is wrong with a run that has raised no fault, but for what nobody can know; "" if nothing is."""
+    speed, expected = _smooth(after, "plant.speed_rpm"), _smooth(reference, "plant.speed_rpm")
+    ends = np.sort(np.vstack((expected, unseen.clock * expected)), axis=0)
     last, last_expected = _on_at_end(after), _on_at_end(reference)
     if last_expected and not last:
         return "stops without a code"
@@ -120,11 +132,11 @@ def _wrong(after: Trace, reference: Trace, limits: Limits, clock: float = 1.0, m
         return "runs where it should stand"
     if _backwards(after, reference, limits):
         return "turns backwards"
-    if _too_much_current(after, reference, limits):
+    if _too_much_current(after, reference, limits, unseen.start_current):
         return "too much current"
     judged = after.time_s >= limits.settled_s
-    off_rpm = np.abs(speed - expected)[judged]
-    band_rpm = np.maximum(BAND_OF_SPEED * np.abs(expected), BAND_OF_RATED * limits.rated_rpm)[judged] + more_rpm
+    off_rpm = np.maximum(np.maximum(ends[0] - speed, speed - ends[1]), 0.0)[judged]
+    band_rpm = np.maximum(BAND_OF_SPEED * np.abs(ends).max(axis=0), BAND_OF_RATED * limits.rated_rpm)[judged] + unseen.more_rpm
     if last_expected and np.any(off_rpm > band_rpm) and not (limits.limited_is_right and limited(after, judged) > 0.5):
         return f"speed off by up to {np.max(off_rpm):.0f} rpm"
     return ""
@@ -142,8 +154,10 @@ def _backwards(after: Trace, reference: Trace, limits: Limits) -> bool:
     return bool(turns > own_turns + BACKWARDS_TURNS)
 
 
-def _too_much_current(after: Trace, reference: Trace, limits: Limits) -> bool:
-    allowed_a = CURRENT_MARGIN * max(limits.most_current_a, float(np.max(_amplitude(reference), initial=0.0)))
+def _too_much_current(after: Trace, reference: Trace, limits: Limits, start_current: float) -> bool:
+    in_loop = np.isin(after.column("fw.state"), limits.closed)
+    most_a = max(limits.most_current_a, float(np.max(_amplitude(reference), initial=0.0)))
+    allowed_a = CURRENT_MARGIN * most_a * np.where(in_loop, 1.0, start_current)
     over = _amplitude(after) > allowed_a
     rows = max(1, round(CURRENT_S / max(after.period_s, 1e-6)))
     return len(over) >= rows and bool(np.max(np.convolve(over, np.ones(rows), "valid")) >= rows)

@@ -140,6 +140,7 @@ def run(job: simulate.Job, image: Path, report: Callable[[float], None]) -> PilR
     pil = PilLibrary(job.library)
     with simulate.using(PilBoard(pil, image), job) as board:
         result = simulate.simulate_on(job if board.has_names else without_names(job), pil, board, report)
+        result.order_rows = 1
         cycles = Cycles(**{name: board.get(f"cpu.{name}") for name in Cycles.__dataclass_fields__})
         return PilRun(result, cycles, int(board.get("pil.ticks")), int(board.get("pil.differences")), board.difference(),
                       board.has_names)

@@ -44,6 +44,8 @@ class Run:
     wall_s: float = 0.0
     cpu_s: float = 0.0
     motor_s: float = 0.0
+    order_rows: int = 0
+    """rows that the PWM module takes to follow an order: an image's row shows the order already, at the end of the interrupt"""
 
     @property
     def speed_factor(self) -> float:

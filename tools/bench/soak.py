@@ -44,6 +44,10 @@ SAGS, WARM_R, WARM_PSI = (0.87, 1.0), (0.85, 1.4), (0.85, 1.05)
 MIDDLE = 0.05
 """Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
+HIDDEN_SHARE = 0.5
+"""Of the back-EMF: what a warm winding's unknown resistance takes of it at most, or no estimator sees the rotor."""
+SWING_SHARE = 0.5
+"""Of the speed: what a growing load takes of it in an electrical period, before any estimator can have seen it."""
 BIDIRECTIONAL = "BIDIRECTIONAL_SPEED"
 MODES = ("", "", BIDIRECTIONAL)
 """One of these in a segment."""
@@ -214,16 +218,25 @@ class _Drawing:
         return max(abs(rpm) / self.slope, coast_s(self.motor, rpm)) + 0.5
 
     def _most_nm(self, rpm: float) -> float:
-        """The largest drawn load that a warm motor holds at a sagging supply."""
+        """The largest drawn load that a warm motor holds at a sagging supply, and at which its back-EMF can be told from its resistance."""
         values = {key: float(value) for key, value in self.plant.items() if not isinstance(value, tuple)}
         values["motor.rs_ohm"] *= WARM_R[1]
         values["motor.psi_vs"] *= WARM_PSI[1]
         most_a = CURRENT_SHARE * param(self.params, "MAXIMUM_CURRENT_A")
+        emf_v = values["motor.pole_pairs"] * abs(rpm) * math.pi / 30.0 * float(self.plant["motor.psi_vs"]) * WARM_PSI[0]
+        unknown_ohm = float(self.plant["motor.rs_ohm"]) * (WARM_R[1] - 1.0)
         for share in SHARES:
             need = reach.least(values, abs(rpm), share * self.motor.rated_torque_nm, most_a)
-            if need.voltage_v is not None and need.voltage_v <= VOLTAGE_SHARE * SAGS[0] * self.bus_v / math.sqrt(3.0):
+            holds = need.voltage_v is not None and need.voltage_v <= VOLTAGE_SHARE * SAGS[0] * self.bus_v / math.sqrt(3.0)
+            if holds and unknown_ohm * need.iq_a <= HIDDEN_SHARE * emf_v:
                 return share * self.motor.rated_torque_nm
         return 0.0
+
+    def _load_time_s(self, change_nm: float) -> float:
+        """A load that grows by m a second takes m / (2 J f^2) of the speed in an electrical period 1/f."""
+        turns_hz = abs(self.rpm) / 60.0
+        inertia_kgm2 = self.motor.inertia_kgm2 + self.motor.load_inertia_kgm2
+        return abs(change_nm) / (2.0 * inertia_kgm2 * (self.motor.pole_pairs * turns_hz) ** 2 * SWING_SHARE * 2.0 * math.pi * turns_hz)
 
     def _load(self, torque_nm: float, over_s: float, at_s: float | None = None) -> None:
         self.load_nm = torque_nm
@@ -231,7 +244,8 @@ class _Drawing:
         self.now_s += over_s
 
     def _new_load(self) -> None:
-        self._load(self.r.random() * self._most_nm(self.rpm), self.r.choice((0.05, self.r.uniform(0.05, 1.0))))
+        load_nm = self.r.random() * self._most_nm(self.rpm)
+        self._load(load_nm, max(self.r.choice((0.05, self.r.uniform(0.05, 1.0))), self._load_time_s(load_nm - self.load_nm)))
         self._rest(0.0)
 
     def _again(self) -> None:

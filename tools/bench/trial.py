@@ -164,7 +164,8 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         rating = injection.Rating(param(bench.library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(bench.motor.path)).rated_torque_nm,
                                   *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
                                   dead_rpm=dead_rpm(bench.library.params))
-        settled_s = max(injected_s + case.over_s + case.lasts_s + judge.SETTLE_S, way.end_s)
+        unseen = case.what.unseen(case.size, rating)
+        settled_s = settled(case, way.end_s, injected_s, unseen.clock)
         end_s = settled_s + judge.JUDGE_S
 
         def goes_wrong() -> tuple[Run, str]:
@@ -177,10 +178,15 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         without = session.run()
     closed = tuple(number for number, name in bench.library.states.items() if name in ("CLOSED", "STOPPING"))
     limits = judge.Limits(injected_s, settled_s, motor_file.load(str(bench.motor.path)).rated_speed_rpm, rating.current_a, case.what.ends,
-                          bench.library.faults, closed, case.what.limits, case.what.unseen(case.size, rating))
+                          bench.library.faults, closed, case.what.limits, unseen)
     with_fault, target = result or (None, "")
     verdict = _ended(ending) if with_fault is None else judge.judge(with_fault.trace, without.trace, limits)
     return Trial(case, with_fault, without, injected_s, state, target, verdict)
+
+
+def settled(case: Case, way_end_s: float, injected_s: float, clock: float) -> float:
+    """When a case is judged: a while after its fault has come and gone, and after its way is over, which a slow clock makes longer."""
+    return max(injected_s + case.over_s + case.lasts_s + judge.SETTLE_S, injected_s + (way_end_s - injected_s) / min(clock, 1.0))
 
 
 def dead_rpm(params: dict[str, float]) -> float:

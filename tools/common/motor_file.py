@@ -20,6 +20,7 @@
     [rating]
     voltage, current, torque, speed; maximum_speed (what the user wants to reach, with field weakening if need be);
     maximum_current                  optional, 1.5 times current if not given
+    thermal_time                     optional, of the winding: the drive then watches its heat (I2t)
 
     [spread]                         optional: what other sheets and measurements say of resistance, inductance, kphi
     kphi = { values = [7.24, 7.57], unit = "...", source = "..." }
@@ -53,13 +54,14 @@ DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "mot
 TABLES = {"electrical": ("pole_pairs", "resistance", "inductance", "inductance_d", "inductance_q", "kphi", "resistance_tempco",
                          "kphi_tempco"),
           "mechanical": ("inertia", "viscous_friction", "coulomb_friction"),
-          "rating": ("voltage", "current", "torque", "speed", "maximum_speed", "maximum_current"),
+          "rating": ("voltage", "current", "torque", "speed", "maximum_speed", "maximum_current", "thermal_time"),
           "spread": ("resistance", "inductance", "kphi"), "load": ("inertia", "start_torque"), "tune": None, "plant": None}
 """Tables of a motor file with their keys; None: any key, checked elsewhere."""
 
 FACTS = {"NOPOLESPAIRS": "[electrical] pole_pairs", "MOTOR_RS_OHM": "[electrical] resistance", "MOTOR_LS_MH": "[electrical] inductance",
          "MOTOR_KPHI_V_PER_KRPM": "[electrical] kphi", "MOTOR_INERTIA_KGM2": "[mechanical] inertia",
          "MAXIMUM_SPEED_RPM": "[rating] maximum_speed", "MAXIMUM_CURRENT_A": "[rating] maximum_current",
+         "I2T_CURRENT_A": "[rating] current", "I2T_TIME_SEC": "[rating] thermal_time",
          "NOMINAL_BUS_V": "the board file", "LOOPTIME_SEC": "the board file", "DEADTIME_SEC": "the board file",
          "SAMPLE_WINDOW_SEC": "the board file", "NORM_CURRENT_CONST": "the board file", "KCURRA": "the board file",
          "KCURRB": "the board file", "BUS_FULL_SCALE_V": "the board file"}
@@ -98,6 +100,8 @@ class Motor:
     rated_speed_rpm: float
     maximum_speed_rpm: float
     maximum_current_a: float
+    thermal_time_s: float
+    """Of the winding; 0 for none."""
     load_inertia_kgm2: float
     start_torque_nm: float
     """What the shaft carries while starting, friction of the motor not included."""
@@ -262,6 +266,7 @@ def _read_rating(section: Section, reader: _Reader) -> dict[str, float]:
         ("rated_voltage_v", "voltage", units.VOLTAGE), ("rated_current_a", "current", units.CURRENT),
         ("rated_torque_nm", "torque", units.TORQUE), ("rated_speed_rpm", "speed", units.SPEED),
         ("maximum_speed_rpm", "maximum_speed", units.SPEED))}
+    result["thermal_time_s"] = reader.may(section, "thermal_time", units.THERMAL_TIME, 0.0)
     result["maximum_current_a"] = reader.may(section, "maximum_current", units.CURRENT, 1.5 * result["rated_current_a"])
     return result
 

@@ -138,6 +138,7 @@ VISCOUS = Kind("N m s", 0.0, 10.0, _scaled(N_m_s=1.0, mN_m_s=1e-3, uN_m_s=1e-6, 
                                          oz_in__krpm=OUNCE_INCH_NM / KRPM))
 SPEED = Kind("rpm", 50.0, 32000.0, {"rpm": Conversion(1.0), "rad/s": Conversion(1.0 / RPM)})
 VOLTAGE = Kind("V", 3.0, 400.0, {"V": Conversion(1.0)})
+THERMAL_TIME = Kind("s", 2.0, 1000.0, {"s": Conversion(1.0), "min": Conversion(60.0)})
 CURRENT = Kind("A peak", 0.02, 100.0, {"A peak": Conversion(1.0), "A rms": Conversion(SQRT2), "A dc": Conversion(PEAK_PER_DC)})
 
 

@@ -42,6 +42,7 @@ MEANINGS: dict[str, dict[str, str]] = {
         "rating.voltage": "rated voltage", "rating.current": "rated current", "rating.torque": "rated torque",
         "rating.speed": "rated speed", "rating.maximum_speed": "speed to reach, by field weakening if need be",
         "rating.maximum_current": "what the winding withstands for a while",
+        "rating.thermal_time": "the winding's thermal time constant: more than `current` then trips in time (I2t)",
         "spread.resistance": "smallest and largest value of other sheets and measurements; the loops hold over it",
         "spread.inductance": "the same", "spread.kphi": "the same", "load.inertia": "what turns with the rotor",
         "load.start_torque": "what the shaft carries while it starts, the motor's friction not included"},
@@ -109,7 +110,7 @@ MEANINGS: dict[str, dict[str, str]] = {
         "*.to_s": "end"}}
 DEFAULTS = {"board": "`mclv`", "electrical.resistance_tempco": f"{100.0 * motor_file.COPPER_PER_K:g} %/K",
             "electrical.kphi_tempco": f"{100.0 * motor_file.FERRITE_PER_K:g} %/K",
-            "mechanical.viscous_friction": "0", "mechanical.coulomb_friction": "0", "rating.maximum_current": "1.5 times current",
+            "mechanical.viscous_friction": "0", "mechanical.coulomb_friction": "0", "rating.maximum_current": "1.5 times current", "rating.thermal_time": "no I2t",
             "load.inertia": "0", "load.start_torque": "a quarter of the rated torque",
             "measure.name": "reference_rpm as text", "expect speed.measure": "all with a reference",
             "electrical.inductance": "this, or d and q", "electrical.inductance_d": "with q, or inductance",

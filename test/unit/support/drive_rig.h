@@ -109,6 +109,7 @@ static inline void rig_lock(int16_t direction)
 {
     rig_start(direction);
     (void)rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u);
+    rig_tick(1); /* its first period with the law */
 }
 
 /** The speed, as the estimator's filter and the observer see it. */
