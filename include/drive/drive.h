@@ -166,7 +166,7 @@ typedef struct {
     drive_control_t control;
     uint16_t stall_steps;         /**< slow steps below half the reference, less four for each above */
     uint16_t probe_steps;         /**< of the probe whether the rotor turns, and of the pause after it */
-    uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference */
+    uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference; more than a dip while the probe's own lasts */
     current_q13_t probe_id_q13;   /**< its d current */
     current_q13_t probe_most_q13; /**< and the most of it */
     uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */

@@ -176,10 +176,17 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
         run->probe_most_q13 = protection_probe_most(run, p);
     } else if (steps < PROBE_WAIT_STEPS + PROBE_STEPS) {
         id_q13 = qm_clamp(qm_abs(run->control.ref_q13.q), 0, run->probe_most_q13);
+        run->dip_steps = PROBE_DIP_STEPS + 1u; /* a heavy load dips for want of the probe's current: none counts before it is over */
         steps = (uint16_t)(doubtful ? steps + turns : PROBE_WAIT_STEPS + PROBE_STEPS);
     } else {
-        run->dip_steps = (uint16_t)((along < reference - (reference >> 2)) ? run->dip_steps + 1u : 0u);
-        steps = (uint16_t)((steps < PROBE_PAUSE_STEPS && run->dip_steps < PROBE_DIP_STEPS) ? steps + 1u : 0u);
+        if (along >= reference - (reference >> 2)) {
+            run->dip_steps = 0;
+        } else if (run->dip_steps <= PROBE_DIP_STEPS) {
+            run->dip_steps++;
+        } else {
+            /* the probe's own */
+        }
+        steps = (uint16_t)((steps < PROBE_PAUSE_STEPS && run->dip_steps != PROBE_DIP_STEPS) ? steps + 1u : 0u);
     }
     run->probe_steps = steps;
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));

@@ -415,6 +415,19 @@ void test_probe_comes_again_after_five_seconds_or_a_dip_of_10_ms(void)
     TEST_ASSERT_GREATER_THAN_INT16(0, probe(100, 0, 400));
 }
 
+void test_a_dip_that_the_probe_itself_makes_brings_no_other(void)
+{
+    loaded(2.2F);
+    (void)probe(100, 0, 400);
+    rig_speed(7400);
+    TEST_ASSERT_GREATER_THAN_INT16(0, probe(90, 0, 400));
+    TEST_ASSERT_EQUAL_INT16(0, probe(200, 0, 400)); /* still low */
+    rig_speed(7600);
+    (void)probe(1, 0, 400);
+    rig_speed(7400);
+    TEST_ASSERT_GREATER_THAN_INT16(0, probe(100, 0, 400)); /* a new one */
+}
+
 void test_probe_leaves_the_q_current_that_flows_but_for_a_tenth(void)
 {
     static const struct {
