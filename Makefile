@@ -266,7 +266,7 @@ modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_t
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
 slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams make_%),$(bench_py))
-sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search)
+sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search low_speeds)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
 all_suites := $(tools_py) $(longest) $(filter-out $(longest) $(sweep_suites),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
@@ -287,7 +287,7 @@ run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unkn
 test: setup-test setup-checks ## [tests] every test but the sweeps; the last line is "N passed, N failed" [ONLY="test_pi ..."]
 	$(call run_suites,$(all_suites) $(if $(ONLY),$(sweep_suites)),$(if $(ONLY),,--summary $T/summary.json))
 
-test-sweeps: setup-test ## [tests] identification of every motor, and the field-weakening search
+test-sweeps: setup-test ## [tests] identification and lowest speed of every motor, and the field-weakening search
 	$(call run_suites,$(sweep_suites))
 
 test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ..."]

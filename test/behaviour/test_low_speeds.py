@@ -1,0 +1,21 @@
+"""Every motor at the lowest speed that `make lowspeed` asks of it, with all its loads: ten seconds, with every probe of the rotor that falls into them."""
+
+import argparse
+import itertools
+
+import pytest
+from support import MOTORS
+
+from tools.bench import command_common, lowspeed
+from tools.common import motor_file, paths
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_the_lowest_speed_is_held_with_every_load(name):
+    table = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
+    options = argparse.Namespace(motor=name, board=None, userparams=None, library=None)
+    motor, board, library, _ = command_common.set_up(table, options, ["PARAMS_IN_RAM"])
+    table = table.for_motor(motor_file.load(name), library.params)
+    bench = lowspeed.Bench(table, motor, board, library)
+    rows = bench.run(list(itertools.product([min(table.speeds_rpm)], table.torques_nm)), name, True)
+    assert {row["name"]: row["verdict"] for row in rows} == dict.fromkeys([row["name"] for row in rows], "ok") and len(rows) == 3
