@@ -157,6 +157,18 @@ QM_INLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const driv
     return (least < standing) ? standing : least;
 }
 
+/** Steps of a dip; those of the probe's own dip stay beyond PROBE_DIP_STEPS until it is over. */
+QM_INLINE void protection_count_dip(drive_run_t *run, uint16_t dips)
+{
+    if (!dips) {
+        run->dip_steps = 0;
+    } else if (run->dip_steps <= PROBE_DIP_STEPS) {
+        run->dip_steps++;
+    } else {
+        /* the probe's own */
+    }
+}
+
 /** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to nothing and is
  *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
  *  again: soon after a dip of the speed.
@@ -179,13 +191,7 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
         run->dip_steps = PROBE_DIP_STEPS + 1u; /* a heavy load dips for want of the probe's current: none counts before it is over */
         steps = (uint16_t)(doubtful ? steps + turns : PROBE_WAIT_STEPS + PROBE_STEPS);
     } else {
-        if (along >= reference - (reference >> 2)) {
-            run->dip_steps = 0;
-        } else if (run->dip_steps <= PROBE_DIP_STEPS) {
-            run->dip_steps++;
-        } else {
-            /* the probe's own */
-        }
+        protection_count_dip(run, (uint16_t)(along < reference - (reference >> 2)));
         steps = (uint16_t)((steps < PROBE_PAUSE_STEPS && run->dip_steps != PROBE_DIP_STEPS) ? steps + 1u : 0u);
     }
     run->probe_steps = steps;
