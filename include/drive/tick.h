@@ -61,6 +61,20 @@ QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
     return duty;
 }
 
+/** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every eighth period. */
+QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
+{
+    if (d->state == (uint16_t)DRIVE_RAMP) {
+        handover_step(d, p);
+    } else if (d->state == (uint16_t)DRIVE_CATCH) {
+        catch_step(d, p);
+    } else if (d->state != (uint16_t)DRIVE_STOPPING || !speed_turn_round(d, p)) {
+        model_update(d, p);
+    } else {
+        /* what the ramp needs of the model comes in block 5 */
+    }
+}
+
 /** Slow work after the duties of a period are written, for they have a deadline and this has none: one block a period in turn. Bus and
  *  circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
  *  @param v_bus_raw the converter's result for the bus, any value */
@@ -78,23 +92,13 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         done = 0;
         break;
     case 1:
-        if (d->state == (uint16_t)DRIVE_RAMP) {
-            handover_step(d, p);
-        } else if (d->state == (uint16_t)DRIVE_CATCH) {
-            catch_step(d, p);
-        } else if (d->state != (uint16_t)DRIVE_STOPPING || !speed_turn_round(d, p)) {
-            model_update(d, p);
-        } else {
-            /* what the ramp needs of the model comes in block 5 */
-        }
+        drive_state_step(d, p);
         done = 1;
         break;
     case 2:
         bus_step(d, p, v_bus_raw);
         protection_check_model(d, p);
-        if (drive_is_closed(d)) {
-            speed_choose_state(d, p);
-        }
+        speed_choose_step(d, p);
         done = 2;
         break;
     case 3:

@@ -414,7 +414,7 @@ static void mechanics_drops(drive_t *d, int32_t speed_q10)
 
 static void forget_parts(identify_t *id)
 {
-    static const identify_part_t nothing;
+    static const identify_part_t nothing = { 0 };
     int16_t n;
     for (n = 0; n < 3; n++) {
         id->parts[n] = nothing;
@@ -580,34 +580,48 @@ static void mechanics_done(drive_t *d)
     finish(d, IDENTIFY_RESULT_DONE);
 }
 
+/** It is as fast as it shall be: what is left is to coast. */
+static void push_ends(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    if (id->phase_blocks < PUSH_LEAST && id->gentler < GENTLER_MOST) { /* too quick to be seen: it counts no more */
+        id->push_q13 = (int16_t)(id->push_q13 - (id->push_q13 >> 2));
+        id->gentler++;
+        forget_parts(id);
+    }
+    id->coasting = 1;
+    mechanics_current(d, 0);
+}
+
+/** It does not get faster: twice the current, or the end. */
+static void push_harder(drive_t *d, const drive_params_t *p, uint16_t follows)
+{
+    identify_t *id = &d->run.identify;
+    if (id->push_q13 >= p->open_loop_q13 || !follows) {
+        finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
+        return;
+    }
+    forget_parts(id);
+    id->push_q13 = (int16_t)((id->push_q13 > (p->open_loop_q13 >> 1)) ? p->open_loop_q13 : 2 * id->push_q13);
+    mechanics_current(d, id->push_q13);
+}
+
 /** A stretch with current. */
 static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
 {
     identify_t *id = &d->run.identify;
     int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
-    uint16_t last = (uint16_t)(id->push_q13 >= p->open_loop_q13);
+    uint16_t last = (uint16_t)(id->push_q13 >= p->open_loop_q13), settled = (uint16_t)(id->phase_blocks > FOLLOW_SETTLE);
     if (id->phase_blocks == 1u) {
         id->first_q10 = speed_q10 - (speed_q10 >> 3);
     }
-    if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
+    if (settled && speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
         part_add(id, PART_PUSH, speed_q10);
     }
     if (speed_q10 > id->top_q10 + (id->top_q10 >> 5)) {
-        if (id->phase_blocks < PUSH_LEAST && id->gentler < GENTLER_MOST) { /* too quick to be seen: it counts no more */
-            id->push_q13 = (int16_t)(id->push_q13 - (id->push_q13 >> 2));
-            id->gentler++;
-            forget_parts(id);
-        }
-        id->coasting = 1;
-        mechanics_current(d, 0);
-    } else if ((id->phase_blocks > FOLLOW_SETTLE && speed_q10 < id->first_q10) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {
-        if (last || speed_q10 < (bottom_q10 >> 1)) {
-            finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
-            return;
-        }
-        forget_parts(id);
-        id->push_q13 = (int16_t)((id->push_q13 > (p->open_loop_q13 >> 1)) ? p->open_loop_q13 : 2 * id->push_q13);
-        mechanics_current(d, id->push_q13);
+        push_ends(d);
+    } else if ((settled && speed_q10 < id->first_q10) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {
+        push_harder(d, p, (uint16_t)(speed_q10 >= (bottom_q10 >> 1)));
     } else {
         /* it accelerates */
     }
