@@ -31,7 +31,14 @@ def test_another_motor_gets_the_same_shares_of_its_rated_speed_and_no_limit_for_
     other = TABLE.for_motor(linix, {"MINIMUM_SPEED_RPM": 200.0, "MAXIMUM_SPEED_RPM": 4000.0})
     share = linix.rated_speed_rpm / hurst.rated_speed_rpm
     assert (other.lowest_rpm, other.speed_rpm) == pytest.approx((-2500.0 * share, 1500.0 * share), rel=0.01)
-    assert (other.highest_rpm, other.stop_s) == (4000.0, [0.0, 0.0, 0.0])
+    assert (other.highest_rpm, other.stop_s, other.settle_s) == (4000.0, [0.0, 0.0, 0.0], TABLE.settle_s)
+
+
+def test_a_motor_whose_winding_takes_longer_for_the_rotor_s_energy_gets_that_time():
+    hurst = motor_file.load(HURST)
+    heavy = TABLE.for_motor(replace(hurst, inertia_kgm2=20.0 * hurst.inertia_kgm2), {"MINIMUM_SPEED_RPM": 200.0, "MAXIMUM_SPEED_RPM": 5500.0})
+    energy_j, most_w = 0.5 * 36.0 * hurst.inertia_kgm2 * (2500.0 * 2.0 * np.pi / 60.0) ** 2, 1.5 * hurst.rs_ohm * hurst.maximum_current_a ** 2
+    assert heavy.settle_s == pytest.approx(TABLE.settle_s + 19.0 * energy_j / most_w, rel=0.02)
 
 
 def cases(rpm=2000.0, inertia=9.0):
@@ -63,6 +70,13 @@ def test_the_moment_of_control_its_speed_and_the_angle_when_it_must_be_right():
     found = catch_sweep.taken_over(closed, run(recorded=closed), 0.5, 0.2)
     assert (found["angle_error_deg"], found["pull_deg"]) == (pytest.approx(2.0), None)
     assert catch_sweep.taken_over(trace(2.0, **{"fw.state": 1.0}), run(), 0.5, 0.2) == {}
+
+
+def test_the_current_of_the_loop_before_is_no_pull_of_the_forced_angle():
+    recorded = trace(2.0, **{"fw.state": step((0.0, 6.0), (0.69, 4.0)), "plant.i_q": 1.0, "plant.i_d": step((0.0, -1.0), (0.6915, 1.0))})
+    assert catch_sweep.taken_over(recorded, run(recorded=recorded), 0.5, 0.2)["pull_deg"] == pytest.approx(45.0, abs=1e-3)
+    slow = trace(2.0, **{"fw.state": step((0.0, 6.0), (0.69, 4.0)), "plant.i_q": 1.0, "plant.i_d": step((0.0, -1.0), (0.693, 1.0))})
+    assert catch_sweep.taken_over(slow, run(recorded=slow), 0.5, 0.2)["pull_deg"] == pytest.approx(135.0, abs=1e-3)
 
 
 def test_a_stop_takes_until_the_outputs_are_off_or_has_no_time():

@@ -2,6 +2,7 @@
 tools/bench/scenarios/tables/catch.toml."""
 
 import argparse
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,6 +26,8 @@ DEBOUNCED_S = 0.028
 FORCED, ALIGNED = "RAMP", "ALIGN"
 DRIVEN = (FORCED, "CLOSED", "STOPPING")
 LOOK_S = 0.02
+CHANGES_S = 0.002
+"""The current of the loop before takes so long to become that of the forced angle."""
 """Over which the angle is looked at, up to within_s."""
 STOP_SETTLE_S, STOP_LONGEST_S = 2.0, 8.0
 INERTIA = "mech.inertia_kgm2"
@@ -72,10 +75,19 @@ class Table(sweep.Table):
             raise UserError("columns of different lengths", self.stop_s_where, "give stop_factors and stop_s as many numbers each")
 
     def for_motor(self, motor: motor_file.Motor, params: dict[str, float]) -> "Table":
-        """The table for another motor than its own: shares of its rated speed, and no limit for the time of a stop."""
+        """The table for another motor than its own: shares of its rated speed, as much more time as its winding takes for its heaviest rotor's energy, and
+        no limit for the time of a stop."""
+        own = motor_file.load(self.motor)
         (lowest, highest, speed), _ = sweep.shares(self.motor, motor, [self.lowest_rpm, self.highest_rpm, self.speed_rpm], [])
-        return replace(self, motor=motor.name, lowest_rpm=lowest, highest_rpm=min(highest, param(params, "MAXIMUM_SPEED_RPM")),
+        more_s = self.burn_s(motor, lowest) - self.burn_s(own, self.lowest_rpm)
+        return replace(self, motor=motor.name, settle_s=self.settle_s + max(0.0, more_s), lowest_rpm=lowest,
+                       highest_rpm=min(highest, param(params, "MAXIMUM_SPEED_RPM")),
                        speed_rpm=sweep.within_header(params, speed), stop_s=[0.0] * len(self.stop_s))
+
+    def burn_s(self, motor: motor_file.Motor, rpm: float) -> float:
+        """How long the most current takes to turn the heaviest rotor's energy into heat of the winding."""
+        energy_j = 0.5 * max(self.inertia_factors) * motor.inertia_kgm2 * (rpm * math.pi / 30.0) ** 2
+        return energy_j / (1.5 * motor.rs_ohm * motor.maximum_current_a ** 2)
 
     def draws(self) -> list[tuple[float, float, float]]:
         """Speed, electrical angle and inertia of each row."""
@@ -171,8 +183,10 @@ def taken_over(trace: Trace, run: Run, s2_s: float, within_s: float) -> dict[str
     error = np.abs(wrapped_deg(angle.column("fw.theta_est_deg").astype(np.float64) - angle.column("plant.theta_e_deg")))
     pull = np.abs(np.degrees(np.arctan2(angle.column("plant.i_q").astype(np.float64), angle.column("plant.i_d"))))
     forced = angle.column("fw.state") == run.state_number(FORCED)
+    before = trace.part(s2_s + within_s - LOOK_S - CHANGES_S, s2_s + within_s - CHANGES_S).column("fw.state") == run.state_number(FORCED)
     return {"how": numbers[int(state[rows[0]])], "control_s": float(then - s2_s), "speed_then_rpm": float(trace.column("plant.speed_rpm")[rows[0]]),
-            "angle_error_deg": float(error[~forced].mean()) if not forced.all() else None, "pull_deg": float(pull[forced].max()) if forced.any() else None}
+            "angle_error_deg": float(error[~forced].mean()) if not forced.all() else None,
+            "pull_deg": float(pull[forced & before].max()) if (forced & before).any() else None}
 
 
 def stopped(trace: Trace, run: Run, s2_s: float) -> dict[str, Any]:
