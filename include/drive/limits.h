@@ -36,7 +36,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
 }
 
-/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 filtered */
+/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 see bus_highest_q15() */
 QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15)
 {
     int16_t over = (int16_t)(bus_q15 - p->bus_regen_q15);

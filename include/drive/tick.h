@@ -114,7 +114,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 6:
         if (drive_is_closed(d)) {
             handover_decay(d);
-            limits_braking(run, p, qm_hi(d->bus_q31));
+            limits_braking(run, p, bus_highest_q15(d, v_bus_raw));
         }
         model_learn_step(d, p);
         done = 6;
