@@ -104,6 +104,22 @@ void test_braking_current_fades_between_27_and_29_volts(void)
     TEST_ASSERT_LESS_THAN_INT16(4960, drive.run.control.brake_limit_q13);
 }
 
+/** The filter would let the bus of a small capacitor rise by another volt or two before braking ends. */
+void test_braking_ends_with_the_sample_of_a_rising_bus_and_comes_back_with_the_filtered_one(void)
+{
+    rig_closed(1, 5000);
+    rig_bus(24.0F);
+    rig_tick(400);
+    TEST_ASSERT_EQUAL_INT16(4960, drive.run.control.brake_limit_q13);
+    rig_bus(29.2F);
+    rig_tick(8);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.brake_limit_q13);
+    rig_tick(400);
+    rig_bus(24.0F);
+    rig_tick(8); /* 27.9 V */
+    TEST_ASSERT_INT16_WITHIN(300, 2650, drive.run.control.brake_limit_q13);
+}
+
 void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)
 {
     static const struct {
