@@ -117,8 +117,11 @@ QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
 /** The same, but above the ripple: an answer to that would drive the current through zero, where dead time makes more of it. */
 QM_INLINE int16_t observer_above_ripple(const observer_t *o, int16_t large_erpm)
 {
-    int16_t ripple = (int16_t)(qm_clamp(qm_hi(o->ripple_q16), 0, 32767 >> OBSERVER_RIPPLE_SHIFT) * (1 << OBSERVER_RIPPLE_SHIFT));
-    return (large_erpm > ripple) ? large_erpm : ripple;
+    int16_t ripple = qm_hi(o->ripple_q16);
+    if (ripple <= (large_erpm >> OBSERVER_RIPPLE_SHIFT)) {
+        return large_erpm;
+    }
+    return (int16_t)((ripple > (32767 >> OBSERVER_RIPPLE_SHIFT)) ? 32767 : ripple * (1 << OBSERVER_RIPPLE_SHIFT));
 }
 
 /** As much unrest as at the hand-over, at least. */
@@ -180,7 +183,8 @@ QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
     if (!observer_is_calm(o)) {
         o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
     } else {
-        (void)qm_lowpass(&o->ripple_q16, (size < o->large_erpm) ? size : o->large_erpm, OBSERVER_RIPPLE_Q16);
+        int16_t counts = (size < o->large_erpm) ? size : o->large_erpm; /* within innovation_max_erpm, so that the difference fits a word */
+        o->ripple_q16 += qm_mulss((int16_t)(counts - qm_hi(o->ripple_q16)), OBSERVER_RIPPLE_Q16);
         o->unrest_steps = (uint16_t)((o->unrest_steps != 0u) ? o->unrest_steps - 1u : 0u);
     }
     if (size > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {

@@ -758,7 +758,7 @@ class Observer:
         rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
         self.rate = toward(rate, toward(0, p["quick_q16"], self.part), self.quick)
         large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
-        self.large = max(min(large + large * self.unrest // 256, 32767), 4 * clamp(upper(self.ripple), 0, 8191))
+        self.large = max(min(large + large * self.unrest // 256, 32767), min(4 * upper(self.ripple), 32767))
 
     def innovation(self, rho, middle):
         """By how much the angle turned further than the speed says, rounded to counts of 2^-16 turns, then to electrical rpm."""

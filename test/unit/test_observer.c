@@ -418,7 +418,7 @@ void test_a_step_of_the_load_is_no_ripple(void)
 
 void test_ripple_at_the_end_of_its_format_keeps_what_is_large_in_a_word(void)
 {
-    static const int16_t cases[][2] = { { 8191, 32764 }, { 8192, 32764 }, { 16383, 32764 }, { 8190, 32760 }, { 37, 149 }, { 38, 152 } };
+    static const int16_t cases[][2] = { { 8191, 32764 }, { 8192, 32767 }, { 16383, 32767 }, { 8190, 32760 }, { 37, 149 }, { 38, 152 } };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         begin(0);
         o.ripple_q16 = (int32_t)cases[n][0] * 65536;
