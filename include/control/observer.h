@@ -8,8 +8,8 @@
  * i_load goes to the controller as it is, so the loop is stiff without waiting for an integral. The rate follows what is known: slow
  * without load, where dead time disturbs the back-EMF most; quicker under load; quickest for a while after a large innovation
  * w^ - w; and all in proportion to the speed at low speed, for the estimator's own lock is as quick as the rotor turns. What counts as
- * large stands out from the ripple that is always there, grows while large ones go on, and one that turns back ends the answer: a step of
- * the load stands out from the calm before it and has one direction, the loop's own swing does not. */
+ * large grows while large ones go on, and one that turns back ends the answer: a step of the load stands out from the calm before it and
+ * has one direction, the loop's own swing does not. */
 #ifndef CONTROL_OBSERVER_H
 #define CONTROL_OBSERVER_H
 
@@ -18,8 +18,6 @@
 #define OBSERVER_UNREST_STEPS 1000 /**< a load step is over in a tenth of a second; what goes on longer is the loop's own */
 #define OBSERVER_UNREST_SHIFT 8    /**< after 256 / 4 steps that were not calm, a large innovation is twice as large */
 #define OBSERVER_START_UNREST 768  /**< at the hand-over it is four times as large: d current and wrong constants shake the estimate */
-#define OBSERVER_RIPPLE_Q16 256    /**< the ripple is the innovations' mean size over 256 calm steps, a tenth of a second */
-#define OBSERVER_RIPPLE_SHIFT 2    /**< what dead time and the converter's steps make peaks at two to four times its mean */
 #define OBSERVER_HALF_Q15 12288    /**< so quick up to one and a half of what is large: dead time may be behind it */
 #define OBSERVER_CALM_SHIFT 6      /**< after a large innovation the quick rate fades by 1/64 a step */
 
@@ -51,7 +49,6 @@ typedef struct {
     q15_t quick_q15;       /**< 1 = a large innovation was just seen */
     uint16_t wrong_steps;  /**< steps with an innovation above wrong_erpm, less those without */
     int16_t large_last;    /**< the last large innovation, erpm */
-    int32_t ripple_q16;    /**< mean size of the innovations while calm, erpm with 16 fraction bits */
     uint16_t unrest_steps; /**< four for each step that was not calm, less one for each that was */
     q15_t share_q15;       /**< of the full rates, by the speed */
 } observer_t;
@@ -114,16 +111,6 @@ QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
     return (int16_t)((large > 32767) ? 32767 : large);
 }
 
-/** The same, but above the ripple: an answer to that would drive the current through zero, where dead time makes more of it. */
-QM_INLINE int16_t observer_above_ripple(const observer_t *o, int16_t large_erpm)
-{
-    int16_t ripple = qm_hi(o->ripple_q16);
-    if (ripple <= (large_erpm >> OBSERVER_RIPPLE_SHIFT)) {
-        return large_erpm;
-    }
-    return (int16_t)((ripple > (32767 >> OBSERVER_RIPPLE_SHIFT)) ? 32767 : ripple * (1 << OBSERVER_RIPPLE_SHIFT));
-}
-
 /** As much unrest as at the hand-over, at least. */
 QM_INLINE void observer_unsettle(observer_t *o)
 {
@@ -151,7 +138,6 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
     wrong = qm_clamp((int16_t)(p->large_erpm + (speed >> 5)), 0, 16383);
     o->wrong_erpm = observer_between((int16_t)(2 * wrong), wrong, loaded);
     o->large_erpm = observer_large((int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5)), o->unrest_steps);
-    o->large_erpm = observer_above_ripple(o, o->large_erpm);
 }
 
 /** By how much the angle has turned further in a step than the speed says, as a speed.
@@ -178,21 +164,20 @@ QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovat
 /** What a step's innovation calls for: in full from one and a half of what is large; none while it is the loop's own swing. */
 QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
 {
-    int16_t size = qm_abs(innovation);
     q15_t level = 0;
     if (!observer_is_calm(o)) {
         o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
+    } else if (o->unrest_steps != 0u) {
+        o->unrest_steps--;
     } else {
-        int16_t counts = (size < o->large_erpm) ? size : o->large_erpm; /* within innovation_max_erpm, so that the difference fits a word */
-        o->ripple_q16 += qm_mulss((int16_t)(counts - qm_hi(o->ripple_q16)), OBSERVER_RIPPLE_Q16);
-        o->unrest_steps = (uint16_t)((o->unrest_steps != 0u) ? o->unrest_steps - 1u : 0u);
+        /* calm for long */
     }
-    if (size > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
+    if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
         if ((innovation ^ o->large_last) < 0 && !observer_is_calm(o)) {
             o->unrest_steps = OBSERVER_UNREST_STEPS;
         }
         o->large_last = innovation;
-        level = (int16_t)((size - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
+        level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
     }
     o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
     if (o->quick_q15 < level) {

@@ -88,7 +88,7 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
     if (run->handover.speed_is_preset) {
         observer_step(&run->observer, &p->observer, run->estimator.rho_q32, c->i_q13.q);
         if (run->handover.offset != 0) {
-            observer_unsettle(&run->observer); /* the ripple grows while the d current falls */
+            observer_unsettle(&run->observer); /* dead time shakes the estimate most while the d current falls */
         }
     } else {
         run->handover.speed_is_preset = 1;

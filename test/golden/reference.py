@@ -709,15 +709,10 @@ class Observer:
     part: int = 0
     unrest: int = 0
     large_last: int = 0
-    ripple: int = 0
 
     @property
     def calm(self):
         return self.quick < 4096
-
-    def follow_ripple(self, size):
-        """Their mean over 256 calm steps."""
-        self.ripple = s32(self.ripple + 256 * (size - upper(self.ripple)))
 
     def follow_unrest(self, innovation):
         """Four more for a step that is not calm, one less for one that is; from 1000 on, a large innovation counts in the calm only. Large ones to
@@ -725,7 +720,6 @@ class Observer:
         if not self.calm:
             self.unrest += 4 if self.unrest < 4000 else 0
         else:
-            self.follow_ripple(min(abs(innovation), self.large))
             self.unrest -= 1 if self.unrest else 0
         counts = abs(innovation) > self.large and (self.unrest < 1000 or self.calm)
         if counts:
@@ -758,7 +752,7 @@ class Observer:
         rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
         self.rate = toward(rate, toward(0, p["quick_q16"], self.part), self.quick)
         large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
-        self.large = max(min(large + large * self.unrest // 256, 32767), min(4 * upper(self.ripple), 32767))
+        self.large = min(large + large * self.unrest // 256, 32767)
 
     def innovation(self, rho, middle):
         """By how much the angle turned further than the speed says, rounded to counts of 2^-16 turns, then to electrical rpm."""
@@ -788,9 +782,6 @@ class ObserverReal(Observer):
     def calm(self):
         return self.quick < 0.125
 
-    def follow_ripple(self, size):
-        self.ripple += (size - self.ripple) / 256
-
     def preset(self, rho, speed, iq):
         self.rho, self.omega, self.load, self.quick = rho, float(speed), iq * self.p["per_current_q16"] / WORD, 0.0
         self.unrest = 768
@@ -802,8 +793,7 @@ class ObserverReal(Observer):
         self.part = slow + (min(2 * slow, 1) - slow) * loaded
         rate = p["quiet_q16"] * slow * (1 - loaded) + p["loaded_q16"] * self.part * loaded
         self.rate = (rate + (p["quick_q16"] * self.part - rate) * self.quick) / WORD
-        large = (p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 256)
-        self.large = max(large, 4 * self.ripple)
+        self.large = (p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 256)
 
     def step(self, rho, iq):
         p, before = self.p, self.omega

@@ -60,7 +60,6 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     o.rho_q32 = any_ul(0, UINT32_MAX);
     o.rate_q16 = any(0, next);
     o.large_erpm = ANY16();
-    o.ripple_q16 = any_l(0, 16383 * 65536l + 65535l);
     o.wrong_erpm = ANY16();
     o.wrong_steps = any_u(0, 65534); /* a fault ends the run long before */
     o.unrest_steps = ANYU16();
@@ -69,7 +68,6 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     observer_step(&o, &p, any_ul(0, UINT32_MAX), any(-IQ_MAX, IQ_MAX));
     //@ check speed: -32767 * 65536 <= o.omega_q16 <= 32767 * 65536;
     //@ check load: -8192 * 65536 <= o.load_q16 <= 8192 * 65536;
-    //@ check ripple: -16384 * 65536 <= o.ripple_q16 <= 16512 * 65536;
     //@ check quick: calm_low == 16384 || 0 <= o.quick_q15;
 }
 

@@ -73,7 +73,6 @@ static void any_observer_state(observer_t *o)
     o->large_erpm = any(0, 32767);
     o->quick_q15 = any(0, 32767);
     o->unrest_steps = ANYU16();
-    o->ripple_q16 = any_l(0, 16383 * 65536l + 65535l);
     o->large_last = ANY16();
     o->share_q15 = any(0, 32767);
 }

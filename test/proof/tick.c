@@ -178,7 +178,6 @@ static inline void observer_step_bounded(observer_t *o, const observer_params_t 
     o->rho_q32 = rho_q32;
     o->quick_q15 = any(0, 32767);
     o->unrest_steps = ANYU16();
-    o->ripple_q16 = any_l(0, 16383 * 65536l + 65535l);
     o->large_last = ANY16();
 }
 

@@ -309,7 +309,7 @@ void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(voi
     }
 }
 
-/** Dead time's ripple grows while the d current falls; without it the unrest ends some 0.3 s after the hand-over. */
+/** Dead time shakes the estimate of an unloaded light rotor most while the d current falls; without this the unrest ends some 0.3 s after the hand-over. */
 void test_unrest_of_the_hand_over_lasts_until_its_d_current_is_gone(void)
 {
     at_the_end_of_the_ramp(1);

@@ -373,60 +373,6 @@ void test_one_side_after_the_other_with_calm_between_is_no_unrest(void)
     TEST_ASSERT_UINT16_WITHIN(8, 4 * 132, o.unrest_steps);
 }
 
-/** Steps at standstill with innovations of so many erpm to both sides in turn. */
-static void ripple(uint16_t steps, int16_t erpm)
-{
-    int16_t counts = (int16_t)((int32_t)erpm * 4096 / p->per_turn_q12);
-    for (uint16_t n = 0; n < steps; n++) {
-        observer_schedule(&o, p, 0);
-        turned_by((int16_t)((n & 1u) ? counts : -counts));
-    }
-}
-
-/** An unloaded motor's dead time and the converter's steps shake the estimate all the time. */
-void test_a_large_innovation_stands_out_from_the_ripple(void)
-{
-    begin(0);
-    ripple(2000, 140); /* large is 149 */
-    TEST_ASSERT_INT16_WITHIN(12, 4 * 140, o.large_erpm);
-    TEST_ASSERT_EQUAL_INT16(0, o.quick_q15);
-    ripple(1, 300);
-    TEST_ASSERT_EQUAL_INT16_MESSAGE(0, o.quick_q15, "an answer to twice the ripple");
-    ripple(1, 700);
-    TEST_ASSERT_EQUAL_INT16_MESSAGE(OBSERVER_HALF_Q15, o.quick_q15, "no answer to five times the ripple");
-    ripple(3000, 0);
-    TEST_ASSERT_EQUAL_INT16(149, o.large_erpm);
-    ripple(1, 300);
-    TEST_ASSERT_EQUAL_INT16_MESSAGE(32767, o.quick_q15, "the ripple has gone");
-}
-
-/** Else the load's own innovations would hide the next load. */
-void test_a_step_of_the_load_is_no_ripple(void)
-{
-    int32_t before_q16, after_q16;
-    begin(0);
-    ripple(3000, 20);
-    before_q16 = o.ripple_q16;
-    TEST_ASSERT_INT32_WITHIN(3 * 65536, 20 * 65536, before_q16);
-    ripple(1, 5000);
-    after_q16 = o.ripple_q16;
-    TEST_ASSERT_EQUAL_INT32(before_q16 + 256 * (149 - before_q16 / 65536), after_q16); /* what is beyond large counts as that */
-    ripple(50, 5000);
-    TEST_ASSERT_FALSE(observer_is_calm(&o));
-    TEST_ASSERT_EQUAL_INT32_MESSAGE(after_q16, o.ripple_q16, "counts in the calm only");
-}
-
-void test_ripple_at_the_end_of_its_format_keeps_what_is_large_in_a_word(void)
-{
-    static const int16_t cases[][2] = { { 8191, 32764 }, { 8192, 32767 }, { 16383, 32767 }, { 8190, 32760 }, { 37, 149 }, { 38, 152 } };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        begin(0);
-        o.ripple_q16 = (int32_t)cases[n][0] * 65536;
-        observer_schedule(&o, p, 0);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], o.large_erpm, golden_row(n));
-    }
-}
-
 static int16_t innovation(uint32_t from_q32, uint32_t to_q32, int16_t erpm)
 {
     o.rho_q32 = from_q32;
