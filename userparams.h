@@ -227,6 +227,7 @@
  * start
  *   forced.end_speed_q10                 1000 rpm            279620  Q10 angle counts a period   -0.000 %  end of the ramp
  *   forced.increase_rate_q10           715.26 rpm/s              10  Q10 counts/period^2            exact  acceleration
+ *   flying_start                            1 1                   1  flag                           exact  1: a rotor that turns is caught
  *   align_periods                         0.2 s                4000  periods                        exact  lock
  *   align_sweep_q32                       900 deg/s          536870  Q32 of a turn a period         exact  first half of the lock
  *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
@@ -240,6 +241,7 @@
  *   i2t_most_q25                            0 A^2                 0  Q25 A^2                        exact  heat that trips
  *   i2t_rate_q16                    0.0085333 1                 559  Q16 a step                  -0.043 %  what the heat follows in 512 ms
  *   fieldweak.trim_max_q13                1.5 A                2793  Q13 A                       +0.010 %  most that the voltage feedback adds
+ *   burn_most_q13                      2.6641 A                4960  Q13 A                       -0.000 %  most d current that burns the rotor's energy
  *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal
  *   bus_over_q15                           34 V               21101  Q15 of full scale           +0.002 %  trips
  *   bus_under_q15                          12 V                7447  Q15 of full scale           -0.004 %  trips

@@ -142,6 +142,7 @@ static void start(void)
     FIELD(forced.end_speed_q10, END_SPEED_RPM, "rpm", 60.0 / pairs / period / 67108864.0, "Q10 angle counts a period", "end of the ramp");
     FIELD(forced.increase_rate_q10, OPENLOOP_RAMPSPEED_INCREASERATE / 67108864.0 / (period * period) * 60.0 / pairs, "rpm/s", 0.0,
           "Q10 counts/period^2", "acceleration");
+    FIELD(flying_start, FLYING_START, "1", 1.0, "flag", "1: a rotor that turns is caught");
     FIELD(align_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
     FIELD(align_sweep_q32, 90.0 / (LOCK_TIME / 2.0 * period), "deg/s", 0.0, "Q32 of a turn a period", "first half of the lock");
     FIELD(open_loop_q13, Q_CURRENT_REF_OPENLOOP, "A", q13_a, "Q13 A", "current of lock and ramp");
@@ -159,6 +160,7 @@ static void limits(void)
     FIELD(i2t_most_q25, (double)I2T_CURRENT_A * I2T_CURRENT_A, "A^2", 2.0 * q13_a * q13_a, "Q25 A^2", "heat that trips");
     FIELD(i2t_rate_q16, 0.512 / I2T_TIME_SEC, "1", 1.0 / 65536.0, "Q16 a step", "what the heat follows in 512 ms");
     FIELD(fieldweak.trim_max_q13, FW_TRIM_CURRENT_A, "A", q13_a, "Q13 A", "most that the voltage feedback adds");
+    FIELD(burn_most_q13, PARAM_BURNS ? most * 31.0 / 32.0 : 0.0, "A", q13_a, "Q13 A", "most d current that burns the rotor's energy");
     FIELD(current_max_reciprocal, most, "A", most / (33554432.0 / (most / q13_a)), "2^25 / Q13", "its reciprocal");
     FIELD(bus_over_q15, OVER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");
     FIELD(bus_under_q15, UNDER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");

@@ -111,6 +111,14 @@ QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
     return (int16_t)((large > 32767) ? 32767 : large);
 }
 
+/** As much unrest as at the hand-over, at least. */
+QM_INLINE void observer_unsettle(observer_t *o)
+{
+    if (o->unrest_steps < OBSERVER_START_UNREST) {
+        o->unrest_steps = OBSERVER_START_UNREST;
+    }
+}
+
 /** The rate for the next step. @param ref_erpm speed reference, any */
 QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm)
 {

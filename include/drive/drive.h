@@ -59,6 +59,7 @@ typedef struct {
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
+    current_q13_t burn_most_q13;        /**< most d current that burns energy in the winding; 0 where that would be no gain */
     uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
     int32_t i2t_most_q25;               /**< square of I2T_CURRENT_A; 0: no I2t */

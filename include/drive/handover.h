@@ -87,6 +87,9 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
     const drive_control_t *c = &run->control;
     if (run->handover.speed_is_preset) {
         observer_step(&run->observer, &p->observer, run->estimator.rho_q32, c->i_q13.q);
+        if (run->handover.offset != 0) {
+            observer_unsettle(&run->observer); /* dead time shakes the estimate most while the d current falls */
+        }
     } else {
         run->handover.speed_is_preset = 1;
         observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, estimator_speed(&run->estimator), c->ref_q13.q);

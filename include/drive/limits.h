@@ -36,7 +36,7 @@ QM_INLINE void limits_burn(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
     int16_t step = (int16_t)(limits_bus_holds(c, observer_speed(&run->observer)) ? LIMITS_BURN_STEP_Q13 : -LIMITS_BURN_STEP_Q13);
-    c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, limits_asked_most(p));
+    c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, p->burn_most_q13);
 }
 
 /** d current: what is left of the hand-over, the table with its trim or what is burnt, the rotor's probe; the q current gets the rest of the circle. */

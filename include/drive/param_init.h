@@ -111,6 +111,7 @@
         .wait_steps = PARAM_SLOW_STEPS(0.2F), \
         .open_loop_q13 = CURRENT_Q13(Q_CURRENT_REF_OPENLOOP), \
         .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
+        .burn_most_q13 = PARAM_BURNS ? CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * 31.0F / 32.0F) : 0, \
         .current_max_reciprocal = (uint16_t)(33554432.0F / (PARAM_F(MAXIMUM_CURRENT_A) / PARAM_F(NORM_CURRENT_CONST) / 4.0F) + 0.5F), \
         .overcurrent_q13 = CURRENT_Q13(OVER_CURRENT_THRESHOLD_A), \
         .i2t_most_q25 = (int32_t)CURRENT_Q13(I2T_CURRENT_A) * CURRENT_Q13(I2T_CURRENT_A) / 2, \

@@ -182,6 +182,9 @@
 #define PARAM_LOWEST_ERPM (PARAM_F(PARAM_LOWEST_SHARE) * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 /** Largest bandwidth of the speed loop, which falls with the speed as the rates do. */
 #define PARAM_CALM_HZ (PARAM_F(PARAM_CALM_SHARE) / 60.0F * PARAM_MAX(PARAM_FULL_ERPM, PARAM_F(MINIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS)))
+/** d current I burns 1.5 R I^2; half of dead time's voltage, all that its compensation may leave where the current's ripple crosses zero, turns it by an
+ *  angle that brakes and gives back 1.5 V I. */
+#define PARAM_BURNS (PARAM_F(MOTOR_RS_OHM) * PARAM_F(MAXIMUM_CURRENT_A) > 0.5F * PARAM_DEAD_TIME_V)
 #define PARAM_LOAD_FROM_LOST 5 /* times the current that dead time loses */
 /** Where the load's current is clear of what dead time leaves; within what the observer's schedule divides by. */
 #define PARAM_LOAD_FROM PARAM_MIN(PARAM_MAX(PARAM_F(PARAM_LOAD_FROM_LOST) * PARAM_LOST_CURRENT_Q13 * PARAM_ACCEL_UNITS, 1.0F), 16000.0F)

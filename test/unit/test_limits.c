@@ -104,6 +104,22 @@ void test_braking_current_fades_between_27_and_29_volts(void)
     TEST_ASSERT_LESS_THAN_INT16(4960, drive.run.control.brake_limit_q13);
 }
 
+/** The filter would let the bus of a small capacitor rise by another volt or two before braking ends. */
+void test_braking_follows_the_bus_of_the_moment(void)
+{
+    rig_closed(1, 5000);
+    rig_bus(24.0F);
+    rig_tick(400);
+    TEST_ASSERT_EQUAL_INT16(4960, drive.run.control.brake_limit_q13);
+    rig_bus(29.2F);
+    rig_tick(8);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.brake_limit_q13);
+    rig_tick(400);
+    rig_bus(24.0F);
+    rig_tick(8);
+    TEST_ASSERT_EQUAL_INT16(4960, drive.run.control.brake_limit_q13);
+}
+
 void test_brake_limit_holds_braking_current_and_leaves_driving_current(void)
 {
     static const struct {
@@ -142,16 +158,21 @@ void test_braking_that_was_limited_leaves_nothing_behind(void)
 
 /* ---- what the bus does not take ---- */
 
-static current_q13_t burnt_after(uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)
+static current_q13_t burnt_with(const drive_params_t *p, uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)
 {
     drive_control_t *c = &drive.run.control;
     rig_speed(10000);
     c->brake_limit_q13 = brake_limit_q13;
     c->ref_q13.q = limits_apply_braking(c, 10000, iq_q13);
     while (steps-- != 0u) {
-        limits_burn(&drive.run, &params);
+        limits_burn(&drive.run, p);
     }
     return c->burn_q13;
+}
+
+static current_q13_t burnt_after(uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)
+{
+    return burnt_with(&params, steps, brake_limit_q13, iq_q13);
 }
 
 void test_d_current_grows_while_the_bus_holds_braking_back_and_goes_when_it_does_not(void)
@@ -164,6 +185,14 @@ void test_d_current_grows_while_the_bus_holds_braking_back_and_goes_when_it_does
     TEST_ASSERT_EQUAL_INT16(4960, burnt_after(200, 700, -5120)); /* 31/32 of MAXIMUM_CURRENT_A */
     TEST_ASSERT_EQUAL_INT16(4640, burnt_after(10, 700, -600));
     TEST_ASSERT_EQUAL_INT16(0, burnt_after(150, 700, 0));
+}
+
+void test_a_winding_that_would_burn_less_than_dead_time_gives_back_burns_nothing(void)
+{
+    drive.run.control.iq_limit_q13 = 5120;
+    limited = params;
+    limited.burn_most_q13 = 0;
+    TEST_ASSERT_EQUAL_INT16(0, burnt_with(&limited, 200, 0, -5120));
 }
 
 void test_d_current_gives_way_where_the_circle_and_not_the_bus_holds_braking_back(void)

@@ -191,6 +191,7 @@ void test_currents_voltages_and_modulator(void)
     EXACT(CURRENT_Q13(-2.2), -4096);
     EXACT(p.open_loop_q13, 2625);
     EXACT(p.current_max_q13, 5120);
+    EXACT(p.burn_most_q13, 4960); /* 2.67 ohm * 2.75 A are more than half of 0.96 V */
     EXACT(p.overcurrent_q13, 7075);
     EXACT(p.current_max_reciprocal, 6554); /* 2^25 / 5120 */
     EXACT(p.kcurr_a, -16384);
