@@ -152,7 +152,7 @@ def test_what_the_build_refuses_of_a_boards_numbers_names_the_board_file_and_a_m
     lines = error.splitlines()
     assert code == 2 and all("late.toml line " in line for line in lines), error
     assert {line.split(" = ")[0] for line in lines} == {"foc33: OVER_VOLTAGE_V", "foc33: UNDER_VOLTAGE_V"}
-    with motor_path(("value = 5, source", "value = 28, source"), ("value = 5.5e-6", "value = 3.5e-7")) as path:
+    with motor_path(("value = 5, source", "value = 31, source"), ("value = 5.5e-6", "value = 4e-7")) as path:
         code, _, error = command("tune", str(path), "--brief")
     assert code == 2 and [word in error for word in ("electrical rpm", "load observer")] == [True, True], error
 
