@@ -142,15 +142,19 @@ class Identified:
         return rows
 
     def _friction_row(self, share: float, kphi: float) -> dict[str, Any]:
-        """Friction at a share of the rated speed."""
+        """Friction at a share of the rated speed, or of the one that the bus allows: what is far above all that was measured says nothing."""
         watch, plant_now = self.measured.watch, self.values
-        speed_rad_s = share * self.motor.rated_speed_rpm * np.pi / 30.0
+        allowed_rpm = 1000.0 * self.board.nominal_bus_v / kphi
+        speed_rpm = share * min(self.motor.rated_speed_rpm, allowed_rpm)
+        speed_rad_s = speed_rpm * np.pi / 30.0
         true_nm = plant_now["mech.coulomb_nm"] + plant_now.get("load.constant_nm", 0.0)
         true_nm += speed_rad_s * (plant_now["mech.viscous_nms"] + plant_now.get("load.viscous_nms", 0.0))
         found_nm = 1e-6 * watch["Coulomb_uNm"] + 1e-9 * watch["Viscous_nNms"] * speed_rad_s
         kt_nm_per_a = kphi * 1.5 / (3.0 ** 0.5 * 1000.0 * np.pi / 30.0)
         least_nm = LEAST_FRICTION_STEPS * self.board.current_full_scale_a / CONVERTER_STEPS * kt_nm_per_a
         name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of rated speed"
+        if allowed_rpm < self.motor.rated_speed_rpm:
+            name = f"{speed_rpm:.0f} rpm"
         return _row(f"friction at {name} [uN m]", f"{1e6 * found_nm:.0f}", f"{1e6 * true_nm:.0f}",
                     1.0 + (found_nm - true_nm) / max(true_nm, least_nm), "friction")
 

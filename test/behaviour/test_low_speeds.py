@@ -6,16 +6,19 @@ import itertools
 import pytest
 from support import MOTORS
 
-from tools.bench import command_common, lowspeed
-from tools.common import motor_file, paths
+from tools.bench import build, command_common, lowspeed
+from tools.common import board_file, motor_file, paths
+from tuning import design, header
 
 
 @pytest.mark.parametrize("name", MOTORS)
-def test_the_lowest_speed_is_held_with_every_load(name):
+def test_the_lowest_speed_is_held_with_every_load(name, tmp_path):
+    values = motor_file.load(name)
+    (tmp_path / build.HEADER).write_text(header.write(design.design(values, board_file.load("mclv"))), encoding="utf-8")
     table = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
-    options = argparse.Namespace(motor=name, board=None, userparams=None, library=None)
+    options = argparse.Namespace(motor=name, board="mclv", userparams=str(tmp_path), library=None)
     motor, board, library, _ = command_common.set_up(table, options, ["PARAMS_IN_RAM"])
-    table = table.for_motor(motor_file.load(name), library.params)
+    table = table.for_motor(values, library.params)
     bench = lowspeed.Bench(table, motor, board, library)
     rows = bench.run(list(itertools.product([min(table.speeds_rpm)], table.torques_nm)), name, True)
     assert {row["name"]: row["verdict"] for row in rows} == dict.fromkeys([row["name"] for row in rows], "ok") and len(rows) == 3
