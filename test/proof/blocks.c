@@ -78,27 +78,47 @@ void proof_between(void)
     }
 }
 
-static void omega_from(uint16_t low)
+static void omega_of(int16_t least, int16_t most)
 {
     static const adaptation_params_t p;
     static const adaptation_t a;
+    motor_model_t model;
+    int16_t omega;
+    model.inv_kfi = any(least, most);
+    adaptation_apply(&a, &p, &model);
+    omega = estimator_omega(ANY16(), model.emf_sum_max_q12, model.inv_kfi);
+    //@ check speed: -32767 <= omega <= 32767;
+}
+
+static void omega_from(uint16_t low)
+{
     //@ loop unroll 256;
     EACH_OF_256(inv_kfi, low) {
-        motor_model_t model;
-        int16_t omega;
-        model.inv_kfi = (int16_t)inv_kfi;
-        adaptation_apply(&a, &p, &model);
-        omega = estimator_omega(ANY16(), model.emf_sum_max_q12, model.inv_kfi);
-        //@ check speed: -32767 <= omega <= 32767;
+        omega_of((int16_t)inv_kfi, (int16_t)inv_kfi);
+    }
+}
+
+/** All 1/Kphi of each limit: larger ones share theirs with their neighbours. */
+static void omega_limited_from(uint16_t low)
+{
+    const uint32_t k = 32767ul * 2048ul;
+    //@ loop unroll 256;
+    EACH_OF_256(limit, low) {
+        omega_of((int16_t)(k / (limit + 1ul) + 1ul), (int16_t)(k / limit));
     }
 }
 
 /** estimator_omega: every 1/Kphi, with the limit that adaptation_apply() leaves beside it, keeps the speed in 16 bits. */
 void proof_omega(void)
 {
-    //@ loop unroll 128;
-    for (uint16_t low = 1024; low <= 32512u; low = (uint16_t)(low + 256u)) {
+    omega_of(1024, 2047);
+    //@ loop unroll 24;
+    for (uint16_t low = 2048; low <= 7936u; low = (uint16_t)(low + 256u)) {
         omega_from(low);
+    }
+    //@ loop unroll 24;
+    for (uint16_t low = 2048; low <= 7936u; low = (uint16_t)(low + 256u)) {
+        omega_limited_from(low);
     }
 }
 
