@@ -36,6 +36,18 @@ static void look_up(int16_t ref_erpm)
     fieldweak_tick(&fw, &params, &tuning, ref_erpm);
 }
 
+/** What the table gave, against a golden row of either table. */
+#define EXPECT_ROW(v, n) \
+    do { \
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((v).index, fw.index, golden_row(n)); \
+        TEST_ASSERT_EQUAL_INT16_MESSAGE((v).idref, fw.table_q13, golden_row(n)); \
+        TEST_ASSERT_EQUAL_INT16_MESSAGE((v).inv_kfi, tuning.inv_kfi, golden_row(n)); \
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((v).ls_q16, tuning.ls_q16, golden_row(n)); \
+        if ((v).above) { \
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(328, tuning.kfilter_esdq_q16, golden_row(n)); \
+        } \
+    } while (0)
+
 void test_look_ups_equal_the_reference_in_both_directions(void)
 {
     TEST_ASSERT_EQUAL_INT(18, FIELDWEAK_ENTRIES); /* AN1292's */
@@ -43,13 +55,7 @@ void test_look_ups_equal_the_reference_in_both_directions(void)
     GOLDEN_EACH(fieldweak, v) {
         for (int16_t direction = 1; direction >= -1; direction = (int16_t)(direction - 2)) {
             look_up((v.ref == INT16_MIN) ? v.ref : (int16_t)(direction * v.ref));
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.index, fw.index, golden_row(n));
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(v.idref, fw.table_q13, golden_row(n));
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(v.inv_kfi, tuning.inv_kfi, golden_row(n));
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.ls_q16, tuning.ls_q16, golden_row(n));
-            if (v.above) {
-                TEST_ASSERT_EQUAL_INT16_MESSAGE(328, tuning.kfilter_esdq_q16, golden_row(n));
-            }
+            EXPECT_ROW(v, n);
         }
     }
 }
@@ -59,13 +65,7 @@ void test_a_step_of_the_table_stays_1024_electrical_rpm_where_a_count_of_speed_i
     GOLDEN_EACH(fieldweak_quick, v) {
         params.index_per_count_q16 = (uint16_t)(v.unit * (65536u >> SPEED_INDEX_CONST));
         look_up(v.ref);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.index, fw.index, golden_row(n));
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.idref, fw.table_q13, golden_row(n));
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.inv_kfi, tuning.inv_kfi, golden_row(n));
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(v.ls_q16, tuning.ls_q16, golden_row(n));
-        if (v.above) {
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(328, tuning.kfilter_esdq_q16, golden_row(n));
-        }
+        EXPECT_ROW(v, n);
     }
 }
 

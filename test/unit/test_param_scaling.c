@@ -394,3 +394,24 @@ void test_constants_follow_period_bus_and_pole_pairs(void)
     EXACT(DEAD_TIME_DUTY, 40);
     EXACT(NOMINAL_SPEED_ERPM, 11200);
 }
+
+/* ---- half of 0.72 V, which dead time takes here, is 0.131 ohm at 2.75 A ---- */
+#undef MOTOR_RS_OHM
+#define MOTOR_RS_OHM 0.1305
+
+void test_a_winding_below_half_of_dead_time_s_voltage_burns_nothing(void)
+{
+    static const drive_params_t p = DRIVE_PARAMS_INIT;
+    TEST_ASSERT_FLOAT_WITHIN(1e-4F, 0.72F, PARAM_DEAD_TIME_V);
+    EXACT(p.burn_most_q13, 0);
+}
+
+#undef MOTOR_RS_OHM
+#define MOTOR_RS_OHM 0.1314
+
+void test_a_winding_above_it_burns_with_all_but_a_32nd_of_the_largest_current(void)
+{
+    static const drive_params_t p = DRIVE_PARAMS_INIT;
+    EXACT(p.burn_most_q13, CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * 31.0F / 32.0F));
+    TEST_ASSERT_INT16_WITHIN(1, p.current_max_q13 - p.current_max_q13 / 32, p.burn_most_q13);
+}
