@@ -126,6 +126,16 @@ def test_each_limit_is_kept(watch, problems):
     assert len(item(**watch).problems()) == problems
 
 
+def test_friction_is_compared_up_to_the_speed_that_the_bus_allows():
+    """24 V and 60 V/krpm: 400 rpm, and at the rated 2800 the error of the viscous part would count seven times."""
+    strong = item(Kphi_mV_per_krpm=60000, Viscous_nNms=15300 + 9000)
+    strong.values["motor.psi_vs"] *= 60.0 / 7.24
+    assert strong.problems() == []
+    assert [row["name"] for row in strong.rows()[-2:]] == ["friction at 200 rpm [uN m]", "friction at 400 rpm [uN m]"]
+    strong.measured.watch["Viscous_nNms"] += 45000 # 54e-6 * 41.9 = 2.3 mN m too much; ten per cent of five steps of the converter are 2.1 mN m
+    assert [line.partition(" is off")[0] for line in strong.problems()] == ["friction at 400 rpm [uN m]"], strong.rows()
+
+
 def test_salient_motors_get_both_inductances():
     assert 'inductance = { value = 3.86, unit = "mH line-to-line"' in item(Lq_uH=1940).paste()
     lines = item(Lq_uH=2500).paste()

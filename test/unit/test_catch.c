@@ -291,15 +291,24 @@ void test_a_stop_turns_round_only_at_its_end_for_a_target_the_other_way_while_th
 void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(void)
 {
     EACH_DIRECTION(direction) {
+        const dq_t v_q14 = { -900, (int16_t)(direction * 2500) };
+        alphabeta_t before, after;
         rig_closed(direction, (int16_t)(direction * 2400));
         drive.state = (uint16_t)DRIVE_STOPPING;
         drive.command.target_erpm = (int16_t)(direction * -6000);
         drive.run.handover.agreed_steps = 99; /* of the start long ago */
         drive.run.estimator.rho_q32 = 0x12340000ul;
+        drive.run.control.v_q14 = v_q14;
+        drive.run.control.burn_q13 = 2000;
         slow_block(2);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state); /* a block with more time turns it round */
+        before = inverse_park(v_q14, trig_sincos(estimator_next_angle(&drive.run.estimator)));
         slow_block(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+        after = inverse_park(drive.run.control.v_q14, drive.frame);
+        TEST_ASSERT_INT16_WITHIN(2, before.alpha, after.alpha); /* the voltage does not jump */
+        TEST_ASSERT_INT16_WITHIN(2, before.beta, after.beta);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.burn_q13);
         TEST_ASSERT_EQUAL_INT16(-direction, drive.direction);
         TEST_ASSERT_INT32_WITHIN(100, -2400L * 3579 / 64, drive.forced.speed_q10);
         TEST_ASSERT_EQUAL_INT16(-direction * params.open_loop_q13, drive.run.control.ref_q13.q);
