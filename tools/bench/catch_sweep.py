@@ -40,8 +40,8 @@ COLUMNS = (
 STOP_COLUMNS = (
     ("rpm", "from\nrpm", "{:.0f}"), ("inertia", "inertia\nfactor", "{:g}"), ("stop_s", "stop\ns", "{:.2f}"), ("current_max_a", "current\nmax A", "{:.2f}"),
     ("copper_max_w", "winding\nmax W", "{:.1f}"), ("bus_max_v", "bus\nmax V", "{:.1f}"), ("verdict", "\nverdict", "{}"))
-KEYS = ("name", "rpm", "rotor_deg", "inertia", "how", "control_s", "speed_then_rpm", "angle_error_deg", "pull_deg", "speed_error_percent", "stop_s", "copper_max_w",
-        "current_max_a", "bus_max_v", "fault", "verdict")
+KEYS = ("name", "rpm", "rotor_deg", "inertia", "how", "control_s", "speed_then_rpm", "angle_error_deg", "pull_deg", "speed_error_percent",
+        "stop_s", "copper_max_w", "current_max_a", "bus_max_v", "fault", "verdict")
 
 
 @dataclass(kw_only=True)
@@ -162,7 +162,8 @@ def measured(item: Case, run: Run) -> dict[str, Any]:
     faults = [name for _, _, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
     current = np.hypot(trace.column("plant.i_d").astype(np.float64), trace.column("plant.i_q").astype(np.float64))
     row = {"name": item.name, "rpm": item.rpm, "rotor_deg": item.rotor_deg, "inertia": item.inertia, "how": None, "control_s": None,
-           "speed_then_rpm": None, "angle_error_deg": None, "pull_deg": None, "stop_s": None, "speed_error_percent": run.measures[sweep.MEASURE]["speed_error_percent"],
+           "speed_then_rpm": None, "angle_error_deg": None, "pull_deg": None, "stop_s": None,
+           "speed_error_percent": run.measures[sweep.MEASURE]["speed_error_percent"],
            "current_max_a": float(current.max()), "bus_max_v": float(trace.column("bus.voltage_v").max()),
            "copper_max_w": 1.5 * item.job.values["motor.rs_ohm"] * float(current.max()) ** 2, "fault": faults[0] if faults else None,
            "limited_percent": limited_percent(trace), "picture": picture.of(run, picture.SWEEP_STRETCHES)}
