@@ -65,6 +65,16 @@ QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, con
     return (uint16_t)(qm_abs(emf.d) > explained_q12);
 }
 
+#define PROTECTION_BLUR_SHIFT 2 /* dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below */
+
+/** 1 near the end of a stop, where what dead time leaves can make innovations that do not end: the currents of a rotor that slows down by
+ *  itself are too small to tell its sign. */
+QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_params_t *p)
+{
+    return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && !d->command.run
+                      && (qm_abs(estimator_emf(&d->run.estimator).q) >> PROTECTION_BLUR_SHIFT) < p->dead_emf_q12);
+}
+
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
  *  with what is measured. Every eighth period in closed loop. */
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
@@ -83,7 +93,12 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
     run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));
     run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + (b >> PROTECTION_PHASE_SHIFT));
     run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + (c >> PROTECTION_PHASE_SHIFT));
-    if (run->observer.wrong_steps > p->wrong_steps) {
+    if (run->observer.wrong_steps <= p->wrong_steps) {
+        return;
+    }
+    if (protection_stop_is_blurred(d, p)) {
+        drive_enter(d, DRIVE_STOPPED); /* as at a stop's end: the bridge goes off and the rotor runs out */
+    } else {
         drive_raise(d, protection_wrong_signal(run));
     }
 }

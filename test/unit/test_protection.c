@@ -336,6 +336,35 @@ void test_voltage_without_current_on_a_rotor_that_stands_is_an_open_phase_within
     TEST_ASSERT_EQUAL_UINT16(250, steps);
 }
 
+void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_without_a_fault(void)
+{
+    const int16_t blurred_q12 = (int16_t)(4 * params.dead_emf_q12);
+    static const struct {
+        const char *what;
+        drive_state_t state;
+        int16_t run, clear_q12;
+        drive_state_t next;
+    } cases[] = { { "stop", DRIVE_STOPPING, 0, 0, DRIVE_STOPPED },
+                  { "stop from above", DRIVE_STOPPING, 0, 1, DRIVE_FAULT },
+                  { "reversal", DRIVE_STOPPING, 1, 0, DRIVE_FAULT },
+                  { "run", DRIVE_CLOSED, 0, 0, DRIVE_FAULT } };
+    EACH(n, cases) {
+        EACH_DIRECTION(sign) {
+            rig_closed((int16_t)sign, 10000);
+            drive.state = (uint16_t)cases[n].state;
+            drive.command.run = cases[n].run;
+            emf(0, (int16_t)(sign * (blurred_q12 - 1 + cases[n].clear_q12)));
+            drive.run.observer.wrong_steps = params.wrong_steps;
+            protection_check_signals(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, cases[n].what);
+            drive.run.observer.wrong_steps++;
+            protection_check_signals(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].next, drive.state, cases[n].what);
+            drive.fault = (uint16_t)FAULT_NONE;
+        }
+    }
+}
+
 /* ---- a rotor that may stand ---- */
 
 /** Slow steps of the probe with this back-EMF; the d current goes on. @return the largest d current seen */
