@@ -7,6 +7,7 @@
 
 #define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
 #define HANDOVER_FLOOR_SHIFT 3      /**< to an eighth at least */
+#define HANDOVER_SWUNG_SHIFT 5      /**< where the rotor is no longer slower than by 1/32 */
 #define HANDOVER_MOST_OFFSET 0x2000 /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
@@ -70,12 +71,22 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     drive_enter(d, DRIVE_CLOSED);
 }
 
-/** In RAMP, every eighth period: hands over once the estimator has agreed long enough and the current pulls the rotor, or cannot fall further. */
-QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
+/** 1 where the current pulls the rotor, or cannot fall further and the rotor has swung to where the floor pulls it: while it falls behind it is slower
+ *  than the speed that the closed loop begins with, and loses more of it before the observer knows. */
+QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p)
 {
     int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
-    if (d->run.handover.agreed_steps >= p->agree_steps
-        && (qm_abs(offset) <= HANDOVER_MOST_OFFSET || qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT))) {
+    if (qm_abs(offset) <= HANDOVER_MOST_OFFSET) {
+        return 1;
+    }
+    return (uint16_t)(qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT)
+                      && along_direction(d, estimator_speed(&d->run.estimator)) >= p->end_erpm - (p->end_erpm >> HANDOVER_SWUNG_SHIFT));
+}
+
+/** In RAMP, every eighth period: hands over once the estimator has agreed long enough and the current is right for it. */
+QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
+{
+    if (d->run.handover.agreed_steps >= p->agree_steps && handover_is_due(d, p)) {
         handover_now(d, p);
     }
 }

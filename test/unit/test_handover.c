@@ -167,6 +167,25 @@ void test_rotor_that_falls_back_is_handed_over_with_the_current_that_is_left(voi
     TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1021 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
 }
 
+void test_rotor_that_still_swings_back_at_the_floor_is_waited_for(void)
+{
+    static const struct {
+        int16_t offset, speed_erpm;
+        drive_state_t state;
+    } cases[] = { { 0x3000, 4843, DRIVE_RAMP }, { 0x3000, 4844, DRIVE_CLOSED }, { -0x3000, 4843, DRIVE_RAMP }, { -0x3000, 4844, DRIVE_CLOSED }, { 0x2000, 4000, DRIVE_CLOSED } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            at_the_end_of_the_ramp(direction);
+            drive.run.handover.agreed_steps = params.agree_steps;
+            drive.run.control.ref_q13.q = (int16_t)(direction * (params.open_loop_q13 >> 3));
+            rig_speed((int16_t)(direction * cases[n].speed_erpm));
+            forced_ahead(cases[n].offset);
+            slow(9);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
+        }
+    }
+}
+
 void test_current_is_whole_again_when_the_agreement_ends(void)
 {
     EACH_DIRECTION(direction) {
