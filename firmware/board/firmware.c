@@ -123,6 +123,7 @@ void firmware_background(void)
     if (elapsed_ms != 0u) {
         panel_inputs_t in;
         panel_lights_t lights;
+        uint16_t found;
         last_ms_tick = (uint16_t)(last_ms_tick + elapsed_ms * PERIODS_PER_MS);
         in.s2_down = BOARD_S2_DOWN();
         in.s3_down = BOARD_S3_DOWN();
@@ -133,8 +134,9 @@ void firmware_background(void)
         BOARD_LED_RUN = lights.led_run & 1u;
         selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
-        if (deviation_tick(&deviation, &board_drive, &board_params, LimitParm.now)) {
-            firmware_trip(FAULT_CURRENT_SENSOR);
+        found = deviation_tick(&deviation, &board_drive, &board_params);
+        if (found != (uint16_t)FAULT_NONE) {
+            firmware_trip((drive_fault_t)found);
         }
         if (overload_tick(&overload, &board_drive, &board_params, elapsed_ms)) {
             firmware_trip(FAULT_OVERTEMPERATURE);

@@ -16,6 +16,8 @@
 #define CATCH_PAUSE_MOST 1000u    /**< periods: 50 ms; in them a rotor turns a tenth of a right angle, or it stands */
 #define CATCH_LEAST_TURN 1638     /**< 9 degrees */
 #define CATCH_BUS_SHIFT 5         /**< a start waits for a bus 1/32 below its trip */
+#define CATCH_BUS_PERIODS 16384u  /**< a rotor that holds the bus there slows down, and the bus falls with it: within some tenths of a second */
+#define CATCH_FALL_SHIFT 7        /**< by 1/128, or it is the supply that holds it */
 #define CATCH_MOST_FLUX_Q11 24000 /**< flux of a look that its format holds */
 
 /** An axis of L i + R int(i dt), voltage times periods. @param i_q14 at the end @param sum_q11 of all samples */
@@ -128,15 +130,33 @@ QM_INLINE uint16_t catch_bus_is_high(const drive_t *d, const drive_params_t *p)
     return (uint16_t)(qm_hi(d->bus_q31) > (int16_t)(p->bus_over_q15 - (p->bus_over_q15 >> CATCH_BUS_SHIFT)));
 }
 
+/** While the bus is too high: 1 when it has not fallen since it was last asked, some tenths of a second before. */
+QM_INLINE uint16_t catch_bus_stays(drive_t *d)
+{
+    catch_t *c = &d->run.catching;
+    int16_t bus = qm_hi(d->bus_q31), before = c->bus_q15;
+    if ((d->periods & (CATCH_BUS_PERIODS - 1u)) != 1u) {
+        return 0;
+    }
+    c->bus_q15 = bus;
+    return (uint16_t)(d->periods != 1u && bus > before - (before >> CATCH_FALL_SHIFT));
+}
+
 /** A period with the outputs off. @return the next state */
 QM_INLINE drive_state_t catch_pass(drive_t *d, const drive_params_t *p)
 {
     const catch_t *c = &d->run.catching;
+    uint16_t high = catch_bus_is_high(d, p), stays;
     if (!d->command.run) {
         return DRIVE_STOPPED;
     }
     d->periods = (uint16_t)(d->periods + 1u); /* wraps where the bus is waited for: the pause begins anew */
-    if (c->step == (uint16_t)CATCH_SEEN || d->periods < c->pause || catch_bus_is_high(d, p)) {
+    stays = catch_bus_stays(d);
+    if (high && stays) {
+        drive_raise(d, FAULT_OVERVOLTAGE);
+        return DRIVE_FAULT;
+    }
+    if (c->step == (uint16_t)CATCH_SEEN || d->periods < c->pause || high) {
         return DRIVE_CATCH;
     }
     return DRIVE_BOOTSTRAP;

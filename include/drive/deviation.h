@@ -1,16 +1,19 @@
-/* The d current against its reference: one that stays off though no limit holds it means a noisy or wrong signal. */
+/* What flows against what is asked for, in closed loop: a d current that stays off means a noisy or wrong signal, a phase without current an open
+ * one. No limit explains either: of the voltage the d axis takes its part first, and a phase carries its share of any current. */
 #ifndef DRIVE_DEVIATION_H
 #define DRIVE_DEVIATION_H
 
 #include "drive/drive.h"
 
-/** Mean size of the d current's deviation over half a second. Zero is a valid start. */
+/** Mean size of the d current's deviation over half a second, and sums of the phases' currents. Zero is a valid start. */
 typedef struct {
-    int32_t id_q16; /**< Q13 counts with 16 fraction bits */
+    int32_t id_q16;              /**< Q13 counts with 16 fraction bits */
+    uint16_t asked[3], flows[3]; /**< |current| that the references ask of the phases and that is measured, Q13 / 16 */
+    uint16_t phase_ms;           /**< sums so far */
 } deviation_t;
 
-/** Every millisecond in the background. @param reasons of limits_reasons() at this moment
- *  @return 1 when it stays larger than dead time and noise make it */
-uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_params_t *p, uint16_t reasons);
+/** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise
+ *  make it, OPEN_PHASE, or none */
+uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_params_t *p);
 
 #endif

@@ -150,6 +150,7 @@ typedef enum {
 typedef struct {
     uint16_t step;         /**< catch_step_t: the look that goes on, or comes after the pause */
     alphabeta_t sum_q11;   /**< currents of this look */
+    int16_t bus_q15;       /**< the bus when it was last asked whether it falls */
     angle_t direction;     /**< of the back-EMF in the middle of the last look */
     uint16_t pause;        /**< with the outputs off, periods */
     uint16_t half_periods; /**< from the middle of the last look to its end; between two looks, to the next one's begin */

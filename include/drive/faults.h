@@ -14,7 +14,7 @@
       "look for a short circuit; check MAXIMUM_CURRENT_A and the current loops; S2 clears it when FLTA1 is high again") \
     X(2, OVERCURRENT_SW, FAULT_STAYS, "a phase current exceeded OVER_CURRENT_THRESHOLD_A", \
       "lower CURRENT_BANDWIDTH_HZ or MAXIMUM_CURRENT_A; check NORM_CURRENT_CONST, KCURRA and KCURRB") \
-    X(3, OVERVOLTAGE, FAULT_PASSES, "the bus exceeded OVER_VOLTAGE_V while something was on, or read the end of its range", \
+    X(3, OVERVOLTAGE, FAULT_PASSES, "the bus exceeded OVER_VOLTAGE_V while something was on, kept a start waiting without falling, or read the end of its range", \
       "brake more gently (SPEEDREFRAMP_RPM_PER_S), lower REGEN_LIMIT_V; check the supply") \
     X(4, UNDERVOLTAGE, FAULT_PASSES, "the bus fell below UNDER_VOLTAGE_V while running", \
       "check the supply, its cable and current limit") \

@@ -165,8 +165,21 @@ def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_it
 def test_a_start_with_as_much_current_as_an_unknown_resistance_hides_cannot_be_known_and_closed_loop_can():
     start = replace(LIMITS, unseen=judge.Unseen(start_current=1.5))
     much = {"plant__i_q": after(0.6, 6.0, 1.0)}
-    assert verdict(start, fw__state=4.0, **much).outcome == judge.UNKNOWABLE
-    assert verdict(start, **much).outcome == judge.SILENT and verdict(start, fw__state=4.0, plant__i_q=after(0.6, 7.0, 1.0)).outcome == judge.SILENT
+    ramp = running(fw__state=4.0, plant__i_q=4.0)
+    assert verdict(start, ramp, fw__state=4.0, **much).outcome == judge.UNKNOWABLE
+    assert verdict(start, ramp, **much).outcome == judge.SILENT and verdict(start, ramp, fw__state=4.0, plant__i_q=after(0.6, 7.0, 1.0)).outcome == judge.SILENT
+    assert verdict(start, running(fw__state=4.0), fw__state=4.0, **much).outcome == judge.SILENT # 1.5 times little is less than the header allows
+
+
+def test_a_rotor_that_the_load_drove_backwards_before_the_start_may_be_caught_and_reversed_and_no_other():
+    def verdict_of(**signals):
+        on = {"pwm__outputs_seen": after(0.6, 63.0), "fw__state": after(0.6, 5.0, 1.0)}
+        return judge.judge(running(**on, **signals), running(**on, plant__speed_rpm=after(0.6, 1000.0)), LIMITS)
+    back_until = lambda end_s, begin_s=0.0: lambda time_s: np.where(time_s < begin_s, 0.0, np.where(time_s < end_s, -600.0, 1000.0)) # noqa: E731
+    assert verdict_of(plant__speed_rpm=back_until(1.2)).outcome == judge.RIDDEN
+    assert verdict_of(plant__speed_rpm=back_until(1.2, 0.61)).why == "turns backwards"
+    again = lambda time_s: np.where((time_s > 0.9) & (time_s < 1.1), -600.0, back_until(0.8)(time_s)) # noqa: E731
+    assert verdict_of(plant__speed_rpm=again).why == "turns backwards"
 
 
 @pytest.mark.parametrize("clock, way_end_s, at_s", [(1.0, 3.0, 3.0), (0.75, 3.0, 3.667), (1.25, 3.0, 3.0), (0.75, 0.5, 2.6)])
@@ -186,6 +199,10 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
     assert f".rs_most = Q15({injection.MOST_RESISTANCE - 1.0:.1f})" in init
     gain = injection.BY_NAME["sensors: current gain"]
     assert [gain.unseen(size, rating).start_current for size in (1.5, 0.8, 0.625, 0.3)] == pytest.approx([1.0, 1.25, 1.6, 1.6])
+    rating = replace(rating, start_dead=0.5)
+    assert [gain.unseen(size, rating).start_current for size in (0.5, 0.3)] == pytest.approx([2.0, 2.1])
+    params = bench.library.params
+    assert trial.start_dead(params) == pytest.approx(24.0 * 2.0 / 50.0 / (params["MOTOR_RS_OHM"] * params["Q_CURRENT_REF_OPENLOOP"]), rel=1e-3)
     text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
     assert f"#define PARAM_LARGE_ERPM ({trial.DEAD_SHARE}F * PARAM_DEAD_TIME_V" in text
 

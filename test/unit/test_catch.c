@@ -185,6 +185,31 @@ void test_a_start_waits_for_a_bus_that_would_trip_and_no_longer(void)
     EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "32.5 V");
 }
 
+void test_a_bus_that_stays_where_a_rotor_would_let_it_fall_is_the_supply_s(void)
+{
+    static const struct {
+        const char *what;
+        float fall_v_per_s;
+        drive_fault_t fault;
+    } cases[] = { { "supply", 0.0F, FAULT_OVERVOLTAGE }, { "flywheel", 0.15F, FAULT_OVERVOLTAGE }, { "rotor", 0.4F, FAULT_NONE } };
+    EACH(n, cases) {
+        float bus_v = 33.9F;
+        uint16_t part;
+        rig_power_up();
+        rig_ready();
+        rig_bus(bus_v);
+        rig_tick(800);
+        drive_start(&drive, &params, 1);
+        for (part = 0; part < 160u; part++) { /* of 10 ms: the count wraps too */
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(FAULT_NONE, (part <= 80u) ? drive.fault : (uint16_t)FAULT_NONE, cases[n].what);
+            bus_v -= 0.01F * cases[n].fall_v_per_s;
+            rig_bus(bus_v);
+            rig_tick(200);
+        }
+        EXPECT_DRIVE((cases[n].fault == FAULT_NONE) ? DRIVE_CATCH : DRIVE_FAULT, cases[n].fault, cases[n].what);
+    }
+}
+
 void test_a_request_that_is_withdrawn_between_two_looks_stops(void)
 {
     turning(4000.0F, 36.0F, 6);

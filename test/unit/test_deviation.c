@@ -1,8 +1,7 @@
-/* Deviations that stay though no limit holds the drive back: they mean a wrong signal. */
+/* What flows against what is asked for: deviations that stay mean a wrong signal, a phase without its share an open one. */
 #include "drive_rig.h"
 
 #include "drive/deviation.h"
-#include "drive/limit_reasons.h"
 
 static deviation_t deviation;
 
@@ -12,57 +11,67 @@ void setUp(void)
     rig_closed(1, 10000);
     drive.run.control.ref_q13.d = 0;
     drive.run.control.i_q13.d = 0;
-    deviation.id_q16 = 0;
+    deviation = (deviation_t){ 0 };
 }
 
-/** Milliseconds until it is found, at most 3000. */
-static uint16_t ms_until_found(uint16_t reasons)
+/** Milliseconds until this fault is found, at most 3000. */
+static uint16_t ms_until(drive_fault_t fault)
 {
-    uint16_t ms = 0;
-    while (ms < 3000u && !deviation_tick(&deviation, &drive, &params, reasons)) {
+    uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
+    while (ms < 3000u && found == (uint16_t)FAULT_NONE) {
+        found = deviation_tick(&deviation, &drive, &params);
         ms++;
     }
+    TEST_ASSERT_EQUAL_UINT16((ms < 3000u) ? fault : FAULT_NONE, found);
     return ms;
 }
+
+/* ---- the d current ---- */
 
 void test_d_current_that_stays_further_off_than_noise_and_dead_time_is_found_whatever_its_sign(void)
 {
     const int16_t limit = params.id_off_q13;
-    uint16_t ms = 0;
+    uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
     drive.run.control.i_q13.d = limit;
-    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_found(0));
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
     setUp();
-    do { /* noise */
+    while (ms < 3000u && found == (uint16_t)FAULT_NONE) { /* noise */
         drive.run.control.i_q13.d = (int16_t)((ms & 1u) ? 4 * limit : -4 * limit);
+        found = deviation_tick(&deviation, &drive, &params);
         ms++;
-    } while (ms < 3000u && !deviation_tick(&deviation, &drive, &params, 0));
-    TEST_ASSERT_UINT16_WITHIN(10, 355, ms);
+    }
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CURRENT_SENSOR, found);
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms);
 }
 
-void test_deviations_are_no_fault_where_a_limit_holds_the_drive_back_or_the_start_is_not_over(void)
+void test_d_current_is_judged_in_closed_loop_after_the_hand_over_and_not_forgotten_in_a_reversal_s_ramp(void)
 {
-    static const uint16_t held[] = { LIMIT_VOLTAGE, LIMIT_CURRENT, LIMIT_BRAKE, LIMIT_RAMP, LIMIT_RAMP_WAITS, LIMIT_SPEED_RANGE };
     drive.run.control.i_q13.d = (int16_t)(4 * params.id_off_q13);
-    EACH(n, held) {
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(3000, ms_until_found(held[n]), golden_row(n));
-    }
-    TEST_ASSERT_LESS_THAN_UINT16(400, ms_until_found((uint16_t)LIMIT_FIELD_WEAKENING));
     drive.run.handover.id_q13 = 10;
-    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_found(0));
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
     drive.run.handover.id_q13 = 0;
+    drive.state = (uint16_t)DRIVE_RAMP;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
     drive.state = (uint16_t)DRIVE_STOPPING;
-    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_found(0));
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms_until(FAULT_CURRENT_SENSOR));
+    drive.state = (uint16_t)DRIVE_RAMP;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
     drive.state = (uint16_t)DRIVE_CLOSED;
-    TEST_ASSERT_UINT16_WITHIN(10, 355, ms_until_found(0)); /* anew */
+    TEST_ASSERT_EQUAL_UINT16(1, ms_until(FAULT_CURRENT_SENSOR));
+    drive.state = (uint16_t)DRIVE_STOPPED;
+    (void)deviation_tick(&deviation, &drive, &params);
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms_until(FAULT_CURRENT_SENSOR)); /* anew */
 }
 
 void test_d_current_that_follows_its_reference_is_none_however_large(void)
 {
     drive.run.control.ref_q13.d = (int16_t)(-4 * params.id_off_q13);
     drive.run.control.i_q13.d = drive.run.control.ref_q13.d;
-    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_found(0));
+    drive.phases_q13 = phases_of(drive.run.control.ref_q13, drive.frame);
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
     drive.run.control.i_q13.d = 0;
-    TEST_ASSERT_UINT16_WITHIN(10, 355, ms_until_found(0));
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms_until(FAULT_CURRENT_SENSOR));
 }
 
 void test_deviations_of_a_quarter_of_a_second_ride_through(void)
@@ -71,11 +80,76 @@ void test_deviations_of_a_quarter_of_a_second_ride_through(void)
     for (n = 0; n < 3u; n++) {
         drive.run.control.i_q13.d = 3000;
         for (ms = 0; ms < 250u; ms++) {
-            TEST_ASSERT_EQUAL_UINT16(0, deviation_tick(&deviation, &drive, &params, 0));
+            TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, deviation_tick(&deviation, &drive, &params));
         }
         drive.run.control.i_q13.d = 0;
         for (ms = 0; ms < 1500u; ms++) {
-            (void)deviation_tick(&deviation, &drive, &params, 0);
+            (void)deviation_tick(&deviation, &drive, &params);
         }
     }
+}
+
+/* ---- the phases ---- */
+
+/** Milliseconds until an open phase is found on a rotor that turns by `step` a millisecond. @param iq_q13 asked for @param share256 of it that flows
+ *  @param open 0..2: carries `left` of 256 of what is asked of it, and the others the rest; 3: none does */
+static uint16_t ms_until_open(int16_t iq_q13, int16_t share256, uint16_t open, int16_t left, uint16_t step)
+{
+    uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
+    angle_t angle = 0x1000;
+    drive.run.control.ref_q13.q = iq_q13;
+    while (ms < 1000u && found == (uint16_t)FAULT_NONE) {
+        dq_t flowing = drive.run.control.ref_q13;
+        flowing.q = (int16_t)(iq_q13 * (int32_t)share256 / 256);
+        drive.frame = trig_sincos(angle);
+        drive.phases_q13 = phases_of(flowing, drive.frame);
+        if (open == 0u) {
+            drive.phases_q13.a = (int16_t)(drive.phases_q13.a * (int32_t)left / 256);
+        } else if (open == 1u) {
+            drive.phases_q13.b = (int16_t)(drive.phases_q13.b * (int32_t)left / 256);
+        } else if (open == 2u) {
+            drive.phases_q13.c = (int16_t)(drive.phases_q13.c * (int32_t)left / 256);
+        } else {
+            /* whole */
+        }
+        found = deviation_tick(&deviation, &drive, &params);
+        angle = (angle_t)(angle + step);
+        ms++;
+    }
+    TEST_ASSERT_EQUAL_UINT16((ms < 1000u) ? FAULT_OPEN_PHASE : FAULT_NONE, found);
+    return ms;
+}
+
+void test_a_phase_that_carries_nearly_none_of_what_is_asked_of_it_is_open_within_two_counts(void)
+{
+    const int16_t little = (int16_t)(2 * params.id_off_q13);
+    uint16_t phase;
+    EACH_DIRECTION(sign) {
+        for (phase = 0; phase < 3u; phase++) {
+            setUp();
+            TEST_ASSERT_EQUAL_UINT16(64, ms_until_open((int16_t)(sign * 4000), 256, phase, 0, 5000));
+            TEST_ASSERT_EQUAL_UINT16(64, ms_until_open((int16_t)(sign * little), 256, phase, 0, 5000));
+            TEST_ASSERT_EQUAL_UINT16(64, ms_until_open((int16_t)(sign * 4000), 256, phase, 56, 5000));
+            TEST_ASSERT_EQUAL_UINT16(1000, ms_until_open((int16_t)(sign * 4000), 256, phase, 72, 5000));
+            setUp();
+            TEST_ASSERT_EQUAL_UINT16(64, ms_until_open((int16_t)(sign * 4000), 128, phase, 0, 5000)); /* at the voltage's limit half of it flows */
+        }
+    }
+}
+
+void test_a_whole_motor_has_no_open_phase_at_any_angle_or_speed_or_limit(void)
+{
+    static const uint16_t steps[] = { 0, 3, 32768u, 32770u, 21845u, 65533u, 5000 };
+    static const int16_t shares[] = { 256, 40, 0, 300 };
+    EACH(n, steps) {
+        EACH(k, shares) {
+            setUp();
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(1000, ms_until_open(4000, shares[k], 3, 256, steps[n]), golden_row(n));
+        }
+    }
+}
+
+void test_a_current_as_small_as_noise_says_nothing_of_an_open_phase(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(1000, ms_until_open(params.id_off_q13, 256, 1, 0, 5000));
 }

@@ -31,6 +31,8 @@ class Rating:
     crystal_hz: float
     dead_rpm: float = 0.0
     """from which deviation of the speed on dead time cannot be behind it (PARAM_LARGE_ERPM)"""
+    start_dead: float = 0.0
+    """dead time's voltage, as a share of what the start's current drives through R"""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Kind:
     keys: Callable[[float, str, Rating], Keys] = lambda size, place, rating: {}
     over_s: tuple[float, float] = (0.0, 0.0)
     """it comes slowly, within a time between these"""
+    reverses: bool = False
+    """a negative size turns the rotor backwards: a start catches it, and needs a second ramp to bring it up"""
     passes: float = 0.0
     """share of the cases in which it is over soon"""
     limits: bool = False
@@ -94,8 +98,8 @@ def _as_dead_time(size: float, rating: Rating) -> Unseen:
 
 
 def _as_warm_winding(size: float, rating: Rating) -> Unseen:
-    """The same; and without a back-EMF, a signal that is too small looks like a resistance that is larger than the header's."""
-    return replace(_as_dead_time(size, rating), start_current=1.0 / min(max(size, 1.0 / MOST_RESISTANCE), 1.0))
+    """The same; and without a back-EMF, a signal that is too small looks like a resistance that is larger than the header's, and like dead time."""
+    return replace(_as_dead_time(size, rating), start_current=min(max(1.0 / size, 1.0), MOST_RESISTANCE + rating.start_dead))
 
 
 MOST_RESISTANCE = 1.6
@@ -154,7 +158,7 @@ KINDS = (
     Kind("shaft", "load step", (*NO_TURN, "OVERTEMPERATURE"), _size(0.1, 3.0), _sets(BRAKE, "torque_nm"), passes=0.5,
          limits=True),
     Kind("shaft", "driven by the load", (*NO_TURN, "OVERVOLTAGE"), _size(0.1, 1.0, True), _sets("load.active_nm", "torque_nm"),
-         passes=0.5, limits=True),
+         passes=0.5, limits=True, reverses=True),
     Kind("temperature", "warm winding", ("OVERTEMPERATURE",), _size(1.05, 1.6), _sets("motor.rs_ohm", "rs_ohm"),
          over_s=(0.3, 1.0), limits=True),
     Kind("temperature", "warm magnets", ("OVERTEMPERATURE",), _size(0.8, 0.99), _sets("motor.psi_vs", "psi_vs"),

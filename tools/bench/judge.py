@@ -37,7 +37,7 @@ class Unseen:
     more_rpm: float = 0.0
     """and so many rpm off"""
     start_current: float = 1.0
-    """before closed loop the current is as many times as large"""
+    """before closed loop the current is as many times that of a start without the fault"""
 
 
 @dataclass(frozen=True)
@@ -143,21 +143,33 @@ def _wrong(after: Trace, reference: Trace, limits: Limits, unseen: Unseen = Unse
 
 
 def _backwards(after: Trace, reference: Trace, limits: Limits) -> bool:
-    """In closed loop, against the direction in which the motor without the fault turns, and further than that one does."""
+    """In closed loop, against the direction in which the motor without the fault turns, and further than that one does. What a rotor turns that
+    the load has already driven backwards before the drive came on does not count until it first stands: it is being caught and reversed."""
     speed, expected = after.column("plant.speed_rpm"), reference.column("plant.speed_rpm")
     if not len(speed):
         return False
     direction = 1.0 if expected[np.argmax(np.abs(expected))] >= 0.0 else -1.0
     in_loop = np.isin(after.column("fw.state"), limits.closed)
+    in_loop[:_driven_rows(direction * speed, after.column("pwm.outputs_seen") != 0.0, BAND_OF_RATED * limits.rated_rpm)] = False
     turns = -np.minimum(direction * speed[in_loop], 0.0).sum() * after.period_s / 60.0
     own_turns = -np.minimum(direction * expected, 0.0).sum() * after.period_s / 60.0
     return bool(turns > own_turns + BACKWARDS_TURNS)
 
 
+def _driven_rows(along_rpm: np.ndarray, on: np.ndarray, band_rpm: float) -> int:
+    """Rows until a rotor first stands that turned backwards when the outputs came on."""
+    first = int(np.argmax(on))
+    if not on[first] or along_rpm[first] >= -band_rpm:
+        return 0
+    stood = along_rpm[first:] >= 0.0
+    return first + (int(np.argmax(stood)) if stood.any() else 0)
+
+
 def _too_much_current(after: Trace, reference: Trace, limits: Limits, start_current: float) -> bool:
     in_loop = np.isin(after.column("fw.state"), limits.closed)
     most_a = max(limits.most_current_a, float(np.max(_amplitude(reference), initial=0.0)))
-    allowed_a = CURRENT_MARGIN * most_a * np.where(in_loop, 1.0, start_current)
+    start_a = float(np.max(_amplitude(reference)[~np.isin(reference.column("fw.state"), limits.closed)], initial=0.0))
+    allowed_a = CURRENT_MARGIN * np.where(in_loop, most_a, max(most_a, start_current * start_a))
     over = _amplitude(after) > allowed_a
     rows = max(1, round(CURRENT_S / max(after.period_s, 1e-6)))
     return len(over) >= rows and bool(np.max(np.convolve(over, np.ones(rows), "valid")) >= rows)

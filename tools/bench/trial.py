@@ -34,6 +34,7 @@ CLEAR_S, AGAIN_S = 0.3, 0.3
 BLOCKED_S, RETRY_PAUSE_S, RETRY_STATES = 0.8, 3.0, ("RETRY", "FAULT")
 """The shaft is blocked for the first; a drive that tries again by itself may wait for the second, in one of these states."""
 RAMP_STEP_S = 0.005
+CLOSED = ("CLOSED", "STOPPING")
 DEAD_SHARE = 0.13
 """Of dead time's voltage: what its compensation leaves may move the speed (include/drive/param_scaling.h)."""
 HANG_S = 300
@@ -163,9 +164,10 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         state = bench.library.states.get(int(board.get("fw.state")), "?")
         rating = injection.Rating(param(bench.library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(bench.motor.path)).rated_torque_nm,
                                   *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
-                                  dead_rpm=dead_rpm(bench.library.params))
+                                  dead_rpm=dead_rpm(bench.library.params), start_dead=start_dead(bench.library.params))
         unseen = case.what.unseen(case.size, rating)
-        settled_s = settled(case, way.end_s, injected_s, unseen.clock)
+        reversal_s = start_time_s(bench.library.params) if case.what.reverses and case.size < 0.0 and state not in CLOSED else 0.0
+        settled_s = settled(case, way.end_s + reversal_s, injected_s, unseen.clock)
         end_s = settled_s + judge.JUDGE_S
 
         def goes_wrong() -> tuple[Run, str]:
@@ -176,7 +178,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         result, ending = _aside(goes_wrong)
         session.run_to(end_s)
         without = session.run()
-    closed = tuple(number for number, name in bench.library.states.items() if name in ("CLOSED", "STOPPING"))
+    closed = tuple(number for number, name in bench.library.states.items() if name in CLOSED)
     limits = judge.Limits(injected_s, settled_s, motor_file.load(str(bench.motor.path)).rated_speed_rpm, rating.current_a, case.what.ends,
                           bench.library.faults, closed, case.what.limits, unseen)
     with_fault, target = result or (None, "")
@@ -191,8 +193,16 @@ def settled(case: Case, way_end_s: float, injected_s: float, clock: float) -> fl
 
 def dead_rpm(params: dict[str, float]) -> float:
     """The firmware's PARAM_LARGE_ERPM as a speed of the shaft."""
-    dead_v = param(params, "NOMINAL_BUS_V") * param(params, "DEADTIME_SEC") / param(params, "LOOPTIME_SEC")
-    return DEAD_SHARE * dead_v * math.sqrt(3.0) * 1000.0 / param(params, "MOTOR_KPHI_V_PER_KRPM")
+    return DEAD_SHARE * _dead_v(params) * math.sqrt(3.0) * 1000.0 / param(params, "MOTOR_KPHI_V_PER_KRPM")
+
+
+def start_dead(params: dict[str, float]) -> float:
+    """Dead time's voltage over R I of the start."""
+    return _dead_v(params) / (param(params, "MOTOR_RS_OHM") * param(params, "Q_CURRENT_REF_OPENLOOP"))
+
+
+def _dead_v(params: dict[str, float]) -> float:
+    return param(params, "NOMINAL_BUS_V") * param(params, "DEADTIME_SEC") / param(params, "LOOPTIME_SEC")
 
 
 def _to_the_moment(session: simulate.Session, way: Scene, case: Case) -> None:
