@@ -9,17 +9,21 @@
 #define PHASE_SHIFT 4 /* so many sums of half the range fit a word */
 #define OPEN_SHIFT 2  /* of what is asked of it an open phase carries less than a quarter of another one's share */
 
+/** @param i Q13 */
+NOINLINE void add_sizes(uint16_t *sums, const phases_t *i)
+{
+    sums[0] = (uint16_t)(sums[0] + ((uint16_t)qm_abs(i->a) >> PHASE_SHIFT));
+    sums[1] = (uint16_t)(sums[1] + ((uint16_t)qm_abs(i->b) >> PHASE_SHIFT));
+    sums[2] = (uint16_t)(sums[2] + ((uint16_t)qm_abs(i->c) >> PHASE_SHIFT));
+}
+
 /** Takes the phases' currents into their sums. What is asked for goes by the same angle, so that samples that always meet a phase near its zero
  *  ask nothing of it. */
 static void add_phases(deviation_t *v, const drive_t *d)
 {
-    phases_t asked = phases_of(d->run.control.ref_q13, d->frame), flows = d->phases_q13;
-    v->asked[0] = (uint16_t)(v->asked[0] + ((uint16_t)qm_abs(asked.a) >> PHASE_SHIFT));
-    v->asked[1] = (uint16_t)(v->asked[1] + ((uint16_t)qm_abs(asked.b) >> PHASE_SHIFT));
-    v->asked[2] = (uint16_t)(v->asked[2] + ((uint16_t)qm_abs(asked.c) >> PHASE_SHIFT));
-    v->flows[0] = (uint16_t)(v->flows[0] + ((uint16_t)qm_abs(flows.a) >> PHASE_SHIFT));
-    v->flows[1] = (uint16_t)(v->flows[1] + ((uint16_t)qm_abs(flows.b) >> PHASE_SHIFT));
-    v->flows[2] = (uint16_t)(v->flows[2] + ((uint16_t)qm_abs(flows.c) >> PHASE_SHIFT));
+    phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
+    add_sizes(v->asked, &asked);
+    add_sizes(v->flows, &d->phases_q13);
 }
 
 /** 1 where a phase is asked for more than noise and carries less than a quarter of the share of it that the phase with the most current does. */
