@@ -211,10 +211,18 @@ static drive_samples_t any_samples(void)
     return raw;
 }
 
+/** As a number, an address is known to equal itself and nothing else: any use of it is an alarm. */
+#define SEALED(x) (*(drive_t **)&(x))
+
+static uint16_t calibrates; /* the calibration's sums are sealed */
+
 static void slow_in(uint16_t slot)
 {
+    uint16_t seals = calibrates, state = drive.state; /* what a check alone reads, the analyser's memory of calls does not know */
     drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
     drive_slow(&drive, &params, ANY16());
+    //@ check sums_stay: seals == 0 || (SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive);
+    //@ check ended: seals == 0 || state == DRIVE_CALIBRATE || drive.state != DRIVE_CALIBRATE;
     bounds_hold_again();
 }
 
@@ -249,9 +257,6 @@ void proof_tick(void)
     }
 }
 
-/** As a number, an address is known to equal itself and nothing else: any use of it is an alarm. */
-#define SEALED(x) (*(drive_t **)&(x))
-
 static drive_t calibrating;
 
 /** CALIBRATE after k samples, with sums that k samples can have; the next sums are those that k + 1 can have. */
@@ -265,12 +270,12 @@ static void calibrate_after(uint16_t k)
     (void)drive_tick(&drive, &params, &raw);
     //@ check sum_a: -32768 * (k + 1) <= drive.calibration.sum_a <= 32767 * (k + 1);
     //@ check sum_b: -32768 * (k + 1) <= drive.calibration.sum_b <= 32767 * (k + 1);
+    //@ check ends: k < 1023 || drive.state != DRIVE_CALIBRATE;
     drive.periods = ANYU16();
     SEALED(drive.calibration.sum_a) = &drive;
     SEALED(drive.calibration.sum_b) = &drive;
+    calibrates = 1;
     slow(); /* every k leaves the same to it, but for the last */
-    //@ check sums_stay: SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive;
-    //@ check ends: k < 1023 || drive.state != DRIVE_CALIBRATE;
 }
 
 /** The calibration, sample by sample. */
