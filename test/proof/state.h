@@ -7,14 +7,14 @@
 #include "any.h"
 #include "bounds.h"
 
-static void any_drive(uint16_t state, uint16_t slot)
+static void any_drive(uint16_t state)
 {
     drive.command.run = any(0, 1);
     drive.command.clear_fault = any(0, 1);
     drive.command.target_erpm = any((int16_t)-erpm_max, erpm_max);
     drive.state = state;
     drive.fault = any_u(0, FAULT_COUNT - 1);
-    drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
+    drive.ticks = ANYU16();
     drive.periods = ANYU16();
     drive.direction = any(0, 1) ? 1 : -1;
     drive.calibration.done = any(0, 1);

@@ -99,9 +99,8 @@ def distinct(preprocessor: list[str], sources: list[str]) -> list[tuple[str, lis
     return list(first.values())
 
 
-def compiler(name: str, command: list[str], sources: list[str]) -> list[Finding]:
+def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -> list[Finding]:
     """One finding for each message in any mode; these compile clean, so the page has no row for them."""
-    jobs = distinct([option for option in command if not option.startswith(("-c", "-o", "-W"))], sources)
     findings = set()
     for (source, options), output in zip(jobs, each(lambda job: run([*command, *INCLUDES, *job[1], job[0]]), jobs), strict=True):
         messages = [line for line in output.splitlines() if re.search(r"(error|warning|ended with code)", line)]
@@ -123,7 +122,7 @@ def cppcheck(sources: list[str]) -> list[Finding]:
     return sorted(findings, key=lambda f: (f.check, f.file, f.line))
 
 
-def clang_tidy(sources: list[str]) -> list[Finding]:
+def clang_tidy(jobs: list[tuple[str, list[str]]]) -> list[Finding]:
     def one(job: tuple[str, list[str]]) -> set[Finding]:
         output = run([os.environ.get("CLANG_TIDY", "clang-tidy-14"), "--quiet", f"--config-file={HERE}/clang-tidy.yaml",
                       "--header-filter=(include|firmware)/.*", job[0], "--", *CLANG_16_BIT, *INCLUDES, *job[1]])
@@ -131,7 +130,7 @@ def clang_tidy(sources: list[str]) -> list[Finding]:
         return {Finding(f"tidy {check}", relative(file), int(number), text)
                 for file, number, text, checks in found for check in checks.split(",")}
 
-    return sorted(set().union(*each(one, distinct([CLANG, *CLANG_16_BIT], sources))), key=lambda f: (f.check, f.file, f.line))
+    return sorted(set().union(*each(one, jobs)), key=lambda f: (f.check, f.file, f.line))
 
 
 def main() -> int:
@@ -143,11 +142,12 @@ def main() -> int:
     BUILD.mkdir(parents=True, exist_ok=True)
 
     gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS]
+    clang_jobs = distinct([CLANG, *CLANG_16_BIT], sources)
     checks = {
         "cppcheck": lambda: cppcheck(sources),
-        "clang_tidy": lambda: clang_tidy(sources),
-        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], sources),
-        "gcc": lambda: compiler("gcc", gcc, sources),
+        "clang_tidy": lambda: clang_tidy(clang_jobs),
+        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], clang_jobs),
+        "gcc": lambda: compiler("gcc", gcc, distinct([gcc[0], "-std=gnu99", "-O2"], sources)),
     }
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):
