@@ -147,7 +147,7 @@ def main() -> int:
         "cppcheck": lambda: cppcheck(sources),
         "clang_tidy": lambda: clang_tidy(clang_jobs),
         "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], clang_jobs),
-        "gcc": lambda: compiler("gcc", gcc, distinct([gcc[0], "-std=gnu99", "-O2"], sources)),
+        "gcc": lambda: compiler("gcc", gcc, distinct([flag for flag in gcc if not flag.startswith(("-c", "-o", "-W"))], sources)),
     }
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):
