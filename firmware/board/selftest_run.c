@@ -170,7 +170,7 @@ static void test_ram_slice(void)
 
 static void test_in_silence(void)
 {
-    if (!selftest_variables_hold(&board_drive)) {
+    if (!selftest_variables_hold(&board_drive) || !panel_holds(&board_panel)) {
         selftest_fail(SELFTEST_VARIABLES);
     }
     if (!selftest_flow_holds(&board_drive)) {

@@ -15,6 +15,7 @@ void panel_init(panel_t *panel)
     panel->wish_run = 0;
     panel->interrupted = 0;
     panel->fast_range = 0;
+    panel_keep(panel, 1);
     panel->pot_q15 = INT16_MIN;
     panel->pot_q31 = INT32_MIN;
     panel->pot_used_q15 = INT16_MIN;
@@ -134,6 +135,7 @@ static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t el
 panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in)
 {
     int16_t target;
+    uint16_t held = panel_holds(panel);
     panel_check_pot(panel, d, p, in->elapsed_ms);
     panel_buttons(panel, d, in);
     target = panel_target(p, panel_pot(panel), panel->fast_range, d->direction);
@@ -152,5 +154,6 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
     if (mode_background(d, p)) {
         panel->wish_run = 0;
     }
+    panel_keep(panel, held);
     return panel_lights(panel, d, in->elapsed_ms);
 }

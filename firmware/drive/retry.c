@@ -65,8 +65,10 @@ void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
     } else if (!r->asked) {
         panel->interrupted = 0; /* somebody else has cleared it */
     } else if (d->state == (uint16_t)DRIVE_STOPPED) {
+        uint16_t held = panel_holds(panel);
         panel->interrupted = 0;
         panel->wish_run = 1;
+        panel_keep(panel, held);
         r->fault = (uint16_t)FAULT_NONE;
         r->asked = 0;
         r->waited_ms = 0;

@@ -34,7 +34,28 @@ typedef struct {
     int16_t pot_used_q15;     /**< the value in use: follows the filtered one with half a converter step of hysteresis */
     uint16_t pot_broken_ms;   /**< how long its signal has been where no position is */
     uint16_t blink_ms;
+    uint16_t kept; /**< complement of wish_run and fast_range, see panel_keep() */
 } panel_t;
+
+/** Complement of the user's wishes, in which no bit of either goes unseen. */
+QM_INLINE uint16_t panel_complement(const panel_t *panel)
+{
+    return (uint16_t) ~((uint16_t)panel->wish_run + 3u * (uint16_t)panel->fast_range);
+}
+
+/** 1 if the wishes are as they were written: a flipped bit could start the motor, or change its speed. The self-test of VARIABLES asks. */
+QM_INLINE uint16_t panel_holds(const panel_t *panel)
+{
+    return (uint16_t)(panel->kept == panel_complement(panel));
+}
+
+/** After a write of wishes. @param held panel_holds() before it: what has not held must be found */
+QM_INLINE void panel_keep(panel_t *panel, uint16_t held)
+{
+    if (held) {
+        panel->kept = panel_complement(panel);
+    }
+}
 
 /** Nothing pressed, nothing wished, potentiometer at its lower end. */
 void panel_init(panel_t *panel);

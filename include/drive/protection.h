@@ -68,11 +68,12 @@ QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, con
 #define PROTECTION_BLUR_SHIFT 2 /* dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below */
 
 /** 1 near the end of a stop, where what dead time leaves can make innovations that do not end: the currents of a rotor that slows down by
- *  itself are too small to tell its sign. */
+ *  itself are too small to tell its sign. A wrong signal would ask for more. */
 QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_params_t *p)
 {
     return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && !d->command.run
-                      && (qm_abs(estimator_emf(&d->run.estimator).q) >> PROTECTION_BLUR_SHIFT) < p->dead_emf_q12);
+                      && (qm_abs(estimator_emf(&d->run.estimator).q) >> PROTECTION_BLUR_SHIFT) < p->dead_emf_q12
+                      && qm_abs(d->run.control.ref_q13.q) < p->id_off_q13);
 }
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold

@@ -11,7 +11,7 @@
     X(3, FLASH, "4.1, 4.3, 5", "CRC-16 of all of the flash: at a start at once, then 32 words a millisecond") \
     X(4, CLOCK, "3", "at power-up: the instruction clock against the low-power oscillator, which drives the watchdog") \
     X(5, FLOW, "1.3", "the slow phases and the background's parts come in their order, and the tests get their turn") \
-    X(6, VARIABLES, "4.2", "state, fault, direction and current offsets against their complements") \
+    X(6, VARIABLES, "4.2", "state, fault, direction, current offsets and the user's wishes against their complements") \
     X(7, REGISTERS, "1.1, 7.1", "registers of PWM, ADC, pins, clock, timer and interrupts as they were written; the outputs as the state asks") \
     X(8, ADC, "7.2.1, 7.2.2", "in STOPPED: the converter reads AVSS as 0 through an input that is switched off") \
     X(9, STACK, "4.2", "the pattern below the stack's limit, and SPLIM") \

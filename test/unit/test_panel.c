@@ -339,3 +339,24 @@ void test_without_dead_ends_no_position_is_a_fault(void)
     (void)panel_tick(&the_panel, &drive, &params, &nothing);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
+
+/* ---- wishes that nobody had ---- */
+
+void test_a_flipped_bit_of_a_wish_shows_until_the_panel_is_set_up_anew_and_a_wish_does_not(void)
+{
+    uint16_t bit;
+    for (bit = 0; bit < 64u; bit++) {
+        int16_t *word = (bit & 16u) ? &the_panel.fast_range : &the_panel.wish_run;
+        panel_reset();
+        rig_ready();
+        if (bit >= 32u) {
+            press_s2(100);
+            press_s3(100);
+            TEST_ASSERT_TRUE(the_panel.wish_run == 1 && the_panel.fast_range == 1);
+        }
+        TEST_ASSERT_EQUAL_UINT16(1, panel_holds(&the_panel));
+        *word = (int16_t)(*word ^ (int16_t)(1u << (bit & 15u)));
+        panel_ms(2);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, panel_holds(&the_panel), golden_row(bit));
+    }
+}

@@ -342,18 +342,20 @@ void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_withou
     static const struct {
         const char *what;
         drive_state_t state;
-        int16_t run, clear_q12;
+        int16_t run, clear_q12, more_q13;
         drive_state_t next;
-    } cases[] = { { "stop", DRIVE_STOPPING, 0, 0, DRIVE_STOPPED },
-                  { "stop from above", DRIVE_STOPPING, 0, 1, DRIVE_FAULT },
-                  { "reversal", DRIVE_STOPPING, 1, 0, DRIVE_FAULT },
-                  { "run", DRIVE_CLOSED, 0, 0, DRIVE_FAULT } };
+    } cases[] = { { "stop", DRIVE_STOPPING, 0, 0, 0, DRIVE_STOPPED },
+                  { "stop from above", DRIVE_STOPPING, 0, 1, 0, DRIVE_FAULT },
+                  { "with current", DRIVE_STOPPING, 0, 0, 1, DRIVE_FAULT },
+                  { "reversal", DRIVE_STOPPING, 1, 0, 0, DRIVE_FAULT },
+                  { "run", DRIVE_CLOSED, 0, 0, 0, DRIVE_FAULT } };
     EACH(n, cases) {
         EACH_DIRECTION(sign) {
             rig_closed((int16_t)sign, 10000);
             drive.state = (uint16_t)cases[n].state;
             drive.command.run = cases[n].run;
             emf(0, (int16_t)(sign * (blurred_q12 - 1 + cases[n].clear_q12)));
+            drive.run.control.ref_q13.q = (int16_t)(sign * (params.id_off_q13 - 1 + cases[n].more_q13));
             drive.run.observer.wrong_steps = params.wrong_steps;
             protection_check_signals(&drive, &params);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, cases[n].what);

@@ -240,6 +240,16 @@ void test_a_changed_bit_of_the_state_stops_within_a_millisecond(void)
     }
 }
 
+void test_a_changed_bit_of_the_user_s_wishes_stops_within_a_millisecond(void)
+{
+    for (uint16_t bit = 0; bit < 16u; bit++) {
+        setUp();
+        board_ms(60);
+        board_panel.fast_range ^= (int16_t)(1u << bit);
+        finds(SELFTEST_VARIABLES, 2, "fast range");
+    }
+}
+
 void test_slow_work_that_stays_away_is_found(void)
 {
     board_ms(60);
