@@ -36,11 +36,11 @@
       "read board_trap_intcon1, the copy of INTCON1 that says which trap it was") \
     X(13, WATCHDOG, FAULT_STAYS, "the watchdog reset the processor: the background or the control interrupt stood still", \
       "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it") \
-    X(14, CURRENT_SENSOR, FAULT_STAYS, "voltages and currents did not fit the motor for a tenth of a second, or speed or d current stayed off though no limit held them: a current signal is wrong", \
+    X(14, CURRENT_SENSOR, FAULT_STAYS, "voltages and currents did not fit the motor for a tenth of a second, or the d current stayed off its reference: a current signal is wrong", \
       "check AN0 and AN1, the shunts and their amplifiers; with the motor at rest both must read the middle; check MOTOR_LS_MH") \
     X(15, BUS_SENSOR, FAULT_STAYS, "the voltage that the motor takes asks for more flux than R, L and Kphi within their tolerances explain: the bus signal is wrong", \
       "measure the bus and compare it with the drive's; check the divider, BUS_FULL_SCALE_V and MOTOR_KPHI_V_PER_KRPM") \
-    X(16, OPEN_PHASE, FAULT_STAYS, "voltages and currents did not fit the motor, and one phase carried much less current than the others", \
+    X(16, OPEN_PHASE, FAULT_STAYS, "voltages and currents did not fit the motor, and one phase carried much less current than the others; or it carried hardly any of what was asked of it", \
       "check the motor's wires, the transistors of that phase and its current signal") \
     X(17, POTENTIOMETER, FAULT_STAYS, "the potentiometer's signal was in the dead ends of POT_LIVE_ZERO, where no position of it is", \
       "check its three wires") \

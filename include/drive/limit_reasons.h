@@ -22,7 +22,7 @@
     X(64, SPEED_RANGE, "TORQUE_MODE: the commanded current would leave the range MINIMUM_SPEED_RPM .. MAXIMUM_SPEED_RPM", \
       "command more current or less, or change load or range") \
     X(128, TOO_FAST, "the start waits for a rotor that turns faster than MAXIMUM_SPEED_RPM, or holds the bus above OVER_VOLTAGE_V", \
-      "wait until it has slowed down; at rest check the supply's voltage") \
+      "wait until it has slowed down; a bus that does not fall meanwhile is the supply's: OVERVOLTAGE") \
     X(256, BURN, "the bus takes no more braking current: d current burns the rotor's energy in the winding, within MAXIMUM_CURRENT_A", \
       "nothing to do, but mind the winding's temperature where a heavy rotor is stopped again and again")
 
