@@ -130,7 +130,8 @@ QM_INLINE uint16_t catch_bus_is_high(const drive_t *d, const drive_params_t *p)
     return (uint16_t)(qm_hi(d->bus_q31) > (int16_t)(p->bus_over_q15 - (p->bus_over_q15 >> CATCH_BUS_SHIFT)));
 }
 
-/** While the bus is too high: 1 when it has not fallen since it was last asked, some tenths of a second before. */
+/** While the bus is too high, for nothing else is waited for so long: 1 when it has not fallen since it was last asked, some tenths of a second
+ *  before. */
 QM_INLINE uint16_t catch_bus_stays(drive_t *d)
 {
     catch_t *c = &d->run.catching;
@@ -146,17 +147,15 @@ QM_INLINE uint16_t catch_bus_stays(drive_t *d)
 QM_INLINE drive_state_t catch_pass(drive_t *d, const drive_params_t *p)
 {
     const catch_t *c = &d->run.catching;
-    uint16_t high = catch_bus_is_high(d, p), stays;
     if (!d->command.run) {
         return DRIVE_STOPPED;
     }
     d->periods = (uint16_t)(d->periods + 1u); /* wraps where the bus is waited for: the pause begins anew */
-    stays = catch_bus_stays(d);
-    if (high && stays) {
+    if (catch_bus_stays(d)) {
         drive_raise(d, FAULT_OVERVOLTAGE);
         return DRIVE_FAULT;
     }
-    if (c->step == (uint16_t)CATCH_SEEN || d->periods < c->pause || high) {
+    if (c->step == (uint16_t)CATCH_SEEN || d->periods < c->pause || catch_bus_is_high(d, p)) {
         return DRIVE_CATCH;
     }
     return DRIVE_BOOTSTRAP;

@@ -40,7 +40,7 @@ typedef struct {
 /** Complement of the user's wishes, in which no bit of either goes unseen. */
 QM_INLINE uint16_t panel_complement(const panel_t *panel)
 {
-    return (uint16_t) ~((uint16_t)panel->wish_run + 3u * (uint16_t)panel->fast_range);
+    return (uint16_t) ~((uint16_t)panel->wish_run + (uint16_t)panel->fast_range);
 }
 
 /** 1 if the wishes are as they were written: a flipped bit could start the motor, or change its speed. The self-test of VARIABLES asks. */
