@@ -180,6 +180,17 @@ def test_a_rotor_that_the_load_drove_backwards_before_the_start_may_be_caught_an
     assert verdict_of(plant__speed_rpm=back_until(1.2, 0.61)).why == "turns backwards"
     again = lambda time_s: np.where((time_s > 0.9) & (time_s < 1.1), -600.0, back_until(0.8)(time_s)) # noqa: E731
     assert verdict_of(plant__speed_rpm=again).why == "turns backwards"
+    recoils = lambda time_s: np.where(time_s < 0.62, -10.0, back_until(1.2)(time_s)) # noqa: E731
+    assert verdict_of(plant__speed_rpm=recoils).why == "turns backwards" # it stood, but for a hair
+
+
+def test_a_start_has_a_ramp_more_where_the_load_drives_the_rotor_backwards(bench):
+    params = bench.library.params
+    driven = next(case for case in CASES if case.kind == "shaft: driven by the load" and case.size < 0.0)
+    assert trial.reversal_s(driven, "STOPPED", params) == trial.start_time_s(params) > 1.0
+    other = next(case for case in CASES if case.kind == "shaft: load step")
+    for case, state in ((driven, "CLOSED"), (driven, "STOPPING"), (replace(driven, size=0.5), "STOPPED"), (other, "STOPPED")):
+        assert trial.reversal_s(case, state, params) == 0.0
 
 
 @pytest.mark.parametrize("clock, way_end_s, at_s", [(1.0, 3.0, 3.0), (0.75, 3.0, 3.667), (1.25, 3.0, 3.0), (0.75, 0.5, 2.6)])

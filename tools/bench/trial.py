@@ -166,8 +166,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
                                   *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
                                   dead_rpm=dead_rpm(bench.library.params), start_dead=start_dead(bench.library.params))
         unseen = case.what.unseen(case.size, rating)
-        reversal_s = start_time_s(bench.library.params) if case.what.reverses and case.size < 0.0 and state not in CLOSED else 0.0
-        settled_s = settled(case, way.end_s + reversal_s, injected_s, unseen.clock)
+        settled_s = settled(case, way.end_s + reversal_s(case, state, bench.library.params), injected_s, unseen.clock)
         end_s = settled_s + judge.JUDGE_S
 
         def goes_wrong() -> tuple[Run, str]:
@@ -189,6 +188,11 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
 def settled(case: Case, way_end_s: float, injected_s: float, clock: float) -> float:
     """When a case is judged: a while after its fault has come and gone, and after its way is over, which a slow clock makes longer."""
     return max(injected_s + case.over_s + case.lasts_s + judge.SETTLE_S, injected_s + (way_end_s - injected_s) / min(clock, 1.0))
+
+
+def reversal_s(case: Case, state: str, params: dict[str, float]) -> float:
+    """What a start takes longer that catches a rotor turning backwards: a ramp more."""
+    return start_time_s(params) if case.what.reverses and case.size < 0.0 and state not in CLOSED else 0.0
 
 
 def dead_rpm(params: dict[str, float]) -> float:
