@@ -30,12 +30,13 @@ static void add_phases(deviation_t *v, const drive_t *d)
 static uint16_t has_open_phase(const deviation_t *v, const drive_params_t *p)
 {
     const uint16_t least = (uint16_t)(((uint16_t)p->id_off_q13 * PHASE_MS) >> PHASE_SHIFT);
-    uint16_t n, most = 0, open = 0;
+    uint16_t n, most = 0, open = 0, flows;
     for (n = 1; n < 3u; n++) {
         most = (v->flows[n] > v->flows[most]) ? n : most;
     }
+    flows = (v->flows[most] < v->asked[most]) ? v->flows[most] : v->asked[most]; /* more is noise */
     for (n = 0; n < 3u; n++) {
-        open |= (uint16_t)(v->asked[n] >= least && qm_muluu(v->flows[n], v->asked[most]) < (qm_muluu(v->flows[most], v->asked[n]) >> OPEN_SHIFT));
+        open |= (uint16_t)(v->asked[n] >= least && qm_muluu(v->flows[n], v->asked[most]) < (qm_muluu(flows, v->asked[n]) >> OPEN_SHIFT));
     }
     return open;
 }

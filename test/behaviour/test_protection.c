@@ -81,6 +81,30 @@ void test_broken_phase_wire_is_noticed(void)
     assert_outputs_off();
 }
 
+void test_each_phase_that_opens_while_little_flows_or_the_voltage_ends_is_named(void)
+{
+    static const double speeds_rpm[] = { 2500.0, 2800.0 };
+    for (size_t i = 0; i < 2; i++) {
+        for (double phase = 1.0; phase <= 3.0; phase += 1.0) {
+            run_at(speeds_rpm[i]);
+            set("load.constant_nm", 0.01);
+            wait_s(0.5);
+            set("fault.open_phase", phase);
+            TEST_ASSERT_TRUE(seconds_to_fault(1.0) < 0.3);
+            assert_fault(FAULT_OPEN_PHASE);
+            set("fault.open_phase", 0.0);
+        }
+    }
+}
+
+void test_a_noisy_current_signal_is_named(void)
+{
+    run_at(2000.0);
+    set("fault.ib_noise_a", 0.5);
+    TEST_ASSERT_TRUE(seconds_to_fault(4.0) < 3.0);
+    assert_fault(FAULT_CURRENT_SENSOR);
+}
+
 void test_first_fault_is_the_one_that_is_kept(void)
 {
     run_at(1500.0);

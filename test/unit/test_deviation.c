@@ -153,3 +153,16 @@ void test_a_current_as_small_as_noise_says_nothing_of_an_open_phase(void)
 {
     TEST_ASSERT_EQUAL_UINT16(1000, ms_until_open(params.id_off_q13, 256, 1, 0, 5000));
 }
+
+void test_noise_of_one_phase_opens_no_other(void)
+{
+    uint16_t ms;
+    for (ms = 0; ms < 256u; ms++) {
+        drive.run.control.ref_q13.q = (int16_t)(2 * params.id_off_q13);
+        drive.frame = trig_sincos((angle_t)(ms * 5000u));
+        drive.phases_q13 = phases_of(drive.run.control.ref_q13, drive.frame);
+        drive.phases_q13.b = (int16_t)(drive.phases_q13.b + ((ms & 1u) ? 4000 : -4000));
+        drive.phases_q13.c = (int16_t)(-drive.phases_q13.a - drive.phases_q13.b);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, deviation_tick(&deviation, &drive, &params));
+    }
+}
