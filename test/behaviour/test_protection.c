@@ -83,11 +83,11 @@ void test_broken_phase_wire_is_noticed(void)
 
 void test_each_phase_that_opens_while_little_flows_or_the_voltage_ends_is_named(void)
 {
-    static const double speeds_rpm[] = { 2500.0, 2800.0 };
+    static const double speeds_rpm[] = { 3200.0, 2800.0 };
     for (size_t i = 0; i < 2; i++) {
         for (double phase = 1.0; phase <= 3.0; phase += 1.0) {
             run_at(speeds_rpm[i]);
-            set("load.constant_nm", 0.01);
+            set("load.constant_nm", 0.02);
             wait_s(0.5);
             set("fault.open_phase", phase);
             TEST_ASSERT_TRUE(seconds_to_fault(1.0) < 0.3);
