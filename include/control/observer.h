@@ -83,6 +83,12 @@ QM_INLINE int16_t observer_between(int16_t a, int16_t b, q15_t share)
     return (int16_t)(a + qm_hi(2 * qm_mulss((int16_t)(b - a), share)));
 }
 
+/** 2 * share, at most 1. @param share 0..1 */
+QM_INLINE q15_t observer_twice(q15_t share)
+{
+    return (int16_t)((share < 16384) ? 2 * share : 32767);
+}
+
 #define OBSERVER_FASTEST_Q16 (32700l * 65536)
 
 /** The speed and a change of it, within the format. @param change at most 2^30 */
@@ -119,11 +125,21 @@ QM_INLINE void observer_unsettle(observer_t *o)
     }
 }
 
-/** The rate for the next step. @param ref_erpm speed reference, any */
-QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm)
+/** How much of a load there is: 0 as without any, 1 where it and the current that flows for it are clear of what dead time leaves. A load that
+ *  only slows the rotor down takes no current.
+ *  @param iq_q13 q current asked for, any */
+QM_INLINE q15_t observer_loaded(const observer_t *o, const observer_params_t *p, current_q13_t iq_q13)
 {
-    int16_t speed = qm_abs(ref_erpm), load = (int16_t)(qm_abs(qm_hi(o->load_q16)) - p->load_from), rate, wrong;
-    q15_t loaded = (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
+    int16_t held = qm_abs(qm_hi(o->load_q16)), flows = qm_abs(qm_mulhi_su(iq_q13, p->per_current_q16));
+    int16_t load = (int16_t)(((held < flows) ? held : flows) - p->load_from);
+    return (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
+}
+
+/** The rate for the next step. @param ref_erpm speed reference, any @param iq_q13 q current asked for, any */
+QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm, current_q13_t iq_q13)
+{
+    int16_t speed = qm_abs(ref_erpm), rate, wrong;
+    q15_t loaded = observer_loaded(o, p, iq_q13);
 
     o->share_q15 = 32767;
     if (speed < p->full_erpm) {
@@ -131,7 +147,7 @@ QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, spee
     }
     rate = observer_between(0, p->quiet_q16, o->share_q15);
     /* under load the back-EMF is clean, and half the speed is enough */
-    o->share_q15 = observer_between(o->share_q15, (int16_t)(o->share_q15 < 16384 ? 2 * o->share_q15 : 32767), loaded);
+    o->share_q15 = observer_between(o->share_q15, observer_twice(o->share_q15), loaded);
     rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
     o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
     /* without load dead time may make a light rotor hunt for long: twice as much is not wrong then */

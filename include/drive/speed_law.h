@@ -15,9 +15,9 @@ QM_INLINE void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
     int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
-    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference);
+    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, run->control.ref_q13.q);
     gain = observer_between(p->speed_kp_q13, p->speed_kp_quick_q13, o->quick_q15);
-    run->control.speed_kp_q13 = observer_between(0, gain, o->share_q15);
+    run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */
 }
 
 /** No integral for the load: its estimate never winds up, for it is made from the current that flows. The trim takes what an estimate leaves

@@ -522,7 +522,7 @@ def adaptation_step(v, rng):
               [(model.kfi - before[0]) / 2 ** 31, (model.rs - before[1]) / 2 ** 31])
 
 
-OBSERVER_FORMAT = ("op 0 schedule by ref and step, 1 preset to speed ref; heavy 1 = the constants h_; ref electrical rpm; rho 2^-32 turns; "
+OBSERVER_FORMAT = ("op 0 schedule by ref and iq, and step, 1 preset to speed ref; heavy 1 = the constants h_; ref electrical rpm; rho 2^-32 turns; "
                    "iq Q13; omega, load 16 fraction bits; load_q26 Q13 current with 13 fraction bits; the ratio is that of speed and load")
 OBSERVER_COLUMNS = ("op:u16 heavy:u16 ref:s16 rho:u32 iq:s16 omega:s32 load:s32 rate:s16 large:s16 quick:s16 part:s16 load_q26:s32")
 OBSERVED = (MACHINE.observer(), ref.Machine(inertia_kgm2=8e-4, speed_hz=1.5, load_hz=30.0).observer())
@@ -533,7 +533,7 @@ def observe(v, model, op, heavy, reference, rho, iq, real=None):
         if op:
             each.preset(rho, reference, iq)
         else:
-            each.schedule(reference)
+            each.schedule(reference, iq)
             each.step(rho, iq)
     m = model
     v.rows.append([op, heavy, reference, rho, iq, m.omega, m.load, m.rate, m.large, m.quick, m.part, m.load_q26()])
@@ -593,7 +593,8 @@ def observer_ends(v, rng):
             for n in range(24): # every step says half a turn
                 observe(v, model, 0, heavy, -32768, n % 2 << 31, -sign * 10240)
             for part in (0, p["full_erpm"] // 4, p["full_erpm"] // 2, p["full_erpm"]): # where the shares of the rates bend, under load
-                observe(v, model, 0, heavy, sign * part, 0, 0)
+                observe(v, model, 0, heavy, sign * part, 0, sign * 8191)
+                observe(v, model, 0, heavy, sign * part, 0, sign * 300)
         for _ in range(40):
             observe(v, model, 0, heavy, rng.randrange(-32768, 32768), rng.randrange(2 ** 32), rng.randrange(-10240, 10241))
 

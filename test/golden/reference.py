@@ -750,9 +750,10 @@ class Observer:
         self.rho, self.omega, self.load, self.quick = rho, speed * WORD, share(iq, self.p["per_current_q16"]) * WORD, 0
         self.unrest = 768
 
-    def schedule(self, ref):
+    def schedule(self, ref, iq):
         p, speed = self.p, magnitude(ref)
-        loaded = s16(clamp(s16(magnitude(upper(self.load)) - p["load_from"]), 0, p["load_width"]) * p["load_slope_q15"])
+        counts = min(magnitude(upper(self.load)), magnitude(s32(iq * p["per_current_q16"]) // WORD))
+        loaded = s16(clamp(s16(counts - p["load_from"]), 0, p["load_width"]) * p["load_slope_q15"])
         slow = speed * 32768 // p["full_erpm"] if speed < p["full_erpm"] else 32767
         self.part = toward(slow, 2 * slow if slow < 16384 else 32767, loaded)
         rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
@@ -792,9 +793,9 @@ class ObserverReal(Observer):
         self.rho, self.omega, self.load, self.quick = rho, float(speed), iq * self.p["per_current_q16"] / WORD, 0.0
         self.unrest = 768
 
-    def schedule(self, ref):
+    def schedule(self, ref, iq):
         p = self.p
-        loaded = clamp((abs(self.load) - p["load_from"]) / p["load_width"], 0, 1)
+        loaded = clamp((min(abs(self.load), abs(iq) * p["per_current_q16"] / WORD) - p["load_from"]) / p["load_width"], 0, 1)
         slow = min(abs(ref) / p["full_erpm"], 1)
         self.part = slow + (min(2 * slow, 1) - slow) * loaded
         rate = p["quiet_q16"] * slow * (1 - loaded) + p["loaded_q16"] * self.part * loaded

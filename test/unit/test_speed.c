@@ -197,13 +197,13 @@ void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
 
 void test_gain_follows_reference_or_speed_whichever_is_more_and_rises_after_a_large_innovation(void)
 {
-    int16_t full = params.observer.full_erpm, half = (int16_t)(full / 2), kp = params.speed_kp_q13, quick = params.speed_kp_quick_q13;
+    int16_t full = params.observer.full_erpm, half = (int16_t)(full / 2), fourth = (int16_t)(full / 4), kp = params.speed_kp_q13, quick = params.speed_kp_quick_q13;
     const struct {
         int16_t reference_erpm, quick_q15, kp_q13, speed_erpm;
     } cases[] = {
-        { full, 0, kp, 0 }, { 32000, 0, kp, 0 }, { half, 0, (int16_t)(kp / 2), 0 }, { (int16_t)-full, 0, kp, 0 }, { (int16_t)-half, 0, (int16_t)(kp / 2), 0 },
-        { 0, 0, 0, 0 }, { full, 32767, quick, 0 }, { half, 32767, (int16_t)(quick / 2), 0 }, { full, 16384, (int16_t)((kp + quick) / 2), 0 },
-        { 0, 0, (int16_t)(kp / 2), half }, { (int16_t)-half, 0, (int16_t)(kp / 2), 100 }, { 100, 0, (int16_t)(kp / 2), (int16_t)-half }, { 32000, 0, kp, half },
+        { full, 0, kp, 0 }, { 32000, 0, kp, 0 }, { half, 0, kp, 0 }, { fourth, 0, (int16_t)(kp / 2), 0 }, { (int16_t)-full, 0, kp, 0 }, { (int16_t)-fourth, 0, (int16_t)(kp / 2), 0 },
+        { 0, 0, 0, 0 }, { half, 32767, quick, 0 }, { fourth, 32767, (int16_t)(quick / 2), 0 }, { full, 16384, (int16_t)((kp + quick) / 2), 0 },
+        { 0, 0, (int16_t)(kp / 2), fourth }, { (int16_t)-fourth, 0, (int16_t)(kp / 2), 100 }, { 100, 0, (int16_t)(kp / 2), (int16_t)-fourth }, { 32000, 0, kp, fourth },
     };
     EACH(n, cases) {
         rig_closed(1, 10000);
