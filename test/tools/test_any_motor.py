@@ -13,7 +13,7 @@ from tuning import any_motor, cli, drawn
 
 CASES = [drawn.draw(9, number) for number in range(1, 201)]
 tuner = functools.partial(command, main=cli.main)
-NUMBERS = [1, 2, 4, 5, 6, 7, 9, 11, 13, 14, 16, 18]
+NUMBERS = [1, 2, 4, 5, 6, 7, 9, 13, 16, 115, 265, 279]
 
 
 def files(case: drawn.Case, folder: Path) -> tuple[motor_file.Motor, board_file.BoardFile]:
