@@ -44,7 +44,7 @@ void BOARD_ISR _ADC1Interrupt(void)
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
-    duty = drive_tick(&board_drive, &board_params, &raw);
+    drive_tick(&board_drive, &board_params, &raw, &duty);
     P1DC1 = duty.a;
     P1DC2 = duty.b;
     P1DC3 = duty.c;

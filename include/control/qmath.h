@@ -128,12 +128,16 @@ QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 }
 
 /** Magnitude; -32768 gives 32767. */
-QM_INLINE int16_t qm_abs(int16_t x)
+QM_INLINE QM_WRAPS int16_t qm_abs(int16_t x)
 {
-    if (x >= 0) {
-        return x;
-    }
-    return (int16_t)((x == INT16_MIN) ? INT16_MAX : -x);
+    uint16_t m = (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);
+    return (int16_t)(m - (m >> 15));
+}
+
+/** 1 where |x| > limit, in one comparison. @param limit 0..16383 */
+QM_INLINE QM_WRAPS uint16_t qm_beyond(int16_t x, int16_t limit)
+{
+    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)limit) > (uint16_t)(2 * limit));
 }
 
 /** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */

@@ -41,8 +41,9 @@ QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q
  *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see bus_update_gain())
  *  @param asked phase currents that the controllers ask for at the centre of the pulse: dead time is compensated for them. The measured
  *         ones are a period older and carry the converter's steps; compensation that follows them makes a current stick at zero
- *  @param i measured phase currents, for the sampling window */
-QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, phases_t asked, phases_t i)
+ *  @param i measured phase currents, for the sampling window
+ *  @param d the duties: written in place, for a returned structure is copied */
+QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, phases_t asked, phases_t i, duties_t *d)
 {
     int16_t a = qm_mulhi_su(v.alpha, duty_per_volt_q16);
     int16_t t = qm_mulhi_su(qm_mulhi_su(v.beta, duty_per_volt_q16), 56756u); /* sqrt(3)/2 */
@@ -50,7 +51,6 @@ QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_v
     int16_t b = (int16_t)(t - half);
     int16_t c = (int16_t)(-t - half);
     int16_t max = a, min = a, shift;
-    duties_t d;
 
     if (b > max) {
         max = b;
@@ -66,10 +66,9 @@ QM_INLINE duties_t svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_v
     if ((int16_t)(max + shift) > p->top) {
         shift = (int16_t)(p->top - max);
     }
-    d.a = svm_leg(p, (int16_t)(a + shift), asked.a, i.a);
-    d.b = svm_leg(p, (int16_t)(b + shift), asked.b, i.b);
-    d.c = svm_leg(p, (int16_t)(c + shift), asked.c, i.c);
-    return d;
+    d->a = svm_leg(p, (int16_t)(a + shift), asked.a, i.a);
+    d->b = svm_leg(p, (int16_t)(b + shift), asked.b, i.b);
+    d->c = svm_leg(p, (int16_t)(c + shift), asked.c, i.c);
 }
 
 #endif

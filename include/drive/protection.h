@@ -8,7 +8,7 @@
 QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
 {
     const int16_t limit = p->overcurrent_q13;
-    if (qm_abs(d->phases_q13.a) > limit || qm_abs(d->phases_q13.b) > limit || qm_abs(d->phases_q13.c) > limit) {
+    if (qm_beyond(d->phases_q13.a, limit) || qm_beyond(d->phases_q13.b, limit) || qm_beyond(d->phases_q13.c, limit)) {
         drive_raise(d, FAULT_OVERCURRENT_SW);
     }
 }

@@ -15,8 +15,8 @@ QM_INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_sa
     d->phases_q13.c = (int16_t)(-d->phases_q13.a - d->phases_q13.b);
 }
 
-/** A period with the bridge switching. */
-QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
+/** A period with the bridge switching. @param duty written */
+QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
 {
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
@@ -38,27 +38,28 @@ QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
     d->frame = trig_sincos(d->angle);
     v = inverse_park(c->v_q14, d->frame);
     estimator_commanded(&run->estimator, v);
-    return svm(&p->svm, v, d->duty_per_volt_q16, phases_of(c->ref_q13, d->frame), d->phases_q13);
+    svm(&p->svm, v, d->duty_per_volt_q16, phases_of(c->ref_q13, d->frame), d->phases_q13, duty);
 }
 
 /** One PWM period up to the duties; then drive_outputs(), drive_slow(), which has no deadline, and last drive_settle().
  *  @param raw the converter's results at the centre of the low sides' conduction
- *  @return duties; the board must load them before the next PWM boundary */
-QM_INLINE duties_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+ *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch */
+QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
-    duties_t duty = { 0, 0, 0 };
-
     d->ticks = (uint16_t)(d->ticks + 1u);
     drive_measure(d, p, raw);
     if (drive_is_running(d)) {
         protection_check_current(d, p); /* before the law: its formats end above the trip level */
         if (drive_is_running(d)) {
-            duty = MODE_RUN(d, p);
+            MODE_RUN(d, p, duty);
+            return;
         }
     } else {
         idle_step(d, p, raw); /* the period in which it begins to run has no time for both: the low sides stay on */
     }
-    return duty;
+    duty->a = 0;
+    duty->b = 0;
+    duty->c = 0;
 }
 
 /** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every eighth period. */

@@ -242,7 +242,8 @@ static void slow(void)
 static void tick(void)
 {
     drive_samples_t raw = any_samples();
-    (void)drive_tick(&drive, &params, &raw);
+    duties_t duty;
+    drive_tick(&drive, &params, &raw, &duty);
     slow();
 }
 
@@ -263,11 +264,12 @@ static drive_t calibrating;
 static void calibrate_after(uint16_t k)
 {
     drive_samples_t raw = any_samples();
+    duties_t duty;
     drive = calibrating;
     drive.periods = k;
     drive.calibration.sum_a = any_l(-32768l * k, 32767l * k);
     drive.calibration.sum_b = any_l(-32768l * k, 32767l * k);
-    (void)drive_tick(&drive, &params, &raw);
+    drive_tick(&drive, &params, &raw, &duty);
     //@ check sum_a: -32768 * (k + 1) <= drive.calibration.sum_a <= 32767 * (k + 1);
     //@ check sum_b: -32768 * (k + 1) <= drive.calibration.sum_b <= 32767 * (k + 1);
     //@ check ends: k < 1023 || drive.state != DRIVE_CALIBRATE;

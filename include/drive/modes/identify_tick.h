@@ -28,10 +28,10 @@ QM_INLINE int16_t identify_current(const drive_t *d)
 }
 
 /** Duties along the same axis: three times the alpha voltage, or sqrt(3) times three times the beta voltage, over the bus. */
-QM_INLINE int16_t identify_duty(const identify_t *id, duties_t duty)
+QM_INLINE int16_t identify_duty(const identify_t *id, const duties_t *duty)
 {
-    int16_t b = (int16_t)duty.b, c = (int16_t)duty.c;
-    return (int16_t)(id->on_q ? 3 * (b - c) : 2 * (int16_t)duty.a - b - c);
+    int16_t b = (int16_t)duty->b, c = (int16_t)duty->c;
+    return (int16_t)(id->on_q ? 3 * (b - c) : 2 * (int16_t)duty->a - b - c);
 }
 
 /** Moves the frame along with the rotor. As in the estimator (Equation 2), the sum of both components is the speed; a frame that leads has
@@ -180,19 +180,18 @@ QM_INLINE void identify_record(drive_t *d, const drive_params_t *p, uint16_t set
 /** Modulation. Dead time is compensated for the currents that are asked for at the centre of the pulse, not for the measured ones:
  *  those are a period older, and compensation that follows them makes a phase's current stick at zero for a while. Turning, that
  *  costs up to 0.3 V across the current, which is where the back-EMF is; standing, the first current would come with a jump. */
-QM_INLINE duties_t identify_duties(const drive_t *d, const drive_params_t *p)
+QM_INLINE void identify_duties(const drive_t *d, const drive_params_t *p, duties_t *duty)
 {
     phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
-    return svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16, asked, asked);
+    svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16, asked, asked, duty);
 }
 
 /** A period with the bridge switching; S2 stops at once. */
-NOINLINE duties_t identify_run(drive_t *d, const drive_params_t *p)
+NOINLINE void identify_run(drive_t *d, const drive_params_t *p, duties_t *duty)
 {
     identify_t *id = &d->run.identify;
     drive_control_t *c = &d->run.control;
     int16_t sign;
-    duties_t duty;
 
     c->i_q13 = park(clarke(d->phases_q13.a, d->phases_q13.b), d->frame);
     identify_record(d, p, identify_turn(d, p));
@@ -200,7 +199,7 @@ NOINLINE duties_t identify_run(drive_t *d, const drive_params_t *p)
     c->v_q14 = identify_voltage(d, sign);
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos(d->angle);
-    duty = identify_duties(d, p);
+    identify_duties(d, p, duty);
     id->sign_before = id->sign;
     id->sign = sign;
     id->duty = identify_duty(id, duty);
@@ -208,7 +207,6 @@ NOINLINE duties_t identify_run(drive_t *d, const drive_params_t *p)
     if (!d->command.run) {
         drive_enter(d, DRIVE_STOPPED);
     }
-    return duty;
 }
 
 /** Prepares the first step. */

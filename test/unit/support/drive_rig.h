@@ -62,7 +62,7 @@ static inline void rig_currents(int16_t a_q13, int16_t b_q13)
 static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
-        out.duty = drive_tick(&drive, &params, &samples);
+        drive_tick(&drive, &params, &samples, &out.duty);
         out.outputs = drive_outputs(&drive);
         drive_slow(&drive, &params, samples.v_bus);
         if (drive_settle(&drive)) {
