@@ -17,7 +17,7 @@ tRetryParm RetryParm;
 static int16_t watch_scaled(int16_t x, uint16_t bits)
 {
     int16_t limit = (int16_t)(32767 >> bits);
-    return (int16_t)(qm_clamp(x, (int16_t)-limit, limit) * (1 << bits));
+    return (int16_t)(qm_limit(x, limit) * (1 << bits));
 }
 
 void watch_refresh(void)

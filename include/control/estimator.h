@@ -80,15 +80,15 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
                                           alphabeta_t now, alphabeta_t previous, alphabeta_t oldest)
 {
     alphabeta_t v;
-    if (qm_abs(estimator_speed(e)) < p->nominal_erpm) {
+    if (!qm_beyond(estimator_speed(e), (int16_t)(p->nominal_erpm - 1))) {
         const int16_t limit = p->d_ilimit_ls_q14;
-        v.alpha = qm_mulhi_su(qm_clamp((int16_t)(now.alpha - oldest.alpha), (int16_t)-limit, limit), t->ls_q16);
-        v.beta = qm_mulhi_su(qm_clamp((int16_t)(now.beta - oldest.beta), (int16_t)-limit, limit), t->ls_q16);
-        v = estimator_turn(v, (int16_t)(7 * qm_clamp(e->half_step_q16_rad, -4681, 4681))); /* 0.5 rad at most */
+        v.alpha = qm_mulhi_su(qm_limit((int16_t)(now.alpha - oldest.alpha), limit), t->ls_q16);
+        v.beta = qm_mulhi_su(qm_limit((int16_t)(now.beta - oldest.beta), limit), t->ls_q16);
+        v = estimator_turn(v, (int16_t)(7 * qm_limit(e->half_step_q16_rad, 4681))); /* 0.5 rad at most */
     } else {
         const int16_t limit = p->d_ilimit_hs_q14;
-        v.alpha = qm_mulhi_su((int16_t)(8 * qm_clamp((int16_t)(now.alpha - previous.alpha), (int16_t)-limit, limit)), t->ls_q16);
-        v.beta = qm_mulhi_su((int16_t)(8 * qm_clamp((int16_t)(now.beta - previous.beta), (int16_t)-limit, limit)), t->ls_q16);
+        v.alpha = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.alpha - previous.alpha), limit)), t->ls_q16);
+        v.beta = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.beta - previous.beta), limit)), t->ls_q16);
     }
     v.alpha = (int16_t)(v.alpha * (1 << p->ls_exp));
     v.beta = (int16_t)(v.beta * (1 << p->ls_exp));
@@ -106,8 +106,8 @@ QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, c
     uint16_t newest = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
     alphabeta_t *slot = &e->history_q14[newest]; /* of the oldest, which makes room */
     alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, *slot);
-    int16_t resistive_alpha = qm_clamp(qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), t->rs_q16), (int16_t)-most, most);
-    int16_t resistive_beta = qm_clamp(qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), t->rs_q16), (int16_t)-most, most);
+    int16_t resistive_alpha = qm_limit(qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), t->rs_q16), most);
+    int16_t resistive_beta = qm_limit(qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), t->rs_q16), most);
 
     e->e_q13.alpha = (int16_t)(((e->v_last_q13.alpha + e->v_before_q13.alpha) >> 1)
                                - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
@@ -120,7 +120,7 @@ QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, c
 /** Equation 2: speed from Eq and Ed. @param sum_max limit of their sum, 32767 * 2048 / inv_kfi @return within 16 bits */
 QM_INLINE speed_erpm_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi)
 {
-    return (int16_t)(qm_mulss(qm_clamp(sum, (int16_t)-sum_max, sum_max), inv_kfi) >> 11);
+    return (int16_t)(qm_mulss(qm_limit(sum, sum_max), inv_kfi) >> 11);
 }
 
 /** Equations 1, 2 and 7: filtered Ed and Eq give the speed, the speed gives the angle.
@@ -130,7 +130,7 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
     int16_t e_d = qm_lowpass(&e->e_d_q28, e_q12.d, t->kfilter_esdq_q16);
     int16_t e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
     speed_erpm_t speed = estimator_speed(e);
-    int16_t sign = (qm_abs(speed) > p->decimate_erpm) ? e_q : speed;
+    int16_t sign = qm_beyond(speed, p->decimate_erpm) ? e_q : speed;
     int16_t sum = (int16_t)((sign >= 0) ? e_q - e_d : e_q + e_d);
     e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
     e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32));

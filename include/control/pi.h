@@ -17,6 +17,21 @@ typedef struct {
     uint16_t shift; /**< 0..14 */
 } pi_gains_t;
 
+/** What the integrator does not keep of a step whose output is at its limit, and that output.
+ *  @param u within the limit or not @param step written @return the output */
+QM_INLINE int16_t pi_limit(int32_t u, int32_t limit_u, const pi_gains_t *gains, int16_t limit, int32_t *step)
+{
+    if (u > limit_u) {
+        *step -= 2 * qm_mulss(qm_hi(u - limit_u), gains->kc);
+        return limit;
+    }
+    if (u < -limit_u) {
+        *step += 2 * qm_mulss(qm_hi(-limit_u - u), gains->kc);
+        return (int16_t)-limit;
+    }
+    return (int16_t)(u >> gains->shift);
+}
+
 /** One step with the output limited to +-limit.
  *  @param err error, |err| <= 32767
  *  @param limit 0..32767 in output counts
@@ -28,14 +43,10 @@ QM_INLINE int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_
     int32_t limit_u = qm_mulss(limit, (int16_t)(1u << gains->shift));
     int16_t out;
 
-    if (u > limit_u) {
-        step -= 2 * qm_mulss(qm_hi(u - limit_u), gains->kc);
-        out = limit;
-    } else if (u < -limit_u) {
-        step += 2 * qm_mulss(qm_hi(-limit_u - u), gains->kc);
-        out = (int16_t)-limit;
-    } else {
+    if (qm_within(qm_hi(u), qm_hi(limit_u))) { /* clear of the limit, as mostly: a word tells */
         out = (int16_t)(u >> gains->shift);
+    } else {
+        out = pi_limit(u, limit_u, gains, limit, &step);
     }
     pi->sum += step;
     return out;

@@ -134,10 +134,25 @@ QM_INLINE QM_WRAPS int16_t qm_abs(int16_t x)
     return (int16_t)(m - (m >> 15));
 }
 
-/** 1 where |x| > limit, in one comparison. @param limit 0..16383 */
-QM_INLINE QM_WRAPS uint16_t qm_beyond(int16_t x, int16_t limit)
+/** 1 where |x| > most, in one comparison. @param most not negative */
+QM_INLINE QM_WRAPS uint16_t qm_beyond(int16_t x, int16_t most)
 {
-    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)limit) > (uint16_t)(2 * limit));
+    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) > (uint16_t)(2u * (uint16_t)most));
+}
+
+/** 1 where -most <= x < most, in one comparison. @param most not negative */
+QM_INLINE QM_WRAPS uint16_t qm_within(int16_t x, int16_t most)
+{
+    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) < (uint16_t)(2u * (uint16_t)most));
+}
+
+/** x limited to -most..most. @param most not negative */
+QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
+{
+    if (qm_beyond(x, most)) {
+        return (int16_t)((x < 0) ? -most : most);
+    }
+    return x;
 }
 
 /** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */

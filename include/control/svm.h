@@ -22,16 +22,26 @@ typedef struct {
 /** Duty that restores what dead time takes: the leg loses Td for a positive current and gains it for a negative one. */
 QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t asked_q13)
 {
-    return (int16_t)((int16_t)(qm_clamp(asked_q13, (int16_t)-p->knee_q13, p->knee_q13) * p->dead_slope_q8) >> 8);
+    if (asked_q13 > p->knee_q13) { /* a constant, and so below */
+        return (int16_t)((int16_t)(p->knee_q13 * p->dead_slope_q8) >> 8);
+    }
+    if (asked_q13 < -p->knee_q13) {
+        return (int16_t)((int16_t)(-p->knee_q13 * p->dead_slope_q8) >> 8);
+    }
+    return (int16_t)((int16_t)(asked_q13 * p->dead_slope_q8) >> 8);
 }
 
+/** @param u duty before dead-time compensation, at most `top`; below zero only by rounding */
 QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q13, current_q13_t i_q13)
 {
-    /* below zero only by rounding; the sum is bounded by full + dead_time */
-    int16_t duty = (int16_t)(qm_clamp(u, 0, p->top) + svm_dead_time(p, asked_q13));
-    /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
-     * is open longer by it; otherwise the compensation must not close the window. */
-    return (duty_t)qm_clamp(duty, 0, (i_q13 > p->turn_q13) ? p->full : p->top);
+    int16_t duty = (int16_t)(((u < 0) ? 0 : u) + svm_dead_time(p, asked_q13));
+    if (duty > p->top) {
+        /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
+         * is open longer by it; otherwise the compensation must not close the window. */
+        int16_t most = (i_q13 > p->turn_q13) ? p->full : p->top;
+        duty = (duty > most) ? most : duty;
+    }
+    return (duty_t)((duty < 0) ? 0 : duty);
 }
 
 /** Duties for a voltage vector.

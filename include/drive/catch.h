@@ -177,7 +177,7 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
     drive_update_model(run, p, e->omega_erpm);
     emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_abs(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
     e->e_q_q28 = (int32_t)((ahead >= 0) ? emf : -emf) * 65536;
-    run->control.v_q14.q = qm_clamp((int16_t)(4 * qm_clamp((int16_t)((ahead >= 0) ? emf : -emf), -8191, 8191)), (int16_t)-d->circle.limit_q14, d->circle.limit_q14);
+    run->control.v_q14.q = qm_limit((int16_t)(4 * qm_limit((int16_t)((ahead >= 0) ? emf : -emf), 8191)), d->circle.limit_q14);
 }
 
 /** In closed loop from the next period on, at the rotor's speed and without torque. */
