@@ -113,6 +113,14 @@ QM_INLINE void firmware_supervise(void)
     record_tick();
 }
 
+/** @param found drive_fault_t, none too */
+static void firmware_find(uint16_t found)
+{
+    if (found != (uint16_t)FAULT_NONE) {
+        firmware_trip((drive_fault_t)found);
+    }
+}
+
 void firmware_background(void)
 {
     static deviation_t deviation;
@@ -120,10 +128,10 @@ void firmware_background(void)
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
 
     firmware_supervise();
+    firmware_find(deviation_phases(&deviation, &board_drive, &board_params));
     if (elapsed_ms != 0u) {
         panel_inputs_t in;
         panel_lights_t lights;
-        uint16_t found;
         last_ms_tick = (uint16_t)(last_ms_tick + elapsed_ms * PERIODS_PER_MS);
         in.s2_down = BOARD_S2_DOWN();
         in.s3_down = BOARD_S3_DOWN();
@@ -134,10 +142,7 @@ void firmware_background(void)
         BOARD_LED_RUN = lights.led_run & 1u;
         selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
-        found = deviation_tick(&deviation, &board_drive, &board_params);
-        if (found != (uint16_t)FAULT_NONE) {
-            firmware_trip((drive_fault_t)found);
-        }
+        firmware_find(deviation_tick(&deviation, &board_drive, &board_params));
         if (overload_tick(&overload, &board_drive, &board_params, elapsed_ms)) {
             firmware_trip(FAULT_OVERTEMPERATURE);
         }

@@ -9,11 +9,15 @@
 typedef struct {
     int32_t id_q16;              /**< Q13 counts with 16 fraction bits */
     uint16_t asked[3], flows[3]; /**< |current| that the references ask of the phases and that is measured, Q13 / 16 */
-    uint16_t phase_ms;           /**< sums so far */
+    uint16_t samples;            /**< in the sums */
+    uint16_t sampled_tick;       /**< period of the last one */
 } deviation_t;
 
+/** Every pass of the background. @return drive_fault_t: OPEN_PHASE when a phase carries next to none of what is asked of it, or none */
+uint16_t deviation_phases(deviation_t *v, const drive_t *d, const drive_params_t *p);
+
 /** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise
- *  make it, OPEN_PHASE, or none */
+ *  make it, or none */
 uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_params_t *p);
 
 #endif
