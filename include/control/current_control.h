@@ -31,7 +31,7 @@ QM_INLINE voltage_q14_t vq_limit(const voltage_circle_t *circle, voltage_q14_t v
 {
     /* |Vd|/limit in Q12, rounded up; below 4096 because |Vd| <= 31/32 limit */
     uint16_t ratio_q12 = (uint16_t)(qm_mulhi_uu((uint16_t)qm_abs(vd_q14), circle->reciprocal) + 1u);
-    return qm_hi(2 * qm_mulss(circle->limit_q14, trig_circle((int16_t)(ratio_q12 << 3))));
+    return (int16_t)qm_mulhi_uu((uint16_t)(2u * (uint16_t)circle->limit_q14), (uint16_t)trig_circle((int16_t)(ratio_q12 << 3)));
 }
 
 /** One period of both controllers.

@@ -4,13 +4,15 @@
 
 #include "drive/model.h"
 
-/** Over-current of any phase, every period with the bridge on. */
-QM_INLINE void protection_check_current(drive_t *d, const drive_params_t *p)
+/** Over-current of any phase, every period with the bridge on. @return 1 then: the law must not run */
+QM_INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
 {
     const int16_t limit = p->overcurrent_q13;
     if (qm_beyond(d->phases_q13.a, limit) || qm_beyond(d->phases_q13.b, limit) || qm_beyond(d->phases_q13.c, limit)) {
         drive_raise(d, FAULT_OVERCURRENT_SW);
+        return 1;
     }
+    return 0;
 }
 
 #define PROTECTION_BUS_END_Q15 32640 /* the converter's last steps: more cannot be told from a broken signal */

@@ -49,8 +49,7 @@ QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_sampl
     d->ticks = (uint16_t)(d->ticks + 1u);
     drive_measure(d, p, raw);
     if (drive_is_running(d)) {
-        protection_check_current(d, p); /* before the law: its formats end above the trip level */
-        if (drive_is_running(d)) {
+        if (!protection_check_current(d, p)) { /* before the law: its formats end above the trip level */
             MODE_RUN(d, p, duty);
             return;
         }
