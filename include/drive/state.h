@@ -5,7 +5,7 @@
 #include "drive/drive.h"
 
 /** Enters a state; its clock begins anew. While a fault is kept, every way leads to FAULT: only drive_clear_fault() opens it. */
-QM_INLINE void drive_enter(drive_t *d, drive_state_t next)
+NOINLINE void drive_enter(drive_t *d, drive_state_t next)
 {
     uint16_t state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
     d->state = state;
@@ -25,7 +25,7 @@ QM_INLINE uint16_t drive_settle(drive_t *d)
 }
 
 /** Stops at once and keeps the code of the first fault. Any context: background, interrupt, trap. */
-QM_INLINE void drive_raise(drive_t *d, drive_fault_t fault)
+NOINLINE void drive_raise(drive_t *d, drive_fault_t fault)
 {
     d->command.run = 0;
     if (d->fault == (uint16_t)FAULT_NONE) {
