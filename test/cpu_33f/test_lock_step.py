@@ -224,7 +224,7 @@ def test_the_fault_recorder_sends_the_trace_to_the_count(board: PilBoard) -> Non
     part = trace[at - 64:at + 16]
     for column, values, count in ((1, rows.i_a, "CURRENT_A"), (2, rows.i_b, "CURRENT_A"), (3, rows.v_d, "VOLTAGE_V"), (4, rows.v_q, "VOLTAGE_V")):
         assert (part[:, column] / library.params[f"COUNT_{count}"]).round().tolist() == (values / library.params[f"COUNT_{count}"]).round().tolist()
-    assert ((part[:, 5] * 65536 / 360).round() // 8 * 8).tolist() == (rows.angle_deg * 65536 / 360).round().tolist()
+    assert ((part[:, 5] * 65536 / 360).round().astype(int) & ~recorder.STATE_BITS).tolist() == (rows.angle_deg * 65536 / 360).round().tolist()
     assert part[:, 6].tolist() == record.states
     assert rows.bus_v[rows.bus_v > 0] == pytest.approx(24.0, abs=0.5)
 

@@ -93,12 +93,17 @@ with_compiler = pytest.mark.skipif(not xc16(), reason="xc16-gcc is not on PATH; 
 MODES = ("OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT", "IDENTIFY", "PARAMS_IN_RAM", "SELFTEST_OFF")
 
 
+def warnings(errors: str) -> list[str]:
+    """What a build says, but for what a mode tells its user on purpose."""
+    return [line for line in errors.splitlines() if "note: #pragma message: " not in line]
+
+
 @with_compiler
 @pytest.mark.parametrize("words", [*([f"OPT={level}", "VARIANT=check"] for level in ("-O1", "-O2", "-O3")),
                                    *([f"DEFINES=-D{mode}", f"VARIANT=check-{mode}"] for mode in MODES)])
 def test_no_warning_and_a_good_image_at_every_level_and_in_every_mode(words):
     done = make("firmware", *words)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, warnings(done.stderr)) == (0, [])
 
 
 @with_compiler
@@ -182,14 +187,14 @@ DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some
     ("spoil_c = spoil_c / board_drive.ticks;", "static volatile int64_t spoil_c;",
      r"called by firmware_background\(\).*: a division: use qm_divud"),
     ("board_drive.ticks = (uint16_t)(100u / board_drive.ticks);", "", r"firmware_background\(\) divides by a variable"),
-    ("spoil_ram[board_drive.ticks & 255u] = 1;", "static volatile int16_t spoil_ram[256];", "RAM: [0-9]+ bytes of a budget of 768"),
+    ("spoil_ram[board_drive.ticks & 15u] = 1;", "static volatile int16_t spoil_ram[16];", "RAM: [0-9]+ bytes of a budget of [0-9]+"),
     ("board_drive.ticks = spoil_flash[board_drive.ticks & 1023u];",
      "extern const uint16_t spoil_flash[1024];\nconst uint16_t spoil_flash[1024] = { 1 };",
      "flash: [0-9]+ bytes of a budget of [0-9]+"),
     ("spoil(board_drive.ticks);", RECURSIVE, "stack: recursion: spoil -> spoil"),
     ("spoil_pointer();", "extern void (*volatile spoil_pointer)(void);\nvoid (*volatile spoil_pointer)(void) = pwm_outputs_off;",
      "stack: firmware_background: call through a pointer"),
-    ("spoil();", DEEP, "stack: up to [0-9]+ bytes of 448")])
+    ("spoil();", DEEP, "stack: up to [0-9]+ bytes of [0-9]+")])
 def test_code_that_fails_the_build_is_told_with_its_place(tree, body, before, told):
     assert re.search(told, " ".join(tree.spoil("firmware/board/firmware.c", HEAD, f"{before}\n{HEAD}    {body}\n").splitlines()))
 
@@ -213,4 +218,4 @@ def test_a_mistake_in_the_boards_files_fails_the_build(tree, file, old, new, tol
 def test_a_mode_in_userparams_h_is_not_held_to_the_budget_of_the_delivered_drive(tree):
     tree.change("userparams.h", "/* #define IDENTIFY */", "#define IDENTIFY")
     done = make("firmware", root=tree.root)
-    assert (done.returncode, done.stderr) == (0, "") and "of 33024 bytes of the chip" in done.stdout
+    assert (done.returncode, warnings(done.stderr)) == (0, []) and "of 33024 bytes of the chip" in done.stdout

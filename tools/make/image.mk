@@ -85,9 +85,9 @@ $X/foc33.hex: $X/foc33.elf
 	$(quiet)$(xc16)bin2hex $< -a -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16)) >$X/foc33.bin2hex 2>&1 || \
 	    { cat $X/foc33.bin2hex >&2; rm -f $@; exit 1; }
 
-# Another mode has its own tables and arrays: the budget is for the drive as it is delivered.
+# Another mode has its own tables and arrays, another level more code: the budget is for the drive as it is delivered.
 target_modes = $(DEFINES)$(filter $(modes),$(shell sed -n 's/^ *# *define *\([A-Z_]*\).*/\1/p' $(call quoted,$(or $(USERPARAMS),.)/userparams.h) 2>/dev/null))
-target_budget = $(if $(target_modes),,--budget firmware/budget.toml)
+target_budget = $(if $(target_modes)$(filter-out -O2,$(OPT)),,--budget firmware/budget.toml)
 target_check = $(python) -m tools.image.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget)
 
 $X/checked: $X/foc33.hex firmware/board/config.c firmware/budget.toml $(wildcard tools/image/*.py)
