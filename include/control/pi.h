@@ -43,7 +43,7 @@ QM_INLINE int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_
     int32_t limit_u = qm_mulss(limit, (int16_t)(1u << gains->shift));
     int16_t out;
 
-    if (qm_within(qm_hi(u), qm_hi(limit_u))) { /* clear of the limit, as mostly: a word tells */
+    if (qm_clear_of(u, limit_u)) { /* as mostly */
         out = (int16_t)(u >> gains->shift);
     } else {
         out = pi_limit(u, limit_u, gains, limit, &step);

@@ -127,23 +127,37 @@ QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
     return (x < least) ? least : x;
 }
 
-/** Magnitude; -32768 gives 32767. */
-QM_INLINE QM_WRAPS int16_t qm_abs(int16_t x)
-{
-    uint16_t m = (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);
-    return (int16_t)(m - (m >> 15));
-}
-
-/** 1 where |x| > most, in one comparison. @param most not negative */
+/* Ranges, each by one comparison without a sign. The proofs read what they mean; test_qmath.c compares. */
+#ifdef __FRAMAC__
+#define qm_beyond(x, most) ((x) > (most) || (x) < -(most))
+#define qm_clear_of(x, most) ((x) <= (most) && (x) >= -(most))
+#define qm_magnitude(x) (((x) >= 0) ? (x) : ((x) == INT16_MIN) ? INT16_MAX \
+                                                               : -(x))
+#else
+/** 1 where |x| > most. @param most not negative */
 QM_INLINE QM_WRAPS uint16_t qm_beyond(int16_t x, int16_t most)
 {
     return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) > (uint16_t)(2u * (uint16_t)most));
 }
 
-/** 1 where -most <= x < most, in one comparison. @param most not negative */
-QM_INLINE QM_WRAPS uint16_t qm_within(int16_t x, int16_t most)
+/** 1 where the upper words alone tell that |x| <= most; 0 tells nothing. @param most not negative */
+QM_INLINE QM_WRAPS uint16_t qm_clear_of(int32_t x, int32_t most)
 {
-    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) < (uint16_t)(2u * (uint16_t)most));
+    uint16_t limit = (uint16_t)qm_hi(most);
+    return (uint16_t)((uint16_t)((uint16_t)qm_hi(x) + limit) < (uint16_t)(2u * limit));
+}
+
+QM_INLINE QM_WRAPS int16_t qm_magnitude(int16_t x)
+{
+    uint16_t m = (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);
+    return (int16_t)(m - (m >> 15));
+}
+#endif
+
+/** Magnitude; -32768 gives 32767. */
+QM_INLINE int16_t qm_abs(int16_t x)
+{
+    return (int16_t)qm_magnitude(x);
 }
 
 /** x limited to -most..most. @param most not negative */

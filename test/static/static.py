@@ -116,7 +116,7 @@ def cppcheck(sources: list[str]) -> list[Finding]:
         # All sources at once: unused types, macros and functions are only known at the end.
         output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
                       f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--force", "--inconclusive",
-                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", *INCLUDES, *sources])
+                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", "-U__FRAMAC__", *INCLUDES, *sources])
     findings = {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), file, int(number), text)
                 for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
     return sorted(findings, key=lambda f: (f.check, f.file, f.line))
