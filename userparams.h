@@ -26,6 +26,7 @@
 #define NOPOLESPAIRS 5              /* [pairs]         1 .. 50        pole pairs */
 #define MOTOR_RS_OHM 2.67           /* [ohm]           0.01 .. 40     phase resistance: half of line to line */
 #define MOTOR_LS_MH 1.92            /* [mH]            0.01 .. 30     phase inductance: half of line to line */
+#define MOTOR_SALIENCY_UH 0         /* [uH]            0 .. 20000     Lq - Ld of a salient motor, whose MOTOR_LS_MH is Lq: least current for the torque (MTPA); 0: not salient */
 #define MOTOR_KPHI_V_PER_KRPM 7.24  /* [V peak/krpm]   0.2 .. 2000    line-to-line back-EMF per 1000 mechanical rpm */
 #define MOTOR_INERTIA_KGM2 5.5e-6   /* [kg m2]         1e-8 .. 10     rotor and whatever turns with it; scales the speed loop */
 

@@ -48,6 +48,7 @@ BOARD_KEYS = {"NOMINAL_BUS_V": "supply.voltage", "LOOPTIME_SEC": "pwm.period", "
               "NORM_CURRENT_CONST": "shunt.amplifier_gain", "BUS_FULL_SCALE_V": "adc.bus_divider", "OVER_VOLTAGE_V": "limits.over_voltage",
               "UNDER_VOLTAGE_V": "limits.under_voltage", "REGEN_LIMIT_V": "limits.regen"}
 """Parameters that the board file alone decides, with the key that they come from."""
+SALIENT_FROM = number("PARAM_SALIENT_FROM")
 ACCEL_MOST, ACCEL_LEAST = number("PARAM_ACCEL_MOST"), number("PARAM_ACCEL_LEAST")
 
 
@@ -286,8 +287,17 @@ def _motor(d: Design) -> None:
     d.put("MOTOR_LS_MH", plain(m.lq_h * 1e3), "motor file; per phase of the star" + (
         ", of the q axis: with Lq in Equation 4 the salient motor's back-EMF lies on the q axis whatever the current, with Ld or a mean "
         "its angle would turn with the torque" if m.salient else ""))
+    d.put("MOTOR_SALIENCY_UH", *_saliency(m, d.envelope.maximum_a))
     d.put("MOTOR_KPHI_V_PER_KRPM", plain(m.kphi_v_per_krpm), "motor file")
     d.put("MOTOR_INERTIA_KGM2", short(m.inertia_kgm2 + m.load_inertia_kgm2), "motor file" + (", rotor and load" if m.load_inertia_kgm2 else ""))
+
+
+def _saliency(m: Motor, maximum_a: float) -> tuple[str, str]:
+    """MOTOR_SALIENCY_UH, and why: where the largest current changes the flux by an eighth."""
+    difference_h = m.lq_h - m.ld_h
+    if difference_h * maximum_a * SALIENT_FROM < 1.001 * m.psi_vs:
+        return "0", "motor file" + ("; the largest current would change the flux by less than an eighth" if m.salient else "")
+    return str(round(difference_h * 1e6)), "motor file; Lq - Ld per phase of the star"
 
 
 def _board(d: Design) -> None:

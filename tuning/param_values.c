@@ -40,6 +40,10 @@ static void motor(void)
     GROUP("motor");
     MACRO(NORM_RS, rs, "ohm", rs / at_most(rs / ohm * 16384.0, 32767.0), "Q15 / 2", "Equation 5, AN1292's constant, at most 32767");
     MACRO(NORM_LSDTBASE, ls, "mH", ls / at_most(ls / one_ls * 128.0, 32767.0), "Q15 / 256", "Equation 5, AN1292's constant, at most 32767");
+#if MOTOR_SALIENCY_UH
+    FIELD(salience_q13, kphi * 60.0 / (2.0 * PI * sqrt(3.0) * 1000.0 * pairs) / (MOTOR_SALIENCY_UH * 1e-6), "A", q13_a, "Q13 A",
+          "-i_d that doubles the flux, psi/(Lq - Ld)");
+#endif
     MACRO(NORM_INVKFIBASE, kphi, "V/krpm", kphi * kphi / (sqrt(3.0) * 1000.0 * pairs * volt * 16384.0) * SPEED_UNIT, "Q15 / 2, 1/Kphi", "Equation 6");
     MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0 / SPEED_UNIT, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
     FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");

@@ -4,6 +4,7 @@
 #include "drive/bus.h"
 #include "drive/limits.h"
 #include "drive/modes/modes.h"
+#include "drive/salient.h"
 #include "drive/state.h"
 
 /** Clears bytes: assigning a zero struct would copy it from flash. */
@@ -20,6 +21,7 @@ NOINLINE void drive_zero(void *object, uint16_t size)
 void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
 {
     fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, ref_erpm);
+    salient_model(run, p);
     adaptation_apply(&run->adaptation, &p->adaptation, &run->model);
 }
 

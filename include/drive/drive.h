@@ -12,6 +12,7 @@
 #include "control/svm.h"
 #include "drive/faults.h"
 #include "drive/modes/mode_state.h"
+#include "drive/salient_state.h"
 #include "drive/selftest_state.h"
 
 /** X(name, meaning): what the drive is doing. */
@@ -89,6 +90,7 @@ typedef struct {
     q15_t ls_off;              /**< how far L may be off, to either side */
     int16_t dead_emf_q12;      /**< what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
+    SALIENT_PARAMS
 } drive_params_t;
 
 /** Raw converter results, signed fractional Q15. */
@@ -174,6 +176,7 @@ typedef struct {
     uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
     uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
     uint16_t lost_lock_steps;     /**< two for each slow step out of lock, less one for each in lock */
+    SALIENT_STATE
     MODE_STATE
 } drive_run_t;
 

@@ -3,6 +3,7 @@
 #define DRIVE_HANDOVER_H
 
 #include "drive/modes/modes.h"
+#include "drive/salient.h"
 #include "drive/state.h"
 
 #define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
@@ -97,13 +98,13 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 {
     const drive_control_t *c = &run->control;
     if (run->handover.speed_is_preset) {
-        observer_step(&run->observer, &p->observer, run->estimator.rho_q32, c->i_q13.q);
+        observer_step(&run->observer, &p->observer, run->estimator.rho_q32, salient_torque(run, c->i_q13.q));
         if (run->handover.offset != 0) {
             observer_unsettle(&run->observer); /* dead time shakes the estimate most while the d current falls */
         }
     } else {
         run->handover.speed_is_preset = 1;
-        observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, estimator_speed(&run->estimator), c->ref_q13.q);
+        observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, estimator_speed(&run->estimator), salient_torque(run, c->ref_q13.q));
     }
 }
 

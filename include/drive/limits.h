@@ -5,6 +5,7 @@
 
 #include "drive/drive.h"
 #include "drive/limit_reasons.h"
+#include "drive/salient.h"
 
 #define LIMITS_MISSING_Q14 4       /**< voltage counts that a count of missing q current asks for */
 #define LIMITS_BURN_STEP_Q13 32    /**< a step of the d current that burns: MAXIMUM_CURRENT_A takes a twentieth of a second */
@@ -47,7 +48,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     uint32_t ratio;
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
-    id_q13 = (int16_t)(run->handover.id_q13 + run->fieldweak.table_q13 + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13);
+    id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13);
     c->ref_q13.d = qm_limit(id_q13, id_max);
     ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));

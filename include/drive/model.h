@@ -2,6 +2,7 @@
 #ifndef DRIVE_MODEL_H
 #define DRIVE_MODEL_H
 
+#include "drive/salient.h"
 #include "drive/state.h"
 
 /** R i_q in the format of the filtered back-EMF. */
@@ -46,6 +47,7 @@ QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
 QM_INLINE void model_update(drive_t *d, const drive_params_t *p)
 {
     if (drive_is_closed(d)) {
+        salient_sees_current(&d->run);
         drive_update_model(&d->run, p, d->run.control.reference_erpm);
     }
 }
@@ -54,6 +56,7 @@ QM_INLINE void model_update(drive_t *d, const drive_params_t *p)
 QM_INLINE void model_update_in_ramp(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_RAMP) {
+        salient_sees_forced_current(d);
         drive_update_model(&d->run, p, p->end_erpm);
     }
 }

@@ -85,6 +85,12 @@
         .kp = PARAM_KP(p), .ki = (i), .kc = Q15(c), .shift = (s) \
     }
 
+#if MOTOR_SALIENCY_UH
+#define PARAM_SALIENT_INIT .salience_q13 = (uint16_t)(PARAM_SALIENCE_Q13 + 0.5F)
+#else
+#define PARAM_SALIENT_INIT
+#endif
+
 /** Initialiser of a drive_params_t. */
 #define DRIVE_PARAMS_INIT \
     { \
@@ -143,7 +149,8 @@
         .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
         .ls_off = Q15(PARAM_L_OFF), \
         .dead_emf_q12 = (int16_t)((VOLTAGE_Q14(PARAM_DEAD_TIME_V) + 2) / 4), \
-        .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(SPEED_COUNTS(PARAM_TOP_ERPM * 1.25F), 32700.0F)) \
+        .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(SPEED_COUNTS(PARAM_TOP_ERPM * 1.25F), 32700.0F)), \
+        PARAM_SALIENT_INIT \
     }
 
 #endif

@@ -200,6 +200,12 @@
 /** The back-EMF filter's corner at low speed is five times the electrical frequency: K per count of speed. */
 #define PARAM_ESDQ_PER_COUNT (65536.0F * 2.0F * PARAM_PI * PARAM_F(PARAM_ESDQ_RATIO) / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT))
 
+/* ---- Salient motors (control/salience.h) ---- */
+/** -i_d that doubles the flux, psi/(Lq - Ld), Q13 counts. */
+#define PARAM_SALIENCE_Q13 (60.0F / (2.0F * PARAM_PI * PARAM_ERPM_PER_V) / (PARAM_MAX(PARAM_F(MOTOR_SALIENCY_UH), 0.001F) * 0.000001F) \
+                            / PARAM_F(NORM_CURRENT_CONST) / 4.0F)
+#define PARAM_SALIENT_FROM 8.0 /* times the largest current: beyond, MTPA would save less than 0.8 % of the largest current, and a third of that at rated current; the tuner reads it */
+
 /* ---- How far the header may be off, as make robust promises (tools/bench/scenarios/tables/robust.toml) ---- */
 #define PARAM_R_LEAST 0.7 /* true R over the header's */
 #define PARAM_R_MOST 1.5

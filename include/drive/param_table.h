@@ -15,6 +15,7 @@
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
     X(MOTOR_RS_OHM, "ohm", 0.01, 40, FROM_MOTOR, "phase resistance: half of line to line") \
     X(MOTOR_LS_MH, "mH", 0.01, 30, FROM_MOTOR, "phase inductance: half of line to line") \
+    X(MOTOR_SALIENCY_UH, "uH", 0, 20000, 0, "Lq - Ld of a salient motor, whose MOTOR_LS_MH is Lq: least current for the torque (MTPA); 0: not salient") \
     X(MOTOR_KPHI_V_PER_KRPM, "V peak/krpm", 0.2, 2000, FROM_MOTOR, "line-to-line back-EMF per 1000 mechanical rpm") \
     X(MOTOR_INERTIA_KGM2, "kg m2", 1e-8, 10, FROM_MOTOR, "rotor and whatever turns with it; scales the speed loop")
 
@@ -116,7 +117,7 @@
 /** Parameters in these units are whole numbers. */
 #define PARAM_COUNTED(unit) \
     (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 || __builtin_strcmp(unit, "times") == 0 || __builtin_strcmp(unit, "switch") == 0 \
-     || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
+     || __builtin_strcmp(unit, "uH") == 0 || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. */
 #define PARAM_RELATION_TABLE(X) \
@@ -146,6 +147,12 @@
     X(PARAM_INVKFI >= 32767.0F || (PARAM_F(INVKFI_SPEED0) >= 0.6F * PARAM_INVKFI && PARAM_F(INVKFI_SPEED0) <= 1.6F * PARAM_INVKFI), \
       PARAM_NAMED(INVKFI_SPEED0) " must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that; a table for another motor, or for another side of 32000 or " \
       "64000 electrical rpm of MAXIMUM_SPEED_RPM, counts otherwise") \
+    X(MOTOR_SALIENCY_UH == 0 || PARAM_F(MOTOR_SALIENCY_UH) < 950.0F * PARAM_F(MOTOR_LS_MH), \
+      PARAM_NAMED(MOTOR_SALIENCY_UH) " must be below 950 * MOTOR_LS_MH: it is Lq - Ld, and MOTOR_LS_MH is Lq") \
+    X(MOTOR_SALIENCY_UH == 0 || (PARAM_SALIENCE_Q13 >= PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) \
+                                 && PARAM_SALIENCE_Q13 <= PARAM_F(PARAM_SALIENT_FROM) * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A))), \
+      PARAM_NAMED(MOTOR_SALIENCY_UH) " times MAXIMUM_CURRENT_A must be 1/8 to 1 of MOTOR_KPHI_V_PER_KRPM * 5513 / NOPOLESPAIRS, the magnets' flux: " \
+      "less is not worth it (0), with more the start's current does not align the rotor") \
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
       PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \

@@ -3,6 +3,7 @@
 #define DRIVE_PROTECTION_H
 
 #include "drive/model.h"
+#include "drive/salient.h"
 
 /** Over-current of any phase, every period with the bridge on. @return 1 then: the law must not run */
 QM_INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
@@ -149,7 +150,11 @@ NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 #define PROBE_PAUSE_STEPS 12500 /* five seconds from one to the next */
 #define PROBE_SLOPE_SHIFT 5     /* the largest current takes 32 steps, so that the estimate does not jump */
 #define PROBE_MOST_Q15 22528    /* of the largest current, so that as much q current is left */
-#define PROBE_LEAST_Q15 14648   /* 1/sqrt(5): takes a tenth of the largest q current, and half of a standing rotor's estimate */
+#if MOTOR_SALIENCY_UH
+#define PROBE_LEAST_Q15 9830 /* 0.3: such a d current takes of a salient motor's torque, too */
+#else
+#define PROBE_LEAST_Q15 14648 /* 1/sqrt(5): takes a tenth of the largest q current, and half of a standing rotor's estimate */
+#endif
 
 /** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand, for a voltage in phase
  *  with the current is both. */
@@ -160,12 +165,17 @@ QM_INLINE uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const dr
     return (uint16_t)(less_q12 <= qm_hi(2 * qm_mulss(protection_ri(p, qm_abs(run->control.i_q13.q)), r_more)));
 }
 
-/** The most d current of a probe: it leaves the q current that flows, but for a tenth of the largest. */
+/** The most d current of a probe: it leaves the q current that flows, but for a tenth of the largest. A salient motor needs more q current beside
+ *  it: half of each step's change is taken, which comes to the current that fits. */
 QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p)
 {
-    uint32_t ratio = qm_muluu((uint16_t)qm_abs(run->control.ref_q13.q), p->current_max_reciprocal) >> 10;
+    uint32_t ratio = qm_muluu(salient_current_beside(run, p, run->probe_most_q13), p->current_max_reciprocal) >> 10;
     int16_t rest = trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio));
-    return qm_hi(2 * qm_mulss(p->current_max_q13, qm_clamp(rest, PROBE_LEAST_Q15, PROBE_MOST_Q15)));
+    int16_t most = qm_hi(2 * qm_mulss(p->current_max_q13, qm_clamp(rest, PROBE_LEAST_Q15, PROBE_MOST_Q15)));
+#if MOTOR_SALIENCY_UH
+    most = (int16_t)((most + run->probe_most_q13) / 2);
+#endif
+    return most;
 }
 
 /** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */

@@ -2,7 +2,7 @@
 #ifndef DRIVE_SPEED_LAW_H
 #define DRIVE_SPEED_LAW_H
 
-#include "drive/drive.h"
+#include "drive/salient.h"
 
 #define SPEED_TRIM_SHIFT 9 /**< the trim takes 1/512 of the error in half of the steps: 2.4 rad/s at 20 kHz */
 #define SPEED_TRIM_HALF (INT32_C(1) << (SPEED_TRIM_SHIFT - 1))
@@ -27,8 +27,9 @@ QM_INLINE int32_t speed_current_q26(const drive_run_t *run, const drive_params_t
 {
     const drive_control_t *c = &run->control;
     int32_t limit_q26 = qm_mulss(c->iq_limit_q13, 8192);
-    int32_t iq_q26 = qm_mulss(qm_sub_limited(target_erpm, observer_speed(&run->observer)), c->speed_kp_q13)
-                     + observer_load_q26(&run->observer, &p->observer) + c->iq_trim_q26;
+    int32_t torque_q26 = qm_mulss(qm_sub_limited(target_erpm, observer_speed(&run->observer)), c->speed_kp_q13)
+                         + observer_load_q26(&run->observer, &p->observer) + c->iq_trim_q26;
+    int32_t iq_q26 = salient_current_q26(run, torque_q26);
     if (iq_q26 > limit_q26) {
         return limit_q26;
     }

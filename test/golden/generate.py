@@ -467,6 +467,42 @@ def emf_filter(v, rng):
             v.add([k, steep, x], [ref.emf_filter(k, steep, x)], [ref.emf_filter_real(k, corner, x)])
 
 
+# ---- salient motors -------------------------------------------------------------------------------------------------
+
+SALIENT = (256, 3000, 8190, 8191, 12412, 32767, 32768, 57343)  # -i_d that doubles the flux, Q13 counts
+
+
+@block("a salient motor's flux at a d current, and torque, current and 1/Kphi with it",
+       "doubles (-i_d that doubles the flux), i_d, i_q, torque Q13; kfi Q15; flux Q13, per_flux Q15 of the magnets'; current_q26 of the q current i_q as a torque in Q26",
+       "doubles:u16 i_d:s16 kfi:s16 flux:u16 per_flux:u16 i_q:s16 torque:s16 current_q26:s32 inv_kfi:s16 flux_kfi:s32", least_db=66.0)
+def salience(v, rng):
+    for double in SALIENT:
+        for i_d in (-32768, -20000, -8000, -2 * double, -double, -1300, -1, 0, 1, 700, double // 2 - 1, double // 2, 8000, 32767):
+            if not -32768 <= i_d <= 32767:
+                continue
+            kfi, i_q, inv_kfi = rng.choice((-9830, -500, 0, 0, 700, 11468)), rng.randrange(-8182, 8183), rng.randrange(1024, 32768)
+            flux, per_flux = ref.salience_flux(double, i_d, kfi)
+            torque, current = ref.salience_torque(flux, i_q), ref.salience_current(per_flux, i_q * 8192)
+            v.rows.append([double, i_d, kfi, flux, per_flux, i_q, torque, current, inv_kfi, ref.salience_kfi(per_flux, inv_kfi)])
+            if double > 2999:
+                more, less = ref.salience_flux_real(double, i_d, kfi)
+                v.compare([more, less, more * i_q / 8192, less * i_q / 8192], [flux / 8192, per_flux / 32768, torque / 8192, current / 2 ** 26])
+
+
+@block("a salient motor's d current of the least current for the torque, step by step",
+       "start 1 = it begins at zero; doubles: -i_d that doubles the flux; i_q, least Q13; of each case the first 30 steps and the hundredth, whose current "
+       "is compared with the closed form",
+       "start:u16 doubles:u16 i_q:s16 least:s16", least_db=66.0)
+def salience_least(v, _):
+    for double, i_q in ((12412, 4279), (12412, -4279), (12412, 6300), (3200, 6300), (25000, 3000), (57343, 7086), (12412, 300)):
+        least = 0
+        for n in range(100):
+            least = ref.salience_least(double, least, i_q)
+            if n < 30 or n == 99:
+                v.rows.append([int(n == 0), double, i_q, least])
+        v.compare([math.hypot(ref.mtpa_real(double, i_q), i_q)], [math.hypot(least, i_q)])
+
+
 # ---- adaptation and load observer -----------------------------------------------------------------------------------
 
 def lock(m, model, kphi, resistance, erpm, iq):

@@ -692,6 +692,49 @@ class AdaptationReal(Adaptation):
         return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), 65535), 32767 * 2048 / max(kfi, 2048)
 
 
+# ---- salient motors -------------------------------------------------------------------------------------------------
+
+def salience_flux(double, i_d, kfi):
+    """Flux over the magnets' in Q13 and one over it in Q15 at a d current; `double` is psi/(Lq - Ld), kfi the learnt change of 1/Kphi."""
+    least = -2 * double if double < 8191 else -16383
+    most = min(double // 2 - 1, 16383)
+    near = clamp(i_d, -16383, 16383)
+    counts = clamp(s16(near + upper(2 * s32(near * kfi))), least, most)
+    change = magnitude(counts) * 8192 // double
+    flux = u16(8192 - change if counts >= 0 else 8192 + change)
+    return flux, u16(2 ** 28 // flux)
+
+
+def salience_flux_real(double, i_d, kfi):
+    counts = clamp(clamp(i_d, -16383, 16383) * (1 + kfi / 32768), max(-2 * double, -16383), min(double / 2, 16383))
+    return 1 - counts / double, 1 / (1 - counts / double)
+
+
+def salience_torque(flux, i_q):
+    """q current without d current of the same torque."""
+    return s16(i_q * flux >> 13)
+
+
+def salience_current(per_flux, torque_q26):
+    """The way back, with 13 fraction bits."""
+    x = clamp(torque_q26, -2 ** 28, 2 ** 28)
+    return s32(2 * s32(upper(x) * per_flux) + (x % WORD * per_flux >> 15))
+
+
+def salience_kfi(per_flux, inv_kfi):
+    return inv_kfi * per_flux >> 15
+
+
+def salience_least(double, least, i_q):
+    """A step of the least current's d current towards i_q^2/(I + least)."""
+    return s16(least + (s16(i_q * i_q // u16(double + least)) - least >> 3))
+
+
+def mtpa_real(double, i_q):
+    """The least current's -i_d in closed form."""
+    return math.sqrt(double * double / 4 + i_q * i_q) - double / 2
+
+
 # ---- load observer --------------------------------------------------------------------------------------------------
 
 FASTEST = 32700 * WORD

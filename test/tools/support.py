@@ -24,8 +24,8 @@ STATES = {0: "CALIBRATE", 1: "STOPPED", 2: "BOOTSTRAP", 3: "ALIGN", 4: "RAMP", 5
 FAULTS = {0: "NONE", 1: "OVERCURRENT_HW", 3: "OVERVOLTAGE", 6: "STALL"}
 LIBRARY = paths.ROOT / "build" / "host" / "libvboard.so"
 
-MOTORS = ("anaheim_bly172s_24v_4000", "hurst_dma0204024b101", "hurst_dmb0224c10002", "linix_45zwn24_40", "maxon_ec45flat_30w_24v",
-          "spindle_7pp_24v_10000", "trinamic_qbl4208_41_04_006")
+MOTORS = ("anaheim_bly172s_24v_4000", "hurst_dma0204024b101", "hurst_dmb0224c10002", "ipm_4pp_24v_2000", "linix_45zwn24_40",
+          "maxon_ec45flat_30w_24v", "spindle_7pp_24v_10000", "trinamic_qbl4208_41_04_006")
 BOARDS = ("mclv", "mclv2")
 """The project's own files. Tests are about these: what a user adds to tuning/motors or tuning/boards may be anything."""
 

@@ -121,6 +121,9 @@ RELATIONS = {
         case("MOTOR_KPHI_V_PER_KRPM", "1.7", "1.8"), case("MOTOR_KPHI_V_PER_KRPM", "56.5", "56.1", SPEED_BANDWIDTH_HZ="4")],
     "INVKFI_SPEED0 must be 0.6 .. 1.6 of NORM_INVKFIBASE": [
         case("INVKFI_SPEED0", "4770", "4780"), case("INVKFI_SPEED0", "12740", "12720"), case("MAXIMUM_SPEED_RPM", "6401", "6400", INVKFI_SPEED0="7956")],
+    "MOTOR_SALIENCY_UH must be below 950 * MOTOR_LS_MH": [case("MOTOR_SALIENCY_UH", "1824", "1823")],
+    "MOTOR_SALIENCY_UH times MAXIMUM_CURRENT_A must be 1/8 to 1 of": [
+        case("MOTOR_SALIENCY_UH", "362", "364"), case("MOTOR_SALIENCY_UH", "1605", "1603", MOTOR_KPHI_V_PER_KRPM="4")],
     "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A": [case("Q_CURRENT_REF_OPENLOOP", "2.76", "2.75")],
     "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A": [case("MAXIMUM_CURRENT_A", "3.8", "3.79")],
     "I2T_CURRENT_A must be at most MAXIMUM_CURRENT_A": [case("I2T_CURRENT_A", "2.76", "2.75")],

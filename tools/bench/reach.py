@@ -48,6 +48,19 @@ def least(values: Mapping[str, float], rpm: float, torque_nm: float, current_max
     return Need(float(i_d[best]), float(i_q[best]), float(length[best]), float(voltage[best]))
 
 
+def least_current(values: Mapping[str, float], rpm: float, torque_nm: float, voltage_v: float) -> Need:
+    """The steady state with the least current among those that make `torque_nm`, friction included, within a voltage; without one that with the
+    smallest voltage. Torque and speed are positive."""
+    pairs, psi, l_d, l_q, r_s = (values[f"motor.{key}"] for key in ("pole_pairs", "psi_vs", "ld_h", "lq_h", "rs_ohm"))
+    omega = pairs * rpm * math.pi / 30.0
+    i_d = np.linspace(-psi / l_d, 0.0, 5 * ID_STEPS)
+    i_q = torque_nm / (1.5 * pairs * (psi + (l_d - l_q) * i_d))
+    length, voltage = np.hypot(i_d, i_q), np.hypot(r_s * i_d - omega * l_q * i_q, r_s * i_q + omega * (l_d * i_d + psi))
+    reached = voltage <= voltage_v
+    best = int(np.argmin(np.where(reached, length, np.inf))) if reached.any() else int(np.argmin(voltage))
+    return Need(float(i_d[best]), float(i_q[best]), float(length[best]), float(voltage[best]))
+
+
 def out_of_reach(need: Need, current_max_a: float, voltage_v: float | None) -> str:
     """Which limit forbids it, with its numbers; "" if none does. `voltage_v`: radius of the voltage circle, None if it is not known."""
     if need.voltage_v is None:

@@ -59,7 +59,7 @@ TABLES = {"electrical": ("pole_pairs", "resistance", "inductance", "inductance_d
 """Tables of a motor file with their keys; None: any key, checked elsewhere."""
 
 FACTS = {"NOPOLESPAIRS": "[electrical] pole_pairs", "MOTOR_RS_OHM": "[electrical] resistance", "MOTOR_LS_MH": "[electrical] inductance",
-         "MOTOR_KPHI_V_PER_KRPM": "[electrical] kphi", "MOTOR_INERTIA_KGM2": "[mechanical] inertia",
+         "MOTOR_SALIENCY_UH": "[electrical] inductance_d and inductance_q", "MOTOR_KPHI_V_PER_KRPM": "[electrical] kphi", "MOTOR_INERTIA_KGM2": "[mechanical] inertia",
          "MAXIMUM_SPEED_RPM": "[rating] maximum_speed", "MAXIMUM_CURRENT_A": "[rating] maximum_current",
          "I2T_CURRENT_A": "[rating] current", "I2T_TIME_SEC": "[rating] thermal_time",
          "NOMINAL_BUS_V": "the board file", "LOOPTIME_SEC": "the board file", "DEADTIME_SEC": "the board file",
