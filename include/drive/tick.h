@@ -16,6 +16,8 @@ QM_INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_sa
 }
 
 /** A period with the bridge switching. */
+/* wcet: drive_run excludes catch_step protection_check_current/drive_enter */
+/* wcet: drive_run/startup_step excludes speed_step speed_choose_state speed_turn_round limits_burn protection_check_signals */
 QM_INLINE duties_t drive_run(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
