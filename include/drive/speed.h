@@ -77,9 +77,9 @@ QM_INLINE void speed_choose_step(drive_t *d, const drive_params_t *p)
     }
 }
 
+/* wcet: speed_turn_round/drive_turns excludes model_update */
 /** In STOPPING, every eighth period: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
  *  @return 1 then */
-/* wcet: speed_turn_round/drive_turns excludes model_update */
 NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
 {
     uint16_t turns = (uint16_t)(d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p));

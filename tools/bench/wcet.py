@@ -166,7 +166,7 @@ def broken(report: Report, budget: Budget | None) -> list[str]:
     lines = [] if budget is None else [*image.unknown_parts(), *over(report.bounds, budget.cycles)]
     if seen is None:
         return lines
-    lines += [f"{item}: not true of {number} interrupts that ran, which had {item.part} and {other}: the bound counts for nothing"
+    lines += [f"{item}: not true of {number} interrupts that ran, which had {item.part if item.part == other else f'{item.part} and {other}'}: the bound counts for nothing"
               for (item, other), number in zip(image.pairs, seen.whole) if number]
     first = len(image.part_names) + 1
     lines += [f"{image.name(head)}: a loop turned {turns} times in one interrupt, but what is stated makes {most} at most"
