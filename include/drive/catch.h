@@ -57,7 +57,7 @@ QM_INLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t turn, uint16
     /* turn 2^16 / (half_periods / 2) / deltat, with what divides brought into a word */
     uint32_t part = (uint32_t)(uint16_t)qm_abs(turn) << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
     int16_t speed = INT16_MAX;
-    while (whole > 65535ul) {
+    while (whole > 65535ul) { /* wcet: at most 15 turns */
         whole >>= 1;
         part >>= 1;
     }
@@ -199,6 +199,7 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     drive_enter(d, DRIVE_CLOSED);
 }
 
+/* wcet: catch_step/catch_preset_estimator excludes catch_look calibration_step startup_bootstrap idle_step/drive_enter */
 /** In CATCH, every eighth period: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
 NOINLINE void catch_step(drive_t *d, const drive_params_t *p)
 {

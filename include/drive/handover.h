@@ -20,6 +20,7 @@ QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
     d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
 }
 
+/* wcet: handover_wait/qm_sub_limited excludes speed_step */
 /** In RAMP, every eighth period: at its end counts how long the estimator agrees with the forced speed, or gives up by name. */
 QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {

@@ -77,6 +77,7 @@ QM_INLINE void speed_choose_step(drive_t *d, const drive_params_t *p)
     }
 }
 
+/* wcet: speed_turn_round/drive_turns excludes model_update */
 /** In STOPPING, every eighth period: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
  *  @return 1 then */
 NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)

@@ -29,6 +29,8 @@ stack_bytes = 30
 isr_max_cycles = 1
 isr_mean_cycles = 1
 latency_max_cycles = 1
+isr_bound_cycles = 1
+duty_bound_cycles = 1
 scenarios = ["demo"]
 [stack]
 calls_nothing = ["_fill"]

@@ -162,6 +162,30 @@ bool iss_profile(iss_t *iss, iss_profile_t what);
 const uint32_t *iss_profile_counts(const iss_t *iss);
 const uint64_t *iss_profile_cycles(const iss_t *iss);
 
+/* Handlers looked at while they are profiled: the cycles of all; of one vector's, too, how often and how late one run executes which parts of it,
+ * and how many runs execute all parts of a set. */
+enum { ISS_WATCH_PARTS = 64, ISS_WATCH_SETS = 128, ISS_VECTORS = 126 };
+
+typedef struct {
+    uint64_t runs;                          /* of the watched handler, from entry to return */
+    uint32_t longest[ISS_VECTORS];          /* of each vector: cycles from entry to return, without handlers in between */
+    uint32_t times[ISS_WATCH_PARTS];        /* how often one run has executed an instruction of the part, at most */
+    uint32_t latest[ISS_WATCH_PARTS];       /* cycles from entry to the end of the part's last instruction, at most */
+    uint64_t whole[ISS_WATCH_SETS];         /* of each set: runs that have executed all of its parts */
+} iss_watched_t;
+
+/* Looks at a vector's handler from now on, with nothing seen; 0 ends it. False: no memory. */
+bool iss_watch(iss_t *iss, unsigned vector);
+
+/* The instruction at a PC address is in a part, below ISS_WATCH_PARTS. */
+void iss_watch_part(iss_t *iss, uint32_t pc, unsigned part);
+
+/* One more set, as bits 1 << part. False: there are ISS_WATCH_SETS already. */
+bool iss_watch_set(iss_t *iss, uint64_t parts);
+
+/* NULL: nothing is watched. */
+const iss_watched_t *iss_watched(const iss_t *iss);
+
 /* Bytes of stack at its deepest, above the last literal moved to W15. iss_stack_clear() starts anew. */
 unsigned iss_stack_bytes(const iss_t *iss);
 void iss_stack_clear(iss_t *iss);
@@ -176,6 +200,38 @@ void iss_stick(iss_t *iss, uint16_t address, uint16_t at_1, uint16_t at_0);
 
 /* Disassemble the word at a PC address; `next` is the word behind it. Words used: 1 or 2, 0 if it is no instruction (".word24 0x..."). */
 unsigned iss_disassemble(uint32_t word, uint32_t next, uint32_t pc, char *buffer, size_t size);
+
+/* ---- instructions as facts, for whoever adds up cycles without running them ---- */
+
+/* Where the program goes on. */
+typedef enum {
+    ISS_FLOW_NEXT,
+    ISS_FLOW_BRANCH,   /* to `target` or on */
+    ISS_FLOW_JUMP,     /* to `target` */
+    ISS_FLOW_COMPUTED, /* jumps or calls to where a register says */
+    ISS_FLOW_CALL,     /* to `target`, and on after its return */
+    ISS_FLOW_RETURN,
+    ISS_FLOW_SKIP,     /* on, or over the next instruction */
+    ISS_FLOW_REPEAT,   /* the next instruction `count` + 1 times */
+    ISS_FLOW_DO,       /* from the next instruction to the one at `target` `count` + 1 times */
+    ISS_FLOW_STOP      /* sleep or reset */
+} iss_flow_t;
+
+typedef struct {
+    int32_t flow;      /* iss_flow_t */
+    int32_t words;     /* 1 or 2 */
+    int32_t cycles;
+    int32_t taken;     /* more cycles of a branch that is taken, for each word of a skip that is */
+    int32_t target;    /* PC address; -1: none, or outside the flash */
+    int32_t count;     /* of REPEAT and DO; -1: a register has it */
+    uint32_t stall;    /* W registers whose change by the instruction before costs a stall: assumption RAW_STALL_CYCLES */
+    uint32_t writes;   /* W registers that it changes */
+    int32_t window;    /* words that it can read through the PSV window, each for the cycles of assumption PSV_READ_CYCLES */
+    int32_t address;   /* data address that it reads, if it is fixed; -1: in the registers of `stall`, or none */
+} iss_fact_t;
+
+/* What the word at a PC address takes and does; `next` is the word behind it. False: it is no instruction. */
+bool iss_fact(uint32_t word, uint32_t next, uint32_t pc, iss_fact_t *fact);
 
 /* ---- assumptions ---- */
 

@@ -101,6 +101,7 @@ static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
     b->in_handler = true;
     b->counter_seen = COUNTER_IN_TIME;
     b->entry_cycle = cycle;
+    measured(&vb_counts(b->vb)->entry, cycle - b->trigger_cycle);
     iss_shadow_tick(b);
 }
 

@@ -55,6 +55,7 @@ void iss_destroy(iss_t *m)
     if (m != NULL) {
         free(m->profile_counts);
         free(m->profile_cycles);
+        free(m->watch);
         free(m);
     }
 }
@@ -192,6 +193,9 @@ static void count_instruction(iss_t *m, uint32_t pc, unsigned handlers)
         m->profile_cycles[pc] += m->cycle - m->profile_mark;
     }
     m->profile_mark = m->cycle;
+    if (m->watch != NULL) {
+        iss_watch_instruction(m, pc, handlers);
+    }
 }
 
 /* The same with the profile. */

@@ -259,7 +259,7 @@ static bool has_two_words(const row_t *row)
 static bool fill(insn_t *i, const row_t *row, uint32_t word, uint32_t next, uint32_t index)
 {
     *i = (insn_t){.run = iss_row_is_byte(row, word) ? row->byte : row->word, .writes = row->writes, .points = row->points | row->reads, .stall = row->reads,
-                  .cycles = row->cycles, .words = has_two_words(row) ? 2 : 1};
+                  .cycles = row->cycles, .taken = row->taken, .words = has_two_words(row) ? 2 : 1};
     for (unsigned n = 0; n < OPERANDS && row->operand[n] != NO_OPERAND; n++) {
         if (!fill_operand(i, row->operand[n], row, word, next, index)) {
             return false;

@@ -24,12 +24,12 @@ void iss_op_outside(iss_t *m, const insn_t *i)
     iss_raise_trap(m, INTCON1_ADDRERR);
 }
 
-/* ---- branches; a taken one costs a second cycle ---- */
+/* ---- branches; one that is taken costs more ---- */
 
 static inline void take(iss_t *m, const insn_t *i)
 {
     m->pc = i->k;
-    m->cycle++;
+    m->cycle += i->taken;
     if (i->k == CODE_OUTSIDE) {
         m->lost_pc = iss_here(m) + 2u + 2u * (uint32_t)as_int16(m->program[iss_here(m) / 2u] & 0xFFFFu);
     }
@@ -159,29 +159,29 @@ static void retfie(iss_t *m, const insn_t *i)
     iss_left_exception(m);
 }
 
-/* ---- skips: a cycle for each word skipped ---- */
+/* ---- skips: each word skipped costs more ---- */
 
-static inline void skip(iss_t *m, bool condition)
+static inline void skip(iss_t *m, const insn_t *i, bool condition)
 {
     if (condition && m->pc < CODE_OUTSIDE) {
         unsigned words = m->code[m->pc].words;
         m->pc += words;
-        m->cycle += words;
+        m->cycle += (uint64_t)words * i->taken;
         if (m->pc >= CODE_OUTSIDE) {
             jump(m, 2u * m->pc);
         }
     }
 }
 
-OP(btsc, skip(m, (source(m, i, 16) >> i->b & 1u) == 0))
-OP(btss, skip(m, (source(m, i, 16) >> i->b & 1u) != 0))
-OP(btsc_f, skip(m, (load8(m, i->k) >> i->b & 1u) == 0))
-OP(btss_f, skip(m, (load8(m, i->k) >> i->b & 1u) != 0))
+OP(btsc, skip(m, i, (source(m, i, 16) >> i->b & 1u) == 0))
+OP(btss, skip(m, i, (source(m, i, 16) >> i->b & 1u) != 0))
+OP(btsc_f, skip(m, i, (load8(m, i->k) >> i->b & 1u) == 0))
+OP(btss_f, skip(m, i, (load8(m, i->k) >> i->b & 1u) != 0))
 
 /* Signed comparisons. */
 #define COMPARE_SKIP(name, relation) \
-    OP(name##_w, skip(m, as_int16(m->data[i->w]) relation as_int16(m->data[i->s]))) \
-    OP(name##_b, skip(m, as_int8(m->data[i->w]) relation as_int8(m->data[i->s])))
+    OP(name##_w, skip(m, i, as_int16(m->data[i->w]) relation as_int16(m->data[i->s]))) \
+    OP(name##_b, skip(m, i, as_int8(m->data[i->w]) relation as_int8(m->data[i->s])))
 
 static inline int as_int8(unsigned value)
 {
@@ -261,39 +261,39 @@ static void disi(iss_t *m, const insn_t *i)
 }
 
 #define SP (1u << 15)
-#define BRA(name, code) {"bra " #name, {RELATIVE}, (uint32_t)(code) << 16, 0xFF0000, bra_##name, NULL, .cycles = 1}
-#define COMPARE_SKIP_ROW(name, value) {#name, {WC, WS}, value, 0xFF83F0, W_B(name), .cycles = 1, .byte_bit = 0x400}
+#define BRA(name, code) {"bra " #name, {RELATIVE}, (uint32_t)(code) << 16, 0xFF0000, bra_##name, NULL, .cycles = 1, .taken = 1, .flow = ISS_FLOW_BRANCH}
+#define COMPARE_SKIP_ROW(name, value) {#name, {WC, WS}, value, 0xFF83F0, W_B(name), .cycles = 1, .taken = 1, .flow = ISS_FLOW_SKIP, .byte_bit = 0x400}
 
 const row_t iss_rows_flow[] = {
-    {"bra", {RELATIVE}, 0x370000, 0xFF0000, bra_always, NULL, .cycles = 1},
+    {"bra", {RELATIVE}, 0x370000, 0xFF0000, bra_always, NULL, .cycles = 1, .taken = 1, .flow = ISS_FLOW_JUMP},
     BRA(ov, 0x30), BRA(c, 0x31), BRA(z, 0x32), BRA(n, 0x33), BRA(le, 0x34), BRA(lt, 0x35), BRA(leu, 0x36),
     BRA(nov, 0x38), BRA(nc, 0x39), BRA(nz, 0x3A), BRA(nn, 0x3B), BRA(gt, 0x3C), BRA(ge, 0x3D), BRA(gtu, 0x3E),
     BRA(oa, 0x0C), BRA(ob, 0x0D), BRA(sa, 0x0E), BRA(sb, 0x0F),
-    {"bra", {WS}, 0x016000, 0xFFFFF0, bra_w, NULL, .cycles = 2},
-    {"goto", {TARGET}, 0x040000, 0xFF0001, goto_far, NULL, .cycles = 2},
-    {"goto", {WS}, 0x014000, 0xFFFFF0, goto_w, NULL, .cycles = 2},
-    {"call", {TARGET}, 0x020000, 0xFF0001, call_far, NULL, .points = SP, .cycles = 2},
-    {"call", {WS}, 0x010000, 0xFFFFF0, call_w, NULL, .points = SP, .cycles = 2},
-    {"rcall", {RELATIVE}, 0x070000, 0xFF0000, rcall, NULL, .points = SP, .cycles = 1},
-    {"rcall", {WS}, 0x012000, 0xFFFFF0, rcall_w, NULL, .points = SP, .cycles = 2},
-    {"return", {NO_OPERAND}, 0x060000, 0xFFFFFF, return_plain, NULL, .reads = ASSUME_RAW_STALL_RETURN != 0 ? SP : 0, .cycles = 3},
-    {"retlw", {K10, WN}, 0x050000, 0xFF8000, W_B(retlw), .reads = ASSUME_RAW_STALL_RETURN != 0 ? SP : 0, .cycles = 3},
-    {"retfie", {NO_OPERAND}, 0x064000, 0xFFFFFF, retfie, NULL, .reads = ASSUME_RAW_STALL_RETURN != 0 ? SP : 0, .cycles = 3},
-    {"btsc", {MS, BIT_NUMBER}, 0xA70000, 0xFF0F80, btsc, NULL, .cycles = 1},
-    {"btss", {MS, BIT_NUMBER}, 0xA60000, 0xFF0F80, btss, NULL, .cycles = 1},
-    {"btsc.b", {FILE_BIT}, 0xAF0000, 0xFF0000, btsc_f, NULL, .cycles = 1},
-    {"btss.b", {FILE_BIT}, 0xAE0000, 0xFF0000, btss_f, NULL, .cycles = 1},
+    {"bra", {WS}, 0x016000, 0xFFFFF0, bra_w, NULL, .cycles = 2, .flow = ISS_FLOW_COMPUTED},
+    {"goto", {TARGET}, 0x040000, 0xFF0001, goto_far, NULL, .cycles = 2, .flow = ISS_FLOW_JUMP},
+    {"goto", {WS}, 0x014000, 0xFFFFF0, goto_w, NULL, .cycles = 2, .flow = ISS_FLOW_COMPUTED},
+    {"call", {TARGET}, 0x020000, 0xFF0001, call_far, NULL, .points = SP, .cycles = 2, .flow = ISS_FLOW_CALL},
+    {"call", {WS}, 0x010000, 0xFFFFF0, call_w, NULL, .points = SP, .cycles = 2, .flow = ISS_FLOW_COMPUTED},
+    {"rcall", {RELATIVE}, 0x070000, 0xFF0000, rcall, NULL, .points = SP, .cycles = 1, .taken = 1, .flow = ISS_FLOW_CALL},
+    {"rcall", {WS}, 0x012000, 0xFFFFF0, rcall_w, NULL, .points = SP, .cycles = 2, .flow = ISS_FLOW_COMPUTED},
+    {"return", {NO_OPERAND}, 0x060000, 0xFFFFFF, return_plain, NULL, .reads = ASSUME_RAW_STALL_RETURN != 0 ? SP : 0, .cycles = 3, .flow = ISS_FLOW_RETURN},
+    {"retlw", {K10, WN}, 0x050000, 0xFF8000, W_B(retlw), .reads = ASSUME_RAW_STALL_RETURN != 0 ? SP : 0, .cycles = 3, .flow = ISS_FLOW_RETURN},
+    {"retfie", {NO_OPERAND}, 0x064000, 0xFFFFFF, retfie, NULL, .reads = ASSUME_RAW_STALL_RETURN != 0 ? SP : 0, .cycles = 3, .flow = ISS_FLOW_RETURN},
+    {"btsc", {MS, BIT_NUMBER}, 0xA70000, 0xFF0F80, btsc, NULL, .cycles = 1, .taken = 1, .flow = ISS_FLOW_SKIP},
+    {"btss", {MS, BIT_NUMBER}, 0xA60000, 0xFF0F80, btss, NULL, .cycles = 1, .taken = 1, .flow = ISS_FLOW_SKIP},
+    {"btsc.b", {FILE_BIT}, 0xAF0000, 0xFF0000, btsc_f, NULL, .cycles = 1, .taken = 1, .flow = ISS_FLOW_SKIP},
+    {"btss.b", {FILE_BIT}, 0xAE0000, 0xFF0000, btss_f, NULL, .cycles = 1, .taken = 1, .flow = ISS_FLOW_SKIP},
     COMPARE_SKIP_ROW(cpseq, 0xE78000), COMPARE_SKIP_ROW(cpsne, 0xE70000),
     COMPARE_SKIP_ROW(cpsgt, 0xE60000), COMPARE_SKIP_ROW(cpslt, 0xE68000),
-    {"repeat", {K14}, 0x090000, 0xFFC000, repeat_k, NULL, .cycles = 1},
-    {"repeat", {WS}, 0x098000, 0xFFFFF0, repeat_w, NULL, .cycles = 1},
-    {"do", {K14, RELATIVE_2}, 0x080000, 0xFFC000, do_k, NULL, .cycles = 2},
-    {"do", {WS, RELATIVE_2}, 0x088000, 0xFFFFF0, do_w, NULL, .cycles = 2},
+    {"repeat", {K14}, 0x090000, 0xFFC000, repeat_k, NULL, .cycles = 1, .flow = ISS_FLOW_REPEAT},
+    {"repeat", {WS}, 0x098000, 0xFFFFF0, repeat_w, NULL, .cycles = 1, .flow = ISS_FLOW_REPEAT},
+    {"do", {K14, RELATIVE_2}, 0x080000, 0xFFC000, do_k, NULL, .cycles = 2, .flow = ISS_FLOW_DO},
+    {"do", {WS, RELATIVE_2}, 0x088000, 0xFFFFF0, do_w, NULL, .cycles = 2, .flow = ISS_FLOW_DO},
     {"nop", {NO_OPERAND}, 0x000000, 0xFF0000, nop, NULL, .cycles = 1},
     {"nopr", {NO_OPERAND}, 0xFF0000, 0xFF0000, nop, NULL, .cycles = 1},
     {"clrwdt", {NO_OPERAND}, 0xFE6000, 0xFFFFFF, clrwdt, NULL, .cycles = 1},
-    {"pwrsav", {K1}, 0xFE4000, 0xFFFFFE, pwrsav, NULL, .cycles = 1},
-    {"reset", {NO_OPERAND}, 0xFE0000, 0xFFFFFF, reset, NULL, .cycles = 1},
+    {"pwrsav", {K1}, 0xFE4000, 0xFFFFFE, pwrsav, NULL, .cycles = 1, .flow = ISS_FLOW_STOP},
+    {"reset", {NO_OPERAND}, 0xFE0000, 0xFFFFFF, reset, NULL, .cycles = 1, .flow = ISS_FLOW_STOP},
     {"disi", {K14}, 0xFC0000, 0xFFC000, disi, NULL, .cycles = 1},
     {0},
 };

@@ -67,6 +67,9 @@ static void enter_exception(iss_t *m, exception_t e)
     if (m->on_enter != NULL) {
         m->on_enter(m->interrupt_context, e.vector, m->cycle);
     }
+    if (m->watch != NULL) {
+        iss_watch_enter(m, e.vector);
+    }
     m->current = NULL;
     r[R_CORCON] = (uint16_t)((r[R_CORCON] & ~(unsigned)CORCON_IPL3) | (level >= 8 ? CORCON_IPL3 : 0u));
     push16(m, pc & 0xFFFFu);
@@ -90,6 +93,9 @@ void iss_left_exception(iss_t *m)
 {
     if (m->nested > 0) {
         m->nested--;
+        if (m->watch != NULL) {
+            iss_watch_leave(m, m->nest[m->nested % NESTING]);
+        }
         if (m->on_leave != NULL) {
             m->on_leave(m->interrupt_context, m->nest[m->nested % NESTING], m->cycle);
         }

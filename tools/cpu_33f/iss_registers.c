@@ -29,6 +29,7 @@ static void forget_pipeline(iss_t *m)
     m->trap_at = 0;
     m->wake_at = ISS_NEVER;
     m->nested = 0;
+    iss_watch_forget(m);
 }
 
 void iss_reset(iss_t *m, chip_reset_t cause)

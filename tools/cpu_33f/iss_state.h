@@ -97,6 +97,8 @@ typedef struct {
     uint16_t points;         /* W registers used as destination addresses beside the operands */
     uint16_t reads;          /* W registers used as source addresses beside the operands */
     uint8_t cycles;
+    uint8_t taken;           /* more cycles of a branch that is taken, for each word of a skip that is */
+    iss_flow_t flow;
     uint32_t byte_bit;       /* 0 means the usual bit 14 */
 } row_t;
 
@@ -112,7 +114,7 @@ struct insn {
     uint8_t x, y, i, j; /* prefetch: W numbers of the targets, codes of the addresses */
     uint8_t a;         /* write-back */
     uint8_t b;         /* bit number or accumulator */
-    uint8_t cycles, words;
+    uint8_t cycles, taken, words;
 };
 
 enum { CODE_OUTSIDE = ISS_PROGRAM_WORDS }; /* index of the instruction that stands for all memory outside the flash */
@@ -133,6 +135,8 @@ typedef struct {
     uint16_t dcount;
     uint32_t start, end;
 } do_shadow_t;
+
+typedef struct watch watch_t; /* iss_watch.c */
 
 struct iss {
     uint64_t cycle;     /* instruction cycles since iss_create() */
@@ -166,6 +170,7 @@ struct iss {
     uint64_t *profile_cycles;
     uint64_t profile_mark;
     iss_profile_t profiling;
+    watch_t *watch;     /* NULL: no handler is watched */
 
     void (*on_report)(void *, iss_error_t, uint32_t, const char *);
     void *report_context;
@@ -213,6 +218,12 @@ uint32_t iss_table_word(iss_t *m, uint32_t address);
 void iss_serve(iss_t *m);
 bool iss_exception_pending(const iss_t *m);
 void iss_left_exception(iss_t *m);
+
+/* iss_watch.c; all but the first need a core that has a watch */
+void iss_watch_forget(iss_t *m);
+void iss_watch_enter(iss_t *m, unsigned vector);
+void iss_watch_leave(iss_t *m, unsigned vector);
+void iss_watch_instruction(iss_t *m, uint32_t index, unsigned handlers);
 
 /* iss_report.c */
 void iss_report(iss_t *m, iss_error_t kind, const char *format, ...) __attribute__((format(printf, 3, 4)));

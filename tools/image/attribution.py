@@ -3,7 +3,7 @@
 import bisect
 import os
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
 
@@ -174,8 +174,22 @@ def read(path: Path) -> Image:
         return _read(elf)
 
 
+def lines(elf: Elf) -> dict[int, tuple[str, int]]:
+    """File and line of every instruction of an image with debugging information."""
+    return _debug(elf).lines
+
+
+@lru_cache(maxsize=1)
+def _cached(sections: tuple[tuple[str, bytes], ...]) -> _Debug:
+    return _Debug(dict(sections))
+
+
+def _debug(elf: Elf) -> _Debug:
+    return _cached(tuple(sorted(elf.debug.items())))
+
+
 def _read(elf: Elf) -> Image:
-    debug = _Debug(elf.debug)
+    debug = _debug(elf)
     words, constants, data, initial = [], [], [], []
     for section in elf.sections:
         named = {item.address: item for item in elf.names if item.section is section}

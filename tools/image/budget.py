@@ -32,6 +32,8 @@ class CycleLimits:
     isr_max: int
     isr_mean: int
     latency_max: int
+    isr_bound: int          # of the longest paths, from entry to return and to the third duty
+    duty_bound: int
     scenarios: tuple[str, ...]
 
 
@@ -95,7 +97,7 @@ class Budget:
             section.close()
         budget.close()
         section = _required(root, "cycles")
-        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "isr_mean", "latency_max")),
+        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "isr_mean", "latency_max", "isr_bound", "duty_bound")),
                              listed(section, "scenarios", "scenario", required=True))
         section.close()
         stack = _required(root, "stack")

@@ -12,7 +12,7 @@ from pathlib import Path
 from tools.common import command_line, paths
 from tools.common.errors import UserError
 
-from . import attribution, crc, device, size
+from . import attribution, crc, device, size, wcet
 from .budget import Budget, Limits
 from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
 from .program import Elf, Words, read_elf, read_hex, reset_target
@@ -142,6 +142,12 @@ def deepest_stack(elf: Path, objdump: str, budget: Budget) -> tuple[int, list[st
     return result.depth, result.errors
 
 
+def longest_paths(elf: Path, budget: Budget) -> tuple[str, list[str]]:
+    """The control interrupt's longest paths in a line, and what is wrong with them."""
+    bounds, failures = wcet.check(elf, budget.cycles)
+    return "longest path of the interrupt " + ", ".join(f"{bound.cycles} cycles to its {bound.to}" for bound in bounds), failures
+
+
 def check_budget(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None) -> list[str]:
     """Flash and RAM in their budgets, the stack in its own and in what is left of the RAM."""
     failures = []
@@ -186,6 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
     parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
     parser.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
+    parser.add_argument("--wcet", action="store_true", help="looks for the interrupt's longest path too, with the simulator's decoder")
     parser.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")
     return command_line.run(lambda: _run(parser.parse_args(arguments)))
 
@@ -200,11 +207,14 @@ def _run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
     failures = check(elf, words, pieces, config, limits, deepest) + [f"stack: {reason}" for reason in unsure if limits]
+    paths_text, too_long = longest_paths(options.elf, Budget.read(options.budget)) if options.wcet and options.budget else ("", [])
+    failures += too_long
     for failure in failures:
         print(f"foc33: {options.hex.name}, {failure}", file=sys.stderr)
     if options.table:
         print("\n".join(configuration_table(words)))
-    print(f"{options.hex}: {summary(words, elf, limits, deepest)}{f'; {len(failures)} checks failed' if failures else ''}")
+    print(f"{options.hex}: {summary(words, elf, limits, deepest)}{paths_text and f', {paths_text}'}"
+          f"{f'; {len(failures)} checks failed' if failures else ''}")
     return 1 if failures else 0
 
 

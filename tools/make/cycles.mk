@@ -1,7 +1,7 @@
-# The image on the virtual board: make pil, cycles. Uses tools/make/image.mk's image.
+# The image on the virtual board: make pil, cycles, wcet. Uses tools/make/image.mk's image.
 #
 # Variables: SCENARIO OUT USERPARAMS, for pil also MOTOR BOARD, as for `make run`; IMAGE (a finished ELF or HEX file instead of one built here).
-.PHONY: pil cycles target-elf
+.PHONY: pil cycles wcet target-elf
 target-elf: image
 	@echo $X/foc33.elf
 
@@ -12,7 +12,14 @@ pil: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the image turns the mo
 	@+$(if $(MOTOR),$(ready),:)
 	@$(alone) $(python) -m tools.bench.pil_command $(scenario) $(pil_image) $(options)
 
+image_options = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
+    $(if $(IMAGE)$(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
+
 cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the control interrupt in cycles, load, latency, stack [SCENARIO= IMAGE=file.elf USERPARAMS= OUT=]
 	$(target_setup)
-	@$(alone) $(python) -m tools.bench.cycles $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
-	    $(if $(IMAGE)$(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
+	@$(alone) $(python) -m tools.bench.cycles $(image_options)
+
+wcet: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] every interrupt's longest path, proven against the deadline, and observed [SCENARIO= IMAGE=file.elf USERPARAMS= OUT=]
+	$(target_setup)
+	$(call build,-s build/iss/libmachine.so)
+	@$(alone) $(python) -m tools.bench.wcet $(image_options)

@@ -88,9 +88,9 @@ $X/foc33.hex: $X/foc33.elf
 # Another mode has its own tables and arrays, another level more code: the budget is for the drive as it is delivered.
 target_modes = $(DEFINES)$(filter $(modes),$(shell sed -n 's/^ *# *define *\([A-Z_]*\).*/\1/p' $(call quoted,$(or $(USERPARAMS),.)/userparams.h) 2>/dev/null))
 target_budget = $(if $(target_modes)$(filter-out -O2,$(OPT)),,--budget firmware/budget.toml)
-target_check = $(python) -m tools.image.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget)
+target_check = $(python) -m tools.image.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget) $(if $(filter -O2,$(OPT)),--wcet)
 
-$X/checked: $X/foc33.hex firmware/board/config.c firmware/budget.toml $(wildcard tools/image/*.py)
+$X/checked: $X/foc33.hex firmware/board/config.c firmware/budget.toml $(wildcard tools/image/*.py) build/iss/libmachine.so
 	$(target_setup)
 	@$(target_check) >$@.new || { status=$$?; cat $@.new; rm -f $@.new $@; mv -f $X/foc33.hex $X/foc33.refused.hex; exit $$status; }
 	@mv $@.new $@

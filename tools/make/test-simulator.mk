@@ -3,7 +3,7 @@
 iss_tests := $(filter-out %/test_peripherals %/test_lock_step,$(call py_tests,cpu_33f))
 all_suites += $(iss_tests)
 
-$(addprefix $T/made/,$(iss_tests)): build/iss/libmachine.so
+$(addprefix $T/made/,$(iss_tests) tools/test_wcet): build/iss/libmachine.so
 
 build/iss/libmachine.so: build/iss/libiss33f.a
 	$(call say,ld,$@)$(CC) -shared -o $@.new -Wl$(comma)--whole-archive $< -Wl$(comma)--no-whole-archive -lm && mv -f $@.new $@

@@ -11,9 +11,10 @@ typedef struct {
     double count, min, max, sum, last;
 } vb_range_t;
 
-/* What a processor with a time of its own has counted; zeroes for the host. Latency: from the trigger to the write of the third duty. */
+/* What a processor with a time of its own has counted; zeroes for the host. Latency: from the trigger to the write of the third duty;
+ * entry: from the trigger to the handler. */
 typedef struct {
-    vb_range_t isr, latency;
+    vb_range_t isr, latency, entry;
     double stack_bytes, instructions, cycles, resets, errors;
     double ticks, differences;
 } vb_counts_t;

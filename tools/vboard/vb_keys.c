@@ -98,6 +98,7 @@ static void set_isr_reset(vb_t *vb, double value)
     (void)value;
     vb->count.isr = (vb_range_t){.last = vb->count.isr.last};
     vb->count.latency = (vb_range_t){.last = vb->count.latency.last};
+    vb->count.entry = (vb_range_t){.last = vb->count.entry.last};
 }
 
 #define AT(field) offsetof(struct vb, field)
@@ -221,6 +222,8 @@ static const key_entry_t table[] = {
     R("cpu.latency_cycles_min", count.latency.min, "cycles", "shortest time from the trigger to the write of the third duty"),
     R("cpu.latency_cycles_max", count.latency.max, "cycles", "longest time from the trigger to the write of the third duty"),
     G("cpu.latency_cycles_mean", get_latency_mean, "cycles", "mean time from the trigger to the write of the third duty"),
+    R("cpu.entry_cycles_min", count.entry.min, "cycles", "shortest time from the trigger to the moment before the interrupt's entry"),
+    R("cpu.entry_cycles_max", count.entry.max, "cycles", "longest time from the trigger to the moment before the interrupt's entry"),
     R("cpu.cycles", count.cycles, "cycles", "instruction cycles since power-up"),
     R("cpu.instructions", count.instructions, "", "instructions since power-up"),
     R("cpu.stack_bytes", count.stack_bytes, "bytes", "deepest stack"),
