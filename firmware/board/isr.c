@@ -34,8 +34,6 @@ QM_INLINE void board_set_outputs(uint16_t outputs)
     P1OVDCON = override;
 }
 
-/* wcet: _ADC1Interrupt/drive_raise excludes drive_outputs/drive_is_running speed_step speed_choose_state protection_check_signals */
-/* wcet: _ADC1Interrupt/drive_raise excludes speed_turn_round drive_update_model handover_now handover_wait/qm_sub_limited */
 /** 20 kHz, triggered by PWM1 through the ADC. */
 void BOARD_ISR _ADC1Interrupt(void)
 {

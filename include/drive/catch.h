@@ -199,7 +199,7 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     drive_enter(d, DRIVE_CLOSED);
 }
 
-/* wcet: catch_step/catch_preset_estimator excludes catch_look calibration_step startup_bootstrap idle_step/drive_enter */
+/* wcet: catch_step/catch_preset_estimator excludes catch_look calibration_step startup_bootstrap */
 /** In CATCH, every eighth period: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
 NOINLINE void catch_step(drive_t *d, const drive_params_t *p)
 {

@@ -15,7 +15,7 @@ QM_INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_sa
     d->phases_q13.c = (int16_t)(-d->phases_q13.a - d->phases_q13.b);
 }
 
-/* wcet: drive_run excludes catch_step protection_check_current/drive_enter */
+/* wcet: drive_run excludes catch_step */
 /* wcet: drive_run/startup_step excludes speed_step speed_choose_state speed_turn_round limits_burn protection_check_signals */
 /** A period with the bridge switching. @param duty written */
 QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
