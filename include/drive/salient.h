@@ -19,23 +19,27 @@ QM_INLINE void salient_model(drive_run_t *run, const drive_params_t *p)
 #endif
 }
 
-/** In closed loop the control's frame is the rotor's. Before drive_update_model(). */
+/** In closed loop the control's frame is the rotor's. What the hand-over has of current along the flux counts half more, as with magnets a fifth
+ *  weaker than the header's: with too much flux in its model the estimator loses its lock. Before drive_update_model(). */
 QM_INLINE void salient_sees_current(drive_run_t *run)
 {
 #if MOTOR_SALIENCY_UH
-    run->salience.id_q13 = run->control.i_q13.d;
+    int16_t id_q13 = run->control.i_q13.d;
+    run->salience.id_q13 = (int16_t)((id_q13 > 0) ? id_q13 + (id_q13 >> 1) : id_q13);
 #else
     (void)run;
 #endif
 }
 
-/** On the forced angle the estimator's frame is the rotor's, as soon as it agrees. Before drive_update_model(). */
+/** On the forced angle the estimator's frame is the rotor's, as soon as it agrees. There is more such current, so it counts three quarters more: the
+ *  estimator finds its lock with half of the flux in its model, but not with half too much. Before drive_update_model(). */
 QM_INLINE void salient_sees_forced_current(drive_t *d)
 {
 #if MOTOR_SALIENCY_UH
     drive_run_t *run = &d->run;
     sincos_t turn = trig_sincos_called((angle_t)(d->angle - estimator_next_angle(&run->estimator)));
-    run->salience.id_q13 = (int16_t)(2 * inverse_park(run->control.i_q13, turn).alpha);
+    int16_t id_q13 = (int16_t)(2 * inverse_park(run->control.i_q13, turn).alpha);
+    run->salience.id_q13 = (int16_t)((id_q13 > 0) ? id_q13 + (id_q13 >> 1) + (id_q13 >> 2) : id_q13);
 #else
     (void)d;
 #endif
