@@ -132,6 +132,14 @@ def test_a_loop_that_nobody_speaks_of_is_refused_with_its_line():
         program(EXCLUDES).bounds("_ADC1Interrupt")
 
 
+def test_a_background_that_holds_interrupts_up_is_refused():
+    words, labels = asm33.assemble("main: disi #9; bra main")
+    image = program()
+    image.elf.words, image.elf.symbols["_main"] = words, labels["main"]
+    with pytest.raises(UserError, match=r"the background holds interrupts up at 0x200 \(disi #0x9\)"):
+        image.longest_instruction()
+
+
 def test_handlers_come_control_interrupt_first_then_by_vector():
     image = program()
     image.handlers = dict.fromkeys(("_DefaultInterrupt", "_FLTA1Interrupt", "_MathError", "_ADC1Interrupt"), 0)

@@ -158,8 +158,13 @@ class Program:
         return max((item.turns for item in self.statements if item.turns and item.where in lines), default=None)
 
     def longest_instruction(self) -> int:
-        """Of the background, in cycles: an interrupt waits for its end."""
-        return build(self._op, self._core, self.elf.symbols[BACKGROUND], self.name).single
+        """Of the background, in cycles: an interrupt waits for its end, and for nothing else."""
+        graph = build(self._op, self._core, self.elf.symbols[BACKGROUND], self.name)
+        for op in graph.ops.values():
+            if op.text.startswith("disi"):
+                raise UserError(f"the background holds interrupts up at 0x{op.address:x} ({op.text})", self.name(op.address),
+                                "leave DISI out, or the deadline cannot be proven")
+        return graph.single
 
     def bounds(self, handler: str) -> list[Bound]:
         """To the return, and in the control interrupt to the third duty."""
