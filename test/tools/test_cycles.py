@@ -100,7 +100,7 @@ def test_a_profile_that_misses_cycles_is_an_error():
 
 def test_budget_file_has_the_limits():
     limits = Budget.read().cycles
-    assert limits.isr_max <= 946 + 54 # AN1292's, and fault recorder, trim, search for wrong signals
+    assert limits.isr_max < 946 # AN1292's
     assert "demo" in limits.scenarios and len(limits.scenarios) > 3
 
 
