@@ -145,7 +145,7 @@ def test_exchanged_signals_or_a_wrong_sign_end_in_over_current(tmp_path, legs, s
 
 def test_an_open_wire_ends_in_the_faults_that_the_page_names():
     start = {"library": LIBRARY, "keys": {"fault.open_phase": 2.0}, "signals": ["fw.fault"]}
-    running = {"library": LIBRARY, "signals": ["fw.fault"], "events": [(2.5, "load.constant_nm", 0.03), (3.0, "fault.open_phase", 1.0)], "at_s": 4.0}
+    running = {"library": LIBRARY, "keys": {"input.pot": 0.3}, "signals": ["fw.fault"], "events": [(2.5, "load.constant_nm", 0.03), (3.0, "fault.open_phase", 1.0)], "at_s": 4.0}
     found = [done["faults"][int(done["trace"][-1, 0])] for done in look(start, running)]
     assert found == ["START_FAILED", "OPEN_PHASE"]
 
