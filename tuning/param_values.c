@@ -160,6 +160,10 @@ static void limits(void)
     double bus = BUS_FULL_SCALE_V / 32768.0, most = MAXIMUM_CURRENT_A;
     GROUP("limits");
     FIELD(current_max_q13, most, "A", q13_a, "Q13 A", "current vector that is asked for");
+#if MOTOR_SALIENCY_UH
+    FIELD(salience_q13, MOTOR_KPHI_V_PER_KRPM / sqrt(3.0) * 60.0 / (2.0 * PI * 1000.0 * pairs) / (MOTOR_SALIENCY_UH * 1e-6), "A", q13_a, "Q13 A",
+          "-i_d that doubles the flux");
+#endif
     FIELD(overcurrent_q13, OVER_CURRENT_THRESHOLD_A, "A", q13_a, "Q13 A", "phase current that trips");
     FIELD(i2t_most_q25, (double)I2T_CURRENT_A * I2T_CURRENT_A, "A^2", 2.0 * q13_a * q13_a, "Q25 A^2", "heat that trips");
     FIELD(i2t_rate_q16, 0.512 / I2T_TIME_SEC, "1", 1.0 / 65536.0, "Q16 a step", "what the heat follows in 512 ms");
