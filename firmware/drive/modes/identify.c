@@ -414,7 +414,7 @@ static void mechanics_drops(drive_t *d, int32_t speed_q10)
 
 static void forget_parts(identify_t *id)
 {
-    static const identify_part_t nothing;
+    static const identify_part_t nothing = { .blocks = 0 };
     int16_t n;
     for (n = 0; n < 3; n++) {
         id->parts[n] = nothing;
