@@ -18,7 +18,7 @@ import pytest
 def pytest_addoption(parser) -> None:
     group = parser.getgroup("foc33")
     group.addoption("--jobs", type=int, default=0, help="suites at the same time, each in its own process")
-    group.addoption("--time-limit", type=float, default=600, metavar="SECONDS", help="how long a suite may take")
+    group.addoption("--time-limit", type=float, default=900, metavar="SECONDS", help="how long a suite may take: the static checks need five minutes of two free cores")
     group.addoption("--told-every", type=float, default=10, metavar="SECONDS", help="how long it may be silent while suites run")
     group.addoption("--made", metavar="FOLDER", help="stamps of make: a suite without one could not be built")
     group.addoption("--summary", metavar="FILE", help="where to write the numbers of a whole run, for the README")
