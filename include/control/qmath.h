@@ -147,6 +147,7 @@ QM_INLINE QM_WRAPS uint16_t qm_clear_of(int32_t x, int32_t most)
     return (uint16_t)((uint16_t)((uint16_t)qm_hi(x) + limit) < (uint16_t)(2u * limit));
 }
 
+/** |x| for qm_abs(); -32768 gives 32767. */
 QM_INLINE QM_WRAPS int16_t qm_magnitude(int16_t x)
 {
     uint16_t m = (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);

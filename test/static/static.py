@@ -28,6 +28,7 @@ CLANG_16_BIT = "--target=msp430 -ffreestanding -std=gnu99".split()
 CLANG_FLAGS = """-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wcast-qual -Wcomma -Wconditional-uninitialized
     -Wextra-semi -Wimplicit-fallthrough -Wmissing-prototypes -Wshift-sign-overflow -Wtautological-compare -Wunreachable-code
     -Wno-#pragma-messages -Werror -fsyntax-only""".split()
+UNUSED = ("misra 2.3", "misra 2.4", "misra 2.5", "cppcheck unusedFunction")
 CLANG = os.environ.get("CLANG", "clang-14")
 INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 
@@ -109,17 +110,27 @@ def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -
 
 
 def cppcheck(sources: list[str]) -> list[Finding]:
-    """Every preprocessor configuration of each file, with the target's type sizes; its own checks and those of its MISRA addon."""
+    """Its own checks and those of its MISRA addon, with the target's type sizes: every preprocessor configuration without the parameters'
+    start values, which are most of the text of each, then them in the one configuration that is delivered."""
     # Its preprocessor expands a parameter's name before ## and #: these files, which end as nothing, are not the compiler's.
     sources = [source for source in sources if source not in ("firmware/drive/param_text.c", "firmware/drive/param_check.c")]
+    with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
+        Path(folder, "drive").mkdir()
+        Path(folder, "drive", "param_init.h").write_text("#define DRIVE_PARAMS_INIT {0}\n")
+        every, delivered = each(lambda options: one_cppcheck(options, sources), [["--force", f"-I{folder}"], ["--max-configs=1"]])
+    # What is never used is so in both.
+    found = {finding for finding in every ^ delivered if finding.check not in UNUSED} | (every & delivered)
+    return sorted((finding for finding in found if not finding.file.startswith("build/")), key=lambda f: (f.check, f.file, f.line))
+
+
+def one_cppcheck(options: list[str], sources: list[str]) -> set[Finding]:
+    """What it finds in all sources at once: unused types, macros and functions are only known at the end."""
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
-        # All sources at once: unused types, macros and functions are only known at the end.
         output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
-                      f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--force", "--inconclusive",
-                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", "-U__FRAMAC__", *INCLUDES, *sources])
-    findings = {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), file, int(number), text)
-                for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
-    return sorted(findings, key=lambda f: (f.check, f.file, f.line))
+                      f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--inconclusive",
+                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", "-U__FRAMAC__", *options, *INCLUDES, *sources])
+    return {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), file, int(number), text)
+            for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
 
 
 def clang_tidy(jobs: list[tuple[str, list[str]]]) -> list[Finding]:

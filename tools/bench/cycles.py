@@ -22,7 +22,7 @@ from tools.common.errors import UserError
 from tools.image import attribution, program
 from tools.image.budget import Budget
 from tools.image.profile import Counts, Profile, profile
-from tools.image.size import write_json
+from tools.image.size import told
 
 from . import build, pil, pil_command, scenario_file, simulate, sweep
 
@@ -323,20 +323,21 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget
     return report
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = command_line.Parser(prog="python3 -m tools.bench.cycles", description=__doc__.splitlines()[0])
+def parser_of(name: str, about: str, command: Callable[[argparse.Namespace], int]) -> argparse.ArgumentParser:
+    """Options of a command that runs scenarios on the image. @param name of the module here and of the file that it writes"""
+    parser = command_line.Parser(prog=f"python3 -m tools.bench.{name}", description=about)
     parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
     parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-    parser.add_argument("--out", type=Path, help="folder for cycles.json; default: the image's")
+    parser.add_argument("--out", type=Path, help=f"folder for {name}.json; default: the image's")
     parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(command=_run)
+    parser.set_defaults(command=command)
     return parser
 
 
 def main(arguments: list[str] | None = None) -> int:
-    return command_line.main(_parser, arguments)
+    return command_line.main(lambda: parser_of("cycles", __doc__.splitlines()[0], _run), arguments)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -344,12 +345,7 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    path = write_json(summary(report), options.out or image.parent, "cycles")
-    print(text(report))
-    print(f"\nwritten: {paths.shown(path)}")
-    for line in report.broken:
-        print(f"foc33: {line}", file=sys.stderr)
-    return 1 if report.broken else 0
+    return told(summary(report), options.out or image.parent, "cycles", text(report) + "\n")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from tools.common.errors import UserError
 from tools.image import device
 from tools.image.budget import Budget
 from tools.image.facts import Decoder
-from tools.image.size import write_json
+from tools.image.size import told
 from tools.image.wcet import INTERRUPT, MOST_PARTS, RETURN, THIRD_DUTY, Bound, Program, by_line, handlers_of, over, read_statements
 
 from . import build, cycles, pil, pil_command, simulate, sweep
@@ -235,32 +235,15 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget
     return report
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = command_line.Parser(prog="python3 -m tools.bench.wcet", description=__doc__.splitlines()[0])
-    parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
-    parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
-    parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-    parser.add_argument("--out", type=Path, help="folder for wcet.json; default: the image's")
-    parser.add_argument("--no-budget", action="store_true", help="another mode or optimisation than the budget is for")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(command=_run)
-    return parser
-
-
 def main(arguments: list[str] | None = None) -> int:
-    return command_line.main(_parser, arguments)
+    return command_line.main(lambda: cycles.parser_of("wcet", __doc__.splitlines()[0], _run), arguments)
 
 
 def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), Budget.read(), not options.no_budget, options.quiet)
-    path = write_json(summary(report), options.out or image.parent, "wcet")
-    print(text(report))
-    print(f"\nwritten: {paths.shown(path)}")
-    for line in report.broken:
-        print(f"foc33: {line}", file=sys.stderr)
-    return 1 if report.broken else 0
+    return told(summary(report), options.out or image.parent, "wcet", text(report) + "\n")
 
 
 if __name__ == "__main__":

@@ -185,6 +185,17 @@ def write_json(data: dict, folder: Path, name: str) -> Path:
     return path
 
 
+def told(data: dict, folder: Path, name: str, report: str) -> int:
+    """Writes folder/name.json, prints the report and a line for each of data["broken"].
+    @return exit status, 1 when something is broken"""
+    path = write_json(data, folder, name)
+    print(report)
+    print(f"written: {paths.shown(path)}")
+    for line in data["broken"]:
+        print(f"foc33: {line}", file=sys.stderr)
+    return 1 if data["broken"] else 0
+
+
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
     body = [[row["name"], *(_number(row[key], 0) for key in ("note", "flash", "budget", "note_ram", "ram", "ram_budget"))]
@@ -234,12 +245,7 @@ def _run(options: argparse.Namespace) -> int:
         report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
-    path = write_json(summary(report), options.out, "size")
-    print(text(report))
-    print(f"written: {paths.shown(path)}")
-    for line in report.broken:
-        print(f"foc33: {line}", file=sys.stderr)
-    return 1 if report.broken else 0
+    return told(summary(report), options.out, "size", text(report))
 
 
 if __name__ == "__main__":
