@@ -21,12 +21,17 @@ typedef struct {
  *  @param u within the limit or not @param step written @return the output */
 QM_INLINE int16_t pi_limit(int32_t u, int32_t limit_u, const pi_gains_t *gains, int16_t limit, int32_t *step)
 {
+    int32_t half;
     if (u > limit_u) {
-        *step -= 2 * qm_mulss(qm_hi(u - limit_u), gains->kc);
+        half = qm_mulss(qm_hi(u - limit_u), gains->kc);
+        *step -= half;
+        *step -= half;
         return limit;
     }
     if (u < -limit_u) {
-        *step += 2 * qm_mulss(qm_hi(-limit_u - u), gains->kc);
+        half = qm_mulss(qm_hi(-limit_u - u), gains->kc);
+        *step += half;
+        *step += half;
         return (int16_t)-limit;
     }
     return (int16_t)(u >> gains->shift);

@@ -31,14 +31,14 @@ QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t asked_q13)
     return (int16_t)((int16_t)(asked_q13 * p->dead_slope_q8) >> 8);
 }
 
-/** @param u duty before dead-time compensation, at most `top`; below zero only by rounding */
-QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q13, current_q13_t i_q13)
+/** @param u duty before dead-time compensation, at most `top`; below zero only by rounding @param i_q13 measured, read only where it matters */
+QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q13, const current_q13_t *i_q13)
 {
     int16_t duty = (int16_t)(((u < 0) ? 0 : u) + svm_dead_time(p, asked_q13));
     if (duty > p->top) {
         /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
          * is open longer by it; otherwise the compensation must not close the window. */
-        int16_t most = (i_q13 > p->turn_q13) ? p->full : p->top;
+        int16_t most = (*i_q13 > p->turn_q13) ? p->full : p->top;
         duty = (duty > most) ? most : duty;
     }
     return (duty_t)((duty < 0) ? 0 : duty);
@@ -53,7 +53,7 @@ QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q
  *         ones are a period older and carry the converter's steps; compensation that follows them makes a current stick at zero
  *  @param i measured phase currents, for the sampling window
  *  @param d the duties: written in place, for a returned structure is copied */
-QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, phases_t asked, phases_t i, duties_t *d)
+QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, phases_t asked, const phases_t *i, duties_t *d)
 {
     int16_t a = qm_mulhi_su(v.alpha, duty_per_volt_q16);
     int16_t t = qm_mulhi_su(qm_mulhi_su(v.beta, duty_per_volt_q16), 56756u); /* sqrt(3)/2 */
@@ -76,9 +76,9 @@ QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_
     if ((int16_t)(max + shift) > p->top) {
         shift = (int16_t)(p->top - max);
     }
-    d->a = svm_leg(p, (int16_t)(a + shift), asked.a, i.a);
-    d->b = svm_leg(p, (int16_t)(b + shift), asked.b, i.b);
-    d->c = svm_leg(p, (int16_t)(c + shift), asked.c, i.c);
+    d->a = svm_leg(p, (int16_t)(a + shift), asked.a, &i->a);
+    d->b = svm_leg(p, (int16_t)(b + shift), asked.b, &i->b);
+    d->c = svm_leg(p, (int16_t)(c + shift), asked.c, &i->c);
 }
 
 #endif

@@ -4,11 +4,11 @@
 
 #include "control/qmath.h"
 
-#define TRIG_SIN_STEPS 128  /* of a turn */
-#define TRIG_SIN_ENTRIES 96 /* half a turn for the sine, a quarter more for the cosine */
+#define TRIG_SIN_STEPS 128 /* of a turn */
+#define TRIG_SIN_ENTRIES (TRIG_SIN_STEPS / 2)
 #define TRIG_CIRCLE_STEPS 64
 
-/** sin(2 pi i / 128) * 32757, i = 0..95. The amplitude is 10 below 32767 because interpolation by the derivative overshoots by 10. */
+/** sin(2 pi i / 128) * 32757, i = 0..63. The amplitude is 10 below 32767 because interpolation by the derivative overshoots by 10. */
 extern const int16_t trig_sin_table[TRIG_SIN_ENTRIES];
 
 /** sqrt(1 - (i/64)^2) in Q15, i = 0..64, rounded down so that the circle is never left. */
@@ -25,14 +25,16 @@ typedef struct {
 QM_INLINE sincos_t trig_sincos(angle_t angle)
 {
     uint16_t nearest = (uint16_t)(angle + 256u);
-    const q15_t *entry = &trig_sin_table[(uint16_t)(nearest >> 9) & (TRIG_SIN_STEPS / 2 - 1)];
-    q15_t s = entry[0];
-    q15_t c = entry[TRIG_SIN_STEPS / 4];
+    uint16_t step = (uint16_t)(nearest >> 9) & (TRIG_SIN_ENTRIES - 1u);
+    q15_t s = trig_sin_table[step];
+    q15_t c = trig_sin_table[step ^ (TRIG_SIN_ENTRIES / 2u)]; /* a quarter of a turn away, to the one side or the other */
     /* the low nine bits as a signed fraction of one step, then in radians * 65536: 2 pi / 128 / 2 * 65536 / 32768 */
     int16_t rest_q16_rad = qm_mulhi((int16_t)(uint16_t)(angle << 7), 3217);
     sincos_t r;
-    if (nearest >= 32768u) { /* half a turn further both change their signs */
+    if (nearest & 0x8000u) {
         s = (int16_t)-s;
+    }
+    if ((uint16_t)(nearest + 0x4000u) & 0x8000u) {
         c = (int16_t)-c;
     }
     r.sin = (int16_t)(s + qm_mulhi(c, rest_q16_rad));

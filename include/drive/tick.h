@@ -40,7 +40,7 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     d->frame = trig_sincos(d->angle);
     v = inverse_park(c->v_q14, d->frame);
     estimator_commanded(&run->estimator, v);
-    svm(&p->svm, v, d->duty_per_volt_q16, phases_of(c->ref_q13, d->frame), d->phases_q13, duty);
+    svm(&p->svm, v, d->duty_per_volt_q16, phases_of(c->ref_q13, d->frame), &d->phases_q13, duty);
 }
 
 /** One PWM period up to the duties; then drive_outputs(), drive_slow(), which has no deadline, and last drive_settle().

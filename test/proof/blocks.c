@@ -248,7 +248,7 @@ static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
     measured.a = ANY16();
     measured.b = ANY16();
     measured.c = ANY16();
-    svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), asked, measured, &d);
+    svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), asked, &measured, &d);
     //@ check duties: d.a <= 5600 && d.b <= 5600 && d.c <= 5600;
 }
 

@@ -17,7 +17,7 @@ void test_duties_equal_the_reference(void)
         alphabeta_t v = { r.alpha, r.beta };
         phases_t asked = { r.asked_a, r.asked_b, r.asked_c }, i = { r.i_a, r.i_b, r.i_c };
         duties_t d;
-        svm(&params, v, r.gain, asked, i, &d);
+        svm(&params, v, r.gain, asked, &i, &d);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.a, d.a, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.b, d.b, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.c, d.c, golden_row(n));
@@ -42,7 +42,7 @@ void test_directions_of_voltage_and_dead_time(void)
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         alphabeta_t v = { cases[n].alpha, cases[n].beta };
         duties_t d;
-        svm(&params, v, GAIN_24V, cases[n].asked, no_current, &d);
+        svm(&params, v, GAIN_24V, cases[n].asked, &no_current, &d);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].a, d.a, cases[n].what);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].b, d.b, cases[n].what);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].c, d.c, cases[n].what);
@@ -56,7 +56,7 @@ static duties_t duties_at(int16_t radius, angle_t angle)
     dq_t v = { radius, 0 };
     duties_t d;
     /* twice the gain: undoes the transformation's halving */
-    svm(&params, inverse_park(v, trig_sincos(angle)), 2u * GAIN_24V, no_current, no_current, &d);
+    svm(&params, inverse_park(v, trig_sincos(angle)), 2u * GAIN_24V, no_current, &no_current, &d);
     return d;
 }
 
@@ -132,8 +132,8 @@ void test_measured_currents_alone_do_not_move_the_duties(void)
     static const phases_t i = { 700, -300, -400 };
     static const alphabeta_t v = { 1000, -2000 };
     duties_t without, with;
-    svm(&params, v, GAIN_24V, no_current, no_current, &without);
-    svm(&params, v, GAIN_24V, no_current, i, &with);
+    svm(&params, v, GAIN_24V, no_current, &no_current, &without);
+    svm(&params, v, GAIN_24V, no_current, &i, &with);
     TEST_ASSERT_EQUAL_UINT16(without.a, with.a);
     TEST_ASSERT_EQUAL_UINT16(without.b, with.b);
     TEST_ASSERT_EQUAL_UINT16(without.c, with.c);
