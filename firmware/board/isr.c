@@ -43,7 +43,6 @@ void BOARD_ISR _ADC1Interrupt(void)
     IFS0bits.AD1IF = 0;
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
-    raw.v_bus = (int16_t)ADC1BUF3;
     drive_tick(&board_drive, &board_params, &raw, &duty);
     P1DC1 = duty.a;
     P1DC2 = duty.b;
@@ -54,7 +53,7 @@ void BOARD_ISR _ADC1Interrupt(void)
     }
     board_panel.pot_q15 = (int16_t)ADC1BUF0;
     board_set_outputs(drive_outputs(&board_drive));
-    drive_slow(&board_drive, &board_params, raw.v_bus);
+    drive_slow(&board_drive, &board_params, (int16_t)ADC1BUF3);
     if (drive_settle(&board_drive)) {
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);

@@ -165,7 +165,8 @@ QM_INLINE int16_t qm_abs(int16_t x)
 QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
 {
     if (qm_beyond(x, most)) {
-        return (int16_t)((x < 0) ? -most : most);
+        int16_t sign = (int16_t)(x >> 15); /* 0 or -1 */
+        return (int16_t)((most ^ sign) - sign);
     }
     return x;
 }

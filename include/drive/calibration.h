@@ -5,11 +5,11 @@
 #include "drive/state.h"
 
 /** One sample. The last one raises FAULT_OFFSET unless both offsets are plausible. @return the next state */
-QM_INLINE drive_state_t calibration_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+QM_INLINE drive_state_t calibration_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {
     calibration_t *c = &d->calibration;
-    c->sum_a += raw->i_a;
-    c->sum_b += raw->i_b;
+    c->sum_a += i_a;
+    c->sum_b += i_b;
     d->periods++;
     if (d->periods == (1u << CALIBRATION_LOG2)) {
         int16_t a_q13 = qm_mulhi((int16_t)(c->sum_a >> CALIBRATION_LOG2), p->kcurr_a);

@@ -6,12 +6,12 @@
 #include "drive/catch.h"
 
 /** A period with the bridge off or charging its drivers: each state says which comes next, the gate lets it in or not. */
-NOINLINE void idle_step(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+NOINLINE void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {
     uint16_t next = d->state;
     switch (next) {
     case DRIVE_CALIBRATE:
-        next = (uint16_t)calibration_step(d, p, raw);
+        next = (uint16_t)calibration_step(d, p, i_a, i_b);
         break;
     case DRIVE_STOPPED:
         d->run.estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
