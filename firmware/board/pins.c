@@ -13,8 +13,8 @@ void pins_init(void)
     TRISC = BOARD_TRIS(C);
 
     __builtin_write_OSCCONL(OSCCON & ~0x0040u); /* unlock the pin selection */
-    RPINR12bits.FLTA1R = BOARD_FLTA_RP;
-    RPINR18bits.U1RXR = BOARD_UART_RX_RP;
+    RPINR12 = BOARD_FLTA_RP;
+    RPINR18 = 0x1F00u | BOARD_UART_RX_RP; /* U1CTS stays without a pin */
     BOARD_UART_TX_PIN = BOARD_UART_TX_FUNCTION;
     __builtin_write_OSCCONL(OSCCON | 0x0040u);
 }

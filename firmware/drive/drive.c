@@ -53,10 +53,10 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     run->control.iq_limit_q13 = p->current_max_q13;
     run->control.brake_limit_q13 = limits_asked_most(p);
     d->forced.speed_q10 = 0;
-    d->forced.angle_q32 = (direction >= 0) ? 0xC0000000ul : 0x40000000ul; /* ALIGN sweeps it to zero */
+    d->forced.angle_q32 = (uint32_t)(angle_t)(direction * -0x4000) << 16; /* ALIGN sweeps it to zero */
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos_called(d->angle);
-    run->catching.step = (uint16_t)((p->flying_start && mode_hands_over()) ? CATCH_FIRST_LOOK : CATCH_NO_LOOK);
+    run->catching.step = mode_hands_over() ? p->flying_start : (uint16_t)CATCH_NO_LOOK;
     mode_start(d, p);
     d->command.run = 1;
 }

@@ -30,8 +30,12 @@ uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
         b->down_ms = 0;
         return 0;
     }
-    b->down_ms = (uint16_t)((before + elapsed_ms > PANEL_DEBOUNCE_MS) ? PANEL_DEBOUNCE_MS : before + elapsed_ms);
-    return (uint16_t)(before < PANEL_DEBOUNCE_MS && b->down_ms >= PANEL_DEBOUNCE_MS);
+    b->down_ms = (uint16_t)(before + elapsed_ms);
+    if (b->down_ms < PANEL_DEBOUNCE_MS) {
+        return 0;
+    }
+    b->down_ms = PANEL_DEBOUNCE_MS;
+    return (uint16_t)(before < PANEL_DEBOUNCE_MS);
 }
 
 /** low + (high - low) * fraction, the fraction in Q16. */
@@ -80,7 +84,7 @@ int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_rang
 static int16_t panel_pot(panel_t *panel)
 {
     int16_t now = qm_lowpass(&panel->pot_q31, panel->pot_q15, 6554);
-    if (now - panel->pot_used_q15 > POT_STEP_Q15 || panel->pot_used_q15 - now > POT_STEP_Q15) {
+    if (qm_beyond((int16_t)(now - panel->pot_used_q15), POT_STEP_Q15)) {
         panel->pot_used_q15 = now;
     }
     return panel->pot_used_q15;
@@ -95,12 +99,12 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
         } else if (panel->interrupted) {
             panel->interrupted = 0; /* a moment before the retry */
         } else {
-            panel->wish_run = (int16_t)!panel->wish_run;
+            panel->wish_run ^= 1;
         }
         panel->fast_range = 0;
     }
     if (button_pressed(&panel->s3, in->s3_down, in->elapsed_ms) && panel->wish_run) {
-        panel->fast_range = (int16_t)!panel->fast_range;
+        panel->fast_range ^= 1;
     }
     if (d->fault != (uint16_t)FAULT_NONE && panel->wish_run) {
         panel->wish_run = 0;

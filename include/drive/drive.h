@@ -53,7 +53,7 @@ typedef struct {
     q15_t kcurr_a, kcurr_b; /**< gain of the samples; Q15 sample to Q13 current by the high word */
     int16_t offset_max_q13; /**< largest plausible offset */
     uint16_t bootstrap_periods;
-    uint16_t flying_start; /**< FLYING_START */
+    uint16_t flying_start; /**< catch_step_t: CATCH_FIRST_LOOK or, without FLYING_START, CATCH_NO_LOOK */
     uint16_t align_periods;
     uint16_t agree_steps, wait_steps; /**< agreement needed at the end of the ramp, and how long it may take */
     uint32_t align_sweep_q32;         /**< angle step while the first half of ALIGN turns by 90 degrees */
