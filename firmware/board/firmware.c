@@ -13,6 +13,15 @@
 #include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
+/* A bit of a port: one instruction for each of its values, where an assignment takes seven. */
+#define SWITCH(bit, on) \
+    do { \
+        if (on) { \
+            bit = 1; \
+        } else { \
+            bit = 0; \
+        } \
+    } while (0)
 #define COUNT_MS 100u
 #define LEAST_TICKS PARAM_PERIODS(0.097F) /* of a tenth of a second: 3 % less */
 
@@ -23,6 +32,8 @@ retry_t board_retry;
 static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;          /* drive ticks at the last check */
 static uint16_t silent_ms;                /* timer 1 milliseconds without a control interrupt */
+static deviation_t deviation;
+static overload_t overload;
 static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
 
 void firmware_trip(drive_fault_t fault)
@@ -97,6 +108,14 @@ static void firmware_watch_interrupt(void)
     }
 }
 
+/** @param found drive_fault_t, none too */
+static void firmware_find(uint16_t found)
+{
+    if (found != (uint16_t)FAULT_NONE) {
+        firmware_trip((drive_fault_t)found);
+    }
+}
+
 /** What must be right for the bridge to be on, and what tells of it after a reset. */
 QM_INLINE void firmware_supervise(void)
 {
@@ -111,24 +130,23 @@ QM_INLINE void firmware_supervise(void)
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
     record_tick();
+    firmware_find(deviation_phases(&deviation, &board_drive, &board_params));
 }
 
-/** @param found drive_fault_t, none too */
-static void firmware_find(uint16_t found)
+/** What a millisecond's look at the drive finds wrong. */
+QM_INLINE void firmware_judge(uint16_t elapsed_ms)
 {
-    if (found != (uint16_t)FAULT_NONE) {
-        firmware_trip((drive_fault_t)found);
+    firmware_find(deviation_tick(&deviation, &board_drive, &board_params));
+    if (overload_tick(&overload, &board_drive, &board_params, elapsed_ms)) {
+        firmware_trip(FAULT_OVERTEMPERATURE);
     }
 }
 
 void firmware_background(void)
 {
-    static deviation_t deviation;
-    static overload_t overload;
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
 
     firmware_supervise();
-    firmware_find(deviation_phases(&deviation, &board_drive, &board_params));
     if (elapsed_ms != 0u) {
         panel_inputs_t in;
         panel_lights_t lights;
@@ -138,14 +156,11 @@ void firmware_background(void)
         in.elapsed_ms = elapsed_ms;
         lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
         retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
-        BOARD_LED_ALIVE = lights.led_alive & 1u;
-        BOARD_LED_RUN = lights.led_run & 1u;
+        SWITCH(BOARD_LED_ALIVE, lights.led_alive);
+        SWITCH(BOARD_LED_RUN, lights.led_run);
         selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
-        firmware_find(deviation_tick(&deviation, &board_drive, &board_params));
-        if (overload_tick(&overload, &board_drive, &board_params, elapsed_ms)) {
-            firmware_trip(FAULT_OVERTEMPERATURE);
-        }
+        firmware_judge(elapsed_ms);
         selftest_part(SELFTEST_PART_WATCH);
         status_tick(elapsed_ms);
         selftest_part(SELFTEST_PART_STATUS);

@@ -3,6 +3,7 @@
 
 #if defined(__XC16__) && !defined(SELFTEST_OFF)
 
+#include "board/reset.h"
 #include "board/selftest_chip.h"
 
 #define WORDS_BELOW 24u /* of stack that the test of the RAM may still need */
@@ -34,8 +35,8 @@ volatile uint16_t *board_free_ram(void)
     "mov %1,w0\n mov #0x010F,w1\n and w0,w1,w0\n mov #0x00E0,w1\n ior w0,w1,w0\n mov w0,0x0042\n mov 0x0042,w1\n" \
     "cp w0,w1\n bra nz,.Lwrong%=\n cp0 w1\n bra z,.Lwrong%=\n"
 
-volatile uint16_t board_cpu_holds;
-static volatile uint16_t pattern;
+volatile uint16_t board_cpu_holds BOARD_PERSISTENT;
+static volatile uint16_t pattern BOARD_PERSISTENT;
 
 void board_cpu_test(void)
 {

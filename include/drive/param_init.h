@@ -110,7 +110,7 @@
         .kcurr_b = Q15(KCURRB), \
         .offset_max_q13 = 1024, /* an eighth of full scale: 0.2 V at the converter */ \
             .bootstrap_periods = PARAM_PERIODS(0.010F), \
-        .flying_start = FLYING_START, \
+        .flying_start = (uint16_t)((FLYING_START) ? CATCH_FIRST_LOOK : CATCH_NO_LOOK), \
         .align_periods = LOCK_TIME, \
         .align_sweep_q32 = 0x40000000ul / (LOCK_TIME / 2), \
         .agree_steps = PARAM_SLOW_STEPS(0.02F), \
