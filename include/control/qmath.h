@@ -56,6 +56,13 @@ QM_INLINE int16_t qm_hi(int32_t x)
     return (int16_t)(x >> 16);
 }
 
+/** x / 32768, rounded to the nearest. @param x below 2^30 - 16384 */
+QM_INLINE int16_t qm_round_q15(int32_t x)
+{
+    int32_t twice = x + x;
+    return qm_hi(twice + 32768);
+}
+
 /** Upper word of the signed product: a*b/65536. */
 QM_INLINE int16_t qm_mulhi(int16_t a, int16_t b)
 {

@@ -57,8 +57,8 @@ QM_INLINE alphabeta_t inverse_park(dq_t x, sincos_t sc)
  *  @param x_q13 |x| at most 11585 @return Q13, to a count and 1/3000; their sum is 0 */
 QM_INLINE phases_t phases_of(dq_t x_q13, sincos_t sc)
 {
-    int16_t alpha = qm_hi(2 * (qm_mulss(x_q13.d, sc.cos) - qm_mulss(x_q13.q, sc.sin)) + 32768);
-    int16_t beta = qm_hi(2 * (qm_mulss(x_q13.d, sc.sin) + qm_mulss(x_q13.q, sc.cos)) + 32768);
+    int16_t alpha = qm_round_q15(qm_mulss(x_q13.d, sc.cos) - qm_mulss(x_q13.q, sc.sin));
+    int16_t beta = qm_round_q15(qm_mulss(x_q13.d, sc.sin) + qm_mulss(x_q13.q, sc.cos));
     phases_t i;
     i.a = alpha;
     i.b = (int16_t)(qm_hi(qm_mulsu(beta, 56756u) + 32768) - (alpha >> 1)); /* sqrt(3)/2 */
