@@ -155,13 +155,11 @@ QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, sincos_t frame)
     return at_middle;
 }
 
-/** One period. @param frame of the control
+/** What the back-EMF says of speed and angle. @param frame of the control
  *  @param forced nonzero while the forced angle drives the motor (ALIGN and RAMP): the estimator runs along in a frame of its own */
-QM_INLINE void estimator_tick(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14,
-                              sincos_t frame, uint16_t forced)
+QM_INLINE void estimator_track(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, sincos_t frame, uint16_t forced)
 {
     dq_t e_q12;
-    estimator_back_emf(e, p, t, i_q14);
     if (forced) {
         e_q12 = park(e->e_q13, trig_sincos_called((angle_t)(e->rho_q32 >> 16)));
     } else {

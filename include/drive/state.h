@@ -56,6 +56,12 @@ QM_INLINE uint16_t drive_is_running(const drive_t *d)
     return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_ALIGN) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_ALIGN);
 }
 
+/** 1 with the forced angle in command, ALIGN or RAMP, of the states in which the bridge switches. */
+QM_INLINE uint16_t drive_is_forced(const drive_t *d)
+{
+    return (uint16_t)(d->state <= (uint16_t)DRIVE_RAMP);
+}
+
 /** 1 with the estimator's angle in command: CLOSED or STOPPING. */
 QM_INLINE uint16_t drive_is_closed(const drive_t *d)
 {

@@ -23,13 +23,13 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), v;
-    uint16_t forced = (uint16_t)(d->state <= (uint16_t)DRIVE_RAMP); /* ALIGN or RAMP */
 
     c->i_q13 = park(i, d->frame);
     c->i_q13.q = (int16_t)(c->i_q13.q + c->sample_shift_q13);
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
-    estimator_tick(&run->estimator, &p->estimator, &run->model, i, d->frame, forced);
-    if (forced) {
+    estimator_back_emf(&run->estimator, &p->estimator, &run->model, i);
+    estimator_track(&run->estimator, &p->estimator, &run->model, d->frame, drive_is_forced(d));
+    if (drive_is_forced(d)) { /* asked again: a flag would take a register from the law */
         startup_step(d, p);
     } else {
         d->angle = estimator_next_angle(&run->estimator);

@@ -274,7 +274,8 @@ static void run_motor(int16_t direction, uint16_t periods)
     while (periods-- != 0u) {
         uint64_t turn = (direction > 0) ? STEP_7500_Q32 : UINT64_C(0x100000000) - STEP_7500_Q32;
         true_q32 = (uint32_t)((true_q32 + turn) & UINT32_C(0xFFFFFFFF)); /* now the angle of this sample */
-        estimator_tick(&e, &params, &tuning, vector(0, 0), frame, 0);
+        estimator_back_emf(&e, &params, &tuning, vector(0, 0));
+        estimator_track(&e, &params, &tuning, frame, 0);
         frame = trig_sincos(estimator_next_angle(&e));
         /* acts for the period centred on the next sample */
         estimator_commanded(&e, inverse_park(rotating(0, (int16_t)(direction * 2 * EMF_7500_Q13)),

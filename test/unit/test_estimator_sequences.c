@@ -49,7 +49,8 @@ static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, i
 {
     tuning.inv_kfi = inv_kfi;
     tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
-    estimator_tick(&r->e, params, &tuning, i, r->frame, !closed);
+    estimator_back_emf(&r->e, params, &tuning, i);
+    estimator_track(&r->e, params, &tuning, r->frame, !closed);
     r->frame = trig_sincos(estimator_next_angle(&r->e));
     estimator_commanded(&r->e, v);
 }
