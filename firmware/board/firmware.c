@@ -29,9 +29,9 @@ drive_t board_drive;
 panel_t board_panel;
 retry_t board_retry;
 
-static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
-static uint16_t supervised_tick;          /* drive ticks at the last check */
-static uint16_t silent_ms;                /* timer 1 milliseconds without a control interrupt */
+static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
+static uint16_t supervised_tick; /* drive ticks at the last check */
+static uint16_t silent_ms;       /* timer 1 milliseconds without a control interrupt */
 static deviation_t deviation;
 static overload_t overload;
 static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */

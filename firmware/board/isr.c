@@ -11,7 +11,7 @@
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
 MODE_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
 
-volatile uint16_t board_clock_failed BOARD_PERSISTENT;
+volatile uint16_t board_clock_failed BOARD_UNSET;
 
 void BOARD_ISR _ADC1Interrupt(void);
 void BOARD_ISR _FLTA1Interrupt(void);

@@ -4,13 +4,13 @@
 #include "board/mclv.h"
 #include "board/selftest_run.h"
 
-volatile uint16_t board_reset_cause BOARD_PERSISTENT;
+volatile uint16_t board_reset_cause BOARD_UNSET;
 volatile uint16_t board_trap_intcon1 BOARD_PERSISTENT;
 
 static volatile uint16_t kept_fault BOARD_PERSISTENT;
 static volatile uint16_t kept_inverse BOARD_PERSISTENT; /* tells a kept fault from what RAM holds after power-up */
 
-static uint16_t served_tick BOARD_PERSISTENT;
+static uint16_t served_tick BOARD_UNSET;
 
 void reset_keep(uint16_t fault)
 {

@@ -35,8 +35,8 @@ volatile uint16_t *board_free_ram(void)
     "mov %1,w0\n mov #0x010F,w1\n and w0,w1,w0\n mov #0x00E0,w1\n ior w0,w1,w0\n mov w0,0x0042\n mov 0x0042,w1\n" \
     "cp w0,w1\n bra nz,.Lwrong%=\n cp0 w1\n bra z,.Lwrong%=\n"
 
-volatile uint16_t board_cpu_holds BOARD_PERSISTENT;
-static volatile uint16_t pattern BOARD_PERSISTENT;
+volatile uint16_t board_cpu_holds BOARD_UNSET;
+static volatile uint16_t pattern BOARD_UNSET;
 
 void board_cpu_test(void)
 {

@@ -16,7 +16,7 @@
 
 static enum { WATCHDOG_NO_TEST,
               WATCHDOG_DUE,
-              WATCHDOG_BITTEN } watchdog_test BOARD_PERSISTENT;
+              WATCHDOG_BITTEN } watchdog_test BOARD_UNSET;
 static volatile uint16_t waited_counts BOARD_PERSISTENT;
 
 /* Power-up clears WDTO, and its own bits stay until the firmware clears them: both together are the reset that the test has waited for. */

@@ -6,13 +6,16 @@
 
 #include <stdint.h>
 
-/** Of a variable: neither cleared nor set by the start-up code. It is kept over a reset, or the firmware gives it its first value; the code's
- *  list of what to clear is shorter by nine bytes for a file whose variables all are so. */
+/** Of a variable that outlives a reset: neither cleared nor set by the start-up code. */
 #ifdef __XC16__
 #define BOARD_PERSISTENT __attribute__((persistent))
 #else
 #define BOARD_PERSISTENT
 #endif
+
+/** Of a variable that the firmware writes before it reads it. The start-up code's list of what to clear is nine bytes shorter for a file that has
+ *  no others. */
+#define BOARD_UNSET BOARD_PERSISTENT
 
 /** X(bit, name): the flags of RCON that say why the processor started. */
 #define RESET_CAUSE_TABLE(X) \

@@ -119,12 +119,13 @@ void test_compensation_is_for_the_currents_asked_for_and_the_window_for_those_me
         { "near zero", 100, -1000, 1000, 20 },
         { "not below zero", 50, -1000, 1000, 0 },
     };
+    static const current_q13_t large = 1000;
     svm_params_t wide = params;
     wide.top = 1960;
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].leg, svm_leg(&params, cases[n].u, cases[n].asked, cases[n].measured), cases[n].what);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].leg, svm_leg(&params, cases[n].u, cases[n].asked, &cases[n].measured), cases[n].what);
     }
-    TEST_ASSERT_EQUAL_UINT16(2000, svm_leg(&wide, 1960, 1000, 1000)); /* never beyond the period */
+    TEST_ASSERT_EQUAL_UINT16(2000, svm_leg(&wide, 1960, 1000, &large)); /* never beyond the period */
 }
 
 void test_measured_currents_alone_do_not_move_the_duties(void)
