@@ -134,10 +134,11 @@ QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
     return (x < least) ? least : x;
 }
 
-/* Ranges, each by one comparison without a sign. The proofs read what they mean; test_qmath.c compares. */
+/* Ranges, each by one comparison without a sign, and a sign without a branch. The proofs read what they mean; test_qmath.c compares. */
 #ifdef __FRAMAC__
 #define qm_beyond(x, most) ((x) > (most) || (x) < -(most))
 #define qm_clear_of(x, most) ((x) <= (most) && (x) >= -(most))
+#define qm_with_sign(most, x) ((int16_t)(((x) < 0) ? -(most) : (most)))
 #define qm_magnitude(x) (((x) >= 0) ? (x) : ((x) == INT16_MIN) ? INT16_MAX \
                                                                : -(x))
 #else
@@ -152,6 +153,13 @@ QM_INLINE QM_WRAPS uint16_t qm_clear_of(int32_t x, int32_t most)
 {
     uint16_t limit = (uint16_t)qm_hi(most);
     return (uint16_t)((uint16_t)((uint16_t)qm_hi(x) + limit) < (uint16_t)(2u * limit));
+}
+
+/** most with the sign of x. @param most not negative */
+QM_INLINE int16_t qm_with_sign(int16_t most, int16_t x)
+{
+    int16_t sign = (int16_t)(x >> 15); /* 0 or -1 */
+    return (int16_t)((most ^ sign) - sign);
 }
 
 /** |x| for qm_abs(); -32768 gives 32767. */
@@ -172,8 +180,7 @@ QM_INLINE int16_t qm_abs(int16_t x)
 QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
 {
     if (qm_beyond(x, most)) {
-        int16_t sign = (int16_t)(x >> 15); /* 0 or -1 */
-        return (int16_t)((most ^ sign) - sign);
+        return qm_with_sign(most, x);
     }
     return x;
 }
