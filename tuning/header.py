@@ -20,6 +20,8 @@ INVKFI_FLAT = """/* 1/Kphi of each entry, in AN1292's counts. The back-EMF keeps
  * constant Kphi is the right start; AN1292's rising table made up for a clipped one. More turns the control angle ahead. */"""
 INVKFI_TUNED = "/* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */"
 WIDTH = 118
+FROM_DEFINES = ("SCOPE",)
+"""Parameters that DEFINES may set instead of the header."""
 
 
 def write(design: Design) -> str:
@@ -107,7 +109,8 @@ def _left(name: str, design: Design) -> str:
 
 
 def _define(design: Design, row: Parameter, facts: dict[str, str]) -> str:
-    return f"{_left(row.name, design)}{_comment(row, facts.get(row.name, ''))}"
+    line = f"{_left(row.name, design)}{_comment(row, facts.get(row.name, ''))}"
+    return f"#ifndef {row.name} /* or build with -D{row.name}=1 */\n{line}\n#endif" if row.name in FROM_DEFINES else line
 
 
 def _comment(row: Parameter, fact: str = "") -> str:
