@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from tools.common import paths
 from tools.common.motor_file import Motor
-from tools.common.param_rows import Parameter, modes, parameters
+from tools.common.param_rows import FROM_DEFINES, Parameter, modes, parameters
 
 from .constants import Constant, filter_hz
 from .design import Design
@@ -20,8 +20,6 @@ INVKFI_FLAT = """/* 1/Kphi of each entry, in AN1292's counts. The back-EMF keeps
  * constant Kphi is the right start; AN1292's rising table made up for a clipped one. More turns the control angle ahead. */"""
 INVKFI_TUNED = "/* 1/Kphi of each entry, in AN1292's counts; NORM_INVKFIBASE is the motor's own. More turns the control angle ahead. */"
 WIDTH = 118
-FROM_DEFINES = ("SCOPE",)
-"""Parameters that DEFINES may set instead of the header."""
 
 
 def write(design: Design) -> str:

@@ -21,10 +21,10 @@ enum { PART_SYN,
        ANSWER_DATA,
        ANSWER_SUM };
 
-/** Service 0: versions of protocol and program, longest data, a dsPIC, dates, state, event, table. */
+/** Service 0: versions of protocol and program, longest data, a dsPIC; no dates; state: the program runs. */
 #define INFO_BYTES 44u
-static const uint8_t device_info[INFO_BYTES] = { 5, 0, 1, 0, 255, 0x10, 0x82, '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0',
-                                                 '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0', '0' };
+#define INFO_STATE 33
+static const uint8_t device_info[INFO_BYTES] = { 5, 0, 1, 0, 255, 0x10, 0x82, [INFO_STATE] = 1 };
 
 lnet_t board_lnet;
 
@@ -32,7 +32,7 @@ void lnet_init(uint8_t *memory, uint8_t size)
 {
     lnet_t *l = &board_lnet;
     l->scope.state = (uint16_t)SCOPE_IDLE;
-    l->scope.end = board_scope_array;
+    l->scope.end = board_scope_array + SCOPE_ARRAY_WORDS;
     l->scope.at = board_scope_array;
     l->scope.event = board_scope_array;
     l->scope.channels = 0;

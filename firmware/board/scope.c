@@ -5,13 +5,18 @@
 
 #if SCOPE
 
-#define CHANNEL_BYTES 6u  /* type of memory, address in four bytes, width */
-#define TRIGGER_BYTES 14u /* with a level of 16 bits */
+#define HEAD_BYTES 4u    /* state, channels, periods */
+#define CHANNEL_BYTES 6u /* type of memory, address in four bytes, width */
+/* Type, type of memory, address, level of 16 bits, delay, edge, mode. */
+#define TRIGGER_LEVEL 6
+#define TRIGGER_DELAY 8
+#define TRIGGER_EDGE 12
+#define TRIGGER_MODE 13u /* 0: none */
+#define TRIGGER_BYTES 14u
 #define TYPE_FLOAT 0x40u
 #define TYPE_SIGNED 0x20u
 #define TYPE_WIDTH 0x1Fu
 #define VERSION 0x82u
-#define DELAY_MOST 32767
 
 int16_t board_scope_array[SCOPE_ARRAY_WORDS + SCOPE_USUAL_WORDS];
 
@@ -51,29 +56,42 @@ static uint16_t take_channels(scope_t *s, const uint8_t *at)
     return (uint16_t)(s->words != 0u);
 }
 
-/** A trigger on a word. @param rows of the ring @return 1 if it is good */
-static uint16_t take_trigger(scope_t *s, const uint8_t *at, uint16_t size, uint16_t rows)
+/** Rows before the trigger and after it. @param before its row, in bytes; negative: bytes after it that are left out @return 1 if there is room */
+static uint16_t take_delay(scope_t *s, int16_t before, uint16_t rows)
 {
-    uint16_t rises, high = word_at(at + 10);
-    s->delay = (int16_t)word_at(at + 8);
-    s->trigger = variable_at(at + 2, 2);
-    if (size != TRIGGER_BYTES || (at[0] & (TYPE_FLOAT | TYPE_WIDTH)) != 2u || s->trigger == 0 || high != ((s->delay < 0) ? 0xFFFFu : 0u)) {
-        return 0;
-    }
-    rises = (uint16_t)(at[12] == 1u);
-    s->flip = (uint16_t)((rises ? 0u : 0xFFFFu) ^ ((at[0] & TYPE_SIGNED) != 0u ? 0u : 0x8000u));
-    s->level = (int16_t)(word_at(at + 6) ^ s->flip);
-    s->was_below = 0;
-    s->stays = (uint16_t)(s->delay >= 0);
+    int16_t before_rows = (int16_t)(before / (int16_t)(2u * s->words));
+    uint16_t skipped = (uint16_t)-before_rows;
+    s->delay = before;
+    s->stays = (uint16_t)(before_rows <= 0);
     if (s->stays) { /* the last row then ends the array */
         s->left = 0;
-        s->after = (uint16_t)(rows + (uint16_t)s->delay);
-        s->at = s->end - s->words * (((uint16_t)s->delay + rows - 1u) % rows + 1u);
-    } else {
-        s->left = (uint16_t)-s->delay;
-        s->after = (uint16_t)(rows - s->left);
+        s->after = (uint16_t)(rows + skipped);
+        s->at = s->end - s->words * ((skipped + rows - 1u) % rows + 1u);
+        return 1;
     }
-    return (uint16_t)(s->stays || s->left < rows);
+    s->left = (uint16_t)before_rows;
+    s->after = (uint16_t)(rows - s->left);
+    return (uint16_t)(s->left < rows);
+}
+
+/** A trigger on a word. @param rows of the ring @return 1 if it is good */
+static uint16_t take_trigger(scope_t *s, const uint8_t *at, uint16_t rows)
+{
+    uint16_t delay = word_at(at + TRIGGER_DELAY), rises = (uint16_t)(at[TRIGGER_EDGE] == 1u);
+    s->trigger = variable_at(at + 2, 2);
+    s->flip = (uint16_t)((rises ? 0u : 0xFFFFu) ^ ((at[0] & TYPE_SIGNED) != 0u ? 0u : 0x8000u));
+    s->level = (int16_t)(word_at(at + TRIGGER_LEVEL) ^ s->flip);
+    s->was_below = 0;
+    return (uint16_t)((at[0] & (TYPE_FLOAT | TYPE_WIDTH)) == 2u && s->trigger != 0
+                      && word_at(at + TRIGGER_DELAY + 2) == ((delay >= 0x8000u) ? 0xFFFFu : 0u) && take_delay(s, (int16_t)delay, rows));
+}
+
+/** Rows from now on. */
+static void take_all(scope_t *s, uint16_t rows)
+{
+    s->left = rows;
+    s->after = 0;
+    s->delay = 0;
 }
 
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
@@ -84,8 +102,8 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
         return 1;
     }
     s->channels = request[1];
-    from = (uint16_t)(4u + CHANNEL_BYTES * s->channels);
-    if (s->channels > SCOPE_WORDS || size < from || state > (uint16_t)SCOPE_AUTO || !take_channels(s, request + 4)) {
+    from = (uint16_t)(HEAD_BYTES + CHANNEL_BYTES * s->channels);
+    if (s->channels > SCOPE_WORDS || size != from + TRIGGER_BYTES || !take_channels(s, request + HEAD_BYTES)) {
         return 0;
     }
     s->periods = (uint16_t)(word_at(request + 2) + 1u);
@@ -94,11 +112,9 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     s->at = board_scope_array;
     s->end = board_scope_array + rows * s->words;
     s->event = board_scope_array;
-    if (state == (uint16_t)SCOPE_AUTO) {
-        s->left = rows;
-        s->after = 0;
-        s->delay = 0;
-    } else if (!take_trigger(s, request + from, (uint16_t)(size - from), rows)) {
+    if (state != (uint16_t)SCOPE_TRIGGERED || request[from + TRIGGER_MODE] == 0u) {
+        take_all(s, rows);
+    } else if (!take_trigger(s, request + from, rows)) {
         return 0;
     } else {
         /* it waits for the trigger */
@@ -135,7 +151,7 @@ uint8_t *scope_put(const scope_t *s, uint8_t *at)
     at = put_long(at, (uint16_t)s->delay, (s->delay < 0) ? 0xFFFFu : 0u);
     at = put_long(at, offset_of(s->event), 0);
     at = put_long(at, offset_of(s->end), 0);
-    at = put_long(at, SCOPE_BYTES, 0);
+    at = put_long(at, offset_of(s->end), 0); /* clients take all of an array of whole rows */
     *at = VERSION;
     return at + 1;
 }

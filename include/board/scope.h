@@ -31,7 +31,7 @@ typedef struct {
     uint16_t was_below;                          /**< 1: the next value that is not below the level is the trigger */
     const volatile int16_t *source[SCOPE_WORDS]; /**< of each word; those that a row does not need are the first one again */
     const int16_t *event;                        /**< the trigger's row */
-    int16_t delay;                               /**< of the first row after the trigger's, in rows; negative: before */
+    int16_t delay;                               /**< bytes that are kept from before the trigger; negative: left out after it */
     uint16_t channels;
 } scope_t;
 
