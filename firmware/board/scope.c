@@ -96,14 +96,14 @@ static void take_all(scope_t *s, uint16_t rows)
 
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
 {
-    uint16_t state = request[0], rows, from;
-    s->state = (uint16_t)SCOPE_IDLE;
-    if (state == (uint16_t)SCOPE_IDLE) {
+    uint16_t mode = request[0], rows, from;
+    s->mode = (uint16_t)SCOPE_IDLE;
+    if (mode == (uint16_t)SCOPE_IDLE) {
         return 1;
     }
     s->channels = request[1];
     from = (uint16_t)(HEAD_BYTES + CHANNEL_BYTES * s->channels);
-    if (s->channels > SCOPE_WORDS || size != from + TRIGGER_BYTES || !take_channels(s, request + HEAD_BYTES)) {
+    if (mode > (uint16_t)SCOPE_AUTO || s->channels > SCOPE_WORDS || size != from + TRIGGER_BYTES || !take_channels(s, request + HEAD_BYTES)) {
         return 0;
     }
     s->periods = (uint16_t)(word_at(request + 2) + 1u);
@@ -112,14 +112,14 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     s->at = board_scope_array;
     s->end = board_scope_array + rows * s->words;
     s->event = board_scope_array;
-    if (state != (uint16_t)SCOPE_TRIGGERED || request[from + TRIGGER_MODE] == 0u) {
+    if (mode != (uint16_t)SCOPE_TRIGGERED || request[from + TRIGGER_MODE] == 0u) {
         take_all(s, rows);
     } else if (!take_trigger(s, request + from, rows)) {
         return 0;
     } else {
         /* it waits for the trigger */
     }
-    s->state = state;
+    s->mode = mode;
     return 1;
 }
 
@@ -142,7 +142,7 @@ static uint16_t offset_of(const int16_t *at)
 uint8_t *scope_put(const scope_t *s, uint8_t *at)
 {
     uint16_t factor = (uint16_t)(s->periods - 1u);
-    at[0] = (uint8_t)s->state;
+    at[0] = (uint8_t)s->mode;
     at[1] = (uint8_t)s->channels;
     at[2] = (uint8_t)factor;
     at[3] = (uint8_t)(factor >> 8);

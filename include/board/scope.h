@@ -14,11 +14,11 @@ typedef enum {
     SCOPE_IDLE,
     SCOPE_TRIGGERED, /**< records, or waits for the trigger */
     SCOPE_AUTO       /**< records at once */
-} scope_state_t;
+} scope_mode_t;
 
-/** The scope. The background changes it in SCOPE_IDLE only, and the state last. */
+/** The scope. The background changes it in SCOPE_IDLE only, and the mode last. */
 typedef struct {
-    volatile uint16_t state;                     /**< scope_state_t; the control interrupt ends it */
+    volatile uint16_t mode;                      /**< scope_mode_t; the control interrupt ends it */
     uint16_t wait, periods;                      /**< until the next row, and from row to row */
     int16_t *at, *end;                           /**< where the next row goes, and the end of the last one in the ring */
     uint16_t words;                              /**< of a row */
@@ -70,7 +70,7 @@ QM_INLINE void scope_row(scope_t *s, int16_t *begin)
             return;
         }
     } else if (--s->left == 0u && s->after == 0u) {
-        s->state = (uint16_t)SCOPE_IDLE;
+        s->mode = (uint16_t)SCOPE_IDLE;
     } else {
         /* it records */
     }
@@ -81,7 +81,7 @@ QM_INLINE void scope_row(scope_t *s, int16_t *begin)
 /** The last work of a period. @param begin of the array */
 QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
 {
-    if (s->state == (uint16_t)SCOPE_IDLE) {
+    if (s->mode == (uint16_t)SCOPE_IDLE) {
         return;
     }
     if (--s->wait == 0u) {
