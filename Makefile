@@ -161,6 +161,11 @@ live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor an
 setup-live:
 	@tools/setup/prepare.sh live
 
+.PHONY: live-pictures
+live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
+	@+$(MAKE) vboard
+	@$(alone) $(python) -m tools.live.pictures
+
 # Each motor with the header that the tuner writes for it.
 drawn_from = $(tuner) tune --all --brief >/dev/null
 drawn = $(if $(SEED),--seed $(call quoted,$(SEED))) $(if $(CASE),--case $(call quoted,$(CASE))) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(out)

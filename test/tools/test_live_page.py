@@ -86,9 +86,9 @@ def turning(chromium, server) -> Page:
     """The page with a motor that turns, as the test before has left it if it did; the potentiometer at its left end."""
     page = Page(chromium[0], server.url)
     page.one("#pot").send_keys(HOME)
-    if page.frame()["state"] != "CLOSED":
+    if page.frame()["state"] == "STOPPED":
         page.click("[data-button=S2]")
-        page.state("CLOSED")
+    page.state("CLOSED")
     return page
 
 
