@@ -9,7 +9,7 @@ packages=""
 for pair in "$@"; do
     name=${pair%%=*}
     case $name in
-        module:*) "$(cat build/setup/python)" -c "import ${name#module:}" 2>/dev/null ;;
+        module:*) "$(cat build/setup/python 2>/dev/null || echo python3)" -c "import ${name#module:}" 2>/dev/null ;;
         *) command -v "$name" >/dev/null ;;
     esac || packages="$packages ${pair#*=}"
 done

@@ -128,7 +128,9 @@ def test_keys_work_the_board_as_the_mouse_does(page):
 
 def test_a_limit_says_what_holds_the_output_back_and_what_to_do(turning):
     turning.one("#pot").send_keys(END)
-    turning.wait("return [...document.querySelectorAll('#limits b')].some((b) => b.textContent === 'RAMP' && b.title.includes('SPEEDREFRAMP'))", "no limit")
+    turning.slide("load.constant_nm", 0.04)
+    turning.wait("return [...document.querySelectorAll('#limits b')].some((b) => b.textContent === 'VOLTAGE' && b.title.includes('raise the bus'))", "no limit")
+    turning.slide("load.constant_nm", 0.0)
 
 
 def test_curves_rotor_and_planes_are_drawn(turning):
