@@ -18,13 +18,19 @@
 #define SWITCH(bit, on) \
     do { \
         if (on) { \
-            bit = 1; \
+            (bit) = 1; \
         } else { \
-            bit = 0; \
+            (bit) = 0; \
         } \
     } while (0)
 #define COUNT_MS 100u
 #define LEAST_TICKS PARAM_PERIODS(0.097F) /* of a tenth of a second: 3 % less */
+
+/** What the background's checks remember of the drive. */
+typedef struct {
+    deviation_t deviation;
+    overload_t overload;
+} judged_t;
 
 drive_t board_drive;
 panel_t board_panel;
@@ -36,8 +42,7 @@ remote_t scope_command;
 static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick; /* drive ticks at the last check */
 static uint16_t silent_ms;       /* timer 1 milliseconds without a control interrupt */
-static deviation_t deviation;
-static overload_t overload;
+static judged_t judged;
 static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
 
 void firmware_trip(drive_fault_t fault)
@@ -137,14 +142,14 @@ QM_INLINE void firmware_supervise(void)
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
     record_tick();
-    firmware_find(deviation_phases(&deviation, &board_drive, &board_params));
+    firmware_find(deviation_phases(&judged.deviation, &board_drive, &board_params));
 }
 
 /** What a millisecond's look at the drive finds wrong. */
 QM_INLINE void firmware_judge(uint16_t elapsed_ms)
 {
-    firmware_find(deviation_tick(&deviation, &board_drive, &board_params));
-    if (overload_tick(&overload, &board_drive, &board_params, elapsed_ms)) {
+    firmware_find(deviation_tick(&judged.deviation, &board_drive, &board_params));
+    if (overload_tick(&judged.overload, &board_drive, &board_params, elapsed_ms)) {
         firmware_trip(FAULT_OVERTEMPERATURE);
     }
 }

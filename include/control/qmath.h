@@ -59,8 +59,8 @@ QM_INLINE int16_t qm_hi(int32_t x)
 /** x / 32768, rounded to the nearest. @param x below 2^30 - 16384 */
 QM_INLINE int16_t qm_round_q15(int32_t x)
 {
-    int32_t twice = x + x;
-    return qm_hi(twice + 32768);
+    int32_t doubled = x + x; /* a step of its own, for the compiler has its own order of 2 * x + 32768 */
+    return qm_hi(doubled + 32768);
 }
 
 /** Upper word of the signed product: a*b/65536. */
@@ -158,7 +158,7 @@ QM_INLINE QM_WRAPS uint16_t qm_clear_of(int32_t x, int32_t most)
 /** most with the sign of x. @param most not negative */
 QM_INLINE int16_t qm_with_sign(int16_t most, int16_t x)
 {
-    int16_t sign = (int16_t)(x >> 15); /* 0 or -1 */
+    int16_t sign = qm_hi(x); /* 0 or -1 */
     return (int16_t)((most ^ sign) - sign);
 }
 
