@@ -10,6 +10,7 @@
 #include "board/watch.h"
 #include "drive/deviation.h"
 #include "drive/overload.h"
+#include "drive/remote.h"
 #include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
@@ -19,6 +20,9 @@
 drive_t board_drive;
 panel_t board_panel;
 retry_t board_retry;
+#if SCOPE
+remote_t scope_command;
+#endif
 
 static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;          /* drive ticks at the last check */
@@ -47,6 +51,9 @@ void firmware_init(void)
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
     retry_init(&board_retry);
+#if SCOPE
+    remote_init(&scope_command);
+#endif
     drive_init(&board_drive, &board_params); /* before anything can trap */
     board_clock_failed = 0;
     if (clock_init()) { /* the trap may have said so before */
@@ -136,6 +143,9 @@ void firmware_background(void)
         in.s2_down = BOARD_S2_DOWN();
         in.s3_down = BOARD_S3_DOWN();
         in.elapsed_ms = elapsed_ms;
+#if SCOPE
+        in.remote = &scope_command;
+#endif
         lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
         retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         BOARD_LED_ALIVE = lights.led_alive & 1u;

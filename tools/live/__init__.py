@@ -1,1 +1,1 @@
-"""make live: a page in the browser at which somebody works with the virtual board, or watches a real one."""
+"""A firmware that runs, seen from outside: the client on its serial line, the virtual board in real time, and the page in the browser."""

@@ -2,9 +2,9 @@
 # Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
 #
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib; if it can be had, dygraphs for the curves of a run's page
-#   tools/setup/prepare.sh live    the same, and aiohttp
-#   tools/setup/prepare.sh tune    the first, with openpyxl
+#   tools/setup/prepare.sh tune    the same, and openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
+#   tools/setup/prepare.sh live    the third, with pyserial and aiohttp
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby), INSTALL=no (install nothing, say what is missing).
@@ -93,22 +93,20 @@ case $job in
         modules="$modules openpyxl"
         python_packages="$python_packages python3-openpyxl"
         ;;
-    target) ;;
-    live) ;;
-    *) give_up "prepare.sh, '$job': name the job, run, live, tune, target or test" ;;
+    target | live) ;;
+    *) give_up "prepare.sh, '$job': name the job, run, tune, target, live or test" ;;
 esac
 
 case $job in
-    target | test)
+    target | test | live)
         modules="$modules elftools intelhex"
         python_packages="$python_packages python3-pyelftools python3-intelhex"
         ;;
 esac
-
 case $job in
     live | test)
-        modules="$modules aiohttp"
-        python_packages="$python_packages python3-aiohttp"
+        modules="$modules serial aiohttp"
+        python_packages="$python_packages python3-serial python3-aiohttp"
         ;;
 esac
 
@@ -117,7 +115,7 @@ if [ "$job" = test ]; then
     python_packages="$python_packages python3-pytest"
 fi
 
-pips=$(echo "$modules" | sed 's/elftools/pyelftools/') # names that pip knows
+pips=$(echo "$modules" | sed 's/elftools/pyelftools/; s/serial/pyserial/') # names that pip knows
 
 mkdir -p $state 2>/dev/null || give_up "set-up, $state: cannot be written, check the folder's permissions"
 look
