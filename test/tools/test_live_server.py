@@ -13,8 +13,8 @@ from pathlib import Path
 
 import aiohttp
 import pytest
-from live_support import served
-from support import LIBRARY, document
+from live_support import parts, served
+from support import document
 
 from tools.bench import scenario_file
 from tools.common import paths
@@ -161,7 +161,7 @@ def test_a_scenario_and_a_csv_are_saved_or_refused_in_one_line(server):
 
 # ---- command line ----------------------------------------------------------------------------------------------------------
 def said(*arguments: str) -> tuple[int, str, str]:
-    done = subprocess.run([sys.executable, "-m", "tools.live", "--library", str(LIBRARY), *arguments], cwd=paths.ROOT, capture_output=True, text=True,
+    done = subprocess.run([sys.executable, "-m", "tools.live", "--library", str(parts().library.path), *arguments], cwd=paths.ROOT, capture_output=True, text=True,
                           timeout=20, check=False)
     return done.returncode, done.stdout, done.stderr
 

@@ -4,6 +4,7 @@ import argparse
 import asyncio
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tools.bench import command_common
 from tools.bench.scenario import Scenario
@@ -12,6 +13,9 @@ from tools.common import command_line
 from tools.common.errors import UserError
 
 from .pace import PACES
+
+if TYPE_CHECKING:
+    from . import board
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -29,15 +33,28 @@ def _parser() -> argparse.ArgumentParser:
 
 def _live(options: argparse.Namespace) -> int:
     from . import server # what only this needs: aiohttp
+    from .board import SCOPE
     from .recording import Origin
+    from .symbols import variables
     from .virtual_board import VirtualBoard
     pace, port = _pace(options.pace), _port(options.listen)
+    parts = _parts(options)
     defines = command_common.macros(options.defines)
-    motor, board, library, _ = command_common.set_up(Scenario("live", "", "", MOTOR, "", 0.0), options, defines)
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
-    origin = Origin(motor, board, defines, words)
-    asyncio.run(server.serve(lambda: VirtualBoard(library, origin), port, pace, _tell))
+    origin = Origin(parts.motor, parts.board, defines + [SCOPE] * (SCOPE not in defines), words)
+    symbols = variables(parts.symbols)
+    asyncio.run(server.serve(lambda: VirtualBoard(parts.library, origin, symbols), port, pace, _tell))
     return 0
+
+
+def _parts(options: argparse.Namespace) -> "board.Parts":
+    """Motor, board and firmware; with --library that one, which its ELF file lies beside."""
+    from . import board
+    if options.library is None:
+        return board.parts(options.motor, options.board, options.defines, options.userparams)
+    motor, board_part = command_common.parts_of(Scenario("live", "", "", MOTOR, "", 0.0), options)
+    library = command_common.library_for([], options.library, options.userparams)
+    return board.Parts(motor, board_part, library, None, options.library.with_name("foc33.elf"))
 
 
 def _tell(url: str) -> None:

@@ -20,7 +20,7 @@ LONGEST_S = 30.0
 @contextlib.contextmanager
 def _page(driver: Any) -> Iterator[None]:
     """A board of its own, and the page."""
-    command = [sys.executable, "-m", "tools.live", "--library", "build/host/libvboard.so", "--listen", "0"]
+    command = [sys.executable, "-m", "tools.live", "--listen", "0"]
     with subprocess.Popen(command, cwd=paths.ROOT, stdout=subprocess.PIPE, text=True) as process:
         try:
             driver.get(process.stdout.readline().split()[1])

@@ -49,6 +49,8 @@ class Server:
         self.loop = asyncio.get_running_loop()
         self.over = asyncio.Event()
         self.pacemaker = Pacemaker(bench, self.publish, pace)
+        bench.start(self.publish)
+        bench.paced(pace)
 
     @property
     def url(self) -> str:
@@ -121,7 +123,9 @@ class Server:
         """One command; what is wrong with it goes back to this tab only."""
         try:
             command = json.loads(text)
-            if isinstance(command, dict) and set(command) == {"pace"}:
+            if isinstance(command, dict) and set(command) == {"scope"} and self.bench.scope is not None:
+                self.bench.scope.ask(command["scope"])
+            elif isinstance(command, dict) and set(command) == {"pace"}:
                 await self._ask(lambda: self._set_pace(command["pace"]))
             else:
                 await self._ask(lambda: self.bench.act(command, tab))
@@ -161,7 +165,8 @@ async def serve(make_bench: Any, port: int | None, pace: float, tell: Any) -> No
         await asyncio.sleep(0.1) # the tabs hear of the board's end
         for tab in list(server.tabs):
             await tab.socket.close()
-        await asyncio.get_running_loop().run_in_executor(None, server.pacemaker.end)
+        await server.loop.run_in_executor(None, server.pacemaker.end)
+        await server.loop.run_in_executor(None, server.bench.end)
     finally:
         await runner.cleanup()
     if server.pacemaker.error is not None:
