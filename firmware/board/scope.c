@@ -18,7 +18,7 @@
 #define TYPE_WIDTH 0x1Fu
 #define VERSION 0x82u
 
-int16_t board_scope_array[SCOPE_ARRAY_WORDS + SCOPE_USUAL_WORDS];
+int16_t board_scope_array[SCOPE_ARRAY_WORDS];
 
 static uint16_t word_at(const uint8_t *at)
 {
@@ -49,9 +49,6 @@ static uint16_t take_channels(scope_t *s, const uint8_t *at)
         for (n = 0; n < words; n++) {
             s->source[s->words++] = first + n;
         }
-    }
-    for (n = s->words; n < SCOPE_WORDS; n++) {
-        s->source[n] = s->source[0];
     }
     return (uint16_t)(s->words != 0u);
 }

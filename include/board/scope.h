@@ -5,8 +5,8 @@
 #include "board/modes/scope_room.h"
 #include "control/qmath.h"
 
-#define SCOPE_WORDS 8u       /* of a row: 16-bit variables; a 32-bit one takes two */
-#define SCOPE_USUAL_WORDS 4u /* copied in one go, a shorter row too */
+#define SCOPE_WORDS 8u /* of a row: 16-bit variables; a 32-bit one takes two */
+#define SCOPE_USUAL_WORDS 4u
 #define SCOPE_ARRAY_WORDS (SCOPE_BYTES / 2u)
 
 /** What it does, as clients know it. */
@@ -29,7 +29,7 @@ typedef struct {
     uint16_t flip;                               /**< bits that turn "falls to" or "unsigned" into "rises to" and "signed" */
     int16_t level;                               /**< flipped */
     uint16_t was_below;                          /**< 1: the next value that is not below the level is the trigger */
-    const volatile int16_t *source[SCOPE_WORDS]; /**< of each word; those that a row does not need are the first one again */
+    const volatile int16_t *source[SCOPE_WORDS]; /**< of each word */
     const int16_t *event;                        /**< the trigger's row */
     int16_t delay;                               /**< bytes that are kept from before the trigger; negative: left out after it */
     uint16_t channels;
@@ -51,19 +51,25 @@ QM_INLINE uint16_t scope_fires(scope_t *s)
     return 1;
 }
 
-/** A row. Four words in a straight line are quicker than a loop of fewer. @param begin of the array */
+/** A row. The usual one is copied in a straight line, others in a loop. @param begin of the array */
 QM_INLINE void scope_row(scope_t *s, int16_t *begin)
 {
+    const volatile int16_t *const *source = s->source;
     int16_t *at = s->at;
-    at[0] = *s->source[0];
-    at[1] = *s->source[1];
-    at[2] = *s->source[2];
-    at[3] = *s->source[3];
-    if (s->words > SCOPE_USUAL_WORDS) {
-        at[4] = *s->source[4];
-        at[5] = *s->source[5];
-        at[6] = *s->source[6];
-        at[7] = *s->source[7];
+    if (s->words == SCOPE_USUAL_WORDS) {
+        at[0] = *source[0];
+        at[1] = *source[1];
+        at[2] = *source[2];
+        at[3] = *source[3];
+        at += SCOPE_USUAL_WORDS;
+    } else {
+        uint16_t left = s->words;
+        do {
+            *at = **source;
+            at++;
+            source++;
+            left--;
+        } while (left != 0u);
     }
     if (s->left == 0u && !scope_fires(s)) {
         if (s->stays) {
@@ -74,7 +80,6 @@ QM_INLINE void scope_row(scope_t *s, int16_t *begin)
     } else {
         /* it records */
     }
-    at += s->words;
     s->at = (at == s->end) ? begin : at;
 }
 
@@ -92,8 +97,8 @@ QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
 
 #if SCOPE
 
-/** Rows go here; behind its end is room for the words that a short last row does not need. */
-extern int16_t board_scope_array[SCOPE_ARRAY_WORDS + SCOPE_USUAL_WORDS];
+/** Rows go here. */
+extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
 
 /** A request to record, as it stands in a frame: state, channels, periods between rows, channels, trigger. Without channels the scope stops.
  *  @return 1 if it was understood; else nothing has changed but that a running record has ended */

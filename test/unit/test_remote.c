@@ -128,6 +128,30 @@ void test_a_client_that_leaves_stops_its_run(void)
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
 }
 
+void test_mode_and_target_without_a_lease_are_no_command(void)
+{
+    client(REMOTE_TARGET, 1, 6000);
+    command.lease_ms = 0;
+    panel_ms(5);
+    TEST_ASSERT_EQUAL_UINT16(0, command.is_taken);
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
+    TEST_ASSERT_NOT_EQUAL(6000, drive.command.target_erpm);
+    attended_ms(5); /* the lease begins: what stood there before is no start */
+    TEST_ASSERT_EQUAL_UINT16(1, command.is_taken);
+    TEST_ASSERT_EQUAL_INT16(6000, drive.command.target_erpm);
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
+}
+
+void test_a_client_that_takes_over_without_a_wish_to_run_stops(void)
+{
+    press_s2(40);
+    panel_and_drive_ms(5);
+    TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
+    client(REMOTE_TARGET, 0, 6000);
+    attended_ms(2);
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
+}
+
 void test_a_run_of_s2_outlives_the_client(void)
 {
     press_s2(40);
@@ -155,7 +179,7 @@ void test_an_unknown_mode_is_the_panels(void)
     client(REMOTE_MODE_COUNT, 1, 6000);
     attended_ms(3);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
-    TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
+    TEST_ASSERT_EQUAL_UINT16(0, command.is_taken);
 }
 
 /** Whoever stands at the board has the last word. */
@@ -169,8 +193,10 @@ void test_s2_takes_the_command_and_stops(void)
     attended_ms(5);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
+    client(REMOTE_TARGET, 1, 6000); /* the client may come back, but its old wish starts nothing */
+    attended_ms(20);
+    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
     command.run = 0;
-    client(REMOTE_TARGET, 0, 6000); /* the client may come back */
     attended_ms(2);
     command.run = 1;
     attended_ms(2);

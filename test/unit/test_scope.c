@@ -7,6 +7,7 @@
 
 static uint8_t setting[100];
 static uint16_t setting_size;
+static uint8_t channels = 4;
 
 static void put_bytes(const uint8_t *bytes, uint16_t count)
 {
@@ -16,12 +17,12 @@ static void put_bytes(const uint8_t *bytes, uint16_t count)
 #define put(...) put_bytes((const uint8_t[]){ __VA_ARGS__ }, sizeof((const uint8_t[]){ __VA_ARGS__ }))
 
 /** The begin of a setting: service, parameter, state, channels, periods less one; and its channels, neighbours of `bytes` each. */
-static void set_channels(uint8_t state, uint8_t channels, uint16_t factor, uint8_t bytes)
+static void set_channels(uint8_t state, uint8_t count, uint16_t factor, uint8_t bytes)
 {
     uint16_t n;
     setting_size = 0;
-    put(18, 1, 0, state, channels, LOW(factor));
-    for (n = 0; n < channels; n++) {
+    put(18, 1, 0, state, count, LOW(factor));
+    for (n = 0; n < count; n++) {
         put(0, LONG(ADDRESS(variable[0]) + n * bytes), bytes);
     }
 }
@@ -37,9 +38,9 @@ static uint8_t start(void)
     return rig_ask_of(setting, setting_size);
 }
 
-static uint8_t record(uint8_t channels, uint16_t factor)
+static uint8_t record(uint8_t count, uint16_t factor)
 {
-    set_channels(SCOPE_AUTO, channels, factor, 2);
+    set_channels(SCOPE_AUTO, count, factor, 2);
     set_trigger(0x82, 0, 0, 1, 0);
     return start();
 }
@@ -105,7 +106,6 @@ void test_four_channels_are_recorded_until_the_array_is_full(void)
 /** Rows of any length: whole ones, and nothing behind the array. */
 void test_one_to_eight_channels(void)
 {
-    uint8_t channels;
     for (channels = 1; channels <= 8u; channels++) {
         uint16_t n, rows = (uint16_t)(SCOPE_ARRAY_WORDS / channels);
         TEST_ASSERT_EQUAL_UINT8(0, record(channels, 0));
@@ -120,7 +120,7 @@ void test_one_to_eight_channels(void)
             TEST_ASSERT_EQUAL_INT(0, memcmp(&variable[1], &board_scope_array[n * channels + 1u], 2u * channels - 2u));
         }
     }
-    TEST_ASSERT_EQUAL_HEX16(0x1111, board_scope_array[SCOPE_ARRAY_WORDS + 3u]);
+    channels = 4;
 }
 
 void test_a_long_variable_takes_two_words(void)
@@ -145,19 +145,19 @@ void test_a_row_every_so_many_periods(void)
     for (n = 0; n < 10; n++) {
         TEST_ASSERT_EQUAL_INT16(3 * n, board_scope_array[n]);
     }
-    TEST_ASSERT_EQUAL_INT16(0x1111, board_scope_array[13]); /* the last row has written four words */
+    TEST_ASSERT_EQUAL_INT16(0x1111, board_scope_array[10]);
     TEST_ASSERT_EQUAL_UINT16(SCOPE_AUTO, state());
     TEST_ASSERT_EQUAL_UINT8(2, answered[4]);
 }
 
 /* ---- trigger ---- */
 
-/** Starts with a trigger on 4 channels and lets the variable climb (or fall) from 0 until the scope has ended. @return its value at the end */
+/** Starts with a trigger on the channels and lets the variable climb (or fall) from 0 until the scope has ended. @return its value at the end */
 static int16_t run_to_trigger(uint8_t type, int16_t level, int32_t before_rows, uint8_t rises, int16_t step)
 {
     int16_t value = 0;
-    set_channels(SCOPE_TRIGGERED, 4, 0, 2);
-    set_trigger(type, level, before_rows * 8, rises, 1);
+    set_channels(SCOPE_TRIGGERED, channels, 0, 2);
+    set_trigger(type, level, before_rows * 2 * channels, rises, 1);
     TEST_ASSERT_EQUAL_UINT8(0, start());
     for (value = 0; board_lnet.scope.mode != SCOPE_IDLE; value = (int16_t)(value + step)) {
         TEST_ASSERT_TRUE(value < 30000 && value > -30000);
@@ -170,12 +170,14 @@ static int16_t run_to_trigger(uint8_t type, int16_t level, int32_t before_rows, 
 /** The rows as a client puts them into order: what is kept begins `before` bytes before the trigger's row; without such, at the array's begin. */
 static void expect_rows(int16_t first, int16_t step, uint16_t before_rows)
 {
-    uint16_t rows = (uint16_t)(long_at(26) / 8u), event = (uint16_t)(long_at(18) / 8u), n;
+    uint16_t row = (uint16_t)(2u * channels), rows = (uint16_t)(long_at(26) / row), event = (uint16_t)(long_at(18) / row), n;
+    uint16_t begin = (uint16_t)((uint16_t)(event + rows - before_rows) % rows);
     for (n = 0; n < rows; n++) {
-        uint16_t place = (uint16_t)((n + event + rows - before_rows) % rows);
-        TEST_ASSERT_EQUAL_INT16(first + (int16_t)n * step, board_scope_array[4u * place]);
+        const int16_t *at = &board_scope_array[(uint16_t)(begin + n) % rows * channels];
+        TEST_ASSERT_EQUAL_INT16(first + (int16_t)n * step, at[0]);
+        TEST_ASSERT_EQUAL_INT(0, memcmp(&variable[1], &at[1], row - 2u));
     }
-    TEST_ASSERT_EQUAL_UINT16((uint16_t)(event + rows - before_rows) % rows * 8u, long_at(6)); /* the next row would be the oldest one's place */
+    TEST_ASSERT_EQUAL_UINT16(begin * row, long_at(6)); /* the next row would be the oldest one's place */
 }
 
 void test_the_triggers_row_is_the_first(void)
@@ -188,12 +190,15 @@ void test_the_triggers_row_is_the_first(void)
 
 void test_rows_before_the_trigger_are_kept(void)
 {
-    static const uint16_t kept[] = { 1, 10, 100, SCOPE_ARRAY_WORDS / 4u - 1u };
-    uint16_t n;
-    for (n = 0; n < sizeof kept / sizeof kept[0]; n++) {
-        (void)run_to_trigger(0xA2, 500, kept[n], 1, 1);
-        expect_rows((int16_t)(500 - kept[n]), 1, kept[n]);
+    for (channels = 1; channels <= 8u; channels++) {
+        const uint16_t kept[] = { 1, 10, (uint16_t)(SCOPE_ARRAY_WORDS / channels - 1u) };
+        uint16_t n;
+        for (n = 0; n < sizeof kept / sizeof kept[0]; n++) {
+            (void)run_to_trigger(0xA2, 500, kept[n], 1, 1);
+            expect_rows((int16_t)(500 - kept[n]), 1, kept[n]);
+        }
     }
+    channels = 4;
 }
 
 /** It must not come before the rows that are to be kept are there. */

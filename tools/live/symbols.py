@@ -1,26 +1,36 @@
-"""The firmware's variables by name, as its ELF file has them: address, size and sign of every number in RAM, members of structures included."""
+"""Names, addresses and types of the firmware's variables, from the ELF file of an image or of `make live-board`.
 
-import io
-from collections.abc import Iterator
+    symbols = Symbols.read(Path("build/target/foc33.elf"))
+    symbols.find("board_drive.run.control.i_q13.q")     # Variable(address=..., bytes=2, signed=True)"""
+
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from tools.common import paths
 from tools.common.errors import UserError, suggestion
+from tools.image import attribution
+from tools.image.program import contents, read_elf, reading
 
-RAM = range(0x0800, 0x8000)
-"""Where variables are; above the dsPIC has its window to constants."""
-MOST_ELEMENTS = 32
-"""Of an array that is listed element by element."""
-WRAPPERS = ("DW_TAG_typedef", "DW_TAG_volatile_type", "DW_TAG_const_type")
-SIGNED = (0x05, 0x06)
-"""DW_ATE_signed and signed_char."""
+from .lnet import Channel
+
+try:
+    from elftools.elf.elffile import ELFFile
+except ImportError:
+    pass # program.reading() says so
+
+DSPIC = 118
+RAM = range(0x0800, 0xF800)
+ADDRESS, PLUS = 0x03, 0x23
+"""DW_OP_addr, DW_OP_plus_uconst."""
+SIGNED = (0x05, 0x06, 0x0D)
+"""DW_ATE: signed, signed char, signed fixed."""
+MOST_ELEMENTS = 1024
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that can be read."""
+    """A number in the firmware's memory."""
 
     name: str
     address: int
@@ -28,90 +38,99 @@ class Variable:
     signed: bool
 
     def value(self, data: bytes) -> int:
-        """From memory."""
+        """The number that these bytes are."""
         return int.from_bytes(data[:self.bytes], "little", signed=self.signed)
 
+    def data(self, value: int) -> bytes:
+        """The bytes of a number that fits; a larger one is a mistake."""
+        try:
+            return value.to_bytes(self.bytes, "little", signed=self.signed)
+        except OverflowError:
+            raise UserError(f"{value} does not fit {self.bytes} bytes", self.name, "write a smaller number") from None
 
-def variables(path: Path) -> dict[str, Variable]:
-    """All of them by name."""
-    from elftools.common.exceptions import ELFError
-    from elftools.elf.elffile import ELFFile
-    label = str(paths.shown(path))
-    try:
-        elf = ELFFile(io.BytesIO(path.read_bytes()))
-    except OSError as error:
-        raise UserError(f"cannot read the symbols ({error.strerror})", label, "name the ELF file of the firmware on the board, ELF=file") from None
-    except ELFError:
-        raise UserError("no ELF file", label, "name the one that make firmware has left, ELF=build/target/foc33.elf") from None
-    found = {item.name: item for item in _listed(elf) if item.address in RAM} if elf.has_dwarf_info() else {}
-    if not found:
-        raise UserError("the ELF file has no variables", label, "build it with -g, as make firmware does")
-    return found
+    @property
+    def channel(self) -> Channel:
+        """For the scope, which takes 16 and 32 bits."""
+        if self.bytes not in (2, 4):
+            raise UserError(f"{self.bytes} bytes cannot be recorded", self.name, "choose a variable of two or four")
+        return Channel(self.address, self.bytes, self.signed)
 
 
-def named(known: dict[str, Variable], name: Any) -> Variable:
-    """One of them; a wrong name is refused."""
-    if not isinstance(name, str) or name not in known:
-        raise UserError(f"the firmware has no variable '{name}'", "scope", suggestion(str(name), known))
-    return known[name]
+@dataclass
+class Symbols:
+    """Every number that an ELF file knows, by name: "scope_command.run", "board_params.fieldweak.idref_q13[3]"."""
+
+    variables: dict[str, Variable]
+
+    @staticmethod
+    def read(path: Path) -> "Symbols":
+        """The variables of an ELF file of XC16, or of the PC's."""
+        with reading("ELF", path):
+            found: dict[str, Variable] = {}
+            for unit in _dwarf(path).iter_CUs():
+                for die in unit.iter_DIEs():
+                    place = die.attributes.get("DW_AT_location") if die.tag == "DW_TAG_variable" else None
+                    if place is not None and isinstance(place.value, (list, bytes)) and len(place.value) > 2 and place.value[0] == ADDRESS:
+                        address = int.from_bytes(bytes(place.value[1:]), "little")
+                        if address in RAM:
+                            found |= {item.name: item for item in _numbers(_declared(die), _name(die), address)}
+        return Symbols(found)
+
+    def find(self, name: str) -> Variable:
+        """A variable by its name."""
+        if name not in self.variables:
+            raise UserError(f"the firmware has no variable '{name}'", "", suggestion(name, self.variables))
+        return self.variables[name]
 
 
-def _listed(elf: Any) -> Iterator[Variable]:
-    for unit in elf.get_dwarf_info().iter_CUs():
-        for entry in unit.get_top_DIE().iter_children():
-            if entry.tag != "DW_TAG_variable" or "DW_AT_location" not in entry.attributes:
-                continue
-            place = entry.attributes["DW_AT_location"].value
-            declared = entry.get_DIE_from_attribute("DW_AT_specification") if "DW_AT_specification" in entry.attributes else entry
-            if isinstance(place, list) and place and place[0] == 0x03 and {"DW_AT_type", "DW_AT_name"} <= declared.attributes.keys(): # DW_OP_addr
-                yield from _numbers(_name(declared), int.from_bytes(bytes(place[1:]), "little"), declared.get_DIE_from_attribute("DW_AT_type"))
+def _dwarf(path: Path) -> Any:
+    data = contents("ELF", path)
+    elf = ELFFile(BytesIO(data))
+    return attribution.dwarf_info(read_elf(path, data).debug) if elf["e_machine"] == DSPIC else elf.get_dwarf_info()
 
 
-def _numbers(name: str, address: int, kind: Any) -> Iterator[Variable]:
-    """A number, or the numbers in a structure or an array."""
-    while kind.tag in WRAPPERS and "DW_AT_type" in kind.attributes:
-        kind = kind.get_DIE_from_attribute("DW_AT_type")
-    if kind.tag in ("DW_TAG_base_type", "DW_TAG_enumeration_type"):
-        size = kind.attributes["DW_AT_byte_size"].value
-        if size in (1, 2, 4):
-            yield Variable(name, address, size, "DW_AT_encoding" in kind.attributes and kind.attributes["DW_AT_encoding"].value in SIGNED)
-    elif kind.tag in ("DW_TAG_structure_type", "DW_TAG_union_type"):
+def _declared(die: Any) -> Any:
+    """A variable that was declared before has its name and type there."""
+    return die.get_DIE_from_attribute("DW_AT_specification") if "DW_AT_specification" in die.attributes else die
+
+
+def _name(die: Any) -> str:
+    found = _declared(die).attributes.get("DW_AT_name")
+    return found.value.decode() if found else "?"
+
+
+def _numbers(die: Any, path: str, address: int):
+    """Each number in a variable or member."""
+    kind = attribution.type_of(die)
+    if kind is None:
+        return
+    if kind.tag == "DW_TAG_structure_type":
         for member in kind.iter_children():
-            if member.tag == "DW_TAG_member" and "DW_AT_bit_size" not in member.attributes and "DW_AT_name" in member.attributes:
-                yield from _numbers(f"{name}.{_name(member)}", address + _offset(member), member.get_DIE_from_attribute("DW_AT_type"))
+            if member.tag == "DW_TAG_member" and "DW_AT_bit_size" not in member.attributes:
+                yield from _numbers(member, f"{path}.{_name(member)}", address + _offset(member))
     elif kind.tag == "DW_TAG_array_type":
-        yield from _elements(name, address, kind)
+        yield from _elements(kind, path, address)
+    elif kind.tag in ("DW_TAG_base_type", "DW_TAG_enumeration_type", "DW_TAG_pointer_type"):
+        size = kind.attributes["DW_AT_byte_size"].value if "DW_AT_byte_size" in kind.attributes else 2
+        encoding = kind.attributes.get("DW_AT_encoding")
+        yield Variable(path, address, size, encoding is not None and encoding.value in SIGNED)
 
 
-def _elements(name: str, address: int, kind: Any) -> Iterator[Variable]:
-    counts = [child.attributes["DW_AT_upper_bound"].value + 1 for child in kind.iter_children()
-              if child.tag == "DW_TAG_subrange_type" and isinstance(getattr(child.attributes.get("DW_AT_upper_bound"), "value", None), int)]
-    element = kind.get_DIE_from_attribute("DW_AT_type")
-    size = _size(element)
-    if len(counts) == 1 and size and counts[0] <= MOST_ELEMENTS:
-        for number in range(counts[0]):
-            yield from _numbers(f"{name}[{number}]", address + number * size, element)
-
-
-def _size(kind: Any) -> int:
-    """0 where it is not known."""
-    while kind.tag in WRAPPERS and "DW_AT_type" in kind.attributes:
-        kind = kind.get_DIE_from_attribute("DW_AT_type")
-    return kind.attributes["DW_AT_byte_size"].value if "DW_AT_byte_size" in kind.attributes else 0
+def _elements(array: Any, path: str, address: int):
+    counts = [child.attributes["DW_AT_upper_bound"].value + 1 for child in array.iter_children() if "DW_AT_upper_bound" in child.attributes]
+    if len(counts) != 1: # none of the firmware's has two dimensions
+        return
+    element = attribution.type_of(array)
+    size = element.attributes["DW_AT_byte_size"].value if element is not None and "DW_AT_byte_size" in element.attributes else 2
+    for index in range(min(counts[0], MOST_ELEMENTS)):
+        yield from _numbers(array, f"{path}[{index}]", address + index * size)
 
 
 def _offset(member: Any) -> int:
-    """Of a member; DWARF 2, as XC16 writes it, has it as an expression: DW_OP_plus_uconst."""
-    if "DW_AT_data_member_location" not in member.attributes:
+    place = member.attributes.get("DW_AT_data_member_location")
+    if place is None or isinstance(place.value, int):
+        return place.value if place is not None else 0
+    value = bytes(place.value)
+    if value[:1] != bytes([PLUS]):
         return 0
-    place = member.attributes["DW_AT_data_member_location"].value
-    if isinstance(place, int):
-        return place
-    value = 0
-    for shift, byte in enumerate(place[1:]):
-        value |= (byte & 0x7F) << 7 * shift
-    return value
-
-
-def _name(entry: Any) -> str:
-    return entry.attributes["DW_AT_name"].value.decode()
+    return sum((byte & 0x7F) << 7 * number for number, byte in enumerate(value[1:]))

@@ -10,7 +10,7 @@
 #define REACHED __attribute__((section("fw_ram")))
 
 extern lnet_t board_lnet REACHED;
-extern int16_t board_scope_array[SCOPE_ARRAY_WORDS + SCOPE_USUAL_WORDS] REACHED;
+extern int16_t board_scope_array[SCOPE_ARRAY_WORDS] REACHED;
 
 #include "unity.h"
 
