@@ -27,7 +27,7 @@ def origin() -> Origin:
 
 def bench() -> VirtualBoard:
     """A board without the scope's thread."""
-    return VirtualBoard(parts().library, origin(), symbols.variables(parts().symbols))
+    return VirtualBoard(parts().library, origin(), symbols.Symbols.read(parts().symbols))
 
 
 def passes(board: VirtualBoard, seconds: float) -> dict:

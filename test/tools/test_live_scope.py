@@ -14,26 +14,12 @@ from tools.live.scale import RAW, scale_of
 from tools.live.scope import USUAL
 from tools.live.virtual_board import VirtualBoard
 
-KNOWN = symbols.variables(parts().symbols)
+SYMBOLS = symbols.Symbols.read(parts().symbols)
+KNOWN = SYMBOLS.variables
 I_Q, ANGLE, SPEED = "board_drive.run.control.i_q13.q", "board_drive.angle", "board_drive.run.estimator.omega_erpm"
 
 
 # ---- names and units -------------------------------------------------------------------------------------------------------
-def test_every_number_of_the_firmware_has_its_name_size_and_sign():
-    assert KNOWN[I_Q].bytes == 2 and KNOWN[I_Q].signed and KNOWN["board_drive.run.control.pi_q.sum"].bytes == 4
-    assert KNOWN[ANGLE].signed is False and KNOWN["board_drive.run.phase_sums[2]"].address == KNOWN["board_drive.run.phase_sums[0]"].address + 4
-    assert {"ParkParm.qIq", "EstimParm.qRho", "scope_command.lease_ms"} <= KNOWN.keys() and set(USUAL) <= KNOWN.keys()
-    addresses = sorted((item.address, item.bytes) for item in KNOWN.values())
-    assert all(address + size <= following for (address, size), (following, _) in zip(addresses, addresses[1:]))
-
-
-def test_a_file_that_is_no_elf_or_is_not_there_is_refused_in_one_line(tmp_path):
-    (tmp_path / "text.elf").write_text("no", encoding="utf-8")
-    refusal(lambda: symbols.variables(tmp_path / "text.elf"), "no ELF file", "make firmware")
-    refusal(lambda: symbols.variables(tmp_path / "none.elf"), "cannot read the symbols", "ELF=file")
-    refusal(lambda: symbols.named(KNOWN, "board_drive.stat"), "did you mean 'board_drive.state'?")
-
-
 def test_scales_are_those_that_the_virtual_board_has_for_the_same_quantity():
     board = bench()
     params, names = board.library.params, {"ParkParm.qIq": "A", I_Q: "A", "ParkParm.qVd": "V", "board_drive.run.control.v_q14.d": "V", ANGLE: "°",
@@ -50,7 +36,7 @@ class Living:
 
     def __init__(self) -> None:
         self.messages: list[dict] = []
-        self.board = VirtualBoard(parts().library, origin(), KNOWN)
+        self.board = VirtualBoard(parts().library, origin(), SYMBOLS)
         self.maker = Pacemaker(self.board, lambda frame: None)
         self.board.start(self.messages.append)
         for command in ({"set": ["input.pot", 0.5]}, {"press": "S2"}, {"release": "S2"}):
@@ -138,7 +124,7 @@ def test_a_power_up_meanwhile_does_not_end_the_scope(living):
 
 @pytest.mark.parametrize("wish, part", [
     ({"channels": []}, "no channel"), ({"channels": ["nothing"]}, "no variable 'nothing'"), ({"channels": [["x"]]}, "no variable"), ({"channels": [I_Q] * 9}, "9 words"),
-    ({"channels": ["board_lnet.sum"]}, "8 bits"), ({"trigger": "board_drive.bus_q31"}, "has not 16"), ({"mode": "always"}, "choose one of auto"),
+    ({"channels": ["board_lnet.sum"]}, "neither 16 nor 32"), ({"trigger": "board_drive.bus_q31"}, "has not 16"), ({"mode": "always"}, "choose one of auto"),
     ({"factor": 0}, "choose 1 .. 1000"), ({"position": 1.5}, "choose 0 .. 1"), ({"level": "high"}, "'level' = high"), ({"more": 1}, "no setup")])
 def test_a_setup_that_makes_no_sense_is_refused_in_one_line(living, wish, part):
     before = living.board.scope.setup

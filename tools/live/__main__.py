@@ -35,14 +35,14 @@ def _live(options: argparse.Namespace) -> int:
     from . import server # what only this needs: aiohttp
     from .board import SCOPE
     from .recording import Origin
-    from .symbols import variables
+    from .symbols import Symbols
     from .virtual_board import VirtualBoard
     pace, port = _pace(options.pace), _port(options.listen)
     parts = _parts(options)
     defines = command_common.macros(options.defines)
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
     origin = Origin(parts.motor, parts.board, defines + [SCOPE] * (SCOPE not in defines), words)
-    symbols = variables(parts.symbols)
+    symbols = Symbols.read(parts.symbols)
     asyncio.run(server.serve(lambda: VirtualBoard(parts.library, origin, symbols), port, pace, _tell))
     return 0
 

@@ -12,12 +12,14 @@ from tools.common.errors import UserError
 
 from . import lnet
 from .scale import scale_of
-from .symbols import Variable, named
+from .symbols import Symbols, Variable
 
 MODES = ("auto", "normal", "single", "stop")
 """auto: without a trigger for a while a trace comes all the same; normal: only with one; single: one trace, then stop."""
 AUTO_S = 0.4
 POLL_S = 0.02
+WIDTHS = (2, 4)
+"""Bytes that it records."""
 AGAIN_S = 0.5
 """After an error of the link."""
 MOST_FACTOR = 1000
@@ -44,10 +46,10 @@ class Setup:
 class Scope(threading.Thread):
     """`open_link` makes the link, `publish` gets messages for the pages. `beat` runs between two requests: other work that needs the link."""
 
-    def __init__(self, open_link: Callable[[], lnet.Lnet], variables: dict[str, Variable], params: Mapping[str, float], publish: Callable[[dict], None],
+    def __init__(self, open_link: Callable[[], lnet.Lnet], symbols: Symbols, params: Mapping[str, float], publish: Callable[[dict], None],
                  beat: Callable[[lnet.Lnet], None] = lambda link: None) -> None:
         super().__init__(name="scope", daemon=True)
-        self.open_link, self.variables, self.params, self.publish, self.beat = open_link, variables, params, publish, beat
+        self.open_link, self.symbols, self.params, self.publish, self.beat = open_link, symbols, params, publish, beat
         self.period_s = params["LOOPTIME_SEC"]
         self.setup: Setup | None = None
         self.link: lnet.Lnet | None = None
@@ -60,12 +62,12 @@ class Scope(threading.Thread):
 
     def first(self) -> dict[str, Any]:
         """What the page shows before anybody has chosen."""
-        names = [name for name in USUAL if name in self.variables] or list(self.variables)[:1]
+        names = [name for name in USUAL if name in self.symbols.variables] or list(self.symbols.variables)[:1]
         return {"channels": names, "trigger": names[0], "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "stop"}
 
     def hello(self) -> dict[str, Any]:
         """For a new tab: every variable that it can record, and what is set up."""
-        units = {name: scale_of(name, self.params).unit for name, item in self.variables.items() if item.bytes > 1}
+        units = {name: scale_of(name, self.params).unit for name, item in self.symbols.variables.items() if item.bytes in WIDTHS}
         return {"variables": units, "period_s": self.period_s, "most_words": lnet.MOST_WORDS, **self.told, "trace": self.trace}
 
     def end(self) -> None:
@@ -88,17 +90,20 @@ class Scope(threading.Thread):
             raise UserError("no setup", "scope", "give " + ", ".join(sorted(keys)))
         if not isinstance(wish["channels"], list) or not wish["channels"]:
             raise UserError("no channel", "scope", "choose a variable")
-        channels = tuple(named(self.variables, name) for name in wish["channels"])
-        trigger = None if wish["trigger"] is None else named(self.variables, wish["trigger"])
+        channels = tuple(self._named(name) for name in wish["channels"])
+        trigger = None if wish["trigger"] is None else self._named(wish["trigger"])
         words = sum(item.bytes // 2 for item in channels)
-        if min(item.bytes for item in channels) < 2 or trigger and trigger.bytes != 2:
-            raise UserError("a number of 8 bits, or a trigger that has not 16", "scope", "choose another variable")
+        if {item.bytes for item in channels} - set(WIDTHS) or trigger and trigger.bytes != 2:
+            raise UserError("a variable that has neither 16 nor 32 bits, or a trigger that has not 16", "scope", "choose another one")
         if words > lnet.MOST_WORDS:
             raise UserError(f"{words} words in a row", "scope", f"it can have {lnet.MOST_WORDS}: choose fewer variables")
         if wish["mode"] not in MODES:
             raise UserError(f"no mode '{wish['mode']}'", "scope", "choose one of " + ", ".join(MODES))
         level, position = _number(wish, "level", -1e9, 1e9), _number(wish, "position", 0.0, 1.0)
         return Setup(channels, trigger, level, wish["rising"] is True, position, round(_number(wish, "factor", 1, MOST_FACTOR)), wish["mode"])
+
+    def _named(self, name: Any) -> Variable:
+        return self.symbols.find(name if isinstance(name, str) else str(name))
 
     def _tell(self, **news: Any) -> None:
         self.told = self.told | news
@@ -149,14 +154,13 @@ class Scope(threading.Thread):
         return size / sum(item.bytes for item in setup.channels) * setup.factor * self.period_s
 
     def _start(self, link: lnet.Lnet, setup: Setup, waits: bool, size: int) -> None:
-        link.channels = [lnet.Channel(item.address, item.bytes, item.signed) for item in setup.channels]
         rows = size // sum(item.bytes for item in setup.channels)
         trigger = None
         if waits and setup.trigger is not None:
             level = round(setup.level / scale_of(setup.trigger.name, self.params).per_count)
             low, high = (-32768, 32767) if setup.trigger.signed else (0, 65535)
             trigger = lnet.Trigger(setup.trigger.address, min(max(level, low), high), setup.rising, setup.trigger.signed)
-        link.scope_setup(link.channels, trigger, -round(setup.position * (rows - 1)) if trigger else 0, setup.factor)
+        link.scope_setup([item.channel for item in setup.channels], trigger, -round(setup.position * (rows - 1)) if trigger else 0, setup.factor)
 
     def _hand_on(self, setup: Setup, rows: list[tuple[int, ...]]) -> None:
         """A trace in engineering units; its times are relative to the trigger."""

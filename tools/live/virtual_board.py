@@ -23,7 +23,7 @@ from .line import Line
 from .lnet import ANSWER_S, Lnet
 from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
-from .symbols import Variable
+from .symbols import Symbols
 
 SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm"]
 FIRST_S = 0.01
@@ -44,11 +44,11 @@ def states() -> dict[str, str]:
 class VirtualBoard:
     """Between two run() it can be worked at; one thread at a time."""
 
-    def __init__(self, library: Library, origin: Origin, variables: dict[str, Variable] | None = None) -> None:
+    def __init__(self, library: Library, origin: Origin, symbols: Symbols | None = None) -> None:
         self.library, self.origin = library, origin
         self.line = Line()
         self.scope: Scope | None = None
-        self.variables = variables or {}
+        self.symbols = symbols
         scenario = Scenario("live", "", "", "", "", 0.0, defines=origin.defines)
         self.job = simulate.prepare(scenario, library, origin.motor, origin.board)
         self.rated = motor_file.load(str(origin.motor.path))
@@ -76,8 +76,8 @@ class VirtualBoard:
 
     def start(self, publish: Callable[[dict[str, Any]], None]) -> None:
         """The scope's thread, where the firmware has a scope; it talks over the serial line while the board runs."""
-        if self.variables:
-            self.scope = Scope(lambda: Lnet(self.line), self.variables, self.library.params, publish)
+        if self.symbols is not None:
+            self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish)
             self.scope.start()
 
     def paced(self, pace: float) -> None:
