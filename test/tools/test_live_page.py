@@ -149,6 +149,25 @@ def test_curves_rotor_and_planes_are_drawn(turning):
     assert 40 / (page.run("return performance.now()") - other) * 1000 > 10 # of the 20 that come
 
 
+def test_the_scope_shows_the_variables_that_somebody_chooses_from_their_trigger_on(turning):
+    turning.click("[data-mode=auto]")
+    turning.wait("return window.eval('foc33.traces') >= 2", "no trace")
+    turning.run("const s = document.getElementById('scope-trigger'); s.value = 'board_drive.angle'; s.onchange();"
+                "const l = document.getElementById('scope-level'); l.value = '180'; l.onchange()")
+    rows = turning.wait("const t = window.eval('views.scope.trace'); return t.triggered ? t.rows : null", "no trigger")
+    at = next(number for number, row in enumerate(rows) if row[0] >= -1e-9)
+    assert rows[at - 1][3] < 180.0 <= rows[at][3] and at == round(0.25 * (len(rows) - 1))
+    last = turning.driver.find_elements("css selector", "#scope-channels input")[3]
+    for text, wrong in (("nothing", True), ("state", False)):
+        last.clear()
+        last.send_keys(text + "\n")
+        assert ("wrong" in last.get_attribute("class")) == wrong
+    turning.wait("return window.eval('views.scope.trace').names[3] === 'board_drive.state'", "another channel")
+    assert {row[4] for row in turning.run("return window.eval('views.scope.trace').rows")} == {5.0} # CLOSED
+    turning.click("[data-mode=stop]")
+    turning.wait("return document.getElementById('scope-status').textContent === 'stopped'", "no stop")
+
+
 def test_pace_slows_the_board_down(turning):
     page = turning
     page.run("const pace = document.getElementById('pace'); pace.value = '0.01'; pace.dispatchEvent(new Event('change'))")

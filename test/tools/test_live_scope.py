@@ -58,8 +58,8 @@ class Living:
 def living():
     item = Living()
     yield item
-    item.maker.end()
     item.board.end()
+    item.maker.end()
 
 
 def test_a_trace_is_what_the_motor_does_in_its_units_and_times(living):

@@ -165,8 +165,8 @@ async def serve(make_bench: Any, port: int | None, pace: float, tell: Any) -> No
         await asyncio.sleep(0.1) # the tabs hear of the board's end
         for tab in list(server.tabs):
             await tab.socket.close()
-        await server.loop.run_in_executor(None, server.pacemaker.end)
-        await server.loop.run_in_executor(None, server.bench.end)
+        for part in (server.bench, server.pacemaker):
+            await server.loop.run_in_executor(None, part.end)
     finally:
         await runner.cleanup()
     if server.pacemaker.error is not None:

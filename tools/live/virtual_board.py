@@ -18,6 +18,7 @@ from tools.common.trace import Trace
 from tools.common.x_macro import rows
 
 from . import view
+from .board import SCOPE
 from .faults import FAULTS, keys_of
 from .line import Line
 from .lnet import ANSWER_S, Lnet
@@ -254,7 +255,7 @@ class VirtualBoard:
     # ---- what a page is told ---------------------------------------------------------------------------------------------
     def hello(self) -> dict[str, Any]:
         """All that a new tab must know."""
-        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title, "defines": self.origin.defines,
+        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title, "defines": [name for name in self.origin.defines if name != SCOPE],
                 "sliders": self.sliders, "pole_pairs": self.rated.pole_pairs, "max_current_a": self.library.params["MAXIMUM_CURRENT_A"],
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],

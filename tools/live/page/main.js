@@ -1,5 +1,5 @@
 // Brings the parts together: a hello builds them, each frame is shown by all.
-const foc33 = { frames: 0, frame: null, refused: "" }; // for those who look from outside
+const foc33 = { frames: 0, frame: null, traces: 0, refused: "" }; // for those who look from outside
 let views = null, run = 0;
 
 function say(text) {
@@ -18,6 +18,7 @@ function begin(hello) {
   const drive = new DriveView(hello), strips = new StripsView(hello);
   views = { drive, strips, all: [drive, strips, board, new BenchView(hello, (command) => link.send(command)), views?.rotor ?? new RotorView(hello), new PlanesView(hello)] };
   views.rotor = views.all[4];
+  views.scope = new ScopeView(hello, (command) => link.send(command));
   run = 0;
 }
 
@@ -34,6 +35,8 @@ function take(message) {
   if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
   if (message.refused) { foc33.refused = message.refused; say(message.refused); setTimeout(() => say(""), 4000); return; }
   if (!views) { return; }
+  if (message.scope) { views.scope.set(message.scope); return; }
+  if (message.trace) { views.scope.draw(message.trace); foc33.traces++; return; }
   if (run && message.run !== run) { views.drive.clear(); views.strips.clear(); }
   run = message.run;
   tempo(message);
