@@ -3,19 +3,22 @@
 import argparse
 import asyncio
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tools.bench import command_common
 from tools.bench.scenario import Scenario
 from tools.bench.scenario_file import MOTOR
-from tools.common import command_line
+from tools.common import command_line, paths
 from tools.common.errors import UserError
 
 from .pace import PACES
 
 if TYPE_CHECKING:
     from . import board
+
+IMAGE = paths.ROOT / "build" / "target" / "foc33.elf"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -26,6 +29,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
     parser.add_argument("--pace", default="1", help="motor seconds in a second: " + ", ".join(f"{pace:g}" for pace in PACES))
+    parser.add_argument("--port", help="serial port of a real board, whose firmware has SCOPE 1")
+    parser.add_argument("--elf", type=Path, metavar="FILE", help="ELF file of the firmware on it; default build/target/foc33.elf, as make firmware leaves it")
     parser.add_argument("--listen", metavar="PORT", help="TCP port of the page; default 8033, or a free one")
     parser.set_defaults(command=_live)
     return parser
@@ -33,18 +38,34 @@ def _parser() -> argparse.ArgumentParser:
 
 def _live(options: argparse.Namespace) -> int:
     from . import server # what only this needs: aiohttp
+    pace, port = _pace(options.pace), _port(options.listen)
+    asyncio.run(server.serve(_real(options) if options.port else _virtual(options), port, pace, _tell))
+    return 0
+
+
+def _real(options: argparse.Namespace) -> Callable[[], Any]:
+    """Makes the bench of a board at a serial port. The PC's firmware, with the same header, tells what its numbers mean."""
+    from .real_board import RealBoard
+    from .symbols import Symbols
+    symbols = Symbols.read(options.elf or IMAGE)
+    parts = _parts(options)
+    return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params)
+
+
+def _virtual(options: argparse.Namespace) -> Callable[[], Any]:
+    """Makes the bench of a virtual board."""
     from .board import SCOPE
     from .recording import Origin
     from .symbols import Symbols
     from .virtual_board import VirtualBoard
-    pace, port = _pace(options.pace), _port(options.listen)
+    if options.elf is not None:
+        raise UserError("an ELF file without a board", "ELF", "name the board's serial port, PORT=/dev/ttyUSB0")
     parts = _parts(options)
     defines = command_common.macros(options.defines)
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
     origin = Origin(parts.motor, parts.board, defines + [SCOPE] * (SCOPE not in defines), words)
     symbols = Symbols.read(parts.symbols)
-    asyncio.run(server.serve(lambda: VirtualBoard(parts.library, origin, symbols), port, pace, _tell))
-    return 0
+    return lambda: VirtualBoard(parts.library, origin, symbols)
 
 
 def _parts(options: argparse.Namespace) -> "board.Parts":

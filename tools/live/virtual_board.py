@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from tools.bench.trial import rating_of
 from tools.common import drive_tables, motor_file, pins
 from tools.common.errors import UserError, suggestion
 from tools.common.trace import Trace
-from tools.common.x_macro import rows
 
 from . import view
 from .board import SCOPE
@@ -34,12 +32,6 @@ LOG_LINES = 200
 SAME_MOVE_S = 1.0
 """A slider that moves on within this time has one line in the log."""
 SUPPLY, TEMPERATURE = "supply.voltage_v", "motor.temp_c"
-
-
-@cache
-def states() -> dict[str, str]:
-    """Name and meaning."""
-    return dict(rows("include", "drive/drive.h", "DRIVE_STATE_TABLE", "#name meaning"))
 
 
 class VirtualBoard:
@@ -259,9 +251,7 @@ class VirtualBoard:
                 "sliders": self.sliders, "pole_pairs": self.rated.pole_pairs, "max_current_a": self.library.params["MAXIMUM_CURRENT_A"],
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
-                "states": states(), "estimates": view.ESTIMATES,
-                "faults": {row.name: {"cause": row.cause, "remedy": row.remedy} for row in drive_tables.faults()},
-                "limits": {row.name: {"cause": row.cause, "remedy": row.remedy} for row in drive_tables.limits()},
+                "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
                 "panels": view.panels(True), "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:

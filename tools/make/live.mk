@@ -2,10 +2,10 @@
 # XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
 .PHONY: live live-pictures live-board live-library setup-live
-live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN=port]
+live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF=]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
-	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN)))
+	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN))) $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF)))
 
 live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
 	@$(alone) $(python) -m tools.live.pictures
