@@ -138,7 +138,7 @@ def test_a_firmware_without_a_scope_or_a_port_without_a_board_is_one_line():
     refusal(lambda: Watch(without, params), "scope_command.mode", "SCOPE 1")
     done = subprocess.run([sys.executable, "-m", "tools.live", "--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing"],
                           cwd=paths.ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1) and "foc33: cannot open the port, /dev/nothing: " in done.stderr
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1) and "foc33: cannot open the port" in done.stderr and "/dev/nothing: name the one" in done.stderr
 
 
 def test_a_line_keeps_what_the_board_cannot_take_yet():

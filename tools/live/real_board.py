@@ -108,6 +108,8 @@ class RealBoard:
         if now_s < remote.renew_at_s and remote.run == remote.sent_run:
             return
         remote.renew_at_s = now_s + RENEW_S
+        if not remote.taken:
+            self._write(link, "run", 0) # a start is a change, and an older 1 may still stand there
         self._write(link, "target_erpm", round(remote.target_rpm / self.params["COUNT_SPEED_RPM"]))
         self._write(link, "lease_ms", LEASE_MS)
         self._write(link, "mode", TARGET_MODE)
