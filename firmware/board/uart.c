@@ -17,7 +17,7 @@ uint16_t uart_has_room(void)
 
 uint16_t uart_send(char c)
 {
-    if (!uart_has_room()) {
+    if (U1STAbits.UTXBF) {
         return 0;
     }
     U1TXREG = (uint16_t)(uint8_t)c;

@@ -1,1 +1,1 @@
-"""A firmware that runs, seen from outside: the client on its serial line, the virtual board in real time, and the page in the browser."""
+"""A firmware that runs: make live, a page in the browser, and make live-board, a serial line with its client."""

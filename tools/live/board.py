@@ -11,13 +11,16 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.bench import build, command_common, pil, pil_command
+from tools.bench import build, command_common, pil, pil_command, simulate
 from tools.bench.board import Board, BoardError, Library
-from tools.common import board_file, board_keys, command_line, motor_file, paths
+from tools.bench.scenario import Scenario
+from tools.bench.scenario_file import MOTOR
+from tools.common import board_keys, command_line, paths
 from tools.common.errors import UserError
 
 SCOPE = "SCOPE=1"
-MOTOR = "hurst_dmb0224c10002"
+REST = Scenario("live-board", "", "", MOTOR, "", 0.0)
+"""Nothing happens."""
 STEP_S = 0.002
 """What the board runs in one go: a byte of the serial line waits so long at most."""
 MOST_BEHIND_S = 0.2
@@ -43,8 +46,7 @@ def parts(motor: str | None = None, board: str | None = None, defines: str = "",
           image: Path | None = None) -> Parts:
     """The parts by their names on the command line; builds the firmware with its scope."""
     options = argparse.Namespace(motor=motor, board=board, userparams=userparams)
-    motor_part = motor_file.part(motor or MOTOR, "--motor")
-    board_part = board_file.part(*board_file.named(motor_part, board))
+    motor_part, board_part = command_common.parts_of(REST, options)
     header = command_common.header_for(options)
     folder = None if header is None else build.header_folder(header)
     macros = command_common.macros(defines)
@@ -63,10 +65,7 @@ class LiveBoard:
         self.parts = made_of
         library = made_of.library
         self.board = pil.PilBoard(library, made_of.image) if isinstance(library, pil.PilLibrary) and made_of.image else Board(library)
-        values = {"input.pot_live_zero": library.params.get("POT_LIVE_ZERO", 0.0)}
-        for key, value in (values | board_keys.resolve([made_of.motor.values, made_of.board.values], library.keys)).items():
-            self.board.set(key, value)
-        self.board.set("bus.voltage_v", self.board.get("supply.voltage_v"))
+        simulate.set_up(self.board, simulate.prepare(REST, library, made_of.motor, made_of.board))
         self.board.set("cpu.background_periods", BACKGROUND_PERIODS)
         if isinstance(self.board, pil.PilBoard):
             self.board.lock_step(False)
