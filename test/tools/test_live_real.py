@@ -86,6 +86,16 @@ def test_s2_takes_the_command_from_the_page(desk):
     assert "the buttons have taken the command" in [line["text"] for line in desk.page.log]
 
 
+def test_the_motor_stops_when_the_tab_that_has_started_it_is_closed(desk):
+    desk.page.act({"start": 1000.0}, "a tab")
+    desk.state("CLOSED")
+    desk.page.left("another tab")
+    desk.page.act({"target": 1100.0}, "another tab")
+    until(lambda: desk.frame()["now"]["estimate_rpm"] == pytest.approx(1100.0, rel=0.02), "not 1100 rpm")
+    desk.page.left("a tab")
+    desk.state("STOPPED")
+
+
 def test_a_fault_is_told_and_the_page_clears_it(desk):
     desk.do(fault=["blocked", True])
     desk.page.act({"start": 1000.0})

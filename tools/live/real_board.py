@@ -49,6 +49,8 @@ class RealBoard:
         self.heard_s = -math.inf
         self.scope: Scope | None = None
         self.remote: Remote | None = None
+        self.driver: Any = None
+        """the tab that has started the motor"""
         self.clears = False
         self.rows: deque[dict[str, float]] = deque(maxlen=round(CSV_S / FRAME_S))
         self.strip: deque[list[Any]] = deque(maxlen=round(view.STRIP_S / FRAME_S))
@@ -130,7 +132,7 @@ class RealBoard:
             low, high = self._range()
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
                 raise UserError(f"{value} rpm is impossible", "page", f"choose {low:g} .. {high:g}")
-            self._wish(name == "start", float(value))
+            self._wish(name == "start", float(value), who)
         elif name == "stop":
             self._wish_stop()
         elif name == "clear":
@@ -139,10 +141,10 @@ class RealBoard:
         else:
             raise UserError("no such command", "page", "a real board takes start, target, stop, clear and scope")
 
-    def _wish(self, starts: bool, target_rpm: float) -> None:
+    def _wish(self, starts: bool, target_rpm: float, who: Any) -> None:
         remote = self.remote
         if starts:
-            self.remote = Remote(True, target_rpm)
+            self.remote, self.driver = Remote(True, target_rpm), who
             self.note(f"start, {target_rpm:.0f} rpm")
         elif remote is not None:
             remote.target_rpm, remote.renew_at_s = target_rpm, 0.0
@@ -153,7 +155,9 @@ class RealBoard:
             self.note("stop")
 
     def left(self, who: Any) -> None:
-        """A tab has gone; the others may still be there."""
+        """A tab has gone: a motor that it has started must not turn on with nobody there."""
+        if who is self.driver and self.remote is not None and self.remote.run:
+            self._wish_stop()
 
     def _range(self) -> tuple[float, float]:
         return self.params["MINIMUM_SPEED_RPM"], self.params["MAXIMUM_SPEED_RPM"]
