@@ -2,16 +2,14 @@
 
 import csv
 import io
-import subprocess
-import sys
 import time
 
 import pytest
 from live_support import origin, parts, until
-from support import refusal
+from support import command, refusal, refused
 
-from tools.common import paths
 from tools.live import symbols
+from tools.live.__main__ import main
 from tools.live.line import Line
 from tools.live.pace import Pacemaker
 from tools.live.real_board import RealBoard
@@ -146,9 +144,7 @@ def test_what_lies_together_is_read_together():
 def test_a_firmware_without_a_scope_or_a_port_without_a_board_is_one_line():
     params, without = parts().library.params, symbols.Symbols({name: item for name, item in SYMBOLS.variables.items() if not name.startswith("scope_command")})
     refusal(lambda: Watch(without, params), "scope_command.mode", "SCOPE 1")
-    done = subprocess.run([sys.executable, "-m", "tools.live", "--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing"],
-                          cwd=paths.ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1) and "foc33: cannot open the port" in done.stderr and "/dev/nothing: name the one" in done.stderr
+    refused(command("--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing", main=main), "cannot open the port", "/dev/nothing")
 
 
 def test_a_line_keeps_what_the_board_cannot_take_yet():

@@ -36,6 +36,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return command_line.main(_parser, arguments)
+
+
 def _live(options: argparse.Namespace) -> int:
     from . import server # what only this needs: aiohttp
     pace, port = _pace(options.pace), _port(options.listen)
@@ -98,4 +103,4 @@ def _port(text: str | None) -> int | None:
 
 
 if __name__ == "__main__":
-    sys.exit(command_line.main(_parser, None))
+    sys.exit(main())

@@ -114,7 +114,8 @@ class RealBoard:
             self._write(link, "run", 0) # a start is a change, and an older 1 may still stand there
         self._write(link, "target_erpm", round(remote.target_rpm / self.params["COUNT_SPEED_RPM"]))
         self._write(link, "lease_ms", LEASE_MS)
-        self._write(link, "mode", TARGET_MODE)
+        if not remote.taken: # once: after S2 it must stay the panel's
+            self._write(link, "mode", TARGET_MODE)
         if remote.run != remote.sent_run:
             self._write(link, "run", int(remote.run))
             remote.sent_run = remote.run
