@@ -259,9 +259,9 @@ $B/libvboard.so: $(firmware_library)
 	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@.new $^ -lm && mv -f $@.new $@
 
 # What a client on the serial line reads names and addresses from.
-$B/foc33.elf: $B/firmware.o
+$B/foc33.elf: $B/firmware.o tools/live/chip_types.py
 	$(call say,ld,$@)$(CC) -nostdlib -static -no-pie -Wl,--section-start=fw_ram=0x800,-Ttext-segment=0x100000,-e,0,--unresolved-symbols=ignore-all \
-	    -o $@.new $< && mv -f $@.new $@
+	    -o $@.new $< && $(python) -m tools.live.chip_types $@.new && mv -f $@.new $@
 
 # ---- tests: pytest runs the Python tests and the Unity executables, after make has built what they need ----------------------
 c_tests = $(patsubst test/%.c,%,$(wildcard test/$1/test_*.c))

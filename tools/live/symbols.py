@@ -67,7 +67,7 @@ class Symbols:
         """The variables of an ELF file of XC16, or of the PC's."""
         with reading("ELF", path):
             found: dict[str, Variable] = {}
-            for unit in _dwarf(path).iter_CUs():
+            for unit in dwarf_of(path).iter_CUs():
                 for die in unit.iter_DIEs():
                     place = die.attributes.get("DW_AT_location") if die.tag == "DW_TAG_variable" else None
                     if place is not None and isinstance(place.value, (list, bytes)) and len(place.value) > 2 and place.value[0] == ADDRESS:
@@ -83,7 +83,8 @@ class Symbols:
         return self.variables[name]
 
 
-def _dwarf(path: Path) -> Any:
+def dwarf_of(path: Path) -> Any:
+    """Its debugging information."""
     data = contents("ELF", path)
     elf = ELFFile(BytesIO(data))
     return attribution.dwarf_info(read_elf(path, data).debug) if elf["e_machine"] == DSPIC else elf.get_dwarf_info()
