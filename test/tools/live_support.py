@@ -21,13 +21,19 @@ def parts() -> board.Parts:
     return board.parts()
 
 
+@functools.cache
+def known() -> symbols.Symbols:
+    """Its variables."""
+    return symbols.Symbols.read(parts().symbols)
+
+
 def origin() -> Origin:
     return Origin(parts().motor, parts().board, [board.SCOPE], {})
 
 
 def bench() -> VirtualBoard:
     """A board without the scope's thread."""
-    return VirtualBoard(parts().library, origin(), symbols.Symbols.read(parts().symbols))
+    return VirtualBoard(parts().library, origin(), known())
 
 
 def passes(board: VirtualBoard, seconds: float) -> dict:

@@ -5,7 +5,7 @@ import io
 import time
 
 import pytest
-from live_support import origin, parts, until
+from live_support import known, origin, parts, until
 from support import command, refusal, refused
 
 from tools.live import symbols
@@ -16,7 +16,7 @@ from tools.live.real_board import RealBoard
 from tools.live.virtual_board import VirtualBoard
 from tools.live.watch import WATCHED, Watch, blocks
 
-SYMBOLS = symbols.Symbols.read(parts().symbols)
+SYMBOLS = known()
 
 
 class Desk:

@@ -5,16 +5,15 @@ import time
 
 import numpy as np
 import pytest
-from live_support import bench, origin, parts, until
+from live_support import bench, known, origin, parts, until
 from support import refusal
 
-from tools.live import symbols
 from tools.live.pace import Pacemaker
 from tools.live.scale import RAW, scale_of
 from tools.live.scope import USUAL
 from tools.live.virtual_board import VirtualBoard
 
-SYMBOLS = symbols.Symbols.read(parts().symbols)
+SYMBOLS = known()
 KNOWN = SYMBOLS.variables
 I_Q, ANGLE, SPEED = "board_drive.run.control.i_q13.q", "board_drive.angle", "board_drive.run.estimator.omega_erpm"
 

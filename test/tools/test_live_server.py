@@ -34,10 +34,11 @@ def answer(server, path: str, **headers: str) -> tuple[int, dict[str, str], str]
 
 
 async def messages(tab, wanted, seconds: float = 10.0):
-    """Reads until a message pleases."""
+    """Reads until a message pleases, and shows each at once."""
     end_s = time.monotonic() + seconds
     while time.monotonic() < end_s:
         message = json.loads((await tab.receive(seconds)).data)
+        await tab.send_json({"seen": True})
         if wanted(message):
             return message
     raise AssertionError("no such message")
@@ -114,6 +115,22 @@ def test_nonsense_is_refused_to_the_tab_that_sent_it_and_the_board_goes_on(serve
         return refused["refused"], [await messages(other, lambda message: True) for _ in range(4)]
     refused, heard = with_tabs(server, work, 2)
     assert part in refused and "\n" not in refused and not [message for message in heard if "refused" in message]
+
+
+def test_a_tab_that_does_not_keep_up_gets_nothing_twice_nothing_old_and_misses_nothing(server):
+    async def work(tab):
+        await asyncio.sleep(1.0) # it shows nothing
+        got = []
+        while len(got) < 6:
+            message = json.loads((await tab.receive(10)).data)
+            if "t" in message:
+                got.append(message)
+                await tab.send_json({"seen": True})
+        return got
+    got = with_tabs(server, work)
+    times = [row[0] for message in got for row in message["strip"]]
+    assert all(0.009 < later - earlier < 0.011 for earlier, later in zip(times, times[1:]))
+    assert max(later["t"] - earlier["t"] for earlier, later in zip(got, got[1:])) > 0.5 # one frame for all that time
 
 
 def test_a_message_that_is_too_long_ends_the_tab_only(server):

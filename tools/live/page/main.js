@@ -31,7 +31,9 @@ function tempo(frame) {
   by("measured").textContent = slow ? `this machine manages 1 : ${(1 / frame.measured).toFixed(frame.measured > 0.1 ? 1 : 0)}` : "";
 }
 
+// The next message comes when this one is on the screen: a slow machine, or a tab out of sight, gets fewer.
 function take(message) {
+  if (message.t !== undefined || message.scope || message.trace) { requestAnimationFrame(() => link.send({ seen: true })); }
   if (message.hello) { begin(message.hello); return; }
   if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
   if (message.refused) { foc33.refused = message.refused; say(message.refused); setTimeout(() => say(""), 4000); return; }
