@@ -2,9 +2,10 @@
 #ifndef DRIVE_MODES_MODE_STATE_H
 #define DRIVE_MODES_MODE_STATE_H
 
+#include "drive/modes/bringup.h"
 #include "drive/modes/identify.h"
 
 /** Members of drive_run_t. */
-#define MODE_STATE IDENTIFY_STATE
+#define MODE_STATE IDENTIFY_STATE BRINGUP_STATE
 
 #endif
