@@ -5,22 +5,22 @@
 
 #include "drive/modes/bringup_tick.h"
 
-#define REST_MS 100u       /* no button is touched yet */
-#define REPEAT_MS 1000u    /* the first line again, by the other pin */
-#define BUTTON_MS 20000u   /* patience with a button */
-#define CURRENT_MS 60000u  /* patience while current flows */
-#define CLEAR_MS 150u      /* a fault is cleared, the offsets are averaged, and it is back if its cause is */
-#define START_MS 100u      /* a start charges the drivers first */
+#define REST_MS 100u      /* no button is touched yet */
+#define REPEAT_MS 1000u   /* the first line again, by the other pin */
+#define BUTTON_MS 20000u  /* patience with a button */
+#define CURRENT_MS 60000u /* patience while current flows */
+#define CLEAR_MS 150u     /* a fault is cleared, the offsets are averaged, and it is back if its cause is */
+#define START_MS 100u     /* a start charges the drivers first */
 #define SUM_LOG2 10u
 #define SETTLE_HALF PARAM_PERIODS(0.3F) /* the rotor swings into the field */
 #define SETTLE_FULL PARAM_PERIODS(0.15F)
-#define NOISE_MOST_STEPS 3 /* mean deviation, steps of the converter */
+#define NOISE_MOST_STEPS 3                        /* mean deviation, steps of the converter */
 #define STEP_Q13 ((int16_t)(64.0F * 0.5F * 0.5F)) /* a step of the converter at a gain of 0.5, halved by the product */
 
 /* ---- What is expected ---- */
 #define BUS_10MV(volts) ((int32_t)(PARAM_F(volts) * 100.0F + 0.5F))
 #define R_MOHM(share) ((int32_t)(PARAM_F(share) * PARAM_F(MOTOR_RS_OHM) * 1000.0F))
-#define R_BRIDGE_MOHM 100     /* transistors, shunt and leads add at most */
+#define R_BRIDGE_MOHM 100 /* transistors, shunt and leads add at most */
 #define DEAD_NS (PARAM_F(DEADTIME_SEC) * 1000000000.0F)
 #define DEAD_LEAST_NS ((int32_t)(0.75F * DEAD_NS))
 #define DEAD_MOST_NS ((int32_t)(1.25F * DEAD_NS + 150.0F)) /* diodes and the transistors' delays */
@@ -417,12 +417,14 @@ static void drive_level(bringup_guide_t *g, drive_t *d, uint16_t phase)
     g->phase = phase;
 }
 
+static const uint16_t phase_of[BRINGUP_DIRECTIONS] = { 0, 2, 1, 0, 2, 1 };
+
 static void keep_level(const bringup_guide_t *g, const drive_t *d, bringup_level_t *level)
 {
     const bringup_run_t *t = &d->run.bringup;
     level->a[g->index] = mean_of(t->sum_a);
     level->b[g->index] = mean_of(t->sum_b);
-    level->amplitude[g->index] = t->amplitude;
+    level->amplitude[g->index] = qm_abs(t->part[phase_of[g->index]]);
 }
 
 /** Half the current, all of it, none, in one direction after the other. A press ends it. */
@@ -570,17 +572,17 @@ static uint16_t holds_a(bringup_guide_t *g, drive_t *d, const drive_params_t *p)
 static void step_ammeter(bringup_guide_t *g, drive_t *d, const drive_params_t *p)
 {
     uint16_t button, ready = holds_a(g, d, p);
-    int16_t i_q13;
     if (g->phase == 2u && has_tripped(g, d)) {
         return;
     }
     if (!ready) {
         return;
     }
-    g->meter = (uint16_t)((g->wiring.leg[0] == 0u) ? 0u : (g->wiring.leg[1] == 0u) ? 1u
-                                                                                   : 2u);
-    i_q13 = mean_of((g->meter == 0u) ? d->run.bringup.sum_a : d->run.bringup.sum_b);
-    button = (g->meter == 2u) ? 2u : answered(g, BRINGUP_ASK_AMMETER, 0, bringup_ma(qm_abs(i_q13)));
+    if (g->wiring.leg[0] != 0u || g->wiring.leg[1] != 1u) {
+        go(g, BRINGUP_STEP_DIRECTION); /* which wire the signal is in is open */
+        return;
+    }
+    button = answered(g, BRINGUP_ASK_AMMETER, 0, bringup_ma(qm_abs(mean_of(d->run.bringup.sum_a))));
     if (button != 0u) {
         g->yes = (uint16_t)(button == 2u);
         go(g, BRINGUP_STEP_GAINS);
@@ -590,15 +592,13 @@ static void step_ammeter(bringup_guide_t *g, drive_t *d, const drive_params_t *p
 /** What the ammeter and both resistances say of the gains. */
 static void step_gains(bringup_guide_t *g)
 {
-    int32_t by_meter = (int32_t)g->bridge.resistance_mohm[g->meter & 1u], both_alike = ratio(&g->bridge);
-    uint16_t alike = (uint16_t)(both_alike >= RATIO_LEAST && both_alike <= RATIO_MOST), other = (uint16_t)((g->meter & 1u) ^ 1u);
+    int32_t by_a = (int32_t)g->bridge.resistance_mohm[0], percent = ratio(&g->bridge);
+    uint16_t alike = (uint16_t)(percent >= RATIO_LEAST && percent <= RATIO_MOST);
     if (!g->yes && alike) {
         find(g, BRINGUP_SHUNT_GAINS, 0);
-    } else if (!g->yes) {
-        find(g, BRINGUP_SHUNT_GAIN, g->meter);
-    } else if (!alike) {
-        find(g, BRINGUP_SHUNT_GAIN, other);
-    } else if (by_meter < R_MOHM(PARAM_R_LEAST) || by_meter > R_MOHM(PARAM_R_MOST) + R_BRIDGE_MOHM) {
+    } else if (!g->yes || !alike) {
+        find(g, BRINGUP_SHUNT_GAIN, g->yes); /* A's, or where A's is right B's */
+    } else if (by_a < R_MOHM(PARAM_R_LEAST) || by_a > R_MOHM(PARAM_R_MOST) + R_BRIDGE_MOHM) {
         find(g, BRINGUP_RESISTANCE, 0);
     } else {
         /* right */

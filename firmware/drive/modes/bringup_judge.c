@@ -4,9 +4,8 @@
 #ifdef BRINGUP
 
 #define PHASES 3u
-#define LIKELY_SHIFT 3      /* another leg than the expected one follows an eighth better, or it is the expected one */
-#define MISSING_SHIFT 2     /* less than a quarter of the current in the other direction */
-#define MA_SHIFT 12u        /* up to 16 mA a count */
+#define MISSING_SHIFT 2 /* less than a quarter of the current in the other direction */
+#define MA_SHIFT 12u    /* up to 16 mA a count */
 #define MA_PER_COUNT ((uint16_t)(4000.0F * PARAM_F(NORM_CURRENT_CONST) * 4096.0F + 0.5F))
 #define DEAD_NS ((uint16_t)(0.75F * PWM_TICK_SEC * 1000000000.0F * 256.0F + 0.5F)) /* of a duty count, Q8: one leg loses what two others gain, 4/3 along the vector */
 #define MOST_MOHM 60000u
@@ -27,17 +26,25 @@ static int16_t answer(const current_q13_t *signal, uint16_t phase)
     return (int16_t)((signal[plus[phase]] - signal[minus[phase]]) / 2);
 }
 
-/** The leg that a signal follows. */
+/** The leg that a signal follows: its answer has the other sign than those to the other two phases. Where one of them says nothing, the
+ *  expected leg. */
 static uint16_t leg_of(const current_q13_t *signal, uint16_t expected)
 {
-    uint16_t phase, best = expected;
+    uint16_t phase, positive = 0, negative = 0;
     for (phase = 0; phase < PHASES; phase++) {
-        int16_t most = qm_abs(answer(signal, best));
-        if (qm_abs(answer(signal, phase)) > most + (most >> LIKELY_SHIFT)) {
-            best = phase;
+        int16_t size = answer(signal, phase);
+        positive |= (uint16_t)((size >= BRINGUP_LEAST_Q13) ? 1u << phase : 0u);
+        negative |= (uint16_t)((size <= -BRINGUP_LEAST_Q13) ? 1u << phase : 0u);
+    }
+    if ((positive | negative) != 7u || positive == 0u || negative == 0u) {
+        return expected;
+    }
+    for (phase = 0; phase < PHASES; phase++) {
+        if (positive == 1u << phase || negative == 1u << phase) {
+            return phase;
         }
     }
-    return best;
+    return expected;
 }
 
 /** Current of a leg in a direction, by the signals that follow two of them. */

@@ -111,6 +111,8 @@ typedef struct {
 
     /* The interrupt's own. */
     volatile int16_t amplitude; /**< duty counts along the vector; the background reads it */
+    volatile int16_t part[3];   /**< of it in each phase, as rounded; the background reads them */
+    int32_t carried_q21;        /**< |A| + |B|, filtered */
     uint32_t turn_q32;          /**< of the turn that goes on */
     uint16_t pause;             /**< periods of the pause after a turn */
 } bringup_run_t;
@@ -121,15 +123,15 @@ typedef struct {
 /** Currents and amplitudes of the six directions +A, -C, +B, -A, +C, -B at one level. */
 typedef struct {
     current_q13_t a[BRINGUP_DIRECTIONS], b[BRINGUP_DIRECTIONS];
-    int16_t amplitude[BRINGUP_DIRECTIONS]; /**< duty counts */
+    int16_t amplitude[BRINGUP_DIRECTIONS]; /**< duty counts of the direction's phase */
 } bringup_level_t;
 
 /** What the currents say of the wires. Masks: bit 0 phase or signal A, 1 B, 2 C. */
 typedef struct {
-    uint16_t dead;               /**< current signals that do not follow */
-    uint16_t leg[2];             /**< the leg that each signal follows, 0..2 */
-    uint16_t inverted;           /**< signals with the wrong sign */
-    uint16_t open, high, low;    /**< phases that carry nothing; whose high, whose low side never turns on */
+    uint16_t dead;            /**< current signals that do not follow */
+    uint16_t leg[2];          /**< the leg that each signal follows, 0..2 */
+    uint16_t inverted;        /**< signals with the wrong sign */
+    uint16_t open, high, low; /**< phases that carry nothing; whose high, whose low side never turns on */
 } bringup_wiring_t;
 
 /** What the bridge says to two levels of current. */

@@ -74,14 +74,13 @@ typedef struct {
     uint16_t blocked; /**< 1: no current before it is mended */
     uint16_t sender;  /**< pin of the serial line, 0, 1, or BRINGUP_LINES_BOTH */
     button_t s2, s3;
-    uint16_t asked, button;     /**< 1 once the question is asked; the button since, 0, 2 or 3 */
-    uint16_t first;             /**< the button that came first */
-    uint16_t swapped;           /**< 1: S2 and S3 have changed places */
-    uint16_t leds;              /**< bit 0 ALIVE, bit 1 RUN */
-    uint16_t leds_judged;       /**< 1: no further question about them */
+    uint16_t asked, button;      /**< 1 once the question is asked; the button since, 0, 2 or 3 */
+    uint16_t first;              /**< the button that came first */
+    uint16_t swapped;            /**< 1: S2 and S3 have changed places */
+    uint16_t leds;               /**< bit 0 ALIVE, bit 1 RUN */
+    uint16_t leds_judged;        /**< 1: no further question about them */
     int16_t pot_left, pot_right; /**< % */
-    uint16_t meter;             /**< the signal that is in the ammeter's wire, 0, 1; 2: none */
-    uint16_t yes;               /**< the ammeter shows what it should */
+    uint16_t yes;                /**< the ammeter shows what it should */
     current_q13_t mean[2], off[2];
     bringup_level_t half, full;
     bringup_wiring_t wiring;

@@ -7,8 +7,9 @@
 #ifdef BRINGUP
 
 #define BRINGUP_HALF_DUTY (PWM_FULL_DUTY / 2)
-#define BRINGUP_STEP_MASK 7u                                                    /* the amplitude changes by a count every eighth period */
-#define BRINGUP_TURN_PERIODS PARAM_PERIODS(0.4F)                                /* of an electrical turn, and of the pause after it */
+#define BRINGUP_FILTER_SHIFT 5                   /* 1.6 ms: four counts of the amplitude */
+#define BRINGUP_STEP_MASK 7u                     /* the amplitude changes by a count every eighth period */
+#define BRINGUP_TURN_PERIODS PARAM_PERIODS(0.4F) /* of an electrical turn, and of the pause after it */
 #define BRINGUP_TURN_Q32 ((uint32_t)(4294967295.0F / PARAM_F(BRINGUP_TURN_PERIODS)))
 
 /** Adds up, in every state. @param settled the amplitude stands */
@@ -34,7 +35,8 @@ QM_INLINE void bringup_add(drive_t *d, uint16_t settled)
 QM_INLINE uint16_t bringup_step_amplitude(drive_t *d)
 {
     bringup_run_t *t = &d->run.bringup;
-    int16_t carried_q13 = (int16_t)(qm_abs(d->phases_q13.a) + qm_abs(d->phases_q13.b));
+    int16_t carried_q13 = (int16_t)(t->carried_q21 >> 8);
+    t->carried_q21 += ((int32_t)(qm_abs(d->phases_q13.a) + qm_abs(d->phases_q13.b)) * 256 - t->carried_q21) >> BRINGUP_FILTER_SHIFT;
     if (t->amplitude < t->most && carried_q13 >= t->stop_q13) {
         t->most = t->amplitude;
     } else if (t->amplitude > 0 && t->most == t->amplitude && carried_q13 > t->stop_q13 + (t->stop_q13 >> 1)) {
@@ -87,6 +89,9 @@ NOINLINE void bringup_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     vector.d = t->amplitude;
     vector.q = 0;
     part = phases_of(vector, trig_sincos(t->angle));
+    t->part[0] = part.a;
+    t->part[1] = part.b;
+    t->part[2] = part.c;
     duty->a = (duty_t)(BRINGUP_HALF_DUTY + part.a);
     duty->b = (duty_t)(BRINGUP_HALF_DUTY + part.b);
     duty->c = (duty_t)(BRINGUP_HALF_DUTY + part.c);
