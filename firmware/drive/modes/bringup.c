@@ -614,6 +614,8 @@ static void step_direction(bringup_guide_t *g, drive_t *d)
     if (has_tripped(g, d)) {
         return;
     }
+    d->run.bringup.most = MOST_AMPLITUDE;
+    d->run.bringup.keeps_current = 1;
     d->run.bringup.turning = 1;
     button = answered(g, BRINGUP_ASK_DIRECTION, 0, 0);
     if (button == 3u) {

@@ -97,16 +97,17 @@ typedef enum { BRINGUP_FINDING_TABLE(BRINGUP_FINDING_ENUM) BRINGUP_FINDINGS } br
 
 /** The instrument: part of a run, so a start clears it. */
 typedef struct {
-    volatile uint16_t ready;       /**< 1: the sums are complete and belong to the background; 0: the interrupt works */
-    volatile uint16_t wait;        /**< periods before the sums begin, counted once the amplitude stands */
-    volatile uint16_t left;        /**< periods to sum */
-    volatile int16_t most;         /**< amplitude to go to, duty counts */
-    volatile int16_t stop_q13;     /**< it stays where |A| + |B| reaches this */
-    volatile uint16_t turning;     /**< 1: the vector turns by whole electrical turns, with a pause after each */
-    volatile angle_t angle;        /**< of the vector; the background writes it at amplitude 0 */
-    volatile uint16_t turns;       /**< electrical turns done */
-    volatile int32_t sum_a, sum_b; /**< of the currents */
-    volatile int32_t off_a, off_b; /**< of what they are off mean_a_q13 and mean_b_q13 */
+    volatile uint16_t ready;         /**< 1: the sums are complete and belong to the background; 0: the interrupt works */
+    volatile uint16_t wait;          /**< periods before the sums begin, counted once the amplitude stands */
+    volatile uint16_t left;          /**< periods to sum */
+    volatile int16_t most;           /**< amplitude to go to, duty counts */
+    volatile int16_t stop_q13;       /**< it stays where |A| + |B| reaches this */
+    volatile uint16_t keeps_current; /**< 1: the amplitude, up to `most`, follows stop_q13 */
+    volatile uint16_t turning;       /**< 1: the vector turns by whole electrical turns, with a pause after each */
+    volatile angle_t angle;          /**< of the vector; the background writes it at amplitude 0 */
+    volatile uint16_t turns;         /**< electrical turns done */
+    volatile int32_t sum_a, sum_b;   /**< of the currents */
+    volatile int32_t off_a, off_b;   /**< of what they are off mean_a_q13 and mean_b_q13 */
     volatile current_q13_t mean_a_q13, mean_b_q13;
 
     /* The interrupt's own. */

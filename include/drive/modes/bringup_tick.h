@@ -31,12 +31,14 @@ QM_INLINE void bringup_add(drive_t *d, uint16_t settled)
     t->ready = (uint16_t)(t->left == 0u);
 }
 
-/** A count towards the amplitude that is asked for, or to where the current is reached. @return 1 when it stands */
-QM_INLINE uint16_t bringup_step_amplitude(drive_t *d)
+/** 1, 0 or -1: where the amplitude goes. A measurement stays at the amplitude where the current is reached; a vector that turns keeps the current,
+ *  for dead time takes more or less of it at each angle. */
+QM_INLINE int16_t bringup_direction(bringup_run_t *t, int16_t carried_q13)
 {
-    bringup_run_t *t = &d->run.bringup;
-    int16_t carried_q13 = (int16_t)(t->carried_q21 >> 8);
-    t->carried_q21 += ((int32_t)(qm_abs(d->phases_q13.a) + qm_abs(d->phases_q13.b)) * 256 - t->carried_q21) >> BRINGUP_FILTER_SHIFT;
+    if (t->keeps_current) {
+        return (int16_t)((carried_q13 < t->stop_q13 && t->amplitude < t->most) ? 1 : (t->amplitude > 0) ? -1
+                                                                                                        : 0);
+    }
     if (t->amplitude < t->most && carried_q13 >= t->stop_q13) {
         t->most = t->amplitude;
     } else if (t->amplitude > 0 && t->most == t->amplitude && carried_q13 > t->stop_q13 + (t->stop_q13 >> 1)) {
@@ -44,13 +46,20 @@ QM_INLINE uint16_t bringup_step_amplitude(drive_t *d)
     } else {
         /* on its way, or there */
     }
-    if (t->amplitude == t->most) {
-        return 1;
-    }
+    return (int16_t)((t->amplitude < t->most) ? 1 : (t->amplitude > t->most) ? -1
+                                                                             : 0);
+}
+
+/** A count towards the amplitude that is asked for. @return 1 when it stands, or follows the current */
+QM_INLINE uint16_t bringup_step_amplitude(drive_t *d)
+{
+    bringup_run_t *t = &d->run.bringup;
+    int16_t direction = bringup_direction(t, (int16_t)(t->carried_q21 >> 8));
+    t->carried_q21 += ((int32_t)(qm_abs(d->phases_q13.a) + qm_abs(d->phases_q13.b)) * 256 - t->carried_q21) >> BRINGUP_FILTER_SHIFT;
     if ((d->ticks & BRINGUP_STEP_MASK) == 0u) {
-        t->amplitude = (int16_t)((t->amplitude < t->most) ? t->amplitude + 1 : t->amplitude - 1);
+        t->amplitude = (int16_t)(t->amplitude + direction);
     }
-    return 0;
+    return (uint16_t)(direction == 0 || t->keeps_current);
 }
 
 /** A period of an electrical turn, or of the pause after it. */
