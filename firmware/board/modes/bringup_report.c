@@ -31,27 +31,24 @@ static const char *const shares[BRINGUP_DIRECTIONS] = { "2 : -1", "1 : 1", "-1 :
 
 static const char *const phases[3] = { "A", "B", "C" };
 
-/** A number with so many decimals, of which the last is its unit. */
+/** A number with so many decimals, of which the last is its unit. @param number of 16 bits and a sign */
 static char *put_number(char *at, int32_t number, uint16_t decimals)
 {
+    char digits[6];
     char *next = at;
-    uint16_t whole, rest, unit = 1, n;
-    uint32_t size = (uint32_t)((number < 0) ? -number : number);
-    for (n = 0; n < decimals; n++) {
-        unit = (uint16_t)(unit * 10u);
+    uint16_t digit, count = 0, rest = (uint16_t)((number < 0) ? -number : number);
+    for (digit = 0; rest != 0u || digit <= decimals; digit++) {
+        if (digit == decimals && decimals != 0u) {
+            digits[count++] = '.';
+        }
+        digits[count++] = (char)('0' + rest % 10u);
+        rest /= 10u;
     }
     if (number < 0) {
         *next++ = '-';
     }
-    whole = (uint16_t)(size / unit);
-    rest = (uint16_t)(size % unit);
-    next = text_put_unsigned(next, whole);
-    if (decimals != 0u) {
-        *next++ = '.';
-    }
-    for (n = decimals; n != 0u; n--) {
-        unit = (uint16_t)(unit / 10u);
-        *next++ = (char)('0' + rest / unit % 10u);
+    while (count != 0u) {
+        *next++ = digits[--count];
     }
     return next;
 }

@@ -24,8 +24,8 @@
 #define DEAD_NS (PARAM_F(DEADTIME_SEC) * 1000000000.0F)
 #define DEAD_LEAST_NS ((int32_t)(0.75F * DEAD_NS))
 #define DEAD_MOST_NS ((int32_t)(1.25F * DEAD_NS + 150.0F)) /* diodes and the transistors' delays */
-#define RATIO_LEAST 90
-#define RATIO_MOST 111
+#define RATIO_LEAST 88u
+#define RATIO_MOST 114u
 #define POT_END 10 /* % */
 
 /* Most amplitude: 1.6 times what R and half as much again as what dead time take. Whatever the signals say, it bounds the current. */
@@ -417,6 +417,8 @@ static void drive_level(bringup_guide_t *g, drive_t *d, uint16_t phase)
     g->phase = phase;
 }
 
+/* +A, -C, +B, -A, +C, -B: every 60 degrees. */
+static const angle_t angle_of[BRINGUP_DIRECTIONS] = { 0, 10923, 21845, 32768u, 43691u, 54613u };
 static const uint16_t phase_of[BRINGUP_DIRECTIONS] = { 0, 2, 1, 0, 2, 1 };
 
 static void keep_level(const bringup_guide_t *g, const drive_t *d, bringup_level_t *level)
@@ -440,7 +442,7 @@ static void step_drive(bringup_guide_t *g, drive_t *d, const drive_params_t *p)
     if (g->button != 0u) {
         go(g, BRINGUP_STEP_LAST);
     } else if (g->phase == 1u) {
-        t->angle = (angle_t)((g->index * 65536ul + 3ul) / BRINGUP_DIRECTIONS);
+        t->angle = angle_of[g->index];
         drive_level(g, d, 2);
     } else if (g->phase == 4u) {
         if (t->amplitude == 0) {
@@ -467,7 +469,7 @@ static void step_show(bringup_guide_t *g, const drive_t *d)
 {
     uint16_t n = g->index;
     say(g, BRINGUP_SHOWS, n, 0);
-    g->message.value = (int32_t)(qm_muluu((uint16_t)g->full.amplitude[n], bus_10mv(d)) / (uint32_t)PWM_FULL_DUTY);
+    g->message.value = (int32_t)qm_divud(qm_muluu((uint16_t)g->full.amplitude[n], bus_10mv(d)), (uint16_t)PWM_FULL_DUTY);
     g->message.low = bringup_ma(g->full.a[n]);
     g->message.high = bringup_ma(g->full.b[n]);
     g->index++;
@@ -527,12 +529,6 @@ static void step_wiring(bringup_guide_t *g)
 
 /* ---- Gains, resistance, dead time ---- */
 
-static int32_t ratio(const bringup_bridge_t *r)
-{
-    uint16_t a = r->resistance_mohm[0];
-    return (int32_t)(qm_muluu(r->resistance_mohm[1], 100u) / ((a == 0u) ? 1u : a));
-}
-
 static void step_bridge(bringup_guide_t *g, const drive_t *d)
 {
     const bringup_bridge_t *r = &g->bridge;
@@ -541,10 +537,10 @@ static void step_bridge(bringup_guide_t *g, const drive_t *d)
     switch (n) {
     case 0:
         g->bridge = bringup_bridge(&g->half, &g->full, &g->wiring, bus_10mv(d));
-        (void)tell(g, BRINGUP_VALUE_RATIO, 0, ratio(r), RATIO_LEAST, RATIO_MOST);
+        (void)tell(g, BRINGUP_VALUE_RATIO, 0, (int32_t)r->b_percent_of_a, (int32_t)RATIO_LEAST, (int32_t)RATIO_MOST);
         break;
     case 1:
-        (void)tell(g, BRINGUP_VALUE_RESISTANCE, 0, (int32_t)r->resistance_mohm[0], R_MOHM(PARAM_R_LEAST), R_MOHM(PARAM_R_MOST) + R_BRIDGE_MOHM);
+        (void)tell(g, BRINGUP_VALUE_RESISTANCE, 0, (int32_t)r->resistance_mohm, R_MOHM(PARAM_R_LEAST), R_MOHM(PARAM_R_MOST) + R_BRIDGE_MOHM);
         break;
     default:
         tell_or_find(g, BRINGUP_VALUE_DEAD_TIME, 0, (int32_t)r->dead_time_ns, DEAD_LEAST_NS, DEAD_MOST_NS, BRINGUP_DEAD_TIME);
@@ -592,8 +588,8 @@ static void step_ammeter(bringup_guide_t *g, drive_t *d, const drive_params_t *p
 /** What the ammeter and both resistances say of the gains. */
 static void step_gains(bringup_guide_t *g)
 {
-    int32_t by_a = (int32_t)g->bridge.resistance_mohm[0], percent = ratio(&g->bridge);
-    uint16_t alike = (uint16_t)(percent >= RATIO_LEAST && percent <= RATIO_MOST);
+    int32_t by_a = (int32_t)g->bridge.resistance_mohm;
+    uint16_t alike = (uint16_t)(g->bridge.b_percent_of_a >= RATIO_LEAST && g->bridge.b_percent_of_a <= RATIO_MOST);
     if (!g->yes && alike) {
         find(g, BRINGUP_SHUNT_GAINS, 0);
     } else if (!g->yes || !alike) {

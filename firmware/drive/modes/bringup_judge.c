@@ -144,12 +144,18 @@ static uint16_t dead_time(const both_t *s)
     return (uint16_t)(qm_muluu(counts, DEAD_NS) >> 9); /* Q8, of two directions */
 }
 
+static uint16_t percent(uint16_t part, uint16_t whole)
+{
+    return quotient(qm_muluu(part, 100u), whole, 999u);
+}
+
 bringup_bridge_t bringup_bridge(const bringup_level_t *half, const bringup_level_t *full, const bringup_wiring_t *w, uint16_t bus_10mv)
 {
     bringup_bridge_t r;
     both_t a = both(half, full, w->leg[0], 0), b = both(half, full, w->leg[1], 1);
-    r.resistance_mohm[0] = resistance(&a, bus_10mv);
-    r.resistance_mohm[1] = resistance(&b, bus_10mv);
+    uint16_t third = (uint16_t)(PHASES - w->leg[0] - w->leg[1]);
+    r.resistance_mohm = resistance(&a, bus_10mv);
+    r.b_percent_of_a = percent((uint16_t)qm_abs(answer(full->b, third)), (uint16_t)qm_abs(answer(full->a, third)));
     r.dead_time_ns = (uint16_t)((dead_time(&a) >> 1) + (dead_time(&b) >> 1));
     return r;
 }

@@ -40,7 +40,7 @@
     X(BUS, " V", 2, "bus") \
     X(OFFSET, " A", 3, "offset of current @") \
     X(NOISE, " A", 3, "noise of current @") \
-    X(RATIO, " %", 0, "resistance by current B against current A") \
+    X(RATIO, " %", 0, "current B against current A where both are alike") \
     X(RESISTANCE, " ohm", 3, "phase resistance with bridge") \
     X(DEAD_TIME, " us", 3, "dead time of the bridge") \
     X(POLE_PAIRS, "", 0, "electrical turns of one turn of the shaft")
@@ -137,7 +137,8 @@ typedef struct {
 
 /** What the bridge says to two levels of current. */
 typedef struct {
-    uint16_t resistance_mohm[2]; /**< by each signal */
+    uint16_t resistance_mohm; /**< by signal A */
+    uint16_t b_percent_of_a;  /**< both signals where their legs carry the same: along the third phase */
     uint16_t dead_time_ns;
 } bringup_bridge_t;
 

@@ -8,4 +8,11 @@
 /** Members of drive_run_t. */
 #define MODE_STATE IDENTIFY_STATE BRINGUP_STATE
 
+/** 0 where no state has a closed loop: what belongs to it is left out. */
+#ifdef BRINGUP
+#define MODE_CLOSES_LOOP 0
+#else
+#define MODE_CLOSES_LOOP 1
+#endif
+
 #endif
