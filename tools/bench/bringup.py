@@ -1,7 +1,7 @@
 """`bringup`: the BRINGUP firmware on the right board and on every miswired one of tables/bringup.toml: what it says, and whether that is it."""
 
 import argparse
-import re
+import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 
 from tools.common import board_keys, output, paths, workers
 from tools.common.board_keys import Values
-from tools.common.errors import UserError, suggestion
+from tools.common.errors import UserError
 from tools.common.progress import Progress
 from tools.common.toml_file import Document
 from . import bringup_user, command_common, report
@@ -120,7 +120,8 @@ def chosen(table: Table, name: str | None) -> list[Variant]:
     """The variant that was asked for, or all."""
     names = [variant.name for variant in table.variants]
     if name is not None and name not in names:
-        raise UserError(f"no variant '{name}'", "VARIANT", suggestion(name, names))
+        near = difflib.get_close_matches(name, names, 1)
+        raise UserError(f"no variant '{name}'", "VARIANT", f"did you mean {near[0]}?" if near else f"take one of {', '.join(names)}")
     return [variant for variant in table.variants if name in (None, variant.name)]
 
 
@@ -154,8 +155,3 @@ def add_command(commands: Any) -> None:
     parser.add_argument("--out", type=Path, help="result folder; default build/run/bringup")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     parser.set_defaults(command=command)
-
-
-def questions_of(text: str) -> list[str]:
-    """Names of the questions in the firmware's table."""
-    return re.findall(r'^    X\((\w+), "', text, re.MULTILINE)

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from .board import Board
 
@@ -180,6 +179,3 @@ def use(board: Board, values: dict[str, float], report: Callable[[float], None])
 def answers() -> set[str]:
     """Names of the questions that the user can answer."""
     return {name.removeprefix("on_").upper() for name in vars(User) if name.startswith("on_")}
-
-
-Result = dict[str, Any]

@@ -31,7 +31,7 @@ static const char *const shares[BRINGUP_DIRECTIONS] = { "2 : -1", "1 : 1", "-1 :
 
 static const char *const phases[3] = { "A", "B", "C" };
 
-/** A number with so many decimals, of which the last is its unit. @param number of 16 bits and a sign */
+/** A number with so many decimals, of which the last is its unit. ~param number of 16 bits and a sign */
 static char *put_number(char *at, int32_t number, uint16_t decimals)
 {
     char digits[6];
@@ -57,19 +57,19 @@ static char *put_number(char *at, int32_t number, uint16_t decimals)
 static uint16_t names_part(const char *text)
 {
     const char *at = text;
-    while (*at != '\0' && *at != '@') {
+    while (*at != '\0' && *at != '~') {
         at++;
     }
-    return (uint16_t)(*at == '@');
+    return (uint16_t)(*at == '~');
 }
 
-/** A text with its phase or pin for @ and its number, in thousandths or whole, for #. */
+/** A text with its phase or pin for ~ and its number, in thousandths or whole, for #. */
 static char *put_text(char *at, const char *text, const char *part, int32_t number, uint16_t decimals)
 {
     char *next = at;
     const char *from;
     for (from = text; *from != '\0'; from++) {
-        if (*from == '@') {
+        if (*from == '~') {
             next = text_put(next, part);
         } else if (*from == '#') {
             next = put_number(next, number, decimals);

@@ -7,7 +7,7 @@
 #define MISSING_SHIFT 2 /* less than a quarter of the current in the other direction */
 #define MA_SHIFT 12u    /* up to 16 mA a count */
 #define MA_PER_COUNT ((uint16_t)(4000.0F * PARAM_F(NORM_CURRENT_CONST) * 4096.0F + 0.5F))
-#define DEAD_NS ((uint16_t)(0.75F * PWM_TICK_SEC * 1000000000.0F * 256.0F + 0.5F)) /* of a duty count, Q8: one leg loses what two others gain, 4/3 along the vector */
+#define DEAD_NS_A_COUNT ((uint16_t)(0.75F * PWM_TICK_SEC * 1000000000.0F * 256.0F + 0.5F)) /* of a duty count, Q8: one leg loses what two others gain, 4/3 along the vector */
 #define MOST_MOHM 60000u
 
 /* Where the directions +A, -C, +B, -A, +C, -B have a phase's own. */
@@ -64,13 +64,13 @@ static void judge_phases(const bringup_level_t *full, bringup_wiring_t *w)
     uint16_t phase;
     for (phase = 0; phase < PHASES; phase++) {
         uint16_t bit = (uint16_t)(1u << phase);
-        int16_t out = leg_current(full, w, phase, plus[phase]), in = (int16_t)-leg_current(full, w, phase, minus[phase]);
+        int16_t away = leg_current(full, w, phase, plus[phase]), back = (int16_t)-leg_current(full, w, phase, minus[phase]);
         int16_t least = BRINGUP_LEAST_Q13;
-        if (out < least && in < least) {
+        if (away < least && back < least) {
             w->open |= bit;
-        } else if (out < (in >> MISSING_SHIFT)) {
+        } else if (away < (back >> MISSING_SHIFT)) {
             w->high |= bit;
-        } else if (in < (out >> MISSING_SHIFT)) {
+        } else if (back < (away >> MISSING_SHIFT)) {
             w->low |= bit;
         } else {
             /* both ways */
@@ -141,7 +141,7 @@ static uint16_t dead_time(const both_t *s)
     if (left > 0 && s->full_q13 > s->half_q13) {
         counts = quotient((uint32_t)left, (uint16_t)(s->full_q13 - s->half_q13), 6000u);
     }
-    return (uint16_t)(qm_muluu(counts, DEAD_NS) >> 9); /* Q8, of two directions */
+    return (uint16_t)(qm_muluu(counts, DEAD_NS_A_COUNT) >> 9); /* Q8, of two directions */
 }
 
 static uint16_t percent(uint16_t part, uint16_t whole)

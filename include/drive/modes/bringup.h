@@ -15,10 +15,10 @@
 /* Rows on lines of their own: clang-format would stagger them. */
 /* clang-format off */
 
-/** X(name, text): what the user is asked. # stands for a number, @ for a pin or a phase. S2 and S3 answer. */
+/** X(name, text): what the user is asked. # stands for a number, ~ for a pin or a phase. S2 and S3 answer. */
 #define BRINGUP_QUESTION_TABLE(X) \
-    X(BEGIN, "foc33 BRINGUP, sent by @. Press S2") \
-    X(UART, "did that line name @? S2 = yes, S3 = no") \
+    X(BEGIN, "foc33 BRINGUP, sent by ~. Press S2") \
+    X(UART, "did that line name ~? S2 = yes, S3 = no") \
     X(S3, "press S3") \
     X(LED_ALIVE, "the ALIVE LED alone is lit? S2 = yes, S3 = no") \
     X(LED_RUN, "the RUN LED alone is lit? S2 = yes, S3 = no") \
@@ -33,19 +33,19 @@
     X(MARK, "mark where the shaft stands, then press S2") \
     X(TURNS, "it turns. Press S2 when the mark is back after one turn. S3 = it stands")
 
-/** X(name, unit, decimals, text): what is measured. @ stands for a phase. */
+/** X(name, unit, decimals, text): what is measured. ~ stands for a phase. */
 #define BRINGUP_VALUE_TABLE(X) \
     X(POT_LEFT, " %", 0, "potentiometer left") \
     X(POT_RIGHT, " %", 0, "potentiometer right") \
     X(BUS, " V", 2, "bus") \
-    X(OFFSET, " A", 3, "offset of current @") \
-    X(NOISE, " A", 3, "noise of current @") \
+    X(OFFSET, " A", 3, "offset of current ~") \
+    X(NOISE, " A", 3, "noise of current ~") \
     X(RATIO, " %", 0, "current B against current A where both are alike") \
     X(RESISTANCE, " ohm", 3, "phase resistance with bridge") \
     X(DEAD_TIME, " us", 3, "dead time of the bridge") \
     X(POLE_PAIRS, "", 0, "electrical turns of one turn of the shaft")
 
-/** X(name, remedy): what can be wrong. @ stands for a phase. A remedy names what to look at first, then the line to change. */
+/** X(name, remedy): what can be wrong. ~ stands for a phase. A remedy names what to look at first, then the line to change. */
 #define BRINGUP_FINDING_TABLE(X) \
     X(UART_PIN, "BOARD_PIN_UART_TX and BOARD_UART_TX_PIN in include/board/mclv.h: take the other pin") \
     X(BUTTON_DOWN, "a button is down at rest: BOARD_PIN_S2, BOARD_PIN_S3 in include/board/mclv.h") \
@@ -57,20 +57,20 @@
     X(POT_REVERSED, "swap the potentiometer's outer wires") \
     X(POT_RANGE, "its supply; POT_LIVE_ZERO in userparams.h") \
     X(BUS_DIVIDER, "the supply; BUS_FULL_SCALE_V in userparams.h, bus_divider in tuning/boards/*.toml") \
-    X(OFFSET, "reference of amplifier @; [shunt] reference in tuning/boards/*.toml, BOARD_PIN_CURRENT_@ in include/board/mclv.h") \
-    X(NOISE, "filter, ground and shield of current @; BOARD_PIN_CURRENT_@ in include/board/mclv.h") \
+    X(OFFSET, "reference of amplifier ~; [shunt] reference in tuning/boards/*.toml, BOARD_PIN_CURRENT_~ in include/board/mclv.h") \
+    X(NOISE, "filter, ground and shield of current ~; BOARD_PIN_CURRENT_~ in include/board/mclv.h") \
     X(FAULT_LOW, "the fault input is low at rest: polarity of the comparator, its pull-up; BOARD_PIN_FAULT in include/board/mclv.h") \
     X(FAULT_DEAD, "the fault input stays high: its wire; BOARD_PIN_FAULT in include/board/mclv.h. No motor before it works") \
     X(NO_CURRENT, "no current in any direction: motor wires, supply of the bridge, both current signals") \
-    X(PHASE_OPEN, "the wire of phase @, or its driver") \
-    X(HIGH_SIDE, "the high side of phase @ never turns on: driver, bootstrap, transistor; BOARD_PIN_PWM_@ in include/board/mclv.h") \
-    X(LOW_SIDE, "the low side of phase @ never turns on: driver, transistor; the pin below BOARD_PIN_PWM_@ in include/board/mclv.h") \
-    X(CURRENT_DEAD, "current signal @ does not follow: amplifier, wire; BOARD_PIN_CURRENT_@ in include/board/mclv.h") \
+    X(PHASE_OPEN, "the wire of phase ~, or its driver") \
+    X(HIGH_SIDE, "the high side of phase ~ never turns on: driver, bootstrap, transistor; BOARD_PIN_PWM_~ in include/board/mclv.h") \
+    X(LOW_SIDE, "the low side of phase ~ never turns on: driver, transistor; the pin below BOARD_PIN_PWM_~ in include/board/mclv.h") \
+    X(CURRENT_DEAD, "current signal ~ does not follow: amplifier, wire; BOARD_PIN_CURRENT_~ in include/board/mclv.h") \
     X(CURRENTS_SWAPPED, "swap the current signals (BOARD_PIN_CURRENT_A and _B in include/board/mclv.h), or the drivers of A and B if the direction is wrong, too") \
-    X(DRIVER_SWAPPED, "current @ follows driver C: swap the drivers of @ and C (BOARD_PIN_PWM_@ and _C in include/board/mclv.h)") \
+    X(DRIVER_SWAPPED, "current ~ follows driver C: swap the drivers of ~ and C (BOARD_PIN_PWM_~ and _C in include/board/mclv.h)") \
     X(CURRENTS_MIXED, "the currents do not belong to two legs: check all three drivers and both current signals") \
-    X(SHUNT_INVERTED, "change the sign of KCURR@ in userparams.h, or inverted in tuning/boards/*.toml") \
-    X(SHUNT_GAIN, "KCURR@ in userparams.h: divide it by the share that the ammeter shows; shunt and amplifier of phase @") \
+    X(SHUNT_INVERTED, "change the sign of KCURR~ in userparams.h, or inverted in tuning/boards/*.toml") \
+    X(SHUNT_GAIN, "KCURR~ in userparams.h: divide it by the share that the ammeter shows; shunt and amplifier of phase ~") \
     X(SHUNT_GAINS, "NORM_CURRENT_CONST in userparams.h; [shunt] resistance, amplifier_gain in tuning/boards/*.toml") \
     X(RESISTANCE, "another motor than MOTOR_RS_OHM in userparams.h says; with the ammeter in doubt NORM_CURRENT_CONST") \
     X(DEAD_TIME, "the driver adds or takes off: DEADTIME_SEC in userparams.h, dead_time in tuning/boards/*.toml") \
@@ -142,10 +142,10 @@ typedef struct {
     uint16_t dead_time_ns;
 } bringup_bridge_t;
 
-/** @param full all of the current @return what is connected to what */
+/** ~param full all of the current ~return what is connected to what */
 bringup_wiring_t bringup_wiring(const bringup_level_t *full);
 
-/** @param half less current than full @param w whose signals follow two legs @param bus_10mv of the bridge */
+/** ~param half less current than full ~param w whose signals follow two legs ~param bus_10mv of the bridge */
 bringup_bridge_t bringup_bridge(const bringup_level_t *half, const bringup_level_t *full, const bringup_wiring_t *w, uint16_t bus_10mv);
 
 /** A current in mA. */
