@@ -160,6 +160,20 @@ bringup: setup-run ## [your board] what BRINGUP says of the right board and of m
 	@+$(if $(MOTOR),$(ready),:)
 	@$(front_end) bringup $(if $(board_variant),--variant $(call quoted,$(board_variant))) $(options)
 
+.PHONY: live setup-live
+live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN=port]
+	@+$(ready)
+	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
+	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN)))
+
+setup-live:
+	@tools/setup/prepare.sh live
+
+.PHONY: live-pictures
+live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
+	@+$(MAKE) vboard
+	@$(alone) $(python) -m tools.live.pictures
+
 # Each motor with the header that the tuner writes for it.
 drawn_from = $(tuner) tune --all --brief >/dev/null
 drawn = $(if $(SEED),--seed $(call quoted,$(SEED))) $(if $(CASE),--case $(call quoted,$(CASE))) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(out)
@@ -273,7 +287,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,si
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams make_%),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams live_page make_%),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search low_speeds)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
@@ -302,9 +316,15 @@ test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ...
 	$(call run_suites,$(quick_suites))
 
 # In one go and in sight; each check's own target looks again for what it alone needs.
+browser := chromium=chromium chromedriver=chromium-driver module:selenium=python3-selenium
 setup-checks: setup-test
-	@$(if $(ONLY),:,test/static/need.sh cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
+	@$(if $(ONLY),:,test/static/need.sh $(browser) cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
 	    avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev soffice=libreoffice-calc-nogui)
+
+# What the tests and the pictures of the page of make live need.
+.PHONY: setup-browser
+setup-browser: setup-test
+	@test/static/need.sh $(browser)
 
 setup-test:
 	@tools/setup/prepare.sh test

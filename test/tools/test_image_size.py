@@ -11,6 +11,7 @@ import pytest
 from sample_image import Function, Sample, program
 from support import command, refused
 
+from tools.common import paths
 from tools.common.errors import UserError
 from tools.image import attribution, base, size, stack
 from tools.image.budget import Budget, shares
@@ -337,7 +338,8 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, sample, arguments, w
 
 # ---- the last commit, with a repository and a compiler of the test's own ---------------------------------------------------
 MAKEFILE = """target-elf:
-	@echo "$(OPT) $$(cat firmware/board/main.c)" >>"$(LOG)"; [ -z "$(FAIL)" ] && cp "$(IMAGE)" made.elf && echo made.elf
+	@echo "$(OPT) $$(cat firmware/board/main.c)" >>"$(LOG)"; [ -z "$(FAIL)" ] || { echo "$(FAIL)" >&2; exit 1; }
+	@cat tools/image/x.py build/setup/python >/dev/null && cp "$(IMAGE)" made.elf && echo made.elf
 """
 
 
@@ -345,8 +347,8 @@ class Repository:
     def __init__(self, folder: Path) -> None:
         self.root, self.log = folder / "repository", folder / "log"
         self.main = self.root / "firmware" / "board" / "main.c"
-        for name, text in {"Makefile": MAKEFILE, "tools/make/x.mk": "", "include/x.h": "", "userparams.h": "",
-                           "firmware/board/main.c": ""}.items():
+        for name, text in {"Makefile": MAKEFILE, "tools/image/x.py": "", "include/x.h": "", "userparams.h": "", ".gitignore": "/build",
+                           "build/setup/python": "python3", "firmware/board/main.c": ""}.items():
             (self.root / name).parent.mkdir(parents=True, exist_ok=True)
             (self.root / name).write_text(text, encoding="utf-8")
 
@@ -413,10 +415,23 @@ def test_the_commit_s_own_sources_are_built_with_the_same_settings_once(reposito
     assert repository.log.read_text(encoding="utf-8").splitlines() == ["-O2 /* one */", "-O1 /* one */"]
 
 
+def test_the_rules_of_make_find_all_they_need_among_the_sources_that_are_built(tmp_path):
+    for name in base.SOURCES:
+        place = paths.ROOT / name
+        (shutil.copytree if place.is_dir() else shutil.copy)(place, tmp_path / name)
+    (tmp_path / "bin").mkdir()
+    shutil.copy("/bin/true", tmp_path / "bin" / "xc16-gcc")
+    environment = {name: value for name, value in os.environ.items() if name not in base.MAKES_OWN}
+    done = subprocess.run(["make", "-n", "target-elf", f"XC16={tmp_path}"], cwd=tmp_path, env=environment, capture_output=True, text=True,
+                          check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "firmware/board/main.c" in done.stdout
+
+
 def test_a_commit_that_does_not_build_is_said_and_not_kept(repository, monkeypatch):
     commit = repository.commit("one")
-    monkeypatch.setenv("FAIL", "1")
-    with pytest.raises(base.NoBase, match=f"{commit[:7]} does not build"):
+    monkeypatch.setenv("FAIL", "main.c: wrong")
+    with pytest.raises(base.NoBase, match=f"{commit[:7]} does not build with these settings: main.c: wrong$"):
         repository.build(commit)
     monkeypatch.setenv("FAIL", "")
     repository.build(commit)

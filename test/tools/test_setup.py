@@ -80,7 +80,7 @@ def test_a_compiler_and_ruby_are_for_root_only(machine):
     (machine.bin / "gcc").unlink()
     code, said = machine.run("tools/setup/prepare.sh test", INSTALL="no")
     assert code == 2 and said.count("\n") == 1
-    assert re.search(r"; without root: python3 -m venv .* pip install numpy matplotlib openpyxl pyelftools intelhex pytest tqdm; "
+    assert re.search(r"; without root: python3 -m venv .* pip install numpy matplotlib openpyxl pyelftools intelhex aiohttp pytest tqdm; "
                      r"ask whoever is root for gcc libc6-dev binutils ruby$", said.strip())
     machine.program("python3", "exit 0")
     assert machine.run(INSTALL="no")[1].endswith("without root: ask whoever is root for gcc libc6-dev binutils\n")
@@ -114,6 +114,8 @@ def test_a_failed_installation_is_one_line_with_the_reason_and_the_way_without_r
 def test_the_checks_tools_are_told_likewise(machine):
     assert machine.run("test/static/need.sh cppcheck=cppcheck", INSTALL="no") == (
         2, "foc33: set-up, missing: tools of the checks: as root: apt-get install cppcheck; without root: make test-quick, which needs none of them\n")
+    code, said = machine.run("test/static/need.sh module:selenium=python3-selenium", INSTALL="no")
+    assert code == 2 and said.startswith("foc33: set-up, missing: tools of the checks: as root: apt-get install python3-selenium; ") and said.count("\n") == 1
     code, said = machine.run("test/static/need.sh cppcheck=cppcheck")
     assert code == 0 and said.startswith("foc33: installing Debian packages as root, a minute or two: cppcheck (log: ")
 

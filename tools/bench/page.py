@@ -58,21 +58,21 @@ class Page:
 
 def write(folder: Path, page: Page, folders: tuple[Path, ...] = LIBRARY_FOLDERS) -> None:
     """Writes the page. `folders`: where the plotting library may be."""
-    here, library = Path(__file__).parent, _library(folders)
+    here, script = Path(__file__).parent, library(folders)
     pictures = _that_fit(page.pictures, {row.picture for table in page.before for row in table.rows if row.bad})
     parts = [f"<h1>{_text(page.title)}</h1>", f'<p class="{"good" if page.passed else "bad"}">{_text(page.verdict)}</p>',
              "".join(f"<p>{_text(note)}</p>" for note in page.notes), *map(_table, page.before)]
     if any(pictures):
-        parts.append('<h2 id="title">Curves</h2>' + ('<div id="curves"></div>' if library else f'<p class="bad">{_text(NO_LIBRARY)}</p>'))
+        parts.append('<h2 id="title">Curves</h2>' + ('<div id="curves"></div>' if script else f'<p class="bad">{_text(NO_LIBRARY)}</p>'))
     left_out = sum(picture is None for picture in pictures) if any(pictures) else 0
     parts += [f"<p>{left_out} runs without curves: the page would be too large.</p>"] * bool(left_out)
     parts += map(_table, page.after)
     parts += [_image(folder / name) for name in page.images]
     parts += ["<h2>Files</h2><p>" + " ".join(f'<a href="{_text(name)}">{_text(name)}</a>' for name in page.files) + "</p>"] * bool(page.files)
-    if library and any(pictures):
+    if script and any(pictures):
         data = [picture and {"head": picture.head, "curves": base64.b64encode(picture.curves).decode()} for picture in pictures]
         parts += [f'<script type="application/json" id="pictures">{_json(data)}</script>',
-                  f"<script>{library}</script>", f'<script>{(here / "page.js").read_text(encoding="utf-8")}</script>']
+                  f"<script>{script}</script>", f'<script>{(here / "page.js").read_text(encoding="utf-8")}</script>']
     head = f'<meta charset="utf-8"><title>{_text(page.title)}</title>\n<style>{(here / "page.css").read_text(encoding="utf-8")}</style>'
     (folder / NAME).write_text(f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(parts) + "\n</body></html>\n",
                                encoding="utf-8")
@@ -83,7 +83,7 @@ def draws(folders: tuple[Path, ...] = LIBRARY_FOLDERS) -> bool:
     return any((folder / LIBRARY).is_file() for folder in folders)
 
 
-def _library(folders: tuple[Path, ...]) -> str:
+def library(folders: tuple[Path, ...]) -> str:
     """The plotting library and its style, or "" where it is not installed."""
     for folder in folders:
         file = folder / LIBRARY

@@ -121,17 +121,22 @@ def simulate_on(job: Job, library: Library, board: Any, report: Callable[[float]
     return session.run()
 
 
+def set_up(board: Any, job: Job) -> None:
+    """Plant and rotor as they are before power-up."""
+    for key, value in job.values.items():
+        board.set(key, value)
+    board.set("state.theta_e_deg", job.scenario.rotor_deg)
+    board.set("state.speed_rpm", job.scenario.speed_rpm)
+    if "bus.voltage_v" not in job.values:
+        board.set("bus.voltage_v", board.get("supply.voltage_v"))
+
+
 class Session:
     """A job on a board, from power-up on, as far as it was taken. A row of the trace every `every` periods."""
 
     def __init__(self, job: Job, library: Library, board: Any, report: Callable[[float], None], every: int = 1) -> None:
         self.job, self.library, self.board = job, library, board
-        for key, value in job.values.items():
-            board.set(key, value)
-        board.set("state.theta_e_deg", job.scenario.rotor_deg)
-        board.set("state.speed_rpm", job.scenario.speed_rpm)
-        if "bus.voltage_v" not in job.values:
-            board.set("bus.voltage_v", board.get("supply.voltage_v"))
+        set_up(board, job)
         self.recorder = _Recorder(board, job.signals, report, every)
         self.done: list[tuple[float, str]] = [(0.0, "power-up")]
         self.pending = list(job.actions)

@@ -162,9 +162,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         _to_the_moment(session, way, case)
         injected_s = session.now_s
         state = bench.library.states.get(int(board.get("fw.state")), "?")
-        rating = injection.Rating(param(bench.library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(bench.motor.path)).rated_torque_nm,
-                                  *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
-                                  dead_rpm=dead_rpm(bench.library.params), start_dead=start_dead(bench.library.params))
+        rating = rating_of(bench.library, bench.motor, board)
         unseen = case.what.unseen(case.size, rating)
         settled_s = settled(case, way.end_s + reversal_s(case, state, bench.library.params), injected_s, unseen.clock)
         end_s = settled_s + judge.JUDGE_S
@@ -183,6 +181,13 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
     with_fault, target = result or (None, "")
     verdict = _ended(ending) if with_fault is None else judge.judge(with_fault.trace, without.trace, limits)
     return Trial(case, with_fault, without, injected_s, state, target, verdict)
+
+
+def rating_of(library: Library, motor: Part, board: Any) -> injection.Rating:
+    """What the sizes of faults are shares of, for the motor on this board."""
+    return injection.Rating(param(library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(motor.path)).rated_torque_nm,
+                            *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
+                            dead_rpm=dead_rpm(library.params), start_dead=start_dead(library.params))
 
 
 def settled(case: Case, way_end_s: float, injected_s: float, clock: float) -> float:

@@ -118,11 +118,16 @@ def write_summary(folder: Path, data: dict[str, Any]) -> None:
 
 def write_trace(path: Path, trace: Trace) -> None:
     """A CSV file: time and every signal, numbers with six significant digits."""
-    form = "%.5f," + ",".join(["%.6g"] * len(trace.names)) + "\n"
     with path.open("w", encoding="utf-8") as file:
-        file.write(",".join(["time_s"] + trace.names) + "\n")
-        columns = trace.data.T.tolist()
-        file.writelines(form % (time, *row) for time, row in zip(trace.time_s.tolist(), columns))
+        file.writelines(trace_lines(trace))
+
+
+def trace_lines(trace: Trace) -> Iterator[str]:
+    """The lines of such a file."""
+    form = "%.5f," + ",".join(["%.6g"] * len(trace.names)) + "\n"
+    yield ",".join(["time_s"] + trace.names) + "\n"
+    for time, row in zip(trace.time_s.tolist(), trace.data.T.tolist()):
+        yield form % (time, *row)
 
 
 def write_csv(path: Path, header: list[str], rows: list[list[Any]]) -> None:

@@ -11,7 +11,8 @@ from pathlib import Path
 from tools.common import paths
 from tools.common.progress import waiting
 
-SOURCES = ("Makefile", "tools/make", "firmware", "include", "userparams.h")
+SOURCES = ("Makefile", "tools", "firmware", "include", "userparams.h") # all that `make image` reads of a tree
+SETUP = Path("build/setup")                                            # what `make image` installs: this tree's is good for any commit
 CHANGED = (":(glob)firmware/**/*.[ch]", ":(glob)include/**/*.h", "userparams.h")
 MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
 
@@ -50,12 +51,15 @@ def build(commit_id: str, variables: list[str], root: Path = paths.ROOT) -> Path
         raise NoBase(f"commit {commit_id[:7]} has no firmware in the folders of today")
     with tarfile.open(fileobj=BytesIO(archive.stdout)) as tar:
         tar.extractall(source)
+    (source / SETUP).parent.mkdir(exist_ok=True)
+    (source / SETUP).symlink_to(root / SETUP)
     environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN}
     with waiting(f"building commit {commit_id[:7]}, to compare with"):
         done = subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "target-elf", *variables], cwd=source, env=environment,
                               stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0 or not done.stdout.strip():
-        raise NoBase(f"commit {commit_id[:7]} does not build with these settings")
+        reason = next(iter(done.stderr.splitlines()), "no image named")
+        raise NoBase(f"commit {commit_id[:7]} does not build with these settings: {reason}")
     (source / done.stdout.split()[-1]).rename(elf)
     return elf
 

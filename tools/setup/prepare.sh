@@ -2,7 +2,8 @@
 # Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
 #
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib; if it can be had, dygraphs for the curves of a run's page
-#   tools/setup/prepare.sh tune    the same, and openpyxl
+#   tools/setup/prepare.sh live    the same, and aiohttp
+#   tools/setup/prepare.sh tune    the first, with openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
@@ -93,13 +94,21 @@ case $job in
         python_packages="$python_packages python3-openpyxl"
         ;;
     target) ;;
-    *) give_up "prepare.sh, '$job': name the job, run, tune, target or test" ;;
+    live) ;;
+    *) give_up "prepare.sh, '$job': name the job, run, live, tune, target or test" ;;
 esac
 
 case $job in
     target | test)
         modules="$modules elftools intelhex"
         python_packages="$python_packages python3-pyelftools python3-intelhex"
+        ;;
+esac
+
+case $job in
+    live | test)
+        modules="$modules aiohttp"
+        python_packages="$python_packages python3-aiohttp"
         ;;
 esac
 

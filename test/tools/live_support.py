@@ -1,0 +1,86 @@
+"""What the tests of make live share: a board to work at, and a server in a process of its own."""
+
+import contextlib
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+from support import LIBRARY
+
+from tools.bench.board import Library
+from tools.common import board_file, motor_file, paths
+from tools.live.pace import FRAME_S
+from tools.live.recording import Origin
+from tools.live.virtual_board import VirtualBoard
+
+MOTOR = "hurst_dmb0224c10002"
+
+
+def origin() -> Origin:
+    motor = motor_file.part(MOTOR)
+    return Origin(motor, board_file.part(*board_file.named(motor)), [], {})
+
+
+def bench() -> VirtualBoard:
+    return VirtualBoard(Library(LIBRARY), origin())
+
+
+def passes(board: VirtualBoard, seconds: float) -> dict:
+    """Lets motor time pass in frames; the last frame, with the log and curves of all."""
+    log, strip = [], []
+    for _ in range(round(seconds / FRAME_S)):
+        board.run(FRAME_S)
+        frame = json.loads(json.dumps(board.frame(), allow_nan=False)) # as the page gets it
+        log += frame["log"]
+        strip += frame["strip"]
+    return frame | {"log": log, "strip": strip}
+
+
+def started(pot: float = 0.5) -> VirtualBoard:
+    """A board whose motor turns."""
+    board = bench()
+    passes(board, 0.2)
+    board.act({"set": ["input.pot", pot]})
+    board.act({"press": "S2"})
+    board.act({"release": "S2"})
+    assert passes(board, 3.0)["state"] == "CLOSED"
+    return board
+
+
+class Served:
+    """A running server. `url` is what it has printed."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "tools.live", "--library", str(LIBRARY), "--listen", "0", *arguments]
+        self.process = subprocess.Popen(command, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        first = self.process.stdout.readline()
+        assert first.startswith("open http://127.0.0.1:"), first + self.process.stderr.read()
+        self.url = first.split()[1]
+        self.port = urlsplit(self.url).port
+        self.token = self.url.partition("token=")[2]
+
+    def end(self) -> tuple[int, str]:
+        self.process.terminate()
+        _, said = self.process.communicate(timeout=10)
+        return self.process.returncode, said
+
+
+@contextlib.contextmanager
+def served(*arguments: str) -> Iterator[Served]:
+    server = Served(*arguments)
+    try:
+        yield server
+    finally:
+        server.end()
+
+
+def until(found, what: str, seconds: float = 15.0):
+    """Waits for something true."""
+    end_s = time.monotonic() + seconds
+    while not (value := found()):
+        assert time.monotonic() < end_s, what
+        time.sleep(0.02)
+    return value

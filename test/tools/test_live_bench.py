@@ -1,0 +1,168 @@
+"""The board of make live: buttons, sliders, faults, what a page is told, and recordings that make run repeats exactly."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from live_support import bench, origin, passes, started
+from support import document, refusal
+
+from tools.bench import report, scenario_file, simulate
+from tools.live.faults import FAULTS
+from tools.live.recording import LONGEST_S
+
+ENDS = {"open_a": "OPEN_PHASE", "open_b": "OPEN_PHASE", "open_c": "OPEN_PHASE", "never_on": "OPEN_PHASE", "never_off": "OVERCURRENT_HW",
+        "ia_zero": "OPEN_PHASE", "ib_stuck": "OPEN_PHASE", "ib_rail": "OVERCURRENT_SW", "ia_gain": "CURRENT_SENSOR", "bus_half": "UNDERVOLTAGE",
+        "bus_rail": "OVERVOLTAGE", "supply_lost": "UNDERVOLTAGE", "blocked": "STALL", "interrupts_some": "INTERRUPT_RATE", "interrupts_all": "ADC_LOST"}
+"""What the drive says within a second at this speed and load; the others it rides through. A dead current signal looks like an open phase."""
+
+
+def test_a_click_on_s2_starts_the_motor_at_the_potentiometers_speed_and_another_stops_it():
+    board = started(0.5)
+    frame = passes(board, 1.0)
+    half_rpm = sum(board.library.params[name] for name in ("MINIMUM_SPEED_RPM", "NOMINAL_SPEED_RPM")) / 2.0
+    assert frame["now"]["target_rpm"] == pytest.approx(half_rpm, abs=3.0) and frame["now"]["speed_rpm"] == pytest.approx(half_rpm, rel=0.005)
+    assert frame["outputs"] == 63 and frame["leds"]["run"] == 1 and frame["t"] == pytest.approx(4.21, abs=0.01)
+    board.act({"press": "S2"})
+    board.act({"release": "S2"})
+    assert passes(board, 2.0)["state"] == "STOPPED" and board.board.get("input.s2") == 0.0
+
+
+def test_a_button_is_up_when_nobody_holds_it_any_more():
+    board = bench()
+    for who in ("one", "other"):
+        board.act({"press": "S3"}, who)
+    passes(board, 0.5)
+    board.act({"release": "S3"}, "one")
+    assert passes(board, 0.1)["buttons"] == {"S2": 0, "S3": 1}
+    board.left("other")
+    assert passes(board, 0.1)["buttons"]["S3"] == 0
+    board.act({"release": "S3"}, "one") # once more: nothing happens
+    assert [keys for _, keys in board.recording.actions] == [{"input.s3": 1.0}, {"input.s3": 0.0}]
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_acts_and_can_be_mended(name):
+    board = started()
+    board.act({"set": ["load.constant_nm", 0.02]})
+    passes(board, 0.5)
+    board.act({"fault": [name, True]})
+    frame = passes(board, 1.0)
+    assert frame["broken"] == [name] and frame["fault"] == ENDS.get(name, "NONE")
+    board.act({"fault": [name, False]})
+    assert passes(board, 0.1)["broken"] == [] and {key: board.board.get(key) for key in board.normal} == board.normal
+
+
+def test_where_two_faults_are_the_same_wire_the_other_stays_when_one_is_mended():
+    board = bench()
+    for command in (["open_a", True], ["open_b", True], ["open_b", False]):
+        board.act({"fault": command})
+    assert board.board.get("fault.open_phase") == 1.0
+
+
+def test_power_up_begins_anew_and_leaves_sliders_and_faults():
+    board = started()
+    board.act({"set": ["supply.voltage_v", 20.0]})
+    board.act({"fault": ["open_c", True]})
+    run = passes(board, 0.5)["run"]
+    board.act({"power": True})
+    frame = passes(board, 0.2)
+    assert frame["run"] == run + 1 and frame["t"] == pytest.approx(0.21, abs=0.01) and frame["state"] == "STOPPED"
+    assert frame["now"]["bus_v"] == pytest.approx(20.0, abs=0.1) and frame["settings"]["input.pot"] == 0.5
+    assert board.board.get("fault.open_phase") == 3.0 and '"fault.open_phase" = 3' in board.scenario()
+
+
+@pytest.mark.parametrize("command, part", [
+    (None, "no such command"), ([], "no such command"), ({"stop": 1}, "press, release, set"), ({"press": "S2", "set": []}, "no such command"),
+    ({"press": "S1"}, "no button 'S1'"), ({"press": ["S2"]}, "no button"), ({"set": "pot"}, "no slider"), ({"set": ["motor.rs_ohm", 1.0]}, "no slider"),
+    ({"set": ["input.pot", 1.01]}, "choose 0 .. 1"), ({"set": ["input.pot", "much"]}, "impossible"), ({"set": ["input.pot", True]}, "impossible"),
+    ({"set": ["input.pot", float("nan")]}, "impossible"), ({"fault": ["open_d", True]}, "did you mean 'open_c'?"), ({"fault": [{}, True]}, "no fault")])
+def test_a_wrong_command_is_refused_in_one_line_and_changes_nothing(command, part):
+    board = bench()
+    refusal(lambda: board.act(command), part)
+    assert board.recording.actions == []
+
+
+def test_a_slider_on_its_way_has_one_line_and_a_curve_a_gap_where_it_means_nothing():
+    board = bench()
+    passes(board, 0.2)
+    lines = []
+    for step in range(1, 11):
+        board.act({"set": ["load.constant_nm", step / 1000.0]})
+        lines += passes(board, 0.05)["log"]
+    texts = {line["id"]: line["text"] for line in lines}
+    assert [text for text in texts.values() if text.startswith("Load")] == ["Load torque 10 mN·m"]
+    row = dict(zip(("t", "reference", "estimate", "true", "d", "q", "asked", "torque", "bus"), passes(board, 0.1)["strip"][-1]))
+    assert [name for name, value in row.items() if value is None] == ["reference", "estimate", "d", "q", "asked"]
+    assert None not in passes(started(), 0.1)["strip"][-1]
+
+
+def test_curves_have_a_row_every_ten_milliseconds_however_time_passes():
+    board = started()
+    times = [row[0] for row in board.strip]
+    for seconds in (0.0005, 0.003, 0.05, 0.007) * 5:
+        board.run(seconds)
+        times += [row[0] for row in board.frame()["strip"]]
+    assert np.diff(times) == pytest.approx(0.01, abs=2e-4) and len(times) > 300
+
+
+def test_the_orbit_is_one_turn_of_the_voltage_that_is_asked_for():
+    frame = passes(started(), 0.5)
+    for name, size in (("v", np.hypot(frame["now"]["v_d_v"], frame["now"]["v_q_v"])), ("i", np.hypot(frame["now"]["i_d_a"], frame["now"]["i_q_a"]))):
+        points = np.array(frame["orbit"][name])
+        turned = np.degrees(np.ptp(np.unwrap(np.arctan2(points[:, 1], points[:, 0]))))
+        assert len(points) > 50 and turned == pytest.approx(360.0, abs=25.0) and np.hypot(*points.T).mean() == pytest.approx(size, rel=0.15)
+
+
+# ---- recordings ----------------------------------------------------------------------------------------------------------
+def repeated(board, text: str):
+    """The run that `make run` makes of a saved scenario."""
+    item = scenario_file.read(document(text))
+    return simulate.simulate(simulate.prepare(item, board.library, origin().motor, origin().board), lambda seconds: None)
+
+
+def test_make_run_repeats_a_saved_scenario_to_the_last_bit_and_its_expectations_hold():
+    board = bench()
+    board.act({"set": ["load.constant_nm", 0.01]})
+    board.act({"power": True})
+    passes(board, 0.2)
+    for command in ({"set": ["input.pot", 0.3]}, {"press": "S2"}):
+        board.act(command)
+    passes(board, 0.15)
+    board.act({"release": "S2"})
+    passes(board, 2.3)
+    board.act({"set": ["input.pot", 0.6123]})
+    board.run(0.0171)
+    board.act({"set": ["supply.voltage_v", 22.5]})
+    passes(board, 0.5)
+    board.act({"fault": ["blocked", True]})
+    assert passes(board, 1.0)["fault"] == "STALL"
+    run, trace = repeated(board, board.scenario()), board.recording.trace()
+    rows = np.searchsorted(run.trace.time_s, trace.time_s - 1e-6)
+    for name in ("plant.theta_e_deg", "plant.i_a", "bus.voltage_v", "fw.state"):
+        assert np.array_equal(run.trace.column(name)[rows], trace.column(name)), name
+    outcomes = report.check(run)
+    assert [outcome.row for outcome in outcomes if not outcome.ok] == [] and len(outcomes) >= 3
+
+
+def test_the_expectations_of_a_saved_scenario_fail_when_the_drive_does_something_else():
+    board = started()
+    run = repeated(board, board.scenario().replace("[[expect]]", '[[event]]\nat_s = 2.5\nset = { "load.locked" = 1 }\n\n[[expect]]', 1))
+    assert len([outcome for outcome in report.check(run) if not outcome.ok]) == 2 # a fault came, and the state at the end is another
+
+
+def test_a_recording_that_is_too_long_or_empty_is_refused_in_one_line():
+    board = bench()
+    refusal(board.scenario, "do something first")
+    refusal(lambda: board.recording.toml(LONGEST_S + 1.0), "120 s", "power up again")
+
+
+def test_csv_has_a_row_a_millisecond_and_the_last_two_minutes():
+    board = started()
+    table = list(csv.reader(io.StringIO(board.csv())))
+    times = np.array([float(row[0]) for row in table[1:]])
+    assert table[0][:2] == ["time_s", "plant.speed_rpm"] and np.diff(times) == pytest.approx(0.001, abs=2e-5) and times[-1] == pytest.approx(board.time_s, abs=0.001)
+    for minute in range(5):
+        board.recording.add_rows(np.array([60.0 * minute, 60.0 * minute + 59.0]), np.zeros((2, len(board.recording.signals))))
+    assert [times[0] for times, _ in board.recording.rows][0] == 120.0

@@ -1,0 +1,195 @@
+"""The page of make live in a real browser: start the motor, turn the potentiometer, break something, read what the page says."""
+
+import subprocess
+
+import pytest
+from live_support import served, until
+from support import document
+
+from tools.bench import scenario_file
+from tools.common import paths
+
+HOME, END, ARROW_DOWN = "\ue011", "\ue010", "\ue015"
+SIZES = [(1400, 900), (1000, 700)]
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory):
+    """The browser, and the folder where it saves."""
+    done = subprocess.run(["make", "-s", "setup-browser"], cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    if done.returncode != 0:
+        pytest.fail(done.stdout, pytrace=False)
+    from tools.live import browser # needs what has just been installed
+    folder = tmp_path_factory.mktemp("saved")
+    driver = browser.start(folder)
+    browser.resize(driver, *SIZES[0])
+    yield driver, folder
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def server():
+    with served() as running:
+        yield running
+
+
+class Page:
+    """What a user sees and does."""
+
+    def __init__(self, driver, url: str) -> None:
+        self.driver = driver
+        driver.get(url)
+        self.wait("return window.eval('foc33.frames') > 2", "no frames come")
+
+    def run(self, script: str, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def frame(self) -> dict:
+        return self.run("return window.eval('foc33.frame')")
+
+    def wait(self, script: str, what: str, seconds: float = 15.0):
+        return until(lambda: self.run(script), f"{what}: {self.run('return document.body.innerText')[:600]}", seconds)
+
+    def one(self, selector: str):
+        return self.driver.find_element("css selector", selector)
+
+    def text(self, selector: str) -> str:
+        return self.one(selector).text
+
+    def state(self, name: str) -> None:
+        self.wait(f"return document.querySelector('#states .now')?.dataset.state === '{name}'", f"the state is not {name}")
+
+    def click(self, selector: str) -> None:
+        self.one(selector).click()
+
+    def slide(self, key: str, value: float) -> None:
+        self.run("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", self.one(f'input[name="{key}"]'), value)
+
+
+@pytest.fixture
+def page(chromium, server) -> Page:
+    """The page as it is opened, the board just powered up, whole and without load, the potentiometer at its left end."""
+    page = Page(chromium[0], server.url)
+    page.one("#pot").send_keys(HOME)
+    page.slide("load.constant_nm", 0.0)
+    page.wait("return window.eval('foc33.frame.settings')['input.pot'] === 0 && window.eval('foc33.frame.settings')['load.constant_nm'] === 0", "sliders")
+    for fault in page.frame()["broken"]:
+        page.click(f"[data-fault={fault}]")
+    page.run("document.getElementById('power').click()")
+    page.wait("return window.eval('foc33.frame.t') < 1.0 && window.eval('foc33.frame.broken.length') === 0", "no power-up")
+    page.state("STOPPED")
+    return page
+
+
+@pytest.fixture
+def turning(chromium, server) -> Page:
+    """The page with a motor that turns, as the test before has left it if it did; the potentiometer at its left end."""
+    page = Page(chromium[0], server.url)
+    page.one("#pot").send_keys(HOME)
+    if page.frame()["state"] == "STOPPED":
+        page.click("[data-button=S2]")
+    page.state("CLOSED")
+    return page
+
+
+def test_s2_starts_the_motor_the_potentiometer_turns_it_faster_and_a_fault_is_told(page):
+    from selenium.webdriver import ActionChains
+    page.click("[data-button=S2]")
+    page.state("CLOSED")
+    slow_rpm = page.frame()["now"]["target_rpm"]
+    ActionChains(page.driver).click_and_hold(page.one("#pot")).move_by_offset(0, -30).move_by_offset(30, 20).release().perform()
+    page.wait("return window.eval('foc33.frame.settings')['input.pot'] > 0.5", "the knob does not turn")
+    page.wait(f"return window.eval('foc33.frame.now.speed_rpm') > {slow_rpm} + 500", "the motor does not follow")
+    assert page.one("#pot").get_attribute("aria-valuenow") == str(round(page.frame()["settings"]["input.pot"] * 100))
+    assert "on" in page.one("#led-run").get_attribute("class") and page.one("#fault").get_attribute("hidden")
+    page.slide("load.constant_nm", 0.03)
+    page.wait("return window.eval('foc33.frame.now.torque_nm') > 0.025", "no load")
+    page.click("[data-fault=open_b]")
+    page.state("FAULT")
+    assert page.text("#fault").startswith("OPEN_PHASE: ") and "check the motor's wires" in page.text("#fault")
+    assert page.one("[data-fault=open_b]").get_attribute("aria-pressed") == "true"
+    lines = page.text("#log").split("\n")
+    assert "fault OPEN_PHASE" in lines and "phase B open" in lines and "S2 pressed" in lines
+    page.click("[data-fault=open_b]")
+    page.click("[data-button=S2]")
+    page.state("STOPPED")
+    assert page.one("#fault").get_attribute("hidden")
+
+
+def test_keys_work_the_board_as_the_mouse_does(page):
+    page.one("#pot").send_keys(END)
+    page.wait("return window.eval('foc33.frame.settings')['input.pot'] === 1", "End")
+    page.one("#pot").send_keys(ARROW_DOWN)
+    page.wait("return Math.abs(window.eval('foc33.frame.settings')['input.pot'] - 0.99) < 1e-9", "arrow")
+    page.one("[data-button=S2]").send_keys(" ")
+    page.state("RAMP")
+    assert page.frame()["buttons"] == {"S2": 0, "S3": 0}
+
+
+def test_a_limit_says_what_holds_the_output_back_and_what_to_do(turning):
+    turning.one("#pot").send_keys(END)
+    turning.slide("load.constant_nm", 0.04)
+    turning.wait("return [...document.querySelectorAll('#limits b')].some((b) => b.textContent === 'VOLTAGE' && b.title.includes('raise the bus'))", "no limit")
+    turning.slide("load.constant_nm", 0.0)
+
+
+def test_curves_rotor_and_planes_are_drawn(turning):
+    page = turning
+
+    def painted(selector: str) -> int:
+        return page.run("""const all = [...document.querySelectorAll(arguments[0])];
+            return Math.min(...all.map((c) => c.getContext("2d").getImageData(0, 0, c.width, c.height).data.filter((v, n) => n % 4 === 3 && v).length))""", selector)
+
+    assert painted("#rotor") > 8000 and painted("#stator") > 1000 and painted("#frame") > 1000
+    assert page.run("return document.querySelectorAll('#strips .graph').length") == 4 and painted("#strips .graph canvas:first-of-type") > 300
+    before = page.run("return document.getElementById('rotor').toDataURL()")
+    page.wait(f"return document.getElementById('rotor').toDataURL() !== '{before}'", "the rotor stands still")
+    first, other = page.run("return window.eval('foc33.frames')"), page.run("return performance.now()")
+    page.wait(f"return window.eval('foc33.frames') >= {first} + 40", "no frames")
+    assert 40 / (page.run("return performance.now()") - other) * 1000 > 10 # of the 20 that come
+
+
+def test_pace_slows_the_board_down(turning):
+    page = turning
+    page.run("const pace = document.getElementById('pace'); pace.value = '0.01'; pace.dispatchEvent(new Event('change'))")
+    page.wait("return window.eval('foc33.frame.pace') === 0.01", "pace")
+    begin = page.frame()["t"]
+    page.wait("return window.eval('foc33.frame.measured') !== null", "nothing measured")
+    assert 0.0 < page.frame()["t"] - begin < 0.1
+    page.run("const pace = document.getElementById('pace'); pace.value = '1'; pace.dispatchEvent(new Event('change'))")
+    page.wait("return window.eval('foc33.frame.pace') === 1", "pace")
+
+
+def test_a_scenario_is_saved_and_make_run_would_take_it(turning, chromium):
+    turning.click("#save-scenario")
+    file = chromium[1] / "recorded.toml"
+    until(file.exists, "no file")
+    item = scenario_file.read(document(until(lambda: file.read_text(encoding="utf-8"), "empty")))
+    assert "S2" in [event.button for event in item.events if event.kind == "press"] and item.motor == "hurst_dmb0224c10002"
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_nothing_is_cut_off_or_wider_than_the_window(turning, size):
+    page = turning
+    from tools.live import browser
+    browser.resize(page.driver, *size)
+    page.wait(f"return innerWidth === {size[0]}", "size")
+    assert page.run("return document.documentElement.scrollWidth <= innerWidth")
+    wide = page.run("""return [...document.querySelectorAll("main *, header *")].filter((e) => e.clientWidth && !e.closest("svg, #what, .graph, #log") &&
+        e.scrollWidth > e.clientWidth + 1).map((e) => `${e.tagName}#${e.id}.${e.className}`)""")
+    assert wide == []
+    browser.resize(page.driver, *SIZES[0])
+
+
+def test_when_the_board_is_gone_the_page_says_so_and_what_to_do(chromium):
+    with served() as short:
+        page = Page(chromium[0], short.url)
+        assert page.one("#message").get_attribute("hidden")
+        assert short.end() == (0, "")
+        page.wait("return document.getElementById('message').innerText.includes('Start it again')", "no word")
+
+
+def test_the_browser_found_nothing_to_complain_about(turning):
+    page = turning
+    own = [entry for entry in page.driver.get_log("browser") if "ERR_CONNECTION_REFUSED" not in entry["message"] and "WebSocket" not in entry["message"]]
+    assert own == [] and page.run("return performance.getEntriesByType('resource').filter((e) => !e.name.startsWith(location.origin)).length") == 0

@@ -1,0 +1,1 @@
+"""make live: a page in the browser at which somebody works with the virtual board, or watches a real one."""

@@ -1,0 +1,57 @@
+// Brings the parts together: a hello builds them, each frame is shown by all.
+const foc33 = { frames: 0, frame: null, refused: "" }; // for those who look from outside
+let views = null, run = 0;
+
+function say(text) {
+  by("message").hidden = !text;
+  by("message").textContent = text;
+}
+
+const link = new Link(take, say);
+const board = new BoardView((command) => link.send(command));
+
+function begin(hello) {
+  document.body.classList.toggle("real", !hello.virtual);
+  by("what").textContent = by("what").title = [hello.motor, hello.board, ...hello.defines].join(" · ");
+  ["sliders", "throws", "states", "log", "pace"].forEach((id) => by(id).replaceChildren());
+  for (const pace of hello.paces) { make("option", { value: pace, textContent: pace === 1 ? "real time" : `1 : ${Math.round(1 / pace)}` }, by("pace")); }
+  const drive = new DriveView(hello), strips = new StripsView(hello);
+  views = { drive, strips, all: [drive, strips, board, new BenchView(hello, (command) => link.send(command)), views?.rotor ?? new RotorView(hello), new PlanesView(hello)] };
+  views.rotor = views.all[4];
+  run = 0;
+}
+
+function tempo(frame) {
+  const slow = frame.measured !== null && frame.measured < 0.95 * frame.pace;
+  by("time").textContent = `${frame.t.toFixed(frame.pace < 0.1 ? 3 : 1)} s`;
+  if (document.activeElement !== by("pace")) { by("pace").value = String(frame.pace); }
+  by("measured").classList.toggle("slow", slow);
+  by("measured").textContent = slow ? `this machine manages 1 : ${(1 / frame.measured).toFixed(frame.measured > 0.1 ? 1 : 0)}` : "";
+}
+
+function take(message) {
+  if (message.hello) { begin(message.hello); return; }
+  if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
+  if (message.refused) { foc33.refused = message.refused; say(message.refused); setTimeout(() => say(""), 4000); return; }
+  if (!views) { return; }
+  if (run && message.run !== run) { views.drive.clear(); views.strips.clear(); }
+  run = message.run;
+  tempo(message);
+  views.all.forEach((view) => view.show(message));
+  foc33.frame = message;
+  foc33.frames++;
+}
+
+by("power").addEventListener("click", () => link.send({ power: true }));
+by("pace").addEventListener("change", () => { link.send({ pace: Number(by("pace").value) }); by("pace").blur(); });
+for (const what of ["scenario", "csv"]) {
+  by(`save-${what}`).addEventListener("click", async (event) => { // what cannot be saved says why, instead of an empty file
+    event.preventDefault();
+    const answer = await fetch(`/save/${what}${location.search}`);
+    if (!answer.ok) { say((await answer.text()).trim()); setTimeout(() => say(""), 6000); return; }
+    const file = make("a", { href: URL.createObjectURL(await answer.blob()), download: { scenario: "recorded.toml", csv: "recorded.csv" }[what] }, document.body);
+    file.click();
+    file.remove();
+    URL.revokeObjectURL(file.href);
+  });
+}

@@ -1,0 +1,180 @@
+"""The page's server: on this machine only, for those who have the token; all tabs see the same board."""
+
+import asyncio
+import contextlib
+import json
+import os
+import secrets
+import signal
+from typing import Any
+
+from aiohttp import WSMsgType, web
+
+from tools.common.errors import UserError
+
+from . import page
+from .pace import PACES, Pacemaker
+
+ADDRESS = "127.0.0.1"
+NAMES = (ADDRESS, "localhost")
+USUAL_PORT = 8033
+FRAMES_KEPT = 40
+"""For a tab that does not keep up; older ones are dropped."""
+LONGEST_MESSAGE = 4096
+SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv")}
+
+
+class Tab:
+    """One connection. `waiting`: frames that are still to be sent."""
+
+    def __init__(self, socket: web.WebSocketResponse) -> None:
+        self.socket = socket
+        self.waiting: asyncio.Queue[str] = asyncio.Queue(FRAMES_KEPT)
+
+    def put(self, text: str) -> None:
+        if self.waiting.full():
+            self.waiting.get_nowait()
+        self.waiting.put_nowait(text)
+
+
+class Server:
+    """Give its `publish` to the pacemaker."""
+
+    def __init__(self, bench: Any, pace: float) -> None:
+        self.bench = bench
+        self.token = secrets.token_urlsafe(16)
+        self.nonce = secrets.token_urlsafe(16)
+        self.tabs: set[Tab] = set()
+        self.port = 0
+        self.loop = asyncio.get_running_loop()
+        self.over = asyncio.Event()
+        self.pacemaker = Pacemaker(bench, self.publish, pace)
+
+    @property
+    def url(self) -> str:
+        return f"http://{ADDRESS}:{self.port}/?token={self.token}"
+
+    def publish(self, frame: dict[str, Any]) -> None:
+        """From the board's thread: a frame for every tab."""
+        text = json.dumps(frame)
+        with contextlib.suppress(RuntimeError): # the loop has ended before the board
+            self.loop.call_soon_threadsafe(self._deal, text, "ended" in frame)
+
+    def _deal(self, text: str, last: bool) -> None:
+        for tab in self.tabs:
+            tab.put(text)
+        if last:
+            self.over.set()
+
+    def application(self) -> web.Application:
+        app = web.Application(middlewares=[self._guard], client_max_size=LONGEST_MESSAGE)
+        app.router.add_get("/", self._page)
+        app.router.add_get("/board", self._socket)
+        app.router.add_get("/save/{what}", self._save)
+        return app
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
+        """Nobody gets in from another page or under another name: that page's scripts could work the board."""
+        hosts = [f"{name}:{self.port}" for name in NAMES]
+        if request.host not in hosts:
+            raise web.HTTPForbidden(text="foc33: another host's name: open the address that make live has printed\n")
+        if request.headers.get("Origin") not in (None, f"http://{request.host}"):
+            raise web.HTTPForbidden(text="foc33: a page from elsewhere\n")
+        if not secrets.compare_digest(request.query.get("token", "").encode(), self.token.encode()):
+            raise web.HTTPForbidden(text="foc33: without the token: open the address that make live has printed\n")
+        return await handler(request)
+
+    async def _page(self, request: web.Request) -> web.Response:
+        policy = (f"default-src 'none'; script-src 'nonce-{self.nonce}'; style-src 'unsafe-inline'; img-src data:; "
+                  f"connect-src 'self' ws://{request.host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'")
+        return web.Response(text=page.text(self.nonce), content_type="text/html", headers={
+            "Content-Security-Policy": policy, "Referrer-Policy": "no-referrer", "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"})
+
+    async def _ask(self, work: Any) -> Any:
+        """Done in the board's thread."""
+        return await asyncio.wrap_future(self.pacemaker.call(work))
+
+    async def _socket(self, request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse(heartbeat=20.0, max_msg_size=LONGEST_MESSAGE)
+        tab = Tab(socket)
+        await socket.prepare(request)
+        self.tabs.add(tab) # first, so that no frame is missed; the page leaves out what it has twice
+        await socket.send_json({"hello": await self._ask(self.bench.hello) | {"paces": PACES}})
+        sender = asyncio.create_task(self._send(tab))
+        try:
+            async for message in socket:
+                if message.type == WSMsgType.TEXT:
+                    await self._take(message.data, tab)
+        finally:
+            self.tabs.discard(tab)
+            sender.cancel()
+            await self._ask(lambda: self.bench.left(tab))
+        return socket
+
+    async def _send(self, tab: Tab) -> None:
+        with contextlib.suppress(ConnectionError):
+            while True:
+                await tab.socket.send_str(await tab.waiting.get())
+
+    async def _take(self, text: str, tab: Tab) -> None:
+        """One command; what is wrong with it goes back to this tab only."""
+        try:
+            command = json.loads(text)
+            if isinstance(command, dict) and set(command) == {"pace"}:
+                await self._ask(lambda: self._set_pace(command["pace"]))
+            else:
+                await self._ask(lambda: self.bench.act(command, tab))
+        except (UserError, ValueError, RecursionError) as error:
+            await tab.socket.send_json({"refused": str(error)})
+
+    def _set_pace(self, pace: Any) -> None:
+        if pace not in PACES or isinstance(pace, bool):
+            raise UserError(f"no pace '{pace}'", "page", f"choose one of {', '.join(map(str, PACES))}")
+        self.pacemaker.set_pace(float(pace))
+
+    async def _save(self, request: web.Request) -> web.Response:
+        what = request.match_info["what"]
+        if what not in SAVED:
+            raise web.HTTPNotFound(text="foc33: nothing to save by this name\n")
+        name, kind = SAVED[what]
+        try:
+            text = await self._ask(getattr(self.bench, what))
+        except UserError as error:
+            return web.Response(status=409, text=f"foc33: {error}\n")
+        return web.Response(text=text, content_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+async def serve(make_bench: Any, port: int | None, pace: float, tell: Any) -> None:
+    """Until Ctrl-C, a signal to end, or the board's own end; `tell` gets the address. Without a port: the usual one, or a free one."""
+    server = Server(make_bench(), pace)
+    for name in (signal.SIGINT, signal.SIGTERM):
+        server.loop.add_signal_handler(name, server.over.set)
+    runner = web.AppRunner(server.application(), access_log=None)
+    await runner.setup()
+    try:
+        site = await _listen(runner, port)
+        server.port = site._server.sockets[0].getsockname()[1]
+        server.pacemaker.start()
+        tell(server.url)
+        await server.over.wait()
+        await asyncio.sleep(0.1) # the tabs hear of the board's end
+        for tab in list(server.tabs):
+            await tab.socket.close()
+        await asyncio.get_running_loop().run_in_executor(None, server.pacemaker.end)
+    finally:
+        await runner.cleanup()
+    if server.pacemaker.error is not None:
+        raise UserError("the board has stopped", "make live", str(server.pacemaker.error))
+
+
+async def _listen(runner: web.AppRunner, port: int | None) -> web.TCPSite:
+    for choice in ([USUAL_PORT, 0] if port is None else [port]):
+        site = web.TCPSite(runner, ADDRESS, choice, shutdown_timeout=1.0)
+        try:
+            await site.start()
+            return site
+        except OSError as error:
+            reason = os.strerror(error.errno) if error.errno else str(error)
+            await site.stop() if site in runner.sites else None
+    raise UserError(f"cannot listen on port {port} ({reason})", "LISTEN", "choose another one, or leave it out")

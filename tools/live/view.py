@@ -1,0 +1,99 @@
+"""What the page shows of a board: which signals it draws, and how a frame is made of a trace."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tools.common.trace import Trace, wrapped_deg
+
+STRIP_ROW_S = 0.01
+"""Time between two points of the rolling curves."""
+STRIP_S = 20.0
+"""What a new tab finds drawn."""
+ORBIT_POINTS = 120
+ESTIMATES = ("RAMP", "CLOSED", "STOPPING")
+"""States in which the estimated angle means something."""
+CLOSED = ("CLOSED", "STOPPING")
+
+
+ALWAYS, SWITCHING, ESTIMATING, CONTROLLED = "always", "switching", "estimating", "controlled"
+"""When a signal means something; outside of it a curve has a gap."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve; `virtual`: a real board cannot tell it."""
+
+    name: str
+    signal: str
+    color: str
+    when: str = ALWAYS
+    dashed: bool = False
+    virtual: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves with one axis."""
+
+    title: str
+    unit: str
+    lines: tuple[Line, ...]
+
+
+TRUE, ESTIMATE, REFERENCE, D, Q = "#2f6fb0", "#d9822b", "#9aa4ae", "#1f8a70", "#7048b5"
+PANELS = (
+    Panel("speed", "rpm", (Line("reference", "fw.speed_ref_rpm", REFERENCE, CONTROLLED, True), Line("estimate", "fw.speed_est_rpm", ESTIMATE, ESTIMATING),
+                           Line("true", "plant.speed_rpm", TRUE, virtual=True))),
+    Panel("current", "A", (Line("d", "fw.i_d_a", D, SWITCHING), Line("q", "fw.i_q_a", Q, SWITCHING),
+                           Line("q asked for", "fw.iq_ref_a", REFERENCE, SWITCHING, True))),
+    Panel("torque", "mN·m", (Line("motor", "plant.torque_nm", TRUE, virtual=True),)),
+    Panel("bus", "V", (Line("bus", "bus.voltage_v", D),)))
+SCALES = {"mN·m": 1000.0}
+NOW = {"speed_rpm": "plant.speed_rpm", "estimate_rpm": "fw.speed_est_rpm", "reference_rpm": "fw.speed_ref_rpm", "target_rpm": "fw.speed_target_rpm",
+       "theta_deg": "plant.theta_e_deg", "theta_est_deg": "fw.theta_est_deg", "i_d_a": "fw.i_d_a", "i_q_a": "fw.i_q_a", "iq_limit_a": "fw.iq_limit_a",
+       "v_d_v": "fw.v_d_v", "v_q_v": "fw.v_q_v", "v_limit_v": "fw.v_limit_v", "torque_nm": "plant.torque_nm", "bus_v": "bus.voltage_v"}
+"""The numbers of the moment, by the page's name."""
+
+
+def strip(trace: Trace, every: int, phase: int, states: dict[int, str]) -> list[list[float | None]]:
+    """Rows of the rolling curves: time, then a value for each curve of the panels in their order. `phase`: how many rows of the trace came before."""
+    rows = slice(-phase % every, None, every)
+    state = trace.column("fw.state")[rows]
+    means = {ALWAYS: np.ones(len(state), bool), SWITCHING: trace.column("pwm.outputs_seen")[rows] > 0,
+             ESTIMATING: np.isin(state, [number for number, name in states.items() if name in ESTIMATES]),
+             CONTROLLED: np.isin(state, [number for number, name in states.items() if name in CLOSED])}
+    columns = [[value if good else None for value, good in zip((trace.column(line.signal)[rows] * SCALES.get(panel.unit, 1.0)).round(4).astype(float).tolist(),
+                                                               means[line.when].tolist())] for panel in PANELS for line in panel.lines]
+    return [list(row) for row in zip(trace.time_s[rows].round(4).tolist(), *columns)]
+
+
+def now(trace: Trace) -> dict[str, float]:
+    """The last row, under the page's names."""
+    return {name: round(float(trace.column(signal)[-1]), 4) for name, signal in NOW.items()}
+
+
+def orbit(trace: Trace) -> dict[str, list[list[float]]]:
+    """The last turn of voltage and current in the alpha-beta plane; a part of it where the frame is shorter."""
+    turn = np.abs(np.cumsum(wrapped_deg(np.diff(trace.column("fw.theta_ctrl_deg")))[::-1]))
+    rows = min(int(np.searchsorted(turn, 360.0)) + 2, len(trace))
+    pick = np.unique(np.linspace(len(trace) - rows, len(trace) - 1, min(rows, ORBIT_POINTS)).astype(int))
+    angle = np.radians(trace.column("fw.theta_ctrl_deg")[pick].astype(float))
+    v_d, v_q, i_a, i_b = (trace.column(name)[pick].astype(float) for name in ("fw.v_d_v", "fw.v_q_v", "plant.i_a", "plant.i_b"))
+    switching = trace.column("pwm.outputs_seen")[pick] > 0
+    v_d, v_q = np.where(switching, v_d, 0.0), np.where(switching, v_q, 0.0)
+    return {"v": _points(v_d * np.cos(angle) - v_q * np.sin(angle), v_d * np.sin(angle) + v_q * np.cos(angle)),
+            "i": _points(i_a, (i_a + 2.0 * i_b) / math.sqrt(3.0))}
+
+
+def _points(x: np.ndarray, y: np.ndarray) -> list[list[float]]:
+    return np.column_stack((x, y)).round(3).tolist()
+
+
+def panels(virtual: bool) -> list[dict[str, Any]]:
+    """What the page draws."""
+    return [{"title": panel.title, "unit": panel.unit,
+             "lines": [{"name": line.name, "color": line.color, "dashed": line.dashed} for line in panel.lines if virtual or not line.virtual]}
+            for panel in PANELS]
