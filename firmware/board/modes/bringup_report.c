@@ -9,25 +9,13 @@
 bringup_guide_t board_bringup;
 
 /* clang-format off */
-#define QUESTION_ROW(name, text) { #name, text },
+#define TEXT_ROW(name, text) { #name, text },
 #define VALUE_ROW(name, unit, decimals, text) { #name, unit, text, decimals },
-#define FINDING_ROW(name, remedy) { #name, remedy },
 /* clang-format on */
 
 typedef struct {
     const char *name, *text;
 } named_text_t;
-
-static const named_text_t questions[] = { BRINGUP_QUESTION_TABLE(QUESTION_ROW) };
-static const named_text_t findings[] = { BRINGUP_FINDING_TABLE(FINDING_ROW) };
-
-static const struct {
-    const char *name, *unit, *text;
-    uint16_t decimals;
-} values[] = { BRINGUP_VALUE_TABLE(VALUE_ROW) };
-
-static const char *const directions[BRINGUP_DIRECTIONS] = { "+A", "-C", "+B", "-A", "+C", "-B" };
-static const char *const shares[BRINGUP_DIRECTIONS] = { "2 : -1", "1 : 1", "-1 : 2", "-2 : 1", "-1 : -1", "1 : -2" };
 
 static const char *const phases[3] = { "A", "B", "C" };
 
@@ -93,6 +81,7 @@ static char *put_name(char *at, const char *name, const char *text, const char *
 static char *put_question(char *line, const bringup_message_t *m)
 {
     static const char *const pins[2] = { PIN_NAME(BOARD_PIN_UART_TX), PIN_NAME(BOARD_OTHER_TX) };
+    static const named_text_t questions[] = { BRINGUP_QUESTION_TABLE(TEXT_ROW) };
     const char *text = questions[m->code].text;
     char *at = text_put(text_put(text_put(line, "ask "), questions[m->code].name), ": ");
     return put_text(at, text, pins[m->part & 1u], m->value, 3);
@@ -100,6 +89,10 @@ static char *put_question(char *line, const bringup_message_t *m)
 
 static char *put_value(char *line, const bringup_message_t *m)
 {
+    static const struct {
+        const char *name, *unit, *text;
+        uint16_t decimals;
+    } values[] = { BRINGUP_VALUE_TABLE(VALUE_ROW) };
     const char *text = values[m->code].text, *unit = values[m->code].unit, *phase = phases[m->part];
     uint16_t decimals = values[m->code].decimals;
     char *at = text_put(line, (m->value >= m->low && m->value <= m->high) ? "ok " : "WRONG ");
@@ -114,6 +107,8 @@ static char *put_value(char *line, const bringup_message_t *m)
 
 static char *put_direction(char *line, const bringup_message_t *m)
 {
+    static const char *const directions[BRINGUP_DIRECTIONS] = { "+A", "-C", "+B", "-A", "+C", "-B" };
+    static const char *const shares[BRINGUP_DIRECTIONS] = { "2 : -1", "1 : 1", "-1 : 2", "-2 : 1", "-1 : -1", "1 : -2" };
     char *at = text_put(text_put(text_put(line, "see "), directions[m->code]), ": ");
     at = put_number(text_put(put_number(at, m->value, 2), " V, current A "), m->low, 3);
     at = put_number(text_put(at, " A, B "), m->high, 3);
@@ -122,6 +117,7 @@ static char *put_direction(char *line, const bringup_message_t *m)
 
 static char *put_finding(char *line, const bringup_message_t *m)
 {
+    static const named_text_t findings[] = { BRINGUP_FINDING_TABLE(TEXT_ROW) };
     const char *text = findings[m->code].text, *phase = phases[m->part];
     char *at = put_name(text_put(line, "FIX "), findings[m->code].name, text, phase);
     return put_text(at, text, phase, m->value, 0);

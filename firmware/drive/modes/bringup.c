@@ -12,6 +12,7 @@
 #define CLEAR_MS 150u     /* a fault is cleared, the offsets are averaged, and it is back if its cause is */
 #define START_MS 100u     /* a start charges the drivers first */
 #define SUM_LOG2 10u
+#define SUM_PERIODS 1024u
 #define SETTLE_HALF PARAM_PERIODS(0.3F) /* the rotor swings into the field */
 #define SETTLE_FULL PARAM_PERIODS(0.15F)
 #define NOISE_MOST_STEPS 3                        /* mean deviation, steps of the converter */
@@ -114,7 +115,7 @@ static void measure(drive_t *d, uint16_t wait)
     t->off_a = 0;
     t->off_b = 0;
     t->wait = wait;
-    t->left = 1u << SUM_LOG2;
+    t->left = SUM_PERIODS;
     t->ready = 0;
 }
 
@@ -417,12 +418,9 @@ static void drive_level(bringup_guide_t *g, drive_t *d, uint16_t phase)
     g->phase = phase;
 }
 
-/* +A, -C, +B, -A, +C, -B: every 60 degrees. */
-static const angle_t angle_of[BRINGUP_DIRECTIONS] = { 0, 10923, 21845, 32768u, 43691u, 54613u };
-static const uint16_t phase_of[BRINGUP_DIRECTIONS] = { 0, 2, 1, 0, 2, 1 };
-
 static void keep_level(const bringup_guide_t *g, const drive_t *d, bringup_level_t *level)
 {
+    static const uint16_t phase_of[BRINGUP_DIRECTIONS] = { 0, 2, 1, 0, 2, 1 };
     const bringup_run_t *t = &d->run.bringup;
     level->a[g->index] = mean_of(t->sum_a);
     level->b[g->index] = mean_of(t->sum_b);
@@ -432,6 +430,7 @@ static void keep_level(const bringup_guide_t *g, const drive_t *d, bringup_level
 /** Half the current, all of it, none, in one direction after the other. A press ends it. */
 static void step_drive(bringup_guide_t *g, drive_t *d, const drive_params_t *p)
 {
+    static const angle_t angle_of[BRINGUP_DIRECTIONS] = { 0, 10923, 21845, 32768u, 43691u, 54613u }; /* +A, -C, +B, -A, +C, -B */
     bringup_run_t *t = &d->run.bringup;
     if (g->phase <= 1u && !started(g, d, p)) {
         return;
@@ -662,8 +661,16 @@ static void step_last(bringup_guide_t *g, drive_t *d)
 
 void bringup_init(bringup_guide_t *g)
 {
-    static const bringup_guide_t zero;
-    *g = zero;
+    g->message.kind = (uint16_t)BRINGUP_SILENT;
+    g->found = 0;
+    g->blocked = 0;
+    g->s2.down_ms = 0;
+    g->s3.down_ms = 0;
+    g->swapped = 0;
+    g->leds = 0;
+    g->leds_judged = 0;
+    g->mean[0] = 0;
+    g->mean[1] = 0;
     g->pending = (uint16_t)BRINGUP_FINDINGS;
     g->sender = 1;
     go(g, BRINGUP_STEP_BEGIN);
@@ -691,7 +698,7 @@ static void step_with_current(bringup_guide_t *g, drive_t *d, const drive_params
     }
 }
 
-static void step(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const panel_inputs_t *in, int16_t pot_q15)
+static void take_step(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const panel_inputs_t *in, int16_t pot_q15)
 {
     switch (g->step) {
     case BRINGUP_STEP_BEGIN: step_begin(g, in); break;
@@ -740,7 +747,7 @@ panel_lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t
         g->pending = (uint16_t)BRINGUP_FINDINGS;
         find(g, finding, g->pending_part);
     } else {
-        step(g, d, p, in, pot_q15);
+        take_step(g, d, p, in, pot_q15);
     }
     lights.led_alive = g->leds & 1u;
     lights.led_run = (uint16_t)(g->leds >> 1);
