@@ -76,9 +76,10 @@ endef
 known_defines = @$(foreach word,$(firstword $(filter-out -D% -U%,$(DEFINES)) $(filter-out %=1,$(filter $(modes:%=-D%=%),$(DEFINES))) \
     $(filter-out $(modes:%=-D%) -U%,$(foreach word,$(DEFINES),$(if $(findstring =,$(word)),,$(word))))), \
     echo foc33: $(call quoted,no mode $(word)$(comma) DEFINES=$(DEFINES)): 'use $(modes:%=-D%) or -DNAME=value' >&2; exit 2)
-# The header would win over a parameter's -D.
+# The header would win over a parameter's -D, but for those that it asks about.
 no_parameters = @for word in $(foreach word,$(filter -D%,$(DEFINES)),$(call quoted,$(patsubst -D%,%,$(word)))); do name="$${word%%=*}"; \
-    test "$$name" = "$$word" || ! grep -q "^ *\# *define  *$$name[ (]" $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
+    test "$$name" = "$$word" || ! grep -q "^ *\# *define  *$$name[ (]" $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || \
+    grep -q "^ *\# *ifndef  *$$name\b" $(call quoted,$(or $(USERPARAMS),.)/userparams.h) || { \
     echo "foc33: $$name is a parameter," $(call quoted,DEFINES=$(DEFINES)): set it in userparams.h >&2; exit 2; }; done
 
 # Both libraries of a build's folder.
@@ -270,9 +271,19 @@ $B/libfirmware.a: $(firmware_objects) $B/contents
 	@rm -f $@.new
 	$(call say,ar,$@)ar rcs $@.new $(firmware_objects) && mv -f $@.new $@
 
-$B/libvboard.so: $(board_objects) $(firmware_objects) $B/contents
-	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@.new \
-	    $(board_objects) $(filter-out %/main.o,$(firmware_objects)) -lm && mv -f $@.new $@
+# The firmware without its loop, its variables in one stretch.
+window_script := tools/cpu_host/window.ld
+$B/firmware.o: $(firmware_objects) $B/contents $(window_script)
+	$(call say,ld,$@)$(CC) -r -nostdlib -Wl,-T,$(window_script) -o $@.new $(filter-out %/main.o %/xc.o,$(firmware_objects)) && mv -f $@.new $@
+
+firmware_library := $(board_objects) $B/firmware.o $B/tools/cpu_host/xc.o
+$B/libvboard.so: $(firmware_library)
+	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@.new $^ -lm && mv -f $@.new $@
+
+# What a client on the serial line reads names and addresses from.
+$B/foc33.elf: $B/firmware.o tools/live/chip_types.py
+	$(call say,ld,$@)$(CC) -nostdlib -static -no-pie -Wl,--section-start=fw_ram=0x800,-Ttext-segment=0x100000,-e,0,--unresolved-symbols=ignore-all \
+	    -o $@.new $< && $(python) -m tools.live.chip_types $@.new && mv -f $@.new $@
 
 # ---- tests: pytest runs the Python tests and the Unity executables, after make has built what they need ----------------------
 c_tests = $(patsubst test/%.c,%,$(wildcard test/$1/test_*.c))

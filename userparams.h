@@ -144,6 +144,11 @@
 /* ---- Fault recorder: 64 rows before a fault, 16 after it ---------------------------------------------------------- */
 #define RECORDER_PERIODS 1          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
 
+/* ---- Scope: watch, record and tune by the serial line (docs/scope.md) --------------------------------------------- */
+#ifndef SCOPE /* or build with -DSCOPE=1 */
+#define SCOPE 0                     /* [switch]        0 .. 1         1: the serial line answers X2C-Scope clients, the fault recorder's memory is their trace buffer; 0: status line only */
+#endif
+
 /* ---- Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it - */
 #define RETRY_COUNT 0               /* [times]         0 .. 20        retries before a fault stays; 0: never, appliances usually have 3 */
 #define RETRY_PAUSE_SEC 2           /* [s]             0.5 .. 600     outputs off before each retry; S2 ends it */

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from tools.common import paths
 from tools.common.motor_file import Motor
-from tools.common.param_rows import Parameter, modes, parameters
+from tools.common.param_rows import FROM_DEFINES, Parameter, modes, parameters
 
 from .constants import Constant, filter_hz
 from .design import Design
@@ -107,7 +107,8 @@ def _left(name: str, design: Design) -> str:
 
 
 def _define(design: Design, row: Parameter, facts: dict[str, str]) -> str:
-    return f"{_left(row.name, design)}{_comment(row, facts.get(row.name, ''))}"
+    line = f"{_left(row.name, design)}{_comment(row, facts.get(row.name, ''))}"
+    return f"#ifndef {row.name} /* or build with -D{row.name}=1 */\n{line}\n#endif" if row.name in FROM_DEFINES else line
 
 
 def _comment(row: Parameter, fact: str = "") -> str:

@@ -11,6 +11,7 @@
 #include "board/watch.h"
 #include "drive/deviation.h"
 #include "drive/overload.h"
+#include "drive/remote.h"
 #include "drive/state.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
@@ -20,6 +21,9 @@
 drive_t board_drive;
 panel_t board_panel;
 retry_t board_retry;
+#if SCOPE
+remote_t scope_command;
+#endif
 
 static uint16_t last_ms_tick;             /* drive ticks already counted as milliseconds */
 static uint16_t supervised_tick;          /* drive ticks at the last check */
@@ -49,6 +53,9 @@ void firmware_init(void)
     panel_init(&board_panel);
     mode_panel_init();
     retry_init(&board_retry);
+#if SCOPE
+    remote_init(&scope_command);
+#endif
     drive_init(&board_drive, &board_params); /* before anything can trap */
     board_clock_failed = 0;
     if (clock_init()) { /* the trap may have said so before */
@@ -138,6 +145,9 @@ void firmware_background(void)
         in.s2_down = BOARD_S2_DOWN();
         in.s3_down = BOARD_S3_DOWN();
         in.elapsed_ms = elapsed_ms;
+#if SCOPE
+        in.remote = &scope_command;
+#endif
         lights = mode_panel(&in);
         retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         BOARD_LED_ALIVE = lights.led_alive & 1u;

@@ -1,5 +1,6 @@
 /* The interrupts: the control interrupt that is one PWM period, the fault input, and the traps. */
 #include "board/firmware.h"
+#include "board/lnet.h"
 #include "board/mclv.h"
 #include "board/peripherals.h"
 #include "board/record.h"
@@ -61,6 +62,9 @@ void BOARD_ISR _ADC1Interrupt(void)
     }
     recorder_tick(&board_recorder, &board_drive, (int16_t)ADC1BUF3);
     mode_record();
+#if SCOPE
+    scope_tick(&board_lnet.scope, board_scope_array);
+#endif
 }
 
 /** The board's comparator: the PWM module has already switched the outputs off. */

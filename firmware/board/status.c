@@ -2,6 +2,7 @@
 #include "board/status.h"
 
 #include "board/firmware.h"
+#include "board/lnet.h"
 #include "board/modes/bringup_report.h"
 #include "board/modes/identify_report.h"
 #include "board/peripherals.h"
@@ -76,8 +77,41 @@ static char *put_reset(void)
     return text_put(selftest_put_marked(at), "\r\n");
 }
 
+#if SCOPE
+
+/** A pass of the line while a client may have it. @return 1 if the status line must wait */
+static uint16_t line_serves_client(void)
+{
+    int16_t byte = uart_receive();
+    if (byte >= 0) {
+        lnet_receive((uint8_t)byte);
+    }
+    if (uart_has_room()) {
+        byte = lnet_next();
+        if (byte >= 0) {
+            (void)uart_send((char)byte);
+        }
+    }
+    return lnet_is_busy();
+}
+
+/** @return 1 once the line's memory is the client's */
+static uint16_t line_is_taken(uint16_t elapsed_ms)
+{
+    lnet_tick(elapsed_ms);
+    return board_lnet.is_up;
+}
+
+#else
+#define line_serves_client() 0u
+#define line_is_taken(elapsed_ms) 0u
+#endif
+
 void status_init(void)
 {
+#if SCOPE
+    lnet_init((uint8_t *)line, sizeof line);
+#endif
     *((board_reset_cause != 0u) ? put_reset() : line) = '\0';
     next = 0;
     waited_ms = 0;
@@ -85,6 +119,9 @@ void status_init(void)
 
 void status_tick(uint16_t elapsed_ms)
 {
+    if (line_is_taken(elapsed_ms)) {
+        return;
+    }
     waited_ms = (uint16_t)(waited_ms + elapsed_ms);
     if (waited_ms < MODE_STATUS_MS || line[next] != '\0') {
         return;
@@ -96,6 +133,9 @@ void status_tick(uint16_t elapsed_ms)
 
 void status_send(void)
 {
+    if (line_serves_client()) {
+        return;
+    }
     if (line[next] == '\0') {
         *record_line(line) = '\0';
         next = 0;

@@ -1,4 +1,4 @@
-/* UART1: polled transmitter at 115200 8N1. */
+/* UART1: polled, at 115200 8N1. */
 #include "board/mclv.h"
 #include "board/peripherals.h"
 
@@ -10,6 +10,11 @@ void uart_init(void)
     U1STAbits.UTXEN = 1;
 }
 
+uint16_t uart_has_room(void)
+{
+    return (uint16_t)!U1STAbits.UTXBF;
+}
+
 uint16_t uart_send(char c)
 {
     if (U1STAbits.UTXBF) {
@@ -17,4 +22,12 @@ uint16_t uart_send(char c)
     }
     U1TXREG = (uint16_t)(uint8_t)c;
     return 1;
+}
+
+int16_t uart_receive(void)
+{
+    if (U1STAbits.OERR) {
+        U1STAbits.OERR = 0; /* the receiver stands still until then */
+    }
+    return (int16_t)(U1STAbits.URXDA ? (int16_t)(U1RXREG & 0xFFu) : -1);
 }

@@ -2,6 +2,7 @@
 #include "drive/panel.h"
 
 #include "drive/modes/modes.h"
+#include "drive/remote.h"
 
 #define BLINK_MS 250u
 #define PAUSE_MS 1500u
@@ -98,6 +99,7 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
             panel->wish_run = (int16_t)!panel->wish_run;
         }
         panel->fast_range = 0;
+        remote_give_up(in->remote);
     }
     if (button_pressed(&panel->s3, in->s3_down, in->elapsed_ms) && panel->wish_run) {
         panel->fast_range = (int16_t)!panel->fast_range;
@@ -138,7 +140,8 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
     uint16_t held = panel_holds(panel);
     panel_check_pot(panel, d, p, in->elapsed_ms);
     panel_buttons(panel, d, in);
-    target = panel_target(p, panel_pot(panel), panel->fast_range, d->direction);
+    remote_tick(in->remote, panel, d, in->elapsed_ms);
+    target = remote_target(in->remote, p, panel_target(p, panel_pot(panel), panel->fast_range, d->direction));
     d->command.target_erpm = target;
     if (!panel->wish_run) {
         d->command.run = 0;

@@ -20,6 +20,11 @@ extern panel_t board_panel;
 /** What is left of the retries, and what began them. */
 extern retry_t board_retry;
 
+#if SCOPE
+/** What a client on the serial line asks of the drive. */
+extern remote_t scope_command;
+#endif
+
 /** Not 0 from a failure of the clock to the next reset: on a wrong clock nothing may run, whatever the user presses. */
 extern volatile uint16_t board_clock_failed;
 

@@ -30,6 +30,12 @@ void uart_init(void);
 /** Sends one character if the transmitter has room. @return 1 when it was taken */
 uint16_t uart_send(char c);
 
+/** 1 if the transmitter has room. */
+uint16_t uart_has_room(void);
+
+/** A character that has come in. @return 0 to 255, or -1: none; when some were lost for want of room, what waited is lost, too */
+int16_t uart_receive(void);
+
 /** All six outputs inactive, whatever else happens. */
 void pwm_outputs_off(void);
 

@@ -2,6 +2,7 @@
 #ifndef DRIVE_PANEL_H
 #define DRIVE_PANEL_H
 
+#include "drive/remote_state.h"
 #include "drive/state.h"
 
 #define PANEL_DEBOUNCE_MS 30
@@ -15,6 +16,7 @@ typedef struct {
 typedef struct {
     uint16_t s2_down, s3_down; /**< 1 = pressed */
     uint16_t elapsed_ms;       /**< time since the last pass, 1 or more */
+    REMOTE_INPUT
 } panel_inputs_t;
 
 /** What the LEDs show. */

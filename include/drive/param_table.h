@@ -9,7 +9,7 @@
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
 #define PARAM_TABLE(X) PARAM_MOTOR(X) PARAM_BOARD(X) PARAM_SPEEDS(X) PARAM_START(X) PARAM_LIMITS(X) PARAM_LOOPS(X) PARAM_FILTERS(X) \
-    PARAM_FIELD_WEAKENING(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_RETRY(X)
+    PARAM_FIELD_WEAKENING(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X)
 
 #define PARAM_MOTOR(X) /* Motor, values per phase of the star */ \
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
@@ -76,6 +76,9 @@
 
 #define PARAM_RECORDER(X) /* Fault recorder: 64 rows before a fault, 16 after it */ \
     X(RECORDER_PERIODS, "periods", 0, 64, 1, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
+
+#define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \
+    X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, the fault recorder's memory is their trace buffer; 0: status line only")
 
 #define PARAM_RETRY(X) /* Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it */ \
     X(RETRY_COUNT, "times", 0, 20, 0, "retries before a fault stays; 0: never, appliances usually have 3") \

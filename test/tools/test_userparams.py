@@ -207,7 +207,7 @@ LEGAL = {
     "gains": HEADER.replace(RS, RS + "#define D_CURRCNTR_PTERM 0.2\n#define SPEEDCNTR_PTERM (0.1 / 2)\n"),
     "1/Kphi changed": value("INVKFI_SPEED3", "(NORM_INVKFIBASE + 100)").replace(
         line_of("INVKFI_SPEED4"), "#define INVKFI_SPEED4 NORM_INVKFIBASE - 100\n"),
-    "no guard": re.sub(r"#(ifndef|define) USERPARAMS_H\n", "", HEADER).replace("\n#endif", ""),
+    "no guard": re.sub(r"#(ifndef|define) USERPARAMS_H\n", "", HEADER).removesuffix("\n#endif\n"),
     "another file": '#include "more.h"\n' + HEADER.replace(RS, ""),
     "a header of the compiler": "#include <stdint.h>\n" + HEADER,
     "DOS line ends": HEADER.replace("\n", "\r\n"),

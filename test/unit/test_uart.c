@@ -23,6 +23,22 @@ void test_eight_bits_are_sent_when_there_is_room_and_a_full_transmitter_is_not_w
     TEST_ASSERT_EQUAL_UINT16(1, uart_send((char)0xE9));
     TEST_ASSERT_EQUAL_HEX16(0x00E9, U1TXREG);
     U1STAbits.UTXBF = 1;
+    TEST_ASSERT_EQUAL_UINT16(0, uart_has_room());
     TEST_ASSERT_EQUAL_UINT16(0, uart_send('x'));
     TEST_ASSERT_EQUAL_HEX16(0x00E9, U1TXREG);
+}
+
+void test_a_character_is_received_when_there_is_one(void)
+{
+    U1RXREG = 0x1E9;
+    TEST_ASSERT_EQUAL_INT16(-1, uart_receive());
+    U1STAbits.URXDA = 1;
+    TEST_ASSERT_EQUAL_INT16(0xE9, uart_receive());
+}
+
+void test_a_receiver_that_stands_still_goes_on(void)
+{
+    U1STAbits.OERR = 1;
+    (void)uart_receive();
+    TEST_ASSERT_EQUAL_UINT16(0, U1STAbits.OERR);
 }

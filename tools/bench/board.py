@@ -10,6 +10,7 @@ from tools.common.errors import UserError
 from tools.common.board_keys import Key
 
 _READ, _WRITE = 1, 2
+PATH_BYTES = 400
 
 
 class _KeyInfo(ctypes.Structure):
@@ -44,7 +45,8 @@ class Library:
                 ("vb_key_info", out(_KeyInfo), [ctypes.c_uint]), ("vb_power_up", ctypes.c_int, [board]),
                 ("vb_run", ctypes.c_int, [board, ctypes.c_uint32]), ("vb_trace_config", ctypes.c_int, [board, text, ctypes.c_uint]),
                 ("vb_trace_data", out(ctypes.c_float), [board, size, size]), ("vb_trace_clear", None, [board]),
-                ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]), ("vb_warning_count", ctypes.c_uint, [board]), ("vb_warning", text, [board, ctypes.c_uint]),
+                ("vb_uart_read", ctypes.c_size_t, [board, text, ctypes.c_size_t]),
+                ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t]), ("vb_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]), ("vb_warning_count", ctypes.c_uint, [board]), ("vb_warning", text, [board, ctypes.c_uint]),
                 ("vb_param", ctypes.c_int, [ctypes.c_uint, out(text), out(number), out(text)]),
                 ("vb_fault_name", text, [ctypes.c_int]), ("vb_state_name", text, [ctypes.c_int]))
 
@@ -137,6 +139,16 @@ class Board:
         text = ctypes.create_string_buffer(4096)
         count = self._c.vb_uart_read(self._vb, text, len(text))
         return text.raw[:count].decode("latin-1")
+
+    def uart_send(self, text: str) -> int:
+        """Characters for the firmware. Returns how many have found room."""
+        return self._c.vb_uart_write(self._vb, text.encode("latin-1"), len(text))
+
+    def terminal(self) -> str:
+        """Open a pseudo-terminal for UART1 and return its path."""
+        path = ctypes.create_string_buffer(PATH_BYTES)
+        self._check(self._c.vb_terminal(self._vb, path, PATH_BYTES))
+        return path.value.decode()
 
     def warnings(self) -> list[str]:
         return [self._c.vb_warning(self._vb, i).decode() for i in range(self._c.vb_warning_count(self._vb))]

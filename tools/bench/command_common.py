@@ -10,7 +10,7 @@ from typing import Any
 
 from tools.common import board_file, board_keys, motor_file, paths
 from tools.common.errors import UserError, suggestion
-from tools.common.param_rows import modes, parameters
+from tools.common.param_rows import FROM_DEFINES, modes, parameters
 from . import build, scenario_file
 from .board import Library
 from .expect import Outcome
@@ -85,7 +85,7 @@ def macros(text: str) -> list[str]:
             raise UserError(f"no mode '{word}'", "DEFINES", f"use {' '.join(f'-D{mode}' for mode in modes())} or -DNAME=value")
         if name not in modes() and not sign:
             raise UserError(f"no mode '{name}'", "DEFINES", suggestion(name, modes()))
-        if name in parameters():
+        if name in parameters() and name not in FROM_DEFINES:
             raise UserError(f"{name} is a parameter", "DEFINES", "set it in userparams.h, or name a folder with another one, USERPARAMS=folder")
         result.append(name if name in modes() else f"{name}={value}")
     return result

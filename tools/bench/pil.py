@@ -32,9 +32,7 @@ class PilLibrary(Library):
                 ("vb_iss_lock_step", None, [board, ctypes.c_int]), ("vb_iss_peek", ctypes.c_int, [board, ctypes.c_uint]),
                 ("vb_iss_read", ctypes.c_int, [board, text, words, ctypes.c_uint]),
                 ("vb_iss_write", ctypes.c_int, [board, text, words, ctypes.c_uint]),
-                ("vb_iss_param_get", ctypes.c_int, [board, text, number]), ("vb_iss_param_set", ctypes.c_int, [board, text, ctypes.c_double]),
-                ("vb_terminal", ctypes.c_int, [board, text, ctypes.c_size_t]),
-                ("vb_uart_write", ctypes.c_size_t, [board, text, ctypes.c_size_t]))
+                ("vb_iss_param_get", ctypes.c_int, [board, text, number]), ("vb_iss_param_set", ctypes.c_int, [board, text, ctypes.c_double]))
 
 
 def library(defines: list[str], userparams: Path | None = None) -> PilLibrary:
@@ -71,15 +69,6 @@ class PilBoard(Board):
     def peek(self, address: int) -> int:
         """The 16-bit word at an address of data memory."""
         return self._c.vb_iss_peek(self._vb, address)
-
-    def uart_send(self, text: str) -> None:
-        self._c.vb_uart_write(self._vb, text.encode("latin-1"), len(text))
-
-    def terminal(self) -> str:
-        """Open a pseudo-terminal for UART1 and return its path."""
-        path = ctypes.create_string_buffer(ERROR_BYTES)
-        self._check(self._c.vb_terminal(self._vb, path, ERROR_BYTES))
-        return path.value.decode()
 
     def variable(self, name: str, count: int) -> list[int]:
         values = (ctypes.c_int16 * count)()

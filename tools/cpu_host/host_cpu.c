@@ -204,7 +204,7 @@ static void host_end(void *context, double length_s)
         return;
     }
     h->background_countdown -= 1.0;
-    if (h->background_countdown <= 0.0) {
+    if (h->background_countdown <= 0.0 || h->chip->uart.rx_count > 0) { /* a character waits for one pass at most, as on the chip */
         h->background_countdown = vb_background_periods(h->vb);
         show_registers(h);
         firmware_background();

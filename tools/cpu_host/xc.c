@@ -134,3 +134,18 @@ void host_write_oscconh(unsigned value)
 {
     OSCCON = (uint16_t)((OSCCON & 0x70FFu) | ((value & 7u) << 8));
 }
+
+/* The linker's names for the ends of the section fw_ram; without one, nothing can be reached. */
+extern uint8_t __start_fw_ram[] __attribute__((weak, visibility("hidden"))), __stop_fw_ram[] __attribute__((weak, visibility("hidden")));
+
+uint8_t *host_window(void)
+{
+    return __start_fw_ram;
+}
+
+size_t host_window_bytes(void)
+{
+    enum { MOST = 0xF000 };
+    size_t bytes = (size_t)((uintptr_t)__stop_fw_ram - (uintptr_t)__start_fw_ram);
+    return bytes < MOST ? bytes : MOST;
+}

@@ -74,6 +74,9 @@ extern uint16_t host_watchdog_counts; /* of timer 1 until it resets; 0: it never
 extern volatile uint16_t host_cpu_holds;
 void host_cpu_test(void);
 uint16_t host_watchdog_bites(void);
+/* The firmware's variables, where the build has put them into one stretch (make live-board): what a client on the serial line can reach, from 0x0800 on. */
+uint8_t *host_window(void);
+size_t host_window_bytes(void);
 #define __builtin_tblrdl(offset) ((uint16_t)host_flash[(offset) / 2u])
 #define __builtin_tblrdh(offset) ((uint16_t)(host_flash[(offset) / 2u] >> 16))
 

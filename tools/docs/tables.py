@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, self-tests, the simulator's
+"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, scope, self-tests, the simulator's
 assumptions.
 
     python3 -m tools.docs.tables                  writes the pages
@@ -41,6 +41,14 @@ def selftest() -> str:
     return table("code, name, clause of table H.1, what is tested", "rlll", [[code, name, clause, what] for code, name, clause, what in found])
 
 
+def scope() -> str:
+    services = rows("include", "board/lnet.h", "LNET_SERVICE_TABLE", "#number #name meaning")
+    errors = rows("include", "board/lnet.h", "LNET_ERROR_TABLE", "#number #name meaning")
+    modes = rows("include", "drive/remote.h", "REMOTE_MODE_TABLE", "#number #name meaning")
+    return "\n".join(table(f"{head}, name, meaning", "rll", [list(row) for row in found])
+                     for head, found in (("service", services), ("error", errors), ("mode of scope_command", modes)))
+
+
 def simulator() -> str:
     found = rows("tools/cpu_33f", "iss_assumptions.h", "ASSUMPTIONS", "#name #value meaning place", also="tools/chip")
     return table("name, value, meaning, where", "lrll", [[f"`{name}`", *rest] for name, *rest in found])
@@ -67,7 +75,7 @@ def pins() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "limits": limits, "parameters": params,
-                                         "pins": pins, "selftest": selftest, "simulator": simulator}
+                                         "pins": pins, "scope": scope, "selftest": selftest, "simulator": simulator}
 
 
 def page(name: str) -> str:

@@ -80,16 +80,20 @@ class Image:
         return BYTES_PER_WORD * (len(self.words) + self.initial_words) + sum(thing.size for thing in self.constants)
 
 
+def dwarf_info(sections: dict[str, bytes]):
+    """The image's DWARF, from its sections."""
+    parameters = DWARFInfo.__init__.__code__
+    names = [name for name in parameters.co_varnames[2:parameters.co_argcount] if name.endswith("_sec")]
+    held = {name: sections.get(name.removesuffix("_sec")) for name in names}
+    return DWARFInfo(DwarfConfig(little_endian=True, machine_arch="dsPIC", default_address_size=4),
+                     **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0) for name, data in held.items()})
+
+
 class _Debug:
     """The image's DWARF: functions with what is inlined into them, lines, and types of variables."""
 
     def __init__(self, sections: dict[str, bytes]) -> None:
-        parameters = DWARFInfo.__init__.__code__
-        names = [name for name in parameters.co_varnames[2:parameters.co_argcount] if name.endswith("_sec")]
-        held = {name: sections.get(name.removesuffix("_sec")) for name in names}
-        self.dwarf = DWARFInfo(DwarfConfig(little_endian=True, machine_arch="dsPIC", default_address_size=4),
-                               **{name: data and DebugSectionDescriptor(BytesIO(data), "." + name, None, len(data), 0)
-                                  for name, data in held.items()})
+        self.dwarf = dwarf_info(sections)
         self.nodes: dict[int, Node] = {}        # called functions, by start
         self.inside: dict[int, list[Node]] = {} # every copy in a called function, by that function's start
         self.lines: dict[int, tuple[str, int]] = {}

@@ -1,1 +1,1 @@
-"""make live: a page in the browser at which somebody works with the virtual board, or watches a real one."""
+"""A firmware that runs: make live, a page in the browser, and make live-board, a serial line with its client."""

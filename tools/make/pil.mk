@@ -7,8 +7,7 @@ pil-library:
 pil_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/cpu_33f/*.c))
 $(pil_objects): private INCLUDES += $(board_includes) -Itools/cpu_33f
 
-$B/libpil.so: $(pil_objects) $(board_objects) $(firmware_objects) $B/contents
-	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@.new \
-	    $(pil_objects) $(board_objects) $(filter-out %/main.o,$(firmware_objects)) -lm && mv -f $@.new $@
+$B/libpil.so: $(pil_objects) $(firmware_library)
+	$(call say,ld,$@)$(CC) -shared $(if $(SAN),$(sanitizer),-Wl$(comma)--no-undefined) -o $@.new $^ -lm && mv -f $@.new $@
 
 -include $(pil_objects:.o=.d)

@@ -5,6 +5,7 @@
 #   tools/setup/prepare.sh live    the same, and aiohttp
 #   tools/setup/prepare.sh tune    the first, with openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
+#   tools/setup/prepare.sh scope   the same, with pyserial
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby), INSTALL=no (install nothing, say what is missing).
@@ -95,13 +96,20 @@ case $job in
         ;;
     target) ;;
     live) ;;
-    *) give_up "prepare.sh, '$job': name the job, run, live, tune, target or test" ;;
+    scope) ;;
+    *) give_up "prepare.sh, '$job': name the job, run, live, scope, tune, target or test" ;;
 esac
 
 case $job in
-    target | test)
+    target | test | scope)
         modules="$modules elftools intelhex"
         python_packages="$python_packages python3-pyelftools python3-intelhex"
+        ;;
+esac
+case $job in
+    scope | test)
+        modules="$modules serial"
+        python_packages="$python_packages python3-serial"
         ;;
 esac
 
@@ -117,7 +125,7 @@ if [ "$job" = test ]; then
     python_packages="$python_packages python3-pytest"
 fi
 
-pips=$(echo "$modules" | sed 's/elftools/pyelftools/') # names that pip knows
+pips=$(echo "$modules" | sed 's/elftools/pyelftools/; s/serial/pyserial/') # names that pip knows
 
 mkdir -p $state 2>/dev/null || give_up "set-up, $state: cannot be written, check the folder's permissions"
 look

@@ -101,6 +101,9 @@
 #define SNAPDELAY 5
 #define DATA_BUFFER_SIZE 50
 #define RECORDER_PERIODS 1
+#ifndef SCOPE
+#define SCOPE 0
+#endif
 #define RETRY_COUNT 0
 #define RETRY_PAUSE_SEC 2
 #define RETRY_FORGET_SEC 10

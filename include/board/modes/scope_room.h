@@ -1,0 +1,26 @@
+/* The scope's memory: the fault recorder's, less what the scope itself and a mode take of it. */
+#ifndef BOARD_MODES_SCOPE_ROOM_H
+#define BOARD_MODES_SCOPE_ROOM_H
+
+#include "drive/drive.h"
+#include "drive/modes/params_in_ram.h"
+
+/** Bytes that a mode has in RAM. */
+#if defined(TUNING) || defined(PARAMS_IN_RAM)
+#define SCOPE_MODE_PARAMS sizeof(drive_params_t)
+#else
+#define SCOPE_MODE_PARAMS 0u
+#endif
+#ifdef IDENTIFY
+#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 36u)
+#else
+#define SCOPE_MODE_IDENTIFY 0u
+#endif
+#if defined(SNAPSHOT) && SCOPE
+#error userparams.h: SNAPSHOT and SCOPE 1 together have no room: remove one; the scope records four variables, too
+#endif
+
+/** Of the trace buffer. */
+#define SCOPE_BYTES ((856u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY) & ~3u)
+
+#endif

@@ -1,0 +1,39 @@
+/* Remote control: a client on the serial line starts and stops the motor and sets its target, for as long as it renews its lease. */
+#ifndef DRIVE_REMOTE_H
+#define DRIVE_REMOTE_H
+
+#include "drive/panel.h"
+
+#define REMOTE_LEASE_MOST_MS 5000u
+
+/** X(number, name, meaning): who is in command. */
+#define REMOTE_MODE_TABLE(X) \
+    X(0, PANEL, "buttons and potentiometer") \
+    X(1, TARGET, "the client starts, stops and sets the target") \
+    X(2, START, "the client starts and stops, the potentiometer sets the target")
+
+#define REMOTE_MODE(number, name, meaning) REMOTE_##name = (number),
+enum { REMOTE_MODE_TABLE(REMOTE_MODE) REMOTE_MODE_COUNT };
+
+#if SCOPE
+
+/** The panel is in command. */
+void remote_init(remote_t *r);
+
+/** Somebody has pressed S2: the panel is in command again, and what it wishes holds. */
+void remote_give_up(remote_t *r);
+
+/** A pass of the background, after the buttons: their wishes become the client's. At the lease's end the panel is in command again; a run that the
+ *  client has started then ends in order. */
+void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
+
+/** The target in command. @param of_panel the potentiometer's */
+int16_t remote_target(const remote_t *r, const drive_params_t *p, int16_t of_panel);
+
+#else
+#define remote_give_up(r) ((void)0)
+#define remote_tick(r, panel, d, elapsed_ms) ((void)0)
+#define remote_target(r, p, of_panel) (of_panel)
+#endif
+
+#endif

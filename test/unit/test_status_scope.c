@@ -1,0 +1,137 @@
+/* The status line with a client on the line: it goes on until the first valid frame, and then never more. */
+/* defines: -DSCOPE=1 */
+#include "lnet_rig.h"
+
+#include "firmware/board/lnet.c"
+#include "firmware/board/scope.c"
+#include "firmware/board/status.c"
+
+#include "mock_peripherals.h"
+#include "mock_selftest_run.h"
+
+drive_t board_drive;
+uint16_t board_selftest_parts;
+volatile uint16_t board_reset_cause;
+tLimitParm LimitParm;
+
+static char sent[200];
+static uint16_t sent_count, room;
+static const uint8_t *coming;
+static uint16_t coming_count;
+
+static uint16_t has_room(int calls)
+{
+    (void)calls;
+    return room;
+}
+
+static uint16_t take_char(char c, int calls)
+{
+    (void)calls;
+    if (!room) {
+        return 0;
+    }
+    sent[sent_count++] = c;
+    sent[sent_count] = '\0';
+    return 1;
+}
+
+static int16_t give(int calls)
+{
+    (void)calls;
+    if (coming_count == 0u) {
+        return -1;
+    }
+    coming_count--;
+    return *coming++;
+}
+
+static char *nothing_more(char *at, int calls)
+{
+    (void)calls;
+    return at;
+}
+
+void setUp(void)
+{
+    uart_has_room_Stub(has_room);
+    uart_send_Stub(take_char);
+    uart_receive_Stub(give);
+    selftest_put_Stub(nothing_more);
+    selftest_put_marked_Stub(nothing_more);
+    board_reset_cause = 0;
+    sent_count = 0;
+    sent[0] = '\0';
+    room = 1;
+    coming_count = 0;
+    status_init();
+}
+
+static void passes(uint16_t count)
+{
+    while (count-- != 0u) {
+        status_send();
+    }
+}
+
+static void receive(const uint8_t *bytes, uint16_t count)
+{
+    coming = bytes;
+    coming_count = count;
+}
+
+static const uint8_t device_info_request[] = { 0x55, 1, 1, 0, 0x57 };
+
+void test_text_goes_on_beside_noise(void)
+{
+    static const uint8_t noise[] = { 0, 0xFF, 'a', 0x02, 0x56 };
+    status_tick(500);
+    receive(noise, sizeof noise);
+    passes(60);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+}
+
+void test_a_valid_frame_ends_the_text_and_only_its_answer_follows(void)
+{
+    uint16_t n;
+    status_tick(500);
+    passes(4);
+    TEST_ASSERT_EQUAL_STRING("stat", sent);
+    receive(device_info_request, sizeof device_info_request);
+    passes(5);
+    TEST_ASSERT_EQUAL_UINT16(5, sent_count); /* the answer begins in the pass of the request's last byte */
+    passes(60);
+    TEST_ASSERT_EQUAL_HEX8(0x55, sent[4]);
+    TEST_ASSERT_EQUAL_HEX8(46, sent[5]);
+    TEST_ASSERT_TRUE(sent_count > 4u + 46u);
+    n = sent_count;
+    status_tick(500);
+    status_tick(500);
+    passes(60);
+    TEST_ASSERT_EQUAL_UINT16(n, sent_count);
+}
+
+void test_text_waits_for_a_frame_that_may_be_valid_and_goes_on_when_it_is_not(void)
+{
+    static const uint8_t begun[] = { 0x55, 40, 1 };
+    status_tick(500);
+    passes(4);
+    receive(begun, sizeof begun);
+    passes(30);
+    TEST_ASSERT_EQUAL_STRING("stat", sent);
+    status_tick(LNET_QUIET_MS);
+    passes(60);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+}
+
+void test_an_answer_waits_for_a_transmitter_that_is_full(void)
+{
+    room = 0;
+    receive(device_info_request, sizeof device_info_request);
+    passes(30);
+    TEST_ASSERT_EQUAL_UINT16(0, sent_count);
+    room = 1;
+    passes(2);
+    TEST_ASSERT_EQUAL_HEX8(0x55, sent[0]);
+    TEST_ASSERT_EQUAL_HEX8(46, sent[1]);
+}

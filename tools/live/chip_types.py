@@ -1,0 +1,66 @@
+"""Names 32-bit types in the debugging information of a PC's ELF file as the chip's compiler does: there, int has 16 bits. Clients of the serial
+line go by the names.
+
+    python3 -m tools.live.chip_types build/host/foc33.elf"""
+
+import sys
+from pathlib import Path
+
+from tools.common.errors import UserError
+from tools.image.program import contents, reading
+
+from .symbols import dwarf_of
+
+NAMES = {"int": "long int", "unsigned int": "long unsigned int"}
+BYTES, WHERE = 4, ("DW_AT_byte_size", "DW_AT_encoding", "DW_AT_name")
+INLINE, POINTER = "DW_FORM_string", "DW_FORM_strp"
+
+
+def rename(path: Path) -> int:
+    """Changes the file in place; returns how many types have a new name. No byte moves: a name of three letters stands in the entry itself, which is as
+    long as an offset to a longer name."""
+    data = bytearray(contents("ELF", path))
+    changed = 0
+    with reading("ELF", path):
+        dwarf = dwarf_of(path)
+        info, texts = dwarf.debug_info_sec, dwarf.debug_str_sec
+        strings = bytes(data[texts.global_offset:texts.global_offset + texts.size])
+        offsets = {new: _offset(strings, new) for new in NAMES.values()}
+        for unit in dwarf.iter_CUs():
+            types = [die for die in unit.iter_DIEs() if die.tag == "DW_TAG_base_type" and tuple(die.attributes) == WHERE]
+            longer = next((die.abbrev_code for die in types if die.attributes["DW_AT_name"].form == POINTER), None)
+            for die in types:
+                name = die.attributes["DW_AT_name"]
+                new = NAMES.get(name.value.decode())
+                if new is None or longer is None or die.attributes["DW_AT_byte_size"].value != BYTES: # a unit with int alone has no variable of it
+                    continue
+                if longer > 0x7F or die.abbrev_code > 0x7F or name.form == INLINE and len(name.value) != 3:
+                    raise UserError("a type cannot be renamed", str(path), "compile with another version of gcc")
+                data[info.global_offset + die.offset] = longer
+                at = info.global_offset + name.offset
+                data[at:at + 4] = offsets[new].to_bytes(4, "little")
+                changed += 1
+    path.write_bytes(data)
+    return changed
+
+
+def _offset(strings: bytes, text: str) -> int:
+    """Where a text begins among those of the file; the end of a longer one will do."""
+    at = strings.find(text.encode() + b"\0")
+    if at < 0:
+        raise UserError(f"no name '{text}'", "debugging information", "compile with another version of gcc")
+    return at
+
+
+def main() -> int:
+    """Run the command; returns the exit code."""
+    try:
+        rename(Path(sys.argv[1]))
+    except (UserError, IndexError) as error:
+        print(f"foc33: {error if isinstance(error, UserError) else 'no file, tools.live.chip_types: name an ELF file'}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
