@@ -8,9 +8,10 @@ import pytest
 from live_support import bench, known, origin, parts, until
 from support import refusal
 
+from tools.live.lnet import ScopeState
 from tools.live.pace import Pacemaker
 from tools.live.scale import RAW, scale_of
-from tools.live.scope import USUAL
+from tools.live.scope import USUAL, Scope
 from tools.live.virtual_board import VirtualBoard
 
 SYMBOLS = known()
@@ -119,6 +120,29 @@ def test_a_power_up_meanwhile_does_not_end_the_scope(living):
     living.messages.clear()
     living.trace()
     living.ask(mode="stop")
+
+
+class EmptyLink:
+    """A firmware whose scope was reset before it had a row."""
+
+    answer_s = 1.0
+
+    def scope_state(self) -> ScopeState:
+        return ScopeState(0, 1, 1, 0, 0x0800, 0, 0, 0, 800)
+
+    def scope_setup(self, *settings) -> None:
+        pass
+
+    def scope_read(self) -> list:
+        return []
+
+
+def test_a_trace_without_rows_is_none():
+    published: list[dict] = []
+    scope = Scope(EmptyLink, SYMBOLS, parts().library.params, published.append)
+    scope.ask({"channels": [I_Q], "trigger": None, "level": 0.0, "rising": True, "position": 0.0, "factor": 1, "mode": "auto"})
+    scope._round(EmptyLink())
+    assert [message for message in published if "trace" in message] == [] and scope.trace is None
 
 
 @pytest.mark.parametrize("wish, part", [

@@ -18,7 +18,7 @@ from .pace import PACES
 if TYPE_CHECKING:
     from . import board
 
-IMAGE = paths.ROOT / "build" / "target" / "foc33.elf"
+IMAGE = paths.shown(paths.ROOT / "build" / "target" / "foc33.elf")
 
 
 def _parser() -> argparse.ArgumentParser:
