@@ -161,20 +161,6 @@ bringup: setup-run ## [your board] what BRINGUP says of the right board and of m
 	@+$(if $(MOTOR),$(ready),:)
 	@$(front_end) bringup $(if $(board_variant),--variant $(call quoted,$(board_variant))) $(options)
 
-.PHONY: live setup-live
-live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN=port]
-	@+$(ready)
-	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
-	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN)))
-
-setup-live:
-	@tools/setup/prepare.sh live
-
-.PHONY: live-pictures
-live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
-	@+$(MAKE) vboard
-	@$(alone) $(python) -m tools.live.pictures
-
 # Each motor with the header that the tuner writes for it.
 drawn_from = $(tuner) tune --all --brief >/dev/null
 drawn = $(if $(SEED),--seed $(call quoted,$(SEED))) $(if $(CASE),--case $(call quoted,$(CASE))) $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(out)

@@ -56,9 +56,9 @@ def test_a_fault_acts_and_can_be_mended(name):
 
 def test_where_two_faults_are_the_same_wire_the_other_stays_when_one_is_mended():
     board = bench()
-    for command in (["open_a", True], ["open_b", True], ["open_b", False]):
+    for command in (["open_a", True], ["blocked", True], ["open_b", True], ["open_b", False], ["blocked", False]):
         board.act({"fault": command})
-    assert board.board.get("fault.open_phase") == 1.0
+    assert board.board.get("fault.open_phase") == 1.0 and board.board.get("load.locked") == 0.0
 
 
 def test_power_up_begins_anew_and_leaves_sliders_and_faults():
