@@ -36,8 +36,7 @@ def hurst(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory):
-    return rows_on(SOME = NAMES[::2]
-OTHER_MOTOR, OTHER_BOARD, tmp_path_factory.mktemp("bringup_other"), SOME)
+    return rows_on(OTHER_MOTOR, OTHER_BOARD, tmp_path_factory.mktemp("bringup_other"), SOME)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -117,6 +117,16 @@ void test_buttons(void)
     }
 }
 
+void test_swapped_buttons_count_by_the_names_on_them(void)
+{
+    answers[BRINGUP_ASK_BEGIN] = 3; /* S2, at the pin of S3 */
+    answers[BRINGUP_ASK_S3] = 2;
+    answers[BRINGUP_ASK_UART] = 3;
+    until(BRINGUP_STEP_LED_ALIVE);
+    TEST_ASSERT_EQUAL_UINT16(0, guide.sender); /* S2: yes */
+    TEST_ASSERT_FALSE(found(BRINGUP_UART_PIN));
+}
+
 void test_a_button_that_is_down_at_rest_ends_it(void)
 {
     inputs.s3_down = 1;
