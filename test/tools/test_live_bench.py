@@ -162,7 +162,8 @@ def test_csv_has_a_row_a_millisecond_and_the_last_two_minutes():
     board = started()
     table = list(csv.reader(io.StringIO(board.csv())))
     times = np.array([float(row[0]) for row in table[1:]])
-    assert table[0][:2] == ["time_s", "plant.speed_rpm"] and np.diff(times) == pytest.approx(0.001, abs=2e-5) and times[-1] == pytest.approx(board.time_s, abs=0.001)
+    assert table[0][:2] == ["time_s", "plant.speed_rpm"] and np.diff(times) == pytest.approx(0.001, abs=2e-5)
+    assert times[-1] == pytest.approx(board.time_s, abs=0.001)
     for minute in range(5):
         board.recording.add_rows(np.array([60.0 * minute, 60.0 * minute + 59.0]), np.zeros((2, len(board.recording.signals))))
     assert [times[0] for times, _ in board.recording.rows][0] == 120.0

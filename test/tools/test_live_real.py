@@ -114,9 +114,10 @@ def test_a_trace_comes_over_the_same_line(desk):
     assert [(later - earlier) % 65536 for earlier, later in zip(ticks, ticks[1:])] == [1] * (len(ticks) - 1) and len(ticks) > 200
 
 
-@pytest.mark.parametrize("command, part", [({"start": 9.0}, "choose"), ({"start": "fast"}, "impossible"), ({"press": "S2"}, "no such command"), ([], "no such command")])
-def test_a_wrong_command_is_refused_in_one_line(desk, command, part):
-    refusal(lambda: desk.page.act(command), part)
+@pytest.mark.parametrize("wish, part", [
+    ({"start": 9.0}, "choose"), ({"start": "fast"}, "impossible"), ({"press": "S2"}, "no such command"), ([], "no such command")])
+def test_a_wrong_command_is_refused_in_one_line(desk, wish, part):
+    refusal(lambda: desk.page.act(wish), part)
     refusal(desk.page.scenario, "save its CSV")
 
 
@@ -144,7 +145,8 @@ def test_what_lies_together_is_read_together():
 def test_a_firmware_without_a_scope_or_a_port_without_a_board_is_one_line():
     params, without = parts().library.params, symbols.Symbols({name: item for name, item in SYMBOLS.variables.items() if not name.startswith("scope_command")})
     refusal(lambda: Watch(without, params), "scope_command.mode", "SCOPE 1")
-    refused(command("--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing", main=main), "cannot open the port", "/dev/nothing")
+    refused(command("--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing", main=main),
+            "cannot open the port", "/dev/nothing")
 
 
 def test_a_line_keeps_what_the_board_cannot_take_yet():

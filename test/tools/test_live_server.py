@@ -181,7 +181,8 @@ def said(*arguments: str) -> tuple[int, str, str]:
 
 @pytest.mark.parametrize("arguments, part", [
     (("--pace", "2"), "no pace '2', PACE: choose one of 1, 0.1, 0.01, 0.001"), (("--listen", "page"), "'page' is no port, LISTEN"),
-    (("--listen", "70000"), "no port"), (("--elf", "foc33.elf"), "PORT=/dev/ttyUSB0"), (("--port", "/dev/nothing", "--elf", "no.elf"), "no.elf"), (("--board", "mclv9"), "no board 'mclv9'"), (("--defines", "TUNING"), "no mode 'TUNING'"), (("rest",), "command line")])
+    (("--listen", "70000"), "no port"), (("--elf", "foc33.elf"), "PORT=/dev/ttyUSB0"), (("--port", "/dev/nothing", "--elf", "no.elf"), "no.elf"),
+    (("--board", "mclv9"), "no board 'mclv9'"), (("--defines", "TUNING"), "no mode 'TUNING'"), (("rest",), "command line")])
 def test_bad_input_is_one_line(arguments, part):
     refused(said(*arguments), part)
 

@@ -70,8 +70,11 @@ def strip(trace: Trace, every: int, phase: int, states: dict[int, str]) -> list[
     means = {ALWAYS: np.ones(len(state), bool), SWITCHING: trace.column("pwm.outputs_seen")[picked] > 0,
              ESTIMATING: np.isin(state, [number for number, name in states.items() if name in ESTIMATES]),
              CONTROLLED: np.isin(state, [number for number, name in states.items() if name in CLOSED])}
-    columns = [[value if good else None for value, good in zip((trace.column(line.signal)[picked] * SCALES.get(panel.unit, 1.0)).round(4).astype(float).tolist(),
-                                                               means[line.when].tolist())] for panel in PANELS for line in panel.lines]
+    columns = []
+    for panel in PANELS:
+        for line in panel.lines:
+            values = trace.column(line.signal)[picked].astype(float) * SCALES.get(panel.unit, 1.0)
+            columns.append([value if good else None for value, good in zip(values.round(4).tolist(), means[line.when].tolist())])
     return [list(row) for row in zip(trace.time_s[picked].round(4).tolist(), *columns)]
 
 

@@ -247,7 +247,8 @@ class VirtualBoard:
     # ---- what a page is told ---------------------------------------------------------------------------------------------
     def hello(self) -> dict[str, Any]:
         """All that a new tab must know."""
-        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title, "defines": [name for name in self.origin.defines if name != SCOPE],
+        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title,
+                "defines": [name for name in self.origin.defines if name != SCOPE],
                 "sliders": self.sliders, "pole_pairs": self.rated.pole_pairs, "max_current_a": self.library.params["MAXIMUM_CURRENT_A"],
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
