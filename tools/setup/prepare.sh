@@ -2,10 +2,10 @@
 # Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
 #
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib; if it can be had, dygraphs for the curves of a run's page
-#   tools/setup/prepare.sh live    the same, and aiohttp
-#   tools/setup/prepare.sh tune    the first, with openpyxl
+#   tools/setup/prepare.sh tune    the same, and openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
-#   tools/setup/prepare.sh scope   the same, with pyserial
+#   tools/setup/prepare.sh scope   the third, with pyserial
+#   tools/setup/prepare.sh live    the same, and aiohttp
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby), INSTALL=no (install nothing, say what is missing).
@@ -94,25 +94,22 @@ case $job in
         modules="$modules openpyxl"
         python_packages="$python_packages python3-openpyxl"
         ;;
-    target) ;;
-    live) ;;
-    scope) ;;
+    target | scope | live) ;;
     *) give_up "prepare.sh, '$job': name the job, run, live, scope, tune, target or test" ;;
 esac
 
 case $job in
-    target | test | scope)
+    target | test | scope | live)
         modules="$modules elftools intelhex"
         python_packages="$python_packages python3-pyelftools python3-intelhex"
         ;;
 esac
 case $job in
-    scope | test)
+    scope | live | test)
         modules="$modules serial"
         python_packages="$python_packages python3-serial"
         ;;
 esac
-
 case $job in
     live | test)
         modules="$modules aiohttp"
@@ -140,8 +137,8 @@ fi
 # Tried once: without it a run's page has its tables only, and says what to do.
 if ! has_dygraphs && [ ! -e $state/no-dygraphs ] && can_install; then
     echo "foc33: installing the Debian package libjs-dygraphs, for the curves of a run's page (log: $log)"
-    apt update
-    apt install --no-install-recommends libjs-dygraphs || {
+    logged "$log" "looking for packages" apt_get update
+    logged "$log" "installing packages" apt_get install --no-install-recommends libjs-dygraphs || {
         touch $state/no-dygraphs
         echo "foc33: set-up, libjs-dygraphs: cannot be installed, see $log; pages show no curves" >&2
     }
