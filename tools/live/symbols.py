@@ -19,7 +19,7 @@ try:
 except ImportError:
     pass # program.reading() says so
 
-DSPIC = 118
+DSPIC = "EM_DSPIC30F"
 RAM = range(0x0800, 0xF800)
 ADDRESS, PLUS = 0x03, 0x23
 """DW_OP_addr, DW_OP_plus_uconst."""
