@@ -32,7 +32,7 @@ void lnet_init(uint8_t *memory, uint8_t size)
 {
     lnet_t *l = &board_lnet;
     l->scope.mode = (uint16_t)SCOPE_IDLE;
-    l->scope.end = board_scope_array + SCOPE_ARRAY_WORDS;
+    l->scope.last = board_scope_array + SCOPE_ARRAY_WORDS;
     l->scope.at = board_scope_array;
     l->scope.event = board_scope_array;
     l->scope.channels = 0;
