@@ -99,6 +99,7 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     }
     s->periods = (uint16_t)(word_at(request + 2) + 1u);
     s->wait = 1;
+    s->unusual_words = (uint16_t)((s->words == SCOPE_USUAL_WORDS) ? 0u : s->words);
     rows = (uint16_t)(SCOPE_ARRAY_WORDS / s->words);
     s->at = board_scope_array;
     s->begin = board_scope_array;
@@ -118,37 +119,21 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     return 1;
 }
 
-/** Four bytes, the lowest first. */
-static uint8_t *put_long(uint8_t *at, uint16_t low, uint16_t high)
-{
-    at[0] = (uint8_t)low;
-    at[1] = (uint8_t)(low >> 8);
-    at[2] = (uint8_t)high;
-    at[3] = (uint8_t)(high >> 8);
-    return at + 4;
-}
-
 /** Bytes from the array's begin. */
 static uint16_t offset_of(const int16_t *at)
 {
     return (uint16_t)((uint16_t)(at - board_scope_array) * 2u);
 }
 
-uint8_t *scope_put(const scope_t *s, uint8_t *at)
+void scope_put(const scope_t *s, uint8_t *at)
 {
-    uint16_t factor = (uint16_t)(s->periods - 1u);
-    at[0] = (uint8_t)s->mode;
-    at[1] = (uint8_t)s->channels;
-    at[2] = (uint8_t)factor;
-    at[3] = (uint8_t)(factor >> 8);
-    at = put_long(at + 4, offset_of(s->at), 0);
-    at = put_long(at, MEMORY_ADDRESS(board_scope_array), 0);
-    at = put_long(at, (uint16_t)s->delay, (s->delay < 0) ? 0xFFFFu : 0u);
-    at = put_long(at, offset_of(s->event), 0);
-    at = put_long(at, offset_of(s->last), 0);
-    at = put_long(at, offset_of(s->last), 0); /* clients take all of an array of whole rows */
-    *at = VERSION;
-    return at + 1;
+    uint16_t used = offset_of(s->last), n; /* and the array's size: clients take all of an array of whole rows */
+    const uint16_t words[] = { (uint16_t)(s->mode | (uint16_t)(s->channels << 8)), (uint16_t)(s->periods - 1u), offset_of(s->at), 0, MEMORY_ADDRESS(board_scope_array), 0,
+                               (uint16_t)s->delay, (uint16_t)((s->delay < 0) ? 0xFFFFu : 0u), offset_of(s->event), 0, used, 0, used, 0, VERSION };
+    for (n = 0; n < sizeof words / sizeof words[0]; n++) {
+        at[2u * n] = (uint8_t)words[n];
+        at[2u * n + 1u] = (uint8_t)(words[n] >> 8);
+    }
 }
 
 #endif

@@ -100,7 +100,7 @@ static uint16_t line_serves_client(void)
 static uint16_t line_is_taken(uint16_t elapsed_ms)
 {
     lnet_tick(elapsed_ms);
-    return board_lnet.is_up;
+    return lnet_is_up();
 }
 
 #else
@@ -111,7 +111,7 @@ static uint16_t line_is_taken(uint16_t elapsed_ms)
 void status_init(void)
 {
 #if SCOPE
-    lnet_init((uint8_t *)line, sizeof line);
+    lnet_init((uint8_t *)line, MODE_LINE_SIZE);
 #endif
     *((board_reset_cause != 0u) ? put_reset() : line) = '\0';
     next = 0;

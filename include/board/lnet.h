@@ -37,19 +37,18 @@ enum { LNET_ERROR_TABLE(LNET_ERROR) };
 /** The line: requests and answers take turns. */
 typedef struct {
     scope_t scope;
-    uint8_t *memory;             /**< for requests and answers, from the first valid frame on */
-    const volatile void *source; /**< what the answer goes on with where the memory ends */
-    uint16_t quiet_ms;           /**< since the last byte of a request that is not complete */
-    uint8_t memory_size;
-    uint8_t part;    /**< what comes next */
-    uint8_t special; /**< the byte that the next one must fill, or 0 */
-    uint8_t size;    /**< of the data */
-    uint8_t done;    /**< of them, received or sent */
-    uint8_t at;      /**< in the memory, of an answer */
-    uint8_t sum;
-    uint8_t is_mine;           /**< 1: this node is meant */
-    uint8_t is_up;             /**< 1 from the first valid frame on */
-    uint8_t first[LNET_FIRST]; /**< a request before that */
+    uint8_t *buffer; /**< a frame from its size to its last byte of data, as far as there is room */
+    uint16_t room;   /**< of it, even */
+    uint8_t *memory; /**< the buffer from the first valid frame on */
+    uint16_t memory_size;
+    const volatile uint8_t *source; /**< what an answer goes on with where the buffer ends */
+    uint16_t quiet_ms;              /**< since the last byte of a request that is not complete */
+    uint16_t part;                  /**< what comes next */
+    uint16_t special;               /**< the byte that the next one must fill, or 0 */
+    uint16_t left;                  /**< bytes of a frame that are still to come or to be sent, its sum not counted */
+    uint16_t at;                    /**< in the buffer */
+    uint16_t sum;
+    uint8_t first[LNET_FIRST]; /**< the buffer before that */
 } lnet_t;
 
 #if SCOPE
@@ -58,7 +57,7 @@ typedef struct {
 extern lnet_t board_lnet;
 
 /** Nothing received, nothing recorded. @param memory of the status line, which the first valid frame takes over @param size even */
-void lnet_init(uint8_t *memory, uint8_t size);
+void lnet_init(uint8_t *memory, uint16_t size);
 
 /** A byte from the line. While an answer is under way it is dropped: a client waits for its answer. */
 void lnet_receive(uint8_t byte);
@@ -68,6 +67,9 @@ int16_t lnet_next(void);
 
 /** Time goes by. */
 void lnet_tick(uint16_t elapsed_ms);
+
+/** 1 from the first valid frame on. */
+uint16_t lnet_is_up(void);
 
 /** 1 while the line belongs to a client: one has sent a valid frame, or what may become the first one comes in. */
 uint16_t lnet_is_busy(void);

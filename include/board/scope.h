@@ -24,10 +24,11 @@ typedef struct {
     int16_t *at, *begin, *end;                   /**< where the next row goes, and the ring in use */
     int16_t *last;                               /**< end of the array's last row */
     uint16_t words;                              /**< of a row */
+    uint16_t unusual_words;                      /**< the same; 0: the usual ones */
     uint16_t left;                               /**< rows to come before the trigger is looked for, or after it; 0: it is looked for */
     uint16_t after;                              /**< rows from the trigger on; 0: it has come */
     uint16_t is_low;                             /**< 1: the value has been on the other side of the level; now it must come over */
-    const volatile uint16_t *trigger;            /**< compared with the level */
+    const volatile uint16_t *volatile trigger;   /**< compared with the level */
     uint16_t flip;                               /**< bits that turn what is waited for into "not below, signed" */
     int16_t level;                               /**< flipped */
     const volatile int16_t *source[SCOPE_WORDS]; /**< of each word */
@@ -58,10 +59,10 @@ QM_INLINE void scope_comes(scope_t *s, const int16_t *at, int16_t *begin)
 /** A row. The usual one is copied in a straight line, others in a loop. @return where the next one goes */
 QM_INLINE int16_t *scope_copy(const scope_t *s)
 {
-    const volatile int16_t *const *source = s->source;
+    const volatile int16_t *const volatile *source = s->source; /* read in this order: an address is not used in the cycle after it was read */
     int16_t *at = s->at;
-    if (s->words != SCOPE_USUAL_WORDS) {
-        uint16_t left = s->words;
+    if (s->unusual_words != 0u) {
+        uint16_t left = s->unusual_words;
         do {
             *at = **source;
             at++;
@@ -81,14 +82,16 @@ QM_INLINE int16_t *scope_copy(const scope_t *s)
 /** The last work of a period. @param begin of the array */
 QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
 {
+    const volatile uint16_t *trigger;
     int16_t *next;
     if (s->mode == (uint16_t)SCOPE_IDLE || --s->wait != 0u) {
         return;
     }
     s->wait = s->periods;
+    trigger = s->trigger;
     next = scope_copy(s);
     if (s->left == 0u) {
-        if ((int16_t)(*s->trigger ^ s->flip) >= s->level) {
+        if ((int16_t)(*trigger ^ s->flip) >= s->level) {
             scope_comes(s, s->at, begin);
         }
     } else if (--s->left == 0u && s->after == 0u) {
@@ -108,8 +111,8 @@ extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
  *  @return 1 if it was understood; else nothing has changed but that a running record has ended */
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
 
-/** What the scope has done, as it stands in a frame. @return the end */
-uint8_t *scope_put(const scope_t *s, uint8_t *at);
+/** What the scope has done, as it stands in a frame. @param at with room for thirty bytes */
+void scope_put(const scope_t *s, uint8_t *at);
 
 #endif
 #endif
