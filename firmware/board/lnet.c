@@ -36,27 +36,22 @@ static const uint8_t device_info[INFO_BYTES] = { 5, 0, 1, 0, 255, 0x10, 0x82, [I
 
 lnet_t board_lnet;
 
-void lnet_init(uint8_t *memory, uint16_t size)
+void lnet_init(uint8_t *memory)
 {
     lnet_t *l = &board_lnet;
     l->scope.mode = (uint16_t)SCOPE_IDLE;
     l->scope.last = board_scope_array + SCOPE_ARRAY_WORDS;
     l->memory = memory;
-    l->memory_size = size;
     l->buffer = l->first;
     l->room = LNET_FIRST;
     l->part = PART_SYN;
     l->special = 0;
-}
-
-uint16_t lnet_is_up(void)
-{
-    return (uint16_t)(board_lnet.buffer != board_lnet.first);
+    l->is_up = 0;
 }
 
 uint16_t lnet_is_busy(void)
 {
-    return (uint16_t)(lnet_is_up() || board_lnet.part != (uint16_t)PART_SYN);
+    return (uint16_t)(board_lnet.is_up || board_lnet.part != (uint16_t)PART_SYN);
 }
 
 void lnet_tick(uint16_t elapsed_ms)
@@ -196,16 +191,17 @@ static void end_frame(lnet_t *l, uint16_t sum)
 {
     const uint8_t *request = l->buffer;
     uint8_t service = request[AT_SERVICE], error = LNET_ERROR_CHECKSUM;
-    uint16_t size = request[AT_SIZE], bytes = 0, fits = (uint16_t)(HEAD + size <= l->room);
+    uint16_t sent = sum_sent(l), size = request[AT_SIZE], bytes = 0, fits = (uint16_t)(HEAD + size <= l->room);
 
     l->part = PART_SYN;
-    if (request[AT_NODE] != LNET_NODE || (sum != sum_sent(l) && !lnet_is_up())) {
+    if (request[AT_NODE] != LNET_NODE || (sum != sent && !l->is_up)) {
         return;
     }
     l->source = 0;
-    if (sum == sum_sent(l)) {
+    if (sum == sent) {
         l->buffer = l->memory;
-        l->room = l->memory_size;
+        l->room = LNET_ROOM;
+        l->is_up = 1;
         error = LNET_ERROR_SIZE;
         if (fits) {
             error = serve(l, request, size, &bytes);

@@ -99,7 +99,7 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     }
     s->periods = (uint16_t)(word_at(request + 2) + 1u);
     s->wait = 1;
-    s->unusual_words = (uint16_t)((s->words == SCOPE_USUAL_WORDS) ? 0u : s->words);
+    s->is_unusual = (uint16_t)(s->words != SCOPE_USUAL_WORDS);
     rows = (uint16_t)(SCOPE_ARRAY_WORDS / s->words);
     s->at = board_scope_array;
     s->begin = board_scope_array;
@@ -125,15 +125,25 @@ static uint16_t offset_of(const int16_t *at)
     return (uint16_t)((uint16_t)(at - board_scope_array) * 2u);
 }
 
-void scope_put(const scope_t *s, uint8_t *at)
+/** Four bytes. */
+static uint16_t *put_long(uint16_t *at, uint16_t low, uint16_t high)
 {
-    uint16_t used = offset_of(s->last), n; /* and the array's size: clients take all of an array of whole rows */
-    const uint16_t words[] = { (uint16_t)(s->mode | (uint16_t)(s->channels << 8)), (uint16_t)(s->periods - 1u), offset_of(s->at), 0, MEMORY_ADDRESS(board_scope_array), 0,
-                               (uint16_t)s->delay, (uint16_t)((s->delay < 0) ? 0xFFFFu : 0u), offset_of(s->event), 0, used, 0, used, 0, VERSION };
-    for (n = 0; n < sizeof words / sizeof words[0]; n++) {
-        at[2u * n] = (uint8_t)words[n];
-        at[2u * n + 1u] = (uint8_t)(words[n] >> 8);
-    }
+    *at++ = low;
+    *at++ = high;
+    return at;
+}
+
+void scope_put(const scope_t *s, void *record)
+{
+    uint16_t *at = put_long(record, (uint16_t)(s->mode | (uint16_t)(s->channels << 8)), (uint16_t)(s->periods - 1u));
+    uint16_t used = offset_of(s->last);
+    at = put_long(at, offset_of(s->at), 0);
+    at = put_long(at, MEMORY_ADDRESS(board_scope_array), 0);
+    at = put_long(at, (uint16_t)s->delay, (s->delay < 0) ? 0xFFFFu : 0u);
+    at = put_long(at, offset_of(s->event), 0);
+    at = put_long(at, used, 0);
+    at = put_long(at, used, 0); /* clients take all of an array of whole rows */
+    *at = VERSION;
 }
 
 #endif

@@ -19,21 +19,21 @@ typedef enum {
 /** The scope. The background changes it in SCOPE_IDLE only, and the mode last. The ring in use is one row until the trigger comes, where nothing
  *  from before it is kept. */
 typedef struct {
-    volatile uint16_t mode;                      /**< scope_mode_t; the control interrupt ends it */
-    uint16_t wait, periods;                      /**< until the next row, and from row to row */
-    int16_t *at, *begin, *end;                   /**< where the next row goes, and the ring in use */
-    int16_t *last;                               /**< end of the array's last row */
-    uint16_t words;                              /**< of a row */
-    uint16_t unusual_words;                      /**< the same; 0: the usual ones */
-    uint16_t left;                               /**< rows to come before the trigger is looked for, or after it; 0: it is looked for */
-    uint16_t after;                              /**< rows from the trigger on; 0: it has come */
-    uint16_t is_low;                             /**< 1: the value has been on the other side of the level; now it must come over */
-    const volatile uint16_t *volatile trigger;   /**< compared with the level */
-    uint16_t flip;                               /**< bits that turn what is waited for into "not below, signed" */
-    int16_t level;                               /**< flipped */
-    const volatile int16_t *source[SCOPE_WORDS]; /**< of each word */
-    const int16_t *event;                        /**< the trigger's row */
-    int16_t delay;                               /**< bytes that are kept from before the trigger; negative: left out after it */
+    volatile uint16_t mode;                               /**< scope_mode_t; the control interrupt ends it */
+    uint16_t wait, periods;                               /**< until the next row, and from row to row */
+    int16_t *at, *begin, *end;                            /**< where the next row goes, and the ring in use */
+    int16_t *last;                                        /**< end of the array's last row */
+    uint16_t words;                                       /**< of a row */
+    uint16_t is_unusual;                                  /**< 1: a row has not SCOPE_USUAL_WORDS */
+    uint16_t left;                                        /**< rows to come before the trigger is looked for, or after it; 0: it is looked for */
+    uint16_t after;                                       /**< rows from the trigger on; 0: it has come */
+    uint16_t is_low;                                      /**< 1: the value has been on the other side of the level; now it must come over */
+    const volatile uint16_t *volatile trigger;            /**< compared with the level */
+    uint16_t flip;                                        /**< bits that turn what is waited for into "not below, signed" */
+    int16_t level;                                        /**< flipped */
+    const volatile int16_t *volatile source[SCOPE_WORDS]; /**< of each word */
+    const int16_t *event;                                 /**< the trigger's row */
+    int16_t delay;                                        /**< bytes that are kept from before the trigger; negative: left out after it */
     uint16_t channels;
 } scope_t;
 
@@ -56,26 +56,31 @@ QM_INLINE void scope_comes(scope_t *s, const int16_t *at, int16_t *begin)
     }
 }
 
-/** A row. The usual one is copied in a straight line, others in a loop. @return where the next one goes */
-QM_INLINE int16_t *scope_copy(const scope_t *s)
+/** A row of any length. @return where the next one goes */
+QM_INLINE int16_t *scope_copy_words(const scope_t *s)
 {
-    const volatile int16_t *const volatile *source = s->source; /* read in this order: an address is not used in the cycle after it was read */
+    const volatile int16_t *const volatile *source = s->source;
     int16_t *at = s->at;
-    if (s->unusual_words != 0u) {
-        uint16_t left = s->unusual_words;
-        do {
-            *at = **source;
-            at++;
-            source++;
-            left--;
-        } while (left != 0u);
-    } else {
-        const volatile int16_t *first = source[0], *second = source[1], *third = source[2], *fourth = source[3];
-        *at++ = *first;
-        *at++ = *second;
-        *at++ = *third;
-        *at++ = *fourth;
-    }
+    uint16_t left = s->words;
+    do {
+        *at = **source;
+        at++;
+        source++;
+        left--;
+    } while (left != 0u);
+    return at;
+}
+
+/** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read.
+ *  @return where the next one goes */
+QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
+{
+    const volatile int16_t *first = s->source[0], *second = s->source[1], *third = s->source[2], *fourth = s->source[3];
+    int16_t *at = s->at;
+    *at++ = *first;
+    *at++ = *second;
+    *at++ = *third;
+    *at++ = *fourth;
     return at;
 }
 
@@ -89,7 +94,7 @@ QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
     }
     s->wait = s->periods;
     trigger = s->trigger;
-    next = scope_copy(s);
+    next = s->is_unusual ? scope_copy_words(s) : scope_copy_usual(s);
     if (s->left == 0u) {
         if ((int16_t)(*trigger ^ s->flip) >= s->level) {
             scope_comes(s, s->at, begin);
@@ -111,8 +116,8 @@ extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
  *  @return 1 if it was understood; else nothing has changed but that a running record has ended */
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
 
-/** What the scope has done, as it stands in a frame. @param at with room for thirty bytes */
-void scope_put(const scope_t *s, uint8_t *at);
+/** What the scope has done, as it stands in a frame. @param record at an even address, with room for thirty bytes */
+void scope_put(const scope_t *s, void *record);
 
 #endif
 #endif

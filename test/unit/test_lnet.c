@@ -35,7 +35,7 @@ void test_memory_is_read_bytes_in_order(void)
 /** Longer than the memory for answers: it is fetched piece by piece. */
 void test_a_long_answer_is_all_there(void)
 {
-    static const uint8_t sizes[] = { 93, 94, 95, 96, 97, 127, 128 };
+    static const uint8_t sizes[] = { 1, 2, 3, LNET_ROOM - 5, LNET_ROOM - 4, LNET_ROOM - 3, LNET_ROOM, 253 };
     uint16_t n;
     for (n = 0; n < sizeof sizes; n++) {
         TEST_ASSERT_EQUAL_UINT8(0, rig_ask(9, LOW(ADDRESS(variable[0])), sizes[n], 1));
@@ -88,12 +88,12 @@ void test_requests_of_a_wrong_length_are_refused(void)
 
 void test_what_is_longer_than_the_memory_for_it_is_refused_by_its_size(void)
 {
-    uint8_t data[102] = { 10, LOW(ADDRESS(variable[0])), 98, 9, 9 };
-    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, 97));
-    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, 102));
+    uint8_t data[LNET_ROOM] = { 10, LOW(ADDRESS(variable[0])), LNET_ROOM - 6u, 9, 9 }; /* size and node are in that memory, too */
+    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, LNET_ROOM - 1u));
+    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, LNET_ROOM));
     TEST_ASSERT_EQUAL_INT16(0x0100, variable[0]);
-    data[3] = 92;
-    TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(data, 96));
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(data, LNET_ROOM - 2u));
+    TEST_ASSERT_EQUAL_INT16(0x0909, variable[0]);
 }
 
 void test_addresses_outside_of_the_variables_are_refused(void)
@@ -224,7 +224,7 @@ void test_a_frame_without_data_is_none(void)
 void test_noise_before_the_first_frame_is_not_answered_and_does_not_take_the_line(void)
 {
     uint16_t n, seed = 1;
-    lnet_init(line_memory, sizeof line_memory);
+    lnet_init(line_memory);
     memset(line_memory, 0x5A, sizeof line_memory);
     for (n = 0; n < 20000u; n++) {
         seed = (uint16_t)(seed * 25173u + 13849u);
@@ -242,7 +242,7 @@ void test_noise_before_the_first_frame_is_not_answered_and_does_not_take_the_lin
 
 void test_the_line_is_kept_free_while_the_first_frame_comes_in(void)
 {
-    lnet_init(line_memory, sizeof line_memory);
+    lnet_init(line_memory);
     lnet_receive('x');
     TEST_ASSERT_FALSE(lnet_is_busy());
     lnet_receive(0x55);
@@ -252,7 +252,7 @@ void test_the_line_is_kept_free_while_the_first_frame_comes_in(void)
 void test_a_long_first_frame_is_answered_by_its_size(void)
 {
     const uint8_t request[] = { 10, LOW(ADDRESS(variable[0])), 5, 1, 2, 3, 4, 5 };
-    lnet_init(line_memory, sizeof line_memory);
+    lnet_init(line_memory);
     TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(request, sizeof request));
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(request, sizeof request));
 }
