@@ -21,6 +21,6 @@
 #endif
 
 /** Of the trace buffer. */
-#define SCOPE_BYTES ((856u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY) & ~3u)
+#define SCOPE_BYTES ((848u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY) & ~3u)
 
 #endif
