@@ -1,7 +1,7 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
 # Variables: SCENARIO MOTOR BOARD SET OUT (what to run, on which board, where to write), DEFINES USERPARAMS (which firmware), VARIANT SAN (a build in
-# a folder of its own), ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing),
+# a folder of its own; of make bringup a miswired board), ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing),
 # FOC33_QUIET=1 (no progress), V=1 (show the commands).
 
 RUBY ?= ruby
@@ -19,6 +19,10 @@ MAKEFLAGS += -j$(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 endif
 
 # ---- folders and flags ---------------------------------------------------------------------------------------------------
+ifneq ($(filter bringup,$(MAKECMDGOALS)),)
+board_variant := $(VARIANT)
+override VARIANT :=
+endif
 suffix := $(if $(VARIANT),-$(VARIANT))$(if $(SAN),-san)
 B := build/host$(suffix)
 T := build/test$(suffix)
@@ -107,7 +111,7 @@ options = $(what) $(out)
 scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
 ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
-.PHONY: anymotor run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch setup-run
+.PHONY: anymotor bringup run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
@@ -153,19 +157,9 @@ catch: setup-run ## [run] S2 while the rotor turns at any speed, and stops on a 
 	@+$(ready)
 	@$(front_end) catch $(options)
 
-.PHONY: live setup-live
-live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN=port]
-	@+$(ready)
-	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
-	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN)))
-
-setup-live:
-	@tools/setup/prepare.sh live
-
-.PHONY: live-pictures
-live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
-	@+$(MAKE) vboard
-	@$(alone) $(python) -m tools.live.pictures
+bringup: setup-run ## [your board] what BRINGUP says of the right board and of miswired ones [VARIANT=name MOTOR= BOARD= USERPARAMS= OUT=]
+	@+$(if $(MOTOR),$(ready),:)
+	@$(front_end) bringup $(if $(board_variant),--variant $(call quoted,$(board_variant))) $(options)
 
 # Each motor with the header that the tuner writes for it.
 drawn_from = $(tuner) tune --all --brief >/dev/null

@@ -19,6 +19,7 @@
 /* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
 /* #define IDENTIFY */              /* measure R, L, Kphi, inertia and friction of the motor instead of running it (docs/tuning.md) */
+/* #define BRINGUP */               /* check a new board step by step with little current instead of running the motor (docs/bringup.md) */
 /* #define PARAMS_IN_RAM */         /* a debugger can change every parameter while the motor turns; TUNING does it too */
 /* #define SELFTEST_OFF */          /* leave out the self-tests in the manner of IEC 60730 Class B (docs/selftest.md) */
 

@@ -2,6 +2,7 @@
 #include "board/firmware.h"
 
 #include "board/mclv.h"
+#include "board/modes/bringup_report.h"
 #include "board/peripherals.h"
 #include "board/record.h"
 #include "board/reset.h"
@@ -50,6 +51,7 @@ void firmware_init(void)
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
+    mode_panel_init();
     retry_init(&board_retry);
 #if SCOPE
     remote_init(&scope_command);
@@ -146,7 +148,7 @@ void firmware_background(void)
 #if SCOPE
         in.remote = &scope_command;
 #endif
-        lights = panel_tick(&board_panel, &board_drive, &board_params, &in);
+        lights = mode_panel(&in);
         retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         BOARD_LED_ALIVE = lights.led_alive & 1u;
         BOARD_LED_RUN = lights.led_run & 1u;

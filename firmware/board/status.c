@@ -3,6 +3,7 @@
 
 #include "board/firmware.h"
 #include "board/lnet.h"
+#include "board/modes/bringup_report.h"
 #include "board/modes/identify_report.h"
 #include "board/peripherals.h"
 #include "board/record.h"
@@ -13,7 +14,6 @@
 #include "drive/limit_reasons.h"
 #include "version.h"
 
-#define STATUS_PERIOD_MS 500u
 #if SCOPE
 #define LINE_PLACE __attribute__((aligned(2))) /* a client's answers are words */
 #else
@@ -61,7 +61,7 @@ static int16_t speed_rpm(speed_erpm_t speed)
 static char *put_line(void)
 {
     char *at = mode_status_line(line, &board_drive);
-    if (at == line) {
+    if (at == line && !mode_speaks(&at)) {
         at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
         at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
         at = text_put_signed(text_put(at, " speed "), speed_rpm(estimator_speed(&board_drive.run.estimator)));
@@ -129,7 +129,7 @@ void status_tick(uint16_t elapsed_ms)
         return;
     }
     waited_ms = (uint16_t)(waited_ms + elapsed_ms);
-    if (waited_ms < STATUS_PERIOD_MS || line[next] != '\0') {
+    if (waited_ms < MODE_STATUS_MS || line[next] != '\0') {
         return;
     }
     waited_ms = 0;

@@ -81,7 +81,9 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 /* ---- UART1: 115200 8N1, status lines ---- */
 #define BOARD_U1BRG 86u                   /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
 #define BOARD_UART_TX_PIN RPOR9bits.RP19R /* the RP number of BOARD_PIN_UART_TX; RP21: RPOR10bits.RP21R */
-#define BOARD_UART_TX_FUNCTION 3u         /* RPnR code of U1TX */
+#define BOARD_OTHER_TX C, 5               /* BRINGUP tries this one, too */
+#define BOARD_OTHER_TX_PIN RPOR10bits.RP21R
+#define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
 #define BOARD_UART_RX_RP ((uint16_t)PIN_RP(BOARD_PIN_UART_RX))
 
 /* ---- LEDs ---- */

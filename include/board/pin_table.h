@@ -55,6 +55,9 @@ enum { CHIP_PIN_TABLE(PIN_NUMBERS) PIN_PORT_A = 0,
 #define PIN_RP(...) PIN_RP_OF(__VA_ARGS__)
 #define PIN_LOW(...) PIN_LOW_OF(__VA_ARGS__)
 #define PIN_LATCH(...) PIN_LATCH_OF(__VA_ARGS__)
+/** Its name as a text: "RC6". */
+#define PIN_NAME_OF(port, bit) "R" #port #bit
+#define PIN_NAME(...) PIN_NAME_OF(__VA_ARGS__)
 /** PIN_MASK(pin, port): the pin's bit in a port's registers; 0 if it is on another port. */
 #define PIN_MASK(...) PIN_MASK_OF(__VA_ARGS__)
 #define PIN_AN_MASK(...) (1u << PIN_AN_OF(__VA_ARGS__))

@@ -59,7 +59,7 @@ QM_INLINE uint16_t drive_is_running(const drive_t *d)
 /** 1 with the estimator's angle in command: CLOSED or STOPPING. */
 QM_INLINE uint16_t drive_is_closed(const drive_t *d)
 {
-    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
+    return (uint16_t)(MODE_CLOSES_LOOP && (uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
 }
 
 /** What drives the bridge (outputs_t) in the drive's present state. */

@@ -56,6 +56,7 @@ QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_sampl
             return;
         }
     } else {
+        mode_idle(d);
         idle_step(d, p, raw); /* the period in which it begins to run has no time for both: the low sides stay on */
     }
     duty->a = 0;

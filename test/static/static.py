@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 HERE = Path(__file__).parent
 PAGE = "docs/deviations.md"
 BUILD = Path("build/static")
-MODES = [(), ("OPEN_LOOP_FUNCTIONING",), ("TUNING",), ("TORQUE_MODE",), ("BIDIRECTIONAL_SPEED",), ("SNAPSHOT",), ("IDENTIFY",), ("PARAMS_IN_RAM",),
+MODES = [(), ("OPEN_LOOP_FUNCTIONING",), ("TUNING",), ("TORQUE_MODE",), ("BIDIRECTIONAL_SPEED",), ("SNAPSHOT",), ("IDENTIFY",), ("BRINGUP",), ("PARAMS_IN_RAM",),
          ("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED")]
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
     -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits

@@ -1,6 +1,7 @@
 """What the tests of make live share: a board to work at, and a server in a process of its own."""
 
 import contextlib
+import functools
 import json
 import subprocess
 import sys
@@ -8,24 +9,31 @@ import time
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
-from support import LIBRARY
-
-from tools.bench.board import Library
-from tools.common import board_file, motor_file, paths
+from tools.common import paths
+from tools.live import board, symbols
 from tools.live.pace import FRAME_S
 from tools.live.recording import Origin
 from tools.live.virtual_board import VirtualBoard
 
-MOTOR = "hurst_dmb0224c10002"
+@functools.cache
+def parts() -> board.Parts:
+    """The firmware with its scope."""
+    return board.parts()
+
+
+@functools.cache
+def known() -> symbols.Symbols:
+    """Its variables."""
+    return symbols.Symbols.read(parts().symbols)
 
 
 def origin() -> Origin:
-    motor = motor_file.part(MOTOR)
-    return Origin(motor, board_file.part(*board_file.named(motor)), [], {})
+    return Origin(parts().motor, parts().board, [board.SCOPE], {})
 
 
 def bench() -> VirtualBoard:
-    return VirtualBoard(Library(LIBRARY), origin())
+    """A board without the scope's thread."""
+    return VirtualBoard(parts().library, origin(), known())
 
 
 def passes(board: VirtualBoard, seconds: float) -> dict:
@@ -54,7 +62,7 @@ class Served:
     """A running server. `url` is what it has printed."""
 
     def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "tools.live", "--library", str(LIBRARY), "--listen", "0", *arguments]
+        command = [sys.executable, "-m", "tools.live", "--library", str(parts().library.path), "--listen", "0", *arguments]
         self.process = subprocess.Popen(command, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         first = self.process.stdout.readline()
         assert first.startswith("open http://127.0.0.1:"), first + self.process.stderr.read()

@@ -90,7 +90,7 @@ def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(t
 
 # ---- with it -------------------------------------------------------------------------------------------------------------
 with_compiler = pytest.mark.skipif(not xc16(), reason="xc16-gcc is not on PATH; give XC16=folder")
-MODES = ("OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT", "IDENTIFY", "PARAMS_IN_RAM", "SELFTEST_OFF")
+MODES = ("OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT", "IDENTIFY", "BRINGUP", "PARAMS_IN_RAM", "SELFTEST_OFF")
 
 
 def warnings(errors: str) -> list[str]:

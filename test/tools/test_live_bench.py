@@ -56,9 +56,9 @@ def test_a_fault_acts_and_can_be_mended(name):
 
 def test_where_two_faults_are_the_same_wire_the_other_stays_when_one_is_mended():
     board = bench()
-    for command in (["open_a", True], ["open_b", True], ["open_b", False]):
+    for command in (["open_a", True], ["blocked", True], ["open_b", True], ["open_b", False], ["blocked", False]):
         board.act({"fault": command})
-    assert board.board.get("fault.open_phase") == 1.0
+    assert board.board.get("fault.open_phase") == 1.0 and board.board.get("load.locked") == 0.0
 
 
 def test_power_up_begins_anew_and_leaves_sliders_and_faults():
@@ -162,7 +162,8 @@ def test_csv_has_a_row_a_millisecond_and_the_last_two_minutes():
     board = started()
     table = list(csv.reader(io.StringIO(board.csv())))
     times = np.array([float(row[0]) for row in table[1:]])
-    assert table[0][:2] == ["time_s", "plant.speed_rpm"] and np.diff(times) == pytest.approx(0.001, abs=2e-5) and times[-1] == pytest.approx(board.time_s, abs=0.001)
+    assert table[0][:2] == ["time_s", "plant.speed_rpm"] and np.diff(times) == pytest.approx(0.001, abs=2e-5)
+    assert times[-1] == pytest.approx(board.time_s, abs=0.001)
     for minute in range(5):
         board.recording.add_rows(np.array([60.0 * minute, 60.0 * minute + 59.0]), np.zeros((2, len(board.recording.signals))))
     assert [times[0] for times, _ in board.recording.rows][0] == 120.0

@@ -17,7 +17,7 @@ from tools.common.paths import ROOT
 
 SOURCES = ("Makefile", "userparams.h", "firmware", "include", "tools", "tuning", "examples", "build/setup")
 HELP = re.findall(r"^  make (\S+) .*?((?: \[.*\])?)$", make().stdout, re.MULTILINE)
-MODES = [mode for mode in modes() if mode not in ("IDENTIFY", "PARAMS_IN_RAM", "SELFTEST_OFF")]
+MODES = [mode for mode in modes() if mode not in ("BRINGUP", "IDENTIFY", "PARAMS_IN_RAM", "SELFTEST_OFF")]
 
 
 def copy(root: Path) -> Path:
@@ -127,7 +127,8 @@ def test_a_build_folder_that_cannot_be_used_is_named(goal, kind):
     (["sanitize", "SCENARIO=dmeo"], "no scenario 'dmeo'.*did you mean 'demo'"), (["run", "SCENARIO=dmeo", "MOTOR=linix_45zwn24_40"], "no scenario 'dmeo'"),
     (["run", "MOTOR=lynix_45zwn24_40"], "no motor 'lynix.*did you mean 'linix"), (["run", "BOARD=mclw"], "no board 'mclw'"),
     (["run", "DEFINES=-DTORQE_MODE"], "no mode 'TORQE_MODE'.*did you mean 'TORQUE_MODE'"), (["sanitize", "DEFINES=TUNING"], "no mode 'TUNING', DEFINES: use -D"),
-    (["run", "DEFINES=-DIDENTIFY"], "no scenario is for IDENTIFY, DEFINES: make identify"), (["run", "DEFINES=-DTUNING=0"], "no mode '-DTUNING=0'"),
+    (["run", "DEFINES=-DIDENTIFY"], "no scenario is for IDENTIFY, DEFINES: make identify"),
+    (["run", "DEFINES=-DBRINGUP"], "no scenario is for BRINGUP, DEFINES: make bringup runs BRINGUP"), (["bringup", "VARIANT=motor_xy"], "no variant 'motor_xy', VARIANT: "), (["run", "DEFINES=-DTUNING=0"], "no mode '-DTUNING=0'"),
     (["run", "DEFINES=-DMOTOR_RS_OHM=3"], "MOTOR_RS_OHM is a parameter, DEFINES: set it in userparams.h")])
 def test_a_wrong_file_or_mode_is_told_before_anything_is_built(blanks, words, text):
     refused(make(*words, root=blanks), text)

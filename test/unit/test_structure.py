@@ -114,7 +114,7 @@ def test_the_state_is_written_in_one_place() -> None:
 
 
 def test_a_modes_name_stands_in_the_modes_rooms_only() -> None:
-    names = "IDENTIFY|TUNING|TORQUE_MODE|SNAPSHOT|BIDIRECTIONAL_SPEED|OPEN_LOOP_FUNCTIONING|PARAMS_IN_RAM"
+    names = "IDENTIFY|BRINGUP|TUNING|TORQUE_MODE|SNAPSHOT|BIDIRECTIONAL_SPEED|OPEN_LOOP_FUNCTIONING|PARAMS_IN_RAM"
     condition = re.compile(rf"^\s*#\s*(?:if|ifdef|ifndef|elif)\b.*\b(?:{names})\b", re.MULTILINE)
     asked = [path for path, text in sources().items() if condition.search(text)]
     assert asked and all("/modes/" in path for path in asked), asked

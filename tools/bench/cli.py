@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import build, campaign, catch_sweep, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
+from . import bringup, build, campaign, catch_sweep, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
                              "of another motor, board or header")
         command.add_argument("--quiet", action="store_true", help="no progress bar")
 
+    bringup.add_command(commands)
     campaign.add_command(commands)
     soak.add_command(commands)
 

@@ -68,7 +68,7 @@ def scenario_for(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
         fitting = [item for item in map(scenario_file.load, paths.names(paths.SCENARIOS)) if set(item.defines) == asked]
         if not fitting:
             raise UserError(f"no scenario is for {' with '.join(sorted(asked))}", "DEFINES",
-                            "make identify runs IDENTIFY" if "IDENTIFY" in asked else "name the one to run, SCENARIO=name")
+                            next((f"make {mode.lower()} runs {mode}" for mode in ("IDENTIFY", "BRINGUP") if mode in asked), "name the one to run, SCENARIO=name"))
         name = next((item.name for item in fitting if item.name.upper() in asked), fitting[0].name)
     item = scenario_file.load(name or ("rated" if options.motor else "demo"))
     more = [define for define in defines if define not in item.defines]

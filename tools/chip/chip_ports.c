@@ -95,6 +95,12 @@ static void write_selection(void *context, uint16_t address, uint16_t value, uin
     chip_put(chip, address, chip_merged(chip, address, value, mask) & 0x1F1Fu);
 }
 
+/* True if the pin RPn is the output of this peripheral. */
+bool chip_ports_pin_has_function(const chip_t *chip, unsigned rp, unsigned function)
+{
+    return (chip_get(chip, (uint16_t)(SFR_RPOR0 + (rp & ~1u))) >> (rp % 2u != 0 ? 8u : 0u) & 0x1Fu) == function;
+}
+
 /* True if some RPn pin is the output of this peripheral. */
 bool chip_ports_have_function(const chip_t *chip, unsigned function)
 {

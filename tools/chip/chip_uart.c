@@ -14,7 +14,6 @@ enum {
     UTXBF = 0x0200,
     UTXEN = 0x0400,
     STATUS = URXDA | OERR | 0x000C | RIDLE | TRMT | UTXBF,
-    RP_U1TX = 3,     /* RPORx */
     RP_VSS = 31      /* RPINR18 */
 };
 
@@ -91,7 +90,7 @@ void chip_uart_sent(chip_t *chip)
     u->sending = false;
     if ((chip_get(chip, SFR_U1MODE) & LPBACK) != 0) {
         receive_character(chip, u->shift);
-    } else if (!chip_ports_have_function(chip, RP_U1TX)) {
+    } else if (!chip_ports_have_function(chip, CHIP_FUNCTION_U1TX)) {
         chip_warn(chip, "RPOR9: no pin has the function U1TX (3), what the firmware sends does not leave the device");
     } else if (chip->board.send != NULL) {
         chip->board.send(chip->board.context, u->shift);

@@ -13,7 +13,7 @@
 void iss_shadow_reset(iss_board_t *b)
 {
     b->shadow.running = false;
-#ifndef IDENTIFY /* there the background takes part in the procedure, which only one of the two can do */
+#if !defined IDENTIFY && !defined BRINGUP /* there the background takes part in the procedure, which only one of the two can do */
     if (b->shadow.on && b->signals) {
         host_registers_reset();
         firmware_init();

@@ -3,15 +3,22 @@
 import argparse
 import asyncio
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tools.bench import command_common
 from tools.bench.scenario import Scenario
 from tools.bench.scenario_file import MOTOR
-from tools.common import command_line
+from tools.common import command_line, paths
 from tools.common.errors import UserError
 
 from .pace import PACES
+
+if TYPE_CHECKING:
+    from . import board
+
+IMAGE = paths.shown(paths.ROOT / "build" / "target" / "foc33.elf")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -22,22 +29,58 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
     parser.add_argument("--pace", default="1", help="motor seconds in a second: " + ", ".join(f"{pace:g}" for pace in PACES))
+    parser.add_argument("--port", help="serial port of a real board, whose firmware has SCOPE 1")
+    parser.add_argument("--elf", type=Path, metavar="FILE", help="ELF file of the firmware on it; default build/target/foc33.elf, as make firmware leaves it")
     parser.add_argument("--listen", metavar="PORT", help="TCP port of the page; default 8033, or a free one")
     parser.set_defaults(command=_live)
     return parser
 
 
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return command_line.main(_parser, arguments)
+
+
 def _live(options: argparse.Namespace) -> int:
     from . import server # what only this needs: aiohttp
-    from .recording import Origin
-    from .virtual_board import VirtualBoard
     pace, port = _pace(options.pace), _port(options.listen)
-    defines = command_common.macros(options.defines)
-    motor, board, library, _ = command_common.set_up(Scenario("live", "", "", MOTOR, "", 0.0), options, defines)
-    words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
-    origin = Origin(motor, board, defines, words)
-    asyncio.run(server.serve(lambda: VirtualBoard(library, origin), port, pace, _tell))
+    asyncio.run(server.serve(_real(options) if options.port else _virtual(options), port, pace, _tell))
     return 0
+
+
+def _real(options: argparse.Namespace) -> Callable[[], Any]:
+    """Makes the bench of a board at a serial port. The PC's firmware, with the same header, tells what its numbers mean."""
+    from .real_board import RealBoard
+    from .symbols import Symbols
+    symbols = Symbols.read(options.elf or IMAGE)
+    parts = _parts(options)
+    return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params)
+
+
+def _virtual(options: argparse.Namespace) -> Callable[[], Any]:
+    """Makes the bench of a virtual board."""
+    from .board import SCOPE
+    from .recording import Origin
+    from .symbols import Symbols
+    from .virtual_board import VirtualBoard
+    if options.elf is not None:
+        raise UserError("an ELF file without a board", "ELF", "name the board's serial port, PORT=/dev/ttyUSB0")
+    parts = _parts(options)
+    defines = command_common.macros(options.defines)
+    words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
+    origin = Origin(parts.motor, parts.board, defines + [SCOPE] * (SCOPE not in defines), words)
+    symbols = Symbols.read(parts.symbols)
+    return lambda: VirtualBoard(parts.library, origin, symbols)
+
+
+def _parts(options: argparse.Namespace) -> "board.Parts":
+    """Motor, board and firmware; with --library that one, which its ELF file lies beside."""
+    from . import board
+    if options.library is None:
+        return board.parts(options.motor, options.board, options.defines, options.userparams)
+    motor, board_part = command_common.parts_of(Scenario("live", "", "", MOTOR, "", 0.0), options)
+    library = command_common.library_for([], options.library, options.userparams)
+    return board.Parts(motor, board_part, library, None, options.library.with_name("foc33.elf"))
 
 
 def _tell(url: str) -> None:
@@ -60,4 +103,4 @@ def _port(text: str | None) -> int | None:
 
 
 if __name__ == "__main__":
-    sys.exit(command_line.main(_parser, None))
+    sys.exit(main())

@@ -13,6 +13,9 @@ from tools.common.errors import UserError
 
 FRAMES_PER_S = 20
 FRAME_S = 1.0 / FRAMES_PER_S
+SLICES = 5
+"""Of a frame's time; between them characters of the serial line change hands."""
+LEAST_SLICE_S = 0.001
 BEHIND_S = 0.25
 """What a frame may be late before the clock starts anew; else a machine that was busy for a while would run too fast afterwards."""
 MEASURED_S = 1.0
@@ -21,7 +24,7 @@ PACES = (1.0, 0.1, 0.01, 0.001)
 
 
 class Pacemaker:
-    """`board` has run(seconds), frame() and time_s; each frame, with its pace, goes to `publish`."""
+    """`board` has run(seconds), paced(pace), frame() and time_s; each frame, with its pace, goes to `publish`."""
 
     def __init__(self, board: Any, publish: Callable[[dict[str, Any]], None], pace: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
         self.board, self.publish, self.pace, self.clock = board, publish, pace, clock
@@ -56,22 +59,34 @@ class Pacemaker:
     def set_pace(self, pace: float) -> None:
         self.pace = pace
         self.measured.clear()
+        self.board.paced(pace)
 
     def _live(self) -> None:
         try:
             due = self.clock()
             while not self.ended:
-                self.step()
-                due = max(due + FRAME_S, self.clock() - BEHIND_S)
-                self.serve(due)
+                due = self.frame(due)
         except Exception as error: # whoever waits for frames must hear of it
             self.error = error
             self.publish({"ended": str(error)})
         self._refuse()
 
-    def step(self) -> None:
-        """The time of one frame passes."""
-        self.board.run(FRAME_S * self.pace)
+    def frame(self, due: float) -> float:
+        """The time of one frame passes, in slices; returns when the next one is due."""
+        seconds = FRAME_S * self.pace
+        slices = max(1, min(SLICES, round(seconds / LEAST_SLICE_S)))
+        for number in range(1, slices + 1):
+            self.board.run(seconds / slices)
+            if number == slices:
+                self.show()
+            due = max(due + FRAME_S / slices, self.clock() - BEHIND_S)
+            self.serve(due)
+            if self.ended:
+                break
+        return due
+
+    def show(self) -> None:
+        """A frame for the pages."""
         now, motor_s = self.clock(), self.board.time_s
         if self.measured and motor_s < self.measured[-1][1]: # powered up again
             self.measured.clear()

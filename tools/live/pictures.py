@@ -14,19 +14,25 @@ from tools.common.progress import waiting
 from . import browser
 
 SIZE, SMALL = (1400, 900), (1000, 700)
-LONGEST_S = 30.0
+LONGEST_S = 120.0
 
 
 @contextlib.contextmanager
-def _page(driver: Any) -> Iterator[None]:
-    """A board of its own, and the page."""
-    command = [sys.executable, "-m", "tools.live", "--library", "build/host/libvboard.so", "--listen", "0"]
-    with subprocess.Popen(command, cwd=paths.ROOT, stdout=subprocess.PIPE, text=True) as process:
+def _program(*command: str) -> Iterator[list[str]]:
+    """A program of this project, ended at the end; its first two lines."""
+    with subprocess.Popen([sys.executable, "-m", *command], cwd=paths.ROOT, stdout=subprocess.PIPE, text=True) as process:
         try:
-            driver.get(process.stdout.readline().split()[1])
-            yield
+            yield [process.stdout.readline() for _ in range(2)]
         finally:
             process.terminate()
+
+
+@contextlib.contextmanager
+def _page(driver: Any, *arguments: str) -> Iterator[None]:
+    """The page of a board of its own."""
+    with _program("tools.live", "--listen", "0", *arguments) as told:
+        driver.get(told[0].split()[1])
+        yield
 
 
 def _until(driver: Any, condition: str) -> None:
@@ -43,33 +49,68 @@ def _slide(driver: Any, key: str, value: float) -> None:
     driver.execute_script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", slider, value)
 
 
+def _click(driver: Any, selector: str) -> None:
+    driver.find_element("css selector", selector).click()
+
+
+def _choose(driver: Any, name: str, value: str) -> None:
+    item = driver.find_element("id", name)
+    driver.execute_script("arguments[0].value = arguments[1]; arguments[0].onchange()", item, value)
+
+
 def _running(driver: Any) -> None:
-    """2000 rpm, then a load."""
+    """2000 rpm, then a load; the scope starts with the angle."""
     _until(driver, "f.t > 1")
     driver.find_element("id", "pot").send_keys("\ue00e" * 6 + "\ue013" * 9) # PageUp, arrow up
-    driver.find_element("css selector", "[data-button=S2]").click()
+    _click(driver, "[data-button=S2]")
     _until(driver, "f.state === 'CLOSED' && !f.limits.length && f.now.speed_rpm > 1900")
     _slide(driver, "load.constant_nm", 0.05)
-    time.sleep(2.0)
+    _choose(driver, "scope-trigger", "board_drive.angle")
+    _choose(driver, "scope-level", "180")
+    _click(driver, "[data-mode=auto]")
+    _until(driver, "window.eval('foc33.traces') > 2")
+    time.sleep(1.0)
 
 
 def _faulty(driver: Any) -> None:
     """The load stays, and a wire breaks."""
-    driver.find_element("css selector", "[data-fault=open_b]").click()
+    _click(driver, "[data-fault=open_b]")
     _until(driver, "f.state === 'FAULT'")
     time.sleep(1.0)
+
+
+def _remote(driver: Any) -> None:
+    """A board at a serial port, started from the page."""
+    _until(driver, "f.state === 'STOPPED'")
+    driver.execute_script("const t = document.getElementById('target'); t.value = 1500; t.oninput()")
+    _click(driver, "#start")
+    _until(driver, "f.state === 'CLOSED' && Math.abs(f.now.estimate_rpm - 1500) < 15")
+    _click(driver, "[data-mode=auto]")
+    _until(driver, "window.eval('foc33.traces') > 2")
+
+
+def _save(driver: Any, name: str, size: tuple[int, int]) -> None:
+    browser.resize(driver, *size)
+    time.sleep(0.6)
+    driver.save_screenshot(str(paths.ROOT / "docs" / f"{name}.png"))
 
 
 def _write() -> int:
     driver = browser.start()
     try:
-        with waiting("the page's pictures"), _page(driver):
+        browser.resize(driver, *SIZE)
+        with waiting("the page's pictures"):
+            with _page(driver):
+                _running(driver)
+                _save(driver, "live-running", SIZE)
+                _faulty(driver)
+                _save(driver, "live-fault", SMALL)
             browser.resize(driver, *SIZE)
-            for name, prepare, size in (("live-running", _running, SIZE), ("live-fault", _faulty, SMALL)):
-                prepare(driver)
-                browser.resize(driver, *size)
-                time.sleep(0.6)
-                driver.save_screenshot(str(paths.ROOT / "docs" / f"{name}.png"))
+            with _program("tools.live.board") as told:
+                port, elf = (line.replace(",", " ").split()[place] for line, place in zip(told, (2, 1)))
+                with _page(driver, "--port", port, "--elf", elf):
+                    _remote(driver)
+                    _save(driver, "live-port", SIZE)
     finally:
         driver.quit()
     return 0

@@ -18,23 +18,51 @@ from .pace import PACES, Pacemaker
 ADDRESS = "127.0.0.1"
 NAMES = (ADDRESS, "localhost")
 USUAL_PORT = 8033
-FRAMES_KEPT = 40
-"""For a tab that does not keep up; older ones are dropped."""
+AHEAD = 2
+"""Messages that a tab may have without having said that it has shown them; what comes meanwhile is joined to one frame."""
+MOST_ROWS, MOST_LINES = 2000, 200
+"""Of curves and log in such a frame."""
 LONGEST_MESSAGE = 4096
 SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv")}
 
 
 class Tab:
-    """One connection. `waiting`: frames that are still to be sent."""
+    """One connection. A tab that cannot keep up, or is not in sight, gets fewer frames, and never old ones."""
 
     def __init__(self, socket: web.WebSocketResponse) -> None:
         self.socket = socket
-        self.waiting: asyncio.Queue[str] = asyncio.Queue(FRAMES_KEPT)
+        self.waiting: dict[str, dict[str, Any]] = {}
+        """the newest message of each kind"""
+        self.unseen = 0
+        self.news = asyncio.Event()
 
-    def put(self, text: str) -> None:
-        if self.waiting.full():
-            self.waiting.get_nowait()
-        self.waiting.put_nowait(text)
+    def put(self, message: dict[str, Any]) -> None:
+        """Something to be sent."""
+        kind = "frame" if "t" in message else next(iter(message))
+        self.waiting[kind] = joined(self.waiting[kind], message) if kind == "frame" and kind in self.waiting else message
+        self.news.set()
+
+    def seen(self) -> None:
+        """The tab has shown a message."""
+        self.unseen = max(self.unseen - 1, 0)
+        self.news.set()
+
+    async def send(self) -> None:
+        """Until the connection ends."""
+        with contextlib.suppress(ConnectionError):
+            while True:
+                await self.news.wait()
+                self.news.clear()
+                while self.waiting and self.unseen < AHEAD:
+                    self.unseen += 1
+                    await self.socket.send_json(self.waiting.pop(next(iter(self.waiting))))
+
+
+def joined(older: dict[str, Any], newer: dict[str, Any]) -> dict[str, Any]:
+    """One frame of two: what has happened in both, and how things stand now. After a power-up the older one counts no more."""
+    if older["run"] != newer["run"]:
+        return newer
+    return newer | {"strip": (older["strip"] + newer["strip"])[-MOST_ROWS:], "log": (older["log"] + newer["log"])[-MOST_LINES:]}
 
 
 class Server:
@@ -49,21 +77,22 @@ class Server:
         self.loop = asyncio.get_running_loop()
         self.over = asyncio.Event()
         self.pacemaker = Pacemaker(bench, self.publish, pace)
+        bench.start(self.publish)
+        bench.paced(pace)
 
     @property
     def url(self) -> str:
         return f"http://{ADDRESS}:{self.port}/?token={self.token}"
 
     def publish(self, frame: dict[str, Any]) -> None:
-        """From the board's thread: a frame for every tab."""
-        text = json.dumps(frame)
+        """From the board's thread, or the scope's: a message for every tab."""
         with contextlib.suppress(RuntimeError): # the loop has ended before the board
-            self.loop.call_soon_threadsafe(self._deal, text, "ended" in frame)
+            self.loop.call_soon_threadsafe(self._deal, frame)
 
-    def _deal(self, text: str, last: bool) -> None:
+    def _deal(self, message: dict[str, Any]) -> None:
         for tab in self.tabs:
-            tab.put(text)
-        if last:
+            tab.put(message)
+        if "ended" in message:
             self.over.set()
 
     def application(self) -> web.Application:
@@ -101,7 +130,7 @@ class Server:
         await socket.prepare(request)
         self.tabs.add(tab) # first, so that no frame is missed; the page leaves out what it has twice
         await socket.send_json({"hello": await self._ask(self.bench.hello) | {"paces": PACES}})
-        sender = asyncio.create_task(self._send(tab))
+        sender = asyncio.create_task(tab.send())
         try:
             async for message in socket:
                 if message.type == WSMsgType.TEXT:
@@ -112,16 +141,15 @@ class Server:
             await self._ask(lambda: self.bench.left(tab))
         return socket
 
-    async def _send(self, tab: Tab) -> None:
-        with contextlib.suppress(ConnectionError):
-            while True:
-                await tab.socket.send_str(await tab.waiting.get())
-
     async def _take(self, text: str, tab: Tab) -> None:
         """One command; what is wrong with it goes back to this tab only."""
         try:
             command = json.loads(text)
-            if isinstance(command, dict) and set(command) == {"pace"}:
+            if command == {"seen": True}:
+                tab.seen()
+            elif isinstance(command, dict) and set(command) == {"scope"} and self.bench.scope is not None:
+                self.bench.scope.ask(command["scope"])
+            elif isinstance(command, dict) and set(command) == {"pace"}:
                 await self._ask(lambda: self._set_pace(command["pace"]))
             else:
                 await self._ask(lambda: self.bench.act(command, tab))
@@ -161,7 +189,8 @@ async def serve(make_bench: Any, port: int | None, pace: float, tell: Any) -> No
         await asyncio.sleep(0.1) # the tabs hear of the board's end
         for tab in list(server.tabs):
             await tab.socket.close()
-        await asyncio.get_running_loop().run_in_executor(None, server.pacemaker.end)
+        for part in (server.bench, server.pacemaker):
+            await server.loop.run_in_executor(None, part.end)
     finally:
         await runner.cleanup()
     if server.pacemaker.error is not None:

@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
+from tools.common import drive_tables
 from tools.common.trace import Trace, wrapped_deg
+from tools.common.x_macro import rows
 
 STRIP_ROW_S = 0.01
 """Time between two points of the rolling curves."""
@@ -16,6 +19,8 @@ ORBIT_POINTS = 120
 ESTIMATES = ("RAMP", "CLOSED", "STOPPING")
 """States in which the estimated angle means something."""
 CLOSED = ("CLOSED", "STOPPING")
+ON = ("BOOTSTRAP", "ALIGN", *ESTIMATES)
+"""In which the bridge switches."""
 
 
 ALWAYS, SWITCHING, ESTIMATING, CONTROLLED = "always", "switching", "estimating", "controlled"
@@ -24,14 +29,14 @@ ALWAYS, SWITCHING, ESTIMATING, CONTROLLED = "always", "switching", "estimating",
 
 @dataclass(frozen=True)
 class Line:
-    """A curve; `virtual`: a real board cannot tell it."""
+    """A curve: the virtual board's signal, and what a real board is asked for (tools/live/watch.py), "" where it cannot tell."""
 
     name: str
     signal: str
+    watched: str
     color: str
     when: str = ALWAYS
     dashed: bool = False
-    virtual: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,12 +50,12 @@ class Panel:
 
 TRUE, ESTIMATE, REFERENCE, D, Q = "#2f6fb0", "#d9822b", "#9aa4ae", "#1f8a70", "#7048b5"
 PANELS = (
-    Panel("speed", "rpm", (Line("reference", "fw.speed_ref_rpm", REFERENCE, CONTROLLED, True), Line("estimate", "fw.speed_est_rpm", ESTIMATE, ESTIMATING),
-                           Line("true", "plant.speed_rpm", TRUE, virtual=True))),
-    Panel("current", "A", (Line("d", "fw.i_d_a", D, SWITCHING), Line("q", "fw.i_q_a", Q, SWITCHING),
-                           Line("q asked for", "fw.iq_ref_a", REFERENCE, SWITCHING, True))),
-    Panel("torque", "mN·m", (Line("motor", "plant.torque_nm", TRUE, virtual=True),)),
-    Panel("bus", "V", (Line("bus", "bus.voltage_v", D),)))
+    Panel("speed", "rpm", (Line("reference", "fw.speed_ref_rpm", "reference_rpm", REFERENCE, CONTROLLED, True),
+                           Line("estimate", "fw.speed_est_rpm", "estimate_rpm", ESTIMATE, ESTIMATING), Line("true", "plant.speed_rpm", "", TRUE))),
+    Panel("current", "A", (Line("d", "fw.i_d_a", "i_d_a", D, SWITCHING), Line("q", "fw.i_q_a", "i_q_a", Q, SWITCHING),
+                           Line("q asked for", "fw.iq_ref_a", "iq_ref_a", REFERENCE, SWITCHING, True))),
+    Panel("torque", "mN·m", (Line("motor", "plant.torque_nm", "", TRUE),)),
+    Panel("bus", "V", (Line("bus", "bus.voltage_v", "bus_v", D),)))
 SCALES = {"mN·m": 1000.0}
 NOW = {"speed_rpm": "plant.speed_rpm", "estimate_rpm": "fw.speed_est_rpm", "reference_rpm": "fw.speed_ref_rpm", "target_rpm": "fw.speed_target_rpm",
        "theta_deg": "plant.theta_e_deg", "theta_est_deg": "fw.theta_est_deg", "i_d_a": "fw.i_d_a", "i_q_a": "fw.i_q_a", "iq_limit_a": "fw.iq_limit_a",
@@ -60,14 +65,17 @@ NOW = {"speed_rpm": "plant.speed_rpm", "estimate_rpm": "fw.speed_est_rpm", "refe
 
 def strip(trace: Trace, every: int, phase: int, states: dict[int, str]) -> list[list[float | None]]:
     """Rows of the rolling curves: time, then a value for each curve of the panels in their order. `phase`: how many rows of the trace came before."""
-    rows = slice(-phase % every, None, every)
-    state = trace.column("fw.state")[rows]
-    means = {ALWAYS: np.ones(len(state), bool), SWITCHING: trace.column("pwm.outputs_seen")[rows] > 0,
+    picked = slice(-phase % every, None, every)
+    state = trace.column("fw.state")[picked]
+    means = {ALWAYS: np.ones(len(state), bool), SWITCHING: trace.column("pwm.outputs_seen")[picked] > 0,
              ESTIMATING: np.isin(state, [number for number, name in states.items() if name in ESTIMATES]),
              CONTROLLED: np.isin(state, [number for number, name in states.items() if name in CLOSED])}
-    columns = [[value if good else None for value, good in zip((trace.column(line.signal)[rows] * SCALES.get(panel.unit, 1.0)).round(4).astype(float).tolist(),
-                                                               means[line.when].tolist())] for panel in PANELS for line in panel.lines]
-    return [list(row) for row in zip(trace.time_s[rows].round(4).tolist(), *columns)]
+    columns = []
+    for panel in PANELS:
+        for line in panel.lines:
+            values = trace.column(line.signal)[picked].astype(float) * SCALES.get(panel.unit, 1.0)
+            columns.append([value if good else None for value, good in zip(values.round(4).tolist(), means[line.when].tolist())])
+    return [list(row) for row in zip(trace.time_s[picked].round(4).tolist(), *columns)]
 
 
 def now(trace: Trace) -> dict[str, float]:
@@ -78,8 +86,8 @@ def now(trace: Trace) -> dict[str, float]:
 def orbit(trace: Trace) -> dict[str, list[list[float]]]:
     """The last turn of voltage and current in the alpha-beta plane; a part of it where the frame is shorter."""
     turn = np.abs(np.cumsum(wrapped_deg(np.diff(trace.column("fw.theta_ctrl_deg")))[::-1]))
-    rows = min(int(np.searchsorted(turn, 360.0)) + 2, len(trace))
-    pick = np.unique(np.linspace(len(trace) - rows, len(trace) - 1, min(rows, ORBIT_POINTS)).astype(int))
+    count = min(int(np.searchsorted(turn, 360.0)) + 2, len(trace))
+    pick = np.unique(np.linspace(len(trace) - count, len(trace) - 1, min(count, ORBIT_POINTS)).astype(int))
     angle = np.radians(trace.column("fw.theta_ctrl_deg")[pick].astype(float))
     v_d, v_q, i_a, i_b = (trace.column(name)[pick].astype(float) for name in ("fw.v_d_v", "fw.v_q_v", "plant.i_a", "plant.i_b"))
     switching = trace.column("pwm.outputs_seen")[pick] > 0
@@ -92,8 +100,34 @@ def _points(x: np.ndarray, y: np.ndarray) -> list[list[float]]:
     return np.column_stack((x, y)).round(3).tolist()
 
 
+def lines(virtual: bool) -> list[Line]:
+    """The curves that such a board has, in the panels' order."""
+    return [line for panel in PANELS for line in panel.lines if virtual or line.watched]
+
+
 def panels(virtual: bool) -> list[dict[str, Any]]:
-    """What the page draws."""
-    return [{"title": panel.title, "unit": panel.unit,
-             "lines": [{"name": line.name, "color": line.color, "dashed": line.dashed} for line in panel.lines if virtual or not line.virtual]}
-            for panel in PANELS]
+    """What the page draws; a panel without curves is left out."""
+    known = lines(virtual)
+    found = [{"title": panel.title, "unit": panel.unit,
+              "lines": [{"name": line.name, "color": line.color, "dashed": line.dashed} for line in panel.lines if line in known]} for panel in PANELS]
+    return [panel for panel in found if panel["lines"]]
+
+
+@cache
+def states() -> dict[str, str]:
+    """Name and meaning, in the order of their numbers."""
+    return dict(rows("include", "drive/drive.h", "DRIVE_STATE_TABLE", "#name meaning"))
+
+
+def faults() -> dict[str, dict[str, str]]:
+    """Cause and remedy by name."""
+    return _told(drive_tables.faults())
+
+
+def limits() -> dict[str, dict[str, str]]:
+    """The same of the reasons for a limit."""
+    return _told(drive_tables.limits())
+
+
+def _told(table: tuple[drive_tables.Row, ...]) -> dict[str, dict[str, str]]:
+    return {row.name: {"cause": row.cause, "remedy": row.remedy} for row in table}

@@ -1,7 +1,7 @@
 """The virtual board at which somebody works: buttons, sliders, faults; what it records, and what a page is told of it."""
 
 from collections import deque
-from functools import cache
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,15 @@ from tools.bench.trial import rating_of
 from tools.common import drive_tables, motor_file, pins
 from tools.common.errors import UserError, suggestion
 from tools.common.trace import Trace
-from tools.common.x_macro import rows
 
 from . import view
+from .board import SCOPE
 from .faults import FAULTS, keys_of
+from .line import Line
+from .lnet import ANSWER_S, Lnet
 from .recording import BUTTONS, POT, Origin, Recording
+from .scope import Scope
+from .symbols import Symbols
 
 SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm"]
 FIRST_S = 0.01
@@ -30,17 +34,14 @@ SAME_MOVE_S = 1.0
 SUPPLY, TEMPERATURE = "supply.voltage_v", "motor.temp_c"
 
 
-@cache
-def states() -> dict[str, str]:
-    """Name and meaning."""
-    return dict(rows("include", "drive/drive.h", "DRIVE_STATE_TABLE", "#name meaning"))
-
-
 class VirtualBoard:
     """Between two run() it can be worked at; one thread at a time."""
 
-    def __init__(self, library: Library, origin: Origin) -> None:
+    def __init__(self, library: Library, origin: Origin, symbols: Symbols | None = None) -> None:
         self.library, self.origin = library, origin
+        self.line = Line()
+        self.scope: Scope | None = None
+        self.symbols = symbols
         scenario = Scenario("live", "", "", "", "", 0.0, defines=origin.defines)
         self.job = simulate.prepare(scenario, library, origin.motor, origin.board)
         self.rated = motor_file.load(str(origin.motor.path))
@@ -66,6 +67,22 @@ class VirtualBoard:
                 SUPPLY: row("Supply", "V", 0.0, float(f"{1.6 * supply_v:.3g}"), supply_v),
                 TEMPERATURE: row("Winding", "°C", -20.0, 160.0, value(TEMPERATURE, 25.0))}
 
+    def start(self, publish: Callable[[dict[str, Any]], None]) -> None:
+        """The scope's thread, where the firmware has a scope; it talks over the serial line while the board runs."""
+        if self.symbols is not None:
+            self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish)
+            self.scope.start()
+
+    def paced(self, pace: float) -> None:
+        """So much slower everything is answered, too."""
+        if self.scope is not None:
+            self.scope.answer_s = ANSWER_S / pace
+
+    def end(self) -> None:
+        """The thread ends."""
+        if self.scope is not None:
+            self.scope.end()
+
     # ---- power, time -----------------------------------------------------------------------------------------------------
     def power_up(self) -> None:
         """A new board with the same motor: sliders and faults stay where they are, and a new recording begins."""
@@ -88,7 +105,9 @@ class VirtualBoard:
         self.releases: dict[str, float] = {}
         self.held = {button: set() for button in self.held}
         self.log: deque[dict[str, Any]] = deque(maxlen=LOG_LINES)
-        self.lines, self.told, self.rows_seen, self.sent = 0, 0, 0, ""
+        self.lines, self.told, self.rows_seen = 0, 0, 0
+        self.recent: list[Trace] = []
+        self.line.clear()
         self.strip: deque[list[float]] = deque(maxlen=round(view.STRIP_S / view.STRIP_ROW_S))
         self.new_strip: list[list[float]] = []
         self.state, self.fault = "", "NONE"
@@ -110,15 +129,15 @@ class VirtualBoard:
         self.board.run(periods)
         self.time_s = self.board.get("time_s")
         data = self.board.trace_take()
-        self.sent = (self.sent + self.board.uart_take())[-4000:]
+        self.line.exchange(self.board.uart_send, self.board.uart_take())
         if len(data):
             times = before_s + (self.time_s - before_s) / len(data) * np.arange(1, len(data) + 1)
             self._recorded(Trace(SIGNALS, times, np.ascontiguousarray(data.T)))
 
     def _recorded(self, trace: Trace) -> None:
-        self.trace = trace
-        self._note_changes("fw.state", self.library.states, self._note_state)
-        self._note_changes("fw.fault", self.library.faults, self._note_fault)
+        self.recent.append(trace)
+        self._note_changes(trace, "fw.state", self.library.states, self._note_state)
+        self._note_changes(trace, "fw.fault", self.library.faults, self._note_fault)
         self.new_strip += view.strip(trace, round(view.STRIP_ROW_S / self.period_s), self.rows_seen, self.library.states)
         every = round(RECORDED_ROW_S / self.period_s)
         first = -self.rows_seen % every
@@ -126,9 +145,10 @@ class VirtualBoard:
             self.recording.add_rows(trace.time_s[first::every], trace.data[:, first::every].T)
         self.rows_seen += len(trace)
 
-    def _note_changes(self, signal: str, names: dict[int, str], note: Any) -> None:
-        for row, number in self.trace.changes(signal):
-            note(float(self.trace.time_s[row]), names.get(int(number), "?"))
+    @staticmethod
+    def _note_changes(trace: Trace, signal: str, names: dict[int, str], note: Any) -> None:
+        for row, number in trace.changes(signal):
+            note(float(trace.time_s[row]), names.get(int(number), "?"))
 
     def _note_state(self, at_s: float, name: str) -> None:
         if name != self.state:
@@ -227,30 +247,30 @@ class VirtualBoard:
     # ---- what a page is told ---------------------------------------------------------------------------------------------
     def hello(self) -> dict[str, Any]:
         """All that a new tab must know."""
-        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title, "defines": self.origin.defines,
+        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title,
+                "defines": [name for name in self.origin.defines if name != SCOPE],
                 "sliders": self.sliders, "pole_pairs": self.rated.pole_pairs, "max_current_a": self.library.params["MAXIMUM_CURRENT_A"],
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
-                "states": states(), "estimates": view.ESTIMATES,
-                "faults": {row.name: {"cause": row.cause, "remedy": row.remedy} for row in drive_tables.faults()},
-                "limits": {row.name: {"cause": row.cause, "remedy": row.remedy} for row in drive_tables.limits()},
-                "panels": view.panels(True), "strip": list(self.strip), "log": list(self.log)}
+                "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
+                "panels": view.panels(True), "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
         """What has happened since the last frame, and how things stand."""
         told, self.told = self.told, self.lines
         new, self.new_strip = self.new_strip, []
         self.strip.extend(new)
+        trace = Trace(SIGNALS, np.concatenate([part.time_s for part in self.recent]), np.concatenate([part.data for part in self.recent], axis=1))
+        self.recent = self.recent[-1:] # where nothing passes until the next frame, it shows the last moment again
         reasons = int(self.board.get("fw.limits"))
         return {"t": round(self.time_s, 4), "state": self.state, "fault": self.fault,
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
-                "now": view.now(self.trace) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
+                "now": view.now(trace) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
                 "outputs": int(self.board.get("pwm.outputs_seen")),
                 "leds": {name: int(self.board.get("pin." + pins.firmware()[f"led_{name}"].pin)) for name in ("alive", "run")},
                 "settings": self.settings, "run": self.runs,
                 "buttons": {button: int(self.board.get(_key(button))) for button in self.held}, "broken": self.faults,
-                "strip": new, "orbit": view.orbit(self.trace), "log": [line for line in self.log if line["id"] >= told],
-                "serial": self.sent.splitlines()[-2:]}
+                "strip": new, "orbit": view.orbit(trace), "log": [line for line in self.log if line["id"] >= told]}
 
     # ---- what is saved ---------------------------------------------------------------------------------------------------
     def scenario(self) -> str:

@@ -8,6 +8,9 @@
 #define PLANT_RPM_PER_RAD_S (30.0 / PLANT_PI)
 #define PLANT_NEVER 1e30
 
+/* Two of three wires that have changed places. */
+typedef enum { PLANT_SWAP_NONE, PLANT_SWAP_AB, PLANT_SWAP_BC, PLANT_SWAP_CA, PLANT_SWAPS } plant_swap_t;
+
 /* ---- motor and mechanics (plant_motor.c) ---- */
 
 typedef struct {
@@ -17,6 +20,7 @@ typedef struct {
     double temp_c, r_tempco, psi_tempco;
     double inertia_kgm2, viscous_nms, coulomb_nm, stiction_nm;
     double load_constant_nm, load_active_nm, load_viscous_nms, load_quadratic_nms2, load_locked;
+    double swapped; /* plant_swap_t: two of its wires; angle, speed and torque here are as the bridge sees them */
     /* effective values of this period */
     double r, psi, ld, lq, inv_ld, inv_lq;
     /* state: dq currents, electrical angle with its cosine and sine, electrical speed (constant within a period) */
@@ -43,8 +47,10 @@ typedef struct {
 typedef struct {
     double rds_on_ohm, diode_v, diode_ohm, turn_on_s, turn_off_s, trip_a, open_phase;
     double shunt_ohm;
+    double swapped;             /* plant_swap_t: of the drivers' signals */
     double never_on, never_off; /* broken transistors: masks of bits 1L, 1H, 2L, 2H, 3L, 3H; one that is in both never turns off */
-    plant_gate_t gate[3];       /* what the drivers ask for */
+    plant_gate_t gate[3];       /* what the drivers are asked for; all else here goes by legs */
+    unsigned leg_of[3];         /* the leg that a driver drives */
     plant_cond_t cond[3];
     bool low_path[3];        /* the low transistor or its diode carries the leg */
     double low_since_s[3];   /* when low_path last changed, absolute time */
@@ -103,11 +109,13 @@ double plant_motor_float_voltage(const plant_motor_t *m, const double v[3], unsi
 void plant_motor_set_alpha_beta(plant_motor_t *m, double i_alpha, double i_beta);
 void plant_motor_emf(const plant_motor_t *m, double e[3]);
 double plant_motor_torque(const plant_motor_t *m);
+double plant_motor_forward(const plant_motor_t *m);
+double plant_motor_angle(const plant_motor_t *m, double theta);
 void plant_motor_mechanics(plant_motor_t *m, double h_s);
 
 /* plant_inverter.c */
 void plant_inverter_reset(plant_t *plant);
-void plant_inverter_gate(plant_t *plant, unsigned leg, plant_gate_t gate);
+void plant_inverter_gate(plant_t *plant, unsigned driver, plant_gate_t gate);
 bool plant_inverter_run(plant_t *plant, double until_s, double trip_a);
 double plant_inverter_bus_a(const plant_t *plant);
 void plant_inverter_prepare(plant_t *plant);

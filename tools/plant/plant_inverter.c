@@ -69,13 +69,13 @@ static plant_gate_t transistors(const plant_inverter_t *inv, unsigned leg, plant
     return (plant_gate_t)(((unsigned)gate & ~dead) | stuck);
 }
 
-/* The drivers of a leg ask for something new. With both transistors off the current chooses the diode. */
-void plant_inverter_gate(plant_t *plant, unsigned leg, plant_gate_t gate)
+/* A driver is asked for something new. With both transistors off the current chooses the diode. */
+void plant_inverter_gate(plant_t *plant, unsigned driver, plant_gate_t gate)
 {
     static const plant_cond_t on[4] = {PLANT_COND_FLOAT, PLANT_COND_LOW, PLANT_COND_HIGH, PLANT_COND_SHOOT};
     plant_inverter_t *inv = &plant->inverter;
-    unsigned bit = 1u << leg;
-    inv->gate[leg] = gate;
+    unsigned leg = inv->leg_of[driver], bit = 1u << leg;
+    inv->gate[driver] = gate;
     gate = transistors(inv, leg, gate);
     if ((inv->open_mask & bit) != 0) {
         inv->off_mask |= bit;
@@ -90,10 +90,20 @@ void plant_inverter_gate(plant_t *plant, unsigned leg, plant_gate_t gate)
     }
 }
 
+/* Which leg each driver drives: a driver's signal may have come to the wrong leg. */
+static void connect_drivers(plant_inverter_t *inv)
+{
+    static const unsigned leg_of[PLANT_SWAPS][3] = {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}};
+    for (unsigned k = 0; k < 3; k++) {
+        inv->leg_of[k] = leg_of[(unsigned)inv->swapped][k];
+    }
+}
+
 void plant_inverter_reset(plant_t *plant)
 {
     plant_inverter_t *inv = &plant->inverter;
     inv->open_mask = inv->dead_mask = inv->stuck_mask = 0;
+    connect_drivers(inv);
     plant->motor.derived_stale = true; /* what is broken acts from the first period on */
     inv->off_mask = 0;
     plant_motor_set_alpha_beta(&plant->motor, 0.0, 0.0);
@@ -121,7 +131,8 @@ void plant_inverter_prepare(plant_t *plant)
     inv->dead_mask = dead;
     inv->stuck_mask = stuck;
     for (unsigned k = 0; k < 3; k++) {
-        if ((opened >> k & 1u) != 0 || (broken >> 2u * k & 3u) != 0) {
+        unsigned leg = inv->leg_of[k];
+        if ((opened >> leg & 1u) != 0 || (broken >> 2u * leg & 3u) != 0) {
             plant_inverter_gate(plant, k, inv->gate[k]);
         }
         set_equation(plant, k);

@@ -84,11 +84,25 @@ double plant_motor_torque(const plant_motor_t *m)
     return 1.5 * m->pole_pairs * (m->psi + (m->ld - m->lq) * m->id) * m->iq;
 }
 
+/* 1, or -1 where two wires have changed places: the shaft turns the other way round. */
+double plant_motor_forward(const plant_motor_t *m)
+{
+    return m->swapped == PLANT_SWAP_NONE ? 1.0 : -1.0;
+}
+
+/* The shaft's angle for that of the rotor flux against the bridge's leg A, and the other way round: with two wires swapped the rotor is
+ * mirrored in the axis of the third. */
+double plant_motor_angle(const plant_motor_t *m, double theta)
+{
+    static const double mirror[PLANT_SWAPS] = {0.0, 2.0 * PLANT_PI / 3.0, 0.0, 4.0 * PLANT_PI / 3.0};
+    return plant_wrap(mirror[(unsigned)m->swapped] + plant_motor_forward(m) * theta, 2.0 * PLANT_PI);
+}
+
 /* Shaft speed after `h_s` at the torque of the period. Coulomb friction and the brake load hold a shaft that stands still and never
  * turn it backwards. */
 static double next_speed(const plant_motor_t *m, double speed, double torque, double h_s)
 {
-    double drive = torque + m->load_active_nm;
+    double drive = torque + plant_motor_forward(m) * m->load_active_nm;
     double dry = m->coulomb_nm + m->load_constant_nm;
     double direction = speed;
     if (speed == 0.0) {

@@ -2,10 +2,10 @@
 # Finds what the named jobs need (compiler, python, ruby), installs what is missing from Debian's packages, and says what it installs.
 #
 #   tools/setup/prepare.sh run     compiler, Python 3.11 with numpy and matplotlib; if it can be had, dygraphs for the curves of a run's page
-#   tools/setup/prepare.sh live    the same, and aiohttp
-#   tools/setup/prepare.sh tune    the first, with openpyxl
+#   tools/setup/prepare.sh tune    the same, and openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
-#   tools/setup/prepare.sh scope   the same, with pyserial
+#   tools/setup/prepare.sh scope   the third, with pyserial
+#   tools/setup/prepare.sh live    the same, and aiohttp
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby), INSTALL=no (install nothing, say what is missing).
@@ -94,25 +94,22 @@ case $job in
         modules="$modules openpyxl"
         python_packages="$python_packages python3-openpyxl"
         ;;
-    target) ;;
-    live) ;;
-    scope) ;;
+    target | scope | live) ;;
     *) give_up "prepare.sh, '$job': name the job, run, live, scope, tune, target or test" ;;
 esac
 
 case $job in
-    target | test | scope)
+    target | test | scope | live)
         modules="$modules elftools intelhex"
         python_packages="$python_packages python3-pyelftools python3-intelhex"
         ;;
 esac
 case $job in
-    scope | test)
+    scope | live | test)
         modules="$modules serial"
         python_packages="$python_packages python3-serial"
         ;;
 esac
-
 case $job in
     live | test)
         modules="$modules aiohttp"

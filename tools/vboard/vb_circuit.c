@@ -3,15 +3,37 @@
 
 #define REFERENCE_V 3.3
 
-enum { FLTA_RP = 8 }; /* FLTA1 is on RB8 */
+enum { FLTA_RP = 8, LED_PORT = 2, LED_BIT = 6, LEDS = 2 }; /* FLTA1 is on RB8, the LEDs on RC6 and RC7 */
+enum { FLTA_DEAD = 1, FLTA_INVERTED = 2, SWAPPED = 1, FIRST_DEAD = 2 };
+
+/* Is the button S2 (0) or S3 (1) pressed, as its pin sees it? */
+static bool button(const vb_t *vb, unsigned number)
+{
+    const vb_wiring_t *w = &vb->wiring;
+    unsigned pressed = w->buttons == SWAPPED ? 1u - number : number;
+    return (pressed == 0 ? vb->controls.s2 : vb->controls.s3) != 0.0 && w->buttons != FIRST_DEAD + (double)number;
+}
+
+static bool fault_is_low(const vb_t *vb)
+{
+    bool fault = vb->controls.flta != 0.0 || vb->controls.comparator;
+    return vb->wiring.flta == FLTA_INVERTED ? !fault : fault && vb->wiring.flta != FLTA_DEAD;
+}
+
+/* Does the first (0) or the second LED (1) light? */
+double vb_circuit_led(const vb_t *vb, unsigned led)
+{
+    unsigned pin = LED_BIT + (vb->wiring.leds == SWAPPED ? LEDS - 1u - led : led);
+    bool output = (CHIP_REG(&vb->chip, TRISC) >> pin & 1u) == 0;
+    return output && vb->wiring.leds != FIRST_DEAD + (double)led ? (double)chip_ports_pin(&vb->chip, LED_PORT, pin) : 0.0;
+}
 
 /* Levels that the circuits give to the pins when these are inputs; everything else is pulled up. */
 static void levels(void *context, uint16_t level[3])
 {
     const vb_t *vb = context;
-    bool fault = vb->controls.flta != 0.0 || vb->controls.comparator;
-    level[0] = (uint16_t)(0x079Fu & ~(vb->controls.s2 != 0.0 ? 1u << 8 : 0u));
-    level[1] = (uint16_t)(0xFFFFu & ~(vb->controls.s3 != 0.0 ? 1u << 4 : 0u) & ~(fault ? 1u << FLTA_RP : 0u));
+    level[0] = (uint16_t)(0x079Fu & ~(button(vb, 0) ? 1u << 8 : 0u));
+    level[1] = (uint16_t)(0xFFFFu & ~(button(vb, 1) ? 1u << 4 : 0u) & ~(fault_is_low(vb) ? 1u << FLTA_RP : 0u));
     level[2] = 0x03FFu;
 }
 
@@ -68,7 +90,7 @@ static double input_voltage(void *context, unsigned input)
     vb_t *vb = context;
     switch (input) {
     case 0:
-    case 1: return current_voltage(vb, input);
+    case 1: return current_voltage(vb, vb->wiring.currents != 0.0 ? 1u - input : input);
     case 2: return sensed(vb, &vb->analogue.bus, vb->plant.supply.bus_v, 1.0 / vb->analogue.vbus_ratio, 0.0);
     case 3:
     case 4:

@@ -19,8 +19,8 @@ typedef struct {
 } key_entry_t;
 
 static double get_time(const vb_t *vb) { return vb->plant.start_s + vb->plant.now_s; }
-static double get_theta(const vb_t *vb) { return vb->plant.motor.theta * (180.0 / PLANT_PI); }
-static double get_speed(const vb_t *vb) { return vb->plant.motor.omega / vb->plant.motor.pole_pairs * PLANT_RPM_PER_RAD_S; }
+static double get_theta(const vb_t *vb) { return plant_motor_angle(&vb->plant.motor, vb->plant.motor.theta) * (180.0 / PLANT_PI); }
+static double get_speed(const vb_t *vb) { return plant_motor_forward(&vb->plant.motor) * vb->plant.motor.omega / vb->plant.motor.pole_pairs * PLANT_RPM_PER_RAD_S; }
 static double get_frequency(const vb_t *vb) { return vb->chip.pwm.running ? 1.0 / vb->chip.pwm.period_s : 0.0; }
 static double get_running(const vb_t *vb) { return vb->chip.pwm.running ? 1.0 : 0.0; }
 static double get_mask(const vb_t *vb) { return (double)chip_pwm_mask(&vb->chip); }
@@ -29,6 +29,8 @@ static double get_fault_active(const vb_t *vb) { return vb->chip.fault.active ? 
 static double get_fault_pin(const vb_t *vb) { return vb->chip.fault.pin ? 1.0 : 0.0; }
 static double get_trigger_us(const vb_t *vb) { return vb->chip.pwm.trigger_s < PLANT_NEVER ? vb->chip.pwm.trigger_s * 1e6 : -1.0; }
 static double get_dead_us(const vb_t *vb) { return vb->chip.pwm.leg[0].dead_high_s * 1e6; }
+static double get_led_alive(const vb_t *vb) { return vb_circuit_led(vb, 0); }
+static double get_led_run(const vb_t *vb) { return vb_circuit_led(vb, 1); }
 static double get_conversion_us(const vb_t *vb) { return (double)vb->chip.adc.channels * vb->chip.adc.conversion_s * 1e6; }
 
 static double reading_of(const vb_t *vb, unsigned k)
@@ -64,14 +66,13 @@ static double get_latency_mean(const vb_t *vb) { return mean_of(&vb->count.laten
 static void set_theta(vb_t *vb, double deg)
 {
     plant_motor_t *m = &vb->plant.motor;
-    double theta = fmod(deg * (PLANT_PI / 180.0), 2.0 * PLANT_PI);
-    m->theta = theta < 0.0 ? theta + 2.0 * PLANT_PI : theta;
+    m->theta = plant_motor_angle(m, fmod(deg * (PLANT_PI / 180.0), 2.0 * PLANT_PI));
     m->c = cos(m->theta);
     m->s = sin(m->theta);
     plant_motor_phase_currents(m, vb->plant.inverter.i);
 }
 
-static void set_speed(vb_t *vb, double rpm) { vb->plant.motor.omega = rpm / PLANT_RPM_PER_RAD_S * vb->plant.motor.pole_pairs; }
+static void set_speed(vb_t *vb, double rpm) { vb->plant.motor.omega = plant_motor_forward(&vb->plant.motor) * rpm / PLANT_RPM_PER_RAD_S * vb->plant.motor.pole_pairs; }
 
 /* The clock changes at the next period: what was decoded with the old one counts no more. */
 static void set_crystal(vb_t *vb, double hz)
@@ -164,21 +165,28 @@ static const key_entry_t table[] = {
     I("fault.never_on", plant.inverter.never_on, 0.0, 0.0, 63.0, "mask", "transistors that never turn on, bits as in P1OVDCON (1L, 1H, 2L, 2H, 3L, 3H)"),
     I("fault.never_off", plant.inverter.never_off, 0.0, 0.0, 63.0, "mask", "transistors that never turn off"),
     I("fault.ia_stuck", analogue.current[0].stuck, 0.0, 0.0, 4.0, "", "signal of phase A's current: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
-    P("fault.ia_gain", analogue.current[0].gain, 1.0, 0.0, 10.0, "", "factor of the reading of phase A's current"),
+    P("fault.ia_gain", analogue.current[0].gain, 1.0, -10.0, 10.0, "", "factor of the reading of phase A's current"),
     P("fault.ia_error_a", analogue.current[0].error, 0.0, -1000.0, 1000.0, "A", "by how much the reading of phase A's current is too high"),
     P("fault.ia_noise_a", analogue.current[0].noise, 0.0, 0.0, 1000.0, "A", "standard deviation of the noise on the reading of phase A's current"),
     I("fault.ib_stuck", analogue.current[1].stuck, 0.0, 0.0, 4.0, "", "signal of phase B's current: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
-    P("fault.ib_gain", analogue.current[1].gain, 1.0, 0.0, 10.0, "", "factor of the reading of phase B's current"),
+    P("fault.ib_gain", analogue.current[1].gain, 1.0, -10.0, 10.0, "", "factor of the reading of phase B's current"),
     P("fault.ib_error_a", analogue.current[1].error, 0.0, -1000.0, 1000.0, "A", "by how much the reading of phase B's current is too high"),
     P("fault.ib_noise_a", analogue.current[1].noise, 0.0, 0.0, 1000.0, "A", "standard deviation of the noise on the reading of phase B's current"),
     I("fault.vbus_stuck", analogue.bus.stuck, 0.0, 0.0, 4.0, "", "signal of the bus: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
-    P("fault.vbus_gain", analogue.bus.gain, 1.0, 0.0, 10.0, "", "factor of the reading of the bus"),
+    P("fault.vbus_gain", analogue.bus.gain, 1.0, -10.0, 10.0, "", "factor of the reading of the bus"),
     P("fault.vbus_error_v", analogue.bus.error, 0.0, -1000.0, 1000.0, "V", "by how much the reading of the bus is too high"),
     P("fault.vbus_noise_v", analogue.bus.noise, 0.0, 0.0, 1000.0, "V", "standard deviation of the noise on the reading of the bus"),
     I("fault.pot_stuck", analogue.pot.stuck, 0.0, 0.0, 4.0, "", "signal of the potentiometer: 1 = stays as it is, 2 = at ground, 3 = at 3.3 V, 4 = in the middle (of a current: zero)"),
-    P("fault.pot_gain", analogue.pot.gain, 1.0, 0.0, 10.0, "", "factor of the reading of the potentiometer"),
+    P("fault.pot_gain", analogue.pot.gain, 1.0, -10.0, 10.0, "", "factor of the reading of the potentiometer"),
     P("fault.pot_error", analogue.pot.error, 0.0, -1000.0, 1000.0, "", "by how much the reading of the potentiometer is too high"),
     P("fault.pot_noise", analogue.pot.noise, 0.0, 0.0, 1000.0, "", "standard deviation of the noise on the reading of the potentiometer"),
+    I("wiring.motor", plant.motor.swapped, 0.0, 0.0, 3.0, "", "motor wires that have changed places: 1 = A and B, 2 = B and C, 3 = C and A"),
+    I("wiring.drivers", plant.inverter.swapped, 0.0, 0.0, 3.0, "", "drivers that have changed places: 1 = A and B, 2 = B and C, 3 = C and A"),
+    I("wiring.currents", wiring.currents, 0.0, 0.0, 1.0, "", "1 = the signals of both currents have changed places"),
+    I("wiring.flta", wiring.flta, 0.0, 0.0, 2.0, "", "FLTA1: 1 = always high, 2 = of the wrong polarity"),
+    I("wiring.buttons", wiring.buttons, 0.0, 0.0, 3.0, "", "1 = S2 and S3 have changed places, 2 = S2 is dead, 3 = S3 is dead"),
+    I("wiring.leds", wiring.leds, 0.0, 0.0, 3.0, "", "1 = the LEDs have changed places, 2 = the first one stays dark, 3 = the second one"),
+    I("wiring.uart_rp", wiring.uart_rp, 0.0, 0.0, 25.0, "", "RP pin that the serial line is connected to; 0 = whichever sends"),
     P("fault.isr_lost_share", chip.adc.lost_share, 0.0, 0.0, 1.0, "", "share of the control interrupts that never come; 0.1 = every tenth"),
     P("fault.isr_late_share", chip.adc.late_share, 0.0, 0.0, 1.0, "", "share of the control interrupts that come late"),
     P("fault.isr_late_us", chip.adc.late_us, 0.0, 0.0, 1000.0, "us", "by how much these are late"),
@@ -247,6 +255,8 @@ static const key_entry_t table[] = {
     G("pwm.trigger_us", get_trigger_us, "us", "special event trigger after the start of the period, -1 = none in this period"),
     G("pwm.fault_active", get_fault_active, "", "1 = the fault input holds the outputs"),
     G("pwm.fault_pin", get_fault_pin, "", "1 = the fault input is active"),
+    G("led.alive", get_led_alive, "", "1 = the first LED is on"),
+    G("led.run", get_led_run, "", "1 = the second LED is on"),
     R("uart.baud", chip.uart.baud, "1/s", "UART1 baud rate of the last character, 0 = none yet"),
     R("uart.lost_count", chip.uart.lost, "", "characters lost by a full buffer"),
     /* plant at the last sampling instant */

@@ -9,18 +9,19 @@ void vb_latch(vb_t *vb)
 {
     const plant_motor_t *m = &vb->plant.motor;
     vb_latch_t *l = &vb->latch;
+    double forward = plant_motor_forward(m);
     l->time_s = vb->plant.start_s + vb->plant.now_s;
     l->i_a = vb->plant.inverter.i[0];
     l->i_b = vb->plant.inverter.i[1];
     l->i_c = vb->plant.inverter.i[2];
     l->i_d = m->id;
-    l->i_q = m->iq;
-    l->theta_e_deg = plant_wrap((m->theta + m->omega * vb->plant.now_s) * (180.0 / PLANT_PI), 360.0);
-    l->speed_rpm = m->omega / m->pole_pairs * PLANT_RPM_PER_RAD_S;
-    l->torque_nm = plant_motor_torque(m);
-    l->turns = m->turns + m->omega * vb->plant.now_s / (2.0 * PLANT_PI * m->pole_pairs);
+    l->i_q = forward * m->iq;
+    l->theta_e_deg = plant_motor_angle(m, m->theta + m->omega * vb->plant.now_s) * (180.0 / PLANT_PI);
+    l->speed_rpm = forward * m->omega / m->pole_pairs * PLANT_RPM_PER_RAD_S;
+    l->torque_nm = forward * plant_motor_torque(m);
+    l->turns = forward * (m->turns + m->omega * vb->plant.now_s / (2.0 * PLANT_PI * m->pole_pairs));
     l->v_d = m->vd_v;
-    l->v_q = m->vq_v;
+    l->v_q = forward * m->vq_v;
     vb->trace.due = true;
     vb->awaits_handler = true;
 }
@@ -30,7 +31,7 @@ void vb_stat_reset(vb_t *vb)
     memset(&vb->stat, 0, sizeof vb->stat);
     vb->stat.bus_max_v = vb->plant.supply.bus_v;
     vb->stat.bus_min_v = vb->plant.supply.bus_v;
-    vb->stat.speed_max_rpm = vb->plant.motor.omega / vb->plant.motor.pole_pairs * PLANT_RPM_PER_RAD_S;
+    vb->stat.speed_max_rpm = plant_motor_forward(&vb->plant.motor) * vb->plant.motor.omega / vb->plant.motor.pole_pairs * PLANT_RPM_PER_RAD_S;
     vb->stat.speed_min_rpm = vb->stat.speed_max_rpm;
 }
 
@@ -38,7 +39,7 @@ void vb_stat_collect(vb_t *vb, double h_s)
 {
     vb_stat_t *t = &vb->stat;
     const plant_motor_t *m = &vb->plant.motor;
-    double rpm = m->omega / m->pole_pairs * PLANT_RPM_PER_RAD_S;
+    double rpm = plant_motor_forward(m) * m->omega / m->pole_pairs * PLANT_RPM_PER_RAD_S;
     double amplitude2 = m->id * m->id + m->iq * m->iq;
     t->periods += 1.0;
     t->bus_max_v = plant_max(t->bus_max_v, vb->plant.supply.bus_v);

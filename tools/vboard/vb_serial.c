@@ -35,6 +35,9 @@ void vb_serial_send(void *context, uint8_t character)
 {
     vb_t *vb = context;
     vb_serial_t *s = &vb->serial;
+    if (vb->wiring.uart_rp != 0.0 && !chip_ports_pin_has_function(&vb->chip, (unsigned)vb->wiring.uart_rp, CHIP_FUNCTION_U1TX)) {
+        return;
+    }
     if (s->tx_count < VB_UART_TX) {
         s->tx[s->tx_count++] = (char)character;
     } else {

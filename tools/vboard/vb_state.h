@@ -15,6 +15,15 @@ typedef struct {
     double trips;
 } vb_controls_t;
 
+/* What may be connected wrongly on the way to a pin (vb_circuit.c); motor wires and drivers are the plant's. */
+typedef struct {
+    double currents;  /* 1: the current channels have changed places */
+    double flta;      /* 1: the comparator does not reach the pin, 2: with the wrong polarity */
+    double buttons;   /* 1: S2 and S3 have changed places, 2: S2 is dead, 3: S3 is dead */
+    double leds;      /* 1: the LEDs have changed places, 2: the first one stays dark, 3: the second one */
+    double uart_rp;   /* the RP pin that the serial line comes from; 0: whichever sends */
+} vb_wiring_t;
+
 /* What a measured signal does instead of following its quantity (vb_circuit.c). */
 typedef enum { VB_SENSE_WORKS, VB_SENSE_HOLDS, VB_SENSE_GROUND, VB_SENSE_SUPPLY, VB_SENSE_MIDDLE, VB_SENSES } vb_sense_state_t;
 
@@ -73,6 +82,7 @@ struct vb {
     chip_t chip;
     plant_t plant;
     vb_controls_t controls;
+    vb_wiring_t wiring;
     vb_analogue_t analogue;
     vb_serial_t serial;
     const probe_signal_t *signals;
@@ -105,6 +115,7 @@ double vb_keys_read(const vb_t *vb, const vb_access_t *access);
 /* vb_circuit.c */
 extern const chip_board_t vb_circuit;
 void vb_circuit_comparator(vb_t *vb, bool period_start);
+double vb_circuit_led(const vb_t *vb, unsigned led);
 
 /* vb_serial.c */
 void vb_serial_send(void *vb, uint8_t character);

@@ -21,9 +21,11 @@ char *identify_status_line(char *line, const drive_t *d);
 void identify_watch(const drive_t *d);
 #endif
 
-/** Longest status line and its end: all reasons of a limit, or all that IDENTIFY measures. */
-#ifdef IDENTIFY
+/** Longest status line and its end: all reasons of a limit, or all that IDENTIFY measures, or a remedy of BRINGUP. */
+#if defined IDENTIFY
 #define MODE_LINE_SIZE 160
+#elif defined BRINGUP
+#define MODE_LINE_SIZE 256
 #else
 #define MODE_LINE_SIZE 144
 #endif

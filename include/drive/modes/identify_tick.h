@@ -218,24 +218,6 @@ uint16_t identify_background(drive_t *d, const drive_params_t *p);
 
 #endif
 
-/** What runs a period with the bridge switching. */
-#ifdef IDENTIFY
-#define MODE_RUN identify_run
-#else
-#define MODE_RUN drive_run
-#endif
-
-/** The last thing that drive_start() prepares. */
-QM_INLINE void mode_start(drive_t *d, const drive_params_t *p)
-{
-#ifdef IDENTIFY
-    identify_start(d, p);
-#else
-    (void)d;
-    (void)p;
-#endif
-}
-
 /** A pass of the background. @return 1 when the motor is to stop */
 QM_INLINE uint16_t mode_background(drive_t *d, const drive_params_t *p)
 {

@@ -1,8 +1,9 @@
 /* The seam between the drive and its modes: each mode is one file, which defines its hook twice, with the mode and without it.
  *
  * hook                  mode                   what it takes over
- * MODE_RUN              IDENTIFY               a period with the bridge switching
- * mode_start            IDENTIFY               the end of drive_start()
+ * MODE_RUN              IDENTIFY, BRINGUP      a period with the bridge switching
+ * mode_start            IDENTIFY, BRINGUP      the end of drive_start()
+ * mode_idle             BRINGUP                a period with the bridge off
  * mode_background       IDENTIFY               a pass of the background
  * mode_reference_step   TUNING                 the speed reference in closed loop
  * mode_speed_target     TUNING                 the speed that the reference goes to
@@ -13,15 +14,38 @@
  * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
  * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
  *
- * SNAPSHOT (modes/snapshot.h) is called by the board, which owns its arrays. */
+ * SNAPSHOT (modes/snapshot.h) is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of panel_tick(). */
 #ifndef DRIVE_MODES_MODES_H
 #define DRIVE_MODES_MODES_H
 
 #include "drive/modes/bidirectional.h"
+#include "drive/modes/bringup_tick.h"
 #include "drive/modes/identify_tick.h"
 #include "drive/modes/open_loop.h"
 #include "drive/modes/params_in_ram.h"
 #include "drive/modes/torque.h"
 #include "drive/modes/tuning.h"
+
+/** What runs a period with the bridge switching. */
+#if defined IDENTIFY
+#define MODE_RUN identify_run
+#elif defined BRINGUP
+#define MODE_RUN bringup_run
+#else
+#define MODE_RUN drive_run
+#endif
+
+/** The last thing that drive_start() prepares. */
+QM_INLINE void mode_start(drive_t *d, const drive_params_t *p)
+{
+#if defined IDENTIFY
+    identify_start(d, p);
+#elif defined BRINGUP
+    bringup_start(d, p);
+#else
+    (void)d;
+    (void)p;
+#endif
+}
 
 #endif

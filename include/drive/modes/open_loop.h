@@ -7,7 +7,7 @@
 /** 1 if the end of the ramp leads to closed loop. */
 QM_INLINE uint16_t mode_hands_over(void)
 {
-#if defined OPEN_LOOP_FUNCTIONING || defined IDENTIFY /* IDENTIFY has ramps of its own */
+#if defined OPEN_LOOP_FUNCTIONING || defined IDENTIFY || defined BRINGUP /* these have vectors of their own */
     return 0;
 #else
     return 1;

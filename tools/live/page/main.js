@@ -1,12 +1,13 @@
 // Brings the parts together: a hello builds them, each frame is shown by all.
-const foc33 = { frames: 0, frame: null, refused: "" }; // for those who look from outside
-let views = null, run = 0;
+const foc33 = { frames: 0, frame: null, traces: 0, refused: "" }; // for those who look from outside
+let views = null, rotor = null, run = 0;
 
 function say(text) {
   by("message").hidden = !text;
   by("message").textContent = text;
 }
 
+let silent = false;
 const link = new Link(take, say);
 const board = new BoardView((command) => link.send(command));
 
@@ -16,8 +17,9 @@ function begin(hello) {
   ["sliders", "throws", "states", "log", "pace"].forEach((id) => by(id).replaceChildren());
   for (const pace of hello.paces) { make("option", { value: pace, textContent: pace === 1 ? "real time" : `1 : ${Math.round(1 / pace)}` }, by("pace")); }
   const drive = new DriveView(hello), strips = new StripsView(hello);
-  views = { drive, strips, all: [drive, strips, board, new BenchView(hello, (command) => link.send(command)), views?.rotor ?? new RotorView(hello), new PlanesView(hello)] };
-  views.rotor = views.all[4];
+  const send = (command) => link.send(command);
+  const own = hello.virtual ? [board, new BenchView(hello, send), rotor ??= new RotorView(hello)] : [new RemoteView(hello.remote, send)];
+  views = { drive, strips, scope: new ScopeView(hello, send), planes: new PlanesView(hello), all: [drive, strips, ...own] };
   run = 0;
 }
 
@@ -29,15 +31,21 @@ function tempo(frame) {
   by("measured").textContent = slow ? `this machine manages 1 : ${(1 / frame.measured).toFixed(frame.measured > 0.1 ? 1 : 0)}` : "";
 }
 
+// The next message comes when this one is on the screen: a slow machine, or a tab out of sight, gets fewer.
 function take(message) {
+  if (message.t !== undefined || message.scope || message.trace) { requestAnimationFrame(() => link.send({ seen: true })); }
   if (message.hello) { begin(message.hello); return; }
   if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
   if (message.refused) { foc33.refused = message.refused; say(message.refused); setTimeout(() => say(""), 4000); return; }
   if (!views) { return; }
+  if (message.scope) { views.scope.set(message.scope); return; }
+  if (message.trace) { views.scope.draw(message.trace); foc33.traces++; return; }
   if (run && message.run !== run) { views.drive.clear(); views.strips.clear(); }
   run = message.run;
   tempo(message);
   views.all.forEach((view) => view.show(message));
+  if (message.now) { views.planes.show(message); } // a real board that has not answered yet has no numbers
+  if (message.silent !== undefined && message.silent !== silent) { silent = message.silent; say(silent ? "The board does not answer: is it on, is its cable in?" : ""); }
   foc33.frame = message;
   foc33.frames++;
 }

@@ -2,6 +2,7 @@
 class RotorView {
   static SLOWER = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
   static MOST_DEG_PER_S = 400;
+  static PICTURE_S = 0.03; // more pictures a second would only cost
 
   constructor(hello) {
     this.hello = hello;
@@ -9,7 +10,11 @@ class RotorView {
     this.error = 0;
     this.frame = null;
     this.last = performance.now();
-    const turn = (now) => { this.turn((now - this.last) / 1000); this.last = now; requestAnimationFrame(turn); };
+    const turn = (now) => {
+      const seconds = (now - this.last) / 1000;
+      if (seconds >= RotorView.PICTURE_S) { this.turn(seconds); this.last = now; }
+      requestAnimationFrame(turn);
+    };
     requestAnimationFrame(turn);
   }
 
@@ -35,7 +40,7 @@ class RotorView {
       this.truth += this.rate * step;
       this.shown += RotorView.wrapped(this.truth - this.shown) * 0.3;
     }
-    this.error += (this.goal - this.error) * 0.2;
+    this.error += (this.goal - this.error) * 0.4;
     this.draw();
   }
 

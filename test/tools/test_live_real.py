@@ -1,0 +1,156 @@
+"""A board at a serial port on the page of make live. The board is a virtual one: all that the page has of it is its serial line."""
+
+import csv
+import io
+import time
+
+import pytest
+from live_support import known, origin, parts, until
+from support import command, refusal, refused
+
+from tools.live import symbols
+from tools.live.__main__ import main
+from tools.live.line import Line
+from tools.live.pace import Pacemaker
+from tools.live.real_board import RealBoard
+from tools.live.virtual_board import VirtualBoard
+from tools.live.watch import WATCHED, Watch, blocks
+
+SYMBOLS = known()
+
+
+class Desk:
+    """A board that lives in a thread, and the page's side of its serial line."""
+
+    def __init__(self) -> None:
+        self.board = VirtualBoard(parts().library, origin())
+        self.maker = Pacemaker(self.board, lambda frame: None)
+        self.maker.start()
+        self.messages: list[dict] = []
+        self.page = RealBoard(self.board.line, "the motor", SYMBOLS, parts().library.params)
+        self.page.start(self.messages.append)
+
+    def do(self, **command) -> None:
+        """Somebody at the board itself."""
+        self.maker.call(lambda: self.board.act(command)).result(5)
+
+    def frame(self) -> dict:
+        self.page.run(0.05)
+        return self.page.frame()
+
+    def state(self, name: str) -> None:
+        until(lambda: self.frame()["state"] == name, f"not {name}: {self.frame()}", 30.0)
+
+
+@pytest.fixture(scope="module")
+def desk():
+    item = Desk()
+    yield item
+    item.page.end()
+    item.maker.end()
+
+
+def test_it_shows_what_the_firmware_knows_in_engineering_units(desk):
+    desk.state("STOPPED")
+    now = desk.frame()["now"]
+    assert now["bus_v"] == pytest.approx(24.0, abs=0.2) and now["estimate_rpm"] == pytest.approx(0.0, abs=1.0)
+    assert desk.page.hello()["virtual"] is False and [panel["title"] for panel in desk.page.hello()["panels"]] == ["speed", "current", "bus"]
+    assert len(desk.frame()["strip"][0]) == 1 + 2 + 3 + 1
+
+
+def test_the_page_starts_the_motor_gives_it_a_target_and_stops_it(desk):
+    desk.page.act({"start": 1200.0})
+    desk.state("CLOSED")
+    until(lambda: desk.frame()["now"]["estimate_rpm"] == pytest.approx(1200.0, rel=0.01), "not 1200 rpm")
+    desk.page.act({"target": 1500})
+    until(lambda: desk.board.board.get("plant.speed_rpm") == pytest.approx(1500.0, rel=0.01), "not 1500 rpm")
+    until(lambda: desk.frame()["now"]["reference_rpm"] == pytest.approx(1500.0, rel=0.01), "the reference is not told")
+    now = desk.frame()["now"]
+    assert now["i_q_a"] == pytest.approx(desk.board.board.get("fw.i_q_a"), abs=0.1)
+    assert now["v_q_v"] == pytest.approx(desk.board.board.get("fw.v_q_v"), rel=0.1)
+    time.sleep(2.5) # longer than a lease
+    assert desk.frame()["state"] == "CLOSED"
+    desk.page.act({"stop": True})
+    desk.state("STOPPED")
+
+
+def test_s2_takes_the_command_from_the_page(desk):
+    desk.page.act({"start": 1000.0})
+    desk.state("CLOSED")
+    desk.do(press="S2")
+    desk.do(release="S2")
+    desk.state("STOPPED")
+    until(lambda: desk.frame()["remote"] is None, "the page still wants to drive")
+    assert "the buttons have taken the command" in [line["text"] for line in desk.page.log]
+
+
+def test_the_motor_stops_when_the_tab_that_has_started_it_is_closed(desk):
+    desk.page.act({"start": 1000.0}, "a tab")
+    desk.state("CLOSED")
+    desk.page.left("another tab")
+    desk.page.act({"target": 1100.0}, "another tab")
+    until(lambda: desk.frame()["now"]["estimate_rpm"] == pytest.approx(1100.0, rel=0.02), "not 1100 rpm")
+    desk.page.left("a tab")
+    desk.state("STOPPED")
+
+
+def test_a_fault_is_told_and_the_page_clears_it(desk):
+    desk.do(fault=["blocked", True])
+    desk.page.act({"start": 1000.0})
+    until(lambda: desk.frame()["fault"] not in ("", "NONE"), "no fault", 30.0)
+    desk.do(fault=["blocked", False])
+    desk.page.act({"stop": True})
+    desk.page.act({"clear": True})
+    until(lambda: desk.frame()["fault"] == "NONE", "not cleared")
+    assert any(line["kind"] == "fault" for line in desk.page.log)
+
+
+def test_a_trace_comes_over_the_same_line(desk):
+    desk.messages.clear()
+    desk.page.scope.ask({"channels": ["board_drive.state", "board_drive.ticks"], "trigger": None, "level": 0, "rising": True, "position": 0.0, "factor": 1,
+                         "mode": "single"})
+    trace = until(lambda: next((message["trace"] for message in list(desk.messages) if "trace" in message), None), "no trace", 30.0)
+    ticks = [row[2] for row in trace["rows"]]
+    assert [(later - earlier) % 65536 for earlier, later in zip(ticks, ticks[1:])] == [1] * (len(ticks) - 1) and len(ticks) > 200
+
+
+@pytest.mark.parametrize("wish, part", [
+    ({"start": 9.0}, "choose"), ({"start": "fast"}, "impossible"), ({"press": "S2"}, "no such command"), ([], "no such command")])
+def test_a_wrong_command_is_refused_in_one_line(desk, wish, part):
+    refusal(lambda: desk.page.act(wish), part)
+    refusal(desk.page.scenario, "save its CSV")
+
+
+def test_csv_is_what_was_read(desk):
+    table = list(csv.reader(io.StringIO(desk.page.csv())))
+    assert table[0] == ["time_s", *WATCHED] and {len(row) for row in table} == {1 + len(WATCHED)} and len(table) > 10
+
+
+def test_a_board_that_falls_silent_is_told(desk):
+    until(lambda: not desk.frame()["silent"], "it is not heard")
+    desk.maker.set_pace(0.0001)
+    until(lambda: desk.frame()["silent"], "nobody says it", 30.0)
+    desk.maker.set_pace(1.0)
+    until(lambda: not desk.frame()["silent"], "it does not come back", 30.0)
+
+
+def test_what_lies_together_is_read_together():
+    found = blocks([SYMBOLS.find(name) for name in WATCHED.values()])
+    assert len(found) <= 4 and max(block.bytes for block in found) <= 252
+    for name in WATCHED.values():
+        item = SYMBOLS.find(name)
+        assert sum(block.address <= item.address and item.address + item.bytes <= block.address + block.bytes for block in found) == 1
+
+
+def test_a_firmware_without_a_scope_or_a_port_without_a_board_is_one_line():
+    params, without = parts().library.params, symbols.Symbols({name: item for name, item in SYMBOLS.variables.items() if not name.startswith("scope_command")})
+    refusal(lambda: Watch(without, params), "scope_command.mode", "SCOPE 1")
+    refused(command("--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing", main=main),
+            "cannot open the port", "/dev/nothing")
+
+
+def test_a_line_keeps_what_the_board_cannot_take_yet():
+    line = Line()
+    line.write(b"abcdef")
+    line.exchange(lambda text: 4, "xyz")
+    assert line.sent == b"ef" and line.read(2) == b"xy" and line.read(9) == b"z" and line.read(9) == b""

@@ -1,0 +1,156 @@
+"""The scope on the page of make live: symbols, units, and traces that the firmware's own scope records and sends over its serial line."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from live_support import bench, known, origin, parts, until
+from support import refusal
+
+from tools.live.lnet import ScopeState
+from tools.live.pace import Pacemaker
+from tools.live.scale import RAW, scale_of
+from tools.live.scope import Scope
+from tools.live.virtual_board import VirtualBoard
+
+SYMBOLS = known()
+KNOWN = SYMBOLS.variables
+I_Q, ANGLE, SPEED = "board_drive.run.control.i_q13.q", "board_drive.angle", "board_drive.run.estimator.omega_erpm"
+
+
+# ---- names and units -------------------------------------------------------------------------------------------------------
+def test_scales_are_those_that_the_virtual_board_has_for_the_same_quantity():
+    board = bench()
+    params, names = board.library.params, {"ParkParm.qIq": "A", I_Q: "A", "ParkParm.qVd": "V", "board_drive.run.control.v_q14.d": "V", ANGLE: "°",
+                                           "EstimParm.qOmegaMr": "rpm", SPEED: "rpm", "board_drive.bus_q31": "V", "board_drive.state": "",
+                                           "board_drive.run.estimator.rho_q32": "°"}
+    assert {name: scale_of(name, params).unit for name in names} == names and set(names) <= KNOWN.keys()
+    assert scale_of("board_drive.state", params) == RAW and scale_of(ANGLE, params).per_count * 65536 == 360.0
+    assert scale_of(I_Q, params).per_count == pytest.approx(4.0 * scale_of("ParkParm.qIq", params).per_count)
+
+
+# ---- traces ------------------------------------------------------------------------------------------------------------------
+class Living:
+    """A board whose motor turns, in a thread, with its scope."""
+
+    def __init__(self) -> None:
+        self.messages: list[dict] = []
+        self.board = VirtualBoard(parts().library, origin(), SYMBOLS)
+        self.maker = Pacemaker(self.board, lambda frame: None)
+        self.board.start(self.messages.append)
+        for command in ({"set": ["input.pot", 0.5]}, {"press": "S2"}, {"release": "S2"}):
+            self.board.act(command)
+        self.board.run(3.0)
+        assert self.board.state == "CLOSED"
+        self.maker.start()
+
+    def ask(self, **wish) -> None:
+        self.messages.clear()
+        usual = {"channels": [I_Q], "trigger": None, "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "single"}
+        self.board.scope.ask(usual | wish)
+
+    def trace(self) -> dict:
+        return until(lambda: next((message["trace"] for message in list(self.messages) if "trace" in message), None), "no trace")
+
+
+@pytest.fixture(scope="module")
+def living():
+    item = Living()
+    yield item
+    item.board.end()
+    item.maker.end()
+
+
+def test_a_trace_is_what_the_motor_does_in_its_units_and_times(living):
+    living.ask(channels=[ANGLE, I_Q, "board_drive.run.control.v_q14.q"])
+    trace = living.trace()
+    rows = np.array(trace["rows"])
+    assert trace["units"] == ["°", "A", "V"] and trace["triggered"] is False and len(rows) > 100
+    assert np.diff(rows[:, 0]) == pytest.approx(1e-4) # two periods
+    turned = np.diff(np.unwrap(np.radians(rows[:, 1]))).mean() / 1e-4
+    rpm = living.board.board.get("plant.speed_rpm")
+    assert turned * 30.0 / math.pi / living.board.rated.pole_pairs == pytest.approx(rpm, rel=0.01)
+    assert rows[:, 3].mean() == pytest.approx(living.board.board.get("fw.v_q_v"), rel=0.05)
+
+
+@pytest.mark.parametrize("rising, position", [(True, 0.0), (True, 0.5), (False, 0.25)])
+def test_the_trigger_stands_at_zero_where_the_value_crosses_its_level(living, rising, position):
+    level = 180.0 if rising else 90.0
+    living.ask(channels=[ANGLE, I_Q], trigger="EstimParm.qRho" if not rising else ANGLE, level=level if rising else 0.0, rising=rising, position=position)
+    trace = living.trace()
+    rows = np.array(trace["rows"])
+    zero = int(np.argmin(np.abs(rows[:, 0])))
+    assert zero == round(position * (len(rows) - 1)) and trace["triggered"] is True
+    if rising and zero:
+        assert rows[zero - 1, 1] < level <= rows[zero, 1]
+
+
+def test_single_gives_one_trace_and_auto_gives_more_even_without_a_trigger(living):
+    living.ask(mode="single")
+    living.trace()
+    time.sleep(0.5)
+    assert len([message for message in living.messages if "trace" in message]) == 1 and living.board.scope.told["setup"]["mode"] == "stop"
+    living.ask(mode="auto", trigger="board_drive.fault", level=5.0) # which never comes
+    assert until(lambda: len([message for message in list(living.messages) if "trace" in message]) >= 2, "no second trace")
+    living.ask(mode="normal", trigger="board_drive.fault", level=5.0)
+    time.sleep(0.8)
+    assert not [message for message in living.messages if "trace" in message]
+    living.ask(mode="stop")
+
+
+def test_a_trigger_on_the_state_catches_a_start(living):
+    for _ in range(2): # stops, then starts
+        living.maker.call(lambda: living.board.act({"press": "S2"})).result(5)
+        living.maker.call(lambda: living.board.act({"release": "S2"})).result(5)
+        if living.board.state in ("CLOSED", "STOPPING"):
+            until(lambda: living.board.state == "STOPPED", "it does not stop")
+            living.ask(channels=["board_drive.state", I_Q], trigger="board_drive.state", level=4.0, mode="normal", factor=10)
+            time.sleep(0.3)
+    rows = np.array(living.trace()["rows"])
+    before, after = rows[rows[:, 0] < -1e-6], rows[rows[:, 0] >= -1e-6]
+    assert set(before[:, 1]) == {3.0} and set(after[:, 1]) == {4.0} # from ALIGN to RAMP
+    until(lambda: living.board.state == "CLOSED", "it does not start")
+
+
+def test_a_power_up_meanwhile_does_not_end_the_scope(living):
+    living.ask(mode="auto")
+    living.trace()
+    living.maker.call(lambda: living.board.act({"power": True})).result(5)
+    living.messages.clear()
+    living.trace()
+    living.ask(mode="stop")
+
+
+class EmptyLink:
+    """A firmware whose scope was reset before it had a row."""
+
+    answer_s = 1.0
+
+    def scope_state(self) -> ScopeState:
+        return ScopeState(0, 1, 1, 0, 0x0800, 0, 0, 0, 800)
+
+    def scope_setup(self, *settings) -> None:
+        pass
+
+    def scope_read(self) -> list:
+        return []
+
+
+def test_a_trace_without_rows_is_none():
+    published: list[dict] = []
+    scope = Scope(EmptyLink, SYMBOLS, parts().library.params, published.append)
+    scope.ask({"channels": [I_Q], "trigger": None, "level": 0.0, "rising": True, "position": 0.0, "factor": 1, "mode": "auto"})
+    scope._round(EmptyLink())
+    assert [message for message in published if "trace" in message] == [] and scope.trace is None
+
+
+@pytest.mark.parametrize("wish, part", [
+    ({"channels": []}, "no channel"), ({"channels": ["nothing"]}, "no variable 'nothing'"), ({"channels": [["x"]]}, "no variable"),
+    ({"channels": [I_Q] * 9}, "9 words"),
+    ({"channels": ["board_lnet.sum"]}, "neither 16 nor 32"), ({"trigger": "board_drive.bus_q31"}, "has not 16"), ({"mode": "always"}, "choose one of auto"),
+    ({"factor": 0}, "choose 1 .. 1000"), ({"position": 1.5}, "choose 0 .. 1"), ({"level": "high"}, "'level' = high"), ({"more": 1}, "no setup")])
+def test_a_setup_that_makes_no_sense_is_refused_in_one_line(living, wish, part):
+    before = living.board.scope.setup
+    refusal(lambda: living.ask(**wish), part)
+    assert living.board.scope.setup is before

@@ -1,0 +1,275 @@
+/* BRINGUP step by step with a bridge of ohms and dead time behind the drive: answers, limits of the current, trips, the end. */
+/* defines: -DBRINGUP */
+#include "panel_rig.h"
+
+#include "firmware/drive/drive.c"
+#include "firmware/drive/modes/bringup.c"
+#include "firmware/drive/modes/bringup_judge.c"
+#include "firmware/drive/panel.c"
+
+#define PRESS_MS (PANEL_DEBOUNCE_MS + 5u)
+
+static bringup_guide_t guide;
+static int16_t pot;
+static float rs_ohm, gain_a, gain_b;
+static int16_t carried_most_q13;
+static bringup_message_t said[64];
+static uint16_t said_count;
+static uint16_t press_ms, button;
+static uint16_t no_answer; /* the question that nobody answers */
+static uint16_t answers[BRINGUP_QUESTIONS];
+
+void setUp(void)
+{
+    static const panel_inputs_t nothing;
+    uint16_t n;
+    bringup_init(&guide);
+    inputs = nothing;
+    rig_power_up();
+    rs_ohm = 2.67F;
+    gain_a = 1.0F;
+    gain_b = 1.0F;
+    pot = 0;
+    said_count = 0;
+    carried_most_q13 = 0;
+    no_answer = BRINGUP_QUESTIONS;
+    press_ms = 0;
+    for (n = 0; n < (uint16_t)BRINGUP_QUESTIONS; n++) {
+        answers[n] = 2;
+    }
+    answers[BRINGUP_ASK_S3] = 3;
+    answers[BRINGUP_ASK_FAULT_INPUT] = 3;
+}
+
+void tearDown(void)
+{
+}
+
+/** Current of a phase of a winding that follows at once: what its duty leaves beyond dead time. */
+static int16_t phase_q13(int16_t part)
+{
+    float counts = (float)part, lost = 80.0F * (float)((part > 0) - (part < 0));
+    float rest = (counts * counts > lost * lost) ? counts - lost : 0.0F;
+    return CURRENT_Q13(rest / 2000.0F * 24.0F / rs_ohm);
+}
+
+static void bridge_period(void)
+{
+    int16_t a = 0, b = 0;
+    if (drive_is_running(&drive) && out.duty.a != 0u) { /* in the first period the low sides are still on */
+        a = phase_q13((int16_t)(out.duty.a - BRINGUP_HALF_DUTY));
+        b = phase_q13((int16_t)(out.duty.b - BRINGUP_HALF_DUTY));
+    }
+    if (qm_abs(a) + qm_abs(b) > carried_most_q13) {
+        carried_most_q13 = (int16_t)(qm_abs(a) + qm_abs(b));
+    }
+    rig_currents((int16_t)(gain_a * (float)a), (int16_t)(gain_b * (float)b));
+    rig_tick(1);
+}
+
+/** Milliseconds with a user who answers. Lines are said at once. */
+static void ms(uint16_t count)
+{
+    uint16_t n;
+    while (count-- != 0u) {
+        for (n = 0; n < 20u; n++) {
+            bridge_period();
+        }
+        if (guide.message.kind == (uint16_t)BRINGUP_ASKS && guide.message.code != no_answer) {
+            button = answers[guide.message.code];
+            press_ms = 2 * PRESS_MS; /* let go of the last one first */
+        }
+        if (guide.message.kind != (uint16_t)BRINGUP_SILENT && said_count < 64u) {
+            said[said_count++] = guide.message;
+        }
+        guide.message.kind = (uint16_t)BRINGUP_SILENT;
+        press_ms = (uint16_t)((press_ms == 0u) ? 0u : press_ms - 1u);
+        inputs.s2_down = (uint16_t)(press_ms != 0u && press_ms <= PRESS_MS && button == 2u);
+        inputs.s3_down = (uint16_t)(press_ms != 0u && press_ms <= PRESS_MS && button == 3u);
+        inputs.elapsed_ms = 1;
+        the_lights = bringup_pass(&guide, &drive, &params, &inputs, pot);
+    }
+}
+
+/** Until a step, or the end. */
+static void until(bringup_step_t step)
+{
+    uint16_t n;
+    for (n = 0; n < 20000u && guide.step != (uint16_t)step && guide.step != (uint16_t)BRINGUP_STEP_END; n++) {
+        ms(1);
+    }
+    ms(2);
+}
+
+/** 1 if this has been found. */
+static uint16_t found(bringup_finding_t finding)
+{
+    uint16_t n;
+    for (n = 0; n < said_count; n++) {
+        if (said[n].kind == (uint16_t)BRINGUP_FINDS && said[n].code == (uint16_t)finding) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+void test_to_the_six_directions_and_no_further_than_the_share_of_the_current(void)
+{
+    until(BRINGUP_STEP_AMMETER);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_AMMETER, guide.step);
+    TEST_ASSERT_EQUAL_UINT16(2, guide.found); /* POT stands still, and this bridge's dead time goes by phases */
+    TEST_ASSERT_TRUE(found(BRINGUP_POT_DEAD));
+    TEST_ASSERT_INT16_WITHIN(BRINGUP_FULL_Q13 / 8, BRINGUP_FULL_Q13, carried_most_q13);
+}
+
+void test_a_dead_signal_leaves_the_amplitude_at_its_bound(void)
+{
+    gain_a = 0.0F;
+    gain_b = 0.0F;
+    until(BRINGUP_STEP_END);
+    TEST_ASSERT_TRUE(found(BRINGUP_NO_CURRENT));
+    TEST_ASSERT_EQUAL_INT16(MOST_AMPLITUDE, guide.full.amplitude[0]);
+    TEST_ASSERT_TRUE(carried_most_q13 < CURRENT_Q13(1.5F * 2.75F * 0.3F * 2.0F));
+}
+
+void test_current_that_grows_by_itself_lowers_the_amplitude(void)
+{
+    int16_t before;
+    until(BRINGUP_STEP_DRIVE);
+    ms(500);
+    before = drive.run.bringup.amplitude;
+    rs_ohm = 1.0F;
+    ms(50);
+    TEST_ASSERT_TRUE(drive.run.bringup.amplitude < before);
+}
+
+void test_a_press_while_current_flows_ends_it(void)
+{
+    until(BRINGUP_STEP_DRIVE);
+    ms(100);
+    TEST_ASSERT_TRUE(drive_is_running(&drive));
+    guide.button = 3;
+    ms(5);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
+    TEST_ASSERT_FALSE(drive_is_running(&drive));
+}
+
+void test_a_trip_ends_it_with_its_name(void)
+{
+    static const struct {
+        drive_fault_t fault;
+        bringup_finding_t finding;
+    } cases[] = { { FAULT_OVERCURRENT_HW, BRINGUP_SHORT_CIRCUIT }, { FAULT_OVERCURRENT_SW, BRINGUP_OVERCURRENT }, { FAULT_UNDERVOLTAGE, BRINGUP_FAULT } };
+    EACH(n, cases) {
+        setUp();
+        until(BRINGUP_STEP_DRIVE);
+        ms(100);
+        drive_raise(&drive, cases[n].fault);
+        ms(5);
+        TEST_ASSERT_TRUE(found(cases[n].finding));
+        TEST_ASSERT_EQUAL_INT32(cases[n].fault, said[said_count - 2u].value);
+        TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
+    }
+}
+
+void test_over_current_protects_as_ever(void)
+{
+    until(BRINGUP_STEP_DRIVE);
+    ms(100);
+    rs_ohm = 0.05F;
+    ms(300);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, drive.fault);
+    TEST_ASSERT_TRUE(found(BRINGUP_OVERCURRENT));
+}
+
+void test_nobody_answers_while_current_flows(void)
+{
+    no_answer = BRINGUP_ASK_AMMETER;
+    until(BRINGUP_STEP_AMMETER);
+    ms(1000);
+    TEST_ASSERT_TRUE(drive_is_running(&drive));
+    guide.waited_ms = CURRENT_MS - 2u;
+    ms(5);
+    TEST_ASSERT_FALSE(drive_is_running(&drive));
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
+}
+
+void test_buttons(void)
+{
+    static const struct {
+        const char *what;
+        uint16_t begin, s3;
+        bringup_finding_t finding;
+        bringup_step_t step; /* where it goes on */
+    } cases[] = {
+        { "right", 2, 3, BRINGUP_FINDINGS, BRINGUP_STEP_UART },
+        { "swapped", 3, 2, BRINGUP_BUTTONS_SWAPPED, BRINGUP_STEP_UART },
+        { "S3 acts as S2", 2, 2, BRINGUP_BUTTON_DEAD, BRINGUP_STEP_END },
+        { "S2 acts as S3", 3, 3, BRINGUP_BUTTON_DEAD, BRINGUP_STEP_END },
+    };
+    EACH(n, cases) {
+        setUp();
+        no_answer = BRINGUP_ASK_UART;
+        answers[BRINGUP_ASK_BEGIN] = cases[n].begin;
+        answers[BRINGUP_ASK_S3] = cases[n].s3;
+        until(cases[n].step);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].step, guide.step, cases[n].what);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].finding != BRINGUP_FINDINGS, found(cases[n].finding), cases[n].what);
+    }
+}
+
+void test_a_button_that_is_down_at_rest_ends_it(void)
+{
+    inputs.s3_down = 1;
+    inputs.elapsed_ms = 1;
+    the_lights = bringup_pass(&guide, &drive, &params, &inputs, pot);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_BUTTON_DOWN, guide.message.code);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_LAST, guide.step);
+}
+
+void test_the_first_line_comes_by_both_pins_in_turn(void)
+{
+    no_answer = BRINGUP_ASK_BEGIN;
+    ms(2500);
+    TEST_ASSERT_EQUAL_UINT16(3, said_count);
+    TEST_ASSERT_EQUAL_UINT16(0, said[0].part);
+    TEST_ASSERT_EQUAL_UINT16(1, said[1].part);
+    TEST_ASSERT_EQUAL_UINT16(0, said[2].part);
+}
+
+void test_potentiometer(void)
+{
+    static const struct {
+        int16_t left, right;
+        bringup_finding_t finding;
+    } cases[] = { { -32768, 32704, BRINGUP_FINDINGS }, { 32704, -32768, BRINGUP_POT_REVERSED }, { 0, 1000, BRINGUP_POT_DEAD }, { -20000, 32704, BRINGUP_POT_RANGE } };
+    EACH(n, cases) {
+        setUp();
+        pot = cases[n].left;
+        until(BRINGUP_STEP_POT_RIGHT);
+        pot = cases[n].right;
+        until(BRINGUP_STEP_FAULT_REST);
+        TEST_ASSERT_EQUAL_UINT16(cases[n].finding != BRINGUP_FINDINGS, guide.found);
+        TEST_ASSERT_EQUAL_UINT16(cases[n].finding != BRINGUP_FINDINGS, found(cases[n].finding));
+    }
+}
+
+void test_what_is_wrong_at_rest_keeps_the_current_away(void)
+{
+    rig_bus(19.0F);
+    until(BRINGUP_STEP_END);
+    TEST_ASSERT_TRUE(found(BRINGUP_BUS_DIVIDER));
+    TEST_ASSERT_EQUAL_INT16(0, carried_most_q13);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_ENDS, said[said_count - 1u].kind);
+    TEST_ASSERT_EQUAL_INT32(2, said[said_count - 1u].value); /* and the potentiometer */
+}
+
+void test_s2_at_the_end_begins_anew(void)
+{
+    answers[BRINGUP_ASK_CURRENT] = 3;
+    until(BRINGUP_STEP_END);
+    guide.button = 2;
+    ms(1);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_BEGIN, guide.step);
+    TEST_ASSERT_EQUAL_UINT16(0, guide.found);
+}
