@@ -107,6 +107,92 @@ void test_a_broken_wire_of_the_potentiometer_reads_a_rail(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.004, 3.3, pin_v("reg.ADC1BUF0"));
 }
 
+/* ---- wiring ---- */
+
+void test_swapped_current_signals_read_each_other_s_phase(void)
+{
+    hold_vector();
+    double a = get("plant.i_a"), b = get("plant.i_b");
+    set_and_run("wiring.currents", 1.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, b, get("adc.ia_a"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, a, get("adc.ib_a"));
+}
+
+void test_a_signal_of_a_driver_comes_to_the_other_leg(void)
+{
+    static const char *const driven[4] = { "plant.i_a", "plant.i_b", "plant.i_a", "plant.i_c" };
+    for (int swap = 0; swap < 4; swap++) {
+        fake_restart();
+        make_ideal();
+        at_init("P1DTCON1", 0); /* no dead time */
+        set("wiring.drivers", swap);
+        run_blocked(400, 1100, 900, 900);
+        TEST_ASSERT_TRUE_MESSAGE(get(driven[swap]) > 0.5, driven[swap]);
+    }
+}
+
+void test_with_two_motor_wires_swapped_the_rotor_aligns_to_another_phase_and_turns_the_other_way_round(void)
+{
+    static const double at_leg_a_deg[4] = { 0.0, 120.0, 0.0, 240.0 };
+    for (int swap = 0; swap < 4; swap++) {
+        fake_restart();
+        make_ideal();
+        set("wiring.motor", swap);
+        set("mech.viscous_nms", 5e-4);
+        set("mech.coulomb_nm", 0.0);
+        set("state.theta_e_deg", at_leg_a_deg[swap] + 30.0);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, at_leg_a_deg[swap] + 30.0, get("state.theta_e_deg"));
+        set_duties(1100, 900, 900);
+        start(20000);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, remainder(get("plant.theta_e_deg") - at_leg_a_deg[swap], 360.0));
+        double before = get("plant.turns");
+        set_duties(1100, 1100, 900); /* from A to -C */
+        run(1000);
+        TEST_ASSERT_TRUE((get("plant.turns") - before) * (swap == 0 ? 1.0 : -1.0) > 0.01);
+        set("state.speed_rpm", 300.0);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 300.0, get("state.speed_rpm"));
+    }
+}
+
+void test_fault_input_is_dead_or_of_the_wrong_polarity(void)
+{
+    start(1);
+    set_and_run("input.flta", 1.0);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("pin.RB8"));
+    set_and_run("wiring.flta", 1.0);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RB8"));
+    set_and_run("wiring.flta", 2.0);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get("pin.RB8"));
+    set_and_run("input.flta", 0.0);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("pin.RB8"));
+}
+
+void test_buttons_swapped_or_dead(void)
+{
+    static const double s2_then[4] = { 0.0, 1.0, 1.0, 0.0 }, s3_then[4] = { 1.0, 0.0, 1.0, 1.0 }; /* levels of the pins while S2 is pressed */
+    set("input.s2", 1.0);
+    start(1);
+    for (int wiring = 0; wiring < 4; wiring++) {
+        set_and_run("wiring.buttons", wiring);
+        TEST_ASSERT_EQUAL_DOUBLE(s2_then[wiring], get("pin.RA8"));
+        TEST_ASSERT_EQUAL_DOUBLE(s3_then[wiring], get("pin.RB4"));
+    }
+}
+
+void test_leds_swapped_or_dark(void)
+{
+    static const double first[4] = { 1.0, 0.0, 0.0, 1.0 }, second[4] = { 0.0, 1.0, 0.0, 0.0 }; /* with RC6 high and RC7 low */
+    start(1);
+    LATC = 0x0040;
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("led.alive")); /* an input */
+    TRISC = 0xFF3F;
+    for (int wiring = 0; wiring < 4; wiring++) {
+        set("wiring.leds", wiring);
+        TEST_ASSERT_EQUAL_DOUBLE(first[wiring], get("led.alive"));
+        TEST_ASSERT_EQUAL_DOUBLE(second[wiring], get("led.run"));
+    }
+}
+
 /* ---- transistors ---- */
 
 void test_through_a_high_transistor_that_never_turns_on_no_current_enters_the_motor(void)

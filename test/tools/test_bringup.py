@@ -1,5 +1,6 @@
 """The `bringup` command: its table, the user who answers, what makes a row fail, and what it refuses."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -29,8 +30,7 @@ def test_the_table_has_the_right_board_and_more_than_14_miswired_ones_with_findi
         assert name in known and bool(phase) == ("~" in known[name]), finding
 
 
-def test_every_finding_but_four_has_a_board():
-    """Of these three need a fault of the processor or a short that the virtual board does not have."""
+def test_every_finding_has_a_board_but_for_those_that_the_unit_tests_cause():
     found = {finding.split()[0] for variant in bringup.read().variants for finding in variant.finds}
     assert set(names("BRINGUP_FINDING_TABLE", "#name remedy")) - found == {"BUTTON_DOWN", "POT_RANGE", "CURRENTS_MIXED", "OVERCURRENT", "FAULT"}
 
@@ -40,7 +40,6 @@ def test_the_user_answers_every_question():
 
 
 def test_remedies_name_files_and_lines_that_are_there():
-    import re
     for name, remedy in x_macro.rows("include", HEADER, "BRINGUP_FINDING_TABLE", "#name remedy"):
         assert len(remedy) < 200, name
         for path in re.findall(r"\b(?:include|docs|tuning)/[\w/.*]+\w", remedy):

@@ -111,6 +111,19 @@ def test_a_failed_installation_is_one_line_with_the_reason_and_the_way_without_r
                                                   f"see build/setup/apt.log, or without root: {VENV}"
 
 
+def test_dygraphs_are_installed_as_root_and_asked_for_once(machine):
+    prepare = machine.root / "tools/setup/prepare.sh"
+    prepare.write_text(prepare.read_text(encoding="utf-8").replace("/usr/share/javascript", "/nowhere"), encoding="utf-8")
+    machine.program("python3", "exit 0")
+    machine.program("id", "echo 1000")
+    machine.program("sudo", 'test "$1" = -n || exec "$@"')
+    machine.program("apt-get", 'echo "$@" >>calls; case $* in *install*) exit 100;; esac')
+    code, said = machine.run()
+    assert code == 0 and said.splitlines()[-1].endswith("foc33: set-up, libjs-dygraphs: cannot be installed, see build/setup/apt.log; pages show no curves")
+    assert machine.read("calls").endswith("install --no-install-recommends libjs-dygraphs\n") and machine.read("calls").count("\n") == 2
+    assert machine.run() == (0, "") and machine.read("calls").count("\n") == 2
+
+
 def test_the_checks_tools_are_told_likewise(machine):
     assert machine.run("test/static/need.sh cppcheck=cppcheck", INSTALL="no") == (
         2, "foc33: set-up, missing: tools of the checks: as root: apt-get install cppcheck; without root: make test-quick, which needs none of them\n")

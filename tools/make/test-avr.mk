@@ -1,6 +1,6 @@
 # The unit tests of the control law where int has 16 bits, as on the chip: avr-gcc and simavr. Uses the variables of the main Makefile.
 # Tests with mocks or registers (the board's) and those of the closed loop in floating point stay on the PC.
-law_tests := $(filter-out $(patsubst test/%.c,%,$(shell grep -lE 'mock_|ideal_motor\.h|identify_rig\.h|<xc\.h>|firmware/board|"board/' $(unit_c:%=test/%.c) /dev/null)),$(unit_c))
+law_tests := $(filter-out $(patsubst test/%.c,%,$(shell grep -lE 'mock_|ideal_motor\.h|identify_rig\.h|bringup_rig\.h|<xc\.h>|firmware/board|"board/' $(unit_c:%=test/%.c) /dev/null)),$(unit_c))
 sixteen_bit = @$(in_turn) $(still) 'unit tests' $(python) test/sixteen_bit/run.py --unity $(unity) --runners $T --host $T
 
 avr_compile = avr-gcc -mmcu=atmega2560 -std=gnu99 -O2 -fno-ivopts -ffunction-sections -fdata-sections -Iinclude -I. $(DEFINES)

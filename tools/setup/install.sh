@@ -38,6 +38,10 @@ as_root() {
     fi
 }
 
+apt_get() {
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=300 "$@"
+}
+
 can_install() {
     [ "${INSTALL:-yes}" != no ] || return 1
     command -v apt-get >/dev/null || return 1
@@ -52,9 +56,8 @@ debian() {
     echo "foc33: installing Debian packages as root, a minute or two: $3 (log: $1)"
     echo "  without root instead: stop here (Ctrl-C), then $4"
     : >"$1"
-    logged "$1" "looking for packages" as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=300 update
+    logged "$1" "looking for packages" apt_get update
     # shellcheck disable=SC2086
-    logged "$1" "installing packages" as_root env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=300 \
-        install --no-install-recommends $3 ||
+    logged "$1" "installing packages" apt_get install --no-install-recommends $3 ||
         give_up "set-up, apt-get install $3: failed ($(grep '^E:' "$1" | tail -n 1)); see $1, or without root: $4"
 }

@@ -137,8 +137,8 @@ fi
 # Tried once: without it a run's page has its tables only, and says what to do.
 if ! has_dygraphs && [ ! -e $state/no-dygraphs ] && can_install; then
     echo "foc33: installing the Debian package libjs-dygraphs, for the curves of a run's page (log: $log)"
-    apt update
-    apt install --no-install-recommends libjs-dygraphs || {
+    logged "$log" "looking for packages" apt_get update
+    logged "$log" "installing packages" apt_get install --no-install-recommends libjs-dygraphs || {
         touch $state/no-dygraphs
         echo "foc33: set-up, libjs-dygraphs: cannot be installed, see $log; pages show no curves" >&2
     }

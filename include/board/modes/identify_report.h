@@ -25,7 +25,7 @@ void identify_watch(const drive_t *d);
 #if defined IDENTIFY
 #define MODE_LINE_SIZE 160
 #elif defined BRINGUP
-#define MODE_LINE_SIZE 256
+#define MODE_LINE_SIZE 240
 #else
 #define MODE_LINE_SIZE 144
 #endif
