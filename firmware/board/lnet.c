@@ -173,7 +173,7 @@ static uint16_t special_of(uint16_t byte)
 }
 
 /** A byte counts in the sum. */
-static void count(lnet_t *l, uint16_t byte)
+static void count_byte(lnet_t *l, uint16_t byte)
 {
     l->sum = (uint16_t)(l->sum + byte);
     l->special = special_of(byte);
@@ -222,7 +222,7 @@ static void end_frame(lnet_t *l, uint16_t sum)
 /** A byte between SYN and checksum. */
 static void take(lnet_t *l, uint8_t byte)
 {
-    count(l, byte);
+    count_byte(l, byte);
     if (l->at < l->room) {
         l->buffer[l->at] = byte;
         l->at++;
@@ -299,7 +299,7 @@ int16_t lnet_next(void)
         }
         byte = l->buffer[l->at];
         l->at++;
-        count(l, byte);
+        count_byte(l, byte);
         l->left--;
         if (l->left == 0u) {
             l->part = ANSWER_SUM;
