@@ -88,13 +88,13 @@ QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
 QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
 {
     const volatile uint16_t *trigger;
-    int16_t *next;
+    int16_t *following;
     if (s->mode == (uint16_t)SCOPE_IDLE || --s->wait != 0u) {
         return;
     }
     s->wait = s->periods;
     trigger = s->trigger;
-    next = s->is_unusual ? scope_copy_words(s) : scope_copy_usual(s);
+    following = s->is_unusual ? scope_copy_words(s) : scope_copy_usual(s);
     if (s->left == 0u) {
         if ((int16_t)(*trigger ^ s->flip) >= s->level) {
             scope_comes(s, s->at, begin);
@@ -104,7 +104,7 @@ QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
     } else {
         /* it records */
     }
-    s->at = (next == s->end) ? s->begin : next;
+    s->at = (following == s->end) ? s->begin : following;
 }
 
 #if SCOPE
