@@ -57,13 +57,14 @@ static uint16_t take_channels(scope_t *s, const uint8_t *at)
 static uint16_t take_delay(scope_t *s, int16_t before, uint16_t rows)
 {
     int16_t before_rows = (int16_t)(before / (int16_t)(2u * s->words));
-    uint16_t skipped = (uint16_t)-before_rows;
     s->delay = before;
-    s->stays = (uint16_t)(before_rows <= 0);
-    if (s->stays) { /* the last row then ends the array */
+    if (before_rows <= 0) { /* the last row then ends the array */
+        uint16_t skipped = (uint16_t)-before_rows;
         s->left = 0;
         s->after = (uint16_t)(rows + skipped);
-        s->at = s->end - s->words * ((skipped + rows - 1u) % rows + 1u);
+        s->begin = s->last - s->words * ((skipped + rows - 1u) % rows + 1u);
+        s->at = s->begin;
+        s->end = s->begin + s->words;
         return 1;
     }
     s->left = (uint16_t)before_rows;
@@ -75,20 +76,13 @@ static uint16_t take_delay(scope_t *s, int16_t before, uint16_t rows)
 static uint16_t take_trigger(scope_t *s, const uint8_t *at, uint16_t rows)
 {
     uint16_t delay = word_at(at + TRIGGER_DELAY), rises = (uint16_t)(at[TRIGGER_EDGE] == 1u);
-    s->trigger = variable_at(at + 2, 2);
-    s->flip = (uint16_t)((rises ? 0u : 0xFFFFu) ^ ((at[0] & TYPE_SIGNED) != 0u ? 0u : 0x8000u));
+    s->trigger = (const volatile uint16_t *)variable_at(at + 2, 2);
+    s->flip = (uint16_t)((rises ? 0xFFFFu : 0u) ^ ((at[0] & TYPE_SIGNED) != 0u ? 0u : 0x8000u));
     s->level = (int16_t)(word_at(at + TRIGGER_LEVEL) ^ s->flip);
-    s->was_below = 0;
+    s->level = (int16_t)(s->level + 1); /* the other side begins there */
+    s->is_low = 0;
     return (uint16_t)((at[0] & (TYPE_FLOAT | TYPE_WIDTH)) == 2u && s->trigger != 0
                       && word_at(at + TRIGGER_DELAY + 2) == ((delay >= 0x8000u) ? 0xFFFFu : 0u) && take_delay(s, (int16_t)delay, rows));
-}
-
-/** Rows from now on. */
-static void take_all(scope_t *s, uint16_t rows)
-{
-    s->left = rows;
-    s->after = 0;
-    s->delay = 0;
 }
 
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
@@ -105,12 +99,17 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     }
     s->periods = (uint16_t)(word_at(request + 2) + 1u);
     s->wait = 1;
+    s->is_unusual = (uint16_t)(s->words != SCOPE_USUAL_WORDS);
     rows = (uint16_t)(SCOPE_ARRAY_WORDS / s->words);
     s->at = board_scope_array;
-    s->end = board_scope_array + rows * s->words;
+    s->begin = board_scope_array;
     s->event = board_scope_array;
+    s->last = board_scope_array + rows * s->words;
+    s->end = s->last;
     if (mode != (uint16_t)SCOPE_TRIGGERED || request[from + TRIGGER_MODE] == 0u) {
-        take_all(s, rows);
+        s->left = rows;
+        s->after = 0;
+        s->delay = 0;
     } else if (!take_trigger(s, request + from, rows)) {
         return 0;
     } else {
@@ -120,37 +119,31 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     return 1;
 }
 
-/** Four bytes, the lowest first. */
-static uint8_t *put_long(uint8_t *at, uint16_t low, uint16_t high)
-{
-    at[0] = (uint8_t)low;
-    at[1] = (uint8_t)(low >> 8);
-    at[2] = (uint8_t)high;
-    at[3] = (uint8_t)(high >> 8);
-    return at + 4;
-}
-
 /** Bytes from the array's begin. */
 static uint16_t offset_of(const int16_t *at)
 {
     return (uint16_t)((uint16_t)(at - board_scope_array) * 2u);
 }
 
-uint8_t *scope_put(const scope_t *s, uint8_t *at)
+/** Four bytes. */
+static uint16_t *put_long(uint16_t *at, uint16_t low, uint16_t high)
 {
-    uint16_t factor = (uint16_t)(s->periods - 1u);
-    at[0] = (uint8_t)s->mode;
-    at[1] = (uint8_t)s->channels;
-    at[2] = (uint8_t)factor;
-    at[3] = (uint8_t)(factor >> 8);
-    at = put_long(at + 4, offset_of(s->at), 0);
+    *at++ = low;
+    *at++ = high;
+    return at;
+}
+
+void scope_put(const scope_t *s, void *record)
+{
+    uint16_t *at = put_long(record, (uint16_t)(s->mode | (uint16_t)(s->channels << 8)), (uint16_t)(s->periods - 1u));
+    uint16_t used = offset_of(s->last);
+    at = put_long(at, offset_of(s->at), 0);
     at = put_long(at, MEMORY_ADDRESS(board_scope_array), 0);
     at = put_long(at, (uint16_t)s->delay, (s->delay < 0) ? 0xFFFFu : 0u);
     at = put_long(at, offset_of(s->event), 0);
-    at = put_long(at, offset_of(s->end), 0);
-    at = put_long(at, offset_of(s->end), 0); /* clients take all of an array of whole rows */
+    at = put_long(at, used, 0);
+    at = put_long(at, used, 0); /* clients take all of an array of whole rows */
     *at = VERSION;
-    return at + 1;
 }
 
 #endif

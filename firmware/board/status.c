@@ -14,7 +14,13 @@
 #include "drive/limit_reasons.h"
 #include "version.h"
 
-static char line[MODE_LINE_SIZE];
+#if SCOPE
+#define LINE_PLACE __attribute__((aligned(2))) /* a client's answers are words */
+#else
+#define LINE_PLACE
+#endif
+
+static char line[MODE_LINE_SIZE] LINE_PLACE;
 static uint16_t next; /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
@@ -110,7 +116,7 @@ static uint16_t line_is_taken(uint16_t elapsed_ms)
 void status_init(void)
 {
 #if SCOPE
-    lnet_init((uint8_t *)line, sizeof line);
+    lnet_init((uint8_t *)line);
 #endif
     *((board_reset_cause != 0u) ? put_reset() : line) = '\0';
     next = 0;

@@ -2,6 +2,7 @@
 #ifndef BOARD_LNET_H
 #define BOARD_LNET_H
 
+#include "board/modes/identify_report.h"
 #include "board/scope.h"
 
 #include "drive/param_scaling.h" /* SCOPE */
@@ -9,9 +10,10 @@
 #define LNET_SYN 0x55u
 #define LNET_KEY 0x02u /* as SYN followed by a fill byte where it is data */
 #define LNET_NODE 1u
-#define LNET_FIRST 8u        /* bytes of the first request; the later ones have the status line's memory */
-#define LNET_MOST_BYTES 253u /* of memory in an answer */
-#define LNET_QUIET_MS 100u   /* silence that ends a frame which is not complete */
+#define LNET_ROOM ((uint16_t)MODE_LINE_SIZE) /* for a frame, even */
+#define LNET_FIRST 8u                        /* bytes of the first request; the later ones have the status line's memory */
+#define LNET_MOST_BYTES 253u                 /* of memory in an answer */
+#define LNET_QUIET_MS 100u                   /* silence that ends a frame which is not complete */
 
 /** X(number, name, meaning): services. */
 #define LNET_SERVICE_TABLE(X) \
@@ -37,19 +39,18 @@ enum { LNET_ERROR_TABLE(LNET_ERROR) };
 /** The line: requests and answers take turns. */
 typedef struct {
     scope_t scope;
-    uint8_t *memory;             /**< for requests and answers, from the first valid frame on */
-    const volatile void *source; /**< what the answer goes on with where the memory ends */
-    uint16_t quiet_ms;           /**< since the last byte of a request that is not complete */
-    uint8_t memory_size;
-    uint8_t part;    /**< what comes next */
-    uint8_t special; /**< the byte that the next one must fill, or 0 */
-    uint8_t size;    /**< of the data */
-    uint8_t done;    /**< of them, received or sent */
-    uint8_t at;      /**< in the memory, of an answer */
-    uint8_t sum;
-    uint8_t is_mine;           /**< 1: this node is meant */
-    uint8_t is_up;             /**< 1 from the first valid frame on */
-    uint8_t first[LNET_FIRST]; /**< a request before that */
+    uint8_t *buffer;                /**< a frame from its size to its last byte of data, as far as there is room */
+    uint16_t room;                  /**< of it, even */
+    uint8_t *memory;                /**< the buffer from the first valid frame on */
+    const volatile uint8_t *source; /**< what an answer goes on with where the buffer ends */
+    uint16_t quiet_ms;              /**< since the last byte of a request that is not complete */
+    uint16_t part;                  /**< what comes next */
+    uint16_t special;               /**< the byte that the next one must fill, or 0 */
+    uint16_t left;                  /**< bytes of a frame that are still to come or to be sent, its sum not counted */
+    uint16_t at;                    /**< in the buffer */
+    uint16_t sum;
+    uint16_t is_up;            /**< 1 from the first valid frame on */
+    uint8_t first[LNET_FIRST]; /**< the buffer before that */
 } lnet_t;
 
 #if SCOPE
@@ -57,8 +58,8 @@ typedef struct {
 /** One link, one scope. */
 extern lnet_t board_lnet;
 
-/** Nothing received, nothing recorded. @param memory of the status line, which the first valid frame takes over @param size even */
-void lnet_init(uint8_t *memory, uint8_t size);
+/** Nothing received, nothing recorded. @param memory of the status line, LNET_ROOM bytes, which the first valid frame takes over */
+void lnet_init(uint8_t *memory);
 
 /** A byte from the line. While an answer is under way it is dropped: a client waits for its answer. */
 void lnet_receive(uint8_t byte);

@@ -16,83 +16,95 @@ typedef enum {
     SCOPE_AUTO       /**< records at once */
 } scope_mode_t;
 
-/** The scope. The background changes it in SCOPE_IDLE only, and the mode last. */
+/** The scope. The background changes it in SCOPE_IDLE only, and the mode last. The ring in use is one row until the trigger comes, where nothing
+ *  from before it is kept. */
 typedef struct {
-    volatile uint16_t mode;                      /**< scope_mode_t; the control interrupt ends it */
-    uint16_t wait, periods;                      /**< until the next row, and from row to row */
-    int16_t *at, *end;                           /**< where the next row goes, and the end of the last one in the ring */
-    uint16_t words;                              /**< of a row */
-    uint16_t left;                               /**< rows to come before the trigger may come, or after it; 0: it may come now */
-    uint16_t after;                              /**< rows from the trigger on; 0: it has come */
-    uint16_t stays;                              /**< 1: nothing from before the trigger is kept */
-    const volatile int16_t *trigger;             /**< compared with the level */
-    uint16_t flip;                               /**< bits that turn "falls to" or "unsigned" into "rises to" and "signed" */
-    int16_t level;                               /**< flipped */
-    uint16_t was_below;                          /**< 1: the next value that is not below the level is the trigger */
-    const volatile int16_t *source[SCOPE_WORDS]; /**< of each word */
-    const int16_t *event;                        /**< the trigger's row */
-    int16_t delay;                               /**< bytes that are kept from before the trigger; negative: left out after it */
+    volatile uint16_t mode;                               /**< scope_mode_t; the control interrupt ends it */
+    uint16_t wait, periods;                               /**< until the next row, and from row to row */
+    int16_t *at, *begin, *end;                            /**< where the next row goes, and the ring in use */
+    int16_t *last;                                        /**< end of the array's last row */
+    uint16_t words;                                       /**< of a row */
+    uint16_t is_unusual;                                  /**< 1: a row has not SCOPE_USUAL_WORDS */
+    uint16_t left;                                        /**< rows to come before the trigger is looked for, or after it; 0: it is looked for */
+    uint16_t after;                                       /**< rows from the trigger on; 0: it has come */
+    uint16_t is_low;                                      /**< 1: the value has been on the other side of the level; now it must come over */
+    const volatile uint16_t *volatile trigger;            /**< compared with the level */
+    uint16_t flip;                                        /**< bits that turn what is waited for into "not below, signed" */
+    int16_t level;                                        /**< flipped */
+    const volatile int16_t *volatile source[SCOPE_WORDS]; /**< of each word */
+    const int16_t *event;                                 /**< the trigger's row */
+    int16_t delay;                                        /**< bytes that are kept from before the trigger; negative: left out after it */
     uint16_t channels;
 } scope_t;
 
-/** Has the trigger come in this row? Then what is left is known. */
-QM_INLINE uint16_t scope_fires(scope_t *s)
+/** What was waited for has come: first the other side of the level, then the trigger. @param at its row @param begin of the array */
+QM_INLINE void scope_comes(scope_t *s, const int16_t *at, int16_t *begin)
 {
-    if ((int16_t)((uint16_t)*s->trigger ^ s->flip) < s->level) {
-        s->was_below = 1;
-        return 0;
+    if (!s->is_low) {
+        s->is_low = 1;
+        s->flip = (uint16_t)~s->flip;
+        s->level = (int16_t)-s->level;
+    } else {
+        s->left = (uint16_t)(s->after - 1u);
+        s->after = 0;
+        s->event = at;
+        s->begin = begin;
+        s->end = s->last;
+        if (s->left == 0u) {
+            s->mode = (uint16_t)SCOPE_IDLE;
+        }
     }
-    if (!s->was_below) {
-        return 0;
-    }
-    s->left = s->after;
-    s->after = 0;
-    s->event = s->at;
-    return 1;
 }
 
-/** A row. The usual one is copied in a straight line, others in a loop. @param begin of the array */
-QM_INLINE void scope_row(scope_t *s, int16_t *begin)
+/** A row of any length. @return where the next one goes */
+QM_INLINE int16_t *scope_copy_words(const scope_t *s)
 {
-    const volatile int16_t *const *source = s->source;
+    const volatile int16_t *const volatile *source = s->source;
     int16_t *at = s->at;
-    if (s->words == SCOPE_USUAL_WORDS) {
-        at[0] = *source[0];
-        at[1] = *source[1];
-        at[2] = *source[2];
-        at[3] = *source[3];
-        at += SCOPE_USUAL_WORDS;
-    } else {
-        uint16_t left = s->words;
-        do {
-            *at = **source;
-            at++;
-            source++;
-            left--;
-        } while (left != 0u);
+    uint16_t left = s->words;
+    do {
+        *at = **source;
+        at++;
+        source++;
+        left--;
+    } while (left != 0u);
+    return at;
+}
+
+/** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read.
+ *  @return where the next one goes */
+QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
+{
+    const volatile int16_t *first = s->source[0], *second = s->source[1], *third = s->source[2], *fourth = s->source[3];
+    int16_t *at = s->at;
+    *at++ = *first;
+    *at++ = *second;
+    *at++ = *third;
+    *at++ = *fourth;
+    return at;
+}
+
+/** The last work of a period. @param begin of the array */
+QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
+{
+    const volatile uint16_t *trigger;
+    int16_t *following;
+    if (s->mode == (uint16_t)SCOPE_IDLE || --s->wait != 0u) {
+        return;
     }
-    if (s->left == 0u && !scope_fires(s)) {
-        if (s->stays) {
-            return;
+    s->wait = s->periods;
+    trigger = s->trigger;
+    following = s->is_unusual ? scope_copy_words(s) : scope_copy_usual(s);
+    if (s->left == 0u) {
+        if ((int16_t)(*trigger ^ s->flip) >= s->level) {
+            scope_comes(s, s->at, begin);
         }
     } else if (--s->left == 0u && s->after == 0u) {
         s->mode = (uint16_t)SCOPE_IDLE;
     } else {
         /* it records */
     }
-    s->at = (at == s->end) ? begin : at;
-}
-
-/** The last work of a period. @param begin of the array */
-QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
-{
-    if (s->mode == (uint16_t)SCOPE_IDLE) {
-        return;
-    }
-    if (--s->wait == 0u) {
-        s->wait = s->periods;
-        scope_row(s, begin);
-    }
+    s->at = (following == s->end) ? s->begin : following;
 }
 
 #if SCOPE
@@ -104,8 +116,8 @@ extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
  *  @return 1 if it was understood; else nothing has changed but that a running record has ended */
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
 
-/** What the scope has done, as it stands in a frame. @return the end */
-uint8_t *scope_put(const scope_t *s, uint8_t *at);
+/** What the scope has done, as it stands in a frame. @param record at an even address, with room for thirty bytes */
+void scope_put(const scope_t *s, void *record);
 
 #endif
 #endif

@@ -148,7 +148,7 @@ def test_a_trace_without_rows_is_none():
 @pytest.mark.parametrize("wish, part", [
     ({"channels": []}, "no channel"), ({"channels": ["nothing"]}, "no variable 'nothing'"), ({"channels": [["x"]]}, "no variable"),
     ({"channels": [I_Q] * 9}, "9 words"),
-    ({"channels": ["board_lnet.sum"]}, "neither 16 nor 32"), ({"trigger": "board_drive.bus_q31"}, "has not 16"), ({"mode": "always"}, "choose one of auto"),
+    ({"channels": ["board_lnet.first[0]"]}, "neither 16 nor 32"), ({"trigger": "board_drive.bus_q31"}, "has not 16"), ({"mode": "always"}, "choose one of auto"),
     ({"factor": 0}, "choose 1 .. 1000"), ({"position": 1.5}, "choose 0 .. 1"), ({"level": "high"}, "'level' = high"), ({"more": 1}, "no setup")])
 def test_a_setup_that_makes_no_sense_is_refused_in_one_line(living, wish, part):
     before = living.board.scope.setup

@@ -5,6 +5,9 @@
 #include "firmware/board/lnet.c"
 #include "firmware/board/scope.c"
 
+/** The last of them, so that the end is not the link's own. */
+static int16_t last_variable[8] REACHED = { 1 };
+
 void setUp(void)
 {
     rig_up();
@@ -35,7 +38,7 @@ void test_memory_is_read_bytes_in_order(void)
 /** Longer than the memory for answers: it is fetched piece by piece. */
 void test_a_long_answer_is_all_there(void)
 {
-    static const uint8_t sizes[] = { 93, 94, 95, 96, 97, 127, 128 };
+    static const uint8_t sizes[] = { 1, 2, 3, LNET_ROOM - 5, LNET_ROOM - 4, LNET_ROOM - 3, LNET_ROOM, 253 };
     uint16_t n;
     for (n = 0; n < sizeof sizes; n++) {
         TEST_ASSERT_EQUAL_UINT8(0, rig_ask(9, LOW(ADDRESS(variable[0])), sizes[n], 1));
@@ -88,12 +91,12 @@ void test_requests_of_a_wrong_length_are_refused(void)
 
 void test_what_is_longer_than_the_memory_for_it_is_refused_by_its_size(void)
 {
-    uint8_t data[102] = { 10, LOW(ADDRESS(variable[0])), 98, 9, 9 };
-    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, 97));
-    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, 102));
+    uint8_t data[LNET_ROOM] = { 10, LOW(ADDRESS(variable[0])), LNET_ROOM - 6u, 9, 9 }; /* size and node are in that memory, too */
+    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, LNET_ROOM - 1u));
+    TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, LNET_ROOM));
     TEST_ASSERT_EQUAL_INT16(0x0100, variable[0]);
-    data[3] = 92;
-    TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(data, 96));
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(data, LNET_ROOM - 2u));
+    TEST_ASSERT_EQUAL_INT16(0x0909, variable[0]);
 }
 
 void test_addresses_outside_of_the_variables_are_refused(void)
@@ -110,6 +113,7 @@ void test_addresses_outside_of_the_variables_are_refused(void)
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask(9, LOW(end - 2u), 2, 1));
     TEST_ASSERT_EQUAL_UINT8(20, rig_ask(9, LOW(end - 2u), 3, 1));
     TEST_ASSERT_EQUAL_UINT8(20, rig_ask(10, LOW(end - 2u), 4, 0, 0, 0, 0));
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(10, LOW(ADDRESS(last_variable[7])), 2, 0, 0));
     /* the link's own variables say where the scope writes */
     TEST_ASSERT_EQUAL_UINT8(20, rig_ask(10, LOW(own), 2, 0, 0));
     TEST_ASSERT_EQUAL_UINT8(20, rig_ask(10, LOW(own - 2u), 4, 0, 0, 0, 0));
@@ -161,6 +165,16 @@ void test_a_frame_that_broke_off_is_forgotten_where_the_next_one_begins(void)
         }
         TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(request, sizeof request));
     }
+}
+
+void test_a_frame_whose_sum_is_missing_is_forgotten_where_the_next_one_begins(void)
+{
+    uint8_t sum = 0x55;
+    lnet_receive(0x55);
+    rig_put(1, &sum);
+    rig_put(1, &sum);
+    rig_put(0, &sum);
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));
 }
 
 void test_a_frame_whose_fill_byte_is_missing_is_dropped(void)
@@ -224,7 +238,7 @@ void test_a_frame_without_data_is_none(void)
 void test_noise_before_the_first_frame_is_not_answered_and_does_not_take_the_line(void)
 {
     uint16_t n, seed = 1;
-    lnet_init(line_memory, sizeof line_memory);
+    lnet_init(line_memory);
     memset(line_memory, 0x5A, sizeof line_memory);
     for (n = 0; n < 20000u; n++) {
         seed = (uint16_t)(seed * 25173u + 13849u);
@@ -240,9 +254,19 @@ void test_noise_before_the_first_frame_is_not_answered_and_does_not_take_the_lin
     TEST_ASSERT_TRUE(lnet_is_busy());
 }
 
+void test_a_wrong_first_frame_is_not_answered(void)
+{
+    const uint8_t request[] = { 0 };
+    lnet_init(line_memory);
+    rig_send_as(1, 1, request, 1, 0x40);
+    TEST_ASSERT_FALSE(rig_answer());
+    TEST_ASSERT_FALSE(lnet_is_busy());
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));
+}
+
 void test_the_line_is_kept_free_while_the_first_frame_comes_in(void)
 {
-    lnet_init(line_memory, sizeof line_memory);
+    lnet_init(line_memory);
     lnet_receive('x');
     TEST_ASSERT_FALSE(lnet_is_busy());
     lnet_receive(0x55);
@@ -252,7 +276,70 @@ void test_the_line_is_kept_free_while_the_first_frame_comes_in(void)
 void test_a_long_first_frame_is_answered_by_its_size(void)
 {
     const uint8_t request[] = { 10, LOW(ADDRESS(variable[0])), 5, 1, 2, 3, 4, 5 };
-    lnet_init(line_memory, sizeof line_memory);
+    lnet_init(line_memory);
     TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(request, sizeof request));
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(request, sizeof request));
+}
+
+/* ---- anything ---- */
+
+static uint32_t seed = 1;
+
+static uint16_t chance(uint16_t most)
+{
+    seed = seed * 1664525u + 1013904223u;
+    return (uint16_t)((seed >> 16) % (most + 1u));
+}
+
+/** What a writing frame does to a copy of the reachable memory, in plain words: nothing, if any byte of it lies outside or is the link's own. */
+static uint16_t expected_write(uint8_t *copy, uint16_t address, const uint8_t *bytes, uint16_t count)
+{
+    uint32_t from = (uint32_t)address - MEMORY_RAM_START, own = (uint32_t)ADDRESS(board_lnet) - MEMORY_RAM_START;
+    if (count == 0u || address < MEMORY_RAM_START || from + count > MEMORY_RAM_BYTES || (from + count > own && from < own + sizeof board_lnet)) {
+        return 20;
+    }
+    memcpy(copy + from, bytes, count);
+    return 0;
+}
+
+/** Thousands of writing frames at any address, whole, broken off, with a byte changed, left out or too many: only what is valid writes, and it writes what
+ *  it says and nothing else; whatever came before, the next request is answered. */
+void test_any_frame_writes_what_it_may_and_nothing_else(void)
+{
+    static uint8_t copy[8192];
+    uint16_t n, written = 0;
+    TEST_ASSERT_TRUE(MEMORY_RAM_BYTES <= sizeof copy);
+    for (n = 0; n < 6000u; n++) {
+        uint8_t data[24], damaged = (uint8_t)chance(3);
+        uint16_t count = chance(12), k, address = (uint16_t)(chance(1) ? MEMORY_RAM_START - 8u + chance((uint16_t)(MEMORY_RAM_BYTES + 16u)) : chance(65535)), error;
+        data[0] = 10;
+        data[1] = (uint8_t)address;
+        data[2] = (uint8_t)(address >> 8);
+        data[3] = (uint8_t)count;
+        for (k = 0; k < count; k++) {
+            data[4u + k] = (uint8_t)(chance(3) == 0u ? 0x55u : chance(255));
+        }
+        memcpy(copy, host_window(), MEMORY_RAM_BYTES);
+        if (damaged == 0u) {
+            error = expected_write(copy, address, data + 4, count);
+            TEST_ASSERT_EQUAL_UINT16(error, rig_ask_of(data, (uint16_t)(4u + count)));
+            written = (uint16_t)(written + (error == 0u));
+        } else if (damaged == 1u) { /* the sum is wrong */
+            rig_send_as((uint8_t)(4u + count), 1, data, (uint16_t)(4u + count), (uint8_t)(1u + chance(254)));
+        } else if (damaged == 2u) { /* more is promised than comes */
+            rig_send_as((uint8_t)(5u + count + chance(100)), 1, data, (uint16_t)(4u + count), 0);
+        } else {
+            uint16_t length = chance(30);
+            for (k = 0; k < length; k++) {
+                lnet_receive((uint8_t)(chance(2) == 0u ? 0x55u : chance(255)));
+            }
+        }
+        while (lnet_next() >= 0) {
+        }
+        lnet_tick(LNET_QUIET_MS);
+        memcpy(copy + (ADDRESS(board_lnet) - MEMORY_RAM_START), &board_lnet, sizeof board_lnet); /* its own affair */
+        TEST_ASSERT_EQUAL_INT(0, memcmp(copy, host_window(), MEMORY_RAM_BYTES));
+        TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));
+    }
+    TEST_ASSERT_TRUE(written > 300u);
 }

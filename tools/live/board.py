@@ -18,6 +18,8 @@ from tools.bench.scenario_file import MOTOR
 from tools.common import board_keys, command_line, paths
 from tools.common.errors import UserError
 
+from . import plain_elf
+
 SCOPE = "SCOPE=1"
 REST = Scenario("live-board", "", "", MOTOR, "", 0.0)
 """Nothing happens."""
@@ -53,7 +55,7 @@ def parts(motor: str | None = None, board: str | None = None, defines: str = "",
     macros += [] if SCOPE in macros else [SCOPE]
     if cpu == "33f":
         elf = pil_command.image_for(macros, folder, image)
-        return Parts(motor_part, board_part, pil.library(macros, folder), elf, elf)
+        return Parts(motor_part, board_part, pil.library(macros, folder), elf, plain_elf.write(elf, elf.with_suffix(".client.elf")))
     library = Library(build.library(macros, folder, "live-library"))
     return Parts(motor_part, board_part, library, None, library.path.with_name("foc33.elf"))
 

@@ -19,7 +19,7 @@ try:
 except ImportError:
     pass # program.reading() says so
 
-DSPIC = 118
+DSPIC = "EM_DSPIC30F"
 RAM = range(0x0800, 0xF800)
 ADDRESS, PLUS = 0x03, 0x23
 """DW_OP_addr, DW_OP_plus_uconst."""
@@ -87,7 +87,11 @@ def dwarf_of(path: Path) -> Any:
     """Its debugging information."""
     data = contents("ELF", path)
     elf = ELFFile(BytesIO(data))
-    return attribution.dwarf_info(read_elf(path, data).debug) if elf["e_machine"] == DSPIC else elf.get_dwarf_info()
+    info = elf.get_section_by_name(".debug_info")
+    if info is None:
+        raise UserError("no debugging information", str(path), "compile with -g")
+    as_xc16 = elf["e_machine"] == DSPIC and not any(info.data()[1::2]) # not so after plain_elf.py
+    return attribution.dwarf_info(read_elf(path, data).debug) if as_xc16 else elf.get_dwarf_info()
 
 
 def _declared(die: Any) -> Any:

@@ -16,11 +16,21 @@
 #else
 #define SCOPE_MODE_IDENTIFY 0u
 #endif
-#if defined(SNAPSHOT) && SCOPE
-#error userparams.h: SNAPSHOT and SCOPE 1 together have no room: remove one; the scope records four variables, too
+#ifdef BRINGUP
+#define SCOPE_MODE_BRINGUP 332u
+#else
+#define SCOPE_MODE_BRINGUP 0u
+#endif
+#ifdef SNAPSHOT
+#define SCOPE_MODE_SNAPSHOT (8u * (DATA_BUFFER_SIZE) + 24u)
+#if SCOPE && (DATA_BUFFER_SIZE) > 60
+#error userparams.h: SNAPSHOT and SCOPE 1 together have no room for DATA_BUFFER_SIZE rows: lower it to 60
+#endif
+#else
+#define SCOPE_MODE_SNAPSHOT 0u
 #endif
 
 /** Of the trace buffer. */
-#define SCOPE_BYTES ((856u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY) & ~3u)
+#define SCOPE_BYTES ((848u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY - SCOPE_MODE_BRINGUP - SCOPE_MODE_SNAPSHOT) & ~3u)
 
 #endif

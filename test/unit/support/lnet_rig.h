@@ -17,9 +17,9 @@ extern int16_t board_scope_array[SCOPE_ARRAY_WORDS] REACHED;
 #include <string.h>
 
 /** The firmware's variables; guard words on both sides are others'. */
-static int16_t variable[64] REACHED = { 1 };
+static int16_t variable[140] REACHED = { 1 };
 
-static uint8_t line_memory[96]; /* of the status line */
+static uint8_t line_memory[LNET_ROOM]; /* of the status line */
 static uint8_t answered[300]; /* the data of the last answer */
 static uint16_t answered_size;
 
@@ -104,8 +104,8 @@ static inline uint8_t rig_ask_of(const uint8_t *data, uint16_t bytes)
 static inline void rig_up(void)
 {
     uint16_t n;
-    lnet_init(line_memory, sizeof line_memory);
-    for (n = 0; n < 64u; n++) {
+    lnet_init(line_memory);
+    for (n = 0; n < 140u; n++) {
         variable[n] = (int16_t)(0x0100 + 3 * (int16_t)n);
     }
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));

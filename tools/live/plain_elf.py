@@ -1,0 +1,51 @@
+"""The ELF file of an image with its debugging information as other programs expect it: XC16 stores a byte of it in every second byte of the file.
+
+    python3 -m tools.live.plain_elf build/target/foc33.elf build/target/foc33.client.elf"""
+
+import struct
+import sys
+from io import BytesIO
+from pathlib import Path
+
+from tools.common.errors import UserError
+from tools.image.program import contents, reading
+
+try:
+    from elftools.elf.elffile import ELFFile
+except ImportError:
+    pass # program.reading() says so
+
+SIZE_AT = 20
+"""Of sh_size in a section's header."""
+
+
+def write(image: Path, path: Path) -> Path:
+    """Writes the file; returns its path."""
+    data = bytearray(contents("ELF", image))
+    with reading("ELF", image):
+        elf = ELFFile(BytesIO(bytes(data)))
+        for number, section in enumerate(elf.iter_sections()):
+            if section.name.startswith(".debug_"):
+                plain = section.data()[::2]
+                at = section["sh_offset"]
+                data[at:at + len(plain)] = plain
+                struct.pack_into("<I", data, elf["e_shoff"] + number * elf["e_shentsize"] + SIZE_AT, len(plain))
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise UserError(f"cannot write the file ({error.strerror})", str(path), "name another one") from None
+    return path
+
+
+def main() -> int:
+    """Run the command; returns the exit code."""
+    try:
+        write(Path(sys.argv[1]), Path(sys.argv[2]))
+    except (UserError, IndexError) as error:
+        print(f"foc33: {error if isinstance(error, UserError) else 'two files, tools.live.plain_elf: name an image and the file to write'}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
