@@ -14,7 +14,7 @@
 
 /* ---- Modes: remove the comment marks, or build with -D ------------------------------------------------------------ */
 /* #define OPEN_LOOP_FUNCTIONING */ /* stay on the forced angle at END_SPEED_RPM; the estimator runs along and can be watched */
-/* #define TUNING */                /* the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself */
+/* #define TUNING */                /* the speed reference ramps slowly from the hand-over to MAXIMUM_SPEED_RPM by itself */
 /* #define TORQUE_MODE */           /* the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed */
 /* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
@@ -50,7 +50,7 @@
 #define POT_LIVE_ZERO 0.0           /* [1]             0 .. 0.2       dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none */
 
 /* ---- Start: align, ramp, hand-over -------------------------------------------------------------------------------- */
-#define LOCK_TIME 4000              /* [periods]       200 .. 32000   rotor held at a fixed angle (two directions, half the time each): 0.2 s */
+#define LOCK_TIME 18750             /* [periods]       2000 .. 32000  the start's current grows from nothing while it turns five times: 0.938 s */
 #define END_SPEED_RPM 1000          /* [rpm]           2 .. 10000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
 #define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of align and ramp: pull-out torque 0.0844 N m */
@@ -235,12 +235,14 @@
  *   forced.end_speed_q10                 1000 rpm            279620  Q10 angle counts a period   -0.000 %  end of the ramp
  *   forced.increase_rate_q10           715.26 rpm/s              10  Q10 counts/period^2            exact  acceleration
  *   flying_start                            1 1                   1  flag                           exact  1: a rotor that turns is caught
- *   align_periods                         0.2 s                4000  periods                        exact  lock
- *   align_sweep_q32                       900 deg/s          536870  Q32 of a turn a period         exact  first half of the lock
+ *   align_periods                      0.9375 s               18750  periods                        exact  lock
+ *   align_rate_q12                      1.504 A/s               573  Q12 of Q13 A a period       -0.083 %  growth of the lock's current
+ *   align_speed_q10                        64 rpm             17895  Q10 angle counts a period   -0.004 %  speed of the lock
  *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
+ *   early_erpm                            240 rpm              1200  erpm                           exact  the hand-over may come from here on
  *   bootstrap_periods                    0.01 s                 200  periods                        exact  low sides on before the start
  *   agree_steps                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
- *   wait_steps                            0.2 s                 500  8 periods                      exact  and how long it may take
+ *   wait_steps                            0.2 s                 500  8 periods                      exact  and how long it may take at the end of the ramp
  *
  * limits
  *   current_max_q13                      2.75 A                5120  Q13 A                       -0.000 %  current vector that is asked for

@@ -515,8 +515,8 @@ def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
           f"{start.DEAD_TIME_ERROR:.0%} of the dead time, one converter step), turns the angle by 20 degrees")
     d.put("MINIMUM_SPEED_RPM", plain(s.minimum_speed_rpm), f"the rotor is held from {s.lowest_speed_rpm:.0f} rpm: back-EMF "
           f"{start.LOWEST_SHARE:g} of the dead-time voltage")
-    d.put("LOCK_TIME", str(2 * round(s.lock_s / d.board.pwm_period_s / 2.0)), f"{start.LOCK_SWINGS:.0f} swings of the locked rotor "
-          f"({s.natural_hz:.0f} Hz, damping {s.damping:.3f}), at least {start.LEAST_LOCK_S:g} s")
+    d.put("LOCK_TIME", str(2 * round(s.lock_s / d.board.pwm_period_s / 2.0)), f"{start.LOCK_SWINGS:.0f} swings of the rotor at the full current "
+          f"({s.natural_hz:.0f} Hz, damping {s.damping:.3f}), at least {start.LEAST_LOCK_S:g} s; thrown back at {s.trial.back_rpm:.0f} rpm at most")
     d.put("OPENLOOP_RAMPSPEED_INCREASERATE", str(s.rate), f"{s.ramp_s:.1f} s to END_SPEED_RPM; J dw/dt at most {start.RAMP_TORQUE_SHARE:.0%} of the pull-out torque")
 
 

@@ -148,11 +148,13 @@ static void start(void)
           "Q10 counts/period^2", "acceleration");
     FIELD(flying_start, FLYING_START, "1", 1.0, "flag", "1: a rotor that turns is caught");
     FIELD(align_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
-    FIELD(align_sweep_q32, 90.0 / (LOCK_TIME / 2.0 * period), "deg/s", 0.0, "Q32 of a turn a period", "first half of the lock");
+    FIELD(align_rate_q12, Q_CURRENT_REF_OPENLOOP / (LOCK_TIME * period), "A/s", q13_a / period / 4096.0, "Q12 of Q13 A a period", "growth of the lock's current");
+    FIELD(align_speed_q10, PARAM_ALIGN_TURNS * 60.0 / (LOCK_TIME * period) / pairs, "rpm", 60.0 / pairs / period / 67108864.0, "Q10 angle counts a period", "speed of the lock");
     FIELD(open_loop_q13, Q_CURRENT_REF_OPENLOOP, "A", q13_a, "Q13 A", "current of lock and ramp");
+    FIELD(early_erpm, PARAM_EARLY_ERPM / pairs, "rpm", erpm, "erpm", "the hand-over may come from here on");
     FIELD(bootstrap_periods, 0.010, "s", period, "periods", "low sides on before the start");
     FIELD(agree_steps, 0.02, "s", slots, "8 periods", "agreement before the hand-over");
-    FIELD(wait_steps, 0.2, "s", slots, "8 periods", "and how long it may take");
+    FIELD(wait_steps, 0.2, "s", slots, "8 periods", "and how long it may take at the end of the ramp");
 }
 
 static void limits(void)

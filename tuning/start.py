@@ -31,9 +31,12 @@ DEAD_TIME_ERROR = 0.20
 """Share of the dead-time voltage that compensation leaves."""
 HAND_OVER_SINE = 0.35
 """Sine of the angle error (20 degrees) that the estimator may have at the hand-over."""
-LEAST_LOCK_S = 0.2
-LOCK_SWINGS = 8.0
-"""The lock lasts so many periods of the rotor's swing at least."""
+LEAST_LOCK_S = 0.3
+LOCK_SWINGS = 32.0
+"""The lock lasts so many periods of the rotor's swing at least: while the current grows, the swing of a rotor that it takes along dies away."""
+LOCK_TURNS = number("PARAM_ALIGN_TURNS")
+MOST_BACK_RPM = 230.0
+"""The lock is longer where the rotor would be thrown back faster: dead time and the current loop add a tenth."""
 LARGEST_RATE = 2000
 LARGEST_END_RPM = 10000.0
 LEAST_ERPM = 100.0
@@ -88,6 +91,8 @@ class Trial:
     labels: list[str]
     swing_rpm: float
     """largest swing about the forced speed that is left at the hand-over"""
+    back_rpm: float
+    """largest speed against the direction"""
 
 
 def emf_error_v(motor: Motor, board: BoardFile, current_a: float) -> float:
@@ -144,7 +149,7 @@ def natural_rad_s(motor: Motor, current_a: float, inertia: float) -> float:
 
 
 def lock_by_rule_s(omega: float) -> float:
-    """Eight swings of the locked rotor, before the trial lengthens it."""
+    """Thirty-two swings of the rotor at the full current, before the trial lengthens it."""
     return max(LEAST_LOCK_S, math.ceil(LOCK_SWINGS * 2.0 * math.pi / omega / 0.05) * 0.05)
 
 
@@ -170,7 +175,7 @@ def rpm_s_of_rate(motor: Motor, board: BoardFile, rate: float) -> float:
 
 def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lock_s: float, acceleration_rpm_s: float, end_rpm: float,
               angles: int = 24) -> Trial:
-    """Integrates J dw/dt = Kt I sin(P (forced - rotor)) - friction - load for all start angles, without load and with the start load.
+    """Integrates J dw/dt = Kt I(t) sin(P (forced - rotor)) - friction - load for all start angles, without load and with the start load.
 
     `forced` is the current's angle: it begins on phase A, a quarter of a turn ahead of the frame, whose q axis it lies on.
     """
@@ -182,34 +187,34 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
     rotor = np.tile(np.arange(angles) * 2.0 * math.pi / angles, len(loads))
     speed = np.zeros_like(rotor)
     dry = np.repeat(np.array(loads), angles) + motor.coulomb_nm
-    start = rotor.copy()
-    forced = 0.0
+    forced, turning = 0.0, 2.0 * math.pi * LOCK_TURNS / lock_s
+    locked, back = rotor, 0.0
     kept: list[tuple[float, float, np.ndarray]] = []
     every = max(1, count // 800)
     for k in range(count):
         now = k * step
-        if now < lock_s:
-            forced_speed = math.pi / lock_s if now < 0.5 * lock_s else 0.0
-        else:
-            forced_speed = min((now - lock_s) * acceleration_rpm_s, end_rpm) * RPM * pairs
+        forced_speed = min(turning + max(now - lock_s, 0.0) * acceleration_rpm_s * RPM * pairs, end_rpm * RPM * pairs)
         forced += forced_speed * step
-        drive = pull * np.sin(forced - rotor) - motor.viscous_nms * speed - (damping - motor.viscous_nms) * (speed - forced_speed / pairs)
+        drive = pull * min(now / lock_s, 1.0) * np.sin(forced - rotor) - motor.viscous_nms * speed - (damping - motor.viscous_nms) * (speed - forced_speed / pairs)
         moving = np.abs(speed) > 1e-9
         free = speed + step / inertia * drive
         slowed = np.where(np.abs(free) <= dry * step / inertia, 0.0, free - np.sign(free) * dry * step / inertia)
         speed = np.where(moving | (np.abs(drive) > dry), slowed, 0.0)
         rotor = rotor + pairs * speed * step
+        back = max(back, -float(speed.min()))
+        if now <= lock_s:
+            locked = rotor - forced
         if k % every == 0:
             kept.append((now, forced_speed / pairs / RPM, speed / RPM))
-    # Each rotor begins within half a turn of the current; one that followed ends within a quarter of it.
+    # The current passes a rotor while it is weak. One that follows the ramp ends within a quarter of a turn of it, and in the same turn as it began.
     turns = (rotor - forced) / (2.0 * math.pi)
-    first = start / (2.0 * math.pi)
     slipped = np.abs(turns - np.round(turns)) > 0.25
-    lost = np.round(turns) - np.round(first) < -1.5
+    lost = np.round(turns) - np.round(locked / (2.0 * math.pi)) < -0.5
     labels = [f"{360.0 * i / angles:.0f} deg, {load:.3g} N m" for load in loads for i in range(angles)]
     times, forced_rpm, rotor_rpm = (np.array([row[i] for row in kept]) for i in range(3))
     last = times > times[-1] - 0.1 # the plateau at the end speed
-    return Trial(times, rotor_rpm, forced_rpm, ~(slipped | lost), labels, float(np.abs(rotor_rpm[last] - forced_rpm[last, None]).max()))
+    return Trial(times, rotor_rpm, forced_rpm, ~(slipped | lost), labels, float(np.abs(rotor_rpm[last] - forced_rpm[last, None]).max()),
+                 back / RPM)
 
 
 def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, maximum_a: float, trip_a: float, nominal_rpm: float,
@@ -230,10 +235,10 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
         acceleration = rpm_s_of_rate(motor, board, rate)
         trial = try_start(motor, inertia, damping, current, lock, acceleration, end)
         follows = bool(trial.followed.all())
-        if follows and trial.swing_rpm <= CALM_SHARE * end:
+        if follows and trial.swing_rpm <= CALM_SHARE * end and trial.back_rpm <= MOST_BACK_RPM:
             break
-        if "LOCK_TIME" not in fixed and lock < 0.99 * longest and lock < 8.0 * LOCK_SWINGS / omega * 2.0 * math.pi:
-            lock *= 1.5
+        if "LOCK_TIME" not in fixed and lock < 0.99 * longest and lock < 4.0 * LOCK_SWINGS / omega * 2.0 * math.pi:
+            lock *= 1.25
         elif not follows and "OPENLOOP_RAMPSPEED_INCREASERATE" not in fixed and rate > 1 and end / acceleration < 6.0:
             rate = max(1, int(rate * 0.7))
         else:

@@ -49,11 +49,11 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     drive_zero(run, sizeof *run);
     drive_turns(d, direction);
     drive_update_model(run, p, p->end_erpm);
-    run->control.ref_q13.q = (int16_t)(direction * p->open_loop_q13);
     run->control.iq_limit_q13 = p->current_max_q13;
     run->control.brake_limit_q13 = limits_asked_most(p);
-    d->forced.speed_q10 = 0;
-    d->forced.angle_q32 = (uint32_t)(angle_t)(direction * -0x4000) << 16; /* ALIGN sweeps it to zero */
+    d->forced.speed_q10 = p->align_speed_q10;
+    d->forced.increase_q10 = 0;
+    d->forced.angle_q32 = 0;
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos_called(d->angle);
     run->catching.step = mode_hands_over() ? p->flying_start : (uint16_t)CATCH_NO_LOOK;

@@ -1,4 +1,4 @@
-/* The forced angle of the start: a fixed direction while the rotor is locked, then a ramp up to the hand-over speed. */
+/* The forced angle of the start: it turns slowly while the current grows, then a ramp takes it up to the hand-over speed. */
 #ifndef CONTROL_FORCED_ANGLE_H
 #define CONTROL_FORCED_ANGLE_H
 
@@ -7,13 +7,14 @@
 /** Constants of the ramp, in AN1292's 1/1024 angle counts per period. */
 typedef struct {
     int32_t end_speed_q10;     /**< END_SPEED_RPM * P * Ts * 65536/60 * 1024 */
-    int16_t increase_rate_q10; /**< OPENLOOP_RAMPSPEED_INCREASERATE: added every period */
+    int16_t increase_rate_q10; /**< OPENLOOP_RAMPSPEED_INCREASERATE: added every period of the ramp, as a rule */
 } forced_angle_params_t;
 
 /** State. */
 typedef struct {
-    int32_t speed_q10;  /**< along the direction, 1/1024 angle counts per period; negative while the rotor still turns against it */
-    uint32_t angle_q32; /**< the fraction below one count is kept, so the speed is exact */
+    int32_t speed_q10;    /**< along the direction, 1/1024 angle counts per period; negative while the rotor still turns against it */
+    uint32_t angle_q32;   /**< the fraction below one count is kept, so the speed is exact */
+    int16_t increase_q10; /**< of the speed, every period: 0 or more */
 } forced_angle_t;
 
 /** Accelerates by one step and moves the angle. @param direction +1 or -1 @return nonzero at the end speed */
@@ -21,7 +22,7 @@ QM_INLINE int16_t forced_angle_tick(forced_angle_t *f, const forced_angle_params
 {
     int16_t at_end = 0;
     uint32_t step_q32;
-    f->speed_q10 += p->increase_rate_q10;
+    f->speed_q10 += f->increase_q10;
     if (f->speed_q10 >= p->end_speed_q10) {
         f->speed_q10 = p->end_speed_q10;
         at_end = 1;

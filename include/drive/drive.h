@@ -20,7 +20,7 @@
     X(CALIBRATE, "outputs off, current offsets are averaged") \
     X(STOPPED, "outputs off, ready") \
     X(BOOTSTRAP, "low sides on: high-side drivers charge, the short circuit's current tells of a rotor that turns") \
-    X(ALIGN, "current in a fixed direction aligns the rotor") \
+    X(ALIGN, "a current that grows while it turns takes the rotor along") \
     X(RAMP, "forced angle accelerates; the estimator runs along") \
     X(CLOSED, "the estimator's angle drives the motor") \
     X(STOPPING, "closed loop, ramping down to a speed where the outputs can go off") \
@@ -55,8 +55,10 @@ typedef struct {
     uint16_t bootstrap_periods;
     uint16_t flying_start; /**< catch_step_t: CATCH_FIRST_LOOK or, without FLYING_START, CATCH_NO_LOOK */
     uint16_t align_periods;
-    uint16_t agree_steps, wait_steps; /**< agreement needed at the end of the ramp, and how long it may take */
-    uint32_t align_sweep_q32;         /**< angle step while the first half of ALIGN turns by 90 degrees */
+    uint16_t agree_steps, wait_steps; /**< agreement needed for the hand-over, and how long it may take at the end of the ramp */
+    uint16_t align_rate_q12;          /**< by which the current of ALIGN grows every period, Q13 counts * 4096 */
+    int32_t align_speed_q10;          /**< of the forced angle in ALIGN */
+    speed_erpm_t early_erpm;          /**< from this forced speed on the estimator may take over */
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
@@ -134,6 +136,7 @@ typedef struct {
 typedef struct {
     uint16_t waited_steps;     /**< at the end of the ramp */
     uint16_t agreed_steps;     /**< of them, the last ones in which the estimator agreed with the forced speed */
+    int16_t ahead_erpm;        /**< by how much the estimated speed is ahead of the forced one, in the mean */
     uint16_t speed_is_preset;  /**< 1 from six periods after the hand-over on: the observer runs */
     int16_t offset;            /**< angle that is left of the change of frame, angle counts */
     current_q13_t current_q13; /**< of the ramp, at the hand-over */

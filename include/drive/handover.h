@@ -9,6 +9,8 @@
 #define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
 #define HANDOVER_FLOOR_SHIFT 3      /**< to an eighth at least */
 #define HANDOVER_SWUNG_SHIFT 5      /**< where the rotor is no longer slower than by 1/32 */
+#define HANDOVER_MEAN_SHIFT 5       /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
+#define HANDOVER_HURRY 3            /**< times the ramp's rate, once the estimator should have agreed */
 #define HANDOVER_MOST_OFFSET 0x2000 /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
@@ -20,26 +22,57 @@ QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
     d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
 }
 
+/** 1 once the estimator has agreed with the forced speed for long enough. */
+QM_INLINE uint16_t handover_agrees(const handover_t *h, const drive_params_t *p)
+{
+    return (uint16_t)(h->agreed_steps >= p->agree_steps);
+}
+
+/** The forced angle's speed along the direction, counts of speed_erpm_t. */
+QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
+{
+    return (int16_t)(qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> 11);
+}
+
 /* wcet: handover_wait/qm_sub_limited excludes speed_step */
-/** In RAMP, every eighth period: at its end counts how long the estimator agrees with the forced speed, or gives up by name. */
+/** In RAMP, every eighth period: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
+ *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
+ *  again, the rotor is blocked or the constants are off: the rest of the ramp is quicker. */
 QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
-    int16_t miss;
-    if (!mode_hands_over() || d->state != (uint16_t)DRIVE_RAMP || d->forced.speed_q10 < p->forced.end_speed_q10) {
+    int16_t forced, ahead, most;
+    uint16_t at_end = (uint16_t)(d->forced.speed_q10 >= p->forced.end_speed_q10);
+    if (!mode_hands_over()) {
         return;
     }
-    miss = qm_abs(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), p->end_erpm));
-    h->waited_steps = (uint16_t)(h->waited_steps + 1u);
-    h->agreed_steps = (uint16_t)((miss < (p->end_erpm >> 2)) ? h->agreed_steps + 1u : 0u);
-    if (h->agreed_steps >= p->agree_steps) {
+    forced = handover_forced_erpm(d, p);
+    ahead = qm_clamp(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), forced), -16383, 16383);
+    h->ahead_erpm = (int16_t)(h->ahead_erpm + ((ahead - h->ahead_erpm) >> HANDOVER_MEAN_SHIFT));
+    if (forced < p->early_erpm) {
+        return;
+    }
+    most = (int16_t)(forced >> (handover_agrees(h, p) ? 1 : 2));
+    h->waited_steps = (uint16_t)(at_end ? h->waited_steps + 1u : 0u);
+    h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
+    if (handover_agrees(h, p)) {
+        d->forced.increase_q10 = 0; /* the speed waits */
         handover_release(d, p);
         return;
     }
     d->run.control.ref_q13.q = along_direction(d, p->open_loop_q13);
+    d->forced.increase_q10 = (int16_t)((forced > p->early_erpm + (p->early_erpm >> 1)) ? HANDOVER_HURRY * p->forced.increase_rate_q10
+                                                                                       : p->forced.increase_rate_q10);
     if (h->waited_steps >= p->wait_steps) {
         drive_raise(d, FAULT_START_FAILED);
     }
+}
+
+/** The speed that the closed loop begins with: a rotor that swings ahead of the forced angle is not braked. */
+QM_INLINE speed_erpm_t handover_reference(const drive_t *d, const drive_params_t *p)
+{
+    int16_t forced = handover_forced_erpm(d, p), seen = along_direction(d, estimator_speed(&d->run.estimator));
+    return (seen > forced) ? seen : forced;
 }
 
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
@@ -67,7 +100,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     h->id_q13 = c->ref_q13.d;
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
-    c->reference_erpm = along_direction(d, p->end_erpm);
+    c->reference_erpm = along_direction(d, handover_reference(d, p));
     d->angle = estimated;
     d->frame = trig_sincos(estimated);
     drive_enter(d, DRIVE_CLOSED);
@@ -77,18 +110,18 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
  *  than the speed that the closed loop begins with, and loses more of it before the observer knows. */
 QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p)
 {
-    int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
+    int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator)), forced = handover_forced_erpm(d, p);
     if (qm_abs(offset) <= HANDOVER_MOST_OFFSET) {
         return 1;
     }
     return (uint16_t)(qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT)
-                      && along_direction(d, estimator_speed(&d->run.estimator)) >= p->end_erpm - (p->end_erpm >> HANDOVER_SWUNG_SHIFT));
+                      && qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), forced) >= -(forced >> HANDOVER_SWUNG_SHIFT));
 }
 
 /** In RAMP, every eighth period: hands over once the estimator has agreed long enough and the current is right for it. */
 QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->run.handover.agreed_steps >= p->agree_steps && handover_is_due(d, p)) {
+    if (handover_agrees(&d->run.handover, p) && handover_is_due(d, p)) {
         handover_now(d, p);
     }
 }

@@ -144,6 +144,12 @@
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC (8.0F * PARAM_F(LOOPTIME_SEC))
 #define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)
+/* ---- The start. The tuner reads the turns. ---- */
+#define PARAM_ALIGN_TURNS 5    /* of the vector while the current of ALIGN grows */
+#define PARAM_EARLY_HZ 20      /* electrical frequency from which the load observer is quick enough to catch the rotor */
+#define PARAM_EARLY_SHARE 1.25 /* of the minimum speed, at least */
+/** From here on the back-EMF is enough for a hand-over. */
+#define PARAM_EARLY_ERPM PARAM_MIN(PARAM_F(ENDSPEED_ELECTR), PARAM_MAX(60.0F * PARAM_F(PARAM_EARLY_HZ), PARAM_F(PARAM_EARLY_SHARE) * PARAM_F(MINIMUM_SPEED_ERPM)))
 /* ---- Load observer (control/observer.h), adaptation, low speed. Rates in rad/s times the slow step. The tuner reads the ratios. ---- */
 #define PARAM_QUIET_RATIO 1.22  /* rate without load over SPEED_BANDWIDTH_HZ */
 #define PARAM_LOADED_SHARE 0.3  /* rate under load over LOAD_BANDWIDTH_HZ */

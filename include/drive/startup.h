@@ -1,4 +1,4 @@
-/* The start without the estimator: charge the drivers, align the rotor, accelerate it by the forced angle. */
+/* The start without the estimator: charge the drivers, take the rotor along, accelerate it by the forced angle. */
 #ifndef DRIVE_STARTUP_H
 #define DRIVE_STARTUP_H
 
@@ -28,12 +28,14 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
 
     run->handover.waited_steps = 0;
     run->handover.agreed_steps = 0;
+    run->handover.ahead_erpm = 0;
     run->handover.speed_is_preset = 0;
     run->handover.offset = 0;
     run->handover.id_q13 = 0;
     c->burn_q13 = 0;
     d->forced.speed_q10 = qm_mulss(along_direction(d, run->estimator.omega_erpm), p->estimator.deltat_q32) >> 6;
     d->forced.angle_q32 = (uint32_t)forced << 16;
+    d->forced.increase_q10 = p->forced.increase_rate_q10;
     c->v_q14.d = along_direction(d, (int16_t)-v.q); /* the same vector in a frame a quarter turn behind */
     c->v_q14.q = along_direction(d, v.d);
     c->ref_q13.d = 0;
@@ -45,34 +47,26 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     drive_enter(d, DRIVE_RAMP);
 }
 
-/** The vector turns by 90 degrees during the first half of ALIGN, so that no rotor position is a dead point. */
-QM_INLINE void startup_sweep(drive_t *d, const drive_params_t *p)
+/** The vector of ALIGN turns PARAM_ALIGN_TURNS times while its current grows from nothing. A weak current passes a rotor that lies against it and takes
+ *  it along the next time, so that it is never thrown back; the ramp goes on from this speed. Every eighth period. */
+QM_INLINE void startup_align(drive_t *d, const drive_params_t *p)
 {
-    d->forced.angle_q32 = (d->direction >= 0) ? qm_turn_add(d->forced.angle_q32, p->align_sweep_q32)
-                                              : qm_turn_sub(d->forced.angle_q32, p->align_sweep_q32);
-}
-
-/** The forced angle while the rotor is aligned and accelerated. */
-QM_INLINE void startup_forced_step(drive_t *d, const drive_params_t *p)
-{
-    if (d->state == (uint16_t)DRIVE_ALIGN) {
-        d->periods++;
-        if (d->periods <= (p->align_periods >> 1)) {
-            startup_sweep(d, p);
-        } else if (d->periods >= p->align_periods) {
-            drive_enter(d, DRIVE_RAMP);
-        }
-        d->angle = forced_angle(&d->forced);
+    int16_t current = p->open_loop_q13;
+    d->periods = (uint16_t)(d->periods + SLOW_PHASES);
+    if (d->periods >= p->align_periods) {
+        d->forced.increase_q10 = p->forced.increase_rate_q10;
+        drive_enter(d, DRIVE_RAMP);
     } else {
-        (void)forced_angle_tick(&d->forced, &p->forced, d->direction);
-        d->angle = forced_angle(&d->forced);
+        current = (int16_t)(qm_muluu(d->periods, p->align_rate_q12) >> 12);
     }
+    d->run.control.ref_q13.q = along_direction(d, current);
 }
 
 /** A period of ALIGN or RAMP, after the estimator. Letting go is harmless at these speeds. */
 QM_INLINE void startup_step(drive_t *d, const drive_params_t *p)
 {
-    startup_forced_step(d, p);
+    (void)forced_angle_tick(&d->forced, &p->forced, d->direction);
+    d->angle = forced_angle(&d->forced);
     if (!d->command.run) {
         drive_enter(d, DRIVE_STOPPED);
     }

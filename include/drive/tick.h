@@ -90,8 +90,13 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 0:
         if (drive_is_closed(d)) {
             speed_step(d, p);
+        } else if (d->state == (uint16_t)DRIVE_RAMP) {
+            handover_wait(d, p);
+        } else if (MODE_ALIGNS && d->state == (uint16_t)DRIVE_ALIGN) {
+            startup_align(d, p);
+        } else {
+            /* nothing turns */
         }
-        handover_wait(d, p);
         done = 0;
         break;
     case 1:

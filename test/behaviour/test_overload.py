@@ -11,6 +11,7 @@ from tools.common import board_file, motor_file, paths
 
 HURST = "hurst_dmb0224c10002"
 RATED_A, TIME_S = 1.0, 4.0
+LOOKS_EVERY_S = 0.512
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,9 @@ def test_overload_trips_when_the_heat_of_the_current_that_flowed_is_the_rated_on
     fault = trace.column("fw.fault")
     trip = np.argmax(fault != 0)
     assert fault[trip] == 19 and 3.5 < trace.time_s[trip] < 8.0
-    assert heat_a2(trace)[trip] == pytest.approx(RATED_A ** 2, rel=0.06)
+    # the drive looks every half second: so much more may have come
+    i2 = float(trace.column("plant.i_q")[trip - 100]) ** 2
+    assert 0.98 * RATED_A ** 2 < heat_a2(trace)[trip] < 1.02 * RATED_A ** 2 + LOOKS_EVERY_S / TIME_S * (i2 - RATED_A ** 2)
     assert np.hypot(trace.column("plant.i_d"), trace.column("plant.i_q"))[-1] == 0.0
 
 

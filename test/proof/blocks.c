@@ -333,7 +333,7 @@ void proof_speed_ramp(void)
 void proof_forced_angle(void)
 {
     forced_angle_params_t p = { any_l(0, 8000000l), any(1, 2000) };
-    forced_angle_t f = { any_l(0, p.end_speed_q10), any_ul(0, UINT32_MAX) };
+    forced_angle_t f = { any_l(0, p.end_speed_q10), any_ul(0, UINT32_MAX), any(0, 6000) };
     (void)forced_angle_tick(&f, &p, any(0, 1) ? 1 : -1);
     //@ check speed: 0 <= f.speed_q10 <= 8000000;
     (void)forced_angle(&f);

@@ -125,7 +125,7 @@ def test_a_good_run_ends_with_zero_and_complete_results_the_same_to_the_last_dig
 
 
 @pytest.mark.parametrize("text, more, allowed",
-                         [(START.replace("min = 900", "min = 5000"), [], "5000"), (START, ["--set", "motor.psi_vs=x0.1"], "900")])
+                         [(START.replace("min = 900", "min = 5000"), [], "5000"), (START, ["--set", "load.locked=1"], "900")])
 def test_a_failed_expectation_ends_with_one_and_names_the_row_and_the_numbers(place, text, more, allowed):
     code, out, error = place.run(text, *more)
     assert code == 1 and "FAIL  waiting: speed_rpm" in out and not place.summary()["passed"]

@@ -65,8 +65,8 @@ def test_a_mistake_in_a_table_is_one_line_with_its_place(tmp_path, room, name, o
 
 # ---- starts --------------------------------------------------------------------------------------------------------------
 def start(**more):
-    return {"rotor_deg": 45.0, "load_nm": 0.03, "closed_after_s": 1.6, "overshoot_percent": 1.0, "speed_error_percent": 0.0,
-            "fault": None} | more
+    return {"rotor_deg": 45.0, "load_nm": 0.03, "inertia": 1.0, "kind": "0.03 N m", "closed_after_s": 1.6, "hand_over_rpm": 250.0, "back_rpm": 120.0,
+            "overshoot_percent": 1.0, "speed_error_percent": 0.0, "fault": None} | more
 
 
 def other(**params):
@@ -94,13 +94,28 @@ def test_a_speed_loop_made_slow_by_its_load_gets_time_to_settle_and_the_speed_is
 @pytest.mark.parametrize("values, ok, got", [
     ({}, True, "speed error +0.00 %"), ({"closed_after_s": 2.01}, False, "closed loop after 2.010 s"),
     ({"closed_after_s": None}, False, "never in closed loop"), ({"overshoot_percent": 10.1}, False, "overshoot 10.1 %"),
-    ({"speed_error_percent": -0.6}, False, "speed error -0.60 %"), ({"fault": "STALL"}, False, "fault STALL")])
+    ({"speed_error_percent": -0.6}, False, "speed error -0.60 %"), ({"fault": "STALL"}, False, "fault STALL"),
+    ({"back_rpm": 301.0}, False, "301 rpm against the direction"), ({"back_rpm": 301.0, "fault": "START_FAILED"}, False, "301 rpm against the direction"),
+    ({"hand_over_rpm": 301.0}, False, "hand-over at 301 rpm"),
+    ({"inertia": 36.0, "overshoot_percent": 39.0, "hand_over_rpm": 400.0, "speed_error_percent": 4.0}, True, "speed error +4.00 %"),
+    ({"inertia": 36.0, "overshoot_percent": 41.0}, False, "overshoot 41.0 %"), ({"inertia": 36.0, "fault": "START_FAILED"}, False, "fault START_FAILED")])
 def test_each_way_to_fail_is_named_with_angle_and_load(values, ok, got):
     outcome = start_sweep.check(STARTS, start(**values))
     assert (outcome.ok, outcome.row, outcome.got) == (ok, "start from 45 deg with 0.03 N m", got)
 
 
+def test_another_motor_s_header_may_refuse_a_rotor_that_it_is_not_made_for_by_name_and_by_no_other():
+    found = {(inertia, fault): start_sweep.check(other(), start(inertia=inertia, fault=fault)).ok
+             for inertia in (1.0, 9.0, 36.0) for fault in ("START_FAILED", "STALL")}
+    assert [key for key, ok in found.items() if ok] == [(36.0, "START_FAILED")]
+
+
+def test_every_load_and_every_heavy_rotor_comes_from_every_angle():
+    cases = STARTS.cases()
+    assert len(set(cases)) == len(cases) == 24 * 5 and {(case.load_nm, case.inertia) for case in cases} == {(0.0, 1.0), (0.03, 1.0), (0.06, 1.0), (0.0, 9.0), (0.0, 36.0)}
+
+
 def test_the_printed_table_has_a_line_for_each_angle():
-    rows = [start(rotor_deg=angle, load_nm=load, fault="STALL" if angle else None) for load in STARTS.loads_nm for angle in (0.0, 15.0)]
-    lines = start_sweep.text(STARTS, rows).splitlines()
+    rows = [start(rotor_deg=angle, kind=f"{load:g} N m", fault="STALL" if angle else None) for load in STARTS.loads_nm for angle in (0.0, 15.0)]
+    lines = start_sweep.text(rows).splitlines()
     assert "1.60 s" in lines[1] and lines[2].split() == ["15", "STALL", "STALL", "STALL"]

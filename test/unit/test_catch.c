@@ -123,7 +123,7 @@ void test_below_the_minimum_speed_the_ramp_goes_on_from_the_rotor_whichever_way_
             TEST_ASSERT_EQUAL_INT16(direction, drive.direction);
             TEST_ASSERT_TRUE_MESSAGE(ideal_motor_run_until(DRIVE_CLOSED, 60000) <= 60000u, golden_row(n));
             EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, golden_row(n));
-            TEST_ASSERT_FLOAT_WITHIN(500.0F, (float)(direction * params.end_erpm), ideal_motor_erpm());
+            TEST_ASSERT_FLOAT_WITHIN(500.0F, (float)(direction * params.early_erpm), ideal_motor_erpm());
         }
     }
 }

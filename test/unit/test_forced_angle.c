@@ -16,6 +16,7 @@ static int16_t run(const forced_angle_params_t *p, int16_t direction, uint16_t p
 {
     int16_t at_end = 0;
     while (periods-- != 0u) {
+        forced.increase_q10 = p->increase_rate_q10;
         at_end = forced_angle_tick(&forced, p, direction);
     }
     return at_end;

@@ -2,6 +2,8 @@
 #include "drive_rig.h"
 #include "golden_hand_over.h"
 
+#define FORCED_ERPM 4998 /* the forced angle's 5000 at the end of the ramp, as the drive counts them */
+
 /** As at the end of the ramp: the forced speed has arrived and the test sets the estimate. */
 static void at_the_end_of_the_ramp(int16_t direction)
 {
@@ -9,6 +11,7 @@ static void at_the_end_of_the_ramp(int16_t direction)
     drive.state = (uint16_t)DRIVE_RAMP;
     drive.run.handover.waited_steps = 0;
     drive.forced.speed_q10 = params.forced.end_speed_q10;
+    drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
     rig_speed((int16_t)(direction * 4800));
 }
 
@@ -49,15 +52,15 @@ static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
     return steps;
 }
 
-void test_estimate_within_a_quarter_of_END_SPEED_for_20_ms_is_ready_and_no_other(void)
+void test_estimate_within_a_quarter_of_the_forced_speed_for_20_ms_is_ready_and_no_other(void)
 {
     enum { READY = 50, NEVER = 500 }; /* 20 ms, 200 ms */
     static const struct {
         int16_t direction, speed_erpm;
         uint16_t steps;
     } cases[] = {
-        { 1, 5000 - 1249, READY }, { 1, 5000 + 1249, READY }, { -1, -5000 - 1249, READY }, { -1, -5000 + 1249, READY },
-        { 1, 5000 - 1250, NEVER }, { 1, 5000 + 1250, NEVER }, { 1, -5000, NEVER }, { -1, 5000, NEVER }, { 1, 0, NEVER },
+        { 1, FORCED_ERPM - 1248, READY }, { 1, FORCED_ERPM + 1248, READY }, { -1, -FORCED_ERPM - 1248, READY }, { -1, -FORCED_ERPM + 1248, READY },
+        { 1, FORCED_ERPM - 1249, NEVER }, { 1, FORCED_ERPM + 1249, NEVER }, { 1, -FORCED_ERPM, NEVER }, { -1, FORCED_ERPM, NEVER }, { 1, 0, NEVER },
     };
     EACH(n, cases) {
         rig_power_up();
@@ -65,6 +68,115 @@ void test_estimate_within_a_quarter_of_END_SPEED_for_20_ms_is_ready_and_no_other
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].steps, ready_steps(cases[n].speed_erpm, 1000), golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].steps == (uint16_t)READY) ? DRIVE_CLOSED : DRIVE_FAULT, drive.state, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].steps == (uint16_t)READY) ? FAULT_NONE : FAULT_START_FAILED, drive.fault, golden_row(n));
+    }
+}
+
+/** Forced speed along the direction, electrical rpm. */
+static void force(float erpm)
+{
+    drive.forced.speed_q10 = (int32_t)(erpm * 67108864.0F / 60.0F * PARAM_F(LOOPTIME_SEC));
+}
+
+void test_agreement_counts_from_the_early_speed_on_and_waiting_at_the_end_of_the_ramp_only(void)
+{
+    static const struct {
+        float forced_erpm;
+        uint16_t counts;
+    } cases[] = { { -3200.0F, 0 }, { 0.0F, 0 }, { 3120.0F, 0 }, { 3132.0F, 1 }, { 4000.0F, 1 }, { 4990.0F, 1 } };
+    TEST_ASSERT_EQUAL_INT16(3125, params.early_erpm); /* 1.25 times the minimum speed, which is more than 20 Hz */
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            uint16_t steps;
+            at_the_end_of_the_ramp(direction);
+            drive.run.handover.agreed_steps = 0;
+            for (steps = 1; steps <= 600u; steps++) {
+                force(cases[n].forced_erpm);
+                rig_speed((int16_t)((float)direction * cases[n].forced_erpm));
+                forced_ahead(0x3800); /* not due: the drive goes on counting */
+                slow(8);
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].counts * steps, drive.run.handover.agreed_steps, golden_row(n));
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.run.handover.waited_steps, golden_row(n));
+            }
+            EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, golden_row(n));
+        }
+    }
+}
+
+void test_rotor_may_swing_by_half_the_speed_once_the_estimator_has_agreed(void)
+{
+    static const struct {
+        int16_t before, speed_erpm;
+        uint16_t after;
+    } cases[] = { { 49, FORCED_ERPM - 1249, 0 }, { 50, FORCED_ERPM - 1249, 51 }, { 50, FORCED_ERPM - 2498, 51 }, { 50, FORCED_ERPM + 2498, 51 },
+                  { 50, FORCED_ERPM - 2499, 0 }, { 50, FORCED_ERPM + 2499, 0 } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            at_the_end_of_the_ramp(direction);
+            drive.run.handover.agreed_steps = (uint16_t)cases[n].before;
+            rig_speed((int16_t)(direction * cases[n].speed_erpm));
+            slow(8);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].after, drive.run.handover.agreed_steps, golden_row(n));
+        }
+    }
+}
+
+void test_speed_that_is_off_in_the_mean_by_an_eighth_is_waited_for_until_the_ramp_s_end(void)
+{
+    static const struct {
+        int16_t off_erpm, swing_erpm;
+        uint16_t agrees;
+    } cases[] = { { 440, 0, 1 }, { -440, 0, 1 }, { 560, 0, 0 }, { -560, 0, 0 }, { 0, 950, 1 }, { 440, 1010, 0 }, { -440, 1010, 0 } };
+    EACH(n, cases) {
+        uint16_t steps, most = 0;
+        at_the_end_of_the_ramp(1);
+        for (steps = 0; steps < 400u; steps++) {
+            int16_t swing = (int16_t)(((steps & 16u) != 0u) ? cases[n].swing_erpm : -cases[n].swing_erpm);
+            int16_t forced = (int16_t)((steps < 200u) ? 3100 : 4000); /* before and after the speed from which it counts */
+            force((float)forced);
+            rig_speed((int16_t)(forced + cases[n].off_erpm + swing));
+            forced_ahead(0x3800);
+            slow(8);
+            most = (drive.run.handover.agreed_steps > most) ? drive.run.handover.agreed_steps : most;
+        }
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].agrees, most >= params.agree_steps, golden_row(n));
+    }
+}
+
+void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_agree_in_time(void)
+{
+    static const struct {
+        float forced_erpm;
+        int16_t seen_erpm;
+        int16_t increase_q10;
+    } cases[] = { { 4680.0F, 0, 10 }, { 4710.0F, 0, 30 }, { 4710.0F, 4700, 30 } };
+    EACH(n, cases) {
+        at_the_end_of_the_ramp(1);
+        force(cases[n].forced_erpm);
+        rig_speed(cases[n].seen_erpm);
+        slow(8);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].increase_q10, drive.forced.increase_q10, golden_row(n));
+    }
+    at_the_end_of_the_ramp(1);
+    drive.run.handover.agreed_steps = params.agree_steps;
+    force(4710.0F);
+    rig_speed(4700);
+    slow(8);
+    TEST_ASSERT_EQUAL_INT16(0, drive.forced.increase_q10); /* it waits for the hand-over */
+}
+
+void test_closed_loop_begins_with_the_faster_one_of_forced_and_estimated_speed(void)
+{
+    EACH_DIRECTION(direction) {
+        at_the_end_of_the_ramp(direction);
+        force(1500.0F);
+        rig_speed((int16_t)(direction * 1300));
+        handover_now(&drive, &params);
+        TEST_ASSERT_INT16_WITHIN(8, (int16_t)(direction * 1496), drive.run.control.reference_erpm);
+        at_the_end_of_the_ramp(direction);
+        force(1500.0F);
+        rig_speed((int16_t)(direction * 1800));
+        handover_now(&drive, &params);
+        TEST_ASSERT_EQUAL_INT16(direction * 1800, drive.run.control.reference_erpm);
     }
 }
 
@@ -172,7 +284,7 @@ void test_rotor_that_still_swings_back_at_the_floor_is_waited_for(void)
     static const struct {
         int16_t offset, speed_erpm;
         drive_state_t state;
-    } cases[] = { { 0x3000, 4843, DRIVE_RAMP }, { 0x3000, 4844, DRIVE_CLOSED }, { -0x3000, 4843, DRIVE_RAMP }, { -0x3000, 4844, DRIVE_CLOSED }, { 0x2000, 4000, DRIVE_CLOSED } };
+    } cases[] = { { 0x3000, 4841, DRIVE_RAMP }, { 0x3000, 4842, DRIVE_CLOSED }, { -0x3000, 4841, DRIVE_RAMP }, { -0x3000, 4842, DRIVE_CLOSED }, { 0x2000, 4000, DRIVE_CLOSED } };
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             at_the_end_of_the_ramp(direction);
@@ -240,7 +352,7 @@ void test_vectors_equal_the_reference_and_controllers_and_observer_go_on_from_th
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_i_d, c->ref_q13.d, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_i_q, c->ref_q13.q, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.new_i_d, drive.run.handover.id_q13, golden_row(n));
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * 5000, c->reference_erpm, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * FORCED_ERPM, c->reference_erpm, golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_d, pi_tick(&c->pi_d, &params.pi_d, 0, 32767), golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(1, v.new_v_q, pi_tick(&c->pi_q, &params.pi_q, 0, 32767), golden_row(n));
         TEST_ASSERT_INT16_WITHIN_MESSAGE(2, v.new_i_q, held_current(), golden_row(n)); /* a unit of load */

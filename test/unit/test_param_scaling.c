@@ -229,8 +229,10 @@ void test_speeds_and_times(void)
     EXACT(p.ramp_hold_erpm, 1750);   /* an eighth of nominal speed */
     EXACT(TUNING_STEP_Q16, 32768);   /* one electrical rpm every 16 periods: half of one in eight */
     EXACT(p.bootstrap_periods, 200); /* 10 ms */
-    EXACT(p.align_periods, 4000);
-    EXACT((int32_t)p.align_sweep_q32, 0x40000000 / 2000); /* a quarter turn in half the time */
+    EXACT(p.align_periods, 10000);
+    EXACT(p.align_rate_q12, 2626l * 4096 / LOCK_TIME);
+    EXACT(p.align_speed_q10, 5l * 67108864 / LOCK_TIME); /* five turns */
+    EXACT(p.early_erpm, 3125);                           /* 1.25 times the minimum speed */
     EXACT(p.agree_steps, 50);                            /* 20 ms */
     EXACT(p.wait_steps, 500);                   /* 200 ms */
     EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */

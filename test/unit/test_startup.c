@@ -1,10 +1,10 @@
-/* The start: requests, bootstrap, the sweep of ALIGN, the ramp, and both of its ends, on the ideal motor. */
+/* The start: requests, bootstrap, the turns of ALIGN, the ramp, and both of its ends, on the ideal motor. */
 #include <string.h>
 
 #include "ideal_motor.h"
 
-#define LOCK_PERIODS 4000u   /* 0.2 s */
-#define RAMP_PERIODS 27962u  /* 1.398 s: 279620 / 10 */
+#define LOCK_PERIODS 10000u  /* 0.5 s */
+#define LOCK_SPEED_Q10 33554 /* 5 turns in them: 120 rpm */
 
 void setUp(void)
 {
@@ -25,7 +25,7 @@ void test_start_is_refused_in_every_state_but_STOPPED_and_a_second_one_changes_n
         TEST_ASSERT_EQUAL_INT16(starts ? -1 : 1, drive.direction);
         drive_start(&drive, &params, 1);
         TEST_ASSERT_EQUAL_INT16(starts ? -1 : 1, drive.direction);
-        TEST_ASSERT_EQUAL_INT16(starts ? -params.open_loop_q13 : 0, drive.run.control.ref_q13.q);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.q); /* ALIGN's grows from nothing */
     }
 }
 
@@ -39,7 +39,7 @@ void test_start_begins_without_memory_of_the_last_run(void)
     drive.forced.speed_q10 = 5000;
     drive_start(&drive, &params, 1);
     TEST_ASSERT_EQUAL_MEMORY(&fresh, &drive.run, sizeof fresh);
-    TEST_ASSERT_EQUAL_INT32(0, drive.forced.speed_q10);
+    TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10, drive.forced.speed_q10);
     TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_q.sum);
     TEST_ASSERT_EQUAL_INT16(0, drive.run.control.reference_erpm);
     TEST_ASSERT_EQUAL_INT32(0, drive.run.estimator.omega_filtered_q16);
@@ -58,9 +58,9 @@ void test_first_period_finds_the_frame_of_the_first_angle(void)
         drive.frame.sin = 1;
         drive.frame.cos = 2;
         drive_start(&drive, &params, direction);
-        TEST_ASSERT_EQUAL_HEX16((direction > 0) ? 0xC000u : 0x4000u, drive.angle);
-        TEST_ASSERT_INT16_WITHIN(11, (int16_t)(direction * -32757), drive.frame.sin);
-        TEST_ASSERT_INT16_WITHIN(3, 0, drive.frame.cos);
+        TEST_ASSERT_EQUAL_HEX16(0, drive.angle);
+        TEST_ASSERT_INT16_WITHIN(3, 0, drive.frame.sin);
+        TEST_ASSERT_INT16_WITHIN(11, 32757, drive.frame.cos);
     }
 }
 
@@ -69,7 +69,7 @@ void test_stop_switches_off_at_once_before_the_loop_is_closed(void)
     static const drive_state_t states[] = { DRIVE_BOOTSTRAP, DRIVE_ALIGN, DRIVE_RAMP };
     EACH(n, states) {
         rig_start(1);
-        (void)ideal_motor_run_until(states[n], 5000);
+        (void)ideal_motor_run_until(states[n], 300u + LOCK_PERIODS);
         ideal_motor_run(100);
         EXPECT_DRIVE(states[n], FAULT_NONE, golden_row(n));
         drive.command.run = 0;
@@ -98,77 +98,83 @@ void test_bootstrap_charges_all_low_sides_for_ten_milliseconds(void)
     TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.b);
 }
 
-void test_align_sweeps_a_quarter_turn_in_its_first_half_then_holds_and_ends_in_the_ramp(void)
+void test_align_turns_five_times_while_its_current_grows_from_nothing_and_ends_in_the_ramp(void)
 {
     EACH_DIRECTION(direction) {
-        angle_t held;
+        uint16_t n;
+        int32_t turned = 0;
+        angle_t before = 0;
         rig_lock(direction); /* with the first period */
-        TEST_ASSERT_UINT16_WITHIN(9, (direction > 0) ? 0xC000u : 0x4000u, drive.angle);
-        rig_tick(999);
-        TEST_ASSERT_UINT16_WITHIN(2, (direction > 0) ? 0xE000u : 0x2000u, drive.angle);
-        rig_tick(1000);
-        TEST_ASSERT_INT16_WITHIN(2, 0, (int16_t)drive.angle);
-        held = drive.angle;
-        rig_tick(LOCK_PERIODS - 2001u);
-        EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, "held");
-        TEST_ASSERT_EQUAL_HEX16(held, drive.angle);
-        rig_tick(1);
-        EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "aligned");
+        for (n = 1; n < LOCK_PERIODS; n++) {
+            turned += (int16_t)(angle_t)(drive.angle - before);
+            before = drive.angle;
+            TEST_ASSERT_INT16_WITHIN(4, (int16_t)(direction * (int16_t)(2625ul * n / LOCK_PERIODS)), drive.run.control.ref_q13.q);
+            rig_tick(1);
+        }
+        (void)rig_tick_until(DRIVE_RAMP, 8); /* the slow work of every eighth period */
+        TEST_ASSERT_INT32_WITHIN(70, direction * 5L * 65536, turned);
+        EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "in the ramp");
+        TEST_ASSERT_EQUAL_INT16(direction * params.open_loop_q13, drive.run.control.ref_q13.q);
     }
 }
 
-void test_ramp_accelerates_by_its_rate_every_period_in_both_directions(void)
+void test_ramp_goes_on_from_the_speed_of_align_and_accelerates_by_its_rate_every_period_in_both_directions(void)
 {
     EACH_DIRECTION(direction) {
         angle_t before;
         rig_lock(direction);
-        (void)rig_tick_until(DRIVE_RAMP, 5000);
+        (void)rig_tick_until(DRIVE_RAMP, LOCK_PERIODS);
         before = drive.angle;
         rig_tick(1000);
-        TEST_ASSERT_EQUAL_INT32(10000, drive.forced.speed_q10);
-        /* 10 / 1024 * 1000 * 1001 / 2 counts */
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(direction * 4888), (int16_t)(uint16_t)(drive.angle - before));
+        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10000, drive.forced.speed_q10);
+        /* 33554 / 1024 * 1000, and 10 / 1024 * 1000 * 1001 / 2 counts */
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(uint16_t)(direction * (32768L + 4888L)), (int16_t)(uint16_t)(drive.angle - before));
     }
 }
 
-void test_align_and_ramp_carry_the_open_loop_current(void)
+void test_ramp_carries_the_open_loop_current(void)
 {
     EACH_DIRECTION(direction) {
-        static const uint16_t periods[] = { 3000, 10000 };
         ideal_motor_reset(1.0F, 0.0F);
         rig_start(direction);
-        (void)ideal_motor_run_until(DRIVE_ALIGN, 300);
-        EACH(n, periods) {
-            ideal_motor_run(periods[n]);
-            EXPECT_DRIVE((n == 0u) ? DRIVE_ALIGN : DRIVE_RAMP, FAULT_NONE, golden_row(n));
-            TEST_ASSERT_INT16_WITHIN(30, (int16_t)(direction * 2625), drive.run.control.i_q13.q); /* 1.41 A */
-            TEST_ASSERT_INT16_WITHIN(30, 0, drive.run.control.i_q13.d);
-        }
+        (void)ideal_motor_run_until(DRIVE_RAMP, 300u + LOCK_PERIODS);
+        ideal_motor_run(1000);
+        EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "in the ramp");
+        TEST_ASSERT_INT16_WITHIN(30, (int16_t)(direction * 2625), drive.run.control.i_q13.q); /* 1.41 A */
+        TEST_ASSERT_INT16_WITHIN(30, 0, drive.run.control.i_q13.d);
     }
+}
+
+void test_speed_waits_once_the_estimator_agrees(void)
+{
+    int32_t waits_q10;
+    rig_start(1);
+    (void)ideal_motor_run_until(DRIVE_RAMP, 300u + LOCK_PERIODS);
+    while (drive.run.handover.agreed_steps < params.agree_steps) {
+        ideal_motor_run(1);
+        EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "on the way up");
+    }
+    waits_q10 = drive.forced.speed_q10;
+    TEST_ASSERT_INT32_WITHIN(600, 174763 + 4000, waits_q10); /* from 625 rpm on 20 ms of agreement */
+    ideal_motor_run(500);
+    EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "the current falls");
+    TEST_ASSERT_EQUAL_INT32(waits_q10, drive.forced.speed_q10);
+    TEST_ASSERT_LESS_THAN_INT16(params.open_loop_q13 / 2, drive.run.control.ref_q13.q);
 }
 
 /* ---- the whole start ---- */
 
 void test_start_is_BOOTSTRAP_ALIGN_RAMP_CLOSED_in_the_times_of_the_parameters(void)
 {
-    uint16_t n;
     rig_start(1);
     drive.command.target_erpm = params.end_erpm;
     ideal_motor_run(1);
     EXPECT_DRIVE(DRIVE_BOOTSTRAP, FAULT_NONE, "started");
     TEST_ASSERT_EQUAL_UINT32(200, ideal_motor_run_until(DRIVE_ALIGN, 60000));
-    TEST_ASSERT_EQUAL_UINT32(LOCK_PERIODS, ideal_motor_run_until(DRIVE_RAMP, 60000));
-    for (n = 1; n < RAMP_PERIODS; n++) {
-        ideal_motor_run(1);
-        TEST_ASSERT_TRUE(drive.forced.speed_q10 < 279620);
-    }
-    ideal_motor_run(1);
-    TEST_ASSERT_INT32_WITHIN(1, 279620, drive.forced.speed_q10); /* 1000 rpm, 5 pole pairs */
-    ideal_motor_run(100);
-    TEST_ASSERT_INT32_WITHIN(1, 279620, drive.forced.speed_q10);
-    EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "at the end of the ramp");
-    /* 50 agreeing slow steps on a grid of eight periods; nothing loads this motor, so the current falls to its end in 177 more */
-    TEST_ASSERT_UINT32_WITHIN(8, (50u + 177u) * 8u - 100u, ideal_motor_run_until(DRIVE_CLOSED, 60000));
+    TEST_ASSERT_UINT32_WITHIN(8, LOCK_PERIODS, ideal_motor_run_until(DRIVE_RAMP, 60000));
+    /* (174763 - 33554) / 10 periods to 625 rpm; 50 agreeing slow steps; nothing loads this motor, so the current falls to its end in 177 more,
+     * and the last swing is waited for */
+    TEST_ASSERT_UINT32_WITHIN(200, 14121u + (50u + 177u) * 8u + 200u, ideal_motor_run_until(DRIVE_CLOSED, 60000));
     EXPECT_DRIVE(DRIVE_CLOSED, FAULT_NONE, "handed over");
 }
 
@@ -193,9 +199,9 @@ void test_blocked_shaft_is_START_FAILED_within_200_ms_after_the_ramp(void)
     motor.blocked = 1;
     EACH_DIRECTION(direction) {
         rig_start(direction);
-        (void)ideal_motor_run_until(DRIVE_RAMP, 5000);
-        ideal_motor_run(RAMP_PERIODS);
-        TEST_ASSERT_UINT32_WITHIN(16, 4000, ideal_motor_run_until(DRIVE_FAULT, 10000));
+        (void)ideal_motor_run_until(DRIVE_RAMP, 300u + LOCK_PERIODS);
+        /* to one and a half times 625 rpm, three times as fast to 1000 rpm, and 0.2 s */
+        TEST_ASSERT_UINT32_WITHIN(60, 22859u + 583u + 4000u, ideal_motor_run_until(DRIVE_FAULT, 40000));
         EXPECT_DRIVE(DRIVE_FAULT, FAULT_START_FAILED, "blocked");
     }
 }

@@ -50,7 +50,7 @@ def _symbols(*files: str) -> list[tuple[str, int, int]]:
     done = subprocess.run(["nm", "-S", "-f", "sysv", "--defined-only", *files], cwd=paths.ROOT, capture_output=True, text=True, check=False)
     if done.returncode:
         raise UserError("nm cannot list the firmware's variables", files[0], (done.stderr.splitlines() or ["install binutils"])[0])
-    rows = re.findall(r"^(\S+) *\|([0-9a-f]+)\| *[bBdD] *\|[^|]*\|([0-9a-f]+)\|[^|]*\|\.(?!data\.rel\.ro)", done.stdout, re.MULTILINE)
+    rows = re.findall(r"^(\S+) *\|([0-9a-f]+)\| *[bBdD] *\|[^|]*\|([0-9a-f]+)\|[^|]*\|(?!\.data\.rel\.ro)", done.stdout, re.MULTILINE)
     return [(name, int(size, 16), int(at, 16)) for name, at, size in rows]
 
 

@@ -193,13 +193,16 @@ def write_table2(rows: list[dict], folder: Path) -> list[str]:
 
 
 def write_starts(rows: list[dict], folder: Path) -> list[str]:
-    """Time to closed loop over the rotor's angle, one line a load."""
-    figure, axes = plt.subplots(layout="constrained")
-    for load in sorted({row["load_nm"] for row in rows}):
-        points = [(row["rotor_deg"], row["closed_after_s"]) for row in rows if row["load_nm"] == load]
-        axes.plot([x for x, _ in points], [np.nan if y is None else y for _, y in points], "o-", label=f"{load:g} N m")
-    _finish(axes, "starts: time from S2 to closed loop", "time [s]", "electrical angle of the rotor at power-up [deg]")
-    axes.set_ylim(bottom=0)
+    """Time to closed loop, speed then, and the worst speed backwards before, over the rotor's angle: one line a load or inertia."""
+    figure, panels = plt.subplots(3, 1, sharex=True, layout="constrained", figsize=(8, 8))
+    for axes, (key, label) in zip(panels, (("closed_after_s", "S2 to closed loop [s]"), ("hand_over_rpm", "speed then [rpm]"),
+                                           ("back_rpm", "backwards before [rpm]"))):
+        for kind in dict.fromkeys(row["kind"] for row in rows):
+            points = [(row["rotor_deg"], row[key]) for row in rows if row["kind"] == kind]
+            axes.plot([x for x, _ in points], [np.nan if y is None else y for _, y in points], "o-", label=kind)
+        axes.set(ylabel=label, ylim=(0, None))
+    _finish(panels[-1], "", panels[-1].get_ylabel(), "electrical angle of the rotor at power-up [deg]")
+    panels[0].set_title("starts")
     return [saved(figure, folder, "starts")]
 
 

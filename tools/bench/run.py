@@ -22,6 +22,8 @@ class HandOver:
     row: int
     after_s2_s: float
     overshoot_percent: float
+    speed_rpm: float
+    """true speed in the direction of rotation"""
     lowest_rpm: float
     """lowest true speed in the direction of rotation, from 50 ms before the hand-over to 1 s after it"""
 
@@ -91,7 +93,8 @@ class Run:
         still_closed = after.column("fw.state") == self.state_number("CLOSED")
         overshoot = np.max(np.where(still_closed, (speed - reference) / reference, -1.0)) * 100.0
         around = self.trace.part(at_s - 0.05, at_s + 1.0).column("plant.speed_rpm") * direction
-        return HandOver(at_s, row, after_s2_s, float(overshoot), float(np.min(around)))
+        return HandOver(at_s, row, after_s2_s, float(overshoot), float(direction * self.trace.column("plant.speed_rpm")[row]),
+                        float(np.min(around)))
 
     def protocol(self) -> list[tuple[float, str]]:
         """What happened and when: the operator's actions, the drive's states, faults."""

@@ -91,8 +91,17 @@ def in_numbers(scenario: Scenario, rating: Rating | None, params: dict[str, floa
     return stretched(found, params, rating.coast_s_per_rpm if rating else 0.0) if scenario.follows_header else found
 
 
+def early_ramp_s(params: Mapping[str, float]) -> float:
+    """The least that the ramp takes: from the lock's speed to the one from which the estimator may take over."""
+    period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
+    lock_hz = number("PARAM_ALIGN_TURNS") / (param(params, "LOCK_TIME") * period_s)
+    early_hz = min(param(params, "END_SPEED_RPM") * pairs / 60.0,
+                   max(number("PARAM_EARLY_HZ"), number("PARAM_EARLY_SHARE") * param(params, "MINIMUM_SPEED_RPM") * pairs / 60.0))
+    return max(0.0, (early_hz - lock_hz) * period_s ** 2 * 65536.0 * 1024.0 / param(params, "OPENLOOP_RAMPSPEED_INCREASERATE"))
+
+
 def start_time_s(params: Mapping[str, float]) -> float:
-    """How long a header's start takes from S2 to closed loop: lock, ramp and what is around them."""
+    """How long a header's start takes at most, from S2 to closed loop: lock, the whole ramp and what is around them."""
     period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
     end_count = param(params, "END_SPEED_RPM") * pairs / 60.0 * period_s * 65536.0 * 1024.0
     ramp_periods = end_count / param(params, "OPENLOOP_RAMPSPEED_INCREASERATE")

@@ -1,4 +1,4 @@
-"""`starts`: the motor started from every rotor angle under several loads. Limits are in tools/bench/scenarios/tables/starts.toml.
+"""`starts`: the motor started from every rotor angle under several loads, and with heavier rotors. Limits are in tools/bench/scenarios/tables/starts.toml.
 
 Loads, speed and times of the table are for its own motor; another one gets shares of its start torque and rated speed, and the time that
 its header's lock and ramp take.
@@ -6,7 +6,7 @@ its header's lock and ramp take.
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from tools.common.board_keys import Part, Values
 
 MARGIN_S = 0.1
 """For the hand-over itself, beside lock and ramp."""
+INERTIA = "mech.inertia_kgm2"
 SETTLE_PERIODS = 5.0
 """Of the speed loop's bandwidth, which a heavy load makes small: what the speed gets to settle, at least the table's own time."""
 
@@ -41,6 +42,14 @@ class Table(sweep.Table):
     error_percent: float = sweep.within(0.0)
     overshoot_percent: float = sweep.within(0.0)
     loads_nm: list[float] = sweep.within(0.0)
+    hand_over_rpm: float = sweep.within(0.0)
+    back_rpm: float = sweep.within(0.0)
+    heavy_factors: list[float] = sweep.within(1.0, 1000.0)
+    heavy_overshoot_percent: float = sweep.within(0.0)
+    heavy_later_s: float = sweep.within(0.0)
+    heavy_error_percent: float = sweep.within(0.0)
+    may_fail_from: float = sweep.within(1.0)
+    other_may_fail_from: float = sweep.within(1.0)
     other_loads_percent: list[float] = sweep.within(0.0, 100.0)
     other_speed_percent: float = sweep.within(1.0, 100.0)
 
@@ -53,9 +62,32 @@ class Table(sweep.Table):
         later_s = sweep.start_time_s(dict(params)) + MARGIN_S - self.within_s
         slower_s = max(SETTLE_PERIODS / params["SPEED_BANDWIDTH_HZ"] - (self.measure_from_s - self.start_s - self.within_s), 0.0)
         speed_rpm = max(self.other_speed_percent / 100.0 * motor.rated_speed_rpm, params["END_SPEED_RPM"])
-        return replace(self, motor=motor.name, speed_rpm=round(speed_rpm), within_s=self.within_s + later_s,
+        return replace(self, motor=motor.name, speed_rpm=round(speed_rpm), hand_over_rpm=1.2 * params["END_SPEED_RPM"], may_fail_from=self.other_may_fail_from, within_s=self.within_s + later_s,
                        measure_from_s=self.measure_from_s + later_s + slower_s, measure_to_s=self.measure_to_s + later_s + slower_s,
                        loads_nm=[float(f"{percent / 100.0 * motor.start_torque_nm:.3g}") for percent in self.other_loads_percent])
+
+    def cases(self) -> list["Case"]:
+        """Every load on the bare rotor, and every heavier rotor without one, from every angle."""
+        kinds = [(load, 1.0) for load in self.loads_nm] + [(0.0, factor) for factor in self.heavy_factors]
+        return [Case(load, inertia, angle) for load, inertia in kinds for angle in np.arange(0.0, 360.0, self.every_deg).tolist()]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One start."""
+
+    load_nm: float
+    inertia: float
+    """of the rotor's"""
+    rotor_deg: float
+
+    @property
+    def is_heavy(self) -> bool:
+        return self.inertia > 1.0
+
+    @property
+    def kind(self) -> str:
+        return f"inertia x{self.inertia:g}" if self.is_heavy else f"{self.load_nm:g} N m"
 
 
 def command(options: argparse.Namespace) -> int:
@@ -69,51 +101,60 @@ def command(options: argparse.Namespace) -> int:
     target = command_common.results("starts", table.motor, options)
     if motor.path.stem != table.motor:
         table = table.for_motor(motor_file.load(str(motor.path)), library.params)
-    cases = [(load, angle) for load in table.loads_nm for angle in np.arange(0.0, 360.0, table.every_deg).tolist()]
-    jobs = [_job(table, load, angle, library, motor, board) for load, angle in cases]
+    cases = table.cases()
+    jobs = [_job(table, case, library, motor, board) for case in cases]
     with output.ResultFolder(target) as folder:
         results = sweep.run_cases("starts", jobs, options.quiet)
-        rows = [{"load_nm": load, "rotor_deg": angle, **result} for (load, angle), result in zip(cases, results)]
+        rows = [{**asdict(case), "kind": case.kind, **result} for case, result in zip(cases, results)]
         outcomes = [check(table, row) for row in rows]
         _write(folder.work, table, rows, outcomes, used)
     print(f"{table.title}: {len(rows)} starts\n\n{report.used_text(used)}\n")
-    print(text(table, rows))
+    print(text(rows))
     print(f"\nresults in {paths.shown(target)}/: index.html")
     return command_common.verdict("starts", outcomes)
 
 
-def _job(table: Table, load: float, angle: float, library: Library, motor: Part, board: Part) -> simulate.Job:
+def _job(table: Table, case: Case, library: Library, motor: Part, board: Part) -> simulate.Job:
     events = sweep.start_events(table.start_s, table.speed_rpm, library.params.get("NOMINAL_SPEED_RPM", 0.0), table.where)
-    scenario = sweep.scenario(f"{angle:g} deg, {load:g} N m", table.title, events, table.speed_rpm, table.measure_from_s,
-                               table.measure_to_s, rotor_deg=angle,
-                               plant=Values({"load.constant_nm": load}, {"load.constant_nm": table.where}))
+    plant = Values({"load.constant_nm": case.load_nm, INERTIA: ("factor", case.inertia)}, {"load.constant_nm": table.where, INERTIA: table.where})
+    later_s = table.heavy_later_s if case.is_heavy else 0.0
+    scenario = sweep.scenario(f"{case.rotor_deg:g} deg, {case.kind}", table.title, events, table.speed_rpm, table.measure_from_s + later_s,
+                               table.measure_to_s + later_s, rotor_deg=case.rotor_deg, plant=plant)
     return simulate.prepare(scenario, library, motor, board)
 
 
 def check(table: Table, row: dict[str, Any]) -> Outcome:
     """One start against the limits; the first that does not hold is named."""
-    name = f"start from {row['rotor_deg']:g} deg with {row['load_nm']:g} N m"
+    name = f"start from {row['rotor_deg']:g} deg with {row['kind']}"
     closed, over, error = row["closed_after_s"], row["overshoot_percent"], row["speed_error_percent"]
+    if row["back_rpm"] > table.back_rpm:
+        return Outcome(name, False, f"{row['back_rpm']:.0f} rpm against the direction", f"at most {table.back_rpm:g} rpm")
+    heavy = row["inertia"] > 1.0
     if row["fault"]:
-        return Outcome(name, False, f"fault {row['fault']}", "no fault")
+        named = "START_FAILED" if row["inertia"] >= table.may_fail_from else ""
+        return Outcome(name, row["fault"] == named, f"fault {row['fault']}", f"no fault but {named}" if named else "no fault")
     if closed is None or closed > table.within_s:
         got = "never in closed loop" if closed is None else f"closed loop after {closed:.3f} s"
         return Outcome(name, False, got, f"at most {table.within_s:g} s")
-    if over > table.overshoot_percent:
-        return Outcome(name, False, f"overshoot {over:.1f} %", f"at most {table.overshoot_percent:g} %")
-    return Outcome(name, abs(error) <= table.error_percent, f"speed error {error:+.2f} %",
-                   f"at most {table.error_percent:g} %")
+    most = table.heavy_overshoot_percent if heavy else table.overshoot_percent
+    if over > most:
+        return Outcome(name, False, f"overshoot {over:.1f} %", f"at most {most:g} %")
+    if not heavy and row["hand_over_rpm"] > table.hand_over_rpm:
+        return Outcome(name, False, f"hand-over at {row['hand_over_rpm']:.0f} rpm", f"at most {table.hand_over_rpm:g} rpm")
+    allowed = table.heavy_error_percent if heavy else table.error_percent
+    return Outcome(name, abs(error) <= allowed, f"speed error {error:+.2f} %", f"at most {allowed:g} %")
 
 
-def text(table: Table, rows: list[dict[str, Any]]) -> str:
-    """Angles down, loads across; each cell: seconds to closed loop, overshoot, speed error."""
-    cells = {(row["load_nm"], row["rotor_deg"]): _cell(row) for row in rows}
+def text(rows: list[dict[str, Any]]) -> str:
+    """Angles down, loads and inertias across; each cell: seconds to closed loop, its speed, the worst speed backwards, overshoot, speed error."""
+    cells = {(row["kind"], row["rotor_deg"]): _cell(row) for row in rows}
+    kinds = list(dict.fromkeys(row["kind"] for row in rows))
     angles = sorted({row["rotor_deg"] for row in rows})
     width = max(map(len, cells.values()))
     width = max(width, 14)
-    lines = ["rotor deg  " + "  ".join(f"{load:g} N m".center(width) for load in table.loads_nm)]
-    lines += [f"{angle:9g}  " + "  ".join(cells[load, angle].rjust(width) for load in table.loads_nm) for angle in angles]
-    return "\n".join(lines) + "\n\neach cell: closed loop after S2, overshoot, speed error at the end"
+    lines = ["rotor deg  " + "  ".join(kind.center(width) for kind in kinds)]
+    lines += [f"{angle:9g}  " + "  ".join(cells[kind, angle].rjust(width) for kind in kinds) for angle in angles]
+    return "\n".join(lines) + "\n\neach cell: closed loop after S2 and at what speed, highest speed backwards before, rpm; overshoot and speed error at the end, %"
 
 
 def _cell(row: dict[str, Any]) -> str:
@@ -121,10 +162,11 @@ def _cell(row: dict[str, Any]) -> str:
         return row["fault"]
     if row["closed_after_s"] is None:
         return "never closed"
-    return f"{row['closed_after_s']:.2f} s {row['overshoot_percent']:5.1f} % {row['speed_error_percent']:+5.2f} %"
+    return (f"{row['closed_after_s']:.2f} s {row['hand_over_rpm']:4.0f} {-row['back_rpm']:4.0f} {row['overshoot_percent']:5.1f} "
+            f"{row['speed_error_percent']:+5.2f}")
 
 
 def _write(folder: Path, table: Table, rows: list[dict[str, Any]], outcomes: list[Outcome], used: dict[str, Any]) -> None:
-    keys = ["load_nm", "rotor_deg", "closed_after_s", "overshoot_percent", "speed_error_percent", "angle_error_rms_deg", "fault"]
+    keys = ["load_nm", "inertia", "rotor_deg", "closed_after_s", "hand_over_rpm", "back_rpm", "overshoot_percent", "speed_error_percent", "angle_error_rms_deg", "fault"]
     from . import plots
     report.write_table(folder, "starts", keys, rows, outcomes, {"title": table.title, **used}, {"plots": plots.write_starts(rows, folder)})

@@ -155,9 +155,16 @@ def reduced(run: Run) -> dict[str, Any]:
     faults = [(at_s, name) for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
     return {"picture": picture.of(run, picture.SWEEP_STRETCHES), **run.measures[MEASURE],
             "closed_after_s": hand_overs[0].after_s2_s if hand_overs else None,
-            "overshoot_percent": hand_overs[0].overshoot_percent if hand_overs else None, "fault": faults[0][1] if faults else None,
+            "overshoot_percent": hand_overs[0].overshoot_percent if hand_overs else None,
+            "hand_over_rpm": hand_overs[0].speed_rpm if hand_overs else None, "back_rpm": back_rpm(run), "fault": faults[0][1] if faults else None,
             "fault_s": faults[0][0] if faults else None,
             "highest_rpm": highest_rpm(run), "warnings": run.warnings, "motor_s": run.motor_s, "wall_s": run.wall_s}
+
+
+def back_rpm(run: Run) -> float:
+    """The highest true speed against a start forwards, until the closed loop or a fault ends it."""
+    ends = [at_s for _, at_s, name in run.state_changes() if name in ("CLOSED", "FAULT")]
+    return max(0.0, -float(np.min(run.trace.part(0.0, ends[0] if ends else run.trace.time_s[-1]).column("plant.speed_rpm"), initial=0.0)))
 
 
 def limit_text(result: dict[str, Any]) -> str:

@@ -18,7 +18,7 @@ from .board import Board, Library
 from .injection import Case
 from .panel import Action
 from .run import Run
-from .scenario import BRAKE, Event, Scenario, param, start_time_s
+from .scenario import BRAKE, Event, Scenario, early_ramp_s, param, start_time_s
 
 EVERY = 4
 """Periods to a row of the trace."""
@@ -94,9 +94,8 @@ def scene(case: Case, bench: Bench) -> Scene:
         events.append(_event(speed_s, "speed_rpm", value=second, finds_range=True))
     ramp_s = abs(second - first) / slope
     end_s = closed_s + judge.SETTLE_S
-    ramping = 0.95 * (closed_s - START_S - lock_s - 0.4)
     begin = {"CALIBRATE": (0.0, 0.045, ()), "STOPPED": (0.06, START_S - 0.06, ()), "BOOTSTRAP": (START_S, 0.009, ("BOOTSTRAP",)),
-             "ALIGN": (START_S, 0.95 * lock_s, ("ALIGN",)), "RAMP": (START_S + lock_s, ramping, ("RAMP",)),
+             "ALIGN": (START_S, 0.95 * lock_s, ("ALIGN",)), "RAMP": (START_S + lock_s, early_ramp_s(params), ("RAMP",)),
              "accelerating": (speed_s + 0.02, 0.9 * ramp_s, ()), "braking": (speed_s + 0.02, 0.9 * ramp_s, ()),
              "field weakening": (speed_s + 0.1 + ramp_s + SETTLE_S, STEADY_S, ()),
              "STOPPING": (speed_s, 0.5 * first / slope, ("STOPPING",)), "FAULT": (speed_s, 0.5 * CLEAR_S, ("FAULT",)),

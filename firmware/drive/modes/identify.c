@@ -105,6 +105,8 @@ void identify_start(drive_t *d, const drive_params_t *p)
     d->run.control.pi_d.sum = (int32_t)16 << SLOW_SHIFT; /* about ten millivolts */
     d->run.control.ref_q13.d = id->rise_q13;
     d->run.control.ref_q13.q = 0;
+    d->forced.speed_q10 = 0;
+    d->forced.increase_q10 = p->forced.increase_rate_q10;
     d->forced.angle_q32 = IDENTIFY_START_ANGLE_Q32;
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos(d->angle);

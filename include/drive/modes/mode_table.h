@@ -5,7 +5,7 @@
 /** X(name, meaning): a macro that userparams.h or DEFINES switches on; what it does is in modes.h. */
 #define MODE_TABLE(X) \
     X(OPEN_LOOP_FUNCTIONING, "stay on the forced angle at END_SPEED_RPM; the estimator runs along and can be watched") \
-    X(TUNING, "the speed reference ramps slowly from END_SPEED_RPM to MAXIMUM_SPEED_RPM by itself") \
+    X(TUNING, "the speed reference ramps slowly from the hand-over to MAXIMUM_SPEED_RPM by itself") \
     X(TORQUE_MODE, "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed") \
     X(BIDIRECTIONAL_SPEED, "the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function") \
     X(SNAPSHOT, "record SnapBuf1..4") \

@@ -2,6 +2,7 @@
  *
  * hook                  mode                   what it takes over
  * MODE_RUN              IDENTIFY, BRINGUP      a period with the bridge switching
+ * MODE_ALIGNS           IDENTIFY, BRINGUP      what ALIGN does every eighth period
  * mode_start            IDENTIFY, BRINGUP      the end of drive_start()
  * mode_idle             BRINGUP                a period with the bridge off
  * mode_background       IDENTIFY               a pass of the background
@@ -26,13 +27,16 @@
 #include "drive/modes/torque.h"
 #include "drive/modes/tuning.h"
 
-/** What runs a period with the bridge switching. */
+/** What runs a period with the bridge switching; and 1 where ALIGN is the start's. */
 #if defined IDENTIFY
 #define MODE_RUN identify_run
+#define MODE_ALIGNS 0
 #elif defined BRINGUP
 #define MODE_RUN bringup_run
+#define MODE_ALIGNS 0
 #else
 #define MODE_RUN drive_run
+#define MODE_ALIGNS 1
 #endif
 
 /** The last thing that drive_start() prepares. */
