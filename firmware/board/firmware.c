@@ -2,7 +2,7 @@
 #include "board/firmware.h"
 
 #include "board/mclv.h"
-#include "board/modes/bringup_report.h"
+#include "board/modes/mode_panel.h"
 #include "board/peripherals.h"
 #include "board/record.h"
 #include "board/reset.h"

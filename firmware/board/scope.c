@@ -135,7 +135,7 @@ static uint16_t *put_long(uint16_t *at, uint16_t low, uint16_t high)
 
 void scope_put(const scope_t *s, void *record)
 {
-    uint16_t *at = put_long(record, (uint16_t)(s->mode | (uint16_t)(s->channels << 8)), (uint16_t)(s->periods - 1u));
+    uint16_t *at = put_long(record, (uint16_t)(s->mode | (uint16_t)(s->channels << 8)), (uint16_t)((s->periods != 0u) ? s->periods - 1u : 0u));
     uint16_t used = offset_of(s->last);
     at = put_long(at, offset_of(s->at), 0);
     at = put_long(at, MEMORY_ADDRESS(board_scope_array), 0);

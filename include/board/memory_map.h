@@ -30,15 +30,15 @@ extern uint16_t _SP_init; /* the linker's: its address is where the variables en
 /** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. */
 static inline uint16_t memory_is_ram(uint16_t address, uint16_t bytes)
 {
-    uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
-    return (uint16_t)(from < MEMORY_RAM_BYTES && bytes <= (uint16_t)(MEMORY_RAM_BYTES - from));
+    uint16_t from = (uint16_t)((address >= MEMORY_RAM_START) ? address - MEMORY_RAM_START : 0u);
+    return (uint16_t)(address >= MEMORY_RAM_START && from < MEMORY_RAM_BYTES && bytes <= (uint16_t)(MEMORY_RAM_BYTES - from));
 }
 
 /** 1 if all of these bytes are variables: neither stack nor registers. */
 static inline uint16_t memory_is_variable(uint16_t address, uint16_t bytes)
 {
-    uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
-    return (uint16_t)(from < MEMORY_VARIABLE_BYTES && bytes <= (uint16_t)(MEMORY_VARIABLE_BYTES - from));
+    uint16_t from = (uint16_t)((address >= MEMORY_RAM_START) ? address - MEMORY_RAM_START : 0u);
+    return (uint16_t)(address >= MEMORY_RAM_START && from < MEMORY_VARIABLE_BYTES && bytes <= (uint16_t)(MEMORY_VARIABLE_BYTES - from));
 }
 
 #endif

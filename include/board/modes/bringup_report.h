@@ -17,24 +17,6 @@ char *bringup_line(char *line);
 #define MODE_STATUS_MS 500u
 #endif
 
-/** After panel_init(). */
-QM_INLINE void mode_panel_init(void)
-{
-#ifdef BRINGUP
-    bringup_init(&board_bringup);
-#endif
-}
-
-/** Buttons and potentiometer to what the drive is asked for. @return the lights */
-QM_INLINE panel_lights_t mode_panel(const panel_inputs_t *in)
-{
-#ifdef BRINGUP
-    return bringup_pass(&board_bringup, &board_drive, &board_params, in, board_panel.pot_q15);
-#else
-    return panel_tick(&board_panel, &board_drive, &board_params, in);
-#endif
-}
-
 /** 1 where the mode alone speaks. @param end where its line begins, and then ends */
 QM_INLINE uint16_t mode_speaks(char **end)
 {

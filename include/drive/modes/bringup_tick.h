@@ -16,7 +16,7 @@
 QM_INLINE void bringup_add(drive_t *d, uint16_t settled)
 {
     bringup_run_t *t = &d->run.bringup;
-    if (t->ready || !settled) {
+    if (t->ready || t->left == 0u || !settled) {
         return;
     }
     if (t->wait != 0u) {

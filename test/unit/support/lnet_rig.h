@@ -9,8 +9,15 @@
 
 #define REACHED __attribute__((section("fw_ram")))
 
+#ifdef __clang__
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wsection" /* nothing has used them yet */
+#endif
 extern lnet_t board_lnet REACHED;
 extern int16_t board_scope_array[SCOPE_ARRAY_WORDS] REACHED;
+#ifdef __clang__
+#pragma clang diagnostic pop
+#endif
 
 #include "unity.h"
 
