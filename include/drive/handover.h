@@ -49,7 +49,7 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     forced = handover_forced_erpm(d, p);
     ahead = qm_clamp(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), forced), -16383, 16383);
     h->ahead_erpm = (int16_t)(h->ahead_erpm + ((ahead - h->ahead_erpm) >> HANDOVER_MEAN_SHIFT));
-    if (forced < p->early_erpm) {
+    if (!at_end && forced < p->early_erpm) { /* the two may be one speed, which is counted down */
         return;
     }
     most = (int16_t)(forced >> (handover_agrees(h, p) ? 1 : 2));

@@ -112,8 +112,8 @@
             .bootstrap_periods = PARAM_PERIODS(0.010F), \
         .flying_start = (uint16_t)((FLYING_START) ? CATCH_FIRST_LOOK : CATCH_NO_LOOK), \
         .align_periods = LOCK_TIME, \
-        .align_rate_q12 = (uint16_t)(CURRENT_Q13(Q_CURRENT_REF_OPENLOOP) * 4096l / LOCK_TIME), \
-        .align_speed_q10 = (int32_t)(PARAM_ALIGN_TURNS * 67108864l / LOCK_TIME), \
+        .align_rate_q12 = (uint16_t)(PARAM_F(Q_CURRENT_REF_OPENLOOP) / PARAM_F(NORM_CURRENT_CONST) * 1024.0F / PARAM_F(LOCK_TIME) + 0.5F), \
+        .align_speed_q10 = (int32_t)((PARAM_ALIGN_TURNS * 67108864l + LOCK_TIME / 2) / LOCK_TIME), \
         .early_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_EARLY_ERPM)), \
         .agree_steps = PARAM_SLOW_STEPS(0.02F), \
         .wait_steps = PARAM_SLOW_STEPS(0.2F), \
