@@ -78,6 +78,18 @@ QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
     }
 }
 
+/** What the start does every eighth period. */
+QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
+{
+    if (d->state == (uint16_t)DRIVE_RAMP) {
+        handover_wait(d, p);
+    } else if (MODE_ALIGNS && d->state == (uint16_t)DRIVE_ALIGN) {
+        startup_align(d, p);
+    } else {
+        /* nothing turns */
+    }
+}
+
 /** Slow work after the duties of a period are written, for they have a deadline and this has none: one block a period in turn. Bus and
  *  circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
  *  @param v_bus_raw the converter's result for the bus, any value */
@@ -90,12 +102,8 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
     case 0:
         if (drive_is_closed(d)) {
             speed_step(d, p);
-        } else if (d->state == (uint16_t)DRIVE_RAMP) {
-            handover_wait(d, p);
-        } else if (MODE_ALIGNS && d->state == (uint16_t)DRIVE_ALIGN) {
-            startup_align(d, p);
         } else {
-            /* nothing turns */
+            drive_start_step(d, p);
         }
         done = 0;
         break;
