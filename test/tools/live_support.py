@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from tools.common import paths
 from tools.live import board, symbols
-from tools.live.pace import FRAME_S
+from tools.live.pace import FRAME_S, Pacemaker
 from tools.live.recording import Origin
 from tools.live.virtual_board import VirtualBoard
 
@@ -56,6 +56,36 @@ def started(pot: float = 0.5) -> VirtualBoard:
     board.act({"release": "S2"})
     assert passes(board, 3.0)["state"] == "CLOSED"
     return board
+
+
+class Living:
+    """A board that lives in a thread of its own, with the scope's thread if it has `symbols`; `messages` are the scope's."""
+
+    def __init__(self, variables: symbols.Symbols | None = None) -> None:
+        self.board = VirtualBoard(parts().library, origin(), variables)
+        self.maker = Pacemaker(self.board, lambda frame: None)
+        self.messages: list[dict] = []
+        self.board.start(self.messages.append)
+
+    def do(self, **command) -> None:
+        """Somebody works at it."""
+        self.maker.call(lambda: self.board.act(command)).result(5)
+
+    def click_s2(self) -> None:
+        self.do(press="S2")
+        self.do(release="S2")
+
+    def traces(self) -> list[dict]:
+        """Those that have come."""
+        return [message["trace"] for message in list(self.messages) if "trace" in message]
+
+    def trace(self) -> dict:
+        """The next one."""
+        return until(self.traces, "no trace", 30.0)[0]
+
+    def close(self) -> None:
+        self.board.end()
+        self.maker.end()
 
 
 class Served:

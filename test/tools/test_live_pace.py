@@ -3,7 +3,7 @@
 import pytest
 from support import refusal
 
-from tools.live.pace import BEHIND_S, FRAME_S, Pacemaker
+from tools.live.pace import BEHIND_S, FRAME_S, Pacemaker, RealTime
 
 
 class Clock:
@@ -75,6 +75,16 @@ def test_after_a_pause_a_quarter_of_a_second_is_made_up_and_the_rest_is_lost():
     gaps = [later - earlier for earlier, later in zip(board.begins, board.begins[1:])]
     late = sum(1 for gap in gaps if gap < 0.9 * FRAME_S)
     assert max(gaps) == pytest.approx(3.01, abs=0.05) and 0 < late <= BEHIND_S / (FRAME_S - 0.01) + 1 and gaps[-10:] == pytest.approx([FRAME_S] * 10)
+
+
+def test_real_time_counts_what_is_lost():
+    clock = Clock()
+    real_time = RealTime(clock)
+    assert real_time.next(0.01) == pytest.approx(100.01) and real_time.lost_s == 0.0
+    clock.now_s += 0.2 # made up for
+    assert [real_time.next(0.01), real_time.next(0.01)] == pytest.approx([100.02, 100.03]) and real_time.lost_s == 0.0
+    clock.now_s += 2.0
+    assert real_time.next(0.01) == pytest.approx(clock.now_s - BEHIND_S) and real_time.lost_s == pytest.approx(102.2 - BEHIND_S - 100.04)
 
 
 def test_what_somebody_asks_for_is_done_between_two_frames_and_errors_go_to_the_one_who_asked():

@@ -1,42 +1,39 @@
 """A board at a serial port on the page of make live. The board is a virtual one: all that the page has of it is its serial line."""
 
+import contextlib
 import csv
 import io
 import time
 
 import pytest
-from live_support import known, origin, parts, until
+from live_support import Living, known, parts, until
 from support import command, refusal, refused
 
 from tools.live import symbols
 from tools.live.__main__ import main
 from tools.live.line import Line
-from tools.live.pace import Pacemaker
 from tools.live.real_board import RealBoard
-from tools.live.virtual_board import VirtualBoard
 from tools.live.watch import WATCHED, Watch, blocks
 
 SYMBOLS = known()
 
 
-class Desk:
-    """A board that lives in a thread, and the page's side of its serial line."""
+class Desk(Living):
+    """A board and the page's side of its serial line."""
 
     def __init__(self) -> None:
-        self.board = VirtualBoard(parts().library, origin())
-        self.maker = Pacemaker(self.board, lambda frame: None)
+        super().__init__()
         self.maker.start()
-        self.messages: list[dict] = []
         self.page = RealBoard(self.board.line, "the motor", SYMBOLS, parts().library.params)
         self.page.start(self.messages.append)
-
-    def do(self, **command) -> None:
-        """Somebody at the board itself."""
-        self.maker.call(lambda: self.board.act(command)).result(5)
 
     def frame(self) -> dict:
         self.page.run(0.05)
         return self.page.frame()
+
+    def close(self) -> None:
+        self.page.end()
+        super().close()
 
     def state(self, name: str) -> None:
         until(lambda: self.frame()["state"] == name, f"not {name}: {self.frame()}", 30.0)
@@ -44,10 +41,8 @@ class Desk:
 
 @pytest.fixture(scope="module")
 def desk():
-    item = Desk()
-    yield item
-    item.page.end()
-    item.maker.end()
+    with contextlib.closing(Desk()) as item:
+        yield item
 
 
 def test_it_shows_what_the_firmware_knows_in_engineering_units(desk):
@@ -77,8 +72,7 @@ def test_the_page_starts_the_motor_gives_it_a_target_and_stops_it(desk):
 def test_s2_takes_the_command_from_the_page(desk):
     desk.page.act({"start": 1000.0})
     desk.state("CLOSED")
-    desk.do(press="S2")
-    desk.do(release="S2")
+    desk.click_s2()
     desk.state("STOPPED")
     until(lambda: desk.frame()["remote"] is None, "the page still wants to drive")
     assert "the buttons have taken the command" in [line["text"] for line in desk.page.log]
@@ -109,8 +103,7 @@ def test_a_trace_comes_over_the_same_line(desk):
     desk.messages.clear()
     desk.page.scope.ask({"channels": ["board_drive.state", "board_drive.ticks"], "trigger": None, "level": 0, "rising": True, "position": 0.0, "factor": 1,
                          "mode": "single"})
-    trace = until(lambda: next((message["trace"] for message in list(desk.messages) if "trace" in message), None), "no trace", 30.0)
-    ticks = [row[2] for row in trace["rows"]]
+    ticks = [row[2] for row in desk.trace()["rows"]]
     assert [(later - earlier) % 65536 for earlier, later in zip(ticks, ticks[1:])] == [1] * (len(ticks) - 1) and len(ticks) > 200
 
 

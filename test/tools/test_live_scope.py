@@ -1,18 +1,17 @@
 """The scope on the page of make live: symbols, units, and traces that the firmware's own scope records and sends over its serial line."""
 
+import contextlib
 import math
 import time
 
 import numpy as np
 import pytest
-from live_support import bench, known, origin, parts, until
+from live_support import Living, bench, known, parts, until
 from support import refusal
 
 from tools.live.lnet import ScopeState
-from tools.live.pace import Pacemaker
 from tools.live.scale import RAW, scale_of
 from tools.live.scope import Scope
-from tools.live.virtual_board import VirtualBoard
 
 SYMBOLS = known()
 KNOWN = SYMBOLS.variables
@@ -31,14 +30,11 @@ def test_scales_are_those_that_the_virtual_board_has_for_the_same_quantity():
 
 
 # ---- traces ------------------------------------------------------------------------------------------------------------------
-class Living:
-    """A board whose motor turns, in a thread, with its scope."""
+class Turning(Living):
+    """A board whose motor turns, with its scope."""
 
     def __init__(self) -> None:
-        self.messages: list[dict] = []
-        self.board = VirtualBoard(parts().library, origin(), SYMBOLS)
-        self.maker = Pacemaker(self.board, lambda frame: None)
-        self.board.start(self.messages.append)
+        super().__init__(SYMBOLS)
         for command in ({"set": ["input.pot", 0.5]}, {"press": "S2"}, {"release": "S2"}):
             self.board.act(command)
         self.board.run(3.0)
@@ -50,16 +46,11 @@ class Living:
         usual = {"channels": [I_Q], "trigger": None, "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "single"}
         self.board.scope.ask(usual | wish)
 
-    def trace(self) -> dict:
-        return until(lambda: next((message["trace"] for message in list(self.messages) if "trace" in message), None), "no trace")
-
 
 @pytest.fixture(scope="module")
 def living():
-    item = Living()
-    yield item
-    item.board.end()
-    item.maker.end()
+    with contextlib.closing(Turning()) as item:
+        yield item
 
 
 def test_a_trace_is_what_the_motor_does_in_its_units_and_times(living):
@@ -89,24 +80,22 @@ def test_the_trigger_stands_at_zero_where_the_value_crosses_its_level(living, ri
 def test_single_gives_one_trace_and_auto_gives_more_even_without_a_trigger(living):
     living.ask(mode="single")
     living.trace()
-    time.sleep(0.5)
-    assert len([message for message in living.messages if "trace" in message]) == 1 and living.board.scope.told["setup"]["mode"] == "stop"
+    time.sleep(0.3) # as long as several traces
+    assert len(living.traces()) == 1 and living.board.scope.told["setup"]["mode"] == "stop"
     living.ask(mode="auto", trigger="board_drive.fault", level=5.0) # which never comes
-    assert until(lambda: len([message for message in list(living.messages) if "trace" in message]) >= 2, "no second trace")
+    until(lambda: len(living.traces()) >= 2, "no second trace")
     living.ask(mode="normal", trigger="board_drive.fault", level=5.0)
-    time.sleep(0.8)
-    assert not [message for message in living.messages if "trace" in message]
+    time.sleep(0.8) # longer than auto would have waited
+    assert not living.traces()
     living.ask(mode="stop")
 
 
 def test_a_trigger_on_the_state_catches_a_start(living):
-    for _ in range(2): # stops, then starts
-        living.maker.call(lambda: living.board.act({"press": "S2"})).result(5)
-        living.maker.call(lambda: living.board.act({"release": "S2"})).result(5)
-        if living.board.state in ("CLOSED", "STOPPING"):
-            until(lambda: living.board.state == "STOPPED", "it does not stop")
-            living.ask(channels=["board_drive.state", I_Q], trigger="board_drive.state", level=4.0, mode="normal", factor=10)
-            time.sleep(0.3)
+    living.click_s2()
+    until(lambda: living.board.state == "STOPPED", "it does not stop")
+    living.ask(channels=["board_drive.state", I_Q], trigger="board_drive.state", level=4.0, mode="normal", factor=10)
+    time.sleep(0.3) # until it is set up
+    living.click_s2()
     rows = np.array(living.trace()["rows"])
     before, after = rows[rows[:, 0] < -1e-6], rows[rows[:, 0] >= -1e-6]
     assert set(before[:, 1]) == {3.0} and set(after[:, 1]) == {4.0} # from ALIGN to RAMP
@@ -116,7 +105,7 @@ def test_a_trigger_on_the_state_catches_a_start(living):
 def test_a_power_up_meanwhile_does_not_end_the_scope(living):
     living.ask(mode="auto")
     living.trace()
-    living.maker.call(lambda: living.board.act({"power": True})).result(5)
+    living.do(power=True)
     living.messages.clear()
     living.trace()
     living.ask(mode="stop")

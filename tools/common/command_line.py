@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TypeVar
 
 from .errors import UserError
@@ -51,6 +52,17 @@ def main(parser: Callable[[], argparse.ArgumentParser], arguments: list[str] | N
         options = parser().parse_args(arguments)
         return options.command(options)
     return run(work)
+
+
+def on_files(program: str, work: Callable[..., object], *names: str) -> int:
+    """Exit code of a command whose arguments are files, one for each of `names`, and nothing else."""
+    def ready() -> int:
+        files = sys.argv[1:]
+        if len(files) != len(names):
+            raise UserError(f"{len(files)} files instead of {len(names)}", program, "name " + " and ".join(names))
+        work(*map(Path, files))
+        return 0
+    return run(ready)
 
 
 def run(work: Callable[[], int]) -> int:

@@ -5,6 +5,7 @@
 import sys
 from pathlib import Path
 
+from tools.common import command_line
 from tools.common.errors import UserError
 
 from . import device, program
@@ -39,7 +40,4 @@ def text(image: program.Elf) -> str:
 
 
 if __name__ == "__main__":
-    try:
-        sys.stdout.write(text(load(Path(sys.argv[1]))))
-    except (UserError, IndexError) as error:
-        sys.exit(f"foc33: {error if isinstance(error, UserError) else 'no image, tools.image.load: name an ELF or HEX file'}")
+    sys.exit(command_line.on_files("tools.image.load", lambda path: sys.stdout.write(text(load(path))), "an ELF or HEX file"))

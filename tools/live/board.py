@@ -19,14 +19,13 @@ from tools.common import board_keys, command_line, paths
 from tools.common.errors import UserError
 
 from . import plain_elf
+from .pace import RealTime
 
 SCOPE = "SCOPE=1"
 REST = Scenario("live-board", "", "", MOTOR, "", 0.0)
 """Nothing happens."""
 STEP_S = 0.002
 """What the board runs in one go: a byte of the serial line waits so long at most."""
-MOST_BEHIND_S = 0.2
-"""What it makes up for; beyond it runs as fast as it can, and real time goes on without it."""
 BACKGROUND_PERIODS = 2
 """Between two passes of a background that takes no time."""
 
@@ -61,7 +60,7 @@ def parts(motor: str | None = None, board: str | None = None, defines: str = "",
 
 
 class LiveBoard:
-    """A virtual board that follows the clock on the wall. One a process."""
+    """A virtual board at rest, whose serial line somebody else has. One a process."""
 
     def __init__(self, made_of: Parts) -> None:
         self.parts = made_of
@@ -73,28 +72,17 @@ class LiveBoard:
             self.board.lock_step(False)
         self.board.power_up()
         self.period_s = library.params.get("LOOPTIME_SEC", 50e-6)
-        self.began_s, self.lost_s = time.monotonic(), 0.0
 
     def close(self) -> None:
         """Switches off."""
         self.board.close()
 
-    def run(self, seconds: float) -> None:
-        """Goes on by so much of its own time, however long that takes."""
-        self.board.run(max(1, round(seconds / self.period_s)))
+    def run(self, seconds: float) -> float:
+        """Goes on by so much of its own time, in whole periods; returns how much that was."""
+        periods = max(1, round(seconds / self.period_s))
+        self.board.run(periods)
+        return periods * self.period_s
 
-    def follow(self) -> float:
-        """Goes on to the present, or as far as it comes in a moment. Returns how far it is behind."""
-        behind_s = self._behind_s()
-        if behind_s > MOST_BEHIND_S:
-            self.lost_s += behind_s - MOST_BEHIND_S
-        end = time.monotonic() + MOST_BEHIND_S
-        while (behind_s := self._behind_s()) > 0.0 and time.monotonic() < end:
-            self.run(min(behind_s, STEP_S))
-        return max(behind_s, 0.0)
-
-    def _behind_s(self) -> float:
-        return time.monotonic() - self.began_s - self.lost_s - self.board.get("time_s")
 
 
 class BoardStream:
@@ -143,16 +131,16 @@ def _run(options: argparse.Namespace) -> int:
     ended: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: ended.append(number))
-    said_s = 1.0
+    real_time, began_s, said_s = RealTime(), time.monotonic(), 1.0
     while not ended:
-        live.follow()
+        due_s = real_time.next(live.run(STEP_S))
         live.board.uart_take() # the terminal has it
-        time.sleep(STEP_S / 2)
-        if live.lost_s > said_s:
-            said_s = 10.0 * live.lost_s
-            print(f"slower than real time: {live.lost_s:.1f} s behind after {time.monotonic() - live.began_s:.0f} s", flush=True)
+        time.sleep(max(due_s - time.monotonic(), 0.0))
+        if real_time.lost_s > said_s:
+            said_s = 10.0 * real_time.lost_s
+            print(f"slower than real time: {real_time.lost_s:.1f} s behind after {time.monotonic() - began_s:.0f} s", flush=True)
     live.close()
-    print(f"\nran for {time.monotonic() - live.began_s:.1f} s")
+    print(f"\nran for {time.monotonic() - began_s:.1f} s")
     return 0
 
 

@@ -6,6 +6,7 @@ line go by the names.
 import sys
 from pathlib import Path
 
+from tools.common import command_line
 from tools.common.errors import UserError
 from tools.image.program import contents, reading
 
@@ -52,15 +53,5 @@ def _offset(strings: bytes, text: str) -> int:
     return at
 
 
-def main() -> int:
-    """Run the command; returns the exit code."""
-    try:
-        rename(Path(sys.argv[1]))
-    except (UserError, IndexError) as error:
-        print(f"foc33: {error if isinstance(error, UserError) else 'no file, tools.live.chip_types: name an ELF file'}", file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.on_files("tools.live.chip_types", rename, "an ELF file"))

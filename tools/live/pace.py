@@ -17,10 +17,25 @@ SLICES = 5
 """Of a frame's time; between them characters of the serial line change hands."""
 LEAST_SLICE_S = 0.001
 BEHIND_S = 0.25
-"""What a frame may be late before the clock starts anew; else a machine that was busy for a while would run too fast afterwards."""
+"""What a board makes up for; else it would run too fast after a while in which the machine was busy."""
 MEASURED_S = 1.0
 PACES = (1.0, 0.1, 0.01, 0.001)
 """Motor seconds in a second that the page offers."""
+
+
+class RealTime:
+    """When a board's next piece of time is due. What a busy machine is late beyond BEHIND_S is lost and not made up for."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
+        self.due_s, self.lost_s = clock(), 0.0
+
+    def next(self, seconds: float) -> float:
+        """A piece that takes so long has begun; returns when it is over."""
+        end_s, earliest_s = self.due_s + seconds, self.clock() - BEHIND_S
+        self.lost_s += max(earliest_s - end_s, 0.0)
+        self.due_s = max(end_s, earliest_s)
+        return self.due_s
 
 
 class Pacemaker:
@@ -63,27 +78,25 @@ class Pacemaker:
 
     def _live(self) -> None:
         try:
-            due = self.clock()
+            real_time = RealTime(self.clock)
             while not self.ended:
-                due = self.frame(due)
+                self.frame(real_time)
         except Exception as error: # whoever waits for frames must hear of it
             self.error = error
             self.publish({"ended": str(error)})
         self._refuse()
 
-    def frame(self, due: float) -> float:
-        """The time of one frame passes, in slices; returns when the next one is due."""
+    def frame(self, real_time: RealTime) -> None:
+        """The time of one frame passes, in slices."""
         seconds = FRAME_S * self.pace
         slices = max(1, min(SLICES, round(seconds / LEAST_SLICE_S)))
         for number in range(1, slices + 1):
             self.board.run(seconds / slices)
             if number == slices:
                 self.show()
-            due = max(due + FRAME_S / slices, self.clock() - BEHIND_S)
-            self.serve(due)
+            self.serve(real_time.next(FRAME_S / slices))
             if self.ended:
-                break
-        return due
+                return
 
     def show(self) -> None:
         """A frame for the pages."""

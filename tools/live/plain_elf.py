@@ -7,6 +7,7 @@ import sys
 from io import BytesIO
 from pathlib import Path
 
+from tools.common import command_line
 from tools.common.errors import UserError
 from tools.image.program import contents, reading
 
@@ -37,15 +38,5 @@ def write(image: Path, path: Path) -> Path:
     return path
 
 
-def main() -> int:
-    """Run the command; returns the exit code."""
-    try:
-        write(Path(sys.argv[1]), Path(sys.argv[2]))
-    except (UserError, IndexError) as error:
-        print(f"foc33: {error if isinstance(error, UserError) else 'two files, tools.live.plain_elf: name an image and the file to write'}", file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line.on_files("tools.live.plain_elf", write, "an image", "the file to write"))
