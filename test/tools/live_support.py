@@ -115,10 +115,10 @@ def served(*arguments: str) -> Iterator[Served]:
         server.end()
 
 
-def until(found, what: str, seconds: float = 15.0):
-    """Waits for something true."""
+def until(found, what, seconds: float = 15.0):
+    """Waits for something true; else `what` has not happened, a text or what makes it."""
     end_s = time.monotonic() + seconds
     while not (value := found()):
-        assert time.monotonic() < end_s, what
+        assert time.monotonic() < end_s, what() if callable(what) else what
         time.sleep(0.02)
     return value

@@ -3,6 +3,7 @@
 import pytest
 from support import refusal
 
+from tools.common.errors import UserError
 from tools.live.pace import BEHIND_S, FRAME_S, Pacemaker, RealTime
 
 
@@ -102,6 +103,16 @@ def test_a_new_pace_is_measured_from_then_on():
     board, published, _ = lived(50, Board, happens=lambda maker, number: maker.set_pace(0.1) if number == 25 else None)
     assert board.told_pace == 0.1
     assert published[30]["measured"] is None and published[-1]["measured"] == pytest.approx(0.1, rel=0.01)
+
+
+def test_a_pace_that_the_board_refuses_is_not_taken():
+    class RealTimeOnly(Board):
+        def paced(self, pace: float) -> None:
+            raise UserError("a real board has real time", "PACE", "leave it out")
+
+    maker = Pacemaker(RealTimeOnly(Clock()), lambda frame: None)
+    refusal(lambda: maker.set_pace(0.1), "real time")
+    assert maker.pace == 1.0
 
 
 def test_the_end_of_a_board_reaches_all_who_wait():

@@ -35,11 +35,12 @@ def server():
 
 
 class Page:
-    """What a user sees and does."""
+    """What a user sees and does. A page that is open stays open: to draw it costs more than what the tests do with it."""
 
     def __init__(self, driver, url: str) -> None:
         self.driver = driver
-        driver.get(url)
+        if driver.current_url != url:
+            driver.get(url)
         self.wait("return window.eval('foc33.frames') > 2", "no frames come")
 
     def run(self, script: str, *arguments):
@@ -49,7 +50,7 @@ class Page:
         return self.run("return window.eval('foc33.frame')")
 
     def wait(self, script: str, what: str, seconds: float = 15.0):
-        return until(lambda: self.run(script), f"{what}: {self.run('return document.body.innerText')[:600]}", seconds)
+        return until(lambda: self.run(script), lambda: f"{what}: {self.run('return document.body.innerText')[:600]}", seconds)
 
     def one(self, selector: str):
         return self.driver.find_element("css selector", selector)

@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import io
+import os
 import time
 
 import pytest
@@ -12,6 +13,7 @@ from support import command, refusal, refused
 from tools.live import symbols
 from tools.live.__main__ import main
 from tools.live.line import Line
+from tools.live.lnet import connect
 from tools.live.real_board import RealBoard
 from tools.live.watch import WATCHED, Watch, blocks
 
@@ -140,6 +142,26 @@ def test_a_firmware_without_a_scope_or_a_port_without_a_board_is_one_line():
     refusal(lambda: Watch(without, params), "scope_command.mode", "SCOPE 1")
     refused(command("--library", str(parts().library.path), "--elf", str(parts().symbols), "--port", "/dev/nothing", main=main),
             "cannot open the port", "/dev/nothing")
+
+
+@pytest.fixture
+def taken():
+    """A serial port that another program has."""
+    serial = pytest.importorskip("serial")
+    ends = os.openpty()
+    with serial.Serial(os.ttyname(ends[1]), exclusive=True) as other:
+        yield other.port
+    for end in ends:
+        os.close(end)
+
+
+def test_a_port_that_cannot_be_opened_is_one_line_that_says_why(tmp_path, taken):
+    pytest.importorskip("serial")
+    (tmp_path / "notes.txt").write_text("nothing", encoding="utf-8")
+    for port, why in ((str(tmp_path / "none"), "(No such file or directory)"), (str(tmp_path), "(Is a directory)"), ("/dev/null", "(it is no serial port)"),
+                      (str(tmp_path / "notes.txt"), "(it is no serial port)"), (taken, "(another program has it)")):
+        assert refusal(lambda port=port: connect(port), f"cannot open the port {why}, {port}: ").count(port) == 1
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "nothing"
 
 
 def test_a_line_keeps_what_the_board_cannot_take_yet():

@@ -6,6 +6,8 @@
     while link.scope_state().running: ...
     rows = link.scope_read()"""
 
+import errno
+import os
 import struct
 import time
 from dataclasses import dataclass, field
@@ -18,6 +20,9 @@ SYN, KEY, NODE = 0x55, 0x02, 1
 DEVICE_INFO, GET_RAM, PUT_RAM, LOAD_PARAMETER, SAVE_PARAMETER = 0, 9, 10, 17, 18
 ERRORS = {19: "the checksum is wrong", 20: "wrong length, address or settings", 21: "too long", 33: "no such service"}
 SCOPE_PARAMETER, RAM, TRIGGERED, AUTO = 1, 0, 1, 2
+OPEN_ERRORS = {None: ("it is no serial port", "name the one that the board is at"), errno.EAGAIN: ("another program has it", "end that one"),
+               errno.EACCES: ("it is not yours to open", "join its group, on Debian dialout, and log in again")}
+"""Why a port does not open, and what to do, by the error's number; others speak for themselves."""
 MOST_BYTES = 253
 """Of memory in one answer."""
 MOST_WORDS = 8
@@ -149,8 +154,9 @@ def _open(port: str) -> Stream:
         raise UserError("no module serial", port, "install python3-serial") from None
     try:
         return serial.Serial(port, BAUD, timeout=0.01, exclusive=True)
-    except (serial.SerialException, OSError) as error:
-        raise UserError(f"cannot open the port ({getattr(error, 'strerror', None) or error})", port, "name the one that the board is at") from None
+    except OSError as error: # serial's, too; without a number it could not set the speed
+        reason, remedy = OPEN_ERRORS.get(error.errno, (os.strerror(error.errno or 0), "name the one that the board is at"))
+        raise UserError(f"cannot open the port ({reason})", port, remedy) from None
 
 
 @dataclass

@@ -72,9 +72,9 @@ class Pacemaker:
                 self.asked.get_nowait()[1].set_exception(UserError("the board has stopped"))
 
     def set_pace(self, pace: float) -> None:
+        self.board.paced(pace)
         self.pace = pace
         self.measured.clear()
-        self.board.paced(pace)
 
     def _live(self) -> None:
         try:

@@ -144,7 +144,7 @@ class Server:
     async def _take(self, text: str, tab: Tab) -> None:
         """One command; what is wrong with it goes back to this tab only."""
         try:
-            command = json.loads(text)
+            command = _command(text)
             if command == {"seen": True}:
                 tab.seen()
             elif isinstance(command, dict) and set(command) == {"scope"} and self.bench.scope is not None:
@@ -153,7 +153,7 @@ class Server:
                 await self._ask(lambda: self._set_pace(command["pace"]))
             else:
                 await self._ask(lambda: self.bench.act(command, tab))
-        except (UserError, ValueError, RecursionError) as error:
+        except UserError as error:
             await tab.socket.send_json({"refused": str(error)})
 
     def _set_pace(self, pace: Any) -> None:
@@ -171,6 +171,14 @@ class Server:
         except UserError as error:
             return web.Response(status=409, text=f"foc33: {error}\n")
         return web.Response(text=text, content_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+def _command(text: str) -> Any:
+    """What a tab has sent."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise UserError("no JSON", "page", "send one command, such as {\"press\": \"S2\"}") from None
 
 
 async def serve(make_bench: Any, port: int | None, pace: float, tell: Any) -> None:
