@@ -19,7 +19,8 @@ ENDS = {"open_a": "OPEN_PHASE", "open_b": "OPEN_PHASE", "open_c": "OPEN_PHASE", 
 """What the drive says within a second at this speed and load; the others it rides through."""
 TURN_PERIODS = 1000
 FAULT_DEG = 15.0
-"""Where the rotor stands when a fault is thrown in. A dead current signal is told by 45 degrees around it; it looks like an open phase from 120 on."""
+"""Where the rotor stands when a fault is thrown in. A dead current signal has its own code within 45 degrees of it; from 120 on it looks
+like an open phase."""
 
 
 def test_a_click_on_s2_starts_the_motor_at_the_potentiometers_speed_and_another_stops_it():
@@ -124,12 +125,15 @@ def test_curves_have_a_row_every_ten_milliseconds_however_time_passes():
     assert np.diff(times) == pytest.approx(0.01, abs=2e-4) and len(times) > 300
 
 
-def test_the_orbit_is_one_turn_of_the_voltage_that_is_asked_for():
+def test_the_orbit_is_one_turn_of_the_voltage_that_is_asked_for_and_ends_where_the_vector_is():
     frame = passes(started(), 0.5)
-    for name, size in (("v", np.hypot(frame["now"]["v_d_v"], frame["now"]["v_q_v"])), ("i", np.hypot(frame["now"]["i_d_a"], frame["now"]["i_q_a"]))):
+    now = frame["now"]
+    for name, d, q in (("v", now["v_d_v"], now["v_q_v"]), ("i", now["i_d_a"], now["i_q_a"])):
         points = np.array(frame["orbit"][name])
-        turned = np.degrees(np.ptp(np.unwrap(np.arctan2(points[:, 1], points[:, 0]))))
-        assert len(points) > 50 and turned == pytest.approx(360.0, abs=25.0) and np.hypot(*points.T).mean() == pytest.approx(size, rel=0.15)
+        angles = np.degrees(np.unwrap(np.arctan2(points[:, 1], points[:, 0])))
+        assert len(points) > 50 and angles[-1] - angles[0] == pytest.approx(360.0, abs=25.0)
+        assert np.hypot(*points.T).mean() == pytest.approx(np.hypot(d, q), rel=0.15)
+        assert abs(wrapped_deg(angles[-1] - now["theta_est_deg"] - np.degrees(np.arctan2(q, d)))) < 15.0
 
 
 # ---- recordings ----------------------------------------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 import contextlib
 import math
+import re
+import struct
 import time
 
 import numpy as np
@@ -9,12 +11,14 @@ import pytest
 from live_support import Living, bench, known, parts, until
 from support import refusal
 
-from tools.live.lnet import ScopeState
+from tools.live import symbols
+from tools.live.lnet import Channel, Lnet, ScopeState, Trigger
 from tools.live.scale import RAW, scale_of
 from tools.live.scope import Scope
 
 SYMBOLS = known()
 KNOWN = SYMBOLS.variables
+WISH = {"channels": [], "trigger": None, "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "single"}
 I_Q, ANGLE, SPEED = "board_drive.run.control.i_q13.q", "board_drive.angle", "board_drive.run.estimator.omega_erpm"
 
 
@@ -27,6 +31,56 @@ def test_scales_are_those_that_the_virtual_board_has_for_the_same_quantity():
     assert {name: scale_of(name, params).unit for name in names} == names and set(names) <= KNOWN.keys()
     assert scale_of("board_drive.state", params) == RAW and scale_of(ANGLE, params).per_count * 65536 == 360.0
     assert scale_of(I_Q, params).per_count == pytest.approx(4.0 * scale_of("ParkParm.qIq", params).per_count)
+
+
+def test_a_quantity_has_one_full_scale_whatever_format_its_variables_have():
+    params = parts().library.params
+    full = {"A": params["COUNT_CURRENT_A"] * 2 ** 13, "V": params["COUNT_VOLTAGE_V"] * 2 ** 14, "rpm": params["COUNT_SPEED_RPM"]}
+    formats = {}
+    for name in KNOWN:
+        scale, bits = scale_of(name, params), re.search(r"_q(\d+)(\.\w+)?$", name)
+        if bits and scale.unit in full and "bus" not in name:
+            formats.setdefault((scale.unit, bits[1]), set()).add(scale.per_count * 2 ** int(bits[1]) / full[scale.unit])
+        if scale.unit == "°":
+            assert scale.per_count * 2 ** (8 * KNOWN[name].bytes) == 360.0, name
+    assert formats.keys() == {("A", "13"), ("A", "26"), ("V", "13"), ("V", "14"), ("rpm", "16")}
+    assert all(ratios == {1.0} for ratios in formats.values()), formats
+    assert scale_of("EstimParm.qEsqf", params) == scale_of("board_drive.run.estimator.e_q13.beta", params)
+
+
+@pytest.mark.parametrize("bytes_, signed, data, value", [
+    (2, True, b"\xfe\xff", -2), (2, True, b"\x00\x80", -32768), (2, False, b"\xfe\xff", 65534), (4, True, b"\xfe\xff\xff\xff", -2),
+    (4, False, b"\x01\x00\x00\x80", 0x80000001), (1, True, b"\x80", -128), (2, True, b"\x34\x12", 0x1234)])
+def test_a_number_keeps_its_sign_and_the_order_of_its_bytes(bytes_, signed, data, value):
+    variable = symbols.Variable("x", 0x0800, bytes_, signed)
+    assert variable.value(data + b"\xff\xff") == value and variable.data(value) == data
+    if bytes_ > 1:
+        assert struct.unpack("<" + variable.channel.format, data) == (value,)
+    refusal(lambda: variable.data(1 << 8 * bytes_), "does not fit")
+
+
+class SetUp:
+    """A link that remembers what the scope is set up for."""
+
+    def scope_setup(self, channels, trigger, delay, factor) -> None:
+        self.trigger, self.delay = trigger, delay
+
+
+@pytest.mark.parametrize("name, level, count", [
+    (I_Q, -1e6, -32768), (I_Q, 1e6, 32767), (I_Q, -0.5, -931), (ANGLE, -10.0, 0), (ANGLE, 270.0, 49152), (ANGLE, 1000.0, 65535)])
+def test_a_level_is_in_counts_and_stops_at_the_ends_of_its_variable(name, level, count):
+    link, scope = SetUp(), Scope(EmptyLink, SYMBOLS, parts().library.params, lambda message: None)
+    scope._start(link, scope._read(WISH | {"channels": [I_Q], "trigger": name, "level": level, "position": 0.5}), True, 202)
+    assert link.trigger == Trigger(KNOWN[name].address, count, True, KNOWN[name].signed) and link.delay == -50
+
+
+def test_trigger_and_delay_reach_the_line_with_their_signs():
+    falls = Trigger(0x0900, 0xFFF0, rising=False, signed=False)
+    for trigger, kind, level, edge in ((Trigger(0x0900, -5), 0xA2, b"\xfb\xff", 1), (falls, 0x82, b"\xf0\xff", 0)):
+        link = Lnet(None)
+        link.request = lambda service, arguments, link=link: setattr(link, "sent", arguments)
+        link.scope_setup([Channel(0x0800), Channel(0x0802, 4)], trigger, -3, 2)
+        assert link.sent[-14:] == bytes([kind, 0]) + struct.pack("<I", 0x0900) + level + struct.pack("<iBB", 18, edge, 1)
 
 
 # ---- traces ------------------------------------------------------------------------------------------------------------------
@@ -43,8 +97,7 @@ class Turning(Living):
 
     def ask(self, **wish) -> None:
         self.messages.clear()
-        usual = {"channels": [I_Q], "trigger": None, "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "single"}
-        self.board.scope.ask(usual | wish)
+        self.board.scope.ask(WISH | {"channels": [I_Q]} | wish)
 
 
 @pytest.fixture(scope="module")

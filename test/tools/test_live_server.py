@@ -106,7 +106,8 @@ def test_all_tabs_see_the_same_board(server):
 
 
 @pytest.mark.parametrize("text, part", [
-    pytest.param("{", "no JSON, page: ", id="half"), pytest.param("[" * 2000, "no JSON, page: ", id="deep"), ("pot", "no JSON, page: "), ('{"press": "S9"}', "no button 'S9'"), ('{"set": ["input.pot", NaN]}', "impossible"), ('{"pace": 3}', "no pace '3'"),
+    pytest.param("{", "no JSON, page: ", id="half"), pytest.param("[" * 2000, "no JSON, page: ", id="deep"), ("pot", "no JSON, page: "),
+    ('{"press": "S9"}', "no button 'S9'"), ('{"set": ["input.pot", NaN]}', "impossible"), ('{"pace": 3}', "no pace '3'"),
     ('{"pace": true}', "no pace"), ('{"pace": 1, "power": true}', "no such command")])
 def test_nonsense_is_refused_to_the_tab_that_sent_it_and_the_board_goes_on(server, text, part):
     async def work(one, other):

@@ -20,7 +20,8 @@ SYN, KEY, NODE = 0x55, 0x02, 1
 DEVICE_INFO, GET_RAM, PUT_RAM, LOAD_PARAMETER, SAVE_PARAMETER = 0, 9, 10, 17, 18
 ERRORS = {19: "the checksum is wrong", 20: "wrong length, address or settings", 21: "too long", 33: "no such service"}
 SCOPE_PARAMETER, RAM, TRIGGERED, AUTO = 1, 0, 1, 2
-OPEN_ERRORS = {None: ("it is no serial port", "name the one that the board is at"), errno.EAGAIN: ("another program has it", "end that one"),
+OPEN_ERRORS = {None: ("it is no serial port", "name the one that the board is at"),
+               errno.EAGAIN: ("another program has it", "end that one"),
                errno.EACCES: ("it is not yours to open", "join its group, on Debian dialout, and log in again")}
 """Why a port does not open, and what to do, by the error's number; others speak for themselves."""
 MOST_BYTES = 253
