@@ -3,13 +3,31 @@
 #include "bringup_rig.h"
 
 #include "firmware/drive/drive.c"
-#include "firmware/drive/modes/bringup.c"
+#include "firmware/drive/modes/bringup_directions.c"
+#include "firmware/drive/modes/bringup_gains.c"
+#include "firmware/drive/modes/bringup_guide.c"
 #include "firmware/drive/modes/bringup_judge.c"
+#include "firmware/drive/modes/bringup_measure.c"
+#include "firmware/drive/modes/bringup_panel.c"
+#include "firmware/drive/modes/bringup_rest.c"
+#include "firmware/drive/modes/bringup_say.c"
+#include "firmware/drive/modes/bringup_turn.c"
 #include "firmware/drive/panel.c"
 
 void setUp(void)
 {
     bringup_reset();
+}
+
+void test_nothing_is_summed_before_a_measurement_begins(void)
+{
+    rig_ready();
+    rig_currents(1000, -500);
+    rig_tick(10);
+    TEST_ASSERT_EQUAL_INT16(1000, drive.phases_q13.a);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.bringup.sum_a);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.bringup.off_b);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.bringup.left);
 }
 
 void test_to_the_six_directions_and_no_further_than_the_share_of_the_current(void)
@@ -27,7 +45,7 @@ void test_a_dead_signal_leaves_the_amplitude_at_its_bound(void)
     gain_b = 0.0F;
     until(BRINGUP_STEP_END);
     TEST_ASSERT_TRUE(found(BRINGUP_NO_CURRENT));
-    TEST_ASSERT_EQUAL_INT16(MOST_AMPLITUDE, guide.full.amplitude[0]);
+    TEST_ASSERT_EQUAL_INT16(BRINGUP_MOST_AMPLITUDE, guide.full.amplitude[0]);
     TEST_ASSERT_TRUE(carried_most_q13 < CURRENT_Q13(1.5F * 2.75F * 0.3F * 2.0F));
 }
 
@@ -48,6 +66,17 @@ void test_a_press_while_current_flows_ends_it(void)
     ms(100);
     TEST_ASSERT_TRUE(drive_is_running(&drive));
     guide.button = 3;
+    ms(5);
+    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
+    TEST_ASSERT_FALSE(drive_is_running(&drive));
+}
+
+void test_a_press_before_the_ammeters_question_ends_it(void)
+{
+    until(BRINGUP_STEP_AMMETER);
+    ms(100);
+    TEST_ASSERT_TRUE(drive_is_running(&drive));
+    guide.button = 2;
     ms(5);
     TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
     TEST_ASSERT_FALSE(drive_is_running(&drive));

@@ -19,7 +19,7 @@ typedef struct {
 
 static const char *const phases[3] = { "A", "B", "C" };
 
-/** A number with so many decimals, of which the last is its unit. ~param number of 16 bits and a sign */
+/** A number with so many decimals, of which the last is its unit. @param number of 16 bits and a sign */
 static char *put_number(char *at, int32_t number, uint16_t decimals)
 {
     char digits[6];

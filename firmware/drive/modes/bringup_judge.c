@@ -1,5 +1,5 @@
 /* BRINGUP, what the currents say: which signal follows which leg and with which sign, what is open or dead, resistance and dead time. */
-#include "drive/modes/bringup.h"
+#include "drive/modes/bringup_judge.h"
 
 #ifdef BRINGUP
 
@@ -7,7 +7,8 @@
 #define MISSING_SHIFT 2 /* less than a quarter of the current in the other direction */
 #define MA_SHIFT 12u    /* up to 16 mA a count */
 #define MA_PER_COUNT ((uint16_t)(4000.0F * PARAM_F(NORM_CURRENT_CONST) * 4096.0F + 0.5F))
-#define DEAD_NS_A_COUNT ((uint16_t)(0.75F * PWM_TICK_SEC * 1000000000.0F * 256.0F + 0.5F)) /* of a duty count, Q8: one leg loses what two others gain, 4/3 along the vector */
+/* Of a duty count, Q8: one leg loses what two others gain, 4/3 along the vector. */
+#define DEAD_NS_A_COUNT ((uint16_t)(0.75F * PWM_TICK_SEC * 1000000000.0F * 256.0F + 0.5F))
 #define MOST_MOHM 60000u
 
 /* Where the directions +A, -C, +B, -A, +C, -B have a phase's own. */

@@ -1,7 +1,10 @@
 /* BRINGUP: the first day with a board. Step by step, with little current, the drive checks what no source confirms.
  *
- * The control interrupt is the instrument (bringup_tick.h): it drives a voltage vector until a current flows, turns it, and adds up what it sees.
- * The background leads through the steps (bringup.c), judges (bringup_judge.c) and asks the user; board/modes/bringup_report.c speaks.
+ * The control interrupt is the instrument (bringup_tick.h): it drives a voltage vector until a current flows, turns it, and adds up what it
+ * sees.
+ * The background leads through the steps: bringup_guide.c takes the one that is due. The steps, in their order, are in bringup_panel.c,
+ * bringup_rest.c, bringup_directions.c, bringup_gains.c and bringup_turn.c; they use the instrument by bringup_measure.c, judge by
+ * bringup_judge.c and speak by bringup_say.c, whose lines board/modes/bringup_report.c writes.
  * `ready` names the owner of the instrument: 1 the background, 0 the interrupt. */
 #ifndef DRIVE_MODES_BRINGUP_H
 #define DRIVE_MODES_BRINGUP_H
@@ -82,8 +85,6 @@
     X(STANDS, "the shaft does not turn: free it, take the load off")
 /* clang-format on */
 
-#define BRINGUP_DIRECTIONS 6u
-
 #ifdef BRINGUP
 
 #define BRINGUP_QUESTION_ENUM(name, text) BRINGUP_ASK_##name,
@@ -119,37 +120,6 @@ typedef struct {
 } bringup_run_t;
 
 #define BRINGUP_FULL_Q13 CURRENT_Q13(PARAM_F(BRINGUP_CURRENT_SHARE) * PARAM_F(MAXIMUM_CURRENT_A)) /* |A| + |B| of a step */
-#define BRINGUP_LEAST_Q13 (BRINGUP_FULL_Q13 / 8)                                                  /* less is no current */
-
-/** Currents and amplitudes of the six directions +A, -C, +B, -A, +C, -B at one level. */
-typedef struct {
-    current_q13_t a[BRINGUP_DIRECTIONS], b[BRINGUP_DIRECTIONS];
-    int16_t amplitude[BRINGUP_DIRECTIONS]; /**< duty counts of the direction's phase */
-} bringup_level_t;
-
-/** What the currents say of the wires. Masks: bit 0 phase or signal A, 1 B, 2 C. */
-typedef struct {
-    uint16_t dead;            /**< current signals that do not follow */
-    uint16_t leg[2];          /**< the leg that each signal follows, 0..2 */
-    uint16_t inverted;        /**< signals with the wrong sign */
-    uint16_t open, high, low; /**< phases that carry nothing; whose high, whose low side never turns on */
-} bringup_wiring_t;
-
-/** What the bridge says to two levels of current. */
-typedef struct {
-    uint16_t resistance_mohm; /**< by signal A */
-    uint16_t b_percent_of_a;  /**< both signals where their legs carry the same: along the third phase */
-    uint16_t dead_time_ns;
-} bringup_bridge_t;
-
-/** ~param full all of the current ~return what is connected to what */
-bringup_wiring_t bringup_wiring(const bringup_level_t *full);
-
-/** ~param half less current than full ~param w whose signals follow two legs ~param bus_10mv of the bridge */
-bringup_bridge_t bringup_bridge(const bringup_level_t *half, const bringup_level_t *full, const bringup_wiring_t *w, uint16_t bus_10mv);
-
-/** A current in mA. */
-int16_t bringup_ma(current_q13_t i_q13);
 
 #define BRINGUP_STATE bringup_run_t bringup;
 #else

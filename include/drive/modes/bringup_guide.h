@@ -2,7 +2,7 @@
 #ifndef DRIVE_MODES_BRINGUP_GUIDE_H
 #define DRIVE_MODES_BRINGUP_GUIDE_H
 
-#include "drive/modes/bringup.h"
+#include "drive/modes/bringup_judge.h"
 #include "drive/panel.h"
 
 #ifdef BRINGUP

@@ -31,8 +31,8 @@ QM_INLINE void bringup_add(drive_t *d, uint16_t settled)
     t->ready = (uint16_t)(t->left == 0u);
 }
 
-/** 1, 0 or -1: where the amplitude goes. A measurement stays at the amplitude where the current is reached; a vector that turns keeps the current,
- *  for dead time takes more or less of it at each angle. */
+/** 1, 0 or -1: where the amplitude goes. A measurement stays at the amplitude where the current is reached; a vector that turns keeps the
+ *  current, for dead time takes more or less of it at each angle. */
 QM_INLINE int16_t bringup_direction(bringup_run_t *t, int16_t carried_q13)
 {
     if (t->keeps_current) {
