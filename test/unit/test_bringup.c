@@ -34,8 +34,7 @@ void test_to_the_six_directions_and_no_further_than_the_share_of_the_current(voi
 {
     until(BRINGUP_STEP_AMMETER);
     TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_AMMETER, guide.step);
-    TEST_ASSERT_EQUAL_UINT16(2, guide.found); /* POT stands still, and this bridge's dead time goes by phases */
-    TEST_ASSERT_TRUE(found(BRINGUP_POT_DEAD));
+    TEST_ASSERT_EQUAL_UINT16(0, guide.found);
     TEST_ASSERT_INT16_WITHIN(BRINGUP_FULL_Q13 / 8, BRINGUP_FULL_Q13, carried_most_q13);
 }
 
@@ -122,76 +121,6 @@ void test_nobody_answers_while_current_flows(void)
     TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
 }
 
-void test_buttons(void)
-{
-    static const struct {
-        const char *what;
-        uint16_t begin, s3;
-        bringup_finding_t finding;
-        bringup_step_t step; /* where it goes on */
-    } cases[] = {
-        { "right", 2, 3, BRINGUP_FINDINGS, BRINGUP_STEP_UART },
-        { "swapped", 3, 2, BRINGUP_BUTTONS_SWAPPED, BRINGUP_STEP_UART },
-        { "S3 acts as S2", 2, 2, BRINGUP_BUTTON_DEAD, BRINGUP_STEP_END },
-        { "S2 acts as S3", 3, 3, BRINGUP_BUTTON_DEAD, BRINGUP_STEP_END },
-    };
-    EACH(n, cases) {
-        setUp();
-        no_answer = BRINGUP_ASK_UART;
-        answers[BRINGUP_ASK_BEGIN] = cases[n].begin;
-        answers[BRINGUP_ASK_S3] = cases[n].s3;
-        until(cases[n].step);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].step, guide.step, cases[n].what);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].finding != BRINGUP_FINDINGS, found(cases[n].finding), cases[n].what);
-    }
-}
-
-void test_swapped_buttons_count_by_the_names_on_them(void)
-{
-    answers[BRINGUP_ASK_BEGIN] = 3; /* S2, at the pin of S3 */
-    answers[BRINGUP_ASK_S3] = 2;
-    answers[BRINGUP_ASK_UART] = 3;
-    until(BRINGUP_STEP_LED_ALIVE);
-    TEST_ASSERT_EQUAL_UINT16(0, guide.sender); /* S2: yes */
-    TEST_ASSERT_FALSE(found(BRINGUP_UART_PIN));
-}
-
-void test_a_button_that_is_down_at_rest_ends_it(void)
-{
-    inputs.s3_down = 1;
-    inputs.elapsed_ms = 1;
-    the_lights = bringup_pass(&guide, &drive, &params, &inputs, pot);
-    TEST_ASSERT_EQUAL_UINT16(BRINGUP_BUTTON_DOWN, guide.message.code);
-    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_LAST, guide.step);
-}
-
-void test_the_first_line_comes_by_both_pins_in_turn(void)
-{
-    no_answer = BRINGUP_ASK_BEGIN;
-    ms(2500);
-    TEST_ASSERT_EQUAL_UINT16(3, said_count);
-    TEST_ASSERT_EQUAL_UINT16(0, said[0].part);
-    TEST_ASSERT_EQUAL_UINT16(1, said[1].part);
-    TEST_ASSERT_EQUAL_UINT16(0, said[2].part);
-}
-
-void test_potentiometer(void)
-{
-    static const struct {
-        int16_t left, right;
-        bringup_finding_t finding;
-    } cases[] = { { -32768, 32704, BRINGUP_FINDINGS }, { 32704, -32768, BRINGUP_POT_REVERSED }, { 0, 1000, BRINGUP_POT_DEAD }, { -20000, 32704, BRINGUP_POT_RANGE } };
-    EACH(n, cases) {
-        setUp();
-        pot = cases[n].left;
-        until(BRINGUP_STEP_POT_RIGHT);
-        pot = cases[n].right;
-        until(BRINGUP_STEP_FAULT_REST);
-        TEST_ASSERT_EQUAL_UINT16(cases[n].finding != BRINGUP_FINDINGS, guide.found);
-        TEST_ASSERT_EQUAL_UINT16(cases[n].finding != BRINGUP_FINDINGS, found(cases[n].finding));
-    }
-}
-
 void test_what_is_wrong_at_rest_keeps_the_current_away(void)
 {
     rig_bus(19.0F);
@@ -199,7 +128,7 @@ void test_what_is_wrong_at_rest_keeps_the_current_away(void)
     TEST_ASSERT_TRUE(found(BRINGUP_BUS_DIVIDER));
     TEST_ASSERT_EQUAL_INT16(0, carried_most_q13);
     TEST_ASSERT_EQUAL_UINT16(BRINGUP_ENDS, said[said_count - 1u].kind);
-    TEST_ASSERT_EQUAL_INT32(2, said[said_count - 1u].value); /* and the potentiometer */
+    TEST_ASSERT_EQUAL_INT32(1, said[said_count - 1u].value);
 }
 
 void test_s2_at_the_end_begins_anew(void)

@@ -68,6 +68,8 @@ class Job:
     library: Path
     values: dict[str, float]
     most_a: float
+    leaves: str = ""
+    """The question at which the user leaves; default: stays to the end."""
 
 
 def prepare(variant: Variant, library: Library, motor: board_keys.Part, board: board_keys.Part) -> Job:
@@ -82,7 +84,7 @@ def run(job: Job, told: Callable[[float], None]) -> dict[str, Any]:
     """One board in this process."""
     board = Board(Library(job.library))
     try:
-        said = bringup_user.use(board, job.values, told)
+        said = bringup_user.use(board, job.values, told, job.leaves)
     except BoardError as error:
         raise UserError(f"the virtual board refuses: {error}", job.variant.name, "correct the motor or board file") from None
     finally:

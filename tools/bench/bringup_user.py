@@ -42,10 +42,10 @@ class Said:
 
 
 class User:
-    """Answers what is asked until the end is said."""
+    """Answers what is asked until the end is said, or until the question at which this user leaves."""
 
-    def __init__(self, board: Board, period_s: float, report: Callable[[float], None]) -> None:
-        self.board, self.period_s, self.report = board, period_s, report
+    def __init__(self, board: Board, period_s: float, report: Callable[[float], None], leaves: str = "") -> None:
+        self.board, self.period_s, self.report, self.leaves = board, period_s, report, leaves
         self.said = Said()
         self.rest = ""
         self.begins = 0
@@ -79,6 +79,9 @@ class User:
             for line in self.lines():
                 self.said.ended = self.said.ended or line.startswith("end:")
                 if asked := re.match(r"ask (\w+): (.*)", line):
+                    if asked[1] == self.leaves:
+                        self.said.ended = True
+                        break
                     button = getattr(self, "on_" + asked[1].lower())(asked[2])
                     if button:
                         self.press(button)
@@ -167,13 +170,13 @@ class User:
         return "s2"
 
 
-def use(board: Board, values: dict[str, float], report: Callable[[float], None]) -> Said:
-    """Switches the board on and does what it asks for."""
+def use(board: Board, values: dict[str, float], report: Callable[[float], None], leaves: str = "") -> Said:
+    """Switches the board on and does what it asks for, up to the question `leaves`."""
     for key, value in values.items():
         board.set(key, value)
     board.power_up()
     board.run(1)
-    return User(board, 1.0 / board.get("pwm.frequency_hz"), report).work()
+    return User(board, 1.0 / board.get("pwm.frequency_hz"), report, leaves).work()
 
 
 def answers() -> set[str]:
