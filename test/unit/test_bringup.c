@@ -30,6 +30,43 @@ void test_nothing_is_summed_before_a_measurement_begins(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.bringup.left);
 }
 
+void test_a_measurement_waits_for_the_amplitude_and_keeps_its_sums(void)
+{
+    int32_t sum;
+    rig_ready();
+    rig_currents(1000, -500);
+    bringup_measure(&drive, 0);
+    bringup_add(&drive, 0);
+    TEST_ASSERT_EQUAL_UINT16(SUM_PERIODS, drive.run.bringup.left);
+    rig_tick(SUM_PERIODS);
+    TEST_ASSERT_TRUE(drive.run.bringup.ready);
+    sum = drive.run.bringup.sum_a;
+    drive.run.bringup.left = 5;
+    rig_tick(3);
+    TEST_ASSERT_EQUAL_INT32(sum, drive.run.bringup.sum_a);
+}
+
+void test_the_amplitudes_bound_is_1_6_times_what_the_resistance_takes_and_dead_time(void)
+{
+    float volts = 1.6F * 0.3F * 2.75F * (2.67F + 0.05F) + 1.5F * 4.0F / 3.0F * 2e-6F * 20000.0F * 24.0F;
+    TEST_ASSERT_INT16_WITHIN(2, (int16_t)(volts / 24.0F * 2000.0F), BRINGUP_MOST_AMPLITUDE);
+}
+
+void test_the_amplitude_goes_down_half_as_much_again_above_the_current_that_is_asked_for(void)
+{
+    bringup_run_t *t = &drive.run.bringup;
+    t->stop_q13 = 1000;
+    t->amplitude = 100;
+    t->most = 100;
+    TEST_ASSERT_EQUAL_INT16(0, bringup_direction(t, 1490));
+    TEST_ASSERT_EQUAL_INT16(-1, bringup_direction(t, 1510));
+    t->keeps_current = 1;
+    t->most = 100;
+    TEST_ASSERT_EQUAL_INT16(-1, bringup_direction(t, 900)); /* at its bound, whatever the signals say */
+    t->most = 101;
+    TEST_ASSERT_EQUAL_INT16(1, bringup_direction(t, 900));
+}
+
 void test_to_the_six_directions_and_no_further_than_the_share_of_the_current(void)
 {
     until(BRINGUP_STEP_AMMETER);

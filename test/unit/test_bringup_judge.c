@@ -17,7 +17,9 @@ typedef struct {
     uint16_t no_high, no_low;
 } board_t;
 
-static const board_t right = { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 0, 0 };
+#define CONNECTED { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F } /* drivers, signals and gains as they should be */
+
+static const board_t right = { CONNECTED, 0, 0, 0 };
 static const float full_a = 0.8F;
 
 void setUp(void)
@@ -71,7 +73,7 @@ void test_each_way_of_wiring_is_told_from_the_others(void)
         board_t board;
         bringup_wiring_t expected; /* dead, legs, inverted, open, high, low */
     } cases[] = {
-        { "right", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 0, 0 }, { 0, { 0, 1 }, 0, 0, 0, 0 } },
+        { "right", { CONNECTED, 0, 0, 0 }, { 0, { 0, 1 }, 0, 0, 0, 0 } },
         { "signals swapped", { { 0, 1, 2 }, { 1, 0 }, { 1.0F, 1.0F }, 0, 0, 0 }, { 0, { 1, 0 }, 0, 0, 0, 0 } },
         { "drivers A and B swapped", { { 1, 0, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 0, 0 }, { 0, { 1, 0 }, 0, 0, 0, 0 } },
         { "drivers B and C swapped", { { 0, 2, 1 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 0, 0 }, { 0, { 0, 2 }, 0, 0, 0, 0 } },
@@ -83,13 +85,13 @@ void test_each_way_of_wiring_is_told_from_the_others(void)
         { "half the gain", { { 0, 1, 2 }, { 0, 1 }, { 0.5F, 1.0F }, 0, 0, 0 }, { 0, { 0, 1 }, 0, 0, 0, 0 } },
         { "signal A dead", { { 0, 1, 2 }, { 0, 1 }, { 0.0F, 1.0F }, 0, 0, 0 }, { 1, { 0, 1 }, 0, 0, 0, 0 } },
         { "signal B dead", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 0.0F }, 0, 0, 0 }, { 2, { 0, 1 }, 0, 0, 0, 0 } },
-        { "A open", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 1, 0, 0 }, { 0, { 0, 1 }, 0, 1, 0, 0 } },
-        { "B open", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 2, 0, 0 }, { 0, { 0, 1 }, 0, 2, 0, 0 } },
-        { "C open", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 4, 0, 0 }, { 0, { 0, 1 }, 0, 4, 0, 0 } },
-        { "nothing flows", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 7, 0, 0 }, { 0, { 0, 1 }, 0, 7, 0, 0 } },
-        { "high side of A", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 1, 0 }, { 0, { 0, 1 }, 0, 0, 1, 0 } },
-        { "high side of C", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 4, 0 }, { 0, { 0, 1 }, 0, 0, 4, 0 } },
-        { "low side of B", { { 0, 1, 2 }, { 0, 1 }, { 1.0F, 1.0F }, 0, 0, 2 }, { 0, { 0, 1 }, 0, 0, 0, 2 } },
+        { "A open", { CONNECTED, 1, 0, 0 }, { 0, { 0, 1 }, 0, 1, 0, 0 } },
+        { "B open", { CONNECTED, 2, 0, 0 }, { 0, { 0, 1 }, 0, 2, 0, 0 } },
+        { "C open", { CONNECTED, 4, 0, 0 }, { 0, { 0, 1 }, 0, 4, 0, 0 } },
+        { "nothing flows", { CONNECTED, 7, 0, 0 }, { 0, { 0, 1 }, 0, 7, 0, 0 } },
+        { "high side of A", { CONNECTED, 0, 1, 0 }, { 0, { 0, 1 }, 0, 0, 1, 0 } },
+        { "high side of C", { CONNECTED, 0, 4, 0 }, { 0, { 0, 1 }, 0, 0, 4, 0 } },
+        { "low side of B", { CONNECTED, 0, 0, 2 }, { 0, { 0, 1 }, 0, 0, 0, 2 } },
     };
     EACH(n, cases) {
         bringup_wiring_t w = wiring(&cases[n].board);
@@ -157,6 +159,56 @@ void test_levels_that_do_not_differ_give_the_largest_resistance_and_no_dead_time
     TEST_ASSERT_EQUAL_UINT16(60000u, bringup_bridge(&same, &same, &w, 2400).resistance_mohm);
     TEST_ASSERT_EQUAL_UINT16(0, bringup_bridge(&same, &same, &w, 2400).dead_time_ns);
     TEST_ASSERT_EQUAL_UINT16(999, bringup_bridge(&none, &none, &w, 2400).b_percent_of_a);
+}
+
+void test_a_side_that_carries_a_quarter_of_the_other_one_turns_on(void)
+{
+    static const struct {
+        int16_t percent; /* of the current of -A in +A */
+        uint16_t high;
+    } cases[] = { { 30, 0 }, { 20, 1 } };
+    EACH(n, cases) {
+        bringup_level_t x = level(&right, full_a, 300);
+        x.a[0] = (current_q13_t)(-x.a[3] * cases[n].percent / 100);
+        TEST_ASSERT_EQUAL_HEX16(cases[n].high, bringup_wiring(&x).high);
+    }
+}
+
+void test_an_eighth_of_the_current_is_a_signal(void)
+{
+    static const struct {
+        int16_t share; /* of the current that is asked for, 1/64 */
+        uint16_t dead;
+    } cases[] = { { 7, 1 }, { 9, 0 } };
+    EACH(n, cases) {
+        bringup_level_t x = level(&right, full_a, 300);
+        uint16_t k;
+        for (k = 0; k < BRINGUP_DIRECTIONS; k++) {
+            x.a[k] = 0;
+        }
+        x.a[0] = (current_q13_t)(BRINGUP_FULL_Q13 / 64 * cases[n].share);
+        x.a[3] = (current_q13_t)-x.a[0];
+        TEST_ASSERT_EQUAL_HEX16(cases[n].dead, bringup_wiring(&x).dead);
+    }
+}
+
+void test_dead_time_is_the_mean_of_both_legs(void)
+{
+    bringup_level_t half = level(&right, 0.4F, amplitude(0.4F, 2.67F, 1.0F)), full = level(&right, 0.8F, amplitude(0.8F, 2.67F, 1.0F));
+    bringup_level_t half_b = level(&right, 0.4F, amplitude(0.4F, 2.67F, 3.0F)), full_b = level(&right, 0.8F, amplitude(0.8F, 2.67F, 3.0F));
+    bringup_wiring_t w = bringup_wiring(&full);
+    half.amplitude[2] = half_b.amplitude[2];
+    half.amplitude[5] = half_b.amplitude[5];
+    full.amplitude[2] = full_b.amplitude[2];
+    full.amplitude[5] = full_b.amplitude[5];
+    TEST_ASSERT_UINT16_WITHIN(60, 2000, bringup_bridge(&half, &full, &w, 2400).dead_time_ns);
+}
+
+void test_amplitude_that_grows_slower_than_the_current_leaves_no_dead_time(void)
+{
+    bringup_level_t half = level(&right, 0.4F, 100), full = level(&right, 0.8F, 300);
+    bringup_wiring_t w = bringup_wiring(&full);
+    TEST_ASSERT_EQUAL_UINT16(0, bringup_bridge(&half, &full, &w, 2400).dead_time_ns);
 }
 
 void test_milliamperes(void)
