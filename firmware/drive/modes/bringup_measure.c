@@ -7,7 +7,7 @@
 
 #define START_MS 100u /* a start charges the drivers first */
 #define SUM_LOG2 10u
-#define SUM_PERIODS (1u << SUM_LOG2)
+#define SUM_PERIODS 1024u
 
 void bringup_measure(drive_t *d, uint16_t wait)
 {
