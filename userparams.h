@@ -50,7 +50,7 @@
 #define POT_LIVE_ZERO 0.0           /* [1]             0 .. 0.2       dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none */
 
 /* ---- Start: align, ramp, hand-over -------------------------------------------------------------------------------- */
-#define LOCK_TIME 18750             /* [periods]       2000 .. 32000  the start's current grows from nothing while it turns five times: 0.938 s */
+#define LOCK_TIME 18750             /* [periods]       2000 .. 64000  the start's current grows from nothing while it turns five times: 0.938 s */
 #define END_SPEED_RPM 1000          /* [rpm]           2 .. 10000     end of the ramp, where the estimator takes over: back-EMF 4.18 V */
 #define OPENLOOP_RAMPSPEED_INCREASERATE 10 /* [count/1024/period] 1 .. 2000      acceleration of the ramp: 715 rpm/s, 1.40 s to the end */
 #define Q_CURRENT_REF_OPENLOOP 1.41 /* [A peak]        0.05 .. 20     current of align and ramp: pull-out torque 0.0844 N m */
@@ -242,7 +242,7 @@
  *   early_erpm                            240 rpm              1200  erpm                           exact  the hand-over may come from here on
  *   bootstrap_periods                    0.01 s                 200  periods                        exact  low sides on before the start
  *   agree_steps                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
- *   wait_steps                            0.2 s                 500  8 periods                      exact  and how long it may take at the end of the ramp
+ *   wait_periods                          0.2 s                4000  periods                        exact  and how long it may take at the end of the ramp
  *
  * limits
  *   current_max_q13                      2.75 A                5120  Q13 A                       -0.000 %  current vector that is asked for

@@ -154,7 +154,7 @@ static void start(void)
     FIELD(early_erpm, PARAM_EARLY_ERPM / pairs, "rpm", erpm, "erpm", "the hand-over may come from here on");
     FIELD(bootstrap_periods, 0.010, "s", period, "periods", "low sides on before the start");
     FIELD(agree_steps, 0.02, "s", slots, "8 periods", "agreement before the hand-over");
-    FIELD(wait_steps, 0.2, "s", slots, "8 periods", "and how long it may take at the end of the ramp");
+    FIELD(wait_periods, 0.2, "s", period, "periods", "and how long it may take at the end of the ramp");
 }
 
 static void limits(void)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
-from tools.common.param_rows import number
+from tools.common.param_rows import number, parameters
 
 from .limits import RPM, digits_down, digits_up
 from .loops import Gains, Plant, current_loop
@@ -37,6 +37,8 @@ LOCK_SWINGS = 32.0
 LOCK_TURNS = number("PARAM_ALIGN_TURNS")
 MOST_BACK_RPM = 230.0
 """The lock is longer where the rotor would be thrown back faster: dead time and the current loop add a tenth."""
+BACK_LOCK_S = 1.6
+"""The longest lock for that alone: more would gain little."""
 LARGEST_RATE = 2000
 LARGEST_END_RPM = 10000.0
 LEAST_ERPM = 100.0
@@ -119,7 +121,7 @@ def needed_torque(motor: Motor, end_rpm: float) -> float:
     return motor.start_torque_nm + motor.coulomb_nm + motor.viscous_nms * end_rpm * RPM
 
 
-QUICK_HZ = 20.0
+QUICK_HZ = number("PARAM_EARLY_HZ")
 
 
 def end_speed(motor: Motor, board: BoardFile, current_a: float, nominal_rpm: float) -> float:
@@ -229,13 +231,13 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
     omega = natural_rad_s(motor, current, inertia)
     damping = damping_nms(motor, plant, gains, omega)
     lock = fixed.get("LOCK_TIME", 0.0) * board.pwm_period_s or lock_by_rule_s(omega)
-    longest = 32000 * board.pwm_period_s
+    longest = float(parameters()["LOCK_TIME"].high) * board.pwm_period_s
     while True:
         lock = min(lock, longest)
         acceleration = rpm_s_of_rate(motor, board, rate)
         trial = try_start(motor, inertia, damping, current, lock, acceleration, end)
         follows = bool(trial.followed.all())
-        if follows and trial.swing_rpm <= CALM_SHARE * end and trial.back_rpm <= MOST_BACK_RPM:
+        if follows and trial.swing_rpm <= CALM_SHARE * end and (trial.back_rpm <= MOST_BACK_RPM or 1.25 * lock > BACK_LOCK_S):
             break
         if "LOCK_TIME" not in fixed and lock < 0.99 * longest and lock < 4.0 * LOCK_SWINGS / omega * 2.0 * math.pi:
             lock *= 1.25

@@ -55,10 +55,11 @@ typedef struct {
     uint16_t bootstrap_periods;
     uint16_t flying_start; /**< catch_step_t: CATCH_FIRST_LOOK or, without FLYING_START, CATCH_NO_LOOK */
     uint16_t align_periods;
-    uint16_t agree_steps, wait_steps; /**< agreement needed for the hand-over, and how long it may take at the end of the ramp */
-    uint16_t align_rate_q12;          /**< by which the current of ALIGN grows every period, Q13 counts * 4096 */
-    int32_t align_speed_q10;          /**< of the forced angle in ALIGN */
-    speed_erpm_t early_erpm;          /**< from this forced speed on the estimator may take over */
+    uint16_t agree_steps;    /**< agreement needed for the hand-over */
+    uint16_t wait_periods;   /**< how long it may take at the end of the ramp */
+    uint16_t align_rate_q12; /**< by which the current of ALIGN grows every period, Q13 counts * 4096 */
+    int32_t align_speed_q10; /**< of the forced angle in ALIGN */
+    speed_erpm_t early_erpm; /**< from this forced speed on the estimator may take over */
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
@@ -134,8 +135,7 @@ typedef struct {
 
 /** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
 typedef struct {
-    uint16_t waited_steps;     /**< at the end of the ramp */
-    uint16_t agreed_steps;     /**< of them, the last ones in which the estimator agreed with the forced speed */
+    uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
     int16_t ahead_erpm;        /**< by how much the estimated speed is ahead of the forced one, in the mean */
     uint16_t speed_is_preset;  /**< 1 from six periods after the hand-over on: the observer runs */
     int16_t offset;            /**< angle that is left of the change of frame, angle counts */
@@ -189,7 +189,7 @@ typedef struct {
     volatile uint16_t state; /**< drive_state_t; written by drive_enter() only */
     volatile uint16_t fault; /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
     volatile uint16_t ticks; /**< periods since power-up, wraps; the background's time base */
-    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP, CATCH and ALIGN count it */
+    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP, CATCH and ALIGN count it, RAMP at its end */
     int16_t direction;       /**< +1 or -1, of the run; of a rotor that was caught backwards until it is reversed */
 
     calibration_t calibration;

@@ -6,12 +6,13 @@
 #include "drive/salient.h"
 #include "drive/state.h"
 
-#define HANDOVER_FALL_SHIFT 7       /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
-#define HANDOVER_FLOOR_SHIFT 3      /**< to an eighth at least */
-#define HANDOVER_SWUNG_SHIFT 5      /**< where the rotor is no longer slower than by 1/32 */
-#define HANDOVER_MEAN_SHIFT 5       /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
-#define HANDOVER_HURRY 3            /**< times the ramp's rate, once the estimator should have agreed */
-#define HANDOVER_MOST_OFFSET 0x2000 /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
+#define HANDOVER_FALL_SHIFT 7                           /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
+#define HANDOVER_FLOOR_SHIFT 3                          /**< to an eighth at least */
+#define HANDOVER_SWUNG_SHIFT 5                          /**< where the rotor is no longer slower than by 1/32 */
+#define HANDOVER_MEAN_SHIFT 5                           /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
+#define HANDOVER_HURRY 3                                /**< times the ramp's rate, once the estimator should have agreed */
+#define HANDOVER_MOST_STEPS(p) ((p)->wait_periods >> 2) /**< 0.4 s of agreement: a rotor's swing has come to where the current pulls it */
+#define HANDOVER_MOST_OFFSET 0x2000                     /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
  *  error of the estimator's angle into torque. */
@@ -53,17 +54,20 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
         return;
     }
     most = (int16_t)(forced >> (handover_agrees(h, p) ? 1 : 2));
-    h->waited_steps = (uint16_t)(at_end ? h->waited_steps + 1u : 0u);
+    d->periods = (uint16_t)(at_end ? d->periods + SLOW_PHASES : 0);
     h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
     if (handover_agrees(h, p)) {
         d->forced.increase_q10 = 0; /* the speed waits */
         handover_release(d, p);
+        if (h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
+            drive_raise(d, FAULT_START_FAILED);
+        }
         return;
     }
     d->run.control.ref_q13.q = along_direction(d, p->open_loop_q13);
     d->forced.increase_q10 = (int16_t)((forced > p->early_erpm + (p->early_erpm >> 1)) ? HANDOVER_HURRY * p->forced.increase_rate_q10
                                                                                        : p->forced.increase_rate_q10);
-    if (h->waited_steps >= p->wait_steps) {
+    if (d->periods >= p->wait_periods) {
         drive_raise(d, FAULT_START_FAILED);
     }
 }

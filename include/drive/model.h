@@ -36,7 +36,7 @@ QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
 {
     if (drive_is_closed(d)) {
         model_learn(&d->run, p);
-    } else if (d->state == (uint16_t)DRIVE_RAMP && d->run.handover.waited_steps != 0u) {
+    } else if (d->state == (uint16_t)DRIVE_RAMP && d->periods != 0u) {
         model_learn_flux(&d->run, p);
     } else {
         /* nothing turns that the estimator could see */

@@ -116,7 +116,7 @@
         .align_speed_q10 = (int32_t)((PARAM_ALIGN_TURNS * 67108864l + LOCK_TIME / 2) / LOCK_TIME), \
         .early_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_EARLY_ERPM)), \
         .agree_steps = PARAM_SLOW_STEPS(0.02F), \
-        .wait_steps = PARAM_SLOW_STEPS(0.2F), \
+        .wait_periods = PARAM_PERIODS(0.2F), \
         .open_loop_q13 = CURRENT_Q13(Q_CURRENT_REF_OPENLOOP), \
         .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
         .burn_most_q13 = PARAM_BURNS ? CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * 31.0F / 32.0F) : 0, \

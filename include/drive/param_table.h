@@ -38,7 +38,7 @@
     X(POT_LIVE_ZERO, "1", 0, 0.2, 0.0, "dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none")
 
 #define PARAM_START(X) /* Start: align, ramp, hand-over */ \
-    X(LOCK_TIME, "periods", 2000, 32000, FROM_TUNER, "the start's current grows from nothing while it turns five times") \
+    X(LOCK_TIME, "periods", 2000, 64000, FROM_TUNER, "the start's current grows from nothing while it turns five times") \
     X(END_SPEED_RPM, "rpm", 2, 10000, FROM_TUNER, "end of the ramp, where the estimator takes over") \
     X(OPENLOOP_RAMPSPEED_INCREASERATE, "count/1024/period", 1, 2000, FROM_TUNER, "acceleration of the ramp") \
     X(Q_CURRENT_REF_OPENLOOP, "A peak", 0.05, 20, FROM_TUNER, "current of align and ramp") \

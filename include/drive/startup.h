@@ -26,7 +26,6 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     angle_t forced = (angle_t)(estimated - quarter);
     dq_t v = c->v_q14;
 
-    run->handover.waited_steps = 0;
     run->handover.agreed_steps = 0;
     run->handover.ahead_erpm = 0;
     run->handover.speed_is_preset = 0;

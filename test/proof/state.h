@@ -32,7 +32,6 @@ static void any_drive(uint16_t state)
     drive.forced.speed_q10 = any_l(-forced_max, forced_max);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
     drive.forced.increase_q10 = any(0, HANDOVER_HURRY * params.forced.increase_rate_q10);
-    drive.run.handover.waited_steps = ANYU16();
     drive.run.handover.agreed_steps = ANYU16();
     drive.run.handover.speed_is_preset = any_u(0, 1);
     drive.run.handover.offset = ANY16();

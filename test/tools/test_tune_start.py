@@ -43,8 +43,7 @@ def test_every_motor_s_start_keeps_the_rules(name):
     assert minimum_rpm <= 0.2 * d.motor.rated_speed_rpm and minimum_rpm <= d.value("END_SPEED_RPM")
     assert s.follows and len(s.trial.labels) == 48
     assert s.trial.back_rpm < 1.2 * start.MOST_BACK_RPM
-    longest = s.lock_s >= 0.99 * 32000 * d.board.pwm_period_s
-    assert s.trial.swing_rpm <= (start.LOUD_SHARE if longest else start.CALM_SHARE) * s.end_speed_rpm
+    assert s.trial.swing_rpm <= start.CALM_SHARE * s.end_speed_rpm
 
 
 def test_numbers_of_the_rules():
@@ -68,7 +67,7 @@ def test_numbers_of_the_rules():
 
 def test_more_inertia_means_a_longer_lock_and_a_slower_ramp():
     light, heavy = designed(), designed(more='[load]\ninertia = { value = 4e-4, unit = "kg m2" }\n')
-    assert heavy.value("LOCK_TIME") > 1.5 * light.value("LOCK_TIME")
+    assert heavy.value("LOCK_TIME") > 2.0 * light.value("LOCK_TIME")
     assert heavy.start_up.acceleration_rpm_s < light.start_up.acceleration_rpm_s
     assert 4.055e-4 * heavy.start_up.acceleration_rpm_s * math.pi / 30 < 0.2 * heavy.start_up.pull_out_nm
 
@@ -98,11 +97,11 @@ def test_the_speed_backwards_is_that_of_the_worst_angle_and_a_heavy_rotor_s_is_s
 
 def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau_and_the_lock_lengthened_until_the_rotor_is_calm():
     free = replace(MOTOR, coulomb_nm=0.0, viscous_nms=0.0, start_torque_nm=0.0)
-    endless = start.try_start(free, 5.5e-6, 1e-5, 1.41, 0.2, 715.0, 1000.0, angles=12)
-    assert endless.followed.all() and endless.swing_rpm > 150.0
+    endless = start.try_start(free, 5.5e-6, 1e-5, 1.41, 0.1, 715.0, 1000.0, angles=12)
+    assert endless.followed.all() and endless.swing_rpm > 200.0
     assert tried().swing_rpm < 10.0
-    bare = designed(("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0")).start_up
-    assert bare.lock_s > 1.2 * designed().start_up.lock_s
+    bare = designed(*NO_FRICTION).start_up
+    assert bare.lock_s > 1.4 * designed().start_up.lock_s
     assert bare.trial.swing_rpm <= start.CALM_SHARE * bare.end_speed_rpm
 
 
@@ -117,7 +116,8 @@ SMALL = (("pole_pairs = { value = 5", "pole_pairs = { value = 1"), ("value = 2.6
 
 @pytest.mark.parametrize("changes, more, warning", [
     ((), "[tune]\nQ_CURRENT_REF_OPENLOOP = 0.1\n", "may not follow the ramp"),
-    ((*NO_FRICTION, ("value = 5.5e-6", "value = 6e-5")), "", r"still swings by \d+ rpm when the estimator takes over at \d+ rpm.*: add \[mechanical\] coulomb_friction"),
+    ((*NO_FRICTION, ("value = 5.5e-6", "value = 6e-5")), "[tune]\nLOCK_TIME = 2000\n", r"may not follow.*0 N m\): add \[mechanical\] coulomb_friction"),
+    (NO_FRICTION, "[tune]\nLOCK_TIME = 4000\n", r"still swings by \d+ rpm when the estimator takes over at \d+ rpm.*: add \[mechanical\] coulomb_friction"),
     # on the virtual board 24 of 72 starts of this motor succeed; with 0.15 mH all
     ((*SMALL, ("value = 1.92", "value = 0.1")), "", "put chokes into the motor's leads")])
 def test_a_start_that_may_fail_is_warned_about_once_with_the_line_to_add(changes, more, warning):
@@ -127,5 +127,5 @@ def test_a_start_that_may_fail_is_warned_about_once_with_the_line_to_add(changes
 
 def test_a_small_inductance_lets_the_swing_grow():
     assert designed(*SMALL, ("value = 1.92", "value = 0.1")).start_up.damping < 0.0
-    large = designed(*SMALL, ("value = 1.92", "value = 1.0")).warnings
+    large = designed(*SMALL, ("value = 1.92", "value = 0.5")).warnings
     assert not any("chokes" in warning or "swings" in warning for warning in large), large

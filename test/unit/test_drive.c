@@ -150,12 +150,13 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off_in_both_dir
 
 void test_reverse_is_the_mirror_image_phases_b_and_c_swapped(void)
 {
-    static duties_t mirror[40]; /* longer, and open integrators collect rounding */
+    static duties_t mirror[100]; /* longer, and open integrators collect rounding */
     EACH_DIRECTION(direction) {
         rig_lock(direction);
         drive.periods = (uint16_t)(params.align_periods - 200u); /* dead time's compensation would show a count of a small current */
-        drive.forced.speed_q10 = 32 * 1024;                               /* whole counts: a rest rounds down either way */
-        drive.forced.angle_q32 = 0;
+        drive.forced.angle_q32 = (direction > 0) ? 0xC0000000u : 0x40000000u;
+        drive.angle = forced_angle(&drive.forced);
+        drive.frame = trig_sincos(drive.angle);
         EACH(n, mirror) {
             int16_t i_a = (int16_t)(n * 16), i_b = (int16_t)(300 - (int16_t)n * 12);
             rig_currents(i_a, (direction > 0) ? i_b : (int16_t)(-i_a - i_b));

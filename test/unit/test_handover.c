@@ -9,7 +9,7 @@ static void at_the_end_of_the_ramp(int16_t direction)
 {
     rig_lock(direction);
     drive.state = (uint16_t)DRIVE_RAMP;
-    drive.run.handover.waited_steps = 0;
+    drive.periods = 0;
     drive.forced.speed_q10 = params.forced.end_speed_q10;
     drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
     rig_speed((int16_t)(direction * 4800));
@@ -95,7 +95,7 @@ void test_agreement_counts_from_the_early_speed_on_and_waiting_at_the_end_of_the
                 forced_ahead(0x3800); /* not due: the drive goes on counting */
                 slow(8);
                 TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].counts * steps, drive.run.handover.agreed_steps, golden_row(n));
-                TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.run.handover.waited_steps, golden_row(n));
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.periods, golden_row(n));
             }
             EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, golden_row(n));
         }
@@ -194,6 +194,25 @@ void test_agreement_must_be_without_a_gap(void)
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
 
+void test_rotor_that_never_comes_to_where_the_current_pulls_it_is_START_FAILED(void)
+{
+    EACH_DIRECTION(direction) {
+        uint16_t steps;
+        rig_power_up();
+        at_the_end_of_the_ramp(direction);
+        for (steps = 0; drive.state == (uint16_t)DRIVE_RAMP && steps < 2000u; steps++) {
+            force(4000.0F);
+            rig_speed((int16_t)(direction * 3800)); /* agrees, and slower than the current turns */
+            forced_ahead((int16_t)(direction * 0x3800));
+            slow(8);
+            slow(9);
+        }
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_START_FAILED, drive.fault);
+        TEST_ASSERT_EQUAL_UINT16(1050, steps); /* 20 ms of agreement and 0.4 s */
+    }
+}
+
 void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_one_only(void)
 {
     uint16_t n;
@@ -202,7 +221,7 @@ void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_on
     for (n = 1; n <= 8u; n++) {
         slow(n);
         TEST_ASSERT_EQUAL_UINT16(params.agree_steps - (n < 8u), drive.run.handover.agreed_steps);
-        TEST_ASSERT_EQUAL_UINT16(n == 8u, drive.run.handover.waited_steps);
+        TEST_ASSERT_EQUAL_UINT16((n == 8u) ? 8 : 0, drive.periods);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */
     }
     for (n = 8; n <= 17u; n++) {

@@ -100,7 +100,7 @@ void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void
     for (uint16_t waited = 0; waited < 2u; waited++) {
         teachable(1);
         drive.state = (uint16_t)DRIVE_RAMP;
-        drive.run.handover.waited_steps = waited;
+        drive.periods = waited;
         drive.ticks = 6;
         drive_slow(&drive, &params, samples.v_bus);
         TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);

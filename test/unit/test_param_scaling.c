@@ -234,7 +234,7 @@ void test_speeds_and_times(void)
     EXACT(p.align_speed_q10, 5l * 67108864 / LOCK_TIME); /* five turns */
     EXACT(p.early_erpm, 3125);                           /* 1.25 times the minimum speed */
     EXACT(p.agree_steps, 50);                            /* 20 ms */
-    EXACT(p.wait_steps, 500);                   /* 200 ms */
+    EXACT(p.wait_periods, 4000);                /* 200 ms */
     EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
     EXACT(p.stall_steps, 575);                           /* 0.23 s */
     EXACT(p.lost_lock_steps, 125);                       /* 50 ms */
