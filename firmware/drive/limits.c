@@ -1,6 +1,7 @@
 /* Why the drive gives less than it is asked for, read off its variables. */
 #include "drive/limits.h"
 
+#include "drive/handover.h"
 #include "drive/modes/modes.h"
 #include "drive/reference.h"
 #include "drive/state.h"
@@ -54,6 +55,15 @@ static uint16_t closed_loop_reasons(const drive_t *d, const drive_params_t *p)
     return found;
 }
 
+/** The estimator's speed is right in the mean, but not for long enough. */
+static uint16_t start_swings(const drive_t *d, const drive_params_t *p)
+{
+    const handover_t *h = &d->run.handover;
+    int16_t forced = handover_forced_erpm(d, p);
+    return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && mode_hands_over() && handover_is_overdue(forced, p) && !handover_agrees(h, p)
+                      && qm_abs(h->ahead_erpm) < forced >> 3);
+}
+
 uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
 {
     const drive_control_t *c = &d->run.control;
@@ -67,6 +77,10 @@ uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
     }
     if (drive_is_closed(d)) {
         found |= closed_loop_reasons(d, p);
+    } else if (start_swings(d, p)) {
+        found |= (uint16_t)LIMIT_SWING;
+    } else {
+        /* bootstrap, align, and a ramp that goes as it should */
     }
     return found;
 }

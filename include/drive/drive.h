@@ -136,6 +136,7 @@ typedef struct {
 /** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
 typedef struct {
     uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
+    uint16_t is_due;           /**< 1: the next period hands over */
     int16_t ahead_erpm;        /**< by how much the estimated speed is ahead of the forced one, in the mean */
     uint16_t speed_is_preset;  /**< 1 from six periods after the hand-over on: the observer runs */
     int16_t offset;            /**< angle that is left of the change of frame, angle counts */

@@ -35,6 +35,21 @@ QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params
     return (int16_t)(qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> 11);
 }
 
+/** 1 from the forced speed on at which the estimator should have agreed. */
+QM_INLINE uint16_t handover_is_overdue(speed_erpm_t forced, const drive_params_t *p)
+{
+    return (uint16_t)(forced > p->early_erpm + (p->early_erpm >> 1));
+}
+
+/** 1 where the current pulls the rotor, or cannot fall further and the rotor has swung to where the floor pulls it: while it falls behind it is slower
+ *  than the speed that the closed loop begins with, and loses more of it before the observer knows. @param ahead_erpm of the forced speed */
+QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, speed_erpm_t forced, int16_t ahead_erpm)
+{
+    int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
+    return (uint16_t)(qm_abs(offset) <= HANDOVER_MOST_OFFSET
+                      || (qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
+}
+
 /* wcet: handover_wait/qm_sub_limited excludes speed_step */
 /** In RAMP, every eighth period: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
@@ -42,13 +57,14 @@ QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params
 QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
-    int16_t forced, ahead, most;
+    int16_t forced, seen, ahead, most;
     uint16_t at_end = (uint16_t)(d->forced.speed_q10 >= p->forced.end_speed_q10);
     if (!mode_hands_over()) {
         return;
     }
     forced = handover_forced_erpm(d, p);
-    ahead = qm_clamp(qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), forced), -16383, 16383);
+    seen = along_direction(d, estimator_speed(&d->run.estimator));
+    ahead = qm_clamp(qm_sub_limited(seen, forced), -16383, 16383);
     h->ahead_erpm = (int16_t)(h->ahead_erpm + ((ahead - h->ahead_erpm) >> HANDOVER_MEAN_SHIFT));
     if (!at_end && forced < p->early_erpm) { /* the two may be one speed, which is counted down */
         return;
@@ -59,24 +75,18 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     if (handover_agrees(h, p)) {
         d->forced.increase_q10 = 0; /* the speed waits */
         handover_release(d, p);
-        if (h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
+        h->is_due = handover_is_due(d, p, forced, ahead);
+        d->run.control.reference_erpm = along_direction(d, (seen > forced) ? seen : forced); /* a rotor that swings ahead is not braked */
+        if (!h->is_due && h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
             drive_raise(d, FAULT_START_FAILED);
         }
         return;
     }
     d->run.control.ref_q13.q = along_direction(d, p->open_loop_q13);
-    d->forced.increase_q10 = (int16_t)((forced > p->early_erpm + (p->early_erpm >> 1)) ? HANDOVER_HURRY * p->forced.increase_rate_q10
-                                                                                       : p->forced.increase_rate_q10);
+    d->forced.increase_q10 = (int16_t)(handover_is_overdue(forced, p) ? HANDOVER_HURRY * p->forced.increase_rate_q10 : p->forced.increase_rate_q10);
     if (d->periods >= p->wait_periods) {
         drive_raise(d, FAULT_START_FAILED);
     }
-}
-
-/** The speed that the closed loop begins with: a rotor that swings ahead of the forced angle is not braked. */
-QM_INLINE speed_erpm_t handover_reference(const drive_t *d, const drive_params_t *p)
-{
-    int16_t forced = handover_forced_erpm(d, p), seen = along_direction(d, estimator_speed(&d->run.estimator));
-    return (seen > forced) ? seen : forced;
 }
 
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
@@ -104,28 +114,15 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     h->id_q13 = c->ref_q13.d;
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
-    c->reference_erpm = along_direction(d, handover_reference(d, p));
     d->angle = estimated;
     d->frame = trig_sincos(estimated);
     drive_enter(d, DRIVE_CLOSED);
 }
 
-/** 1 where the current pulls the rotor, or cannot fall further and the rotor has swung to where the floor pulls it: while it falls behind it is slower
- *  than the speed that the closed loop begins with, and loses more of it before the observer knows. */
-QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p)
-{
-    int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator)), forced = handover_forced_erpm(d, p);
-    if (qm_abs(offset) <= HANDOVER_MOST_OFFSET) {
-        return 1;
-    }
-    return (uint16_t)(qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT)
-                      && qm_sub_limited(along_direction(d, estimator_speed(&d->run.estimator)), forced) >= -(forced >> HANDOVER_SWUNG_SHIFT));
-}
-
-/** In RAMP, every eighth period: hands over once the estimator has agreed long enough and the current is right for it. */
+/** In RAMP, in the period after handover_wait(), which has time for one of the two. */
 QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
 {
-    if (handover_agrees(&d->run.handover, p) && handover_is_due(d, p)) {
+    if (d->run.handover.is_due) {
         handover_now(d, p);
     }
 }

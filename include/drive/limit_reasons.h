@@ -24,7 +24,9 @@
     X(128, TOO_FAST, "the start waits for a rotor that turns faster than MAXIMUM_SPEED_RPM, or holds the bus above OVER_VOLTAGE_V", \
       "wait until it has slowed down; a bus that does not fall meanwhile is the supply's: OVERVOLTAGE") \
     X(256, BURN, "the bus takes no more braking current: d current burns the rotor's energy in the winding, within MAXIMUM_CURRENT_A", \
-      "nothing to do, but mind the winding's temperature where a heavy rotor is stopped again and again")
+      "nothing to do, but mind the winding's temperature where a heavy rotor is stopped again and again") \
+    X(512, SWING, "the hand-over waits for a rotor that swings about the ramp's speed", \
+      "make tune with the load's inertia in the motor file; or raise LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE")
 
 #define DRIVE_LIMIT_ENUM(bit, name, cause, remedy) LIMIT_##name = (bit),
 /** Reasons as bits. */

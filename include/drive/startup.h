@@ -27,6 +27,7 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     dq_t v = c->v_q14;
 
     run->handover.agreed_steps = 0;
+    run->handover.is_due = 0;
     run->handover.ahead_erpm = 0;
     run->handover.speed_is_preset = 0;
     run->handover.offset = 0;

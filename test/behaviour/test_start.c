@@ -140,6 +140,36 @@ void test_blocked_shaft_and_a_load_beyond_the_start_current_fault_by_name_in_two
     expect_a_failed_start();
 }
 
+/** Starts and counts the moments, every millisecond of RAMP, in which the drive says that the start swings. */
+static int swing_said_ms(void)
+{
+    int said = 0;
+    press("input.s2");
+    for (int ms = 0; ms < 3000 && board_drive.fault == 0 && board_drive.state != DRIVE_CLOSED; ms++) {
+        wait_s(0.001);
+        said += (board_drive.state == DRIVE_RAMP && ((int)get("fw.limits") & LIMIT_SWING) != 0);
+    }
+    return said;
+}
+
+void test_a_rotor_that_swings_is_said_to_and_a_calm_or_blocked_one_is_not(void)
+{
+    power_on();
+    TEST_ASSERT_EQUAL_INT(0, swing_said_ms());
+    TEST_ASSERT_EQUAL_INT(DRIVE_CLOSED, board_drive.state);
+    bench_set_up();
+    set("load.locked", 1.0);
+    power_on();
+    TEST_ASSERT_EQUAL_INT(0, swing_said_ms());
+    assert_fault(FAULT_START_FAILED);
+    bench_set_up();
+    set("mech.inertia_kgm2", 4.0 * get("mech.inertia_kgm2"));
+    set("mech.coulomb_nm", 0.0);
+    set("mech.viscous_nms", 0.0);
+    power_on();
+    TEST_ASSERT_GREATER_THAN_INT(50, swing_said_ms());
+}
+
 void test_outputs_stay_off_until_s2(void)
 {
     TEST_ASSERT_EQUAL_INT(0, vb_power_up(bench));

@@ -322,6 +322,7 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         drive.state = (uint16_t)DRIVE_STOPPING;
         drive.command.target_erpm = (int16_t)(direction * -6000);
         drive.run.handover.agreed_steps = 99; /* of the start long ago */
+        drive.run.handover.is_due = 1;
         drive.run.estimator.rho_q32 = 0x12340000ul;
         drive.run.control.v_q14 = v_q14;
         drive.run.control.burn_q13 = 2000;
@@ -338,6 +339,7 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         TEST_ASSERT_INT32_WITHIN(100, -2400L * 3579 / 64, drive.forced.speed_q10);
         TEST_ASSERT_EQUAL_INT16(-direction * params.open_loop_q13, drive.run.control.ref_q13.q);
         TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.is_due);
         /* the current lies along the rotor's flux */
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)estimator_next_angle(&drive.run.estimator), (int16_t)(angle_t)(drive.angle - (angle_t)(direction * 0x4000)));
     }

@@ -164,19 +164,27 @@ void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_
     TEST_ASSERT_EQUAL_INT16(0, drive.forced.increase_q10); /* it waits for the hand-over */
 }
 
+/** The hand-over at this forced and this estimated speed, where the current pulls the rotor. */
+static void begin_closed_loop(float forced_erpm, int16_t speed_erpm)
+{
+    drive.run.handover.agreed_steps = params.agree_steps;
+    force(forced_erpm);
+    rig_speed(speed_erpm);
+    forced_ahead(0);
+    slow(8);
+    slow(9);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+}
+
 void test_closed_loop_begins_with_the_faster_one_of_forced_and_estimated_speed(void)
 {
     EACH_DIRECTION(direction) {
         at_the_end_of_the_ramp(direction);
-        force(1500.0F);
-        rig_speed((int16_t)(direction * 1300));
-        handover_now(&drive, &params);
-        TEST_ASSERT_INT16_WITHIN(8, (int16_t)(direction * 1496), drive.run.control.reference_erpm);
+        begin_closed_loop(4500.0F, (int16_t)(direction * 4300));
+        TEST_ASSERT_INT16_WITHIN(8, (int16_t)(direction * 4496), drive.run.control.reference_erpm);
         at_the_end_of_the_ramp(direction);
-        force(1500.0F);
-        rig_speed((int16_t)(direction * 1800));
-        handover_now(&drive, &params);
-        TEST_ASSERT_EQUAL_INT16(direction * 1800, drive.run.control.reference_erpm);
+        begin_closed_loop(4500.0F, (int16_t)(direction * 4800));
+        TEST_ASSERT_EQUAL_INT16(direction * 4800, drive.run.control.reference_erpm);
     }
 }
 
@@ -292,10 +300,11 @@ void test_rotor_that_falls_back_is_handed_over_with_the_current_that_is_left(voi
     TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
     TEST_ASSERT_INT16_WITHIN(20, 1021, drive.run.control.ref_q13.q); /* 2625 (253/256)^80, and a count a step */
     forced_ahead(0x1800);
+    slow(8);
     slow(9);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-    TEST_ASSERT_INT16_WITHIN(20, 1021, drive.run.handover.current_q13);
-    TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1021 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
+    TEST_ASSERT_INT16_WITHIN(20, 1008, drive.run.handover.current_q13); /* a step later */
+    TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1008 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
 }
 
 void test_rotor_that_still_swings_back_at_the_floor_is_waited_for(void)
@@ -311,6 +320,7 @@ void test_rotor_that_still_swings_back_at_the_floor_is_waited_for(void)
             drive.run.control.ref_q13.q = (int16_t)(direction * (params.open_loop_q13 >> 3));
             rig_speed((int16_t)(direction * cases[n].speed_erpm));
             forced_ahead(cases[n].offset);
+            slow(8);
             slow(9);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
         }
@@ -343,6 +353,7 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.run.estimator.rho_q32 = (uint32_t)estimated << 16;
     drive.run.estimator.half_step_q16_rad = 0;
     rig_speed((int16_t)(direction * 4800));
+    drive.run.control.reference_erpm = (int16_t)(direction * FORCED_ERPM); /* as handover_wait() leaves it */
     drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
     drive.run.control.v_q14.d = v_d;
     drive.run.control.v_q14.q = v_q;
