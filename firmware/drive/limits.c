@@ -60,7 +60,10 @@ static uint16_t start_swings(const drive_t *d, const drive_params_t *p)
 {
     const handover_t *h = &d->run.handover;
     int16_t forced = handover_forced_erpm(d, p);
-    return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && mode_hands_over() && handover_is_overdue(forced, p) && !handover_agrees(h, p)
+    if (!mode_hands_over()) {
+        return 0;
+    }
+    return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && handover_is_overdue(forced, p) && !handover_agrees(h, p)
                       && qm_abs(h->ahead_erpm) < forced >> 3);
 }
 

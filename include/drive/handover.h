@@ -50,6 +50,20 @@ QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, sp
                       || (qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
 }
 
+/** While the estimator agrees: the speed waits, the current falls, and what the closed loop begins with is ready. A rotor that swings ahead is not braked.
+ *  @param forced,seen speeds along the direction @param ahead_erpm of the forced speed */
+QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_t forced, speed_erpm_t seen, int16_t ahead_erpm)
+{
+    handover_t *h = &d->run.handover;
+    d->forced.increase_q10 = 0;
+    handover_release(d, p);
+    h->is_due = handover_is_due(d, p, forced, ahead_erpm);
+    d->run.control.reference_erpm = along_direction(d, (seen > forced) ? seen : forced);
+    if (!h->is_due && h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
+        drive_raise(d, FAULT_START_FAILED);
+    }
+}
+
 /* wcet: handover_wait/qm_sub_limited excludes speed_step */
 /** In RAMP, every eighth period: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
@@ -73,13 +87,7 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     d->periods = (uint16_t)(at_end ? d->periods + SLOW_PHASES : 0);
     h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
     if (handover_agrees(h, p)) {
-        d->forced.increase_q10 = 0; /* the speed waits */
-        handover_release(d, p);
-        h->is_due = handover_is_due(d, p, forced, ahead);
-        d->run.control.reference_erpm = along_direction(d, (seen > forced) ? seen : forced); /* a rotor that swings ahead is not braked */
-        if (!h->is_due && h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
-            drive_raise(d, FAULT_START_FAILED);
-        }
+        handover_prepare(d, p, forced, seen, ahead);
         return;
     }
     d->run.control.ref_q13.q = along_direction(d, p->open_loop_q13);

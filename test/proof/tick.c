@@ -324,6 +324,6 @@ void proof_limits_reasons(void)
         uint16_t reasons;
         any_state(state);
         reasons = limits_reasons(&drive, &params);
-        //@ check known: reasons <= 511;
+        //@ check known: reasons <= 1023;
     }
 }

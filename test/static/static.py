@@ -72,6 +72,9 @@ def run(command: list[str]) -> str:
     except OSError as error:
         print(f"foc33: {command[0]}, static checks: cannot be run ({error.strerror}); make static installs it", file=sys.stderr)
         sys.exit(2)
+    if done.returncode < 0:
+        print(f"foc33: {command[0]}, static checks: ended by signal {-done.returncode}; run them again", file=sys.stderr)
+        sys.exit(2)
     if done.returncode != 0 and not done.stdout.strip():
         return f"{command[0]} ended with code {done.returncode}"
     return done.stdout
@@ -111,15 +114,17 @@ def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -
 
 def cppcheck(sources: list[str]) -> list[Finding]:
     """Its own checks and those of its MISRA addon, with the target's type sizes: every preprocessor configuration without the parameters'
-    start values, which are most of the text of each, then them in the one configuration that is delivered."""
+    start values, which are most of the text of each, then the source that has them in the one configuration that is delivered."""
     # Its preprocessor expands a parameter's name before ## and #: these files, which end as nothing, are not the compiler's.
     sources = [source for source in sources if source not in ("firmware/drive/param_text.c", "firmware/drive/param_check.c")]
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
         Path(folder, "drive").mkdir()
         Path(folder, "drive", "param_init.h").write_text("#define DRIVE_PARAMS_INIT {0}\n")
-        every, delivered = each(lambda options: one_cppcheck(options, sources), [["--force", f"-I{folder}"], ["--max-configs=1"]])
-    # What is never used is so in both.
-    found = {finding for finding in every ^ delivered if finding.check not in UNUSED} | (every & delivered)
+        with_values = [source for source in sources if '"drive/param_init.h"' in Path(source).read_text()]
+        every, delivered = each(lambda job: one_cppcheck(*job), [(["--force", "-U__clang__", f"-I{folder}"], sources), (["--max-configs=1"], with_values)])
+    # What is never used is so in both, where both look.
+    seen = set(run([os.environ.get("CC", "gcc"), "-MM", *INCLUDES, *with_values]).split())
+    found = {f for f in every ^ delivered if f.check not in UNUSED or (f in every and f.file not in seen)} | (every & delivered)
     return sorted((finding for finding in found if not finding.file.startswith("build/")), key=lambda f: (f.check, f.file, f.line))
 
 
