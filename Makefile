@@ -41,7 +41,11 @@ compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFI
 board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
 board_includes := $(board_rooms:%=-I%)
 firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c firmware/*/*/*.c) tools/cpu_host/xc.c)
-board_objects := $(patsubst %.c,$B/%.o,$(filter-out tools/cpu_host/xc.c,$(wildcard $(board_rooms:%=%/*.c))))
+# All variants share the board but for its view into the firmware, unless they compile in a way of their own.
+own_way := $(SAN)$(WERROR)$(filter command%,$(origin CC) $(origin CFLAGS) $(origin warnings))
+board_folder := $(if $(own_way),$B,build/board)
+probe := $B/tools/cpu_host/probe.o
+board_objects := $(probe) $(patsubst %.c,$(board_folder)/%.o,$(filter-out tools/cpu_host/xc.c tools/cpu_host/probe.c,$(wildcard $(board_rooms:%=%/*.c))))
 
 part_makefiles := $(wildcard tools/make/*.mk)
 
@@ -249,6 +253,18 @@ $B/params: $B/flags $(params_source)
 
 $(board_objects): private INCLUDES += $(board_includes)
 
+ifeq ($(own_way),)
+board_compile = $(CC) $(CFLAGS) $(warnings) -Itools/cpu_host -Iinclude -I. $(board_includes)
+
+build/board/flags: FORCE
+	$(call remember,$(board_compile))
+
+# Two variants may do this at the same time.
+build/board/%.o: %.c build/board/flags
+	@mkdir -p $(@D)
+	$(call say,cc,$<)$(board_compile) -MMD -MP -MF $@.$$$$.d -MT $@ -c $< -o $@.$$$$ && mv -f $@.$$$$.d $(@:.o=.d) && mv -f $@.$$$$ $@
+endif
+
 $B/%.o: %.c $B/flags | $B/params
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
@@ -399,7 +415,7 @@ c_executables := $(addprefix $T/,$(unit_c) $(board_c) $(behaviour_c))
 $(c_executables): %: %.o %_runner.o $T/unity.o $T/cmock.o
 	$(quiet)$(CC) $(sanitizer) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lm
 $(addprefix $T/,$(unit_c)): $B/libfirmware.a
-$(addprefix $T/,$(board_c)): $(filter-out %/probe.o,$(board_objects)) $B/tools/cpu_host/xc.o
+$(addprefix $T/,$(board_c)): $(filter-out $(probe),$(board_objects)) $B/tools/cpu_host/xc.o
 $(addprefix $T/,$(behaviour_c)): $(board_objects) $B/libfirmware.a
 
 $T/made/%:
@@ -428,6 +444,6 @@ sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCEN
 	    $(front_end) run $(scenario) --library "$$library" --no-plots $(out)
 
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
-	@rm -rf build/host* build/test* build/target* build/size build/golden build/run
+	@rm -rf build/board build/host* build/test* build/target* build/size build/golden build/run
 
 -include $B/params.d $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)
