@@ -39,8 +39,7 @@ lnet_t board_lnet;
 void lnet_init(uint8_t *memory)
 {
     lnet_t *l = &board_lnet;
-    l->scope.mode = (uint16_t)SCOPE_IDLE;
-    l->scope.last = board_scope_array + SCOPE_ARRAY_WORDS;
+    scope_init(&l->scope);
     l->memory = memory;
     l->buffer = l->first;
     l->room = LNET_FIRST;

@@ -52,6 +52,19 @@ static void period(int16_t value)
     scope_tick(&board_lnet.scope, board_scope_array);
 }
 
+/** It looks for the trigger. */
+static void expect_looks(void)
+{
+    TEST_ASSERT_EQUAL_INT16(SCOPE_LOOKS_UNUSUAL, board_lnet.scope.mode);
+}
+
+/** The trigger has come with the last row. */
+static void expect_triggered(void)
+{
+    TEST_ASSERT_EQUAL_INT16(SCOPE_TRIGGERED, board_lnet.scope.mode);
+    TEST_ASSERT_EQUAL_UINT16(SCOPE_ARRAY_WORDS - 1u, board_lnet.scope.left);
+}
+
 static uint16_t long_at(uint16_t at)
 {
     TEST_ASSERT_EQUAL_HEX8(0, answered[at + 2u]);
@@ -78,6 +91,8 @@ void test_nothing_is_recorded_before_it_is_asked_for(void)
     period(1);
     TEST_ASSERT_EQUAL_HEX16(0x1111, board_scope_array[0]);
     TEST_ASSERT_EQUAL_UINT16(SCOPE_IDLE, state());
+    TEST_ASSERT_EACH_EQUAL_UINT8(0, answered + 2, 8); /* neither channels nor a place */
+    TEST_ASSERT_EACH_EQUAL_UINT8(0, answered + 14, 8);
     TEST_ASSERT_EQUAL_UINT16(SCOPE_BYTES, long_at(26));
 }
 
@@ -244,16 +259,16 @@ void test_unsigned_variables_are_compared_as_such(void)
     for (n = 0; n < 10; n++) {
         period(0x7000);
     }
-    TEST_ASSERT_EQUAL_UINT16(0, board_lnet.scope.left);
+    expect_looks();
     period((int16_t)0x9000);
-    TEST_ASSERT_EQUAL_UINT16(SCOPE_ARRAY_WORDS - 1u, board_lnet.scope.left);
+    expect_triggered();
     set_channels(SCOPE_TRIGGERED, 1, 0, 2);
     set_trigger(0x82, 0x7000, 0, 0, 1);
     TEST_ASSERT_EQUAL_UINT8(0, start());
     period((int16_t)0x9000);
-    TEST_ASSERT_EQUAL_UINT16(0, board_lnet.scope.left);
+    expect_looks();
     period(0x7000);
-    TEST_ASSERT_EQUAL_UINT16(SCOPE_ARRAY_WORDS - 1u, board_lnet.scope.left);
+    expect_triggered();
 }
 
 void test_a_level_that_has_always_been_passed_is_no_trigger(void)
@@ -268,7 +283,46 @@ void test_a_level_that_has_always_been_passed_is_no_trigger(void)
     TEST_ASSERT_EQUAL_UINT16(SCOPE_TRIGGERED, state());
     period(4);
     period(5);
-    TEST_ASSERT_EQUAL_UINT16(SCOPE_ARRAY_WORDS - 1u, board_lnet.scope.left);
+    expect_triggered();
+}
+
+/** The lowest level cannot be risen to, nor the highest be fallen to: there is no other side. */
+void test_a_level_without_another_side_is_no_trigger(void)
+{
+    static const struct {
+        uint8_t type;
+        int16_t level;
+        uint8_t rises;
+    } without[] = { { 0xA2, INT16_MIN, 1 }, { 0xA2, INT16_MAX, 0 }, { 0x82, 0, 1 }, { 0x82, -1, 0 } };
+    uint16_t n;
+    for (n = 0; n < 4u; n++) {
+        set_channels(SCOPE_TRIGGERED, 1, 0, 2);
+        set_trigger(without[n].type, without[n].level, 0, without[n].rises, 1);
+        TEST_ASSERT_EQUAL_UINT8(0, start());
+        period(without[n].level);
+        period((int16_t)~without[n].level);
+        period(without[n].level);
+        expect_looks();
+    }
+}
+
+void test_the_outermost_levels_are_reached(void)
+{
+    static const struct {
+        uint8_t type;
+        int16_t level;
+        uint8_t rises;
+    } reached[] = { { 0xA2, INT16_MAX, 1 }, { 0xA2, INT16_MIN, 0 }, { 0x82, -1, 1 }, { 0x82, 0, 0 } };
+    uint16_t n;
+    for (n = 0; n < 4u; n++) {
+        set_channels(SCOPE_TRIGGERED, 1, 0, 2);
+        set_trigger(reached[n].type, reached[n].level, 0, reached[n].rises, 1);
+        TEST_ASSERT_EQUAL_UINT8(0, start());
+        period((int16_t)(reached[n].level ^ 1));
+        expect_looks();
+        period(reached[n].level);
+        expect_triggered();
+    }
 }
 
 void test_a_trigger_that_is_switched_off_is_none(void)
