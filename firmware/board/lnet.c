@@ -9,10 +9,10 @@
 #define SCOPE_STATE_BYTES 29u
 
 /** What comes next on the line. */
-enum { PART_SYN,
+enum { PART_SYN = 0,
+       PART_SUM, /* a SYN in its place begins a frame, too */
        PART_SIZE,
        PART_DATA, /* from the node on */
-       PART_SUM,
        ANSWER_SYN,
        ANSWER_DATA, /* from the size on */
        ANSWER_SUM };
@@ -29,28 +29,31 @@ enum { AT_SIZE,
        AT_PAYLOAD };
 #define HEAD 2u /* size and node */
 
-/** Service 0: versions of protocol and program, longest data, a dsPIC; no dates; state: the program runs. */
-#define INFO_BYTES 44u
-#define INFO_STATE 33
-static const uint8_t device_info[INFO_BYTES] = { 5, 0, 1, 0, 255, 0x10, 0x82, [INFO_STATE] = 1 };
+/** Service 0, words of its answer: versions of protocol and program, longest data, a dsPIC; no dates; state: the program runs. */
+#define INFO_WORDS 22
+#define INFO_PROTOCOL 0
+#define INFO_PROGRAM 1
+#define INFO_LONGEST 2 /* and the processor's low byte */
+#define INFO_PROCESSOR 3
+#define INFO_STATE 16 /* its high byte */
 
 lnet_t board_lnet;
 
 void lnet_init(uint8_t *memory)
 {
     lnet_t *l = &board_lnet;
-    scope_init(&l->scope);
     l->memory = memory;
     l->buffer = l->first;
     l->room = LNET_FIRST;
     l->part = PART_SYN;
     l->special = 0;
     l->is_up = 0;
+    scope_init(&l->scope);
 }
 
 uint16_t lnet_is_busy(void)
 {
-    return (uint16_t)(board_lnet.is_up || board_lnet.part != (uint16_t)PART_SYN);
+    return (uint16_t)(board_lnet.is_up | board_lnet.part);
 }
 
 void lnet_tick(uint16_t elapsed_ms)
@@ -58,7 +61,6 @@ void lnet_tick(uint16_t elapsed_ms)
     lnet_t *l = &board_lnet;
     l->quiet_ms = (uint16_t)(l->quiet_ms + elapsed_ms);
     if (l->quiet_ms >= LNET_QUIET_MS && l->part < (uint16_t)ANSWER_SYN) {
-        l->quiet_ms = 0;
         l->part = PART_SYN;
         l->special = 0;
     }
@@ -66,7 +68,7 @@ void lnet_tick(uint16_t elapsed_ms)
 
 /* ---- services ---- */
 
-/** Fills the buffer from `at` on with the answer's next bytes. Words where they are aligned, so that none is torn. */
+/** Fills the buffer from `at` on, which is even, with the answer's next bytes. Words where they are aligned, so that none is torn. */
 static void fetch(lnet_t *l, uint16_t at, uint16_t bytes)
 {
     const volatile uint8_t *from = l->source;
@@ -78,9 +80,7 @@ static void fetch(lnet_t *l, uint16_t at, uint16_t bytes)
             at++;
             from++;
         } else {
-            uint16_t word = *(const volatile uint16_t *)(const volatile void *)from;
-            l->buffer[at] = (uint8_t)word;
-            l->buffer[at + 1u] = (uint8_t)(word >> 8);
+            *(uint16_t *)(void *)&l->buffer[at] = *(const volatile uint16_t *)(const volatile void *)from;
             at = (uint16_t)(at + 2u);
             from += 2;
         }
@@ -88,79 +88,90 @@ static void fetch(lnet_t *l, uint16_t at, uint16_t bytes)
     l->source = from;
 }
 
-/** What a client may write: any variable but those of this link, with which it could make the scope write anywhere. */
+/** What a client may write of the RAM: any variable but those of this link, with which it could make the scope write anywhere. */
 static uint16_t may_write(uint16_t address, uint16_t bytes)
 {
     uint16_t own = MEMORY_ADDRESS(&board_lnet);
     return (uint16_t)(memory_is_variable(address, bytes) && ((uint16_t)(address + bytes) <= own || address >= own + sizeof board_lnet));
 }
 
-/** Words where they are aligned: the control interrupt never sees half of one. */
+/** Words where they are aligned: the control interrupt never sees half of one. @param from an even address */
 static void store(uint16_t address, const uint8_t *from, uint16_t bytes)
 {
     volatile uint8_t *to = MEMORY_AT(address);
     const uint8_t *end = &from[bytes];
-    if (((address | bytes) & 1u) != 0u) {
-        while (from != end) {
+    uint16_t is_odd = (uint16_t)((address | bytes) & 1u);
+    while (from != end) {
+        if (is_odd) {
             *to = *from;
             to++;
             from++;
-        }
-    } else {
-        while (from != end) {
-            *(volatile uint16_t *)(volatile void *)to = (uint16_t)(from[0] | (uint16_t)(from[1] << 8));
+        } else {
+            *(volatile uint16_t *)(volatile void *)to = *(const uint16_t *)(const void *)from;
             to += 2;
             from += 2;
         }
     }
 }
 
-/** Carries a request out. @param size of its data @param bytes of the answer after its error; where they are is l->source, if not in the buffer
- *  @return the error */
-static uint8_t serve(lnet_t *l, const uint8_t *request, uint16_t size, uint16_t *bytes)
+/** The answer to service 0. @return its bytes */
+static uint16_t put_info(uint16_t *to)
+{
+    uint16_t n;
+    for (n = 0; n < INFO_WORDS; n++) {
+        to[n] = 0;
+    }
+    to[INFO_PROTOCOL] = 5;
+    to[INFO_PROGRAM] = 1;
+    to[INFO_LONGEST] = 0x10FFu;
+    to[INFO_PROCESSOR] = 0x0082u;
+    to[INFO_STATE] = 0x0100u;
+    return 2u * INFO_WORDS;
+}
+
+/** Carries a request out. As many bytes as l->left tells follow the error; where they are is l->source, if not in the buffer.
+ *  @param size of the request's data @return the error */
+static uint8_t serve(lnet_t *l, const uint8_t *request, uint16_t size)
 {
     uint16_t address = (uint16_t)(request[AT_ADDRESS] | (uint16_t)(request[AT_ADDRESS + 1] << 8)), count = request[AT_COUNT];
-    uint8_t error = LNET_ERROR_FORMAT;
+    uint16_t is_ram = (uint16_t)(count != 0u && memory_is_ram(address, count)), is_scope = (uint16_t)(address == PARAMETER_SCOPE);
+    uint16_t is_good = 0;
 
     switch (request[AT_SERVICE]) {
     case LNET_DEVICE_INFO:
-        l->source = device_info;
-        *bytes = INFO_BYTES;
-        return LNET_ERROR_OK;
+        l->left = put_info((uint16_t *)(void *)&l->buffer[AT_PAYLOAD]);
+        is_good = 1;
+        break;
     case LNET_GET_RAM:
         if (count > LNET_MOST_BYTES) {
-            error = LNET_ERROR_SIZE;
-        } else if (size == 5u && count != 0u && memory_is_ram(address, count)) {
+            return LNET_ERROR_SIZE;
+        }
+        if (size == 5u && is_ram) {
             l->source = MEMORY_AT(address);
-            *bytes = count;
-            error = LNET_ERROR_OK;
-        } else {
-            /* refused */
+            l->left = count;
+            is_good = 1;
         }
         break;
     case LNET_PUT_RAM:
-        if (size == 4u + count && count != 0u && may_write(address, count)) {
+        if (size == 4u + count && is_ram && may_write(address, count)) {
             store(address, &request[AT_WRITTEN], count);
-            error = LNET_ERROR_OK;
+            is_good = 1;
         }
         break;
     case LNET_LOAD_PARAMETER:
-        if (size == 3u && address == PARAMETER_SCOPE) {
+        if (size == 3u && is_scope) {
             scope_put(&l->scope, &l->buffer[AT_PAYLOAD]);
-            *bytes = SCOPE_STATE_BYTES;
-            error = LNET_ERROR_OK;
+            l->left = SCOPE_STATE_BYTES;
+            is_good = 1;
         }
         break;
     case LNET_SAVE_PARAMETER:
-        if (size > 3u && address == PARAMETER_SCOPE && scope_start(&l->scope, &request[AT_SETTING], (uint16_t)(size - 3u))) {
-            error = LNET_ERROR_OK;
-        }
+        is_good = (uint16_t)(size > 3u && is_scope && scope_start(&l->scope, &request[AT_SETTING], (uint16_t)(size - 3u)));
         break;
     default:
-        error = LNET_ERROR_SERVICE;
-        break;
+        return LNET_ERROR_SERVICE;
     }
-    return error;
+    return is_good ? LNET_ERROR_OK : LNET_ERROR_FORMAT;
 }
 
 /* ---- frames ---- */
@@ -189,31 +200,34 @@ static uint16_t sum_sent(const lnet_t *l)
 static void end_frame(lnet_t *l, uint16_t sum)
 {
     const uint8_t *request = l->buffer;
+    uint8_t *answer = l->buffer;
     uint8_t service = request[AT_SERVICE], error = LNET_ERROR_CHECKSUM;
-    uint16_t sent = sum_sent(l), size = request[AT_SIZE], bytes = 0, fits = (uint16_t)(HEAD + size <= l->room);
+    uint16_t is_right = (uint16_t)(sum == sum_sent(l)), size = request[AT_SIZE], fits = (uint16_t)(HEAD + size <= l->room);
 
     l->part = PART_SYN;
-    if (request[AT_NODE] != LNET_NODE || (sum != sent && !l->is_up)) {
+    if (request[AT_NODE] != LNET_NODE || (!is_right && !l->is_up)) {
         return;
     }
     l->source = 0;
-    if (sum == sent) {
-        l->buffer = l->memory;
+    l->left = 0;
+    if (is_right) {
+        answer = l->memory;
+        l->buffer = answer;
         l->room = LNET_ROOM;
         l->is_up = 1;
         error = LNET_ERROR_SIZE;
         if (fits) {
-            error = serve(l, request, size, &bytes);
+            error = serve(l, request, size);
         }
     }
-    l->buffer[AT_SIZE] = (uint8_t)(2u + bytes);
-    l->buffer[AT_NODE] = LNET_NODE;
-    l->buffer[AT_SERVICE] = service;
-    l->buffer[AT_ERROR] = error;
+    answer[AT_SIZE] = (uint8_t)(2u + l->left);
+    answer[AT_NODE] = LNET_NODE;
+    answer[AT_SERVICE] = service;
+    answer[AT_ERROR] = error;
     if (l->source != 0) {
-        fetch(l, AT_PAYLOAD, bytes);
+        fetch(l, AT_PAYLOAD, l->left);
     }
-    l->left = (uint16_t)(HEAD + 2u + bytes);
+    l->left = (uint16_t)(HEAD + 2u + l->left);
     l->at = 0;
     l->part = ANSWER_SYN;
 }
@@ -263,7 +277,7 @@ void lnet_receive(uint8_t byte)
             begin_frame(l); /* it was no data: the frame before it has broken off */
         }
     }
-    if (byte == LNET_SYN && (l->part == (uint16_t)PART_SYN || l->part == (uint16_t)PART_SUM)) {
+    if (byte == LNET_SYN && l->part <= (uint16_t)PART_SUM) {
         begin_frame(l);
     } else if (l->part == (uint16_t)PART_SUM) {
         end_frame(l, byte);

@@ -67,7 +67,8 @@ static uint16_t take_channels(scope_t *s, const uint8_t *at)
 /** Rows before the trigger and after it. @param before its row, in bytes; negative: bytes after it that are left out @return 1 if there is room */
 static uint16_t take_delay(scope_t *s, int16_t before, uint16_t rows)
 {
-    uint16_t size = (uint16_t)((before < 0) ? 0u - (uint16_t)before : (uint16_t)before), count = qm_divud(size, (uint16_t)(2u * s->words));
+    uint16_t size = (uint16_t)((before < 0) ? (uint16_t) ~(uint16_t)before + 1u : (uint16_t)before);
+    uint16_t count = qm_divud(size, (uint16_t)(2u * s->words));
     s->delay = before;
     if (before > 0 && count != 0u) {
         s->before = count;
@@ -138,11 +139,15 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
 /** Words of any number. @return where the next row goes */
 static int16_t *copy_words(const scope_t *s)
 {
+    const volatile int16_t *const volatile *source = s->source;
     int16_t *at = s->at;
-    uint16_t n;
-    for (n = 0; n < s->words; n++) {
-        *at++ = *s->source[n];
-    }
+    uint16_t left = s->words;
+    do {
+        *at = **source; /* wcet: at most 8 turns */
+        at++;
+        source++;
+        left--;
+    } while (left != 0u);
     return at;
 }
 

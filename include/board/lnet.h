@@ -70,7 +70,7 @@ int16_t lnet_next(void);
 /** Time goes by. */
 void lnet_tick(uint16_t elapsed_ms);
 
-/** 1 while the line belongs to a client: one has sent a valid frame, or what may become the first one comes in. */
+/** Not 0 while the line belongs to a client: one has sent a valid frame, or what may become the first one comes in. */
 uint16_t lnet_is_busy(void);
 
 #endif

@@ -2,7 +2,7 @@
 #ifndef BOARD_MEMORY_MAP_H
 #define BOARD_MEMORY_MAP_H
 
-#include <stdint.h>
+#include "control/qmath.h"
 
 #ifndef __XC16__
 #include <xc.h> /* the PC's: where the window is */
@@ -27,18 +27,18 @@ extern uint16_t _SP_init; /* the linker's: its address is where the variables en
 
 #endif
 
-/** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. */
-static inline uint16_t memory_is_ram(uint16_t address, uint16_t bytes)
+/** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. What is below wraps to beyond the end. */
+static inline QM_WRAPS uint16_t memory_is_ram(uint16_t address, uint16_t bytes)
 {
-    uint16_t from = (uint16_t)((address >= MEMORY_RAM_START) ? address - MEMORY_RAM_START : 0u);
-    return (uint16_t)(address >= MEMORY_RAM_START && from < MEMORY_RAM_BYTES && bytes <= (uint16_t)(MEMORY_RAM_BYTES - from));
+    uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
+    return (uint16_t)(from < MEMORY_RAM_BYTES && bytes <= (uint16_t)(MEMORY_RAM_BYTES - from));
 }
 
-/** 1 if all of these bytes are variables: neither stack nor registers. */
+/** 1 if all of these bytes of RAM are variables: no stack. */
 static inline uint16_t memory_is_variable(uint16_t address, uint16_t bytes)
 {
-    uint16_t from = (uint16_t)((address >= MEMORY_RAM_START) ? address - MEMORY_RAM_START : 0u);
-    return (uint16_t)(address >= MEMORY_RAM_START && from < MEMORY_VARIABLE_BYTES && bytes <= (uint16_t)(MEMORY_VARIABLE_BYTES - from));
+    uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
+    return (uint16_t)(from + bytes <= MEMORY_VARIABLE_BYTES);
 }
 
 #endif

@@ -1,0 +1,88 @@
+"""What the scope costs the control interrupt, counted by the simulator in every period of a record. Needs XC16."""
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+from tools.live import board as live_board
+from tools.live import lnet
+from tools.live.symbols import Symbols
+
+XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
+OFF_CYCLES, MOST_CYCLES = 3, 35
+"""Without a record; with four channels of 16 bits, whatever the scope does in the period."""
+SLOW_PHASES = 8
+"""Periods after which an interrupt of the drive at rest costs the same again."""
+CHANNELS = ("board_drive.phases_q13.a", "board_drive.phases_q13.b", "board_drive.ticks", "board_drive.angle")
+LEVEL = 500
+ENOUGH_S = 0.02
+"""For all rows."""
+
+
+class Bench:
+    """A board at rest with a client."""
+
+    def __init__(self, parts: live_board.Parts) -> None:
+        self.live, symbols = live_board.LiveBoard(parts), Symbols.read(parts.symbols)
+        self.link = lnet.connect(live_board.BoardStream(self.live))
+        self.channels = [symbols.find(name).channel for name in CHANNELS]
+        self.watched = symbols.find("scope_command.target_erpm")
+        self.live.run(0.2)
+        self.periods = 0
+        self.live.board.trace_start(["cpu.isr_cycles"], 1)
+        self.live.run(ENOUGH_S)
+        rest = self.taken()
+        self.rest = rest[:SLOW_PHASES]
+        assert (rest == np.resize(self.rest, len(rest))).all()
+
+    def taken(self) -> np.ndarray:
+        """Cycles of every interrupt since the last call."""
+        rows = self.live.board.trace_take()[:, 0]
+        self.periods += len(rows)
+        return rows
+
+    def costs(self) -> list[int]:
+        """What the scope took in every period since the last call, nothing done."""
+        first = self.periods % SLOW_PHASES
+        rows = self.taken()
+        return (rows - np.resize(np.roll(self.rest, -first), len(rows)) + OFF_CYCLES).astype(int).tolist()
+
+    def record(self, trigger: bool, delay: int = 0, rising: bool = True, wait_s: float = 0.0) -> list[int]:
+        """The costs of a record from before its begin until after its end."""
+        low, high = (0, 2 * LEVEL) if rising else (2 * LEVEL, 0)
+        self.link.write(self.watched.address, self.watched.data(low))
+        self.taken()
+        self.link.scope_setup(self.channels, lnet.Trigger(self.watched.address, LEVEL, rising) if trigger else None, delay)
+        self.live.run(ENOUGH_S + wait_s)
+        self.link.write(self.watched.address, self.watched.data(high))
+        self.live.run(ENOUGH_S)
+        assert not self.link.scope_state().running
+        return self.costs()
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    if not XC16:
+        pytest.skip("xc16-gcc is not installed")
+    return Bench(live_board.parts(cpu="33f"))
+
+
+def rows_of(bench: Bench) -> int:
+    return bench.link.scope_state().used // (2 * len(CHANNELS))
+
+
+def test_a_record_without_a_trigger(bench: Bench) -> None:
+    costs = bench.record(False)
+    armed = [cycles for cycles in costs if cycles != OFF_CYCLES]
+    assert len(armed) == rows_of(bench) and max(armed) <= MOST_CYCLES
+    assert min(costs) == OFF_CYCLES
+
+
+def test_waiting_and_the_trigger_itself(bench: Bench) -> None:
+    for rising in (True, False):
+        for delay in (0, 5, -20, 1 - rows_of(bench)):
+            # the trigger comes at various places in the array
+            costs = [cycles for n in range(16) for cycles in bench.record(True, delay, rising, n * bench.live.period_s)]
+            assert min(costs) == OFF_CYCLES and max(costs) <= MOST_CYCLES, (delay, rising)
