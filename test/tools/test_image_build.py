@@ -100,7 +100,8 @@ def warnings(errors: str) -> list[str]:
 
 @with_compiler
 @pytest.mark.parametrize("words", [*([f"OPT={level}", "VARIANT=check"] for level in ("-O1", "-O2", "-O3")),
-                                   *([f"DEFINES=-D{mode}", f"VARIANT=check-{mode}"] for mode in MODES)])
+                                   *([f"DEFINES=-D{mode}", f"VARIANT=check-{mode}"] for mode in MODES),
+                                   *([f"DEFINES=-DSCOPE=1{more}", "VARIANT=check-scope"] for more in ("", *(f" -D{mode}" for mode in MODES)))])
 def test_no_warning_and_a_good_image_at_every_level_and_in_every_mode(words):
     done = make("firmware", *words)
     assert (done.returncode, warnings(done.stderr)) == (0, [])

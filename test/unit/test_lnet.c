@@ -17,11 +17,11 @@ void setUp(void)
 
 void test_device_info_tells_a_dspic_that_runs(void)
 {
+    static const uint8_t told[46] = { [2] = 5, [4] = 1, [6] = 255, [7] = 0x10, [8] = 0x82, [35] = 1 };
+    memset(line_memory, 0x5A, sizeof line_memory);
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));
     TEST_ASSERT_EQUAL_UINT16(46, answered_size);
-    TEST_ASSERT_EQUAL_HEX8(0x10, answered[7]);
-    TEST_ASSERT_EQUAL_HEX8(0x82, answered[8]);
-    TEST_ASSERT_EQUAL_UINT8(1, answered[35]);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(told, answered, 46);
 }
 
 void test_memory_is_read_bytes_in_order(void)
@@ -58,6 +58,8 @@ void test_variables_are_written_and_nothing_beside_them(void)
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask(10, LOW(ADDRESS(variable[8])), 5, 1, 2, 3, 4, 5));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(((uint8_t[]){ 1, 2, 3, 4, 5, 0x01 }), (uint8_t *)&variable[8], 6);
     TEST_ASSERT_EQUAL_UINT16(2, answered_size);
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(10, LOW(ADDRESS(variable[12]) + 1u), 2, 6, 7)); /* words at odd addresses are none */
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((uint8_t[]){ 0x24, 6, 7, 0x01 }), (uint8_t *)&variable[12], 4);
 }
 
 void test_other_services_are_not_available(void)
@@ -92,11 +94,20 @@ void test_requests_of_a_wrong_length_are_refused(void)
 void test_what_is_longer_than_the_memory_for_it_is_refused_by_its_size(void)
 {
     uint8_t data[LNET_ROOM] = { 10, LOW(ADDRESS(variable[0])), LNET_ROOM - 6u, 9, 9 }; /* size and node are in that memory, too */
+    memset(line_memory + LNET_ROOM, 0x5A, 2);
     TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, LNET_ROOM - 1u));
     TEST_ASSERT_EQUAL_UINT8(21, rig_ask_of(data, LNET_ROOM));
     TEST_ASSERT_EQUAL_INT16(0x0100, variable[0]);
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask_of(data, LNET_ROOM - 2u));
     TEST_ASSERT_EQUAL_INT16(0x0909, variable[0]);
+    TEST_ASSERT_EACH_EQUAL_HEX8(0x5A, line_memory + LNET_ROOM, 2);
+}
+
+/** Two bytes, which keep what they are. */
+static void expect_writable(uint16_t address)
+{
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(9, LOW(address), 2, 1));
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(10, LOW(address), 2, answered[2], answered[3]));
 }
 
 void test_addresses_outside_of_the_variables_are_refused(void)
@@ -119,6 +130,9 @@ void test_addresses_outside_of_the_variables_are_refused(void)
     TEST_ASSERT_EQUAL_UINT8(20, rig_ask(10, LOW(own - 2u), 4, 0, 0, 0, 0));
     TEST_ASSERT_EQUAL_UINT8(20, rig_ask(10, LOW(own + sizeof board_lnet - 1u), 1, 0));
     TEST_ASSERT_EQUAL_UINT8(0, rig_ask(9, LOW(own), 2, 1));
+    expect_writable((uint16_t)(own - 2u));
+    expect_writable((uint16_t)(own + sizeof board_lnet));
+    expect_writable((uint16_t)(end - 2u));
 }
 
 void test_a_wrong_checksum_changes_nothing_and_is_told(void)

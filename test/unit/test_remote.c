@@ -174,6 +174,41 @@ void test_a_lease_is_five_seconds_at_most(void)
     TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
 }
 
+void test_a_longer_lease_is_cut_to_that_at_once(void)
+{
+    client(REMOTE_TARGET, 1, 6000);
+    command.lease_ms = REMOTE_LEASE_MOST_MS + 1u;
+    panel_ms(1);
+    TEST_ASSERT_EQUAL_UINT16(REMOTE_LEASE_MOST_MS - 1u, command.lease_ms);
+}
+
+void test_a_lease_counts_the_time_that_a_pass_has_taken(void)
+{
+    client(REMOTE_TARGET, 0, 6000);
+    remote_tick(&command, &the_panel, &drive, 30);
+    TEST_ASSERT_EQUAL_UINT16(70, command.lease_ms);
+    remote_tick(&command, &the_panel, &drive, 70);
+    TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
+}
+
+/** Or the retry would start it again. */
+void test_a_client_that_stops_or_clears_in_a_fault_forgets_the_run_that_it_has_ended(void)
+{
+    client(REMOTE_TARGET, 1, 6000);
+    attended_ms(5);
+    drive_raise(&drive, FAULT_STALL);
+    attended_ms(2);
+    TEST_ASSERT_EQUAL_INT16(1, the_panel.interrupted);
+    command.run = 0;
+    attended_ms(1);
+    TEST_ASSERT_EQUAL_INT16(0, the_panel.interrupted);
+    the_panel.interrupted = 1;
+    command.run = 1;
+    command.clear_fault = 1;
+    attended_ms(1);
+    TEST_ASSERT_EQUAL_INT16(0, the_panel.interrupted);
+}
+
 void test_an_unknown_mode_is_the_panels(void)
 {
     client(REMOTE_MODE_COUNT, 1, 6000);

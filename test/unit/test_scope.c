@@ -250,6 +250,20 @@ void test_rows_after_the_trigger_are_left_out(void)
     }
 }
 
+/** In bytes; positive is before the trigger, as in the request. */
+void test_the_delay_is_told_as_it_was_asked_for(void)
+{
+    static const int16_t delays[] = { 0, 8, 160, -8, -800, -32768 };
+    uint16_t n;
+    for (n = 0; n < sizeof delays / sizeof delays[0]; n++) {
+        set_channels(SCOPE_TRIGGERED, 4, 0, 2);
+        set_trigger(0xA2, 500, delays[n], 1, 1);
+        TEST_ASSERT_EQUAL_UINT8(0, start());
+        TEST_ASSERT_EQUAL_UINT16(SCOPE_TRIGGERED, state());
+        TEST_ASSERT_EQUAL_HEX8_ARRAY(((uint8_t[]){ LONG(delays[n]) }), answered + 14, 4);
+    }
+}
+
 void test_unsigned_variables_are_compared_as_such(void)
 {
     int16_t n;
@@ -360,6 +374,18 @@ void test_settings_that_the_scope_cannot_have_are_refused(void)
     TEST_ASSERT_EQUAL_UINT8(20, record(9, 0));
     set_channels(SCOPE_AUTO, 1, 0, 1);
     set_trigger(0x82, 0, 0, 1, 0);
+    expect_refused();
+    set_channels(SCOPE_AUTO, 1, 0, 6);
+    set_trigger(0x82, 0, 0, 1, 0);
+    expect_refused();
+    set_channels(SCOPE_AUTO, 4, 0, 4);
+    setting[4] = 5; /* a ninth word */
+    put(0, LONG(ADDRESS(variable[20])), 2);
+    set_trigger(0x82, 0, 0, 1, 0);
+    expect_refused();
+    set_channels(SCOPE_AUTO, 1, 0, 2);
+    set_trigger(0x82, 0, 0, 1, 0);
+    put(0); /* one too many */
     expect_refused();
     set_channels(SCOPE_AUTO, 2, 0, 3);
     set_trigger(0x82, 0, 0, 1, 0);

@@ -9,6 +9,9 @@
 
 #define REACHED __attribute__((section("fw_ram")))
 
+/** The first of them, so that the link's own are neither the first nor the last in any order. */
+static int16_t first_variable[8] REACHED __attribute__((used)) = { 1 };
+
 #ifdef __clang__
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wsection" /* nothing has used them yet */
@@ -26,7 +29,7 @@ extern int16_t board_scope_array[SCOPE_ARRAY_WORDS] REACHED;
 /** The firmware's variables; guard words on both sides are others'. */
 static int16_t variable[140] REACHED = { 1 };
 
-static uint8_t line_memory[LNET_ROOM]; /* of the status line */
+static uint8_t line_memory[LNET_ROOM + 2u]; /* of the status line, and what lies behind it */
 static uint8_t answered[300]; /* the data of the last answer */
 static uint16_t answered_size;
 
