@@ -72,7 +72,7 @@ static uint16_t take_delay(scope_t *s, int16_t before, uint16_t rows)
     s->delay = before;
     if (before > 0 && count != 0u) {
         s->before = count;
-        s->left = (uint16_t)(rows - 1u - count);
+        s->left = (uint16_t)((count < rows) ? rows - 1u - count : 0u);
     } else { /* it looks in the place from which on the last row ends the array */
         s->left = (uint16_t)(rows - 1u + count);
         s->ring_begin = s->last - (uint16_t)(s->words * (uint16_t)(s->left - rows * qm_divud(s->left, rows) + 1));
