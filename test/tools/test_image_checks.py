@@ -254,12 +254,21 @@ def test_a_budget_that_is_just_kept_passes_and_each_that_is_broken_is_a_line(ben
 def test_a_stack_that_is_deeper_than_its_budget_or_than_what_is_free_is_a_line(bench, monkeypatch):
     budget = bench.budget(12288, 768, 400)
     monkeypatch.setattr(image, "deepest_stack", lambda *_: (400, []))
+    monkeypatch.setattr(image, "start_up_bytes", lambda *_: 0)
     assert "stack at most 400 of 400 bytes, 1732 bytes free" in bench.passes("--objdump", "x", *budget)
     take_ram(bench.image, 1700)
     bench.fails("stack: up to 400 bytes of 332", more=("--objdump", "x"))
     take_ram(bench.image, 300)
     monkeypatch.setattr(image, "deepest_stack", lambda *_: (401, ["f: calls through a pointer"]))
     bench.fails("stack: up to 401 bytes of 400; make size", "stack: f: calls through a pointer", more=("--objdump", "x", *budget))
+
+
+def test_the_compiler_s_start_up_code_is_in_no_budget(bench, monkeypatch):
+    monkeypatch.setattr(image, "deepest_stack", lambda *_: (100, []))
+    monkeypatch.setattr(image, "start_up_bytes", lambda *_: 6)
+    ours = bench.flash - 6
+    assert f"flash {ours} of {ours} bytes and 6 of start-up code, RAM" in bench.passes("--objdump", "x", *bench.budget(ours, 768, 400))
+    bench.fails(f"flash: {ours} bytes of a budget of {ours - 1}", more=("--objdump", "x", *bench.budget(ours - 1, 768, 400)))
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------------

@@ -214,6 +214,16 @@ def test_what_no_module_claims_counts_as_the_note_s_and_a_module_with_a_budget_o
     assert report(1, 3, held=held).broken == ["flash, guard: 9 bytes, 3 over the budget of 6"]
 
 
+def test_a_group_that_is_not_ours_is_shown_and_in_no_sum(report, image, tmp_path):
+    held = budget_in(tmp_path, 'title = "additions"\n', 'title = "additions"\ncounted = false\n')
+    found = report(20, 200, held=held)
+    assert found.broken == []
+    assert {row.name: row.flash for row in found.rows if row.kind != "function"} == {
+        "the law": 60, "control": 60, "additions": 600, "guard": 600, size.NOTE_TITLE: 60, "whole image": 60}
+    code = image(program((0x200, 20), (0x400, 200), functions=[tick(0x228), guard(0x400, 0x590)]))
+    assert held.uncounted(shares(code, held)) == 600 and budget_in(tmp_path).uncounted(shares(code, held)) == 0
+
+
 def test_the_change_is_counted_for_what_came_what_went_and_the_sums(report, image, budget):
     before = shares(image(program((0x200, 5), (0x300, 4), functions=[tick(0x20A), Function("park", PARK, 1, 0x300, 0x308)])), budget)
     rows = {row.name: row.flash_change for row in report(7, 2, before=before).rows}
@@ -317,7 +327,7 @@ def test_the_projects_budget_names_what_is_there_and_is_the_note_s():
     assert budget.unmatched(Sources.read()) == []
     assert {group.title: group.note_flash for group in budget.groups if group.note_flash is not None} == {
         "sensorless FOC without field weakening": 4425, "field weakening": 612, "user interface": 645}
-    assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682, 444, 21280, 1610)
+    assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682 - 303, 444, 21100, 1610)
 
 
 # ---- bad input -----------------------------------------------------------------------------------------------------------

@@ -43,6 +43,7 @@ class Group:
     name: str
     title: str
     note_flash: int | None
+    counted: bool = True         # in the whole image
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class Budget:
         stack = _required(root, "stack")
         calls_nothing = listed(stack, "calls_nothing", "compiler", required=True)
         stack.close()
-        groups = [Group(section.text("name"), section.text("title"), section.integer("note_flash_bytes", None, minimum=0))
+        groups = [Group(section.text("name"), section.text("title"), section.integer("note_flash_bytes", None, minimum=0), section.flag("counted", True))
                   for section in root.sections("group")]
         modules = []
         for section in root.sections("module"):
@@ -116,6 +117,12 @@ class Budget:
         with_caller = listed(root, "with_caller", "function", required=True)
         root.close()
         return Budget(*limits, cycles, groups, modules, with_caller, calls_nothing, names)
+
+    def uncounted(self, found: "Shares") -> int:
+        """Bytes of flash in groups that the budget does not count."""
+        left_out = {group.name for group in self.groups if not group.counted}
+        modules = {module.name for module in self.modules if module.group in left_out}
+        return sum(share.flash for (module, _), share in found.items() if module in modules)
 
     # ---- what belongs to what --------------------------------------------------------------------------------------------
     def of_function(self, name: str, file: str) -> Module:

@@ -13,7 +13,7 @@ from tools.common import command_line, paths
 from tools.common.errors import UserError
 
 from . import attribution, crc, device, size, wcet
-from .budget import Budget, Limits
+from .budget import Budget, Limits, shares
 from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
 from .program import Elf, Words, read_elf, read_hex, reset_target
 
@@ -148,10 +148,15 @@ def longest_paths(elf: Path, budget: Budget) -> tuple[str, list[str]]:
     return "longest path of the interrupt " + ", ".join(f"{bound.cycles} cycles to its {bound.to}" for bound in bounds), failures
 
 
-def check_budget(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None) -> list[str]:
-    """Flash and RAM in their budgets, the stack in its own and in what is left of the RAM."""
+def start_up_bytes(elf: Path, budget: Budget) -> int:
+    """Flash of the compiler's start-up code, which differs between versions and is in no budget."""
+    return budget.uncounted(shares(attribution.read(elf), budget))
+
+
+def check_budget(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None, start_up: int = 0) -> list[str]:
+    """Flash, without the compiler's start-up code, and RAM in their budgets, the stack in its own and in what is left of the RAM."""
     failures = []
-    flash, stack = flash_bytes(words), stack_space(elf)
+    flash, stack = flash_bytes(words) - start_up, stack_space(elf)
     room = limits.stack if limits else stack
     if deepest is not None and room is not None and deepest > room:
         failures.append(f"stack: up to {deepest} bytes of {room}; make size shows the calls")
@@ -166,22 +171,22 @@ def check_budget(words: Words, elf: Elf, limits: Limits | None, deepest: int | N
     return failures
 
 
-def summary(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None) -> str:
+def summary(words: Words, elf: Elf, limits: Limits | None, deepest: int | None = None, start_up: int = 0) -> str:
     """What the image takes of its budget, or of the chip where there is none."""
     flash, ram = ((f"{limits.flash} bytes", f"{limits.ram} bytes") if limits else
                   (f"{len(device.PROGRAM) * attribution.BYTES_PER_WORD} bytes of the chip", f"{len(device.RAM)} bytes of the chip"))
     stack = stack_space(elf)
-    return (f"flash {flash_bytes(words)} of {flash}, RAM {elf.ram_bytes} of {ram}, "
+    return (f"flash {flash_bytes(words) - start_up} of {flash}{f' and {start_up} of start-up code' if start_up else ''}, RAM {elf.ram_bytes} of {ram}, "
             + ("" if deepest is None else f"stack at most {deepest}{f' of {limits.stack}' if limits else ''} bytes, ")
             + f"{stack if stack is not None else 'unknown'} bytes free for it")
 
 
 def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, str], limits: Limits | None,
-          deepest: int | None = None) -> list[str]:
+          deepest: int | None = None, start_up: int = 0) -> list[str]:
     """Every failure of an image; `pieces` None when there is no map, `deepest` None when nobody has looked for the deepest stack."""
     return [*check_device(elf), *check_memory(words), *check_same(words, elf), *check_reset(words, elf), *check_vectors(words, elf, pieces),
             *check_configuration(words, config), *crc.check(words, elf), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []),
-            *check_budget(words, elf, limits, deepest)]
+            *check_budget(words, elf, limits, deepest, start_up)]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -202,18 +207,19 @@ def _run(options: argparse.Namespace) -> int:
     pieces = read_map(options.map) if options.map else None
     limits = Budget.read(options.budget).image if options.budget else None
     deepest, unsure = deepest_stack(options.elf, options.objdump, Budget.read()) if options.objdump else (None, [])
+    start_up = start_up_bytes(options.elf, Budget.read(options.budget)) if options.objdump and limits else 0
     try:
         config = wanted_fields(options.config.read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
-    failures = check(elf, words, pieces, config, limits, deepest) + [f"stack: {reason}" for reason in unsure if limits]
+    failures = check(elf, words, pieces, config, limits, deepest, start_up) + [f"stack: {reason}" for reason in unsure if limits]
     paths_text, too_long = longest_paths(options.elf, Budget.read(options.budget)) if options.wcet and options.budget else ("", [])
     failures += too_long
     for failure in failures:
         print(f"foc33: {options.hex.name}, {failure}", file=sys.stderr)
     if options.table:
         print("\n".join(configuration_table(words)))
-    print(f"{options.hex}: {summary(words, elf, limits, deepest)}{paths_text and f', {paths_text}'}"
+    print(f"{options.hex}: {summary(words, elf, limits, deepest, start_up)}{paths_text and f', {paths_text}'}"
           f"{f'; {len(failures)} checks failed' if failures else ''}")
     return 1 if failures else 0
 
