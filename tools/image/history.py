@@ -21,6 +21,7 @@ from . import base # noqa: E402
 FOLDER = Path("docs/history")
 FIRST = ["commit", "date"]
 MOST_CURVES = 12
+UNITS = {"size": "bytes", "cycles": "cycles"}
 
 Line = dict[str, str]
 
@@ -78,7 +79,7 @@ def draw(name: str, columns: list[str], lines: list[Line], folder: Path) -> Path
     figure, axes = plt.subplots(figsize=(10, 6), layout="constrained")
     for column in shown:
         axes.plot([float(line.get(column) or "nan") for line in lines], marker=".", label=column)
-    axes.set(title=f"{name}: commit by commit", yscale="log", xticks=range(len(lines)))
+    axes.set(title=f"{name}: commit by commit", ylabel=UNITS[name], yscale="log", xticks=range(len(lines)))
     axes.set_xticklabels([f"{line['date']} {line['commit']}" for line in lines], rotation=90, fontsize=7)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     axes.grid(alpha=0.3)
