@@ -2,7 +2,7 @@
 
 import pytest
 
-from static import static
+import static
 
 
 def test_nothing_is_found_that_the_page_does_not_list(make) -> None:

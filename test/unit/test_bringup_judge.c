@@ -169,7 +169,7 @@ void test_a_side_that_carries_a_quarter_of_the_other_one_turns_on(void)
     } cases[] = { { 30, 0 }, { 20, 1 } };
     EACH(n, cases) {
         bringup_level_t x = level(&right, full_a, 300);
-        x.a[0] = (current_q13_t)(-x.a[3] * cases[n].percent / 100);
+        x.a[0] = (current_q13_t)(-(int32_t)x.a[3] * cases[n].percent / 100);
         TEST_ASSERT_EQUAL_HEX16(cases[n].high, bringup_wiring(&x).high);
     }
 }

@@ -365,7 +365,7 @@ void test_each_answer_of_the_wiring_is_its_finding(void)
         TEST_ASSERT_EQUAL_UINT16(cases[n].finding != BRINGUP_FINDINGS, guide.found);
         if (cases[n].finding != BRINGUP_FINDINGS) {
             TEST_ASSERT_TRUE(found(cases[n].finding));
-            TEST_ASSERT_EQUAL_UINT16(cases[n].part, line_of(BRINGUP_FINDS, cases[n].finding)->part);
+            TEST_ASSERT_EQUAL_UINT16(cases[n].part, line_of(BRINGUP_FINDS, (uint16_t)cases[n].finding)->part);
         }
         TEST_ASSERT_EQUAL_UINT16(cases[n].step != BRINGUP_STEP_END, line_of(BRINGUP_TELLS, BRINGUP_VALUE_DEAD_TIME) != 0);
     }
