@@ -59,6 +59,11 @@ def test_the_rotor_turns_just_before_the_button_counts_on_a_supply_that_takes_no
     assert (start.bus_v, stop.bus_v, stop.rpm) == (34.0, 30.0, 5500.0)
 
 
+def test_a_rotor_heavier_than_the_header_s_turns_at_the_start_of_a_stop_and_the_bare_one_stands():
+    for inertia, turned in ((1.0, []), (9.0, [(pytest.approx(0.128), {"state.speed_rpm": 1500.0})])):
+        assert [(action.at_s, action.keys) for action in cases(inertia=inertia)[1].job.actions if "state.speed_rpm" in action.keys] == turned
+
+
 # ---- what is measured ----------------------------------------------------------------------------------------------------
 def test_the_moment_of_control_its_speed_and_the_angle_when_it_must_be_right():
     recorded = trace(2.0, **{"fw.state": step((0.0, 1.0), (0.55, 5.0), (0.69, 4.0)), "plant.speed_rpm": 1234.0, "fw.theta_est_deg": 50.0,

@@ -208,7 +208,7 @@ void test_rotor_that_never_comes_to_where_the_current_pulls_it_is_START_FAILED(v
         uint16_t steps;
         rig_power_up();
         at_the_end_of_the_ramp(direction);
-        for (steps = 0; drive.state == (uint16_t)DRIVE_RAMP && steps < 2000u; steps++) {
+        for (steps = 0; drive.state == (uint16_t)DRIVE_RAMP && steps < 6000u; steps++) {
             force(4000.0F);
             rig_speed((int16_t)(direction * 3800)); /* agrees, and slower than the current turns */
             forced_ahead((int16_t)(direction * 0x3800));
@@ -217,7 +217,7 @@ void test_rotor_that_never_comes_to_where_the_current_pulls_it_is_START_FAILED(v
         }
         TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
         TEST_ASSERT_EQUAL_UINT16(FAULT_START_FAILED, drive.fault);
-        TEST_ASSERT_EQUAL_UINT16(1050, steps); /* 20 ms of agreement and 0.4 s */
+        TEST_ASSERT_EQUAL_UINT16(4050, steps); /* 20 ms of agreement and 1.6 s */
     }
 }
 

@@ -132,10 +132,13 @@ def catch_case(table: Table, rpm: float, rotor_deg: float, inertia: float, libra
 
 
 def stop_case(table: Table, inertia: float, stop_s: float, library: Library, motor: Part, board: Part) -> Case:
-    """An orderly stop from the maximum speed, on a supply that takes nothing back."""
+    """An orderly stop from the maximum speed, on a supply that takes nothing back. A rotor that is heavier than the header says turns at S2: how it starts
+    from rest is the matter of `make starts`."""
     top_rpm = param(library.params, "MAXIMUM_SPEED_RPM")
     heavy = STOP_SETTLE_S * (1.0 + inertia / 12.0) # the reference waits for a rotor that the current turns up slowly
     events = sweep.start_events(table.start_s, top_rpm, param(library.params, "NOMINAL_SPEED_RPM"), table.where)
+    if inertia > 1.0:
+        events.append(Event(table.start_s + DEBOUNCED_S, "set", table.where, keys={"state.speed_rpm": table.speed_rpm}, note="the rotor turns"))
     s2_s = table.start_s + sweep.start_time_s(library.params) + sweep.ramp_time_s(library.params, top_rpm) + heavy + 1.0
     events.append(Event(s2_s, "press", table.where, button="S2", hold_s=0.1))
     return _case(table, top_rpm, None, inertia, library, motor, board, events, top_rpm, s2_s + STOP_LONGEST_S, s2_s, stop_s)
