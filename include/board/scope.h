@@ -41,6 +41,8 @@ typedef struct {
     uint16_t channels;
 } scope_t;
 
+#if SCOPE
+
 /** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read.
  *  @return where the next one goes */
 QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
@@ -121,8 +123,6 @@ QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
         scope_look(s, trigger, scope_copy_usual(s));
     }
 }
-
-#if SCOPE
 
 /** Rows go here. */
 extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
