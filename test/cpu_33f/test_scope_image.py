@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -71,6 +72,17 @@ def bench() -> Bench:
 
 def rows_of(bench: Bench) -> int:
     return bench.link.scope_state().used // (2 * len(CHANNELS))
+
+
+def test_costs_are_what_a_period_took_beyond_the_same_slow_phase_at_rest() -> None:
+    """The counting itself; it needs no image."""
+    bench, rest = object.__new__(Bench), np.arange(600, 600 + SLOW_PHASES)
+    took = [0, 0, 31, 0, 34, 0, 0, 0, 0, 32]
+    bench.rest, bench.periods = rest, 3
+    bench.live = mock.Mock()
+    bench.live.board.trace_take.return_value = np.array([[rest[(3 + n) % SLOW_PHASES] + more] for n, more in enumerate(took)])
+    assert bench.costs() == [OFF_CYCLES + more for more in took]
+    assert bench.periods == 13
 
 
 def test_a_record_without_a_trigger(bench: Bench) -> None:
