@@ -1,4 +1,4 @@
-/* ADC1: both phase currents, bus and potentiometer sampled at once at the centre of the low sides' conduction. */
+/* ADC1: both phase currents, bus and potentiometer sampled at once at the centre of the low sides' conduction; the interrupts of a period. */
 #include "board/mclv.h"
 #include "board/peripherals.h"
 
@@ -13,5 +13,8 @@ void adc_init(void)
     IFS0bits.AD1IF = 0;
     IPC3bits.AD1IP = 5;
     IEC0bits.AD1IE = 1;
+    IFS0bits.T2IF = 0;
+    IPC1bits.T2IP = 3; /* raised by the control interrupt alone, and below it */
+    IEC0bits.T2IE = 1;
     AD1CON1bits.ADON = 1;
 }

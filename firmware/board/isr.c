@@ -14,7 +14,11 @@ MODE_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 volatile uint16_t board_clock_failed BOARD_UNSET;
 
-void BOARD_ISR _ADC1Interrupt(void);
+/* From the control interrupt to the slow work, which says so: there the fault takes no time from the next duties. */
+static uint16_t board_is_late;
+
+void BOARD_ISR_SHADOW _ADC1Interrupt(void);
+void BOARD_ISR _T2Interrupt(void);
 void BOARD_ISR _FLTA1Interrupt(void);
 void BOARD_ISR _OscillatorFail(void);
 void BOARD_ISR _AddressError(void);
@@ -35,8 +39,11 @@ QM_INLINE void board_set_outputs(uint16_t outputs)
     P1OVDCON = override;
 }
 
-/** 20 kHz, triggered by PWM1 through the ADC. */
-void BOARD_ISR _ADC1Interrupt(void)
+/* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
+#define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
+
+/** The control interrupt, 20 kHz, triggered by PWM1 through the ADC: from the samples to the duties. */
+void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
     duties_t duty;
@@ -48,22 +55,48 @@ void BOARD_ISR _ADC1Interrupt(void)
     P1DC1 = duty.a;
     P1DC2 = duty.b;
     P1DC3 = duty.c;
-    /* The duties load when the counter reaches zero. Still counting down and no new sample: in time. */
-    if ((P1TMR & 0x8000u) == 0u || IFS0bits.AD1IF) {
+    /* The duties load when the counter reaches zero. Still counting down: in time. */
+    if ((P1TMR & 0x8000u) == 0u || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
+        board_is_late = 1;
+        P1OVDCON = BOARD_OUTPUTS_OFF;
+    }
+    if (board_drive.fault != (uint16_t)FAULT_NONE) {
+        P1OVDCON = BOARD_OUTPUTS_OFF;
+    }
+    IFS0bits.T2IF = 1;
+}
+
+/** What of a period has no deadline but the next one's begin. The control interrupt raises it and may interrupt it; timer 2 stands still, only its
+ *  vector is used. */
+void BOARD_ISR _T2Interrupt(void)
+{
+    drive_samples_t raw;
+    uint16_t before, after;
+
+    if (board_is_late) {
+        board_is_late = 0;
         drive_raise(&board_drive, FAULT_ISR_OVERRUN);
     }
+    raw.i_a = (int16_t)ADC1BUF1;
+    raw.i_b = (int16_t)ADC1BUF2;
+    raw.v_bus = (int16_t)ADC1BUF3;
     board_panel.pot_q15 = (int16_t)ADC1BUF0;
-    board_set_outputs(drive_outputs(&board_drive));
-    drive_slow(&board_drive, &board_params, (int16_t)ADC1BUF3);
-    if (drive_settle(&board_drive)) {
+    before = drive_outputs(&board_drive);
+    drive_slow(&board_drive, &board_params, &raw);
+    after = drive_outputs(&board_drive);
+    if (after != (uint16_t)OUTPUTS_PWM || before == (uint16_t)OUTPUTS_PWM) { /* the bridge begins to switch when its first duties are written */
+        board_set_outputs(after);
+    }
+    if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);
     }
-    recorder_tick(&board_recorder, &board_drive, (int16_t)ADC1BUF3);
+    recorder_tick(&board_recorder, &board_drive, raw.v_bus);
     mode_record();
 #if SCOPE
     scope_tick(&board_lnet.scope, board_scope_array);
 #endif
+    IFS0bits.T2IF = 0; /* last: as long as it is set the work is not done */
 }
 
 /** The board's comparator: the PWM module has already switched the outputs off. */

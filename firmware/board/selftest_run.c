@@ -71,11 +71,12 @@ static const written_t written[] = {
     { &T1CON, 0xA076u, 0x8000u },
     { &PR1, 0xFFFFu, BOARD_FCY_HZ / 1000ul - 1ul },
     { &PMD1, 0xFFFFu, 0u },
-    /* interrupts: only the control interrupt and the fault input; the core */
-    { &IEC0, 0xFFFFu, 0x2000u },
+    /* interrupts: only the control interrupt, that of the slow work, and the fault input; the core */
+    { &IEC0, 0xFFFFu, 0x2080u },
     { &IEC3, 0xFFFFu, 0x8000u },
+    { &IPC1, 0x7000u, 0x3000u },
     { &IPC3, 0x0070u, 0x0050u },
-    { &IPC15, 0x7000u, 0x5000u },
+    { &IPC15, 0x7000u, 0x3000u },
     { &INTCON1, 0x8000u, 0u },
     { &INTCON2, 0x8000u, 0u },
     { &CORCON, 0x10F7u, 0x0024u },

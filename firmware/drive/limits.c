@@ -75,7 +75,7 @@ uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
     if (!drive_is_running(d)) {
         return (uint16_t)((d->state == (uint16_t)DRIVE_CATCH && d->run.catching.step <= (uint16_t)CATCH_FIRST_LOOK) ? LIMIT_TOO_FAST : LIMIT_NONE);
     }
-    if (at_limit(c->v_q14.q, c->vq_limit_q14) || at_limit(c->v_q14.d, vd_limit(&d->circle))) {
+    if (at_limit(c->v_q14.q, c->vq_limit_q14) || at_limit(c->v_q14.d, d->circle.vd_most_q14)) {
         found = (uint16_t)LIMIT_VOLTAGE;
     }
     if (drive_is_closed(d)) {

@@ -37,4 +37,8 @@ PARAM_CHECK(relations)
     if (!(1 PARAM_TABLE(RANGE_HOLDS))) {
     }
     PARAM_RELATION_TABLE(CHECK_RELATION)
+#ifdef BRINGUP
+    CHECK_RELATION(PARAM_F(NORM_CURRENT_CONST) <= 0.0039F,
+                   PARAM_NAMED(NORM_CURRENT_CONST) " must be at most 0.0039 with BRINGUP, which counts milliamperes in 16 bits: leave BRINGUP out")
+#endif
 }

@@ -37,8 +37,10 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 
 #ifdef __XC16__
 #define BOARD_ISR __attribute__((interrupt, no_auto_psv))
+#define BOARD_ISR_SHADOW __attribute__((interrupt, shadow, no_auto_psv)) /* one set of shadow registers: for one priority, which does not nest */
 #else
 #define BOARD_ISR
+#define BOARD_ISR_SHADOW
 #endif
 
 /* ---- Clock: 8 MHz crystal * 40 / (2 * 2) = 80 MHz, 40 MIPS ---- */

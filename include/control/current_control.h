@@ -7,8 +7,9 @@
 
 /** The voltage circle at the measured bus. */
 typedef struct {
-    voltage_q14_t limit_q14; /**< radius */
-    uint16_t reciprocal;     /**< 2^28 / radius, see voltage_circle_reciprocal() */
+    voltage_q14_t limit_q14;   /**< radius */
+    voltage_q14_t vd_most_q14; /**< see vd_limit() */
+    uint16_t reciprocal;       /**< 2^28 / radius, see voltage_circle_reciprocal() */
 } voltage_circle_t;
 
 #define VOLTAGE_CIRCLE_LEAST_Q14 4097 /* a quarter of the nominal bus */
@@ -21,16 +22,24 @@ QM_INLINE uint16_t voltage_circle_reciprocal(voltage_q14_t radius_q14)
 }
 
 /** Largest |Vd|: 31/32 of the circle, so that the q axis never loses all control. */
-QM_INLINE voltage_q14_t vd_limit(const voltage_circle_t *circle)
+QM_INLINE voltage_q14_t vd_limit(voltage_q14_t radius_q14)
 {
-    return (int16_t)(circle->limit_q14 - (circle->limit_q14 >> 5));
+    return (int16_t)(radius_q14 - (radius_q14 >> 5));
+}
+
+/** The circle of this radius. */
+QM_INLINE void voltage_circle_of(voltage_circle_t *circle, voltage_q14_t radius_q14)
+{
+    circle->limit_q14 = radius_q14;
+    circle->vd_most_q14 = vd_limit(radius_q14);
+    circle->reciprocal = voltage_circle_reciprocal(radius_q14);
 }
 
 /** Largest |Vq|: sqrt(limit^2 - Vd^2), by the circle table, never rounded up. @param vd_q14 within vd_limit() */
 QM_INLINE voltage_q14_t vq_limit(const voltage_circle_t *circle, voltage_q14_t vd_q14)
 {
     /* |Vd|/limit in Q12, rounded up; below 4096 because |Vd| <= 31/32 limit */
-    uint16_t ratio_q12 = (uint16_t)(qm_mulhi_uu((uint16_t)qm_abs(vd_q14), circle->reciprocal) + 1u);
+    uint16_t ratio_q12 = (uint16_t)(qm_mulhi_uu(qm_unsigned(vd_q14), circle->reciprocal) + 1u);
     return (int16_t)qm_mulhi_uu((uint16_t)(2u * (uint16_t)circle->limit_q14), (uint16_t)trig_circle((int16_t)(ratio_q12 << 3)));
 }
 
@@ -42,7 +51,7 @@ QM_INLINE dq_t current_control(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q
                                dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q)
 {
     dq_t v;
-    v.d = pi_tick(pi_d, gains_d, (int16_t)(ref_q13.d - meas_q13.d), vd_limit(circle));
+    v.d = pi_tick(pi_d, gains_d, (int16_t)(ref_q13.d - meas_q13.d), circle->vd_most_q14);
     *limit_q = vq_limit(circle, v.d);
     v.q = pi_tick(pi_q, gains_q, (int16_t)(ref_q13.q - meas_q13.q), *limit_q);
     return v;

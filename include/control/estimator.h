@@ -4,7 +4,7 @@
 
 #include "control/transforms.h"
 
-#define ESTIMATOR_HISTORY 8
+#define ESTIMATOR_HISTORY 7 /* and the current of the last period: eight */
 
 /** Motor and filter constants that do not change while the motor runs. */
 typedef struct {
@@ -31,16 +31,22 @@ typedef struct {
 
 /** State. Everything zero is a valid start at standstill. */
 typedef struct {
-    alphabeta_t history_q14[ESTIMATOR_HISTORY]; /**< currents of the last eight periods */
-    uint16_t newest;                            /**< index of the most recent one */
+    alphabeta_t history_q14[ESTIMATOR_HISTORY]; /**< currents of the periods before the last one */
+    uint16_t slot;                              /**< index of the one that makes room */
+    alphabeta_t i_last_q14;                     /**< the current of the last period */
+    alphabeta_t i_oldest_q14;                   /**< and of eight periods before the next one */
     alphabeta_t v_last_q13;                     /**< voltage commanded one period ago */
     alphabeta_t v_before_q13;                   /**< and two periods ago */
-    alphabeta_t e_q13;                          /**< back-EMF, half a period in the past */
+    alphabeta_t v_mean_q13;                     /**< that acts between the last sample and the next one: the mean of the last two */
     int32_t e_d_q28, e_q_q28;                   /**< filtered back-EMF: Q12 with 16 fraction bits */
     speed_erpm_t omega_erpm;                    /**< speed of Equation 2; integrates to the angle */
     int32_t omega_filtered_q16;                 /**< filtered speed, 16 fraction bits: speed loop, thresholds, display */
     uint32_t rho_q32;                           /**< angle of the rotor flux half a period after the last sample */
     int16_t half_step_q16_rad;                  /**< half the angle step of a period, radians * 65536 */
+    angle_t next;                               /**< see estimator_next_angle() */
+    int16_t old_turn_q16_rad;                   /**< 3.5 steps: from the middle of eight periods to that of the last one */
+    int16_t sign;                               /**< of the rotation, for Equation 2: 1, 0 at the start, or -1 */
+    sincos_t own;                               /**< of rho, while the forced angle drives the motor */
 } estimator_t;
 
 /** Filtered speed. */
@@ -61,8 +67,13 @@ QM_INLINE dq_t estimator_emf(const estimator_t *e)
 /** Angle that the next period needs: at the next sample, which is also the centre of the next voltage pulse. */
 QM_INLINE angle_t estimator_next_angle(const estimator_t *e)
 {
-    /* rad * 65536 back to angle counts: / (2 pi) */
-    return (angle_t)((uint16_t)(e->rho_q32 >> 16) + (uint16_t)qm_mulhi(e->half_step_q16_rad, 10430));
+    return e->next;
+}
+
+/** Half a step ahead of rho. @param step_q32 of a period */
+QM_INLINE angle_t estimator_ahead(uint32_t rho_q32, int32_t step_q32)
+{
+    return (angle_t)((uint16_t)(rho_q32 >> 16) + (uint16_t)(qm_hi(step_q32) >> 1));
 }
 
 /** x turned by a small angle: error a^2/2. @param a_q16_rad angle in radians * 65536, +-0.5 rad */
@@ -76,19 +87,18 @@ QM_INLINE alphabeta_t estimator_turn(alphabeta_t x, int16_t a_q16_rad)
 
 /** Voltage of the inductance, Q13. Below nominal speed over eight samples, which is four samples old and therefore
  *  turned forward by 3.5 steps to the middle of the last period; above over one sample. */
-QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const motor_model_t *t,
-                                          alphabeta_t now, alphabeta_t previous, alphabeta_t oldest)
+QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t now)
 {
     alphabeta_t v;
     if (!qm_beyond(estimator_speed(e), (int16_t)(p->nominal_erpm - 1))) {
         const int16_t limit = p->d_ilimit_ls_q14;
-        v.alpha = qm_mulhi_su(qm_limit((int16_t)(now.alpha - oldest.alpha), limit), t->ls_q16);
-        v.beta = qm_mulhi_su(qm_limit((int16_t)(now.beta - oldest.beta), limit), t->ls_q16);
-        v = estimator_turn(v, (int16_t)(7 * qm_limit(e->half_step_q16_rad, 4681))); /* 0.5 rad at most */
+        v.alpha = qm_mulhi_su(qm_limit((int16_t)(now.alpha - e->i_oldest_q14.alpha), limit), t->ls_q16);
+        v.beta = qm_mulhi_su(qm_limit((int16_t)(now.beta - e->i_oldest_q14.beta), limit), t->ls_q16);
+        v = estimator_turn(v, e->old_turn_q16_rad);
     } else {
         const int16_t limit = p->d_ilimit_hs_q14;
-        v.alpha = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.alpha - previous.alpha), limit)), t->ls_q16);
-        v.beta = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.beta - previous.beta), limit)), t->ls_q16);
+        v.alpha = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.alpha - e->i_last_q14.alpha), limit)), t->ls_q16);
+        v.beta = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.beta - e->i_last_q14.beta), limit)), t->ls_q16);
     }
     v.alpha = (int16_t)(v.alpha * (1 << p->ls_exp));
     v.beta = (int16_t)(v.beta * (1 << p->ls_exp));
@@ -98,23 +108,19 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
 /** Equation 4 in the stator frame: E = V - Rs I - Ls dI/dt, all taken at the middle of the last period.
  *
  *  The delay constant: a vector computed at sample n is loaded at the next PWM boundary, half a period later, and acts
- *  for one period; so the mean voltage between samples n-1 and n is the mean of the last two vectors. */
-QM_INLINE void estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
+ *  for one period; so the mean voltage between samples n-1 and n is the mean of the last two vectors.
+ *  @return the back-EMF half a period in the past, Q13 */
+QM_INLINE alphabeta_t estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
-    alphabeta_t previous = e->history_q14[e->newest];
     const int16_t most = p->resistive_max_q13; /* the adaptation may raise Rs, but not the format's end */
-    uint16_t newest = (e->newest + 1u) & (ESTIMATOR_HISTORY - 1u);
-    alphabeta_t *slot = &e->history_q14[newest]; /* of the oldest, which makes room */
-    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, previous, *slot);
-    int16_t resistive_alpha = qm_limit(qm_mulhi_su((int16_t)((i_q14.alpha + previous.alpha) >> 1), t->rs_q16), most);
-    int16_t resistive_beta = qm_limit(qm_mulhi_su((int16_t)((i_q14.beta + previous.beta) >> 1), t->rs_q16), most);
+    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14), e_q13;
+    int16_t resistive_alpha = qm_limit(qm_mulhi_su((int16_t)((i_q14.alpha + e->i_last_q14.alpha) >> 1), t->rs_q16), most);
+    int16_t resistive_beta = qm_limit(qm_mulhi_su((int16_t)((i_q14.beta + e->i_last_q14.beta) >> 1), t->rs_q16), most);
 
-    e->e_q13.alpha = (int16_t)(((e->v_last_q13.alpha + e->v_before_q13.alpha) >> 1)
-                               - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
-    e->e_q13.beta = (int16_t)(((e->v_last_q13.beta + e->v_before_q13.beta) >> 1)
-                              - resistive_beta * (1 << p->rs_exp) - inductive.beta);
-    *slot = i_q14;
-    e->newest = newest;
+    e_q13.alpha = (int16_t)(e->v_mean_q13.alpha - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
+    e_q13.beta = (int16_t)(e->v_mean_q13.beta - resistive_beta * (1 << p->rs_exp) - inductive.beta);
+    e->i_last_q14 = i_q14;
+    return e_q13;
 }
 
 /** Equation 2: speed from Eq and Ed. @param sum_max limit of their sum, 32767 * 2048 / inv_kfi @return within 16 bits */
@@ -123,47 +129,81 @@ QM_INLINE speed_erpm_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv
     return (int16_t)(qm_mulss(qm_limit(sum, sum_max), inv_kfi) >> 11);
 }
 
-/** Equations 1, 2 and 7: filtered Ed and Eq give the speed, the speed gives the angle.
+/** Equations 1 and 2, and Equation 7 for Ed and Eq: filtered, they give the speed, the speed gives the angle.
  *  Lock is stable where cos(error) + sin(error) = K'/K: a wrong Kphi turns the angle, not the speed. */
 QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, dq_t e_q12)
 {
     int16_t e_d = qm_lowpass(&e->e_d_q28, e_q12.d, t->kfilter_esdq_q16);
     int16_t e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
-    speed_erpm_t speed = estimator_speed(e);
-    int16_t sign = qm_beyond(speed, p->decimate_erpm) ? e_q : speed;
-    int16_t sum = (int16_t)((sign >= 0) ? e_q - e_d : e_q + e_d);
+    int16_t sum = (int16_t)(e_q - e->sign * e_d);
+    int32_t step_q32;
+
     e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
-    e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32));
+    step_q32 = qm_mulss(e->omega_erpm, p->deltat_q32);
+    e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)step_q32);
+    e->next = estimator_ahead(e->rho_q32, step_q32);
     e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, p->half_step_q16_rad);
-    (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
 }
 
 /** Remembers the vector that was just given to the modulator. */
 QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
 {
-    e->v_before_q13 = e->v_last_q13;
     e->v_last_q13 = v_q13;
+}
+
+/** What follows the speed slowly: the sign of Equation 2, that of Eq, at low speed that of the filtered speed; and the turn of the eight-sample
+ *  difference. */
+QM_INLINE void estimator_follow(estimator_t *e, const estimator_params_t *p)
+{
+    speed_erpm_t speed = estimator_speed(e);
+    e->sign = (int16_t)(((qm_beyond(speed, p->decimate_erpm) ? qm_hi(e->e_q_q28) : speed) >= 0) ? 1 : -1);
+    e->old_turn_q16_rad = (int16_t)(7 * qm_limit(qm_mulhi_su(speed, p->half_step_q16_rad), 4681)); /* 0.5 rad at most */
+}
+
+/** What the next period needs of those that were. */
+QM_INLINE void estimator_remember(estimator_t *e)
+{
+    alphabeta_t *slot = &e->history_q14[e->slot];
+    e->i_oldest_q14 = *slot;
+    *slot = e->i_last_q14;
+    e->slot = (uint16_t)((e->slot != 0u) ? e->slot - 1u : ESTIMATOR_HISTORY - 1u);
+    e->v_mean_q13.alpha = (int16_t)((e->v_last_q13.alpha + e->v_before_q13.alpha) >> 1);
+    e->v_mean_q13.beta = (int16_t)((e->v_last_q13.beta + e->v_before_q13.beta) >> 1);
+    e->v_before_q13 = e->v_last_q13;
+}
+
+/** After the duties of a period: the filtered speed of Equation 7, and what the next period needs. */
+QM_INLINE void estimator_settle(estimator_t *e, const estimator_params_t *p)
+{
+    estimator_remember(e);
+    (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
 }
 
 /** Back-EMF in the control frame while that is the estimator's own: Park with the frame's sine and cosine, turned back by the
  *  half step from the sample to the middle of the last period, so that no second sine is needed. */
-QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, sincos_t frame)
+QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, alphabeta_t e_q13, sincos_t frame)
 {
-    dq_t at_sample = park(e->e_q13, frame), at_middle;
+    dq_t at_sample = park(e_q13, frame), at_middle;
     at_middle.d = (int16_t)(at_sample.d - qm_mulhi(at_sample.q, e->half_step_q16_rad));
     at_middle.q = (int16_t)(at_sample.q + qm_mulhi(at_sample.d, e->half_step_q16_rad));
     return at_middle;
 }
 
-/** What the back-EMF says of speed and angle. @param frame of the control
+/** The estimator's own frame for the next period, which needs it while the forced angle drives the motor. */
+QM_INLINE void estimator_turn_frame(estimator_t *e)
+{
+    e->own = trig_sincos_called((angle_t)(e->rho_q32 >> 16));
+}
+
+/** What the back-EMF says of speed and angle. @param e_q13 see estimator_back_emf() @param frame of the control
  *  @param forced nonzero while the forced angle drives the motor (ALIGN and RAMP): the estimator runs along in a frame of its own */
-QM_INLINE void estimator_track(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, sincos_t frame, uint16_t forced)
+QM_INLINE void estimator_track(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t e_q13, sincos_t frame, uint16_t forced)
 {
     dq_t e_q12;
     if (forced) {
-        e_q12 = park(e->e_q13, trig_sincos_called((angle_t)(e->rho_q32 >> 16)));
+        e_q12 = park(e_q13, e->own);
     } else {
-        e_q12 = estimator_in_control_frame(e, frame);
+        e_q12 = estimator_in_control_frame(e, e_q13, frame);
     }
     estimator_pll(e, p, t, e_q12);
 }

@@ -137,15 +137,23 @@ QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 /* Ranges, each by one comparison without a sign, and a sign without a branch. The proofs read what they mean; test_qmath.c compares. */
 #ifdef __FRAMAC__
 #define qm_beyond(x, most) ((x) > (most) || (x) < -(most))
+#define qm_outside(x, most) ((x) < 0 || (x) > (most))
 #define qm_clear_of(x, most) ((x) <= (most) && (x) >= -(most))
 #define qm_with_sign(most, x) ((int16_t)(((x) < 0) ? -(most) : (most)))
 #define qm_magnitude(x) (((x) >= 0) ? (x) : ((x) == INT16_MIN) ? INT16_MAX \
                                                                : -(x))
+#define qm_unsigned(x) ((uint16_t)(((x) >= 0) ? (x) : -(x)))
 #else
 /** 1 where |x| > most. @param most not negative */
 QM_INLINE QM_WRAPS uint16_t qm_beyond(int16_t x, int16_t most)
 {
     return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) > (uint16_t)(2u * (uint16_t)most));
+}
+
+/** 1 where x is not 0..most. @param most not negative */
+QM_INLINE uint16_t qm_outside(int16_t x, int16_t most)
+{
+    return (uint16_t)((uint16_t)x > (uint16_t)most);
 }
 
 /** 1 where the upper words alone tell that |x| <= most; 0 tells nothing. @param most not negative */
@@ -162,10 +170,16 @@ QM_INLINE int16_t qm_with_sign(int16_t most, int16_t x)
     return (int16_t)((most ^ sign) - sign);
 }
 
+/** Magnitude of any x, without the end that a sign needs. */
+QM_INLINE QM_WRAPS uint16_t qm_unsigned(int16_t x)
+{
+    return (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);
+}
+
 /** |x| for qm_abs(); -32768 gives 32767. */
 QM_INLINE QM_WRAPS int16_t qm_magnitude(int16_t x)
 {
-    uint16_t m = (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);
+    uint16_t m = qm_unsigned(x);
     return (int16_t)(m - (m >> 15));
 }
 #endif

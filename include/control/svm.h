@@ -14,6 +14,11 @@ typedef struct {
     int16_t turn_q13;      /**< most that a phase current changes in a period */
 } svm_params_t;
 
+/** What each leg gets for its dead time, duty counts. */
+typedef struct {
+    int16_t a, b, c;
+} dead_duties_t;
+
 /** The three duties. */
 typedef struct {
     duty_t a, b, c;
@@ -31,17 +36,27 @@ QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t asked_q13)
     return (int16_t)((int16_t)(asked_q13 * p->dead_slope_q8) >> 8);
 }
 
-/** @param u duty before dead-time compensation, at most `top`; below zero only by rounding @param i_q13 measured, read only where it matters */
-QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q13, const current_q13_t *i_q13)
+/** What dead time takes from each leg while these currents flow. */
+QM_INLINE dead_duties_t svm_compensation(const svm_params_t *p, phases_t asked)
 {
-    int16_t duty = (int16_t)(((u < 0) ? 0 : u) + svm_dead_time(p, asked_q13));
-    if (duty > p->top) {
+    dead_duties_t r;
+    r.a = svm_dead_time(p, asked.a);
+    r.b = svm_dead_time(p, asked.b);
+    r.c = svm_dead_time(p, asked.c);
+    return r;
+}
+
+/** @param duty with its dead-time compensation @param i_q13 measured, read only where it matters @return what the leg can have of it */
+QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t duty, const current_q13_t *i_q13)
+{
+    if (qm_outside(duty, p->top)) {
         /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
          * is open longer by it; otherwise the compensation must not close the window. */
         int16_t most = (*i_q13 > p->turn_q13) ? p->full : p->top;
-        duty = (duty > most) ? most : duty;
+        duty = (duty < 0) ? 0 : (duty > most) ? most
+                                              : duty;
     }
-    return (duty_t)((duty < 0) ? 0 : duty);
+    return (duty_t)duty;
 }
 
 /** Duties for a voltage vector.
@@ -49,11 +64,11 @@ QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t u, current_q13_t asked_q
  *  vector 000, less of 111, the same line voltages.
  *  @param v voltage vector, Q13
  *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see bus_update_gain())
- *  @param asked phase currents that the controllers ask for at the centre of the pulse: dead time is compensated for them. The measured
+ *  @param dead of the phase currents that the controllers ask for at the centre of the pulse, see svm_compensation(). The measured
  *         ones are a period older and carry the converter's steps; compensation that follows them makes a current stick at zero
  *  @param i measured phase currents, for the sampling window
  *  @param d the duties: written in place, for a returned structure is copied */
-QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, phases_t asked, const phases_t *i, duties_t *d)
+QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, const dead_duties_t *dead, const phases_t *i, duties_t *d)
 {
     int16_t a = qm_mulhi_su(v.alpha, duty_per_volt_q16);
     int16_t t = qm_mulhi_su(qm_mulhi_su(v.beta, duty_per_volt_q16), 56756u); /* sqrt(3)/2 */
@@ -76,9 +91,9 @@ QM_INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_
     if ((int16_t)(max + shift) > p->top) {
         shift = (int16_t)(p->top - max);
     }
-    d->a = svm_leg(p, (int16_t)(a + shift), asked.a, &i->a);
-    d->b = svm_leg(p, (int16_t)(b + shift), asked.b, &i->b);
-    d->c = svm_leg(p, (int16_t)(c + shift), asked.c, &i->c);
+    d->a = svm_leg(p, (int16_t)(a + shift + dead->a), &i->a);
+    d->b = svm_leg(p, (int16_t)(b + shift + dead->b), &i->b);
+    d->c = svm_leg(p, (int16_t)(c + shift + dead->c), &i->c);
 }
 
 #endif

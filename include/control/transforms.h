@@ -52,6 +52,15 @@ QM_INLINE alphabeta_t inverse_park(dq_t x, sincos_t sc)
     return r;
 }
 
+/** x turned by a small angle: error a^2/2. @param a_q16_rad angle in radians * 65536, +-0.5 rad */
+QM_INLINE dq_t dq_turn(dq_t x, int16_t a_q16_rad)
+{
+    dq_t r;
+    r.d = (int16_t)(x.d - qm_mulhi(x.q, a_q16_rad));
+    r.q = (int16_t)(x.q + qm_mulhi(x.d, a_q16_rad));
+    return r;
+}
+
 /** The phase currents of a current vector: inverse Park, then a = alpha, b = (sqrt(3) beta - alpha)/2, c = -a - b.
  *  Rounded to the nearest: an offset of one phase would be a direct voltage where dead time is compensated for these currents.
  *  @param x_q13 |x| at most 11585 @return Q13, to a count and 1/3000; their sum is 0 */

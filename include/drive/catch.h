@@ -172,8 +172,10 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
 
     e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
                  + (uint32_t)half_step_q32 * (uint32_t)(uint16_t)(c->half_periods + 2u * d->periods + 1u);
+    e->next = estimator_ahead(e->rho_q32, 2 * half_step_q32);
     e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, p->estimator.half_step_q16_rad);
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
+    estimator_follow(e, &p->estimator);
     drive_update_model(run, p, e->omega_erpm);
     emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_abs(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
     e->e_q_q28 = (int32_t)((ahead >= 0) ? emf : -emf) * 65536;
@@ -196,6 +198,7 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     d->frame = trig_sincos_called(d->angle);
     run->estimator.v_last_q13 = inverse_park(c->v_q14, d->frame);
     run->estimator.v_before_q13 = run->estimator.v_last_q13;
+    run->estimator.v_mean_q13 = run->estimator.v_last_q13;
     drive_enter(d, DRIVE_CLOSED);
 }
 

@@ -200,8 +200,9 @@ typedef struct {
     uint16_t duty_per_volt_q16;
 
     forced_angle_t forced;
-    angle_t angle;  /**< control angle of the next sample */
-    sincos_t frame; /**< its sine and cosine */
+    dead_duties_t dead; /**< dead-time compensation of the next pulse */
+    angle_t angle;      /**< control angle of the next sample */
+    sincos_t frame;     /**< its sine and cosine */
     drive_run_t run;
     SELFTEST_STATE
 } drive_t;

@@ -5,7 +5,7 @@
 #include "drive/calibration.h"
 #include "drive/catch.h"
 
-/** A period with the bridge off or charging its drivers: each state says which comes next, the gate lets it in or not. */
+/** A period with the bridge off or charging its drivers, after its duties: each state says which comes next, the gate lets it in or not. */
 NOINLINE void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {
     uint16_t next = d->state;

@@ -6,7 +6,7 @@
 #include "drive/modes/recorder_room.h"
 #include "drive/param_scaling.h"
 
-#define RECORDER_ROWS 80  /* 12 bytes each: 960 of the part's 2048; a seventh word would be 160 more, and the stack needs 512 */
+#define RECORDER_ROWS 72  /* 12 bytes each: 864 of the part's 2048; the stack needs 494 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */
 
 /** The words of a row. The bus and the speed take turns in the last one: both change slowly. */

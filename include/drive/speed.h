@@ -48,14 +48,14 @@ QM_INLINE void speed_go_on(drive_t *d)
     drive_enter(d, DRIVE_CLOSED);
 }
 
-/** Whether the run goes on or slows down: a target in the other direction slows it down; a new wish to run goes on from the present speed.
+/** Whether the run goes on or slows down: the wish to stop or a target in the other direction slows it down; a new wish to run goes on from the present speed.
  *  Every eighth period in closed loop. */
 NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
 
     if (!stops) {
-        if (other) {
+        if (other || !d->command.run) {
             drive_enter(d, DRIVE_STOPPING);
         }
     } else if (d->command.run) {

@@ -62,14 +62,4 @@ QM_INLINE void startup_align(drive_t *d, const drive_params_t *p)
     d->run.control.ref_q13.q = along_direction(d, current);
 }
 
-/** A period of ALIGN or RAMP, after the estimator. Letting go is harmless at these speeds. */
-QM_INLINE void startup_step(drive_t *d, const drive_params_t *p)
-{
-    (void)forced_angle_tick(&d->forced, &p->forced, d->direction);
-    d->angle = forced_angle(&d->forced);
-    if (!d->command.run) {
-        drive_enter(d, DRIVE_STOPPED);
-    }
-}
-
 #endif

@@ -15,53 +15,55 @@ QM_INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_sa
     d->phases_q13.c = (int16_t)(-d->phases_q13.a - d->phases_q13.b);
 }
 
-/* wcet: drive_run excludes catch_step */
-/* wcet: drive_run/startup_step excludes speed_step speed_choose_state speed_turn_round limits_burn protection_check_signals */
 /** A period with the bridge switching. @param duty written */
 QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
 {
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
-    alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), v;
+    alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), e, v;
 
     c->i_q13 = park(i, d->frame);
     c->i_q13.q = (int16_t)(c->i_q13.q + c->sample_shift_q13);
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
-    estimator_back_emf(&run->estimator, &p->estimator, &run->model, i);
-    estimator_track(&run->estimator, &p->estimator, &run->model, d->frame, drive_is_forced(d));
-    if (drive_is_forced(d)) { /* asked again: a flag would take a register from the law */
-        startup_step(d, p);
-    } else {
-        d->angle = estimator_next_angle(&run->estimator);
-        if (!d->command.run && d->state == (uint16_t)DRIVE_CLOSED) {
-            drive_enter(d, DRIVE_STOPPING);
-        }
-    }
+    e = estimator_back_emf(&run->estimator, &p->estimator, &run->model, i);
+    estimator_track(&run->estimator, &p->estimator, &run->model, e, d->frame, drive_is_forced(d));
+    d->angle = drive_is_forced(d) ? forced_angle(&d->forced) : estimator_next_angle(&run->estimator); /* asked again: a flag would take a register */
     d->frame = trig_sincos(d->angle);
     v = inverse_park(c->v_q14, d->frame);
     estimator_commanded(&run->estimator, v);
-    svm(&p->svm, v, d->duty_per_volt_q16, phases_of(c->ref_q13, d->frame), &d->phases_q13, duty);
+    svm(&p->svm, v, d->duty_per_volt_q16, &d->dead, &d->phases_q13, duty);
 }
 
-/** One PWM period up to the duties; then drive_outputs(), drive_slow(), which has no deadline, and last drive_settle().
+/** Last of the slow work: what the next period's law needs and the samples do not change. */
+QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
+{
+    dq_t asked = d->run.control.ref_q13;
+    if (drive_is_forced(d)) {
+        (void)forced_angle_tick(&d->forced, &p->forced, d->direction);
+        estimator_turn_frame(&d->run.estimator);
+        if (!d->command.run) { /* letting go is harmless at these speeds */
+            drive_enter(d, DRIVE_STOPPED);
+        }
+    } else {
+        asked = dq_turn(asked, (int16_t)(2 * qm_limit(d->run.estimator.half_step_q16_rad, 16383))); /* the frame goes on by a step */
+    }
+    d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
+}
+
+/** One PWM period up to the duties; after it drive_slow(), which has no deadline, drive_outputs(), and last drive_settle().
  *  @param raw the converter's results at the centre of the low sides' conduction
  *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch */
 QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
     d->ticks = (uint16_t)(d->ticks + 1u);
     drive_measure(d, p, raw);
-    if (drive_is_running(d)) {
-        if (!protection_check_current(d, p)) { /* before the law: its formats end above the trip level */
-            MODE_RUN(d, p, duty);
-            return;
-        }
+    if (drive_is_running(d) && !protection_check_current(d, p)) { /* before the law: its formats end above the trip level */
+        MODE_RUN(d, p, duty);
     } else {
-        mode_idle(d);
-        idle_step(d, p, raw->i_a, raw->i_b); /* the period in which it begins to run has no time for both: the low sides stay on */
+        duty->a = 0;
+        duty->b = 0;
+        duty->c = 0;
     }
-    duty->a = 0;
-    duty->b = 0;
-    duty->c = 0;
 }
 
 /** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every eighth period. */
@@ -90,14 +92,50 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** Slow work after the duties of a period are written, for they have a deadline and this has none: one block a period in turn. Bus and
- *  circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
- *  @param v_bus_raw the converter's result for the bus, any value */
-NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
+/* wcet: idle_step excludes estimator_settle speed_step speed_choose_state protection_check_signals protection_probe_rotor */
+/** First of the slow work: what a period leaves to be done, or what the states with the bridge off do. */
+QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    if (!drive_is_running(d)) {
+        mode_idle(d);
+        idle_step(d, p, raw->i_a, raw->i_b);
+    } else if (MODE_ALIGNS) {
+        estimator_settle(&d->run.estimator, &p->estimator);
+    } else {
+        /* the mode's own */
+    }
+}
+
+/** What the running motor teaches, and what falls by and by. Every eighth period. @param bus_q15 of this moment */
+QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus_q15)
+{
+    if (drive_is_closed(d)) {
+        handover_decay(d);
+        limits_braking(&d->run, p, bus_q15);
+    }
+    model_learn_step(d, p);
+    if (drive_is_running(d)) {
+        estimator_follow(&d->run.estimator, &p->estimator);
+    }
+}
+
+/** drive_prepare() where the law goes on. */
+QM_INLINE void drive_prepare_step(drive_t *d, const drive_params_t *p)
+{
+    if (MODE_ALIGNS && drive_is_running(d)) {
+        drive_prepare(d, p);
+    }
+}
+
+/** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period: one block a period
+ *  in turn, between what each period needs. Bus and circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
+ *  @param raw the converter's results of this period */
+QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     drive_run_t *run = &d->run;
     uint16_t done;
 
+    drive_follow(d, p, raw);
     switch (d->ticks & (SLOW_PHASES - 1u)) {
     case 0:
         if (drive_is_closed(d)) {
@@ -112,7 +150,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         done = 1;
         break;
     case 2:
-        bus_step(d, p, v_bus_raw);
+        bus_step(d, p, raw->v_bus);
         protection_check_model(d, p);
         speed_choose_step(d, p);
         done = 2;
@@ -142,11 +180,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         done = 5;
         break;
     case 6:
-        if (drive_is_closed(d)) {
-            handover_decay(d);
-            limits_braking(run, p, bus_sample(v_bus_raw));
-        }
-        model_learn_step(d, p);
+        drive_learn_step(d, p, bus_sample(raw->v_bus));
         done = 6;
         break;
     default: /* 7 */
@@ -157,6 +191,7 @@ NOINLINE void drive_slow(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
         break;
     }
     SELFTEST_MARK(d, done);
+    drive_prepare_step(d, p);
 }
 
 #endif

@@ -39,6 +39,7 @@ void test_bit_views_sit_where_the_device_has_the_bits(void)
     EXPECT_VIEW(IFS0, AD1IF, 1, 0x2000);
     EXPECT_VIEW(IFS3, FLTA1IF, 1, 0x8000);
     EXPECT_VIEW(IFS3, PWM1IF, 1, 0x8200);
+    EXPECT_VIEW(IPC1, T2IP, 3, 0x3440);
     EXPECT_VIEW(IPC3, AD1IP, 6, 0x0064);
     EXPECT_VIEW(IPC15, FLTA1IP, 7, 0x7000);
     EXPECT_VIEW(P1OVDCON, POVD3H, 0, 0x1F00);

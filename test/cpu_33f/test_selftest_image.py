@@ -112,8 +112,8 @@ def test_the_panel_keeps_its_potentiometer_while_the_converter_is_tested(board: 
 
 @pytest.mark.parametrize("name, bits", [
     ("p1tper", 0x0010), ("pwm1con1", 0x0001), ("p1dtcon1", 0x0008), ("p1fltacon", 0x0001), ("p1secmp", 0x0020), ("pwm1con2", 0x0004),
-    ("ad1con2", 0x0100), ("ad1con3", 0x0040), ("ad1chs123", 0x0100), ("ad1pcfgl", 0x0010), ("trisb", 0x0002), ("trisc", 0x0040),
-    ("rpinr12", 0x0003), ("pr1", 0x0400), ("ipc15", 0x1000), ("ipc3", 0x0010), ("corcon", 0x0001), ("osctun", 0x0001), ("pllfbd", 0x0001)])
+    ("ad1con2", 0x0100), ("ad1con3", 0x0004), ("ad1chs123", 0x0100), ("ad1pcfgl", 0x0010), ("trisb", 0x0002), ("trisc", 0x0040),
+    ("rpinr12", 0x0003), ("pr1", 0x0400), ("ipc15", 0x1000), ("ipc3", 0x0010), ("ipc1", 0x1000), ("corcon", 0x0001), ("osctun", 0x0001), ("pllfbd", 0x0001)])
 def test_a_changed_bit_of_a_register_stops(board: PilBoard, name: str, bits: int) -> None:
     flip(running(board), REGISTERS[name], bits)
     assert finds(board, "REGISTERS", 15) <= 12

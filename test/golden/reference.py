@@ -360,7 +360,7 @@ def svm(p, alpha, beta, duty_per_volt, asked, currents):
 
 def leg(p, u, asked_q13, i_q13):
     """Inside the window; its dead time may go beyond only where the current surely keeps its sign to the next sample."""
-    return clamp(clamp(u, 0, p["top"]) + dead_time(p, asked_q13), 0, p["full"] if i_q13 > p["turn_q13"] else p["top"])
+    return clamp(u + dead_time(p, asked_q13), 0, p["full"] if i_q13 > p["turn_q13"] else p["top"])
 
 
 def svm_real(p, alpha, beta, duty_per_volt, asked, currents):
@@ -369,7 +369,7 @@ def svm_real(p, alpha, beta, duty_per_volt, asked, currents):
     shift = (p["full"] - max(phases) - min(phases)) / 2
     shift = min(shift, p["top"] - max(phases))
     knee = p["knee_q13"]
-    legs = [clamp(u + shift, 0, p["top"]) + p["dead_time"] * clamp(i / knee, -1, 1) for u, i in zip(phases, asked)]
+    legs = [u + shift + p["dead_time"] * clamp(i / knee, -1, 1) for u, i in zip(phases, asked)]
     return [clamp(u, 0, p["full"] if i > p["turn_q13"] else p["top"]) for u, i in zip(legs, currents)]
 
 
@@ -473,15 +473,18 @@ class Estimator:
     omega: int = 0
     filtered: int = 0
     rho: int = 0        # modulo 2^32
+    step: int = 0       # of a period, 2^32 = a turn
     half_step: int = 0
+    old_turn: int = 0   # 3.5 steps of the filtered speed
+    sign: int = 0
 
     @property
     def speed(self):
         return upper(self.filtered)
 
     def next_angle(self):
-        """The angle half a period after the last sample, plus half a step; radians * 65536 to counts: / (2 pi)."""
-        return (self.rho // WORD + share(self.half_step, nearest(WORD / (2 * math.pi)))) % WORD
+        """The angle half a period after the last sample, plus half a step."""
+        return (self.rho // WORD + self.step // WORD // 2) % WORD
 
     def inductive(self, now, ls_q16):
         """Ls dI/dt in Q13: eight samples below nominal speed, turned from 4 samples ago to the middle of the last
@@ -492,7 +495,7 @@ class Estimator:
         change = [clamp(s16(n - b), -limit, limit) for n, b in zip(now, base)]
         v = [share(s16(c if slow else 8 * c), ls_q16) for c in change]
         if slow:
-            v = turn_small(*v, s16(7 * clamp(self.half_step, -4681, 4681)))
+            v = turn_small(*v, self.old_turn)
         return [s16(x << p["ls_exp"]) for x in v]
 
     def back_emf(self, now, ls_q16):
@@ -508,29 +511,39 @@ class Estimator:
         self.history = self.history[1:] + [tuple(now)]
 
     def pll(self, e_d, e_q, inv_kfi):
-        """Equations 7, 2 and 1. The sign is Eq's above a tenth of nominal speed, the filtered speed's below."""
+        """Equations 7, 2 and 1."""
         p = self.p
         self.e_d = lowpass(self.e_d, e_d, self.kfilter_esdq_q16)
         self.e_q = lowpass(self.e_q, e_q, self.kfilter_esdq_q16)
         d, q = upper(self.e_d), upper(self.e_q)
-        decides = q if magnitude(self.speed) > p["decimate_erpm"] else self.speed
         most = emf_sum_max(inv_kfi)
-        total = clamp(s16(q - d if decides >= 0 else q + d), -most, most)
+        total = clamp(s16(q - self.sign * d), -most, most)
         self.omega = s16(total * inv_kfi // 2048)
-        self.rho = (self.rho + self.omega * p["deltat_q32"]) % (1 << 32)
+        self.step = self.omega * p["deltat_q32"]
+        self.rho = (self.rho + self.step) % (1 << 32)
         self.half_step = share(self.omega, p["half_step_q16_rad"])
         self.filtered = lowpass(self.filtered, self.omega, p["kfilter_velestim_q16"])
+
+    def follow(self):
+        """For the next periods: the sign of Equation 2, Eq's above a tenth of nominal speed and the filtered speed's below; 3.5 steps, half a radian
+        at most."""
+        p = self.p
+        decides = upper(self.e_q) if magnitude(self.speed) > p["decimate_erpm"] else self.speed
+        self.sign = 1 if decides >= 0 else -1
+        self.old_turn = s16(7 * clamp(share(self.speed, p["half_step_q16_rad"]), -4681, 4681))
 
     def tick_free(self, now, ls_q16, inv_kfi):
         """In the estimator's own frame, by its own sine and cosine."""
         self.back_emf(now, ls_q16)
         self.pll(*park(*self.e, *sincos(self.rho // WORD)), inv_kfi)
+        self.follow()
 
     def tick_closed(self, now, ls_q16, inv_kfi, frame):
         """In the control frame of this sample, turned back by half a step to the middle of the last period."""
         self.back_emf(now, ls_q16)
         d, q = park(*self.e, *frame)
         self.pll(s16(d - share(q, self.half_step)), s16(q + share(d, self.half_step)), inv_kfi)
+        self.follow()
 
     def commanded(self, v):
         self.v = [self.v[1], tuple(v)]
@@ -556,7 +569,7 @@ class EstimatorReal:
             limit = m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
             change = i - self.history[0]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
-            change *= cmath.rect(1.0, clamp(3.5 * step * rad, -0.5, 0.5))
+            change *= cmath.rect(1.0, clamp(3.5 * self.filtered * m.turns_per_erpm * rad, -0.5, 0.5))
         else:
             limit = m.current_step(m.maximum_rpm) * m.i0
             change = i - self.history[-1]

@@ -231,24 +231,22 @@ static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
 {
     svm_params_t p;
     alphabeta_t v;
-    phases_t asked, measured;
+    phases_t measured;
+    dead_duties_t dead;
     duties_t d;
 
     p.full = any(1600, 5600);
     p.top = any(1280, 5480);
-    p.dead_time = any(20, 120);
-    p.knee_q13 = 20;
-    p.dead_slope_q8 = any(256, 1536); /* each knee: see proof_dead_time */
     p.turn_q13 = any(0, 8192);
     v.alpha = PIECE(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, alpha, SVM_PIECES);
     v.beta = PIECE(-SVM_VOLTAGE_MAX, SVM_VOLTAGE_MAX, beta, SVM_PIECES);
-    asked.a = ANY16();
-    asked.b = ANY16();
-    asked.c = ANY16();
+    dead.a = any(-120, 120); /* see proof_dead_time */
+    dead.b = any(-120, 120);
+    dead.c = any(-120, 120);
     measured.a = ANY16();
     measured.b = ANY16();
     measured.c = ANY16();
-    svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), asked, &measured, &d);
+    svm(&p, v, any_u(8192u * ratio, 8192u * ratio + 8191u), &dead, &measured, &d);
     //@ check duties: d.a <= 5600 && d.b <= 5600 && d.c <= 5600;
 }
 
@@ -345,11 +343,10 @@ void proof_estimator_blocks(void)
     estimator_t e;
     alphabeta_t x = { any(-21844, 21844), any(-21844, 21844) };
     e.rho_q32 = any_ul(0, UINT32_MAX);
-    e.half_step_q16_rad = ANY16();
+    (void)estimator_ahead(e.rho_q32, any_l(INT32_MIN, INT32_MAX));
     e.omega_filtered_q16 = any_l(INT32_MIN, INT32_MAX);
     e.e_d_q28 = any_l(INT32_MIN, INT32_MAX);
     e.e_q_q28 = any_l(INT32_MIN, INT32_MAX);
-    (void)estimator_next_angle(&e);
     (void)estimator_speed(&e);
     (void)estimator_emf(&e);
     (void)estimator_turn(x, ANY16());

@@ -94,8 +94,7 @@ static void circle_between(int16_t low, int16_t high)
     dq_t v;
     int32_t square;
 
-    circle.limit_q14 = any(low, high);
-    circle.reciprocal = voltage_circle_reciprocal(circle.limit_q14);
+    voltage_circle_of(&circle, any(low, high));
     v = current_control(&pi, &gains, &pi, &gains, zero, zero, &circle, &limit_q);
     square = qm_mulss(v.d, v.d) + qm_mulss(v.q, v.q);
     //@ check length: square <= largest_square;
@@ -110,8 +109,7 @@ void proof_circle(void)
     largest_square = qm_mulss(radius_max, radius_max) + qm_mulss(radius_max, radius_max) / 20;
     //@ loop unroll 200;
     while (low < radius_max) {
-        const voltage_circle_t outer = { high, 0 };
-        int16_t most = vd_limit(&outer);
+        int16_t most = vd_limit(high);
         //@ loop unroll D_PIECES;
         for (int16_t k = 0; k < D_PIECES; k++) {
             d_low = piece_low((int16_t)-most, most, k, D_PIECES);

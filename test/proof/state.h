@@ -7,6 +7,8 @@
 #include "any.h"
 #include "bounds.h"
 
+#define DEAD_MOST 120 /* duty counts: blocks.c, proof_dead_time */
+
 static void any_drive(uint16_t state)
 {
     drive.command.run = any(0, 1);
@@ -23,9 +25,11 @@ static void any_drive(uint16_t state)
     drive.calibration.offset_a_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
     drive.calibration.offset_b_q13 = any((int16_t)-params.offset_max_q13, params.offset_max_q13);
     drive.bus_q31 = any_l(0, INT32_MAX);
-    drive.circle.limit_q14 = any(0, radius_max);
-    drive.circle.reciprocal = voltage_circle_reciprocal(drive.circle.limit_q14);
+    voltage_circle_of(&drive.circle, any(0, radius_max));
     drive.duty_per_volt_q16 = any_u(0, qm_divud(params.duty_per_volt_numerator, (uint16_t)((uint16_t)params.bus_under_q15 << 1)));
+    drive.dead.a = any(-DEAD_MOST, DEAD_MOST);
+    drive.dead.b = any(-DEAD_MOST, DEAD_MOST);
+    drive.dead.c = any(-DEAD_MOST, DEAD_MOST);
     drive.angle = ANYU16();
     drive.frame.sin = any(-32767, 32767);
     drive.frame.cos = any(-32767, 32767);
@@ -49,18 +53,27 @@ static void any_estimator(estimator_t *e)
         e->history_q14[i].alpha = any((int16_t)-alpha_max, alpha_max);
         e->history_q14[i].beta = any((int16_t)-beta_max, beta_max);
     }
-    e->newest = any_u(0, ESTIMATOR_HISTORY - 1);
+    e->slot = any_u(0, ESTIMATOR_HISTORY - 1);
+    e->i_last_q14.alpha = any((int16_t)-alpha_max, alpha_max);
+    e->i_last_q14.beta = any((int16_t)-beta_max, beta_max);
+    e->i_oldest_q14.alpha = any((int16_t)-alpha_max, alpha_max);
+    e->i_oldest_q14.beta = any((int16_t)-beta_max, beta_max);
     e->v_last_q13.alpha = any((int16_t)-voltage_max, voltage_max);
     e->v_last_q13.beta = any((int16_t)-voltage_max, voltage_max);
     e->v_before_q13.alpha = any((int16_t)-voltage_max, voltage_max);
     e->v_before_q13.beta = any((int16_t)-voltage_max, voltage_max);
-    e->e_q13.alpha = ANY16();
-    e->e_q13.beta = ANY16();
+    e->v_mean_q13.alpha = any((int16_t)-voltage_max, voltage_max);
+    e->v_mean_q13.beta = any((int16_t)-voltage_max, voltage_max);
     e->e_d_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
     e->e_q_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
     e->omega_erpm = any(-32767, 32767);
     e->omega_filtered_q16 = any_l(-32767 * 65536l, INT32_MAX);
     e->rho_q32 = any_ul(0, UINT32_MAX);
+    e->next = ANYU16();
+    e->old_turn_q16_rad = any(-32767, 32767);
+    e->sign = any(-1, 1);
+    e->own.sin = any(-32767, 32767);
+    e->own.cos = any(-32767, 32767);
     e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, params.estimator.half_step_q16_rad);
 }
 
@@ -115,11 +128,16 @@ static void bounds_hold_again(void)
     //@ check bus: 0 <= drive.bus_q31;
     //@ check circle: 0 <= drive.circle.limit_q14 <= radius_max;
     //@ check forced: -forced_max <= drive.forced.speed_q10 <= forced_max;
-    //@ check newest: e->newest < ESTIMATOR_HISTORY;
+    //@ check slot: e->slot < ESTIMATOR_HISTORY;
+    //@ check i_last: -alpha_max <= e->i_last_q14.alpha <= alpha_max && -beta_max <= e->i_last_q14.beta <= beta_max;
+    //@ check i_oldest: -alpha_max <= e->i_oldest_q14.alpha <= alpha_max && -beta_max <= e->i_oldest_q14.beta <= beta_max;
+    //@ check old_turn: -32767 <= e->old_turn_q16_rad && -1 <= e->sign <= 1;
+    //@ check dead: -DEAD_MOST <= drive.dead.a <= DEAD_MOST && -DEAD_MOST <= drive.dead.b <= DEAD_MOST && -DEAD_MOST <= drive.dead.c <= DEAD_MOST;
     //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
     //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
     //@ check v_last: -voltage_max <= e->v_last_q13.alpha <= voltage_max && -voltage_max <= e->v_last_q13.beta <= voltage_max;
     //@ check v_before: -voltage_max <= e->v_before_q13.alpha <= voltage_max && -voltage_max <= e->v_before_q13.beta <= voltage_max;
+    //@ check v_mean: -voltage_max <= e->v_mean_q13.alpha <= voltage_max && -voltage_max <= e->v_mean_q13.beta <= voltage_max;
     //@ check emf_d: emf_dq_max * -65536 <= e->e_d_q28 <= emf_dq_max * 65536 + 65535;
     //@ check emf_q: emf_dq_max * -65536 <= e->e_q_q28 <= emf_dq_max * 65536 + 65535;
     //@ check omega: -32767 <= e->omega_erpm;

@@ -157,7 +157,7 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 {
     dq_t v;
     //@ check radius: 0 <= circle->limit_q14 <= radius_max;
-    v.d = pi_tick_bounded(pi_d, gains_d, (int16_t)(ref_q13.d - meas_q13.d), vd_limit(circle));
+    v.d = pi_tick_bounded(pi_d, gains_d, (int16_t)(ref_q13.d - meas_q13.d), circle->vd_most_q14);
     *limit_q = any(0, circle->limit_q14);
     v.q = pi_tick_bounded(pi_q, gains_q, (int16_t)(ref_q13.q - meas_q13.q), *limit_q);
     return v;
@@ -219,8 +219,10 @@ static uint16_t calibrates; /* the calibration's sums are sealed */
 static void slow_in(uint16_t slot)
 {
     uint16_t seals = calibrates, state = drive.state; /* what a check alone reads, the analyser's memory of calls does not know */
+    drive_samples_t raw;
     drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
-    drive_slow(&drive, &params, ANY16());
+    raw = any_samples();
+    drive_slow(&drive, &params, &raw);
     //@ check sums_stay: seals == 0 || (SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive);
     //@ check ended: seals == 0 || state == DRIVE_CALIBRATE || drive.state != DRIVE_CALIBRATE;
     bounds_hold_again();

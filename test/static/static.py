@@ -122,10 +122,13 @@ def cppcheck(sources: list[str]) -> list[Finding]:
         Path(folder, "drive", "param_init.h").write_text("#define DRIVE_PARAMS_INIT {0}\n")
         with_values = [source for source in sources if '"drive/param_init.h"' in Path(source).read_text()]
         every, delivered = each(lambda job: one_cppcheck(*job), [(["--force", "-U__clang__", f"-I{folder}"], sources), (["--max-configs=1"], with_values)])
-    # What is never used is so in both, where both look.
     seen = set(run([os.environ.get("CC", "gcc"), "-MM", *INCLUDES, *with_values]).split())
-    found = {f for f in every ^ delivered if f.check not in UNUSED or (f in every and f.file not in seen)} | (every & delivered)
-    return sorted((finding for finding in found if not finding.file.startswith("build/")), key=lambda f: (f.check, f.file, f.line))
+    return sorted((f for f in of_both(every, delivered, seen) if not f.file.startswith("build/")), key=lambda f: (f.check, f.file, f.line))
+
+
+def of_both(every: set[Finding], delivered: set[Finding], seen: set[str]) -> set[Finding]:
+    """What either run finds; but what is never used is so in both, where both look: `seen` are the files that the second one reads."""
+    return {f for f in every ^ delivered if f.check not in UNUSED or (f in every and f.file not in seen)} | (every & delivered)
 
 
 def one_cppcheck(options: list[str], sources: list[str]) -> set[Finding]:

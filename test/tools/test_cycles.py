@@ -18,8 +18,9 @@ from tools.image.budget import Budget, CycleLimits, Limits
 from tools.image.profile import Counts, Profile
 from tools.image.size import write_json
 
-BUDGET = Budget(Limits(0, 0), Limits(0, 0, 512), CycleLimits(600, 500, 960, 700, 500, ("demo",)), [], [], (), (), [])
+BUDGET = Budget(Limits(0, 0), Limits(0, 0, 512), CycleLimits(600, 800, 700, 960, 700, 500, 300, ("demo",)), [], [], (), (), [])
 WORDS = {0: 0x040200, 2: 0, 0x200: 0, 0x202: 0x37FFFF}
+SLOW = 200
 NO_CYCLES = pil.Cycles(*[0.0] * len(pil.Cycles.__dataclass_fields__))
 
 
@@ -29,10 +30,13 @@ def spread(values) -> cycles.Spread:
 
 def found(name: str, without: list[int], weakening: list[int], latency: tuple[int, ...] = (700,), stack: int = 100,
           differences: int = 0) -> cycles.Found:
-    """A scenario with these interrupts in closed loop."""
-    return cycles.Found({"STOPPED": spread([]), "CLOSED": spread(without + weakening), cycles.WITHOUT: spread(without),
-                         cycles.WITH: spread(weakening)},
-                        spread(latency), Counts({0x200: 1}, {0x200: sum(without + weakening)}), stack, differences, 10,
+    """A scenario with these control interrupts in closed loop, each with SLOW cycles of slow work."""
+    def by_name(slow: int) -> dict[str, cycles.Spread]:
+        lists = {"STOPPED": [], "CLOSED": without + weakening, cycles.WITHOUT: without, cycles.WITH: weakening}
+        return {key: spread([value + slow for value in values]) for key, values in lists.items()}
+
+    everything = by_name(SLOW)
+    return cycles.Found(by_name(0), everything, spread(latency), Counts({0x200: 1}, {0x200: everything["CLOSED"].sum}), stack, differences, 10,
                         "tick 3, P1DC1" if differences else "", {name: (max(without + weakening), 1.5, "CLOSED")}, 967, 2.0, 1.0, 5e6)
 
 
@@ -69,14 +73,16 @@ def test_every_interrupt_belongs_to_one_state_bridge_off_to_neither_figure_and_f
 def test_scenarios_are_put_together():
     whole = cycles.merged([found("demo", [400], [500], stack=90), found("stop", [300], [450], latency=(800,), stack=110)])
     assert (min(whole.spreads[cycles.WITHOUT]), whole.spreads[cycles.WITH].most) == (300, 500)
-    assert (whole.latency.most, whole.stack_bytes, set(whole.longest), whole.counts.cycles) == (800, 110, {"demo", "stop"}, {0x200: 1650})
+    assert (whole.latency.most, whole.stack_bytes, set(whole.longest), whole.counts.cycles) == (800, 110, {"demo", "stop"}, {0x200: 1650 + 4 * SLOW})
+    assert (min(whole.periods[cycles.WITHOUT]), whole.periods[cycles.WITH].most) == (300 + SLOW, 500 + SLOW)
 
 
 # ---- budgets -------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("item, budget, lines", [
     (found("demo", [500], [490, 510]), BUDGET, []),
-    (found("demo", [500], [500, 510]), BUDGET, ["mean interrupt with field weakening: 505.0 cycles, over the budget of 500"]),
-    (found("demo", [400], [390, 601]), BUDGET, ["longest interrupt: 601 cycles, 1 over the budget of 600 (demo at 1.5000 s, CLOSED)"]),
+    (found("demo", [500], [500, 510]), BUDGET, ["mean period with field weakening: 705.0 cycles of both interrupts, over the budget of 700"]),
+    (found("demo", [400], [390, 601]), BUDGET, ["longest period: 801 cycles of both interrupts, over the budget of 800",
+                                                 "longest control interrupt: 601 cycles, 1 over the budget of 600 (demo at 1.5000 s, CLOSED)"]),
     (found("demo", [400], [400], latency=(961,), stack=513), BUDGET,
      ["trigger to duties: 961 cycles, over the budget of 960", "stack: 513 bytes, over the budget of 512"]),
     (found("demo", [400], [400], latency=(967,)), None,
@@ -90,31 +96,33 @@ def test_each_broken_budget_is_a_line(item, budget, lines):
 def test_a_profile_that_misses_cycles_is_an_error():
     item = found("demo", [400], [400])
     item.counts.cycles[0x200] = 700
-    assert "the profile has 700 cycles, the interrupts took 800" in report(item, None).broken[0]
+    assert "the profile has 700 cycles, the interrupts took 1200" in report(item, None).broken[0]
     long = found("demo", [400000], [400000])
     long.counts.cycles[0x200] += 75 # one interrupt is still under way at the end
     assert report(long, None).broken == []
     long.counts.cycles[0x200] += 25 # what the background executes is none of the interrupt's
-    assert "the profile has 800100 cycles, the interrupts took 800000" in report(long, None).broken[0]
+    assert "the profile has 800500 cycles, the interrupts took 800400" in report(long, None).broken[0]
 
 
 def test_budget_file_has_the_limits():
     limits = Budget.read().cycles
-    assert limits.isr_max < 946 # AN1292's
+    assert limits.isr_max < limits.period_max < 946 # AN1292's
     assert "demo" in limits.scenarios and len(limits.scenarios) > 3
 
 
 # ---- output --------------------------------------------------------------------------------------------------------------
 def test_table_has_cycles_us_load_and_the_notes_figures(tmp_path):
     lines = cycles.text(report(found("demo", [400, 600], [500]))).splitlines()
-    row = next(line for line in lines if line.startswith(cycles.WITHOUT))
-    assert row.split() == "without field weakening 2 400 500.0 600 10.00 12.50 15.00 25.0 % 14.725 / 20.8 / 21.4".split()
+    alone, both = (line.split() for line in lines if line.startswith(cycles.WITHOUT) and "%" in line)
+    assert alone == "without field weakening 2 400 500.0 600 10.00 12.50 15.00 25.0 %".split()
+    assert both == "without field weakening 2 600 700.0 800 15.00 17.50 20.00 35.0 % 14.725 / 20.8 / 21.4".split()
     assert any("ENTRY" in line and "cycles of an entry" in line for line in lines)
     # the README's table follows from the file
     head, rows = cycles.readme_table(json.loads(write_json(cycles.summary(report(found("demo", [400], [440, 480]))), tmp_path,
                                                            "cycles").read_text()))
     assert all(len(row) == len(head) for row in rows)
-    assert ["interrupt with field weakening", "14.975 / 23.325 / 23.65", "440 / 460 / 480", "11.00 / 11.50 / 12.00"] in rows
+    assert ["control interrupt with field weakening", "", "440 / 460 / 480", "11.00 / 11.50 / 12.00"] in rows
+    assert ["with its slow work, with field weakening", "14.975 / 23.325 / 23.65", "640 / 660 / 680", "16.00 / 16.50 / 17.00"] in rows
 
 
 @pytest.mark.parametrize("ticks, differences, first, defines, has_names, ok, got", [

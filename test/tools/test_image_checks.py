@@ -11,7 +11,7 @@ from tools.image import device, image
 CALL, RCALL = 0x020000, 0x070000
 BUDGET = """with_caller = []
 budget = {{ note = {{ flash_bytes = 1, ram_bytes = 1 }}, image = {{ flash_bytes = {}, ram_bytes = {}, stack_bytes = {} }} }}
-cycles = {{ isr_max_cycles = 1, isr_mean_cycles = 1, latency_max_cycles = 1, isr_bound_cycles = 1, duty_bound_cycles = 1, scenarios = [] }}
+cycles = {{ isr_max_cycles = 1, period_max_cycles = 1, period_mean_cycles = 1, latency_max_cycles = 1, isr_bound_cycles = 1, duty_bound_cycles = 1, slow_bound_cycles = 1, scenarios = [] }}
 stack = {{ calls_nothing = [] }}
 """
 
@@ -107,8 +107,8 @@ def unseen_helper(image):
     pytest.param(lambda image: image.point("_ADC1Interrupt", image.symbols["__FLTA1Interrupt"]), [
         r"vector _ADC1Interrupt of the IVT \(0x02E\) goes to .* \(_FLTA1Interrupt\), not to .* \(_ADC1Interrupt\)", "of the AIVT"],
                  id="a vector that goes to another handler"),
-    pytest.param(lambda image: image.point("_T2Interrupt", image.symbols["_main"]),
-                 [r"_T2Interrupt of the IVT .*\(main\), not to .*_DefaultInterrupt", "AIVT"], id="a vector that goes elsewhere"),
+    pytest.param(lambda image: image.point("_T3Interrupt", image.symbols["_main"]),
+                 [r"_T3Interrupt of the IVT .*\(main\), not to .*_DefaultInterrupt", "AIVT"], id="a vector that goes elsewhere"),
     pytest.param(lambda image: image.function("_T1Interrupt", RETFIE),
                  ["_T1Interrupt of the IVT .*_DefaultInterrupt.*, not to .*_T1Interrupt", "AIVT"], id="a function that is not in its vector"),
     pytest.param(lambda image: image.words.update({device.IVT + 2 * number: 0 for number in range(len(device.VECTORS))}),

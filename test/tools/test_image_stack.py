@@ -152,11 +152,11 @@ def analyse(levels: dict[str, int], handlers: list[str]) -> stack.Result:
     return stack.analyse(listing(SYSTEM), 0x200, handlers, levels)
 
 
-def test_the_levels_of_the_sources_are_read_by_register_field_and_the_board_s_two_are_the_same():
+def test_the_levels_of_the_sources_are_read_by_register_field_and_slow_work_and_fault_input_have_the_same():
     source = "IPC3bits.AD1IP = 5;\n    IPC15bits.FLTA1IP  =  6; IPC0bits.T1IP = 2; IFS0bits.AD1IF = 0;"
     assert stack.priorities(source) == {ADC1: 5, FLTA1: 6, T1: 2}
     levels = stack.priorities("".join(path.read_text(encoding="utf-8") for path in sorted(size.BOARD.glob("*.c"))))
-    assert (levels[ADC1], levels[FLTA1]) == (5, 5)
+    assert (levels[ADC1], levels["_T2Interrupt"], levels[FLTA1]) == (5, 3, 3)
 
 
 @pytest.mark.parametrize("levels, handlers, priorities, depth", [

@@ -20,14 +20,14 @@ STATUS = "state 7 fault 6 speed 0 rpm\r\n"
 
 def lines(count: int = 4, sent: int | None = None, fault: int = 6, first: int = 1, every: int = 1) -> str:
     """A record as the firmware sends it; the last two rows are in the fault."""
-    rows = [f"row {(first - n) % 80} {n} {-n} {10 * n} -1 {16 * n + (7 if n >= count - 2 else 5)} {-20000 + n}\r\n" for n in range(count)]
+    rows = [f"row {(first - n) % 72} {n} {-n} {10 * n} -1 {16 * n + (7 if n >= count - 2 else 5)} {-20000 + n}\r\n" for n in range(count)]
     return f"record fault {fault} rows {count} every {every}\r\n" + "".join(rows[:sent])
 
 
 def test_a_record_among_other_lines_is_read_from_the_oldest_row_on() -> None:
     text = "foc33 0.10.0 reset BOR POR\r\n" + STATUS + lines().replace("row 0", STATUS + "row 0") + STATUS
     found = recorder.parse(text, "log")
-    assert found == [recorder.Record(6, 1, (1, 0, 79, 78), ((0, 0, 0, -1, 5, -20000), (1, -1, 10, -1, 21, -19999), (2, -2, 20, -1, 39, -19998),
+    assert found == [recorder.Record(6, 1, (1, 0, 71, 70), ((0, 0, 0, -1, 5, -20000), (1, -1, 10, -1, 21, -19999), (2, -2, 20, -1, 39, -19998),
                                                             (3, -3, 30, -1, 55, -19997)))]
     assert found[0].states == [5, 5, 7, 7] and found[0].fault_row(7) == 2
 
@@ -45,9 +45,9 @@ def test_one_that_is_cut_is_forgotten_where_a_whole_one_is_there() -> None:
     ("", "no record of a fault, log: log the board's UART"), (STATUS, "no record of a fault, log"),
     (lines(sent=3), "the record ends after 3 of 4 rows, log line 1: log it again"),
     (lines(sent=0), "the record ends after 0 of 4 rows"),
-    (lines().replace("row 79 2", "row 79"), "no row of a record: 'row 79 -2 20 -1 39 -19998', log line 4"),
-    (lines().replace("row 79", "row 99"), "no row of a record: 'row 99 2"), (lines().replace("-19998", "-40000"), "no row of a record: 'row 79 2"),
-    (lines().replace("row 79", "row 78"), "row 79 is missing after row 0, log line 4"),
+    (lines().replace("row 71 2", "row 71"), "no row of a record: 'row 71 -2 20 -1 39 -19998', log line 4"),
+    (lines().replace("row 71", "row 99"), "no row of a record: 'row 99 2"), (lines().replace("-19998", "-40000"), "no row of a record: 'row 71 2"),
+    (lines().replace("row 71", "row 70"), "row 71 is missing after row 0, log line 4"),
     (lines().replace("row 0 1 -1 10 -1 21 -19999\r\n", ""), "row 0 is missing after row 1, log line 3"),
     (lines(fault=99), "no head of a record: 'record fault 99 rows 4 every 1', log line 1"),
     (lines().replace("rows 4", "rows 81"), "no head of a record"), (lines(every=0), "no head of a record")])
@@ -115,11 +115,11 @@ def faulted(causes: dict[str, float], at_s: float) -> tuple[str, np.ndarray, Lib
 def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float], fault: set[int]) -> None:
     sent, trace, library = faulted(causes, 0.5)
     record, = recorder.parse(sent, "")
-    assert record.fault in fault and record.every == 1 and len(record.words) == 80
+    assert record.fault in fault and record.every == 1 and len(record.words) == 72
     rows = recorder.scaled(record, library.params, library.states)
     at = int(np.flatnonzero(trace[:, 0])[0])
-    assert record.fault_row(7) == 64
-    part = {name: trace[at - 64:at + 16, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
+    assert record.fault_row(7) == 56
+    part = {name: trace[at - 56:at + 16, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
     for name, values in (("fw.i_a_a", rows.i_a), ("fw.i_b_a", rows.i_b), ("fw.v_d_v", rows.v_d), ("fw.v_q_v", rows.v_q)):
         scale = library.params["COUNT_CURRENT_A" if name.endswith("_a") else "COUNT_VOLTAGE_V"]
         assert np.round(part[name] / scale).tolist() == np.round(values / scale).tolist(), name
@@ -155,10 +155,10 @@ def test_a_run_that_ends_in_a_fault_shows_its_record_and_make_recorder_the_same(
     assert 'alt="recorder"' in page and "recorder.csv" in page and LOG in page
     assert "simulated 1.00 s" in out, "what is run on for the record is no part of the run"
     code, out, _ = command("recorder", str(tmp_path / "run" / LOG), "--library", str(LIBRARY), "--out", str(tmp_path / "again"))
-    assert code == 0 and "OVERCURRENT_HW: 64 rows before it, 16 from it on, 1 period apart" in out
+    assert code == 0 and "OVERCURRENT_HW: 56 rows before it, 16 from it on, 1 period apart" in out
     assert 'alt="recorder"' in (tmp_path / "again" / "index.html").read_text(encoding="utf-8")
     tables = [list(csv.DictReader((tmp_path / name / "recorder.csv").open(encoding="utf-8"))) for name in ("run", "again")]
-    assert tables[0] == tables[1] and len(tables[0]) == 80 and tables[0][64]["state"] == "FAULT" and float(tables[0][64]["time_ms"]) == 0.0
+    assert tables[0] == tables[1] and len(tables[0]) == 72 and tables[0][56]["state"] == "FAULT" and float(tables[0][56]["time_ms"]) == 0.0
 
 
 def test_a_run_without_a_fault_has_no_record(tmp_path: Path) -> None:
@@ -185,5 +185,5 @@ def test_a_log_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
 
 
 def test_the_longest_record_is_sent_in_the_time_that_a_run_waits_for_it() -> None:
-    longest = len("record fault 13 rows 80 every 64\r\n") + 80 * len("row 79" + 6 * " -32768" + "\r\n") + 10 * 80
+    longest = len("record fault 13 rows 72 every 64\r\n") + 72 * len("row 71" + 6 * " -32768" + "\r\n") + 10 * 80
     assert longest / 11520 < 0.05e-3 * simulate.CHUNK_PERIODS * simulate.LONGEST_RECORD_CHUNKS

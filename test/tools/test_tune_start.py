@@ -95,6 +95,17 @@ def test_the_speed_backwards_is_that_of_the_worst_angle_and_a_heavy_rotor_s_is_s
     assert tried(inertia=36 * 5.5e-6).back_rpm < 0.5 * tried().back_rpm
 
 
+def test_a_rotor_that_is_thrown_back_gets_a_longer_lock_of_1_6_s_at_most(monkeypatch):
+    def lock_s(most_back_rpm: float, load: str = "") -> float:
+        monkeypatch.setattr(start, "MOST_BACK_RPM", most_back_rpm)
+        return designed(more=load).start_up.lock_s
+
+    heavy = '[load]\ninertia = { value = 4e-4, unit = "kg m2" }\n'
+    ever_s, never_s = lock_s(0.0), lock_s(1e9)
+    assert never_s < lock_s(230.0) < 1.6 / 1.25 < ever_s <= 1.6
+    assert lock_s(0.0, heavy) == lock_s(1e9, heavy) > 1.6, "it is longer for the swing, and not for the speed backwards"
+
+
 def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau_and_the_lock_lengthened_until_the_rotor_is_calm():
     free = replace(MOTOR, coulomb_nm=0.0, viscous_nms=0.0, start_torque_nm=0.0)
     endless = start.try_start(free, 5.5e-6, 1e-5, 1.41, 0.1, 715.0, 1000.0, angles=12)

@@ -59,7 +59,7 @@ def program(*statements: Statement) -> Program:
 
 
 def limits(isr: int = 1000, duty: int = 1000) -> Budget:
-    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, isr, duty, ()), [], [], (), (), [])
+    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, isr, duty, 1, ()), [], [], (), (), [])
 
 
 def report(*statements: Statement, **seen) -> bench.Report:

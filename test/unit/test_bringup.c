@@ -96,26 +96,26 @@ void test_current_that_grows_by_itself_lowers_the_amplitude(void)
     TEST_ASSERT_TRUE(drive.run.bringup.amplitude < before);
 }
 
-void test_a_press_while_current_flows_ends_it(void)
+/** In a step in which current flows. */
+static void expect_that_a_press_ends(bringup_step_t step, uint16_t button)
 {
-    until(BRINGUP_STEP_DRIVE);
+    until(step);
     ms(100);
     TEST_ASSERT_TRUE(drive_is_running(&drive));
-    guide.button = 3;
+    guide.button = button;
     ms(5);
     TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
     TEST_ASSERT_FALSE(drive_is_running(&drive));
 }
 
+void test_a_press_while_current_flows_ends_it(void)
+{
+    expect_that_a_press_ends(BRINGUP_STEP_DRIVE, 3);
+}
+
 void test_a_press_before_the_ammeters_question_ends_it(void)
 {
-    until(BRINGUP_STEP_AMMETER);
-    ms(100);
-    TEST_ASSERT_TRUE(drive_is_running(&drive));
-    guide.button = 2;
-    ms(5);
-    TEST_ASSERT_EQUAL_UINT16(BRINGUP_STEP_END, guide.step);
-    TEST_ASSERT_FALSE(drive_is_running(&drive));
+    expect_that_a_press_ends(BRINGUP_STEP_AMMETER, 2);
 }
 
 void test_a_trip_ends_it_with_its_name(void)

@@ -55,10 +55,11 @@ void test_commanded_volts_arrive_and_the_circle_follows_whatever_the_bus(void)
     };
     EACH(n, cases) {
         static const phases_t none;
+        static const dead_duties_t no_dead_time;
         alphabeta_t v = { (int16_t)(cases[n].sign * (VOLTAGE_Q14(4.0) / 2)), 0 };
         duties_t duty;
         settle(cases[n].bus_v);
-        svm(&params.svm, v, drive.duty_per_volt_q16, none, &none, &duty);
+        svm(&params.svm, v, drive.duty_per_volt_q16, &no_dead_time, &none, &duty);
         TEST_ASSERT_FLOAT_WITHIN(0.05F, cases[n].sign * 6.0F, ((float)duty.a - (float)duty.b) / (float)PWM_FULL_DUTY * cases[n].bus_v);
         TEST_ASSERT_INT16_WITHIN(20, (int16_t)(cases[n].circle_v / 12.970F * VOLTAGE_Q14(12.970)), drive.circle.limit_q14);
     }

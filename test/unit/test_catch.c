@@ -286,7 +286,7 @@ void test_a_stop_that_goes_on_forgets_a_load_that_drives_and_keeps_one_that_brak
 static void slow_block(uint16_t block)
 {
     drive.ticks = block;
-    drive_slow(&drive, &params, samples.v_bus);
+    drive_slow(&drive, &params, &samples);
 }
 
 void test_a_stop_turns_round_only_at_its_end_for_a_target_the_other_way_while_the_run_is_wished(void)
@@ -328,6 +328,9 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         drive.run.control.burn_q13 = 2000;
         slow_block(2);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state); /* a block with more time turns it round */
+        drive.run.handover.ahead_erpm = 300;
+        drive.run.handover.offset = 500;
+        drive.run.handover.id_q13 = -30;
         before = inverse_park(v_q14, trig_sincos(estimator_next_angle(&drive.run.estimator)));
         slow_block(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
@@ -340,6 +343,10 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         TEST_ASSERT_EQUAL_INT16(-direction * params.open_loop_q13, drive.run.control.ref_q13.q);
         TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
         TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.is_due);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.ahead_erpm);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
+        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.speed_is_preset); /* the next hand-over presets the observer anew */
         /* the current lies along the rotor's flux */
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)estimator_next_angle(&drive.run.estimator), (int16_t)(angle_t)(drive.angle - (angle_t)(direction * 0x4000)));
     }

@@ -21,6 +21,7 @@ void setUp(void)
     params = p;
     tuning = t;
     e = zero;
+    e.sign = 1;
 }
 
 static dq_t rotating(int16_t d, int16_t q)
@@ -40,24 +41,33 @@ static void filtered_speed(int16_t erpm)
     e.omega_filtered_q16 = (int32_t)erpm * 65536;
 }
 
+static alphabeta_t e_q13;
+
 static void back_emf(int16_t alpha, int16_t beta)
 {
-    estimator_back_emf(&e, &params, &tuning, vector(alpha, beta));
+    e_q13 = estimator_back_emf(&e, &params, &tuning, vector(alpha, beta));
+    estimator_remember(&e);
+}
+
+static void commanded(int16_t alpha, int16_t beta)
+{
+    estimator_commanded(&e, vector(alpha, beta));
+    estimator_remember(&e);
 }
 
 static void expect_emf(int16_t alpha, int16_t beta)
 {
-    TEST_ASSERT_EQUAL_INT16(alpha, e.e_q13.alpha);
-    TEST_ASSERT_EQUAL_INT16(beta, e.e_q13.beta);
+    TEST_ASSERT_EQUAL_INT16(alpha, e_q13.alpha);
+    TEST_ASSERT_EQUAL_INT16(beta, e_q13.beta);
 }
 
 /* ---- Equation 4: voltage and resistance ---- */
 
 void test_acting_voltage_is_the_mean_of_the_last_two_vectors(void)
 {
-    estimator_commanded(&e, vector(8000, 8000)); /* of three periods ago: does not count */
-    estimator_commanded(&e, vector(3000, 400));
-    estimator_commanded(&e, vector(1000, -2000));
+    commanded(8000, 8000); /* of three periods ago: does not count */
+    commanded(3000, 400);
+    commanded(1000, -2000);
     back_emf(0, 0);
     expect_emf(2000, -800);
 }
@@ -109,8 +119,8 @@ void test_resistive_drop_ends_at_what_the_headers_resistance_gives_at_the_trip_l
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         back_emf(cases[n].i_alpha, cases[n].i_beta);
         back_emf(cases[n].i_alpha, cases[n].i_beta); /* the mean of two */
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e.e_q13.alpha, cases[n].what);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e.e_q13.beta, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e_q13.alpha, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e_q13.beta, cases[n].what);
     }
     params.rs_exp = 1; /* the limit is before the doubling */
     back_emf(12000, -12000);
@@ -151,9 +161,9 @@ void test_step_of_the_current_shows_in_one_span_as_inductive_voltage(void)
         params.d_ilimit_hs_q14 = cases[n].limit_hs;
         filtered_speed(cases[n].speed);
         back_emf(cases[n].i_alpha, cases[n].i_beta);
-        while (e.e_q13.alpha != 0 && periods < 20u) {
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e.e_q13.alpha, cases[n].what);
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e.e_q13.beta, cases[n].what);
+        while (e_q13.alpha != 0 && periods < 20u) {
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e_q13.alpha, cases[n].what);
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e_q13.beta, cases[n].what);
             periods++;
             back_emf(cases[n].i_alpha, cases[n].i_beta);
         }
@@ -167,9 +177,8 @@ void test_both_derivatives_agree_on_a_slope_and_the_history_is_a_ring_of_eight(v
     tuning.rs_q16 = 0;
     for (n = 1; n <= 20; n++) {
         back_emf((int16_t)(100 * n), (int16_t)(-60 * n));
-        TEST_ASSERT_EQUAL_UINT16((uint16_t)n & 7u, e.newest);
-        TEST_ASSERT_EQUAL_INT16(100 * n, e.history_q14[e.newest].alpha);
-        TEST_ASSERT_EQUAL_INT16(-60 * n, e.history_q14[e.newest].beta);
+        TEST_ASSERT_EQUAL_INT16((n >= 8) ? 100 * (n - 7) : 0, e.i_oldest_q14.alpha);
+        TEST_ASSERT_EQUAL_INT16((n >= 8) ? -60 * (n - 7) : 0, e.i_oldest_q14.beta);
     }
     expect_emf(-200, 120);
     filtered_speed(20000);
@@ -181,26 +190,38 @@ void test_eight_sample_voltage_is_turned_forward_by_three_and_a_half_steps(void)
 {
     static const struct {
         const char *what;
-        int16_t half_step, speed, i_alpha, i_beta;
+        int16_t turn, speed, i_alpha, i_beta;
         uint16_t ls_q16;
         int16_t e_alpha, e_beta;
     } cases[] = {
-        { "alpha, 7000 / 65536 rad", 1000, 0, 4000, 0, 16384u, -1000, -106 },
-        { "beta", 1000, 0, 0, 4000, 16384u, 106, -1000 },
-        { "follows the sense of rotation", -1000, 0, 4000, 0, 16384u, -1000, 107 },
-        { "at most half a radian", 9000, 0, 6000, 0, 65535u, -5999, -2999 },
-        { "at most half a radian, backwards", -9000, 0, 6000, 0, 65535u, -5999, 3000 },
-        { "one-sample voltage is not turned", 4000, 20000, 800, 0, 16384u, -1600, 0 },
+        { "alpha, 7000 / 65536 rad", 7000, 0, 4000, 0, 16384u, -1000, -106 },
+        { "beta", 7000, 0, 0, 4000, 16384u, 106, -1000 },
+        { "follows the sense of rotation", -7000, 0, 4000, 0, 16384u, -1000, 107 },
+        { "half a radian", 32767, 0, 6000, 0, 65535u, -5999, -2999 },
+        { "half a radian, backwards", -32767, 0, 6000, 0, 65535u, -5999, 3000 },
+        { "one-sample voltage is not turned", 28000, 20000, 800, 0, 16384u, -1600, 0 },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         setUp();
         tuning.rs_q16 = 0;
         tuning.ls_q16 = cases[n].ls_q16;
-        e.half_step_q16_rad = cases[n].half_step;
+        e.old_turn_q16_rad = cases[n].turn;
         filtered_speed(cases[n].speed);
         back_emf(cases[n].i_alpha, cases[n].i_beta);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e.e_q13.alpha, cases[n].what);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e.e_q13.beta, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e_q13.alpha, cases[n].what);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e_q13.beta, cases[n].what);
+    }
+}
+
+void test_turn_of_the_eight_samples_follows_the_filtered_speed_up_to_half_a_radian(void)
+{
+    static const int16_t cases[][2] = { /* electrical rpm, 7 half steps of 11244 / 65536 a count */
+        { 0, 0 }, { 5829, 7000 }, { -5829, -7007 }, { 27283, 32760 }, { 27289, 32767 }, { 32767, 32767 }, { -32767, -32767 }
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        filtered_speed(cases[n][0]);
+        estimator_follow(&e, &params);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], e.old_turn_q16_rad, golden_row(n));
     }
 }
 
@@ -213,6 +234,7 @@ static int16_t speed_of(int16_t e_d, int16_t e_q, int16_t filtered_erpm)
     e.e_d_q28 = (int32_t)e_d * 65536;
     e.e_q_q28 = (int32_t)e_q * 65536;
     filtered_speed(filtered_erpm);
+    estimator_follow(&e, &params);
     estimator_pll(&e, &params, &tuning, rotating(e_d, e_q));
     return e.omega_erpm;
 }
@@ -250,6 +272,7 @@ void test_speed_is_back_emf_over_Kphi_with_the_sign_of_Eq_or_of_the_filtered_spe
 void test_filters_make_their_share_of_the_way(void)
 {
     int16_t omega = speed_of(0, 1287, 0);
+    estimator_settle(&e, &params);
     TEST_ASSERT_EQUAL_INT32((int32_t)omega * 1496, e.omega_filtered_q16);
     TEST_ASSERT_EQUAL_INT16(114, estimator_speed(&e));
     setUp();
@@ -274,12 +297,14 @@ static void run_motor(int16_t direction, uint16_t periods)
     while (periods-- != 0u) {
         uint64_t turn = (direction > 0) ? STEP_7500_Q32 : UINT64_C(0x100000000) - STEP_7500_Q32;
         true_q32 = (uint32_t)((true_q32 + turn) & UINT32_C(0xFFFFFFFF)); /* now the angle of this sample */
-        estimator_back_emf(&e, &params, &tuning, vector(0, 0));
-        estimator_track(&e, &params, &tuning, frame, 0);
+        alphabeta_t emf = estimator_back_emf(&e, &params, &tuning, vector(0, 0));
+        estimator_track(&e, &params, &tuning, emf, frame, 0);
         frame = trig_sincos(estimator_next_angle(&e));
         /* acts for the period centred on the next sample */
         estimator_commanded(&e, inverse_park(rotating(0, (int16_t)(direction * 2 * EMF_7500_Q13)),
                                              trig_sincos((angle_t)(((true_q32 + turn) >> 16) & 0xFFFFu))));
+        estimator_settle(&e, &params);
+        estimator_follow(&e, &params);
     }
 }
 

@@ -31,6 +31,7 @@ static void reset(runner_t *r)
 {
     static const estimator_t zero;
     r->e = zero;
+    estimator_turn_frame(&r->e);
     r->frame = trig_sincos(0);
 }
 
@@ -49,10 +50,14 @@ static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, i
 {
     tuning.inv_kfi = inv_kfi;
     tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
-    estimator_back_emf(&r->e, params, &tuning, i);
-    estimator_track(&r->e, params, &tuning, r->frame, !closed);
+    alphabeta_t emf;
+    emf = estimator_back_emf(&r->e, params, &tuning, i);
+    estimator_track(&r->e, params, &tuning, emf, r->frame, !closed);
     r->frame = trig_sincos(estimator_next_angle(&r->e));
     estimator_commanded(&r->e, v);
+    estimator_settle(&r->e, params);
+    estimator_follow(&r->e, params);
+    estimator_turn_frame(&r->e);
 }
 
 /* Rows of all sequences have the same members but their own types. */

@@ -351,3 +351,49 @@ void test_one_silent_millisecond_is_forgiven_and_passes_without_one_do_not_count
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
 }
+
+/* ---- what flows against what is asked for ---- */
+
+/** Passes in closed loop, 23 periods apart, on a turning motor whose phase A is open or not. */
+static void turning_passes(uint16_t passes, uint16_t a_is_open)
+{
+    static angle_t angle;
+    while (passes-- != 0u) {
+        angle = (angle_t)(angle + 5000u);
+        board_drive.frame = trig_sincos(angle);
+        board_drive.phases_q13 = phases_of(board_drive.run.control.ref_q13, board_drive.frame);
+        board_drive.phases_q13.a = (int16_t)(a_is_open ? 0 : board_drive.phases_q13.a);
+        board_drive.ticks = (uint16_t)(board_drive.ticks + 23u);
+        pass(0);
+    }
+}
+
+/** In closed loop with this current asked for. */
+static void start_closed(int16_t iq_q13)
+{
+    start(0);
+    board_drive.state = (uint16_t)DRIVE_CLOSED;
+    board_drive.run.control.ref_q13.q = iq_q13;
+}
+
+void test_phase_that_carries_nothing_switches_off(void)
+{
+    start_closed(4000);
+    turning_passes(200, 0);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    pwm_outputs_off_Ignore();
+    turning_passes(128, 1); /* two counts: the first may have begun whole */
+    expect_fault(FAULT_OPEN_PHASE);
+}
+
+void test_d_current_that_stays_off_switches_off(void)
+{
+    start_closed(0);
+    healthy_ms(300);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    board_drive.run.control.i_q13.d = 3000;
+    pwm_outputs_off_Ignore();
+    uart_send_IgnoreAndReturn(0);
+    healthy_ms(400);
+    expect_fault(FAULT_CURRENT_SENSOR);
+}

@@ -16,6 +16,7 @@
 
 #include <string.h>
 
+#include "interrupts.h"
 #include "unity.h"
 
 static void bus_volts(float bus_v)
@@ -37,7 +38,7 @@ static void board_ms(uint16_t ms)
         uint16_t n;
         for (n = 0; n < 20u; n++) {
             ADC1BUF0 = (AD1CHS0 == 8u) ? 0x0000u : 0x8000u; /* the potentiometer in its middle; an input that is switched off */
-            _ADC1Interrupt();
+            a_period();
         }
         IFS0bits.T1IF = 1;
         firmware_background();
@@ -95,10 +96,11 @@ static const struct {
     { "RPOR9", 0x0300, 0 },    /* U1TX on RP19 */
     { "LATA", 0, 1 }, { "LATB", 0, 1 }, { "LATC", 0, 1 },
     { "TRISA", 0xFFFF, 1 }, { "TRISB", 0xFFFF, 1 }, { "TRISC", 0xFF37, 1 }, /* outputs: RC3 transmits, RC6 and RC7 are LEDs */
-    { "IEC0", 0x2000, 0 },     /* AD1IE */
+    { "IEC0", 0x2080, 0 },     /* AD1IE, T2IE */
+    { "IPC1", 0x3440, 0 },     /* T2IP 3 */
     { "IEC3", 0x8000, 0 },     /* FLTA1IE */
     { "IPC3", 0x0054, 0 },     /* AD1IP 5 */
-    { "IPC15", 0x5000, 0 },    /* FLTA1IP 5 */
+    { "IPC15", 0x3000, 0 },    /* FLTA1IP 3 */
     { "T1CON", 0x8000, 1 },    /* on, internal clock, no prescaler: a millisecond at 40 MIPS */
     { "PR1", 39999u, 1 }, { "TMR1", 0, 1 },
     { "U1MODE", 0x8008, 1 },   /* on, high-speed divider, 8 bits, no parity, one stop bit */
@@ -111,7 +113,7 @@ void test_every_register_after_the_start(void)
     size_t n, k;
     host_registers_reset();
     bus_volts(24.0F);
-    IFS0 = 0x2008; /* AD1IF and T1IF, and FLTA1IF: cleared before they can interrupt */
+    IFS0 = 0x2088; /* AD1IF, T1IF and T2IF, and FLTA1IF: cleared before they can interrupt */
     IFS3 = 0x8000;
     for (k = 0; k < sizeof expected / sizeof expected[0]; k++) {
         if (expected[k].whole) {

@@ -25,7 +25,7 @@ void setUp(void)
 static void slow(uint16_t slot)
 {
     drive.ticks = slot;
-    drive_slow(&drive, &params, rig_raw_bus(24.0F));
+    drive_slow(&drive, &params, &samples);
 }
 
 /* ---- readiness ---- */
@@ -33,8 +33,7 @@ static void slow(uint16_t slot)
 /** The forced angle ahead of the estimated one by this: at 90 degrees the current has no torque. */
 static void forced_ahead(int16_t offset)
 {
-    drive.run.estimator.half_step_q16_rad = 0;
-    drive.run.estimator.rho_q32 = 0;
+    drive.run.estimator.next = 0;
     drive.angle = (angle_t)offset;
 }
 
@@ -89,6 +88,7 @@ void test_agreement_counts_from_the_early_speed_on_and_waiting_at_the_end_of_the
             uint16_t steps;
             at_the_end_of_the_ramp(direction);
             drive.run.handover.agreed_steps = 0;
+            drive.periods = (uint16_t)(cases[n].counts ? 3990 : 0); /* waited at an end that lies behind */
             for (steps = 1; steps <= 600u; steps++) {
                 force(cases[n].forced_erpm);
                 rig_speed((int16_t)((float)direction * cases[n].forced_erpm));
@@ -140,6 +140,35 @@ void test_speed_that_is_off_in_the_mean_by_an_eighth_is_waited_for_until_the_ram
         }
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].agrees, most >= params.agree_steps, golden_row(n));
     }
+}
+
+void test_mean_deviation_takes_a_32nd_of_it_a_step_and_of_16383_at_most_with_its_sign(void)
+{
+    static const struct {
+        float forced_erpm;
+        int16_t seen_erpm, mean_erpm;
+    } cases[] = { { 4800.0F, 8000, 100 }, { 4800.0F, 1600, -100 }, { 20000.0F, -20000, -512 }, { -20000.0F, 20000, 511 } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            at_the_end_of_the_ramp(direction);
+            drive.run.handover.ahead_erpm = 0;
+            force(cases[n].forced_erpm);
+            rig_speed((int16_t)(direction * cases[n].seen_erpm));
+            slow(8);
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].mean_erpm, drive.run.handover.ahead_erpm, golden_row(n));
+        }
+    }
+}
+
+void test_end_of_the_ramp_counts_also_below_the_early_speed(void)
+{
+    drive_params_t p = params;
+    p.early_erpm = FORCED_ERPM + 1;
+    drive.run.handover.agreed_steps = 0;
+    rig_speed(FORCED_ERPM);
+    handover_wait(&drive, &p);
+    TEST_ASSERT_EQUAL_UINT16(1, drive.run.handover.agreed_steps);
+    TEST_ASSERT_EQUAL_UINT16(SLOW_PHASES, drive.periods);
 }
 
 void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_agree_in_time(void)
@@ -221,6 +250,25 @@ void test_rotor_that_never_comes_to_where_the_current_pulls_it_is_START_FAILED(v
     }
 }
 
+void test_rotor_that_comes_in_the_last_step_is_handed_over(void)
+{
+    static const struct {
+        int16_t offset;
+        drive_state_t state;
+    } cases[] = { { 0x2000, DRIVE_CLOSED }, { 0x3800, DRIVE_FAULT } };
+    EACH(n, cases) {
+        rig_power_up();
+        at_the_end_of_the_ramp(1);
+        drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps + HANDOVER_MOST_STEPS(&params) - 1u);
+        force(4000.0F);
+        rig_speed(3800);
+        forced_ahead(cases[n].offset);
+        slow(8);
+        slow(9);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
+    }
+}
+
 void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_one_only(void)
 {
     uint16_t n;
@@ -246,6 +294,8 @@ void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(voi
     drive.run.handover.agreed_steps = params.agree_steps;
     EACH(n, states) {
         drive.state = (uint16_t)states[n];
+        drive.fault = (uint16_t)((states[n] == DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
+        drive.command.run = (states[n] == DRIVE_ALIGN);
         slow(1);
         TEST_ASSERT_EQUAL_UINT16(states[n], drive.state);
     }
@@ -351,7 +401,7 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.state = (uint16_t)DRIVE_RAMP;
     drive.angle = forced;
     drive.run.estimator.rho_q32 = (uint32_t)estimated << 16;
-    drive.run.estimator.half_step_q16_rad = 0;
+    drive.run.estimator.next = estimated;
     rig_speed((int16_t)(direction * 4800));
     drive.run.control.reference_erpm = (int16_t)(direction * FORCED_ERPM); /* as handover_wait() leaves it */
     drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
@@ -395,8 +445,7 @@ void test_estimated_angle_of_the_next_sample_takes_over_with_its_frame(void)
 {
     sincos_t frame;
     drive.angle = 20000;
-    drive.run.estimator.rho_q32 = 15000ul << 16;
-    drive.run.estimator.half_step_q16_rad = 6283; /* 1000 counts */
+    drive.run.estimator.next = 16000;
     handover_now(&drive, &params);
     frame = trig_sincos(drive.angle);
     TEST_ASSERT_UINT16_WITHIN(1, 16000, drive.angle);

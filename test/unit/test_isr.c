@@ -21,33 +21,35 @@ static void maybe_trap(void)
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
-static uint16_t sample_arrives_meanwhile, trap_comes_meanwhile, flag_during_tick;
+static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick;
 
 static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
-static void slow_and_look(drive_t *d, const drive_params_t *p, int16_t v_bus_raw);
+static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 #define drive_tick(d, p, raw, duty) tick_and_meanwhile(d, p, raw, duty)
-#define drive_slow(d, p, v_bus_raw) slow_and_look(d, p, v_bus_raw)
+#define drive_slow(d, p, raw) slow_and_look(d, p, raw)
 #include "firmware/board/isr.c"
 #undef drive_tick
 #undef drive_slow
 
-/* What the duties and the override were when the slow work began. */
+/* What the duties were when the slow work began. */
 static struct {
-    uint16_t duty_a, duty_b, duty_c, override;
+    uint16_t duty_a, duty_b, duty_c;
 } at_slow;
 
-static void slow_and_look(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
+static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     at_slow.duty_a = P1DC1;
     at_slow.duty_b = P1DC2;
     at_slow.duty_c = P1DC3;
-    at_slow.override = P1OVDCON;
-    drive_slow(d, p, v_bus_raw);
+    drive_slow(d, p, raw);
 }
 
 static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
     flag_during_tick = IFS0bits.AD1IF;
+    if (slow_work_waits) {
+        IFS0bits.T2IF = 1;
+    }
     if (sample_arrives_meanwhile) {
         IFS0bits.AD1IF = 1;
     }
@@ -58,6 +60,7 @@ static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_
     }
 }
 
+#include "interrupts.h"
 #include "unity.h"
 
 static int16_t raw_bus(float bus_v)
@@ -69,7 +72,7 @@ static void control_interrupts(uint16_t periods)
 {
     while (periods-- != 0u) {
         IFS0bits.AD1IF = 1;
-        _ADC1Interrupt();
+        a_period();
     }
 }
 
@@ -87,6 +90,7 @@ void setUp(void)
     ADC1BUF3 = (uint16_t)raw_bus(24.0F);
     drive_init(&board_drive, &board_params);
     sample_arrives_meanwhile = 0;
+    slow_work_waits = 0;
     trap_comes_meanwhile = 0;
     trap_comes_in_the_hand_over = 0;
 }
@@ -97,7 +101,7 @@ static void bring_to_align(void)
     setUp();
     control_interrupts(1024);
     drive_start(&board_drive, &board_params, 1);
-    control_interrupts(201);
+    control_interrupts(202); /* with a first period of the law */
     TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, board_drive.state);
 }
 
@@ -117,7 +121,7 @@ void test_samples_come_from_the_channels_of_the_facts(void)
 void test_outputs_stay_overridden_off_until_a_start_then_bootstrap_then_pwm(void)
 {
     static const uint16_t expected[][2] = { /* periods, 0: the start; override */
-        { 1, 0x0000 }, { 3000, 0x0000 }, { 0, 0x0000 }, { 1, 0x0015 }, { 199, 0x0015 }, { 1, 0x3F00 }
+        { 1, 0x0000 }, { 3000, 0x0000 }, { 0, 0x0000 }, { 1, 0x0015 }, { 200, 0x0015 }, { 1, 0x3F00 }
     };
     P1OVDCON = 0x3F00;
     for (unsigned n = 0; n < sizeof expected / sizeof expected[0]; n++) {
@@ -154,21 +158,40 @@ void test_each_duty_reaches_its_own_pair(void)
     TEST_ASSERT_TRUE(P1DC1 != P1DC2 && P1DC2 != P1DC3 && P1DC1 != P1DC3);
 }
 
-void test_slow_work_waits_until_duties_and_override_are_written_and_they_fit_the_timer(void)
+void test_slow_work_waits_until_duties_are_written_and_they_fit_the_timer(void)
 {
     uint16_t n;
     control_interrupts(1024);
     drive_start(&board_drive, &board_params, 1);
     for (n = 0; n < 4200u; n++) {
         control_interrupts(1);
-        TEST_ASSERT_EQUAL_HEX16(P1OVDCON, at_slow.override);
         TEST_ASSERT_EQUAL_UINT16(P1DC1, at_slow.duty_a);
         TEST_ASSERT_EQUAL_UINT16(P1DC2, at_slow.duty_b);
         TEST_ASSERT_EQUAL_UINT16(P1DC3, at_slow.duty_c);
         TEST_ASSERT_TRUE(P1DC1 <= 2000u && P1DC2 <= 2000u && P1DC3 <= 2000u);
     }
-    TEST_ASSERT_EQUAL_HEX16(0x3F00, at_slow.override);
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
     TEST_ASSERT_TRUE(P1DC1 != 0);
+}
+
+void test_bridge_begins_to_switch_only_with_duties_of_the_law(void)
+{
+    bring_to_align();
+    board_drive.state = (uint16_t)DRIVE_CATCH; /* a rotor that turns has been seen; its current is gone */
+    board_drive.run.catching.step = (uint16_t)CATCH_SEEN;
+    board_drive.run.estimator.omega_erpm = 10000;
+    board_drive.periods = 1000;
+    control_interrupts(1);
+    while (board_drive.state == (uint16_t)DRIVE_CATCH) {
+        TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+        control_interrupts(1);
+    }
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, board_drive.state);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON); /* the duties are still those of the low sides */
+    TEST_ASSERT_EQUAL_UINT16(0, P1DC1);
+    control_interrupts(1);
+    TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+    TEST_ASSERT_TRUE(P1DC1 != 0u && P1DC1 != P1DC2);
 }
 
 void test_fault_of_the_slow_work_switches_off_in_its_own_interrupt(void)
@@ -188,18 +211,20 @@ void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
 {
     static const struct {
         const char *what;
-        uint16_t timer, sample_arrives, i_a;
+        uint16_t timer, sample_arrives, slow_waits, i_a;
         drive_fault_t fault;
     } cases[] = {
-        { "duties just before the boundary", 0x8001, 0, 0, FAULT_NONE },
-        { "duties after the boundary: counting up, they have been loaded", 0x0001, 0, 0, FAULT_ISR_OVERRUN },
-        { "the next sample during the interrupt", 0x8001, 1, 0, FAULT_ISR_OVERRUN },
-        { "too much current", 0x8001, 0, (uint16_t)(-4 * 7076), FAULT_OVERCURRENT_SW },
+        { "duties just before the boundary", 0x8001, 0, 0, 0, FAULT_NONE },
+        { "duties after the boundary: counting up, they have been loaded", 0x0001, 0, 0, 0, FAULT_ISR_OVERRUN },
+        { "the next sample during the interrupt", 0x8001, 1, 0, 0, FAULT_ISR_OVERRUN },
+        { "the slow work of the period before is not done", 0x8001, 0, 1, 0, FAULT_ISR_OVERRUN },
+        { "too much current", 0x8001, 0, 0, (uint16_t)(-4 * 7076), FAULT_OVERCURRENT_SW },
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         bring_to_align();
         P1TMR = cases[n].timer;
         sample_arrives_meanwhile = cases[n].sample_arrives;
+        slow_work_waits = cases[n].slow_waits;
         ADC1BUF1 = cases[n].i_a;
         control_interrupts(1);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault, board_drive.fault, cases[n].what);
@@ -207,6 +232,7 @@ void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
         if (cases[n].fault) {
             P1TMR = 0x81F4;
             sample_arrives_meanwhile = 0;
+            slow_work_waits = 0;
             control_interrupts(1000);
             expect_off(cases[n].fault);
         }

@@ -11,7 +11,7 @@ static void set_free(int16_t direction)
     drive_control_t *c = &drive.run.control;
     way = direction;
     rig_closed(direction, (int16_t)(direction * 10000));
-    drive.circle.limit_q14 = 12800;
+    voltage_circle_of(&drive.circle, 12800);
     c->v_q14.d = 0;
     c->v_q14.q = (int16_t)(direction * 6000);
     c->vq_limit_q14 = 12800;

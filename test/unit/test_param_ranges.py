@@ -43,11 +43,11 @@ def with_values(values: dict[str, str]) -> str:
     return text
 
 
-def build(values: dict[str, str]) -> tuple[int, str]:
-    """Compiles param_check.c with these values: exit code and messages."""
+def build(values: dict[str, str], *options: str) -> tuple[int, str]:
+    """Compiles param_check.c with these values and the compiler's options: exit code and messages."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "userparams.h").write_text(with_values(values), encoding="utf-8")
-        done = compiler([*CFLAGS, f"-I{folder}", "-Iinclude", "-I.", "-c", "firmware/drive/param_check.c", "-o", f"{folder}/out.o"])
+        done = compiler([*CFLAGS, *options, f"-I{folder}", "-Iinclude", "-I.", "-c", "firmware/drive/param_check.c", "-o", f"{folder}/out.o"])
         return done.returncode, done.stderr
 
 
@@ -217,6 +217,15 @@ def test_a_broken_relation_stops_the_build_with_its_message(values: dict[str, st
     code, messages = build(BASE | values)
     first = next(line for line in messages.splitlines() if "error:" in line)
     assert code != 0 and f"userparams.h: {message}" in first, messages
+
+
+@pytest.mark.parametrize("a_count, option, refused", [("0.00391", "-DBRINGUP", True), ("0.00391", "-UBRINGUP", False), ("0.00389", "-DBRINGUP", False)])
+def test_bringup_is_refused_on_boards_whose_milliamperes_do_not_fit_its_words(a_count: str, option: str, refused: bool) -> None:
+    large = {"NORM_CURRENT_CONST": a_count, "MAXIMUM_CURRENT_A": "12", "OVER_CURRENT_THRESHOLD_A": "20",
+             "MOTOR_RS_OHM": "0.1", "MOTOR_LS_MH": "0.1", "MOTOR_INERTIA_KGM2": "5e-5"}
+    code, messages = build(BASE | large, option)
+    message = f"userparams.h: NORM_CURRENT_CONST = {a_count} must be at most 0.0039 with BRINGUP, which counts milliamperes in 16 bits: leave BRINGUP out"
+    assert (code != 0, message in messages) == (refused, refused), messages
 
 
 @pytest.mark.parametrize("name", ["SPEEDCNTR_ITERM", "SPEEDCNTR_CTERM"])

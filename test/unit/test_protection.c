@@ -609,7 +609,7 @@ void test_signals_and_model_are_checked_in_slow_steps_of_closed_loop_only(void)
         drive.run.impossible_steps = 1000;
         drive.run.adaptation.rs_q31 = INT32_MAX;
         drive.ticks = slot;
-        drive_slow(&drive, &params, rig_raw_bus(24.0F));
+        drive_slow(&drive, &params, &samples);
         TEST_ASSERT_EQUAL_UINT16((slot == 4u) ? FAULT_CURRENT_SENSOR : (slot == 2u) ? FAULT_OVERTEMPERATURE : FAULT_NONE, drive.fault);
         drive.fault = (uint16_t)FAULT_NONE;
     }
@@ -618,7 +618,7 @@ void test_signals_and_model_are_checked_in_slow_steps_of_closed_loop_only(void)
     drive.run.impossible_steps = 1000;
     for (slot = 0; slot < 8u; slot++) {
         drive.ticks = slot;
-        drive_slow(&drive, &params, rig_raw_bus(24.0F));
+        drive_slow(&drive, &params, &samples);
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault); /* no estimate is used yet */
 }

@@ -117,6 +117,7 @@ void test_a_number_is_beyond_a_limit_of_either_sign_only_if_its_magnitude_is_lar
         for (int16_t k = 0; k < NEAR_COUNT; k++) {
             int32_t x = near_bound(mosts[n], k), limited = (x > mosts[n]) ? mosts[n] : (x < -(int32_t)mosts[n]) ? -(int32_t)mosts[n] : x;
             TEST_ASSERT_EQUAL_UINT16(x > mosts[n] || x < -(int32_t)mosts[n], qm_beyond((int16_t)x, mosts[n]));
+            TEST_ASSERT_EQUAL_UINT16(x > mosts[n] || x < 0, qm_outside((int16_t)x, mosts[n]));
             TEST_ASSERT_EQUAL_INT16(limited, qm_limit((int16_t)x, mosts[n]));
             TEST_ASSERT_EQUAL_INT16((x == INT16_MIN) ? INT16_MAX : (x < 0) ? -x : x, qm_abs((int16_t)x));
         }

@@ -73,9 +73,9 @@ void test_lines_tell_head_and_rows_from_the_oldest_on(void)
     record(2);
     record_tick();
     expect_line("record fault 6 rows 18 every 1\r\n");
-    expect_line("row 79 0 0 1000 -1000 5 0\r\n");    /* odd: the speed */
-    expect_line("row 78 1 -1 1001 -1001 21 3\r\n");  /* even: the bus */
-    expect_line("row 77 500 -500 1500 -1500 8007 500\r\n");
+    expect_line("row 71 0 0 1000 -1000 5 0\r\n");    /* odd: the speed */
+    expect_line("row 70 1 -1 1001 -1001 21 3\r\n");  /* even: the bus */
+    expect_line("row 69 500 -500 1500 -1500 8007 500\r\n");
     TEST_ASSERT_EQUAL_UINT16(15, lines());
     expect_line("");
 }
@@ -85,9 +85,9 @@ void test_the_ring_s_end_is_in_the_middle_of_a_full_record(void)
     uint16_t n;
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 80 every 1\r\n");
-    for (n = 26; n < 26 + 80; n++) {
-        unsigned place = 79u - n % 80u;
+    expect_line("record fault 6 rows 72 every 1\r\n");
+    for (n = 34; n < 34 + 72; n++) {
+        unsigned place = 71u - n % 72u;
         char begin[20];
         (void)snprintf(begin, sizeof begin, "row %u %d ", place, (n < 90u) ? n : n + 410u);
         TEST_ASSERT_TRUE(record_line(line) > line);
@@ -98,7 +98,7 @@ void test_the_ring_s_end_is_in_the_middle_of_a_full_record(void)
 
 void test_the_longest_row_fits_a_status_line(void)
 {
-    TEST_ASSERT_TRUE(sizeof "row 79 -32768 -32768 -32768 -32768 -32768 -32768\r\n" < sizeof line);
+    TEST_ASSERT_TRUE(sizeof "row 71 -32768 -32768 -32768 -32768 -32768 -32768\r\n" < sizeof line);
 }
 
 void test_nothing_is_sent_before_the_last_row_and_nothing_twice(void)
@@ -122,12 +122,12 @@ void test_a_kept_record_is_sent_again_after_a_reset(void)
 {
     record(90);
     record_tick();
-    TEST_ASSERT_EQUAL_UINT16(81, lines());
+    TEST_ASSERT_EQUAL_UINT16(73, lines());
     board_reset_cause = PIN;
     record_init(FAULT_NONE);
     expect_line("");
     record_tick();
-    TEST_ASSERT_EQUAL_UINT16(81, lines());
+    TEST_ASSERT_EQUAL_UINT16(73, lines());
     board_reset_cause = POWER_UP;
     record_init(FAULT_NONE);
     record_tick();
@@ -143,7 +143,7 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
 {
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 80 every 1\r\n");
+    expect_line("record fault 6 rows 72 every 1\r\n");
     board_drive.fault = (uint16_t)FAULT_NONE;
     board_drive.command.run = 1;
     record_tick();

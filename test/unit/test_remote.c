@@ -29,6 +29,15 @@ static void attended_ms(uint16_t ms)
     }
 }
 
+/** A client's run that has ended with a stall so many milliseconds ago. */
+static void stall_of_a_run(uint16_t ago_ms)
+{
+    client(REMOTE_TARGET, 1, 6000);
+    attended_ms(5);
+    drive_raise(&drive, FAULT_STALL);
+    attended_ms(ago_ms);
+}
+
 void setUp(void)
 {
     rig_ready();
@@ -194,10 +203,7 @@ void test_a_lease_counts_the_time_that_a_pass_has_taken(void)
 /** Or the retry would start it again. */
 void test_a_client_that_stops_or_clears_in_a_fault_forgets_the_run_that_it_has_ended(void)
 {
-    client(REMOTE_TARGET, 1, 6000);
-    attended_ms(5);
-    drive_raise(&drive, FAULT_STALL);
-    attended_ms(2);
+    stall_of_a_run(2);
     TEST_ASSERT_EQUAL_INT16(1, the_panel.interrupted);
     command.run = 0;
     attended_ms(1);
@@ -240,10 +246,7 @@ void test_s2_takes_the_command_and_stops(void)
 
 void test_a_fault_ends_the_run_and_needs_a_clear_and_a_new_start(void)
 {
-    client(REMOTE_TARGET, 1, 6000);
-    attended_ms(5);
-    drive_raise(&drive, FAULT_STALL);
-    attended_ms(5);
+    stall_of_a_run(5);
     TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, drive.fault);
     command.clear_fault = 1;

@@ -24,6 +24,7 @@ static uint16_t stuck_bits;
 
 #include <string.h>
 
+#include "interrupts.h"
 #include "unity.h"
 
 static char sent[1024];
@@ -68,7 +69,7 @@ static void board_ms(uint16_t count)
         uint16_t n;
         for (n = 0; n < 20u; n++) {
             ADC1BUF0 = (AD1CHS0 == 8u) ? 0x0000u : ground_reads_raw;
-            _ADC1Interrupt();
+            a_period();
         }
         IFS0bits.T1IF = 1;
         for (n = 0; n < 5u; n++) {

@@ -5,6 +5,7 @@
 #include "firmware/board/isr.c"
 #include "firmware/board/modes/snapshot_arrays.c"
 
+#include "interrupts.h"
 #include "unity.h"
 
 static uint16_t period;
@@ -92,9 +93,9 @@ void test_control_interrupt_records(void)
     host_registers_reset();
     SnapStart = 1;
     for (n = 0; n < 249u; n++) {
-        _ADC1Interrupt();
+        a_period();
     }
     TEST_ASSERT_EQUAL_UINT16(0, SnapDone);
-    _ADC1Interrupt();
+    a_period();
     TEST_ASSERT_EQUAL_UINT16(1, SnapDone);
 }

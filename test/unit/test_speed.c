@@ -260,14 +260,14 @@ void test_schedule_of_the_speed_comes_every_eighth_period_in_closed_loop_only(vo
         drive.run.control.sample_shift_q13 = 0;
         drive.run.control.speed_kp_q13 = 0;
         drive.ticks = slot;
-        drive_slow(&drive, &params, samples.v_bus);
+        drive_slow(&drive, &params, &samples);
         TEST_ASSERT_EQUAL_INT16(slot == 5u, drive.run.control.sample_shift_q13 > 0);
         TEST_ASSERT_EQUAL_INT16(slot == 5u, drive.run.control.speed_kp_q13 > 0);
     }
     drive.run.control.sample_shift_q13 = 0;
     drive.state = (uint16_t)DRIVE_RAMP;
     drive.ticks = 5;
-    drive_slow(&drive, &params, samples.v_bus);
+    drive_slow(&drive, &params, &samples);
     TEST_ASSERT_EQUAL_INT16(0, drive.run.control.sample_shift_q13);
 }
 

@@ -80,6 +80,15 @@ void test_stop_switches_off_at_once_before_the_loop_is_closed(void)
 
 /* ---- bootstrap and align ---- */
 
+void test_over_current_is_found_while_the_drivers_charge(void)
+{
+    rig_start(1);
+    rig_tick(10);
+    rig_currents(CURRENT_Q13(3.9F), 0);
+    rig_tick(10);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERCURRENT_SW, "3.8 A");
+}
+
 void test_bootstrap_charges_all_low_sides_for_ten_milliseconds(void)
 {
     uint16_t n;
@@ -124,9 +133,10 @@ void test_ramp_goes_on_from_the_speed_of_align_and_accelerates_by_its_rate_every
         angle_t before;
         rig_lock(direction);
         (void)rig_tick_until(DRIVE_RAMP, LOCK_PERIODS);
+        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10, drive.forced.speed_q10); /* of the next period */
         before = drive.angle;
         rig_tick(1000);
-        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10000, drive.forced.speed_q10);
+        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10010, drive.forced.speed_q10);
         /* 33554 / 1024 * 1000, and 10 / 1024 * 1000 * 1001 / 2 counts */
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)(uint16_t)(direction * (32768L + 4888L)), (int16_t)(uint16_t)(drive.angle - before));
     }
@@ -148,9 +158,10 @@ void test_ramp_carries_the_open_loop_current(void)
 void test_speed_waits_once_the_estimator_agrees(void)
 {
     int32_t waits_q10;
+    uint16_t n;
     rig_start(1);
     (void)ideal_motor_run_until(DRIVE_RAMP, 300u + LOCK_PERIODS);
-    while (drive.run.handover.agreed_steps < params.agree_steps) {
+    for (n = 0; n < 30000u && drive.run.handover.agreed_steps < params.agree_steps; n++) {
         ideal_motor_run(1);
         EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "on the way up");
     }

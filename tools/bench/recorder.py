@@ -10,7 +10,7 @@ from tools.common import drive_tables
 from tools.common.errors import UserError
 from .scenario import param
 
-RING_ROWS, AFTER_ROWS, WORDS, STATE_BITS, FAULT_STATE = 80, 16, 6, 15, 7
+RING_ROWS, AFTER_ROWS, WORDS, STATE_BITS, FAULT_STATE = 72, 16, 6, 15, 7
 HEAD = re.compile(r"record fault (\d+) rows (\d+) every (\d+)$")
 ROW = re.compile(r"row (\d+)((?: -?\d+){%d})$" % WORDS)
 AGAIN = "log it again: after a reset by its pin the board sends the record once more"

@@ -20,16 +20,17 @@ from tools.image import device
 from tools.image.budget import Budget
 from tools.image.facts import Decoder
 from tools.image.size import told
-from tools.image.wcet import INTERRUPT, MOST_PARTS, RETURN, THIRD_DUTY, Bound, Program, by_line, handlers_of, over, read_statements
+from tools.image.profile import INTERRUPT, SLOW
+from tools.image.wcet import MOST_PARTS, RETURN, THIRD_DUTY, Bound, Program, by_line, handlers_of, over, read_statements
 
 from . import build, cycles, pil, pil_command, simulate, sweep
 
-ADC1_VECTOR = device.VECTORS.index(INTERRUPT)
+ADC1_VECTOR, SLOW_VECTOR = device.VECTORS.index(INTERRUPT), device.VECTORS.index(SLOW)
 
 
 @dataclass(frozen=True)
 class Watch:
-    """What the simulator looks for in each control interrupt."""
+    """What the simulator looks for in each interrupt of a period."""
     parts: tuple[tuple[int, ...], ...]      # addresses of each
     sets: tuple[int, ...]                   # parts as bits, of which no interrupt has all
 
@@ -62,16 +63,18 @@ class _Watched(ctypes.Structure):
 
 
 class _Core(cycles._Core): # pylint: disable=protected-access
-    """Watching the control interrupt in the core of a board."""
+    """Watching both interrupts of a period in the core of a board."""
 
     def __init__(self, board: pil.PilBoard, watch: Watch) -> None:
         super().__init__(board)
         core, number = ctypes.c_void_p, ctypes.c_uint
-        board.library.declare(("iss_watch", ctypes.c_bool, [core, number]), ("iss_watch_part", None, [core, ctypes.c_uint32, number]),
+        board.library.declare(("iss_watch", ctypes.c_bool, [core, number]), ("iss_watch_also", None, [core, number]),
+                              ("iss_watch_part", None, [core, ctypes.c_uint32, number]),
                               ("iss_watch_set", ctypes.c_bool, [core, ctypes.c_uint64]), ("iss_watched", ctypes.POINTER(_Watched), [core]))
         held = self._c.iss_watch(self._core, ADC1_VECTOR) and all(self._c.iss_watch_set(self._core, parts) for parts in watch.sets)
         if not held:
             raise UserError(f"{len(watch.sets)} exclusions are stated", "make wcet", f"the simulator has room for {len(_Watched().whole)}")
+        self._c.iss_watch_also(self._core, SLOW_VECTOR)
         for part, addresses in enumerate(watch.parts):
             for address in addresses:
                 self._c.iss_watch_part(self._core, address, part)
@@ -100,7 +103,7 @@ class Report:
     program: Program
     bounds: list[Bound]
     instruction: int                # cycles of the background's longest
-    loops: list[tuple[int, int]]    # of the control interrupt: address of the head, executions in one interrupt at most
+    loops: list[tuple[int, int]]    # of a period's interrupts: address of the head, executions in one interrupt at most
     seen: Seen | None = None
     broken: list[str] = field(default_factory=list)
 
@@ -133,7 +136,12 @@ class Report:
     @property
     def others(self) -> int:
         """Cycles of the longest handler that can come before: the fault's, whose bridge is off, so that a late duty does no harm."""
-        return max((bound.cycles for bound in self.bounds if bound.handler != INTERRUPT), default=0)
+        return max((bound.cycles for bound in self.bounds if bound.handler not in (INTERRUPT, SLOW)), default=0)
+
+    @property
+    def period(self) -> int:
+        """Cycles of both interrupts of a period and of a fault's handler, at most."""
+        return sum(bound.cycles for bound in self.bounds if bound.to == RETURN and bound.handler in (INTERRUPT, SLOW)) + self.others
 
     @property
     def latency(self) -> int:
@@ -145,11 +153,13 @@ class Report:
 def of_image(image: Path) -> Report:
     """The bounds of an image, before anything has run."""
     program = Program.read(image, read_statements(), Decoder())
-    ways = program.ways(INTERRUPT)
-    bounds = program.bounds_of(ways, INTERRUPT)
-    for handler in handlers_of(program)[1:]:
-        bounds += program.bounds(handler)
-    return Report(str(paths.shown(image)), program, bounds, program.longest_instruction(), executions(ways.loops.values()))
+    bounds: list[Bound] = []
+    loops: list[Any] = []
+    for handler in handlers_of(program):
+        ways = program.ways(handler)
+        bounds += program.bounds_of(ways, handler)
+        loops += ways.loops.values() if handler in (INTERRUPT, SLOW) else []
+    return Report(str(paths.shown(image)), program, bounds, program.longest_instruction(), executions(loops))
 
 
 def executions(loops: Any) -> list[tuple[int, int]]:
@@ -180,6 +190,9 @@ def broken(report: Report, budget: Budget | None) -> list[str]:
     elif report.latency >= seen.load_cycles:
         lines.append(f"the deadline is not proven: up to {report.latency} cycles from the trigger to the third duty, but the duties load after "
                      f"{seen.load_cycles}")
+    if report.period >= cycles.PERIOD_CYCLES:
+        lines.append(f"the slow work is not proven to end in its period: up to {report.period} cycles with the control interrupt and a fault's handler, the "
+                     f"period has {cycles.PERIOD_CYCLES}")
     if seen.entry[1] - seen.entry[0] > report.instruction - 1 + report.others:
         lines.append(f"an interrupt waited {seen.entry[1] - seen.entry[0]} cycles for its entry, longer than any instruction and handler takes")
     return lines
@@ -195,7 +208,7 @@ def text(report: Report) -> str:
     if report.seen is not None:
         parts.append(deadline(report, report.seen))
     parts += ["\n".join([f"{bound.handler} to its {bound.to}: {bound.cycles} cycles", f"{'cycles':>6}{'line':>6}", *by_line(report.program, bound)])
-              for bound in report.bounds if bound.handler == INTERRUPT]
+              for bound in report.bounds if bound.handler in (INTERRUPT, SLOW)]
     stated = "\n".join(f"  {item}" for item in report.program.statements)
     parts.append(f"stated, and true of all that ran:\n{stated}" if not report.broken else f"stated:\n{stated}")
     return "\n\n".join(parts)
@@ -209,7 +222,8 @@ def deadline(report: Report, seen: Seen) -> str:
     return (f"trigger to the third duty: {report.latency} cycles at most, the duties load after {seen.load_cycles}\n"
             f"  {seen.entry[0]} until the samples are there, {waited} until the background's instruction ends "
             f"(seen: {seen.entry[1] - seen.entry[0]}{fault}), {duty} in the interrupt\n"
-            f"{seen.runs} control interrupts ran in {seen.scenarios} scenarios")
+            f"both interrupts of a period and a fault's handler: {report.period} cycles at most, the period has {cycles.PERIOD_CYCLES}\n"
+            f"{seen.runs} interrupts ran in {seen.scenarios} scenarios")
 
 
 def summary(report: Report) -> dict[str, Any]:

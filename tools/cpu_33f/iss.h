@@ -167,7 +167,7 @@ const uint64_t *iss_profile_cycles(const iss_t *iss);
 enum { ISS_WATCH_PARTS = 64, ISS_WATCH_SETS = 128, ISS_VECTORS = 126 };
 
 typedef struct {
-    uint64_t runs;                          /* of the watched handler, from entry to return */
+    uint64_t runs;                          /* of the watched handlers, from entry to return */
     uint32_t longest[ISS_VECTORS];          /* of each vector: cycles from entry to return, without handlers in between */
     uint32_t times[ISS_WATCH_PARTS];        /* how often one run has executed an instruction of the part, at most */
     uint32_t latest[ISS_WATCH_PARTS];       /* cycles from entry to the end of the part's last instruction, at most */
@@ -176,6 +176,9 @@ typedef struct {
 
 /* Looks at a vector's handler from now on, with nothing seen; 0 ends it. False: no memory. */
 bool iss_watch(iss_t *iss, unsigned vector);
+
+/* Its runs count like those of the first one, each by itself. */
+void iss_watch_also(iss_t *iss, unsigned vector);
 
 /* The instruction at a PC address is in a part, below ISS_WATCH_PARTS. */
 void iss_watch_part(iss_t *iss, uint32_t pc, unsigned part);

@@ -10,6 +10,8 @@
 
 enum {
     ADC1_VECTOR = 21, /* (0x2E - 4) / 2 */
+    T2_VECTOR = 15,   /* raised by software: the slow work of a period */
+    T2_FLAG = 1 << CHIP_IRQ_T2,
     IUE = 0x0004,
     START_PERIODS = 3600,    /* "PWM periods" of 50 us that the start-up with its PLL may take */
     COUNTER_IN_TIME = 0x81F4 /* counting down: what a handler would see that does not look */
@@ -95,6 +97,9 @@ static void core_reset(iss_cpu_t *cpu)
 static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
 {
     iss_board_t *b = context;
+    if (vector == T2_VECTOR) {
+        b->slow_cycle = cycle;
+    }
     if (vector != ADC1_VECTOR) {
         return;
     }
@@ -105,17 +110,39 @@ static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
     iss_shadow_tick(b);
 }
 
-static void leave_interrupt(void *context, unsigned vector, uint64_t cycle)
+/* The work of a period is done. */
+static void period_done(iss_board_t *b)
 {
-    iss_board_t *b = context;
-    if (vector != ADC1_VECTOR || !b->in_handler) {
-        return;
-    }
-    b->in_handler = false;
-    measured(&vb_counts(b->vb)->isr, cycle - b->entry_cycle);
+    measured(&vb_counts(b->vb)->period, (uint64_t)(vb_counts(b->vb)->isr.last + vb_counts(b->vb)->slow.last));
     iss_shadow_compare(b);
     b->handled = true;
     iss_cpu_break(&b->cpu);
+}
+
+static bool slow_is_raised(const iss_board_t *b)
+{
+    const chip_t *chip = b->cpu.chip;
+    return ((unsigned)CHIP_REG(chip, IFS0) & CHIP_REG(chip, IEC0) & T2_FLAG) != 0;
+}
+
+static void leave_interrupt(void *context, unsigned vector, uint64_t cycle)
+{
+    iss_board_t *b = context;
+    if (vector == ADC1_VECTOR && b->in_handler) {
+        b->in_handler = false;
+        measured(&vb_counts(b->vb)->isr, cycle - b->entry_cycle);
+        vb_counts(b->vb)->slow.last = 0.0;
+        b->slow_to_come = slow_is_raised(b);
+        if (!b->slow_to_come) {
+            period_done(b);
+        }
+    } else if (vector == T2_VECTOR && b->slow_to_come) {
+        b->slow_to_come = false;
+        measured(&vb_counts(b->vb)->slow, cycle - b->slow_cycle);
+        period_done(b);
+    } else {
+        /* another one */
+    }
 }
 
 /* The core met something that no program should do. It goes on as the chip would. */
@@ -143,6 +170,7 @@ static void start_time(iss_board_t *b)
     b->written = false;
     b->handled = false;
     b->in_handler = false;
+    b->slow_to_come = false;
 }
 
 /* Persistent variables hold anything after power-on; here always the same, so that runs can be repeated. */
@@ -227,6 +255,7 @@ static void follow_reset(iss_board_t *b)
     chip_t *chip = b->cpu.chip;
     vb_counts(b->vb)->resets += 1.0;
     b->in_handler = false;
+    b->slow_to_come = false;
     chip->adc.due_s = PLANT_NEVER;
     chip->pwm.running = false;
     chip_pwm_cut(chip);

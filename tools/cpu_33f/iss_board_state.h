@@ -24,7 +24,8 @@ typedef struct {
     double pending_s;       /* when the board must follow the core, PLANT_NEVER: not */
     bool clock_changed, was_reset, written, handled;
     bool in_handler;
-    uint64_t entry_cycle, trigger_cycle;
+    bool slow_to_come;      /* the control interrupt has raised its slow work, which is not over */
+    uint64_t entry_cycle, trigger_cycle, slow_cycle;
     uint16_t counter_seen;  /* P1TMR as the handler has read it last */
     bool (*core_raised)(void *context, unsigned irq);
     bool signals;           /* the image says where board_drive is */

@@ -97,7 +97,7 @@ static bool signals_agree(iss_board_t *b)
     return true;
 }
 
-/* The target leaves its control interrupt. The host's handler runs now, when it is known whether the target's was in time. */
+/* The target has done the work of a period. The host's handlers run now, when it is known whether the target's were in time. */
 void iss_shadow_compare(iss_board_t *b)
 {
     if (!b->shadow.running) {
@@ -106,6 +106,9 @@ void iss_shadow_compare(iss_board_t *b)
     P1TMR = b->counter_seen;
     IFS0bits.AD1IF = 1;
     _ADC1Interrupt();
+    if (IFS0bits.T2IF) {
+        _T2Interrupt();
+    }
     b->shadow.ticks++;
     if (!registers_agree(b) || !signals_agree(b)) {
         b->shadow.differences++;

@@ -1,11 +1,11 @@
-/* Handlers run by run: the cycles of all; of one, how often and how late which of its parts run, and which together. */
+/* Handlers run by run: the cycles of all; of one or two, how often and how late which of its parts run, and which together. */
 #include "iss_state.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 struct watch {
-    unsigned vector;
+    unsigned vector, also;      /* 0: no other one */
     unsigned level;             /* handlers entered, with the watched one; 0: it does not run */
     uint64_t entered[NESTING], others[NESTING]; /* of each handler: cycle of its entry; cycles of handlers in between */
     uint64_t mask;              /* parts of this run */
@@ -24,6 +24,13 @@ bool iss_watch(iss_t *m, unsigned vector)
         m->watch->vector = vector;
     }
     return vector == 0 || m->watch != NULL;
+}
+
+void iss_watch_also(iss_t *m, unsigned vector)
+{
+    if (m->watch != NULL) {
+        m->watch->also = vector;
+    }
 }
 
 void iss_watch_part(iss_t *m, uint32_t pc, unsigned part)
@@ -75,7 +82,7 @@ void iss_watch_enter(iss_t *m, unsigned vector)
     unsigned around = m->nested % NESTING;
     w->entered[around] = m->cycle;
     w->others[around] = 0;
-    if (vector == w->vector && w->level == 0) {
+    if ((vector == w->vector || (w->also != 0 && vector == w->also)) && w->level == 0) {
         w->level = m->nested + 1u;
         w->mask = 0;
         memset(w->times, 0, sizeof w->times);

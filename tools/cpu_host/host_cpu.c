@@ -125,7 +125,24 @@ static unsigned level(void)
     return ((unsigned)SR >> 5) & 7u;
 }
 
-/* The handler runs at once, if it may. */
+/* Flags that were set by software, or while their interrupt was disabled or masked: each once. */
+static void serve_pending(host_t *h)
+{
+    if ((IFS0 & IEC0) == 0 && (IFS3 & IEC3) == 0) {
+        return;
+    }
+    uint16_t ifs[CHIP_IRQ_WORDS] = {IFS0, IFS1, 0, IFS3, IFS4}, ipc[4 * CHIP_IRQ_WORDS];
+    const uint16_t iec[CHIP_IRQ_WORDS] = {IEC0, IEC1, 0, IEC3, IEC4};
+    for (unsigned n = 0; n < 4 * CHIP_IRQ_WORDS; n++) {
+        ipc[n] = chip_get(h->chip, SFR_IPC0 + 2u * n);
+    }
+    for (chip_irq_t next = chip_irq_pending(ifs, iec, ipc); next.priority > level(); next = chip_irq_pending(ifs, iec, ipc)) {
+        ifs[next.number / 16u] = (uint16_t)(ifs[next.number / 16u] & ~(1u << next.number % 16u));
+        serve(h, next.number);
+    }
+}
+
+/* The handler runs at once, if it may, and after it what it has raised. */
 static bool host_raised(void *context, unsigned irq)
 {
     host_t *h = context;
@@ -141,26 +158,16 @@ static bool host_raised(void *context, unsigned irq)
                   handler != NULL ? handler->name : "an interrupt", level());
     } else {
         serve(h, irq);
+        if (!h->stuck) {
+            serve_pending(h);
+        }
     }
     return false;
 }
 
-/* Flags that were set while their interrupt was disabled or masked, or by software. */
 static void host_begin(void *context)
 {
-    host_t *h = context;
-    if ((IFS0 & IEC0) == 0 && (IFS3 & IEC3) == 0) {
-        return;
-    }
-    uint16_t ifs[CHIP_IRQ_WORDS] = {IFS0, IFS1, 0, IFS3, IFS4}, ipc[4 * CHIP_IRQ_WORDS];
-    const uint16_t iec[CHIP_IRQ_WORDS] = {IEC0, IEC1, 0, IEC3, IEC4};
-    for (unsigned n = 0; n < 4 * CHIP_IRQ_WORDS; n++) {
-        ipc[n] = chip_get(h->chip, SFR_IPC0 + 2u * n);
-    }
-    for (chip_irq_t next = chip_irq_pending(ifs, iec, ipc); next.priority > level(); next = chip_irq_pending(ifs, iec, ipc)) {
-        ifs[next.number / 16u] = (uint16_t)(ifs[next.number / 16u] & ~(1u << next.number % 16u)); /* each once a period */
-        serve(h, next.number);
-    }
+    serve_pending(context);
 }
 
 /* ---- the rest of what the chip asks of its processor ---- */

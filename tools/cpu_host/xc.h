@@ -119,6 +119,7 @@ HOST_BITS(IEC0, {
 })
 HOST_BITS(IEC3, { u(9); uint16_t PWM1IE:1, QEI1IE:1; u(4); uint16_t FLTA1IE:1; })
 HOST_BITS(IPC0, { uint16_t INT0IP:3; u(1); uint16_t IC1IP:3; u(1); uint16_t OC1IP:3; u(1); uint16_t T1IP:3; u(1); })
+HOST_BITS(IPC1, { u(4); uint16_t OC2IP:3; u(1); uint16_t IC2IP:3; u(1); uint16_t T2IP:3; u(1); })
 HOST_BITS(IPC3, { uint16_t U1TXIP:3; u(1); uint16_t AD1IP:3; u(9); })
 HOST_BITS(IPC15, { u(12); uint16_t FLTA1IP:3; u(1); })
 HOST_BITS(OSCCON, {

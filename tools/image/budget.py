@@ -30,10 +30,12 @@ class Limits:
 class CycleLimits:
     """[cycles]: of the control interrupt, and the scenarios to find them with."""
     isr_max: int
-    isr_mean: int
+    period_max: int         # both interrupts of a period
+    period_mean: int
     latency_max: int
     isr_bound: int          # of the longest paths, from entry to return and to the third duty
     duty_bound: int
+    slow_bound: int
     scenarios: tuple[str, ...]
 
 
@@ -98,7 +100,7 @@ class Budget:
             section.close()
         budget.close()
         section = _required(root, "cycles")
-        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "isr_mean", "latency_max", "isr_bound", "duty_bound")),
+        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound")),
                              listed(section, "scenarios", "scenario", required=True))
         section.close()
         stack = _required(root, "stack")

@@ -30,7 +30,7 @@ VECTORS = (*TRAPS, *(f"_{INTERRUPTS[n]}Interrupt" if n in INTERRUPTS else f"_Int
 LEFT_ERASED = 80
 DEFAULT_VECTOR = "_DefaultInterrupt"
 #: without these the drive is not controlled, or does not stop when it must
-REQUIRED = ("_OscillatorFail", "_AddressError", "_StackError", "_MathError", "_ADC1Interrupt", "_FLTA1Interrupt")
+REQUIRED = ("_OscillatorFail", "_AddressError", "_StackError", "_MathError", "_ADC1Interrupt", "_T2Interrupt", "_FLTA1Interrupt")
 
 
 @dataclass(frozen=True)

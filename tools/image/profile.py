@@ -1,4 +1,4 @@
-"""Cycles of the control interrupt by function, as linked and as written.
+"""Cycles of the control interrupt and of its slow work by function, as linked and as written.
 
 The counts are those of handlers alone: the background executes some of the interrupt's functions. What other handlers execute of them is
 counted with it, too; that is little."""
@@ -12,7 +12,7 @@ from .linked import branch_target
 from .program import Elf
 from .stack import plain
 
-INTERRUPT = "_ADC1Interrupt"
+INTERRUPT, SLOW = "_ADC1Interrupt", "_T2Interrupt" # the slow work of a period is raised by the first
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,15 @@ class Profile:
     total: int = 0
 
 
-def reachable(elf: Elf, image: Image, start: str = INTERRUPT) -> set[int]:
-    """First addresses of the linked functions that the interrupt can come to."""
+def reachable(elf: Elf, image: Image, starts: tuple[str, ...] = (INTERRUPT, SLOW)) -> set[int]:
+    """First addresses of the linked functions that the two interrupts can come to."""
     first = {word.address: word.copy[0] for word in image.words}
     leaving: dict[int, set[int]] = {}
     for place, function in first.items():
         target = branch_target(elf.words, place)
         if target in first:
             leaving.setdefault(function, set()).add(first[target])
-    todo = [address for address, name in elf.functions if name == start]
+    todo = [address for address, name in elf.functions if name in starts]
     found: set[int] = set()
     while todo:
         function = todo.pop()

@@ -14,7 +14,7 @@ typedef struct {
 /* What a processor with a time of its own has counted; zeroes for the host. Latency: from the trigger to the write of the third duty;
  * entry: from the trigger to the handler. */
 typedef struct {
-    vb_range_t isr, latency, entry;
+    vb_range_t isr, slow, period, latency, entry;
     double stack_bytes, instructions, cycles, resets, errors;
     double ticks, differences;
 } vb_counts_t;

@@ -61,6 +61,8 @@ static double get_torque_mean(const vb_t *vb) { return mean(vb, vb->stat.torque_
 
 static double mean_of(const vb_range_t *range) { return range->count > 0.0 ? range->sum / range->count : 0.0; }
 static double get_isr_mean(const vb_t *vb) { return mean_of(&vb->count.isr); }
+static double get_slow_mean(const vb_t *vb) { return mean_of(&vb->count.slow); }
+static double get_period_mean(const vb_t *vb) { return mean_of(&vb->count.period); }
 static double get_latency_mean(const vb_t *vb) { return mean_of(&vb->count.latency); }
 
 static void set_theta(vb_t *vb, double deg)
@@ -98,6 +100,8 @@ static void set_isr_reset(vb_t *vb, double value)
 {
     (void)value;
     vb->count.isr = (vb_range_t){.last = vb->count.isr.last};
+    vb->count.slow = (vb_range_t){.last = vb->count.slow.last};
+    vb->count.period = (vb_range_t){.last = vb->count.period.last};
     vb->count.latency = (vb_range_t){.last = vb->count.latency.last};
     vb->count.entry = (vb_range_t){.last = vb->count.entry.last};
 }
@@ -227,6 +231,11 @@ static const key_entry_t table[] = {
     R("cpu.isr_cycles_min", count.isr.min, "cycles", "shortest control interrupt, entry to return"),
     R("cpu.isr_cycles_max", count.isr.max, "cycles", "longest control interrupt"),
     G("cpu.isr_cycles_mean", get_isr_mean, "cycles", "mean control interrupt"),
+    R("cpu.slow_cycles", count.slow.last, "cycles", "the last interrupt that the control interrupt has raised for its slow work; 0 = it raised none"),
+    R("cpu.slow_cycles_max", count.slow.max, "cycles", "longest interrupt of the slow work"),
+    G("cpu.slow_cycles_mean", get_slow_mean, "cycles", "mean interrupt of the slow work"),
+    R("cpu.period_cycles_max", count.period.max, "cycles", "longest work of a period: both interrupts"),
+    G("cpu.period_cycles_mean", get_period_mean, "cycles", "mean work of a period"),
     R("cpu.latency_cycles_min", count.latency.min, "cycles", "shortest time from the trigger to the write of the third duty"),
     R("cpu.latency_cycles_max", count.latency.max, "cycles", "longest time from the trigger to the write of the third duty"),
     G("cpu.latency_cycles_mean", get_latency_mean, "cycles", "mean time from the trigger to the write of the third duty"),

@@ -5,7 +5,7 @@
 
 #define PHASES 3u
 #define MISSING_SHIFT 2 /* less than a quarter of the current in the other direction */
-#define MA_SHIFT 12u    /* up to 16 mA a count */
+#define MA_SHIFT 12u    /* up to 16 mA a count: the build refuses more */
 #define MA_PER_COUNT ((uint16_t)(4000.0F * PARAM_F(NORM_CURRENT_CONST) * 4096.0F + 0.5F))
 /* Of a duty count, Q8: one leg loses what two others gain, 4/3 along the vector. */
 #define DEAD_NS_A_COUNT ((uint16_t)(0.75F * PWM_TICK_SEC * 1000000000.0F * 256.0F + 0.5F))

@@ -12,7 +12,7 @@
 #define SCOPE_MODE_PARAMS 0u
 #endif
 #ifdef IDENTIFY
-#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 44u) /* its stack, too */
+#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 128u) /* its stack, too */
 #else
 #define SCOPE_MODE_IDENTIFY 0u
 #endif

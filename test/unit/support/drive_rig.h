@@ -63,8 +63,8 @@ static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
         drive_tick(&drive, &params, &samples, &out.duty);
+        drive_slow(&drive, &params, &samples);
         out.outputs = drive_outputs(&drive);
-        drive_slow(&drive, &params, samples.v_bus);
         if (drive_settle(&drive)) {
             out.outputs = (uint16_t)OUTPUTS_OFF;
         }
@@ -117,6 +117,7 @@ static inline void rig_speed(int16_t speed_erpm)
 {
     drive.run.observer.omega_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    drive.run.estimator.omega_erpm = speed_erpm; /* as steady as it is filtered */
 }
 
 /** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
