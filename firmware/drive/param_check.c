@@ -1,4 +1,5 @@
 /* Refuses a userparams.h that cannot work: every value against its range, and the values against each other, by name. */
+#include "drive/modes/mode_relations.h"
 #include "drive/param_refuse.h"
 #include "drive/param_scaling.h"
 #include "drive/param_table.h"
@@ -37,8 +38,5 @@ PARAM_CHECK(relations)
     if (!(1 PARAM_TABLE(RANGE_HOLDS))) {
     }
     PARAM_RELATION_TABLE(CHECK_RELATION)
-#ifdef BRINGUP
-    CHECK_RELATION(PARAM_F(NORM_CURRENT_CONST) <= 0.0039F,
-                   PARAM_NAMED(NORM_CURRENT_CONST) " must be at most 0.0039 with BRINGUP, which counts milliamperes in 16 bits: leave BRINGUP out")
-#endif
+    MODE_RELATION_TABLE(CHECK_RELATION)
 }
