@@ -39,6 +39,9 @@ QM_INLINE void board_set_outputs(uint16_t outputs)
     P1OVDCON = override;
 }
 
+/* What looks at each period itself. */
+#define BOARD_SLOW_EVERY_PERIOD (SCOPE || MODE_RECORDS)
+
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
 
@@ -59,14 +62,17 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
     if ((P1TMR & 0x8000u) == 0u || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
         board_is_late = 1;
         P1OVDCON = BOARD_OUTPUTS_OFF;
+        IFS0bits.T2IF = 1;
     }
     if (board_drive.fault != (uint16_t)FAULT_NONE) {
         P1OVDCON = BOARD_OUTPUTS_OFF;
     }
-    IFS0bits.T2IF = 1;
+    if (BOARD_SLOW_EVERY_PERIOD || drive_slow_is_due(&board_drive)) {
+        IFS0bits.T2IF = 1;
+    }
 }
 
-/** What of a period has no deadline but the next one's begin. The control interrupt raises it and may interrupt it; timer 2 stands still, only its
+/** What has no deadline but the next period's begin, every second period, and with the bridge off each. The control interrupt raises it and may interrupt it; timer 2 stands still, only its
  *  vector is used. */
 void BOARD_ISR _T2Interrupt(void)
 {

@@ -68,9 +68,9 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte)
 
 uint16_t selftest_flow_holds(const drive_t *d)
 {
-    uint16_t ticks = d->ticks, rest = (uint16_t)(ticks & (SLOW_PHASES - 1u));
-    uint16_t expected = (uint16_t)((ticks / SLOW_PHASES) * (SLOW_PHASES * (SLOW_PHASES - 1u) / 2u) + rest * (rest + 1u) / 2u);
-    return (uint16_t)(((d->selftest.phases ^ expected) & 0x7FFFu) == 0u); /* the sum of all 65536 ticks is a multiple of 0x8000 */
+    uint16_t calls = (uint16_t)(d->ticks / SLOW_EVERY), rest = (uint16_t)(calls & (SLOW_QUARTERS - 1u));
+    uint16_t expected = (uint16_t)((calls / SLOW_QUARTERS) * (SLOW_QUARTERS * (SLOW_QUARTERS - 1u) / 2u) + rest * (rest + 1u) / 2u);
+    return (uint16_t)(((d->selftest.phases ^ expected) & 0x3FFFu) == 0u); /* the sum of 65536 ticks is a multiple of 0x4000 */
 }
 
 uint16_t selftest_variables_hold(const drive_t *d)

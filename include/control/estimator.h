@@ -4,7 +4,7 @@
 
 #include "control/transforms.h"
 
-#define ESTIMATOR_HISTORY 7 /* and the current of the last period: eight */
+#define ESTIMATOR_HISTORY 4 /* two periods apart, and the current of the last period: eight periods */
 
 /** Motor and filter constants that do not change while the motor runs. */
 typedef struct {
@@ -15,7 +15,7 @@ typedef struct {
     int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
     int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and count of speed (NORM_DELTAT, unrounded) */
     uint16_t half_step_q16_rad;   /**< Ts pi/60 * 2^32: half the angle step in radians * 65536, per count of speed, as high-word factor */
-    int16_t kfilter_velestim_q16; /**< speed filter, 2 * KFILTER_VELESTIM */
+    int16_t kfilter_velestim_q16; /**< speed filter, of every second period: 1 - (1 - KFILTER_VELESTIM)^2 */
     speed_erpm_t nominal_erpm;    /**< EIGHT_SAMPLES_ERPM: above, the derivative spans one sample instead of eight */
     speed_erpm_t decimate_erpm;   /**< a tenth of it: below, the sign of Equation 2 comes from the filtered speed */
 } estimator_params_t;
@@ -31,12 +31,11 @@ typedef struct {
 
 /** State. Everything zero is a valid start at standstill. */
 typedef struct {
-    alphabeta_t history_q14[ESTIMATOR_HISTORY]; /**< currents of the periods before the last one */
-    uint16_t slot;                              /**< index of the one that makes room */
+    alphabeta_t history_q14[ESTIMATOR_HISTORY]; /**< currents, the newest two periods before the last settled one */
+    uint16_t slot;                              /**< index of the oldest, which makes room */
     alphabeta_t i_last_q14;                     /**< the current of the last period */
-    alphabeta_t i_oldest_q14;                   /**< and of eight periods before the next one */
+    alphabeta_t i_oldest_q14;                   /**< and of eight periods before the next two, in the mean of the two */
     alphabeta_t v_last_q13;                     /**< voltage commanded one period ago */
-    alphabeta_t v_before_q13;                   /**< and two periods ago */
     alphabeta_t v_mean_q13;                     /**< that acts between the last sample and the next one: the mean of the last two */
     int32_t e_d_q28, e_q_q28;                   /**< filtered back-EMF: Q12 with 16 fraction bits */
     speed_erpm_t omega_erpm;                    /**< speed of Equation 2; integrates to the angle */
@@ -46,7 +45,7 @@ typedef struct {
     angle_t next;                               /**< see estimator_next_angle() */
     int16_t old_turn_q16_rad;                   /**< 3.5 steps: from the middle of eight periods to that of the last one */
     int16_t sign;                               /**< of the rotation, for Equation 2: 1, 0 at the start, or -1 */
-    sincos_t own;                               /**< of rho, while the forced angle drives the motor */
+    sincos_t own;                               /**< of rho and half a step, while the forced angle drives the motor */
 } estimator_t;
 
 /** Filtered speed. */
@@ -148,6 +147,8 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
 /** Remembers the vector that was just given to the modulator. */
 QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
 {
+    e->v_mean_q13.alpha = (int16_t)((v_q13.alpha + e->v_last_q13.alpha) >> 1);
+    e->v_mean_q13.beta = (int16_t)((v_q13.beta + e->v_last_q13.beta) >> 1);
     e->v_last_q13 = v_q13;
 }
 
@@ -160,19 +161,26 @@ QM_INLINE void estimator_follow(estimator_t *e, const estimator_params_t *p)
     e->old_turn_q16_rad = (int16_t)(7 * qm_limit(qm_mulhi_su(speed, p->half_step_q16_rad), 4681)); /* 0.5 rad at most */
 }
 
-/** What the next period needs of those that were. */
+/** Three quarters of the current of six periods ago and a quarter of that of eight: the current of 6.5 periods ago, which is eight before the
+ *  next two periods in the mean. Their ripple, a sixteenth, has half the PWM's frequency and is nothing behind the back-EMF's filter. */
+QM_INLINE int16_t estimator_oldest(int16_t six_ago, int16_t eight_ago)
+{
+    return (int16_t)(six_ago - (six_ago >> 2) + (eight_ago >> 2));
+}
+
+/** What the next two periods need of those that were. */
 QM_INLINE void estimator_remember(estimator_t *e)
 {
     alphabeta_t *slot = &e->history_q14[e->slot];
-    e->i_oldest_q14 = *slot;
+    alphabeta_t eight_ago = *slot;
     *slot = e->i_last_q14;
-    e->slot = (uint16_t)((e->slot != 0u) ? e->slot - 1u : ESTIMATOR_HISTORY - 1u);
-    e->v_mean_q13.alpha = (int16_t)((e->v_last_q13.alpha + e->v_before_q13.alpha) >> 1);
-    e->v_mean_q13.beta = (int16_t)((e->v_last_q13.beta + e->v_before_q13.beta) >> 1);
-    e->v_before_q13 = e->v_last_q13;
+    e->slot = (uint16_t)((e->slot - 1u) & (ESTIMATOR_HISTORY - 1u));
+    slot = &e->history_q14[e->slot];
+    e->i_oldest_q14.alpha = estimator_oldest(slot->alpha, eight_ago.alpha);
+    e->i_oldest_q14.beta = estimator_oldest(slot->beta, eight_ago.beta);
 }
 
-/** After the duties of a period: the filtered speed of Equation 7, and what the next period needs. */
+/** After the duties of every second period: the filtered speed of Equation 7, and what the next two periods need. */
 QM_INLINE void estimator_settle(estimator_t *e, const estimator_params_t *p)
 {
     estimator_remember(e);
@@ -189,10 +197,10 @@ QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, alphabeta_t e_q1
     return at_middle;
 }
 
-/** The estimator's own frame for the next period, which needs it while the forced angle drives the motor. */
+/** The estimator's own frame for the next two periods, in the mean of the two; they need it while the forced angle drives the motor. */
 QM_INLINE void estimator_turn_frame(estimator_t *e)
 {
-    e->own = trig_sincos_called((angle_t)(e->rho_q32 >> 16));
+    e->own = trig_sincos_called(e->next);
 }
 
 /** What the back-EMF says of speed and angle. @param e_q13 see estimator_back_emf() @param frame of the control

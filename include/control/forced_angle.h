@@ -14,22 +14,29 @@ typedef struct {
 typedef struct {
     int32_t speed_q10;    /**< along the direction, 1/1024 angle counts per period; negative while the rotor still turns against it */
     uint32_t angle_q32;   /**< the fraction below one count is kept, so the speed is exact */
+    uint32_t step_q32;    /**< of the angle, every period: the speed with the direction's sign */
     int16_t increase_q10; /**< of the speed, every period: 0 or more */
 } forced_angle_t;
 
-/** Accelerates by one step and moves the angle. @param direction +1 or -1 @return nonzero at the end speed */
-QM_INLINE int16_t forced_angle_tick(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction)
+/** Accelerates. @param direction +1 or -1 @param periods 1 or 2, since the last time @return nonzero at the end speed */
+QM_INLINE QM_WRAPS int16_t forced_angle_accelerate(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction, uint16_t periods)
 {
     int16_t at_end = 0;
     uint32_t step_q32;
-    f->speed_q10 += f->increase_q10;
+    f->speed_q10 += qm_mulsu(f->increase_q10, periods);
     if (f->speed_q10 >= p->end_speed_q10) {
         f->speed_q10 = p->end_speed_q10;
         at_end = 1;
     }
     step_q32 = (uint32_t)qm_shift(f->speed_q10, 6);
-    f->angle_q32 = (direction >= 0) ? qm_turn_add(f->angle_q32, step_q32) : qm_turn_sub(f->angle_q32, step_q32);
+    f->step_q32 = (direction >= 0) ? step_q32 : 0u - step_q32;
     return at_end;
+}
+
+/** A period passes. */
+QM_INLINE void forced_angle_move(forced_angle_t *f)
+{
+    f->angle_q32 = qm_turn_add(f->angle_q32, f->step_q32);
 }
 
 /** The angle in counts. */

@@ -197,7 +197,6 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     d->angle = estimator_next_angle(&run->estimator);
     d->frame = trig_sincos_called(d->angle);
     run->estimator.v_last_q13 = inverse_park(c->v_q14, d->frame);
-    run->estimator.v_before_q13 = run->estimator.v_last_q13;
     run->estimator.v_mean_q13 = run->estimator.v_last_q13;
     drive_enter(d, DRIVE_CLOSED);
 }

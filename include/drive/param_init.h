@@ -25,7 +25,7 @@
         .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
         .half_step_q16_rad = (uint16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F * PARAM_F(SPEED_UNIT)), \
-        .kfilter_velestim_q16 = 2 * (KFILTER_VELESTIM), \
+        .kfilter_velestim_q16 = PARAM_VELESTIM_Q16, \
         .nominal_erpm = (int16_t)SPEED_COUNTS(EIGHT_SAMPLES_ERPM), \
         .decimate_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(DECIMATE_NOMINAL_SPEED)) \
     }

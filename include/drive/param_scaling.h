@@ -33,6 +33,8 @@
 
 /* ---- AN1292's motor constants, Equations 5 and 6, pre-divided by 2, 256 and 2. The estimator has formats of its own
  * for R and L, which fit where these two end at 32767. ---- */
+/* The speed filter runs every second period: two steps of Equation 7 in one. */
+#define PARAM_VELESTIM_Q16 ((int16_t)PARAM_ROUND(PARAM_F(KFILTER_VELESTIM) * (4.0F - PARAM_F(KFILTER_VELESTIM) / 16384.0F)))
 #define PARAM_AN1292(x) ((int16_t)PARAM_ROUND(((x) < 32767.0F) ? (x) : 32767.0F))
 #define NORM_RS PARAM_AN1292(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F)
 #define NORM_LSDTBASE PARAM_AN1292(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F)
@@ -137,8 +139,10 @@
 /** duty counts per Q13 voltage count * 65536 = this / bus in Q16 of full scale. */
 #define DUTY_PER_VOLT_NUMERATOR ((uint32_t)(PARAM_F(PWM_FULL_DUTY) * 4.0F * NORM_VOLTAGE_CONST / PARAM_F(BUS_FULL_SCALE_V) * 4294967296.0F))
 
-/* ---- Slow steps: each of the eight phases comes every eighth period ---- */
-#define SLOW_PHASES 8
+/* ---- Slow steps: a quarter of the slow work follows every second period ---- */
+#define SLOW_EVERY 2u
+#define SLOW_QUARTERS 4u
+#define SLOW_PHASES 8 /* periods of a slow step */
 #define SLOW_STEPS_PER_SEC (1.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))

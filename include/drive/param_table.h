@@ -75,7 +75,7 @@
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
 
 #define PARAM_RECORDER(X) /* Fault recorder: 64 rows before a fault, 16 after it */ \
-    X(RECORDER_PERIODS, "periods", 0, 64, 1, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
+    X(RECORDER_PERIODS, "periods", 0, 64, 2, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
 
 #define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \
     X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, the fault recorder's memory is their trace buffer; 0: status line only")
@@ -207,8 +207,8 @@
       "check its unit") \
     X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074: the observer's step is eight periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
-    X(((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
-      PARAM_NAMED(RECORDER_PERIODS) " must be 0, 1, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
+    X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
+      PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
     X(PARAM_F(SPEED_BANDWIDTH_HZ) <= PARAM_CALM_HZ, \
       PARAM_NAMED(SPEED_BANDWIDTH_HZ) " must be at most 0.148 * LOAD_BANDWIDTH_HZ, or 0.4 of the electrical frequency at " \
       PARAM_NAMED(MINIMUM_SPEED_RPM) " if that is more: lower it, or the speed hunts without load")

@@ -52,7 +52,7 @@ uint16_t recorder_place(const recorder_t *r, uint16_t n);
 /** 1 in the periods that get a row. */
 QM_INLINE uint16_t recorder_is_due(const drive_t *d)
 {
-    return (uint16_t)(RECORDER_EVERY == 1u || (RECORDER_EVERY != 0u && (d->ticks & (uint16_t)(RECORDER_EVERY - 1u)) == 0u));
+    return (uint16_t)(RECORDER_EVERY != 0u && (d->ticks & (uint16_t)(RECORDER_EVERY - 1u)) == 0u);
 }
 
 /** A period in a fault, before recorder_tick(). */

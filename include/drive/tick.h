@@ -27,30 +27,36 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
     e = estimator_back_emf(&run->estimator, &p->estimator, &run->model, i);
     estimator_track(&run->estimator, &p->estimator, &run->model, e, d->frame, drive_is_forced(d));
-    d->angle = drive_is_forced(d) ? forced_angle(&d->forced) : estimator_next_angle(&run->estimator); /* asked again: a flag would take a register */
+    if (drive_is_forced(d)) { /* asked again: a flag would take a register */
+        forced_angle_move(&d->forced);
+        d->angle = forced_angle(&d->forced);
+    } else {
+        d->angle = estimator_next_angle(&run->estimator);
+    }
     d->frame = trig_sincos(d->angle);
     v = inverse_park(c->v_q14, d->frame);
     estimator_commanded(&run->estimator, v);
     svm(&p->svm, v, d->duty_per_volt_q16, &d->dead, &d->phases_q13, duty);
 }
 
-/** Last of the slow work: what the next period's law needs and the samples do not change. */
+/** Last of the slow work: what the law of the next two periods needs and the samples do not change. */
 QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
 {
     dq_t asked = d->run.control.ref_q13;
     if (drive_is_forced(d)) {
-        (void)forced_angle_tick(&d->forced, &p->forced, d->direction);
+        (void)forced_angle_accelerate(&d->forced, &p->forced, d->direction, SLOW_EVERY);
         estimator_turn_frame(&d->run.estimator);
         if (!d->command.run) { /* letting go is harmless at these speeds */
             drive_enter(d, DRIVE_STOPPED);
         }
-    } else {
-        asked = dq_turn(asked, (int16_t)(2 * qm_limit(d->run.estimator.half_step_q16_rad, 16383))); /* the frame goes on by a step */
+    } else { /* the pulses' centres are one and two steps ahead of the frame */
+        asked = dq_turn(asked, (int16_t)(3 * qm_limit(d->run.estimator.half_step_q16_rad, 10922)));
     }
     d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
 }
 
-/** One PWM period up to the duties; after it drive_slow(), which has no deadline, drive_outputs(), and last drive_settle().
+/** One PWM period up to the duties; after it, where drive_slow_is_due(), drive_slow(), which has no deadline, drive_outputs(), and last
+ *  drive_settle().
  *  @param raw the converter's results at the centre of the low sides' conduction
  *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch */
 QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
@@ -93,16 +99,12 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
 }
 
 /* wcet: idle_step excludes estimator_settle speed_step speed_choose_state protection_check_signals protection_probe_rotor */
-/** First of the slow work: what a period leaves to be done, or what the states with the bridge off do. */
-QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+/** First of the slow work: what a period with the bridge off is. */
+QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     if (!drive_is_running(d)) {
         mode_idle(d);
         idle_step(d, p, raw->i_a, raw->i_b);
-    } else if (MODE_ALIGNS) {
-        estimator_settle(&d->run.estimator, &p->estimator);
-    } else {
-        /* the mode's own */
     }
 }
 
@@ -119,26 +121,17 @@ QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus
     }
 }
 
-/** drive_prepare() where the law goes on. */
-QM_INLINE void drive_prepare_step(drive_t *d, const drive_params_t *p)
-{
-    if (MODE_ALIGNS && drive_is_running(d)) {
-        drive_prepare(d, p);
-    }
-}
-
-/** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period: one block a period
- *  in turn, between what each period needs. Bus and circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
+/** What comes every eighth period, a quarter of it at a time: bus and circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
  *  @param raw the converter's results of this period */
-QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     drive_run_t *run = &d->run;
     uint16_t done;
 
-    drive_follow(d, p, raw);
-    switch (d->ticks & (SLOW_PHASES - 1u)) {
+    switch ((d->ticks / SLOW_EVERY) & (SLOW_QUARTERS - 1u)) {
     case 0:
         if (drive_is_closed(d)) {
+            handover_observe(run, p);
             speed_step(d, p);
         } else {
             drive_start_step(d, p);
@@ -147,51 +140,58 @@ QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_sampl
         break;
     case 1:
         drive_state_step(d, p);
-        done = 1;
-        break;
-    case 2:
         bus_step(d, p, raw->v_bus);
         protection_check_model(d, p);
         speed_choose_step(d, p);
-        done = 2;
+        done = 1;
         break;
-    case 3:
+    case 2:
         bus_update_voltage_limit(d, p);
-        protection_probe_step(d, p);
         if (drive_is_closed(d)) {
+            protection_probe_rotor(d, p);
             limits_burn(run, p);
-        }
-        done = 3;
-        break;
-    case 4:
-        if (drive_is_closed(d)) {
             protection_check_signals(d, p);
             limits_current(run, p);
         }
-        done = 4;
+        done = 2;
         break;
-    case 5:
+    default: /* 3 */
         if (drive_is_closed(d)) {
             protection_check_rotor(d, p);
             speed_follow(run, p);
         } else {
             model_update_in_ramp(d, p);
         }
-        done = 5;
-        break;
-    case 6:
         drive_learn_step(d, p, bus_sample(raw->v_bus));
-        done = 6;
-        break;
-    default: /* 7 */
-        if (drive_is_closed(d)) {
-            handover_observe(run, p);
-        }
-        done = 7;
+        done = 3;
         break;
     }
     SELFTEST_MARK(d, done);
-    drive_prepare_step(d, p);
+}
+
+/** 1 in the periods that slow work follows: every second one, and with the bridge off each. */
+QM_INLINE uint16_t drive_slow_is_due(const drive_t *d)
+{
+    return (uint16_t)((d->ticks & (SLOW_EVERY - 1u)) == 0u || !drive_is_running(d));
+}
+
+/** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
+ *  @param raw the converter's results of this period */
+QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    uint16_t was_running = drive_is_running(d);
+
+    drive_rest(d, p, raw);
+    if ((d->ticks & (SLOW_EVERY - 1u)) != 0u) {
+        return;
+    }
+    if (MODE_ALIGNS && was_running) {
+        estimator_settle(&d->run.estimator, &p->estimator);
+    }
+    drive_quarter(d, p, raw);
+    if (MODE_ALIGNS && drive_is_running(d)) {
+        drive_prepare(d, p);
+    }
 }
 
 #endif

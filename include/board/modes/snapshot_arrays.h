@@ -13,7 +13,14 @@ extern volatile uint16_t SnapStart, SnapDone;
 extern snapshot_t board_snapshot;
 #endif
 
-/** The mode's part of the control interrupt, after the slow work. */
+/** 1 where the mode has work in every period. */
+#ifdef SNAPSHOT
+#define MODE_RECORDS 1
+#else
+#define MODE_RECORDS 0
+#endif
+
+/** The mode's part of the slow work. */
 QM_INLINE void mode_record(void)
 {
 #ifdef SNAPSHOT

@@ -59,7 +59,8 @@ QM_INLINE uint16_t identify_turn(drive_t *d, const drive_params_t *p)
         if (d->state == (uint16_t)DRIVE_ALIGN) {
             drive_enter(d, DRIVE_RAMP);
         }
-        settled = (uint16_t)forced_angle_tick(&d->forced, &to, 1);
+        settled = (uint16_t)forced_angle_accelerate(&d->forced, &to, 1, 1);
+        forced_angle_move(&d->forced);
     } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
         identify_follow(d);
     } else if (id->sweep) {

@@ -100,7 +100,7 @@
 #define LS_OVER2LS0_SPEED17 0.5
 #define SNAPDELAY 5
 #define DATA_BUFFER_SIZE 50
-#define RECORDER_PERIODS 1
+#define RECORDER_PERIODS 2
 #ifndef SCOPE
 #define SCOPE 0
 #endif
