@@ -99,10 +99,13 @@ static void test_registers(void)
     }
 }
 
-/** The override as the interrupt's last words have left it: as the state asks, or off. */
+/** The override as the interrupts' last words have left it: as the state asks, or off. The low sides stay on until the first duties are written. */
 static uint16_t outputs_hold(void)
 {
     uint16_t outputs = drive_outputs(&board_drive), now = P1OVDCON;
+    if (board_drive.state == (uint16_t)DRIVE_ALIGN && board_drive.periods == 0u && now == BOARD_OUTPUTS_BOOTSTRAP) {
+        return 1;
+    }
     return (uint16_t)(now == BOARD_OUTPUTS_OFF || (outputs != 0u && now == (outputs == OUTPUTS_PWM ? BOARD_OUTPUTS_PWM : BOARD_OUTPUTS_BOOTSTRAP)));
 }
 
