@@ -37,6 +37,7 @@ typedef struct {
     alphabeta_t v_mean_q13;                     /**< that acts between the last sample and the next one: the mean of the last two */
     int32_t e_d_q28, e_q_q28;                   /**< filtered back-EMF: Q12 with 16 fraction bits */
     speed_erpm_t omega_erpm;                    /**< speed of Equation 2; integrates to the angle */
+    speed_erpm_t omega_before_erpm;             /**< and of the period before */
     int32_t omega_filtered_q16;                 /**< filtered speed, 16 fraction bits: speed loop, thresholds, display */
     uint32_t rho_q32;                           /**< angle of the rotor flux half a period after the last sample */
     int16_t half_step_q16_rad;                  /**< half the angle step of a period, radians * 65536 */
@@ -134,6 +135,7 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
     int16_t sum = (int16_t)(e_q - e->sign * e_d);
     int32_t step_q32;
 
+    e->omega_before_erpm = e->omega_erpm;
     e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
     step_q32 = qm_mulss(e->omega_erpm, p->deltat_q32);
     e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)step_q32);
@@ -180,8 +182,9 @@ QM_INLINE void estimator_remember(estimator_t *e)
 /** After the duties of every second period: the filtered speed of Equation 7, and what the next two periods need. */
 QM_INLINE void estimator_settle(estimator_t *e, const estimator_params_t *p)
 {
+    int16_t mean = (int16_t)(((int32_t)e->omega_erpm + e->omega_before_erpm) >> 1); /* free of the ripple of estimator_remember() */
     estimator_remember(e);
-    (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
+    (void)qm_lowpass(&e->omega_filtered_q16, mean, p->kfilter_velestim_q16);
 }
 
 /** Back-EMF in the control frame while that is the estimator's own: Park with the frame's sine and cosine, turned back by the
