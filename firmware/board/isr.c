@@ -29,11 +29,22 @@ void BOARD_ISR _DefaultInterrupt(void);
 /** Where the bridge does not switch. */
 QM_INLINE void board_set_idle_outputs(uint16_t outputs)
 {
-    P1OVDCON = (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) ? BOARD_OUTPUTS_BOOTSTRAP : BOARD_OUTPUTS_OFF;
+    uint16_t override = BOARD_OUTPUTS_OFF;
+    if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) {
+        override = BOARD_OUTPUTS_BOOTSTRAP;
+    }
+    P1OVDCON = override;
 }
 
-/* What looks at each period itself. */
-#define BOARD_SLOW_EVERY_PERIOD (SCOPE || MODE_RECORDS)
+/** 1 in the periods with the bridge switching that slow work follows: scope and SNAPSHOT look at each. */
+QM_INLINE uint16_t board_slow_is_due(void)
+{
+#if SCOPE || MODE_RECORDS
+    return 1;
+#else
+    return drive_slow_is_due(&board_drive);
+#endif
+}
 
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
@@ -63,7 +74,7 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
             P1OVDCON = BOARD_OUTPUTS_OFF;
         }
         IFS0bits.T2IF = 1;
-    } else if (BOARD_SLOW_EVERY_PERIOD || drive_slow_is_due(&board_drive)) {
+    } else if (board_slow_is_due()) {
         IFS0bits.T2IF = 1;
     } else {
         /* the next period raises it */

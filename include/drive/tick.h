@@ -110,6 +110,14 @@ QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_sampl
     }
 }
 
+/** What the estimator's last two periods leave to be done. @param was_running the law has run in them; the modes of their own have no estimator */
+QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_running)
+{
+    if (was_running && MODE_ALIGNS) {
+        estimator_settle(&d->run.estimator, &p->estimator);
+    }
+}
+
 /** What the running motor teaches, and what falls by and by. Every eighth period. @param bus_q15 of this moment */
 QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus_q15)
 {
@@ -187,9 +195,7 @@ QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_sampl
     if (!drive_slow_is_due(d)) {
         return;
     }
-    if (MODE_ALIGNS && was_running) {
-        estimator_settle(&d->run.estimator, &p->estimator);
-    }
+    drive_follow(d, p, was_running);
     drive_quarter(d, p, raw);
     if (MODE_ALIGNS && drive_is_running(d)) {
         drive_prepare(d, p);
