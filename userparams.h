@@ -141,7 +141,7 @@
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
 
-/* ---- Fault recorder: 64 rows before a fault, 16 after it ---------------------------------------------------------- */
+/* ---- Fault recorder: 56 rows before a fault, 16 from it on -------------------------------------------------------- */
 #define RECORDER_PERIODS 2          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
 
 /* ---- Scope: watch, record and tune by the serial line (docs/scope.md) --------------------------------------------- */

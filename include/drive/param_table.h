@@ -74,7 +74,7 @@
     X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
 
-#define PARAM_RECORDER(X) /* Fault recorder: 64 rows before a fault, 16 after it */ \
+#define PARAM_RECORDER(X) /* Fault recorder: 56 rows before a fault, 16 from it on */ \
     X(RECORDER_PERIODS, "periods", 0, 64, 2, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
 
 #define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \

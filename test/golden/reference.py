@@ -286,7 +286,7 @@ class Machine:
             "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
             "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
-            "kfilter_velestim_q16": 2 * self.kfilter_velestim,
+            "kfilter_velestim_q16": nearest((1 - (1 - self.kfilter_velestim / 32768) ** 2) * WORD),
             "nominal_erpm": int(self.eight_samples_erpm / unit),
             "decimate_erpm": nearest(self.nominal_rpm * self.pole_pairs / 10 / unit),
             "inv_kfi": nearest(self.inv_kfi * 16384 / unit),
@@ -462,10 +462,13 @@ def turn_small(x, y, a_q16_rad):
 
 @dataclass
 class Estimator:
-    """The PLL of Equations 1 to 7 in integers; p is Machine.estimator()."""
+    """The PLL of Equations 1 to 7 in integers; p is Machine.estimator(). What need not follow each sample is settled every second period."""
     p: dict
     kfilter_esdq_q16: int = 2400
-    history: list = field(default_factory=lambda: [(0, 0)] * 8)  # oldest first
+    history: list = field(default_factory=lambda: [(0, 0)] * 9)  # of every period, oldest first
+    oldest: tuple = (0, 0)
+    periods: int = 0
+    own: tuple = field(default_factory=lambda: sincos(0))        # frame of the periods to come
     v: list = field(default_factory=lambda: [(0, 0)] * 2)        # two periods ago, one period ago
     e: tuple = (0, 0)
     e_d: int = 0
@@ -491,7 +494,7 @@ class Estimator:
         period (3.5 steps, half a radian at most); one sample above, which counts eightfold."""
         p = self.p
         slow = magnitude(self.speed) < p["nominal_erpm"]
-        base, limit = (self.history[0], p["d_ilimit_ls_q14"]) if slow else (self.history[-1], p["d_ilimit_hs_q14"])
+        base, limit = (self.oldest, p["d_ilimit_ls_q14"]) if slow else (self.history[-1], p["d_ilimit_hs_q14"])
         change = [clamp(s16(n - b), -limit, limit) for n, b in zip(now, base)]
         v = [share(s16(c if slow else 8 * c), ls_q16) for c in change]
         if slow:
@@ -522,7 +525,17 @@ class Estimator:
         self.step = self.omega * p["deltat_q32"]
         self.rho = (self.rho + self.step) % (1 << 32)
         self.half_step = share(self.omega, p["half_step_q16_rad"])
-        self.filtered = lowpass(self.filtered, self.omega, p["kfilter_velestim_q16"])
+
+    def settle(self):
+        """After every second period: the filtered speed, the current of 6.5 periods ago, which is eight before the next two in their mean, and the
+        frame of the next two."""
+        self.periods += 1
+        if self.periods % 2:
+            return
+        self.oldest = tuple(s16(six - six // 4 + eight // 4) for six, eight in zip(self.history[-7], self.history[-9]))
+        self.filtered = lowpass(self.filtered, self.omega, self.p["kfilter_velestim_q16"])
+        self.own = sincos(self.next_angle())
+        self.follow()
 
     def follow(self):
         """For the next periods: the sign of Equation 2, Eq's above a tenth of nominal speed and the filtered speed's below; 3.5 steps, half a radian
@@ -535,15 +548,15 @@ class Estimator:
     def tick_free(self, now, ls_q16, inv_kfi):
         """In the estimator's own frame, by its own sine and cosine."""
         self.back_emf(now, ls_q16)
-        self.pll(*park(*self.e, *sincos(self.rho // WORD)), inv_kfi)
-        self.follow()
+        self.pll(*park(*self.e, *self.own), inv_kfi)
+        self.settle()
 
     def tick_closed(self, now, ls_q16, inv_kfi, frame):
         """In the control frame of this sample, turned back by half a step to the middle of the last period."""
         self.back_emf(now, ls_q16)
         d, q = park(*self.e, *frame)
         self.pll(s16(d - share(q, self.half_step)), s16(q + share(d, self.half_step)), inv_kfi)
-        self.follow()
+        self.settle()
 
     def commanded(self, v):
         self.v = [self.v[1], tuple(v)]
@@ -554,20 +567,24 @@ class EstimatorReal:
     """The same equations in float64 and SI units, with exact rotations."""
     m: Machine
     kfilter_esdq: float = 1200 / 32768
-    history: list = field(default_factory=lambda: [0j] * 8)
+    history: list = field(default_factory=lambda: [0j] * 9)
+    oldest: complex = 0j
     v: list = field(default_factory=lambda: [0j] * 2)
     e_dq: complex = 0j
     omega: float = 0.0     # electrical rpm
     filtered: float = 0.0
     rho: float = 0.0       # turns, not wrapped
     frame: float = 0.0     # turns: angle of the next sample
+    own: float = 0.0       # turns: the estimator's own frame for two periods
+    sign: int = 0
+    periods: int = 0
 
     def tick(self, i, inv_kphi_ratio, closed):
         m, rad = self.m, 2 * math.pi
         step = self.omega * m.turns_per_erpm  # turns a period
         if abs(self.filtered) < m.eight_samples_erpm:
             limit = m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
-            change = i - self.history[0]
+            change = i - self.oldest
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
             change *= cmath.rect(1.0, clamp(3.5 * self.filtered * m.turns_per_erpm * rad, -0.5, 0.5))
         else:
@@ -576,15 +593,26 @@ class EstimatorReal:
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit))
         e = sum(self.v) / 2 - m.rs_ohm * (i + self.history[-1]) / 2 - m.ls_h / m.period_s * change
         self.history = self.history[1:] + [i]
-        e_dq = e * cmath.rect(1.0, -rad * ((self.frame - step / 2) if closed else self.rho))
+        e_dq = e * cmath.rect(1.0, -rad * ((self.frame - step / 2) if closed else self.own))
         self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
-        decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
-        total = self.e_dq.imag - self.e_dq.real if decides >= 0 else self.e_dq.imag + self.e_dq.real
+        total = self.e_dq.imag - self.sign * self.e_dq.real
         per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
         self.omega = clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
         self.rho += self.omega * m.turns_per_erpm
-        self.filtered += m.kfilter_velestim / 32768 * (self.omega - self.filtered)
         self.frame = self.rho + self.omega * m.turns_per_erpm / 2
+        self.settle()
+
+    def settle(self):
+        """After every second period."""
+        m = self.m
+        self.periods += 1
+        if self.periods % 2:
+            return
+        self.oldest = 0.75 * self.history[-7] + 0.25 * self.history[-9]
+        self.filtered += (1 - (1 - m.kfilter_velestim / 32768) ** 2) * (self.omega - self.filtered)
+        self.own = self.frame
+        decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
+        self.sign = 1 if decides >= 0 else -1
 
     def commanded(self, v):
         self.v = [self.v[1], v]
@@ -871,9 +899,10 @@ class ObserverReal(Observer):
 
 # ---- start ----------------------------------------------------------------------------------------------------------
 
-def forced_angle(rate_q10, end_q10, direction, speed_q10, angle_q32):
-    """One period of the start ramp: counts/1024 per period, angle in 2^-32 turns (2^-16 counts)."""
-    speed = min(speed_q10 + rate_q10, end_q10)
+def forced_angle(rate_q10, end_q10, direction, speed_q10, angle_q32, tick):
+    """One period of the start ramp, ticks 1, 2, ...: counts/1024 per period, angle in 2^-32 turns (2^-16 counts). The speed grows before every odd
+    tick, for two periods."""
+    speed = min(speed_q10 + 2 * rate_q10, end_q10) if tick % 2 else speed_q10
     return speed, (angle_q32 + direction * speed * 64) % (1 << 32), int(speed == end_q10)
 
 

@@ -63,7 +63,9 @@ static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
         drive_tick(&drive, &params, &samples, &out.duty);
-        drive_slow(&drive, &params, &samples);
+        if (drive_slow_is_due(&drive)) {
+            drive_slow(&drive, &params, &samples);
+        }
         out.outputs = drive_outputs(&drive);
         if (drive_settle(&drive)) {
             out.outputs = (uint16_t)OUTPUTS_OFF;
@@ -135,10 +137,17 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     speed_follow(&drive.run, &params);
 }
 
-/** Counter of the slow steps brought to a value, so that the next tick runs the block of `slot`. */
-static inline void rig_next_slot(uint16_t slot)
+/** Counter of the periods brought to a value, so that the next tick runs this quarter of the slow work. */
+static inline void rig_next_quarter(uint16_t quarter)
 {
-    drive.ticks = (uint16_t)((drive.ticks & ~7u) + slot - 1u);
+    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_PHASES - 1u)) + SLOW_EVERY * quarter - 1u);
+}
+
+/** This quarter of the slow work alone, without the period before it. */
+static inline void rig_slow(uint16_t quarter)
+{
+    drive.ticks = (uint16_t)(SLOW_PHASES + SLOW_EVERY * quarter);
+    drive_slow(&drive, &params, &samples);
 }
 
 #endif
