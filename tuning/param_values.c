@@ -61,8 +61,10 @@ static void estimator(void)
     GROUP("estimator");
     FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle a period");
     FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0 / SPEED_UNIT, "Q16 rad/erpm", "half of it");
-    FIELD(estimator.d_ilimit_ls_q14, least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A", "D_ILIMIT_LS: change in eight periods");
-    FIELD(estimator.d_ilimit_hs_q14, most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A", "D_ILIMIT_HS: change in a period");
+    FIELD(estimator.d_ilimit_ls_q14, PARAM_LDI_LS_SHARE * least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A",
+          "change in eight periods: D_ILIMIT_LS, or what the format leaves of it");
+    FIELD(estimator.d_ilimit_hs_q14, PARAM_LDI_SHARE * most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A",
+          "change in a period: D_ILIMIT_HS, or what the format leaves of it");
     MACRO(D_ILIMIT_LS, least * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
     MACRO(D_ILIMIT_HS, most * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
     FIELD(fieldweak.kfilter_esdq_q16, filter_hz(KFILTER_ESDQ), "Hz", 0.0, "Q16 a period", "Equation 7");
@@ -132,7 +134,7 @@ static void observer(void)
     FIELD(adaptation.kfi_least, -0.30, "1", 1.0 / 32768.0, "Q15", "least change of 1/Kphi");
     FIELD(adaptation.kfi_most, 0.35, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.rs_least, -0.4, "1", 1.0 / 32768.0, "Q15", "least change of R");
-    FIELD(adaptation.rs_most, 0.6, "1", 1.0 / 32768.0, "Q15", "largest");
+    FIELD(adaptation.rs_most, PARAM_RS_MOST, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.emf_least_q12, 0.2 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "back-EMF from which it learns");
     FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a / erpm / 65536.0, "Q16 Q13 A/erpm",
           "q current that the sample misses");
@@ -178,7 +180,7 @@ static void limits(void)
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
     FIELD(stall_steps, PARAM_STALL_SEC, "s", slots, "8 periods", "stall");
-    FIELD(lost_lock_steps, 0.05, "s", slots, "8 periods", "lost lock");
+    FIELD(lost_lock_steps, 0.06, "s", slots, "8 periods", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "8 periods", "voltages and currents do not fit the motor");
     FIELD(impossible_steps, 0.25, "s", slots, "8 periods", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");

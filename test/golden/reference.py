@@ -200,6 +200,8 @@ class Machine:
     window_s: float = 1.6e-6
     peak_current_a: float = 4.4     # of 32768 counts
     maximum_current_a: float = 2.75
+    over_current_a: float = 3.8
+    over_voltage_v: float = 34.0
     nominal_rpm: float = 2800.0
     maximum_rpm: float = 5500.0
     kfilter_velestim: int = 748
@@ -247,6 +249,33 @@ class Machine:
         return self.kphi / SQRT3 / (1000 * 2 * math.pi / 60) / self.pole_pairs
 
     @property
+    def fastest_rpm(self):
+        return max(self.maximum_rpm, 1.5 * self.nominal_rpm)
+
+    @property
+    def shares(self):
+        """In volts: what 99 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
+        room = 0.99 * 131068 * self.u0 - self.over_voltage_v / SQRT3
+        return room, 2 / SQRT3 * self.over_current_a * self.rs_ohm, \
+            1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
+
+    @property
+    def ldi_share(self):
+        """What is left of L di/dt with R as large as the adaptation makes it, three quarters at least."""
+        room, ri, ldi = self.shares
+        return clamp((room - 1.6 * ri) / ldi, 0.75, 1)
+
+    @property
+    def ldi_ls_share(self):
+        return min(self.ldi_share * self.fastest_rpm / (1.5 * self.nominal_rpm), 1)
+
+    @property
+    def rs_end(self):
+        """How far R may grow in what is left beside that."""
+        room, ri, ldi = self.shares
+        return (room - self.ldi_share * ldi) / ri
+
+    @property
     def lost_current(self):
         """Phase current (Q13) that half the bus takes back within the dead time: below it less voltage is lost."""
         return self.bus_v / 2 * self.dead_time_s / self.ls_h / self.i0 / 4
@@ -282,8 +311,8 @@ class Machine:
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
-            "d_ilimit_ls_q14": min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
-            "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
+            "d_ilimit_ls_q14": nearest(self.ldi_ls_share * min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383)),
+            "d_ilimit_hs_q14": nearest(self.ldi_share * min(nearest(self.current_step(self.maximum_rpm) / 2), 4095)),
             "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
             "kfilter_velestim_q16": nearest((1 - (1 - self.kfilter_velestim / 32768) ** 2) * WORD),
@@ -317,7 +346,7 @@ class Machine:
         return {
             "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
             "rs_most": q15(0.6), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
-            "rs_base_q16": e["rs_q16"],
+            "rs_base_q16": e["rs_q16"], "rs_end_q16": min(int(self.rs_end * e["rs_q16"]), 65535),
         }
 
     def modulator(self):
@@ -474,6 +503,7 @@ class Estimator:
     e_d: int = 0
     e_q: int = 0
     omega: int = 0
+    before: int = 0     # omega of the period before
     filtered: int = 0
     rho: int = 0        # modulo 2^32
     step: int = 0       # of a period, 2^32 = a turn
@@ -521,7 +551,7 @@ class Estimator:
         d, q = upper(self.e_d), upper(self.e_q)
         most = emf_sum_max(inv_kfi)
         total = clamp(s16(q - self.sign * d), -most, most)
-        self.omega = s16(total * inv_kfi // 2048)
+        self.before, self.omega = self.omega, s16(total * inv_kfi // 2048)
         self.step = self.omega * p["deltat_q32"]
         self.rho = (self.rho + self.step) % (1 << 32)
         self.half_step = share(self.omega, p["half_step_q16_rad"])
@@ -533,7 +563,7 @@ class Estimator:
         if self.periods % 2:
             return
         self.oldest = tuple(s16(six - six // 4 + eight // 4) for six, eight in zip(self.history[-7], self.history[-9]))
-        self.filtered = lowpass(self.filtered, self.omega, self.p["kfilter_velestim_q16"])
+        self.filtered = lowpass(self.filtered, (self.omega + self.before) // 2, self.p["kfilter_velestim_q16"])
         self.own = sincos(self.next_angle())
         self.follow()
 
@@ -572,6 +602,7 @@ class EstimatorReal:
     v: list = field(default_factory=lambda: [0j] * 2)
     e_dq: complex = 0j
     omega: float = 0.0     # electrical rpm
+    before: float = 0.0
     filtered: float = 0.0
     rho: float = 0.0       # turns, not wrapped
     frame: float = 0.0     # turns: angle of the next sample
@@ -583,12 +614,12 @@ class EstimatorReal:
         m, rad = self.m, 2 * math.pi
         step = self.omega * m.turns_per_erpm  # turns a period
         if abs(self.filtered) < m.eight_samples_erpm:
-            limit = m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
+            limit = m.ldi_ls_share * m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
             change = i - self.oldest
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
             change *= cmath.rect(1.0, clamp(3.5 * self.filtered * m.turns_per_erpm * rad, -0.5, 0.5))
         else:
-            limit = m.current_step(m.maximum_rpm) * m.i0
+            limit = m.ldi_share * m.current_step(m.maximum_rpm) * m.i0
             change = i - self.history[-1]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit))
         e = sum(self.v) / 2 - m.rs_ohm * (i + self.history[-1]) / 2 - m.ls_h / m.period_s * change
@@ -597,7 +628,7 @@ class EstimatorReal:
         self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
         total = self.e_dq.imag - self.sign * self.e_dq.real
         per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
-        self.omega = clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
+        self.before, self.omega = self.omega, clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
         self.rho += self.omega * m.turns_per_erpm
         self.frame = self.rho + self.omega * m.turns_per_erpm / 2
         self.settle()
@@ -609,7 +640,7 @@ class EstimatorReal:
         if self.periods % 2:
             return
         self.oldest = 0.75 * self.history[-7] + 0.25 * self.history[-9]
-        self.filtered += (1 - (1 - m.kfilter_velestim / 32768) ** 2) * (self.omega - self.filtered)
+        self.filtered += (1 - (1 - m.kfilter_velestim / 32768) ** 2) * ((self.omega + self.before) / 2 - self.filtered)
         self.own = self.frame
         decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
         self.sign = 1 if decides >= 0 else -1
@@ -713,7 +744,7 @@ class Adaptation:
     def apply(self, inv_kfi):
         """@param inv_kfi of the table @return 1/Kphi, R and the EMF limit"""
         kfi = clamp(inv_kfi + 2 * share(inv_kfi, upper(self.kfi)), 1024, 32767)
-        rs = min(self.p["rs_base_q16"] + 2 * share(upper(self.rs), self.p["rs_base_q16"]), 65535)
+        rs = min(self.p["rs_base_q16"] + 2 * share(upper(self.rs), self.p["rs_base_q16"]), self.p["rs_end_q16"])
         return kfi, u16(rs), emf_sum_max(kfi)
 
 
@@ -730,7 +761,7 @@ class AdaptationReal(Adaptation):
 
     def apply(self, inv_kfi):
         kfi = clamp(inv_kfi * (1 + self.kfi), 1024, 32767)
-        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), 65535), 32767 * 2048 / max(kfi, 2048)
+        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), self.p["rs_end_q16"]), 32767 * 2048 / max(kfi, 2048)
 
 
 # ---- salient motors -------------------------------------------------------------------------------------------------
