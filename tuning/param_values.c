@@ -48,8 +48,6 @@ static void motor(void)
     MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0 / SPEED_UNIT, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
     FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
     FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
-    FIELD(adaptation.rs_end_q16, at_most(rs * PARAM_RS_END, ohm / 32768.0 * (1 << p.estimator.rs_exp) * 65535.0), "ohm",
-          ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "largest R that the back-EMF's format has room for");
     FIELD(fieldweak.ls_base_q16, ls, "mH", one_ls / 4096.0 * (1 << p.estimator.ls_exp), q16_divided[p.estimator.ls_exp],
           "L of the estimator, eight samples");
     FIELD(estimator.ls_exp, 1 << p.estimator.ls_exp, "1", 0.0, "count", "the product is shifted left by it");
@@ -134,7 +132,7 @@ static void observer(void)
     FIELD(adaptation.kfi_least, -0.30, "1", 1.0 / 32768.0, "Q15", "least change of 1/Kphi");
     FIELD(adaptation.kfi_most, 0.35, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.rs_least, -0.4, "1", 1.0 / 32768.0, "Q15", "least change of R");
-    FIELD(adaptation.rs_most, PARAM_RS_MOST, "1", 1.0 / 32768.0, "Q15", "largest");
+    FIELD(adaptation.rs_most, PARAM_RS_RISES, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.emf_least_q12, 0.2 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "back-EMF from which it learns");
     FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a / erpm / 65536.0, "Q16 Q13 A/erpm",
           "q current that the sample misses");
@@ -185,6 +183,7 @@ static void limits(void)
     FIELD(impossible_steps, 0.25, "s", slots, "8 periods", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
     FIELD(id_off_q13, most / 32.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
+    FIELD(rs_impossible, (PARAM_RS_RISES > 0.99 * PARAM_RS_MOST) ? PARAM_RS_RISES : 1.0, "1", 1.0 / 32768.0, "Q15", "change of R that no winding survives, 1: not told");
     FIELD(rs_off_least, PARAM_R_LEAST - 1.0, "1", 1.0 / 32768.0, "Q15", "so far may R be off");
     FIELD(rs_off_most, PARAM_R_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "upwards");
     FIELD(ls_off, PARAM_L_OFF, "1", 1.0 / 32768.0, "Q15", "and L");

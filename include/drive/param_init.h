@@ -56,10 +56,9 @@
 #define PARAM_ADAPTATION_INIT \
     { \
         .rate_q16 = (int16_t)(6.0F * PARAM_STEP_SEC * 65536.0F + 0.5F), /* 6/s, less where a part of the voltage is R i */ \
-            .kfi_least = Q15(-0.30), .kfi_most = Q15(0.35), .rs_least = Q15(-0.4), .rs_most = Q15(PARAM_RS_MOST), \
+            .kfi_least = Q15(-0.30), .kfi_most = Q15(0.35), .rs_least = Q15(-0.4), .rs_most = Q15(PARAM_RS_RISES), \
         .emf_least_q12 = (int16_t)(0.2F * PARAM_DEAD_TIME_V / NORM_VOLTAGE_CONST / 8.0F), \
-        .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP), \
-        .rs_end_q16 = (uint16_t)PARAM_MIN(PARAM_RS_END * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP), 65535.0F) \
+        .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
     }
 
 #define PARAM_OBSERVER_INIT \
@@ -145,6 +144,7 @@
         .impossible_steps = PARAM_SLOW_STEPS(0.25F), \
         .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
         .id_off_q13 = CURRENT_Q13(PARAM_ID_OFF), \
+        .rs_impossible = (PARAM_RS_RISES > 0.99F * PARAM_F(PARAM_RS_MOST)) ? Q15(PARAM_RS_RISES) : INT16_MAX, \
         .rs_off_least = Q15(PARAM_R_LEAST - 1.0), \
         .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
         .ls_off = Q15(PARAM_L_OFF), \

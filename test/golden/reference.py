@@ -345,8 +345,8 @@ class Machine:
         e = self.estimator()
         return {
             "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
-            "rs_most": q15(0.6), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
-            "rs_base_q16": e["rs_q16"], "rs_end_q16": min(int(self.rs_end * e["rs_q16"]), 65535),
+            "rs_most": q15(min(0.6, self.rs_end - 1)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
+            "rs_base_q16": e["rs_q16"],
         }
 
     def modulator(self):
@@ -744,7 +744,7 @@ class Adaptation:
     def apply(self, inv_kfi):
         """@param inv_kfi of the table @return 1/Kphi, R and the EMF limit"""
         kfi = clamp(inv_kfi + 2 * share(inv_kfi, upper(self.kfi)), 1024, 32767)
-        rs = min(self.p["rs_base_q16"] + 2 * share(upper(self.rs), self.p["rs_base_q16"]), self.p["rs_end_q16"])
+        rs = min(self.p["rs_base_q16"] + 2 * share(upper(self.rs), self.p["rs_base_q16"]), 65535)
         return kfi, u16(rs), emf_sum_max(kfi)
 
 
@@ -761,7 +761,7 @@ class AdaptationReal(Adaptation):
 
     def apply(self, inv_kfi):
         kfi = clamp(inv_kfi * (1 + self.kfi), 1024, 32767)
-        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), self.p["rs_end_q16"]), 32767 * 2048 / max(kfi, 2048)
+        return kfi, min(self.p["rs_base_q16"] * (1 + self.rs), 65535), 32767 * 2048 / max(kfi, 2048)
 
 
 # ---- salient motors -------------------------------------------------------------------------------------------------

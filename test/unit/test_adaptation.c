@@ -14,7 +14,7 @@ void setUp(void)
 {
     static const adaptation_params_t p = {
         GOLDEN_ADAPTATION_STEP_RATE_Q16, GOLDEN_ADAPTATION_STEP_KFI_LEAST, GOLDEN_ADAPTATION_STEP_KFI_MOST, GOLDEN_ADAPTATION_STEP_RS_LEAST,
-        GOLDEN_ADAPTATION_STEP_RS_MOST, GOLDEN_ADAPTATION_STEP_EMF_LEAST_Q12, GOLDEN_ADAPTATION_STEP_RS_BASE_Q16, GOLDEN_ADAPTATION_STEP_RS_END_Q16
+        GOLDEN_ADAPTATION_STEP_RS_MOST, GOLDEN_ADAPTATION_STEP_EMF_LEAST_Q12, GOLDEN_ADAPTATION_STEP_RS_BASE_Q16
     };
     static const adaptation_t zero;
     params = p;
@@ -206,16 +206,6 @@ void test_changes_are_bounded(void)
 
 /* ---- the model ---- */
 
-void test_resistance_ends_where_the_back_emf_has_room_for_it(void)
-{
-    static const uint16_t cases[][2] = { { 28940u, 28940u }, { 31000u, 31000u }, { 37619u, 37619u }, { 37620u, 37620u }, { 37621u, 37620u }, { 65535u, 37620u } };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        learnt.rs_q31 = INT32_C(9830) * 65536; /* 28940 (1 + 0.3) */
-        params.rs_end_q16 = cases[n][0];
-        TEST_ASSERT_EQUAL_UINT16(cases[n][1], model_of(7956).rs_q16);
-    }
-}
-
 void test_model_gets_what_was_learnt_within_its_formats_and_keeps_the_rest(void)
 {
     static const struct {
@@ -242,7 +232,6 @@ void test_model_gets_what_was_learnt_within_its_formats_and_keeps_the_rest(void)
         learnt.kfi_q31 = cases[n].kfi * INT32_C(65536);
         learnt.rs_q31 = cases[n].rs * INT32_C(65536);
         params.rs_base_q16 = cases[n].rs_base;
-        params.rs_end_q16 = 65535u;
         model = model_of(cases[n].inv_kfi);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].inv_kfi_after, model.inv_kfi, cases[n].what);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].rs_after, model.rs_q16, cases[n].what);

@@ -314,7 +314,6 @@ void test_adaptation(void)
     EXACT(p.kfi_most, GOLDEN_PARAMS_ADAPTATION_KFI_MOST);
     EXACT(p.rs_least, GOLDEN_PARAMS_ADAPTATION_RS_LEAST);
     EXACT(p.rs_most, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
-    NEAR(p.rs_end_q16, GOLDEN_PARAMS_ADAPTATION_RS_END_Q16, 2); /* single precision */
     EXACT(p.emf_least_q12, GOLDEN_PARAMS_ADAPTATION_EMF_LEAST_Q12);
 }
 
@@ -324,9 +323,11 @@ void test_with_a_high_trip_level_resistance_and_derivative_share_the_back_emf_s_
 #define OVER_CURRENT_THRESHOLD_A 5.0
     static const adaptation_params_t p = PARAM_ADAPTATION_INIT;
     static const estimator_params_t e = PARAM_ESTIMATOR_INIT;
-    NEAR(p.rs_end_q16, GOLDEN_PARAMS_TIGHT_RS_END_Q16, 2);
+    static const drive_params_t d = DRIVE_PARAMS_INIT;
+    NEAR(p.rs_most, GOLDEN_PARAMS_TIGHT_RS_MOST, 1); /* single precision */
+    EXACT(d.rs_impossible, INT16_MAX);
     EXACT(e.d_ilimit_hs_q14, GOLDEN_PARAMS_TIGHT_D_ILIMIT_HS_Q14);
-    TEST_ASSERT_TRUE(p.rs_end_q16 >= p.rs_base_q16 && p.rs_end_q16 < GOLDEN_PARAMS_ADAPTATION_RS_END_Q16);
+    TEST_ASSERT_TRUE(p.rs_most >= 0 && p.rs_most < GOLDEN_PARAMS_ADAPTATION_RS_MOST);
 #undef OVER_CURRENT_THRESHOLD_A
 #define OVER_CURRENT_THRESHOLD_A 3.8
 }
