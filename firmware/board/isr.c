@@ -26,21 +26,25 @@ void BOARD_ISR _StackError(void);
 void BOARD_ISR _MathError(void);
 void BOARD_ISR _DefaultInterrupt(void);
 
-QM_INLINE void board_set_outputs(uint16_t outputs)
+/** Where the bridge does not switch. */
+QM_INLINE void board_set_idle_outputs(uint16_t outputs)
 {
     uint16_t override = BOARD_OUTPUTS_OFF;
-    if (outputs == (uint16_t)OUTPUTS_PWM) {
-        override = BOARD_OUTPUTS_PWM;
-    } else if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) {
+    if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) {
         override = BOARD_OUTPUTS_BOOTSTRAP;
-    } else {
-        /* off */
     }
     P1OVDCON = override;
 }
 
-/* What looks at each period itself. */
-#define BOARD_SLOW_EVERY_PERIOD (SCOPE || MODE_RECORDS)
+/** 1 in the periods with the bridge switching that slow work follows: scope and SNAPSHOT look at each. */
+QM_INLINE uint16_t board_slow_is_due(void)
+{
+#if SCOPE || MODE_RECORDS
+    return 1;
+#else
+    return drive_slow_is_due(&board_drive);
+#endif
+}
 
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
@@ -50,11 +54,12 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
     duties_t duty;
+    uint16_t switches;
 
     IFS0bits.AD1IF = 0;
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
-    drive_tick(&board_drive, &board_params, &raw, &duty);
+    switches = drive_tick(&board_drive, &board_params, &raw, &duty);
     P1DC1 = duty.a;
     P1DC2 = duty.b;
     P1DC3 = duty.c;
@@ -64,11 +69,15 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
         P1OVDCON = BOARD_OUTPUTS_OFF;
         IFS0bits.T2IF = 1;
     }
-    if (board_drive.fault != (uint16_t)FAULT_NONE) {
-        P1OVDCON = BOARD_OUTPUTS_OFF;
-    }
-    if (BOARD_SLOW_EVERY_PERIOD || drive_slow_is_due(&board_drive)) {
+    if (!switches) {
+        if (board_drive.fault != (uint16_t)FAULT_NONE) {
+            P1OVDCON = BOARD_OUTPUTS_OFF;
+        }
         IFS0bits.T2IF = 1;
+    } else if (board_slow_is_due()) {
+        IFS0bits.T2IF = 1;
+    } else {
+        /* the next period raises it */
     }
 }
 
@@ -77,7 +86,7 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 void BOARD_ISR _T2Interrupt(void)
 {
     drive_samples_t raw;
-    uint16_t before, after;
+    uint16_t switched;
 
     if (board_is_late) {
         board_is_late = 0;
@@ -87,11 +96,14 @@ void BOARD_ISR _T2Interrupt(void)
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
     board_panel.pot_q15 = (int16_t)ADC1BUF0;
-    before = drive_outputs(&board_drive);
+    switched = drive_is_running(&board_drive);
     drive_slow(&board_drive, &board_params, &raw);
-    after = drive_outputs(&board_drive);
-    if (after != (uint16_t)OUTPUTS_PWM || before == (uint16_t)OUTPUTS_PWM) { /* the bridge begins to switch when its first duties are written */
-        board_set_outputs(after);
+    if (!drive_is_running(&board_drive)) {
+        board_set_idle_outputs(drive_outputs(&board_drive));
+    } else if (switched) {
+        P1OVDCON = BOARD_OUTPUTS_PWM;
+    } else {
+        /* the bridge begins to switch when its first duties are written */
     }
     if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */
         pwm_outputs_off();

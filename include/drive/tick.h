@@ -55,21 +55,23 @@ QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
     d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
 }
 
-/** One PWM period up to the duties; after it, where drive_slow_is_due(), drive_slow(), which has no deadline, drive_outputs(), and last
+/** One PWM period up to the duties; after it, where drive_slow_is_due() or the bridge does not switch, drive_slow(), which has no deadline, drive_outputs(), and last
  *  drive_settle().
  *  @param raw the converter's results at the centre of the low sides' conduction
- *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch */
-QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
+ *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch
+ *  @return 1 where it does */
+QM_INLINE uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
     d->ticks = (uint16_t)(d->ticks + 1u);
     drive_measure(d, p, raw);
     if (drive_is_running(d) && !protection_check_current(d, p)) { /* before the law: its formats end above the trip level */
         MODE_RUN(d, p, duty);
-    } else {
-        duty->a = 0;
-        duty->b = 0;
-        duty->c = 0;
+        return 1;
     }
+    duty->a = 0;
+    duty->b = 0;
+    duty->c = 0;
+    return 0;
 }
 
 /** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every eighth period. */
@@ -98,13 +100,21 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/* wcet: idle_step excludes estimator_settle speed_step speed_choose_state protection_check_signals protection_probe_rotor */
+/* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn */
 /** First of the slow work: what a period with the bridge off is. */
 QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     if (!drive_is_running(d)) {
         mode_idle(d);
         idle_step(d, p, raw->i_a, raw->i_b);
+    }
+}
+
+/** What the estimator's last two periods leave to be done. @param was_running the law has run in them; the modes of their own have no estimator */
+QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_running)
+{
+    if (was_running && MODE_ALIGNS) {
+        estimator_settle(&d->run.estimator, &p->estimator);
     }
 }
 
@@ -169,10 +179,10 @@ QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_sa
     SELFTEST_MARK(d, done);
 }
 
-/** 1 in the periods that slow work follows: every second one, and with the bridge off each. */
+/** 1 in the periods that slow work follows while the bridge switches, every second one. With the bridge off it follows each. */
 QM_INLINE uint16_t drive_slow_is_due(const drive_t *d)
 {
-    return (uint16_t)((d->ticks & (SLOW_EVERY - 1u)) == 0u || !drive_is_running(d));
+    return (uint16_t)((d->ticks & (SLOW_EVERY - 1u)) == 0u);
 }
 
 /** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
@@ -182,12 +192,10 @@ QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_sampl
     uint16_t was_running = drive_is_running(d);
 
     drive_rest(d, p, raw);
-    if ((d->ticks & (SLOW_EVERY - 1u)) != 0u) {
+    if (!drive_slow_is_due(d)) {
         return;
     }
-    if (MODE_ALIGNS && was_running) {
-        estimator_settle(&d->run.estimator, &p->estimator);
-    }
+    drive_follow(d, p, was_running);
     drive_quarter(d, p, raw);
     if (MODE_ALIGNS && drive_is_running(d)) {
         drive_prepare(d, p);

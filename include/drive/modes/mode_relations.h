@@ -2,6 +2,8 @@
 #ifndef DRIVE_MODES_MODE_RELATIONS_H
 #define DRIVE_MODES_MODE_RELATIONS_H
 
+#include "drive/param_scaling.h" /* userparams.h may define the mode */
+
 /** X(condition, message): as PARAM_RELATION_TABLE, for the mode that is switched on. */
 #ifdef BRINGUP
 #define MODE_RELATION_TABLE(X) \
