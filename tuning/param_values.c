@@ -48,8 +48,8 @@ static void motor(void)
     MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0 / SPEED_UNIT, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
     FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
     FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
-    FIELD(adaptation.rs_end_q16, at_most(rs * PARAM_RS_END, ohm / 32768.0 * (1 << p.estimator.rs_exp) * 65535.0), "ohm",
-          ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "largest R that the back-EMF's format has room for");
+    FIELD(estimator.resistive_max_q13, 2.0 / sqrt(3.0) * OVER_CURRENT_THRESHOLD_A * rs, "V", 4.0 * volt * (1 << p.estimator.rs_exp), "Q13 V",
+          "largest R i, at the trip level");
     FIELD(fieldweak.ls_base_q16, ls, "mH", one_ls / 4096.0 * (1 << p.estimator.ls_exp), q16_divided[p.estimator.ls_exp],
           "L of the estimator, eight samples");
     FIELD(estimator.ls_exp, 1 << p.estimator.ls_exp, "1", 0.0, "count", "the product is shifted left by it");

@@ -18,7 +18,6 @@ typedef struct {
     q15_t rs_least, rs_most;   /**< and of R, above -1 */
     int16_t emf_least_q12;     /**< no information below, at least 1 */
     uint16_t rs_base_q16;      /**< R of the header, see motor_model_t */
-    uint16_t rs_end_q16;       /**< largest R for which the back-EMF's format has room at the trip level */
 } adaptation_params_t;
 
 /** State: changes against the header, Q31. */
@@ -66,7 +65,7 @@ QM_INLINE void adaptation_apply(const adaptation_t *a, const adaptation_params_t
     int32_t kfi = (int32_t)model->inv_kfi + 2 * (int32_t)qm_mulhi(model->inv_kfi, qm_hi(a->kfi_q31));
     int32_t rs = (int32_t)p->rs_base_q16 + 2 * (int32_t)qm_mulhi_su(qm_hi(a->rs_q31), p->rs_base_q16);
     model->inv_kfi = adaptation_kfi(kfi);
-    model->rs_q16 = (rs > (int32_t)p->rs_end_q16) ? p->rs_end_q16 : (uint16_t)rs;
+    model->rs_q16 = (uint16_t)((rs > 65535) ? 65535 : rs);
     /* below 2048 no sum is too large: 1/Kphi of a slow motor */
     model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)((model->inv_kfi < 2048) ? 2048 : model->inv_kfi));
 }

@@ -18,6 +18,9 @@
     { \
         .rs_exp = PARAM_RS_EXP, \
         .ls_exp = PARAM_LS_EXP, \
+        .resistive_max_q13 = (int16_t)(2.0F / PARAM_SQRT3 * CURRENT_Q14_F(OVER_CURRENT_THRESHOLD_A) \
+                                           * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) / 65536.0F \
+                                       + 0.5F), \
         .d_ilimit_ls_q14 = D_ILIMIT_LS_Q14, \
         .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
@@ -58,8 +61,7 @@
         .rate_q16 = (int16_t)(6.0F * PARAM_STEP_SEC * 65536.0F + 0.5F), /* 6/s, less where a part of the voltage is R i */ \
             .kfi_least = Q15(-0.30), .kfi_most = Q15(0.35), .rs_least = Q15(-0.4), .rs_most = Q15(0.6), \
         .emf_least_q12 = (int16_t)(0.2F * PARAM_DEAD_TIME_V / NORM_VOLTAGE_CONST / 8.0F), \
-        .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP), \
-        .rs_end_q16 = (uint16_t)PARAM_MIN(PARAM_RS_END * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP), 65535.0F) \
+        .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
     }
 
 #define PARAM_OBSERVER_INIT \

@@ -80,15 +80,11 @@
 #define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in AN1292's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
 
-#define PARAM_TRIP_RI_V (2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM)) /* of an axis */
 /** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format.
  *  LS_OVER2LS0 may raise Ls by 1.2; below nominal speed turning the old difference forward may lengthen an axis by 1.5. */
-#define PARAM_EMF_MAX_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3 + PARAM_TRIP_RI_V \
+#define PARAM_EMF_MAX_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3 + 2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM) \
                          + 2.0F * PARAM_PI / 60.0F * PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM)) \
                                * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
-#define PARAM_EMF_END_V (0.99F * 131068.0F * NORM_VOLTAGE_CONST)
-/** By what factor the adaptation may raise R before the format ends. */
-#define PARAM_RS_END (1.0F + (PARAM_EMF_END_V - PARAM_EMF_MAX_V) / PARAM_TRIP_RI_V)
 
 /* ---- Controllers: gains in AN1292's units (gain/16 and per-period integral, in full scales) from bandwidths.
  *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, and the load observer.
