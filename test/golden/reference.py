@@ -474,6 +474,7 @@ class Estimator:
     e_d: int = 0
     e_q: int = 0
     omega: int = 0
+    before: int = 0     # omega of the period before
     filtered: int = 0
     rho: int = 0        # modulo 2^32
     step: int = 0       # of a period, 2^32 = a turn
@@ -521,19 +522,19 @@ class Estimator:
         d, q = upper(self.e_d), upper(self.e_q)
         most = emf_sum_max(inv_kfi)
         total = clamp(s16(q - self.sign * d), -most, most)
-        self.omega = s16(total * inv_kfi // 2048)
+        self.before, self.omega = self.omega, s16(total * inv_kfi // 2048)
         self.step = self.omega * p["deltat_q32"]
         self.rho = (self.rho + self.step) % (1 << 32)
         self.half_step = share(self.omega, p["half_step_q16_rad"])
 
     def settle(self):
-        """After every second period: the filtered speed, the current of 6.5 periods ago, which is eight before the next two in their mean, and the
+        """After every second period: the filtered speed of the two periods' mean, the current of 6.5 periods ago, which is eight before the next two in their mean, and the
         frame of the next two."""
         self.periods += 1
         if self.periods % 2:
             return
         self.oldest = tuple(s16(six - six // 4 + eight // 4) for six, eight in zip(self.history[-7], self.history[-9]))
-        self.filtered = lowpass(self.filtered, self.omega, self.p["kfilter_velestim_q16"])
+        self.filtered = lowpass(self.filtered, (self.omega + self.before) // 2, self.p["kfilter_velestim_q16"])
         self.own = sincos(self.next_angle())
         self.follow()
 
@@ -572,6 +573,7 @@ class EstimatorReal:
     v: list = field(default_factory=lambda: [0j] * 2)
     e_dq: complex = 0j
     omega: float = 0.0     # electrical rpm
+    before: float = 0.0    # of the period before
     filtered: float = 0.0
     rho: float = 0.0       # turns, not wrapped
     frame: float = 0.0     # turns: angle of the next sample
@@ -597,6 +599,7 @@ class EstimatorReal:
         self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
         total = self.e_dq.imag - self.sign * self.e_dq.real
         per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
+        self.before = self.omega
         self.omega = clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
         self.rho += self.omega * m.turns_per_erpm
         self.frame = self.rho + self.omega * m.turns_per_erpm / 2
@@ -609,7 +612,7 @@ class EstimatorReal:
         if self.periods % 2:
             return
         self.oldest = 0.75 * self.history[-7] + 0.25 * self.history[-9]
-        self.filtered += (1 - (1 - m.kfilter_velestim / 32768) ** 2) * (self.omega - self.filtered)
+        self.filtered += (1 - (1 - m.kfilter_velestim / 32768) ** 2) * ((self.omega + self.before) / 2 - self.filtered)
         self.own = self.frame
         decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
         self.sign = 1 if decides >= 0 else -1

@@ -23,7 +23,7 @@ static void maybe_trap(void)
 /* The real tick, with what the hardware may do meanwhile behind it. */
 static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick;
 
-static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
+static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
 static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 #define drive_tick(d, p, raw, duty) tick_and_meanwhile(d, p, raw, duty)
 #define drive_slow(d, p, raw) slow_and_look(d, p, raw)
@@ -45,8 +45,9 @@ static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_sampl
     drive_slow(d, p, raw);
 }
 
-static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
+static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
+    uint16_t switches;
     flag_during_tick = IFS0bits.AD1IF;
     if (slow_work_waits) {
         IFS0bits.T2IF = 1;
@@ -54,11 +55,12 @@ static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_
     if (sample_arrives_meanwhile) {
         IFS0bits.AD1IF = 1;
     }
-    drive_tick(d, p, raw, duty);
+    switches = drive_tick(d, p, raw, duty);
     if (trap_comes_meanwhile) {
         trap_comes_meanwhile = 0;
         _MathError();
     }
+    return switches;
 }
 
 #include "interrupts.h"

@@ -62,8 +62,7 @@ static inline void rig_currents(int16_t a_q13, int16_t b_q13)
 static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
-        drive_tick(&drive, &params, &samples, &out.duty);
-        if (drive_slow_is_due(&drive)) {
+        if (!drive_tick(&drive, &params, &samples, &out.duty) || drive_slow_is_due(&drive)) {
             drive_slow(&drive, &params, &samples);
         }
         out.outputs = drive_outputs(&drive);
@@ -120,6 +119,7 @@ static inline void rig_speed(int16_t speed_erpm)
     drive.run.observer.omega_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_erpm = speed_erpm; /* as steady as it is filtered */
+    drive.run.estimator.omega_before_erpm = speed_erpm;
 }
 
 /** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
