@@ -114,7 +114,10 @@ void BOARD_ISR _T2Interrupt(void)
 #if SCOPE
     scope_tick(&board_lnet.scope, board_scope_array);
 #endif
-    IFS0bits.T2IF = 0; /* last: as long as it is set the work is not done */
+    IFS0bits.T2IF = 0;   /* last: as long as it is set the work is not done */
+    if (board_is_late) { /* a control interrupt meanwhile: its flag is gone with the own one */
+        IFS0bits.T2IF = 1;
+    }
 }
 
 /** The board's comparator: the PWM module has already switched the outputs off. */

@@ -332,6 +332,7 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         TEST_ASSERT_EQUAL_INT16(0, drive.run.control.burn_q13);
         TEST_ASSERT_EQUAL_INT16(-direction, drive.direction);
         TEST_ASSERT_INT32_WITHIN(100, -2400L * 3579 / 64, drive.forced.speed_q10);
+        TEST_ASSERT_EQUAL_HEX32((uint32_t)(-direction * drive.forced.speed_q10 * 64), drive.forced.step_q32); /* of the very next period */
         TEST_ASSERT_EQUAL_INT16(-direction * params.open_loop_q13, drive.run.control.ref_q13.q);
         TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
         TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.is_due);

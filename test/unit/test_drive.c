@@ -106,13 +106,14 @@ void test_a_period_with_the_bridge_off_has_its_own_work_and_every_second_a_quart
 {
     rig_currents(100, 50);
     rig_bus(20.0F);
+    drive.run.estimator.history_q14[0].alpha = 7777;
     for (uint16_t n = 0; n < 32u; n++) {
         int32_t sum_a = drive.calibration.sum_a, bus_q31 = drive.bus_q31;
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
         TEST_ASSERT_TRUE_MESSAGE(sum_a != drive.calibration.sum_a, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(drive.ticks % 8u == 2u, bus_q31 != drive.bus_q31, golden_row(n));
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(0, drive.run.estimator.history_q14[0].alpha, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(7777, drive.run.estimator.history_q14[0].alpha, golden_row(n));
     }
 }
 
@@ -121,7 +122,7 @@ void test_filter_history_and_dead_time_follow_every_second_period_of_the_law(voi
     rig_closed(1, 8000);
     for (uint16_t n = 0; n < 32u; n++) {
         uint16_t even;
-        int16_t newest_q14 = drive.run.estimator.history_q14[0].alpha;
+        int16_t newest = drive.run.estimator.history_q14[0].alpha;
         int32_t filtered_q16 = drive.run.estimator.omega_filtered_q16;
         drive.run.control.ref_q13.q = (int16_t)(2000 + n);
         drive.dead.a = 9999;
@@ -129,7 +130,7 @@ void test_filter_history_and_dead_time_follow_every_second_period_of_the_law(voi
         drive.run.estimator.omega_erpm = (int16_t)(7000 + n);
         rig_tick(1);
         even = (uint16_t)((drive.ticks & 1u) == 0u);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, newest_q14 != drive.run.estimator.history_q14[0].alpha, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, newest != drive.run.estimator.history_q14[0].alpha, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, filtered_q16 != drive.run.estimator.omega_filtered_q16, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, drive.dead.a != 9999, golden_row(n));
     }

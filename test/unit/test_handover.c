@@ -458,6 +458,29 @@ void test_estimated_angle_of_the_next_sample_takes_over_with_its_frame(void)
     TEST_ASSERT_EQUAL_INT16(frame.cos, drive.frame.cos);
 }
 
+void test_period_after_the_hand_over_has_the_dead_time_of_the_new_frame(void)
+{
+    EACH_DIRECTION(direction) {
+        dq_t asked;
+        dead_duties_t expected;
+        at_the_end_of_the_ramp(direction);
+        drive.run.handover.agreed_steps = params.agree_steps;
+        drive.run.handover.is_due = 1;
+        drive.dead = (dead_duties_t){ 0, 0, 0 };
+        drive.angle = 0x1000;
+        drive.run.estimator.next = 0x3000;
+        drive.run.estimator.half_step_q16_rad = (int16_t)(direction * 800);
+        rig_slow(1);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+        asked = dq_turn(drive.run.control.ref_q13, (int16_t)(direction * 3 * 800));
+        expected = svm_compensation(&params.svm, phases_of(asked, trig_sincos(0x3000)));
+        TEST_ASSERT_EQUAL_INT16(expected.a, drive.dead.a);
+        TEST_ASSERT_EQUAL_INT16(expected.b, drive.dead.b);
+        TEST_ASSERT_EQUAL_INT16(expected.c, drive.dead.c);
+        TEST_ASSERT_TRUE(drive.dead.a != 0 || drive.dead.b != 0);
+    }
+}
+
 void test_observer_is_preset_once_and_before_the_first_step_of_the_speed_controller(void)
 {
     int16_t held_q13;

@@ -21,7 +21,7 @@ static void maybe_trap(void)
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
-static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick;
+static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick, sample_comes_in_slow_work;
 
 static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
 static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
@@ -43,6 +43,10 @@ static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_sampl
     at_slow.duty_c = P1DC3;
     at_slow.calls++;
     drive_slow(d, p, raw);
+    if (sample_comes_in_slow_work) {
+        sample_comes_in_slow_work = 0;
+        _ADC1Interrupt();
+    }
 }
 
 static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
@@ -96,6 +100,7 @@ void setUp(void)
     slow_work_waits = 0;
     trap_comes_meanwhile = 0;
     trap_comes_in_the_hand_over = 0;
+    sample_comes_in_slow_work = 0;
 }
 
 /** Running: ALIGN has begun. */
@@ -291,6 +296,24 @@ void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
             expect_off(cases[n].fault);
         }
     }
+}
+
+void test_slow_work_that_outlasts_its_period_comes_again_at_once_and_says_so(void)
+{
+    bring_to_align();
+    while (board_drive.ticks % 2u == 0u) {
+        control_interrupts(1);
+    }
+    sample_comes_in_slow_work = 1;
+    _ADC1Interrupt();
+    TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF);
+    _T2Interrupt();
+    TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF); /* raised meanwhile; its own end must not take that back */
+    _T2Interrupt();
+    expect_off(FAULT_ISR_OVERRUN);
+    TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.T2IF);
+    control_interrupts(10);
+    expect_off(FAULT_ISR_OVERRUN);
 }
 
 void test_fault_input_switches_off_and_keeps_its_code_through_later_faults(void)

@@ -237,6 +237,7 @@ void test_speeds_and_times(void)
     EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
     EXACT(p.stall_steps, 575);                           /* 0.23 s */
     EXACT(p.lost_lock_steps, 150);                       /* 60 ms */
+    EXACT(p.rs_impossible, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
 }
 
 void test_controllers(void)
