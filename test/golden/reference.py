@@ -311,8 +311,8 @@ class Machine:
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
-            "d_ilimit_ls_q14": nearest(self.ldi_ls_share * min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383)),
-            "d_ilimit_hs_q14": nearest(self.ldi_share * min(nearest(self.current_step(self.maximum_rpm) / 2), 4095)),
+            "d_ilimit_ls_q14": min(nearest(self.ldi_ls_share * self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
+            "d_ilimit_hs_q14": min(nearest(self.ldi_share * self.current_step(self.maximum_rpm) / 2), 4095),
             "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
             "kfilter_velestim_q16": nearest((1 - (1 - self.kfilter_velestim / 32768) ** 2) * WORD),
