@@ -10,7 +10,6 @@
 typedef struct {
     uint16_t rs_exp;              /**< 0..3, for motors whose Rs does not fit */
     uint16_t ls_exp;              /**< 0..3, the same for Ls */
-    int16_t resistive_max_q13;    /**< limit of Rs i of an axis, Q13 voltage >> rs_exp: what the header's Rs gives at the trip level */
     int16_t d_ilimit_ls_q14;      /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
     int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
     int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and count of speed (NORM_DELTAT, unrounded) */
@@ -111,10 +110,9 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
  *  @return the back-EMF half a period in the past, Q13 */
 QM_INLINE alphabeta_t estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
-    const int16_t most = p->resistive_max_q13; /* the adaptation may raise Rs, but not the format's end */
     alphabeta_t inductive = estimator_inductive(e, p, t, i_q14), e_q13;
-    int16_t resistive_alpha = qm_limit(qm_mulhi_su((int16_t)((i_q14.alpha + e->i_last_q14.alpha) >> 1), t->rs_q16), most);
-    int16_t resistive_beta = qm_limit(qm_mulhi_su((int16_t)((i_q14.beta + e->i_last_q14.beta) >> 1), t->rs_q16), most);
+    int16_t resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + e->i_last_q14.alpha) >> 1), t->rs_q16);
+    int16_t resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + e->i_last_q14.beta) >> 1), t->rs_q16);
 
     e_q13.alpha = (int16_t)(e->v_mean_q13.alpha - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
     e_q13.beta = (int16_t)(e->v_mean_q13.beta - resistive_beta * (1 << p->rs_exp) - inductive.beta);

@@ -692,6 +692,8 @@ def params(v, _):
     v.constants |= {**{f"svm_{name}": value for name, value in m.modulator().items()},
                     **{f"observer_{name}": value for name, value in m.observer().items()},
                     **{f"adaptation_{name}": value for name, value in m.adaptation().items()},
+                    "tight_rs_most": ref.Machine(over_current_a=5.0).adaptation()["rs_most"],
+                    "tight_d_ilimit_hs_q14": ref.Machine(over_current_a=5.0).estimator()["d_ilimit_hs_q14"],
                     "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
                     "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}
 

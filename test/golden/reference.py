@@ -200,6 +200,8 @@ class Machine:
     window_s: float = 1.6e-6
     peak_current_a: float = 4.4     # of 32768 counts
     maximum_current_a: float = 2.75
+    over_current_a: float = 3.8
+    over_voltage_v: float = 34.0
     nominal_rpm: float = 2800.0
     maximum_rpm: float = 5500.0
     kfilter_velestim: int = 748
@@ -247,6 +249,33 @@ class Machine:
         return self.kphi / SQRT3 / (1000 * 2 * math.pi / 60) / self.pole_pairs
 
     @property
+    def fastest_rpm(self):
+        return max(self.maximum_rpm, 1.5 * self.nominal_rpm)
+
+    @property
+    def shares(self):
+        """In volts: what 99 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
+        room = 0.99 * 131068 * self.u0 - self.over_voltage_v / SQRT3
+        return room, 2 / SQRT3 * self.over_current_a * self.rs_ohm, \
+            1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
+
+    @property
+    def ldi_share(self):
+        """What is left of L di/dt with R as large as the adaptation makes it, three quarters at least."""
+        room, ri, ldi = self.shares
+        return clamp((room - 1.6 * ri) / ldi, 0.75, 1)
+
+    @property
+    def ldi_ls_share(self):
+        return min(self.ldi_share * self.fastest_rpm / (1.5 * self.nominal_rpm), 1)
+
+    @property
+    def rs_end(self):
+        """How far R may grow in what is left beside that."""
+        room, ri, ldi = self.shares
+        return (room - self.ldi_share * ldi) / ri
+
+    @property
     def lost_current(self):
         """Phase current (Q13) that half the bus takes back within the dead time: below it less voltage is lost."""
         return self.bus_v / 2 * self.dead_time_s / self.ls_h / self.i0 / 4
@@ -282,8 +311,8 @@ class Machine:
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
-            "d_ilimit_ls_q14": min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
-            "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
+            "d_ilimit_ls_q14": nearest(self.ldi_ls_share * min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383)),
+            "d_ilimit_hs_q14": nearest(self.ldi_share * min(nearest(self.current_step(self.maximum_rpm) / 2), 4095)),
             "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
             "kfilter_velestim_q16": nearest((1 - (1 - self.kfilter_velestim / 32768) ** 2) * WORD),
@@ -316,7 +345,7 @@ class Machine:
         e = self.estimator()
         return {
             "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
-            "rs_most": q15(0.6), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
+            "rs_most": q15(min(0.6, self.rs_end - 1)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
             "rs_base_q16": e["rs_q16"],
         }
 
@@ -528,7 +557,7 @@ class Estimator:
         self.half_step = share(self.omega, p["half_step_q16_rad"])
 
     def settle(self):
-        """After every second period: the filtered speed of the two periods' mean, the current of 6.5 periods ago, which is eight before the next two in their mean, and the
+        """After every second period: the filtered speed, the current of 6.5 periods ago, which is eight before the next two in their mean, and the
         frame of the next two."""
         self.periods += 1
         if self.periods % 2:
@@ -573,7 +602,7 @@ class EstimatorReal:
     v: list = field(default_factory=lambda: [0j] * 2)
     e_dq: complex = 0j
     omega: float = 0.0     # electrical rpm
-    before: float = 0.0    # of the period before
+    before: float = 0.0
     filtered: float = 0.0
     rho: float = 0.0       # turns, not wrapped
     frame: float = 0.0     # turns: angle of the next sample
@@ -585,12 +614,12 @@ class EstimatorReal:
         m, rad = self.m, 2 * math.pi
         step = self.omega * m.turns_per_erpm  # turns a period
         if abs(self.filtered) < m.eight_samples_erpm:
-            limit = m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
+            limit = m.ldi_ls_share * m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
             change = i - self.oldest
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
             change *= cmath.rect(1.0, clamp(3.5 * self.filtered * m.turns_per_erpm * rad, -0.5, 0.5))
         else:
-            limit = m.current_step(m.maximum_rpm) * m.i0
+            limit = m.ldi_share * m.current_step(m.maximum_rpm) * m.i0
             change = i - self.history[-1]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit))
         e = sum(self.v) / 2 - m.rs_ohm * (i + self.history[-1]) / 2 - m.ls_h / m.period_s * change
@@ -599,8 +628,7 @@ class EstimatorReal:
         self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
         total = self.e_dq.imag - self.sign * self.e_dq.real
         per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
-        self.before = self.omega
-        self.omega = clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
+        self.before, self.omega = self.omega, clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
         self.rho += self.omega * m.turns_per_erpm
         self.frame = self.rho + self.omega * m.turns_per_erpm / 2
         self.settle()

@@ -12,7 +12,7 @@ static uint16_t periods;
 void setUp(void)
 {
     static const estimator_params_t p = {
-        .rs_exp = 0, .ls_exp = 0, .resistive_max_q13 = INT16_MAX, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
+        .rs_exp = 0, .ls_exp = 0, .d_ilimit_ls_q14 = 6000, .d_ilimit_hs_q14 = 1000, .deltat_q32 = 3579,
         .half_step_q16_rad = 11244, .kfilter_velestim_q16 = 2958, .nominal_erpm = 14000, .decimate_erpm = 1400
     };
     static const motor_model_t t = {
@@ -86,21 +86,6 @@ void test_acting_voltage_is_the_mean_of_the_last_two_vectors(void)
     expect_emf(1000, -1000);
 }
 
-void test_resistive_drop_ends_at_its_limit_on_each_axis_and_sign(void)
-{
-    tuning.ls_q16 = 0;
-    params.resistive_max_q13 = 1500;
-    back_emf(2000, -4000);
-    back_emf(2000, -4000); /* half of it: 1000 and -2000 */
-    expect_emf(-1000, 1500);
-    back_emf(-4000, 2996);
-    back_emf(-4000, 2996);
-    expect_emf(1500, -1498);
-    params.rs_exp = 1; /* the limit is in the format before it */
-    back_emf(-4000, 2996);
-    expect_emf(3000, -2996);
-}
-
 void test_resistive_drop_is_that_of_the_mean_of_two_currents(void)
 {
     tuning.ls_q16 = 0;
@@ -115,31 +100,6 @@ void test_resistive_drop_is_that_of_the_mean_of_two_currents(void)
     tuning.rs_q16 = 49152u; /* unsigned */
     back_emf(4000, -2000);
     expect_emf(-3000, 1500);
-}
-
-void test_resistive_drop_ends_at_what_the_headers_resistance_gives_at_the_trip_level(void)
-{
-    static const struct {
-        const char *what;
-        int16_t i_alpha, i_beta, e_alpha, e_beta;
-    } cases[] = {
-        { "up to the limit", 6000, -6000, -3000, 3000 },
-        { "beyond", 6004, -12000, -3000, 3000 },
-        { "each axis alone, either sign", -12000, 1000, 3000, -500 },
-        { "beta", 1000, 12000, -500, -3000 },
-    };
-    tuning.ls_q16 = 0;
-    params.resistive_max_q13 = 3000;
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        back_emf(cases[n].i_alpha, cases[n].i_beta);
-        back_emf(cases[n].i_alpha, cases[n].i_beta); /* the mean of two */
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_alpha, e_q13.alpha, cases[n].what);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].e_beta, e_q13.beta, cases[n].what);
-    }
-    params.rs_exp = 1; /* the limit is before the doubling */
-    back_emf(12000, -12000);
-    back_emf(12000, -12000);
-    expect_emf(-6000, 6000);
 }
 
 /* ---- Equation 4: inductance ---- */

@@ -17,7 +17,7 @@ typedef struct {
 
 #define PARAMS(name) \
     { \
-        .rs_exp = GOLDEN_##name##_RS_EXP, .ls_exp = GOLDEN_##name##_LS_EXP, .resistive_max_q13 = INT16_MAX, \
+        .rs_exp = GOLDEN_##name##_RS_EXP, .ls_exp = GOLDEN_##name##_LS_EXP, \
         .d_ilimit_ls_q14 = GOLDEN_##name##_D_ILIMIT_LS_Q14, .d_ilimit_hs_q14 = GOLDEN_##name##_D_ILIMIT_HS_Q14, \
         .deltat_q32 = GOLDEN_##name##_DELTAT_Q32, .half_step_q16_rad = (uint16_t)GOLDEN_##name##_HALF_STEP_Q16_RAD, \
         .kfilter_velestim_q16 = GOLDEN_##name##_KFILTER_VELESTIM_Q16, .nominal_erpm = GOLDEN_##name##_NOMINAL_ERPM, \

@@ -139,7 +139,7 @@ void test_undervoltage_waits_for_a_start_and_comes_before_the_first_pulse(void)
 
 void test_stall_and_lost_lock_are_faults_when_they_last(void)
 {
-    enum { NEVER = 2000, STALL = 576, LOST_LOCK = 63 }; /* 230 ms, 25 ms */
+    enum { NEVER = 2000, STALL = 576, LOST_LOCK = 76 }; /* 230 ms, 30 ms */
     static const struct {
         const char *what;
         int16_t reference_erpm, speed_erpm, e_d, e_q;

@@ -132,7 +132,6 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     drive.run.control.reference_erpm = speed_erpm;
     drive.run.control.ref_q13.q = 0;
     rig_speed(speed_erpm);
-    drive.run.estimator.omega_erpm = speed_erpm;
     drive.run.handover.speed_is_preset = 1;
     speed_follow(&drive.run, &params);
 }
