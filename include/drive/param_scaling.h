@@ -84,7 +84,7 @@
  *  quarter of it; then R rises less, and tells nothing of the winding's temperature. */
 #define PARAM_RS_MOST 0.6
 #define PARAM_LDI_SHARE PARAM_MAX(0.75F, PARAM_MIN(1.0F, (PARAM_EMF_END_V - PARAM_MOST_V - (1.0F + PARAM_F(PARAM_RS_MOST)) * PARAM_TRIP_RI_V) / PARAM_LDI_V))
-#define PARAM_LDI_LS_SHARE PARAM_MIN(1.0F, PARAM_LDI_SHARE * PARAM_FASTEST_RPM / (1.5F * PARAM_F(NOMINAL_SPEED_RPM)))
+#define PARAM_LDI_LS_SHARE PARAM_MIN(1.0F, PARAM_LDI_SHARE *PARAM_FASTEST_RPM / (1.5F * PARAM_F(NOMINAL_SPEED_RPM)))
 #define PARAM_RS_ROOM ((PARAM_EMF_END_V - PARAM_MOST_V - PARAM_LDI_SHARE * PARAM_LDI_V) / PARAM_TRIP_RI_V - 1.0F)
 #define PARAM_RS_RISES PARAM_MIN(PARAM_F(PARAM_RS_MOST), PARAM_RS_ROOM)
 /** Below it the derivative spans eight samples, in which the current turns by 43 degrees at most: AN1292's nominal speed, or less with a long period. */
