@@ -254,8 +254,8 @@ class Machine:
 
     @property
     def shares(self):
-        """In volts: what 99 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
-        room = 0.99 * 131068 * self.u0 - min(self.over_voltage_v, 1.25 * self.bus_v) / SQRT3
+        """In volts: what 98 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
+        room = 0.98 * 131068 * self.u0 - min(self.over_voltage_v, 1.25 * self.bus_v) / SQRT3
         return room, 2 / SQRT3 * self.over_current_a * self.rs_ohm, \
             1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
 
@@ -345,7 +345,7 @@ class Machine:
         e = self.estimator()
         return {
             "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
-            "rs_most": q15(min(0.6, self.rs_end - 1)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
+            "rs_most": q15(clamp(self.rs_end - 1, 0, 0.6)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
             "rs_base_q16": e["rs_q16"],
         }
 

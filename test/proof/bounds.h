@@ -66,7 +66,7 @@ static void set_bounds(void)
     params = from_user;
     alpha_max = (int16_t)(2 * params.overcurrent_q13);
     beta_max = (int16_t)(((int32_t)params.overcurrent_q13 * 18919 >> 13) + 8);
-    radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_over_q15 << params.bus_shift), params.voltage_limit_per_bus_q16);
+    radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_used_q15 << params.bus_shift), params.voltage_limit_per_bus_q16);
     rs_max = largest_rs();
     voltage_max = (int16_t)(radius_max / 2 + radius_max / 64 + 8);
     /* Park halves it; the turn by half a step h to the middle of the period lengthens it by sqrt(1 + h^2) < 1 + h^2 / 2 */
