@@ -73,7 +73,7 @@ class Scales:
     iterm_per_hz: float
     speed_pterm_per_hz: float
     acceleration: float
-    """of a count of current, counts of speed in eight periods"""
+    """of a count of current, counts of speed in a slow step"""
     large_counts: float
     """innovation that the load observer calls large, counts of speed"""
     count_a: float

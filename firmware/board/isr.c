@@ -45,24 +45,57 @@ QM_INLINE void board_set_outputs(uint16_t outputs)
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
 
-/** The control interrupt, 20 kHz, triggered by PWM1 through the ADC: from the samples to the duties. */
+/* Duties that wait for the next period's begin (drive/late.h). */
+__extension__ static duties_t board_waiting[LATE_WAITS];
+
+QM_INLINE void board_write(const duties_t *duty)
+{
+    P1DC1 = duty->a;
+    P1DC2 = duty->b;
+    P1DC3 = duty->c;
+}
+
+/** The duties load when the counter reaches zero. @return 1 once it counts up: too late */
+QM_INLINE uint16_t board_counts_up(void)
+{
+    return (uint16_t)((P1TMR & 0x8000u) == 0u);
+}
+
+/** The bridge is off at once; the slow work says why. */
+QM_INLINE void board_overrun(void)
+{
+    board_is_late = 1;
+    P1OVDCON = BOARD_OUTPUTS_OFF;
+    IFS0bits.T2IF = 1;
+}
+
+/** 1 where the duties are the law's. Late ones come a period after it has begun: until then they are 0, as those of a bridge that does not switch. */
+QM_INLINE uint16_t board_law_has_written(void)
+{
+    return (uint16_t)(!LATE_DUTIES || (P1DC1 | P1DC2 | P1DC3) != 0u);
+}
+
+/** The control interrupt, triggered every period by PWM1 through the ADC: from the samples to the duties. */
 void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
-    duties_t duty;
+    duties_t in_time, *duty = LATE_DUTIES ? board_waiting : &in_time;
 
     IFS0bits.AD1IF = 0;
+    if (LATE_DUTIES) {
+        board_write(duty);
+        if (board_counts_up()) {
+            board_overrun();
+        }
+    }
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
-    drive_tick(&board_drive, &board_params, &raw, &duty);
-    P1DC1 = duty.a;
-    P1DC2 = duty.b;
-    P1DC3 = duty.c;
-    /* The duties load when the counter reaches zero. Still counting down: in time. */
-    if ((P1TMR & 0x8000u) == 0u || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
-        board_is_late = 1;
-        P1OVDCON = BOARD_OUTPUTS_OFF;
-        IFS0bits.T2IF = 1;
+    drive_tick(&board_drive, &board_params, &raw, duty);
+    if (!LATE_DUTIES) {
+        board_write(duty);
+    }
+    if ((!LATE_DUTIES && board_counts_up()) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
+        board_overrun();
     }
     if (board_drive.fault != (uint16_t)FAULT_NONE) {
         P1OVDCON = BOARD_OUTPUTS_OFF;
@@ -90,7 +123,8 @@ void BOARD_ISR _T2Interrupt(void)
     before = drive_outputs(&board_drive);
     drive_slow(&board_drive, &board_params, &raw);
     after = drive_outputs(&board_drive);
-    if (after != (uint16_t)OUTPUTS_PWM || before == (uint16_t)OUTPUTS_PWM) { /* the bridge begins to switch when its first duties are written */
+    /* the bridge begins to switch when its first duties are written */
+    if (after != (uint16_t)OUTPUTS_PWM || (before == (uint16_t)OUTPUTS_PWM && board_law_has_written())) {
         board_set_outputs(after);
     }
     if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */

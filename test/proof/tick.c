@@ -233,8 +233,8 @@ static void slow(void)
 {
     static drive_t left;
     left = drive;
-    //@ loop unroll SLOW_PHASES;
-    for (uint16_t slot = 0; slot < SLOW_PHASES; slot++) {
+    //@ loop unroll SLOW_PERIODS;
+    for (uint16_t slot = 0; slot < SLOW_PERIODS; slot++) {
         drive = left;
         slow_in(slot);
     }

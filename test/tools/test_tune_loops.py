@@ -232,7 +232,7 @@ def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_
 def test_a_heavy_rotor_gets_a_slower_load_observer_and_a_large_innovation_asks_for_the_same_share_of_the_current():
     light, heavy = (loops.calm_load_bandwidth(100.0, acceleration, 5000.0, 50e-6) for acceleration in (0.1, 0.01))
     assert light == pytest.approx(10.0 * heavy)
-    step = 2.0 * np.pi * heavy * loops.SLOW_PHASES * 50e-6
+    step = 2.0 * np.pi * heavy * 8 * 50e-6
     assert loops.FULL_RATIO * 100.0 * step / 0.01 == pytest.approx(loops.HEAVY_SHARE * 5000.0)
 
 

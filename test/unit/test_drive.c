@@ -112,7 +112,7 @@ void test_withdrawn_request_in_every_state(void)
         drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         drive.periods = 0;
         drive.command.run = 0;
-        rig_tick(SLOW_PHASES);
+        rig_tick(SLOW_PERIODS);
         TEST_ASSERT_EQUAL_UINT16(next[state], drive.state);
     }
 }
