@@ -100,7 +100,7 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
     if (board_drive.fault != (uint16_t)FAULT_NONE) {
         P1OVDCON = BOARD_OUTPUTS_OFF;
     }
-    if (BOARD_SLOW_EVERY_PERIOD || drive_slow_is_due(&board_drive) || (LATE_DUTIES && recorder_is_due(&board_drive))) {
+    if (BOARD_SLOW_EVERY_PERIOD || drive_slow_is_due(&board_drive)) {
         IFS0bits.T2IF = 1;
     }
 }

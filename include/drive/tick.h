@@ -214,23 +214,27 @@ QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_sa
     SELFTEST_MARK(d, late_mark(done, call));
 }
 
-/** 1 in the periods that slow work follows: every second one, and with the bridge off each. */
+/** 1 in the periods that slow work follows: every second one, and with the bridge off or late duties each. */
 QM_INLINE uint16_t drive_slow_is_due(const drive_t *d)
 {
-    return (uint16_t)((d->ticks & (SLOW_EVERY - 1u)) == 0u || !drive_is_running(d));
+    return (uint16_t)(LATE_DUTIES || (d->ticks & (SLOW_EVERY - 1u)) == 0u || !drive_is_running(d));
 }
 
 /** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
+ *  With late duties the periods between those of the slow steps take the estimator's share, and the recorder's.
  *  @param raw the converter's results of this period */
 QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    uint16_t was_running = drive_is_running(d);
+    uint16_t settles = (uint16_t)(MODE_ALIGNS && drive_is_running(d));
 
     drive_rest(d, p, raw);
     if ((d->ticks & (SLOW_EVERY - 1u)) != 0u) {
+        if (LATE_DUTIES && settles) {
+            estimator_settle(&d->run.estimator, &p->estimator);
+        }
         return;
     }
-    if (MODE_ALIGNS && was_running) {
+    if (!LATE_DUTIES && settles) {
         estimator_settle(&d->run.estimator, &p->estimator);
     }
     drive_quarter(d, p, raw);
