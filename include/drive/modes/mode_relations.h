@@ -2,13 +2,26 @@
 #ifndef DRIVE_MODES_MODE_RELATIONS_H
 #define DRIVE_MODES_MODE_RELATIONS_H
 
+#include "drive/modes/recorder_room.h"
+
 /** X(condition, message): as PARAM_RELATION_TABLE, for the mode that is switched on. */
 #ifdef BRINGUP
-#define MODE_RELATION_TABLE(X) \
+#define MODE_RELATION_BRINGUP(X) \
     X(PARAM_F(NORM_CURRENT_CONST) <= 0.0039F, \
       PARAM_NAMED(NORM_CURRENT_CONST) " must be at most 0.0039 with BRINGUP, which counts milliamperes in 16 bits: leave BRINGUP out")
 #else
-#define MODE_RELATION_TABLE(X)
+#define MODE_RELATION_BRINGUP(X)
 #endif
+
+/* Those that take the fault recorder's RAM take more than its time, too. */
+#ifdef MODE_WITHOUT_RECORDER
+#define MODE_RELATION_LATE(X) \
+    X(!LATE_DUTIES, \
+      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with " MODE_WITHOUT_RECORDER ", for which a shorter period has no time: leave it out, or use a longer period")
+#else
+#define MODE_RELATION_LATE(X)
+#endif
+
+#define MODE_RELATION_TABLE(X) MODE_RELATION_LATE(X) MODE_RELATION_BRINGUP(X)
 
 #endif
