@@ -6,14 +6,14 @@
 #include "drive/salient.h"
 #include "drive/state.h"
 
-#define HANDOVER_FALL_SHIFT 7                      /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
-#define HANDOVER_FLOOR_SHIFT 3                     /**< to an eighth at least */
-#define HANDOVER_SWUNG_SHIFT 5                     /**< where the rotor is no longer slower than by 1/32 */
-#define HANDOVER_MEAN_SHIFT 5                      /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
-#define HANDOVER_HURRY 3                           /**< times the ramp's rate, once the estimator should have agreed */
+#define HANDOVER_FALL_SHIFT 7                                                 /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
+#define HANDOVER_FLOOR_SHIFT 3                                                /**< to an eighth at least */
+#define HANDOVER_SWUNG_SHIFT 5                                                /**< where the rotor is no longer slower than by 1/32 */
+#define HANDOVER_MEAN_SHIFT 5                                                 /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
+#define HANDOVER_HURRY 3                                                      /**< times the ramp's rate, once the estimator should have agreed */
 #define HANDOVER_MOST_STEPS(p) ((uint16_t)((p)->wait_periods >> LATE_DUTIES)) /**< 1.6 s of agreement: the slowest rotor has swung to where the current pulls it */
-#define HANDOVER_DECAY 8                           /**< angle counts of the offset that go in a step */
-#define HANDOVER_MOST_OFFSET 0x2000                /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
+#define HANDOVER_DECAY 8                                                      /**< angle counts of the offset that go in a step */
+#define HANDOVER_MOST_OFFSET 0x2000                                           /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
  *  error of the estimator's angle into torque. */

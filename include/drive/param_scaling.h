@@ -147,7 +147,7 @@
 #define SLOW_EVERY 2u
 #define SLOW_QUARTERS 4u
 #define SLOW_PERIODS_IN_TIME 8
-#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_QUARTERS : SLOW_QUARTERS)                              /* of a slow step */
+#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_QUARTERS : SLOW_QUARTERS)                               /* of a slow step */
 #define SLOW_PERIODS ((LATE_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a slow step */
 #define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
