@@ -126,6 +126,8 @@
 #define PARAM_RELATION_TABLE(X) \
     X(PARAM_PWM_REST < 0.01F, \
       PARAM_NAMED(LOOPTIME_SEC) " must be a multiple of 50 ns, as 0.00005 is: the PWM counts up and down in steps of 25 ns") \
+    X(!LATE_DUTIES || (SCOPE) == 0, \
+      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with SCOPE, for which a shorter period has no time: leave SCOPE 0, or use a longer period") \
     PARAM_RELATION_GAIN(X, KCURRA) PARAM_RELATION_GAIN(X, KCURRB) \
     X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, PARAM_NAMED(NOMINAL_SPEED_RPM) " must be above " PARAM_NAMED(MINIMUM_SPEED_RPM)) \
     X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, PARAM_NAMED(MAXIMUM_SPEED_RPM) " must be at least " PARAM_NAMED(NOMINAL_SPEED_RPM)) \

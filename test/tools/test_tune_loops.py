@@ -121,9 +121,9 @@ def test_the_gain_margin_is_where_a_simulated_speed_loop_begins_to_swing(rpm, tr
 
 def test_the_observer_and_its_controller_are_those_of_the_equations():
     """Without delays: per estimated speed (2 r k s + r^2 (s + k))/(s (s + k + 2 r)) over a; a current that the speed agrees with changes nothing."""
-    hz, fine = np.array([3.0, 20.0, 60.0]), replace(AT_1000_HZ, period_s=1e-6)
+    hz, fine = np.array([3.0, 20.0, 60.0]), replace(AT_1000_HZ, period_s=5e-7)
     s, r, k, a = 2j * np.pi * hz, 2 * np.pi * 47.0, 2 * np.pi * 13.0, MOTOR.kt * MOTOR.pole_pairs / MOTOR.inertia
-    per_speed, per_current = observer_law(hz, MOTOR, replace(fine, rate=r * 8e-6, speed_kp=k / a))
+    per_speed, per_current = observer_law(hz, MOTOR, replace(fine, rate=r * fine.slow_s, speed_kp=k / a))
     alone = -(2 * r * k * s + r * r * (s + k)) / (s * (s + k + 2 * r)) / a
     assert per_speed / (1.0 - per_current) == approx(alone, rel=0.002)
     assert per_speed * a / s + per_current == approx(-k / s, rel=0.005), "the load stays what it is"

@@ -83,11 +83,11 @@ class Found:
     ticks: int
     first_difference: str
     longest: dict[str, tuple[int, float, str]] # scenario: most cycles of the control interrupt, when, in which state
-    period_cycles: int = PERIOD_CYCLES
     load_cycles: int = 0   # from the trigger to the moment when the duties load
     motor_s: float = 0.0
     cpu_s: float = 0.0
     instructions: float = 0.0
+    period_cycles: int = PERIOD_CYCLES
 
 
 def classes(state: np.ndarray, states: dict[int, str], reference_rpm: np.ndarray, fw_start_rpm: float) -> dict[str, np.ndarray]:
@@ -117,8 +117,8 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
         latency = trace.column("cpu.latency_cycles")
         return Found(spreads, periods, Spread.of(latency[latency > 0]), counts, int(board.get("cpu.stack_bytes")),
                      int(board.get("pil.differences")),
-                     int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, period_cycles(run.params), board.peek(P1SECMP) & 0x7FFF,
-                     run.motor_s, run.cpu_s, board.get("cpu.instructions"))
+                     int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, board.peek(P1SECMP) & 0x7FFF,
+                     run.motor_s, run.cpu_s, board.get("cpu.instructions"), period_cycles(run.params))
 
 
 def merged(found: list[Found]) -> Found:
@@ -129,8 +129,8 @@ def merged(found: list[Found]) -> Found:
                             for one, two in ((whole.spreads, item.spreads), (whole.periods, item.periods)))
         whole = Found(spreads, periods, added([whole.latency, item.latency]), whole.counts + item.counts, max(whole.stack_bytes, item.stack_bytes),
                       whole.differences + item.differences, whole.ticks + item.ticks, whole.first_difference or item.first_difference,
-                      whole.longest | item.longest, whole.period_cycles, min(whole.load_cycles, item.load_cycles), whole.motor_s + item.motor_s,
-                      whole.cpu_s + item.cpu_s, whole.instructions + item.instructions)
+                      whole.longest | item.longest, min(whole.load_cycles, item.load_cycles), whole.motor_s + item.motor_s,
+                      whole.cpu_s + item.cpu_s, whole.instructions + item.instructions, whole.period_cycles)
     return whole
 
 

@@ -2,7 +2,7 @@
 #ifndef DRIVE_MODES_MODE_RELATIONS_H
 #define DRIVE_MODES_MODE_RELATIONS_H
 
-#include "drive/modes/recorder_room.h"
+#include "drive/param_scaling.h" /* userparams.h may define the mode */
 
 /** X(condition, message): as PARAM_RELATION_TABLE, for the mode that is switched on. */
 #ifdef BRINGUP
@@ -13,11 +13,22 @@
 #define MODE_RELATION_BRINGUP(X)
 #endif
 
-/* Those that take the fault recorder's RAM take more than its time, too. */
-#ifdef MODE_WITHOUT_RECORDER
+/* Those that add to each period's work. */
+#if defined(SNAPSHOT)
+#define MODE_WITHOUT_TIME "SNAPSHOT"
+#elif defined(TUNING)
+#define MODE_WITHOUT_TIME "TUNING"
+#elif defined(PARAMS_IN_RAM)
+#define MODE_WITHOUT_TIME "PARAMS_IN_RAM"
+#elif defined(IDENTIFY)
+#define MODE_WITHOUT_TIME "IDENTIFY"
+#elif defined(BRINGUP)
+#define MODE_WITHOUT_TIME "BRINGUP"
+#endif
+#ifdef MODE_WITHOUT_TIME
 #define MODE_RELATION_LATE(X) \
     X(!LATE_DUTIES, \
-      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with " MODE_WITHOUT_RECORDER ", for which a shorter period has no time: leave it out, or use a longer period")
+      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with " MODE_WITHOUT_TIME ", for which a shorter period has no time: leave it out, or use a longer period")
 #else
 #define MODE_RELATION_LATE(X)
 #endif
