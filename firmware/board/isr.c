@@ -1,4 +1,5 @@
 /* The interrupts: the control interrupt that is one PWM period, the fault input, and the traps. */
+#include "board/duties.h"
 #include "board/firmware.h"
 #include "board/lnet.h"
 #include "board/mclv.h"
@@ -45,21 +46,8 @@ QM_INLINE void board_set_outputs(uint16_t outputs)
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
 
-/* Duties that wait for the next period's begin (drive/late.h). */
+/* For the next period's begin. */
 __extension__ static duties_t board_waiting[LATE_WAITS];
-
-QM_INLINE void board_write(const duties_t *duty)
-{
-    P1DC1 = duty->a;
-    P1DC2 = duty->b;
-    P1DC3 = duty->c;
-}
-
-/** The duties load when the counter reaches zero. @return 1 once it counts up: too late */
-QM_INLINE uint16_t board_counts_up(void)
-{
-    return (uint16_t)((P1TMR & 0x8000u) == 0u);
-}
 
 /** The bridge is off at once; the slow work says why. */
 QM_INLINE void board_overrun(void)
@@ -69,32 +57,20 @@ QM_INLINE void board_overrun(void)
     IFS0bits.T2IF = 1;
 }
 
-/** 1 where the duties are the law's. Late ones come a period after it has begun: until then they are 0, as those of a bridge that does not switch. */
-QM_INLINE uint16_t board_law_has_written(void)
-{
-    return (uint16_t)(!LATE_DUTIES || (P1DC1 | P1DC2 | P1DC3) != 0u);
-}
-
 /** The control interrupt, triggered every period by PWM1 through the ADC: from the samples to the duties. */
 void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
-    duties_t in_time, *duty = LATE_DUTIES ? board_waiting : &in_time;
+    duties_t now, *duty = duties_place(board_waiting, &now);
 
     IFS0bits.AD1IF = 0;
-    if (LATE_DUTIES) {
-        board_write(duty);
-        if (board_counts_up()) {
-            board_overrun();
-        }
+    if (duties_write_waiting(duty)) {
+        board_overrun();
     }
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     drive_tick(&board_drive, &board_params, &raw, duty);
-    if (!LATE_DUTIES) {
-        board_write(duty);
-    }
-    if ((!LATE_DUTIES && board_counts_up()) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
+    if (duties_write_now(duty) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
         board_overrun();
     }
     if (board_drive.fault != (uint16_t)FAULT_NONE) {
@@ -124,7 +100,7 @@ void BOARD_ISR _T2Interrupt(void)
     drive_slow(&board_drive, &board_params, &raw);
     after = drive_outputs(&board_drive);
     /* the bridge begins to switch when its first duties are written */
-    if (after != (uint16_t)OUTPUTS_PWM || (before == (uint16_t)OUTPUTS_PWM && board_law_has_written())) {
+    if (after != (uint16_t)OUTPUTS_PWM || (before == (uint16_t)OUTPUTS_PWM && duties_are_the_laws())) {
         board_set_outputs(after);
     }
     if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */
