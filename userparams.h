@@ -141,7 +141,7 @@
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
 
-/* ---- Fault recorder: 64 rows before a fault, 16 after it ---------------------------------------------------------- */
+/* ---- Fault recorder: 56 rows before a fault, 16 from it on -------------------------------------------------------- */
 #define RECORDER_PERIODS 2          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
 
 /* ---- Scope: watch, record and tune by the serial line (docs/scope.md) --------------------------------------------- */
@@ -164,15 +164,14 @@
  *   NORM_DELTAT                         5e-05 s                1790  Q15 of a turn/erpm          +0.024 %  Equation 1, AN1292's constant
  *   adaptation.rs_base_q16               2.67 ohm             28940  Q16 / 1                     +0.002 %  R of the estimator
  *   estimator.rs_exp                        1 1                   0  count                          exact  the product is shifted left by it
- *   estimator.resistive_max_q13        11.716 V                7215  Q13 V                       +0.001 %  largest R i, at the trip level
  *   fieldweak.ls_base_q16                1.92 mH              52026  Q16 / 1                     -0.000 %  L of the estimator, eight samples
  *   estimator.ls_exp                        1 1                   0  count                          exact  the product is shifted left by it
  *
  * estimator
  *   estimator.deltat_q32                5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
  *   estimator.half_step_q16_rad       2.5e-05 s               11244  Q16 rad/erpm                -0.002 %  half of it
- *   estimator.d_ilimit_ls_q14          1.6127 A                6005  Q14 A                       -0.001 %  D_ILIMIT_LS: change in eight periods
- *   estimator.d_ilimit_hs_q14         0.39597 A                1474  Q14 A                       -0.031 %  D_ILIMIT_HS: change in a period
+ *   estimator.d_ilimit_ls_q14          1.6127 A                6005  Q14 A                       -0.001 %  change in eight periods: D_ILIMIT_LS, or what the format leaves of it
+ *   estimator.d_ilimit_hs_q14         0.31033 A                1155  Q14 A                       -0.048 %  change in a period: D_ILIMIT_HS, or what the format leaves of it
  *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in AN1292's format
  *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in AN1292's format
  *   fieldweak.kfilter_esdq_q16         200.46 Hz               4000  Q16 a period                   exact  Equation 7
@@ -258,11 +257,12 @@
  *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
  *   stall_steps                          0.23 s                 575  slow steps                     exact  stall
- *   lost_lock_steps                      0.05 s                 125  slow steps                     exact  lost lock
+ *   lost_lock_steps                      0.06 s                 150  slow steps                     exact  lost lock
  *   wrong_steps                           0.1 s                 250  slow steps                     exact  voltages and currents do not fit the motor
  *   impossible_steps                     0.25 s                 625  slow steps                     exact  flux or resistance impossible
  *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
  *   id_off_q13                        0.10185 A                 190  Q13 A                       +0.194 %  d current's mean deviation
+ *   rs_impossible                         0.6 1               19660  Q15                         -0.004 %  change of R that no winding survives, 1: not told
  *   rs_off_least                         -0.3 1               -9830  Q15                         -0.004 %  so far may R be off
  *   rs_off_most                           0.5 1               16384  Q15                            exact  upwards
  *   ls_off                                0.3 1                9830  Q15                         -0.004 %  and L

@@ -53,7 +53,9 @@ int main(void)
         ADC1BUF2 = converter(0.5 - (-0.5 * i_alpha + 0.866 * i_beta) / 8.8);
         ADC1BUF3 = converter(BUS_V / 52.8);
         _ADC1Interrupt();
-        _T2Interrupt(); /* which the control interrupt raises */
+        if (IFS0bits.T2IF) { /* the slow work, which the control interrupt raises */
+            _T2Interrupt();
+        }
         firmware_background();
         motor_step(acting); /* the old duties act until the counter is at zero, */
         acting[0] = P1DC1;  /* then the new ones load */

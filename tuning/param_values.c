@@ -48,8 +48,6 @@ static void motor(void)
     MACRO(NORM_DELTAT, period, "s", 60.0 / 2147483648.0 / SPEED_UNIT, "Q15 of a turn/erpm", "Equation 1, AN1292's constant");
     FIELD(adaptation.rs_base_q16, rs, "ohm", ohm / 32768.0 * (1 << p.estimator.rs_exp), q16_divided[p.estimator.rs_exp], "R of the estimator");
     FIELD(estimator.rs_exp, 1 << p.estimator.rs_exp, "1", 0.0, "count", "the product is shifted left by it");
-    FIELD(estimator.resistive_max_q13, 2.0 / sqrt(3.0) * OVER_CURRENT_THRESHOLD_A * rs, "V", 4.0 * volt * (1 << p.estimator.rs_exp), "Q13 V",
-          "largest R i, at the trip level");
     FIELD(fieldweak.ls_base_q16, ls, "mH", one_ls / 4096.0 * (1 << p.estimator.ls_exp), q16_divided[p.estimator.ls_exp],
           "L of the estimator, eight samples");
     FIELD(estimator.ls_exp, 1 << p.estimator.ls_exp, "1", 0.0, "count", "the product is shifted left by it");
@@ -61,8 +59,10 @@ static void estimator(void)
     GROUP("estimator");
     FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle a period");
     FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0 / SPEED_UNIT, "Q16 rad/erpm", "half of it");
-    FIELD(estimator.d_ilimit_ls_q14, least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A", "D_ILIMIT_LS: change in eight periods");
-    FIELD(estimator.d_ilimit_hs_q14, most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A", "D_ILIMIT_HS: change in a period");
+    FIELD(estimator.d_ilimit_ls_q14, PARAM_LDI_LS_SHARE * least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A",
+          "change in eight periods: D_ILIMIT_LS, or what the format leaves of it");
+    FIELD(estimator.d_ilimit_hs_q14, PARAM_LDI_SHARE * most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A",
+          "change in a period: D_ILIMIT_HS, or what the format leaves of it");
     MACRO(D_ILIMIT_LS, least * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
     MACRO(D_ILIMIT_HS, most * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
     FIELD(fieldweak.kfilter_esdq_q16, filter_hz(KFILTER_ESDQ), "Hz", 0.0, "Q16 a period", "Equation 7");
@@ -132,7 +132,7 @@ static void observer(void)
     FIELD(adaptation.kfi_least, -0.30, "1", 1.0 / 32768.0, "Q15", "least change of 1/Kphi");
     FIELD(adaptation.kfi_most, 0.35, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.rs_least, -0.4, "1", 1.0 / 32768.0, "Q15", "least change of R");
-    FIELD(adaptation.rs_most, 0.6, "1", 1.0 / 32768.0, "Q15", "largest");
+    FIELD(adaptation.rs_most, PARAM_RS_RISES, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.emf_least_q12, 0.2 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "back-EMF from which it learns");
     FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a / erpm / 65536.0, "Q16 Q13 A/erpm",
           "q current that the sample misses");
@@ -178,11 +178,12 @@ static void limits(void)
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
     FIELD(stall_steps, PARAM_STALL_SEC, "s", slots, "slow steps", "stall");
-    FIELD(lost_lock_steps, 0.05, "s", slots, "slow steps", "lost lock");
+    FIELD(lost_lock_steps, 0.06, "s", slots, "slow steps", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "slow steps", "voltages and currents do not fit the motor");
     FIELD(impossible_steps, 0.25, "s", slots, "slow steps", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
     FIELD(id_off_q13, most / 32.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
+    FIELD(rs_impossible, (PARAM_RS_RISES > 0.99 * PARAM_RS_MOST) ? PARAM_RS_RISES : 1.0, "1", 1.0 / 32768.0, "Q15", "change of R that no winding survives, 1: not told");
     FIELD(rs_off_least, PARAM_R_LEAST - 1.0, "1", 1.0 / 32768.0, "Q15", "so far may R be off");
     FIELD(rs_off_most, PARAM_R_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "upwards");
     FIELD(ls_off, PARAM_L_OFF, "1", 1.0 / 32768.0, "Q15", "and L");

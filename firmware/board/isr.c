@@ -27,21 +27,25 @@ void BOARD_ISR _StackError(void);
 void BOARD_ISR _MathError(void);
 void BOARD_ISR _DefaultInterrupt(void);
 
-QM_INLINE void board_set_outputs(uint16_t outputs)
+/** Where the bridge does not switch. */
+QM_INLINE void board_set_idle_outputs(uint16_t outputs)
 {
     uint16_t override = BOARD_OUTPUTS_OFF;
-    if (outputs == (uint16_t)OUTPUTS_PWM) {
-        override = BOARD_OUTPUTS_PWM;
-    } else if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) {
+    if (outputs == (uint16_t)OUTPUTS_BOOTSTRAP) {
         override = BOARD_OUTPUTS_BOOTSTRAP;
-    } else {
-        /* off */
     }
     P1OVDCON = override;
 }
 
-/* What looks at each period itself. */
-#define BOARD_SLOW_EVERY_PERIOD (SCOPE || MODE_RECORDS)
+/** 1 in the periods with the bridge switching that slow work follows: scope and SNAPSHOT look at each. */
+QM_INLINE uint16_t board_slow_is_due(void)
+{
+#if SCOPE || MODE_RECORDS
+    return 1;
+#else
+    return drive_slow_follows(&board_drive);
+#endif
+}
 
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
@@ -62,6 +66,7 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
     duties_t now, *duty = duties_place(board_waiting, &now);
+    uint16_t switches;
 
     IFS0bits.AD1IF = 0;
     if (duties_write_waiting(duty)) {
@@ -69,15 +74,19 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
     }
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
-    drive_tick(&board_drive, &board_params, &raw, duty);
+    switches = drive_tick(&board_drive, &board_params, &raw, duty);
     if (duties_write_now(duty) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
         board_overrun();
     }
-    if (board_drive.fault != (uint16_t)FAULT_NONE) {
-        P1OVDCON = BOARD_OUTPUTS_OFF;
-    }
-    if (BOARD_SLOW_EVERY_PERIOD || drive_slow_is_due(&board_drive)) {
+    if (!switches) {
+        if (board_drive.fault != (uint16_t)FAULT_NONE) {
+            P1OVDCON = BOARD_OUTPUTS_OFF;
+        }
         IFS0bits.T2IF = 1;
+    } else if (board_slow_is_due()) {
+        IFS0bits.T2IF = 1;
+    } else {
+        /* the next period raises it */
     }
 }
 
@@ -86,7 +95,7 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 void BOARD_ISR _T2Interrupt(void)
 {
     drive_samples_t raw;
-    uint16_t before, after;
+    uint16_t switched;
 
     if (board_is_late) {
         board_is_late = 0;
@@ -96,12 +105,14 @@ void BOARD_ISR _T2Interrupt(void)
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
     board_panel.pot_q15 = (int16_t)ADC1BUF0;
-    before = drive_outputs(&board_drive);
+    switched = drive_is_running(&board_drive);
     drive_slow(&board_drive, &board_params, &raw);
-    after = drive_outputs(&board_drive);
-    /* the bridge begins to switch when its first duties are written */
-    if (after != (uint16_t)OUTPUTS_PWM || (before == (uint16_t)OUTPUTS_PWM && duties_are_the_laws())) {
-        board_set_outputs(after);
+    if (!drive_is_running(&board_drive)) {
+        board_set_idle_outputs(drive_outputs(&board_drive));
+    } else if (switched && duties_are_the_laws()) {
+        P1OVDCON = BOARD_OUTPUTS_PWM;
+    } else {
+        /* the bridge begins to switch when its first duties are written */
     }
     if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */
         pwm_outputs_off();
@@ -112,7 +123,10 @@ void BOARD_ISR _T2Interrupt(void)
 #if SCOPE
     scope_tick(&board_lnet.scope, board_scope_array);
 #endif
-    IFS0bits.T2IF = 0; /* last: as long as it is set the work is not done */
+    IFS0bits.T2IF = 0;   /* last: as long as it is set the work is not done */
+    if (board_is_late) { /* a control interrupt meanwhile: its flag is gone with the own one */
+        IFS0bits.T2IF = 1;
+    }
 }
 
 /** The board's comparator: the PWM module has already switched the outputs off. */

@@ -8,6 +8,7 @@
 #include "board/reset.h"
 #include "board/selftest_chip.h"
 #include "board/text.h"
+#include "drive/late.h"
 #include "drive/state.h"
 
 #define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
@@ -99,10 +100,13 @@ static void test_registers(void)
     }
 }
 
-/** The override as the interrupt's last words have left it: as the state asks, or off. */
+/** The override as the interrupts' last words have left it: as the state asks, or off. The low sides stay on until the first duties are written. */
 static uint16_t outputs_hold(void)
 {
     uint16_t outputs = drive_outputs(&board_drive), now = P1OVDCON;
+    if (board_drive.state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
+        return 1;
+    }
     return (uint16_t)(now == BOARD_OUTPUTS_OFF || (outputs != 0u && now == (outputs == OUTPUTS_PWM ? BOARD_OUTPUTS_PWM : BOARD_OUTPUTS_BOOTSTRAP)));
 }
 

@@ -10,7 +10,6 @@
 typedef struct {
     uint16_t rs_exp;              /**< 0..3, for motors whose Rs does not fit */
     uint16_t ls_exp;              /**< 0..3, the same for Ls */
-    int16_t resistive_max_q13;    /**< limit of Rs i of an axis, Q13 voltage >> rs_exp: what the header's Rs gives at the trip level */
     int16_t d_ilimit_ls_q14;      /**< limit of the eight-sample current difference (D_ILIMIT_LS), below 16384 */
     int16_t d_ilimit_hs_q14;      /**< limit of the one-sample difference (D_ILIMIT_HS), below 4096 */
     int16_t deltat_q32;           /**< Ts/60 * 2^32: angle per period and count of speed (NORM_DELTAT, unrounded) */
@@ -32,13 +31,13 @@ typedef struct {
 /** State. Everything zero is a valid start at standstill. */
 typedef struct {
     alphabeta_t history_q14[ESTIMATOR_HISTORY]; /**< currents, the newest two periods before the last settled one */
-    uint16_t slot;                              /**< index of the oldest, which makes room */
     alphabeta_t i_last_q14;                     /**< the current of the last period */
     alphabeta_t i_oldest_q14;                   /**< and of eight periods before the next two, in the mean of the two */
     alphabeta_t v_last_q13;                     /**< voltage commanded one period ago */
     alphabeta_t v_mean_q13;                     /**< that acts between the last sample and the next one: the mean of the last two */
     int32_t e_d_q28, e_q_q28;                   /**< filtered back-EMF: Q12 with 16 fraction bits */
     speed_erpm_t omega_erpm;                    /**< speed of Equation 2; integrates to the angle */
+    speed_erpm_t omega_before_erpm;             /**< and of the period before */
     int32_t omega_filtered_q16;                 /**< filtered speed, 16 fraction bits: speed loop, thresholds, display */
     uint32_t rho_q32;                           /**< angle of the rotor flux half a period after the last sample */
     int16_t half_step_q16_rad;                  /**< half the angle step of a period, radians * 65536 */
@@ -111,10 +110,9 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
  *  @return the back-EMF half a period in the past, Q13 */
 QM_INLINE alphabeta_t estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
-    const int16_t most = p->resistive_max_q13; /* the adaptation may raise Rs, but not the format's end */
     alphabeta_t inductive = estimator_inductive(e, p, t, i_q14), e_q13;
-    int16_t resistive_alpha = qm_limit(qm_mulhi_su((int16_t)((i_q14.alpha + e->i_last_q14.alpha) >> 1), t->rs_q16), most);
-    int16_t resistive_beta = qm_limit(qm_mulhi_su((int16_t)((i_q14.beta + e->i_last_q14.beta) >> 1), t->rs_q16), most);
+    int16_t resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + e->i_last_q14.alpha) >> 1), t->rs_q16);
+    int16_t resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + e->i_last_q14.beta) >> 1), t->rs_q16);
 
     e_q13.alpha = (int16_t)(e->v_mean_q13.alpha - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
     e_q13.beta = (int16_t)(e->v_mean_q13.beta - resistive_beta * (1 << p->rs_exp) - inductive.beta);
@@ -137,6 +135,7 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
     int16_t sum = (int16_t)(e_q - e->sign * e_d);
     int32_t step_q32;
 
+    e->omega_before_erpm = e->omega_erpm;
     e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
     step_q32 = qm_mulss(e->omega_erpm, p->deltat_q32);
     e->rho_q32 = qm_turn_add(e->rho_q32, (uint32_t)step_q32);
@@ -171,20 +170,21 @@ QM_INLINE int16_t estimator_oldest(int16_t six_ago, int16_t eight_ago)
 /** What the next two periods need of those that were. */
 QM_INLINE void estimator_remember(estimator_t *e)
 {
-    alphabeta_t *slot = &e->history_q14[e->slot];
-    alphabeta_t eight_ago = *slot;
-    *slot = e->i_last_q14;
-    e->slot = (uint16_t)((e->slot - 1u) & (ESTIMATOR_HISTORY - 1u));
-    slot = &e->history_q14[e->slot];
-    e->i_oldest_q14.alpha = estimator_oldest(slot->alpha, eight_ago.alpha);
-    e->i_oldest_q14.beta = estimator_oldest(slot->beta, eight_ago.beta);
+    alphabeta_t *ago = e->history_q14; /* two, four, six, eight periods */
+    e->i_oldest_q14.alpha = estimator_oldest(ago[2].alpha, ago[3].alpha);
+    e->i_oldest_q14.beta = estimator_oldest(ago[2].beta, ago[3].beta);
+    ago[3] = ago[2];
+    ago[2] = ago[1];
+    ago[1] = ago[0];
+    ago[0] = e->i_last_q14;
 }
 
 /** After the duties of every second period: the filtered speed of Equation 7, and what the next two periods need. */
 QM_INLINE void estimator_settle(estimator_t *e, const estimator_params_t *p)
 {
+    int16_t mean = (int16_t)(((int32_t)e->omega_erpm + e->omega_before_erpm) >> 1); /* free of the ripple of estimator_remember() */
     estimator_remember(e);
-    (void)qm_lowpass(&e->omega_filtered_q16, e->omega_erpm, p->kfilter_velestim_q16);
+    (void)qm_lowpass(&e->omega_filtered_q16, mean, p->kfilter_velestim_q16);
 }
 
 /** Back-EMF in the control frame while that is the estimator's own: Park with the frame's sine and cosine, turned back by the

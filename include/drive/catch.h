@@ -88,6 +88,7 @@ QM_INLINE uint16_t catch_see(drive_t *d, const drive_params_t *p, angle_t direct
     return 1;
 }
 
+/* wcet: catch_look excludes drive_update_model adaptation_learn handover_decay svm_compensation */
 /** A period of a look. @return 1 when it has ended and the rotor turns: the outputs go off */
 NOINLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
 {

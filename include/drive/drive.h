@@ -89,6 +89,7 @@ typedef struct {
     uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
     q15_t kfi_impossible;      /**< change of 1/Kphi that asks for more flux than the header's may be off */
     current_q13_t id_off_q13;  /**< d current's mean deviation that noise and dead time make at most */
+    q15_t rs_impossible;       /**< change of R that no winding survives; INT16_MAX: the format ends before */
     q15_t rs_off_least;        /**< how far R may be below the header's, as a share of it: negative */
     q15_t rs_off_most;         /**< and above */
     q15_t ls_off;              /**< how far L may be off, to either side */

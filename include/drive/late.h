@@ -11,6 +11,9 @@
 /** Largest half step that so many leave within a word. */
 #define LATE_HALF_STEP_MOST (32767 / LATE_HALF_STEPS)
 
+/** As long as ALIGN counts before its first duties are written. */
+#define LATE_ALIGN_PERIODS (LATE_DUTIES ? SLOW_PERIODS : 0u)
+
 /** Frame of the pulse whose duties are computed now: the next sample's, or a step further. @param before angle of this period's sample */
 QM_INLINE QM_WRAPS sincos_t late_frame(const drive_t *d, angle_t before)
 {

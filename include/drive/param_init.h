@@ -18,11 +18,8 @@
     { \
         .rs_exp = PARAM_RS_EXP, \
         .ls_exp = PARAM_LS_EXP, \
-        .resistive_max_q13 = (int16_t)(2.0F / PARAM_SQRT3 * CURRENT_Q14_F(OVER_CURRENT_THRESHOLD_A) \
-                                           * (float)PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) / 65536.0F \
-                                       + 0.5F), \
-        .d_ilimit_ls_q14 = D_ILIMIT_LS_Q14, \
-        .d_ilimit_hs_q14 = D_ILIMIT_HS_Q14, \
+        .d_ilimit_ls_q14 = (int16_t)(PARAM_LDI_LS_SHARE * PARAM_F(D_ILIMIT_LS_Q14) + 0.5F), \
+        .d_ilimit_hs_q14 = (int16_t)(PARAM_LDI_SHARE * PARAM_F(D_ILIMIT_HS_Q14) + 0.5F), \
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
         .half_step_q16_rad = (uint16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F * PARAM_F(SPEED_UNIT)), \
         .kfilter_velestim_q16 = PARAM_VELESTIM_Q16, \
@@ -59,7 +56,7 @@
 #define PARAM_ADAPTATION_INIT \
     { \
         .rate_q16 = (int16_t)(6.0F * PARAM_STEP_SEC * 65536.0F + 0.5F), /* 6/s, less where a part of the voltage is R i */ \
-            .kfi_least = Q15(-0.30), .kfi_most = Q15(0.35), .rs_least = Q15(-0.4), .rs_most = Q15(0.6), \
+            .kfi_least = Q15(-0.30), .kfi_most = Q15(0.35), .rs_least = Q15(-0.4), .rs_most = Q15(PARAM_RS_RISES), \
         .emf_least_q12 = (int16_t)(0.2F * PARAM_DEAD_TIME_V / NORM_VOLTAGE_CONST / 8.0F), \
         .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
     }
@@ -140,13 +137,14 @@
         .tuning_step_q16 = TUNING_STEP_Q16, \
         .ramp_hold_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F)), \
         .stall_steps = PARAM_SLOW_STEPS(PARAM_F(PARAM_STALL_SEC)), \
-        .lost_lock_steps = PARAM_SLOW_STEPS(0.05F), \
+        .lost_lock_steps = PARAM_SLOW_STEPS(0.06F), \
         .pot_zero_q16 = (uint16_t)(PARAM_F(POT_LIVE_ZERO) * 65536.0F + 0.5F), \
         .pot_scale_q15 = (uint16_t)(32768.0F / (1.0F - 2.0F * PARAM_F(POT_LIVE_ZERO)) + 0.5F), \
         .wrong_steps = PARAM_SLOW_STEPS(0.1F), \
         .impossible_steps = PARAM_SLOW_STEPS(0.25F), \
         .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
         .id_off_q13 = CURRENT_Q13(PARAM_ID_OFF), \
+        .rs_impossible = (PARAM_RS_RISES > 0.99F * PARAM_F(PARAM_RS_MOST)) ? Q15(PARAM_RS_RISES) : INT16_MAX, \
         .rs_off_least = Q15(PARAM_R_LEAST - 1.0), \
         .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
         .ls_off = Q15(PARAM_L_OFF), \

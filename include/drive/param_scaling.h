@@ -72,6 +72,21 @@
 #define PARAM_DI(rpm) (2.0F * PARAM_PI * PARAM_F(rpm) / 60.0F * PARAM_F(NOPOLESPAIRS) * PARAM_F(LOOPTIME_SEC) * CURRENT_Q14_F(MAXIMUM_CURRENT_A))
 #define PARAM_MIN(a, b) (((a) < (b)) ? (a) : (b))
 #define PARAM_MAX(a, b) (((a) > (b)) ? (a) : (b))
+/** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format.
+ *  LS_OVER2LS0 may raise Ls by 1.2; below nominal speed turning the old difference forward may lengthen an axis by 1.5. */
+#define PARAM_EMF_MAX_V (PARAM_MOST_V + PARAM_TRIP_RI_V + PARAM_LDI_V)
+#define PARAM_MOST_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3)
+#define PARAM_TRIP_RI_V (2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM))
+#define PARAM_FASTEST_RPM PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM))
+#define PARAM_LDI_V (2.0F * PARAM_PI / 60.0F * PARAM_FASTEST_RPM * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
+#define PARAM_EMF_END_V (0.99F * 131068.0F * NORM_VOLTAGE_CONST)
+/** The adaptation raises R, too. What is missing for that the limits of L di/dt give, which full current at full speed alone would reach: at most a
+ *  quarter of it; then R rises less, and tells nothing of the winding's temperature. */
+#define PARAM_RS_MOST 0.6
+#define PARAM_LDI_SHARE PARAM_MAX(0.75F, PARAM_MIN(1.0F, (PARAM_EMF_END_V - PARAM_MOST_V - (1.0F + PARAM_F(PARAM_RS_MOST)) * PARAM_TRIP_RI_V) / PARAM_LDI_V))
+#define PARAM_LDI_LS_SHARE PARAM_MIN(1.0F, PARAM_LDI_SHARE *PARAM_FASTEST_RPM / (1.5F * PARAM_F(NOMINAL_SPEED_RPM)))
+#define PARAM_RS_ROOM ((PARAM_EMF_END_V - PARAM_MOST_V - PARAM_LDI_SHARE * PARAM_LDI_V) / PARAM_TRIP_RI_V - 1.0F)
+#define PARAM_RS_RISES PARAM_MIN(PARAM_F(PARAM_RS_MOST), PARAM_RS_ROOM)
 /** Below it the derivative spans eight samples, in which the current turns by 43 degrees at most: AN1292's nominal speed, or less with a long period. */
 #define EIGHT_SAMPLES_ERPM PARAM_MIN(PARAM_F(NOMINAL_SPEED_ERPM), PARAM_F(PARAM_EIGHT_TURN) * 60.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
 #define PARAM_EIGHT_TURN 0.12
@@ -79,12 +94,6 @@
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
 #define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in AN1292's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
-
-/** Largest back-EMF Equation 4 can give below the trip levels: voltage limit + R i + L di/dt. Must fit its Q13 format.
- *  LS_OVER2LS0 may raise Ls by 1.2; below nominal speed turning the old difference forward may lengthen an axis by 1.5. */
-#define PARAM_EMF_MAX_V (PARAM_F(OVER_VOLTAGE_V) / PARAM_SQRT3 + 2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM) \
-                         + 2.0F * PARAM_PI / 60.0F * PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM)) \
-                               * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 
 /* ---- Controllers: gains in AN1292's units (gain/16 and per-period integral, in full scales) from bandwidths.
  *      Current loops: pole-zero cancellation, Kp = 2 pi f L, Ki = 2 pi f R. Speed loop: Kp = 2 pi f J/Kt, and the load observer.

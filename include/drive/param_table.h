@@ -74,7 +74,7 @@
     X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
 
-#define PARAM_RECORDER(X) /* Fault recorder: 64 rows before a fault, 16 after it */ \
+#define PARAM_RECORDER(X) /* Fault recorder: 56 rows before a fault, 16 from it on */ \
     X(RECORDER_PERIODS, "periods", 0, 64, 2, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
 
 #define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \
@@ -176,7 +176,7 @@
     X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, \
       "the controllers' PTERMs must be positive") \
     X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F && PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F, "the current controllers' ITERMs must not be negative") \
-    X(PARAM_EMF_MAX_V < 0.99F * 131068.0F * NORM_VOLTAGE_CONST, \
+    X(PARAM_EMF_MAX_V < PARAM_EMF_END_V, \
       "the back-EMF's format overflows: lower OVER_VOLTAGE_V, OVER_CURRENT_THRESHOLD_A or MAXIMUM_SPEED_RPM") \
     PARAM_RELATION_IDREF(X, 0) PARAM_RELATION_IDREF(X, 1) PARAM_RELATION_IDREF(X, 2) PARAM_RELATION_IDREF(X, 3) \
     PARAM_RELATION_IDREF(X, 4) PARAM_RELATION_IDREF(X, 5) PARAM_RELATION_IDREF(X, 6) PARAM_RELATION_IDREF(X, 7) \

@@ -135,7 +135,7 @@ NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
         return;
     }
     strong = protection_flux_is_impossible(run, p);
-    hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->adaptation.rs_most);
+    hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->rs_impossible);
     run->impossible_steps = (uint16_t)((strong || hot) ? run->impossible_steps + 1u : 0u);
     if (run->impossible_steps > p->impossible_steps) {
         drive_raise(d, strong ? FAULT_BUS_SENSOR : FAULT_OVERTEMPERATURE);

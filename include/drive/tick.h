@@ -56,21 +56,23 @@ QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
     d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
 }
 
-/** One PWM period up to the duties; after it, where drive_slow_is_due(), drive_slow(), which has no deadline, drive_outputs(), and last
+/** One PWM period up to the duties; after it, where drive_slow_is_due() or the bridge does not switch, drive_slow(), which has no deadline, drive_outputs(), and last
  *  drive_settle().
  *  @param raw the converter's results at the centre of the low sides' conduction
- *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch */
-QM_INLINE void drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
+ *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch
+ *  @return 1 where it does */
+QM_INLINE uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
     d->ticks = (uint16_t)(d->ticks + 1u);
     drive_measure(d, p, raw);
     if (drive_is_running(d) && !protection_check_current(d, p)) { /* before the law: its formats end above the trip level */
         MODE_RUN(d, p, duty);
-    } else {
-        duty->a = 0;
-        duty->b = 0;
-        duty->c = 0;
+        return 1;
     }
+    duty->a = 0;
+    duty->b = 0;
+    duty->c = 0;
+    return 0;
 }
 
 /** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every eighth period. */
@@ -99,13 +101,21 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/* wcet: idle_step excludes estimator_settle speed_step speed_choose_state protection_check_signals protection_probe_rotor */
+/* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn */
 /** First of the slow work: what a period with the bridge off is. */
 QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     if (!drive_is_running(d)) {
         mode_idle(d);
         idle_step(d, p, raw->i_a, raw->i_b);
+    }
+}
+
+/** What the estimator's last two periods leave to be done. @param was_running the law has run in them; the modes of their own have no estimator */
+QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_running)
+{
+    if (was_running && MODE_ALIGNS) {
+        estimator_settle(&d->run.estimator, &p->estimator);
     }
 }
 
@@ -214,10 +224,16 @@ QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_sa
     SELFTEST_MARK(d, late_mark(done, call));
 }
 
-/** 1 in the periods that slow work follows: every second one, and with the bridge off or late duties each. */
+/** 1 in the periods that slow work follows while the bridge switches, every second one. With the bridge off it follows each. */
 QM_INLINE uint16_t drive_slow_is_due(const drive_t *d)
 {
-    return (uint16_t)(LATE_DUTIES || (d->ticks & (SLOW_EVERY - 1u)) == 0u || !drive_is_running(d));
+    return (uint16_t)((d->ticks & (SLOW_EVERY - 1u)) == 0u);
+}
+
+/** 1 where the slow work has something to do in this period while the bridge switches: with late duties in each. */
+QM_INLINE uint16_t drive_slow_follows(const drive_t *d)
+{
+    return (uint16_t)(LATE_DUTIES || drive_slow_is_due(d));
 }
 
 /** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
@@ -225,17 +241,17 @@ QM_INLINE uint16_t drive_slow_is_due(const drive_t *d)
  *  @param raw the converter's results of this period */
 QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    uint16_t settles = (uint16_t)(MODE_ALIGNS && drive_is_running(d));
+    uint16_t was_running = drive_is_running(d);
 
     drive_rest(d, p, raw);
-    if ((d->ticks & (SLOW_EVERY - 1u)) != 0u) {
-        if (LATE_DUTIES && settles) {
-            estimator_settle(&d->run.estimator, &p->estimator);
+    if (!drive_slow_is_due(d)) {
+        if (LATE_DUTIES) {
+            drive_follow(d, p, was_running);
         }
         return;
     }
-    if (!LATE_DUTIES && settles) {
-        estimator_settle(&d->run.estimator, &p->estimator);
+    if (!LATE_DUTIES) {
+        drive_follow(d, p, was_running);
     }
     drive_quarter(d, p, raw);
     if (MODE_ALIGNS && drive_is_running(d)) {

@@ -635,18 +635,18 @@ def observer_ends(v, rng):
             observe(v, model, 0, heavy, rng.randrange(-32768, 32768), rng.randrange(2 ** 32), rng.randrange(-10240, 10241))
 
 
-@block("start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, every 499th period",
-       "tick number; speed 1/1024 counts per period; angle 2^-32 turns; at_end is 1 from tick 27962 = 1.398 s on",
+@block("start ramp in both directions to 1000 rpm at 10/1024 counts per period squared, by 20 every second one; every 499th period",
+       "tick number; speed 1/1024 counts per period; angle 2^-32 turns; at_end is 1 from tick 27961 = 1.398 s on",
        "direction:s16 tick:u16 speed:s32 angle:u32 at_end:u16", least_db=130.0)
 def forced_angle(v, _):
     exact_end = 1000 * 5 * 50e-6 / 60 * 65536 * 1024
     rate, end = 10, round(exact_end)
     v.constants = {"end_speed_q10": end, "increase_rate_q10": rate}
     for direction in (1, -1):
-        speed, angle, exact, exact_speed = 0, 0, 0.0, 0.0
+        speed, angle, exact = 0, 0, 0.0
         for tick in range(1, 31001):
-            speed, angle, at_end = ref.forced_angle(rate, end, direction, speed, angle)
-            exact_speed = min(exact_speed + rate, exact_end)
+            speed, angle, at_end = ref.forced_angle(rate, end, direction, speed, angle, tick)
+            exact_speed = min(rate * (tick + tick % 2), exact_end)
             exact += exact_speed / 1024
             if tick % 499 == 1 or 27960 <= tick <= 27964:
                 nearest = exact + ref.wrap16(round(direction * angle / 65536 - exact) % 65536)
@@ -692,6 +692,8 @@ def params(v, _):
     v.constants |= {**{f"svm_{name}": value for name, value in m.modulator().items()},
                     **{f"observer_{name}": value for name, value in m.observer().items()},
                     **{f"adaptation_{name}": value for name, value in m.adaptation().items()},
+                    "tight_rs_most": ref.Machine(over_current_a=5.0).adaptation()["rs_most"],
+                    "tight_d_ilimit_hs_q14": ref.Machine(over_current_a=5.0).estimator()["d_ilimit_hs_q14"],
                     "duty_per_volt_24": m.duty_per_volt_q16(24.0), "duty_per_volt_12": m.duty_per_volt_q16(12.0),
                     "radius_24": m.circle_radius_q14(24.0), "radius_34": m.circle_radius_q14(34.0)}
 

@@ -200,6 +200,8 @@ class Machine:
     window_s: float = 1.6e-6
     peak_current_a: float = 4.4     # of 32768 counts
     maximum_current_a: float = 2.75
+    over_current_a: float = 3.8
+    over_voltage_v: float = 34.0
     nominal_rpm: float = 2800.0
     maximum_rpm: float = 5500.0
     kfilter_velestim: int = 748
@@ -247,6 +249,33 @@ class Machine:
         return self.kphi / SQRT3 / (1000 * 2 * math.pi / 60) / self.pole_pairs
 
     @property
+    def fastest_rpm(self):
+        return max(self.maximum_rpm, 1.5 * self.nominal_rpm)
+
+    @property
+    def shares(self):
+        """In volts: what 99 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
+        room = 0.99 * 131068 * self.u0 - self.over_voltage_v / SQRT3
+        return room, 2 / SQRT3 * self.over_current_a * self.rs_ohm, \
+            1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
+
+    @property
+    def ldi_share(self):
+        """What is left of L di/dt with R as large as the adaptation makes it, three quarters at least."""
+        room, ri, ldi = self.shares
+        return clamp((room - 1.6 * ri) / ldi, 0.75, 1)
+
+    @property
+    def ldi_ls_share(self):
+        return min(self.ldi_share * self.fastest_rpm / (1.5 * self.nominal_rpm), 1)
+
+    @property
+    def rs_end(self):
+        """How far R may grow in what is left beside that."""
+        room, ri, ldi = self.shares
+        return (room - self.ldi_share * ldi) / ri
+
+    @property
     def lost_current(self):
         """Phase current (Q13) that half the bus takes back within the dead time: below it less voltage is lost."""
         return self.bus_v / 2 * self.dead_time_s / self.ls_h / self.i0 / 4
@@ -282,11 +311,11 @@ class Machine:
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
-            "d_ilimit_ls_q14": min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
-            "d_ilimit_hs_q14": min(nearest(self.current_step(self.maximum_rpm) / 2), 4095),
+            "d_ilimit_ls_q14": nearest(self.ldi_ls_share * min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383)),
+            "d_ilimit_hs_q14": nearest(self.ldi_share * min(nearest(self.current_step(self.maximum_rpm) / 2), 4095)),
             "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
-            "kfilter_velestim_q16": 2 * self.kfilter_velestim,
+            "kfilter_velestim_q16": nearest((1 - (1 - self.kfilter_velestim / 32768) ** 2) * WORD),
             "nominal_erpm": int(self.eight_samples_erpm / unit),
             "decimate_erpm": nearest(self.nominal_rpm * self.pole_pairs / 10 / unit),
             "inv_kfi": nearest(self.inv_kfi * 16384 / unit),
@@ -316,7 +345,7 @@ class Machine:
         e = self.estimator()
         return {
             "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
-            "rs_most": q15(0.6), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
+            "rs_most": q15(min(0.6, self.rs_end - 1)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
             "rs_base_q16": e["rs_q16"],
         }
 
@@ -462,15 +491,19 @@ def turn_small(x, y, a_q16_rad):
 
 @dataclass
 class Estimator:
-    """The PLL of Equations 1 to 7 in integers; p is Machine.estimator()."""
+    """The PLL of Equations 1 to 7 in integers; p is Machine.estimator(). What need not follow each sample is settled every second period."""
     p: dict
     kfilter_esdq_q16: int = 2400
-    history: list = field(default_factory=lambda: [(0, 0)] * 8)  # oldest first
+    history: list = field(default_factory=lambda: [(0, 0)] * 9)  # of every period, oldest first
+    oldest: tuple = (0, 0)
+    periods: int = 0
+    own: tuple = field(default_factory=lambda: sincos(0))        # frame of the periods to come
     v: list = field(default_factory=lambda: [(0, 0)] * 2)        # two periods ago, one period ago
     e: tuple = (0, 0)
     e_d: int = 0
     e_q: int = 0
     omega: int = 0
+    before: int = 0     # omega of the period before
     filtered: int = 0
     rho: int = 0        # modulo 2^32
     step: int = 0       # of a period, 2^32 = a turn
@@ -491,7 +524,7 @@ class Estimator:
         period (3.5 steps, half a radian at most); one sample above, which counts eightfold."""
         p = self.p
         slow = magnitude(self.speed) < p["nominal_erpm"]
-        base, limit = (self.history[0], p["d_ilimit_ls_q14"]) if slow else (self.history[-1], p["d_ilimit_hs_q14"])
+        base, limit = (self.oldest, p["d_ilimit_ls_q14"]) if slow else (self.history[-1], p["d_ilimit_hs_q14"])
         change = [clamp(s16(n - b), -limit, limit) for n, b in zip(now, base)]
         v = [share(s16(c if slow else 8 * c), ls_q16) for c in change]
         if slow:
@@ -518,11 +551,21 @@ class Estimator:
         d, q = upper(self.e_d), upper(self.e_q)
         most = emf_sum_max(inv_kfi)
         total = clamp(s16(q - self.sign * d), -most, most)
-        self.omega = s16(total * inv_kfi // 2048)
+        self.before, self.omega = self.omega, s16(total * inv_kfi // 2048)
         self.step = self.omega * p["deltat_q32"]
         self.rho = (self.rho + self.step) % (1 << 32)
         self.half_step = share(self.omega, p["half_step_q16_rad"])
-        self.filtered = lowpass(self.filtered, self.omega, p["kfilter_velestim_q16"])
+
+    def settle(self):
+        """After every second period: the filtered speed, the current of 6.5 periods ago, which is eight before the next two in their mean, and the
+        frame of the next two."""
+        self.periods += 1
+        if self.periods % 2:
+            return
+        self.oldest = tuple(s16(six - six // 4 + eight // 4) for six, eight in zip(self.history[-7], self.history[-9]))
+        self.filtered = lowpass(self.filtered, (self.omega + self.before) // 2, self.p["kfilter_velestim_q16"])
+        self.own = sincos(self.next_angle())
+        self.follow()
 
     def follow(self):
         """For the next periods: the sign of Equation 2, Eq's above a tenth of nominal speed and the filtered speed's below; 3.5 steps, half a radian
@@ -535,15 +578,15 @@ class Estimator:
     def tick_free(self, now, ls_q16, inv_kfi):
         """In the estimator's own frame, by its own sine and cosine."""
         self.back_emf(now, ls_q16)
-        self.pll(*park(*self.e, *sincos(self.rho // WORD)), inv_kfi)
-        self.follow()
+        self.pll(*park(*self.e, *self.own), inv_kfi)
+        self.settle()
 
     def tick_closed(self, now, ls_q16, inv_kfi, frame):
         """In the control frame of this sample, turned back by half a step to the middle of the last period."""
         self.back_emf(now, ls_q16)
         d, q = park(*self.e, *frame)
         self.pll(s16(d - share(q, self.half_step)), s16(q + share(d, self.half_step)), inv_kfi)
-        self.follow()
+        self.settle()
 
     def commanded(self, v):
         self.v = [self.v[1], tuple(v)]
@@ -554,37 +597,53 @@ class EstimatorReal:
     """The same equations in float64 and SI units, with exact rotations."""
     m: Machine
     kfilter_esdq: float = 1200 / 32768
-    history: list = field(default_factory=lambda: [0j] * 8)
+    history: list = field(default_factory=lambda: [0j] * 9)
+    oldest: complex = 0j
     v: list = field(default_factory=lambda: [0j] * 2)
     e_dq: complex = 0j
     omega: float = 0.0     # electrical rpm
+    before: float = 0.0
     filtered: float = 0.0
     rho: float = 0.0       # turns, not wrapped
     frame: float = 0.0     # turns: angle of the next sample
+    own: float = 0.0       # turns: the estimator's own frame for two periods
+    sign: int = 0
+    periods: int = 0
 
     def tick(self, i, inv_kphi_ratio, closed):
         m, rad = self.m, 2 * math.pi
         step = self.omega * m.turns_per_erpm  # turns a period
         if abs(self.filtered) < m.eight_samples_erpm:
-            limit = m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
-            change = i - self.history[0]
+            limit = m.ldi_ls_share * m.current_step(m.eight_samples_erpm / m.pole_pairs, 8) * m.i0
+            change = i - self.oldest
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit)) / 8
             change *= cmath.rect(1.0, clamp(3.5 * self.filtered * m.turns_per_erpm * rad, -0.5, 0.5))
         else:
-            limit = m.current_step(m.maximum_rpm) * m.i0
+            limit = m.ldi_share * m.current_step(m.maximum_rpm) * m.i0
             change = i - self.history[-1]
             change = complex(clamp(change.real, -limit, limit), clamp(change.imag, -limit, limit))
         e = sum(self.v) / 2 - m.rs_ohm * (i + self.history[-1]) / 2 - m.ls_h / m.period_s * change
         self.history = self.history[1:] + [i]
-        e_dq = e * cmath.rect(1.0, -rad * ((self.frame - step / 2) if closed else self.rho))
+        e_dq = e * cmath.rect(1.0, -rad * ((self.frame - step / 2) if closed else self.own))
         self.e_dq += self.kfilter_esdq * (e_dq - self.e_dq)
-        decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
-        total = self.e_dq.imag - self.e_dq.real if decides >= 0 else self.e_dq.imag + self.e_dq.real
+        total = self.e_dq.imag - self.sign * self.e_dq.real
         per_volt = SQRT3 * 1000 * m.pole_pairs / m.kphi * inv_kphi_ratio
-        self.omega = clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
+        self.before, self.omega = self.omega, clamp(total * per_volt, -32767.0 * m.speed_unit, 32767.0 * m.speed_unit)
         self.rho += self.omega * m.turns_per_erpm
-        self.filtered += m.kfilter_velestim / 32768 * (self.omega - self.filtered)
         self.frame = self.rho + self.omega * m.turns_per_erpm / 2
+        self.settle()
+
+    def settle(self):
+        """After every second period."""
+        m = self.m
+        self.periods += 1
+        if self.periods % 2:
+            return
+        self.oldest = 0.75 * self.history[-7] + 0.25 * self.history[-9]
+        self.filtered += (1 - (1 - m.kfilter_velestim / 32768) ** 2) * ((self.omega + self.before) / 2 - self.filtered)
+        self.own = self.frame
+        decides = self.e_dq.imag if abs(self.filtered) > m.nominal_rpm * m.pole_pairs / 10 else self.filtered
+        self.sign = 1 if decides >= 0 else -1
 
     def commanded(self, v):
         self.v = [self.v[1], v]
@@ -871,9 +930,10 @@ class ObserverReal(Observer):
 
 # ---- start ----------------------------------------------------------------------------------------------------------
 
-def forced_angle(rate_q10, end_q10, direction, speed_q10, angle_q32):
-    """One period of the start ramp: counts/1024 per period, angle in 2^-32 turns (2^-16 counts)."""
-    speed = min(speed_q10 + rate_q10, end_q10)
+def forced_angle(rate_q10, end_q10, direction, speed_q10, angle_q32, tick):
+    """One period of the start ramp, ticks 1, 2, ...: counts/1024 per period, angle in 2^-32 turns (2^-16 counts). The speed grows before every odd
+    tick, for two periods."""
+    speed = min(speed_q10 + 2 * rate_q10, end_q10) if tick % 2 else speed_q10
     return speed, (angle_q32 + direction * speed * 64) % (1 << 32), int(speed == end_q10)
 
 

@@ -1,7 +1,7 @@
 /* The blocks of the control law, each with all inputs and all parameters of their ranges.
  *
  * sources: firmware/control/trig.c
- * options: -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40 */
+ * options: -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40 -eva-subdivide-non-linear-function estimator_oldest:100 */
 #include "any.h"
 
 #include "control/adaptation.h"
@@ -331,10 +331,22 @@ void proof_speed_ramp(void)
 void proof_forced_angle(void)
 {
     forced_angle_params_t p = { any_l(0, 8000000l), any(1, 2000) };
-    forced_angle_t f = { any_l(0, p.end_speed_q10), any_ul(0, UINT32_MAX), any(0, 6000) };
-    (void)forced_angle_tick(&f, &p, any(0, 1) ? 1 : -1);
+    forced_angle_t f = { any_l(0, p.end_speed_q10), any_ul(0, UINT32_MAX), any_ul(0, UINT32_MAX), any(0, 6000) };
+    (void)forced_angle_accelerate(&f, &p, any(0, 1) ? 1 : -1, any_u(1, 2));
     //@ check speed: 0 <= f.speed_q10 <= 8000000;
+    forced_angle_move(&f);
     (void)forced_angle(&f);
+}
+
+/** estimator.h: what is kept of two currents is no larger than they are. Beta ends at 16364: the trip level is at most 86.5 %. */
+void proof_estimator_oldest(void)
+{
+    //@ loop unroll 80;
+    for (int16_t k = 0; k < 80; k++) {
+        int16_t most = (int16_t)(256 * k + 255);
+        int16_t oldest = estimator_oldest(any((int16_t)-most, most), any((int16_t)-most, most));
+        //@ check between: -most <= oldest <= most;
+    }
 }
 
 /** estimator.h: the small blocks with every int16. */

@@ -35,6 +35,7 @@ static void any_drive(uint16_t state)
     drive.frame.cos = any(-32767, 32767);
     drive.forced.speed_q10 = any_l(-forced_max, forced_max);
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
+    drive.forced.step_q32 = any_ul(0, UINT32_MAX);
     drive.forced.increase_q10 = any(0, HANDOVER_HURRY * params.forced.increase_rate_q10);
     drive.run.handover.agreed_steps = ANYU16();
     drive.run.handover.speed_is_preset = any_u(0, 1);
@@ -53,20 +54,18 @@ static void any_estimator(estimator_t *e)
         e->history_q14[i].alpha = any((int16_t)-alpha_max, alpha_max);
         e->history_q14[i].beta = any((int16_t)-beta_max, beta_max);
     }
-    e->slot = any_u(0, ESTIMATOR_HISTORY - 1);
     e->i_last_q14.alpha = any((int16_t)-alpha_max, alpha_max);
     e->i_last_q14.beta = any((int16_t)-beta_max, beta_max);
     e->i_oldest_q14.alpha = any((int16_t)-alpha_max, alpha_max);
     e->i_oldest_q14.beta = any((int16_t)-beta_max, beta_max);
     e->v_last_q13.alpha = any((int16_t)-voltage_max, voltage_max);
     e->v_last_q13.beta = any((int16_t)-voltage_max, voltage_max);
-    e->v_before_q13.alpha = any((int16_t)-voltage_max, voltage_max);
-    e->v_before_q13.beta = any((int16_t)-voltage_max, voltage_max);
     e->v_mean_q13.alpha = any((int16_t)-voltage_max, voltage_max);
     e->v_mean_q13.beta = any((int16_t)-voltage_max, voltage_max);
     e->e_d_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
     e->e_q_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
     e->omega_erpm = any(-32767, 32767);
+    e->omega_before_erpm = any(-32767, 32767);
     e->omega_filtered_q16 = any_l(-32767 * 65536l, INT32_MAX);
     e->rho_q32 = any_ul(0, UINT32_MAX);
     e->next = ANYU16();
@@ -128,7 +127,6 @@ static void bounds_hold_again(void)
     //@ check bus: 0 <= drive.bus_q31;
     //@ check circle: 0 <= drive.circle.limit_q14 <= radius_max;
     //@ check forced: -forced_max <= drive.forced.speed_q10 <= forced_max;
-    //@ check slot: e->slot < ESTIMATOR_HISTORY;
     //@ check i_last: -alpha_max <= e->i_last_q14.alpha <= alpha_max && -beta_max <= e->i_last_q14.beta <= beta_max;
     //@ check i_oldest: -alpha_max <= e->i_oldest_q14.alpha <= alpha_max && -beta_max <= e->i_oldest_q14.beta <= beta_max;
     //@ check old_turn: -32767 <= e->old_turn_q16_rad && -1 <= e->sign <= 1;
@@ -136,11 +134,10 @@ static void bounds_hold_again(void)
     //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
     //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
     //@ check v_last: -voltage_max <= e->v_last_q13.alpha <= voltage_max && -voltage_max <= e->v_last_q13.beta <= voltage_max;
-    //@ check v_before: -voltage_max <= e->v_before_q13.alpha <= voltage_max && -voltage_max <= e->v_before_q13.beta <= voltage_max;
     //@ check v_mean: -voltage_max <= e->v_mean_q13.alpha <= voltage_max && -voltage_max <= e->v_mean_q13.beta <= voltage_max;
     //@ check emf_d: emf_dq_max * -65536 <= e->e_d_q28 <= emf_dq_max * 65536 + 65535;
     //@ check emf_q: emf_dq_max * -65536 <= e->e_q_q28 <= emf_dq_max * 65536 + 65535;
-    //@ check omega: -32767 <= e->omega_erpm;
+    //@ check omega: -32767 <= e->omega_erpm && -32767 <= e->omega_before_erpm;
     //@ check omega_filtered: -32767 * 65536 <= e->omega_filtered_q16;
     //@ check reference: -32767 <= c->reference_erpm;
     //@ check ref: -current_max <= c->ref_q13.d <= current_max && -current_max <= c->ref_q13.q <= current_max;

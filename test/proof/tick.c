@@ -2,9 +2,10 @@
  *
  * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c firmware/drive/limits.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING
- * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between -eva-subdivide-non-linear-function vd_limit:100
+ * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between
+ *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
- *     -eva-slevel-function drive_tick:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
+ *     -eva-slevel-function drive_tick:200,drive_rest:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
  *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20 */
 #include "any.h"
 
@@ -214,7 +215,7 @@ static drive_samples_t any_samples(void)
 /** As a number, an address is known to equal itself and nothing else: any use of it is an alarm. */
 #define SEALED(x) (*(drive_t **)&(x))
 
-static uint16_t calibrates; /* the calibration's sums are sealed */
+static uint16_t calibrates; /* the calibration has had its sample, and its sums are sealed */
 
 static void slow_in(uint16_t slot)
 {
@@ -222,7 +223,11 @@ static void slow_in(uint16_t slot)
     drive_samples_t raw;
     drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
     raw = any_samples();
-    drive_slow(&drive, &params, &raw);
+    if (!calibrates) {
+        drive_slow(&drive, &params, &raw);
+    } else if ((slot & (SLOW_EVERY - 1u)) == 0u) {
+        drive_quarter(&drive, &params, &raw);
+    }
     //@ check sums_stay: seals == 0 || (SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive);
     //@ check ended: seals == 0 || state == DRIVE_CALIBRATE || drive.state != DRIVE_CALIBRATE;
     bounds_hold_again();
@@ -272,6 +277,8 @@ static void calibrate_after(uint16_t k)
     drive.calibration.sum_a = any_l(-32768l * k, 32767l * k);
     drive.calibration.sum_b = any_l(-32768l * k, 32767l * k);
     drive_tick(&drive, &params, &raw, &duty);
+    drive_rest(&drive, &params, &raw);
+    //@ check off: drive.state == DRIVE_CALIBRATE || drive.state == DRIVE_STOPPED || drive.state == DRIVE_FAULT;
     //@ check sum_a: -32768 * (k + 1) <= drive.calibration.sum_a <= 32767 * (k + 1);
     //@ check sum_b: -32768 * (k + 1) <= drive.calibration.sum_b <= 32767 * (k + 1);
     //@ check ends: k < 1023 || drive.state != DRIVE_CALIBRATE;

@@ -84,7 +84,7 @@ def test_rows_without_a_fault_end_in_the_reset_that_was_one() -> None:
 
 # ---- the firmware on the virtual board -------------------------------------------------------------------------------------------
 
-SIGNALS = ("fw.fault", "fw.i_a_a", "fw.i_b_a", "fw.v_d_v", "fw.v_q_v", "fw.theta_ctrl_deg", "reg.ADC1BUF3", "fw.speed_est_rpm", "fw.state")
+SIGNALS = ("fw.fault", "fw.i_a_a", "fw.i_b_a", "fw.v_d_v", "fw.v_q_v", "fw.theta_ctrl_deg", "reg.ADC1BUF3", "fw.speed_est_rpm", "fw.state", "fw.slow_phase")
 
 
 def faulted(causes: dict[str, float], at_s: float) -> tuple[str, np.ndarray, Library]:
@@ -115,11 +115,12 @@ def faulted(causes: dict[str, float], at_s: float) -> tuple[str, np.ndarray, Lib
 def test_what_the_board_sends_is_its_trace_to_the_count(causes: dict[str, float], fault: set[int]) -> None:
     sent, trace, library = faulted(causes, 0.5)
     record, = recorder.parse(sent, "")
-    assert record.fault in fault and record.every == 1 and len(record.words) == 72
+    assert record.fault in fault and record.every == 2 and len(record.words) == 72
     rows = recorder.scaled(record, library.params, library.states)
     at = int(np.flatnonzero(trace[:, 0])[0])
     assert record.fault_row(7) == 56
-    part = {name: trace[at - 56:at + 16, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
+    first = at + int(trace[at, SIGNALS.index("fw.slow_phase")]) % 2 # rows are those of the even periods
+    part = {name: trace[first - 112:first + 32:2, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
     for name, values in (("fw.i_a_a", rows.i_a), ("fw.i_b_a", rows.i_b), ("fw.v_d_v", rows.v_d), ("fw.v_q_v", rows.v_q)):
         scale = library.params["COUNT_CURRENT_A" if name.endswith("_a") else "COUNT_VOLTAGE_V"]
         assert np.round(part[name] / scale).tolist() == np.round(values / scale).tolist(), name
@@ -155,7 +156,7 @@ def test_a_run_that_ends_in_a_fault_shows_its_record_and_make_recorder_the_same(
     assert 'alt="recorder"' in page and "recorder.csv" in page and LOG in page
     assert "simulated 1.00 s" in out, "what is run on for the record is no part of the run"
     code, out, _ = command("recorder", str(tmp_path / "run" / LOG), "--library", str(LIBRARY), "--out", str(tmp_path / "again"))
-    assert code == 0 and "OVERCURRENT_HW: 56 rows before it, 16 from it on, 1 period apart" in out
+    assert code == 0 and "OVERCURRENT_HW: 56 rows before it, 16 from it on, 2 periods apart" in out
     assert 'alt="recorder"' in (tmp_path / "again" / "index.html").read_text(encoding="utf-8")
     tables = [list(csv.DictReader((tmp_path / name / "recorder.csv").open(encoding="utf-8"))) for name in ("run", "again")]
     assert tables[0] == tables[1] and len(tables[0]) == 72 and tables[0][56]["state"] == "FAULT" and float(tables[0][56]["time_ms"]) == 0.0

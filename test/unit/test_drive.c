@@ -1,4 +1,4 @@
-/* The whole drive: power-up, one slow block a period, controlled stop, both directions alike, and the closed loop on the ideal motor. */
+/* The whole drive: power-up, a quarter of the slow work every second period, controlled stop, both directions alike, and the closed loop on the ideal motor. */
 #include "ideal_motor.h"
 
 void setUp(void)
@@ -42,14 +42,14 @@ void test_a_stopped_drive_stays_off_and_shows_neither_speed_nor_reference(void)
     }
 }
 
-/* ---- slow steps: one block a period, each every eighth ---- */
+/* ---- slow steps: a quarter every second period, each every eighth ---- */
 
-void test_each_slow_block_runs_in_its_own_period_of_eight(void)
+void test_each_quarter_of_the_slow_work_runs_in_its_own_period_of_eight(void)
 {
     uint16_t n;
     rig_closed(1, 8000);
     for (n = 0; n < 32u; n++) {
-        uint16_t slot;
+        uint16_t period;
         drive.run.control.reference_erpm = 7000;
         drive.command.target_erpm = 8000;
         drive.run.fieldweak.index = 99;
@@ -61,15 +61,15 @@ void test_each_slow_block_runs_in_its_own_period_of_eight(void)
         rig_speed(8000);
         drive.run.estimator.e_q_q28 = 10000L * 65536;
         rig_tick(1);
-        slot = drive.ticks & 7u;
+        period = drive.ticks & 7u;
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 0u, drive.run.control.reference_erpm != 7000, "speed");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 1u, drive.run.fieldweak.index != 99u, "field weakening");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 2u, drive.duty_per_volt_q16 != 1u, "bus");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 3u, drive.circle.reciprocal != 1u, "circle");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 5u, drive.run.stall_steps != 99u, "protection");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(slot == 6u, drive.run.control.brake_limit_q13 != 1, "hand-over");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 0u, drive.run.control.reference_erpm != 7000, "speed");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 2u, drive.run.fieldweak.index != 99u, "field weakening");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 2u, drive.duty_per_volt_q16 != 1u, "bus");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 4u, drive.circle.reciprocal != 1u, "circle");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 6u, drive.run.stall_steps != 99u, "protection");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 6u, drive.run.control.brake_limit_q13 != 1, "hand-over");
     }
 }
 
@@ -82,9 +82,86 @@ void test_field_weakening_is_indexed_by_the_reference_and_not_the_speed(void)
     EACH(n, cases) {
         rig_closed(1, cases[n].reference_erpm);
         rig_speed(cases[n].speed_erpm);
-        rig_next_slot(1);
+        rig_next_quarter(1);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(cases[n].index, drive.run.fieldweak.index);
+    }
+}
+
+void test_slow_work_is_due_every_second_period_while_the_bridge_switches_and_else_in_each(void)
+{
+    EACH(state, rig_outputs) {
+        for (uint16_t n = 0; n < 16u; n++) {
+            rig_power_up();
+            drive.state = state;
+            drive.ticks = n;
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(n % 2u == 0u, drive_slow_is_due(&drive), golden_row(state));
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(rig_outputs[state] == (uint16_t)OUTPUTS_PWM, drive_tick(&drive, &params, &samples, &out.duty), golden_row(state));
+        }
+    }
+}
+
+/* The bus' filter stands for the quarters, the estimator's history for what comes every second period, the offsets' sum for the bridge that is off. */
+void test_a_period_with_the_bridge_off_has_its_own_work_and_every_second_a_quarter(void)
+{
+    rig_currents(100, 50);
+    rig_bus(20.0F);
+    drive.run.estimator.history_q14[0].alpha = 7777;
+    for (uint16_t n = 0; n < 32u; n++) {
+        int32_t sum_a = drive.calibration.sum_a, bus_q31 = drive.bus_q31;
+        rig_tick(1);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, drive.state);
+        TEST_ASSERT_TRUE_MESSAGE(sum_a != drive.calibration.sum_a, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(drive.ticks % 8u == 2u, bus_q31 != drive.bus_q31, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(7777, drive.run.estimator.history_q14[0].alpha, golden_row(n));
+    }
+}
+
+void test_filter_history_and_dead_time_follow_every_second_period_of_the_law(void)
+{
+    rig_closed(1, 8000);
+    for (uint16_t n = 0; n < 32u; n++) {
+        uint16_t even;
+        int16_t newest = drive.run.estimator.history_q14[0].alpha;
+        int32_t filtered_q16 = drive.run.estimator.omega_filtered_q16;
+        drive.run.control.ref_q13.q = (int16_t)(2000 + n);
+        drive.dead.a = 9999;
+        rig_currents((int16_t)(100 + n), 50);
+        drive.run.estimator.omega_erpm = (int16_t)(7000 + n);
+        rig_tick(1);
+        even = (uint16_t)((drive.ticks & 1u) == 0u);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, newest != drive.run.estimator.history_q14[0].alpha, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, filtered_q16 != drive.run.estimator.omega_filtered_q16, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(even, drive.dead.a != 9999, golden_row(n));
+    }
+}
+
+/* Their centres are one and two periods of angle ahead of the frame that the slow work finds: three half steps in the mean. */
+void test_dead_time_is_that_of_the_current_asked_for_in_the_middle_of_the_two_pulses_to_come(void)
+{
+    drive_params_t p = params;
+    p.svm.knee_q13 = 810; /* beyond the current: so that the dead time is the current, 40 counts for 256 */
+    p.svm.dead_slope_q8 = 40;
+    EACH_DIRECTION(direction) {
+        for (uint16_t n = 0; n < 40u; n++) {
+            dead_duties_t expected;
+            rig_closed(direction, (int16_t)(direction * 8000));
+            drive.run.control.ref_q13.d = -480;
+            drive.run.control.ref_q13.q = (int16_t)(direction * 640);
+            drive.run.estimator.half_step_q16_rad = (int16_t)(direction * 2000); /* three are 0.0916 rad, 955 counts */
+            drive.angle = (angle_t)(n * 1638u);
+            drive.frame = trig_sincos(drive.angle);
+            drive_prepare(&drive, &p);
+            expected = svm_compensation(&p.svm, phases_of(drive.run.control.ref_q13, trig_sincos((angle_t)(drive.angle + (uint16_t)(direction * 955)))));
+            /* the tangent makes 800 counts longer by 0.4 %, the turn and the phases are rounded by 3 in all: 7 of current, 2 of the duty; a half step is 24 and 4 */
+            TEST_ASSERT_INT16_WITHIN(2, expected.a, drive.dead.a);
+            TEST_ASSERT_INT16_WITHIN(2, expected.b, drive.dead.b);
+            TEST_ASSERT_INT16_WITHIN(2, expected.c, drive.dead.c);
+        }
+        drive.run.estimator.half_step_q16_rad = (int16_t)(direction * 32767); /* three would not fit the word: half a radian at most */
+        drive_prepare(&drive, &p);
+        TEST_ASSERT_EQUAL_INT16(svm_compensation(&p.svm, phases_of(dq_turn(drive.run.control.ref_q13, (int16_t)(direction * 32766)), drive.frame)).a,
+                                drive.dead.a);
     }
 }
 
@@ -133,7 +210,7 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off_in_both_dir
     EACH_DIRECTION(direction) {
         run_at(direction, 10000);
         drive.command.run = 0;
-        ideal_motor_run(1);
+        ideal_motor_run(SLOW_PERIODS);
         EXPECT_DRIVE(DRIVE_STOPPING, FAULT_NONE, "asked to stop");
         drive_start(&drive, &params, (int16_t)-direction); /* waits for the stop */
         TEST_ASSERT_EQUAL_INT16(0, drive.command.run);

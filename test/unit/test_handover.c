@@ -12,6 +12,7 @@ static void at_the_end_of_the_ramp(int16_t direction)
     drive.periods = 0;
     drive.forced.speed_q10 = params.forced.end_speed_q10;
     drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
+    drive.command.target_erpm = (int16_t)(direction * 6000); /* the quarter that hands over looks at it too */
     rig_speed((int16_t)(direction * 4800));
 }
 
@@ -19,13 +20,6 @@ void setUp(void)
 {
     rig_power_up();
     at_the_end_of_the_ramp(1);
-}
-
-/** The slow work of one period. */
-static void slow(uint16_t slot)
-{
-    drive.ticks = slot;
-    drive_slow(&drive, &params, &samples);
 }
 
 /* ---- readiness ---- */
@@ -44,8 +38,8 @@ static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
     while (drive.state == (uint16_t)DRIVE_RAMP && steps < most) {
         rig_speed(speed_erpm);
         forced_ahead(0x2000);
-        slow(8);
-        slow(9); /* the next period carries it out */
+        rig_slow(0);
+        rig_slow(1); /* the next quarter carries it out */
         steps++;
     }
     return steps;
@@ -93,7 +87,7 @@ void test_agreement_counts_from_the_early_speed_on_and_waiting_at_the_end_of_the
                 force(cases[n].forced_erpm);
                 rig_speed((int16_t)((float)direction * cases[n].forced_erpm));
                 forced_ahead(0x3800); /* not due: the drive goes on counting */
-                slow(8);
+                rig_slow(0);
                 TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].counts * steps, drive.run.handover.agreed_steps, golden_row(n));
                 TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.periods, golden_row(n));
             }
@@ -114,7 +108,7 @@ void test_rotor_may_swing_by_half_the_speed_once_the_estimator_has_agreed(void)
             at_the_end_of_the_ramp(direction);
             drive.run.handover.agreed_steps = (uint16_t)cases[n].before;
             rig_speed((int16_t)(direction * cases[n].speed_erpm));
-            slow(8);
+            rig_slow(0);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].after, drive.run.handover.agreed_steps, golden_row(n));
         }
     }
@@ -135,7 +129,7 @@ void test_speed_that_is_off_in_the_mean_by_an_eighth_is_waited_for_until_the_ram
             force((float)forced);
             rig_speed((int16_t)(forced + cases[n].off_erpm + swing));
             forced_ahead(0x3800);
-            slow(8);
+            rig_slow(0);
             most = (drive.run.handover.agreed_steps > most) ? drive.run.handover.agreed_steps : most;
         }
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].agrees, most >= params.agree_steps, golden_row(n));
@@ -154,7 +148,7 @@ void test_mean_deviation_takes_a_32nd_of_it_a_step_and_of_16383_at_most_with_its
             drive.run.handover.ahead_erpm = 0;
             force(cases[n].forced_erpm);
             rig_speed((int16_t)(direction * cases[n].seen_erpm));
-            slow(8);
+            rig_slow(0);
             TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].mean_erpm, drive.run.handover.ahead_erpm, golden_row(n));
         }
     }
@@ -182,14 +176,14 @@ void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_
         at_the_end_of_the_ramp(1);
         force(cases[n].forced_erpm);
         rig_speed(cases[n].seen_erpm);
-        slow(8);
+        rig_slow(0);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].increase_q10, drive.forced.increase_q10, golden_row(n));
     }
     at_the_end_of_the_ramp(1);
     drive.run.handover.agreed_steps = params.agree_steps;
     force(4710.0F);
     rig_speed(4700);
-    slow(8);
+    rig_slow(0);
     TEST_ASSERT_EQUAL_INT16(0, drive.forced.increase_q10); /* it waits for the hand-over */
 }
 
@@ -200,8 +194,8 @@ static void begin_closed_loop(float forced_erpm, int16_t speed_erpm)
     force(forced_erpm);
     rig_speed(speed_erpm);
     forced_ahead(0);
-    slow(8);
-    slow(9);
+    rig_slow(0);
+    rig_slow(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
 
@@ -241,8 +235,8 @@ void test_rotor_that_never_comes_to_where_the_current_pulls_it_is_START_FAILED(v
             force(4000.0F);
             rig_speed((int16_t)(direction * 3800)); /* agrees, and slower than the current turns */
             forced_ahead((int16_t)(direction * 0x3800));
-            slow(8);
-            slow(9);
+            rig_slow(0);
+            rig_slow(1);
         }
         TEST_ASSERT_EQUAL_UINT16(DRIVE_FAULT, drive.state);
         TEST_ASSERT_EQUAL_UINT16(FAULT_START_FAILED, drive.fault);
@@ -263,32 +257,41 @@ void test_rotor_that_comes_in_the_last_step_is_handed_over(void)
         force(4000.0F);
         rig_speed(3800);
         forced_ahead(cases[n].offset);
-        slow(8);
-        slow(9);
+        rig_slow(0);
+        rig_slow(1);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
     }
 }
 
-void test_readiness_is_looked_at_every_eighth_period_and_acted_on_in_the_next_one_only(void)
+/** The slow work of a period, where it is due. */
+static void period(uint16_t ticks)
+{
+    drive.ticks = ticks;
+    if (drive_slow_is_due(&drive)) {
+        drive_slow(&drive, &params, &samples);
+    }
+}
+
+void test_readiness_is_looked_at_every_eighth_period_and_acted_on_two_periods_later_only(void)
 {
     uint16_t n;
     drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
     forced_ahead(0);
     for (n = 1; n <= 8u; n++) {
-        slow(n);
+        period(n);
         TEST_ASSERT_EQUAL_UINT16(params.agree_steps - (n < 8u), drive.run.handover.agreed_steps);
         TEST_ASSERT_EQUAL_UINT16((n == 8u) ? 8 : 0, drive.periods);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state); /* both in one period would miss the deadline */
     }
-    for (n = 8; n <= 17u; n++) {
-        if (n != 9u) {
-            slow(n);
-            TEST_ASSERT_EQUAL_UINT16((n == 17u) ? DRIVE_CLOSED : DRIVE_RAMP, drive.state);
+    for (n = 8; n <= 18u; n++) {
+        if (n != 10u) {
+            period(n);
+            TEST_ASSERT_EQUAL_UINT16((n == 18u) ? DRIVE_CLOSED : DRIVE_RAMP, drive.state);
         }
     }
 }
 
-void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(void)
+void test_fault_or_stop_before_its_own_period_keeps_the_hand_over_from_happening(void)
 {
     static const drive_state_t states[] = { DRIVE_STOPPED, DRIVE_FAULT, DRIVE_ALIGN };
     drive.run.handover.agreed_steps = params.agree_steps;
@@ -296,7 +299,7 @@ void test_fault_or_stop_in_its_own_period_keeps_the_hand_over_from_happening(voi
         drive.state = (uint16_t)states[n];
         drive.fault = (uint16_t)((states[n] == DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         drive.command.run = (states[n] == DRIVE_ALIGN);
-        slow(1);
+        rig_slow(1);
         TEST_ASSERT_EQUAL_UINT16(states[n], drive.state);
     }
 }
@@ -314,8 +317,8 @@ static uint16_t fall(int16_t direction, int16_t offset, int16_t *current_q13)
         rig_speed((int16_t)(direction * 5000));
         forced_ahead(offset);
         *current_q13 = (int16_t)(direction * drive.run.control.ref_q13.q);
-        slow(8);
-        slow(9);
+        rig_slow(0);
+        rig_slow(1);
         steps++;
     }
     return steps;
@@ -344,14 +347,14 @@ void test_rotor_that_falls_back_is_handed_over_with_the_current_that_is_left(voi
     for (n = 0; n < 80u; n++) {
         rig_speed(5000);
         forced_ahead(0x3800);
-        slow(8);
-        slow(9);
+        rig_slow(0);
+        rig_slow(1);
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
     TEST_ASSERT_INT16_WITHIN(20, 1021, drive.run.control.ref_q13.q); /* 2625 (253/256)^80, and a count a step */
     forced_ahead(0x1800);
-    slow(8);
-    slow(9);
+    rig_slow(0);
+    rig_slow(1);
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
     TEST_ASSERT_INT16_WITHIN(20, 1008, drive.run.handover.current_q13); /* a step later */
     TEST_ASSERT_INT16_WITHIN(20, (int16_t)(1008 * 0.831F), drive.run.control.ref_q13.q); /* cos 33.75 degrees */
@@ -370,8 +373,8 @@ void test_rotor_that_still_swings_back_at_the_floor_is_waited_for(void)
             drive.run.control.ref_q13.q = (int16_t)(direction * (params.open_loop_q13 >> 3));
             rig_speed((int16_t)(direction * cases[n].speed_erpm));
             forced_ahead(cases[n].offset);
-            slow(8);
-            slow(9);
+            rig_slow(0);
+            rig_slow(1);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
         }
     }
@@ -386,7 +389,7 @@ void test_current_is_whole_again_when_the_agreement_ends(void)
         drive.run.control.ref_q13.q = (int16_t)(direction * 500);
         drive.run.handover.agreed_steps = params.agree_steps;
         rig_speed(0);
-        slow(8);
+        rig_slow(0);
         TEST_ASSERT_EQUAL_INT16(direction * params.open_loop_q13, drive.run.control.ref_q13.q);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
     }
@@ -409,7 +412,7 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.run.control.v_q14.q = v_q;
     drive.run.handover.speed_is_preset = 0; /* as the start has left it */
     handover_now(&drive, &params);
-    slow(7);
+    handover_observe(&drive.run, &params);
 }
 
 /** q current that keeps the observed speed. */
@@ -455,16 +458,44 @@ void test_estimated_angle_of_the_next_sample_takes_over_with_its_frame(void)
     TEST_ASSERT_EQUAL_INT16(frame.cos, drive.frame.cos);
 }
 
+void test_period_after_the_hand_over_has_the_dead_time_of_the_new_frame(void)
+{
+    EACH_DIRECTION(direction) {
+        dq_t asked;
+        dead_duties_t expected;
+        at_the_end_of_the_ramp(direction);
+        drive.run.handover.agreed_steps = params.agree_steps;
+        drive.run.handover.is_due = 1;
+        drive.dead = (dead_duties_t){ 0, 0, 0 };
+        drive.angle = 0x1000;
+        drive.run.estimator.next = 0x3000;
+        drive.run.estimator.half_step_q16_rad = (int16_t)(direction * 800);
+        rig_slow(1);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+        asked = dq_turn(drive.run.control.ref_q13, (int16_t)(direction * 3 * 800));
+        expected = svm_compensation(&params.svm, phases_of(asked, trig_sincos(0x3000)));
+        TEST_ASSERT_EQUAL_INT16(expected.a, drive.dead.a);
+        TEST_ASSERT_EQUAL_INT16(expected.b, drive.dead.b);
+        TEST_ASSERT_EQUAL_INT16(expected.c, drive.dead.c);
+        TEST_ASSERT_TRUE(drive.dead.a != 0 || drive.dead.b != 0);
+    }
+}
+
 void test_observer_is_preset_once_and_before_the_first_step_of_the_speed_controller(void)
 {
+    int16_t held_q13;
     handover_now(&drive, &params);
     drive.run.observer.omega_q16 = 12345;
-    slow(6);
-    TEST_ASSERT_EQUAL_INT32(12345, drive.run.observer.omega_q16);
-    slow(7);
+    for (uint16_t quarter = 1; quarter < SLOW_QUARTERS; quarter++) {
+        rig_slow(quarter);
+        TEST_ASSERT_EQUAL_INT32(12345, drive.run.observer.omega_q16);
+    }
+    held_q13 = drive.run.control.ref_q13.q;
+    rig_slow(0);
     TEST_ASSERT_EQUAL_INT32(4800L * 65536, drive.run.observer.omega_q16);
+    TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current()); /* what the speed controller of this very quarter begins with */
     rig_speed(3000); /* the estimator and the observer: from here on the observer only follows the angle, which stands */
-    slow(15);
+    rig_slow(0);
     TEST_ASSERT_LESS_THAN_INT32(3000L * 65536, drive.run.observer.omega_q16);
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.run.observer.omega_q16);
 }
@@ -473,13 +504,13 @@ void test_observer_steps_by_the_estimators_angle_and_the_measured_q_current(void
 {
     observer_t expected;
     handover_now(&drive, &params);
-    slow(7);
+    rig_slow(0);
     speed_schedule(&drive.run, &params);
     expected = drive.run.observer;
     drive.run.estimator.rho_q32 += 0x0B000000ul; /* 48 degrees: faster than the 42 of 4800 erpm in 8 periods */
     drive.run.control.i_q13.q = 700;
     observer_step(&expected, &params.observer, drive.run.estimator.rho_q32, 700);
-    slow(15);
+    rig_slow(0);
     TEST_ASSERT_EQUAL_INT32(expected.omega_q16, drive.run.observer.omega_q16);
     TEST_ASSERT_EQUAL_INT32(expected.load_q16, drive.run.observer.load_q16);
     TEST_ASSERT_GREATER_THAN_INT16(4800, observer_speed(&drive.run.observer));
@@ -488,11 +519,13 @@ void test_observer_steps_by_the_estimators_angle_and_the_measured_q_current(void
 void test_stop_right_after_the_hand_over_goes_on_from_its_q_current_too(void)
 {
     EACH_DIRECTION(direction) {
+        int16_t held_q13;
         at_the_end_of_the_ramp(direction);
         handover_now(&drive, &params);
         drive.state = (uint16_t)DRIVE_STOPPING; /* the very next period */
-        slow(7);
-        TEST_ASSERT_INT16_WITHIN(2, drive.run.control.ref_q13.q, held_current());
+        held_q13 = drive.run.control.ref_q13.q;
+        rig_slow(0);
+        TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current());
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
     }
 }
@@ -524,20 +557,20 @@ void test_unrest_of_the_hand_over_lasts_until_its_d_current_is_gone(void)
 {
     at_the_end_of_the_ramp(1);
     hand_over(0x3000, 0, 0, 2000, 1);
-    slow(7); /* the preset; from here on the rotor stands and the observer knows it */
+    rig_slow(0); /* the preset; from here on the rotor stands and the observer knows it */
     drive.run.observer.omega_q16 = 0;
     drive.run.observer.load_q16 = 0;
     drive.run.control.i_q13.q = 0;
     drive.run.handover.offset = 1;
     for (uint16_t n = 0; n < 1000u; n++) {
-        slow(7);
+        rig_slow(0);
     }
     TEST_ASSERT_EQUAL_UINT16(OBSERVER_START_UNREST, drive.run.observer.unrest_steps);
     drive.run.observer.unrest_steps = OBSERVER_START_UNREST + 100;
-    slow(7);
+    rig_slow(0);
     TEST_ASSERT_EQUAL_UINT16_MESSAGE(OBSERVER_START_UNREST + 99, drive.run.observer.unrest_steps, "more of it fades");
     drive.run.handover.offset = 0;
-    slow(7);
+    rig_slow(0);
     TEST_ASSERT_EQUAL_UINT16(OBSERVER_START_UNREST + 98, drive.run.observer.unrest_steps);
 }
 

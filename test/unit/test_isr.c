@@ -21,9 +21,9 @@ static void maybe_trap(void)
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
-static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick;
+static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick, sample_comes_in_slow_work;
 
-static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
+static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
 static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 #define drive_tick(d, p, raw, duty) tick_and_meanwhile(d, p, raw, duty)
 #define drive_slow(d, p, raw) slow_and_look(d, p, raw)
@@ -31,9 +31,9 @@ static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_sampl
 #undef drive_tick
 #undef drive_slow
 
-/* What the duties were when the slow work began. */
+/* What the duties were when the slow work began, and how often it did. */
 static struct {
-    uint16_t duty_a, duty_b, duty_c;
+    uint16_t duty_a, duty_b, duty_c, calls;
 } at_slow;
 
 static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
@@ -41,11 +41,17 @@ static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_sampl
     at_slow.duty_a = P1DC1;
     at_slow.duty_b = P1DC2;
     at_slow.duty_c = P1DC3;
+    at_slow.calls++;
     drive_slow(d, p, raw);
+    if (sample_comes_in_slow_work) {
+        sample_comes_in_slow_work = 0;
+        _ADC1Interrupt();
+    }
 }
 
-static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
+static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
+    uint16_t switches;
     flag_during_tick = IFS0bits.AD1IF;
     if (slow_work_waits) {
         IFS0bits.T2IF = 1;
@@ -53,11 +59,12 @@ static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_
     if (sample_arrives_meanwhile) {
         IFS0bits.AD1IF = 1;
     }
-    drive_tick(d, p, raw, duty);
+    switches = drive_tick(d, p, raw, duty);
     if (trap_comes_meanwhile) {
         trap_comes_meanwhile = 0;
         _MathError();
     }
+    return switches;
 }
 
 #include "interrupts.h"
@@ -93,6 +100,7 @@ void setUp(void)
     slow_work_waits = 0;
     trap_comes_meanwhile = 0;
     trap_comes_in_the_hand_over = 0;
+    sample_comes_in_slow_work = 0;
 }
 
 /** Running: ALIGN has begun. */
@@ -121,7 +129,7 @@ void test_samples_come_from_the_channels_of_the_facts(void)
 void test_outputs_stay_overridden_off_until_a_start_then_bootstrap_then_pwm(void)
 {
     static const uint16_t expected[][2] = { /* periods, 0: the start; override */
-        { 1, 0x0000 }, { 3000, 0x0000 }, { 0, 0x0000 }, { 1, 0x0015 }, { 200, 0x0015 }, { 1, 0x3F00 }
+        { 1, 0x0000 }, { 3000, 0x0000 }, { 0, 0x0000 }, { 1, 0x0015 }, { 200, 0x0015 }, { 2, 0x3F00 }
     };
     P1OVDCON = 0x3F00;
     for (unsigned n = 0; n < sizeof expected / sizeof expected[0]; n++) {
@@ -164,10 +172,16 @@ void test_slow_work_waits_until_duties_are_written_and_they_fit_the_timer(void)
     control_interrupts(1024);
     drive_start(&board_drive, &board_params, 1);
     for (n = 0; n < 4200u; n++) {
+        uint16_t calls = at_slow.calls, switches = drive_is_running(&board_drive);
         control_interrupts(1);
-        TEST_ASSERT_EQUAL_UINT16(P1DC1, at_slow.duty_a);
-        TEST_ASSERT_EQUAL_UINT16(P1DC2, at_slow.duty_b);
-        TEST_ASSERT_EQUAL_UINT16(P1DC3, at_slow.duty_c);
+        if (!switches || board_drive.ticks % 2u == 0u) {
+            TEST_ASSERT_EQUAL_UINT16(calls + 1u, at_slow.calls);
+            TEST_ASSERT_EQUAL_UINT16(P1DC1, at_slow.duty_a);
+            TEST_ASSERT_EQUAL_UINT16(P1DC2, at_slow.duty_b);
+            TEST_ASSERT_EQUAL_UINT16(P1DC3, at_slow.duty_c);
+        } else {
+            TEST_ASSERT_EQUAL_UINT16(calls, at_slow.calls);
+        }
         TEST_ASSERT_TRUE(P1DC1 <= 2000u && P1DC2 <= 2000u && P1DC3 <= 2000u);
     }
     TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
@@ -189,9 +203,54 @@ void test_bridge_begins_to_switch_only_with_duties_of_the_law(void)
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, board_drive.state);
     TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON); /* the duties are still those of the low sides */
     TEST_ASSERT_EQUAL_UINT16(0, P1DC1);
-    control_interrupts(1);
+    for (uint16_t n = 0; n < 2u && P1OVDCON == 0u; n++) { /* with the slow work, which is due in the second one at the latest */
+        control_interrupts(1);
+        TEST_ASSERT_TRUE(P1DC1 != 0u && P1DC1 != P1DC2);
+    }
     TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
-    TEST_ASSERT_TRUE(P1DC1 != 0u && P1DC1 != P1DC2);
+}
+
+void test_slow_work_is_raised_every_second_period_while_the_bridge_switches_and_else_by_each(void)
+{
+    for (uint16_t n = 0; n < 20u; n++) {
+        _ADC1Interrupt();
+        TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF);
+        _T2Interrupt();
+        TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.T2IF);
+    }
+    bring_to_align();
+    recorder_restart(&board_recorder, 1, FAULT_NONE);
+    for (uint16_t n = 0; n < 20u; n++) {
+        int16_t next = board_recorder.next;
+        _ADC1Interrupt();
+        TEST_ASSERT_EQUAL_UINT16(board_drive.ticks % 2u == 0u, IFS0bits.T2IF);
+        if (IFS0bits.T2IF) {
+            _T2Interrupt();
+        }
+        TEST_ASSERT_EQUAL_UINT16(board_drive.ticks % 2u == 0u, next != board_recorder.next); /* a row with each */
+        TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.T2IF);
+    }
+}
+
+void test_late_control_interrupt_raises_the_slow_work_at_once(void)
+{
+    for (uint16_t odd = 0; odd < 2u; odd++) {
+        bring_to_align();
+        while (board_drive.ticks % 2u == odd) {
+            control_interrupts(1);
+        }
+        P1TMR = 0x0001; /* counts up: the duties come too late */
+        _ADC1Interrupt();
+        TEST_ASSERT_EQUAL_UINT16(odd, board_drive.ticks % 2u);
+        TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+        TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault); /* told by the slow work, which has the time */
+        P1TMR = 0x81F4;
+        _T2Interrupt();
+        expect_off(FAULT_ISR_OVERRUN);
+        control_interrupts(10);
+        expect_off(FAULT_ISR_OVERRUN);
+    }
 }
 
 void test_fault_of_the_slow_work_switches_off_in_its_own_interrupt(void)
@@ -237,6 +296,24 @@ void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
             expect_off(cases[n].fault);
         }
     }
+}
+
+void test_slow_work_that_outlasts_its_period_comes_again_at_once_and_says_so(void)
+{
+    bring_to_align();
+    while (board_drive.ticks % 2u == 0u) {
+        control_interrupts(1);
+    }
+    sample_comes_in_slow_work = 1;
+    _ADC1Interrupt();
+    TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF);
+    _T2Interrupt();
+    TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF); /* raised meanwhile; its own end must not take that back */
+    _T2Interrupt();
+    expect_off(FAULT_ISR_OVERRUN);
+    TEST_ASSERT_EQUAL_UINT16(0, IFS0bits.T2IF);
+    control_interrupts(10);
+    expect_off(FAULT_ISR_OVERRUN);
 }
 
 void test_fault_input_switches_off_and_keeps_its_code_through_later_faults(void)

@@ -12,16 +12,18 @@
 static uint16_t sample_arrives_meanwhile, slow_work_waits;
 static duties_t computed;
 
-static void tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
+static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)
 {
+    uint16_t switches;
     if (slow_work_waits) {
         IFS0bits.T2IF = 1;
     }
     if (sample_arrives_meanwhile) {
         IFS0bits.AD1IF = 1;
     }
-    drive_tick(d, p, raw, duty);
+    switches = drive_tick(d, p, raw, duty);
     computed = *duty;
+    return switches;
 }
 
 #define drive_tick(d, p, raw, duty) tick_and_meanwhile(d, p, raw, duty)

@@ -163,7 +163,8 @@ RELATIONS = {
     # 1126 * 24 * 2 us / 50 us / 7.24 = 149.3
     "END_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("END_SPEED_RPM", "149", "150")],
     "MINIMUM_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("MINIMUM_SPEED_RPM", "149", "150")],
-    "RECORDER_PERIODS must be 0, 1, 2, 4": [case("RECORDER_PERIODS", "3", "4"), case("RECORDER_PERIODS", "63", "64"), case("RECORDER_PERIODS", "5", "0")],
+    "RECORDER_PERIODS must be 0, 2, 4": [case("RECORDER_PERIODS", "1", "2"), case("RECORDER_PERIODS", "3", "4"), case("RECORDER_PERIODS", "63", "64"),
+                                         case("RECORDER_PERIODS", "5", "0")],
     "SPEED_BANDWIDTH_HZ must be at most 0.148 * LOAD_BANDWIDTH_HZ": [
         case("SPEED_BANDWIDTH_HZ", "16.4", "16.2", MINIMUM_SPEED_RPM="150"), case("SPEED_BANDWIDTH_HZ", "33.5", "33.2", MINIMUM_SPEED_RPM="1000")],
 }
@@ -213,6 +214,7 @@ def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     ({"IDREF_SPEED17": "-18.0"}, "IDREF_SPEED17 = -18.0 must not exceed MAXIMUM_CURRENT_A = 2.75"),
     ({"FW_TRIM_CURRENT_A": "18.0"}, "FW_TRIM_CURRENT_A = 18.0 must not exceed MAXIMUM_CURRENT_A = 2.75"),
     ({"MINIMUM_SPEED_RPM": "149"}, "MINIMUM_SPEED_RPM = 149 must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI"),
+    ({"RECORDER_PERIODS": "1"}, "RECORDER_PERIODS = 1 must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits"),
     ({"SPEED_BANDWIDTH_HZ": "17"}, "SPEED_BANDWIDTH_HZ = 17 must be at most 0.148 * LOAD_BANDWIDTH_HZ"),
 ])
 def test_a_broken_relation_stops_the_build_with_its_message(values: dict[str, str], message: str) -> None:

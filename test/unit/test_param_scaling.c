@@ -179,7 +179,6 @@ void test_constants_at_4_4_A_are_14470_and_1626(void)
     EXACT(NORM_INVKFIBASE, 7956);
     EXACT(NORM_DELTAT, 1790);
     EXPECT_ESTIMATOR(p.estimator, p.fieldweak, p.adaptation, C440);
-    EXACT(p.estimator.resistive_max_q13, 7215); /* 2/sqrt(3) * 3.8 A * R */
     TEST_ASSERT_FLOAT_WITHIN(1e-9F, 4.05949e-4F, NORM_VOLTAGE_CONST);
     TEST_ASSERT_FLOAT_WITHIN(0.000001F, 0.0598743F, PARAM_KT);
 }
@@ -237,7 +236,8 @@ void test_speeds_and_times(void)
     EXACT(p.wait_periods, 4000);                /* 200 ms */
     EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
     EXACT(p.stall_steps, 575);                           /* 0.23 s */
-    EXACT(p.lost_lock_steps, 125);                       /* 50 ms */
+    EXACT(p.lost_lock_steps, 150);                       /* 60 ms */
+    EXACT(p.rs_impossible, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
 }
 
 void test_controllers(void)
@@ -316,6 +316,21 @@ void test_adaptation(void)
     EXACT(p.rs_least, GOLDEN_PARAMS_ADAPTATION_RS_LEAST);
     EXACT(p.rs_most, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
     EXACT(p.emf_least_q12, GOLDEN_PARAMS_ADAPTATION_EMF_LEAST_Q12);
+}
+
+void test_with_a_high_trip_level_resistance_and_derivative_share_the_back_emf_s_format(void)
+{
+#undef OVER_CURRENT_THRESHOLD_A
+#define OVER_CURRENT_THRESHOLD_A 5.0
+    static const adaptation_params_t p = PARAM_ADAPTATION_INIT;
+    static const estimator_params_t e = PARAM_ESTIMATOR_INIT;
+    static const drive_params_t d = DRIVE_PARAMS_INIT;
+    NEAR(p.rs_most, GOLDEN_PARAMS_TIGHT_RS_MOST, 1); /* single precision */
+    EXACT(d.rs_impossible, INT16_MAX);
+    EXACT(e.d_ilimit_hs_q14, GOLDEN_PARAMS_TIGHT_D_ILIMIT_HS_Q14);
+    TEST_ASSERT_TRUE(p.rs_most >= 0 && p.rs_most < GOLDEN_PARAMS_ADAPTATION_RS_MOST);
+#undef OVER_CURRENT_THRESHOLD_A
+#define OVER_CURRENT_THRESHOLD_A 3.8
 }
 
 void test_field_weakening(void)

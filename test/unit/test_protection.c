@@ -76,7 +76,7 @@ static void bus_in_state(uint16_t state, uint16_t bus_q15, uint16_t periods)
 {
     rig_bus(PARAM_F(NOMINAL_BUS_V));
     rig_lock(1);
-    rig_next_slot(2);
+    rig_next_quarter(1);
     drive.state = state;
     rig_speed(10000);
     drive.run.control.reference_erpm = 10000;
@@ -139,7 +139,7 @@ void test_undervoltage_waits_for_a_start_and_comes_before_the_first_pulse(void)
 
 void test_stall_and_lost_lock_are_faults_when_they_last(void)
 {
-    enum { NEVER = 2000, STALL = 576, LOST_LOCK = 63 }; /* 230 ms, 25 ms */
+    enum { NEVER = 2000, STALL = 576, LOST_LOCK = 76 }; /* 230 ms, 30 ms */
     static const struct {
         const char *what;
         int16_t reference_erpm, speed_erpm, e_d, e_q;
@@ -602,23 +602,21 @@ void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
 
 void test_signals_and_model_are_checked_in_slow_steps_of_closed_loop_only(void)
 {
-    uint16_t slot;
-    for (slot = 0; slot < 8u; slot++) {
+    uint16_t quarter;
+    for (quarter = 0; quarter < SLOW_QUARTERS; quarter++) {
         rig_closed(1, 10000);
         drive.run.observer.wrong_steps = 1000;
         drive.run.impossible_steps = 1000;
         drive.run.adaptation.rs_q31 = INT32_MAX;
-        drive.ticks = slot;
-        drive_slow(&drive, &params, &samples);
-        TEST_ASSERT_EQUAL_UINT16((slot == 4u) ? FAULT_CURRENT_SENSOR : (slot == 2u) ? FAULT_OVERTEMPERATURE : FAULT_NONE, drive.fault);
+        rig_slow(quarter);
+        TEST_ASSERT_EQUAL_UINT16((quarter == 2u) ? FAULT_CURRENT_SENSOR : (quarter == 1u) ? FAULT_OVERTEMPERATURE : FAULT_NONE, drive.fault);
         drive.fault = (uint16_t)FAULT_NONE;
     }
     rig_lock(1);
     drive.run.observer.wrong_steps = 1000;
     drive.run.impossible_steps = 1000;
-    for (slot = 0; slot < 8u; slot++) {
-        drive.ticks = slot;
-        drive_slow(&drive, &params, &samples);
+    for (quarter = 0; quarter < SLOW_QUARTERS; quarter++) {
+        rig_slow(quarter);
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault); /* no estimate is used yet */
 }

@@ -72,7 +72,7 @@ void test_lines_tell_head_and_rows_from_the_oldest_on(void)
 {
     record(2);
     record_tick();
-    expect_line("record fault 6 rows 18 every 1\r\n");
+    expect_line("record fault 6 rows 18 every 2\r\n");
     expect_line("row 71 0 0 1000 -1000 5 0\r\n");    /* odd: the speed */
     expect_line("row 70 1 -1 1001 -1001 21 3\r\n");  /* even: the bus */
     expect_line("row 69 500 -500 1500 -1500 8007 500\r\n");
@@ -85,7 +85,7 @@ void test_the_ring_s_end_is_in_the_middle_of_a_full_record(void)
     uint16_t n;
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 72 every 1\r\n");
+    expect_line("record fault 6 rows 72 every 2\r\n");
     for (n = 34; n < 34 + 72; n++) {
         unsigned place = 71u - n % 72u;
         char begin[20];
@@ -143,7 +143,7 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
 {
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 72 every 1\r\n");
+    expect_line("record fault 6 rows 72 every 2\r\n");
     board_drive.fault = (uint16_t)FAULT_NONE;
     board_drive.command.run = 1;
     record_tick();
@@ -151,5 +151,5 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
     board_drive.command.run = 0;
     record(1);
     record_tick();
-    expect_line("record fault 6 rows 17 every 1\r\n");
+    expect_line("record fault 6 rows 17 every 2\r\n");
 }

@@ -15,7 +15,7 @@ void setUp(void)
     rig_ready();
     memset(&recorder, 0x5A, sizeof recorder); /* what RAM may hold */
     recorder_restart(&recorder, 1, FAULT_NONE);
-    ticks = 0;
+    ticks = 0; /* and the drive's are 1024 */
 }
 
 void test_power_up_leaves_no_word_as_it_was(void)
@@ -67,13 +67,26 @@ static void periods(uint16_t count)
     }
 }
 
-/** The record is complete, and its rows are those of the ticks before `end`. */
+/** Periods count from 0 again. The drive's are even then: 1, 3, 5, ... get a row. */
+static void count_anew(void)
+{
+    drive.ticks = (uint16_t)(drive.ticks & ~1u);
+    ticks = 0;
+}
+
+/** The period after the record's last row, for a fault after so many. */
+static uint16_t end_of(uint16_t before)
+{
+    return (uint16_t)((before | 1u) + 2u * RECORDER_AFTER - 1u);
+}
+
+/** The record is complete, and its rows are those of every second tick before `end`. */
 static void expect_rows(uint16_t rows, uint16_t end)
 {
     uint16_t n;
     TEST_ASSERT_EQUAL_UINT16(rows, recorder_rows(&recorder));
     for (n = 0; n < rows; n++) {
-        uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(end - rows + n);
+        uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(((end - 2u) | 1u) - 2u * (rows - 1u - n));
         const int16_t *word = &recorder.word[place * RECORDER_WORDS];
         TEST_ASSERT_TRUE(place < RECORDER_ROWS);
         TEST_ASSERT_EQUAL_INT16(i_a(tick), word[RECORDER_I_A]);
@@ -85,16 +98,16 @@ static void expect_rows(uint16_t rows, uint16_t end)
     }
 }
 
-void test_sixty_four_rows_before_a_fault_and_sixteen_from_it_on_wherever_the_ring_stands(void)
+void test_fifty_six_rows_before_a_fault_and_sixteen_from_it_on_wherever_the_ring_stands(void)
 {
     uint16_t before;
-    for (before = RECORDER_ROWS - RECORDER_AFTER; before < 2 * RECORDER_ROWS + 8; before++) {
+    for (before = 2 * (RECORDER_ROWS - RECORDER_AFTER); before < 4 * RECORDER_ROWS + 16; before++) {
         setUp();
         periods(before);
         TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
         drive_raise(&drive, FAULT_TRAP);
-        periods(RECORDER_AFTER + 20);
-        expect_rows(RECORDER_ROWS, (uint16_t)(before + RECORDER_AFTER));
+        periods(2 * RECORDER_AFTER + 20);
+        expect_rows(RECORDER_ROWS, end_of(before));
         TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, recorder.fault);
     }
 }
@@ -102,19 +115,19 @@ void test_sixty_four_rows_before_a_fault_and_sixteen_from_it_on_wherever_the_rin
 void test_a_fault_soon_after_the_beginning_has_fewer_rows_before_it(void)
 {
     uint16_t before;
-    for (before = 0; before < RECORDER_ROWS - RECORDER_AFTER; before++) {
+    for (before = 0; before < 2 * (RECORDER_ROWS - RECORDER_AFTER); before++) {
         setUp();
         periods(before);
         drive_raise(&drive, FAULT_STALL);
-        periods(RECORDER_AFTER + 3);
-        expect_rows((uint16_t)(before + RECORDER_AFTER), (uint16_t)(before + RECORDER_AFTER));
+        periods(2 * RECORDER_AFTER + 3);
+        expect_rows((uint16_t)(before / 2u + RECORDER_AFTER), end_of(before));
     }
 }
 
 void test_first_row_in_state_fault_is_the_fault_s_own(void)
 {
     uint16_t n;
-    periods(100);
+    periods(200);
     rig_currents(0, 0);
     drive_raise(&drive, FAULT_OVERCURRENT_HW);
     periods(40);
@@ -133,15 +146,15 @@ static void clear_fault(void)
 
 void test_a_cleared_fault_s_record_stays_until_the_next_start(void)
 {
-    periods(100);
+    periods(200);
     drive_raise(&drive, FAULT_OVERVOLTAGE);
-    periods(30);
+    periods(40);
     clear_fault();
     recorder_background(&recorder, &drive);
     drive_raise(&drive, FAULT_UNDERVOLTAGE); /* a second fault, without a start between */
-    periods(30);
+    periods(40);
     recorder_background(&recorder, &drive);
-    expect_rows(RECORDER_ROWS, 100 + RECORDER_AFTER);
+    expect_rows(RECORDER_ROWS, end_of(200));
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERVOLTAGE, recorder.fault);
     clear_fault();
     while (drive.state != (uint16_t)DRIVE_STOPPED) {
@@ -150,46 +163,46 @@ void test_a_cleared_fault_s_record_stays_until_the_next_start(void)
     drive_start(&drive, &params, 1);
     recorder_background(&recorder, &drive);
     TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
-    ticks = 0;
+    count_anew();
     periods(5);
     drive_raise(&drive, FAULT_OVERCURRENT_HW);
-    periods(30);
-    expect_rows(5 + RECORDER_AFTER, 5 + RECORDER_AFTER);
+    periods(40);
+    expect_rows(2 + RECORDER_AFTER, end_of(5));
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, recorder.fault);
 }
 
 void test_of_two_faults_at_once_the_first_is_told(void)
 {
-    periods(90);
+    periods(190);
     drive_raise(&drive, FAULT_LOST_LOCK);
     periods(3);
     drive_raise(&drive, FAULT_OVERVOLTAGE);
-    periods(30);
+    periods(40);
     TEST_ASSERT_EQUAL_UINT16(FAULT_LOST_LOCK, recorder.fault);
-    expect_rows(RECORDER_ROWS, 90 + RECORDER_AFTER);
+    expect_rows(RECORDER_ROWS, end_of(190));
 }
 
 void test_a_fault_cleared_within_its_sixteen_rows_ends_the_record(void)
 {
-    periods(90);
+    periods(190);
     drive_raise(&drive, FAULT_LOST_LOCK);
     periods(7);
     recorder_background(&recorder, &drive);
     TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
     clear_fault();
     recorder_background(&recorder, &drive);
-    expect_rows(RECORDER_ROWS, 98);
-    periods(30);
-    expect_rows(RECORDER_ROWS, 98);
+    expect_rows(RECORDER_ROWS, 198);
+    periods(40);
+    expect_rows(RECORDER_ROWS, 198);
 }
 
 void test_a_reset_keeps_the_record_of_a_fault_and_power_up_does_not(void)
 {
-    periods(100);
+    periods(200);
     drive_raise(&drive, FAULT_STALL);
-    periods(30);
+    periods(40);
     recorder_restart(&recorder, 0, FAULT_NONE);
-    expect_rows(RECORDER_ROWS, 100 + RECORDER_AFTER);
+    expect_rows(RECORDER_ROWS, end_of(200));
     recorder_restart(&recorder, 0, FAULT_WATCHDOG); /* the first stays the first */
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, recorder.fault);
     recorder_restart(&recorder, 1, FAULT_NONE);
@@ -199,16 +212,16 @@ void test_a_reset_keeps_the_record_of_a_fault_and_power_up_does_not(void)
 
 void test_a_reset_that_is_a_fault_itself_keeps_what_came_before_it(void)
 {
-    periods(100);
+    periods(200);
     recorder_restart(&recorder, 0, FAULT_WATCHDOG);
-    expect_rows(RECORDER_ROWS, 100);
+    expect_rows(RECORDER_ROWS, 200);
     TEST_ASSERT_EQUAL_UINT16(FAULT_WATCHDOG, recorder.fault);
     setUp();
     periods(33);
     drive_raise(&drive, FAULT_TRAP);
     periods(4);
     recorder_restart(&recorder, 0, FAULT_TRAP); /* in the middle of the last rows */
-    expect_rows(37, 37);
+    expect_rows(18, 37);
 }
 
 void test_a_reset_of_a_healthy_drive_begins_anew(void)
@@ -216,11 +229,11 @@ void test_a_reset_of_a_healthy_drive_begins_anew(void)
     periods(100);
     recorder_restart(&recorder, 0, FAULT_NONE);
     TEST_ASSERT_EQUAL_UINT16(0, recorder_rows(&recorder));
-    ticks = 0;
+    count_anew();
     periods(3);
     drive_raise(&drive, FAULT_STALL);
-    periods(20);
-    expect_rows(3 + RECORDER_AFTER, 3 + RECORDER_AFTER);
+    periods(40);
+    expect_rows(1 + RECORDER_AFTER, end_of(3));
 }
 
 void test_what_ram_happens_to_hold_is_no_record(void)

@@ -164,6 +164,25 @@ void test_outputs_that_the_state_does_not_ask_for_are_found(void)
     TEST_ASSERT_EQUAL_UINT16(SELFTEST_REGISTERS, board_selftest_failed);
 }
 
+void test_low_sides_may_stay_on_until_the_bridge_s_first_duties(void)
+{
+    board_ms(100);
+    PORTAbits.RA8 = 0;
+    for (uint16_t n = 0; n < 2000u && board_drive.state != (uint16_t)DRIVE_ALIGN; n++) {
+        if (n % 20u == 0u) {
+            IFS0bits.T1IF = 1;
+            firmware_background();
+        }
+        a_period();
+    }
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, board_drive.state);
+    TEST_ASSERT_EQUAL_HEX16(BOARD_OUTPUTS_BOOTSTRAP, P1OVDCON);
+    owed_ms = 1;
+    firmware_background();
+    TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_ALIGN, board_drive.state);
+}
+
 /* ---- processor, RAM, flash, stack ---- */
 
 void test_each_bit_of_each_processor_register_is_tested(void)

@@ -64,17 +64,23 @@ void test_first_period_finds_the_frame_of_the_first_angle(void)
     }
 }
 
-void test_stop_switches_off_at_once_before_the_loop_is_closed(void)
+void test_stop_switches_off_in_the_next_slow_work_before_the_loop_is_closed(void)
 {
     static const drive_state_t states[] = { DRIVE_BOOTSTRAP, DRIVE_ALIGN, DRIVE_RAMP };
     EACH(n, states) {
+        uint16_t bridge_is_off = (states[n] == DRIVE_BOOTSTRAP), periods = 0;
         rig_start(1);
         (void)ideal_motor_run_until(states[n], 300u + LOCK_PERIODS);
         ideal_motor_run(100);
         EXPECT_DRIVE(states[n], FAULT_NONE, golden_row(n));
+        drive.ticks = (uint16_t)(drive.ticks & ~1u); /* the next period has no slow work while the bridge switches */
         drive.command.run = 0;
-        ideal_motor_run(1);
+        while (drive.state != (uint16_t)DRIVE_STOPPED && periods < 9u) {
+            ideal_motor_run(1);
+            periods++;
+        }
         EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(bridge_is_off ? 1u : SLOW_EVERY, periods, golden_row(n));
     }
 }
 
@@ -127,18 +133,66 @@ void test_align_turns_five_times_while_its_current_grows_from_nothing_and_ends_i
     }
 }
 
-void test_ramp_goes_on_from_the_speed_of_align_and_accelerates_by_its_rate_every_period_in_both_directions(void)
+void test_ramp_goes_on_from_the_speed_of_align_and_accelerates_by_its_rate_in_both_directions(void)
 {
     EACH_DIRECTION(direction) {
         angle_t before;
         rig_lock(direction);
         (void)rig_tick_until(DRIVE_RAMP, LOCK_PERIODS);
-        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10, drive.forced.speed_q10); /* of the next period */
+        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 20, drive.forced.speed_q10); /* of the next two periods */
         before = drive.angle;
         rig_tick(1000);
-        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10010, drive.forced.speed_q10);
-        /* 33554 / 1024 * 1000, and 10 / 1024 * 1000 * 1001 / 2 counts */
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(uint16_t)(direction * (32768L + 4888L)), (int16_t)(uint16_t)(drive.angle - before));
+        TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10 + 10020, drive.forced.speed_q10);
+        /* 33554 / 1024 * 1000, and 20 / 1024 * 2 * 500 * 501 / 2 counts */
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(uint16_t)(direction * (32768L + 4893L)), (int16_t)(uint16_t)(drive.angle - before));
+    }
+}
+
+void test_forced_angle_moves_every_period_though_its_speed_changes_every_second(void)
+{
+    EACH_DIRECTION(direction) {
+        uint16_t n;
+        rig_lock(direction);
+        (void)rig_tick_until(DRIVE_RAMP, LOCK_PERIODS);
+        for (n = 0; n < 100u; n++) {
+            uint32_t angle_q32 = drive.forced.angle_q32;
+            int32_t speed_q10 = drive.forced.speed_q10;
+            rig_tick(1);
+            TEST_ASSERT_EQUAL_HEX32(qm_turn_add(angle_q32, (uint32_t)(direction * speed_q10 * 64)), drive.forced.angle_q32);
+            TEST_ASSERT_EQUAL_HEX16(drive.forced.angle_q32 >> 16, drive.angle);
+            TEST_ASSERT_EQUAL_INT32(((drive.ticks & 1u) == 0u) ? speed_q10 + 20 : speed_q10, drive.forced.speed_q10);
+        }
+    }
+}
+
+/* Slow work at the end of BOOTSTRAP prepares what follows if its period is an even one; else the first period stands on what the start has left. */
+void test_first_period_with_the_law_is_whole_in_an_even_and_an_odd_one(void)
+{
+    EACH_DIRECTION(direction) {
+        for (uint16_t odd = 0; odd < 2u; odd++) {
+            uint32_t step_q32 = (uint32_t)((int32_t)direction * params.align_speed_q10 * 64);
+            rig_ready();
+            drive.forced.step_q32 = 0x01000000u; /* of the last run */
+            drive.dead = (dead_duties_t){ 40, -40, 0 };
+            drive.ticks = (uint16_t)((drive.ticks & ~1u) + odd);
+            drive_start(&drive, &params, direction);
+            TEST_ASSERT_EQUAL_UINT16(params.bootstrap_periods + 1u, rig_tick_until(DRIVE_ALIGN, params.bootstrap_periods + 2u));
+            TEST_ASSERT_EQUAL_UINT16((odd + params.bootstrap_periods + 1u) & 1u, drive.ticks & 1u);
+            TEST_ASSERT_EQUAL_HEX32(0, drive.forced.angle_q32);
+            TEST_ASSERT_EQUAL_HEX32((drive.ticks & 1u) ? 0 : step_q32, drive.forced.step_q32);
+            TEST_ASSERT_EQUAL_INT16(0, drive.dead.a); /* no current is asked for */
+            TEST_ASSERT_EQUAL_INT16(0, drive.dead.b);
+            TEST_ASSERT_EQUAL_INT16(0, drive.dead.c);
+            for (uint16_t n = 0; n < 2u; n++) {
+                uint32_t moves_q32 = drive.forced.step_q32, angle_q32 = drive.forced.angle_q32;
+                rig_tick(1);
+                TEST_ASSERT_EQUAL_HEX32(qm_turn_add(angle_q32, moves_q32), drive.forced.angle_q32);
+                TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.a);
+                TEST_ASSERT_NOT_EQUAL_UINT16(0, out.duty.b);
+                EXPECT_DRIVE(DRIVE_ALIGN, FAULT_NONE, golden_row(n));
+            }
+            TEST_ASSERT_EQUAL_HEX32(step_q32, drive.forced.step_q32);
+        }
     }
 }
 

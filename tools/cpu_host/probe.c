@@ -22,7 +22,7 @@
 #define DRIVE_SIGNALS(X) \
     X(state, "fw.state", "", "drive state (drive_state_t)", (double)d->state) \
     X(fault, "fw.fault", "", "fault code (drive_fault_t)", (double)d->fault) \
-    X(slow_phase, "fw.slow_phase", "", "period of the slow step, from 0 on", (double)(d->ticks % SLOW_PERIODS)) \
+    X(slow_phase, "fw.slow_phase", "", "period of the slow step that was the last, from 0 on", (double)(d->ticks % SLOW_PERIODS)) \
     X(running, "fw.run", "", "1 while the bridge switches", (double)drive_is_running(d)) \
     X(calibrated, "fw.calibrated", "", "1 after the offset calibration", (double)d->calibration.done) \
     X(theta_est, "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", \

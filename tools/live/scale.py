@@ -26,7 +26,7 @@ _RULES = (
     (r"(EstimParm\.qRho|ParkParm\.qAngle|board_drive\.angle|\.offset)$", "°", "", TURN_DEG / 2.0 ** 16),
     (r"(rho|angle)_q32$", "°", "", TURN_DEG / 2.0 ** 32),
     (r"omega(_filtered)?_q16$", "rpm", "COUNT_SPEED_RPM", 2.0 ** -16),
-    (r"\b(e|v_last|v_before)_q13(\.\w+)?$", "V", "COUNT_VOLTAGE_V", 2.0),
+    (r"\b(e|v_last|v_mean)_q13(\.\w+)?$", "V", "COUNT_VOLTAGE_V", 2.0),
     (r"\b(v|limit|vq_limit)_q14(\.\w+)?$", "V", "COUNT_VOLTAGE_V", 1.0),
     (r"\b(phases|i|ref|iq_limit|brake_limit|burn|trim|table|current|id|probe_\w+|offset_[ab])_q13(\.\w+)?$", "A", "COUNT_CURRENT_A", 1.0),
     (r"\biq_trim_q26$", "A", "COUNT_CURRENT_A", 2.0 ** -13),

@@ -62,8 +62,9 @@ static inline void rig_currents(int16_t a_q13, int16_t b_q13)
 static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
-        drive_tick(&drive, &params, &samples, &out.duty);
-        drive_slow(&drive, &params, &samples);
+        if (!drive_tick(&drive, &params, &samples, &out.duty) || drive_slow_is_due(&drive)) {
+            drive_slow(&drive, &params, &samples);
+        }
         out.outputs = drive_outputs(&drive);
         if (drive_settle(&drive)) {
             out.outputs = (uint16_t)OUTPUTS_OFF;
@@ -118,6 +119,7 @@ static inline void rig_speed(int16_t speed_erpm)
     drive.run.observer.omega_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_erpm = speed_erpm; /* as steady as it is filtered */
+    drive.run.estimator.omega_before_erpm = speed_erpm;
 }
 
 /** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
@@ -130,15 +132,21 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     drive.run.control.reference_erpm = speed_erpm;
     drive.run.control.ref_q13.q = 0;
     rig_speed(speed_erpm);
-    drive.run.estimator.omega_erpm = speed_erpm;
     drive.run.handover.speed_is_preset = 1;
     speed_follow(&drive.run, &params);
 }
 
-/** Counter of the slow steps brought to a value, so that the next tick runs the block of `slot`. */
-static inline void rig_next_slot(uint16_t slot)
+/** Counter of the periods brought to a value, so that the next tick runs this quarter of the slow work. */
+static inline void rig_next_quarter(uint16_t quarter)
 {
-    drive.ticks = (uint16_t)((drive.ticks & ~7u) + slot - 1u);
+    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_PERIODS - 1u)) + SLOW_EVERY * quarter - 1u);
+}
+
+/** This quarter of the slow work alone, without the period before it. */
+static inline void rig_slow(uint16_t quarter)
+{
+    drive.ticks = (uint16_t)(SLOW_PERIODS + SLOW_EVERY * quarter);
+    drive_slow(&drive, &params, &samples);
 }
 
 #endif
