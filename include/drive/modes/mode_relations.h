@@ -13,13 +13,9 @@
 #define MODE_RELATION_BRINGUP(X)
 #endif
 
-/* Those that add to each period's work. */
+/* Those that add to each period's work, or look at what follows a duty at once. */
 #if defined(SNAPSHOT)
 #define MODE_WITHOUT_TIME "SNAPSHOT"
-#elif defined(TUNING)
-#define MODE_WITHOUT_TIME "TUNING"
-#elif defined(PARAMS_IN_RAM)
-#define MODE_WITHOUT_TIME "PARAMS_IN_RAM"
 #elif defined(IDENTIFY)
 #define MODE_WITHOUT_TIME "IDENTIFY"
 #elif defined(BRINGUP)
