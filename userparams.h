@@ -171,7 +171,7 @@
  *   estimator.deltat_q32                5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
  *   estimator.half_step_q16_rad       2.5e-05 s               11244  Q16 rad/erpm                -0.002 %  half of it
  *   estimator.d_ilimit_ls_q14          1.6127 A                6005  Q14 A                       -0.001 %  change in eight periods: D_ILIMIT_LS, or what the format leaves of it
- *   estimator.d_ilimit_hs_q14         0.31033 A                1155  Q14 A                       -0.048 %  change in a period: D_ILIMIT_HS, or what the format leaves of it
+ *   estimator.d_ilimit_hs_q14         0.30546 A                1137  Q14 A                       -0.039 %  change in a period: D_ILIMIT_HS, or what the format leaves of it
  *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in AN1292's format
  *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in AN1292's format
  *   fieldweak.kfilter_esdq_q16         200.46 Hz               4000  Q16 a period                   exact  Equation 7
@@ -253,6 +253,7 @@
  *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal
  *   bus_over_q15                           34 V               21101  Q15 of full scale           +0.002 %  trips
  *   bus_under_q15                          12 V                7447  Q15 of full scale           -0.004 %  trips
+ *   bus_used_q15                           30 V               18618  Q15 of full scale           -0.001 %  most that the voltage circle makes use of
  *   bus_regen_q15                          27 V               16756  Q15 of full scale           -0.002 %  braking is reduced from here
  *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt

@@ -174,6 +174,7 @@ static void limits(void)
     FIELD(current_max_reciprocal, most, "A", most / (33554432.0 / (most / q13_a)), "2^25 / Q13", "its reciprocal");
     FIELD(bus_over_q15, OVER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");
     FIELD(bus_under_q15, UNDER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");
+    FIELD(bus_used_q15, PARAM_USED_BUS_V, "V", bus, "Q15 of full scale", "most that the voltage circle makes use of");
     FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");

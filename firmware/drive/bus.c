@@ -10,6 +10,6 @@ void bus_update_gain(drive_t *d, const drive_params_t *p, int16_t bus_q15)
 
 void bus_update_voltage_limit(drive_t *d, const drive_params_t *p)
 {
-    int16_t bus_q15 = qm_clamp(qm_hi(d->bus_q31), 0, p->bus_over_q15); /* above it nothing runs, and the formats end */
+    int16_t bus_q15 = qm_clamp(qm_hi(d->bus_q31), 0, p->bus_used_q15);
     voltage_circle_of(&d->circle, (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)bus_q15 << p->bus_shift), p->voltage_limit_per_bus_q16));
 }

@@ -73,6 +73,7 @@ typedef struct {
     uint16_t voltage_limit_per_bus_q16; /**< see param_scaling.h */
     uint32_t duty_per_volt_numerator;
     int16_t bus_over_q15, bus_under_q15; /**< trip levels */
+    int16_t bus_used_q15;                /**< most of it that the law makes use of: the formats end */
     int16_t bus_regen_q15;               /**< braking current falls from here */
     int16_t brake_per_bus_q8;            /**< braking current taken off per bus count above, Q13 counts * 256 */
     int16_t bus_nominal_q15;             /**< start value of the bus filter */

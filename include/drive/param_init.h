@@ -126,6 +126,7 @@
         .duty_per_volt_numerator = DUTY_PER_VOLT_NUMERATOR, \
         .bus_over_q15 = BUS_Q15(OVER_VOLTAGE_V), \
         .bus_under_q15 = BUS_Q15(UNDER_VOLTAGE_V), \
+        .bus_used_q15 = BUS_Q15(PARAM_USED_BUS_V), \
         .bus_regen_q15 = BUS_Q15(REGEN_LIMIT_V), \
         .brake_per_bus_q8 = (int16_t)(256.0F * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(2.0F)) + 0.5F), /* to nothing in 2 V */ \
             .bus_nominal_q15 = BUS_Q15(NOMINAL_BUS_V), \

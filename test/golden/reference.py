@@ -255,9 +255,9 @@ class Machine:
     @property
     def shares(self):
         """In volts: what 99 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
-        room = 0.99 * 131068 * self.u0 - self.over_voltage_v / SQRT3
+        room = 0.99 * 131068 * self.u0 - min(self.over_voltage_v, 1.25 * self.bus_v) / SQRT3
         return room, 2 / SQRT3 * self.over_current_a * self.rs_ohm, \
-            1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
+            1.18 * 1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
 
     @property
     def ldi_share(self):

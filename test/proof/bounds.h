@@ -48,11 +48,11 @@ static uint16_t largest_rs(void)
     return (uint16_t)((rs > 65535) ? 65535 : rs);
 }
 
-/** Length of Equation 4's vector in Q13: circle, resistance, and an inductance with both axes at their limit. */
+/** Length of Equation 4's vector in Q13: circle, resistance at the trip level, and an inductance with both axes at their limit. */
 static int32_t longest_emf(void)
 {
     const estimator_params_t *e = &params.estimator;
-    int32_t resistive = (int32_t)(e->resistive_max_q13 + 1) * (1 << e->rs_exp);
+    int32_t resistive = (int32_t)(qm_mulhi_su(beta_max, largest_rs()) + 1) * (1 << e->rs_exp);
     int32_t fast = (int32_t)qm_mulhi_su((int16_t)(8 * e->d_ilimit_hs_q14), largest_ls()) * (1 << e->ls_exp);
     int32_t slow = (int32_t)qm_mulhi_su(e->d_ilimit_ls_q14, largest_ls()) * (1 << e->ls_exp) * 9 / 8; /* turned: sqrt(1 + 0.5^2) */
     int32_t inductive = (fast > slow) ? fast : slow;
@@ -66,7 +66,7 @@ static void set_bounds(void)
     params = from_user;
     alpha_max = (int16_t)(2 * params.overcurrent_q13);
     beta_max = (int16_t)(((int32_t)params.overcurrent_q13 * 18919 >> 13) + 8);
-    radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_over_q15 << params.bus_shift), params.voltage_limit_per_bus_q16);
+    radius_max = (int16_t)qm_mulhi_uu((uint16_t)((uint16_t)params.bus_used_q15 << params.bus_shift), params.voltage_limit_per_bus_q16);
     rs_max = largest_rs();
     voltage_max = (int16_t)(radius_max / 2 + radius_max / 64 + 8);
     /* Park halves it; the turn by half a step h to the middle of the period lengthens it by sqrt(1 + h^2) < 1 + h^2 / 2 */

@@ -206,8 +206,8 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
     kinds = ("sensors: current reads zero", "sensors: current offset", "sensors: current offset drifts", "sensors: current gain", "sensors: current noise",
              "power stage: transistor never turns on")
     assert unseen == dict.fromkeys(kinds, judge.Unseen(more_rpm=0.5 * np.pi * rating.dead_rpm)) | {"clock: crystal off frequency": judge.Unseen(clock=1.2)}
-    init = (paths.ROOT / "include" / "drive" / "param_init.h").read_text(encoding="utf-8")
-    assert f".rs_most = Q15({injection.MOST_RESISTANCE - 1.0:.1f})" in init
+    scaling = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
+    assert f"#define PARAM_RS_MOST {injection.MOST_RESISTANCE - 1.0:.1f}\n" in scaling
     gain = injection.BY_NAME["sensors: current gain"]
     assert [gain.unseen(size, rating).start_current for size in (1.5, 0.8, 0.625, 0.3)] == pytest.approx([1.0, 1.25, 1.6, 1.6])
     rating = replace(rating, start_dead=0.5)

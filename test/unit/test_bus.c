@@ -47,11 +47,11 @@ void test_modulators_gain_is_that_of_the_last_sample(void)
 
 void test_commanded_volts_arrive_and_the_circle_follows_whatever_the_bus(void)
 {
-    /* 4 V in alpha: 6 V between a and b. The circle: 93.6 % of the bus / sqrt(3), but within the trip levels, where its format ends */
+    /* 4 V in alpha: 6 V between a and b. The circle: 93.6 % of the bus / sqrt(3), of at most 1.25 times its nominal voltage */
     static const struct {
         float bus_v, sign, circle_v;
     } cases[] = {
-        { 24.0F, 1.0F, 12.970F }, { 12.5F, 1.0F, 6.755F }, { 18.0F, 1.0F, 9.728F }, { 33.0F, 1.0F, 17.834F }, { 30.0F, -1.0F, 16.213F },
+        { 24.0F, 1.0F, 12.970F }, { 12.5F, 1.0F, 6.755F }, { 18.0F, 1.0F, 9.728F }, { 29.0F, 1.0F, 15.673F }, { 30.0F, -1.0F, 16.213F }, { 33.0F, 1.0F, 16.213F },
     };
     EACH(n, cases) {
         static const phases_t none;
@@ -91,7 +91,7 @@ void test_circle_of_a_supply_that_is_a_seventh_of_the_bus_range(void)
     static const drive_params_t small = DRIVE_PARAMS_INIT;
     static const struct {
         float bus_v, circle_v;
-    } cases[] = { { 8.0F, 4.323F }, { 6.0F, 3.243F }, { 12.0F, 6.485F }, { 15.0F, 8.106F }, { 30.0F, 8.106F /* the trip level's */ } };
+    } cases[] = { { 8.0F, 4.323F }, { 6.0F, 3.243F }, { 9.5F, 5.134F }, { 10.0F, 5.404F }, { 10.5F, 5.404F /* that of 1.25 times 8 V */ }, { 30.0F, 5.404F } };
     TEST_ASSERT_EQUAL_UINT16(2u, small.bus_shift);
     EACH(n, cases) {
         drive.bus_q31 = (int32_t)BUS_Q15(cases[n].bus_v) * 65536;

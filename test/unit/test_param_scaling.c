@@ -198,6 +198,7 @@ void test_currents_voltages_and_modulator(void)
     EXACT(p.offset_max_q13, 1024);
     NEAR(VOLTAGE_Q14(13.3021), 16384, 1);
     EXACT(p.bus_nominal_q15, 14895); /* 24 / 52.8 * 32768 */
+    EXACT(p.bus_used_q15, 18618); /* 30 V of 52.8 V: 1.25 times 24 V */
     EXACT(p.bus_regen_q15, 16756);
     EXACT(p.bus_over_q15, 21101);
     EXACT(p.bus_under_q15, 7447);
