@@ -5,8 +5,8 @@ import pytest
 from pytest import approx
 from support import command
 
-from tools.bench import build, cli, command_common, report, scenario_file, simulate
-from tools.common import board_file, motor_file
+from tools.bench import build, cli, command_common, report, scenario_file, simulate, sweep, table2
+from tools.common import board_file, motor_file, paths
 from tools.common.param_rows import duties_are_late, slow_periods
 from tuning import design, header, loops
 
@@ -64,3 +64,14 @@ def test_a_header_of_another_period_than_the_boards_is_refused_in_one_line(folde
     code, _, told = command("run", "demo", "--board", QUICK, "--out", str(tmp_path), main=cli.main)
     assert code == 2 and told.count("\n") <= 1
     assert "the header's LOOPTIME_SEC is 50 us, the board's period 25 us, tuning/boards/mclv_40khz.toml: add MOTOR=name" in told
+
+
+def test_rows_of_table_2_hold(folder):
+    """The slowest one under the largest load, and one in field weakening."""
+    table = table2.Table.read(paths.TABLES / "table2.toml")
+    library = command_common.library_for([], None, folder)
+    rows = [row for row in table2.rows_for(table, library.params["LOOPTIME_SEC"]) if row.reference_rpm in (500.0, 3500.0)]
+    assert [row.more_percent for row in rows] == [5.0, 5.0] and not any(row.more_percent for row in table2.rows_for(table, 50e-6))
+    for row in rows:
+        result = sweep.run_cases("table2", [table2.job(table, row, library, motor_file.part(HURST), board_file.part(QUICK))], True)[0]
+        assert [f"{outcome.row}: {outcome.got}" for outcome in table2.check(row, result) if not outcome.ok] == []
