@@ -36,7 +36,7 @@ QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params
     int32_t erpm = qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> (11 - LATE_DUTIES);
     if (LATE_DUTIES) { /* the angle per period may be rounded up by more than a count of the largest speed */
         erpm = (erpm > INT16_MAX) ? INT16_MAX : (erpm < -INT16_MAX) ? -INT16_MAX
-                                                                     : erpm;
+                                                                    : erpm;
     }
     return (int16_t)erpm;
 }
