@@ -171,7 +171,7 @@
  *   estimator.deltat_q32                5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
  *   estimator.half_step_q16_rad       2.5e-05 s               11244  Q16 rad/erpm                -0.002 %  half of it
  *   estimator.d_ilimit_ls_q14          1.6127 A                6005  Q14 A                       -0.001 %  change in eight periods: D_ILIMIT_LS, or what the format leaves of it
- *   estimator.d_ilimit_hs_q14         0.30546 A                1137  Q14 A                       -0.039 %  change in a period: D_ILIMIT_HS, or what the format leaves of it
+ *   estimator.d_ilimit_hs_q14          0.3489 A                1299  Q14 A                       -0.014 %  change in a period: D_ILIMIT_HS, or what the format leaves of it
  *   D_ILIMIT_LS                        1.6127 A               12010  Q15 A                          exact  the same in AN1292's format
  *   D_ILIMIT_HS                       0.39597 A                2948  Q15 A                          exact  the same in AN1292's format
  *   fieldweak.kfilter_esdq_q16         200.46 Hz               4000  Q16 a period                   exact  Equation 7

@@ -55,16 +55,17 @@ static void motor(void)
 
 static void estimator(void)
 {
-    double least = at_most(8.0 * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)), 16383.0), most = at_most(PARAM_DI(MAXIMUM_SPEED_RPM), 4095.0), q14_a = 2.0 * ampere;
+    double least = 8.0 * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)), most = PARAM_DI(MAXIMUM_SPEED_RPM), q14_a = 2.0 * ampere;
+    double least_left = at_most(PARAM_LDI_LS_SHARE * least, 16383.0), most_left = at_most(PARAM_LDI_SHARE * most, 4095.0);
     GROUP("estimator");
     FIELD(estimator.deltat_q32, period, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle a period");
     FIELD(estimator.half_step_q16_rad, period / 2.0, "s", 60.0 / (2.0 * PI) / 4294967296.0 / SPEED_UNIT, "Q16 rad/erpm", "half of it");
-    FIELD(estimator.d_ilimit_ls_q14, PARAM_LDI_LS_SHARE * least * q14_a, "A", least * q14_a / at_most(least, 16382.5), "Q14 A",
+    FIELD(estimator.d_ilimit_ls_q14, least_left * q14_a, "A", least_left * q14_a / at_most(least_left, 16382.5), "Q14 A",
           "change in eight periods: D_ILIMIT_LS, or what the format leaves of it");
-    FIELD(estimator.d_ilimit_hs_q14, PARAM_LDI_SHARE * most * q14_a, "A", most * q14_a / at_most(most, 4094.5), "Q14 A",
+    FIELD(estimator.d_ilimit_hs_q14, most_left * q14_a, "A", most_left * q14_a / at_most(most_left, 4094.5), "Q14 A",
           "change in a period: D_ILIMIT_HS, or what the format leaves of it");
-    MACRO(D_ILIMIT_LS, least * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
-    MACRO(D_ILIMIT_HS, most * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
+    MACRO(D_ILIMIT_LS, at_most(least, 16383.0) * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
+    MACRO(D_ILIMIT_HS, at_most(most, 4095.0) * q14_a, "A", 0.0, "Q15 A", "the same in AN1292's format");
     FIELD(fieldweak.kfilter_esdq_q16, filter_hz(KFILTER_ESDQ), "Hz", 0.0, "Q16 a period", "Equation 7");
     FIELD(fieldweak.kfilter_esdq_fw_q16, filter_hz(KFILTER_ESDQ_FW), "Hz", 0.0, "Q16 a period", "Equation 7");
     FIELD(estimator.kfilter_velestim_q16, filter_hz(KFILTER_VELESTIM), "Hz", 0.0, "Q16 a period", "Equation 7");

@@ -64,8 +64,8 @@ IU = "(I0_a/U0_v)"
 TOP_ERPM = "MAXIMUM_SPEED_RPM*NOPOLESPAIRS"
 LARGEST_CURRENT = "MAXIMUM_CURRENT_A/NORM_CURRENT_CONST"
 FASTEST = "MAX(MAXIMUM_SPEED_RPM,1.5*NOMINAL_SPEED_RPM)"
-LDI = f"(1.18*2*PI()/60*{FASTEST}*NOPOLESPAIRS*1.2*MOTOR_LS_MH/1000*MAXIMUM_CURRENT_A)"
-LDI_SHARE = (f"MAX(0.75,MIN(1,(0.99*131068/32768*U0_v-MIN(OVER_VOLTAGE_V,1.25*NOMINAL_BUS_V)/SQRT(3)-1.6*2/SQRT(3)*OVER_CURRENT_THRESHOLD_A*MOTOR_RS_OHM)/{LDI}))")
+LDI = f"(2*PI()/60*{FASTEST}*NOPOLESPAIRS*1.2*MOTOR_LS_MH/1000*MAXIMUM_CURRENT_A)"
+LDI_SHARE = (f"MAX(0.75,MIN(1,(0.98*131068*U0_v-MIN(OVER_VOLTAGE_V,1.25*NOMINAL_BUS_V)/SQRT(3)-1.6*2/SQRT(3)*OVER_CURRENT_THRESHOLD_A*MOTOR_RS_OHM)/{LDI}))")
 """What the back-EMF's format leaves for L di/dt, where the adaptation may raise R by 60 %."""
 SCALED = (("NORM_RS", "MOTOR_RS_OHM*I0_a/U0_v*32768", "Rs I0/U0 2^15 (Equation 5)", 1, "phase resistance"),
           ("NORM_LSDTBASE", "MOTOR_LS_MH/1000/LOOPTIME_SEC*I0_a/U0_v*32768", "(Ls/Ts) I0/U0 2^15 (Equation 5)", 8,
@@ -92,8 +92,8 @@ CONSTANTS = {
         ("NORM_INVKFIBASE", "SQRT(3)*1000*NOPOLESPAIRS*U0_v/MOTOR_KPHI_V_PER_KRPM*16384/SPEED_UNIT", "Q15 / 2", "Equation 6"),
         ("NORM_DELTAT", "LOOPTIME_SEC/60*2147483648*SPEED_UNIT", "Q15 of a turn/erpm", "Equation 1")),
     "Derivative limits: a sine of the largest current, 2 pi (n/60) P Ts Imax": (
-        ("estimator.d_ilimit_hs_q14", f"{LDI_SHARE}*MIN(2*PI()*MAXIMUM_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC*{LARGEST_CURRENT}/2,4095)", "Q14 A", "in a period"),
-        ("estimator.d_ilimit_ls_q14", f"MIN(1,{LDI_SHARE}*{FASTEST}/1.5/NOMINAL_SPEED_RPM)*MIN(8*2*PI()*MIN(NOMINAL_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC,0.12/8)*{LARGEST_CURRENT}/2,16383)", "Q14 A",
+        ("estimator.d_ilimit_hs_q14", f"MIN({LDI_SHARE}*2*PI()*MAXIMUM_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC*{LARGEST_CURRENT}/2,4095)", "Q14 A", "in a period"),
+        ("estimator.d_ilimit_ls_q14", f"MIN(MIN(1,{LDI_SHARE}*{FASTEST}/1.5/NOMINAL_SPEED_RPM)*8*2*PI()*MIN(NOMINAL_SPEED_RPM/60*NOPOLESPAIRS*LOOPTIME_SEC,0.12/8)*{LARGEST_CURRENT}/2,16383)", "Q14 A",
          "in eight periods, of 0.12 turns at most")),
     "Speeds": tuple((field, f"{name}*NOPOLESPAIRS{part}/SPEED_UNIT", "erpm", meaning) for field, name, part, meaning in (
         ("minimum_erpm", "MINIMUM_SPEED_RPM", "", "potentiometer at zero"),

@@ -18,8 +18,8 @@
     { \
         .rs_exp = PARAM_RS_EXP, \
         .ls_exp = PARAM_LS_EXP, \
-        .d_ilimit_ls_q14 = (int16_t)(PARAM_LDI_LS_SHARE * PARAM_F(D_ILIMIT_LS_Q14) + 0.5F), \
-        .d_ilimit_hs_q14 = (int16_t)(PARAM_LDI_SHARE * PARAM_F(D_ILIMIT_HS_Q14) + 0.5F), \
+        .d_ilimit_ls_q14 = PARAM_LDI_LS_Q14, \
+        .d_ilimit_hs_q14 = PARAM_LDI_HS_Q14, \
         .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
         .half_step_q16_rad = (uint16_t)PARAM_ROUND(PARAM_F(LOOPTIME_SEC) * PARAM_PI / 60.0F * 4294967296.0F * PARAM_F(SPEED_UNIT)), \
         .kfilter_velestim_q16 = PARAM_VELESTIM_Q16, \

@@ -80,20 +80,21 @@
 #define PARAM_TRIP_RI_V (2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM))
 #define PARAM_FASTEST_RPM PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), 1.5F * PARAM_F(NOMINAL_SPEED_RPM))
 #define PARAM_LDI_V (2.0F * PARAM_PI / 60.0F * PARAM_FASTEST_RPM * PARAM_F(NOPOLESPAIRS) * 1.2F * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
-#define PARAM_LDI_VECTOR_V (1.18F * PARAM_LDI_V) /* sqrt(2)/1.2 */
-#define PARAM_EMF_END_V (0.99F * 131068.0F * NORM_VOLTAGE_CONST)
+#define PARAM_EMF_END_V (0.98F * 131068.0F * NORM_VOLTAGE_CONST) /* an axis may be lengthened by the turn to the middle of the period */
 /** The adaptation raises R, too. What is missing for that the limits of L di/dt give, which full current at full speed alone would reach: at most a
- *  quarter of it, as a vector with both axes at their limits; then R rises less, and tells nothing of the winding's temperature. */
+ *  quarter of it; then R rises less, and tells nothing of the winding's temperature. */
 #define PARAM_RS_MOST 0.6
-#define PARAM_LDI_SHARE PARAM_MAX(0.75F, PARAM_MIN(1.0F, (PARAM_EMF_END_V - PARAM_MOST_V - (1.0F + PARAM_F(PARAM_RS_MOST)) * PARAM_TRIP_RI_V) / PARAM_LDI_VECTOR_V))
+#define PARAM_LDI_SHARE PARAM_MAX(0.75F, PARAM_MIN(1.0F, (PARAM_EMF_END_V - PARAM_MOST_V - (1.0F + PARAM_F(PARAM_RS_MOST)) * PARAM_TRIP_RI_V) / PARAM_LDI_V))
 #define PARAM_LDI_LS_SHARE PARAM_MIN(1.0F, PARAM_LDI_SHARE *PARAM_FASTEST_RPM / (1.5F * PARAM_F(NOMINAL_SPEED_RPM)))
-#define PARAM_RS_ROOM ((PARAM_EMF_END_V - PARAM_MOST_V - PARAM_LDI_SHARE * PARAM_LDI_VECTOR_V) / PARAM_TRIP_RI_V - 1.0F)
-#define PARAM_RS_RISES PARAM_MIN(PARAM_F(PARAM_RS_MOST), PARAM_RS_ROOM)
+#define PARAM_RS_ROOM ((PARAM_EMF_END_V - PARAM_MOST_V - PARAM_LDI_SHARE * PARAM_LDI_V) / PARAM_TRIP_RI_V - 1.0F)
+#define PARAM_RS_RISES PARAM_MAX(0.0F, PARAM_MIN(PARAM_F(PARAM_RS_MOST), PARAM_RS_ROOM))
 /** Below it the derivative spans eight samples, in which the current turns by 43 degrees at most: AN1292's nominal speed, or less with a long period. */
 #define EIGHT_SAMPLES_ERPM PARAM_MIN(PARAM_F(NOMINAL_SPEED_ERPM), PARAM_F(PARAM_EIGHT_TURN) * 60.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
 #define PARAM_EIGHT_TURN 0.12
 #define D_ILIMIT_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)) + 0.5F, 16383.0F))
 #define D_ILIMIT_HS_Q14 ((int16_t)PARAM_MIN(PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
+#define PARAM_LDI_LS_Q14 ((int16_t)PARAM_MIN(8.0F * PARAM_LDI_LS_SHARE * PARAM_DI(EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS)) + 0.5F, 16383.0F))
+#define PARAM_LDI_HS_Q14 ((int16_t)PARAM_MIN(PARAM_LDI_SHARE * PARAM_DI(MAXIMUM_SPEED_RPM) + 0.5F, 4095.0F))
 #define D_ILIMIT_LS ((int16_t)(2 * D_ILIMIT_LS_Q14)) /* in AN1292's format */
 #define D_ILIMIT_HS ((int16_t)(2 * D_ILIMIT_HS_Q14))
 

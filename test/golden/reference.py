@@ -254,10 +254,10 @@ class Machine:
 
     @property
     def shares(self):
-        """In volts: what 99 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
-        room = 0.99 * 131068 * self.u0 - min(self.over_voltage_v, 1.25 * self.bus_v) / SQRT3
+        """In volts: what 98 % of Q13 leaves beside the largest voltage, R i at the trip level, and the largest L di/dt."""
+        room = 0.98 * 131068 * self.u0 - min(self.over_voltage_v, 1.25 * self.bus_v) / SQRT3
         return room, 2 / SQRT3 * self.over_current_a * self.rs_ohm, \
-            1.18 * 1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
+            1.2 * self.fastest_rpm * self.pole_pairs * 2 * math.pi / 60 * self.ls_h * self.maximum_current_a
 
     @property
     def ldi_share(self):
@@ -311,8 +311,8 @@ class Machine:
         return {
             "rs_q16": nearest(rs / 2 ** rs_exp), "rs_exp": rs_exp,
             "ls_q16": nearest(ls / 2 ** ls_exp), "ls_exp": ls_exp,
-            "d_ilimit_ls_q14": nearest(self.ldi_ls_share * min(nearest(self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383)),
-            "d_ilimit_hs_q14": nearest(self.ldi_share * min(nearest(self.current_step(self.maximum_rpm) / 2), 4095)),
+            "d_ilimit_ls_q14": min(nearest(self.ldi_ls_share * self.current_step(self.eight_samples_erpm / self.pole_pairs, 8) / 2), 16383),
+            "d_ilimit_hs_q14": min(nearest(self.ldi_share * self.current_step(self.maximum_rpm) / 2), 4095),
             "deltat_q32": nearest(self.turns_per_erpm * unit * 2 ** 32),
             "half_step_q16_rad": nearest(self.turns_per_erpm * unit * math.pi * 2 ** 32),
             "kfilter_velestim_q16": nearest((1 - (1 - self.kfilter_velestim / 32768) ** 2) * WORD),
@@ -345,7 +345,7 @@ class Machine:
         e = self.estimator()
         return {
             "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
-            "rs_most": q15(min(0.6, self.rs_end - 1)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
+            "rs_most": q15(clamp(self.rs_end - 1, 0, 0.6)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
             "rs_base_q16": e["rs_q16"],
         }
 

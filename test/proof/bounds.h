@@ -48,11 +48,11 @@ static uint16_t largest_rs(void)
     return (uint16_t)((rs > 65535) ? 65535 : rs);
 }
 
-/** Length of Equation 4's vector in Q13: circle, resistance at the trip level, and an inductance with both axes at their limit. */
+/** Length of Equation 4's vector in Q13: circle, resistance, and an inductance with both axes at their limit. */
 static int32_t longest_emf(void)
 {
     const estimator_params_t *e = &params.estimator;
-    int32_t resistive = (int32_t)(qm_mulhi_su(beta_max, largest_rs()) + 1) * (1 << e->rs_exp);
+    int32_t resistive = ((int32_t)qm_mulhi_uu((uint16_t)beta_max, rs_max) + 2) * (1 << e->rs_exp); /* no vector is longer than the largest beta */
     int32_t fast = (int32_t)qm_mulhi_su((int16_t)(8 * e->d_ilimit_hs_q14), largest_ls()) * (1 << e->ls_exp);
     int32_t slow = (int32_t)qm_mulhi_su(e->d_ilimit_ls_q14, largest_ls()) * (1 << e->ls_exp) * 9 / 8; /* turned: sqrt(1 + 0.5^2) */
     int32_t inductive = (fast > slow) ? fast : slow;

@@ -6,7 +6,9 @@
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
  *     -eva-slevel-function drive_tick:200,drive_rest:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
- *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20 */
+ *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20
+ *     -eva-slevel-function estimator_pll:200,lowpass_bounded:50,emf_d_in_pieces:50,emf_q_beside_d:10
+ *     -eva-split-return-function lowpass_in_pieces:full,lowpass_bounded:full,emf_d_in_pieces:full */
 #include "any.h"
 
 #include "control/transforms.h"
@@ -80,6 +82,33 @@ static inline q15_t circle_bounded(q15_t x)
     return any(0, 32767);
 }
 
+static int16_t emf_d; /* of this period; the q axis comes after it */
+
+/** Pieces, for the q axis has what d leaves. */
+static inline int16_t emf_d_in_pieces(int32_t *y_q16)
+{
+    int16_t wide = (int16_t)(emf_dq_max / 8 + 1);
+    //@ loop unroll 16;
+    for (int16_t k = -8; k < 8; k++) {
+        if (k == 7 || any(0, 1)) {
+            *y_q16 = any_l(k * wide * 65536l, (k + 1) * wide * 65536l - 1);
+            break;
+        }
+    }
+    //@ admit piece: emf_dq_max * -65536 <= *y_q16 <= emf_dq_max * 65536 + 65535;
+    emf_d = qm_hi(*y_q16);
+    return emf_d;
+}
+
+/** |d| + |q| of a vector is at most sqrt(2) times its length. */
+static inline int16_t emf_q_beside_d(int32_t *y_q16)
+{
+    int16_t most = (int16_t)(emf_dq_max * 1449l / 1024 + 2 - qm_abs(emf_d));
+    most = (most < emf_dq_max) ? most : emf_dq_max;
+    *y_q16 = any_l(most * -65536l, most * 65536l + 65535);
+    return qm_hi(*y_q16);
+}
+
 /** circle.c, proof_lowpass: the back-EMF, whose filter follows the speed. */
 static inline int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
 {
@@ -87,8 +116,7 @@ static inline int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
     //@ admit length_of_the_back_emf: -emf_dq_max <= x <= emf_dq_max;
     //@ check filter: (FIELDWEAK_FILTER_LEAST <= k_q16 && k_q16 % 8 == 0) || k_q16 == p->kfilter_esdq_q16 || k_q16 == p->kfilter_esdq_fw_q16;
     //@ check largest: k_q16 <= p->kfilter_esdq_q16 || k_q16 <= p->kfilter_esdq_fw_q16;
-    *y_q16 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535);
-    return qm_hi(*y_q16);
+    return (y_q16 == &drive.run.estimator.e_d_q28) ? emf_d_in_pieces(y_q16) : emf_q_beside_d(y_q16);
 }
 
 /** y += K (x - y) stays in the range of x, but only because y is near x at its ends: pieces that shrink towards them. */

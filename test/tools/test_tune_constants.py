@@ -24,7 +24,7 @@ def golden(rs: float, ls_mh: float, kphi: float, pairs: int, amperes: float, mos
     slope = [PI2 * rpm / 60.0 * pairs * 50e-6 * most_a / amperes * 16384.0 for rpm in speeds]
     return {"NORM_RS": rs * ratio * 16384.0, "NORM_LSDTBASE": ls_mh * 1e-3 / 50e-6 * ratio * 128.0, "NORM_DELTAT": 50e-6 / 60.0 * 2.0 ** 31,
             "NORM_INVKFIBASE": math.sqrt(3.0) * 1000.0 * pairs * (24.0 / math.sqrt(3.0) * 0.96 / 32768.0) / kphi * 16384.0,
-            "estimator.d_ilimit_ls_q14": 8.0 * slope[0], "estimator.d_ilimit_hs_q14": slope[1],
+            "estimator.d_ilimit_ls_q14": 8.0 * slope[0], "D_ILIMIT_HS": 2.0 * round(slope[1]),
             "pi_q.kp": PI2 * hz * ls_mh * 1e-3 * ratio / 16.0 * 32768.0, "pi_q.ki": PI2 * hz * rs * 50e-6 * ratio * 2048.0}
 
 

@@ -278,6 +278,7 @@ void test_speed_is_back_emf_over_Kphi_with_the_sign_of_Eq_or_of_the_filtered_spe
         { "backwards", 100, -1000, -1400, -900 },
         { "standstill counts as forward", 100, 0, 0, -100 },
         { "so does no Eq", 100, 0, 2000, -100 },
+        { "a count backwards is backwards", 100, 0, -1, 100 },
         { "speed stops short of the word", 0, 12000, 20000, 8434 },
         { "on both sides", 0, -12000, -20000, -8434 },
         { "also of a sum of 32000", -16000, 16000, 20000, 8434 },
