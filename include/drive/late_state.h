@@ -6,7 +6,7 @@
 #include "drive/param_scaling.h" /* LATE_DUTIES */
 
 /** How much waits for the next control interrupt, as a number that arrays can have. */
-__extension__ enum { LATE_WAITS = LATE_DUTIES };
+__extension__ typedef enum { LATE_WAITS = LATE_DUTIES } late_waits_t;
 
 /** Member of drive_run_t: the vector whose duties wait, Q13. */
 #define LATE_STATE __extension__ alphabeta_t late_v_q13[LATE_WAITS];
