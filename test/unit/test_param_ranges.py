@@ -136,7 +136,7 @@ RELATIONS = {
     "the controllers' PTERMs must be positive": [case(f"{loop}_PTERM", "0.0", "0.001") for loop in LOOPS],
     "the current controllers' ITERMs must not be negative": [
         case("D_CURRCNTR_ITERM", "-0.001", "0.0"), case("Q_CURRCNTR_ITERM", "-0.001", "0.0")],
-    "the back-EMF's format overflows": [case("MOTOR_RS_OHM", "3.45", "3.35")],
+    "the back-EMF's format overflows": [case("MOTOR_RS_OHM", "3.93", "3.86")],
     "OVER_VOLTAGE_V must be above NOMINAL_BUS_V": [case("OVER_VOLTAGE_V", "24.0", "24.1")],
     "OVER_VOLTAGE_V must be inside BUS_FULL_SCALE_V": [case("BUS_FULL_SCALE_V", "34.6", "34.8")],
     "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V": [case("OVER_VOLTAGE_V", "45.7", "45.5")],
