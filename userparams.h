@@ -33,7 +33,7 @@
 
 /* ---- Supply and board: dsPICDEM MCLV, 24 V supply ----------------------------------------------------------------- */
 #define NOMINAL_BUS_V 24.0          /* [V]             8 .. 60        supply; the unit of voltage follows from it */
-#define LOOPTIME_SEC 0.00005        /* [s]             0.00004 .. 0.00014 PWM and control period */
+#define LOOPTIME_SEC 0.00005        /* [s]             0.000025 .. 0.00014 PWM and control period */
 #define DEADTIME_SEC 0.000002       /* [s]             0.0000005 .. 0.000003 dead time of the bridge */
 #define NORM_CURRENT_CONST 0.0001342773 /* [A/count]       0.000001 .. 0.01 current of one count, full scale / 32768; calibrate with a probe: 4.4 A full scale */
 #define KCURRA -0.5                 /* [1]             -0.6 .. 0.6    gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
@@ -189,8 +189,8 @@
  *   fieldweak.on_speed_erpm              2640 rpm             13200  erpm                           exact  field weakening starts
  *   estimator.nominal_erpm               2800 rpm             14000  erpm                           exact  one-sample derivative above
  *   estimator.decimate_erpm               280 rpm              1400  erpm                           exact  sign of Equation 2 from the filtered speed below
- *   speed_ramp_q16                       4000 rpm/s          524288  Q16 erpm in 8 periods          exact  slope of the reference
- *   tuning_step_q16                        15 periods         32768  Q16 erpm in 8 periods          exact  slope in TUNING
+ *   speed_ramp_q16                       4000 rpm/s          524288  Q16 erpm a slow step           exact  slope of the reference
+ *   tuning_step_q16                        15 periods         32768  Q16 erpm a slow step           exact  slope in TUNING
  *   ramp_hold_erpm                        350 rpm              1750  erpm                           exact  the ramp waits when the motor is further behind
  *   overspeed_erpm                       6540 rpm             32700  erpm                           exact  lost lock above
  *
@@ -205,7 +205,7 @@
  *   speed_kp_quick_q13              0.0013708 A/rpm            4181  Q15 / 16                    -0.012 %  after a large innovation
  *
  * load observer, adaptation and low speed
- *   observer.deltat_q32                 5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle a period
+ *   observer.deltat_q32                 5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle in an eighth of a step
  *   observer.per_turn_q12             0.45776 rpm              9375  Q12 erpm                       exact  2^16 counts of the angle in a step
  *   observer.shift                          3 1                   3  count                          exact  2^this of its units of acceleration are an erpm a step
  *   observer.per_current_q16       1.0396e+05 rpm/s/A         58548  Q16 unit/Q13 A              +0.000 %  Kt/J
@@ -240,7 +240,7 @@
  *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
  *   early_erpm                            240 rpm              1200  erpm                           exact  the hand-over may come from here on
  *   bootstrap_periods                    0.01 s                 200  periods                        exact  low sides on before the start
- *   agree_steps                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
+ *   agree_steps                          0.02 s                  50  slow steps                     exact  agreement before the hand-over
  *   wait_periods                          0.2 s                4000  periods                        exact  and how long it may take at the end of the ramp
  *
  * limits
@@ -257,10 +257,10 @@
  *   bus_regen_q15                          27 V               16756  Q15 of full scale           -0.002 %  braking is reduced from here
  *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
- *   stall_steps                          0.23 s                 575  8 periods                      exact  stall
- *   lost_lock_steps                      0.06 s                 150  8 periods                      exact  lost lock
- *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
- *   impossible_steps                     0.25 s                 625  8 periods                      exact  flux or resistance impossible
+ *   stall_steps                          0.23 s                 575  slow steps                     exact  stall
+ *   lost_lock_steps                      0.06 s                 150  slow steps                     exact  lost lock
+ *   wrong_steps                           0.1 s                 250  slow steps                     exact  voltages and currents do not fit the motor
+ *   impossible_steps                     0.25 s                 625  slow steps                     exact  flux or resistance impossible
  *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
  *   id_off_q13                        0.10185 A                 190  Q13 A                       +0.194 %  d current's mean deviation
  *   rs_impossible                         0.6 1               19660  Q15                         -0.004 %  change of R that no winding survives, 1: not told

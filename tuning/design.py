@@ -73,7 +73,7 @@ class Scales:
     iterm_per_hz: float
     speed_pterm_per_hz: float
     acceleration: float
-    """of a count of current, counts of speed in eight periods"""
+    """of a count of current, counts of speed in a slow step"""
     large_counts: float
     """innovation that the load observer calls large, counts of speed"""
     count_a: float
@@ -536,7 +536,7 @@ def _field_weakening(d: Design) -> None:
     why = f"least d current that keeps the voltage within {limits.TABLE_SHARE:.0%} of its circle without load"
     if tables is not None and "FW_START_SPEED_RPM" not in d.motor.tune:
         rows, d.tuned_by_machine = tables.parameters(), True
-        d.tables_from = f"{paths.shown(fw_tables.path_of(d.motor.name))}, found on the virtual board by make tune-fw"
+        d.tables_from = f"{paths.shown(tables.path or fw_tables.path_of(d.motor.name))}, found on the virtual board by make tune-fw"
         why = "found on the virtual board"
     for name, text in rows.items():
         d.put(name, text, why)

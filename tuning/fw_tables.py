@@ -50,6 +50,8 @@ class Tables:
     maximum_speed_rpm: float = 0.0
     goal: dict[str, float] = field(default_factory=dict)
     rows: list[dict[str, float]] = field(default_factory=list)
+    path: Path | None = field(default=None, compare=False)
+    """where they were read"""
 
     def speed_rpm(self, index: int) -> float:
         """Speed reference of an entry."""
@@ -81,8 +83,9 @@ def fingerprint(params: Mapping[str, float]) -> dict[str, float]:
     return {name: float(params[name]) for name in FINGERPRINT}
 
 
-def path_of(motor: str) -> Path:
-    return FOLDER / f"{motor}.toml"
+def path_of(motor: str, board: str = "") -> Path:
+    """The motor's file; with a board, other than the motor's own, that for this board."""
+    return FOLDER / (f"{motor}-{board}.toml" if board else f"{motor}.toml")
 
 
 def load(path: Path) -> Tables:
@@ -104,6 +107,7 @@ def load(path: Path) -> Tables:
     if goal is not None:
         tables.goal = {key: goal.number(key) for key in goal.data}
     tables.rows = _rows(root.section("entries"))
+    tables.path = path
     root.close()
     return tables
 
@@ -120,15 +124,16 @@ def _rows(measured: Section | None) -> list[dict[str, float]]:
 
 
 def load_for(motor: str, params: Mapping[str, float], folder: Path = FOLDER) -> tuple[Tables | None, str]:
-    """The motor's tables, or None and the reason in one line ("" where there is simply no file)."""
-    path = folder / f"{motor}.toml"
-    if not path.is_file():
-        return None, ""
-    tables = load(path)
-    reason = tables.mismatch(params)
-    if reason:
-        return None, f"{paths.shown(path)} is not used: {reason}; run make tune-fw MOTOR={motor}"
-    return tables, ""
+    """The motor's tables, those for one board or another, or None and the reason in one line ("" where there is simply no file)."""
+    told = ""
+    for path in (folder / f"{motor}.toml", *sorted(folder.glob(f"{motor}-*.toml"))):
+        if path.is_file():
+            tables = load(path)
+            reason = tables.mismatch(params)
+            if not reason:
+                return tables, ""
+            told = told or f"{paths.shown(path)} is not used: {reason}; run make tune-fw MOTOR={motor}"
+    return None, told
 
 
 def check_place(path: Path) -> None:

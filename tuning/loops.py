@@ -5,8 +5,10 @@ and acts for one period, and is turned by the angle of sample n+1; so, with h = 
 
     i[n+1] = h^2 e^(-j phi) i[n] + (1 - h)/R v[n] + h (1 - h)/R e^(-j phi) v[n-1]      C(z) = Kp + Ki/(z - 1)
 
-Speed loop. Every 8 periods the load observer (include/control/observer.h) takes the estimated speed's mean over them and the q current and
-gives the speed and the load, from which the controller makes the q current of two periods later; the estimated speed is half a period older.
+With late duties (include/drive/late.h) v[n] acts a period later, turned by the angle of sample n+2: one more delay, 1/z.
+
+Speed loop. Every 8 periods, with late duties 16, the load observer (include/control/observer.h) takes the estimated speed's mean over them and the q current and
+gives the speed and the load, from which the controller makes the q current of a quarter of that later; the estimated speed is half a period older.
 Per step T, with a = Kt P/J, r the rate times T, w^ that mean,
 
     e = w^ - w - a T (i - l)/2,   w <- w + a T (i - l) + 2 r e,   l <- l - r^2/(a T) e,   i* = l - Kp w
@@ -25,7 +27,7 @@ import numpy as np
 
 from tools.bench import robust
 from tools.common import paths
-from tools.common.param_rows import number
+from tools.common.param_rows import duties_are_late, number, slow_periods
 
 from .limits import digits_down
 
@@ -62,7 +64,6 @@ innovation is worth; the step of current shakes the estimate, and that is the ne
 1.1 some swing between both limits. A heavy rotor needs no quick observer: a load slows it slowly."""
 RATE_MOST = 0.374
 """OBSERVER_RATE_MOST_Q16 of control/observer.h"""
-SLOW_PHASES = int(number("SLOW_PHASES"))
 CURRENT_TOP = 1.0 / 12.0
 """Taken above the cap only for a motor whose rotation at top speed would cost the margin below it."""
 CURRENT_NEARLY_DEG = 5.0
@@ -102,6 +103,11 @@ class Gains:
     rate: float
     esdq: float
     period_s: float
+
+    @property
+    def slow_s(self) -> float:
+        """A slow step."""
+        return slow_periods(self.period_s) * self.period_s
 
 
 @dataclass(frozen=True)
@@ -165,7 +171,8 @@ def current_loop(hz: np.ndarray, plant: Plant, gains: Gains, omega_e: float, axi
     z, turn = np.exp(2j * np.pi * hz * ts), np.exp(-1j * omega_e * ts)
     h = np.exp(-plant.rs * ts / (2.0 * inductance))
     b = (1.0 - h) / plant.rs
-    return (kp + gains.ki / (z - 1.0)) * b * (z + h * turn) / (z * (z - h * h * turn))
+    late = z if duties_are_late(ts) else 1.0
+    return (kp + gains.ki / (z - 1.0)) * b * (z + h * turn) / (late * z * (z - h * h * turn))
 
 
 def estimator(hz: np.ndarray, gains: Gains, omega_e: float, strength: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -179,7 +186,7 @@ def estimator(hz: np.ndarray, gains: Gains, omega_e: float, strength: float = 1.
 
 def observer_law(hz: np.ndarray, assumed: Plant, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
     """The q current that observer and controller ask for: per estimated speed, per measured q current."""
-    step = SLOW_PHASES * gains.period_s
+    step = gains.slow_s
     z, r, gain = np.exp(2j * np.pi * hz * step), gains.rate, assumed.kt * assumed.pole_pairs / assumed.inertia * step
     (a, b), (c, d) = (1.0 - 2.0 * r, -(1.0 - r) * gain), (r * r / gain, 1.0 - 0.5 * r * r)
 
@@ -187,16 +194,16 @@ def observer_law(hz: np.ndarray, assumed: Plant, gains: Gains) -> tuple[np.ndarr
         speed, load = (z - d) * to_speed + b * to_load, c * to_speed + (z - a) * to_load
         return z * (load - gains.speed_kp * speed) / ((z - a) * (z - d) - b * c)
 
-    mean = (1.0 - 1.0 / z) / (1.0 - np.exp(-2j * np.pi * hz * gains.period_s)) / SLOW_PHASES
+    mean = (1.0 - 1.0 / z) / (1.0 - np.exp(-2j * np.pi * hz * gains.period_s)) * gains.period_s / step
     return current(2.0 * r, -c) * mean, current(-b, 0.5 * r * r)
 
 
 def speed_loop(hz: np.ndarray, true: Plant, assumed: Plant, gains: Gains, omega_e: float) -> np.ndarray:
     """Open speed loop of a motor `true` with controllers made for `assumed`."""
     ts, s = gains.period_s, 2j * np.pi * hz
-    slow = SLOW_PHASES * ts
+    slow = gains.slow_s
     inner = current_loop(hz, true, gains, 0.0)
-    current = inner / (1.0 + inner) * (1.0 - np.exp(-s * slow)) / (s * slow) * np.exp(-2.0 * s * ts)
+    current = inner / (1.0 + inner) * (1.0 - np.exp(-s * slow)) / (s * slow) * np.exp(-0.25 * s * slow)
     shaft = true.kt * true.pole_pairs / (true.inertia * s + true.viscous)
     speed, error = estimator(hz, gains, omega_e, true.psi / assumed.psi)
     wrong = (true.rs - assumed.rs + s * (true.lq - assumed.lq)) / assumed.psi
@@ -274,7 +281,7 @@ def speed_gains(plant: Plant, bandwidth_hz: float, load_hz: float, base: Gains, 
     """Kp = 2 pi f J/Kt per mechanical, i.e. / P per electrical rad/s, and the observer at its three rates; both fall with the speed below
     the one that the rates need, under load below half of it, and so does the corner of the back-EMF filter."""
     full = omega_e / full_rad_s(load_hz)
-    kp, step = 2.0 * np.pi * bandwidth_hz * plant.inertia / plant.kt / plant.pole_pairs, SLOW_PHASES * base.period_s
+    kp, step = 2.0 * np.pi * bandwidth_hz * plant.inertia / plant.kt / plant.pole_pairs, base.slow_s
     loaded, esdq = LOADED_SHARE * load_hz, min(base.esdq, ESDQ_RATIO * omega_e * base.period_s)
 
     def at(rate_hz: float, share: float, gain: float = 1.0) -> Gains:
@@ -333,14 +340,14 @@ def _steps(highest: float, lowest: float, ratio: float) -> list[float]:
 def load_bandwidth(base: Gains, esdq_hz: float, current_hz: float) -> float:
     """Largest bandwidth of the load observer: its time constant is that of back-EMF filter and current loop and one slow step together, and
     its rate times the step keeps within its format."""
-    step = 2.0 * np.pi * SLOW_PHASES * base.period_s
+    step = 2.0 * np.pi * base.slow_s
     return min(1.0 / (1.0 / esdq_hz + 1.0 / current_hz + step), RATE_MOST / step)
 
 
 def calm_load_bandwidth(innovation_counts: float, acceleration: float, largest_counts: float, period_s: float) -> float:
     """Bandwidth of the load observer at which a large innovation asks for HEAVY_SHARE of the largest current, at the lowest speed of the full
     rates. `acceleration`: of a count of current, counts of speed in a slow step."""
-    return HEAVY_SHARE * largest_counts * acceleration / (FULL_RATIO * innovation_counts) / (2.0 * math.pi * SLOW_PHASES * period_s)
+    return HEAVY_SHARE * largest_counts * acceleration / (FULL_RATIO * innovation_counts) / (2.0 * math.pi * slow_periods(period_s) * period_s)
 
 
 def speed_cap(friction_over_lost: float) -> float:
@@ -362,7 +369,7 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
                  load_hz: float, fixed_hz: float | None = None, fixed_load_hz: float | None = None, cap: float = SPEED_CAP) -> LoopDesign:
     """Bandwidth of the load observer, the largest up to `load_hz` with enough margin at every speed of `speeds_rad_s` (name: electrical
     rad/s) and every rate, and of the speed loop that goes with it: up to `largest_hz` and what is calm at the lowest speed."""
-    grid = np.geomspace(0.05, 0.45 / (SLOW_PHASES * base.period_s), 400)
+    grid = np.geomspace(0.05, 0.45 / base.slow_s, 400)
     whole, lowest = corners(plant, spread), min(speeds_rad_s.values())
     sets = {"quiet": whole, "loaded": [item for item in whole if (item[1].rs, item[1].psi) == (plant.rs, plant.psi)], "quick": whole[:1],
             "quick, L wrong": [(f"L x{factor:g}", replace(plant, ld=plant.ld * factor, lq=plant.lq * factor)) for factor in WRONG_L]}

@@ -142,7 +142,7 @@ def _page(design: Design, plots: dict[str, str]) -> str:
                                                   "acts from half a period after its sample for one period. Dashed: negative frequencies, which differ when the rotor turns."),
               plots["current_loop"],
               "<h2>Speed loop</h2>", _loop_text(d.speed_loop, "Kp = 2&pi;f J/Kt on the observed speed, and the observed load, at each rate of the load observer: quiet, loaded, quick after a load "
-                                                "step. In the loop, opened at the estimated speed: hold over 8 periods, closed current loop, inertia, back-EMF filter with "
+                                                "step. In the loop, opened at the estimated speed: hold over a slow step, closed current loop, inertia, back-EMF filter with "
                                                 "the estimator's own feedback (it is as fast as the motor turns), computing. R and L that the estimator has wrong reach "
                                                 "the speed through the q current: that is the worst case."),
               plots["speed_loop"], "<h2>Start</h2>", _start_text(d), plots["start"],

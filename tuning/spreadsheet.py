@@ -53,7 +53,7 @@ DATA = {
         Datum("Inertia of rotor and load", "inertia_gcm2", "g cm2", 0.1, 1e6, "MOTOR_INERTIA_KGM2", "inertia_gcm2/10000000", 1e7)),
     "Supply and board": (
         Datum("Supply (DC link)", "supply_v", "V", 10, 48, "NOMINAL_BUS_V", "supply_v"),
-        Datum("PWM and control period", "period_us", "us", 40, 140, "LOOPTIME_SEC", "period_us/1000000", 1e6),
+        Datum("PWM and control period", "period_us", "us", 25, 140, "LOOPTIME_SEC", "period_us/1000000", 1e6),
         Datum("Dead time", "dead_time_us", "us", 0.5, 3, "DEADTIME_SEC", "dead_time_us/1000000", 1e6),
         Datum("Low sides on around the sample", "window_us", "us", 1.5, 4, "SAMPLE_WINDOW_SEC", "window_us/1000000", 1e6),
         Datum("Ipeak: current at full scale, reference / (shunt * gain)", "ipeak_a", "A peak", 0.33, 65, "NORM_CURRENT_CONST",

@@ -1,4 +1,5 @@
 /* The interrupts: the control interrupt that is one PWM period, the fault input, and the traps. */
+#include "board/duties.h"
 #include "board/firmware.h"
 #include "board/lnet.h"
 #include "board/mclv.h"
@@ -42,32 +43,40 @@ QM_INLINE uint16_t board_slow_is_due(void)
 #if SCOPE || MODE_RECORDS
     return 1;
 #else
-    return drive_slow_is_due(&board_drive);
+    return drive_slow_follows(&board_drive);
 #endif
 }
 
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
 
-/** The control interrupt, 20 kHz, triggered by PWM1 through the ADC: from the samples to the duties. */
+/* For the next period's begin. */
+__extension__ static duties_t board_waiting[LATE_WAITS];
+
+/** The bridge is off at once; the slow work says why. */
+QM_INLINE void board_overrun(void)
+{
+    board_is_late = 1;
+    P1OVDCON = BOARD_OUTPUTS_OFF;
+    IFS0bits.T2IF = 1;
+}
+
+/** The control interrupt, triggered every period by PWM1 through the ADC: from the samples to the duties. */
 void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
-    duties_t duty;
+    duties_t now, *duty = duties_place(board_waiting, &now);
     uint16_t switches;
 
     IFS0bits.AD1IF = 0;
+    if (duties_write_waiting(duty)) {
+        board_overrun();
+    }
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
-    switches = drive_tick(&board_drive, &board_params, &raw, &duty);
-    P1DC1 = duty.a;
-    P1DC2 = duty.b;
-    P1DC3 = duty.c;
-    /* The duties load when the counter reaches zero. Still counting down: in time. */
-    if ((P1TMR & 0x8000u) == 0u || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
-        board_is_late = 1;
-        P1OVDCON = BOARD_OUTPUTS_OFF;
-        IFS0bits.T2IF = 1;
+    switches = drive_tick(&board_drive, &board_params, &raw, duty);
+    if (duties_write_now(duty) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
+        board_overrun();
     }
     if (!switches) {
         if (board_drive.fault != (uint16_t)FAULT_NONE) {
@@ -100,7 +109,7 @@ void BOARD_ISR _T2Interrupt(void)
     drive_slow(&board_drive, &board_params, &raw);
     if (!drive_is_running(&board_drive)) {
         board_set_idle_outputs(drive_outputs(&board_drive));
-    } else if (switched) {
+    } else if (switched && duties_are_the_laws()) {
         P1OVDCON = BOARD_OUTPUTS_PWM;
     } else {
         /* the bridge begins to switch when its first duties are written */

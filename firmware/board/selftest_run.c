@@ -8,6 +8,7 @@
 #include "board/reset.h"
 #include "board/selftest_chip.h"
 #include "board/text.h"
+#include "drive/late.h"
 #include "drive/state.h"
 
 #define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
@@ -103,7 +104,7 @@ static void test_registers(void)
 static uint16_t outputs_hold(void)
 {
     uint16_t outputs = drive_outputs(&board_drive), now = P1OVDCON;
-    if (board_drive.state == (uint16_t)DRIVE_ALIGN && board_drive.periods == 0u && now == BOARD_OUTPUTS_BOOTSTRAP) {
+    if (board_drive.state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
         return 1;
     }
     return (uint16_t)(now == BOARD_OUTPUTS_OFF || (outputs != 0u && now == (outputs == OUTPUTS_PWM ? BOARD_OUTPUTS_PWM : BOARD_OUTPUTS_BOOTSTRAP)));

@@ -68,8 +68,8 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte)
 
 uint16_t selftest_flow_holds(const drive_t *d)
 {
-    uint16_t calls = (uint16_t)(d->ticks / SLOW_EVERY), rest = (uint16_t)(calls & (SLOW_QUARTERS - 1u));
-    uint16_t expected = (uint16_t)((calls / SLOW_QUARTERS) * (SLOW_QUARTERS * (SLOW_QUARTERS - 1u) / 2u) + rest * (rest + 1u) / 2u);
+    uint16_t calls = (uint16_t)(d->ticks / SLOW_EVERY), rest = (uint16_t)(calls & (SLOW_CALLS - 1u));
+    uint16_t expected = (uint16_t)((calls / SLOW_CALLS) * (SLOW_CALLS * (SLOW_CALLS - 1u) / 2u) + rest * (rest + 1u) / 2u);
     return (uint16_t)(((d->selftest.phases ^ expected) & 0x3FFFu) == 0u); /* the sum of 65536 ticks is a multiple of 0x4000 */
 }
 

@@ -11,7 +11,7 @@ typedef struct {
     int16_t dead_time;     /**< duty that dead time takes from a leg: Td / Ts * full */
     int16_t knee_q13;      /**< current at which dead-time compensation is full; linear below */
     int16_t dead_slope_q8; /**< dead_time / knee_q13 * 256; times knee_q13 it fits a word */
-    int16_t turn_q13;      /**< most that a phase current changes in a period */
+    int16_t turn_q13;      /**< most that a phase current changes from the sample to the middle of the pulse */
 } svm_params_t;
 
 /** What each leg gets for its dead time, duty counts. */

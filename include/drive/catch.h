@@ -6,19 +6,20 @@
 #ifndef DRIVE_CATCH_H
 #define DRIVE_CATCH_H
 
+#include "drive/late.h"
 #include "drive/modes/modes.h"
 #include "drive/startup.h"
 
-#define CATCH_LOOK_PERIODS 32u    /**< of a look at a slow rotor */
-#define CATCH_STANDS_Q11 256      /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
-#define CATCH_PAUSE_TURN 13653u   /**< 75 degrees: less than half a turn, even where a look and a wrong Kphi make them twice as many */
-#define CATCH_PAUSE_LEAST 4u      /**< periods */
-#define CATCH_PAUSE_MOST 1000u    /**< periods: 50 ms; in them a rotor turns a tenth of a right angle, or it stands */
-#define CATCH_LEAST_TURN 1638     /**< 9 degrees */
-#define CATCH_BUS_SHIFT 5         /**< a start waits for a bus 1/32 below its trip */
-#define CATCH_BUS_PERIODS 16384u  /**< a rotor that holds the bus there slows down, and the bus falls with it: within some tenths of a second */
-#define CATCH_FALL_SHIFT 7        /**< by 1/128, or it is the supply that holds it */
-#define CATCH_MOST_FLUX_Q11 24000 /**< flux of a look that its format holds */
+#define CATCH_LOOK_PERIODS (4u * SLOW_PERIODS)                /**< of a look at a slow rotor */
+#define CATCH_STANDS_Q11 ((int16_t)(8u * CATCH_LOOK_PERIODS)) /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
+#define CATCH_PAUSE_TURN 13653u                               /**< 75 degrees: less than half a turn, even where a look and a wrong Kphi make them twice as many */
+#define CATCH_PAUSE_LEAST 4u                                  /**< periods */
+#define CATCH_PAUSE_MOST (125u * SLOW_PERIODS)                /**< periods: 50 ms; in them a rotor turns a tenth of a right angle, or it stands */
+#define CATCH_LEAST_TURN 1638                                 /**< 9 degrees */
+#define CATCH_BUS_SHIFT 5                                     /**< a start waits for a bus 1/32 below its trip */
+#define CATCH_BUS_PERIODS (2048u * SLOW_PERIODS)              /**< a rotor that holds the bus there slows down, and the bus falls with it: within some tenths of a second */
+#define CATCH_FALL_SHIFT 7                                    /**< by 1/128, or it is the supply that holds it */
+#define CATCH_MOST_FLUX_Q11 24000                             /**< flux of a look that its format holds */
 
 /** An axis of L i + R int(i dt), voltage times periods. @param i_q14 at the end @param sum_q11 of all samples */
 QM_INLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t *p, int16_t i_q14, int16_t sum_q11)
@@ -197,8 +198,7 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     d->angle = estimator_next_angle(&run->estimator);
     d->frame = trig_sincos_called(d->angle);
-    run->estimator.v_last_q13 = inverse_park(c->v_q14, d->frame);
-    run->estimator.v_mean_q13 = run->estimator.v_last_q13;
+    late_preset(run, inverse_park(c->v_q14, d->frame));
     drive_enter(d, DRIVE_CLOSED);
 }
 

@@ -11,6 +11,7 @@
 #include "control/speed_ramp.h"
 #include "control/svm.h"
 #include "drive/faults.h"
+#include "drive/late_state.h"
 #include "drive/modes/mode_state.h"
 #include "drive/salient_state.h"
 #include "drive/selftest_state.h"
@@ -37,7 +38,7 @@ typedef enum {
     OUTPUTS_PWM
 } outputs_t;
 
-/** Constants of the machine around the control law. Times in periods or in slow steps (8 periods). */
+/** Constants of the machine around the control law. Times in periods or in slow steps (SLOW_PERIODS). */
 typedef struct {
     estimator_params_t estimator;
     fieldweak_params_t fieldweak;
@@ -135,7 +136,7 @@ typedef struct {
     current_q13_t sample_shift_q13; /**< q current that the sample misses at this speed */
 } drive_control_t;
 
-/** The way from the forced angle to the estimator's. A step is a slow one: eight periods. */
+/** The way from the forced angle to the estimator's. A step is a slow one. */
 typedef struct {
     uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
     uint16_t is_due;           /**< 1: the next period hands over */
@@ -183,6 +184,7 @@ typedef struct {
     uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
     uint16_t lost_lock_steps;     /**< two for each slow step out of lock, less one for each in lock */
     SALIENT_STATE
+    LATE_STATE
     MODE_STATE
 } drive_run_t;
 

@@ -6,13 +6,14 @@
 #include "drive/salient.h"
 #include "drive/state.h"
 
-#define HANDOVER_FALL_SHIFT 7                      /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
-#define HANDOVER_FLOOR_SHIFT 3                     /**< to an eighth at least */
-#define HANDOVER_SWUNG_SHIFT 5                     /**< where the rotor is no longer slower than by 1/32 */
-#define HANDOVER_MEAN_SHIFT 5                      /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
-#define HANDOVER_HURRY 3                           /**< times the ramp's rate, once the estimator should have agreed */
-#define HANDOVER_MOST_STEPS(p) ((p)->wait_periods) /**< 1.6 s of agreement: the slowest rotor has swung to where the current pulls it */
-#define HANDOVER_MOST_OFFSET 0x2000                /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
+#define HANDOVER_FALL_SHIFT 7                                                 /**< the current that has brought the rotor up falls by 1/128 + 1/256 a step */
+#define HANDOVER_FLOOR_SHIFT 3                                                /**< to an eighth at least */
+#define HANDOVER_SWUNG_SHIFT 5                                                /**< where the rotor is no longer slower than by 1/32 */
+#define HANDOVER_MEAN_SHIFT 5                                                 /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
+#define HANDOVER_HURRY 3                                                      /**< times the ramp's rate, once the estimator should have agreed */
+#define HANDOVER_MOST_STEPS(p) ((uint16_t)((p)->wait_periods >> LATE_DUTIES)) /**< 1.6 s of agreement: the slowest rotor has swung to where the current pulls it */
+#define HANDOVER_DECAY 8                                                      /**< angle counts of the offset that go in a step */
+#define HANDOVER_MOST_OFFSET 0x2000                                           /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
  *  error of the estimator's angle into torque. */
@@ -32,7 +33,12 @@ QM_INLINE uint16_t handover_agrees(const handover_t *h, const drive_params_t *p)
 /** The forced angle's speed along the direction, counts of speed_erpm_t. */
 QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
 {
-    return (int16_t)(qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> 11);
+    int32_t erpm = qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> (11 - LATE_DUTIES);
+    if (LATE_DUTIES) { /* the angle per period may be rounded up by more than a count of the largest speed */
+        erpm = (erpm > INT16_MAX) ? INT16_MAX : (erpm < -INT16_MAX) ? -INT16_MAX
+                                                                    : erpm;
+    }
+    return (int16_t)erpm;
 }
 
 /** 1 from the forced speed on at which the estimator should have agreed. */
@@ -84,7 +90,7 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
         return;
     }
     most = (int16_t)(forced >> (handover_agrees(h, p) ? 1 : 2));
-    d->periods = (uint16_t)(at_end ? d->periods + SLOW_PHASES : 0);
+    d->periods = (uint16_t)(at_end ? d->periods + SLOW_PERIODS : 0);
     h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
     if (handover_agrees(h, p)) {
         handover_prepare(d, p, forced, seen, ahead);
@@ -151,7 +157,7 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
     }
 }
 
-/** What is left of the angle offset falls by one count a period, every eighth period by eight; its d current follows. */
+/** What is left of the angle offset falls every slow step; its d current follows. */
 QM_INLINE void handover_decay(drive_t *d)
 {
     handover_t *h = &d->run.handover;
@@ -159,10 +165,10 @@ QM_INLINE void handover_decay(drive_t *d)
     if (offset == 0) {
         return;
     }
-    if (offset > -2 * SLOW_PHASES && offset < 2 * SLOW_PHASES) {
+    if (offset > -2 * HANDOVER_DECAY && offset < 2 * HANDOVER_DECAY) {
         offset = 0;
     } else {
-        offset = (int16_t)((offset > 0) ? offset - SLOW_PHASES : offset + SLOW_PHASES);
+        offset = (int16_t)((offset > 0) ? offset - HANDOVER_DECAY : offset + HANDOVER_DECAY);
     }
     h->offset = offset;
     h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(h->current_q13, trig_sincos((angle_t)offset).sin));

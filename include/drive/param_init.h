@@ -50,7 +50,7 @@
         .dead_time = DEAD_TIME_DUTY, \
         .knee_q13 = DEAD_TIME_KNEE_Q13, \
         .dead_slope_q8 = DEAD_TIME_SLOPE_Q8, \
-        .turn_q13 = (int16_t)(PARAM_DI(MAXIMUM_SPEED_RPM) / 2.0F) \
+        .turn_q13 = (int16_t)(PARAM_DI(MAXIMUM_SPEED_RPM) * (float)(1 + LATE_DUTIES) / 2.0F) \
     }
 
 #define PARAM_ADAPTATION_INIT \
@@ -63,8 +63,8 @@
 
 #define PARAM_OBSERVER_INIT \
     { \
-        .deltat_q32 = (int16_t)PARAM_ROUND(PARAM_DELTAT_Q32), \
-        .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / (8.0F * PARAM_DELTAT_Q32) + 0.5F), \
+        .deltat_q32 = (int16_t)PARAM_ROUND((float)(1 + LATE_DUTIES) * PARAM_DELTAT_Q32), \
+        .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / ((float)SLOW_PERIODS * PARAM_DELTAT_Q32) + 0.5F), \
         .shift = PARAM_ACCEL_SHIFT, \
         .per_current_q16 = (uint16_t)PARAM_MIN(PARAM_ACCEL_UNITS * 65536.0F + 0.5F, 65535.0F), \
         .per_unit_q15 = (uint16_t)PARAM_MIN(32768.0F / PARAM_ACCEL_UNITS + 0.5F, 65535.0F), \

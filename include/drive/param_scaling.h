@@ -151,14 +151,20 @@
 /** duty counts per Q13 voltage count * 65536 = this / bus in Q16 of full scale. */
 #define DUTY_PER_VOLT_NUMERATOR ((uint32_t)(PARAM_F(PWM_FULL_DUTY) * 4.0F * NORM_VOLTAGE_CONST / PARAM_F(BUS_FULL_SCALE_V) * 4294967296.0F))
 
-/* ---- Slow steps: a quarter of the slow work follows every second period ---- */
+/* ---- Duties: in time for the next pulse, or in a shorter period for the one after it (drive/late.h). The tuner reads the period. ---- */
+#define LATE_BELOW_SEC 0.00004
+#define LATE_DUTIES (PARAM_F(LOOPTIME_SEC) < PARAM_F(LATE_BELOW_SEC))
+
+/* ---- Slow steps: a quarter of the slow work follows every second period, with late duties half a quarter. The tools read the periods. ---- */
 #define SLOW_EVERY 2u
 #define SLOW_QUARTERS 4u
-#define SLOW_PHASES 8 /* periods of a slow step */
-#define SLOW_STEPS_PER_SEC (1.0F / (8.0F * PARAM_F(LOOPTIME_SEC)))
+#define SLOW_PERIODS_IN_TIME 8
+#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_QUARTERS : SLOW_QUARTERS)                               /* of a slow step */
+#define SLOW_PERIODS ((LATE_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a slow step */
+#define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
-#define PARAM_STEP_SEC (8.0F * PARAM_F(LOOPTIME_SEC))
+#define PARAM_STEP_SEC ((float)SLOW_PERIODS * PARAM_F(LOOPTIME_SEC))
 #define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)
 /* ---- The start. The tuner reads the turns. ---- */
 #define PARAM_ALIGN_TURNS 5    /* of the vector while the current of ALIGN grows */
@@ -239,6 +245,6 @@
 #define PARAM_STALL_SEC 0.23 /* below half the reference; until a standing rotor shows takes up to 0.08 s more */
 
 /** TUNING's ramp: Q16 of a count per slow step. */
-#define TUNING_STEP_Q16 (PARAM_ROUND(SPEED_COUNTS(8.0F) * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
+#define TUNING_STEP_Q16 (PARAM_ROUND(SPEED_COUNTS(SLOW_PERIODS) * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 
 #endif

@@ -21,7 +21,7 @@
 
 #define PARAM_BOARD(X) /* Supply and board */ \
     X(NOMINAL_BUS_V, "V", 8, 60, FROM_BOARD, "supply; the unit of voltage follows from it") \
-    X(LOOPTIME_SEC, "s", 0.00004, 0.00014, FROM_BOARD, "PWM and control period") \
+    X(LOOPTIME_SEC, "s", 0.000025, 0.00014, FROM_BOARD, "PWM and control period") \
     X(DEADTIME_SEC, "s", 0.0000005, 0.000003, FROM_BOARD, "dead time of the bridge") \
     X(NORM_CURRENT_CONST, "A/count", 0.000001, 0.01, FROM_BOARD, "current of one count, full scale / 32768; calibrate with a probe") \
     X(KCURRA, "1", -0.6, 0.6, FROM_BOARD, "gain of phase A's current, 0.5 = 1; negative: shunt in the low leg") \
@@ -126,6 +126,8 @@
 #define PARAM_RELATION_TABLE(X) \
     X(PARAM_PWM_REST < 0.01F, \
       PARAM_NAMED(LOOPTIME_SEC) " must be a multiple of 50 ns, as 0.00005 is: the PWM counts up and down in steps of 25 ns") \
+    X(!LATE_DUTIES || (SCOPE) == 0, \
+      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with SCOPE, for which a shorter period has no time: leave SCOPE 0, or use a longer period") \
     PARAM_RELATION_GAIN(X, KCURRA) PARAM_RELATION_GAIN(X, KCURRB) \
     X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, PARAM_NAMED(NOMINAL_SPEED_RPM) " must be above " PARAM_NAMED(MINIMUM_SPEED_RPM)) \
     X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, PARAM_NAMED(MAXIMUM_SPEED_RPM) " must be at least " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
@@ -205,7 +207,7 @@
     X(PARAM_ACCEL < PARAM_F(PARAM_ACCEL_MOST) && PARAM_ACCEL >= PARAM_F(PARAM_ACCEL_LEAST), \
       PARAM_NAMED(MOTOR_INERTIA_KGM2) " does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): " \
       "check its unit") \
-    X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074: the observer's step is eight periods") \
+    X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074, or 0.0037 with a LOOPTIME_SEC below 0.00004: the observer's step is eight or sixteen periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
     X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
       PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \

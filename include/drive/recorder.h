@@ -49,10 +49,10 @@ uint16_t recorder_rows(const recorder_t *r);
 /** Place in the ring of row n of the record, the oldest being row 0. */
 uint16_t recorder_place(const recorder_t *r, uint16_t n);
 
-/** 1 in the periods that get a row. */
+/** 1 in the periods that get a row: those of the slow steps, with late duties those between, which have the time. */
 QM_INLINE uint16_t recorder_is_due(const drive_t *d)
 {
-    return (uint16_t)(RECORDER_EVERY != 0u && (d->ticks & (uint16_t)(RECORDER_EVERY - 1u)) == 0u);
+    return (uint16_t)(RECORDER_EVERY != 0u && (d->ticks & (uint16_t)(RECORDER_EVERY - 1u)) == (uint16_t)LATE_DUTIES);
 }
 
 /** A period in a fault, before recorder_tick(). */

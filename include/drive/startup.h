@@ -52,7 +52,7 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
 QM_INLINE void startup_align(drive_t *d, const drive_params_t *p)
 {
     int16_t current = p->open_loop_q13;
-    d->periods = (uint16_t)(d->periods + SLOW_PHASES);
+    d->periods = (uint16_t)(d->periods + SLOW_PERIODS);
     if (d->periods >= p->align_periods) {
         d->forced.increase_q10 = p->forced.increase_rate_q10;
         drive_enter(d, DRIVE_RAMP);

@@ -20,6 +20,7 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
 {
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
+    const angle_t before = d->angle;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), e, v;
 
     c->i_q13 = park(i, d->frame);
@@ -34,8 +35,8 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
         d->angle = estimator_next_angle(&run->estimator);
     }
     d->frame = trig_sincos(d->angle);
-    v = inverse_park(c->v_q14, d->frame);
-    estimator_commanded(&run->estimator, v);
+    v = inverse_park(c->v_q14, late_frame(d, before));
+    estimator_commanded(&run->estimator, late_vector(run, v));
     svm(&p->svm, v, d->duty_per_volt_q16, &d->dead, &d->phases_q13, duty);
 }
 
@@ -49,8 +50,8 @@ QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
         if (!d->command.run) { /* letting go is harmless at these speeds */
             drive_enter(d, DRIVE_STOPPED);
         }
-    } else { /* the pulses' centres are one and two steps ahead of the frame */
-        asked = dq_turn(asked, (int16_t)(3 * qm_limit(d->run.estimator.half_step_q16_rad, 10922)));
+    } else { /* the pulses' centres are one and two steps ahead of the frame, or two and three */
+        asked = late_asked(&d->run);
     }
     d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
 }
@@ -131,52 +132,96 @@ QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus
     }
 }
 
-/** What comes every eighth period, a quarter of it at a time: bus and circle in every state, the hand-over at the end of RAMP, the rest in closed loop.
- *  @param raw the converter's results of this period */
-QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+/** Speed controller and observer, or the start. Every slow step, in two halves. @param call of late_call() */
+QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
-    drive_run_t *run = &d->run;
-    uint16_t done;
-
-    switch ((d->ticks / SLOW_EVERY) & (SLOW_QUARTERS - 1u)) {
-    case 0:
-        if (drive_is_closed(d)) {
-            handover_observe(run, p);
-            speed_step(d, p);
-        } else {
+    if (!drive_is_closed(d)) {
+        if (late_first(call)) {
             drive_start_step(d, p);
         }
-        done = 0;
-        break;
-    case 1:
+        return;
+    }
+    if (late_first(call)) {
+        handover_observe(&d->run, p);
+    }
+    if (late_second(call)) {
+        speed_step(d, p);
+    }
+}
+
+/** State and model, then the bus and what follows from it. Every slow step, in two halves. */
+QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t raw_bus, uint16_t call)
+{
+    if (late_first(call)) {
         drive_state_step(d, p);
-        bus_step(d, p, raw->v_bus);
+    }
+    if (late_second(call)) {
+        bus_step(d, p, raw_bus);
         protection_check_model(d, p);
         speed_choose_step(d, p);
-        done = 1;
-        break;
-    case 2:
+    }
+}
+
+/** The voltage circle, and in closed loop what limits the currents. Every slow step, in two halves. */
+QM_INLINE void drive_limit_step(drive_t *d, const drive_params_t *p, uint16_t call)
+{
+    const uint16_t closed = drive_is_closed(d);
+    if (late_first(call)) {
         bus_update_voltage_limit(d, p);
-        if (drive_is_closed(d)) {
+        if (closed) {
             protection_probe_rotor(d, p);
-            limits_burn(run, p);
-            protection_check_signals(d, p);
-            limits_current(run, p);
+            limits_burn(&d->run, p);
         }
-        done = 2;
-        break;
-    default: /* 3 */
+    }
+    if (late_second(call) && closed) {
+        protection_check_signals(d, p);
+        limits_current(&d->run, p);
+    }
+}
+
+/** Does the rotor follow? Then what it teaches. Every slow step, in two halves. @param bus_q15 of this moment */
+QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, int16_t bus_q15, uint16_t call)
+{
+    if (late_first(call)) {
         if (drive_is_closed(d)) {
             protection_check_rotor(d, p);
-            speed_follow(run, p);
+            speed_follow(&d->run, p);
         } else {
             model_update_in_ramp(d, p);
         }
-        drive_learn_step(d, p, bus_sample(raw->v_bus));
+    }
+    if (late_second(call)) {
+        drive_learn_step(d, p, bus_q15);
+    }
+}
+
+/** What comes every slow step, a quarter of it at a time, with late duties half a quarter: bus and circle in every state, the hand-over at the end of
+ *  RAMP, the rest in closed loop.
+ *  @param raw the converter's results of this period */
+QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    const uint16_t call = late_call(d->ticks);
+    uint16_t done;
+
+    switch (late_quarter(call)) {
+    case 0:
+        drive_speed_step(d, p, call);
+        done = 0;
+        break;
+    case 1:
+        drive_bus_step(d, p, raw->v_bus, call);
+        done = 1;
+        break;
+    case 2:
+        drive_limit_step(d, p, call);
+        done = 2;
+        break;
+    default: /* 3 */
+        drive_rotor_step(d, p, bus_sample(raw->v_bus), call);
         done = 3;
         break;
     }
-    SELFTEST_MARK(d, done);
+    SELFTEST_MARK(d, late_mark(done, call));
 }
 
 /** 1 in the periods that slow work follows while the bridge switches, every second one. With the bridge off it follows each. */
@@ -185,7 +230,14 @@ QM_INLINE uint16_t drive_slow_is_due(const drive_t *d)
     return (uint16_t)((d->ticks & (SLOW_EVERY - 1u)) == 0u);
 }
 
+/** 1 where the slow work has something to do in this period while the bridge switches: with late duties in each. */
+QM_INLINE uint16_t drive_slow_follows(const drive_t *d)
+{
+    return (uint16_t)(LATE_DUTIES || drive_slow_is_due(d));
+}
+
 /** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
+ *  With late duties the periods between those of the slow steps take the estimator's share, and the recorder's.
  *  @param raw the converter's results of this period */
 QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
@@ -193,9 +245,14 @@ QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_sampl
 
     drive_rest(d, p, raw);
     if (!drive_slow_is_due(d)) {
+        if (LATE_DUTIES) {
+            drive_follow(d, p, was_running);
+        }
         return;
     }
-    drive_follow(d, p, was_running);
+    if (!LATE_DUTIES) {
+        drive_follow(d, p, was_running);
+    }
     drive_quarter(d, p, raw);
     if (MODE_ALIGNS && drive_is_running(d)) {
         drive_prepare(d, p);

@@ -48,6 +48,15 @@ static void any_drive(uint16_t state)
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);
 }
 
+/* The vector whose duties wait, where they do. */
+static void any_late(void)
+{
+    for (int i = 0; i < LATE_WAITS; i++) {
+        drive.run.late_v_q13[i].alpha = any((int16_t)-voltage_max, voltage_max);
+        drive.run.late_v_q13[i].beta = any((int16_t)-voltage_max, voltage_max);
+    }
+}
+
 static void any_estimator(estimator_t *e)
 {
     for (int i = 0; i < ESTIMATOR_HISTORY; i++) {
@@ -133,6 +142,8 @@ static void bounds_hold_again(void)
     //@ check dead: -DEAD_MOST <= drive.dead.a <= DEAD_MOST && -DEAD_MOST <= drive.dead.b <= DEAD_MOST && -DEAD_MOST <= drive.dead.c <= DEAD_MOST;
     //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
     //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
+    //@ check late_alpha: \forall integer i; 0 <= i < LATE_WAITS ==> -voltage_max <= drive.run.late_v_q13[i].alpha <= voltage_max;
+    //@ check late_beta: \forall integer i; 0 <= i < LATE_WAITS ==> -voltage_max <= drive.run.late_v_q13[i].beta <= voltage_max;
     //@ check v_last: -voltage_max <= e->v_last_q13.alpha <= voltage_max && -voltage_max <= e->v_last_q13.beta <= voltage_max;
     //@ check v_mean: -voltage_max <= e->v_mean_q13.alpha <= voltage_max && -voltage_max <= e->v_mean_q13.beta <= voltage_max;
     //@ check emf_d: emf_dq_max * -65536 <= e->e_d_q28 <= emf_dq_max * 65536 + 65535;

@@ -26,7 +26,7 @@ LIBRARY = paths.ROOT / "build" / "host" / "libvboard.so"
 
 MOTORS = ("anaheim_bly172s_24v_4000", "hurst_dma0204024b101", "hurst_dmb0224c10002", "ipm_4pp_24v_2000", "linix_45zwn24_40",
           "maxon_ec45flat_30w_24v", "spindle_7pp_24v_10000", "trinamic_qbl4208_41_04_006")
-BOARDS = ("mclv", "mclv2")
+BOARDS = ("mclv", "mclv2", "mclv_40khz")
 """The project's own files. Tests are about these: what a user adds to tuning/motors or tuning/boards may be anything."""
 
 SCENARIO = """

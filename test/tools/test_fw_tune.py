@@ -298,6 +298,12 @@ def test_what_is_written_is_read(path):
     found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, path.parent)
     assert (found is None, reason) == (False, "")
     assert fw_tables.load_for("nobody", PARAMS, path.parent) == (None, "")
+    # of several boards' files the one that fits; the motor's own one first
+    other = replace(TABLES, fingerprint=TABLES.fingerprint | {"LOOPTIME_SEC": 25e-6}, start_speed_rpm=2330.0)
+    fw_tables.write(path.with_name(f"{HURST}-quick.toml"), other)
+    assert fw_tables.path_of(HURST, "quick").name == f"{HURST}-quick.toml" and fw_tables.path_of(HURST).name == f"{HURST}.toml"
+    assert [fw_tables.load_for(HURST, PARAMS | more, path.parent)[0].start_speed_rpm for more in ({}, {"LOOPTIME_SEC": 25e-6})] \
+        == [TABLES.start_speed_rpm, 2330.0]
     # header names keep the base value by name
     values = TABLES.parameters()
     assert (values["INVKFI_SPEED3"], values["INVKFI_SPEED4"]) == ("NORM_INVKFIBASE", "7966")

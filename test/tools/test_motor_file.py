@@ -278,7 +278,7 @@ BAD_BOARDS = {
     "flag": ("sinks = false", "sinks = 0", "'sinks' is neither true nor false"),
     "no flag": ("inverted = true", "", "'inverted' is missing"),
     "bits": ("bits = { value = 10", "bits = { value = 10.5", "'bits' = 10.5 is not a whole number"),
-    "period": ("value = 50, unit = \"us\"", "value = 50, unit = \"ms\"", "'period' = 50 ms is impossible", "0.04 .. 0.14 ms"),
+    "period": ("value = 50, unit = \"us\"", "value = 50, unit = \"ms\"", "'period' = 50 ms is impossible", "0.025 .. 0.14 ms"),
     "reference": ("value = 1.65", "value = 2.5", "reference = 2.5 V is not the middle of the converter's 3.3 V"),
     "limits in order": ("value = 34", "value = 26", "do not rise in this order", "12, 24, 27, 26 and 52.8 V"),
     "bus beyond the converter": ("bus_divider = { value = 16", "bus_divider = { value = 10", "do not rise in this order"),

@@ -121,9 +121,9 @@ def test_the_gain_margin_is_where_a_simulated_speed_loop_begins_to_swing(rpm, tr
 
 def test_the_observer_and_its_controller_are_those_of_the_equations():
     """Without delays: per estimated speed (2 r k s + r^2 (s + k))/(s (s + k + 2 r)) over a; a current that the speed agrees with changes nothing."""
-    hz, fine = np.array([3.0, 20.0, 60.0]), replace(AT_1000_HZ, period_s=1e-6)
+    hz, fine = np.array([3.0, 20.0, 60.0]), replace(AT_1000_HZ, period_s=5e-7)
     s, r, k, a = 2j * np.pi * hz, 2 * np.pi * 47.0, 2 * np.pi * 13.0, MOTOR.kt * MOTOR.pole_pairs / MOTOR.inertia
-    per_speed, per_current = observer_law(hz, MOTOR, replace(fine, rate=r * 8e-6, speed_kp=k / a))
+    per_speed, per_current = observer_law(hz, MOTOR, replace(fine, rate=r * fine.slow_s, speed_kp=k / a))
     alone = -(2 * r * k * s + r * r * (s + k)) / (s * (s + k + 2 * r)) / a
     assert per_speed / (1.0 - per_current) == approx(alone, rel=0.002)
     assert per_speed * a / s + per_current == approx(-k / s, rel=0.005), "the load stays what it is"
@@ -232,7 +232,7 @@ def test_a_current_loop_that_rotation_costs_the_margin_is_not_slowed_down_for_a_
 def test_a_heavy_rotor_gets_a_slower_load_observer_and_a_large_innovation_asks_for_the_same_share_of_the_current():
     light, heavy = (loops.calm_load_bandwidth(100.0, acceleration, 5000.0, 50e-6) for acceleration in (0.1, 0.01))
     assert light == pytest.approx(10.0 * heavy)
-    step = 2.0 * np.pi * heavy * loops.SLOW_PHASES * 50e-6
+    step = 2.0 * np.pi * heavy * 8 * 50e-6
     assert loops.FULL_RATIO * 100.0 * step / 0.01 == pytest.approx(loops.HEAVY_SHARE * 5000.0)
 
 

@@ -95,6 +95,10 @@ MISTAKES = {
     "a mode = off": (HEADER.replace(MODE, "#define TUNING off"), "TUNING", "TUNING = off switches the mode on"),
     "a period the PWM cannot divide": (value("LOOPTIME_SEC", "0.0000501234"), "LOOPTIME_SEC",
                                        "LOOPTIME_SEC = 0.0000501234 must be a multiple of 50 ns, as 0.00005 is"),
+    "a period that the law has no time for": (value("LOOPTIME_SEC", "0.0000245"), "LOOPTIME_SEC",
+                                              f"LOOPTIME_SEC = 0.0000245 is outside {range_of('LOOPTIME_SEC')}"),
+    "a mode that late duties have no time for": (value("LOOPTIME_SEC", "0.000025").replace(MODE, "#define IDENTIFY"), "LOOPTIME_SEC",
+                                                 "LOOPTIME_SEC = 0.000025 must be at least 0.00004 with IDENTIFY"),
     "whole numbers divided": (value("LOOPTIME_SEC", "(1/20000)"), "LOOPTIME_SEC",
                               f"LOOPTIME_SEC = (1/20000) is outside {range_of('LOOPTIME_SEC')}"),
     # these break relations, too, and the formulas of other files

@@ -189,7 +189,7 @@ void test_withdrawn_request_in_every_state(void)
         drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         drive.periods = 0;
         drive.command.run = 0;
-        rig_tick(SLOW_PHASES);
+        rig_tick(SLOW_PERIODS);
         TEST_ASSERT_EQUAL_UINT16(next[state], drive.state);
     }
 }
@@ -210,7 +210,7 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off_in_both_dir
     EACH_DIRECTION(direction) {
         run_at(direction, 10000);
         drive.command.run = 0;
-        ideal_motor_run(SLOW_PHASES);
+        ideal_motor_run(SLOW_PERIODS);
         EXPECT_DRIVE(DRIVE_STOPPING, FAULT_NONE, "asked to stop");
         drive_start(&drive, &params, (int16_t)-direction); /* waits for the stop */
         TEST_ASSERT_EQUAL_INT16(0, drive.command.run);

@@ -162,7 +162,7 @@ void test_end_of_the_ramp_counts_also_below_the_early_speed(void)
     rig_speed(FORCED_ERPM);
     handover_wait(&drive, &p);
     TEST_ASSERT_EQUAL_UINT16(1, drive.run.handover.agreed_steps);
-    TEST_ASSERT_EQUAL_UINT16(SLOW_PHASES, drive.periods);
+    TEST_ASSERT_EQUAL_UINT16(SLOW_PERIODS, drive.periods);
 }
 
 void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_agree_in_time(void)

@@ -99,6 +99,7 @@ def case(name: str, breaks: str, keeps: str, **others: str) -> tuple[dict[str, s
 LOOPS = ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR")
 # For each relation a value that breaks it, and one just inside. R, L and Kphi scale with 24 V, 50 us and 4.4 A.
 RELATIONS = {
+    "LOOPTIME_SEC must be at least 0.00004 with SCOPE": [case("SCOPE", "1", "0", LOOPTIME_SEC="0.000025"), case("LOOPTIME_SEC", "0.00003995", "0.00004", SCOPE="1")],
     "LOOPTIME_SEC must be a multiple of 50 ns": [
         case("LOOPTIME_SEC", "0.00005001", "0.00005"), case("LOOPTIME_SEC", "0.000050025", "0.00005005"), case("LOOPTIME_SEC", "0.00013993", "0.00013995")],
     **{f"{gain} must be 0.1 .. 0.6 or -0.6 .. -0.1": [case(gain, "0", "0.1"), case(gain, "-0.09", "-0.1"), case(gain, "0.09", "0.6")]
@@ -157,7 +158,8 @@ RELATIONS = {
     "MOTOR_INERTIA_KGM2 does not fit the load observer's format": [
         case("MOTOR_INERTIA_KGM2", "6.1e-7", "6.2e-7"), case("MOTOR_INERTIA_KGM2", "4.1e-2", "4.0e-2", SPEED_BANDWIDTH_HZ="0.2")],
     "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074": [
-        case("LOAD_BANDWIDTH_HZ", "150", "148"), case("LOAD_BANDWIDTH_HZ", "75", "74", LOOPTIME_SEC="0.0001")],
+        case("LOAD_BANDWIDTH_HZ", "150", "148"), case("LOAD_BANDWIDTH_HZ", "75", "74", LOOPTIME_SEC="0.0001"),
+        case("LOAD_BANDWIDTH_HZ", "150", "148", LOOPTIME_SEC="0.000025")],
     # 1126 * 24 * 2 us / 50 us / 7.24 = 149.3
     "END_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("END_SPEED_RPM", "149", "150")],
     "MINIMUM_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("MINIMUM_SPEED_RPM", "149", "150")],

@@ -114,8 +114,18 @@ def set_up(item: Any, options: argparse.Namespace, defines: list[str]) -> tuple[
     motor, board = parts_of(item, options)
     userparams = header_for(options)
     library = library_for(defines, options.library, userparams)
+    if options.board:
+        _refuse_other_period(board_file.load(options.board, "--board"), library)
     told = used(motor, library, header_name(options.library, userparams)) | {"board": str(paths.shown(board.path))}
     return motor, board, library, told
+
+
+def _refuse_other_period(board: board_file.BoardFile, library: Library) -> None:
+    """The PWM of the run is the header's: with a board of another period it would not be the run that was asked for."""
+    period_s = library.params["LOOPTIME_SEC"]
+    if abs(period_s / board.pwm_period_s - 1.0) > 1e-3:
+        raise UserError(f"the header's LOOPTIME_SEC is {period_s * 1e6:g} us, the board's period {board.pwm_period_s * 1e6:g} us", str(paths.shown(board.path)),
+                        "add MOTOR=name, which brings a header for this board, or install one with make userparams")
 
 
 def used(motor: board_keys.Part, library: Library, header: str) -> dict[str, Any]:

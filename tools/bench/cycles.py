@@ -10,7 +10,7 @@ import functools
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from . import build, pil, pil_command, scenario_file, simulate, sweep
 
 FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
+"""of 50 us, AN1292's period and usually the header's"""
 P1SECMP = 0x01C6    # the counter's value at the trigger; it counts down to zero from there, and the duties load
 MOST_EXPENSIVE = 10
 MISSED = 0.0001     # share of the cycles by which the profile may be off: other handlers call some of the interrupt's functions
@@ -86,6 +87,7 @@ class Found:
     motor_s: float = 0.0
     cpu_s: float = 0.0
     instructions: float = 0.0
+    period_cycles: int = PERIOD_CYCLES
 
 
 def classes(state: np.ndarray, states: dict[int, str], reference_rpm: np.ndarray, fw_start_rpm: float) -> dict[str, np.ndarray]:
@@ -116,7 +118,7 @@ def work(image: Path, job: simulate.Job, progress: Callable[[float], None]) -> F
         return Found(spreads, periods, Spread.of(latency[latency > 0]), counts, int(board.get("cpu.stack_bytes")),
                      int(board.get("pil.differences")),
                      int(board.get("pil.ticks")), board.difference(), {job.scenario.name: where}, board.peek(P1SECMP) & 0x7FFF,
-                     run.motor_s, run.cpu_s, board.get("cpu.instructions"))
+                     run.motor_s, run.cpu_s, board.get("cpu.instructions"), period_cycles(run.params))
 
 
 def merged(found: list[Found]) -> Found:
@@ -128,7 +130,7 @@ def merged(found: list[Found]) -> Found:
         whole = Found(spreads, periods, added([whole.latency, item.latency]), whole.counts + item.counts, max(whole.stack_bytes, item.stack_bytes),
                       whole.differences + item.differences, whole.ticks + item.ticks, whole.first_difference or item.first_difference,
                       whole.longest | item.longest, min(whole.load_cycles, item.load_cycles), whole.motor_s + item.motor_s,
-                      whole.cpu_s + item.cpu_s, whole.instructions + item.instructions)
+                      whole.cpu_s + item.cpu_s, whole.instructions + item.instructions, whole.period_cycles)
     return whole
 
 
@@ -221,22 +223,27 @@ def broken(report: Report) -> list[str]:
 
 
 # ---- output --------------------------------------------------------------------------------------------------------------
+def period_cycles(params: Mapping[str, float]) -> int:
+    """Cycles of a header's period."""
+    return round(params["LOOPTIME_SEC"] * FCY_MHZ * 1e6)
+
+
 def us(cycles: float) -> float:
     return cycles / FCY_MHZ
 
 
-def _spread_line(name: str, spread: Spread, note: tuple[float, ...] | None = None) -> str:
+def _spread_line(name: str, spread: Spread, period: int, note: tuple[float, ...] | None = None) -> str:
     if not spread:
         return f"{name:<26}{'-':>10}"
     told = f"{name:<26}{spread.total():>10}{min(spread):>8}{spread.mean:>9.1f}{spread.most:>7}"
-    told += f"{us(min(spread)):>10.2f}{us(spread.mean):>8.2f}{us(spread.most):>8.2f}{100.0 * spread.mean / PERIOD_CYCLES:>8.1f} %"
+    told += f"{us(min(spread)):>10.2f}{us(spread.mean):>8.2f}{us(spread.most):>8.2f}{100.0 * spread.mean / period:>8.1f} %"
     return told + (f"   {note[0]:g} / {note[1]:g} / {note[2]:g}" if note else "")
 
 
-def _spread_lines(spreads: dict[str, Spread], everything: Spread, notes: dict[str, tuple[float, ...]]) -> list[str]:
+def _spread_lines(spreads: dict[str, Spread], everything: Spread, period: int, notes: dict[str, tuple[float, ...]]) -> list[str]:
     """With and without field weakening, each state, all."""
-    return [*(_spread_line(name, spreads[name], notes.get(name)) for name in NOTE_US),
-            *(_spread_line(f"  {name}", spread) for name, spread in spreads.items() if name not in NOTE_US and spread), _spread_line("all", everything)]
+    return [*(_spread_line(name, spreads[name], period, notes.get(name)) for name in NOTE_US),
+            *(_spread_line(f"  {name}", spread, period) for name, spread in spreads.items() if name not in NOTE_US and spread), _spread_line("all", everything, period)]
 
 
 def text(report: Report) -> str:
@@ -248,8 +255,8 @@ def text(report: Report) -> str:
     for name, (cycles, at_s, state) in sorted(found.longest.items(), key=lambda item: -item[1][0]):
         where.setdefault(f"{cycles} in {state} at {at_s:.4f} s", []).append(name)
     parts = [f"{report.image}: the interrupts of a period in cycles (entry to return), at {FCY_MHZ:g} MIPS in us, and their share of the core",
-             "\n".join([head, "-" * len(head), *_spread_lines(found.spreads, report.all, {})]),
-             "\n".join([head.replace("control interrupt", "with its slow work", 1), "-" * len(head), *_spread_lines(found.periods, report.all_periods, NOTE_US)]),
+             "\n".join([head, "-" * len(head), *_spread_lines(found.spreads, report.all, found.period_cycles, {})]),
+             "\n".join([head.replace("control interrupt", "with its slow work", 1), "-" * len(head), *_spread_lines(found.periods, report.all_periods, found.period_cycles, NOTE_US)]),
              "\n".join(f"{name}: {meaning}" for name, meaning in MEANING.items()),
              "longest in each scenario:\n" + "\n".join(f"  {place}: {', '.join(names)}" for place, names in where.items())]
     latency, least = found.latency, min(found.latency, default=0)
@@ -285,7 +292,7 @@ def summary(report: Report) -> dict[str, Any]:
             "all": report.all.data(), "all_periods": report.all_periods.data(), "latency": found.latency.data(), "stack_bytes": found.stack_bytes, "ticks": found.ticks,
             "differences": found.differences, "first_difference": found.first_difference,
             "longest": {name: {"cycles": cycles, "at_s": at_s, "state": state} for name, (cycles, at_s, state) in found.longest.items()},
-            "load_cycles": found.load_cycles, "instructions_per_second": found.instructions / found.cpu_s,
+            "load_cycles": found.load_cycles, "period_cycles": found.period_cycles, "instructions_per_second": found.instructions / found.cpu_s,
             "speed_factor": found.motor_s / found.cpu_s,
             "functions": {name: cycles / interrupts for name, cycles in report.profile.inlined.most_common()},
             "symbols": {name: cycles / interrupts for name, cycles in report.profile.symbols.most_common()},

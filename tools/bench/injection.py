@@ -8,6 +8,8 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from tools.common import param_rows
+
 from .judge import Unseen
 from .scenario import BRAKE
 
@@ -181,7 +183,7 @@ BY_NAME = {f"{kind.room}: {kind.name}": kind for kind in KINDS}
 SCENES = {"CALIBRATE": 0.6, "STOPPED": 0.6, "BOOTSTRAP": 0.6, "ALIGN": 1.0, "RAMP": 1.2, "low speed": 2.0, "half speed": 2.5, "rated speed": 2.5,
           "accelerating": 1.2, "braking": 1.5, "field weakening": 2.0, "STOPPING": 1.0, "FAULT": 0.8, "retry": 0.8}
 """When it happens, and how often: a state of the drive, or what it does in closed loop; "retry" is the pause after a stall."""
-SLOW_PHASES = 8
+SLOW_PHASES = int(param_rows.number("SLOW_PERIODS_IN_TIME"))
 PASSES_S = (0.02, 0.3)
 
 

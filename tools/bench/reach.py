@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.common.param_rows import number
+from tools.common.param_rows import slow_periods
 
 ID_STEPS = 2001
 BEYOND = "out of reach"
@@ -81,7 +81,7 @@ def answer_s(params: Mapping[str, float]) -> float:
     """Time constants of what lies between a load and the current that holds it: back-EMF filter, current loop, slow step, load observer."""
     filter_s = -params["LOOPTIME_SEC"] / math.log(1.0 - params["KFILTER_ESDQ"] / 32768.0)
     loops_s = sum(1.0 / (2.0 * math.pi * params[name]) for name in ("CURRENT_BANDWIDTH_HZ", "LOAD_BANDWIDTH_HZ"))
-    return filter_s + loops_s + number("SLOW_PHASES") * params["LOOPTIME_SEC"]
+    return filter_s + loops_s + slow_periods(params["LOOPTIME_SEC"]) * params["LOOPTIME_SEC"]
 
 
 def too_quick(stops: float, answers: float) -> str:

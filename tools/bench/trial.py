@@ -12,6 +12,7 @@ from typing import Any
 
 from tools.common import motor_file
 from tools.common.board_keys import Part, Values
+from tools.common.param_rows import slow_periods
 
 from . import injection, judge, memory, pil, simulate
 from .board import Board, Library
@@ -222,7 +223,7 @@ def _to_the_moment(session: simulate.Session, way: Scene, case: Case) -> None:
             break
         session.run_to(session.now_s + WAIT_STEP_S)
     session.run_to(session.now_s + case.part * way.within_s)
-    for _ in range(injection.SLOW_PHASES):
+    for _ in range(slow_periods(session.recorder.period_s)):
         if session.board.get("fw.slow_phase") == case.phase:
             break
         session.run_to(session.now_s + session.recorder.period_s)

@@ -106,6 +106,8 @@ class Report:
     loops: list[tuple[int, int]]    # of a period's interrupts: address of the head, executions in one interrupt at most
     seen: Seen | None = None
     broken: list[str] = field(default_factory=list)
+    period_cycles: int = cycles.PERIOD_CYCLES
+    """of the header that the image was made with"""
 
     @property
     def watch(self) -> Watch:
@@ -190,9 +192,9 @@ def broken(report: Report, budget: Budget | None) -> list[str]:
     elif report.latency >= seen.load_cycles:
         lines.append(f"the deadline is not proven: up to {report.latency} cycles from the trigger to the third duty, but the duties load after "
                      f"{seen.load_cycles}")
-    if report.period >= cycles.PERIOD_CYCLES:
+    if report.period >= report.period_cycles:
         lines.append(f"the slow work is not proven to end in its period: up to {report.period} cycles with the control interrupt and a fault's handler, the "
-                     f"period has {cycles.PERIOD_CYCLES}")
+                     f"period has {report.period_cycles}")
     if seen.entry[1] - seen.entry[0] > report.instruction - 1 + report.others:
         lines.append(f"an interrupt waited {seen.entry[1] - seen.entry[0]} cycles for its entry, longer than any instruction and handler takes")
     return lines
@@ -222,7 +224,7 @@ def deadline(report: Report, seen: Seen) -> str:
     return (f"trigger to the third duty: {report.latency} cycles at most, the duties load after {seen.load_cycles}\n"
             f"  {seen.entry[0]} until the samples are there, {waited} until the background's instruction ends "
             f"(seen: {seen.entry[1] - seen.entry[0]}{fault}), {duty} in the interrupt\n"
-            f"both interrupts of a period and a fault's handler: {report.period} cycles at most, the period has {cycles.PERIOD_CYCLES}\n"
+            f"both interrupts of a period and a fault's handler: {report.period} cycles at most, the period has {report.period_cycles}\n"
             f"{seen.runs} interrupts ran in {seen.scenarios} scenarios")
 
 
@@ -242,6 +244,7 @@ def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget
     if not pil.check_image(library, image):
         raise UserError("the image does not say where functions and variables are", str(image), "name the ELF file that the HEX file was made from")
     report = of_image(image.with_suffix(".elf") if image.suffix == ".hex" else image)
+    report.period_cycles = cycles.period_cycles(library.params)
     jobs = cycles.jobs_of(names or budget.cycles.scenarios, library)
     found = sweep.run_cases("wcet", jobs, quiet, functools.partial(work, image, report.watch))
     report.seen = functools.reduce(lambda one, two: one + two, found)

@@ -40,7 +40,7 @@ TABLES: dict[str, dict[str, tuple[str, Kind]]] = {
               "settle": ("shunt.settle_s", Kind("s", 0.0, 1e-4, _TIME))},
     "adc": {"full_scale": ("", Kind("V", 1.0, 5.5, _VOLT)), "bus_divider": ("adc.vbus_ratio", Kind("1", 1.0, 100.0, _ONE)),
             "noise": ("adc.noise_lsb", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}))},
-    "pwm": {"period": ("", Kind("s", 40e-6, 140e-6, _TIME)), "dead_time": ("", Kind("s", 0.5e-6, 3e-6, _TIME)),
+    "pwm": {"period": ("", Kind("s", 25e-6, 140e-6, _TIME)), "dead_time": ("", Kind("s", 0.5e-6, 3e-6, _TIME)),
             "sample_window": ("", Kind("s", 1.5e-6, 4e-6, _TIME))},
     "limits": {"over_voltage": ("", Kind("V", 6.0, 100.0, _VOLT)), "under_voltage": ("", Kind("V", 3.0, 60.0, _VOLT)),
                "regen": ("", Kind("V", 6.0, 100.0, _VOLT))}}

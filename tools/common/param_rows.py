@@ -44,6 +44,16 @@ def number(name: str) -> float:
     return float(found[1])
 
 
+def duties_are_late(period_s: float) -> bool:
+    """True where the firmware's duties act a period later: LATE_DUTIES of param_scaling.h."""
+    return period_s < 0.9999 * number("LATE_BELOW_SEC")
+
+
+def slow_periods(period_s: float) -> int:
+    """Periods of a slow step: SLOW_PERIODS of param_scaling.h."""
+    return int(number("SLOW_PERIODS_IN_TIME")) * (2 if duties_are_late(period_s) else 1)
+
+
 @functools.cache
 def parameters() -> dict[str, Parameter]:
     """Every parameter by name, in the order of the table."""

@@ -110,13 +110,21 @@ static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
     iss_shadow_tick(b);
 }
 
+/* What the control interrupt has done goes into the trace. With late duties its slow work ends behind the next sample, and is in the next row. */
+static void row_is_due(iss_board_t *b)
+{
+    b->handled = true;
+    iss_cpu_break(&b->cpu);
+}
+
 /* The work of a period is done. */
 static void period_done(iss_board_t *b)
 {
     measured(&vb_counts(b->vb)->period, (uint64_t)(vb_counts(b->vb)->isr.last + vb_counts(b->vb)->slow.last));
     iss_shadow_compare(b);
-    b->handled = true;
-    iss_cpu_break(&b->cpu);
+    if (!LATE_DUTIES) {
+        row_is_due(b);
+    }
 }
 
 static bool slow_is_raised(const iss_board_t *b)
@@ -131,7 +139,11 @@ static void leave_interrupt(void *context, unsigned vector, uint64_t cycle)
     if (vector == ADC1_VECTOR && b->in_handler) {
         b->in_handler = false;
         measured(&vb_counts(b->vb)->isr, cycle - b->entry_cycle);
-        vb_counts(b->vb)->slow.last = 0.0;
+        if (LATE_DUTIES) {
+            row_is_due(b);
+        } else {
+            vb_counts(b->vb)->slow.last = 0.0;
+        }
         b->slow_to_come = slow_is_raised(b);
         if (!b->slow_to_come) {
             period_done(b);
@@ -198,6 +210,7 @@ static int live_reset(void *context)
     b->start_cycle = now_cycle(b);
     b->shadow.ticks = 0;
     b->shadow.differences = 0;
+    b->shadow.starting = 0;
     b->shadow.first[0] = '\0';
     iss_probe_restart(true);
     iss_shadow_reset(b);

@@ -12,6 +12,7 @@ enum { ISS_DIFFERENCE = 256 };
 typedef struct {
     bool on, running;       /* wanted; the host's firmware has been initialised and follows */
     uint64_t ticks, differences;
+    unsigned starting;      /* differences while stopped that a start may explain: the interrupt came in the midst of drive_start() */
     char first[ISS_DIFFERENCE];
 } iss_shadow_t;
 

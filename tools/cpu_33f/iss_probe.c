@@ -93,6 +93,7 @@ static const int16_t *target_array(unsigned n)
 #define probe_signal_count iss_probe_signal_count
 #define probe_params iss_unused_params
 #define probe_param_count iss_unused_param_count
+#define probe_isr_us iss_unused_isr_us
 #define probe_fault_name iss_unused_fault_name
 #define probe_state_name iss_unused_state_name
 #define probe_param_get raw_param_get
@@ -104,6 +105,7 @@ const char *iss_unused_fault_name(int code);
 const char *iss_unused_state_name(int code);
 extern const probe_param_t iss_unused_params[];
 extern const unsigned iss_unused_param_count;
+extern const double iss_unused_isr_us;
 
 #include "../cpu_host/probe.c"
 

@@ -1,5 +1,6 @@
 /* Processor 1: the firmware that is linked with this library, whose handlers take no time. */
 #include "chip.h"
+#include "probe.h"
 #include "vb_cpu.h"
 
 #include <stdlib.h>
@@ -241,6 +242,7 @@ vb_t *vb_create(void)
     for (unsigned n = 0; n < WATCHED; n++) {
         h->place[n] = h->chip->place[watched[n] / 2u];
     }
+    h->chip->adc.hold_us = probe_isr_us;
     h->chip->config[CHIP_FOSCSEL] = 3; /* the crystal with the PLL, as xc.h's OSCCON has it */
     h->chip->config[CHIP_FWDT] = 0;    /* no watchdog on a PC: time stands still while the firmware runs */
     return h->vb;

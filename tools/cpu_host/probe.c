@@ -22,7 +22,7 @@
 #define DRIVE_SIGNALS(X) \
     X(state, "fw.state", "", "drive state (drive_state_t)", (double)d->state) \
     X(fault, "fw.fault", "", "fault code (drive_fault_t)", (double)d->fault) \
-    X(slow_phase, "fw.slow_phase", "", "period of the slow step that was the last, 0..7: half of it is the quarter of drive_slow", (double)(d->ticks % SLOW_PHASES)) \
+    X(slow_phase, "fw.slow_phase", "", "period of the slow step that was the last, from 0 on", (double)(d->ticks % SLOW_PERIODS)) \
     X(running, "fw.run", "", "1 while the bridge switches", (double)drive_is_running(d)) \
     X(calibrated, "fw.calibrated", "", "1 after the offset calibration", (double)d->calibration.done) \
     X(theta_est, "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", \
@@ -97,6 +97,8 @@ const probe_param_t probe_params[] = {
     PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }, { "COUNT_SPEED_RPM", SPEED_RPM(1), "rpm" }
 };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
+
+const double probe_isr_us = LATE_DUTIES ? 0.5 : 13.0;
 
 /* What may change while the motor turns: the name of userparams.h (or its stem, for the 18 entries of a table), where the firmware
  * keeps it, and the value of one count. A name in two rows has two places. */

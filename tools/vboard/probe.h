@@ -26,6 +26,9 @@ extern const unsigned probe_signal_count;
 extern const probe_param_t probe_params[];
 extern const unsigned probe_param_count;
 
+/* From the control interrupt to the write of the duties, as cpu.isr_us: with late duties the write is the first that it does. */
+extern const double probe_isr_us;
+
 /* Read or write a parameter while the motor turns, as a debugger does: the entries of the three field-weakening tables and what frames
  * them, by their names in userparams.h and in its units. The value is rounded to the firmware's counts and used from the next period on.
  * 0; -1 where this build keeps it as a constant (no PARAMS_IN_RAM), or never lets it change; -2 for a value outside its range. A

@@ -7,11 +7,13 @@ extern const probe_signal_t probe_signals[] __attribute__((weak));
 extern const probe_param_t probe_params[] __attribute__((weak));
 extern const unsigned probe_signal_count __attribute__((weak));
 extern const unsigned probe_param_count __attribute__((weak));
+extern const double probe_isr_us __attribute__((weak));
 
 const probe_signal_t probe_signals[1] = {{"", "", "", NULL}};
 const unsigned probe_signal_count = 0;
 const probe_param_t probe_params[1] = {{"", 0.0, ""}};
 const unsigned probe_param_count = 0;
+const double probe_isr_us = 13.0;
 
 __attribute__((weak)) const char *probe_fault_name(int code)
 {
