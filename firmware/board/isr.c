@@ -90,8 +90,8 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
     }
 }
 
-/** What has no deadline but the next period's begin, every second period, and with the bridge off each. The control interrupt raises it and may interrupt it; timer 2 stands still, only its
- *  vector is used. */
+/** What has no deadline but the next period's begin, every second period, and with the bridge off each. The control interrupt raises it and may
+ *  interrupt it; timer 2 stands still, only its vector is used. */
 void BOARD_ISR _T2Interrupt(void)
 {
     drive_samples_t raw;
