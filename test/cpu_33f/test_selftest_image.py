@@ -135,7 +135,7 @@ def test_a_stuck_bit_of_ram_is_found_while_running(board: PilBoard, place: int) 
     assert finds(board, "RAM", 400) < 360
 
 
-@pytest.mark.parametrize("place", [RAM_START + 0x260, 0x0C00, 0x0E02, SPLIM + 6, RAM_END - 2])
+@pytest.mark.parametrize("place", [RAM_START + 0x260, 0x0C00, 0x0D02, SPLIM + 6, RAM_END - 2])
 @pytest.mark.parametrize("at_1, at_0", [(0x0001, 0), (0, 0x8000)])
 def test_a_stuck_bit_of_ram_is_found_at_a_start(board: PilBoard, place: int, at_1: int, at_0: int) -> None:
     C.iss_stick(C.vb_iss_core(board._vb), place, at_1, at_0)
