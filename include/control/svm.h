@@ -49,13 +49,15 @@ QM_INLINE dead_duties_t svm_compensation(const svm_params_t *p, phases_t asked)
 /** @param duty with its dead-time compensation @param i_q13 measured, read only where it matters @return what the leg can have of it */
 QM_INLINE duty_t svm_leg(const svm_params_t *p, int16_t duty, const current_q13_t *i_q13)
 {
-    int16_t given = duty;
+    int16_t given;
     if (qm_outside(duty, p->top)) {
         /* A current that is surely still positive at the next sample flows in the low diode during the dead time, so the window
          * is open longer by it; otherwise the compensation must not close the window. */
         int16_t most = (*i_q13 > p->turn_q13) ? p->full : p->top;
         given = (duty < 0) ? 0 : (duty > most) ? most
                                                : duty;
+    } else {
+        given = duty;
     }
     return (duty_t)given;
 }
