@@ -298,6 +298,20 @@ void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
     }
 }
 
+void test_outputs_are_off_before_the_slow_work_tells_of_too_much_current(void)
+{
+    for (uint16_t odd = 0; odd < 2u; odd++) {
+        bring_to_align();
+        control_interrupts((uint16_t)(2u + odd));
+        TEST_ASSERT_EQUAL_HEX16(0x3F00, P1OVDCON);
+        ADC1BUF1 = (uint16_t)(-4 * 7076);
+        _ADC1Interrupt();
+        TEST_ASSERT_EQUAL_HEX16(0x0000, P1OVDCON);
+        TEST_ASSERT_EQUAL_UINT16(1, IFS0bits.T2IF);
+        TEST_ASSERT_EQUAL_UINT16(0, P1DC1);
+    }
+}
+
 void test_slow_work_that_outlasts_its_period_comes_again_at_once_and_says_so(void)
 {
     bring_to_align();
