@@ -22,7 +22,7 @@ typedef struct {
     int16_t kfilter_esdq_fw_q16;                /**< and above */
     uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per count of speed */
     int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
-    int16_t trim_step_q13;                      /**< its change per step (2^3 periods) */
+    int16_t trim_step_q13;                      /**< its change a slow step */
     speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */
 } fieldweak_params_t;
 

@@ -19,7 +19,7 @@ QM_INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
 #define PROTECTION_BUS_END_Q15 32640 /* the converter's last steps: more cannot be told from a broken signal */
 
 /** Over-voltage at once, under-voltage filtered, both while anything is on: at rest a rotor may charge the bus, but no further than what can be
- *  measured. Every eighth period. @param now_q15 unfiltered @param bus_q15 filtered */
+ *  measured. Every slow step. @param now_q15 unfiltered @param bus_q15 filtered */
 QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
     drive_fault_t found;
@@ -80,7 +80,7 @@ QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_para
 }
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
- *  with what is measured. Every eighth period in closed loop. */
+ *  with what is measured. Every slow step in closed loop. */
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -126,7 +126,7 @@ QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const d
 }
 
 /** What the motor has shown against the header must be possible: the flux within its tolerance, and a winding that has gained 60 % of its
- *  resistance is too hot. Every eighth period in closed loop. */
+ *  resistance is too hot. Every slow step in closed loop. */
 NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -200,7 +200,7 @@ QM_INLINE void protection_count_dip(drive_run_t *run, uint16_t dips)
 /** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to nothing and is
  *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
  *  again: soon after a dip of the speed.
- *  Every eighth period in closed loop. */
+ *  Every slow step in closed loop. */
 NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -226,15 +226,7 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
 }
 
-/** The same where it can be: in closed loop. */
-QM_INLINE void protection_probe_step(drive_t *d, const drive_params_t *p)
-{
-    if (drive_is_closed(d)) {
-        protection_probe_rotor(d, p);
-    }
-}
-
-/** Stall and lost lock: conditions that must not last. Every eighth period in closed loop. */
+/** Stall and lost lock: conditions that must not last. Every slow step in closed loop. */
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;

@@ -15,7 +15,7 @@ QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every eighth period in closed loop. */
+/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every slow step in closed loop. */
 QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
 {
     speed_schedule(run, p);
@@ -49,7 +49,7 @@ QM_INLINE void speed_go_on(drive_t *d)
 }
 
 /** Whether the run goes on or slows down: the wish to stop or a target in the other direction slows it down; a new wish to run goes on from the present speed.
- *  Every eighth period in closed loop. */
+ *  Every slow step in closed loop. */
 NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
@@ -78,7 +78,7 @@ QM_INLINE void speed_choose_step(drive_t *d, const drive_params_t *p)
 }
 
 /* wcet: speed_turn_round/drive_turns excludes model_update */
-/** In STOPPING, every eighth period: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
+/** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
  *  @return 1 then */
 NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
 {
@@ -90,7 +90,7 @@ NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
     return turns;
 }
 
-/** One step of the controller, every eighth period in closed loop. */
+/** One step of the controller, every slow step in closed loop. */
 NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;

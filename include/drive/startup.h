@@ -48,7 +48,7 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
 }
 
 /** The vector of ALIGN turns PARAM_ALIGN_TURNS times while its current grows from nothing. A weak current passes a rotor that lies against it and takes
- *  it along the next time, so that it is never thrown back; the ramp goes on from this speed. Every eighth period. */
+ *  it along the next time, so that it is never thrown back; the ramp goes on from this speed. Every slow step. */
 QM_INLINE void startup_align(drive_t *d, const drive_params_t *p)
 {
     int16_t current = p->open_loop_q13;

@@ -75,7 +75,7 @@ QM_INLINE uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
     return 0;
 }
 
-/** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every eighth period. */
+/** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every slow step. */
 QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_RAMP) {
@@ -85,11 +85,11 @@ QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
     } else if (d->state != (uint16_t)DRIVE_STOPPING || !speed_turn_round(d, p)) {
         model_update(d, p);
     } else {
-        /* what the ramp needs of the model comes in block 5 */
+        /* what the ramp needs of the model comes in quarter 3 */
     }
 }
 
-/** What the start does every eighth period. */
+/** What the start does every slow step. */
 QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_RAMP) {
@@ -119,7 +119,7 @@ QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_ru
     }
 }
 
-/** What the running motor teaches, and what falls by and by. Every eighth period. @param bus_q15 of this moment */
+/** What the running motor teaches, and what falls by and by. Every slow step. @param bus_q15 of this moment */
 QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus_q15)
 {
     if (drive_is_closed(d)) {

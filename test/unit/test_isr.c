@@ -68,6 +68,7 @@ static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const dr
 }
 
 #include "interrupts.h"
+#include "overrun_cases.h"
 #include "unity.h"
 
 static int16_t raw_bus(float bus_v)
@@ -268,32 +269,12 @@ void test_fault_of_the_slow_work_switches_off_in_its_own_interrupt(void)
 
 void test_overrun_and_overcurrent_are_off_within_the_period_and_stay(void)
 {
-    static const struct {
-        const char *what;
-        uint16_t timer, sample_arrives, slow_waits, i_a;
+    for (unsigned n = 0; n < OVERRUN_CASES; n++) {
         drive_fault_t fault;
-    } cases[] = {
-        { "duties just before the boundary", 0x8001, 0, 0, 0, FAULT_NONE },
-        { "duties after the boundary: counting up, they have been loaded", 0x0001, 0, 0, 0, FAULT_ISR_OVERRUN },
-        { "the next sample during the interrupt", 0x8001, 1, 0, 0, FAULT_ISR_OVERRUN },
-        { "the slow work of the period before is not done", 0x8001, 0, 1, 0, FAULT_ISR_OVERRUN },
-        { "too much current", 0x8001, 0, 0, (uint16_t)(-4 * 7076), FAULT_OVERCURRENT_SW },
-    };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         bring_to_align();
-        P1TMR = cases[n].timer;
-        sample_arrives_meanwhile = cases[n].sample_arrives;
-        slow_work_waits = cases[n].slow_waits;
-        ADC1BUF1 = cases[n].i_a;
-        control_interrupts(1);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault, board_drive.fault, cases[n].what);
-        TEST_ASSERT_EQUAL_HEX16_MESSAGE(cases[n].fault ? 0x0000 : 0x3F00, P1OVDCON, cases[n].what);
-        if (cases[n].fault) {
-            P1TMR = 0x81F4;
-            sample_arrives_meanwhile = 0;
-            slow_work_waits = 0;
-            control_interrupts(1000);
-            expect_off(cases[n].fault);
+        fault = overrun_case(n, &sample_arrives_meanwhile, &slow_work_waits);
+        if (fault != FAULT_NONE) {
+            expect_off(fault);
         }
     }
 }

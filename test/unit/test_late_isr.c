@@ -34,6 +34,7 @@ static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const dr
 #include "firmware/drive/drive.c"
 
 #include "interrupts.h"
+#include "overrun_cases.h"
 #include "unity.h"
 
 static void control_interrupts(uint16_t periods)
@@ -115,26 +116,9 @@ void test_a_stop_lets_no_old_duties_out(void)
 
 void test_an_overrun_and_too_much_current_are_off_within_the_period_and_stay(void)
 {
-    static const struct {
-        const char *what;
-        uint16_t timer, sample_arrives, slow_waits, i_a;
-        drive_fault_t fault;
-    } cases[] = {
-        { "written just before the boundary", 0x8001, 0, 0, 0, FAULT_NONE },
-        { "written after the boundary", 0x0001, 0, 0, 0, FAULT_ISR_OVERRUN },
-        { "the next sample during the interrupt", 0x8001, 1, 0, 0, FAULT_ISR_OVERRUN },
-        { "the slow work of the period before is not done", 0x8001, 0, 1, 0, FAULT_ISR_OVERRUN },
-        { "too much current", 0x8001, 0, 0, (uint16_t)(-4 * 7076), FAULT_OVERCURRENT_SW },
-    };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+    for (unsigned n = 0; n < OVERRUN_CASES; n++) {
         bring_to_align(0);
         control_interrupts(10);
-        P1TMR = cases[n].timer;
-        sample_arrives_meanwhile = cases[n].sample_arrives;
-        slow_work_waits = cases[n].slow_waits;
-        ADC1BUF1 = cases[n].i_a;
-        control_interrupts(1);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault, board_drive.fault, cases[n].what);
-        TEST_ASSERT_EQUAL_HEX16_MESSAGE(cases[n].fault ? 0x0000 : 0x3F00, P1OVDCON, cases[n].what);
+        (void)overrun_case(n, &sample_arrives_meanwhile, &slow_work_waits);
     }
 }

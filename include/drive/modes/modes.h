@@ -2,7 +2,7 @@
  *
  * hook                  mode                   what it takes over
  * MODE_RUN              IDENTIFY, BRINGUP      a period with the bridge switching
- * MODE_ALIGNS           IDENTIFY, BRINGUP      what ALIGN does every eighth period
+ * MODE_ALIGNS           IDENTIFY, BRINGUP      what ALIGN does every slow step
  * mode_start            IDENTIFY, BRINGUP      the end of drive_start()
  * mode_idle             BRINGUP                a period with the bridge off
  * mode_background       IDENTIFY               a pass of the background
