@@ -30,7 +30,7 @@ typedef struct {
 QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
 {
     uint16_t emf = (uint16_t)qm_abs(emf_q12.q), ri = (uint16_t)qm_abs(ri_q12), wrong = (uint16_t)qm_abs(emf_q12.d), sum = emf + ri;
-    int16_t error, flux_rate;
+    int16_t error, rs_rate;
     if (emf < (uint16_t)p->emf_least_q12) {
         return;
     }
@@ -42,12 +42,12 @@ QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, d
         error = (int16_t)-error;
     }
     /* The rate is shared out, not the error: an error's rounding would turn its noise into a drift of R where no current holds it. */
-    flux_rate = qm_hi(2 * qm_mulss(qm_share(emf, (uint16_t)(sum + 1u)), p->rate_q16) + 32768);
-    a->kfi_q31 = qm_clamp_hi(a->kfi_q31 - qm_mulss(error, flux_rate), p->kfi_least, p->kfi_most);
+    rs_rate = qm_hi(2 * qm_mulss(qm_share(ri, sum), p->rate_q16) + 32768);
+    a->kfi_q31 = qm_clamp_hi(a->kfi_q31 - qm_mulss(error, (int16_t)(p->rate_q16 - rs_rate)), p->kfi_least, p->kfi_most);
     if ((ri_q12 ^ emf_q12.q) < 0) {
         error = (int16_t)-error;
     }
-    a->rs_q31 = qm_clamp_hi(a->rs_q31 + qm_mulss(error, (int16_t)(p->rate_q16 - flux_rate)), p->rs_least, p->rs_most);
+    a->rs_q31 = qm_clamp_hi(a->rs_q31 + qm_mulss(error, rs_rate), p->rs_least, p->rs_most);
 }
 
 /** 1/Kphi within its format, ADAPTATION_KFI_LEAST .. 32767. */

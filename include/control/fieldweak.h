@@ -5,8 +5,8 @@
 #include "control/estimator.h"
 
 #define FIELDWEAK_ENTRIES 18
-#define FIELDWEAK_TRIM_SHIFT 4     /**< d current of the voltage feedback: counts a step per 16 counts of missing voltage */
-#define FIELDWEAK_TRIM_MOST 12     /**< d current that a step adds at most, Q13 counts */
+#define FIELDWEAK_TRIM_SHIFT 3     /**< d current of the voltage feedback: counts a step per 8 counts of missing voltage */
+#define FIELDWEAK_TRIM_MOST 24     /**< d current that a step adds at most, Q13 counts */
 #define FIELDWEAK_FILTER_LEAST 256 /**< K of the slowest back-EMF filter, Q16 */
 #define SPEED_INDEX_CONST 10       /**< one table step is 2^10 electrical rpm */
 
@@ -22,7 +22,7 @@ typedef struct {
     int16_t kfilter_esdq_fw_q16;                /**< and above */
     uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per count of speed */
     int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
-    int16_t trim_step_q13;                      /**< its change a slow step */
+    int16_t trim_step_q13;                      /**< its change a rare step */
     speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */
 } fieldweak_params_t;
 

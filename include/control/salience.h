@@ -7,7 +7,7 @@
 
 #include "control/qmath.h"
 
-#define SALIENCE_LEAST_SHIFT 3               /**< the d current follows in eight steps */
+#define SALIENCE_LEAST_SHIFT 2               /**< the d current follows in four rare steps */
 #define SALIENCE_MOST_Q13 16383              /**< d current that counts: twice full scale */
 #define SALIENCE_MOST_Q26 (INT32_C(1) << 28) /**< q current that can be converted: four times full scale */
 

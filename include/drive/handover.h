@@ -12,7 +12,7 @@
 #define HANDOVER_MEAN_SHIFT 5                                                 /**< the mean deviation of the speed is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it */
 #define HANDOVER_HURRY 3                                                      /**< times the ramp's rate, once the estimator should have agreed */
 #define HANDOVER_MOST_STEPS(p) ((uint16_t)((p)->wait_periods >> LATE_DUTIES)) /**< 1.6 s of agreement: the slowest rotor has swung to where the current pulls it */
-#define HANDOVER_DECAY 8                                                      /**< angle counts of the offset that go in a step */
+#define HANDOVER_DECAY 16                                                     /**< angle counts of the offset that go in a rare step */
 #define HANDOVER_MOST_OFFSET 0x2000                                           /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
@@ -157,7 +157,7 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
     }
 }
 
-/** What is left of the angle offset falls every slow step; its d current follows. */
+/** What is left of the angle offset falls every rare step; its d current follows. */
 QM_INLINE void handover_decay(drive_t *d)
 {
     handover_t *h = &d->run.handover;

@@ -48,19 +48,19 @@ QM_INLINE dq_t late_asked(const drive_run_t *run)
     return dq_turn(run->control.ref_q13, (int16_t)(LATE_HALF_STEPS * qm_limit(run->estimator.half_step_q16_rad, LATE_HALF_STEP_MOST)));
 }
 
-/** Which call of the slow step's this is. */
+/** Which call of the rare step's this is. */
 QM_INLINE uint16_t late_call(uint16_t ticks)
 {
     return (uint16_t)((ticks / SLOW_EVERY) & (SLOW_CALLS - 1u));
 }
 
-/** The quarter of the slow step that a call belongs to. */
-QM_INLINE uint16_t late_quarter(uint16_t call)
+/** The part of the rare step that a call belongs to. */
+QM_INLINE uint16_t late_part(uint16_t call)
 {
     return (uint16_t)(call >> LATE_DUTIES);
 }
 
-/** 1 in a call that takes the first half of its quarter. */
+/** 1 in a call that takes the first half of its part. */
 QM_INLINE uint16_t late_first(uint16_t call)
 {
     return (uint16_t)(!LATE_DUTIES || (call & 1u) == 0u);
@@ -72,10 +72,10 @@ QM_INLINE uint16_t late_second(uint16_t call)
     return (uint16_t)(!LATE_DUTIES || (call & 1u) != 0u);
 }
 
-/** What the self-test's sum gets for a quarter, or for its half. @param quarter that came to its end */
-QM_INLINE uint16_t late_mark(uint16_t quarter, uint16_t call)
+/** What the self-test's sum gets for a part, or for its half. @param part that came to its end */
+QM_INLINE uint16_t late_mark(uint16_t part, uint16_t call)
 {
-    return (uint16_t)(LATE_DUTIES ? 2u * quarter + (call & 1u) : quarter);
+    return (uint16_t)(LATE_DUTIES ? 2u * part + (call & 1u) : part);
 }
 
 #endif

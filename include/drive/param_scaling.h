@@ -155,14 +155,18 @@
 #define LATE_BELOW_SEC 0.00004
 #define LATE_DUTIES (PARAM_F(LOOPTIME_SEC) < PARAM_F(LATE_BELOW_SEC))
 
-/* ---- Slow steps: a quarter of the slow work follows every second period, with late duties half a quarter. The tools read the periods. ---- */
+/* ---- Slow steps: a part of the slow work follows every second period, with late duties half a part. Two slow steps are a rare one: eight parts, of which
+ *      speed and bus come twice. The tools read the periods. ---- */
 #define SLOW_EVERY 2u
-#define SLOW_QUARTERS 4u
+#define SLOW_PARTS 8u /* of a rare step */
 #define SLOW_PERIODS_IN_TIME 8
-#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_QUARTERS : SLOW_QUARTERS)                               /* of a slow step */
+#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_PARTS : SLOW_PARTS)                                     /* of a rare step */
 #define SLOW_PERIODS ((LATE_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a slow step */
+#define SLOW_RARE 2u                                                                                  /* slow steps in a rare one */
+#define SLOW_RARE_PERIODS (SLOW_RARE * SLOW_PERIODS)
 #define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
+#define PARAM_RARE_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_RARE))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC ((float)SLOW_PERIODS * PARAM_F(LOOPTIME_SEC))
 #define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)

@@ -81,7 +81,7 @@ QM_INLINE uint16_t salient_current_beside(const drive_run_t *run, const drive_pa
 #endif
 }
 
-/** d current of the least current, or field weakening's if that is more. Every slow step in closed loop. */
+/** d current of the least current, or field weakening's if that is more. Every rare step in closed loop. */
 QM_INLINE current_q13_t salient_id(drive_run_t *run, const drive_params_t *p)
 {
 #if MOTOR_SALIENCY_UH

@@ -15,7 +15,7 @@ QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every slow step in closed loop. */
+/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop. */
 QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
 {
     speed_schedule(run, p);
@@ -49,7 +49,7 @@ QM_INLINE void speed_go_on(drive_t *d)
 }
 
 /** Whether the run goes on or slows down: the wish to stop or a target in the other direction slows it down; a new wish to run goes on from the present speed.
- *  Every slow step in closed loop. */
+ *  Every rare step in closed loop. */
 NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);

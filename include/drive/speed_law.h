@@ -10,7 +10,7 @@
 #define SPEED_TRIM_MOST_SHIFT 3  /**< an eighth of the largest current at most */
 #define SPEED_TRIM_ERROR_SHIFT 3 /**< an error beyond an eighth of the speed is no rest */
 
-/** The observer's rate and the gain that goes with it. Every slow step in closed loop. */
+/** The observer's rate and the gain that goes with it. Every rare step in closed loop. */
 QM_INLINE void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;

@@ -75,17 +75,17 @@ QM_INLINE uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
     return 0;
 }
 
-/** Where a state leads to the next by what the rotor does; the others have the time for the motor's model. Every slow step. */
+/** Where a state leads to the next by what the rotor does. Every slow step. */
 QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_RAMP) {
         handover_step(d, p);
     } else if (d->state == (uint16_t)DRIVE_CATCH) {
         catch_step(d, p);
-    } else if (d->state != (uint16_t)DRIVE_STOPPING || !speed_turn_round(d, p)) {
-        model_update(d, p);
+    } else if (d->state == (uint16_t)DRIVE_STOPPING) {
+        (void)speed_turn_round(d, p);
     } else {
-        /* what the ramp needs of the model comes in quarter 3 */
+        /* the others are left elsewhere */
     }
 }
 
@@ -119,19 +119,6 @@ QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_ru
     }
 }
 
-/** What the running motor teaches, and what falls by and by. Every slow step. @param bus_q15 of this moment */
-QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus_q15)
-{
-    if (drive_is_closed(d)) {
-        handover_decay(d);
-        limits_braking(&d->run, p, bus_q15);
-    }
-    model_learn_step(d, p);
-    if (drive_is_running(d)) {
-        estimator_follow(&d->run.estimator, &p->estimator);
-    }
-}
-
 /** Speed controller and observer, or the start. Every slow step, in two halves. @param call of late_call() */
 QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
@@ -149,7 +136,7 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
-/** State and model, then the bus and what follows from it. Every slow step, in two halves. */
+/** The state, then the bus and what braking may do to it. Every slow step, in two halves. */
 QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t raw_bus, uint16_t call)
 {
     if (late_first(call)) {
@@ -157,68 +144,104 @@ QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t raw_b
     }
     if (late_second(call)) {
         bus_step(d, p, raw_bus);
-        protection_check_model(d, p);
-        speed_choose_step(d, p);
+        if (drive_is_closed(d)) {
+            limits_burn(&d->run, p);
+            limits_braking(&d->run, p, bus_sample(raw_bus));
+        }
     }
 }
 
-/** The voltage circle, and in closed loop what limits the currents. Every slow step, in two halves. */
+/** The voltage circle, and in closed loop what limits the currents. Every rare step, in two halves. */
 QM_INLINE void drive_limit_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
-    const uint16_t closed = drive_is_closed(d);
     if (late_first(call)) {
         bus_update_voltage_limit(d, p);
-        if (closed) {
-            protection_probe_rotor(d, p);
-            limits_burn(&d->run, p);
-        }
     }
-    if (late_second(call) && closed) {
-        protection_check_signals(d, p);
+    if (late_second(call) && drive_is_closed(d)) {
+        handover_decay(d);
         limits_current(&d->run, p);
     }
 }
 
-/** Does the rotor follow? Then what it teaches. Every slow step, in two halves. @param bus_q15 of this moment */
-QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, int16_t bus_q15, uint16_t call)
+/** Does the rotor follow? Then what it teaches. Every rare step, in two halves. */
+QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t call)
+{
+    if (late_first(call) && drive_is_closed(d)) {
+        protection_check_rotor(d, p);
+        speed_follow(&d->run, p);
+    }
+    if (late_second(call)) {
+        model_learn_step(d, p);
+        if (drive_is_running(d)) {
+            estimator_follow(&d->run.estimator, &p->estimator);
+        }
+    }
+}
+
+/** Does the rotor stand? Do the signals fit the motor? Does the run go on? Every rare step in closed loop, in two halves. */
+QM_INLINE void drive_signal_step(drive_t *d, const drive_params_t *p, uint16_t call)
+{
+    if (!drive_is_closed(d)) {
+        return;
+    }
+    if (late_first(call)) {
+        protection_probe_rotor(d, p);
+    }
+    if (late_second(call)) {
+        protection_check_signals(d, p);
+        speed_choose_step(d, p);
+    }
+}
+
+/** The motor's model, and whether it is possible. Every rare step, in two halves. */
+QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (late_first(call)) {
         if (drive_is_closed(d)) {
-            protection_check_rotor(d, p);
-            speed_follow(&d->run, p);
+            model_update(d, p);
         } else {
             model_update_in_ramp(d, p);
         }
     }
     if (late_second(call)) {
-        drive_learn_step(d, p, bus_q15);
+        protection_check_model(d, p);
     }
 }
 
-/** What comes every slow step, a quarter of it at a time, with late duties half a quarter: bus and circle in every state, the hand-over at the end of
+/** A part of what comes every slow or rare step, with late duties half a part: bus and circle in every state, the hand-over at the end of
  *  RAMP, the rest in closed loop.
  *  @param raw the converter's results of this period */
-QM_INLINE void drive_quarter(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+QM_INLINE void drive_part(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    const uint16_t call = late_call(d->ticks);
+    const uint16_t call = late_call(d->ticks), part = late_part(call);
     uint16_t done;
 
-    switch (late_quarter(call)) {
+    switch (part) {
     case 0:
+    case 4:
         drive_speed_step(d, p, call);
-        done = 0;
+        done = (uint16_t)(part & 4u);
         break;
     case 1:
+    case 5:
         drive_bus_step(d, p, raw->v_bus, call);
-        done = 1;
+        done = (uint16_t)((part & 4u) | 1u);
         break;
     case 2:
         drive_limit_step(d, p, call);
         done = 2;
         break;
-    default: /* 3 */
-        drive_rotor_step(d, p, bus_sample(raw->v_bus), call);
+    case 3:
+        drive_rotor_step(d, p, call);
         done = 3;
+        break;
+    case 6:
+        drive_signal_step(d, p, call);
+        done = 6;
+        break;
+    default: /* 7 */
+        drive_model_step(d, p, call);
+        done = 7;
         break;
     }
     SELFTEST_MARK(d, late_mark(done, call));
@@ -253,7 +276,7 @@ QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_sampl
     if (!LATE_DUTIES) {
         drive_follow(d, p, was_running);
     }
-    drive_quarter(d, p, raw);
+    drive_part(d, p, raw);
     if (MODE_ALIGNS && drive_is_running(d)) {
         drive_prepare(d, p);
     }

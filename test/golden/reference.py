@@ -344,7 +344,7 @@ class Machine:
     def adaptation(self):
         e = self.estimator()
         return {
-            "rate_q16": nearest(6 * 8 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
+            "rate_q16": nearest(6 * 16 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
             "rs_most": q15(clamp(self.rs_end - 1, 0, 0.6)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
             "rs_base_q16": e["rs_q16"],
         }
@@ -735,11 +735,11 @@ class Adaptation:
         if magnitude(e_q) < p["emf_least_q12"]:
             return
         error = s16(min(magnitude(e_d), total - 1) * 32768 // total) * (-1 if e_d < 0 else 1)
-        by_flux = magnitude(e_q) * 32768 // u16(total + 1)
-        flux_rate = upper(2 * s16(by_flux) * p["rate_q16"] + 32768)
-        self.kfi = self.bounded(self.kfi - error * flux_rate, p["kfi_least"], p["kfi_most"])
+        by_rs = magnitude(ri) * 32768 // total
+        rs_rate = upper(2 * s16(by_rs) * p["rate_q16"] + 32768)
+        self.kfi = self.bounded(self.kfi - error * (p["rate_q16"] - rs_rate), p["kfi_least"], p["kfi_most"])
         along = -error if (ri < 0) != (e_q < 0) else error
-        self.rs = self.bounded(self.rs + along * (p["rate_q16"] - flux_rate), p["rs_least"], p["rs_most"])
+        self.rs = self.bounded(self.rs + along * rs_rate, p["rs_least"], p["rs_most"])
 
     def apply(self, inv_kfi):
         """@param inv_kfi of the table @return 1/Kphi, R and the EMF limit"""
@@ -799,7 +799,7 @@ def salience_kfi(per_flux, inv_kfi):
 
 def salience_least(double, least, i_q):
     """A step of the least current's d current towards i_q^2/(I + least)."""
-    return s16(least + (s16(i_q * i_q // u16(double + least)) - least >> 3))
+    return s16(least + (s16(i_q * i_q // u16(double + least)) - least >> 2))
 
 
 def mtpa_real(double, i_q):

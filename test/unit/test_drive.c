@@ -1,4 +1,4 @@
-/* The whole drive: power-up, a quarter of the slow work every second period, controlled stop, both directions alike, and the closed loop on the ideal motor. */
+/* The whole drive: power-up, a part of the slow work every second period, controlled stop, both directions alike, and the closed loop on the ideal motor. */
 #include "ideal_motor.h"
 
 void setUp(void)
@@ -42,14 +42,14 @@ void test_a_stopped_drive_stays_off_and_shows_neither_speed_nor_reference(void)
     }
 }
 
-/* ---- slow steps: a quarter every second period, each every eighth ---- */
+/* ---- slow steps: a part every second period, speed and bus every eighth, the others every sixteenth ---- */
 
-void test_each_quarter_of_the_slow_work_runs_in_its_own_period_of_eight(void)
+void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_or_sixteen(void)
 {
     uint16_t n;
     rig_closed(1, 8000);
-    for (n = 0; n < 32u; n++) {
-        uint16_t period;
+    for (n = 0; n < 64u; n++) {
+        uint16_t period, often;
         drive.run.control.reference_erpm = 7000;
         drive.command.target_erpm = 8000;
         drive.run.fieldweak.index = 99;
@@ -57,19 +57,22 @@ void test_each_quarter_of_the_slow_work_runs_in_its_own_period_of_eight(void)
         drive.circle.reciprocal = 1;
         drive.run.control.iq_limit_q13 = 1;
         drive.run.stall_steps = 99;
+        drive.run.probe_most_q13 = 1;
         drive.run.control.brake_limit_q13 = 1;
         rig_speed(8000);
         drive.run.estimator.e_q_q28 = 10000L * 65536;
         rig_tick(1);
-        period = drive.ticks & 7u;
+        period = drive.ticks & 15u;
+        often = drive.ticks & 7u;
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 0u, drive.run.control.reference_erpm != 7000, "speed");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 2u, drive.run.fieldweak.index != 99u, "field weakening");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 2u, drive.duty_per_volt_q16 != 1u, "bus");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(often == 0u, drive.run.control.reference_erpm != 7000, "speed");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 14u, drive.run.fieldweak.index != 99u, "field weakening");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(often == 2u, drive.duty_per_volt_q16 != 1u, "bus");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 4u, drive.circle.reciprocal != 1u, "circle");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 6u, drive.run.stall_steps != 99u, "protection");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 6u, drive.run.control.brake_limit_q13 != 1, "hand-over");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(often == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
     }
 }
 
@@ -82,7 +85,7 @@ void test_field_weakening_is_indexed_by_the_reference_and_not_the_speed(void)
     EACH(n, cases) {
         rig_closed(1, cases[n].reference_erpm);
         rig_speed(cases[n].speed_erpm);
-        rig_next_quarter(1);
+        rig_next_part(7);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(cases[n].index, drive.run.fieldweak.index);
     }
@@ -101,8 +104,8 @@ void test_slow_work_is_due_every_second_period_while_the_bridge_switches_and_els
     }
 }
 
-/* The bus' filter stands for the quarters, the estimator's history for what comes every second period, the offsets' sum for the bridge that is off. */
-void test_a_period_with_the_bridge_off_has_its_own_work_and_every_second_a_quarter(void)
+/* The bus' filter stands for the parts, the estimator's history for what comes every second period, the offsets' sum for the bridge that is off. */
+void test_a_period_with_the_bridge_off_has_its_own_work_and_every_second_a_part(void)
 {
     rig_currents(100, 50);
     rig_bus(20.0F);
@@ -189,7 +192,7 @@ void test_withdrawn_request_in_every_state(void)
         drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         drive.periods = 0;
         drive.command.run = 0;
-        rig_tick(SLOW_PERIODS);
+        rig_tick(SLOW_RARE_PERIODS);
         TEST_ASSERT_EQUAL_UINT16(next[state], drive.state);
     }
 }
@@ -210,7 +213,7 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off_in_both_dir
     EACH_DIRECTION(direction) {
         run_at(direction, 10000);
         drive.command.run = 0;
-        ideal_motor_run(SLOW_PERIODS);
+        ideal_motor_run(SLOW_RARE_PERIODS);
         EXPECT_DRIVE(DRIVE_STOPPING, FAULT_NONE, "asked to stop");
         drive_start(&drive, &params, (int16_t)-direction); /* waits for the stop */
         TEST_ASSERT_EQUAL_INT16(0, drive.command.run);

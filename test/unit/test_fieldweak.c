@@ -26,7 +26,7 @@ void setUp(void)
     params.kfilter_esdq_fw_q16 = 328;
     params.esdq_per_erpm_q13 = 14055u; /* 50 us */
     params.trim_max_q13 = 101;
-    params.trim_step_q13 = 2;
+    params.trim_step_q13 = 4;
     params.trim_speed_erpm = 8000;
     fw = zero;
 }
@@ -131,20 +131,20 @@ void test_trim_asks_for_more_d_current_where_voltage_is_short_and_gives_it_back(
         int16_t before, free_q14, speed_erpm, after;
     } cases[] = {
         { "a little short of voltage", 0, -1, 8001, -1 },
-        { "by 16 counts", -2, -16, 8001, -3 },
-        { "by 17", -2, -17, 8001, -4 },
-        { "backwards", -2, -17, -8001, -4 },
-        { "by 192: the most in a step", -2, -192, 8001, -14 },
-        { "outside the circle, backwards", -2, -800, -8001, -14 },
+        { "by 8 counts", -2, -8, 8001, -3 },
+        { "by 9", -2, -9, 8001, -4 },
+        { "backwards", -2, -9, -8001, -4 },
+        { "by 192: the most in a step", -2, -192, 8001, -26 },
+        { "outside the circle, backwards", -2, -800, -8001, -26 },
         { "at its limit", -101, -300, 20000, -101 },
         { "nearly at its limit", -100, -300, 20000, -101 },
         { "just enough", -10, 0, 20000, -10 },
-        { "and up to 15 counts more", -10, 15, 20000, -10 },
-        { "16 counts more", -10, 16, 20000, -9 },
-        { "voltage is free", -10, 32, 20000, -8 },
-        { "and plenty", -10, 15700, 20000, -8 },
-        { "speed is low", -10, -300, 8000, -8 },
-        { "speed is low, backwards", -10, -300, -8000, -8 },
+        { "and up to 7 counts more", -10, 7, 20000, -10 },
+        { "8 counts more", -10, 8, 20000, -9 },
+        { "voltage is free", -10, 32, 20000, -6 },
+        { "and plenty", -10, 15700, 20000, -6 },
+        { "speed is low", -10, -300, 8000, -6 },
+        { "speed is low, backwards", -10, -300, -8000, -6 },
         { "nearly nothing is left", -1, 700, 20000, 0 },
         { "nothing is left", 0, 700, 20000, 0 },
     };

@@ -12,7 +12,7 @@ static void at_the_end_of_the_ramp(int16_t direction)
     drive.periods = 0;
     drive.forced.speed_q10 = params.forced.end_speed_q10;
     drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
-    drive.command.target_erpm = (int16_t)(direction * 6000); /* the quarter that hands over looks at it too */
+    drive.command.target_erpm = (int16_t)(direction * 6000); /* the part that hands over looks at it too */
     rig_speed((int16_t)(direction * 4800));
 }
 
@@ -39,7 +39,7 @@ static uint16_t ready_steps(int16_t speed_erpm, uint16_t most)
         rig_speed(speed_erpm);
         forced_ahead(0x2000);
         rig_slow(0);
-        rig_slow(1); /* the next quarter carries it out */
+        rig_slow(1); /* the next part carries it out */
         steps++;
     }
     return steps;
@@ -486,14 +486,14 @@ void test_observer_is_preset_once_and_before_the_first_step_of_the_speed_control
     int16_t held_q13;
     handover_now(&drive, &params);
     drive.run.observer.omega_q16 = 12345;
-    for (uint16_t quarter = 1; quarter < SLOW_QUARTERS; quarter++) {
-        rig_slow(quarter);
+    for (uint16_t part = 1; part < SLOW_PARTS / SLOW_RARE; part++) {
+        rig_slow(part);
         TEST_ASSERT_EQUAL_INT32(12345, drive.run.observer.omega_q16);
     }
     held_q13 = drive.run.control.ref_q13.q;
     rig_slow(0);
     TEST_ASSERT_EQUAL_INT32(4800L * 65536, drive.run.observer.omega_q16);
-    TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current()); /* what the speed controller of this very quarter begins with */
+    TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current()); /* what the speed controller of this very part begins with */
     rig_speed(3000); /* the estimator and the observer: from here on the observer only follows the angle, which stands */
     rig_slow(0);
     TEST_ASSERT_LESS_THAN_INT32(3000L * 65536, drive.run.observer.omega_q16);
@@ -538,9 +538,9 @@ void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(voi
         int16_t n, odd;
         for (odd = 0; odd <= 3; odd = (int16_t)(odd + 3)) {
             drive.run.handover.offset = (int16_t)(sign * (1000 + odd));
-            for (n = 1; n <= 124; n++) {
-                handover_decay(&drive); /* every eighth period */
-                TEST_ASSERT_EQUAL_INT16(sign * (1000 + odd - 8 * n), drive.run.handover.offset);
+            for (n = 1; n <= 61; n++) {
+                handover_decay(&drive); /* every sixteenth period */
+                TEST_ASSERT_EQUAL_INT16(sign * (1000 + odd - 16 * n), drive.run.handover.offset);
             }
             handover_decay(&drive);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);

@@ -101,7 +101,7 @@ void test_a_slow_step_lasts_as_long_as_with_duties_in_time(void)
 #define LOOPTIME_SEC 0.000025
 }
 
-void test_each_half_of_a_quarter_comes_in_its_turn_and_leaves_its_mark(void)
+void test_each_half_of_a_part_comes_in_its_turn_and_leaves_its_mark(void)
 {
     uint16_t n;
     rig_power_up();

@@ -58,7 +58,7 @@ void test_trim_sees_the_voltage_that_q_leaves_unused_in_both_directions(void)
         rig_speed((int16_t)(direction * 20000));
         drive.run.control.v_q14.q = (int16_t)(direction * (16000 + 32));
         limits_current(&drive.run, &params);
-        TEST_ASSERT_EQUAL_INT16(-2, drive.run.control.ref_q13.d);
+        TEST_ASSERT_EQUAL_INT16(-4, drive.run.control.ref_q13.d);
         drive.run.control.v_q14.q = (int16_t)(direction * (16000 - 32));
         limits_current(&drive.run, &params);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.d);

@@ -236,8 +236,8 @@ void test_speeds_and_times(void)
     EXACT(p.agree_steps, 50);                            /* 20 ms */
     EXACT(p.wait_periods, 4000);                /* 200 ms */
     EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
-    EXACT(p.stall_steps, 575);                           /* 0.23 s */
-    EXACT(p.lost_lock_steps, 150);                       /* 60 ms */
+    EXACT(p.stall_steps, 288);                           /* 0.23 s */
+    EXACT(p.lost_lock_steps, 75);                        /* 60 ms */
     EXACT(p.rs_impossible, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
 }
 
@@ -337,7 +337,7 @@ void test_with_a_high_trip_level_resistance_and_derivative_share_the_back_emf_s_
 void test_field_weakening(void)
 {
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
-    EXACT(fw.trim_step_q13, 2);      /* 2.7 A a second: 1.07 mA in 400 us */
+    EXACT(fw.trim_step_q13, 4);      /* 2.7 A a second: 2.15 mA in 800 us */
     EXACT(fw.trim_max_q13, 1489);    /* 0.8 A */
     EXACT(fw.trim_speed_erpm, 7800); /* 60 % of the start speed */
     EXACT(fw.kfilter_esdq_q16, 2400);
@@ -382,7 +382,7 @@ void test_loop_time_scales_every_time_and_duty(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     EXACT(p.bootstrap_periods, 100);
-    EXACT(p.stall_steps, 288);
+    EXACT(p.stall_steps, 144);
     EXACT(p.svm.full, 4000);
     EXACT(p.svm.dead_time, 80); /* the same 2 us */
     EXACT(p.svm.top, 3872);

@@ -73,7 +73,7 @@ void test_d_current_that_is_not_wanted_goes(void)
     uint16_t n;
     s.least_q13 = 1300;
     salience_least(&s, DOUBLE_Q13, 4000, 0);
-    TEST_ASSERT_EQUAL_INT16(1300 - 163, s.least_q13);
+    TEST_ASSERT_EQUAL_INT16(1300 - 325, s.least_q13);
     for (n = 0; n < 100u; n++) {
         salience_least(&s, DOUBLE_Q13, 4000, 0);
     }

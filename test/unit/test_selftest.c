@@ -1,4 +1,4 @@
-/* Self-tests that see no register, each with the faults that it must find: memory, CRC, order of the slow quarters, variables kept twice. */
+/* Self-tests that see no register, each with the faults that it must find: memory, CRC, order of the slow work's parts, variables kept twice. */
 #include "drive_rig.h"
 
 /* ---- memory with one fault, behind the firmware's own accesses ---- */
@@ -198,9 +198,9 @@ void test_crc_changes_with_one_two_and_three_bits_and_every_burst_of_sixteen(voi
     }
 }
 
-/* ---- order of the slow quarters ---- */
+/* ---- order of the slow work's parts ---- */
 
-void test_the_slow_quarters_hold_their_order_in_every_state(void)
+void test_the_parts_of_the_slow_work_hold_their_order_in_every_state(void)
 {
     uint16_t n;
     TEST_ASSERT_EQUAL_UINT16(1, selftest_flow_holds(&drive)); /* before the first period, too */
@@ -226,27 +226,27 @@ void test_the_order_holds_where_the_ticks_wrap(void)
     for (n = 0; n < 70000ul; n++) {
         drive.ticks = (uint16_t)(drive.ticks + 1u);
         if ((drive.ticks & 1u) == 0u) {
-            SELFTEST_MARK(&drive, (drive.ticks / 2u) & 3u);
+            SELFTEST_MARK(&drive, (drive.ticks / 2u) & 7u);
         }
         TEST_ASSERT_EQUAL_UINT16(1, selftest_flow_holds(&drive));
     }
 }
 
-void test_a_quarter_that_is_missing_doubled_or_in_the_place_of_another_is_found_whenever_one_looks(void)
+void test_a_part_that_is_missing_doubled_or_in_the_place_of_another_is_found_whenever_one_looks(void)
 {
-    uint16_t quarter, other, later, periods;
-    for (quarter = 0; quarter < 4u; quarter++) {
-        for (other = 0; other < 4u; other++) {
-            for (later = 0; later < 40u && other != quarter; later += 13u) {
+    uint16_t part, other, later, periods;
+    for (part = 0; part < 8u; part++) {
+        for (other = 0; other < 8u; other++) {
+            for (later = 0; later < 40u && other != part; later += 13u) {
                 rig_power_up();
-                rig_tick((uint16_t)(1024u + 2u * quarter));
-                drive.selftest.phases = (uint16_t)(drive.selftest.phases - quarter + other);
+                rig_tick((uint16_t)(1024u + 2u * part));
+                drive.selftest.phases = (uint16_t)(drive.selftest.phases - part + other);
                 rig_tick(later);
                 TEST_ASSERT_EQUAL_UINT16(0, selftest_flow_holds(&drive));
             }
         }
     }
-    for (periods = 1; periods < 8u; periods++) { /* without slow work, or the other way round; all eight of them would not show */
+    for (periods = 1; periods < 16u; periods++) { /* without slow work, or the other way round; all sixteen of them would not show */
         rig_ready();
         drive.ticks = (uint16_t)(drive.ticks + periods);
         TEST_ASSERT_EQUAL_UINT16(periods == 1u, selftest_flow_holds(&drive)); /* an odd period has none */

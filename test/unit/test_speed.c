@@ -253,15 +253,15 @@ void test_q_current_is_raised_by_what_the_back_emf_took_before_the_sample(void)
     }
 }
 
-void test_schedule_of_the_speed_comes_every_eighth_period_in_closed_loop_only(void)
+void test_schedule_of_the_speed_comes_every_sixteenth_period_in_closed_loop_only(void)
 {
     rig_closed(1, 18000);
-    for (uint16_t quarter = 0; quarter < SLOW_QUARTERS; quarter++) {
+    for (uint16_t part = 0; part < SLOW_PARTS; part++) {
         drive.run.control.sample_shift_q13 = 0;
         drive.run.control.speed_kp_q13 = 0;
-        rig_slow(quarter);
-        TEST_ASSERT_EQUAL_INT16(quarter == 3u, drive.run.control.sample_shift_q13 > 0);
-        TEST_ASSERT_EQUAL_INT16(quarter == 3u, drive.run.control.speed_kp_q13 > 0);
+        rig_slow(part);
+        TEST_ASSERT_EQUAL_INT16(part == 3u, drive.run.control.sample_shift_q13 > 0);
+        TEST_ASSERT_EQUAL_INT16(part == 3u, drive.run.control.speed_kp_q13 > 0);
     }
     drive.run.control.sample_shift_q13 = 0;
     drive.state = (uint16_t)DRIVE_RAMP;

@@ -136,16 +136,16 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     speed_follow(&drive.run, &params);
 }
 
-/** Counter of the periods brought to a value, so that the next tick runs this quarter of the slow work. */
-static inline void rig_next_quarter(uint16_t quarter)
+/** Counter of the periods brought to a value, so that the next tick runs this part of the slow work. */
+static inline void rig_next_part(uint16_t part)
 {
-    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_PERIODS - 1u)) + SLOW_EVERY * quarter - 1u);
+    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_RARE_PERIODS - 1u)) + SLOW_EVERY * part - 1u);
 }
 
-/** This quarter of the slow work alone, without the period before it. */
-static inline void rig_slow(uint16_t quarter)
+/** This part of the slow work alone, without the period before it. */
+static inline void rig_slow(uint16_t part)
 {
-    drive.ticks = (uint16_t)(SLOW_PERIODS + SLOW_EVERY * quarter);
+    drive.ticks = (uint16_t)(SLOW_RARE_PERIODS + SLOW_EVERY * part);
     drive_slow(&drive, &params, &samples);
 }
 
