@@ -109,7 +109,7 @@ static void controllers(void)
 static void observer(void)
 {
     double unit = 1.0 / (1 << p.observer.shift), lost = PARAM_LOST_CURRENT_Q13;
-    double rate = 1.0 / (2.0 * PI * slots * 65536.0), learns = 1.0 / (SLOW_RARE * slots * 65536.0);
+    double rate = 1.0 / (2.0 * PI * slots * 65536.0), learns = 1.0 / (SLOW_SELDOM * slots * 65536.0);
     GROUP("load observer, adaptation and low speed");
     FIELD(observer.deltat_q32, slots / 8.0, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle in an eighth of a step");
     FIELD(observer.per_turn_q12, 65536.0 / 4294967296.0 * 60.0 / slots / pairs, "rpm", erpm / 4096.0, "Q12 erpm", "2^16 counts of the angle in a step");
@@ -179,10 +179,10 @@ static void limits(void)
     FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
-    FIELD(stall_steps, PARAM_STALL_SEC, "s", SLOW_RARE * slots, "rare steps", "stall");
-    FIELD(lost_lock_steps, 0.06, "s", SLOW_RARE * slots, "rare steps", "lost lock");
+    FIELD(stall_steps, PARAM_STALL_SEC, "s", SLOW_SELDOM * slots, "seldom steps", "stall");
+    FIELD(lost_lock_steps, 0.06, "s", SLOW_SELDOM * slots, "seldom steps", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "slow steps", "voltages and currents do not fit the motor");
-    FIELD(impossible_steps, 0.25, "s", SLOW_RARE * slots, "rare steps", "flux or resistance impossible");
+    FIELD(impossible_steps, 0.25, "s", SLOW_SELDOM * slots, "seldom steps", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
     FIELD(id_off_q13, most / 32.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
     FIELD(rs_impossible, (PARAM_RS_RISES > 0.99 * PARAM_RS_MOST) ? PARAM_RS_RISES : 1.0, "1", 1.0 / 32768.0, "Q15", "change of R that no winding survives, 1: not told");

@@ -61,12 +61,30 @@ QM_INLINE void board_overrun(void)
     IFS0bits.T2IF = 1;
 }
 
+/** The duties that do not wait, and whether they are in time. */
+QM_INLINE void board_write(const duties_t *duty)
+{
+    if (duties_write_now(duty) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
+        board_overrun();
+    }
+}
+
+/** The end of a period whose bridge does not switch; with late duties the zeros wait. Called, for its way to write them is not that of the law's. */
+NOINLINE void board_rest(void)
+{
+    const duties_t off = { 0, 0, 0 };
+    board_write(&off);
+    if (board_drive.fault != (uint16_t)FAULT_NONE) {
+        P1OVDCON = BOARD_OUTPUTS_OFF;
+    }
+    IFS0bits.T2IF = 1;
+}
+
 /** The control interrupt, triggered every period by PWM1 through the ADC: from the samples to the duties. */
 void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
     duties_t now, *duty = duties_place(board_waiting, &now);
-    uint16_t switches;
 
     IFS0bits.AD1IF = 0;
     if (duties_write_waiting(duty)) {
@@ -74,19 +92,13 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
     }
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
-    switches = drive_tick(&board_drive, &board_params, &raw, duty);
-    if (duties_write_now(duty) || (IFS0 & BOARD_LATE_FLAGS) != 0u) {
-        board_overrun();
-    }
-    if (!switches) {
-        if (board_drive.fault != (uint16_t)FAULT_NONE) {
-            P1OVDCON = BOARD_OUTPUTS_OFF;
+    if (drive_tick(&board_drive, &board_params, &raw, duty)) {
+        board_write(duty);
+        if (board_slow_is_due()) {
+            IFS0bits.T2IF = 1;
         }
-        IFS0bits.T2IF = 1;
-    } else if (board_slow_is_due()) {
-        IFS0bits.T2IF = 1;
     } else {
-        /* the next period raises it */
+        board_rest();
     }
 }
 
@@ -95,7 +107,6 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 void BOARD_ISR _T2Interrupt(void)
 {
     drive_samples_t raw;
-    uint16_t switched;
 
     if (board_is_late) {
         board_is_late = 0;
@@ -105,12 +116,12 @@ void BOARD_ISR _T2Interrupt(void)
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
     board_panel.pot_q15 = (int16_t)ADC1BUF0;
-    switched = drive_is_running(&board_drive);
-    drive_slow(&board_drive, &board_params, &raw);
-    if (!drive_is_running(&board_drive)) {
+    if (drive_slow(&board_drive, &board_params, &raw)) {
+        if (duties_are_the_laws()) {
+            P1OVDCON = BOARD_OUTPUTS_PWM;
+        }
+    } else if (!drive_is_running(&board_drive)) {
         board_set_idle_outputs(drive_outputs(&board_drive));
-    } else if (switched && duties_are_the_laws()) {
-        P1OVDCON = BOARD_OUTPUTS_PWM;
     } else {
         /* the bridge begins to switch when its first duties are written */
     }

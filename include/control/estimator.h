@@ -84,19 +84,21 @@ QM_INLINE alphabeta_t estimator_turn(alphabeta_t x, int16_t a_q16_rad)
 }
 
 /** Voltage of the inductance, Q13. Below nominal speed over eight samples, which is four samples old and therefore
- *  turned forward by 3.5 steps to the middle of the last period; above over one sample. */
-QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t now)
+ *  turned forward by 3.5 steps to the middle of the last period; above over one sample.
+ *  @param last the current of the last period */
+QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t now, alphabeta_t last)
 {
+    const uint16_t ls_q16 = t->ls_q16;
     alphabeta_t v;
     if (!qm_beyond(estimator_speed(e), (int16_t)(p->nominal_erpm - 1))) {
         const int16_t limit = p->d_ilimit_ls_q14;
-        v.alpha = qm_mulhi_su(qm_limit((int16_t)(now.alpha - e->i_oldest_q14.alpha), limit), t->ls_q16);
-        v.beta = qm_mulhi_su(qm_limit((int16_t)(now.beta - e->i_oldest_q14.beta), limit), t->ls_q16);
+        v.alpha = qm_mulhi_su(qm_limit((int16_t)(now.alpha - e->i_oldest_q14.alpha), limit), ls_q16);
+        v.beta = qm_mulhi_su(qm_limit((int16_t)(now.beta - e->i_oldest_q14.beta), limit), ls_q16);
         v = estimator_turn(v, e->old_turn_q16_rad);
     } else {
         const int16_t limit = p->d_ilimit_hs_q14;
-        v.alpha = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.alpha - e->i_last_q14.alpha), limit)), t->ls_q16);
-        v.beta = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.beta - e->i_last_q14.beta), limit)), t->ls_q16);
+        v.alpha = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.alpha - last.alpha), limit)), ls_q16);
+        v.beta = qm_mulhi_su((int16_t)(8 * qm_limit((int16_t)(now.beta - last.beta), limit)), ls_q16);
     }
     v.alpha = (int16_t)(v.alpha * (1 << p->ls_exp));
     v.beta = (int16_t)(v.beta * (1 << p->ls_exp));
@@ -110,13 +112,15 @@ QM_INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_
  *  @return the back-EMF half a period in the past, Q13 */
 QM_INLINE alphabeta_t estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14)
 {
-    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14), e_q13;
-    int16_t resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + e->i_last_q14.alpha) >> 1), t->rs_q16);
-    int16_t resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + e->i_last_q14.beta) >> 1), t->rs_q16);
+    const alphabeta_t last = e->i_last_q14;
+    alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, last), e_q13;
+    int16_t resistive_alpha, resistive_beta;
 
+    e->i_last_q14 = i_q14;
+    resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + last.alpha) >> 1), t->rs_q16);
+    resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + last.beta) >> 1), t->rs_q16);
     e_q13.alpha = (int16_t)(e->v_mean_q13.alpha - resistive_alpha * (1 << p->rs_exp) - inductive.alpha);
     e_q13.beta = (int16_t)(e->v_mean_q13.beta - resistive_beta * (1 << p->rs_exp) - inductive.beta);
-    e->i_last_q14 = i_q14;
     return e_q13;
 }
 
@@ -146,9 +150,10 @@ QM_INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const 
 /** Remembers the vector that was just given to the modulator. */
 QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
 {
-    e->v_mean_q13.alpha = (int16_t)((v_q13.alpha + e->v_last_q13.alpha) >> 1);
-    e->v_mean_q13.beta = (int16_t)((v_q13.beta + e->v_last_q13.beta) >> 1);
+    const alphabeta_t last = e->v_last_q13; /* read before it is written: the compiler adds it in a register then */
     e->v_last_q13 = v_q13;
+    e->v_mean_q13.alpha = (int16_t)((v_q13.alpha + last.alpha) >> 1);
+    e->v_mean_q13.beta = (int16_t)((v_q13.beta + last.beta) >> 1);
 }
 
 /** What follows the speed slowly: the sign of Equation 2, that of Eq, at low speed that of the filtered speed; and the turn of the eight-sample
@@ -171,9 +176,10 @@ QM_INLINE int16_t estimator_oldest(int16_t six_ago, int16_t eight_ago)
 QM_INLINE void estimator_remember(estimator_t *e)
 {
     alphabeta_t *ago = e->history_q14; /* two, four, six, eight periods */
-    e->i_oldest_q14.alpha = estimator_oldest(ago[2].alpha, ago[3].alpha);
-    e->i_oldest_q14.beta = estimator_oldest(ago[2].beta, ago[3].beta);
-    ago[3] = ago[2];
+    const alphabeta_t six = ago[2], eight = ago[3];
+    e->i_oldest_q14.alpha = estimator_oldest(six.alpha, eight.alpha);
+    e->i_oldest_q14.beta = estimator_oldest(six.beta, eight.beta);
+    ago[3] = six;
     ago[2] = ago[1];
     ago[1] = ago[0];
     ago[0] = e->i_last_q14;
@@ -182,7 +188,7 @@ QM_INLINE void estimator_remember(estimator_t *e)
 /** After the duties of every second period: the filtered speed of Equation 7, and what the next two periods need. */
 QM_INLINE void estimator_settle(estimator_t *e, const estimator_params_t *p)
 {
-    int16_t mean = (int16_t)(((int32_t)e->omega_erpm + e->omega_before_erpm) >> 1); /* free of the ripple of estimator_remember() */
+    int16_t mean = qm_mean(e->omega_erpm, e->omega_before_erpm); /* free of the ripple of estimator_remember() */
     estimator_remember(e);
     (void)qm_lowpass(&e->omega_filtered_q16, mean, p->kfilter_velestim_q16);
 }

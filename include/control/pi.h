@@ -18,7 +18,7 @@ typedef struct {
 } pi_gains_t;
 
 /** What the integrator does not keep of a step whose output is at its limit, and that output.
- *  @param u within the limit or not @param step written @return the output */
+ *  @param u within the limit or not @param step of the integrator, less what it does not keep @return the output */
 QM_INLINE int16_t pi_limit(int32_t u, int32_t limit_u, const pi_gains_t *gains, int16_t limit, int32_t *step)
 {
     int32_t half;
@@ -43,17 +43,19 @@ QM_INLINE int16_t pi_limit(int32_t u, int32_t limit_u, const pi_gains_t *gains, 
  *  @return the limited output. The excess is taken in steps of 65536 U counts, alike for both signs. */
 QM_INLINE int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit)
 {
-    int32_t u = pi->sum + qm_mulss(err, gains->kp);
-    int32_t step = qm_mulss(err, gains->ki);
-    int32_t limit_u = qm_mulss(limit, (int16_t)(1u << gains->shift));
+    const int32_t sum = pi->sum;
+    int32_t u = sum + qm_mulss(err, gains->kp);
+    int32_t limit_u = qm_mulss(limit, (int16_t)(1u << gains->shift)), step;
     int16_t out;
 
     if (qm_clear_of(u, limit_u)) { /* as mostly */
         out = (int16_t)(u >> gains->shift);
+        step = qm_mulss(err, gains->ki);
     } else {
+        step = qm_mulss(err, gains->ki);
         out = pi_limit(u, limit_u, gains, limit, &step);
     }
-    pi->sum += step;
+    pi->sum = sum + step;
     return out;
 }
 

@@ -199,6 +199,12 @@ QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
     return x;
 }
 
+/** (a + b) / 2, rounded toward minus infinity, in 16 bits. */
+QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
+{
+    return (int16_t)((a & b) + ((int16_t)(a ^ b) >> 1));
+}
+
 /** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */
 QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
 {

@@ -36,14 +36,12 @@ QM_INLINE int16_t svm_dead_time(const svm_params_t *p, current_q13_t asked_q13)
     return (int16_t)((int16_t)(asked_q13 * p->dead_slope_q8) >> 8);
 }
 
-/** What dead time takes from each leg while these currents flow. */
-QM_INLINE dead_duties_t svm_compensation(const svm_params_t *p, phases_t asked)
+/** What dead time takes from each leg while these currents flow. @param dead written in place, for a returned structure is copied */
+QM_INLINE void svm_compensation(const svm_params_t *p, phases_t asked, dead_duties_t *dead)
 {
-    dead_duties_t r;
-    r.a = svm_dead_time(p, asked.a);
-    r.b = svm_dead_time(p, asked.b);
-    r.c = svm_dead_time(p, asked.c);
-    return r;
+    dead->a = svm_dead_time(p, asked.a);
+    dead->b = svm_dead_time(p, asked.b);
+    dead->c = svm_dead_time(p, asked.c);
 }
 
 /** @param duty with its dead-time compensation @param i_q13 measured, read only where it matters @return what the leg can have of it */

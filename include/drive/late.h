@@ -48,13 +48,13 @@ QM_INLINE dq_t late_asked(const drive_run_t *run)
     return dq_turn(run->control.ref_q13, (int16_t)(LATE_HALF_STEPS * qm_limit(run->estimator.half_step_q16_rad, LATE_HALF_STEP_MOST)));
 }
 
-/** Which call of the rare step's this is. */
+/** Which call of the round's this is. */
 QM_INLINE uint16_t late_call(uint16_t ticks)
 {
     return (uint16_t)((ticks / SLOW_EVERY) & (SLOW_CALLS - 1u));
 }
 
-/** The part of the rare step that a call belongs to. */
+/** The part of the round that a call belongs to. */
 QM_INLINE uint16_t late_part(uint16_t call)
 {
     return (uint16_t)(call >> LATE_DUTIES);

@@ -18,7 +18,7 @@ QM_INLINE void model_learn_flux(drive_run_t *run, const drive_params_t *p)
     adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), 0);
 }
 
-/** A step of the adaptation, every rare step in closed loop. It rests until the observer runs, while the speed changes fast, and at the
+/** A step of the adaptation, every seldom step in closed loop. It rests until the observer runs, while the speed changes fast, and at the
  *  limits of current and voltage. It does not wait for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock
  *  needs it before; what dR i_d puts into Ed passes with that current. */
 QM_INLINE void model_learn(drive_run_t *run, const drive_params_t *p)
@@ -31,7 +31,7 @@ QM_INLINE void model_learn(drive_run_t *run, const drive_params_t *p)
     adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), model_ri(run, p));
 }
 
-/** What is learnt in this state. Every rare step. */
+/** What is learnt in this state. Every seldom step. */
 QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
 {
     if (drive_is_closed(d)) {
@@ -43,7 +43,7 @@ QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** The motor's constants follow the speed reference, and what was learnt. Every rare step in closed loop. */
+/** The motor's constants follow the speed reference, and what was learnt. Every seldom step in closed loop. */
 QM_INLINE void model_update(drive_t *d, const drive_params_t *p)
 {
     salient_sees_current(&d->run);

@@ -155,18 +155,18 @@
 #define LATE_BELOW_SEC 0.00004
 #define LATE_DUTIES (PARAM_F(LOOPTIME_SEC) < PARAM_F(LATE_BELOW_SEC))
 
-/* ---- Slow steps: a part of the slow work follows every second period, with late duties half a part. Two slow steps are a rare one: eight parts, of which
- *      speed and bus come twice. The tools read the periods. ---- */
+/* ---- The slow work: a part of it follows every second period, with late duties half a part. Sixteen parts are a round: speed and bus come every slow step,
+ *      four times in it; limits and rates every rare step, twice; the others once, every seldom step. The tools read the periods. ---- */
 #define SLOW_EVERY 2u
-#define SLOW_PARTS 8u /* of a rare step */
+#define SLOW_PARTS 16u /* of a round */
 #define SLOW_PERIODS_IN_TIME 8
-#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_PARTS : SLOW_PARTS)                                     /* of a rare step */
+#define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_PARTS : SLOW_PARTS)                                     /* of a round */
 #define SLOW_PERIODS ((LATE_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a slow step */
 #define SLOW_RARE 2u                                                                                  /* slow steps in a rare one */
-#define SLOW_RARE_PERIODS (SLOW_RARE * SLOW_PERIODS)
+#define SLOW_SELDOM 4u                                                                                /* and in a seldom one, which is a round */
 #define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
-#define PARAM_RARE_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_RARE))
+#define PARAM_SELDOM_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_SELDOM))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC ((float)SLOW_PERIODS * PARAM_F(LOOPTIME_SEC))
 #define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)

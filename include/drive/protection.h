@@ -36,7 +36,7 @@ QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t
     drive_raise(d, found);
 }
 
-#define PROTECTION_PHASE_SHIFT 6 /* 125 sums of a current above the trip level fit a word */
+#define PROTECTION_PHASE_SHIFT 6 /* 62 sums of a current above the trip level fit a word */
 #define PROTECTION_OPEN_SHIFT 2  /* a phase with less than a quarter of the largest current is open */
 
 /** Which signal is wrong: currents that do not fit the motor, with or without a phase that carries hardly any. */
@@ -51,7 +51,7 @@ QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
 }
 
 #define PROTECTION_DEAD_TIMES 5   /* emf_least_q12 is a fifth of what dead time takes */
-#define PROTECTION_UNEXPLAINED 4u /* as many wrong innovations: two a slow step */
+#define PROTECTION_UNEXPLAINED 8u /* as many wrong innovations: two a slow step */
 
 /** R of the header times a current, Q12. @param i_q13 not negative */
 QM_INLINE voltage_q12_t protection_ri(const drive_params_t *p, int16_t i_q13)
@@ -80,7 +80,7 @@ QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_para
 }
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
- *  with what is measured. Every rare step in closed loop. */
+ *  with what is measured. Every seldom step in closed loop. */
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -126,7 +126,7 @@ QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const d
 }
 
 /** What the motor has shown against the header must be possible: the flux within its tolerance, and a winding that has gained 60 % of its
- *  resistance is too hot. Every rare step in closed loop. */
+ *  resistance is too hot. Every seldom step in closed loop. */
 NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -144,11 +144,11 @@ NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 
 #define STALL_FALL 4u /* steps that a fast one takes back */
 
-#define PROBE_WAIT_STEPS 25     /* the rotor seems to turn for 20 ms before a probe */
-#define PROBE_STEPS 50          /* a probe takes 40 ms: more than the estimator's filters at the lowest speed */
-#define PROBE_DIP_STEPS 12      /* or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long */
-#define PROBE_PAUSE_STEPS 6250  /* five seconds from one to the next */
-#define PROBE_SLOPE_SHIFT 4     /* the largest current takes 16 steps, so that the estimate does not jump */
+#define PROBE_WAIT_STEPS 13    /* the rotor seems to turn for 20 ms before a probe */
+#define PROBE_STEPS 25         /* a probe takes 40 ms: more than the estimator's filters at the lowest speed */
+#define PROBE_DIP_STEPS 6      /* or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long */
+#define PROBE_PAUSE_STEPS 3125 /* five seconds from one to the next */
+#define PROBE_SLOPE_SHIFT 3    /* the largest current takes 8 steps, so that the estimate does not jump */
 #define PROBE_MOST_Q15 22528    /* of the largest current, so that as much q current is left */
 #if MOTOR_SALIENCY_UH
 #define PROBE_LEAST_Q15 9830 /* 0.3: such a d current takes of a salient motor's torque, too */
@@ -200,7 +200,7 @@ QM_INLINE void protection_count_dip(drive_run_t *run, uint16_t dips)
 /** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to nothing and is
  *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
  *  again: soon after a dip of the speed.
- *  Every rare step in closed loop. */
+ *  Every seldom step in closed loop. */
 NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -226,7 +226,7 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
 }
 
-/** Stall and lost lock: conditions that must not last. Every rare step in closed loop. */
+/** Stall and lost lock: conditions that must not last. Every seldom step in closed loop. */
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;

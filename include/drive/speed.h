@@ -49,7 +49,7 @@ QM_INLINE void speed_go_on(drive_t *d)
 }
 
 /** Whether the run goes on or slows down: the wish to stop or a target in the other direction slows it down; a new wish to run goes on from the present speed.
- *  Every rare step in closed loop. */
+ *  Every seldom step in closed loop. */
 NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
@@ -90,6 +90,16 @@ NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
     return turns;
 }
 
+/** The controller's trim, every rare step in closed loop. */
+QM_INLINE void speed_trim_step(drive_t *d, const drive_params_t *p)
+{
+    drive_control_t *c = &d->run.control;
+    if (!mode_commands_current(d)) {
+        speed_trim(&d->run, p, c->trim_reference_erpm, c->ref_q13.q);
+    }
+    c->trim_reference_erpm = c->reference_erpm;
+}
+
 /** One step of the controller, every slow step in closed loop. */
 NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
 {
@@ -98,10 +108,8 @@ NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
     current_q13_t iq_q13;
 
     if (!mode_current_step(d, p, &iq_q13)) {
-        speed_erpm_t before = c->reference_erpm;
         speed_reference_step(d, p);
         iq_q13 = speed_current_step(&d->run, p, c->reference_erpm);
-        speed_trim(&d->run, p, before, iq_q13);
     }
     c->ref_q13.q = limits_apply_braking(c, speed, iq_q13);
 }

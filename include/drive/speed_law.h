@@ -4,9 +4,9 @@
 
 #include "drive/salient.h"
 
-#define SPEED_TRIM_SHIFT 9 /**< the trim takes 1/512 of the error in half of the steps: 2.4 rad/s at 20 kHz */
+#define SPEED_TRIM_SHIFT 8 /**< the trim takes 1/256 of the error in half of the rare steps: 2.4 rad/s at 20 kHz */
 #define SPEED_TRIM_HALF (INT32_C(1) << (SPEED_TRIM_SHIFT - 1))
-#define SPEED_TRIM_LEAK_SHIFT 8  /**< and is forgotten in a tenth of a second */
+#define SPEED_TRIM_LEAK_SHIFT 7  /**< and is forgotten in a tenth of a second */
 #define SPEED_TRIM_MOST_SHIFT 3  /**< an eighth of the largest current at most */
 #define SPEED_TRIM_ERROR_SHIFT 3 /**< an error beyond an eighth of the speed is no rest */
 
@@ -45,7 +45,7 @@ QM_INLINE current_q13_t speed_current(const drive_run_t *run, const drive_params
 /** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer, that acts while the
  *  reference stands, nothing changes fast and no limit is reached, and is forgotten otherwise. It waits in the steps in which the observer's
  *  load moves against the error by itself: while a load grows, the error is the observer's.
- *  @param before_erpm the reference a step ago @param iq_q13 the controller's output */
+ *  @param before_erpm the reference a rare step ago @param iq_q13 the q current that is asked for */
 QM_INLINE void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_erpm, current_q13_t iq_q13)
 {
     drive_control_t *c = &run->control;

@@ -47,13 +47,10 @@ QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
     if (drive_is_forced(d)) {
         (void)forced_angle_accelerate(&d->forced, &p->forced, d->direction, SLOW_EVERY);
         estimator_turn_frame(&d->run.estimator);
-        if (!d->command.run) { /* letting go is harmless at these speeds */
-            drive_enter(d, DRIVE_STOPPED);
-        }
     } else { /* the pulses' centres are one and two steps ahead of the frame, or two and three */
         asked = late_asked(&d->run);
     }
-    d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
+    svm_compensation(&p->svm, phases_of(asked, d->frame), &d->dead);
 }
 
 /** One PWM period up to the duties; after it, where drive_slow_is_due() or the bridge does not switch, drive_slow(), which has no deadline, drive_outputs(), and last
@@ -92,30 +89,30 @@ QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
 /** What the start does every slow step. */
 QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->state == (uint16_t)DRIVE_RAMP) {
+    if (!MODE_ALIGNS || !drive_is_running(d)) { /* nothing turns, or the mode turns it */
+        return;
+    }
+    if (!d->command.run) { /* letting go is harmless at these speeds */
+        drive_enter(d, DRIVE_STOPPED);
+    } else if (d->state == (uint16_t)DRIVE_RAMP) {
         handover_wait(d, p);
-    } else if (MODE_ALIGNS && d->state == (uint16_t)DRIVE_ALIGN) {
-        startup_align(d, p);
     } else {
-        /* nothing turns */
+        startup_align(d, p);
     }
 }
 
 /* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn */
-/** First of the slow work: what a period with the bridge off is. */
-QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+/** First of the slow work: what a period with the bridge off is, or what the estimator's last two periods leave to be done; the modes of their own have
+ *  no estimator. @param was_running the law has run in them @param follows 1: they have come to their end */
+QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, uint16_t was_running, uint16_t follows)
 {
-    if (!drive_is_running(d)) {
+    if (!was_running) {
         mode_idle(d);
         idle_step(d, p, raw->i_a, raw->i_b);
-    }
-}
-
-/** What the estimator's last two periods leave to be done. @param was_running the law has run in them; the modes of their own have no estimator */
-QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_running)
-{
-    if (was_running && MODE_ALIGNS) {
+    } else if (MODE_ALIGNS && follows) {
         estimator_settle(&d->run.estimator, &p->estimator);
+    } else {
+        /* in the next period */
     }
 }
 
@@ -163,23 +160,25 @@ QM_INLINE void drive_limit_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
-/** Does the rotor follow? Then what it teaches. Every rare step, in two halves. */
-QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t call)
+/** What follows the speed: rates, gain and trim of its controller, then the estimator's sign. Every rare step, in two halves. */
+QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
-    if (late_first(call) && drive_is_closed(d)) {
-        protection_check_rotor(d, p);
+    const uint16_t closed = drive_is_closed(d);
+    if (late_first(call) && closed) {
         speed_follow(&d->run, p);
     }
     if (late_second(call)) {
-        model_learn_step(d, p);
+        if (closed) {
+            speed_trim_step(d, p);
+        }
         if (drive_is_running(d)) {
             estimator_follow(&d->run.estimator, &p->estimator);
         }
     }
 }
 
-/** Does the rotor stand? Do the signals fit the motor? Does the run go on? Every rare step in closed loop, in two halves. */
-QM_INLINE void drive_signal_step(drive_t *d, const drive_params_t *p, uint16_t call)
+/** Does the rotor stand? Does it follow? Every seldom step in closed loop, in two halves. */
+QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (!drive_is_closed(d)) {
         return;
@@ -188,12 +187,11 @@ QM_INLINE void drive_signal_step(drive_t *d, const drive_params_t *p, uint16_t c
         protection_probe_rotor(d, p);
     }
     if (late_second(call)) {
-        protection_check_signals(d, p);
-        speed_choose_step(d, p);
+        protection_check_rotor(d, p);
     }
 }
 
-/** The motor's model, and whether it is possible. Every rare step, in two halves. */
+/** The motor's model. Does the run go on? Every seldom step, in two halves. */
 QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (late_first(call)) {
@@ -204,44 +202,75 @@ QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t ca
         }
     }
     if (late_second(call)) {
+        speed_choose_step(d, p);
+    }
+}
+
+/** Do signals and motor fit each other? Every seldom step in closed loop, in two halves. */
+QM_INLINE void drive_signal_step(drive_t *d, const drive_params_t *p, uint16_t call)
+{
+    if (late_first(call) && drive_is_closed(d)) {
+        protection_check_signals(d, p);
+    }
+    if (late_second(call)) {
         protection_check_model(d, p);
     }
 }
 
-/** A part of what comes every slow or rare step, with late duties half a part: bus and circle in every state, the hand-over at the end of
- *  RAMP, the rest in closed loop.
+/** What the running motor teaches. Every seldom step, of two halves the second. */
+QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, uint16_t call)
+{
+    if (late_second(call)) {
+        model_learn_step(d, p);
+    }
+}
+
+/** The third and fourth part of each slow step. @param part of the round @return which part it was */
+QM_INLINE uint16_t drive_rare_part(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
+{
+    switch (part) {
+    case 2:
+    case 10:
+        drive_limit_step(d, p, call);
+        return (uint16_t)(part & 8u) | 2u;
+    case 3:
+    case 11:
+        drive_rate_step(d, p, call);
+        return (uint16_t)(part & 8u) | 3u;
+    case 6:
+        drive_rotor_step(d, p, call);
+        return 6;
+    case 7:
+        drive_model_step(d, p, call);
+        return 7;
+    case 14:
+        drive_signal_step(d, p, call);
+        return 14;
+    default: /* 15 */
+        drive_learn_step(d, p, call);
+        return 15;
+    }
+}
+
+/** A part of what comes by and by, with late duties half a part: bus and circle in every state, the hand-over at the end of RAMP, the rest in
+ *  closed loop.
  *  @param raw the converter's results of this period */
 QM_INLINE void drive_part(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     const uint16_t call = late_call(d->ticks), part = late_part(call);
     uint16_t done;
 
-    switch (part) {
+    switch (part & 3u) {
     case 0:
-    case 4:
         drive_speed_step(d, p, call);
-        done = (uint16_t)(part & 4u);
+        done = (uint16_t)(part & 12u);
         break;
     case 1:
-    case 5:
         drive_bus_step(d, p, raw->v_bus, call);
-        done = (uint16_t)((part & 4u) | 1u);
+        done = (uint16_t)((part & 12u) | 1u);
         break;
-    case 2:
-        drive_limit_step(d, p, call);
-        done = 2;
-        break;
-    case 3:
-        drive_rotor_step(d, p, call);
-        done = 3;
-        break;
-    case 6:
-        drive_signal_step(d, p, call);
-        done = 6;
-        break;
-    default: /* 7 */
-        drive_model_step(d, p, call);
-        done = 7;
+    default:
+        done = drive_rare_part(d, p, part, call);
         break;
     }
     SELFTEST_MARK(d, late_mark(done, call));
@@ -260,26 +289,24 @@ QM_INLINE uint16_t drive_slow_follows(const drive_t *d)
 }
 
 /** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
- *  With late duties the periods between those of the slow steps take the estimator's share, and the recorder's.
- *  @param raw the converter's results of this period */
-QM_INLINE void drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+ *  With late duties the periods between those of the parts take the estimator's share, and the recorder's.
+ *  @param raw the converter's results of this period @return 1 while the bridge goes on switching */
+QM_INLINE uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    uint16_t was_running = drive_is_running(d);
+    const uint16_t was_running = drive_is_running(d), due = drive_slow_is_due(d);
 
-    drive_rest(d, p, raw);
-    if (!drive_slow_is_due(d)) {
-        if (LATE_DUTIES) {
-            drive_follow(d, p, was_running);
-        }
-        return;
-    }
-    if (!LATE_DUTIES) {
-        drive_follow(d, p, was_running);
+    drive_rest(d, p, raw, was_running, (uint16_t)(LATE_DUTIES ? due ^ 1u : due));
+    if (!due) {
+        return was_running;
     }
     drive_part(d, p, raw);
-    if (MODE_ALIGNS && drive_is_running(d)) {
+    if (!drive_is_running(d)) {
+        return 0;
+    }
+    if (MODE_ALIGNS) {
         drive_prepare(d, p);
     }
+    return was_running;
 }
 
 #endif

@@ -107,7 +107,7 @@ void test_flux_and_resistance_are_found_in_both_directions_and_while_braking(voi
         int16_t kphi = cases[n / 4u].kphi_percent, rs = cases[n / 4u].rs_percent;
         uint16_t round;
         setUp();
-        params.rate_q16 = (int16_t)(5 * params.rate_q16); /* for a fifth of the steps */
+        params.rate_q16 = (int16_t)(5 * params.rate_q16 / 2); /* for two fifths of the steps */
         for (round = 0; round < 16u; round++) {
             run(kphi, rs, (int16_t)(direction * 5000), (int16_t)(direction * 300), 50);
             run(kphi, rs, (int16_t)(direction * 2500), (int16_t)(direction * load), 100);
@@ -119,10 +119,10 @@ void test_flux_and_resistance_are_found_in_both_directions_and_while_braking(voi
 
 void test_flux_settles_in_half_a_second_without_load(void)
 {
-    run(80, 100, 2500, 60, 625);
+    run(80, 100, 2500, 60, 313);
     TEST_ASSERT_INT16_WITHIN(25, 250, per_mille(learnt.kfi_q31));
     setUp();
-    run(120, 100, -2500, -60, 625);
+    run(120, 100, -2500, -60, 313);
     TEST_ASSERT_INT16_WITHIN(25, -167, per_mille(learnt.kfi_q31));
 }
 

@@ -42,14 +42,14 @@ void test_a_stopped_drive_stays_off_and_shows_neither_speed_nor_reference(void)
     }
 }
 
-/* ---- slow steps: a part every second period, speed and bus every eighth, the others every sixteenth ---- */
+/* ---- the slow work: a part every second period, speed and bus every eighth, limits and rates every sixteenth, the others every 32nd ---- */
 
-void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_or_sixteen(void)
+void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_thirty_two(void)
 {
     uint16_t n;
     rig_closed(1, 8000);
-    for (n = 0; n < 64u; n++) {
-        uint16_t period, often;
+    for (n = 0; n < 128u; n++) {
+        uint16_t period, rare, slow;
         drive.run.control.reference_erpm = 7000;
         drive.command.target_erpm = 8000;
         drive.run.fieldweak.index = 99;
@@ -58,20 +58,25 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_or_sixteen(
         drive.run.control.iq_limit_q13 = 1;
         drive.run.stall_steps = 99;
         drive.run.probe_most_q13 = 1;
+        drive.run.control.trim_reference_erpm = 1;
+        drive.run.observer.wrong_erpm = 1;
         drive.run.control.brake_limit_q13 = 1;
         rig_speed(8000);
         drive.run.estimator.e_q_q28 = 10000L * 65536;
         rig_tick(1);
-        period = drive.ticks & 15u;
-        often = drive.ticks & 7u;
+        period = drive.ticks & 31u;
+        rare = drive.ticks & 15u;
+        slow = drive.ticks & 7u;
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(often == 0u, drive.run.control.reference_erpm != 7000, "speed");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 0u, drive.run.control.reference_erpm != 7000, "speed");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 14u, drive.run.fieldweak.index != 99u, "field weakening");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(often == 2u, drive.duty_per_volt_q16 != 1u, "bus");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 4u, drive.circle.reciprocal != 1u, "circle");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 6u, drive.run.stall_steps != 99u, "protection");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(often == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.duty_per_volt_q16 != 1u, "bus");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.circle.reciprocal != 1u, "circle");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.stall_steps != 99u, "protection");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u, drive.run.control.trim_reference_erpm != 1, "trim");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u, drive.run.observer.wrong_erpm != 1, "rates");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
     }
 }
@@ -146,6 +151,7 @@ void test_dead_time_is_that_of_the_current_asked_for_in_the_middle_of_the_two_pu
     p.svm.knee_q13 = 810; /* beyond the current: so that the dead time is the current, 40 counts for 256 */
     p.svm.dead_slope_q8 = 40;
     EACH_DIRECTION(direction) {
+        dead_duties_t most;
         for (uint16_t n = 0; n < 40u; n++) {
             dead_duties_t expected;
             rig_closed(direction, (int16_t)(direction * 8000));
@@ -155,7 +161,7 @@ void test_dead_time_is_that_of_the_current_asked_for_in_the_middle_of_the_two_pu
             drive.angle = (angle_t)(n * 1638u);
             drive.frame = trig_sincos(drive.angle);
             drive_prepare(&drive, &p);
-            expected = svm_compensation(&p.svm, phases_of(drive.run.control.ref_q13, trig_sincos((angle_t)(drive.angle + (uint16_t)(direction * 955)))));
+            svm_compensation(&p.svm, phases_of(drive.run.control.ref_q13, trig_sincos((angle_t)(drive.angle + (uint16_t)(direction * 955)))), &expected);
             /* the tangent makes 800 counts longer by 0.4 %, the turn and the phases are rounded by 3 in all: 7 of current, 2 of the duty; a half step is 24 and 4 */
             TEST_ASSERT_INT16_WITHIN(2, expected.a, drive.dead.a);
             TEST_ASSERT_INT16_WITHIN(2, expected.b, drive.dead.b);
@@ -163,8 +169,8 @@ void test_dead_time_is_that_of_the_current_asked_for_in_the_middle_of_the_two_pu
         }
         drive.run.estimator.half_step_q16_rad = (int16_t)(direction * 32767); /* three would not fit the word: half a radian at most */
         drive_prepare(&drive, &p);
-        TEST_ASSERT_EQUAL_INT16(svm_compensation(&p.svm, phases_of(dq_turn(drive.run.control.ref_q13, (int16_t)(direction * 32766)), drive.frame)).a,
-                                drive.dead.a);
+        svm_compensation(&p.svm, phases_of(dq_turn(drive.run.control.ref_q13, (int16_t)(direction * 32766)), drive.frame), &most);
+        TEST_ASSERT_EQUAL_INT16(most.a, drive.dead.a);
     }
 }
 
@@ -192,7 +198,7 @@ void test_withdrawn_request_in_every_state(void)
         drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         drive.periods = 0;
         drive.command.run = 0;
-        rig_tick(SLOW_RARE_PERIODS);
+        rig_tick(SLOW_SELDOM * SLOW_PERIODS);
         TEST_ASSERT_EQUAL_UINT16(next[state], drive.state);
     }
 }
@@ -213,7 +219,7 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off_in_both_dir
     EACH_DIRECTION(direction) {
         run_at(direction, 10000);
         drive.command.run = 0;
-        ideal_motor_run(SLOW_RARE_PERIODS);
+        ideal_motor_run(SLOW_SELDOM * SLOW_PERIODS);
         EXPECT_DRIVE(DRIVE_STOPPING, FAULT_NONE, "asked to stop");
         drive_start(&drive, &params, (int16_t)-direction); /* waits for the stop */
         TEST_ASSERT_EQUAL_INT16(0, drive.command.run);

@@ -24,7 +24,7 @@ static void maybe_trap(void)
 static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick, sample_comes_in_slow_work;
 
 static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
-static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
+static uint16_t slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 #define drive_tick(d, p, raw, duty) tick_and_meanwhile(d, p, raw, duty)
 #define drive_slow(d, p, raw) slow_and_look(d, p, raw)
 #include "firmware/board/isr.c"
@@ -36,17 +36,19 @@ static struct {
     uint16_t duty_a, duty_b, duty_c, calls;
 } at_slow;
 
-static void slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static uint16_t slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
+    uint16_t goes_on;
     at_slow.duty_a = P1DC1;
     at_slow.duty_b = P1DC2;
     at_slow.duty_c = P1DC3;
     at_slow.calls++;
-    drive_slow(d, p, raw);
+    goes_on = drive_slow(d, p, raw);
     if (sample_comes_in_slow_work) {
         sample_comes_in_slow_work = 0;
         _ADC1Interrupt();
     }
+    return goes_on;
 }
 
 static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty)

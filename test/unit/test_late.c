@@ -73,7 +73,7 @@ void test_dead_time_is_compensated_for_the_currents_five_half_steps_ahead_of_the
     dead_duties_t expected;
     drive.frame = trig_sincos(7000);
     drive.run.control.ref_q13 = asked;
-    expected = svm_compensation(&params.svm, phases_of(dq_turn(asked, 5 * 300), drive.frame));
+    svm_compensation(&params.svm, phases_of(dq_turn(asked, 5 * 300), drive.frame), &expected);
     drive_prepare(&drive, &params);
     TEST_ASSERT_EQUAL_INT16(expected.a, drive.dead.a);
     TEST_ASSERT_EQUAL_INT16(expected.b, drive.dead.b);

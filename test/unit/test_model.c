@@ -81,7 +81,7 @@ void test_it_rests_where_there_is_no_back_emf(void)
     TEST_ASSERT_EQUAL_INT16(1, learns());
 }
 
-void test_it_learns_every_sixteenth_period_of_the_closed_loop_only(void)
+void test_it_learns_every_32nd_period_of_the_closed_loop_only(void)
 {
     static const drive_state_t states[] = { DRIVE_CLOSED, DRIVE_STOPPING, DRIVE_RAMP, DRIVE_STOPPED };
     EACH(n, states) {
@@ -89,7 +89,7 @@ void test_it_learns_every_sixteenth_period_of_the_closed_loop_only(void)
             teachable(1);
             drive.state = (uint16_t)states[n];
             rig_slow(part);
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(part == 3u && n < 2u, drive.run.adaptation.kfi_q31 != 0, golden_row(n));
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(part == 15u && n < 2u, drive.run.adaptation.kfi_q31 != 0, golden_row(n));
         }
     }
 }
@@ -100,7 +100,7 @@ void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void
         teachable(1);
         drive.state = (uint16_t)DRIVE_RAMP;
         drive.periods = waited;
-        rig_slow(3);
+        rig_slow(15);
         TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
     }

@@ -226,7 +226,7 @@ void test_the_order_holds_where_the_ticks_wrap(void)
     for (n = 0; n < 70000ul; n++) {
         drive.ticks = (uint16_t)(drive.ticks + 1u);
         if ((drive.ticks & 1u) == 0u) {
-            SELFTEST_MARK(&drive, (drive.ticks / 2u) & 7u);
+            SELFTEST_MARK(&drive, (drive.ticks / 2u) & 15u);
         }
         TEST_ASSERT_EQUAL_UINT16(1, selftest_flow_holds(&drive));
     }
@@ -235,8 +235,8 @@ void test_the_order_holds_where_the_ticks_wrap(void)
 void test_a_part_that_is_missing_doubled_or_in_the_place_of_another_is_found_whenever_one_looks(void)
 {
     uint16_t part, other, later, periods;
-    for (part = 0; part < 8u; part++) {
-        for (other = 0; other < 8u; other++) {
+    for (part = 0; part < 16u; part++) {
+        for (other = 0; other < 16u; other++) {
             for (later = 0; later < 40u && other != part; later += 13u) {
                 rig_power_up();
                 rig_tick((uint16_t)(1024u + 2u * part));
@@ -246,7 +246,7 @@ void test_a_part_that_is_missing_doubled_or_in_the_place_of_another_is_found_whe
             }
         }
     }
-    for (periods = 1; periods < 16u; periods++) { /* without slow work, or the other way round; all sixteen of them would not show */
+    for (periods = 1; periods < 32u; periods++) { /* without slow work, or the other way round; all 32 of them would not show */
         rig_ready();
         drive.ticks = (uint16_t)(drive.ticks + periods);
         TEST_ASSERT_EQUAL_UINT16(periods == 1u, selftest_flow_holds(&drive)); /* an odd period has none */

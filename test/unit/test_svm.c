@@ -18,7 +18,8 @@ void test_duties_equal_the_reference(void)
         alphabeta_t v = { r.alpha, r.beta };
         phases_t asked = { r.asked_a, r.asked_b, r.asked_c }, i = { r.i_a, r.i_b, r.i_c };
         duties_t d;
-        dead_duties_t dead = svm_compensation(&params, asked);
+        dead_duties_t dead;
+        svm_compensation(&params, asked, &dead);
         svm(&params, v, r.gain, &dead, &i, &d);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.a, d.a, golden_row(n));
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(r.b, d.b, golden_row(n));
@@ -44,7 +45,8 @@ void test_directions_of_voltage_and_dead_time(void)
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         alphabeta_t v = { cases[n].alpha, cases[n].beta };
         duties_t d;
-        dead_duties_t dead = svm_compensation(&params, cases[n].asked);
+        dead_duties_t dead;
+        svm_compensation(&params, cases[n].asked, &dead);
         svm(&params, v, GAIN_24V, &dead, &no_current, &d);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].a, d.a, cases[n].what);
         TEST_ASSERT_UINT16_WITHIN_MESSAGE(2, cases[n].b, d.b, cases[n].what);

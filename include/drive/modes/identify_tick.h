@@ -184,7 +184,8 @@ QM_INLINE void identify_record(drive_t *d, const drive_params_t *p, uint16_t set
 QM_INLINE void identify_duties(const drive_t *d, const drive_params_t *p, duties_t *duty)
 {
     phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
-    dead_duties_t dead = svm_compensation(&p->svm, asked);
+    dead_duties_t dead;
+    svm_compensation(&p->svm, asked, &dead);
     svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16, &dead, &asked, duty);
 }
 

@@ -27,6 +27,17 @@ QM_INLINE mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_r
     return range;
 }
 
+/** 1 while the mode, and no speed controller, makes the q current. */
+QM_INLINE uint16_t mode_commands_current(const drive_t *d)
+{
+#ifdef TORQUE_MODE
+    return (uint16_t)(d->state == (uint16_t)DRIVE_CLOSED);
+#else
+    (void)d;
+    return 0;
+#endif
+}
+
 /** The q current in CLOSED: as commanded, between what would hold the minimum speed, below which the estimator would lose the rotor, and
  *  what holds the maximum speed. Both come from the speed controller's own law, which has no memory: limits are met and left without
  *  a bounce, and a stop goes on from what is there. @param iq_q13 the result @return 1 if the mode has taken the step */
@@ -37,7 +48,7 @@ QM_INLINE uint16_t mode_current_step(drive_t *d, const drive_params_t *p, curren
     int16_t iq, speed = along_direction(d, observer_speed(&run->observer));
 
     *iq_q13 = 0;
-    if (d->state != (uint16_t)DRIVE_CLOSED) {
+    if (!mode_commands_current(d)) {
         return 0;
     }
     /* field weakening, the rates and a controlled stop start from it */
@@ -62,7 +73,7 @@ QM_INLINE uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p,
     int16_t missing = qm_sub_limited(asked, along_direction(d, d->run.control.ref_q13.q));
 
     *reasons = (uint16_t)((qm_abs(missing) > (p->current_max_q13 >> 6)) ? LIMIT_SPEED_RANGE : LIMIT_NONE);
-    return (uint16_t)(d->state == (uint16_t)DRIVE_CLOSED);
+    return mode_commands_current(d);
 #else
     (void)d;
     (void)p;

@@ -63,7 +63,7 @@ static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
         if (!drive_tick(&drive, &params, &samples, &out.duty) || drive_slow_is_due(&drive)) {
-            drive_slow(&drive, &params, &samples);
+            (void)drive_slow(&drive, &params, &samples);
         }
         out.outputs = drive_outputs(&drive);
         if (drive_settle(&drive)) {
@@ -139,14 +139,14 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
 /** Counter of the periods brought to a value, so that the next tick runs this part of the slow work. */
 static inline void rig_next_part(uint16_t part)
 {
-    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_RARE_PERIODS - 1u)) + SLOW_EVERY * part - 1u);
+    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_SELDOM * SLOW_PERIODS - 1u)) + SLOW_EVERY * part - 1u);
 }
 
 /** This part of the slow work alone, without the period before it. */
 static inline void rig_slow(uint16_t part)
 {
-    drive.ticks = (uint16_t)(SLOW_RARE_PERIODS + SLOW_EVERY * part);
-    drive_slow(&drive, &params, &samples);
+    drive.ticks = (uint16_t)(SLOW_SELDOM * SLOW_PERIODS + SLOW_EVERY * part);
+    (void)drive_slow(&drive, &params, &samples);
 }
 
 #endif
