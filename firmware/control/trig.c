@@ -26,7 +26,7 @@ sincos_t trig_sincos_called(angle_t angle)
 
 angle_t trig_direction(int16_t x, int16_t y)
 {
-    uint16_t across = (uint16_t)qm_abs(x), up = (uint16_t)qm_abs(y), steep = (uint16_t)(up > across);
+    uint16_t across = (uint16_t)qm_size(x), up = (uint16_t)qm_size(y), steep = (uint16_t)(up > across);
     uint16_t least = steep ? across : up, most = steep ? up : across;
     q15_t r;
     angle_t angle;

@@ -15,9 +15,9 @@
 /** @param i Q13 */
 NOINLINE void add_sizes(uint16_t *sums, const phases_t *i)
 {
-    sums[0] = (uint16_t)(sums[0] + ((uint16_t)qm_abs(i->a) >> PHASE_SHIFT));
-    sums[1] = (uint16_t)(sums[1] + ((uint16_t)qm_abs(i->b) >> PHASE_SHIFT));
-    sums[2] = (uint16_t)(sums[2] + ((uint16_t)qm_abs(i->c) >> PHASE_SHIFT));
+    sums[0] = (uint16_t)(sums[0] + ((uint16_t)qm_size(i->a) >> PHASE_SHIFT));
+    sums[1] = (uint16_t)(sums[1] + ((uint16_t)qm_size(i->b) >> PHASE_SHIFT));
+    sums[2] = (uint16_t)(sums[2] + ((uint16_t)qm_size(i->c) >> PHASE_SHIFT));
 }
 
 /** Takes the phases' currents into their sums. What is asked for goes by the next period's angle: in the mean over a turn they agree. */
@@ -92,7 +92,7 @@ uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_params_t *
     if (!is_judged(d)) {
         return (uint16_t)FAULT_NONE;
     }
-    size = qm_clamp(qm_abs((int16_t)(c->ref_q13.d - c->i_q13.d)), 0, (int16_t)(MOST_TIMES * p->id_off_q13));
+    size = qm_clamp(qm_size((int16_t)(c->ref_q13.d - c->i_q13.d)), 0, (int16_t)(MOST_TIMES * p->id_off_q13));
     v->id_q16 += ((int32_t)size * 65536 - v->id_q16) >> MEAN_SHIFT;
     return (uint16_t)((qm_hi(v->id_q16) > p->id_off_q13) ? FAULT_CURRENT_SENSOR : FAULT_NONE);
 }

@@ -9,7 +9,7 @@
 /** 1 from 1/32 below the limit on: field weakening's trim keeps the voltage a little below it. @param limit 0 or more */
 static uint16_t at_limit(int16_t x, int16_t limit)
 {
-    return (uint16_t)(qm_abs(x) >= (int16_t)(limit - (limit >> 5)));
+    return (uint16_t)(qm_size(x) >= (int16_t)(limit - (limit >> 5)));
 }
 
 /** The q current is held by the bus. With no braking current at all its reference is 0, which has no sign. */
@@ -23,7 +23,7 @@ static uint16_t brakes_at_limit(const drive_control_t *c, speed_erpm_t speed)
 static uint16_t ramp_reasons(const drive_t *d, const drive_params_t *p)
 {
     speed_erpm_t target = mode_speed_target(d, p);
-    int16_t left = qm_abs(qm_sub_limited(target, d->run.control.reference_erpm));
+    int16_t left = qm_size(qm_sub_limited(target, d->run.control.reference_erpm));
     uint16_t waits = (uint16_t)(left != 0 && !reference_may_move(d, p, target));
 
     return (uint16_t)((waits || left >= qm_hi(2 * p->speed_ramp_q16 + 65535) ? (uint16_t)LIMIT_RAMP : 0u) | (waits ? (uint16_t)LIMIT_RAMP_WAITS : 0u));
@@ -64,7 +64,7 @@ static uint16_t start_swings(const drive_t *d, const drive_params_t *p)
         return 0;
     }
     return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && handover_is_overdue(forced, p) && !handover_agrees(h, p)
-                      && qm_abs(h->ahead_erpm) < forced >> 3);
+                      && qm_size(h->ahead_erpm) < forced >> 3);
 }
 
 uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)

@@ -188,12 +188,12 @@ QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
     } else {
         /* calm for long */
     }
-    if (qm_abs(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
+    if (qm_size(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
         if ((innovation ^ o->large_last_erpm) < 0 && !observer_is_calm(o)) {
             o->unrest_steps = OBSERVER_UNREST_STEPS;
         }
         o->large_last_erpm = innovation;
-        level = (int16_t)((qm_abs(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
+        level = (int16_t)((qm_size(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
     }
     o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
     if (o->quick_q15 < level) {
@@ -211,7 +211,7 @@ QM_INLINE void observer_step(observer_t *o, const observer_params_t *p, uint32_t
     innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
     o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
     o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
-    if (qm_abs(innovation) > o->wrong_erpm) {
+    if (qm_size(innovation) > o->wrong_erpm) {
         o->wrong_steps++;
     } else if (o->wrong_steps != 0u) {
         o->wrong_steps--;

@@ -190,6 +190,12 @@ QM_INLINE int16_t qm_abs(int16_t x)
     return (int16_t)qm_magnitude(x);
 }
 
+/** Magnitude of what the caller proves to be above -32768: two instructions, where qm_abs() takes four. */
+QM_INLINE int16_t qm_size(int16_t x)
+{
+    return (int16_t)((x < 0) ? -x : x);
+}
+
 /** x limited to -most..most. @param most not negative */
 QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
 {
@@ -208,11 +214,11 @@ QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
 /** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */
 QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
 {
-    int32_t difference = (int32_t)a - b;
-    if (difference > 16383) {
-        return 16383;
+    int16_t half = (int16_t)((a >> 1) - (b >> 1));
+    if (qm_beyond(half, 8191)) { /* 16383 at least: half of an odd number is rounded */
+        return qm_with_sign(16383, half);
     }
-    return (int16_t)((difference < -16383) ? -16383 : difference);
+    return (int16_t)(a - b);
 }
 
 /** x * 2^bits; the caller proves that it fits. @param bits 0..15 */

@@ -22,7 +22,7 @@
 #define CATCH_MOST_FLUX_Q11 24000                             /**< flux of a look that its format holds */
 
 /** An axis of L i + R int(i dt), voltage times periods. @param i_q14 at the end @param sum_q11 of all samples */
-QM_INLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t *p, int16_t i_q14, int16_t sum_q11)
+NOINLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t *p, int16_t i_q14, int16_t sum_q11)
 {
     int32_t inductive = (qm_mulsu(i_q14, run->model.ls_q16) >> 15) * (1 << p->ls_exp);
     int32_t resistive = (qm_mulsu((int16_t)(sum_q11 - (i_q14 >> 4)), run->model.rs_q16) >> 15) * (1 << p->rs_exp);
@@ -36,7 +36,7 @@ QM_INLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_
 /** How long a rotor takes for CATCH_PAUSE_TURN. @param flux_q11 of a look @param samples that it took, the first of a part of a period */
 QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)
 {
-    int16_t alpha = qm_abs(flux_q11.alpha), beta = qm_abs(flux_q11.beta);
+    int16_t alpha = qm_size(flux_q11.alpha), beta = qm_size(flux_q11.beta);
     int16_t length = (int16_t)((alpha > beta) ? alpha + (beta >> 2) : beta + (alpha >> 2)); /* to 11 per cent */
     uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u));
     int16_t emf_q12 = (int16_t)((half_emf_q12 > 16383u) ? 32767 : (int16_t)(2u * half_emf_q12));
@@ -81,7 +81,7 @@ QM_INLINE uint16_t catch_see(drive_t *d, const drive_params_t *p, angle_t direct
     run->estimator.omega_erpm = catch_speed(p, turn, (uint16_t)(c->half_periods + samples));
     c->pause = 0;
     c->step = (uint16_t)CATCH_SEEN;
-    if (qm_abs(run->estimator.omega_erpm) > p->maximum_erpm) { /* it is waited for */
+    if (qm_size(run->estimator.omega_erpm) > p->maximum_erpm) { /* it is waited for */
         c->pause = CATCH_PAUSE_MOST;
         c->step = (uint16_t)CATCH_FIRST_LOOK;
     }
@@ -94,7 +94,7 @@ NOINLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
 {
     catch_t *c = &d->run.catching;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), flux;
-    int16_t most = (int16_t)(p->current_max_q13 / 5), alpha = qm_abs(i.alpha), beta = qm_abs(i.beta);
+    int16_t most = (int16_t)(p->current_max_q13 / 5), alpha = qm_size(i.alpha), beta = qm_size(i.beta);
     uint16_t samples = d->periods, turns;
     angle_t direction;
 
@@ -106,7 +106,7 @@ NOINLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
     flux.alpha = catch_flux_q11(&d->run, &p->estimator, i.alpha, c->sum_q11.alpha);
     flux.beta = catch_flux_q11(&d->run, &p->estimator, i.beta, c->sum_q11.beta);
     direction = trig_direction((int16_t)-flux.alpha, (int16_t)-flux.beta);
-    turns = (uint16_t)(samples < CATCH_LOOK_PERIODS || qm_abs(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_abs(c->sum_q11.beta) >= CATCH_STANDS_Q11);
+    turns = (uint16_t)(samples < CATCH_LOOK_PERIODS || qm_size(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_size(c->sum_q11.beta) >= CATCH_STANDS_Q11);
     if (turns && c->step == (uint16_t)CATCH_FIRST_LOOK) {
         c->pause = catch_pause(&d->run, p, flux, samples);
         c->half_periods = (uint16_t)(samples + 2u * c->pause);
@@ -179,7 +179,7 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
     estimator_follow(e, &p->estimator);
     drive_update_model(run, p, e->omega_erpm);
-    emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_abs(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
+    emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_size(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
     e->e_q_q28 = (int32_t)((ahead >= 0) ? emf : -emf) * 65536;
     run->control.v_q14.q = qm_limit((int16_t)(4 * qm_limit((int16_t)((ahead >= 0) ? emf : -emf), 8191)), d->circle.limit_q14);
 }
@@ -210,7 +210,7 @@ NOINLINE void catch_step(drive_t *d, const drive_params_t *p)
         return;
     }
     catch_preset_estimator(d, p);
-    if (qm_abs(d->run.estimator.omega_erpm) >= p->minimum_erpm) {
+    if (qm_size(d->run.estimator.omega_erpm) >= p->minimum_erpm) {
         catch_close(d, p);
     } else {
         startup_ramp_from_here(d, p);

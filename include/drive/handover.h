@@ -19,7 +19,7 @@
  *  error of the estimator's angle into torque. */
 QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
 {
-    int16_t current = qm_abs(d->run.control.ref_q13.q), least = (int16_t)(p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT);
+    int16_t current = qm_size(d->run.control.ref_q13.q), least = (int16_t)(p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT);
     current = (int16_t)(current - (current >> HANDOVER_FALL_SHIFT) - (current >> (HANDOVER_FALL_SHIFT + 1)) - 1);
     d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
 }
@@ -53,7 +53,7 @@ QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, sp
 {
     int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
     return (uint16_t)(qm_abs(offset) <= HANDOVER_MOST_OFFSET
-                      || (qm_abs(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
+                      || (qm_size(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
 }
 
 /** While the estimator agrees: the speed waits, the current falls, and what the closed loop begins with is ready. A rotor that swings ahead is not braked.
@@ -91,7 +91,7 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     }
     most = (int16_t)(forced >> (handover_agrees(h, p) ? 1 : 2));
     d->periods = (uint16_t)(at_end ? d->periods + SLOW_PERIODS : 0);
-    h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
+    h->agreed_steps = (uint16_t)((qm_size(ahead) < most && (at_end || qm_size(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
     if (handover_agrees(h, p)) {
         handover_prepare(d, p, forced, seen, ahead);
         return;
@@ -115,7 +115,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     alphabeta_t y;
 
     h->offset = (int16_t)(angle_t)(d->angle - estimated);
-    turn = trig_sincos((angle_t)h->offset);
+    turn = trig_sincos_called((angle_t)h->offset);
     y = inverse_park(c->v_q14, turn);
     c->v_q14.d = (int16_t)(2 * y.alpha);
     c->v_q14.q = (int16_t)(2 * y.beta);
@@ -129,7 +129,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     d->angle = estimated;
-    d->frame = trig_sincos(estimated);
+    d->frame = trig_sincos_called(estimated);
     drive_enter(d, DRIVE_CLOSED);
 }
 
@@ -171,7 +171,7 @@ QM_INLINE void handover_decay(drive_t *d)
         offset = (int16_t)((offset > 0) ? offset - HANDOVER_DECAY : offset + HANDOVER_DECAY);
     }
     h->offset = offset;
-    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(h->current_q13, trig_sincos((angle_t)offset).sin));
+    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(h->current_q13, trig_sincos_called((angle_t)offset).sin));
 }
 
 #endif

@@ -16,7 +16,7 @@
 QM_INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c)
 {
     int16_t missing = (int16_t)((c->ref_q13.q >= 0) ? c->ref_q13.q - c->i_q13.q : c->i_q13.q - c->ref_q13.q);
-    return (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
+    return (int16_t)(c->vq_limit_q14 - qm_size(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
 }
 
 /** Most that the d axis and braking ask for: what the current controllers overshoot stays within MAXIMUM_CURRENT_A. */
@@ -28,7 +28,7 @@ QM_INLINE current_q13_t limits_asked_most(const drive_params_t *p)
 /** 1 while the bus, and not the circle, holds the q current. With no braking current at all its reference is 0, which has no sign. */
 QM_INLINE uint16_t limits_bus_holds(const drive_control_t *c, speed_erpm_t speed)
 {
-    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && qm_abs(c->ref_q13.q) == c->brake_limit_q13 && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0));
+    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && qm_size(c->ref_q13.q) == c->brake_limit_q13 && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0));
 }
 
 /** The d current that burns the rotor's energy in the winding: more while the bus holds the braking current back, less while the circle does or
@@ -50,7 +50,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
     id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13);
     c->ref_q13.d = qm_limit(id_q13, id_max);
-    ratio = qm_muluu((uint16_t)qm_abs(c->ref_q13.d), p->current_max_reciprocal) >> 10;
+    ratio = qm_muluu((uint16_t)qm_size(c->ref_q13.d), p->current_max_reciprocal) >> 10;
     c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
 }
 
@@ -71,7 +71,7 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
 /** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
 QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    if ((iq_q13 ^ speed) < 0 && qm_abs(iq_q13) > c->brake_limit_q13) {
+    if ((iq_q13 ^ speed) < 0 && qm_size(iq_q13) > c->brake_limit_q13) {
         return (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
     }
     return iq_q13;

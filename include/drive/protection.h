@@ -36,14 +36,14 @@ QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t
     drive_raise(d, found);
 }
 
-#define PROTECTION_PHASE_SHIFT 6 /* 62 sums of a current above the trip level fit a word */
+#define PROTECTION_PHASE_SHIFT 6 /* 250 sums of a current above the trip level fit a word */
 #define PROTECTION_OPEN_SHIFT 2  /* a phase with less than a quarter of the largest current is open */
 
 /** Which signal is wrong: currents that do not fit the motor, with or without a phase that carries hardly any. */
 QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
 {
     uint16_t most = 0, least = 0xFFFFu, n;
-    for (n = 0; n < 3u; n++) {
+    for (n = 0; n < 3u; n++) { /* wcet: at most 3 turns */
         most = (run->phase_sums[n] > most) ? run->phase_sums[n] : most;
         least = (run->phase_sums[n] < least) ? run->phase_sums[n] : least;
     }
@@ -63,9 +63,9 @@ QM_INLINE voltage_q12_t protection_ri(const drive_params_t *p, int16_t i_q13)
 QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
-    int32_t explained_q12 = (int32_t)qm_abs(emf.q) + protection_ri(p, qm_abs(i.d)) + protection_ri(p, qm_abs(i.q))
+    int32_t explained_q12 = (int32_t)qm_size(emf.q) + protection_ri(p, qm_size(i.d)) + protection_ri(p, qm_size(i.q))
                             + (int32_t)PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12;
-    return (uint16_t)(qm_abs(emf.d) > explained_q12);
+    return (uint16_t)(qm_size(emf.d) > explained_q12);
 }
 
 #define PROTECTION_BLUR_SHIFT 2 /* dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below */
@@ -75,8 +75,19 @@ QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, con
 QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_params_t *p)
 {
     return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && !d->command.run
-                      && (qm_abs(estimator_emf(&d->run.estimator).q) >> PROTECTION_BLUR_SHIFT) < p->dead_emf_q12
-                      && qm_abs(d->run.control.ref_q13.q) < p->id_off_q13);
+                      && (qm_size(estimator_emf(&d->run.estimator).q) >> PROTECTION_BLUR_SHIFT) < p->dead_emf_q12
+                      && qm_size(d->run.control.ref_q13.q) < p->id_off_q13);
+}
+
+/** What the phases carry while innovations are wrong. Every slow step in closed loop, for seldom ones would meet the same angles of a turn. */
+QM_INLINE void protection_sum_phases(drive_t *d)
+{
+    drive_run_t *run = &d->run;
+    if (run->observer.wrong_steps != 0u) {
+        run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + ((uint16_t)qm_size(d->phases_q13.a) >> PROTECTION_PHASE_SHIFT));
+        run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + ((uint16_t)qm_size(d->phases_q13.b) >> PROTECTION_PHASE_SHIFT));
+        run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + ((uint16_t)qm_size(d->phases_q13.c) >> PROTECTION_PHASE_SHIFT));
+    }
 }
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
@@ -84,7 +95,6 @@ QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_para
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    uint16_t a = (uint16_t)qm_abs(d->phases_q13.a), b = (uint16_t)qm_abs(d->phases_q13.b), c = (uint16_t)qm_abs(d->phases_q13.c);
     if (protection_voltage_is_unexplained(run, p)) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + PROTECTION_UNEXPLAINED);
     }
@@ -92,15 +102,9 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
         run->phase_sums[0] = 0;
         run->phase_sums[1] = 0;
         run->phase_sums[2] = 0;
-        return;
-    }
-    run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));
-    run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + (b >> PROTECTION_PHASE_SHIFT));
-    run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + (c >> PROTECTION_PHASE_SHIFT));
-    if (run->observer.wrong_steps <= p->wrong_steps) {
-        return;
-    }
-    if (protection_stop_is_blurred(d, p)) {
+    } else if (run->observer.wrong_steps <= p->wrong_steps) {
+        /* not for long enough */
+    } else if (protection_stop_is_blurred(d, p)) {
         drive_enter(d, DRIVE_STOPPED); /* as at a stop's end: the bridge goes off and the rotor runs out */
     } else {
         drive_raise(d, protection_wrong_signal(run));
@@ -116,10 +120,10 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 QM_INLINE uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
-    int16_t e_q12 = qm_abs(emf.q), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
+    int16_t e_q12 = qm_size(emf.q), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
     int16_t r_more = (int16_t)(((i.q ^ emf.q) >= 0) ? p->rs_off_most - rs : rs - p->rs_off_least);
-    int16_t ri_q12 = protection_ri(p, qm_abs(i.q));
-    uint16_t turned_q13 = (uint16_t)((uint16_t)qm_abs(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);
+    int16_t ri_q12 = protection_ri(p, qm_size(i.q));
+    uint16_t turned_q13 = (uint16_t)((uint16_t)qm_size(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);
     uint32_t li_q12 = (qm_muluu(turned_q13, run->model.ls_q16) >> 16) << p->estimator.ls_exp;
     int32_t parts_q27 = qm_mulss(ri_q12, r_more) + qm_mulss((int16_t)((li_q12 > 32767ul) ? 32767ul : li_q12), p->ls_off);
     return (uint16_t)(qm_mulss(e_q12, more) - ((int32_t)p->dead_emf_q12 << 15) > parts_q27);
@@ -161,8 +165,8 @@ NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 QM_INLINE uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t r_more = (int16_t)(p->rs_off_most - qm_hi(run->adaptation.rs_q31));
-    int16_t less_q12 = (int16_t)(qm_abs(estimator_emf(&run->estimator).q) - p->adaptation.emf_least_q12);
-    return (uint16_t)(less_q12 <= qm_hi(2 * qm_mulss(protection_ri(p, qm_abs(run->control.i_q13.q)), r_more)));
+    int16_t less_q12 = (int16_t)(qm_size(estimator_emf(&run->estimator).q) - p->adaptation.emf_least_q12);
+    return (uint16_t)(less_q12 <= qm_hi(2 * qm_mulss(protection_ri(p, qm_size(run->control.i_q13.q)), r_more)));
 }
 
 /** The most d current of a probe: it leaves the q current that flows, but for a tenth of the largest. A salient motor needs more q current beside
@@ -181,7 +185,7 @@ QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const driv
 /** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
 QM_INLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
 {
-    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
+    int16_t least = (int16_t)(qm_size(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
     return (least < standing) ? standing : least;
 }
 
@@ -204,18 +208,18 @@ QM_INLINE void protection_count_dip(drive_run_t *run, uint16_t dips)
 NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_abs(run->control.reference_erpm);
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_size(run->control.reference_erpm);
     uint16_t doubtful = (uint16_t)(run->handover.id_q13 == 0 && protection_rotor_is_doubtful(run, p));
     uint16_t seems_to_turn = (uint16_t)(along >= protection_least_speed(run, p));
     dq_t emf = estimator_emf(&run->estimator);
-    uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2)), steps = run->probe_steps;
+    uint16_t turns = (uint16_t)(seems_to_turn || qm_size(emf.d) < (qm_size(emf.q) >> 2)), steps = run->probe_steps;
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
 
     if (steps < PROBE_WAIT_STEPS) {
         steps = (uint16_t)((doubtful && seems_to_turn) ? steps + 1u : 0u);
         run->probe_most_q13 = protection_probe_most(run, p);
     } else if (steps < PROBE_WAIT_STEPS + PROBE_STEPS) {
-        id_q13 = qm_clamp(qm_abs(run->control.ref_q13.q), 0, run->probe_most_q13);
+        id_q13 = qm_clamp(qm_size(run->control.ref_q13.q), 0, run->probe_most_q13);
         run->dip_steps = PROBE_DIP_STEPS + 1u; /* a heavy load dips for want of the probe's current: none counts before it is over */
         steps = (uint16_t)(doubtful ? steps + turns : PROBE_WAIT_STEPS + PROBE_STEPS);
     } else {
@@ -230,9 +234,9 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_abs(along), standing = (int16_t)(p->minimum_erpm >> 1);
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_size(along), standing = (int16_t)(p->minimum_erpm >> 1);
     dq_t emf = estimator_emf(&run->estimator);
-    uint16_t lost = (uint16_t)(speed >= standing && qm_abs(emf.d) > qm_abs(emf.q)); /* of a standing rotor its direction says nothing */
+    uint16_t lost = (uint16_t)(speed >= standing && qm_size(emf.d) > qm_size(emf.q)); /* of a standing rotor its direction says nothing */
 
     if (along < protection_least_speed(run, p)) {
         run->stall_steps++;

@@ -71,7 +71,7 @@ QM_INLINE int32_t salient_current_q26(const drive_run_t *run, int32_t torque_q26
  *  @return not negative */
 QM_INLINE uint16_t salient_current_beside(const drive_run_t *run, const drive_params_t *p, current_q13_t id_q13)
 {
-    uint16_t torque_q13 = (uint16_t)qm_abs(salient_torque(run, run->control.ref_q13.q));
+    uint16_t torque_q13 = (uint16_t)qm_size(salient_torque(run, run->control.ref_q13.q));
 #if MOTOR_SALIENCY_UH
     return qm_divud(qm_muluu(torque_q13, p->salience_q13), (uint16_t)(p->salience_q13 - (uint16_t)id_q13));
 #else

@@ -32,8 +32,8 @@ QM_INLINE uint16_t speed_is_to_turn(const drive_t *d)
  *  unloaded motor's current can hold it just above. */
 QM_INLINE uint16_t speed_has_stopped(const drive_t *d, const drive_params_t *p)
 {
-    return (uint16_t)(qm_abs(observer_speed(&d->run.observer)) < p->minimum_erpm + (p->minimum_erpm >> 1)
-                      && qm_abs(d->run.control.reference_erpm) < p->minimum_erpm);
+    return (uint16_t)(qm_size(observer_speed(&d->run.observer)) < p->minimum_erpm + (p->minimum_erpm >> 1)
+                      && qm_size(d->run.control.reference_erpm) < p->minimum_erpm);
 }
 
 /** A stop goes on as a run, from the rotor's speed. What drove the rotor in the observer's eyes was its inertia, if there is more of it than the

@@ -14,7 +14,7 @@
 QM_INLINE void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
-    int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
+    int16_t gain, reference = qm_size(run->control.reference_erpm), speed = qm_size(observer_speed(o));
     observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, run->control.ref_q13.q);
     gain = observer_between(p->speed_kp_q13, p->speed_kp_quick_q13, o->quick_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */
@@ -52,8 +52,8 @@ QM_INLINE void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_
     const speed_erpm_t speed = observer_speed(&run->observer);
     const int16_t error = qm_sub_limited(c->reference_erpm, speed), ahead = qm_sub_limited(estimator_speed(&run->estimator), speed);
     int32_t most_q26 = qm_mulss(p->current_max_q13, 8192 >> SPEED_TRIM_MOST_SHIFT), trim_q26 = c->iq_trim_q26;
-    if (c->reference_erpm == before_erpm && qm_abs(error) <= (qm_abs(before_erpm) >> SPEED_TRIM_ERROR_SHIFT)
-        && observer_is_calm(&run->observer) && qm_abs(iq_q13) < c->iq_limit_q13 && qm_abs(c->v_q14.q) < c->vq_limit_q14) {
+    if (c->reference_erpm == before_erpm && qm_size(error) <= (qm_size(before_erpm) >> SPEED_TRIM_ERROR_SHIFT)
+        && observer_is_calm(&run->observer) && qm_size(iq_q13) < c->iq_limit_q13 && qm_size(c->v_q14.q) < c->vq_limit_q14) {
         trim_q26 += (qm_mulss(error, ahead) < 0) ? 0 : ((qm_mulss(error, c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT);
     } else {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;

@@ -101,7 +101,7 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn */
+/* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn_step */
 /** First of the slow work: what a period with the bridge off is, or what the estimator's last two periods leave to be done; the modes of their own have
  *  no estimator. @param was_running the law has run in them @param follows 1: they have come to their end */
 QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, uint16_t was_running, uint16_t follows)
@@ -127,6 +127,7 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
     if (late_first(call)) {
         handover_observe(&d->run, p);
+        protection_sum_phases(d);
     }
     if (late_second(call)) {
         speed_step(d, p);

@@ -59,7 +59,7 @@ void test_starts_in_the_direction_of_the_pot_and_the_other_one_is_a_stop_and_a_n
     panel_turn_pot(0);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);
-    rig_tick(SLOW_EVERY); /* STOPPED */
+    rig_tick(SLOW_PERIODS); /* STOPPED */
     panel_ms(1);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(-1, drive.direction);

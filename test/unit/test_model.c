@@ -17,7 +17,7 @@ static void teachable(int16_t direction)
 static int16_t learns(void)
 {
     adaptation_t before = drive.run.adaptation;
-    model_learn(&drive.run, &params);
+    model_learn_step(&drive, &params);
     return (int16_t)(drive.run.adaptation.kfi_q31 != before.kfi_q31 || drive.run.adaptation.rs_q31 != before.rs_q31);
 }
 

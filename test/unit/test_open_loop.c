@@ -16,7 +16,7 @@ void test_stays_on_the_ramps_end_speed_with_the_estimator_beside_it_until_the_st
     TEST_ASSERT_FLOAT_WITHIN(25.0F, 5000.0F, ideal_motor_erpm());
     TEST_ASSERT_INT16_WITHIN(60, 5000, estimator_speed(&drive.run.estimator));
     drive.command.run = 0;
-    ideal_motor_run(SLOW_EVERY);
+    ideal_motor_run(SLOW_PERIODS);
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "stopped");
 }
 

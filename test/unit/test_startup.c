@@ -64,7 +64,7 @@ void test_first_period_finds_the_frame_of_the_first_angle(void)
     }
 }
 
-void test_stop_switches_off_in_the_next_slow_work_before_the_loop_is_closed(void)
+void test_stop_switches_off_within_a_slow_step_before_the_loop_is_closed(void)
 {
     static const drive_state_t states[] = { DRIVE_BOOTSTRAP, DRIVE_ALIGN, DRIVE_RAMP };
     EACH(n, states) {
@@ -73,14 +73,14 @@ void test_stop_switches_off_in_the_next_slow_work_before_the_loop_is_closed(void
         (void)ideal_motor_run_until(states[n], 300u + LOCK_PERIODS);
         ideal_motor_run(100);
         EXPECT_DRIVE(states[n], FAULT_NONE, golden_row(n));
-        drive.ticks = (uint16_t)(drive.ticks & ~1u); /* the next period has no slow work while the bridge switches */
+        drive.ticks = (uint16_t)(drive.ticks & ~(SLOW_PERIODS - 1u)); /* its part of the slow work has just been */
         drive.command.run = 0;
         while (drive.state != (uint16_t)DRIVE_STOPPED && periods < 9u) {
             ideal_motor_run(1);
             periods++;
         }
         EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, golden_row(n));
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(bridge_is_off ? 1u : SLOW_EVERY, periods, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(bridge_is_off ? 1u : SLOW_PERIODS, periods, golden_row(n));
     }
 }
 
