@@ -10,6 +10,7 @@
 #include "control/observer.h"
 #include "control/speed_ramp.h"
 #include "control/svm.h"
+#include "drive/dead_state.h"
 #include "drive/faults.h"
 #include "drive/late_state.h"
 #include "drive/modes/mode_state.h"
@@ -204,9 +205,10 @@ typedef struct {
     uint16_t duty_per_volt_q16;
 
     forced_angle_t forced;
-    dead_duties_t dead; /**< dead-time compensation of the next pulse */
-    angle_t angle;      /**< control angle of the next sample */
-    sincos_t frame;     /**< its sine and cosine */
+    dead_duties_t dead; /**< dead-time compensation of the next two pulses, or of the first */
+    DEAD_STATE
+    angle_t angle;  /**< control angle of the next sample */
+    sincos_t frame; /**< its sine and cosine */
     drive_run_t run;
     SELFTEST_STATE
 } drive_t;

@@ -157,6 +157,9 @@
 
 /* ---- Slow steps: a quarter of the slow work follows every second period, with late duties half a quarter. The tools read the periods. ---- */
 #define SLOW_EVERY 2u
+/** Two pulses have one compensation of dead time, unless the rotor may turn by more than 12 degrees in a period. */
+#define DEAD_EACH_TURN 0.0333
+#define DEAD_EACH (PARAM_TOP_ERPM / 60.0F * PARAM_F(LOOPTIME_SEC) > PARAM_F(DEAD_EACH_TURN))
 #define SLOW_QUARTERS 4u
 #define SLOW_PERIODS_IN_TIME 8
 #define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_QUARTERS : SLOW_QUARTERS)                               /* of a slow step */

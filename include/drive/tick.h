@@ -3,6 +3,7 @@
 #define DRIVE_TICK_H
 
 #include "drive/bus.h"
+#include "drive/dead_time.h"
 #include "drive/idle.h"
 #include "drive/model.h"
 #include "drive/speed.h"
@@ -37,7 +38,7 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     d->frame = trig_sincos(d->angle);
     v = inverse_park(c->v_q14, late_frame(d, before));
     estimator_commanded(&run->estimator, late_vector(run, v));
-    svm(&p->svm, v, d->duty_per_volt_q16, &d->dead, &d->phases_q13, duty);
+    svm(&p->svm, v, d->duty_per_volt_q16, dead_of_pulse(d), &d->phases_q13, duty);
 }
 
 /** Last of the slow work: what the law of the next two periods needs and the samples do not change. */
@@ -54,6 +55,7 @@ QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
         asked = late_asked(&d->run);
     }
     d->dead = svm_compensation(&p->svm, phases_of(asked, d->frame));
+    dead_prepare_second(d, p, asked);
 }
 
 /** One PWM period up to the duties; after it, where drive_slow_is_due() or the bridge does not switch, drive_slow(), which has no deadline, drive_outputs(), and last
