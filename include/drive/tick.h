@@ -134,20 +134,17 @@ QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, int16_t bus
     }
 }
 
-/** Speed controller and observer, or the start. Every slow step, in two halves. @param call of late_call() */
+/** Speed controller, or the start. Every slow step, in the second half or the first. @param call of late_call() */
 QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (!drive_is_closed(d)) {
         if (late_first(call)) {
             drive_start_step(d, p);
         }
-        return;
-    }
-    if (late_first(call)) {
-        handover_observe(&d->run, p);
-    }
-    if (late_second(call)) {
+    } else if (late_second(call)) {
         speed_step(d, p);
+    } else {
+        /* the observer's step was before */
     }
 }
 
@@ -194,6 +191,9 @@ QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, int16_t bus
     }
     if (late_second(call)) {
         drive_learn_step(d, p, bus_q15);
+        if (drive_is_closed(d)) { /* two periods before the speed controller; at once, a load that goes is more often followed by a slip of the angle */
+            handover_observe(&d->run, p);
+        }
     }
 }
 

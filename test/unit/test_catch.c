@@ -301,6 +301,7 @@ void test_a_stop_turns_round_only_at_its_end_for_a_target_the_other_way_while_th
             rig_slow(2);
             rig_slow(3);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(DRIVE_STOPPING, drive.state, golden_row(n));
+            rig_speed((int16_t)(direction * cases[n].speed)); /* the observer has seen an angle that stands */
             rig_slow(1);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].after, drive.state, golden_row(n));
         }
