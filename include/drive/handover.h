@@ -141,7 +141,7 @@ QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** The observer's step. Its first one, six periods after the hand-over, whose own period has enough to do, begins with the hand-over's q
+/** The observer's step. Its first one, four periods after the hand-over, whose own period has enough to do, begins with the hand-over's q
  *  current, so that the speed controller, which comes next, goes on from it. */
 QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 {

@@ -6,10 +6,12 @@
 
 #include "drive/drive.h"
 
-/** Half steps of the angle from the frame that the slow work sees to the middle of the next two pulses. */
-#define LATE_HALF_STEPS (3 + 2 * LATE_DUTIES)
+/** Half steps of the angle from the frame that the slow work sees to the middle of the next two pulses, or to the first one. */
+#define LATE_HALF_STEPS (3 - DEAD_EACH + 2 * LATE_DUTIES)
 /** Largest half step that so many leave within a word. */
 #define LATE_HALF_STEP_MOST (32767 / LATE_HALF_STEPS)
+/** 1 where no speed that a word holds has a larger one. */
+#define LATE_HALF_STEP_FITS (32768.0F * 65536.0F * PARAM_PI / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT) < PARAM_F(LATE_HALF_STEP_MOST))
 
 /** As long as ALIGN counts before its first duties are written. */
 #define LATE_ALIGN_PERIODS (LATE_DUTIES ? SLOW_PERIODS : 0u)
@@ -42,10 +44,14 @@ QM_INLINE void late_preset(drive_run_t *run, alphabeta_t v_q13)
     (void)late_vector(run, v_q13);
 }
 
-/** The asked currents at the middle of the next two pulses. */
+/** The asked currents at the middle of the next two pulses, or of the first one. */
 QM_INLINE dq_t late_asked(const drive_run_t *run)
 {
-    return dq_turn(run->control.ref_q13, (int16_t)(LATE_HALF_STEPS * qm_limit(run->estimator.half_step_q16_rad, LATE_HALF_STEP_MOST)));
+    int16_t half_step = run->estimator.half_step_q16_rad;
+    if (!LATE_HALF_STEP_FITS) {
+        half_step = qm_limit(half_step, LATE_HALF_STEP_MOST);
+    }
+    return dq_turn(run->control.ref_q13, (int16_t)(LATE_HALF_STEPS * half_step));
 }
 
 /** Which call of the round's this is. */

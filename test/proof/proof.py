@@ -18,8 +18,8 @@ HERE = Path(os.path.relpath(Path(__file__).parent)) # Frama-C cannot tell a blan
 BUILD = Path("build/proof")
 KERNEL = """-machdep gcc_x86_16 -warn-signed-overflow -no-warn-left-shift-negative -kernel-warn-key parser:decimal-float=inactive
     -eva -eva-warn-signed-converted-downcast -eva-no-show-progress -report-unclassified-warning NONE""".split()
-LATE = "LATE"
-"""A mode that is a header: with the shortest period, whose duties are late."""
+HEADERS = {"LATE": "late_header.h", "EACH": "each_header.h", "EACH_LATE": "each_late_header.h"}
+"""Modes that are a header: with the shortest period, whose duties are late; with dead time's compensation for each pulse."""
 PROVED = {"Valid", "Considered valid", "Valid under hypotheses", "Dead"}
 
 
@@ -55,7 +55,7 @@ def run(proof: Proof) -> tuple[list[str], float]:
     report = BUILD / f"{proof.name}.csv"
     report.unlink(missing_ok=True)
     # A register or flag that an interrupt may change is any value at the start of a proof, and constant during a tick.
-    mode = f"-include {HERE}/late_header.h" if proof.mode == LATE else f"-D{proof.mode}" if proof.mode else ""
+    mode = f"-include {HERE}/{HEADERS[proof.mode]}" if proof.mode in HEADERS else f"-D{proof.mode}" if proof.mode else ""
     cpp = f"-I{HERE} -Iinclude -Itools/cpu_host -I. -Dvolatile= {mode}"
     command = ["frama-c", *KERNEL, *proof.options, f"-cpp-extra-args={cpp}", "-main", proof.function, str(proof.file), *proof.sources,
                "-then", "-report-csv", str(report)]

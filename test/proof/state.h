@@ -48,6 +48,16 @@ static void any_drive(uint16_t state)
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);
 }
 
+/* The compensation of the second pulse, where it has its own. */
+static void any_dead_second(void)
+{
+    for (int i = 0; i < DEAD_MORE; i++) {
+        drive.dead_second[i].a = any(-DEAD_MOST, DEAD_MOST);
+        drive.dead_second[i].b = any(-DEAD_MOST, DEAD_MOST);
+        drive.dead_second[i].c = any(-DEAD_MOST, DEAD_MOST);
+    }
+}
+
 /* The vector whose duties wait, where they do. */
 static void any_late(void)
 {
@@ -140,6 +150,9 @@ static void bounds_hold_again(void)
     //@ check i_oldest: -alpha_max <= e->i_oldest_q14.alpha <= alpha_max && -beta_max <= e->i_oldest_q14.beta <= beta_max;
     //@ check old_turn: -32767 <= e->old_turn_q16_rad && -1 <= e->sign <= 1;
     //@ check dead: -DEAD_MOST <= drive.dead.a <= DEAD_MOST && -DEAD_MOST <= drive.dead.b <= DEAD_MOST && -DEAD_MOST <= drive.dead.c <= DEAD_MOST;
+    //@ check dead_second_a: \forall integer i; 0 <= i < DEAD_MORE ==> -DEAD_MOST <= drive.dead_second[i].a <= DEAD_MOST;
+    //@ check dead_second_b: \forall integer i; 0 <= i < DEAD_MORE ==> -DEAD_MOST <= drive.dead_second[i].b <= DEAD_MOST;
+    //@ check dead_second_c: \forall integer i; 0 <= i < DEAD_MORE ==> -DEAD_MOST <= drive.dead_second[i].c <= DEAD_MOST;
     //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
     //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
     //@ check late_alpha: \forall integer i; 0 <= i < LATE_WAITS ==> -voltage_max <= drive.run.late_v_q13[i].alpha <= voltage_max;

@@ -1,7 +1,7 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
  * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c firmware/drive/limits.c
- * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING LATE
+ * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING LATE EACH EACH_LATE
  * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
@@ -225,6 +225,7 @@ static void any_state(uint16_t state)
     any_drive(state);
     any_estimator(&drive.run.estimator);
     any_late();
+    any_dead_second();
     any_control(&drive.run.control);
     drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
     any_observer_state(&drive.run.observer);

@@ -486,16 +486,18 @@ void test_observer_is_preset_once_and_before_the_first_step_of_the_speed_control
     int16_t held_q13;
     handover_now(&drive, &params);
     drive.run.observer.omega_q16 = 12345;
-    for (uint16_t part = 1; part < SLOW_PARTS / SLOW_SELDOM; part++) {
+    for (uint16_t part = 1; part < 3u; part++) {
         rig_slow(part);
         TEST_ASSERT_EQUAL_INT32(12345, drive.run.observer.omega_q16);
     }
     held_q13 = drive.run.control.ref_q13.q;
-    rig_slow(0);
+    rig_slow(3);
     TEST_ASSERT_EQUAL_INT32(4800L * 65536, drive.run.observer.omega_q16);
-    TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current()); /* what the speed controller of this very part begins with */
-    rig_speed(3000); /* the estimator and the observer: from here on the observer only follows the angle, which stands */
+    TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current()); /* what the speed controller of the next part begins with */
     rig_slow(0);
+    TEST_ASSERT_EQUAL_INT32_MESSAGE(4800L * 65536, drive.run.observer.omega_q16, "the controller's part is not the observer's");
+    rig_speed(3000); /* the estimator and the observer: from here on the observer only follows the angle, which stands */
+    rig_slow(3);
     TEST_ASSERT_LESS_THAN_INT32(3000L * 65536, drive.run.observer.omega_q16);
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.run.observer.omega_q16);
 }
@@ -504,13 +506,13 @@ void test_observer_steps_by_the_estimators_angle_and_the_measured_q_current(void
 {
     observer_t expected;
     handover_now(&drive, &params);
-    rig_slow(0);
+    rig_slow(3);
     speed_schedule(&drive.run, &params);
     expected = drive.run.observer;
     drive.run.estimator.rho_q32 += 0x0B000000ul; /* 48 degrees: faster than the 42 of 4800 erpm in 8 periods */
     drive.run.control.i_q13.q = 700;
     observer_step(&expected, &params.observer, drive.run.estimator.rho_q32, 700);
-    rig_slow(0);
+    rig_slow(3);
     TEST_ASSERT_EQUAL_INT32(expected.omega_q16, drive.run.observer.omega_q16);
     TEST_ASSERT_EQUAL_INT32(expected.load_q16, drive.run.observer.load_q16);
     TEST_ASSERT_GREATER_THAN_INT16(4800, observer_speed(&drive.run.observer));
@@ -524,7 +526,7 @@ void test_stop_right_after_the_hand_over_goes_on_from_its_q_current_too(void)
         handover_now(&drive, &params);
         drive.state = (uint16_t)DRIVE_STOPPING; /* the very next period */
         held_q13 = drive.run.control.ref_q13.q;
-        rig_slow(0);
+        rig_slow(3);
         TEST_ASSERT_INT16_WITHIN(2, held_q13, held_current());
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
     }
@@ -557,20 +559,19 @@ void test_unrest_of_the_hand_over_lasts_until_its_d_current_is_gone(void)
 {
     at_the_end_of_the_ramp(1);
     hand_over(0x3000, 0, 0, 2000, 1);
-    rig_slow(0); /* the preset; from here on the rotor stands and the observer knows it */
-    drive.run.observer.omega_q16 = 0;
+    drive.run.observer.omega_q16 = 0; /* from here on the rotor stands and the observer knows it */
     drive.run.observer.load_q16 = 0;
     drive.run.control.i_q13.q = 0;
     drive.run.handover.offset = 1;
     for (uint16_t n = 0; n < 1000u; n++) {
-        rig_slow(0);
+        handover_observe(&drive.run, &params);
     }
     TEST_ASSERT_EQUAL_UINT16(OBSERVER_START_UNREST, drive.run.observer.unrest_steps);
     drive.run.observer.unrest_steps = OBSERVER_START_UNREST + 100;
-    rig_slow(0);
+    handover_observe(&drive.run, &params);
     TEST_ASSERT_EQUAL_UINT16_MESSAGE(OBSERVER_START_UNREST + 99, drive.run.observer.unrest_steps, "more of it fades");
     drive.run.handover.offset = 0;
-    rig_slow(0);
+    handover_observe(&drive.run, &params);
     TEST_ASSERT_EQUAL_UINT16(OBSERVER_START_UNREST + 98, drive.run.observer.unrest_steps);
 }
 
