@@ -132,6 +132,25 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
+/** What belongs to the speed: every other slow step rates and gain of its controller, in the first half; in those between its trim, in closed loop, and
+ *  the estimator's sign. */
+QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
+{
+    if (!late_first(call) || !drive_is_running(d)) {
+        return;
+    }
+    if ((part & 4u) != 0u) {
+        if (drive_is_closed(d)) {
+            speed_trim_step(d, p);
+        }
+        estimator_follow(&d->run.estimator, &p->estimator);
+    } else if (drive_is_closed(d)) {
+        speed_follow(&d->run, p);
+    } else {
+        /* no controller */
+    }
+}
+
 /** The state, then the bus and what braking may do to it. Every slow step, in two halves. */
 QM_INLINE void drive_bus_step(drive_t *d, const drive_params_t *p, int16_t raw_bus, uint16_t call)
 {
@@ -159,24 +178,7 @@ QM_INLINE void drive_limit_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
-/** What follows the speed: rates, gain and trim of its controller, then the estimator's sign. Every rare step, in two halves. */
-QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t call)
-{
-    const uint16_t closed = drive_is_closed(d);
-    if (late_first(call) && closed) {
-        speed_follow(&d->run, p);
-    }
-    if (late_second(call)) {
-        if (closed) {
-            speed_trim_step(d, p);
-        }
-        if (drive_is_running(d)) {
-            estimator_follow(&d->run.estimator, &p->estimator);
-        }
-    }
-}
-
-/** Does the rotor stand? Does it follow? Every seldom step in closed loop, in two halves. */
+/** Does the rotor stand? Does it follow? Does the run go on? Every seldom step in closed loop, in two halves. */
 QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (!drive_is_closed(d)) {
@@ -187,61 +189,27 @@ QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
     if (late_second(call)) {
         protection_check_rotor(d, p);
+        speed_choose_step(d, p);
     }
 }
 
-/** The motor's model. Does the run go on? Every seldom step, in two halves. */
+/** Do signals and motor fit each other? Then the motor's model. Every seldom step, in two halves. */
 QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (late_first(call)) {
         if (drive_is_closed(d)) {
+            protection_check_signals(d, p);
             model_update(d, p);
         } else {
             model_update_in_ramp(d, p);
         }
     }
     if (late_second(call)) {
-        speed_choose_step(d, p);
-    }
-}
-
-/** Do signals and motor fit each other? Every seldom step in closed loop, in two halves. */
-QM_INLINE void drive_signal_step(drive_t *d, const drive_params_t *p, uint16_t call)
-{
-    if (late_first(call) && drive_is_closed(d)) {
-        protection_check_signals(d, p);
-    }
-    if (late_second(call)) {
         protection_check_model(d, p);
     }
 }
 
-/** What the running motor teaches. Every seldom step, of two halves the second. */
-QM_INLINE void drive_learn_step(drive_t *d, const drive_params_t *p, uint16_t call)
-{
-    if (late_second(call)) {
-        model_learn_step(d, p);
-    }
-}
-
-/** First part of a slow step: the speed, and what belongs to it. @param part of the round @return which one it was */
-QM_INLINE uint16_t drive_speed_part(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
-{
-    drive_speed_step(d, p, call);
-    switch (part) {
-    case 4:
-        drive_model_step(d, p, call);
-        return 4;
-    case 12:
-        drive_learn_step(d, p, call);
-        return 12;
-    default: /* 0, 8 */
-        drive_rate_step(d, p, call);
-        return (uint16_t)(part & 8u);
-    }
-}
-
-/** Third part of a slow step: limits and protection. @param part of the round @return which one it was */
+/** Third part of a slow step: limits, protection, and what the running motor teaches. @param part of the round @return which one it was */
 QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
 {
     switch (part) {
@@ -249,10 +217,13 @@ QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_
         drive_rotor_step(d, p, call);
         return 6;
     case 14:
-        drive_signal_step(d, p, call);
+        drive_model_step(d, p, call);
         return 14;
     default: /* 2, 10 */
         drive_limit_step(d, p, call);
+        if ((part & 8u) != 0u && late_first(call)) {
+            model_learn_step(d, p);
+        }
         return (uint16_t)((part & 8u) | 2u);
     }
 }
@@ -277,7 +248,9 @@ QM_INLINE void drive_part(drive_t *d, const drive_params_t *p, const drive_sampl
 
     switch (part & 3u) {
     case 0:
-        done = drive_speed_part(d, p, part, call);
+        drive_speed_step(d, p, call);
+        drive_rate_step(d, p, part, call);
+        done = (uint16_t)(part & 12u);
         break;
     case 1:
         drive_bus_step(d, p, raw->v_bus, call);

@@ -69,12 +69,12 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
         slow = drive.ticks & 7u;
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 0u, drive.run.control.reference_erpm != 7000, "speed");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 8u, drive.run.fieldweak.index != 99u, "field weakening");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 28u, drive.run.fieldweak.index != 99u, "field weakening");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.duty_per_volt_q16 != 1u, "bus");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.circle.reciprocal != 1u, "circle");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.stall_steps != 99u, "protection");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 0u, drive.run.control.trim_reference_erpm != 1, "trim");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 8u, drive.run.control.trim_reference_erpm != 1, "trim");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 0u, drive.run.observer.wrong_erpm != 1, "rates");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
@@ -90,7 +90,7 @@ void test_field_weakening_is_indexed_by_the_reference_and_not_the_speed(void)
     EACH(n, cases) {
         rig_closed(1, cases[n].reference_erpm);
         rig_speed(cases[n].speed_erpm);
-        rig_next_part(4);
+        rig_next_part(14);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(cases[n].index, drive.run.fieldweak.index);
     }

@@ -89,7 +89,7 @@ void test_it_learns_every_32nd_period_of_the_closed_loop_only(void)
             teachable(1);
             drive.state = (uint16_t)states[n];
             rig_slow(part);
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(part == 12u && n < 2u, drive.run.adaptation.kfi_q31 != 0, golden_row(n));
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(part == 10u && n < 2u, drive.run.adaptation.kfi_q31 != 0, golden_row(n));
         }
     }
 }
@@ -100,7 +100,7 @@ void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void
         teachable(1);
         drive.state = (uint16_t)DRIVE_RAMP;
         drive.periods = waited;
-        rig_slow(12);
+        rig_slow(10);
         TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
     }
@@ -113,7 +113,7 @@ void test_in_the_ramp_the_model_is_that_of_the_end_speed_with_what_was_learnt(vo
     drive.state = (uint16_t)DRIVE_RAMP;
     drive.run.adaptation.kfi_q31 = 3277l * 65536; /* a tenth */
     drive.run.model.kfilter_esdq_q16 = 0;
-    rig_slow(4);
+    rig_slow(14);
     TEST_ASSERT_EQUAL_INT16(2 * KFILTER_ESDQ, drive.run.model.kfilter_esdq_q16);
     TEST_ASSERT_INT16_WITHIN(2, (int16_t)(1.1F * (float)params.fieldweak.inv_kfi[0]), drive.run.model.inv_kfi);
 }
@@ -147,7 +147,7 @@ void test_what_was_learnt_comes_into_the_model_with_the_tables_and_a_start_forge
     uint16_t rs_q16 = drive.run.model.rs_q16;
     drive.run.adaptation.kfi_q31 = -0x10000000l; /* 1/8 less */
     drive.run.adaptation.rs_q31 = 0x20000000l;   /* 1/4 more */
-    rig_slow(4);
+    rig_slow(14);
     TEST_ASSERT_INT16_WITHIN(2, (int16_t)(inv_kfi - inv_kfi / 8), drive.run.model.inv_kfi);
     TEST_ASSERT_UINT16_WITHIN(2, rs_q16 + rs_q16 / 4, drive.run.model.rs_q16);
     TEST_ASSERT_INT16_WITHIN(1, (int16_t)(INT32_C(32767) * 2048 / drive.run.model.inv_kfi), drive.run.model.emf_sum_max_q12);
