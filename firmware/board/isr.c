@@ -118,7 +118,7 @@ void BOARD_ISR _T2Interrupt(void)
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);
     }
-    recorder_tick(&board_recorder, &board_drive, raw.v_bus);
+    recorder_tick(&board_recorder, &board_drive, &raw);
     mode_record();
 #if SCOPE
     scope_tick(&board_lnet.scope, board_scope_array);

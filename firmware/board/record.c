@@ -36,16 +36,18 @@ static char *put_head(char *line, uint16_t rows)
 {
     char *at = text_put_unsigned(text_put(line, "record fault "), board_recorder.fault);
     at = text_put_unsigned(text_put(at, " rows "), rows);
-    return text_put_unsigned(text_put(at, " every "), RECORDER_EVERY);
+    at = text_put_unsigned(text_put(at, " every "), RECORDER_EVERY);
+    at = text_put_signed(text_put(at, " offsets "), board_recorder.offset_a_q13);
+    return text_put_signed(text_put(at, " "), board_recorder.offset_b_q13);
 }
 
 static char *put_row(char *line, uint16_t place)
 {
-    const int16_t *word = &board_recorder.word[place * (uint16_t)RECORDER_WORDS];
+    const int8_t *byte = &board_recorder.byte[place * (uint16_t)RECORDER_BYTES];
     char *at = text_put_unsigned(text_put(line, "row "), place);
     uint16_t n;
-    for (n = 0; n < (uint16_t)RECORDER_WORDS; n++) {
-        at = text_put_signed(text_put(at, " "), word[n]);
+    for (n = 0; n < (uint16_t)RECORDER_BYTES; n++) {
+        at = text_put_signed(text_put(at, " "), byte[n]);
     }
     return at;
 }

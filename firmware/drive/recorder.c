@@ -12,7 +12,10 @@ static void recorder_begin(recorder_t *r)
     r->check = RECORDER_CHECK;
     r->next = RECORDER_FIRST;
     r->full = 0;
-    r->fault = (uint16_t)FAULT_NONE;
+    r->fault = (uint8_t)FAULT_NONE;
+    r->slow = 0;
+    r->offset_a_q13 = 0;
+    r->offset_b_q13 = 0;
     r->left = RECORDER_AFTER + 1u; /* last: from now on the control interrupt writes */
 }
 
@@ -20,7 +23,7 @@ static void recorder_begin(recorder_t *r)
 static uint16_t recorder_is_valid(const recorder_t *r)
 {
     return (uint16_t)(r->check == RECORDER_CHECK && r->left <= RECORDER_AFTER + 1u && r->full <= 1u && r->fault < (uint16_t)FAULT_COUNT
-                      && r->next >= 0 && r->next <= RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_WORDS == 0u);
+                      && r->next >= 0 && r->next <= RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_BYTES == 0u);
 }
 
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
@@ -28,8 +31,8 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
     uint16_t first;
     if (powered_up) { /* the test of the RAM reads it all */
         uint16_t n;
-        for (n = 0; n < sizeof r->word / sizeof r->word[0]; n++) {
-            r->word[n] = 0;
+        for (n = 0; n < sizeof r->byte; n++) {
+            r->byte[n] = 0;
         }
     }
     if (powered_up || !recorder_is_valid(r)) {
@@ -41,20 +44,22 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
         recorder_begin(r);
         return;
     }
-    r->fault = first;
+    r->fault = (uint8_t)first;
     r->left = 0;
 }
 
 void recorder_background(recorder_t *r, const drive_t *d)
 {
-    if (r->left == 0u) {
-        if (d->command.run) {
-            recorder_begin(r);
-        }
-    } else if (r->left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
+    if (r->left == 0u && d->command.run) {
+        recorder_begin(r);
+    }
+    if (r->left > RECORDER_AFTER) {
+        r->offset_a_q13 = d->calibration.offset_a_q13;
+        r->offset_b_q13 = d->calibration.offset_b_q13;
+    } else if (d->fault == (uint16_t)FAULT_NONE) {
         r->left = 0; /* cleared before the last row: what comes now is no part of it */
     } else {
-        /* it records */
+        /* the rows after a fault */
     }
 }
 
@@ -63,11 +68,11 @@ uint16_t recorder_rows(const recorder_t *r)
     if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
         return 0;
     }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_FIRST - r->next) / RECORDER_WORDS);
+    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_FIRST - r->next) / RECORDER_BYTES);
 }
 
 uint16_t recorder_place(const recorder_t *r, uint16_t n)
 {
-    int16_t place = (int16_t)((r->full ? r->next : RECORDER_FIRST) / RECORDER_WORDS - (int16_t)n);
+    int16_t place = (int16_t)((r->full ? r->next : RECORDER_FIRST) / RECORDER_BYTES - (int16_t)n);
     return (uint16_t)((place >= 0) ? place : place + (int16_t)RECORDER_ROWS);
 }

@@ -6,41 +6,53 @@
 #include "drive/modes/recorder_room.h"
 #include "drive/param_scaling.h"
 
-#define RECORDER_ROWS 72  /* 12 bytes each: 864 of the part's 2048; the stack needs 494 */
+#define RECORDER_ROWS 64  /* six bytes each: 384 of the part's 2048 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */
 
-/** The words of a row. The bus and the speed take turns in the last one: both change slowly. */
+/** The bytes of a row. All but the last are the upper byte of a word, which is never out of range. */
 enum {
-    RECORDER_I_A, /**< measured, Q13 */
+    RECORDER_I_A, /**< as the converter gives it: the head line tells the offsets */
     RECORDER_I_B,
-    RECORDER_V_D, /**< commanded, Q14 */
+    RECORDER_V_D, /**< commanded, Q14 / 256 */
     RECORDER_V_Q,
-    RECORDER_ANGLE, /**< control angle of the next sample; its lowest four bits are the state */
-    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed, electrical rpm */
-    RECORDER_WORDS  /**< of a row: 12 bytes */
+    RECORDER_ANGLE, /**< control angle of the next sample, 256 a turn */
+    RECORDER_SLOW,  /**< state in the lower four bits; above them half a byte of what changes slowly */
+    RECORDER_BYTES  /**< of a row */
 };
 #define RECORDER_STATE_BITS 15u
 
+/** What changes slowly is one byte in two rows of the ring, of the moment of the first, an odd one, which has its upper half: the speed in rows 1 and 0,
+ *  5 and 4, ...; the bus as the converter gives it in rows 3 and 2, 7 and 6, ... So the halves belong together. */
+#define RECORDER_SPEED_TOP (1.25F * SPEED_COUNTS(PARAM_TOP_ERPM)) /* where it is LOST_LOCK */
+#define RECORDER_SPEED_SHIFT ((RECORDER_SPEED_TOP > 16256.0F)  ? 8 \
+                              : (RECORDER_SPEED_TOP > 8128.0F) ? 7 \
+                              : (RECORDER_SPEED_TOP > 4064.0F) ? 6 \
+                              : (RECORDER_SPEED_TOP > 2032.0F) ? 5 \
+                                                               : 4)
+
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)
-#define RECORDER_FIRST ((int16_t)(RECORDER_EVERY != 0u ? (RECORDER_ROWS - 1) * RECORDER_WORDS : 0)) /**< index of the first row that is written */
-#define RECORDER_SIZE (RECORDER_FIRST + RECORDER_WORDS)
+#define RECORDER_FIRST ((int16_t)(RECORDER_EVERY != 0u ? (RECORDER_ROWS - 1) * RECORDER_BYTES : 0)) /**< index of the first row that is written */
+#define RECORDER_SIZE (RECORDER_FIRST + RECORDER_BYTES)
 
 /** It outlives a reset: nothing but recorder_restart() gives it a start value. */
 typedef struct {
-    int16_t word[RECORDER_SIZE]; /**< rows, the newest before the older ones */
-    int16_t next;                /**< index of the next row's first word */
-    volatile uint16_t left;      /**< RECORDER_AFTER + 1 before a fault, then one less with each row; 0: complete, nothing more is recorded */
-    uint16_t full;               /**< 1: every row has been written */
-    uint16_t fault;              /**< drive_fault_t, the first since the recorder began */
-    uint16_t check;              /**< tells a recorder from what RAM holds after power-up */
+    int8_t byte[RECORDER_SIZE]; /**< rows, the newest before the older ones */
+    int16_t next;               /**< index of the next row's first byte */
+    int16_t offset_a_q13;       /**< of the currents, calibrated: after a reset nobody else knows it */
+    int16_t offset_b_q13;
+    uint16_t check;        /**< tells a recorder from what RAM holds after power-up */
+    volatile uint8_t left; /**< RECORDER_AFTER + 1 before a fault, then one less with each row; 0: complete, nothing more is recorded */
+    uint8_t full;          /**< 1: every row has been written */
+    uint8_t fault;         /**< drive_fault_t, the first since the recorder began */
+    uint8_t slow;          /**< the byte that two rows share */
 } recorder_t;
 
 /** After a reset. A record of a fault, or of what came before a reset that is a fault itself, is kept; else the recorder begins anew.
  *  @param powered_up RAM holds anything @param fault that the drive starts with */
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault);
 
-/** A pass of the background: a start begins a new record. */
+/** A pass of the background: a start begins a new record, which has the offsets of its run. */
 void recorder_background(recorder_t *r, const drive_t *d);
 
 /** Rows of a complete record; 0 before a fault. */
@@ -62,30 +74,47 @@ QM_INLINE void recorder_in_fault(recorder_t *r, const drive_t *d)
         r->left--;
     }
     if (r->fault == (uint16_t)FAULT_NONE) {
-        r->fault = d->fault;
+        r->fault = (uint8_t)d->fault;
     }
 }
 
-/** The last work of a period. @param v_bus_raw the converter's result for the bus */
-QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t v_bus_raw)
+/** The upper byte of a word. */
+QM_INLINE int8_t recorder_upper(int16_t word)
 {
-    int16_t *row;
-    int16_t at = r->next, slow = v_bus_raw;
+    return (int8_t)(word >> 8);
+}
+
+/** What two rows share from this one on. @param at index of the row, an odd one: six bytes a row */
+QM_INLINE uint8_t recorder_slow(const drive_t *d, const drive_samples_t *raw, int16_t at)
+{
+    if (((uint16_t)at & 4u) == 0u) {
+        return (uint8_t)recorder_upper(raw->v_bus);
+    }
+    return (uint8_t)qm_clamp((int16_t)(estimator_speed(&d->run.estimator) >> RECORDER_SPEED_SHIFT), -128, 127);
+}
+
+/** The last work of a period. @param raw the converter's results of it */
+QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, const drive_samples_t *raw)
+{
+    int8_t *row;
+    int16_t at = r->next;
 
     if (r->left == 0u || !recorder_is_due(d)) {
         return;
     }
-    row = &r->word[at];
-    if (((uint16_t)at & 2u) != 0u) { /* six words a row: set in every other one */
-        slow = estimator_speed(&d->run.estimator);
+    row = &r->byte[at];
+    if (((uint16_t)at & 2u) != 0u) {
+        r->slow = recorder_slow(d, raw, at);
+        row[RECORDER_SLOW] = (int8_t)((r->slow & (uint8_t)~RECORDER_STATE_BITS) | d->state);
+    } else {
+        row[RECORDER_SLOW] = (int8_t)((uint16_t)((uint16_t)r->slow << 4) | d->state);
     }
-    row[RECORDER_I_A] = d->phases_q13.a;
-    row[RECORDER_I_B] = d->phases_q13.b;
-    row[RECORDER_V_D] = d->run.control.v_q14.d;
-    row[RECORDER_V_Q] = d->run.control.v_q14.q;
-    row[RECORDER_ANGLE] = (int16_t)((d->angle & (uint16_t)~RECORDER_STATE_BITS) | d->state);
-    row[RECORDER_SLOW] = slow;
-    at = (int16_t)(at - (int16_t)RECORDER_WORDS);
+    row[RECORDER_I_A] = recorder_upper(raw->i_a);
+    row[RECORDER_I_B] = recorder_upper(raw->i_b);
+    row[RECORDER_V_D] = recorder_upper(d->run.control.v_q14.d);
+    row[RECORDER_V_Q] = recorder_upper(d->run.control.v_q14.q);
+    row[RECORDER_ANGLE] = recorder_upper((int16_t)d->angle);
+    at = (int16_t)(at - (int16_t)RECORDER_BYTES);
     if (at < 0) {
         at = RECORDER_FIRST;
         r->full = 1;
