@@ -5,7 +5,7 @@
 #pragma message(MODE_WITHOUT_RECORDER " takes the RAM of the fault recorder: this build has no recorder, whatever RECORDER_PERIODS says")
 #endif
 
-#define RECORDER_CHECK 0x5EC0u
+#define RECORDER_CHECK 0x5Eu
 
 static void recorder_begin(recorder_t *r)
 {

@@ -9,26 +9,20 @@
 #define RECORDER_ROWS 64  /* six bytes each: 384 of the part's 2048 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */
 
-/** The bytes of a row. All but the last are the upper byte of a word, which is never out of range. */
+/** The bytes of a row. All but the last are the upper byte of a word, which is never out of range.
+ *
+ *  What changes slowly is a word in four rows, its upper bits first, all of them of the first row's moment: the estimated speed in places 7..4 of the
+ *  ring, 15..12, ...; the bus as the converter gives it in places 3..0, 11..8, ... */
 enum {
     RECORDER_I_A, /**< as the converter gives it: the head line tells the offsets */
     RECORDER_I_B,
     RECORDER_V_D, /**< commanded, Q14 / 256 */
     RECORDER_V_Q,
     RECORDER_ANGLE, /**< control angle of the next sample, 256 a turn */
-    RECORDER_SLOW,  /**< state in the lower four bits; above them half a byte of what changes slowly */
+    RECORDER_SLOW,  /**< four bits of what changes slowly; the lower four are the state */
     RECORDER_BYTES  /**< of a row */
 };
 #define RECORDER_STATE_BITS 15u
-
-/** What changes slowly is one byte in two rows of the ring, of the moment of the first, an odd one, which has its upper half: the speed in rows 1 and 0,
- *  5 and 4, ...; the bus as the converter gives it in rows 3 and 2, 7 and 6, ... So the halves belong together. */
-#define RECORDER_SPEED_TOP (1.25F * SPEED_COUNTS(PARAM_TOP_ERPM)) /* where it is LOST_LOCK */
-#define RECORDER_SPEED_SHIFT ((RECORDER_SPEED_TOP > 16256.0F)  ? 8 \
-                              : (RECORDER_SPEED_TOP > 8128.0F) ? 7 \
-                              : (RECORDER_SPEED_TOP > 4064.0F) ? 6 \
-                              : (RECORDER_SPEED_TOP > 2032.0F) ? 5 \
-                                                               : 4)
 
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)
@@ -41,11 +35,11 @@ typedef struct {
     int16_t next;               /**< index of the next row's first byte */
     int16_t offset_a_q13;       /**< of the currents, calibrated: after a reset nobody else knows it */
     int16_t offset_b_q13;
-    uint16_t check;        /**< tells a recorder from what RAM holds after power-up */
+    uint16_t slow;         /**< what changes slowly: its upper four bits are the next row's */
     volatile uint8_t left; /**< RECORDER_AFTER + 1 before a fault, then one less with each row; 0: complete, nothing more is recorded */
     uint8_t full;          /**< 1: every row has been written */
     uint8_t fault;         /**< drive_fault_t, the first since the recorder began */
-    uint8_t slow;          /**< the byte that two rows share */
+    uint8_t check;         /**< tells a recorder from what RAM holds after power-up */
 } recorder_t;
 
 /** After a reset. A record of a fault, or of what came before a reset that is a fault itself, is kept; else the recorder begins anew.
@@ -84,36 +78,27 @@ QM_INLINE int8_t recorder_upper(int16_t word)
     return (int8_t)(word >> 8);
 }
 
-/** What two rows share from this one on. @param at index of the row, an odd one: six bytes a row */
-QM_INLINE uint8_t recorder_slow(const drive_t *d, const drive_samples_t *raw, int16_t at)
-{
-    if (((uint16_t)at & 4u) == 0u) {
-        return (uint8_t)recorder_upper(raw->v_bus);
-    }
-    return (uint8_t)qm_clamp((int16_t)(estimator_speed(&d->run.estimator) >> RECORDER_SPEED_SHIFT), -128, 127);
-}
-
 /** The last work of a period. @param raw the converter's results of it */
 QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, const drive_samples_t *raw)
 {
     int8_t *row;
     int16_t at = r->next;
+    uint16_t slow = r->slow;
 
     if (r->left == 0u || !recorder_is_due(d)) {
         return;
     }
-    row = &r->byte[at];
-    if (((uint16_t)at & 2u) != 0u) {
-        r->slow = recorder_slow(d, raw, at);
-        row[RECORDER_SLOW] = (int8_t)((r->slow & (uint8_t)~RECORDER_STATE_BITS) | d->state);
-    } else {
-        row[RECORDER_SLOW] = (int8_t)((uint16_t)((uint16_t)r->slow << 4) | d->state);
+    if (((uint16_t)at & 6u) == 2u) { /* six bytes a row: places 3, 7, 11, ... */
+        slow = (uint16_t)((((uint16_t)at & 8u) != 0u) ? estimator_speed(&d->run.estimator) : raw->v_bus);
     }
+    row = &r->byte[at];
     row[RECORDER_I_A] = recorder_upper(raw->i_a);
     row[RECORDER_I_B] = recorder_upper(raw->i_b);
     row[RECORDER_V_D] = recorder_upper(d->run.control.v_q14.d);
     row[RECORDER_V_Q] = recorder_upper(d->run.control.v_q14.q);
     row[RECORDER_ANGLE] = recorder_upper((int16_t)d->angle);
+    row[RECORDER_SLOW] = (int8_t)((recorder_upper((int16_t)slow) & ~(int16_t)RECORDER_STATE_BITS) | (int16_t)d->state);
+    r->slow = (uint16_t)(slow << 4);
     at = (int16_t)(at - (int16_t)RECORDER_BYTES);
     if (at < 0) {
         at = RECORDER_FIRST;

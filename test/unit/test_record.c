@@ -34,7 +34,7 @@ static void rows(uint16_t count, int16_t first)
         board_drive.run.control.v_q14.d = (int16_t)(upper + 0x0100);
         board_drive.run.control.v_q14.q = (int16_t)(-upper - 1);
         board_drive.angle = (uint16_t)(uint32_t)(16 * upper);
-        board_drive.run.estimator.omega_filtered_q16 = (0x3400 + upper) * 65536;
+        board_drive.run.estimator.omega_filtered_q16 = (0x3456 + upper) * 65536;
         if (board_drive.fault != (uint16_t)FAULT_NONE) {
             recorder_in_fault(&board_recorder, &board_drive);
         }
@@ -75,11 +75,11 @@ void test_lines_tell_head_and_rows_from_the_oldest_on(void)
     record(4);
     record_tick();
     expect_line("record fault 6 rows 20 every 2 offsets -40 3\r\n");
-    expect_line("row 63 0 0 1 -1 0 21\r\n");    /* 0x15: CLOSED, and the bus 0x12 begins */
-    expect_line("row 62 1 -1 2 -2 16 37\r\n");  /* 0x25 */
-    expect_line("row 61 2 -2 3 -3 32 53\r\n");  /* 0x35: the speed 0x36 begins */
-    expect_line("row 60 3 -3 4 -4 48 101\r\n"); /* 0x65 */
-    expect_line("row 59 -20 20 -19 19 -64 -9\r\n"); /* 0xF7: FAULT, and the bus 0xFE */
+    expect_line("row 63 0 0 1 -1 0 53\r\n"); /* 0x35: the speed, 0x3456, and CLOSED */
+    expect_line("row 62 1 -1 2 -2 16 69\r\n");
+    expect_line("row 61 2 -2 3 -3 32 85\r\n");
+    expect_line("row 60 3 -3 4 -4 48 101\r\n");
+    expect_line("row 59 -20 20 -19 19 -64 -9\r\n"); /* 0xF7: the bus, 0xFE00, and FAULT */
     TEST_ASSERT_EQUAL_UINT16(15, lines());
     expect_line("");
 }

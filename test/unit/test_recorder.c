@@ -115,12 +115,12 @@ static uint16_t end_of(uint16_t before)
     return (uint16_t)((before | 1u) + 2u * RECORDER_AFTER - 1u);
 }
 
-/** Half a byte of what changes slowly: in an odd place the upper one of this tick, in an even one the lower one of two ticks before. */
-static int slow_half(uint16_t place, uint16_t tick)
+/** Four bits of what changes slowly, of the tick of the first of four rows. */
+static unsigned slow_bits(uint16_t place, uint16_t tick)
 {
-    uint16_t of = (uint16_t)((place % 2u) ? tick : tick - 2u);
-    int byte = (place % 4u >= 2u) ? upper(v_bus(of)) : upper(speed(of)); /* RECORDER_SPEED_SHIFT is 8 */
-    return (place % 2u) ? (byte & 0xFF) >> 4 : byte & 15;
+    uint16_t row = (uint16_t)(3u - place % 4u), of = (uint16_t)(tick - 2u * row);
+    int16_t word = (place % 8u >= 4u) ? speed(of) : v_bus(of);
+    return ((unsigned)word >> (12u - 4u * row)) & 15u;
 }
 
 /** The record is complete, and its rows are those of every second tick before `end`. */
@@ -138,7 +138,7 @@ static void expect_rows(uint16_t rows, uint16_t end)
         TEST_ASSERT_EQUAL_INT8(upper(v_q(tick)), byte[RECORDER_V_Q]);
         TEST_ASSERT_EQUAL_HEX8(angle(tick) >> 8, byte[RECORDER_ANGLE]);
         TEST_ASSERT_EQUAL_HEX8(state_of[tick], (unsigned)byte[RECORDER_SLOW] & RECORDER_STATE_BITS);
-        TEST_ASSERT_EQUAL_HEX8(slow_half(place, tick), ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
+        TEST_ASSERT_EQUAL_HEX8(slow_bits(place, tick), ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
     }
 }
 
@@ -246,26 +246,6 @@ void test_record_keeps_the_offsets_of_its_run(void)
     drive.command.run = 1;
     pass(9, -10); /* at once: the fault may come before the next pass */
     expect_offsets(9, -10);
-}
-
-void test_speed_beyond_a_byte_is_the_most_that_it_has(void)
-{
-    static const struct {
-        int16_t speed;
-        uint16_t upper, lower;
-    } cases[] = { { INT16_MAX, 7, 15 }, { INT16_MIN, 8, 0 }, { 256, 0, 1 }, { 255, 0, 0 }, { -1, 15, 15 } };
-    EACH(n, cases) {
-        recorder.next = 5 * RECORDER_BYTES; /* an odd one, with the speed */
-        recorder.byte[4 * RECORDER_BYTES + RECORDER_SLOW] = 0;
-        rig_speed(cases[n].speed);
-        for (uint16_t row = 0; row < 2u; row++) {
-            drive.ticks = (uint16_t)((drive.ticks | 1u) + 1u);
-            recorder_tick(&recorder, &drive, &samples);
-            rig_speed(1234); /* the second half is the first one's */
-        }
-        TEST_ASSERT_EQUAL_HEX8(cases[n].upper << 4 | drive.state, recorder.byte[5 * RECORDER_BYTES + RECORDER_SLOW]);
-        TEST_ASSERT_EQUAL_HEX8(cases[n].lower << 4 | drive.state, recorder.byte[4 * RECORDER_BYTES + RECORDER_SLOW]);
-    }
 }
 
 void test_of_two_faults_at_once_the_first_is_told(void)

@@ -34,12 +34,13 @@ class Record:
     def states(self) -> list[int]:
         return [row[5] & STATE_BITS for row in self.rows]
 
-    def slow_bytes(self, of: int) -> np.ndarray:
-        """The byte, -128 .. 127, that begins in the rows of the ring `of`, `of` + 4, ...: the upper half there, the lower one in the next row. Else nan."""
+    def slow_words(self, of: int) -> np.ndarray:
+        """The word, as a signed number, that four rows have, the first of them in place `of`, `of` + 8, ... of the ring; nan in the others."""
         found = np.full(len(self.rows), np.nan)
-        for number, (place, upper, lower) in enumerate(zip(self.places, self.rows, self.rows[1:])):
-            if place % 4 == of:
-                found[number] = (upper[5] & ~STATE_BITS) + ((lower[5] & 0xFF) >> 4)
+        for number, place in enumerate(self.places[:-3]):
+            if place % 8 == of:
+                upper, *lower = (row[5] >> 4 for row in self.rows[number:number + 4])
+                found[number] = upper * 4096 + sum((bits & 15) << shift for bits, shift in zip(lower, (8, 4, 0)))
         return found
 
     def fault_row(self, fault_state: int) -> int:
@@ -119,7 +120,7 @@ def _row(line: str, where: str) -> tuple[int, tuple[int, ...]]:
 
 @dataclass(frozen=True)
 class Rows:
-    """A record in engineering units; bus and speed are numbers in every fourth row."""
+    """A record in engineering units; bus and speed are numbers in every eighth row."""
 
     time_ms: np.ndarray
     """from the fault on"""
@@ -146,8 +147,8 @@ def scaled(record: Record, params: Mapping[str, float], states: Mapping[int, str
                 for column, gain, offset in zip((0, 1), ("KCURRA", "KCURRB"), record.offsets_q13)]
     return Rows(1e3 * time, *currents, *(middles[:, column] * param(params, "COUNT_VOLTAGE_V") for column in (2, 3)),
                 middles[:, 4] % 65536.0 * 360.0 / 65536.0,
-                (record.slow_bytes(3) + 128.5) / 256.0 * param(params, "BUS_FULL_SCALE_V"),
-                (record.slow_bytes(1) + 0.5) * param(params, "RECORDER_SPEED_RPM"),
+                (record.slow_words(3) + 32768.0) / 65536.0 * param(params, "BUS_FULL_SCALE_V"),
+                record.slow_words(7) * param(params, "COUNT_SPEED_RPM"),
                 [states.get(number, f"state {number}") for number in record.states])
 
 

@@ -6,7 +6,6 @@
 #include "drive/limits.h"
 #include "drive/param_table.h"
 #include "drive/param_scaling.h"
-#include "drive/recorder.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -95,8 +94,7 @@ const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[
 #define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },
 /* Behind the parameters the scales of what the fault recorder sends. */
 const probe_param_t probe_params[] = {
-    PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }, { "COUNT_SPEED_RPM", SPEED_RPM(1), "rpm" },
-    { "RECORDER_SPEED_RPM", SPEED_RPM(1 << RECORDER_SPEED_SHIFT), "rpm" }
+    PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }, { "COUNT_SPEED_RPM", SPEED_RPM(1), "rpm" }
 };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 
