@@ -43,7 +43,7 @@ static char *put_head(char *line, uint16_t rows)
 
 static char *put_row(char *line, uint16_t place)
 {
-    const int8_t *byte = &board_recorder.byte[place * (uint16_t)RECORDER_BYTES];
+    const int8_t *byte = board_recorder.row[place].byte;
     char *at = text_put_unsigned(text_put(line, "row "), place);
     uint16_t n;
     for (n = 0; n < (uint16_t)RECORDER_BYTES; n++) {

@@ -31,8 +31,10 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
     uint16_t first;
     if (powered_up) { /* the test of the RAM reads it all */
         uint16_t n;
-        for (n = 0; n < sizeof r->byte; n++) {
-            r->byte[n] = 0;
+        for (n = 0; n < sizeof r->row / sizeof r->row[0]; n++) {
+            r->row[n].word[0] = 0;
+            r->row[n].word[1] = 0;
+            r->row[n].word[2] = 0;
         }
     }
     if (powered_up || !recorder_is_valid(r)) {

@@ -9,33 +9,39 @@
 #define RECORDER_ROWS 64  /* six bytes each: 384 of the part's 2048 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */
 
-/** The bytes of a row. All but the last are the upper byte of a word, which is never out of range.
+/** The bytes of a row. All but the state's are the upper byte of a word, which is never out of range.
  *
- *  What changes slowly is a word in four rows, its upper bits first, all of them of the first row's moment: the estimated speed in places 7..4 of the
- *  ring, 15..12, ...; the bus as the converter gives it in places 3..0, 11..8, ... */
+ *  What changes slowly is a word in four rows, its lowest bits first, all of them of the first row's moment: the estimated speed from the places 4, 12, ...
+ *  of the ring on, the bus as the converter gives it from 0, 8, ... on. */
 enum {
     RECORDER_I_A, /**< as the converter gives it: the head line tells the offsets */
-    RECORDER_I_B,
     RECORDER_V_D, /**< commanded, Q14 / 256 */
+    RECORDER_I_B,
     RECORDER_V_Q,
-    RECORDER_ANGLE, /**< control angle of the next sample, 256 a turn */
     RECORDER_SLOW,  /**< four bits of what changes slowly; the lower four are the state */
+    RECORDER_ANGLE, /**< control angle of the next sample, 256 a turn */
     RECORDER_BYTES  /**< of a row */
 };
 #define RECORDER_STATE_BITS 15u
 
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)
-#define RECORDER_FIRST ((int16_t)(RECORDER_EVERY != 0u ? (RECORDER_ROWS - 1) * RECORDER_BYTES : 0)) /**< index of the first row that is written */
-#define RECORDER_SIZE (RECORDER_FIRST + RECORDER_BYTES)
+#define RECORDER_FIRST ((int16_t)(RECORDER_EVERY != 0u ? (RECORDER_ROWS - 1) * RECORDER_BYTES : 0)) /**< bytes before the first row that is written */
+#define RECORDER_PLACES (RECORDER_EVERY != 0u ? RECORDER_ROWS : 1)
+
+/** A word's lower byte makes place for the byte before it: cheaper than to take the words apart. */
+typedef union {
+    int16_t word[RECORDER_BYTES / 2];
+    int8_t byte[RECORDER_BYTES];
+} recorder_row_t;
 
 /** It outlives a reset: nothing but recorder_restart() gives it a start value. */
 typedef struct {
-    int8_t byte[RECORDER_SIZE]; /**< rows, the newest before the older ones */
-    int16_t next;               /**< index of the next row's first byte */
-    int16_t offset_a_q13;       /**< of the currents, calibrated: after a reset nobody else knows it */
+    recorder_row_t row[RECORDER_PLACES]; /**< the newest before the older ones */
+    int16_t next;                        /**< bytes before the next row */
+    int16_t offset_a_q13;                /**< of the currents, calibrated: after a reset nobody else knows it */
     int16_t offset_b_q13;
-    uint16_t slow;         /**< what changes slowly: its upper four bits are the next row's */
+    uint16_t slow;         /**< what changes slowly: its lowest four bits are the next row's */
     volatile uint8_t left; /**< RECORDER_AFTER + 1 before a fault, then one less with each row; 0: complete, nothing more is recorded */
     uint8_t full;          /**< 1: every row has been written */
     uint8_t fault;         /**< drive_fault_t, the first since the recorder began */
@@ -81,24 +87,24 @@ QM_INLINE int8_t recorder_upper(int16_t word)
 /** The last work of a period. @param raw the converter's results of it */
 QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, const drive_samples_t *raw)
 {
-    int8_t *row;
+    recorder_row_t *row;
     int16_t at = r->next;
     uint16_t slow = r->slow;
 
     if (r->left == 0u || !recorder_is_due(d)) {
         return;
     }
-    if (((uint16_t)at & 6u) == 2u) { /* six bytes a row: places 3, 7, 11, ... */
+    if (((uint16_t)at & 6u) == 0u) { /* six bytes a row: every fourth place */
         slow = (uint16_t)((((uint16_t)at & 8u) != 0u) ? estimator_speed(&d->run.estimator) : raw->v_bus);
     }
-    row = &r->byte[at];
-    row[RECORDER_I_A] = recorder_upper(raw->i_a);
-    row[RECORDER_I_B] = recorder_upper(raw->i_b);
-    row[RECORDER_V_D] = recorder_upper(d->run.control.v_q14.d);
-    row[RECORDER_V_Q] = recorder_upper(d->run.control.v_q14.q);
-    row[RECORDER_ANGLE] = recorder_upper((int16_t)d->angle);
-    row[RECORDER_SLOW] = (int8_t)((recorder_upper((int16_t)slow) & ~(int16_t)RECORDER_STATE_BITS) | (int16_t)d->state);
-    r->slow = (uint16_t)(slow << 4);
+    row = (recorder_row_t *)(void *)((int8_t *)r->row + at);
+    row->word[RECORDER_V_D / 2] = d->run.control.v_q14.d;
+    row->word[RECORDER_V_Q / 2] = d->run.control.v_q14.q;
+    row->word[RECORDER_ANGLE / 2] = (int16_t)d->angle;
+    row->byte[RECORDER_I_A] = recorder_upper(raw->i_a);
+    row->byte[RECORDER_I_B] = recorder_upper(raw->i_b);
+    row->byte[RECORDER_SLOW] = (int8_t)((uint16_t)(slow << 4) | d->state);
+    r->slow = (uint16_t)(slow >> 4);
     at = (int16_t)(at - (int16_t)RECORDER_BYTES);
     if (at < 0) {
         at = RECORDER_FIRST;

@@ -48,9 +48,10 @@ static unsigned upper(size_t row, int column, double per_count)
 /** Four bits of what changes slowly, of the first of four rows. */
 static unsigned slow_bits(uint16_t place, size_t row)
 {
-    size_t of = row - RECORDER_EVERY * (3u - place % 4u);
-    unsigned word = (unsigned)((place % 8u >= 4u) ? counts(of, SPEED, 1.0 / NOPOLESPAIRS) : counts(of, BUS, 1.0));
-    return (word >> (4u * (place % 4u))) & 15u;
+    unsigned after = (0u - place) % 4u;
+    size_t of = row - RECORDER_EVERY * after;
+    unsigned word = (unsigned)(((place + after) % 8u == 4u) ? counts(of, SPEED, 1.0 / NOPOLESPAIRS) : counts(of, BUS, 1.0));
+    return (word >> (4u * after)) & 15u;
 }
 
 static void expect_trace(void)
@@ -60,7 +61,7 @@ static void expect_trace(void)
     for (uint16_t n = 0; n < RECORDER_ROWS; n++) {
         uint16_t place = recorder_place(&board_recorder, n);
         size_t row = fault_row - RECORDER_EVERY * (RECORDER_ROWS - RECORDER_AFTER) + (size_t)RECORDER_EVERY * n;
-        const int8_t *byte = &board_recorder.byte[place * RECORDER_BYTES];
+        const int8_t *byte = board_recorder.row[place].byte;
         TEST_ASSERT_EQUAL_HEX8(upper(row, RAW_A, 1.0), byte[RECORDER_I_A]);
         TEST_ASSERT_EQUAL_HEX8(upper(row, RAW_B, 1.0), byte[RECORDER_I_B]);
         TEST_ASSERT_EQUAL_HEX8(upper(row, V_D, volts), byte[RECORDER_V_D]);

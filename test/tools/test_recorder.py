@@ -26,16 +26,16 @@ def lines(count: int = 4, sent: int | None = None, fault: int = 6, first: int = 
     rows = []
     for n in range(count):
         place = (first - n) % 64
-        slow = ((SPEED if place % 8 >= 4 else BUS) >> 4 * (place % 4) & 15) << 4 | (7 if n >= count - 2 else 5)
-        rows.append(f"row {place} {n} {-n} {10 * n % 100} -1 {n - 2} {slow - 256 if slow > 127 else slow}\r\n")
+        slow = ((SPEED if (place - 1) % 8 < 4 else BUS) >> 4 * (-place % 4) & 15) << 4 | (7 if n >= count - 2 else 5)
+        rows.append(f"row {place} {n} {10 * n % 100} {-n} -1 {slow - 256 if slow > 127 else slow} {n - 2}\r\n")
     return f"record fault {fault} rows {count} every {every} offsets -40 30\r\n" + "".join(rows[:sent])
 
 
 def test_a_record_among_other_lines_is_read_from_the_oldest_row_on() -> None:
     text = "foc33 0.10.0 reset BOR POR\r\n" + STATUS + lines().replace("row 0", STATUS + "row 0") + STATUS
     found = recorder.parse(text, "log")
-    assert found == [recorder.Record(6, 1, (-40, 30), (1, 0, 63, 62), ((0, 0, 0, -1, -2, -27), (1, -1, 10, -1, -1, 21), (2, -2, 20, -1, 0, -105),
-                                                                       (3, -3, 30, -1, 1, -57)))]
+    assert found == [recorder.Record(6, 1, (-40, 30), (1, 0, 63, 62), ((0, 0, 0, -1, -107, -2), (1, 10, -1, -1, 21, -1), (2, 20, -2, -1, -25, 0),
+                                                                       (3, 30, -3, -1, -73, 1)))]
     assert found[0].states == [5, 5, 7, 7] and found[0].fault_row(7) == 2
 
 
@@ -53,11 +53,11 @@ def test_one_that_is_cut_is_forgotten_where_a_whole_one_is_there() -> None:
     ("", "no record of a fault, log: log the board's UART"), (STATUS, "no record of a fault, log"),
     (lines(sent=3), "the record ends after 3 of 4 rows, log line 1: log it again"),
     (lines(sent=0), "the record ends after 0 of 4 rows"),
-    (lines().replace("row 63 2", "row 63"), "no row of a record: 'row 63 -2 20 -1 0 -105', log line 4"),
-    (lines().replace("row 63", "row 64"), "no row of a record: 'row 64 2"), (lines().replace("-105", "-129"), "no row of a record: 'row 63 2"),
+    (lines().replace("row 63 2", "row 63"), "no row of a record: 'row 63 20 -2 -1 -25 0', log line 4"),
+    (lines().replace("row 63", "row 64"), "no row of a record: 'row 64 2"), (lines().replace("-25", "-129"), "no row of a record: 'row 63 2"),
     (lines().replace(" 21", " 128"), "no row of a record: 'row 0 1"),
     (lines().replace("row 63", "row 62"), "row 63 is missing after row 0, log line 4"),
-    (lines().replace("row 0 1 -1 10 -1 -1 21\r\n", ""), "row 0 is missing after row 1, log line 3"),
+    (lines().replace("row 0 1 10 -1 -1 21 -1\r\n", ""), "row 0 is missing after row 1, log line 3"),
     (lines(fault=99), "no head of a record: 'record fault 99 rows 4 every 1 offsets -40 30', log line 1"),
     (lines().replace("rows 4", "rows 81"), "no head of a record"), (lines(every=0), "no head of a record"),
     ("record fault 6 rows 72 every 2\r\nrow 67 5008 -3456 48 9160 -18683 185\r\n",
@@ -88,14 +88,14 @@ def test_bytes_become_engineering_units_and_the_fault_is_at_zero() -> None:
 
 
 def test_bus_and_speed_are_words_in_four_rows_each_and_a_part_of_one_is_no_number() -> None:
-    rows = recorder.scaled(recorder.parse(lines(count=17, first=5), "")[0], PARAMS, STATES) # 5 4 | 3 2 1 0 | 63 62 61 60 | 59 58 57 56 | 55 54 53
-    numbers = {name: [at for at in range(17) if not np.isnan(getattr(rows, name)[at])] for name in ("bus_v", "speed_rpm")}
-    assert numbers == {"bus_v": [2, 10], "speed_rpm": [6]}
-    assert rows.bus_v[[2, 10]] == pytest.approx([(BUS + 32768) / 65536 * 50.0] * 2) and rows.speed_rpm[6] == pytest.approx((SPEED - 65536) * 0.2)
+    rows = recorder.scaled(recorder.parse(lines(count=16, first=5), "")[0], PARAMS, STATES) # 5 | 4 3 2 1 | 0 63 62 61 | 60 59 58 57 | 56 55 54
+    numbers = {name: [at for at in range(16) if not np.isnan(getattr(rows, name)[at])] for name in ("bus_v", "speed_rpm")}
+    assert numbers == {"bus_v": [5], "speed_rpm": [1, 9]}
+    assert rows.speed_rpm[[1, 9]] == pytest.approx([(SPEED - 65536) * 0.2] * 2) and rows.bus_v[5] == pytest.approx((BUS + 32768) / 65536 * 50.0)
 
 
 def test_rows_without_a_fault_end_in_the_reset_that_was_one() -> None:
-    text = lines(fault=13).replace(" -105", " -107").replace(" -57", " -59") # still CLOSED
+    text = lines(fault=13).replace(" -25", " -27").replace(" -73", " -75") # still CLOSED
     rows = recorder.scaled(recorder.parse(text, "")[0], PARAMS, STATES)
     assert rows.time_ms == pytest.approx([-0.2, -0.15, -0.1, -0.05])
 
@@ -153,7 +153,7 @@ def test_what_the_board_sends_is_its_trace_within_a_byte_s_step(causes: dict[str
                                           ((part["reg.ADC1BUF3"].astype(int) ^ 0x8000) / 65536.0 * bus_v, rows.bus_v, bus_v / 1e6),
                                           (part["fw.speed_est_rpm"], rows.speed_rpm, 0.01 * speed_rpm)):
         assert np.nanmax(np.abs(expected - values)) <= 1.001 * half_a_step
-    for of, values in ((3, rows.bus_v), (7, rows.speed_rpm)): # the last three rows may have a part of one
+    for of, values in ((0, rows.bus_v), (4, rows.speed_rpm)): # the last three rows may have a part of one
         assert np.isnan(values[:-3]).tolist() == [place % 8 != of for place in record.places[:-3]]
     assert part["fw.state"].astype(int).tolist() == record.states
     assert rows.bus_v[~np.isnan(rows.bus_v)] == pytest.approx(24.0, abs=1.0), "and of the right size"

@@ -115,12 +115,15 @@ static uint16_t end_of(uint16_t before)
     return (uint16_t)((before | 1u) + 2u * RECORDER_AFTER - 1u);
 }
 
-/** Four bits of what changes slowly, of the tick of the first of four rows. */
+/** Four bits of what changes slowly, of the tick of the first of four rows; 0 before that. */
 static unsigned slow_bits(uint16_t place, uint16_t tick)
 {
-    uint16_t row = (uint16_t)(3u - place % 4u), of = (uint16_t)(tick - 2u * row);
-    int16_t word = (place % 8u >= 4u) ? speed(of) : v_bus(of);
-    return ((unsigned)word >> (12u - 4u * row)) & 15u;
+    uint16_t row = (uint16_t)(0u - place) % 4u;
+    int16_t of = (int16_t)(tick - 2u * row);
+    if (of < 0) {
+        return 0;
+    }
+    return ((unsigned)(((place + row) % 8u == 4u) ? speed((uint16_t)of) : v_bus((uint16_t)of)) >> (4u * row)) & 15u;
 }
 
 /** The record is complete, and its rows are those of every second tick before `end`. */
@@ -130,7 +133,7 @@ static void expect_rows(uint16_t rows, uint16_t end)
     TEST_ASSERT_EQUAL_UINT16(rows, recorder_rows(&recorder));
     for (n = 0; n < rows; n++) {
         uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(((end - 2u) | 1u) - 2u * (rows - 1u - n));
-        const int8_t *byte = &recorder.byte[place * RECORDER_BYTES];
+        const int8_t *byte = recorder.row[place].byte;
         TEST_ASSERT_TRUE(place < RECORDER_ROWS);
         TEST_ASSERT_EQUAL_INT8(upper(raw_a(tick)), byte[RECORDER_I_A]);
         TEST_ASSERT_EQUAL_INT8(upper(raw_b(tick)), byte[RECORDER_I_B]);
@@ -176,7 +179,7 @@ void test_first_row_in_state_fault_is_the_fault_s_own(void)
     drive_raise(&drive, FAULT_OVERCURRENT_HW);
     periods(40);
     for (n = 0; n < RECORDER_ROWS; n++) {
-        uint16_t state = (uint16_t)recorder.byte[recorder_place(&recorder, n) * RECORDER_BYTES + RECORDER_SLOW] & RECORDER_STATE_BITS;
+        uint16_t state = (uint16_t)recorder.row[recorder_place(&recorder, n)].byte[RECORDER_SLOW] & RECORDER_STATE_BITS;
         TEST_ASSERT_EQUAL_UINT16((n < RECORDER_ROWS - RECORDER_AFTER) ? DRIVE_STOPPED : DRIVE_FAULT, state);
     }
 }

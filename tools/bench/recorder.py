@@ -11,6 +11,7 @@ from tools.common.errors import UserError
 from .scenario import param
 
 RING_ROWS, AFTER_ROWS, BYTES, STATE_BITS, FAULT_STATE = 64, 16, 6, 15, 7
+I_A, V_D, I_B, V_Q, SLOW, ANGLE = range(BYTES)
 HEAD = re.compile(r"record fault (\d+) rows (\d+) every (\d+)(?: offsets (-?\d+) (-?\d+))?$")
 ROW = re.compile(r"row (\d+)((?: -?\d+){%d})$" % BYTES)
 AGAIN = "log it again: after a reset by its pin the board sends the record once more"
@@ -32,15 +33,15 @@ class Record:
 
     @property
     def states(self) -> list[int]:
-        return [row[5] & STATE_BITS for row in self.rows]
+        return [row[SLOW] & STATE_BITS for row in self.rows]
 
     def slow_words(self, of: int) -> np.ndarray:
         """The word, as a signed number, that four rows have, the first of them in place `of`, `of` + 8, ... of the ring; nan in the others."""
         found = np.full(len(self.rows), np.nan)
         for number, place in enumerate(self.places[:-3]):
             if place % 8 == of:
-                upper, *lower = (row[5] >> 4 for row in self.rows[number:number + 4])
-                found[number] = upper * 4096 + sum((bits & 15) << shift for bits, shift in zip(lower, (8, 4, 0)))
+                *lower, upper = (row[SLOW] >> 4 for row in self.rows[number:number + 4])
+                found[number] = upper * 4096 + sum((bits & 15) << shift for bits, shift in zip(lower, (0, 4, 8)))
         return found
 
     def fault_row(self, fault_state: int) -> int:
@@ -144,11 +145,11 @@ def scaled(record: Record, params: Mapping[str, float], states: Mapping[int, str
     fault_state = next((number for number, name in states.items() if name == "FAULT"), FAULT_STATE)
     time = (np.arange(len(middles)) - record.fault_row(fault_state)) * record.every * param(params, "LOOPTIME_SEC")
     currents = [(middles[:, column] * param(params, gain) / 2.0 - offset) * param(params, "COUNT_CURRENT_A") # drive_measure() of include/drive/tick.h
-                for column, gain, offset in zip((0, 1), ("KCURRA", "KCURRB"), record.offsets_q13)]
-    return Rows(1e3 * time, *currents, *(middles[:, column] * param(params, "COUNT_VOLTAGE_V") for column in (2, 3)),
-                middles[:, 4] % 65536.0 * 360.0 / 65536.0,
-                (record.slow_words(3) + 32768.0) / 65536.0 * param(params, "BUS_FULL_SCALE_V"),
-                record.slow_words(7) * param(params, "COUNT_SPEED_RPM"),
+                for column, gain, offset in zip((I_A, I_B), ("KCURRA", "KCURRB"), record.offsets_q13)]
+    return Rows(1e3 * time, *currents, *(middles[:, column] * param(params, "COUNT_VOLTAGE_V") for column in (V_D, V_Q)),
+                middles[:, ANGLE] % 65536.0 * 360.0 / 65536.0,
+                (record.slow_words(0) + 32768.0) / 65536.0 * param(params, "BUS_FULL_SCALE_V"),
+                record.slow_words(4) * param(params, "COUNT_SPEED_RPM"),
                 [states.get(number, f"state {number}") for number in record.states])
 
 
