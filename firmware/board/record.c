@@ -61,6 +61,6 @@ char *record_line(char *line)
         return line;
     }
     lines_left--;
-    at = (lines_left == rows) ? put_head(line, rows) : put_row(line, recorder_place(&board_recorder, (uint16_t)(rows - 1u - lines_left)));
+    at = (lines_left == rows) ? put_head(line, rows) : put_row(line, recorder_place(&board_recorder, lines_left));
     return text_put(at, "\r\n");
 }

@@ -13,9 +13,6 @@ static void recorder_begin(recorder_t *r)
     r->next = RECORDER_FIRST;
     r->full = 0;
     r->fault = (uint8_t)FAULT_NONE;
-    r->slow = 0;
-    r->offset_a_q13 = 0;
-    r->offset_b_q13 = 0;
     r->left = RECORDER_AFTER + 1u; /* last: from now on the control interrupt writes */
 }
 
@@ -23,18 +20,16 @@ static void recorder_begin(recorder_t *r)
 static uint16_t recorder_is_valid(const recorder_t *r)
 {
     return (uint16_t)(r->check == RECORDER_CHECK && r->left <= RECORDER_AFTER + 1u && r->full <= 1u && r->fault < (uint16_t)FAULT_COUNT
-                      && r->next >= 0 && r->next <= RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_BYTES == 0u);
+                      && (uint16_t)r->next <= (uint16_t)RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_BYTES == 0u);
 }
 
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
 {
     uint16_t first;
     if (powered_up) { /* the test of the RAM reads it all */
-        uint16_t n;
-        for (n = 0; n < sizeof r->row / sizeof r->row[0]; n++) {
-            r->row[n].word[0] = 0;
-            r->row[n].word[1] = 0;
-            r->row[n].word[2] = 0;
+        uint8_t *at = (uint8_t *)(void *)r, *end = (uint8_t *)(void *)(r + 1);
+        while (at != end) {
+            *at++ = 0;
         }
     }
     if (powered_up || !recorder_is_valid(r)) {
@@ -52,17 +47,23 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
 
 void recorder_background(recorder_t *r, const drive_t *d)
 {
-    if (r->left == 0u && d->command.run) {
-        recorder_begin(r);
-    }
-    if (r->left > RECORDER_AFTER) {
+    if (r->left != 0u) {
         r->offset_a_q13 = d->calibration.offset_a_q13;
         r->offset_b_q13 = d->calibration.offset_b_q13;
-    } else if (d->fault == (uint16_t)FAULT_NONE) {
-        r->left = 0; /* cleared before the last row: what comes now is no part of it */
+        if (r->left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
+            r->left = 0; /* cleared before the last row: what comes now is no part of it */
+        }
+    } else if (d->command.run) {
+        recorder_begin(r);
     } else {
-        /* the rows after a fault */
+        /* it is kept */
     }
+}
+
+/** Place of the next row. */
+static uint16_t recorder_next(const recorder_t *r)
+{
+    return (uint16_t)r->next / (uint16_t)RECORDER_BYTES;
 }
 
 uint16_t recorder_rows(const recorder_t *r)
@@ -70,11 +71,10 @@ uint16_t recorder_rows(const recorder_t *r)
     if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
         return 0;
     }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_FIRST - r->next) / RECORDER_BYTES);
+    return (uint16_t)(r->full ? RECORDER_ROWS : (uint16_t)(RECORDER_FIRST / RECORDER_BYTES) - recorder_next(r));
 }
 
-uint16_t recorder_place(const recorder_t *r, uint16_t n)
+uint16_t recorder_place(const recorder_t *r, uint16_t later)
 {
-    int16_t place = (int16_t)((r->full ? r->next : RECORDER_FIRST) / RECORDER_BYTES - (int16_t)n);
-    return (uint16_t)((place >= 0) ? place : place + (int16_t)RECORDER_ROWS);
+    return (uint16_t)(recorder_next(r) + 1u + later) % RECORDER_ROWS;
 }

@@ -58,8 +58,8 @@ void recorder_background(recorder_t *r, const drive_t *d);
 /** Rows of a complete record; 0 before a fault. */
 uint16_t recorder_rows(const recorder_t *r);
 
-/** Place in the ring of row n of the record, the oldest being row 0. */
-uint16_t recorder_place(const recorder_t *r, uint16_t n);
+/** Place in the ring of the row that so many later ones follow: the newest has none. */
+uint16_t recorder_place(const recorder_t *r, uint16_t later);
 
 /** 1 in the periods that get a row: those of the slow steps, with late duties those between, which have the time. */
 QM_INLINE uint16_t recorder_is_due(const drive_t *d)

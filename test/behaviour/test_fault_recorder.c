@@ -59,7 +59,7 @@ static void expect_trace(void)
     const double volts = 2.0 * (double)NORM_VOLTAGE_CONST;
     TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&board_recorder));
     for (uint16_t n = 0; n < RECORDER_ROWS; n++) {
-        uint16_t place = recorder_place(&board_recorder, n);
+        uint16_t place = recorder_place(&board_recorder, (uint16_t)(RECORDER_ROWS - 1 - n));
         size_t row = fault_row - RECORDER_EVERY * (RECORDER_ROWS - RECORDER_AFTER) + (size_t)RECORDER_EVERY * n;
         const int8_t *byte = board_recorder.row[place].byte;
         TEST_ASSERT_EQUAL_HEX8(upper(row, RAW_A, 1.0), byte[RECORDER_I_A]);
