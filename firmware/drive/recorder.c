@@ -9,10 +9,9 @@
 
 static void recorder_begin(recorder_t *r)
 {
+    drive_zero(r, sizeof *r); /* the test of the RAM reads it all */
     r->check = RECORDER_CHECK;
     r->next = RECORDER_FIRST;
-    r->full = 0;
-    r->fault = (uint8_t)FAULT_NONE;
     r->left = RECORDER_AFTER + 1u; /* last: from now on the control interrupt writes */
 }
 
@@ -25,32 +24,25 @@ static uint16_t recorder_is_valid(const recorder_t *r)
 
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
 {
-    uint16_t first;
-    if (powered_up) { /* the test of the RAM reads it all */
-        uint8_t *at = (uint8_t *)(void *)r, *end = (uint8_t *)(void *)(r + 1);
-        while (at != end) {
-            *at++ = 0;
+    if (!powered_up && recorder_is_valid(r)) {
+        if (r->fault == (uint8_t)FAULT_NONE) {
+            r->fault = (uint8_t)fault;
+        }
+        if (r->fault != (uint8_t)FAULT_NONE) {
+            r->left = 0;
+            return;
         }
     }
-    if (powered_up || !recorder_is_valid(r)) {
-        recorder_begin(r);
-        return;
-    }
-    first = (r->fault != (uint16_t)FAULT_NONE) ? r->fault : (uint16_t)fault;
-    if (first == (uint16_t)FAULT_NONE) {
-        recorder_begin(r);
-        return;
-    }
-    r->fault = (uint8_t)first;
-    r->left = 0;
+    recorder_begin(r);
 }
 
 void recorder_background(recorder_t *r, const drive_t *d)
 {
-    if (r->left != 0u) {
+    const uint16_t left = r->left;
+    if (left != 0u) {
         r->offset_a_q13 = d->calibration.offset_a_q13;
         r->offset_b_q13 = d->calibration.offset_b_q13;
-        if (r->left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
+        if (left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
             r->left = 0; /* cleared before the last row: what comes now is no part of it */
         }
     } else if (d->command.run) {
@@ -60,21 +52,10 @@ void recorder_background(recorder_t *r, const drive_t *d)
     }
 }
 
-/** Place of the next row. */
-static uint16_t recorder_next(const recorder_t *r)
-{
-    return (uint16_t)r->next / (uint16_t)RECORDER_BYTES;
-}
-
 uint16_t recorder_rows(const recorder_t *r)
 {
     if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
         return 0;
     }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (uint16_t)(RECORDER_FIRST / RECORDER_BYTES) - recorder_next(r));
-}
-
-uint16_t recorder_place(const recorder_t *r, uint16_t later)
-{
-    return (uint16_t)(recorder_next(r) + 1u + later) % RECORDER_ROWS;
+    return (uint16_t)(r->full ? RECORDER_ROWS : (uint16_t)(RECORDER_FIRST / RECORDER_BYTES) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
 }

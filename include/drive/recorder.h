@@ -59,7 +59,10 @@ void recorder_background(recorder_t *r, const drive_t *d);
 uint16_t recorder_rows(const recorder_t *r);
 
 /** Place in the ring of the row that so many later ones follow: the newest has none. */
-uint16_t recorder_place(const recorder_t *r, uint16_t later);
+QM_INLINE uint16_t recorder_place(const recorder_t *r, uint16_t later)
+{
+    return (uint16_t)((uint16_t)r->next / (uint16_t)RECORDER_BYTES + 1u + later) % RECORDER_ROWS;
+}
 
 /** 1 in the periods that get a row: those of the slow steps, with late duties those between, which have the time. */
 QM_INLINE uint16_t recorder_is_due(const drive_t *d)
