@@ -87,8 +87,8 @@ QM_INLINE int8_t recorder_upper(int16_t word)
     return (int8_t)(word >> 8);
 }
 
-/** The last work of a period. @param raw the converter's results of it */
-QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, const drive_samples_t *raw)
+/** The last work of a period. @param i_a,i_b,v_bus the converter's results; as a structure they would be kept on the stack */
+QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, int16_t v_bus)
 {
     recorder_row_t *row;
     int16_t at = r->next;
@@ -98,14 +98,14 @@ QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, const drive_sample
         return;
     }
     if (((uint16_t)at & 6u) == 0u) { /* six bytes a row: every fourth place */
-        slow = (uint16_t)((((uint16_t)at & 8u) != 0u) ? estimator_speed(&d->run.estimator) : raw->v_bus);
+        slow = (uint16_t)((((uint16_t)at & 8u) != 0u) ? estimator_speed(&d->run.estimator) : v_bus);
     }
     row = (recorder_row_t *)(void *)((int8_t *)r->row + at);
     row->word[RECORDER_V_D / 2] = d->run.control.v_q14.d;
     row->word[RECORDER_V_Q / 2] = d->run.control.v_q14.q;
     row->word[RECORDER_ANGLE / 2] = (int16_t)d->angle;
-    row->byte[RECORDER_I_A] = recorder_upper(raw->i_a);
-    row->byte[RECORDER_I_B] = recorder_upper(raw->i_b);
+    row->byte[RECORDER_I_A] = recorder_upper(i_a);
+    row->byte[RECORDER_I_B] = recorder_upper(i_b);
     row->byte[RECORDER_SLOW] = (int8_t)((uint16_t)(slow << 4) | d->state);
     r->slow = (uint16_t)(slow >> 4);
     at = (int16_t)(at - (int16_t)RECORDER_BYTES);

@@ -30,7 +30,6 @@ static void rows(uint16_t count, int16_t first)
     uint16_t n;
     for (n = 0; n < count; n++) {
         int16_t x = (int16_t)(first + (int16_t)n), upper = (int16_t)(256 * x);
-        const drive_samples_t raw = { upper, (int16_t)-upper, (int16_t)(0x1200 + upper) };
         board_drive.run.control.v_q14.d = (int16_t)(upper + 0x0100);
         board_drive.run.control.v_q14.q = (int16_t)(-upper - 1);
         board_drive.angle = (uint16_t)(uint32_t)(16 * upper);
@@ -38,7 +37,7 @@ static void rows(uint16_t count, int16_t first)
         if (board_drive.fault != (uint16_t)FAULT_NONE) {
             recorder_in_fault(&board_recorder, &board_drive);
         }
-        recorder_tick(&board_recorder, &board_drive, &raw);
+        recorder_tick(&board_recorder, &board_drive, upper, (int16_t)-upper, (int16_t)(0x1200 + upper));
     }
 }
 
