@@ -98,7 +98,10 @@ QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t i_a, int16
         return;
     }
     if (((uint16_t)at & 6u) == 0u) { /* six bytes a row: every fourth place */
-        slow = (uint16_t)((((uint16_t)at & 8u) != 0u) ? estimator_speed(&d->run.estimator) : v_bus);
+        slow = (uint16_t)estimator_speed(&d->run.estimator);
+        if (((uint16_t)at & 8u) == 0u) {
+            slow = (uint16_t)v_bus;
+        }
     }
     row = (recorder_row_t *)(void *)((int8_t *)r->row + at);
     row->word[RECORDER_V_D / 2] = d->run.control.v_q14.d;
