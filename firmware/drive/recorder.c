@@ -2,7 +2,7 @@
 #include "drive/recorder.h"
 
 #ifdef MODE_WITHOUT_RECORDER
-#pragma message(MODE_WITHOUT_RECORDER " takes the RAM of the fault recorder: this build has no recorder, whatever RECORDER_PERIODS says")
+#pragma message(MODE_WITHOUT_RECORDER " takes the fault recorder's place in RAM: this build has no recorder, whatever RECORDER_PERIODS says")
 #endif
 
 #define RECORDER_CHECK 0x5Eu
