@@ -118,6 +118,7 @@ void BOARD_ISR _T2Interrupt(void)
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);
     }
+    /* the currents once more: kept, they would take registers from the slow work */
     recorder_tick(&board_recorder, &board_drive, (int16_t)ADC1BUF1, (int16_t)ADC1BUF2, raw.v_bus);
     mode_record();
 #if SCOPE

@@ -57,5 +57,5 @@ uint16_t recorder_rows(const recorder_t *r)
     if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
         return 0;
     }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (uint16_t)(RECORDER_FIRST / RECORDER_BYTES) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
+    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
 }

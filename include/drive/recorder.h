@@ -11,8 +11,8 @@
 
 /** The bytes of a row. All but the state's are the upper byte of a word, which is never out of range.
  *
- *  What changes slowly is a word in four rows, its lowest bits first, all of them of the first row's moment: the estimated speed from the places 4, 12, ...
- *  of the ring on, the bus as the converter gives it from 0, 8, ... on. */
+ *  What changes slowly is a word in four rows, its lowest bits first, all of them of the first row's moment: the estimated speed where the
+ *  first row's place in the ring is 4, 12, ..., the bus as the converter gives it where it is 0, 8, ... */
 enum {
     RECORDER_I_A, /**< as the converter gives it: the head line tells the offsets */
     RECORDER_V_D, /**< commanded, Q14 / 256 */
@@ -26,8 +26,8 @@ enum {
 
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)
-#define RECORDER_FIRST ((int16_t)(RECORDER_EVERY != 0u ? (RECORDER_ROWS - 1) * RECORDER_BYTES : 0)) /**< bytes before the first row that is written */
 #define RECORDER_PLACES (RECORDER_EVERY != 0u ? RECORDER_ROWS : 1)
+#define RECORDER_FIRST ((int16_t)((RECORDER_PLACES - 1) * RECORDER_BYTES)) /**< bytes before the first row that is written */
 
 /** A word's lower byte makes place for the byte before it: cheaper than to take the words apart. */
 typedef union {

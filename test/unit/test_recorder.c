@@ -179,7 +179,8 @@ void test_first_row_in_state_fault_is_the_fault_s_own(void)
     drive_raise(&drive, FAULT_OVERCURRENT_HW);
     periods(40);
     for (n = 0; n < RECORDER_ROWS; n++) {
-        uint16_t state = (uint16_t)recorder.row[recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n))].byte[RECORDER_SLOW] & RECORDER_STATE_BITS;
+        uint16_t place = recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n));
+        unsigned state = (unsigned)recorder.row[place].byte[RECORDER_SLOW] & RECORDER_STATE_BITS;
         TEST_ASSERT_EQUAL_UINT16((n < RECORDER_ROWS - RECORDER_AFTER) ? DRIVE_STOPPED : DRIVE_FAULT, state);
     }
 }

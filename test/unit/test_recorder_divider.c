@@ -43,9 +43,11 @@ void test_every_fourth_period_has_a_row_and_sixteen_of_them_follow_the_fault_in_
         }
         TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&recorder));
         for (n = 0; n < RECORDER_ROWS; n++) {
-            uint16_t place = recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n)), tick = (uint16_t)(first_after + 4u * (n - (RECORDER_ROWS - RECORDER_AFTER)));
+            uint16_t place = recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n));
+            uint16_t tick = (uint16_t)(first_after + 4u * (n - (RECORDER_ROWS - RECORDER_AFTER)));
             const int8_t *byte = recorder.row[place].byte;
-            uint16_t row = (uint16_t)(0u - place) % 4u, of = (uint16_t)(tick - 4u * row), slow = (uint16_t)((((place + row) % 8u == 4u) ? 32u : 96u) * of);
+            uint16_t row = (uint16_t)(0u - place) % 4u, of = (uint16_t)(tick - 4u * row);
+            uint16_t slow = (uint16_t)((((place + row) % 8u == 4u) ? 32u : 96u) * of);
             TEST_ASSERT_EQUAL_HEX8(64u * tick >> 8, byte[RECORDER_V_D]);
             TEST_ASSERT_EQUAL_HEX8((slow >> (4u * row)) & 15u, ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
             TEST_ASSERT_EQUAL_UINT16((tick < first_after) ? DRIVE_CALIBRATE : DRIVE_FAULT, (unsigned)byte[RECORDER_SLOW] & RECORDER_STATE_BITS);

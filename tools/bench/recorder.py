@@ -36,7 +36,7 @@ class Record:
         return [row[SLOW] & STATE_BITS for row in self.rows]
 
     def slow_words(self, of: int) -> np.ndarray:
-        """The word, as a signed number, that four rows have, the first of them in place `of`, `of` + 8, ... of the ring; nan in the others."""
+        """The signed word that four rows have, where the first one's place is `of`, `of` + 8, ...; nan in the others."""
         found = np.full(len(self.rows), np.nan)
         for number, place in enumerate(self.places[:-3]):
             if place % 8 == of:
@@ -144,7 +144,8 @@ def scaled(record: Record, params: Mapping[str, float], states: Mapping[int, str
     middles = 256.0 * (np.array(record.rows, dtype=np.float64).reshape(-1, BYTES) + 0.5)
     fault_state = next((number for number, name in states.items() if name == "FAULT"), FAULT_STATE)
     time = (np.arange(len(middles)) - record.fault_row(fault_state)) * record.every * param(params, "LOOPTIME_SEC")
-    currents = [(middles[:, column] * param(params, gain) / 2.0 - offset) * param(params, "COUNT_CURRENT_A") # drive_measure() of include/drive/tick.h
+    # as drive_measure() of include/drive/tick.h
+    currents = [(middles[:, column] * param(params, gain) / 2.0 - offset) * param(params, "COUNT_CURRENT_A")
                 for column, gain, offset in zip((I_A, I_B), ("KCURRA", "KCURRB"), record.offsets_q13)]
     return Rows(1e3 * time, *currents, *(middles[:, column] * param(params, "COUNT_VOLTAGE_V") for column in (V_D, V_Q)),
                 middles[:, ANGLE] % 65536.0 * 360.0 / 65536.0,
