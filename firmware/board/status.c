@@ -24,19 +24,28 @@ static char line[MODE_LINE_SIZE] LINE_PLACE;
 static uint16_t next; /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms;
 
-/** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". @return the text's end */
+#define LIMIT_NAME(bit, name, cause, remedy) " " #name,
+static const char *const limit_names[] = { DRIVE_LIMIT_TABLE(LIMIT_NAME) };
+
+/* From here on the line has no room for the longest reason, a self-test and the end. */
+#define LIMITS_END (sizeof line - sizeof " FIELD_WEAKENING" - sizeof " selftest 10\r\n")
+
+/** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". What finds no room waits for the next line.
+ *  @return the text's end */
 static char *put_limits(char *at)
 {
     char *end = at;
+    uint16_t n, bit = 1;
     if (LimitParm.seen != 0u) {
         end = text_put(end, " limit");
     }
-#define PUT_REASON(bit, name, cause, remedy) \
-    if ((LimitParm.seen & (uint16_t)LIMIT_##name) != 0u) { \
-        end = text_put(end, " " #name); \
+    for (n = 0; n < sizeof limit_names / sizeof limit_names[0] && end <= line + LIMITS_END; n++) {
+        if ((LimitParm.seen & bit) != 0u) {
+            end = text_put(end, limit_names[n]);
+            LimitParm.seen ^= bit;
+        }
+        bit = (uint16_t)(bit << 1);
     }
-    DRIVE_LIMIT_TABLE(PUT_REASON)
-    LimitParm.seen = 0;
     return end;
 }
 

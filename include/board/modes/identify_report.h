@@ -21,13 +21,16 @@ char *identify_status_line(char *line, const drive_t *d);
 void identify_watch(const drive_t *d);
 #endif
 
-/** Longest status line and its end: all reasons of a limit, or all that IDENTIFY measures, or a remedy of BRINGUP. */
+/** Longest status line and its end: retries with four reasons of a limit or more, or all that IDENTIFY measures, or a remedy of BRINGUP, or a client's
+ *  longest frame. */
 #if defined IDENTIFY
 #define MODE_LINE_SIZE 160
 #elif defined BRINGUP
 #define MODE_LINE_SIZE 240
-#else
+#elif SCOPE
 #define MODE_LINE_SIZE 144
+#else
+#define MODE_LINE_SIZE 112
 #endif
 
 /** The mode's status line. @return its end; the line itself without the mode */
