@@ -143,7 +143,7 @@ typedef struct {
     uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
     uint16_t is_due;           /**< 1: the next period hands over */
     int16_t ahead_erpm;        /**< by how much the estimated speed is ahead of the forced one, in the mean */
-    uint16_t speed_is_preset;  /**< 1 from four periods after the hand-over on: the observer runs */
+    uint16_t speed_is_preset;  /**< 1 from six periods after the hand-over on: the observer runs */
     int16_t offset;            /**< angle that is left of the change of frame, angle counts */
     current_q13_t current_q13; /**< of the ramp, at the hand-over */
     current_q13_t id_q13;      /**< d current that goes with the offset */

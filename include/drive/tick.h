@@ -118,36 +118,21 @@ QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_sampl
     }
 }
 
-/** Speed controller, or the start. Every slow step, in the second half or the first. @param call of late_call() */
+/** Observer and speed controller, or the start. Every slow step, in two halves. @param call of late_call() */
 QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (!drive_is_closed(d)) {
         if (late_first(call)) {
             drive_start_step(d, p);
         }
-    } else if (late_second(call)) {
-        speed_step(d, p);
-    } else {
-        /* the observer's step was before */
-    }
-}
-
-/** What belongs to the speed: every other slow step rates and gain of its controller, in the first half; in those between its trim, in closed loop, and
- *  the estimator's sign. */
-QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
-{
-    if (!late_first(call) || !drive_is_running(d)) {
         return;
     }
-    if ((part & 4u) != 0u) {
-        if (drive_is_closed(d)) {
-            speed_trim_step(d, p);
-        }
-        estimator_follow(&d->run.estimator, &p->estimator);
-    } else if (drive_is_closed(d)) {
-        speed_follow(&d->run, p);
-    } else {
-        /* no controller */
+    if (late_first(call)) {
+        handover_observe(&d->run, p);
+        protection_sum_phases(d);
+    }
+    if (late_second(call)) {
+        speed_step(d, p);
     }
 }
 
@@ -228,13 +213,22 @@ QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_
     }
 }
 
-/** Last part of a slow step: the load observer, two periods before the speed controller; at once, a load that goes is more often followed by a slip of
- *  the angle. In closed loop, with late duties in the second half. */
-QM_INLINE void drive_observe_step(drive_t *d, const drive_params_t *p, uint16_t call)
+/** Last part of a slow step, what belongs to the speed: in every other one the rates and the gain of its controller, in those between its trim, in closed
+ *  loop, and the estimator's sign. With late duties in the first half. */
+QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
 {
-    if (late_second(call) && drive_is_closed(d)) {
-        handover_observe(&d->run, p);
-        protection_sum_phases(d);
+    if (!late_first(call) || !drive_is_running(d)) {
+        return;
+    }
+    if ((part & 4u) != 0u) {
+        if (drive_is_closed(d)) {
+            speed_trim_step(d, p);
+        }
+        estimator_follow(&d->run.estimator, &p->estimator);
+    } else if (drive_is_closed(d)) {
+        speed_follow(&d->run, p);
+    } else {
+        /* no controller */
     }
 }
 
@@ -249,7 +243,6 @@ QM_INLINE void drive_part(drive_t *d, const drive_params_t *p, const drive_sampl
     switch (part & 3u) {
     case 0:
         drive_speed_step(d, p, call);
-        drive_rate_step(d, p, part, call);
         done = (uint16_t)(part & 12u);
         break;
     case 1:
@@ -260,7 +253,7 @@ QM_INLINE void drive_part(drive_t *d, const drive_params_t *p, const drive_sampl
         done = drive_limit_part(d, p, part, call);
         break;
     default: /* 3 */
-        drive_observe_step(d, p, call);
+        drive_rate_step(d, p, part, call);
         done = (uint16_t)((part & 12u) | 3u);
         break;
     }

@@ -300,7 +300,6 @@ void test_a_stop_turns_round_only_at_its_end_for_a_target_the_other_way_while_th
             drive.command.run = cases[n].run;
             rig_slow(2);
             rig_slow(3);
-            rig_speed((int16_t)(direction * cases[n].speed)); /* the observer has seen an angle that stands */
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(DRIVE_STOPPING, drive.state, golden_row(n));
             rig_slow(1);
             rig_slow(6);

@@ -260,12 +260,12 @@ void test_schedule_of_the_speed_comes_every_sixteenth_period_in_closed_loop_only
         drive.run.control.sample_shift_q13 = 0;
         drive.run.control.speed_kp_q13 = 0;
         rig_slow(part);
-        TEST_ASSERT_EQUAL_INT16((part & 7u) == 0u, drive.run.control.sample_shift_q13 > 0);
-        TEST_ASSERT_EQUAL_INT16((part & 7u) == 0u, drive.run.control.speed_kp_q13 > 0);
+        TEST_ASSERT_EQUAL_INT16((part & 7u) == 3u, drive.run.control.sample_shift_q13 > 0);
+        TEST_ASSERT_EQUAL_INT16((part & 7u) == 3u, drive.run.control.speed_kp_q13 > 0);
     }
     drive.run.control.sample_shift_q13 = 0;
     drive.state = (uint16_t)DRIVE_RAMP;
-    rig_slow(0);
+    rig_slow(3);
     TEST_ASSERT_EQUAL_INT16(0, drive.run.control.sample_shift_q13);
 }
 
