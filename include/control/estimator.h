@@ -68,12 +68,6 @@ QM_INLINE angle_t estimator_next_angle(const estimator_t *e)
     return e->next;
 }
 
-/** The angle of the period before. */
-QM_INLINE QM_WRAPS uint32_t estimator_rho_before(const estimator_t *e, const estimator_params_t *p)
-{
-    return qm_turn_sub(e->rho_q32, (uint32_t)qm_mulss(e->omega_erpm, p->deltat_q32));
-}
-
 /** Half a step ahead of rho. @param step_q32 of a period */
 QM_INLINE angle_t estimator_ahead(uint32_t rho_q32, int32_t step_q32)
 {

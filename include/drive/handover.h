@@ -142,20 +142,18 @@ QM_INLINE void handover_step(drive_t *d, const drive_params_t *p)
 }
 
 /** The observer's step. Its first one, six periods after the hand-over, whose own period has enough to do, begins with the hand-over's q
- *  current, so that the speed controller, which comes next, goes on from it. It sees the angle of the period before: without that delay
- *  the estimator slips twice as often where a load goes and dead time hides the rotor, with more of it a load makes the speed dip further. */
+ *  current, so that the speed controller, which comes next, goes on from it. */
 QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 {
     const drive_control_t *c = &run->control;
-    const uint32_t rho_q32 = estimator_rho_before(&run->estimator, &p->estimator);
     if (run->handover.speed_is_preset) {
-        observer_step(&run->observer, &p->observer, rho_q32, salient_torque(run, c->i_q13.q));
+        observer_step(&run->observer, &p->observer, run->estimator.rho_q32, salient_torque(run, c->i_q13.q));
         if (run->handover.offset != 0) {
             observer_unsettle(&run->observer); /* dead time shakes the estimate most while the d current falls */
         }
     } else {
         run->handover.speed_is_preset = 1;
-        observer_preset(&run->observer, &p->observer, rho_q32, estimator_speed(&run->estimator), salient_torque(run, c->ref_q13.q));
+        observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, estimator_speed(&run->estimator), salient_torque(run, c->ref_q13.q));
     }
 }
 

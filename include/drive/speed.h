@@ -15,8 +15,9 @@ QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop. */
-QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
+/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop, and at once after a
+ *  large innovation. */
+NOINLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
 {
     speed_schedule(run, p);
     run->control.sample_shift_q13 = qm_mulhi(observer_speed(&run->observer), p->sample_shift_q16);

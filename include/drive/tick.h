@@ -130,6 +130,9 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t ca
     if (late_first(call)) {
         handover_observe(&d->run, p);
         protection_sum_phases(d);
+        if (!observer_is_calm(&d->run.observer)) { /* the very step that sees a load answers it */
+            speed_follow(&d->run, p);
+        }
     }
     if (late_second(call)) {
         speed_step(d, p);
@@ -217,18 +220,20 @@ QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_
  *  loop, and the estimator's sign. With late duties in the first half. */
 QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
 {
+    const uint16_t between = (uint16_t)(part & 4u);
     if (!late_first(call) || !drive_is_running(d)) {
         return;
     }
-    if ((part & 4u) != 0u) {
-        if (drive_is_closed(d)) {
+    if (drive_is_closed(d)) {
+        if (between) {
             speed_trim_step(d, p);
         }
+        if (!between) {
+            speed_follow(&d->run, p);
+        }
+    }
+    if (between) {
         estimator_follow(&d->run.estimator, &p->estimator);
-    } else if (drive_is_closed(d)) {
-        speed_follow(&d->run, p);
-    } else {
-        /* no controller */
     }
 }
 

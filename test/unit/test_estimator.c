@@ -209,21 +209,6 @@ void test_frame_of_its_own_is_that_of_the_next_sample(void)
     }
 }
 
-void test_angle_of_the_period_before_is_what_the_last_step_began_with_also_where_it_wraps(void)
-{
-    static const uint32_t rho_q32[] = { 0x12345678u, 5u, 0xFFFFFFF0u };
-    for (uint16_t n = 0; n < 2u * sizeof rho_q32 / sizeof rho_q32[0]; n++) {
-        int16_t sign = (int16_t)((n & 1u) ? -1 : 1);
-        setUp();
-        e.sign = sign;
-        e.e_q_q28 = (int32_t)sign * 3000 * 65536;
-        e.rho_q32 = rho_q32[n / 2u];
-        estimator_pll(&e, &params, &tuning, rotating(0, (int16_t)(sign * 3000)));
-        TEST_ASSERT_TRUE(e.rho_q32 != rho_q32[n / 2u]);
-        TEST_ASSERT_EQUAL_HEX32(rho_q32[n / 2u], estimator_rho_before(&e, &params));
-    }
-}
-
 void test_eight_sample_voltage_is_turned_forward_by_three_and_a_half_steps(void)
 {
     static const struct {

@@ -113,7 +113,7 @@ void test_observer_counts_torque(void)
     flux_of((int16_t)-tenth());
     drive.run.control.i_q13.q = 1000;
     expected = drive.run.observer;
-    observer_step(&expected, &params.observer, estimator_rho_before(&drive.run.estimator, &params.estimator), (int16_t)(1000L * drive.run.salience.flux_q13 >> 13));
+    observer_step(&expected, &params.observer, drive.run.estimator.rho_q32, (int16_t)(1000L * drive.run.salience.flux_q13 >> 13));
     TEST_ASSERT_INT16_WITHIN(1, 1100, (int16_t)(1000L * drive.run.salience.flux_q13 >> 13));
     handover_observe(&drive.run, &params);
     TEST_ASSERT_EQUAL_INT32(expected.omega_q16, drive.run.observer.omega_q16);

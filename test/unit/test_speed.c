@@ -253,20 +253,37 @@ void test_q_current_is_raised_by_what_the_back_emf_took_before_the_sample(void)
     }
 }
 
+/** A part of the slow work with the rates forgotten, the rotor as fast as the observer sees it or so many electrical rpm faster. @return 1: they are known */
+static uint16_t rates_come(uint16_t part, int16_t faster_erpm)
+{
+    drive.run.control.sample_shift_q13 = 0;
+    drive.run.control.speed_kp_q13 = 0;
+    drive.run.estimator.rho_q32 = drive.run.observer.rho_q32 + 8u * (uint32_t)qm_mulss((int16_t)(observer_speed(&drive.run.observer) + faster_erpm), params.observer.deltat_q32);
+    rig_slow(part);
+    TEST_ASSERT_EQUAL_INT16(drive.run.control.sample_shift_q13 > 0, drive.run.control.speed_kp_q13 > 0);
+    return (uint16_t)(drive.run.control.sample_shift_q13 > 0);
+}
+
 void test_schedule_of_the_speed_comes_every_sixteenth_period_in_closed_loop_only(void)
 {
     rig_closed(1, 18000);
     for (uint16_t part = 0; part < SLOW_PARTS; part++) {
-        drive.run.control.sample_shift_q13 = 0;
-        drive.run.control.speed_kp_q13 = 0;
-        rig_slow(part);
-        TEST_ASSERT_EQUAL_INT16((part & 7u) == 3u, drive.run.control.sample_shift_q13 > 0);
-        TEST_ASSERT_EQUAL_INT16((part & 7u) == 3u, drive.run.control.speed_kp_q13 > 0);
+        TEST_ASSERT_EQUAL_UINT16((part & 7u) == 3u, rates_come(part, 0));
     }
-    drive.run.control.sample_shift_q13 = 0;
     drive.state = (uint16_t)DRIVE_RAMP;
-    rig_slow(3);
-    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.sample_shift_q13);
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(3, 0));
+}
+
+void test_a_large_innovation_has_the_quick_rate_before_the_controller_s_next_step_and_until_it_fades(void)
+{
+    rig_closed(1, 18000);
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(0, 0));
+    TEST_ASSERT_EQUAL_UINT16(1, rates_come(4, 4000));
+    TEST_ASSERT_GREATER_THAN_INT16(params.speed_kp_q13, drive.run.control.speed_kp_q13);
+    TEST_ASSERT_EQUAL_UINT16(1, rates_come(8, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(5, 0));
+    drive.run.observer.quick_q15 = 4000;
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(12, 0));
 }
 
 /* ---- the end of a stop ---- */
