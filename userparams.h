@@ -141,12 +141,12 @@
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
 
-/* ---- Fault recorder: 56 rows before a fault, 16 from it on -------------------------------------------------------- */
+/* ---- Fault recorder: 48 rows before a fault, 16 from it on -------------------------------------------------------- */
 #define RECORDER_PERIODS 2          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
 
 /* ---- Scope: watch, record and tune by the serial line (docs/scope.md) --------------------------------------------- */
 #ifndef SCOPE /* or build with -DSCOPE=1 */
-#define SCOPE 0                     /* [switch]        0 .. 1         1: the serial line answers X2C-Scope clients, the fault recorder's memory is their trace buffer; 0: status line only */
+#define SCOPE 0                     /* [switch]        0 .. 1         1: the serial line answers X2C-Scope clients, their trace buffer takes the fault recorder's place; 0: status line only */
 #endif
 
 /* ---- Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it - */

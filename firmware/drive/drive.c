@@ -7,8 +7,7 @@
 #include "drive/salient.h"
 #include "drive/state.h"
 
-/** Clears bytes: assigning a zero struct would copy it from flash. */
-NOINLINE void drive_zero(void *object, uint16_t size)
+void drive_zero(void *object, uint16_t size)
 {
     uint8_t *byte = object;
     uint16_t left;

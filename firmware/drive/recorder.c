@@ -2,17 +2,16 @@
 #include "drive/recorder.h"
 
 #ifdef MODE_WITHOUT_RECORDER
-#pragma message(MODE_WITHOUT_RECORDER " takes the RAM of the fault recorder: this build has no recorder, whatever RECORDER_PERIODS says")
+#pragma message(MODE_WITHOUT_RECORDER " takes the fault recorder's place in RAM: this build has no recorder, whatever RECORDER_PERIODS says")
 #endif
 
-#define RECORDER_CHECK 0x5EC0u
+#define RECORDER_CHECK 0x5Eu
 
 static void recorder_begin(recorder_t *r)
 {
+    drive_zero(r, sizeof *r); /* the test of the RAM reads it all */
     r->check = RECORDER_CHECK;
     r->next = RECORDER_FIRST;
-    r->full = 0;
-    r->fault = (uint16_t)FAULT_NONE;
     r->left = RECORDER_AFTER + 1u; /* last: from now on the control interrupt writes */
 }
 
@@ -20,41 +19,36 @@ static void recorder_begin(recorder_t *r)
 static uint16_t recorder_is_valid(const recorder_t *r)
 {
     return (uint16_t)(r->check == RECORDER_CHECK && r->left <= RECORDER_AFTER + 1u && r->full <= 1u && r->fault < (uint16_t)FAULT_COUNT
-                      && r->next >= 0 && r->next <= RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_WORDS == 0u);
+                      && (uint16_t)r->next < sizeof r->row && (uint16_t)r->next % (uint16_t)RECORDER_BYTES == 0u);
 }
 
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
 {
-    uint16_t first;
-    if (powered_up) { /* the test of the RAM reads it all */
-        uint16_t n;
-        for (n = 0; n < sizeof r->word / sizeof r->word[0]; n++) {
-            r->word[n] = 0;
+    if (!powered_up && recorder_is_valid(r)) {
+        if (r->fault == (uint8_t)FAULT_NONE) {
+            r->fault = (uint8_t)fault;
+        }
+        if (r->fault != (uint8_t)FAULT_NONE) {
+            r->left = 0;
+            return;
         }
     }
-    if (powered_up || !recorder_is_valid(r)) {
-        recorder_begin(r);
-        return;
-    }
-    first = (r->fault != (uint16_t)FAULT_NONE) ? r->fault : (uint16_t)fault;
-    if (first == (uint16_t)FAULT_NONE) {
-        recorder_begin(r);
-        return;
-    }
-    r->fault = first;
-    r->left = 0;
+    recorder_begin(r);
 }
 
 void recorder_background(recorder_t *r, const drive_t *d)
 {
-    if (r->left == 0u) {
-        if (d->command.run) {
-            recorder_begin(r);
+    const uint16_t left = r->left;
+    if (left != 0u) {
+        r->offset_a_q13 = d->calibration.offset_a_q13;
+        r->offset_b_q13 = d->calibration.offset_b_q13;
+        if (left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
+            r->left = 0; /* cleared before the last row: what comes now is no part of it */
         }
-    } else if (r->left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
-        r->left = 0; /* cleared before the last row: what comes now is no part of it */
+    } else if (d->command.run) {
+        recorder_begin(r);
     } else {
-        /* it records */
+        /* it is kept */
     }
 }
 
@@ -63,11 +57,5 @@ uint16_t recorder_rows(const recorder_t *r)
     if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
         return 0;
     }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_FIRST - r->next) / RECORDER_WORDS);
-}
-
-uint16_t recorder_place(const recorder_t *r, uint16_t n)
-{
-    int16_t place = (int16_t)((r->full ? r->next : RECORDER_FIRST) / RECORDER_WORDS - (int16_t)n);
-    return (uint16_t)((place >= 0) ? place : place + (int16_t)RECORDER_ROWS);
+    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
 }

@@ -213,6 +213,9 @@ typedef struct {
 
 #define CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
 
+/** Clears bytes: assigning a zero struct would copy it from flash. */
+void drive_zero(void *object, uint16_t size);
+
 /** Brings the object to CALIBRATE; every field gets its start value. */
 void drive_init(drive_t *d, const drive_params_t *p);
 

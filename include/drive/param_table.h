@@ -74,11 +74,11 @@
     X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
 
-#define PARAM_RECORDER(X) /* Fault recorder: 56 rows before a fault, 16 from it on */ \
+#define PARAM_RECORDER(X) /* Fault recorder: 48 rows before a fault, 16 from it on */ \
     X(RECORDER_PERIODS, "periods", 0, 64, 2, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
 
 #define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \
-    X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, the fault recorder's memory is their trace buffer; 0: status line only")
+    X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, their trace buffer takes the fault recorder's place; 0: status line only")
 
 #define PARAM_RETRY(X) /* Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it */ \
     X(RETRY_COUNT, "times", 0, 20, 0, "retries before a fault stays; 0: never, appliances usually have 3") \

@@ -6,48 +6,62 @@
 #include "drive/modes/recorder_room.h"
 #include "drive/param_scaling.h"
 
-#define RECORDER_ROWS 72  /* 12 bytes each: 864 of the part's 2048; the stack needs 494 */
+#define RECORDER_ROWS 64  /* six bytes each: 384 of the part's 2048 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */
 
-/** The words of a row. The bus and the speed take turns in the last one: both change slowly. */
+/** The bytes of a row. All but the state's are the upper byte of a word, which is never out of range.
+ *
+ *  What changes slowly is a word in four rows, its lowest bits first, all of them of the first row's moment: the estimated speed where the
+ *  first row's place in the ring is 4, 12, ..., the bus as the converter gives it where it is 0, 8, ... */
 enum {
-    RECORDER_I_A, /**< measured, Q13 */
+    RECORDER_I_A, /**< as the converter gives it: the head line tells the offsets */
+    RECORDER_V_D, /**< commanded, Q14 / 256 */
     RECORDER_I_B,
-    RECORDER_V_D, /**< commanded, Q14 */
     RECORDER_V_Q,
-    RECORDER_ANGLE, /**< control angle of the next sample; its lowest four bits are the state */
-    RECORDER_SLOW,  /**< in even rows of the ring the bus as the converter gives it; in odd ones the estimated speed, electrical rpm */
-    RECORDER_WORDS  /**< of a row: 12 bytes */
+    RECORDER_SLOW,  /**< four bits of what changes slowly; the lower four are the state */
+    RECORDER_ANGLE, /**< control angle of the next sample, 256 a turn */
+    RECORDER_BYTES  /**< of a row */
 };
-#define RECORDER_STATE_BITS 15u
 
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)
-#define RECORDER_FIRST ((int16_t)(RECORDER_EVERY != 0u ? (RECORDER_ROWS - 1) * RECORDER_WORDS : 0)) /**< index of the first row that is written */
-#define RECORDER_SIZE (RECORDER_FIRST + RECORDER_WORDS)
+#define RECORDER_PLACES (RECORDER_EVERY != 0u ? RECORDER_ROWS : 1)
+#define RECORDER_FIRST ((int16_t)((RECORDER_PLACES - 1) * RECORDER_BYTES)) /**< bytes before the first row that is written */
+
+/** A word's lower byte makes place for the byte before it: cheaper than to take the words apart. */
+typedef union {
+    int16_t word[RECORDER_BYTES / 2];
+    int8_t byte[RECORDER_BYTES];
+} recorder_row_t;
 
 /** It outlives a reset: nothing but recorder_restart() gives it a start value. */
 typedef struct {
-    int16_t word[RECORDER_SIZE]; /**< rows, the newest before the older ones */
-    int16_t next;                /**< index of the next row's first word */
-    volatile uint16_t left;      /**< RECORDER_AFTER + 1 before a fault, then one less with each row; 0: complete, nothing more is recorded */
-    uint16_t full;               /**< 1: every row has been written */
-    uint16_t fault;              /**< drive_fault_t, the first since the recorder began */
-    uint16_t check;              /**< tells a recorder from what RAM holds after power-up */
+    recorder_row_t row[RECORDER_PLACES]; /**< the newest before the older ones */
+    int16_t next;                        /**< bytes before the next row */
+    int16_t offset_a_q13;                /**< of the currents, calibrated: after a reset nobody else knows it */
+    int16_t offset_b_q13;
+    uint16_t slow;         /**< what changes slowly: its lowest four bits are the next row's */
+    volatile uint8_t left; /**< RECORDER_AFTER + 1 before a fault, then one less with each row; 0: complete, nothing more is recorded */
+    uint8_t full;          /**< 1: every row has been written */
+    uint8_t fault;         /**< drive_fault_t, the first since the recorder began */
+    uint8_t check;         /**< tells a recorder from what RAM holds after power-up */
 } recorder_t;
 
 /** After a reset. A record of a fault, or of what came before a reset that is a fault itself, is kept; else the recorder begins anew.
  *  @param powered_up RAM holds anything @param fault that the drive starts with */
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault);
 
-/** A pass of the background: a start begins a new record. */
+/** A pass of the background: a start begins a new record, which has the offsets of its run. */
 void recorder_background(recorder_t *r, const drive_t *d);
 
 /** Rows of a complete record; 0 before a fault. */
 uint16_t recorder_rows(const recorder_t *r);
 
-/** Place in the ring of row n of the record, the oldest being row 0. */
-uint16_t recorder_place(const recorder_t *r, uint16_t n);
+/** Place in the ring of the row that so many later ones follow: the newest has none. */
+QM_INLINE uint16_t recorder_place(const recorder_t *r, uint16_t later)
+{
+    return (uint16_t)((uint16_t)r->next / (uint16_t)RECORDER_BYTES + 1u + later) % RECORDER_ROWS;
+}
 
 /** 1 in the periods that get a row: those of the slow steps, with late duties those between, which have the time. */
 QM_INLINE uint16_t recorder_is_due(const drive_t *d)
@@ -62,30 +76,41 @@ QM_INLINE void recorder_in_fault(recorder_t *r, const drive_t *d)
         r->left--;
     }
     if (r->fault == (uint16_t)FAULT_NONE) {
-        r->fault = d->fault;
+        r->fault = (uint8_t)d->fault;
     }
 }
 
-/** The last work of a period. @param v_bus_raw the converter's result for the bus */
-QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t v_bus_raw)
+/** The upper byte of a word. */
+QM_INLINE int8_t recorder_upper(int16_t word)
 {
-    int16_t *row;
-    int16_t at = r->next, slow = v_bus_raw;
+    return (int8_t)(word >> 8);
+}
+
+/** The last work of a period. @param i_a,i_b,v_bus the converter's results; as a structure they would be kept on the stack */
+QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, int16_t v_bus)
+{
+    recorder_row_t *row;
+    int16_t at = r->next;
+    uint16_t slow = r->slow;
 
     if (r->left == 0u || !recorder_is_due(d)) {
         return;
     }
-    row = &r->word[at];
-    if (((uint16_t)at & 2u) != 0u) { /* six words a row: set in every other one */
-        slow = estimator_speed(&d->run.estimator);
+    if (((uint16_t)at & 6u) == 0u) { /* six bytes a row: every fourth place */
+        slow = (uint16_t)estimator_speed(&d->run.estimator);
+        if (((uint16_t)at & 8u) == 0u) {
+            slow = (uint16_t)v_bus;
+        }
     }
-    row[RECORDER_I_A] = d->phases_q13.a;
-    row[RECORDER_I_B] = d->phases_q13.b;
-    row[RECORDER_V_D] = d->run.control.v_q14.d;
-    row[RECORDER_V_Q] = d->run.control.v_q14.q;
-    row[RECORDER_ANGLE] = (int16_t)((d->angle & (uint16_t)~RECORDER_STATE_BITS) | d->state);
-    row[RECORDER_SLOW] = slow;
-    at = (int16_t)(at - (int16_t)RECORDER_WORDS);
+    row = (recorder_row_t *)(void *)((int8_t *)r->row + at);
+    row->word[RECORDER_V_D / 2] = d->run.control.v_q14.d;
+    row->word[RECORDER_V_Q / 2] = d->run.control.v_q14.q;
+    row->word[RECORDER_ANGLE / 2] = (int16_t)d->angle;
+    row->byte[RECORDER_I_A] = recorder_upper(i_a);
+    row->byte[RECORDER_I_B] = recorder_upper(i_b);
+    row->byte[RECORDER_SLOW] = (int8_t)((uint16_t)(slow << 4) | d->state);
+    r->slow = (uint16_t)(slow >> 4);
+    at = (int16_t)(at - (int16_t)RECORDER_BYTES);
     if (at < 0) {
         at = RECORDER_FIRST;
         r->full = 1;

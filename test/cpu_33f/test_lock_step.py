@@ -210,22 +210,24 @@ def test_the_fault_input_is_a_named_fault_in_both(board: PilBoard) -> None:
     assert board.get("pwm.outputs_on") == 0
 
 
-def test_the_fault_recorder_sends_the_trace_to_the_count(board: PilBoard) -> None:
+def test_the_fault_recorder_sends_the_trace_to_the_byte(board: PilBoard) -> None:
     start(board)
-    board.trace_start(["fw.fault", "fw.i_a_a", "fw.i_b_a", "fw.v_d_v", "fw.v_q_v", "fw.theta_ctrl_deg", "fw.state", "fw.slow_phase"], 1)
+    board.trace_start(["fw.fault", "reg.ADC1BUF1", "reg.ADC1BUF2", "fw.v_d_v", "fw.v_q_v", "fw.theta_ctrl_deg", "fw.state", "fw.slow_phase"], 1)
     pass_ms(board, 100)
     board.uart_take()
     board.set("input.flta", 1)
     pass_ms(board, 400)
     record, = recorder.parse(board.uart_take(), "")
-    assert (record.fault, record.every, len(record.words), record.fault_row(7)) == (1, 2, 72, 56)
+    assert (record.fault, record.every, len(record.rows), record.fault_row(7)) == (1, 2, 64, 48)
     rows, trace = recorder.scaled(record, library.params, library.states), board.trace_take()
     at = int((trace[:, 0] != 0).argmax())
     at += int(trace[at, 7]) % 2 # a row belongs to an even period
-    part = trace[at - 2 * 56:at + 2 * 16:2]
-    for column, values, count in ((1, rows.i_a, "CURRENT_A"), (2, rows.i_b, "CURRENT_A"), (3, rows.v_d, "VOLTAGE_V"), (4, rows.v_q, "VOLTAGE_V")):
-        assert (part[:, column] / library.params[f"COUNT_{count}"]).round().tolist() == (values / library.params[f"COUNT_{count}"]).round().tolist()
-    assert ((part[:, 5] * 65536 / 360).round().astype(int) & ~recorder.STATE_BITS).tolist() == (rows.angle_deg * 65536 / 360).round().tolist()
+    part = trace[at - 2 * 48:at + 2 * 16:2].astype(float)
+    volts = library.params["COUNT_VOLTAGE_V"]
+    for column, place, count in ((1, recorder.I_A, 1.0), (2, recorder.I_B, 1.0), (3, recorder.V_D, volts), (4, recorder.V_Q, volts),
+                                 (5, recorder.ANGLE, 360.0 / 65536.0)):
+        words = (part[:, column] / count).round().astype(int)
+        assert (words >> 8 & 0xFF).tolist() == [row[place] & 0xFF for row in record.rows]
     assert part[:, 6].tolist() == record.states
     assert rows.bus_v[rows.bus_v > 0] == pytest.approx(24.0, abs=0.5)
 
@@ -289,7 +291,7 @@ def test_outputs_go_off_and_the_fault_outlives_the_watchdogs_reset(running: PilB
     sent = running.uart_take()
     assert re.search(rf"reset WDTO\r\n(.*\n)*state 7 fault {fault} speed", sent)
     record = recorder.parse(sent.partition("reset WDTO")[2], "")[0]
-    assert record.fault == fault and len(record.words) == 72 and set(record.states) <= {3, 7}, "what came before it outlives the reset, too"
+    assert record.fault == fault and len(record.rows) == 64 and set(record.states) <= {3, 7}, "what came before it outlives the reset, too"
     assert running.get("pwm.outputs_on") == 0
     assert [text for text in running.warnings() if "PLL" in text] == [], "the old clock goes on over this reset"
 

@@ -24,22 +24,20 @@ void setUp(void)
     record_init(FAULT_NONE);
 }
 
-/** Rows that differ in every word, the first one with `first`. */
+/** Rows that differ in every byte, the first one with `first`. */
 static void rows(uint16_t count, int16_t first)
 {
     uint16_t n;
     for (n = 0; n < count; n++) {
-        int16_t x = (int16_t)(first + (int16_t)n);
-        board_drive.phases_q13.a = x;
-        board_drive.phases_q13.b = (int16_t)-x;
-        board_drive.run.control.v_q14.d = (int16_t)(x + 1000);
-        board_drive.run.control.v_q14.q = (int16_t)(-x - 1000);
-        board_drive.angle = (uint16_t)(16u * (uint16_t)x);
-        board_drive.run.estimator.omega_filtered_q16 = x * 65536;
+        int16_t x = (int16_t)(first + (int16_t)n), upper = (int16_t)(256 * x);
+        board_drive.run.control.v_q14.d = (int16_t)(upper + 0x0100);
+        board_drive.run.control.v_q14.q = (int16_t)(-upper - 1);
+        board_drive.angle = (uint16_t)(uint32_t)(16 * upper);
+        board_drive.run.estimator.omega_filtered_q16 = (0x3456 + upper) * 65536;
         if (board_drive.fault != (uint16_t)FAULT_NONE) {
             recorder_in_fault(&board_recorder, &board_drive);
         }
-        recorder_tick(&board_recorder, &board_drive, (int16_t)(3 * x));
+        recorder_tick(&board_recorder, &board_drive, upper, (int16_t)-upper, (int16_t)(0x1200 + upper));
     }
 }
 
@@ -49,7 +47,7 @@ static void record(uint16_t before)
     rows(before, 0);
     board_drive.fault = (uint16_t)FAULT_STALL;
     board_drive.state = (uint16_t)DRIVE_FAULT;
-    rows(30, 500);
+    rows(30, -20);
 }
 
 static void expect_line(const char *text)
@@ -70,12 +68,17 @@ static uint16_t lines(void)
 
 void test_lines_tell_head_and_rows_from_the_oldest_on(void)
 {
-    record(2);
+    board_drive.calibration.offset_a_q13 = -40;
+    board_drive.calibration.offset_b_q13 = 3;
     record_tick();
-    expect_line("record fault 6 rows 18 every 2\r\n");
-    expect_line("row 71 0 0 1000 -1000 5 0\r\n");    /* odd: the speed */
-    expect_line("row 70 1 -1 1001 -1001 21 3\r\n");  /* even: the bus */
-    expect_line("row 69 500 -500 1500 -1500 8007 500\r\n");
+    record(4);
+    record_tick();
+    expect_line("record fault 6 rows 20 every 2 offsets -40 3\r\n");
+    expect_line("row 63 0 1 0 -1 5 0\r\n"); /* CLOSED, and nothing yet of what changes slowly */
+    expect_line("row 62 1 2 -1 -2 5 16\r\n");
+    expect_line("row 61 2 3 -2 -3 5 32\r\n");
+    expect_line("row 60 3 4 -3 -4 101 48\r\n");        /* 0x65: the speed, 0x3756 */
+    expect_line("row 59 -20 -19 20 19 87 -64\r\n");    /* 0x57: FAULT */
     TEST_ASSERT_EQUAL_UINT16(15, lines());
     expect_line("");
 }
@@ -85,20 +88,20 @@ void test_the_ring_s_end_is_in_the_middle_of_a_full_record(void)
     uint16_t n;
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 72 every 2\r\n");
-    for (n = 34; n < 34 + 72; n++) {
-        unsigned place = 71u - n % 72u;
+    expect_line("record fault 6 rows 64 every 2 offsets 0 0\r\n");
+    for (n = 42; n < 42 + 64; n++) {
+        unsigned place = 63u - n % 64u;
         char begin[20];
-        (void)snprintf(begin, sizeof begin, "row %u %d ", place, (n < 90u) ? n : n + 410u);
+        (void)snprintf(begin, sizeof begin, "row %u %d ", place, (n < 90u) ? n : n - 110);
         TEST_ASSERT_TRUE(record_line(line) > line);
         TEST_ASSERT_EQUAL_STRING_LEN(begin, line, strlen(begin));
     }
     expect_line("");
 }
 
-void test_the_longest_row_fits_a_status_line(void)
+void test_the_longest_line_fits_a_status_line(void)
 {
-    TEST_ASSERT_TRUE(sizeof "row 71 -32768 -32768 -32768 -32768 -32768 -32768\r\n" < sizeof line);
+    TEST_ASSERT_TRUE(sizeof "record fault 20 rows 64 every 64 offsets -1024 -1024\r\n" < sizeof line);
 }
 
 void test_nothing_is_sent_before_the_last_row_and_nothing_twice(void)
@@ -122,12 +125,11 @@ void test_a_kept_record_is_sent_again_after_a_reset(void)
 {
     record(90);
     record_tick();
-    TEST_ASSERT_EQUAL_UINT16(73, lines());
+    TEST_ASSERT_EQUAL_UINT16(65, lines());
     board_reset_cause = PIN;
     record_init(FAULT_NONE);
-    expect_line("");
     record_tick();
-    TEST_ASSERT_EQUAL_UINT16(73, lines());
+    TEST_ASSERT_EQUAL_UINT16(65, lines());
     board_reset_cause = POWER_UP;
     record_init(FAULT_NONE);
     record_tick();
@@ -143,7 +145,7 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
 {
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 72 every 2\r\n");
+    expect_line("record fault 6 rows 64 every 2 offsets 0 0\r\n");
     board_drive.fault = (uint16_t)FAULT_NONE;
     board_drive.command.run = 1;
     record_tick();
@@ -151,5 +153,5 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
     board_drive.command.run = 0;
     record(1);
     record_tick();
-    expect_line("record fault 6 rows 17 every 2\r\n");
+    expect_line("record fault 6 rows 17 every 2 offsets 0 0\r\n");
 }

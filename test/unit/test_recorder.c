@@ -3,6 +3,7 @@
 
 #include "drive/recorder.h"
 
+#include <math.h>
 #include <string.h>
 
 static recorder_t recorder;
@@ -18,43 +19,77 @@ void setUp(void)
     ticks = 0; /* and the drive's are 1024 */
 }
 
-void test_power_up_leaves_no_word_as_it_was(void)
+void test_power_up_leaves_no_byte_as_it_was(void)
 {
-    for (uint16_t n = 0; n < sizeof recorder.word / sizeof recorder.word[0]; n++) {
-        TEST_ASSERT_EQUAL_INT16(0, recorder.word[n]);
-    }
+    static recorder_t other;
+    memset(&other, 0xA5, sizeof other);
+    recorder_restart(&other, 1, FAULT_NONE);
+    TEST_ASSERT_EQUAL_MEMORY(&other, &recorder, sizeof recorder);
+    TEST_ASSERT_EQUAL_UINT(RECORDER_ROWS * RECORDER_BYTES + 12, sizeof recorder);
 }
 
-/* What the row of a tick has. */
-static int16_t i_a(uint16_t tick)
+/* What the samples and the drive have in a tick; multiples of 257 differ in their upper bytes. */
+static int16_t word(uint16_t tick, int16_t times)
 {
-    return (int16_t)(-16 * (int16_t)(tick % 100u));
+    return (int16_t)(257 * times * (int16_t)(tick % 10u));
 }
 
-static int16_t i_b(uint16_t tick)
+static int16_t raw_a(uint16_t tick)
 {
-    return (int16_t)(16 * (int16_t)(tick % 90u));
+    return word(tick, -12);
+}
+
+static int16_t raw_b(uint16_t tick)
+{
+    return word(tick, 11);
+}
+
+static int16_t v_d(uint16_t tick)
+{
+    return (int16_t)(80 * tick);
+}
+
+static int16_t v_q(uint16_t tick)
+{
+    return (int16_t)(-57 * (int16_t)tick);
+}
+
+static uint16_t angle(uint16_t tick)
+{
+    return (uint16_t)(977u * tick);
 }
 
 static int16_t v_bus(uint16_t tick)
 {
-    return rig_raw_bus(PARAM_F(NOMINAL_BUS_V) + 0.1F * (float)(tick % 20u));
+    return rig_raw_bus(PARAM_F(NOMINAL_BUS_V) + 0.25F * (float)(tick % 20u));
+}
+
+static int16_t speed(uint16_t tick)
+{
+    return (int16_t)(-20000 + 67 * (int16_t)tick);
+}
+
+/** Upper byte, rounded down. */
+static int upper(int16_t x)
+{
+    return (int)floor((double)x / 256.0);
 }
 
 /** A period as the board's interrupt has it; every quantity moves. */
 static void period(void)
 {
-    rig_currents(i_a(ticks), i_b(ticks));
+    samples.i_a = raw_a(ticks);
+    samples.i_b = raw_b(ticks);
     samples.v_bus = v_bus(ticks);
-    drive.run.control.v_q14.d = (int16_t)(100 + ticks);
-    drive.run.control.v_q14.q = (int16_t)-ticks;
-    drive.angle = (uint16_t)(977u * ticks);
+    drive.run.control.v_q14.d = v_d(ticks);
+    drive.run.control.v_q14.q = v_q(ticks);
+    drive.angle = angle(ticks);
     rig_tick(1);
-    rig_speed((int16_t)(3 * ticks));
+    rig_speed(speed(ticks));
     if (drive.fault != (uint16_t)FAULT_NONE) {
         recorder_in_fault(&recorder, &drive);
     }
-    recorder_tick(&recorder, &drive, samples.v_bus);
+    recorder_tick(&recorder, &drive, samples.i_a, samples.i_b, samples.v_bus);
     TEST_ASSERT_TRUE(ticks < sizeof state_of);
     state_of[ticks] = (uint8_t)drive.state;
     ticks++;
@@ -80,25 +115,37 @@ static uint16_t end_of(uint16_t before)
     return (uint16_t)((before | 1u) + 2u * RECORDER_AFTER - 1u);
 }
 
+/** Four bits of what changes slowly, of the tick of the first of four rows; 0 before that. */
+static unsigned slow_bits(uint16_t place, uint16_t tick)
+{
+    uint16_t row = (uint16_t)(0u - place) % 4u;
+    int16_t of = (int16_t)(tick - 2u * row);
+    if (of < 0) {
+        return 0;
+    }
+    return ((unsigned)(((place + row) % 8u == 4u) ? speed((uint16_t)of) : v_bus((uint16_t)of)) >> (4u * row)) & 15u;
+}
+
 /** The record is complete, and its rows are those of every second tick before `end`. */
 static void expect_rows(uint16_t rows, uint16_t end)
 {
     uint16_t n;
     TEST_ASSERT_EQUAL_UINT16(rows, recorder_rows(&recorder));
     for (n = 0; n < rows; n++) {
-        uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(((end - 2u) | 1u) - 2u * (rows - 1u - n));
-        const int16_t *word = &recorder.word[place * RECORDER_WORDS];
+        uint16_t place = recorder_place(&recorder, (uint16_t)(rows - 1u - n)), tick = (uint16_t)(((end - 2u) | 1u) - 2u * (rows - 1u - n));
+        const int8_t *byte = recorder.row[place].byte;
         TEST_ASSERT_TRUE(place < RECORDER_ROWS);
-        TEST_ASSERT_EQUAL_INT16(i_a(tick), word[RECORDER_I_A]);
-        TEST_ASSERT_EQUAL_INT16(i_b(tick), word[RECORDER_I_B]);
-        TEST_ASSERT_EQUAL_INT16(100 + tick, word[RECORDER_V_D]);
-        TEST_ASSERT_EQUAL_INT16(-(int16_t)tick, word[RECORDER_V_Q]);
-        TEST_ASSERT_EQUAL_HEX16(((uint16_t)(977u * tick) & 0xFFF0u) | state_of[tick], word[RECORDER_ANGLE]);
-        TEST_ASSERT_EQUAL_INT16((place % 2u) ? (int16_t)(3 * tick) : v_bus(tick), word[RECORDER_SLOW]);
+        TEST_ASSERT_EQUAL_INT8(upper(raw_a(tick)), byte[RECORDER_I_A]);
+        TEST_ASSERT_EQUAL_INT8(upper(raw_b(tick)), byte[RECORDER_I_B]);
+        TEST_ASSERT_EQUAL_INT8(upper(v_d(tick)), byte[RECORDER_V_D]);
+        TEST_ASSERT_EQUAL_INT8(upper(v_q(tick)), byte[RECORDER_V_Q]);
+        TEST_ASSERT_EQUAL_HEX8(angle(tick) >> 8, byte[RECORDER_ANGLE]);
+        TEST_ASSERT_EQUAL_HEX8(state_of[tick], (unsigned)byte[RECORDER_SLOW] & 15u);
+        TEST_ASSERT_EQUAL_HEX8(slow_bits(place, tick), ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
     }
 }
 
-void test_fifty_six_rows_before_a_fault_and_sixteen_from_it_on_wherever_the_ring_stands(void)
+void test_forty_eight_rows_before_a_fault_and_sixteen_from_it_on_wherever_the_ring_stands(void)
 {
     uint16_t before;
     for (before = 2 * (RECORDER_ROWS - RECORDER_AFTER); before < 4 * RECORDER_ROWS + 16; before++) {
@@ -132,7 +179,8 @@ void test_first_row_in_state_fault_is_the_fault_s_own(void)
     drive_raise(&drive, FAULT_OVERCURRENT_HW);
     periods(40);
     for (n = 0; n < RECORDER_ROWS; n++) {
-        uint16_t state = (uint16_t)recorder.word[recorder_place(&recorder, n) * RECORDER_WORDS + RECORDER_ANGLE] & RECORDER_STATE_BITS;
+        uint16_t place = recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n));
+        unsigned state = (unsigned)recorder.row[place].byte[RECORDER_SLOW] & 15u;
         TEST_ASSERT_EQUAL_UINT16((n < RECORDER_ROWS - RECORDER_AFTER) ? DRIVE_STOPPED : DRIVE_FAULT, state);
     }
 }
@@ -169,6 +217,40 @@ void test_a_cleared_fault_s_record_stays_until_the_next_start(void)
     periods(40);
     expect_rows(2 + RECORDER_AFTER, end_of(5));
     TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_HW, recorder.fault);
+}
+
+static void expect_offsets(int16_t a_q13, int16_t b_q13)
+{
+    TEST_ASSERT_EQUAL_INT16(a_q13, recorder.offset_a_q13);
+    TEST_ASSERT_EQUAL_INT16(b_q13, recorder.offset_b_q13);
+}
+
+static void pass(int16_t offset_a_q13, int16_t offset_b_q13)
+{
+    drive.calibration.offset_a_q13 = offset_a_q13;
+    drive.calibration.offset_b_q13 = offset_b_q13;
+    recorder_background(&recorder, &drive);
+}
+
+void test_record_keeps_the_offsets_of_its_run(void)
+{
+    expect_offsets(0, 0);
+    pass(-40, 30);
+    expect_offsets(-40, 30);
+    periods(100);
+    drive_raise(&drive, FAULT_STALL);
+    periods(7);
+    pass(-40, 30);
+    periods(40);
+    pass(7, 8); /* measured anew after the fault is cleared */
+    expect_offsets(-40, 30);
+    recorder_restart(&recorder, 0, FAULT_WATCHDOG);
+    pass(0, 0); /* after a reset nobody has measured yet */
+    expect_offsets(-40, 30);
+    drive.command.run = 1;
+    pass(9, -10);
+    pass(9, -10);
+    expect_offsets(9, -10);
 }
 
 void test_of_two_faults_at_once_the_first_is_told(void)
@@ -240,20 +322,21 @@ void test_what_ram_happens_to_hold_is_no_record(void)
 {
     static const struct {
         const char *what;
-        uint16_t left, next, full, fault, check_off;
+        uint8_t left, full, fault, check_off;
+        int16_t next;
     } cases[] = {
-        { "check word", 0, 0, 1, FAULT_STALL, 1 },
-        { "rows to come", RECORDER_AFTER + 2, 0, 1, FAULT_STALL, 0 },
-        { "next row behind the last", 0, RECORDER_ROWS * RECORDER_WORDS, 1, FAULT_STALL, 0 },
-        { "next row before the first", 0, (uint16_t)-RECORDER_WORDS, 1, FAULT_STALL, 0 },
-        { "next row within a row", 0, 3, 1, FAULT_STALL, 0 },
-        { "neither full nor not", 0, 0, 2, FAULT_STALL, 0 },
-        { "no such fault", 0, 0, 1, FAULT_COUNT, 0 },
+        { "check word", 0, 1, FAULT_STALL, 1, 0 },
+        { "rows to come", RECORDER_AFTER + 2, 1, FAULT_STALL, 0, 0 },
+        { "next row behind the last", 0, 1, FAULT_STALL, 0, RECORDER_ROWS * RECORDER_BYTES },
+        { "next row before the first", 0, 1, FAULT_STALL, 0, -RECORDER_BYTES },
+        { "next row within a row", 0, 1, FAULT_STALL, 0, 3 },
+        { "neither full nor not", 0, 2, FAULT_STALL, 0, 0 },
+        { "no such fault", 0, 1, FAULT_COUNT, 0, 0 },
     };
     periods(100);
     EACH(n, cases) {
         recorder.left = cases[n].left;
-        recorder.next = (int16_t)cases[n].next;
+        recorder.next = cases[n].next;
         recorder.full = cases[n].full;
         recorder.fault = cases[n].fault;
         recorder.check = (uint16_t)(recorder.check + cases[n].check_off);

@@ -17,12 +17,13 @@ void setUp(void)
 static void period(void)
 {
     drive.ticks++;
-    drive.run.control.v_q14.d = (int16_t)drive.ticks;
-    rig_speed((int16_t)(2u * drive.ticks));
+    drive.run.control.v_q14.d = (int16_t)(64u * drive.ticks);
+    rig_speed((int16_t)(32u * drive.ticks));
+    samples.v_bus = (int16_t)(96u * drive.ticks);
     if (drive.fault != (uint16_t)FAULT_NONE) {
         recorder_in_fault(&recorder, &drive);
     }
-    recorder_tick(&recorder, &drive, (int16_t)(3u * drive.ticks));
+    recorder_tick(&recorder, &drive, samples.i_a, samples.i_b, samples.v_bus);
 }
 
 void test_every_fourth_period_has_a_row_and_sixteen_of_them_follow_the_fault_in_any_phase(void)
@@ -42,11 +43,14 @@ void test_every_fourth_period_has_a_row_and_sixteen_of_them_follow_the_fault_in_
         }
         TEST_ASSERT_EQUAL_UINT16(RECORDER_ROWS, recorder_rows(&recorder));
         for (n = 0; n < RECORDER_ROWS; n++) {
-            uint16_t place = recorder_place(&recorder, n), tick = (uint16_t)(first_after + 4u * (n - (RECORDER_ROWS - RECORDER_AFTER)));
-            const int16_t *word = &recorder.word[place * RECORDER_WORDS];
-            TEST_ASSERT_EQUAL_INT16(tick, word[RECORDER_V_D]);
-            TEST_ASSERT_EQUAL_INT16((place % 2u) ? 2u * tick : 3u * tick, word[RECORDER_SLOW]);
-            TEST_ASSERT_EQUAL_UINT16((tick < first_after) ? DRIVE_CALIBRATE : DRIVE_FAULT, (uint16_t)word[RECORDER_ANGLE] & RECORDER_STATE_BITS);
+            uint16_t place = recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n));
+            uint16_t tick = (uint16_t)(first_after + 4u * (n - (RECORDER_ROWS - RECORDER_AFTER)));
+            const int8_t *byte = recorder.row[place].byte;
+            uint16_t row = (uint16_t)(0u - place) % 4u, of = (uint16_t)(tick - 4u * row);
+            uint16_t slow = (uint16_t)((((place + row) % 8u == 4u) ? 32u : 96u) * of);
+            TEST_ASSERT_EQUAL_HEX8(64u * tick >> 8, byte[RECORDER_V_D]);
+            TEST_ASSERT_EQUAL_HEX8((slow >> (4u * row)) & 15u, ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
+            TEST_ASSERT_EQUAL_UINT16((tick < first_after) ? DRIVE_CALIBRATE : DRIVE_FAULT, (unsigned)byte[RECORDER_SLOW] & 15u);
         }
     }
 }

@@ -157,9 +157,9 @@ def write_record(rows: Rows, title: str, folder: Path, name: str) -> str:
     for values, label in ((rows.v_d, "Vd"), (rows.v_q, "Vq")):
         voltages.plot(rows.time_ms, values, ".-", markersize=3, label=label)
     angle.plot(rows.time_ms, rows.angle_deg, ".", markersize=3, label="control angle of the next sample")
-    has_bus, speed = ~np.isnan(rows.bus_v), slow.twinx()
+    has_bus, has_speed, speed = ~np.isnan(rows.bus_v), ~np.isnan(rows.speed_rpm), slow.twinx()
     lines = slow.plot(rows.time_ms[has_bus], rows.bus_v[has_bus], ".-", markersize=3, color="C0", label="bus")
-    lines += speed.plot(rows.time_ms[~has_bus], rows.speed_rpm[~has_bus], ".-", markersize=3, color="C1", label="estimated speed")
+    lines += speed.plot(rows.time_ms[has_speed], rows.speed_rpm[has_speed], ".-", markersize=3, color="C1", label="estimated speed")
     speed.set_ylabel("speed [rpm]")
     speed.grid(False)
     for axes, label in zip(panels, ("current [A]", "voltage [V peak, phase]", "angle [deg]", "bus [V]")):

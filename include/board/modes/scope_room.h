@@ -1,4 +1,4 @@
-/* The scope's memory: the fault recorder's, less what the scope itself and a mode take of it. */
+/* The scope's memory: what the chip has left without the fault recorder, less what a mode takes of it. */
 #ifndef BOARD_MODES_SCOPE_ROOM_H
 #define BOARD_MODES_SCOPE_ROOM_H
 

@@ -1,4 +1,4 @@
-/* Which modes take the fault recorder's RAM. */
+/* Which modes take the fault recorder's place in RAM. */
 #ifndef DRIVE_MODES_RECORDER_ROOM_H
 #define DRIVE_MODES_RECORDER_ROOM_H
 
