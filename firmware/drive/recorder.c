@@ -19,7 +19,7 @@ static void recorder_begin(recorder_t *r)
 static uint16_t recorder_is_valid(const recorder_t *r)
 {
     return (uint16_t)(r->check == RECORDER_CHECK && r->left <= RECORDER_AFTER + 1u && r->full <= 1u && r->fault < (uint16_t)FAULT_COUNT
-                      && (uint16_t)r->next <= (uint16_t)RECORDER_FIRST && (uint16_t)r->next % (uint16_t)RECORDER_BYTES == 0u);
+                      && (uint16_t)r->next < sizeof r->row && (uint16_t)r->next % (uint16_t)RECORDER_BYTES == 0u);
 }
 
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)

@@ -22,7 +22,6 @@ enum {
     RECORDER_ANGLE, /**< control angle of the next sample, 256 a turn */
     RECORDER_BYTES  /**< of a row */
 };
-#define RECORDER_STATE_BITS 15u
 
 /** Rows apart, in periods; 0: no recorder. */
 #define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)

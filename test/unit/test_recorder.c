@@ -140,7 +140,7 @@ static void expect_rows(uint16_t rows, uint16_t end)
         TEST_ASSERT_EQUAL_INT8(upper(v_d(tick)), byte[RECORDER_V_D]);
         TEST_ASSERT_EQUAL_INT8(upper(v_q(tick)), byte[RECORDER_V_Q]);
         TEST_ASSERT_EQUAL_HEX8(angle(tick) >> 8, byte[RECORDER_ANGLE]);
-        TEST_ASSERT_EQUAL_HEX8(state_of[tick], (unsigned)byte[RECORDER_SLOW] & RECORDER_STATE_BITS);
+        TEST_ASSERT_EQUAL_HEX8(state_of[tick], (unsigned)byte[RECORDER_SLOW] & 15u);
         TEST_ASSERT_EQUAL_HEX8(slow_bits(place, tick), ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
     }
 }
@@ -180,7 +180,7 @@ void test_first_row_in_state_fault_is_the_fault_s_own(void)
     periods(40);
     for (n = 0; n < RECORDER_ROWS; n++) {
         uint16_t place = recorder_place(&recorder, (uint16_t)(RECORDER_ROWS - 1u - n));
-        unsigned state = (unsigned)recorder.row[place].byte[RECORDER_SLOW] & RECORDER_STATE_BITS;
+        unsigned state = (unsigned)recorder.row[place].byte[RECORDER_SLOW] & 15u;
         TEST_ASSERT_EQUAL_UINT16((n < RECORDER_ROWS - RECORDER_AFTER) ? DRIVE_STOPPED : DRIVE_FAULT, state);
     }
 }

@@ -50,7 +50,7 @@ void test_every_fourth_period_has_a_row_and_sixteen_of_them_follow_the_fault_in_
             uint16_t slow = (uint16_t)((((place + row) % 8u == 4u) ? 32u : 96u) * of);
             TEST_ASSERT_EQUAL_HEX8(64u * tick >> 8, byte[RECORDER_V_D]);
             TEST_ASSERT_EQUAL_HEX8((slow >> (4u * row)) & 15u, ((unsigned)byte[RECORDER_SLOW] & 0xFFu) >> 4);
-            TEST_ASSERT_EQUAL_UINT16((tick < first_after) ? DRIVE_CALIBRATE : DRIVE_FAULT, (unsigned)byte[RECORDER_SLOW] & RECORDER_STATE_BITS);
+            TEST_ASSERT_EQUAL_UINT16((tick < first_after) ? DRIVE_CALIBRATE : DRIVE_FAULT, (unsigned)byte[RECORDER_SLOW] & 15u);
         }
     }
 }
