@@ -142,7 +142,7 @@
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
 
 /* ---- Fault recorder: 48 rows before a fault, 16 from it on -------------------------------------------------------- */
-#define RECORDER_PERIODS 2          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
+#define RECORDER_PERIODS 4          /* [periods]       0 .. 64        one row every RECORDER_PERIODS periods, a power of two; 0: no recorder */
 
 /* ---- Scope: watch, record and tune by the serial line (docs/scope.md) --------------------------------------------- */
 #ifndef SCOPE /* or build with -DSCOPE=1 */

@@ -75,7 +75,7 @@
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
 
 #define PARAM_RECORDER(X) /* Fault recorder: 48 rows before a fault, 16 from it on */ \
-    X(RECORDER_PERIODS, "periods", 0, 64, 2, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
+    X(RECORDER_PERIODS, "periods", 0, 64, 4, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
 
 #define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \
     X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, their trace buffer takes the fault recorder's place; 0: status line only")

@@ -44,8 +44,9 @@ QM_INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
 /** Last of the slow work: what the law of the next two periods needs and the samples do not change. */
 QM_INLINE void drive_prepare(drive_t *d, const drive_params_t *p)
 {
-    dq_t asked = d->run.control.ref_q13;
+    dq_t asked;
     if (drive_is_forced(d)) {
+        asked = d->run.control.ref_q13;
         (void)forced_angle_accelerate(&d->forced, &p->forced, d->direction, SLOW_EVERY);
         estimator_turn_frame(&d->run.estimator);
     } else { /* the pulses' centres are one and two steps ahead of the frame, or two and three */
@@ -104,17 +105,18 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
 }
 
 /* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn_step */
-/** First of the slow work: what a period with the bridge off is, or what the estimator's last two periods leave to be done; the modes of their own have
- *  no estimator. @param was_running the law has run in them @param follows 1: they have come to their end */
-QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, uint16_t was_running, uint16_t follows)
+/** First of the slow work: what a period with the bridge off is. */
+QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    if (!was_running) {
-        mode_idle(d);
-        idle_step(d, p, raw->i_a, raw->i_b);
-    } else if (MODE_ALIGNS && follows) {
+    mode_idle(d);
+    idle_step(d, p, raw->i_a, raw->i_b);
+}
+
+/** What the estimator's last two periods leave to be done. @param was_running the law has run in them; the modes of their own have no estimator */
+QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_running)
+{
+    if (MODE_ALIGNS && was_running) {
         estimator_settle(&d->run.estimator, &p->estimator);
-    } else {
-        /* in the next period */
     }
 }
 
@@ -282,11 +284,18 @@ QM_INLINE uint16_t drive_slow_follows(const drive_t *d)
  *  @param raw the converter's results of this period @return 1 while the bridge goes on switching */
 QM_INLINE uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    const uint16_t was_running = drive_is_running(d), due = drive_slow_is_due(d);
-
-    drive_rest(d, p, raw, was_running, (uint16_t)(LATE_DUTIES ? due ^ 1u : due));
-    if (!due) {
+    const uint16_t was_running = drive_is_running(d);
+    if (!was_running) {
+        drive_rest(d, p, raw);
+    }
+    if (!drive_slow_is_due(d)) {
+        if (LATE_DUTIES) {
+            drive_follow(d, p, was_running);
+        }
         return was_running;
+    }
+    if (!LATE_DUTIES) {
+        drive_follow(d, p, was_running);
     }
     drive_part(d, p, raw);
     if (!drive_is_running(d)) {

@@ -218,11 +218,11 @@ def test_the_fault_recorder_sends_the_trace_to_the_byte(board: PilBoard) -> None
     board.set("input.flta", 1)
     pass_ms(board, 400)
     record, = recorder.parse(board.uart_take(), "")
-    assert (record.fault, record.every, len(record.rows), record.fault_row(7)) == (1, 2, 64, 48)
+    assert (record.fault, record.every, len(record.rows), record.fault_row(7)) == (1, 4, 64, 48)
     rows, trace = recorder.scaled(record, library.params, library.states), board.trace_take()
     at = int((trace[:, 0] != 0).argmax())
     at += int(trace[at, 7]) % 2 # a row belongs to an even period
-    part = trace[at - 2 * 48:at + 2 * 16:2].astype(float)
+    part = trace[at - 4 * 48:at + 4 * 16:4].astype(float)
     volts = library.params["COUNT_VOLTAGE_V"]
     for column, place, count in ((1, recorder.I_A, 1.0), (2, recorder.I_B, 1.0), (3, recorder.V_D, volts), (4, recorder.V_Q, volts),
                                  (5, recorder.ANGLE, 360.0 / 65536.0)):

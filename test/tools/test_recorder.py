@@ -137,7 +137,7 @@ def faulted(causes: dict[str, float], at_s: float) -> tuple[str, np.ndarray, Lib
 def test_what_the_board_sends_is_its_trace_within_a_byte_s_step(causes: dict[str, float], fault: set[int]) -> None:
     sent, trace, library = faulted(causes, 0.5)
     record, = recorder.parse(sent, "")
-    assert record.fault in fault and record.every == 2 and len(record.rows) == 64
+    assert record.fault in fault and record.every == 4 and len(record.rows) == 64
     rows = recorder.scaled(record, library.params, library.states)
     at = int(np.flatnonzero(trace[:, 0])[0])
     assert record.fault_row(7) == 48
@@ -182,7 +182,7 @@ def test_a_run_that_ends_in_a_fault_shows_its_record_and_make_recorder_the_same(
     assert 'alt="recorder"' in page and "recorder.csv" in page and LOG in page
     assert "simulated 1.00 s" in out, "what is run on for the record is no part of the run"
     code, out, _ = command("recorder", str(tmp_path / "run" / LOG), "--library", str(LIBRARY), "--out", str(tmp_path / "again"))
-    assert code == 0 and "OVERCURRENT_HW: 48 rows before it, 16 from it on, 2 periods apart" in out
+    assert code == 0 and "OVERCURRENT_HW: 48 rows before it, 16 from it on, 4 periods apart" in out
     assert 'alt="recorder"' in (tmp_path / "again" / "index.html").read_text(encoding="utf-8")
     tables = [list(csv.DictReader((tmp_path / name / "recorder.csv").open(encoding="utf-8"))) for name in ("run", "again")]
     assert tables[0] == tables[1] and len(tables[0]) == 64 and tables[0][48]["state"] == "FAULT" and float(tables[0][48]["time_ms"]) == 0.0
