@@ -131,11 +131,11 @@ typedef struct {
     dq_t v_q14;                    /**< commanded voltages in the control frame */
     voltage_q14_t vq_limit_q14;
     pi_t pi_d, pi_q;
-    int16_t speed_kp_q13;           /**< the speed controller's gain in use */
-    int32_t iq_trim_q26;            /**< what its load's estimate misses at rest */
+    int16_t speed_kp_q13;             /**< the speed controller's gain in use */
+    int32_t iq_trim_q26;              /**< what its load's estimate misses at rest */
     speed_erpm_t trim_reference_erpm; /**< the reference at its last step */
-    int16_t iq_rest_q26;            /**< what its last step left below a whole count of q current */
-    current_q13_t sample_shift_q13; /**< q current that the sample misses at this speed */
+    int16_t iq_rest_q26;              /**< what its last step left below a whole count of q current */
+    current_q13_t sample_shift_q13;   /**< q current that the sample misses at this speed */
 } drive_control_t;
 
 /** The way from the forced angle to the estimator's. A step is a slow one. */

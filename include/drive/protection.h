@@ -153,7 +153,7 @@ NOINLINE void protection_check_model(drive_t *d, const drive_params_t *p)
 #define PROBE_DIP_STEPS 6      /* or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long */
 #define PROBE_PAUSE_STEPS 3125 /* five seconds from one to the next */
 #define PROBE_SLOPE_SHIFT 3    /* the largest current takes 8 steps, so that the estimate does not jump */
-#define PROBE_MOST_Q15 22528    /* of the largest current, so that as much q current is left */
+#define PROBE_MOST_Q15 22528   /* of the largest current, so that as much q current is left */
 #if MOTOR_SALIENCY_UH
 #define PROBE_LEAST_Q15 9830 /* 0.3: such a d current takes of a salient motor's torque, too */
 #else
