@@ -339,7 +339,7 @@ void test_what_ram_happens_to_hold_is_no_record(void)
         recorder.next = cases[n].next;
         recorder.full = cases[n].full;
         recorder.fault = cases[n].fault;
-        recorder.check = (uint16_t)(recorder.check + cases[n].check_off);
+        recorder.check = (uint8_t)(recorder.check + cases[n].check_off);
         recorder_restart(&recorder, 0, FAULT_STALL);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, recorder_rows(&recorder), cases[n].what);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(RECORDER_AFTER + 1, recorder.left, cases[n].what);
