@@ -221,7 +221,7 @@
  *   observer.load_slope_q15                16 1/A               315  Q15 a unit                  -0.064 %  one over it
  *   observer.large_erpm                29.856 rpm               149  erpm                        -0.189 %  large innovation without load
  *   observer.large_loaded_erpm         6.8899 rpm                34  erpm                        -1.305 %  and under load
- *   adaptation.rate_q16                     6 1/s               315  Q16 a step                  +0.136 %  flux and R follow
+ *   adaptation.rate_q16                     6 1/s               629  Q16 a step                  -0.023 %  flux and R follow
  *   adaptation.kfi_least                 -0.3 1               -9830  Q15                         -0.004 %  least change of 1/Kphi
  *   adaptation.kfi_most                  0.35 1               11468  Q15                         -0.007 %  largest
  *   adaptation.rs_least                  -0.4 1              -13107  Q15                         -0.002 %  least change of R
@@ -260,7 +260,7 @@
  *   stall_steps                          0.23 s                 288  rare steps                  +0.174 %  stall
  *   lost_lock_steps                      0.06 s                  75  rare steps                     exact  lost lock
  *   wrong_steps                           0.1 s                 250  slow steps                     exact  voltages and currents do not fit the motor
- *   impossible_steps                     0.25 s                 313  rare steps                  +0.160 %  flux or resistance impossible
+ *   impossible_steps                     0.25 s                 156  seldom steps                -0.160 %  flux or resistance impossible
  *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
  *   id_off_q13                        0.10185 A                 190  Q13 A                       +0.194 %  d current's mean deviation
  *   rs_impossible                         0.6 1               19660  Q15                         -0.004 %  change of R that no winding survives, 1: not told

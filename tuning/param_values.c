@@ -179,8 +179,8 @@ static void limits(void)
     FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
-    FIELD(stall_steps, PARAM_STALL_SEC, "s", SLOW_SELDOM * slots, "seldom steps", "stall");
-    FIELD(lost_lock_steps, 0.06, "s", SLOW_SELDOM * slots, "seldom steps", "lost lock");
+    FIELD(stall_steps, PARAM_STALL_SEC, "s", SLOW_RARE * slots, "rare steps", "stall");
+    FIELD(lost_lock_steps, 0.06, "s", SLOW_RARE * slots, "rare steps", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "slow steps", "voltages and currents do not fit the motor");
     FIELD(impossible_steps, 0.25, "s", SLOW_SELDOM * slots, "seldom steps", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");

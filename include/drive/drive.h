@@ -39,7 +39,7 @@ typedef enum {
     OUTPUTS_PWM
 } outputs_t;
 
-/** Constants of the machine around the control law. Times in periods, in slow steps (SLOW_PERIODS), or in seldom ones, of four. */
+/** Constants of the machine around the control law. Times in periods, in slow steps (SLOW_PERIODS), in rare ones, of two, or in seldom ones, of four. */
 typedef struct {
     estimator_params_t estimator;
     fieldweak_params_t fieldweak;
@@ -85,7 +85,7 @@ typedef struct {
     int32_t speed_ramp_q16;    /**< reference step per slow step, electrical rpm with 16 fraction bits */
     int32_t tuning_step_q16;   /**< the same in TUNING */
     int16_t ramp_hold_erpm;    /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
-    uint16_t stall_steps;      /**< seldom steps below half the reference that are a stall */
+    uint16_t stall_steps;      /**< rare steps below half the reference that are a stall */
     uint16_t lost_lock_steps;  /**< and out of lock that are a lost one */
     uint16_t wrong_steps;      /**< voltages and currents do not fit the motor */
     uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
@@ -177,14 +177,14 @@ typedef struct {
     handover_t handover;
     catch_t catching;
     drive_control_t control;
-    uint16_t stall_steps;         /**< seldom steps below half the reference, less four for each above */
+    uint16_t stall_steps;         /**< rare steps below half the reference, less four for each above */
     uint16_t probe_steps;         /**< of the probe whether the rotor turns, and of the pause after it */
     uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference; more than a dip while the probe's own lasts */
     current_q13_t probe_id_q13;   /**< its d current */
     current_q13_t probe_most_q13; /**< and the most of it */
     uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
     uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
-    uint16_t lost_lock_steps;     /**< two for each seldom step out of lock, less one for each in lock */
+    uint16_t lost_lock_steps;     /**< two for each rare step out of lock, less one for each in lock */
     SALIENT_STATE
     LATE_STATE
     MODE_STATE

@@ -137,8 +137,8 @@
         .speed_ramp_q16 = SPEEDREFRAMP, \
         .tuning_step_q16 = TUNING_STEP_Q16, \
         .ramp_hold_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) / 8.0F)), \
-        .stall_steps = PARAM_SELDOM_STEPS(PARAM_F(PARAM_STALL_SEC)), \
-        .lost_lock_steps = PARAM_SELDOM_STEPS(0.06F), \
+        .stall_steps = PARAM_RARE_STEPS(PARAM_F(PARAM_STALL_SEC)), \
+        .lost_lock_steps = PARAM_RARE_STEPS(0.06F), \
         .pot_zero_q16 = (uint16_t)(PARAM_F(POT_LIVE_ZERO) * 65536.0F + 0.5F), \
         .pot_scale_q15 = (uint16_t)(32768.0F / (1.0F - 2.0F * PARAM_F(POT_LIVE_ZERO)) + 0.5F), \
         .wrong_steps = PARAM_SLOW_STEPS(0.1F), \

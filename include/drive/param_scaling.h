@@ -169,6 +169,7 @@
 #define SLOW_SELDOM 4u                                                                                /* and in a seldom one, which is a round */
 #define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
 #define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
+#define PARAM_RARE_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_RARE))
 #define PARAM_SELDOM_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_SELDOM))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC ((float)SLOW_PERIODS * PARAM_F(LOOPTIME_SEC))

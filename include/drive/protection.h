@@ -51,7 +51,7 @@ QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
 }
 
 #define PROTECTION_DEAD_TIMES 5   /* emf_least_q12 is a fifth of what dead time takes */
-#define PROTECTION_UNEXPLAINED 8u /* as many wrong innovations: two a slow step */
+#define PROTECTION_UNEXPLAINED 2u /* as many wrong innovations */
 
 /** R of the header times a current, Q12. @param i_q13 not negative */
 QM_INLINE voltage_q12_t protection_ri(const drive_params_t *p, int16_t i_q13)
@@ -79,22 +79,13 @@ QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_para
                       && qm_size(d->run.control.ref_q13.q) < p->id_off_q13);
 }
 
-/** What the phases carry while innovations are wrong. Every slow step in closed loop, for seldom ones would meet the same angles of a turn. */
-QM_INLINE void protection_sum_phases(drive_t *d)
-{
-    drive_run_t *run = &d->run;
-    if (run->observer.wrong_steps != 0u) {
-        run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + ((uint16_t)qm_size(d->phases_q13.a) >> PROTECTION_PHASE_SHIFT));
-        run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + ((uint16_t)qm_size(d->phases_q13.b) >> PROTECTION_PHASE_SHIFT));
-        run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + ((uint16_t)qm_size(d->phases_q13.c) >> PROTECTION_PHASE_SHIFT));
-    }
-}
-
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
- *  with what is measured. Every seldom step in closed loop. */
+ *  with what is measured. In closed loop every seldom step, and every slow one while something is wrong: the phases' sums must not meet the same
+ *  angles of each turn. */
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
+    uint16_t a = (uint16_t)qm_size(d->phases_q13.a), b = (uint16_t)qm_size(d->phases_q13.b), c = (uint16_t)qm_size(d->phases_q13.c);
     if (protection_voltage_is_unexplained(run, p)) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + PROTECTION_UNEXPLAINED);
     }
@@ -102,9 +93,15 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
         run->phase_sums[0] = 0;
         run->phase_sums[1] = 0;
         run->phase_sums[2] = 0;
-    } else if (run->observer.wrong_steps <= p->wrong_steps) {
-        /* not for long enough */
-    } else if (protection_stop_is_blurred(d, p)) {
+        return;
+    }
+    run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));
+    run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + (b >> PROTECTION_PHASE_SHIFT));
+    run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + (c >> PROTECTION_PHASE_SHIFT));
+    if (run->observer.wrong_steps <= p->wrong_steps) {
+        return;
+    }
+    if (protection_stop_is_blurred(d, p)) {
         drive_enter(d, DRIVE_STOPPED); /* as at a stop's end: the bridge goes off and the rotor runs out */
     } else {
         drive_raise(d, protection_wrong_signal(run));
@@ -230,7 +227,7 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
 }
 
-/** Stall and lost lock: conditions that must not last. Every seldom step in closed loop. */
+/** Stall and lost lock: conditions that must not last. Every rare step in closed loop. */
 QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;

@@ -15,8 +15,8 @@ QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop, and at once after a
- *  large innovation. */
+/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop, after a large
+ *  innovation every slow one. */
 NOINLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
 {
     speed_schedule(run, p);

@@ -131,10 +131,6 @@ QM_INLINE void drive_speed_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
     if (late_first(call)) {
         handover_observe(&d->run, p);
-        protection_sum_phases(d);
-        if (!observer_is_calm(&d->run.observer)) { /* the very step that sees a load answers it */
-            speed_follow(&d->run, p);
-        }
     }
     if (late_second(call)) {
         speed_step(d, p);
@@ -168,7 +164,7 @@ QM_INLINE void drive_limit_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
-/** Does the rotor stand? Does it follow? Does the run go on? Every seldom step in closed loop, in two halves. */
+/** Does the rotor stand? Does the run go on? Every seldom step in closed loop, in two halves. */
 QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t call)
 {
     if (!drive_is_closed(d)) {
@@ -178,7 +174,6 @@ QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t ca
         protection_probe_rotor(d, p);
     }
     if (late_second(call)) {
-        protection_check_rotor(d, p);
         speed_choose_step(d, p);
     }
 }
@@ -188,7 +183,9 @@ QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t ca
 {
     if (late_first(call)) {
         if (drive_is_closed(d)) {
-            protection_check_signals(d, p);
+            if (d->run.observer.wrong_steps == 0u) { /* else its turn comes in each slow step */
+                protection_check_signals(d, p);
+            }
             model_update(d, p);
         } else {
             model_update_in_ramp(d, p);
@@ -218,24 +215,28 @@ QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_
     }
 }
 
-/** Last part of a slow step, what belongs to the speed: in every other one the rates and the gain of its controller, in those between its trim, in closed
- *  loop, and the estimator's sign. With late duties in the first half. */
+/** Last part of a slow step, what belongs to the speed: in every other one, and in each after a large innovation, the rates and the gain of its
+ *  controller; in those between its trim, does the rotor follow, in closed loop, and the estimator's sign; while signals seem wrong, are they? In two
+ *  halves. */
 QM_INLINE void drive_rate_step(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
 {
     const uint16_t between = (uint16_t)(part & 4u);
-    if (!late_first(call) || !drive_is_running(d)) {
-        return;
-    }
-    if (drive_is_closed(d)) {
+    if (late_first(call) && drive_is_closed(d)) {
         if (between) {
             speed_trim_step(d, p);
+            protection_check_rotor(d, p);
         }
-        if (!between) {
+        if (!between || !observer_is_calm(&d->run.observer)) {
             speed_follow(&d->run, p);
         }
     }
-    if (between) {
-        estimator_follow(&d->run.estimator, &p->estimator);
+    if (late_second(call)) {
+        if (between && drive_is_running(d)) {
+            estimator_follow(&d->run.estimator, &p->estimator);
+        }
+        if (d->run.observer.wrong_steps != 0u && drive_is_closed(d)) {
+            protection_check_signals(d, p);
+        }
     }
 }
 

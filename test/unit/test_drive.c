@@ -73,9 +73,9 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.duty_per_volt_q16 != 1u, "bus");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.circle.reciprocal != 1u, "circle");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.stall_steps != 99u, "protection");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.stall_steps != 99u, "protection");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.control.trim_reference_erpm != 1, "trim");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u || (slow == 0u && !observer_is_calm(&drive.run.observer)), drive.run.observer.wrong_erpm != 1, "rates");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u || (slow == 6u && !observer_is_calm(&drive.run.observer)), drive.run.observer.wrong_erpm != 1, "rates");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
     }

@@ -236,8 +236,8 @@ void test_speeds_and_times(void)
     EXACT(p.agree_steps, 50);                            /* 20 ms */
     EXACT(p.wait_periods, 4000);                /* 200 ms */
     EXACT(p.id_off_q13, 197);                            /* 2.75 A / 32 + 0.2 * 0.96 V / (2 pi 800 Hz 1.92 mH) */
-    EXACT(p.stall_steps, 144);                           /* 0.23 s */
-    EXACT(p.lost_lock_steps, 38);                        /* 60 ms */
+    EXACT(p.stall_steps, 288);                           /* 0.23 s */
+    EXACT(p.lost_lock_steps, 75);                        /* 60 ms */
     EXACT(p.rs_impossible, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
 }
 
@@ -382,7 +382,7 @@ void test_loop_time_scales_every_time_and_duty(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     EXACT(p.bootstrap_periods, 100);
-    EXACT(p.stall_steps, 72);
+    EXACT(p.stall_steps, 144);
     EXACT(p.svm.full, 4000);
     EXACT(p.svm.dead_time, 80); /* the same 2 us */
     EXACT(p.svm.top, 3872);

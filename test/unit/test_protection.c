@@ -139,7 +139,7 @@ void test_undervoltage_waits_for_a_start_and_comes_before_the_first_pulse(void)
 
 void test_stall_and_lost_lock_are_faults_when_they_last(void)
 {
-    enum { NEVER = 2000, STALL = 145, LOST_LOCK = 20 }; /* 230 ms, 30 ms */
+    enum { NEVER = 2000, STALL = 289, LOST_LOCK = 38 }; /* 230 ms, 30 ms */
     static const struct {
         const char *what;
         int16_t reference_erpm, speed_erpm, e_d, e_q;
@@ -198,10 +198,10 @@ void test_short_dips_of_speed_and_short_losses_of_lock_ride_through(void)
     uint16_t n;
     rig_closed(1, 10000);
     for (n = 0; n < 3u; n++) {
-        steps(144, 1000, 0);
-        steps(36, 6000, 0); /* a quarter of it */
-        steps(15, 10000, 2000);
-        steps(30, 10000, 0);
+        steps(288, 1000, 0);
+        steps(72, 6000, 0); /* a quarter of it */
+        steps(31, 10000, 2000);
+        steps(62, 10000, 0);
     }
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
 }
@@ -212,8 +212,8 @@ void test_rotor_that_only_jerks_has_stalled_though_it_is_fast_now_and_then(void)
     rig_closed(1, 10000);
     for (turn = 0; turn < 4u; turn++) {
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
-        steps(75, 1000, 0);
-        steps(12, 10000, 0);
+        steps(150, 1000, 0);
+        steps(25, 10000, 0);
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, drive.fault);
 }
@@ -247,10 +247,8 @@ static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13)
         drive.phases_q13.b = b_q13;
         drive.phases_q13.c = (int16_t)(-a_q13 - b_q13);
         drive.run.observer.wrong_steps++;
-        protection_sum_phases(&drive);
-        if (++steps % SLOW_SELDOM == 3u) {
-            protection_check_signals(&drive, &params);
-        }
+        protection_check_signals(&drive, &params);
+        steps++;
     }
     return steps;
 }
@@ -314,7 +312,7 @@ void test_voltage_that_neither_speed_nor_resistance_nor_dead_time_explains_is_a_
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.run.observer.wrong_steps, cases[n].what);
             emf((int16_t)(sign * (explained + 8)), cases[n].q_q12);
             protection_check_signals(&drive, &params);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(8, drive.run.observer.wrong_steps, cases[n].what);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(2, drive.run.observer.wrong_steps, cases[n].what);
         }
     }
 }
@@ -329,14 +327,13 @@ void test_voltage_without_current_on_a_rotor_that_stands_is_an_open_phase_within
     drive.phases_q13.c = -500;
     while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
         if (drive.run.observer.wrong_steps != 0u) {
-            drive.run.observer.wrong_steps = (uint16_t)(drive.run.observer.wrong_steps - 4u); /* four steps in which the observer sees nothing wrong */
+            drive.run.observer.wrong_steps--; /* the observer sees nothing wrong */
         }
-        protection_sum_phases(&drive);
         protection_check_signals(&drive, &params);
         steps++;
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_OPEN_PHASE, drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(62, steps);
+    TEST_ASSERT_EQUAL_UINT16(250, steps);
 }
 
 void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_without_a_fault(void)
@@ -603,7 +600,7 @@ void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.probe_steps);
 }
 
-void test_signals_and_model_are_checked_in_seldom_steps_of_closed_loop_only(void)
+void test_signals_and_model_are_checked_in_closed_loop_only_signals_that_seem_wrong_in_every_slow_step(void)
 {
     uint16_t part;
     for (part = 0; part < SLOW_PARTS; part++) {
@@ -612,8 +609,14 @@ void test_signals_and_model_are_checked_in_seldom_steps_of_closed_loop_only(void
         drive.run.impossible_steps = 1000;
         drive.run.adaptation.rs_q31 = INT32_MAX;
         rig_slow(part);
-        TEST_ASSERT_EQUAL_UINT16((part == 14u) ? FAULT_CURRENT_SENSOR : (part == 14u) ? FAULT_OVERTEMPERATURE : FAULT_NONE, drive.fault);
+        TEST_ASSERT_EQUAL_UINT16(((part & 3u) == 3u) ? FAULT_CURRENT_SENSOR : (part == 14u) ? FAULT_OVERTEMPERATURE : FAULT_NONE, drive.fault);
         drive.fault = (uint16_t)FAULT_NONE;
+    }
+    for (part = 1; part < SLOW_PARTS; part = (uint16_t)(part + ((part & 3u) == 3u ? 2u : 1u))) { /* but the observer's own: what nothing explains begins every seldom step */
+        rig_closed(1, 10000);
+        emf(30000, 10);
+        rig_slow(part);
+        TEST_ASSERT_EQUAL_UINT16((part == 14u) ? PROTECTION_UNEXPLAINED : 0u, drive.run.observer.wrong_steps);
     }
     rig_lock(1);
     drive.run.observer.wrong_steps = 1000;

@@ -274,16 +274,17 @@ void test_schedule_of_the_speed_comes_every_sixteenth_period_in_closed_loop_only
     TEST_ASSERT_EQUAL_UINT16(0, rates_come(3, 0));
 }
 
-void test_a_large_innovation_has_the_quick_rate_before_the_controller_s_next_step_and_until_it_fades(void)
+void test_after_a_large_innovation_the_rates_come_in_each_slow_step_until_it_fades(void)
 {
     rig_closed(1, 18000);
-    TEST_ASSERT_EQUAL_UINT16(0, rates_come(0, 0));
-    TEST_ASSERT_EQUAL_UINT16(1, rates_come(4, 4000));
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(7, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(4, 4000));
+    TEST_ASSERT_EQUAL_UINT16(1, rates_come(7, 0));
     TEST_ASSERT_GREATER_THAN_INT16(params.speed_kp_q13, drive.run.control.speed_kp_q13);
-    TEST_ASSERT_EQUAL_UINT16(1, rates_come(8, 0));
-    TEST_ASSERT_EQUAL_UINT16(0, rates_come(5, 0));
-    drive.run.observer.quick_q15 = 4000;
-    TEST_ASSERT_EQUAL_UINT16(0, rates_come(12, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(8, 0));
+    TEST_ASSERT_EQUAL_UINT16(1, rates_come(15, 0));
+    drive.run.observer.quick_q15 = 4095;
+    TEST_ASSERT_EQUAL_UINT16(0, rates_come(7, 0));
 }
 
 /* ---- the end of a stop ---- */
