@@ -25,8 +25,6 @@ static uint16_t next; /* index of the next character; a zero byte ends the line 
 static uint16_t waited_ms;
 
 #define LIMIT_NAME(bit, name, cause, remedy) " " #name,
-static const char *const limit_names[] = { DRIVE_LIMIT_TABLE(LIMIT_NAME) };
-
 /* From here on the line has no room for the longest reason, a self-test and the end. */
 #define LIMITS_END (sizeof line - sizeof " FIELD_WEAKENING" - sizeof " selftest 10\r\n")
 
@@ -34,6 +32,7 @@ static const char *const limit_names[] = { DRIVE_LIMIT_TABLE(LIMIT_NAME) };
  *  @return the text's end */
 static char *put_limits(char *at)
 {
+    static const char *const limit_names[] = { DRIVE_LIMIT_TABLE(LIMIT_NAME) };
     char *end = at;
     uint16_t n, bit = 1;
     if (LimitParm.seen != 0u) {

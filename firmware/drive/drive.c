@@ -55,9 +55,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     d->forced.angle_q32 = 0;
     d->forced.step_q32 = 0;
     d->dead = (dead_duties_t){ 0, 0, 0 };
-    if (DEAD_EACH) {
-        *d->dead_second = d->dead;
-    }
+    drive_zero(d->dead_second, (uint16_t)sizeof d->dead_second);
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos_called(d->angle);
     run->catching.step = mode_hands_over() ? p->flying_start : (uint16_t)CATCH_NO_LOOK;

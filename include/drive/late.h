@@ -11,7 +11,7 @@
 /** Largest half step that so many leave within a word. */
 #define LATE_HALF_STEP_MOST (32767 / LATE_HALF_STEPS)
 /** 1 where no speed that a word holds has a larger one. */
-#define LATE_HALF_STEP_FITS (32768.0F * 65536.0F * PARAM_PI / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT) < PARAM_F(LATE_HALF_STEP_MOST))
+#define LATE_HALF_STEP_FITS (32768.0F * 65536.0F * PARAM_PI / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT) < 32767.0F / PARAM_F(LATE_HALF_STEPS))
 
 /** As long as ALIGN counts before its first duties are written. */
 #define LATE_ALIGN_PERIODS (LATE_DUTIES ? SLOW_PERIODS : 0u)
