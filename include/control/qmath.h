@@ -208,17 +208,27 @@ QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
 /** (a + b) / 2, rounded toward minus infinity, in 16 bits. */
 QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
 {
+#ifdef __FRAMAC__ /* what it means */
+    return (int16_t)(((int32_t)a + b) >> 1);
+#else
     return (int16_t)((a & b) + ((int16_t)(a ^ b) >> 1));
+#endif
 }
 
 /** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */
 QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
 {
+#ifdef __FRAMAC__ /* what it means */
+    int32_t difference = (int32_t)a - b;
+    return (int16_t)((difference > 16383) ? 16383 : (difference < -16383) ? -16383
+                                                                          : difference);
+#else
     int16_t half = (int16_t)((a >> 1) - (b >> 1));
     if (qm_beyond(half, 8191)) { /* 16383 at least: half of an odd number is rounded */
         return qm_with_sign(16383, half);
     }
     return (int16_t)(a - b);
+#endif
 }
 
 /** x * 2^bits; the caller proves that it fits. @param bits 0..15 */

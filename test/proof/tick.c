@@ -247,16 +247,18 @@ static drive_samples_t any_samples(void)
 
 static uint16_t calibrates; /* the calibration has had its sample, and its sums are sealed */
 
+#define ROUND (SLOW_SELDOM * SLOW_PERIODS)
+
 static void slow_in(uint16_t slot)
 {
     uint16_t seals = calibrates, state = drive.state; /* what a check alone reads, the analyser's memory of calls does not know */
     drive_samples_t raw;
-    drive.ticks = (uint16_t)(8u * any_u(0, 8191) + slot);
+    drive.ticks = (uint16_t)(ROUND * any_u(0, 65536ul / ROUND - 1u) + slot);
     raw = any_samples();
     if (!calibrates) {
-        drive_slow(&drive, &params, &raw);
+        (void)drive_slow(&drive, &params, &raw);
     } else if ((slot & (SLOW_EVERY - 1u)) == 0u) {
-        drive_quarter(&drive, &params, &raw);
+        drive_part(&drive, &params, &raw);
     }
     //@ check sums_stay: seals == 0 || (SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive);
     //@ check ended: seals == 0 || state == DRIVE_CALIBRATE || drive.state != DRIVE_CALIBRATE;
@@ -268,11 +270,13 @@ static void slow(void)
 {
     static drive_t left;
     left = drive;
-    //@ loop unroll 16;
-    for (uint16_t slot = 0; slot < SLOW_PERIODS; slot++) {
+    //@ loop unroll 33;
+    for (uint16_t slot = 0; slot < ROUND; slot = (uint16_t)(slot + SLOW_EVERY)) {
         drive = left;
         slow_in(slot);
     }
+    drive = left;
+    slow_in(1); /* the odd ones are all alike */
 }
 
 /** A period: before the slow work, all slots are the same. */

@@ -146,3 +146,17 @@ void test_a_number_is_clear_of_a_limit_only_if_it_is_within_and_where_its_upper_
         }
     }
 }
+
+void test_difference_and_mean_are_those_of_17_bits_at_every_edge(void)
+{
+    static const int16_t edges[] = { -32768, -32767, -16385, -16384, -16383, -16382, -8193, -8192, -2, -1, 0, 1, 2, 8191, 8192, 16382, 16383, 16384, 16385, 32766, 32767 };
+    for (unsigned n = 0; n < sizeof edges / sizeof edges[0]; n++) {
+        for (int32_t b = -32768; b <= 32767; b++) {
+            int32_t difference = (int32_t)edges[n] - b;
+            int32_t limited = (difference > 16383) ? 16383 : (difference < -16383) ? -16383 : difference;
+            if (qm_sub_limited(edges[n], (int16_t)b) != limited || qm_mean(edges[n], (int16_t)b) != (((int32_t)edges[n] + b) >> 1)) {
+                TEST_FAIL_MESSAGE("a pair differs");
+            }
+        }
+    }
+}
