@@ -221,7 +221,7 @@ def test_the_fault_recorder_sends_the_trace_to_the_byte(board: PilBoard) -> None
     assert (record.fault, record.every, len(record.rows), record.fault_row(7)) == (1, 4, 64, 48)
     rows, trace = recorder.scaled(record, library.params, library.states), board.trace_take()
     at = int((trace[:, 0] != 0).argmax())
-    at += int(trace[at, 7]) % 2 # a row belongs to an even period
+    at += -int(trace[at, 7]) % 4 # a row belongs to every fourth period
     part = trace[at - 4 * 48:at + 4 * 16:4].astype(float)
     volts = library.params["COUNT_VOLTAGE_V"]
     for column, place, count in ((1, recorder.I_A, 1.0), (2, recorder.I_B, 1.0), (3, recorder.V_D, volts), (4, recorder.V_Q, volts),

@@ -141,8 +141,8 @@ def test_what_the_board_sends_is_its_trace_within_a_byte_s_step(causes: dict[str
     rows = recorder.scaled(record, library.params, library.states)
     at = int(np.flatnonzero(trace[:, 0])[0])
     assert record.fault_row(7) == 48
-    first = at + int(trace[at, SIGNALS.index("fw.slow_phase")]) % 2 # rows are those of the even periods
-    part = {name: trace[first - 96:first + 32:2, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
+    first = at + -int(trace[at, SIGNALS.index("fw.slow_phase")]) % 4 # rows are those of every fourth period
+    part = {name: trace[first - 4 * 48:first + 4 * 16:4, column].astype(np.float64) for column, name in enumerate(SIGNALS)}
     amperes, volts = library.params["COUNT_CURRENT_A"], library.params["COUNT_VOLTAGE_V"]
     assert list(record.offsets_q13) == [round(part[f"fw.offset_{phase}_a"][0] / amperes) for phase in "ab"]
     assert abs(record.offsets_q13[0]) > 200 and abs(record.offsets_q13[1]) > 100, "and there is one"
