@@ -6,7 +6,7 @@
 enum { RAW_A, RAW_B, V_D, V_Q, ANGLE, STATE, BUS, SPEED, FAULT, PHASE, COLUMNS };
 
 static const float *trace;
-static size_t fault_row; /* of the trace, with the record's first row in a fault: the first even period */
+static size_t fault_row; /* of the trace, with the record's first row in a fault: the first period that has one */
 
 void setUp(void)
 {
@@ -30,7 +30,7 @@ static void trace_from_here(void)
 static void find_fault(drive_fault_t fault)
 {
     size_t rows, columns;
-    wait_s(0.002);
+    wait_s((RECORDER_AFTER + 2u) * RECORDER_EVERY * (double)LOOPTIME_SEC);
     TEST_ASSERT_EQUAL_INT(fault, board_drive.fault);
     trace = vb_trace_data(bench, &rows, &columns);
     TEST_ASSERT_EQUAL_UINT(COLUMNS, columns);
@@ -77,7 +77,7 @@ void test_rows_of_an_overcurrent_are_those_of_the_trace(void)
     run_at(2000.0);
     ramp_load(0.06);
     trace_from_here();
-    wait_s(0.006);
+    wait_s((RECORDER_ROWS - RECORDER_AFTER + 2u) * RECORDER_EVERY * (double)LOOPTIME_SEC);
     set("shunt.gain_v_per_a", 0.375 * 5.0); /* the amplifier shows five times the current */
     (void)seconds_to_fault(0.02);
     find_fault(FAULT_OVERCURRENT_SW);
@@ -100,7 +100,7 @@ void test_a_fault_that_the_background_finds_is_recorded_as_well(void)
 {
     run_at(1500.0);
     trace_from_here();
-    wait_s(0.006);
+    wait_s((RECORDER_ROWS - RECORDER_AFTER + 2u) * RECORDER_EVERY * (double)LOOPTIME_SEC);
     board_clock_failed = 1;
     find_fault(FAULT_CLOCK);
     expect_trace();
