@@ -29,11 +29,12 @@ typedef struct {
 /** One step. @param emf_q12 filtered back-EMF in the estimator's frame @param ri_q12 R i_q of the model, signed */
 QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
 {
-    uint16_t emf = (uint16_t)qm_abs(emf_q12.q), ri = (uint16_t)qm_abs(ri_q12), wrong = (uint16_t)qm_abs(emf_q12.d), sum = emf + ri;
+    uint16_t emf = (uint16_t)qm_abs(emf_q12.q), ri = (uint16_t)qm_abs(ri_q12), wrong = (uint16_t)qm_abs(emf_q12.d), sum;
     int16_t error, rs_rate;
     if (emf < (uint16_t)p->emf_least_q12) {
         return;
     }
+    sum = (uint16_t)(emf + ri); /* more than either: the least back-EMF is 1 at least */
     if (wrong >= sum) {
         wrong = (uint16_t)(sum - 1u);
     }

@@ -285,7 +285,7 @@ QM_INLINE uint16_t drive_slow_follows(const drive_t *d)
  *  @param raw the converter's results of this period @return 1 while the bridge goes on switching */
 QM_INLINE uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    const uint16_t was_running = drive_is_running(d);
+    uint16_t was_running = drive_is_running(d);
     if (!was_running) {
         drive_rest(d, p, raw);
     }

@@ -121,7 +121,7 @@ static void any_control(drive_control_t *c)
     c->ref_q13.q = any((int16_t)-current_max, current_max);
     c->iq_limit_q13 = any(0, current_max);
     c->brake_limit_q13 = any(0, current_max);
-    c->i_q13.d = ANY16();
+    c->i_q13.d = any(-IQ_MAX, IQ_MAX);
     c->i_q13.q = any(-IQ_MAX, IQ_MAX);
     c->v_q14.d = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
     c->v_q14.q = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
@@ -171,7 +171,7 @@ static void bounds_hold_again(void)
     //@ check v: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max && -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;
     //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;
     //@ check sums: -SUM_MAX <= c->pi_d.sum <= SUM_MAX && -SUM_MAX <= c->pi_q.sum <= SUM_MAX;
-    //@ check measured: -IQ_MAX <= c->i_q13.q <= IQ_MAX;
+    //@ check measured: -IQ_MAX <= c->i_q13.d <= IQ_MAX && -IQ_MAX <= c->i_q13.q <= IQ_MAX;
     //@ check gain: 0 <= c->speed_kp_q13 <= params.speed_kp_quick_q13;
     //@ check sample_shift: -sample_shift_max <= c->sample_shift_q13 <= sample_shift_max;
     //@ check observed_speed: -32767 * 65536 <= o->omega_q16 <= 32767 * 65536;
