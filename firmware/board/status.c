@@ -25,8 +25,9 @@ static uint16_t next; /* index of the next character; a zero byte ends the line 
 static uint16_t waited_ms;
 
 #define LIMIT_NAME(bit, name, cause, remedy) " " #name,
-/* From here on the line has no room for the longest reason, a self-test and the end. */
-#define LIMITS_END (sizeof line - sizeof " FIELD_WEAKENING" - sizeof " selftest 10\r\n")
+#define LONGEST_LIMIT " FIELD_WEAKENING" /* a test holds the others to it */
+/* From here on the line has no room for it, a self-test and the end. */
+#define LIMITS_END (sizeof line - sizeof LONGEST_LIMIT - sizeof " selftest 10\r\n")
 
 /** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". What finds no room waits for the next line.
  *  @return the text's end */

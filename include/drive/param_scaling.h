@@ -155,12 +155,13 @@
 #define LATE_BELOW_SEC 0.00004
 #define LATE_DUTIES (PARAM_F(LOOPTIME_SEC) < PARAM_F(LATE_BELOW_SEC))
 
-/* ---- The slow work: a part of it follows every second period, with late duties half a part. Sixteen parts are a round: speed and bus come every slow step,
- *      four times in it; limits and rates every rare step, twice; the others once, every seldom step. The tools read the periods. ---- */
-#define SLOW_EVERY 2u
 /** Two pulses have one compensation of dead time, unless the rotor may turn by more than 12 degrees in a period. */
 #define DEAD_EACH_TURN 0.0333
 #define DEAD_EACH (PARAM_TOP_ERPM / 60.0F * PARAM_F(LOOPTIME_SEC) > PARAM_F(DEAD_EACH_TURN))
+
+/* ---- The slow work: a part of it follows every second period, with late duties half a part. Sixteen parts are a round: speed and bus come every slow step,
+ *      four times in it; limits and rates every rare step, twice; the others once, every seldom step. The tools read the periods. ---- */
+#define SLOW_EVERY 2u
 #define SLOW_PARTS 16u /* of a round */
 #define SLOW_PERIODS_IN_TIME 8
 #define SLOW_CALLS ((LATE_DUTIES) ? 2u * SLOW_PARTS : SLOW_PARTS)                                     /* of a round */

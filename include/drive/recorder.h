@@ -1,4 +1,4 @@
-/* The fault recorder: a ring of rows, one a period, that stops a little after a fault and is kept until the next start. */
+/* The fault recorder: a ring of rows, RECORDER_PERIODS apart, that stops a little after a fault and is kept until the next start. */
 #ifndef DRIVE_RECORDER_H
 #define DRIVE_RECORDER_H
 

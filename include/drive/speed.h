@@ -70,14 +70,6 @@ NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** The same where it can be: in closed loop. */
-QM_INLINE void speed_choose_step(drive_t *d, const drive_params_t *p)
-{
-    if (drive_is_closed(d)) {
-        speed_choose_state(d, p);
-    }
-}
-
 /* wcet: speed_turn_round/drive_turns excludes model_update */
 /** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
  *  @return 1 then */

@@ -174,7 +174,7 @@ QM_INLINE void drive_rotor_step(drive_t *d, const drive_params_t *p, uint16_t ca
         protection_probe_rotor(d, p);
     }
     if (late_second(call)) {
-        speed_choose_step(d, p);
+        speed_choose_state(d, p);
     }
 }
 

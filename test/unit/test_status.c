@@ -113,6 +113,7 @@ void test_each_reason_is_told_by_its_name_and_what_finds_no_room_is_told_in_the_
         status_tick(500);
         send_passes(100);
         TEST_ASSERT_EQUAL_STRING(strcat(strcat(text, names[n].name), "\r\n"), sent);
+        TEST_ASSERT_LESS_OR_EQUAL(sizeof LONGEST_LIMIT - sizeof " ", strlen(names[n].name));
     }
     selftest_put_Stub(a_selftest);
     board_drive.state = board_drive.fault = 32767;
