@@ -52,7 +52,7 @@ QM_INLINE void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_
     const speed_erpm_t speed = observer_speed(&run->observer);
     const int16_t error = qm_sub_limited(c->reference_erpm, speed), ahead = qm_sub_limited(estimator_speed(&run->estimator), speed);
     int32_t most_q26 = qm_mulss(p->current_max_q13, 8192 >> SPEED_TRIM_MOST_SHIFT), trim_q26 = c->iq_trim_q26;
-    if (c->reference_erpm == before_erpm && qm_abs(error) <= (qm_size(before_erpm) >> SPEED_TRIM_ERROR_SHIFT)
+    if (c->reference_erpm == before_erpm && qm_size(error) <= (qm_size(before_erpm) >> SPEED_TRIM_ERROR_SHIFT)
         && observer_is_calm(&run->observer) && qm_size(iq_q13) < c->iq_limit_q13 && qm_size(c->v_q14.q) < c->vq_limit_q14) {
         trim_q26 += (qm_mulss(error, ahead) < 0) ? 0 : ((qm_mulss(error, c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT);
     } else {
