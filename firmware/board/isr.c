@@ -129,8 +129,9 @@ void BOARD_ISR _T2Interrupt(void)
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);
     }
-    /* the currents once more: kept, they would take registers from the slow work */
-    recorder_tick(&board_recorder, &board_drive, (int16_t)ADC1BUF1, (int16_t)ADC1BUF2, raw.v_bus);
+    if (recorder_is_due(&board_drive)) { /* the samples once more: kept, they would take registers from the slow work */
+        recorder_write(&board_recorder, &board_drive, (int16_t)ADC1BUF1, (int16_t)ADC1BUF2, (int16_t)ADC1BUF3);
+    }
     mode_record();
 #if SCOPE
     scope_tick(&board_lnet.scope, board_scope_array);

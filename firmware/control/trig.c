@@ -19,9 +19,9 @@ const int16_t trig_circle_table[TRIG_CIRCLE_STEPS + 1] = {
     11402, 9914, 8127, 5769, 0
 };
 
-sincos_t trig_sincos_called(angle_t angle)
+void trig_sincos_called(sincos_t *r, angle_t angle)
 {
-    return trig_sincos(angle);
+    *r = trig_sincos(angle);
 }
 
 angle_t trig_direction(int16_t x, int16_t y)

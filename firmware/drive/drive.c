@@ -57,7 +57,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     d->dead = (dead_duties_t){ 0, 0, 0 };
     drive_zero(d->dead_second, (uint16_t)sizeof d->dead_second);
     d->angle = forced_angle(&d->forced);
-    d->frame = trig_sincos_called(d->angle);
+    trig_sincos_called(&d->frame, d->angle);
     run->catching.step = mode_hands_over() ? p->flying_start : (uint16_t)CATCH_NO_LOOK;
     mode_start(d, p);
     d->command.run = 1;

@@ -206,7 +206,7 @@ QM_INLINE dq_t estimator_in_control_frame(const estimator_t *e, alphabeta_t e_q1
 /** The estimator's own frame for the next two periods, in the mean of the two; they need it while the forced angle drives the motor. */
 QM_INLINE void estimator_turn_frame(estimator_t *e)
 {
-    e->own = trig_sincos_called(e->next);
+    trig_sincos_called(&e->own, e->next);
 }
 
 /** What the back-EMF says of speed and angle. @param e_q13 see estimator_back_emf() @param frame of the control

@@ -56,13 +56,6 @@ QM_INLINE int16_t qm_hi(int32_t x)
     return (int16_t)(x >> 16);
 }
 
-/** x / 32768, rounded to the nearest. @param x below 2^30 - 16384 */
-QM_INLINE int16_t qm_round_q15(int32_t x)
-{
-    int32_t doubled = x + x; /* a step of its own, for the compiler has its own order of 2 * x + 32768 */
-    return qm_hi(doubled + 32768);
-}
-
 /** Upper word of the signed product: a*b/65536. */
 QM_INLINE int16_t qm_mulhi(int16_t a, int16_t b)
 {

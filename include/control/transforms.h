@@ -66,8 +66,9 @@ QM_INLINE dq_t dq_turn(dq_t x, int16_t a_q16_rad)
  *  @param x_q13 |x| at most 11585 @return Q13, to a count and 1/3000; their sum is 0 */
 QM_INLINE phases_t phases_of(dq_t x_q13, sincos_t sc)
 {
-    int16_t alpha = qm_round_q15(qm_mulss(x_q13.d, sc.cos) - qm_mulss(x_q13.q, sc.sin));
-    int16_t beta = qm_round_q15(qm_mulss(x_q13.d, sc.sin) + qm_mulss(x_q13.q, sc.cos));
+    dq_t x_q14 = { (int16_t)(2 * x_q13.d), (int16_t)(2 * x_q13.q) };
+    int16_t alpha = qm_hi(qm_mulss(x_q14.d, sc.cos) - qm_mulss(x_q14.q, sc.sin) + 32768);
+    int16_t beta = qm_hi(qm_mulss(x_q14.d, sc.sin) + qm_mulss(x_q14.q, sc.cos) + 32768);
     phases_t i;
     i.a = alpha;
     i.b = (int16_t)(qm_hi(qm_mulsu(beta, 56756u) + 32768) - (alpha >> 1)); /* sqrt(3)/2 */

@@ -42,8 +42,8 @@ QM_INLINE sincos_t trig_sincos(angle_t angle)
     return r;
 }
 
-/** The same as one called copy, for where it runs rarely. */
-sincos_t trig_sincos_called(angle_t angle);
+/** The same as one called copy, for where it runs rarely. @param r written */
+void trig_sincos_called(sincos_t *r, angle_t angle);
 
 /** Direction of the vector (x, y), to a quarter of a degree; 0 of a vector that has none. @param x,y -32767 .. 32767 */
 angle_t trig_direction(int16_t x, int16_t y);

@@ -197,7 +197,7 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     pi_preset(&c->pi_d, &p->pi_d, 0, 0);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     d->angle = estimator_next_angle(&run->estimator);
-    d->frame = trig_sincos_called(d->angle);
+    trig_sincos_called(&d->frame, d->angle);
     late_preset(run, inverse_park(c->v_q14, d->frame));
     drive_enter(d, DRIVE_CLOSED);
 }

@@ -23,7 +23,7 @@ QM_INLINE void dead_prepare_second(drive_t *d, const drive_params_t *p, dq_t ask
     if (DEAD_EACH) {
         sincos_t frame = d->frame;
         if (!drive_is_forced(d)) {
-            frame = trig_sincos_called((angle_t)(d->angle + (uint16_t)qm_mulhi(d->run.estimator.half_step_q16_rad, DEAD_STEP)));
+            trig_sincos_called(&frame, (angle_t)(d->angle + (uint16_t)qm_mulhi(d->run.estimator.half_step_q16_rad, DEAD_STEP)));
         }
         svm_compensation(&p->svm, phases_of(asked, frame), d->dead_second);
     }

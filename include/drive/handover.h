@@ -115,7 +115,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     alphabeta_t y;
 
     h->offset = (int16_t)(angle_t)(d->angle - estimated);
-    turn = trig_sincos_called((angle_t)h->offset);
+    trig_sincos_called(&turn, (angle_t)h->offset);
     y = inverse_park(c->v_q14, turn);
     c->v_q14.d = (int16_t)(2 * y.alpha);
     c->v_q14.q = (int16_t)(2 * y.beta);
@@ -129,7 +129,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     d->angle = estimated;
-    d->frame = trig_sincos_called(estimated);
+    trig_sincos_called(&d->frame, estimated);
     drive_enter(d, DRIVE_CLOSED);
 }
 
@@ -157,21 +157,19 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
     }
 }
 
-/** What is left of the angle offset falls every rare step; its d current follows. */
-QM_INLINE void handover_decay(drive_t *d)
+/** What is left of the angle offset falls every rare step, while there is any; its d current follows. */
+NOINLINE void handover_decay(handover_t *h)
 {
-    handover_t *h = &d->run.handover;
     int16_t offset = h->offset;
-    if (offset == 0) {
-        return;
-    }
+    sincos_t turn;
     if (offset > -2 * HANDOVER_DECAY && offset < 2 * HANDOVER_DECAY) {
         offset = 0;
     } else {
         offset = (int16_t)((offset > 0) ? offset - HANDOVER_DECAY : offset + HANDOVER_DECAY);
     }
     h->offset = offset;
-    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(h->current_q13, trig_sincos_called((angle_t)offset).sin));
+    trig_sincos_called(&turn, (angle_t)offset);
+    h->id_q13 = (int16_t)-qm_hi(2 * qm_mulss(h->current_q13, turn.sin));
 }
 
 #endif

@@ -69,7 +69,7 @@ QM_INLINE uint16_t recorder_is_due(const drive_t *d)
     return (uint16_t)(RECORDER_EVERY != 0u && (d->ticks & (uint16_t)(RECORDER_EVERY - 1u)) == (uint16_t)LATE_DUTIES);
 }
 
-/** A period in a fault, before recorder_tick(). */
+/** A period in a fault, before recorder_write(). */
 QM_INLINE void recorder_in_fault(recorder_t *r, const drive_t *d)
 {
     if (r->left != 0u && recorder_is_due(d)) {
@@ -86,14 +86,13 @@ QM_INLINE int8_t recorder_upper(int16_t word)
     return (int8_t)(word >> 8);
 }
 
-/** The last work of a period. @param i_a,i_b,v_bus the converter's results; as a structure they would be kept on the stack */
-QM_INLINE void recorder_tick(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, int16_t v_bus)
+/** The last work of a period that gets a row. @param i_a,i_b,v_bus the converter's results; as a structure they would be kept on the stack */
+QM_INLINE void recorder_write(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, int16_t v_bus)
 {
     recorder_row_t *row;
     int16_t at = r->next;
     uint16_t slow = r->slow;
-
-    if (r->left == 0u || !recorder_is_due(d)) {
+    if (r->left == 0u) {
         return;
     }
     if (((uint16_t)at & 6u) == 0u) { /* six bytes a row: every fourth place */

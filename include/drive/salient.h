@@ -37,8 +37,10 @@ QM_INLINE void salient_sees_forced_current(drive_t *d)
 {
 #if MOTOR_SALIENCY_UH
     drive_run_t *run = &d->run;
-    sincos_t turn = trig_sincos_called((angle_t)(d->angle - estimator_next_angle(&run->estimator)));
-    int16_t id_q13 = (int16_t)(2 * inverse_park(run->control.i_q13, turn).alpha);
+    sincos_t turn;
+    int16_t id_q13;
+    trig_sincos_called(&turn, (angle_t)(d->angle - estimator_next_angle(&run->estimator)));
+    id_q13 = (int16_t)(2 * inverse_park(run->control.i_q13, turn).alpha);
     run->salience.id_q13 = (int16_t)((id_q13 > 0) ? id_q13 + (id_q13 >> 1) + (id_q13 >> 2) : id_q13);
 #else
     (void)d;

@@ -43,7 +43,7 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
     pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
     d->angle = forced;
-    d->frame = trig_sincos_called(forced);
+    trig_sincos_called(&d->frame, forced);
     drive_enter(d, DRIVE_RAMP);
 }
 

@@ -112,10 +112,10 @@ QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_sampl
     idle_step(d, p, raw->i_a, raw->i_b);
 }
 
-/** What the estimator's last two periods leave to be done. @param was_running the law has run in them; the modes of their own have no estimator */
-QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p, uint16_t was_running)
+/** What the estimator's last two periods leave to be done; the modes of their own have no estimator. */
+QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p)
 {
-    if (MODE_ALIGNS && was_running) {
+    if (MODE_ALIGNS) {
         estimator_settle(&d->run.estimator, &p->estimator);
     }
 }
@@ -159,7 +159,9 @@ QM_INLINE void drive_limit_step(drive_t *d, const drive_params_t *p, uint16_t ca
         bus_update_voltage_limit(d, p);
     }
     if (late_second(call) && drive_is_closed(d)) {
-        handover_decay(d);
+        if (d->run.handover.offset != 0) {
+            handover_decay(&d->run.handover);
+        }
         limits_current(&d->run, p);
     }
 }
@@ -285,18 +287,23 @@ QM_INLINE uint16_t drive_slow_follows(const drive_t *d)
  *  @param raw the converter's results of this period @return 1 while the bridge goes on switching */
 QM_INLINE uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    uint16_t was_running = drive_is_running(d);
-    if (!was_running) {
-        drive_rest(d, p, raw);
-    }
-    if (!drive_slow_is_due(d)) {
-        if (LATE_DUTIES) {
-            drive_follow(d, p, was_running);
+    uint16_t was_running = 1;
+    if (drive_is_running(d)) {
+        if (!drive_slow_is_due(d)) {
+            if (LATE_DUTIES) {
+                drive_follow(d, p);
+            }
+            return 1;
         }
-        return was_running;
-    }
-    if (!LATE_DUTIES) {
-        drive_follow(d, p, was_running);
+        if (!LATE_DUTIES) {
+            drive_follow(d, p);
+        }
+    } else {
+        was_running = 0;
+        drive_rest(d, p, raw);
+        if (!drive_slow_is_due(d)) {
+            return 0;
+        }
     }
     drive_part(d, p, raw);
     if (!drive_is_running(d)) {

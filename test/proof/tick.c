@@ -33,7 +33,7 @@ static inline int16_t observer_between(int16_t a, int16_t b, q15_t share);
 #include "control/speed_ramp.h"
 static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
 #define trig_sincos sincos_bounded
-#define trig_sincos_called sincos_bounded
+#define trig_sincos_called(r, angle) (*(r) = sincos_bounded(angle))
 #define trig_circle circle_bounded
 #define qm_lowpass lowpass_in_pieces
 #define clarke clarke_bounded

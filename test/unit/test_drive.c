@@ -61,6 +61,7 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
         drive.run.control.trim_reference_erpm = 1;
         drive.run.observer.wrong_erpm = 1;
         drive.run.control.brake_limit_q13 = 1;
+        drive.run.estimator.old_turn_q16_rad = 1;
         rig_speed(8000);
         drive.run.estimator.e_q_q28 = 10000L * 65536;
         rig_tick(1);
@@ -76,6 +77,7 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.stall_steps != 99u, "protection");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.control.trim_reference_erpm != 1, "trim");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u || (slow == 6u && !observer_is_calm(&drive.run.observer)), drive.run.observer.wrong_erpm != 1, "rates");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.estimator.old_turn_q16_rad != 1, "the estimator's sign");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
     }

@@ -539,15 +539,15 @@ void test_offset_decays_by_a_count_a_period_from_both_signs_and_ends_at_zero(voi
         for (odd = 0; odd <= 3; odd = (int16_t)(odd + 3)) {
             drive.run.handover.offset = (int16_t)(sign * (1000 + odd));
             for (n = 1; n <= 61; n++) {
-                handover_decay(&drive); /* every sixteenth period */
+                handover_decay(&drive.run.handover); /* every sixteenth period */
                 TEST_ASSERT_EQUAL_INT16(sign * (1000 + odd - 16 * n), drive.run.handover.offset);
             }
-            handover_decay(&drive);
+            handover_decay(&drive.run.handover);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
         }
         drive.run.handover.offset = sign;
-        handover_decay(&drive);
+        handover_decay(&drive.run.handover);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
     }
 }
@@ -578,10 +578,10 @@ void test_current_follows_its_offset(void)
     EACH_DIRECTION(direction) { /* d = -Iq sin(offset), at 45 degrees after the step */
         drive.run.handover.current_q13 = (int16_t)(direction * params.open_loop_q13);
         drive.run.handover.offset = 8192 + 8;
-        handover_decay(&drive);
+        handover_decay(&drive.run.handover);
         TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * -1856), drive.run.handover.id_q13);
         drive.run.handover.offset = -8192 - 8;
-        handover_decay(&drive);
+        handover_decay(&drive.run.handover);
         TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * 1856), drive.run.handover.id_q13);
     }
 }

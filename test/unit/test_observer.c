@@ -308,6 +308,7 @@ void test_steps_with_more_than_dead_time_and_a_32nd_of_the_speed_are_counted_and
     TEST_ASSERT_EQUAL_UINT16(20, wrong_after(10, 60)); /* 137 */
     TEST_ASSERT_EQUAL_UINT16(0, wrong_after(25, 0));
     TEST_ASSERT_EQUAL_UINT16(10, wrong_after(10, 400));
+    TEST_ASSERT_EQUAL_UINT16(20, wrong_after(10, (uint32_t)-400)); /* to either side */
     o.load_q16 = 0;
     large_at_20000.large_erpm = 20000;
     observer_schedule(&o, &large_at_20000, 3200, 8000);

@@ -124,15 +124,6 @@ void test_a_number_is_beyond_a_limit_of_either_sign_only_if_its_magnitude_is_lar
     }
 }
 
-void test_a_product_of_q15_is_rounded_to_the_nearest_half_upwards(void)
-{
-    static const int32_t cases[][2] = { { 0, 0 }, { 16383, 0 }, { 16384, 1 }, { 49151, 1 }, { 49152, 2 }, { -16384, 0 }, { -16385, -1 },
-                                        { -49152, -1 }, { -49153, -2 }, { 1073709056, 32767 }, { -1073741824, -32768 } };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        TEST_ASSERT_EQUAL_INT16(cases[n][1], qm_round_q15(cases[n][0]));
-    }
-}
-
 void test_a_number_is_clear_of_a_limit_only_if_it_is_within_and_where_its_upper_word_is_smaller(void)
 {
     static const int16_t lows[] = { 0, 1, 32767, -32768, -1 };

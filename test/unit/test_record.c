@@ -37,7 +37,9 @@ static void rows(uint16_t count, int16_t first)
         if (board_drive.fault != (uint16_t)FAULT_NONE) {
             recorder_in_fault(&board_recorder, &board_drive);
         }
-        recorder_tick(&board_recorder, &board_drive, upper, (int16_t)-upper, (int16_t)(0x1200 + upper));
+        if (recorder_is_due(&board_drive)) {
+            recorder_write(&board_recorder, &board_drive, upper, (int16_t)-upper, (int16_t)(0x1200 + upper));
+        }
     }
 }
 

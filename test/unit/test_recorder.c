@@ -89,7 +89,9 @@ static void period(void)
     if (drive.fault != (uint16_t)FAULT_NONE) {
         recorder_in_fault(&recorder, &drive);
     }
-    recorder_tick(&recorder, &drive, samples.i_a, samples.i_b, samples.v_bus);
+    if (recorder_is_due(&drive)) {
+        recorder_write(&recorder, &drive, samples.i_a, samples.i_b, samples.v_bus);
+    }
     TEST_ASSERT_TRUE(ticks < sizeof state_of);
     state_of[ticks] = (uint8_t)drive.state;
     ticks++;

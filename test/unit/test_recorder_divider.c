@@ -23,7 +23,9 @@ static void period(void)
     if (drive.fault != (uint16_t)FAULT_NONE) {
         recorder_in_fault(&recorder, &drive);
     }
-    recorder_tick(&recorder, &drive, samples.i_a, samples.i_b, samples.v_bus);
+    if (recorder_is_due(&drive)) {
+        recorder_write(&recorder, &drive, samples.i_a, samples.i_b, samples.v_bus);
+    }
 }
 
 void test_every_fourth_period_has_a_row_and_sixteen_of_them_follow_the_fault_in_any_phase(void)

@@ -34,6 +34,16 @@ static int16_t torque(int16_t direction, int16_t command_q13, int16_t speed_erpm
     return (int16_t)(direction * drive.run.control.ref_q13.q);
 }
 
+void test_the_speed_controller_s_trim_is_left_alone(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.iq_trim_q26 = 1000000;
+    drive.run.control.trim_reference_erpm = 0;
+    speed_trim_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT32(1000000, drive.run.control.iq_trim_q26);
+    TEST_ASSERT_EQUAL_INT16(drive.run.control.reference_erpm, drive.run.control.trim_reference_erpm);
+}
+
 void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_below(void)
 {
     static const struct {
