@@ -89,15 +89,24 @@ QM_INLINE q15_t observer_twice(q15_t share)
     return (int16_t)((share < 16384) ? 2 * share : 32767);
 }
 
-#define OBSERVER_FASTEST_Q16 (32700l * 65536)
+#define OBSERVER_FASTEST 32700u
+#define OBSERVER_FASTEST_Q16 ((int32_t)OBSERVER_FASTEST * 65536)
 
 /** The speed and a change of it, within the format. @param change at most 2^30 */
-QM_INLINE int32_t observer_sum(int32_t omega_q16, int32_t change)
+QM_INLINE QM_WRAPS int32_t observer_sum(int32_t omega_q16, int32_t change)
 {
+#ifdef __FRAMAC__ /* what it means */
     if (change >= 0) {
         return (omega_q16 > OBSERVER_FASTEST_Q16 - change) ? OBSERVER_FASTEST_Q16 : omega_q16 + change;
     }
     return (omega_q16 < -OBSERVER_FASTEST_Q16 - change) ? -OBSERVER_FASTEST_Q16 : omega_q16 + change;
+#else
+    int16_t half = qm_hi((omega_q16 >> 1) + (change >> 1)); /* its whole tells the end exactly: that is even */
+    if ((uint16_t)((uint16_t)half + OBSERVER_FASTEST / 2u) >= OBSERVER_FASTEST) {
+        return (int32_t)qm_with_sign((int16_t)OBSERVER_FASTEST, half) * 65536;
+    }
+    return omega_q16 + change;
+#endif
 }
 
 /** Begins at a known angle and speed with a known q current, calm. @param speed_erpm at most 32700 */

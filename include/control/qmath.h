@@ -121,10 +121,17 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
 QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 {
     int32_t least = (int32_t)low * 65536, most = (int32_t)high * 65536;
+#ifdef __FRAMAC__ /* what it means */
     if (x > most) {
         return most;
     }
     return (x < least) ? least : x;
+#else
+    if (qm_hi(x) >= high) { /* the upper word tells it all: just at the end it is the end */
+        return most;
+    }
+    return (qm_hi(x) < low) ? least : x;
+#endif
 }
 
 /* Ranges, each by one comparison without a sign, and a sign without a branch. The proofs read what they mean; test_qmath.c compares. */

@@ -194,10 +194,8 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     c->reference_erpm = run->estimator.omega_erpm;
     c->ref_q13.d = run->fieldweak.table_q13;
     c->ref_q13.q = 0;
-    pi_preset(&c->pi_d, &p->pi_d, 0, 0);
-    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
-    d->angle = estimator_next_angle(&run->estimator);
-    trig_sincos_called(&d->frame, d->angle);
+    c->v_q14.d = 0;
+    handover_preset(d, p, estimator_next_angle(&run->estimator));
     late_preset(run, inverse_park(c->v_q14, d->frame));
     drive_enter(d, DRIVE_CLOSED);
 }

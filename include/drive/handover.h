@@ -103,6 +103,16 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     }
 }
 
+/** The law goes on at an angle: its frame, and integrators that give the voltages that are commanded. */
+NOINLINE void handover_preset(drive_t *d, const drive_params_t *p, angle_t angle)
+{
+    drive_control_t *c = &d->run.control;
+    pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
+    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
+    d->angle = angle;
+    trig_sincos_called(&d->frame, angle);
+}
+
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
  *  those of the next sample. */
 NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
@@ -126,10 +136,7 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     c->ref_q13.d = (int16_t)(2 * y.alpha);
     c->ref_q13.q = (int16_t)(2 * y.beta);
     h->id_q13 = c->ref_q13.d;
-    pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
-    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
-    d->angle = estimated;
-    trig_sincos_called(&d->frame, estimated);
+    handover_preset(d, p, estimated);
     drive_enter(d, DRIVE_CLOSED);
 }
 

@@ -40,10 +40,7 @@ NOINLINE void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     c->v_q14.q = along_direction(d, v.d);
     c->ref_q13.d = 0;
     c->ref_q13.q = along_direction(d, p->open_loop_q13);
-    pi_preset(&c->pi_d, &p->pi_d, 0, c->v_q14.d);
-    pi_preset(&c->pi_q, &p->pi_q, 0, c->v_q14.q);
-    d->angle = forced;
-    trig_sincos_called(&d->frame, forced);
+    handover_preset(d, p, forced);
     drive_enter(d, DRIVE_RAMP);
 }
 
