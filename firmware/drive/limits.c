@@ -3,7 +3,6 @@
 
 #include "drive/handover.h"
 #include "drive/modes/modes.h"
-#include "drive/reference.h"
 #include "drive/state.h"
 
 /** 1 from 1/32 below the limit on: field weakening's trim keeps the voltage a little below it. @param limit 0 or more */
@@ -24,7 +23,7 @@ static uint16_t ramp_reasons(const drive_t *d, const drive_params_t *p)
 {
     speed_erpm_t target = mode_speed_target(d, p);
     int16_t left = qm_size(qm_sub_limited(target, d->run.control.reference_erpm));
-    uint16_t waits = (uint16_t)(left != 0 && !reference_may_move(d, p, target));
+    uint16_t waits = d->run.control.ramp_waits;
 
     return (uint16_t)((waits || left >= qm_hi(2 * p->speed_ramp_q16 + 65535) ? (uint16_t)LIMIT_RAMP : 0u) | (waits ? (uint16_t)LIMIT_RAMP_WAITS : 0u));
 }

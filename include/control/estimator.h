@@ -158,7 +158,7 @@ QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
 
 /** What follows the speed slowly: the sign of Equation 2, that of Eq, at low speed that of the filtered speed; and the turn of the eight-sample
  *  difference. */
-QM_INLINE void estimator_follow(estimator_t *e, const estimator_params_t *p)
+NOINLINE void estimator_follow(estimator_t *e, const estimator_params_t *p)
 {
     speed_erpm_t speed = estimator_speed(e);
     e->sign = (int16_t)(((qm_beyond(speed, p->decimate_erpm) ? qm_hi(e->e_q_q28) : speed) >= 0) ? 1 : -1);

@@ -123,6 +123,7 @@ typedef struct {
 typedef struct {
     speed_erpm_t reference_erpm;   /**< ramped speed reference */
     uint16_t ramp_q16;             /**< what its last step left below a whole electrical rpm */
+    uint16_t ramp_waits;           /**< 1: its last step waited for the motor */
     dq_t ref_q13;                  /**< current references */
     current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2) */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */

@@ -18,8 +18,14 @@ QM_INLINE void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t 
     drive_control_t *c = &d->run.control;
     int32_t step = step_q16 + (int32_t)c->ramp_q16;
     c->ramp_q16 = (uint16_t)step;
-    if (c->reference_erpm != target && reference_may_move(d, p, target)) {
+    c->ramp_waits = 0;
+    if (c->reference_erpm == target) {
+        return;
+    }
+    if (reference_may_move(d, p, target)) {
         c->reference_erpm = speed_ramp(c->reference_erpm, target, qm_hi(step));
+    } else {
+        c->ramp_waits = 1;
     }
 }
 

@@ -43,6 +43,7 @@ static void any_drive(uint16_t state)
     drive.run.handover.id_q13 = any((int16_t)-current_max, current_max);
 #ifdef TUNING
     drive.run.control.ramp_q16 = ANYU16();
+    drive.run.control.ramp_waits = any_u(0, 1);
 #endif
     drive.run.stall_steps = any_u(0, params.stall_steps);
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);

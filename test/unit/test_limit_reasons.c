@@ -32,6 +32,13 @@ static void expect(uint16_t reasons, const char *what)
     TEST_ASSERT_EQUAL_HEX16_MESSAGE(reasons, limits_reasons(&drive, &params), what);
 }
 
+/** The same after a step of the reference, which says whether it waits. */
+static void expect_after_step(uint16_t reasons, const char *what)
+{
+    speed_reference_step(&drive, &params);
+    expect(reasons, what);
+}
+
 /** Both directions, each anew. */
 #define EACH_FREE for (int16_t way_ = -1; way_ <= 1 && (set_free(way_), 1); way_ = (int16_t)(way_ + 2))
 
@@ -126,13 +133,13 @@ void test_ramp_waits_for_the_motor_at_any_distance_and_at_its_target_it_does_not
 {
     EACH_FREE {
         rig_speed((int16_t)(way * 8000));
-        expect(LIMIT_NONE, "behind at the target");
+        expect_after_step(LIMIT_NONE, "behind at the target");
         drive.command.target_erpm = (int16_t)(way * (10000 + 1));
-        expect(LIMIT_RAMP | LIMIT_RAMP_WAITS, "behind");
+        expect_after_step(LIMIT_RAMP | LIMIT_RAMP_WAITS, "behind");
         drive.command.target_erpm = (int16_t)(way * 5000);
-        expect(LIMIT_RAMP, "behind on the way down");
+        expect_after_step(LIMIT_RAMP, "behind on the way down");
         rig_speed((int16_t)(way * 12000));
-        expect(LIMIT_RAMP | LIMIT_RAMP_WAITS, "ahead on the way down");
+        expect_after_step(LIMIT_RAMP | LIMIT_RAMP_WAITS, "ahead on the way down");
     }
 }
 
@@ -148,7 +155,7 @@ void test_field_weakening_is_the_reason_with_a_d_current_of_table_or_trim(void)
         drive.run.control.v_q14.q = (int16_t)(way * 12800);
         drive.command.target_erpm = (int16_t)(way * 20000);
         rig_speed(0);
-        expect(LIMIT_VOLTAGE | LIMIT_CURRENT | LIMIT_RAMP | LIMIT_RAMP_WAITS | LIMIT_FIELD_WEAKENING, "several at once");
+        expect_after_step(LIMIT_VOLTAGE | LIMIT_CURRENT | LIMIT_RAMP | LIMIT_RAMP_WAITS | LIMIT_FIELD_WEAKENING, "several at once");
     }
 }
 
