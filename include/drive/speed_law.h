@@ -42,6 +42,12 @@ QM_INLINE current_q13_t speed_current(const drive_run_t *run, const drive_params
     return (int16_t)((speed_current_q26(run, p, target_erpm) + 4096) >> 13);
 }
 
+/** 1 where the observer's load moves against the error by itself. @param seen,speed the estimator's speed and the observer's */
+QM_INLINE uint16_t speed_load_moves_against(speed_erpm_t seen, speed_erpm_t speed, int16_t error)
+{
+    return (uint16_t)((seen < speed) ? error > 0 : (seen > speed && error < 0));
+}
+
 /** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer, that acts while the
  *  reference stands, nothing changes fast and no limit is reached, and is forgotten otherwise. It waits in the steps in which the observer's
  *  load moves against the error by itself: while a load grows, the error is the observer's.
@@ -50,16 +56,17 @@ QM_INLINE void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_
 {
     drive_control_t *c = &run->control;
     const speed_erpm_t speed = observer_speed(&run->observer);
-    const int16_t error = qm_sub_limited(c->reference_erpm, speed), ahead = qm_sub_limited(estimator_speed(&run->estimator), speed);
-    int32_t most_q26 = qm_mulss(p->current_max_q13, 8192 >> SPEED_TRIM_MOST_SHIFT), trim_q26 = c->iq_trim_q26;
+    const int16_t error = qm_sub_limited(c->reference_erpm, speed), most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
+    int32_t trim_q26 = c->iq_trim_q26;
     if (c->reference_erpm == before_erpm && qm_size(error) <= (qm_size(before_erpm) >> SPEED_TRIM_ERROR_SHIFT)
         && observer_is_calm(&run->observer) && qm_size(iq_q13) < c->iq_limit_q13 && qm_size(c->v_q14.q) < c->vq_limit_q14) {
-        trim_q26 += (qm_mulss(error, ahead) < 0) ? 0 : ((qm_mulss(error, c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT);
+        if (!speed_load_moves_against(estimator_speed(&run->estimator), speed, error)) {
+            trim_q26 += (qm_mulss(error, c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT;
+        }
     } else {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;
     }
-    c->iq_trim_q26 = (trim_q26 > most_q26) ? most_q26 : (trim_q26 < -most_q26) ? -most_q26
-                                                                               : trim_q26;
+    c->iq_trim_q26 = qm_clamp_hi(trim_q26, (int16_t)-most_q10, most_q10);
 }
 
 /** The same step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */
