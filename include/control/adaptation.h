@@ -43,7 +43,7 @@ QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, d
         error = (int16_t)-error;
     }
     /* The rate is shared out, not the error: an error's rounding would turn its noise into a drift of R where no current holds it. */
-    rs_rate = qm_hi(2 * qm_mulss(qm_share(ri, sum), p->rate_q16) + 32768);
+    rs_rate = qm_hi_rounded(2 * qm_mulss(qm_share(ri, sum), p->rate_q16));
     a->kfi_q31 = qm_clamp_hi(a->kfi_q31 - qm_mulss(error, (int16_t)(p->rate_q16 - rs_rate)), p->kfi_least, p->kfi_most);
     if ((ri_q12 ^ emf_q12.q) < 0) {
         error = (int16_t)-error;

@@ -62,7 +62,7 @@ QM_INLINE speed_erpm_t observer_speed(const observer_t *o)
 /** The q current that holds the load, with 13 fraction bits. */
 QM_INLINE int32_t observer_load_q26(const observer_t *o, const observer_params_t *p)
 {
-    return qm_mulsu(qm_hi(o->load_q16 + 32768), p->per_unit_q15) >> 2;
+    return qm_mulsu(qm_hi_rounded(o->load_q16), p->per_unit_q15) >> 2;
 }
 
 /** The same in whole counts. */

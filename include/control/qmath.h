@@ -56,6 +56,12 @@ QM_INLINE int16_t qm_hi(int32_t x)
     return (int16_t)(x >> 16);
 }
 
+/** The same, rounded to the nearest, half upwards. */
+QM_INLINE int16_t qm_hi_rounded(int32_t x)
+{
+    return (int16_t)(qm_hi(x) + (int16_t)((uint16_t)x >> 15));
+}
+
 /** Upper word of the signed product: a*b/65536. */
 QM_INLINE int16_t qm_mulhi(int16_t a, int16_t b)
 {
@@ -216,7 +222,7 @@ QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
 }
 
 /** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */
-QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
+NOINLINE int16_t qm_sub_limited(int16_t a, int16_t b)
 {
 #ifdef __FRAMAC__ /* what it means */
     int32_t difference = (int32_t)a - b;

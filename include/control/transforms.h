@@ -67,11 +67,11 @@ QM_INLINE dq_t dq_turn(dq_t x, int16_t a_q16_rad)
 QM_INLINE phases_t phases_of(dq_t x_q13, sincos_t sc)
 {
     dq_t x_q14 = { (int16_t)(2 * x_q13.d), (int16_t)(2 * x_q13.q) };
-    int16_t alpha = qm_hi(qm_mulss(x_q14.d, sc.cos) - qm_mulss(x_q14.q, sc.sin) + 32768);
-    int16_t beta = qm_hi(qm_mulss(x_q14.d, sc.sin) + qm_mulss(x_q14.q, sc.cos) + 32768);
+    int16_t alpha = qm_hi_rounded(qm_mulss(x_q14.d, sc.cos) - qm_mulss(x_q14.q, sc.sin));
+    int16_t beta = qm_hi_rounded(qm_mulss(x_q14.d, sc.sin) + qm_mulss(x_q14.q, sc.cos));
     phases_t i;
     i.a = alpha;
-    i.b = (int16_t)(qm_hi(qm_mulsu(beta, 56756u) + 32768) - (alpha >> 1)); /* sqrt(3)/2 */
+    i.b = (int16_t)(qm_hi_rounded(qm_mulsu(beta, 56756u)) - (alpha >> 1)); /* sqrt(3)/2 */
     i.c = (int16_t)(-i.a - i.b);
     return i;
 }

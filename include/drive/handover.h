@@ -70,11 +70,11 @@ QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_
     }
 }
 
-/* wcet: handover_wait/qm_sub_limited excludes speed_step */
+/* wcet: handover_wait/handover_forced_erpm excludes speed_step */
 /** In RAMP, every slow step: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
  *  again, the rotor is blocked or the constants are off: the rest of the ramp is quicker. */
-QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
+NOINLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
     int16_t forced, seen, ahead, most;
@@ -84,7 +84,7 @@ QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
     }
     forced = handover_forced_erpm(d, p);
     seen = along_direction(d, estimator_speed(&d->run.estimator));
-    ahead = qm_clamp(qm_sub_limited(seen, forced), -16383, 16383);
+    ahead = qm_sub_limited(seen, forced);
     h->ahead_erpm = (int16_t)(h->ahead_erpm + ((ahead - h->ahead_erpm) >> HANDOVER_MEAN_SHIFT));
     if (!at_end && forced < p->early_erpm) { /* the two may be one speed, which is counted down */
         return;

@@ -84,7 +84,7 @@ NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
 }
 
 /** The controller's trim, every rare step in closed loop. */
-QM_INLINE void speed_trim_step(drive_t *d, const drive_params_t *p)
+NOINLINE void speed_trim_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
     if (!mode_commands_current(d)) {
