@@ -22,10 +22,10 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void);
 void BOARD_ISR _T2Interrupt(void);
 void BOARD_ISR _FLTA1Interrupt(void);
 void BOARD_ISR _OscillatorFail(void);
-void BOARD_ISR _AddressError(void);
-void BOARD_ISR _StackError(void);
-void BOARD_ISR _MathError(void);
 void BOARD_ISR _DefaultInterrupt(void);
+void BOARD_ISR _AddressError(void) __attribute__((alias("_DefaultInterrupt")));
+void BOARD_ISR _StackError(void) __attribute__((alias("_DefaultInterrupt")));
+void BOARD_ISR _MathError(void) __attribute__((alias("_DefaultInterrupt")));
 
 /** Where the bridge does not switch. */
 QM_INLINE void board_set_idle_outputs(uint16_t outputs)
@@ -46,6 +46,8 @@ QM_INLINE uint16_t board_slow_is_due(void)
     return drive_slow_follows(&board_drive);
 #endif
 }
+
+#define BOARD_TRAP_FLAGS 0x001Cu /* ADDRERR, STKERR, MATHERR */
 
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
@@ -165,25 +167,9 @@ void BOARD_ISR _OscillatorFail(void)
     INTCON1bits.OSCFAIL = 0;
 }
 
-void BOARD_ISR _AddressError(void)
-{
-    board_trap(FAULT_TRAP);
-    INTCON1bits.ADDRERR = 0;
-}
-
-void BOARD_ISR _StackError(void)
-{
-    board_trap(FAULT_TRAP);
-    INTCON1bits.STKERR = 0;
-}
-
-void BOARD_ISR _MathError(void)
-{
-    board_trap(FAULT_TRAP);
-    INTCON1bits.MATHERR = 0;
-}
-
+/* The others are one handler: which of them it was is in board_trap_intcon1. */
 void BOARD_ISR _DefaultInterrupt(void)
 {
     board_trap(FAULT_TRAP);
+    INTCON1 &= (uint16_t)~BOARD_TRAP_FLAGS;
 }

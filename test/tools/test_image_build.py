@@ -206,7 +206,7 @@ WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS327
 
 @with_compiler
 @pytest.mark.parametrize("file, old, new, told", [
-    ("isr.c", "void BOARD_ISR _MathError(void)\n{", "void BOARD_ISR _T3Interrupt(void);\nvoid BOARD_ISR _T3Interrupt(void)\n{",
+    ("isr.c", "void BOARD_ISR _MathError(void) ", "void BOARD_ISR _T3Interrupt(void) ",
      "the image has no _MathError"),
     ("config.c", "PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON (PWM pins are inputs at reset)"),
     *(("config.c", old, new, f"{new} in config.c, but the board needs") for old, new in WATCHDOG), # off or too slow

@@ -153,7 +153,7 @@ def test_each_copy_counts_and_vectors_are_the_handlers_and_do_not(image, budget)
     share = shares(image(program((0x200, 5), functions=[tick(0x20A, guard(0x200, 0x202), guard(0x206, 0x20A))])), budget)["guard", "guard"]
     assert (share.flash, len(share.copies)) == (9, 2)
     found = image(Sample({0x200: 0, 4: 0x200, 6: 0x300}, functions=[tick(0x202)]))
-    assert (found.handlers, found.flash_bytes) == ([0x200, 0x300], 3)
+    assert (list(found.handlers), found.flash_bytes) == ([0x200, 0x300], 3)
 
 
 @pytest.mark.parametrize("values, calls", [([0x800, 4, 0, 0], False), ([0x800, 4, 1, 7, 7, 0], False), ([0x800, 4, 2, 7, 7, 0], False),

@@ -149,7 +149,7 @@ MAIN, ADC1_BYTES = 14, 4 + 8 + 4 + 2
 
 
 def analyse(levels: dict[str, int], handlers: list[str]) -> stack.Result:
-    return stack.analyse(listing(SYSTEM), 0x200, handlers, levels)
+    return stack.analyse(listing(SYSTEM), 0x200, {name: [name] for name in handlers}, levels)
 
 
 def test_the_levels_of_the_sources_are_read_by_register_field_and_slow_work_and_fault_input_have_the_same():
@@ -167,6 +167,13 @@ def test_the_levels_of_the_sources_are_read_by_register_field_and_slow_work_and_
 def test_interrupts_stand_on_the_background_and_on_lower_levels(levels, handlers, priorities, depth):
     result = analyse(levels, handlers)
     assert ([level.priority for level in result.levels], result.depth) == (priorities, depth)
+
+
+def test_a_handler_of_several_traps_stands_on_itself_once_for_each_level_and_on_interrupts_that_have_none():
+    vectors = {ADC1: [ADC1], MATH: ["_MathError", "_StackError", "_T3Interrupt", "_T4Interrupt"]}
+    result = stack.analyse(listing(SYSTEM), 0x200, vectors, {ADC1: 5})
+    assert [level.priority for level in result.levels] == [stack.RESET_LEVEL, 5, 11, 12]
+    assert result.depth == MAIN + ADC1_BYTES + 3 * (4 + 4)
 
 
 def test_the_table_ends_at_the_depth_and_names_what_was_not_deepest_and_a_missing_handler_is_an_error():

@@ -70,7 +70,7 @@ class Image:
     data: list[Thing]         # sizes in bytes of RAM
     initial_words: int        # start values of the RAM, and the list of what to clear
     initial_calls: bool       # whether that list names a function to call
-    handlers: list[int]       # addresses in the vector table
+    handlers: dict[int, list[str]] # addresses in the vector table: the vectors that go there
     ram_bytes: int
     entry: int
     labels: frozenset[str] = frozenset()    # names in the code
@@ -208,9 +208,18 @@ def _read(elf: Elf) -> Image:
     rest = elf.ram_bytes - sum(thing.size for thing in data)
     if rest:
         data.append(Thing("(alignment)", rest))
-    handlers = {elf.words[address] for address in range(device.IVT, device.VECTORS_END, 2) if address in elf.words}
-    return Image(words, constants, data, len(initial), _calls(initial), sorted(handlers), elf.ram_bytes, elf.entry,
+    return Image(words, constants, data, len(initial), _calls(initial), _handlers(elf), elf.ram_bytes, elf.entry,
                  frozenset(item.name for item in elf.names if item.section is not None and item.section.memory == CODE))
+
+
+def _handlers(elf: Elf) -> dict[int, list[str]]:
+    """Vectors of both tables by the address of their handler."""
+    found: dict[int, list[str]] = {}
+    for table in (device.IVT, device.AIVT):
+        for number, vector in enumerate(device.VECTORS):
+            if (address := elf.words.get(table + 2 * number)) is not None and vector not in found.setdefault(address, []):
+                found[address].append(vector)
+    return dict(sorted(found.items()))
 
 
 def _calls(records: list[int]) -> bool:

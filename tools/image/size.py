@@ -57,7 +57,7 @@ def deepest(image: attribution.Image, listing: str, budget: Budget, board: Path 
     """The deepest stack, with the levels that the interrupts get in the sources of firmware/board.
     @param listing the image's disassembly"""
     functions = {function.instructions[0].address: stack.plain(function.name) for function in stack.parse(listing)}
-    handlers = [functions[address] for address in image.handlers if address in functions]
+    handlers = {functions[address]: vectors for address, vectors in image.handlers.items() if address in functions}
     sources = "".join(path.read_text(encoding="utf-8") for path in sorted(board.glob("*.c")))
     result = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
     if image.initial_calls:

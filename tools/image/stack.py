@@ -256,22 +256,23 @@ def priorities(source: str) -> dict[str, int]:
     return {f"_{'ADC1' if name == 'AD1' else name}Interrupt": int(level) for name, level in found}
 
 
-def analyse(listing: str, start: int, handlers: list[str], levels: dict[str, int], calls_nothing: tuple[str, ...] = ()) -> Result:
+def analyse(listing: str, start: int, handlers: dict[str, list[str]], levels: dict[str, int], calls_nothing: tuple[str, ...] = ()) -> Result:
     """The deepest stack of a program.
     @param start address of the first instruction after reset
-    @param handlers names of the interrupt functions
-    @param levels priority of a handler; another one counts as RESET_LEVEL, a trap as what the core says"""
+    @param handlers names of the interrupt functions: the vectors that go to each
+    @param levels priority of a vector; another one counts as RESET_LEVEL, a trap as what the core says"""
     program = Program(parse(listing), calls_nothing)
     main = program.deepest(start)
     at: dict[int, list[Chain]] = {}
-    for name in handlers:
+    for name, vectors in handlers.items():
         function = program.named(name)
         if function is None:
             program._error(f"{name}: no such function")
             continue
         chain = program.deepest(function.instructions[0].address)
         entry = Chain(chain.depth + ENTRY_BYTES, (("interrupt entry", ENTRY_BYTES), *chain.steps))
-        at.setdefault(TRAP_LEVELS.get(name, levels.get(name, RESET_LEVEL)), []).append(entry)
+        for level in {TRAP_LEVELS.get(vector, levels.get(vector, RESET_LEVEL)) for vector in vectors}:
+            at.setdefault(level, []).append(entry)
     result = []
     for level, chains in sorted(at.items()):
         chains.sort(key=lambda chain: -chain.depth)

@@ -110,8 +110,8 @@ class Program:
             lines = attribution.lines(elf)
         places = {word.address: Place(tuple(plain(f"_{frame.name}") for frame in word.chain), *lines.get(word.address, ("?", 0)))
                   for word in image.words}
-        names = {address: name for address, name in elf.functions if address in image.handlers}
-        return Program(elf, places, statements, decoder, {plain(f"_{name}"): address for address, name in names.items()})
+        names = {plain(name): address for name, address in elf.symbols.items() if address in image.handlers}
+        return Program(elf, places, statements, decoder, {name: names[name] for name in names if name in (*device.VECTORS, device.DEFAULT_VECTOR)})
 
     @cached_property
     def part_names(self) -> list[str]:
