@@ -90,7 +90,7 @@ QM_INLINE uint16_t catch_see(drive_t *d, const drive_params_t *p, angle_t direct
 
 /* wcet: catch_look excludes drive_update_model adaptation_learn handover_decay svm_compensation */
 /** A period of a look. @return 1 when it has ended and the rotor turns: the outputs go off */
-NOINLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
+QM_INLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
 {
     catch_t *c = &d->run.catching;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), flux;
