@@ -13,8 +13,8 @@ target_device := 33FJ32MC204
 target_opt_suffix := $(subst $() ,,$(filter-out -O2,$(OPT)))
 X := build/target$(target_opt_suffix)$(if $(VARIANT),-$(VARIANT))
 
-# -fno-reorder-blocks and -fno-gcse: a fifth less flash in the interrupt at the same worst case.
-target_flags = -std=gnu99 $(OPT) -g -fno-reorder-blocks -fno-gcse -fno-inline-small-functions -ffunction-sections
+# -fno-reorder-blocks and -fno-gcse: a fifth less flash in the interrupt at the same worst case; -fno-tree-pre: 84 bytes and 4 cycles less.
+target_flags = -std=gnu99 $(OPT) -g -fno-reorder-blocks -fno-gcse -fno-tree-pre -fno-inline-small-functions -ffunction-sections
 target_includes = $(if $(USERPARAMS),-I$X/header -I$(call quoted,$(USERPARAMS))) -Iinclude -I.
 # All that XC16's compiler knows and -Wall -Wextra leave out.
 target_warnings := -Wall -Wextra -Werror -pedantic -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align \
