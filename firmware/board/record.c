@@ -26,20 +26,20 @@ void record_tick(void)
 
 static char *put_head(char *line)
 {
-    char *at = text_put_unsigned(text_put(line, "record fault "), board_recorder.fault);
-    at = text_put_unsigned(text_put(at, " rows "), rows_left);
-    at = text_put_unsigned(text_put(at, " every "), RECORDER_EVERY);
-    at = text_put_signed(text_put(at, " offsets "), board_recorder.offset_a_q13);
-    return text_put_signed(text_put(at, " "), board_recorder.offset_b_q13);
+    char *at = text_put_named(line, "record fault ", board_recorder.fault);
+    at = text_put_named(at, " rows ", (int16_t)rows_left);
+    at = text_put_named(at, " every ", (int16_t)RECORDER_EVERY);
+    at = text_put_named(at, " offsets ", board_recorder.offset_a_q13);
+    return text_put_named(at, " ", board_recorder.offset_b_q13);
 }
 
 static char *put_row(char *line, uint16_t place)
 {
     const int8_t *byte = board_recorder.row[place].byte;
-    char *at = text_put_unsigned(text_put(line, "row "), place);
+    char *at = text_put_named(line, "row ", (int16_t)place);
     uint16_t n;
     for (n = 0; n < (uint16_t)RECORDER_BYTES; n++) {
-        at = text_put_signed(text_put(at, " "), byte[n]);
+        at = text_put_named(at, " ", byte[n]);
     }
     return at;
 }

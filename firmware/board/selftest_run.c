@@ -257,7 +257,7 @@ void selftest_ms(void)
 
 char *selftest_put(char *at)
 {
-    return board_selftest_failed ? text_put_unsigned(text_put(at, " selftest "), board_selftest_failed) : at;
+    return board_selftest_failed ? text_put_named(at, " selftest ", (int16_t)board_selftest_failed) : at;
 }
 
 char *selftest_put_marked(char *at)
