@@ -12,49 +12,49 @@
 #define WAIT_MASK 7u
 #define OPEN_SHIFT 2 /* of what is asked of it an open phase carries less than a quarter of another one's share */
 
-/** @param i Q13 */
-NOINLINE void add_sizes(uint16_t *sums, const phases_t *i)
+/** @param a,b,c Q13; as a structure they would go over the stack */
+NOINLINE void add_sizes(uint16_t *sums, current_q13_t a, current_q13_t b, current_q13_t c)
 {
-    sums[0] = (uint16_t)(sums[0] + ((uint16_t)qm_size(i->a) >> PHASE_SHIFT));
-    sums[1] = (uint16_t)(sums[1] + ((uint16_t)qm_size(i->b) >> PHASE_SHIFT));
-    sums[2] = (uint16_t)(sums[2] + ((uint16_t)qm_size(i->c) >> PHASE_SHIFT));
+    sums[0] = (uint16_t)(sums[0] + ((uint16_t)qm_size(a) >> PHASE_SHIFT));
+    sums[1] = (uint16_t)(sums[1] + ((uint16_t)qm_size(b) >> PHASE_SHIFT));
+    sums[2] = (uint16_t)(sums[2] + ((uint16_t)qm_size(c) >> PHASE_SHIFT));
 }
 
 /** Takes the phases' currents into their sums. What is asked for goes by the next period's angle: in the mean over a turn they agree. */
-static void add_phases(deviation_t *v, const drive_t *d)
+static void add_phases(deviation_sums_t *s, const drive_t *d)
 {
     phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
-    add_sizes(v->asked, &asked);
-    add_sizes(v->flows, &d->phases_q13);
+    add_sizes(s->asked, asked.a, asked.b, asked.c);
+    add_sizes(s->flows, d->phases_q13.a, d->phases_q13.b, d->phases_q13.c);
 }
 
 /** 1 where a phase is asked for more than noise and carries less than a quarter of the share of it that the phase with the most current does. */
-static uint16_t has_open_phase(const deviation_t *v, const drive_params_t *p)
+static uint16_t has_open_phase(const deviation_sums_t *s, const drive_params_t *p)
 {
     const uint16_t least = (uint16_t)(((uint16_t)p->id_off_q13 * SAMPLES) >> PHASE_SHIFT);
-    uint16_t n, most = 0, open = 0, flows;
-    for (n = 1; n < 3u; n++) {
-        most = (v->flows[n] > v->flows[most]) ? n : most;
-    }
-    flows = (v->flows[most] < v->asked[most]) ? v->flows[most] : v->asked[most]; /* more is noise */
+    uint16_t n, flows = 0, asked = 0;
     for (n = 0; n < 3u; n++) {
-        open |= (uint16_t)(v->asked[n] >= least && qm_muluu(v->flows[n], v->asked[most]) < (qm_muluu(flows, v->asked[n]) >> OPEN_SHIFT));
+        if (s->flows[n] > flows) {
+            flows = s->flows[n];
+            asked = s->asked[n];
+        }
     }
-    return open;
+    flows = (flows < asked) ? flows : asked; /* more is noise */
+    for (n = 0; n < 3u; n++) {
+        if (s->asked[n] >= least && qm_muluu(s->flows[n], asked) < (qm_muluu(flows, s->asked[n]) >> OPEN_SHIFT)) {
+            return 1;
+        }
+    }
+    return 0;
 }
 
-static void phases_anew(deviation_t *v)
+static void sums_anew(deviation_sums_t *s)
 {
-    uint16_t n;
-    for (n = 0; n < 3u; n++) {
-        v->asked[n] = 0;
-        v->flows[n] = 0;
-    }
-    v->samples = 0;
+    drive_zero(s, sizeof *s);
 }
 
 /** 1 in closed loop after the hand-over; a reversal's ramp forgets nothing. */
-static uint16_t is_judged(const drive_t *d)
+QM_INLINE uint16_t is_judged(const drive_t *d)
 {
     return (uint16_t)(drive_is_closed(d) && d->run.handover.id_q13 == 0);
 }
@@ -65,19 +65,19 @@ uint16_t deviation_phases(deviation_t *v, const drive_t *d, const drive_params_t
     uint16_t open;
 
     if (!drive_is_running(d)) {
-        phases_anew(v);
+        sums_anew(&v->sums);
     }
-    if (!is_judged(d) || (uint16_t)(now - v->sampled_tick) < WAIT_LEAST + ((v->samples * WAIT_STEP) & WAIT_MASK)) {
+    if (!is_judged(d) || (uint16_t)(now - v->sampled_tick) < WAIT_LEAST + ((v->sums.samples * WAIT_STEP) & WAIT_MASK)) {
         return (uint16_t)FAULT_NONE;
     }
     v->sampled_tick = now;
-    add_phases(v, d);
-    v->samples++;
-    if (v->samples < SAMPLES) {
+    add_phases(&v->sums, d);
+    v->sums.samples++;
+    if (v->sums.samples < SAMPLES) {
         return (uint16_t)FAULT_NONE;
     }
-    open = has_open_phase(v, p);
-    phases_anew(v);
+    open = has_open_phase(&v->sums, p);
+    sums_anew(&v->sums);
     return (uint16_t)(open ? FAULT_OPEN_PHASE : FAULT_NONE);
 }
 

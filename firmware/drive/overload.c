@@ -5,11 +5,11 @@
 
 #define SUM_SHIFT 10 /* i^2 / 2 over OVERLOAD_STEP_MS keeps to its word */
 
-/** i_d^2 + i_q^2. A stopped drive's registers keep what flowed last. @return Q26, at most 2^31 */
+/** i_d^2 + i_q^2. @return Q26, at most 2^31 */
 static uint32_t square_of_current(const drive_t *d)
 {
     dq_t i = d->run.control.i_q13;
-    return drive_is_running(d) ? (uint32_t)qm_mulss(i.d, i.d) + (uint32_t)qm_mulss(i.q, i.q) : 0u;
+    return (uint32_t)qm_mulss(i.d, i.d) + (uint32_t)qm_mulss(i.q, i.q);
 }
 
 /** a * rate, in all bits of a. */
@@ -20,21 +20,23 @@ static int32_t part_of(int32_t a, uint16_t rate_q16)
 
 uint16_t overload_tick(overload_t *o, const drive_t *d, const drive_params_t *p, uint16_t ms)
 {
-    const uint32_t square = square_of_current(d) >> SUM_SHIFT;
-    uint16_t rest = ms;
+    const uint16_t runs = drive_is_running(d);
+    uint32_t square = 0; /* a stopped drive's registers keep what flowed last */
+    uint16_t rest;
     if (p->i2t_most_q25 == 0) {
         return 0;
     }
-    while (rest != 0u) {
-        uint16_t left = (uint16_t)(OVERLOAD_STEP_MS - o->ms), part = (rest < left) ? rest : left;
-        rest = (uint16_t)(rest - part);
-        o->ms = (uint16_t)(o->ms + part);
-        o->sum += square * part;
+    if (runs) {
+        square = square_of_current(d) >> SUM_SHIFT;
+    }
+    for (rest = ms; rest != 0u; rest--) { /* one as a rule */
+        o->sum += square;
+        o->ms++;
         if (o->ms == OVERLOAD_STEP_MS) {
             o->heat_q25 += part_of((int32_t)o->sum - o->heat_q25, p->i2t_rate_q16);
             o->sum = 0;
             o->ms = 0;
         }
     }
-    return (uint16_t)(drive_is_running(d) && o->heat_q25 >= p->i2t_most_q25);
+    return (uint16_t)(runs && o->heat_q25 >= p->i2t_most_q25);
 }

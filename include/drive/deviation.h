@@ -5,12 +5,17 @@
 
 #include "drive/drive.h"
 
-/** Mean size of the d current's deviation over half a second, and sums of the phases' currents. Zero is a valid start. */
+/** Sums of the phases' currents. */
 typedef struct {
-    int32_t id_q16;              /**< Q13 counts with 16 fraction bits */
     uint16_t asked[3], flows[3]; /**< |current| that the references ask of the phases and that is measured, Q13 / 16 */
     uint16_t samples;            /**< in the sums */
-    uint16_t sampled_tick;       /**< period of the last one */
+} deviation_sums_t;
+
+/** Mean size of the d current's deviation over half a second, and what the phases carry. Zero is a valid start. */
+typedef struct {
+    int32_t id_q16; /**< Q13 counts with 16 fraction bits */
+    deviation_sums_t sums;
+    uint16_t sampled_tick; /**< period of the last sample */
 } deviation_t;
 
 /** Every pass of the background. @return drive_fault_t: OPEN_PHASE when a phase carries next to none of what is asked of it, or none */
