@@ -8,7 +8,7 @@ recorder_t board_recorder BOARD_PERSISTENT;
 
 #define RECORD_IS_NEW 0xFFFFu /* more than there are: its head has not been sent */
 
-static uint16_t rows_left; /* to be sent */
+static uint16_t rows_left BOARD_UNSET; /* to be sent */
 
 void record_init(drive_fault_t kept)
 {
@@ -19,7 +19,7 @@ void record_init(drive_fault_t kept)
 void record_tick(void)
 {
     recorder_background(&board_recorder, &board_drive);
-    if (recorder_rows(&board_recorder) == 0u) {
+    if (board_recorder.left != 0u) {
         rows_left = RECORD_IS_NEW;
     }
 }

@@ -20,9 +20,9 @@
 #define LINE_PLACE
 #endif
 
-static char line[MODE_LINE_SIZE] LINE_PLACE;
-static uint16_t next; /* index of the next character; a zero byte ends the line */
-static uint16_t waited_ms;
+static char line[MODE_LINE_SIZE] LINE_PLACE BOARD_UNSET;
+static uint16_t next BOARD_UNSET; /* index of the next character; a zero byte ends the line */
+static uint16_t waited_ms BOARD_UNSET;
 
 #define LIMIT_NAME(bit, name, cause, remedy) " " #name "\0" /* one after the other: a pointer to each would take as much as half of them */
 #define LONGEST_LIMIT " FIELD_WEAKENING"                    /* a test holds the others to it */

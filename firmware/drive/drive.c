@@ -17,6 +17,11 @@ void drive_zero(void *object, uint16_t size)
     }
 }
 
+void drive_fail(drive_t *d, drive_fault_t fault)
+{
+    drive_raise(d, fault);
+}
+
 void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
 {
     fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, ref_erpm);

@@ -11,32 +11,24 @@
 
 void panel_init(panel_t *panel)
 {
-    panel->s2.down_ms = 0;
-    panel->s3.down_ms = 0;
-    panel->wish_run = 0;
-    panel->interrupted = 0;
-    panel->fast_range = 0;
-    panel_keep(panel, 1);
+    drive_zero(panel, sizeof *panel);
+    panel->kept = 0xFFFFu; /* panel_keep() without a wish */
     panel->pot_q15 = INT16_MIN;
     panel->pot_q31 = INT32_MIN;
     panel->pot_used_q15 = INT16_MIN;
-    panel->pot_broken_ms = 0;
-    panel->blink_ms = 0;
 }
 
 uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
 {
-    uint16_t before = b->down_ms;
-    if (!down) {
-        b->down_ms = 0;
-        return 0;
+    uint16_t before = b->down_ms, now = 0;
+    if (down) {
+        now = (uint16_t)(before + elapsed_ms);
+        if (now > PANEL_DEBOUNCE_MS) {
+            now = PANEL_DEBOUNCE_MS;
+        }
     }
-    b->down_ms = (uint16_t)(before + elapsed_ms);
-    if (b->down_ms < PANEL_DEBOUNCE_MS) {
-        return 0;
-    }
-    b->down_ms = PANEL_DEBOUNCE_MS;
-    return (uint16_t)(before < PANEL_DEBOUNCE_MS);
+    b->down_ms = now;
+    return (uint16_t)(now >= PANEL_DEBOUNCE_MS && before < PANEL_DEBOUNCE_MS);
 }
 
 /** low + (high - low) * fraction, the fraction in Q16. */
@@ -67,7 +59,7 @@ static void panel_check_pot(panel_t *panel, drive_t *d, const drive_params_t *p,
     panel->pot_broken_ms = (uint16_t)(panel->pot_broken_ms + elapsed_ms);
     if (panel->pot_broken_ms >= POT_BROKEN_MS) {
         panel->pot_broken_ms = POT_BROKEN_MS;
-        drive_raise(d, FAULT_POTENTIOMETER);
+        drive_fail(d, FAULT_POTENTIOMETER);
     }
 }
 
@@ -114,26 +106,22 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
     }
 }
 
-/** A fault's code, blinked. */
-QM_INLINE uint16_t panel_fault_light(const panel_t *panel, uint16_t fault)
+/** A fault's code, blinked. @param burst_ms how long that takes */
+QM_INLINE uint16_t panel_fault_light(uint16_t blink_ms, uint16_t burst_ms)
 {
-    uint16_t in_burst = (uint16_t)(panel->blink_ms < 2u * BLINK_MS * fault);
-    return (uint16_t)(in_burst && (panel->blink_ms / BLINK_MS) % 2u == 0u);
+    return (uint16_t)(blink_ms < burst_ms && (blink_ms / BLINK_MS) % 2u == 0u);
 }
 
 static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t elapsed_ms)
 {
     panel_lights_t lights;
-    uint16_t period = (d->fault == (uint16_t)FAULT_NONE) ? 4u * BLINK_MS : (uint16_t)(2u * BLINK_MS * d->fault + PAUSE_MS);
-    panel->blink_ms = (uint16_t)(panel->blink_ms + elapsed_ms);
-    if (panel->blink_ms >= period) {
-        panel->blink_ms = 0;
+    uint16_t burst_ms = (uint16_t)(2u * BLINK_MS * d->fault);
+    uint16_t blink_ms = (uint16_t)(panel->blink_ms + elapsed_ms);
+    if (blink_ms >= ((burst_ms == 0u) ? 4u * BLINK_MS : burst_ms + PAUSE_MS)) {
+        blink_ms = 0;
     }
-    if (d->fault == (uint16_t)FAULT_NONE) {
-        lights.led_alive = (uint16_t)(panel->blink_ms < 2u * BLINK_MS);
-    } else {
-        lights.led_alive = panel_fault_light(panel, d->fault);
-    }
+    panel->blink_ms = blink_ms;
+    lights.led_alive = (burst_ms == 0u) ? (uint16_t)(blink_ms < 2u * BLINK_MS) : panel_fault_light(blink_ms, burst_ms);
     lights.led_run = drive_is_running(d);
     return lights;
 }

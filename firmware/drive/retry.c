@@ -7,11 +7,10 @@
 
 void retry_init(retry_t *r)
 {
-    r->left = RETRY_COUNT;
-    r->first = (uint16_t)FAULT_NONE;
-    r->fault = (uint16_t)FAULT_NONE;
-    r->asked = 0;
-    r->waited_ms = 0;
+    drive_zero(r, sizeof *r);
+    if (RETRY_COUNT != 0) {
+        r->left = RETRY_COUNT;
+    }
 }
 
 /** 1 for a fault that may pass by itself (drive/faults.h). */
