@@ -86,59 +86,82 @@ static const written_t written[] = {
 
 static void test_registers(void)
 {
-    static uint16_t row;
+    static uint16_t rows_left;
     uint16_t left;
     for (left = REGISTERS_AT_ONCE; left != 0u; left--) {
-        const written_t *w = &written[row];
+        const written_t *w;
+        if (rows_left == 0u) {
+            rows_left = sizeof written / sizeof written[0];
+        }
+        rows_left--;
+        w = &written[rows_left];
         if ((*w->place & w->mask) != w->value) {
             selftest_fail(SELFTEST_REGISTERS);
         }
-        row = (uint16_t)((row + 1u < sizeof written / sizeof written[0]) ? row + 1u : 0u);
     }
     if (PSVPAG != 0u) { /* 8 bits in the device header */
         selftest_fail(SELFTEST_REGISTERS);
     }
 }
 
-/** The override as the interrupts' last words have left it: as the state asks, or off. The low sides stay on until the first duties are written. */
-static uint16_t outputs_hold(void)
+/** The override as the interrupts' last words have left it: as the state asks (drive_outputs()), or off. The low sides stay on until the first duties
+ *  are written. */
+static void test_outputs(void)
 {
-    uint16_t outputs = drive_outputs(&board_drive), now = P1OVDCON;
-    if (board_drive.state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
-        return 1;
+    const uint16_t now = P1OVDCON, state = board_drive.state;
+    uint16_t asked = BOARD_OUTPUTS_OFF;
+    if (board_drive.fault == (uint16_t)FAULT_NONE) {
+        if (drive_is_running(&board_drive)) {
+            asked = BOARD_OUTPUTS_PWM;
+        } else if (state == (uint16_t)DRIVE_BOOTSTRAP) {
+            asked = BOARD_OUTPUTS_BOOTSTRAP;
+        } else {
+            /* off */
+        }
     }
-    return (uint16_t)(now == BOARD_OUTPUTS_OFF || (outputs != 0u && now == (outputs == OUTPUTS_PWM ? BOARD_OUTPUTS_PWM : BOARD_OUTPUTS_BOOTSTRAP)));
+    if (state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
+        return;
+    }
+    if (now != BOARD_OUTPUTS_OFF && now != asked) {
+        selftest_fail(SELFTEST_REGISTERS);
+    }
 }
 
 /* ---- flash ---- */
 
 static uint16_t flash_at;
-static uint16_t flash_without_crc; /* erased words in its place: linked without tools/image/crc.py */
+static uint16_t flash_has_crc; /* 0: erased words in its place, linked without tools/image/crc.py */
 static uint16_t flash_crc;
+
+static void judge_flash(uint16_t crc)
+{
+    uint16_t stored = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT), inverse = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT + 2u);
+    flash_has_crc = (uint16_t) ~(stored & inverse);
+    if (flash_has_crc && (stored != crc || (uint16_t)(inverse ^ crc) != 0xFFFFu)) {
+        selftest_fail(SELFTEST_FLASH);
+    }
+}
 
 uint16_t selftest_flash(void)
 {
-    uint16_t left, stored, inverse;
+    uint16_t at = flash_at, crc = flash_crc, left;
     TBLPAG = 0;
+    if (at == 0u) {
+        crc = SELFTEST_CRC_START;
+    }
     for (left = FLASH_WORDS; left != 0u; left--) {
-        uint16_t low = (uint16_t)__builtin_tblrdl(flash_at), high = (uint16_t)__builtin_tblrdh(flash_at);
-        if (flash_at == 0u) {
-            flash_crc = SELFTEST_CRC_START;
-        }
-        flash_crc = selftest_crc(selftest_crc(selftest_crc(flash_crc, low & 0xFFu), low >> 8), high & 0xFFu);
-        flash_at = (uint16_t)(flash_at + 2u);
-        if (flash_at == BOARD_FLASH_CRC_AT) {
-            stored = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT);
-            inverse = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT + 2u);
-            flash_without_crc = (uint16_t)((stored & inverse) == 0xFFFFu);
-            if (!flash_without_crc && (stored != flash_crc || (uint16_t)(inverse ^ flash_crc) != 0xFFFFu)) {
-                selftest_fail(SELFTEST_FLASH);
-            }
-            flash_at = 0;
-            return 1;
+        uint16_t low = (uint16_t)__builtin_tblrdl(at), high = (uint16_t)__builtin_tblrdh(at);
+        crc = selftest_crc(selftest_crc(selftest_crc(crc, low & 0xFFu), low >> 8), high & 0xFFu);
+        at = (uint16_t)(at + 2u);
+        if (at == BOARD_FLASH_CRC_AT) {
+            judge_flash(crc);
+            at = 0;
+            break;
         }
     }
-    return 0;
+    flash_at = at;
+    flash_crc = crc;
+    return left;
 }
 
 #ifdef __XC16__
@@ -153,7 +176,7 @@ static void test_ram_slice(void)
 {
     static uint16_t from, n; /* word of the RAM, background */
     volatile uint16_t *at = BOARD_RAM + from;
-    uint16_t words = (uint16_t)(BOARD_RAM_END - at);
+    uint16_t words = (uint16_t)((uint16_t)(BOARD_RAM_END - BOARD_RAM) - from);
 
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
     if (words > 1u) {
@@ -181,9 +204,7 @@ static void test_in_silence(void)
     if (!selftest_flow_holds(&board_drive)) {
         selftest_fail(SELFTEST_FLOW);
     }
-    if (!outputs_hold()) {
-        selftest_fail(SELFTEST_REGISTERS);
-    }
+    test_outputs();
     test_ram_slice();
 }
 
@@ -262,7 +283,7 @@ char *selftest_put(char *at)
 
 char *selftest_put_marked(char *at)
 {
-    return flash_without_crc ? text_put(at, " flash without CRC") : at;
+    return flash_has_crc ? at : text_put(at, " flash without CRC");
 }
 
 #endif
