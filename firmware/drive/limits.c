@@ -12,11 +12,16 @@ static uint16_t at_limit(int16_t x, int16_t limit)
     return (uint16_t)(qm_size(x) >= (int16_t)(limit - (limit >> 5)));
 }
 
-/** The q current is held by the bus. With no braking current at all its reference is 0, which has no sign. */
-static uint16_t brakes_at_limit(const drive_control_t *c, speed_erpm_t speed)
+/** What holds the q current: the bus if it brakes, else the current. With no braking current at all its reference is 0, which has no sign. */
+static uint16_t current_reasons(const drive_control_t *c, speed_erpm_t speed)
 {
-    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && at_limit(c->ref_q13.q, c->brake_limit_q13)
-                      && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0));
+    int16_t limit = c->iq_limit_q13;
+    uint16_t reason = (uint16_t)LIMIT_CURRENT;
+    if (c->brake_limit_q13 < limit && (c->ref_q13.q == 0 || (c->ref_q13.q ^ speed) < 0)) {
+        limit = c->brake_limit_q13;
+        reason = (uint16_t)LIMIT_BRAKE;
+    }
+    return (uint16_t)(at_limit(c->ref_q13.q, limit) ? reason : 0u);
 }
 
 /** What holds the speed reference. A rest that the next step takes is no ramp. */
@@ -24,9 +29,11 @@ static uint16_t ramp_reasons(const drive_t *d, const drive_params_t *p)
 {
     speed_erpm_t target = mode_speed_target(d, p);
     int16_t left = qm_size(qm_sub_limited(target, d->run.control.reference_erpm));
-    uint16_t waits = (uint16_t)(left != 0 && !reference_may_move(d, p, target));
 
-    return (uint16_t)((waits || left >= qm_hi(2 * p->speed_ramp_q16 + 65535) ? (uint16_t)LIMIT_RAMP : 0u) | (waits ? (uint16_t)LIMIT_RAMP_WAITS : 0u));
+    if (left != 0 && !reference_may_move(d, p, target)) {
+        return (uint16_t)LIMIT_RAMP | (uint16_t)LIMIT_RAMP_WAITS;
+    }
+    return (uint16_t)((left > qm_hi(2 * p->speed_ramp_q16 - 1)) ? LIMIT_RAMP : LIMIT_NONE);
 }
 
 /** What holds the current's references in closed loop. */
@@ -39,13 +46,7 @@ static uint16_t closed_loop_reasons(const drive_t *d, const drive_params_t *p)
     if (!mode_limit_reasons(d, p, &found)) {
         found = ramp_reasons(d, p);
     }
-    if (brakes_at_limit(c, observer_speed(&run->observer))) {
-        found |= (uint16_t)LIMIT_BRAKE;
-    } else if (at_limit(c->ref_q13.q, c->iq_limit_q13)) {
-        found |= (uint16_t)LIMIT_CURRENT;
-    } else {
-        /* the q current is what it was asked to be */
-    }
+    found |= current_reasons(c, observer_speed(&run->observer));
     if (c->burn_q13 > 0) {
         found |= (uint16_t)LIMIT_BURN;
     }
@@ -70,14 +71,12 @@ static uint16_t start_swings(const drive_t *d, const drive_params_t *p)
 uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
 {
     const drive_control_t *c = &d->run.control;
-    uint16_t found = 0;
+    uint16_t found;
 
     if (!drive_is_running(d)) {
         return (uint16_t)((d->state == (uint16_t)DRIVE_CATCH && d->run.catching.step <= (uint16_t)CATCH_FIRST_LOOK) ? LIMIT_TOO_FAST : LIMIT_NONE);
     }
-    if (at_limit(c->v_q14.q, c->vq_limit_q14) || at_limit(c->v_q14.d, d->circle.vd_most_q14)) {
-        found = (uint16_t)LIMIT_VOLTAGE;
-    }
+    found = (uint16_t)((at_limit(c->v_q14.q, c->vq_limit_q14) | at_limit(c->v_q14.d, d->circle.vd_most_q14)) * (uint16_t)LIMIT_VOLTAGE);
     if (drive_is_closed(d)) {
         found |= closed_loop_reasons(d, p);
     } else if (start_swings(d, p)) {
