@@ -12,7 +12,7 @@ static uint16_t rows_left BOARD_UNSET; /* to be sent */
 
 void record_init(drive_fault_t kept)
 {
-    recorder_restart(&board_recorder, RESET_LOST_RAM, kept);
+    recorder_restart(&board_recorder, RESET_LOST_RAM(board_reset_cause), kept);
     rows_left = RECORD_IS_NEW;
 }
 

@@ -26,11 +26,11 @@ drive_fault_t reset_take(void)
     RCON = 0;
     board_reset_cause = cause;
     served_tick = 0;
-    if (RESET_LOST_RAM) {
+    if (RESET_LOST_RAM(cause)) {
         board_trap_intcon1 = 0;
         return FAULT_NONE; /* what is kept holds anything now: it is not even read */
     }
-    if (!RESET_WAS(TRAPR, cause) && !RESET_WAS(IOPUWR, cause) && !RESET_WAS(WDTO, cause)) {
+    if ((cause & (RESET_FLAG(TRAPR) | RESET_FLAG(IOPUWR) | RESET_FLAG(WDTO))) == 0u) {
         return FAULT_NONE;
     }
     fault = kept_fault;

@@ -51,11 +51,3 @@ void recorder_background(recorder_t *r, const drive_t *d)
         /* it is kept */
     }
 }
-
-uint16_t recorder_rows(const recorder_t *r)
-{
-    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
-        return 0;
-    }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
-}

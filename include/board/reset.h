@@ -36,8 +36,10 @@ enum { RESET_CAUSE_TABLE(RESET_BIT) };
 
 /** RCON as it was found at the start: bits of RESET_CAUSE_TABLE. */
 extern volatile uint16_t board_reset_cause;
-/** 1 if RAM holds anything: after power-up, or a supply that dipped. */
-#define RESET_LOST_RAM (RESET_WAS(POR, board_reset_cause) || RESET_WAS(BOR, board_reset_cause))
+/** The flag as a bit, to ask for several at once. */
+#define RESET_FLAG(name) (1u << RESET_##name)
+/** Not 0 if RAM holds anything: after power-up, or a supply that dipped. */
+#define RESET_LOST_RAM(rcon) ((uint16_t)((rcon) & (RESET_FLAG(POR) | RESET_FLAG(BOR))))
 
 /** INTCON1 at the last trap (FAULT_TRAP): its bits name the trap. Kept over every reset but power-up. */
 extern volatile uint16_t board_trap_intcon1;

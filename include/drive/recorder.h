@@ -55,7 +55,13 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault);
 void recorder_background(recorder_t *r, const drive_t *d);
 
 /** Rows of a complete record; 0 before a fault. */
-uint16_t recorder_rows(const recorder_t *r);
+QM_INLINE uint16_t recorder_rows(const recorder_t *r)
+{
+    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
+        return 0;
+    }
+    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
+}
 
 /** Place in the ring of the row that so many later ones follow: the newest has none. */
 QM_INLINE uint16_t recorder_place(const recorder_t *r, uint16_t later)
