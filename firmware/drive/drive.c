@@ -55,12 +55,12 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
     drive_update_model(run, p, p->end_erpm);
     run->control.iq_limit_q13 = p->current_max_q13;
     run->control.brake_limit_q13 = limits_asked_most(p);
+    drive_zero(&d->forced, sizeof d->forced);
     d->forced.speed_q10 = p->align_speed_q10;
-    d->forced.increase_q10 = 0;
-    d->forced.angle_q32 = 0;
-    d->forced.step_q32 = 0;
     d->dead = (dead_duties_t){ 0, 0, 0 };
-    drive_zero(d->dead_second, (uint16_t)sizeof d->dead_second);
+    if (sizeof d->dead_second != 0u) {
+        drive_zero(d->dead_second, (uint16_t)sizeof d->dead_second);
+    }
     d->angle = forced_angle(&d->forced);
     d->frame = trig_sincos_called(d->angle);
     run->catching.step = mode_hands_over() ? p->flying_start : (uint16_t)CATCH_NO_LOOK;
