@@ -52,6 +52,14 @@ void firmware_trip(drive_fault_t fault)
     drive_fail(&board_drive, fault);
 }
 
+/** @param found drive_fault_t, none too */
+static void firmware_find(uint16_t found)
+{
+    if (found != (uint16_t)FAULT_NONE) {
+        firmware_trip((drive_fault_t)found);
+    }
+}
+
 void firmware_init(void)
 {
     drive_fault_t kept;
@@ -80,11 +88,7 @@ void firmware_init(void)
     uart_init();
     timer_init();
     pwm_init();
-    if (board_clock_failed) {
-        firmware_trip(FAULT_CLOCK);
-    } else if (kept != FAULT_NONE) {
-        firmware_trip(kept);
-    }
+    firmware_find(board_clock_failed ? (uint16_t)FAULT_CLOCK : (uint16_t)kept);
     adc_init();
     ClrWdt();
 }
@@ -118,14 +122,6 @@ static void firmware_watch_interrupt(void)
         firmware_trip(FAULT_ADC_LOST);
     } else {
         judged.was_silent = 1;
-    }
-}
-
-/** @param found drive_fault_t, none too */
-static void firmware_find(uint16_t found)
-{
-    if (found != (uint16_t)FAULT_NONE) {
-        firmware_trip((drive_fault_t)found);
     }
 }
 
