@@ -106,17 +106,18 @@ static char *put_line(void)
 /** The first line: "foc33 0.9.0 reset BOR POR". */
 static char *put_reset(void)
 {
-    const uint16_t causes = 0u RESET_CAUSE_TABLE(CAUSE_BIT);
     const char *name = RESET_CAUSE_TABLE(CAUSE_NAME);
     char *at = text_put(line, "foc33 " FOC33_VERSION " reset");
-    uint16_t bit;
-    for (bit = 0x8000u; bit != 0u; bit >>= 1) {
-        if ((causes & bit) != 0u) {
-            if ((board_reset_cause & bit) != 0u) {
+    uint16_t named = 0u RESET_CAUSE_TABLE(CAUSE_BIT), found = board_reset_cause; /* the highest bit is the next one */
+    while (named != 0u) {
+        if ((named & 0x8000u) != 0u) {
+            if ((found & 0x8000u) != 0u) {
                 at = text_put(at, name);
             }
             name = next_name(name);
         }
+        named = (uint16_t)(named << 1);
+        found = (uint16_t)(found << 1);
     }
     return text_put(selftest_put_marked(at), "\r\n");
 }
