@@ -10,11 +10,12 @@
 void drive_zero(void *object, uint16_t size)
 {
     uint8_t *byte = object;
-    uint16_t left;
-    for (left = size; left != 0u; left--) {
+    uint16_t left = size;
+    do {
         *byte = 0;
         byte++;
-    }
+        left--;
+    } while (left != 0u);
 }
 
 void drive_fail(drive_t *d, drive_fault_t fault)
@@ -34,6 +35,7 @@ void drive_init(drive_t *d, const drive_params_t *p)
     drive_zero(d, sizeof *d);
     d->direction = 1;
     SELFTEST_KEEP(d, direction, 1);
+    SELFTEST_KEEP(d, state, DRIVE_CALIBRATE); /* 0, as all of it: drive_enter() would find nothing else to do */
     SELFTEST_KEEP(d, fault, FAULT_NONE);
     SELFTEST_KEEP(d, offset_a, 0);
     SELFTEST_KEEP(d, offset_b, 0);
@@ -41,7 +43,6 @@ void drive_init(drive_t *d, const drive_params_t *p)
     bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);
     drive_update_model(&d->run, p, p->end_erpm);
-    drive_enter(d, DRIVE_CALIBRATE);
 }
 
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
