@@ -170,6 +170,14 @@ const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLAS
 
 /* ---- between two control interrupts ---- */
 
+void selftest_cpu(void)
+{
+    board_cpu_test();
+    if (board_cpu_holds == 0u) {
+        selftest_fail(SELFTEST_CPU);
+    }
+}
+
 /** Four words of RAM; at its end the processor's registers, and another background. With interrupts off. */
 static void test_ram_slice(void)
 {
@@ -191,10 +199,7 @@ static void test_ram_slice(void)
     } else {
         from = 0;
         n = (uint16_t)((n + 1u < SELFTEST_BACKGROUNDS) ? n + 1u : 0u);
-        board_cpu_test();
-        if (board_cpu_holds == 0u) {
-            selftest_fail(SELFTEST_CPU);
-        }
+        selftest_cpu();
     }
 }
 

@@ -46,17 +46,18 @@ static char *put_limits(char *at)
 {
     const char *name = DRIVE_LIMIT_TABLE(LIMIT_NAME);
     char *end = at;
-    uint16_t bit = 1;
-    if (LimitParm.seen != 0u) {
+    uint16_t bit = 1, seen = LimitParm.seen;
+    if (seen != 0u) {
         end = text_put(end, " limit");
     }
     for (; *name != '\0' && end <= line + LIMITS_END; name = next_name(name)) {
-        if ((LimitParm.seen & bit) != 0u) {
+        if ((seen & bit) != 0u) {
             end = text_put(end, name);
-            LimitParm.seen ^= bit;
+            seen ^= bit;
         }
         bit = (uint16_t)(bit << 1);
     }
+    LimitParm.seen = seen;
     return end;
 }
 

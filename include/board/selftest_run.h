@@ -28,6 +28,9 @@ void selftest_pass(void);
 /** At the end of a millisecond's work. */
 void selftest_ms(void);
 
+/** The processor's registers. With interrupts off; leaves level 7. */
+void selftest_cpu(void);
+
 /** One slice of the flash's CRC. @return not 0 at the flash's end */
 uint16_t selftest_flash(void);
 
