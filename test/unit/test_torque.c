@@ -4,7 +4,7 @@
 #include "panel_rig.h"
 
 #include "firmware/drive/limits.c"
-#include "firmware/drive/panel.c"
+#include "drive/panel_tick.h"
 
 void setUp(void)
 {
