@@ -1,7 +1,7 @@
 /* AN1292's watch variables, copied from the drive in the background. */
 #include "board/watch.h"
 
-#include "drive/limits.h"
+#include "drive/limits_now.h"
 
 tFdWeakParm FdWeakParm;
 tMotorEstimParm MotorEstimParm;

@@ -3,7 +3,7 @@
 #include "ideal_motor.h"
 #include "panel_rig.h"
 
-#include "firmware/drive/limits.c"
+#include "drive/limits_now.h"
 #include "drive/panel_tick.h"
 
 void setUp(void)
