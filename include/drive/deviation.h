@@ -63,11 +63,6 @@ QM_INLINE uint16_t deviation_open_phase(const deviation_sums_t *s, const drive_p
     return 0;
 }
 
-QM_INLINE void deviation_sums_anew(deviation_sums_t *s)
-{
-    drive_zero(s, sizeof *s);
-}
-
 /** 1 in closed loop after the hand-over; a reversal's ramp forgets nothing. */
 QM_INLINE uint16_t deviation_is_judged(const drive_t *d)
 {
@@ -78,10 +73,9 @@ QM_INLINE uint16_t deviation_is_judged(const drive_t *d)
 QM_INLINE uint16_t deviation_phases(deviation_t *v, const drive_t *d, const drive_params_t *p)
 {
     const uint16_t now = d->ticks;
-    uint16_t open;
 
-    if (!drive_is_running(d)) {
-        deviation_sums_anew(&v->sums);
+    if (!drive_is_running(d) || v->sums.samples >= DEVIATION_SAMPLES) {
+        drive_zero(&v->sums, sizeof v->sums);
     }
     if (!deviation_is_judged(d) || (uint16_t)(now - v->sampled_tick) < DEVIATION_WAIT_LEAST + ((v->sums.samples * DEVIATION_WAIT_STEP) & DEVIATION_WAIT_MASK)) {
         return (uint16_t)FAULT_NONE;
@@ -92,9 +86,7 @@ QM_INLINE uint16_t deviation_phases(deviation_t *v, const drive_t *d, const driv
     if (v->sums.samples < DEVIATION_SAMPLES) {
         return (uint16_t)FAULT_NONE;
     }
-    open = deviation_open_phase(&v->sums, p);
-    deviation_sums_anew(&v->sums);
-    return (uint16_t)(open ? FAULT_OPEN_PHASE : FAULT_NONE);
+    return (uint16_t)(deviation_open_phase(&v->sums, p) ? FAULT_OPEN_PHASE : FAULT_NONE);
 }
 
 /** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise

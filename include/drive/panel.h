@@ -14,7 +14,7 @@ typedef struct {
 
 /** Inputs of one background pass. */
 typedef struct {
-    uint16_t s2_down, s3_down; /**< 1 = pressed */
+    uint16_t s2_down, s3_down; /**< not 0: pressed */
     uint16_t elapsed_ms;       /**< time since the last pass, 1 or more */
     REMOTE_INPUT
 } panel_inputs_t;
