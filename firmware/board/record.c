@@ -58,5 +58,5 @@ char *record_line(char *line)
         rows_left--;
         at = put_row(line, recorder_place(&board_recorder, rows_left));
     }
-    return text_put(at, "\r\n");
+    return text_end(at);
 }

@@ -96,7 +96,7 @@ static char *put_line(void)
         at = text_put_named(at, " fault ", (int16_t)board_drive.fault);
         at = text_put_named(at, " speed ", speed_rpm(estimator_speed(&board_drive.run.estimator)));
         at = put_limits(put_retry(text_put(at, " rpm")));
-        at = text_put(selftest_put(at), "\r\n");
+        at = text_end(selftest_put(at));
     }
     return at;
 }
@@ -120,7 +120,7 @@ static char *put_reset(void)
         named = (uint16_t)(named << 1);
         found = (uint16_t)(found << 1);
     }
-    return text_put(selftest_put_marked(at), "\r\n");
+    return text_end(selftest_put_marked(at));
 }
 
 #if SCOPE

@@ -42,3 +42,8 @@ char *text_put_named(char *at, const char *name, int16_t number)
 {
     return text_put_signed(text_put(at, name), number);
 }
+
+char *text_end(char *at)
+{
+    return text_put(at, "\r\n");
+}

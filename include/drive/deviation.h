@@ -73,11 +73,13 @@ QM_INLINE uint16_t deviation_is_judged(const drive_t *d)
 QM_INLINE uint16_t deviation_phases(deviation_t *v, const drive_t *d, const drive_params_t *p)
 {
     const uint16_t now = d->ticks;
+    uint16_t wait;
 
     if (!drive_is_running(d) || v->sums.samples >= DEVIATION_SAMPLES) {
         drive_zero(&v->sums, sizeof v->sums);
     }
-    if (!deviation_is_judged(d) || (uint16_t)(now - v->sampled_tick) < DEVIATION_WAIT_LEAST + ((v->sums.samples * DEVIATION_WAIT_STEP) & DEVIATION_WAIT_MASK)) {
+    wait = (uint16_t)(DEVIATION_WAIT_LEAST + ((v->sums.samples * DEVIATION_WAIT_STEP) & DEVIATION_WAIT_MASK));
+    if (!deviation_is_judged(d) || (uint16_t)(now - v->sampled_tick) < wait) {
         return (uint16_t)FAULT_NONE;
     }
     v->sampled_tick = now;
