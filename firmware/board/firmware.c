@@ -40,7 +40,7 @@ drive_t board_drive BOARD_UNSET;
 panel_t board_panel BOARD_UNSET;
 retry_t board_retry BOARD_UNSET;
 #if SCOPE
-remote_t scope_command BOARD_UNSET;
+remote_t scope_command; /* cleared: remote_init() leaves what the client has not written */
 #endif
 
 static uint16_t last_ms_tick BOARD_UNSET; /* drive ticks already counted as milliseconds */
