@@ -2,6 +2,7 @@
 #ifndef DRIVE_PANEL_TICK_H
 #define DRIVE_PANEL_TICK_H
 
+#include "drive/begin.h"
 #include "drive/modes/modes.h"
 #include "drive/panel.h"
 #include "drive/remote.h"
@@ -146,7 +147,7 @@ QM_INLINE panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_para
     if (!panel->wish_run) {
         d->command.run = 0;
     } else if (d->state == (uint16_t)DRIVE_STOPPED) {
-        drive_start(d, p, (int16_t)((target >= 0) ? 1 : -1));
+        drive_begin(d, p, (int16_t)((target >= 0) ? 1 : -1));
     } else if (drive_is_closed(d)) {
         d->command.run = 1; /* a stop under way goes on from the present speed; the drive itself turns to the target's direction */
     } else if ((target ^ d->direction) < 0) {
