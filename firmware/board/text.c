@@ -6,10 +6,8 @@
 char *text_put(char *at, const char *text)
 {
     char *next = at;
-    const char *from = text;
-    char c;
-    while ((c = *from++) != '\0') {
-        *next++ = c;
+    while (*text != '\0') {
+        *next++ = *text++;
     }
     return next;
 }
