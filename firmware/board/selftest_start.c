@@ -65,7 +65,7 @@ static void test_ram(void)
     uint16_t room = (uint16_t)(BOARD_FREE_END - spare), wrong = 0, n, words;
 
     for (n = 0; n < SELFTEST_BACKGROUNDS; n++) {
-        wrong |= selftest_march(spare, room, selftest_backgrounds[n], spare);
+        wrong |= selftest_march(spare, room, selftest_backgrounds[n], 0);
         at = BOARD_RAM;
         do {
             words = (uint16_t)(BOARD_USED_END(spare) - at);

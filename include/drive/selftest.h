@@ -29,7 +29,7 @@ extern const uint16_t selftest_backgrounds[SELFTEST_BACKGROUNDS];
 /** March C- over a stretch of RAM: up w; up r, w~; up r~, w; down r, w~; down r~, w; up r. Nothing may use the stretch meanwhile.
  *  Apart from its beginning and end it works in registers alone: the stretch may hold the stack.
  *  @param background what w writes; w~ is its complement
- *  @param spare keeps the contents meanwhile, outside of the stretch; the stretch itself: they get lost @return 0, or bits that were wrong */
+ *  @param spare keeps the contents meanwhile, outside of the stretch; 0: they may get lost @return 0, or bits that were wrong */
 uint16_t selftest_march(volatile uint16_t *first, uint16_t words, uint16_t background, volatile uint16_t *spare);
 
 /** CRC-16 of CCITT (polynomial 0x1021, start value 0xFFFF, highest bit first) of one more byte. */
