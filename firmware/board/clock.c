@@ -2,17 +2,24 @@
 #include "board/mclv.h"
 #include "board/peripherals.h"
 
+void clock_write_low(uint16_t low)
+{
+    __builtin_write_OSCCONL(low);
+}
+
 /** @param needs bits of OSCCON that tell that the source is ready @return 0, or 1 if it is not the clock */
 static uint16_t clock_switch(uint16_t source, uint16_t needs)
 {
-    uint16_t loops = BOARD_WAIT_LOOPS;
+    uint16_t loops;
     __builtin_write_OSCCONH(source);
-    __builtin_write_OSCCONL(OSCCON | 0x0001u);
-    while ((OSCCONbits.COSC != source || (OSCCON & needs) != needs) && loops != 0u) {
-        loops--;
+    clock_write_low((uint16_t)(OSCCON | 0x0001u));
+    for (loops = BOARD_WAIT_LOOPS; loops != 0u; loops--) {
+        if (OSCCONbits.COSC == source && (OSCCON & needs) == needs) {
+            return 0;
+        }
         ClrWdt(); /* the wait is bounded, but longer than the watchdog's time */
     }
-    return (uint16_t)(loops == 0u);
+    return 1;
 }
 
 uint16_t clock_init(void)

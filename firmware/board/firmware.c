@@ -31,25 +31,33 @@
 typedef struct {
     deviation_t deviation;
     overload_t overload;
+    uint16_t supervised_tick;          /* drive ticks at the last check */
+    uint16_t was_silent;               /* a timer 1 millisecond without a control interrupt */
+    uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
 } judged_t;
 
-drive_t board_drive;
-panel_t board_panel;
-retry_t board_retry;
+drive_t board_drive BOARD_UNSET;
+panel_t board_panel BOARD_UNSET;
+retry_t board_retry BOARD_UNSET;
 #if SCOPE
-remote_t scope_command;
+remote_t scope_command; /* cleared: remote_init() leaves what the client has not written */
 #endif
 
-static uint16_t last_ms_tick;    /* drive ticks already counted as milliseconds */
-static uint16_t supervised_tick; /* drive ticks at the last check */
-static uint16_t silent_ms;       /* timer 1 milliseconds without a control interrupt */
-static judged_t judged;
-static uint16_t counted_tick, counted_ms; /* drive ticks at the beginning of the count, and timer 1 milliseconds since */
+static uint16_t last_ms_tick BOARD_UNSET; /* drive ticks already counted as milliseconds */
+static judged_t judged BOARD_UNSET;
 
 void firmware_trip(drive_fault_t fault)
 {
     pwm_outputs_off();
-    drive_raise(&board_drive, fault);
+    drive_fail(&board_drive, fault);
+}
+
+/** @param found drive_fault_t, none too */
+static void firmware_find(uint16_t found)
+{
+    if (found != (uint16_t)FAULT_NONE) {
+        firmware_trip((drive_fault_t)found);
+    }
 }
 
 void firmware_init(void)
@@ -60,10 +68,7 @@ void firmware_init(void)
     kept = reset_take();
     record_init(kept);
     last_ms_tick = 0;
-    supervised_tick = 0;
-    silent_ms = 0;
-    counted_tick = 0;
-    counted_ms = 0;
+    drive_zero(&judged, sizeof judged);
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
     panel_init(&board_panel);
@@ -83,50 +88,40 @@ void firmware_init(void)
     uart_init();
     timer_init();
     pwm_init();
-    if (board_clock_failed) {
-        firmware_trip(FAULT_CLOCK);
-    } else if (kept != FAULT_NONE) {
-        firmware_trip(kept);
-    }
+    firmware_find(board_clock_failed ? (uint16_t)FAULT_CLOCK : (uint16_t)kept);
     adc_init();
     ClrWdt();
 }
 
 /** Control interrupts are as many as the timer says. A background pass that takes longer than a millisecond loses one of the timer's, never of
  *  the interrupts': only too few are a fault. Every millisecond. */
-static void firmware_count_interrupts(void)
+static void firmware_count_interrupts(uint16_t ticks)
 {
-    if (++counted_ms < COUNT_MS) {
+    if (++judged.counted_ms < COUNT_MS) {
         return;
     }
-    if ((uint16_t)(board_drive.ticks - counted_tick) < LEAST_TICKS) {
+    if ((uint16_t)(ticks - judged.counted_tick) < LEAST_TICKS) {
         firmware_trip(FAULT_INTERRUPT_RATE);
     }
-    counted_tick = board_drive.ticks;
-    counted_ms = 0;
+    judged.counted_tick = ticks;
+    judged.counted_ms = 0;
 }
 
 /** A control interrupt that stays away for 2 ms leaves the bridge without control. */
 static void firmware_watch_interrupt(void)
 {
+    uint16_t ticks = board_drive.ticks;
     if (!timer_ms_passed()) {
         return;
     }
-    firmware_count_interrupts();
-    if (board_drive.ticks != supervised_tick) {
-        supervised_tick = board_drive.ticks;
-        silent_ms = 0;
-    } else if (++silent_ms >= 2u) {
-        silent_ms = 2;
+    firmware_count_interrupts(ticks);
+    if (ticks != judged.supervised_tick) {
+        judged.supervised_tick = ticks;
+        judged.was_silent = 0;
+    } else if (judged.was_silent) {
         firmware_trip(FAULT_ADC_LOST);
-    }
-}
-
-/** @param found drive_fault_t, none too */
-static void firmware_find(uint16_t found)
-{
-    if (found != (uint16_t)FAULT_NONE) {
-        firmware_trip((drive_fault_t)found);
+    } else {
+        judged.was_silent = 1;
     }
 }
 
@@ -172,9 +167,9 @@ void firmware_background(void)
         in.remote = &scope_command;
 #endif
         lights = mode_panel(&in);
-        retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         SWITCH(BOARD_LED_ALIVE, lights.led_alive);
         SWITCH(BOARD_LED_RUN, lights.led_run);
+        retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
         selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
         firmware_judge(elapsed_ms);

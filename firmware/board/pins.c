@@ -12,9 +12,9 @@ void pins_init(void)
     TRISB = BOARD_TRIS(B);
     TRISC = BOARD_TRIS(C);
 
-    __builtin_write_OSCCONL(OSCCON & ~0x0040u); /* unlock the pin selection */
+    clock_write_low((uint16_t)(OSCCON & ~0x0040u)); /* unlock the pin selection */
     RPINR12 = BOARD_FLTA_RP;
     RPINR18 = 0x1F00u | BOARD_UART_RX_RP; /* U1CTS stays without a pin */
     BOARD_UART_TX_PIN = BOARD_UART_TX_FUNCTION;
-    __builtin_write_OSCCONL(OSCCON | 0x0040u);
+    clock_write_low((uint16_t)(OSCCON | 0x0040u));
 }

@@ -2,11 +2,6 @@
 #include "board/mclv.h"
 #include "board/peripherals.h"
 
-void pwm_outputs_off(void)
-{
-    P1OVDCON = BOARD_OUTPUTS_OFF;
-}
-
 void pwm_init(void)
 {
     P1TCON = 0;

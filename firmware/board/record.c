@@ -8,38 +8,38 @@ recorder_t board_recorder BOARD_PERSISTENT;
 
 #define RECORD_IS_NEW 0xFFFFu /* more than there are: its head has not been sent */
 
-static uint16_t rows_left; /* to be sent */
+static uint16_t rows_left BOARD_UNSET; /* to be sent */
 
 void record_init(drive_fault_t kept)
 {
-    recorder_restart(&board_recorder, RESET_LOST_RAM, kept);
+    recorder_restart(&board_recorder, RESET_LOST_RAM(board_reset_cause), kept);
     rows_left = RECORD_IS_NEW;
 }
 
 void record_tick(void)
 {
     recorder_background(&board_recorder, &board_drive);
-    if (recorder_rows(&board_recorder) == 0u) {
+    if (board_recorder.left != 0u) {
         rows_left = RECORD_IS_NEW;
     }
 }
 
 static char *put_head(char *line)
 {
-    char *at = text_put_unsigned(text_put(line, "record fault "), board_recorder.fault);
-    at = text_put_unsigned(text_put(at, " rows "), rows_left);
-    at = text_put_unsigned(text_put(at, " every "), RECORDER_EVERY);
-    at = text_put_signed(text_put(at, " offsets "), board_recorder.offset_a_q13);
-    return text_put_signed(text_put(at, " "), board_recorder.offset_b_q13);
+    char *at = text_put_named(line, "record fault ", board_recorder.fault);
+    at = text_put_named(at, " rows ", (int16_t)rows_left);
+    at = text_put_named(at, " every ", (int16_t)RECORDER_EVERY);
+    at = text_put_named(at, " offsets ", board_recorder.offset_a_q13);
+    return text_put_named(at, " ", board_recorder.offset_b_q13);
 }
 
 static char *put_row(char *line, uint16_t place)
 {
     const int8_t *byte = board_recorder.row[place].byte;
-    char *at = text_put_unsigned(text_put(line, "row "), place);
+    char *at = text_put_named(line, "row ", (int16_t)place);
     uint16_t n;
     for (n = 0; n < (uint16_t)RECORDER_BYTES; n++) {
-        at = text_put_signed(text_put(at, " "), byte[n]);
+        at = text_put_named(at, " ", byte[n]);
     }
     return at;
 }
@@ -58,5 +58,5 @@ char *record_line(char *line)
         rows_left--;
         at = put_row(line, recorder_place(&board_recorder, rows_left));
     }
-    return text_put(at, "\r\n");
+    return text_end(at);
 }

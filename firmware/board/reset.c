@@ -10,7 +10,7 @@ volatile uint16_t board_trap_intcon1 BOARD_PERSISTENT;
 static volatile uint16_t kept_fault BOARD_PERSISTENT;
 static volatile uint16_t kept_inverse BOARD_PERSISTENT; /* tells a kept fault from what RAM holds after power-up */
 
-static uint16_t served_tick BOARD_UNSET;
+uint16_t reset_served_tick BOARD_UNSET;
 
 void reset_keep(uint16_t fault)
 {
@@ -25,12 +25,12 @@ drive_fault_t reset_take(void)
 
     RCON = 0;
     board_reset_cause = cause;
-    served_tick = 0;
-    if (RESET_LOST_RAM) {
+    reset_served_tick = 0;
+    if (RESET_LOST_RAM(cause)) {
         board_trap_intcon1 = 0;
         return FAULT_NONE; /* what is kept holds anything now: it is not even read */
     }
-    if (!RESET_WAS(TRAPR, cause) && !RESET_WAS(IOPUWR, cause) && !RESET_WAS(WDTO, cause)) {
+    if ((cause & (RESET_FLAG(TRAPR) | RESET_FLAG(IOPUWR) | RESET_FLAG(WDTO))) == 0u) {
         return FAULT_NONE;
     }
     fault = kept_fault;
@@ -38,12 +38,4 @@ drive_fault_t reset_take(void)
         return (drive_fault_t)fault;
     }
     return RESET_WAS(WDTO, cause) ? FAULT_WATCHDOG : FAULT_TRAP;
-}
-
-void reset_serve_watchdog(uint16_t ticks)
-{
-    if (ticks != served_tick) {
-        served_tick = ticks;
-        ClrWdt();
-    }
 }

@@ -11,8 +11,9 @@
 #include "drive/late.h"
 #include "drive/state.h"
 
-#define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
-#define FLASH_WORDS 32u /* of flash in a millisecond */
+#define SLICE_WORDS 4u                                       /* of RAM; two slices overlap by one, so that faults between neighbours show */
+#define SLICE_BEFORE ((SLICE_WORDS - 1u) * sizeof(uint16_t)) /* bytes that a slice may begin before a word and still hold it */
+#define FLASH_WORDS 32u                                      /* of flash in a millisecond */
 #define REGISTERS_AT_ONCE 4u
 #define OWED_MS 50u /* in this time the tests get their turn */
 #define ADC_EVERY_MS 512u
@@ -86,59 +87,80 @@ static const written_t written[] = {
 
 static void test_registers(void)
 {
-    static uint16_t row;
-    uint16_t left;
+    static uint16_t rows_left;
+    uint16_t left, wrong = PSVPAG; /* 8 bits in the device header */
     for (left = REGISTERS_AT_ONCE; left != 0u; left--) {
-        const written_t *w = &written[row];
-        if ((*w->place & w->mask) != w->value) {
-            selftest_fail(SELFTEST_REGISTERS);
+        const written_t *w;
+        if (rows_left == 0u) {
+            rows_left = sizeof written / sizeof written[0];
         }
-        row = (uint16_t)((row + 1u < sizeof written / sizeof written[0]) ? row + 1u : 0u);
+        rows_left--;
+        w = &written[rows_left];
+        wrong |= (uint16_t)((*w->place & w->mask) ^ w->value);
     }
-    if (PSVPAG != 0u) { /* 8 bits in the device header */
+    if (wrong != 0u) {
         selftest_fail(SELFTEST_REGISTERS);
     }
 }
 
-/** The override as the interrupts' last words have left it: as the state asks, or off. The low sides stay on until the first duties are written. */
-static uint16_t outputs_hold(void)
+/** The override as the interrupts' last words have left it: as the state asks (drive_outputs()), or off. The low sides stay on until the first duties
+ *  are written. */
+static void test_outputs(void)
 {
-    uint16_t outputs = drive_outputs(&board_drive), now = P1OVDCON;
-    if (board_drive.state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
-        return 1;
+    const uint16_t now = P1OVDCON, state = board_drive.state;
+    uint16_t asked = BOARD_OUTPUTS_OFF;
+    if (board_drive.fault == (uint16_t)FAULT_NONE) {
+        if (drive_is_running(&board_drive)) {
+            asked = BOARD_OUTPUTS_PWM;
+        } else if (state == (uint16_t)DRIVE_BOOTSTRAP) {
+            asked = BOARD_OUTPUTS_BOOTSTRAP;
+        } else {
+            /* off */
+        }
     }
-    return (uint16_t)(now == BOARD_OUTPUTS_OFF || (outputs != 0u && now == (outputs == OUTPUTS_PWM ? BOARD_OUTPUTS_PWM : BOARD_OUTPUTS_BOOTSTRAP)));
+    if (state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
+        return;
+    }
+    if (now != BOARD_OUTPUTS_OFF && now != asked) {
+        selftest_fail(SELFTEST_REGISTERS);
+    }
 }
 
 /* ---- flash ---- */
 
 static uint16_t flash_at;
-static uint16_t flash_without_crc; /* erased words in its place: linked without tools/image/crc.py */
+static uint16_t flash_has_crc; /* 0: erased words in its place, linked without tools/image/crc.py */
 static uint16_t flash_crc;
+
+static void judge_flash(uint16_t crc)
+{
+    uint16_t stored = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT), inverse = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT + 2u);
+    flash_has_crc = (uint16_t) ~(stored & inverse);
+    if (flash_has_crc && (stored != crc || (uint16_t)(inverse ^ crc) != 0xFFFFu)) {
+        selftest_fail(SELFTEST_FLASH);
+    }
+}
 
 uint16_t selftest_flash(void)
 {
-    uint16_t left, stored, inverse;
+    uint16_t at = flash_at, crc = flash_crc, left;
     TBLPAG = 0;
+    if (at == 0u) {
+        crc = SELFTEST_CRC_START;
+    }
     for (left = FLASH_WORDS; left != 0u; left--) {
-        uint16_t low = (uint16_t)__builtin_tblrdl(flash_at), high = (uint16_t)__builtin_tblrdh(flash_at);
-        if (flash_at == 0u) {
-            flash_crc = SELFTEST_CRC_START;
-        }
-        flash_crc = selftest_crc(selftest_crc(selftest_crc(flash_crc, low & 0xFFu), low >> 8), high & 0xFFu);
-        flash_at = (uint16_t)(flash_at + 2u);
-        if (flash_at == BOARD_FLASH_CRC_AT) {
-            stored = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT);
-            inverse = (uint16_t)__builtin_tblrdl(BOARD_FLASH_CRC_AT + 2u);
-            flash_without_crc = (uint16_t)((stored & inverse) == 0xFFFFu);
-            if (!flash_without_crc && (stored != flash_crc || (uint16_t)(inverse ^ flash_crc) != 0xFFFFu)) {
-                selftest_fail(SELFTEST_FLASH);
-            }
-            flash_at = 0;
-            return 1;
+        uint16_t low = (uint16_t)__builtin_tblrdl(at), high = (uint16_t)__builtin_tblrdh(at);
+        crc = selftest_crc(selftest_crc(selftest_crc(crc, low & 0xFFu), low >> 8), high & 0xFFu);
+        at = (uint16_t)(at + 2u);
+        if (at == BOARD_FLASH_CRC_AT) {
+            judge_flash(crc);
+            at = 0;
+            break;
         }
     }
-    return 0;
+    flash_at = at;
+    flash_crc = crc;
+    return left;
 }
 
 #ifdef __XC16__
@@ -148,17 +170,28 @@ const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLAS
 
 /* ---- between two control interrupts ---- */
 
+void selftest_cpu(void)
+{
+    board_cpu_test();
+    if (board_cpu_holds == 0u) {
+        selftest_fail(SELFTEST_CPU);
+    }
+}
+
 /** Four words of RAM; at its end the processor's registers, and another background. With interrupts off. */
 static void test_ram_slice(void)
 {
     static uint16_t from, n; /* word of the RAM, background */
     volatile uint16_t *at = BOARD_RAM + from;
-    uint16_t words = (uint16_t)(BOARD_RAM_END - at);
+    uint16_t words = (uint16_t)((uint16_t)(BOARD_RAM_END - BOARD_RAM) - from);
 
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
     if (words > 1u) {
         static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
-        volatile uint16_t *spare = (at < keep + SLICE_WORDS && at + SLICE_WORDS > keep) ? keep + 2u * SLICE_WORDS : keep;
+        volatile uint16_t *spare = keep;
+        if ((uintptr_t)at - (uintptr_t)keep + SLICE_BEFORE <= 2u * SLICE_BEFORE) { /* the slice meets the keep's beginning */
+            spare = keep + 2u * SLICE_WORDS;
+        }
         if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
             selftest_fail(SELFTEST_RAM);
         }
@@ -166,10 +199,7 @@ static void test_ram_slice(void)
     } else {
         from = 0;
         n = (uint16_t)((n + 1u < SELFTEST_BACKGROUNDS) ? n + 1u : 0u);
-        board_cpu_test();
-        if (board_cpu_holds == 0u) {
-            selftest_fail(SELFTEST_CPU);
-        }
+        selftest_cpu();
     }
 }
 
@@ -181,9 +211,7 @@ static void test_in_silence(void)
     if (!selftest_flow_holds(&board_drive)) {
         selftest_fail(SELFTEST_FLOW);
     }
-    if (!outputs_hold()) {
-        selftest_fail(SELFTEST_REGISTERS);
-    }
+    test_outputs();
     test_ram_slice();
 }
 
@@ -227,10 +255,9 @@ void selftest_pass(void)
     board_selftest_parts = SELFTEST_PART_SUPERVISE;
     end_adc();
     if (owed_ms != 0u && BOARD_QUIET()) {
-        uint16_t level;
-        SET_AND_SAVE_CPU_IPL(level, 7);
+        SET_CPU_IPL(7);
         test_in_silence();
-        RESTORE_CPU_IPL(level & 7u);
+        SET_CPU_IPL(0); /* the background's */
         owed_ms = 0;
     }
 }
@@ -257,12 +284,12 @@ void selftest_ms(void)
 
 char *selftest_put(char *at)
 {
-    return board_selftest_failed ? text_put_unsigned(text_put(at, " selftest "), board_selftest_failed) : at;
+    return board_selftest_failed ? text_put_named(at, " selftest ", (int16_t)board_selftest_failed) : at;
 }
 
 char *selftest_put_marked(char *at)
 {
-    return flash_without_crc ? text_put(at, " flash without CRC") : at;
+    return flash_has_crc ? at : text_put(at, " flash without CRC");
 }
 
 #endif

@@ -54,7 +54,7 @@ static void wait_for_watchdog(void)
         counts = TMR1;
         waited_counts = counts;
     }
-    judge_watchdog(RESET_WAS(WDTO, RCON));
+    judge_watchdog(RCON & RESET_FLAG(WDTO));
     RCON = 0;
 }
 
@@ -66,11 +66,13 @@ static void test_ram(void)
 
     for (n = 0; n < SELFTEST_BACKGROUNDS; n++) {
         wrong |= selftest_march(spare, room, selftest_backgrounds[n], 0);
-        for (at = BOARD_RAM; at != BOARD_USED_END(spare); at += words) {
+        at = BOARD_RAM;
+        do {
             words = (uint16_t)(BOARD_USED_END(spare) - at);
             words = (words < room) ? words : room;
             wrong |= selftest_march(at, words, selftest_backgrounds[n], spare);
-        }
+            at += words;
+        } while (at != BOARD_USED_END(spare));
         ClrWdt();
     }
     if (wrong) {
@@ -90,10 +92,7 @@ void selftest_start(drive_fault_t kept)
     } else {
         /* once each power-up */
     }
-    board_cpu_test();
-    if (board_cpu_holds == 0u) {
-        selftest_fail(SELFTEST_CPU);
-    }
+    selftest_cpu();
     SET_CPU_IPL(0); /* no interrupt is enabled yet */
     test_ram();
     STACK_GUARD[0] = STACK_PATTERN;

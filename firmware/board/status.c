@@ -20,32 +20,44 @@
 #define LINE_PLACE
 #endif
 
-static char line[MODE_LINE_SIZE] LINE_PLACE;
-static uint16_t next; /* index of the next character; a zero byte ends the line */
-static uint16_t waited_ms;
+static char line[MODE_LINE_SIZE] LINE_PLACE BOARD_UNSET;
+static uint16_t next BOARD_UNSET; /* index of the next character; a zero byte ends the line */
+static uint16_t waited_ms BOARD_UNSET;
 
-#define LIMIT_NAME(bit, name, cause, remedy) " " #name,
-#define LONGEST_LIMIT " FIELD_WEAKENING" /* a test holds the others to it */
+#define LIMIT_NAME(bit, name, cause, remedy) " " #name "\0" /* one after the other: a pointer to each would take as much as half of them */
+#define LONGEST_LIMIT " FIELD_WEAKENING"                    /* a test holds the others to it */
 /* From here on the line has no room for it, a self-test and the end. */
 #define LIMITS_END (sizeof line - sizeof LONGEST_LIMIT - sizeof " selftest 10\r\n")
+
+/** What follows a text of a list, whose end is an empty one. */
+QM_INLINE const char *next_name(const char *name)
+{
+    const char *after = name;
+    char c;
+    do {
+        c = *after++;
+    } while (c != '\0');
+    return after;
+}
 
 /** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". What finds no room waits for the next line.
  *  @return the text's end */
 static char *put_limits(char *at)
 {
-    static const char *const limit_names[] = { DRIVE_LIMIT_TABLE(LIMIT_NAME) };
+    const char *name = DRIVE_LIMIT_TABLE(LIMIT_NAME);
     char *end = at;
-    uint16_t n, bit = 1;
-    if (LimitParm.seen != 0u) {
+    uint16_t bit = 1, seen = LimitParm.seen;
+    if (seen != 0u) {
         end = text_put(end, " limit");
     }
-    for (n = 0; n < sizeof limit_names / sizeof limit_names[0] && end <= line + LIMITS_END; n++) {
-        if ((LimitParm.seen & bit) != 0u) {
-            end = text_put(end, limit_names[n]);
-            LimitParm.seen ^= bit;
+    for (; *name != '\0' && end <= line + LIMITS_END; name = next_name(name)) {
+        if ((seen & bit) != 0u) {
+            end = text_put(end, name);
+            seen ^= bit;
         }
         bit = (uint16_t)(bit << 1);
     }
+    LimitParm.seen = seen;
     return end;
 }
 
@@ -58,11 +70,20 @@ static char *put_retry(char *at)
     return text_put_unsigned(text_put(text_put_unsigned(text_put(at, " retries "), board_retry.left), " first "), board_retry.first);
 }
 
-/** Mechanical rpm; what a lost estimator sees may be more than a word holds. */
+/** Mechanical rpm of a speed without a sign. */
+NOINLINE int16_t size_rpm(uint16_t size)
+{
+    uint32_t erpm = qm_muluu(size, SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
+    if (SPEED_UNIT > NOPOLESPAIRS && erpm > most) { /* what a lost estimator sees */
+        erpm = most;
+    }
+    return (int16_t)qm_divud(erpm, NOPOLESPAIRS);
+}
+
+/** Mechanical rpm. */
 static int16_t speed_rpm(speed_erpm_t speed)
 {
-    uint32_t erpm = qm_muluu((uint16_t)qm_abs(speed), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
-    int16_t rpm = (int16_t)qm_divud((erpm < most) ? erpm : most, NOPOLESPAIRS);
+    int16_t rpm = size_rpm((uint16_t)qm_abs(speed));
     return (int16_t)((speed < 0) ? -rpm : rpm);
 }
 
@@ -71,25 +92,35 @@ static char *put_line(void)
 {
     char *at = mode_status_line(line, &board_drive);
     if (at == line && !mode_speaks(&at)) {
-        at = text_put_signed(text_put(at, "state "), (int16_t)board_drive.state);
-        at = text_put_signed(text_put(at, " fault "), (int16_t)board_drive.fault);
-        at = text_put_signed(text_put(at, " speed "), speed_rpm(estimator_speed(&board_drive.run.estimator)));
+        at = text_put_named(at, "state ", (int16_t)board_drive.state);
+        at = text_put_named(at, " fault ", (int16_t)board_drive.fault);
+        at = text_put_named(at, " speed ", speed_rpm(estimator_speed(&board_drive.run.estimator)));
         at = put_limits(put_retry(text_put(at, " rpm")));
-        at = text_put(selftest_put(at), "\r\n");
+        at = text_end(selftest_put(at));
     }
     return at;
 }
 
+#define CAUSE_BIT(bit, name, meaning) | (1u << (bit))
+#define CAUSE_NAME(bit, name, meaning) " " #name "\0"
+
 /** The first line: "foc33 0.9.0 reset BOR POR". */
 static char *put_reset(void)
 {
+    const char *name = RESET_CAUSE_TABLE(CAUSE_NAME);
     char *at = text_put(line, "foc33 " FOC33_VERSION " reset");
-#define PUT_CAUSE(bit, name, meaning) \
-    if (RESET_WAS(name, board_reset_cause)) { \
-        at = text_put(at, " " #name); \
+    uint16_t named = 0u RESET_CAUSE_TABLE(CAUSE_BIT), found = board_reset_cause; /* the highest bit is the next one */
+    while (named != 0u) {
+        if ((named & 0x8000u) != 0u) {
+            if ((found & 0x8000u) != 0u) {
+                at = text_put(at, name);
+            }
+            name = next_name(name);
+        }
+        named = (uint16_t)(named << 1);
+        found = (uint16_t)(found << 1);
     }
-    RESET_CAUSE_TABLE(PUT_CAUSE)
-    return text_put(selftest_put_marked(at), "\r\n");
+    return text_end(selftest_put_marked(at));
 }
 
 #if SCOPE

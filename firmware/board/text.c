@@ -14,18 +14,16 @@ char *text_put(char *at, const char *text)
 
 char *text_put_unsigned(char *at, uint16_t number)
 {
-    char digits[6];
-    char *next = at;
-    uint16_t count = 0;
+    char digits[6], *digit = digits, *next = at;
     uint16_t rest = number;
 
     do {
-        digits[count++] = (char)('0' + rest % 10u);
+        *digit++ = (char)('0' + rest % 10u);
         rest /= 10u;
     } while (rest != 0u);
-    while (count != 0u) {
-        *next++ = digits[--count];
-    }
+    do {
+        *next++ = *--digit;
+    } while (digit != digits);
     return next;
 }
 
@@ -36,4 +34,14 @@ char *text_put_signed(char *at, int16_t number)
         *next++ = '-';
     }
     return text_put_unsigned(next, (uint16_t)qm_abs(number));
+}
+
+char *text_put_named(char *at, const char *name, int16_t number)
+{
+    return text_put_signed(text_put(at, name), number);
+}
+
+char *text_end(char *at)
+{
+    return text_put(at, "\r\n");
 }

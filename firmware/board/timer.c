@@ -10,12 +10,3 @@ void timer_init(void)
     IFS0bits.T1IF = 0;
     T1CON = 0x8000u;
 }
-
-uint16_t timer_ms_passed(void)
-{
-    uint16_t passed = IFS0bits.T1IF;
-    if (passed) {
-        IFS0bits.T1IF = 0;
-    }
-    return passed;
-}

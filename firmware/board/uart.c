@@ -10,20 +10,6 @@ void uart_init(void)
     U1STAbits.UTXEN = 1;
 }
 
-uint16_t uart_has_room(void)
-{
-    return (uint16_t)!U1STAbits.UTXBF;
-}
-
-uint16_t uart_send(char c)
-{
-    if (U1STAbits.UTXBF) {
-        return 0;
-    }
-    U1TXREG = (uint16_t)(uint8_t)c;
-    return 1;
-}
-
 int16_t uart_receive(void)
 {
     if (U1STAbits.OERR) {

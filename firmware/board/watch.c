@@ -1,7 +1,7 @@
 /* AN1292's watch variables, copied from the drive in the background. */
 #include "board/watch.h"
 
-#include "drive/limits.h"
+#include "drive/limits_now.h"
 
 tFdWeakParm FdWeakParm;
 tMotorEstimParm MotorEstimParm;
@@ -20,6 +20,16 @@ static int16_t watch_scaled(int16_t x, uint16_t bits)
     return (int16_t)(qm_limit(x, limit) * (1 << bits));
 }
 
+static int16_t watch_current(current_q13_t i)
+{
+    return watch_scaled(i, 2);
+}
+
+static int16_t watch_voltage(voltage_q14_t v)
+{
+    return watch_scaled(v, 1);
+}
+
 void watch_refresh(void)
 {
     const drive_t *d = &board_drive;
@@ -28,7 +38,6 @@ void watch_refresh(void)
     dq_t emf = estimator_emf(&run->estimator);
 
     FdWeakParm.qIndex = (int16_t)run->fieldweak.index;
-    FdWeakParm.qIdRef = watch_scaled(run->control.ref_q13.d, 2);
     FdWeakParm.qFwOnSpeed = board_params.fieldweak.on_speed_erpm;
     MotorEstimParm.qRs = (motor->rs_exp == 0u) ? (int16_t)(run->model.rs_q16 >> 1) : INT16_MAX; /* the exponent begins where NORM_RS ends */
     MotorEstimParm.qLsDt = (int16_t)qm_mulhi_uu(run->model.ls_q16, (uint16_t)(2048u << motor->ls_exp));
@@ -37,20 +46,21 @@ void watch_refresh(void)
     EstimParm.qRho = (int16_t)(run->estimator.rho_q32 >> 16);
     EstimParm.qVelEstim = estimator_speed(&run->estimator);
     EstimParm.qOmegaMr = run->estimator.omega_erpm;
-    EstimParm.qEsdf = watch_scaled(emf.d, 1);
-    EstimParm.qEsqf = watch_scaled(emf.q, 1);
-    ParkParm.qIa = watch_scaled(d->phases_q13.a, 2);
-    ParkParm.qIb = watch_scaled(d->phases_q13.b, 2);
-    ParkParm.qId = watch_scaled(run->control.i_q13.d, 2);
-    ParkParm.qIq = watch_scaled(run->control.i_q13.q, 2);
-    ParkParm.qVd = watch_scaled(run->control.v_q14.d, 1);
-    ParkParm.qVq = watch_scaled(run->control.v_q14.q, 1);
+    EstimParm.qEsdf = watch_voltage(emf.d);
+    EstimParm.qEsqf = watch_voltage(emf.q);
+    ParkParm.qIa = watch_current(d->phases_q13.a);
+    ParkParm.qIb = watch_current(d->phases_q13.b);
+    ParkParm.qId = watch_current(run->control.i_q13.d);
+    ParkParm.qIq = watch_current(run->control.i_q13.q);
+    ParkParm.qVd = watch_voltage(run->control.v_q14.d);
+    ParkParm.qVq = watch_voltage(run->control.v_q14.q);
     ParkParm.qAngle = (int16_t)d->angle;
     CtrlParm.qVelRef = run->control.reference_erpm;
-    CtrlParm.qVdRef = watch_scaled(run->control.ref_q13.d, 2);
-    CtrlParm.qVqRef = watch_scaled(run->control.ref_q13.q, 2);
+    CtrlParm.qVdRef = watch_current(run->control.ref_q13.d);
+    FdWeakParm.qIdRef = CtrlParm.qVdRef;
+    CtrlParm.qVqRef = watch_current(run->control.ref_q13.q);
     LoadParm.qVel = observer_speed(&run->observer);
-    LoadParm.qLoad = watch_scaled(observer_load(&run->observer, &board_params.observer), 2);
+    LoadParm.qLoad = watch_current(observer_load(&run->observer, &board_params.observer));
     AdaptParm.qInvKFi = qm_hi(run->adaptation.kfi_q31);
     AdaptParm.qRs = qm_hi(run->adaptation.rs_q31);
     LimitParm.now = limits_reasons(d, &board_params);

@@ -1,20 +1,25 @@
 /* The drive's beginnings: the object at power-up and the preparation of each start. */
 #include "drive/drive.h"
 
+#include "drive/begin.h"
 #include "drive/bus.h"
-#include "drive/limits.h"
-#include "drive/modes/modes.h"
 #include "drive/salient.h"
 #include "drive/state.h"
 
 void drive_zero(void *object, uint16_t size)
 {
     uint8_t *byte = object;
-    uint16_t left;
-    for (left = size; left != 0u; left--) {
+    uint16_t left = size;
+    do {
         *byte = 0;
         byte++;
-    }
+        left--;
+    } while (left != 0u);
+}
+
+void drive_fail(drive_t *d, drive_fault_t fault)
+{
+    drive_raise(d, fault);
 }
 
 void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
@@ -29,6 +34,7 @@ void drive_init(drive_t *d, const drive_params_t *p)
     drive_zero(d, sizeof *d);
     d->direction = 1;
     SELFTEST_KEEP(d, direction, 1);
+    SELFTEST_KEEP(d, state, DRIVE_CALIBRATE); /* 0, as all of it: drive_enter() would find nothing else to do */
     SELFTEST_KEEP(d, fault, FAULT_NONE);
     SELFTEST_KEEP(d, offset_a, 0);
     SELFTEST_KEEP(d, offset_b, 0);
@@ -36,29 +42,9 @@ void drive_init(drive_t *d, const drive_params_t *p)
     bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);
     drive_update_model(&d->run, p, p->end_erpm);
-    drive_enter(d, DRIVE_CALIBRATE);
 }
 
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
 {
-    drive_run_t *run = &d->run;
-    if (d->state != (uint16_t)DRIVE_STOPPED || d->command.run) {
-        return;
-    }
-    drive_zero(run, sizeof *run);
-    drive_turns(d, direction);
-    drive_update_model(run, p, p->end_erpm);
-    run->control.iq_limit_q13 = p->current_max_q13;
-    run->control.brake_limit_q13 = limits_asked_most(p);
-    d->forced.speed_q10 = p->align_speed_q10;
-    d->forced.increase_q10 = 0;
-    d->forced.angle_q32 = 0;
-    d->forced.step_q32 = 0;
-    d->dead = (dead_duties_t){ 0, 0, 0 };
-    drive_zero(d->dead_second, (uint16_t)sizeof d->dead_second);
-    d->angle = forced_angle(&d->forced);
-    trig_sincos_called(&d->frame, d->angle);
-    run->catching.step = mode_hands_over() ? p->flying_start : (uint16_t)CATCH_NO_LOOK;
-    mode_start(d, p);
-    d->command.run = 1;
+    drive_begin(d, p, direction);
 }

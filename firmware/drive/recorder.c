@@ -7,7 +7,7 @@
 
 #define RECORDER_CHECK 0x5Eu
 
-static void recorder_begin(recorder_t *r)
+void recorder_begin(recorder_t *r)
 {
     drive_zero(r, sizeof *r); /* the test of the RAM reads it all */
     r->check = RECORDER_CHECK;
@@ -34,28 +34,4 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault)
         }
     }
     recorder_begin(r);
-}
-
-void recorder_background(recorder_t *r, const drive_t *d)
-{
-    const uint16_t left = r->left;
-    if (left != 0u) {
-        r->offset_a_q13 = d->calibration.offset_a_q13;
-        r->offset_b_q13 = d->calibration.offset_b_q13;
-        if (left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
-            r->left = 0; /* cleared before the last row: what comes now is no part of it */
-        }
-    } else if (d->command.run) {
-        recorder_begin(r);
-    } else {
-        /* it is kept */
-    }
-}
-
-uint16_t recorder_rows(const recorder_t *r)
-{
-    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
-        return 0;
-    }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
 }

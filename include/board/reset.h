@@ -2,9 +2,10 @@
 #ifndef BOARD_RESET_H
 #define BOARD_RESET_H
 
-#include "drive/faults.h"
+#include <xc.h>
 
-#include <stdint.h>
+#include "control/qmath.h"
+#include "drive/faults.h"
 
 /** Of a variable that outlives a reset: neither cleared nor set by the start-up code. */
 #ifdef __XC16__
@@ -36,8 +37,10 @@ enum { RESET_CAUSE_TABLE(RESET_BIT) };
 
 /** RCON as it was found at the start: bits of RESET_CAUSE_TABLE. */
 extern volatile uint16_t board_reset_cause;
-/** 1 if RAM holds anything: after power-up, or a supply that dipped. */
-#define RESET_LOST_RAM (RESET_WAS(POR, board_reset_cause) || RESET_WAS(BOR, board_reset_cause))
+/** The flag as a bit, to ask for several at once. */
+#define RESET_FLAG(name) (1u << RESET_##name)
+/** Not 0 if RAM holds anything: after power-up, or a supply that dipped. */
+#define RESET_LOST_RAM(rcon) ((uint16_t)((rcon) & (RESET_FLAG(POR) | RESET_FLAG(BOR))))
 
 /** INTCON1 at the last trap (FAULT_TRAP): its bits name the trap. Kept over every reset but power-up. */
 extern volatile uint16_t board_trap_intcon1;
@@ -50,9 +53,18 @@ drive_fault_t reset_take(void);
 /** Keeps a fault (or FAULT_NONE) for the time after a reset. */
 void reset_keep(uint16_t fault);
 
+/** Ticks of the drive when the watchdog was served. */
+extern uint16_t reset_served_tick;
+
 /** Serves the watchdog if a control interrupt came since the last call; the caller shows that the background is alive.
  *  Nothing else serves it after the start: when either stands still, the reset comes 16 ms later.
  *  @param ticks of the drive */
-void reset_serve_watchdog(uint16_t ticks);
+QM_INLINE void reset_serve_watchdog(uint16_t ticks)
+{
+    if (ticks != reset_served_tick) {
+        reset_served_tick = ticks;
+        ClrWdt();
+    }
+}
 
 #endif

@@ -28,7 +28,10 @@ void selftest_pass(void);
 /** At the end of a millisecond's work. */
 void selftest_ms(void);
 
-/** One slice of the flash's CRC. @return 1 at the flash's end */
+/** The processor's registers. With interrupts off; leaves level 7. */
+void selftest_cpu(void);
+
+/** One slice of the flash's CRC. @return not 0 at the flash's end */
 uint16_t selftest_flash(void);
 
 /** Status line: " selftest 3" after a failure, the code of SELFTEST_TABLE. @return the text's end */

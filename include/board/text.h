@@ -9,4 +9,10 @@ char *text_put(char *at, const char *text);
 char *text_put_unsigned(char *at, uint16_t number);
 char *text_put_signed(char *at, int16_t number);
 
+/** The line's end. */
+char *text_end(char *at);
+
+/** A text and a number behind it, in one call: the lines have many of them. */
+char *text_put_named(char *at, const char *name, int16_t number);
+
 #endif

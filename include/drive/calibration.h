@@ -14,7 +14,7 @@ QM_INLINE drive_state_t calibration_step(drive_t *d, const drive_params_t *p, in
     if (d->periods == (1u << CALIBRATION_LOG2)) {
         int16_t a_q13 = qm_mulhi((int16_t)(c->sum_a >> CALIBRATION_LOG2), p->kcurr_a);
         int16_t b_q13 = qm_mulhi((int16_t)(c->sum_b >> CALIBRATION_LOG2), p->kcurr_b);
-        if (qm_size(a_q13) > p->offset_max_q13 || qm_size(b_q13) > p->offset_max_q13) {
+        if (qm_beyond(a_q13, p->offset_max_q13) || qm_beyond(b_q13, p->offset_max_q13)) {
             drive_raise(d, FAULT_OFFSET);
         } else {
             c->offset_a_q13 = a_q13;

@@ -220,6 +220,9 @@ typedef struct {
 /** Clears bytes: assigning a zero struct would copy it from flash. */
 void drive_zero(void *object, uint16_t size);
 
+/** drive_raise() for all that is not the control interrupt: one copy of it. */
+void drive_fail(drive_t *d, drive_fault_t fault);
+
 /** Brings the object to CALIBRATE; every field gets its start value. */
 void drive_init(drive_t *d, const drive_params_t *p);
 

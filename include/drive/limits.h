@@ -77,8 +77,4 @@ QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erp
     return iq_q13;
 }
 
-/** Why the drive gives less than it is asked for at this moment: a sum of limit_reason_t, 0 while the bridge is off. It reads the drive's
- *  variables and changes nothing; the background calls it, for the control interrupt has no time to spare. */
-uint16_t limits_reasons(const drive_t *d, const drive_params_t *p);
-
 #endif

@@ -14,7 +14,7 @@ typedef struct {
 
 /** Inputs of one background pass. */
 typedef struct {
-    uint16_t s2_down, s3_down; /**< 1 = pressed */
+    uint16_t s2_down, s3_down; /**< not 0: pressed */
     uint16_t elapsed_ms;       /**< time since the last pass, 1 or more */
     REMOTE_INPUT
 } panel_inputs_t;
@@ -58,19 +58,5 @@ QM_INLINE void panel_keep(panel_t *panel, uint16_t held)
         panel->kept = panel_complement(panel);
     }
 }
-
-/** Nothing pressed, nothing wished, potentiometer at its lower end. */
-void panel_init(panel_t *panel);
-
-/** 1 once per press. */
-uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms);
-
-/** Speed target for a potentiometer position; TORQUE_MODE: q current in Q13.
- *  @param pot_q15 signed fractional sample, -32768 = lower end
- *  @param direction of the running motor: in BIDIRECTIONAL_SPEED the middle keeps it */
-int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction);
-
-/** One pass: buttons to requests, potentiometer to target, state to lights. S2 in a fault only clears the fault. */
-panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in);
 
 #endif

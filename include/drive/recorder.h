@@ -51,11 +51,34 @@ typedef struct {
  *  @param powered_up RAM holds anything @param fault that the drive starts with */
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault);
 
+/** From now on a new record. */
+void recorder_begin(recorder_t *r);
+
 /** A pass of the background: a start begins a new record, which has the offsets of its run. */
-void recorder_background(recorder_t *r, const drive_t *d);
+QM_INLINE void recorder_background(recorder_t *r, const drive_t *d)
+{
+    const uint16_t left = r->left;
+    if (left != 0u) {
+        r->offset_a_q13 = d->calibration.offset_a_q13;
+        r->offset_b_q13 = d->calibration.offset_b_q13;
+        if (left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
+            r->left = 0; /* cleared before the last row: what comes now is no part of it */
+        }
+    } else if (d->command.run) {
+        recorder_begin(r);
+    } else {
+        /* it is kept */
+    }
+}
 
 /** Rows of a complete record; 0 before a fault. */
-uint16_t recorder_rows(const recorder_t *r);
+QM_INLINE uint16_t recorder_rows(const recorder_t *r)
+{
+    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
+        return 0;
+    }
+    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
+}
 
 /** Place in the ring of the row that so many later ones follow: the newest has none. */
 QM_INLINE uint16_t recorder_place(const recorder_t *r, uint16_t later)

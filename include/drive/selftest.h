@@ -38,10 +38,22 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte);
 
 #ifndef SELFTEST_OFF
 /** 1 if the sum of the slow phases is the one that belongs to the ticks: each came in its turn, ever since the start. Between two periods. */
-uint16_t selftest_flow_holds(const drive_t *d);
+QM_INLINE uint16_t selftest_flow_holds(const drive_t *d)
+{
+    uint16_t calls = (uint16_t)(d->ticks / SLOW_EVERY), rest = (uint16_t)(calls & (SLOW_CALLS - 1u));
+    uint16_t expected = (uint16_t)((calls / SLOW_CALLS) * (SLOW_CALLS * (SLOW_CALLS - 1u) / 2u) + rest * (rest + 1u) / 2u);
+    return (uint16_t)(((d->selftest.phases ^ expected) & 0x3FFFu) == 0u); /* the sum of 65536 ticks is a multiple of 0x4000 */
+}
 
 /** 1 if what is kept twice agrees. Between two periods. */
-uint16_t selftest_variables_hold(const drive_t *d);
+QM_INLINE uint16_t selftest_variables_hold(const drive_t *d)
+{
+    const selftest_state_t *s = &d->selftest;
+    uint16_t same = (uint16_t)((s->state ^ d->state) & (s->fault ^ d->fault) & (s->direction ^ (uint16_t)d->direction)
+                               & (s->offset_a ^ (uint16_t)d->calibration.offset_a_q13)
+                               & (s->offset_b ^ (uint16_t)d->calibration.offset_b_q13));
+    return (uint16_t)(same == 0xFFFFu);
+}
 #endif
 
 #endif

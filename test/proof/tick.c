@@ -1,6 +1,6 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
- * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c firmware/drive/limits.c
+ * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING LATE EACH EACH_LATE
  * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
@@ -51,6 +51,7 @@ static inline void adaptation_learn_bounded(adaptation_t *a, const adaptation_pa
 #define observer_step observer_step_bounded
 #define adaptation_learn adaptation_learn_bounded
 #include "drive/tick.h"
+#include "drive/limits_now.h"
 #undef trig_sincos
 #undef trig_sincos_called
 #undef trig_circle

@@ -2,7 +2,7 @@
 /* defines: -DBIDIRECTIONAL_SPEED -DTORQUE_MODE */
 #include "panel_rig.h"
 
-#include "firmware/drive/panel.c"
+#include "drive/panel_tick.h"
 
 void setUp(void)
 {

@@ -12,7 +12,7 @@
 #include "firmware/drive/modes/bringup_rest.c"
 #include "firmware/drive/modes/bringup_say.c"
 #include "firmware/drive/modes/bringup_turn.c"
-#include "firmware/drive/panel.c"
+#include "drive/panel_tick.h"
 
 void setUp(void)
 {

@@ -1,7 +1,7 @@
 /* The flying start: what two looks at a turning rotor tell, and what follows from it, on the ideal motor. */
 #include "ideal_motor.h"
 
-#include "firmware/drive/limits.c"
+#include "drive/limits_now.h"
 
 #define TURNS 8
 #define MOST_A (1.1F * PARAM_F(MAXIMUM_CURRENT_A))

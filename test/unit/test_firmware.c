@@ -35,21 +35,43 @@ void setUp(void)
     board_recorder.check = 0; /* what RAM may hold */
 }
 
+static void outputs_on(void)
+{
+    P1OVDCON = BOARD_OUTPUTS_PWM;
+}
+
+static uint16_t outputs_are_off(void)
+{
+    return (uint16_t)(P1OVDCON == BOARD_OUTPUTS_OFF);
+}
+
+/** What a start finds of the PLL, and whether its outputs were off by then. */
+static uint16_t pll_fails, off_before_the_clock;
+
+static uint16_t look_at_the_outputs(int calls)
+{
+    (void)calls;
+    off_before_the_clock = outputs_are_off();
+    outputs_on();
+    return pll_fails;
+}
+
 /** A start, in its order. */
 static void start(uint16_t no_lock)
 {
     RCON = 0; /* no first line on the UART */
-    pwm_outputs_off_Expect();
+    pll_fails = no_lock;
+    outputs_on();
     clock_init_ExpectAndReturn(no_lock);
+    clock_init_AddCallback(look_at_the_outputs);
     pins_init_Expect();
     uart_init_Expect();
     timer_init_Expect();
     pwm_init_Expect();
-    if (no_lock) {
-        pwm_outputs_off_Expect();
-    }
     adc_init_Expect();
     firmware_init();
+    TEST_ASSERT_EQUAL_UINT16(1, off_before_the_clock);
+    TEST_ASSERT_EQUAL_UINT16(no_lock, outputs_are_off()); /* what pwm_init() does is its own test */
 }
 
 static struct {
@@ -67,7 +89,6 @@ static void look_at_the_drive(int calls)
 /** A start with something that happens while the clock comes up; its order does not matter. */
 static void start_with(uint16_t (*clock_starts)(int calls))
 {
-    pwm_outputs_off_Ignore();
     clock_init_Stub(clock_starts);
     pins_init_Ignore();
     uart_init_Ignore();
@@ -80,16 +101,16 @@ static void start_with(uint16_t (*clock_starts)(int calls))
 /** One pass of the loop. @param timer_ms what timer 1 says */
 static void pass(uint16_t timer_ms)
 {
-    timer_ms_passed_ExpectAndReturn(timer_ms);
+    IFS0bits.T1IF = (timer_ms != 0u);
     firmware_background();
 }
 
 /** One pass that switches off. */
 static void tripping_pass(uint16_t timer_ms)
 {
-    timer_ms_passed_ExpectAndReturn(timer_ms);
-    pwm_outputs_off_Expect();
-    firmware_background();
+    outputs_on();
+    pass(timer_ms);
+    TEST_ASSERT_EQUAL_UINT16(1, outputs_are_off());
 }
 
 /** Milliseconds in which both the control interrupt and timer 1 run. */
@@ -266,7 +287,6 @@ void test_panel_runs_once_a_millisecond_of_control_time_and_a_slow_pass_catches_
 void test_lights_reach_their_pins_and_the_watch_variables_are_refreshed(void)
 {
     start(0);
-    uart_send_IgnoreAndReturn(0);
     board_drive.state = (uint16_t)DRIVE_ALIGN;
     board_drive.run.control.reference_erpm = 4321;
     healthy_ms(1);
@@ -287,11 +307,12 @@ void test_status_line_goes_out_twice_a_second_a_character_a_pass(void)
     healthy_ms(499);
     board_drive.ticks = (uint16_t)(board_drive.ticks + 20u);
     for (n = 0; n < sizeof expected - 1u; n++) {
-        timer_ms_passed_ExpectAndReturn(n == 0u);
-        uart_send_ExpectAndReturn(expected[n], 1);
-        firmware_background();
+        pass(n == 0u);
+        TEST_ASSERT_EQUAL_UINT16(expected[n], U1TXREG);
+        U1TXREG = HOST_U1TXREG_EMPTY;
     }
-    pass(0); /* nothing left */
+    pass(0);
+    TEST_ASSERT_EQUAL_HEX16(HOST_U1TXREG_EMPTY, U1TXREG); /* nothing left */
 }
 
 /* ---- supervision ---- */
@@ -314,26 +335,14 @@ void test_control_interrupt_that_stays_away_for_two_milliseconds_switches_off(vo
     expect_fault(FAULT_ADC_LOST);
 }
 
-static uint32_t times_off;
-
-static void count_off(int calls)
-{
-    (void)calls;
-    times_off++;
-}
-
 void test_outputs_are_held_off_for_ever_while_the_interrupt_stays_away(void)
 {
     uint32_t n;
     start(0);
     pass(1);
-    pwm_outputs_off_Stub(count_off);
-    times_off = 0;
-    timer_ms_passed_IgnoreAndReturn(1);
     for (n = 0; n < 70000u; n++) {
-        firmware_background();
+        tripping_pass(1);
     }
-    TEST_ASSERT_EQUAL_UINT32(70000u + 700u, times_off); /* and every tenth of a second, for too few interrupts */
 }
 
 void test_one_silent_millisecond_is_forgiven_and_passes_without_one_do_not_count(void)
@@ -381,9 +390,10 @@ void test_phase_that_carries_nothing_switches_off(void)
     start_closed(4000);
     turning_passes(200, 0);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
-    pwm_outputs_off_Ignore();
+    outputs_on();
     turning_passes(128, 1); /* two counts: the first may have begun whole */
     expect_fault(FAULT_OPEN_PHASE);
+    TEST_ASSERT_EQUAL_UINT16(1, outputs_are_off());
 }
 
 void test_d_current_that_stays_off_switches_off(void)
@@ -392,8 +402,8 @@ void test_d_current_that_stays_off_switches_off(void)
     healthy_ms(300);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
     board_drive.run.control.i_q13.d = 3000;
-    pwm_outputs_off_Ignore();
-    uart_send_IgnoreAndReturn(0);
+    outputs_on();
     healthy_ms(400);
     expect_fault(FAULT_CURRENT_SENSOR);
+    TEST_ASSERT_EQUAL_UINT16(1, outputs_are_off());
 }

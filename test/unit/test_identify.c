@@ -4,7 +4,7 @@
 
 #include "firmware/drive/drive.c"
 #include "firmware/drive/modes/identify.c"
-#include "firmware/drive/panel.c"
+#include "drive/panel_tick.h"
 
 static identify_t *const id = &drive.run.identify;
 static drive_control_t *const control = &drive.run.control;

@@ -9,6 +9,7 @@
 #include "drive/param_init.h"
 #include "mock_peripherals.h"
 #include "mock_selftest_run.h"
+#include "transmitter.h"
 #include "unity.h"
 
 drive_t board_drive;
@@ -16,17 +17,6 @@ retry_t board_retry;
 volatile uint16_t board_reset_cause;
 uint16_t board_selftest_parts;
 const drive_params_t board_params = DRIVE_PARAMS_INIT;
-
-static char sent[256];
-static uint16_t sent_count;
-
-static uint16_t take(char c, int calls)
-{
-    (void)calls;
-    sent[sent_count++] = c;
-    sent[sent_count] = '\0';
-    return 1;
-}
 
 /** No self-test has failed, and the flash has its CRC. */
 static char *nothing_more(char *at, int calls)
@@ -41,8 +31,7 @@ void setUp(void)
     selftest_put_marked_Stub(nothing_more);
     static const drive_t zero;
     board_drive = zero;
-    sent_count = 0;
-    uart_send_Stub(take);
+    transmitter_begins();
     status_init();
 }
 
@@ -52,6 +41,7 @@ static void expect_line(const char *text)
     status_tick(500);
     for (n = 0; n < 200u; n++) {
         status_send();
+        transmitter_takes();
     }
     TEST_ASSERT_EQUAL_STRING(text, sent);
 }

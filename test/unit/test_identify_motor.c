@@ -4,7 +4,7 @@
 
 #include "firmware/drive/drive.c"
 #include "firmware/drive/modes/identify.c"
-#include "firmware/drive/panel.c"
+#include "drive/panel_tick.h"
 
 static identify_values_t *const values = &drive.run.identify.values;
 

@@ -1,7 +1,7 @@
 /* Why the drive gives less than it is asked for: each reason alone, at its edge, in both directions. */
 #include "drive_rig.h"
 
-#include "firmware/drive/limits.c"
+#include "drive/limits_now.h"
 
 static int16_t way;
 

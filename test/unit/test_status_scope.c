@@ -8,33 +8,15 @@
 
 #include "mock_peripherals.h"
 #include "mock_selftest_run.h"
+#include "transmitter.h"
 
 drive_t board_drive;
 uint16_t board_selftest_parts;
 volatile uint16_t board_reset_cause;
 tLimitParm LimitParm;
 
-static char sent[200];
-static uint16_t sent_count, room;
 static const uint8_t *coming;
 static uint16_t coming_count;
-
-static uint16_t has_room(int calls)
-{
-    (void)calls;
-    return room;
-}
-
-static uint16_t take_char(char c, int calls)
-{
-    (void)calls;
-    if (!room) {
-        return 0;
-    }
-    sent[sent_count++] = c;
-    sent[sent_count] = '\0';
-    return 1;
-}
 
 static int16_t give(int calls)
 {
@@ -54,15 +36,11 @@ static char *nothing_more(char *at, int calls)
 
 void setUp(void)
 {
-    uart_has_room_Stub(has_room);
-    uart_send_Stub(take_char);
     uart_receive_Stub(give);
     selftest_put_Stub(nothing_more);
     selftest_put_marked_Stub(nothing_more);
     board_reset_cause = 0;
-    sent_count = 0;
-    sent[0] = '\0';
-    room = 1;
+    transmitter_begins();
     coming_count = 0;
     status_init();
 }
@@ -71,6 +49,7 @@ static void passes(uint16_t count)
 {
     while (count-- != 0u) {
         status_send();
+        transmitter_takes();
     }
 }
 
@@ -126,11 +105,11 @@ void test_text_waits_for_a_frame_that_may_be_valid_and_goes_on_when_it_is_not(vo
 
 void test_an_answer_waits_for_a_transmitter_that_is_full(void)
 {
-    room = 0;
+    U1STAbits.UTXBF = 1;
     receive(device_info_request, sizeof device_info_request);
     passes(30);
     TEST_ASSERT_EQUAL_UINT16(0, sent_count);
-    room = 1;
+    U1STAbits.UTXBF = 0;
     passes(2);
     TEST_ASSERT_EQUAL_HEX8(0x55, sent[0]);
     TEST_ASSERT_EQUAL_HEX8(46, sent[1]);

@@ -3,8 +3,8 @@
 #include "ideal_motor.h"
 #include "panel_rig.h"
 
-#include "firmware/drive/limits.c"
-#include "firmware/drive/panel.c"
+#include "drive/limits_now.h"
+#include "drive/panel_tick.h"
 
 void setUp(void)
 {

@@ -3,7 +3,7 @@
 #include "ideal_motor.h"
 
 #include "firmware/drive/drive.c"
-#include "firmware/drive/limits.c"
+#include "drive/limits_now.h"
 
 void setUp(void)
 {

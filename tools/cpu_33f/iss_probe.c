@@ -21,8 +21,7 @@
 #include "drive/param_scaling.h"
 #include "drive/param_init.h"
 
-#define limits_reasons target_limits_reasons
-#include "firmware/drive/limits.c" /* reads a drive, so it is needed in this layout too */
+#include "drive/limits_now.h" /* reads a drive, so it is needed in this layout too */
 
 static drive_t target_drive;
 static drive_params_t target_params = DRIVE_PARAMS_INIT;

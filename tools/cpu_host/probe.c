@@ -3,7 +3,7 @@
 
 #include "board/firmware.h"
 #include "board/watch.h"
-#include "drive/limits.h"
+#include "drive/limits_now.h"
 #include "drive/param_table.h"
 #include "drive/param_scaling.h"
 

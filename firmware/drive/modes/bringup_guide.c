@@ -9,6 +9,7 @@
 #include "drive/modes/bringup_rest.h"
 #include "drive/modes/bringup_say.h"
 #include "drive/modes/bringup_turn.h"
+#include "drive/panel_tick.h"
 
 #define CURRENT_MS 60000u /* patience while current flows */
 

@@ -3,6 +3,7 @@
 #define BOARD_MODES_MODE_PANEL_H
 
 #include "board/modes/bringup_report.h"
+#include "drive/panel_tick.h"
 
 /** After panel_init(). */
 QM_INLINE void mode_panel_init(void)

@@ -4,7 +4,7 @@
 
 #include "drive_rig.h"
 
-#include "drive/panel.h"
+#include "drive/panel_tick.h"
 
 static panel_t the_panel;
 static panel_inputs_t inputs;

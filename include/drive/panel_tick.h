@@ -1,52 +1,49 @@
 /* Buttons, potentiometer and LEDs: from what a person does to what the drive is asked, in the background. */
-#include "drive/panel.h"
+#ifndef DRIVE_PANEL_TICK_H
+#define DRIVE_PANEL_TICK_H
 
+#include "drive/begin.h"
 #include "drive/modes/modes.h"
+#include "drive/panel.h"
 #include "drive/remote.h"
 
-#define BLINK_MS 250u
-#define PAUSE_MS 1500u
-#define POT_STEP_Q15 32 /* half a step of the converter */
-#define POT_BROKEN_MS 100u
+#define PANEL_BLINK_MS 250u
+#define PANEL_PAUSE_MS 1500u
+#define PANEL_POT_STEP_Q15 32 /* half a step of the converter */
+#define PANEL_POT_BROKEN_MS 100u
 
-void panel_init(panel_t *panel)
+/** Nothing pressed, nothing wished, potentiometer at its lower end. */
+QM_INLINE void panel_init(panel_t *panel)
 {
-    panel->s2.down_ms = 0;
-    panel->s3.down_ms = 0;
-    panel->wish_run = 0;
-    panel->interrupted = 0;
-    panel->fast_range = 0;
-    panel_keep(panel, 1);
+    drive_zero(panel, sizeof *panel);
+    panel->kept = 0xFFFFu; /* panel_keep() without a wish */
     panel->pot_q15 = INT16_MIN;
     panel->pot_q31 = INT32_MIN;
     panel->pot_used_q15 = INT16_MIN;
-    panel->pot_broken_ms = 0;
-    panel->blink_ms = 0;
 }
 
-uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
+/** 1 once per press. */
+NOINLINE uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
 {
-    uint16_t before = b->down_ms;
-    if (!down) {
-        b->down_ms = 0;
-        return 0;
+    uint16_t before = b->down_ms, now = 0;
+    if (down) {
+        now = (uint16_t)(before + elapsed_ms);
+        if (now > PANEL_DEBOUNCE_MS) {
+            now = PANEL_DEBOUNCE_MS;
+        }
     }
-    b->down_ms = (uint16_t)(before + elapsed_ms);
-    if (b->down_ms < PANEL_DEBOUNCE_MS) {
-        return 0;
-    }
-    b->down_ms = PANEL_DEBOUNCE_MS;
-    return (uint16_t)(before < PANEL_DEBOUNCE_MS);
+    b->down_ms = now;
+    return (uint16_t)(now >= PANEL_DEBOUNCE_MS && before < PANEL_DEBOUNCE_MS);
 }
 
 /** low + (high - low) * fraction, the fraction in Q16. */
-static int16_t between(int16_t low, int16_t high, uint16_t fraction_q16)
+QM_INLINE int16_t panel_between(int16_t low, int16_t high, uint16_t fraction_q16)
 {
     return (int16_t)(low + (int16_t)qm_mulhi_uu((uint16_t)(high - low), fraction_q16));
 }
 
 /** Share of the travel between its dead ends, Q16. */
-static uint16_t panel_travel(const drive_params_t *p, uint16_t pot_q16)
+QM_INLINE uint16_t panel_travel(const drive_params_t *p, uint16_t pot_q16)
 {
     uint16_t most_q16 = (uint16_t)(65535u - 2u * p->pot_zero_q16), above = 0;
     if (pot_q16 > p->pot_zero_q16) {
@@ -56,7 +53,7 @@ static uint16_t panel_travel(const drive_params_t *p, uint16_t pot_q16)
 }
 
 /** A wire of the potentiometer is broken: its signal stays in the outer half of a dead end. */
-static void panel_check_pot(panel_t *panel, drive_t *d, const drive_params_t *p, uint16_t elapsed_ms)
+QM_INLINE void panel_check_pot(panel_t *panel, drive_t *d, const drive_params_t *p, uint16_t elapsed_ms)
 {
     uint16_t pot_q16 = (uint16_t)((uint16_t)panel->pot_q15 ^ 0x8000u), half = (uint16_t)(p->pot_zero_q16 >> 1);
     uint16_t top_q16 = (uint16_t)(65535u - half);
@@ -65,33 +62,36 @@ static void panel_check_pot(panel_t *panel, drive_t *d, const drive_params_t *p,
         return;
     }
     panel->pot_broken_ms = (uint16_t)(panel->pot_broken_ms + elapsed_ms);
-    if (panel->pot_broken_ms >= POT_BROKEN_MS) {
-        panel->pot_broken_ms = POT_BROKEN_MS;
-        drive_raise(d, FAULT_POTENTIOMETER);
+    if (panel->pot_broken_ms >= PANEL_POT_BROKEN_MS) {
+        panel->pot_broken_ms = PANEL_POT_BROKEN_MS;
+        drive_fail(d, FAULT_POTENTIOMETER);
     }
 }
 
-int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction)
+/** Speed target for a potentiometer position; TORQUE_MODE: q current in Q13.
+ *  @param pot_q15 signed fractional sample, -32768 = lower end
+ *  @param direction of the running motor: in BIDIRECTIONAL_SPEED the middle keeps it */
+QM_INLINE int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction)
 {
     /* the middle of the converter's step, so that the upper end is reached to half a step */
     uint16_t pot_q16 = (uint16_t)(((uint16_t)pot_q15 ^ 0x8000u) | 0x20u);
     int16_t towards = direction;
     uint16_t travel_q16 = mode_pot_split(panel_travel(p, pot_q16), &towards);
     mode_range_t range = mode_target_range(p, fast_range);
-    return (int16_t)(towards * between(range.low, range.high, travel_q16));
+    return (int16_t)(towards * panel_between(range.low, range.high, travel_q16));
 }
 
 /** Filters the potentiometer (10 ms) and holds it within a converter step, so that noise does not move the reference. */
-static int16_t panel_pot(panel_t *panel)
+QM_INLINE int16_t panel_pot(panel_t *panel)
 {
     int16_t now = qm_lowpass(&panel->pot_q31, panel->pot_q15, 6554);
-    if (qm_beyond((int16_t)(now - panel->pot_used_q15), POT_STEP_Q15)) {
+    if (qm_beyond((int16_t)(now - panel->pot_used_q15), PANEL_POT_STEP_Q15)) {
         panel->pot_used_q15 = now;
     }
     return panel->pot_used_q15;
 }
 
-static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
+QM_INLINE void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
 {
     if (button_pressed(&panel->s2, in->s2_down, in->elapsed_ms)) {
         if (d->fault != (uint16_t)FAULT_NONE) {
@@ -114,31 +114,28 @@ static void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *in)
     }
 }
 
-/** A fault's code, blinked. */
-QM_INLINE uint16_t panel_fault_light(const panel_t *panel, uint16_t fault)
+/** A fault's code, blinked. @param burst_ms how long that takes */
+QM_INLINE uint16_t panel_fault_light(uint16_t blink_ms, uint16_t burst_ms)
 {
-    uint16_t in_burst = (uint16_t)(panel->blink_ms < 2u * BLINK_MS * fault);
-    return (uint16_t)(in_burst && (panel->blink_ms / BLINK_MS) % 2u == 0u);
+    return (uint16_t)(blink_ms < burst_ms && (blink_ms / PANEL_BLINK_MS) % 2u == 0u);
 }
 
-static panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t elapsed_ms)
+QM_INLINE panel_lights_t panel_lights(panel_t *panel, const drive_t *d, uint16_t elapsed_ms)
 {
     panel_lights_t lights;
-    uint16_t period = (d->fault == (uint16_t)FAULT_NONE) ? 4u * BLINK_MS : (uint16_t)(2u * BLINK_MS * d->fault + PAUSE_MS);
-    panel->blink_ms = (uint16_t)(panel->blink_ms + elapsed_ms);
-    if (panel->blink_ms >= period) {
-        panel->blink_ms = 0;
+    uint16_t burst_ms = (uint16_t)(2u * PANEL_BLINK_MS * d->fault);
+    uint16_t blink_ms = (uint16_t)(panel->blink_ms + elapsed_ms);
+    if (blink_ms >= ((burst_ms == 0u) ? 4u * PANEL_BLINK_MS : burst_ms + PANEL_PAUSE_MS)) {
+        blink_ms = 0;
     }
-    if (d->fault == (uint16_t)FAULT_NONE) {
-        lights.led_alive = (uint16_t)(panel->blink_ms < 2u * BLINK_MS);
-    } else {
-        lights.led_alive = panel_fault_light(panel, d->fault);
-    }
+    panel->blink_ms = blink_ms;
+    lights.led_alive = (burst_ms == 0u) ? (uint16_t)(blink_ms < 2u * PANEL_BLINK_MS) : panel_fault_light(blink_ms, burst_ms);
     lights.led_run = drive_is_running(d);
     return lights;
 }
 
-panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in)
+/** One pass: buttons to requests, potentiometer to target, state to lights. S2 in a fault only clears the fault. */
+QM_INLINE panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in)
 {
     int16_t target;
     uint16_t held = panel_holds(panel);
@@ -150,7 +147,7 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
     if (!panel->wish_run) {
         d->command.run = 0;
     } else if (d->state == (uint16_t)DRIVE_STOPPED) {
-        drive_start(d, p, (int16_t)((target >= 0) ? 1 : -1));
+        drive_begin(d, p, (int16_t)((target >= 0) ? 1 : -1));
     } else if (drive_is_closed(d)) {
         d->command.run = 1; /* a stop under way goes on from the present speed; the drive itself turns to the target's direction */
     } else if ((target ^ d->direction) < 0) {
@@ -164,3 +161,5 @@ panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, c
     panel_keep(panel, held);
     return panel_lights(panel, d, in->elapsed_ms);
 }
+
+#endif
