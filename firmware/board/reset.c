@@ -10,7 +10,7 @@ volatile uint16_t board_trap_intcon1 BOARD_PERSISTENT;
 static volatile uint16_t kept_fault BOARD_PERSISTENT;
 static volatile uint16_t kept_inverse BOARD_PERSISTENT; /* tells a kept fault from what RAM holds after power-up */
 
-uint16_t reset_served_tick BOARD_UNSET;
+static uint16_t served_tick BOARD_UNSET;
 
 void reset_keep(uint16_t fault)
 {
@@ -25,7 +25,7 @@ drive_fault_t reset_take(void)
 
     RCON = 0;
     board_reset_cause = cause;
-    reset_served_tick = 0;
+    served_tick = 0;
     if (RESET_LOST_RAM(cause)) {
         board_trap_intcon1 = 0;
         return FAULT_NONE; /* what is kept holds anything now: it is not even read */
@@ -38,4 +38,12 @@ drive_fault_t reset_take(void)
         return (drive_fault_t)fault;
     }
     return RESET_WAS(WDTO, cause) ? FAULT_WATCHDOG : FAULT_TRAP;
+}
+
+void reset_serve_watchdog(uint16_t ticks)
+{
+    if (ticks != served_tick) {
+        served_tick = ticks;
+        ClrWdt();
+    }
 }

@@ -1,7 +1,18 @@
 /* The retry: when a run begins again by itself, and when it does not. */
 #include "drive/retry.h"
 
+#include "drive/param_scaling.h"
+
 #define RETRY_MS(seconds) ((uint32_t)(PARAM_F(seconds) * 1000.0F + 0.5F))
+
+void retry_init(retry_t *r)
+{
+    r->left = RETRY_COUNT;
+    r->first = (uint16_t)FAULT_NONE;
+    r->fault = (uint16_t)FAULT_NONE;
+    r->asked = 0;
+    r->waited_ms = 0;
+}
 
 /** 1 for a fault that may pass by itself (drive/faults.h). */
 static uint16_t retry_may_pass(uint16_t fault)
@@ -40,9 +51,11 @@ static void retry_pause(retry_t *r, drive_t *d, uint16_t elapsed_ms)
     }
 }
 
-void retry_pass(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
+void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
 {
-    if (!panel->interrupted) {
+    if (RETRY_COUNT == 0) {
+        panel->interrupted = 0;
+    } else if (!panel->interrupted) {
         uint16_t calm = (uint16_t)(drive_is_closed(d) && time_is_over(r, elapsed_ms, RETRY_MS(RETRY_FORGET_SEC)));
         if (calm || !panel->wish_run) { /* long enough without a fault, or a person has stopped it */
             retry_init(r);

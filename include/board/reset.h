@@ -2,10 +2,9 @@
 #ifndef BOARD_RESET_H
 #define BOARD_RESET_H
 
-#include <xc.h>
-
-#include "control/qmath.h"
 #include "drive/faults.h"
+
+#include <stdint.h>
 
 /** Of a variable that outlives a reset: neither cleared nor set by the start-up code. */
 #ifdef __XC16__
@@ -53,18 +52,9 @@ drive_fault_t reset_take(void);
 /** Keeps a fault (or FAULT_NONE) for the time after a reset. */
 void reset_keep(uint16_t fault);
 
-/** Ticks of the drive when the watchdog was served. */
-extern uint16_t reset_served_tick;
-
 /** Serves the watchdog if a control interrupt came since the last call; the caller shows that the background is alive.
  *  Nothing else serves it after the start: when either stands still, the reset comes 16 ms later.
  *  @param ticks of the drive */
-QM_INLINE void reset_serve_watchdog(uint16_t ticks)
-{
-    if (ticks != reset_served_tick) {
-        reset_served_tick = ticks;
-        ClrWdt();
-    }
-}
+void reset_serve_watchdog(uint16_t ticks);
 
 #endif

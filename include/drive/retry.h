@@ -3,7 +3,6 @@
 #define DRIVE_RETRY_H
 
 #include "drive/panel.h"
-#include "drive/param_scaling.h"
 
 /** State of the retry. */
 typedef struct {
@@ -15,25 +14,9 @@ typedef struct {
 } retry_t;
 
 /** All retries left. */
-QM_INLINE void retry_init(retry_t *r)
-{
-    drive_zero(r, sizeof *r);
-    if (RETRY_COUNT != 0) {
-        r->left = RETRY_COUNT;
-    }
-}
-
-/** A pass where a run may begin again. */
-void retry_pass(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
+void retry_init(retry_t *r);
 
 /** A pass of the background, after panel_tick(): it clears a fault and wishes a run as S2 would. RETRY_COUNT 0: never. */
-QM_INLINE void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
-{
-    if (RETRY_COUNT == 0) {
-        panel->interrupted = 0;
-    } else {
-        retry_pass(r, panel, d, elapsed_ms);
-    }
-}
+void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
 
 #endif

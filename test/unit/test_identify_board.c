@@ -2,6 +2,8 @@
 /* defines: -DIDENTIFY */
 #include "hurst_params.h"
 
+#include "firmware/drive/modes/identify.c"
+
 #include "firmware/board/modes/identify_report.c"
 #include "firmware/board/status.c"
 #include "firmware/board/watch.c"

@@ -76,7 +76,7 @@ void test_what_ram_happens_to_hold_is_no_kept_fault(void)
 
 void test_watchdog_is_served_once_for_each_new_period_and_never_without_one(void)
 {
-    reset_served_tick = 77;
+    served_tick = 77;
     (void)start(POWER_UP);
     reset_serve_watchdog(0); /* no interrupt has come yet */
     TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
