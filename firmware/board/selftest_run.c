@@ -11,9 +11,8 @@
 #include "drive/late.h"
 #include "drive/state.h"
 
-#define SLICE_WORDS 4u                                       /* of RAM; two slices overlap by one, so that faults between neighbours show */
-#define SLICE_BEFORE ((SLICE_WORDS - 1u) * sizeof(uint16_t)) /* bytes that a slice may begin before a word and still hold it */
-#define FLASH_WORDS 32u                                      /* of flash in a millisecond */
+#define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
+#define FLASH_WORDS 32u /* of flash in a millisecond */
 #define REGISTERS_AT_ONCE 4u
 #define OWED_MS 50u /* in this time the tests get their turn */
 #define ADC_EVERY_MS 512u
@@ -188,10 +187,7 @@ static void test_ram_slice(void)
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
     if (words > 1u) {
         static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
-        volatile uint16_t *spare = keep;
-        if ((uintptr_t)at - (uintptr_t)keep + SLICE_BEFORE <= 2u * SLICE_BEFORE) { /* the slice meets the keep's beginning */
-            spare = keep + 2u * SLICE_WORDS;
-        }
+        volatile uint16_t *spare = (at < keep + SLICE_WORDS && at + SLICE_WORDS > keep) ? keep + 2u * SLICE_WORDS : keep;
         if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
             selftest_fail(SELFTEST_RAM);
         }

@@ -48,7 +48,7 @@ enum { CHIP_PIN_TABLE(PIN_NUMBERS) PIN_PORT_A = 0,
 /* What follows from a pin that is written as "port, bit": #define BOARD_PIN_S2 A, 8. PIN_LOW: not 0 where it is. */
 #define PIN_AN_OF(port, bit) PIN_##port##bit##_AN
 #define PIN_RP_OF(port, bit) PIN_##port##bit##_RP
-#define PIN_LOW_OF(port, bit) ((uint16_t)(~PORT##port & (1u << (bit))))
+#define PIN_LOW_OF(port, bit) ((uint16_t)((uint16_t)~PORT##port & (1u << (bit))))
 #define PIN_LATCH_OF(port, bit) LAT##port##bits.LAT##port##bit
 #define PIN_MASK_OF(port, bit, wanted) ((PIN_PORT_##port == PIN_PORT_##wanted) ? 1u << (bit) : 0u)
 #define PIN_AN(...) PIN_AN_OF(__VA_ARGS__)
