@@ -181,12 +181,12 @@ void selftest_cpu(void)
 static void test_ram_slice(void)
 {
     static uint16_t from, n; /* word of the RAM, background */
-    volatile uint16_t *at = BOARD_RAM + from;
     uint16_t words = (uint16_t)((uint16_t)(BOARD_RAM_END - BOARD_RAM) - from);
 
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
     if (words > 1u) {
         static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
+        volatile uint16_t *at = BOARD_RAM + from;
         volatile uint16_t *spare = (at < keep + SLICE_WORDS && at + SLICE_WORDS > keep) ? keep + 2u * SLICE_WORDS : keep;
         if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
             selftest_fail(SELFTEST_RAM);

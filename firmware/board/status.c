@@ -32,12 +32,11 @@ static uint16_t waited_ms BOARD_UNSET;
 /** What follows a text of a list, whose end is an empty one. */
 QM_INLINE const char *next_name(const char *name)
 {
-    const char *after = name;
-    char c;
-    do {
-        c = *after++;
-    } while (c != '\0');
-    return after;
+    const char *end = name;
+    while (*end != '\0') {
+        end++;
+    }
+    return &end[1];
 }
 
 /** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". What finds no room waits for the next line.

@@ -90,16 +90,16 @@ QM_INLINE q15_t observer_twice(q15_t share)
 }
 
 #define OBSERVER_FASTEST 32700u
-#define OBSERVER_FASTEST_Q16 ((int32_t)OBSERVER_FASTEST * 65536)
 
 /** The speed and a change of it, within the format. @param change at most 2^30 */
 QM_INLINE QM_WRAPS int32_t observer_sum(int32_t omega_q16, int32_t change)
 {
 #ifdef __FRAMAC__ /* what it means */
+    const int32_t fastest_q16 = (int32_t)OBSERVER_FASTEST * 65536;
     if (change >= 0) {
-        return (omega_q16 > OBSERVER_FASTEST_Q16 - change) ? OBSERVER_FASTEST_Q16 : omega_q16 + change;
+        return (omega_q16 > fastest_q16 - change) ? fastest_q16 : omega_q16 + change;
     }
-    return (omega_q16 < -OBSERVER_FASTEST_Q16 - change) ? -OBSERVER_FASTEST_Q16 : omega_q16 + change;
+    return (omega_q16 < -fastest_q16 - change) ? -fastest_q16 : omega_q16 + change;
 #else
     int16_t half = qm_hi((omega_q16 >> 1) + (change >> 1)); /* its whole tells the end exactly: that is even */
     if ((uint16_t)((uint16_t)half + OBSERVER_FASTEST / 2u) >= OBSERVER_FASTEST) {

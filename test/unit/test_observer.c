@@ -17,6 +17,8 @@
 #define EACH_DIRECTION(direction) for (int16_t direction = -1; direction <= 1; direction = (int16_t)(direction + 2))
 
 /** The Hurst motor with its bare rotor, a rotor 150 times as heavy with slow loops, and a motor whose count of speed is 4 electrical rpm. */
+#define FASTEST_Q16 (32700L * 65536)
+
 static const observer_params_t rotors[] = { OBSERVER(), OBSERVER(H_), OBSERVER(QUICK_) };
 static const observer_params_t *p;
 static observer_t o;
@@ -503,11 +505,11 @@ void test_speed_ends_at_32700_and_load_at_its_largest(void)
 
 void test_speed_and_load_keep_their_fractions_up_to_their_ends(void)
 {
-    TEST_ASSERT_EQUAL_INT32(OBSERVER_FASTEST_Q16, observer_sum(OBSERVER_FASTEST_Q16 - 5, 6));
-    TEST_ASSERT_EQUAL_INT32(OBSERVER_FASTEST_Q16 - 1, observer_sum(OBSERVER_FASTEST_Q16 - 5, 4));
-    TEST_ASSERT_EQUAL_INT32(-OBSERVER_FASTEST_Q16, observer_sum(5 - OBSERVER_FASTEST_Q16, -6));
-    TEST_ASSERT_EQUAL_INT32(-OBSERVER_FASTEST_Q16, observer_sum(-OBSERVER_FASTEST_Q16, -1));
-    TEST_ASSERT_EQUAL_INT32(1 - OBSERVER_FASTEST_Q16, observer_sum(5 - OBSERVER_FASTEST_Q16, -4));
+    TEST_ASSERT_EQUAL_INT32(FASTEST_Q16, observer_sum(FASTEST_Q16 - 5, 6));
+    TEST_ASSERT_EQUAL_INT32(FASTEST_Q16 - 1, observer_sum(FASTEST_Q16 - 5, 4));
+    TEST_ASSERT_EQUAL_INT32(-FASTEST_Q16, observer_sum(5 - FASTEST_Q16, -6));
+    TEST_ASSERT_EQUAL_INT32(-FASTEST_Q16, observer_sum(-FASTEST_Q16, -1));
+    TEST_ASSERT_EQUAL_INT32(1 - FASTEST_Q16, observer_sum(5 - FASTEST_Q16, -4));
     EACH_DIRECTION(direction) {
         int32_t load_q16 = direction * (INT32_C(65536) * GOLDEN_OBSERVER_LOAD_MAX - 1000);
         balanced(0, 0, 0);
