@@ -86,15 +86,15 @@ static const written_t written[] = {
 
 static void test_registers(void)
 {
-    static uint16_t rows_left;
+    static uint16_t untested;
     uint16_t left, wrong = PSVPAG; /* 8 bits in the device header */
     for (left = REGISTERS_AT_ONCE; left != 0u; left--) {
         const written_t *w;
-        if (rows_left == 0u) {
-            rows_left = sizeof written / sizeof written[0];
+        if (untested == 0u) {
+            untested = sizeof written / sizeof written[0];
         }
-        rows_left--;
-        w = &written[rows_left];
+        untested--;
+        w = &written[untested];
         wrong |= (uint16_t)((*w->place & w->mask) ^ w->value);
     }
     if (wrong != 0u) {
@@ -164,7 +164,7 @@ uint16_t selftest_flash(void)
 
 #ifdef __XC16__
 /** Here tools/image/crc.py writes. */
-const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLASH_CRC_AT), keep)) = { 0xFFFFu, 0xFFFFu };
+const uint16_t board_flash_crc[2] __attribute__((space(prog), address(BOARD_FLASH_CRC_AT), keep, externally_visible)) = { 0xFFFFu, 0xFFFFu };
 #endif
 
 /* ---- between two control interrupts ---- */

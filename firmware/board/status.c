@@ -21,7 +21,7 @@
 #endif
 
 static char line[MODE_LINE_SIZE] LINE_PLACE BOARD_UNSET;
-static uint16_t next BOARD_UNSET; /* index of the next character; a zero byte ends the line */
+static uint16_t line_next BOARD_UNSET; /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms BOARD_UNSET;
 
 #define LIMIT_NAME(bit, name, cause, remedy) " " #name "\0" /* one after the other: a pointer to each would take as much as half of them */
@@ -158,7 +158,7 @@ void status_init(void)
     lnet_init((uint8_t *)line);
 #endif
     *((board_reset_cause != 0u) ? put_reset() : line) = '\0';
-    next = 0;
+    line_next = 0;
     waited_ms = 0;
 }
 
@@ -168,12 +168,12 @@ void status_tick(uint16_t elapsed_ms)
         return;
     }
     waited_ms = (uint16_t)(waited_ms + elapsed_ms);
-    if (waited_ms < MODE_STATUS_MS || line[next] != '\0') {
+    if (waited_ms < MODE_STATUS_MS || line[line_next] != '\0') {
         return;
     }
     waited_ms = 0;
     *put_line() = '\0';
-    next = 0;
+    line_next = 0;
 }
 
 void status_send(void)
@@ -181,11 +181,11 @@ void status_send(void)
     if (line_serves_client()) {
         return;
     }
-    if (line[next] == '\0') {
+    if (line[line_next] == '\0') {
         *record_line(line) = '\0';
-        next = 0;
+        line_next = 0;
     }
-    if (line[next] != '\0' && uart_send(line[next])) {
-        next++;
+    if (line[line_next] != '\0' && uart_send(line[line_next])) {
+        line_next++;
     }
 }

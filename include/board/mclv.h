@@ -36,8 +36,8 @@ PIN_NEEDS(fault_input_has_an_RP_number, PIN_RP(BOARD_PIN_FAULT) >= 0);
 PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(BOARD_PIN_UART_RX) >= 0);
 
 #ifdef __XC16__
-#define BOARD_ISR __attribute__((interrupt, no_auto_psv))
-#define BOARD_ISR_SHADOW __attribute__((interrupt, shadow, no_auto_psv)) /* one set of shadow registers: for one priority, which does not nest */
+#define BOARD_ISR __attribute__((interrupt, no_auto_psv, externally_visible))
+#define BOARD_ISR_SHADOW __attribute__((interrupt, shadow, no_auto_psv, externally_visible)) /* one set of shadow registers: for one priority, which does not nest */
 #else
 #define BOARD_ISR
 #define BOARD_ISR_SHADOW

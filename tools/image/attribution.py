@@ -126,10 +126,11 @@ class _Debug:
 
     def _variable(self, die, files: dict[int, str], unit: str) -> None:
         """One that others see is defined in the unit, whatever header declares it; a static one where it is written."""
+        place = die.attributes.get("DW_AT_location")
+        die = _origin(die)
         name = _text(die, "DW_AT_name")
         if "DW_AT_type" in die.attributes:
             self.variables.setdefault(name, die)
-        place = die.attributes.get("DW_AT_location")
         if place is not None and isinstance(place.value, (list, bytes)) and len(place.value) > 1 and place.value[0] == ADDRESS:
             written = die.attributes.get("DW_AT_decl_file")
             self.files[int.from_bytes(bytes(place.value[1:]), "little")] = \
@@ -344,9 +345,15 @@ def _range(die) -> tuple[int, int]:
     return (low.value, high.value) if low and high else (0, 0)
 
 
-def _frame(die, files: dict[int, str]) -> Frame:
+def _origin(die):
+    """Where a copy's name is: a function that is inlined, and what is in it, refers to the one that is written."""
     while "DW_AT_name" not in die.attributes and "DW_AT_abstract_origin" in die.attributes:
         die = die.get_DIE_from_attribute("DW_AT_abstract_origin")
+    return die
+
+
+def _frame(die, files: dict[int, str]) -> Frame:
+    die = _origin(die)
     place = die.attributes.get("DW_AT_decl_file")
     return Frame(_text(die, "DW_AT_name"), files.get(place.value, "?") if place else "?")
 

@@ -2,7 +2,8 @@
 
     make project-facts | python3 -m tools.image.project [--out firmware.X]
 
-The project has three files, those that MPLAB X keeps under version control; only nbproject/configurations.xml depends on these facts."""
+The project has the three files that MPLAB X keeps under version control, of which only nbproject/configurations.xml depends on these facts,
+and image.c: the firmware's sources as one unit, as make firmware compiles them."""
 
 import sys
 import xml.etree.ElementTree as ET
@@ -22,19 +23,21 @@ BOXES = {
 #: MPLAB X builds in the order of the project and stops at the first file with an error: these say what is wrong with userparams.h
 FIRST = ["firmware/drive/param_text.c", "firmware/drive/param_check.c"]
 FIRST_FOLDER = "(first) userparams.h"
+UNIT = "image.c"
+UNIT_SAYS = "/* Every source of the firmware as one unit, as make firmware compiles them (-fwhole-program); written by make project. */"
 LINKER_BOXES = {"--gc-sections": ("remove-unused-sections", "true"), "--report-mem": ("report-memory-usage", "true")}
 
 
 def read(lines: Iterable[str]) -> dict[str, list[str]]:
-    """Facts by kind: file, flag, include, link, device."""
-    facts: dict[str, list[str]] = {"file": [], "flag": [], "include": [], "link": [], "device": []}
+    """Facts by kind."""
+    facts: dict[str, list[str]] = {"source": [], "header": [], "flag": [], "include": [], "link": [], "device": []}
     for line in lines:
         kind, _, value = line.strip().partition(" ")
         if kind not in facts or not value:
             raise UserError(f"not a fact of the project: '{line.strip()[:60]}'", "make project", "this is what make project-facts prints")
         facts[kind].append(value)
-    if len(facts["device"]) != 1 or not facts["file"]:
-        raise UserError("no device or no files", "make project", "this is what make project-facts prints")
+    if len(facts["device"]) != 1 or not facts["source"]:
+        raise UserError("no device or no sources", "make project", "this is what make project-facts prints")
     return facts
 
 
@@ -47,16 +50,19 @@ def updated(text: str, facts: dict[str, list[str]]) -> str:
     """configurations.xml with these files, flags, folders and device; all else as it is."""
     root = ET.fromstring(text)
     root.find(".//targetDevice").text = f"dsPIC{facts['device'][0]}"
-    for name, ending in (("HeaderFiles", ".h"), ("SourceFiles", ".c")):
-        _fill(root.find(f".//logicalFolder[@name='{name}']"), sorted((file for file in facts["file"] if file.endswith(ending)), key=_order))
+    _fill(root.find(".//logicalFolder[@name='HeaderFiles']"), sorted(facts["header"]))
+    compiled = root.find(".//logicalFolder[@name='SourceFiles']")
+    _fill(compiled, [file for file in FIRST if file in facts["source"]])
+    ET.SubElement(compiled, "itemPath").text = UNIT
     _set(root.find(".//C30"), BOXES, facts["flag"], {"extra-include-directories": ";".join(above(path) for path in facts["include"])})
     _set(root.find(".//C30-LD"), LINKER_BOXES, facts["link"], {})
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
-def _order(file: str) -> tuple[int, str]:
-    return FIRST.index(file) if file in FIRST else len(FIRST), file
+def unit(facts: dict[str, list[str]]) -> str:
+    """image.c."""
+    return "\n".join([UNIT_SAYS, *(f'#include "{file}"' for file in sorted(facts["source"]) if file not in FIRST), ""])
 
 
 def _fill(folder: ET.Element, files: list[str]) -> None:
@@ -90,11 +96,12 @@ def _write(path: Path) -> int:
     facts = read(sys.stdin)
     try:
         path.write_text(updated(path.read_text(encoding="utf-8"), facts), encoding="utf-8")
+        (path.parents[1] / UNIT).write_text(unit(facts), encoding="utf-8")
     except OSError as error:
         raise UserError(f"cannot write the project ({error.strerror})", str(path), "check the folder's permissions") from None
     except (ET.ParseError, AttributeError) as error:
         raise UserError(f"not a configuration of MPLAB X ({error})", str(path), "take the committed one: git checkout firmware.X") from None
-    print(f"{path.parents[1].name}: {CONFIGURATIONS}")
+    print(f"{path.parents[1].name}: {CONFIGURATIONS}, {UNIT}")
     return 0
 
 

@@ -1,7 +1,7 @@
 # The unit tests of the control law as the chip runs them: compiled by XC16, in the instruction-set simulator. Uses tools/make/image.mk.
 #
 # The same tests as on the AVR: those without mocks, registers and the motor in floating point (tools/make/test-avr.mk).
-target_test_law = $(filter $X/firmware/control/%.o $X/firmware/drive/%.o,$(target_objects))
+target_test_law = $(patsubst %.c,$X/%.o,$(filter firmware/control/% firmware/drive/%,$(target_sources)))
 target_test_simulator := $B/target-test
 
 $(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/run_image.h test/sixteen_bit/ports.h \
