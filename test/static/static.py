@@ -31,6 +31,8 @@ CLANG_FLAGS = """-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -
 UNUSED = ("misra 2.3", "misra 2.4", "misra 2.5", "cppcheck unusedFunction")
 CLANG = os.environ.get("CLANG", "clang-14")
 INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
+# Text only, without code; cppcheck's preprocessor expands a parameter's name before ## and #.
+CHECKS_OF_PARAMETERS = ("firmware/drive/param_text.c", "firmware/drive/param_check.c")
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def each(function, items) -> list:
 
 
 def relative(path: str) -> str:
-    return os.path.relpath(path, os.getcwd()) if os.path.isabs(path) else path
+    return os.path.relpath(path)
 
 
 def distinct(preprocessor: list[str], sources: list[str]) -> list[tuple[str, list[str]]]:
@@ -112,32 +114,36 @@ def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -
     return sorted(findings, key=lambda f: (f.file, f.text))
 
 
-def cppcheck(sources: list[str]) -> list[Finding]:
-    """Its own checks and those of its MISRA addon, with the target's type sizes: every preprocessor configuration without the parameters'
-    start values, which are most of the text of each, then the source that has them in the one configuration that is delivered."""
-    # Its preprocessor expands a parameter's name before ## and #: these files, which end as nothing, are not the compiler's.
-    sources = [source for source in sources if source not in ("firmware/drive/param_text.c", "firmware/drive/param_check.c")]
+def one_unit(sources: list[str]) -> str:
+    """All sources as one, as the image is compiled: each header is looked at once, not with every source that includes it. Nothing is said of this
+    file itself."""
+    unit = BUILD / "unit.c"
+    unit.write_text("".join(f'#include "{source}"\n' for source in sources if source not in CHECKS_OF_PARAMETERS))
+    return str(unit)
+
+
+def cppcheck(unit: str, sources: list[str]) -> list[Finding]:
+    """Its own checks and those of its MISRA addon, with the target's type sizes: of the unit every preprocessor configuration without the
+    parameters' start values, which are most of the text of each, then of each file (some rules read its text only) the one that is delivered."""
+    sources = [source for source in sources if source not in CHECKS_OF_PARAMETERS]
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
         Path(folder, "drive").mkdir()
         Path(folder, "drive", "param_init.h").write_text("#define DRIVE_PARAMS_INIT {0}\n")
-        with_values = [source for source in sources if '"drive/param_init.h"' in Path(source).read_text()]
-        every, delivered = each(lambda job: one_cppcheck(*job), [(["--force", "-U__clang__", f"-I{folder}"], sources), (["--max-configs=1"], with_values)])
-    seen = set(run([os.environ.get("CC", "gcc"), "-MM", *INCLUDES, *with_values]).split())
-    return sorted((f for f in of_both(every, delivered, seen) if not f.file.startswith("build/")), key=lambda f: (f.check, f.file, f.line))
+        every, delivered = each(lambda job: one_cppcheck(*job), [(["--force", "-U__clang__", f"-I{folder}"], [unit]), (["--max-configs=1"], sources)])
+    return sorted(of_both(every, delivered), key=lambda f: (f.check, f.file, f.line))
 
 
-def of_both(every: set[Finding], delivered: set[Finding], seen: set[str]) -> set[Finding]:
-    """What either run finds; but what is never used is so in both, where both look: `seen` are the files that the second one reads."""
-    return {f for f in every ^ delivered if f.check not in UNUSED or (f in every and f.file not in seen)} | (every & delivered)
+def of_both(every: set[Finding], delivered: set[Finding]) -> set[Finding]:
+    """What either run finds; but what is never used is so in both."""
+    return {f for f in every ^ delivered if f.check not in UNUSED} | (every & delivered)
 
 
 def one_cppcheck(options: list[str], sources: list[str]) -> set[Finding]:
-    """What it finds in all sources at once: unused types, macros and functions are only known at the end."""
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
         output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
                       f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--inconclusive",
                       "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", "-U__FRAMAC__", *options, *INCLUDES, *sources])
-    return {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), file, int(number), text)
+    return {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), relative(file), int(number), text)
             for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
 
 
@@ -161,9 +167,10 @@ def main() -> int:
     BUILD.mkdir(parents=True, exist_ok=True)
 
     gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS]
-    clang_jobs = distinct([CLANG, *CLANG_16_BIT], sources)
+    unit = one_unit(sources)
+    clang_jobs = distinct([CLANG, *CLANG_16_BIT], [unit, *CHECKS_OF_PARAMETERS])
     checks = {
-        "cppcheck": lambda: cppcheck(sources),
+        "cppcheck": lambda: cppcheck(unit, sources),
         "clang_tidy": lambda: clang_tidy(clang_jobs),
         "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], clang_jobs),
         "gcc": lambda: compiler("gcc", gcc, distinct([flag for flag in gcc if not flag.startswith(("-c", "-o", "-W"))], sources)),
@@ -171,7 +178,7 @@ def main() -> int:
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):
         unlisted = []
-        for finding in findings:
+        for finding in (f for f in findings if not f.file.startswith(f"{BUILD}/")):
             row = next((d for d in deviations if d.covers(finding)), None)
             if row:
                 row.used += 1

@@ -282,7 +282,7 @@ static void inductance_d_done(drive_t *d)
 
 /* ---- Back-EMF ---- */
 
-static int16_t gain(soft_float_t x)
+static int16_t gain_of(soft_float_t x)
 {
     uint16_t g = soft_float_to_uint16(x);
     if (g > 32767u) {
@@ -309,9 +309,9 @@ static void inductance_q_done(drive_t *d, const drive_params_t *p)
         finish(d, IDENTIFY_RESULT_L_RANGE);
         return;
     }
-    id->kp_d = gain(soft_float_mul(soft_float_of(id->values.ld_uh), C_KP));
-    id->kp_q = gain(soft_float_mul(soft_float_of(id->values.lq_uh), C_KP));
-    id->ki_d = gain(soft_float_mul(soft_float_of(id->values.rs_mohm), C_KI));
+    id->kp_d = gain_of(soft_float_mul(soft_float_of(id->values.ld_uh), C_KP));
+    id->kp_q = gain_of(soft_float_mul(soft_float_of(id->values.lq_uh), C_KP));
+    id->ki_d = gain_of(soft_float_mul(soft_float_of(id->values.rs_mohm), C_KI));
     id->ki_q = id->ki_d;
     id->shift = LOOP_SHIFT;
     id->halvings = 1;
