@@ -19,6 +19,7 @@ except ImportError:
 
 BYTES_PER_WORD = 3          # as data sheets count program memory
 COPIES = 2                  # the start-up code's ways to fill RAM: 0 clear, 1 two bytes a word, 2 three; above: call a function
+DEBUGGED = {"debug_info", "debug_abbrev", "debug_line"}
 ADDRESS = 0x03              # DW_OP_addr: a variable with a place of its own
 
 
@@ -173,7 +174,7 @@ class _Debug:
 def read(path: Path) -> Image:
     """The image in an ELF file of XC16."""
     elf = read_elf(path)
-    if not {"debug_info", "debug_abbrev", "debug_line"} <= set(elf.debug):
+    if not DEBUGGED <= set(elf.debug):
         raise UserError("no debugging information", str(path), "compile with -g")
     with reading("ELF", path):
         return _read(elf)
@@ -182,6 +183,16 @@ def read(path: Path) -> Image:
 def lines(elf: Elf) -> dict[int, tuple[str, int]]:
     """File and line of every instruction of an image with debugging information."""
     return _debug(elf).lines
+
+
+def place(elf: Elf, address: int) -> str:
+    """The function whose code it is, where it is written, though the compiler has put it into another one: "name() (file, line 7)"; in an image without
+    debugging information the name that is before it."""
+    word = _word(address, debug := _debug(elf)) if DEBUGGED <= set(elf.debug) else None
+    if word is None:
+        return f"{elf.function_at(address)}()"
+    file, line = debug.lines.get(address, (word.chain[-1].file, 0))
+    return f"{word.chain[-1].name}() ({file}{f', line {line}' if line else ''})"
 
 
 @lru_cache(maxsize=1)

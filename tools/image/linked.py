@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tools.common.errors import UserError
 
-from . import device
+from . import attribution, device
 from .program import Elf, Words
 
 #: What may be in the image besides our own objects, by the file that the map names: the compiler's start-up code (crt1: without start
@@ -82,7 +82,7 @@ def origins(elf: Elf, pieces: list[Piece]) -> list[str]:
     # What only another helper needs goes when that one goes; a piece that nothing calls is told if there is no other.
     roots = [piece for piece in foreign if any(not any(f.start <= place < f.end for f in foreign) for place in called[piece])]
     for piece in roots or foreign:
-        callers = sorted({f"{elf.function_at(place)}()" for place in called[piece] if not any(f.start <= place < f.end for f in foreign)})
+        callers = sorted({attribution.place(elf, place) for place in called[piece] if not any(f.start <= place < f.end for f in foreign)})
         helpers = helper_names(elf, piece, called[piece])
         failures.append(f"{helpers} of the compiler's library is in the image ({member(piece)}), called by "
                         f"{', '.join(callers) or 'nothing that can be seen'}: {advice(helpers, member(piece))}")
@@ -109,9 +109,9 @@ def advice(helpers: str, where: str) -> str:
 def divisions(elf: Elf, pieces: list[Piece]) -> list[str]:
     """A line for every function of ours with a division that C's / or % made, not a built-in: nobody has proved its operands' ranges."""
     own = [piece for piece in pieces if is_own(piece) and ".text" in piece.section]
-    found = {elf.function_at(address) for piece in own for address in range(piece.start, piece.end, 2)
+    found = {attribution.place(elf, address) for piece in own for address in range(piece.start, piece.end, 2)
              if divides_in_c(elf.words.get(address, 0))}
-    return [f"{name}() divides by a variable with / or %: use qm_divud() or __builtin_divsd() with a proven range, "
+    return [f"{name} divides by a variable with / or %: use qm_divud() or __builtin_divsd() with a proven range, "
             "or multiply by a constant"
             for name in sorted(found)]
 

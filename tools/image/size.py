@@ -5,6 +5,7 @@ Program memory is counted as data sheets do, three bytes a word, without the vec
 
 import argparse
 import json
+import re
 import shlex
 import shutil
 import subprocess
@@ -62,7 +63,15 @@ def deepest(image: attribution.Image, listing: str, budget: Budget, board: Path 
     result = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
     if image.initial_calls:
         result.errors.append("the list of start values names a function to call")
+    written = {word.address: word.chain[-1] for word in image.words}
+    result.errors[:] = [re.sub(r"at 0x([0-9a-f]+)", lambda found: _placed(found, written), error) for error in result.errors]
     return result
+
+
+def _placed(found: re.Match, written: dict[int, attribution.Frame]) -> str:
+    """An address with the function that is written there: in the image it may be a part of another one."""
+    frame = written.get(int(found[1], 16))
+    return f"{found[0]}, {frame.name}() of {frame.file}" if frame and frame.file else found[0]
 
 
 def measure(image: attribution.Image, depth: stack.Result, budget: Budget, before: Shares | None = None, limits: bool = True) -> Report:
