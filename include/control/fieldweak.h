@@ -33,16 +33,39 @@ typedef struct {
     current_q13_t trim_q13;  /**< d current added by the voltage feedback, -trim_max_q13..0 */
 } fieldweak_t;
 
+/** Where the three tables are. */
+typedef struct {
+    const int16_t *idref_q13, *inv_kfi, *ls_over2ls0_q15;
+} fieldweak_tables_t;
+
+#define FIELDWEAK_SAME(t, n) ((t)[n] == (t)[(n) + 1])
+#define FIELDWEAK_FLAT(t) \
+    (FIELDWEAK_SAME(t, 0) & FIELDWEAK_SAME(t, 1) & FIELDWEAK_SAME(t, 2) & FIELDWEAK_SAME(t, 3) & FIELDWEAK_SAME(t, 4) & FIELDWEAK_SAME(t, 5) \
+     & FIELDWEAK_SAME(t, 6) & FIELDWEAK_SAME(t, 7) & FIELDWEAK_SAME(t, 8) & FIELDWEAK_SAME(t, 9) & FIELDWEAK_SAME(t, 10) & FIELDWEAK_SAME(t, 11) \
+     & FIELDWEAK_SAME(t, 12) & FIELDWEAK_SAME(t, 13) & FIELDWEAK_SAME(t, 14) & FIELDWEAK_SAME(t, 15) & FIELDWEAK_SAME(t, 16))
+
 /** Entry of a table between two points. @param index 0..FIELDWEAK_ENTRIES - 2 */
 QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16)
 {
     return (int16_t)(table[index] - qm_mulhi_su((int16_t)(table[index] - table[index + 1u]), fraction_q16));
 }
 
+/** The same of a table of the parameters; of constants it may be known that all entries are the same. */
+#define FIELDWEAK_ENTRY(p, tables, name, index, fraction_q16) \
+    (QM_KNOWN(FIELDWEAK_FLAT((p)->name)) ? (p)->name[0] : fieldweak_between((tables)->name, index, fraction_q16))
+
+/** Those among the parameters. */
+QM_INLINE fieldweak_tables_t fieldweak_tables(const fieldweak_params_t *p)
+{
+    fieldweak_tables_t tables = { p->idref_q13, p->inv_kfi, p->ls_over2ls0_q15 };
+    return tables;
+}
+
 /** Looks up the three tables for a speed reference (not the estimated speed); with the back-EMF's filter they go to the estimator.
  *  Entries above the last are never read: at and beyond index 17 the last entry holds, to one count.
+ *  @param tables with the parameters' entries, in the parameters or elsewhere
  *  @param ref_erpm speed reference, any value and sign */
-void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm);
+void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, const fieldweak_tables_t *tables, motor_model_t *model, speed_erpm_t ref_erpm);
 
 /** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later.
  *  It makes up for a sagging bus or a table that is not tuned; it is bounded, so it cannot run the motor into demagnetisation.

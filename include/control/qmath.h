@@ -10,6 +10,15 @@
 /** Blocks of the interrupt that run rarely or in turn: called, so that they take no registers from the main path. */
 #define NOINLINE static __attribute__((noinline, unused))
 
+/** 1 where the compiler knows x, of parameters that are constants of the image; 1 where it knows that c holds. It leaves out what then cannot
+ *  happen. 0 tells nothing. */
+#ifdef __XC16__
+#define QM_CONSTANT(x) __builtin_constant_p(x)
+#else
+#define QM_CONSTANT(x) 0
+#endif
+#define QM_KNOWN(c) (QM_CONSTANT(c) && (c))
+
 /** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
  *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */
 typedef int16_t current_q13_t; /**< phase, d and q currents: 8192 = full-scale current */

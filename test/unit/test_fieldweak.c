@@ -14,7 +14,8 @@ static fieldweak_t fw;
 void setUp(void)
 {
     static const fieldweak_t zero;
-    GOLDEN_EACH(fieldweak_tables, v) {
+    GOLDEN_EACH(fieldweak_tables, v)
+    {
         params.idref_q13[n] = v.idref;
         params.inv_kfi[n] = v.inv_kfi;
         params.ls_over2ls0_q15[n] = v.ls;
@@ -33,7 +34,8 @@ void setUp(void)
 
 static void look_up(int16_t ref_erpm)
 {
-    fieldweak_tick(&fw, &params, &tuning, ref_erpm);
+    const fieldweak_tables_t tables = fieldweak_tables(&params);
+    fieldweak_tick(&fw, &params, &tables, &tuning, ref_erpm);
 }
 
 /** What the table gave, against a golden row of either table. */
@@ -52,7 +54,8 @@ void test_look_ups_equal_the_reference_in_both_directions(void)
 {
     TEST_ASSERT_EQUAL_INT(18, FIELDWEAK_ENTRIES); /* AN1292's */
     TEST_ASSERT_EQUAL_UINT32(18u, GOLDEN_FIELDWEAK_TABLES_ROWS);
-    GOLDEN_EACH(fieldweak, v) {
+    GOLDEN_EACH(fieldweak, v)
+    {
         for (int16_t direction = 1; direction >= -1; direction = (int16_t)(direction - 2)) {
             look_up((v.ref == INT16_MIN) ? v.ref : (int16_t)(direction * v.ref));
             EXPECT_ROW(v, n);
@@ -62,7 +65,8 @@ void test_look_ups_equal_the_reference_in_both_directions(void)
 
 void test_a_step_of_the_table_stays_1024_electrical_rpm_where_a_count_of_speed_is_more_than_one(void)
 {
-    GOLDEN_EACH(fieldweak_quick, v) {
+    GOLDEN_EACH(fieldweak_quick, v)
+    {
         params.index_per_count_q16 = (uint16_t)(v.unit * (65536u >> SPEED_INDEX_CONST));
         look_up(v.ref);
         EXPECT_ROW(v, n);
@@ -90,7 +94,8 @@ void test_beyond_the_end_nothing_is_read_and_the_last_entry_holds_to_one_count(v
 void test_filters_equal_the_reference(void)
 {
     params.on_speed_erpm = 32767;
-    GOLDEN_EACH(emf_filter, v) {
+    GOLDEN_EACH(emf_filter, v)
+    {
         params.kfilter_esdq_q16 = v.k;
         params.esdq_per_erpm_q13 = v.per_erpm;
         look_up(v.ref);
