@@ -60,15 +60,42 @@ QM_INLINE int16_t adaptation_kfi(int32_t kfi)
     return (int16_t)((kfi < ADAPTATION_KFI_LEAST) ? ADAPTATION_KFI_LEAST : kfi);
 }
 
+/** A constant with a change of it, Q15. */
+#define ADAPTATION_CHANGED(base, change) ((int32_t)(base) + 2 * (((int32_t)(base) * (change)) >> 16))
+
+/** 1/Kphi with its change; of constants it is known whether that reaches a limit. */
+QM_INLINE int16_t adaptation_kfi_changed(const adaptation_params_t *p, int16_t table, q15_t change)
+{
+    int16_t more = (int16_t)(2 * qm_mulhi(table, change));
+    if (QM_KNOWN((ADAPTATION_CHANGED(table, p->kfi_least) >= ADAPTATION_KFI_LEAST) & (ADAPTATION_CHANGED(table, p->kfi_most) <= 32767))) {
+        return (int16_t)(table + more);
+    }
+    return adaptation_kfi((int32_t)table + more);
+}
+
+/** The same of R. */
+QM_INLINE uint16_t adaptation_rs_changed(const adaptation_params_t *p, q15_t change)
+{
+    int16_t half = qm_mulhi_su(change, p->rs_base_q16);
+    int32_t rs;
+    if (QM_KNOWN(ADAPTATION_CHANGED(p->rs_base_q16, p->rs_most) <= 65535)) {
+        return (uint16_t)(p->rs_base_q16 + 2u * (uint16_t)half);
+    }
+    rs = (int32_t)p->rs_base_q16 + 2 * (int32_t)half;
+    return (uint16_t)((rs > 65535) ? 65535 : rs);
+}
+
 /** The model with what was learnt: 1/Kphi comes from the table anew in every step, R from the header. */
 QM_INLINE void adaptation_apply(const adaptation_t *a, const adaptation_params_t *p, motor_model_t *model)
 {
-    int32_t kfi = (int32_t)model->inv_kfi + 2 * (int32_t)qm_mulhi(model->inv_kfi, qm_hi(a->kfi_q31));
-    int32_t rs = (int32_t)p->rs_base_q16 + 2 * (int32_t)qm_mulhi_su(qm_hi(a->rs_q31), p->rs_base_q16);
-    model->inv_kfi = adaptation_kfi(kfi);
-    model->rs_q16 = (uint16_t)((rs > 65535) ? 65535 : rs);
-    /* below 2048 no sum is too large: 1/Kphi of a slow motor */
-    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)((model->inv_kfi < 2048) ? 2048 : model->inv_kfi));
+    const int16_t table = model->inv_kfi;
+    int16_t kfi = adaptation_kfi_changed(p, table, qm_hi(a->kfi_q31));
+    model->inv_kfi = kfi;
+    model->rs_q16 = adaptation_rs_changed(p, qm_hi(a->rs_q31));
+    if (!QM_KNOWN(ADAPTATION_CHANGED(table, p->kfi_least) >= 2048) && kfi < 2048) {
+        kfi = 2048; /* below no sum is too large: 1/Kphi of a slow motor */
+    }
+    model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)kfi);
 }
 
 #endif
