@@ -68,7 +68,8 @@ QM_INLINE int32_t observer_load_q26(const observer_t *o, const observer_params_t
 /** The same in whole counts. */
 QM_INLINE current_q13_t observer_load(const observer_t *o, const observer_params_t *p)
 {
-    return (int16_t)((observer_load_q26(o, p) + 4096) >> 13);
+    int32_t load_q28 = qm_mulsu(qm_hi_rounded(o->load_q16), p->per_unit_q15);
+    return (int16_t)(2 * qm_hi(load_q28) + (int16_t)((((uint16_t)load_q28 >> 14) + 1u) >> 1)); /* rounded to Q13 */
 }
 
 /** 1 while nothing changes fast: the innovation has been small for some 50 ms. */

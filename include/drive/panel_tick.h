@@ -46,6 +46,9 @@ QM_INLINE int16_t panel_between(int16_t low, int16_t high, uint16_t fraction_q16
 QM_INLINE uint16_t panel_travel(const drive_params_t *p, uint16_t pot_q16)
 {
     uint16_t most_q16 = (uint16_t)(65535u - 2u * p->pot_zero_q16), above = 0;
+    if (p->pot_zero_q16 == 0u) { /* all of it is live */
+        return pot_q16;
+    }
     if (pot_q16 > p->pot_zero_q16) {
         above = (uint16_t)(pot_q16 - p->pot_zero_q16);
     }
