@@ -206,8 +206,8 @@ typedef struct {
     voltage_circle_t circle; /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
 
-    forced_angle_t forced;
-    dead_duties_t dead; /**< dead-time compensation of the next two pulses, or of the first */
+    forced_angle_t forced; /**< a start clears all from here to the run */
+    dead_duties_t dead;    /**< dead-time compensation of the next two pulses, or of the first */
     DEAD_STATE
     angle_t angle;  /**< control angle of the next sample */
     sincos_t frame; /**< its sine and cosine */
