@@ -96,6 +96,7 @@ QM_INLINE uint16_t deviation_phases(deviation_t *v, const drive_t *d, const driv
 QM_INLINE uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_params_t *p)
 {
     const drive_control_t *c = &d->run.control;
+    int32_t off_q16;
     int16_t size;
 
     if (!drive_is_running(d)) {
@@ -105,7 +106,8 @@ QM_INLINE uint16_t deviation_tick(deviation_t *v, const drive_t *d, const drive_
         return (uint16_t)FAULT_NONE;
     }
     size = qm_clamp(qm_size((int16_t)(c->ref_q13.d - c->i_q13.d)), 0, (int16_t)(DEVIATION_MOST_TIMES * p->id_off_q13));
-    v->id_q16 += ((int32_t)size * 65536 - v->id_q16) >> DEVIATION_MEAN_SHIFT;
+    off_q16 = (int32_t)size * 65536 - v->id_q16;
+    v->id_q16 += qm_mulsu(qm_hi(off_q16), 1u << (16 - DEVIATION_MEAN_SHIFT)) + (int32_t)((uint16_t)off_q16 >> DEVIATION_MEAN_SHIFT); /* off >> shift */
     return (uint16_t)((qm_hi(v->id_q16) > p->id_off_q13) ? FAULT_CURRENT_SENSOR : FAULT_NONE);
 }
 
