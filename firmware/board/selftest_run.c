@@ -107,20 +107,12 @@ static void test_registers(void)
 static void test_outputs(void)
 {
     const uint16_t now = P1OVDCON, state = board_drive.state;
-    uint16_t asked = BOARD_OUTPUTS_OFF;
-    if (board_drive.fault == (uint16_t)FAULT_NONE) {
-        if (drive_is_running(&board_drive)) {
-            asked = BOARD_OUTPUTS_PWM;
-        } else if (state == (uint16_t)DRIVE_BOOTSTRAP) {
-            asked = BOARD_OUTPUTS_BOOTSTRAP;
-        } else {
-            /* off */
-        }
-    }
-    if (state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP) {
+    if (now == BOARD_OUTPUTS_OFF || (state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= LATE_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP)) {
         return;
     }
-    if (now != BOARD_OUTPUTS_OFF && now != asked) {
+    if (board_drive.fault != (uint16_t)FAULT_NONE
+        || now != (drive_is_running(&board_drive) ? BOARD_OUTPUTS_PWM : (state == (uint16_t)DRIVE_BOOTSTRAP) ? BOARD_OUTPUTS_BOOTSTRAP
+                                                                                                             : BOARD_OUTPUTS_OFF)) {
         selftest_fail(SELFTEST_REGISTERS);
     }
 }

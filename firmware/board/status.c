@@ -82,8 +82,7 @@ NOINLINE int16_t size_rpm(uint16_t size)
 /** Mechanical rpm. */
 static int16_t speed_rpm(speed_erpm_t speed)
 {
-    int16_t rpm = size_rpm((uint16_t)qm_abs(speed));
-    return (int16_t)((speed < 0) ? -rpm : rpm);
+    return qm_with_sign(size_rpm((uint16_t)qm_abs(speed)), speed);
 }
 
 /** The line's text. @return its end */
@@ -108,16 +107,14 @@ static char *put_reset(void)
 {
     const char *name = RESET_CAUSE_TABLE(CAUSE_NAME);
     char *at = text_put(line, "foc33 " FOC33_VERSION " reset");
-    uint16_t named = 0u RESET_CAUSE_TABLE(CAUSE_BIT), found = board_reset_cause; /* the highest bit is the next one */
-    while (named != 0u) {
-        if ((named & 0x8000u) != 0u) {
-            if ((found & 0x8000u) != 0u) {
+    uint16_t bit;
+    for (bit = 0x8000u; bit != 0u; bit >>= 1) { /* the highest bit is the next one */
+        if (((0u RESET_CAUSE_TABLE(CAUSE_BIT)) & bit) != 0u) {
+            if ((board_reset_cause & bit) != 0u) {
                 at = text_put(at, name);
             }
             name = next_name(name);
         }
-        named = (uint16_t)(named << 1);
-        found = (uint16_t)(found << 1);
     }
     return text_end(selftest_put_marked(at));
 }
