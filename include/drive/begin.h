@@ -2,8 +2,6 @@
 #ifndef DRIVE_BEGIN_H
 #define DRIVE_BEGIN_H
 
-#include <stddef.h>
-
 #include "drive/limits.h"
 #include "drive/modes/modes.h"
 #include "drive/state.h"
@@ -12,11 +10,12 @@
 QM_INLINE void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
 {
     drive_run_t *run = &d->run;
+    uint8_t *from = (uint8_t *)&d->forced;
     if (d->state != (uint16_t)DRIVE_STOPPED || d->command.run) {
         return;
     }
     /* from the forced angle on, whose angle is the control's */
-    drive_zero((uint8_t *)d + offsetof(drive_t, forced), (uint16_t)(offsetof(drive_t, run) + sizeof *run - offsetof(drive_t, forced)));
+    drive_zero(from, (uint16_t)((uint8_t *)(run + 1) - from));
     drive_turns(d, direction);
     drive_update_model(run, p, p->end_erpm);
     run->control.iq_limit_q13 = p->current_max_q13;
