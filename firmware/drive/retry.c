@@ -7,11 +7,8 @@
 
 void retry_init(retry_t *r)
 {
+    drive_zero(r, sizeof *r);
     r->left = RETRY_COUNT;
-    r->first = (uint16_t)FAULT_NONE;
-    r->fault = (uint16_t)FAULT_NONE;
-    r->asked = 0;
-    r->waited_ms = 0;
 }
 
 /** 1 for a fault that may pass by itself (drive/faults.h). */
