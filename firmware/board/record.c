@@ -26,11 +26,11 @@ void record_tick(void)
 
 static char *put_head(char *line)
 {
-    char *at = text_put_named(line, "record fault ", board_recorder.fault);
+    char *at = text_put_named(line, text_record_fault, board_recorder.fault);
     at = text_put_named(at, " rows ", (int16_t)rows_left);
     at = text_put_named(at, " every ", (int16_t)RECORDER_EVERY);
     at = text_put_named(at, " offsets ", board_recorder.offset_a_q13);
-    return text_put_named(at, " ", board_recorder.offset_b_q13);
+    return text_put_named(at, TEXT_BLANK, board_recorder.offset_b_q13);
 }
 
 static char *put_row(char *line, uint16_t place)
@@ -39,7 +39,7 @@ static char *put_row(char *line, uint16_t place)
     char *at = text_put_named(line, "row ", (int16_t)place);
     uint16_t n;
     for (n = 0; n < (uint16_t)RECORDER_BYTES; n++) {
-        at = text_put_named(at, " ", byte[n]);
+        at = text_put_named(at, TEXT_BLANK, byte[n]);
     }
     return at;
 }

@@ -91,7 +91,7 @@ static char *put_line(void)
     char *at = mode_status_line(line, &board_drive);
     if (at == line && !mode_speaks(&at)) {
         at = text_put_named(at, "state ", (int16_t)board_drive.state);
-        at = text_put_named(at, " fault ", (int16_t)board_drive.fault);
+        at = text_put_named(at, TEXT_FAULT, (int16_t)board_drive.fault);
         at = text_put_named(at, " speed ", speed_rpm(estimator_speed(&board_drive.run.estimator)));
         at = put_limits(put_retry(text_put(at, " rpm")));
         at = text_end(selftest_put(at));

@@ -3,6 +3,8 @@
 
 #include "control/qmath.h"
 
+const char text_record_fault[] = "record fault ";
+
 char *text_put(char *at, const char *text)
 {
     char *next = at;
