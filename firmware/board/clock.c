@@ -10,11 +10,12 @@ void clock_write_low(uint16_t low)
 /** @param needs bits of OSCCON that tell that the source is ready @return 0, or 1 if it is not the clock */
 static uint16_t clock_switch(uint16_t source, uint16_t needs)
 {
+    const uint16_t mask = (uint16_t)(0x7000u | needs), ready = (uint16_t)((uint16_t)(source << 12) | needs); /* COSC */
     uint16_t loops;
     __builtin_write_OSCCONH(source);
     clock_write_low((uint16_t)(OSCCON | 0x0001u));
     for (loops = BOARD_WAIT_LOOPS; loops != 0u; loops--) {
-        if (OSCCONbits.COSC == source && (OSCCON & needs) == needs) {
+        if ((OSCCON & mask) == ready) {
             return 0;
         }
         ClrWdt(); /* the wait is bounded, but longer than the watchdog's time */

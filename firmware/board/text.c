@@ -16,17 +16,15 @@ char *text_put(char *at, const char *text)
 
 char *text_put_unsigned(char *at, uint16_t number)
 {
-    char digits[6], *digit = digits, *next = at;
+    char digits[6], *digit = &digits[5];
     uint16_t rest = number;
 
+    *digit = '\0';
     do {
-        *digit++ = (char)('0' + rest % 10u);
+        *--digit = (char)('0' + rest % 10u);
         rest /= 10u;
     } while (rest != 0u);
-    do {
-        *next++ = *--digit;
-    } while (digit != digits);
-    return next;
+    return text_put(at, digit);
 }
 
 char *text_put_signed(char *at, int16_t number)

@@ -25,15 +25,17 @@ QM_INLINE void panel_init(panel_t *panel)
 /** 1 once per press. */
 NOINLINE uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
 {
-    uint16_t before = b->down_ms, now = 0;
-    if (down) {
-        now = (uint16_t)(before + elapsed_ms);
-        if (now > PANEL_DEBOUNCE_MS) {
-            now = PANEL_DEBOUNCE_MS;
-        }
+    uint16_t before = b->down_ms;
+    b->down_ms = 0;
+    if (!down) {
+        return 0;
     }
-    b->down_ms = now;
-    return (uint16_t)(now >= PANEL_DEBOUNCE_MS && before < PANEL_DEBOUNCE_MS);
+    b->down_ms = (uint16_t)(before + elapsed_ms);
+    if (b->down_ms < PANEL_DEBOUNCE_MS) {
+        return 0;
+    }
+    b->down_ms = PANEL_DEBOUNCE_MS;
+    return (uint16_t)(before < PANEL_DEBOUNCE_MS);
 }
 
 /** low + (high - low) * fraction, the fraction in Q16. */
