@@ -169,6 +169,12 @@ void selftest_cpu(void)
     }
 }
 
+/** 1 if two slices have a word in common, or if the first ends where the second begins. */
+QM_INLINE QM_WRAPS uint16_t slices_touch(const volatile uint16_t *first, const volatile uint16_t *second)
+{
+    return (uint16_t)((uintptr_t)(first + SLICE_WORDS) - (uintptr_t)second < 2u * SLICE_WORDS * sizeof *first);
+}
+
 /** Four words of RAM; at its end the processor's registers, and another background. With interrupts off. */
 static void test_ram_slice(void)
 {
@@ -179,7 +185,7 @@ static void test_ram_slice(void)
     if (words > 1u) {
         static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
         volatile uint16_t *at = BOARD_RAM + from;
-        volatile uint16_t *spare = (at < keep + SLICE_WORDS && at + SLICE_WORDS > keep) ? keep + 2u * SLICE_WORDS : keep;
+        volatile uint16_t *spare = slices_touch(at, keep) ? keep + 2u * SLICE_WORDS : keep;
         if (selftest_march(at, words, selftest_backgrounds[n], spare) != 0u) {
             selftest_fail(SELFTEST_RAM);
         }
