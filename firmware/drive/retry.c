@@ -51,8 +51,9 @@ static void retry_pause(retry_t *r, drive_t *d, uint16_t elapsed_ms)
 void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
 {
     if (RETRY_COUNT == 0) {
-        panel->interrupted = 0;
-    } else if (!panel->interrupted) {
+        return;
+    }
+    if (!panel->interrupted) {
         uint16_t calm = (uint16_t)(drive_is_closed(d) && time_is_over(r, elapsed_ms, RETRY_MS(RETRY_FORGET_SEC)));
         if (calm || !panel->wish_run) { /* long enough without a fault, or a person has stopped it */
             retry_init(r);

@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     button_t s2, s3;
     int16_t wish_run;         /**< the user wants the motor to run */
-    int16_t interrupted;      /**< a fault has ended a run that the user still wished; S2 forgets it */
+    int16_t interrupted;      /**< a fault has ended a run that the user still wished; S2 forgets it. For the retry: 0 without */
     int16_t fast_range;       /**< S3: NOMINAL..MAXIMUM instead of MINIMUM..NOMINAL */
     volatile int16_t pot_q15; /**< last sample of the potentiometer, signed fractional; the control interrupt writes it */
     int32_t pot_q31;          /**< filtered potentiometer */

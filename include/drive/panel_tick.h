@@ -22,6 +22,14 @@ QM_INLINE void panel_init(panel_t *panel)
     panel->pot_used_q15 = INT16_MIN;
 }
 
+/** A fault has ended a run (1), or that no longer matters (0). */
+QM_INLINE void panel_interrupt(panel_t *panel, int16_t interrupted)
+{
+    if (RETRY_COUNT != 0) {
+        panel->interrupted = interrupted;
+    }
+}
+
 /** 1 once per press. */
 NOINLINE uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
 {
@@ -101,9 +109,9 @@ QM_INLINE void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *i
     if (button_pressed(&panel->s2, in->s2_down, in->elapsed_ms)) {
         if (d->fault != (uint16_t)FAULT_NONE) {
             d->command.clear_fault = 1;
-            panel->interrupted = 0;
-        } else if (panel->interrupted) {
-            panel->interrupted = 0; /* a moment before the retry */
+            panel_interrupt(panel, 0);
+        } else if (RETRY_COUNT != 0 && panel->interrupted) {
+            panel_interrupt(panel, 0); /* a moment before the retry */
         } else {
             panel->wish_run ^= 1;
         }
@@ -115,7 +123,7 @@ QM_INLINE void panel_buttons(panel_t *panel, drive_t *d, const panel_inputs_t *i
     }
     if (d->fault != (uint16_t)FAULT_NONE && panel->wish_run) {
         panel->wish_run = 0;
-        panel->interrupted = 1;
+        panel_interrupt(panel, 1);
     }
 }
 

@@ -6,6 +6,7 @@
 #undef RETRY_COUNT
 #define RETRY_COUNT 3
 
+#include "firmware/board/firmware.c"
 #include "firmware/drive/retry.c"
 
 void setUp(void)

@@ -2,6 +2,9 @@
 /* defines: -DSCOPE=1 */
 #include "hurst_params.h"
 
+#undef RETRY_COUNT
+#define RETRY_COUNT 3
+
 #include "drive/remote.h"
 
 #include "panel_rig.h"
