@@ -55,5 +55,7 @@ void drive_init(drive_t *d, const drive_params_t *p)
 
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
 {
-    drive_begin(d, p, direction);
+    if (d->state == (uint16_t)DRIVE_STOPPED && !d->command.run) {
+        drive_begin(d, p, direction);
+    }
 }

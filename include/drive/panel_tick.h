@@ -160,7 +160,9 @@ QM_INLINE panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_para
     if (!panel->wish_run) {
         d->command.run = 0;
     } else if (d->state == (uint16_t)DRIVE_STOPPED) {
-        drive_begin(d, p, (int16_t)((target >= 0) ? 1 : -1));
+        if (!d->command.run) {
+            drive_begin(d, p, (int16_t)((target >= 0) ? 1 : -1));
+        }
     } else if (drive_is_closed(d)) {
         d->command.run = 1; /* a stop under way goes on from the present speed; the drive itself turns to the target's direction */
     } else if ((target ^ d->direction) < 0) {
