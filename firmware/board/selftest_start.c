@@ -14,9 +14,10 @@
 #define WATCHDOG_MOST 14500u
 #define WATCHDOG_NEVER 20000u
 
-static enum { WATCHDOG_NO_TEST,
-              WATCHDOG_DUE,
-              WATCHDOG_BITTEN } watchdog_test BOARD_UNSET;
+enum { WATCHDOG_NO_TEST,
+       WATCHDOG_DUE,
+       WATCHDOG_BITTEN };
+static uint16_t watchdog_test BOARD_UNSET;
 static volatile uint16_t waited_counts BOARD_PERSISTENT;
 
 /* Power-up clears WDTO, and its own bits stay until the firmware clears them: both together are the reset that the test has waited for. */
@@ -26,8 +27,8 @@ uint16_t selftest_reset_cause(uint16_t rcon)
     if (!RESET_WAS(POR, rcon) && !RESET_WAS(BOR, rcon)) {
         return rcon;
     }
-    watchdog_test = RESET_WAS(WDTO, rcon) ? WATCHDOG_BITTEN : WATCHDOG_DUE;
-    return (uint16_t)(rcon & ~(1u << RESET_WDTO));
+    watchdog_test = (uint16_t)(WATCHDOG_DUE + RESET_WAS(WDTO, rcon)); /* BITTEN is the next */
+    return (uint16_t)(rcon & ~RESET_FLAG(WDTO));
 }
 
 /** The clock that counted is the crystal's, the watchdog's is the low-power oscillator. */
