@@ -3,7 +3,7 @@
 
 #include "control/qmath.h"
 
-const char text_record_fault[] = "record fault ";
+const char text_record_fault[sizeof "record fault "] = "record fault ";
 
 char *text_put(char *at, const char *text)
 {

@@ -28,10 +28,10 @@ void drive_fail(drive_t *d, drive_fault_t fault)
 static const int16_t constant_idref_q13[FIELDWEAK_ENTRIES] = PARAM_18(PARAM_IDREF);
 static const int16_t constant_inv_kfi[FIELDWEAK_ENTRIES] = PARAM_18(PARAM_INVKFI_ENTRY);
 static const int16_t constant_ls_over2ls0_q15[FIELDWEAK_ENTRIES] = PARAM_18(PARAM_LS_ENTRY);
-static const fieldweak_tables_t constant_tables = { constant_idref_q13, constant_inv_kfi, constant_ls_over2ls0_q15 };
 
 void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
 {
+    static const fieldweak_tables_t constant_tables = { constant_idref_q13, constant_inv_kfi, constant_ls_over2ls0_q15 };
     const fieldweak_tables_t tables = fieldweak_tables(&p->fieldweak);
     fieldweak_tick(&run->fieldweak, &p->fieldweak, QM_CONSTANT(p->end_erpm) ? &constant_tables : &tables, &run->model, ref_erpm);
     salient_model(run, p);

@@ -10,7 +10,7 @@ char *text_put_unsigned(char *at, uint16_t number);
 char *text_put_signed(char *at, int16_t number);
 
 /** What other texts end with: XC16's linker has no part of a text in common with another. */
-extern const char text_record_fault[];
+extern const char text_record_fault[sizeof "record fault "];
 #define TEXT_FAULT (text_record_fault + sizeof "record" - 1)
 #define TEXT_BLANK (text_record_fault + sizeof "record fault" - 1)
 

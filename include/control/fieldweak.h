@@ -38,11 +38,13 @@ typedef struct {
     const int16_t *idref_q13, *inv_kfi, *ls_over2ls0_q15;
 } fieldweak_tables_t;
 
-#define FIELDWEAK_SAME(t, n) ((t)[n] == (t)[(n) + 1])
+#define FIELDWEAK_STEP(t, n) ((uint16_t)(t)[n] ^ (uint16_t)(t)[(n) + 1])
+/** All entries are the same; without a branch the compiler knows it at once. */
 #define FIELDWEAK_FLAT(t) \
-    (FIELDWEAK_SAME(t, 0) & FIELDWEAK_SAME(t, 1) & FIELDWEAK_SAME(t, 2) & FIELDWEAK_SAME(t, 3) & FIELDWEAK_SAME(t, 4) & FIELDWEAK_SAME(t, 5) \
-     & FIELDWEAK_SAME(t, 6) & FIELDWEAK_SAME(t, 7) & FIELDWEAK_SAME(t, 8) & FIELDWEAK_SAME(t, 9) & FIELDWEAK_SAME(t, 10) & FIELDWEAK_SAME(t, 11) \
-     & FIELDWEAK_SAME(t, 12) & FIELDWEAK_SAME(t, 13) & FIELDWEAK_SAME(t, 14) & FIELDWEAK_SAME(t, 15) & FIELDWEAK_SAME(t, 16))
+    ((FIELDWEAK_STEP(t, 0) | FIELDWEAK_STEP(t, 1) | FIELDWEAK_STEP(t, 2) | FIELDWEAK_STEP(t, 3) | FIELDWEAK_STEP(t, 4) | FIELDWEAK_STEP(t, 5) \
+      | FIELDWEAK_STEP(t, 6) | FIELDWEAK_STEP(t, 7) | FIELDWEAK_STEP(t, 8) | FIELDWEAK_STEP(t, 9) | FIELDWEAK_STEP(t, 10) | FIELDWEAK_STEP(t, 11) \
+      | FIELDWEAK_STEP(t, 12) | FIELDWEAK_STEP(t, 13) | FIELDWEAK_STEP(t, 14) | FIELDWEAK_STEP(t, 15) | FIELDWEAK_STEP(t, 16)) \
+     == 0u)
 
 /** Entry of a table between two points. @param index 0..FIELDWEAK_ENTRIES - 2 */
 QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16)

@@ -48,11 +48,10 @@ QM_INLINE uint16_t deviation_open_phase(const deviation_sums_t *s, const drive_p
 {
     const uint16_t least = (uint16_t)(((uint16_t)p->id_off_q13 * DEVIATION_SAMPLES) >> DEVIATION_PHASE_SHIFT);
     uint16_t n, flows = 0, asked = 0;
-    for (n = 3; n != 0u;) {
-        n--;
-        if (s->flows[n] >= flows) {
-            flows = s->flows[n];
-            asked = s->asked[n];
+    for (n = 3; n != 0u; n--) {
+        if (s->flows[n - 1u] >= flows) {
+            flows = s->flows[n - 1u];
+            asked = s->asked[n - 1u];
         }
     }
     flows = (flows < asked) ? flows : asked; /* more is noise */
