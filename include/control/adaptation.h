@@ -67,8 +67,10 @@ QM_INLINE int16_t adaptation_kfi(int32_t kfi)
 QM_INLINE int16_t adaptation_kfi_changed(const adaptation_params_t *p, int16_t table, q15_t change)
 {
     int16_t more = (int16_t)(2 * qm_mulhi(table, change));
-    if (QM_KNOWN(ADAPTATION_CHANGED(table, p->kfi_least) >= ADAPTATION_KFI_LEAST) && QM_KNOWN(ADAPTATION_CHANGED(table, p->kfi_most) <= 32767)) {
-        return (int16_t)(table + more);
+    if (QM_KNOWN(ADAPTATION_CHANGED(table, p->kfi_least) >= ADAPTATION_KFI_LEAST)) {
+        if (QM_KNOWN(ADAPTATION_CHANGED(table, p->kfi_most) <= 32767)) {
+            return (int16_t)(table + more);
+        }
     }
     return adaptation_kfi((int32_t)table + more);
 }
