@@ -77,10 +77,10 @@ QM_INLINE uint16_t observer_is_calm(const observer_t *o)
     return (uint16_t)(o->quick_q15 < 4096);
 }
 
-/** a + (b - a) * share; b - a fits a word. */
+/** a + (b - a) * share; b - a fits a word. @param share 0..1 */
 QM_INLINE int16_t observer_between(int16_t a, int16_t b, q15_t share)
 {
-    return (int16_t)(a + qm_hi(2 * qm_mulss((int16_t)(b - a), share)));
+    return (int16_t)(a + qm_mulhi_su((int16_t)(b - a), (uint16_t)(2u * (uint16_t)share)));
 }
 
 /** 2 * share, at most 1. @param share 0..1 */
