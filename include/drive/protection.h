@@ -23,7 +23,7 @@ QM_INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
 QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
     drive_fault_t found;
-    if (drive_outputs(d) == (uint16_t)OUTPUTS_OFF && now_q15 < PROTECTION_BUS_END_Q15) {
+    if (!drive_conducts(d) && now_q15 < PROTECTION_BUS_END_Q15) {
         return;
     }
     if (now_q15 > p->bus_over_q15) {

@@ -68,6 +68,13 @@ QM_INLINE uint16_t drive_is_closed(const drive_t *d)
     return (uint16_t)(MODE_CLOSES_LOOP && (uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
 }
 
+/** 1 while the bridge conducts, its drivers' charge with it, BOOTSTRAP to STOPPING: drive_outputs() are not off. In one comparison. */
+QM_INLINE uint16_t drive_conducts(const drive_t *d)
+{
+    return (uint16_t)(d->fault == (uint16_t)FAULT_NONE
+                      && (uint16_t)(d->state - (uint16_t)DRIVE_BOOTSTRAP) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_BOOTSTRAP);
+}
+
 /** What drives the bridge (outputs_t) in the drive's present state. */
 QM_INLINE uint16_t drive_outputs(const drive_t *d)
 {
