@@ -2,6 +2,7 @@
 #ifndef DRIVE_PROTECTION_H
 #define DRIVE_PROTECTION_H
 
+#include "drive/limits.h"
 #include "drive/model.h"
 #include "drive/salient.h"
 
@@ -170,9 +171,9 @@ QM_INLINE uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const dr
  *  it: half of each step's change is taken, which comes to the current that fits. */
 QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p)
 {
-    uint32_t ratio = qm_muluu(salient_current_beside(run, p, run->probe_most_q13), p->current_max_reciprocal) >> 10;
-    int16_t rest = trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio));
-    int16_t most = qm_hi(2 * qm_mulss(p->current_max_q13, qm_clamp(rest, PROBE_LEAST_Q15, PROBE_MOST_Q15)));
+    int16_t most = limits_beside(p, salient_current_beside(run, p, run->probe_most_q13));
+    /* products in C: constants */
+    most = qm_clamp(most, (int16_t)(((int32_t)p->current_max_q13 * PROBE_LEAST_Q15) >> 15), (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
 #if MOTOR_SALIENCY_UH
     most = (int16_t)((most + run->probe_most_q13) / 2);
 #endif
