@@ -74,7 +74,7 @@ QM_INLINE current_q13_t observer_load(const observer_t *o, const observer_params
 /** 1 while nothing changes fast: the innovation has been small for some 50 ms. */
 QM_INLINE uint16_t observer_is_calm(const observer_t *o)
 {
-    return (uint16_t)(o->quick_q15 < 4096);
+    return (uint16_t)(((uint16_t)o->quick_q15 >> 12) == 0u);
 }
 
 /** a + (b - a) * share; b - a fits a word. @param share 0..1 */
@@ -119,11 +119,15 @@ QM_INLINE void observer_preset(observer_t *o, const observer_params_t *p, uint32
     o->unrest_steps = OBSERVER_START_UNREST;
 }
 
-/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 */
+/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 @param unrest_steps some thousand at most */
 QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
 {
-    int32_t large = calm_erpm + (qm_mulsu(calm_erpm, unrest_steps) >> OBSERVER_UNREST_SHIFT);
-    return (int16_t)((large > 32767) ? 32767 : large);
+    uint32_t large = qm_muluu((uint16_t)calm_erpm, (uint16_t)(unrest_steps + (1u << OBSERVER_UNREST_SHIFT)));
+    int16_t limited = 32767;
+    if (((uint16_t)(large >> 16) >> (OBSERVER_UNREST_SHIFT - 1)) == 0u) {
+        limited = (int16_t)(large >> OBSERVER_UNREST_SHIFT);
+    }
+    return limited;
 }
 
 /** As much unrest as at the hand-over, at least. */
@@ -136,31 +140,31 @@ QM_INLINE void observer_unsettle(observer_t *o)
 
 /** How much of a load there is: 0 as without any, 1 where it and the current that flows for it are clear of what dead time leaves. A load that
  *  only slows the rotor down takes no current.
- *  @param iq_q13 q current asked for, any */
+ *  @param iq_q13 q current asked for, above -32768 */
 QM_INLINE q15_t observer_loaded(const observer_t *o, const observer_params_t *p, current_q13_t iq_q13)
 {
-    int16_t held = qm_abs(qm_hi(o->load_q16)), flows = qm_abs(qm_mulhi_su(iq_q13, p->per_current_q16));
+    int16_t held = qm_size(qm_hi(o->load_q16)), flows = qm_size(qm_mulhi_su(iq_q13, p->per_current_q16));
     int16_t load = (int16_t)(((held < flows) ? held : flows) - p->load_from);
     return (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
 }
 
-/** The rate for the next step. @param ref_erpm speed reference, any @param iq_q13 q current asked for, any */
-QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm, current_q13_t iq_q13)
+/** The rate for the next step. @param speed magnitude of the speed reference @param iq_q13 q current asked for, above -32768 */
+QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    int16_t speed = qm_abs(ref_erpm), rate, wrong;
-    q15_t loaded = observer_loaded(o, p, iq_q13);
+    int16_t rate, wrong = (int16_t)(p->large_erpm + (speed >> 5));
+    q15_t loaded = observer_loaded(o, p, iq_q13), share = 32767;
 
-    o->share_q15 = 32767;
     if (speed < p->full_erpm) {
-        o->share_q15 = (int16_t)qm_divud((uint32_t)(uint16_t)speed << 15, (uint16_t)p->full_erpm);
+        share = qm_share((uint16_t)speed, (uint16_t)p->full_erpm);
     }
-    rate = observer_between(0, p->quiet_q16, o->share_q15);
+    rate = observer_between(0, p->quiet_q16, share);
     /* under load the back-EMF is clean, and half the speed is enough */
-    o->share_q15 = observer_between(o->share_q15, observer_twice(o->share_q15), loaded);
-    rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
-    o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
+    share = observer_between(share, observer_twice(share), loaded);
+    o->share_q15 = share;
+    rate = observer_between(rate, observer_between(0, p->loaded_q16, share), loaded);
+    o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, share), o->quick_q15);
     /* without load dead time may make a light rotor hunt for long: twice as much is not wrong then */
-    wrong = qm_clamp((int16_t)(p->large_erpm + (speed >> 5)), 0, 16383);
+    wrong = (int16_t)((wrong > 16383) ? 16383 : wrong);
     o->wrong_erpm = observer_between((int16_t)(2 * wrong), wrong, loaded);
     o->large_erpm = observer_large((int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5)), o->unrest_steps);
 }
