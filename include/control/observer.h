@@ -71,10 +71,16 @@ QM_INLINE current_q13_t observer_load(const observer_t *o, const observer_params
     return (int16_t)((observer_load_q26(o, p) + 4096) >> 13);
 }
 
-/** 1 while nothing changes fast: the innovation has been small for some 50 ms. */
+/** Nonzero while something changes fast: the innovation has been large in the last 50 ms or so. */
+QM_INLINE uint16_t observer_is_stirred(const observer_t *o)
+{
+    return (uint16_t)((uint16_t)o->quick_q15 >> 12);
+}
+
+/** 1 while nothing does. */
 QM_INLINE uint16_t observer_is_calm(const observer_t *o)
 {
-    return (uint16_t)(((uint16_t)o->quick_q15 >> 12) == 0u);
+    return (uint16_t)(observer_is_stirred(o) == 0u);
 }
 
 /** a + (b - a) * share; b - a fits a word. @param share 0..1 */
@@ -193,21 +199,24 @@ QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovat
 /** What a step's innovation calls for: in full from one and a half of what is large; none while it is the loop's own swing. */
 QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
 {
+    const uint16_t stirred = observer_is_stirred(o);
+    uint16_t unrest = o->unrest_steps;
     q15_t level = 0;
-    if (!observer_is_calm(o)) {
-        o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
-    } else if (o->unrest_steps != 0u) {
-        o->unrest_steps--;
+    if (stirred) {
+        unrest = (uint16_t)((unrest < 4u * OBSERVER_UNREST_STEPS) ? unrest + 4u : unrest);
+    } else if (unrest != 0u) {
+        unrest--;
     } else {
         /* calm for long */
     }
-    if (qm_size(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
-        if ((innovation ^ o->large_last_erpm) < 0 && !observer_is_calm(o)) {
-            o->unrest_steps = OBSERVER_UNREST_STEPS;
+    if (qm_size(innovation) > o->large_erpm && (!stirred || unrest < OBSERVER_UNREST_STEPS)) {
+        if (stirred && (innovation ^ o->large_last_erpm) < 0) {
+            unrest = OBSERVER_UNREST_STEPS;
         }
         o->large_last_erpm = innovation;
         level = (int16_t)((qm_size(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
     }
+    o->unrest_steps = unrest;
     o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
     if (o->quick_q15 < level) {
         o->quick_q15 = level;
