@@ -169,7 +169,8 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
     drive_run_t *run = &d->run;
     estimator_t *e = &run->estimator;
     const catch_t *c = &run->catching;
-    int16_t ahead = (int16_t)((e->omega_erpm >= 0) ? 0x4000 : -0x4000), emf;
+    int16_t ahead = qm_with_sign(0x4000, e->omega_erpm);
+    uint16_t emf, most;
     int32_t half_step_q32 = qm_mulss(e->omega_erpm, p->estimator.deltat_q32) / 2;
 
     e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
@@ -179,9 +180,11 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
     estimator_follow(e, &p->estimator);
     drive_update_model(run, p, e->omega_erpm);
-    emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_size(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
-    e->e_q_q28 = (int32_t)((ahead >= 0) ? emf : -emf) * 65536;
-    run->control.v_q14.q = qm_limit((int16_t)(4 * qm_limit((int16_t)((ahead >= 0) ? emf : -emf), 8191)), d->circle.limit_q14);
+    emf = qm_divud(qm_muluu((uint16_t)qm_size(e->omega_erpm), 2048u), (uint16_t)run->model.inv_kfi);
+    e->e_q_q28 = (int32_t)qm_with_sign((int16_t)emf, ahead) * 65536;
+    emf = (uint16_t)(4u * ((emf > 8191u) ? 8191u : emf));
+    most = (uint16_t)d->circle.limit_q14;
+    run->control.v_q14.q = qm_with_sign((int16_t)((emf > most) ? most : emf), ahead);
 }
 
 /** In closed loop from the next period on, at the rotor's speed and without torque. */
@@ -190,13 +193,13 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
 
-    drive_turns(d, (int16_t)((run->estimator.omega_erpm >= 0) ? 1 : -1));
+    drive_turns(d, qm_with_sign(1, run->estimator.omega_erpm));
     c->reference_erpm = run->estimator.omega_erpm;
     c->ref_q13.d = run->fieldweak.table_q13;
     c->ref_q13.q = 0;
     c->v_q14.d = 0;
     handover_preset(d, p, estimator_next_angle(&run->estimator));
-    late_preset(run, inverse_park(c->v_q14, d->frame));
+    late_preset(run, inverse_park_q(c->v_q14.q, d->frame));
     drive_enter(d, DRIVE_CLOSED);
 }
 

@@ -121,7 +121,6 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     handover_t *h = &d->run.handover;
     angle_t estimated = estimator_next_angle(&d->run.estimator);
     sincos_t turn;
-    dq_t x;
     alphabeta_t y;
 
     h->offset = (int16_t)(angle_t)(d->angle - estimated);
@@ -129,10 +128,8 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     y = inverse_park(c->v_q14, turn);
     c->v_q14.d = (int16_t)(2 * y.alpha);
     c->v_q14.q = (int16_t)(2 * y.beta);
-    x.d = 0;
-    x.q = c->ref_q13.q;
-    h->current_q13 = x.q;
-    y = inverse_park(x, turn);
+    h->current_q13 = c->ref_q13.q;
+    y = inverse_park_q(h->current_q13, turn);
     c->ref_q13.d = (int16_t)(2 * y.alpha);
     c->ref_q13.q = (int16_t)(2 * y.beta);
     h->id_q13 = c->ref_q13.d;
