@@ -38,54 +38,50 @@ QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, 
 {
     int16_t alpha = qm_size(flux_q11.alpha), beta = qm_size(flux_q11.beta);
     int16_t length = (int16_t)((alpha > beta) ? alpha + (beta >> 2) : beta + (alpha >> 2)); /* to 11 per cent */
-    uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u));
-    int16_t emf_q12 = (int16_t)((half_emf_q12 > 16383u) ? 32767 : (int16_t)(2u * half_emf_q12));
-    speed_erpm_t speed = estimator_omega(emf_q12, run->model.emf_sum_max_q12, run->model.inv_kfi);
+    uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u)), sum_max_q12 = (uint16_t)run->model.emf_sum_max_q12;
+    uint16_t emf_q12 = (half_emf_q12 > sum_max_q12 >> 1) ? sum_max_q12 : (uint16_t)(2u * half_emf_q12);
+    speed_erpm_t speed = (int16_t)(qm_mulss((int16_t)emf_q12, run->model.inv_kfi) >> 11); /* estimator_omega() within its limit */
     uint16_t step = (uint16_t)qm_mulhi(speed, p->estimator.deltat_q32), pause = CATCH_PAUSE_MOST;
 
-    if (step != 0u) {
+    if (step > CATCH_PAUSE_TURN / CATCH_PAUSE_MOST) {
         pause = qm_divud(CATCH_PAUSE_TURN, step);
-    }
-    if (pause > CATCH_PAUSE_MOST) {
-        return CATCH_PAUSE_MOST;
     }
     return (pause < CATCH_PAUSE_LEAST) ? CATCH_PAUSE_LEAST : pause;
 }
 
-/** Speed from a turn. @return within 16 bits */
-QM_INLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t turn, uint16_t half_periods)
+/** Speed from a turn. @param size of the turn, 0..32767 @return not negative */
+QM_INLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t size, uint16_t half_periods)
 {
     /* turn 2^16 / (half_periods / 2) / deltat, with what divides brought into a word */
-    uint32_t part = (uint32_t)(uint16_t)qm_abs(turn) << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
-    int16_t speed = INT16_MAX;
-    while (whole > 65535ul) { /* wcet: at most 15 turns */
+    uint32_t part = (uint32_t)(uint16_t)size << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
+    while ((uint16_t)(whole >> 16) != 0u) { /* wcet: at most 15 turns */
         whole >>= 1;
         part >>= 1;
     }
-    if ((part >> 15) < whole) {
-        speed = (int16_t)qm_divud(part, (uint16_t)whole);
+    if ((uint16_t)(part >> 15) < (uint16_t)whole) {
+        return (int16_t)qm_divud(part, (uint16_t)whole);
     }
-    return (int16_t)((turn < 0) ? -speed : speed);
+    return INT16_MAX;
 }
 
-/** The second look has ended: the turn since the first one. @return 1 if the rotor turns */
-QM_INLINE uint16_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
+/** The second look has ended: the turn since the first one. @return what comes next: the rotor stands, or it is known, or it is waited for */
+QM_INLINE catch_step_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
 {
     drive_run_t *run = &d->run;
     catch_t *c = &run->catching;
-    int16_t turn = (int16_t)(angle_t)(direction - c->direction);
+    int16_t turn = (int16_t)(angle_t)(direction - c->direction), size = qm_abs(turn), speed;
 
-    if (qm_abs(turn) < CATCH_LEAST_TURN) {
-        return 0;
+    if (size < CATCH_LEAST_TURN) {
+        return CATCH_NO_LOOK;
     }
-    run->estimator.omega_erpm = catch_speed(p, turn, (uint16_t)(c->half_periods + samples));
-    c->pause = 0;
-    c->step = (uint16_t)CATCH_SEEN;
-    if (qm_size(run->estimator.omega_erpm) > p->maximum_erpm) { /* it is waited for */
+    speed = catch_speed(p, size, (uint16_t)(c->half_periods + samples));
+    run->estimator.omega_erpm = qm_with_sign(speed, turn);
+    if (speed > p->maximum_erpm) {
         c->pause = CATCH_PAUSE_MOST;
-        c->step = (uint16_t)CATCH_FIRST_LOOK;
+        return CATCH_FIRST_LOOK;
     }
-    return 1;
+    c->pause = 0;
+    return CATCH_SEEN;
 }
 
 /* wcet: catch_look excludes drive_update_model adaptation_learn handover_decay svm_compensation */
@@ -95,7 +91,8 @@ QM_INLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
     catch_t *c = &d->run.catching;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), flux;
     int16_t most = (int16_t)(p->current_max_q13 / 5), alpha = qm_size(i.alpha), beta = qm_size(i.beta);
-    uint16_t samples = d->periods, turns;
+    uint16_t samples = d->periods;
+    catch_step_t next = CATCH_NO_LOOK; /* it stands */
     angle_t direction;
 
     c->sum_q11.alpha = (int16_t)(c->sum_q11.alpha + (i.alpha >> 3));
@@ -106,24 +103,21 @@ QM_INLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
     flux.alpha = catch_flux_q11(&d->run, &p->estimator, i.alpha, c->sum_q11.alpha);
     flux.beta = catch_flux_q11(&d->run, &p->estimator, i.beta, c->sum_q11.beta);
     direction = trig_direction((int16_t)-flux.alpha, (int16_t)-flux.beta);
-    turns = (uint16_t)(samples < CATCH_LOOK_PERIODS || qm_size(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_size(c->sum_q11.beta) >= CATCH_STANDS_Q11);
-    if (turns && c->step == (uint16_t)CATCH_FIRST_LOOK) {
-        c->pause = catch_pause(&d->run, p, flux, samples);
-        c->half_periods = (uint16_t)(samples + 2u * c->pause);
-        c->step = (uint16_t)CATCH_SECOND_LOOK;
-    } else if (turns) {
-        turns = catch_see(d, p, direction, samples);
+    if (samples < CATCH_LOOK_PERIODS || qm_size(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_size(c->sum_q11.beta) >= CATCH_STANDS_Q11) {
+        if (c->step == (uint16_t)CATCH_FIRST_LOOK) {
+            c->pause = catch_pause(&d->run, p, flux, samples);
+            samples = (uint16_t)(samples + 2u * c->pause);
+            next = CATCH_SECOND_LOOK;
+        } else {
+            next = catch_see(d, p, direction, samples);
+        }
         c->half_periods = samples;
-    } else {
-        /* it stands */
     }
-    if (!turns) {
-        c->step = (uint16_t)CATCH_NO_LOOK;
-    }
+    c->step = (uint16_t)next;
     c->direction = direction;
     c->sum_q11.alpha = 0;
     c->sum_q11.beta = 0;
-    return turns;
+    return (uint16_t)(next != CATCH_NO_LOOK);
 }
 
 /** 1 with the bus so high that switching anything on would trip: a very fast rotor holds it there through the diodes. */
