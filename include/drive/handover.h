@@ -16,12 +16,14 @@
 #define HANDOVER_MOST_OFFSET 0x2000                                           /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
- *  error of the estimator's angle into torque. */
-QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
+ *  error of the estimator's angle into torque. @return its magnitude */
+QM_INLINE current_q13_t handover_release(drive_t *d, const drive_params_t *p)
 {
     int16_t current = qm_size(d->run.control.ref_q13.q), least = (int16_t)(p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT);
     current = (int16_t)(current - (current >> HANDOVER_FALL_SHIFT) - (current >> (HANDOVER_FALL_SHIFT + 1)) - 1);
-    d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
+    current = (current < least) ? least : current;
+    d->run.control.ref_q13.q = along_direction(d, current);
+    return current;
 }
 
 /** 1 once the estimator has agreed with the forced speed for long enough. */
@@ -48,12 +50,13 @@ QM_INLINE uint16_t handover_is_overdue(speed_erpm_t forced, const drive_params_t
 }
 
 /** 1 where the current pulls the rotor, or cannot fall further and the rotor has swung to where the floor pulls it: while it falls behind it is slower
- *  than the speed that the closed loop begins with, and loses more of it before the observer knows. @param ahead_erpm of the forced speed */
-QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, speed_erpm_t forced, int16_t ahead_erpm)
+ *  than the speed that the closed loop begins with, and loses more of it before the observer knows.
+ *  @param current_q13 its magnitude @param ahead_erpm of the forced speed */
+QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, current_q13_t current_q13, speed_erpm_t forced, int16_t ahead_erpm)
 {
     int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
-    return (uint16_t)(qm_abs(offset) <= HANDOVER_MOST_OFFSET
-                      || (qm_size(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
+    return (uint16_t)(!qm_beyond(offset, HANDOVER_MOST_OFFSET)
+                      || (current_q13 <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
 }
 
 /** While the estimator agrees: the speed waits, the current falls, and what the closed loop begins with is ready. A rotor that swings ahead is not braked.
@@ -61,9 +64,9 @@ QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, sp
 QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_t forced, speed_erpm_t seen, int16_t ahead_erpm)
 {
     handover_t *h = &d->run.handover;
+    current_q13_t current = handover_release(d, p);
     d->forced.increase_q10 = 0;
-    handover_release(d, p);
-    h->is_due = handover_is_due(d, p, forced, ahead_erpm);
+    h->is_due = handover_is_due(d, p, current, forced, ahead_erpm);
     d->run.control.reference_erpm = along_direction(d, (seen > forced) ? seen : forced);
     if (!h->is_due && h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
         drive_raise(d, FAULT_START_FAILED);
