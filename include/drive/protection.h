@@ -40,6 +40,12 @@ QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t
 #define PROTECTION_PHASE_SHIFT 6 /* 250 sums of a current above the trip level fit a word */
 #define PROTECTION_OPEN_SHIFT 2  /* a phase with less than a quarter of the largest current is open */
 
+/** A phase's sum with this period's current. */
+QM_INLINE uint16_t protection_phase_sum(uint16_t sum, current_q13_t i_q13)
+{
+    return (uint16_t)(sum + ((uint16_t)qm_size(i_q13) >> PROTECTION_PHASE_SHIFT));
+}
+
 /** Which signal is wrong: currents that do not fit the motor, with or without a phase that carries hardly any. */
 QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
 {
@@ -64,9 +70,10 @@ QM_INLINE voltage_q12_t protection_ri(const drive_params_t *p, int16_t i_q13)
 QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
-    int32_t explained_q12 = (int32_t)qm_size(emf.q) + protection_ri(p, qm_size(i.d)) + protection_ri(p, qm_size(i.q))
-                            + (int32_t)PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12;
-    return (uint16_t)(qm_size(emf.d) > explained_q12);
+    int16_t unturned_q12 = (int16_t)(qm_size(emf.d) - qm_size(emf.q)); /* beyond a back-EMF in its direction */
+    /* fits a word: no current flows for which R takes more voltage than there is */
+    uint16_t ri_q12 = (uint16_t)((uint16_t)protection_ri(p, qm_size(i.d)) + (uint16_t)protection_ri(p, qm_size(i.q)));
+    return (uint16_t)(unturned_q12 > 0 && (uint16_t)unturned_q12 > ri_q12 + (uint16_t)(PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12));
 }
 
 #define PROTECTION_BLUR_SHIFT 2 /* dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below */
@@ -86,7 +93,6 @@ QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_para
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    uint16_t a = (uint16_t)qm_size(d->phases_q13.a), b = (uint16_t)qm_size(d->phases_q13.b), c = (uint16_t)qm_size(d->phases_q13.c);
     if (protection_voltage_is_unexplained(run, p)) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + PROTECTION_UNEXPLAINED);
     }
@@ -96,9 +102,9 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
         run->phase_sums[2] = 0;
         return;
     }
-    run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));
-    run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + (b >> PROTECTION_PHASE_SHIFT));
-    run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + (c >> PROTECTION_PHASE_SHIFT));
+    run->phase_sums[0] = protection_phase_sum(run->phase_sums[0], d->phases_q13.a);
+    run->phase_sums[1] = protection_phase_sum(run->phase_sums[1], d->phases_q13.b);
+    run->phase_sums[2] = protection_phase_sum(run->phase_sums[2], d->phases_q13.c);
     if (run->observer.wrong_steps <= p->wrong_steps) {
         return;
     }
