@@ -33,7 +33,7 @@ QM_INLINE uint16_t handover_agrees(const handover_t *h, const drive_params_t *p)
 }
 
 /** The forced angle's speed along the direction, counts of speed_erpm_t. */
-QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
+NOINLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
 {
     int32_t erpm = qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> (11 - LATE_DUTIES);
     if (LATE_DUTIES) { /* the angle per period may be rounded up by more than a count of the largest speed */
