@@ -15,7 +15,10 @@
  *  current than it must, and one that costs speed takes what it needs. */
 QM_INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c)
 {
-    int16_t missing = (int16_t)((c->ref_q13.q >= 0) ? c->ref_q13.q - c->i_q13.q : c->i_q13.q - c->ref_q13.q);
+    int16_t missing = (int16_t)(c->ref_q13.q - c->i_q13.q);
+    if (c->ref_q13.q < 0) {
+        missing = (int16_t)-missing;
+    }
     return (int16_t)(c->vq_limit_q14 - qm_size(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
 }
 
@@ -79,8 +82,8 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
 /** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
 QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    if ((iq_q13 ^ speed) < 0 && qm_size(iq_q13) > c->brake_limit_q13) {
-        return (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
+    if ((iq_q13 ^ speed) < 0) {
+        return qm_limit(iq_q13, c->brake_limit_q13);
     }
     return iq_q13;
 }

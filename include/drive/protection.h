@@ -240,14 +240,13 @@ QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_size(along), standing = (int16_t)(p->minimum_erpm >> 1);
     dq_t emf = estimator_emf(&run->estimator);
-    uint16_t lost = (uint16_t)(speed >= standing && qm_size(emf.d) > qm_size(emf.q)); /* of a standing rotor its direction says nothing */
 
     if (along < protection_least_speed(run, p)) {
         run->stall_steps++;
     } else { /* of a rotor that only jerks the estimate is fast now and then */
         run->stall_steps = (uint16_t)((run->stall_steps > STALL_FALL) ? run->stall_steps - STALL_FALL : 0u);
     }
-    if (lost || speed > p->overspeed_erpm) {
+    if (speed > p->overspeed_erpm || (speed >= standing && qm_size(emf.d) > qm_size(emf.q))) { /* of a standing rotor its direction says nothing */
         run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
     } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */
         run->lost_lock_steps--;
