@@ -98,7 +98,7 @@ QM_INLINE q15_t observer_twice(q15_t share)
 #define OBSERVER_FASTEST 32700u
 
 /** The speed and a change of it, within the format. @param change at most 2^30 */
-QM_INLINE QM_WRAPS int32_t observer_sum(int32_t omega_q16, int32_t change)
+NOINLINE QM_WRAPS int32_t observer_sum(int32_t omega_q16, int32_t change)
 {
 #ifdef __FRAMAC__ /* what it means */
     const int32_t fastest_q16 = (int32_t)OBSERVER_FASTEST * 65536;

@@ -71,16 +71,13 @@ NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 }
 
 /* wcet: speed_turn_round/drive_turns excludes model_update */
-/** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
- *  @return 1 then */
-NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
+/** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero. */
+NOINLINE void speed_turn_round(drive_t *d, const drive_params_t *p)
 {
-    uint16_t turns = (uint16_t)(d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p));
-    if (turns) {
+    if (d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p)) {
         drive_turns(d, (int16_t)-d->direction);
         startup_ramp_from_here(d, p);
     }
-    return turns;
 }
 
 /** The controller's trim, every rare step in closed loop. */

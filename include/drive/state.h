@@ -7,7 +7,7 @@
 /** Enters a state; its clock begins anew. While a fault is kept, every way leads to FAULT: only drive_clear_fault() opens it. */
 NOINLINE void drive_enter(drive_t *d, drive_state_t next)
 {
-    uint16_t state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
+    uint16_t state = (uint16_t)((d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
     d->state = state;
     SELFTEST_KEEP(d, state, state);
     d->periods = 0;

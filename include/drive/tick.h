@@ -84,7 +84,7 @@ QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
     } else if (state == (uint16_t)DRIVE_CATCH) {
         catch_step(d, p);
     } else if (state == (uint16_t)DRIVE_STOPPING) {
-        (void)speed_turn_round(d, p);
+        speed_turn_round(d, p);
     } else {
         /* the others are left elsewhere */
     }
