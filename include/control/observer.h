@@ -185,7 +185,7 @@ QM_INLINE QM_WRAPS int16_t observer_innovation(observer_t *o, const observer_par
     /* rounded: a count of `more` is 2 electrical rpm, so that half of one would be an offset of the speed */
     int16_t more = qm_clamp(qm_hi((int32_t)qm_turn_add(qm_turn_sub(turned, 8u * expected), 32768u)), -8192, 8191);
     o->rho_q32 = rho_q32;
-    return qm_limit((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), p->innovation_max_erpm);
+    return qm_limit_called((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), p->innovation_max_erpm);
 }
 
 /** By how much the load's estimate falls: innovation * rate^2 in all its bits, for a slow rate's square is below a word's last.

@@ -215,6 +215,12 @@ QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
     return x;
 }
 
+/** The same as one called copy. */
+NOINLINE int16_t qm_limit_called(int16_t x, int16_t most)
+{
+    return qm_limit(x, most);
+}
+
 /** (a + b) / 2, rounded toward minus infinity, in 16 bits. */
 QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
 {

@@ -61,7 +61,7 @@ QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
     id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13);
-    c->ref_q13.d = qm_limit(id_q13, id_max);
+    c->ref_q13.d = qm_limit_called(id_q13, id_max);
     c->iq_limit_q13 = limits_beside(p, (uint16_t)qm_size(c->ref_q13.d));
 }
 
@@ -83,7 +83,7 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
 QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
 {
     if ((iq_q13 ^ speed) < 0) {
-        return qm_limit(iq_q13, c->brake_limit_q13);
+        return qm_limit_called(iq_q13, c->brake_limit_q13);
     }
     return iq_q13;
 }
