@@ -34,7 +34,7 @@ NOINLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t
 }
 
 /** How long a rotor takes for CATCH_PAUSE_TURN. @param flux_q11 of a look @param samples that it took, the first of a part of a period */
-QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)
+NOINLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)
 {
     int16_t alpha = qm_size(flux_q11.alpha), beta = qm_size(flux_q11.beta);
     int16_t length = (int16_t)((alpha > beta) ? alpha + (beta >> 2) : beta + (alpha >> 2)); /* to 11 per cent */
@@ -50,7 +50,7 @@ QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, 
 }
 
 /** Speed from a turn. @param size of the turn, 0..32767 @return not negative */
-QM_INLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t size, uint16_t half_periods)
+NOINLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t size, uint16_t half_periods)
 {
     /* turn 2^16 / (half_periods / 2) / deltat, with what divides brought into a word */
     uint32_t part = (uint32_t)(uint16_t)size << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
