@@ -199,7 +199,7 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
 
 /* wcet: catch_step/catch_preset_estimator excludes catch_look calibration_step startup_bootstrap */
 /** In CATCH, every slow step: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
-NOINLINE void catch_step(drive_t *d, const drive_params_t *p)
+QM_INLINE void catch_step(drive_t *d, const drive_params_t *p)
 {
     if (d->run.catching.step != (uint16_t)CATCH_SEEN || d->periods < CATCH_PAUSE_LEAST) { /* the look's current goes first */
         return;

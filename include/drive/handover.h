@@ -77,7 +77,7 @@ QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_
 /** In RAMP, every slow step: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
  *  again, the rotor is blocked or the constants are off: the rest of the ramp is quicker. */
-NOINLINE void handover_wait(drive_t *d, const drive_params_t *p)
+QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
     int16_t forced, seen, ahead, most;
@@ -118,7 +118,7 @@ NOINLINE void handover_preset(drive_t *d, const drive_params_t *p, angle_t angle
 
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
  *  those of the next sample. */
-NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
+QM_INLINE void handover_now(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
     handover_t *h = &d->run.handover;
@@ -165,7 +165,7 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 }
 
 /** What is left of the angle offset falls every rare step, while there is any; its d current follows. */
-NOINLINE void handover_decay(handover_t *h)
+QM_INLINE void handover_decay(handover_t *h)
 {
     int16_t offset = h->offset;
     sincos_t turn;

@@ -209,7 +209,7 @@ QM_INLINE void protection_count_dip(drive_run_t *run, uint16_t dips)
  *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
  *  again: soon after a dip of the speed.
  *  Every seldom step in closed loop. */
-NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
+QM_INLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_size(run->control.reference_erpm);
