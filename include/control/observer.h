@@ -151,7 +151,7 @@ QM_INLINE q15_t observer_loaded(const observer_t *o, const observer_params_t *p,
 {
     int16_t held = qm_size(qm_hi(o->load_q16)), flows = qm_size(qm_mulhi_su(iq_q13, p->per_current_q16));
     int16_t load = (int16_t)(((held < flows) ? held : flows) - p->load_from);
-    return (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
+    return (int16_t)(qm_clamp_called(load, 0, p->load_width) * p->load_slope_q15);
 }
 
 /** The rate for the next step. @param speed magnitude of the speed reference @param iq_q13 q current asked for, above -32768 */

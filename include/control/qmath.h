@@ -123,6 +123,12 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
     return (x < low) ? low : x;
 }
 
+/** The same as one called copy. */
+NOINLINE int16_t qm_clamp_called(int16_t x, int16_t low, int16_t high)
+{
+    return qm_clamp(x, low, high);
+}
+
 /** x limited to low..high, its upper word. */
 NOINLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 {

@@ -179,7 +179,7 @@ QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const driv
 {
     int16_t most = limits_beside(p, salient_current_beside(run, p, run->probe_most_q13));
     /* products in C: constants */
-    most = qm_clamp(most, (int16_t)(((int32_t)p->current_max_q13 * PROBE_LEAST_Q15) >> 15), (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
+    most = qm_clamp_called(most, (int16_t)(((int32_t)p->current_max_q13 * PROBE_LEAST_Q15) >> 15), (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
 #if MOTOR_SALIENCY_UH
     most = (int16_t)((most + run->probe_most_q13) / 2);
 #endif
@@ -187,7 +187,7 @@ QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const driv
 }
 
 /** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
-QM_INLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
+NOINLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t least = (int16_t)(qm_size(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
     return (least < standing) ? standing : least;
@@ -231,7 +231,7 @@ QM_INLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
         steps = (uint16_t)((steps < PROBE_PAUSE_STEPS && run->dip_steps != PROBE_DIP_STEPS) ? steps + 1u : 0u);
     }
     run->probe_steps = steps;
-    run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
+    run->probe_id_q13 = qm_clamp_called(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
 }
 
 /** Stall and lost lock: conditions that must not last. Every rare step in closed loop. */
