@@ -10,7 +10,7 @@
 /** The next speed reference. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->state == (uint16_t)DRIVE_STOPPING || !mode_reference_step(d, p)) {
+    if (!mode_reference_step(d, p)) {
         reference_step(d, p, mode_speed_target(d, p), p->speed_ramp_q16);
     }
 }
