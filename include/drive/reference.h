@@ -4,7 +4,7 @@
 
 #include "drive/drive.h"
 
-/** 1 while the motor is near enough to the reference, which a target draws up or down: field weakening is indexed by it, so it must stay true. */
+/** 1 while the motor is near enough to the reference, on the side of the target: field weakening is indexed by it, so it must stay true. */
 QM_INLINE int16_t reference_may_move(const drive_t *d, const drive_params_t *p, speed_erpm_t target)
 {
     const speed_erpm_t reference = d->run.control.reference_erpm;
