@@ -164,7 +164,7 @@ NOINLINE void estimator_follow(estimator_t *e, const estimator_params_t *p)
     if (qm_beyond(speed, p->decimate_erpm)) {
         turns = qm_hi(e->e_q_q28);
     }
-    e->sign = (int16_t)((turns >> 15) | 1);
+    e->sign = (int16_t)(qm_hi(turns) | 1);
     e->old_turn_q16_rad = (int16_t)(7 * qm_limit_called(qm_mulhi_su(speed, p->half_step_q16_rad), 4681)); /* 0.5 rad at most */
 }
 

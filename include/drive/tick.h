@@ -93,13 +93,12 @@ QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
 /** What the start does every slow step. */
 QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
 {
-    const uint16_t state = d->state;
-    if (!MODE_ALIGNS || (state != (uint16_t)DRIVE_ALIGN && state != (uint16_t)DRIVE_RAMP)) { /* nothing turns, or the mode turns it */
+    if (!MODE_ALIGNS || !drive_is_running(d)) { /* nothing turns, or the mode turns it */
         return;
     }
     if (!d->command.run) { /* letting go is harmless at these speeds */
         drive_enter(d, DRIVE_STOPPED);
-    } else if (state == (uint16_t)DRIVE_RAMP) {
+    } else if (d->state == (uint16_t)DRIVE_RAMP) {
         handover_wait(d, p);
     } else {
         startup_align(d, p);
