@@ -122,10 +122,11 @@ void BOARD_ISR _T2Interrupt(void)
         if (duties_are_the_laws()) {
             P1OVDCON = BOARD_OUTPUTS_PWM;
         }
-    } else if (!drive_is_running(&board_drive)) {
-        board_set_idle_outputs(drive_outputs(&board_drive));
     } else {
-        /* the bridge begins to switch when its first duties are written */
+        uint16_t outputs = drive_outputs(&board_drive);
+        if (outputs != (uint16_t)OUTPUTS_PWM) { /* the bridge begins to switch when its first duties are written */
+            board_set_idle_outputs(outputs);
+        }
     }
     if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */
         pwm_outputs_off();

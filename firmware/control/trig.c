@@ -36,7 +36,7 @@ angle_t trig_direction(int16_t x, int16_t y)
     }
     /* atan r = r pi/4 + 0.273 r (1 - r), within 0.22 degrees */
     r = (least == most) ? 32767 : qm_share(least, most);
-    angle = (angle_t)(((uint16_t)r >> 2) + (uint16_t)qm_hi(2 * qm_mulss(qm_hi(2 * qm_mulss(r, (int16_t)(32767 - r))), 2847)));
+    angle = (angle_t)(((uint16_t)r >> 2) + (uint16_t)qm_mulhi(qm_mulhi_su(r, (uint16_t)((uint16_t)(32767 - r) << 1)), 5694));
     angle = steep ? (angle_t)(0x4000u - angle) : angle;
     angle = (x < 0) ? (angle_t)(0x8000u - angle) : angle;
     return (y < 0) ? (angle_t)~angle : angle; /* to a count */

@@ -160,9 +160,12 @@ QM_INLINE void estimator_commanded(estimator_t *e, alphabeta_t v_q13)
  *  difference. */
 NOINLINE void estimator_follow(estimator_t *e, const estimator_params_t *p)
 {
-    speed_erpm_t speed = estimator_speed(e);
-    e->sign = (int16_t)(((qm_beyond(speed, p->decimate_erpm) ? qm_hi(e->e_q_q28) : speed) >= 0) ? 1 : -1);
-    e->old_turn_q16_rad = (int16_t)(7 * qm_limit(qm_mulhi_su(speed, p->half_step_q16_rad), 4681)); /* 0.5 rad at most */
+    int16_t speed = estimator_speed(e), turns = speed;
+    if (qm_beyond(speed, p->decimate_erpm)) {
+        turns = qm_hi(e->e_q_q28);
+    }
+    e->sign = (int16_t)(qm_hi(turns) | 1);
+    e->old_turn_q16_rad = (int16_t)(7 * qm_limit_called(qm_mulhi_su(speed, p->half_step_q16_rad), 4681)); /* 0.5 rad at most */
 }
 
 /** Three quarters of the current of six periods ago and a quarter of that of eight: the current of 6.5 periods ago, which is eight before the

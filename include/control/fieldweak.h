@@ -76,7 +76,7 @@ void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, const fieldwea
 QM_INLINE void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, voltage_q14_t free_q14, speed_erpm_t speed_erpm)
 {
     int16_t step = p->trim_step_q13;
-    if (qm_abs(speed_erpm) > p->trim_speed_erpm) {
+    if (qm_beyond(speed_erpm, p->trim_speed_erpm)) {
         step = qm_clamp((int16_t)(free_q14 >> FIELDWEAK_TRIM_SHIFT), (int16_t)-FIELDWEAK_TRIM_MOST, p->trim_step_q13);
     }
     fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 + step), (int16_t)-p->trim_max_q13, 0);

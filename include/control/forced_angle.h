@@ -21,16 +21,15 @@ typedef struct {
 /** Accelerates. @param direction +1 or -1 @param periods 1 or 2, since the last time @return nonzero at the end speed */
 QM_INLINE QM_WRAPS int16_t forced_angle_accelerate(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction, uint16_t periods)
 {
-    int16_t at_end = 0;
+    int32_t speed_q10 = f->speed_q10 + qm_mulsu(f->increase_q10, periods);
     uint32_t step_q32;
-    f->speed_q10 += qm_mulsu(f->increase_q10, periods);
-    if (f->speed_q10 >= p->end_speed_q10) {
-        f->speed_q10 = p->end_speed_q10;
-        at_end = 1;
+    if (speed_q10 > p->end_speed_q10) {
+        speed_q10 = p->end_speed_q10;
     }
-    step_q32 = (uint32_t)qm_shift(f->speed_q10, 6);
+    f->speed_q10 = speed_q10;
+    step_q32 = (uint32_t)qm_shift(speed_q10, 6);
     f->step_q32 = (direction >= 0) ? step_q32 : 0u - step_q32;
-    return at_end;
+    return (int16_t)(speed_q10 == p->end_speed_q10);
 }
 
 /** A period passes. */

@@ -72,16 +72,22 @@ QM_INLINE current_q13_t observer_load(const observer_t *o, const observer_params
     return (int16_t)(2 * qm_hi(load_q28) + (int16_t)((((uint16_t)load_q28 >> 14) + 1u) >> 1)); /* rounded to Q13 */
 }
 
-/** 1 while nothing changes fast: the innovation has been small for some 50 ms. */
-QM_INLINE uint16_t observer_is_calm(const observer_t *o)
+/** Nonzero while something changes fast: the innovation has been large in the last 50 ms or so. */
+QM_INLINE uint16_t observer_is_stirred(const observer_t *o)
 {
-    return (uint16_t)(o->quick_q15 < 4096);
+    return (uint16_t)((uint16_t)o->quick_q15 >> 12);
 }
 
-/** a + (b - a) * share; b - a fits a word. */
+/** 1 while nothing does. */
+QM_INLINE uint16_t observer_is_calm(const observer_t *o)
+{
+    return (uint16_t)(observer_is_stirred(o) == 0u);
+}
+
+/** a + (b - a) * share; b - a fits a word. @param share 0..1 */
 QM_INLINE int16_t observer_between(int16_t a, int16_t b, q15_t share)
 {
-    return (int16_t)(a + qm_hi(2 * qm_mulss((int16_t)(b - a), share)));
+    return (int16_t)(a + qm_mulhi_su((int16_t)(b - a), (uint16_t)(2u * (uint16_t)share)));
 }
 
 /** 2 * share, at most 1. @param share 0..1 */
@@ -93,7 +99,7 @@ QM_INLINE q15_t observer_twice(q15_t share)
 #define OBSERVER_FASTEST 32700u
 
 /** The speed and a change of it, within the format. @param change at most 2^30 */
-QM_INLINE QM_WRAPS int32_t observer_sum(int32_t omega_q16, int32_t change)
+NOINLINE QM_WRAPS int32_t observer_sum(int32_t omega_q16, int32_t change)
 {
 #ifdef __FRAMAC__ /* what it means */
     const int32_t fastest_q16 = (int32_t)OBSERVER_FASTEST * 65536;
@@ -120,11 +126,20 @@ QM_INLINE void observer_preset(observer_t *o, const observer_params_t *p, uint32
     o->unrest_steps = OBSERVER_START_UNREST;
 }
 
-/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 */
+/** What counts as a large innovation after so much unrest: up to 16 times as much.
+ *  @param calm_erpm 0..32767 @param unrest_steps some thousand at most */
 QM_INLINE int16_t observer_large(int16_t calm_erpm, uint16_t unrest_steps)
 {
-    int32_t large = calm_erpm + (qm_mulsu(calm_erpm, unrest_steps) >> OBSERVER_UNREST_SHIFT);
-    return (int16_t)((large > 32767) ? 32767 : large);
+    uint32_t large = qm_muluu((uint16_t)calm_erpm, (uint16_t)(unrest_steps + (1u << OBSERVER_UNREST_SHIFT)));
+    int16_t limited = 32767;
+#ifdef __FRAMAC__ /* what it means */
+    if (large < 32768ul << OBSERVER_UNREST_SHIFT) {
+#else
+    if (((uint16_t)(large >> 16) >> (OBSERVER_UNREST_SHIFT - 1)) == 0u) {
+#endif
+        limited = (int16_t)(large >> OBSERVER_UNREST_SHIFT);
+    }
+    return limited;
 }
 
 /** As much unrest as at the hand-over, at least. */
@@ -137,31 +152,31 @@ QM_INLINE void observer_unsettle(observer_t *o)
 
 /** How much of a load there is: 0 as without any, 1 where it and the current that flows for it are clear of what dead time leaves. A load that
  *  only slows the rotor down takes no current.
- *  @param iq_q13 q current asked for, any */
+ *  @param iq_q13 q current asked for, above -32768 */
 QM_INLINE q15_t observer_loaded(const observer_t *o, const observer_params_t *p, current_q13_t iq_q13)
 {
-    int16_t held = qm_abs(qm_hi(o->load_q16)), flows = qm_abs(qm_mulhi_su(iq_q13, p->per_current_q16));
+    int16_t held = qm_size(qm_hi(o->load_q16)), flows = qm_size(qm_mulhi_su(iq_q13, p->per_current_q16));
     int16_t load = (int16_t)(((held < flows) ? held : flows) - p->load_from);
-    return (int16_t)(qm_clamp(load, 0, p->load_width) * p->load_slope_q15);
+    return (int16_t)(qm_clamp_called(load, 0, p->load_width) * p->load_slope_q15);
 }
 
-/** The rate for the next step. @param ref_erpm speed reference, any @param iq_q13 q current asked for, any */
-QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t ref_erpm, current_q13_t iq_q13)
+/** The rate for the next step. @param speed magnitude of the speed reference @param iq_q13 q current asked for, above -32768 */
+QM_INLINE void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    int16_t speed = qm_abs(ref_erpm), rate, wrong;
-    q15_t loaded = observer_loaded(o, p, iq_q13);
+    int16_t rate, wrong = (int16_t)(p->large_erpm + (speed >> 5));
+    q15_t loaded = observer_loaded(o, p, iq_q13), share = 32767;
 
-    o->share_q15 = 32767;
     if (speed < p->full_erpm) {
-        o->share_q15 = (int16_t)qm_divud((uint32_t)(uint16_t)speed << 15, (uint16_t)p->full_erpm);
+        share = qm_share((uint16_t)speed, (uint16_t)p->full_erpm);
     }
-    rate = observer_between(0, p->quiet_q16, o->share_q15);
+    rate = observer_between(0, p->quiet_q16, share);
     /* under load the back-EMF is clean, and half the speed is enough */
-    o->share_q15 = observer_between(o->share_q15, observer_twice(o->share_q15), loaded);
-    rate = observer_between(rate, observer_between(0, p->loaded_q16, o->share_q15), loaded);
-    o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, o->share_q15), o->quick_q15);
+    share = observer_between(share, observer_twice(share), loaded);
+    o->share_q15 = share;
+    rate = observer_between(rate, observer_between(0, p->loaded_q16, share), loaded);
+    o->rate_q16 = observer_between(rate, observer_between(0, p->quick_q16, share), o->quick_q15);
     /* without load dead time may make a light rotor hunt for long: twice as much is not wrong then */
-    wrong = qm_clamp((int16_t)(p->large_erpm + (speed >> 5)), 0, 16383);
+    wrong = (int16_t)((wrong > 16383) ? 16383 : wrong);
     o->wrong_erpm = observer_between((int16_t)(2 * wrong), wrong, loaded);
     o->large_erpm = observer_large((int16_t)(observer_between(p->large_erpm, p->large_loaded_erpm, loaded) + (speed >> 5)), o->unrest_steps);
 }
@@ -176,7 +191,7 @@ QM_INLINE QM_WRAPS int16_t observer_innovation(observer_t *o, const observer_par
     /* rounded: a count of `more` is 2 electrical rpm, so that half of one would be an offset of the speed */
     int16_t more = qm_clamp(qm_hi((int32_t)qm_turn_add(qm_turn_sub(turned, 8u * expected), 32768u)), -8192, 8191);
     o->rho_q32 = rho_q32;
-    return qm_limit((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), p->innovation_max_erpm);
+    return qm_limit_called((int16_t)((qm_mulss(more, p->per_turn_q12) + 2048) >> 12), p->innovation_max_erpm);
 }
 
 /** By how much the load's estimate falls: innovation * rate^2 in all its bits, for a slow rate's square is below a word's last.
@@ -190,21 +205,24 @@ QM_INLINE int32_t observer_load_step(const observer_params_t *p, int16_t innovat
 /** What a step's innovation calls for: in full from one and a half of what is large; none while it is the loop's own swing. */
 QM_INLINE void observer_answer(observer_t *o, int16_t innovation)
 {
+    const uint16_t stirred = observer_is_stirred(o);
+    uint16_t unrest = o->unrest_steps;
     q15_t level = 0;
-    if (!observer_is_calm(o)) {
-        o->unrest_steps = (uint16_t)((o->unrest_steps < 4u * OBSERVER_UNREST_STEPS) ? o->unrest_steps + 4u : o->unrest_steps);
-    } else if (o->unrest_steps != 0u) {
-        o->unrest_steps--;
+    if (stirred) {
+        unrest = (uint16_t)((unrest < 4u * OBSERVER_UNREST_STEPS) ? unrest + 4u : unrest);
+    } else if (unrest != 0u) {
+        unrest--;
     } else {
         /* calm for long */
     }
-    if (qm_size(innovation) > o->large_erpm && (o->unrest_steps < OBSERVER_UNREST_STEPS || observer_is_calm(o))) {
-        if ((innovation ^ o->large_last_erpm) < 0 && !observer_is_calm(o)) {
-            o->unrest_steps = OBSERVER_UNREST_STEPS;
+    if (qm_size(innovation) > o->large_erpm && (!stirred || unrest < OBSERVER_UNREST_STEPS)) {
+        if (stirred && (innovation ^ o->large_last_erpm) < 0) {
+            unrest = OBSERVER_UNREST_STEPS;
         }
         o->large_last_erpm = innovation;
         level = (int16_t)((qm_size(innovation) - (o->large_erpm >> 1) > o->large_erpm) ? 32767 : OBSERVER_HALF_Q15);
     }
+    o->unrest_steps = unrest;
     o->quick_q15 = (int16_t)(o->quick_q15 - (o->quick_q15 >> OBSERVER_CALM_SHIFT));
     if (o->quick_q15 < level) {
         o->quick_q15 = level;

@@ -62,7 +62,7 @@ QM_INLINE int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_
 /** Presets the integrator so that the next step returns out for the error err: a bumpless take-over. */
 QM_INLINE void pi_preset(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t out)
 {
-    pi->sum = qm_mulss(out, (int16_t)(1u << gains->shift)) - qm_mulss(err, gains->kp);
+    pi->sum = qm_mulss(out, (int16_t)(1u << gains->shift)) - (int32_t)err * gains->kp; /* in C: no error costs nothing */
 }
 
 #endif

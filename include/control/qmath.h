@@ -132,20 +132,30 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
     return (x < low) ? low : x;
 }
 
-/** x limited to low..high, its upper word. */
-QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
+/** The same as one called copy. */
+NOINLINE int16_t qm_clamp_called(int16_t x, int16_t low, int16_t high)
 {
-    int32_t least = (int32_t)low * 65536, most = (int32_t)high * 65536;
+    return qm_clamp(x, low, high);
+}
+
+/** x limited to low..high, its upper word. */
+NOINLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
+{
 #ifdef __FRAMAC__ /* what it means */
+    int32_t least = (int32_t)low * 65536, most = (int32_t)high * 65536;
     if (x > most) {
         return most;
     }
     return (x < least) ? least : x;
 #else
-    if (qm_hi(x) >= high) { /* the upper word tells it all: just at the end it is the end */
-        return most;
+    int16_t end = high;
+    if (qm_hi(x) < high) { /* the upper word tells it all: just at the end it is the end */
+        if (qm_hi(x) >= low) {
+            return x;
+        }
+        end = low;
     }
-    return (qm_hi(x) < low) ? least : x;
+    return (int32_t)end * 65536;
 #endif
 }
 
@@ -218,6 +228,12 @@ QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
         return qm_with_sign(most, x);
     }
     return x;
+}
+
+/** The same as one called copy. */
+NOINLINE int16_t qm_limit_called(int16_t x, int16_t most)
+{
+    return qm_limit(x, most);
 }
 
 /** (a + b) / 2, rounded toward minus infinity, in 16 bits. */

@@ -52,6 +52,15 @@ QM_INLINE alphabeta_t inverse_park(dq_t x, sincos_t sc)
     return r;
 }
 
+/** The same of a vector along the q axis. */
+QM_INLINE alphabeta_t inverse_park_q(int16_t q, sincos_t sc)
+{
+    alphabeta_t r;
+    r.alpha = qm_hi(-qm_mulss(q, sc.sin));
+    r.beta = qm_hi(qm_mulss(q, sc.cos));
+    return r;
+}
+
 /** x turned by a small angle: error a^2/2. @param a_q16_rad angle in radians * 65536, +-0.5 rad */
 QM_INLINE dq_t dq_turn(dq_t x, int16_t a_q16_rad)
 {

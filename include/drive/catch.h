@@ -34,58 +34,56 @@ NOINLINE int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t
 }
 
 /** How long a rotor takes for CATCH_PAUSE_TURN. @param flux_q11 of a look @param samples that it took, the first of a part of a period */
-QM_INLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)
+NOINLINE uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)
 {
     int16_t alpha = qm_size(flux_q11.alpha), beta = qm_size(flux_q11.beta);
     int16_t length = (int16_t)((alpha > beta) ? alpha + (beta >> 2) : beta + (alpha >> 2)); /* to 11 per cent */
     uint16_t half_emf_q12 = qm_divud(qm_muluu((uint16_t)length, 4u), (uint16_t)(4u * samples - 1u));
-    int16_t emf_q12 = (int16_t)((half_emf_q12 > 16383u) ? 32767 : (int16_t)(2u * half_emf_q12));
-    speed_erpm_t speed = estimator_omega(emf_q12, run->model.emf_sum_max_q12, run->model.inv_kfi);
+    uint16_t sum_max_q12 = (uint16_t)run->model.emf_sum_max_q12;
+    uint16_t emf_q12 = (half_emf_q12 > sum_max_q12 >> 1) ? sum_max_q12 : (uint16_t)(2u * half_emf_q12);
+    speed_erpm_t speed = (int16_t)(qm_mulss((int16_t)emf_q12, run->model.inv_kfi) >> 11); /* estimator_omega() within its limit */
     uint16_t step = (uint16_t)qm_mulhi(speed, p->estimator.deltat_q32), pause = CATCH_PAUSE_MOST;
 
-    if (step != 0u) {
+    if (step > CATCH_PAUSE_TURN / CATCH_PAUSE_MOST) {
         pause = qm_divud(CATCH_PAUSE_TURN, step);
-    }
-    if (pause > CATCH_PAUSE_MOST) {
-        return CATCH_PAUSE_MOST;
     }
     return (pause < CATCH_PAUSE_LEAST) ? CATCH_PAUSE_LEAST : pause;
 }
 
-/** Speed from a turn. @return within 16 bits */
-QM_INLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t turn, uint16_t half_periods)
+/** Speed from a turn. @param size of the turn, 0..32767 @return not negative */
+NOINLINE speed_erpm_t catch_speed(const drive_params_t *p, int16_t size, uint16_t half_periods)
 {
     /* turn 2^16 / (half_periods / 2) / deltat, with what divides brought into a word */
-    uint32_t part = (uint32_t)(uint16_t)qm_abs(turn) << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
-    int16_t speed = INT16_MAX;
-    while (whole > 65535ul) { /* wcet: at most 15 turns */
+    uint32_t part = (uint32_t)(uint16_t)size << 16, whole = qm_muluu(half_periods, (uint16_t)p->estimator.deltat_q32) >> 1;
+    while ((uint16_t)(whole >> 16) != 0u) { /* wcet: at most 15 turns */
         whole >>= 1;
         part >>= 1;
     }
-    if ((part >> 15) < whole) {
-        speed = (int16_t)qm_divud(part, (uint16_t)whole);
+    if ((uint16_t)(part >> 15) < (uint16_t)whole) {
+        return (int16_t)qm_divud(part, (uint16_t)whole);
     }
-    return (int16_t)((turn < 0) ? -speed : speed);
+    return INT16_MAX;
 }
 
-/** The second look has ended: the turn since the first one. @return 1 if the rotor turns */
-QM_INLINE uint16_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
+/** The second look has ended: the turn since the first one.
+ *  @return what comes next: no look, nothing more to see, or the first look again after a pause */
+QM_INLINE catch_step_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
 {
     drive_run_t *run = &d->run;
     catch_t *c = &run->catching;
-    int16_t turn = (int16_t)(angle_t)(direction - c->direction);
+    int16_t turn = (int16_t)(angle_t)(direction - c->direction), size = qm_abs(turn), speed;
 
-    if (qm_abs(turn) < CATCH_LEAST_TURN) {
-        return 0;
+    if (size < CATCH_LEAST_TURN) {
+        return CATCH_NO_LOOK;
     }
-    run->estimator.omega_erpm = catch_speed(p, turn, (uint16_t)(c->half_periods + samples));
-    c->pause = 0;
-    c->step = (uint16_t)CATCH_SEEN;
-    if (qm_size(run->estimator.omega_erpm) > p->maximum_erpm) { /* it is waited for */
+    speed = catch_speed(p, size, (uint16_t)(c->half_periods + samples));
+    run->estimator.omega_erpm = qm_with_sign(speed, turn);
+    if (speed > p->maximum_erpm) {
         c->pause = CATCH_PAUSE_MOST;
-        c->step = (uint16_t)CATCH_FIRST_LOOK;
+        return CATCH_FIRST_LOOK;
     }
-    return 1;
+    c->pause = 0;
+    return CATCH_SEEN;
 }
 
 /* wcet: catch_look excludes drive_update_model adaptation_learn handover_decay svm_compensation */
@@ -95,7 +93,8 @@ QM_INLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
     catch_t *c = &d->run.catching;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), flux;
     int16_t most = (int16_t)(p->current_max_q13 / 5), alpha = qm_size(i.alpha), beta = qm_size(i.beta);
-    uint16_t samples = d->periods, turns;
+    uint16_t samples = d->periods;
+    catch_step_t next = CATCH_NO_LOOK; /* it stands */
     angle_t direction;
 
     c->sum_q11.alpha = (int16_t)(c->sum_q11.alpha + (i.alpha >> 3));
@@ -106,24 +105,21 @@ QM_INLINE uint16_t catch_look(drive_t *d, const drive_params_t *p)
     flux.alpha = catch_flux_q11(&d->run, &p->estimator, i.alpha, c->sum_q11.alpha);
     flux.beta = catch_flux_q11(&d->run, &p->estimator, i.beta, c->sum_q11.beta);
     direction = trig_direction((int16_t)-flux.alpha, (int16_t)-flux.beta);
-    turns = (uint16_t)(samples < CATCH_LOOK_PERIODS || qm_size(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_size(c->sum_q11.beta) >= CATCH_STANDS_Q11);
-    if (turns && c->step == (uint16_t)CATCH_FIRST_LOOK) {
-        c->pause = catch_pause(&d->run, p, flux, samples);
-        c->half_periods = (uint16_t)(samples + 2u * c->pause);
-        c->step = (uint16_t)CATCH_SECOND_LOOK;
-    } else if (turns) {
-        turns = catch_see(d, p, direction, samples);
+    if (samples < CATCH_LOOK_PERIODS || qm_size(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_size(c->sum_q11.beta) >= CATCH_STANDS_Q11) {
+        if (c->step == (uint16_t)CATCH_FIRST_LOOK) {
+            c->pause = catch_pause(&d->run, p, flux, samples);
+            samples = (uint16_t)(samples + 2u * c->pause);
+            next = CATCH_SECOND_LOOK;
+        } else {
+            next = catch_see(d, p, direction, samples);
+        }
         c->half_periods = samples;
-    } else {
-        /* it stands */
     }
-    if (!turns) {
-        c->step = (uint16_t)CATCH_NO_LOOK;
-    }
+    c->step = (uint16_t)next;
     c->direction = direction;
     c->sum_q11.alpha = 0;
     c->sum_q11.beta = 0;
-    return turns;
+    return (uint16_t)(next != CATCH_NO_LOOK);
 }
 
 /** 1 with the bus so high that switching anything on would trip: a very fast rotor holds it there through the diodes. */
@@ -169,7 +165,8 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
     drive_run_t *run = &d->run;
     estimator_t *e = &run->estimator;
     const catch_t *c = &run->catching;
-    int16_t ahead = (int16_t)((e->omega_erpm >= 0) ? 0x4000 : -0x4000), emf;
+    int16_t ahead = qm_with_sign(0x4000, e->omega_erpm);
+    uint16_t emf, most;
     int32_t half_step_q32 = qm_mulss(e->omega_erpm, p->estimator.deltat_q32) / 2;
 
     e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
@@ -179,9 +176,11 @@ QM_INLINE QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t 
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
     estimator_follow(e, &p->estimator);
     drive_update_model(run, p, e->omega_erpm);
-    emf = (int16_t)qm_divud((uint32_t)(uint16_t)qm_size(e->omega_erpm) << 11, (uint16_t)run->model.inv_kfi);
-    e->e_q_q28 = (int32_t)((ahead >= 0) ? emf : -emf) * 65536;
-    run->control.v_q14.q = qm_limit((int16_t)(4 * qm_limit((int16_t)((ahead >= 0) ? emf : -emf), 8191)), d->circle.limit_q14);
+    emf = qm_divud(qm_muluu((uint16_t)qm_size(e->omega_erpm), 2048u), (uint16_t)run->model.inv_kfi);
+    e->e_q_q28 = (int32_t)qm_with_sign((int16_t)emf, ahead) * 65536;
+    emf = (uint16_t)(4u * ((emf > 8191u) ? 8191u : emf));
+    most = (uint16_t)d->circle.limit_q14;
+    run->control.v_q14.q = qm_with_sign((int16_t)((emf > most) ? most : emf), ahead);
 }
 
 /** In closed loop from the next period on, at the rotor's speed and without torque. */
@@ -190,19 +189,19 @@ QM_INLINE void catch_close(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
 
-    drive_turns(d, (int16_t)((run->estimator.omega_erpm >= 0) ? 1 : -1));
+    drive_turns(d, qm_with_sign(1, run->estimator.omega_erpm));
     c->reference_erpm = run->estimator.omega_erpm;
     c->ref_q13.d = run->fieldweak.table_q13;
     c->ref_q13.q = 0;
     c->v_q14.d = 0;
     handover_preset(d, p, estimator_next_angle(&run->estimator));
-    late_preset(run, inverse_park(c->v_q14, d->frame));
+    late_preset(run, inverse_park_q(c->v_q14.q, d->frame));
     drive_enter(d, DRIVE_CLOSED);
 }
 
 /* wcet: catch_step/catch_preset_estimator excludes catch_look calibration_step startup_bootstrap */
 /** In CATCH, every slow step: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
-NOINLINE void catch_step(drive_t *d, const drive_params_t *p)
+QM_INLINE void catch_step(drive_t *d, const drive_params_t *p)
 {
     if (d->run.catching.step != (uint16_t)CATCH_SEEN || d->periods < CATCH_PAUSE_LEAST) { /* the look's current goes first */
         return;

@@ -16,12 +16,14 @@
 #define HANDOVER_MOST_OFFSET 0x2000                                           /**< 45 degrees: so much torque of the current is no surprise to the estimator's frame */
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
- *  error of the estimator's angle into torque. */
-QM_INLINE void handover_release(drive_t *d, const drive_params_t *p)
+ *  error of the estimator's angle into torque. @return its magnitude */
+QM_INLINE current_q13_t handover_release(drive_t *d, const drive_params_t *p)
 {
     int16_t current = qm_size(d->run.control.ref_q13.q), least = (int16_t)(p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT);
     current = (int16_t)(current - (current >> HANDOVER_FALL_SHIFT) - (current >> (HANDOVER_FALL_SHIFT + 1)) - 1);
-    d->run.control.ref_q13.q = along_direction(d, (current < least) ? least : current);
+    current = (current < least) ? least : current;
+    d->run.control.ref_q13.q = along_direction(d, current);
+    return current;
 }
 
 /** 1 once the estimator has agreed with the forced speed for long enough. */
@@ -31,7 +33,7 @@ QM_INLINE uint16_t handover_agrees(const handover_t *h, const drive_params_t *p)
 }
 
 /** The forced angle's speed along the direction, counts of speed_erpm_t. */
-QM_INLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
+NOINLINE speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
 {
     int32_t erpm = qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> (11 - LATE_DUTIES);
     if (LATE_DUTIES) { /* the angle per period may be rounded up by more than a count of the largest speed */
@@ -48,12 +50,14 @@ QM_INLINE uint16_t handover_is_overdue(speed_erpm_t forced, const drive_params_t
 }
 
 /** 1 where the current pulls the rotor, or cannot fall further and the rotor has swung to where the floor pulls it: while it falls behind it is slower
- *  than the speed that the closed loop begins with, and loses more of it before the observer knows. @param ahead_erpm of the forced speed */
-QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, speed_erpm_t forced, int16_t ahead_erpm)
+ *  than the speed that the closed loop begins with, and loses more of it before the observer knows.
+ *  @param current_q13 its magnitude @param ahead_erpm of the forced speed */
+QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, current_q13_t current_q13, speed_erpm_t forced,
+                                   int16_t ahead_erpm)
 {
     int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
-    return (uint16_t)(qm_abs(offset) <= HANDOVER_MOST_OFFSET
-                      || (qm_size(d->run.control.ref_q13.q) <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
+    return (uint16_t)(!qm_beyond(offset, HANDOVER_MOST_OFFSET)
+                      || (current_q13 <= (p->open_loop_q13 >> HANDOVER_FLOOR_SHIFT) && ahead_erpm >= -(forced >> HANDOVER_SWUNG_SHIFT)));
 }
 
 /** While the estimator agrees: the speed waits, the current falls, and what the closed loop begins with is ready. A rotor that swings ahead is not braked.
@@ -61,9 +65,9 @@ QM_INLINE uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, sp
 QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_t forced, speed_erpm_t seen, int16_t ahead_erpm)
 {
     handover_t *h = &d->run.handover;
+    current_q13_t current = handover_release(d, p);
     d->forced.increase_q10 = 0;
-    handover_release(d, p);
-    h->is_due = handover_is_due(d, p, forced, ahead_erpm);
+    h->is_due = handover_is_due(d, p, current, forced, ahead_erpm);
     d->run.control.reference_erpm = along_direction(d, (seen > forced) ? seen : forced);
     if (!h->is_due && h->agreed_steps >= p->agree_steps + HANDOVER_MOST_STEPS(p)) {
         drive_raise(d, FAULT_START_FAILED);
@@ -74,7 +78,7 @@ QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_
 /** In RAMP, every slow step: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
  *  again, the rotor is blocked or the constants are off: the rest of the ramp is quicker. */
-NOINLINE void handover_wait(drive_t *d, const drive_params_t *p)
+QM_INLINE void handover_wait(drive_t *d, const drive_params_t *p)
 {
     handover_t *h = &d->run.handover;
     int16_t forced, seen, ahead, most;
@@ -115,13 +119,12 @@ NOINLINE void handover_preset(drive_t *d, const drive_params_t *p, angle_t angle
 
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
  *  those of the next sample. */
-NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
+QM_INLINE void handover_now(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
     handover_t *h = &d->run.handover;
     angle_t estimated = estimator_next_angle(&d->run.estimator);
     sincos_t turn;
-    dq_t x;
     alphabeta_t y;
 
     h->offset = (int16_t)(angle_t)(d->angle - estimated);
@@ -129,10 +132,8 @@ NOINLINE void handover_now(drive_t *d, const drive_params_t *p)
     y = inverse_park(c->v_q14, turn);
     c->v_q14.d = (int16_t)(2 * y.alpha);
     c->v_q14.q = (int16_t)(2 * y.beta);
-    x.d = 0;
-    x.q = c->ref_q13.q;
-    h->current_q13 = x.q;
-    y = inverse_park(x, turn);
+    h->current_q13 = c->ref_q13.q;
+    y = inverse_park_q(h->current_q13, turn);
     c->ref_q13.d = (int16_t)(2 * y.alpha);
     c->ref_q13.q = (int16_t)(2 * y.beta);
     h->id_q13 = c->ref_q13.d;
@@ -165,7 +166,7 @@ QM_INLINE void handover_observe(drive_run_t *run, const drive_params_t *p)
 }
 
 /** What is left of the angle offset falls every rare step, while there is any; its d current follows. */
-NOINLINE void handover_decay(handover_t *h)
+QM_INLINE void handover_decay(handover_t *h)
 {
     int16_t offset = h->offset;
     sincos_t turn;

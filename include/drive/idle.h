@@ -6,7 +6,7 @@
 #include "drive/catch.h"
 
 /** A period with the bridge off or charging its drivers, after its duties: each state says which comes next, the gate lets it in or not. */
-NOINLINE void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
+QM_INLINE void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {
     uint16_t next = d->state;
     switch (next) {

@@ -15,7 +15,10 @@
  *  current than it must, and one that costs speed takes what it needs. */
 QM_INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c)
 {
-    int16_t missing = (int16_t)((c->ref_q13.q >= 0) ? c->ref_q13.q - c->i_q13.q : c->i_q13.q - c->ref_q13.q);
+    int16_t missing = (int16_t)(c->ref_q13.q - c->i_q13.q);
+    if (c->ref_q13.q < 0) {
+        missing = (int16_t)-missing;
+    }
     return (int16_t)(c->vq_limit_q14 - qm_size(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
 }
 
@@ -40,18 +43,26 @@ QM_INLINE void limits_burn(drive_run_t *run, const drive_params_t *p)
     c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, p->burn_most_q13);
 }
 
+/** What MAXIMUM_CURRENT_A leaves beside a current of the other axis, by the circle table. @param other_q13 not negative */
+NOINLINE current_q13_t limits_beside(const drive_params_t *p, uint16_t other_q13)
+{
+    uint32_t ratio = qm_muluu(other_q13, p->current_max_reciprocal) >> 10;
+    if (ratio > 32767u) {
+        ratio = 32767u;
+    }
+    return qm_mulhi_su(p->current_max_q13, (uint16_t)(2u * (uint16_t)trig_circle((int16_t)ratio)));
+}
+
 /** d current: what is left of the hand-over, the table with its trim or what is burnt, the rotor's probe; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
     int16_t id_max = limits_asked_most(p), id_q13;
-    uint32_t ratio;
 
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
     id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13);
-    c->ref_q13.d = qm_limit(id_q13, id_max);
-    ratio = qm_muluu((uint16_t)qm_size(c->ref_q13.d), p->current_max_reciprocal) >> 10;
-    c->iq_limit_q13 = qm_hi(2 * qm_mulss(p->current_max_q13, trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio))));
+    c->ref_q13.d = qm_limit_called(id_q13, id_max);
+    c->iq_limit_q13 = limits_beside(p, (uint16_t)qm_size(c->ref_q13.d));
 }
 
 /** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: a filter's lag would let the bus
@@ -71,8 +82,8 @@ QM_INLINE void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t
 /** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
 QM_INLINE current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed, current_q13_t iq_q13)
 {
-    if ((iq_q13 ^ speed) < 0 && qm_size(iq_q13) > c->brake_limit_q13) {
-        return (int16_t)((iq_q13 < 0) ? -c->brake_limit_q13 : c->brake_limit_q13);
+    if ((iq_q13 ^ speed) < 0) {
+        return qm_limit_called(iq_q13, c->brake_limit_q13);
     }
     return iq_q13;
 }

@@ -23,7 +23,7 @@ QM_INLINE uint16_t model_is_taught(const drive_run_t *run)
 
 /** A step of the adaptation, every seldom step. At the end of the ramp, while the estimator is waited for, it may need a truer flux before it can
  *  lock, with flux, R and L all off; the current is nearly all d current there and says nothing of R. */
-NOINLINE void model_learn_step(drive_t *d, const drive_params_t *p)
+QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     voltage_q12_t ri_q12 = 0;

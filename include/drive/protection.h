@@ -2,6 +2,7 @@
 #ifndef DRIVE_PROTECTION_H
 #define DRIVE_PROTECTION_H
 
+#include "drive/limits.h"
 #include "drive/model.h"
 #include "drive/salient.h"
 
@@ -23,7 +24,7 @@ QM_INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
 QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
     drive_fault_t found;
-    if (drive_outputs(d) == (uint16_t)OUTPUTS_OFF && now_q15 < PROTECTION_BUS_END_Q15) {
+    if (!drive_conducts(d) && now_q15 < PROTECTION_BUS_END_Q15) {
         return;
     }
     if (now_q15 > p->bus_over_q15) {
@@ -38,6 +39,12 @@ QM_INLINE void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t
 
 #define PROTECTION_PHASE_SHIFT 6 /* 250 sums of a current above the trip level fit a word */
 #define PROTECTION_OPEN_SHIFT 2  /* a phase with less than a quarter of the largest current is open */
+
+/** A phase's sum with this period's current. */
+QM_INLINE uint16_t protection_phase_sum(uint16_t sum, current_q13_t i_q13)
+{
+    return (uint16_t)(sum + ((uint16_t)qm_size(i_q13) >> PROTECTION_PHASE_SHIFT));
+}
 
 /** Which signal is wrong: currents that do not fit the motor, with or without a phase that carries hardly any. */
 QM_INLINE drive_fault_t protection_wrong_signal(const drive_run_t *run)
@@ -63,9 +70,11 @@ QM_INLINE voltage_q12_t protection_ri(const drive_params_t *p, int16_t i_q13)
 QM_INLINE uint16_t protection_voltage_is_unexplained(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
-    int32_t explained_q12 = (int32_t)qm_size(emf.q) + protection_ri(p, qm_size(i.d)) + protection_ri(p, qm_size(i.q))
-                            + (int32_t)PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12;
-    return (uint16_t)(qm_size(emf.d) > explained_q12);
+    int16_t unturned_q12 = (int16_t)(qm_size(emf.d) - qm_size(emf.q)); /* beyond a back-EMF in its direction */
+    /* fits a word: no current flows for which R takes more voltage than there is */
+    uint16_t ri_q12 = (uint16_t)((uint16_t)protection_ri(p, qm_size(i.d)) + (uint16_t)protection_ri(p, qm_size(i.q)));
+    uint16_t dead_q12 = (uint16_t)(PROTECTION_DEAD_TIMES * p->adaptation.emf_least_q12);
+    return (uint16_t)(unturned_q12 > 0 && (uint16_t)unturned_q12 > ri_q12 + dead_q12);
 }
 
 #define PROTECTION_BLUR_SHIFT 2 /* dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below */
@@ -85,7 +94,6 @@ QM_INLINE uint16_t protection_stop_is_blurred(const drive_t *d, const drive_para
 NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    uint16_t a = (uint16_t)qm_size(d->phases_q13.a), b = (uint16_t)qm_size(d->phases_q13.b), c = (uint16_t)qm_size(d->phases_q13.c);
     if (protection_voltage_is_unexplained(run, p)) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + PROTECTION_UNEXPLAINED);
     }
@@ -95,9 +103,9 @@ NOINLINE void protection_check_signals(drive_t *d, const drive_params_t *p)
         run->phase_sums[2] = 0;
         return;
     }
-    run->phase_sums[0] = (uint16_t)(run->phase_sums[0] + (a >> PROTECTION_PHASE_SHIFT));
-    run->phase_sums[1] = (uint16_t)(run->phase_sums[1] + (b >> PROTECTION_PHASE_SHIFT));
-    run->phase_sums[2] = (uint16_t)(run->phase_sums[2] + (c >> PROTECTION_PHASE_SHIFT));
+    run->phase_sums[0] = protection_phase_sum(run->phase_sums[0], d->phases_q13.a);
+    run->phase_sums[1] = protection_phase_sum(run->phase_sums[1], d->phases_q13.b);
+    run->phase_sums[2] = protection_phase_sum(run->phase_sums[2], d->phases_q13.c);
     if (run->observer.wrong_steps <= p->wrong_steps) {
         return;
     }
@@ -170,9 +178,10 @@ QM_INLINE uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const dr
  *  it: half of each step's change is taken, which comes to the current that fits. */
 QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p)
 {
-    uint32_t ratio = qm_muluu(salient_current_beside(run, p, run->probe_most_q13), p->current_max_reciprocal) >> 10;
-    int16_t rest = trig_circle((int16_t)((ratio > 32767u) ? 32767u : ratio));
-    int16_t most = qm_hi(2 * qm_mulss(p->current_max_q13, qm_clamp(rest, PROBE_LEAST_Q15, PROBE_MOST_Q15)));
+    int16_t most = limits_beside(p, salient_current_beside(run, p, run->probe_most_q13));
+    /* products in C: constants */
+    most = qm_clamp_called(most, (int16_t)(((int32_t)p->current_max_q13 * PROBE_LEAST_Q15) >> 15),
+                           (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
 #if MOTOR_SALIENCY_UH
     most = (int16_t)((most + run->probe_most_q13) / 2);
 #endif
@@ -180,7 +189,7 @@ QM_INLINE current_q13_t protection_probe_most(const drive_run_t *run, const driv
 }
 
 /** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
-QM_INLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
+NOINLINE speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t least = (int16_t)(qm_size(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
     return (least < standing) ? standing : least;
@@ -202,7 +211,7 @@ QM_INLINE void protection_count_dip(drive_run_t *run, uint16_t dips)
  *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
  *  again: soon after a dip of the speed.
  *  Every seldom step in closed loop. */
-NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
+QM_INLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_size(run->control.reference_erpm);
@@ -224,7 +233,7 @@ NOINLINE void protection_probe_rotor(drive_t *d, const drive_params_t *p)
         steps = (uint16_t)((steps < PROBE_PAUSE_STEPS && run->dip_steps != PROBE_DIP_STEPS) ? steps + 1u : 0u);
     }
     run->probe_steps = steps;
-    run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
+    run->probe_id_q13 = qm_clamp_called(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
 }
 
 /** Stall and lost lock: conditions that must not last. Every rare step in closed loop. */
@@ -233,14 +242,14 @@ QM_INLINE void protection_check_rotor(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_size(along), standing = (int16_t)(p->minimum_erpm >> 1);
     dq_t emf = estimator_emf(&run->estimator);
-    uint16_t lost = (uint16_t)(speed >= standing && qm_size(emf.d) > qm_size(emf.q)); /* of a standing rotor its direction says nothing */
 
     if (along < protection_least_speed(run, p)) {
         run->stall_steps++;
     } else { /* of a rotor that only jerks the estimate is fast now and then */
         run->stall_steps = (uint16_t)((run->stall_steps > STALL_FALL) ? run->stall_steps - STALL_FALL : 0u);
     }
-    if (lost || speed > p->overspeed_erpm) {
+    /* of a standing rotor the direction of its back-EMF says nothing */
+    if (speed > p->overspeed_erpm || (speed >= standing && qm_size(emf.d) > qm_size(emf.q))) {
         run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
     } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */
         run->lost_lock_steps--;

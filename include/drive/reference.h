@@ -4,12 +4,15 @@
 
 #include "drive/drive.h"
 
-/** 1 while the motor is near enough to the reference: field weakening is indexed by it, so it must stay true. */
+/** 1 while the motor is near enough to the reference, on the side of the target: field weakening is indexed by it, so it must stay true. */
 QM_INLINE int16_t reference_may_move(const drive_t *d, const drive_params_t *p, speed_erpm_t target)
 {
     const speed_erpm_t reference = d->run.control.reference_erpm;
-    const int16_t ahead = along_direction(d, qm_sub_limited(estimator_speed(&d->run.estimator), reference)); /* ramp_hold_erpm is below half the format */
-    return (int16_t)((along_direction(d, target) > along_direction(d, reference)) ? ahead > -p->ramp_hold_erpm : ahead < p->ramp_hold_erpm);
+    int16_t ahead = qm_sub_limited(estimator_speed(&d->run.estimator), reference); /* ramp_hold_erpm is below half the format */
+    if (target < reference) {
+        ahead = (int16_t)-ahead;
+    }
+    return (int16_t)(ahead > -p->ramp_hold_erpm);
 }
 
 /** One step of the reference towards the target; what a step has below a whole electrical rpm counts in the next. @param step_q16 0 or more */

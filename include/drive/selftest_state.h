@@ -17,9 +17,10 @@ typedef struct {
 #define SELFTEST_STATE selftest_state_t selftest;
 
 /** The complement of what is written. */
-QM_INLINE uint16_t selftest_complement(uint16_t value)
+QM_INLINE QM_WRAPS uint16_t selftest_complement(uint16_t value)
 {
-    return (uint16_t)~value;
+    const uint16_t negative = (uint16_t)(0u - value); /* of ~value the compiler computes 32 bits */
+    return (uint16_t)(negative - 1u);
 }
 
 /** The sum with one phase more. */

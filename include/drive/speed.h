@@ -10,14 +10,14 @@
 /** The next speed reference. */
 QM_INLINE void speed_reference_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->state == (uint16_t)DRIVE_STOPPING || !mode_reference_step(d, p)) {
+    if (!mode_reference_step(d, p)) {
         reference_step(d, p, mode_speed_target(d, p), p->speed_ramp_q16);
     }
 }
 
 /** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop, after a large
  *  innovation every slow one. */
-NOINLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
+QM_INLINE void speed_follow(drive_run_t *run, const drive_params_t *p)
 {
     speed_schedule(run, p);
     run->control.sample_shift_q13 = qm_mulhi(observer_speed(&run->observer), p->sample_shift_q16);
@@ -71,20 +71,17 @@ NOINLINE void speed_choose_state(drive_t *d, const drive_params_t *p)
 }
 
 /* wcet: speed_turn_round/drive_turns excludes model_update */
-/** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero.
- *  @return 1 then */
-NOINLINE uint16_t speed_turn_round(drive_t *d, const drive_params_t *p)
+/** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero. */
+QM_INLINE void speed_turn_round(drive_t *d, const drive_params_t *p)
 {
-    uint16_t turns = (uint16_t)(d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p));
-    if (turns) {
+    if (d->command.run && speed_is_to_turn(d) && speed_has_stopped(d, p)) {
         drive_turns(d, (int16_t)-d->direction);
         startup_ramp_from_here(d, p);
     }
-    return turns;
 }
 
 /** The controller's trim, every rare step in closed loop. */
-NOINLINE void speed_trim_step(drive_t *d, const drive_params_t *p)
+QM_INLINE void speed_trim_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
     if (!mode_commands_current(d)) {
@@ -94,7 +91,7 @@ NOINLINE void speed_trim_step(drive_t *d, const drive_params_t *p)
 }
 
 /** One step of the controller, every slow step in closed loop. */
-NOINLINE void speed_step(drive_t *d, const drive_params_t *p)
+QM_INLINE void speed_step(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
     speed_erpm_t speed = observer_speed(&d->run.observer);

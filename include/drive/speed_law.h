@@ -42,10 +42,11 @@ QM_INLINE current_q13_t speed_current(const drive_run_t *run, const drive_params
     return (int16_t)((speed_current_q26(run, p, target_erpm) + 4096) >> 13);
 }
 
-/** 1 where the observer's load moves against the error by itself. @param seen,speed the estimator's speed and the observer's */
+/** 1 where the observer's load moves against the error by itself.
+ *  @param seen,speed the estimator's speed and the observer's @param error where it is 0 the trim asks in vain */
 QM_INLINE uint16_t speed_load_moves_against(speed_erpm_t seen, speed_erpm_t speed, int16_t error)
 {
-    return (uint16_t)((seen < speed) ? error > 0 : (seen > speed && error < 0));
+    return (uint16_t)((error > 0) ? seen < speed : seen > speed);
 }
 
 /** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer, that acts while the

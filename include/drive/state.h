@@ -7,7 +7,7 @@
 /** Enters a state; its clock begins anew. While a fault is kept, every way leads to FAULT: only drive_clear_fault() opens it. */
 NOINLINE void drive_enter(drive_t *d, drive_state_t next)
 {
-    uint16_t state = (uint16_t)((next == DRIVE_FAULT || d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
+    uint16_t state = (uint16_t)((d->fault == (uint16_t)FAULT_NONE) ? next : DRIVE_FAULT);
     d->state = state;
     SELFTEST_KEEP(d, state, state);
     d->periods = 0;
@@ -66,6 +66,13 @@ QM_INLINE uint16_t drive_is_forced(const drive_t *d)
 QM_INLINE uint16_t drive_is_closed(const drive_t *d)
 {
     return (uint16_t)(MODE_CLOSES_LOOP && (uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
+}
+
+/** 1 while the bridge conducts, its drivers' charge with it, BOOTSTRAP to STOPPING: drive_outputs() are not off. In one comparison. */
+QM_INLINE uint16_t drive_conducts(const drive_t *d)
+{
+    return (uint16_t)(d->fault == (uint16_t)FAULT_NONE
+                      && (uint16_t)(d->state - (uint16_t)DRIVE_BOOTSTRAP) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_BOOTSTRAP);
 }
 
 /** What drives the bridge (outputs_t) in the drive's present state. */

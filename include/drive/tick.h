@@ -78,12 +78,13 @@ QM_INLINE uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_s
 /** Where a state leads to the next by what the rotor does. Every slow step. */
 QM_INLINE void drive_state_step(drive_t *d, const drive_params_t *p)
 {
-    if (d->state == (uint16_t)DRIVE_RAMP) {
+    const uint16_t state = d->state;
+    if (state == (uint16_t)DRIVE_RAMP) {
         handover_step(d, p);
-    } else if (d->state == (uint16_t)DRIVE_CATCH) {
+    } else if (state == (uint16_t)DRIVE_CATCH) {
         catch_step(d, p);
-    } else if (d->state == (uint16_t)DRIVE_STOPPING) {
-        (void)speed_turn_round(d, p);
+    } else if (state == (uint16_t)DRIVE_STOPPING) {
+        speed_turn_round(d, p);
     } else {
         /* the others are left elsewhere */
     }

@@ -43,7 +43,7 @@ void setUp(void)
             begin(v.heavy); \
             observer_preset(&o, p, v.rho, v.ref, v.iq); \
         } else { \
-            observer_schedule(&o, p, v.ref, v.iq); \
+            observer_schedule(&o, p, qm_abs(v.ref), v.iq); \
             observer_step(&o, p, v.rho, v.iq); \
         } \
         TEST_ASSERT_EQUAL_INT32_MESSAGE(v.omega, o.omega_q16, golden_row(n)); \
@@ -97,7 +97,7 @@ static void balanced(uint16_t heavy, int16_t erpm, int16_t load_q13)
 static void run(uint16_t steps, int16_t ref_erpm, int16_t iq_q13, int16_t load_q13)
 {
     while (steps-- != 0u) {
-        observer_schedule(&o, p, ref_erpm, iq_q13);
+        observer_schedule(&o, p, qm_abs(ref_erpm), iq_q13);
         shaft_step(iq_q13, load_q13);
         observer_step(&o, p, shaft_rho_q32, iq_q13);
     }
@@ -149,7 +149,7 @@ static int16_t rate_at(int16_t ref_erpm, int16_t load_units, q15_t quick_q15)
 {
     o.load_q16 = (int32_t)load_units * 65536;
     o.quick_q15 = quick_q15;
-    observer_schedule(&o, p, ref_erpm, -8000); /* all of the load makes current */
+    observer_schedule(&o, p, qm_abs(ref_erpm), -8000); /* all of the load makes current */
     return o.rate_q16;
 }
 

@@ -18,10 +18,13 @@ QM_INLINE speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t 
 #endif
 }
 
-/** One step of the reference in closed loop. @return 1 if the mode has taken it */
+/** One step of the reference in closed loop. @return 1 if the mode has taken it; a stop is never its own */
 QM_INLINE uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
 {
 #ifdef TUNING
+    if (d->state == (uint16_t)DRIVE_STOPPING) {
+        return 0;
+    }
     reference_step(d, p, mode_speed_target(d, p), p->tuning_step_q16);
     return 1;
 #else
