@@ -236,7 +236,7 @@ void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 /** x turned into the direction of rotation. */
 QM_INLINE int16_t along_direction(const drive_t *d, int16_t x)
 {
-    return (int16_t)qm_mulss(x, d->direction);
+    return qm_with_sign(x, d->direction);
 }
 
 #endif

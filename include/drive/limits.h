@@ -43,14 +43,20 @@ QM_INLINE void limits_burn(drive_run_t *run, const drive_params_t *p)
     c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, p->burn_most_q13);
 }
 
-/** What MAXIMUM_CURRENT_A leaves beside a current of the other axis, by the circle table. @param other_q13 not negative */
-NOINLINE current_q13_t limits_beside(const drive_params_t *p, uint16_t other_q13)
+/** What a circle leaves beside a current of the other axis, by the circle table. @param reciprocal of most_q13 @param other_q13 not negative */
+NOINLINE current_q13_t limits_circle(current_q13_t most_q13, uint16_t reciprocal, uint16_t other_q13)
 {
-    uint32_t ratio = qm_muluu(other_q13, p->current_max_reciprocal) >> 10;
+    uint32_t ratio = qm_muluu(other_q13, reciprocal) >> 10;
     if (ratio > 32767u) {
         ratio = 32767u;
     }
-    return qm_mulhi_su(p->current_max_q13, (uint16_t)(2u * (uint16_t)trig_circle((int16_t)ratio)));
+    return qm_mulhi_su(most_q13, (uint16_t)(2u * (uint16_t)trig_circle((int16_t)ratio)));
+}
+
+/** What MAXIMUM_CURRENT_A leaves. A pointer to the parameters would keep all of them in the image. */
+QM_INLINE current_q13_t limits_beside(const drive_params_t *p, uint16_t other_q13)
+{
+    return limits_circle(p->current_max_q13, p->current_max_reciprocal, other_q13);
 }
 
 /** d current: what is left of the hand-over, the table with its trim or what is burnt, the rotor's probe; the q current gets the rest of the circle. */
