@@ -74,7 +74,7 @@ QM_INLINE void handover_prepare(drive_t *d, const drive_params_t *p, speed_erpm_
     }
 }
 
-/* wcet: handover_wait/handover_forced_erpm excludes speed_step */
+/* wcet: handover_wait excludes speed_step */
 /** In RAMP, every slow step: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
  *  again, the rotor is blocked or the constants are off: the rest of the ramp is quicker. */

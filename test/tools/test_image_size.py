@@ -329,7 +329,7 @@ def test_the_projects_budget_names_what_is_there_and_is_the_note_s():
     assert budget.unmatched(Sources.read()) == []
     assert {group.title: group.note_flash for group in budget.groups if group.note_flash is not None} == {
         "sensorless FOC without field weakening": 4425, "field weakening": 612, "user interface": 645}
-    assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682 - 303, 444, 18570, 1024)
+    assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682 - 303, 444, 16384, 1024)
 
 
 # ---- bad input -----------------------------------------------------------------------------------------------------------
