@@ -11,10 +11,10 @@ void adc_init(void)
     AD1CHS123 = BOARD_AD1CHS123;
     AD1CSSL = 0;
     IFS0bits.AD1IF = 0;
-    IPC3 = BOARD_IPC3;
+    IPC3bits.AD1IP = 5;
     IEC0bits.AD1IE = 1;
     IFS0bits.T2IF = 0;
-    IPC1 = BOARD_IPC1; /* raised by the control interrupt alone, and below it */
+    IPC1bits.T2IP = 3; /* raised by the control interrupt alone, and below it */
     IEC0bits.T2IE = 1;
     AD1CON1bits.ADON = 1;
 }

@@ -17,7 +17,7 @@ void pwm_init(void)
     P1DC3 = 0;
     P1SECMP = BOARD_P1SECMP;
     IFS3bits.FLTA1IF = 0;
-    IPC15 = BOARD_IPC15; /* as the slow work: neither disturbs the other's state; the pins are off by hardware */
+    IPC15bits.FLTA1IP = 3; /* as the slow work: neither disturbs the other's state; the pins are off by hardware */
     IEC3bits.FLTA1IE = 1;
     P1TCON = BOARD_P1TCON;
 }

@@ -75,9 +75,9 @@ static const written_t written[] = {
     /* interrupts: only the control interrupt, that of the slow work, and the fault input; the core */
     { &IEC0, 0xFFFFu, 0x2080u },
     { &IEC3, 0xFFFFu, 0x8000u },
-    { &IPC1, 0x7000u, BOARD_IPC1 & 0x7000u },
-    { &IPC3, 0x0070u, BOARD_IPC3 & 0x0070u },
-    { &IPC15, 0x7000u, BOARD_IPC15 & 0x7000u },
+    { &IPC1, 0x7000u, 0x3000u },
+    { &IPC3, 0x0070u, 0x0050u },
+    { &IPC15, 0x7000u, 0x3000u },
     { &INTCON1, 0x8000u, 0u },
     { &INTCON2, 0x8000u, 0u },
     { &CORCON, 0x10F7u, 0x0024u },

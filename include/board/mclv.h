@@ -76,11 +76,6 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_AD1PCFGL ((uint16_t) ~(PIN_AN_MASK(BOARD_PIN_CURRENT_A) | PIN_AN_MASK(BOARD_PIN_CURRENT_B) | PIN_AN_MASK(BOARD_PIN_BUS) \
                                      | PIN_AN_MASK(BOARD_PIN_POT))) /* 0 is analogue */
 
-/* ---- Interrupt priorities: a whole register each, the others' 4 as after a reset ---- */
-#define BOARD_IPC1 0x3440u  /* slow work: 3 */
-#define BOARD_IPC3 0x0054u  /* control: 5 */
-#define BOARD_IPC15 0x3000u /* fault input: 3 */
-
 /* ---- Buttons, active low ---- */
 #define BOARD_S2_DOWN() PIN_LOW(BOARD_PIN_S2) /* start, stop, clear a fault */
 #define BOARD_S3_DOWN() PIN_LOW(BOARD_PIN_S3) /* speed range */
