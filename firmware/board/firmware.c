@@ -60,8 +60,7 @@ static void firmware_find(uint16_t found)
     }
 }
 
-/* This and the background are called, so that the stack of neither stays while the other runs. */
-void __attribute__((noinline)) firmware_init(void)
+void firmware_init(void)
 {
     drive_fault_t kept;
 
@@ -152,7 +151,7 @@ QM_INLINE void firmware_judge(uint16_t elapsed_ms)
     }
 }
 
-void __attribute__((noinline)) firmware_background(void)
+void firmware_background(void)
 {
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
 

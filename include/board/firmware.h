@@ -28,14 +28,17 @@ extern remote_t scope_command;
 /** Not 0 from a failure of the clock to the next reset: on a wrong clock nothing may run, whatever the user presses. */
 extern volatile uint16_t board_clock_failed;
 
+/* Not in main: the stack of neither stays while the other runs. */
+#define FIRMWARE_CALLED __attribute__((noinline))
+
 /** All that main does before its loop: clock, pins, PWM with its outputs off, ADC, timer, UART, interrupts.
  *  A clock that does not come up, or fails later, raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
-void firmware_init(void);
+void firmware_init(void) FIRMWARE_CALLED;
 
 /** Outputs off and the fault raised, from anywhere but the control interrupt. */
 void firmware_trip(drive_fault_t fault);
 
 /** One pass of the loop. */
-void firmware_background(void);
+void firmware_background(void) FIRMWARE_CALLED;
 
 #endif

@@ -673,10 +673,10 @@ void test_current_gains_follow_from_R_and_L(void)
     TEST_ASSERT_EQUAL_UINT16(SETTLE_PERIODS, id->wait);
     TEST_ASSERT_EQUAL_UINT16(32, id->left);
     TEST_ASSERT_EQUAL_UINT16(0, id->blocks);
-    TEST_ASSERT_EQUAL_INT16(32767, gain(soft_float_of(70000ul)));
-    TEST_ASSERT_EQUAL_INT16(32767, gain(soft_float_of(32768ul)));
-    TEST_ASSERT_EQUAL_INT16(32767, gain(soft_float_of(32767ul)));
-    TEST_ASSERT_EQUAL_INT16(1, gain(soft_float_scaled(1, 9)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain_of(soft_float_of(70000ul)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain_of(soft_float_of(32768ul)));
+    TEST_ASSERT_EQUAL_INT16(32767, gain_of(soft_float_of(32767ul)));
+    TEST_ASSERT_EQUAL_INT16(1, gain_of(soft_float_scaled(1, 9)));
 }
 
 void test_each_axis_has_its_own_gain(void)
