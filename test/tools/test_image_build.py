@@ -220,3 +220,11 @@ def test_a_mode_in_userparams_h_is_not_held_to_the_budget_of_the_delivered_drive
     tree.change("userparams.h", "/* #define IDENTIFY */", "#define IDENTIFY")
     done = make("firmware", root=tree.root)
     assert (done.returncode, warnings(done.stderr)) == (0, []) and "of 33024 bytes of the chip" in done.stdout
+
+
+@with_compiler
+def test_another_header_is_held_to_the_chip_and_to_the_deadline_only(tree):
+    tree.change("userparams.h", "#define SCOPE 0 ", "#define SCOPE 1 ")
+    done = make("firmware", root=tree.root)
+    assert (done.returncode, warnings(done.stderr)) == (0, [])
+    assert "of 33024 bytes of the chip" in done.stdout and "cycles to its return" in done.stdout

@@ -332,6 +332,11 @@ def test_the_projects_budget_names_what_is_there_and_is_the_note_s():
     assert (budget.note.flash, budget.note.ram, budget.image.flash, budget.image.ram) == (5682 - 303, 444, 16384, 1024)
 
 
+def test_the_projects_budget_is_for_the_delivered_header():
+    done = subprocess.run(["cksum"], stdin=(paths.ROOT / "userparams.h").open("rb"), capture_output=True, text=True, check=True)
+    assert Budget.read().image.header == int(done.stdout.split()[0]), "write it into firmware/budget.toml"
+
+
 # ---- bad input -----------------------------------------------------------------------------------------------------------
 GOOD, BARE, OTHER = program((0x200, 1), functions=[tick(0x202)]), program((0x200, 1)), program((0x200, 1), machine=62)
 

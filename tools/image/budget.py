@@ -24,6 +24,7 @@ class Limits:
     flash: int
     ram: int
     stack: int = 0
+    header: int | None = None   # cksum of the userparams.h that they are for
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,8 @@ class Budget:
         for name in ("note", "image"):
             section = _required(budget, name)
             limits.append(Limits(section.integer("flash_bytes", minimum=0), section.integer("ram_bytes", minimum=0),
-                                 section.integer("stack_bytes", minimum=0) if name == "image" else 0))
+                                 section.integer("stack_bytes", minimum=0) if name == "image" else 0,
+                                 section.integer("header_cksum", None, minimum=0) if name == "image" else None))
             section.close()
         budget.close()
         section = _required(root, "cycles")

@@ -195,6 +195,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("hex", type=Path)
     parser.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
     parser.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
+    parser.add_argument("--other-header", action="store_true", help="another userparams.h than the budget's: flash, RAM and stack may be what the chip has")
     parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
     parser.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
     parser.add_argument("--wcet", action="store_true", help="looks for the interrupt's longest path too, with the simulator's decoder")
@@ -205,7 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     elf, words = read_elf(options.elf), read_hex(options.hex)
     pieces = read_map(options.map) if options.map else None
-    limits = Budget.read(options.budget).image if options.budget else None
+    limits = Budget.read(options.budget).image if options.budget and not options.other_header else None
     deepest, unsure = deepest_stack(options.elf, options.objdump, Budget.read()) if options.objdump else (None, [])
     start_up = start_up_bytes(options.elf, Budget.read(options.budget)) if options.objdump and limits else 0
     try:

@@ -13,7 +13,7 @@ pil: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the image turns the mo
 	@$(alone) $(python) -m tools.bench.pil_command $(scenario) $(pil_image) $(options)
 
 image_options = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(pil_image) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS))) $(out) \
-    $(if $(IMAGE)$(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
+    $(if $(IMAGE)$(target_other),--no-budget)
 
 cycles: setup-run $$(if $$(IMAGE),,find-xc16) ## [simulator] the control interrupt in cycles, load, latency, stack [SCENARIO= IMAGE=file.elf USERPARAMS= OUT=]
 	$(target_setup)

@@ -5,4 +5,4 @@ size: image ## [your board] flash, RAM and stack by module and function, against
 	$(target_setup)
 	@$(python) -m tools.image.size $X/foc33.elf --out $X --objdump $(call quoted,$(xc16)objdump) \
 	    --base OPT=$(OPT) $(foreach name,XC16 DFP USERPARAMS,$(if $($(name)),$(call quoted,$(name)=$(call absolute,$($(name)))))) \
-	    $(if $(DEFINES),$(call quoted,DEFINES=$(DEFINES))) $(if $(target_modes)$(USERPARAMS)$(filter-out -O2,$(OPT)),--no-budget)
+	    $(if $(DEFINES),$(call quoted,DEFINES=$(DEFINES))) $(if $(target_other),--no-budget)
