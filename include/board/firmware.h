@@ -28,7 +28,7 @@ extern remote_t scope_command;
 /** Not 0 from a failure of the clock to the next reset: on a wrong clock nothing may run, whatever the user presses. */
 extern volatile uint16_t board_clock_failed;
 
-/* Not in main: the stack of neither stays while the other runs. */
+/* Not in main: the stack of neither stays while the other runs. The processor's test has registers of its own. */
 #define FIRMWARE_CALLED __attribute__((noinline))
 
 /** All that main does before its loop: clock, pins, PWM with its outputs off, ADC, timer, UART, interrupts.

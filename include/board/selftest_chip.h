@@ -27,7 +27,7 @@ extern uint16_t _SPLIM_init; /* the linker's: its address is the stack's limit *
 volatile uint16_t *board_free_ram(void);
 
 /** Do W0 to W15 and the flags hold a pattern and its complement? With interrupts off; leaves level 7. */
-void board_cpu_test(void);
+void board_cpu_test(void) FIRMWARE_CALLED;
 
 /** Not 0: they do. In memory, because it could be the register of a function's value that is wrong. */
 extern volatile uint16_t board_cpu_holds;

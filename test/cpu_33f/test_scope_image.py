@@ -14,7 +14,7 @@ from tools.live.symbols import Symbols
 XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
 OFF_CYCLES, MOST_CYCLES = 3, 35
 """Without a record; with four channels of 16 bits, whatever the scope does in the period."""
-SLOW_PHASES = 8
+SLOW_PHASES = 32
 """Periods after which an interrupt of the drive at rest costs the same again."""
 CHANNELS = ("board_drive.phases_q13.a", "board_drive.phases_q13.b", "board_drive.ticks", "board_drive.angle")
 LEVEL = 500
