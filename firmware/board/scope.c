@@ -156,7 +156,7 @@ void scope_record_unusual(scope_t *s)
     if (s->mode == s->looking) {
         scope_look(s, s->trigger, copy_words(s));
     } else if (s->before != 0u) {
-        scope_fill(s, copy_words(s));
+        scope_fill(s, copy_words(s), 1);
     } else {
         scope_turn(s, board_scope_array);
         scope_go_on(s, copy_words(s));

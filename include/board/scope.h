@@ -89,13 +89,14 @@ QM_INLINE void scope_go_on(scope_t *s, int16_t *following)
     }
 }
 
-/** A row is there before the trigger is looked for: there is always room for one more. @param following where it ended */
-QM_INLINE void scope_fill(scope_t *s, int16_t *following)
+/** A row is there before the trigger is looked for: there is always room for one more. @param following where it ended
+ *  @param is_rare what it is from the trigger's search on */
+QM_INLINE void scope_fill(scope_t *s, int16_t *following, uint16_t is_rare)
 {
     s->at = following;
     if (--s->before == 0u) {
         s->mode = s->looking;
-        s->is_rare = (uint16_t)(s->looking >= 0);
+        s->is_rare = is_rare;
     }
 }
 
@@ -114,7 +115,7 @@ QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
             scope_turn(s, begin);
             scope_go_on(s, scope_copy_usual(s));
         } else if (s->looking < 0) {
-            scope_fill(s, scope_copy_usual(s));
+            scope_fill(s, scope_copy_usual(s), 0);
         } else {
             scope_record_unusual(s);
         }
