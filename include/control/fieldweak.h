@@ -6,7 +6,6 @@
 
 #define FIELDWEAK_ENTRIES 18
 #define FIELDWEAK_TRIM_SHIFT 3     /**< d current of the voltage feedback: counts a step per 8 counts of missing voltage */
-#define FIELDWEAK_TRIM_MOST 24     /**< d current that a step adds at most, Q13 counts */
 #define FIELDWEAK_FILTER_LEAST 256 /**< K of the slowest back-EMF filter, Q16 */
 #define SPEED_INDEX_CONST 10       /**< one table step is 2^10 electrical rpm */
 
@@ -22,7 +21,8 @@ typedef struct {
     int16_t kfilter_esdq_fw_q16;                /**< and above */
     uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per count of speed */
     int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
-    int16_t trim_step_q13;                      /**< its change a rare step */
+    int16_t trim_step_q13;                      /**< by how much a rare step gives back at most */
+    int16_t trim_most_q13;                      /**< by how much one asks for more at most */
     speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */
 } fieldweak_params_t;
 
@@ -77,7 +77,7 @@ QM_INLINE void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, volt
 {
     int16_t step = p->trim_step_q13;
     if (qm_beyond(speed_erpm, p->trim_speed_erpm)) {
-        step = qm_clamp((int16_t)(free_q14 >> FIELDWEAK_TRIM_SHIFT), (int16_t)-FIELDWEAK_TRIM_MOST, p->trim_step_q13);
+        step = qm_clamp((int16_t)(free_q14 >> FIELDWEAK_TRIM_SHIFT), (int16_t)-p->trim_most_q13, p->trim_step_q13);
     }
     fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 + step), (int16_t)-p->trim_max_q13, 0);
 }

@@ -301,6 +301,7 @@ void proof_fieldweak_trim(void)
     fieldweak_t fw;
     p.trim_max_q13 = any(0, 8192);
     p.trim_step_q13 = any(1, 16);
+    p.trim_most_q13 = any(1, 32);
     p.trim_speed_erpm = any(0, INT16_MAX);
     fw.trim_q13 = any(-8192, 0);
     fieldweak_trim(&fw, &p, any(-28000, 28000), ANY16());

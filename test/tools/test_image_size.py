@@ -34,6 +34,7 @@ latency_max_cycles = 1
 isr_bound_cycles = 1
 duty_bound_cycles = 1
 slow_bound_cycles = 1
+duty_deadline_cycles = 1
 scenarios = ["demo"]
 [stack]
 calls_nothing = ["_fill"]

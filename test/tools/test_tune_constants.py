@@ -69,7 +69,7 @@ def test_all_numbers_of_the_drive_s_parameters_are_listed():
     """A new field of drive_params_t without a constant here would be a number that no table shows."""
     known = {item.name.split("[")[0].split(".")[-1] for motor in (HURST, "ipm_4pp_24v_2000") for item in of(motor).constants}
     text = (paths.ROOT / "include/drive/param_init.h").read_text(encoding="utf-8")
-    plain = {"shift", "trim_step_q13", "offset_max_q13"} # written as numbers in param_init.h itself
+    plain = {"shift", "trim_step_q13", "trim_most_q13", "offset_max_q13"} # written as numbers in param_init.h itself
     fields = set(re.findall(r"\.(\w+) = ", text)) - {"estimator", "fieldweak", "forced", "svm", "pi_d", "pi_q", "adaptation", "observer"}
     assert fields - known - plain == set()
 

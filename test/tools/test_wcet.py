@@ -3,6 +3,7 @@
 import dataclasses
 import re
 from pathlib import Path
+from unittest import mock
 
 import asm33
 import pytest
@@ -58,8 +59,8 @@ def program(*statements: Statement) -> Program:
     return Program(elf, places, list(statements), DECODER, {"_ADC1Interrupt": LABELS["interrupt"], "_FLTA1Interrupt": LABELS["fault"]})
 
 
-def limits(isr: int = 1000, duty: int = 1000) -> Budget:
-    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, isr, duty, 1, ()), [], [], (), (), [])
+def limits(isr: int = 1000, duty: int = 1000, deadline: int = 745) -> Budget:
+    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, isr, duty, 1, deadline, ()), [], [], (), (), [])
 
 
 def report(*statements: Statement, **seen) -> bench.Report:
@@ -231,3 +232,12 @@ def test_bad_input_is_one_line(arguments, words):
 def test_without_the_simulator_it_says_what_to_make(tmp_path):
     with pytest.raises(UserError, match="the simulator is not built.*libmachine.so.*make"):
         Decoder(tmp_path / "libmachine.so")
+
+
+def test_another_header_than_the_delivered_one_is_held_to_the_deadline_alone():
+    bounds = [mock.Mock(handler=wcet.INTERRUPT, to=wcet.THIRD_DUTY, cycles=746), mock.Mock(handler=wcet.INTERRUPT, to=wcet.RETURN, cycles=1500),
+              mock.Mock(handler=wcet.SLOW, to=wcet.RETURN, cycles=1500)]
+    cycles = limits(500, 470).cycles
+    assert len(wcet.over(bounds, cycles)) == 3
+    assert wcet.over(bounds, cycles, delivered=False) == [
+        "longest path of _ADC1Interrupt to the third duty: 746 cycles, 1 over the budget of 745; make wcet shows it"]

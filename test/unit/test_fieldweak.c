@@ -28,6 +28,7 @@ void setUp(void)
     params.esdq_per_erpm_q13 = 14055u; /* 50 us */
     params.trim_max_q13 = 101;
     params.trim_step_q13 = 4;
+    params.trim_most_q13 = 24;
     params.trim_speed_erpm = 8000;
     fw = zero;
 }

@@ -338,6 +338,7 @@ void test_field_weakening(void)
 {
     static const fieldweak_params_t fw = PARAM_FIELDWEAK_INIT;
     EXACT(fw.trim_step_q13, 4);      /* 2.7 A a second: 2.15 mA in 800 us */
+    EXACT(fw.trim_most_q13, 24);
     EXACT(fw.trim_max_q13, 1489);    /* 0.8 A */
     EXACT(fw.trim_speed_erpm, 7800); /* 60 % of the start speed */
     EXACT(fw.kfilter_esdq_q16, 2400);

@@ -37,6 +37,7 @@ class CycleLimits:
     isr_bound: int          # of the longest paths, from entry to return and to the third duty
     duty_bound: int
     slow_bound: int
+    duty_deadline: int      # to the third duty, of any image
     scenarios: tuple[str, ...]
 
 
@@ -102,7 +103,7 @@ class Budget:
             section.close()
         budget.close()
         section = _required(root, "cycles")
-        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound")),
+        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound", "duty_deadline")),
                              listed(section, "scenarios", "scenario", required=True))
         section.close()
         stack = _required(root, "stack")

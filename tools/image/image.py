@@ -142,9 +142,9 @@ def deepest_stack(elf: Path, objdump: str, budget: Budget) -> tuple[int, list[st
     return result.depth, result.errors
 
 
-def longest_paths(elf: Path, budget: Budget) -> tuple[str, list[str]]:
+def longest_paths(elf: Path, budget: Budget, delivered: bool) -> tuple[str, list[str]]:
     """The control interrupt's longest paths in a line, and what is wrong with them."""
-    bounds, failures = wcet.check(elf, budget.cycles)
+    bounds, failures = wcet.check(elf, budget.cycles, delivered)
     return "longest path of the interrupt " + ", ".join(f"{bound.cycles} cycles to its {bound.to}" for bound in bounds), failures
 
 
@@ -195,7 +195,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("hex", type=Path)
     parser.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
     parser.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
-    parser.add_argument("--other-header", action="store_true", help="another userparams.h than the budget's: flash, RAM and stack may be what the chip has")
+    parser.add_argument("--other-header", action="store_true", help="another userparams.h than the budget's: it is held to the chip and the deadline")
     parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
     parser.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
     parser.add_argument("--wcet", action="store_true", help="looks for the interrupt's longest path too, with the simulator's decoder")
@@ -214,7 +214,7 @@ def _run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
     failures = check(elf, words, pieces, config, limits, deepest, start_up) + [f"stack: {reason}" for reason in unsure if limits]
-    paths_text, too_long = longest_paths(options.elf, Budget.read(options.budget)) if options.wcet and options.budget else ("", [])
+    paths_text, too_long = longest_paths(options.elf, Budget.read(options.budget), not options.other_header) if options.wcet and options.budget else ("", [])
     failures += too_long
     for failure in failures:
         print(f"foc33: {options.hex.name}, {failure}", file=sys.stderr)

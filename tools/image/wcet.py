@@ -229,9 +229,12 @@ def handlers_of(program: Program) -> list[str]:
     return sorted(program.handlers, key=lambda name: (order.index(name) if name in order else len(order), name))
 
 
-def over(bounds: list[Bound], limits: CycleLimits) -> list[str]:
-    """A line for each bound of a period's interrupts that is above its limit."""
-    most = {(INTERRUPT, THIRD_DUTY): limits.duty_bound, (INTERRUPT, RETURN): limits.isr_bound, (SLOW, RETURN): limits.slow_bound}
+def over(bounds: list[Bound], limits: CycleLimits, delivered: bool = True) -> list[str]:
+    """A line for each bound of a period's interrupts that is above its limit.
+    @param delivered the limits are for this image; another one has the deadline only"""
+    most = {(INTERRUPT, THIRD_DUTY): limits.duty_deadline}
+    if delivered:
+        most = {(INTERRUPT, THIRD_DUTY): limits.duty_bound, (INTERRUPT, RETURN): limits.isr_bound, (SLOW, RETURN): limits.slow_bound}
     return [f"longest path of {bound.handler} to {_the(bound.to)}: {bound.cycles} cycles, {bound.cycles - limit} over the budget of {limit}; make wcet shows it"
             for bound in bounds if (limit := most.get((bound.handler, bound.to), bound.cycles)) < bound.cycles]
 
@@ -240,8 +243,8 @@ def _the(to: str) -> str:
     return f"its {to}" if to == RETURN else f"the {to}"
 
 
-def check(elf: Path, limits: CycleLimits) -> tuple[list[Bound], list[str]]:
+def check(elf: Path, limits: CycleLimits, delivered: bool = True) -> tuple[list[Bound], list[str]]:
     """Bounds of a period's interrupts, and what is wrong with them or with what is stated."""
     image = Program.read(elf, read_statements(), Decoder())
     bounds = image.bounds(INTERRUPT) + image.bounds(SLOW)
-    return bounds, [*image.unknown_parts(), *over(bounds, limits)]
+    return bounds, [*image.unknown_parts(), *over(bounds, limits, delivered)]
