@@ -22,7 +22,7 @@ typedef struct {
     uint16_t esdq_per_erpm_q13;                 /**< at low speed the filter's corner is five times the electrical frequency: K per count of speed */
     int16_t trim_max_q13;                       /**< largest additional d current of the voltage feedback */
     int16_t trim_step_q13;                      /**< by how much a rare step gives back at most */
-    int16_t trim_most_q13;                      /**< by how much one asks for more at most */
+    int16_t trim_most_q13;                      /**< by how much one asks for more at most: less with late duties, whose ripple it follows */
     speed_erpm_t trim_speed_erpm;               /**< estimated speed above which the trim may act */
 } fieldweak_params_t;
 

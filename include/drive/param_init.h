@@ -40,8 +40,8 @@
         .esdq_per_erpm_q13 = (uint16_t)PARAM_MIN(PARAM_ESDQ_PER_COUNT * 8192.0F + 0.5F, 65535.0F), \
         .trim_max_q13 = CURRENT_Q13(FW_TRIM_CURRENT_A), \
         .trim_step_q13 = 4, \
-        .trim_most_q13 = LATE_DUTIES ? 15 : 24, /* late duties ripple: 24 asks for 4 % more current than it needs */ \
-            .trim_speed_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(FW_START_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 0.6F)) \
+        .trim_most_q13 = LATE_DUTIES ? 15 : 24, \
+        .trim_speed_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(FW_START_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * 0.6F)) \
     }
 
 #define PARAM_SVM_INIT \
