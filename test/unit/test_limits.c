@@ -42,6 +42,15 @@ void test_current_vector_fills_its_circle_and_never_leaves_it(void)
     }
 }
 
+void test_a_current_beyond_its_circle_leaves_the_other_axis_as_little_as_one_at_its_end(void)
+{
+    const int16_t at_end = limits_circle(5120, 6554, 5120);
+    TEST_ASSERT_INT16_WITHIN(40, 40, at_end);
+    TEST_ASSERT_EQUAL_INT16(at_end, limits_circle(5120, 6554, 5200));
+    TEST_ASSERT_EQUAL_INT16(at_end, limits_circle(5120, 6554, 8192));
+    TEST_ASSERT_EQUAL_INT16(5119, limits_circle(5120, 6554, 0));
+}
+
 void test_d_reference_is_the_sum_of_hand_over_table_trim_and_probe(void)
 {
     drive.run.probe_id_q13 = 700;
