@@ -12,10 +12,12 @@
 
 /** 1 where the compiler knows x, of parameters that are constants of the image; 1 where it knows that c holds. It leaves out what then cannot
  *  happen. 0 tells nothing. */
+#ifndef QM_CONSTANT /* a test knows them all */
 #ifdef __XC16__
 #define QM_CONSTANT(x) __builtin_constant_p(x)
 #else
 #define QM_CONSTANT(x) 0
+#endif
 #endif
 #define QM_KNOWN(c) (QM_CONSTANT(c) && (c))
 

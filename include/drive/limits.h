@@ -43,7 +43,8 @@ QM_INLINE void limits_burn(drive_run_t *run, const drive_params_t *p)
     c->burn_q13 = qm_clamp((int16_t)(c->burn_q13 + step), 0, p->burn_most_q13);
 }
 
-/** What a circle leaves beside a current of the other axis, by the circle table. @param reciprocal of most_q13 @param other_q13 not negative */
+/** What a circle leaves beside a current of the other axis, by the circle table.
+ *  @param reciprocal 2^25 / most_q13 @param other_q13 not negative @return 0..most_q13 */
 NOINLINE current_q13_t limits_circle(current_q13_t most_q13, uint16_t reciprocal, uint16_t other_q13)
 {
     uint32_t ratio = qm_muluu(other_q13, reciprocal) >> 10;

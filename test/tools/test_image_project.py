@@ -13,7 +13,7 @@ FOLDER = ROOT / "firmware.X"
 TEXT = (FOLDER / project.CONFIGURATIONS).read_text(encoding="utf-8")
 TREE = ET.fromstring(TEXT)
 UNIT = (FOLDER / project.UNIT).read_text(encoding="utf-8")
-FACTS = ["source firmware/board/a.c", "header include/drive/b.h", "header userparams.h", "flag -O2", "flag -std=gnu99", "flag -Wall",
+FACTS = ["unit firmware/board/a.c", "header include/drive/b.h", "header userparams.h", "flag -O2", "flag -std=gnu99", "flag -Wall",
          "include include", "include .", "link --gc-sections", "link --odd", "device 33FJ32MC204"]
 
 
@@ -70,7 +70,7 @@ def test_what_has_no_box_becomes_an_additional_option_and_odd_characters_stay():
 
 @pytest.mark.parametrize("lines, text, status", [
     (FACTS, TEXT, 0), (FACTS, "<a/>", 2), (FACTS, "no xml", 2), (FACTS, None, 2),
-    *((lines, TEXT, 2) for lines in (["nonsense"], ["source"], [], FACTS[:-1], [*FACTS, "device 33FJ64MC204"]))])
+    *((lines, TEXT, 2) for lines in (["nonsense"], ["unit"], [], FACTS[:-1], [*FACTS, "device 33FJ64MC204"]))])
 def test_the_command_writes_the_project_or_says_why_not(tmp_path, monkeypatch, capsys, lines, text, status):
     path = tmp_path / project.CONFIGURATIONS
     path.parent.mkdir()

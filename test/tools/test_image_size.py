@@ -35,6 +35,7 @@ isr_bound_cycles = 1
 duty_bound_cycles = 1
 slow_bound_cycles = 1
 duty_deadline_cycles = 1
+both_deadline_cycles = 1
 scenarios = ["demo"]
 [stack]
 calls_nothing = ["_fill"]

@@ -59,8 +59,8 @@ def program(*statements: Statement) -> Program:
     return Program(elf, places, list(statements), DECODER, {"_ADC1Interrupt": LABELS["interrupt"], "_FLTA1Interrupt": LABELS["fault"]})
 
 
-def limits(isr: int = 1000, duty: int = 1000, deadline: int = 745) -> Budget:
-    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, isr, duty, 1, deadline, ()), [], [], (), (), [])
+def limits(isr: int = 1000, duty: int = 1000, deadline: int = 745, both: int = 1950) -> Budget:
+    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, isr, duty, 1, deadline, both, ()), [], [], (), (), [])
 
 
 def report(*statements: Statement, **seen) -> bench.Report:
@@ -234,10 +234,12 @@ def test_without_the_simulator_it_says_what_to_make(tmp_path):
         Decoder(tmp_path / "libmachine.so")
 
 
-def test_another_header_than_the_delivered_one_is_held_to_the_deadline_alone():
-    bounds = [mock.Mock(handler=wcet.INTERRUPT, to=wcet.THIRD_DUTY, cycles=746), mock.Mock(handler=wcet.INTERRUPT, to=wcet.RETURN, cycles=1500),
-              mock.Mock(handler=wcet.SLOW, to=wcet.RETURN, cycles=1500)]
-    cycles = limits(500, 470).cycles
-    assert len(wcet.over(bounds, cycles)) == 3
-    assert wcet.over(bounds, cycles, delivered=False) == [
-        "longest path of _ADC1Interrupt to the third duty: 746 cycles, 1 over the budget of 745; make wcet shows it"]
+@pytest.mark.parametrize("duty, isr, slow, delivered, broken", [
+    (470, 500, 960, True, []), (471, 501, 961, True, ["the third duty", "its return", "its return"]),
+    (745, 990, 960, False, []), (746, 990, 960, False, ["the third duty"]), (745, 990, 961, False, ["together: 1951 cycles, 1 more"])])
+def test_another_header_than_the_delivered_one_is_held_to_the_deadlines_alone(duty, isr, slow, delivered, broken):
+    bounds = [mock.Mock(handler=handler, to=to, cycles=cycles) for handler, to, cycles in (
+        (wcet.INTERRUPT, wcet.THIRD_DUTY, duty), (wcet.INTERRUPT, wcet.RETURN, isr), (wcet.SLOW, wcet.RETURN, slow))]
+    cycles = dataclasses.replace(limits(500, 470).cycles, slow_bound=960)
+    lines = wcet.over(bounds, cycles, delivered)
+    assert len(lines) == len(broken) and all(words in line for words, line in zip(broken, lines))

@@ -188,7 +188,10 @@ def lines(elf: Elf) -> dict[int, tuple[str, int]]:
 def place(elf: Elf, address: int) -> str:
     """The function whose code it is, where it is written, though the compiler has put it into another one: "name() (file, line 7)"; in an image without
     debugging information the name that is before it."""
-    word = _word(address, debug := _debug(elf)) if DEBUGGED <= set(elf.debug) else None
+    if not DEBUGGED <= set(elf.debug):
+        return f"{elf.function_at(address)}()"
+    with reading("ELF", Path("the image")):
+        word = _word(address, debug := _debug(elf))
     if word is None:
         return f"{elf.function_at(address)}()"
     file, line = debug.lines.get(address, (word.chain[-1].file, 0))

@@ -37,7 +37,8 @@ class CycleLimits:
     isr_bound: int          # of the longest paths, from entry to return and to the third duty
     duty_bound: int
     slow_bound: int
-    duty_deadline: int      # to the third duty, of any image
+    duty_deadline: int      # of any image: to the third duty
+    both_deadline: int      # and both interrupts, entry to return
     scenarios: tuple[str, ...]
 
 
@@ -103,7 +104,8 @@ class Budget:
             section.close()
         budget.close()
         section = _required(root, "cycles")
-        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in ("isr_max", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound", "duty_deadline")),
+        cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in (
+            "isr_max", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound", "duty_deadline", "both_deadline")),
                              listed(section, "scenarios", "scenario", required=True))
         section.close()
         stack = _required(root, "stack")

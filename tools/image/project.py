@@ -21,7 +21,6 @@ BOXES = {
     "-O3": ("optimization-level", "3"),
 }
 #: MPLAB X builds in the order of the project and stops at the first file with an error: these say what is wrong with userparams.h
-FIRST = ["firmware/drive/param_text.c", "firmware/drive/param_check.c"]
 FIRST_FOLDER = "(first) userparams.h"
 UNIT = "image.c"
 UNIT_SAYS = "/* Every source of the firmware as one unit, as make firmware compiles them (-fwhole-program); written by make project. */"
@@ -29,14 +28,14 @@ LINKER_BOXES = {"--gc-sections": ("remove-unused-sections", "true"), "--report-m
 
 
 def read(lines: Iterable[str]) -> dict[str, list[str]]:
-    """Facts by kind."""
-    facts: dict[str, list[str]] = {"source": [], "header": [], "flag": [], "include": [], "link": [], "device": []}
+    """Facts by kind: what is compiled first and by itself, what is in the unit, headers, flags, folders, device."""
+    facts: dict[str, list[str]] = {"first": [], "unit": [], "header": [], "flag": [], "include": [], "link": [], "device": []}
     for line in lines:
         kind, _, value = line.strip().partition(" ")
         if kind not in facts or not value:
             raise UserError(f"not a fact of the project: '{line.strip()[:60]}'", "make project", "this is what make project-facts prints")
         facts[kind].append(value)
-    if len(facts["device"]) != 1 or not facts["source"]:
+    if len(facts["device"]) != 1 or not facts["unit"]:
         raise UserError("no device or no sources", "make project", "this is what make project-facts prints")
     return facts
 
@@ -50,9 +49,9 @@ def updated(text: str, facts: dict[str, list[str]]) -> str:
     """configurations.xml with these files, flags, folders and device; all else as it is."""
     root = ET.fromstring(text)
     root.find(".//targetDevice").text = f"dsPIC{facts['device'][0]}"
-    _fill(root.find(".//logicalFolder[@name='HeaderFiles']"), sorted(facts["header"]))
+    _fill(root.find(".//logicalFolder[@name='HeaderFiles']"), {file: "/".join(Path(file).parent.parts[1:]) for file in sorted(facts["header"])})
     compiled = root.find(".//logicalFolder[@name='SourceFiles']")
-    _fill(compiled, [file for file in FIRST if file in facts["source"]])
+    _fill(compiled, {file: FIRST_FOLDER for file in facts["first"]})
     ET.SubElement(compiled, "itemPath").text = UNIT
     _set(root.find(".//C30"), BOXES, facts["flag"], {"extra-include-directories": ";".join(above(path) for path in facts["include"])})
     _set(root.find(".//C30-LD"), LINKER_BOXES, facts["link"], {})
@@ -61,18 +60,17 @@ def updated(text: str, facts: dict[str, list[str]]) -> str:
 
 
 def unit(facts: dict[str, list[str]]) -> str:
-    """image.c."""
-    return "\n".join([UNIT_SAYS, *(f'#include "{file}"' for file in sorted(facts["source"]) if file not in FIRST), ""])
+    """What image.c is."""
+    return "\n".join([UNIT_SAYS, *(f'#include "{file}"' for file in facts["unit"]), ""])
 
 
-def _fill(folder: ET.Element, files: list[str]) -> None:
-    """MPLAB X's folder of files, with one folder inside for each folder of the sources."""
+def _fill(folder: ET.Element, inside: dict[str, str]) -> None:
+    """MPLAB X's folder of files, each in a folder inside."""
     folder[:] = []
-    inside = {file: FIRST_FOLDER if file in FIRST else "/".join(Path(file).parent.parts[1:]) for file in files}
-    for number, group in enumerate(sorted(set(inside.values()), key=lambda name: (name != FIRST_FOLDER, not name, name)), 1):
+    for number, group in enumerate(sorted(set(inside.values()), key=lambda name: (not name, name)), 1):
         into = ET.SubElement(folder, "logicalFolder", name=f"f{number}", displayName=group, projectFiles="true") if group else folder
-        for file in files:
-            if inside[file] == group:
+        for file, its_group in inside.items():
+            if its_group == group:
                 ET.SubElement(into, "itemPath").text = above(file)
 
 

@@ -231,12 +231,16 @@ def handlers_of(program: Program) -> list[str]:
 
 def over(bounds: list[Bound], limits: CycleLimits, delivered: bool = True) -> list[str]:
     """A line for each bound of a period's interrupts that is above its limit.
-    @param delivered the limits are for this image; another one has the deadline only"""
-    most = {(INTERRUPT, THIRD_DUTY): limits.duty_deadline}
-    if delivered:
-        most = {(INTERRUPT, THIRD_DUTY): limits.duty_bound, (INTERRUPT, RETURN): limits.isr_bound, (SLOW, RETURN): limits.slow_bound}
-    return [f"longest path of {bound.handler} to {_the(bound.to)}: {bound.cycles} cycles, {bound.cycles - limit} over the budget of {limit}; make wcet shows it"
-            for bound in bounds if (limit := most.get((bound.handler, bound.to), bound.cycles)) < bound.cycles]
+    @param delivered the limits are for this image; another one has the deadlines only"""
+    most = {(INTERRUPT, THIRD_DUTY): limits.duty_bound, (INTERRUPT, RETURN): limits.isr_bound, (SLOW, RETURN): limits.slow_bound}
+    if not delivered:
+        most = {(INTERRUPT, THIRD_DUTY): limits.duty_deadline}
+    lines = [f"longest path of {bound.handler} to {_the(bound.to)}: {bound.cycles} cycles, {bound.cycles - limit} over the budget of {limit}; make wcet shows it"
+             for bound in bounds if (limit := most.get((bound.handler, bound.to), bound.cycles)) < bound.cycles]
+    both = sum(bound.cycles for bound in bounds if bound.to == RETURN and bound.handler in (INTERRUPT, SLOW))
+    if both > limits.both_deadline:
+        lines.append(f"longest paths of {INTERRUPT} and {SLOW} together: {both} cycles, {both - limits.both_deadline} more than a period leaves; make wcet shows them")
+    return lines
 
 
 def _the(to: str) -> str:

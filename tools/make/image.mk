@@ -29,7 +29,8 @@ target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 target_sources := $(wildcard firmware/*/*.c firmware/*/*/*.c)
 hash := \#
 # One unit of them all: the compiler then sees every caller and keeps nothing for others, which is 900 bytes less. The parameters' checks are no code.
-target_unit = $(foreach file,$(sort $(filter-out $(params_source),$(target_sources))),'$(hash)include "$(file)"')
+target_in_unit := $(sort $(filter-out $(params_source),$(target_sources)))
+target_unit = $(foreach file,$(target_in_unit),'$(hash)include "$(file)"')
 
 .PHONY: firmware image flash project find-xc16
 firmware: find-xc16 ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
@@ -109,7 +110,7 @@ flash: firmware ## [your board] program the board by MPLAB IPE's command line, o
 	@$(python) -m tools.image.flash $X/foc33.hex --elf $X/foc33.elf $(if $(TOOL),--tool $(call quoted,$(TOOL))) $(if $(IPE),--ipe $(call quoted,$(IPE)))
 
 # What the MPLAB X project is made of, one item a line: it cannot say anything else than this file does.
-target_facts = $(foreach word,$(target_sources),'source $(word)') $(foreach word,$(wildcard include/*.h include/*/*.h include/*/*/*.h) userparams.h,'header $(word)') \
+target_facts = $(foreach word,$(filter %.c,$(params_source)),'first $(word)') $(foreach word,$(target_in_unit),'unit $(word)') $(foreach word,$(wildcard include/*.h include/*/*.h include/*/*/*.h) userparams.h,'header $(word)') \
     $(foreach word,$(filter-out -Werror,$(target_flags) $(target_whole) $(target_warnings)),'flag $(word)') \
     $(foreach word,$(patsubst -I%,%,$(target_includes)),'include $(word)') \
     $(foreach word,$(subst $(comma), ,$(target_link_options)),'link $(word)') 'device $(target_device)'
