@@ -93,6 +93,41 @@ void test_speed_follows_from_turn_and_time_in_its_format(void)
 
 /* ---- what follows ---- */
 
+void test_the_pause_between_two_looks_falls_with_the_rotor_s_speed_between_its_ends(void)
+{
+    uint16_t taken, before, pause = 0;
+    rig_ready();
+    for (taken = 1; taken <= 20u; taken++) {
+        int16_t flux;
+        before = CATCH_PAUSE_MOST;
+        for (flux = 0; flux <= 16000; flux++) {
+            const alphabeta_t flux_q11 = { (int16_t)-flux, 0 };
+            pause = catch_pause(&drive.run, &params, flux_q11, taken);
+            TEST_ASSERT_TRUE_MESSAGE(pause <= before && pause >= CATCH_PAUSE_LEAST, golden_row(taken));
+            before = pause;
+        }
+        TEST_ASSERT_TRUE_MESSAGE(taken > 8u || pause < 20u, golden_row(taken));
+    }
+}
+
+void test_the_voltage_of_a_rotor_beyond_the_circle_is_the_circle_s(void)
+{
+    static const int16_t speeds[] = { 16500, 20000, 32000 };
+    drive_params_t strong = params;
+    uint16_t n;
+    rig_ready();
+    for (n = 0; n < FIELDWEAK_ENTRIES; n++) {
+        strong.fieldweak.inv_kfi[n] = 2048;
+    }
+    EACH_DIRECTION(direction) {
+        EACH(k, speeds) {
+            drive.run.estimator.omega_erpm = (int16_t)(direction * speeds[k]);
+            catch_preset_estimator(&drive, &strong);
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * drive.circle.limit_q14, drive.run.control.v_q14.q, golden_row(k));
+        }
+    }
+}
+
 void test_a_rotor_that_turns_the_wrong_way_is_slowed_down_and_reversed_without_an_alignment(void)
 {
     EACH_DIRECTION(direction) {

@@ -91,3 +91,16 @@ void test_the_wait_is_long_enough_for_crystal_and_lock(void)
     /* a loop takes at least 3 clocks; 2 ms are needed, at 40 MIPS at worst */
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(2ul * 40000ul, 3ul * BOARD_WAIT_LOOPS);
 }
+
+void test_a_source_that_shares_bits_with_the_one_asked_for_is_another(void)
+{
+    static const uint16_t sources[] = { 0x7020, 0x2020, 0x1020, 0x3000 };
+    uint16_t n;
+    oscillator_answers = 0;
+    for (n = 0; n < 4u; n++) {
+        OSCCON = sources[n];
+        TEST_ASSERT_EQUAL_UINT16(1, clock_switch(3, 0x0020));
+    }
+    OSCCON = 0x3020;
+    TEST_ASSERT_EQUAL_UINT16(0, clock_switch(3, 0x0020));
+}

@@ -26,6 +26,21 @@ static uint16_t ms_until(drive_fault_t fault)
     return ms;
 }
 
+void test_the_mean_of_the_deviation_is_exact_to_its_last_bit(void)
+{
+    static const struct {
+        int16_t i_d;
+        int32_t before_q16;
+    } cases[] = { { 0, 1 }, { 0, 0x12345 }, { 3, 0xFFFF }, { 40, 0x2FFFF }, { 40, 0x7FFFFF }, { 1, 0 } };
+    EACH(n, cases) {
+        drive.run.control.i_q13.d = cases[n].i_d;
+        deviation.id_q16 = cases[n].before_q16;
+        (void)deviation_tick(&deviation, &drive, &params);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(
+            cases[n].before_q16 + (((int32_t)cases[n].i_d * 65536 - cases[n].before_q16) >> DEVIATION_MEAN_SHIFT), deviation.id_q16, golden_row(n));
+    }
+}
+
 /* ---- the d current ---- */
 
 void test_d_current_that_stays_further_off_than_noise_and_dead_time_is_found_whatever_its_sign(void)

@@ -53,6 +53,16 @@ void test_button_acts_once_after_30_ms_of_calm_contact(void)
     }
 }
 
+void test_a_button_that_is_held_for_minutes_acts_once(void)
+{
+    button_t b = { 0 };
+    uint32_t ms;
+    TEST_ASSERT_EQUAL_UINT16(1, button_pressed(&b, 1, 30));
+    for (ms = 0; ms < 70000ul; ms++) { /* more than the counter's word holds */
+        TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, 1, 1));
+    }
+}
+
 void test_each_press_acts_and_slow_passes_count_their_elapsed_time(void)
 {
     static const uint16_t presses[][2] = { { 40, 1 }, { 29, 0 }, { 30, 1 }, { 31, 1 } };
@@ -64,6 +74,17 @@ void test_each_press_acts_and_slow_passes_count_their_elapsed_time(void)
     TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, 1, 10));
     TEST_ASSERT_EQUAL_UINT16(0, button_pressed(&b, 1, 19));
     TEST_ASSERT_EQUAL_UINT16(1, button_pressed(&b, 1, 1));
+}
+
+void test_a_start_that_is_asked_for_is_not_begun_anew_before_the_interrupt_has_seen_it(void)
+{
+    static const panel_inputs_t nothing = { 0, 0, 1 };
+    the_panel.wish_run = 1;
+    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
+    drive.forced.speed_q10 = 77;
+    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    TEST_ASSERT_EQUAL_INT32(77, drive.forced.speed_q10);
 }
 
 /* ---- S2 ---- */

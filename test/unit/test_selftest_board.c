@@ -157,6 +157,33 @@ void test_outputs_that_the_state_does_not_ask_for_are_found(void)
     TEST_ASSERT_EQUAL_UINT16(SELFTEST_REGISTERS, board_selftest_failed);
 }
 
+void test_outputs_that_are_on_with_a_fault_are_wrong_in_every_state(void)
+{
+    static const uint16_t states[] = { DRIVE_BOOTSTRAP, DRIVE_ALIGN, DRIVE_CLOSED, DRIVE_FAULT };
+    size_t n;
+    for (n = 0; n < sizeof states / sizeof states[0]; n++) {
+        power_up();
+        board_drive.state = states[n];
+        P1OVDCON = (states[n] == DRIVE_BOOTSTRAP) ? BOARD_OUTPUTS_BOOTSTRAP : BOARD_OUTPUTS_PWM;
+        test_outputs();
+        TEST_ASSERT_EQUAL_UINT16((states[n] == DRIVE_FAULT) ? SELFTEST_REGISTERS : SELFTEST_NONE, board_selftest_failed);
+        board_drive.fault = FAULT_STALL;
+        test_outputs();
+        TEST_ASSERT_EQUAL_UINT16(SELFTEST_REGISTERS, board_selftest_failed);
+    }
+}
+
+void test_a_slice_that_has_a_word_of_the_keep_is_seen(void)
+{
+    static volatile uint16_t ram[4u * SLICE_WORDS];
+    const volatile uint16_t *keep = &ram[2u * SLICE_WORDS];
+    uint16_t n;
+    for (n = 0; n < 3u * SLICE_WORDS; n++) {
+        TEST_ASSERT_EQUAL_UINT16(n >= SLICE_WORDS, slices_touch(&ram[n], keep));
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, slices_touch(&ram[3u * SLICE_WORDS], keep));
+}
+
 void test_low_sides_may_stay_on_until_the_bridge_s_first_duties(void)
 {
     board_ms(100);
