@@ -145,6 +145,16 @@ def test_a_stuck_bit_of_ram_is_found_at_a_start(board: PilBoard, place: int, at_
     assert board.get("fw.fault") == SELFTEST and board.get("pwm.outputs_on") == 0
 
 
+def test_a_stuck_bit_of_the_way_back_from_the_start_leaves_the_outputs_off(board: PilBoard) -> None:
+    """The program cannot come back to tell: the core resets, again and again."""
+    C.iss_stick(C.vb_iss_core(board._vb), 0x0C00, 0x0001, 0)
+    board.power_up()
+    for _ in range(100):
+        pass_ms(board, 1)
+        assert board.get("pwm.outputs_on") == 0
+    assert board.get("cpu.resets") > 1 and board.get("fw.state") != 1
+
+
 def call(chip: PilBoard, address: int) -> int:
     """W0 after a call of the target's function."""
     core, back = C.vb_iss_core(chip._vb), 0x200
