@@ -117,11 +117,13 @@ void test_a_table_of_one_value_is_that_value_at_every_speed(void)
     uint16_t n;
     int16_t ref_erpm;
     for (n = 0; n < FIELDWEAK_ENTRIES; n++) {
+        params.idref_q13[n] = -300;
         params.inv_kfi[n] = 7956;
         params.ls_over2ls0_q15[n] = 16384;
     }
     for (ref_erpm = 0; ref_erpm < 30000; ref_erpm = (int16_t)(ref_erpm + 1000)) {
         look_up(ref_erpm);
+        TEST_ASSERT_EQUAL_INT16(-300, fw.table_q13);
         TEST_ASSERT_EQUAL_INT16(7956, model.inv_kfi);
         TEST_ASSERT_EQUAL_UINT16(GOLDEN_FIELDWEAK_LS_BASE, model.ls_q16);
     }
