@@ -2,9 +2,8 @@
 #include "control/fieldweak.h"
 #include "golden.h"
 #include "golden_emf_filter.h"
-#include "golden_fieldweak.h"
+#include "golden_fieldweak_params.h"
 #include "golden_fieldweak_quick.h"
-#include "golden_fieldweak_tables.h"
 #include "unity.h"
 
 static fieldweak_params_t params;
@@ -14,15 +13,7 @@ static fieldweak_t fw;
 void setUp(void)
 {
     static const fieldweak_t zero;
-    GOLDEN_EACH(fieldweak_tables, v)
-    {
-        params.idref_q13[n] = v.idref;
-        params.inv_kfi[n] = v.inv_kfi;
-        params.ls_over2ls0_q15[n] = v.ls;
-    }
-    params.on_speed_erpm = GOLDEN_FIELDWEAK_ON_SPEED;
-    params.index_per_count_q16 = 65536u >> SPEED_INDEX_CONST;
-    params.ls_base_q16 = (uint16_t)GOLDEN_FIELDWEAK_LS_BASE;
+    golden_fieldweak_params(&params);
     params.kfilter_esdq_q16 = 2400;
     params.kfilter_esdq_fw_q16 = 328;
     params.esdq_per_erpm_q13 = 14055u; /* 50 us */
