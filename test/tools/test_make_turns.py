@@ -1,13 +1,16 @@
 """Two makes at once in one tree, and two programs that write the same result: they take turns or have folders of their own."""
 
 import fcntl
+import io
 import json
 import multiprocessing
 import os
 import shlex
 import shutil
 import subprocess
+import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -152,8 +155,10 @@ def test_a_reader_always_finds_a_result(tmp_path):
     assert len(set(seen)) > 1
 
 
-def test_a_search_and_an_identification_wait_for_another_one(tmp_path, monkeypatch, capsys):
+def test_a_search_and_an_identification_wait_for_another_one(tmp_path, monkeypatch):
     monkeypatch.setattr(output, "ROOT", tmp_path)
+    said = io.StringIO() # capsys empties what it reads, and would lose what the other thread writes meanwhile
+    monkeypatch.setattr(sys, "stdout", said)
     order, begun = [], threading.Event()
 
     def second() -> None:
@@ -166,10 +171,9 @@ def test_a_search_and_an_identification_wait_for_another_one(tmp_path, monkeypat
             begun.set()
             with output.in_turn("another search"):
                 pass
-            said = ""
-            while "waiting for another search\n" not in said: # a read may come between the words and the line's end
+            while said.getvalue() != "waiting for another search\n":
                 assert not waiting.done()
-                said += capsys.readouterr().out
+                time.sleep(0.001)
             order.append("first")
         waiting.result()
     assert order == ["first", "second"]
