@@ -60,18 +60,13 @@ QM_INLINE current_q13_t limits_beside(const drive_params_t *p, uint16_t other_q1
     return limits_circle(p->current_max_q13, p->current_max_reciprocal, other_q13);
 }
 
-/** Field weakening's trim, twice in a round in closed loop. */
-QM_INLINE void limits_trim(drive_run_t *run, const drive_params_t *p)
-{
-    fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(&run->control), estimator_speed(&run->estimator));
-}
-
 /** d current: what is left of the hand-over, the table with its trim or what is burnt, the rotor's probe; the q current gets the rest of the circle. */
 QM_INLINE void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
     int16_t id_max = limits_asked_most(p), id_q13;
 
+    fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
     id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->burn_q13);
     c->ref_q13.d = qm_limit_called(id_q13, id_max);
     c->iq_limit_q13 = limits_beside(p, (uint16_t)qm_size(c->ref_q13.d));

@@ -200,27 +200,24 @@ QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
-/** Third part of a slow step: limits, protection, and what the running motor teaches. Field weakening's trim has two steps in a round, a quarter and
- *  three quarters of it apart: a ripple that fits twice into a round it sees once from either side, not in one phase for seconds.
+/** Third part of a slow step: limits, protection, and what the running motor teaches. The limits' two steps of a round are a quarter and three
+ *  quarters of it apart: the trim of field weakening sees a ripple that fits twice into a round once from either side, not in one phase for seconds.
  *  @param part of the round @return which one it was */
 QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
 {
-    if ((part & 8u) == 0u && late_second(call) && drive_is_closed(d)) {
-        limits_trim(&d->run, p);
-    }
     switch (part) {
-    case 6:
+    case 10:
         drive_rotor_step(d, p, call);
-        return 6;
+        return 10;
     case 14:
         drive_model_step(d, p, call);
         return 14;
-    default: /* 2, 10 */
+    default: /* 2, 6 */
         drive_limit_step(d, p, call);
-        if ((part & 8u) != 0u && late_first(call)) {
+        if ((part & 4u) != 0u && late_first(call)) {
             model_learn_step(d, p);
         }
-        return (uint16_t)((part & 8u) | 2u);
+        return (uint16_t)((part & 4u) | 2u);
     }
 }
 

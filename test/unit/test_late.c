@@ -101,16 +101,6 @@ void test_a_slow_step_lasts_as_long_as_with_duties_in_time(void)
 #define LOOPTIME_SEC 0.000025
 }
 
-void test_field_weakenings_trim_takes_two_steps_in_a_round(void)
-{
-    drive.run.fieldweak.trim_q13 = -100;
-    for (uint16_t n = 0; n < SLOW_SELDOM * SLOW_PERIODS; n++) {
-        rig_speed(8000);
-        rig_tick(1);
-    }
-    TEST_ASSERT_EQUAL_INT16(-100 + 2 * params.fieldweak.trim_step_q13, drive.run.fieldweak.trim_q13);
-}
-
 /** Else they would see one rotor at two speeds, and the speed's trim would take the difference for a load that moves. */
 void test_estimator_and_observer_turn_a_speed_into_the_same_angle(void)
 {

@@ -57,8 +57,8 @@ void test_d_reference_is_the_sum_of_hand_over_table_trim_and_probe(void)
     drive.run.handover.id_q13 = 500;
     drive.run.fieldweak.table_q13 = -900;
     drive.run.fieldweak.trim_q13 = -100;
-    limits_current(&drive.run, &params);
-    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + 700, drive.run.control.ref_q13.d);
+    limits_current(&drive.run, &params); /* the trim goes back by one step */
+    TEST_ASSERT_EQUAL_INT16(500 - 900 - 100 + 700 + params.fieldweak.trim_step_q13, drive.run.control.ref_q13.d);
 }
 
 void test_trim_sees_the_voltage_that_q_leaves_unused_in_both_directions(void)
@@ -66,11 +66,11 @@ void test_trim_sees_the_voltage_that_q_leaves_unused_in_both_directions(void)
     EACH_DIRECTION(direction) {
         rig_speed((int16_t)(direction * 20000));
         drive.run.control.v_q14.q = (int16_t)(direction * (16000 + 32));
-        limits_trim(&drive.run, &params);
-        TEST_ASSERT_EQUAL_INT16(-4, drive.run.fieldweak.trim_q13);
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(-4, drive.run.control.ref_q13.d);
         drive.run.control.v_q14.q = (int16_t)(direction * (16000 - 32));
-        limits_trim(&drive.run, &params);
-        TEST_ASSERT_EQUAL_INT16(0, drive.run.fieldweak.trim_q13);
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.d);
     }
 }
 

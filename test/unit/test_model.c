@@ -124,7 +124,7 @@ void test_it_learns_every_32nd_period_of_the_closed_loop_only(void)
             teachable(1);
             drive.state = (uint16_t)states[n];
             rig_slow(part);
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(part == 10u && n < 2u, drive.run.adaptation.kfi_q31 != 0, golden_row(n));
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(part == 6u && n < 2u, drive.run.adaptation.kfi_q31 != 0, golden_row(n));
         }
     }
 }
@@ -135,7 +135,7 @@ void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void
         teachable(1);
         drive.state = (uint16_t)DRIVE_RAMP;
         drive.periods = waited;
-        rig_slow(10);
+        rig_slow(6);
         TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
     }
