@@ -3,17 +3,13 @@
  * In lock the filtered Ed is zero if 1/Kphi and R are right. An angle that leads makes it positive in both directions of rotation (see
  * estimator_pll()): 1/Kphi is too large, or R too small for a motor that drives. A step down the gradient corrects each by its own share of
  * the voltage, so that the flux learns where the back-EMF prevails and the resistance where the current does. The tables of field
- * weakening stay the feed-forward; the flux is the magnets' temperature, the resistance the winding's.
- *
- * What is learnt from is the mean of Ed. Dead time leaves it a sixth harmonic, and one look in a round of the slow work would for seconds see one
- * phase of that: at some speeds the two beat slowly. */
+ * weakening stay the feed-forward; the flux is the magnets' temperature, the resistance the winding's. */
 #ifndef CONTROL_ADAPTATION_H
 #define CONTROL_ADAPTATION_H
 
 #include "control/estimator.h"
 
 #define ADAPTATION_KFI_LEAST 1024 /**< a speed of 2048 counts at full voltage: a count is 0.1 % */
-#define ADAPTATION_MEAN_Q16 2048  /**< K of Ed's mean, of every second period: 50 Hz at 20 kHz */
 
 /** Constants. */
 typedef struct {
@@ -28,16 +24,9 @@ typedef struct {
 typedef struct {
     int32_t kfi_q31; /**< of 1/Kphi: negative where the flux is stronger */
     int32_t rs_q31;
-    int32_t e_d_q28; /**< mean of Ed: Q12 with 16 fraction bits */
 } adaptation_t;
 
-/** The mean goes on. Every second period. @param e_d_q12 filtered Ed */
-QM_INLINE void adaptation_average(adaptation_t *a, voltage_q12_t e_d_q12)
-{
-    (void)qm_lowpass(&a->e_d_q28, e_d_q12, ADAPTATION_MEAN_Q16);
-}
-
-/** One step. @param emf_q12 filtered back-EMF in the estimator's frame, Ed in the mean @param ri_q12 R i_q of the model, signed */
+/** One step. @param emf_q12 filtered back-EMF in the estimator's frame @param ri_q12 R i_q of the model, signed */
 QM_INLINE void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
 {
     uint16_t emf = (uint16_t)qm_abs(emf_q12.q), ri = (uint16_t)qm_abs(ri_q12), wrong = (uint16_t)qm_abs(emf_q12.d), sum;

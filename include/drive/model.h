@@ -27,7 +27,6 @@ QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     voltage_q12_t ri_q12 = 0;
-    dq_t emf_q12;
     if (drive_is_closed(d)) {
         if (!model_is_taught(run)) {
             return;
@@ -38,9 +37,7 @@ QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
     } else {
         /* flux alone */
     }
-    emf_q12.d = qm_hi(run->adaptation.e_d_q28);
-    emf_q12.q = qm_hi(run->estimator.e_q_q28);
-    adaptation_learn(&run->adaptation, &p->adaptation, emf_q12, ri_q12);
+    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), ri_q12);
 }
 
 /** The motor's constants follow the speed reference, and what was learnt. Every seldom step in closed loop. */

@@ -64,8 +64,8 @@
 
 #define PARAM_OBSERVER_INIT \
     { \
-        .deltat_q32 = (int16_t)((1 + LATE_DUTIES) * PARAM_ROUND(PARAM_DELTAT_Q32)), /* rounded as the estimator's */ \
-            .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / ((float)SLOW_PERIODS * PARAM_DELTAT_Q32) + 0.5F), \
+        .deltat_q32 = (int16_t)PARAM_ROUND((float)(1 + LATE_DUTIES) * PARAM_DELTAT_Q32), \
+        .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / ((float)SLOW_PERIODS * PARAM_DELTAT_Q32) + 0.5F), \
         .shift = PARAM_ACCEL_SHIFT, \
         .per_current_q16 = (uint16_t)PARAM_MIN(PARAM_ACCEL_UNITS * 65536.0F + 0.5F, 65535.0F), \
         .per_unit_q15 = (uint16_t)PARAM_MIN(32768.0F / PARAM_ACCEL_UNITS + 0.5F, 65535.0F), \

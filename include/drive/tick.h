@@ -118,7 +118,6 @@ QM_INLINE void drive_follow(drive_t *d, const drive_params_t *p)
 {
     if (MODE_ALIGNS) {
         estimator_settle(&d->run.estimator, &p->estimator);
-        adaptation_average(&d->run.adaptation, qm_hi(d->run.estimator.e_d_q28));
     }
 }
 
@@ -200,24 +199,22 @@ QM_INLINE void drive_model_step(drive_t *d, const drive_params_t *p, uint16_t ca
     }
 }
 
-/** Third part of a slow step: limits, protection, and what the running motor teaches. The limits' two steps of a round are a quarter and three
- *  quarters of it apart: the trim of field weakening sees a ripple that fits twice into a round once from either side, not in one phase for seconds.
- *  @param part of the round @return which one it was */
+/** Third part of a slow step: limits, protection, and what the running motor teaches. @param part of the round @return which one it was */
 QM_INLINE uint16_t drive_limit_part(drive_t *d, const drive_params_t *p, uint16_t part, uint16_t call)
 {
     switch (part) {
-    case 10:
+    case 6:
         drive_rotor_step(d, p, call);
-        return 10;
+        return 6;
     case 14:
         drive_model_step(d, p, call);
         return 14;
-    default: /* 2, 6 */
+    default: /* 2, 10 */
         drive_limit_step(d, p, call);
-        if ((part & 4u) != 0u && late_first(call)) {
+        if ((part & 8u) != 0u && late_first(call)) {
             model_learn_step(d, p);
         }
-        return (uint16_t)((part & 4u) | 2u);
+        return (uint16_t)((part & 8u) | 2u);
     }
 }
 

@@ -4,7 +4,6 @@
  * options: -eva-subdivide-non-linear-function vd_limit:100 -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40,circle_in_pieces:100 */
 #include "any.h"
 
-#include "control/adaptation.h"
 #include "control/pi.h"
 #include "control/transforms.h"
 
@@ -152,14 +151,13 @@ static void lowpass_from(int16_t k)
     }
 }
 
-/** The filtered back-EMF stays in the range of the back-EMF, with every filter that fieldweak_tick() can choose, and with that of Ed's mean. */
+/** The filtered back-EMF stays in the range of the back-EMF, with every filter that fieldweak_tick() can choose. */
 void proof_lowpass(void)
 {
     set_bounds();
     //@ check met: 2 * emf_dq_max <= 40000;
     lowpass_with(params.fieldweak.kfilter_esdq_q16);
     lowpass_with(params.fieldweak.kfilter_esdq_fw_q16);
-    lowpass_with(ADAPTATION_MEAN_Q16);
     //@ loop unroll 128;
     for (int16_t k = FIELDWEAK_FILTER_LEAST; k < params.fieldweak.kfilter_esdq_q16 || k < params.fieldweak.kfilter_esdq_fw_q16; k += 128) {
         lowpass_from(k);

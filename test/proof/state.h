@@ -113,7 +113,6 @@ static void any_adaptation(adaptation_t *a)
 {
     a->kfi_q31 = any_l(params.adaptation.kfi_least * 65536l, params.adaptation.kfi_most * 65536l);
     a->rs_q31 = any_l(params.adaptation.rs_least * 65536l, params.adaptation.rs_most * 65536l);
-    a->e_d_q28 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
 }
 
 static void any_control(drive_control_t *c)
@@ -183,7 +182,6 @@ static void bounds_hold_again(void)
     //@ check quick: 0 <= o->quick_q15 && 0 <= o->share_q15;
     //@ check learnt_kfi: params.adaptation.kfi_least * 65536 <= a->kfi_q31 <= params.adaptation.kfi_most * 65536;
     //@ check learnt_rs: params.adaptation.rs_least * 65536 <= a->rs_q31 <= params.adaptation.rs_most * 65536;
-    //@ check mean_of_ed: emf_dq_max * -65536 <= a->e_d_q28 <= emf_dq_max * 65536 + 65535;
     //@ check model_rs: drive.run.model.rs_q16 <= rs_max;
     //@ check trim: -params.fieldweak.trim_max_q13 <= drive.run.fieldweak.trim_q13 <= 0;
     //@ check table: drive.run.fieldweak.index < FIELDWEAK_ENTRIES;

@@ -120,14 +120,6 @@ static inline int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
     return (y_q16 == &drive.run.estimator.e_d_q28) ? emf_d_in_pieces(y_q16) : emf_q_beside_d(y_q16);
 }
 
-/** circle.c, proof_lowpass: the mean of Ed. */
-static inline int16_t mean_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
-{
-    //@ check input: -emf_dq_max <= x <= emf_dq_max && k_q16 == ADAPTATION_MEAN_Q16;
-    *y_q16 = any_l(emf_dq_max * -65536l, emf_dq_max * 65536l + 65535l);
-    return qm_hi(*y_q16);
-}
-
 /** y += K (x - y) stays in the range of x, but only because y is near x at its ends: pieces that shrink towards them. */
 static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16)
 {
@@ -135,8 +127,6 @@ static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16
     int16_t low = -32767, high = 32767;
     if (y_q16 == &drive.bus_q31) {
         low = 0;
-    } else if (y_q16 == &drive.run.adaptation.e_d_q28) {
-        return mean_bounded(y_q16, x, k_q16);
     } else if (y_q16 != &drive.run.estimator.omega_filtered_q16) {
         return lowpass_bounded(y_q16, x, k_q16);
     }

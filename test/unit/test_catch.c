@@ -288,12 +288,12 @@ void test_a_stop_goes_on_from_the_present_speed_and_a_target_the_other_way_slows
         speed_choose_state(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         drive.command.run = 1;
-        rig_next_part(10);
+        rig_next_part(6);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
         TEST_ASSERT_INT16_WITHIN(20, (int16_t)(direction * 10000), drive.run.control.reference_erpm);
         drive.command.target_erpm = (int16_t)(direction * -10000);
-        rig_next_part(10);
+        rig_next_part(6);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
@@ -338,7 +338,7 @@ void test_a_stop_turns_round_only_at_its_end_for_a_target_the_other_way_while_th
             rig_slow(3);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(DRIVE_STOPPING, drive.state, golden_row(n));
             rig_slow(1);
-            rig_slow(10);
+            rig_slow(6);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].after, drive.state, golden_row(n));
         }
     }

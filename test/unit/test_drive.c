@@ -42,14 +42,14 @@ void test_a_stopped_drive_stays_off_and_shows_neither_speed_nor_reference(void)
     }
 }
 
-/* ---- the slow work: a part every second period, speed and bus every eighth, rates every sixteenth, the limits twice in 32, the others every 32nd ---- */
+/* ---- the slow work: a part every second period, speed and bus every eighth, limits and rates every sixteenth, the others every 32nd ---- */
 
 void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_thirty_two(void)
 {
     uint16_t n;
     rig_closed(1, 8000);
     for (n = 0; n < 128u; n++) {
-        uint16_t period, rare, slow, limits;
+        uint16_t period, rare, slow;
         drive.run.control.reference_erpm = 7000;
         drive.command.target_erpm = 8000;
         drive.run.fieldweak.index = 99;
@@ -68,19 +68,18 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
         period = drive.ticks & 31u;
         rare = drive.ticks & 15u;
         slow = drive.ticks & 7u;
-        limits = (uint16_t)(period == 4u || period == 12u); /* a quarter of a round apart: what ripples twice in it is seen from either side */
         TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 0u, drive.run.control.reference_erpm != 7000, "speed");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 28u, drive.run.fieldweak.index != 99u, "field weakening");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.duty_per_volt_q16 != 1u, "bus");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(limits, drive.circle.reciprocal != 1u, "circle");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(limits, drive.run.control.iq_limit_q13 != 1, "current limit");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.circle.reciprocal != 1u, "circle");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.stall_steps != 99u, "protection");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.control.trim_reference_erpm != 1, "trim");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u || (slow == 6u && !observer_is_calm(&drive.run.observer)), drive.run.observer.wrong_erpm != 1, "rates");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.estimator.old_turn_q16_rad != 1, "the estimator's sign");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 20u, drive.run.probe_most_q13 != 1, "probe");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
     }
 }
 

@@ -33,7 +33,7 @@ static adaptation_params_t bounds(q15_t kfi, q15_t rs_most, uint16_t rs_base_q16
 
 static void apply(const adaptation_params_t *p, int16_t inv_kfi, q15_t kfi, q15_t rs)
 {
-    const adaptation_t learnt = { .kfi_q31 = (int32_t)kfi * 65536, .rs_q31 = (int32_t)rs * 65536 };
+    const adaptation_t learnt = { (int32_t)kfi * 65536, (int32_t)rs * 65536 };
     model.inv_kfi = inv_kfi;
     adaptation_apply(&learnt, p, &model);
 }
@@ -48,7 +48,7 @@ void test_what_was_learnt_goes_to_the_model_as_by_the_reference(void)
     };
     GOLDEN_EACH(adaptation_step, v)
     {
-        const adaptation_t learnt = { .kfi_q31 = v.kfi, .rs_q31 = v.rs };
+        const adaptation_t learnt = { v.kfi, v.rs };
         model.inv_kfi = v.inv_kfi0;
         adaptation_apply(&learnt, &p, &model);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.inv_kfi, model.inv_kfi, golden_row(n));

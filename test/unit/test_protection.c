@@ -595,7 +595,7 @@ void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
     emf(0, 400);
     drive.state = (uint16_t)DRIVE_RAMP;
     for (uint16_t n = 0; n < 200u; n++) {
-        rig_slow(10);
+        rig_slow(6);
     }
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.probe_steps);
 }

@@ -146,7 +146,7 @@ void test_stop_while_torque_is_on_ramps_down_from_the_speed_and_the_load_that_ar
         int16_t before = 1000, n;
         TEST_ASSERT_EQUAL_INT16(1000, step(direction, 1000, 10000, 900));
         drive.command.run = 0;
-        rig_next_part(10);
+        rig_next_part(6);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPING, drive.state);
         rig_speed((int16_t)(direction * 10000));
