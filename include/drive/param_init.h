@@ -62,9 +62,10 @@
         .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
     }
 
+/* A speed's angle is rounded as the estimator rounds it. */
 #define PARAM_OBSERVER_INIT \
     { \
-        .deltat_q32 = (int16_t)PARAM_ROUND((float)(1 + LATE_DUTIES) * PARAM_DELTAT_Q32), \
+        .deltat_q32 = (int16_t)((1 + LATE_DUTIES) * PARAM_ROUND(PARAM_DELTAT_Q32)), \
         .per_turn_q12 = (int16_t)(65536.0F * 4096.0F / ((float)SLOW_PERIODS * PARAM_DELTAT_Q32) + 0.5F), \
         .shift = PARAM_ACCEL_SHIFT, \
         .per_current_q16 = (uint16_t)PARAM_MIN(PARAM_ACCEL_UNITS * 65536.0F + 0.5F, 65535.0F), \

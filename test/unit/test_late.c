@@ -101,6 +101,12 @@ void test_a_slow_step_lasts_as_long_as_with_duties_in_time(void)
 #define LOOPTIME_SEC 0.000025
 }
 
+/** Else they would see one rotor at two speeds, and the speed's trim would take the difference for a load that moves. */
+void test_estimator_and_observer_turn_a_speed_into_the_same_angle(void)
+{
+    TEST_ASSERT_EQUAL_INT16(2 * params.estimator.deltat_q32, params.observer.deltat_q32);
+}
+
 void test_each_half_of_a_part_comes_in_its_turn_and_leaves_its_mark(void)
 {
     uint16_t n;
