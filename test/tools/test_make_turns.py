@@ -171,8 +171,9 @@ def test_a_search_and_an_identification_wait_for_another_one(tmp_path, monkeypat
             begun.set()
             with output.in_turn("another search"):
                 pass
+            latest_s = time.monotonic() + 60.0
             while said.getvalue() != "waiting for another search\n":
-                assert not waiting.done()
+                assert not waiting.done() and time.monotonic() < latest_s, said.getvalue()
                 time.sleep(0.001)
             order.append("first")
         waiting.result()
