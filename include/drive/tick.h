@@ -105,7 +105,7 @@ QM_INLINE void drive_start_step(drive_t *d, const drive_params_t *p)
     }
 }
 
-/* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor model_learn_step */
+/* wcet: idle_step excludes estimator_settle speed_step protection_check_signals protection_probe_rotor protection_check_rotor adaptation_learn */
 /** First of the slow work: what a period with the bridge off is. */
 QM_INLINE void drive_rest(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {

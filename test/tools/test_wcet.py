@@ -172,6 +172,12 @@ def test_a_statement_that_a_run_contradicts_fails():
     assert line.startswith("ramp excludes _ADC1Interrupt/look (isr.c:3): not true of 3 interrupts that ran, which had ramp and _ADC1Interrupt/look")
 
 
+def test_a_part_that_never_ran_is_told():
+    ran, never = (report(EXCLUDES, times=[1, times, 0, 3]) for times in (1, 0))
+    assert [item.unseen for item in (ran, never)] == [[], ["ramp"]] == [bench.summary(item)["unseen"] for item in (ran, never)]
+    assert "ran in no scenario, so that no run has tried what is stated of it: ramp" in bench.text(never) and "ran in no scenario" not in bench.text(ran)
+
+
 def test_a_loop_that_turned_more_often_than_is_stated_fails():
     line, = bench.broken(report(times=[1, 4]), None)
     assert line == "turn(), include/tick.h:7: a loop turned 4 times in one interrupt, but what is stated makes 3 at most"

@@ -121,6 +121,11 @@ class Report:
         return Watch(tuple(parts), tuple(bit[item.part] | bit[other] for item, other in image.pairs))
 
     @property
+    def unseen(self) -> list[str]:
+        """Stated parts that no interrupt has executed: there the runs have held nothing against the statement."""
+        return [] if self.seen is None else [name for name, times in zip(self.program.part_names, self.seen.times) if not times]
+
+    @property
     def duties(self) -> list[int]:
         return sorted({bound.path.nodes[-1][0].address for bound in self.bounds if bound.to == THIRD_DUTY})
 
@@ -213,6 +218,8 @@ def text(report: Report) -> str:
               for bound in report.bounds if bound.handler in (INTERRUPT, SLOW)]
     stated = "\n".join(f"  {item}" for item in report.program.statements)
     parts.append(f"stated, and true of all that ran:\n{stated}" if not report.broken else f"stated:\n{stated}")
+    if report.unseen:
+        parts.append(f"ran in no scenario, so that no run has tried what is stated of it: {', '.join(report.unseen)}")
     return "\n\n".join(parts)
 
 
@@ -234,7 +241,7 @@ def summary(report: Report) -> dict[str, Any]:
             "bounds": [{"handler": bound.handler, "to": bound.to, "bound": bound.cycles, "observed": report.observed(bound), "free": bound.free}
                        for bound in report.bounds], "statements": [str(item) for item in report.program.statements]}
     if report.seen is not None:
-        data |= {"latency": report.latency, "load_cycles": report.seen.load_cycles, "interrupts": report.seen.runs}
+        data |= {"unseen": report.unseen, "latency": report.latency, "load_cycles": report.seen.load_cycles, "interrupts": report.seen.runs}
     return data
 
 
