@@ -3,7 +3,6 @@
 
 #include "drive/recorder.h"
 
-#include <math.h>
 #include <string.h>
 
 static recorder_t recorder;
@@ -72,7 +71,7 @@ static int16_t speed(uint16_t tick)
 /** Upper byte, rounded down. */
 static int upper(int16_t x)
 {
-    return (int)floor((double)x / 256.0);
+    return (x >= 0) ? x / 256 : -1 - (-1 - x) / 256;
 }
 
 /** A period as the board's interrupt has it; every quantity moves. */
