@@ -1,25 +1,18 @@
 """The assembler's table against itself and, where XC16 is installed (PATH or XC16=dir), against its assembler and disassembler."""
 
-import os
 import random
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
 import asm33
+import xc16
 from machine import Machine
 from operands import Sampler
 
 SAMPLES = 25
-
-
-def xc16(name: str) -> str | None:
-    """Path of one of XC16's programs."""
-    folder = os.environ.get("XC16")
-    return shutil.which(f"xc16-{name}", path=f"{folder}/bin" if folder else None)
 
 
 def texts(samples: int = SAMPLES, seed: int = 1, address: int = 0) -> list[tuple[asm33.Row, str]]:
@@ -83,23 +76,19 @@ def test_words_outside_the_table_are_no_instructions(machine: Machine) -> None:
 
 # ---- XC16 ----------------------------------------------------------------------------------------------------------------
 
-needs_xc16 = pytest.mark.skipif(not (xc16("as") and xc16("objdump")),
-                                reason="encodings against XC16: xc16-as and xc16-objdump are not on PATH nor in XC16=dir/bin")
-
-
 def assembled(folder: Path, lines: list[str]) -> list[tuple[int, int, str]]:
     """Address, word and disassembly of what XC16's assembler makes of these lines."""
     source, target = folder / "rows.s", folder / "rows.o"
     source.write_text("\n".join([".text", *lines, ""]), encoding="ascii")
-    done = subprocess.run([xc16("as"), "-p33FJ32MC204", source, "-o", target], capture_output=True, text=True, check=False)
+    done = subprocess.run([xc16.program("as"), "-p33FJ32MC204", source, "-o", target], capture_output=True, text=True, check=False)
     messages = [line for line in done.stderr.splitlines() if "DO loop" not in line and "Assembler messages" not in line]
     assert (done.returncode, messages[:20]) == (0, [])
-    listing = subprocess.run([xc16("objdump"), "-drz", target], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run([xc16.program("objdump"), "-drz", target], capture_output=True, text=True, check=True).stdout
     found = re.findall(r"^ *([0-9a-f]+):\t([0-9a-f]{2}) ([0-9a-f]{2}) ([0-9a-f]{2}) *\t?(.*)$", listing, re.MULTILINE)
     return [(int(at, 16), int(high + middle + low, 16), text.strip()) for at, low, middle, high, text in found]
 
 
-@needs_xc16
+@xc16.needs_compiler
 def test_xc16s_assembler_gives_the_same_words(tmp_path: Path) -> None:
     lines = []
     for row, text in texts():
@@ -112,7 +101,7 @@ def test_xc16s_assembler_gives_the_same_words(tmp_path: Path) -> None:
     assert (wrong[:20], len(got)) == ([], len(ours))
 
 
-@needs_xc16
+@xc16.needs_compiler
 def test_xc16s_disassembler_reads_the_same_instruction(tmp_path: Path) -> None:
     encoded = [asm33.encode(text) for _, text in texts()]
     listing = assembled(tmp_path, [f".pword 0x{word:06x}" for words in encoded for word in [*words, 0]])

@@ -3,23 +3,21 @@
 import ctypes
 import io
 import json
-import os
 import re
 import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from elftools.elf.elffile import ELFFile
 
+import xc16
 from chip import RAM, REGISTERS, ROOT, STOP, image, library, pass_ms
 from tools.bench import pil_command, recorder
 from tools.bench.board import BoardError
 from tools.bench.pil import PilBoard
 from tools.common.errors import UserError
 
-XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
 IMAGE = ROOT / "build" / "target" / "foc33.elf"
 
 
@@ -120,10 +118,9 @@ def test_what_the_core_met_is_a_warning_with_its_address(pil) -> None:
 @pytest.fixture
 def firmware() -> Path:
     """The ELF file that `make firmware` builds, with the HEX file beside it."""
-    if not XC16:
-        pytest.skip("xc16-gcc is not installed")
-    subprocess.run(["make", "-s", "-C", str(ROOT), "firmware"], check=True,
-                   env={k: v for k, v in os.environ.items() if not k.startswith("MAKE")})
+    if not xc16.COMPILER:
+        pytest.skip(xc16.NONE)
+    xc16.made("firmware")
     return IMAGE
 
 

@@ -1,17 +1,15 @@
 """What the scope costs the interrupt of the slow work, counted by the simulator in every period of a record. Needs XC16."""
 
-import os
-import shutil
 from unittest import mock
 
 import numpy as np
 import pytest
+import xc16
 
 from tools.live import board as live_board
 from tools.live import lnet
 from tools.live.symbols import Symbols
 
-XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
 OFF_CYCLES, MOST_CYCLES = 3, 35
 """Without a record; with four channels of 16 bits, whatever the scope does in the period."""
 SLOW_PHASES = 32
@@ -65,8 +63,8 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def bench() -> Bench:
-    if not XC16:
-        pytest.skip("xc16-gcc is not installed")
+    if not xc16.COMPILER:
+        pytest.skip(xc16.NONE)
     return Bench(live_board.parts(cpu="33f"))
 
 

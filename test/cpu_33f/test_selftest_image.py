@@ -1,21 +1,18 @@
 """The self-tests of the image in the simulator: a healthy chip passes, and each planted defect stops it by name. Needs XC16."""
 
 import ctypes
-import os
 import pathlib
 import re
-import shutil
-import subprocess
 from collections.abc import Callable, Iterator
 
 import pytest
 
+import xc16
 from chip import REGISTERS, ROOT, library, pass_ms
 from tools.bench.pil import PilBoard
 from tools.common.x_macro import rows
 from tools.image import crc, load, program
 
-XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
 ELF = ROOT / "build" / "target" / "foc33.elf"
 TESTS = {name: int(code) for code, name, *_ in rows("include", "drive/selftest.h", "SELFTEST_TABLE", "#code #name clause what")}
 STATE, DIRECTION, TICKS = 6, 14, 10 # bytes from board_drive
@@ -33,9 +30,9 @@ for _name, _result, *_arguments in (
 
 @pytest.fixture(scope="module")
 def elf() -> program.Elf:
-    if not XC16:
-        pytest.skip("xc16-gcc is not installed")
-    subprocess.run(["make", "-s", "-C", str(ROOT), "firmware"], check=True, env={k: v for k, v in os.environ.items() if not k.startswith("MAKE")})
+    if not xc16.COMPILER:
+        pytest.skip(xc16.NONE)
+    xc16.made("firmware")
     return program.read_elf(ELF)
 
 

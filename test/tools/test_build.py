@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from support import refusal
-from test_image_build import make
+from xc16 import make
 
 from tools.bench import build
 from tools.common import paths

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import support
 from sample_image import hex_text
-from test_image_build import compiler_free_path, make, our_lines
+from test_image_build import compiler_free_path, our_lines
+from xc16 import make
 
 from tools.bench import cycles, pil, pil_command
 from tools.common import paths

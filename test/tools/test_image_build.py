@@ -1,33 +1,19 @@
 """make firmware as a user calls it: without the compiler one clear line; with it no warning, and a build that fails for a bad image."""
 
-import os
 import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from xc16 import ROOT, build_image, make, needs_compiler, program, warnings
 
-from tools.common import paths
+from tools.common.param_rows import modes
 from tools.image import device, image
 
-ROOT = paths.ROOT
-MAKES_OWN = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "OPT", "DEFINES", "USERPARAMS", "VARIANT", "DFP", "V")
 TREE = ("Makefile", "userparams.h", "firmware", "include", "tools")
 NEEDED = ("make", "python3", "sh", "env", "grep", "sed", "test", "cat", "rm", "mv", "mkdir", "cmp", "printf", "getconf", "echo", "dirname",
           "head", "tail", "id", "gcc", "ar", "wc", "sort", "cut", "expr", "awk", "find", "flock", "mktemp", "cp")
-
-
-def xc16() -> str | None:
-    folder = os.environ.get("XC16")
-    return shutil.which(f"{folder}/bin/xc16-gcc" if folder else "xc16-gcc")
-
-
-def make(*arguments: str, root: Path = ROOT, path: str | None = None) -> subprocess.CompletedProcess:
-    environment = {name: value for name, value in os.environ.items() if name not in MAKES_OWN and (path is None or name != "XC16")}
-    if path is not None:
-        environment["PATH"] = path
-    return subprocess.run(["make", "-s", *arguments], cwd=root, env=environment, capture_output=True, text=True, check=False)
 
 
 def our_lines(done: subprocess.CompletedProcess) -> list[str]:
@@ -89,28 +75,16 @@ def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(t
 
 
 # ---- with it -------------------------------------------------------------------------------------------------------------
-with_compiler = pytest.mark.skipif(not xc16(), reason="xc16-gcc is not on PATH; give XC16=folder")
-MODES = ("OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SNAPSHOT", "IDENTIFY", "BRINGUP", "PARAMS_IN_RAM", "SELFTEST_OFF")
+@needs_compiler
+@pytest.mark.parametrize("word", ["OPT=-O1", "OPT=-O3", *(f"DEFINES=-DSCOPE=1 -D{mode}" for mode in modes())])
+def test_no_warning_and_a_good_image_at_every_level_and_with_the_scope_in_every_mode(word):
+    build_image(word, "VARIANT=check")
 
 
-def warnings(errors: str) -> list[str]:
-    """What a build says, but for what a mode tells its user on purpose."""
-    return [line for line in errors.splitlines() if "note: #pragma message: " not in line and not line.startswith("In file included from ")]
-
-
-@with_compiler
-@pytest.mark.parametrize("words", [*([f"OPT={level}", "VARIANT=check"] for level in ("-O1", "-O2", "-O3")),
-                                   *([f"DEFINES=-D{mode}", f"VARIANT=check-{mode}"] for mode in MODES),
-                                   *([f"DEFINES=-DSCOPE=1{more}", "VARIANT=check-scope"] for more in ("", *(f" -D{mode}" for mode in MODES)))])
-def test_no_warning_and_a_good_image_at_every_level_and_in_every_mode(words):
-    done = make("firmware", *words)
-    assert (done.returncode, warnings(done.stderr)) == (0, [])
-
-
-@with_compiler
+@needs_compiler
 def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
-    assert make("firmware", "VARIANT=check").returncode == 0
-    elf, words = (read(ROOT / "build/target-check" / name) for read, name in ((image.read_elf, "foc33.elf"), (image.read_hex, "foc33.hex")))
+    build_image()
+    elf, words = (read(ROOT / "build/target" / name) for read, name in ((image.read_elf, "foc33.elf"), (image.read_hex, "foc33.hex")))
     assert words[0] == 0x040000 | elf.symbols["__reset"]
     for base in (device.IVT, device.AIVT):
         assert words[base + 2 * device.VECTORS.index("_ADC1Interrupt")] == elf.symbols["__ADC1Interrupt"]
@@ -122,19 +96,18 @@ def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
         assert words[address] & mask == value
 
 
-@with_compiler
+@needs_compiler
 def test_a_compiler_under_xc_dsc_s_names_makes_the_same_image(tmp_path):
-    real = Path(xc16()).parent
     (tmp_path / "bin").mkdir()
-    for program in ("gcc", "bin2hex", "objdump", "ar"):
-        (tmp_path / f"bin/xc-dsc-{program}").write_text(f'#!/bin/sh\nexec {real}/xc16-{program} "$@"\n', encoding="utf-8")
-        (tmp_path / f"bin/xc-dsc-{program}").chmod(0o755)
-    for words in (["VARIANT=check"], ["VARIANT=check-dsc", f"XC16={tmp_path}"]):
-        assert make("firmware", *words).returncode == 0
-    assert (ROOT / "build/target-check-dsc/foc33.hex").read_bytes() == (ROOT / "build/target-check/foc33.hex").read_bytes()
+    for name in ("gcc", "bin2hex", "objdump", "ar"):
+        (tmp_path / f"bin/xc-dsc-{name}").write_text(f'#!/bin/sh\nexec {program(name)} "$@"\n', encoding="utf-8")
+        (tmp_path / f"bin/xc-dsc-{name}").chmod(0o755)
+    build_image()
+    build_image("VARIANT=check-dsc", f"XC16={tmp_path}")
+    assert (ROOT / "build/target-check-dsc/foc33.hex").read_bytes() == (ROOT / "build/target/foc33.hex").read_bytes()
 
 
-@with_compiler
+@needs_compiler
 def test_other_flags_rebuild_and_the_same_flags_do_not():
     elf, times = ROOT / "build/target-check/foc33.elf", []
     for words in ([], [], ["DEFINES=-DPARAMS_IN_RAM"]):
@@ -181,7 +154,7 @@ DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some
         f"{NOINLINE} spoil(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n    deeper();\n    some[1] = 1;\n}}")
 
 
-@with_compiler
+@needs_compiler
 @pytest.mark.parametrize("body, before, told", [
     ("spoil_a = (int32_t)((float)spoil_b * 1.5F);", NUMBERS, r"called by firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\): a float: use a Q format"),
     ("spoil_a = spoil_a / spoil_b;", NUMBERS, r"called by firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\): a division: use qm_divud"),
@@ -204,7 +177,7 @@ WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS327
             ("WINDIS = OFF", "WINDIS = ON"))
 
 
-@with_compiler
+@needs_compiler
 @pytest.mark.parametrize("file, old, new, told", [
     ("isr.c", "void BOARD_ISR _MathError(void) ", "void BOARD_ISR _T3Interrupt(void) ",
      "the image has no _MathError"),
@@ -215,14 +188,14 @@ def test_a_mistake_in_the_boards_files_fails_the_build(tree, file, old, new, tol
     assert told in tree.spoil(f"firmware/board/{file}", old, new)
 
 
-@with_compiler
+@needs_compiler
 def test_a_mode_in_userparams_h_is_not_held_to_the_budget_of_the_delivered_drive(tree):
     tree.change("userparams.h", "/* #define IDENTIFY */", "#define IDENTIFY")
     done = make("firmware", root=tree.root)
     assert (done.returncode, warnings(done.stderr)) == (0, []) and "of 33024 bytes of the chip" in done.stdout
 
 
-@with_compiler
+@needs_compiler
 def test_another_header_is_held_to_the_chip_and_to_the_deadline_only(tree):
     tree.change("userparams.h", "#define SCOPE 0 ", "#define SCOPE 1 ")
     done = make("firmware", root=tree.root)

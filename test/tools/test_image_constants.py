@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from elftools.elf.elffile import ELFFile
-from test_image_build import ROOT, with_compiler, xc16
+from xc16 import COMPILER, ROOT, needs_compiler
 
 from tools.image import device
 from tools.image.attribution import type_of
@@ -90,7 +90,7 @@ def test_the_fields_are_read_with_their_names_sizes_and_signs(tmp_path):
     assert "board_params.fieldweak.idref_q13[17]" in found
 
 
-@with_compiler
+@needs_compiler
 @pytest.mark.parametrize("seed", [None, *range(12)])
 def test_every_field_is_the_same_for_the_projects_own_parameters_and_for_others(tmp_path, seed):
     text = (ROOT / "userparams.h").read_text(encoding="utf-8")
@@ -100,6 +100,6 @@ def test_every_field_is_the_same_for_the_projects_own_parameters_and_for_others(
         text = NUMBER.sub(lambda m: f"{m[1]}{float(m[2]) * rng.uniform(0.9, 1.1):.7g}", text)
     header = tmp_path / "userparams.h"
     header.write_text(text, encoding="utf-8")
-    pairs = values(header, tmp_path, xc16())
+    pairs = values(header, tmp_path, COMPILER)
     assert len(pairs) > 100 and sum(host != 0 for _, host, _ in pairs) > 90
     assert [f"{path}: {host} on the PC, {image} on the chip" for path, host, image in pairs if host != image] == []

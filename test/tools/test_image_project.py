@@ -5,7 +5,7 @@ import re
 import xml.etree.ElementTree as ET
 
 import pytest
-from test_image_build import ROOT, make
+from xc16 import ROOT, make
 
 from tools.image import project
 

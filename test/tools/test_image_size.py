@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from sample_image import Function, Sample, program
 from support import command, refused
+import xc16
 
 from tools.common import paths
 from tools.common.errors import UserError
@@ -469,13 +470,12 @@ void __attribute__((interrupt, no_auto_psv)) _ADC1Interrupt(void);
 void __attribute__((interrupt, no_auto_psv)) _ADC1Interrupt(void) { drive.fault = guard(drive.fault) + table[drive.estimator.lost & 15]; }
 int main(void) { for (;;) { drive.estimator.lost = park(drive.fault, drive.estimator.history[1]); } }
 """
-XC16 = os.environ["XC16"] + "/bin/" if os.environ.get("XC16") else ""
 
 
-@pytest.mark.skipif(not shutil.which(f"{XC16}xc16-gcc"), reason="no xc16-gcc on PATH; give XC16=folder")
+@xc16.needs_compiler
 def test_a_compiled_program(tmp_path):
     (tmp_path / "guard.c").write_text(SOURCE, encoding="utf-8")
-    part = [f"{XC16}xc16-gcc", "-mcpu=33FJ32MC204", "-omf=elf"]
+    part = [xc16.COMPILER, "-mcpu=33FJ32MC204", "-omf=elf"]
     subprocess.run([*part, "-O2", "-g", "-std=gnu99", "-c", "guard.c", "-o", "t.o"], cwd=tmp_path, check=True)
     done = subprocess.run([*part, "-T", "p33FJ32MC204.gld", "-o", "t.elf", "t.o", "-Wl,--report-mem,-Map=t.map"], cwd=tmp_path, check=True,
                           capture_output=True, text=True)
@@ -489,7 +489,7 @@ def test_a_compiled_program(tmp_path):
     members = (("guard", "drive.fault"), ("guard", "drive.estimator.lost"), ("start", "drive.estimator"))
     assert [found[member].ram for member in members] == [2, 2, 8]
     assert found["guard", "table"].flash == 60
-    result = stack.analyse(size.disassemble(f"{XC16}xc16-objdump", tmp_path / "t.elf"), image.entry, {"_ADC1Interrupt": ["_ADC1Interrupt"]}, {},
+    result = stack.analyse(size.disassemble(xc16.program("objdump"), tmp_path / "t.elf"), image.entry, {"_ADC1Interrupt": ["_ADC1Interrupt"]}, {},
                            ("_data_init",))
     assert result.errors == []
     assert [name for name, _ in result.levels[0].chain.steps] == ["interrupt entry", "_ADC1Interrupt", "guard"]

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_image_build import ROOT, make, with_compiler
+from xc16 import ROOT, make, needs_compiler
 
 sys.path.insert(0, str(ROOT / "test" / "sixteen_bit"))
 import run as target_run # noqa: E402
@@ -126,7 +126,7 @@ def test_an_error_of_the_compiler_is_shown(judge):
 
 
 # ---- with the compiler ---------------------------------------------------------------------------------------------------
-@with_compiler
+@needs_compiler
 def test_some_unit_tests_give_the_pcs_results():
     done = make("test-target", "ONLY=test_pi test_trig")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -135,7 +135,7 @@ def test_some_unit_tests_give_the_pcs_results():
     assert all(re.search(rf"{suite}\.c:\w+:PASS", results) for suite in ("test_pi", "test_trig"))
 
 
-@with_compiler
+@needs_compiler
 def test_an_unknown_test_is_one_line():
     done = make("test-target", "ONLY=test_nothing")
     assert done.returncode == 2, done.stdout + done.stderr

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from support import refusal
-from test_image_build import make, our_lines
+from test_image_build import our_lines
+from xc16 import make
 
 from tools.bench import cli, command_common
 from tools.common.param_rows import modes

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from test_image_build import MAKES_OWN
+from xc16 import MAKES_OWN
 from test_make_input import copy
 
 from tools.bench import command_common

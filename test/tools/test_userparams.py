@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import xc16
 
 from tools.common import paths
 from tools.common.param_rows import modes, parameters
@@ -17,9 +18,8 @@ from tools.image import image
 
 HEADER = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
 PC = [*shlex.split(os.environ.get("CC") or "gcc"), "-O2", "-ftrack-macro-expansion=0"]
-XC16 = shutil.which("xc16-gcc", path=os.pathsep.join([os.path.join(os.environ.get("XC16", ""), "bin"), os.environ.get("PATH", "")]))
-CHIP = [XC16 or "", "-mcpu=33FJ32MC204", "-omf=elf", "-O2", "-Werror", "-pedantic", "-Wconversion"]
-COMPILERS = [pytest.param(PC, id="pc"), *[pytest.param(CHIP, id="chip")] * bool(XC16)]
+CHIP = [xc16.COMPILER or "", "-mcpu=33FJ32MC204", "-omf=elf", "-O2", "-Werror", "-pedantic", "-Wconversion"]
+COMPILERS = [pytest.param(PC, id="pc"), *[pytest.param(CHIP, id="chip")] * bool(xc16.COMPILER)]
 CHECKS = ("firmware/drive/param_text.c", "firmware/drive/param_check.c")
 
 
@@ -230,13 +230,11 @@ def test_a_build_without_optimisation_refuses_nothing_more(tmp_path):
     assert compiled(tmp_path, [*PC, "-O0"], HEADER) == ""
 
 
-@pytest.mark.skipif(not XC16, reason="xc16-gcc is not on PATH; give XC16=folder")
+@xc16.needs_compiler
 def test_the_checks_cost_the_image_nothing():
-    done = subprocess.run(["make", "-s", "target-elf", "VARIANT=check"], cwd=paths.ROOT, capture_output=True, text=True, check=False,
-                          env={name: text for name, text in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")})
-    assert done.returncode == 0, done.stderr
-    folder = paths.ROOT / "build/target-check"
-    names = subprocess.run([XC16.removesuffix("gcc") + "nm", folder / CHECKS[1].replace(".c", ".o")], capture_output=True, text=True,
+    xc16.made("target-elf")
+    folder = paths.ROOT / "build/target"
+    names = subprocess.run([xc16.program("nm"), folder / CHECKS[1].replace(".c", ".o")], capture_output=True, text=True,
                            check=True)
     assert "_range_of_MOTOR_RS_OHM" in names.stdout
     assert not [name for name in image.read_elf(folder / "foc33.elf").symbols if re.match(r"_(text_of|range_of|relations)", name)]
@@ -249,7 +247,7 @@ def make(*words: str) -> subprocess.CompletedProcess:
     return subprocess.run(["make", *words], cwd=paths.ROOT, env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("words", [["lib"], pytest.param(["target-elf"], marks=pytest.mark.skipif(not XC16, reason="no xc16-gcc"))])
+@pytest.mark.parametrize("words", [["lib"], pytest.param(["target-elf"], marks=xc16.needs_compiler)])
 def test_nothing_is_compiled_with_a_header_that_is_refused_and_a_mended_one_is_looked_at_again(tmp_path, words):
     words = [*words, "VARIANT=refused", f"USERPARAMS={tmp_path}"]
     for kind in ("host", "target"):

@@ -1,0 +1,23 @@
+"""Each check of the image tells its line when it ends; at the end stands the time of each, and of the other suites, dearest first."""
+
+from collections import Counter
+
+import pytest
+
+CHECKS = "image/"
+times: Counter = Counter()
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    suite, _, test = report.nodeid.partition("::")
+    checks = CHECKS in suite
+    name = test.removeprefix("test_").replace("_", " ") if checks else suite
+    times[name] += report.duration
+    if checks and (report.when == "call" or not report.passed):
+        print(f"  check {name:60} {report.outcome:8} ({report.duration:.1f} s)", flush=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if not hasattr(session.config, "workerinput"):
+        print("times, dearest first:", *(f"{seconds:8.1f} s  {name}" for name, seconds in times.most_common()), sep="\n", flush=True)
