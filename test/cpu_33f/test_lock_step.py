@@ -18,6 +18,7 @@ from tools.bench.board import BoardError
 from tools.bench.pil import PilBoard
 from tools.common.errors import UserError
 
+pytestmark = pytest.mark.xc16
 IMAGE = ROOT / "build" / "target" / "foc33.elf"
 
 

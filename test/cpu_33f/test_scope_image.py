@@ -10,6 +10,7 @@ from tools.live import board as live_board
 from tools.live import lnet
 from tools.live.symbols import Symbols
 
+pytestmark = pytest.mark.xc16
 OFF_CYCLES, MOST_CYCLES = 3, 35
 """Without a record; with four channels of 16 bits, whatever the scope does in the period."""
 SLOW_PHASES = 32

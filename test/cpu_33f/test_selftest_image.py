@@ -13,6 +13,7 @@ from tools.bench.pil import PilBoard
 from tools.common.x_macro import rows
 from tools.image import crc, load, program
 
+pytestmark = pytest.mark.xc16
 ELF = ROOT / "build" / "target" / "foc33.elf"
 TESTS = {name: int(code) for code, name, *_ in rows("include", "drive/selftest.h", "SELFTEST_TABLE", "#code #name clause what")}
 STATE, DIRECTION, TICKS = 6, 14, 10 # bytes from board_drive

@@ -17,6 +17,12 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         print(f"  check {name:60} {report.outcome:8} ({report.duration:.1f} s)", flush=True)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.nodeid.startswith(CHECKS):
+            item.add_marker("xc16")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if not hasattr(session.config, "workerinput"):

@@ -19,7 +19,7 @@ from tools.image import image
 HEADER = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
 PC = [*shlex.split(os.environ.get("CC") or "gcc"), "-O2", "-ftrack-macro-expansion=0"]
 CHIP = [xc16.COMPILER or "", "-mcpu=33FJ32MC204", "-omf=elf", "-O2", "-Werror", "-pedantic", "-Wconversion"]
-COMPILERS = [pytest.param(PC, id="pc"), *[pytest.param(CHIP, id="chip")] * bool(xc16.COMPILER)]
+COMPILERS = [pytest.param(PC, id="pc"), *[pytest.param(CHIP, id="chip", marks=xc16.MARKS)] * bool(xc16.COMPILER)]
 CHECKS = ("firmware/drive/param_text.c", "firmware/drive/param_check.c")
 
 
@@ -247,7 +247,7 @@ def make(*words: str) -> subprocess.CompletedProcess:
     return subprocess.run(["make", *words], cwd=paths.ROOT, env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("words", [["lib"], pytest.param(["target-elf"], marks=xc16.needs_compiler)])
+@pytest.mark.parametrize("words", [["lib"], pytest.param(["target-elf"], marks=xc16.MARKS)])
 def test_nothing_is_compiled_with_a_header_that_is_refused_and_a_mended_one_is_looked_at_again(tmp_path, words):
     words = [*words, "VARIANT=refused", f"USERPARAMS={tmp_path}"]
     for kind in ("host", "target"):

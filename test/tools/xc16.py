@@ -1,8 +1,10 @@
 """The target compiler, where the Makefile finds one: in XC16, else on PATH, as XC16 or its successor XC-DSC; and make with it."""
 
+import functools
 import os
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,12 @@ FOLDER = os.environ.get("XC16") and str(paths.ROOT / os.environ["XC16"])
 os.environ.update({"XC16": FOLDER} if FOLDER else {}) # for make in a copy of the project, too
 COMPILER = next(filter(None, (shutil.which(f"{name}gcc", path=f"{FOLDER}/bin" if FOLDER else None) for name in ("xc16-", "xc-dsc-"))), None)
 NONE = "no xc16-gcc on PATH; give XC16=folder"
-needs_compiler = pytest.mark.skipif(not COMPILER, reason=NONE)
+MARKS = [pytest.mark.xc16, pytest.mark.skipif(not COMPILER, reason=NONE)]
+"""Of what make test-image runs."""
+
+
+def needs_compiler(test: Callable) -> Callable:
+    return functools.reduce(lambda marked, mark: mark(marked), MARKS, test)
 
 
 def program(name: str) -> str:
