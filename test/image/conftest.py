@@ -25,5 +25,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    if not hasattr(session.config, "workerinput"):
+    if times and not hasattr(session.config, "workerinput"): # else a worker of a run that tells it
         print("times, dearest first:", *(f"{seconds:8.1f} s  {name}" for name, seconds in times.most_common()), sep="\n", flush=True)
