@@ -185,7 +185,9 @@ WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS327
      "the image has no _MathError"),
     ("config.c", "PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON (PWM pins are inputs at reset)"),
     *(("config.c", old, new, f"{new} in config.c, but the board needs") for old, new in WATCHDOG), # off or too slow
-    ("main.c", "int main(void)\n{", "int main(void)\n{\n    int unused = 1;", "unused variable")])
+    ("main.c", "int main(void)\n{", "int main(void)\n{\n    int unused = 1;", "unused variable"),
+    ("main.c", "int main(void)\n{", "void nowhere(void);\nint main(void)\n{\n    nowhere();",
+     "foc33: the image does not link: undefined reference to `_nowhere' (more in build/target/foc33.memory)")])
 def test_a_mistake_in_the_boards_files_fails_the_build(tree, file, old, new, told):
     assert told in tree.spoil(f"firmware/board/{file}", old, new)
 

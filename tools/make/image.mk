@@ -84,7 +84,8 @@ $X/%.o: %.c $X/flags | $X/params
 
 $X/foc33.elf: $X/image.o tools/image/crc.py
 	$(call say,ld,$@)$(target_link) -o $@ $< -Wl,-Map=$X/foc33.map,$(target_link_options) >$X/foc33.memory 2>&1 || \
-	    { cat $X/foc33.memory >&2; rm -f $@; exit 1; }
+	    { reason=$$(grep -iEm 1 'undefined reference|error|could not|cannot|is full|multiple definition' $X/foc33.memory); \
+	    echo "foc33: the image does not link: $${reason#: } (more in $X/foc33.memory)" >&2; rm -f $@; exit 1; }
 	@! grep -i warning $X/foc33.memory >&2 || { rm -f $@; exit 1; }
 	$(target_setup)
 	@$(python) -m tools.image.crc $@ || { rm -f $@; exit 1; }
