@@ -2,9 +2,9 @@
 
     python3 -m tools.docs.readme [--check] [--compiler] [name ...]
 
-A table's place is between the marks <!-- name --> and <!-- end --> of a page, whichever. Each of its rows carries, out of sight, the checksum of the firmware
-that it was measured on (tools/common/checksum.py) and the date; a row of older firmware shows the date. With --check nothing is written: what takes seconds
-is measured anew, and a row that differs is an error."""
+A table's place is between the marks <!-- name --> and <!-- end --> of a page, whichever. Each of its rows carries, out of sight, the
+checksum of the firmware that it was measured on (tools/common/checksum.py) and the date; a row of older firmware shows the date. With
+--check nothing is written: what takes seconds is measured anew, and a row that differs is an error."""
 
 import argparse
 import datetime
@@ -28,8 +28,9 @@ from .figures import BLOCKS, Part
 ROOT = paths.ROOT
 MOTORS = paths.names(paths.MOTORS)
 AT_40KHZ = "MOTOR=hurst_dmb0224c10002 BOARD=mclv_40khz"
+HEADER_40KHZ = "build/tune/hurst_dmb0224c10002-mclv_40khz"
 OTHER_INPUT = ("firmware/budget.toml", "tools/bench/*.py", "tools/bench/scenarios/*.toml", "tools/image/*.py")
-"""What the cycles depend on beside the code that the checksum is of."""
+"""What results in build/ depend on beside the code that the checksum is of."""
 OURS = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "MAKEOVERRIDES", "CHECK", "ONLY")
 """Variables of this make that the ones it starts do not have."""
 
@@ -49,7 +50,8 @@ SOURCES = {
                    pictures=(("run/demo/speed.png", "demo-speed.png"), ("run/demo/field_weakening.png", "demo-field-weakening.png"))),
     **{name: Source((f"run SCENARIO={name}",), takes="seconds") for name in ("stop_from_top", "fault_stall")},
     "table2": Source(("table2",), takes="seconds"),
-    **{name: Source((name,), of, "seconds", f"target/{name}.json") for name, of in (("size", "image"), ("cycles", "chip"), ("wcet", "chip"))},
+    "size": Source(("size",), "image", "seconds", "target/size.json"),
+    **{name: Source((name,), "chip", "seconds", f"target/{name}.json") for name in ("cycles", "wcet")},
     **{name: Source((name,)) for name in ("starts", "motors")},
     "tune-fw": Source(("tune-fw",), pictures=(("tune-fw/hurst_dmb0224c10002/over_speed.png", "tuning-fw.png"),)),
     "robust": Source(("robust",), pictures=(("run/robust/margins.png", "tuning-margins.png"),)),
@@ -57,7 +59,7 @@ SOURCES = {
     **{name: Source(tuple(f"{name} MOTOR={motor}" for motor in MOTORS)) for name in ("loadsteps", "lowspeed", "catch")},
     "demo_40khz": Source((f"run SCENARIO=demo_40khz {AT_40KHZ} OUT=build/run/demo_40khz",)),
     "table2_40khz": Source((f"table2 {AT_40KHZ} OUT=build/run/table2_40khz",)),
-    "cycles_40khz": Source((f"tune {AT_40KHZ}", "cycles SCENARIO=demo_40khz USERPARAMS=build/tune/hurst_dmb0224c10002-mclv_40khz OUT=build/target/40khz"), "chip"),
+    "cycles_40khz": Source((f"tune {AT_40KHZ}", f"cycles SCENARIO=demo_40khz USERPARAMS={HEADER_40KHZ} OUT=build/target/40khz"), "chip"),
     **{name: Source((name,), takes="by name", left=f"{name}/seed-1/summary.json") for name in ("campaign", "soak")},
     "tests": Source(("test", "coverage"), takes="found", left="test/summary.json"),
 }
@@ -105,7 +107,8 @@ def blocks_of(texts: dict[Path, str]) -> dict[str, Path]:
     for name in BLOCKS:
         places = [page for other, page in found if other == name]
         if len(places) != 1:
-            raise UserError(f"marks '<!-- {name} -->' and '<!-- end -->' found {len(places)} times", "README.md and docs/", "put them in once")
+            raise UserError(f"marks '<!-- {name} -->' and '<!-- end -->' found {len(places)} times", "README.md and docs/",
+                            "put them in once")
     for name, page in found:
         if name not in BLOCKS:
             raise UserError(f"no table '{name}'", str(page.relative_to(ROOT)), suggestion(name, BLOCKS))
@@ -136,6 +139,10 @@ def refilled(name: str, old: str, measured: set[str], sums: dict[str, str], toda
     return "\n".join(["| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1), *lines, ""])
 
 
+def refill(part: Part) -> str:
+    return f"make readme ONLY=\"{' '.join(part.sources)}\""
+
+
 def differences(name: str, page: str, old: str, measured: set[str]) -> list[str]:
     """A line for each row that a command now gives otherwise."""
     _, rows = rows_in(old)
@@ -145,11 +152,13 @@ def differences(name: str, page: str, old: str, measured: set[str]) -> list[str]
             continue
         command = " and ".join(f"`make {SOURCES[source].commands[0]}`" for source in part.sources)
         for says, gives in itertools.zip_longest((row.cells for row in kept(part, rows)), part.make()[1], fillvalue=[]):
-            pairs = list(zip(says, gives)) if len(says) == len(gives) else [(" | ".join(says) or "no such row", " | ".join(gives) or "no such row")]
+            pairs = list(zip(says, gives))
+            if len(says) != len(gives):
+                pairs = [(" | ".join(says) or "no such row", " | ".join(gives) or "no such row")]
             differing = [[cell or "nothing" for cell in pair] for pair in pairs if pair[0] != pair[1]]
             if differing:
                 one, two = map(", ".join, zip(*differing))
-                lines.append(f"{page}, {name}, {(says or gives)[0]}: says {one}; {command} gives {two}: run `make readme ONLY=\"{' '.join(part.sources)}\"`")
+                lines.append(f"{page}, {name}, {(says or gives)[0]}: says {one}; {command} gives {two}: run `{refill(part)}`")
     return lines
 
 
@@ -160,18 +169,20 @@ def older(name: str, old: str, measured: set[str], sums: dict[str, str]) -> list
         found = [row for row in kept(part, rows_in(old)[1]) if row.sum != sums[SOURCES[part.sources[0]].of]]
         if found and not measured.issuperset(part.sources):
             what = part.name or f"{len(found)} rows"
-            lines.append(f"  {name}, {what if len(what) < 60 else what[:57] + '...'}: of {found[0].date or 'no date'} (make readme ONLY=\"{' '.join(part.sources)}\")")
+            short = what if len(what) < 60 else what[:57] + "..."
+            lines.append(f"  {name}, {short}: of {found[0].date or 'no date'} ({refill(part)})")
     return lines
 
 
 # ---- measuring -----------------------------------------------------------------------------------------------------------
 def is_of_now(source: Source, sums: dict[str, str]) -> bool:
-    """Whether a result that is there already is of today's firmware: by its checksum, or because it is newer than every source."""
+    """Whether a result that is there already is of today's firmware: newer than all sources, whose comments may state something, and made of
+    just this image."""
     path = ROOT / "build" / source.left
     if not source.left or not path.exists():
         return False
     data = figures.loaded(source.left)
-    inputs = files("chip") if source.takes != "seconds" else [found for pattern in OTHER_INPUT for found in ROOT.glob(pattern)]
+    inputs = [*files("chip"), *(found for pattern in OTHER_INPUT for found in ROOT.glob(pattern))]
     return (not data.get("broken") and (source.takes != "seconds" or data.get("sources") == sums[source.of])
             and path.stat().st_mtime > max(found.stat().st_mtime for found in inputs))
 
@@ -181,8 +192,8 @@ def make(command: str) -> None:
     print(f"  make {command}", flush=True)
     log = ROOT / "build/readme.log"
     environment = {name: value for name, value in os.environ.items() if name not in OURS}
-    done = subprocess.run([sys.executable, "-m", "tools.common.progress", f"make {command}", "sh", "-c", f"exec make -s {command} >build/readme.log 2>&1"],
-                          cwd=ROOT, env=environment, check=False)
+    quietly = ["sh", "-c", f"exec make -s {command} >build/readme.log 2>&1"]
+    done = subprocess.run([sys.executable, "-m", "tools.common.progress", f"make {command}", *quietly], cwd=ROOT, env=environment, check=False)
     if done.returncode:
         told = log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or [f"exit status {done.returncode}"]
         named = [line for line in told if line.startswith("foc33: ")]
@@ -198,7 +209,8 @@ def chosen(names: Iterable[str], checks: bool, compiler: bool, sums: dict[str, s
         found = [source for part in BLOCKS.get(name, []) for source in part.sources] or [name]
         without = [source for source in found if SOURCES[source].of != "pc"]
         if without and not compiler:
-            raise UserError(f"'{without[0]}' needs Microchip's compiler", "ONLY", "put it on PATH or name its folder, e.g. XC16=/opt/microchip/xc16/v2.10")
+            raise UserError(f"'{without[0]}' needs Microchip's compiler", "ONLY",
+                            "put it on PATH or name its folder, e.g. XC16=/opt/microchip/xc16/v2.10")
         result += found
     turns = ("seconds",) if checks else ("seconds", "long")
     return list(dict.fromkeys(result)) or [name for name, source in SOURCES.items() if (compiler or source.of == "pc")
@@ -239,8 +251,10 @@ def check(texts: dict[Path, str], done: set[str], sums: dict[str, str]) -> list[
 
 def write(texts: dict[Path, str], done: set[str], sums: dict[str, str]) -> None:
     today = datetime.date.today().isoformat()
-    new = {page: BLOCK.sub(lambda found: found[1] + refilled(found[2], found[3], done, sums, today) + found[4] if found[2] in BLOCKS else found[0], text)
-           for page, text in texts.items()}
+
+    def block(found: re.Match) -> str:
+        return found[1] + refilled(found[2], found[3], done, sums, today) + found[4] if found[2] in BLOCKS else found[0]
+    new = {page: BLOCK.sub(block, text) for page, text in texts.items()}
     drawn = [(ROOT / "build" / source, ROOT / "docs" / target) for name in done for source, target in SOURCES[name].pictures]
     for source, _ in drawn: # before anything is written
         if not source.exists():
