@@ -202,7 +202,7 @@ setup-tune:
 	@tools/setup/prepare.sh tune
 
 .PHONY: readme bench
-readme: setup-run ## [upkeep] measure what the tables and pictures of README and docs/ show, and write them there; CHECK=1 only compares [CHECK=1 ONLY="demo size ..."]
+readme: setup-run ## [upkeep] measure what the tables and pictures of README and docs/ show, and write or compare them [CHECK=1 ONLY="demo size ..."]
 	@mkdir -p build; $(alone) $(python) -m tools.docs.readme $(if $(CHECK),--check) $(if $(shell command -v $(xc16)gcc),--compiler) \
 	    $(foreach name,$(ONLY),$(call quoted,$(name)))
 

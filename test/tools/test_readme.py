@@ -209,7 +209,7 @@ def test_the_check_finds_the_row_that_differs_and_writes_nothing(page, capsys):
     page.gives["fast"] = "7"
     assert page("--check") == (1, PAGE)
     told = capsys.readouterr()
-    assert told.err == 'foc33: README.md, one, fast: says 1; `make run SCENARIO=fast` gives 7: run `make readme ONLY="fast"`\n'
+    assert told.err == 'foc33: README.md, one, fast: says 1, but 7 by `make run SCENARIO=fast`: run `make readme ONLY="fast"`\n'
     assert set(page.made) == {"run SCENARIO=fast"}
     assert "of older firmware, not measured here:\n  one, long: of 2028-01-01 (make readme ONLY=\"long\")\n" in told.out
 
@@ -219,7 +219,7 @@ def test_a_row_too_many_or_too_few_does_not_pass(page, capsys, monkeypatch):
     for rows in parts.values():
         monkeypatch.setattr(readme, "BLOCKS", {"one": [Part(("fast",), lambda rows=rows: (["what", "value"], rows), "fast"), readme.BLOCKS["one"][1]]})
         assert page("--check")[0] == 1
-    assert re.findall(r"one, (\w+): says (.*?); .* gives (.*?): run", capsys.readouterr().err) == [
+    assert re.findall(r"one, (\w+): says (.*?), but (.*?) by .*: run", capsys.readouterr().err) == [
         ("new", "no such row", "new | 2"), ("fast", "fast | 1", "no such row")]
 
 
@@ -230,7 +230,7 @@ def test_rows_of_one_name_are_compared_one_by_one(page, tmp_path, capsys, monkey
     assert page("--check")[0] == 0
     rows.reverse()
     assert page("--check")[0] == 1
-    assert re.findall(r"says (.*?); .* gives (.*?): run", capsys.readouterr().err) == [("1", "2"), ("2", "1")]
+    assert re.findall(r"says (.*?), but (.*?) by .*: run", capsys.readouterr().err) == [("1", "2"), ("2", "1")]
 
 
 def test_a_command_that_fails_fails_the_check_and_keeps_the_page(page, monkeypatch, capsys):

@@ -158,7 +158,7 @@ def differences(name: str, page: str, old: str, measured: set[str]) -> list[str]
             differing = [[cell or "nothing" for cell in pair] for pair in pairs if pair[0] != pair[1]]
             if differing:
                 one, two = map(", ".join, zip(*differing))
-                lines.append(f"{page}, {name}, {(says or gives)[0]}: says {one}; {command} gives {two}: run `{refill(part)}`")
+                lines.append(f"{page}, {name}, {(says or gives)[0]}: says {one}, but {two} by {command}: run `{refill(part)}`")
     return lines
 
 
