@@ -292,6 +292,15 @@ def test_without_a_compiler_the_check_says_what_it_leaves_out(page, monkeypatch,
         page("fast")
 
 
+def test_a_target_that_fails_is_one_line_with_its_own_words_and_knows_nothing_of_this_make(monkeypatch, capsys):
+    for name in ("MAKEFLAGS", "MAKELEVEL", "CHECK", "ONLY"):
+        monkeypatch.setenv(name, "1")
+    with pytest.raises(UserError, match=r"^make find-xc16 XC16=/none fails: no xc16-gcc, XC16=/none has no bin/xc16-gcc: .*, build/readme.log: "):
+        readme.make("find-xc16 XC16=/none")
+    assert capsys.readouterr().out == "  make find-xc16 XC16=/none\n"
+    readme.make("help")
+
+
 def test_an_unknown_name_is_one_line_with_the_nearest():
     refused(command("demmo", main=readme.main), "no table or measurement 'demmo', ONLY: did you mean 'demo'?")
 
