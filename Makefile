@@ -201,17 +201,10 @@ spreadsheet: setup-tune ## [upkeep] write tuning/tuning_params.xlsx
 setup-tune:
 	@tools/setup/prepare.sh tune
 
-logged_step = echo "  make $$step"; $(still) "make $$step" sh -c '$(MAKE) -s "$$@" OUT= >build/readme.log 2>&1' sh $$step || { \
-    tail -n 3 build/readme.log >&2; exit 1; }
-
 .PHONY: readme bench
-readme: ## [upkeep] run what the README's tables and pictures show, and write them into it
-	@+for step in "run SCENARIO=demo" "run SCENARIO=stop_from_top" "run SCENARIO=fault_stall" table2 starts motors tune-fw robust "identify MOTOR=all" \
-	    $(foreach name,$(basename $(notdir $(wildcard tuning/motors/*.toml))),"loadsteps MOTOR=$(name)" "lowspeed MOTOR=$(name)" "catch MOTOR=$(name)"); do \
-	    $(logged_step); done
-	@+if command -v $(xc16)gcc >/dev/null; then for step in size cycles; do \
-	    $(logged_step); done; fi
-	@$(python) tools/docs/readme.py
+readme: setup-run ## [upkeep] measure what the tables and pictures of README and docs/ show, and write or compare them [CHECK=1 ONLY="demo size ..."]
+	@mkdir -p build; $(alone) $(python) -m tools.docs.readme $(if $(CHECK),--check) $(if $(shell command -v $(xc16)gcc),--compiler) \
+	    $(foreach name,$(ONLY),$(call quoted,$(name)))
 
 bench: ## [simulator] motor seconds that the virtual board simulates in one second of one core
 	$(call build,$B/bench)

@@ -15,6 +15,7 @@ from xc16 import make
 
 from tools.bench import cycles, pil, pil_command
 from tools.common import paths
+from tools.common.checksum import checksum
 from tools.image.budget import Budget, CycleLimits, Limits
 from tools.image.profile import Counts, Profile
 from tools.image.size import write_json
@@ -118,12 +119,28 @@ def test_table_has_cycles_us_load_and_the_notes_figures(tmp_path):
     assert alone == "without field weakening 2 400 500.0 600 10.00 12.50 15.00 25.0 %".split()
     assert both == "without field weakening 2 600 700.0 800 15.00 17.50 20.00 35.0 % 14.725 / 20.8 / 21.4".split()
     assert any("ENTRY" in line and "cycles of an entry" in line for line in lines)
-    # the README's table follows from the file
-    head, rows = cycles.readme_table(json.loads(write_json(cycles.summary(report(found("demo", [400], [440, 480]))), tmp_path,
-                                                           "cycles").read_text()))
+
+
+LONGEST = {"bounds": [{"handler": "_ADC1Interrupt", "to": "third duty", "bound": 464, "observed": 424},
+                      {"handler": "_ADC1Interrupt", "to": "return", "bound": 494, "observed": 450},
+                      {"handler": "_T2Interrupt", "to": "return", "bound": 900, "observed": None}], "latency": 658, "period": 1465}
+
+
+def test_the_readme_tells_the_proven_bound_before_the_longest_seen(tmp_path):
+    data = json.loads(write_json(cycles.summary(report(found("demo", [400], [440, 480]))), tmp_path, "cycles").read_text())
+    head, rows = cycles.readme_table(data, LONGEST)
     assert all(len(row) == len(head) for row in rows)
-    assert ["control interrupt with field weakening", "", "440 / 460 / 480", "11.00 / 11.50 / 12.00"] in rows
-    assert ["with its slow work, with field weakening", "14.975 / 23.325 / 23.65", "640 / 660 / 680", "16.00 / 16.50 / 17.00"] in rows
+    assert rows[:2] == [["longest control interrupt: proven / seen", "", "494 / 450", "12.35 / 11.25"],
+                        ["longest slow work: proven / seen", "", "900 / 0", "22.50 / 0.00"]]
+    assert ["control interrupt with field weakening: min / mean / max", "", "440 / 460 / 480", "11.00 / 11.50 / 12.00"] in rows
+    assert ["with its slow work, with field weakening: min / mean / max", "14.975 / 23.325 / 23.65", "640 / 660 / 680", "16.00 / 16.50 / 17.00"] in rows
+    assert cycles.short_table(data)[1][0] == ["control interrupt", "400 / 440 / 480", "10.00 / 11.00 / 12.00"]
+
+
+@pytest.mark.parametrize("arguments, has", [([], True), (["demo"], False), (["--no-budget"], False), (["--image", "a.elf"], False)])
+def test_only_a_complete_measurement_of_the_delivered_image_says_what_it_is_of(arguments, has):
+    options = cycles.parser_of("cycles", "", lambda _: 0).parse_args(arguments)
+    assert cycles.sources_of(options) == ({"sources": checksum("chip")} if has else {})
 
 
 @pytest.mark.parametrize("ticks, differences, first, defines, has_names, ok, got", [

@@ -1,10 +1,20 @@
-"""The README's count of tests: from a complete run without a failure, or none."""
+"""make readme: tables filled from results, rows that know their firmware, and a check that a wrong figure does not pass."""
 
 import json
+import os
+import re
+import time
 
 import pytest
+from support import command, refused
 
-from tools.docs import readme
+from tools.common import checksum
+from tools.common.errors import UserError
+from tools.docs import figures, readme
+from tools.docs.figures import BLOCKS, Part
+from tools.docs.readme import SOURCES, Row, Source
+
+NOW, TODAY = {"pc": "aaaaaaaa", "chip": "cccccccc", "image": "bbbbbbbb"}, "2030-01-02"
 
 
 @pytest.fixture
@@ -13,6 +23,7 @@ def result(tmp_path, monkeypatch):
     (tmp_path / "build/test").mkdir(parents=True)
     (tmp_path / "build/coverage").mkdir()
     (tmp_path / "build/coverage/summary.json").write_text('{"line_percent": 100, "branch_percent": 99.6}')
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
     monkeypatch.setattr(readme, "ROOT", tmp_path)
 
     def write(passed: int, failed: int, skipped: int) -> None:
@@ -20,26 +31,18 @@ def result(tmp_path, monkeypatch):
     return write
 
 
-@pytest.mark.parametrize("numbers, row", [((3, 0, 1), "| unit, board and closed-loop tests (1 more were skipped) | 3 |"),
-                                          ((1, 0, 0), "| unit, board and closed-loop tests, with those that need XC16 | 1 |")])
+# ---- what the tables show ------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("numbers, row", [((3, 0, 1), ["unit, board and closed-loop tests (1 more were skipped)", "3", "`make test`"]),
+                                          ((1, 0, 0), ["unit, board and closed-loop tests, with those that need XC16", "1", "`make test`"])])
 def test_a_complete_run_gives_its_numbers(result, numbers, row):
-    assert readme.tests() is None # before it the table stays
     result(*numbers)
-    assert row in readme.tests()
+    assert figures.tests()[1][0] == row
 
 
 def test_a_failed_test_keeps_the_readme_as_it_is(result):
     result(0, 1, 0)
-    with pytest.raises(SystemExit, match=r"^foc33: 1 tests failed, build/test/summary.json: repair them"):
-        readme.tests()
-
-
-def test_a_missing_picture_is_one_line_and_nothing_is_written(result, tmp_path, monkeypatch):
-    (tmp_path / "README.md").write_text("as it was")
-    monkeypatch.setattr(readme, "README", tmp_path / "README.md")
-    with pytest.raises(SystemExit, match=r"^foc33: no picture, build/run/demo/speed.png: run `make readme`"):
-        readme.main()
-    assert (tmp_path / "README.md").read_text() == "as it was"
+    with pytest.raises(UserError, match=r"^1 tests failed, build/test/summary.json: repair them"):
+        figures.tests()
 
 
 STEP = {"reference_rpm": 500.0, "torque_nm": 0.05, "kphi": 1.0, "dip_percent": 47.6, "on_back_s": 0.03, "off_back_s": 0.04, "beyond": "",
@@ -57,7 +60,7 @@ def left(tmp_path, name: str, motor: str, rows: list[dict], **more) -> None:
     ({"beyond": "needs 14 V", "on_back_s": None}, "48 % (out of reach) | out of reach | 0.040 s | 5°")])
 def test_a_load_step_is_told_with_its_dip_and_its_return(result, tmp_path, changes, cells):
     left(tmp_path, "loadsteps", "own", [STEP | changes])
-    assert f"| 500 rpm | 0.05 N·m | {cells} |" in readme.loadsteps()
+    assert figures.loadsteps()[1] == [f"500 rpm | 0.05 N·m | {cells}".split(" | ")]
 
 
 def test_every_motor_has_its_line_of_load_steps_and_low_speeds(result, tmp_path):
@@ -67,8 +70,8 @@ def test_every_motor_has_its_line_of_load_steps_and_low_speeds(result, tmp_path)
         (tmp_path / f"tuning/motors/{motor}.toml").touch()
         left(tmp_path, f"loadsteps{end}", motor, [STEP, STEP | {"kphi": 0.8, "dip_percent": 90.0, "off_back_s": 0.2, "ok": not end}])
         left(tmp_path, f"lowspeed{end}", motor, [{"asked_rpm": 151.2}], lowest=lowest)
-    lines = readme.stiffness().splitlines()
-    assert lines[2:] == ["| other | 1 of 2 | 48 % | 0.200 s | 1 of 1 | 151 | 120 / - |", "| own | 2 of 2 | 48 % | 0.200 s | 1 of 1 | 151 | 120 / - |"]
+    assert figures.stiffness()[1] == [["other", "1 of 2", "48 %", "0.200 s", "1 of 1", "151", "120 / -"],
+                                      ["own", "2 of 2", "48 %", "0.200 s", "1 of 1", "151", "120 / -"]]
 
 
 def test_every_motor_has_its_line_of_flying_starts_and_stops(result, tmp_path):
@@ -77,7 +80,7 @@ def test_every_motor_has_its_line_of_flying_starts_and_stops(result, tmp_path):
     start = {"rpm": -2000.0, "rotor_deg": 10.0, "verdict": "ok", "control_s": 0.03, "current_max_a": 2.5, "bus_max_v": 33.0, "stop_s": None}
     stop = {"rpm": 5500.0, "rotor_deg": None, "verdict": "ok", "control_s": None, "current_max_a": 2.8, "bus_max_v": 28.6, "stop_s": 1.39}
     left(tmp_path, "catch", "own", [start, start | {"rpm": 3400.0, "control_s": 0.061, "verdict": "angle"}, stop, stop | {"stop_s": None}])
-    assert readme.catches().splitlines()[2:] == ["| own | -2000 .. 3400 | 1 of 2 | 0.061 s | 2.80 A | 5500 rpm | 1.39 / never s | 28.6 V |"]
+    assert figures.catches()[1] == [["own", "-2000 .. 3400", "1 of 2", "0.061 s", "2.80 A", "5500 rpm", "1.39 / never s", "28.6 V"]]
 
 
 @pytest.fixture
@@ -93,16 +96,235 @@ def long_draws(result, tmp_path):
 
 def test_the_long_draws_are_told_with_their_shares(long_draws):
     long_draws()
-    assert [cells[1] for cells in readme.drawn()] == ["1990 no effect; 10 ridden through", "0 wrong in 24.2 h"]
+    assert [figures.campaign(), figures.soak()] == ["1990 no effect; 10 ridden through", "0 wrong in 24.2 h"]
 
 
-@pytest.mark.parametrize("less", [{"cases": 1989}, {"hours": 23.9}])
-def test_less_than_the_readme_promises_is_refused(long_draws, less):
+@pytest.mark.parametrize("less, told", [({"cases": 1989}, figures.campaign), ({"hours": 23.9}, figures.soak)])
+def test_less_than_the_readme_promises_is_refused(long_draws, less, told):
     long_draws(**less)
-    with pytest.raises(SystemExit, match=r"less than the README promises: run `make campaign` and `make soak`"):
-        readme.drawn()
+    with pytest.raises(UserError, match=r"^less than the README promises, make (campaign|soak): "):
+        told()
 
 
-def test_a_long_draw_that_was_not_made_is_one_line_with_its_command(result):
-    with pytest.raises(SystemExit, match=r"^foc33: no results, build/campaign/seed-1/summary.json: run `make campaign`"):
-        readme.drawn()
+def test_a_result_that_is_missing_is_one_line_with_its_command(result):
+    with pytest.raises(UserError, match=r"^no results, build/campaign/seed-1/summary.json: run `make campaign`"):
+        figures.campaign()
+
+
+@pytest.mark.parametrize("cpu_s, cell", [(1.0, "at least 20 times"), (0.4, "at least 20 times"), (2.0, "15 times")])
+def test_the_speed_of_the_board_is_no_figure_of_one_machine(result, tmp_path, cpu_s, cell):
+    (tmp_path / "build/run/demo").mkdir(parents=True)
+    (tmp_path / "build/run/demo/summary.json").write_text(json.dumps({"motor_seconds": 30.0, "cpu_seconds": cpu_s}))
+    assert figures.real_time() == cell
+
+
+# ---- which firmware ------------------------------------------------------------------------------------------------------
+SOURCE = '#define A 1 /* one */\nint f(void)\n{\n    return A + 2; // "sum"\n}\nchar *s = "/* no comment */";\n'
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """The sources of a small firmware. @return its checksum with one file changed"""
+    for name in (*checksum.FIRMWARE[:2], *checksum.BOARD, "tools/cpu_33f", "tools/make"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "tools/make/image.mk").write_text("# flags\nOPT ?= -O2\ntarget_flags = -g\n")
+
+    def of(kind: str = "pc", file: str = "firmware/a.c", text: str = SOURCE) -> str:
+        for name, old in (("firmware/a.c", SOURCE), ("userparams.h", "#define R 1.0\n"), ("tools/plant/p.c", SOURCE), ("tools/cpu_33f/i.c", SOURCE)):
+            (tmp_path / name).write_text(text if name == file else old)
+        if file == "tools/make/image.mk":
+            (tmp_path / file).write_text(text)
+        return checksum.checksum(kind, tmp_path)
+    return of
+
+
+@pytest.mark.parametrize("text", [SOURCE.replace("/* one */", "/* the first */"), SOURCE.replace("    return A + 2;", "  return A+2;\n\n"),
+                                  SOURCE.replace("#define A 1", "#define  A \\\n 1"), SOURCE.replace('// "sum"', "/* it's */"), SOURCE.replace("\n", "\r\n")])
+def test_comments_and_white_space_are_no_other_firmware(tree, text):
+    assert tree(text=text) == tree()
+
+
+@pytest.mark.parametrize("text", [SOURCE.replace("A 1", "A 2"), SOURCE.replace("A + 2", "A - 2"), SOURCE.replace("/* no comment */", "/* */"),
+                                  SOURCE.replace("A 1 ", "A (1) "), SOURCE.replace("A 1 /* one */\n", "A\n1\n"), "/* " + SOURCE])
+def test_another_constant_operator_or_text_is_another_firmware(tree, text):
+    assert tree(text=text) != tree()
+
+
+@pytest.mark.parametrize("file, kinds", [("userparams.h", {"pc", "chip", "image"}), ("tools/plant/p.c", {"pc", "chip"}), ("tools/cpu_33f/i.c", {"chip"}),
+                                         ("tools/make/image.mk", {"chip", "image"})])
+def test_a_result_depends_on_what_it_is_made_of(tree, file, kinds):
+    text = "OPT ?= -O1\n" if file.endswith(".mk") else "int other;\n"
+    assert {kind for kind in checksum.PARTS if tree(kind, file, text) != tree(kind, "tools/make/image.mk", "# new\nOPT ?= -O2\ntarget_flags = -g\n")} == kinds
+
+
+# ---- pages ---------------------------------------------------------------------------------------------------------------
+PAGE = """text
+<!-- one -->
+| what | value |
+| --- | ---: |
+| fast | 1 <!-- 2029-01-01 aaaaaaaa --> |
+| long (of 2028-01-01) | 2 <!-- 2028-01-01 99999999 --> |
+<!-- end -->
+more
+"""
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    """A page with a table of two rows, whose commands give other values now."""
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "README.md").write_text(PAGE)
+    for module in (readme, figures):
+        monkeypatch.setattr(module, "ROOT", tmp_path)
+    gives = {"fast": "1", "long": "3"}
+    monkeypatch.setattr(readme, "BLOCKS", {"one": [Part((name,), lambda name=name: (["what", "value"], [[name, gives[name]]]), name) for name in gives]})
+    monkeypatch.setattr(readme, "SOURCES", {"fast": Source(("run SCENARIO=fast",), takes="seconds"), "long": Source(("sweep",))})
+    monkeypatch.setattr(readme, "checksum", NOW.get)
+    made: list[str] = []
+    monkeypatch.setattr(readme, "make", made.append)
+
+    def run(*arguments: str) -> tuple[int, str]:
+        return readme.run(readme.parser().parse_args(list(arguments))), (tmp_path / "README.md").read_text()
+    run.gives, run.made = gives, made
+    return run
+
+
+def test_a_measured_row_is_filled_and_stamped_and_the_others_stay(page):
+    page.gives["fast"] = "7"
+    code, text = page("fast")
+    assert code == 0 and page.made == ["run SCENARIO=fast"]
+    assert re.search(r"\| fast \| 7 <!-- \d{4}-\d\d-\d\d aaaaaaaa --> \|\n\| long \(of 2028-01-01\) \| 2 <!-- 2028-01-01 99999999 --> \|\n", text)
+    assert text.startswith("text\n") and text.endswith("more\n")
+
+
+def test_a_row_of_this_firmware_shows_no_date_and_one_of_an_older_one_does(page, monkeypatch):
+    page("long")
+    monkeypatch.setattr(readme, "checksum", {kind: "dddddddd" for kind in NOW}.get)
+    _, text = page("long")
+    assert "| fast (of 2029-01-01) | 1 <!-- 2029-01-01 aaaaaaaa --> |" in text and "| long | 3 <!-- " in text
+
+
+def test_the_check_finds_the_row_that_differs_and_writes_nothing(page, capsys):
+    assert page("--check") == (0, PAGE)
+    page.gives["fast"] = "7"
+    assert page("--check") == (1, PAGE)
+    told = capsys.readouterr()
+    assert told.err == 'foc33: README.md, one, fast: says 1, but 7 by `make run SCENARIO=fast`: run `make readme ONLY="fast"`\n'
+    assert set(page.made) == {"run SCENARIO=fast"}
+    assert "of older firmware, not measured here:\n  one, long: of 2028-01-01 (make readme ONLY=\"long\")\n" in told.out
+
+
+def test_a_row_too_many_or_too_few_does_not_pass(page, capsys, monkeypatch):
+    parts = {"more": [["fast", "1"], ["new", "2"]], "none": []}
+    for rows in parts.values():
+        monkeypatch.setattr(readme, "BLOCKS", {"one": [Part(("fast",), lambda rows=rows: (["what", "value"], rows), "fast"), readme.BLOCKS["one"][1]]})
+        assert page("--check")[0] == 1
+    assert re.findall(r"one, (\w+): says (.*?), but (.*?) by .*: run", capsys.readouterr().err) == [
+        ("new", "no such row", "new | 2"), ("fast", "fast | 1", "no such row")]
+
+
+def test_rows_of_one_name_are_compared_one_by_one(page, tmp_path, capsys, monkeypatch):
+    rows = [["fast", "1"], ["fast", "2"]]
+    monkeypatch.setattr(readme, "BLOCKS", {"one": [Part(("fast",), lambda: (["what", "value"], rows))]})
+    (tmp_path / "README.md").write_text(PAGE.replace("| long", "| fast"))
+    assert page("--check")[0] == 0
+    rows.reverse()
+    assert page("--check")[0] == 1
+    assert re.findall(r"says (.*?), but (.*?) by .*: run", capsys.readouterr().err) == [("1", "2"), ("2", "1")]
+
+
+def test_a_command_that_fails_fails_the_check_and_keeps_the_page(page, monkeypatch, capsys):
+    def fails(name: str) -> None:
+        raise UserError(f"make {name} fails: why")
+    monkeypatch.setattr(readme, "make", fails)
+    assert page("--check") == (1, PAGE) and "foc33: make run SCENARIO=fast fails: why" in capsys.readouterr().err
+    with pytest.raises(UserError):
+        page("fast")
+
+
+def test_a_block_that_is_missing_or_unknown_or_there_twice_is_one_line(page, tmp_path):
+    for text, line in ((PAGE.replace("<!-- one -->", ""), "marks '<!-- one -->' and '<!-- end -->' found 0 times"), (PAGE + PAGE, "found 2 times"),
+                       (PAGE + PAGE.replace("-- one", "-- two"), "no table 'two', README.md: use one of one")):
+        (tmp_path / "README.md").write_text(text)
+        with pytest.raises(UserError, match=re.escape(line)):
+            page("--check")
+
+
+def test_a_block_may_stand_in_any_page(page, tmp_path):
+    (tmp_path / "docs/results.md").write_text(PAGE)
+    (tmp_path / "README.md").write_text("nothing\n")
+    page("long")
+    assert "| long | 3 <!-- " in (tmp_path / "docs/results.md").read_text() and (tmp_path / "README.md").read_text() == "nothing\n"
+
+
+def test_a_row_that_nothing_measures_is_refused(page, tmp_path):
+    (tmp_path / "README.md").write_text(PAGE.replace("| fast |", "| renamed |"))
+    with pytest.raises(UserError, match="^1 rows are no longer measured, table 'one'"):
+        page("long")
+
+
+def test_a_missing_picture_is_one_line_and_nothing_is_written(page, monkeypatch, tmp_path):
+    monkeypatch.setitem(readme.SOURCES, "long", Source(("sweep",), pictures=(("run/demo/speed.png", "demo-speed.png"),)))
+    with pytest.raises(UserError, match=r"^no picture, build/run/demo/speed.png: run `make readme`"):
+        page("long")
+    assert (tmp_path / "README.md").read_text() == PAGE
+
+
+def test_a_result_that_others_left_counts_while_it_is_of_this_firmware(page, monkeypatch, tmp_path):
+    path = tmp_path / "build/r.json"
+    path.parent.mkdir()
+    monkeypatch.setitem(readme.SOURCES, "fast", Source(("cycles",), "chip", "seconds", "r.json"))
+    monkeypatch.setattr(readme, "OTHER_INPUT", ("README.md",))
+    for data, age_s, runs in (({"sources": NOW["chip"]}, 0, []), ({"sources": "old"}, 0, ["cycles"]), ({}, 0, ["cycles"]),
+                              ({"sources": NOW["chip"], "broken": ["deadline"]}, 0, ["cycles"]), ({"sources": NOW["chip"]}, 1e6, ["cycles"])):
+        page.made.clear()
+        path.write_text(json.dumps(data))
+        os.utime(path, (time.time() + 10 - age_s,) * 2)
+        page("--check", "--compiler")
+        assert page.made == runs, data
+
+
+def test_without_a_compiler_the_check_says_what_it_leaves_out(page, monkeypatch, capsys):
+    monkeypatch.setitem(readme.SOURCES, "fast", Source(("cycles",), "chip", "seconds"))
+    assert page("--check")[0] == 0 and page.made == []
+    assert "not checked: size, cycles, longest path" in capsys.readouterr().out
+    with pytest.raises(UserError, match="^'fast' needs Microchip's compiler"):
+        page("fast")
+
+
+def test_a_target_that_fails_is_one_line_with_its_own_words_and_knows_nothing_of_this_make(monkeypatch, capsys):
+    for name in ("MAKEFLAGS", "MAKELEVEL", "CHECK", "ONLY"):
+        monkeypatch.setenv(name, "1")
+    with pytest.raises(UserError, match=r"^make find-xc16 XC16=/none fails: no xc16-gcc, XC16=/none has no bin/xc16-gcc: .*, build/readme.log: "):
+        readme.make("find-xc16 XC16=/none")
+    assert capsys.readouterr().out == "  make find-xc16 XC16=/none\n"
+    readme.make("help")
+
+
+def test_an_unknown_name_is_one_line_with_the_nearest():
+    refused(command("demmo", main=readme.main), "no table or measurement 'demmo', ONLY: did you mean 'demo'?")
+
+
+# ---- the pages as they are -----------------------------------------------------------------------------------------------
+def test_every_table_of_the_pages_is_filled_and_every_row_knows_its_firmware():
+    texts = readme.pages()
+    places = readme.blocks_of(texts)
+    for name, path in places.items():
+        block = next(match[3] for match in readme.BLOCK.finditer(texts[path]) if match[2] == name)
+        head, rows = readme.rows_in(block)
+        assert len(rows) >= len(BLOCKS[name]), name
+        for row in rows:
+            assert len(row.cells) == len(head) and re.fullmatch(r"[0-9a-f]{8}", row.sum) and re.fullmatch(r"\d{4}-\d\d-\d\d", row.date), (name, row)
+        assert all(readme.kept(part, rows) for part in BLOCKS[name]), name
+
+
+def test_every_source_is_shown_and_every_part_has_sources_of_one_kind():
+    parts = [part for block in BLOCKS.values() for part in block]
+    assert {source for part in parts for source in part.sources} == set(SOURCES)
+    assert all(len({SOURCES[source].of for source in part.sources}) == 1 for part in parts)
+
+
+def test_a_row_reads_back_what_it_wrote():
+    row = Row(["name", "1 / 2", ""], "2030-01-01", "12345678")
+    assert Row.read(row.text("12345678")) == row == Row.read(row.text("other"))
+    assert "(of 2030-01-01)" in row.text("other") and "(of" not in row.text("12345678")

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 
 from tools.common import board_file, command_line, motor_file, paths
+from tools.common.checksum import checksum
 from tools.common.errors import UserError
 from tools.image import attribution, history, program
 from tools.image.budget import Budget
-from tools.image.profile import Counts, Profile, profile
+from tools.image.profile import INTERRUPT, SLOW, Counts, Profile, profile
 from tools.image.size import told
+from tools.image.wcet import RETURN
 
 from . import build, pil, pil_command, scenario_file, simulate, sweep
 
@@ -307,20 +309,46 @@ def kept(report: Report) -> dict[str, float]:
     return sums | {name: round(cycles / interrupts, 1) for name, cycles in report.profile.inlined.most_common() if cycles >= interrupts}
 
 
-def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Head and rows of the README's table, from what cycles.json holds."""
-    def spread(values: dict[str, Any]) -> list[str]:
-        cycles = f"{values['min']} / {values['mean']:.0f} / {values['max']}"
-        return [cycles, " / ".join(f"{values[name] / data['fcy_mhz']:.2f}" for name in ("min", "mean", "max"))]
+def _spread_cells(data: dict[str, Any], values: dict[str, Any]) -> list[str]:
+    cycles = f"{values['min']} / {values['mean']:.0f} / {values['max']}"
+    return [cycles, " / ".join(f"{values[name] / data['fcy_mhz']:.2f}" for name in ("min", "mean", "max"))]
 
-    rows = [[f"control interrupt {name}", "", *spread(data["spreads"][name])] for name in (WITHOUT, WITH)]
-    rows += [[f"with its slow work, {name}", " / ".join(f"{value:g}" for value in data["note_us"][name]), *spread(data["periods"][name])]
-             for name in (WITHOUT, WITH)]
-    rows.append([f"trigger to the third duty (loads after {data['load_cycles']})", "", *spread(data["latency"])])
+
+def readme_table(data: dict[str, Any], longest: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of the README's table. @param data what cycles.json holds @param longest what wcet.json holds"""
+    bound = {(item["handler"], item["to"]): (item["bound"], item["observed"]) for item in longest["bounds"]}
+
+    def proven(name: str, pair: tuple[int, int | None], note: str = "") -> list[str]:
+        most, seen = pair[0], pair[1] or 0
+        return [f"{name}: proven / seen", note, f"{most} / {seen}", f"{us(most):.2f} / {us(seen):.2f}"]
+
+    rows = [proven("longest control interrupt", bound[INTERRUPT, RETURN]),
+            proven("longest slow work", bound[SLOW, RETURN]),
+            proven(f"longest from the trigger to the third duty (loads after {data['load_cycles']})", (longest["latency"], data["latency"]["max"])),
+            proven("longest period: both, proven with a fault's handler", (longest["period"], data["all_periods"]["max"]), f"{NOTE_US[WITH][2]:g}")]
+    rows += [[f"control interrupt {name}: min / mean / max", "", *_spread_cells(data, data["spreads"][name])] for name in (WITHOUT, WITH)]
+    rows += [[f"with its slow work, {name}: min / mean / max", " / ".join(f"{value:g}" for value in data["note_us"][name]),
+              *_spread_cells(data, data["periods"][name])] for name in (WITHOUT, WITH)]
     load = 100.0 * data["periods"][WITH]["mean"] / PERIOD_CYCLES
     rows.append(["load of the core with field weakening", f"{100.0 * data['note_us'][WITH][1] / 50.0:.0f} %", f"{load:.0f} %", ""])
     rows.append(["deepest stack seen", "", f"{data['stack_bytes']} bytes", ""])
-    return ["min / mean / max", "AN1292, us", "cycles", "us"], rows
+    return ["both interrupts of a period", "AN1292, us", "cycles", "us"], rows
+
+
+def short_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of another header's figures, with the bridge on."""
+    on = {key: added_data([data[key][name] for name in NOTE_US]) for key in ("spreads", "periods")}
+    return [f"of {data['period_cycles']} cycles a period", "min / mean / max", "us"], [
+        ["control interrupt", *_spread_cells(data, on["spreads"])], ["with its slow work", *_spread_cells(data, on["periods"])],
+        [f"trigger to the third duty (loads after {data['load_cycles']})", *_spread_cells(data, data["latency"])]]
+
+
+def added_data(spreads: list[dict[str, Any]]) -> dict[str, Any]:
+    """Several spreads of the file as one."""
+    number = sum(item["interrupts"] for item in spreads)
+    some = [item for item in spreads if item["interrupts"]]
+    return {"interrupts": number, "min": min(item["min"] for item in some), "max": max(item["max"] for item in some),
+            "mean": sum(item["mean"] * item["interrupts"] for item in some) / number}
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
@@ -367,6 +395,11 @@ def parser_of(name: str, about: str, command: Callable[[argparse.Namespace], int
     return parser
 
 
+def sources_of(options: argparse.Namespace) -> dict[str, str]:
+    """Which firmware the result is of, where it is the delivered one's and complete: `make readme` need not measure it again."""
+    return {} if options.no_budget or options.scenarios or options.image else {"sources": checksum("chip")}
+
+
 def main(arguments: list[str] | None = None) -> int:
     return command_line.main(lambda: parser_of("cycles", __doc__.splitlines()[0], _run), arguments)
 
@@ -376,7 +409,7 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    status = told(summary(report), options.out or image.parent, "cycles", text(report) + "\n")
+    status = told(summary(report) | sources_of(options), options.out or image.parent, "cycles", text(report) + "\n")
     if not options.no_budget and not options.scenarios:
         print(history.keep("cycles", kept(report), options.out or image.parent))
     return status

@@ -241,7 +241,8 @@ def summary(report: Report) -> dict[str, Any]:
             "bounds": [{"handler": bound.handler, "to": bound.to, "bound": bound.cycles, "observed": report.observed(bound), "free": bound.free}
                        for bound in report.bounds], "statements": [str(item) for item in report.program.statements]}
     if report.seen is not None:
-        data |= {"unseen": report.unseen, "latency": report.latency, "load_cycles": report.seen.load_cycles, "interrupts": report.seen.runs}
+        data |= {"unseen": report.unseen, "latency": report.latency, "period": report.period, "load_cycles": report.seen.load_cycles,
+                 "interrupts": report.seen.runs}
     return data
 
 
@@ -267,7 +268,7 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), Budget.read(), not options.no_budget, options.quiet)
-    return told(summary(report), options.out or image.parent, "wcet", text(report) + "\n")
+    return told(summary(report) | cycles.sources_of(options), options.out or image.parent, "wcet", text(report) + "\n")
 
 
 if __name__ == "__main__":

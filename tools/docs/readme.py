@@ -1,215 +1,301 @@
-"""Fills the tables of README.md from the results in build/run/: `make readme` runs what they need first."""
+"""`make readme`: measures what the tables and pictures of README.md and docs/ show, and writes them there.
 
-import importlib
-import json
+    python3 -m tools.docs.readme [--check] [--compiler] [name ...]
+
+A table's place is between the marks <!-- name --> and <!-- end --> of a page, whichever. Each of its rows carries, out of sight, the
+checksum of the firmware that it was measured on (tools/common/checksum.py) and the date; a row of older firmware shows the date. With
+--check nothing is written: what takes seconds is measured anew, and a row that differs is an error."""
+
+import argparse
+import datetime
+import itertools
+import os
 import re
 import shutil
+import subprocess
 import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-README = ROOT / "README.md"
-PICTURES = {"run/demo/speed.png": "demo-speed.png", "run/demo/field_weakening.png": "demo-field-weakening.png",
-            "tune-fw/hurst_dmb0224c10002/over_speed.png": "tuning-fw.png", "run/robust/margins.png": "tuning-margins.png"}
+from tools.common import command_line, paths
+from tools.common.checksum import PARTS, checksum, files
+from tools.common.errors import UserError, suggestion
+
+from . import figures
+from .figures import BLOCKS, Part
+
+ROOT = paths.ROOT
+MOTORS = paths.names(paths.MOTORS)
+AT_40KHZ = "MOTOR=hurst_dmb0224c10002 BOARD=mclv_40khz"
+HEADER_40KHZ = "build/tune/hurst_dmb0224c10002-mclv_40khz"
+OTHER_INPUT = ("firmware/budget.toml", "tools/bench/*.py", "tools/bench/scenarios/*.toml", "tools/image/*.py")
+"""What results in build/ depend on beside the code that the checksum is of."""
+OURS = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "MAKEOVERRIDES", "CHECK", "ONLY")
+"""Variables of this make that the ones it starts do not have."""
 
 
-def result(name: str, folder: str = "run", command: str = "make readme") -> dict:
-    path = ROOT / "build" / folder / name / "summary.json"
-    try:
-        return json.loads(path.read_text())
-    except OSError:
-        sys.exit(f"foc33: no results, {path.relative_to(ROOT)}: run `{command}`, which makes them")
+@dataclass(frozen=True)
+class Source:
+    """Commands that leave a result in build/, and the pictures that they draw."""
+    commands: tuple[str, ...]
+    of: str = "pc"          # the code that it depends on: of checksum.PARTS
+    takes: str = "long"     # or seconds: --check runs it; by name: run where it is asked for; found: left by others
+    left: str = ""          # where it leaves a result that may be taken while it is of this firmware
+    pictures: tuple[tuple[str, str], ...] = ()
 
 
-def table(head: list[str], rows: list[list[str]]) -> str:
-    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+SOURCES = {
+    "demo": Source(("run SCENARIO=demo",), takes="seconds",
+                   pictures=(("run/demo/speed.png", "demo-speed.png"), ("run/demo/field_weakening.png", "demo-field-weakening.png"))),
+    **{name: Source((f"run SCENARIO={name}",), takes="seconds") for name in ("stop_from_top", "fault_stall")},
+    "table2": Source(("table2",), takes="seconds"),
+    "size": Source(("size",), "image", "seconds", "target/size.json"),
+    **{name: Source((name,), "chip", "seconds", f"target/{name}.json") for name in ("cycles", "wcet")},
+    **{name: Source((name,)) for name in ("starts", "motors")},
+    "tune-fw": Source(("tune-fw",), pictures=(("tune-fw/hurst_dmb0224c10002/over_speed.png", "tuning-fw.png"),)),
+    "robust": Source(("robust",), pictures=(("run/robust/margins.png", "tuning-margins.png"),)),
+    "identify": Source(("identify MOTOR=all",)),
+    **{name: Source(tuple(f"{name} MOTOR={motor}" for motor in MOTORS)) for name in ("loadsteps", "lowspeed", "catch")},
+    "demo_40khz": Source((f"run SCENARIO=demo_40khz {AT_40KHZ} OUT=build/run/demo_40khz",)),
+    "table2_40khz": Source((f"table2 {AT_40KHZ} OUT=build/run/table2_40khz",)),
+    "cycles_40khz": Source((f"tune {AT_40KHZ}", f"cycles SCENARIO=demo_40khz USERPARAMS={HEADER_40KHZ} OUT=build/target/40khz"), "chip"),
+    **{name: Source((name,), takes="by name", left=f"{name}/seed-1/summary.json") for name in ("campaign", "soak")},
+    "tests": Source(("test", "coverage"), takes="found", left="test/summary.json"),
+}
 
 
-def demo() -> str:
-    rows = [[m["name"], f"{m['reference_rpm']:.0f}", f"{m['speed_rpm']:.1f}", f"{m['speed_error_percent']:+.2f} %",
-             f"{m['current_rms_a']:.2f} A", f"{m['angle_error_mean_deg']:+.1f}°", f"{m['angle_error_rms_deg']:.1f}°",
-             f"{m['voltage_percent']:.0f} %"] for m in result("demo")["measures"]]
-    return table(["step", "reference rpm", "true rpm", "error", "phase current RMS", "angle error mean", "angle error RMS",
-                  "share of the voltage limit"], rows)
+# ---- pages ---------------------------------------------------------------------------------------------------------------
+STAMP = re.compile(r" *<!-- (\d{4}-\d\d-\d\d) (\w+) -->")
+SHOWN_DATE = re.compile(r" \(of \d{4}-\d\d-\d\d\)$")
+BLOCK = re.compile(r"(<!-- (?!end)([a-zA-Z][\w ]*) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
-def table2() -> str:
-    rows = [[f"{r['reference_rpm']:.0f} rpm", f"{r['torque_nm_set']:.3f} N·m", f"{r['note_rpm']:.0f}", f"{r['speed_rpm']:.0f}",
-             f"{r['note_current_a']:.2f} A", f"{r['current_rms_a']:.2f} A", f"{r['angle_error_rms_deg']:.1f}°", f"{r['voltage_percent']:.0f} %"]
-            for r in result("table2")["rows"]]
-    return table(["reference", "torque", "AN1292: rpm", "ours", "AN1292: current RMS", "ours", "angle error RMS", "share of the voltage limit"], rows)
+@dataclass(frozen=True)
+class Row:
+    """A line of a table with the firmware that it was measured on."""
+    cells: list[str]
+    date: str = ""
+    sum: str = ""
+
+    @staticmethod
+    def read(line: str) -> "Row":
+        stamp = STAMP.search(line)
+        cells = [cell.strip() for cell in STAMP.sub("", line).strip().strip("|").split("|")]
+        return Row([SHOWN_DATE.sub("", cells[0]), *cells[1:]], *(stamp.groups() if stamp else ("", "")))
+
+    def text(self, now: str) -> str:
+        """@param now checksum of today's firmware"""
+        name = self.cells[0] + (f" (of {self.date})" if self.sum not in ("", now) else "")
+        stamp = f" <!-- {self.date} {self.sum} -->" if self.sum else ""
+        return "| " + " | ".join([name, *self.cells[1:]]) + stamp + " |"
 
 
-def motors() -> str:
-    """A line for each motor of tuning/motors: what it was measured to do with its own header."""
-    by_motor: dict[str, list[dict]] = {}
-    for row in result("motors")["rows"]:
-        by_motor.setdefault(row["motor"], []).append(row)
-    rows = []
-    for motor, cases in by_motor.items():
-        held = [case for case in cases if case["torque_nm_set"] > 0.0]
-        found = {row["name"].split(" [")[0]: row["error_percent"] for row in result(motor, "identify")["rows"]}
-        rows.append([motor, " / ".join(f"{case['speed_rpm']:.0f}" for case in held), f"{max(abs(case['speed_error_percent']) for case in held):.2f} %",
-                     f"{max(case['angle_error_rms_deg'] for case in held):.1f}°", f"{max(case['speed_rpm'] for case in cases):.0f}",
-                     " / ".join(f"{found[name]:+.1f}" for name in ("R winding", "Ld", "Lq", "Kphi", "J", "friction at rated speed"))])
-    return table(["motor", "rpm at 20 / 50 / 100 % of rated speed, half the rated torque", "worst speed error", "worst angle error RMS", "top rpm, no load",
-                  "IDENTIFY: error of R / Ld / Lq / Kphi / J / friction in %"], rows)
+def pages() -> dict[Path, str]:
+    return {path: path.read_text(encoding="utf-8") for path in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]}
 
 
-def of_motor(name: str, motor: str) -> dict:
-    """What a table of many runs left for a motor; the table's own one has no name there."""
-    own = result(name)
-    return own if Path(own["motor"]).stem == motor else result(f"{name}-{motor}")
+def rows_in(block: str) -> tuple[list[str], list[Row]]:
+    """Head and rows of a block's table."""
+    lines = block.splitlines()
+    return (Row.read(lines[0]).cells if lines else []), [Row.read(line) for line in lines[2:]]
 
 
-def held(data: dict) -> str:
-    return f"{sum(e['ok'] for e in data['expectations'])} of {len(data['expectations'])}"
+def blocks_of(texts: dict[Path, str]) -> dict[str, Path]:
+    """The page of each block; a block stands in one."""
+    found = [(match[2], page) for page, text in texts.items() for match in BLOCK.finditer(text) if match[2] != "table"]
+    for name in BLOCKS:
+        places = [page for other, page in found if other == name]
+        if len(places) != 1:
+            raise UserError(f"marks '<!-- {name} -->' and '<!-- end -->' found {len(places)} times", "README.md and docs/",
+                            "put them in once")
+    for name, page in found:
+        if name not in BLOCKS:
+            raise UserError(f"no table '{name}'", str(page.relative_to(ROOT)), suggestion(name, BLOCKS))
+    return dict(found)
 
 
-def loadsteps() -> str:
-    """A line for each speed and torque, a dip for each Kphi."""
-    rows: dict[tuple, list[dict]] = {}
-    for row in result("loadsteps")["rows"]:
-        rows.setdefault((row["reference_rpm"], row["torque_nm"]), []).append(row)
-
-    def dip(case: dict) -> str:
-        return f"{case['dip_percent']:.0f} %" + (" (out of reach)" if case["beyond"] else "")
-
-    def back(cases: list[dict], edge: str) -> str:
-        found = [case[edge] for case in cases if not (edge == "on_back_s" and case["beyond"])]
-        return "out of reach" if not found else "never" if None in found else f"{max(found):.3f} s"
-    return table(["speed", "torque"] + [f"dip, true Kphi x{case['kphi']:g}" for case in next(iter(rows.values()))]
-                 + ["back within 2 %, on", "off", "angle error, at most"],
-                 [[f"{rpm:.0f} rpm", f"{torque:.2f} N·m", *map(dip, cases), back(cases, "on_back_s"), back(cases, "off_back_s"),
-                   f"{max(case['angle_error_max_deg'] for case in cases):.0f}°"]
-                  for (rpm, torque), cases in rows.items()])
+def kept(part: Part, rows: list[Row]) -> list[Row]:
+    """The rows of a part as they stand in the page."""
+    return [row for row in rows if not part.name or row.cells[0] == part.name]
 
 
-def stiffness() -> str:
-    """A line for each motor: load steps and low speeds that hold, with the worst numbers."""
-    rows = []
-    for motor in sorted(path.stem for path in (ROOT / "tuning/motors").glob("*.toml")):
-        steps, slow = of_motor("loadsteps", motor), of_motor("lowspeed", motor)
-        back = [row[edge] for row in steps["rows"] for edge in ("on_back_s", "off_back_s") if not (edge == "on_back_s" and row["beyond"])]
-        lowest = ["-" if item["lowest_rpm"] is None else f"{item['lowest_rpm']:.0f}" for item in slow["lowest"]]
-        rows.append([motor, held(steps), f"{max(row['dip_percent'] for row in steps['rows'] if row['kphi'] == 1.0):.0f} %",
-                     "never" if None in back else f"{max(back):.3f} s", held(slow), f"{slow['rows'][0]['asked_rpm']:.0f}", " / ".join(lowest)])
-    return table(["motor", "load steps that hold", "largest dip, true Kphi x1", "slowest return", "low speeds that hold", "lowest asked for, rpm",
-                  "lowest held, rpm: no load / light / heavy"], rows)
+def refilled(name: str, old: str, measured: set[str], sums: dict[str, str], today: str) -> str:
+    """A block with new rows of what has been measured; the others stay, with their date if they are of older firmware."""
+    head, rows = rows_in(old)
+    lines: list[str] = []
+    used = 0
+    for part in BLOCKS[name]:
+        now = sums[SOURCES[part.sources[0]].of]
+        if measured.issuperset(part.sources):
+            head, cells = part.make()
+            lines += [Row(line, today, now).text(now) for line in cells]
+            used += len(kept(part, rows))
+        else:
+            lines += [row.text(now) for row in kept(part, rows)]
+            used += len(kept(part, rows))
+    if used != len(rows):
+        raise UserError(f"{len(rows) - used} rows are no longer measured", f"table '{name}'", "take them out of the page")
+    return "\n".join(["| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1), *lines, ""])
 
 
-def catches() -> str:
-    """A line for each motor: flying starts in control, and stops on a supply that takes nothing back."""
-    rows = []
-    for motor in sorted(path.stem for path in (ROOT / "tuning/motors").glob("*.toml")):
-        data = of_motor("catch", motor)
-        starts, stops = ([row for row in data["rows"] if (row["rotor_deg"] is None) == is_stop] for is_stop in (False, True))
-        taken = [row["control_s"] for row in starts]
-        rows.append([motor, f"{min(row['rpm'] for row in starts):.0f} .. {max(row['rpm'] for row in starts):.0f}",
-                     f"{sum(row['verdict'] == 'ok' for row in starts)} of {len(starts)}", "never" if None in taken else f"{max(taken):.3f} s",
-                     f"{max(row['current_max_a'] for row in data['rows']):.2f} A", f"{stops[0]['rpm']:.0f} rpm",
-                     " / ".join("never" if row["stop_s"] is None else f"{row['stop_s']:.2f}" for row in stops) + " s",
-                     f"{max(row['bus_max_v'] for row in stops):.1f} V"])
-    return table(["motor", "rotor at S2, rpm", "in control", "slowest, after S2", "largest current", "stop from", "inertia x1 / x9 / x36", "bus, at most"], rows)
+def refill(part: Part) -> str:
+    return f"make readme ONLY=\"{' '.join(part.sources)}\""
 
 
-def drawn() -> list[list[str]]:
-    """What the long draws found: faults, and hours without one. `make readme` does not run them, for they take an hour."""
-    faults, hours = result("seed-1", "campaign", "make campaign"), result("seed-1", "soak", "make soak")
-    classes = {name: count for name, count in faults["classes"].items() if count}
-    cases = sum(classes.values())
-    if cases < 2000 or hours["motor_hours"] < 24.0:
-        sys.exit("foc33: a campaign or a soak of less than the README promises: run `make campaign` and `make soak`")
-    return [
-        [f"{cases} injected faults: each is ridden through or ends in a named stop", "; ".join(f"{count} {name}" for name, count in classes.items()),
-         "`make campaign`"],
-        ["24 motor hours of random commands, loads, temperatures, sags, noise on all motors: no fault, no drift, no lost lock",
-         f"{hours['wrong']} wrong in {hours['motor_hours']:.1f} h", "`make soak`"]]
+def differences(name: str, page: str, old: str, measured: set[str]) -> list[str]:
+    """A line for each row that a command now gives otherwise."""
+    _, rows = rows_in(old)
+    lines = []
+    for part in BLOCKS[name]:
+        if not measured.issuperset(part.sources):
+            continue
+        command = " and ".join(f"`make {SOURCES[source].commands[0]}`" for source in part.sources)
+        for says, gives in itertools.zip_longest((row.cells for row in kept(part, rows)), part.make()[1], fillvalue=[]):
+            pairs = list(zip(says, gives))
+            if len(says) != len(gives):
+                pairs = [(" | ".join(says) or "no such row", " | ".join(gives) or "no such row")]
+            differing = [[cell or "nothing" for cell in pair] for pair in pairs if pair[0] != pair[1]]
+            if differing:
+                one, two = map(", ".join, zip(*differing))
+                lines.append(f"{page}, {name}, {(says or gives)[0]}: says {one}, but {two} by {command}: run `{refill(part)}`")
+    return lines
 
 
-def guarantees() -> str:
-    run, top, blocked, starts = result("demo"), result("stop_from_top"), result("fault_stall"), result("starts")
-    robust, weakening = result("robust"), result("hurst_dmb0224c10002", "tune-fw")
-    hand_over = run["hand_overs"][0]
-    worst_speed = max(abs(m["speed_error_percent"]) for m in run["measures"])
-    worst_angle = max(m["angle_error_rms_deg"] for m in run["measures"])
-    bus = next(e["got"] for e in top["expectations"] if e["row"].startswith("bus"))
-    at = {entry["event"]: entry["at_s"] for entry in reversed(blocked["protocol"])}
-    fault = f"START_FAILED after {at['fault START_FAILED'] - at['S2 pressed']:.2f} s"
-    rows = [
-        ["closed loop within 2.0 s after S2", f"{hand_over['after_s2_s']:.2f} s, overshoot {hand_over['overshoot_percent']:.1f} %", "`make run`"],
-        ["speed within 0.5 % of the reference, 1000 to 5500 rpm", f"{worst_speed:.2f} %", "`make run`"],
-        ["rotor angle error below 2° RMS from 1000 rpm up", f"{worst_angle:.1f}°", "`make run`"],
-        ["starts from every rotor angle, loaded with 0, 0.03 and 0.06 N·m, and with 9 and 36 times the inertia; never 300 rpm backwards; hand-over below 300 rpm",
-         f"{held(starts)}; {max(row['back_rpm'] for row in starts['rows']):.0f} rpm; "
-         f"{max(row['hand_over_rpm'] for row in starts['rows'] if row['inertia'] == 1.0):.0f} rpm", "`make starts`"],
-        ["holds the reference in all rows of AN1292's Table 2; rows 2 to 8 take less current",
-         f"worst {max(abs(r['speed_error_percent']) for r in result('table2')['rows']):.2f} %", "`make table2`"],
-        ["twice the base speed, unloaded", f"{weakening['maximum_speed_rpm']:.0f} rpm", "`make tune-fw`"],
-        ["angle within 2° RMS loaded, 4° unloaded with Kphi ±20 % or R -30 .. +50 %, within 1° of the law with L ±30 % or with R and field weakening's d current, "
-         "within 10° in every corner",
-         held(robust), "`make robust`"],
-        ["0.03, 0.05 and 0.08 N·m at once on and off the bare rotor at 500, 1190, 2500 rpm, Kphi ±20 %: never backwards; back within 2 % in 0.3 s where the voltage allows the load",
-         held(result("loadsteps")), "`make loadsteps`"],
-        ["150 rpm and up held for 10 s with 0, 0.03 and 0.08 N·m: speed within 1 %, angle within 8° RMS", held(result("lowspeed")), "`make lowspeed`"],
-        ["flying start at -2500 to 3500 rpm, angle and speed drawn, inertia x1, x9, x36: in control within 0.2 s, current below its maximum and a tenth; "
-         "stops from 5500 rpm without a sink, bus below 30 V", held(result("catch")), "`make catch`"],
-        ["controlled stop from 5500 rpm, bus below 30 V", bus, "`make run SCENARIO=stop_from_top`"],
-        ["a blocked shaft ends in a named fault within 2 s", fault, "`make run SCENARIO=fault_stall`"],
-        *drawn(),
-        ["virtual board: 20 times real time on one core", f"{run['motor_seconds'] / run['cpu_seconds']:.0f} times", "`make run`"],
-    ]
-    return table(["guarantee", "measured", "command"], rows)
+def older(name: str, old: str, measured: set[str], sums: dict[str, str]) -> list[str]:
+    """The rows of older firmware that nothing has measured now, by what measures them."""
+    lines = []
+    for part in BLOCKS[name]:
+        found = [row for row in kept(part, rows_in(old)[1]) if row.sum != sums[SOURCES[part.sources[0]].of]]
+        if found and not measured.issuperset(part.sources):
+            what = part.name or f"{len(found)} rows"
+            short = what if len(what) < 60 else what[:57] + "..."
+            lines.append(f"  {name}, {short}: of {found[0].date or 'no date'} ({refill(part)})")
+    return lines
 
 
-def of_target(name: str, module: str) -> str | None:
-    """What `make size` or `make cycles` left in build/target; None without a compiler for the target."""
-    path = ROOT / f"build/target/{name}.json"
-    if not path.exists():
-        return None
-    return table(*importlib.import_module(module).readme_table(json.loads(path.read_text())))
+# ---- measuring -----------------------------------------------------------------------------------------------------------
+def is_of_now(source: Source, sums: dict[str, str]) -> bool:
+    """Whether a result that is there already is of today's firmware: newer than all sources, whose comments may state something, and made of
+    just this image."""
+    path = ROOT / "build" / source.left
+    if not source.left or not path.exists():
+        return False
+    data = figures.loaded(source.left)
+    inputs = [*files("chip"), *(found for pattern in OTHER_INPUT for found in ROOT.glob(pattern))]
+    return (not data.get("broken") and (source.takes != "seconds" or data.get("sources") == sums[source.of])
+            and path.stat().st_mtime > max(found.stat().st_mtime for found in inputs))
 
 
-def tests() -> str | None:
-    """What `make test`, `make coverage` and `make mutate` left in build/; None while the first two have not been run."""
-    coverage, mutants, suites = (ROOT / "build" / name for name in ("coverage/summary.json", "mutate/report.json", "test/summary.json"))
-    if not (coverage.exists() and suites.exists()):
-        return None
-    coverage, suites = json.loads(coverage.read_text()), json.loads(suites.read_text())
-    if suites["failed"]:
-        sys.exit(f"foc33: {suites['failed']} tests failed, build/test/summary.json: repair them, run `make test`, then `make readme`")
-    rows = [
-        ["unit, board and closed-loop tests" + (f" ({suites['skipped']} more were skipped)" if suites["skipped"] else ", with those that need XC16"),
-         str(suites["passed"]), "`make test`"],
-        ["control law: lines / branches that the unit tests reach", f"{coverage['line_percent']:.0f} % / {coverage['branch_percent']:.0f} %", "`make coverage`"],
-    ]
-    if mutants.exists():
-        found = json.loads(mutants.read_text())
-        rows.append([f"planted defects noticed ({found['tests']}, {'all' if found['full'] else 'sample of'} {len(found['mutants'])})",
-                     f"{found['score']:.1f} %", "`make mutate`"])
-    return table(["check", "result", "command"], rows)
+def make(command: str) -> None:
+    """Runs a target, quietly; an error is its last line."""
+    print(f"  make {command}", flush=True)
+    log = ROOT / "build/readme.log"
+    environment = {name: value for name, value in os.environ.items() if name not in OURS}
+    quietly = ["sh", "-c", f"exec make -s {command} >build/readme.log 2>&1"]
+    done = subprocess.run([sys.executable, "-m", "tools.common.progress", f"make {command}", *quietly], cwd=ROOT, env=environment, check=False)
+    if done.returncode:
+        told = log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or [f"exit status {done.returncode}"]
+        named = [line for line in told if line.startswith("foc33: ")]
+        raise UserError(f"make {command} fails: {(named or told)[-1].removeprefix('foc33: ')}", "build/readme.log", "repair it first")
 
 
-def main() -> None:
-    for source in PICTURES: # before anything is written
-        if not (ROOT / "build" / source).exists():
-            sys.exit(f"foc33: no picture, build/{source}: run `make readme`, which makes it")
-    text = README.read_text()
-    for name, make in (("guarantees", guarantees), ("demo", demo), ("table2", table2), ("motors", motors),
-                       ("loadsteps", loadsteps), ("stiffness", stiffness), ("catch", catches),
-                       ("size", lambda: of_target("size", "tools.image.size")), ("cycles", lambda: of_target("cycles", "tools.bench.cycles")),
-                       ("tests", tests)):
-        block = make()
-        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)",
-                              lambda m: m[0] if block is None else m[1] + block + "\n" + m[2], text, flags=re.S)
-        if count != 1:
-            sys.exit(f"foc33: marks '<!-- {name} -->' and '<!-- end -->', README.md: found {count} times, put them in once")
-    README.write_text(text)
-    for source, target in PICTURES.items():
-        shutil.copy(ROOT / "build" / source, ROOT / "docs" / target)
+def chosen(names: Iterable[str], checks: bool, compiler: bool, sums: dict[str, str]) -> list[str]:
+    """The sources to measure: those that are named, as themselves or by their table, else all that have a turn."""
+    result: list[str] = []
+    for name in names:
+        if name not in SOURCES and name not in BLOCKS:
+            raise UserError(f"no table or measurement '{name}'", "ONLY", suggestion(name, [*BLOCKS, *SOURCES]))
+        found = [source for part in BLOCKS.get(name, []) for source in part.sources] or [name]
+        without = [source for source in found if SOURCES[source].of != "pc"]
+        if without and not compiler:
+            raise UserError(f"'{without[0]}' needs Microchip's compiler", "ONLY",
+                            "put it on PATH or name its folder, e.g. XC16=/opt/microchip/xc16/v2.10")
+        result += found
+    turns = ("seconds",) if checks else ("seconds", "long")
+    return list(dict.fromkeys(result)) or [name for name, source in SOURCES.items() if (compiler or source.of == "pc")
+                                           and (source.takes in turns or not checks and is_of_now(source, sums))]
+
+
+def measured(names: list[str], checks: bool, asked: bool, sums: dict[str, str]) -> tuple[set[str], list[str]]:
+    """Runs what the sources need. @return those that have a result now, and with --check a line for each that fails"""
+    done, failed = set(), []
+    for name in names:
+        source = SOURCES[name]
+        ready = (checks or source.takes in ("by name", "found")) and is_of_now(source, sums)
+        if source.takes == "found" and not ready:
+            raise UserError("no result of this firmware", f"build/{source.left}", f"run `make {'` and `make '.join(source.commands)}`")
+        try:
+            for command in () if ready and not (asked and source.takes == "by name") else source.commands:
+                make(command)
+            done.add(name)
+        except UserError as error:
+            if not checks:
+                raise
+            failed.append(str(error))
+    return done, failed
+
+
+def check(texts: dict[Path, str], done: set[str], sums: dict[str, str]) -> list[str]:
+    """A line for each row that differs; tells of the rows that are of older firmware."""
+    lines, aged = [], []
+    for page, text in texts.items():
+        for _, name, old, _ in BLOCK.findall(text):
+            if name in BLOCKS:
+                lines += differences(name, str(page.relative_to(ROOT)), old, done)
+                aged += older(name, old, done, sums)
+    if aged:
+        print("\n".join(["of older firmware, not measured here:", *aged]))
+    return lines
+
+
+def write(texts: dict[Path, str], done: set[str], sums: dict[str, str]) -> None:
+    today = datetime.date.today().isoformat()
+
+    def block(found: re.Match) -> str:
+        return found[1] + refilled(found[2], found[3], done, sums, today) + found[4] if found[2] in BLOCKS else found[0]
+    new = {page: BLOCK.sub(block, text) for page, text in texts.items()}
+    drawn = [(ROOT / "build" / source, ROOT / "docs" / target) for name in done for source, target in SOURCES[name].pictures]
+    for source, _ in drawn: # before anything is written
+        if not source.exists():
+            raise UserError("no picture", str(source.relative_to(ROOT)), "run `make readme`, which makes it")
+    for page, text in new.items():
+        if text != texts[page]:
+            page.write_text(text, encoding="utf-8")
+    for source, target in drawn:
+        shutil.copy(source, target)
+
+
+def parser() -> argparse.ArgumentParser:
+    options = command_line.Parser(prog="python3 -m tools.docs.readme", description=__doc__.splitlines()[0])
+    options.add_argument("names", nargs="*", help="tables or measurements; default: all but those that take an hour")
+    options.add_argument("--check", action="store_true", help="write nothing: compare what takes seconds")
+    options.add_argument("--compiler", action="store_true", help="there is one for the target")
+    options.set_defaults(command=run)
+    return options
+
+
+def run(options: argparse.Namespace) -> int:
+    blocks_of(pages()) # before hours of measuring
+    sums = {kind: checksum(kind) for kind in PARTS}
+    done, lines = measured(chosen(options.names, options.check, options.compiler, sums), options.check, bool(options.names), sums)
+    if sums != {kind: checksum(kind) for kind in PARTS}:
+        raise UserError("the sources have changed meanwhile", "make readme", "run it again")
+    texts = pages()
+    if not options.check:
+        write(texts, done, sums)
+        return 0
+    if not options.compiler:
+        print("not checked: size, cycles, longest path; there is no compiler for the target on PATH or at XC16=folder")
+    lines += check(texts, done, sums)
+    for line in lines:
+        print(f"foc33: {line}", file=sys.stderr)
+    return 1 if lines else 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    return command_line.main(parser, arguments)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -171,13 +171,13 @@ class _Debug:
         return Thing(symbol.name, size, list(_members(die, symbol.name)) if die is not None else [], self.files.get(symbol.address, ""))
 
 
-def read(path: Path) -> Image:
-    """The image in an ELF file of XC16."""
+def read(path: Path, by_lines: bool = True) -> Image:
+    """The image in an ELF file of XC16. @param by_lines off: inlined code is only told by its address"""
     elf = read_elf(path)
     if not DEBUGGED <= set(elf.debug):
         raise UserError("no debugging information", str(path), "compile with -g")
     with reading("ELF", path):
-        return _read(elf)
+        return _read(elf, by_lines)
 
 
 def lines(elf: Elf) -> dict[int, tuple[str, int]]:
@@ -207,7 +207,7 @@ def _debug(elf: Elf) -> _Debug:
     return _cached(tuple(sorted(elf.debug.items())))
 
 
-def _read(elf: Elf) -> Image:
+def _read(elf: Elf, by_lines: bool) -> Image:
     debug = _debug(elf)
     words, constants, data, initial = [], [], [], []
     for section in elf.sections:
@@ -219,7 +219,7 @@ def _read(elf: Elf) -> Image:
         elif section.name == ".dinit":
             initial += [elf.words[address] for address in range(section.start, section.end, 2)]
         elif section.memory == CODE and section.start in device.PROGRAM:
-            words += [_word(address, debug) or _unknown(address, named) for address in range(section.start, section.end, 2)]
+            words += [_word(address, debug, by_lines) or _unknown(address, named) for address in range(section.start, section.end, 2)]
     rest = elf.ram_bytes - sum(thing.size for thing in data)
     if rest:
         data.append(Thing("(alignment)", rest))
@@ -254,7 +254,7 @@ def _unknown(address: int, named: dict[int, Symbol]) -> Word:
     return Word(address, (Frame(named[start].name if start in named else "?", ""),), (start,))
 
 
-def _word(address: int, debug: _Debug) -> Word | None:
+def _word(address: int, debug: _Debug, by_lines: bool = True) -> Word | None:
     """A word of a C function."""
     index = bisect.bisect_right(debug.starts, address) - 1
     if index < 0 or debug.nodes[debug.starts[index]].high <= address:
@@ -264,7 +264,7 @@ def _word(address: int, debug: _Debug) -> Word | None:
     best = max((node for node in copies if node.low <= address < node.high), key=lambda node: (node.depth, node.low - node.high),
                default=function)
     # The lines tell more exactly than the stretches, which have gaps where the compiler has mixed two functions' instructions.
-    place = debug.lines.get(address)
+    place = debug.lines.get(address) if by_lines else None
     name = debug.function_at(*place) if place else None
     if name is not None and name != best.frame.name:
         named = [node for node in [function, *copies] if node.frame.name == name]

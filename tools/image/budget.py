@@ -24,6 +24,7 @@ class Limits:
     flash: int
     ram: int
     stack: int = 0
+    goal: int | None = None     # flash that it is to come down to
     header: int | None = None   # cksum of the userparams.h that they are for
 
 
@@ -100,6 +101,7 @@ class Budget:
             section = _required(budget, name)
             limits.append(Limits(section.integer("flash_bytes", minimum=0), section.integer("ram_bytes", minimum=0),
                                  section.integer("stack_bytes", minimum=0) if name == "image" else 0,
+                                 section.integer("goal_flash_bytes", None, minimum=0) if name == "note" else None,
                                  section.integer("header_cksum", None, minimum=0) if name == "image" else None))
             section.close()
         budget.close()

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tools.common import command_line, paths
+from tools.common.checksum import checksum
 from tools.common.errors import UserError
 from tools.common.progress import waiting
 
@@ -36,12 +37,14 @@ class Row:
     note: int | None = None
     flash: int = 0
     budget: int | None = None
+    goal: int | None = None
     flash_change: int | None = None
     ram: int = 0
     note_ram: int | None = None
     ram_budget: int | None = None
     ram_change: int | None = None
     copies: int = 0
+    counted: bool = True     # in the whole image
 
 
 @dataclass
@@ -52,6 +55,7 @@ class Report:
     base_name: str = ""       # commit compared with, "" without one
     no_base: str = ""         # why there is none
     broken: list[str] = field(default_factory=list)
+    by_address: int | None = None   # what NOTE_TITLE takes when inlined code is told by its address alone
 
 
 def deepest(image: attribution.Image, listing: str, budget: Budget, board: Path = BOARD) -> stack.Result:
@@ -84,6 +88,11 @@ def measure(image: attribution.Image, depth: stack.Result, budget: Budget, befor
     return report
 
 
+def note_bytes(now: Shares, budget: Budget) -> int:
+    """Flash of what AN1292 does, too."""
+    return next(row.flash for row in rows(now, None, budget) if row.name == NOTE_TITLE)
+
+
 def rows(now: Shares, before: Shares | None, budget: Budget) -> list[Row]:
     """Functions and objects under their modules, modules under their groups, then the totals."""
     result, totals = [], []
@@ -98,13 +107,14 @@ def rows(now: Shares, before: Shares | None, budget: Budget) -> list[Row]:
             if below:
                 inside += [_sum("module", module.name, title, below, budget=module.flash_budget), *below]
         if inside:
-            total = _sum("group", title, title, [row for row in inside if row.kind == "module"], note=group.note_flash if group else None)
+            total = _sum("group", title, title, [row for row in inside if row.kind == "module"], note=group.note_flash if group else None,
+                         counted=group is None or group.counted)
             totals.append((total, group))
             result += [total, *inside]
     # what is not assigned counts as AN1292's until somebody says otherwise
-    as_note = [row for row, group in totals if group is None or group.note_flash is not None]
-    known = [group.note_flash for group in budget.groups if group.note_flash is not None]
-    result.append(_sum("total", NOTE_TITLE, "", as_note, note=sum(known), budget=budget.note.flash, note_ram=budget.note.ram,
+    as_note = [row for row, group in totals if group is None or group.counted and group.note_flash is not None]
+    known = [group.note_flash for group in budget.groups if group.counted and group.note_flash is not None]
+    result.append(_sum("total", NOTE_TITLE, "", as_note, note=sum(known), budget=budget.note.flash, goal=budget.note.goal, note_ram=budget.note.ram,
                        ram_budget=budget.note.ram))
     result.append(_sum("total", "whole image", "", [row for row, group in totals if group is None or group.counted], budget=budget.image.flash, ram_budget=budget.image.ram))
     return result
@@ -129,7 +139,7 @@ def broken(report: Report, now: Shares, limits: bool) -> list[str]:
     """A line for each budget that does not hold, and for what no module of the budget file claims."""
     lines = []
     for row in report.rows:
-        what = {NOTE_TITLE: "control law, field weakening and user interface"}.get(row.name, row.name)
+        what = {NOTE_TITLE: "what AN1292 does, too"}.get(row.name, row.name)
         for memory, size, limit in (("flash", row.flash, row.budget), ("RAM", row.ram, row.ram_budget)):
             if limits and limit is not None and size > limit:
                 lines.append(f"{memory}, {what}: {size} bytes, {size - limit} over the budget of {limit}")
@@ -171,7 +181,8 @@ def text(report: Report) -> str:
     lines += [HEAD, *(_line(row) for row in report.rows if row.kind != "function")]
     lines.append(f"{'stack':<44}{'':>7}{'':>7}{'':>8}{'':>8}{report.stack.depth:>7}{report.budget.image.stack:>8}")
     lines.append("bytes; flash is 3 bytes a word; AN1292 is at its -O3; not counted: vector tables, configuration words, and on both sides the start-up code")
-    lines.append("inlined code is its source line's function; by its address alone the sums differ by up to 90 bytes")
+    lines.append("inlined code is its source line's function" + ("" if report.by_address is None else
+                                                                 f"; by its address alone '{NOTE_TITLE}' is {report.by_address} bytes"))
     lines.append(f"change: since {report.base_name}" if report.base_name else f"no column for the change: {report.no_base}")
     return "\n".join(lines)
 
@@ -181,7 +192,7 @@ def summary(report: Report) -> dict:
     return {"rows": [vars(row) for row in report.rows], "stack_bytes": report.stack.depth, "stack_budget_bytes": report.budget.image.stack,
             "stack": [{"priority": 0, "steps": report.stack.main.steps}] +
                      [{"priority": level.priority, "steps": level.chain.steps} for level in report.stack.levels],
-            "base": report.base_name or None, "broken": report.broken}
+            "by_address_bytes": report.by_address, "base": report.base_name or None, "broken": report.broken}
 
 
 def kept(report: Report) -> dict[str, float]:
@@ -215,8 +226,12 @@ def told(data: dict, folder: Path, name: str, report: str) -> int:
 
 def readme_table(data: dict) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what size.json holds."""
-    body = [[row["name"], *(_number(row[key], 0) for key in ("note", "flash", "budget", "note_ram", "ram", "ram_budget"))]
-            for row in data["rows"] if row["kind"] in ("group", "total")]
+    def budget(row: dict) -> str:
+        return _number(row["budget"], 0) + (f" (goal {row['goal']})" if row["goal"] is not None else "")
+    body = [[row["name"], _number(row["note"], 0), _number(row["flash"], 0), budget(row), *(_number(row[key], 0) for key in ("note_ram", "ram", "ram_budget"))]
+            for row in data["rows"] if row["kind"] in ("group", "total") and row["counted"]]
+    body.insert(next(i for i, row in enumerate(body) if row[0] == NOTE_TITLE) + 1,
+                ["the same, inlined code by its address alone", "", str(data["by_address_bytes"]), "", "", "", ""])
     body.append(["stack at its deepest", "", "", "", "", str(data["stack_bytes"]), str(data["stack_budget_bytes"])])
     return ["bytes", "AN1292: flash", "flash", "budget", "AN1292: RAM", "RAM", "budget"], body
 
@@ -260,9 +275,11 @@ def _run(options: argparse.Namespace) -> int:
     before, name, reason = (None, "", "not asked for (--base)") if options.base is None else compare(options.base, budget)
     with waiting("measuring the image"):
         report = measure(image, deepest(image, listing, budget), budget, before, not options.no_budget)
+        report.by_address = note_bytes(shares(attribution.read(options.elf, by_lines=False), budget), budget)
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
-    status = told(summary(report), options.out, "size", text(report))
+    sources = {} if options.no_budget else {"sources": checksum("image")}
+    status = told(summary(report) | sources, options.out, "size", text(report))
     if not options.no_budget:
         print(history.keep("size", kept(report), options.out))
     return status
