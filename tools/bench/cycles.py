@@ -19,7 +19,7 @@ import numpy as np
 
 from tools.common import board_file, command_line, motor_file, paths
 from tools.common.errors import UserError
-from tools.image import attribution, history, program
+from tools.image import attribution, program
 from tools.image.budget import Budget
 from tools.image.profile import Counts, Profile, profile
 from tools.image.size import told
@@ -299,14 +299,6 @@ def summary(report: Report) -> dict[str, Any]:
             "executed": report.profile.executed, "assumptions": report.assumptions, "broken": report.broken}
 
 
-def kept(report: Report) -> dict[str, float]:
-    """What a commit's line has: the longest period and control interrupt, the mean periods, then the mean cycles of each function of at least one."""
-    found, interrupts = report.found, max(report.all.total(), 1)
-    sums = {"longest": report.all_periods.most, "control interrupt": report.all.most, "third duty": found.latency.most}
-    sums |= {f"mean {name}": round(found.periods[name].mean, 1) for name in (WITHOUT, WITH)}
-    return sums | {name: round(cycles / interrupts, 1) for name, cycles in report.profile.inlined.most_common() if cycles >= interrupts}
-
-
 def readme_table(data: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
     """Head and rows of the README's table, from what cycles.json holds."""
     def spread(values: dict[str, Any]) -> list[str]:
@@ -376,10 +368,7 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    status = told(summary(report), options.out or image.parent, "cycles", text(report) + "\n")
-    if not options.no_budget and not options.scenarios:
-        print(history.keep("cycles", kept(report), options.out or image.parent))
-    return status
+    return told(summary(report), options.out or image.parent, "cycles", text(report) + "\n")
 
 
 if __name__ == "__main__":
