@@ -247,7 +247,7 @@ $B/contents: FORCE
 
 # Nothing is compiled with a userparams.h that cannot work.
 params = @tools/make/userparams.sh $@
-params_source := firmware/drive/param_text.c firmware/drive/param_check.c tools/make/userparams.sh
+params_source := firmware/drive/param_text.c firmware/drive/param_check.c $(addprefix tools/make/,userparams.sh userparams.awk nearest.awk)
 $B/params: $B/flags $(params_source)
 	$(params) $(compile)
 
