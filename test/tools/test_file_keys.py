@@ -12,7 +12,8 @@ from tools.common import board_file, motor_file, paths
 from tools.docs import file_keys, tables
 
 MOTOR, BOARD = (paths.ROOT / f"examples/my_{kind}.toml" for kind in ("motor", "board"))
-SALIENT = paths.MOTORS / "ipm_4pp_24v_2000.toml"
+ROUND = paths.MOTORS / "hurst_dmb0224c10002.toml"
+"""One inductance."""
 
 
 def cells(name: str) -> list[str]:
@@ -21,17 +22,19 @@ def cells(name: str) -> list[str]:
     return [cell.strip() for cell in line.split("|")[1:-1]]
 
 
-def keys() -> list[tuple]:
-    return [(loader, SALIENT if key[-2:] in ("_d", "_q") else example, table, key) for loader, example in ((motor_file, MOTOR), (board_file, BOARD))
-            for table, keys in loader.TABLES.items() for key in keys or ()]
+KEYS = {f"{table} {key}": (loader, ROUND if (table, key) == ("electrical", "inductance") else example, table, key)
+        for loader, example in ((motor_file, MOTOR), (board_file, BOARD)) for table, keys in loader.TABLES.items() for key in keys or ()}
 
 
-@pytest.mark.parametrize("loader, example, table, key", keys(), ids=lambda item: item if isinstance(item, str) else "")
+@pytest.mark.parametrize("loader, example, table, key", KEYS.values(), ids=KEYS)
 def test_a_loader_reads_each_key_of_its_tables(tmp_path, loader, example, table, key):
-    head, inside, rest = example.read_text(encoding="utf-8").partition(f"[{table}]\n")
+    before, head, rest = example.read_text(encoding="utf-8").partition(f"[{table}]\n")
+    inside, blank, after = rest.partition("\n\n")
+    changed, count = re.subn(rf"(?m)^{key} = .*", f"{key} = 1", inside)
     path = tmp_path / example.name
-    path.write_text(head + inside + re.sub(rf"(?m)^{key} = .*", f"{key} = 1", rest, count=1), encoding="utf-8")
-    refusal(lambda: loader.load(str(path)), f"'{key}'")
+    path.write_text(before + head + changed + blank + after, encoding="utf-8")
+    assert count == 1
+    refusal(lambda: loader.load(str(path)), f"'{key}'", example.name)
 
 
 def test_every_event_and_expectation_is_in_an_example():

@@ -1,6 +1,6 @@
 """Motor files: the numbers of a data sheet with unit and source, turned into one star phase in SI, and checked for sense.
 
-examples/my_motor.toml has every key but those of a salient motor, TABLES what each means; [tune] replaces values of userparams.h that the tuner would
+examples/my_motor.toml shows a file, TABLES has every key and what it means; [tune] replaces values of userparams.h that the tuner would
 choose, [plant] sets keys of the virtual board that no sheet gives."""
 
 import functools
