@@ -240,7 +240,7 @@ $B/contents: FORCE
 
 # Nothing is compiled with a userparams.h that cannot work.
 params = @tools/make/userparams.sh $@
-params_source := firmware/drive/param_text.c firmware/drive/param_check.c tools/make/userparams.sh
+params_source := firmware/drive/param_text.c firmware/drive/param_check.c $(addprefix tools/make/,userparams.sh userparams.awk nearest.awk)
 $B/params: $B/flags $(params_source)
 	$(params) $(compile)
 
@@ -289,7 +289,7 @@ board_c := $(call c_tests,chip)
 behaviour_c := $(call c_tests,behaviour)
 source_py := $(call py_tests,unit) $(call py_tests,golden)
 bench_py := $(call py_tests,tools) $(call py_tests,behaviour) $(call py_tests,fuzz)
-tools_py := $(call py_tests,static) $(call py_tests,coverage) $(call py_tests,sixteen_bit)
+tools_py := $(call py_tests,static) $(call py_tests,coverage)
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
@@ -325,7 +325,7 @@ test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ...
 browser := chromium=chromium chromedriver=chromium-driver module:selenium=python3-selenium
 setup-checks: setup-test
 	@$(if $(ONLY),:,test/static/need.sh $(browser) cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
-	    avr-gcc=gcc-avr avr-gcc=avr-libc simavr=simavr simavr=libsimavr-dev simavr=libelf-dev soffice=libreoffice-calc-nogui)
+	    soffice=libreoffice-calc-nogui)
 
 # What the tests and the pictures of the page of make live need.
 .PHONY: setup-browser

@@ -59,7 +59,7 @@ def command(options: argparse.Namespace) -> int:
 # ---- what is given ---------------------------------------------------------------------------------------------------------
 def keys() -> dict[str, str]:
     """What may be given: short name, or the key's own where only one table has it; and the key with its table."""
-    every = [f"{table}.{key}" for table, kinds in board_file.TABLES.items() for key in kinds]
+    every = [f"{table}.{key}" for table, known in board_file.TABLES.items() for key, told in known.items() if told.has_units]
     own = {name.split(".")[1]: name for name in every if sum(other.endswith(name[name.index("."):]) for other in every) == 1}
     return own | SHORT
 
@@ -117,7 +117,7 @@ def written(changes: dict[str, str], path: Path) -> str:
     title = changes.pop("title", path.stem)
     chosen = {key: changes.pop(key) for key in list(changes) if key in pins.firmware()}
     if "supply.voltage" in changes:
-        supply_v, _ = number("supply.voltage", board_file.TABLES["supply"]["voltage"][1], changes["supply.voltage"])
+        supply_v, _ = number("supply.voltage", board_file.TABLES["supply"]["voltage"].kind, changes["supply.voltage"])
         changes = {**{key: f"{float(f'{share * supply_v:.3g}'):g}" for key, share in OF_SUPPLY.items()}, **changes}
     table, result = "", ["# Made by: make board; look through every number. [?] in a source: not confirmed for this board."]
     for line in lines:
@@ -140,7 +140,7 @@ def _line(name: str, line: str, changes: dict[str, str], title: str) -> str:
         if changes[name] not in ("yes", "no"):
             raise UserError(f"'{key}' = '{changes[name]}' is neither yes nor no", WHERE, "write one of them")
         return f"{key} = {'true' if changes[name] == 'yes' else 'false'}"
-    value, unit = number(name, board_file.TABLES[table][key][1], changes[name])
+    value, unit = number(name, board_file.TABLES[table][key].kind, changes[name])
     return f'{key} = {{ value = {value:.10g}, unit = "{unit}", source = "given to make board: {_quoted(changes[name])}" }}'
 
 

@@ -368,43 +368,44 @@ def locked_sequence(v, speed, current, closed_from, compare_from, within_deg, *m
 @block("estimator from standstill: the start ramp in its own frame, then the control frame, a load change",
        ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS, 44.0)
 def estimator_start(v, _):
-    speed = profile([(0, 0.0), (200, 0.0), (1600, 5000.0), (2500, 5000.0)])
-    current = [1.41 * cmath.rect(1, math.radians(x)) for x in profile([(0, 5.0), (2000, 20.0), (2100, 80.0), (2500, 80.0)])]
-    locked_sequence(v, speed, current, 1900, range(1600, 2500), 1.0)
+    speed = profile([(0, 0.0), (100, 0.0), (800, 5000.0), (1250, 5000.0)])
+    current = [1.41 * cmath.rect(1, math.radians(x)) for x in profile([(0, 5.0), (1000, 20.0), (1050, 80.0), (1250, 80.0)])]
+    locked_sequence(v, speed, current, 950, range(800, 1250), 1.0)
 
 
 @block("estimator started on a turning motor: lock, load step, across nominal speed, field weakening at 5500 rpm",
        ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS, 53.0)
 def estimator_speed(v, _):
-    speed = profile([(0, 5000.0), (600, 5000.0), (1000, 13900.0), (1200, 14100.0), (1900, 27500.0), (2500, 27500.0)])
-    current = profile([(0, 0.5j), (500, 0.5j), (520, 2j), (1000, 1j), (1900, -2.2 + 0.4j), (2100, -2.2 + 0.4j),
-                       (2110, -2.2 + 1.0j), (2500, -2.2 + 1.0j)])
-    locked_sequence(v, speed, current, 0, range(500, 2500), 1.5)
+    speed = profile([(0, 5000.0), (300, 5000.0), (500, 13900.0), (600, 14100.0), (950, 27500.0), (1250, 27500.0)])
+    current = profile([(0, 0.5j), (250, 0.5j), (260, 2j), (500, 1j), (950, -2.2 + 0.4j), (1050, -2.2 + 0.4j),
+                       (1055, -2.2 + 1.0j), (1250, -2.2 + 1.0j)])
+    locked_sequence(v, speed, current, 0, range(250, 1250), 1.5)
 
 
-@block("estimator of a motor whose count of speed is 4 electrical rpm: lock, load step, across eight samples' end, 1225 Hz with load",
+@block("estimator whose count of speed is 4 electrical rpm: lock, load step, count by count across eight samples' end, 1225 Hz with load",
        ESTIMATOR_FORMAT.replace("omega electrical rpm", "omega 4 electrical rpm"), ESTIMATOR_COLUMNS, 50.0)
 def estimator_quick(v, _):
-    speed = profile([(0, 14000.0), (400, 14000.0), (700, 22000.0), (2000, 73500.0), (2800, 73500.0)])
-    current = profile([(0, 0.3j), (300, 0.3j), (320, 1.9j), (2300, 1.9j), (2310, 0.3j), (2500, 0.3j), (2510, -1.5 + 1.5j), (2800, -1.5 + 1.5j)])
-    locked_sequence(v, speed, current, 0, range(300, 2800), 2.0, QUICK, 4348)
+    speed = profile([(0, 14000.0), (200, 14000.0), (300, 17980.0), (500, 18020.0), (600, 22000.0), (1150, 73500.0), (1550, 73500.0)])
+    current = profile([(0, 0.3j), (150, 0.3j), (160, 1.9j), (1300, 1.9j), (1305, 0.3j), (1400, 0.3j), (1405, -1.5 + 1.5j),
+                       (1550, -1.5 + 1.5j)])
+    locked_sequence(v, speed, current, 0, range(150, 1550), 2.0, QUICK, 4348)
 
 
 @block("estimator from negative speed through standstill to positive speed: the sign of Equation 2 changes",
        ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS, 47.0)
 def estimator_reversal(v, _):
-    speed = profile([(0, -5000.0), (600, -5000.0), (1200, -800.0), (1500, 0.0), (1700, 1200.0), (2300, 6000.0), (2700, 6000.0)])
-    current = profile([(0, -1j), (600, -1j), (700, 1j), (2000, 1j), (2700, 0.3j)])
-    locked_sequence(v, speed, current, 0, [*range(500, 1200), *range(2300, 2700)], 1.0)
+    speed = profile([(0, -5000.0), (300, -5000.0), (600, -800.0), (750, 0.0), (850, 1200.0), (1150, 6000.0), (1350, 6000.0)])
+    current = profile([(0, -1j), (300, -1j), (350, 1j), (1000, 1j), (1350, 0.3j)])
+    locked_sequence(v, speed, current, 0, [*range(250, 600), *range(1150, 1350)], 1.0)
 
 
 @block("estimator with 1/Kphi at 1, 1.1, 2 and 0.8 times the true one: the angle follows sqrt(2) sin(D + 45 deg) = K'/K, the speed stays",
        ESTIMATOR_FORMAT, ESTIMATOR_COLUMNS + " inv_kfi:s16", 47.0)
 def estimator_kphi(v, _):
-    ratios = [1.0] * 500 + [1.1] * 400 + [2.0] * 600 + [0.8] * 800
-    speed = [7500.0] * 2301
-    turns = estimator_sequence(v, speed, [0.8j] * 2301, 0, ratios, [*range(400, 500), *range(800, 900), *range(2200, 2300)])
-    for end in (500, 900, 1500, 2300):
+    ratios = [1.0] * 300 + [1.1] * 300 + [2.0] * 300 + [0.8] * 400
+    speed = [7500.0] * 1301
+    turns = estimator_sequence(v, speed, [0.8j] * 1301, 0, ratios, [*range(250, 300), *range(550, 600), *range(1250, 1300)])
+    for end in (300, 600, 900, 1300):
         require_lock(v, turns, speed, end - 1, ref.lock_error_deg(1 / ratios[end - 1]), 0.5) # K'/K is a ratio of Kphi, inv_kfi its inverse
 
 

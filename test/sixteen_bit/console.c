@@ -37,14 +37,12 @@ static void finish(uint8_t code)
     }
 }
 
-#ifndef __AVR__
 void __attribute__((interrupt, no_auto_psv)) _DefaultInterrupt(void);
 
 void _DefaultInterrupt(void)
 {
     finish(PORT_UNEXPECTED);
 }
-#endif
 
 int main(void)
 {

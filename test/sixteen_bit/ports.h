@@ -1,4 +1,4 @@
-/* What both simulators offer a test image, in addresses where the chip has no registers: bytes out, bytes in, shared by both sides.
+/* What the simulator offers a test image, in addresses where the chip has no registers: bytes out, bytes in, shared by both sides.
  *
  * Golden vectors are larger than the flash: the simulator holds them, and the image asks for them a row at a time. */
 #ifndef TEST_PORTS_H
@@ -6,11 +6,8 @@
 
 #include <stdint.h>
 
-#ifdef __AVR__
-#define PORT(number) (*(volatile unsigned char *)(0xE0 + (number)))
-#else
-#define PORT(number) (*(volatile unsigned int *)(0x07F0 + 2 * (number)))
-#endif
+#define PORTS 0x07F0
+#define PORT(number) (*(volatile unsigned int *)(PORTS + 2 * (number)))
 
 enum {
     PORT_CONSOLE, /* write: one character of the results */

@@ -1,6 +1,6 @@
-"""Runs unit tests of the control law where int has 16 bits, in a simulator, and compares every result with the PC's.
+"""Runs unit tests of the control law where int has 16 bits, in the chip's simulator, and compares every result with the PC's.
 
-The chip is the command line's: compiler, linker, simulator. A test is one image, or several where the flash does not hold all of it."""
+A test is one image, or several where the flash does not hold all of it."""
 
 import argparse
 import os
@@ -15,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import golden_words # noqa: E402
+from tools.image import load # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 SIMULATOR_FAILED = 255  # exit code; below, it is the number of failed tests
@@ -60,7 +61,6 @@ class Builder:
         self.out, self.unity, self.runners = Path(options.out), Path(options.unity), Path(options.runners)
         self.compiler, self.linker = shlex.split(options.compile), shlex.split(options.link)
         self.library, self.simulator, self.cycles = options.library, options.simulator, options.cycles
-        self.flat = options.flat
         self.includes = [f"-I{HERE}", "-Itest/unit/support", f"-I{self.out}/golden", "-isystem", f"{self.unity}/src"]
         self.tables: list[Path] = []
         self.objects: list[Path] = []
@@ -129,9 +129,6 @@ class Builder:
 
     def loadable(self, elf: Path) -> Path:
         """What the simulator reads."""
-        if not self.flat:
-            return elf
-        from tools.image import load
         image = elf.with_suffix(".image")
         image.write_text(load.text(load.load(elf)), encoding="utf-8")
         return image
@@ -181,7 +178,6 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--link", required=True, help="command with {objects}, {elf} and {map} in it")
     parser.add_argument("--library", required=True, help="archive of the control law for that chip")
     parser.add_argument("--simulator", required=True)
-    parser.add_argument("--flat", action="store_true", help="the simulator reads images as tools/image/load.py writes them")
     parser.add_argument("--runners", required=True, help="folder of the generated runners")
     parser.add_argument("--host", required=True, help="folder of the PC's executables")
     parser.add_argument("--out", required=True)

@@ -1,4 +1,4 @@
-"""docs/files.md: every key that a loader asks for, with its range and default; the virtual board's keys as the board has them."""
+"""docs/files.md: every key of a loader, with its range and default; the virtual board's keys as the board has them."""
 
 import re
 from dataclasses import replace
@@ -8,15 +8,12 @@ from support import LIBRARY, refusal
 
 from tools.bench import expect, scenario_file
 from tools.bench.board import Board, Library
-from tools.common import board_file, motor_file
+from tools.common import board_file, motor_file, paths
 from tools.docs import file_keys, tables
 
-MOTOR = file_keys.EXAMPLES["motor"][0]
-
-
-@pytest.fixture(scope="module")
-def found() -> dict[str, dict[str, file_keys.Asked]]:
-    return {kind: file_keys.listen(kind) for kind in file_keys.LOADERS}
+MOTOR, BOARD = (paths.ROOT / f"examples/my_{kind}.toml" for kind in ("motor", "board"))
+ROUND = paths.MOTORS / "hurst_dmb0224c10002.toml"
+"""One inductance."""
 
 
 def cells(name: str) -> list[str]:
@@ -25,17 +22,29 @@ def cells(name: str) -> list[str]:
     return [cell.strip() for cell in line.split("|")[1:-1]]
 
 
-def test_no_key_of_the_loaders_own_tables_is_left_out(found):
-    assert {f"{table}.{key}" for table, keys in motor_file.TABLES.items() for key in keys or ()} <= set(found["motor"])
-    board = {table: (*keys, *board_file.OTHERS.get(table, ())) for table, keys in board_file.TABLES.items()}
-    assert {f"{table}.{key}" for table, keys in board.items() for key in keys} <= set(found["board"])
-    assert {f"event.{kind}" for kind in scenario_file.EVENT_KINDS} <= set(found["scenario"])
-    keyless = {"no_warnings", "clean", "no_fault", "outputs_off"}
-    assert set(expect.KINDS) - keyless <= {item.table.removeprefix("expect ") for item in found["scenario"].values()}
+KEYS = {f"{table} {key}": (loader, ROUND if (table, key) == ("electrical", "inductance") else example, table, key)
+        for loader, example in ((motor_file, MOTOR), (board_file, BOARD)) for table, keys in loader.TABLES.items() for key in keys or ()}
+
+
+@pytest.mark.parametrize("loader, example, table, key", KEYS.values(), ids=KEYS)
+def test_a_loader_reads_each_key_of_its_tables(tmp_path, loader, example, table, key):
+    before, head, rest = example.read_text(encoding="utf-8").partition(f"[{table}]\n")
+    inside, blank, after = rest.partition("\n\n")
+    changed, count = re.subn(rf"(?m)^{key} = .*", f"{key} = 1", inside)
+    path = tmp_path / example.name
+    path.write_text(before + head + changed + blank + after, encoding="utf-8")
+    assert count == 1
+    refusal(lambda: loader.load(str(path)), f"'{key}'", example.name)
+
+
+def test_every_event_and_expectation_is_in_an_example():
+    found = file_keys.asked()
+    assert set(scenario_file.EVENT_KINDS) <= {item.key for item in found["event"]}
+    assert {f"expect {name}" for name in expect.KINDS} - {"expect no_warnings"} == {name for name in found if name.startswith("expect ")}
 
 
 @pytest.mark.parametrize("row", [
-    ["`dead_time`", "s", "5e-07 .. 3e-06", "must be given"], ["`pole_pairs`", "pairs", "1 .. 50", "must be given"],
+    ["`dead_time`", "s", "5e-07 .. 3e-06", "must be given"], ["`pole_pairs`", "pole pairs", "1 .. 50", "must be given"],
     ["`coulomb_friction`", "N m", "0 .. 10", "0"],
     ["`rotor_deg`", "deg", "-360 .. 360", "0"], ["`sinks`", "", "true or false", "must be given"],
     ["`torque_percent`", "%", "0 .. 1000", "one of these"],
@@ -45,22 +54,14 @@ def test_unit_range_and_default_are_the_loader_s(row):
 
 
 def test_another_range_in_a_loader_is_another_page(monkeypatch):
-    monkeypatch.setitem(board_file.TABLES["pwm"], "dead_time", ("", replace(board_file.TABLES["pwm"]["dead_time"][1], maximum=4e-6)))
+    key = board_file.TABLES["pwm"]["dead_time"]
+    monkeypatch.setitem(board_file.TABLES["pwm"], "dead_time", replace(key, kind=replace(key.kind, maximum=4e-6)))
     assert "| 5e-07 .. 4e-06 |" in tables.page("files")
 
 
-def test_a_key_without_a_meaning_and_a_meaning_without_a_key_are_refused(monkeypatch):
-    meanings = file_keys.MEANINGS["board"]
-    monkeypatch.setitem(file_keys.MEANINGS, "board", {name: text for name, text in meanings.items() if name != "bus.load"})
-    refusal(lambda: tables.page("files"), "no meaning of 'bus.load' in a board file, tools/docs/file_keys.py")
-    monkeypatch.setitem(file_keys.MEANINGS, "board", meanings | {"bus.weight": "none"})
-    refusal(lambda: tables.page("files"), "no key 'bus.weight' in a board file")
-
-
-def test_listening_leaves_the_loaders_as_they_were():
-    before = {name: getattr(file_keys.Section, name) for name in ("text", "number", "choice", "flag")}, file_keys.units.read
-    file_keys.listen("board")
-    assert before == ({name: getattr(file_keys.Section, name) for name in before[0]}, file_keys.units.read)
+def test_a_key_without_a_meaning_is_refused(monkeypatch):
+    monkeypatch.setitem(scenario_file.EVENT_KINDS, "press", "")
+    refusal(lambda: tables.page("files"), "'press' of [event] has no meaning")
 
 
 @pytest.mark.parametrize("key, expected", [
@@ -72,7 +73,7 @@ def test_what_stands_in_for_a_quantity_is_what_the_page_says(tmp_path, key, expe
     (tmp_path / "m.toml").write_text(re.sub(rf"(?m)^{key} = .*\n", "", MOTOR.read_text(encoding="utf-8")), encoding="utf-8")
     motor = motor_file.load(str(tmp_path / "m.toml"))
     assert {name: getattr(motor, name) for name in expected} == pytest.approx(expected)
-    assert cells(key)[3] in ("0.39 %/K", "-0.2 %/K", "0", "1.5 times current", "no I2t", "a quarter of the rated torque")
+    assert cells(key)[3] in ("0.0039", "-0.002", "0", "1.5 times current", "no I2t", "0.25 times the rated torque")
 
 
 def test_the_virtual_board_has_the_keys_of_the_page_with_these_units_ranges_defaults_and_meanings():

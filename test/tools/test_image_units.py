@@ -74,6 +74,7 @@ def judge(tmp_path, monkeypatch):
     (tmp_path / "unity/src/unity.c").write_text("")
     (tmp_path / "law.a").write_text("")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(target_run.Builder, "loadable", lambda builder, elf: elf)
 
     def of(on_chip: list[str], on_pc: dict[str, str] | None = None, source: str = "int x;\n"):
         Path("test/unit/test_x.c").write_text(source)
@@ -85,8 +86,7 @@ def judge(tmp_path, monkeypatch):
                         + "END\n")
         host.chmod(0o755)
         options = argparse.Namespace(out=f"{tmp_path}/out", unity="unity", runners="runners", compile=shlex.quote(f"{tmp_path}/cc"),
-                                     link=shlex.quote(f"{tmp_path}/ld") + " {elf} {objects}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1,
-                                     flat=False)
+                                     link=shlex.quote(f"{tmp_path}/ld") + " {elf} {objects}", library="law.a", simulator=f"{tmp_path}/sim", cycles=1)
         builder = target_run.Builder(options)
         builder.shared()
         return target_run.judge("unit/test_x", builder, Path("runners"))

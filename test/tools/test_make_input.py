@@ -76,9 +76,17 @@ def test_a_variable_that_a_target_would_not_read_is_refused(goal, word, text):
 def test_what_the_list_of_targets_names_is_taken_and_so_are_the_usual_ones(goal, brackets):
     names = re.findall(r"\b([A-Z][A-Z0-9]*)=", brackets)
     for typed in (names, ["V", "CC", "PYTHON", "XC16", "INSTALL"]):
-        done = subprocess.run(["awk", "-v", f"typed={' '.join(typed)}", "-v", f"goals={goal}", "-f", "tools/make/input.awk", "Makefile",
+        done = subprocess.run(["awk", "-v", f"typed={' '.join(typed)}", "-v", f"goals={goal}", "-f", "tools/make/nearest.awk", "-f", "tools/make/input.awk", "Makefile",
                                *map(str, ROOT.glob("tools/make/*.mk"))], cwd=ROOT, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stdout) == (0, "")
+
+
+def test_without_python3_a_misspelt_variable_is_refused_all_the_same(tmp_path):
+    for tool in ("awk", "sh"):
+        (tmp_path / tool).symlink_to(shutil.which(tool))
+    done = subprocess.run(["awk", "-v", "typed=MOTER", "-v", "goals=run", "-f", "tools/make/nearest.awk", "-f", "tools/make/input.awk", "Makefile"], cwd=ROOT,
+                          env={"PATH": str(tmp_path)}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "foc33: no variable MOTER, make's command line: `make` lists them\n")
 
 
 def test_one_of_several_goals_is_enough_and_inner_makes_are_not_asked():

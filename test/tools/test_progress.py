@@ -98,8 +98,7 @@ def test_what_cannot_be_run_is_one_line(capfd, arguments, said):
     refused((code, *capfd.readouterr()), said)
 
 
-WRAPPED = {"proof.mk": "proof.py", "mutate.mk": "mutate.py", "static.mk": "static.py|ubsan.sh", "coverage.mk": "MAKE", "test-avr.mk": "call build",
-           "test-target.mk": "call build"}
+WRAPPED = {"proof.mk": "proof.py", "mutate.mk": "mutate.py", "static.mk": "static.py|ubsan.sh", "coverage.mk": "MAKE", "test-target.mk": "call build"}
 
 
 @pytest.mark.parametrize("file, program", WRAPPED.items(), ids=WRAPPED)

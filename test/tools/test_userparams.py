@@ -173,6 +173,16 @@ def test_a_name_that_cannot_be_meant_is_one_line_with_its_place(tmp_path, mistak
     assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: userparams.h:{number}: {told}"), lines
 
 
+def test_without_python3_a_misspelt_name_is_not_found_and_the_build_says_so(tmp_path, monkeypatch):
+    (tmp_path / "bin").mkdir()
+    for folder in ("/bin", "/usr/bin"): # all but python3
+        for tool in Path(folder).iterdir():
+            if not tool.name.startswith("python") and not (tmp_path / "bin" / tool.name).exists():
+                (tmp_path / "bin" / tool.name).symlink_to(tool)
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    assert checked(tmp_path, PC, HEADER.replace(MODE, "#define TUNNING")) == (0, ["foc33: no python3: a misspelt name in userparams.h is not looked for"])
+
+
 def test_a_mode_that_the_header_and_the_command_line_switch_on_is_one_line(tmp_path):
     text = HEADER.replace(MODE, "#define TUNING")
     code, lines = checked(tmp_path, [*PC, "-DTUNING"], text)

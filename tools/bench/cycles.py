@@ -20,7 +20,7 @@ import numpy as np
 from tools.common import board_file, command_line, motor_file, paths
 from tools.common.checksum import checksum
 from tools.common.errors import UserError
-from tools.image import attribution, history, program
+from tools.image import attribution, program
 from tools.image.budget import Budget
 from tools.image.profile import INTERRUPT, SLOW, Counts, Profile, profile
 from tools.image.size import told
@@ -301,14 +301,6 @@ def summary(report: Report) -> dict[str, Any]:
             "executed": report.profile.executed, "assumptions": report.assumptions, "broken": report.broken}
 
 
-def kept(report: Report) -> dict[str, float]:
-    """What a commit's line has: the longest period and control interrupt, the mean periods, then the mean cycles of each function of at least one."""
-    found, interrupts = report.found, max(report.all.total(), 1)
-    sums = {"longest": report.all_periods.most, "control interrupt": report.all.most, "third duty": found.latency.most}
-    sums |= {f"mean {name}": round(found.periods[name].mean, 1) for name in (WITHOUT, WITH)}
-    return sums | {name: round(cycles / interrupts, 1) for name, cycles in report.profile.inlined.most_common() if cycles >= interrupts}
-
-
 def _spread_cells(data: dict[str, Any], values: dict[str, Any]) -> list[str]:
     cycles = f"{values['min']} / {values['mean']:.0f} / {values['max']}"
     return [cycles, " / ".join(f"{values[name] / data['fcy_mhz']:.2f}" for name in ("min", "mean", "max"))]
@@ -409,10 +401,7 @@ def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
     image = pil_command.image_for([], userparams, options.image)
     report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
-    status = told(summary(report) | sources_of(options), options.out or image.parent, "cycles", text(report) + "\n")
-    if not options.no_budget and not options.scenarios:
-        print(history.keep("cycles", kept(report), options.out or image.parent))
-    return status
+    return told(summary(report) | sources_of(options), options.out or image.parent, "cycles", text(report) + "\n")
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ class Bounds:
 
     @classmethod
     def read(cls, section: Section) -> "Bounds":
-        low, high = section.number("min", None), section.number("max", None)
+        low, high = section.number("min", None, meaning="at least; min, max or both"), section.number("max", None, meaning="at most")
         if low is None and high is None:
             raise section.fail("kind", "neither 'min' nor 'max' is there", "add one, or both")
         if low is not None and high is not None and low > high:
@@ -85,8 +85,8 @@ class Expectation:
 
 
 def _window(section: Section, duration_s: float) -> tuple[float, float]:
-    from_s = section.number("from_s", 0.0, 0.0, duration_s)
-    to_s = section.number("to_s", duration_s, 0.0, duration_s)
+    from_s = section.number("from_s", 0.0, 0.0, duration_s, "begin")
+    to_s = section.number("to_s", duration_s, 0.0, duration_s, "end")
     if to_s < from_s:
         raise section.fail("to_s", f"to_s = {to_s:g} is before from_s = {from_s:g}", "choose a later one")
     return from_s, to_s
@@ -107,13 +107,14 @@ class MeasureExpectation(Expectation):
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "MeasureExpectation":
         speed = section.data["kind"] == "speed"
+        section.note("measure", "text or list of texts", "name, or a list of names", *(["all with a reference"] if speed else []))
         referred = [name for name, has_reference in measures.items() if has_reference]
         names = referred if speed and referred and "measure" not in section else section.choices("measure", sorted(measures))
-        value = "speed_error_percent" if speed else section.choice("value", tuple(MEASURE_VALUES))
+        value = "speed_error_percent" if speed else section.choice("value", tuple(MEASURE_VALUES), meaning="column, see below")
         for name in names:
             if value == "speed_error_percent" and not measures[name]:
                 raise section.fail("kind" if speed else "value", f"'{name}' has no speed error", "add reference_rpm to the measure")
-        percent = section.number("percent", 0.5, 0.0) if speed else 0.0
+        percent = section.number("percent", 0.5, 0.0, meaning="at most this error") if speed else 0.0
         return cls(names, value, Bounds(-percent, percent) if speed else Bounds.read(section))
 
     def reads_firmware(self) -> bool:
@@ -135,8 +136,8 @@ class HandOverExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "HandOverExpectation":
-        return cls(section.integer("press", 1, 1), section.number("within_s", 2.0, 0.0),
-                   section.number("overshoot_percent", None, 0.0), section.flag("no_reverse_motion", False))
+        return cls(section.integer("press", 1, 1, meaning="which press of S2"), section.number("within_s", 2.0, 0.0, meaning="how soon"),
+                   section.number("overshoot_percent", None, 0.0, meaning="at most"), section.flag("no_reverse_motion", False, "true: never backwards"))
 
     def reads_firmware(self) -> bool:
         return True
@@ -185,9 +186,12 @@ class StopExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StopExpectation":
-        after_s = section.number("after_s", REQUIRED, 0.0, duration_s)
-        return cls(after_s, section.number("within_s", REQUIRED, 0.0), section.number("to_s", duration_s, after_s, duration_s),
-                   section.number("speed_max_rpm", None, 0.0), section.number("lowest_rpm", 0.0), section.number("brake_max_a", None, 0.0))
+        after_s = section.number("after_s", REQUIRED, 0.0, duration_s, "when S2 was pressed")
+        return cls(after_s, section.number("within_s", REQUIRED, 0.0, meaning="how soon"),
+                   section.number("to_s", duration_s, after_s, duration_s, "until when they stay off"),
+                   section.number("speed_max_rpm", None, 0.0, meaning="no faster when they go off"),
+                   section.number("lowest_rpm", 0.0, meaning="no slower on the way"),
+                   section.number("brake_max_a", None, 0.0, meaning="braking current at most; MAXIMUM_CURRENT_A if not given"))
 
     def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.after_s, self.to_s)
@@ -251,7 +255,8 @@ class SignalExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "SignalExpectation":
-        signal, statistic = section.text("signal"), section.choice("statistic", tuple(_STATISTICS))
+        signal = section.text("signal", meaning="its name")
+        statistic = section.choice("statistic", tuple(_STATISTICS), meaning="what of it")
         return cls(f"{signal} {statistic}", signal, statistic, Bounds.read(section), *_window(section, duration_s))
 
     def check(self, run: Run) -> list[Outcome]:
@@ -272,7 +277,8 @@ class BusVoltageExpectation(SignalExpectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "BusVoltageExpectation":
-        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s), section.flag("above_regen", False))
+        return cls("bus voltage", "bus.voltage_v", "span", Bounds.read(section), *_window(section, duration_s),
+                   section.flag("above_regen", False, "true: `max` counts from REGEN_LIMIT_V, at 24 V or in proportion"))
 
     def check(self, run: Run) -> list[Outcome]:
         column = run.trace.part(self.from_s, self.to_s).column(self.signal)
@@ -303,7 +309,9 @@ class StateExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StateExpectation":
-        name, at_s, never = section.text("name"), section.number("at_s", None, 0.0, duration_s), section.flag("never", False)
+        name = section.text("name", meaning="state, as in docs/architecture.md")
+        at_s = section.number("at_s", None, 0.0, duration_s, "then; or from_s and to_s")
+        never = section.flag("never", False, "true: it must not occur")
         if at_s is None:
             return cls(name, *_window(section, duration_s), never)
         return cls(name, at_s, at_s, never)
@@ -336,10 +344,12 @@ class FaultExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "FaultExpectation":
-        return cls(section.text("name"), section.number("after_s", REQUIRED, 0.0, duration_s),
-                   section.number("within_s", REQUIRED, 0.0),
-                   section.integer("outputs_off_within_periods", 1, 0), section.flag("from_cause", False),
-                   section.number("kept_to_s", None, 0.0, duration_s), section.number("cleared_from_s", None, 0.0, duration_s))
+        return cls(section.text("name", meaning="as in docs/faults.md"), section.number("after_s", REQUIRED, 0.0, duration_s, "when its cause begins"),
+                   section.number("within_s", REQUIRED, 0.0, meaning="how soon it comes"),
+                   section.integer("outputs_off_within_periods", 1, 0, meaning="PWM periods from the fault to the outputs off"),
+                   section.flag("from_cause", False, "true: from the cause"),
+                   section.number("kept_to_s", None, 0.0, duration_s, "the code stays until then"),
+                   section.number("cleared_from_s", None, 0.0, duration_s, "no fault from then on"))
 
     def names(self) -> dict[str, str]:
         return {"fault": self.name}
@@ -414,8 +424,8 @@ class VariableExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "VariableExpectation":
-        return cls(section.text("name"), section.integer("count", 1, 1, 1000), section.choice("statistic", tuple(_STATISTICS)),
-                   Bounds.read(section))
+        return cls(section.text("name", meaning="its name, as a debugger knows it"), section.integer("count", 1, 1, 1000, "16-bit elements"),
+                   section.choice("statistic", tuple(_STATISTICS), meaning="what of them"), Bounds.read(section))
 
     def check(self, run: Run) -> list[Outcome]:
         got = float(_STATISTICS[self.statistic](np.array(run.variables[self.name][:self.count], dtype=np.float64)))
@@ -425,16 +435,33 @@ class VariableExpectation(Expectation):
         return {self.name: self.count}
 
 
-KINDS: dict[str, tuple[type[Expectation], ...]] = {
-    "measure": (MeasureExpectation,), "speed": (MeasureExpectation,), "hand_over": (HandOverExpectation,), "stop": (StopExpectation,),
-    "outputs_off": (OutputsOffExpectation,), "bus_voltage": (BusVoltageExpectation,), "signal": (SignalExpectation,),
-    "state": (StateExpectation,), "fault": (FaultExpectation,), "no_fault": (NoFaultExpectation,), "no_warnings": (NoWarningsExpectation,),
-    "clean": (NoFaultExpectation, NoWarningsExpectation), "variable": (VariableExpectation,)}
+@dataclass(frozen=True)
+class Kind:
+    """A kind of [[expect]]: what docs/files.md says of it, and what it checks."""
+
+    meaning: str
+    parts: tuple[type[Expectation], ...]
+
+
+KINDS = {
+    "measure": Kind("values of rows of the table", (MeasureExpectation,)),
+    "speed": Kind("the true mean speed holds the reference", (MeasureExpectation,)),
+    "hand_over": Kind("closed loop after S2", (HandOverExpectation,)),
+    "stop": Kind("outputs off after S2, and off to the end", (StopExpectation,)),
+    "outputs_off": Kind("all six outputs off", (OutputsOffExpectation,)),
+    "bus_voltage": Kind("lowest and highest bus voltage", (BusVoltageExpectation,)),
+    "signal": Kind("a signal of the trace: a readable key below or of `python3 -m tools.bench keys`", (SignalExpectation,)),
+    "state": Kind("the drive's state", (StateExpectation,)),
+    "fault": Kind("a fault", (FaultExpectation,)),
+    "no_fault": Kind("no fault", (NoFaultExpectation,)),
+    "no_warnings": Kind("the virtual board found nothing wrong with the firmware's settings", (NoWarningsExpectation,)),
+    "clean": Kind("no fault and no warnings", (NoFaultExpectation, NoWarningsExpectation)),
+    "variable": Kind("a firmware variable at the end", (VariableExpectation,))}
 
 
 def read_expectations(section: Section, measures: dict[str, bool], duration_s: float) -> list[Expectation]:
     """What one [[expect]] table asks for. `measures` holds the known measures' names, and whether they have a reference speed."""
-    kinds = KINDS[section.choice("kind", tuple(KINDS))]
-    found = [kind.read(section, measures, duration_s) for kind in kinds]
+    kind = section.choice("kind", tuple(KINDS), meaning="what must hold; each has its keys below")
+    found = [part.read(section, measures, duration_s) for part in KINDS[kind].parts]
     section.close()
     return found

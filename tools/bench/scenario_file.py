@@ -13,7 +13,16 @@ from .panel import HOLD_S
 from .scenario import Event, Scenario
 
 MOTOR = "hurst_dmb0224c10002"
-EVENT_KINDS = ("start_rpm", "press", "speed_rpm", "speed_percent", "speed", "current_a", "pot", "set", "torque_percent", "debug")
+EVENT_KINDS = {
+    "start_rpm": "S2, with the potentiometer at this speed since power-up", "press": "a button",
+    "speed_rpm": "potentiometer to this speed, in the range that S3 has chosen",
+    "speed_percent": "potentiometer to this share of the rated speed, with S3 where it takes that",
+    "speed": "potentiometer to the header's speed of this name, with S3 where it takes that",
+    "current_a": "potentiometer to this current, in TORQUE_MODE", "pot": "potentiometer's position, left to right",
+    "set": "keys of the virtual board with their new values: `{ \"load.constant_nm\" = 0.05 }`",
+    "torque_percent": "the brake `load.constant_nm` to this share of the rated torque",
+    "debug": "writes 16-bit variables of the firmware, as a debugger would: `{ SnapStart = 1 }`"}
+"""What an event does, and what docs/files.md says of it."""
 
 
 def load(name: str) -> Scenario:
@@ -24,13 +33,16 @@ def load(name: str) -> Scenario:
 def read(document: Document) -> Scenario:
     """Check a whole document and return what it says."""
     root = document.root
-    scenario = Scenario(document.path.stem, root.text("title"), root.text("description", ""), root.text("motor", MOTOR),
-                        root.text("board", ""), root.number("duration_s", minimum=0.01, maximum=120.0), root.flag("follows_header", False))
+    scenario = Scenario(
+        document.path.stem, root.text("title", meaning="one line for the list of scenarios"), root.text("description", "", "longer text"),
+        root.text("motor", MOTOR, "name in tuning/motors or a path"), root.text("board", "", "name in tuning/boards or a path; else the motor file's"),
+        root.number("duration_s", REQUIRED, 0.01, 120.0, "motor time of the run"),
+        root.flag("follows_header", False, "true: a start or a ramp that takes longer with this header shifts what comes after"))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))
     _read_start(root.section("start"), scenario)
-    fault = _fault_tables(root.section("fault"))
+    fault = _fault_tables(root.section("fault"), scenario.duration_s)
     scenario.events = [event for section in fault["event"] + root.sections("event") for event in _read_event(section, scenario.duration_s)]
     scenario.events.sort(key=lambda event: event.at_s)
     _read_measures(fault["measure"] + root.sections("measure"), scenario)
@@ -46,7 +58,7 @@ def read(document: Document) -> Scenario:
 def _read_firmware(section: Section | None, scenario: Scenario) -> None:
     if section is None:
         return
-    scenario.defines = section.texts("defines", [])
+    scenario.defines = section.texts("defines", [], "modes or macros of this build, without -D")
     for define in scenario.defines:
         name, _, value = define.partition("=")
         if not name.isidentifier() or not all(c.isalnum() or c in "+-._" for c in value):
@@ -57,18 +69,25 @@ def _read_firmware(section: Section | None, scenario: Scenario) -> None:
 def _read_start(section: Section | None, scenario: Scenario) -> None:
     if section is None:
         return
-    scenario.rotor_deg = section.number("rotor_deg", 0.0, -360.0, 360.0)
-    scenario.speed_rpm = section.number("speed_rpm", 0.0, -10000.0, 10000.0)
+    scenario.rotor_deg = section.number("rotor_deg", 0.0, -360.0, 360.0, "electrical angle of the rotor at power-up")
+    scenario.speed_rpm = section.number("speed_rpm", 0.0, -10000.0, 10000.0, "speed of the shaft at power-up")
     section.close()
 
 
-def _fault_tables(section: Section | None) -> dict[str, list[Section]]:
+def _fault_tables(section: Section | None, duration_s: float) -> dict[str, list[Section]]:
     """The tables of events, measures and expectations that [fault] stands for."""
     if section is None:
         return {"event": [], "measure": [], "expect": []}
-    rpm, name, within_s = section.number("rpm"), section.text("name"), section.number("within_s", minimum=0.0)
-    cause, mended = section.values("cause"), section.values("mended")
-    section.close({"over_s", "note", "mended_note", "from_cause", "kept_to_s"})
+    rpm = section.number("rpm", meaning="speed at which something breaks after 3 s; it is mended at 4 s, S2 follows at 4.2 s")
+    cause, mended = section.values("cause", meaning="keys that break it"), section.values("mended", meaning="keys that mend it")
+    name = section.text("name", meaning="fault that must come, stay until S2 and be gone after it")
+    within_s = section.number("within_s", minimum=0.0, meaning="how soon after the cause")
+    section.number("over_s", None, 0.0, duration_s, "how long the cause takes")
+    section.text("note", "", "text for the protocol")
+    section.text("mended_note", "", "the same for the mending")
+    section.flag("from_cause", False, "as in expect fault")
+    section.number("kept_to_s", None, 0.0, duration_s, "as in expect fault")
+    section.close()
 
     def given(**keys: str) -> dict[str, Any]:
         return {new: section.data[key] for new, key in keys.items() if key in section}
@@ -81,35 +100,36 @@ def _fault_tables(section: Section | None) -> dict[str, list[Section]]:
                    {"kind": "fault", "name": name, "after_s": 3.0, "within_s": within_s, "kept_to_s": 4.2, "cleared_from_s": 4.3,
                     **given(from_cause="from_cause", kept_to_s="kept_to_s")},
                    {"kind": "state", "name": "STOPPED", "from_s": 4.3}, {"kind": "outputs_off", "from_s": round(3.01 + within_s, 2)}]}
-    return {key: [Section(section.document, row, section.path) for row in rows] for key, rows in tables.items()}
+    return {key: [Section(section.document, row, section.path, noted=False) for row in rows] for key, rows in tables.items()}
 
 
 def _read_event(section: Section, duration_s: float) -> list[Event]:
-    at_s = section.number("at_s", minimum=0.0)
+    at_s = section.number("at_s", minimum=0.0, meaning="when it happens")
     if at_s > duration_s:
         raise section.fail("at_s", f"at_s = {at_s:g} is after the end", f"choose 0 .. duration_s = {duration_s:g}")
-    note = section.text("note", "")
-    hold_s = section.number("hold_s", None, 0.001, duration_s)
-    over_s = section.number("over_s", None, 0.0, duration_s)
-    kind = section.one_of(EVENT_KINDS)
+    note = section.text("note", "", "text for the protocol")
+    hold_s = section.number("hold_s", None, 0.001, duration_s, "how long the button is held")
+    over_s = section.number("over_s", None, 0.0, duration_s, "how long the change takes, in a straight line")
+    kind = section.one_of(tuple(EVENT_KINDS))
+    meaning = EVENT_KINDS[kind]
     if hold_s is not None and kind != "press":
         raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
     if over_s is not None and kind in ("start_rpm", "press", "debug"):
         raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
     event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
     if kind == "start_rpm":
-        turned = Event(0.0, "speed_rpm", event["where"], value=section.number(kind))
+        turned = Event(0.0, "speed_rpm", event["where"], value=section.number(kind, meaning=meaning))
         return [turned, Event(at_s, "press", event["where"], button="S2", hold_s=HOLD_S, note=note)]
     if kind == "press":
-        event |= {"button": section.choice(kind, ("S2", "S3")), "hold_s": HOLD_S if hold_s is None else hold_s}
+        event |= {"button": section.choice(kind, ("S2", "S3"), meaning=meaning), "hold_s": HOLD_S if hold_s is None else hold_s}
     elif kind == "set":
-        event["keys"] = section.values(kind)
+        event["keys"] = section.values(kind, meaning=meaning)
     elif kind == "debug":
-        event["variables"] = _variables(section, kind)
+        event["variables"] = _variables(section, kind, meaning)
     elif kind == "speed":
-        event["text"] = section.choice(kind, SPEEDS)
+        event["text"] = section.choice(kind, SPEEDS, meaning=meaning)
     else:
-        event["value"] = section.number(kind, **_EVENT_RANGES.get(kind, {}))
+        event["value"] = section.number(kind, **_EVENT_RANGES.get(kind, {}), meaning=meaning)
     return [Event(**event)]
 
 
@@ -117,8 +137,8 @@ _EVENT_RANGES = {"pot": {"minimum": 0.0, "maximum": 1.0}, "speed_percent": {"min
                  "torque_percent": {"minimum": 0.0, "maximum": 1000.0}}
 
 
-def _variables(section: Section, key: str) -> dict[str, int]:
-    values = section.values(key)
+def _variables(section: Section, key: str, meaning: str) -> dict[str, int]:
+    values = section.values(key, meaning=meaning)
     for name, value in values.items():
         if value != int(value) or not -32768 <= value <= 65535:
             raise section.fail(key, f"'{name}' = {value:g} is impossible", "choose a whole number within 16 bits")
@@ -127,15 +147,16 @@ def _variables(section: Section, key: str) -> dict[str, int]:
 
 def _read_measures(sections: list[Section], scenario: Scenario) -> None:
     for section in sections:
-        rpm = section.number("reference_rpm", None)
+        section.note("name", "text", "the row's name", "reference_rpm as text")
+        rpm = section.number("reference_rpm", None, meaning="speed that the error is told against; one of the three at most")
         name = section.text("name", REQUIRED if rpm is None else f"{rpm:g} rpm")
-        from_s = section.number("from_s", minimum=0.0)
-        to_s = section.number("to_s", maximum=scenario.duration_s)
+        from_s = section.number("from_s", minimum=0.0, meaning="begin")
+        to_s = section.number("to_s", maximum=scenario.duration_s, meaning="end")
         given = [key for key in ("reference_rpm", "reference_percent", "reference") if key in section]
         if len(given) > 1:
             raise section.fail(given[1], f"'{given[0]}' and '{given[1]}' together", "keep one of them")
-        references = {"reference_rpm": rpm, "reference_percent": section.number("reference_percent", None),
-                      "reference": section.choice("reference", SPEEDS, "")}
+        references = {"reference_rpm": rpm, "reference_percent": section.number("reference_percent", None, meaning="the same as a share of the rated speed"),
+                      "reference": section.choice("reference", SPEEDS, "", "the same by the header's name")}
         section.close()
         if to_s <= from_s:
             raise section.fail("to_s", f"to_s = {to_s:g} is not after from_s = {from_s:g}", "choose a later one")

@@ -1,12 +1,6 @@
 """Board files: supply, bridge, shunts, converter, PWM and limits; the tuner and the virtual board read the same numbers.
 
-    title = "..."
-    [supply] voltage, resistance, sinks = false      [bus] capacitance, load
-    [inverter] rds_on, diode_voltage, trip_current   [shunt] resistance, amplifier_gain, reference, settle, inverted = true
-    [adc] bits, full_scale, bus_divider, noise       [pwm] period, dead_time, sample_window
-    [limits] over_voltage, under_voltage, regen      [plant] further keys of the virtual board, by key
-    [pins] current_a, current_b, bus, pot, fault, uart_tx, uart_rx, s2, s3, led_alive, led_run, pwm_a, pwm_b, pwm_c: optional, "RB8", "RP8" or "AN0";
-           those of the MCLV where nothing is said
+TABLES has the tables; besides them title, [plant] (further keys of the virtual board) and [pins] (tools/common/pins.py; the MCLV's where nothing is said).
 
 Every number is { value = ..., unit = "...", source = "..." }. Nothing is said twice: the current at the end of the converter's range
 is reference / (resistance * gain), the bus voltage there is full_scale * divider."""
@@ -19,7 +13,7 @@ from .board_keys import Part, Values
 from .errors import Problems, UserError
 from .motor_file import Motor, read_safely
 from .toml_file import Document, Section, flatten
-from .units import Conversion, Kind, Quantity
+from .units import Conversion, Key, Kind, Quantity
 
 _VOLT = {"V": Conversion(1.0), "mV": Conversion(1e-3)}
 _OHM = {"ohm": Conversion(1.0), "mohm": Conversion(1e-3)}
@@ -27,27 +21,32 @@ _TIME = {"s": Conversion(1.0), "ms": Conversion(1e-3), "us": Conversion(1e-6), "
 _AMPERE = {"A": Conversion(1.0), "mA": Conversion(1e-3)}
 _ONE = {"1": Conversion(1.0)}
 
-TABLES: dict[str, dict[str, tuple[str, Kind]]] = {
-    "supply": {"voltage": ("supply.voltage_v", Kind("V", 8.0, 60.0, _VOLT)),
-               "resistance": ("supply.resistance_ohm", Kind("ohm", 0.001, 10.0, _OHM))},
-    "bus": {"capacitance": ("bus.capacitance_f", Kind("F", 1e-6, 1.0, {"F": Conversion(1.0), "mF": Conversion(1e-3), "uF": Conversion(1e-6)})),
-            "load": ("bus.load_a", Kind("A", 0.0, 10.0, _AMPERE))},
-    "inverter": {"rds_on": ("inverter.rds_on_ohm", Kind("ohm", 1e-4, 1.0, _OHM)),
-                 "diode_voltage": ("inverter.diode_v", Kind("V", 0.0, 2.0, _VOLT)),
-                 "trip_current": ("inverter.trip_a", Kind("A", 0.0, 100.0, _AMPERE))},
-    "shunt": {"resistance": ("shunt.ohm", Kind("ohm", 1e-4, 1.0, _OHM)), "amplifier_gain": ("", Kind("1", 1.0, 500.0, _ONE)),
-              "reference": ("shunt.reference_v", Kind("V", 0.1, 3.2, _VOLT)),
-              "settle": ("shunt.settle_s", Kind("s", 0.0, 1e-4, _TIME))},
-    "adc": {"full_scale": ("", Kind("V", 1.0, 5.5, _VOLT)), "bus_divider": ("adc.vbus_ratio", Kind("1", 1.0, 100.0, _ONE)),
-            "noise": ("adc.noise_lsb", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}))},
-    "pwm": {"period": ("", Kind("s", 25e-6, 140e-6, _TIME)), "dead_time": ("", Kind("s", 0.5e-6, 3e-6, _TIME)),
-            "sample_window": ("", Kind("s", 1.5e-6, 4e-6, _TIME))},
-    "limits": {"over_voltage": ("", Kind("V", 6.0, 100.0, _VOLT)), "under_voltage": ("", Kind("V", 3.0, 60.0, _VOLT)),
-               "regen": ("", Kind("V", 6.0, 100.0, _VOLT))}}
-"""Table and key of the file: key of the virtual board ("" for what only the firmware needs to know) and what it may be."""
-
-OTHERS = {"supply": ("sinks",), "shunt": ("inverted",), "adc": ("bits",)}
-"""Keys without a unit: true or false, and a count."""
+TABLES: dict[str, dict[str, Key]] = {
+    "supply": {"voltage": Key("nominal bus", Kind("V", 8.0, 60.0, _VOLT), plant="supply.voltage_v"),
+               "resistance": Key("of the supply and its cable", Kind("ohm", 0.001, 10.0, _OHM), plant="supply.resistance_ohm"),
+               "sinks": Key("true: the supply takes braking current back", plant="supply.sinks")},
+    "bus": {"capacitance": Key("bus capacitors", Kind("F", 1e-6, 1.0, {"F": Conversion(1.0), "mF": Conversion(1e-3), "uF": Conversion(1e-6)}),
+                               plant="bus.capacitance_f"),
+            "load": Key("what the board itself draws", Kind("A", 0.0, 10.0, _AMPERE), plant="bus.load_a")},
+    "inverter": {"rds_on": Key("on-resistance of a transistor", Kind("ohm", 1e-4, 1.0, _OHM), plant="inverter.rds_on_ohm"),
+                 "diode_voltage": Key("forward voltage of its diode", Kind("V", 0.0, 2.0, _VOLT), plant="inverter.diode_v"),
+                 "trip_current": Key("bus current at which the comparator pulls FLTA1; 0: no comparator", Kind("A", 0.0, 100.0, _AMPERE),
+                                     plant="inverter.trip_a")},
+    "shunt": {"resistance": Key("shunt in the low leg of a phase", Kind("ohm", 1e-4, 1.0, _OHM), plant="shunt.ohm"),
+              "amplifier_gain": Key("of the shunt's amplifier", Kind("1", 1.0, 500.0, _ONE)),
+              "reference": Key("amplifier's output without current", Kind("V", 0.1, 3.2, _VOLT), plant="shunt.reference_v"),
+              "settle": Key("time until the amplifier shows the current", Kind("s", 0.0, 1e-4, _TIME), plant="shunt.settle_s"),
+              "inverted": Key("true: the output falls with current into the motor")},
+    "adc": {"bits": Key("resolution of the converter", Kind("bits", 8, 16, {})),
+            "full_scale": Key("voltage of the converter's full scale", Kind("V", 1.0, 5.5, _VOLT)),
+            "bus_divider": Key("bus voltage over the pin's voltage", Kind("1", 1.0, 100.0, _ONE), plant="adc.vbus_ratio"),
+            "noise": Key("standard deviation of a conversion", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}), plant="adc.noise_lsb")},
+    "pwm": {"period": Key("PWM and control period", Kind("s", 25e-6, 140e-6, _TIME)),
+            "dead_time": Key("between the transistors of a leg", Kind("s", 0.5e-6, 3e-6, _TIME)),
+            "sample_window": Key("low sides on, on each side of the sample", Kind("s", 1.5e-6, 4e-6, _TIME))},
+    "limits": {"over_voltage": Key("bus above it trips", Kind("V", 6.0, 100.0, _VOLT)),
+               "under_voltage": Key("bus below it trips while running", Kind("V", 3.0, 60.0, _VOLT)),
+               "regen": Key("braking current falls from here", Kind("V", 6.0, 100.0, _VOLT))}}
 
 
 @dataclass(frozen=True)
@@ -116,21 +115,17 @@ def _read(root: Section) -> BoardFile:
     title = root.text("title")
     found: dict[str, Quantity] = {}
     values = Values()
-    inverted, problems = False, Problems()
+    problems = Problems()
     for table, keys in TABLES.items():
         section = root.section(table)
         if section is None:
             problems.found.append(UserError(f"the table [{table}] is missing", root.document.label, "add it with " + ", ".join(keys)))
             continue
-        problems.attempt(lambda section=section, names={*keys, *OTHERS.get(table, ())}: section.close(names))
-        _read_table(section, table, keys, found, values, problems)
-        if table == "supply":
-            values.add("supply.sinks", float(problems.attempt(lambda section=section: section.flag("sinks"), False)), section.where("sinks"))
-        if table == "shunt":
-            inverted = problems.attempt(lambda section=section: section.flag("inverted"), False)
-        if table == "adc":
-            found["adc.bits"] = problems.attempt(lambda section=section: units.read_count(section, "bits", 8, 16, "bits"))
+        problems.attempt(lambda section=section, keys=keys: section.close(set(keys)))
+        for key, told in keys.items():
+            problems.attempt(lambda section=section, key=key, told=told: _read_key(section, key, told, found, values))
     problems.tell()
+    inverted = root.data["shunt"]["inverted"]
     volts_per_ampere = found["shunt.resistance"].value_si * found["shunt.amplifier_gain"].value_si
     values.add("shunt.gain_v_per_a", volts_per_ampere if inverted else -volts_per_ampere, found["shunt.amplifier_gain"].where)
     values.add("expect.pwm_hz", 1.0 / found["pwm.period"].value_si, found["pwm.period"].where)
@@ -140,15 +135,14 @@ def _read(root: Section) -> BoardFile:
     return board
 
 
-def _read_table(section: Section, table: str, keys: dict[str, tuple[str, Kind]], found: dict[str, Quantity], values: Values,
-                problems: Problems) -> None:
-    for key, (plant_key, kind) in keys.items():
-        quantity = problems.attempt(lambda key=key, kind=kind: units.read(section, key, kind))
-        if quantity is None:
-            continue
-        found[f"{table}.{key}"] = quantity
-        if plant_key:
-            values.add(plant_key, quantity.value_si, quantity.where)
+def _read_key(section: Section, key: str, told: Key, found: dict[str, Quantity], values: Values) -> None:
+    if told.kind is None:
+        value, where = float(section.flag(key)), section.where(key)
+    else:
+        quantity = units.read(section, key, told.kind) if told.has_units else units.read_count(section, key, told.kind)
+        found[f"{section.path[0]}.{key}"], value, where = quantity, quantity.value_si, quantity.where
+    if told.plant:
+        values.add(told.plant, value, where)
 
 
 def _read_plant(section: Section | None, values: Values) -> None:

@@ -1,34 +1,7 @@
 """Motor files: the numbers of a data sheet with unit and source, turned into one star phase in SI, and checked for sense.
 
-    title = "Hurst DMB0224C10002"
-    connection = "Y"                 or "delta": counts for values "winding"
-    board = "mclv"                   optional: a name in tuning/boards, or a path seen from this file; BOARD= overrides it
-
-    [electrical]                     every number: { value = ..., unit = "...", source = "..." }; units.py lists the units
-    pole_pairs = { value = 5, source = "..." }
-    resistance = { value = 5.34, unit = "ohm line-to-line", at_degc = 25, source = "..." }
-    inductance = { value = 3.84, unit = "mH line-to-line", frequency_hz = 1000, source = "..." }
-                                     or inductance_d and inductance_q, if they differ
-    kphi = { value = 7.24, unit = "V peak line-to-line/krpm", at_degc = 25, source = "..." }
-    resistance_tempco = ...          optional, copper if not given
-    kphi_tempco = ...                optional, ferrite magnets if not given
-
-    [mechanical]
-    inertia = ...
-    viscous_friction = ...           optional, as is coulomb_friction
-
-    [rating]
-    voltage, current, torque, speed; maximum_speed (what the user wants to reach, with field weakening if need be);
-    maximum_current                  optional, 1.5 times current if not given
-    thermal_time                     optional, of the winding: the drive then watches its heat (I2t)
-
-    [spread]                         optional: what other sheets and measurements say of resistance, inductance, kphi
-    kphi = { values = [7.24, 7.57], unit = "...", source = "..." }
-
-    [load]                           optional: inertia and start_torque of what the motor drives; a source is not needed
-    [tune]                           optional: values of userparams.h that replace the ones the tuner would choose
-    [plant]                          optional: keys of the virtual board that no sheet gives, e.g. "motor.sat_lq_ratio" = 0.2
-"""
+examples/my_motor.toml shows a file, TABLES has every key and what it means; [tune] replaces values of userparams.h that the tuner would
+choose, [plant] sets keys of the virtual board that no sheet gives."""
 
 import functools
 import math
@@ -42,21 +15,50 @@ from . import param_rows, paths, units
 from .board_keys import Part, Values
 from .errors import Problems, UserError, suggestion
 from .toml_file import Document, Section, flatten
-from .units import Quantity
+from .units import Key, Kind, Quantity
 
 COPPER_PER_K = 0.0039
 FERRITE_PER_K = -0.002
+MAXIMUM_OVER_RATED = 1.5
+START_OVER_RATED = 0.25
 LARGEST_FILE = 65536
 PLANT_TABLES = ("motor.", "mech.")
 DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "motor.r_tempco", "motor.psi_tempco",
                 "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm")
 
-TABLES = {"electrical": ("pole_pairs", "resistance", "inductance", "inductance_d", "inductance_q", "kphi", "resistance_tempco",
-                         "kphi_tempco"),
-          "mechanical": ("inertia", "viscous_friction", "coulomb_friction"),
-          "rating": ("voltage", "current", "torque", "speed", "maximum_speed", "maximum_current", "thermal_time"),
-          "spread": ("resistance", "inductance", "kphi"), "load": ("inertia", "start_torque"), "tune": None, "plant": None}
-"""Tables of a motor file with their keys; None: any key, checked elsewhere."""
+_DEGC = f"{units.AT_DEGC[0]:g} .. {units.AT_DEGC[1]:g}, {units.REFERENCE_DEGC:g} if not given"
+_HZ = f"`frequency_hz` of the LCR meter {units.AT_HZ[0]:g} .. {units.AT_HZ[1]:g}"
+
+TABLES: dict[str, dict[str, Key] | None] = {
+    "electrical": {
+        "pole_pairs": Key("half the number of poles", Kind("pole pairs", 1, 50, {})),
+        "resistance": Key(f"winding; `at_degc` of the value {_DEGC}", units.resistance("Y")),
+        "inductance": Key(f"of a motor whose d and q axes do not differ; {_HZ}", units.inductance("Y"), "this, or d and q"),
+        "inductance_d": Key(f"smallest inductance over the rotor's angle; {_HZ}", units.inductance("Y"), "with q, or inductance"),
+        "inductance_q": Key("largest inductance over the rotor's angle", units.inductance("Y"), "with d, or inductance"),
+        "kphi": Key(f"motor constant in any of its forms; `at_degc` of the magnets {_DEGC}", units.kphi("Y", 1)),
+        "resistance_tempco": Key("change of R with temperature; copper if not given", units.RESISTANCE_TEMPCO, f"{COPPER_PER_K:g}"),
+        "kphi_tempco": Key("change of Kphi with temperature; ferrite magnets if not given", units.KPHI_TEMPCO, f"{FERRITE_PER_K:g}")},
+    "mechanical": {
+        "inertia": Key("rotor alone", units.INERTIA),
+        "viscous_friction": Key("torque proportional to speed", units.VISCOUS, "0"),
+        "coulomb_friction": Key("torque that does not depend on speed; give at least an estimate: without it a start is harder", units.FRICTION, "0")},
+    "rating": {
+        "voltage": Key("rated voltage", units.VOLTAGE), "current": Key("rated current", units.CURRENT), "torque": Key("rated torque", units.TORQUE),
+        "speed": Key("rated speed", units.SPEED), "maximum_speed": Key("speed to reach, by field weakening if need be", units.SPEED),
+        "maximum_current": Key("what the winding withstands for a while", units.CURRENT, f"{MAXIMUM_OVER_RATED:g} times current"),
+        "thermal_time": Key("the winding's thermal time constant: more than `current` then trips in time (I2t)", units.THERMAL_TIME, "no I2t")},
+    "spread": {
+        "resistance": Key("smallest and largest value of other sheets and measurements; the loops hold over it", units.resistance("Y"), ""),
+        "inductance": Key("the same", units.inductance("Y"), ""), "kphi": Key("the same", units.kphi("Y", 1), "")},
+    "load": {
+        "inertia": Key("what turns with the rotor", units.LOAD_INERTIA, "0"),
+        "start_torque": Key("what the shaft carries while it starts, the motor's friction not included", units.FRICTION,
+                            f"{START_OVER_RATED:g} times the rated torque")},
+    "tune": None, "plant": None}
+"""Tables of a motor file with their keys; None: any key, checked elsewhere. Kinds are a star's; a delta, and Kphi, have other factors."""
+ROOT = {"title": Key("one line for tables and reports"), "connection": Key("`Y` (star) or `delta`; counts only for values per `winding`"),
+        "board": Key("the board that turns it: a name in tuning/boards or a path; `BOARD=` overrides it", default="`mclv`")}
 
 FACTS = {"NOPOLESPAIRS": "[electrical] pole_pairs", "MOTOR_RS_OHM": "[electrical] resistance", "MOTOR_LS_MH": "[electrical] inductance",
          "MOTOR_SALIENCY_UH": "[electrical] inductance_d and inductance_q", "MOTOR_KPHI_V_PER_KRPM": "[electrical] kphi", "MOTOR_INERTIA_KGM2": "[mechanical] inertia",
@@ -165,6 +167,12 @@ def read_safely(path: Path, reader: Callable[[Section], Any]) -> Any:
         raise UserError("tables too deep", label, "write keys as a data sheet's names") from None
 
 
+def kind_of(section: Section, key: str) -> Kind:
+    keys = TABLES[section.path[0]]
+    assert keys and (kind := keys[key].kind)
+    return kind
+
+
 class _Reader:
     """Collects the quantities of a file by name."""
 
@@ -172,21 +180,21 @@ class _Reader:
         self.found: dict[str, Quantity] = {}
         self.problems = Problems()
 
-    def need(self, section: Section, key: str, kind: units.Kind, extra: tuple[str, ...] = ()) -> float:
-        """Not a number where it is refused; the refusal is kept."""
+    def need(self, section: Section, key: str, kind: Kind | None = None, extra: tuple[str, ...] = ()) -> float:
+        """Not a number where it is refused; the refusal is kept. `kind`: another one than that of TABLES"""
         def read() -> float:
-            self.found[key] = units.read(section, key, kind, extra=extra)
+            self.found[key] = units.read(section, key, kind or kind_of(section, key), extra=extra)
             return self.found[key].value_si
         return self.problems.attempt(read, math.nan)
 
-    def may(self, section: Section, key: str, kind: units.Kind, default: float) -> float:
-        return self.need(section, key, kind) if key in section else default
+    def may(self, section: Section, key: str, default: float) -> float:
+        return self.need(section, key) if key in section else default
 
 
 def _tables(root: Section) -> dict[str, Section | None]:
     """All tables, present or not; unknown tables and keys come first, for a slip of the pen makes another one missing."""
     problems = Problems()
-    problems.attempt(lambda: root.close({"title", "connection", "board", *TABLES}))
+    problems.attempt(lambda: root.close({*ROOT, *TABLES}))
     sections = {name: root.section(name) for name in TABLES}
     for name, section in sections.items():
         keys = TABLES[name]
@@ -206,9 +214,9 @@ def _read(root: Section) -> Motor:
     reader = _Reader()
     problems = reader.problems
     values = _read_electrical(electrical, connection, reader)
-    values["inertia_kgm2"] = reader.need(mechanical, "inertia", units.INERTIA)
-    values["viscous_nms"] = reader.may(mechanical, "viscous_friction", units.VISCOUS, 0.0)
-    values["coulomb_nm"] = reader.may(mechanical, "coulomb_friction", units.FRICTION, 0.0)
+    values["inertia_kgm2"] = reader.need(mechanical, "inertia")
+    values["viscous_nms"] = reader.may(mechanical, "viscous_friction", 0.0)
+    values["coulomb_nm"] = reader.may(mechanical, "coulomb_friction", 0.0)
     values |= _read_rating(rating, reader)
     values |= problems.attempt(lambda: _read_load(tables["load"], values["rated_torque_nm"], reader), {})
     spread = problems.attempt(lambda: _read_spread(tables["spread"], connection, values["pole_pairs"]), {})
@@ -228,11 +236,11 @@ def _board(root: Section) -> str:
 
 
 def _read_electrical(section: Section, connection: str, reader: _Reader) -> dict[str, Any]:
-    count = reader.problems.attempt(lambda: units.read_count(section, "pole_pairs", 1, 50, "pole pairs"))
+    count = reader.problems.attempt(lambda: units.read_count(section, "pole_pairs", kind_of(section, "pole_pairs")))
     pole_pairs = int(count.value_si) if count else 1
     reader.found |= {"pole_pairs": count} if count else {}
-    r_tempco = reader.may(section, "resistance_tempco", units.RESISTANCE_TEMPCO, COPPER_PER_K)
-    psi_tempco = reader.may(section, "kphi_tempco", units.KPHI_TEMPCO, FERRITE_PER_K)
+    r_tempco = reader.may(section, "resistance_tempco", COPPER_PER_K)
+    psi_tempco = reader.may(section, "kphi_tempco", FERRITE_PER_K)
     rs_ohm = reader.need(section, "resistance", units.resistance(connection), extra=("at_degc",))
     rs_ohm /= 1.0 + r_tempco * _above_25(section, "resistance", reader)
     kphi = reader.need(section, "kphi", units.kphi(connection, pole_pairs), extra=("at_degc",))
@@ -250,34 +258,33 @@ def _read_inductance(section: Section, connection: str, reader: _Reader) -> tupl
     kind = units.inductance(connection)
     keys = ("inductance_d", "inductance_q") if both else ("inductance",)
     found = [reader.need(section, key, kind, extra=("frequency_hz",)) for key in keys]
-    frequency_hz = reader.problems.attempt(lambda: units.detail(section, keys[0], "frequency_hz", None, 1.0, 1e6)) if keys[0] in reader.found else None
+    frequency_hz = reader.problems.attempt(lambda: units.detail(section, keys[0], "frequency_hz", None, *units.AT_HZ)) if keys[0] in reader.found else None
     return found[0], found[-1], frequency_hz
 
 
 def _above_25(section: Section, key: str, reader: _Reader) -> float:
     if key not in reader.found:
         return 0.0
-    at_degc = reader.problems.attempt(lambda: units.detail(section, key, "at_degc", units.REFERENCE_DEGC, -40.0, 155.0))
+    at_degc = reader.problems.attempt(lambda: units.detail(section, key, "at_degc", units.REFERENCE_DEGC, *units.AT_DEGC))
     return (at_degc or 0.0) - units.REFERENCE_DEGC
 
 
 def _read_rating(section: Section, reader: _Reader) -> dict[str, float]:
-    result = {name: reader.need(section, key, kind) for name, key, kind in (
-        ("rated_voltage_v", "voltage", units.VOLTAGE), ("rated_current_a", "current", units.CURRENT),
-        ("rated_torque_nm", "torque", units.TORQUE), ("rated_speed_rpm", "speed", units.SPEED),
-        ("maximum_speed_rpm", "maximum_speed", units.SPEED))}
-    result["thermal_time_s"] = reader.may(section, "thermal_time", units.THERMAL_TIME, 0.0)
-    result["maximum_current_a"] = reader.may(section, "maximum_current", units.CURRENT, 1.5 * result["rated_current_a"])
+    result = {name: reader.need(section, key) for name, key in (
+        ("rated_voltage_v", "voltage"), ("rated_current_a", "current"), ("rated_torque_nm", "torque"), ("rated_speed_rpm", "speed"),
+        ("maximum_speed_rpm", "maximum_speed"))}
+    result["thermal_time_s"] = reader.may(section, "thermal_time", 0.0)
+    result["maximum_current_a"] = reader.may(section, "maximum_current", MAXIMUM_OVER_RATED * result["rated_current_a"])
     return result
 
 
 def _read_load(section: Section | None, rated_torque_nm: float, reader: _Reader) -> dict[str, float]:
-    result = {"load_inertia_kgm2": 0.0, "start_torque_nm": 0.25 * rated_torque_nm}
+    result = {"load_inertia_kgm2": 0.0, "start_torque_nm": START_OVER_RATED * rated_torque_nm}
     if section is None:
         return result
-    for name, key, kind in (("load_inertia_kgm2", "inertia", units.LOAD_INERTIA), ("start_torque_nm", "start_torque", units.FRICTION)):
+    for name, key in (("load_inertia_kgm2", "inertia"), ("start_torque_nm", "start_torque")):
         if key in section:
-            quantity = units.read(section, key, kind, source="the user's load")
+            quantity = units.read(section, key, kind_of(section, key), source="the user's load")
             reader.found["load_inertia" if key == "inertia" else key] = quantity
             result[name] = quantity.value_si
     return result

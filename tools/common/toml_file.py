@@ -3,6 +3,7 @@
 import math
 import re
 import tomllib
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,20 @@ from . import paths
 from .errors import UserError, suggestion
 
 REQUIRED: Any = object()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A key as its loader asks for it; docs/files.md lists those of scenario files."""
+
+    section: "Section"
+    key: str
+    what: str
+    meaning: str
+    default: Any = REQUIRED
+    low: float = -math.inf
+    high: float = math.inf
+    options: tuple[str, ...] = field(default=())
 
 
 class Document:
@@ -32,6 +47,8 @@ class Document:
             raise UserError("TOML syntax", *self._syntax(str(error))) from None
         except (ValueError, RecursionError):
             raise UserError("a number too long or tables too deep", self.label, "write numbers as people do") from None
+        self.asked: dict[tuple[str, str], Asked] = {}
+        """By table and key."""
         self.root = Section(self, self.data, ())
 
     def _syntax(self, message: str) -> tuple[str, str]:
@@ -77,8 +94,10 @@ def _key_parts(text: str) -> list[str]:
 class Section:
     """One table of a document. Ask for every key that may be there, then close()."""
 
-    def __init__(self, document: Document, data: dict[str, Any], path: tuple) -> None:
+    def __init__(self, document: Document, data: dict[str, Any], path: tuple, noted: bool = True) -> None:
+        """`noted`: False for a table that the file does not have, made of another"""
         self.document = document
+        self.noted = noted
         self.data = data
         self.path = path
         self.asked: set[str] = set()
@@ -93,6 +112,12 @@ class Section:
     def __contains__(self, key: str) -> bool:
         return key in self.data
 
+    def note(self, key: str, what: str, meaning: str, default: Any = REQUIRED, **more: Any) -> None:
+        """Keeps what is asked for first under a key, for docs/files.md."""
+        kind = f" {self.data['kind']}" if self.path[:1] == ("expect",) and key != "kind" else ""
+        if self.noted:
+            self.document.asked.setdefault((".".join(map(str, self.path[:1])) + kind, key), Asked(self, key, what, meaning, default, **more))
+
     def _take(self, key: str, default: Any) -> Any:
         self.asked.add(key)
         if key not in self.data:
@@ -101,20 +126,23 @@ class Section:
             return default
         return self.data[key]
 
-    def text(self, key: str, default: Any = REQUIRED) -> Any:
+    def text(self, key: str, default: Any = REQUIRED, meaning: str = "") -> Any:
+        self.note(key, "text", meaning, default)
         value = self._take(key, default)
         if value is not default and (not isinstance(value, str) or not value.strip()):
             raise self.fail(key, f"'{key}' is not a text", "write it in quotes")
         return value
 
-    def choice(self, key: str, options: list[str] | tuple[str, ...], default: Any = REQUIRED) -> Any:
+    def choice(self, key: str, options: list[str] | tuple[str, ...], default: Any = REQUIRED, meaning: str = "") -> Any:
+        self.note(key, "text", meaning, default, options=tuple(options))
         value = self._take(key, default)
         if value is not default and value not in options:
             raise self.fail(key, f"'{value}' is no {key}", suggestion(str(value), options))
         return value
 
-    def choices(self, key: str, options: list[str] | tuple[str, ...]) -> list[str]:
-        """One of the options, or a list of them."""
+    def choices(self, key: str, options: list[str] | tuple[str, ...], meaning: str = "") -> list[str]:
+        """One of the options, which the file itself names, or a list of them."""
+        self.note(key, "text or list of texts", meaning)
         if not isinstance(self.data.get(key), list):
             return [self.choice(key, options)]
         for item in self.texts(key):
@@ -122,26 +150,30 @@ class Section:
                 raise self.fail(key, f"'{item}' is no {key}", suggestion(item, options))
         return self.data[key]
 
-    def flag(self, key: str, default: Any = REQUIRED) -> Any:
+    def flag(self, key: str, default: Any = REQUIRED, meaning: str = "") -> Any:
+        self.note(key, "true or false", meaning, default)
         value = self._take(key, default)
         if value is not default and not isinstance(value, bool):
             raise self.fail(key, f"'{key}' is neither true nor false", "write one of them, without quotes")
         return value
 
-    def number(self, key: str, default: Any = REQUIRED, minimum: float = -math.inf, maximum: float = math.inf) -> Any:
+    def number(self, key: str, default: Any = REQUIRED, minimum: float = -math.inf, maximum: float = math.inf, meaning: str = "") -> Any:
         """A finite number within minimum .. maximum."""
+        self.note(key, "number", meaning, default, low=minimum, high=maximum)
         value = self._take(key, default)
         if value is default:
             return value
         return self._checked_number(key, value, minimum, maximum)
 
-    def integer(self, key: str, default: Any = REQUIRED, minimum: float = -math.inf, maximum: float = math.inf) -> Any:
+    def integer(self, key: str, default: Any = REQUIRED, minimum: float = -math.inf, maximum: float = math.inf, meaning: str = "") -> Any:
+        self.note(key, "whole number", meaning, default, low=minimum, high=maximum)
         value = self.number(key, default, minimum, maximum)
         if value is not default and value != int(value):
             raise self.fail(key, f"'{key}' = {value:g} is not a whole number", "round it")
         return value if value is default else int(value)
 
-    def texts(self, key: str, default: Any = REQUIRED) -> Any:
+    def texts(self, key: str, default: Any = REQUIRED, meaning: str = "") -> Any:
+        self.note(key, "list of texts", meaning, default)
         value = self._take(key, default)
         if value is not default and not (isinstance(value, list) and all(isinstance(item, str) and item for item in value)):
             raise self.fail(key, f"'{key}' is not a list of texts", f"write {key} = [\"...\", \"...\"]")
@@ -153,12 +185,13 @@ class Section:
             raise self.fail(key, f"'{key}' is not a list of numbers", f"write {key} = [1.0, 2.0]")
         return [self._checked_number(key, item, minimum, maximum) for item in value]
 
-    def values(self, key: str, factors: bool = False) -> dict[str, Any]:
+    def values(self, key: str, factors: bool = False, meaning: str = "") -> dict[str, Any]:
         """A table of numbers under dotted names, quoted or nested; with `factors` also { factor = number } as ("factor", number)."""
+        self.note(key, "table of keys", meaning)
         table = self._take(key, REQUIRED)
         if not isinstance(table, dict):
             raise self.fail(key, f"'{key}' is not a table", f"write {key} = {{ \"name\" = 1.0 }}")
-        return flatten(Section(self.document, table, self.path + (key,)), factors)
+        return flatten(Section(self.document, table, self.path + (key,), noted=False), factors)
 
     def _checked_number(self, key: str, value: Any, minimum: float, maximum: float) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
@@ -219,10 +252,10 @@ def flatten(section: Section, factors: bool = False) -> dict[str, Any]:
     for key, value in section.data.items():
         section.asked.add(key)
         if isinstance(value, dict) and set(value) == {"factor"} and factors:
-            inner = Section(section.document, value, section.path + (key,))
+            inner = Section(section.document, value, section.path + (key,), noted=False)
             result[key] = ("factor", inner.number("factor"))
         elif isinstance(value, dict) and value:
-            inner = Section(section.document, value, section.path + (key,))
+            inner = Section(section.document, value, section.path + (key,), noted=False)
             result.update({f"{key}.{name}": item for name, item in flatten(inner, factors).items()})
         else:
             result[key] = section.number(key)

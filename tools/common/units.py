@@ -36,6 +36,8 @@ OUNCE_INCH_NM = 0.028349523125 * 9.80665 * 0.0254
 SIX_STEP_MEAN = 3.0 / math.pi
 PEAK_PER_DC = 2.0 * SQRT3 / math.pi
 REFERENCE_DEGC = 25.0
+AT_DEGC = (-40.0, 155.0)
+AT_HZ = (1.0, 1e6)
 REFERENCES = r"\b(?:peak|rms|dc|phase|winding|line-to-line)\b"
 """What a unit may say of its number besides the size."""
 
@@ -64,6 +66,22 @@ class Kind:
     minimum: float
     maximum: float
     units: dict[str, Conversion]
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a motor or board file, as docs/files.md lists it."""
+
+    meaning: str
+    kind: Kind | None = None
+    """None for true or false; a count has no units to choose from."""
+    default: str = "must be given"
+    plant: str = ""
+    """Key of the virtual board with the same value, "" for what it does not need."""
+
+    @property
+    def has_units(self) -> bool:
+        return self.kind is not None and bool(self.kind.units)
 
 
 @dataclass(frozen=True)
@@ -157,15 +175,15 @@ def read(section: Section, key: str, kind: Kind, source: str | None = None, extr
     return Quantity(key, conversion(number), kind.si_unit, f"{number:.10g} {unit}", _source(inner, key, source), section.where(key))
 
 
-def read_count(section: Section, key: str, minimum: int, maximum: int, what: str) -> Quantity:
+def read_count(section: Section, key: str, kind: Kind) -> Quantity:
     """key = { value = 5, source = "..." } with a whole number."""
     inner = _table(section, key, None, ("value", "source"))
     count = _number(inner, "value", key)
-    if not minimum <= count <= maximum:
-        raise inner.fail("value", f"'{key}' = {count:g} is impossible", f"choose {minimum} .. {maximum}")
+    if not kind.minimum <= count <= kind.maximum:
+        raise inner.fail("value", f"'{key}' = {count:g} is impossible", f"choose {kind.minimum:g} .. {kind.maximum:g}")
     if count != int(count):
         raise inner.fail("value", f"'{key}' = {count:g} is not a whole number", "give a whole one")
-    return Quantity(key, count, what, f"{count:g} {what}", _source(inner, key, None), section.where(key))
+    return Quantity(key, count, kind.si_unit, f"{count:g} {kind.si_unit}", _source(inner, key, None), section.where(key))
 
 
 def read_pair(section: Section, key: str, kind: Kind) -> tuple[float, float]:

@@ -35,17 +35,6 @@ def commit(root: Path = paths.ROOT) -> str:
     return found
 
 
-def checked_out(root: Path = paths.ROOT) -> tuple[str, str]:
-    """Short name and date of the commit that the sources are just as in."""
-    found = _git(root, "log", "-1", "--format=%h %cs") if shutil.which("git") else None
-    if not found or _git(root, "rev-parse", "--show-prefix") is None:
-        raise NoBase("there is no git history here")
-    if _git(root, "--no-optional-locks", "status", "--porcelain", "--", *CHANGED):
-        raise NoBase("the sources are not as in the last commit")
-    name, date = found.split()
-    return name, date
-
-
 def build(commit_id: str, variables: list[str], root: Path = paths.ROOT) -> Path:
     """The commit's ELF file, from the cache if it has been built so before.
     @param variables of make: OPT=-O2, XC16=folder ..."""

@@ -18,7 +18,7 @@ from tools.common.checksum import checksum
 from tools.common.errors import UserError
 from tools.common.progress import waiting
 
-from . import attribution, base, history, stack
+from . import attribution, base, stack
 from .budget import UNASSIGNED, Budget, Share, Shares, shares
 from .sources import Sources
 
@@ -195,13 +195,6 @@ def summary(report: Report) -> dict:
             "by_address_bytes": report.by_address, "base": report.base_name or None, "broken": report.broken}
 
 
-def kept(report: Report) -> dict[str, float]:
-    """What a commit's line has: the sums, RAM and stack, then each module's flash."""
-    sums = {row.name: float(row.flash) for row in report.rows if row.kind == "total"}
-    whole = next(row for row in report.rows if row.name == "whole image")
-    return sums | {"RAM": whole.ram, "stack": report.stack.depth} | {row.name: row.flash for row in report.rows if row.kind == "module"}
-
-
 def write_json(data: dict, folder: Path, name: str) -> Path:
     """folder/name.json."""
     path = folder / f"{name}.json"
@@ -279,10 +272,7 @@ def _run(options: argparse.Namespace) -> int:
     report.base_name, report.no_base = name, reason
     report.broken += budget.unmatched(Sources.read(), image)
     sources = {} if options.no_budget else {"sources": checksum("image")}
-    status = told(summary(report) | sources, options.out, "size", text(report))
-    if not options.no_budget:
-        print(history.keep("size", kept(report), options.out))
-    return status
+    return told(summary(report) | sources, options.out, "size", text(report))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # Reads the list of targets in the makefiles and says in one line what is wrong with the variables on make's command line: a name that
 # nothing reads, or one that none of the goals reads. Says nothing if all is well.
 #
-#   awk -v typed="MOTER OUT" -v goals="run" -f input.awk Makefile tools/make/*.mk
+#   awk -v typed="MOTER OUT" -v goals="run" -f nearest.awk -f input.awk Makefile tools/make/*.mk
 #
 # What a target reads is in the brackets of its line in the list. Beside that:
 BEGIN {
@@ -30,7 +30,8 @@ END {
     for (i = 1; i <= typed_count; i++) {
         name = typed_list[i]
         if (!(name in known)) {
-            print "foc33: no variable " name ", make's command line: did you mean " nearest(name) "?"
+            near = nearest(name, all(), 0)
+            print "foc33: no variable " name ", make's command line: " (near == "" ? "`make` lists them" : "did you mean " near "?")
             exit 1
         }
         if (!(name in everywhere) && !read_by_a_goal(name)) {
@@ -53,27 +54,7 @@ function read_by_a_goal(name,   i) {
     return 0
 }
 
-function nearest(word,   name, best, steps, least) {
-    least = 1e9
-    for (name in known) {
-        steps = distance(toupper(word), toupper(name))
-        if (steps < least || steps == least && name < best) {
-            best = name
-            least = steps
-        }
-    }
-    return best
-}
-
-# Letters to change, insert, leave out or swap.
-function distance(a, b,   i, j, d, least) {
-    for (i = 0; i <= length(a); i++)
-        for (j = 0; j <= length(b); j++) {
-            least = i == 0 ? j : j == 0 ? i : d[i - 1, j - 1] + (substr(a, i, 1) != substr(b, j, 1))
-            if (i && d[i - 1, j] + 1 < least) least = d[i - 1, j] + 1
-            if (j && d[i, j - 1] + 1 < least) least = d[i, j - 1] + 1
-            if (i > 1 && j > 1 && substr(a, i - 1, 2) == substr(b, j, 1) substr(b, j - 1, 1) && d[i - 2, j - 2] + 1 < least) least = d[i - 2, j - 2] + 1
-            d[i, j] = least
-        }
-    return d[length(a), length(b)]
+function all(   name, text) {
+    for (name in known) text = text " " name
+    return text
 }

@@ -6,7 +6,7 @@ given = $(filter command environment,$(firstword $(origin $1)))
 good = $(shell { $1; } >&2)$(if $(filter-out 0,$(.SHELLSTATUS)),$(error nothing was done))
 
 typed := $(foreach name,$(.VARIABLES),$(if $(filter command,$(call given,$(name))),$(name)))
-$(if $(typed),$(call good,awk -v typed='$(typed)' -v goals=$(call quoted,$(goals)) -f tools/make/input.awk Makefile $(part_makefiles)))
+$(if $(typed),$(call good,awk -v typed='$(typed)' -v goals=$(call quoted,$(goals)) -f tools/make/nearest.awk -f tools/make/input.awk Makefile $(part_makefiles)))
 
 # A tool that was asked for; the usual ones are installed.
 $(foreach tool,CC RUBY,$(if $(filter-out gcc ruby,$(firstword $($(tool)))),$(call good,set -- $($(tool)); command -v "$$1" >/dev/null || \

@@ -1,11 +1,10 @@
 # The unit tests of the control law as the chip runs them: compiled by XC16, in the instruction-set simulator. Uses tools/make/image.mk.
-#
-# The same tests as on the AVR: those without mocks, registers and the motor in floating point (tools/make/test-avr.mk).
+# Tests with mocks or registers (the board's) and those of the closed loop in floating point stay on the PC.
+law_tests := $(filter-out $(patsubst test/%.c,%,$(shell grep -lE 'mock_|ideal_motor\.h|identify_rig\.h|bringup_rig\.h|<xc\.h>|firmware/board|"board/' $(unit_c:%=test/%.c) /dev/null)),$(unit_c))
 target_test_law = $(patsubst %.c,$X/%.o,$(filter firmware/control/% firmware/drive/%,$(target_sources)))
 target_test_simulator := $B/target-test
 
-$(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/run_image.h test/sixteen_bit/ports.h \
-    $$(iss_folder)/libiss33f.a
+$(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/ports.h $$(iss_folder)/libiss33f.a
 	@mkdir -p $(@D)
 	$(call say,cc,$@)$(iss_compile) -o $@ $(filter %.c %.a,$^) -lm
 
@@ -17,6 +16,7 @@ test-target: setup-test find-xc16 ## [tests] the unit tests of the control law a
 	@$(if $(call chosen,$(law_tests)),:,echo foc33: no unit test of the control law, ONLY=$(call quoted,$(ONLY)): use \
 	    $(call quoted,$(sort $(notdir $(law_tests)))) >&2; exit 2)
 	$(call build,-s $X/test/liblaw.a $(target_test_simulator) $(addprefix $T/,$(call chosen,$(law_tests))),building the tests)
-	$(sixteen_bit) --out $X/test --library $X/test/liblaw.a --simulator $(target_test_simulator) --flat \
+	@$(in_turn) $(still) 'unit tests' $(python) test/sixteen_bit/run.py --unity $(unity) --runners $T --host $T --out $X/test \
+	    --library $X/test/liblaw.a --simulator $(target_test_simulator) \
 	    --compile $(call quoted,$(xc16)gcc $(target_part) $(target_flags) $(target_includes) $(DEFINES)) \
 	    --link $(call quoted,$(target_link) -o {elf} {objects} -Wl$(comma)-Map={map}$(comma)$(target_link_options)) $(call chosen,$(law_tests))

@@ -1,24 +1,9 @@
 # Names in userparams.h that cannot be meant: defined twice with two values, or close to a name that is missing.
 #
-#   awk -v places=FILE -f tools/make/userparams.awk KNOWN DEFINED
+#   awk -v places=FILE -f tools/make/nearest.awk -f tools/make/userparams.awk KNOWN DEFINED
 #
 # KNOWN: the rows of the tables of parameters and modes, with @ between the cells; DEFINED: userparams.h as gcc -E -dD shows it, with line
 # markers. To FILE goes where each parameter stands: name, file:line, range, with tabs between them.
-
-function least(a, b) { return a < b ? a : b }
-
-# Letters to change, add, leave out or exchange with their neighbour between two words.
-function distance(a, b,    i, j, d) {
-    for (i = 0; i <= length(a); i++) d[i, 0] = i
-    for (j = 0; j <= length(b); j++) d[0, j] = j
-    for (i = 1; i <= length(a); i++)
-        for (j = 1; j <= length(b); j++) {
-            d[i, j] = least(least(d[i - 1, j], d[i, j - 1]) + 1, d[i - 1, j - 1] + (substr(a, i, 1) != substr(b, j, 1)))
-            if (i > 1 && j > 1 && substr(a, i, 1) == substr(b, j - 1, 1) && substr(a, i - 1, 1) == substr(b, j, 1))
-                d[i, j] = least(d[i, j], d[i - 2, j - 2] + 1)
-        }
-    return d[length(a), length(b)]
-}
 
 function refuse(what) {
     print "foc33: " what
@@ -64,17 +49,13 @@ END {
     }
     gsub(/[^A-Za-z0-9_]+/, " ", used)
     used = " " used " "
+    for (word in known)
+        if (!(word in value)) missing = missing " " word
     for (name in value) {
         if (name in known)
             print name "\t" place[name] "\t" known[name] >places
         else if (place[name] != option && !index(used, " " name " ")) { # what another macro uses is the user's own
-            near = ""
-            close_to = least(2, int(length(name) / 4)) + 1
-            for (word in known)
-                if (!(word in value) && (d = distance(toupper(name), word)) < close_to) {
-                    near = word
-                    close_to = d
-                }
+            near = nearest(name, missing, 0.83)
             if (near != "")
                 refuse(place[name] ": " name " is no parameter: did you mean " near (known[near] == "" ? "" : ", " known[near]) "?")
         }

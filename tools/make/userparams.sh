@@ -59,7 +59,8 @@ PARAM_TABLE(PARAMETER) PARAM_OPTIONAL(OTHER) MODE_TABLE(OTHER)'
 echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || refuse "$1"
 echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || refuse "$1"
 header=$(sed -n 's|^# 1 "\(\./\)\{0,1\}\(.*userparams\.h\)".*|\2|p' "$work/defined" | head -n 1)
-awk -v places="$work/places" -f tools/make/userparams.awk "$work/known" "$work/defined" >&2 || exit 2
+command -v python3 >/dev/null || echo "foc33: no python3: a misspelt name in $header is not looked for" >&2
+awk -v places="$work/places" -f tools/make/nearest.awk -f tools/make/userparams.awk "$work/known" "$work/defined" >&2 || exit 2
 
 for source in param_text param_check; do
     compiler "$@" -w -MMD -MP -MF "$work/depends" -MT "$stamp" -c "firmware/drive/$source.c" -o "$work/object.o" || refuse "$1"
