@@ -1,11 +1,15 @@
 """The command line: `python3 -m tools.bench <command>`. Exit codes: 0 all well, 1 an expectation failed, 2 bad input."""
 
 import argparse
+import functools
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
 from . import bringup, build, campaign, catch_sweep, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
+from .expect import Outcome
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 
@@ -96,21 +100,26 @@ def _run(options: argparse.Namespace) -> int:
     job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
     target = command_common.results(item.name, item.motor, options, asked)
     with output.ResultFolder(target) as folder:
-        run = sweep.run_cases(item.name, [job], options.quiet, simulate.simulate)[0]
-        outcomes = report.check(run)
-        data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
-        _write_traces(run, folder.work)
-        if not options.no_plots:
-            with waiting("plots", options.quiet):
-                from . import plots, recorder_command
-                data["plots"] = plots.write_all(run, folder.work) + recorder_command.of_run(run, folder.work)
-        output.write_summary(folder.work, data)
-        report.write_page(folder.work, run, outcomes, data)
-    print(report.text(run, outcomes, data))
-    print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
-          f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time")
+        text, outcomes = sweep.run_cases(item.name, [job], options.quiet, functools.partial(_reported, folder.work, used, options))[0]
+    print(text)
     print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
+
+
+def _reported(folder: Path, used: dict[str, Any], options: argparse.Namespace, job: simulate.Job, tell: Callable[[float], None]) -> tuple[str, list[Outcome]]:
+    """The run and its whole report, in the run's process: a trace takes too much memory to be there twice."""
+    run = simulate.simulate(job, tell)
+    outcomes = report.check(run)
+    data = report.summary(run, outcomes, used["motor"], used["board"]) | used
+    _write_traces(run, folder)
+    if not options.no_plots:
+        with waiting("plots", options.quiet):
+            from . import plots, recorder_command
+            data["plots"] = plots.write_all(run, folder) + recorder_command.of_run(run, folder)
+    output.write_summary(folder, data)
+    report.write_page(folder, run, outcomes, data)
+    return (f"{report.text(run, outcomes, data)}\n\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
+            f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time"), outcomes
 
 
 def _prepare(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from tools.common import motor_file, workers
 from tools.common.progress import Progress
 from tools.common.toml_file import Document
-from . import command_common, picture, report, simulate
+from . import command_common, long_run, picture, report, simulate
 from .metrics import Measure
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, param, start_time_s
@@ -145,6 +145,7 @@ def _work(job: simulate.Job, report: Callable[[float], None]) -> dict[str, Any]:
 
 def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any] = _work) -> list[Any]:
     """The results of all jobs, in order; reduced, if `work` does not make something else of a job."""
+    long_run.say(title, jobs)
     with Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         return workers.run_all(jobs, work, progress)
 

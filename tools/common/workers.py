@@ -14,6 +14,7 @@ from .errors import UserError
 
 _ENDING = {signal.SIGINT, signal.SIGTERM}
 _ended: list[int] = []
+NO_MEMORY = "close other programs"
 
 
 def end(number: int, frame: Any) -> None:
@@ -78,7 +79,17 @@ def _child(work: Any, job: Any, other_end: Any, pipe: Any) -> None:
     try:
         pipe.send(("result", work(job, lambda seconds: pipe.send(("progress", seconds)))))
     except UserError as error:
-        pipe.send(("error", str(error)))
+        pipe.send(("error", UserError(str(error))))
+    except MemoryError:
+        pipe.send(("error", UserError("no memory is left", "", NO_MEMORY)))
+    except OSError as error: # a full disk is the caller's matter
+        pipe.send(("error", error))
+
+
+def _died(code: int) -> UserError:
+    if code == -signal.SIGKILL:
+        return UserError("the simulation was killed", "most often for want of memory", NO_MEMORY)
+    return UserError("the simulation ended by itself", f"exit code {code}", "a crash in the virtual board or the firmware; build with SAN=1 to find it")
 
 
 def _receive(running: dict[Any, _Running], pipe: Any, results: list[Any], progress: Callable[[float], None]) -> None:
@@ -87,13 +98,12 @@ def _receive(running: dict[Any, _Running], pipe: Any, results: list[Any], progre
         kind, value = pipe.recv()
     except EOFError:
         item.process.join()
-        raise UserError("the simulation ended by itself", f"exit code {item.process.exitcode}",
-                        "a crash in the virtual board or the firmware; build with SAN=1 to find it") from None
+        raise _died(item.process.exitcode) from None
     if kind == "progress":
         progress(value)
         return
     if kind == "error":
-        raise UserError(value)
+        raise value
     results[item.number] = value
     item.process.join()
     pipe.close()

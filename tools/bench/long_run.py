@@ -1,0 +1,49 @@
+"""What makes a run long: of its motor time, the part that takes most, and the key to change. Said before a long run begins."""
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+from .scenario import SETTLE_PERIODS, Scenario, start_time_s
+
+LONG_S = 120.0
+"""Of motor time; the trace of a run of two minutes fits in memory as it is."""
+
+
+def reason(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float = 0.0) -> str:
+    """What takes most of a run, with its key. The scenario is in numbers."""
+    parts = list(_parts(scenario, params, coast_s_per_rpm))
+    own_s = scenario.duration_s - sum(seconds for seconds, _ in parts)
+    seconds, text = max([*parts, (own_s, f"are its own waits and stretches: change the times of {scenario.name}")])
+    return f"about {min(seconds, scenario.duration_s):.0f} s of it {text}"
+
+
+def _parts(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float) -> Iterator[tuple[float, str]]:
+    """Seconds, and what takes them, by key of the header or the motor file."""
+    presses = [event.at_s for event in scenario.events if event.kind == "press" and event.button == "S2"]
+    speeds = [event.value for event in scenario.events if event.kind == "speed_rpm"] or [0.0]
+    speeds += [0.0] * (len(presses) > 1)
+    first_rpm = max(speeds[0] - params.get("END_SPEED_RPM", 0.0), 0.0)
+    up_rpm, down_rpm = first_rpm + sum(max(b - a, 0.0) for a, b in pairwise(speeds)), sum(max(a - b, 0.0) for a, b in pairwise(speeds))
+    slope, hz = params.get("SPEEDREFRAMP_RPM_PER_S", 0.0), params.get("SPEED_BANDWIDTH_HZ", 0.0)
+    if slope:
+        slowed_rpm = 0.0 if coast_s_per_rpm * slope > 1.0 else down_rpm
+        yield (up_rpm + slowed_rpm) / slope, f"are ramps of the speed, SPEEDREFRAMP_RPM_PER_S = {slope:g} in the header: raise it"
+        yield (down_rpm - slowed_rpm) * coast_s_per_rpm, "is a rotor that only friction slows: give the motor a load, or the board a supply that takes energy back"
+    if hz:
+        yield len(speeds) * SETTLE_PERIODS / hz, f"is for the speed to settle, SPEED_BANDWIDTH_HZ = {hz:g} in the header: raise it"
+    if presses and "LOCK_TIME" in params:
+        lock_s = params["LOCK_TIME"] * params["LOOPTIME_SEC"]
+        start_s = start_time_s(params)
+        key = "LOCK_TIME: lower it" if lock_s > 0.5 * start_s else "OPENLOOP_RAMPSPEED_INCREASERATE: raise it"
+        yield start_s * (len(presses) + 1) // 2, f"are starts, in the header {key}"
+
+
+def say(title: str, jobs: Sequence[Any]) -> None:
+    """One line on stderr if any of the jobs is long. `jobs`: what has a scenario, and may have `long`, its reason()."""
+    longest = max((job for job in jobs if getattr(job, "long", "")), key=lambda job: job.scenario.duration_s, default=None)
+    if longest is None:
+        return
+    many = f", the longest of {len(jobs)} runs" if len(jobs) > 1 else ""
+    print(f"foc33: {title}: {longest.scenario.duration_s:.0f} s of motor time{many}; {longest.long}", file=sys.stderr, flush=True)
