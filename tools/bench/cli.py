@@ -8,9 +8,19 @@ from typing import Any
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import bringup, build, campaign, catch_sweep, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
+from . import build, campaign, command_common, report, scenario_file, simulate, soak, sweep
+from .bringup import Bringup
+from .catch_sweep import Catch
 from .expect import Outcome
+from .loadsteps import LoadSteps
+from .lowspeed import LowSpeed
+from .rating_sweep import Rated
+from .robust import Robust
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
+from .start_sweep import Starts
+from .table2 import Table2
+
+SWEEPS = (Table2, Starts, Rated, LoadSteps, LowSpeed, Catch, Robust, Bringup)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -34,51 +44,16 @@ def _parser() -> argparse.ArgumentParser:
     for command in (run, prepare):
         command.add_argument("scenario", nargs="?", help="name (see `scenarios`) or TOML file; default demo, rated with --motor")
         command.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
-
-    loads = commands.add_parser("table2", help="the eight rows of AN1292's Table 2 beside ours")
-    loads.set_defaults(command=table2.command)
-
-    angles = commands.add_parser("starts", help="start from every rotor angle under several loads")
-    angles.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
-    angles.set_defaults(command=start_sweep.command)
-
-    rating = commands.add_parser("rated", help="every motor with its tuned header at 20, 50 and 100 %% of its rated speed under load")
-    rating.add_argument("--motor", nargs="+", metavar="NAME", help="these motors only: names in tuning/motors or paths")
-    rating.set_defaults(command=rating_sweep.command)
-
-    steps = commands.add_parser("loadsteps", help="the brake closes and opens at once: dips, and how soon the speed is back")
-    steps.set_defaults(command=loadsteps.command)
-
-    slow = commands.add_parser("lowspeed", help="low speeds held under load, and how low it goes")
-    slow.set_defaults(command=lowspeed.command)
-
-    catches = commands.add_parser("catch", help="S2 while the rotor turns at any speed, and stops on a supply that cannot sink")
-    catches.set_defaults(command=catch_sweep.command)
-
-    margins = commands.add_parser("robust", help="how far the motor's true R, L and Kphi may be off what the header says")
-    margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
-    margins.set_defaults(command=robust.command)
+    command_common.add_options(run, "SCENARIO")
+    command_common.add_options(prepare, "", without=("library", "out", "quiet"))
+    for kind in SWEEPS:
+        kind.add_command(commands)
 
     record = commands.add_parser("recorder", help="draw what the fault recorder has sent: a log of the UART")
     record.add_argument("log", nargs="?", help="default: what the last run that ended in a fault has sent")
+    command_common.add_options(record, "recorder")
     record.set_defaults(command=_recorder)
 
-    for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
-                            (slow, "lowspeed"), (catches, "catch"), (margins, "robust"), (record, "recorder")):
-        header = "build/tune/NAME, written by make tune MOTOR=NAME" + ("" if command is rating else "; without --motor the project's own")
-        command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
-        command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
-        if command is not rating:
-            command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
-        if command is prepare:
-            continue
-        if command is not rating:
-            command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
-        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}, with the names "
-                             "of another motor, board or header")
-        command.add_argument("--quiet", action="store_true", help="no progress bar")
-
-    bringup.add_command(commands)
     campaign.add_command(commands)
     soak.add_command(commands)
 

@@ -346,7 +346,7 @@ class FaultExpectation(Expectation):
 
     def check(self, run: Run) -> list[Outcome]:
         title = f"fault {self.name}"
-        raised = [(row, at_s, name) for row, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
+        raised = run.raised()
         allowed = f"{self.name} within {self.within_s:g} s of {self.after_s:g} s"
         if not raised:
             return [Outcome(f"{title}: raised", False, "no fault", allowed)]

@@ -96,7 +96,7 @@ def faults_table(run: Run) -> list[page.Table]:
     """The faults of a run, with cause and remedy."""
     known = {row.name: row for row in drive_tables.faults()}
     rows = [page.Row([f"{at_s:.4f}", name, *((known[name].cause, known[name].remedy) if name in known else ("", ""))], True, at_s=at_s)
-            for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
+            for _, at_s, name in run.raised()]
     return [page.Table("Faults", ["s", "fault", "cause", "remedy"], rows)] if rows else []
 
 

@@ -48,6 +48,8 @@ class Job:
     """of userparams.h, changed at power-up; needs PARAMS_IN_RAM"""
     long: str = ""
     """why it takes long"""
+    case: Any = None
+    """of the sweep that it belongs to"""
 
 
 def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board: board_keys.Part, extra: board_keys.Values | None = None,
