@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from support import FAULTS, LIBRARY, MOTORS, command, trace
 
-from tools.bench import campaign, injection, judge, memory, trial
+from tools.bench import campaign, draws, injection, judge, memory, trial
 from tools.bench.board import Library
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, motor_file, paths, workers
 
 HURST = "hurst_dmb0224c10002"
 CASES = [injection.draw(1, number, list(MOTORS)) for number in range(1, 1001)]
@@ -219,7 +219,7 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
 
 
 def test_the_campaigns_header_is_the_tuners_with_a_potentiometer_that_has_live_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr(campaign, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(campaign, "HEADERS", tmp_path / "results")
     header = tmp_path / "motor"
     header.mkdir()
     (header / "userparams.h").write_text("#define OTHER 1\n#define POT_LIVE_ZERO 0.0 /* [1] */\n", encoding="utf-8")
@@ -251,7 +251,7 @@ def test_a_comparison_that_trips_by_itself_is_none():
 # ---- a case on the virtual board ---------------------------------------------------------------------------------------------
 def alone(case, bench):
     """In a process of its own, as the command does it."""
-    return campaign.workers.run_all([case], lambda case, tell: trial.run(case, bench).row(), lambda seconds: None)[0]
+    return workers.run_all([case], lambda case, tell: trial.run(case, bench).row(), lambda seconds: None)[0]
 
 
 def case_of(kind, **more):
@@ -406,13 +406,13 @@ def test_an_interrupted_campaign_goes_on_with_the_cases_that_are_missing(hurst, 
 
 
 def test_a_half_written_line_and_lines_of_another_firmware_are_not_used(tmp_path):
-    part = campaign.Part(tmp_path / "out", {"seed": 1})
+    part = draws.Part(tmp_path / "out", {"seed": 1}, campaign.KEYS, "case")
     assert part.rows() == {}
     part.add(dict.fromkeys(campaign.KEYS, "a \"quoted\", text") | {"case": 3, "after_s": None, "size": 0.5})
-    with (part.folder / campaign.PART_FILE).open("a", encoding="utf-8") as file:
+    with (part.folder / draws.PART_FILE).open("a", encoding="utf-8") as file:
         file.write('"4","half')
     assert list(part.rows()) == [3] and part.rows()[3]["why"] == "a \"quoted\", text" and part.rows()[3]["after_s"] is None
-    assert campaign.Part(tmp_path / "out", {"seed": 2}).rows() == {}
+    assert draws.Part(tmp_path / "out", {"seed": 2}, campaign.KEYS, "case").rows() == {}
 
 
 def test_the_worst_are_the_silent_ones_one_of_each_kind_first_then_the_slowest_stops():

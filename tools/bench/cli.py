@@ -8,8 +8,9 @@ from typing import Any
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import build, campaign, command_common, report, scenario_file, simulate, soak, sweep
+from . import build, command_common, report, scenario_file, simulate, sweep
 from .bringup import Bringup
+from .campaign import Campaign
 from .catch_sweep import Catch
 from .expect import Outcome
 from .loadsteps import LoadSteps
@@ -17,6 +18,7 @@ from .lowspeed import LowSpeed
 from .rating_sweep import Rated
 from .robust import Robust
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
+from .soak import Soak
 from .start_sweep import Starts
 from .table2 import Table2
 
@@ -46,16 +48,13 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     command_common.add_options(run, "SCENARIO")
     command_common.add_options(prepare, "", without=("library", "out", "quiet"))
-    for kind in SWEEPS:
+    for kind in (*SWEEPS, Campaign, Soak):
         kind.add_command(commands)
 
     record = commands.add_parser("recorder", help="draw what the fault recorder has sent: a log of the UART")
     record.add_argument("log", nargs="?", help="default: what the last run that ended in a fault has sent")
     command_common.add_options(record, "recorder")
     record.set_defaults(command=_recorder)
-
-    campaign.add_command(commands)
-    soak.add_command(commands)
 
     listing = commands.add_parser("scenarios", help="list the scenarios")
     listing.set_defaults(command=_scenarios)

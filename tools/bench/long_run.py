@@ -1,9 +1,8 @@
 """What makes a run long: of its motor time, the part that takes most, and the key to change. Said before a long run begins."""
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 from .scenario import SETTLE_PERIODS, Scenario, start_time_s
 
@@ -40,10 +39,9 @@ def _parts(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: flo
         yield start_s * (len(presses) + 1) // 2, f"are starts, in the header {key}"
 
 
-def say(title: str, jobs: Sequence[Any]) -> None:
-    """One line on stderr if any of the jobs is long. `jobs`: what has a scenario, and may have `long`, its reason()."""
-    longest = max((job for job in jobs if getattr(job, "long", "")), key=lambda job: job.scenario.duration_s, default=None)
-    if longest is None:
-        return
-    many = f", the longest of {len(jobs)} runs" if len(jobs) > 1 else ""
-    print(f"foc33: {title}: {longest.scenario.duration_s:.0f} s of motor time{many}; {longest.long}", file=sys.stderr, flush=True)
+def say(title: str, runs: Sequence[tuple[float, Callable[[], str]]]) -> None:
+    """One line on stderr if any of the runs is long. Of each its duration, and what gives its reason()."""
+    seconds, why = max(runs, key=lambda run: run[0], default=(0.0, str))
+    if seconds > LONG_S:
+        many = f", the longest of {len(runs)} runs" if len(runs) > 1 else ""
+        print(f"foc33: {title}: {seconds:.0f} s of motor time{many}; {why()}", file=sys.stderr, flush=True)

@@ -201,6 +201,6 @@ class Sweep:
 
 def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any]) -> list[Any]:
     """What `work` makes of each job, in order; side by side."""
-    long_run.say(title, jobs)
+    long_run.say(title, [(job.scenario.duration_s, lambda job=job: job.long) for job in jobs])
     with Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
         return workers.run_all(jobs, work, progress)
