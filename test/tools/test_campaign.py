@@ -406,13 +406,14 @@ def test_an_interrupted_campaign_goes_on_with_the_cases_that_are_missing(hurst, 
 
 
 def test_a_half_written_line_and_lines_of_another_firmware_are_not_used(tmp_path):
-    part = draws.Part(tmp_path / "out", {"seed": 1}, campaign.KEYS, "case")
+    part = draws.Part(tmp_path / "out", {"seed": 1}, "case")
     assert part.rows() == {}
     part.add(dict.fromkeys(campaign.KEYS, "a \"quoted\", text") | {"case": 3, "after_s": None, "size": 0.5})
     with (part.folder / draws.PART_FILE).open("a", encoding="utf-8") as file:
-        file.write('"4","half')
-    assert list(part.rows()) == [3] and part.rows()[3]["why"] == "a \"quoted\", text" and part.rows()[3]["after_s"] is None
-    assert draws.Part(tmp_path / "out", {"seed": 2}, campaign.KEYS, "case").rows() == {}
+        file.write('{"case": 4, "kind": "half')
+    part.add({"case": 5})
+    assert list(part.rows()) == [3, 5] and part.rows()[3]["why"] == "a \"quoted\", text" and part.rows()[3]["after_s"] is None
+    assert draws.Part(tmp_path / "out", {"seed": 2}, "case").rows() == {}
 
 
 def test_the_worst_are_the_silent_ones_one_of_each_kind_first_then_the_slowest_stops():

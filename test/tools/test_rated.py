@@ -116,6 +116,8 @@ def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_pa
     error = command("rated", "--motor", "linix_45zwn24_40", HURST, *out)[2]
     assert ready == [HURST] and not (tmp_path / "out").exists()
     assert re.fullmatch(r"foc33: no userparams.h for motor 'linix_45zwn24_40'.*\nfoc33: that is enough\n", error)
+    monkeypatch.setattr(paths, "RESULTS", tmp_path / "run")
+    assert command("rated", "--motor", "linix_45zwn24_40", HURST)[2] == error and not any((tmp_path / "run").iterdir()) # in a folder of its own
 
 
 @pytest.mark.parametrize("arguments, parts", [

@@ -3,7 +3,6 @@
 A kind of series is a subclass of Series with what is its own. Each case that is over has its line in the folder OUT.part."""
 
 import argparse
-import csv
 import json
 import os
 import shutil
@@ -17,9 +16,8 @@ from tools.common.errors import UserError
 from tools.common.progress import Progress
 from . import long_run, page, picture, report
 from .run import Run
-from .scenario import Scenario
 
-PART_FILE, IDENTITY = "cases.csv", "identity.json"
+PART_FILE, IDENTITY = "cases.jsonl", "identity.json"
 MOST_NUMBER = 1_000_000
 Tell = Callable[[float], None]
 
@@ -30,7 +28,6 @@ class Part:
 
     target: Path
     made_with: dict[str, Any]
-    keys: tuple[str, ...]
     number: str
     """the key of a case's number"""
 
@@ -40,27 +37,22 @@ class Part:
 
     def rows(self) -> dict[int, dict[str, Any]]:
         """The rows so far, by number; none if firmware, tools or draw have changed since."""
+        known, lines, made_with = self.folder / IDENTITY, self.folder / PART_FILE, json.dumps(self.made_with)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            known = self.folder / IDENTITY
-            if not known.is_file() or known.read_text(encoding="utf-8") != json.dumps(self.made_with):
-                (self.folder / PART_FILE).unlink(missing_ok=True)
-                known.write_text(json.dumps(self.made_with), encoding="utf-8")
-            if not (self.folder / PART_FILE).is_file():
-                return {}
-            with (self.folder / PART_FILE).open(encoding="utf-8", newline="") as file:
-                whole = [cells for cells in csv.reader(file) if len(cells) == len(self.keys) + 1 and cells[-1] == "end"]
+            if not known.is_file() or known.read_text(encoding="utf-8") != made_with:
+                lines.unlink(missing_ok=True)
+                known.write_text(made_with, encoding="utf-8")
+            whole = lines.read_text(encoding="utf-8").splitlines(keepends=True) if lines.is_file() else []
         except OSError as error:
             raise UserError(f"cannot write '{self.folder}' ({error.strerror})", "--out", "choose a folder that can be written") from None
-        rows = [{key: json.loads(cell) for key, cell in zip(self.keys, cells)} for cells in whole]
+        rows = [json.loads(line) for line in whole if line.endswith("}\n")]
         return {row[self.number]: row for row in rows}
 
     def add(self, row: dict[str, Any]) -> None:
         """One more line, in one write: several processes do this at once."""
-        cells = [json.dumps(row[key]).replace('"', '""') for key in self.keys]
-        data = ",".join(f'"{cell}"' for cell in [*cells, "end"]) + "\n"
         file = os.open(self.folder / PART_FILE, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-        os.write(file, data.encode())
+        os.write(file, f"\n{json.dumps(row)}\n".encode()) # what another one has left unfinished ends here
         os.close(file)
 
     def remove(self) -> None:
@@ -69,7 +61,19 @@ class Part:
 
 @dataclass
 class Series:
-    """One series. A case has its `number`."""
+    """One series of cases, each with its `number`. Of its own a kind has
+
+    prepared(options)  the series, ready to run, and its cases
+    identity()         what the lines of an unfinished series must have been made with
+    plans(cases)       scenarios that last as long as the longest, each with its header's parameters
+    row(case, tell)    runs a case; in a process of its own, as the next two. tell(): so much more of its amount is done
+    curves(case)       the run once more, for its picture; None without
+    alone(case, folder)   one with its whole report: the summary, with "passed", and what is printed
+    text(rows)         the table as printed
+    is_bad(row), line(row)   whether a case is wrong, and what is said of it
+    worst(rows)        those that the page shows, the worst first
+    page(rows)         the summary, with title and "passed", and the page, to which the worst are added
+    """
 
     seed: int
     benches: dict[Any, Any]
@@ -99,53 +103,9 @@ class Series:
                 raise UserError(f"{value} is no number of {cls.what}s or of a {cls.what}", name, f"choose 1 .. {MOST_NUMBER}")
         return sorted(set(options.case)) if options.case else list(range(1, count + 1))
 
-    @classmethod
-    def prepared(cls, options: argparse.Namespace) -> tuple["Series", list[Any]]:
-        """The series, ready to run, and its cases."""
-        raise NotImplementedError
-
-    def identity(self) -> dict[str, Any]:
-        """What the lines of an unfinished series must have been made with."""
-        raise NotImplementedError
-
     def amount(self, item: Any) -> float:
         """How far a case brings the series."""
         return 1.0
-
-    def row(self, item: Any, tell: Tell) -> dict[str, Any]:
-        """Runs a case, in a process of its own. tell(): some more of its amount is done."""
-        raise NotImplementedError
-
-    def plans(self, items: list[Any]) -> list[tuple[Scenario, dict[str, float]]]:
-        """What runs as long as any of them, with the header's parameters."""
-        raise NotImplementedError
-
-    def alone(self, item: Any, folder: Path) -> tuple[dict[str, Any], str]:
-        """One case with its whole report: what goes into the summary, with "passed", and what is printed. In a process of its own."""
-        raise NotImplementedError
-
-    def curves(self, item: Any) -> Run | None:
-        """The case once more, for its picture. In a process of its own."""
-        raise NotImplementedError
-
-    def is_bad(self, row: dict[str, Any]) -> bool:
-        raise NotImplementedError
-
-    def line(self, row: dict[str, Any]) -> str:
-        """A wrong case in one line."""
-        raise NotImplementedError
-
-    def text(self, rows: list[dict[str, Any]]) -> str:
-        """The table as printed."""
-        raise NotImplementedError
-
-    def worst(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Those that the page shows, the worst first."""
-        raise NotImplementedError
-
-    def page(self, rows: list[dict[str, Any]]) -> tuple[dict[str, Any], page.Page]:
-        """The summary, with title and "passed", and the page; the worst are added to its tables."""
-        raise NotImplementedError
 
     @classmethod
     def command(cls, options: argparse.Namespace) -> int:
@@ -156,7 +116,7 @@ class Series:
         if options.case and len(items) == 1:
             return series.run_alone(items[0], target)
         long_run.say(cls.name, [(plan.duration_s, lambda plan=plan, params=params: long_run.reason(plan, params)) for plan, params in series.plans(items)])
-        part = Part(target, series.identity(), cls.keys, cls.what)
+        part = Part(target, series.identity(), cls.what)
         return series.finish(items, series.run(items, part, options.quiet), part)
 
     def run(self, items: list[Any], part: Part, quiet: bool) -> list[dict[str, Any]]:

@@ -79,7 +79,12 @@ class Loaded:
 
 @dataclass
 class Sweep:
-    """One sweep. Of its own a kind has at least `cases`, `job` and `check`; the rest where it differs."""
+    """One sweep. Of its own a kind has, beside what differs from the following,
+
+    cases()            what runs, in order
+    job(case)          a case, ready to run
+    check(case, row)   what must hold for its row: Outcomes
+    """
 
     table: Any
     motor: Part | None = None
@@ -108,14 +113,6 @@ class Sweep:
     def ask(self, options: argparse.Namespace) -> None:
         """Takes what else the command line says."""
 
-    def cases(self) -> list[Any]:
-        """What runs, in order."""
-        raise NotImplementedError
-
-    def job(self, item: Any) -> simulate.Job:
-        """A case, ready to run."""
-        raise NotImplementedError
-
     def measured(self, run: Run, item: Any) -> dict[str, Any]:
         """What is read from a case's run, in the process that ran it."""
         return case.reduced(run)
@@ -127,10 +124,6 @@ class Sweep:
     def verdict(self, item: Any, row: dict[str, Any]) -> str:
         """"ok", or the first thing that does not hold; "" for a kind that has Outcomes only."""
         return ""
-
-    def check(self, item: Any, row: dict[str, Any]) -> list[Outcome]:
-        """What must hold for a row."""
-        raise NotImplementedError
 
     def more(self, rows: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
         """What else goes into the summary: pictures, and what is found out after the cases."""
