@@ -114,6 +114,12 @@ def test_a_code_before_the_injection_is_none():
     assert judge.judge(running(**cleared), running(**cleared), LIMITS).outcome == judge.NO_EFFECT
 
 
+@pytest.mark.parametrize("signals, outcome", [({}, judge.NO_EFFECT), ({"plant__speed_rpm": after(0.6, 900.0, 1000.0)}, judge.SILENT)])
+def test_two_recordings_of_which_one_is_thinned_are_compared_row_by_row(signals, outcome):
+    with_fault, without = running(**signals), running()
+    assert judge.judge(with_fault.thinned(3), without, LIMITS).outcome == judge.judge(with_fault, without.thinned(9), LIMITS).outcome == outcome
+
+
 def test_a_drive_that_cannot_leave_an_earlier_fault_says_so_and_is_not_silent():
     cleared = {"fw__fault": lambda time_s: np.where(time_s < 0.8, 6.0, 0.0), "fw__state": after(0.8, 5.0, 7.0), "pwm__outputs_seen": after(0.8, 63.0)}
     kept = {"fw__fault": 6.0, "fw__state": 7.0, "pwm__outputs_seen": 0.0, "plant__speed_rpm": 0.0}

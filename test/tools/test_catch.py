@@ -1,12 +1,10 @@
 """Flying starts and stops without a sink: what is drawn, what is measured of a run, and what makes a row fail."""
 
-import csv
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import LIBRARY, command, run, step, trace
+from support import LIBRARY, run, small_sweep, step, trace
 
 from tools.bench import catch_sweep
 from tools.bench.board import Library
@@ -116,18 +114,7 @@ def test_each_way_to_fail_is_named(stop, changes, text):
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
 def test_some_starts_and_a_stop_in_full(tmp_path, monkeypatch):
-    text = (paths.TABLES / "catch.toml").read_text(encoding="utf-8")
-    for old, new in (("count = 60", "count = 4"), ("inertia_factors = [1, 9, 36]", "inertia_factors = [9]"), ("stop_factors = [1, 9, 36]", "stop_factors = [9]"),
-                     ("stop_s = [1.66, 1.66, 1.66]", "stop_s = [1.66]")):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "tables").mkdir()
-    (tmp_path / "tables/catch.toml").write_text(text, encoding="utf-8")
-    monkeypatch.setattr(paths, "TABLES", tmp_path / "tables")
-    code, out, error = command("catch", "--out", str(tmp_path / "out"), "--quiet")
+    code, out, error, data, rows = small_sweep(tmp_path, monkeypatch, "catch", count="4", inertia_factors="[9]", stop_factors="[9]", stop_s="[1.66]")
     assert (code, error) == (0, ""), out
-    data = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
-    with (tmp_path / "out/catch.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
     assert data["passed"] and [row["verdict"] for row in rows] == ["ok"] * 5
     assert np.max([float(row["control_s"]) for row in rows[:4]]) < 0.1 and rows[4]["control_s"] == "" and 1.0 < float(rows[4]["stop_s"]) < 1.66

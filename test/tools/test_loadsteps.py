@@ -1,14 +1,12 @@
 """Load steps and low speed: what is asked of a motor, what is out of its reach, and what makes a row fail."""
 
-import csv
 import itertools
-import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import LIBRARY, command, run, step
+from support import LIBRARY, run, small_sweep, step
 
 from tools.bench import case, loadsteps, lowspeed, plots, reach, simulate
 from tools.bench.board import Library
@@ -221,21 +219,8 @@ def test_how_low_it_goes_is_found_for_each_torque_and_what_happens_below_is_told
 
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
-def small(tmp_path, monkeypatch, name, **changes):
-    """Run a command with a smaller table."""
-    text = (paths.TABLES / f"{name}.toml").read_text(encoding="utf-8")
-    lines = [f"{key} = {changes[key]}" if (key := line.split(" = ")[0]) in changes else line for line in text.splitlines()]
-    (tmp_path / "tables").mkdir()
-    (tmp_path / f"tables/{name}.toml").write_text("\n".join(lines), encoding="utf-8")
-    monkeypatch.setattr(paths, "TABLES", tmp_path / "tables")
-    code, out, error = command(name, "--out", str(tmp_path / "out"), "--quiet")
-    data = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
-    with (tmp_path / f"out/{name}.csv").open(encoding="utf-8") as file:
-        return code, out, error, data, list(csv.DictReader(file))
-
-
 def test_load_steps_in_full(tmp_path, monkeypatch):
-    code, out, error, data, rows = small(tmp_path, monkeypatch, "loadsteps", speeds_rpm="[1190, 2500]", torques_nm="[0.08]",
+    code, out, error, data, rows = small_sweep(tmp_path, monkeypatch, "loadsteps", speeds_rpm="[1190, 2500]", torques_nm="[0.08]",
                                          kphi_factors="[1.0]")
     assert (code, error, data["passed"]) == (0, "", True), out
     assert [item["verdict"] for item in rows] == ["ok", "out of reach"] and "needs 1" in out
@@ -244,7 +229,7 @@ def test_load_steps_in_full(tmp_path, monkeypatch):
 
 
 def test_low_speed_in_full(tmp_path, monkeypatch):
-    code, out, error, data, rows = small(tmp_path, monkeypatch, "lowspeed", speeds_rpm="[400]", torques_nm="[0.03]", measure_s="0.5",
+    code, out, error, data, rows = small_sweep(tmp_path, monkeypatch, "lowspeed", speeds_rpm="[400]", torques_nm="[0.03]", measure_s="0.5",
                                          lowest_rpm="300", ratio="1.3")
     assert (code, error, [item["verdict"] for item in rows]) == (0, "", ["ok"]), out
     assert "0.03 N m is held down to 300 rpm (the search ended there)" in out

@@ -141,7 +141,7 @@ def test_a_long_run_says_so_before_it_begins_and_its_whole_report_takes_little_m
         _, status, used = os.wait4(process.pid, 0) # the largest of it and its processes
     told = (tmp_path / "said").read_text(encoding="utf-8")
     assert (status, told.count("\n")) == (0, 1) and re.match(r"foc33: long: 161 s of motor time; about \d\d s of it is a rotor that only friction slows", told), told
-    assert used.ru_maxrss < 600_000
+    assert used.ru_maxrss < 600_000 and "its trace has one period of 3<" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert 90_000 < sum(1 for _ in (tmp_path / "out/trace.csv").open(encoding="utf-8")) < 110_000 # a thirtieth
 
 

@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 from support import LIBRARY, command, refused
@@ -81,6 +82,14 @@ def test_what_a_sweep_cannot_do_is_one_line_and_leaves_nothing(run, tmp_path):
     refused(run("[24]"), "columns of different lengths", "supply.toml", "give volts and names as many numbers each")
     refused(run("[24, 18]", "--motor", "no_such"), "no motor 'no_such'")
     assert not (tmp_path / "out").exists()
+
+
+def test_of_long_runs_two_at_once_have_room_whatever_the_processors(monkeypatch):
+    monkeypatch.setattr(sweep.workers, "processors", lambda: 16)
+    runs = {seconds: [SimpleNamespace(scenario=SimpleNamespace(duration_s=seconds))] * 3 for seconds in (1.0, 20.0, 60.0, 3000.0)}
+    assert {seconds: sweep.side_by_side(jobs) for seconds, jobs in runs.items()} == {1.0: 16, 20.0: 6, 60.0: 2, 3000.0: 2}
+    monkeypatch.setattr(sweep.workers, "processors", lambda: 1)
+    assert sweep.side_by_side(runs[3000.0]) == sweep.side_by_side([]) == 1
 
 
 def test_searches_share_the_runs_of_their_group_and_go_on_until_each_knows_its_end():

@@ -199,7 +199,8 @@ class Catch(sweep.Sweep):
         else:
             angles = ", ".join(f"{text} {row[key]:.1f} deg" for key, text in (("angle_error_deg", "angle error"), ("pull_deg", "pull")) if row[key] is not None)
             got = ("never" if row["control_s"] is None else f"{row['how']} after {row['control_s']:.3f} s, {angles}") + f", {both}"
-            allowed = f"no fault, {table.within_s:g} s, {table.angle_error_deg:g} deg, {self.most_a:.2f} A, bus {self.bus_v(item):g} V, speed {table.error_percent:g} %"
+            allowed = f"no fault, {table.within_s:g} s, {table.angle_error_deg:g} deg, {self.most_a:.2f} A, bus {self.bus_v(item):g} V, " \
+                      f"speed {table.error_percent:g} %"
         return [Outcome(item.name, row["verdict"] == "ok", f"{row['verdict']}; {got}", allowed)]
 
     def text(self, rows: list[dict[str, Any]]) -> str:

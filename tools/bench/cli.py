@@ -80,7 +80,8 @@ def _run(options: argparse.Namespace) -> int:
     return command_common.verdict(item.name, outcomes)
 
 
-def _reported(folder: Path, used: dict[str, Any], options: argparse.Namespace, job: simulate.Job, tell: Callable[[float], None]) -> tuple[str, list[Outcome]]:
+def _reported(folder: Path, used: dict[str, Any], options: argparse.Namespace, job: simulate.Job,
+              tell: Callable[[float], None]) -> tuple[str, list[Outcome]]:
     """The run and its whole report, in the run's process: a trace takes too much memory to be there twice."""
     run = simulate.simulate(job, tell)
     outcomes = report.check(run)

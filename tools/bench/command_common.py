@@ -22,12 +22,12 @@ SAME_MOTOR = 0.01
 """Header and motor file belong together if their values agree to this."""
 
 
-def add_options(parser: argparse.ArgumentParser, folder: str, header: str = "build/tune/NAME, written by make tune MOTOR=NAME; without --motor the project's own",
-                without: tuple[str, ...] = ()) -> None:
-    """The options of all running commands, but for those that one of them has not; `folder`: of its results."""
+def add_options(parser: argparse.ArgumentParser, folder: str, own: str = "; without --motor the project's own", without: tuple[str, ...] = ()) -> None:
+    """The options of all running commands, but for those that one of them has not. `folder`: of its results; `own`: what its default header may be."""
     for name, more in (
             ("board", {"help": "board file instead of the motor's or the scenario's: a name in tuning/boards or a path"}),
-            ("userparams", {"metavar": "FOLDER", "help": f"build with the userparams.h in this folder; default: {header}"}),
+            ("userparams", {"metavar": "FOLDER", "help": "build with the userparams.h in this folder; default: build/tune/NAME, "
+                                                       f"written by make tune MOTOR=NAME{own}"}),
             ("motor", {"help": "motor file instead of the scenario's: a name in tuning/motors or a path"}),
             ("library", {"type": Path, "help": "a libvboard.so to use instead of building one"}),
             ("out", {"type": Path, "help": f"result folder, replaced when the run is complete; default build/run/{folder}, with the names "

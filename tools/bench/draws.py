@@ -3,6 +3,7 @@
 A kind of series is a subclass of Series with what is its own. Each case that is over has its line in the folder OUT.part."""
 
 import argparse
+import functools
 import json
 import os
 import shutil
@@ -115,7 +116,7 @@ class Series:
         target = options.out or paths.ROOT / "build" / cls.name / folder
         if options.case and len(items) == 1:
             return series.run_alone(items[0], target)
-        long_run.say(cls.name, [(plan.duration_s, lambda plan=plan, params=params: long_run.reason(plan, params)) for plan, params in series.plans(items)])
+        long_run.say(cls.name, [(plan.duration_s, functools.partial(long_run.reason, plan, params)) for plan, params in series.plans(items)])
         part = Part(target, series.identity(), cls.what)
         return series.finish(items, series.run(items, part, options.quiet), part)
 

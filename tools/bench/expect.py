@@ -366,7 +366,7 @@ class FaultExpectation(Expectation):
         off = _off_row(run.trace, first)
         periods = None if off is None else (off - first) * run.trace.step
         kept = off is not None and _stays_off(run, run.trace, off, self._kept_row(run))
-        thinned = f", of which the trace has every {run.trace.step}th" if run.trace.step > 1 else ""
+        thinned = f", of which the trace has one of {run.trace.step}" if run.trace.step > 1 else ""
         got = "never" if periods is None else f"{periods} periods{thinned}" + ("" if kept else ", on again later")
         origin = "cause" if self.from_cause else "fault"
         return Outcome(f"{title}: outputs off", kept and periods is not None and periods <= self.outputs_off_within_periods, got,

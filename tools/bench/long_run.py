@@ -29,7 +29,8 @@ def _parts(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: flo
     if slope:
         slowed_rpm = 0.0 if coast_s_per_rpm * slope > 1.0 else down_rpm
         yield (up_rpm + slowed_rpm) / slope, f"are ramps of the speed, SPEEDREFRAMP_RPM_PER_S = {slope:g} in the header: raise it"
-        yield (down_rpm - slowed_rpm) * coast_s_per_rpm, "is a rotor that only friction slows: give the motor a load, or the board a supply that takes energy back"
+        yield (down_rpm - slowed_rpm) * coast_s_per_rpm, \
+            "is a rotor that only friction slows: give the motor a load, or the board a supply that takes energy back"
     if hz:
         yield len(speeds) * SETTLE_PERIODS / hz, f"is for the speed to settle, SPEED_BANDWIDTH_HZ = {hz:g} in the header: raise it"
     if presses and "LOCK_TIME" in params:

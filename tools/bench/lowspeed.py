@@ -98,13 +98,14 @@ class LowSpeed(sweep.Sweep):
 
     def more(self, rows: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
         self.lowest = self.find_lowest(rows)
-        return {"lowest": [{"torque_nm": torque, "lowest_rpm": None if found.fails_at_once else found.good, "fails_at_rpm": found.bad, "why": found.why}
-                           for torque, found in self.lowest.items()]}
+        return {"lowest": [{"torque_nm": torque, "lowest_rpm": None if found.fails_at_once else found.good, "fails_at_rpm": found.bad,
+                            "why": found.why} for torque, found in self.lowest.items()]}
 
     def find_lowest(self, known: list[dict[str, Any]]) -> dict[float, search.Search]:
         """By torque, downwards from the table's highest speed. `known`: the table's own rows."""
         table = self.table
-        searches = {self.torque_nm(torque): search.Search(False, lambda row: row["verdict"] == "ok", max(table.speeds_rpm)) for torque in table.torques_nm}
+        searches = {self.torque_nm(torque): search.Search(False, lambda row: row["verdict"] == "ok", max(table.speeds_rpm))
+                    for torque in table.torques_nm}
         for row in known:
             searches[row["torque_nm_set"]].narrow(row["reference_rpm"], row)
         first = [(torque, rpm) for rpm, torque in itertools.product(table.below(), searches)]

@@ -77,8 +77,8 @@ def _drawn(run: Run, starts: np.ndarray, widths: np.ndarray) -> list[tuple[str, 
         part = Trace(run.trace.names, run.trace.time_s[rows], run.trace.data[:, rows])
         blocks.append([(title, unit, [replace(curve, values=_lowest_and_highest(curve.values, starts[first:end] - from_row, widths[first:end]))
                                       for curve in curves]) for title, unit, curves in _panels(run, part) if curves])
-    return [(title, unit, [replace(curve, values=np.concatenate([block[panel][2][line].values for block in blocks])) for line, curve in enumerate(curves)])
-            for panel, (title, unit, curves) in enumerate(blocks[0])]
+    return [(title, unit, [replace(curve, values=np.concatenate([block[panel][2][line].values for block in blocks]))
+                           for line, curve in enumerate(curves)]) for panel, (title, unit, curves) in enumerate(blocks[0])]
 
 
 def _stretches(run: Run, most: int) -> tuple[np.ndarray, np.ndarray]:

@@ -80,7 +80,7 @@ class Rated(sweep.Sweep):
     def add_command(cls, commands: Any) -> argparse.ArgumentParser:
         parser = commands.add_parser(cls.name, help=cls.about)
         parser.add_argument("--motor", nargs="+", metavar="NAME", help="these motors only: names in tuning/motors or paths")
-        command_common.add_options(parser, cls.name, "build/tune/NAME, written by make tune MOTOR=NAME", without=("motor", "library"))
+        command_common.add_options(parser, cls.name, "", ("motor", "library"))
         parser.set_defaults(command=cls.command)
         return parser
 
@@ -118,7 +118,8 @@ class Rated(sweep.Sweep):
 
     def row(self, item: tuple[Candidate, Row], job: simulate.Job, result: dict[str, Any]) -> dict[str, Any]:
         row = item[1]
-        return {"motor": item[0].motor.name, "row": row.name, "name": f"  {row.name}", "reference_rpm": row.rpm, "torque_nm_set": row.torque_nm, **result}
+        return {"motor": item[0].motor.name, "row": row.name, "name": f"  {row.name}", "reference_rpm": row.rpm, "torque_nm_set": row.torque_nm,
+                **result}
 
     def verdict(self, item: Any, row: dict[str, Any]) -> str:
         table, closed, speed = self.table, row["closed_after_s"], case.speed_verdict(row, self.table.error_percent)

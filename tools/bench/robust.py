@@ -206,8 +206,9 @@ class Robust(sweep.Sweep):
         got = row["verdict"] + "".join(f", {text} {row[key]:{form}}" for text, key, form in (
             ("error", "speed_error_percent", "+.2f"), ("angle error", "angle_error_rms_deg", ".1f"), ("volts needed", "need_voltage_v", ".2f"),
             ("volts there", "voltage_limit_v", ".2f")) if row[key] is not None)
-        return [Outcome(f"{row['case']}, {row['reference_rpm']:.0f} rpm, {row['load']}", row["verdict"] in ("ok", reach.BEYOND), got,
-                        f"starts and runs, error {self.table.error_percent:g} %, angle error {row['angle_limit_deg']:.1f} deg RMS")] if item[0].promised else []
+        allowed = f"starts and runs, error {self.table.error_percent:g} %, angle error {row['angle_limit_deg']:.1f} deg RMS"
+        name = f"{row['case']}, {row['reference_rpm']:.0f} rpm, {row['load']}"
+        return [Outcome(name, row["verdict"] in ("ok", reach.BEYOND), got, allowed)] if item[0].promised else []
 
     def head(self) -> dict[str, Any]:
         return super().head() | {"speed_rpm": self.rpm(self.table.margin_speed_percent), "torque_nm": self.torque_nm(True),
@@ -229,7 +230,8 @@ class Robust(sweep.Sweep):
                            in itertools.product(PARAMETERS, CRITERIA, (False, True))})
 
         def tried(number: int, wanted: list[tuple[Any, float]]) -> list[dict[str, Any]]:
-            found = self.run([(deviation_of(name, factor), loaded, self.table.margin_speed_percent) for (name, loaded), factor in wanted], f"margins {number}")
+            cases = [(deviation_of(name, factor), loaded, self.table.margin_speed_percent) for (name, loaded), factor in wanted]
+            found = self.run(cases, f"margins {number}")
             margins.rows.extend(row | {"parameter": name, "factor": factor} for ((name, _), factor), row in zip(wanted, found))
             return found
         first = [((name, loaded), factor) for factor in sorted(ladder(self.table), key=lambda factor: abs(math.log(factor)))

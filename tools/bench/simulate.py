@@ -73,8 +73,10 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
         for name, count in expectation.variables().items():
             variables[name] = max(count, variables.get(name, 0))
     _check_signals(signals, library, scenario)
-    why = long_run.reason(scenario, params, (rating or rating_of(motor, board)).coast_s_per_rpm) if scenario.duration_s > long_run.LONG_S else ""
-    return Job(scenario, library.path, values, actions, signals, variables, parameters or {}, why)
+    job = Job(scenario, library.path, values, actions, signals, variables, parameters or {})
+    if scenario.duration_s > long_run.LONG_S:
+        job.long = long_run.reason(scenario, params, (rating or rating_of(motor, board)).coast_s_per_rpm)
+    return job
 
 
 def rating_of(motor: board_keys.Part, board: board_keys.Part) -> scenarios.Rating:

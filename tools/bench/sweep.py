@@ -13,10 +13,14 @@ from tools.common.board_keys import Part
 from tools.common.errors import UserError
 from tools.common.progress import Progress
 from tools.common.toml_file import Document
+from tools.common.trace import MOST_ROWS
 from . import case, command_common, long_run, report, simulate
 from .board import Library
 from .expect import Outcome
 from .run import Run
+
+QUICKEST_HZ = 40e3
+"""Rows a second of motor time, at most."""
 
 
 def within(minimum: float, maximum: float = float("inf")) -> Any:
@@ -192,8 +196,14 @@ class Sweep:
         return parser
 
 
+def side_by_side(jobs: list[simulate.Job]) -> int:
+    """How many of the jobs may run at once: as many as there are processors, but of long ones only two, for their traces take 0.3 GB each."""
+    rows = min(MOST_ROWS, max((job.scenario.duration_s for job in jobs), default=0.0) * QUICKEST_HZ)
+    return max(1, min(workers.processors(), int(2 * MOST_ROWS / max(rows, 1.0))))
+
+
 def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any]) -> list[Any]:
-    """What `work` makes of each job, in order; side by side."""
+    """What `work` makes of each job, in order."""
     long_run.say(title, [(job.scenario.duration_s, lambda job=job: job.long) for job in jobs])
     with Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
-        return workers.run_all(jobs, work, progress)
+        return workers.run_all(jobs, work, progress, side_by_side(jobs))

@@ -33,6 +33,11 @@ class _Running:
 Report = Callable[[float], None]
 
 
+def processors() -> int:
+    """Those that this program may use."""
+    return (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()) or 1
+
+
 def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Report, processes: int | None = None) -> list[Any]:
     """Results of work(job, report) for every job, in order, with at most `processes` at a time (default: one per processor).
 
@@ -40,7 +45,7 @@ def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Repor
     raised here; a process that dies is an error too. Whatever happens, no process is left behind.
     """
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    limit = processes or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()) or 1
+    limit = processes or processors()
     results: list[Any] = [None] * len(jobs)
     waiting = list(enumerate(jobs))[::-1]
     running: dict[Any, _Running] = {}
