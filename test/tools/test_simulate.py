@@ -117,14 +117,17 @@ def test_a_long_recording_keeps_every_third_row_then_every_ninth_and_never_more_
 
 @pytest.mark.parametrize("values, said", [
     ({}, "about 2480 s of it are ramps of the speed, SPEEDREFRAMP_RPM_PER_S = 2.5 in the header: raise it"),
-    ({"SPEEDREFRAMP_RPM_PER_S": 1000.0}, "about 2989 s of it are its own waits and stretches: change the times of test"),
+    ({"SPEEDREFRAMP_RPM_PER_S": 1000.0}, "about 2989 s of it are its own waits and stretches: change the times of "),
     ({"SPEEDREFRAMP_RPM_PER_S": 1000.0, "SPEED_BANDWIDTH_HZ": 0.004}, "about 2500 s of it is for the speed to settle, SPEED_BANDWIDTH_HZ = 0.004 in the header"),
     ({"SPEEDREFRAMP_RPM_PER_S": 1000.0, "LOCK_TIME": 6e7}, "about 3000 s of it are starts, in the header LOCK_TIME: lower it")])
 def test_a_long_run_names_what_takes_most_of_it_and_the_key_to_change(values, said):
     item = scenario("[[event]]\nat_s = 0.0\nspeed_rpm = 3200\n[[event]]\nat_s = 0.1\npress = \"S2\"\n[[event]]\nat_s = 1.5\nspeed_rpm = 6300\n")
     params = {"SPEEDREFRAMP_RPM_PER_S": 2.5, "SPEED_BANDWIDTH_HZ": 2.0, "END_SPEED_RPM": 100.0, "LOCK_TIME": 4000.0, "LOOPTIME_SEC": 50e-6,
               "NOPOLESPAIRS": 5.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 10.0}
-    assert said in long_run.reason(replace(item, duration_s=3000.0), params | values)
+    told = long_run.reason(replace(item, duration_s=3000.0), params | values)
+    assert said in told and (" waits " not in told or told.endswith("test.toml"))
+    sweeps_own = long_run.reason(replace(item, events=[replace(event, where="tables/x.toml") for event in item.events], duration_s=9000.0), params)
+    assert sweeps_own.endswith("its own waits and stretches: change the times of tables/x.toml")
 
 
 def test_a_long_run_says_so_before_it_begins_and_its_whole_report_takes_little_memory(tmp_path):

@@ -14,7 +14,8 @@ def reason(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: flo
     """What takes most of a run, with its key. The scenario is in numbers."""
     parts = list(_parts(scenario, params, coast_s_per_rpm))
     own_s = scenario.duration_s - sum(seconds for seconds, _ in parts)
-    seconds, text = max([*parts, (own_s, f"are its own waits and stretches: change the times of {scenario.name}")])
+    file = next((event.where for event in scenario.events), scenario.name).partition(" line ")[0]
+    seconds, text = max([*parts, (own_s, f"are its own waits and stretches: change the times of {file}")])
     return f"about {min(seconds, scenario.duration_s):.0f} s of it {text}"
 
 
@@ -23,7 +24,7 @@ def _parts(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: flo
     presses = [event.at_s for event in scenario.events if event.kind == "press" and event.button == "S2"]
     speeds = [event.value for event in scenario.events if event.kind == "speed_rpm"] or [0.0]
     speeds += [0.0] * (len(presses) > 1)
-    first_rpm = max(speeds[0] - params.get("END_SPEED_RPM", 0.0), 0.0)
+    first_rpm = abs(abs(speeds[0]) - params.get("END_SPEED_RPM", 0.0))
     up_rpm, down_rpm = first_rpm + sum(max(b - a, 0.0) for a, b in pairwise(speeds)), sum(max(a - b, 0.0) for a, b in pairwise(speeds))
     slope, hz = params.get("SPEEDREFRAMP_RPM_PER_S", 0.0), params.get("SPEED_BANDWIDTH_HZ", 0.0)
     if slope:
