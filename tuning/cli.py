@@ -123,4 +123,4 @@ def _motors(options: argparse.Namespace) -> int:
     tuned, _ = _tune_each(paths.names(paths.MOTORS), argparse.Namespace(**vars(options) | {"out": None}), True,
                           lambda name, error: refused.update({name: str(error)}))
     out = options.out or rating_sweep.results("motors", None, command_common.board_asked_for(options))
-    return rating_sweep.command(argparse.Namespace(**vars(options) | {"motor": tuned, "refused": refused, "userparams": None, "out": out}))
+    return rating_sweep.Rated.command(argparse.Namespace(**vars(options) | {"motor": tuned, "refused": refused, "userparams": None, "out": out}))

@@ -10,7 +10,7 @@ import numpy as np
 from tools.bench import build
 from tools.bench.board import Board, Library
 from tools.bench.panel import Ranges
-from tools.bench.sweep import start_time_s
+from tools.bench.scenario import start_time_s
 from tools.common import paths
 from tools.common.errors import UserError
 from tools.common.trace import wrapped_deg

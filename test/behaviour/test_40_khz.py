@@ -5,7 +5,7 @@ import pytest
 from pytest import approx
 from support import command
 
-from tools.bench import build, cli, command_common, report, scenario_file, simulate, sweep, table2
+from tools.bench import build, cli, command_common, report, scenario_file, simulate, table2
 from tools.common import board_file, motor_file, paths
 from tools.common.param_rows import duties_are_late, slow_periods
 from tuning import design, header, loops
@@ -70,8 +70,8 @@ def test_rows_of_table_2_hold(folder):
     """The slowest one under the largest load, where field weakening begins, and one in it."""
     table = table2.Table.read(paths.TABLES / "table2.toml")
     library = command_common.library_for([], None, folder)
-    rows = [row for row in table2.rows_for(table, library.params["LOOPTIME_SEC"]) if row.reference_rpm in (500.0, 3000.0, 3500.0)]
-    assert [row.more_percent for row in rows] == [5.0, 5.0, 5.0] and not any(row.more_percent for row in table2.rows_for(table, 50e-6))
-    for row in rows:
-        result = sweep.run_cases("table2", [table2.job(table, row, library, motor_file.part(HURST), board_file.part(QUICK))], True)[0]
-        assert [f"{outcome.row}: {outcome.got}" for outcome in table2.check(row, result) if not outcome.ok] == []
+    quick, slow = (table2.Table2(table, motor_file.part(HURST), board_file.part(QUICK), found) for found in (library, command_common.library_for([], None)))
+    rows = [row for row in quick.cases() if row.reference_rpm in (500.0, 3000.0, 3500.0)]
+    assert [row.more_percent for row in rows] == [5.0, 5.0, 5.0] and not any(row.more_percent for row in slow.cases())
+    outcomes = [outcome for row, result in zip(rows, quick.run(rows, "table2")) for outcome in quick.check(row, result)]
+    assert [f"{outcome.row}: {outcome.got}" for outcome in outcomes if not outcome.ok] == []

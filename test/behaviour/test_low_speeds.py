@@ -19,6 +19,5 @@ def test_the_lowest_speed_is_held_with_every_load(name, tmp_path):
     options = argparse.Namespace(motor=name, board="mclv", userparams=str(tmp_path), library=None)
     motor, board, library, _ = command_common.set_up(table, options, ["PARAMS_IN_RAM"])
     table = table.for_motor(values, library.params)
-    bench = lowspeed.Bench(table, motor, board, library)
-    rows = bench.run(list(itertools.product([min(table.speeds_rpm)], table.torques_nm)), name, True)
+    rows = lowspeed.LowSpeed(table, motor, board, library).run(list(itertools.product([min(table.speeds_rpm)], table.torques_nm)), name)
     assert {row["name"]: row["verdict"] for row in rows} == dict.fromkeys([row["name"] for row in rows], "ok") and len(rows) == 3

@@ -7,7 +7,7 @@ import pytest
 
 from tools.bench import campaign, cli, command_common, judge, memory, soak, trial
 from tools.bench.board import Library
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, motor_file, paths, workers
 
 HURST = "hurst_dmb0224c10002"
 CASES = 60
@@ -52,4 +52,4 @@ def test_a_fault_during_the_soak_is_found(key, worse):
 
     def work(item, tell):
         return soak.row_of(item, soak.run(item, benches, tell), 2800.0)["verdict"]
-    assert campaign.workers.run_all([segment], work, lambda seconds: None)[0] != soak.OK
+    assert workers.run_all([segment], work, lambda seconds: None)[0] != soak.OK

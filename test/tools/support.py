@@ -1,7 +1,9 @@
 """What the front end's tests share: scenario texts, made-up traces and runs, and calls of the command line."""
 
 import contextlib
+import csv
 import io
+import json
 import re
 import tempfile
 from pathlib import Path
@@ -81,6 +83,20 @@ def command(*arguments: str, main=cli.main) -> tuple[int, str, str]:
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
         code = main(list(arguments))
     return code, out.getvalue(), error.getvalue()
+
+
+def small_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, **changes: str) -> tuple[int, str, str, dict, list[dict]]:
+    """A sweep with a smaller table: exit code, stdout, stderr, summary and rows of the CSV file; its folder is tmp_path/out."""
+    lines = (paths.TABLES / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    lines = [f"{key} = {changes.pop(key)}" if (key := line.split(" = ")[0]) in changes else line for line in lines]
+    assert not changes
+    (tmp_path / "tables").mkdir()
+    (tmp_path / f"tables/{name}.toml").write_text("\n".join(lines), encoding="utf-8")
+    monkeypatch.setattr(paths, "TABLES", tmp_path / "tables")
+    code, out, error = command(name, "--out", str(tmp_path / "out"), "--quiet")
+    data = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    with (tmp_path / f"out/{name}.csv").open(encoding="utf-8") as file:
+        return code, out, error, data, list(csv.DictReader(file))
 
 
 def refusal(call, *parts: str) -> str:

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from support import FAULTS, LIBRARY, MOTORS, command, trace
 
-from tools.bench import campaign, injection, judge, memory, trial
+from tools.bench import campaign, draws, injection, judge, memory, trial
 from tools.bench.board import Library
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, motor_file, paths, workers
 
 HURST = "hurst_dmb0224c10002"
 CASES = [injection.draw(1, number, list(MOTORS)) for number in range(1, 1001)]
@@ -112,6 +112,12 @@ def test_a_fault_of_the_drive_stops_with_the_right_code_or_with_another():
 def test_a_code_before_the_injection_is_none():
     cleared = {"fw__fault": lambda time_s: np.where(time_s < 0.6, 6.0, 0.0), "fw__state": after(0.6, 5.0, 7.0)}
     assert judge.judge(running(**cleared), running(**cleared), LIMITS).outcome == judge.NO_EFFECT
+
+
+@pytest.mark.parametrize("signals, outcome", [({}, judge.NO_EFFECT), ({"plant__speed_rpm": after(0.6, 900.0, 1000.0)}, judge.SILENT)])
+def test_two_recordings_of_which_one_is_thinned_are_compared_row_by_row(signals, outcome):
+    with_fault, without = running(**signals), running()
+    assert judge.judge(with_fault.thinned(3), without, LIMITS).outcome == judge.judge(with_fault, without.thinned(9), LIMITS).outcome == outcome
 
 
 def test_a_drive_that_cannot_leave_an_earlier_fault_says_so_and_is_not_silent():
@@ -219,7 +225,7 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
 
 
 def test_the_campaigns_header_is_the_tuners_with_a_potentiometer_that_has_live_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr(campaign, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(campaign, "HEADERS", tmp_path / "results")
     header = tmp_path / "motor"
     header.mkdir()
     (header / "userparams.h").write_text("#define OTHER 1\n#define POT_LIVE_ZERO 0.0 /* [1] */\n", encoding="utf-8")
@@ -251,7 +257,7 @@ def test_a_comparison_that_trips_by_itself_is_none():
 # ---- a case on the virtual board ---------------------------------------------------------------------------------------------
 def alone(case, bench):
     """In a process of its own, as the command does it."""
-    return campaign.workers.run_all([case], lambda case, tell: trial.run(case, bench).row(), lambda seconds: None)[0]
+    return workers.run_all([case], lambda case, tell: trial.run(case, bench).row(), lambda seconds: None)[0]
 
 
 def case_of(kind, **more):
@@ -406,13 +412,14 @@ def test_an_interrupted_campaign_goes_on_with_the_cases_that_are_missing(hurst, 
 
 
 def test_a_half_written_line_and_lines_of_another_firmware_are_not_used(tmp_path):
-    part = campaign.Part(tmp_path / "out", {"seed": 1})
+    part = draws.Part(tmp_path / "out", {"seed": 1}, "case")
     assert part.rows() == {}
     part.add(dict.fromkeys(campaign.KEYS, "a \"quoted\", text") | {"case": 3, "after_s": None, "size": 0.5})
-    with (part.folder / campaign.PART_FILE).open("a", encoding="utf-8") as file:
-        file.write('"4","half')
-    assert list(part.rows()) == [3] and part.rows()[3]["why"] == "a \"quoted\", text" and part.rows()[3]["after_s"] is None
-    assert campaign.Part(tmp_path / "out", {"seed": 2}).rows() == {}
+    with (part.folder / draws.PART_FILE).open("a", encoding="utf-8") as file:
+        file.write('{"case": 4, "kind": "half')
+    part.add({"case": 5})
+    assert list(part.rows()) == [3, 5] and part.rows()[3]["why"] == "a \"quoted\", text" and part.rows()[3]["after_s"] is None
+    assert draws.Part(tmp_path / "out", {"seed": 2}, "case").rows() == {}
 
 
 def test_the_worst_are_the_silent_ones_one_of_each_kind_first_then_the_slowest_stops():

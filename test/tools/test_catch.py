@@ -1,15 +1,14 @@
 """Flying starts and stops without a sink: what is drawn, what is measured of a run, and what makes a row fail."""
 
-import csv
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import LIBRARY, command, run, step, trace
+from support import LIBRARY, run, small_sweep, step, trace
 
 from tools.bench import catch_sweep
 from tools.bench.board import Library
+from tools.bench.catch_sweep import Case
 from tools.common import board_file, motor_file, paths
 
 HURST, LINIX = "hurst_dmb0224c10002", "linix_45zwn24_40"
@@ -42,26 +41,28 @@ def test_a_motor_whose_winding_takes_longer_for_the_rotor_s_energy_gets_that_tim
     assert heavy.settle_s == pytest.approx(TABLE.settle_s + 19.0 * energy_j / most_w, rel=0.02)
 
 
+CATCH = catch_sweep.Catch(TABLE, motor_file.part(HURST), board_file.part("mclv"), Library(LIBRARY))
+
+
 def cases(rpm=2000.0, inertia=9.0):
     """A start and a stop of the project's own motor."""
-    room = (Library(LIBRARY), motor_file.part(HURST), board_file.part("mclv"))
-    return catch_sweep.catch_case(TABLE, rpm, 40.0, inertia, *room), catch_sweep.stop_case(TABLE, inertia, 1.66, *room)
+    return Case(rpm, 40.0, inertia), Case(5500.0, None, inertia, 1.66)
 
 
 def test_the_rotor_turns_just_before_the_button_counts_on_a_supply_that_takes_nothing_back():
     start, stop = cases()
-    turned = [(action.at_s, action.keys) for action in start.job.actions if "state.speed_rpm" in action.keys]
+    turned = [(action.at_s, action.keys) for action in CATCH.job(start).actions if "state.speed_rpm" in action.keys]
     assert turned == [(pytest.approx(0.128), {"state.speed_rpm": 2000.0, "state.theta_e_deg": 40.0})]
     for item in (start, stop):
-        assert item.job.values["supply.sinks"] == 0.0
-        assert item.job.values["mech.inertia_kgm2"] == pytest.approx(9.0 * motor_file.load(HURST).inertia_kgm2)
-        assert item.most_a == pytest.approx(1.1 * 2.75)
-    assert (start.bus_v, stop.bus_v, stop.rpm) == (34.0, 30.0, 5500.0)
+        assert CATCH.job(item).values["supply.sinks"] == 0.0
+        assert CATCH.job(item).values["mech.inertia_kgm2"] == pytest.approx(9.0 * motor_file.load(HURST).inertia_kgm2)
+    assert CATCH.most_a == pytest.approx(1.1 * 2.75) and (CATCH.bus_v(start), CATCH.bus_v(stop)) == (34.0, 30.0)
+    assert [item.rpm for item in CATCH.cases()[60:]] == [5500.0] * 3
 
 
 def test_a_rotor_heavier_than_the_header_s_turns_at_the_start_of_a_stop_and_the_bare_one_stands():
     for inertia, turned in ((1.0, []), (9.0, [(pytest.approx(0.128), {"state.speed_rpm": 1500.0})])):
-        assert [(action.at_s, action.keys) for action in cases(inertia=inertia)[1].job.actions if "state.speed_rpm" in action.keys] == turned
+        assert [(action.at_s, action.keys) for action in CATCH.job(cases(inertia=inertia)[1]).actions if "state.speed_rpm" in action.keys] == turned
 
 
 # ---- what is measured ----------------------------------------------------------------------------------------------------
@@ -105,26 +106,15 @@ ROW = {"fault": None, "current_max_a": 2.0, "bus_max_v": 29.0, "stop_s": 1.5, "c
     (False, {"speed_error_percent": -1.1}, "speed")])
 def test_each_way_to_fail_is_named(stop, changes, text):
     item, row = cases()[stop], ROW | changes
-    assert catch_sweep.verdict(item, row) == text
-    outcome = catch_sweep.check(item, row | {"verdict": text})
+    assert CATCH.verdict(item, row) == text
+    outcome, = CATCH.check(item, row | {"verdict": text})
     assert outcome.ok == (text == "ok") and outcome.got.startswith(text)
     assert outcome.row == ("stop from 5500 rpm, inertia x9" if stop else "start at 2000 rpm, inertia x9")
 
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
 def test_some_starts_and_a_stop_in_full(tmp_path, monkeypatch):
-    text = (paths.TABLES / "catch.toml").read_text(encoding="utf-8")
-    for old, new in (("count = 60", "count = 4"), ("inertia_factors = [1, 9, 36]", "inertia_factors = [9]"), ("stop_factors = [1, 9, 36]", "stop_factors = [9]"),
-                     ("stop_s = [1.66, 1.66, 1.66]", "stop_s = [1.66]")):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "tables").mkdir()
-    (tmp_path / "tables/catch.toml").write_text(text, encoding="utf-8")
-    monkeypatch.setattr(paths, "TABLES", tmp_path / "tables")
-    code, out, error = command("catch", "--out", str(tmp_path / "out"), "--quiet")
+    code, out, error, data, rows = small_sweep(tmp_path, monkeypatch, "catch", count="4", inertia_factors="[9]", stop_factors="[9]", stop_s="[1.66]")
     assert (code, error) == (0, ""), out
-    data = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
-    with (tmp_path / "out/catch.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
     assert data["passed"] and [row["verdict"] for row in rows] == ["ok"] * 5
     assert np.max([float(row["control_s"]) for row in rows[:4]]) < 0.1 and rows[4]["control_s"] == "" and 1.0 < float(rows[4]["stop_s"]) < 1.66

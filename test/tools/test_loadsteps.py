@@ -1,20 +1,17 @@
 """Load steps and low speed: what is asked of a motor, what is out of its reach, and what makes a row fail."""
 
-import csv
 import itertools
-import json
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import LIBRARY, command, run, step
+from support import LIBRARY, run, small_sweep, step
 
-from tools.bench import loadsteps, lowspeed, plots, reach, simulate, sweep
+from tools.bench import case, loadsteps, lowspeed, plots, reach, simulate
 from tools.bench.board import Library
 from tools.bench.build import library
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, motor_file, paths, workers
 from tools.common.errors import UserError
 
 HURST, LINIX = "hurst_dmb0224c10002", "linix_45zwn24_40"
@@ -66,19 +63,19 @@ def test_27_steps_are_asked_for_and_another_motor_gets_the_same_shares_of_its_ra
     assert (other.dip_percent, other.unloaded_rpm, other.back_s) == ([], [], STEPS.back_s)
 
 
-def a_case(torque_nm=0.08, kphi=1.0, rpm=1190.0, table=STEPS):
-    return loadsteps.case(table, rpm, torque_nm, kphi, Library(LIBRARY), motor_file.part(HURST), board_file.part("mclv"))
+def steps(**changes):
+    return loadsteps.LoadSteps(replace(STEPS, **changes), motor_file.part(HURST), board_file.part("mclv"), Library(LIBRARY))
 
 
 def test_the_brake_closes_and_opens_in_one_step_on_a_plant_whose_flux_the_header_does_not_know():
-    item, motor = a_case(kphi=0.8), motor_file.load(HURST)
-    brakes = [(action.at_s, action.keys["load.constant_nm"]) for action in item.job.actions if "load.constant_nm" in action.keys]
-    assert brakes[-2:] == [(item.on_s, 0.08), (item.off_s, 0.0)] and {torque for _, torque in brakes[:-2]} == {0.0}
-    assert item.job.values["motor.psi_vs"] == pytest.approx(0.8 * motor.psi_vs)
-    assert item.scenario.duration_s == pytest.approx(item.off_s + STEPS.hold_s)
-    most_nm = 0.85 * item.current_max_a * 0.8 * 1.5 * motor.pole_pairs * motor.psi_vs
-    strong = replace(STEPS, torques_nm=[0.5, 1.0]) # no more than the current gives
-    found = [a_case(torque, 0.8, table=strong).torque_nm for torque in strong.torques_nm]
+    job, motor = steps().job(loadsteps.Case(1190.0, 0.08, 0.8)), motor_file.load(HURST)
+    brakes = [(action.at_s, action.keys["load.constant_nm"]) for action in job.actions if "load.constant_nm" in action.keys]
+    on_s = job.scenario.measures[0].from_s
+    assert brakes[-2:] == [(on_s, 0.08), (on_s + STEPS.hold_s, 0.0)] and {torque for _, torque in brakes[:-2]} == {0.0}
+    assert job.values["motor.psi_vs"] == pytest.approx(0.8 * motor.psi_vs)
+    assert job.scenario.duration_s == pytest.approx(on_s + 2.0 * STEPS.hold_s)
+    most_nm = 0.85 * 2.75 * 0.8 * 1.5 * motor.pole_pairs * motor.psi_vs # no more than the current gives
+    found = [item.torque_nm for item in steps(torques_nm=[0.5, 1.0], speeds_rpm=[1190.0], kphi_factors=[0.8]).cases()]
     assert found == pytest.approx([0.5 * most_nm, most_nm], rel=0.005)
 
 
@@ -90,15 +87,15 @@ def test_back_is_where_the_speed_stays_within_two_per_cent(speed, back_s):
 
 
 def test_dip_rise_and_angle_are_read_from_the_run():
-    item = SimpleNamespace(table=STEPS, rpm=1000.0, on_s=1.0, off_s=1.5)
-    recorded = run(fw__speed_ref_rpm=1002.0, fw__state=step((0, 4), (0.5, 5)), fw__v_limit_v=13.0,
+    item = loadsteps.Case(1000.0, 0.08, 1.0)
+    recorded = run('[[measure]]\nname = "measured"\nfrom_s = 1.0\nto_s = 2.0\n', fw__speed_ref_rpm=1002.0, fw__state=step((0, 4), (0.5, 5)), fw__v_limit_v=13.0,
                    fw__theta_est_deg=step((0, 0), (1.0, -7)), plant__speed_rpm=step((0, 1001), (0.9, 1003), (1.0, 801.6), (1.1, 1000),
                                                                                         (1.5, 1202.4), (1.55, 1000)))
-    found = loadsteps.measured(item, recorded)
+    found = loadsteps.LoadSteps(replace(STEPS, hold_s=0.5)).measured(recorded, item)
     assert [found[key] for key in ("unloaded_min_rpm", "unloaded_max_rpm", "lowest_rpm", "highest_rpm", "dip_percent", "rise_percent",
                                    "on_back_s", "off_back_s", "angle_error_max_deg", "voltage_limit_v")] == pytest.approx(
         [1001.0, 1003.0, 801.6, 1202.4, 20.0, 20.0, 0.1, 0.05, 7.0, 13.0], rel=1e-3)
-    assert (found["fault"], found["closed"]) == (None, True) and found["drawn"][0][0] == pytest.approx(-0.1, abs=1e-3)
+    assert (found["fault"], found["closed"]) == (None, True) and found["drawn"][0][0] == pytest.approx(-0.05, abs=1e-3)
 
 
 def step_row(**more):
@@ -122,8 +119,8 @@ FIVE = {"reference_rpm": 500.0, "ramped_rpm": 500.0, "torque_nm": 0.05, "unloade
     ({"too_quick": "stops", "lowest_rpm": -9.0, "on_back_s": 0.31}, "step on: not back in 0.3 s")])
 def test_each_way_to_fail_is_named_and_what_is_out_of_reach_must_still_come_back(values, text):
     row = step_row(**values)
-    row["verdict"] = loadsteps.verdict(STEPS, row)
-    outcome = loadsteps.check(STEPS, row)
+    row["verdict"] = loadsteps.LoadSteps(STEPS).verdict(None, row)
+    outcome, = loadsteps.LoadSteps(STEPS).check(None, row)
     assert (row["verdict"], outcome.ok) == (text, text in ("ok", "out of reach"))
     assert ("after the step off" in outcome.allowed) == bool(row["beyond"])
 
@@ -131,7 +128,8 @@ def test_each_way_to_fail_is_named_and_what_is_out_of_reach_must_still_come_back
 def test_the_table_ends_with_the_numbers_of_what_is_out_of_reach():
     rows = [step_row(unloaded="1 .. 2", angle_error_max_deg=3.0, verdict="ok"),
             step_row(unloaded="1 .. 2", angle_error_max_deg=3.0, verdict="out of reach", beyond="needs 14.00 V of 13.00 V")]
-    assert loadsteps.text(rows).endswith("\nx, Kphi x1: needs 14.00 V of 13.00 V") and "friction" not in loadsteps.text(rows[:1])
+    text = loadsteps.LoadSteps(STEPS).text
+    assert text(rows).endswith("\nx, Kphi x1: needs 14.00 V of 13.00 V") and "friction" not in text(rows[:1])
 
 
 # ---- low speed -----------------------------------------------------------------------------------------------------------
@@ -144,14 +142,14 @@ def test_another_motor_gets_the_same_shares_of_its_rating_and_no_speed_below_its
 
 
 def slow_bench(defines=()):
-    return lowspeed.Bench(SLOW, motor_file.part(HURST), board_file.part("mclv"), Library(library(list(defines)) if defines else LIBRARY))
+    return lowspeed.LowSpeed(SLOW, motor_file.part(HURST), board_file.part("mclv"), Library(library(list(defines)) if defines else LIBRARY))
 
 
 def test_150_to_500_rpm_are_asked_for_in_ten_seconds_and_the_header_s_minimum_is_lowered_where_it_is_above():
     assert (min(SLOW.speeds_rpm), max(SLOW.speeds_rpm), SLOW.torques_nm, SLOW.measure_s) == (150.0, 500.0, [0.0, 0.03, 0.08], 10.0)
     bench = slow_bench()
     header = bench.library.params["MINIMUM_SPEED_RPM"]
-    slow, quick = bench.job(0.5 * header, 0.03), bench.job(2.0 * header, 0.03)
+    slow, quick = bench.job((0.5 * header, 0.03)), bench.job((2.0 * header, 0.03))
     assert (slow.parameters, quick.parameters) == ({"MINIMUM_SPEED_RPM": 0.5 * header}, {})
     pots = [action.keys["input.pot"] for action in slow.actions if "input.pot" in action.keys]
     assert pots[-1] == pytest.approx(0.0, abs=1e-3) # the potentiometer's zero is that speed
@@ -161,13 +159,13 @@ def test_150_to_500_rpm_are_asked_for_in_ten_seconds_and_the_header_s_minimum_is
 
 
 def test_a_parameter_changes_at_power_up_in_a_firmware_that_keeps_them_in_ram_only():
-    job = slow_bench(("PARAMS_IN_RAM",)).job(100.0, 0.0)
+    job = slow_bench(("PARAMS_IN_RAM",)).job((100.0, 0.0))
     job.actions, job.scenario.duration_s = [], 0.01
-    found = sweep.workers.run_all([job], _minimum, lambda seconds: None)
+    found = workers.run_all([job], _minimum, lambda seconds: None)
     assert found == [pytest.approx(100.0)]
     with pytest.raises(UserError, match="MINIMUM_SPEED_RPM cannot change in this firmware: build it with PARAMS_IN_RAM"):
-        fixed = slow_bench().job(100.0, 0.0)
-        sweep.workers.run_all([fixed], _minimum, lambda seconds: None)
+        fixed = slow_bench().job((100.0, 0.0))
+        workers.run_all([fixed], _minimum, lambda seconds: None)
 
 
 def _minimum(job, report):
@@ -189,53 +187,40 @@ def slow_row(**more):
     ({"angle_error_rms_deg": 8.1}, "angle")])
 def test_each_way_not_to_hold_a_low_speed_is_named(values, text):
     row = slow_row(**values)
-    assert lowspeed.verdict(SLOW, row) == text
-    assert lowspeed.check(SLOW, row | {"verdict": text}).ok == (text == "ok")
+    assert lowspeed.LowSpeed(SLOW).verdict(None, row) == text
+    assert lowspeed.LowSpeed(SLOW).check(None, row | {"verdict": text})[0].ok == (text == "ok")
 
 
 def test_the_speed_is_compared_with_the_reference_that_the_firmware_had():
     text = "[[event]]\nat_s = 0.1\npress = \"S2\"\n[[measure]]\nname = \"measured\"\nfrom_s = 0.5\nto_s = 1.0\nreference_rpm = 150\n"
     recorded = run(text, fw__speed_ref_rpm=152.0, plant__speed_rpm=151.24, fw__state=step((0, 4), (0.3, 5)), pwm__outputs_seen=63)
-    found = lowspeed.measured(recorded)
+    found = lowspeed.LowSpeed(SLOW).measured(recorded, (150.0, 0.0))
     assert (found["asked_rpm"], found["speed_error_percent"]) == pytest.approx((152.0, -0.5), abs=1e-3)
 
 
 def test_how_low_it_goes_is_found_for_each_torque_and_what_happens_below_is_told():
     limits, seen = {0.0: 70.0, 0.03: 600.0, 0.08: 0.0}, []
 
-    class FakeBench(lowspeed.Bench):
-        def run(self, cases, title, quiet):
+    class FakeBench(lowspeed.LowSpeed):
+        def run(self, cases, title):
             seen.extend(cases)
             return [{"reference_rpm": rpm, "torque_nm_set": torque, "verdict": "ok" if rpm > limits[torque] else "angle"}
                     for rpm, torque in cases]
 
     bench = FakeBench(*(getattr(slow_bench(), name) for name in ("table", "motor", "board", "library")))
-    known = bench.run(list(itertools.product(SLOW.speeds_rpm, limits)), "", True)
+    known = bench.run(list(itertools.product(SLOW.speeds_rpm, limits)), "")
     seen.clear()
-    found = lowspeed.find_lowest(bench, known, True)
+    bench.lowest = found = bench.find_lowest(known)
     assert 70.0 < found[0.0].good <= 70.0 * 1.041 and found[0.08].good == 50.0 and len(set(seen)) == len(seen)
-    lines = lowspeed.lowest_text(found).splitlines()
+    lines = bench.text([slow_row()]).splitlines()[-3:]
     assert lines[0].startswith("0 N m is held down to 7") and lines[0].endswith(": angle)")
     assert lines[1] == "0.03 N m is held not at all (at 500 rpm: angle)"
     assert lines[2] == "0.08 N m is held down to 50 rpm (the search ended there)"
 
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
-def small(tmp_path, monkeypatch, name, **changes):
-    """Run a command with a smaller table."""
-    text = (paths.TABLES / f"{name}.toml").read_text(encoding="utf-8")
-    lines = [f"{key} = {changes[key]}" if (key := line.split(" = ")[0]) in changes else line for line in text.splitlines()]
-    (tmp_path / "tables").mkdir()
-    (tmp_path / f"tables/{name}.toml").write_text("\n".join(lines), encoding="utf-8")
-    monkeypatch.setattr(paths, "TABLES", tmp_path / "tables")
-    code, out, error = command(name, "--out", str(tmp_path / "out"), "--quiet")
-    data = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
-    with (tmp_path / f"out/{name}.csv").open(encoding="utf-8") as file:
-        return code, out, error, data, list(csv.DictReader(file))
-
-
 def test_load_steps_in_full(tmp_path, monkeypatch):
-    code, out, error, data, rows = small(tmp_path, monkeypatch, "loadsteps", speeds_rpm="[1190, 2500]", torques_nm="[0.08]",
+    code, out, error, data, rows = small_sweep(tmp_path, monkeypatch, "loadsteps", speeds_rpm="[1190, 2500]", torques_nm="[0.08]",
                                          kphi_factors="[1.0]")
     assert (code, error, data["passed"]) == (0, "", True), out
     assert [item["verdict"] for item in rows] == ["ok", "out of reach"] and "needs 1" in out
@@ -244,7 +229,7 @@ def test_load_steps_in_full(tmp_path, monkeypatch):
 
 
 def test_low_speed_in_full(tmp_path, monkeypatch):
-    code, out, error, data, rows = small(tmp_path, monkeypatch, "lowspeed", speeds_rpm="[400]", torques_nm="[0.03]", measure_s="0.5",
+    code, out, error, data, rows = small_sweep(tmp_path, monkeypatch, "lowspeed", speeds_rpm="[400]", torques_nm="[0.03]", measure_s="0.5",
                                          lowest_rpm="300", ratio="1.3")
     assert (code, error, [item["verdict"] for item in rows]) == (0, "", ["ok"]), out
     assert "0.03 N m is held down to 300 rpm (the search ended there)" in out

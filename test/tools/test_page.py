@@ -53,6 +53,15 @@ def test_a_rising_curve_rises_and_a_falling_one_falls():
         assert np.all(sign * np.diff(curves["speed", "true"]) > 0.0)
 
 
+def test_a_long_run_drawn_block_by_block_looks_the_same(monkeypatch):
+    item = run(plant__speed_rpm=lambda t: 1000.0 * np.sin(9.0 * t), fw__state=step((0, 4), (1.0, 5)), fw__v_q_v=lambda t: 5.0 * t, pwm__outputs_seen=63)
+    for stretches in (130, picture.RUN_STRETCHES):
+        monkeypatch.setattr(picture, "BLOCK_ROWS", 100_000)
+        whole = picture.of(item, stretches)
+        monkeypatch.setattr(picture, "BLOCK_ROWS", 999)
+        assert picture.of(item, stretches) == whole
+
+
 def test_a_hand_over_and_a_fault_are_there_in_full():
     item = run(fw__state=step((0, 4), (1.0, 5), (1.5, 7)), fw__fault=step((0, 0), (1.5, 6)), pwm__outputs_seen=63)
     _, times, _ = decoded(picture.of(item, picture.RUN_STRETCHES))

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 from support import MOTORS, command, refusal, refused, run, step
 
-from tools.bench import plots, rating_sweep, scenario, sweep
-from tools.bench.rating_sweep import Candidate, Table
+from tools.bench import case, plots, rating_sweep, scenario
+from tools.bench.rating_sweep import Candidate, Rated, Table
 from tools.common import motor_file, paths
 from tools.common.errors import UserError
 
@@ -31,7 +31,7 @@ def row(**more):
 def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_torque_of_the_rating_and_the_header_s_maximum():
     assert (TABLE.speeds_percent, TABLE.torque_percent, TABLE.error_percent) == ([20.0, 50.0, 100.0], 50.0, 0.5)
     motor = motor_file.load(HURST)
-    rows = rating_sweep.rows_of(TABLE, Candidate(motor, None, None, "", SimpleNamespace(params=PARAMS)))
+    rows = Rated(TABLE).rows_of(Candidate(motor, None, None, "", SimpleNamespace(params=PARAMS)))
     half, rated_rpm = 0.5 * motor.rated_torque_nm, pytest.approx(motor.rated_speed_rpm)
     assert [(item.name, item.torque_nm) for item in rows] == [("20 %", half), ("50 %", half), ("100 %", half), ("maximum", 0.0)]
     assert [rows[0].rpm / 0.2, rows[1].rpm / 0.5, rows[2].rpm, rows[3].rpm] == [rated_rpm, rated_rpm, rated_rpm, 5500.0]
@@ -45,29 +45,29 @@ def test_20_50_and_100_per_cent_are_asked_for_within_half_a_per_cent_at_half_tor
     ({"current_of_maximum_percent": 100.1}, "current"),
     ({"speed_error_percent": -2.0, "limited_percent": {"VOLTAGE": 100.0}}, "speed -2.0 % (VOLTAGE 100 %)")])
 def test_each_way_to_fail_is_named(values, text):
-    assert rating_sweep.verdict(TABLE, row(**values)) == text
-    assert rating_sweep.check(TABLE, row(verdict=text))[0].ok == (text == "ok")
+    assert Rated(TABLE).verdict(None, row(**values)) == text
+    assert Rated(TABLE).check(None, row(verdict=text))[0].ok == (text == "ok")
 
 
 def test_a_failed_row_names_motor_row_and_numbers_and_what_was_reached_without_load_is_told():
     for rpm, text in ((5432.1, "without load up to 5432 rpm (MAXIMUM_SPEED_RPM 5500)"), (None, "no closed loop without load")):
         assert rating_sweep.highest_text([row(highest_rpm=rpm, reference_rpm=5500.0)]) == text
-    outcome = rating_sweep.check(TABLE, row(verdict="angle", angle_error_rms_deg=12.0))[0]
+    outcome = Rated(TABLE).check(None, row(verdict="angle", angle_error_rms_deg=12.0))[0]
     assert outcome.row == "m at 50 %" and "angle error 12.0 deg" in outcome.got and "angle error 10 deg" in outcome.allowed
 
 
 # ---- when it happens -----------------------------------------------------------------------------------------------------
 def test_the_start_takes_lock_and_ramp_a_slower_header_is_given_more_time_and_one_that_hides_a_parameter_is_refused():
-    took = sweep.start_time_s(PARAMS)
+    took = scenario.start_time_s(PARAMS)
     assert took == pytest.approx(0.2 + 1.398 + scenario.START_MARGIN_S, abs=1e-3)
     for change in ({"LOCK_TIME": 8000.0}, {"OPENLOOP_RAMPSPEED_INCREASERATE": 5.0}, {"END_SPEED_RPM": 1500.0}):
-        assert sweep.start_time_s(PARAMS | change) > took + 0.19, change
-    refusal(lambda: sweep.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")
+        assert scenario.start_time_s(PARAMS | change) > took + 0.19, change
+    refusal(lambda: scenario.start_time_s({name: value for name, value in PARAMS.items() if name != "LOCK_TIME"}), "does not tell LOCK_TIME")
 
 
 def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it():
-    events, settled_s = sweep.loaded_run(PARAMS, 2600.0, TIMES, "x", torque_nm=0.04, start_torque_nm=0.01)
-    at_speed_s = 0.1 + sweep.start_time_s(PARAMS) + 1600.0 / 4000.0 + 1.0
+    events, settled_s = case.loaded_run(PARAMS, 2600.0, TIMES, "x", torque_nm=0.04, start_torque_nm=0.01)
+    at_speed_s = 0.1 + scenario.start_time_s(PARAMS) + 1600.0 / 4000.0 + 1.0
     brakes = [(event.at_s, event.keys["load.constant_nm"]) for event in events if event.keys]
     assert brakes == [(0.0, 0.01), (pytest.approx(at_speed_s), 0.04)]
     assert settled_s == pytest.approx(at_speed_s + 0.5 + 1.0)
@@ -75,7 +75,7 @@ def test_the_brake_closes_when_the_speed_is_reached_and_the_measure_waits_for_it
 
 @pytest.mark.parametrize("rpm, first", [(5500.0, 2800.0), (1400.0, 1400.0)])
 def test_the_potentiometer_waits_inside_its_normal_range_until_the_loop_is_closed(rpm, first):
-    speeds = [(event.at_s, event.value) for event in sweep.loaded_run(PARAMS, rpm, TIMES, "x")[0] if event.kind == "speed_rpm"]
+    speeds = [(event.at_s, event.value) for event in case.loaded_run(PARAMS, rpm, TIMES, "x")[0] if event.kind == "speed_rpm"]
     assert [speed for _, speed in speeds] == [first, rpm] and speeds[1][0] > 1.6
 
 
@@ -85,7 +85,7 @@ def test_the_potentiometer_waits_inside_its_normal_range_until_the_loop_is_close
      pytest.approx(2000.0 + 1000.0 * 0.005 / 0.1, abs=1.0)), # a mean in closed loop
     ({"fw__state": 4, "plant__speed_rpm": 1000}, None), ({"fw__state": 5, "plant__speed_rpm": -1500}, pytest.approx(1500.0))])
 def test_the_highest_speed(signals, rpm):
-    assert sweep.highest_rpm(run(**signals)) == rpm
+    assert case.highest_rpm(run(**signals)) == rpm
 
 
 # ---- for the user --------------------------------------------------------------------------------------------------------
@@ -104,11 +104,11 @@ def test_one_motor_in_full(tmp_path):
 def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_path, monkeypatch):
     ready = []
 
-    def build(found, options):
+    def build(found, quiet):
         ready.extend(motor.name for motor, *_ in found)
         raise UserError("that is enough")
     monkeypatch.setattr(paths, "TUNED", tmp_path)
-    monkeypatch.setattr(rating_sweep, "_candidates", build)
+    monkeypatch.setattr(rating_sweep, "built", build)
     out = ("--out", str(tmp_path / "out"))
     refused(command("rated", "--motor", HURST, *out), f"no userparams.h for motor '{HURST}'", f"make tune MOTOR={HURST}")
     (tmp_path / HURST).mkdir()
@@ -116,6 +116,8 @@ def test_a_motor_without_a_header_is_refused_and_does_not_stop_the_others(tmp_pa
     error = command("rated", "--motor", "linix_45zwn24_40", HURST, *out)[2]
     assert ready == [HURST] and not (tmp_path / "out").exists()
     assert re.fullmatch(r"foc33: no userparams.h for motor 'linix_45zwn24_40'.*\nfoc33: that is enough\n", error)
+    monkeypatch.setattr(paths, "RESULTS", tmp_path / "run")
+    assert command("rated", "--motor", "linix_45zwn24_40", HURST)[2] == error and not any((tmp_path / "run").iterdir()) # in a folder of its own
 
 
 @pytest.mark.parametrize("arguments, parts", [

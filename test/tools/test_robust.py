@@ -11,7 +11,8 @@ from support import LIBRARY, command, refused
 
 from tools.bench import plots, robust
 from tools.bench.board import Library
-from tools.bench.robust import Bench, Deviation, Margins, Search, Table
+from tools.bench.robust import Deviation, Margins, Robust, Table
+from tools.bench.search import Search
 from tools.common import board_file, motor_file, paths
 
 HURST = "hurst_dmb0224c10002"
@@ -45,8 +46,8 @@ def test_the_protections_allow_for_what_is_promised():
 
 def test_the_plant_of_a_job_is_changed_and_its_header_is_not():
     library, motor = Library(LIBRARY), motor_file.load(HURST)
-    bench = Bench(TABLE, motor, motor_file.part(HURST), board_file.part("mclv"), library)
-    job = bench.job(Deviation("x", (0.7, 1.3, 0.85), temperature_degc=80.0), True, 50.0)
+    bench = Robust(TABLE, motor_file.part(HURST), board_file.part("mclv"), library)
+    job = bench.job((Deviation("x", (0.7, 1.3, 0.85), temperature_degc=80.0), True, 50.0))
     assert {key: job.values[key] for key in ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.temp_c")} == pytest.approx({
         "motor.rs_ohm": 0.7 * motor.rs_ohm, "motor.ld_h": 1.3 * motor.ld_h, "motor.lq_h": 1.3 * motor.lq_h,
         "motor.psi_vs": 0.85 * motor.psi_vs,
@@ -54,14 +55,14 @@ def test_the_plant_of_a_job_is_changed_and_its_header_is_not():
     brakes = [action.keys["load.constant_nm"] for action in job.actions if "load.constant_nm" in action.keys]
     assert (brakes[0], brakes[-1]) == pytest.approx((motor.start_torque_nm, 0.5 * motor.rated_torque_nm))
     assert (job.library, job.scenario.measures[0].reference_rpm) == (library.path, pytest.approx(0.5 * motor.rated_speed_rpm))
-    assert {action.keys.get("load.constant_nm", 0.0) for action in bench.job(Deviation("x"), False, 50.0).actions} == {0.0}
+    assert {action.keys.get("load.constant_nm", 0.0) for action in bench.job((Deviation("x"), False, 50.0)).actions} == {0.0}
     for percent, rpm in ((1.0, library.params["MINIMUM_SPEED_RPM"]), (900.0, library.params["MAXIMUM_SPEED_RPM"]), (42.5, 1190.0)):
         assert bench.rpm(percent) == pytest.approx(rpm)
 
 
 def test_temperature_shows_in_the_true_factors():
     motor = motor_file.load(HURST)
-    found = Bench(TABLE, motor, None, None, None)._true(Deviation("hot", temperature_degc=125.0))
+    found = robust.true_factors(motor, Deviation("hot", temperature_degc=125.0))
     assert found == pytest.approx([1.0 + 100.0 * motor.resistance_tempco_per_k, 1.0, 1.0 + 100.0 * motor.kphi_tempco_per_k])
 
 
@@ -85,7 +86,7 @@ def test_a_wrong_resistance_turns_the_angle_by_what_the_d_current_makes_of_it(fa
     ("L", False, 0.4, 4.0), ("L", False, 3.5, 4.5),
     ("", True, 5.0, 10.0)])
 def test_the_allowed_angle_is_two_degrees_loaded_four_unloaded_and_the_law_plus_one_for_l(alone, loaded, law, degrees):
-    assert robust.angle_limit_deg(TABLE, alone, loaded, law) == pytest.approx(degrees)
+    assert Robust(TABLE).angle_limit_deg(alone, loaded, law) == pytest.approx(degrees)
 
 
 # ---- verdicts ------------------------------------------------------------------------------------------------------------
@@ -97,13 +98,13 @@ def test_the_allowed_angle_is_two_degrees_loaded_four_unloaded_and_the_law_plus_
     ({"speed_error_percent": -9.0, "beyond": "needs 14 V"}, "out of reach"),
     ({"fault": "STALL", "fault_s": 2.4, "beyond": "needs 14 V"}, "fault STALL")])
 def test_each_way_to_fail_is_named(values, text):
-    assert robust.verdict(TABLE, row(**values)) == text
+    assert Robust(TABLE).verdict(None, row(**values)) == text
 
 
 def test_a_start_that_does_not_last_is_none_and_a_failed_case_names_its_load_and_its_error():
     for fault_s, started in ((2.19, False), (2.21, True)): # S2 at 0.1 s, closed 1.6 s later: must last to 2.2 s
-        assert robust.started(TABLE, row(fault="LOST_LOCK", fault_s=fault_s)) == started
-    outcome = robust.check(TABLE, row(case="R -30 %", load="loaded", reference_rpm=1190.0, verdict="no start: STALL",
+        assert Robust(TABLE).started(row(fault="LOST_LOCK", fault_s=fault_s)) == started
+    outcome, = Robust(TABLE).check((Deviation("x", promised=True), True, 50.0), row(case="R -30 %", load="loaded", reference_rpm=1190.0, verdict="no start: STALL",
                                       speed_error_percent=-100.0, angle_error_rms_deg=None, need_voltage_v=3.0, voltage_limit_v=13.0))
     assert (outcome.row, outcome.ok) == ("R -30 %, 1190 rpm, loaded", False)
     assert outcome.got == "no start: STALL, error -100.00, volts needed 3.00, volts there 13.00"
@@ -170,10 +171,8 @@ def test_the_printed_margin_marks_an_end_that_is_only_the_search_s_and_the_table
 def test_every_case_is_tried_in_a_handful_of_rounds_and_never_twice():
     seen, rounds = [], []
 
-    class FakeBench:
-        table = TABLE
-
-        def run(self, cases, title, quiet):
+    class FakeBench(Robust):
+        def run(self, cases, title):
             rounds.append(title)
             assert {percent for _, _, percent in cases} == {TABLE.margin_speed_percent}
             seen.extend((item.name, loaded) for item, loaded, _ in cases)
@@ -181,7 +180,7 @@ def test_every_case_is_tried_in_a_handful_of_rounds_and_never_twice():
             return [{"started": ok, "verdict": "ok" if ok else "no", "load": robust.load_name(loaded)}
                     for ok, (_, loaded, _) in zip(good, cases)]
 
-    found = robust.find_margins(FakeBench(), True)
+    found = FakeBench(TABLE).find_margins()
     assert len(set(seen)) == len(seen) and len(rounds) <= 5
     assert found.cell("L", "runs, loaded") == "<0.30 .. >3.00"
     low, high = (found.searches["Kphi", "runs, no load", upwards].good for upwards in (False, True))

@@ -2,14 +2,19 @@
 
 import faulthandler
 import os
+import re
+import signal
+import subprocess
+import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import FAULTS, STATES, refusal, scenario
+from support import FAULTS, LIBRARY, SCENARIO, STATES, refusal, scenario
 
-from tools.bench import simulate
-from tools.common import workers
+from tools.bench import long_run, simulate
+from tools.common import paths, workers
 from tools.common.errors import UserError
 from tools.bench.panel import Ranges, plan
 
@@ -99,6 +104,50 @@ def test_every_period_is_recorded_once_with_its_time():
     assert seconds == pytest.approx(2.0)
 
 
+def test_a_long_recording_keeps_every_third_row_then_every_ninth_and_never_more_than_it_may():
+    whole = simulated("", FakeBoard())[0].trace
+    job = simulate.Job(scenario(), None, {}, [], ["plant.speed_rpm"])
+    session = simulate.Session(job, FakeLibrary, FakeBoard(), lambda seconds: None, most=5000)
+    session.run_to_end()
+    thin = session.run().trace
+    assert (thin.step, len(thin)) == (9, 4445)
+    assert np.array_equal(thin.data, whole.data[:, ::9]) and np.array_equal(thin.time_s, whole.time_s[::9])
+    assert (thin.part(0.5, 1.0).step, thin.thinned(2).step) == (9, 18)
+
+
+@pytest.mark.parametrize("values, said", [
+    ({}, "about 2480 s of it are ramps of the speed, SPEEDREFRAMP_RPM_PER_S = 2.5 in the header: raise it"),
+    ({"SPEEDREFRAMP_RPM_PER_S": 1000.0}, "about 2989 s of it are its own waits and stretches: change the times of "),
+    ({"SPEEDREFRAMP_RPM_PER_S": 1000.0, "SPEED_BANDWIDTH_HZ": 0.004}, "about 2500 s of it is for the speed to settle, SPEED_BANDWIDTH_HZ = 0.004 in the header"),
+    ({"SPEEDREFRAMP_RPM_PER_S": 1000.0, "LOCK_TIME": 6e7}, "about 3000 s of it are starts, in the header LOCK_TIME: lower it")])
+def test_a_long_run_names_what_takes_most_of_it_and_the_key_to_change(values, said):
+    item = scenario("[[event]]\nat_s = 0.0\nspeed_rpm = 3200\n[[event]]\nat_s = 0.1\npress = \"S2\"\n[[event]]\nat_s = 1.5\nspeed_rpm = 6300\n")
+    params = {"SPEEDREFRAMP_RPM_PER_S": 2.5, "SPEED_BANDWIDTH_HZ": 2.0, "END_SPEED_RPM": 100.0, "LOCK_TIME": 4000.0, "LOOPTIME_SEC": 50e-6,
+              "NOPOLESPAIRS": 5.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 10.0}
+    told = long_run.reason(replace(item, duration_s=3000.0), params | values)
+    assert said in told and (" waits " not in told or told.endswith("test.toml"))
+    sweeps_own = long_run.reason(replace(item, events=[replace(event, where="tables/x.toml") for event in item.events], duration_s=9000.0), params)
+    assert sweeps_own.endswith("its own waits and stretches: change the times of tables/x.toml")
+
+
+def test_a_long_run_says_so_before_it_begins_and_its_whole_report_takes_little_memory(tmp_path):
+    """Three million rows: their recording alone has 0.36 GB, and was there four times over."""
+    text = (paths.MOTORS / "hurst_dmb0224c10002.toml").read_text(encoding="utf-8")
+    (tmp_path / "flywheel.toml").write_text(text + '[load]\ninertia = { value = 1, unit = "kg m2" }\nstart_torque = { value = 0.01, unit = "N m" }\n', encoding="utf-8")
+    events = "".join(f"[[event]]\nat_s = {at_s}\n{what}\n" for at_s, what in (
+        (0.0, "speed_percent = 96"), (0.1, 'press = "S2"'), (50.0, "speed_percent = 25"), (60.0, "speed_percent = 96"), (70.0, "speed_percent = 25")))
+    scenario_text = SCENARIO.replace("duration_s = 2.0", "duration_s = 75\nfollows_header = true") + events
+    (tmp_path / "long.toml").write_text(scenario_text, encoding="utf-8")
+    with (tmp_path / "said").open("w", encoding="utf-8") as said:
+        process = subprocess.Popen([sys.executable, "-m", "tools.bench", "run", tmp_path / "long.toml", "--library", LIBRARY, "--quiet",
+                                    "--motor", tmp_path / "flywheel.toml", "--out", tmp_path / "out"], cwd=paths.ROOT, stdout=subprocess.DEVNULL, stderr=said)
+        _, status, used = os.wait4(process.pid, 0) # the largest of it and its processes
+    told = (tmp_path / "said").read_text(encoding="utf-8")
+    assert (status, told.count("\n")) == (0, 1) and re.match(r"foc33: long: 161 s of motor time; about \d\d s of it is a rotor that only friction slows", told), told
+    assert used.ru_maxrss < 600_000 and "its trace has one period of 3<" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert 90_000 < sum(1 for _ in (tmp_path / "out/trace.csv").open(encoding="utf-8")) < 110_000 # a thirtieth
+
+
 def test_a_wrong_pwm_period_still_ends_at_the_right_time():
     board = FakeBoard(period_s=100e-6)
     simulated("[[event]]\nat_s = 1.0\npot = 0.5\n", board)
@@ -127,6 +176,14 @@ def crash(job, report):
     os.abort()
 
 
+def killed(job, report):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def full_disk(job, report):
+    raise OSError(28, "No space left on device")
+
+
 def own_process(job, report):
     return os.getpid()
 
@@ -141,6 +198,12 @@ def test_every_job_has_a_process_of_its_own():
     assert len({os.getpid(), *workers.run_all([0] * 5, own_process, print, processes=2)}) == 6
 
 
-@pytest.mark.parametrize("work, line", [(refuse, "no such thing, job 1: think again"), (crash, "the simulation ended by itself, exit code -6")])
+@pytest.mark.parametrize("work, line", [(refuse, "no such thing, job 1: think again"), (crash, "the simulation ended by itself, exit code -6"),
+                                        (killed, "the simulation was killed, most often for want of memory: close other programs")])
 def test_a_refusal_or_a_crash_in_a_process_is_one_line_here_and_no_endless_wait(work, line):
     refusal(lambda: workers.run_all([1], work, print), line)
+
+
+def test_a_full_disk_in_a_process_is_one_here():
+    with pytest.raises(OSError, match="No space left"):
+        workers.run_all([1], full_disk, print)

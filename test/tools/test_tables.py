@@ -3,12 +3,13 @@
 import pytest
 from support import refusal
 
-from tools.bench import catch_sweep, loadsteps, lowspeed, rating_sweep, report, robust, start_sweep, table2
+from tools.bench import case, catch_sweep, loadsteps, lowspeed, rating_sweep, report, robust, start_sweep, table2
 from tools.common import motor_file, paths
 
 NOTE = {500: (500, 0.148, 1.697), 1000: (1000, 0.111, 1.556), 1500: (1425, 0.083, 1.513), 2000: (1900, 0.062, 1.117),
         2500: (2375, 0.031, 0.608), 3000: (2850, 0.020, 0.636), 3500: (3325, 0.019, 1.174), 4000: (3800, 0.015, 1.556)}
-ROWS = table2.Table.read(paths.TABLES / "table2.toml").rows
+TABLE2 = table2.Table2(table2.Table.read(paths.TABLES / "table2.toml"))
+ROWS = TABLE2.table.rows
 STARTS = start_sweep.Table.read(paths.TABLES / "starts.toml")
 LINIX = {"LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 2.0, "END_SPEED_RPM": 800.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 3.0, "LOCK_TIME": 32000.0,
          "SPEED_BANDWIDTH_HZ": 12.0}
@@ -22,10 +23,10 @@ def result(**more):
 def test_the_file_holds_the_note_s_eight_rows_and_half_a_per_cent_and_the_note_s_current_for_all_but_the_first():
     assert {row.reference_rpm: (row.note_rpm, row.torque_nm, row.note_current_a) for row in ROWS} == NOTE
     assert [(row.error_percent, row.no_more_current) for row in ROWS] == [(0.5, False)] + [(0.5, True)] * 7
-    assert len(table2.check(ROWS[0], result(current_rms_a=9.0))) == 1
+    assert len(TABLE2.check(ROWS[0], result(current_rms_a=9.0))) == 1
     # the printed table has AN1292's columns
-    assert {"note_rpm", "note_current_a", "speed_rpm", "current_rms_a"} <= {key for key, _, _ in table2.COLUMNS}
-    assert "limited by" in report.table([{"name": "x"}], table2.COLUMNS)
+    assert {"note_rpm", "note_current_a", "speed_rpm", "current_rms_a"} <= {key for key, _, _ in table2.Table2.columns}
+    assert "limited by" in report.table([{"name": "x"}], table2.Table2.columns)
 
 
 @pytest.mark.parametrize("which, values, ok, row, got", [
@@ -35,7 +36,7 @@ def test_the_file_holds_the_note_s_eight_rows_and_half_a_per_cent_and_the_note_s
     *((1, {"current_rms_a": current}, ok, "1500 rpm, 0.083 N m: current", got)
       for current, ok, got in ((1.513, True, "1.513"), (1.514, False, "1.514"), (None, False, "nothing")))])
 def test_a_row_fails_beyond_half_a_per_cent_above_the_note_s_current_and_with_a_fault(which, values, ok, row, got):
-    outcome = table2.check(ROWS[2], result(**values))[which]
+    outcome = TABLE2.check(ROWS[2], result(**values))[which]
     assert (outcome.ok, outcome.row) == (ok, row) and got in outcome.got
 
 
@@ -43,7 +44,7 @@ def test_a_row_fails_beyond_half_a_per_cent_above_the_note_s_current_and_with_a_
     (-3.0, {"VOLTAGE": 100.0, "CURRENT": 0.4}, "VOLTAGE 100 %"), (-3.0, {"CURRENT": 80.0, "RAMP": 1.0}, "CURRENT 80 %, RAMP 1 %"),
     (-0.4, {"VOLTAGE": 100.0}, ""), (-3.0, {}, "not limited")])
 def test_a_shortfall_is_explained_by_what_limited_the_output_and_for_how_long(error, shares, text):
-    assert table2.limit_text(result(speed_error_percent=error, limited_percent=shares)) == text
+    assert case.limit_text(result(speed_error_percent=error, limited_percent=shares)) == text
 
 
 @pytest.mark.parametrize("room, name, old, new, said", [
@@ -100,12 +101,12 @@ def test_a_speed_loop_made_slow_by_its_load_gets_time_to_settle_and_the_speed_is
     ({"inertia": 36.0, "overshoot_percent": 39.0, "hand_over_rpm": 400.0, "speed_error_percent": 4.0}, True, "speed error +4.00 %"),
     ({"inertia": 36.0, "overshoot_percent": 41.0}, False, "overshoot 41.0 %"), ({"inertia": 36.0, "fault": "START_FAILED"}, False, "fault START_FAILED")])
 def test_each_way_to_fail_is_named_with_angle_and_load(values, ok, got):
-    outcome = start_sweep.check(STARTS, start(**values))
+    outcome, = start_sweep.Starts(STARTS).check(None, start(**values))
     assert (outcome.ok, outcome.row, outcome.got) == (ok, "start from 45 deg with 0.03 N m", got)
 
 
 def test_another_motor_s_header_may_refuse_a_rotor_that_it_is_not_made_for_by_name_and_by_no_other():
-    found = {(inertia, fault): start_sweep.check(other(), start(inertia=inertia, fault=fault)).ok
+    found = {(inertia, fault): start_sweep.Starts(other()).check(None, start(inertia=inertia, fault=fault))[0].ok
              for inertia in (1.0, 9.0, 36.0) for fault in ("START_FAILED", "STALL")}
     assert [key for key, ok in found.items() if ok] == [(36.0, "START_FAILED")]
 
@@ -117,5 +118,5 @@ def test_every_load_and_every_heavy_rotor_comes_from_every_angle():
 
 def test_the_printed_table_has_a_line_for_each_angle():
     rows = [start(rotor_deg=angle, kind=f"{load:g} N m", fault="STALL" if angle else None) for load in STARTS.loads_nm for angle in (0.0, 15.0)]
-    lines = start_sweep.text(rows).splitlines()
+    lines = start_sweep.Starts(STARTS).text(rows).splitlines()
     assert "1.60 s" in lines[1] and lines[2].split() == ["15", "STALL", "STALL", "STALL"]

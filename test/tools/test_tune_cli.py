@@ -161,7 +161,7 @@ def test_what_the_build_refuses_of_a_boards_numbers_names_the_board_file_and_a_m
 def test_make_motors_runs_those_that_got_a_header_and_hands_on_why_the_others_did_not(several, out, refuses):
     if not refuses:
         (several / "b_large.toml").unlink()
-    with mock.patch.object(rating_sweep, "command", return_value=1) as runs:
+    with mock.patch.object(rating_sweep.Rated, "command", return_value=1) as runs:
         code, _, error = command("motors", "--out", str(out), "--quiet")
     (options,) = runs.call_args.args
     assert (code, error, options.motor, options.out, options.board) == (1, "", ["a_first", "c_last"], out, None)
@@ -207,7 +207,7 @@ def test_make_motors_runs_each_motor_on_its_board(own_board, out):
     def stop(found, options):
         taken.update({motor.name: board.path.stem for motor, board, _ in found})
         raise UserError("that is enough")
-    with mock.patch.object(rating_sweep, "_candidates", stop):
+    with mock.patch.object(rating_sweep, "built", stop):
         refused((*command("motors", "--out", str(out), "--quiet")[:1], "", "foc33: that is enough\n"))
     assert taken == {"a_first": "my_board", "c_last": "mclv"}
 

@@ -3,16 +3,16 @@
 import argparse
 import difflib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tools.common import board_keys, output, paths, workers
+from tools.common import board_keys, paths, workers
 from tools.common.board_keys import Values
 from tools.common.errors import UserError
 from tools.common.progress import Progress
 from tools.common.toml_file import Document
-from . import bringup_user, command_common, report
+from . import bringup_user, command_common, sweep
 from .board import Board, BoardError, Library
 from .expect import Outcome
 from .scenario import param
@@ -20,9 +20,6 @@ from .scenario import param
 MODE = "BRINGUP"
 USUAL_S = 25.0
 """Of motor time, for the progress bar."""
-COLUMNS = (("title", "what is\nwrong", "{}"), ("said", "BRINGUP\nsaid", "{}"), ("current_max_a", "current\nmax A", "{:.2f}"),
-           ("motor_s", "motor\ns", "{:.1f}"), ("verdict", "\nverdict", "{}"))
-KEYS = ("name", "title", "said", "fix", "current_max_a", "motor_s", "verdict")
 
 
 @dataclass(frozen=True)
@@ -60,7 +57,7 @@ def read(path: Path = paths.TABLES / "bringup.toml") -> Table:
     return table
 
 
-@dataclass(frozen=True)
+@dataclass
 class Job:
     """A variant with everything needed to run it."""
 
@@ -70,6 +67,7 @@ class Job:
     most_a: float
     leaves: str = ""
     """The question at which the user leaves; default: stays to the end."""
+    case: Variant | None = None
 
 
 def prepare(variant: Variant, library: Library, motor: board_keys.Part, board: board_keys.Part) -> Job:
@@ -118,6 +116,51 @@ def simulate(jobs: list[Job], quiet: bool) -> list[dict[str, Any]]:
         return workers.run_all(jobs, run, progress)
 
 
+class Bringup(sweep.Sweep):
+    """The sweep: a case is a variant."""
+
+    name, about, defines = "bringup", "the BRINGUP firmware on the right board and on every miswired one", (MODE,)
+    columns = (("title", "what is\nwrong", "{}"), ("said", "BRINGUP\nsaid", "{}"), ("current_max_a", "current\nmax A", "{:.2f}"),
+               ("motor_s", "motor\ns", "{:.1f}"), ("verdict", "\nverdict", "{}"))
+    keys = ("name", "title", "said", "fix", "current_max_a", "motor_s", "verdict")
+    alone = False
+
+    @classmethod
+    def add_command(cls, commands: Any) -> argparse.ArgumentParser:
+        parser = super().add_command(commands)
+        parser.add_argument("--variant", help="this one only, with all its lines; default: all, as a table")
+        return parser
+
+    @classmethod
+    def read(cls, options: argparse.Namespace) -> Table:
+        table = read()
+        return replace(table, variants=chosen(table, options.variant))
+
+    def ask(self, options: argparse.Namespace) -> None:
+        self.alone = options.variant is not None
+
+    def cases(self) -> list[Variant]:
+        return self.table.variants
+
+    def job(self, item: Variant) -> Job:
+        return prepare(item, self.library, self.motor, self.board)
+
+    def results(self, title: str, jobs: list[Job]) -> list[dict[str, Any]]:
+        return simulate(jobs, self.quiet)
+
+    def check(self, item: Variant, row: dict[str, Any]) -> list[Outcome]:
+        return [check(self.job(item), row)]
+
+    def finish(self, target: Path) -> int:
+        """One alone with all that it says, and without a folder."""
+        if not self.alone:
+            return super().finish(target)
+        (item,) = self.cases()
+        row, = self.run([item], self.name)
+        print("\n".join(row["lines"]) + f"\n\n{row['name']}: {row['title']}")
+        return command_common.verdict(self.name, self.check(item, row))
+
+
 def chosen(table: Table, name: str | None) -> list[Variant]:
     """The variant that was asked for, or all."""
     names = [variant.name for variant in table.variants]
@@ -125,35 +168,3 @@ def chosen(table: Table, name: str | None) -> list[Variant]:
         near = difflib.get_close_matches(name, names, 1)
         raise UserError(f"no variant '{name}'", "VARIANT", f"did you mean {near[0]}?" if near else f"take one of {', '.join(names)}")
     return [variant for variant in table.variants if name in (None, variant.name)]
-
-
-def command(options: argparse.Namespace) -> int:
-    """The whole command; returns the exit code."""
-    table = read()
-    variants = chosen(table, options.variant)
-    motor, board, library, used = command_common.set_up(table, options, [MODE])
-    jobs = [prepare(variant, library, motor, board) for variant in variants]
-    if options.variant is not None:
-        row = simulate(jobs, options.quiet)[0]
-        print("\n".join(row["lines"]) + f"\n\n{row['name']}: {row['title']}")
-        return command_common.verdict("bringup", [check(jobs[0], row)])
-    with output.ResultFolder(command_common.results("bringup", table.motor, options)) as folder:
-        rows = simulate(jobs, options.quiet)
-        outcomes = [check(job, row) for job, row in zip(jobs, rows)]
-        report.write_table(folder.work, "bringup", KEYS, rows, outcomes, {"title": table.title, **used}, {})
-    print(f"{table.title}\n\n{report.used_text(used)}\n")
-    print(report.table(rows, COLUMNS))
-    return command_common.verdict("bringup", outcomes)
-
-
-def add_command(commands: Any) -> None:
-    """Adds `bringup` to a command line's commands."""
-    parser = commands.add_parser("bringup", help="the BRINGUP firmware on the right board and on every miswired one")
-    parser.add_argument("--variant", help="this one only, with all its lines; default: all, as a table")
-    parser.add_argument("--motor", help="a name in tuning/motors or a path")
-    parser.add_argument("--board", help="a name in tuning/boards or a path")
-    parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
-    parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
-    parser.add_argument("--out", type=Path, help="result folder; default build/run/bringup")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(command=command)

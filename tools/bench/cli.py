@@ -1,12 +1,28 @@
 """The command line: `python3 -m tools.bench <command>`. Exit codes: 0 all well, 1 an expectation failed, 2 bad input."""
 
 import argparse
+import functools
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tools.common import command_line, motor_file, output, paths
 from tools.common.progress import waiting
-from . import bringup, build, campaign, catch_sweep, command_common, loadsteps, lowspeed, rating_sweep, report, robust, scenario_file, simulate, soak, start_sweep, sweep, table2
+from . import build, command_common, report, scenario_file, simulate, sweep
+from .bringup import Bringup
+from .campaign import Campaign
+from .catch_sweep import Catch
+from .expect import Outcome
+from .loadsteps import LoadSteps
+from .lowspeed import LowSpeed
+from .rating_sweep import Rated
+from .robust import Robust
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
+from .soak import Soak
+from .start_sweep import Starts
+from .table2 import Table2
+
+SWEEPS = (Table2, Starts, Rated, LoadSteps, LowSpeed, Catch, Robust, Bringup)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -30,53 +46,15 @@ def _parser() -> argparse.ArgumentParser:
     for command in (run, prepare):
         command.add_argument("scenario", nargs="?", help="name (see `scenarios`) or TOML file; default demo, rated with --motor")
         command.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
-
-    loads = commands.add_parser("table2", help="the eight rows of AN1292's Table 2 beside ours")
-    loads.set_defaults(command=table2.command)
-
-    angles = commands.add_parser("starts", help="start from every rotor angle under several loads")
-    angles.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
-    angles.set_defaults(command=start_sweep.command)
-
-    rating = commands.add_parser("rated", help="every motor with its tuned header at 20, 50 and 100 %% of its rated speed under load")
-    rating.add_argument("--motor", nargs="+", metavar="NAME", help="these motors only: names in tuning/motors or paths")
-    rating.set_defaults(command=rating_sweep.command)
-
-    steps = commands.add_parser("loadsteps", help="the brake closes and opens at once: dips, and how soon the speed is back")
-    steps.set_defaults(command=loadsteps.command)
-
-    slow = commands.add_parser("lowspeed", help="low speeds held under load, and how low it goes")
-    slow.set_defaults(command=lowspeed.command)
-
-    catches = commands.add_parser("catch", help="S2 while the rotor turns at any speed, and stops on a supply that cannot sink")
-    catches.set_defaults(command=catch_sweep.command)
-
-    margins = commands.add_parser("robust", help="how far the motor's true R, L and Kphi may be off what the header says")
-    margins.add_argument("--no-margins", action="store_true", help="only the promised deviations, not how far one may go")
-    margins.set_defaults(command=robust.command)
+    command_common.add_options(run, "SCENARIO")
+    command_common.add_options(prepare, "", without=("library", "out", "quiet"))
+    for kind in (*SWEEPS, Campaign, Soak):
+        kind.add_command(commands)
 
     record = commands.add_parser("recorder", help="draw what the fault recorder has sent: a log of the UART")
     record.add_argument("log", nargs="?", help="default: what the last run that ended in a fault has sent")
+    command_common.add_options(record, "recorder")
     record.set_defaults(command=_recorder)
-
-    for command, folder in ((run, "SCENARIO"), (prepare, ""), (loads, "table2"), (angles, "starts"), (rating, "rated"), (steps, "loadsteps"),
-                            (slow, "lowspeed"), (catches, "catch"), (margins, "robust"), (record, "recorder")):
-        header = "build/tune/NAME, written by make tune MOTOR=NAME" + ("" if command is rating else "; without --motor the project's own")
-        command.add_argument("--board", help="board file instead of the motor's or the scenario's: a name in tuning/boards or a path")
-        command.add_argument("--userparams", metavar="FOLDER", help=f"build with the userparams.h in this folder; default: {header}")
-        if command is not rating:
-            command.add_argument("--motor", help="motor file instead of the scenario's: a name in tuning/motors or a path")
-        if command is prepare:
-            continue
-        if command is not rating:
-            command.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
-        command.add_argument("--out", type=Path, help=f"result folder, replaced when the run is complete; default build/run/{folder}, with the names "
-                             "of another motor, board or header")
-        command.add_argument("--quiet", action="store_true", help="no progress bar")
-
-    bringup.add_command(commands)
-    campaign.add_command(commands)
-    soak.add_command(commands)
 
     listing = commands.add_parser("scenarios", help="list the scenarios")
     listing.set_defaults(command=_scenarios)
@@ -96,21 +74,27 @@ def _run(options: argparse.Namespace) -> int:
     job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
     target = command_common.results(item.name, item.motor, options, asked)
     with output.ResultFolder(target) as folder:
-        run = sweep.run_cases(item.name, [job], options.quiet, simulate.simulate)[0]
-        outcomes = report.check(run)
-        data = report.summary(run, outcomes, str(paths.shown(motor.path)), str(paths.shown(board.path))) | used
-        _write_traces(run, folder.work)
-        if not options.no_plots:
-            with waiting("plots", options.quiet):
-                from . import plots, recorder_command
-                data["plots"] = plots.write_all(run, folder.work) + recorder_command.of_run(run, folder.work)
-        output.write_summary(folder.work, data)
-        report.write_page(folder.work, run, outcomes, data)
-    print(report.text(run, outcomes, data))
-    print(f"\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
-          f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time")
+        text, outcomes = sweep.run_cases(item.name, [job], options.quiet, functools.partial(_reported, folder.work, used, options))[0]
+    print(text)
     print(f"results in {paths.shown(target)}/: index.html")
     return command_common.verdict(item.name, outcomes)
+
+
+def _reported(folder: Path, used: dict[str, Any], options: argparse.Namespace, job: simulate.Job,
+              tell: Callable[[float], None]) -> tuple[str, list[Outcome]]:
+    """The run and its whole report, in the run's process: a trace takes too much memory to be there twice."""
+    run = simulate.simulate(job, tell)
+    outcomes = report.check(run)
+    data = report.summary(run, outcomes, used["motor"], used["board"]) | used
+    _write_traces(run, folder)
+    if not options.no_plots:
+        with waiting("plots", options.quiet):
+            from . import plots, recorder_command
+            data["plots"] = plots.write_all(run, folder) + recorder_command.of_run(run, folder)
+    output.write_summary(folder, data)
+    report.write_page(folder, run, outcomes, data)
+    return (f"{report.text(run, outcomes, data)}\n\nsimulated {run.motor_s:.2f} s of motor time in {run.wall_s:.2f} s on one core "
+            f"({run.cpu_s:.2f} s of processor time): {run.speed_factor:.1f} times real time"), outcomes
 
 
 def _prepare(options: argparse.Namespace) -> int:

@@ -22,6 +22,21 @@ SAME_MOTOR = 0.01
 """Header and motor file belong together if their values agree to this."""
 
 
+def add_options(parser: argparse.ArgumentParser, folder: str, own: str = "; without --motor the project's own", without: tuple[str, ...] = ()) -> None:
+    """The options of all running commands, but for those that one of them has not. `folder`: of its results; `own`: what its default header may be."""
+    for name, more in (
+            ("board", {"help": "board file instead of the motor's or the scenario's: a name in tuning/boards or a path"}),
+            ("userparams", {"metavar": "FOLDER", "help": "build with the userparams.h in this folder; default: build/tune/NAME, "
+                                                       f"written by make tune MOTOR=NAME{own}"}),
+            ("motor", {"help": "motor file instead of the scenario's: a name in tuning/motors or a path"}),
+            ("library", {"type": Path, "help": "a libvboard.so to use instead of building one"}),
+            ("out", {"type": Path, "help": f"result folder, replaced when the run is complete; default build/run/{folder}, with the names "
+                                           "of another motor, board or header"}),
+            ("quiet", {"action": "store_true", "help": "no progress bar"})):
+        if name not in without:
+            parser.add_argument(f"--{name}", **more)
+
+
 def library_for(defines: list[str], given: Path | None, userparams: str | Path | None = None) -> Library:
     """The board with the firmware that the defines ask for, built with the userparams.h in the folder `userparams`."""
     if given is not None and not given.is_file():

@@ -356,7 +356,7 @@ class FaultExpectation(Expectation):
 
     def check(self, run: Run) -> list[Outcome]:
         title = f"fault {self.name}"
-        raised = [(row, at_s, name) for row, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
+        raised = run.raised()
         allowed = f"{self.name} within {self.within_s:g} s of {self.after_s:g} s"
         if not raised:
             return [Outcome(f"{title}: raised", False, "no fault", allowed)]
@@ -374,9 +374,10 @@ class FaultExpectation(Expectation):
         """The row after `first` is one period later."""
         first = int(np.searchsorted(run.trace.time_s, self.after_s)) if self.from_cause else fault_row
         off = _off_row(run.trace, first)
-        periods = None if off is None else off - first
+        periods = None if off is None else (off - first) * run.trace.step
         kept = off is not None and _stays_off(run, run.trace, off, self._kept_row(run))
-        got = "never" if periods is None else f"{periods} periods" + ("" if kept else ", on again later")
+        thinned = f", of which the trace has one of {run.trace.step}" if run.trace.step > 1 else ""
+        got = "never" if periods is None else f"{periods} periods{thinned}" + ("" if kept else ", on again later")
         origin = "cause" if self.from_cause else "fault"
         return Outcome(f"{title}: outputs off", kept and periods is not None and periods <= self.outputs_off_within_periods, got,
                        f"at most {self.outputs_off_within_periods} after the {origin}")

@@ -71,6 +71,8 @@ class Verdict:
 
 def judge(with_fault: Trace, without: Trace, limits: Limits) -> Verdict:
     """The verdict on two traces with the same signals."""
+    step = max(with_fault.step, without.step)
+    with_fault, without = (trace.thinned(step // trace.step) if trace.step < step else trace for trace in (with_fault, without))
     after = with_fault.part(limits.injected_s, np.inf)
     reference = without.part(limits.injected_s, np.inf)
     rows = min(len(after), len(reference))

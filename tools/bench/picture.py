@@ -3,13 +3,14 @@
 import json
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from tools.common import drive_tables
-from tools.common.trace import wrapped_deg
+from tools.common.trace import Trace, wrapped_deg
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
 
 RUN_STRETCHES = 12000
@@ -17,6 +18,8 @@ RUN_STRETCHES = 12000
 SWEEP_STRETCHES = 250
 """Of a run that shares the page with many."""
 AROUND_FAULT_S = (0.04, 0.01)
+BLOCK_ROWS = 100_000
+"""All curves of a long run at once would take many times the room of its trace."""
 MISSING = -32768
 """Where a curve has no value."""
 
@@ -46,7 +49,6 @@ def of(run: Run, stretches: int) -> Picture:
     """The picture of a run; of one without a trace, what is known without."""
     trace = run.trace
     starts, widths = _stretches(run, stretches)
-    panels = [(title, unit, curves) for title, unit, curves in _panels(run) if curves]
     rows = _rows(starts, widths)
     head: dict[str, Any] = {
         "title": run.scenario.name, "points": len(rows), "from_s": float(trace.time_s[0]) if len(trace) else 0.0,
@@ -55,14 +57,28 @@ def of(run: Run, stretches: int) -> Picture:
         "faults": [[at_s, name] for _, at_s, name in run.fault_changes()],
         "limits": _limits(run, max(1, len(trace) // stretches)), "events": [[at_s, text] for at_s, text in run.protocol()]}
     parts = [_differences(np.round(trace.time_s[rows] * 1e6).astype(np.int32))]
-    for title, unit, curves in panels:
+    for title, unit, curves in _drawn(run, starts, widths):
         lines = []
         for curve in curves:
-            counts, low, step = _counts(_lowest_and_highest(curve.values, starts, widths))
+            counts, low, step = _counts(curve.values)
             lines.append({"name": curve.name, "color": curve.color, "style": curve.style, "low": low, "step": step})
             parts.append(_differences(counts))
         head["panels"].append({"title": title, "unit": unit, "lines": lines})
     return Picture(json.dumps(head, allow_nan=False), zlib.compress(b"".join(parts), 9))
+
+
+def _drawn(run: Run, starts: np.ndarray, widths: np.ndarray) -> list[tuple[str, str, list[Curve]]]:
+    """The panels that have curves, with a value for each of _rows(); made block by block."""
+    edges = np.unique(np.append(np.searchsorted(starts, np.arange(0, len(run.trace), BLOCK_ROWS)), len(starts)))
+    blocks = []
+    for first, end in list(pairwise(edges.tolist())) or [(0, 0)]:
+        from_row = int(starts[first]) if end else 0
+        rows = slice(from_row, int(starts[end - 1] + widths[end - 1]) if end else 0)
+        part = Trace(run.trace.names, run.trace.time_s[rows], run.trace.data[:, rows])
+        blocks.append([(title, unit, [replace(curve, values=_lowest_and_highest(curve.values, starts[first:end] - from_row, widths[first:end]))
+                                      for curve in curves]) for title, unit, curves in _panels(run, part) if curves])
+    return [(title, unit, [replace(curve, values=np.concatenate([block[panel][2][line].values for block in blocks]))
+                           for line, curve in enumerate(curves)]) for panel, (title, unit, curves) in enumerate(blocks[0])]
 
 
 def _stretches(run: Run, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -137,9 +153,8 @@ def _limits(run: Run, gap: int) -> dict[str, list[list[float]]]:
     return found
 
 
-def _panels(run: Run) -> Iterator[tuple[str, str, list[Curve]]]:
-    """What is drawn: title, unit, and those curves that the trace has the signals of."""
-    trace = run.trace
+def _panels(run: Run, trace: Trace) -> Iterator[tuple[str, str, list[Curve]]]:
+    """What is drawn of a part of the run's trace: title, unit, and those curves that it has the signals of."""
 
     def column(name: str) -> np.ndarray | None:
         return trace.column(name).astype(np.float64) if name in trace else None

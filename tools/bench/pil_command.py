@@ -117,12 +117,15 @@ def _table2(options: argparse.Namespace) -> int:
     library = pil.library(defines, folder)
     runs: list[pil.PilRun] = []
 
-    def cases(title: str, jobs: list[simulate.Job], quiet: bool) -> list[dict[str, Any]]:
-        runs.extend(sweep.run_cases(title, jobs, quiet, functools.partial(work, image)))
-        return [sweep.reduced(run.run) for run in runs]
+    class OnTarget(table2.Table2):
+        """The sweep on the image."""
+
+        def results(self, title: str, jobs: list[simulate.Job]) -> list[dict[str, Any]]:
+            runs.extend(sweep.run_cases(title, jobs, self.quiet, functools.partial(work, image)))
+            return [self.measured(run.run, None) for run in runs]
 
     out = command_common.results("pil-table2", table2.Table.read(paths.TABLES / "table2.toml").motor, options, defines)
-    status = table2.command(argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": out}), cases)
+    status = OnTarget.command(argparse.Namespace(**vars(options) | {"library": library.path, "userparams": None, "out": out}))
     outcomes = [comparison(run) for run in runs]
     print()
     for outcome in outcomes:

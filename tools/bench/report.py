@@ -87,16 +87,22 @@ def write_page(folder: Path, run: Run, outcomes: list[Outcome], data: dict[str, 
         for number, (at_s, text) in enumerate(run.protocol(), 1)])
     page.write(folder, page.Page(
         f"{run.scenario.name}: {run.scenario.title}", data["passed"], outcomes_count(outcomes),
-        used_lines(data) + [f"warning of the board: {line}" for line in run.warnings],
+        used_lines(data) + notes(run),
         [*faults_table(run), *([measures] if rows else []), outcomes_table(outcomes)], [shown], [*limits_table(run), events],
         [name for name in data.get("plots", []) if name.startswith(EXTRA_PLOTS) or not page.draws()], sorted(file.name for file in folder.iterdir())))
+
+
+def notes(run: Run) -> list[str]:
+    """What a reader should know beside the results."""
+    thinned = [f"the run is so long that its trace has one period of {run.trace.step}"] if run.trace.step > 1 else []
+    return thinned + [f"warning of the board: {line}" for line in run.warnings]
 
 
 def faults_table(run: Run) -> list[page.Table]:
     """The faults of a run, with cause and remedy."""
     known = {row.name: row for row in drive_tables.faults()}
     rows = [page.Row([f"{at_s:.4f}", name, *((known[name].cause, known[name].remedy) if name in known else ("", ""))], True, at_s=at_s)
-            for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
+            for _, at_s, name in run.raised()]
     return [page.Table("Faults", ["s", "fault", "cause", "remedy"], rows)] if rows else []
 
 
@@ -194,7 +200,7 @@ def text(run: Run, outcomes: list[Outcome], data: dict[str, Any]) -> str:
     if data["measures"]:
         parts.append(table(data["measures"]))
     parts.append("\n".join(f"{at_s:9.4f} s  {line}" for at_s, line in run.protocol()))
-    if run.warnings:
-        parts.append("\n".join(f"warning of the board: {line}" for line in run.warnings))
+    if told := notes(run):
+        parts.append("\n".join(told))
     parts.append(outcomes_text(outcomes))
     return "\n\n".join(parts)

@@ -62,6 +62,10 @@ class Run:
         """(row, time, name) whenever the fault code changes, the start included."""
         return self._changes("fw.fault", self.faults, "code")
 
+    def raised(self) -> list[tuple[int, float, str]]:
+        """Those of fault_changes() at which there is a fault."""
+        return [change for change in self.fault_changes() if change[2] != self.faults.get(0, "NONE")]
+
     def state_changes(self) -> list[tuple[int, float, str]]:
         """(row, time, name) whenever the drive's state changes, the start included."""
         return self._changes("fw.state", self.states, "state")

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from tools.common import board_keys, motor_file
-from . import panel
+from . import long_run, panel
 from . import scenario as scenarios
 from .board import Board, BoardError, Library
 from tools.common.errors import UserError, suggestion
 from .recorder import under_way
 from .run import Run
 from .scenario import Scenario
-from tools.common.trace import Trace
+from tools.common.trace import MOST_ROWS, Recording
 
 CHUNK_PERIODS = 2000
 LONGEST_RECORD_CHUNKS = 10
@@ -46,6 +46,10 @@ class Job:
     variables: dict[str, int] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
     """of userparams.h, changed at power-up; needs PARAMS_IN_RAM"""
+    long: str = ""
+    """why it takes long"""
+    case: Any = None
+    """of the sweep that it belongs to"""
 
 
 def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board: board_keys.Part, extra: board_keys.Values | None = None,
@@ -69,7 +73,10 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
         for name, count in expectation.variables().items():
             variables[name] = max(count, variables.get(name, 0))
     _check_signals(signals, library, scenario)
-    return Job(scenario, library.path, values, actions, signals, variables, parameters or {})
+    job = Job(scenario, library.path, values, actions, signals, variables, parameters or {})
+    if scenario.duration_s > long_run.LONG_S:
+        job.long = long_run.reason(scenario, params, (rating or rating_of(motor, board)).coast_s_per_rpm)
+    return job
 
 
 def rating_of(motor: board_keys.Part, board: board_keys.Part) -> scenarios.Rating:
@@ -132,12 +139,12 @@ def set_up(board: Any, job: Job) -> None:
 
 
 class Session:
-    """A job on a board, from power-up on, as far as it was taken. A row of the trace every `every` periods."""
+    """A job on a board, from power-up on, as far as it was taken. A row of the trace every `every` periods, but no more than `most` in all."""
 
-    def __init__(self, job: Job, library: Library, board: Any, report: Callable[[float], None], every: int = 1) -> None:
+    def __init__(self, job: Job, library: Library, board: Any, report: Callable[[float], None], every: int = 1, most: int = MOST_ROWS) -> None:
         self.job, self.library, self.board = job, library, board
         set_up(board, job)
-        self.recorder = _Recorder(board, job.signals, report, every)
+        self.recorder = _Recorder(board, job.signals, report, every, most)
         self.done: list[tuple[float, str]] = [(0.0, "power-up")]
         self.pending = list(job.actions)
         self._act_until(0.0) # in place before the firmware looks at its pins
@@ -176,7 +183,7 @@ class Session:
         """What has happened so far. After a fault the board runs on, without a trace, until the fault recorder's lines are out."""
         job, library = self.job, self.library
         variables = {name: self.board.variable(name, count) for name, count in job.variables.items()}
-        motor_s, trace, warnings = self.board.get("time_s"), self.recorder.trace(), self.board.warnings()
+        motor_s, trace, warnings = self.board.get("time_s"), self.recorder.recording.trace(), self.board.warnings()
         if "fw.fault" in trace and len(trace) and trace.column("fw.fault")[-1] != 0:
             self.recorder.sent += _rest_of_record(self.board, self.recorder.sent)
         return Run(job.scenario, trace, list(self.done), warnings, library.states, library.faults, variables, library.params | job.parameters,
@@ -206,14 +213,12 @@ def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> Non
 class _Recorder:
     """Lets the board run and collects its trace, a chunk at a time."""
 
-    def __init__(self, board: Any, signals: list[str], report: Callable[[float], None], every: int = 1) -> None:
+    def __init__(self, board: Any, signals: list[str], report: Callable[[float], None], every: int, most: int) -> None:
         self.board = board
-        self.signals = signals
         self.report = report
         self.now_s = 0.0
         self.period_s = 50e-6
-        self.rows: list[np.ndarray] = []
-        self.times: list[np.ndarray] = []
+        self.recording = Recording(signals, most)
         self.sent = ""
         self.board.trace_start(signals, every)
 
@@ -225,13 +230,7 @@ class _Recorder:
             rows = self.board.trace_take()
             self.sent += self.board.uart_take()
             if len(rows):
-                self.rows.append(rows)
-                self.times.append(self.now_s + (now_s - self.now_s) / len(rows) * np.arange(1, len(rows) + 1))
+                self.recording.add(self.now_s + (now_s - self.now_s) / len(rows) * np.arange(1, len(rows) + 1), rows)
             self.report(now_s - self.now_s)
             self.period_s = (now_s - self.now_s) / periods
             self.now_s = now_s
-
-    def trace(self) -> Trace:
-        if not self.rows:
-            return Trace(self.signals, np.empty(0), np.empty((len(self.signals), 0), dtype=np.float32))
-        return Trace(self.signals, np.concatenate(self.times), np.ascontiguousarray(np.concatenate(self.rows).T))

@@ -14,22 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from tools.common import board_file, motor_file, output, paths, workers
+from tools.common import board_file, motor_file, paths
 from tools.common.board_keys import Values
 from tools.common.errors import UserError
-from tools.common.progress import Progress
 from tools.common.trace import wrapped_deg
 
-from . import command_common, judge, page, picture, reach, report, simulate
+from . import command_common, draws, judge, page, reach, simulate
 from .board import Board
-from .campaign import Part
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, param, start_time_s
 from .trial import Bench, coast_s
 
-RESULTS = paths.ROOT / "build" / "soak"
-SEGMENTS = "segments.csv"
-KEYS = ("segment", "motor", "mode", "motor_s", "starts", "stretches", "worst_speed_error_percent", "worst_angle_error_deg", "verdict")
 SEGMENT_S = 40.0
 """Of motor time, about."""
 EVERY = 20
@@ -68,16 +63,77 @@ class Segment:
     starts: int = 1
 
 
-def add_command(commands: Any) -> None:
-    """Adds `soak` to a command line's commands."""
-    parser = commands.add_parser("soak", help="motor hours of random commands, loads, temperatures, sags, noise: nothing may trip")
-    parser.add_argument("--hours", type=float, default=24.0, help="motor hours, simulated; default 24")
-    parser.add_argument("--seed", type=int, default=1, help="of the draw; default 1")
-    parser.add_argument("--case", type=int, nargs="+", metavar="NUMBER", help="these segments alone; of a single one the whole report")
-    parser.add_argument("--motor", nargs="+", metavar="NAME", help="motors to draw from; default: all of tuning/motors")
-    parser.add_argument("--out", type=Path, help="result folder, replaced when complete; default build/soak/seed-SEED")
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    parser.set_defaults(command=command)
+@dataclass
+class Soak(draws.Series):
+    """The series: segments of motor hours, on every motor in one direction and in both."""
+
+    name, about = "soak", "motor hours of random commands, loads, temperatures, sags, noise: nothing may trip"
+    what, unit, file, told = "segment", "motor hours", "segments.csv", 20
+    keys = ("segment", "motor", "mode", "motor_s", "starts", "stretches", "worst_speed_error_percent", "worst_angle_error_deg", "verdict")
+
+    @classmethod
+    def add_command(cls, commands: Any) -> argparse.ArgumentParser:
+        parser = super().add_command(commands)
+        parser.add_argument("--hours", type=float, default=24.0, help="motor hours, simulated; default 24")
+        return parser
+
+    @classmethod
+    def prepared(cls, options: argparse.Namespace) -> tuple["Soak", list[Segment]]:
+        if not 0.0 < options.hours <= MOST_HOURS:
+            raise UserError(f"{options.hours:g} motor hours are impossible", "--hours", f"choose more than 0, at most {MOST_HOURS:g}")
+        numbers = cls.numbers(options, "--hours", math.ceil(3600.0 * options.hours / SEGMENT_S))
+        benches = prepared(options.motor or paths.names(paths.MOTORS))
+        return cls(options.seed, benches), [draw(options.seed, number, benches) for number in numbers]
+
+    def identity(self) -> dict[str, Any]:
+        files = [paths.ROOT / "tools" / "bench" / "soak.py", *(self.benches[key].library.path for key in sorted(self.benches))]
+        return {"seed": self.seed, "motors": [list(key) for key in sorted(self.benches)], "files": [zlib.crc32(path.read_bytes()) for path in files]}
+
+    def amount(self, item: Segment) -> float:
+        return item.scenario.duration_s / 3600.0
+
+    def plans(self, items: list[Segment]) -> list[tuple[Scenario, dict[str, float]]]:
+        return [(item.scenario, self.benches[item.motor, item.mode].library.params) for item in items]
+
+    def row(self, item: Segment, tell: draws.Tell) -> dict[str, Any]:
+        return self._row(item, run(item, self.benches, lambda seconds: tell(seconds / 3600.0)))
+
+    def _row(self, item: Segment, found: Run) -> dict[str, Any]:
+        return row_of(item, found, motor_file.load(str(self.benches[item.motor, item.mode].motor.path)).rated_speed_rpm)
+
+    def alone(self, item: Segment, folder: Path) -> tuple[dict[str, Any], str]:
+        bench, found = self.benches[item.motor, item.mode], run(item, self.benches, lambda seconds: None)
+        row = self._row(item, found)
+        text = f"{draws.reported(found, bench, folder)}\n\nsegment {item.number}, {item.motor}, header of {paths.shown(bench.motor.path)}: {row['verdict']}"
+        return {"title": item.scenario.title, "passed": row["verdict"] == OK, "row": row}, text
+
+    def curves(self, item: Segment) -> Run:
+        return run(item, self.benches, lambda seconds: None)
+
+    def is_bad(self, row: dict[str, Any]) -> bool:
+        return row["verdict"] != OK
+
+    def line(self, row: dict[str, Any]) -> str:
+        return f"segment {row['segment']}, {row['motor']}{', ' + row['mode'] if row['mode'] else ''}: {row['verdict']}"
+
+    def text(self, rows: list[dict[str, Any]]) -> str:
+        """What was run and what went wrong, by motor."""
+        lines = []
+        for name in sorted({row["motor"] for row in rows}):
+            own = [row for row in rows if row["motor"] == name]
+            lines.append(f"{name:28} {sum(row['motor_s'] for row in own) / 3600.0:8.3f} h {sum(row['starts'] for row in own):6d} starts "
+                         f"{sum(row['stretches'] for row in own):6d} stretches, worst speed error {max(row['worst_speed_error_percent'] for row in own):.2f} %, "
+                         f"{sum(map(self.is_bad, own))} wrong")
+        return "\n".join(lines)
+
+    def worst(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        return sorted(rows, key=lambda row: (not self.is_bad(row), 0.0 if self.is_bad(row) else -row["worst_speed_error_percent"]))[:12]
+
+    def page(self, rows: list[dict[str, Any]]) -> tuple[dict[str, Any], page.Page]:
+        bad, hours = sum(map(self.is_bad, rows)), sum(row["motor_s"] for row in rows) / 3600.0
+        title = f"{hours:.3f} motor hours, seed {self.seed}"
+        return {"title": title, "passed": not bad, "motor_hours": hours, "wrong": bad}, page.Page(
+            f"soak: {title}", not bad, f"{len(rows) - bad} of {len(rows)} segments without a fault", self.text(rows).splitlines())
 
 
 def prepared(names: list[str]) -> dict[tuple[str, str], Bench]:
@@ -90,44 +146,6 @@ def prepared(names: list[str]) -> dict[tuple[str, str], Bench]:
             library = command_common.library_for([mode] if mode else [], None, header)
             result[motor.name, mode] = Bench(motor_file.part(str(motor.path)), board_file.part(*board_file.named(motor, None)), library, [])
     return result
-
-
-def command(options: argparse.Namespace) -> int:
-    """The whole command; returns the exit code."""
-    if not 0.0 < options.hours <= MOST_HOURS:
-        raise UserError(f"{options.hours:g} motor hours are impossible", "--hours", f"choose more than 0, at most {MOST_HOURS:g}")
-    if min(options.case or [1]) < 1:
-        raise UserError(f"{min(options.case)} is no number of a segment", "--case", "choose 1 or more")
-    benches = prepared(options.motor or paths.names(paths.MOTORS))
-    numbers = sorted(set(options.case)) if options.case else list(range(1, math.ceil(3600.0 * options.hours / SEGMENT_S) + 1))
-    segments = [draw(options.seed, number, benches) for number in numbers]
-    target = options.out or RESULTS / (f"seed-{options.seed}" + (f"-case-{numbers[0]}" if options.case else ""))
-    if options.case and len(segments) == 1:
-        return _alone(segments[0], benches, target)
-    part = Part(target, _identity(options.seed, benches), KEYS, "segment")
-    known = part.rows()
-    missing = [segment for segment in segments if segment.number not in known]
-    if len(missing) < len(segments):
-        print(f"{len(segments) - len(missing)} of {len(segments)} segments are there already, {paths.shown(part.folder)}")
-    with Progress("soak", sum(segment.scenario.duration_s for segment in segments) / 3600.0, options.quiet, "motor hours") as progress:
-        progress(sum(segment.scenario.duration_s for segment in segments if segment.number in known) / 3600.0)
-        workers.run_all(missing, lambda segment, tell: _one(segment, benches, part, tell), progress)
-    found = part.rows()
-    rows = [found[segment.number] for segment in segments]
-    with output.ResultFolder(target) as folder:
-        _write(folder.work, rows, segments, benches, options.seed)
-    part.remove()
-    print(_text(rows))
-    print(f"results in {paths.shown(target)}/: index.html")
-    bad = [row for row in rows if row["verdict"] != OK]
-    for row in bad[:20]:
-        print(f"segment {row['segment']}, {row['motor']}{', ' + row['mode'] if row['mode'] else ''}: {row['verdict']}")
-    return 1 if bad else 0
-
-
-def _identity(seed: int, benches: dict[tuple[str, str], Bench]) -> dict[str, Any]:
-    files = [paths.ROOT / "tools" / "bench" / "soak.py", *(benches[key].library.path for key in sorted(benches))]
-    return {"seed": seed, "motors": [list(key) for key in sorted(benches)], "files": [zlib.crc32(path.read_bytes()) for path in files]}
 
 
 def draw(seed: int, number: int, benches: dict[tuple[str, str], Bench]) -> Segment:
@@ -270,11 +288,6 @@ class _Drawing:
         self._rest(0.0)
 
 
-def _one(segment: Segment, benches: dict[tuple[str, str], Bench], part: Part, tell: Callable[[float], None]) -> None:
-    found = run(segment, benches, lambda seconds: tell(seconds / 3600.0))
-    part.add(row_of(segment, found, motor_file.load(str(benches[segment.motor, segment.mode].motor.path)).rated_speed_rpm))
-
-
 def run(segment: Segment, benches: dict[tuple[str, str], Bench], tell: Callable[[float], None]) -> Run:
     """The segment in this process, which can run no other board afterwards."""
     bench = benches[segment.motor, segment.mode]
@@ -297,9 +310,8 @@ def row_of(segment: Segment, found: Run, rated_rpm: float) -> dict[str, Any]:
 
 def verdict(run: Run, errors: list[tuple[float, float, float]], angle_deg: float) -> str:
     """The first thing that is wrong; OK if nothing is."""
-    for _, at_s, name in run.fault_changes():
-        if name != run.faults.get(0, "NONE"):
-            return f"trips: {name} at {at_s:.3f} s"
+    for _, at_s, name in run.raised():
+        return f"trips: {name} at {at_s:.3f} s"
     for at_s, error_percent, allowed_percent in errors:
         if abs(error_percent) > allowed_percent:
             return f"speed {error_percent:+.2f} % off at {at_s:.2f} s, allowed {allowed_percent:.2f} %"
@@ -327,50 +339,3 @@ def _angle_error_deg(run: Run) -> float:
     if len(error) < rows:
         return 0.0
     return float(np.max(np.min(np.lib.stride_tricks.sliding_window_view(error, rows), axis=1)))
-
-
-def _alone(segment: Segment, benches: dict[tuple[str, str], Bench], target: Path) -> int:
-    bench = benches[segment.motor, segment.mode]
-    with output.ResultFolder(target) as folder:
-        row, text = workers.run_all([segment], lambda item, tell: _report(item, benches, folder.work), lambda seconds: None)[0]
-        output.write_summary(folder.work, report.clean({"title": segment.scenario.title, "passed": row["verdict"] == OK, "row": row}))
-    print(text)
-    print(f"\nsegment {segment.number}, {segment.motor}, header of {paths.shown(bench.motor.path)}: {row['verdict']}")
-    print(f"results in {paths.shown(target)}/: index.html")
-    return 0 if row["verdict"] == OK else 1
-
-
-def _report(segment: Segment, benches: dict[tuple[str, str], Bench], folder: Path) -> tuple[dict[str, Any], str]:
-    bench = benches[segment.motor, segment.mode]
-    found = run(segment, benches, lambda seconds: None)
-    data = report.summary(found, [], str(bench.motor.path), str(bench.board.path))
-    output.write_trace(folder / "trace.csv", found.trace)
-    report.write_page(folder, found, [], data)
-    return row_of(segment, found, motor_file.load(str(bench.motor.path)).rated_speed_rpm), report.text(found, [], data)
-
-
-def _text(rows: list[dict[str, Any]]) -> str:
-    """What was run and what went wrong, by motor."""
-    lines = []
-    for name in sorted({row["motor"] for row in rows}):
-        own = [row for row in rows if row["motor"] == name]
-        lines.append(f"{name:28} {sum(row['motor_s'] for row in own) / 3600.0:8.3f} h {sum(row['starts'] for row in own):6d} starts "
-                     f"{sum(row['stretches'] for row in own):6d} stretches, worst speed error {max(row['worst_speed_error_percent'] for row in own):.2f} %, "
-                     f"{sum(row['verdict'] != OK for row in own)} wrong")
-    return "\n".join(lines)
-
-
-def _write(folder: Path, rows: list[dict[str, Any]], segments: list[Segment], benches: dict[tuple[str, str], Bench], seed: int) -> None:
-    output.write_csv(folder / SEGMENTS, list(KEYS), [[row[key] for key in KEYS] for row in rows])
-    bad = [row for row in rows if row["verdict"] != OK]
-    hours = sum(row["motor_s"] for row in rows) / 3600.0
-    output.write_summary(folder, report.clean({"title": f"{hours:.3f} motor hours, seed {seed}", "passed": not bad, "motor_hours": hours, "wrong": len(bad)}))
-    shown = (bad + sorted((row for row in rows if row["verdict"] == OK), key=lambda row: -row["worst_speed_error_percent"]))[:12]
-    by_number = {segment.number: segment for segment in segments}
-    pictures = [workers.run_all([by_number[row["segment"]]], lambda item, tell: picture.of(run(item, benches, tell), 4 * picture.SWEEP_STRETCHES),
-                                lambda seconds: None)[0] for row in shown]
-    table = page.Table("The worst segments", list(KEYS), [page.Row([str(row[key]) for key in KEYS], row["verdict"] != OK, number)
-                                                          for number, row in enumerate(shown)])
-    page.write(folder, page.Page(f"soak: {hours:.3f} motor hours, seed {seed}", not bad, f"{len(rows) - len(bad)} of {len(rows)} segments without a fault",
-                                 [*_text(rows).splitlines(), "make soak CASE=number runs one segment again, with its whole report."], [table], pictures, [], [],
-                                 [SEGMENTS, output.SUMMARY]))

@@ -1,25 +1,26 @@
-"""Many runs of one kind: builds a scenario for each case, runs them in parallel and keeps what the tables need."""
+"""A sweep: a table of what is asked, a case for each row, all of them run side by side, then verdicts, the printed table and the result folder.
 
-import math
-from collections.abc import Callable
+A kind of sweep is a subclass of Sweep with what is its own."""
+
+import argparse
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-import numpy as np
-
-from tools.common import motor_file, workers
+from tools.common import motor_file, output, paths, workers
+from tools.common.board_keys import Part
+from tools.common.errors import UserError
 from tools.common.progress import Progress
 from tools.common.toml_file import Document
-from . import command_common, picture, report, simulate
-from .metrics import Measure
+from tools.common.trace import MOST_ROWS
+from . import case, command_common, long_run, report, simulate
+from .board import Library
+from .expect import Outcome
 from .run import Run
-from .scenario import BRAKE, Event, Scenario, param, start_time_s
 
-MEASURE = "measured"
-S3_DEBOUNCE_S = 0.03
-HIGHEST_OVER_S = 0.1
-"""The highest speed of a run is a mean over this time."""
+QUICKEST_HZ = 40e3
+"""Rows a second of motor time, at most."""
 
 
 def within(minimum: float, maximum: float = float("inf")) -> Any:
@@ -28,7 +29,7 @@ def within(minimum: float, maximum: float = float("inf")) -> Any:
 
 
 @dataclass(kw_only=True)
-class Table:
+class AnyMotorTable:
     """What a sweep asks for, from scenarios/tables/NAME.toml. Every field is a key there, but those that end with "where": they tell
     where the others were read."""
 
@@ -51,149 +52,158 @@ class Table:
         root.close()
         return cls(**values)
 
+    def same_lengths(self, *names: str) -> None:
+        """Refuses columns of different lengths."""
+        if len({len(getattr(self, name)) for name in names}) > 1:
+            raise UserError("columns of different lengths", getattr(self, f"{names[0]}_where"),
+                            f"give {', '.join(names[:-1])} and {names[-1]} as many numbers each")
+
+
+@dataclass(kw_only=True)
+class Table(AnyMotorTable):
+    """A table that is for a motor."""
+
+    motor: str
+    motor_where: str
+
+    def for_motor(self, motor: motor_file.Motor, params: dict[str, float]) -> Any:
+        """The table for another motor than its own."""
+        return self
+
+
+@dataclass(kw_only=True)
+class Loaded:
+    """The times of case.loaded_run()."""
+
+    start_s: float = within(0.01, 60.0)
+    settle_s: float = within(0.01, 60.0)
+    torque_over_s: float = within(0.01, 60.0)
+    measure_s: float = within(0.01, 60.0)
+
 
 @dataclass
-class Search:
-    """How far something may go in one direction from `start`: `good` still does, `bad` is the first that does not, `why` says what happens
-    there. No `bad`: all that were tried do. What works again beyond the first failure does not count."""
+class Sweep:
+    """One sweep. Of its own a kind has, beside what differs from the following,
 
-    upwards: bool
-    holds: Callable[[dict[str, Any]], bool]
-    start: float
-    tried: dict[float, tuple[bool, str]] = field(default_factory=dict, kw_only=True)
-    good: float = field(init=False, default=0.0)
-    bad: float | None = field(init=False, default=None)
-    why: str = field(init=False, default="")
+    cases()            what runs, in order
+    job(case)          a case, ready to run
+    check(case, row)   what must hold for its row: Outcomes
+    """
 
-    def narrow(self, value: float, row: dict[str, Any]) -> None:
-        """Learn from one run."""
-        self.tried[value] = (self.holds(row), row["verdict"])
-        self.good, self.bad, self.why = self.start, None, ""
-        for known in sorted(self.tried, reverse=not self.upwards):
-            holds, verdict = self.tried[known]
-            if not holds:
-                self.bad, self.why = known, verdict
-                return
-            self.good = known
+    table: Any
+    motor: Part | None = None
+    board: Part | None = None
+    library: Library | None = None
+    used: dict[str, Any] = field(default_factory=dict)
+    """command_common.used()"""
+    quiet: bool = True
+    outcomes: list[Outcome] = field(default_factory=list)
 
-    def next(self, resolution: float) -> float | None:
-        """The value to try next; None when it is known well enough."""
-        if self.bad is None or max(self.good, self.bad) / min(self.good, self.bad) <= 1.0 + resolution:
-            return None
-        return math.sqrt(self.good * self.bad)
+    name, about, kind_of_table, defines = "", "", Table, ()
+    columns: ClassVar[Any] = ()
+    """as printed: key, heading, format"""
+    keys: ClassVar[Any] = ()
+    """of the CSV file"""
+
+    @property
+    def params(self) -> dict[str, float]:
+        return self.library.params
+
+    @classmethod
+    def read(cls, options: argparse.Namespace) -> Any:
+        """The table that is asked for."""
+        return cls.kind_of_table.read(paths.TABLES / f"{cls.name}.toml")
+
+    def ask(self, options: argparse.Namespace) -> None:
+        """Takes what else the command line says."""
+
+    def measured(self, run: Run, item: Any) -> dict[str, Any]:
+        """What is read from a case's run, in the process that ran it."""
+        return case.reduced(run)
+
+    def row(self, item: Any, job: simulate.Job, result: dict[str, Any]) -> dict[str, Any]:
+        """A row of the table, without its verdict."""
+        return result
+
+    def verdict(self, item: Any, row: dict[str, Any]) -> str:
+        """"ok", or the first thing that does not hold; "" for a kind that has Outcomes only."""
+        return ""
+
+    def more(self, rows: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
+        """What else goes into the summary: pictures, and what is found out after the cases."""
+        return {}
+
+    def head(self) -> dict[str, Any]:
+        """What the summary begins with."""
+        return {"title": self.table.title, **self.used}
+
+    def title(self, rows: list[dict[str, Any]]) -> str:
+        return self.table.title
+
+    def text(self, rows: list[dict[str, Any]]) -> str:
+        """The printed table."""
+        return report.table(rows, self.columns)
+
+    def told(self, rows: list[dict[str, Any]]) -> str:
+        """All that is printed of the results."""
+        return f"{self.title(rows)}\n\n{report.used_text(self.used)}\n\n{self.text(rows)}"
+
+    def results(self, title: str, jobs: list[simulate.Job]) -> list[dict[str, Any]]:
+        """What was measured, in the order of the jobs."""
+        return run_cases(title, jobs, self.quiet, self._work)
+
+    def _work(self, job: simulate.Job, tell: Callable[[float], None]) -> dict[str, Any]:
+        return self.measured(simulate.simulate(job, tell), job.case)
+
+    def run(self, items: Sequence[Any], title: str) -> list[dict[str, Any]]:
+        """The rows of these cases, in order."""
+        jobs = [self.job(item) for item in items]
+        for job, item in zip(jobs, items):
+            job.case = item
+        rows = [self.row(item, job, result) for item, job, result in zip(items, jobs, self.results(title, jobs))]
+        return [row | ({"verdict": verdict} if (verdict := self.verdict(item, row)) else {}) for item, row in zip(items, rows)]
+
+    def finish(self, target: Path) -> int:
+        """Runs all of it, leaves the results in their folder and says how it went; returns the exit code."""
+        with output.ResultFolder(target) as folder:
+            items = self.cases()
+            rows = self.run(items, self.name)
+            self.outcomes = [outcome for item, row in zip(items, rows) for outcome in self.check(item, row)] + self.outcomes
+            more = self.more(rows, folder.work)
+            report.write_table(folder.work, self.name, self.keys, rows, self.outcomes, self.head(), more)
+        print(self.told(rows))
+        print(f"\nresults in {paths.shown(target)}/: index.html")
+        return command_common.verdict(self.name, self.outcomes)
+
+    @classmethod
+    def command(cls, options: argparse.Namespace) -> int:
+        """The whole command; returns the exit code."""
+        table = cls.read(options)
+        motor, board, library, used = command_common.set_up(table, options, list(cls.defines))
+        target = command_common.results(cls.name, table.motor, options)
+        if motor.path.stem != table.motor:
+            table = table.for_motor(motor_file.load(str(motor.path)), library.params)
+        sweep = cls(table, motor, board, library, used, options.quiet)
+        sweep.ask(options)
+        return sweep.finish(target)
+
+    @classmethod
+    def add_command(cls, commands: Any) -> argparse.ArgumentParser:
+        """Adds the sweep to a command line's commands."""
+        parser = commands.add_parser(cls.name, help=cls.about)
+        command_common.add_options(parser, cls.name)
+        parser.set_defaults(command=cls.command)
+        return parser
 
 
-def start_events(start_s: float, speed_rpm: float, nominal_rpm: float, where: str) -> list[Event]:
-    """Potentiometer and buttons for a start at speed_rpm; above the nominal speed S3 follows after the hand-over."""
-    press = {"kind": "press", "hold_s": 0.1, "where": where}
-    first = min(speed_rpm, nominal_rpm)
-    events = [Event(0.0, "speed_rpm", where, value=first), Event(start_s, button="S2", **press)]
-    if speed_rpm > nominal_rpm:
-        fast_s = start_s + 2.0
-        events += [Event(fast_s, button="S3", **press), Event(fast_s + S3_DEBOUNCE_S, "speed_rpm", where, value=speed_rpm)]
-    return events
+def side_by_side(jobs: list[simulate.Job]) -> int:
+    """How many of the jobs may run at once: as many as there are processors, but of long ones only two, for their traces take 0.3 GB each."""
+    rows = min(MOST_ROWS, max((job.scenario.duration_s for job in jobs), default=0.0) * QUICKEST_HZ)
+    return max(1, min(workers.processors(), int(2 * MOST_ROWS / max(rows, 1.0))))
 
 
-def scenario(name: str, title: str, events: list[Event], reference_rpm: float, from_s: float, to_s: float, **more: Any) -> Scenario:
-    """A scenario that ends with its only measure."""
-    return Scenario(name, title, "", "", "", to_s, events=sorted(events, key=lambda event: event.at_s),
-                    measures=[Measure(MEASURE, from_s, to_s, reference_rpm)], **more)
-
-
-def ramp_time_s(params: dict[str, float], rpm: float) -> float:
-    """How long the reference takes from the end of the start to a speed."""
-    return abs(rpm - param(params, "END_SPEED_RPM")) / param(params, "SPEEDREFRAMP_RPM_PER_S")
-
-
-def shares(table_motor: str, motor: motor_file.Motor, speeds_rpm: list[float], torques_nm: list[float]) -> tuple[list[float], list[float]]:
-    """A table's speeds and torques for another motor than the table's own: the same shares of its rating, to three digits."""
-    own = motor_file.load(table_motor)
-    by_speed, by_torque = motor.rated_speed_rpm / own.rated_speed_rpm, motor.rated_torque_nm / own.rated_torque_nm
-    return [three_digits(rpm * by_speed) for rpm in speeds_rpm], [three_digits(torque * by_torque) for torque in torques_nm]
-
-
-def three_digits(value: float) -> float:
-    """The value as it is printed."""
-    return float(f"{value:.3g}")
-
-
-def within_header(params: dict[str, float], rpm: float) -> float:
-    """The speed nearest to this one that the header allows."""
-    return min(max(rpm, param(params, "MINIMUM_SPEED_RPM")), param(params, "MAXIMUM_SPEED_RPM"))
-
-
-def loaded_run(params: dict[str, float], rpm: float, times: Any, name: str, torque_nm: float = 0.0,
-               start_torque_nm: float = 0.0) -> tuple[list[Event], float]:
-    """A start under `start_torque_nm`, then to a speed, then the brake to `torque_nm`: the events, and the time at which the motor should
-    have settled. `times` has start_s (of S2), settle_s, torque_over_s, and where it was read; `name` says in an error what was asked for."""
-    where = times.where
-    closed_s = times.start_s + start_time_s(params)
-    at_speed_s = closed_s + ramp_time_s(params, rpm) + times.settle_s
-    first = min(max(rpm, param(params, "MINIMUM_SPEED_RPM")), param(params, "NOMINAL_SPEED_RPM"))
-    events = [Event(0.0, "set", where, keys={BRAKE: start_torque_nm}), Event(0.0, "speed_rpm", where, value=first),
-              Event(times.start_s, "press", where, button="S2", hold_s=0.1),
-              Event(closed_s, "speed_rpm", where, value=rpm, finds_range=True, written=name)]
-    if torque_nm == start_torque_nm:
-        return events, at_speed_s
-    events.append(Event(at_speed_s, "set", where, keys={BRAKE: torque_nm}, over_s=times.torque_over_s))
-    return events, at_speed_s + times.torque_over_s + times.settle_s
-
-
-def _work(job: simulate.Job, report: Callable[[float], None]) -> dict[str, Any]:
-    return reduced(simulate.simulate(job, report))
-
-
-def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any] = _work) -> list[Any]:
-    """The results of all jobs, in order; reduced, if `work` does not make something else of a job."""
+def run_cases(title: str, jobs: list[simulate.Job], quiet: bool, work: Callable[..., Any]) -> list[Any]:
+    """What `work` makes of each job, in order."""
+    long_run.say(title, [(job.scenario.duration_s, lambda job=job: job.long) for job in jobs])
     with Progress(title, sum(job.scenario.duration_s for job in jobs), quiet) as progress:
-        return workers.run_all(jobs, work, progress)
-
-
-def reduced(run: Run) -> dict[str, Any]:
-    """What a table needs of a run."""
-    hand_overs = run.hand_overs()
-    faults = [(at_s, name) for _, at_s, name in run.fault_changes() if name != run.faults.get(0, "NONE")]
-    return {"picture": picture.of(run, picture.SWEEP_STRETCHES), **run.measures[MEASURE],
-            "closed_after_s": hand_overs[0].after_s2_s if hand_overs else None,
-            "overshoot_percent": hand_overs[0].overshoot_percent if hand_overs else None,
-            "hand_over_rpm": hand_overs[0].speed_rpm if hand_overs else None, "back_rpm": back_rpm(run), "fault": faults[0][1] if faults else None,
-            "fault_s": faults[0][0] if faults else None,
-            "highest_rpm": highest_rpm(run), "warnings": run.warnings, "motor_s": run.motor_s, "wall_s": run.wall_s}
-
-
-def back_rpm(run: Run) -> float:
-    """The highest true speed against a start forwards, until the closed loop or a fault ends it."""
-    ends = [at_s for _, at_s, name in run.state_changes() if name in ("CLOSED", "FAULT")]
-    return max(0.0, -float(np.min(run.trace.part(0.0, ends[0] if ends else run.trace.time_s[-1]).column("plant.speed_rpm"), initial=0.0)))
-
-
-def limit_text(result: dict[str, Any]) -> str:
-    """What explains a shortfall of more than 0.5 %, and for which share of the time; "" where there is none."""
-    if result["fault"]:
-        return f"fault {result['fault']}"
-    error = result["speed_error_percent"]
-    if error is None or error >= -0.5:
-        return ""
-    return report.limits_text(result["limited_percent"]) or "not limited"
-
-
-def speed_verdict(row: dict[str, Any], error_percent: float) -> str:
-    """"" if the mean speed is at its reference, else by how much it is not, and the limit that explains it."""
-    error = row["speed_error_percent"]
-    if error is not None and abs(error) <= error_percent:
-        return ""
-    reason = limit_text(row)
-    return ("no speed" if error is None else f"speed {error:+.1f} %") + (f" ({reason})" if reason else "")
-
-
-def highest_rpm(run: Run) -> float | None:
-    """The highest true speed in closed loop that lasted for HIGHEST_OVER_S, against either direction; None without closed loop."""
-    if "fw.state" not in run.trace:
-        return None
-    closed = np.flatnonzero(run.trace.column("fw.state") == run.state_number("CLOSED"))
-    rows = max(1, round(HIGHEST_OVER_S / run.trace.period_s)) if len(run.trace) > 1 else 1
-    if len(closed) < rows:
-        return None
-    speed = np.abs(run.trace.column("plant.speed_rpm")[closed[0]:closed[-1] + 1].astype(np.float64))
-    sums = np.concatenate(([0.0], np.cumsum(speed)))
-    return float(np.max(sums[rows:] - sums[:-rows]) / rows)
+        return workers.run_all(jobs, work, progress, side_by_side(jobs))

@@ -21,8 +21,8 @@ from .panel import Action
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, early_ramp_s, param, start_time_s
 
-EVERY = 4
-"""Periods to a row of the trace."""
+EVERY, MOST_ROWS = 4, 400_000
+"""Periods to a row of the trace, and rows at most: a case has five of it at once."""
 START_S, PRESS_S = 0.15, 0.1
 WAIT_STEP_S = 0.001
 SETTLE_S = 0.4
@@ -158,7 +158,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
     way = scene(case, bench)
     job = simulate.prepare(way.scenario, bench.library, bench.motor, bench.board)
     with simulate.using(bench.new_board(), job) as board:
-        session = simulate.Session(job, bench.library, board, tell, EVERY)
+        session = simulate.Session(job, bench.library, board, tell, EVERY, MOST_ROWS)
         _to_the_moment(session, way, case)
         injected_s = session.now_s
         state = bench.library.states.get(int(board.get("fw.state")), "?")

@@ -14,6 +14,7 @@ from .errors import UserError
 
 _ENDING = {signal.SIGINT, signal.SIGTERM}
 _ended: list[int] = []
+NO_MEMORY = "close other programs"
 
 
 def end(number: int, frame: Any) -> None:
@@ -32,6 +33,11 @@ class _Running:
 Report = Callable[[float], None]
 
 
+def processors() -> int:
+    """Those that this program may use."""
+    return (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()) or 1
+
+
 def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Report, processes: int | None = None) -> list[Any]:
     """Results of work(job, report) for every job, in order, with at most `processes` at a time (default: one per processor).
 
@@ -39,7 +45,7 @@ def run_all(jobs: list[Any], work: Callable[[Any, Report], Any], progress: Repor
     raised here; a process that dies is an error too. Whatever happens, no process is left behind.
     """
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    limit = processes or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()) or 1
+    limit = processes or processors()
     results: list[Any] = [None] * len(jobs)
     waiting = list(enumerate(jobs))[::-1]
     running: dict[Any, _Running] = {}
@@ -78,7 +84,17 @@ def _child(work: Any, job: Any, other_end: Any, pipe: Any) -> None:
     try:
         pipe.send(("result", work(job, lambda seconds: pipe.send(("progress", seconds)))))
     except UserError as error:
-        pipe.send(("error", str(error)))
+        pipe.send(("error", UserError(str(error))))
+    except MemoryError:
+        pipe.send(("error", UserError("no memory is left", "", NO_MEMORY)))
+    except OSError as error: # a full disk is the caller's matter
+        pipe.send(("error", error))
+
+
+def _died(code: int) -> UserError:
+    if code == -signal.SIGKILL:
+        return UserError("the simulation was killed", "most often for want of memory", NO_MEMORY)
+    return UserError("the simulation ended by itself", f"exit code {code}", "a crash in the virtual board or the firmware; build with SAN=1 to find it")
 
 
 def _receive(running: dict[Any, _Running], pipe: Any, results: list[Any], progress: Callable[[float], None]) -> None:
@@ -87,13 +103,12 @@ def _receive(running: dict[Any, _Running], pipe: Any, results: list[Any], progre
         kind, value = pipe.recv()
     except EOFError:
         item.process.join()
-        raise UserError("the simulation ended by itself", f"exit code {item.process.exitcode}",
-                        "a crash in the virtual board or the firmware; build with SAN=1 to find it") from None
+        raise _died(item.process.exitcode) from None
     if kind == "progress":
         progress(value)
         return
     if kind == "error":
-        raise UserError(value)
+        raise value
     results[item.number] = value
     item.process.join()
     pipe.close()
