@@ -18,8 +18,9 @@ HERE = Path(__file__).parent
 PAGE = "docs/deviations.md"
 BUILD = Path("build/static")
 MODE_TABLE = Path("include/drive/modes/mode_table.h")
-COMBINED = [("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"), 
-            ("TUNING", "SELFTEST_OFF"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
+COMBINED = [("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
+            ("TUNING", "SELFTEST_OFF"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"),
+            ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
 ON_TARGET = ("__XC16__",)
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
     -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits
@@ -151,8 +152,9 @@ def one_unit(sources: list[str]) -> str:
 
 
 def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[str]) -> list[Finding]:
-    """Its own checks and those of its MISRA addon, with the target's type sizes: of the unit in configurations that have every line between them,
-    without the parameters' start values, which are most of the text of each; of each file (some rules read its text only) what is delivered."""
+    """Its own checks and those of its MISRA addon, with the target's type sizes: of the unit in configurations that have every line
+    between them, without the parameters' start values, which are most of the text of each; of each file, for some rules read its text only,
+    what is delivered."""
     sources = [source for source in sources if source not in CHECKS_OF_PARAMETERS]
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
         Path(folder, "drive").mkdir()
