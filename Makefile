@@ -292,11 +292,11 @@ bench_py := $(call py_tests,tools) $(call py_tests,behaviour) $(call py_tests,fu
 tools_py := $(call py_tests,static) $(call py_tests,coverage)
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
-# The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps.
-slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams live_page make_%),$(bench_py))
+# The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps, no search for a parameter's ends.
+slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams live_% make_% campaign setup suites),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search low_speeds)
 longest := $(slow_suites)
-quick_suites := $(filter-out golden/%,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
+quick_suites := $(filter-out golden/% unit/test_param_ranges,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
 all_suites := $(tools_py) $(longest) $(filter-out $(longest) $(sweep_suites),$(bench_py)) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
 
 # Every chosen suite runs anew. make leaves a stamp for each that it could build; one without has failed.

@@ -11,6 +11,16 @@ pytest_plugins = ["unity_suites", "side_by_side"]
 
 
 @pytest.fixture
+def terminals() -> None:
+    """Skips a test where the machine has no pseudo-terminals (a container without devpts)."""
+    try:
+        for end in os.openpty():
+            os.close(end)
+    except OSError as error:
+        pytest.skip(f"this machine has no pseudo-terminals: {error}")
+
+
+@pytest.fixture
 def make(pytestconfig: pytest.Config):
     """Runs a make target that is a test by itself; what it says is the failure's text."""
     def run(target: str) -> None:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+DEAREST = 10 # suites that the end names with their time
+
 
 def pytest_addoption(parser) -> None:
     group = parser.getgroup("foc33")
@@ -77,10 +79,12 @@ class Child:
         except ProcessLookupError:
             pass
 
-    def end(self) -> str:
+    def end(self) -> tuple[str, float]:
+        """How it ended, and the processor seconds of all that it has waited for."""
         os.close(self.pipe)
-        code = os.waitstatus_to_exitcode(os.waitpid(self.process, 0)[1])
-        return f"signal {-code}" if code < 0 else f"exit {code}"
+        _, status, used = os.wait4(self.process, 0)
+        code = os.waitstatus_to_exitcode(status)
+        return f"signal {-code}" if code < 0 else f"exit {code}", used.ru_utime + used.ru_stime
 
 
 def run_child(config: pytest.Config, items: list[pytest.Item], writer: int) -> None:
@@ -114,6 +118,7 @@ class SideBySide:
         self.counts: dict[str, Counter] = {}
         self.ignored: list[str] = []
         self.failed: list[str] = []
+        self.took: list[tuple[float, float, str]] = []
         self.told_s = time.monotonic()
 
     @pytest.hookimpl(tryfirst=True)
@@ -178,7 +183,8 @@ class SideBySide:
 
     def finish(self, child: Child) -> None:
         """The suite's line; one that ended too early, or had nothing but ignored tests, has failed."""
-        end, seconds = child.end(), time.monotonic() - child.start
+        (end, cpu_s), seconds = child.end(), time.monotonic() - child.start
+        self.took.append((seconds, cpu_s, child.suite))
         counts = self.counts.setdefault(child.suite, Counter())
         if child.missing:
             how = f"no end after {self.limit_s:g} s" if seconds > self.limit_s else f"crashed: {end}"
@@ -216,6 +222,10 @@ class SideBySide:
             print(f"FAILED {line}")
         if not self.counts:
             print("FAILED: no test suite was run")
+        if len(self.took) > DEAREST:
+            print("dearest suites, in seconds, and seconds of a processor:")
+            for seconds, cpu_s, suite in sorted(self.took, reverse=True)[:DEAREST]:
+                print(f"  {suite:49} {seconds:8.1f} {cpu_s:8.1f}")
         if self.config.option.summary:
             numbers = {name: total[name] for name in ("passed", "failed", "skipped")}
             Path(self.config.option.summary).write_text(json.dumps(numbers) + "\n", encoding="utf-8")

@@ -190,7 +190,8 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
     speed = np.zeros_like(rotor)
     dry = np.repeat(np.array(loads), angles) + motor.coulomb_nm
     forced, turning = 0.0, 2.0 * math.pi * LOCK_TURNS / lock_s
-    locked, back = rotor, 0.0
+    hold = dry * step / inertia
+    locked, lowest = rotor, speed
     kept: list[tuple[float, float, np.ndarray]] = []
     every = max(1, count // 800)
     for k in range(count):
@@ -200,10 +201,10 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
         drive = pull * min(now / lock_s, 1.0) * np.sin(forced - rotor) - motor.viscous_nms * speed - (damping - motor.viscous_nms) * (speed - forced_speed / pairs)
         moving = np.abs(speed) > 1e-9
         free = speed + step / inertia * drive
-        slowed = np.where(np.abs(free) <= dry * step / inertia, 0.0, free - np.sign(free) * dry * step / inertia)
+        slowed = np.where(np.abs(free) <= hold, 0.0, free - np.sign(free) * hold)
         speed = np.where(moving | (np.abs(drive) > dry), slowed, 0.0)
         rotor = rotor + pairs * speed * step
-        back = max(back, -float(speed.min()))
+        lowest = np.minimum(lowest, speed)
         if now <= lock_s:
             locked = rotor - forced
         if k % every == 0:
@@ -216,7 +217,7 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
     times, forced_rpm, rotor_rpm = (np.array([row[i] for row in kept]) for i in range(3))
     last = times > times[-1] - 0.1 # the plateau at the end speed
     return Trial(times, rotor_rpm, forced_rpm, ~(slipped | lost), labels, float(np.abs(rotor_rpm[last] - forced_rpm[last, None]).max()),
-                 back / RPM)
+                 max(0.0, -float(lowest.min())) / RPM)
 
 
 def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, maximum_a: float, trip_a: float, nominal_rpm: float,

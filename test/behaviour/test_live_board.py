@@ -202,7 +202,7 @@ def running(*options: str):
         assert process.wait() == 0
 
 
-def test_over_a_pseudo_terminal_in_real_time(parts):
+def test_over_a_pseudo_terminal_in_real_time(terminals, parts):
     pytest.importorskip("serial")
     with running(f"--defines={MACROS}") as (_, told):
         port = re.search(r"serial line +(\S+),", told)[1]

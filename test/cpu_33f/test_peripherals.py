@@ -369,12 +369,7 @@ def test_the_receivers_interrupt_comes_when_urxisel_says(mode: int, count: int) 
         assert bool(int(chip.get("reg.IFS0")) & 0x0800) == (received >= count), f"{received} characters"
 
 
-def test_on_a_pseudo_terminal() -> None:
-    try:
-        for end in os.openpty():
-            os.close(end)
-    except OSError as error:
-        pytest.skip(f"this machine has no pseudo-terminals: {error}")
+def test_on_a_pseudo_terminal(terminals) -> None:
     chip = board(PLL + UART + RECEIVER + "again: btss u1sta, #0; bra again; mov u1rxreg, w0; inc w0, w0\nmov w0, u1txreg; bra again\n")
     line = os.open(chip.terminal(), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:

@@ -1,4 +1,4 @@
-"""Static checks of the firmware: compiler warnings in every mode, cppcheck, its MISRA addon and clang-tidy.
+"""Static checks of the firmware: compiler warnings in every mode; cppcheck, its MISRA addon and clang-tidy in enough modes for every line.
 
 A finding passes only if docs/deviations.md lists it, with the check's name, the places and a reason; a line there that no finding needs
 any more fails too, so the page stays true. Environment: CC, CLANG, CLANG_TIDY, CPPCHECK (the tools to use).
@@ -17,8 +17,11 @@ from tempfile import TemporaryDirectory
 HERE = Path(__file__).parent
 PAGE = "docs/deviations.md"
 BUILD = Path("build/static")
-MODES = [(), ("OPEN_LOOP_FUNCTIONING",), ("TUNING",), ("TORQUE_MODE",), ("BIDIRECTIONAL_SPEED",), ("SNAPSHOT",), ("IDENTIFY",), ("BRINGUP",), ("PARAMS_IN_RAM",),
-         ("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED")]
+MODE_TABLE = Path("include/drive/modes/mode_table.h")
+COMBINED = [("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
+            ("TUNING", "SELFTEST_OFF"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"),
+            ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
+ON_TARGET = ("__XC16__",)
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
     -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits
     -Wfloat-equal -Wnull-dereference -Werror -c -o /dev/null""".split()
@@ -91,18 +94,44 @@ def relative(path: str) -> str:
     return os.path.relpath(path)
 
 
-def distinct(preprocessor: list[str], sources: list[str]) -> list[tuple[str, list[str]]]:
-    """Each source with the options of the modes to compile it in: one of all in which it has the same text and macros."""
-    def text(job: tuple[str, list[str]]) -> str:
-        source, options = job
-        names = {f"#define {option.removeprefix('-D')} 1" for option in options}
-        return "\n".join(line for line in run([*preprocessor, *INCLUDES, *options, "-E", "-dD", source]).splitlines() if line not in names)
+def configurations() -> list[tuple[str, ...]]:
+    """Macros of each build that is looked at: as delivered, each mode alone, with the scope, some modes together."""
+    modes = re.findall(r"^ *X\((\w+), ", MODE_TABLE.read_text(encoding="utf-8"), re.M)
+    return [(), *((mode,) for mode in modes), ("SCOPE",), *COMBINED]
 
-    jobs = [(source, [f"-D{name}" for name in mode]) for source in sources for mode in MODES]
-    first = {}
-    for job, seen in zip(jobs, each(text, jobs), strict=True):
-        first.setdefault((job[0], seen), job)
-    return list(first.values())
+
+def defines(configuration: tuple[str, ...]) -> list[str]:
+    return [f"-D{name}=1" for name in configuration]
+
+
+def preprocessed(source: str, options: list[str]) -> frozenset[tuple[str, int, str]]:
+    """Every line of the project's that these options leave: file, number, and text after expansion."""
+    lines, file, number = set(), "", 0
+    for line in run([CLANG, *CLANG_16_BIT, *INCLUDES, *options, "-w", "-E", "-dD", source]).splitlines():
+        if marker := re.match(r'# (\d+) "(.*?)"', line):
+            number, file = int(marker[1]), marker[2]
+            continue
+        if line.strip() and not os.path.isabs(file) and not file.startswith("<"):
+            lines.add((relative(file), number, line))
+        number += 1
+    return frozenset(lines)
+
+
+def distinct(source: str, of: list[tuple[str, ...]]) -> dict[tuple[str, ...], frozenset]:
+    """The configurations that differ in this source's text, with their lines."""
+    first: dict[frozenset, tuple[str, ...]] = {}
+    for configuration, lines in zip(of, each(lambda configuration: preprocessed(source, defines(configuration)), of), strict=True):
+        first.setdefault(lines, configuration)
+    return {configuration: lines for lines, configuration in first.items()}
+
+
+def cover(texts: dict[tuple[str, ...], frozenset]) -> list[tuple[str, ...]]:
+    """As few configurations as have each line that any of them has."""
+    chosen, missing = [], frozenset().union(*texts.values())
+    while missing:
+        chosen.append(max(texts, key=lambda configuration: len(texts[configuration] & missing)))
+        missing -= texts[chosen[-1]]
+    return chosen
 
 
 def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -> list[Finding]:
@@ -122,27 +151,34 @@ def one_unit(sources: list[str]) -> str:
     return str(unit)
 
 
-def cppcheck(unit: str, sources: list[str]) -> list[Finding]:
-    """Its own checks and those of its MISRA addon, with the target's type sizes: of the unit every preprocessor configuration without the
-    parameters' start values, which are most of the text of each, then of each file (some rules read its text only) the one that is delivered."""
+def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[str]) -> list[Finding]:
+    """Its own checks and those of its MISRA addon, with the target's type sizes: of the unit in configurations that have every line
+    between them, without the parameters' start values, which are most of the text of each; of each file, for some rules read its text only,
+    what is delivered."""
     sources = [source for source in sources if source not in CHECKS_OF_PARAMETERS]
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
         Path(folder, "drive").mkdir()
         Path(folder, "drive", "param_init.h").write_text("#define DRIVE_PARAMS_INIT {0}\n")
-        every, delivered = each(lambda job: one_cppcheck(*job), [(["--force", "-U__clang__", f"-I{folder}"], [unit]), (["--max-configs=1"], sources)])
-    return sorted(of_both(every, delivered), key=lambda f: (f.check, f.file, f.line))
+        chosen = cover(texts)
+        jobs = [(["-DANALYSED=1", f"-I{folder}", *defines(configuration)], [unit]) for configuration in chosen]
+        found = each(lambda job: one_cppcheck(*job), [(["--max-configs=1"], sources), *jobs])
+    return sorted(of_all(found, [texts[configuration] for configuration in ((), *chosen)]), key=lambda f: (f.check, f.file, f.line))
 
 
-def of_both(every: set[Finding], delivered: set[Finding]) -> set[Finding]:
-    """What either run finds; but what is never used is so in both."""
-    return {f for f in every ^ delivered if f.check not in UNUSED} | (every & delivered)
+def of_all(found: list[set[Finding]], texts: list[frozenset]) -> set[Finding]:
+    """What any run finds; but what is never used is so in the first, what is delivered, and in each other one that has its line; a
+    macro's is looked at by its name, in whichever branch."""
+    places = [{line[:2] for line in text} for text in texts]
+    return {finding for finding in set().union(*found) if finding.check not in UNUSED
+            or finding in found[0] and all(finding in run for run, lines in zip(found, places, strict=True)
+                                         if finding.check == "misra 2.5" or (finding.file, finding.line) in lines)}
 
 
 def one_cppcheck(options: list[str], sources: list[str]) -> set[Finding]:
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
         output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
                       f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--inconclusive",
-                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", "-U__FRAMAC__", *options, *INCLUDES, *sources])
+                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", *options, *INCLUDES, *sources])
     return {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), relative(file), int(number), text)
             for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
 
@@ -166,14 +202,14 @@ def main() -> int:
     deviations = read_deviations(Path(PAGE))
     BUILD.mkdir(parents=True, exist_ok=True)
 
-    gcc = [os.environ.get("CC", "gcc"), *GCC_FLAGS]
     unit = one_unit(sources)
-    clang_jobs = distinct([CLANG, *CLANG_16_BIT], [unit, *CHECKS_OF_PARAMETERS])
+    texts = {source: distinct(source, configurations()) for source in (unit, *CHECKS_OF_PARAMETERS)}
+    jobs = [(source, defines(configuration)) for source, its in texts.items() for configuration in its]
     checks = {
-        "cppcheck": lambda: cppcheck(unit, sources),
-        "clang_tidy": lambda: clang_tidy(clang_jobs),
-        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], clang_jobs),
-        "gcc": lambda: compiler("gcc", gcc, distinct([flag for flag in gcc if not flag.startswith(("-c", "-o", "-W"))], sources)),
+        "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources),
+        "clang_tidy": lambda: clang_tidy([(source, defines(modes)) for source, its in texts.items() for modes in cover(its)]),
+        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], jobs),
+        "gcc": lambda: compiler("gcc", [os.environ.get("CC", "gcc"), *GCC_FLAGS], jobs),
     }
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):

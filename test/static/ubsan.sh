@@ -14,7 +14,7 @@ if ! echo 'int main(void) { return 0; }' | clang-14 $sanitize -x c - -o "$logs/t
 fi
 
 report=$(UBSAN_OPTIONS=log_path=$logs/run make CC=clang-14 VARIANT=ubsan SAN= ONLY="$(cd test && ls unit/test_*.c | sed 's|\.c$||' | tr '\n' ' ')" sanitizer="$sanitize" \
-    CFLAGS="-std=gnu99 -O1 -g -fPIC -fsanitize-ignorelist=test/static/ubsan-ignore.txt $sanitize" test-quick 2>&1)
+    CFLAGS="-std=gnu99 -O0 -fPIC -fsanitize-ignorelist=test/static/ubsan-ignore.txt $sanitize" test-quick 2>&1)
 echo "$report" | sed '$d'
 summary=$(echo "$report" | grep -E '^[0-9]+ passed, [0-9]+ failed$' | tail -n 1)
 passed=${summary%% passed*}

@@ -206,7 +206,7 @@ def test_nothing_is_cut_off_or_wider_than_the_window(turning, size):
 
 
 @pytest.fixture
-def port():
+def port(terminals):
     """A board at a pseudo-terminal: its name, and the ELF file's."""
     with subprocess.Popen([sys.executable, "-m", "tools.live.board"], cwd=paths.ROOT, stdout=subprocess.PIPE, text=True) as board:
         try:

@@ -169,7 +169,7 @@ def test_a_firmware_without_a_scope_or_a_port_without_a_board_is_one_line():
 
 
 @pytest.fixture
-def taken():
+def taken(terminals):
     """A serial port that another program has."""
     serial = pytest.importorskip("serial")
     ends = os.openpty()

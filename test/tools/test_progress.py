@@ -72,7 +72,7 @@ def test_a_silent_command_is_said_to_run_still_and_its_exit_code_is_kept():
     assert (quick.returncode, quick.stdout, quick.stderr) == (0, "", "")
 
 
-def test_on_a_terminal_it_is_one_line_that_goes_away():
+def test_on_a_terminal_it_is_one_line_that_goes_away(terminals):
     pytest.importorskip("tqdm")
     ours, theirs = pty.openpty()
     done = wrapped("proof", *SLOW, capture_output=False, stderr=theirs, stdout=subprocess.PIPE)

@@ -90,6 +90,11 @@ def test_the_last_line_and_the_summary_hold_the_sums(result):
     assert summary == {"passed": passed, "failed": failed, "skipped": 3}
 
 
+def test_the_dearest_suites_are_named_with_their_time_dearest_first(result):
+    found = re.findall(r"^  unit/test_\w+ +(\d+\.\d) +\d+\.\d$", result[1].partition("dearest suites, ")[2], re.MULTILINE)
+    assert len(found) == 10 and found == sorted(found, key=float, reverse=True)
+
+
 def test_at_the_time_limit_a_suite_ends_with_all_that_it_has_started(tmp_path):
     (tmp_path / "test/unit").mkdir(parents=True)
     (tmp_path / "test/pytest.ini").write_text("[pytest]\n")

@@ -2,7 +2,9 @@
 
 import contextlib
 import functools
+import hashlib
 import os
+import pickle
 import shlex
 import subprocess
 import tempfile
@@ -70,9 +72,25 @@ def designed(*changes: tuple[str, str], more: str = "", board: str = "mclv") -> 
 
 
 @functools.cache
+def inputs() -> bytes:
+    """What a design is made from: the tuner, its files, and the firmware's headers."""
+    every = (path for room in ("tuning", "tools/common", "include") for path in sorted((paths.ROOT / room).rglob("*")))
+    files = (path for path in every if path.suffix in (".py", ".toml", ".h"))
+    return hashlib.sha256(b"\0".join(str(path).encode() + b"\0" + path.read_bytes() for path in files)).digest()
+
+
+@functools.cache
 def of(name: str) -> Design:
-    """The design of one of the project's motors; shared, not to be changed."""
-    return design(motor_file.load(name), board_file.load("mclv"))
+    """The design of one of the project's motors; shared, not to be changed, and kept for the other suites, which ask for the same."""
+    kept = paths.ROOT / "build/test/designs" / hashlib.sha256(inputs() + name.encode()).hexdigest()
+    with contextlib.suppress(OSError):
+        return pickle.loads(kept.read_bytes())
+    made = design(motor_file.load(name), board_file.load("mclv"))
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    new = kept.with_suffix(f".{os.getpid()}")
+    new.write_bytes(pickle.dumps(made))
+    new.replace(kept)
+    return made
 
 
 def build(text: str, *arguments: str, includes: list[str] = INCLUDES) -> str:

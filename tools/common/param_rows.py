@@ -36,6 +36,7 @@ class Parameter:
     """of the table whose entry this is"""
 
 
+@functools.cache
 def number(name: str) -> float:
     """A limit of the table's relations, or a ratio of param_scaling.h, that is a macro of its own."""
     found = re.search(rf"^#define {name} ([\d.]+)(?= |$)", TABLE.read_text(encoding="utf-8") + SCALING.read_text(encoding="utf-8"), re.MULTILINE)

@@ -1,7 +1,7 @@
 # Coverage of the control law by the unit tests. Uses the variables of the main Makefile.
 # The law's functions are always inlined, once for each call; for counting they are ordinary functions, whose copies in the
 # translation units gcovr adds up, and one that nobody calls is kept, so that it counts as not covered.
-coverage_flags = -std=gnu99 -O0 -g -fkeep-inline-functions -Dalways_inline=unused
+coverage_flags = -std=gnu99 -O0 -fkeep-inline-functions -Dalways_inline=unused
 
 .PHONY: coverage
 coverage: setup-test ## [tests] the control law by the unit tests: 100 % of lines and branches required [build/coverage/index.html]
