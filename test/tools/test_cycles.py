@@ -192,7 +192,7 @@ def test_bad_input_is_one_line(tmp_path, room, arguments, words):
 def test_table2_goes_where_out_says(tmp_path, monkeypatch, given):
     (tmp_path / "x.hex").write_text(hex_text(WORDS), encoding="utf-8")
     asked = []
-    monkeypatch.setattr(pil_command.table2, "command", lambda options, *_, **__: asked.append(options.out) or 0)
+    monkeypatch.setattr(pil_command.table2.Table2, "command", classmethod(lambda _, options: asked.append(options.out) or 0))
     pil_command.main(["table2", "--image", str(tmp_path / "x.hex"), *(word.format(tmp_path) for word in given)])
     assert asked == [tmp_path if given else paths.RESULTS / "pil-table2"]
 
