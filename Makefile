@@ -40,7 +40,15 @@ compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFI
 # The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.
 board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
 board_includes := $(board_rooms:%=-I%)
-firmware_objects := $(patsubst %.c,$B/%.o,$(wildcard firmware/*/*.c firmware/*/*/*.c) tools/cpu_host/xc.c)
+# One unit of them all, as the image (tools/make/image.mk); the parameters' checks are no code, and a harness may have a loop of its own.
+params_source := firmware/drive/param_text.c firmware/drive/param_check.c
+firmware_sources := $(filter-out $(params_source),$(wildcard firmware/*/*.c firmware/*/*/*.c))
+includes_of = $(foreach file,$1,'$(hash)include "$(file)"')
+hash := \#
+unit := $B/unit.o
+firmware_objects := $(unit) $B/firmware/board/main.o $B/tools/cpu_host/xc.o
+# Each file alone, so that a test or a mock may take the place of any.
+part_objects := $(firmware_sources:%.c=$B/%.o) $B/tools/cpu_host/xc.o
 # All variants share the board but for its view into the firmware, unless they compile in a way of their own.
 own_way := $(SAN)$(WERROR)$(filter command%,$(origin CC) $(origin CFLAGS) $(origin warnings))
 board_folder := $(if $(own_way),$B,build/board)
@@ -54,6 +62,7 @@ say = $(if $(V),,@printf '  %-4s %s\n' $1 $2;)
 comma := ,
 quoted = '$(subst ','\'',$1)'
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
+remember_lines = @mkdir -p $(@D); printf '%s\n' $1 | cmp -s - $@ || printf '%s\n' $1 >$@
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@
 
 # Whoever compiles holds build/lock or its variant's, so that two makes in this tree take turns; what such a make starts holds it, too.
@@ -115,7 +124,7 @@ options = $(what) $(out)
 scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
 ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
-.PHONY: anymotor bringup run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch setup-run
+.PHONY: sensitivity anymotor bringup run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
@@ -160,6 +169,10 @@ lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MO
 catch: setup-run ## [run] S2 while the rotor turns at any speed, and stops on a supply that cannot sink [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) catch $(options)
+
+sensitivity: setup-run ## [tests] every number chosen by trial a fifth less and more: what moves, what is on an edge [ONLY="GATE_SHARE ..." ALL=1 MOTOR= BOARD= USERPARAMS= OUT=]
+	@+$(ready)
+	@$(front_end) sensitivity $(if $(ALL),--all) $(if $(ONLY),--only $(foreach name,$(ONLY),$(call quoted,$(name)))) $(options)
 
 bringup: setup-run ## [your board] what BRINGUP says of the right board and of miswired ones [VARIANT=name MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(if $(MOTOR),$(ready),:)
@@ -240,8 +253,7 @@ $B/contents: FORCE
 
 # Nothing is compiled with a userparams.h that cannot work.
 params = @tools/make/userparams.sh $@
-params_source := firmware/drive/param_text.c firmware/drive/param_check.c $(addprefix tools/make/,userparams.sh userparams.awk nearest.awk)
-$B/params: $B/flags $(params_source)
+$B/params: $B/flags $(params_source) $(addprefix tools/make/,userparams.sh userparams.awk nearest.awk)
 	$(params) $(compile)
 
 $(board_objects): private INCLUDES += $(board_includes)
@@ -262,14 +274,28 @@ $B/%.o: %.c $B/flags | $B/params
 	@mkdir -p $(@D)
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
+$B/unit.c: FORCE
+	$(call remember_lines,$(call includes_of,$(filter-out %/main.c,$(firmware_sources))))
+
+# Control and drive as one unit, for tests with a mode or parameters of their own and for the image's probe.
+$B/law.c: FORCE
+	$(call remember_lines,$(call includes_of,$(filter firmware/control/% firmware/drive/%,$(firmware_sources))))
+
+$(unit): $B/unit.c $B/flags | $B/params
+	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
+
 $B/libfirmware.a: $(firmware_objects) $B/contents
 	@rm -f $@.new
 	$(call say,ar,$@)ar rcs $@.new $(firmware_objects) && mv -f $@.new $@
 
+$B/libparts.a: $(part_objects) $B/contents
+	@rm -f $@.new
+	$(call say,ar,$@)ar rcs $@.new $(part_objects) && mv -f $@.new $@
+
 # The firmware without its loop, its variables in one stretch.
 window_script := tools/cpu_host/window.ld
-$B/firmware.o: $(firmware_objects) $B/contents $(window_script)
-	$(call say,ld,$@)$(CC) -r -nostdlib -Wl,-T,$(window_script) -o $@.new $(filter-out %/main.o %/xc.o,$(firmware_objects)) && mv -f $@.new $@
+$B/firmware.o: $(unit) $B/contents $(window_script)
+	$(call say,ld,$@)$(CC) -r -nostdlib -Wl,-T,$(window_script) -o $@.new $(unit) && mv -f $@.new $@
 
 firmware_library := $(board_objects) $B/firmware.o $B/tools/cpu_host/xc.o
 $B/libvboard.so: $(firmware_library)
@@ -293,7 +319,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage)
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps, no search for a parameter's ends.
-slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps image_build examples progress bench_pages userparams live_% make_% campaign setup suites),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps sensitivity image_build examples progress recipes bench_pages userparams live_% make_% campaign setup suites),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search low_speeds)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/% unit/test_param_ranges,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
@@ -361,22 +387,20 @@ golden: setup-run ## [upkeep] write the golden vectors from the reference model
 
 # A test's own flags stand in its first lines: /* defines: -DTUNING */. They act on the test and its runner, not on the library.
 own_defines = $$(sed -n '1,5s@.*/\* defines: \(.*\) \*/.*@\1@p' $1)
-test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes) $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -Ibuild/golden \
+test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes) $(patsubst %/,-I%,$(wildcard include/*/)) -I$T/mocks -I$B -Ibuild/golden \
     -isystem $(unity)/src -isystem $(cmock)/src -DUNITY_INCLUDE_CONFIG_H $(DEFINES)
 
 $T/flags: FORCE | $B/flags
 	$(call remember,$(test_compile))
 
-$T/%.o: test/%.c $T/flags | $B/params $(gem_stamp) $(golden_stamp)
-	@mkdir -p $(@D)
-	$(call say,cc,$<)$(test_compile) $(warnings) -Werror $(call own_defines,$<) -MMD -MP -c $< -o $@
-
 $T/%_runner.c: test/%.c test/unit/support/cmock.yml | $(gem_stamp)
 	@mkdir -p $(@D)
 	$(quiet)$(RUBY) $(unity)/auto/generate_test_runner.rb test/unit/support/cmock.yml $< $@ >$@.log 2>&1 || { head -n 1 $@.log >&2; exit 1; }
 
-$T/%_runner.o: $T/%_runner.c $T/flags | $(golden_stamp)
-	$(quiet)$(test_compile) -w -Itest/$(*D) $(call own_defines,test/$*.c) -MMD -MP -c $< -o $@
+# The test and its runner are one unit: what both include is read once.
+$T/%.o: test/%.c $T/%_runner.c $T/flags | $B/params $B/law.c $(gem_stamp) $(golden_stamp)
+	@mkdir -p $(@D)
+	$(call say,cc,$<)$(test_compile) $(warnings) -Werror -Itest/$(*D) $(call own_defines,$<) -MMD -MP -include $< -c $T/$*_runner.c -o $@
 
 $T/unity.o: $T/flags | $(gem_stamp)
 	$(quiet)$(test_compile) -w -c $(unity)/src/unity.c -o $@
@@ -397,7 +421,7 @@ $T/mocks/mock_%.o: $T/mocks/mock_%.c $T/flags
 mock_uses := $(shell grep -HoE 'mock_[a-z0-9_]+\.h' $(wildcard test/*/test_*.c) /dev/null)
 mocks_of = $(sort $(patsubst test/$1.c:%.h,$T/mocks/%.o,$(filter test/$1.c:%,$(mock_uses))))
 define uses_mocks
-$T/$1.o $T/$1_runner.o: | $(patsubst %.o,%.h,$(call mocks_of,$1))
+$T/$1.o: | $(patsubst %.o,%.h,$(call mocks_of,$1))
 $T/$1: $(call mocks_of,$1)
 endef
 $(foreach test,$(unit_c) $(board_c) $(behaviour_c),$(eval $(call uses_mocks,$(test))))
@@ -405,11 +429,13 @@ $(foreach test,$(unit_c) $(board_c) $(behaviour_c),$(eval $(call uses_mocks,$(te
 # The library comes last: what the test or a mock defines is then not taken from it. The board's own tests bring a small firmware
 # of theirs instead, so the probe that looks into the real one stays out.
 c_executables := $(addprefix $T/,$(unit_c) $(board_c) $(behaviour_c))
-$(c_executables): %: %.o %_runner.o $T/unity.o $T/cmock.o
+$(c_executables): %: %.o $T/unity.o $T/cmock.o
 	$(quiet)$(CC) $(sanitizer) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lm
-$(addprefix $T/,$(unit_c)): $B/libfirmware.a
+$(addprefix $T/,$(unit_c)): $B/libparts.a
 $(addprefix $T/,$(board_c)): $(filter-out $(probe),$(board_objects)) $B/tools/cpu_host/xc.o
-$(addprefix $T/,$(behaviour_c)): $(board_objects) $B/libfirmware.a
+own_files := $(patsubst test/%.c,%,$(shell grep -l '"firmware/' $(behaviour_c:%=test/%.c) /dev/null))
+$(addprefix $T/,$(filter-out $(own_files),$(behaviour_c))): $(board_objects) $B/libfirmware.a
+$(addprefix $T/,$(own_files)): $(board_objects) $B/libparts.a
 
 $T/made/%:
 	@mkdir -p $(@D) && touch $@
@@ -439,4 +465,4 @@ sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCEN
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
 	@rm -rf build/board build/host* build/test* build/target* build/size build/golden build/run
 
--include $B/params.d $(firmware_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d) $(c_executables:%=%_runner.d)
+-include $B/params.d $(firmware_objects:.o=.d) $(part_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d)

@@ -202,7 +202,7 @@
  *   pi_q.ki                             16776 V/(A s)           568  Q11 a period                -0.040 %  integral gain
  *   pi_q.kc                             0.999 1               32734  Q15                         -0.004 %  anti-windup
  *   speed_kp_q13                   0.00076155 A/rpm            2323  Q15 / 16                    -0.002 %  proportional gain
- *   speed_kp_quick_q13              0.0013708 A/rpm            4181  Q15 / 16                    -0.012 %  after a large innovation
+ *   speed_kp_fast_q13               0.0013708 A/rpm            4181  Q15 / 16                    -0.012 %  after a large innovation
  *
  * load observer, adaptation and low speed
  *   observer.deltat_q32                 5e-05 s                3579  Q32 of a turn/erpm          -0.004 %  angle in an eighth of a step
@@ -214,13 +214,13 @@
  *   observer.load_max                    2.75 A                4574  units                          exact  largest load
  *   observer.quiet_q16                 15.372 Hz               2531  Q16 a step                  -0.036 %  rate without load
  *   observer.loaded_q16                  32.1 Hz               5287  Q16 a step                  -0.004 %  rate under load
- *   observer.quick_q16                    107 Hz              17623  Q16 a step                  -0.005 %  rate after a large innovation
+ *   observer.fast_q16                     107 Hz              17623  Q16 a step                  -0.005 %  rate after a large innovation
  *   observer.full_erpm                 475.56 rpm              2377  erpm                        -0.033 %  speed reference from which rates and gain are these
  *   observer.load_from                 0.0625 A                 103  units                       -0.920 %  load that begins to count
  *   observer.load_width                0.0625 A                 103  units                       -0.920 %  over what more it counts
  *   observer.load_slope_q15                16 1/A               315  Q15 a unit                  -0.064 %  one over it
- *   observer.large_erpm                29.856 rpm               149  erpm                        -0.189 %  large innovation without load
- *   observer.large_loaded_erpm         6.8899 rpm                34  erpm                        -1.305 %  and under load
+ *   observer.gate_erpm                 29.856 rpm               149  erpm                        -0.189 %  large innovation without load
+ *   observer.gate_loaded_erpm          6.8899 rpm                34  erpm                        -1.305 %  and under load
  *   adaptation.rate_q16                     6 1/s               629  Q16 a step                  -0.023 %  flux and R follow
  *   adaptation.kfi_least                 -0.3 1               -9830  Q15                         -0.004 %  least change of 1/Kphi
  *   adaptation.kfi_most                  0.35 1               11468  Q15                         -0.007 %  largest
@@ -249,7 +249,7 @@
  *   i2t_most_q25                            0 A^2                 0  Q25 A^2                        exact  heat that trips
  *   i2t_rate_q16                    0.0085333 1                 559  Q16 a step                  -0.043 %  what the heat follows in 512 ms
  *   fieldweak.trim_max_q13                1.5 A                2793  Q13 A                       +0.010 %  most that the voltage feedback adds
- *   burn_most_q13                      2.6641 A                4960  Q13 A                       -0.000 %  most d current that burns the rotor's energy
+ *   flux_brake_most_q13                2.6641 A                4960  Q13 A                       -0.000 %  most d current that burns the rotor's energy
  *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal
  *   bus_over_q15                           34 V               21101  Q15 of full scale           +0.002 %  trips
  *   bus_under_q15                          12 V                7447  Q15 of full scale           -0.004 %  trips

@@ -103,7 +103,7 @@ def shared_firmware() -> Firmware:
     objects = [paths.ROOT / name for name in (folder / "contents").read_text(encoding="utf-8").split() if not name.endswith("/main.o")]
     with_header = [path for path in objects if HEADER in path.with_suffix(".d").read_text(encoding="utf-8")]
     flags = shlex.split((folder / "flags").read_text(encoding="utf-8")) + [f"-Itools/{room}" for room in ("plant", "chip", "vboard", "cpu_host")]
-    sources = [f"{path.relative_to(folder).with_suffix('.c')}" for path in with_header]
+    sources = [str(path.with_suffix(".c") if path.with_suffix(".c").exists() else path.relative_to(folder).with_suffix(".c")) for path in with_header]
     return Firmware(flags, sources, [str(path) for path in objects if path not in with_header])
 
 

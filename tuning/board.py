@@ -25,7 +25,7 @@ FLAGS = {"inverted": "shunt.inverted", "sinks": "supply.sinks"}
 OF_SUPPLY = {"limits.over_voltage": 1.4, "limits.under_voltage": 0.5, "limits.regen": 1.125}
 """Limits that follow the supply's voltage, if they are not given: their share of it."""
 LEAST_SHARE = 0.063
-"""Of full scale: the smallest MAXIMUM_CURRENT_A of include/drive/param_table.h."""
+"""Of full scale: the smallest MAXIMUM_CURRENT_A of include/drive/param_limits.h."""
 WHERE = "SET"
 
 

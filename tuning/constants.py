@@ -28,7 +28,7 @@ class Constant:
 
     group: str
     name: str
-    """a macro of param_scaling.h, or a field of drive_params_t"""
+    """a macro of the scaling headers, or a field of drive_params_t"""
     value: float
     """engineering value that it stands for"""
     unit: str
@@ -88,7 +88,7 @@ def header(params: Mapping[str, str]) -> Header:
 
 
 def evaluate(params: Mapping[str, str], *expressions: str) -> list[float]:
-    """Macros of param_scaling.h, which need only those parameters that they name."""
+    """Macros of the scaling headers, which need only those parameters that they name."""
     prints = "".join(f'    printf("%.9g\\n", (double)({expression}));\n' for expression in expressions)
     return [float(line) for line in _output(f'#include <stdio.h>\n#include "drive/param_scaling.h"\nint main(void)\n{{\n{prints}    return 0;\n}}\n',
                                             params).split()]
@@ -111,7 +111,7 @@ def _output(source: str, params: Mapping[str, str]) -> str:
 
 @functools.cache
 def _headers() -> str:
-    return "".join(path.read_text(encoding="utf-8") for room in ("control", "drive") for path in sorted((INCLUDE / room).glob("*.h")))
+    return "".join(path.read_text(encoding="utf-8") for room in ("control", "drive") for path in sorted((INCLUDE / room).rglob("*.h")))
 
 
 def _compiled(source: str, userparams: str) -> str:

@@ -63,7 +63,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Scales:
-    """Numbers that param_scaling.h makes of motor and board."""
+    """Numbers that the scaling headers make of motor and board."""
 
     invkfi: float
     """counts of 1/Kphi"""
@@ -382,7 +382,7 @@ def _currents(d: Design, currents: limits.Currents) -> None:
 
 
 def _fit_emf(motor: Motor, board: BoardFile, wanted: limits.Currents) -> limits.Currents:
-    """Lowers first the trip level, then the largest current, until Equation 4 stays inside its format (a relation of param_table.h).
+    """Lowers first the trip level, then the largest current, until Equation 4 stays inside its format (a relation of param_limits.h).
     Gives up at half the rated current; the relation's own message tells then."""
     fastest = max(min(motor.maximum_speed_rpm, limits.largest_erpm(board.pwm_period_s) / motor.pole_pairs), 1.5 * motor.rated_speed_rpm) * RPM * motor.pole_pairs
     room_v = 0.985 * 4.0 * board.nominal_bus_v / math.sqrt(3.0) * (1.0 - board.dead_time_s / board.pwm_period_s) - board.over_voltage_v / math.sqrt(3.0)

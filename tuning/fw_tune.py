@@ -315,7 +315,7 @@ def highest_speed(known: dict[str, float]) -> float:
         pairs, bus = known["NOPOLESPAIRS"], known["NOMINAL_BUS_V"]
         base = next((rpm for rpm in range(100, 30000, 100) if model_use(known, rpm, 0.0, 0.0) > 1.0), 30000)
         ends = base + (ENTRIES + 1) * STEP_ERPM / pairs
-        # the back-EMF's format, as PARAM_EMF_MAX_V of include/drive/param_scaling.h
+        # the back-EMF's format, as PARAM_EMF_MAX_V of include/drive/scaling/estimator.h
         u0 = bus / math.sqrt(3.0) * (1.0 - known["DEADTIME_SEC"] / known["LOOPTIME_SEC"]) / 32768.0
         free_v = 0.9895 * 131068.0 * u0 - known["OVER_VOLTAGE_V"] / math.sqrt(3.0) \
             - 2.0 / math.sqrt(3.0) * known["OVER_CURRENT_THRESHOLD_A"] * known["MOTOR_RS_OHM"]

@@ -1,4 +1,4 @@
-"""The text of a userparams.h: the rows of include/drive/param_table.h with a design's values, and what the firmware makes of them."""
+"""The text of a userparams.h: the rows of include/drive/param_limits.h with a design's values, and what the firmware makes of them."""
 
 import itertools
 import math

@@ -5,7 +5,7 @@ and acts for one period, and is turned by the angle of sample n+1; so, with h = 
 
     i[n+1] = h^2 e^(-j phi) i[n] + (1 - h)/R v[n] + h (1 - h)/R e^(-j phi) v[n-1]      C(z) = Kp + Ki/(z - 1)
 
-With late duties (include/drive/late.h) v[n] acts a period later, turned by the angle of sample n+2: one more delay, 1/z.
+With late duties (include/drive/deferred.h) v[n] acts a period later, turned by the angle of sample n+2: one more delay, 1/z.
 
 Speed loop. Every 8 periods, with late duties 16, the load observer (include/control/observer.h) takes the estimated speed's mean over them and the q current and
 gives the speed and the load, from which the controller makes the q current of a quarter of that later; the estimated speed is half a period older.
@@ -56,7 +56,7 @@ SLOW_SHARE = 0.2
 STEP_SHARE_MOST = 0.25
 """Of SLOW_SHARE of the rated speed, most that half a step of the converter may turn the rotor off its speed in an electrical turn. Motors with 0.15
 hold their speed on the virtual board, one with 0.4 does not."""
-QUIET_RATIO, LOADED_SHARE, QUICK_GAIN = (number(f"PARAM_{name}") for name in ("QUIET_RATIO", "LOADED_SHARE", "QUICK_GAIN"))
+QUIET_RATIO, LOADED_SHARE, FAST_GAIN = (number(f"PARAM_{name}") for name in ("QUIET_RATIO", "LOADED_SHARE", "FAST_GAIN"))
 FULL_RATIO, ESDQ_RATIO = (number(f"PARAM_{name}") for name in ("FULL_RATIO", "ESDQ_RATIO"))
 HEAVY_SHARE = 0.75
 """What an innovation that is just large may ask for until the estimator answers, of the largest current. The heavier the rotor, the more current an
@@ -288,7 +288,7 @@ def speed_gains(plant: Plant, bandwidth_hz: float, load_hz: float, base: Gains, 
         return replace(base, speed_kp=kp * gain * min(1.0, share), rate=2.0 * np.pi * rate_hz * step * min(1.0, share), esdq=esdq)
 
     return {"quiet": at(min(QUIET_RATIO * bandwidth_hz, loaded), full), "loaded": at(loaded, 2.0 * full),
-            "quick": at(load_hz, 2.0 * full, QUICK_GAIN)}
+            "quick": at(load_hz, 2.0 * full, FAST_GAIN)}
 
 
 def full_rad_s(load_hz: float) -> float:

@@ -3,7 +3,7 @@
 #include <stdio.h>
 
 #include "drive/param_init.h"
-#include "drive/param_table.h"
+#include "drive/param_limits.h"
 
 static const drive_params_t p = DRIVE_PARAMS_INIT;
 
@@ -102,7 +102,7 @@ static void controllers(void)
     CURRENT_LOOP(pi_d, D);
     CURRENT_LOOP(pi_q, Q);
     FIELD(speed_kp_q13, SPEEDCNTR_PTERM * 16.0 * ampere / erpm, "A/rpm", q15_16 * ampere / erpm, "Q15 / 16", "proportional gain");
-    FIELD(speed_kp_quick_q13, at_most(SPEEDCNTR_PTERM * PARAM_QUICK_GAIN, 32767.0 / 32768.0) * 16.0 * ampere / erpm, "A/rpm",
+    FIELD(speed_kp_fast_q13, at_most(SPEEDCNTR_PTERM * PARAM_FAST_GAIN, 32767.0 / 32768.0) * 16.0 * ampere / erpm, "A/rpm",
           q15_16 * ampere / erpm, "Q15 / 16", "after a large innovation");
 }
 
@@ -122,13 +122,13 @@ static void observer(void)
     FIELD(observer.quiet_q16, PARAM_MIN(PARAM_QUIET_RATIO * SPEED_BANDWIDTH_HZ, PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ), "Hz", rate, "Q16 a step",
           "rate without load");
     FIELD(observer.loaded_q16, PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate under load");
-    FIELD(observer.quick_q16, LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate after a large innovation");
+    FIELD(observer.fast_q16, LOAD_BANDWIDTH_HZ, "Hz", rate, "Q16 a step", "rate after a large innovation");
     FIELD(observer.full_erpm, 60.0 / PARAM_FULL_RATIO * LOAD_BANDWIDTH_HZ / pairs, "rpm", erpm, "erpm", "speed reference from which rates and gain are these");
     FIELD(observer.load_from, PARAM_LOAD_FROM_LOST * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "load that begins to count");
     FIELD(observer.load_width, PARAM_LOAD_FROM_LOST * lost * q13_a, "A", q13_a / PARAM_ACCEL_UNITS, "units", "over what more it counts");
     FIELD(observer.load_slope_q15, 1.0 / (PARAM_LOAD_FROM_LOST * lost * q13_a), "1/A", PARAM_ACCEL_UNITS / q13_a / 32767.0, "Q15 a unit", "one over it");
-    FIELD(observer.large_erpm, PARAM_LARGE_ERPM / pairs, "rpm", erpm, "erpm", "large innovation without load");
-    FIELD(observer.large_loaded_erpm, PARAM_LARGE_LOADED_ERPM / pairs, "rpm", erpm, "erpm", "and under load");
+    FIELD(observer.gate_erpm, PARAM_LARGE_ERPM / pairs, "rpm", erpm, "erpm", "large innovation without load");
+    FIELD(observer.gate_loaded_erpm, PARAM_LARGE_LOADED_ERPM / pairs, "rpm", erpm, "erpm", "and under load");
     FIELD(adaptation.rate_q16, 6.0, "1/s", learns, "Q16 a step", "flux and R follow");
     FIELD(adaptation.kfi_least, -0.30, "1", 1.0 / 32768.0, "Q15", "least change of 1/Kphi");
     FIELD(adaptation.kfi_most, 0.35, "1", 1.0 / 32768.0, "Q15", "largest");
@@ -171,7 +171,7 @@ static void limits(void)
     FIELD(i2t_most_q25, (double)I2T_CURRENT_A * I2T_CURRENT_A, "A^2", 2.0 * q13_a * q13_a, "Q25 A^2", "heat that trips");
     FIELD(i2t_rate_q16, 0.512 / I2T_TIME_SEC, "1", 1.0 / 65536.0, "Q16 a step", "what the heat follows in 512 ms");
     FIELD(fieldweak.trim_max_q13, FW_TRIM_CURRENT_A, "A", q13_a, "Q13 A", "most that the voltage feedback adds");
-    FIELD(burn_most_q13, PARAM_BURNS ? most * 31.0 / 32.0 : 0.0, "A", q13_a, "Q13 A", "most d current that burns the rotor's energy");
+    FIELD(flux_brake_most_q13, PARAM_FLUX_BRAKES ? most * 31.0 / 32.0 : 0.0, "A", q13_a, "Q13 A", "most d current that burns the rotor's energy");
     FIELD(current_max_reciprocal, most, "A", most / (33554432.0 / (most / q13_a)), "2^25 / Q13", "its reciprocal");
     FIELD(bus_over_q15, OVER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");
     FIELD(bus_under_q15, UNDER_VOLTAGE_V, "V", bus, "Q15 of full scale", "trips");

@@ -1,7 +1,7 @@
 """Writes tuning/tuning_params.xlsx: AN1292's spreadsheet with live formulas, for people who tune a motor in one.
 
 Motor and board data go in; AN1292's constants, the firmware's and the lines of userparams.h come out. What needs trying (bandwidths, start,
-field weakening) is what make tune found for the chosen motor. The parameters are the rows of include/drive/param_table.h.
+field weakening) is what make tune found for the chosen motor. The parameters are the rows of include/drive/param_limits.h.
 """
 
 import argparse

@@ -2,17 +2,16 @@
 #include "board/firmware.h"
 
 #include "board/mclv.h"
-#include "board/modes/mode_panel.h"
+#include "board/modes/mode_board.h"
 #include "board/peripherals.h"
-#include "board/record.h"
+#include "board/status.h"
 #include "board/reset.h"
 #include "board/selftest_run.h"
-#include "board/status.h"
 #include "board/watch.h"
-#include "drive/deviation.h"
-#include "drive/overload.h"
+#include "drive/protection.h"
 #include "drive/remote.h"
-#include "drive/state.h"
+#include "drive/signals.h"
+#include "drive/states.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
 /* A bit of a port: one instruction for each of its values, where an assignment takes seven. */
@@ -29,7 +28,7 @@
 
 /** What the background's checks remember of the drive. */
 typedef struct {
-    deviation_t deviation;
+    signals_t signals;
     overload_t overload;
     uint16_t supervised_tick;          /* drive ticks at the last check */
     uint16_t was_silent;               /* a timer 1 millisecond without a control interrupt */
@@ -49,7 +48,7 @@ static judged_t judged BOARD_UNSET;
 void firmware_trip(drive_fault_t fault)
 {
     pwm_outputs_off();
-    drive_fail(&board_drive, fault);
+    drive_raise(&board_drive, fault);
 }
 
 /** @param found drive_fault_t, none too */
@@ -139,13 +138,13 @@ QM_INLINE void firmware_supervise(void)
     reset_keep(board_drive.fault);
     reset_serve_watchdog(board_drive.ticks);
     record_tick();
-    firmware_find(deviation_phases(&judged.deviation, &board_drive, &board_params));
+    firmware_find(signals_phases(&judged.signals, &board_drive, &board_params));
 }
 
 /** What a millisecond's look at the drive finds wrong. */
 QM_INLINE void firmware_judge(uint16_t elapsed_ms)
 {
-    firmware_find(deviation_tick(&judged.deviation, &board_drive, &board_params));
+    firmware_find(signals_d_current(&judged.signals, &board_drive, &board_params));
     if (overload_tick(&judged.overload, &board_drive, &board_params, elapsed_ms)) {
         firmware_trip(FAULT_OVERTEMPERATURE);
     }

@@ -1,10 +1,10 @@
 /* The interrupts: the control interrupt that is one PWM period, the fault input, and the traps. */
 #include "board/duties.h"
 #include "board/firmware.h"
-#include "board/lnet.h"
+#include "board/scope.h"
 #include "board/mclv.h"
 #include "board/peripherals.h"
-#include "board/record.h"
+#include "board/status.h"
 #include "board/reset.h"
 #include "board/watch.h"
 #include "drive/param_init.h"
@@ -53,7 +53,7 @@ QM_INLINE uint16_t board_slow_is_due(void)
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
 
 /* For the next period's begin. */
-__extension__ static duties_t board_waiting[LATE_WAITS];
+static duties_t board_waiting;
 
 /** The bridge is off at once; the slow work says why. */
 QM_INLINE void board_overrun(void)
@@ -72,7 +72,7 @@ QM_INLINE void board_write(const duties_t *duty)
 }
 
 /** The end of a period whose bridge does not switch; with late duties the zeros wait. Called, for its way to write them is not that of the law's. */
-NOINLINE void board_rest(void)
+static NOINLINE void board_idle(void)
 {
     const duties_t off = { 0, 0, 0 };
     board_write(&off);
@@ -86,7 +86,7 @@ NOINLINE void board_rest(void)
 void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
-    duties_t now, *duty = duties_place(board_waiting, &now);
+    duties_t now, *duty = duties_place(&board_waiting, &now);
 
     IFS0bits.AD1IF = 0;
     if (duties_write_waiting(duty)) {
@@ -100,7 +100,7 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
             IFS0bits.T2IF = 1;
         }
     } else {
-        board_rest();
+        board_idle();
     }
 }
 
@@ -128,7 +128,7 @@ void BOARD_ISR _T2Interrupt(void)
             board_set_idle_outputs(outputs);
         }
     }
-    if (drive_settle(&board_drive)) { /* also where a trap came between the two lines before */
+    if (drive_latch_fault(&board_drive)) { /* also where a trap came between the two lines before */
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);
     }

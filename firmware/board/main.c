@@ -1,6 +1,6 @@
 /* The program: initialise, then the background for ever; the control interrupt does the rest. */
 #include "board/firmware.h"
-#include "board/selftest_chip.h"
+#include "board/selftest_cpu.h"
 
 int main(void)
 {

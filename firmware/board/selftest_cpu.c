@@ -1,10 +1,11 @@
 /* The processor's registers hold what is written to them: the only file with assembler. The PC has its own (tools/cpu_host/xc.c). */
+#include "board/selftest_cpu.h"
+
 #include "board/selftest_run.h"
 
 #if defined(__XC16__) && !defined(SELFTEST_OFF)
 
 #include "board/reset.h"
-#include "board/selftest_chip.h"
 
 #define WORDS_BELOW 24u /* of stack that the test of the RAM may still need */
 

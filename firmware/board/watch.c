@@ -1,7 +1,8 @@
 /* AN1292's watch variables, copied from the drive in the background. */
 #include "board/watch.h"
 
-#include "drive/limits_now.h"
+#include "board/firmware.h"
+#include "drive/limits.h"
 
 tFdWeakParm FdWeakParm;
 tMotorEstimParm MotorEstimParm;

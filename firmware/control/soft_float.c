@@ -1,4 +1,4 @@
-/* Arithmetic with 16 significant bits and any exponent, by the core's own products and divisions. */
+/* Positive numbers with 16 significant bits and any exponent, and integer square roots, for background work whose range no Q format holds. */
 #include "control/soft_float.h"
 
 soft_float_t soft_float_of(uint32_t x)
@@ -66,4 +66,21 @@ int32_t soft_float_times(int32_t x, soft_float_t a)
         /* below one */
     }
     return (x < 0) ? -(int32_t)size : (int32_t)size;
+}
+
+uint16_t root_of(uint32_t x)
+{
+    uint16_t r = 0, bit;
+    for (bit = 0x8000u; bit != 0u; bit >>= 1) {
+        uint16_t next = (uint16_t)(r | bit);
+        if (qm_muluu(next, next) <= x) {
+            r = next;
+        }
+    }
+    return r;
+}
+
+uint16_t root_length(int16_t x, int16_t y)
+{
+    return root_of((uint32_t)(qm_mulss(x, x) + qm_mulss(y, y)));
 }

@@ -1,5 +1,33 @@
-/* The tables behind trig.h, of which test/golden recomputes every entry, and its called function. */
+/* Sine and cosine from a table of 128 steps a turn, and the circle limit sqrt(1 - x^2), without a square root or a branch. */
 #include "control/trig.h"
+
+INLINE sincos_t trig_sincos(angle_t angle)
+{
+    uint16_t nearest = (uint16_t)(angle + 256u);
+    uint16_t step = (uint16_t)(nearest >> 9) & (TRIG_SIN_ENTRIES - 1u);
+    q15_t s = trig_sin_table[step];
+    q15_t c = trig_sin_table[step ^ (TRIG_SIN_ENTRIES / 2u)]; /* a quarter of a turn away, to the one side or the other */
+    /* the low nine bits as a signed fraction of one step, then in radians * 65536: 2 pi / 128 / 2 * 65536 / 32768 */
+    int16_t rest_q16_rad = qm_mulhi((int16_t)(uint16_t)(angle << 7), 3217);
+    sincos_t r;
+    if (nearest & 0x8000u) {
+        s = (int16_t)-s;
+    }
+    if ((uint16_t)(nearest + 0x4000u) & 0x8000u) {
+        c = (int16_t)-c;
+    }
+    r.sin = (int16_t)(s + qm_mulhi(c, rest_q16_rad));
+    r.cos = (int16_t)(c - qm_mulhi(s, rest_q16_rad));
+    return r;
+}
+
+INLINE q15_t trig_circle(q15_t x)
+{
+    const q15_t *entry = &trig_circle_table[(uint16_t)x >> 9];
+    uint16_t fraction_q16 = (uint16_t)((uint16_t)x << 7);
+    int16_t drop = (int16_t)(entry[0] - entry[1]);
+    return (int16_t)(entry[0] - qm_mulhi_su(drop, fraction_q16));
+}
 
 const int16_t trig_sin_table[TRIG_SIN_ENTRIES] = {
     0, 1607, 3211, 4806, 6391, 7959, 9509, 11036, 12536, 14005, 15442, 16840,
@@ -19,14 +47,9 @@ const int16_t trig_circle_table[TRIG_CIRCLE_STEPS + 1] = {
     11402, 9914, 8127, 5769, 0
 };
 
-void trig_sincos_called(sincos_t *r, angle_t angle)
-{
-    *r = trig_sincos(angle);
-}
-
 angle_t trig_direction(int16_t x, int16_t y)
 {
-    uint16_t across = (uint16_t)qm_size(x), up = (uint16_t)qm_size(y), steep = (uint16_t)(up > across);
+    uint16_t across = (uint16_t)qm_abs(x), up = (uint16_t)qm_abs(y), steep = (uint16_t)(up > across);
     uint16_t least = steep ? across : up, most = steep ? up : across;
     q15_t r;
     angle_t angle;

@@ -1,11 +1,13 @@
-/* The drive's beginnings: the object at power-up and the preparation of each start. */
+/* The drive's types: states, parameters, and the one object with everything the machine knows. */
 #include "drive/drive.h"
 
-#include "drive/begin.h"
-#include "drive/bus.h"
-#include "drive/param_init.h"
-#include "drive/salient.h"
-#include "drive/state.h"
+#include "drive/limits.h"
+#include "drive/states.h"
+
+INLINE int16_t along_direction(const drive_t *d, int16_t x)
+{
+    return qm_with_sign(x, d->direction);
+}
 
 void drive_zero(void *object, uint16_t size)
 {
@@ -18,27 +20,9 @@ void drive_zero(void *object, uint16_t size)
     } while (left != 0u);
 }
 
-void drive_fail(drive_t *d, drive_fault_t fault)
-{
-    drive_raise(d, fault);
-}
-
-#ifdef __XC16__
-/* The image keeps every byte of an object that it reads by an index. The tables of constant parameters are therefore objects of their own, and
- * nothing is left of all others, which are in the instructions. */
-static const int16_t constant_idref_q13[FIELDWEAK_ENTRIES] = PARAM_18(PARAM_IDREF);
-static const int16_t constant_inv_kfi[FIELDWEAK_ENTRIES] = PARAM_18(PARAM_INVKFI_ENTRY);
-static const int16_t constant_ls_over2ls0_q15[FIELDWEAK_ENTRIES] = PARAM_18(PARAM_LS_ENTRY);
-static const fieldweak_tables_t constant_tables = { constant_idref_q13, constant_inv_kfi, constant_ls_over2ls0_q15 };
-#define TABLES(p, others) (QM_CONSTANT((p)->end_erpm) ? &constant_tables : (others))
-#else
-#define TABLES(p, others) (others)
-#endif
-
 void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
 {
-    const fieldweak_tables_t tables = fieldweak_tables(&p->fieldweak);
-    fieldweak_tick(&run->fieldweak, &p->fieldweak, TABLES(p, &tables), &run->model, ref_erpm);
+    fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, ref_erpm);
     salient_model(run, p);
     adaptation_apply(&run->adaptation, &p->adaptation, &run->model);
 }

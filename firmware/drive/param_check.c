@@ -1,8 +1,7 @@
 /* Refuses a userparams.h that cannot work: every value against its range, and the values against each other, by name. */
-#include "drive/modes/mode_relations.h"
-#include "drive/param_refuse.h"
+#include "drive/modes/mode_table.h"
+#include "drive/param_limits.h"
 #include "drive/param_scaling.h"
-#include "drive/param_table.h"
 
 #if defined(SPEEDCNTR_ITERM) || defined(SPEEDCNTR_CTERM)
 #error userparams.h: SPEEDCNTR_ITERM and SPEEDCNTR_CTERM mean nothing: the load observer (LOAD_BANDWIDTH_HZ) takes the place of the integral, remove them

@@ -3,9 +3,8 @@
  * Only the text is looked at, for as an expression such a value gives messages about formulas, in every file that uses it; this file
  * therefore comes first in the build. Without optimisation (-O0) the compiler does not evaluate the texts, and they are not looked at. */
 #include "drive/modes/mode_table.h"
-#include "drive/param_refuse.h"
+#include "drive/param_limits.h"
 #include "drive/param_scaling.h"
-#include "drive/param_table.h"
 
 #ifdef __OPTIMIZE__
 #define IS_EMPTY(text) (sizeof(text) == 1)

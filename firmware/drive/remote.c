@@ -1,7 +1,10 @@
-/* Remote control: who is in command, and what a client's command comes to. */
+/* What a client on the serial line asks of the drive: nothing where SCOPE is 0. */
 #include "drive/remote.h"
 
+#include "drive/drive.h"
+#include "drive/faults.h"
 #include "drive/modes/modes.h"
+#include "drive/panel.h"
 
 #if SCOPE
 

@@ -1,7 +1,11 @@
-/* The retry: when a run begins again by itself, and when it does not. */
+/* The retry: a run that a passing fault has ended starts again by itself, after a pause and a stated number of times. */
 #include "drive/retry.h"
 
+#include "drive/drive.h"
+#include "drive/faults.h"
+#include "drive/panel.h"
 #include "drive/param_scaling.h"
+#include "drive/states.h"
 
 #define RETRY_MS(seconds) ((uint32_t)(PARAM_F(seconds) * 1000.0F + 0.5F))
 
@@ -14,7 +18,7 @@ void retry_init(retry_t *r)
 /** 1 for a fault that may pass by itself (drive/faults.h). */
 static uint16_t retry_may_pass(uint16_t fault)
 {
-#define PASSING_BIT(code, name, passes, cause, remedy) | ((uint32_t)(passes) << (code))
+#define PASSING_BIT(code, name, passes, decided_by, cause, remedy) | ((uint32_t)(passes) << (code))
     const uint32_t passing = 0ul DRIVE_FAULT_TABLE(PASSING_BIT);
     return (uint16_t)((passing >> fault) & 1u);
 }

@@ -3,7 +3,7 @@
 #define BOARD_FIRMWARE_H
 
 #include "drive/drive.h"
-#include "drive/modes/params_in_ram.h"
+#include "drive/modes/mode_table.h"
 #include "drive/panel.h"
 #include "drive/param_scaling.h"
 #include "drive/retry.h"

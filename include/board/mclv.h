@@ -20,6 +20,7 @@
 #define BOARD_PIN_S3 B, 4        /* S3, low when pressed; published code */
 #define BOARD_PIN_FAULT B, 8     /* FLTA1, the over-current comparator, low on a fault; published code */
 #define BOARD_PIN_UART_TX C, 3   /* serial line, transmits at 115200 baud; [?] try C, 5 (RP21) first if no line comes */
+#define BOARD_OTHER_TX C, 5      /* BRINGUP tries this one, too */
 #define BOARD_PIN_UART_RX C, 4   /* serial line, receives; one other program for this board, its board unknown [?] */
 #define BOARD_PIN_LED_ALIVE C, 6 /* LED: alive, fault code; [?] a free pin until it is known */
 #define BOARD_PIN_LED_RUN C, 7   /* LED: running; [?] a free pin until it is known */
@@ -42,6 +43,11 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_ISR
 #define BOARD_ISR_SHADOW
 #endif
+
+/* ---- Priorities of the interrupts: set by peripherals.c, tested by selftest_run.c, read by the stack's proof (tools/image/stack.py) ---- */
+#define BOARD_PRIORITY_CONTROL 5u /* the control interrupt, alone at its level: its shadow registers do not nest */
+#define BOARD_PRIORITY_SLOW 3u    /* the slow work: raised by the control interrupt alone, and below it */
+#define BOARD_PRIORITY_FAULT 3u   /* the fault input: as the slow work, so that neither disturbs the other's state; the pins are off by hardware */
 
 /* ---- Clock: 8 MHz crystal * 40 / (2 * 2) = 80 MHz, 40 MIPS ---- */
 #define BOARD_FCY_HZ 40000000ul
@@ -81,10 +87,7 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_S3_DOWN() PIN_LOW(BOARD_PIN_S3) /* speed range */
 
 /* ---- UART1: 115200 8N1, status lines ---- */
-#define BOARD_U1BRG 86u                   /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
-#define BOARD_UART_TX_PIN RPOR9bits.RP19R /* the RP number of BOARD_PIN_UART_TX; RP21: RPOR10bits.RP21R */
-#define BOARD_OTHER_TX C, 5               /* BRINGUP tries this one, too */
-#define BOARD_OTHER_TX_PIN RPOR10bits.RP21R
+#define BOARD_U1BRG 86u           /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
 #define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
 #define BOARD_UART_RX_RP ((uint16_t)PIN_RP(BOARD_PIN_UART_RX))
 

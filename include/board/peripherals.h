@@ -1,12 +1,8 @@
-/* The peripherals of the board room, one function for each thing that main and the interrupts ask of them. Those of one or two instructions are
- * here as a whole: a call would be more. */
+/* The peripherals of the board room: clock, pins, PWM1, ADC1, timer 1, UART1. */
 #ifndef BOARD_PERIPHERALS_H
 #define BOARD_PERIPHERALS_H
 
-#include <stdint.h>
-
-#include "board/mclv.h"
-#include "drive/drive.h"
+#include "control/qmath.h"
 
 /** Starts the PLL and switches to it. @return 0, or 1 when it did not lock in a bounded time */
 uint16_t clock_init(void);
@@ -27,41 +23,21 @@ void adc_init(void);
 void timer_init(void);
 
 /** 1 once for each millisecond of timer 1. */
-QM_INLINE uint16_t timer_ms_passed(void)
-{
-    if (!IFS0bits.T1IF) {
-        return 0;
-    }
-    IFS0bits.T1IF = 0;
-    return 1;
-}
+uint16_t timer_ms_passed(void);
 
 /** UART1 at 115200 8N1. */
 void uart_init(void);
 
 /** 1 if the transmitter has room. */
-QM_INLINE uint16_t uart_has_room(void)
-{
-    return (uint16_t)!U1STAbits.UTXBF;
-}
+uint16_t uart_has_room(void);
 
 /** Sends one character if the transmitter has room. @return 1 when it was taken */
-QM_INLINE uint16_t uart_send(char c)
-{
-    if (!uart_has_room()) {
-        return 0;
-    }
-    U1TXREG = (uint16_t)(uint8_t)c;
-    return 1;
-}
+uint16_t uart_send(char c);
 
 /** A character that has come in. @return 0 to 255, or -1: none; when some were lost for want of room, what waited is lost, too */
 int16_t uart_receive(void);
 
 /** All six outputs inactive, whatever else happens. */
-QM_INLINE void pwm_outputs_off(void)
-{
-    P1OVDCON = BOARD_OUTPUTS_OFF;
-}
+void pwm_outputs_off(void);
 
 #endif

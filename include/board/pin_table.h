@@ -45,16 +45,47 @@ enum { CHIP_PIN_TABLE(PIN_NUMBERS) PIN_PORT_A = 0,
        PIN_PORT_B = 1,
        PIN_PORT_C = 2 };
 
+/* Where a remappable pin's output is chosen; a test holds the RP numbers to those above. */
+#define PIN_B0_OUTPUT RPOR0bits.RP0R
+#define PIN_B1_OUTPUT RPOR0bits.RP1R
+#define PIN_B2_OUTPUT RPOR1bits.RP2R
+#define PIN_B3_OUTPUT RPOR1bits.RP3R
+#define PIN_B4_OUTPUT RPOR2bits.RP4R
+#define PIN_B5_OUTPUT RPOR2bits.RP5R
+#define PIN_B6_OUTPUT RPOR3bits.RP6R
+#define PIN_B7_OUTPUT RPOR3bits.RP7R
+#define PIN_B8_OUTPUT RPOR4bits.RP8R
+#define PIN_B9_OUTPUT RPOR4bits.RP9R
+#define PIN_B10_OUTPUT RPOR5bits.RP10R
+#define PIN_B11_OUTPUT RPOR5bits.RP11R
+#define PIN_B12_OUTPUT RPOR6bits.RP12R
+#define PIN_B13_OUTPUT RPOR6bits.RP13R
+#define PIN_B14_OUTPUT RPOR7bits.RP14R
+#define PIN_B15_OUTPUT RPOR7bits.RP15R
+#define PIN_C0_OUTPUT RPOR8bits.RP16R
+#define PIN_C1_OUTPUT RPOR8bits.RP17R
+#define PIN_C2_OUTPUT RPOR9bits.RP18R
+#define PIN_C3_OUTPUT RPOR9bits.RP19R
+#define PIN_C4_OUTPUT RPOR10bits.RP20R
+#define PIN_C5_OUTPUT RPOR10bits.RP21R
+#define PIN_C6_OUTPUT RPOR11bits.RP22R
+#define PIN_C7_OUTPUT RPOR11bits.RP23R
+#define PIN_C8_OUTPUT RPOR12bits.RP24R
+#define PIN_C9_OUTPUT RPOR12bits.RP25R
+
 /* What follows from a pin that is written as "port, bit": #define BOARD_PIN_S2 A, 8. PIN_LOW: not 0 where it is. */
 #define PIN_AN_OF(port, bit) PIN_##port##bit##_AN
 #define PIN_RP_OF(port, bit) PIN_##port##bit##_RP
 #define PIN_LOW_OF(port, bit) ((uint16_t)((uint16_t)~PORT##port & (1u << (bit))))
 #define PIN_LATCH_OF(port, bit) LAT##port##bits.LAT##port##bit
 #define PIN_MASK_OF(port, bit, wanted) ((PIN_PORT_##port == PIN_PORT_##wanted) ? 1u << (bit) : 0u)
+#define PIN_OUTPUT_OF(port, bit) PIN_##port##bit##_OUTPUT
 #define PIN_AN(...) PIN_AN_OF(__VA_ARGS__)
 #define PIN_RP(...) PIN_RP_OF(__VA_ARGS__)
 #define PIN_LOW(...) PIN_LOW_OF(__VA_ARGS__)
 #define PIN_LATCH(...) PIN_LATCH_OF(__VA_ARGS__)
+/** The field that says which peripheral drives the pin. */
+#define PIN_OUTPUT(...) PIN_OUTPUT_OF(__VA_ARGS__)
 /** Its name as a text: "RC6". */
 #define PIN_NAME_OF(port, bit) "R" #port #bit
 #define PIN_NAME(...) PIN_NAME_OF(__VA_ARGS__)

@@ -1,9 +1,16 @@
-/* The scope: up to eight variables, a row of them every so many control interrupts, into what RAM is left; with trigger and pre-trigger. */
+/* The scope, and LNet, the protocol of X2C-Scope clients that reads and writes memory and runs it (docs/scope.md).
+ *
+ * The scope records up to eight variables, a row of them every so many control interrupts, into what RAM is left; with trigger and pre-trigger. */
 #ifndef BOARD_SCOPE_H
 #define BOARD_SCOPE_H
 
-#include "board/modes/scope_room.h"
+#include "board/modes/mode_board.h"
 #include "control/qmath.h"
+#include "drive/param_scaling.h"
+
+#ifndef __XC16__
+#include <xc.h> /* the PC's: where the window is */
+#endif
 
 #define SCOPE_WORDS 8u /* of a row: 16-bit variables; a 32-bit one takes two */
 #define SCOPE_USUAL_WORDS 4u
@@ -43,87 +50,11 @@ typedef struct {
 
 #if SCOPE
 
-/** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read.
- *  @return where the next one goes */
-QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
-{
-    const volatile int16_t *first = s->source[0], *second = s->source[1], *third = s->source[2], *fourth = s->source[3];
-    int16_t *at = s->at;
-    *at++ = *first;
-    *at++ = *second;
-    *at++ = *third;
-    *at++ = *fourth;
-    return at;
-}
-
-/** A row is there while the trigger is looked for. After the trigger's, scope_turn() ends a round. @param following where it ended */
-QM_INLINE void scope_look(scope_t *s, const volatile uint16_t *trigger, int16_t *following)
-{
-    if ((int16_t)(*trigger ^ s->flip) < s->level) {
-        s->is_low = 0xFFFFu;
-    } else if (s->is_low) {
-        s->event = following;
-        s->mode = s->then;
-        s->at = following;
-        return;
-    } else {
-        /* it has always been there */
-    }
-    s->at = (following == s->ring_end) ? s->ring_begin : following;
-}
-
-/** Before a row after the trigger's, or without one: a new round at the array's end. @param begin of the array */
-QM_INLINE void scope_turn(scope_t *s, int16_t *begin)
-{
-    if (s->at == s->last) {
-        s->at = begin;
-    }
-}
-
-/** Such a row is there. @param following where it ended */
-QM_INLINE void scope_go_on(scope_t *s, int16_t *following)
-{
-    s->at = following;
-    if (--s->left == 0u) {
-        s->mode = SCOPE_IDLE;
-    }
-}
-
-/** A row is there before the trigger is looked for: there is always room for one more. @param following where it ended
- *  @param is_rare what it is from the trigger's search on */
-QM_INLINE void scope_fill(scope_t *s, int16_t *following, uint16_t is_rare)
-{
-    s->at = following;
-    if (--s->before == 0u) {
-        s->mode = s->looking;
-        s->is_rare = is_rare;
-    }
-}
-
 /** A row that is not the usual one: any length, whatever it costs. */
 void scope_record_unusual(scope_t *s);
 
 /** The last work of a period. @param begin of the array */
-QM_INLINE void scope_tick(scope_t *s, int16_t *begin)
-{
-    if (s->mode == SCOPE_IDLE || --s->wait != 0u) {
-        return;
-    }
-    s->wait = s->periods;
-    if (s->mode >= 0) {
-        if (!s->is_rare) {
-            scope_turn(s, begin);
-            scope_go_on(s, scope_copy_usual(s));
-        } else if (s->looking < 0) {
-            scope_fill(s, scope_copy_usual(s), 0);
-        } else {
-            scope_record_unusual(s);
-        }
-    } else {
-        const volatile uint16_t *trigger = s->trigger;
-        scope_look(s, trigger, scope_copy_usual(s));
-    }
-}
+void scope_tick(scope_t *s, int16_t *begin);
 
 /** Rows go here. */
 extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
@@ -139,4 +70,102 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
 void scope_put(const scope_t *s, void *record);
 
 #endif
+
+/* ---- The memory that a client on the serial line may see, by 16-bit addresses: the chip's own; on a PC the window of tools/cpu_host ---- */
+
+#define MEMORY_RAM_START 0x0800u
+
+#ifdef __XC16__
+
+extern uint16_t _SP_init; /* the linker's: its address is where the variables end and the stack begins */
+#define MEMORY_RAM_BYTES 0x0800u
+#define MEMORY_VARIABLE_BYTES ((uint16_t)((uint16_t)(uintptr_t)&_SP_init - MEMORY_RAM_START))
+#define MEMORY_AT(address) ((volatile void *)(uintptr_t)(address))
+#define MEMORY_ADDRESS(pointer) ((uint16_t)(uintptr_t)(pointer))
+
+#else
+
+#define MEMORY_RAM_BYTES ((uint16_t)host_window_bytes())
+#define MEMORY_VARIABLE_BYTES MEMORY_RAM_BYTES
+#define MEMORY_AT(address) ((volatile void *)(host_window() + ((address)-MEMORY_RAM_START)))
+#define MEMORY_ADDRESS(pointer) ((uint16_t)((const volatile uint8_t *)(pointer)-host_window() + (ptrdiff_t)MEMORY_RAM_START))
+
+#endif
+
+/** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. What is below wraps to beyond the end. */
+uint16_t memory_is_ram(uint16_t address, uint16_t bytes);
+
+/** 1 if all of these bytes of RAM are variables: no stack. */
+uint16_t memory_is_variable(uint16_t address, uint16_t bytes);
+
+/* ---- LNet, the protocol of X2C-Scope clients, on the serial line: answers frames, reads and writes memory, runs the scope (docs/scope.md) ---- */
+
+#define LNET_SYN 0x55u
+#define LNET_KEY 0x02u /* as SYN followed by a fill byte where it is data */
+#define LNET_NODE 1u
+#define LNET_ROOM ((uint16_t)MODE_LINE_SIZE) /* for a frame, even */
+#define LNET_FIRST 8u                        /* bytes of the first request; the later ones have the status line's memory */
+#define LNET_MOST_BYTES 253u                 /* of memory in an answer */
+#define LNET_QUIET_MS 100u                   /* silence that ends a frame which is not complete */
+
+/** X(number, name, meaning): services. */
+#define LNET_SERVICE_TABLE(X) \
+    X(0, DEVICE_INFO, "what is there") \
+    X(9, GET_RAM, "read memory") \
+    X(10, PUT_RAM, "write variables") \
+    X(17, LOAD_PARAMETER, "what the scope has done") \
+    X(18, SAVE_PARAMETER, "start or stop the scope")
+
+/** X(number, name, meaning): how a request ends. */
+#define LNET_ERROR_TABLE(X) \
+    X(0, OK, "done") \
+    X(19, CHECKSUM, "the checksum is wrong") \
+    X(20, FORMAT, "wrong length, an address that is not allowed, or settings that the scope cannot have") \
+    X(21, SIZE, "longer than the memory for it") \
+    X(33, SERVICE, "no such service")
+
+#define LNET_SERVICE(number, name, meaning) LNET_##name = (number),
+#define LNET_ERROR(number, name, meaning) LNET_ERROR_##name = (number),
+enum { LNET_SERVICE_TABLE(LNET_SERVICE) };
+enum { LNET_ERROR_TABLE(LNET_ERROR) };
+
+/** The line: requests and answers take turns. */
+typedef struct {
+    scope_t scope;
+    uint8_t *buffer;                /**< a frame from its size to its last byte of data, as far as there is room */
+    uint16_t room;                  /**< of it, even */
+    uint8_t *memory;                /**< the buffer from the first valid frame on */
+    const volatile uint8_t *source; /**< what an answer goes on with where the buffer ends */
+    uint16_t quiet_ms;              /**< since the last byte of a request that is not complete */
+    uint16_t part;                  /**< what comes next */
+    uint16_t special;               /**< the byte that the next one must fill, or 0 */
+    uint16_t left;                  /**< bytes of a frame that are still to come or to be sent, its sum not counted */
+    uint16_t at;                    /**< in the buffer */
+    uint16_t sum;
+    uint16_t is_up;            /**< 1 from the first valid frame on */
+    uint8_t first[LNET_FIRST]; /**< the buffer before that */
+} lnet_t;
+
+#if SCOPE
+
+/** One link, one scope. */
+extern lnet_t board_lnet;
+
+/** Nothing received, nothing recorded. @param memory of the status line, LNET_ROOM bytes, which the first valid frame takes over */
+void lnet_init(uint8_t *memory);
+
+/** A byte from the line. While an answer is under way it is dropped: a client waits for its answer. */
+void lnet_receive(uint8_t byte);
+
+/** The next byte of an answer. @return 0 to 255, or -1: nothing to send */
+int16_t lnet_next(void);
+
+/** Time goes by. */
+void lnet_tick(uint16_t elapsed_ms);
+
+/** Not 0 while the line belongs to a client: one has sent a valid frame, or what may become the first one comes in. */
+uint16_t lnet_is_busy(void);
+
+#endif
+
 #endif

@@ -2,10 +2,22 @@
 #ifndef BOARD_SELFTEST_RUN_H
 #define BOARD_SELFTEST_RUN_H
 
-#include "board/selftest_flow.h"
 #include "drive/faults.h"
+#include "drive/selftest.h"
+
+/** The background's parts, which come in this order. */
+enum { SELFTEST_PART_SUPERVISE = 1,
+       SELFTEST_PART_PANEL,
+       SELFTEST_PART_WATCH,
+       SELFTEST_PART_STATUS };
 
 #ifndef SELFTEST_OFF
+
+/** The parts that have come to their end, three bits each. */
+extern uint16_t board_selftest_parts;
+
+/** A part has come to its end. */
+#define selftest_part(part) (board_selftest_parts = (uint16_t)((uint16_t)(board_selftest_parts << 3) | (part)))
 
 /** The self-test that failed first (selftest_t), 0: none. From then on to the next reset by power-up or MCLR nothing may run. */
 extern volatile uint16_t board_selftest_failed;
@@ -47,6 +59,7 @@ char *selftest_put_marked(char *at);
 #define selftest_ms() ((void)0)
 #define selftest_put(at) (at)
 #define selftest_put_marked(at) (at)
+#define selftest_part(part) ((void)0)
 #endif
 
 #endif

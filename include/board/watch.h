@@ -2,8 +2,7 @@
 #ifndef BOARD_WATCH_H
 #define BOARD_WATCH_H
 
-#include "board/modes/identify_report.h"
-#include "board/modes/snapshot_arrays.h"
+#include "board/modes/mode_board.h"
 
 /** Field weakening: table index in use, d reference (Q15 of full-scale current), start speed. Speeds here are in electrical rpm, or in counts of
  *  SPEED_UNIT of them (the table at the end of userparams.h) where MAXIMUM_SPEED_RPM is above 32000

@@ -3,11 +3,10 @@
 #define CONTROL_FIELDWEAK_H
 
 #include "control/estimator.h"
+#include "control/qmath.h"
 
 #define FIELDWEAK_ENTRIES 18
-#define FIELDWEAK_TRIM_SHIFT 3     /**< d current of the voltage feedback: counts a step per 8 counts of missing voltage */
-#define FIELDWEAK_FILTER_LEAST 256 /**< K of the slowest back-EMF filter, Q16 */
-#define SPEED_INDEX_CONST 10       /**< one table step is 2^10 electrical rpm */
+#define SPEED_INDEX_CONST 10 /**< one table step is 2^10 electrical rpm */
 
 /** The three tables of AN1292 and what frames them. */
 typedef struct {
@@ -33,53 +32,18 @@ typedef struct {
     current_q13_t trim_q13;  /**< d current added by the voltage feedback, -trim_max_q13..0 */
 } fieldweak_t;
 
-/** Where the three tables are. */
-typedef struct {
-    const int16_t *idref_q13, *inv_kfi, *ls_over2ls0_q15;
-} fieldweak_tables_t;
-
-#define FIELDWEAK_STEP(t, n) ((uint16_t)(t)[n] ^ (uint16_t)(t)[(n) + 1])
-/** All entries are the same; without a branch the compiler knows it at once. */
-#define FIELDWEAK_FLAT(t) \
-    ((FIELDWEAK_STEP(t, 0) | FIELDWEAK_STEP(t, 1) | FIELDWEAK_STEP(t, 2) | FIELDWEAK_STEP(t, 3) | FIELDWEAK_STEP(t, 4) | FIELDWEAK_STEP(t, 5) \
-      | FIELDWEAK_STEP(t, 6) | FIELDWEAK_STEP(t, 7) | FIELDWEAK_STEP(t, 8) | FIELDWEAK_STEP(t, 9) | FIELDWEAK_STEP(t, 10) | FIELDWEAK_STEP(t, 11) \
-      | FIELDWEAK_STEP(t, 12) | FIELDWEAK_STEP(t, 13) | FIELDWEAK_STEP(t, 14) | FIELDWEAK_STEP(t, 15) | FIELDWEAK_STEP(t, 16)) \
-     == 0u)
-
 /** Entry of a table between two points. @param index 0..FIELDWEAK_ENTRIES - 2 */
-QM_INLINE int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16)
-{
-    return (int16_t)(table[index] - qm_mulhi_su((int16_t)(table[index] - table[index + 1u]), fraction_q16));
-}
-
-/** The same of a table of the parameters; of constants it may be known that all entries are the same. */
-#define FIELDWEAK_ENTRY(p, tables, name, index, fraction_q16) \
-    (QM_KNOWN(FIELDWEAK_FLAT((p)->name)) ? (p)->name[0] : fieldweak_between((tables)->name, index, fraction_q16))
-
-/** Those among the parameters. */
-QM_INLINE fieldweak_tables_t fieldweak_tables(const fieldweak_params_t *p)
-{
-    fieldweak_tables_t tables = { p->idref_q13, p->inv_kfi, p->ls_over2ls0_q15 };
-    return tables;
-}
+int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16);
 
 /** Looks up the three tables for a speed reference (not the estimated speed); with the back-EMF's filter they go to the estimator.
  *  Entries above the last are never read: at and beyond index 17 the last entry holds, to one count.
- *  @param tables with the parameters' entries, in the parameters or elsewhere
  *  @param ref_erpm speed reference, any value and sign */
-void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, const fieldweak_tables_t *tables, motor_model_t *model, speed_erpm_t ref_erpm);
+void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm);
 
 /** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later.
  *  It makes up for a sagging bus or a table that is not tuned; it is bounded, so it cannot run the motor into demagnetisation.
  *  @param free_q14 q-axis limit minus |Vq| of the last period
  *  @param speed_erpm filtered estimated speed */
-QM_INLINE void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, voltage_q14_t free_q14, speed_erpm_t speed_erpm)
-{
-    int16_t step = p->trim_step_q13;
-    if (qm_beyond(speed_erpm, p->trim_speed_erpm)) {
-        step = qm_clamp((int16_t)(free_q14 >> FIELDWEAK_TRIM_SHIFT), (int16_t)-p->trim_most_q13, p->trim_step_q13);
-    }
-    fw->trim_q13 = qm_clamp((int16_t)(fw->trim_q13 + step), (int16_t)-p->trim_max_q13, 0);
-}
+void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, voltage_q14_t free_q14, speed_erpm_t speed_erpm);
 
 #endif

@@ -4,22 +4,11 @@
 
 #include <stdint.h>
 
-/** Blocks of the PWM interrupt are composed in one translation unit; a call would cost 18 cycles of saved registers. */
-#define QM_INLINE static inline __attribute__((always_inline))
-
-/** Blocks of the interrupt that run rarely or in turn: called, so that they take no registers from the main path. */
-#define NOINLINE static __attribute__((noinline, unused))
-
-/** 1 where the compiler knows x, of parameters that are constants of the image; 1 where it knows that c holds. It leaves out what then cannot
- *  happen. 0 tells nothing. */
-#ifndef QM_CONSTANT /* a test knows them all */
-#ifdef __XC16__
-#define QM_CONSTANT(x) __builtin_constant_p(x)
-#else
-#define QM_CONSTANT(x) 0
-#endif
-#endif
-#define QM_KNOWN(c) (QM_CONSTANT(c) && (c))
+/** A part of the PWM period, composed in place: a call costs 18 cycles of saved registers. In the image every file is one unit. */
+#define INLINE inline __attribute__((always_inline))
+#define QM_INLINE static INLINE
+/** Called, so that it takes no registers from the main path. */
+#define NOINLINE __attribute__((noinline))
 
 /** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
  *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */
@@ -134,93 +123,35 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
     return (x < low) ? low : x;
 }
 
-/** The same as one called copy. */
-NOINLINE int16_t qm_clamp_called(int16_t x, int16_t low, int16_t high)
-{
-    return qm_clamp(x, low, high);
-}
-
 /** x limited to low..high, its upper word. */
-NOINLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
+QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 {
-#ifdef __FRAMAC__ /* what it means */
-    int32_t least = (int32_t)low * 65536, most = (int32_t)high * 65536;
+    const int32_t least = (int32_t)low * 65536, most = (int32_t)high * 65536;
     if (x > most) {
         return most;
     }
     return (x < least) ? least : x;
-#else
-    int16_t end = high;
-    if (qm_hi(x) < high) { /* the upper word tells it all: just at the end it is the end */
-        if (qm_hi(x) >= low) {
-            return x;
-        }
-        end = low;
+}
+
+/** Magnitude; -32768 gives 32767. */
+QM_INLINE int16_t qm_abs(int16_t x)
+{
+    if (x >= 0) {
+        return x;
     }
-    return (int32_t)end * 65536;
-#endif
-}
-
-/* Ranges, each by one comparison without a sign, and a sign without a branch. The proofs read what they mean; test_qmath.c compares. */
-#ifdef __FRAMAC__
-#define qm_beyond(x, most) ((x) > (most) || (x) < -(most))
-#define qm_outside(x, most) ((x) < 0 || (x) > (most))
-#define qm_clear_of(x, most) ((x) <= (most) && (x) >= -(most))
-#define qm_with_sign(most, x) ((int16_t)(((x) < 0) ? -(most) : (most)))
-#define qm_magnitude(x) (((x) >= 0) ? (x) : ((x) == INT16_MIN) ? INT16_MAX \
-                                                               : -(x))
-#define qm_unsigned(x) ((uint16_t)(((x) >= 0) ? (x) : -(x)))
-#else
-/** 1 where |x| > most. @param most not negative */
-QM_INLINE QM_WRAPS uint16_t qm_beyond(int16_t x, int16_t most)
-{
-    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) > (uint16_t)(2u * (uint16_t)most));
-}
-
-/** 1 where x is not 0..most. @param most not negative */
-QM_INLINE uint16_t qm_outside(int16_t x, int16_t most)
-{
-    return (uint16_t)((uint16_t)x > (uint16_t)most);
-}
-
-/** 1 where the upper words alone tell that |x| <= most; 0 tells nothing. @param most not negative */
-QM_INLINE QM_WRAPS uint16_t qm_clear_of(int32_t x, int32_t most)
-{
-    uint16_t limit = (uint16_t)qm_hi(most);
-    return (uint16_t)((uint16_t)((uint16_t)qm_hi(x) + limit) < (uint16_t)(2u * limit));
+    return (int16_t)((x == INT16_MIN) ? INT16_MAX : -x);
 }
 
 /** most with the sign of x. @param most not negative */
 QM_INLINE int16_t qm_with_sign(int16_t most, int16_t x)
 {
-    int16_t sign = qm_hi(x); /* 0 or -1 */
-    return (int16_t)((most ^ sign) - sign);
+    return (int16_t)((x < 0) ? -most : most);
 }
 
-/** Magnitude of any x, without the end that a sign needs. */
-QM_INLINE QM_WRAPS uint16_t qm_unsigned(int16_t x)
+/** 1 where |x| > most. @param most not negative */
+QM_INLINE uint16_t qm_beyond(int16_t x, int16_t most)
 {
-    return (uint16_t)((x < 0) ? 0u - (uint16_t)x : (uint16_t)x);
-}
-
-/** |x| for qm_abs(); -32768 gives 32767. */
-QM_INLINE QM_WRAPS int16_t qm_magnitude(int16_t x)
-{
-    uint16_t m = qm_unsigned(x);
-    return (int16_t)(m - (m >> 15));
-}
-#endif
-
-/** Magnitude; -32768 gives 32767. */
-QM_INLINE int16_t qm_abs(int16_t x)
-{
-    return (int16_t)qm_magnitude(x);
-}
-
-/** Magnitude of what the caller proves to be above -32768: two instructions, where qm_abs() takes four. */
-QM_INLINE int16_t qm_size(int16_t x)
-{
-    return (int16_t)((x < 0) ? -x : x);
+    return (uint16_t)(x > most || x < -most);
 }
 
 /** x limited to -most..most. @param most not negative */
@@ -232,36 +163,20 @@ QM_INLINE int16_t qm_limit(int16_t x, int16_t most)
     return x;
 }
 
-/** The same as one called copy. */
-NOINLINE int16_t qm_limit_called(int16_t x, int16_t most)
-{
-    return qm_limit(x, most);
-}
-
-/** (a + b) / 2, rounded toward minus infinity, in 16 bits. */
+/** (a + b) / 2, rounded toward minus infinity. */
 QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
 {
-#ifdef __FRAMAC__ /* what it means */
     return (int16_t)(((int32_t)a + b) >> 1);
-#else
-    return (int16_t)((a & b) + ((int16_t)(a ^ b) >> 1));
-#endif
 }
 
-/** a - b in 17 bits, limited to half the int16 range so that it can be summed again without overflow. */
-NOINLINE int16_t qm_sub_limited(int16_t a, int16_t b)
+/** a - b, limited to half the int16 range so that it can be summed again without overflow. */
+QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
 {
-#ifdef __FRAMAC__ /* what it means */
-    int32_t difference = (int32_t)a - b;
-    return (int16_t)((difference > 16383) ? 16383 : (difference < -16383) ? -16383
-                                                                          : difference);
-#else
-    int16_t half = (int16_t)((a >> 1) - (b >> 1));
-    if (qm_beyond(half, 8191)) { /* 16383 at least: half of an odd number is rounded */
-        return qm_with_sign(16383, half);
+    const int32_t difference = (int32_t)a - b;
+    if (difference > 16383) {
+        return 16383;
     }
-    return (int16_t)(a - b);
-#endif
+    return (int16_t)((difference < -16383) ? -16383 : difference);
 }
 
 /** x * 2^bits; the caller proves that it fits. @param bits 0..15 */

@@ -1,4 +1,4 @@
-/* Positive numbers with 16 significant bits and any exponent, for background work whose range no Q format holds. */
+/* Positive numbers with 16 significant bits and any exponent, and integer square roots, for background work whose range no Q format holds. */
 #ifndef CONTROL_SOFT_FLOAT_H
 #define CONTROL_SOFT_FLOAT_H
 
@@ -27,5 +27,11 @@ uint16_t soft_float_to_uint16(soft_float_t a);
 
 /** x times a, truncated towards zero, for products below 2^30. */
 int32_t soft_float_times(int32_t x, soft_float_t a);
+
+/** Square root, rounded down. */
+uint16_t root_of(uint32_t x);
+
+/** Length of (x, y), rounded down. @param x,y -32767 .. 32767 */
+uint16_t root_length(int16_t x, int16_t y);
 
 #endif

@@ -2,45 +2,27 @@
 #ifndef DRIVE_DRIVE_H
 #define DRIVE_DRIVE_H
 
-#include "control/adaptation.h"
+#include "control/motor_model.h"
 #include "control/current_control.h"
 #include "control/estimator.h"
 #include "control/fieldweak.h"
 #include "control/forced_angle.h"
 #include "control/observer.h"
-#include "control/speed_ramp.h"
+#include "control/qmath.h"
 #include "control/svm.h"
-#include "drive/dead_state.h"
+#include "control/transforms.h"
+#include "control/trig.h"
+#include "drive/catch.h"
 #include "drive/faults.h"
-#include "drive/late_state.h"
-#include "drive/modes/mode_state.h"
-#include "drive/salient_state.h"
-#include "drive/selftest_state.h"
-
-/** X(name, meaning): what the drive is doing. */
-#define DRIVE_STATE_TABLE(X) \
-    X(CALIBRATE, "outputs off, current offsets are averaged") \
-    X(STOPPED, "outputs off, ready") \
-    X(BOOTSTRAP, "low sides on: high-side drivers charge, the short circuit's current tells of a rotor that turns") \
-    X(ALIGN, "a current that grows while it turns takes the rotor along") \
-    X(RAMP, "forced angle accelerates; the estimator runs along") \
-    X(CLOSED, "the estimator's angle drives the motor") \
-    X(STOPPING, "closed loop, ramping down to a speed where the outputs can go off") \
-    X(FAULT, "outputs off until S2 clears the fault") \
-    X(CATCH, "outputs off: between two looks at a rotor that turns, or while it is too fast")
-
-#define DRIVE_STATE_ENUM(name, meaning) DRIVE_##name,
-typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_state_t;
-
-/** What drives the six outputs. */
-typedef enum {
-    OUTPUTS_OFF,
-    OUTPUTS_BOOTSTRAP,
-    OUTPUTS_PWM
-} outputs_t;
+#include "drive/forward.h"
+#include "drive/handover.h"
+#include "drive/model.h"
+#include "drive/modes/modes.h"
+#include "drive/selftest.h"
+#include "drive/startup.h"
 
 /** Constants of the machine around the control law. Times in periods, in slow steps (SLOW_PERIODS), in rare ones, of two, or in seldom ones, of four. */
-typedef struct {
+struct drive_params {
     estimator_params_t estimator;
     fieldweak_params_t fieldweak;
     forced_angle_params_t forced;
@@ -48,14 +30,14 @@ typedef struct {
     pi_gains_t pi_d, pi_q;
     adaptation_params_t adaptation;
     observer_params_t observer;
-    int16_t speed_kp_q13, speed_kp_quick_q13; /**< q current counts * 8192 per erpm: as a rule, and after a large innovation */
-    int16_t sample_shift_q16;                 /**< q current that a sample after the centre of the low sides' conduction misses, counts
+    int16_t speed_kp_q13, speed_kp_fast_q13; /**< q current counts * 8192 per erpm: as a rule, and after a large innovation */
+    int16_t sample_shift_q16;                /**< q current that a sample after the centre of the low sides' conduction misses, counts
                                                    * 65536 per erpm: delay * psi / L */
 
     q15_t kcurr_a, kcurr_b; /**< gain of the samples; Q15 sample to Q13 current by the high word */
     int16_t offset_max_q13; /**< largest plausible offset */
     uint16_t bootstrap_periods;
-    uint16_t flying_start; /**< catch_step_t: CATCH_FIRST_LOOK or, without FLYING_START, CATCH_NO_LOOK */
+    uint16_t flying_start; /**< 1: a start looks whether the rotor turns (FLYING_START) */
     uint16_t align_periods;
     uint16_t agree_steps;    /**< agreement needed for the hand-over */
     uint16_t wait_periods;   /**< how long it may take at the end of the ramp */
@@ -65,7 +47,7 @@ typedef struct {
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
-    current_q13_t burn_most_q13;        /**< most d current that burns energy in the winding; 0 where that would be no gain */
+    current_q13_t flux_brake_most_q13;  /**< most d current that burns energy in the winding; 0 where that would be no gain */
     uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
     int32_t i2t_most_q25;               /**< square of I2T_CURRENT_A; 0: no I2t */
@@ -98,12 +80,7 @@ typedef struct {
     int16_t dead_emf_q12;      /**< what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
     SALIENT_PARAMS
-} drive_params_t;
-
-/** Raw converter results, signed fractional Q15. */
-typedef struct {
-    int16_t i_a, i_b, v_bus;
-} drive_samples_t;
+};
 
 /** Requests from the background; 16-bit, so written in one instruction. */
 typedef struct {
@@ -111,13 +88,6 @@ typedef struct {
     volatile int16_t clear_fault; /**< 1: one request, taken back by the tick */
     volatile int16_t target_erpm; /**< speed target, signed; TORQUE_MODE: q current, Q13 */
 } drive_command_t;
-
-/** Current offsets and the sums they come from. */
-typedef struct {
-    int32_t sum_a, sum_b;
-    int16_t offset_a_q13, offset_b_q13;
-    int16_t done; /**< 1: the offsets are known */
-} calibration_t;
 
 /** Controller variables of the closed loop. */
 typedef struct {
@@ -127,7 +97,7 @@ typedef struct {
     dq_t ref_q13;                  /**< current references */
     current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2) */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */
-    current_q13_t burn_q13;        /**< d current that burns what the bus does not take, 0 or more */
+    current_q13_t flux_brake_q13;  /**< d current that burns what the bus does not take, 0 or more */
     dq_t i_q13;                    /**< measured currents in the control frame */
     dq_t v_q14;                    /**< commanded voltages in the control frame */
     voltage_q14_t vq_limit_q14;
@@ -139,37 +109,8 @@ typedef struct {
     current_q13_t sample_shift_q13;   /**< q current that the sample misses at this speed */
 } drive_control_t;
 
-/** The way from the forced angle to the estimator's. A step is a slow one. */
-typedef struct {
-    uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
-    uint16_t is_due;           /**< 1: the next period hands over */
-    int16_t ahead_erpm;        /**< by how much the estimated speed is ahead of the forced one, in the mean */
-    uint16_t speed_is_preset;  /**< 1 from six periods after the hand-over on: the observer runs */
-    int16_t offset;            /**< angle that is left of the change of frame, angle counts */
-    current_q13_t current_q13; /**< of the ramp, at the hand-over */
-    current_q13_t id_q13;      /**< d current that goes with the offset */
-} handover_t;
-
-/** What a look at the rotor is for. */
-typedef enum {
-    CATCH_NO_LOOK, /**< it stands, or nobody wants to know */
-    CATCH_FIRST_LOOK,
-    CATCH_SECOND_LOOK,
-    CATCH_SEEN /**< angle and speed are known */
-} catch_step_t;
-
-/** A rotor that turns at the start (drive/catch.h). */
-typedef struct {
-    uint16_t step;         /**< catch_step_t: the look that goes on, or comes after the pause */
-    alphabeta_t sum_q11;   /**< currents of this look */
-    int16_t bus_q15;       /**< the bus when it was last asked whether it falls */
-    angle_t direction;     /**< of the back-EMF in the middle of the last look */
-    uint16_t pause;        /**< with the outputs off, periods */
-    uint16_t half_periods; /**< from the middle of the last look to its end; between two looks, to the next one's begin */
-} catch_t;
-
 /** What a start begins anew: all of it is cleared. */
-typedef struct {
+struct drive_run {
     estimator_t estimator;
     motor_model_t model; /**< the motor's constants, from the tables and the adaptation */
     fieldweak_t fieldweak;
@@ -179,20 +120,21 @@ typedef struct {
     catch_t catching;
     drive_control_t control;
     uint16_t stall_steps;         /**< rare steps below half the reference, less four for each above */
-    uint16_t probe_steps;         /**< of the probe whether the rotor turns, and of the pause after it */
+    uint16_t probe_phase;         /**< probe_phase_t, of the probe whether the rotor turns; written by probe_enter() only */
+    uint16_t probe_steps;         /**< in the phase */
     uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference; more than a dip while the probe's own lasts */
     current_q13_t probe_id_q13;   /**< its d current */
     current_q13_t probe_most_q13; /**< and the most of it */
     uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
     uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
     uint16_t lost_lock_steps;     /**< two for each rare step out of lock, less one for each in lock */
+    alphabeta_t deferred_v_q13;   /**< the vector whose duties wait for the next control interrupt, where they do */
     SALIENT_STATE
-    LATE_STATE
     MODE_STATE
-} drive_run_t;
+};
 
 /** Everything the drive knows. Owned by the board; zero plus drive_init() is the start. */
-typedef struct {
+struct drive {
     drive_command_t command;
     volatile uint16_t state; /**< drive_state_t; written by drive_enter() only */
     volatile uint16_t fault; /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
@@ -206,22 +148,19 @@ typedef struct {
     voltage_circle_t circle; /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
 
-    forced_angle_t forced; /**< a start clears all from here to the run */
-    dead_duties_t dead;    /**< dead-time compensation of the next two pulses, or of the first */
-    DEAD_STATE
-    angle_t angle;  /**< control angle of the next sample */
-    sincos_t frame; /**< its sine and cosine */
+    forced_angle_t forced;     /**< a start clears it, with all that follows (drive_begin()) */
+    dead_duties_t dead;        /**< dead-time compensation of the next two pulses, or of the first */
+    dead_duties_t dead_second; /**< of the second pulse to come, where each has its own */
+    angle_t angle;             /**< control angle of the next sample */
+    sincos_t frame;            /**< its sine and cosine */
     drive_run_t run;
     SELFTEST_STATE
-} drive_t;
+};
 
 #define CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
 
 /** Clears bytes: assigning a zero struct would copy it from flash. */
 void drive_zero(void *object, uint16_t size);
-
-/** drive_raise() for all that is not the control interrupt: one copy of it. */
-void drive_fail(drive_t *d, drive_fault_t fault);
 
 /** Brings the object to CALIBRATE; every field gets its start value. */
 void drive_init(drive_t *d, const drive_params_t *p);
@@ -234,9 +173,6 @@ void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t 
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
 /** x turned into the direction of rotation. */
-QM_INLINE int16_t along_direction(const drive_t *d, int16_t x)
-{
-    return qm_with_sign(x, d->direction);
-}
+int16_t along_direction(const drive_t *d, int16_t x);
 
 #endif

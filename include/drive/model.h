@@ -1,59 +1,50 @@
-/* What the running motor teaches about itself, and when it may. */
+/* What the running motor teaches about itself, and what a salient motor adds. */
 #ifndef DRIVE_MODEL_H
 #define DRIVE_MODEL_H
 
-#include "drive/salient.h"
-#include "drive/state.h"
+#include "control/qmath.h"
+#include "control/motor_model.h"
+#include "drive/forward.h"
+#include "drive/param_scaling.h"
+
+#if MOTOR_SALIENCY_UH
+#define SALIENT_PARAMS uint16_t salience_q13; /**< -i_d that doubles the flux, psi/(Lq - Ld) */
+#define SALIENT_STATE salience_t salience;
+#else
+#define SALIENT_PARAMS
+#define SALIENT_STATE
+#endif
+
+/** The model with the flux that the d current makes, before what was learnt is applied to 1/Kphi of the magnets. */
+void salient_model(drive_run_t *run, const drive_params_t *p);
+
+/** What a q current is worth: the one that makes the same torque without d current. */
+current_q13_t salient_torque(const drive_run_t *run, current_q13_t iq_q13);
+
+/** The q current for that torque. Both with 13 fraction bits. */
+int32_t salient_current_q26(const drive_run_t *run, int32_t torque_q26);
+
+/** q current that the torque takes while d current along the flux takes of it. @param id_q13 0 .. MAXIMUM_CURRENT_A, which is less than doubles the flux
+ *  @return not negative */
+uint16_t salient_current_beside(const drive_run_t *run, const drive_params_t *p, current_q13_t id_q13);
+
+/** d current of the least current, or field weakening's if that is more. Every rare step in closed loop. */
+current_q13_t salient_id(drive_run_t *run, const drive_params_t *p);
+
+/** R of the header times a current. @param i_q13 not negative */
+voltage_q12_t model_header_ri(const drive_params_t *p, current_q13_t i_q13);
 
 /** R i_q in the format of the filtered back-EMF. */
-QM_INLINE voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p)
-{
-    return (int16_t)(qm_mulhi_su(run->control.i_q13.q, run->model.rs_q16) * (1 << p->estimator.rs_exp));
-}
-
-/** 1 where the closed loop teaches: it rests until the observer runs, while the speed changes fast, and at the limits of current and voltage. It does
- *  not wait for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock needs it before; what dR i_d puts into Ed passes with
- *  that current. */
-QM_INLINE uint16_t model_is_taught(const drive_run_t *run)
-{
-    const drive_control_t *c = &run->control;
-    return (uint16_t)(run->handover.speed_is_preset && observer_is_calm(&run->observer) && qm_size(c->v_q14.q) < c->vq_limit_q14
-                      && qm_size(c->ref_q13.q) < c->iq_limit_q13);
-}
+voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
 
 /** A step of the adaptation, every seldom step. At the end of the ramp, while the estimator is waited for, it may need a truer flux before it can
  *  lock, with flux, R and L all off; the current is nearly all d current there and says nothing of R. */
-QM_INLINE void model_learn_step(drive_t *d, const drive_params_t *p)
-{
-    drive_run_t *run = &d->run;
-    voltage_q12_t ri_q12 = 0;
-    if (drive_is_closed(d)) {
-        if (!model_is_taught(run)) {
-            return;
-        }
-        ri_q12 = model_ri(run, p);
-    } else if (d->state != (uint16_t)DRIVE_RAMP || d->periods == 0u) {
-        return; /* nothing turns that the estimator could see */
-    } else {
-        /* flux alone */
-    }
-    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), ri_q12);
-}
+void model_learn_step(drive_t *d, const drive_params_t *p);
 
 /** The motor's constants follow the speed reference, and what was learnt. Every seldom step in closed loop. */
-QM_INLINE void model_update(drive_t *d, const drive_params_t *p)
-{
-    salient_sees_current(&d->run);
-    drive_update_model(&d->run, p, d->run.control.reference_erpm);
-}
+void model_update(drive_t *d, const drive_params_t *p);
 
 /** The same in RAMP. */
-QM_INLINE void model_update_in_ramp(drive_t *d, const drive_params_t *p)
-{
-    if (d->state == (uint16_t)DRIVE_RAMP) {
-        salient_sees_forced_current(d);
-        drive_update_model(&d->run, p, p->end_erpm);
-    }
-}
+void model_update_in_ramp(drive_t *d, const drive_params_t *p);
 
 #endif

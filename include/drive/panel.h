@@ -2,8 +2,9 @@
 #ifndef DRIVE_PANEL_H
 #define DRIVE_PANEL_H
 
-#include "drive/remote_state.h"
-#include "drive/state.h"
+#include "control/qmath.h"
+#include "drive/forward.h"
+#include "drive/remote.h"
 
 #define PANEL_DEBOUNCE_MS 30
 
@@ -26,7 +27,7 @@ typedef struct {
 } panel_lights_t;
 
 /** State of the panel. */
-typedef struct {
+struct panel {
     button_t s2, s3;
     int16_t wish_run;         /**< the user wants the motor to run */
     int16_t interrupted;      /**< a fault has ended a run that the user still wished; S2 forgets it. For the retry: 0 without */
@@ -37,26 +38,26 @@ typedef struct {
     uint16_t pot_broken_ms;   /**< how long its signal has been where no position is */
     uint16_t blink_ms;
     uint16_t kept; /**< complement of wish_run and fast_range, see panel_keep() */
-} panel_t;
-
-/** Complement of the user's wishes, in which no bit of either goes unseen. */
-QM_INLINE uint16_t panel_complement(const panel_t *panel)
-{
-    return (uint16_t) ~((uint16_t)panel->wish_run + (uint16_t)panel->fast_range);
-}
+};
 
 /** 1 if the wishes are as they were written: a flipped bit could start the motor, or change its speed. The self-test of VARIABLES asks. */
-QM_INLINE uint16_t panel_holds(const panel_t *panel)
-{
-    return (uint16_t)(panel->kept == panel_complement(panel));
-}
+uint16_t panel_holds(const panel_t *panel);
 
 /** After a write of wishes. @param held panel_holds() before it: what has not held must be found */
-QM_INLINE void panel_keep(panel_t *panel, uint16_t held)
-{
-    if (held) {
-        panel->kept = panel_complement(panel);
-    }
-}
+void panel_keep(panel_t *panel, uint16_t held);
+
+/** Nothing pressed, nothing wished, potentiometer at its lower end. */
+void panel_init(panel_t *panel);
+
+/** 1 once per press. */
+uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms);
+
+/** Speed target for a potentiometer position; TORQUE_MODE: q current in Q13.
+ *  @param pot_q15 signed fractional sample, -32768 = lower end
+ *  @param direction of the running motor: in BIDIRECTIONAL_SPEED the middle keeps it */
+int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction);
+
+/** One pass: buttons to requests, potentiometer to target, state to lights. S2 in a fault only clears the fault. */
+panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in);
 
 #endif

@@ -2,8 +2,10 @@
 #ifndef DRIVE_RECORDER_H
 #define DRIVE_RECORDER_H
 
-#include "drive/drive.h"
-#include "drive/modes/recorder_room.h"
+#include "control/qmath.h"
+#include "drive/faults.h"
+#include "drive/forward.h"
+#include "drive/modes/mode_table.h"
 #include "drive/param_scaling.h"
 
 #define RECORDER_ROWS 64  /* six bytes each: 384 of the part's 2048 */
@@ -23,10 +25,18 @@ enum {
     RECORDER_BYTES  /**< of a row */
 };
 
+#if SCOPE && !defined(MODE_WITHOUT_RECORDER)
+#define MODE_WITHOUT_RECORDER "SCOPE"
+#endif
+#ifdef MODE_WITHOUT_RECORDER
+#define RECORDER_IN_USE_PERIODS 0u
+#else
+#define RECORDER_IN_USE_PERIODS (RECORDER_PERIODS)
+#endif
+
 /** Rows apart, in periods; 0: no recorder. */
-#define RECORDER_EVERY ((uint16_t)MODE_RECORDER_PERIODS)
+#define RECORDER_EVERY ((uint16_t)RECORDER_IN_USE_PERIODS)
 #define RECORDER_PLACES (RECORDER_EVERY != 0u ? RECORDER_ROWS : 1)
-#define RECORDER_FIRST ((int16_t)((RECORDER_PLACES - 1) * RECORDER_BYTES)) /**< bytes before the first row that is written */
 
 /** A word's lower byte makes place for the byte before it: cheaper than to take the words apart. */
 typedef union {
@@ -55,89 +65,21 @@ void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault);
 void recorder_begin(recorder_t *r);
 
 /** A pass of the background: a start begins a new record, which has the offsets of its run. */
-QM_INLINE void recorder_background(recorder_t *r, const drive_t *d)
-{
-    const uint16_t left = r->left;
-    if (left != 0u) {
-        r->offset_a_q13 = d->calibration.offset_a_q13;
-        r->offset_b_q13 = d->calibration.offset_b_q13;
-        if (left <= RECORDER_AFTER && d->fault == (uint16_t)FAULT_NONE) {
-            r->left = 0; /* cleared before the last row: what comes now is no part of it */
-        }
-    } else if (d->command.run) {
-        recorder_begin(r);
-    } else {
-        /* it is kept */
-    }
-}
+void recorder_background(recorder_t *r, const drive_t *d);
 
 /** Rows of a complete record; 0 before a fault. */
-QM_INLINE uint16_t recorder_rows(const recorder_t *r)
-{
-    if (r->left != 0u) { /* without a recorder it begins and never ends, or has no row */
-        return 0;
-    }
-    return (uint16_t)(r->full ? RECORDER_ROWS : (RECORDER_PLACES - 1) - (uint16_t)r->next / (uint16_t)RECORDER_BYTES);
-}
+uint16_t recorder_rows(const recorder_t *r);
 
 /** Place in the ring of the row that so many later ones follow: the newest has none. */
-QM_INLINE uint16_t recorder_place(const recorder_t *r, uint16_t later)
-{
-    return (uint16_t)((uint16_t)r->next / (uint16_t)RECORDER_BYTES + 1u + later) % RECORDER_ROWS;
-}
+uint16_t recorder_place(const recorder_t *r, uint16_t later);
 
 /** 1 in the periods that get a row: those of the slow steps, with late duties those between, which have the time. */
-QM_INLINE uint16_t recorder_is_due(const drive_t *d)
-{
-    return (uint16_t)(RECORDER_EVERY != 0u && (d->ticks & (uint16_t)(RECORDER_EVERY - 1u)) == (uint16_t)LATE_DUTIES);
-}
+uint16_t recorder_is_due(const drive_t *d);
 
 /** A period in a fault, before recorder_write(). */
-QM_INLINE void recorder_in_fault(recorder_t *r, const drive_t *d)
-{
-    if (r->left != 0u && recorder_is_due(d)) {
-        r->left--;
-    }
-    if (r->fault == (uint16_t)FAULT_NONE) {
-        r->fault = (uint8_t)d->fault;
-    }
-}
-
-/** The upper byte of a word. */
-QM_INLINE int8_t recorder_upper(int16_t word)
-{
-    return (int8_t)(word >> 8);
-}
+void recorder_in_fault(recorder_t *r, const drive_t *d);
 
 /** The last work of a period that gets a row. @param i_a,i_b,v_bus the converter's results; as a structure they would be kept on the stack */
-QM_INLINE void recorder_write(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, int16_t v_bus)
-{
-    recorder_row_t *row;
-    int16_t at = r->next;
-    uint16_t slow = r->slow;
-    if (r->left == 0u) {
-        return;
-    }
-    if (((uint16_t)at & 6u) == 0u) { /* six bytes a row: every fourth place */
-        slow = (uint16_t)estimator_speed(&d->run.estimator);
-        if (((uint16_t)at & 8u) == 0u) {
-            slow = (uint16_t)v_bus;
-        }
-    }
-    row = (recorder_row_t *)(void *)((int8_t *)r->row + at);
-    row->word[RECORDER_V_D / 2] = d->run.control.v_q14.d;
-    row->word[RECORDER_V_Q / 2] = d->run.control.v_q14.q;
-    row->word[RECORDER_ANGLE / 2] = (int16_t)d->angle;
-    row->byte[RECORDER_I_A] = recorder_upper(i_a);
-    row->byte[RECORDER_I_B] = recorder_upper(i_b);
-    row->byte[RECORDER_SLOW] = (int8_t)((uint16_t)(slow << 4) | d->state);
-    r->slow = (uint16_t)(slow >> 4);
-    at = (int16_t)(at - (int16_t)RECORDER_BYTES);
-    if (at < 0) {
-        at = RECORDER_FIRST;
-        r->full = 1;
-    }
-    r->next = at;
-}
+void recorder_write(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, int16_t v_bus);
 
 #endif

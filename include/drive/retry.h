@@ -2,7 +2,8 @@
 #ifndef DRIVE_RETRY_H
 #define DRIVE_RETRY_H
 
-#include "drive/panel.h"
+#include "control/qmath.h"
+#include "drive/forward.h"
 
 /** State of the retry. */
 typedef struct {

@@ -1,7 +1,7 @@
 /* The fault recorder on the virtual board: its rows are the trace's, to the byte, and outlast all but a power-up and a start. */
 #include "bench.h"
 
-#include "board/record.h"
+#include "board/status.h"
 
 enum { RAW_A, RAW_B, V_D, V_Q, ANGLE, STATE, BUS, SPEED, FAULT, PHASE, COLUMNS };
 

@@ -7,6 +7,7 @@
 #define RETRY_COUNT 3
 
 #include "firmware/board/firmware.c"
+#include "firmware/drive/panel.c"
 #include "firmware/drive/retry.c"
 
 void setUp(void)

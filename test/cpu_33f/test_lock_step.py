@@ -16,6 +16,7 @@ from chip import RAM, REGISTERS, ROOT, STOP, image, library, pass_ms
 from tools.bench import pil_command, recorder
 from tools.bench.board import BoardError
 from tools.bench.pil import PilBoard
+from tools.common import drive_tables
 from tools.common.errors import UserError
 
 pytestmark = pytest.mark.xc16
@@ -188,7 +189,7 @@ def test_an_image_of_other_settings_is_refused(firmware: Path, tmp_path: Path) -
 def test_the_status_line_comes_out_of_the_serial_port(board: PilBoard) -> None:
     start(board)
     pass_ms(board, 700)
-    assert re.search(r"state \d fault 0 speed -?\d+ rpm\r\n", board.uart_take())
+    assert re.search(r"state \d fault NONE speed -?\d+ rpm\r\n", board.uart_take())
 
 
 def test_a_handler_that_is_held_up_is_the_same_fault_in_both(board: PilBoard) -> None:
@@ -287,7 +288,8 @@ def test_outputs_go_off_and_the_fault_outlives_the_watchdogs_reset(running: PilB
     pass_ms(running, 700)
     assert running.get("cpu.resets") == 2
     sent = running.uart_take()
-    assert re.search(rf"reset WDTO\r\n(.*\n)*state 7 fault {fault} speed", sent)
+    name = drive_tables.faults()[fault].name
+    assert re.search(rf"reset WDTO\r\n(.*\n)*state 7 fault {name} speed", sent)
     record = recorder.parse(sent.partition("reset WDTO")[2], "")[0]
     assert record.fault == fault and len(record.rows) == 64 and set(record.states) <= {3, 7}, "what came before it outlives the reset, too"
     assert running.get("pwm.outputs_on") == 0
@@ -309,5 +311,5 @@ def test_power_on_forgets_it_all(running: PilBoard) -> None:
     running.power_up()
     pass_ms(running, 700)
     sent = running.uart_take().rpartition("reset BOR POR")[2]
-    assert re.search(r"^\r\n(.*\n)*state 1 fault 0 speed", sent)
+    assert re.search(r"^\r\n(.*\n)*state 1 fault NONE speed", sent)
     assert "record" not in sent

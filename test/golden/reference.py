@@ -3,7 +3,7 @@
 Every block comes twice. The function named `..._real` is the equation itself in float64. The one without is the same
 equation in integers, with the formats that the headers of include/control document: a product is exact, its "upper word"
 is floor(product / 65536), and every intermediate result is checked against the word it has to fit. Nothing wraps, except
-where a format says so (angles). Equation numbers are AN1292's in their corrected form, see docs/architecture.md.
+where a format says so (angles). Equation numbers are AN1292's in their corrected form, see docs/law.md.
 """
 
 import cmath
@@ -335,10 +335,10 @@ class Machine:
             "innovation_max": int(min(16383, 16000 * WORD * WORD / quick ** 2 / 2 ** shift)),
             "load_max": int(nearest(self.maximum_current_a / self.i0 / 4) * units),
             "quiet_q16": int(min(1.22 * self.speed_hz / self.load_hz, 0.3) * quick),
-            "loaded_q16": int(0.3 * quick), "quick_q16": int(quick),
+            "loaded_q16": int(0.3 * quick), "fast_q16": int(quick),
             "full_erpm": int(60 / 2.7 * self.load_hz / unit), "load_from": int(load_from), "load_width": int(load_from),
             "load_slope_q15": int(32767 / load_from),
-            "large_erpm": int(0.13 * self.dead_time_erpm / unit), "large_loaded_erpm": int(0.03 * self.dead_time_erpm / unit),
+            "gate_erpm": int(0.13 * self.dead_time_erpm / unit), "gate_loaded_erpm": int(0.03 * self.dead_time_erpm / unit),
         }
 
     def adaptation(self):
@@ -872,8 +872,8 @@ class Observer:
         slow = speed * 32768 // p["full_erpm"] if speed < p["full_erpm"] else 32767
         self.part = toward(slow, 2 * slow if slow < 16384 else 32767, loaded)
         rate = toward(toward(0, p["quiet_q16"], slow), toward(0, p["loaded_q16"], self.part), loaded)
-        self.rate = toward(rate, toward(0, p["quick_q16"], self.part), self.quick)
-        large = s16(toward(p["large_erpm"], p["large_loaded_erpm"], loaded) + speed // 32)
+        self.rate = toward(rate, toward(0, p["fast_q16"], self.part), self.quick)
+        large = s16(toward(p["gate_erpm"], p["gate_loaded_erpm"], loaded) + speed // 32)
         self.large = min(large + large * self.unrest // 256, 32767)
 
     def innovation(self, rho, middle):
@@ -914,8 +914,8 @@ class ObserverReal(Observer):
         slow = min(abs(ref) / p["full_erpm"], 1)
         self.part = slow + (min(2 * slow, 1) - slow) * loaded
         rate = p["quiet_q16"] * slow * (1 - loaded) + p["loaded_q16"] * self.part * loaded
-        self.rate = (rate + (p["quick_q16"] * self.part - rate) * self.quick) / WORD
-        self.large = (p["large_erpm"] + (p["large_loaded_erpm"] - p["large_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 256)
+        self.rate = (rate + (p["fast_q16"] * self.part - rate) * self.quick) / WORD
+        self.large = (p["gate_erpm"] + (p["gate_loaded_erpm"] - p["gate_erpm"]) * loaded + abs(ref) / 32) * (1 + self.unrest / 256)
 
     def step(self, rho, iq):
         p, before = self.p, self.omega

@@ -17,7 +17,7 @@ _DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.M)
 _DEFINE = re.compile(r"[ \t]*#[ \t]*define[ \t]+(\w+)(\([^)]*\))?")
 
 # Conditions that no host build fulfils, and those that every host build does: their dead branches are not mutated.
-_ALWAYS = {"ifdef __XC16__": False, "ifndef __XC16__": True, "ifdef __FRAMAC__": False, "if __GNUC__ >= 5": True}
+_ALWAYS = {"ifdef __XC16__": False, "ifndef __XC16__": True, "if __GNUC__ >= 5": True}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import c_tokens
 
 # Files whose macros are computations or register values; elsewhere a macro is a name or a table.
-MACRO_FILES = ("include/drive/param_scaling.h", "include/drive/param_init.h", "include/board/mclv.h")
+SCALING_FILES = (*(f"include/drive/scaling/{name}.h" for name in ("controllers", "current_voltage", "estimator", "load_observer", "protection", "start")),
+                 "include/drive/param_init.h")
+MACRO_FILES = (*SCALING_FILES, "include/board/mclv.h")
 # A constant of a long table is one of many alike: this many of a table are enough, and more would flatter the score.
 TABLE_SITES = 8
 TABLE_LENGTH = 16
@@ -45,7 +47,7 @@ class Mutant:
 
 
 def _is_type(token):
-    return token.kind == "id" and (token.text in TYPE_WORDS or token.text.endswith("_t") or token.text == "QM_INLINE")
+    return token.kind == "id" and (token.text in TYPE_WORDS or token.text.endswith("_t") or token.text in ("INLINE", "QM_INLINE", "QM_WRAPS"))
 
 
 OPENS = {"(": ")", "[": "]", "{": "}"}

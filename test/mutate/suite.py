@@ -70,7 +70,7 @@ def copy_sources(root, tree):
     shutil.copy2(root / "userparams.h", tree)
     for path in sorted((root / "build").rglob("*")):
         where = path.relative_to(root)
-        if path.suffix in (".c", ".h", ".inc") and where.parts[1] not in ("gems", "mutate", "setup", "coverage", "host"):
+        if path.suffix in (".c", ".h", ".inc") and where.parts[1] not in ("gems", "mutate", "setup", "coverage", "host") or path.match("build/host/law.c"):
             (tree / where).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(path, tree / where)
     os.symlink((root / "build/gems").resolve(), tree / "build/gems")

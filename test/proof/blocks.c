@@ -1,20 +1,20 @@
 /* The blocks of the control law, each with all inputs and all parameters of their ranges.
  *
- * sources: firmware/control/trig.c
- * options: -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40 -eva-subdivide-non-linear-function estimator_oldest:100 */
+ * options: -eva-split-return-function qm_beyond:full -eva-slevel-function qm_abs:5,qm_beyond:5,qm_clamp:5,qm_limit:5,set_bounds:40,largest_ls:40
+ *     -eva-subdivide-non-linear-function estimator_oldest:100 */
 #include "any.h"
 
-#include "control/adaptation.h"
-#include "control/current_control.h"
-#include "control/estimator.h"
-#include "control/fieldweak.h"
-#include "control/forced_angle.h"
-#include "control/observer.h"
-#include "control/speed_ramp.h"
-#include "control/svm.h"
-#include "drive/param_scaling.h"
-
 #include "bounds.h"
+
+#include "firmware/control/motor_model.c"
+#include "firmware/control/current_control.c"
+#include "firmware/control/estimator.c"
+#include "firmware/control/fieldweak.c"
+#include "firmware/control/forced_angle.c"
+#include "firmware/control/observer.c"
+#include "firmware/control/svm.c"
+#include "firmware/control/trig.c"
+#include "firmware/drive/speed.c"
 
 /** qmath.h: every function, every int16. */
 void proof_qmath(void)
@@ -65,11 +65,13 @@ static void between_from(uint16_t low)
     //@ loop unroll 256;
     EACH_OF_256(apart, low) {
         int16_t up = observer_between(0, (int16_t)apart, any(0, 32767)), down = observer_between((int16_t)apart, 0, any(0, 32767));
-        //@ check between: 0 <= up <= apart && 0 <= down <= apart;
+        int16_t rising[] = { 0, (int16_t)apart }, falling[] = { (int16_t)apart, 0 };
+        int16_t rises = fieldweak_between(rising, 0, ANYU16()), falls = fieldweak_between(falling, 0, ANYU16());
+        //@ check between: 0 <= up <= apart && 0 <= down <= apart && 0 <= rises <= apart && 0 <= falls <= apart;
     }
 }
 
-/** observer_between: for numbers that are not negative, the result is between them, whatever their difference. */
+/** observer_between, fieldweak_between: for numbers that are not negative, the result is between them, whatever their difference. */
 void proof_between(void)
 {
     //@ loop unroll 128;
@@ -122,7 +124,7 @@ void proof_omega(void)
     }
 }
 
-/** trig.h: every angle and every x; sine, cosine and chord stay within Q15. */
+/** trig.c: every angle and every x; sine, cosine and chord stay within Q15. */
 void proof_trig(void)
 {
     //@ loop unroll 512;
@@ -178,7 +180,7 @@ static void pi_pieces(int16_t shift, int16_t error_max, int16_t limit_low, int16
     }
 }
 
-/** pi.h: the integrator keeps its bound for all gains, errors and limits. */
+/** pi_tick: the integrator keeps its bound for all gains, errors and limits. */
 void proof_pi(void)
 {
     pi_pieces(CURRENT_PI_SHIFT, PI_ERROR_MAX, 0, INT16_MAX);
@@ -250,7 +252,7 @@ static void svm_piece(int16_t alpha, int16_t beta, uint16_t ratio)
     //@ check duties: d.a <= 5600 && d.b <= 5600 && d.c <= 5600;
 }
 
-/** svm.h: every vector of the circle that the formats allow, every bus, every current, all timings. */
+/** svm.c: every vector of the circle that the formats allow, every bus, every current, all timings. */
 void proof_svm(void)
 {
     //@ loop unroll SVM_PIECES;
@@ -264,32 +266,6 @@ void proof_svm(void)
             for (uint16_t ratio = 0; ratio < 8; ratio++) {
                 svm_piece(alpha, beta, ratio);
             }
-        }
-    }
-}
-
-/** Interpolation between any two entries stays between them (here: to a piece) and in 16 bits. */
-static void between_piece(int16_t low, int16_t high, int16_t first, int16_t second)
-{
-    int16_t table[2], least, most, y;
-    table[0] = PIECE(low, high, first, 16);
-    table[1] = PIECE(low, high, second, 16);
-    least = piece_low(low, high, (int16_t)(((first < second) ? first : second) - 1), 16);
-    most = piece_low(low, high, (int16_t)(((first < second) ? second : first) + 2), 16);
-    y = fieldweak_between(table, 0, ANYU16());
-    //@ check between: least - 1 <= y <= most + 1;
-}
-
-/** fieldweak.h: any table, any fraction. */
-void proof_fieldweak_between(void)
-{
-    //@ loop unroll 16;
-    for (int16_t first = 0; first < 16; first++) {
-        //@ loop unroll 16;
-        for (int16_t second = 0; second < 16; second++) {
-            between_piece(-8192, 0, first, second);
-            between_piece(2048, 30719, first, second);
-            between_piece(3276, 19661, first, second);
         }
     }
 }
@@ -317,7 +293,7 @@ static void ramp_piece(int16_t step, int16_t end)
     //@ check range: -32767 <= y <= 32767;
 }
 
-/** speed_ramp.h: every reference and target, steps over the parameter's whole range. */
+/** speed_ramp: every reference and target, steps over the parameter's whole range. */
 void proof_speed_ramp(void)
 {
     //@ loop unroll 4801;
@@ -328,7 +304,7 @@ void proof_speed_ramp(void)
     }
 }
 
-/** forced_angle.h: all parameters, both directions. */
+/** forced_angle.c: all parameters, both directions. */
 void proof_forced_angle(void)
 {
     forced_angle_params_t p = { any_l(0, 8000000l), any(1, 2000) };
@@ -339,7 +315,7 @@ void proof_forced_angle(void)
     (void)forced_angle(&f);
 }
 
-/** estimator.h: what is kept of two currents is no larger than they are. Beta ends at 16364: the trip level is at most 86.5 %. */
+/** estimator.c: what is kept of two currents is no larger than they are. Beta ends at 16364: the trip level is at most 86.5 %. */
 void proof_estimator_oldest(void)
 {
     //@ loop unroll 80;
@@ -350,7 +326,7 @@ void proof_estimator_oldest(void)
     }
 }
 
-/** estimator.h: the small blocks with every int16. */
+/** estimator.c: the small blocks with every int16. */
 void proof_estimator_blocks(void)
 {
     estimator_t e;

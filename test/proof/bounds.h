@@ -20,7 +20,7 @@ static int32_t forced_max;  /**< speed of the forced angle: the ramp's end, or a
 static uint16_t rs_max;     /**< R with the adaptation's largest change */
 
 /** Largest integrator of the current controllers. */
-#define RATE_MOST_Q16 24576 /* LOAD_BANDWIDTH_HZ's relation in param_table.h */
+#define RATE_MOST_Q16 24576 /* LOAD_BANDWIDTH_HZ's relation in param_limits.h */
 #define SUM_MAX 1350000000l
 /** Inputs of the controllers for which that is proved. */
 #define PI_ERROR_MAX 22400

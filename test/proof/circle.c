@@ -1,24 +1,28 @@
 /* What the tick's proof takes from its blocks: vectors stay in their circles, and phase C bounds the beta current.
  *
- * sources: firmware/control/trig.c
- * options: -eva-subdivide-non-linear-function vd_limit:100 -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40,circle_in_pieces:100 */
+ * options: -eva-use-spec pi_tick -eva-subdivide-non-linear-function vd_limit:100 -eva-slevel-function qm_abs:5,qm_clamp:5,set_bounds:40,largest_ls:40,circle_in_pieces:100 */
 #include "any.h"
-
-#include "control/pi.h"
-#include "control/transforms.h"
-
-static inline q15_t circle_in_pieces(q15_t x);
-static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
-#define pi_tick pi_tick_piece
-#define trig_circle circle_in_pieces
-#include "control/current_control.h"
-#undef pi_tick
-#undef trig_circle
 
 #include "bounds.h"
 
+#include "firmware/control/trig.c"
+
+static int16_t d_low, d_high; /* piece of the d controller's result under proof */
+static int16_t is_q;          /* the q controller comes next */
+
+/*@ assigns pi->sum, is_q, \result \from pi->sum, gains->kp, err, limit, is_q, d_low, d_high;
+    admit ensures turn: is_q == 1 - \old(is_q);
+    admit ensures limited: -limit <= \result <= limit;
+    admit ensures piece: \old(is_q) == 0 ==> d_low <= \result <= d_high; */ /* blocks.c, proof_pi; piece by piece for d */
+int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
+
+static q15_t circle_in_pieces(q15_t x);
+#define trig_circle circle_in_pieces
+#include "firmware/control/current_control.c"
+#undef trig_circle
+
 /** One piece for each entry of the table, so that the analysis keeps neighbours together. */
-static inline q15_t circle_in_pieces(q15_t x)
+static q15_t circle_in_pieces(q15_t x)
 {
     for (int16_t k = 1; k < TRIG_CIRCLE_STEPS; k++) {
         if (x < 512 * k) {
@@ -70,19 +74,7 @@ void proof_sincos_length(void)
 
 #define D_PIECES 96
 
-static int16_t d_low, d_high; /* piece of the d controller's result under proof */
 static int32_t largest_square;
-
-/** The d controller's result is a piece, the q controller's anything within its limit, as proof_pi shows. */
-static inline int16_t pi_tick_piece(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit)
-{
-    static int16_t is_q;
-    (void)pi;
-    (void)gains;
-    (void)err;
-    is_q = (int16_t)!is_q;
-    return is_q ? any(d_low, d_high) : any((int16_t)-limit, limit);
-}
 
 static void circle_between(int16_t low, int16_t high)
 {
@@ -95,6 +87,7 @@ static void circle_between(int16_t low, int16_t high)
     int32_t square;
 
     voltage_circle_of(&circle, any(low, high));
+    is_q = 0;
     v = current_control(&pi, &gains, &pi, &gains, zero, zero, &circle, &limit_q);
     square = qm_mulss(v.d, v.d) + qm_mulss(v.q, v.q);
     //@ check length: square <= largest_square;

@@ -1,27 +1,22 @@
 /* The load observer and the adaptation, each with all inputs and all parameters that the build accepts.
  *
- * sources: firmware/control/trig.c
- * options: -eva-slevel-function qm_abs:5,qm_clamp:5,observer_step:200,observer_answer:200,observer_sum:10,adaptation_learn:100
- *     -eva-domains octagon,equality,symbolic-locations -eva-octagon-through-calls -inline-calls qm_hi,qm_abs,shift_in_pieces */
+ * options: -eva-slevel-function qm_abs:5,qm_beyond:5,qm_clamp:5,qm_limit:5,observer_step:200,observer_answer:200,observer_sum:10,adaptation_learn:100
+ *     -eva-split-return-function qm_beyond:full -eva-domains octagon,equality,symbolic-locations -eva-octagon-through-calls -inline-calls qm_hi,qm_abs,shift_in_pieces */
 #include "any.h"
-
-#include "control/qmath.h"
-
-static inline int32_t shift_in_pieces(int32_t x, uint16_t bits);
-#define qm_shift shift_in_pieces
-
-static inline q15_t share_bounded(uint16_t part, uint16_t whole);
-#define qm_share share_bounded
-#include "control/adaptation.h"
-#include "control/observer.h"
-#undef qm_shift
-#undef qm_share
-#include "drive/param_scaling.h"
 
 #include "bounds.h"
 
+static int32_t shift_in_pieces(int32_t x, uint16_t bits);
+static q15_t share_bounded(uint16_t part, uint16_t whole);
+#define qm_shift shift_in_pieces
+#define qm_share share_bounded
+#include "firmware/control/motor_model.c"
+#include "firmware/control/observer.c"
+#undef qm_shift
+#undef qm_share
+
 /** x * 2^bits as the caller promises; a piece for each sign. */
-static inline int32_t shift_in_pieces(int32_t x, uint16_t bits)
+static int32_t shift_in_pieces(int32_t x, uint16_t bits)
 {
     //@ check fits: -2147483648 <= x * (1 << bits) <= 2147483647;
     if (x < 0) {
@@ -31,7 +26,7 @@ static inline int32_t shift_in_pieces(int32_t x, uint16_t bits)
 }
 
 /** blocks.c, proof_qmath. */
-static inline q15_t share_bounded(uint16_t part, uint16_t whole)
+static q15_t share_bounded(uint16_t part, uint16_t whole)
 {
     int16_t fits = (int16_t)(part < whole);
     //@ check below_one: fits == 1;
@@ -59,16 +54,16 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     o.load_q16 = any_l(-8193 * 65536l, 8192 * 65536l);
     o.rho_q32 = any_ul(0, UINT32_MAX);
     o.rate_q16 = any(0, next);
-    o.large_erpm = ANY16();
+    o.gate_erpm = ANY16();
     o.wrong_erpm = ANY16();
     o.wrong_steps = any_u(0, 65534); /* a fault ends the run long before */
-    o.unrest_steps = ANYU16();
-    o.large_last_erpm = ANY16();
-    o.quick_q15 = any(calm_low, calm_high);
+    o.gate_level = ANYU16();
+    o.gate_last_erpm = ANY16();
+    o.fast_share_q15 = any(calm_low, calm_high);
     observer_step(&o, &p, any_ul(0, UINT32_MAX), any(-IQ_MAX, IQ_MAX));
     //@ check speed: -32767 * 65536 <= o.omega_q16 <= 32767 * 65536;
     //@ check load: -8192 * 65536 <= o.load_q16 <= 8192 * 65536;
-    //@ check quick: calm_low == 16384 || 0 <= o.quick_q15;
+    //@ check quick: calm_low == 16384 || 0 <= o.fast_share_q15;
 }
 
 /** Every rate and every inertia: no step of speed or load leaves its format. */

@@ -16,7 +16,7 @@ from pathlib import Path
 
 HERE = Path(os.path.relpath(Path(__file__).parent)) # Frama-C cannot tell a blank in a path from the next argument
 BUILD = Path("build/proof")
-KERNEL = """-machdep gcc_x86_16 -warn-signed-overflow -no-warn-left-shift-negative -kernel-warn-key parser:decimal-float=inactive
+KERNEL = """-machdep gcc_x86_16 -warn-signed-overflow -no-warn-left-shift-negative -kernel-warn-key parser:decimal-float=inactive,annot:missing-spec=abort
     -eva -eva-warn-signed-converted-downcast -eva-no-show-progress -report-unclassified-warning NONE""".split()
 HEADERS = {"LATE": "late_header.h", "EACH": "each_header.h", "EACH_LATE": "each_late_header.h"}
 """Modes that are a header: with the shortest period, whose duties are late; with dead time's compensation for each pulse."""

@@ -30,6 +30,11 @@ static void any_drive(uint16_t state)
     drive.dead.a = any(-DEAD_MOST, DEAD_MOST);
     drive.dead.b = any(-DEAD_MOST, DEAD_MOST);
     drive.dead.c = any(-DEAD_MOST, DEAD_MOST);
+    drive.dead_second.a = any(-DEAD_MOST, DEAD_MOST);
+    drive.dead_second.b = any(-DEAD_MOST, DEAD_MOST);
+    drive.dead_second.c = any(-DEAD_MOST, DEAD_MOST);
+    drive.run.deferred_v_q13.alpha = any((int16_t)-voltage_max, voltage_max);
+    drive.run.deferred_v_q13.beta = any((int16_t)-voltage_max, voltage_max);
     drive.angle = ANYU16();
     drive.frame.sin = any(-32767, 32767);
     drive.frame.cos = any(-32767, 32767);
@@ -38,7 +43,8 @@ static void any_drive(uint16_t state)
     drive.forced.step_q32 = any_ul(0, UINT32_MAX);
     drive.forced.increase_q10 = any(0, HANDOVER_HURRY * params.forced.increase_rate_q10);
     drive.run.handover.agreed_steps = ANYU16();
-    drive.run.handover.speed_is_preset = any_u(0, 1);
+    drive.run.handover.phase = any_u(START_ALIGN, START_DONE);
+    drive.run.handover.at_end = any_u(0, 1);
     drive.run.handover.offset = ANY16();
     drive.run.handover.id_q13 = any((int16_t)-current_max, current_max);
 #ifdef TUNING
@@ -47,25 +53,6 @@ static void any_drive(uint16_t state)
 #endif
     drive.run.stall_steps = any_u(0, params.stall_steps);
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);
-}
-
-/* The compensation of the second pulse, where it has its own. */
-static void any_dead_second(void)
-{
-    for (int i = 0; i < DEAD_MORE; i++) {
-        drive.dead_second[i].a = any(-DEAD_MOST, DEAD_MOST);
-        drive.dead_second[i].b = any(-DEAD_MOST, DEAD_MOST);
-        drive.dead_second[i].c = any(-DEAD_MOST, DEAD_MOST);
-    }
-}
-
-/* The vector whose duties wait, where they do. */
-static void any_late(void)
-{
-    for (int i = 0; i < LATE_WAITS; i++) {
-        drive.run.late_v_q13[i].alpha = any((int16_t)-voltage_max, voltage_max);
-        drive.run.late_v_q13[i].beta = any((int16_t)-voltage_max, voltage_max);
-    }
 }
 
 static void any_estimator(estimator_t *e)
@@ -101,11 +88,11 @@ static void any_observer_state(observer_t *o)
     o->omega_q16 = any_l(-32767 * 65536l, 32767 * 65536l);
     o->load_q16 = any_l((params.observer.load_max + 1) * -65536l, params.observer.load_max * 65536l);
     o->rho_q32 = any_ul(0, UINT32_MAX);
-    o->rate_q16 = any(0, params.observer.quick_q16);
-    o->large_erpm = any(0, 32767);
-    o->quick_q15 = any(0, 32767);
-    o->unrest_steps = ANYU16();
-    o->large_last_erpm = ANY16();
+    o->rate_q16 = any(0, params.observer.fast_q16);
+    o->gate_erpm = any(0, 32767);
+    o->fast_share_q15 = any(0, 32767);
+    o->gate_level = ANYU16();
+    o->gate_last_erpm = ANY16();
     o->share_q15 = any(0, 32767);
 }
 
@@ -129,7 +116,7 @@ static void any_control(drive_control_t *c)
     c->vq_limit_q14 = any(0, radius_max);
     c->pi_d.sum = any_l(-SUM_MAX, SUM_MAX);
     c->pi_q.sum = any_l(-SUM_MAX, SUM_MAX);
-    c->speed_kp_q13 = any(0, params.speed_kp_quick_q13);
+    c->speed_kp_q13 = any(0, params.speed_kp_fast_q13);
     c->sample_shift_q13 = any((int16_t)-sample_shift_max, sample_shift_max);
 }
 
@@ -151,13 +138,13 @@ static void bounds_hold_again(void)
     //@ check i_oldest: -alpha_max <= e->i_oldest_q14.alpha <= alpha_max && -beta_max <= e->i_oldest_q14.beta <= beta_max;
     //@ check old_turn: -32767 <= e->old_turn_q16_rad && -1 <= e->sign <= 1;
     //@ check dead: -DEAD_MOST <= drive.dead.a <= DEAD_MOST && -DEAD_MOST <= drive.dead.b <= DEAD_MOST && -DEAD_MOST <= drive.dead.c <= DEAD_MOST;
-    //@ check dead_second_a: \forall integer i; 0 <= i < DEAD_MORE ==> -DEAD_MOST <= drive.dead_second[i].a <= DEAD_MOST;
-    //@ check dead_second_b: \forall integer i; 0 <= i < DEAD_MORE ==> -DEAD_MOST <= drive.dead_second[i].b <= DEAD_MOST;
-    //@ check dead_second_c: \forall integer i; 0 <= i < DEAD_MORE ==> -DEAD_MOST <= drive.dead_second[i].c <= DEAD_MOST;
+    //@ check dead_second_a: -DEAD_MOST <= drive.dead_second.a <= DEAD_MOST;
+    //@ check dead_second_b: -DEAD_MOST <= drive.dead_second.b <= DEAD_MOST;
+    //@ check dead_second_c: -DEAD_MOST <= drive.dead_second.c <= DEAD_MOST;
     //@ check history_alpha: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -alpha_max <= e->history_q14[i].alpha <= alpha_max;
     //@ check history_beta: \forall integer i; 0 <= i < ESTIMATOR_HISTORY ==> -beta_max <= e->history_q14[i].beta <= beta_max;
-    //@ check late_alpha: \forall integer i; 0 <= i < LATE_WAITS ==> -voltage_max <= drive.run.late_v_q13[i].alpha <= voltage_max;
-    //@ check late_beta: \forall integer i; 0 <= i < LATE_WAITS ==> -voltage_max <= drive.run.late_v_q13[i].beta <= voltage_max;
+    //@ check late_alpha: -voltage_max <= drive.run.deferred_v_q13.alpha <= voltage_max;
+    //@ check late_beta: -voltage_max <= drive.run.deferred_v_q13.beta <= voltage_max;
     //@ check v_last: -voltage_max <= e->v_last_q13.alpha <= voltage_max && -voltage_max <= e->v_last_q13.beta <= voltage_max;
     //@ check v_mean: -voltage_max <= e->v_mean_q13.alpha <= voltage_max && -voltage_max <= e->v_mean_q13.beta <= voltage_max;
     //@ check emf_d: emf_dq_max * -65536 <= e->e_d_q28 <= emf_dq_max * 65536 + 65535;
@@ -173,13 +160,13 @@ static void bounds_hold_again(void)
     //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;
     //@ check sums: -SUM_MAX <= c->pi_d.sum <= SUM_MAX && -SUM_MAX <= c->pi_q.sum <= SUM_MAX;
     //@ check measured: -IQ_MAX <= c->i_q13.d <= IQ_MAX && -IQ_MAX <= c->i_q13.q <= IQ_MAX;
-    //@ check gain: 0 <= c->speed_kp_q13 <= params.speed_kp_quick_q13;
+    //@ check gain: 0 <= c->speed_kp_q13 <= params.speed_kp_fast_q13;
     //@ check sample_shift: -sample_shift_max <= c->sample_shift_q13 <= sample_shift_max;
     //@ check observed_speed: -32767 * 65536 <= o->omega_q16 <= 32767 * 65536;
     //@ check observed_load: (params.observer.load_max + 1) * -65536 <= o->load_q16 <= params.observer.load_max * 65536;
-    //@ check rate: 0 <= o->rate_q16 <= params.observer.quick_q16;
-    //@ check large: 0 <= o->large_erpm;
-    //@ check quick: 0 <= o->quick_q15 && 0 <= o->share_q15;
+    //@ check rate: 0 <= o->rate_q16 <= params.observer.fast_q16;
+    //@ check large: 0 <= o->gate_erpm;
+    //@ check quick: 0 <= o->fast_share_q15 && 0 <= o->share_q15;
     //@ check learnt_kfi: params.adaptation.kfi_least * 65536 <= a->kfi_q31 <= params.adaptation.kfi_most * 65536;
     //@ check learnt_rs: params.adaptation.rs_least * 65536 <= a->rs_q31 <= params.adaptation.rs_most * 65536;
     //@ check model_rs: drive.run.model.rs_q16 <= rs_max;

@@ -1,64 +1,81 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
- * sources: firmware/control/trig.c firmware/control/fieldweak.c firmware/drive/drive.c firmware/drive/bus.c
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING LATE EACH EACH_LATE
- * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between
+ * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between,fieldweak_between
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
- *     -eva-slevel-function drive_tick:200,drive_rest:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp_in_pieces:10,speed_ramp:10
- *     -eva-slevel-function qm_abs:5,qm_clamp:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20
+ *     -eva-slevel-function drive_tick:200,drive_idle:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp:10
+ *     -eva-slevel-function qm_abs:5,qm_beyond:5,qm_clamp:5,qm_limit:5,qm_sub_limited:5,set_bounds:40,largest_ls:40,any_estimator:20,bounds_hold_again:20
  *     -eva-slevel-function estimator_pll:200,lowpass_bounded:50,emf_d_in_pieces:50,emf_q_beside_d:10
- *     -eva-split-return-function lowpass_in_pieces:full,lowpass_bounded:full,emf_d_in_pieces:full */
+ *     -eva-split-return-function qm_beyond:full,lowpass_in_pieces:full,lowpass_bounded:full,emf_d_in_pieces:full */
 #include "any.h"
+#include "bounds.h"
 
-#include "control/transforms.h"
-
-static inline sincos_t sincos_bounded(angle_t angle);
-static inline q15_t circle_bounded(q15_t x);
-static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16);
-static inline alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13);
-static inline alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc);
-static inline int16_t speed_ramp_in_pieces(int16_t reference, int16_t target, int16_t step_erpm);
+#include "firmware/control/current_control.c"
+#include "firmware/control/trig.c"
 
 /*@ assigns \result \from sum, sum_max, inv_kfi;
     admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: adaptation_apply() alone writes the last two */
-static inline int16_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi);
+int16_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi);
 
 /*@ assigns \result \from a, b, share;
     admit ensures between: a <= \result <= b || b <= \result <= a; */ /* blocks.c, proof_between */
-static inline int16_t observer_between(int16_t a, int16_t b, q15_t share);
+int16_t observer_between(int16_t a, int16_t b, q15_t share);
+
+/*@ requires entry: index <= 16;
+    assigns \result \from table[index], table[index + 1], fraction_q16;
+    admit ensures between: table[index] <= \result <= table[index + 1] || table[index + 1] <= \result <= table[index]; */ /* blocks.c, proof_between */
+int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16);
+
+/*@ requires pieces: reference < -erpm_max || -erpm_max <= reference <= erpm_max || erpm_max < reference; */ /* further out is no step outwards */
+int16_t speed_ramp(int16_t reference, int16_t target, int16_t step_erpm);
 
 /* In the drive, a call of a block that was proved alone (blocks.c, circle.c) goes through what was proved of it. */
-#include "control/pi.h"
-#include "control/speed_ramp.h"
-static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
+static sincos_t sincos_bounded(angle_t angle);
+static q15_t circle_bounded(q15_t x);
+static int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16);
+static alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13);
+static alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc);
+static int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
+static dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
+                                    dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q);
+static void observer_step_bounded(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13);
+static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12);
 #define trig_sincos sincos_bounded
-#define trig_sincos_called(r, angle) (*(r) = sincos_bounded(angle))
 #define trig_circle circle_bounded
 #define qm_lowpass lowpass_in_pieces
 #define clarke clarke_bounded
 #define inverse_park inverse_park_bounded
-#define speed_ramp speed_ramp_in_pieces
 #define pi_tick pi_tick_bounded
-#include "control/current_control.h"
-static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
-                                           dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q);
+#include "firmware/control/motor_model.c"
+#include "firmware/control/estimator.c"
+#include "firmware/control/fieldweak.c"
+#include "firmware/control/forced_angle.c"
+#include "firmware/control/observer.c"
+#include "firmware/control/svm.c"
 #define current_control current_control_bounded
-#include "control/adaptation.h"
-#include "control/observer.h"
-static inline void observer_step_bounded(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13);
-static inline void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12);
 #define observer_step observer_step_bounded
 #define adaptation_learn adaptation_learn_bounded
-#include "drive/tick.h"
-#include "drive/limits_now.h"
+#include "firmware/drive/limits.c"
+#include "firmware/drive/catch.c"
+#include "firmware/drive/deferred.c"
+#include "firmware/drive/drive.c"
+#include "firmware/drive/handover.c"
+#include "firmware/drive/model.c"
+#include "firmware/drive/modes/bringup.c"
+#include "firmware/drive/modes/modes.c"
+#include "firmware/drive/protection.c"
+#include "firmware/drive/schedule.c"
+#include "firmware/drive/signals.c"
+#include "firmware/drive/speed.c"
+#include "firmware/drive/startup.c"
+#include "firmware/drive/states.c"
+#include "firmware/drive/tick.c"
 #undef trig_sincos
-#undef trig_sincos_called
 #undef trig_circle
 #undef qm_lowpass
 #undef clarke
 #undef inverse_park
-#undef speed_ramp
 #undef pi_tick
 #undef current_control
 #undef observer_step
@@ -69,7 +86,7 @@ static drive_t drive;
 #include "state.h"
 
 /** blocks.c, proof_trig. */
-static inline sincos_t sincos_bounded(angle_t angle)
+static sincos_t sincos_bounded(angle_t angle)
 {
     sincos_t r = { any(-32767, 32767), any(-32767, 32767) };
     (void)angle;
@@ -77,7 +94,7 @@ static inline sincos_t sincos_bounded(angle_t angle)
 }
 
 /** blocks.c, proof_trig. */
-static inline q15_t circle_bounded(q15_t x)
+static q15_t circle_bounded(q15_t x)
 {
     //@ check input: 0 <= x;
     return any(0, 32767);
@@ -86,7 +103,7 @@ static inline q15_t circle_bounded(q15_t x)
 static int16_t emf_d; /* of this period; the q axis comes after it */
 
 /** Pieces, for the q axis has what d leaves. */
-static inline int16_t emf_d_in_pieces(int32_t *y_q16)
+static int16_t emf_d_in_pieces(int32_t *y_q16)
 {
     int16_t wide = (int16_t)(emf_dq_max / 8 + 1);
     //@ loop unroll 16;
@@ -102,7 +119,7 @@ static inline int16_t emf_d_in_pieces(int32_t *y_q16)
 }
 
 /** |d| + |q| of a vector is at most sqrt(2) times its length. */
-static inline int16_t emf_q_beside_d(int32_t *y_q16)
+static int16_t emf_q_beside_d(int32_t *y_q16)
 {
     int16_t most = (int16_t)(emf_dq_max * 1449l / 1024 + 2 - qm_abs(emf_d));
     most = (most < emf_dq_max) ? most : emf_dq_max;
@@ -111,7 +128,7 @@ static inline int16_t emf_q_beside_d(int32_t *y_q16)
 }
 
 /** circle.c, proof_lowpass: the back-EMF, whose filter follows the speed. */
-static inline int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
+static int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
 {
     const fieldweak_params_t *p = &params.fieldweak;
     //@ admit length_of_the_back_emf: -emf_dq_max <= x <= emf_dq_max;
@@ -121,7 +138,7 @@ static inline int16_t lowpass_bounded(int32_t *y_q16, int16_t x, int16_t k_q16)
 }
 
 /** y += K (x - y) stays in the range of x, but only because y is near x at its ends: pieces that shrink towards them. */
-static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16)
+static int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16)
 {
     static const int16_t widths[] = { 0, 4, 20, 84, 340, 1364, 5460, 21844 };
     int16_t low = -32767, high = 32767;
@@ -142,7 +159,7 @@ static inline int16_t lowpass_in_pieces(int32_t *y_q16, int16_t x, int16_t k_q16
     return qm_lowpass(y_q16, x, k_q16);
 }
 
-static inline alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13)
+static alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13)
 {
     alphabeta_t r;
     //@ check trip_level: -params.overcurrent_q13 <= a_q13 <= params.overcurrent_q13 && -params.overcurrent_q13 <= b_q13 <= params.overcurrent_q13;
@@ -151,27 +168,15 @@ static inline alphabeta_t clarke_bounded(int16_t a_q13, int16_t b_q13)
     return r;
 }
 
-static inline alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc)
+static alphabeta_t inverse_park_bounded(dq_t x, sincos_t sc)
 {
     alphabeta_t r = inverse_park(x, sc);
     //@ admit vector_is_in_the_circle: -voltage_max <= r.alpha <= voltage_max && -voltage_max <= r.beta <= voltage_max;
     return r;
 }
 
-/** Pieces: beyond the largest target, there is no step outwards. */
-static inline int16_t speed_ramp_in_pieces(int16_t reference, int16_t target, int16_t step_erpm)
-{
-    if (reference > erpm_max) {
-        return speed_ramp(reference, target, step_erpm);
-    }
-    if (reference < -erpm_max) {
-        return speed_ramp(reference, target, step_erpm);
-    }
-    return speed_ramp(reference, target, step_erpm);
-}
-
 /** blocks.c, proof_pi: the integrator and the limit hold for these inputs. */
-static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit)
+static int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit)
 {
     //@ check gains: gains->kp >= 0 && gains->ki >= 0 && gains->kc >= PI_KC_MIN;
     //@ check error: -PI_ERROR_MAX <= err <= PI_ERROR_MAX;
@@ -182,7 +187,7 @@ static inline int16_t pi_tick_bounded(pi_t *pi, const pi_gains_t *gains, int16_t
 }
 
 /** circle.c: with the reciprocal of its radius, the result is within the circle. */
-static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
+static dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
                                            dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q)
 {
     dq_t v;
@@ -194,25 +199,25 @@ static inline dq_t current_control_bounded(pi_t *pi_d, const pi_gains_t *gains_d
 }
 
 /** observer.c, proof_observer_step: speed and load stay in their formats for these parameters and this current. */
-static inline void observer_step_bounded(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
+static void observer_step_bounded(observer_t *o, const observer_params_t *p, uint32_t rho_q32, current_q13_t iq_q13)
 {
-    int32_t square = qm_mulss(p->quick_q16, p->quick_q16) >> 10;
+    int32_t square = qm_mulss(p->fast_q16, p->fast_q16) >> 10;
     int64_t largest = (int64_t)p->innovation_max_erpm * square << p->shift;
     //@ check formats: 1 <= p->shift <= 13 && 32768 <= p->per_current_q16 && 0 < p->load_max <= 8192;
     //@ check angle: 2863 <= p->deltat_q32 <= 16780 && 1999 <= p->per_turn_q12 <= 11719;
-    //@ check rate: 0 <= o->rate_q16 <= p->quick_q16 <= RATE_MOST_Q16;
+    //@ check rate: 0 <= o->rate_q16 <= p->fast_q16 <= RATE_MOST_Q16;
     //@ check innovation: 0 < p->innovation_max_erpm <= 16383 && largest <= 16000 * 4194304;
     //@ check current: -IQ_MAX <= iq_q13 <= IQ_MAX;
     o->omega_q16 = any_l(-32767 * 65536l, 32767 * 65536l);
     o->load_q16 = any_l(p->load_max * -65536l, p->load_max * 65536l);
     o->rho_q32 = rho_q32;
-    o->quick_q15 = any(0, 32767);
-    o->unrest_steps = ANYU16();
-    o->large_last_erpm = ANY16();
+    o->fast_share_q15 = any(0, 32767);
+    o->gate_level = ANYU16();
+    o->gate_last_erpm = ANY16();
 }
 
 /** observer.c, proof_adaptation_learn. */
-static inline void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
+static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q12, voltage_q12_t ri_q12)
 {
     (void)emf_q12;
     (void)ri_q12;
@@ -225,8 +230,6 @@ static void any_state(uint16_t state)
 {
     any_drive(state);
     any_estimator(&drive.run.estimator);
-    any_late();
-    any_dead_second();
     any_control(&drive.run.control);
     drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
     any_observer_state(&drive.run.observer);
@@ -259,7 +262,7 @@ static void slow_in(uint16_t slot)
     if (!calibrates) {
         (void)drive_slow(&drive, &params, &raw);
     } else if ((slot & (SLOW_EVERY - 1u)) == 0u) {
-        drive_part(&drive, &params, &raw);
+        schedule_run(&drive, &params, &raw);
     }
     //@ check sums_stay: seals == 0 || (SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive);
     //@ check ended: seals == 0 || state == DRIVE_CALIBRATE || drive.state != DRIVE_CALIBRATE;
@@ -312,7 +315,7 @@ static void calibrate_after(uint16_t k)
     drive.calibration.sum_a = any_l(-32768l * k, 32767l * k);
     drive.calibration.sum_b = any_l(-32768l * k, 32767l * k);
     drive_tick(&drive, &params, &raw, &duty);
-    drive_rest(&drive, &params, &raw);
+    drive_idle(&drive, &params, &raw);
     //@ check off: drive.state == DRIVE_CALIBRATE || drive.state == DRIVE_STOPPED || drive.state == DRIVE_FAULT;
     //@ check sum_a: -32768 * (k + 1) <= drive.calibration.sum_a <= 32767 * (k + 1);
     //@ check sum_b: -32768 * (k + 1) <= drive.calibration.sum_b <= 32767 * (k + 1);

@@ -35,9 +35,9 @@ def test_chosen_configurations_have_every_line_between_them() -> None:
     assert static.cover(texts) == [("A",), ("C",)]
 
 
-NOT_REACHED = {"ifdef __FRAMAC__", "ifdef __OPTIMIZE__", "if MOTOR_SALIENCY_UH", "else of ifdef __clang__",
+NOT_REACHED = {"ifdef __OPTIMIZE__", "if MOTOR_SALIENCY_UH", "else of ifdef __clang__",
                "else of ifdef DRIVE_PARAM_SCALING_H"}
-"""The proof's; what asks the optimizer; what a salient motor's userparams.h has; what is empty."""
+"""What asks the optimizer; what a salient motor's userparams.h has; what is empty."""
 
 
 def branches(path: Path) -> Iterator[tuple[str, list[int]]]:

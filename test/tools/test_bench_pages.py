@@ -48,7 +48,7 @@ def test_every_variable_that_a_page_names_is_one_that_a_debugger_finds():
     pattern = r"`((?:board_drive|board_params|[A-Z]\w+Parm)(?:\.\w+(?:\[\d+\])?)+|Snap(?:Buf\d|Start|Done))`"
     names = sorted({name for text in PAGES.values() for name in re.findall(pattern, text)})
     lines = [f"    (void)sizeof({name});" for name in names if not name.startswith("IdentifyParm")]
-    source = '#include "board/watch.h"\nint main(void)\n{\n' + "\n".join(lines) + "\n    return 0;\n}\n"
+    source = '#include "board/firmware.h"\n#include "board/watch.h"\nint main(void)\n{\n' + "\n".join(lines) + "\n    return 0;\n}\n"
     done = subprocess.run([*GCC, "-DSNAPSHOT", "-fsyntax-only", "-xc", "-"], input=source, cwd=paths.ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert {"board_params.fieldweak.idref_q13[3]", "ParkParm.qIq", "SnapBuf1"} <= set(names)

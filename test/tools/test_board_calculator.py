@@ -54,7 +54,7 @@ def test_what_the_calculator_says_of_the_currents_is_what_the_tuner_allows():
     with motor_path(("value = 2.75", "value = 9")) as motor:
         params = design(motor_file.load(str(motor)), board_file.load("mclv")).params
     assert float(params["MAXIMUM_CURRENT_A"]) == most and board.LEAST_SHARE == float(
-        re.search(r"PARAM_F\(MAXIMUM_CURRENT_A\) >= ([\d.]+)F", (paths.ROOT / "include/drive/param_table.h").read_text(encoding="utf-8"))[1])
+        re.search(r"PARAM_F\(MAXIMUM_CURRENT_A\) >= ([\d.]+)F", (paths.ROOT / "include/drive/param_limits.h").read_text(encoding="utf-8"))[1])
 
 
 def test_a_motor_can_name_the_new_board_beside_it(path):

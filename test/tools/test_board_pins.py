@@ -34,11 +34,15 @@ def test_no_pin_is_there_twice_and_the_pwm_s_are_rb10_to_15():
     assert found == {"PWM1H1": "RB14", "PWM1L1": "RB15", "PWM1H2": "RB12", "PWM1L2": "RB13", "PWM1H3": "RB10", "PWM1L3": "RB11"}
 
 
-def test_the_firmware_s_pins_are_all_told_and_the_transmitter_s_register_is_that_of_its_pin():
+def test_the_firmware_s_pins_are_all_told():
     assert len(pins.firmware()) == len(re.findall(r"^#define BOARD_PIN_", HEADER, re.MULTILINE)) == 14
     assert (pins.firmware()["fault"].pin, pins.firmware()["fault"].known_from) == ("RB8", "published code")
-    rp = pins.chip()[pins.firmware()["uart_tx"].pin].rp
-    assert re.search(r"#define BOARD_UART_TX_PIN (\S+)", HEADER)[1] == f"RPOR{rp // 2}bits.RP{rp}R"
+
+
+def test_a_remappable_pin_s_output_is_chosen_in_the_register_of_its_rp_number():
+    found = re.findall(r"#define PIN_([BC]\d+)_OUTPUT (\S+)", (paths.ROOT / "include/board/pin_table.h").read_text(encoding="utf-8"))
+    assert found == [(name[1:], f"RPOR{pin.rp // 2}bits.RP{pin.rp}R") for name, pin in
+                     sorted(pins.chip().items(), key=lambda item: item[1].rp or 0) if pin.rp is not None]
 
 
 def test_the_page_tells_what_the_board_has_on_a_pin_and_on_the_low_side_of_its_bridge():
@@ -60,7 +64,7 @@ def test_a_pin_may_be_told_by_any_of_its_names_and_what_differs_is_a_line_of_mcl
     found = load('fault = "RP9"\ncurrent_a = "AN3"\ncurrent_b = "RB2"\nbus = "AN5"\nuart_tx = "RC5"\ns2 = "RA8"\npwm_a = "PWM1H1"').pins
     assert found == {"fault": "RB9", "current_a": "RB1", "current_b": "RB2", "bus": "RB3", "uart_tx": "RC5", "s2": "RA8", "pwm_a": "RB14"}
     assert pins.differences(found) == ["#define BOARD_PIN_FAULT B, 9", "#define BOARD_PIN_CURRENT_A B, 1", "#define BOARD_PIN_CURRENT_B B, 2",
-                                       "#define BOARD_PIN_BUS B, 3", "#define BOARD_PIN_UART_TX C, 5", "#define BOARD_UART_TX_PIN RPOR10bits.RP21R"]
+                                       "#define BOARD_PIN_BUS B, 3", "#define BOARD_PIN_UART_TX C, 5"]
 
 
 @pytest.mark.parametrize("line, parts", [
@@ -84,14 +88,14 @@ def built(folder, *changes: tuple[str, str], holds: str = "1") -> str:
         assert count == 1
     (folder / "board").mkdir(exist_ok=True)
     (folder / "board" / "mclv.h").write_text(text, encoding="utf-8")
-    arguments = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude", "-I.", "firmware/board/pins.c",
-                 "firmware/board/adc.c", "-xc", "-"]
+    arguments = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude", "-I.",
+                 "firmware/board/peripherals.c", "-xc", "-"]
     source = f'#include "board/mclv.h"\nPIN_NEEDS(registers, {holds});\n'
     return subprocess.run([*COMPILER, *arguments], input=source, cwd=paths.ROOT, capture_output=True, text=True, check=False).stderr
 
 
 @pytest.mark.parametrize("changes, named", [
-    ((("BOARD_PIN_FAULT", "B, 9"), ("BOARD_PIN_POT", "C, 0"), ("BOARD_PIN_LED_RUN", "A, 4")), ""),
+    ((("BOARD_PIN_FAULT", "B, 9"), ("BOARD_PIN_POT", "C, 0"), ("BOARD_PIN_LED_RUN", "A, 4"), ("BOARD_PIN_UART_TX", "C, 5")), ""),
     ((("BOARD_PIN_CURRENT_A", "B, 1"), ("BOARD_PIN_CURRENT_B", "B, 2"), ("BOARD_PIN_BUS", "B, 3")), ""),
     ((("BOARD_PIN_FAULT", "A, 8"),), "fault_input_has_an_RP_number"), ((("BOARD_PIN_UART_RX", "A, 9"),), "serial_line_has_RP_numbers"),
     ((("BOARD_PIN_POT", "B, 8"),), "potentiometer_has_an_AN_number"), ((("BOARD_PIN_BUS", "B, 1"),), "currents_and_bus_are_AN0_to_2_or_AN3_to_5"),

@@ -17,7 +17,7 @@ from support import FAULTS, LIBRARY, MOTORS, command, trace
 
 from tools.bench import campaign, draws, injection, judge, memory, trial
 from tools.bench.board import Library
-from tools.common import board_file, motor_file, paths, workers
+from tools.common import board_file, motor_file, param_rows, paths, workers
 
 HURST = "hurst_dmb0224c10002"
 CASES = [injection.draw(1, number, list(MOTORS)) for number in range(1, 1001)]
@@ -212,16 +212,14 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
     kinds = ("sensors: current reads zero", "sensors: current offset", "sensors: current offset drifts", "sensors: current gain", "sensors: current noise",
              "power stage: transistor never turns on")
     assert unseen == dict.fromkeys(kinds, judge.Unseen(more_rpm=0.5 * np.pi * rating.dead_rpm)) | {"clock: crystal off frequency": judge.Unseen(clock=1.2)}
-    scaling = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
-    assert f"#define PARAM_RS_MOST {injection.MOST_RESISTANCE - 1.0:.1f}\n" in scaling
+    assert param_rows.number("PARAM_RS_MOST") == pytest.approx(injection.MOST_RESISTANCE - 1.0)
     gain = injection.BY_NAME["sensors: current gain"]
     assert [gain.unseen(size, rating).start_current for size in (1.5, 0.8, 0.625, 0.3)] == pytest.approx([1.0, 1.25, 1.6, 1.6])
     rating = replace(rating, start_dead=0.5)
     assert [gain.unseen(size, rating).start_current for size in (0.5, 0.3)] == pytest.approx([2.0, 2.1])
     params = bench.library.params
     assert trial.start_dead(params) == pytest.approx(24.0 * 2.0 / 50.0 / (params["MOTOR_RS_OHM"] * params["Q_CURRENT_REF_OPENLOOP"]), rel=1e-3)
-    text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
-    assert f"#define PARAM_LARGE_ERPM ({trial.DEAD_SHARE}F * PARAM_DEAD_TIME_V" in text
+    assert param_rows.number("GATE_SHARE") == trial.DEAD_SHARE
 
 
 def test_the_campaigns_header_is_the_tuners_with_a_potentiometer_that_has_live_ends(tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ from tools.image.budget import Budget, CycleLimits, Limits
 from tools.image.profile import Counts, Profile
 from tools.image.size import write_json
 
-BUDGET = Budget(Limits(0, 0), Limits(0, 0, 512), CycleLimits(600, 800, 700, 960, 700, 500, 300, 745, 1949, ("demo",)), [], [], (), (), [])
+BUDGET = Budget(Limits(0, 0), Limits(0, 0, 512), CycleLimits(600, 600, 800, 700, 960, 700, 500, 300, 745, 1949, ("demo",)), [], [], (), (), [])
 WORDS = {0: 0x040200, 2: 0, 0x200: 0, 0x202: 0x37FFFF}
 SLOW = 200
 NO_CYCLES = pil.Cycles(*[0.0] * len(pil.Cycles.__dataclass_fields__))

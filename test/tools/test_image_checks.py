@@ -11,7 +11,7 @@ from tools.image import device, image
 CALL, RCALL = 0x020000, 0x070000
 BUDGET = """with_caller = []
 budget = {{ note = {{ flash_bytes = 1, ram_bytes = 1 }}, image = {{ flash_bytes = {}, ram_bytes = {}, stack_bytes = {} }} }}
-cycles = {{ isr_max_cycles = 1, period_max_cycles = 1, period_mean_cycles = 1, latency_max_cycles = 1, isr_bound_cycles = 1, duty_bound_cycles = 1, slow_bound_cycles = 1, duty_deadline_cycles = 1, both_deadline_cycles = 1, scenarios = [] }}
+cycles = {{ isr_max_cycles = 1, isr_mean_cycles = 1, period_max_cycles = 1, period_mean_cycles = 1, latency_max_cycles = 1, isr_bound_cycles = 1, duty_bound_cycles = 1, slow_bound_cycles = 1, duty_deadline_cycles = 1, both_deadline_cycles = 1, scenarios = [] }}
 stack = {{ calls_nothing = [] }}
 """
 

@@ -1,6 +1,7 @@
 """The deepest stack from a disassembly: each use counts what a hand count gives, what cannot be followed is an error by name."""
 
 import pytest
+from support import refusal
 
 from tools.image import size, stack
 
@@ -153,10 +154,11 @@ def analyse(levels: dict[str, int], handlers: list[str]) -> stack.Result:
 
 
 def test_the_levels_of_the_sources_are_read_by_register_field_and_slow_work_and_fault_input_have_the_same():
-    source = "IPC3bits.AD1IP = 5;\n    IPC15bits.FLTA1IP  =  6; IPC0bits.T1IP = 2; IFS0bits.AD1IF = 0;"
+    source = "#define BOARD_PRIORITY_TIMER 2u\nIPC3bits.AD1IP = 5;\n    IPC15bits.FLTA1IP  =  6; IPC0bits.T1IP = BOARD_PRIORITY_TIMER; IFS0bits.AD1IF = 0;"
     assert stack.priorities(source) == {ADC1: 5, FLTA1: 6, T1: 2}
-    levels = stack.priorities("".join(path.read_text(encoding="utf-8") for path in sorted(size.BOARD.glob("*.c"))))
+    levels = stack.priorities("".join(path.read_text(encoding="utf-8") for path in size.LEVELS))
     assert (levels[ADC1], levels["_T2Interrupt"], levels[FLTA1]) == (5, 3, 3)
+    refusal(lambda: stack.priorities("IPC3bits.AD1IP = BOARD_LEVEL;"), "the priority of an interrupt is no number, AD1IP = BOARD_LEVEL", "BOARD_PRIORITY_NAME")
 
 
 @pytest.mark.parametrize("levels, handlers, priorities, depth", [

@@ -70,6 +70,40 @@ def test_the_newest_version_is_the_headers():
     assert version == newest and told <= {version}
 
 
+def test_the_readme_is_for_a_reader_in_a_hurry_the_guarantees_are_its_one_table_of_results():
+    text = pages()["README.md"]
+    assert text.count("\n") <= 180
+    assert re.findall(r"<!-- (?!end)([a-z]\w*) -->", text) == ["guarantees"]
+
+
+MOST_WORDS = 25
+
+
+def sentences(text: str) -> list[str]:
+    """The sentences of a page's paragraphs and lists, an inline code as one word; without code, tables, headings, pictures and marks."""
+    text = re.sub(r"```.*?```|<!--.*?-->", "\n\n", text, flags=re.DOTALL)
+    parts = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) |\||#)", text)
+    plain = (re.sub(r"^\s*(?:[-*]|\d+\.) |(?<=\])\([^)]*\)", "", re.sub(r"`[^`]*`", "code", part)) for part in parts if not re.match(r"\s*(?:\||#|!\[)|    ", part))
+    return [sentence for part in plain for sentence in re.split(r"(?<=[.!?])[\")*]*\s+(?=\W*[A-Z0-9]|code|\[)|:\s+(?=[A-Z])", " ".join(part.split()))
+            if sentence]
+
+
+def words(sentence: str) -> int:
+    return sum(bool(re.search(r"\w", word)) for word in sentence.split())
+
+
+def test_sentences_are_counted_as_a_reader_does():
+    text = "# A heading\n\nOne `a b c` [two three](x.md).  Four: five; six\nseven. Eight!\n\n- nine\n- ten eleven\n1. 12\n\n| a | b |\n|---|---|\n\n    x = 1\n"
+    assert [words(sentence) for sentence in sentences(text)] == [4, 4, 1, 1, 2, 1]
+    assert words(sentences("a " * 30)[0]) == 30
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if page.startswith("docs/") or page in ("README.md", "CONTRIBUTING.md")])
+def test_no_sentence_is_longer_than_a_reader_s_breath(page):
+    text = pages()[page].partition("## What must hold between them")[0] # messages of a header
+    assert [] == [(words(sentence), sentence) for sentence in sentences(text) if words(sentence) > MOST_WORDS]
+
+
 def test_make_lists_every_target_in_a_group():
     listed = re.findall(r"^([a-z0-9-]+):.*## (?:\[(.*?)\])?", makefiles(), re.MULTILINE)
     assert [] == [name for name, group in listed if group not in GROUPS]

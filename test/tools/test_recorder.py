@@ -15,13 +15,13 @@ from tools.common.errors import UserError
 
 PARAMS = {"LOOPTIME_SEC": 5e-5, "COUNT_CURRENT_A": 0.001, "COUNT_VOLTAGE_V": 0.002, "BUS_FULL_SCALE_V": 50.0, "COUNT_SPEED_RPM": 0.2,
           "KCURRA": -0.5, "KCURRB": 0.25}
-STATUS = "state 7 fault 6 speed 0 rpm\r\n"
+STATUS = "state 7 fault STALL speed 0 rpm\r\n"
 
 
 SPEED, BUS = 0x9CD5, 0x5BE1
 
 
-def lines(count: int = 4, sent: int | None = None, fault: int = 6, first: int = 1, every: int = 1) -> str:
+def lines(count: int = 4, sent: int | None = None, fault: str = "STALL", first: int = 1, every: int = 1) -> str:
     """A record as the firmware sends it; the last two rows are in the fault."""
     rows = []
     for n in range(count):
@@ -40,12 +40,12 @@ def test_a_record_among_other_lines_is_read_from_the_oldest_row_on() -> None:
 
 
 def test_of_two_records_both_are_read_and_one_that_is_sent_again_once() -> None:
-    assert [record.fault for record in recorder.parse(lines() + lines() + lines(fault=3), "")] == [6, 3]
+    assert [record.fault for record in recorder.parse(lines() + lines() + lines(fault="OVERVOLTAGE"), "")] == [6, 3]
 
 
 def test_one_that_is_cut_is_forgotten_where_a_whole_one_is_there() -> None:
     assert len(recorder.parse(lines(sent=2) + "foc33 0.10.0 reset EXTR\r\n" + lines(), "")) == 1
-    assert len(recorder.parse(lines() + lines(fault=2, sent=3), "")) == 1
+    assert len(recorder.parse(lines() + lines(fault="OVERCURRENT_SW", sent=3), "")) == 1
     assert len(recorder.parse(lines().replace(" offsets -40 30", "") + lines(), "")) == 1, "the board has a newer firmware now"
 
 
@@ -58,10 +58,10 @@ def test_one_that_is_cut_is_forgotten_where_a_whole_one_is_there() -> None:
     (lines().replace(" 21", " 128"), "no row of a record: 'row 0 1"),
     (lines().replace("row 63", "row 62"), "row 63 is missing after row 0, log line 4"),
     (lines().replace("row 0 1 10 -1 -1 21 -1\r\n", ""), "row 0 is missing after row 1, log line 3"),
-    (lines(fault=99), "no head of a record: 'record fault 99 rows 4 every 1 offsets -40 30', log line 1"),
+    (lines(fault="STAL"), "no head of a record: 'record fault STAL rows 4 every 1 offsets -40 30', log line 1"),
     (lines().replace("rows 4", "rows 81"), "no head of a record"), (lines(every=0), "no head of a record"),
-    ("record fault 6 rows 72 every 2\r\nrow 67 5008 -3456 48 9160 -18683 185\r\n",
-     "no offsets in the record's head: 'record fault 6 rows 72 every 2', log line 1: an older firmware sends none")])
+    ("record fault STALL rows 72 every 2\r\nrow 67 5008 -3456 48 9160 -18683 185\r\n",
+     "no offsets in the record's head: 'record fault STALL rows 72 every 2', log line 1: an older firmware sends none")])
 def test_a_bad_log_is_one_line_that_says_where(text: str, line: str) -> None:
     with pytest.raises(UserError) as error:
         recorder.parse(text, "log")
@@ -72,7 +72,7 @@ def test_a_bad_log_is_one_line_that_says_where(text: str, line: str) -> None:
 def test_a_record_is_under_way_until_its_last_line_is_out() -> None:
     assert not recorder.under_way("") and not recorder.under_way(STATUS) and not recorder.under_way(lines())
     assert all(recorder.under_way(lines(sent=n)) for n in range(4))
-    assert recorder.under_way(lines()[:-2]) and recorder.under_way("record fault 6 rows 4")
+    assert recorder.under_way(lines()[:-2]) and recorder.under_way("record fault STALL rows 4")
     assert recorder.under_way(lines() + lines(sent=1)), "the second"
 
 
@@ -96,7 +96,7 @@ def test_bus_and_speed_are_words_in_four_rows_each_and_a_part_of_one_is_no_numbe
 
 
 def test_rows_without_a_fault_end_in_the_reset_that_was_one() -> None:
-    text = lines(fault=13).replace(" -25", " -27").replace(" -73", " -75") # still CLOSED
+    text = lines(fault="WATCHDOG").replace(" -25", " -27").replace(" -73", " -75") # still CLOSED
     rows = recorder.scaled(recorder.parse(text, "")[0], PARAMS, STATES)
     assert rows.time_ms == pytest.approx([-0.2, -0.15, -0.1, -0.05])
 
@@ -212,5 +212,5 @@ def test_a_log_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
 
 
 def test_the_longest_record_is_sent_in_the_time_that_a_run_waits_for_it() -> None:
-    longest = len("record fault 13 rows 64 every 64 offsets -1024 -1024\r\n") + 64 * len("row 63" + 6 * " -128" + "\r\n") + 10 * 80
+    longest = len("record fault OVERTEMPERATURE rows 64 every 64 offsets -1024 -1024\r\n") + 64 * len("row 63" + 6 * " -128" + "\r\n") + 10 * 100
     assert longest / 11520 < 0.05e-3 * simulate.CHUNK_PERIODS * simulate.LONGEST_RECORD_CHUNKS

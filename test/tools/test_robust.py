@@ -13,7 +13,7 @@ from tools.bench import plots, robust
 from tools.bench.board import Library
 from tools.bench.robust import Deviation, Margins, Robust, Table
 from tools.bench.search import Search
-from tools.common import board_file, motor_file, paths
+from tools.common import board_file, motor_file, param_rows, paths
 
 HURST = "hurst_dmb0224c10002"
 TABLE = Table.read(paths.TABLES / "robust.toml")
@@ -38,8 +38,7 @@ def test_each_deviation_alone_and_every_corner_are_promised_and_a_cold_and_a_hot
 
 def test_the_protections_allow_for_what_is_promised():
     """Where voltages and currents ask for an impossible flux, the header may be as wrong as this table promises."""
-    text = (paths.ROOT / "include" / "drive" / "param_scaling.h").read_text(encoding="utf-8")
-    r_least, r_most, l_off, flux_most = (float(re.search(rf"#define PARAM_{name} ([0-9.]+)", text)[1]) for name in ("R_LEAST", "R_MOST", "L_OFF", "FLUX_MOST"))
+    r_least, r_most, l_off, flux_most = (param_rows.number(f"PARAM_{name}") for name in ("R_LEAST", "R_MOST", "L_OFF", "FLUX_MOST"))
     assert [r_least, r_most] == TABLE.promised["R"] and [1.0 - l_off, 1.0 + l_off] == TABLE.promised["L"]
     assert TABLE.promised["Kphi"][1] < flux_most < 1.1 * TABLE.promised["Kphi"][1]
 

@@ -74,7 +74,7 @@ def test_comments_end_where_they_should_and_a_title_cannot_end_one(name):
     assert text.count("/*") == text.count("*/") and not re.search(r"/\*(?:(?!\*/)[\s\S])*/\*", text)
 
 
-# ---- one row more in a copy of param_table.h, and nothing else -------------------------------------------------------------
+# ---- one row more in a copy of param_limits.h, and nothing else -------------------------------------------------------------
 def forget() -> None:
     param_rows.parameters.cache_clear()
     param_rows.number.cache_clear()
@@ -85,7 +85,7 @@ def forget() -> None:
 def include(tmp_path, monkeypatch):
     folder, row = tmp_path / "include", '    X(SNAPDELAY, "periods"'
     shutil.copytree(paths.ROOT / "include", folder)
-    table = folder / "drive" / "param_table.h"
+    table = folder / "drive" / "param_limits.h"
     text = table.read_text(encoding="utf-8")
     assert text.count(row) == 1
     table.write_text(text.replace(row, f'    X(NEW_A, "A peak", 0.1, 20, 1.5, "what a test adds") \\\n{row}'), encoding="utf-8")
@@ -117,13 +117,13 @@ def test_a_row_that_cannot_be_read_is_told(include):
     text = param_rows.TABLE.read_text(encoding="utf-8")
     param_rows.TABLE.write_text(text.replace('0.1, 20, 1.5, "what', '0.1, 20, "what'), encoding="utf-8")
     forget()
-    with pytest.raises(UserError, match=r"a row cannot be read: X\(NEW_A, .*param_table.h"):
+    with pytest.raises(UserError, match=r"a row cannot be read: X\(NEW_A, .*param_limits.h"):
         parameters()
 
 
 # ---- the docs' tables ------------------------------------------------------------------------------------------------------
 def test_the_rows_are_read_as_the_compiler_reads_them():
-    found = tables.rows("include", "drive/param_table.h", "PARAM_TABLE", "#name unit #low #high #default meaning")
+    found = tables.rows("include", "drive/param_limits.h", "PARAM_TABLE", "#name unit #low #high #default meaning")
     assert [row[:4] + row[5:] for row in found] == [[p.name, p.unit, p.low, p.high, p.meaning] for p in parameters().values()]
 
 

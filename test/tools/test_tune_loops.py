@@ -135,8 +135,8 @@ def test_rates_and_gain_are_those_of_the_header_and_fall_with_the_speed():
     full = rates(speed_hz, load_hz, 2800.0)
     electrical = 5 * 2 * math.pi / 60 # rad/s per rpm
     assert d.constant("speed_kp_q13").value == approx(full["quiet"].speed_kp * electrical, rel=1e-4)
-    assert d.constant("speed_kp_quick_q13").value == approx(full["quick"].speed_kp * electrical, rel=1e-4)
-    for name, gains in full.items():
+    assert d.constant("speed_kp_fast_q13").value == approx(full["quick"].speed_kp * electrical, rel=1e-4)
+    for name, gains in ((name.replace("quick", "fast"), gains) for name, gains in full.items()):
         assert gains.rate * 65536 == approx(d.constant(f"observer.{name}_q16").q_value, abs=1.0), name
     assert d.constant("observer.full_erpm").value * electrical == approx(full_rad_s(load_hz), rel=1e-6)
     half = rates(speed_hz, load_hz, 0.25 * full_rad_s(load_hz) / electrical)

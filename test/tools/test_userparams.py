@@ -276,6 +276,6 @@ def test_nothing_is_compiled_with_a_header_that_is_refused_and_a_mended_one_is_l
 
 
 def test_the_optional_gains_are_those_that_have_a_default():
-    scaling = (paths.ROOT / "include/drive/param_scaling.h").read_text(encoding="utf-8")
-    listed = [name for name, in rows("include", "drive/param_table.h", "PARAM_OPTIONAL", "#name")]
+    scaling = (paths.ROOT / "include/drive/scaling/controllers.h").read_text(encoding="utf-8")
+    listed = [name for name, in rows("include", "drive/param_limits.h", "PARAM_OPTIONAL", "#name")]
     assert listed == re.findall(r"^#ifndef (\w+?)(?<!_H)\b", scaling, re.MULTILINE) and not set(listed) & (set(parameters()) | set(modes()))

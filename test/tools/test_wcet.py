@@ -60,7 +60,7 @@ def program(*statements: Statement) -> Program:
 
 
 def limits(isr: int = 1000, duty: int = 1000, deadline: int = 745, both: int = 1949) -> Budget:
-    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, isr, duty, 1, deadline, both, ()), [], [], (), (), [])
+    return Budget(Limits(0, 0), Limits(0, 0), CycleLimits(1, 1, 1, 1, 1, isr, duty, 1, deadline, both, ()), [], [], (), (), [])
 
 
 def report(*statements: Statement, **seen) -> bench.Report:

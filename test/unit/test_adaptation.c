@@ -1,5 +1,5 @@
 /* Adaptation of flux and resistance: it converges from wrong constants in both directions, shares by voltage, and stays in its bounds. */
-#include "control/adaptation.h"
+#include "control/motor_model.h"
 #include "golden.h"
 #include "golden_adaptation.h"
 #include "golden_adaptation_step.h"

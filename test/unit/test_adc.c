@@ -5,7 +5,7 @@ static volatile AD1CON1BITS *const control_bits = &AD1CON1bits;
 
 /* The access to the bits switches the converter on. */
 #define AD1CON1bits (*((void)registers_watch(&AD1CON1), control_bits))
-#include "firmware/board/adc.c"
+#include "firmware/board/peripherals.c"
 #undef AD1CON1bits
 
 void setUp(void)

@@ -1,8 +1,12 @@
 /* The panel in BIDIRECTIONAL_SPEED: the potentiometer's sides are the directions, its middle is the lowest speed. */
 /* defines: -DBIDIRECTIONAL_SPEED */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "panel_rig.h"
 
-#include "drive/panel_tick.h"
+#include "drive/modes/modes.h"
+#include "drive/panel.h"
 
 void setUp(void)
 {

@@ -1,8 +1,11 @@
 /* The panel in BIDIRECTIONAL_SPEED and TORQUE_MODE together: a signed q current. */
 /* defines: -DBIDIRECTIONAL_SPEED -DTORQUE_MODE */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "panel_rig.h"
 
-#include "drive/panel_tick.h"
+#include "drive/panel.h"
 
 void setUp(void)
 {

@@ -1,18 +1,11 @@
 /* BRINGUP step by step with a bridge of ohms and dead time behind the drive: answers, limits of the current, trips, the end. */
 /* defines: -DBRINGUP */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "bringup_rig.h"
 
-#include "firmware/drive/drive.c"
-#include "firmware/drive/modes/bringup_directions.c"
-#include "firmware/drive/modes/bringup_gains.c"
-#include "firmware/drive/modes/bringup_guide.c"
-#include "firmware/drive/modes/bringup_judge.c"
-#include "firmware/drive/modes/bringup_measure.c"
-#include "firmware/drive/modes/bringup_panel.c"
-#include "firmware/drive/modes/bringup_rest.c"
-#include "firmware/drive/modes/bringup_say.c"
-#include "firmware/drive/modes/bringup_turn.c"
-#include "drive/panel_tick.h"
+#include "drive/panel.h"
 
 void setUp(void)
 {

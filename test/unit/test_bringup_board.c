@@ -2,10 +2,12 @@
 /* defines: -DBRINGUP */
 #include "hurst_params.h"
 
-#include "firmware/board/modes/bringup_report.c"
+#include "firmware/board/modes/mode_board.c"
 
-#include "board/modes/identify_report.h"
+#include "board/modes/mode_board.h"
 #include "unity.h"
+
+#include "law.c"
 
 #define EACH(n, table) for (uint16_t n = 0; n < sizeof(table) / sizeof(table)[0]; n++)
 
@@ -48,7 +50,7 @@ void test_each_kind_of_line(void)
           "ok RESISTANCE: phase resistance with bridge 60.000 ohm, expected 0.000 .. 60.100 ohm\r\n" },
         { { BRINGUP_SHOWS, 1, 0, 353, -407, 411 }, "see -C: 3.53 V, current A -0.407 A, B 0.411 A, expected 1 : 1\r\n" },
         { { BRINGUP_FINDS, BRINGUP_PHASE_OPEN, 2, 0, 0, 0 }, "FIX PHASE_OPEN C: the wire of phase C, or its driver\r\n" },
-        { { BRINGUP_FINDS, BRINGUP_FAULT, 0, 9, 0, 0 }, "FIX FAULT: the drive stopped with the fault 9 of docs/faults.md\r\n" },
+        { { BRINGUP_FINDS, BRINGUP_FAULT, 0, 9, 0, 0 }, "FIX FAULT: the drive stopped with the fault OFFSET of docs/faults.md\r\n" },
         { { BRINGUP_ENDS, 0, 0, 3, 0, 0 }, "end: findings 3\r\n" },
     };
     EACH(n, cases) {

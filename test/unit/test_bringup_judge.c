@@ -2,7 +2,7 @@
 /* defines: -DBRINGUP */
 #include "hurst_params.h"
 
-#include "firmware/drive/modes/bringup_judge.c"
+#include "law.c"
 
 #include "unity.h"
 

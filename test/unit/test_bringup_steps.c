@@ -1,18 +1,11 @@
 /* BRINGUP's steps one by one: what each says of a right board, and what it finds on a wrong one. */
 /* defines: -DBRINGUP */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "bringup_rig.h"
 
-#include "firmware/drive/drive.c"
-#include "firmware/drive/modes/bringup_directions.c"
-#include "firmware/drive/modes/bringup_gains.c"
-#include "firmware/drive/modes/bringup_guide.c"
-#include "firmware/drive/modes/bringup_judge.c"
-#include "firmware/drive/modes/bringup_measure.c"
-#include "firmware/drive/modes/bringup_panel.c"
-#include "firmware/drive/modes/bringup_rest.c"
-#include "firmware/drive/modes/bringup_say.c"
-#include "firmware/drive/modes/bringup_turn.c"
-#include "drive/panel_tick.h"
+#include "drive/panel.h"
 
 void setUp(void)
 {

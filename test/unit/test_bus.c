@@ -1,4 +1,5 @@
 /* The bus: its filter, the modulator's gain and the voltage circle that follow it, and both ends of their formats. */
+#include "drive/limits.h"
 #include "drive_rig.h"
 
 void setUp(void)

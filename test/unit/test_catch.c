@@ -1,7 +1,7 @@
 /* The flying start: what two looks at a turning rotor tell, and what follows from it, on the ideal motor. */
 #include "ideal_motor.h"
 
-#include "drive/limits_now.h"
+#include "drive/limits.h"
 
 #define TURNS 8
 #define MOST_A (1.1F * PARAM_F(MAXIMUM_CURRENT_A))
@@ -256,11 +256,46 @@ void test_a_request_that_is_withdrawn_between_two_looks_stops(void)
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "withdrawn");
 }
 
+/** The phases that a start goes through on this rotor until a state, or in so many periods; none of them twice in a row. */
+static void expect_phases(const char *expected, float bus_v, drive_state_t until, uint16_t most)
+{
+    static const char letters[] = "-12b.f!"; /* no look, first, second, bus high, pause, too fast, seen */
+    char seen[12] = "";
+    size_t count = 0;
+    drive_start(&drive, &params, 1);
+    motor.bus_v = bus_v;
+    while (drive.state != (uint16_t)until && most-- != 0u) {
+        const char now = letters[drive.run.catching.phase];
+        if ((count == 0u || seen[count - 1u] != now) && count + 1u < sizeof seen) {
+            seen[count] = now;
+            count++;
+        }
+        ideal_motor_run(1);
+        motor.bus_v = (most < 3000u) ? PARAM_F(NOMINAL_BUS_V) : bus_v;
+    }
+    TEST_ASSERT_EQUAL_STRING(expected, seen);
+}
+
+void test_a_catch_goes_through_its_phases(void)
+{
+    turning(6000.0F, 36.0F, 3);
+    expect_phases("1.2!", PARAM_F(NOMINAL_BUS_V), DRIVE_CLOSED, 1000);
+    TEST_ASSERT_EQUAL_UINT16(START_OBSERVE, drive.run.handover.phase); /* the hand-over's part of it is done */
+    turning(0.0F, 36.0F, 3);
+    expect_phases("1-", PARAM_F(NOMINAL_BUS_V), DRIVE_ALIGN, 1000);
+    turning(30000.0F, 36.0F, 3);
+    expect_phases("1.2f1.2f", PARAM_F(NOMINAL_BUS_V), DRIVE_CLOSED, 1500);
+    turning(0.0F, 36.0F, 3);
+    motor.bus_v = 33.5F;
+    ideal_motor_run(2000); /* the filter follows */
+    expect_phases("1b1-", 33.5F, DRIVE_ALIGN, 5000);
+}
+
 void test_without_FLYING_START_every_start_is_aligned(void)
 {
     turning(10000.0F, 36.0F, 4);
     drive_start(&drive, &params, 1);
-    drive.run.catching.step = (uint16_t)CATCH_NO_LOOK;
+    drive.run.catching.phase = (uint16_t)CATCH_NO_LOOK;
     motor.omega = 0.0F;
     TEST_ASSERT_EQUAL_UINT32(201, ideal_motor_run_until(DRIVE_ALIGN, 300));
 }
@@ -270,11 +305,11 @@ void test_FLYING_START_is_what_asks_for_the_first_look(void)
     drive_params_t none = params;
     rig_ready();
     drive_start(&drive, &params, 1);
-    TEST_ASSERT_EQUAL_UINT16(CATCH_FIRST_LOOK, drive.run.catching.step);
+    TEST_ASSERT_EQUAL_UINT16(CATCH_FIRST_LOOK, drive.run.catching.phase);
     rig_ready();
     none.flying_start = 0;
     drive_start(&drive, &none, 1);
-    TEST_ASSERT_EQUAL_UINT16(CATCH_NO_LOOK, drive.run.catching.step);
+    TEST_ASSERT_EQUAL_UINT16(CATCH_NO_LOOK, drive.run.catching.phase);
 }
 
 /* ---- a stop goes on, a run is reversed ---- */
@@ -353,10 +388,11 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         drive.state = (uint16_t)DRIVE_STOPPING;
         drive.command.target_erpm = (int16_t)(direction * -6000);
         drive.run.handover.agreed_steps = 99; /* of the start long ago */
-        drive.run.handover.is_due = 1;
+        drive.run.handover.at_end = 1;
+        drive.run.handover.phase = (uint16_t)START_HAND_OVER;
         drive.run.estimator.rho_q32 = 0x12340000ul;
         drive.run.control.v_q14 = v_q14;
-        drive.run.control.burn_q13 = 2000;
+        drive.run.control.flux_brake_q13 = 2000;
         drive.run.handover.ahead_erpm = 300;
         drive.run.handover.offset = 500;
         drive.run.handover.id_q13 = -30;
@@ -366,17 +402,17 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         after = inverse_park(drive.run.control.v_q14, drive.frame);
         TEST_ASSERT_INT16_WITHIN(2, before.alpha, after.alpha); /* the voltage does not jump */
         TEST_ASSERT_INT16_WITHIN(2, before.beta, after.beta);
-        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.burn_q13);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.control.flux_brake_q13);
         TEST_ASSERT_EQUAL_INT16(-direction, drive.direction);
         TEST_ASSERT_INT32_WITHIN(100, -2400L * 3579 / 64, drive.forced.speed_q10);
         TEST_ASSERT_EQUAL_HEX32((uint32_t)(-direction * drive.forced.speed_q10 * 64), drive.forced.step_q32); /* of the very next period */
         TEST_ASSERT_EQUAL_INT16(-direction * params.open_loop_q13, drive.run.control.ref_q13.q);
         TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.agreed_steps);
-        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.is_due);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.ahead_erpm);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
-        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.speed_is_preset); /* the next hand-over presets the observer anew */
+        TEST_ASSERT_EQUAL_UINT16(START_RAMP, drive.run.handover.phase); /* the next hand-over presets the observer anew */
+        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.at_end);
         /* the current lies along the rotor's flux */
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)estimator_next_angle(&drive.run.estimator), (int16_t)(angle_t)(drive.angle - (angle_t)(direction * 0x4000)));
     }

@@ -29,7 +29,7 @@ static void oscillator_low(uint16_t value)
 #undef __builtin_write_OSCCONL
 #define __builtin_write_OSCCONH(value) oscillator_high((uint16_t)(value))
 #define __builtin_write_OSCCONL(value) oscillator_low((uint16_t)(value))
-#include "firmware/board/clock.c"
+#include "firmware/board/peripherals.c"
 
 void setUp(void)
 {

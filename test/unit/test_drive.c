@@ -76,7 +76,7 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 4u, drive.run.control.iq_limit_q13 != 1, "current limit");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.stall_steps != 99u, "protection");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.control.trim_reference_erpm != 1, "trim");
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u || (slow == 6u && !observer_is_calm(&drive.run.observer)), drive.run.observer.wrong_erpm != 1, "rates");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 6u || (slow == 6u && !observer_gate_is_closed(&drive.run.observer)), drive.run.observer.wrong_erpm != 1, "rates");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(rare == 14u, drive.run.estimator.old_turn_q16_rad != 1, "the estimator's sign");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(slow == 2u, drive.run.control.brake_limit_q13 != 1, "braking");
         TEST_ASSERT_EQUAL_INT16_MESSAGE(period == 12u, drive.run.probe_most_q13 != 1, "probe");
@@ -105,7 +105,7 @@ void test_slow_work_is_due_every_second_period_while_the_bridge_switches_and_els
             rig_power_up();
             drive.state = state;
             drive.ticks = n;
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(n % 2u == 0u, drive_slow_is_due(&drive), golden_row(state));
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(n % 2u == 0u, drive_slow_follows(&drive), golden_row(state));
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(rig_outputs[state] == (uint16_t)OUTPUTS_PWM, drive_tick(&drive, &params, &samples, &out.duty), golden_row(state));
         }
     }

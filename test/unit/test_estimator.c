@@ -47,6 +47,7 @@ static alphabeta_t vector(int16_t alpha, int16_t beta)
 static void filtered_speed(int16_t erpm)
 {
     e.omega_filtered_q16 = (int32_t)erpm * 65536;
+    estimator_choose_span(&e, &params);
 }
 
 static alphabeta_t e_q13;
@@ -299,13 +300,13 @@ void test_filters_make_their_share_of_the_way(void)
     for (unsigned n = 0; n < sizeof before / sizeof before[0]; n++) { /* in the mean of two periods, whose half count falls */
         (void)speed_of(0, (int16_t)((before[n] == 32767) ? 8434 : 1287), 0);
         e.omega_before_erpm = before[n];
-        estimator_settle(&e, &params);
+        estimator_filter_speed(&e, &params);
         TEST_ASSERT_EQUAL_INT32_MESSAGE((((int32_t)before[n] + e.omega_erpm) >> 1) * 2958, e.omega_filtered_q16, golden_row((uint16_t)n));
     }
     e.omega_filtered_q16 = 0;
     e.omega_erpm = 4999;
     e.omega_before_erpm = 5002;
-    estimator_settle(&e, &params);
+    estimator_filter_speed(&e, &params);
     TEST_ASSERT_EQUAL_INT32(INT32_C(5000) * 2958, e.omega_filtered_q16);
     TEST_ASSERT_EQUAL_INT16(225, estimator_speed(&e));
     estimator_pll(&e, &params, &tuning, rotating(0, 1287));
@@ -333,13 +334,13 @@ static void run_motor(int16_t direction, uint16_t count)
         uint64_t turn = (direction > 0) ? STEP_7500_Q32 : UINT64_C(0x100000000) - STEP_7500_Q32;
         true_q32 = (uint32_t)((true_q32 + turn) & UINT32_C(0xFFFFFFFF)); /* now the angle of this sample */
         alphabeta_t emf = estimator_back_emf(&e, &params, &tuning, vector(0, 0));
-        estimator_track(&e, &params, &tuning, emf, frame, 0);
+        estimator_track(&e, &params, &tuning, emf, frame);
         frame = trig_sincos(estimator_next_angle(&e));
         /* acts for the period centred on the next sample */
         estimator_commanded(&e, inverse_park(rotating(0, (int16_t)(direction * 2 * EMF_7500_Q13)),
                                              trig_sincos((angle_t)(((true_q32 + turn) >> 16) & 0xFFFFu))));
         if (slow_is_due()) {
-            estimator_settle(&e, &params);
+            estimator_filter_speed(&e, &params);
             estimator_follow(&e, &params);
         }
     }

@@ -54,11 +54,15 @@ static void period(runner_t *r, alphabeta_t i, alphabeta_t v, uint16_t closed, i
     tuning.emf_sum_max_q12 = (int16_t)qm_divud(UINT32_C(32767) * 2048u, (uint16_t)inv_kfi);
     alphabeta_t emf;
     emf = estimator_back_emf(&r->e, params, &tuning, i);
-    estimator_track(&r->e, params, &tuning, emf, r->frame, !closed);
+    if (closed) {
+        estimator_track(&r->e, params, &tuning, emf, r->frame);
+    } else {
+        estimator_run_along(&r->e, params, &tuning, emf);
+    }
     r->frame = trig_sincos(estimator_next_angle(&r->e));
     estimator_commanded(&r->e, v);
     if ((++r->periods & 1u) == 0u) {
-        estimator_settle(&r->e, params);
+        estimator_filter_speed(&r->e, params);
         estimator_follow(&r->e, params);
         estimator_turn_frame(&r->e);
     }

@@ -26,8 +26,7 @@ void setUp(void)
 
 static void look_up(int16_t ref_erpm)
 {
-    const fieldweak_tables_t tables = fieldweak_tables(&params);
-    fieldweak_tick(&fw, &params, &tables, &tuning, ref_erpm);
+    fieldweak_tick(&fw, &params, &tuning, ref_erpm);
 }
 
 /** What the table gave, against a golden row of either table. */

@@ -4,8 +4,9 @@
 #include "firmware/board/firmware.c"
 
 #include "board/watch.h"
-#include "mock_peripherals.h"
 #include "mock_selftest_run.h"
+#include "mock_peripherals.h"
+#include "peripherals_on_registers.h"
 #include "unity.h"
 
 volatile uint16_t board_selftest_failed;
@@ -25,6 +26,7 @@ static char *nothing_more(char *at, int calls)
 
 void setUp(void)
 {
+    peripherals_on_registers();
     host_registers_reset();
     selftest_reset_cause_Stub(same_cause); /* its own test: test_selftest_board.c */
     selftest_start_Ignore();
@@ -301,7 +303,7 @@ void test_lights_reach_their_pins_and_the_watch_variables_are_refreshed(void)
 
 void test_status_line_goes_out_twice_a_second_a_character_a_pass(void)
 {
-    static const char expected[] = "state 0 fault 0 speed 0 rpm\r\n";
+    static const char expected[] = "state 0 fault NONE speed 0 rpm\r\n";
     uint16_t n;
     start(0);
     healthy_ms(499);

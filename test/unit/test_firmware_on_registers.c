@@ -1,17 +1,11 @@
 /* The firmware on the host's registers, as any harness sees it: what firmware_init() leaves in every register, and a start by hand. */
 #include "hurst_params.h"
 
-#include "firmware/board/adc.c"
-#include "firmware/board/clock.c"
+#include "firmware/board/peripherals.c"
 #include "firmware/board/firmware.c"
 #include "firmware/board/isr.c"
-#include "firmware/board/pins.c"
-#include "firmware/board/pwm.c"
 #include "firmware/board/selftest_run.c"
-#include "firmware/board/selftest_start.c"
 #include "firmware/board/status.c"
-#include "firmware/board/timer.c"
-#include "firmware/board/uart.c"
 #include "firmware/board/watch.c"
 
 #include <string.h>

@@ -81,7 +81,8 @@ void test_agreement_counts_from_the_early_speed_on_and_waiting_at_the_end_of_the
         EACH(n, cases) {
             uint16_t steps;
             at_the_end_of_the_ramp(direction);
-            drive.run.handover.agreed_steps = 0;
+            rig_agreed(0);
+            drive.run.handover.at_end = 1;
             drive.periods = (uint16_t)(cases[n].counts ? 3990 : 0); /* waited at an end that lies behind */
             for (steps = 1; steps <= 600u; steps++) {
                 force(cases[n].forced_erpm);
@@ -90,6 +91,7 @@ void test_agreement_counts_from_the_early_speed_on_and_waiting_at_the_end_of_the
                 rig_slow(0);
                 TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].counts * steps, drive.run.handover.agreed_steps, golden_row(n));
                 TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.periods, golden_row(n));
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(!cases[n].counts, drive.run.handover.at_end, golden_row(n));
             }
             EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, golden_row(n));
         }
@@ -106,7 +108,7 @@ void test_rotor_may_swing_by_half_the_speed_once_the_estimator_has_agreed(void)
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             at_the_end_of_the_ramp(direction);
-            drive.run.handover.agreed_steps = (uint16_t)cases[n].before;
+            rig_agreed((uint16_t)cases[n].before);
             rig_speed((int16_t)(direction * cases[n].speed_erpm));
             rig_slow(0);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].after, drive.run.handover.agreed_steps, golden_row(n));
@@ -158,7 +160,7 @@ void test_end_of_the_ramp_counts_also_below_the_early_speed(void)
 {
     drive_params_t p = params;
     p.early_erpm = FORCED_ERPM + 1;
-    drive.run.handover.agreed_steps = 0;
+    rig_agreed(0);
     rig_speed(FORCED_ERPM);
     handover_wait(&drive, &p);
     TEST_ASSERT_EQUAL_UINT16(1, drive.run.handover.agreed_steps);
@@ -180,7 +182,7 @@ void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_
         TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].increase_q10, drive.forced.increase_q10, golden_row(n));
     }
     at_the_end_of_the_ramp(1);
-    drive.run.handover.agreed_steps = params.agree_steps;
+    rig_agreed(params.agree_steps);
     force(4710.0F);
     rig_speed(4700);
     rig_slow(0);
@@ -190,7 +192,7 @@ void test_rest_of_the_ramp_is_three_times_as_quick_where_the_estimator_does_not_
 /** The hand-over at this forced and this estimated speed, where the current pulls the rotor. */
 static void begin_closed_loop(float forced_erpm, int16_t speed_erpm)
 {
-    drive.run.handover.agreed_steps = params.agree_steps;
+    rig_agreed(params.agree_steps);
     force(forced_erpm);
     rig_speed(speed_erpm);
     forced_ahead(0);
@@ -253,7 +255,7 @@ void test_rotor_that_comes_in_the_last_step_is_handed_over(void)
     EACH(n, cases) {
         rig_power_up();
         at_the_end_of_the_ramp(1);
-        drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps + HANDOVER_MOST_STEPS(&params) - 1u);
+        rig_agreed((uint16_t)(params.agree_steps + HANDOVER_MOST_STEPS(&params) - 1u));
         force(4000.0F);
         rig_speed(3800);
         forced_ahead(cases[n].offset);
@@ -267,7 +269,7 @@ void test_rotor_that_comes_in_the_last_step_is_handed_over(void)
 static void period(uint16_t ticks)
 {
     drive.ticks = ticks;
-    if (drive_slow_is_due(&drive)) {
+    if (drive_slow_follows(&drive)) {
         (void)drive_slow(&drive, &params, &samples);
     }
 }
@@ -275,7 +277,7 @@ static void period(uint16_t ticks)
 void test_readiness_is_looked_at_every_eighth_period_and_acted_on_two_periods_later_only(void)
 {
     uint16_t n;
-    drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
+    rig_agreed((uint16_t)(params.agree_steps - 1u));
     forced_ahead(0);
     for (n = 1; n <= 8u; n++) {
         period(n);
@@ -294,7 +296,7 @@ void test_readiness_is_looked_at_every_eighth_period_and_acted_on_two_periods_la
 void test_fault_or_stop_before_its_own_period_keeps_the_hand_over_from_happening(void)
 {
     static const drive_state_t states[] = { DRIVE_STOPPED, DRIVE_FAULT, DRIVE_ALIGN };
-    drive.run.handover.agreed_steps = params.agree_steps;
+    rig_agreed(params.agree_steps);
     EACH(n, states) {
         drive.state = (uint16_t)states[n];
         drive.fault = (uint16_t)((states[n] == DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
@@ -302,6 +304,46 @@ void test_fault_or_stop_before_its_own_period_keeps_the_hand_over_from_happening
         rig_slow(1);
         TEST_ASSERT_EQUAL_UINT16(states[n], drive.state);
     }
+}
+
+/* ---- the phases of a start ---- */
+
+void test_a_start_goes_through_its_phases_in_their_order_and_back_when_the_agreement_ends(void)
+{
+    handover_t *h = &drive.run.handover;
+    rig_lock(1);
+    TEST_ASSERT_EQUAL_UINT16(START_ALIGN, h->phase);
+    (void)rig_tick_until(DRIVE_RAMP, (uint16_t)(params.align_periods + 8u));
+    TEST_ASSERT_EQUAL_UINT16(START_RAMP, h->phase);
+    at_the_end_of_the_ramp(1);
+    handover_enter(h, START_RAMP);
+    force(3000.0F);
+    rig_speed(3000);
+    rig_slow(0);
+    TEST_ASSERT_EQUAL_UINT16(START_RAMP, h->phase); /* too slow to be asked */
+    force(4000.0F);
+    rig_speed(4000);
+    forced_ahead(0x3800);
+    for (uint16_t steps = 1; steps <= params.agree_steps; steps++) {
+        rig_slow(0);
+        TEST_ASSERT_EQUAL_UINT16((steps < params.agree_steps) ? START_AGREE : START_RELEASE, h->phase);
+        rig_slow(1);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+    }
+    rig_speed(0);
+    rig_slow(0);
+    TEST_ASSERT_EQUAL_UINT16(START_AGREE, h->phase);
+    rig_agreed(params.agree_steps);
+    h->ahead_erpm = 0;
+    rig_speed(4000);
+    forced_ahead(0);
+    rig_slow(0);
+    TEST_ASSERT_EQUAL_UINT16(START_HAND_OVER, h->phase);
+    rig_slow(1);
+    TEST_ASSERT_EQUAL_UINT16(START_OBSERVE, h->phase);
+    TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+    handover_observe(&drive.run, &params);
+    TEST_ASSERT_EQUAL_UINT16(START_DONE, h->phase);
 }
 
 /* ---- the fall of the ramp's current ---- */
@@ -312,7 +354,7 @@ static uint16_t fall(int16_t direction, int16_t offset, int16_t *current_q13)
     uint16_t steps = 0;
     rig_power_up();
     at_the_end_of_the_ramp(direction);
-    drive.run.handover.agreed_steps = (uint16_t)(params.agree_steps - 1u);
+    rig_agreed((uint16_t)(params.agree_steps - 1u));
     while (drive.state == (uint16_t)DRIVE_RAMP && steps < 1000u) {
         rig_speed((int16_t)(direction * 5000));
         forced_ahead(offset);
@@ -343,7 +385,7 @@ void test_current_falls_until_it_pulls_the_rotor_or_is_an_eighth(void)
 void test_rotor_that_falls_back_is_handed_over_with_the_current_that_is_left(void)
 {
     uint16_t n;
-    drive.run.handover.agreed_steps = params.agree_steps;
+    rig_agreed(params.agree_steps);
     for (n = 0; n < 80u; n++) {
         rig_speed(5000);
         forced_ahead(0x3800);
@@ -369,7 +411,7 @@ void test_rotor_that_still_swings_back_at_the_floor_is_waited_for(void)
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             at_the_end_of_the_ramp(direction);
-            drive.run.handover.agreed_steps = params.agree_steps;
+            rig_agreed(params.agree_steps);
             drive.run.control.ref_q13.q = (int16_t)(direction * (params.open_loop_q13 >> 3));
             rig_speed((int16_t)(direction * cases[n].speed_erpm));
             forced_ahead(cases[n].offset);
@@ -387,7 +429,7 @@ void test_current_is_whole_again_when_the_agreement_ends(void)
         (void)fall(direction, 0x3000, &current_q13);
         at_the_end_of_the_ramp(direction);
         drive.run.control.ref_q13.q = (int16_t)(direction * 500);
-        drive.run.handover.agreed_steps = params.agree_steps;
+        rig_agreed(params.agree_steps);
         rig_speed(0);
         rig_slow(0);
         TEST_ASSERT_EQUAL_INT16(direction * params.open_loop_q13, drive.run.control.ref_q13.q);
@@ -410,7 +452,7 @@ static void hand_over(angle_t forced, angle_t estimated, int16_t v_d, int16_t v_
     drive.run.control.ref_q13.q = (int16_t)(direction * params.open_loop_q13);
     drive.run.control.v_q14.d = v_d;
     drive.run.control.v_q14.q = v_q;
-    drive.run.handover.speed_is_preset = 0; /* as the start has left it */
+    drive.run.handover.phase = (uint16_t)START_OBSERVE; /* as the start has left it */
     handover_now(&drive, &params);
     handover_observe(&drive.run, &params);
 }
@@ -464,8 +506,8 @@ void test_period_after_the_hand_over_has_the_dead_time_of_the_new_frame(void)
         dq_t asked;
         dead_duties_t expected;
         at_the_end_of_the_ramp(direction);
-        drive.run.handover.agreed_steps = params.agree_steps;
-        drive.run.handover.is_due = 1;
+        rig_agreed(params.agree_steps);
+        drive.run.handover.phase = (uint16_t)START_HAND_OVER;
         drive.dead = (dead_duties_t){ 0, 0, 0 };
         drive.angle = 0x1000;
         drive.run.estimator.next = 0x3000;
@@ -564,13 +606,13 @@ void test_unrest_of_the_hand_over_lasts_until_its_d_current_is_gone(void)
     for (uint16_t n = 0; n < 1000u; n++) {
         handover_observe(&drive.run, &params);
     }
-    TEST_ASSERT_EQUAL_UINT16(OBSERVER_START_UNREST, drive.run.observer.unrest_steps);
-    drive.run.observer.unrest_steps = OBSERVER_START_UNREST + 100;
+    TEST_ASSERT_EQUAL_UINT16(OBSERVER_GATE_AT_START, drive.run.observer.gate_level);
+    drive.run.observer.gate_level = OBSERVER_GATE_AT_START + 100;
     handover_observe(&drive.run, &params);
-    TEST_ASSERT_EQUAL_UINT16_MESSAGE(OBSERVER_START_UNREST + 99, drive.run.observer.unrest_steps, "more of it fades");
+    TEST_ASSERT_EQUAL_UINT16_MESSAGE(OBSERVER_GATE_AT_START + 99, drive.run.observer.gate_level, "more of it fades");
     drive.run.handover.offset = 0;
     handover_observe(&drive.run, &params);
-    TEST_ASSERT_EQUAL_UINT16(OBSERVER_START_UNREST + 98, drive.run.observer.unrest_steps);
+    TEST_ASSERT_EQUAL_UINT16(OBSERVER_GATE_AT_START + 98, drive.run.observer.gate_level);
 }
 
 void test_current_follows_its_offset(void)

@@ -1,10 +1,11 @@
 /* The identification's bookkeeping with exact data: sums, timing of the square voltage, inertia and friction, results. */
 /* defines: -DIDENTIFY */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "panel_rig.h"
 
-#include "firmware/drive/drive.c"
-#include "firmware/drive/modes/identify.c"
-#include "drive/panel_tick.h"
+#include "drive/panel.h"
 
 static identify_t *const id = &drive.run.identify;
 static drive_control_t *const control = &drive.run.control;

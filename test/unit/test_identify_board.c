@@ -2,19 +2,20 @@
 /* defines: -DIDENTIFY */
 #include "hurst_params.h"
 
-#include "firmware/drive/modes/identify.c"
-
-#include "firmware/board/modes/identify_report.c"
+#include "firmware/board/modes/mode_board.c"
 #include "firmware/board/status.c"
 #include "firmware/board/watch.c"
 
 #include "drive/param_init.h"
-#include "mock_peripherals.h"
+#include "law.c"
 #include "mock_selftest_run.h"
+#include "mock_peripherals.h"
+#include "peripherals_on_registers.h"
 #include "transmitter.h"
 #include "unity.h"
 
 drive_t board_drive;
+panel_t board_panel;
 retry_t board_retry;
 volatile uint16_t board_reset_cause;
 uint16_t board_selftest_parts;
@@ -29,6 +30,7 @@ static char *nothing_more(char *at, int calls)
 
 void setUp(void)
 {
+    peripherals_on_registers();
     selftest_put_Stub(nothing_more);
     selftest_put_marked_Stub(nothing_more);
     static const drive_t zero;
@@ -50,7 +52,7 @@ static void expect_line(const char *text)
 
 void test_line_before_the_first_measurement(void)
 {
-    expect_line("step 0 NONE fault 0 R 0 mohm Ld 0 uH Lq 0 uH Kphi 0 mV/krpm J 0e-8 kgm2 friction 0 uNm + 0 nNms\r\n");
+    expect_line("step 0 NONE fault NONE R 0 mohm Ld 0 uH Lq 0 uH Kphi 0 mV/krpm J 0e-8 kgm2 friction 0 uNm + 0 nNms\r\n");
 }
 
 void test_line_with_the_largest_numbers_fits(void)
@@ -59,10 +61,10 @@ void test_line_with_the_largest_numbers_fits(void)
     board_drive.run.identify.step = IDENTIFY_MECHANICS;
     board_drive.run.identify.result = IDENTIFY_RESULT_CURRENT_NOT_REACHED;
     board_drive.run.identify.values = all;
-    board_drive.fault = FAULT_TRAP;
-    expect_line("step 12 CURRENT_NOT_REACHED fault 12 R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm"
+    board_drive.fault = FAULT_OVERTEMPERATURE;
+    expect_line("step 12 CURRENT_NOT_REACHED fault OVERTEMPERATURE R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm"
                 " J 65535e-8 kgm2 friction 65535 uNm + 65535 nNms\r\n");
-    TEST_ASSERT_TRUE(sent_count < sizeof line);
+    TEST_ASSERT_TRUE(sent_count < sizeof sent_line);
 }
 
 void test_watch_variable_shows_all_of_it(void)

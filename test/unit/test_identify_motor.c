@@ -1,10 +1,11 @@
 /* The identification in closed loop with motors that it does not know: what it measures, what it refuses by name, how it stops. */
 /* defines: -DIDENTIFY */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "identify_rig.h"
 
-#include "firmware/drive/drive.c"
-#include "firmware/drive/modes/identify.c"
-#include "drive/panel_tick.h"
+#include "drive/panel.h"
 
 static identify_values_t *const values = &drive.run.identify.values;
 

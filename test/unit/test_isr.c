@@ -3,7 +3,8 @@
 
 #include <xc.h>
 
-#include "control/pi.h"
+#include "control/current_control.h"
+#include "drive/tick.h"
 
 /* A trap may come anywhere in the tick; here in the middle of the hand-over, before it writes the next state. */
 static uint16_t trap_comes_in_the_hand_over;
@@ -17,7 +18,7 @@ static void maybe_trap(void)
 }
 
 #define pi_preset(pi, gains, err, output) (maybe_trap(), pi_preset(pi, gains, err, output))
-#include "drive/tick.h"
+#include "firmware/drive/handover.c"
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
@@ -30,6 +31,7 @@ static uint16_t slow_and_look(drive_t *d, const drive_params_t *p, const drive_s
 #include "firmware/board/isr.c"
 #undef drive_tick
 #undef drive_slow
+#include "firmware/drive/recorder.c"
 
 /* What the duties were when the slow work began, and how often it did. */
 static struct {
@@ -195,7 +197,7 @@ void test_bridge_begins_to_switch_only_with_duties_of_the_law(void)
 {
     bring_to_align();
     board_drive.state = (uint16_t)DRIVE_CATCH; /* a rotor that turns has been seen; its current is gone */
-    board_drive.run.catching.step = (uint16_t)CATCH_SEEN;
+    board_drive.run.catching.phase = (uint16_t)CATCH_SEEN;
     board_drive.run.estimator.omega_erpm = 10000;
     board_drive.periods = 1000;
     control_interrupts(1);

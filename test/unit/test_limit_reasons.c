@@ -1,7 +1,7 @@
 /* Why the drive gives less than it is asked for: each reason alone, at its edge, in both directions. */
 #include "drive_rig.h"
 
-#include "drive/limits_now.h"
+#include "drive/limits.h"
 
 static int16_t way;
 
@@ -180,12 +180,12 @@ void test_bridge_that_is_off_has_no_reason_and_a_forced_angle_only_the_voltage(v
 void test_a_start_that_waits_for_a_fast_rotor_or_a_high_bus_says_so_and_a_pause_between_two_looks_does_not(void)
 {
     static const struct {
-        catch_step_t step;
+        catch_phase_t phase;
         uint16_t reasons;
-    } cases[] = { { CATCH_NO_LOOK, LIMIT_TOO_FAST }, { CATCH_FIRST_LOOK, LIMIT_TOO_FAST }, { CATCH_SECOND_LOOK, 0 }, { CATCH_SEEN, 0 } };
+    } cases[] = { { CATCH_BUS_HIGH, LIMIT_TOO_FAST }, { CATCH_TOO_FAST, LIMIT_TOO_FAST }, { CATCH_PAUSE, 0 }, { CATCH_SEEN, 0 } };
     drive.state = (uint16_t)DRIVE_CATCH;
     EACH(n, cases) {
-        drive.run.catching.step = (uint16_t)cases[n].step;
+        drive.run.catching.phase = (uint16_t)cases[n].phase;
         expect(cases[n].reasons, golden_row(n));
     }
 }
@@ -193,9 +193,9 @@ void test_a_start_that_waits_for_a_fast_rotor_or_a_high_bus_says_so_and_a_pause_
 void test_d_current_that_burns_the_rotors_energy_is_a_reason(void)
 {
     EACH_FREE {
-        drive.run.control.burn_q13 = 1;
-        expect(LIMIT_BURN, "burns");
-        drive.run.control.burn_q13 = 0;
+        drive.run.control.flux_brake_q13 = 1;
+        expect(LIMIT_FLUX_BRAKING, "burns");
+        drive.run.control.flux_brake_q13 = 0;
         expect(LIMIT_NONE, "does not");
     }
 }
@@ -206,7 +206,7 @@ static void set_ramp(int16_t direction, float forced_erpm, int16_t ahead_erpm)
     set_free(direction);
     drive.state = (uint16_t)DRIVE_RAMP;
     drive.forced.speed_q10 = (int32_t)(forced_erpm * 67108864.0F / 60.0F * PARAM_F(LOOPTIME_SEC));
-    drive.run.handover.agreed_steps = 0;
+    rig_agreed(0);
     drive.run.handover.ahead_erpm = ahead_erpm;
 }
 
@@ -226,7 +226,7 @@ void test_a_start_that_is_right_in_the_mean_but_not_for_long_enough_swings(void)
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             set_ramp(direction, cases[n].forced_erpm, cases[n].ahead_erpm);
-            drive.run.handover.agreed_steps = cases[n].agreed_steps;
+            rig_agreed(cases[n].agreed_steps);
             drive.state = cases[n].state;
             expect(cases[n].reasons, golden_row(n));
         }

@@ -174,9 +174,9 @@ static current_q13_t burnt_with(const drive_params_t *p, uint16_t steps, int16_t
     c->brake_limit_q13 = brake_limit_q13;
     c->ref_q13.q = limits_apply_braking(c, 10000, iq_q13);
     while (steps-- != 0u) {
-        limits_burn(&drive.run, p);
+        limits_flux_brake(&drive.run, p);
     }
-    return c->burn_q13;
+    return c->flux_brake_q13;
 }
 
 static current_q13_t burnt_after(uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)
@@ -200,26 +200,26 @@ void test_a_winding_that_would_burn_less_than_dead_time_gives_back_burns_nothing
 {
     drive.run.control.iq_limit_q13 = 5120;
     limited = params;
-    limited.burn_most_q13 = 0;
+    limited.flux_brake_most_q13 = 0;
     TEST_ASSERT_EQUAL_INT16(0, burnt_with(&limited, 200, 0, -5120));
 }
 
 void test_d_current_gives_way_where_the_circle_and_not_the_bus_holds_braking_back(void)
 {
     drive.run.control.iq_limit_q13 = 2000;
-    drive.run.control.burn_q13 = 4000;
+    drive.run.control.flux_brake_q13 = 4000;
     TEST_ASSERT_EQUAL_INT16(3968, burnt_after(1, 2000, -5120));
     TEST_ASSERT_EQUAL_INT16(4000, burnt_after(1, 1999, -5120));
 }
 
 void test_what_is_burnt_and_field_weakening_share_the_largest_current(void)
 {
-    drive.run.control.burn_q13 = 3000;
+    drive.run.control.flux_brake_q13 = 3000;
     drive.run.fieldweak.table_q13 = -1000;
     limits_current(&drive.run, &params);
     TEST_ASSERT_EQUAL_INT16(-4000, drive.run.control.ref_q13.d);
     TEST_ASSERT_INT16_WITHIN(20, 3196, drive.run.control.iq_limit_q13); /* sqrt(5120^2 - 4000^2) */
-    drive.run.control.burn_q13 = 4960;
+    drive.run.control.flux_brake_q13 = 4960;
     limits_current(&drive.run, &params);
     TEST_ASSERT_EQUAL_INT16(-4960, drive.run.control.ref_q13.d);
 }

@@ -2,7 +2,6 @@
 /* defines: -DSCOPE=1 */
 #include "lnet_rig.h"
 
-#include "firmware/board/lnet.c"
 #include "firmware/board/scope.c"
 
 /** The last of them, so that the end is not the link's own. */

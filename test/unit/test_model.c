@@ -40,15 +40,15 @@ void test_motor_in_lock_at_an_even_speed_teaches(void)
 
 void test_it_rests_until_the_observer_runs(void)
 {
-    drive.run.handover.speed_is_preset = 0;
+    drive.run.handover.phase = (uint16_t)START_OBSERVE;
     TEST_ASSERT_EQUAL_INT16(0, learns());
 }
 
 void test_it_rests_while_the_speed_changes_fast(void)
 {
-    drive.run.observer.quick_q15 = 4096;
+    drive.run.observer.fast_share_q15 = 4096;
     TEST_ASSERT_EQUAL_INT16(0, learns());
-    drive.run.observer.quick_q15 = 4095;
+    drive.run.observer.fast_share_q15 = 4095;
     TEST_ASSERT_EQUAL_INT16(1, learns());
 }
 
@@ -99,7 +99,7 @@ void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void
     for (uint16_t waited = 0; waited < 2u; waited++) {
         teachable(1);
         drive.state = (uint16_t)DRIVE_RAMP;
-        drive.periods = waited;
+        drive.run.handover.at_end = waited;
         rig_slow(10);
         TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);

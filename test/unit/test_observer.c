@@ -10,9 +10,9 @@
     GOLDEN_OBSERVER_##which##DELTAT_Q32, GOLDEN_OBSERVER_##which##PER_TURN_Q12, GOLDEN_OBSERVER_##which##SHIFT, \
     GOLDEN_OBSERVER_##which##PER_CURRENT_Q16, GOLDEN_OBSERVER_##which##PER_UNIT_Q15, GOLDEN_OBSERVER_##which##INNOVATION_MAX, \
     GOLDEN_OBSERVER_##which##LOAD_MAX, GOLDEN_OBSERVER_##which##QUIET_Q16, GOLDEN_OBSERVER_##which##LOADED_Q16, \
-    GOLDEN_OBSERVER_##which##QUICK_Q16, GOLDEN_OBSERVER_##which##FULL_ERPM, GOLDEN_OBSERVER_##which##LOAD_FROM, \
-    GOLDEN_OBSERVER_##which##LOAD_WIDTH, GOLDEN_OBSERVER_##which##LOAD_SLOPE_Q15, GOLDEN_OBSERVER_##which##LARGE_ERPM, \
-    GOLDEN_OBSERVER_##which##LARGE_LOADED_ERPM \
+    GOLDEN_OBSERVER_##which##FAST_Q16, GOLDEN_OBSERVER_##which##FULL_ERPM, GOLDEN_OBSERVER_##which##LOAD_FROM, \
+    GOLDEN_OBSERVER_##which##LOAD_WIDTH, GOLDEN_OBSERVER_##which##LOAD_SLOPE_Q15, GOLDEN_OBSERVER_##which##GATE_ERPM, \
+    GOLDEN_OBSERVER_##which##GATE_LOADED_ERPM \
 }
 #define EACH_DIRECTION(direction) for (int16_t direction = -1; direction <= 1; direction = (int16_t)(direction + 2))
 
@@ -50,8 +50,8 @@ void setUp(void)
         TEST_ASSERT_EQUAL_INT32_MESSAGE(v.load, o.load_q16, golden_row(n)); \
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(v.rho, o.rho_q32, golden_row(n)); \
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.rate, o.rate_q16, golden_row(n)); \
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.large, o.large_erpm, golden_row(n)); \
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.quick, o.quick_q15, golden_row(n)); \
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.large, o.gate_erpm, golden_row(n)); \
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(v.quick, o.fast_share_q15, golden_row(n)); \
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.part, o.share_q15, golden_row(n)); \
         TEST_ASSERT_EQUAL_INT32_MESSAGE(v.load_q26, observer_load_q26(&o, p), golden_row(n)); \
     }
@@ -145,17 +145,17 @@ void test_follows_a_current_step_without_taking_it_for_a_load(void)
 
 /* ---- rates ---- */
 
-static int16_t rate_at(int16_t ref_erpm, int16_t load_units, q15_t quick_q15)
+static int16_t rate_at(int16_t ref_erpm, int16_t load_units, q15_t fast_share_q15)
 {
     o.load_q16 = (int32_t)load_units * 65536;
-    o.quick_q15 = quick_q15;
+    o.fast_share_q15 = fast_share_q15;
     observer_schedule(&o, p, qm_abs(ref_erpm), -8000); /* all of the load makes current */
     return o.rate_q16;
 }
 
 void test_rate_follows_load_innovation_and_speed(void)
 {
-    enum { QUIET = GOLDEN_OBSERVER_QUIET_Q16, LOADED = GOLDEN_OBSERVER_LOADED_Q16, QUICK = GOLDEN_OBSERVER_QUICK_Q16 };
+    enum { QUIET = GOLDEN_OBSERVER_QUIET_Q16, LOADED = GOLDEN_OBSERVER_LOADED_Q16, QUICK = GOLDEN_OBSERVER_FAST_Q16 };
     static const struct {
         const char *what;
         int16_t ref_erpm, load;
@@ -197,7 +197,7 @@ void test_a_large_innovation_is_smaller_under_load_and_larger_at_speed(void)
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         (void)rate_at(cases[n][0], cases[n][1], 0);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][2], o.large_erpm, golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][2], o.gate_erpm, golden_row(n));
     }
 }
 
@@ -206,12 +206,12 @@ void test_the_longer_large_innovations_go_on_the_larger_they_must_be(void)
 {
     static const uint16_t cases[][2] = { { 0, 149 }, { 4, 151 }, { 128, 223 }, { 256, 298 }, { 4000, 2477 } };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        o.unrest_steps = cases[n][0];
+        o.gate_level = cases[n][0];
         (void)rate_at(0, 0, 0);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][1], o.large_erpm, golden_row(n));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][1], o.gate_erpm, golden_row(n));
     }
-    TEST_ASSERT_EQUAL_INT16(32767, observer_large(20000, 256));
-    TEST_ASSERT_EQUAL_INT16(32766, observer_large(16383, 256));
+    TEST_ASSERT_EQUAL_INT16(32767, observer_gate(20000, 256));
+    TEST_ASSERT_EQUAL_INT16(32766, observer_gate(16383, 256));
 }
 
 void test_is_quick_after_a_large_innovation_and_calm_50_ms_later(void)
@@ -219,28 +219,28 @@ void test_is_quick_after_a_large_innovation_and_calm_50_ms_later(void)
     EACH_DIRECTION(direction) {
         uint16_t steps = 0;
         balanced(0, (int16_t)(direction * 2500), 0);
-        TEST_ASSERT_TRUE(observer_is_calm(&o));
+        TEST_ASSERT_TRUE(observer_gate_is_closed(&o));
         run(1, 2500, 0, 0);
-        TEST_ASSERT_EQUAL_INT16(0, o.quick_q15);
+        TEST_ASSERT_EQUAL_INT16(0, o.fast_share_q15);
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500 + 400), 0);
         run(1, 2500, 0, 0);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(0, o.quick_q15, "the start is unrest");
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(0, o.fast_share_q15, "the start is unrest");
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500 + 400), 0);
-        o.unrest_steps = 0;
+        o.gate_level = 0;
         run(1, 2500, 0, 0);
-        TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
-        TEST_ASSERT_FALSE(observer_is_calm(&o));
+        TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
+        TEST_ASSERT_FALSE(observer_gate_is_closed(&o));
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500), 0);
-        o.quick_q15 = 32767;
-        while (!observer_is_calm(&o)) {
+        o.fast_share_q15 = 32767;
+        while (!observer_gate_is_closed(&o)) {
             run(1, 2500, 0, 0);
             steps++;
         }
         TEST_ASSERT_UINT16_WITHIN(2, 133, steps); /* 0.4 ms each */
-        o.quick_q15 = 4096; /* an eighth */
-        TEST_ASSERT_FALSE(observer_is_calm(&o));
-        o.quick_q15 = 4095;
-        TEST_ASSERT_TRUE(observer_is_calm(&o));
+        o.fast_share_q15 = 4096; /* an eighth */
+        TEST_ASSERT_FALSE(observer_gate_is_closed(&o));
+        o.fast_share_q15 = 4095;
+        TEST_ASSERT_TRUE(observer_gate_is_closed(&o));
     }
 }
 
@@ -249,17 +249,17 @@ static q15_t quick_after(uint32_t counts, q15_t before)
 {
     begin(0);
     observer_schedule(&o, p, 0, 0);
-    o.quick_q15 = before;
-    o.large_erpm = 100;
+    o.fast_share_q15 = before;
+    o.gate_erpm = 100;
     observer_step(&o, p, counts << 16, 0);
-    return o.quick_q15;
+    return o.fast_share_q15;
 }
 
 void test_innovation_that_is_barely_large_is_answered_less_quickly(void)
 {
     TEST_ASSERT_EQUAL_INT16(0, quick_after(40, 0));                  /* 92 erpm */
-    TEST_ASSERT_EQUAL_INT16(OBSERVER_HALF_Q15, quick_after(45, 0));  /* 103 */
-    TEST_ASSERT_EQUAL_INT16(OBSERVER_HALF_Q15, quick_after(65, 0));  /* 149 */
+    TEST_ASSERT_EQUAL_INT16(OBSERVER_FAST_HALF_Q15, quick_after(45, 0));  /* 103 */
+    TEST_ASSERT_EQUAL_INT16(OBSERVER_FAST_HALF_Q15, quick_after(65, 0));  /* 149 */
     TEST_ASSERT_EQUAL_INT16(32767, quick_after(67, 0));              /* 153 */
     TEST_ASSERT_EQUAL_INT16(20000 - 312, quick_after(45, 20000)); /* and makes a quick one no slower */
 }
@@ -271,7 +271,7 @@ void test_load_that_takes_no_current_counts_as_none(void)
     EACH_DIRECTION(direction) {
         int16_t units = (int16_t)(direction * 4000), all = (int16_t)(direction * 8000), least = (int16_t)(GOLDEN_OBSERVER_LOAD_FROM * 65536LL / p->per_current_q16);
         o.load_q16 = (int32_t)units * 65536;
-        o.quick_q15 = 0;
+        o.fast_share_q15 = 0;
         observer_schedule(&o, p, 10000, all);
         TEST_ASSERT_INT16_WITHIN(LOADED / 100, LOADED, o.rate_q16);
         observer_schedule(&o, p, 10000, (int16_t)-all);
@@ -312,7 +312,7 @@ void test_steps_with_more_than_dead_time_and_a_32nd_of_the_speed_are_counted_and
     TEST_ASSERT_EQUAL_UINT16(10, wrong_after(10, 400));
     TEST_ASSERT_EQUAL_UINT16(20, wrong_after(10, (uint32_t)-400)); /* to either side */
     o.load_q16 = 0;
-    large_at_20000.large_erpm = 20000;
+    large_at_20000.gate_erpm = 20000;
     observer_schedule(&o, &large_at_20000, 3200, 8000);
     TEST_ASSERT_INT16_WITHIN(2, 32766, o.wrong_erpm); /* the end of its format */
 }
@@ -332,29 +332,29 @@ static void unrest(uint16_t steps)
 void test_large_innovations_for_long_are_answered_only_from_calm(void)
 {
     uint16_t fading = 0;
-    o.large_erpm = 100;
+    o.gate_erpm = 100;
     unrest(250);
-    TEST_ASSERT_EQUAL_UINT16(996, o.unrest_steps);
-    TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
+    TEST_ASSERT_EQUAL_UINT16(996, o.gate_level);
+    TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
     unrest(1);
-    TEST_ASSERT_EQUAL_INT16(32767 - 511, o.quick_q15);
-    while (!observer_is_calm(&o)) {
+    TEST_ASSERT_EQUAL_INT16(32767 - 511, o.fast_share_q15);
+    while (!observer_gate_is_closed(&o)) {
         unrest(1);
         fading++;
     }
     TEST_ASSERT_UINT16_WITHIN(2, 132, fading);
     unrest(1);
-    TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
+    TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
     unrest(5000);
-    TEST_ASSERT_UINT16_WITHIN(4, 4000, o.unrest_steps);
+    TEST_ASSERT_UINT16_WITHIN(4, 4000, o.gate_level);
     o.omega_q16 = 0;
     for (uint16_t n = 0; n < 4200u; n++) {
         observer_step(&o, p, o.rho_q32, 0);
     }
-    TEST_ASSERT_EQUAL_UINT16(0, o.unrest_steps);
+    TEST_ASSERT_EQUAL_UINT16(0, o.gate_level);
     unrest(2);
-    TEST_ASSERT_EQUAL_UINT16(4, o.unrest_steps);
-    TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
+    TEST_ASSERT_EQUAL_UINT16(4, o.gate_level);
+    TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
 }
 
 /** A step at standstill that turns by so many counts. */
@@ -370,22 +370,22 @@ void test_large_innovations_to_both_sides_are_answered_only_from_calm(void)
     EACH_DIRECTION(direction) {
         begin(0);
         observer_schedule(&o, p, 0, 0);
-        o.unrest_steps = 0;
-        o.large_erpm = 100;
+        o.gate_level = 0;
+        o.gate_erpm = 100;
         turned_by((int16_t)(direction * 400));
         turned_by((int16_t)(direction * 400));
-        TEST_ASSERT_EQUAL_UINT16(4, o.unrest_steps); /* to one side: a step of the load */
+        TEST_ASSERT_EQUAL_UINT16(4, o.gate_level); /* to one side: a step of the load */
         turned_by((int16_t)(direction * -400));
-        TEST_ASSERT_EQUAL_UINT16(OBSERVER_UNREST_STEPS, o.unrest_steps);
-        TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15); /* the first one back is answered still */
+        TEST_ASSERT_EQUAL_UINT16(OBSERVER_GATE_STEPS, o.gate_level);
+        TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15); /* the first one back is answered still */
         turned_by((int16_t)(direction * 400));
-        TEST_ASSERT_EQUAL_INT16(32767 - 511, o.quick_q15);
-        while (!observer_is_calm(&o)) {
+        TEST_ASSERT_EQUAL_INT16(32767 - 511, o.fast_share_q15);
+        while (!observer_gate_is_closed(&o)) {
             turned_by(0);
         }
         turned_by((int16_t)(direction * 400));
-        TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
-        TEST_ASSERT_UINT16_WITHIN(600, 1500, o.unrest_steps);
+        TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
+        TEST_ASSERT_UINT16_WITHIN(600, 1500, o.gate_level);
     }
 }
 
@@ -393,15 +393,15 @@ void test_one_side_after_the_other_with_calm_between_is_no_unrest(void)
 {
     begin(0);
     observer_schedule(&o, p, 0, 0);
-    o.unrest_steps = 0;
-    o.large_erpm = 100;
+    o.gate_level = 0;
+    o.gate_erpm = 100;
     turned_by(400);
-    while (!observer_is_calm(&o)) {
+    while (!observer_gate_is_closed(&o)) {
         turned_by(0);
     }
     turned_by(-400);
-    TEST_ASSERT_EQUAL_INT16(32767, o.quick_q15);
-    TEST_ASSERT_UINT16_WITHIN(8, 4 * 132, o.unrest_steps);
+    TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
+    TEST_ASSERT_UINT16_WITHIN(8, 4 * 132, o.gate_level);
 }
 
 static int16_t innovation(uint32_t from_q32, uint32_t to_q32, int16_t erpm)
@@ -539,11 +539,11 @@ void test_preset_is_bumpless(void)
     for (unsigned n = 0; n < sizeof currents / sizeof currents[0]; n++) {
         EACH_DIRECTION(direction) {
             balanced(0, (int16_t)(direction * 5000), currents[n]);
-            o.quick_q15 = 32767;
+            o.fast_share_q15 = 32767;
             observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 5000), currents[n]);
             TEST_ASSERT_INT16_WITHIN_MESSAGE(2, currents[n], observer_load(&o, p), golden_row(n));
             TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * 5000, observer_speed(&o), golden_row(n));
-            TEST_ASSERT_TRUE(observer_is_calm(&o));
+            TEST_ASSERT_TRUE(observer_gate_is_closed(&o));
             run(20, (int16_t)(direction * 5000), currents[n], currents[n]);
             TEST_ASSERT_INT16_WITHIN_MESSAGE(2, (int16_t)(direction * 5000), observer_speed(&o), golden_row(n));
             TEST_ASSERT_INT16_WITHIN_MESSAGE(4, currents[n], observer_load(&o, p), golden_row(n));

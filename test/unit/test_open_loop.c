@@ -1,5 +1,8 @@
 /* The drive in OPEN_LOOP_FUNCTIONING: it never leaves the forced angle; the estimator can be watched. */
 /* defines: -DOPEN_LOOP_FUNCTIONING */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "ideal_motor.h"
 
 void setUp(void)

@@ -1,7 +1,7 @@
 /* I2t: how long a winding stands more than its current, and how it cools. */
 #include "drive_rig.h"
 
-#include "drive/overload.h"
+#include "drive/protection.h"
 
 #define RATED_Q13 2800.0F
 static overload_t overload;

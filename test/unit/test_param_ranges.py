@@ -31,7 +31,7 @@ def refusal(p: Parameter, value: str) -> str:
 
 def relations() -> list[str]:
     """The messages of the relations between parameters."""
-    return [message for _, message in rows("include", "drive/param_table.h", "PARAM_RELATION_TABLE", "#condition message")]
+    return [message for _, message in rows("include", "drive/param_limits.h", "PARAM_RELATION_TABLE", "#condition message")]
 
 
 def with_values(values: dict[str, str]) -> str:
@@ -173,8 +173,8 @@ BASE = {p.name: p.low if p.default in FOLLOWS else p.default for p in PARAMETERS
     re.findall(r"^#define (\w+) (\S+)$", (ROOT / "test/unit/support/hurst_params.h").read_text(encoding="utf-8"), re.MULTILINE))
 
 
-# Parameters that have a default in param_scaling.h, with that default.
-SCALING = (ROOT / "include/drive/param_scaling.h").read_text(encoding="utf-8")
+# Parameters that have a default in the scaling headers, with that default.
+SCALING = "".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "include/drive/scaling").glob("*.h")))
 DERIVED = dict(re.findall(r"^#ifndef (?:\w+).*\n#define (\w+) ((?:.*\\\n)*.*)", SCALING, re.MULTILINE))
 
 
@@ -190,7 +190,7 @@ def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     tried = [(message, values, holds) for message, pairs in RELATIONS.items() for pair in pairs
              for values, holds in zip(pair, (False, True), strict=True)]
     source = ["#include <stdio.h>", "#define USERPARAMS_H", *defines(BASE),
-              '#include "drive/param_init.h"', '#include "drive/param_table.h"',
+              '#include "drive/param_init.h"', '#include "drive/param_limits.h"',
               "#define HOLDS(condition, message) putchar((condition) ? '1' : '0');", "int main(void)", "{"]
     for _, values, _ in tried:
         source += [*defines(values), "    PARAM_RELATION_TABLE(HOLDS)", "    puts(\"\");",
@@ -277,9 +277,9 @@ MEMBER = re.compile(r"^\s*(\w+) ([\w, \[\]]+);", re.MULTILINE)
 
 def members(struct: str, headers: str, prefix: str = "") -> list[str]:
     """Paths of all numbers in a struct of the headers, array elements included."""
-    body = re.search(r"typedef struct \{([^}]*)\} " + struct + ";", headers).group(1)
+    body = re.search(rf"struct {struct.removesuffix('_t')} \{{([^}}]*)\}};|struct \{{([^}}]*)\}} {struct};", headers)
     found = []
-    for kind, names in MEMBER.findall(body):
+    for kind, names in MEMBER.findall(body[1] or body[2]):
         for name in names.split(","):
             base, _, size = name.strip().rstrip("]").partition("[")
             if re.search(r"\} " + kind + ";", headers):
@@ -317,14 +317,14 @@ def random_value(dice: random.Random, p: Parameter) -> str:
 def numbers_in_counts(wide: bool) -> tuple[list[str], list[list[str]]]:
     """The names of all numbers in the drive's parameters; for each case whether the build accepts it, and the numbers."""
     headers = "".join((ROOT / "include" / h).read_text(encoding="utf-8") for h in (
-        "control/estimator.h", "control/fieldweak.h", "control/forced_angle.h", "control/svm.h", "control/pi.h", "control/observer.h",
-        "control/adaptation.h", "drive/drive.h"))
+        "control/estimator.h", "control/fieldweak.h", "control/forced_angle.h", "control/svm.h", "control/current_control.h", "control/observer.h",
+        "control/motor_model.h", "drive/drive.h"))
     paths = members("drive_params_t", headers)
     assert len(paths) > 60, paths
     source = ["#include <stdint.h>", "#include <stdio.h>"]
     if wide:
         source += [f"#define {name}_t int64_t" for name in ("int16", "uint16", "int32", "uint32")]
-    source += ["#define USERPARAMS_H", *defines(BASE), '#include "drive/param_init.h"', '#include "drive/param_table.h"',
+    source += ["#define USERPARAMS_H", *defines(BASE), '#include "drive/param_init.h"', '#include "drive/param_limits.h"',
                "#define AND(condition, message) && (condition)",
                "static void show(int accepted, const drive_params_t *p)", "{", '    printf("%d", accepted);',
                *(f'    printf(" %lld", (long long)p->{path});' for path in paths), '    puts("");', "}"]

@@ -190,7 +190,7 @@ void test_currents_voltages_and_modulator(void)
     EXACT(CURRENT_Q13(-2.2), -4096);
     EXACT(p.open_loop_q13, 2625);
     EXACT(p.current_max_q13, 5120);
-    EXACT(p.burn_most_q13, 4960); /* 2.67 ohm * 2.75 A are more than half of 0.96 V */
+    EXACT(p.flux_brake_most_q13, 4960); /* 2.67 ohm * 2.75 A are more than half of 0.96 V */
     EXACT(p.overcurrent_q13, 7075);
     EXACT(p.current_max_reciprocal, 6554); /* 2^25 / 5120 */
     EXACT(p.kcurr_a, -16384);
@@ -258,7 +258,7 @@ void test_controllers(void)
     EXACT(p.pi_q.shift, 10);
     /* Kp = 2 pi 13 J/Kt = 0.0075031 A s/rad = 0.29258 counts Q13 per electrical rpm, times 2^13; 1.8 times that after a load step */
     NEAR(p.speed_kp_q13, 2397, 1);
-    NEAR(p.speed_kp_quick_q13, 4314, 1);
+    NEAR(p.speed_kp_fast_q13, 4314, 1);
     EXACT(given.kp, 655); /* 16 * 0.02 of full scale: 0.64 Q14 counts per Q13 count, times 2^10 */
     EXACT(given.ki, 4);
 }
@@ -277,13 +277,13 @@ void test_load_observer_and_what_belongs_to_low_speed(void)
     OBSERVER(load_max, LOAD_MAX);
     OBSERVER(quiet_q16, QUIET_Q16);
     OBSERVER(loaded_q16, LOADED_Q16);
-    OBSERVER(quick_q16, QUICK_Q16);
+    OBSERVER(fast_q16, FAST_Q16);
     OBSERVER(full_erpm, FULL_ERPM);
     OBSERVER(load_from, LOAD_FROM);
     OBSERVER(load_width, LOAD_WIDTH);
     OBSERVER(load_slope_q15, LOAD_SLOPE_Q15);
-    NEAR(p.observer.large_erpm, 149, 1); /* 0.13 of the dead time's 0.96 V at 1196 erpm a volt */
-    NEAR(p.observer.large_loaded_erpm, 34, 1);
+    NEAR(p.observer.gate_erpm, 149, 1); /* 0.13 of the dead time's 0.96 V at 1196 erpm a volt */
+    NEAR(p.observer.gate_loaded_erpm, 34, 1);
     NEAR(p.sample_shift_q16, 80, 0);                  /* 1.5 us * 7.983 mV s/1.92 mH, in counts per erpm */
     NEAR(p.fieldweak.esdq_per_erpm_q13, 14055, 1);    /* 2 pi 5/60 * 50 us * 2^29 */
     EXACT(p.svm.dead_time, 80);
@@ -422,7 +422,7 @@ void test_a_winding_below_half_of_dead_time_s_voltage_burns_nothing(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
     TEST_ASSERT_FLOAT_WITHIN(1e-4F, 0.72F, PARAM_DEAD_TIME_V);
-    EXACT(p.burn_most_q13, 0);
+    EXACT(p.flux_brake_most_q13, 0);
 }
 
 #undef MOTOR_RS_OHM
@@ -431,6 +431,6 @@ void test_a_winding_below_half_of_dead_time_s_voltage_burns_nothing(void)
 void test_a_winding_above_it_burns_with_all_but_a_32nd_of_the_largest_current(void)
 {
     static const drive_params_t p = DRIVE_PARAMS_INIT;
-    EXACT(p.burn_most_q13, CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * 31.0F / 32.0F));
-    TEST_ASSERT_INT16_WITHIN(1, p.current_max_q13 - p.current_max_q13 / 32, p.burn_most_q13);
+    EXACT(p.flux_brake_most_q13, CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * 31.0F / 32.0F));
+    TEST_ASSERT_INT16_WITHIN(1, p.current_max_q13 - p.current_max_q13 / 32, p.flux_brake_most_q13);
 }

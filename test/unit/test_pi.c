@@ -1,5 +1,5 @@
 /* The PI controller: gains, both limits, wind-up and recovery, the preset, and the reference. */
-#include "control/pi.h"
+#include "control/current_control.h"
 #include "golden.h"
 #include "golden_pi.h"
 #include "unity.h"

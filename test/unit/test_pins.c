@@ -1,12 +1,10 @@
 /* Pins: the lock of the pin selection, and the buttons. */
 #include "registers.h"
 
-#include "board/peripherals.h"
-
 /* Each write of the lock bit, and what the pin selection held then: only between unlock and lock does the chip take a write. */
 static uint16_t lock_writes, written[2], fault_pin_then[2];
 
-void clock_write_low(uint16_t value)
+static void write_lock(uint16_t value)
 {
     if (lock_writes < 2u) {
         written[lock_writes] = value & 0x00FFu;
@@ -16,7 +14,9 @@ void clock_write_low(uint16_t value)
     host_write_oscconl(value);
 }
 
-#include "firmware/board/pins.c"
+#undef __builtin_write_OSCCONL
+#define __builtin_write_OSCCONL(value) write_lock((uint16_t)(value))
+#include "firmware/board/peripherals.c"
 
 void setUp(void)
 {

@@ -1,4 +1,6 @@
 /* Protection: over-current in the same period, bus trips within a slow step, stall and lost lock only when they last. */
+#include "drive/protection.h"
+#include "drive/signals.h"
 #include "drive_rig.h"
 
 void setUp(void)
@@ -235,145 +237,13 @@ void test_estimator_that_slips_past_the_rotor_has_lost_it_though_each_loss_is_sh
     }
 }
 
-/* ---- signals that do not fit the motor ---- */
-
-/** Slow steps with these phase currents and innovations that do not end, until a fault. @return steps */
-static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13)
-{
-    uint16_t steps = 0;
-    rig_closed(1, 10000);
-    while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
-        drive.phases_q13.a = a_q13;
-        drive.phases_q13.b = b_q13;
-        drive.phases_q13.c = (int16_t)(-a_q13 - b_q13);
-        drive.run.observer.wrong_steps++;
-        protection_check_signals(&drive, &params);
-        steps++;
-    }
-    return steps;
-}
-
-void test_innovations_that_do_not_end_are_a_sensor_or_an_open_phase_after_100_ms(void)
-{
-    static const struct {
-        int16_t a_q13, b_q13;
-        drive_fault_t fault;
-    } cases[] = {
-        { 1000, -500, FAULT_CURRENT_SENSOR }, { -1000, 500, FAULT_CURRENT_SENSOR }, { 1000, -700, FAULT_CURRENT_SENSOR },
-        { 10, 1000, FAULT_OPEN_PHASE }, { 1000, -10, FAULT_OPEN_PHASE }, { -1000, 990, FAULT_OPEN_PHASE }, { 7000, 70, FAULT_OPEN_PHASE },
-        { 7000, -7000, FAULT_OPEN_PHASE }, { 0, 0, FAULT_CURRENT_SENSOR },
-    };
-    EACH(n, cases) {
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(251, wrong_until_fault(cases[n].a_q13, cases[n].b_q13), golden_row(n));
-        TEST_ASSERT_EQUAL_UINT16(cases[n].fault, drive.fault);
-        drive.fault = (uint16_t)FAULT_NONE;
-    }
-}
-
-void test_phase_currents_are_summed_anew_when_the_innovations_have_ended(void)
-{
-    rig_closed(1, 10000);
-    drive.run.phase_sums[1] = 77;
-    protection_check_signals(&drive, &params);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.run.phase_sums[1]);
-    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
-}
-
-/** Header's R times a current is this share of the rig's back-EMF. */
-static int16_t current_of_ri(float share)
-{
-    return (int16_t)(share * 4000.0F * 65536.0F / (float)params.adaptation.rs_base_q16 / (float)(1 << params.estimator.rs_exp));
-}
-
-static void emf(int16_t d_q12, int16_t q_q12)
-{
-    drive.run.estimator.e_d_q28 = (int32_t)d_q12 * 65536;
-    drive.run.estimator.e_q_q28 = (int32_t)q_q12 * 65536;
-}
-
-void test_voltage_that_neither_speed_nor_resistance_nor_dead_time_explains_is_a_wrong_signal(void)
-{
-    const int16_t dead_q12 = (int16_t)(5 * params.adaptation.emf_least_q12);
-    static const struct {
-        const char *what;
-        float ri_d, ri_q;
-        int16_t q_q12;
-    } cases[] = { { "no current", 0.0F, 0.0F, 0 }, { "q current", 0.0F, 0.5F, 0 }, { "d current", -0.5F, 0.0F, 0 }, { "speed", 0.0F, 0.0F, 2000 },
-                  { "reverse speed", 0.0F, 0.0F, -2000 }, { "all", 0.25F, -0.25F, 1000 } };
-    EACH(n, cases) {
-        int16_t explained = (int16_t)(dead_q12 + 4000.0F * (qm_abs((int16_t)(100 * cases[n].ri_d)) + qm_abs((int16_t)(100 * cases[n].ri_q))) / 100.0F
-                                      + (float)qm_abs(cases[n].q_q12));
-        EACH_DIRECTION(sign) {
-            rig_closed(1, 10000);
-            drive.run.control.i_q13.d = current_of_ri(cases[n].ri_d);
-            drive.run.control.i_q13.q = current_of_ri(cases[n].ri_q);
-            emf((int16_t)(sign * (explained - 8)), cases[n].q_q12);
-            protection_check_signals(&drive, &params);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.run.observer.wrong_steps, cases[n].what);
-            emf((int16_t)(sign * (explained + 8)), cases[n].q_q12);
-            protection_check_signals(&drive, &params);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(2, drive.run.observer.wrong_steps, cases[n].what);
-        }
-    }
-}
-
-void test_voltage_without_current_on_a_rotor_that_stands_is_an_open_phase_within_100_ms(void)
-{
-    uint16_t steps = 0;
-    rig_closed(1, 10000);
-    emf(8000, 10);
-    drive.phases_q13.a = 0;
-    drive.phases_q13.b = 500;
-    drive.phases_q13.c = -500;
-    while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
-        if (drive.run.observer.wrong_steps != 0u) {
-            drive.run.observer.wrong_steps--; /* the observer sees nothing wrong */
-        }
-        protection_check_signals(&drive, &params);
-        steps++;
-    }
-    TEST_ASSERT_EQUAL_UINT16(FAULT_OPEN_PHASE, drive.fault);
-    TEST_ASSERT_EQUAL_UINT16(250, steps);
-}
-
-void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_without_a_fault(void)
-{
-    const int16_t blurred_q12 = (int16_t)(4 * params.dead_emf_q12);
-    static const struct {
-        const char *what;
-        drive_state_t state;
-        int16_t run, clear_q12, more_q13;
-        drive_state_t next;
-    } cases[] = { { "stop", DRIVE_STOPPING, 0, 0, 0, DRIVE_STOPPED },
-                  { "stop from above", DRIVE_STOPPING, 0, 1, 0, DRIVE_FAULT },
-                  { "with current", DRIVE_STOPPING, 0, 0, 1, DRIVE_FAULT },
-                  { "reversal", DRIVE_STOPPING, 1, 0, 0, DRIVE_FAULT },
-                  { "run", DRIVE_CLOSED, 0, 0, 0, DRIVE_FAULT } };
-    EACH(n, cases) {
-        EACH_DIRECTION(sign) {
-            rig_closed((int16_t)sign, 10000);
-            drive.state = (uint16_t)cases[n].state;
-            drive.command.run = cases[n].run;
-            emf(0, (int16_t)(sign * (blurred_q12 - 1 + cases[n].clear_q12)));
-            drive.run.control.ref_q13.q = (int16_t)(sign * (params.id_off_q13 - 1 + cases[n].more_q13));
-            drive.run.observer.wrong_steps = params.wrong_steps;
-            protection_check_signals(&drive, &params);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, cases[n].what);
-            drive.run.observer.wrong_steps++;
-            protection_check_signals(&drive, &params);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].next, drive.state, cases[n].what);
-            drive.fault = (uint16_t)FAULT_NONE;
-        }
-    }
-}
-
 /* ---- a rotor that may stand ---- */
 
 /** Seldom steps of the probe with this back-EMF; the d current goes on. @return the largest d current seen */
 static int16_t probe(uint16_t count, int16_t d_q12, int16_t q_q12)
 {
     int16_t most = 0;
-    emf(d_q12, q_q12);
+    rig_emf(d_q12, q_q12);
     while (count-- != 0u) {
         protection_probe_rotor(&drive, &params);
         most = (drive.run.probe_id_q13 > most) ? drive.run.probe_id_q13 : most;
@@ -385,7 +255,7 @@ static int16_t probe(uint16_t count, int16_t d_q12, int16_t q_q12)
 static void loaded(float ri)
 {
     rig_closed(1, 10000);
-    drive.run.control.i_q13.q = current_of_ri(0.1F * ri);
+    drive.run.control.i_q13.q = rig_current_of_ri(0.1F * ri);
     drive.run.control.ref_q13.q = drive.run.control.i_q13.q;
 }
 
@@ -431,6 +301,20 @@ void test_d_current_of_a_probe_rises_and_falls_by_an_eighth_of_the_largest_a_ste
     TEST_ASSERT_EQUAL_INT16(most, probe(22, 0, 400));
     (void)probe(2, 0, 400);
     TEST_ASSERT_INT16_WITHIN(slope, most - 2 * slope, drive.run.probe_id_q13);
+}
+
+void test_a_probe_goes_through_its_phases(void)
+{
+    loaded(2.2F);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(12, 0, 400), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(1, 0, 400), drive.run.probe_phase)); /* 13 steps, 20 ms */
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(24, 0, 400), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(1, 0, 400), drive.run.probe_phase)); /* 25 steps, 40 ms */
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(3087, 0, 400), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(1, 0, 400), drive.run.probe_phase));
+    (void)probe(13, 0, 400);
+    drive.run.handover.id_q13 = 10; /* nothing to doubt */
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(1, 0, 400), drive.run.probe_phase));
 }
 
 void test_probe_comes_again_after_five_seconds_or_a_dip_of_10_ms(void)
@@ -592,12 +476,13 @@ void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
     TEST_ASSERT_EQUAL_UINT16(150, drive.run.impossible_steps);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     loaded(2.2F);
-    emf(0, 400);
+    rig_emf(0, 400);
     drive.state = (uint16_t)DRIVE_RAMP;
     for (uint16_t n = 0; n < 200u; n++) {
         rig_slow(6);
     }
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.probe_steps);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, drive.run.probe_phase);
 }
 
 void test_signals_and_model_are_checked_in_closed_loop_only_signals_that_seem_wrong_in_every_slow_step(void)
@@ -614,9 +499,9 @@ void test_signals_and_model_are_checked_in_closed_loop_only_signals_that_seem_wr
     }
     for (part = 1; part < SLOW_PARTS; part = (uint16_t)(part + ((part & 3u) == 3u ? 2u : 1u))) { /* but the observer's own: what nothing explains begins every seldom step */
         rig_closed(1, 10000);
-        emf(30000, 10);
+        rig_emf(30000, 10);
         rig_slow(part);
-        TEST_ASSERT_EQUAL_UINT16((part == 14u) ? PROTECTION_UNEXPLAINED : 0u, drive.run.observer.wrong_steps);
+        TEST_ASSERT_EQUAL_UINT16((part == 14u) ? SIGNALS_UNEXPLAINED : 0u, drive.run.observer.wrong_steps);
     }
     rig_lock(1);
     drive.run.observer.wrong_steps = 1000;

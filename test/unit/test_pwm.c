@@ -13,7 +13,7 @@ static volatile uint16_t *watch_pairs(volatile uint16_t *pairs)
 
 #define P1TCON (*registers_watch(&P1TCON))
 #define PWM1CON1 (*watch_pairs(&PWM1CON1))
-#include "firmware/board/pwm.c"
+#include "firmware/board/peripherals.c"
 #undef P1TCON
 #undef PWM1CON1
 

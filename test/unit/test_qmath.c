@@ -97,7 +97,7 @@ void test_limits_of_the_upper_word_keep_the_lower_one_within(void)
     }
 }
 
-/* ---- ranges by one comparison ---- */
+/* ---- ranges and magnitudes ---- */
 
 /** Numbers around each bound of -most..most and the ends of the format. */
 static int16_t near_bound(int16_t most, int16_t k)
@@ -117,23 +117,8 @@ void test_a_number_is_beyond_a_limit_of_either_sign_only_if_its_magnitude_is_lar
         for (int16_t k = 0; k < NEAR_COUNT; k++) {
             int32_t x = near_bound(mosts[n], k), limited = (x > mosts[n]) ? mosts[n] : (x < -(int32_t)mosts[n]) ? -(int32_t)mosts[n] : x;
             TEST_ASSERT_EQUAL_UINT16(x > mosts[n] || x < -(int32_t)mosts[n], qm_beyond((int16_t)x, mosts[n]));
-            TEST_ASSERT_EQUAL_UINT16(x > mosts[n] || x < 0, qm_outside((int16_t)x, mosts[n]));
             TEST_ASSERT_EQUAL_INT16(limited, qm_limit((int16_t)x, mosts[n]));
             TEST_ASSERT_EQUAL_INT16((x == INT16_MIN) ? INT16_MAX : (x < 0) ? -x : x, qm_abs((int16_t)x));
-        }
-    }
-}
-
-void test_a_number_is_clear_of_a_limit_only_if_it_is_within_and_where_its_upper_word_is_smaller(void)
-{
-    static const int16_t lows[] = { 0, 1, 32767, -32768, -1 };
-    for (unsigned n = 0; n < sizeof mosts / sizeof mosts[0]; n++) {
-        for (int16_t k = 0; k < NEAR_COUNT * 5; k++) {
-            int16_t high = near_bound(mosts[n], k / 5);
-            int32_t x = (int32_t)high * 65536 + (uint16_t)lows[k % 5], most = (int32_t)mosts[n] * 65536 + (uint16_t)lows[(k + 2) % 5];
-            uint16_t within = (uint16_t)(x <= most && x >= -most), clear = qm_clear_of(x, most);
-            TEST_ASSERT_TRUE(!clear || within);
-            TEST_ASSERT_EQUAL_UINT16(high >= -(int32_t)mosts[n] && high < mosts[n], clear);
         }
     }
 }

@@ -1,14 +1,20 @@
 /* The recorder's lines on the UART: head and rows of a complete record, once after a fault and once after a reset that kept one. */
 #include "hurst_params.h"
 
-#include "firmware/board/record.c"
+#include "firmware/board/status.c"
 
+#include "mock_selftest_run.h"
 #include "unity.h"
 
 #include <stdio.h>
 #include <string.h>
 
 drive_t board_drive;
+panel_t board_panel;
+const drive_params_t board_params;
+retry_t board_retry;
+tLimitParm LimitParm;
+uint16_t board_selftest_parts;
 volatile uint16_t board_reset_cause;
 
 static char line[128];
@@ -75,7 +81,7 @@ void test_lines_tell_head_and_rows_from_the_oldest_on(void)
     record_tick();
     record(4);
     record_tick();
-    expect_line("record fault 6 rows 20 every 2 offsets -40 3\r\n");
+    expect_line("record fault STALL rows 20 every 2 offsets -40 3\r\n");
     expect_line("row 63 0 1 0 -1 5 0\r\n"); /* CLOSED, and nothing yet of what changes slowly */
     expect_line("row 62 1 2 -1 -2 5 16\r\n");
     expect_line("row 61 2 3 -2 -3 5 32\r\n");
@@ -90,7 +96,7 @@ void test_the_ring_s_end_is_in_the_middle_of_a_full_record(void)
     uint16_t n;
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 64 every 2 offsets 0 0\r\n");
+    expect_line("record fault STALL rows 64 every 2 offsets 0 0\r\n");
     for (n = 42; n < 42 + 64; n++) {
         unsigned place = 63u - n % 64u;
         char begin[20];
@@ -103,7 +109,7 @@ void test_the_ring_s_end_is_in_the_middle_of_a_full_record(void)
 
 void test_the_longest_line_fits_a_status_line(void)
 {
-    TEST_ASSERT_TRUE(sizeof "record fault 20 rows 64 every 64 offsets -1024 -1024\r\n" < sizeof line);
+    TEST_ASSERT_TRUE(sizeof "record fault OVERTEMPERATURE rows 64 every 64 offsets -1024 -1024\r\n" < sizeof line);
 }
 
 void test_nothing_is_sent_before_the_last_row_and_nothing_twice(void)
@@ -147,7 +153,7 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
 {
     record(90);
     record_tick();
-    expect_line("record fault 6 rows 64 every 2 offsets 0 0\r\n");
+    expect_line("record fault STALL rows 64 every 2 offsets 0 0\r\n");
     board_drive.fault = (uint16_t)FAULT_NONE;
     board_drive.command.run = 1;
     record_tick();
@@ -155,5 +161,5 @@ void test_a_start_ends_the_sending_and_the_next_fault_begins_it_anew(void)
     board_drive.command.run = 0;
     record(1);
     record_tick();
-    expect_line("record fault 6 rows 17 every 2 offsets 0 0\r\n");
+    expect_line("record fault STALL rows 17 every 2 offsets 0 0\r\n");
 }

@@ -1,7 +1,7 @@
 /* The fault recorder: which rows it holds, in which order, how long it keeps them, and when it begins anew. */
 #include "drive_rig.h"
 
-#include "drive/recorder.h"
+#include "firmware/drive/recorder.c"
 
 #include <string.h>
 

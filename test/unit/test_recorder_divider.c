@@ -4,6 +4,7 @@
 #undef RECORDER_PERIODS
 #define RECORDER_PERIODS 4
 
+#include "law.c"
 #include "drive_rig.h"
 
 #include "drive/recorder.h"

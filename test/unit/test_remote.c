@@ -7,10 +7,10 @@
 
 #include "drive/remote.h"
 
+#include "law.c"
 #include "panel_rig.h"
 
-#include "drive/panel_tick.h"
-#include "firmware/drive/remote.c"
+#include "drive/panel.h"
 
 static remote_t command;
 

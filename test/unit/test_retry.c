@@ -4,9 +4,8 @@
 #undef RETRY_COUNT
 #define RETRY_COUNT 3
 
+#include "law.c"
 #include "panel_rig.h"
-
-#include "firmware/drive/retry.c"
 
 static retry_t retry;
 
@@ -100,7 +99,7 @@ void test_after_the_stated_number_the_fault_stays_and_the_first_cause_is_told(vo
 
 void test_each_fault_is_tried_again_as_its_row_says(void)
 {
-#define ROW(code, name, passes, cause, remedy) { #name, (code), (passes) },
+#define ROW(code, name, passes, decided_by, cause, remedy) { #name, (code), (passes) },
     static const struct {
         const char *name;
         uint16_t code, passes;

@@ -1,5 +1,5 @@
 /* Square roots and lengths, exact to the last bit. */
-#include "control/root.h"
+#include "control/soft_float.h"
 #include "unity.h"
 
 void test_square_roots_are_exact(void)

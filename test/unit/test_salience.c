@@ -1,7 +1,7 @@
 /* Salient motors: flux and torque with a d current, and the d current of the least current for the torque. */
 #include "hurst_params.h"
 
-#include "control/salience.h"
+#include "control/motor_model.h"
 #include "golden.h"
 #include "golden_salience.h"
 #include "golden_salience_least.h"

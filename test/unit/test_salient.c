@@ -4,10 +4,8 @@
 #undef MOTOR_SALIENCY_UH
 #define MOTOR_SALIENCY_UH 960 /* Ld is half of Lq, and 8.3 A double the flux */
 
+#include "law.c"
 #include "drive_rig.h"
-
-#include "firmware/drive/bus.c"
-#include "firmware/drive/drive.c"
 
 #define ONE_Q13 8192
 
@@ -121,7 +119,7 @@ void test_observer_counts_torque(void)
 void test_observer_begins_with_the_hand_over_s_torque(void)
 {
     flux_of((int16_t)-tenth());
-    drive.run.handover.speed_is_preset = 0;
+    drive.run.handover.phase = (uint16_t)START_OBSERVE;
     drive.run.control.ref_q13.q = 1000;
     handover_observe(&drive.run, &params);
     TEST_ASSERT_INT16_WITHIN(2, 1100, observer_load(&drive.run.observer, &params.observer));

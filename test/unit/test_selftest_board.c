@@ -9,17 +9,12 @@ static uint16_t stuck_bits;
 #define SELFTEST_READ(cell) (*(cell))
 #define SELFTEST_WRITE(cell, value) (*(cell) = (uint16_t)(((cell) == stuck_word) ? (value) | stuck_bits : (value)))
 
-#include "firmware/board/adc.c"
-#include "firmware/board/clock.c"
+#include "firmware/board/peripherals.c"
 #include "firmware/board/firmware.c"
 #include "firmware/board/isr.c"
-#include "firmware/board/pins.c"
-#include "firmware/board/pwm.c"
 #include "firmware/board/reset.c"
 #include "firmware/board/selftest_run.c"
-#include "firmware/board/selftest_start.c"
 #include "firmware/board/status.c"
-#include "firmware/board/timer.c"
 #include "firmware/drive/selftest.c"
 
 #include <string.h>
@@ -29,10 +24,6 @@ static uint16_t stuck_bits;
 #include "unity.h"
 
 static uint16_t ground_reads_raw;
-
-void uart_init(void)
-{
-}
 
 
 static void power_up(void)
@@ -426,6 +417,18 @@ void test_other_resets_test_no_watchdog_and_leave_a_kept_fault(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
 }
 
+/* ---- the drive's own: a transition that is not in its table ---- */
+
+void test_a_state_that_none_may_follow_is_a_failure_of_the_flow_that_S2_does_not_clear(void)
+{
+    run_motor();
+    drive_enter(&board_drive, DRIVE_BOOTSTRAP);
+    finds(SELFTEST_FLOW, 1, "BOOTSTRAP after CLOSED");
+    press_s2();
+    press_s2();
+    TEST_ASSERT_EQUAL_UINT16(FAULT_SELFTEST, board_drive.fault);
+}
+
 /* ---- what a failure does ---- */
 
 void test_S2_does_not_clear_a_failure_and_a_reset_of_the_watchdog_keeps_its_name(void)
@@ -439,7 +442,7 @@ void test_S2_does_not_clear_a_failure_and_a_reset_of_the_watchdog_keeps_its_name
     TEST_ASSERT_EQUAL_UINT16(FAULT_SELFTEST, board_drive.fault);
     TEST_ASSERT_EQUAL_HEX16(BOARD_OUTPUTS_OFF, P1OVDCON);
     board_ms(1000);
-    TEST_ASSERT_NOT_NULL(strstr(sent, "state 7 fault 20 speed 0 rpm selftest 9\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(sent, "state 7 fault SELFTEST speed 0 rpm selftest 9\r\n"));
     RCON = 0x0010u;
     firmware_init();
     TEST_ASSERT_EQUAL_UINT16(FAULT_SELFTEST, board_drive.fault);

@@ -3,7 +3,7 @@
 #include "hurst_params.h"
 
 #include "firmware/board/isr.c"
-#include "firmware/board/modes/snapshot_arrays.c"
+#include "firmware/board/modes/mode_board.c"
 
 #include "interrupts.h"
 #include "unity.h"

@@ -171,7 +171,7 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
         turn_at(cases[n].observed_erpm, cases[n].observed_erpm);
         drive.run.control.iq_limit_q13 = 5120;
         drive.run.control.iq_trim_q26 = 256L * 8192;
-        drive.run.observer.quick_q15 = cases[n].quick;
+        drive.run.observer.fast_share_q15 = cases[n].quick;
         drive.run.control.vq_limit_q14 = 20000;
         drive.run.control.v_q14.q = cases[n].v_q_q14;
         speed_trim(&drive.run, &params, cases[n].before_erpm, cases[n].iq_q13);
@@ -197,9 +197,9 @@ void test_current_ends_at_its_limit_and_leaves_it_at_once(void)
 
 void test_gain_follows_reference_or_speed_whichever_is_more_and_rises_after_a_large_innovation(void)
 {
-    int16_t full = params.observer.full_erpm, half = (int16_t)(full / 2), fourth = (int16_t)(full / 4), kp = params.speed_kp_q13, quick = params.speed_kp_quick_q13;
+    int16_t full = params.observer.full_erpm, half = (int16_t)(full / 2), fourth = (int16_t)(full / 4), kp = params.speed_kp_q13, quick = params.speed_kp_fast_q13;
     const struct {
-        int16_t reference_erpm, quick_q15, kp_q13, speed_erpm;
+        int16_t reference_erpm, fast_share_q15, kp_q13, speed_erpm;
     } cases[] = {
         { full, 0, kp, 0 }, { 32000, 0, kp, 0 }, { half, 0, kp, 0 }, { fourth, 0, (int16_t)(kp / 2), 0 }, { (int16_t)-full, 0, kp, 0 }, { (int16_t)-fourth, 0, (int16_t)(kp / 2), 0 },
         { 0, 0, 0, 0 }, { half, 32767, quick, 0 }, { fourth, 32767, (int16_t)(quick / 2), 0 }, { full, 16384, (int16_t)((kp + quick) / 2), 0 },
@@ -209,7 +209,7 @@ void test_gain_follows_reference_or_speed_whichever_is_more_and_rises_after_a_la
         rig_closed(1, 10000);
         rig_speed(cases[n].speed_erpm);
         drive.run.control.reference_erpm = cases[n].reference_erpm;
-        drive.run.observer.quick_q15 = cases[n].quick_q15;
+        drive.run.observer.fast_share_q15 = cases[n].fast_share_q15;
         speed_schedule(&drive.run, &params);
         TEST_ASSERT_INT16_WITHIN_MESSAGE(3, cases[n].kp_q13, drive.run.control.speed_kp_q13, golden_row(n));
     }
@@ -283,7 +283,7 @@ void test_after_a_large_innovation_the_rates_come_in_each_slow_step_until_it_fad
     TEST_ASSERT_GREATER_THAN_INT16(params.speed_kp_q13, drive.run.control.speed_kp_q13);
     TEST_ASSERT_EQUAL_UINT16(0, rates_come(8, 0));
     TEST_ASSERT_EQUAL_UINT16(1, rates_come(15, 0));
-    drive.run.observer.quick_q15 = 4095;
+    drive.run.observer.fast_share_q15 = 4095;
     TEST_ASSERT_EQUAL_UINT16(0, rates_come(7, 0));
 }
 

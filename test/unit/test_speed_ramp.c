@@ -1,5 +1,5 @@
 /* The speed reference's ramp: the reference has far, near and equal targets, two steps to the count, zero and both ends of the word. */
-#include "control/speed_ramp.h"
+#include "drive/speed.h"
 #include "golden.h"
 #include "golden_speed_ramp.h"
 #include "unity.h"

@@ -2,10 +2,12 @@
 #include "hurst_params.h"
 
 #include "drive/param_init.h"
-#include "drive/param_table.h"
+#include "drive/param_limits.h"
 
 #include "golden_params_quick.h"
 #include "unity.h"
+
+#include "law.c"
 
 #define EXACT(value, expected) TEST_ASSERT_EQUAL_INT32_MESSAGE(expected, value, #value)
 
@@ -34,8 +36,8 @@
         EXACT((o).load_max, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_LOAD_MAX); \
         EXACT((o).full_erpm, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_FULL_ERPM); \
         EXACT((o).load_from, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_LOAD_FROM); \
-        EXACT((o).large_erpm, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_LARGE_ERPM); \
-        EXACT((o).large_loaded_erpm, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_LARGE_LOADED_ERPM); \
+        EXACT((o).gate_erpm, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_GATE_ERPM); \
+        EXACT((o).gate_loaded_erpm, GOLDEN_PARAMS_QUICK_##unit##_OBSERVER_GATE_LOADED_ERPM); \
     } while (0)
 
 void test_a_count_is_one_electrical_rpm_up_to_32000_of_them_then_two_then_four(void)

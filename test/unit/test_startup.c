@@ -31,14 +31,17 @@ void test_start_is_refused_in_every_state_but_STOPPED_and_a_second_one_changes_n
 
 void test_start_begins_without_memory_of_the_last_run(void)
 {
-    drive_run_t fresh;
+    drive_t fresh;
     rig_start(1);
-    fresh = drive.run;
+    fresh = drive;
     rig_ready();
     memset(&drive.run, 0x5A, sizeof drive.run);
-    drive.forced.speed_q10 = 5000;
+    memset(&drive.forced, 0x5A, sizeof drive.forced);
+    memset(&drive.dead, 0x5A, sizeof drive.dead);
+    memset(&drive.dead_second, 0x5A, sizeof drive.dead_second);
+    drive.angle = 0x5A5A;
     drive_start(&drive, &params, 1);
-    TEST_ASSERT_EQUAL_MEMORY(&fresh, &drive.run, sizeof fresh);
+    TEST_ASSERT_EQUAL_MEMORY(&fresh, &drive, sizeof fresh);
     TEST_ASSERT_INT32_WITHIN(1, LOCK_SPEED_Q10, drive.forced.speed_q10);
     TEST_ASSERT_EQUAL_INT32(0, drive.run.control.pi_q.sum);
     TEST_ASSERT_EQUAL_INT16(0, drive.run.control.reference_erpm);

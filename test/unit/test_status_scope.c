@@ -2,15 +2,18 @@
 /* defines: -DSCOPE=1 */
 #include "lnet_rig.h"
 
-#include "firmware/board/lnet.c"
 #include "firmware/board/scope.c"
 #include "firmware/board/status.c"
 
-#include "mock_peripherals.h"
 #include "mock_selftest_run.h"
+#include "mock_peripherals.h"
+#include "peripherals_on_registers.h"
 #include "transmitter.h"
 
 drive_t board_drive;
+panel_t board_panel;
+const drive_params_t board_params;
+retry_t board_retry;
 uint16_t board_selftest_parts;
 volatile uint16_t board_reset_cause;
 tLimitParm LimitParm;
@@ -36,6 +39,7 @@ static char *nothing_more(char *at, int calls)
 
 void setUp(void)
 {
+    peripherals_on_registers();
     uart_receive_Stub(give);
     selftest_put_Stub(nothing_more);
     selftest_put_marked_Stub(nothing_more);
@@ -67,7 +71,7 @@ void test_text_goes_on_beside_noise(void)
     status_tick(500);
     receive(noise, sizeof noise);
     passes(60);
-    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault NONE speed 0 rpm\r\n", sent);
 }
 
 void test_a_valid_frame_ends_the_text_and_only_its_answer_follows(void)
@@ -100,7 +104,7 @@ void test_text_waits_for_a_frame_that_may_be_valid_and_goes_on_when_it_is_not(vo
     TEST_ASSERT_EQUAL_STRING("stat", sent);
     status_tick(LNET_QUIET_MS);
     passes(60);
-    TEST_ASSERT_EQUAL_STRING("state 0 fault 0 speed 0 rpm\r\n", sent);
+    TEST_ASSERT_EQUAL_STRING("state 0 fault NONE speed 0 rpm\r\n", sent);
 }
 
 void test_an_answer_waits_for_a_transmitter_that_is_full(void)

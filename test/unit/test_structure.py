@@ -1,5 +1,6 @@
 """What must hold between the rooms of the firmware: who may include whom, headers that stand alone, no stray files, fuses as in the facts."""
 
+import graphlib
 import importlib
 import re
 
@@ -9,10 +10,14 @@ from c_compiler import CFLAGS, ROOT, compiler
 # A room's files may include these.
 ROOMS = {
     "control": r"control/\w+\.h|stdint\.h",
-    "drive": r"(control|drive|drive/modes)/\w+\.h|userparams\.h|stdint\.h",
+    "drive": r"(control|drive|drive/modes|drive/scaling)/\w+\.h|userparams\.h|stdint\.h",
     "board": r"(control|drive|drive/modes|board|board/modes)/\w+\.h|version\.h|xc\.h|stdint\.h",
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+
+
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+FUNCTION = re.compile(r"^(?!typedef|struct|enum|union)(\w[^\n;{}#=]*?\b(\w+)\([^;{}]*\)(?: \w+\(.*?\))?)\s*\n\{\n.*?^\}", re.DOTALL | re.MULTILINE)
 
 
 def sources(room: str = "") -> dict[str, str]:
@@ -33,9 +38,93 @@ def test_a_room_includes_only_what_it_may(room: str) -> None:
     assert not wrong, wrong
 
 
-def test_only_params_h_reads_userparams_h() -> None:
+def test_no_file_includes_itself_by_a_detour() -> None:
+    graph = {path.removeprefix("include/"): INCLUDE.findall(text) for path, text in sources().items()}
+    assert any(name in graph for names in graph.values() for name in names)
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(f"a loop of files: {' <- '.join(error.args[1])}")
+
+
+def functions(text: str) -> list[tuple[str, str, int]]:
+    """Name, what stands before it, and length in lines of each function that a file defines."""
+    code = COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
+    return [(found[2], found[1].split(found[2])[0], found[0].count("\n") + 1) for found in FUNCTION.finditer(code)]
+
+
+def test_a_header_declares_and_a_c_file_defines() -> None:
+    arithmetic = {"include/control/qmath.h", "include/control/transforms.h"}
+    bodies = {path for path, text in sources().items() if path.endswith(".h") and functions(text)}
+    assert bodies == arithmetic, bodies ^ arithmetic
+
+
+def test_no_function_is_longer_than_45_lines() -> None:
+    lengths = {(path, name): lines for path, text in sources().items() for name, _, lines in functions(text)}
+    assert len(lengths) > 400
+    assert not (long := {key: lines for key, lines in lengths.items() if lines > 45}), long
+
+
+def test_a_source_includes_its_own_header_first() -> None:
+    """What has none: the fuses, the interrupts, the loop, and the texts of the parameters' check."""
+    without = {f"firmware/{name}.c" for name in ("board/config", "board/isr", "board/main", "drive/param_check", "drive/param_text")}
+    own = {path: path.replace("firmware/", "").replace(".c", ".h") for path in sources() if path.startswith("firmware/")}
+    assert {path for path, header in own.items() if f"include/{header}" not in sources()} == without
+    wrong = [path for path, header in own.items() if path not in without and INCLUDE.findall(sources()[path])[0] != header]
+    assert not wrong, wrong
+
+
+PREFIXES = {
+    "board/main": "main",
+    "board/modes/mode_board": "bringup identify mode",
+    "board/peripherals": "adc clock pins pwm timer uart",
+    "board/selftest_cpu": "board",
+    "board/scope": "lnet memory scope",
+    "board/status": "record status text",
+    "control/current_control": "current pi vd voltage vq",
+    "control/motor_model": "adaptation salience",
+    "control/soft_float": "root soft",
+    "drive/drive": "along drive",
+    "drive/deferred": "dead deferred",
+    "drive/limits": "bus limits",
+    "drive/model": "model salient",
+    "drive/modes/bringup": "bringup mode",
+    "drive/modes/identify": "identify mode",
+    "drive/modes/modes": "mode snapshot",
+    "drive/panel": "button panel",
+    "drive/protection": "overload protection",
+    "drive/speed": "reference speed",
+    "drive/startup": "calibration startup",
+    "drive/states": "drive idle states",
+    "drive/tick": "drive",
+}
+"""Of the functions of a file, where they are not its name's first word."""
+
+
+def test_a_functions_name_leads_to_its_file() -> None:
+    for path, text in sources().items():
+        if path.endswith(".c"):
+            known = PREFIXES.get(path.removeprefix("firmware/").removesuffix(".c"), path.rsplit("/", 1)[1].removesuffix(".c").split("_")[0]).split()
+            names = [name for name, before, _ in functions(text) if "static" not in before and "QM_INLINE" not in before and name[0] != "_"]
+            wrong = [name for name in names if not f"{name}_".startswith(tuple(f"{prefix}_" for prefix in known))]
+            unused = [prefix for prefix in known if names and not any(f"{name}_".startswith(f"{prefix}_") for name in names)]
+            assert not wrong and not unused, f"{path}: {wrong} {unused}"
+
+
+def test_nothing_is_written_twice_for_the_proofs_or_the_compiler() -> None:
+    found = [(path, word) for path, text in sources().items() for word in ("__FRAMAC__", "QM_KNOWN", "QM_CONSTANT") if word in text]
+    assert not found, found
+
+
+def test_the_firmware_grows_no_further_in_files_and_lines() -> None:
+    files = [f for top in ("firmware", "include") for f in (ROOT / top).rglob("*") if f.is_file()]
+    lines = sum(len(f.read_text(encoding="utf-8").splitlines()) for f in files)
+    assert len(files) <= 106 and lines <= 13_110, f"{len(files)} files, {lines} lines: the goal is 100 and 12 600, so only lower these"
+
+
+def test_one_header_alone_reads_userparams_h() -> None:
     readers = [path for path, text in sources().items() if "userparams.h" in INCLUDE.findall(text)]
-    assert readers == ["include/drive/param_scaling.h"], readers
+    assert readers == ["include/drive/scaling/current_voltage.h"], readers
 
 
 def test_control_and_drive_name_no_register_and_no_motor() -> None:
@@ -91,8 +180,8 @@ def test_there_are_no_stray_files_in_the_firmware() -> None:
 def test_the_watchdog_is_served_in_few_places() -> None:
     served = {path: text.count("ClrWdt()") for path, text in sources().items() if "ClrWdt()" in text}
     # bounded waits, the tests at a start and its end; later only reset_serve_watchdog()
-    assert served == {"firmware/board/clock.c": 1, "firmware/board/firmware.c": 1, "firmware/board/reset.c": 1,
-                      "firmware/board/selftest_start.c": 3}, served
+    assert served == {"firmware/board/firmware.c": 1, "firmware/board/peripherals.c": 1, "firmware/board/reset.c": 1,
+                      "firmware/board/selftest_run.c": 3}, served
 
 
 def test_inline_assembly_is_in_one_file_only() -> None:
@@ -104,14 +193,20 @@ def test_what_outlives_a_reset_is_left_alone_by_the_start_up_code() -> None:
     text = sources("board")
     assert "#define BOARD_PERSISTENT __attribute__((persistent))" in text["include/board/reset.h"]
     kept = {path: re.findall(r"^.*?(\w+) BOARD_PERSISTENT;", code, re.MULTILINE) for path, code in text.items() if " BOARD_PERSISTENT;" in code}
-    assert kept == {"firmware/board/reset.c": ["board_trap_intcon1", "kept_fault", "kept_inverse"], "firmware/board/record.c": ["board_recorder"],
-                    "firmware/board/selftest_run.c": ["board_selftest_failed"],
-                    "firmware/board/selftest_start.c": ["waited_counts"]}
+    assert kept == {"firmware/board/reset.c": ["board_trap_intcon1", "kept_fault", "kept_inverse"], "firmware/board/status.c": ["board_recorder"],
+                    "firmware/board/selftest_run.c": ["board_selftest_failed", "waited_counts"]}
 
 
 def test_the_state_is_written_in_one_place() -> None:
     written = [(path, line) for path, text in sources().items() for line in re.findall(r".*(?:->|\.)state\s*=(?!=).*", text)]
-    assert [path for path, _ in written] == ["include/drive/state.h"], written
+    assert [path for path, _ in written] == ["firmware/drive/states.c"], written
+
+
+@pytest.mark.parametrize("field, writer", [("catching.phase|c->phase", "firmware/drive/catch.c"), ("handover.phase|h->phase", "firmware/drive/handover.c"),
+                                           ("probe_phase", "firmware/drive/protection.c")])
+def test_a_phase_is_written_in_one_place(field: str, writer: str) -> None:
+    written = [path for path, text in sources().items() for _ in re.findall(rf"(?:->|\.|\b)(?:{field})\s*=(?!=)", text)]
+    assert written == [writer], written
 
 
 def test_a_modes_name_stands_in_the_modes_rooms_only() -> None:

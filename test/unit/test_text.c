@@ -1,5 +1,6 @@
 /* Text and decimal numbers: every number of digits, both signs, the ends of the words, and nothing written behind the text. */
-#include "board/text.h"
+#include "board/status.h"
+#include "drive/faults.h"
 
 #include "unity.h"
 
@@ -32,5 +33,20 @@ void test_texts_and_numbers_end_where_the_next_one_begins(void)
         if (cases[n].number <= INT16_MAX) {
             expect_text(cases[n].text, buffer, text_put_signed(buffer, (int16_t)cases[n].number));
         }
+    }
+}
+
+#define EACH_FAULT(code, name, passes, by, cause, remedy) { (code), "fault " #name },
+
+void test_a_fault_is_told_by_its_name_and_what_is_none_as_unknown(void)
+{
+    static const struct {
+        uint16_t code;
+        const char *text;
+    } faults[] = { DRIVE_FAULT_TABLE(EACH_FAULT){ FAULT_COUNT, "fault UNKNOWN" }, { 32767, "fault UNKNOWN" }, { 65535, "fault UNKNOWN" } };
+    for (unsigned n = 0; n < sizeof faults / sizeof faults[0]; n++) {
+        char buffer[32];
+        memset(buffer, '#', sizeof buffer);
+        expect_text(faults[n].text, buffer, text_put_fault(buffer, "fault ", faults[n].code));
     }
 }

@@ -2,7 +2,7 @@
 #include "registers.h"
 
 #define T1CON (*registers_watch(&T1CON)) /* the timer stands still while it is set up */
-#include "firmware/board/timer.c"
+#include "firmware/board/peripherals.c"
 #undef T1CON
 
 void setUp(void)

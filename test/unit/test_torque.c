@@ -1,10 +1,13 @@
 /* TORQUE_MODE: the potentiometer commands the q current, speed is only guarded. */
 /* defines: -DTORQUE_MODE */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "ideal_motor.h"
 #include "panel_rig.h"
 
-#include "drive/limits_now.h"
-#include "drive/panel_tick.h"
+#include "drive/limits.h"
+#include "drive/panel.h"
 
 void setUp(void)
 {

@@ -1,9 +1,11 @@
 /* The drive in TUNING: the reference ramps by itself from END_SPEED to MAXIMUM_SPEED. */
 /* defines: -DTUNING */
+#include "hurst_params.h"
+
+#include "law.c"
 #include "ideal_motor.h"
 
-#include "firmware/drive/drive.c"
-#include "drive/limits_now.h"
+#include "drive/limits.h"
 
 void setUp(void)
 {

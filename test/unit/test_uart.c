@@ -2,7 +2,7 @@
 #include "registers.h"
 
 #define U1MODE (*registers_watch(&U1MODE)) /* the last access switches the module on */
-#include "firmware/board/uart.c"
+#include "firmware/board/peripherals.c"
 #undef U1MODE
 
 void setUp(void)

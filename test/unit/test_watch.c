@@ -8,6 +8,7 @@
 #include "unity.h"
 
 drive_t board_drive;
+panel_t board_panel;
 static const drive_params_t fresh = DRIVE_PARAMS_INIT;
 drive_params_t board_params = DRIVE_PARAMS_INIT;
 retry_t board_retry;
@@ -61,13 +62,12 @@ void test_voltages_are_Q15_of_full_scale_and_back_emf_of_four_times_it(void)
 
 void test_angles_are_65536_a_turn_and_speeds_electrical_rpm(void)
 {
-    const fieldweak_tables_t tables = fieldweak_tables(&board_params.fieldweak);
     board_drive.angle = 0xC123;
     board_drive.run.estimator.rho_q32 = 0xA1234567ul;
     board_drive.run.estimator.omega_filtered_q16 = 5000L * 65536 + 1;
     board_drive.run.estimator.omega_erpm = -4900;
     board_drive.run.control.reference_erpm = -12345;
-    fieldweak_tick(&board_drive.run.fieldweak, &board_params.fieldweak, &tables, &board_drive.run.model, 27500);
+    fieldweak_tick(&board_drive.run.fieldweak, &board_params.fieldweak, &board_drive.run.model, 27500);
     watch_refresh();
     TEST_ASSERT_EQUAL_HEX16(0xC123, ParkParm.qAngle);
     TEST_ASSERT_EQUAL_HEX16(0xA123, EstimParm.qRho);

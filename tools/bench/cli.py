@@ -18,11 +18,12 @@ from .lowspeed import LowSpeed
 from .rating_sweep import Rated
 from .robust import Robust
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
+from .sensitivity import Sensitivity
 from .soak import Soak
 from .start_sweep import Starts
 from .table2 import Table2
 
-SWEEPS = (Table2, Starts, Rated, LoadSteps, LowSpeed, Catch, Robust, Bringup)
+SWEEPS = (Table2, Starts, Rated, LoadSteps, LowSpeed, Catch, Robust, Bringup, Sensitivity)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -215,6 +215,8 @@ def broken(report: Report) -> list[str]:
         lines.append(f"longest control interrupt: {report.all.most} cycles, {report.all.most - limits.isr_max} over the budget of {limits.isr_max} "
                      f"({worst[0]} at {worst[1][1]:.4f} s, {worst[1][2]})")
     for name in NOTE_US:
+        if found.spreads[name].mean > limits.isr_mean:
+            lines.append(f"mean control interrupt {name}: {found.spreads[name].mean:.1f} cycles, over the budget of {limits.isr_mean}")
         if found.periods[name].mean > limits.period_mean:
             lines.append(f"mean period {name}: {found.periods[name].mean:.1f} cycles of both interrupts, over the budget of {limits.period_mean}")
     if found.latency.most > limits.latency_max:

@@ -309,7 +309,7 @@ class StateExpectation(Expectation):
 
     @classmethod
     def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "StateExpectation":
-        name = section.text("name", meaning="state, as in docs/architecture.md")
+        name = section.text("name", meaning="state, as in docs/law.md")
         at_s = section.number("at_s", None, 0.0, duration_s, "then; or from_s and to_s")
         never = section.flag("never", False, "true: it must not occur")
         if at_s is None:

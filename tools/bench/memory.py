@@ -31,13 +31,10 @@ class Variable:
 
 def variables(library: Library) -> list[Variable]:
     """Every writable variable of the firmware that the library was linked from, DRIVE first."""
-    folder = library.path.parent
-    try:
-        names = (folder / "contents").read_text(encoding="utf-8").split()
-    except OSError as error:
-        raise UserError(f"cannot read what the library was linked from ({error.strerror})", str(paths.shown(folder / "contents")), "make vboard") from None
-    objects = [name for name in names if "/firmware/" in name and not name.endswith("/main.o")]
-    written = {(name, size) for name, size, _ in _symbols(*objects)}
+    unit = library.path.parent / "unit.o"
+    if not unit.exists():
+        raise UserError("cannot read what the library was linked from", str(paths.shown(unit)), "make vboard")
+    written = {(name, size) for name, size, _ in _symbols(str(unit))}
     found = {name: Variable(name, at, size) for name, size, at in _symbols(str(library.path)) if (name, size) in written}
     if DRIVE not in found:
         raise UserError(f"the firmware has no variable '{DRIVE}'", str(paths.shown(library.path)), "rebuild with make vboard")

@@ -304,3 +304,17 @@ def _angle_over_factor(runs: list[dict], folder: Path) -> str:
         axes.minorticks_off()
         _finish(axes, name, "estimated less true angle [deg]" if name == names[0] else "", "true value / the header's")
     return saved(figure, folder, "angle_error")
+
+
+def write_sensitivity(rows: list[dict], folder: Path) -> list[str]:
+    """How far each number's two changes move the dip, the angle and the lowest speed, as bars: the numbers that move one of them most."""
+    before = rows[0]
+    figure, panels = plt.subplots(1, 4, layout="constrained", figsize=(19, 7))
+    for axes, key, title in zip(panels, ("dip_percent", "angle_deg", "low_angle_deg", "lowest_rpm"),
+                               ("dip [%]", "largest angle error [deg]", "angle error at low speed [deg]", "lowest speed [rpm]")):
+        moves = [(row[key] - row[f"{key}_before"], row["name"]) for row in rows[1:] if row[key] is not None and row[f"{key}_before"] is not None]
+        most = sorted(sorted(moves, key=lambda pair: -abs(pair[0]))[:24], reverse=True)
+        axes.barh([name for _, name in most], [move for move, _ in most], color=["C3" if move > 0.0 else "C0" for move, _ in most])
+        axes.set(title=f"change of {title}, {before[key]:.3g} as it stands" if before[key] is not None else title)
+        axes.tick_params(axis="y", labelsize=7)
+    return [saved(figure, folder, "sensitivity")]

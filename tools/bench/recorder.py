@@ -12,7 +12,7 @@ from .scenario import param
 
 RING_ROWS, AFTER_ROWS, BYTES, STATE_BITS, FAULT_STATE = 64, 16, 6, 15, 7
 I_A, V_D, I_B, V_Q, SLOW, ANGLE = range(BYTES)
-HEAD = re.compile(r"record fault (\d+) rows (\d+) every (\d+)(?: offsets (-?\d+) (-?\d+))?$")
+HEAD = re.compile(r"record fault (\w+) rows (\d+) every (\d+)(?: offsets (-?\d+) (-?\d+))?$")
 ROW = re.compile(r"row (\d+)((?: -?\d+){%d})$" % BYTES)
 AGAIN = "log it again: after a reset by its pin the board sends the record once more"
 OLDER = "an older firmware sends none: draw its log with the foc33 of its own version"
@@ -79,7 +79,7 @@ def parse(text: str, where: str) -> list[Record]:
 
 def under_way(text: str) -> bool:
     """Whether the last record has begun and has not been sent to its end."""
-    heads = list(re.finditer(r"record fault \d+ rows (\d+)", text))
+    heads = list(re.finditer(r"record fault \w+ rows (\d+)", text))
     return bool(heads) and len(re.findall(r"^row .*\r\n", text[heads[-1].start():], re.MULTILINE)) < int(heads[-1][1])
 
 
@@ -91,9 +91,9 @@ def _record(head: re.Match[str], lines: list[str], at: int, where: str) -> Recor
     place_of = f"{where} line {at + 1}"
     if head[4] is None:
         raise _Cut(f"no offsets in the record's head: '{lines[at]}'", place_of, OLDER)
-    fault, count, every, *offsets = map(int, head.groups())
-    known = {row.code for row in drive_tables.faults()}
-    if fault not in known or not 1 <= count <= RING_ROWS or every < 1:
+    count, every, *offsets = map(int, head.groups()[1:])
+    fault = next((row.code for row in drive_tables.faults() if row.name == head[1]), None)
+    if fault is None or not 1 <= count <= RING_ROWS or every < 1:
         raise UserError(f"no head of a record: '{lines[at]}'", place_of, AGAIN)
     places: list[int] = []
     rows: list[tuple[int, ...]] = []

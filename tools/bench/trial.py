@@ -37,7 +37,7 @@ BLOCKED_S, RETRY_PAUSE_S, RETRY_STATES = 0.8, 3.0, ("RETRY", "FAULT")
 RAMP_STEP_S = 0.005
 CLOSED = ("CLOSED", "STOPPING")
 DEAD_SHARE = 0.13
-"""Of dead time's voltage: what its compensation leaves may move the speed (include/drive/param_scaling.h)."""
+"""Of dead time's voltage: what its compensation leaves may move the speed (GATE_SHARE of include/control/tuned.h)."""
 HANG_S = 300
 WHERE = "campaign"
 HUNG = "WATCHDOG"

@@ -1,15 +1,16 @@
-"""What userparams.h is made of: the rows of include/drive/param_table.h with unit, range, default and meaning, and the modes."""
+"""What userparams.h is made of: the rows of include/drive/param_limits.h with unit, range, default and meaning, and the modes."""
 
 import functools
 import re
 from dataclasses import dataclass
 
-from . import paths
+from . import paths, tuned_rows
 from .errors import UserError
 from .x_macro import rows
 
-TABLE = paths.ROOT / "include" / "drive" / "param_table.h"
-SCALING = TABLE.with_name("param_scaling.h")
+TABLE = paths.ROOT / "include" / "drive" / "param_limits.h"
+SCALING = TABLE.with_name("scaling")
+"""One header a subject."""
 ENTRIES = 18
 """Parameters of a field-weakening table: stem0 .. stem17."""
 FOLLOWS = {"FROM_MOTOR": "motor file", "FROM_BOARD": "board file", "FROM_TUNER": "tuner"}
@@ -38,20 +39,21 @@ class Parameter:
 
 @functools.cache
 def number(name: str) -> float:
-    """A limit of the table's relations, or a ratio of param_scaling.h, that is a macro of its own."""
-    found = re.search(rf"^#define {name} ([\d.]+)(?= |$)", TABLE.read_text(encoding="utf-8") + SCALING.read_text(encoding="utf-8"), re.MULTILINE)
+    """A limit of the table's relations, a unit of the scaling headers or a tuned number, that is a macro of its own."""
+    texts = [path.read_text(encoding="utf-8") for path in (TABLE, tuned_rows.TABLE, *sorted(SCALING.glob("*.h")))]
+    found = re.search(rf"^#define {name} ([\d.]+)u?(?= |$)", "".join(texts), re.MULTILINE)
     if found is None:
-        raise UserError(f"{name} cannot be read", str(paths.shown(TABLE)), f"write #define {name} and its number, there or in {SCALING.name}")
+        raise UserError(f"{name} cannot be read", str(paths.shown(TABLE)), f"write #define {name} and its number, there or in {paths.shown(tuned_rows.TABLE)}")
     return float(found[1])
 
 
 def duties_are_late(period_s: float) -> bool:
-    """True where the firmware's duties act a period later: LATE_DUTIES of param_scaling.h."""
-    return period_s < 0.9999 * number("LATE_BELOW_SEC")
+    """True where the firmware's duties act a period later: DEFER_DUTIES of scaling/current_voltage.h."""
+    return period_s < 0.9999 * number("DEFER_BELOW_SEC")
 
 
 def slow_periods(period_s: float) -> int:
-    """Periods of a slow step: SLOW_PERIODS of param_scaling.h."""
+    """Periods of a slow step: SLOW_PERIODS of scaling/current_voltage.h."""
     return int(number("SLOW_PERIODS_IN_TIME")) * (2 if duties_are_late(period_s) else 1)
 
 

@@ -103,15 +103,7 @@ def _problem(key: str, pin: Pin) -> str:
 
 def differences(pins: dict[str, str]) -> list[str]:
     """The lines of include/board/mclv.h to change before the firmware fits these pins."""
-    lines = []
-    for key, name in pins.items():
-        if name == firmware()[key].pin:
-            continue
-        lines.append(f"#define BOARD_PIN_{key.upper()} {name[1]}, {name[2:]}")
-        if key == "uart_tx":
-            rp = chip()[name].rp or 0
-            lines.append(f"#define BOARD_UART_TX_PIN RPOR{rp // 2}bits.RP{rp}R")
-    return lines
+    return [f"#define BOARD_PIN_{key.upper()} {name[1]}, {name[2:]}" for key, name in pins.items() if name != firmware()[key].pin]
 
 
 def page() -> list[list[str]]:

@@ -23,7 +23,7 @@ def rows(folder: str, header: str, macro: str, columns: str, also: str = "") -> 
     include from the folder `also`."""
     names = columns.replace("#", "").split()
     source = f'#include "{header}"\n#define ROW({", ".join(names)}) @@ {" @ ".join(columns.split())}\n{macro}(ROW)\n'
-    done = run_compiler(["-E", "-P", f"-I{ROOT / folder}", f"-I{ROOT / also}"], source)
+    done = run_compiler(["-E", "-P", f"-I{ROOT / folder}", f"-I{ROOT}", f"-I{ROOT / also}"], source)
     if done.returncode != 0:
         raise UserError(f"{folder}/{header} does not compile", done.args[0], (done.stderr.splitlines() or ["no message"])[0])
     found = [row.split(" @ ") for row in done.stdout.replace("\n", " ").split("@@")[1:]]

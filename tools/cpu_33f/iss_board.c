@@ -122,7 +122,7 @@ static void period_done(iss_board_t *b)
 {
     measured(&vb_counts(b->vb)->period, (uint64_t)(vb_counts(b->vb)->isr.last + vb_counts(b->vb)->slow.last));
     iss_shadow_compare(b);
-    if (!LATE_DUTIES) {
+    if (!DEFER_DUTIES) {
         row_is_due(b);
     }
 }
@@ -139,7 +139,7 @@ static void leave_interrupt(void *context, unsigned vector, uint64_t cycle)
     if (vector == ADC1_VECTOR && b->in_handler) {
         b->in_handler = false;
         measured(&vb_counts(b->vb)->isr, cycle - b->entry_cycle);
-        if (LATE_DUTIES) {
+        if (DEFER_DUTIES) {
             row_is_due(b);
         } else {
             vb_counts(b->vb)->slow.last = 0.0;

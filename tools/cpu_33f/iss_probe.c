@@ -17,11 +17,11 @@
 
 #include "board/firmware.h"
 #include "board/watch.h"
-#include "drive/param_table.h"
+#include "drive/param_limits.h"
 #include "drive/param_scaling.h"
 #include "drive/param_init.h"
 
-#include "drive/limits_now.h" /* reads a drive, so it is needed in this layout too */
+#include "law.c" /* its functions read a drive, so they are needed in this layout too */
 
 static drive_t target_drive;
 static drive_params_t target_params = DRIVE_PARAMS_INIT;

@@ -3,8 +3,8 @@
 
 #include "board/firmware.h"
 #include "board/watch.h"
-#include "drive/limits_now.h"
-#include "drive/param_table.h"
+#include "drive/limits.h"
+#include "drive/param_limits.h"
 #include "drive/param_scaling.h"
 
 #include <math.h>
@@ -98,7 +98,7 @@ const probe_param_t probe_params[] = {
 };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 
-const double probe_isr_us = LATE_DUTIES ? 0.5 : 13.0;
+const double probe_isr_us = DEFER_DUTIES ? 0.5 : 13.0;
 
 /* What may change while the motor turns: the name of userparams.h (or its stem, for the 18 entries of a table), where the firmware
  * keeps it, and the value of one count. A name in two rows has two places. */
@@ -135,8 +135,8 @@ typedef struct {
     double min, max;
 } range_t;
 
-#define PARAM_RANGE(name, unit, min, max, value, meaning) { #name, min, max },
-static const range_t ranges[] = { PARAM_TABLE(PARAM_RANGE) };
+#define RANGE_OF(name, unit, min, max, value, meaning) { #name, min, max },
+static const range_t ranges[] = { PARAM_TABLE(RANGE_OF) };
 
 static int16_t *tunable_place(const tunable_t *t, const char *name)
 {
@@ -184,7 +184,7 @@ int probe_param_set(const char *name, double value)
 
 const char *probe_fault_name(int code)
 {
-#define FAULT_NAME(number, name, passes, cause, remedy) \
+#define FAULT_NAME(number, name, passes, decided_by, cause, remedy) \
     if (code == (number)) { \
         return #name; \
     }

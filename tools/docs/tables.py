@@ -1,5 +1,5 @@
-"""Writes the tables of docs/ that are made from headers and loaders: faults, limits, parameters, pins, keys of files, scope, self-tests, the simulator's
-assumptions.
+"""Writes the tables of docs/ that are made from headers and loaders: faults, the schedule, limits, parameters, pins, keys of files, scope, self-tests, states, the
+simulator's assumptions, numbers chosen by trial.
 
     python3 -m tools.docs.tables                  writes the pages
     python3 -m tools.docs.tables --print faults   prints one page instead
@@ -16,6 +16,7 @@ from tools.common import pins as chip_pins
 from tools.common.errors import UserError
 from tools.common.param_rows import FOLLOWS, parameters
 from tools.common.paths import ROOT
+from tools.common.tuned_rows import tuned
 from tools.common.x_macro import rows
 
 BEGIN, END = "<!-- table -->\n", "<!-- end -->"
@@ -27,13 +28,61 @@ def table(head: str, align: str, lines: list[list[str]]) -> str:
     return f"| {head.replace(', ', ' | ')} |\n|{rule}|\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
+def _where(functions: tuple[str, ...]) -> str:
+    """Each function with the file that defines it."""
+    found = []
+    for name in functions:
+        defined = re.compile(rf"^[\w ]+ \*?{name}\([^;]*$", re.MULTILINE)
+        place = next((path for path in sorted(ROOT.glob("firmware/*/*.c")) if defined.search(path.read_text(encoding="utf-8"))), None)
+        if place is None:
+            raise UserError(f"no function '{name}'", "include/drive/faults.h", "name the one that decides the fault")
+        found.append(f"[`{name}`](../{place.relative_to(ROOT)})")
+    return ", ".join(found)
+
+
 def faults() -> str:
-    return table("code, name, may pass, cause, remedy", "lllll", [
-        [str(row.code), row.name, "yes" if row.passes else "", row.cause, row.remedy] for row in drive_tables.faults()[1:]])
+    return table("code, name, may pass, cause, remedy, decided by", "llllll", [
+        [str(row.code), row.name, "yes" if row.passes else "", row.cause, row.remedy, _where(row.decided_by)]
+        for row in drive_tables.faults()[1:]])
+
+
+def states() -> str:
+    """The transitions as a diagram, but for those to FAULT, and as a table with all reasons."""
+    found, drawn, lines = drive_tables.states(), "", []
+    for state in found:
+        for following, group in itertools.groupby(sorted(state.transitions, key=lambda to: to[0] == "FAULT"), lambda to: to[0]):
+            reasons = [reason for _, reason in group]
+            lines.append([state.name, following, "<br>".join(reasons)])
+            if following != "FAULT":
+                drawn += f"    {state.name} --> {following}: {re.split('[:;]', reasons[0])[0]}\n"
+    diagram = f"```mermaid\nstateDiagram-v2\n    [*] --> {found[0].name}\n{drawn}```\n\nEach state leads to FAULT, too: the table says why.\n"
+    return "\n".join([diagram, table("state, what the drive does", "ll", [[state.name, state.meaning] for state in found]), table("from, to, why", "lll", lines)])
 
 
 def limits() -> str:
     return table("bit, name, cause, remedy", "rlll", [[str(row.code), row.name, row.cause, row.remedy] for row in drive_tables.limits()])
+
+
+SLOT_MS = 0.1
+"""Two periods (SLOW_EVERY) at 20 kHz."""
+
+
+def schedule() -> str:
+    """The slots, and what each of their functions does, as its comment says."""
+    found = rows("include", "drive/schedule.h", "SCHEDULE_TABLE", "#number #first #first_in #second #second_in")
+    source = (ROOT / "firmware/drive/schedule.c").read_text(encoding="utf-8")
+    says = {name: " ".join(text.split()) for text, name in re.findall(r"/\*\* ((?:(?!\*/).)*?) \*/\nstatic void (\w+)\(", source, re.DOTALL)}
+    slots: dict[str, list[str]] = {}
+    for number, first, _, second, _ in found:
+        for name in (first, second):
+            slots.setdefault(name, []).append(number)
+    for name in slots:
+        if name not in says:
+            raise UserError(f"no comment says what '{name}' does", "firmware/drive/schedule.c", "write one above it: /** ... */")
+    when = table("slot, ms, first half, in states, second half, in states", "rrllll", [
+        [number, f"{int(number) * SLOT_MS:.1f}", f"`{first}`", first_in, f"`{second}`", second_in] for number, first, first_in, second, second_in in found])
+    return when + "\n" + table("function, in slots, every, what it does", "llrl", [
+        [f"`{name}`", ", ".join(numbers), f"{2 * len(found) // len(numbers)} periods", says[name]] for name, numbers in slots.items()])
 
 
 def selftest() -> str:
@@ -42,8 +91,8 @@ def selftest() -> str:
 
 
 def scope() -> str:
-    services = rows("include", "board/lnet.h", "LNET_SERVICE_TABLE", "#number #name meaning")
-    errors = rows("include", "board/lnet.h", "LNET_ERROR_TABLE", "#number #name meaning")
+    services = rows("include", "board/scope.h", "LNET_SERVICE_TABLE", "#number #name meaning", also="tools/cpu_host")
+    errors = rows("include", "board/scope.h", "LNET_ERROR_TABLE", "#number #name meaning", also="tools/cpu_host")
     modes = rows("include", "drive/remote.h", "REMOTE_MODE_TABLE", "#number #name meaning")
     return "\n".join(table(f"{head}, name, meaning", "rll", [list(row) for row in found])
                      for head, found in (("service", services), ("error", errors), ("mode of scope_command", modes)))
@@ -60,9 +109,15 @@ def params() -> str:
         text += f"## {section}\n\n" + table("parameter, unit, minimum, maximum, default, meaning", "llrrll", [
             [f"`{row.name}`" if not row.stem else f"`{row.stem}0` .. `17`", row.unit, row.low, row.high, FOLLOWS.get(row.default, row.default), row.meaning]
             for row in group if not row.stem or row.name == f"{row.stem}0"]) + "\n"
-    relations = [message for _, message in rows("include", "drive/param_table.h", "PARAM_RELATION_TABLE", "#condition message")]
+    relations = [message for _, message in rows("include", "drive/param_limits.h", "PARAM_RELATION_TABLE", "#condition message")]
     return text + "## What must hold between them\n\n" + "".join(
         f"- {message.replace('SPEED0', 'SPEED0 .. 17')}\n" for message in relations if not re.match(r"IDREF_SPEED[1-9]", message))
+
+
+def tuned_numbers() -> str:
+    return "\n".join(f"### {section}\n\n" + table("number, value, unit, meaning, shown by", "lrlll", [
+        [f"`{row.name}`", row.value, row.unit, row.meaning, f"`make {row.command}`"] for row in group])
+        for section, group in itertools.groupby(tuned().values(), lambda row: row.section))
 
 
 def files() -> str:
@@ -74,8 +129,9 @@ def pins() -> str:
     return table("pin, port, analogue, remappable, also, on the MCLV, known from", "rllllll", chip_pins.page())
 
 
-PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "limits": limits, "parameters": params,
-                                         "pins": pins, "scope": scope, "selftest": selftest, "simulator": simulator}
+PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "law": schedule, "limits": limits, "parameters": params,
+                                         "pins": pins, "scope": scope, "selftest": selftest, "simulator": simulator, "states": states,
+                                         "tuned": tuned_numbers}
 
 
 def page(name: str) -> str:

@@ -32,6 +32,7 @@ class Limits:
 class CycleLimits:
     """[cycles]: of the control interrupt, and the scenarios to find them with."""
     isr_max: int
+    isr_mean: int
     period_max: int         # both interrupts of a period
     period_mean: int
     latency_max: int
@@ -107,7 +108,7 @@ class Budget:
         budget.close()
         section = _required(root, "cycles")
         cycles = CycleLimits(*(section.integer(f"{name}_cycles", minimum=1) for name in (
-            "isr_max", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound", "duty_deadline", "both_deadline")),
+            "isr_max", "isr_mean", "period_max", "period_mean", "latency_max", "isr_bound", "duty_bound", "slow_bound", "duty_deadline", "both_deadline")),
                              listed(section, "scenarios", "scenario", required=True))
         section.close()
         stack = _required(root, "stack")

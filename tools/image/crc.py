@@ -22,7 +22,7 @@ try:
 except ImportError:
     pass # program.py says so
 
-PLACE = device.FLASH[-2]            # BOARD_FLASH_CRC_AT of include/board/selftest_chip.h
+PLACE = device.FLASH[-2]            # BOARD_FLASH_CRC_AT of include/board/selftest_cpu.h
 SELF_TESTS, VARIABLE = "board_selftest_failed", "board_flash_crc"
 START = 0xFFFF
 

@@ -23,7 +23,7 @@ from .budget import UNASSIGNED, Budget, Share, Shares, shares
 from .sources import Sources
 
 OUT = paths.ROOT / "build" / "target"
-BOARD = paths.ROOT / "firmware" / "board"
+LEVELS = [paths.ROOT / "include" / "board" / "mclv.h", *sorted((paths.ROOT / "firmware" / "board").glob("*.c"))]   # where interrupts get theirs
 NOTE_TITLE = "as in AN1292"
 
 
@@ -58,13 +58,13 @@ class Report:
     by_address: int | None = None   # what NOTE_TITLE takes when inlined code is told by its address alone
 
 
-def deepest(image: attribution.Image, listing: str, budget: Budget, board: Path = BOARD) -> stack.Result:
-    """The deepest stack, with the levels that the interrupts get in the sources of firmware/board.
+def deepest(image: attribution.Image, listing: str, budget: Budget, sources: list[Path] | None = None) -> stack.Result:
+    """The deepest stack, with the levels that the interrupts get in the sources.
     @param listing the image's disassembly"""
     functions = {function.instructions[0].address: stack.plain(function.name) for function in stack.parse(listing)}
     handlers = {functions[address]: vectors for address, vectors in image.handlers.items() if address in functions}
-    sources = "".join(path.read_text(encoding="utf-8") for path in sorted(board.glob("*.c")))
-    result = stack.analyse(listing, image.entry, handlers, stack.priorities(sources), budget.calls_nothing)
+    text = "".join(path.read_text(encoding="utf-8") for path in (LEVELS if sources is None else sources))
+    result = stack.analyse(listing, image.entry, handlers, stack.priorities(text), budget.calls_nothing)
     if image.initial_calls:
         result.errors.append("the list of start values names a function to call")
     written = {word.address: word.chain[-1] for word in image.words}

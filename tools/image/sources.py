@@ -11,7 +11,7 @@ DROPPED = re.compile(r"/\*.*?\*/|//[^\n]*|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.DOT
 FUNCTION = re.compile(r"^\w[\w \*]*?\b(\w+)\([^(){};]*\)\s*\{", re.MULTILINE)
 VARIABLE = re.compile(r"^((?:\w+[ \*]+)+)(?![A-Z_]+;)(\w+(?:, \*?\w+)*)(?: [A-Z_]+)?(?: =|;)",
                       re.MULTILINE) # after array sizes are taken out
-STRUCT = re.compile(r"^typedef struct\b[^{;]*\{", re.MULTILINE)
+STRUCT = re.compile(r"^(?:typedef )?struct\b(?: (\w+))?[^{;]*\{", re.MULTILINE) # struct name { is a name_t of drive/forward.h
 NOT_DEFINED = ("typedef", "extern", "return")
 
 Members = dict[str, "str | Members"]    # name -> name of the type, or the members of a nested structure
@@ -37,7 +37,7 @@ class Sources:
             for start in STRUCT.finditer(text):
                 tokens = iter(re.findall(r"\w+|[{};,\[\]]", text[start.end():]))
                 members = _members(tokens)
-                result.types[next(tokens)] = members
+                result.types[f"{start[1]}_t" if start[1] else next(tokens)] = members
         return result
 
     def objects(self) -> set[str]:

@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass, field, replace
 
+from tools.common.errors import UserError
+
 ENTRY_BYTES = 4     # of a call, an interrupt and a trap: return address, and for the latter the status
 TRAP_LEVELS = {"_MathError": 11, "_StackError": 12, "_AddressError": 13, "_OscillatorFail": 14}
 RESET_LEVEL = 4     # priority of an interrupt whose IPC field nobody writes
@@ -251,9 +253,17 @@ def plain(symbol: str) -> str:
 
 
 def priorities(source: str) -> dict[str, int]:
-    """Handler and level of every interrupt whose IPC field the source sets: IPC3bits.AD1IP = 5 gives _ADC1Interrupt."""
-    found = re.findall(r"\bIPC\d+bits\.(\w+?)IP\s*=\s*(\d+)", source)
-    return {f"_{'ADC1' if name == 'AD1' else name}Interrupt": int(level) for name, level in found}
+    """Handler and level of every interrupt whose IPC field the source sets: IPC3bits.AD1IP = 5, or a name for 5 that the source defines, gives
+    _ADC1Interrupt."""
+    named = dict(re.findall(r"^#define (BOARD_PRIORITY_\w+) (\d+)", source, re.MULTILINE))
+    levels: dict[str, int] = {}
+    for name, level in re.findall(r"\bIPC\d+bits\.(\w+?)IP\s*=\s*(\w+)", source):
+        number = named.get(level, level)
+        if not number.isdecimal():
+            raise UserError(f"the priority of an interrupt is no number, {name}IP = {level}", "firmware/board",
+                            "define it in include/board/mclv.h as BOARD_PRIORITY_NAME")
+        levels[f"_{'ADC1' if name == 'AD1' else name}Interrupt"] = int(number)
+    return levels
 
 
 def analyse(listing: str, start: int, handlers: dict[str, list[str]], levels: dict[str, int], calls_nothing: tuple[str, ...] = ()) -> Result:

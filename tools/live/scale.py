@@ -1,4 +1,4 @@
-"""Counts of the firmware's variables in engineering units: a name tells the quantity and its format (docs/architecture.md, Numbers)."""
+"""Counts of the firmware's variables in engineering units: a name tells the quantity and its format (docs/formats.md)."""
 
 import re
 from collections.abc import Mapping

@@ -116,7 +116,7 @@ def panels(virtual: bool) -> list[dict[str, Any]]:
 @cache
 def states() -> dict[str, str]:
     """Name and meaning, in the order of their numbers."""
-    return dict(rows("include", "drive/drive.h", "DRIVE_STATE_TABLE", "#name meaning"))
+    return dict(rows("include", "drive/states.h", "DRIVE_STATE_TABLE", "#name meaning"))
 
 
 def faults() -> dict[str, dict[str, str]]:

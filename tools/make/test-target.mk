@@ -1,7 +1,7 @@
 # The unit tests of the control law as the chip runs them: compiled by XC16, in the instruction-set simulator. Uses tools/make/image.mk.
 # Tests with mocks or registers (the board's) and those of the closed loop in floating point stay on the PC.
 law_tests := $(filter-out $(patsubst test/%.c,%,$(shell grep -lE 'mock_|ideal_motor\.h|identify_rig\.h|bringup_rig\.h|<xc\.h>|firmware/board|"board/' $(unit_c:%=test/%.c) /dev/null)),$(unit_c))
-target_test_law = $(patsubst %.c,$X/%.o,$(filter firmware/control/% firmware/drive/%,$(target_sources)))
+target_test_law = $(patsubst %.c,$X/%.o,$(filter firmware/control/% firmware/drive/%,$(firmware_sources)))
 target_test_simulator := $B/target-test
 
 $(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/ports.h $$(iss_folder)/libiss33f.a

@@ -51,7 +51,7 @@ refuse() {
 
 : >"$work/places"
 header=userparams.h
-known='#include "drive/param_table.h"
+known='#include "drive/param_limits.h"
 #include "drive/modes/mode_table.h"
 #define PARAMETER(name, unit, min, max, ...) @parameter@#name@#min .. #max unit@
 #define OTHER(name, ...) @other@#name@@

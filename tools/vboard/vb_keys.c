@@ -219,7 +219,7 @@ static const key_entry_t table[] = {
     P("input.pot_live_zero", controls.pot_zero, 0.0, 0.0, 0.4, "", "share of its range that the potentiometer's signal keeps from each rail; a scenario takes the header's POT_LIVE_ZERO"),
     I("input.flta", controls.flta, 0.0, 0.0, 1.0, "", "1 = an external circuit holds FLTA1 active"),
     /* CPU */
-    P("cpu.isr_us", chip.adc.hold_us, VB_ISR_US, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act, 0.5 of a header with late duties; on a target image what exceeds 13 holds the interrupt up"),
+    P("cpu.isr_us", chip.adc.hold_us, VB_ISR_US, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act, 0.5 of a header with deferred duties; on a target image what exceeds 13 holds the interrupt up"),
     I("cpu.isr_dropped", chip.adc.dropped, 0.0, 0.0, 1.0, "", "1 = the ADC handler is not called any more"),
     I("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
     SP("cpu.crystal_hz", chip.clock.crystal_hz, set_crystal, 8e6, 1e5, 64e6, "Hz", "crystal"),

@@ -1,10 +1,12 @@
-/* IDENTIFY, the background's part: takes the interrupt's sums, computes R, L, Kphi, inertia and friction, and asks for the next step. */
-#include "drive/modes/identify_tick.h"
+/* IDENTIFY: the drive measures R, Ld, Lq, Kphi, inertia and friction of an unknown motor. */
+#include "drive/modes/identify.h"
+
+#include "control/forced_angle.h"
+#include "control/trig.h"
+#include "drive/drive.h"
+#include "drive/states.h"
 
 #ifdef IDENTIFY
-
-#include "control/root.h"
-#include "drive/param_scaling.h"
 
 #define SETTLE_PERIODS PARAM_PERIODS(0.4F) /* ten time constants of the slow current controller */
 #define SLOW_LOOP_RAD_S 25.0F              /* slow enough for R/L from 10 rad/s up, fast enough for SETTLE_PERIODS */
@@ -16,8 +18,8 @@
 #define MEAN_LOG2 12 /* periods of a mean at standstill */
 #define TRY_HALVES 64u
 #define INDUCTANCE_PERIODS 8192u
-#define FIRST_HALF 4u /* periods of half a square wave: short, so that the rotor does not answer */
-#define LAST_HALF 64u
+#define HALF_FIRST 4u /* periods of half a square wave: short, so that the rotor does not answer */
+#define HALF_LAST 64u
 #define BLOCK_LOG2 5  /* periods of a stretch of back-EMF: short against the rotor's swinging */
 #define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
@@ -35,17 +37,21 @@
 
 /* ---- Constants from the board's parameters ---- */
 #define TS_US (PARAM_F(LOOPTIME_SEC) * 1000000.0F)
+
 /* mohm for a bus of 1 (Q16) and one duty count along phase A per current count. */
 #define MOHM_PER_RATIO (1000.0F * PARAM_F(BUS_FULL_SCALE_V) / (65536.0F * 3.0F * (float)PWM_FULL_DUTY * 4.0F * PARAM_F(NORM_CURRENT_CONST)))
 #define C_RESISTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * 16777216.0F), 24)
+
 /* The sums of duties are sums of two. */
 #define C_INDUCTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * TS_US / 2000.0F * 268435456.0F), 28)
 #define C_TS soft_float_scaled((uint32_t)(TS_US / 1000.0F * 16777216.0F), 24) /* uH per mohm */
 #define C_KP soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.000001F * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 16777216.0F), 24)
 #define C_KI soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.001F * PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 268435456.0F), 28)
 #define C_OHMIC soft_float_scaled((uint32_t)(0.001F * 2.0F * PARAM_IU * 4294967296.0F), 32) /* Q13 current to Q14 voltage per mohm */
+
 /* The same per uH and 1/1024 angle count a period. */
 #define C_REACTIVE soft_float_scaled((uint32_t)(0.000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 72057594037927936.0F), 56)
+
 /* mV line to line per 1000 rpm, from Q14 voltage over 1/1024 angle counts a period. */
 #define C_KPHI soft_float_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
                                             * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), \
@@ -53,21 +59,27 @@
 
 /* Torque of one count of q current for a Kphi of 1 mV/krpm, uN m: 3/2 psi P i. */
 #define UNM_PER_COUNT (1000.0F * 1.5F * 60.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * 4.0F * PARAM_F(NORM_CURRENT_CONST))
+
 /* Mechanical rad/s of 1/1024 angle count a period. */
 #define RAD_S_PER_COUNT (2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) / PARAM_F(NOPOLESPAIRS))
+
 /* Currents are means * 2^FOLLOW_LOG2, accelerations counts a period * 128, speeds / 16. */
 #define C_TORQUE soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 1099511627776.0F), 40)
 #define C_INERTIA soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 12800.0F * PARAM_F(LOOPTIME_SEC) \
                                                / RAD_S_PER_COUNT * 65536.0F), \
                                     16)
+
 #define C_DRAG soft_float_scaled((uint32_t)(RAD_S_PER_COUNT / PARAM_F(LOOPTIME_SEC) / 128.0F / 100.0F * 4294967296.0F), 32)
 #define C_VISCOUS soft_float_scaled((uint32_t)(1000.0F / (16.0F * RAD_S_PER_COUNT) * 256.0F), 8)
+
 /* Sums of current over a stretch for a back-EMF of 1 mV/krpm, a speed / 16 and 1/uH that a sample misses which is taken so much late. */
 #define MISSED(late_sec) \
     ((float)(16u << FOLLOW_LOG2) * RAD_S_PER_COUNT * 60000.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * (late_sec) \
      / (4.0F * PARAM_F(NORM_CURRENT_CONST)))
+
 #define SAMPLE_LATE_SEC (PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC)
 #define C_MISSED_COASTING soft_float_scaled((uint32_t)(MISSED(SAMPLE_LATE_SEC) * 16777216.0F), 24)
+
 /* With current, dead time delays one edge of every pulse, whatever the current's sign: its centre moves towards the sample. */
 #define C_MISSED_PUSHING soft_float_scaled((uint32_t)(MISSED(PARAM_MAX(SAMPLE_LATE_SEC - 0.5F * PARAM_F(DEADTIME_SEC), 0.0F)) * 16777216.0F), 24)
 
@@ -99,8 +111,8 @@ void identify_start(drive_t *d, const drive_params_t *p)
     id->result = (uint16_t)IDENTIFY_RESULT_BUSY;
     id->mode = (uint16_t)IDENTIFY_GROW;
     id->shift = SLOW_SHIFT;
-    id->half = FIRST_HALF;
-    id->half_left = FIRST_HALF / 2u;
+    id->half = HALF_FIRST;
+    id->half_left = HALF_FIRST / 2u;
     id->rise_q13 = (int16_t)(p->open_loop_q13 >> 1);
     d->run.control.pi_d.sum = (int32_t)16 << SLOW_SHIFT; /* about ten millivolts */
     d->run.control.ref_q13.d = id->rise_q13;
@@ -220,7 +232,7 @@ static void bias_done(drive_t *d)
     id->bias_q14 = d->run.control.v_q14.d;
     id->square_q14 = (int16_t)(d->circle.limit_q14 >> 7);
     id->mode = (uint16_t)IDENTIFY_INJECT;
-    go(id, IDENTIFY_TRY_D, 4u * FIRST_HALF, TRY_HALVES * FIRST_HALF);
+    go(id, IDENTIFY_TRY_D, 4u * HALF_FIRST, TRY_HALVES * HALF_FIRST);
 }
 
 /** More voltage, then longer halves, until the current changes by 1/6 to 1/3 of Q_CURRENT_REF_OPENLOOP from peak to peak; with a bias of
@@ -239,7 +251,7 @@ static void try_done(drive_t *d, const drive_params_t *p, identify_step_t next)
     }
     if (id->square_q14 < most) {
         id->square_q14 = (int16_t)((id->square_q14 > (most >> 1)) ? most : 2 * id->square_q14);
-    } else if (half < LAST_HALF) {
+    } else if (half < HALF_LAST) {
         half = (uint16_t)(2u * half);
         id->half = half;
     } else {
@@ -726,3 +738,207 @@ uint16_t identify_background(drive_t *d, const drive_params_t *p)
 }
 
 #endif
+
+/* ---- IDENTIFY, the interrupt's part: one PWM period of holding, injecting or turning a vector, or of following the rotor, and of adding up ---- */
+
+#ifdef IDENTIFY
+
+#define IDENTIFY_SWEEP_Q32 ((uint32_t)(715827882.0F / (0.5F / PARAM_F(LOOPTIME_SEC)))) /**< to phase A within half a second */
+
+voltage_q14_t identify_most(const voltage_circle_t *circle)
+{
+    return (int16_t)(circle->limit_q14 - (circle->limit_q14 >> 2));
+}
+
+/** Filtered bus, Q16 of full scale. */
+static uint16_t identify_bus(const drive_t *d)
+{
+    return (uint16_t)((uint32_t)d->bus_q31 >> 15);
+}
+
+int16_t identify_current(const drive_t *d)
+{
+    return (int16_t)(d->run.identify.on_q ? d->phases_q13.a + 2 * d->phases_q13.b : d->phases_q13.a);
+}
+
+/** Duties along the same axis: three times the alpha voltage, or sqrt(3) times three times the beta voltage, over the bus. */
+static int16_t identify_duty(const identify_t *id, const duties_t *duty)
+{
+    int16_t b = (int16_t)duty->b, c = (int16_t)duty->c;
+    return (int16_t)(id->on_q ? 3 * (b - c) : 2 * (int16_t)duty->a - b - c);
+}
+
+void identify_follow(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    int32_t emf = (int32_t)d->run.control.v_q14.q - id->drop_q_q14 - d->run.control.v_q14.d - id->drop_d_q14;
+    id->emf_q22 += (emf * 256 - id->emf_q22) >> 2; /* 0.9 kHz */
+    emf = id->emf_q22 >> 8;
+    emf = (emf < 0) ? 0 : (emf > 32767) ? 32767
+                                        : emf;
+    d->forced.speed_q10 = (int32_t)(qm_muluu((uint16_t)emf, id->speed_per_emf_q5) >> 5);
+    d->forced.angle_q32 = qm_turn_add(d->forced.angle_q32, (uint32_t)d->forced.speed_q10 << 6);
+}
+
+uint16_t identify_turn(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    uint16_t settled = 1;
+    if (id->mode == (uint16_t)IDENTIFY_TURN) {
+        forced_angle_params_t to = p->forced;
+        to.end_speed_q10 >>= id->halvings;
+        if (d->state == (uint16_t)DRIVE_ALIGN) {
+            drive_enter(d, DRIVE_RAMP);
+        }
+        settled = (uint16_t)forced_angle_accelerate(&d->forced, &to, 1, 1);
+        forced_angle_move(&d->forced);
+    } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
+        identify_follow(d);
+    } else if (id->sweep) {
+        d->forced.angle_q32 = qm_turn_add(d->forced.angle_q32, IDENTIFY_SWEEP_Q32);
+        settled = 0;
+        if (d->forced.angle_q32 < IDENTIFY_START_ANGLE_Q32) {
+            d->forced.angle_q32 = 0;
+            id->sweep = 0;
+        }
+    }
+    return settled;
+}
+
+int16_t identify_square(identify_t *id)
+{
+    int16_t sign = (int16_t)((id->sign < 0) ? -1 : 1);
+    if (id->half_left == 0u) {
+        id->half_left = id->half;
+        sign = (int16_t)-sign;
+    }
+    id->half_left--;
+    return sign;
+}
+
+dq_t identify_voltage(drive_t *d, int16_t sign)
+{
+    identify_t *id = &d->run.identify;
+    drive_control_t *c = &d->run.control;
+    pi_gains_t gains_d, gains_q;
+
+    if (id->mode == (uint16_t)IDENTIFY_INJECT) {
+        dq_t v;
+        v.d = id->bias_q14;
+        v.q = 0;
+        if (id->on_q) {
+            v.q = (int16_t)(sign * id->square_q14);
+        } else {
+            v.d = (int16_t)(v.d + sign * id->square_q14);
+        }
+        return v;
+    }
+    if (id->mode == (uint16_t)IDENTIFY_GROW && !id->ready && (d->ticks & 15u) == 0u) {
+        c->pi_d.sum += c->pi_d.sum >> 7;
+    }
+    gains_d.kp = id->kp_d;
+    gains_d.ki = id->ki_d;
+    gains_d.kc = Q15(0.999);
+    gains_d.shift = id->shift;
+    gains_q = gains_d;
+    gains_q.kp = id->kp_q;
+    gains_q.ki = id->ki_q;
+    return current_control(&c->pi_d, &gains_d, &c->pi_q, &gains_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
+}
+
+void identify_add(drive_t *d, const drive_params_t *p)
+{
+    identify_t *id = &d->run.identify;
+    int16_t i_q13 = identify_current(d);
+    if (id->mode == (uint16_t)IDENTIFY_TURN) {
+        id->sum[0] += d->run.control.v_q14.d;
+        id->sum[1] += d->run.control.v_q14.q;
+        id->sum[2] += d->run.control.i_q13.d;
+        id->sum[3] += d->run.control.i_q13.q;
+    } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
+        id->sum[0] += d->forced.speed_q10;
+        id->sum[1] += d->run.control.i_q13.q;
+    } else if (id->mode != (uint16_t)IDENTIFY_INJECT) {
+        id->sum[0] += id->duty - 4 * p->svm.dead_time;
+        id->sum[1] += i_q13;
+        id->sum[2] += d->phases_q13.b;
+        id->sum[3] += identify_bus(d);
+    } else if (id->sign == id->sign_before) {
+        int16_t s = id->sign;
+        int32_t duties = 2 * (int32_t)id->duty;
+        id->sum[0] += s * duties;
+        id->sum[1] += s * ((int32_t)i_q13 + id->i_before_q13);
+        id->sum[2] += s * ((int32_t)i_q13 - id->i_before_q13);
+    } else {
+        /* the mean is no square voltage */
+    }
+}
+
+void identify_record(drive_t *d, const drive_params_t *p, uint16_t settled)
+{
+    identify_t *id = &d->run.identify;
+    uint16_t done = 0;
+    if (id->ready || !settled) {
+        return;
+    }
+    if (id->mode == (uint16_t)IDENTIFY_GROW) {
+        done = (uint16_t)(d->run.control.i_q13.d >= id->rise_q13 || d->run.control.v_q14.d >= identify_most(&d->circle));
+    } else if (id->wait != 0u) {
+        id->wait--;
+    } else {
+        identify_add(d, p);
+        id->left--;
+        done = (uint16_t)(id->left == 0u);
+    }
+    if (done) {
+        id->bus_q16 = identify_bus(d);
+        id->at = d->ticks;
+        id->ready = 1;
+    }
+}
+
+/** Modulation. Dead time is compensated for the currents that are asked for at the centre of the pulse, not for the measured ones:
+ *  those are a period older, and compensation that follows them makes a phase's current stick at zero for a while. Turning, that
+ *  costs up to 0.3 V across the current, which is where the back-EMF is; standing, the first current would come with a jump. */
+static void identify_duties(const drive_t *d, const drive_params_t *p, duties_t *duty)
+{
+    phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
+    dead_duties_t dead;
+    svm_compensation(&p->svm, asked, &dead);
+    svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16, &dead, &asked, duty);
+}
+
+void identify_run(drive_t *d, const drive_params_t *p, duties_t *duty)
+{
+    identify_t *id = &d->run.identify;
+    drive_control_t *c = &d->run.control;
+    int16_t sign;
+
+    c->i_q13 = park(clarke(d->phases_q13.a, d->phases_q13.b), d->frame);
+    identify_record(d, p, identify_turn(d, p));
+    sign = identify_square(id);
+    c->v_q14 = identify_voltage(d, sign);
+    d->angle = forced_angle(&d->forced);
+    d->frame = trig_sincos(d->angle);
+    identify_duties(d, p, duty);
+    id->sign_before = id->sign;
+    id->sign = sign;
+    id->duty = identify_duty(id, duty);
+    id->i_before_q13 = identify_current(d);
+    if (!d->command.run) {
+        drive_enter(d, DRIVE_STOPPED);
+    }
+}
+
+#endif
+
+uint16_t mode_background(drive_t *d, const drive_params_t *p)
+{
+#ifdef IDENTIFY
+    return identify_background(d, p);
+#else
+    (void)d;
+    (void)p;
+    return 0;
+#endif
+}

@@ -1,16 +1,17 @@
 /* BRINGUP: the first day with a board. Step by step, with little current, the drive checks what no source confirms.
  *
- * The control interrupt is the instrument (bringup_tick.h): it drives a voltage vector until a current flows, turns it, and adds up what it
- * sees.
- * The background leads through the steps: bringup_guide.c takes the one that is due. The steps, in their order, are in bringup_panel.c,
- * bringup_rest.c, bringup_directions.c, bringup_gains.c and bringup_turn.c; they use the instrument by bringup_measure.c, judge by
- * bringup_judge.c and speak by bringup_say.c, whose lines board/modes/bringup_report.c writes.
+ * The control interrupt is the instrument: it drives a voltage vector until a current flows, turns it, and adds up what it sees. The background
+ * leads through the steps (bringup_steps.c), judges the instrument's numbers, and says what follows; board/modes/mode_board.c writes the lines.
  * `ready` names the owner of the instrument: 1 the background, 0 the interrupt. */
 #ifndef DRIVE_MODES_BRINGUP_H
 #define DRIVE_MODES_BRINGUP_H
 
 #include "control/qmath.h"
-#include "drive/param_scaling.h" /* userparams.h may define BRINGUP */
+#include "control/svm.h"
+#include "drive/faults.h"
+#include "drive/forward.h"
+#include "drive/panel.h"
+#include "drive/param_scaling.h"
 
 /** The most current that any step asks for, as a share of MAXIMUM_CURRENT_A. Over-current, bus and fault input protect as ever. */
 #define BRINGUP_CURRENT_SHARE 0.3
@@ -50,7 +51,7 @@
 
 /** X(name, remedy): what can be wrong. ~ stands for a phase. A remedy names what to look at first, then the line to change. */
 #define BRINGUP_FINDING_TABLE(X) \
-    X(UART_PIN, "BOARD_PIN_UART_TX and BOARD_UART_TX_PIN in include/board/mclv.h: take the other pin") \
+    X(UART_PIN, "BOARD_PIN_UART_TX in include/board/mclv.h: take the other pin") \
     X(BUTTON_DOWN, "a button is down at rest: BOARD_PIN_S2, BOARD_PIN_S3 in include/board/mclv.h") \
     X(BUTTONS_SWAPPED, "swap BOARD_PIN_S2 and BOARD_PIN_S3 in include/board/mclv.h") \
     X(BUTTON_DEAD, "no other button came: BOARD_PIN_S2, BOARD_PIN_S3 in include/board/mclv.h") \
@@ -79,21 +80,25 @@
     X(DEAD_TIME, "the driver adds or takes off: DEADTIME_SEC in userparams.h, dead_time in tuning/boards/*.toml") \
     X(SHORT_CIRCUIT, "the fault input tripped: dead time too short, a transistor that never turns off, a short in the motor") \
     X(OVERCURRENT, "more current than OVER_CURRENT_THRESHOLD_A: a short in the motor, offsets, or the current signals") \
-    X(FAULT, "the drive stopped with the fault # of docs/faults.md") \
+    X(FAULT, "the drive stopped with the fault $ of docs/faults.md") \
     X(DIRECTION, "swap any two motor wires") \
     X(POLE_PAIRS, "NOPOLESPAIRS in userparams.h, pole_pairs in tuning/motors/*.toml") \
     X(STANDS, "the shaft does not turn: free it, take the load off")
+
 /* clang-format on */
 
 #ifdef BRINGUP
 
 #define BRINGUP_QUESTION_ENUM(name, text) BRINGUP_ASK_##name,
+
 typedef enum { BRINGUP_QUESTION_TABLE(BRINGUP_QUESTION_ENUM) BRINGUP_QUESTIONS } bringup_question_t;
 
 #define BRINGUP_VALUE_ENUM(name, unit, decimals, text) BRINGUP_VALUE_##name,
+
 typedef enum { BRINGUP_VALUE_TABLE(BRINGUP_VALUE_ENUM) BRINGUP_VALUES } bringup_value_t;
 
 #define BRINGUP_FINDING_ENUM(name, remedy) BRINGUP_##name,
+
 typedef enum { BRINGUP_FINDING_TABLE(BRINGUP_FINDING_ENUM) BRINGUP_FINDINGS } bringup_finding_t;
 
 /** The instrument: part of a run, so a start clears it. */
@@ -120,10 +125,208 @@ typedef struct {
 } bringup_run_t;
 
 #define BRINGUP_FULL_Q13 CURRENT_Q13(PARAM_F(BRINGUP_CURRENT_SHARE) * PARAM_F(MAXIMUM_CURRENT_A)) /* |A| + |B| of a step */
-
 #define BRINGUP_STATE bringup_run_t bringup;
+
 #else
 #define BRINGUP_STATE
+#endif
+
+#ifdef BRINGUP
+
+#define BRINGUP_HALF_DUTY (PWM_FULL_DUTY / 2)
+
+/** Adds up, in every state. @param settled the amplitude stands */
+void bringup_add(drive_t *d, uint16_t settled);
+
+/** 1, 0 or -1: where the amplitude goes. A measurement stays at the amplitude where the current is reached; a vector that turns keeps the
+ *  current, for dead time takes more or less of it at each angle. */
+int16_t bringup_direction(bringup_run_t *t, int16_t carried_q13);
+
+/** A period of an electrical turn, or of the pause after it. */
+void bringup_turn(bringup_run_t *t);
+
+/** A period with the bridge switching: no law, no compensation, just a vector. */
+void bringup_run(drive_t *d, const drive_params_t *p, duties_t *duty);
+
+/** The background's first word of a start: the instrument is its own. */
+void bringup_start(drive_t *d, const drive_params_t *p);
+
+#endif
+
+/** A period with the bridge off: the mode may add up the samples. */
+void mode_idle(drive_t *d);
+
+/* ---- The judge: what currents in six directions say: which signal follows which leg, what is open or dead, resistance and dead time ---- */
+
+#ifdef BRINGUP
+
+#define BRINGUP_DIRECTIONS 6u
+
+/** Currents and amplitudes of the six directions +A, -C, +B, -A, +C, -B at one level. */
+typedef struct {
+    current_q13_t a[BRINGUP_DIRECTIONS], b[BRINGUP_DIRECTIONS];
+    int16_t amplitude[BRINGUP_DIRECTIONS]; /**< duty counts of the direction's phase */
+} bringup_level_t;
+
+/** What the currents say of the wires. Masks: bit 0 phase or signal A, 1 B, 2 C. */
+typedef struct {
+    uint16_t dead;            /**< current signals that do not follow */
+    uint16_t leg[2];          /**< the leg that each signal follows, 0..2 */
+    uint16_t inverted;        /**< signals with the wrong sign */
+    uint16_t open, high, low; /**< phases that carry nothing; whose high, whose low side never turns on */
+} bringup_wiring_t;
+
+/** What the bridge says to two levels of current. */
+typedef struct {
+    uint16_t resistance_mohm; /**< by signal A */
+    uint16_t b_percent_of_a;  /**< both signals where their legs carry the same: along the third phase */
+    uint16_t dead_time_ns;
+} bringup_bridge_t;
+
+/** @param full all of the current @return what is connected to what */
+bringup_wiring_t bringup_wiring(const bringup_level_t *full);
+
+/** @param half less current than full @param w whose signals follow two legs @param bus_10mv of the bridge */
+bringup_bridge_t bringup_bridge(const bringup_level_t *half, const bringup_level_t *full, const bringup_wiring_t *w, uint16_t bus_10mv);
+
+/** A current in mA. */
+int16_t bringup_ma(current_q13_t i_q13);
+
+/* ---- The guide, in the background: what it knows of the board so far, and what it says next ---- */
+
+/** What kind of line is said next. */
+typedef enum {
+    BRINGUP_SILENT,
+    BRINGUP_ASKS,  /**< code: bringup_question_t, value */
+    BRINGUP_TELLS, /**< code: bringup_value_t; value, and low to high, within which it is right */
+    BRINGUP_SHOWS, /**< code: the direction; value: its voltage in 10 mV, low and high: both currents in mA */
+    BRINGUP_FINDS, /**< code: bringup_finding_t, value */
+    BRINGUP_ENDS   /**< value: how many findings */
+} bringup_kind_t;
+
+/** A line to be said. Whoever has said it makes it BRINGUP_SILENT. */
+typedef struct {
+    uint16_t kind; /**< bringup_kind_t */
+    uint16_t code;
+    uint16_t part; /**< phase or signal, 0: A; for questions of the serial line, its pin */
+    int32_t value, low, high;
+} bringup_message_t;
+
+#define BRINGUP_LINES_BOTH 2u /* not one of the two pins, but both */
+
+/** X(name): steps in their order. */
+#define BRINGUP_STEP_TABLE(X) \
+    X(BEGIN) \
+    X(S3) \
+    X(UART) \
+    X(LED_ALIVE) \
+    X(LED_ALIVE_OTHER) \
+    X(LED_RUN) \
+    X(LED_RUN_OTHER) \
+    X(POT_LEFT) \
+    X(POT_RIGHT) \
+    X(POT) \
+    X(BUS) \
+    X(OFFSETS) \
+    X(NOISES) \
+    X(SIGNALS) \
+    X(FAULT_REST) \
+    X(FAULT_INPUT) \
+    X(FAULT_OPEN) \
+    X(CURRENT) \
+    X(DRIVE) \
+    X(SHOW) \
+    X(WIRING) \
+    X(BRIDGE) \
+    X(AMMETER) \
+    X(GAINS) \
+    X(DIRECTION) \
+    X(MARK) \
+    X(TURNS) \
+    X(LAST) \
+    X(END)
+
+#define BRINGUP_STEP_ENUM(name) BRINGUP_STEP_##name,
+
+typedef enum { BRINGUP_STEP_TABLE(BRINGUP_STEP_ENUM) BRINGUP_STEPS } bringup_step_t;
+
+/** All of it. */
+typedef struct {
+    bringup_message_t message;
+    uint16_t pending, pending_part; /**< a finding that follows a value: bringup_finding_t; BRINGUP_FINDINGS: none */
+    uint16_t step;                  /**< bringup_step_t */
+    uint16_t index;                 /**< what a step is at */
+    uint16_t phase;                 /**< of a measurement: 0 before it */
+    uint16_t waited_ms;
+    uint16_t found;   /**< findings so far */
+    uint16_t blocked; /**< 1: no current before it is mended */
+    uint16_t sender;  /**< pin of the serial line, 0, 1, or BRINGUP_LINES_BOTH */
+    button_t s2, s3;
+    uint16_t asked, button;      /**< 1 once the question is asked; the button since, 0, 2 or 3 */
+    uint16_t first;              /**< the button that came first */
+    uint16_t swapped;            /**< 1: S2 and S3 have changed places */
+    uint16_t leds;               /**< bit 0 ALIVE, bit 1 RUN */
+    uint16_t leds_judged;        /**< 1: no further question about them */
+    int16_t pot_left, pot_right; /**< % */
+    uint16_t yes;                /**< the ammeter shows what it should */
+    current_q13_t mean[2], off[2];
+    bringup_level_t half, full;
+    bringup_wiring_t wiring;
+    bringup_bridge_t bridge;
+} bringup_guide_t;
+
+/** Begins anew. */
+void bringup_init(bringup_guide_t *g);
+
+/** A pass of the background, in place of panel_tick(). @param pot_q15 signed fractional */
+panel_lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const panel_inputs_t *in, int16_t pot_q15);
+
+/** A line without a value. */
+void bringup_say(bringup_guide_t *g, bringup_kind_t kind, uint16_t code, uint16_t part);
+
+/** On to a step, from its beginning. */
+void bringup_go(bringup_guide_t *g, bringup_step_t step);
+
+/** Something is wrong; the rest can be checked nevertheless. */
+void bringup_find(bringup_guide_t *g, bringup_finding_t finding, uint16_t part);
+
+/** Something is wrong, and the rest has no meaning or is dangerous: to the end. */
+void bringup_give_up(bringup_guide_t *g, bringup_finding_t finding, uint16_t part);
+
+/** A value with its range. @return 1 if it is inside */
+uint16_t bringup_tell(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high);
+
+/** A value with its range; outside of it the finding follows. */
+void bringup_tell_or_find(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high,
+                          bringup_finding_t finding);
+
+/** Asks once and waits. @return the button that answers, 2 or 3; 0: none yet */
+uint16_t bringup_answered(bringup_guide_t *g, bringup_question_t question, uint16_t part, int32_t value);
+
+#define BRINGUP_10MV(volts) ((int32_t)(PARAM_F(volts) * 100.0F + 0.5F))
+#define BRINGUP_SWING_PERIODS PARAM_PERIODS(0.3F) /* the rotor swings into the field */
+
+/* Most amplitude: 1.6 times what R and half as much again as what dead time take. Whatever the signals say, it bounds the current. */
+#define BRINGUP_MOST_A (1.6F * PARAM_F(BRINGUP_CURRENT_SHARE) * PARAM_F(MAXIMUM_CURRENT_A))
+#define BRINGUP_MOST_V (BRINGUP_MOST_A * (PARAM_F(MOTOR_RS_OHM) + 0.05F) + 1.5F * 4.0F / 3.0F * PARAM_DEAD_TIME_V)
+#define BRINGUP_MOST_ROOM (PARAM_F(PWM_TOP_DUTY) - PARAM_F(PWM_FULL_DUTY) / 2.0F)
+#define BRINGUP_MOST_AMPLITUDE ((int16_t)PARAM_MIN(BRINGUP_MOST_V / PARAM_F(NOMINAL_BUS_V) * PARAM_F(PWM_FULL_DUTY), BRINGUP_MOST_ROOM))
+
+/** Sums anew, after so many periods at the amplitude. Write all else before: from here on the interrupt owns the instrument. */
+void bringup_measure(drive_t *d, uint16_t wait);
+
+/** The mean of a complete sum. */
+int16_t bringup_mean_of(int32_t sum);
+
+/** The bridge begins to switch, without a vector. Phase 0 of the step becomes 1. @return 1 when it does, or when it will not */
+uint16_t bringup_started(bringup_guide_t *g, drive_t *d, const drive_params_t *p);
+
+/** What has switched the bridge off is a finding, and ends it. @return 1 if something has */
+uint16_t bringup_has_tripped(bringup_guide_t *g, const drive_t *d);
+
+/** The bus voltage. */
+uint16_t bringup_bus_10mv(const drive_t *d);
+
 #endif
 
 #endif

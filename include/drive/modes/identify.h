@@ -6,9 +6,13 @@
 #ifndef DRIVE_MODES_IDENTIFY_H
 #define DRIVE_MODES_IDENTIFY_H
 
+#include "control/current_control.h"
 #include "control/qmath.h"
 #include "control/soft_float.h"
-#include "drive/param_scaling.h" /* userparams.h may define IDENTIFY */
+#include "control/svm.h"
+#include "control/transforms.h"
+#include "drive/forward.h"
+#include "drive/param_scaling.h"
 
 /** X(name, meaning): steps of the procedure. */
 #define IDENTIFY_STEP_TABLE(X) \
@@ -50,9 +54,11 @@
 #ifdef IDENTIFY
 
 #define IDENTIFY_STEP_ENUM(name, meaning) IDENTIFY_##name,
+
 typedef enum { IDENTIFY_STEP_TABLE(IDENTIFY_STEP_ENUM) IDENTIFY_STEP_COUNT } identify_step_t;
 
 #define IDENTIFY_RESULT_ENUM(code, name, cause, remedy) IDENTIFY_RESULT_##name = (code),
+
 typedef enum { IDENTIFY_RESULT_TABLE(IDENTIFY_RESULT_ENUM) IDENTIFY_RESULT_COUNT } identify_result_t;
 
 /** What the interrupt does with the bridge. */
@@ -137,8 +143,63 @@ typedef struct {
 } identify_t;
 
 #define IDENTIFY_STATE identify_t identify;
+
 #else
 #define IDENTIFY_STATE
 #endif
+
+/* ---- IDENTIFY, the interrupt's part: one PWM period of holding, injecting or turning a vector, or of following the rotor, and of adding up ---- */
+
+#ifdef IDENTIFY
+
+#define IDENTIFY_START_ANGLE_Q32 0xD5555555ul /**< -60 degrees: all three phases carry current */
+
+/** Largest voltage that holds a current: the rest is for the square voltage. */
+voltage_q14_t identify_most(const voltage_circle_t *circle);
+
+/** Current along the axis of the square voltage, in counts that both axes share: phase A, or A + 2 B = sqrt(3) beta. */
+int16_t identify_current(const drive_t *d);
+
+/** Moves the frame along with the rotor. As in the estimator (Equation 2), the sum of both components is the speed; a frame that leads has
+ *  a negative speed of its own. The voltage that was commanded a period ago is centred on this sample, whose frame this still is. */
+void identify_follow(drive_t *d);
+
+/** Moves the frame. @return 1 when it stands or has reached its speed */
+uint16_t identify_turn(drive_t *d, const drive_params_t *p);
+
+/** Sign of the square voltage in the next period. */
+int16_t identify_square(identify_t *id);
+
+/** Next voltage in the frame. @param sign of the square voltage */
+dq_t identify_voltage(drive_t *d, int16_t sign);
+
+/** One period of sums.
+ *
+ *  Standing: duties along phase A less the dead-time compensation in them, current of phase A, of phase B, and the bus.
+ *  Square voltage: with the sign s as instrument, duties, currents and current differences. A voltage commanded at sample n acts for
+ *  one period from the boundary after it, half of it before sample n+1 and half after; so between the last two samples acted
+ *  the mean of the vectors commanded one and two periods before this one; where their signs differ it says nothing, else both are
+ *  alike.
+ *  Turning: voltage d and q (centred on the sample, as commanded a period ago), current d and q.
+ *  Following: speed, q current. */
+void identify_add(drive_t *d, const drive_params_t *p);
+
+/** Waits, then adds up, then hands over to the background. @param settled the frame stands or has its speed */
+void identify_record(drive_t *d, const drive_params_t *p, uint16_t settled);
+
+/** A period with the bridge switching; S2 stops at once. */
+void identify_run(drive_t *d, const drive_params_t *p, duties_t *duty);
+
+/** Prepares the first step. */
+void identify_start(drive_t *d, const drive_params_t *p);
+
+/** The background's part: evaluates a finished step and asks for the next one. Once a millisecond.
+ *  @return 1 when the procedure is not running: the bridge is to be off */
+uint16_t identify_background(drive_t *d, const drive_params_t *p);
+
+#endif
+
+/** A pass of the background. @return 1 when the motor is to stop */
+uint16_t mode_background(drive_t *d, const drive_params_t *p);
 
 #endif

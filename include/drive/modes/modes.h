@@ -1,4 +1,4 @@
-/* The seam between the drive and its modes: each mode is one file, which defines its hook twice, with the mode and without it.
+/* The seam between the drive and its modes: each mode defines its hook twice, with the mode and without it.
  *
  * hook                  mode                   what it takes over
  * MODE_RUN              IDENTIFY, BRINGUP      a period with the bridge switching
@@ -15,17 +15,14 @@
  * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
  * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
  *
- * SNAPSHOT (modes/snapshot.h) is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of panel_tick(). */
+ * SNAPSHOT is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of panel_tick(). */
 #ifndef DRIVE_MODES_MODES_H
 #define DRIVE_MODES_MODES_H
 
-#include "drive/modes/bidirectional.h"
-#include "drive/modes/bringup_tick.h"
-#include "drive/modes/identify_tick.h"
-#include "drive/modes/open_loop.h"
-#include "drive/modes/params_in_ram.h"
-#include "drive/modes/torque.h"
-#include "drive/modes/tuning.h"
+#include "control/qmath.h"
+#include "drive/forward.h"
+#include "drive/modes/bringup.h"
+#include "drive/modes/identify.h"
 
 /** What runs a period with the bridge switching; and 1 where ALIGN is the start's. */
 #if defined IDENTIFY
@@ -40,16 +37,80 @@
 #endif
 
 /** The last thing that drive_start() prepares. */
-QM_INLINE void mode_start(drive_t *d, const drive_params_t *p)
-{
-#if defined IDENTIFY
-    identify_start(d, p);
-#elif defined BRINGUP
-    bringup_start(d, p);
+void mode_start(drive_t *d, const drive_params_t *p);
+
+/* ---- What the modes add to the state of a run: nothing unless userparams.h or DEFINES switches one on ---- */
+
+/** Members of drive_run_t. */
+#define MODE_STATE IDENTIFY_STATE BRINGUP_STATE
+
+/** 0 where no state has a closed loop: what belongs to it is left out. */
+#ifdef BRINGUP
+#define MODE_CLOSES_LOOP 0
 #else
-    (void)d;
-    (void)p;
+#define MODE_CLOSES_LOOP 1
 #endif
-}
+
+/* ---- OPEN_LOOP_FUNCTIONING: the forced angle keeps turning the motor at END_SPEED_RPM, for a first look at currents and voltages ---- */
+
+/** 1 if the end of the ramp leads to closed loop. */
+uint16_t mode_hands_over(void);
+
+/* ---- TUNING: in closed loop the reference climbs slowly to the maximum speed, whatever the potentiometer says ---- */
+
+/** The speed that the reference goes to. STOPPING ramps to three quarters of the minimum speed, where it ends: the rates follow the
+ *  reference. */
+speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p);
+
+/** One step of the reference in closed loop. @return 1 if the mode has taken it; a stop is never its own */
+uint16_t mode_reference_step(drive_t *d, const drive_params_t *p);
+
+/* ---- BIDIRECTIONAL_SPEED: the middle of the potentiometer is the lowest speed, its two halves are the two directions ---- */
+
+#ifdef BIDIRECTIONAL_SPEED
+#define MODE_TWO_DIRECTIONS 1
+#else
+#define MODE_TWO_DIRECTIONS 0
+#endif
+
+/** The potentiometer's travel and direction. @param direction of the running motor, which the middle keeps; becomes +1 or -1
+ *  @return the travel, Q16 */
+uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction);
+
+/* ---- TORQUE_MODE: the potentiometer commands the q current; speed is only limited ---- */
+
+/** Ends of the potentiometer's travel: speeds, or q currents in Q13. */
+typedef struct {
+    int16_t low, high;
+} mode_range_t;
+
+/** What the potentiometer's travel means. @param fast_range S3's speed range, NOMINAL to MAXIMUM; not with two directions */
+mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range);
+
+/** 1 while the mode, and no speed controller, makes the q current. */
+uint16_t mode_commands_current(const drive_t *d);
+
+/** The q current in CLOSED: as commanded, between what would hold the minimum speed, below which the estimator would lose the rotor, and
+ *  what holds the maximum speed. Both come from the speed controller's own law, which has no memory: limits are met and left without
+ *  a bounce, and a stop goes on from what is there. @param iq_q13 the result @return 1 if the mode has taken the step */
+uint16_t mode_current_step(drive_t *d, const drive_params_t *p, current_q13_t *iq_q13);
+
+/** Why the commanded current is not given. @param reasons the result @return 1 if the mode, and no speed reference, is in command */
+uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t *reasons);
+
+/* ---- SNAPSHOT, AN1292's recorder: four arrays filled with one row every SNAPDELAY periods, on request ---- */
+
+/** Recorder; the arrays belong to the board and bear AN1292's names. */
+typedef struct {
+    int16_t *column[4];       /**< SnapBuf1..4: phase current a, q current, filtered speed, angle */
+    uint16_t rows;            /**< DATA_BUFFER_SIZE */
+    uint16_t delay;           /**< SNAPDELAY, periods per row */
+    volatile uint16_t *start; /**< set to 1 to record; goes back to 0 when done */
+    volatile uint16_t *done;  /**< 1 when the arrays are full */
+    uint16_t row, wait;
+} snapshot_t;
+
+/** One period of the recorder. Currents are in AN1292's format (Q15 of full scale). */
+void snapshot_tick(snapshot_t *s, const drive_t *d);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "panel_rig.h"
 
-#include "drive/modes/bringup_guide.h"
+#include "drive/modes/bringup.h"
 
 #define PRESS_MS (PANEL_DEBOUNCE_MS + 5u)
 

@@ -41,7 +41,7 @@ static inline void dead_time_expect_each(int16_t half_steps)
             dead_time_closed(direction, (angle_t)(n * 1638u));
             drive_prepare(&drive, &p);
             dead_time_expect(&p, half_steps, &drive.dead, n);
-            dead_time_expect(&p, (int16_t)(half_steps + 2), &drive.dead_second[0], n);
+            dead_time_expect(&p, (int16_t)(half_steps + 2), &drive.dead_second, n);
         }
     }
 }

@@ -4,6 +4,7 @@
 
 #include "hurst_params.h"
 
+#include "drive/speed.h"
 #include "drive/tick.h"
 #include "drive/param_init.h"
 #include "golden.h"
@@ -62,11 +63,11 @@ static inline void rig_currents(int16_t a_q13, int16_t b_q13)
 static inline void rig_tick(uint16_t periods)
 {
     while (periods-- != 0u) {
-        if (!drive_tick(&drive, &params, &samples, &out.duty) || drive_slow_is_due(&drive)) {
+        if (!drive_tick(&drive, &params, &samples, &out.duty) || drive_slow_follows(&drive)) {
             (void)drive_slow(&drive, &params, &samples);
         }
         out.outputs = drive_outputs(&drive);
-        if (drive_settle(&drive)) {
+        if (drive_latch_fault(&drive)) {
             out.outputs = (uint16_t)OUTPUTS_OFF;
         }
     }
@@ -118,8 +119,28 @@ static inline void rig_speed(int16_t speed_erpm)
 {
     drive.run.observer.omega_q16 = (int32_t)speed_erpm * 65536;
     drive.run.estimator.omega_filtered_q16 = (int32_t)speed_erpm * 65536;
+    estimator_choose_span(&drive.run.estimator, &params.estimator);
     drive.run.estimator.omega_erpm = speed_erpm; /* as steady as it is filtered */
     drive.run.estimator.omega_before_erpm = speed_erpm;
+}
+
+/** In RAMP, so many steps of agreement. */
+static inline void rig_agreed(uint16_t steps)
+{
+    drive.run.handover.agreed_steps = steps;
+    handover_enter(&drive.run.handover, (steps >= params.agree_steps) ? START_RELEASE : START_AGREE);
+}
+
+static inline void rig_emf(int16_t d_q12, int16_t q_q12)
+{
+    drive.run.estimator.e_d_q28 = (int32_t)d_q12 * 65536;
+    drive.run.estimator.e_q_q28 = (int32_t)q_q12 * 65536;
+}
+
+/** Header's R times a current is this share of a back-EMF of 4000. */
+static inline int16_t rig_current_of_ri(float share)
+{
+    return (int16_t)(share * 4000.0F * 65536.0F / (float)params.adaptation.rs_base_q16 / (float)(1 << params.estimator.rs_exp));
 }
 
 /** In closed loop without the way there: the estimator turns at a speed and nothing changes it but the samples. */
@@ -132,7 +153,7 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
     drive.run.control.reference_erpm = speed_erpm;
     drive.run.control.ref_q13.q = 0;
     rig_speed(speed_erpm);
-    drive.run.handover.speed_is_preset = 1;
+    drive.run.handover.phase = (uint16_t)START_DONE;
     speed_follow(&drive.run, &params);
 }
 

@@ -4,8 +4,7 @@
 
 #include "hurst_params.h"
 
-#include "board/lnet.h"
-#include "board/memory_map.h"
+#include "board/scope.h"
 
 #define REACHED __attribute__((section("fw_ram")))
 

@@ -4,7 +4,7 @@
 
 #include "drive_rig.h"
 
-#include "drive/panel_tick.h"
+#include "drive/panel.h"
 
 static panel_t the_panel;
 static panel_inputs_t inputs;

@@ -1,0 +1,143 @@
+/* What the running motor teaches about itself, and what a salient motor adds. */
+#include "drive/model.h"
+
+#include "control/estimator.h"
+#include "control/observer.h"
+#include "control/transforms.h"
+#include "control/trig.h"
+#include "drive/drive.h"
+#include "drive/states.h"
+
+void salient_model(drive_run_t *run, const drive_params_t *p)
+{
+#if MOTOR_SALIENCY_UH
+    salience_update(&run->salience, p->salience_q13, qm_hi(run->adaptation.kfi_q31));
+    run->model.inv_kfi = adaptation_kfi(salience_kfi(&run->salience, run->model.inv_kfi));
+#else
+    (void)run;
+    (void)p;
+#endif
+}
+
+/** In closed loop the control's frame is the rotor's. What the hand-over has of current along the flux counts half more, as with magnets a fifth
+ *  weaker than the header's: with too much flux in its model the estimator loses its lock. Before drive_update_model(). */
+static void salient_sees_current(drive_run_t *run)
+{
+#if MOTOR_SALIENCY_UH
+    int16_t id_q13 = run->control.i_q13.d;
+    run->salience.id_q13 = (int16_t)((id_q13 > 0) ? id_q13 + (id_q13 >> 1) : id_q13);
+#else
+    (void)run;
+#endif
+}
+
+/** On the forced angle the estimator's frame is the rotor's, as soon as it agrees. There is more such current, so it counts three quarters more: the
+ *  estimator finds its lock with half of the flux in its model, but not with half too much. Before drive_update_model(). */
+static void salient_sees_forced_current(drive_t *d)
+{
+#if MOTOR_SALIENCY_UH
+    drive_run_t *run = &d->run;
+    sincos_t turn;
+    int16_t id_q13;
+    turn = trig_sincos((angle_t)(d->angle - estimator_next_angle(&run->estimator)));
+    id_q13 = (int16_t)(2 * inverse_park(run->control.i_q13, turn).alpha);
+    run->salience.id_q13 = (int16_t)((id_q13 > 0) ? id_q13 + (id_q13 >> 1) + (id_q13 >> 2) : id_q13);
+#else
+    (void)d;
+#endif
+}
+
+current_q13_t salient_torque(const drive_run_t *run, current_q13_t iq_q13)
+{
+#if MOTOR_SALIENCY_UH
+    return salience_torque(&run->salience, iq_q13);
+#else
+    (void)run;
+    return iq_q13;
+#endif
+}
+
+int32_t salient_current_q26(const drive_run_t *run, int32_t torque_q26)
+{
+#if MOTOR_SALIENCY_UH
+    return salience_current_q26(&run->salience, torque_q26);
+#else
+    (void)run;
+    return torque_q26;
+#endif
+}
+
+uint16_t salient_current_beside(const drive_run_t *run, const drive_params_t *p, current_q13_t id_q13)
+{
+    uint16_t torque_q13 = (uint16_t)qm_abs(salient_torque(run, run->control.ref_q13.q));
+#if MOTOR_SALIENCY_UH
+    return qm_divud(qm_muluu(torque_q13, p->salience_q13), (uint16_t)(p->salience_q13 - (uint16_t)id_q13));
+#else
+    (void)p;
+    (void)id_q13;
+    return torque_q13;
+#endif
+}
+
+current_q13_t salient_id(drive_run_t *run, const drive_params_t *p)
+{
+#if MOTOR_SALIENCY_UH
+    int16_t least = run->salience.least_q13;
+    salience_least(&run->salience, p->salience_q13, run->control.ref_q13.q, (uint16_t)(run->probe_id_q13 == 0));
+    return (int16_t)((-least < run->fieldweak.table_q13) ? -least : run->fieldweak.table_q13);
+#else
+    (void)p;
+    return run->fieldweak.table_q13;
+#endif
+}
+
+voltage_q12_t model_header_ri(const drive_params_t *p, current_q13_t i_q13)
+{
+    return (int16_t)(qm_mulhi_su(i_q13, p->adaptation.rs_base_q16) * (1 << p->estimator.rs_exp));
+}
+
+voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p)
+{
+    return (int16_t)(qm_mulhi_su(run->control.i_q13.q, run->model.rs_q16) * (1 << p->estimator.rs_exp));
+}
+
+/** 1 where the closed loop teaches: it rests until the observer runs, while the speed changes fast, and at the limits of current and voltage. It does
+ *  not wait for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock needs it before; what dR i_d puts into Ed passes with
+ *  that current. */
+static uint16_t model_is_taught(const drive_run_t *run)
+{
+    const drive_control_t *c = &run->control;
+    return (uint16_t)(run->handover.phase == (uint16_t)START_DONE && observer_gate_is_closed(&run->observer) && qm_abs(c->v_q14.q) < c->vq_limit_q14
+                      && qm_abs(c->ref_q13.q) < c->iq_limit_q13);
+}
+
+void model_learn_step(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    voltage_q12_t ri_q12 = 0;
+    if (drive_is_closed(d)) {
+        if (!model_is_taught(run)) {
+            return;
+        }
+        ri_q12 = model_ri(run, p);
+    } else if (d->state != (uint16_t)DRIVE_RAMP || !d->run.handover.at_end) {
+        return; /* nothing turns that the estimator could see */
+    } else {
+        /* flux alone */
+    }
+    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), ri_q12);
+}
+
+void model_update(drive_t *d, const drive_params_t *p)
+{
+    salient_sees_current(&d->run);
+    drive_update_model(&d->run, p, d->run.control.reference_erpm);
+}
+
+void model_update_in_ramp(drive_t *d, const drive_params_t *p)
+{
+    if (d->state == (uint16_t)DRIVE_RAMP) {
+        salient_sees_forced_current(d);
+        drive_update_model(&d->run, p, p->end_erpm);
+    }
+}

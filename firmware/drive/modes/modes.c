@@ -1,0 +1,167 @@
+/* The seam between the drive and its modes: each mode defines its hook twice, with the mode and without it. */
+#include "drive/modes/modes.h"
+
+#include "control/estimator.h"
+#include "control/observer.h"
+#include "drive/drive.h"
+#include "drive/limits.h"
+#include "drive/speed.h"
+#include "drive/states.h"
+
+void mode_start(drive_t *d, const drive_params_t *p)
+{
+#if defined IDENTIFY
+    identify_start(d, p);
+#elif defined BRINGUP
+    bringup_start(d, p);
+#else
+    (void)d;
+    (void)p;
+#endif
+}
+
+/* ---- OPEN_LOOP_FUNCTIONING: the forced angle keeps turning the motor at END_SPEED_RPM, for a first look at currents and voltages ---- */
+
+uint16_t mode_hands_over(void)
+{
+#if defined OPEN_LOOP_FUNCTIONING || defined IDENTIFY || defined BRINGUP /* these have vectors of their own */
+    return 0;
+#else
+    return 1;
+#endif
+}
+
+/* ---- TUNING: in closed loop the reference climbs slowly to the maximum speed, whatever the potentiometer says ---- */
+
+speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p)
+{
+    if (d->state == (uint16_t)DRIVE_STOPPING) {
+        return along_direction(d, (int16_t)(p->minimum_erpm - (p->minimum_erpm >> 2)));
+    }
+#ifdef TUNING
+    return along_direction(d, p->maximum_erpm);
+#else
+    return d->command.target_erpm;
+#endif
+}
+
+uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
+{
+#ifdef TUNING
+    if (d->state == (uint16_t)DRIVE_STOPPING) {
+        return 0;
+    }
+    reference_step(d, p, mode_speed_target(d, p), p->tuning_step_q16);
+    return 1;
+#else
+    (void)d;
+    (void)p;
+    return 0;
+#endif
+}
+
+/* ---- BIDIRECTIONAL_SPEED: the middle of the potentiometer is the lowest speed, its two halves are the two directions ---- */
+
+uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction)
+{
+#ifdef BIDIRECTIONAL_SPEED
+    int16_t signed_q15 = (int16_t)(pot_q16 ^ 0x8000u);
+    uint16_t travel_q16 = (uint16_t)(2u * (uint16_t)qm_abs(signed_q15));
+    if (travel_q16 > 2048u) { /* three per cent around the middle */
+        *direction = (int16_t)((signed_q15 > 0) ? 1 : -1);
+    }
+    return travel_q16;
+#else
+    *direction = 1;
+    return pot_q16;
+#endif
+}
+
+/* ---- TORQUE_MODE: the potentiometer commands the q current; speed is only limited ---- */
+
+mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range)
+{
+    mode_range_t range;
+#ifdef TORQUE_MODE
+    (void)fast_range;
+    range.low = MODE_TWO_DIRECTIONS; /* never 0 then: the sign is the direction */
+    range.high = p->current_max_q13;
+#else
+    uint16_t fast = (uint16_t)(fast_range && !MODE_TWO_DIRECTIONS);
+    range.low = fast ? p->nominal_erpm : p->minimum_erpm;
+    range.high = fast ? p->maximum_erpm : p->nominal_erpm;
+#endif
+    return range;
+}
+
+uint16_t mode_commands_current(const drive_t *d)
+{
+#ifdef TORQUE_MODE
+    return (uint16_t)(d->state == (uint16_t)DRIVE_CLOSED);
+#else
+    (void)d;
+    return 0;
+#endif
+}
+
+uint16_t mode_current_step(drive_t *d, const drive_params_t *p, current_q13_t *iq_q13)
+{
+#ifdef TORQUE_MODE
+    drive_run_t *run = &d->run;
+    int16_t iq, speed = along_direction(d, observer_speed(&run->observer));
+
+    *iq_q13 = 0;
+    if (!mode_commands_current(d)) {
+        return 0;
+    }
+    /* field weakening, the rates and a controlled stop start from it */
+    run->control.reference_erpm = along_direction(d, (speed > p->minimum_erpm) ? speed : p->minimum_erpm);
+    iq = qm_clamp(qm_abs(d->command.target_erpm), along_direction(d, speed_current(run, p, along_direction(d, p->minimum_erpm))),
+                  along_direction(d, speed_current(run, p, along_direction(d, p->maximum_erpm))));
+    *iq_q13 = along_direction(d, iq);
+    return 1;
+#else
+    (void)d;
+    (void)p;
+    *iq_q13 = 0;
+    return 0;
+#endif
+}
+
+uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t *reasons)
+{
+#ifdef TORQUE_MODE
+    int16_t asked = qm_clamp(qm_abs(d->command.target_erpm), 0, d->run.control.iq_limit_q13);
+    int16_t missing = qm_sub_limited(asked, along_direction(d, d->run.control.ref_q13.q));
+
+    *reasons = (uint16_t)((qm_abs(missing) > (p->current_max_q13 >> 6)) ? LIMIT_SPEED_RANGE : LIMIT_NONE);
+    return mode_commands_current(d);
+#else
+    (void)d;
+    (void)p;
+    *reasons = (uint16_t)LIMIT_NONE;
+    return 0;
+#endif
+}
+
+/* ---- SNAPSHOT, AN1292's recorder: four arrays filled with one row every SNAPDELAY periods, on request ---- */
+
+void snapshot_tick(snapshot_t *s, const drive_t *d)
+{
+    uint16_t row = s->row;
+    if (!*s->start || ++s->wait < s->delay) {
+        return;
+    }
+    s->wait = 0;
+    *s->done = 0;
+    s->column[0][row] = (int16_t)(4 * qm_clamp(d->phases_q13.a, -8191, 8191));
+    s->column[1][row] = (int16_t)(4 * qm_clamp(d->run.control.i_q13.q, -8191, 8191));
+    s->column[2][row] = estimator_speed(&d->run.estimator);
+    s->column[3][row] = (int16_t)(d->run.estimator.rho_q32 >> 16);
+    s->row = (uint16_t)(row + 1u);
+    if (s->row >= s->rows) {
+        s->row = 0;
+        *s->start = 0;
+        *s->done = 1;
+    }
+}

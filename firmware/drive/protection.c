@@ -1,0 +1,221 @@
+/* Protection: the conditions that the control interrupt finds itself and that end in a fault. */
+#include "drive/protection.h"
+
+#include "control/estimator.h"
+#include "control/qmath.h"
+#include "control/transforms.h"
+#include "control/tuned.h"
+#include "drive/drive.h"
+#include "drive/faults.h"
+#include "drive/limits.h"
+#include "drive/model.h"
+#include "drive/param_scaling.h"
+#include "drive/states.h"
+
+INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
+{
+    const int16_t limit = p->overcurrent_q13;
+    if (qm_beyond(d->phases_q13.a, limit) || qm_beyond(d->phases_q13.b, limit) || qm_beyond(d->phases_q13.c, limit)) {
+        drive_raise(d, FAULT_OVERCURRENT_SW);
+        return 1;
+    }
+    return 0;
+}
+
+#define PROTECTION_BUS_END_Q15 32640 /* the converter's last steps: more cannot be told from a broken signal */
+
+void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
+{
+    drive_fault_t found;
+    if (!drive_conducts(d) && now_q15 < PROTECTION_BUS_END_Q15) {
+        return;
+    }
+    if (now_q15 > p->bus_over_q15) {
+        found = FAULT_OVERVOLTAGE;
+    } else if (bus_q15 < p->bus_under_q15) {
+        found = FAULT_UNDERVOLTAGE;
+    } else {
+        return;
+    }
+    drive_raise(d, found);
+}
+
+#define PROTECTION_TURN_SHIFT 4 /* the angle step of a period to that of eight: ls_q16 is L of eight samples */
+
+uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_params_t *p)
+{
+    dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
+    int16_t e_q12 = qm_abs(emf.q), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
+    int16_t r_more = (int16_t)(limits_brakes(i.q, emf.q) ? rs - p->rs_off_least : p->rs_off_most - rs);
+    int16_t ri_q12 = model_header_ri(p, qm_abs(i.q));
+    uint16_t turned_q13 = (uint16_t)((uint16_t)qm_abs(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);
+    uint32_t li_q12 = (qm_muluu(turned_q13, run->model.ls_q16) >> 16) << p->estimator.ls_exp;
+    int32_t parts_q27 = qm_mulss(ri_q12, r_more) + qm_mulss((int16_t)((li_q12 > 32767ul) ? 32767ul : li_q12), p->ls_off);
+    return (uint16_t)(qm_mulss(e_q12, more) - ((int32_t)p->dead_emf_q12 << 15) > parts_q27);
+}
+
+void protection_check_model(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    uint16_t strong, hot;
+    if (!drive_is_closed(d)) {
+        return;
+    }
+    strong = protection_flux_is_impossible(run, p);
+    hot = (uint16_t)(qm_hi(run->adaptation.rs_q31) >= p->rs_impossible);
+    run->impossible_steps = (uint16_t)((strong || hot) ? run->impossible_steps + 1u : 0u);
+    if (run->impossible_steps > p->impossible_steps) {
+        drive_raise(d, strong ? FAULT_BUS_SENSOR : FAULT_OVERTEMPERATURE);
+    }
+}
+
+#define PROTECTION_PROBE_LEAST_Q15 ((MOTOR_SALIENCY_UH) ? PROBE_LEAST_SALIENT_Q15 : PROBE_LEAST_Q15)
+
+/** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand, for a voltage in phase
+ *  with the current is both. */
+static uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
+{
+    int16_t r_more = (int16_t)(p->rs_off_most - qm_hi(run->adaptation.rs_q31));
+    int16_t less_q12 = (int16_t)(qm_abs(estimator_emf(&run->estimator).q) - p->adaptation.emf_least_q12);
+    return (uint16_t)(less_q12 <= qm_hi(2 * qm_mulss(model_header_ri(p, qm_abs(run->control.i_q13.q)), r_more)));
+}
+
+current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p)
+{
+    int16_t most = limits_beside(p, salient_current_beside(run, p, run->probe_most_q13));
+    /* products in C: constants */
+    most = qm_clamp(most, (int16_t)(((int32_t)p->current_max_q13 * PROTECTION_PROBE_LEAST_Q15) >> 15),
+                    (int16_t)(((int32_t)p->current_max_q13 * PROBE_MOST_Q15) >> 15));
+#if MOTOR_SALIENCY_UH
+    most = (int16_t)((most + run->probe_most_q13) / 2);
+#endif
+    return most;
+}
+
+/** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
+static speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
+{
+    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
+    return (least < standing) ? standing : least;
+}
+
+/** The one place that writes the phase. */
+static void probe_enter(drive_run_t *run, probe_phase_t next)
+{
+    run->probe_phase = (uint16_t)next;
+    run->probe_steps = 0;
+}
+
+/** Steps of a dip; those of the probe's own dip stay beyond PROBE_DIP_STEPS until it is over. */
+static void protection_count_dip(drive_run_t *run, uint16_t dips)
+{
+    if (!dips) {
+        run->dip_steps = 0;
+    } else if (run->dip_steps <= PROBE_DIP_STEPS) {
+        run->dip_steps++;
+    } else {
+        /* the probe's own */
+    }
+}
+
+void protection_probe_rotor(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_abs(run->control.reference_erpm);
+    uint16_t doubtful = (uint16_t)(run->handover.id_q13 == 0 && protection_rotor_is_doubtful(run, p));
+    uint16_t seems_to_turn = (uint16_t)(along >= protection_least_speed(run, p));
+    dq_t emf = estimator_emf(&run->estimator);
+    uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2));
+    int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
+
+    switch (run->probe_phase) {
+    case PROBE_WAIT:
+        run->probe_steps = (uint16_t)((doubtful && seems_to_turn) ? run->probe_steps + 1u : 0u);
+        run->probe_most_q13 = protection_probe_most(run, p);
+        if (run->probe_steps == PROBE_WAIT_STEPS) {
+            probe_enter(run, PROBE_TEST);
+        }
+        break;
+    case PROBE_TEST:
+        id_q13 = qm_clamp(qm_abs(run->control.ref_q13.q), 0, run->probe_most_q13);
+        run->dip_steps = PROBE_DIP_STEPS + 1u; /* a heavy load dips for want of the probe's current: none counts before it is over */
+        run->probe_steps = (uint16_t)(run->probe_steps + turns);
+        if (!doubtful || run->probe_steps == PROBE_STEPS) {
+            probe_enter(run, PROBE_PAUSE);
+        }
+        break;
+    case PROBE_PAUSE:
+    default:
+        protection_count_dip(run, (uint16_t)(along < reference - (reference >> 2)));
+        run->probe_steps++;
+        if (run->probe_steps > PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS || run->dip_steps == PROBE_DIP_STEPS) {
+            probe_enter(run, PROBE_WAIT);
+        }
+        break;
+    }
+    run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));
+}
+
+void protection_check_rotor(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_abs(along), standing = (int16_t)(p->minimum_erpm >> 1);
+    dq_t emf = estimator_emf(&run->estimator);
+
+    if (along < protection_least_speed(run, p)) {
+        run->stall_steps++;
+    } else { /* of a rotor that only jerks the estimate is fast now and then */
+        run->stall_steps = (uint16_t)((run->stall_steps > STALL_FALL) ? run->stall_steps - STALL_FALL : 0u);
+    }
+    /* of a standing rotor the direction of its back-EMF says nothing */
+    if (speed > p->overspeed_erpm || (speed >= standing && qm_abs(emf.d) > qm_abs(emf.q))) {
+        run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
+    } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */
+        run->lost_lock_steps--;
+    } else {
+        /* in lock */
+    }
+    if (run->stall_steps > p->stall_steps || run->lost_lock_steps > p->lost_lock_steps) {
+        drive_raise(d, (run->stall_steps > p->stall_steps) ? FAULT_STALL : FAULT_LOST_LOCK);
+    }
+}
+
+/* ---- overload ---- */
+
+#define OVERLOAD_SUM_SHIFT 10 /* i^2 / 2 over OVERLOAD_STEP_MS keeps to its word */
+
+/** i_d^2 + i_q^2. @return Q26, at most 2^31 */
+static uint32_t overload_square(const drive_t *d)
+{
+    dq_t i = d->run.control.i_q13;
+    return (uint32_t)qm_mulss(i.d, i.d) + (uint32_t)qm_mulss(i.q, i.q);
+}
+
+/** a * rate, in all bits of a. */
+static int32_t overload_part(int32_t a, uint16_t rate_q16)
+{
+    return qm_mulsu(qm_hi(a), rate_q16) + (int32_t)(qm_muluu((uint16_t)a, rate_q16) >> 16);
+}
+
+uint16_t overload_tick(overload_t *o, const drive_t *d, const drive_params_t *p, uint16_t ms)
+{
+    const uint16_t runs = drive_is_running(d);
+    uint32_t square = 0; /* a stopped drive's registers keep what flowed last */
+    uint16_t rest;
+    if (p->i2t_most_q25 == 0) {
+        return 0;
+    }
+    if (runs) {
+        square = overload_square(d) >> OVERLOAD_SUM_SHIFT;
+    }
+    for (rest = ms; rest != 0u; rest--) { /* one as a rule */
+        o->sum += square;
+        o->ms++;
+        if (o->ms == OVERLOAD_STEP_MS) {
+            o->heat_q25 += overload_part((int32_t)o->sum - o->heat_q25, p->i2t_rate_q16);
+            o->sum = 0;
+            o->ms = 0;
+        }
+    }
+    return (uint16_t)(runs && o->heat_q25 >= p->i2t_most_q25);
+}

@@ -1,0 +1,159 @@
+/* Do the measured currents fit? An open phase and a wrong current signal, by two rules that see different motors: the table is in the header. */
+#include "drive/signals.h"
+
+#include "control/estimator.h"
+#include "control/qmath.h"
+#include "control/transforms.h"
+#include "control/tuned.h"
+#include "drive/drive.h"
+#include "drive/faults.h"
+#include "drive/model.h"
+#include "drive/states.h"
+
+/** Takes the sizes of the phases' currents into sums. @param a,b,c Q13; as a structure they would go over the stack
+ *  @param shift so many sums of the largest current must fit a word */
+static void signals_add_sizes(uint16_t *sums, current_q13_t a, current_q13_t b, current_q13_t c, uint16_t shift)
+{
+    sums[0] = (uint16_t)(sums[0] + ((uint16_t)qm_abs(a) >> shift));
+    sums[1] = (uint16_t)(sums[1] + ((uint16_t)qm_abs(b) >> shift));
+    sums[2] = (uint16_t)(sums[2] + ((uint16_t)qm_abs(c) >> shift));
+}
+
+/* ---- the law's rule: voltages and currents fit the motor ---- */
+
+#define SIGNALS_WRONG_SHIFT 6                                                       /* 250 sums of a current above the trip level fit a word */
+#define SIGNALS_DEAD_TIMES ((int16_t)(1.0F / PARAM_F(ADAPTATION_EMF_SHARE) + 0.5F)) /* emf_least_q12 is a fifth of what dead time takes */
+
+/** 1 where neither a back-EMF in its direction nor R off by all of it nor dead time explains the voltage: one is commanded that drives no current. */
+static uint16_t signals_voltage_is_unexplained(const drive_run_t *run, const drive_params_t *p)
+{
+    dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
+    int16_t unturned_q12 = (int16_t)(qm_abs(emf.d) - qm_abs(emf.q)); /* beyond a back-EMF in its direction */
+    /* fits a word: no current flows for which R takes more voltage than there is */
+    uint16_t ri_q12 = (uint16_t)((uint16_t)model_header_ri(p, qm_abs(i.d)) + (uint16_t)model_header_ri(p, qm_abs(i.q)));
+    uint16_t dead_q12 = (uint16_t)(SIGNALS_DEAD_TIMES * p->adaptation.emf_least_q12);
+    return (uint16_t)(unturned_q12 > 0 && (uint16_t)unturned_q12 > ri_q12 + dead_q12);
+}
+
+/** 1 near the end of a stop, where what dead time leaves can make innovations that do not end: the currents of a rotor that slows down by
+ *  itself are too small to tell its sign. A wrong signal would ask for more. */
+static uint16_t signals_stop_is_blurred(const drive_t *d, const drive_params_t *p)
+{
+    return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && !d->command.run
+                      && (qm_abs(estimator_emf(&d->run.estimator).q) >> SIGNALS_BLUR_SHIFT) < p->dead_emf_q12
+                      && qm_abs(d->run.control.ref_q13.q) < p->id_off_q13);
+}
+
+/** Currents that do not fit the motor, with or without a phase that carries hardly any. */
+static drive_fault_t signals_which_is_wrong(const uint16_t *sums)
+{
+    uint16_t most = 0, least = 0xFFFFu, n;
+    for (n = 0; n < 3u; n++) { /* wcet: at most 3 turns */
+        most = (sums[n] > most) ? sums[n] : most;
+        least = (sums[n] < least) ? sums[n] : least;
+    }
+    return (least < (most >> SIGNALS_OPEN_SHIFT)) ? FAULT_OPEN_PHASE : FAULT_CURRENT_SENSOR;
+}
+
+void signals_check(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    if (signals_voltage_is_unexplained(run, p)) {
+        run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + SIGNALS_UNEXPLAINED);
+    }
+    if (run->observer.wrong_steps == 0u) {
+        run->phase_sums[0] = 0;
+        run->phase_sums[1] = 0;
+        run->phase_sums[2] = 0;
+        return;
+    }
+    signals_add_sizes(run->phase_sums, d->phases_q13.a, d->phases_q13.b, d->phases_q13.c, SIGNALS_WRONG_SHIFT);
+    if (run->observer.wrong_steps <= p->wrong_steps) {
+        return;
+    }
+    if (signals_stop_is_blurred(d, p)) {
+        drive_enter(d, DRIVE_STOPPED); /* as at a stop's end: the bridge goes off and the rotor runs out */
+    } else {
+        drive_raise(d, signals_which_is_wrong(run->phase_sums));
+    }
+}
+
+/* ---- the background's rule: what flows follows what is asked for ---- */
+
+#define SIGNALS_SAMPLE_SHIFT 4 /* so many sums of half the range fit a word */
+#define SIGNALS_WAIT_LEAST 16u /* periods from a sample to the next: 16 to 23, each in turn, so that no speed meets the same angles again and again */
+#define SIGNALS_WAIT_STEP 5u
+#define SIGNALS_WAIT_MASK 7u
+
+/** Takes the phases' currents into their sums. What is asked for goes by the next period's angle: in the mean over a turn they agree. */
+static void signals_add(signals_sums_t *sums, const drive_t *d)
+{
+    phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
+    signals_add_sizes(sums->asked, asked.a, asked.b, asked.c, SIGNALS_SAMPLE_SHIFT);
+    signals_add_sizes(sums->flows, d->phases_q13.a, d->phases_q13.b, d->phases_q13.c, SIGNALS_SAMPLE_SHIFT);
+}
+
+/** 1 where a phase is asked for more than noise and carries less than a quarter of the share of it that the phase with the most current does. */
+static uint16_t signals_lack_a_phase(const signals_sums_t *sums, const drive_params_t *p)
+{
+    const uint16_t least = (uint16_t)(((uint16_t)p->id_off_q13 * SIGNALS_SAMPLES) >> SIGNALS_SAMPLE_SHIFT);
+    uint16_t n, flows = 0, asked = 0;
+    for (n = 3; n != 0u; n--) {
+        if (sums->flows[n - 1u] >= flows) {
+            flows = sums->flows[n - 1u];
+            asked = sums->asked[n - 1u];
+        }
+    }
+    flows = (flows < asked) ? flows : asked; /* more is noise */
+    for (n = 0; n < 3u; n++) {
+        if (sums->asked[n] >= least && qm_muluu(sums->flows[n], asked) < (qm_muluu(flows, sums->asked[n]) >> SIGNALS_OPEN_SHIFT)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/** 1 in closed loop after the hand-over; a reversal's ramp forgets nothing. */
+static uint16_t signals_are_judged(const drive_t *d)
+{
+    return (uint16_t)(drive_is_closed(d) && d->run.handover.id_q13 == 0);
+}
+
+uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p)
+{
+    const uint16_t now = d->ticks;
+    uint16_t wait;
+
+    if (!drive_is_running(d) || s->sums.samples >= SIGNALS_SAMPLES) {
+        drive_zero(&s->sums, sizeof s->sums);
+    }
+    wait = (uint16_t)(SIGNALS_WAIT_LEAST + ((s->sums.samples * SIGNALS_WAIT_STEP) & SIGNALS_WAIT_MASK));
+    if (!signals_are_judged(d) || (uint16_t)(now - s->sampled_tick) < wait) {
+        return (uint16_t)FAULT_NONE;
+    }
+    s->sampled_tick = now;
+    signals_add(&s->sums, d);
+    s->sums.samples++;
+    if (s->sums.samples < SIGNALS_SAMPLES) {
+        return (uint16_t)FAULT_NONE;
+    }
+    return (uint16_t)(signals_lack_a_phase(&s->sums, p) ? FAULT_OPEN_PHASE : FAULT_NONE);
+}
+
+uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t *p)
+{
+    const drive_control_t *c = &d->run.control;
+    int32_t off_q16;
+    int16_t size;
+
+    if (!drive_is_running(d)) {
+        s->id_q16 = 0;
+    }
+    if (!signals_are_judged(d)) {
+        return (uint16_t)FAULT_NONE;
+    }
+    size = qm_clamp(qm_abs((int16_t)(c->ref_q13.d - c->i_q13.d)), 0, (int16_t)(SIGNALS_MOST_TIMES * p->id_off_q13));
+    off_q16 = (int32_t)size * 65536 - s->id_q16;
+    s->id_q16 += qm_mulsu(qm_hi(off_q16), 1u << (16 - SIGNALS_MEAN_SHIFT)) + (int32_t)((uint16_t)off_q16 >> SIGNALS_MEAN_SHIFT); /* off >> shift */
+    return (uint16_t)((qm_hi(s->id_q16) > p->id_off_q13) ? FAULT_CURRENT_SENSOR : FAULT_NONE);
+}

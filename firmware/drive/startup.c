@@ -1,0 +1,92 @@
+/* The start without the estimator: average the current offsets, charge the drivers, take the rotor along, accelerate it by the forced angle. */
+#include "drive/startup.h"
+
+#include "control/estimator.h"
+#include "control/qmath.h"
+#include "control/transforms.h"
+#include "drive/drive.h"
+#include "drive/faults.h"
+#include "drive/handover.h"
+#include "drive/param_scaling.h"
+#include "drive/protection.h"
+#include "drive/selftest.h"
+#include "drive/states.h"
+
+drive_state_t calibration_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
+{
+    calibration_t *c = &d->calibration;
+    c->sum_a += i_a;
+    c->sum_b += i_b;
+    d->periods++;
+    if (d->periods == (1u << CALIBRATION_LOG2)) {
+        int16_t a_q13 = qm_mulhi((int16_t)(c->sum_a >> CALIBRATION_LOG2), p->kcurr_a);
+        int16_t b_q13 = qm_mulhi((int16_t)(c->sum_b >> CALIBRATION_LOG2), p->kcurr_b);
+        if (qm_beyond(a_q13, p->offset_max_q13) || qm_beyond(b_q13, p->offset_max_q13)) {
+            drive_raise(d, FAULT_OFFSET);
+        } else {
+            c->offset_a_q13 = a_q13;
+            c->offset_b_q13 = b_q13;
+            SELFTEST_KEEP(d, offset_a, a_q13);
+            SELFTEST_KEEP(d, offset_b, b_q13);
+            c->done = 1;
+            return DRIVE_STOPPED;
+        }
+    }
+    return DRIVE_CALIBRATE;
+}
+
+void calibration_restart(calibration_t *c)
+{
+    c->sum_a = 0;
+    c->sum_b = 0;
+}
+
+drive_state_t startup_bootstrap(drive_t *d, const drive_params_t *p)
+{
+    (void)protection_check_current(d, p); /* a fault that it raises keeps every state out */
+    d->periods++;
+    if (!d->command.run) {
+        return DRIVE_STOPPED;
+    }
+    return (d->periods >= p->bootstrap_periods) ? DRIVE_ALIGN : DRIVE_BOOTSTRAP;
+}
+
+void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
+{
+    drive_run_t *run = &d->run;
+    drive_control_t *c = &run->control;
+    angle_t quarter = (angle_t)along_direction(d, 0x4000), estimated = estimator_next_angle(&run->estimator);
+    angle_t forced = (angle_t)(estimated - quarter);
+    dq_t v = c->v_q14;
+
+    run->handover.agreed_steps = 0;
+    run->handover.at_end = 0;
+    run->handover.ahead_erpm = 0;
+    run->handover.offset = 0;
+    run->handover.id_q13 = 0;
+    c->flux_brake_q13 = 0;
+    d->forced.speed_q10 = qm_mulss(along_direction(d, run->estimator.omega_erpm), p->estimator.deltat_q32) >> 6;
+    d->forced.angle_q32 = (uint32_t)forced << 16;
+    d->forced.increase_q10 = p->forced.increase_rate_q10;
+    c->v_q14.d = along_direction(d, (int16_t)-v.q); /* the same vector in a frame a quarter turn behind */
+    c->v_q14.q = along_direction(d, v.d);
+    c->ref_q13.d = 0;
+    c->ref_q13.q = along_direction(d, p->open_loop_q13);
+    handover_preset(d, p, forced);
+    handover_enter(&run->handover, START_RAMP);
+    drive_enter(d, DRIVE_RAMP);
+}
+
+void startup_align(drive_t *d, const drive_params_t *p)
+{
+    int16_t current = p->open_loop_q13;
+    d->periods = (uint16_t)(d->periods + SLOW_PERIODS);
+    if (d->periods >= p->align_periods) {
+        d->forced.increase_q10 = p->forced.increase_rate_q10;
+        handover_enter(&d->run.handover, START_RAMP);
+        drive_enter(d, DRIVE_RAMP);
+    } else {
+        current = (int16_t)(qm_muluu(d->periods, p->align_rate_q12) >> 12);
+    }
+    d->run.control.ref_q13.q = along_direction(d, current);
+}

@@ -1,0 +1,198 @@
+/* The one machine: the drive's states, what each does on entry and in a step, and which may follow which. */
+#include "drive/states.h"
+
+#include "control/qmath.h"
+#include "control/trig.h"
+#include "drive/catch.h"
+#include "drive/drive.h"
+#include "drive/faults.h"
+#include "drive/handover.h"
+#include "drive/limits.h"
+#include "drive/modes/modes.h"
+#include "drive/selftest.h"
+#include "drive/speed.h"
+#include "drive/startup.h"
+
+#define BIT_OF(next, reason) | (1u << (uint16_t)DRIVE_##next)
+#define MASK_FROM(name, meaning) (uint16_t)(0u TRANSITIONS_FROM_##name(BIT_OF)),
+
+/* A bit for each state that may follow. */
+static const uint16_t may_follow[DRIVE_STATE_COUNT] = { DRIVE_STATE_TABLE(MASK_FROM) };
+
+uint16_t drive_may_follow(uint16_t state, drive_state_t next)
+{
+    return (uint16_t)(state < (uint16_t)DRIVE_STATE_COUNT && ((may_follow[state] >> (uint16_t)next) & 1u) != 0u);
+}
+
+/** The one place that writes the state. */
+static void states_write(drive_t *d, drive_state_t next)
+{
+    d->state = (uint16_t)next;
+    SELFTEST_KEEP(d, state, next);
+    d->periods = 0;
+}
+
+void drive_raise(drive_t *d, drive_fault_t fault)
+{
+    d->command.run = 0;
+    if (d->fault == (uint16_t)FAULT_NONE) {
+        d->fault = (uint16_t)fault;
+        SELFTEST_KEEP(d, fault, fault);
+    }
+    states_write(d, DRIVE_FAULT);
+}
+
+void drive_enter(drive_t *d, drive_state_t next)
+{
+    if (d->fault != (uint16_t)FAULT_NONE) {
+        states_write(d, DRIVE_FAULT);
+    } else if (drive_may_follow(d->state, next)) {
+        states_write(d, next); /* a trap between the two lines: drive_latch_fault() has the last word */
+    } else {
+        drive_raise(d, FAULT_SELFTEST);
+    }
+}
+
+uint16_t drive_latch_fault(drive_t *d)
+{
+    if (d->fault == (uint16_t)FAULT_NONE) {
+        return 0;
+    }
+    states_write(d, DRIVE_FAULT);
+    return 1;
+}
+
+drive_state_t drive_clear_fault(drive_t *d)
+{
+    d->fault = (uint16_t)FAULT_NONE;
+    SELFTEST_KEEP(d, fault, FAULT_NONE);
+    return d->calibration.done ? DRIVE_STOPPED : DRIVE_CALIBRATE;
+}
+
+void drive_set_direction(drive_t *d, int16_t direction)
+{
+    d->direction = direction;
+    SELFTEST_KEEP(d, direction, direction);
+}
+
+INLINE uint16_t drive_is_running(const drive_t *d)
+{
+    return (uint16_t)((uint16_t)(d->state - (uint16_t)DRIVE_ALIGN) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_ALIGN);
+}
+
+INLINE uint16_t drive_is_forced(const drive_t *d)
+{
+    return (uint16_t)(d->state <= (uint16_t)DRIVE_RAMP);
+}
+
+INLINE uint16_t drive_is_closed(const drive_t *d)
+{
+    return (uint16_t)(MODE_CLOSES_LOOP && (uint16_t)(d->state - (uint16_t)DRIVE_CLOSED) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_CLOSED);
+}
+
+uint16_t drive_conducts(const drive_t *d)
+{
+    return (uint16_t)(d->fault == (uint16_t)FAULT_NONE
+                      && (uint16_t)(d->state - (uint16_t)DRIVE_BOOTSTRAP) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_BOOTSTRAP);
+}
+
+uint16_t drive_outputs(const drive_t *d)
+{
+    if (d->fault != (uint16_t)FAULT_NONE) {
+        return (uint16_t)OUTPUTS_OFF;
+    }
+    if (drive_is_running(d)) {
+        return (uint16_t)OUTPUTS_PWM;
+    }
+    return (uint16_t)((d->state == (uint16_t)DRIVE_BOOTSTRAP) ? OUTPUTS_BOOTSTRAP : OUTPUTS_OFF);
+}
+
+void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
+{
+    drive_run_t *run = &d->run;
+    drive_set_direction(d, direction);
+    drive_zero(&d->forced, sizeof d->forced);
+    drive_zero(&d->dead, sizeof d->dead);
+    drive_zero(&d->dead_second, sizeof d->dead_second);
+    drive_zero(run, sizeof *run);
+    d->angle = 0;
+    drive_update_model(run, p, p->end_erpm);
+    run->control.iq_limit_q13 = p->current_max_q13;
+    run->control.brake_limit_q13 = limits_asked_most(p);
+    d->forced.speed_q10 = p->align_speed_q10;
+    d->frame = trig_sincos(0);
+    catch_begin(run, p);
+    mode_start(d, p);
+    d->command.run = 1;
+}
+
+/** Leaves a state whose bridge is off, or is left by a fault. */
+static void idle_move(drive_t *d, drive_state_t next)
+{
+    drive_enter(d, next);
+}
+
+void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
+{
+    uint16_t next = d->state;
+    switch (next) {
+    case DRIVE_CALIBRATE:
+        next = (uint16_t)calibration_step(d, p, i_a, i_b);
+        break;
+    case DRIVE_STOPPED:
+        d->run.estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
+        d->run.control.reference_erpm = 0;
+        if (d->command.run) {
+            next = (uint16_t)(catch_waits_for_bus(d, p) ? DRIVE_CATCH : DRIVE_BOOTSTRAP);
+        }
+        break;
+    case DRIVE_BOOTSTRAP:
+        next = (uint16_t)startup_bootstrap(d, p);
+        if (next == (uint16_t)DRIVE_BOOTSTRAP && d->run.catching.phase != (uint16_t)CATCH_NO_LOOK && catch_look(d, p)) {
+            next = (uint16_t)DRIVE_CATCH;
+        }
+        break;
+    case DRIVE_CATCH:
+        next = (uint16_t)catch_pass(d, p);
+        break;
+    case DRIVE_FAULT:
+    default: /* without a fault when the background raised one while it was cleared here */
+        if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) {
+            calibration_restart(&d->calibration);
+            next = (uint16_t)drive_clear_fault(d);
+        }
+        break;
+    }
+    d->command.clear_fault = 0;
+    if (d->state != next) {
+        idle_move(d, (drive_state_t)next);
+    }
+}
+
+void states_start_step(drive_t *d, const drive_params_t *p)
+{
+    if (!d->command.run) { /* letting go is harmless at these speeds */
+        drive_enter(d, DRIVE_STOPPED);
+    } else if (d->state == (uint16_t)DRIVE_ALIGN) {
+        startup_align(d, p);
+    } else {
+        handover_wait(d, p);
+    }
+}
+
+void states_rotor_step(drive_t *d, const drive_params_t *p)
+{
+    switch (d->state) {
+    case DRIVE_RAMP:
+        handover_step(d, p);
+        break;
+    case DRIVE_STOPPING:
+        speed_turn_round(d, p);
+        break;
+    case DRIVE_CATCH:
+        catch_step(d, p);
+        break;
+    default: /* the others are left elsewhere */
+        break;
+    }
+}

@@ -1,0 +1,130 @@
+/* The seam between the board and the modes: lines, watch variables, arrays and memory of theirs. */
+#ifndef BOARD_MODES_MODE_BOARD_H
+#define BOARD_MODES_MODE_BOARD_H
+
+#include "control/qmath.h"
+#include "drive/drive.h"
+#include "drive/forward.h"
+#include "drive/modes/bringup.h"
+#include "drive/modes/mode_table.h"
+#include "drive/modes/modes.h"
+#include "drive/panel.h"
+#include "drive/param_scaling.h"
+
+#ifdef IDENTIFY
+
+/** What the drive has measured: step and result (identify_step_t, identify_result_t in drive/modes/identify.h), phase resistance [mohm]
+ *  with the bridge's share, d and q inductance [uH], back-EMF [mV peak line to line per 1000 rpm], inertia
+ *  [10^-8 kg m2], friction at standstill [uN m] and its growth [nN m s]; 0 = not measured yet. */
+typedef struct {
+    uint16_t step, result, Rs_mohm, Ld_uH, Lq_uH, Kphi_mV_per_krpm, J_1e8_kgm2, Coulomb_uNm, Viscous_nNms;
+} tIdentifyParm;
+
+extern tIdentifyParm IdentifyParm;
+
+/** "step 0 DONE fault NONE R 2692 mohm Ld 1919 uH Lq 1920 uH Kphi 7240 mV/krpm J 550e-8 kgm2 friction 4000 uNm + 15300 nNms" in one line. @return its end */
+char *identify_status_line(char *line, const drive_t *d);
+
+/** Copies what has been measured to IdentifyParm. */
+void identify_watch(const drive_t *d);
+
+#endif
+
+/** Longest status line and its end: retries with four reasons of a limit or more, or all that IDENTIFY measures, or a remedy of BRINGUP, or a client's
+ *  longest frame. */
+#if defined IDENTIFY
+#define MODE_LINE_SIZE 160
+#elif defined BRINGUP
+#define MODE_LINE_SIZE 240
+#else
+#define MODE_LINE_SIZE 144
+#endif
+
+/** The mode's status line. @return its end; the line itself without the mode */
+char *mode_status_line(char *line, const drive_t *d);
+
+/** Refreshes the mode's watch variable. */
+void mode_watch(const drive_t *d);
+
+/* ---- BRINGUP on the board: the guide in the panel's place, its lines on the serial line, and the two pins that this may be on ---- */
+
+#ifdef BRINGUP
+
+/** Steps, answers, measurements. */
+extern bringup_guide_t board_bringup;
+
+/** The guide's next line, if it has one: "ask 4 ...", "ok BUS ...", "WRONG BUS ...", "-> BUS_DIVIDER: ...". @return its end */
+char *bringup_line(char *line);
+
+#define MODE_STATUS_MS 1u /* the guide waits for its lines */
+
+#else
+#define MODE_STATUS_MS 500u
+#endif
+
+/** 1 where the mode alone speaks. @param end where its line begins, and then ends */
+uint16_t mode_speaks(char **end);
+
+/* ---- SNAPSHOT on the board: AN1292's arrays, and the recorder that fills them ---- */
+
+#ifdef SNAPSHOT
+
+/** Set SnapStart to 1; SnapDone becomes 1 when the arrays are full. Columns: phase current a, q current (Q15 of full
+ *  scale), filtered estimated speed (as EstimParm.qVelEstim), estimated angle. */
+extern int16_t SnapBuf1[DATA_BUFFER_SIZE], SnapBuf2[DATA_BUFFER_SIZE], SnapBuf3[DATA_BUFFER_SIZE], SnapBuf4[DATA_BUFFER_SIZE];
+
+extern volatile uint16_t SnapStart, SnapDone;
+
+extern snapshot_t board_snapshot;
+
+#endif
+
+/** 1 where the mode has work in every period. */
+#ifdef SNAPSHOT
+#define MODE_RECORDS 1
+#else
+#define MODE_RECORDS 0
+#endif
+
+/** The mode's part of the slow work. */
+void mode_record(void);
+
+/* ---- Who looks at buttons and potentiometer: the panel, or BRINGUP's guide in its place ---- */
+
+/** After panel_init(). */
+void mode_panel_init(void);
+
+/** Buttons and potentiometer to what the drive is asked for. @return the lights */
+panel_lights_t mode_panel(const panel_inputs_t *in);
+
+/* ---- The scope's memory: what the chip has left without the fault recorder, less what a mode takes of it ---- */
+
+/** Bytes that a mode has in RAM. */
+#if defined(TUNING) || defined(PARAMS_IN_RAM)
+#define SCOPE_MODE_PARAMS sizeof(drive_params_t)
+#else
+#define SCOPE_MODE_PARAMS 0u
+#endif
+#ifdef IDENTIFY
+#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 128u) /* its stack, too */
+#else
+#define SCOPE_MODE_IDENTIFY 0u
+#endif
+#ifdef BRINGUP
+#define SCOPE_MODE_BRINGUP 332u
+#else
+#define SCOPE_MODE_BRINGUP 0u
+#endif
+#ifdef SNAPSHOT
+#define SCOPE_MODE_SNAPSHOT (8u * (DATA_BUFFER_SIZE) + 24u)
+#if SCOPE && (DATA_BUFFER_SIZE) > 60
+#error userparams.h: SNAPSHOT and SCOPE 1 together have no room for DATA_BUFFER_SIZE rows: lower it to 60
+#endif
+#else
+#define SCOPE_MODE_SNAPSHOT 0u
+#endif
+
+/** Of the trace buffer. */
+#define SCOPE_BYTES ((848u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY - SCOPE_MODE_BRINGUP - SCOPE_MODE_SNAPSHOT) & ~3u)
+
+#endif

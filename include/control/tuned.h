@@ -1,0 +1,127 @@
+/* Every number that was chosen by trial and not by a formula: a row each, with unit, meaning and the command that shows its effect.
+ *
+ * A row is one line, for tools read it: #define NAME value, then in a comment [unit] meaning | target of make. make sensitivity ONLY=NAME shows
+ * what moves with a fifth less and a fifth more, a shift by a step (docs/tuned.md). What a user may want to change is in userparams.h. */
+#ifndef CONTROL_TUNED_H
+#define CONTROL_TUNED_H
+
+/* clang-format off */
+
+/* ---- Current and voltage ---- */
+#define USED_BUS_SHARE 1.25         /* [1] of the nominal bus: what braking lifts beyond it serves nobody | run SCENARIO=stop_from_top */
+#define DEAD_KNEE_SHARE 0.25        /* [1] of the current that dead time loses: compensation is linear below; more looks like a resistance that drives | lowspeed */
+#define SAMPLE_DELAY_CLOCKS 60      /* [25 ns] from the centre of the low sides' conduction to the sample | lowspeed */
+#define DEAD_EACH_TURN 0.0333       /* [turn] a rotor that turns by more in a period needs a compensation for each pulse: 12 degrees | table2 MOTOR=spindle_7pp_24v_10000 */
+#define OFFSET_MOST_SHARE 0.125     /* [1] of full scale: 0.2 V at the converter; a larger offset is a fault | run SCENARIO=fault_offset */
+
+/* ---- Estimator ---- */
+#define PARAM_EIGHT_TURN 0.12       /* [turn] most that the current turns in the eight samples of the derivative: 43 degrees | robust */
+#define PARAM_LDI_LEAST_SHARE 0.75  /* [1] of L di/dt at full current and speed: what its limits keep at least where R's rise needs the format | robust */
+#define PARAM_OLD_LONGER 1.5        /* [1] turning the old difference of eight samples forward may lengthen an axis by so much | robust */
+#define PARAM_EMF_SHARE 0.98        /* [1] of the back-EMF's format: an axis may be lengthened by the turn to the middle of the period | robust */
+#define PARAM_ESDQ_RATIO 5          /* [1] corner of the back-EMF filter at low speed over the electrical frequency | lowspeed */
+#define FIELDWEAK_FILTER_LEAST 256  /* [Q16] K of the slowest back-EMF filter | lowspeed */
+
+/* ---- What the running motor teaches ---- */
+#define ADAPTATION_RATE 6           /* [1/s] flux and resistance follow; less where a part of the voltage is R i | robust */
+#define ADAPTATION_KFI_LESS 0.30    /* [1] 1/Kphi may fall by so much | robust */
+#define ADAPTATION_KFI_MORE 0.35    /* [1] and rise by so much | robust */
+#define ADAPTATION_RS_LESS 0.4      /* [1] R may fall by so much | robust */
+#define PARAM_RS_MOST 0.6           /* [1] and rise by so much: then the winding is too hot | robust */
+#define ADAPTATION_EMF_SHARE 0.2    /* [1] of dead time's voltage: the least back-EMF that teaches | lowspeed */
+
+/* ---- Controllers ---- */
+#define CURRENT_KEEP_LESS 0.001     /* [1] anti-windup of the current controllers: 1 less their KC | table2 */
+#define PARAM_FAST_GAIN 1.8        /* [1] times the speed controller's gain after a large innovation | loadsteps */
+#define PARAM_CALM_SHARE 0.4        /* [1] most of SPEED_BANDWIDTH_HZ over the electrical frequency, or the speed hunts without load; over 2.7 in a message | lowspeed */
+#define PARAM_LOWEST_SHARE 0.65     /* [1] back-EMF over dead-time voltage at the lowest speed at which a rotor is held; times 1732 in a message | lowspeed */
+#define RAMP_HOLD_SHARE 0.125       /* [1] of the nominal speed: the ramp waits for a motor that is further behind | run SCENARIO=rated */
+#define SPEED_TRIM_SHIFT 8          /* [shift] the trim takes 1/256 of the error in half of the rare steps: 2.4 rad/s at 20 kHz | lowspeed */
+#define SPEED_TRIM_LEAK_SHIFT 7     /* [shift] and is forgotten in a tenth of a second | loadsteps */
+#define SPEED_TRIM_MOST_SHIFT 3     /* [shift] an eighth of the largest current at most | lowspeed */
+#define SPEED_TRIM_ERROR_SHIFT 3    /* [shift] an error beyond an eighth of the speed is no rest | loadsteps */
+
+/* ---- Field weakening and d current ---- */
+#define FIELDWEAK_TRIM_STEP 4       /* [Q13 A] d current that the voltage feedback gives back in a rare step | run SCENARIO=demo */
+#define FIELDWEAK_TRIM_MOST 24      /* [Q13 A] and takes at most | run SCENARIO=demo */
+#define FIELDWEAK_TRIM_DEFERRED 15      /* [Q13 A] the same with deferred duties | run SCENARIO=demo_40khz */
+#define FIELDWEAK_TRIM_FROM 0.6     /* [1] of FW_START_SPEED_RPM: below the voltage feedback takes nothing | run SCENARIO=demo */
+#define FIELDWEAK_TRIM_SHIFT 3      /* [shift] counts of d current a step per 8 counts of missing voltage | run SCENARIO=demo */
+#define LIMITS_MISSING_Q14 4        /* [Q14/Q13] voltage counts that a count of missing q current asks for | run SCENARIO=demo */
+#define LIMITS_MISSING_MOST_Q13 64  /* [Q13 A] missing q current that counts at most | run SCENARIO=demo */
+#define FLUX_BRAKE_STEP_Q13 32     /* [Q13 A] a step of the d current that burns: MAXIMUM_CURRENT_A takes a twentieth of a second | run SCENARIO=stop_from_top */
+#define FLUX_BRAKE_DEAD_SHARE 0.5         /* [1] of dead time's voltage, which R at full current must exceed for d current to burn anything | catch */
+#define ASKED_LESS_SHIFT 5          /* [shift] of MAXIMUM_CURRENT_A 1/32 is left to what the current controllers overshoot | run SCENARIO=demo */
+#define BRAKE_BAND_V 2.0            /* [V] above REGEN_LIMIT_V, over which braking current falls to nothing | run SCENARIO=brake_without_sink */
+#define SALIENCE_LEAST_SHIFT 2      /* [shift] MTPA's d current follows in four rare steps | run MOTOR=ipm_4pp_24v_2000 */
+#define PARAM_SALIENT_FROM 8.0      /* [1] times the largest current: with more to double the flux MTPA would save less than 0.8 % of it; the tuner reads it | run MOTOR=ipm_4pp_24v_2000 */
+
+/* ---- Load observer ---- */
+#define PARAM_QUIET_RATIO 1.22      /* [1] rate without load over SPEED_BANDWIDTH_HZ | loadsteps */
+#define PARAM_LOADED_SHARE 0.3      /* [1] rate under load over LOAD_BANDWIDTH_HZ | loadsteps */
+#define PARAM_FULL_RATIO 2.7        /* [1] LOAD_BANDWIDTH_HZ over the electrical frequency from which rates and gain are in full | lowspeed */
+#define PARAM_LOAD_FROM_LOST 5      /* [1] times the current that dead time loses: the load that begins to count | loadsteps */
+#define GATE_SHARE 0.13            /* [1] of dead time's voltage, as a speed: a large innovation without load | loadsteps */
+#define GATE_LOADED_SHARE 0.03     /* [1] and under load | loadsteps */
+#define OBSERVER_GATE_SPEED_SHIFT 5 /* [shift] and 1/32 of the speed more | loadsteps */
+#define OBSERVER_FAST_HALF_Q15 12288     /* [Q15] so quick up to one and a half of what is large: dead time may be behind it | loadsteps */
+#define OBSERVER_FAST_FADE_SHIFT 6       /* [shift] after a large innovation the quick rate fades by 1/64 a step | loadsteps */
+#define OBSERVER_GATE_OPEN_SHIFT 12   /* [shift] the quick rate above 2^-3 of its most is still an answer: 50 ms or so | loadsteps */
+#define OBSERVER_GATE_SHIFT 8     /* [shift] after 256 / 4 steps that were not calm, a large innovation is twice as large | loadsteps */
+#define OBSERVER_GATE_STEPS 1000  /* [steps] a load step is over in a tenth of a second; what goes on longer is the loop's own | loadsteps */
+#define OBSERVER_GATE_AT_START 768   /* [steps] at the hand-over it is four times as large: d current and wrong constants shake the estimate | starts */
+
+/* ---- Start, hand-over, catch ---- */
+#define BOOTSTRAP_SEC 0.010         /* [s] low sides on before the start, for the drivers' supply | starts */
+#define PARAM_ALIGN_TURNS 5         /* [turns] of the vector while the current of ALIGN grows; the tuner reads it | starts */
+#define PARAM_EARLY_HZ 20           /* [Hz] electrical frequency from which the load observer is quick enough to catch the rotor | starts */
+#define PARAM_EARLY_SHARE 1.25      /* [1] of the minimum speed, at least | starts */
+#define AGREE_SEC 0.02              /* [s] the estimator agrees for so long before the hand-over | starts */
+#define WAIT_SEC 0.2                /* [s] for the agreement at the end of the ramp | starts */
+#define HANDOVER_HURRY 3            /* [1] times the ramp's rate, once the estimator should have agreed | starts */
+#define HANDOVER_FALL_SHIFT 7       /* [shift] the current that has brought the rotor up falls by 1/128 + 1/256 a step | starts */
+#define HANDOVER_FLOOR_SHIFT 3      /* [shift] to an eighth at least | starts */
+#define HANDOVER_SWUNG_SHIFT 5      /* [shift] where the rotor is no longer slower than by 1/32 | starts */
+#define HANDOVER_MEAN_SHIFT 5       /* [shift] the speed's mean deviation is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it | starts */
+#define HANDOVER_DECAY 16           /* [2^-16 turn] of the angle's offset that go in a rare step | starts */
+#define HANDOVER_MOST_OFFSET 8192   /* [2^-16 turn] 45 degrees: so much torque of the current is no surprise to the estimator's frame | starts */
+#define CATCH_LOOK_STEPS 4u         /* [slow steps] of a look at a slow rotor | catch */
+#define CATCH_STANDS 8u             /* [Q11 A] mean of a look's currents below which the rotor stands: two steps of the converter | catch */
+#define CATCH_PAUSE_TURN 13653u     /* [2^-16 turn] 75 degrees: less than half a turn, even where a look and a wrong Kphi make them twice as many | catch */
+#define CATCH_LEAST_TURN 1638       /* [2^-16 turn] 9 degrees: below a rotor stands | catch */
+#define CATCH_PAUSE_LEAST 4u        /* [periods] the look's current goes first | catch */
+#define CATCH_PAUSE_STEPS 125u      /* [slow steps] 50 ms: in them a rotor turns a tenth of a right angle, or it stands | catch */
+#define CATCH_BUS_SHIFT 5           /* [shift] a start waits for a bus 1/32 below its trip | catch */
+#define CATCH_FALL_SHIFT 7          /* [shift] which must fall by 1/128 in some tenths of a second, or it is the supply that holds it | catch */
+
+/* ---- Protection ---- */
+#define PARAM_R_LEAST 0.7           /* [1] true R over the header's, as make robust promises | robust */
+#define PARAM_R_MOST 1.5            /* [1] upwards | robust */
+#define PARAM_L_OFF 0.3             /* [1] L off the header's, to either side | robust */
+#define PARAM_FLUX_MOST 1.25        /* [1] true flux over the header's: 1.2, and what dead time leaves | robust */
+#define ID_OFF_NOISE 0.03125        /* [1] of the largest current: noise in the d current's mean deviation | campaign */
+#define ID_OFF_DEAD 0.2             /* [1] of dead time's voltage, which drives the d current against its controller | campaign */
+#define OVERSPEED_SHARE 1.25        /* [1] of the maximum speed: the lock is lost above | run SCENARIO=fault_lost_lock */
+#define PARAM_STALL_SEC 0.23        /* [s] below half the reference; until a standing rotor shows takes up to 0.08 s more | run SCENARIO=fault_stall_running */
+#define STALL_FALL 4u               /* [steps] that a fast one takes back | run SCENARIO=fault_stall_running */
+#define LOST_LOCK_SEC 0.06          /* [s] Ed above Eq | run SCENARIO=fault_lost_lock */
+#define WRONG_SEC 0.1               /* [s] of innovations that no load explains | run SCENARIO=fault_open_phase */
+#define IMPOSSIBLE_SEC 0.25         /* [s] of a flux or resistance that cannot be | campaign */
+#define SIGNALS_UNEXPLAINED 2u      /* [steps] so many wrong innovations is an unexplained voltage | run SCENARIO=fault_open_phase */
+#define SIGNALS_OPEN_SHIFT 2        /* [shift] an open phase carries less than a quarter of its share, in both rules | run SCENARIO=fault_open_phase */
+#define SIGNALS_BLUR_SHIFT 2        /* [shift] dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below | run SCENARIO=stop_from_top */
+#define PROBE_WAIT_STEPS 13         /* [seldom steps] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
+#define PROBE_STEPS 25              /* [seldom steps] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
+#define PROBE_DIP_STEPS 6           /* [seldom steps] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
+#define PROBE_EVERY_STEPS 3125      /* [seldom steps] five seconds from one to the next | lowspeed */
+#define PROBE_SLOPE_SHIFT 3         /* [shift] the largest current takes 8 steps, so that the estimate does not jump | lowspeed */
+#define PROBE_MOST_Q15 22528        /* [Q15] of the largest current, so that as much q current is left | lowspeed */
+#define PROBE_LEAST_Q15 14648       /* [Q15] 1/sqrt(5): takes a tenth of the largest q current, and half of a standing rotor's estimate | lowspeed */
+#define PROBE_LEAST_SALIENT_Q15 9830 /* [Q15] 0.3: such a d current takes of a salient motor's torque, too | lowspeed MOTOR=ipm_4pp_24v_2000 */
+#define SIGNALS_MOST_TIMES 2        /* [1] a deviation counts as twice its limit at most: then it may last 0.35 s | campaign */
+#define SIGNALS_MEAN_SHIFT 9        /* [shift] its mean is one over 512 ms | campaign */
+#define SIGNALS_SAMPLES 64u         /* [samples] of the phases' currents that are compared, some 62 ms | run SCENARIO=fault_open_phase */
+
+/* clang-format on */
+
+#endif

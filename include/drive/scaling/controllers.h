@@ -1,0 +1,91 @@
+/* The gains of the controllers, from bandwidths, and the d current's.
+ *
+ *     current loops: Kp = 2 pi f L, Ki = 2 pi f R    the zero cancels the pole of u = R i + L di/dt
+ *     speed loop:    Kp = 2 pi f J/Kt, Kt = 3/2 p psi    the load observer takes the place of the integral (control/observer.h)
+ *     burnt:         1.5 R I^2 against the 1.5 V I that half of dead time's voltage V, all that its compensation may leave, gives back
+ *
+ * In AN1292's units: Kp/16 and the integral per period, both in full scales I0 and U0. Any gain may be defined in userparams.h instead. */
+#ifndef DRIVE_SCALING_CONTROLLERS_H
+#define DRIVE_SCALING_CONTROLLERS_H
+
+#include "drive/scaling/current_voltage.h"
+
+/* ---- Current loops ---- */
+#ifndef D_CURRCNTR_PTERM
+#define D_CURRCNTR_PTERM (2.0F * PARAM_PI * PARAM_F(CURRENT_BANDWIDTH_HZ) * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_IU / 16.0F)
+#endif
+#ifndef D_CURRCNTR_ITERM
+#define D_CURRCNTR_ITERM (2.0F * PARAM_PI * PARAM_F(CURRENT_BANDWIDTH_HZ) * PARAM_F(MOTOR_RS_OHM) * PARAM_F(LOOPTIME_SEC) * PARAM_IU)
+#endif
+#ifndef D_CURRCNTR_CTERM
+#define D_CURRCNTR_CTERM (1.0F - PARAM_F(CURRENT_KEEP_LESS))
+#endif
+#ifndef Q_CURRCNTR_PTERM
+#define Q_CURRCNTR_PTERM D_CURRCNTR_PTERM
+#endif
+#ifndef Q_CURRCNTR_ITERM
+#define Q_CURRCNTR_ITERM D_CURRCNTR_ITERM
+#endif
+#ifndef Q_CURRCNTR_CTERM
+#define Q_CURRCNTR_CTERM (1.0F - PARAM_F(CURRENT_KEEP_LESS))
+#endif
+#define CURRENT_PI_SHIFT 10u
+#define PARAM_KP(pterm) ((int16_t)PARAM_ROUND(PARAM_F(pterm) * 32768.0F))
+#define PARAM_CURRENT_KI(iterm) ((int16_t)PARAM_ROUND(PARAM_F(iterm) * 2048.0F))
+#define PARAM_PI_INIT(p, i, c, s) \
+    { \
+        .kp = PARAM_KP(p), .ki = (i), .kc = Q15(c), .shift = (s) \
+    }
+
+/* ---- Speed loop ---- */
+#define PARAM_KT (1.5F * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / PARAM_SQRT3 * 60.0F / (2000.0F * PARAM_PI)) /* N m per A peak */
+#ifndef SPEEDCNTR_PTERM                                                                               /* A per count of speed, over I0 (Q15 counts), /16 */
+#define SPEEDCNTR_PTERM (2.0F * PARAM_PI * PARAM_F(SPEED_BANDWIDTH_HZ) * PARAM_F(MOTOR_INERTIA_KGM2) / PARAM_KT \
+                         * (2.0F * PARAM_PI / 60.0F) / PARAM_F(NOPOLESPAIRS) / PARAM_F(NORM_CURRENT_CONST) / 16.0F * PARAM_F(SPEED_UNIT))
+#endif
+/** Largest bandwidth of the speed loop, which falls with the speed as the observer's rates do. */
+#define PARAM_CALM_HZ (PARAM_F(PARAM_CALM_SHARE) / 60.0F * PARAM_MAX(PARAM_FULL_ERPM, PARAM_F(MINIMUM_SPEED_RPM) * PARAM_F(NOPOLESPAIRS)))
+/** Below, the voltage that dead time's compensation leaves takes the estimator's lock from a rotor under load. */
+#define PARAM_LOWEST_ERPM (PARAM_F(PARAM_LOWEST_SHARE) * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
+#define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)
+/** TUNING's ramp: Q16 of a count per slow step. */
+#define TUNING_STEP_Q16 (PARAM_ROUND(SPEED_COUNTS(SLOW_PERIODS) * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
+
+/* ---- Field weakening ---- */
+#define PARAM_18(f) \
+    { \
+        f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15), f(16), f(17) \
+    }
+#define PARAM_IDREF(i) CURRENT_Q13(IDREF_SPEED##i)
+#define PARAM_INVKFI_ENTRY(i) ((int16_t)PARAM_ROUND(PARAM_F(INVKFI_SPEED##i)))
+#define PARAM_LS_ENTRY(i) ((int16_t)PARAM_ROUND(PARAM_F(LS_OVER2LS0_SPEED##i) * 32768.0F))
+#define PARAM_FIELDWEAK_INIT \
+    { \
+        .idref_q13 = PARAM_18(PARAM_IDREF), \
+        .inv_kfi = PARAM_18(PARAM_INVKFI_ENTRY), \
+        .ls_over2ls0_q15 = PARAM_18(PARAM_LS_ENTRY), \
+        .on_speed_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(FW_START_SPEED_ERPM)), \
+        .index_per_count_q16 = (uint16_t)(SPEED_UNIT * (65536l >> SPEED_INDEX_CONST)), \
+        .ls_base_q16 = PARAM_SCALED(PARAM_LS_FULL, PARAM_LS_EXP), \
+        .kfilter_esdq_q16 = 2 * (KFILTER_ESDQ), \
+        .kfilter_esdq_fw_q16 = 2 * (KFILTER_ESDQ_FW), \
+        .esdq_per_erpm_q13 = (uint16_t)PARAM_MIN(PARAM_ESDQ_PER_COUNT * 8192.0F + 0.5F, 65535.0F), \
+        .trim_max_q13 = CURRENT_Q13(FW_TRIM_CURRENT_A), \
+        .trim_step_q13 = FIELDWEAK_TRIM_STEP, \
+        .trim_most_q13 = DEFER_DUTIES ? FIELDWEAK_TRIM_DEFERRED : FIELDWEAK_TRIM_MOST, \
+        .trim_speed_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(FW_START_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * PARAM_F(FIELDWEAK_TRIM_FROM))) \
+    }
+
+/* ---- Salient motors: -i_d that doubles the flux, psi/(Lq - Ld), Q13 counts ---- */
+#define PARAM_SALIENCE_Q13 (60.0F / (2.0F * PARAM_PI * PARAM_ERPM_PER_V) / (PARAM_MAX(PARAM_F(MOTOR_SALIENCY_UH), 0.001F) * 0.000001F) \
+                            / PARAM_F(NORM_CURRENT_CONST) / 4.0F)
+#if MOTOR_SALIENCY_UH
+#define PARAM_SALIENT_INIT .salience_q13 = (uint16_t)(PARAM_SALIENCE_Q13 + 0.5F)
+#else
+#define PARAM_SALIENT_INIT
+#endif
+
+/* ---- d current that burns the rotor's energy in the winding ---- */
+#define PARAM_FLUX_BRAKES (PARAM_F(MOTOR_RS_OHM) * PARAM_F(MAXIMUM_CURRENT_A) > PARAM_F(FLUX_BRAKE_DEAD_SHARE) * PARAM_DEAD_TIME_V)
+
+#endif

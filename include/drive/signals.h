@@ -1,0 +1,46 @@
+/* Do the measured currents fit? An open phase and a wrong current signal, by two rules that see different motors.
+ *
+ *                   the law's rule: signals_check()                      the background's rule: signals_phases(), signals_d_current()
+ * asks              do voltages and currents fit the motor?              does what flows follow what is asked for?
+ * sums              |current| of each phase, while they do not fit       |current| of each phase, asked and measured, over 64 samples
+ * OPEN_PHASE        the least sum is below a quarter of the largest      a phase's measured sum, as a share of what is asked of it, is
+ *                                                                        below a quarter of the best phase's share
+ * CURRENT_SENSOR    else                                                 the d current stays off its reference
+ * finds             what the observer or the voltage shows, in 0.1 s     what the controllers hide from the model: noise, a small load
+ * no limit excuses  a voltage that drives no current                     the d axis takes its voltage first, each phase its share */
+#ifndef DRIVE_SIGNALS_H
+#define DRIVE_SIGNALS_H
+
+#include "control/qmath.h"
+#include "drive/forward.h"
+
+/* ---- the law's rule, in the control law's slow work ---- */
+
+/** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
+ *  with what is measured. In closed loop every seldom step, and every slow one while something is wrong: the phases' sums must not meet the same
+ *  angles of each turn. */
+void signals_check(drive_t *d, const drive_params_t *p);
+
+/* ---- the background's rule ---- */
+
+/** Sums of the phases' currents. */
+typedef struct {
+    uint16_t asked[3], flows[3]; /**< |current| that the references ask of the phases and that is measured, Q13 / 16 */
+    uint16_t samples;            /**< in the sums */
+} signals_sums_t;
+
+/** Mean size of the d current's deviation over half a second, and what the phases carry. Zero is a valid start. */
+typedef struct {
+    int32_t id_q16; /**< Q13 counts with 16 fraction bits */
+    signals_sums_t sums;
+    uint16_t sampled_tick; /**< period of the last sample */
+} signals_t;
+
+/** Every pass of the background. @return drive_fault_t: OPEN_PHASE when a phase carries next to none of what is asked of it, or none */
+uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p);
+
+/** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise
+ *  make it, or none */
+uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t *p);
+
+#endif

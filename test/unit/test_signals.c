@@ -1,0 +1,311 @@
+/* Both rules of the signals: what flows against what is asked for, and voltages and currents against the motor. */
+#include "drive_rig.h"
+
+#include "drive/signals.h"
+
+static signals_t signals;
+
+void setUp(void)
+{
+    rig_power_up();
+    rig_closed(1, 10000);
+    drive.run.control.ref_q13.d = 0;
+    drive.run.control.i_q13.d = 0;
+    signals = (signals_t){ 0 };
+}
+
+/** Milliseconds until this fault is found, at most 3000. */
+static uint16_t ms_until(drive_fault_t fault)
+{
+    uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
+    while (ms < 3000u && found == (uint16_t)FAULT_NONE) {
+        found = signals_d_current(&signals, &drive, &params);
+        ms++;
+    }
+    TEST_ASSERT_EQUAL_UINT16((ms < 3000u) ? fault : FAULT_NONE, found);
+    return ms;
+}
+
+void test_the_mean_of_the_deviation_is_exact_to_its_last_bit(void)
+{
+    static const struct {
+        int16_t i_d;
+        int32_t before_q16;
+    } cases[] = { { 0, 1 }, { 0, 0x12345 }, { 3, 0xFFFF }, { 40, 0x2FFFF }, { 40, 0x7FFFFF }, { 1, 0 } };
+    EACH(n, cases) {
+        drive.run.control.i_q13.d = cases[n].i_d;
+        signals.id_q16 = cases[n].before_q16;
+        (void)signals_d_current(&signals, &drive, &params);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(
+            cases[n].before_q16 + (((int32_t)cases[n].i_d * 65536 - cases[n].before_q16) >> SIGNALS_MEAN_SHIFT), signals.id_q16, golden_row(n));
+    }
+}
+
+/* ---- the d current ---- */
+
+void test_d_current_that_stays_further_off_than_noise_and_dead_time_is_found_whatever_its_sign(void)
+{
+    const int16_t limit = params.id_off_q13;
+    uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
+    drive.run.control.i_q13.d = limit;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
+    setUp();
+    while (ms < 3000u && found == (uint16_t)FAULT_NONE) { /* noise */
+        drive.run.control.i_q13.d = (int16_t)((ms & 1u) ? 4 * limit : -4 * limit);
+        found = signals_d_current(&signals, &drive, &params);
+        ms++;
+    }
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CURRENT_SENSOR, found);
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms);
+}
+
+void test_d_current_is_judged_in_closed_loop_after_the_hand_over_and_not_forgotten_in_a_reversal_s_ramp(void)
+{
+    drive.run.control.i_q13.d = (int16_t)(4 * params.id_off_q13);
+    drive.run.handover.id_q13 = 10;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
+    drive.run.handover.id_q13 = 0;
+    drive.state = (uint16_t)DRIVE_RAMP;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
+    drive.state = (uint16_t)DRIVE_STOPPING;
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms_until(FAULT_CURRENT_SENSOR));
+    drive.state = (uint16_t)DRIVE_RAMP;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    TEST_ASSERT_EQUAL_UINT16(1, ms_until(FAULT_CURRENT_SENSOR));
+    drive.state = (uint16_t)DRIVE_STOPPED;
+    (void)signals_d_current(&signals, &drive, &params);
+    drive.state = (uint16_t)DRIVE_CLOSED;
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms_until(FAULT_CURRENT_SENSOR)); /* anew */
+}
+
+void test_d_current_that_follows_its_reference_is_none_however_large(void)
+{
+    drive.run.control.ref_q13.d = (int16_t)(-4 * params.id_off_q13);
+    drive.run.control.i_q13.d = drive.run.control.ref_q13.d;
+    drive.phases_q13 = phases_of(drive.run.control.ref_q13, drive.frame);
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until(FAULT_CURRENT_SENSOR));
+    drive.run.control.i_q13.d = 0;
+    TEST_ASSERT_UINT16_WITHIN(10, 356, ms_until(FAULT_CURRENT_SENSOR));
+}
+
+void test_deviations_of_a_quarter_of_a_second_ride_through(void)
+{
+    uint16_t n, ms;
+    for (n = 0; n < 3u; n++) {
+        drive.run.control.i_q13.d = 3000;
+        for (ms = 0; ms < 250u; ms++) {
+            TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, signals_d_current(&signals, &drive, &params));
+        }
+        drive.run.control.i_q13.d = 0;
+        for (ms = 0; ms < 1500u; ms++) {
+            (void)signals_d_current(&signals, &drive, &params);
+        }
+    }
+}
+
+/* ---- the phases ---- */
+
+#define COUNT 1248u /* periods of 64 samples, 16 to 23 apart */
+
+/** Periods until an open phase is found on a rotor that turns by `step` a period; what is asked for goes by the next period's angle.
+ *  @param iq_q13 asked for @param share256 of it that flows
+ *  @param open 0..2: carries `left` of 256 of what is asked of it, and the others the rest; 3: none does */
+static uint16_t periods_until_open(int16_t iq_q13, int16_t share256, uint16_t open, int16_t left, uint16_t step)
+{
+    uint16_t periods = 0, found = (uint16_t)FAULT_NONE;
+    angle_t angle = 0x1000;
+    drive.run.control.ref_q13.q = iq_q13;
+    while (periods < 20000u && found == (uint16_t)FAULT_NONE) {
+        dq_t flowing = drive.run.control.ref_q13;
+        flowing.q = (int16_t)(iq_q13 * (int32_t)share256 / 256);
+        drive.phases_q13 = phases_of(flowing, trig_sincos(angle));
+        angle = (angle_t)(angle + step);
+        drive.frame = trig_sincos(angle);
+        if (open == 0u) {
+            drive.phases_q13.a = (int16_t)(drive.phases_q13.a * (int32_t)left / 256);
+        } else if (open == 1u) {
+            drive.phases_q13.b = (int16_t)(drive.phases_q13.b * (int32_t)left / 256);
+        } else if (open == 2u) {
+            drive.phases_q13.c = (int16_t)(drive.phases_q13.c * (int32_t)left / 256);
+        } else {
+            /* whole */
+        }
+        drive.ticks++;
+        found = signals_phases(&signals, &drive, &params);
+        periods++;
+    }
+    TEST_ASSERT_EQUAL_UINT16((periods < 20000u) ? FAULT_OPEN_PHASE : FAULT_NONE, found);
+    return periods;
+}
+
+#define EXPECT_FOUND(...) TEST_ASSERT_UINT16_WITHIN(32, COUNT, periods_until_open(__VA_ARGS__))
+#define EXPECT_WHOLE(...) TEST_ASSERT_EQUAL_UINT16(20000, periods_until_open(__VA_ARGS__))
+
+void test_a_phase_that_carries_nearly_none_of_what_is_asked_of_it_is_open_within_two_counts(void)
+{
+    const int16_t little = (int16_t)(2 * params.id_off_q13);
+    uint16_t phase;
+    EACH_DIRECTION(sign) {
+        for (phase = 0; phase < 3u; phase++) {
+            setUp();
+            EXPECT_FOUND((int16_t)(sign * 4000), 256, phase, 0, 257);
+            EXPECT_FOUND((int16_t)(sign * little), 256, phase, 0, 257);
+            EXPECT_FOUND((int16_t)(sign * 4000), 256, phase, 56, 257);
+            EXPECT_WHOLE((int16_t)(sign * 4000), 256, phase, 72, 257);
+            setUp();
+            EXPECT_FOUND((int16_t)(sign * 4000), 128, phase, 0, 257); /* at the voltage's limit half of it flows */
+        }
+    }
+}
+
+void test_a_whole_motor_has_no_open_phase_at_any_angle_or_speed_or_limit(void)
+{
+    static const uint16_t steps[] = { 1, 3, 257, 1638, 1639, 819, 3277, 3276, 1092, 1820, 2048, 4096, 64260u };
+    static const int16_t shares[] = { 256, 40, 0, 300 };
+    EACH(n, steps) {
+        EACH(k, shares) {
+            setUp();
+            EXPECT_WHOLE(4000, shares[k], 3, 256, steps[n]);
+        }
+    }
+}
+
+void test_a_current_as_small_as_noise_says_nothing_of_an_open_phase(void)
+{
+    EXPECT_WHOLE(params.id_off_q13, 256, 1, 0, 257);
+}
+
+void test_noise_of_one_phase_opens_no_other(void)
+{
+    uint16_t n;
+    for (n = 0; n < 256u; n++) {
+        drive.run.control.ref_q13.q = (int16_t)(2 * params.id_off_q13);
+        drive.frame = trig_sincos((angle_t)(n * 5000u));
+        drive.phases_q13 = phases_of(drive.run.control.ref_q13, drive.frame);
+        drive.phases_q13.b = (int16_t)(drive.phases_q13.b + ((n & 1u) ? 4000 : -4000));
+        drive.phases_q13.c = (int16_t)(-drive.phases_q13.a - drive.phases_q13.b);
+        drive.ticks = (uint16_t)(drive.ticks + 23u);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, signals_phases(&signals, &drive, &params));
+    }
+}
+
+/* ---- signals that do not fit the motor ---- */
+
+/** Slow steps with these phase currents and innovations that do not end, until a fault. @return steps */
+static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13)
+{
+    uint16_t steps = 0;
+    rig_closed(1, 10000);
+    while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
+        drive.phases_q13.a = a_q13;
+        drive.phases_q13.b = b_q13;
+        drive.phases_q13.c = (int16_t)(-a_q13 - b_q13);
+        drive.run.observer.wrong_steps++;
+        signals_check(&drive, &params);
+        steps++;
+    }
+    return steps;
+}
+
+void test_innovations_that_do_not_end_are_a_sensor_or_an_open_phase_after_100_ms(void)
+{
+    static const struct {
+        int16_t a_q13, b_q13;
+        drive_fault_t fault;
+    } cases[] = {
+        { 1000, -500, FAULT_CURRENT_SENSOR }, { -1000, 500, FAULT_CURRENT_SENSOR }, { 1000, -700, FAULT_CURRENT_SENSOR },
+        { 10, 1000, FAULT_OPEN_PHASE }, { 1000, -10, FAULT_OPEN_PHASE }, { -1000, 990, FAULT_OPEN_PHASE }, { 7000, 70, FAULT_OPEN_PHASE },
+        { 7000, -7000, FAULT_OPEN_PHASE }, { 0, 0, FAULT_CURRENT_SENSOR }, { 4192, -7000, FAULT_CURRENT_SENSOR }, /* no sum wraps */
+    };
+    EACH(n, cases) {
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(251, wrong_until_fault(cases[n].a_q13, cases[n].b_q13), golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16(cases[n].fault, drive.fault);
+        drive.fault = (uint16_t)FAULT_NONE;
+    }
+}
+
+void test_phase_currents_are_summed_anew_when_the_innovations_have_ended(void)
+{
+    rig_closed(1, 10000);
+    drive.run.phase_sums[1] = 77;
+    signals_check(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.phase_sums[1]);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
+void test_voltage_that_neither_speed_nor_resistance_nor_dead_time_explains_is_a_wrong_signal(void)
+{
+    const int16_t dead_q12 = (int16_t)(5 * params.adaptation.emf_least_q12);
+    static const struct {
+        const char *what;
+        float ri_d, ri_q;
+        int16_t q_q12;
+    } cases[] = { { "no current", 0.0F, 0.0F, 0 }, { "q current", 0.0F, 0.5F, 0 }, { "d current", -0.5F, 0.0F, 0 }, { "speed", 0.0F, 0.0F, 2000 },
+                  { "reverse speed", 0.0F, 0.0F, -2000 }, { "all", 0.25F, -0.25F, 1000 } };
+    EACH(n, cases) {
+        int16_t explained = (int16_t)(dead_q12 + 4000.0F * (qm_abs((int16_t)(100 * cases[n].ri_d)) + qm_abs((int16_t)(100 * cases[n].ri_q))) / 100.0F
+                                      + (float)qm_abs(cases[n].q_q12));
+        EACH_DIRECTION(sign) {
+            rig_closed(1, 10000);
+            drive.run.control.i_q13.d = rig_current_of_ri(cases[n].ri_d);
+            drive.run.control.i_q13.q = rig_current_of_ri(cases[n].ri_q);
+            rig_emf((int16_t)(sign * (explained - 8)), cases[n].q_q12);
+            signals_check(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.run.observer.wrong_steps, cases[n].what);
+            rig_emf((int16_t)(sign * (explained + 8)), cases[n].q_q12);
+            signals_check(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(2, drive.run.observer.wrong_steps, cases[n].what);
+        }
+    }
+}
+
+void test_voltage_without_current_on_a_rotor_that_stands_is_an_open_phase_within_100_ms(void)
+{
+    uint16_t steps = 0;
+    rig_closed(1, 10000);
+    rig_emf(8000, 10);
+    drive.phases_q13.a = 0;
+    drive.phases_q13.b = 500;
+    drive.phases_q13.c = -500;
+    while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
+        if (drive.run.observer.wrong_steps != 0u) {
+            drive.run.observer.wrong_steps--; /* the observer sees nothing wrong */
+        }
+        signals_check(&drive, &params);
+        steps++;
+    }
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OPEN_PHASE, drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(250, steps);
+}
+
+void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_without_a_fault(void)
+{
+    const int16_t blurred_q12 = (int16_t)(4 * params.dead_emf_q12);
+    static const struct {
+        const char *what;
+        drive_state_t state;
+        int16_t run, clear_q12, more_q13;
+        drive_state_t next;
+    } cases[] = { { "stop", DRIVE_STOPPING, 0, 0, 0, DRIVE_STOPPED },
+                  { "stop from above", DRIVE_STOPPING, 0, 1, 0, DRIVE_FAULT },
+                  { "with current", DRIVE_STOPPING, 0, 0, 1, DRIVE_FAULT },
+                  { "reversal", DRIVE_STOPPING, 1, 0, 0, DRIVE_FAULT },
+                  { "run", DRIVE_CLOSED, 0, 0, 0, DRIVE_FAULT } };
+    EACH(n, cases) {
+        EACH_DIRECTION(sign) {
+            rig_closed((int16_t)sign, 10000);
+            drive.state = (uint16_t)cases[n].state;
+            drive.command.run = cases[n].run;
+            rig_emf(0, (int16_t)(sign * (blurred_q12 - 1 + cases[n].clear_q12)));
+            drive.run.control.ref_q13.q = (int16_t)(sign * (params.id_off_q13 - 1 + cases[n].more_q13));
+            drive.run.observer.wrong_steps = params.wrong_steps;
+            signals_check(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, cases[n].what);
+            drive.run.observer.wrong_steps++;
+            signals_check(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].next, drive.state, cases[n].what);
+            drive.fault = (uint16_t)FAULT_NONE;
+        }
+    }
+}
