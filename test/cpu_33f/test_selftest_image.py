@@ -143,9 +143,9 @@ def test_a_stuck_bit_of_ram_is_found_at_a_start(board: PilBoard, place: int, at_
     assert board.get("fw.fault") == SELFTEST and board.get("pwm.outputs_on") == 0
 
 
-def test_a_stuck_bit_of_the_way_back_from_the_start_leaves_the_outputs_off(board: PilBoard) -> None:
-    """The program cannot come back to tell: the core resets, again and again."""
-    C.iss_stick(C.vb_iss_core(board._vb), 0x0C00, 0x0001, 0)
+def test_a_stuck_bit_of_the_way_back_from_the_start_leaves_the_outputs_off(elf: program.Elf, board: PilBoard) -> None:
+    """In the first words of the stack. The program cannot come back to tell: the core resets, again and again."""
+    C.iss_stick(C.vb_iss_core(board._vb), elf.symbols["__SP_init"] + 6, 0x0001, 0)
     board.power_up()
     for _ in range(100):
         pass_ms(board, 1)

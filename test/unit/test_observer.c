@@ -1,5 +1,6 @@
 /* The load observer: it converges to speed and load, is quick after a large innovation and calm again, and keeps to its formats. */
 #include "control/observer.h"
+#include "control/tuned.h"
 #include "golden.h"
 #include "golden_observer.h"
 #include "golden_observer_ends.h"
