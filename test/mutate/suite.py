@@ -122,10 +122,10 @@ class Suite:
             uses = sorted(set(re.findall(r"#include \"(mock_\w+)\.h\"", text)))
             for mock in uses:
                 mocks.setdefault(mock, self.unit(f"build/test/mocks/{mock}.c", []))
-            runner = self.unit(f"build/test/{name}_runner.c", [f"-Itest/{os.path.dirname(name)}", *flags])
-            plans.append((name, [self.unit(f"test/{name}.c", flags, o) for o in (FAST, LONG)], runner, [mocks[m] for m in uses]))
+            flags = [f"-Itest/{os.path.dirname(name)}", *flags, "-include", f"test/{name}.c"] # test and runner are one
+            plans.append((name, [self.unit(f"build/test/{name}_runner.c", flags, o) for o in (FAST, LONG)], [mocks[m] for m in uses]))
         everything = [*frame, *self.firmware.values(), *mocks.values(), *self.bench]
-        everything += [u for _, units, runner, _ in plans for u in (units[0], runner)]
+        everything += [units[0] for _, units, _ in plans]
         with ThreadPoolExecutor(self.jobs) as pool:
             list(pool.map(self.compile_base, everything))
             run(["ar", "rcs", "obj/firmware.a", *self.firmware], self.base)
@@ -134,8 +134,8 @@ class Suite:
 
     def link_base(self, plan, frame, on_board):
         """Links and runs a test; a unit test that takes long is built again so that it runs faster."""
-        name, units, runner, mocks = plan
-        fixed = [u.object for u in (runner, *mocks, *frame)]
+        name, units, mocks = plan
+        fixed = [u.object for u in (*mocks, *frame)]
         test = self.try_base(name, units[0], fixed, on_board)
         if test.seconds > LONG_SECONDS and not on_board:
             test = self.try_base(name, self.compile_base(units[1]), fixed, on_board)
