@@ -391,7 +391,7 @@ test_compile = $(CC) $(CFLAGS) $(INCLUDES) -Itest/unit/support $(board_includes)
     -isystem $(unity)/src -isystem $(cmock)/src -DUNITY_INCLUDE_CONFIG_H $(DEFINES)
 
 $T/flags: FORCE | $B/flags
-	$(call remember,$(test_compile))
+	$(call remember,$(test_compile) -include)
 
 $T/%_runner.c: test/%.c test/unit/support/cmock.yml | $(gem_stamp)
 	@mkdir -p $(@D)
