@@ -1,4 +1,4 @@
-/* The interrupts: the control interrupt that is one PWM period, the fault input, and the traps. */
+/* The interrupts: the control interrupt that is one PWM period, the slow work's behind it, the fault input, and the traps. */
 #include "board/duties.h"
 #include "board/firmware.h"
 #include "board/scope.h"

@@ -1,4 +1,4 @@
-/* The program: initialise, then the background for ever; the control interrupt does the rest. */
+/* The program: initialise, then the background for ever; the interrupts do the rest. */
 #include "board/firmware.h"
 #include "board/selftest_cpu.h"
 

@@ -1,4 +1,4 @@
-/* The peripherals of the board room: clock, pins, PWM1, ADC1, timer 1, UART1. */
+/* The peripherals of the board room: clock, pins, PWM1, ADC1, timer 1, the slow work's interrupt, UART1. */
 #include "board/peripherals.h"
 
 #include "board/mclv.h"

@@ -1,8 +1,4 @@
-/* The catch of a rotor that turns at the start: what the short circuit of the bootstrap tells of its angle and speed.
- *
- * With all low sides on the back-EMF alone drives the current, free of dead time and of the bus:  L i + R int(i dt) = -int(E dt).  A look ends as
- * soon as the current is a tenth of its maximum, so it costs the rotor next to nothing. Its direction is the back-EMF's; the pause before
- * the second look is meant to be 75 degrees, and the turn from look to look is the speed with its sign, whatever Kphi is. */
+/* The catch of a rotor that turns at the start: the two looks, the pause between them, and the estimator's begin. */
 #include "drive/catch.h"
 
 #include "control/estimator.h"
@@ -10,10 +6,10 @@
 #include "control/transforms.h"
 #include "control/trig.h"
 #include "control/tuned.h"
+#include "drive/deferred.h"
 #include "drive/drive.h"
 #include "drive/faults.h"
 #include "drive/handover.h"
-#include "drive/deferred.h"
 #include "drive/modes/modes.h"
 #include "drive/param_scaling.h"
 #include "drive/startup.h"

@@ -1,9 +1,9 @@
-/* The hand-over from the forced angle to the estimator's: the decision, the change of frame, and what decays after it. */
+/* The hand-over from the forced angle to the estimator's: the decision, the change of frame, what decays after it, and the observer's step in between. */
 #include "drive/handover.h"
 
+#include "control/current_control.h"
 #include "control/estimator.h"
 #include "control/observer.h"
-#include "control/current_control.h"
 #include "control/qmath.h"
 #include "control/transforms.h"
 #include "control/trig.h"

@@ -1,4 +1,4 @@
-/* The slots of the schedule: each half is one function that asks for nothing but the state. */
+/* The slots of the schedule: what each half calls, and how the self-test follows it. */
 #include "drive/schedule.h"
 
 #include "control/estimator.h"

@@ -1,4 +1,4 @@
-/* The hand-over from the forced angle to the estimator's: the decision, the change of frame, and what decays after it. */
+/* The hand-over from the forced angle to the estimator's: the decision, the change of frame, what decays after it, and the observer's step in between. */
 #ifndef DRIVE_HANDOVER_H
 #define DRIVE_HANDOVER_H
 

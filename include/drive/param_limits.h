@@ -197,8 +197,11 @@
       PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V)) \
     X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, \
       PARAM_NAMED(UNDER_VOLTAGE_V) " is too low for the modulator's division") \
-    X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000501F >= PARAM_F(DEADTIME_SEC), \
-      PARAM_NAMED(SAMPLE_WINDOW_SEC) " must be at least DEADTIME_SEC - 0.5 us: the low sides then conduct for 1 us before the sample") \
+    X(PARAM_F(SAMPLE_WINDOW_SEC) + PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC >= PARAM_F(DEADTIME_SEC) + 0.000000999F, \
+      PARAM_NAMED(SAMPLE_WINDOW_SEC) " must be at least DEADTIME_SEC + 1 us less the SAMPLE_DELAY_CLOCKS, 25 ns each: " \
+      "the low sides then conduct for 1 us before the sample") \
+    X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000001F >= PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC, \
+      PARAM_NAMED(SAMPLE_WINDOW_SEC) " must be at least the SAMPLE_DELAY_CLOCKS, 25 ns each: the low sides then still conduct at the sample") \
     X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, \
       "the current gain exceeds its Q format: lower " PARAM_NAMED(CURRENT_BANDWIDTH_HZ)) \
     X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, \

@@ -56,7 +56,7 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
     TRANSITIONS_BY_CURRENT_OR_BUS(X) \
     TRANSITIONS_BY_ROTOR_OR_SIGNAL(X)
 #define TRANSITIONS_FROM_STOPPING(X) \
-    X(STOPPED, "the rotor is slow enough; or what dead time leaves hides it at a stop's end") \
+    X(STOPPED, "the rotor is slow enough; or dead time hides its speed near the stop's end") \
     X(RAMP, "slow enough, with a target in the other direction: the ramp takes the rotor through zero") \
     X(CLOSED, "a run is requested again, in this direction") \
     TRANSITIONS_BY_SUPERVISION(X) \

@@ -22,7 +22,8 @@ static void maybe_trap(void)
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */
-static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick, sample_comes_in_slow_work;
+static uint16_t sample_arrives_meanwhile, slow_work_waits, trap_comes_meanwhile, flag_during_tick, sample_comes_in_slow_work,
+    trap_comes_after_slow_work;
 
 static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
 static uint16_t slow_and_look(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
@@ -49,6 +50,10 @@ static uint16_t slow_and_look(drive_t *d, const drive_params_t *p, const drive_s
     if (sample_comes_in_slow_work) {
         sample_comes_in_slow_work = 0;
         _ADC1Interrupt();
+    }
+    if (trap_comes_after_slow_work && goes_on) {
+        trap_comes_after_slow_work = 0;
+        _MathError();
     }
     return goes_on;
 }
@@ -106,6 +111,7 @@ void setUp(void)
     trap_comes_meanwhile = 0;
     trap_comes_in_the_hand_over = 0;
     sample_comes_in_slow_work = 0;
+    trap_comes_after_slow_work = 0;
 }
 
 /** Running: ALIGN has begun. */
@@ -367,6 +373,15 @@ void test_trap_inside_the_control_interrupt_is_off_within_one_period(void)
     control_interrupts(2); /* the one that was interrupted, and the next */
     expect_off(FAULT_TRAP);
     control_interrupts(100);
+    expect_off(FAULT_TRAP);
+}
+
+void test_trap_between_the_slow_work_and_its_outputs_ends_with_them_off(void)
+{
+    bring_to_align();
+    trap_comes_after_slow_work = 1;
+    _T2Interrupt();
+    TEST_ASSERT_EQUAL_UINT16(0, trap_comes_after_slow_work);
     expect_off(FAULT_TRAP);
 }
 

@@ -10,6 +10,7 @@ import pytest
 from c_compiler import CFLAGS, ROOT, compiler
 
 from tools.common.param_rows import FOLLOWS, Parameter, modes, parameters
+from tools.common.tuned_rows import tuned
 from tools.common.x_macro import rows
 
 USERPARAMS = (ROOT / "userparams.h").read_text(encoding="utf-8")
@@ -145,9 +146,12 @@ RELATIONS = {
     "REGEN_LIMIT_V must be above NOMINAL_BUS_V": [case("REGEN_LIMIT_V", "24.0", "24.1")],
     "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V": [case("REGEN_LIMIT_V", "32.1", "31.9")],
     "UNDER_VOLTAGE_V is too low for the modulator's division": [case("LOOPTIME_SEC", "0.0002", "0.00014")],
-    "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC - 0.5 us": [
+    "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC + 1 us": [
         case("DEADTIME_SEC", "0.00000213", "0.0000021"),
+        case("SAMPLE_DELAY_CLOCKS", "39", "40", DEADTIME_SEC="0.000002", SAMPLE_WINDOW_SEC="0.000002"),
         case("SAMPLE_WINDOW_SEC", "0.00000248", "0.0000025", DEADTIME_SEC="0.000003")],
+    "SAMPLE_WINDOW_SEC must be at least the SAMPLE_DELAY_CLOCKS": [
+        case("SAMPLE_DELAY_CLOCKS", "81", "80", SAMPLE_WINDOW_SEC="0.000002"), case("SAMPLE_WINDOW_SEC", "0.00000158", "0.0000016", SAMPLE_DELAY_CLOCKS="64")],
     "BUS_FULL_SCALE_V is too large for NOMINAL_BUS_V": [case("BUS_FULL_SCALE_V", "329.9", "326", NOMINAL_BUS_V="20", OVER_CURRENT_THRESHOLD_A="3")],
     **{f"IDREF_SPEED{i} must not exceed MAXIMUM_CURRENT_A": [case(f"IDREF_SPEED{i}", "-2.76", "-2.75")] for i in range(18)},
     "the current gain exceeds its Q format": [
@@ -194,7 +198,7 @@ def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
               "#define HOLDS(condition, message) putchar((condition) ? '1' : '0');", "int main(void)", "{"]
     for _, values, _ in tried:
         source += [*defines(values), "    PARAM_RELATION_TABLE(HOLDS)", "    puts(\"\");",
-                   *defines({name: BASE.get(name) or DERIVED[name] for name in values})]
+                   *defines({name: BASE.get(name) or DERIVED.get(name) or tuned()[name].value for name in values})]
     source += ["    return 0;", "}"]
     in_table = relations()
     wrong = []
