@@ -495,6 +495,97 @@ void test_a_brake_load_never_turns_the_shaft_backwards(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, get("stat.speed_max_rpm"));
 }
 
+/* A shaft without friction whose only load swings with its angle. */
+static void pulsing_shaft(double nm, double order, double deg)
+{
+    fake_override = 0x0000;
+    no_friction();
+    set("mech.inertia_kgm2", 1e-4);
+    set("load.pulse2_nm", nm);
+    set("load.pulse2_order", order);
+    set("load.pulse2_deg", deg);
+    power_up();
+}
+
+void test_a_load_by_angle_takes_and_gives_the_energy_of_its_potential(void)
+{
+    const double nm = 0.05, order = 2.0, w0 = 600.0 * PI / 30.0;
+    pulsing_shaft(nm, order, 0.0);
+    set("state.speed_rpm", 600.0);
+    double worst = 0.0, slowest = w0;
+    for (int k = 0; k < 20000; k++) { /* ten turns */
+        run(1);
+        double taken = nm / order * (1.0 - cos(order * 2.0 * PI * get("plant.turns")));
+        double expected = sqrt(w0 * w0 - 2.0 * taken / 1e-4);
+        double w = get("plant.speed_rpm") * PI / 30.0;
+        worst = fmax(worst, fabs(w / expected - 1.0));
+        slowest = fmin(slowest, w);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, sqrt(w0 * w0 - 4.0 * nm / order / 1e-4), slowest);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-4, 0.0, worst);
+}
+
+void test_a_load_by_angle_swings_a_standing_shaft_about_its_valley_and_neither_dies_nor_grows(void)
+{
+    pulsing_shaft(0.02, 1.0, 10.0); /* 10 degrees beside the valley */
+    for (int k = 0; k < 20; k++) {
+        double low = 1e3, high = -1e3;
+        for (int n = 0; n < 18000; n++) { /* two swings */
+            run(1);
+            low = fmin(low, get("plant.turns") * 360.0);
+            high = fmax(high, get("plant.turns") * 360.0);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, -20.0, low);
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, high);
+    }
+}
+
+void test_a_load_by_angle_pushes_a_standing_shaft_backwards_unless_dry_friction_holds_it(void)
+{
+    pulsing_shaft(0.02, 1.0, 90.0);
+    set("mech.coulomb_nm", 0.0201);
+    run(200);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get("state.speed_rpm"));
+    set("mech.coulomb_nm", 0.0199);
+    run(200);
+    TEST_ASSERT_TRUE(get("state.speed_rpm") < 0.0);
+}
+
+void test_a_load_by_angle_holds_a_standing_shaft_that_something_drives(void)
+{
+    pulsing_shaft(0.02, 1.0, 90.0);
+    set("load.active_nm", 0.02); /* just what the pulse takes */
+    run(2000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, get("state.speed_rpm"));
+    set("load.active_nm", 0.03);
+    run(200);
+    TEST_ASSERT_TRUE(get("state.speed_rpm") > 0.0);
+}
+
+void test_loads_by_angle_add_up(void)
+{
+    static const char *const phase[3] = {"load.pulse1_deg", "load.pulse2_deg", "load.pulse3_deg"};
+    static const char *const amplitude[3] = {"load.pulse1_nm", "load.pulse2_nm", "load.pulse3_nm"};
+    fake_override = 0x0000;
+    no_friction();
+    set("mech.inertia_kgm2", 100.0);
+    for (int k = 0; k < 3; k++) {
+        set(phase[k], -90.0);
+        set(amplitude[k], 1.0 + k);
+    }
+    power_up();
+    run(2000); /* 0.1 s under 6 N m, forwards */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 6.0 / 100.0 * 0.1, get("state.speed_rpm") * PI / 30.0);
+}
+
+void test_with_two_wires_swapped_a_load_by_angle_is_still_that_of_the_shaft(void)
+{
+    set("wiring.motor", 1.0);
+    pulsing_shaft(0.02, 1.0, 90.0);
+    run(200);
+    TEST_ASSERT_TRUE(get("state.speed_rpm") < 0.0);
+}
+
 void test_a_locked_shaft_stands_still_at_any_torque(void)
 {
     set("load.locked", 1.0);

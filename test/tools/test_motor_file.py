@@ -104,6 +104,8 @@ BAD = {
     # optional tables
     "thermal time": ("", "thermal_time = { value = 20, unit = \"min\", source = \"s\" }", "'thermal_time' = 20 min is impossible", "line 19"),
     "start torque": ("", "[load]\nstart_torque = { value = 0.1, unit = \"N m\" }", "start_torque = 0.1 N m is more than maximum_current gives", "line 20"),
+    "pulses in a turn": ("", "[load]\npulses_per_turn = { value = 1.5 }", "'pulses_per_turn' = 1.5 is not a whole number", "line 20"),
+    "pulse in another table": ("", "[plant]\n\"load.pulse1_nm\" = 1", "'load.pulse1_nm' stands in another table", "line 20"),
     "load key": ("", "[load]\ntorque = { value = 0.1, unit = \"N m\" }", "unknown key 'torque'", "line 20"),
     "spread of one": ("", "[spread]\nresistance = { values = [1], unit = \"ohm phase\", source = \"s\" }", "'resistance' has no pair of values", "line 20"),
     "spread of text": ("", "[spread]\nresistance = { values = [1, \"2\"], unit = \"ohm phase\", source = \"s\" }", "'resistance' is not a number", "line 20"),
@@ -173,7 +175,17 @@ def test_optional_tables_are_read(load):
                   "tune": {"END_SPEED_RPM": 700.0, "IDREF_SPEED17": -1.5}})
     assert motor.spread == {"rs_ohm": pytest.approx((0.8, 1.0)), "ls_h": pytest.approx((0.0012, 0.0014)),
                             "kphi_v_per_krpm": pytest.approx((3.8785, 4.553), abs=5e-5)}
+    assert "load.pulse1_nm" not in motor.plant_values().values
     assert motor.plant_extra.values == {"motor.sat_lq_ratio": 0.2, "mech.stiction_nm": 0.01}
+
+
+def test_a_load_that_swings_with_the_angle_comes_to_the_virtual_board_and_more_of_it_by_the_board_s_keys(load):
+    motor = load(MOTOR + "[load]\npulse_torque = { value = 5, unit = \"mN m\" }\npulses_per_turn = { value = 2 }\n"
+                 "[plant]\n\"load.pulse2_nm\" = 0.001\n\"load.pulse1_deg\" = 90\n")
+    values = motor.plant_values()
+    assert {key: value for key, value in values.values.items() if key.startswith("load.")} \
+        == {"load.pulse1_nm": 0.005, "load.pulse1_order": 2.0, "load.pulse2_nm": 0.001, "load.pulse1_deg": 90.0}
+    assert values.where["load.pulse1_nm"].endswith("line 20") and values.where["load.pulse2_nm"].endswith("line 23")
 
 
 def test_temperatures_are_brought_to_25_degrees(load):

@@ -22,9 +22,9 @@ FERRITE_PER_K = -0.002
 MAXIMUM_OVER_RATED = 1.5
 START_OVER_RATED = 0.25
 LARGEST_FILE = 65536
-PLANT_TABLES = ("motor.", "mech.")
+PLANT_TABLES = ("motor.", "mech.", "load.pulse")
 DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "motor.r_tempco", "motor.psi_tempco",
-                "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm")
+                "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm", "load.pulse1_nm", "load.pulse1_order")
 
 _DEGC = f"{units.AT_DEGC[0]:g} .. {units.AT_DEGC[1]:g}, {units.REFERENCE_DEGC:g} if not given"
 _HZ = f"`frequency_hz` of the LCR meter {units.AT_HZ[0]:g} .. {units.AT_HZ[1]:g}"
@@ -54,7 +54,10 @@ TABLES: dict[str, dict[str, Key] | None] = {
     "load": {
         "inertia": Key("what turns with the rotor", units.LOAD_INERTIA, "0"),
         "start_torque": Key("what the shaft carries while it starts, the motor's friction not included", units.FRICTION,
-                            f"{START_OVER_RATED:g} times the rated torque")},
+                            f"{START_OVER_RATED:g} times the rated torque"),
+        "pulse_torque": Key("amplitude of a torque that swings with the shaft's angle, as that of a piston; [plant] may add `load.pulse2_nm` and more",
+                            units.FRICTION, "0"),
+        "pulses_per_turn": Key("how often it swings in a turn", Kind("per turn", 1, 100, {}), "1")},
     "tune": None, "plant": None}
 """Tables of a motor file with their keys; None: any key, checked elsewhere. Kinds are a star's; a delta, and Kphi, have other factors."""
 ROOT = {"title": Key("one line for tables and reports"), "connection": Key("`Y` (star) or `delta`; counts only for values per `winding`"),
@@ -107,6 +110,9 @@ class Motor:
     load_inertia_kgm2: float
     start_torque_nm: float
     """What the shaft carries while starting, friction of the motor not included."""
+    pulse_nm: float
+    """Amplitude of the load that swings pulses_per_turn times with the shaft's angle."""
+    pulses_per_turn: float
     tune: dict[str, float]
     spread: dict[str, tuple[float, float]]
     """Smallest and largest published value of rs_ohm, ls_h, kphi_v_per_krpm, if the file has them."""
@@ -137,6 +143,9 @@ class Motor:
                 ("mech.viscous_nms", self.viscous_nms, "viscous_friction"), ("mech.coulomb_nm", self.coulomb_nm, "coulomb_friction")):
             quantity = self.quantities.get(origin) or self.quantities.get("inductance" if origin.startswith("inductance") else "")
             result.add(key, value, quantity.where if quantity else str(paths.shown(self.path)))
+        if self.pulse_nm:
+            result.add("load.pulse1_nm", self.pulse_nm, self.quantities["pulse_torque"].where)
+            result.add("load.pulse1_order", self.pulses_per_turn, self.quantities["pulse_torque"].where)
         for key, value in self.plant_extra.values.items():
             result.add(key, value, self.plant_extra.where[key])
         return result
@@ -279,12 +288,14 @@ def _read_rating(section: Section, reader: _Reader) -> dict[str, float]:
 
 
 def _read_load(section: Section | None, rated_torque_nm: float, reader: _Reader) -> dict[str, float]:
-    result = {"load_inertia_kgm2": 0.0, "start_torque_nm": START_OVER_RATED * rated_torque_nm}
+    result = {"load_inertia_kgm2": 0.0, "start_torque_nm": START_OVER_RATED * rated_torque_nm, "pulse_nm": 0.0, "pulses_per_turn": 1.0}
     if section is None:
         return result
-    for name, key in (("load_inertia_kgm2", "inertia"), ("start_torque_nm", "start_torque")):
+    for name, key in (("load_inertia_kgm2", "inertia"), ("start_torque_nm", "start_torque"), ("pulse_nm", "pulse_torque"),
+                      ("pulses_per_turn", "pulses_per_turn")):
         if key in section:
-            quantity = units.read(section, key, kind_of(section, key), source="the user's load")
+            kind = kind_of(section, key)
+            quantity = (units.read if kind.units else units.read_count)(section, key, kind, source="the user's load")
             reader.found["load_inertia" if key == "inertia" else key] = quantity
             result[name] = quantity.value_si
     return result
@@ -319,7 +330,7 @@ def _read_tune(section: Section | None) -> dict[str, float]:
 def plant_ranges() -> dict[str, tuple[str, float, float]]:
     """Unit, minimum and maximum of the virtual board's keys of a motor, from its source: what runs only when it is built knows too late."""
     text = (paths.ROOT / "tools" / "vboard" / "vb_keys.c").read_text(encoding="utf-8")
-    rows = re.findall(r'\b[PI]\("((?:motor|mech)\.\w+)", [\w.]+, \S+, (\S+), (\S+), "([^"]*)"', text)
+    rows = re.findall(r'\b[PI]\("((?:motor\.|mech\.|load\.pulse)\w+)", [\w.\[\]]+, \S+, (\S+), (\S+), "([^"]*)"', text)
     return {name: (unit, float(low), float(high)) for name, low, high, unit in rows}
 
 
@@ -331,7 +342,7 @@ def _read_plant(section: Section | None) -> Values:
         if key in DERIVED_KEYS:
             raise section.fail(key, f"'{key}' stands in another table of this file", "change the number there")
         if not key.startswith(PLANT_TABLES):
-            raise section.fail(key, f"'{key}' is no key of the motor", "use motor.* and mech.* only, see `python3 -m tools.bench keys`")
+            raise section.fail(key, f"'{key}' is no key of the motor", "use motor.*, mech.* and load.pulse* only, see `python3 -m tools.bench keys`")
         if key not in ranges:
             raise section.fail(key, f"unknown key '{key}'", suggestion(key, set(ranges) - set(DERIVED_KEYS)))
         unit, low, high = ranges[key]

@@ -175,15 +175,15 @@ def read(section: Section, key: str, kind: Kind, source: str | None = None, extr
     return Quantity(key, conversion(number), kind.si_unit, f"{number:.10g} {unit}", _source(inner, key, source), section.where(key))
 
 
-def read_count(section: Section, key: str, kind: Kind) -> Quantity:
-    """key = { value = 5, source = "..." } with a whole number."""
+def read_count(section: Section, key: str, kind: Kind, source: str | None = None) -> Quantity:
+    """key = { value = 5, source = "..." } with a whole number; `source` as in read()."""
     inner = _table(section, key, None, ("value", "source"))
     count = _number(inner, "value", key)
     if not kind.minimum <= count <= kind.maximum:
         raise inner.fail("value", f"'{key}' = {count:g} is impossible", f"choose {kind.minimum:g} .. {kind.maximum:g}")
     if count != int(count):
         raise inner.fail("value", f"'{key}' = {count:g} is not a whole number", "give a whole one")
-    return Quantity(key, count, kind.si_unit, f"{count:g} {kind.si_unit}", _source(inner, key, None), section.where(key))
+    return Quantity(key, count, kind.si_unit, f"{count:g} {kind.si_unit}", _source(inner, key, source), section.where(key))
 
 
 def read_pair(section: Section, key: str, kind: Kind) -> tuple[float, float]:

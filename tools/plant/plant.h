@@ -13,6 +13,13 @@ typedef enum { PLANT_SWAP_NONE, PLANT_SWAP_AB, PLANT_SWAP_BC, PLANT_SWAP_CA, PLA
 
 /* ---- motor and mechanics (plant_motor.c) ---- */
 
+/* A load that goes with the shaft's angle: nm * sin(order * angle + deg), against the forward direction; it also acts on a shaft that stands. */
+typedef struct {
+    double nm, order, deg;
+} plant_pulse_t;
+
+enum { PLANT_PULSES = 3 };
+
 typedef struct {
     /* parameters as set by keys */
     double rs_ohm, ld_h, lq_h, psi_vs, pole_pairs;
@@ -20,6 +27,7 @@ typedef struct {
     double temp_c, r_tempco, psi_tempco;
     double inertia_kgm2, viscous_nms, coulomb_nm, stiction_nm;
     double load_constant_nm, load_active_nm, load_viscous_nms, load_quadratic_nms2, load_locked;
+    plant_pulse_t load_pulse[PLANT_PULSES]; /* their sum; the angle is the shaft's since creation */
     double swapped; /* plant_swap_t: two of its wires; angle, speed and torque here are as the bridge sees them */
     /* effective values of this period */
     double r, psi, ld, lq, inv_ld, inv_lq;
@@ -109,6 +117,7 @@ double plant_motor_float_voltage(const plant_motor_t *m, const double v[3], unsi
 void plant_motor_set_alpha_beta(plant_motor_t *m, double i_alpha, double i_beta);
 void plant_motor_emf(const plant_motor_t *m, double e[3]);
 double plant_motor_torque(const plant_motor_t *m);
+double plant_motor_pulse(const plant_motor_t *m);
 double plant_motor_forward(const plant_motor_t *m);
 double plant_motor_angle(const plant_motor_t *m, double theta);
 void plant_motor_mechanics(plant_motor_t *m, double h_s);

@@ -98,11 +98,26 @@ double plant_motor_angle(const plant_motor_t *m, double theta)
     return plant_wrap(mirror[(unsigned)m->swapped] + plant_motor_forward(m) * theta, 2.0 * PLANT_PI);
 }
 
+/* What the load by angle asks of the shaft here, positive against the forward direction: it follows from the angle alone, so a turn neither
+ * takes nor gives energy. */
+double plant_motor_pulse(const plant_motor_t *m)
+{
+    double angle = plant_motor_forward(m) * 2.0 * PLANT_PI * m->turns;
+    double torque = 0.0;
+    for (unsigned k = 0; k < PLANT_PULSES; k++) {
+        const plant_pulse_t *pulse = &m->load_pulse[k];
+        if (pulse->nm != 0.0) {
+            torque += pulse->nm * sin(pulse->order * angle + pulse->deg * (PLANT_PI / 180.0));
+        }
+    }
+    return torque;
+}
+
 /* Shaft speed after `h_s` at the torque of the period. Coulomb friction and the brake load hold a shaft that stands still and never
  * turn it backwards. */
 static double next_speed(const plant_motor_t *m, double speed, double torque, double h_s)
 {
-    double drive = torque + plant_motor_forward(m) * m->load_active_nm;
+    double drive = torque + plant_motor_forward(m) * (m->load_active_nm - plant_motor_pulse(m));
     double dry = m->coulomb_nm + m->load_constant_nm;
     double direction = speed;
     if (speed == 0.0) {
