@@ -1,5 +1,4 @@
 /* The interrupts: the control interrupt that is one PWM period, the slow work's behind it, the fault input, and the traps. */
-#include "board/duties.h"
 #include "board/firmware.h"
 #include "board/scope.h"
 #include "board/mclv.h"
@@ -8,6 +7,7 @@
 #include "board/reset.h"
 #include "board/watch.h"
 #include "drive/param_init.h"
+#include "drive/param_scaling.h"
 #include "drive/tick.h"
 
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
@@ -26,6 +26,35 @@ void BOARD_ISR _DefaultInterrupt(void);
 void BOARD_ISR _AddressError(void) __attribute__((alias("_DefaultInterrupt")));
 void BOARD_ISR _StackError(void) __attribute__((alias("_DefaultInterrupt")));
 void BOARD_ISR _MathError(void) __attribute__((alias("_DefaultInterrupt")));
+
+/* ---- the way of the duties to the PWM: written as soon as they are computed, or, where they are deferred, at the begin of the next period ---- */
+
+/** The duties load when the counter reaches zero. @return 1 once it counts up: too late */
+QM_INLINE uint16_t duties_write(const duties_t *duty)
+{
+    P1DC1 = duty->a;
+    P1DC2 = duty->b;
+    P1DC3 = duty->c;
+    return (uint16_t)((P1TMR & 0x8000u) == 0u);
+}
+
+/** Before the law: those that have waited. @return 1 too late */
+QM_INLINE uint16_t duties_write_waiting(const duties_t *duty)
+{
+    return (uint16_t)(DEFER_DUTIES ? duties_write(duty) : 0u);
+}
+
+/** After the law: those that do not wait. @return 1 too late */
+QM_INLINE uint16_t duties_write_now(const duties_t *duty)
+{
+    return (uint16_t)(DEFER_DUTIES ? 0u : duties_write(duty));
+}
+
+/** 1 where the duties are the law's. Deferred ones come a period after it has begun: until then they are 0, as those of a bridge that does not switch. */
+QM_INLINE uint16_t duties_are_the_laws(void)
+{
+    return (uint16_t)(!DEFER_DUTIES || (P1DC1 | P1DC2 | P1DC3) != 0u);
+}
 
 /** Where the bridge does not switch. */
 QM_INLINE void board_set_idle_outputs(uint16_t outputs)
@@ -52,8 +81,7 @@ QM_INLINE uint16_t board_slow_is_due(void)
 /* A sample that comes before the interrupt is through, and the slow work of the period before, if that is not done. */
 #define BOARD_LATE_FLAGS 0x2080u /* AD1IF, T2IF */
 
-/* For the next period's begin. */
-static duties_t board_waiting;
+static duties_t board_waiting; /* deferred, for the next period's begin */
 
 /** The bridge is off at once; the slow work says why. */
 QM_INLINE void board_overrun(void)
@@ -86,7 +114,7 @@ static NOINLINE void board_idle(void)
 void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
-    duties_t now, *duty = duties_place(&board_waiting, &now);
+    duties_t now, *duty = DEFER_DUTIES ? &board_waiting : &now;
 
     IFS0bits.AD1IF = 0;
     if (duties_write_waiting(duty)) {

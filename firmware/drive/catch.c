@@ -4,7 +4,7 @@
 #include "control/estimator.h"
 #include "control/qmath.h"
 #include "control/transforms.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "control/tuned.h"
 #include "drive/deferred.h"
 #include "drive/drive.h"

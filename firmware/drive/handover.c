@@ -6,7 +6,7 @@
 #include "control/observer.h"
 #include "control/qmath.h"
 #include "control/transforms.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "control/tuned.h"
 #include "drive/drive.h"
 #include "drive/faults.h"

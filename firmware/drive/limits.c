@@ -5,7 +5,7 @@
 #include "control/estimator.h"
 #include "control/fieldweak.h"
 #include "control/observer.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "control/tuned.h"
 #include "drive/catch.h"
 #include "drive/handover.h"

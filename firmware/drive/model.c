@@ -4,7 +4,7 @@
 #include "control/estimator.h"
 #include "control/observer.h"
 #include "control/transforms.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "drive/drive.h"
 #include "drive/states.h"
 

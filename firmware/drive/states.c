@@ -2,7 +2,7 @@
 #include "drive/states.h"
 
 #include "control/qmath.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "drive/catch.h"
 #include "drive/drive.h"
 #include "drive/faults.h"

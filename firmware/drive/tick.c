@@ -3,10 +3,9 @@
 
 #include "control/current_control.h"
 #include "control/estimator.h"
-#include "control/forced_angle.h"
+#include "control/angle.h"
 #include "control/observer.h"
 #include "control/transforms.h"
-#include "control/trig.h"
 #include "drive/limits.h"
 #include "drive/catch.h"
 #include "drive/deferred.h"

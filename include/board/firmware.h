@@ -6,7 +6,6 @@
 #include "drive/modes/mode_table.h"
 #include "drive/panel.h"
 #include "drive/param_scaling.h"
-#include "drive/retry.h"
 
 /** The drive's parameters, from userparams.h. */
 extern MODE_PARAMS_PLACE drive_params_t board_params;

@@ -4,7 +4,7 @@
 
 #include "control/qmath.h"
 #include "control/transforms.h"
-#include "control/trig.h"
+#include "control/angle.h"
 
 #define ESTIMATOR_HISTORY 4 /* two periods apart, and the current of the last period: eight periods */
 

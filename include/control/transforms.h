@@ -2,7 +2,7 @@
 #ifndef CONTROL_TRANSFORMS_H
 #define CONTROL_TRANSFORMS_H
 
-#include "control/trig.h"
+#include "control/angle.h"
 
 /** A vector in the stator frame; the unit is that of its user. */
 typedef struct {

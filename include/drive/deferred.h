@@ -5,7 +5,7 @@
 #include "control/qmath.h"
 #include "control/svm.h"
 #include "control/transforms.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "drive/forward.h"
 #include "drive/param_scaling.h"
 

@@ -1,4 +1,4 @@
-/* What a person does at the board: buttons S2 and S3, the potentiometer, and what the LEDs say. */
+/* What a person does at the board: buttons S2 and S3, the potentiometer, and what the LEDs say; the retry does it in their place. */
 #ifndef DRIVE_PANEL_H
 #define DRIVE_PANEL_H
 
@@ -59,5 +59,22 @@ int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_rang
 
 /** One pass: buttons to requests, potentiometer to target, state to lights. S2 in a fault only clears the fault. */
 panel_lights_t panel_tick(panel_t *panel, drive_t *d, const drive_params_t *p, const panel_inputs_t *in);
+
+/* ---- the retry: a run that a passing fault has ended starts again by itself, after a pause and a stated number of times ---- */
+
+/** State of the retry. */
+typedef struct {
+    uint16_t left;      /**< retries left before a fault stays */
+    uint16_t first;     /**< drive_fault_t that began it; FAULT_NONE: nothing to tell */
+    uint16_t fault;     /**< the one that the pause is for */
+    uint16_t asked;     /**< 1: the fault has been asked to go */
+    uint32_t waited_ms; /**< in the pause, or in closed loop since the last fault */
+} retry_t;
+
+/** All retries left. */
+void retry_init(retry_t *r);
+
+/** A pass of the background, after panel_tick(): it clears a fault and wishes a run as S2 would. RETRY_COUNT 0: never. */
+void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
 
 #endif

@@ -9,7 +9,6 @@
 #include "drive/scaling/current_voltage.h"
 #include "drive/scaling/estimator.h"
 #include "drive/scaling/load_observer.h"
-#include "drive/scaling/protection.h"
-#include "drive/scaling/start.h"
+#include "drive/scaling/machine.h"
 
 #endif

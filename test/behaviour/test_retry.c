@@ -8,7 +8,6 @@
 
 #include "firmware/board/firmware.c"
 #include "firmware/drive/panel.c"
-#include "firmware/drive/retry.c"
 
 void setUp(void)
 {

@@ -10,10 +10,9 @@
 #include "firmware/control/current_control.c"
 #include "firmware/control/estimator.c"
 #include "firmware/control/fieldweak.c"
-#include "firmware/control/forced_angle.c"
+#include "firmware/control/angle.c"
 #include "firmware/control/observer.c"
 #include "firmware/control/svm.c"
-#include "firmware/control/trig.c"
 #include "firmware/drive/speed.c"
 
 /** qmath.h: every function, every int16. */
@@ -124,7 +123,7 @@ void proof_omega(void)
     }
 }
 
-/** trig.c: every angle and every x; sine, cosine and chord stay within Q15. */
+/** Sine and circle: every angle and every x; sine, cosine and chord stay within Q15. */
 void proof_trig(void)
 {
     //@ loop unroll 512;
@@ -304,7 +303,7 @@ void proof_speed_ramp(void)
     }
 }
 
-/** forced_angle.c: all parameters, both directions. */
+/** The forced angle: all parameters, both directions. */
 void proof_forced_angle(void)
 {
     forced_angle_params_t p = { any_l(0, 8000000l), any(1, 2000) };

@@ -12,7 +12,7 @@
 #include "bounds.h"
 
 #include "firmware/control/current_control.c"
-#include "firmware/control/trig.c"
+#include "firmware/control/angle.c"
 
 /*@ assigns \result \from sum, sum_max, inv_kfi;
     admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: adaptation_apply() alone writes the last two */
@@ -50,7 +50,6 @@ static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t 
 #include "firmware/control/motor_model.c"
 #include "firmware/control/estimator.c"
 #include "firmware/control/fieldweak.c"
-#include "firmware/control/forced_angle.c"
 #include "firmware/control/observer.c"
 #include "firmware/control/svm.c"
 #define current_control current_control_bounded

@@ -79,7 +79,7 @@ class Sample:
         self.places.append((start, 2 * len(words), section, file))
         return start
 
-    def constant(self, *words: int, file: str = "build/target/firmware/control/trig.o") -> None:
+    def constant(self, *words: int, file: str = "build/target/firmware/control/angle.o") -> None:
         """Appends words that the program reads through the window in the data space."""
         self.places.append((CONSTANTS + sum(item[1] for item in self.constants), 2 * len(words), ".const", file))
         self.constants.append((f"_constant{len(self.constants)}", 2 * len(words), words))
@@ -164,8 +164,8 @@ class Sample:
         (folder / "a.elf").write_bytes(self.elf())
         (folder / "a.hex").write_text(self.hex(), encoding="ascii")
         (folder / "a.map").write_text(self.map(), encoding="utf-8")
-        (folder / "config.c").write_text(CONFIG, encoding="utf-8")
-        return [str(folder / "a.elf"), str(folder / "a.hex"), "--map", str(folder / "a.map"), "--config", str(folder / "config.c")]
+        (folder / "main.c").write_text(CONFIG, encoding="utf-8")
+        return [str(folder / "a.elf"), str(folder / "a.hex"), "--map", str(folder / "a.map"), "--config", str(folder / "main.c")]
 
 
 def program(*code: tuple[int, int], **fields) -> Sample:

@@ -183,8 +183,8 @@ WATCHDOG = (("FWDTEN = ON", "FWDTEN = OFF"), ("WDTPOST = PS16", "WDTPOST = PS327
 @pytest.mark.parametrize("file, old, new, told", [
     ("isr.c", "void BOARD_ISR _MathError(void) ", "void BOARD_ISR _T3Interrupt(void) ",
      "the image has no _MathError"),
-    ("config.c", "PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON (PWM pins are inputs at reset)"),
-    *(("config.c", old, new, f"{new} in config.c, but the board needs") for old, new in WATCHDOG), # off or too slow
+    ("main.c", "PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in main.c, but the board needs ON (PWM pins are inputs at reset)"),
+    *(("main.c", old, new, f"{new} in main.c, but the board needs") for old, new in WATCHDOG), # off or too slow
     ("main.c", "int main(void)\n{", "int main(void)\n{\n    int unused = 1;", "unused variable"),
     ("main.c", "int main(void)\n{", "void nowhere(void);\nint main(void)\n{\n    nowhere();",
      "foc33: the image does not link: undefined reference to `_nowhere' (more in build/target/foc33.memory)")])

@@ -179,11 +179,11 @@ def test_every_wrong_bit_of_a_known_field_is_found(bench, name):
         bench.image.words[field.word] ^= bit
 
 
-@pytest.mark.parametrize("old, new, expected", [("PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in config.c, but the board needs ON"),
-                                                ("#pragma", "#pragma config PLLKEN = ON\n#pragma", "PLLKEN = ON in config.c is unknown")])
+@pytest.mark.parametrize("old, new, expected", [("PWMPIN = ON", "PWMPIN = OFF", "PWMPIN = OFF in main.c, but the board needs ON"),
+                                                ("#pragma", "#pragma config PLLKEN = ON\n#pragma", "PLLKEN = ON in main.c is unknown")])
 def test_sources_that_set_what_the_board_cannot_have_are_refused(bench, old, new, expected):
     arguments = bench.image.write(bench.folder)
-    path = bench.folder / "config.c"
+    path = bench.folder / "main.c"
     path.write_text(path.read_text().replace(old, new, 1))
     status, _, lines = bench.check(arguments=arguments)
     assert status == 1 and expected in lines[0]

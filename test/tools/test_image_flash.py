@@ -19,7 +19,7 @@ def folder(tmp_path, monkeypatch):
     for name, value in (("RESULT", str(tmp_path / "result")), ("PATH", f"{tmp_path}/path:/usr/bin:/bin"), ("STATUS", "0")):
         monkeypatch.setenv(name, value)
     good_image().write(tmp_path)
-    monkeypatch.setattr(image, "CONFIG_C", tmp_path / "config.c")
+    monkeypatch.setattr(image, "CONFIG_C", tmp_path / "main.c")
     return tmp_path
 
 

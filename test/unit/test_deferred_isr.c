@@ -29,7 +29,6 @@ static uint16_t tick_and_meanwhile(drive_t *d, const drive_params_t *p, const dr
 #define drive_tick(d, p, raw, duty) tick_and_meanwhile(d, p, raw, duty)
 #include "firmware/board/isr.c"
 #undef drive_tick
-#include "firmware/board/duties.c"
 
 #include "law.c"
 #include "interrupts.h"

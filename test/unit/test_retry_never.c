@@ -1,8 +1,6 @@
 /* Without retries (RETRY_COUNT 0) a fault stays until S2, and one press clears it. */
 #include "panel_rig.h"
 
-#include "drive/retry.h"
-
 static retry_t retry;
 
 static void all_ms(uint32_t ms)

@@ -66,8 +66,8 @@ def test_no_function_is_longer_than_45_lines() -> None:
 
 
 def test_a_source_includes_its_own_header_first() -> None:
-    """What has none: the fuses, the interrupts, the loop, and the texts of the parameters' check."""
-    without = {f"firmware/{name}.c" for name in ("board/config", "board/isr", "board/main", "drive/param_check", "drive/param_text")}
+    """What has none: the interrupts, the loop with the fuses, and the texts of the parameters' check."""
+    without = {f"firmware/{name}.c" for name in ("board/isr", "board/main", "drive/param_check", "drive/param_text")}
     own = {path: path.replace("firmware/", "").replace(".c", ".h") for path in sources() if path.startswith("firmware/")}
     assert {path for path, header in own.items() if f"include/{header}" not in sources()} == without
     wrong = [path for path, header in own.items() if path not in without and INCLUDE.findall(sources()[path])[0] != header]
@@ -81,6 +81,7 @@ PREFIXES = {
     "board/selftest_cpu": "board",
     "board/scope": "lnet memory scope",
     "board/status": "record status text",
+    "control/angle": "forced trig",
     "control/current_control": "current pi vd voltage vq",
     "control/motor_model": "adaptation salience",
     "control/soft_float": "root soft",
@@ -91,7 +92,7 @@ PREFIXES = {
     "drive/modes/bringup": "bringup mode",
     "drive/modes/identify": "identify mode",
     "drive/modes/modes": "mode snapshot",
-    "drive/panel": "button panel",
+    "drive/panel": "button panel retry",
     "drive/protection": "overload protection",
     "drive/speed": "reference speed",
     "drive/startup": "calibration startup",
@@ -119,7 +120,7 @@ def test_nothing_is_written_twice_for_the_proofs_or_the_compiler() -> None:
 def test_the_firmware_grows_no_further_in_files_and_lines() -> None:
     files = [f for top in ("firmware", "include") for f in (ROOT / top).rglob("*") if f.is_file()]
     lines = sum(len(f.read_text(encoding="utf-8").splitlines()) for f in files)
-    assert len(files) <= 106 and lines <= 13_110, f"{len(files)} files, {lines} lines: the goal is 100 and 12 600, so only lower these"
+    assert len(files) <= 98 and lines <= 13_036, f"{len(files)} files, {lines} lines: the goal is 100 and 12 600, so only lower these"
 
 
 def test_one_header_alone_reads_userparams_h() -> None:
@@ -224,7 +225,7 @@ FUSES = {
 
 
 def test_configuration_words_are_those_of_the_board() -> None:
-    text = (ROOT / "firmware/board/config.c").read_text(encoding="utf-8")
+    text = (ROOT / "firmware/board/main.c").read_text(encoding="utf-8")
     words = re.findall(r"^#pragma config (\w+) = (\w+)$", text, re.MULTILINE)
     assert len(dict(words)) == len(words), "a word is set twice"
     wrong = {name: dict(words).get(name) for name, value in FUSES.items() if dict(words).get(name) != value}

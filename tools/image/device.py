@@ -89,7 +89,7 @@ FIELDS = {
     "JTAGEN": Field(0xF8000E, 0x20, {"OFF": (0x00, "no JTAG"), "ON": (0x20, "JTAG")}),
 }
 
-#: what the board needs, whatever firmware/board/config.c says
+#: what the board needs, whatever firmware/board/main.c says
 BOARD_NEEDS = {
     "FNOSC": "FRC", "FCKSM": "CSECMD", "POSCMD": "XT", "IOL1WAY": "OFF", "FWDTEN": "ON", "WINDIS": "OFF", "WDTPRE": "PR32",
     "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON", "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF",

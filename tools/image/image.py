@@ -17,7 +17,7 @@ from .budget import Budget, Limits, shares
 from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
 from .program import Elf, Words, read_elf, read_hex, reset_target
 
-CONFIG_C = paths.ROOT / "firmware" / "board" / "config.c"
+CONFIG_C = paths.ROOT / "firmware" / "board" / "main.c"
 PRAGMA = re.compile(r"^\s*#\s*pragma\s+config\s+(\w+)\s*=\s*(\w+)\s*$", re.MULTILINE)
 
 
@@ -96,18 +96,18 @@ def check_vectors(words: Words, elf: Elf, pieces: list[Piece] | None) -> list[st
 
 
 def wanted_fields(text: str) -> dict[str, str]:
-    """The settings of config.c."""
+    """The settings of main.c."""
     return dict(PRAGMA.findall(text))
 
 
 def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
-    """Every field of the configuration words as config.c and the board want it; a field that neither names is left alone."""
-    failures = [f"configuration: {name} = {config[name]} in config.c, but the board needs {value} ({device.FIELDS[name].values[value][1]})"
+    """Every field of the configuration words as main.c and the board want it; a field that neither names is left alone."""
+    failures = [f"configuration: {name} = {config[name]} in main.c, but the board needs {value} ({device.FIELDS[name].values[value][1]})"
                 for name, value in device.BOARD_NEEDS.items() if config.get(name, value) != value]
     for name, value in {**device.BOARD_NEEDS, **config}.items():
         field = device.FIELDS.get(name)
         if field is None or value not in field.values:
-            failures.append(f"configuration: {name} = {value} in config.c is unknown for the {device.NAME}: "
+            failures.append(f"configuration: {name} = {value} in main.c is unknown for the {device.NAME}: "
                             "add it to tools/image/device.py")
             continue
         word = words.get(field.word)
@@ -196,7 +196,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--map", type=Path, help="the linker's map: looks for library helpers too")
     parser.add_argument("--budget", type=Path, help="TOML file with [budget.image]")
     parser.add_argument("--other-header", action="store_true", help="another userparams.h than the budget's: it is held to the chip and the deadline")
-    parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/config.c)")
+    parser.add_argument("--config", type=Path, default=CONFIG_C, help="C file with the #pragma config lines (firmware/board/main.c)")
     parser.add_argument("--objdump", help="XC16's disassembler: looks for the deepest stack too")
     parser.add_argument("--wcet", action="store_true", help="looks for the interrupt's longest path too, with the simulator's decoder")
     parser.add_argument("--table", action="store_true", help="also print the configuration words and their meaning")

@@ -97,7 +97,7 @@ target_other = $(target_modes)$(filter-out -O2,$(OPT))$(if $(filter $(target_hea
 target_budget = $(if $(target_modes)$(filter-out -O2,$(OPT)),,--budget firmware/budget.toml $(if $(target_other),--other-header))
 target_check = $(python) -m tools.image.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget) $(if $(filter -O2,$(OPT)),--wcet)
 
-$X/checked: $X/foc33.hex firmware/board/config.c firmware/budget.toml $(wildcard tools/image/*.py)
+$X/checked: $X/foc33.hex firmware/board/main.c firmware/budget.toml $(wildcard tools/image/*.py)
 	$(target_setup)
 	$(call build,-s build/iss/libmachine.so)
 	@$(target_check) >$@.new || { status=$$?; cat $@.new; rm -f $@.new $@; mv -f $X/foc33.hex $X/foc33.refused.hex; exit $$status; }

@@ -2,7 +2,7 @@
 #include "drive/modes/bringup.h"
 
 #include "control/transforms.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "drive/drive.h"
 #include "drive/modes/bringup_steps.h"
 #include "drive/states.h"

@@ -1,8 +1,7 @@
 /* IDENTIFY: the drive measures R, Ld, Lq, Kphi, inertia and friction of an unknown motor. */
 #include "drive/modes/identify.h"
 
-#include "control/forced_angle.h"
-#include "control/trig.h"
+#include "control/angle.h"
 #include "drive/drive.h"
 #include "drive/states.h"
 

@@ -1,5 +1,5 @@
-/* Sine and cosine from a table of 128 steps a turn, and the circle limit sqrt(1 - x^2), without a square root or a branch. */
-#include "control/trig.h"
+/* Angles: sine, cosine and direction from tables of 128 steps a turn, the circle sqrt(1 - x^2), and the angle that a start forces on the rotor. */
+#include "control/angle.h"
 
 INLINE sincos_t trig_sincos(angle_t angle)
 {
@@ -63,4 +63,29 @@ angle_t trig_direction(int16_t x, int16_t y)
     angle = steep ? (angle_t)(0x4000u - angle) : angle;
     angle = (x < 0) ? (angle_t)(0x8000u - angle) : angle;
     return (y < 0) ? (angle_t)~angle : angle; /* to a count */
+}
+
+/* ---- the forced angle ---- */
+
+QM_WRAPS int16_t forced_angle_accelerate(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction, uint16_t periods)
+{
+    int32_t speed_q10 = f->speed_q10 + qm_mulsu(f->increase_q10, periods);
+    uint32_t step_q32;
+    if (speed_q10 > p->end_speed_q10) {
+        speed_q10 = p->end_speed_q10;
+    }
+    f->speed_q10 = speed_q10;
+    step_q32 = (uint32_t)qm_shift(speed_q10, 6);
+    f->step_q32 = (direction >= 0) ? step_q32 : 0u - step_q32;
+    return (int16_t)(speed_q10 == p->end_speed_q10);
+}
+
+INLINE void forced_angle_move(forced_angle_t *f)
+{
+    f->angle_q32 = qm_turn_add(f->angle_q32, f->step_q32);
+}
+
+INLINE angle_t forced_angle(const forced_angle_t *f)
+{
+    return (angle_t)(f->angle_q32 >> 16);
 }
