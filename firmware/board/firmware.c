@@ -9,9 +9,7 @@
 #include "board/selftest_run.h"
 #include "board/watch.h"
 #include "drive/protection.h"
-#include "drive/remote.h"
 #include "drive/signals.h"
-#include "drive/states.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
 /* A bit of a port: one instruction for each of its values, where an assignment takes seven. */

@@ -2,7 +2,6 @@
 #include "board/scope.h"
 
 #if SCOPE
-
 QM_WRAPS uint16_t memory_is_ram(uint16_t address, uint16_t bytes)
 {
     uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
@@ -278,13 +277,11 @@ void scope_put(const scope_t *s, void *record)
     at = put_long(at, used, 0); /* clients take all of an array of whole rows */
     *at = VERSION;
 }
-
 #endif
 
 /* ---- LNet: frames in and out byte by byte, and the services. No register: the caller moves the bytes ---- */
 
 #if SCOPE
-
 #define PARAMETER_SCOPE 1u
 #define SCOPE_STATE_BYTES 29u
 
@@ -600,5 +597,4 @@ int16_t lnet_next(void)
     }
     return (int16_t)byte;
 }
-
 #endif

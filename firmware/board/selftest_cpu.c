@@ -4,7 +4,6 @@
 #include "board/selftest_run.h"
 
 #if defined(__XC16__) && !defined(SELFTEST_OFF)
-
 #include "board/reset.h"
 
 #define WORDS_BELOW 24u /* of stack that the test of the RAM may still need */
@@ -30,8 +29,7 @@ volatile uint16_t *board_free_ram(void)
     "cp w0,w14\n bra nz,.Lwrong%=\n cp w1,w14\n bra nz,.Lwrong%=\n"
 /* The stack pointer (0x001E), whose bit 0 is always 0. Nothing uses the stack meanwhile. */
 #define STACK_POINTER "mov 0x001E,w2\n mov w0,0x001E\n mov 0x001E,w1\n mov w2,0x001E\n bclr w0,#0\n cp w0,w1\n bra nz,.Lwrong%=\n"
-/* C, Z, OV, N and DC of SR (0x0042), level 7 stays. No MOV changes a flag; a Z that is stuck shows
- * in the last branch. */
+/* C, Z, OV, N and DC of SR (0x0042), level 7 stays. No MOV changes a flag; a Z that is stuck shows in the last branch. */
 #define FLAGS \
     "mov %1,w0\n mov #0x010F,w1\n and w0,w1,w0\n mov #0x00E0,w1\n ior w0,w1,w0\n mov w0,0x0042\n mov 0x0042,w1\n" \
     "cp w0,w1\n bra nz,.Lwrong%=\n cp0 w1\n bra z,.Lwrong%=\n"
@@ -51,7 +49,6 @@ void board_cpu_test(void)
                      :
                      : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "w8", "w9", "w10", "w11", "w12", "w13", "cc");
 }
-
 #else
 typedef int selftest_cpu_is_for_the_target;
 #endif

@@ -2,7 +2,6 @@
 #include "board/selftest_run.h"
 
 #ifndef SELFTEST_OFF
-
 #include "board/firmware.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
@@ -383,5 +382,4 @@ void selftest_start(drive_fault_t kept)
     }
     board_selftest_stepped = board_drive.ticks;
 }
-
 #endif

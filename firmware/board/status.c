@@ -7,7 +7,6 @@
 #include "board/reset.h"
 #include "board/selftest_run.h"
 #include "board/watch.h"
-#include "control/qmath.h"
 #include "drive/limits.h"
 #include "version.h"
 
@@ -107,7 +106,6 @@ static char *put_reset(void)
 }
 
 #if SCOPE
-
 /** A pass of the line while a client may have it. @return 1 if the status line must wait */
 static uint16_t line_serves_client(void)
 {
@@ -130,7 +128,6 @@ static uint16_t line_is_taken(uint16_t elapsed_ms)
     lnet_tick(elapsed_ms);
     return board_lnet.is_up;
 }
-
 #else
 #define line_serves_client() 0u
 #define line_is_taken(elapsed_ms) 0u

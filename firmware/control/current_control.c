@@ -1,8 +1,6 @@
 /* The two current controllers and the voltage circle: the d axis takes what it needs first, the q axis gets the rest. */
 #include "control/current_control.h"
 
-#include "control/angle.h"
-
 /* ---- AN1292's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out) ---- */
 
 /** What the integrator gives back of an excess beyond the limit, 0 or more. */

@@ -32,9 +32,8 @@ INLINE alphabeta_t estimator_turn(alphabeta_t x, int16_t a_q16_rad)
     return r;
 }
 
-/** Voltage of the inductance, Q13. Below nominal speed over eight samples, which is four samples old and therefore
- *  turned forward by 3.5 steps to the middle of the last period; above over one sample.
- *  @param last the current of the last period */
+/** Voltage of the inductance, Q13. Below nominal speed over eight samples, which is four samples old and therefore turned forward by 3.5
+ *  steps to the middle of the last period; above over one sample. @param last the current of the last period */
 static INLINE alphabeta_t estimator_inductive(const estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t now, alphabeta_t last)
 {
     const uint16_t ls_q16 = t->ls_q16;

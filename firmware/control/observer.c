@@ -73,9 +73,8 @@ void observer_raise_gate(observer_t *o)
     }
 }
 
-/** How much of a load there is: 0 as without any, 1 where it and the current that flows for it are clear of what dead time leaves. A load that
- *  only slows the rotor down takes no current.
- *  @param iq_q13 q current asked for, above -32768 */
+/** How much of a load there is: 0 as without any, 1 where it and the current that flows for it are clear of what dead time leaves. A load
+ *  that only slows the rotor down takes no current. @param iq_q13 q current asked for, above -32768 */
 static q15_t observer_loaded(const observer_t *o, const observer_params_t *p, current_q13_t iq_q13)
 {
     int16_t held = qm_abs(qm_hi(o->load_q16)), flows = qm_abs(qm_mulhi_su(iq_q13, p->per_current_q16));

@@ -1,19 +1,8 @@
 /* The catch of a rotor that turns at the start: the two looks, the pause between them, and the estimator's begin. */
 #include "drive/catch.h"
 
-#include "control/estimator.h"
-#include "control/qmath.h"
-#include "control/transforms.h"
-#include "control/angle.h"
-#include "control/tuned.h"
 #include "drive/deferred.h"
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/handover.h"
-#include "drive/modes/modes.h"
-#include "drive/param_scaling.h"
-#include "drive/startup.h"
-#include "drive/states.h"
 
 #define CATCH_LOOK_PERIODS (CATCH_LOOK_STEPS * SLOW_PERIODS)            /**< of a look at a slow rotor */
 #define CATCH_STANDS_Q11 ((int16_t)(CATCH_STANDS * CATCH_LOOK_PERIODS)) /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
@@ -90,8 +79,7 @@ speed_erpm_t catch_speed(const drive_params_t *p, int16_t size, uint16_t half_pe
     return INT16_MAX;
 }
 
-/** The second look has ended: the turn since the first one.
- *  @return CATCH_NO_LOOK of a rotor that stands, CATCH_TOO_FAST, CATCH_SEEN */
+/** The second look has ended: the turn since the first one. @return CATCH_NO_LOOK of a rotor that stands, CATCH_TOO_FAST, CATCH_SEEN */
 static catch_phase_t catch_see(drive_t *d, const drive_params_t *p, angle_t direction, uint16_t samples)
 {
     drive_run_t *run = &d->run;

@@ -2,7 +2,6 @@
 #include "drive/deferred.h"
 
 #include "drive/drive.h"
-#include "drive/states.h"
 
 /** Half steps of the angle from the frame that the slow work sees to the middle of the next two pulses, or to the first one. */
 #define DEFER_HALF_STEPS (3 - DEAD_EACH + 2 * DEFER_DUTIES)

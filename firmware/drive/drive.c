@@ -2,7 +2,6 @@
 #include "drive/drive.h"
 
 #include "drive/limits.h"
-#include "drive/states.h"
 
 INLINE int16_t along_direction(const drive_t *d, int16_t x)
 {

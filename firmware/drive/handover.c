@@ -1,19 +1,7 @@
 /* The hand-over from the forced angle to the estimator's: the decision, the change of frame, what decays after it, and the observer's step in between. */
 #include "drive/handover.h"
 
-#include "control/current_control.h"
-#include "control/estimator.h"
-#include "control/observer.h"
-#include "control/qmath.h"
-#include "control/transforms.h"
-#include "control/angle.h"
-#include "control/tuned.h"
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/model.h"
-#include "drive/modes/modes.h"
-#include "drive/param_scaling.h"
-#include "drive/states.h"
 
 /** The current of the ramp, which a light load leaves nearly without torque, falls until the rotor needs it: a large d current would turn every
  *  error of the estimator's angle into torque. @return its magnitude */

@@ -1,18 +1,7 @@
 /* Limits of voltage and current, the bus that they come from, and why the drive gives less than it is asked for. */
 #include "drive/limits.h"
 
-#include "control/current_control.h"
-#include "control/estimator.h"
-#include "control/fieldweak.h"
-#include "control/observer.h"
-#include "control/angle.h"
-#include "control/tuned.h"
-#include "drive/catch.h"
-#include "drive/handover.h"
-#include "drive/model.h"
-#include "drive/modes/modes.h"
 #include "drive/protection.h"
-#include "drive/states.h"
 
 voltage_q14_t limits_free_voltage(const drive_control_t *c)
 {

@@ -1,12 +1,7 @@
 /* What the running motor teaches about itself, and what a salient motor adds. */
 #include "drive/model.h"
 
-#include "control/estimator.h"
-#include "control/observer.h"
-#include "control/transforms.h"
-#include "control/angle.h"
 #include "drive/drive.h"
-#include "drive/states.h"
 
 void salient_model(drive_run_t *run, const drive_params_t *p)
 {

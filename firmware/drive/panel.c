@@ -2,11 +2,6 @@
 #include "drive/panel.h"
 
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/modes/modes.h"
-#include "drive/modes/identify.h"
-#include "drive/param_scaling.h"
-#include "drive/states.h"
 
 /** Complement of the user's wishes, in which no bit of either goes unseen. */
 static uint16_t panel_complement(const panel_t *panel)

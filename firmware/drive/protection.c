@@ -1,16 +1,8 @@
 /* Protection: the conditions that the control interrupt finds itself and that end in a fault. */
 #include "drive/protection.h"
 
-#include "control/estimator.h"
-#include "control/qmath.h"
-#include "control/transforms.h"
-#include "control/tuned.h"
 #include "drive/drive.h"
-#include "drive/faults.h"
 #include "drive/limits.h"
-#include "drive/model.h"
-#include "drive/param_scaling.h"
-#include "drive/states.h"
 
 INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
 {

@@ -1,7 +1,6 @@
 /* The fault recorder: a ring of rows, RECORDER_PERIODS apart, that stops a little after a fault and is kept until the next start. */
 #include "drive/recorder.h"
 
-#include "control/estimator.h"
 #include "drive/drive.h"
 
 #define RECORDER_FIRST ((int16_t)((RECORDER_PLACES - 1) * RECORDER_BYTES)) /**< bytes before the first row that is written */

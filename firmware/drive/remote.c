@@ -2,12 +2,9 @@
 #include "drive/remote.h"
 
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/modes/modes.h"
 #include "drive/panel.h"
 
 #if SCOPE
-
 void remote_give_up(remote_t *r)
 {
     r->mode = REMOTE_PANEL;
@@ -88,5 +85,4 @@ int16_t remote_target(const remote_t *r, const drive_params_t *p, int16_t of_pan
     size = qm_clamp(qm_abs(r->target_erpm), low, high);
     return (int16_t)((r->target_erpm < 0) ? -size : size);
 }
-
 #endif

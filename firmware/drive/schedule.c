@@ -1,20 +1,11 @@
 /* The slots of the schedule: what each half calls, and how the self-test follows it. */
 #include "drive/schedule.h"
 
-#include "control/estimator.h"
-#include "control/observer.h"
-#include "drive/catch.h"
 #include "drive/drive.h"
-#include "drive/handover.h"
 #include "drive/limits.h"
-#include "drive/model.h"
-#include "drive/modes/modes.h"
 #include "drive/protection.h"
-#include "drive/selftest.h"
 #include "drive/signals.h"
 #include "drive/speed.h"
-#include "drive/startup.h"
-#include "drive/states.h"
 
 /** A step of the start; in closed loop the load observer's. */
 static void observe_load(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)

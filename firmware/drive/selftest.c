@@ -4,7 +4,6 @@
 #include "drive/drive.h"
 
 #ifndef SELFTEST_OFF
-
 uint16_t selftest_flow_holds(const drive_t *d)
 {
     uint16_t calls = (uint16_t)(d->ticks / SLOW_EVERY), rest = (uint16_t)(calls & (SLOW_CALLS - 1u));
@@ -20,7 +19,6 @@ uint16_t selftest_variables_hold(const drive_t *d)
                                & (s->offset_b ^ (uint16_t)d->calibration.offset_b_q13));
     return (uint16_t)(same == 0xFFFFu);
 }
-
 #endif
 
 /* A test of this file puts memory with faults behind these. */

@@ -1,14 +1,7 @@
 /* Do the measured currents fit? An open phase and a wrong current signal, by two rules that see different motors: the table is in the header. */
 #include "drive/signals.h"
 
-#include "control/estimator.h"
-#include "control/qmath.h"
-#include "control/transforms.h"
-#include "control/tuned.h"
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/model.h"
-#include "drive/states.h"
 
 /** Takes the sizes of the phases' currents into sums. @param a,b,c Q13; as a structure they would go over the stack
  *  @param shift so many sums of the largest current must fit a word */

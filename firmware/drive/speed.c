@@ -1,15 +1,8 @@
 /* The speed controller: the ramped reference, the observed speed and the observed load give the q current. */
 #include "drive/speed.h"
 
-#include "control/estimator.h"
-#include "control/observer.h"
-#include "control/tuned.h"
 #include "drive/drive.h"
 #include "drive/limits.h"
-#include "drive/model.h"
-#include "drive/modes/modes.h"
-#include "drive/startup.h"
-#include "drive/states.h"
 
 speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t step_erpm)
 {

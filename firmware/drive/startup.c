@@ -1,16 +1,8 @@
 /* The start without the estimator: average the current offsets, charge the drivers, take the rotor along, accelerate it by the forced angle. */
 #include "drive/startup.h"
 
-#include "control/estimator.h"
-#include "control/qmath.h"
-#include "control/transforms.h"
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/handover.h"
-#include "drive/param_scaling.h"
 #include "drive/protection.h"
-#include "drive/selftest.h"
-#include "drive/states.h"
 
 drive_state_t calibration_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {

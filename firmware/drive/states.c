@@ -1,17 +1,9 @@
 /* The one machine: the drive's states, what each does on entry and in a step, and which may follow which. */
 #include "drive/states.h"
 
-#include "control/qmath.h"
-#include "control/angle.h"
-#include "drive/catch.h"
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/handover.h"
 #include "drive/limits.h"
-#include "drive/modes/modes.h"
-#include "drive/selftest.h"
 #include "drive/speed.h"
-#include "drive/startup.h"
 
 #define BIT_OF(next, reason) | (1u << (uint16_t)DRIVE_##next)
 #define MASK_FROM(name, meaning) (uint16_t)(0u TRANSITIONS_FROM_##name(BIT_OF)),
@@ -136,9 +128,7 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {
     uint16_t next = d->state;
     switch (next) {
-    case DRIVE_CALIBRATE:
-        next = (uint16_t)calibration_step(d, p, i_a, i_b);
-        break;
+    case DRIVE_CALIBRATE: next = (uint16_t)calibration_step(d, p, i_a, i_b); break;
     case DRIVE_STOPPED:
         d->run.estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
         d->run.control.reference_erpm = 0;
@@ -152,9 +142,7 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
             next = (uint16_t)DRIVE_CATCH;
         }
         break;
-    case DRIVE_CATCH:
-        next = (uint16_t)catch_pass(d, p);
-        break;
+    case DRIVE_CATCH: next = (uint16_t)catch_pass(d, p); break;
     case DRIVE_FAULT:
     default: /* without a fault when the background raised one while it was cleared here */
         if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) {
@@ -183,15 +171,9 @@ void states_start_step(drive_t *d, const drive_params_t *p)
 void states_rotor_step(drive_t *d, const drive_params_t *p)
 {
     switch (d->state) {
-    case DRIVE_RAMP:
-        handover_step(d, p);
-        break;
-    case DRIVE_STOPPING:
-        speed_turn_round(d, p);
-        break;
-    case DRIVE_CATCH:
-        catch_step(d, p);
-        break;
+    case DRIVE_RAMP: handover_step(d, p); break;
+    case DRIVE_STOPPING: speed_turn_round(d, p); break;
+    case DRIVE_CATCH: catch_step(d, p); break;
     default: /* the others are left elsewhere */
         break;
     }

@@ -1,25 +1,11 @@
 /* One PWM period of the drive, top to bottom: samples, currents, current control, angle, modulation; then the slow work. */
 #include "drive/tick.h"
 
-#include "control/current_control.h"
-#include "control/estimator.h"
-#include "control/angle.h"
-#include "control/observer.h"
-#include "control/transforms.h"
 #include "drive/limits.h"
-#include "drive/catch.h"
 #include "drive/deferred.h"
 #include "drive/drive.h"
-#include "drive/handover.h"
-#include "drive/model.h"
-#include "drive/modes/bringup.h"
-#include "drive/modes/modes.h"
-#include "drive/param_scaling.h"
 #include "drive/protection.h"
-#include "drive/selftest.h"
 #include "drive/speed.h"
-#include "drive/startup.h"
-#include "drive/states.h"
 
 INLINE void drive_measure(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {

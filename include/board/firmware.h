@@ -5,7 +5,6 @@
 #include "drive/drive.h"
 #include "drive/modes/mode_table.h"
 #include "drive/panel.h"
-#include "drive/param_scaling.h"
 
 /** The drive's parameters, from userparams.h. */
 extern MODE_PARAMS_PLACE drive_params_t board_params;

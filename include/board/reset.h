@@ -52,9 +52,8 @@ drive_fault_t reset_take(void);
 /** Keeps a fault (or FAULT_NONE) for the time after a reset. */
 void reset_keep(uint16_t fault);
 
-/** Serves the watchdog if a control interrupt came since the last call; the caller shows that the background is alive.
- *  Nothing else serves it after the start: when either stands still, the reset comes 16 ms later.
- *  @param ticks of the drive */
+/** Serves the watchdog if a control interrupt came since the last call; the caller shows that the background is alive. Nothing else serves
+ *  it after the start: when either stands still, the reset comes 16 ms later. @param ticks of the drive */
 void reset_serve_watchdog(uint16_t ticks);
 
 #endif

@@ -5,8 +5,6 @@
 #define BOARD_SCOPE_H
 
 #include "board/modes/mode_board.h"
-#include "control/qmath.h"
-#include "drive/param_scaling.h"
 
 #ifndef __XC16__
 #include <xc.h> /* the PC's: where the window is */
@@ -49,7 +47,6 @@ typedef struct {
 } scope_t;
 
 #if SCOPE
-
 /** A row that is not the usual one: any length, whatever it costs. */
 void scope_record_unusual(scope_t *s);
 
@@ -68,7 +65,6 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
 
 /** What the scope has done, as it stands in a frame. @param record at an even address, with room for thirty bytes */
 void scope_put(const scope_t *s, void *record);
-
 #endif
 
 /* ---- The memory that a client on the serial line may see, by 16-bit addresses: the chip's own; on a PC the window of tools/cpu_host ---- */
@@ -76,20 +72,16 @@ void scope_put(const scope_t *s, void *record);
 #define MEMORY_RAM_START 0x0800u
 
 #ifdef __XC16__
-
 extern uint16_t _SP_init; /* the linker's: its address is where the variables end and the stack begins */
 #define MEMORY_RAM_BYTES 0x0800u
 #define MEMORY_VARIABLE_BYTES ((uint16_t)((uint16_t)(uintptr_t)&_SP_init - MEMORY_RAM_START))
 #define MEMORY_AT(address) ((volatile void *)(uintptr_t)(address))
 #define MEMORY_ADDRESS(pointer) ((uint16_t)(uintptr_t)(pointer))
-
 #else
-
 #define MEMORY_RAM_BYTES ((uint16_t)host_window_bytes())
 #define MEMORY_VARIABLE_BYTES MEMORY_RAM_BYTES
 #define MEMORY_AT(address) ((volatile void *)(host_window() + ((address)-MEMORY_RAM_START)))
 #define MEMORY_ADDRESS(pointer) ((uint16_t)((const volatile uint8_t *)(pointer)-host_window() + (ptrdiff_t)MEMORY_RAM_START))
-
 #endif
 
 /** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. What is below wraps to beyond the end. */
@@ -147,7 +139,6 @@ typedef struct {
 } lnet_t;
 
 #if SCOPE
-
 /** One link, one scope. */
 extern lnet_t board_lnet;
 
@@ -165,7 +156,6 @@ void lnet_tick(uint16_t elapsed_ms);
 
 /** Not 0 while the line belongs to a client: one has sent a valid frame, or what may become the first one comes in. */
 uint16_t lnet_is_busy(void);
-
 #endif
 
 #endif

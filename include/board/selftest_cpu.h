@@ -13,7 +13,6 @@
 #define BOARD_AN_OFF ((uint16_t)((BOARD_AD1PCFGL & 0x0040u) ? 6 : 7))
 
 #ifdef __XC16__
-
 #define BOARD_RAM ((volatile uint16_t *)0x0800)
 #define BOARD_RAM_END ((volatile uint16_t *)0x1000)
 #define BOARD_USED_END(free_ram) (free_ram)
@@ -37,9 +36,7 @@ extern volatile uint16_t board_cpu_holds;
 
 /** A pass of waiting for the watchdog's reset. @return 0: the reset leaves no time for another answer */
 #define BOARD_WATCHDOG_BITES() 0u
-
 #else /* the PC: registers are variables (tools/cpu_host), nothing interrupts the background */
-
 #define BOARD_RAM ((volatile uint16_t *)(void *)&board_drive)
 #define BOARD_RAM_END (BOARD_RAM + sizeof board_drive / sizeof *BOARD_RAM)
 #define BOARD_STACK_LIMIT (host_stack + HOST_STACK_WORDS)
@@ -50,6 +47,6 @@ extern volatile uint16_t board_cpu_holds;
 #define board_cpu_test() host_cpu_test()
 #define BOARD_QUIET() 1u
 #define BOARD_WATCHDOG_BITES() host_watchdog_bites()
-
 #endif
+
 #endif

@@ -12,7 +12,6 @@ enum { SELFTEST_PART_SUPERVISE = 1,
        SELFTEST_PART_STATUS };
 
 #ifndef SELFTEST_OFF
-
 /** The parts that have come to their end, three bits each. */
 extern uint16_t board_selftest_parts;
 
@@ -51,7 +50,6 @@ char *selftest_put(char *at);
 
 /** First line: says that the image has no CRC, so that the flash is not tested. @return the text's end */
 char *selftest_put_marked(char *at);
-
 #else
 #define selftest_reset_cause(rcon) (rcon)
 #define selftest_start(kept) ((void)(kept))

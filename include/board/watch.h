@@ -4,9 +4,8 @@
 
 #include "board/modes/mode_board.h"
 
-/** Field weakening: table index in use, d reference (Q15 of full-scale current), start speed. Speeds here are in electrical rpm, or in counts of
- *  SPEED_UNIT of them (the table at the end of userparams.h) where MAXIMUM_SPEED_RPM is above 32000
- *  electrical rpm. */
+/** Field weakening: table index in use, d reference (Q15 of full-scale current), start speed. Speeds here are in electrical rpm, or in
+ *  counts of SPEED_UNIT of them (the table at the end of userparams.h) where MAXIMUM_SPEED_RPM is above 32000 electrical rpm. */
 typedef struct {
     int16_t qIndex, qIdRef, qFwOnSpeed;
 } tFdWeakParm;

@@ -2,7 +2,6 @@
 #ifndef CONTROL_CURRENT_CONTROL_H
 #define CONTROL_CURRENT_CONTROL_H
 
-#include "control/qmath.h"
 #include "control/transforms.h"
 
 /* ---- AN1292's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out) ---- */
@@ -20,10 +19,8 @@ typedef struct {
     uint16_t shift; /**< 0..14 */
 } pi_gains_t;
 
-/** One step with the output limited to +-limit.
- *  @param err error, |err| <= 32767
- *  @param limit 0..32767 in output counts
- *  @return the limited output. The excess is taken in steps of 65536 U counts, alike for both signs. */
+/** One step with the output limited to +-limit. @param err error, |err| <= 32767 @param limit 0..32767 in output counts @return the limited
+ *  output. The excess is taken in steps of 65536 U counts, alike for both signs. */
 int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t limit);
 
 /** Presets the integrator so that the next step returns out for the error err: a bumpless take-over. */
@@ -53,10 +50,8 @@ void voltage_circle_of(voltage_circle_t *circle, voltage_q14_t radius_q14);
 /** Largest |Vq|: sqrt(limit^2 - Vd^2), by the circle table, never rounded up. @param vd_q14 within vd_limit() */
 voltage_q14_t vq_limit(const voltage_circle_t *circle, voltage_q14_t vd_q14);
 
-/** One period of both controllers.
- *  @param ref_q13,meas_q13 d and q currents
- *  @param limit_q of the q axis, returned for display and for the field-weakening trim
- *  @return d and q voltage inside the circle */
+/** One period of both controllers. @param ref_q13,meas_q13 d and q currents @param limit_q of the q axis, returned for display and for the
+ *  field-weakening trim @return d and q voltage inside the circle */
 dq_t current_control(pi_t *pi_d, const pi_gains_t *gains_d, pi_t *pi_q, const pi_gains_t *gains_q,
                      dq_t ref_q13, dq_t meas_q13, const voltage_circle_t *circle, voltage_q14_t *limit_q);
 

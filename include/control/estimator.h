@@ -2,9 +2,7 @@
 #ifndef CONTROL_ESTIMATOR_H
 #define CONTROL_ESTIMATOR_H
 
-#include "control/qmath.h"
 #include "control/transforms.h"
-#include "control/angle.h"
 
 #define ESTIMATOR_HISTORY 4 /* two periods apart, and the current of the last period: eight periods */
 
@@ -67,9 +65,8 @@ alphabeta_t estimator_turn(alphabeta_t x, int16_t a_q16_rad);
 
 /** Equation 4 in the stator frame: E = V - Rs I - Ls dI/dt, all taken at the middle of the last period.
  *
- *  The delay constant: a vector computed at sample n is loaded at the next PWM boundary, half a period later, and acts
- *  for one period; so the mean voltage between samples n-1 and n is the mean of the last two vectors.
- *  @return the back-EMF half a period in the past, Q13 */
+ *  The delay constant: a vector computed at sample n is loaded at the next PWM boundary, half a period later, and acts for one period; so
+ *  the mean voltage between samples n-1 and n is the mean of the last two vectors. @return the back-EMF half a period in the past, Q13 */
 alphabeta_t estimator_back_emf(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t i_q14);
 
 /** Equation 2: speed from Eq and Ed. @param sum_max limit of their sum, 32767 * 2048 / inv_kfi @return within 16 bits */

@@ -3,7 +3,6 @@
 #define CONTROL_FIELDWEAK_H
 
 #include "control/estimator.h"
-#include "control/qmath.h"
 
 #define FIELDWEAK_ENTRIES 18
 #define SPEED_INDEX_CONST 10 /**< one table step is 2^10 electrical rpm */
@@ -40,10 +39,9 @@ int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fractio
  *  @param ref_erpm speed reference, any value and sign */
 void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm);
 
-/** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later.
- *  It makes up for a sagging bus or a table that is not tuned; it is bounded, so it cannot run the motor into demagnetisation.
- *  @param free_q14 q-axis limit minus |Vq| of the last period
- *  @param speed_erpm filtered estimated speed */
+/** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later. It makes up for a
+ *  sagging bus or a table that is not tuned; it is bounded, so it cannot run the motor into demagnetisation. @param free_q14 q-axis limit
+ *  minus |Vq| of the last period @param speed_erpm filtered estimated speed */
 void fieldweak_trim(fieldweak_t *fw, const fieldweak_params_t *p, voltage_q14_t free_q14, speed_erpm_t speed_erpm);
 
 #endif

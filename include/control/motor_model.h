@@ -8,8 +8,6 @@
 #define CONTROL_MOTOR_MODEL_H
 
 #include "control/estimator.h"
-#include "control/qmath.h"
-#include "control/transforms.h"
 
 #define ADAPTATION_KFI_LEAST 1024 /**< a speed of 2048 counts at full voltage: a count is 0.1 % */
 

@@ -80,8 +80,7 @@ QM_INLINE uint16_t qm_mulhi_uu(uint16_t a, uint16_t b)
     return (uint16_t)(qm_muluu(a, b) >> 16);
 }
 
-/** Unsigned 32/16 division. The caller proves denominator > numerator >> 16, as the core's DIV needs.
- *  @return quotient, truncated. */
+/** Unsigned 32/16 division. The caller proves denominator > numerator >> 16, as the core's DIV needs. @return quotient, truncated. */
 QM_INLINE uint16_t qm_divud(uint32_t numerator, uint16_t denominator)
 {
 #ifdef __XC16__

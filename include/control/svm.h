@@ -2,7 +2,6 @@
 #ifndef CONTROL_SVM_H
 #define CONTROL_SVM_H
 
-#include "control/qmath.h"
 #include "control/transforms.h"
 
 /** Constants of the modulator, in duty counts. */

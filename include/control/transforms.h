@@ -21,9 +21,8 @@ typedef struct {
     current_q13_t a, b, c;
 } phases_t;
 
-/** Clarke: alpha = a, beta = (a + 2 b)/sqrt(3), for a + b + c = 0.
- *  @param a_q13,b_q13 phase currents, |a|, |b| and |a + b| <= 10240 (full scale and offset), so that all fits 16 bits
- *  @return the current vector in Q14 */
+/** Clarke: alpha = a, beta = (a + 2 b)/sqrt(3), for a + b + c = 0. @param a_q13,b_q13 phase currents, |a|, |b| and |a + b| <= 10240 (full
+ *  scale and offset), so that all fits 16 bits @return the current vector in Q14 */
 QM_INLINE alphabeta_t clarke(current_q13_t a_q13, current_q13_t b_q13)
 {
     int16_t sum = (int16_t)(a_q13 + 2 * b_q13);

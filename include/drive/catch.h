@@ -6,10 +6,7 @@
 #ifndef DRIVE_CATCH_H
 #define DRIVE_CATCH_H
 
-#include "control/qmath.h"
 #include "control/transforms.h"
-#include "control/tuned.h"
-#include "drive/forward.h"
 #include "drive/param_scaling.h"
 #include "drive/states.h"
 

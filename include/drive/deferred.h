@@ -2,10 +2,7 @@
 #ifndef DRIVE_DEFERRED_H
 #define DRIVE_DEFERRED_H
 
-#include "control/qmath.h"
 #include "control/svm.h"
-#include "control/transforms.h"
-#include "control/angle.h"
 #include "drive/forward.h"
 #include "drive/param_scaling.h"
 

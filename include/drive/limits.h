@@ -2,9 +2,7 @@
 #ifndef DRIVE_LIMITS_H
 #define DRIVE_LIMITS_H
 
-#include "control/qmath.h"
 #include "drive/drive.h"
-#include "drive/forward.h"
 
 /** X(bit, name, cause, remedy). Several may hold at once, so each is a bit, which never changes its meaning. */
 #define DRIVE_LIMIT_TABLE(X) \

@@ -2,7 +2,6 @@
 #ifndef DRIVE_MODEL_H
 #define DRIVE_MODEL_H
 
-#include "control/qmath.h"
 #include "control/motor_model.h"
 #include "drive/forward.h"
 #include "drive/param_scaling.h"

@@ -2,8 +2,6 @@
 #ifndef DRIVE_PANEL_H
 #define DRIVE_PANEL_H
 
-#include "control/qmath.h"
-#include "drive/forward.h"
 #include "drive/remote.h"
 
 #define PANEL_DEBOUNCE_MS 30
@@ -52,8 +50,7 @@ void panel_init(panel_t *panel);
 /** 1 once per press. */
 uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms);
 
-/** Speed target for a potentiometer position; TORQUE_MODE: q current in Q13.
- *  @param pot_q15 signed fractional sample, -32768 = lower end
+/** Speed target for a potentiometer position; TORQUE_MODE: q current in Q13. @param pot_q15 signed fractional sample, -32768 = lower end
  *  @param direction of the running motor: in BIDIRECTIONAL_SPEED the middle keeps it */
 int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int16_t fast_range, int16_t direction);
 

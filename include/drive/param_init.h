@@ -4,7 +4,6 @@
 
 #include "drive/drive.h"
 #include "drive/protection.h"
-#include "drive/param_scaling.h"
 
 /** Initialiser of a drive_params_t. */
 #define DRIVE_PARAMS_INIT \

@@ -33,10 +33,9 @@ typedef enum {
  *  it: half of each step's change is taken, which comes to the current that fits. */
 current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p);
 
-/** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to nothing and is
- *  a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the current's direction, and comes
- *  again: soon after a dip of the speed.
- *  Every seldom step in closed loop. */
+/** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to
+ *  nothing and is a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the
+ *  current's direction, and comes again: soon after a dip of the speed. Every seldom step in closed loop. */
 void protection_probe_rotor(drive_t *d, const drive_params_t *p);
 
 /** Stall and lost lock: conditions that must not last. Every rare step in closed loop. */

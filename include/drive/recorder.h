@@ -6,7 +6,6 @@
 #include "drive/faults.h"
 #include "drive/forward.h"
 #include "drive/modes/mode_table.h"
-#include "drive/param_scaling.h"
 
 #define RECORDER_ROWS 64  /* six bytes each: 384 of the part's 2048 */
 #define RECORDER_AFTER 16 /* of them, those after the fault */

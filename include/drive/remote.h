@@ -38,7 +38,6 @@ struct remote {
 enum { REMOTE_MODE_TABLE(REMOTE_MODE) REMOTE_MODE_COUNT };
 
 #if SCOPE
-
 /** The panel is in command. */
 void remote_init(remote_t *r);
 
@@ -51,7 +50,6 @@ void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
 
 /** The target in command. @param of_panel the potentiometer's */
 int16_t remote_target(const remote_t *r, const drive_params_t *p, int16_t of_panel);
-
 #else
 #define remote_give_up(r) ((void)0)
 #define remote_tick(r, panel, d, elapsed_ms) ((void)0)

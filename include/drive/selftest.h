@@ -7,7 +7,6 @@
 #include "drive/param_scaling.h"
 
 #ifndef SELFTEST_OFF
-
 /** Complements of the drive's fields of the same name, and the sum of the slots that came to their end. */
 typedef struct {
     uint16_t state, fault, direction, offset_a, offset_b;
@@ -22,7 +21,6 @@ typedef struct {
 
 /** A slow phase has come to its end. */
 #define SELFTEST_MARK(d, phase) ((d)->selftest.phases = (uint16_t)((d)->selftest.phases + (phase)))
-
 #else
 #define SELFTEST_STATE
 #define SELFTEST_KEEP(d, field, value) ((void)0)
@@ -53,10 +51,9 @@ typedef enum { SELFTEST_NONE = 0,
 /** Words for selftest_march(): any two bits of a word differ in at least one of them. */
 extern const uint16_t selftest_backgrounds[SELFTEST_BACKGROUNDS];
 
-/** March C- over a stretch of RAM: up w; up r, w~; up r~, w; down r, w~; down r~, w; up r. Nothing may use the stretch meanwhile.
- *  Apart from its beginning and end it works in registers alone: the stretch may hold the stack.
- *  @param background what w writes; w~ is its complement
- *  @param spare keeps the contents meanwhile, outside of the stretch; 0: they may get lost @return 0, or bits that were wrong */
+/** March C- over a stretch of RAM: up w; up r, w~; up r~, w; down r, w~; down r~, w; up r. Nothing may use the stretch meanwhile. Apart
+ *  from its beginning and end it works in registers alone: the stretch may hold the stack. @param background what w writes; w~ is its
+ *  complement @param spare keeps the contents meanwhile, outside of the stretch; 0: they may get lost @return 0, or bits that were wrong */
 uint16_t selftest_march(volatile uint16_t *first, uint16_t words, uint16_t background, volatile uint16_t *spare);
 
 /** CRC-16 of CCITT (polynomial 0x1021, start value 0xFFFF, highest bit first) of one more byte. */
@@ -65,13 +62,11 @@ uint16_t selftest_crc(uint16_t crc, uint16_t byte);
 #define SELFTEST_CRC_START 0xFFFFu
 
 #ifndef SELFTEST_OFF
-
 /** 1 if the sum of the slots is the one that belongs to the ticks: each came in its turn, ever since the start. Between two periods. */
 uint16_t selftest_flow_holds(const drive_t *d);
 
 /** 1 if what is kept twice agrees. Between two periods. */
 uint16_t selftest_variables_hold(const drive_t *d);
-
 #endif
 
 #endif

@@ -2,8 +2,6 @@
 #ifndef DRIVE_STARTUP_H
 #define DRIVE_STARTUP_H
 
-#include "control/qmath.h"
-#include "drive/forward.h"
 #include "drive/states.h"
 
 /** Current offsets and the sums they come from. */

@@ -2,9 +2,7 @@
 #ifndef DRIVE_TICK_H
 #define DRIVE_TICK_H
 
-#include "control/qmath.h"
 #include "control/svm.h"
-#include "drive/forward.h"
 #include "drive/schedule.h"
 
 /** Phase currents from the samples: gain, then the calibrated offset. */
@@ -16,11 +14,9 @@ void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty);
 /** Last of the slow work: what the law of the next two periods needs and the samples do not change. */
 void drive_prepare(drive_t *d, const drive_params_t *p);
 
-/** One PWM period up to the duties; after it, where schedule_is_due() or the bridge does not switch, drive_slow(), which has no deadline, drive_outputs(), and last
- *  drive_latch_fault().
- *  @param raw the converter's results at the centre of the low sides' conduction
- *  @param duty the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch
- *  @return 1 where it does */
+/** One PWM period up to the duties; after it, where schedule_is_due() or the bridge does not switch, drive_slow(), which has no deadline,
+ *  drive_outputs(), and last drive_latch_fault(). @param raw the converter's results at the centre of the low sides' conduction @param duty
+ *  the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch @return 1 where it does */
 uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
 
 /** First of the slow work: what a period with the bridge off is. */

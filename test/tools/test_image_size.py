@@ -45,28 +45,24 @@ calls_nothing = ["_fill"]
 name = "law"
 title = "the law"
 note_flash_bytes = 60
+[[group.module]]
+name = "control"
+files = ["include/a/tick.h", "include/a/park.h", "firmware/a/table.c"]
+objects = ["drive"]
+[[group.module]]
+name = "start"
+compiler = ["_reset*"]
+objects = ["(start values)", "drive.estimator"]
 [[group]]
 name = "more"
 title = "additions"
-[[module]]
-name = "control"
-group = "law"
-files = ["include/a/tick.h", "include/a/park.h", "firmware/a/table.c"]
-objects = ["drive"]
-[[module]]
-name = "start"
-group = "law"
-compiler = ["_reset*"]
-objects = ["(start values)", "drive.estimator"]
-[[module]]
+[[group.module]]
 name = "guard"
-group = "more"
 files = ["include/a/guard.h", "firmware/a/guard.c"]
 functions = ["tick_guard"]
 objects = ["drive.fault", "drive.estimator.lost", "silent"]
-[[module]]
+[[group.module]]
 name = "hand-over"
-group = "more"
 whole = true
 functions = ["hand_over"]
 objects = ["(texts)", "(alignment)"]
@@ -337,7 +333,7 @@ def test_a_name_that_matches_nothing_is_a_line(tree, image, old, new, expected):
     assert all(re.search(pattern, line) for pattern, line in zip(expected, lines)), lines
 
 
-@pytest.mark.parametrize("old, new, told", [('group = "more"', 'group = "mroe"', "'mroe' is no group, .*budget.toml line .*more"),
+@pytest.mark.parametrize("old, new, told", [('[[group.module]]\nname = "guard"', '[[module]]\nname = "guard"', "unknown key 'module'.*budget.toml line"),
                                             ("whole = true", "hole = true", "unknown key 'hole'"),
                                             ("[stack]", "[stak]", r"no table \[stack\]")])
 def test_a_budget_file_with_a_mistake(tmp_path, old, new, told):

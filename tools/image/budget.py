@@ -114,15 +114,15 @@ class Budget:
         stack = _required(root, "stack")
         calls_nothing = listed(stack, "calls_nothing", "compiler", required=True)
         stack.close()
-        groups = [Group(section.text("name"), section.text("title"), section.integer("note_flash_bytes", None, minimum=0), section.flag("counted", True))
-                  for section in root.sections("group")]
-        modules = []
-        for section in root.sections("module"):
-            modules.append(Module(section.text("name"), section.choice("group", [group.name for group in groups]),
-                                  listed(section, "files", "file"),
-                                  listed(section, "functions", "function") + listed(section, "compiler", "compiler"),
-                                  listed(section, "objects", "object"), section.flag("whole", False),
-                                  section.integer("flash_bytes", None, minimum=0)))
+        groups, modules = [], []
+        for section in root.sections("group"):
+            group = Group(section.text("name"), section.text("title"), section.integer("note_flash_bytes", None, minimum=0), section.flag("counted", True))
+            groups.append(group)
+            for part in section.sections("module"):
+                modules.append(Module(part.text("name"), group.name, listed(part, "files", "file"),
+                                      listed(part, "functions", "function") + listed(part, "compiler", "compiler"),
+                                      listed(part, "objects", "object"), part.flag("whole", False), part.integer("flash_bytes", None, minimum=0)))
+                part.close()
             section.close()
         with_caller = listed(root, "with_caller", "function", required=True)
         root.close()

@@ -5,7 +5,6 @@
 #include "board/mclv.h"
 #include "board/pin_table.h"
 #include "board/status.h"
-#include "drive/modes/identify.h"
 
 #include <xc.h>
 
@@ -29,7 +28,6 @@ void mode_watch(const drive_t *d)
 }
 
 #ifdef IDENTIFY
-
 tIdentifyParm IdentifyParm;
 
 char *identify_status_line(char *line, const drive_t *d)
@@ -60,7 +58,6 @@ void identify_watch(const drive_t *d)
     IdentifyParm.Coulomb_uNm = id->values.coulomb_unm;
     IdentifyParm.Viscous_nNms = id->values.viscous_nnms;
 }
-
 #endif
 
 /* ---- BRINGUP on the board: the guide in the panel's place, its lines on the serial line, and the two pins that this may be on ---- */
@@ -77,7 +74,6 @@ uint16_t mode_speaks(char **end)
 }
 
 #ifdef BRINGUP
-
 bringup_guide_t board_bringup;
 
 /* clang-format off */
@@ -223,7 +219,6 @@ char *bringup_line(char *line)
     m->kind = (uint16_t)BRINGUP_SILENT;
     return text_put(at, "\r\n");
 }
-
 #endif
 
 /* ---- SNAPSHOT on the board: AN1292's arrays, and the recorder that fills them ---- */
@@ -236,7 +231,6 @@ void mode_record(void)
 }
 
 #ifdef SNAPSHOT
-
 int16_t SnapBuf1[DATA_BUFFER_SIZE], SnapBuf2[DATA_BUFFER_SIZE], SnapBuf3[DATA_BUFFER_SIZE], SnapBuf4[DATA_BUFFER_SIZE];
 
 volatile uint16_t SnapStart, SnapDone;
@@ -244,7 +238,6 @@ volatile uint16_t SnapStart, SnapDone;
 snapshot_t board_snapshot = {
     { SnapBuf1, SnapBuf2, SnapBuf3, SnapBuf4 }, DATA_BUFFER_SIZE, SNAPDELAY, &SnapStart, &SnapDone, 0, 0
 };
-
 #endif
 
 /* ---- Who looks at buttons and potentiometer: the panel, or BRINGUP's guide in its place ---- */

@@ -1,14 +1,10 @@
 /* BRINGUP: the first day with a board. */
 #include "drive/modes/bringup.h"
 
-#include "control/transforms.h"
-#include "control/angle.h"
 #include "drive/drive.h"
 #include "drive/modes/bringup_steps.h"
-#include "drive/states.h"
 
 #ifdef BRINGUP
-
 #define BRINGUP_FILTER_SHIFT 5                   /* 1.6 ms: four counts of the amplitude */
 #define BRINGUP_STEP_MASK 7u                     /* the amplitude changes by a count every eighth period */
 #define BRINGUP_TURN_PERIODS PARAM_PERIODS(0.4F) /* of an electrical turn, and of the pause after it */
@@ -111,7 +107,6 @@ void bringup_start(drive_t *d, const drive_params_t *p)
     (void)p;
     d->run.bringup.ready = 1;
 }
-
 #endif
 
 void mode_idle(drive_t *d)
@@ -126,7 +121,6 @@ void mode_idle(drive_t *d)
 /* ---- BRINGUP, the background's part: what it knows of the board so far, and what it says next ---- */
 
 #ifdef BRINGUP
-
 void bringup_say(bringup_guide_t *g, bringup_kind_t kind, uint16_t code, uint16_t part)
 {
     g->message.kind = (uint16_t)kind;
@@ -350,7 +344,6 @@ panel_lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t
     lights.led_run = (uint16_t)(g->leds >> 1);
     return lights;
 }
-
 #endif
 
 /* ---- BRINGUP: what currents in six directions say: which signal follows which leg, what is open or dead, resistance and dead time ---- */
@@ -515,5 +508,4 @@ bringup_bridge_t bringup_bridge(const bringup_level_t *half, const bringup_level
     r.dead_time_ns = (uint16_t)((dead_time(&a) >> 1) + (dead_time(&b) >> 1));
     return r;
 }
-
 #endif

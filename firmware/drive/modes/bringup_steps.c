@@ -2,11 +2,8 @@
 #include "drive/modes/bringup_steps.h"
 
 #include "drive/drive.h"
-#include "drive/faults.h"
-#include "drive/param_scaling.h"
 
 #ifdef BRINGUP
-
 #define REST_MS 100u     /* no button is touched yet */
 #define REPEAT_MS 1000u  /* the first line again, by the other pin */
 #define BUTTON_MS 20000u /* patience with a button */
@@ -510,5 +507,4 @@ void bringup_step_turns(bringup_guide_t *g, drive_t *d)
     }
     bringup_go(g, BRINGUP_STEP_LAST);
 }
-
 #endif

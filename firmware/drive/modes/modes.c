@@ -1,12 +1,9 @@
 /* The seam between the drive and its modes: each mode defines its hook twice, with the mode and without it. */
 #include "drive/modes/modes.h"
 
-#include "control/estimator.h"
-#include "control/observer.h"
 #include "drive/drive.h"
 #include "drive/limits.h"
 #include "drive/speed.h"
-#include "drive/states.h"
 
 void mode_start(drive_t *d, const drive_params_t *p)
 {

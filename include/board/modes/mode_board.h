@@ -2,17 +2,12 @@
 #ifndef BOARD_MODES_MODE_BOARD_H
 #define BOARD_MODES_MODE_BOARD_H
 
-#include "control/qmath.h"
 #include "drive/drive.h"
-#include "drive/forward.h"
 #include "drive/modes/bringup.h"
 #include "drive/modes/mode_table.h"
-#include "drive/modes/modes.h"
 #include "drive/panel.h"
-#include "drive/param_scaling.h"
 
 #ifdef IDENTIFY
-
 /** What the drive has measured: step and result (identify_step_t, identify_result_t in drive/modes/identify.h), phase resistance [mohm]
  *  with the bridge's share, d and q inductance [uH], back-EMF [mV peak line to line per 1000 rpm], inertia
  *  [10^-8 kg m2], friction at standstill [uN m] and its growth [nN m s]; 0 = not measured yet. */
@@ -27,7 +22,6 @@ char *identify_status_line(char *line, const drive_t *d);
 
 /** Copies what has been measured to IdentifyParm. */
 void identify_watch(const drive_t *d);
-
 #endif
 
 /** Longest status line and its end: retries with four reasons of a limit or more, or all that IDENTIFY measures, or a remedy of BRINGUP, or a client's
@@ -49,7 +43,6 @@ void mode_watch(const drive_t *d);
 /* ---- BRINGUP on the board: the guide in the panel's place, its lines on the serial line, and the two pins that this may be on ---- */
 
 #ifdef BRINGUP
-
 /** Steps, answers, measurements. */
 extern bringup_guide_t board_bringup;
 
@@ -57,7 +50,6 @@ extern bringup_guide_t board_bringup;
 char *bringup_line(char *line);
 
 #define MODE_STATUS_MS 1u /* the guide waits for its lines */
-
 #else
 #define MODE_STATUS_MS 500u
 #endif
@@ -68,7 +60,6 @@ uint16_t mode_speaks(char **end);
 /* ---- SNAPSHOT on the board: AN1292's arrays, and the recorder that fills them ---- */
 
 #ifdef SNAPSHOT
-
 /** Set SnapStart to 1; SnapDone becomes 1 when the arrays are full. Columns: phase current a, q current (Q15 of full
  *  scale), filtered estimated speed (as EstimParm.qVelEstim), estimated angle. */
 extern int16_t SnapBuf1[DATA_BUFFER_SIZE], SnapBuf2[DATA_BUFFER_SIZE], SnapBuf3[DATA_BUFFER_SIZE], SnapBuf4[DATA_BUFFER_SIZE];
@@ -76,7 +67,6 @@ extern int16_t SnapBuf1[DATA_BUFFER_SIZE], SnapBuf2[DATA_BUFFER_SIZE], SnapBuf3[
 extern volatile uint16_t SnapStart, SnapDone;
 
 extern snapshot_t board_snapshot;
-
 #endif
 
 /** 1 where the mode has work in every period. */

@@ -6,12 +6,9 @@
 #ifndef DRIVE_MODES_BRINGUP_H
 #define DRIVE_MODES_BRINGUP_H
 
-#include "control/qmath.h"
 #include "control/svm.h"
 #include "drive/faults.h"
-#include "drive/forward.h"
 #include "drive/panel.h"
-#include "drive/param_scaling.h"
 
 /** The most current that any step asks for, as a share of MAXIMUM_CURRENT_A. Over-current, bus and fault input protect as ever. */
 #define BRINGUP_CURRENT_SHARE 0.3
@@ -88,7 +85,6 @@
 /* clang-format on */
 
 #ifdef BRINGUP
-
 #define BRINGUP_QUESTION_ENUM(name, text) BRINGUP_ASK_##name,
 
 typedef enum { BRINGUP_QUESTION_TABLE(BRINGUP_QUESTION_ENUM) BRINGUP_QUESTIONS } bringup_question_t;
@@ -126,13 +122,11 @@ typedef struct {
 
 #define BRINGUP_FULL_Q13 CURRENT_Q13(PARAM_F(BRINGUP_CURRENT_SHARE) * PARAM_F(MAXIMUM_CURRENT_A)) /* |A| + |B| of a step */
 #define BRINGUP_STATE bringup_run_t bringup;
-
 #else
 #define BRINGUP_STATE
 #endif
 
 #ifdef BRINGUP
-
 #define BRINGUP_HALF_DUTY (PWM_FULL_DUTY / 2)
 
 /** Adds up, in every state. @param settled the amplitude stands */
@@ -150,7 +144,6 @@ void bringup_run(drive_t *d, const drive_params_t *p, duties_t *duty);
 
 /** The background's first word of a start: the instrument is its own. */
 void bringup_start(drive_t *d, const drive_params_t *p);
-
 #endif
 
 /** A period with the bridge off: the mode may add up the samples. */
@@ -159,7 +152,6 @@ void mode_idle(drive_t *d);
 /* ---- The judge: what currents in six directions say: which signal follows which leg, what is open or dead, resistance and dead time ---- */
 
 #ifdef BRINGUP
-
 #define BRINGUP_DIRECTIONS 6u
 
 /** Currents and amplitudes of the six directions +A, -C, +B, -A, +C, -B at one level. */
@@ -326,7 +318,6 @@ uint16_t bringup_has_tripped(bringup_guide_t *g, const drive_t *d);
 
 /** The bus voltage. */
 uint16_t bringup_bus_10mv(const drive_t *d);
-
 #endif
 
 #endif

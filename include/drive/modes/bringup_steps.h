@@ -2,13 +2,9 @@
 #ifndef DRIVE_MODES_BRINGUP_STEPS_H
 #define DRIVE_MODES_BRINGUP_STEPS_H
 
-#include "control/qmath.h"
-#include "drive/forward.h"
 #include "drive/modes/bringup.h"
-#include "drive/panel.h"
 
 #ifdef BRINGUP
-
 /** Says by which pin of the serial line it speaks, by one and the other in turn, until a button comes. */
 void bringup_step_begin(bringup_guide_t *g, const panel_inputs_t *in);
 
@@ -77,7 +73,6 @@ void bringup_step_mark(bringup_guide_t *g, drive_t *d);
 
 /** Turns until the mark is back, and counts. */
 void bringup_step_turns(bringup_guide_t *g, drive_t *d);
-
 #endif
 
 #endif
