@@ -18,7 +18,6 @@
 #include "firmware/control/soft_float.c"
 #include "firmware/control/svm.c"
 #include "firmware/drive/catch.c"
-#include "firmware/drive/deferred.c"
 #include "firmware/drive/drive.c"
 #include "firmware/drive/handover.c"
 #include "firmware/drive/limits.c"

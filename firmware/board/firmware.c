@@ -60,7 +60,6 @@ static void firmware_find(uint16_t found)
 void firmware_init(void)
 {
     drive_fault_t kept;
-
     pwm_outputs_off();
     kept = reset_take();
     record_init(kept);
@@ -151,7 +150,6 @@ QM_INLINE void firmware_judge(uint16_t elapsed_ms)
 void firmware_background(void)
 {
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
-
     firmware_supervise();
     if (elapsed_ms != 0u) {
         panel_inputs_t in;

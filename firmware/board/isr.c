@@ -115,7 +115,6 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 {
     drive_samples_t raw;
     duties_t now, *duty = DEFER_DUTIES ? &board_waiting : &now;
-
     IFS0bits.AD1IF = 0;
     if (duties_write_waiting(duty)) {
         board_overrun();
@@ -137,7 +136,6 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
 void BOARD_ISR _T2Interrupt(void)
 {
     drive_samples_t raw;
-
     if (board_is_late) {
         board_is_late = 0;
         drive_raise(&board_drive, FAULT_ISR_OVERRUN);

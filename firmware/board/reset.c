@@ -22,7 +22,6 @@ drive_fault_t reset_take(void)
 {
     uint16_t cause = selftest_reset_cause(RCON);
     uint16_t fault;
-
     RCON = 0;
     board_reset_cause = cause;
     served_tick = 0;

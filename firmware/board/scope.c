@@ -37,8 +37,7 @@ static void scope_look(scope_t *s, const volatile uint16_t *trigger, int16_t *fo
         s->mode = s->then;
         s->at = following;
         return;
-    } else {
-        /* it has always been there */
+    } else { /* it has always been there */
     }
     s->at = (following == s->ring_end) ? s->ring_begin : following;
 }
@@ -413,7 +412,6 @@ static uint8_t serve(lnet_t *l, const uint8_t *request, uint16_t size)
     uint16_t address = (uint16_t)(request[AT_ADDRESS] | (uint16_t)(request[AT_ADDRESS + 1] << 8)), count = request[AT_COUNT];
     uint16_t is_ram = (uint16_t)(count != 0u && memory_is_ram(address, count)), is_scope = (uint16_t)(address == PARAMETER_SCOPE);
     uint16_t is_good = 0;
-
     switch (request[AT_SERVICE]) {
     case LNET_DEVICE_INFO:
         l->left = put_info((uint16_t *)(void *)&l->buffer[AT_PAYLOAD]);
@@ -480,7 +478,6 @@ static void end_frame(lnet_t *l, uint16_t sum)
     uint8_t *answer = l->buffer;
     uint8_t service = request[AT_SERVICE], error = LNET_ERROR_CHECKSUM;
     uint16_t is_right = (uint16_t)(sum == sum_sent(l)), size = request[AT_SIZE], fits = (uint16_t)(HEAD + size <= l->room);
-
     l->part = PART_SYN;
     if (request[AT_NODE] != LNET_NODE || (!is_right && !l->is_up)) {
         return;
@@ -539,7 +536,6 @@ void lnet_receive(uint8_t byte)
 {
     lnet_t *l = &board_lnet;
     uint16_t before = l->special;
-
     if (l->part >= (uint16_t)ANSWER_SYN) {
         return;
     }
@@ -560,8 +556,7 @@ void lnet_receive(uint8_t byte)
         end_frame(l, byte);
     } else if (l->part != (uint16_t)PART_SYN) {
         take(l, byte);
-    } else {
-        /* noise */
+    } else { /* noise */
     }
 }
 
@@ -569,7 +564,6 @@ int16_t lnet_next(void)
 {
     lnet_t *l = &board_lnet;
     uint16_t byte = 0;
-
     if (l->part < (uint16_t)ANSWER_SYN) {
         return -1;
     }

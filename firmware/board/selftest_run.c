@@ -7,7 +7,7 @@
 #include "board/reset.h"
 #include "board/selftest_cpu.h"
 #include "board/status.h"
-#include "drive/deferred.h"
+#include "drive/tick.h"
 #include "drive/states.h"
 
 #define SLICE_WORDS 4u  /* of RAM; two slices overlap by one, so that faults between neighbours show */
@@ -178,7 +178,6 @@ static void test_ram_slice(void)
 {
     static uint16_t from, n; /* word of the RAM, background */
     uint16_t words = (uint16_t)((uint16_t)(BOARD_RAM_END - BOARD_RAM) - from);
-
     words = (words < SLICE_WORDS) ? words : SLICE_WORDS;
     if (words > 1u) {
         static volatile uint16_t keep[3u * SLICE_WORDS]; /* a slice never touches both ends */
@@ -343,7 +342,6 @@ static void test_ram(void)
 {
     volatile uint16_t *spare = board_free_ram(), *at;
     uint16_t room = (uint16_t)(BOARD_FREE_END - spare), wrong = 0, n, words;
-
     for (n = 0; n < SELFTEST_BACKGROUNDS; n++) {
         wrong |= selftest_march(spare, room, selftest_backgrounds[n], 0);
         at = BOARD_RAM;
@@ -369,8 +367,7 @@ void selftest_start(drive_fault_t kept)
         judge_watchdog(1);
     } else if (watchdog_test == WATCHDOG_DUE && !board_clock_failed) { /* only with a clock that is known */
         wait_for_watchdog();
-    } else {
-        /* once each power-up */
+    } else { /* once each power-up */
     }
     selftest_cpu();
     SET_CPU_IPL(0); /* no interrupt is enabled yet */

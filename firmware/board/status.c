@@ -188,7 +188,6 @@ char *text_put_unsigned(char *at, uint16_t number)
 {
     char digits[6], *digit = &digits[5];
     uint16_t rest = number;
-
     *digit = '\0';
     do {
         *--digit = (char)('0' + rest % 10u);

@@ -37,7 +37,6 @@ void watch_refresh(void)
     const drive_run_t *run = &d->run;
     const estimator_params_t *motor = &board_params.estimator;
     dq_t emf = estimator_emf(&run->estimator);
-
     FdWeakParm.qIndex = (int16_t)run->fieldweak.index;
     FdWeakParm.qFwOnSpeed = board_params.fieldweak.on_speed_erpm;
     MotorEstimParm.qRs = (motor->rs_exp == 0u) ? (int16_t)(run->model.rs_q16 >> 1) : INT16_MAX; /* the exponent begins where NORM_RS ends */

@@ -53,7 +53,6 @@ angle_t trig_direction(int16_t x, int16_t y)
     uint16_t least = steep ? across : up, most = steep ? up : across;
     q15_t r;
     angle_t angle;
-
     if (most == 0u) {
         return 0;
     }

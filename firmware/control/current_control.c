@@ -1,8 +1,6 @@
 /* The two current controllers and the voltage circle: the d axis takes what it needs first, the q axis gets the rest. */
 #include "control/current_control.h"
 
-/* ---- AN1292's PI controller with anti-windup: U = Sum + Kp err; out = limit(U); Sum += Ki err - Kc (U - out) ---- */
-
 /** What the integrator gives back of an excess beyond the limit, 0 or more. */
 static INLINE int32_t pi_excess(const pi_gains_t *gains, int32_t beyond)
 {
@@ -15,7 +13,6 @@ INLINE int16_t pi_tick(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t l
     const int32_t u = pi->sum + qm_mulss(err, gains->kp), most = qm_mulss(limit, (int16_t)(1u << gains->shift));
     int32_t step = qm_mulss(err, gains->ki);
     int16_t out;
-
     if (u > most) {
         step -= pi_excess(gains, u - most);
         out = limit;
@@ -33,8 +30,6 @@ void pi_preset(pi_t *pi, const pi_gains_t *gains, int16_t err, int16_t out)
 {
     pi->sum = qm_mulss(out, (int16_t)(1u << gains->shift)) - (int32_t)err * gains->kp; /* in C: no error costs nothing */
 }
-
-/* ---- The voltage circle and both controllers ---- */
 
 uint16_t voltage_circle_reciprocal(voltage_q14_t radius_q14)
 {

@@ -58,7 +58,6 @@ INLINE alphabeta_t estimator_back_emf(estimator_t *e, const estimator_params_t *
     const alphabeta_t last = e->i_last_q14;
     alphabeta_t inductive = estimator_inductive(e, p, t, i_q14, last), e_q13;
     int16_t resistive_alpha, resistive_beta;
-
     e->i_last_q14 = i_q14;
     resistive_alpha = qm_mulhi_su((int16_t)((i_q14.alpha + last.alpha) >> 1), t->rs_q16);
     resistive_beta = qm_mulhi_su((int16_t)((i_q14.beta + last.beta) >> 1), t->rs_q16);
@@ -78,7 +77,6 @@ INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const mot
     int16_t e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
     int16_t sum = (int16_t)(e_q - e->sign * e_d);
     int32_t step_q32;
-
     e->omega_before_erpm = e->omega_erpm;
     e->omega_erpm = estimator_omega(sum, t->emf_sum_max_q12, t->inv_kfi);
     step_q32 = qm_mulss(e->omega_erpm, p->deltat_q32);

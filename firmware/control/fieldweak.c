@@ -21,7 +21,6 @@ void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t 
 {
     int16_t speed = qm_abs(ref_erpm), above = (int16_t)(speed - p->on_speed_erpm), filter, ratio_q15;
     uint16_t index = 0, fraction_q16 = 0;
-
     model->kfilter_esdq_q16 = p->kfilter_esdq_q16;
     if (above > 0) {
         uint32_t place_q16 = qm_muluu((uint16_t)above, p->index_per_count_q16);

@@ -59,8 +59,6 @@ void adaptation_apply(const adaptation_t *a, const adaptation_params_t *p, motor
     model->emf_sum_max_q12 = (int16_t)qm_divud(32767ul * 2048ul, (uint16_t)kfi);
 }
 
-/* ---- Salient motors: what the d current does to torque and back-EMF, and the d current of the least current for the torque (MTPA) ---- */
-
 #define SALIENCE_MOST_Q13 16383 /**< d current that counts: twice full scale */
 
 void salience_update(salience_t *s, uint16_t double_q13, q15_t kfi)

@@ -86,7 +86,6 @@ void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t s
 {
     int16_t rate, wrong = (int16_t)(p->gate_erpm + (speed >> OBSERVER_GATE_SPEED_SHIFT));
     q15_t loaded = observer_loaded(o, p, iq_q13), share = 32767;
-
     if (speed < p->full_erpm) {
         share = qm_share((uint16_t)speed, (uint16_t)p->full_erpm);
     }
@@ -126,8 +125,7 @@ void observer_answer(observer_t *o, int16_t innovation)
         unrest = (uint16_t)((unrest < 4u * OBSERVER_GATE_STEPS) ? unrest + 4u : unrest);
     } else if (unrest != 0u) {
         unrest--;
-    } else {
-        /* calm for long */
+    } else { /* calm for long */
     }
     if (qm_abs(innovation) > o->gate_erpm && (!stirred || unrest < OBSERVER_GATE_STEPS)) {
         if (stirred && (innovation ^ o->gate_last_erpm) < 0) {
@@ -147,7 +145,6 @@ void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, 
 {
     int16_t innovation;
     int32_t before_q16 = o->omega_q16;
-
     o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
     innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
     o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
@@ -156,8 +153,7 @@ void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, 
         o->wrong_steps++;
     } else if (o->wrong_steps != 0u) {
         o->wrong_steps--;
-    } else {
-        /* right for long */
+    } else { /* right for long */
     }
     observer_answer(o, innovation);
 }

@@ -62,8 +62,7 @@ int32_t soft_float_times(int32_t x, soft_float_t a)
         size = (n.e > 14) ? 0x3FFFFFFFul : (uint32_t)n.m << (uint16_t)n.e;
     } else if (n.e > -16) {
         size = (uint32_t)n.m >> (uint16_t)-n.e;
-    } else {
-        /* below one */
+    } else { /* below one */
     }
     return (x < 0) ? -(int32_t)size : (int32_t)size;
 }

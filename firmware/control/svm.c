@@ -42,7 +42,6 @@ INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16
     int16_t b = (int16_t)(t - half);
     int16_t c = (int16_t)(-t - half);
     int16_t max = a, min = a, shift;
-
     if (b > max) {
         max = b;
     } else {

@@ -1,8 +1,8 @@
 /* The catch of a rotor that turns at the start: the two looks, the pause between them, and the estimator's begin. */
 #include "drive/catch.h"
 
-#include "drive/deferred.h"
 #include "drive/drive.h"
+#include "drive/tick.h"
 
 #define CATCH_LOOK_PERIODS (CATCH_LOOK_STEPS * SLOW_PERIODS)            /**< of a look at a slow rotor */
 #define CATCH_STANDS_Q11 ((int16_t)(CATCH_STANDS * CATCH_LOOK_PERIODS)) /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
@@ -56,7 +56,6 @@ uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_
     uint16_t emf_q12 = (half_emf_q12 > sum_max_q12 >> 1) ? sum_max_q12 : (uint16_t)(2u * half_emf_q12);
     speed_erpm_t speed = (int16_t)(qm_mulss((int16_t)emf_q12, run->model.inv_kfi) >> 11); /* estimator_omega() within its limit */
     uint16_t step = (uint16_t)qm_mulhi(speed, p->estimator.deltat_q32), pause = CATCH_PAUSE_MOST;
-
     if (step > CATCH_PAUSE_TURN / CATCH_PAUSE_MOST) {
         pause = qm_divud(CATCH_PAUSE_TURN, step);
     }
@@ -85,7 +84,6 @@ static catch_phase_t catch_see(drive_t *d, const drive_params_t *p, angle_t dire
     drive_run_t *run = &d->run;
     catch_t *c = &run->catching;
     int16_t turn = (int16_t)(angle_t)(direction - c->direction), size = qm_abs(turn), speed;
-
     if (size < CATCH_LEAST_TURN) {
         return CATCH_NO_LOOK;
     }
@@ -108,7 +106,6 @@ uint16_t catch_look(drive_t *d, const drive_params_t *p)
     uint16_t samples = d->periods;
     catch_phase_t next = CATCH_NO_LOOK; /* it stands */
     angle_t direction;
-
     c->sum_q11.alpha = (int16_t)(c->sum_q11.alpha + (i.alpha >> 3));
     c->sum_q11.beta = (int16_t)(c->sum_q11.beta + (i.beta >> 3));
     if (samples < CATCH_LOOK_PERIODS && alpha < most && beta < most) {
@@ -177,7 +174,6 @@ QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t *p)
     int16_t ahead = qm_with_sign(0x4000, e->omega_erpm);
     uint16_t emf, most;
     int32_t half_step_q32 = qm_mulss(e->omega_erpm, p->estimator.deltat_q32) / 2;
-
     e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
                  + (uint32_t)half_step_q32 * (uint32_t)(uint16_t)(c->half_periods + 2u * d->periods + 1u);
     e->next = estimator_ahead(e->rho_q32, 2 * half_step_q32);
@@ -197,7 +193,6 @@ void catch_close(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     drive_control_t *c = &run->control;
-
     drive_set_direction(d, qm_with_sign(1, run->estimator.omega_erpm));
     c->reference_erpm = run->estimator.omega_erpm;
     c->ref_q13.d = run->fieldweak.table_q13;

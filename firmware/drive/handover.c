@@ -112,7 +112,6 @@ void handover_now(drive_t *d, const drive_params_t *p)
     angle_t estimated = estimator_next_angle(&d->run.estimator);
     sincos_t turn;
     alphabeta_t y;
-
     h->offset = (int16_t)(angle_t)(d->angle - estimated);
     turn = trig_sincos((angle_t)h->offset);
     y = inverse_park(c->v_q14, turn);

@@ -59,7 +59,6 @@ void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
     int16_t id_max = limits_asked_most(p), id_q13;
-
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
     id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->flux_brake_q13);
     c->ref_q13.d = qm_limit(id_q13, id_max);
@@ -70,7 +69,6 @@ void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15)
 {
     int16_t over = (int16_t)(bus_q15 - p->bus_regen_q15);
     int16_t most = limits_asked_most(p);
-
     if (over > 0) {
         int32_t less = qm_mulss(over, p->brake_per_bus_q8) >> 8;
         most = (int16_t)((less > most) ? 0 : most - less);
@@ -109,7 +107,6 @@ static uint16_t limits_ramp_reasons(const drive_t *d, const drive_params_t *p)
 {
     speed_erpm_t target = mode_speed_target(d, p);
     int16_t left = qm_abs(qm_sub_limited(target, d->run.control.reference_erpm));
-
     if (d->run.control.ramp_waits) {
         return (uint16_t)LIMIT_RAMP | (uint16_t)LIMIT_RAMP_WAITS;
     }
@@ -122,7 +119,6 @@ static uint16_t limits_closed_loop_reasons(const drive_t *d, const drive_params_
     const drive_run_t *run = &d->run;
     const drive_control_t *c = &run->control;
     uint16_t found;
-
     if (!mode_limit_reasons(d, p, &found)) {
         found = limits_ramp_reasons(d, p);
     }
@@ -152,7 +148,6 @@ uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
 {
     const drive_control_t *c = &d->run.control;
     uint16_t found;
-
     if (!drive_is_running(d)) {
         const uint16_t phase = d->run.catching.phase;
         const uint16_t waits = (uint16_t)(phase == (uint16_t)CATCH_BUS_HIGH || phase == (uint16_t)CATCH_TOO_FAST);
@@ -163,13 +158,10 @@ uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)
         found |= limits_closed_loop_reasons(d, p);
     } else if (limits_start_swings(d, p)) {
         found |= (uint16_t)LIMIT_SWING;
-    } else {
-        /* bootstrap, align, and a ramp that goes as it should */
+    } else { /* bootstrap, align, and a ramp that goes as it should */
     }
     return found;
 }
-
-/* ---- The bus voltage: its filter, and what the modulator and the current controllers get from it ---- */
 
 int16_t bus_sample(int16_t v_bus_raw)
 {
@@ -180,7 +172,6 @@ void bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
     int16_t now_q15 = bus_sample(v_bus_raw);
     int16_t bus_q15 = qm_lowpass(&d->bus_q31, now_q15, 16384);
-
     protection_check_bus(d, p, now_q15, bus_q15);
     bus_update_gain(d, p, now_q15);
 }

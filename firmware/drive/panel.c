@@ -254,7 +254,6 @@ void retry_tick(retry_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
         r->fault = (uint16_t)FAULT_NONE;
         r->asked = 0;
         r->waited_ms = 0;
-    } else {
-        /* it is about to stop */
+    } else { /* it is about to stop */
     }
 }

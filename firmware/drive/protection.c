@@ -105,8 +105,7 @@ static void protection_count_dip(drive_run_t *run, uint16_t dips)
         run->dip_steps = 0;
     } else if (run->dip_steps <= PROBE_DIP_STEPS) {
         run->dip_steps++;
-    } else {
-        /* the probe's own */
+    } else { /* the probe's own */
     }
 }
 
@@ -119,7 +118,6 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     dq_t emf = estimator_emf(&run->estimator);
     uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2));
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
-
     switch (run->probe_phase) {
     case PROBE_WAIT:
         run->probe_steps = (uint16_t)((doubtful && seems_to_turn) ? run->probe_steps + 1u : 0u);
@@ -153,7 +151,6 @@ void protection_check_rotor(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_abs(along), standing = (int16_t)(p->minimum_erpm >> 1);
     dq_t emf = estimator_emf(&run->estimator);
-
     if (along < protection_least_speed(run, p)) {
         run->stall_steps++;
     } else { /* of a rotor that only jerks the estimate is fast now and then */
@@ -164,8 +161,7 @@ void protection_check_rotor(drive_t *d, const drive_params_t *p)
         run->lost_lock_steps = (uint16_t)(run->lost_lock_steps + 2u);
     } else if (run->lost_lock_steps != 0u) { /* a lost estimator slips past the rotor: only now and then Ed is the larger one */
         run->lost_lock_steps--;
-    } else {
-        /* in lock */
+    } else { /* in lock */
     }
     if (run->stall_steps > p->stall_steps || run->lost_lock_steps > p->lost_lock_steps) {
         drive_raise(d, (run->stall_steps > p->stall_steps) ? FAULT_STALL : FAULT_LOST_LOCK);

@@ -16,8 +16,7 @@ void recorder_background(recorder_t *r, const drive_t *d)
         }
     } else if (d->command.run) {
         recorder_begin(r);
-    } else {
-        /* it is kept */
+    } else { /* it is kept */
     }
 }
 

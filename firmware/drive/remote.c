@@ -45,15 +45,13 @@ static void remote_wish(remote_t *r, panel_t *panel, const drive_t *d, uint16_t 
     } else if (starts && d->fault == (uint16_t)FAULT_NONE) {
         r->has_started = (uint16_t)(r->has_started || !panel->wish_run);
         panel->wish_run = 1;
-    } else {
-        /* as it is */
+    } else { /* as it is */
     }
 }
 
 void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
 {
     uint16_t starts = (uint16_t)(r->run != 0u && !r->seen_run);
-
     r->seen_run = (uint16_t)(r->run != 0u);
     if (r->lease_ms > REMOTE_LEASE_MOST_MS) {
         r->lease_ms = REMOTE_LEASE_MOST_MS;
@@ -70,8 +68,7 @@ void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
             panel->wish_run = 0;
         }
         remote_give_up(r);
-    } else {
-        /* the panel is in command */
+    } else { /* the panel is in command */
     }
     r->clear_fault = 0;
 }

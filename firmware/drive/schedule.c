@@ -171,11 +171,9 @@ void schedule_run(drive_t *d, const drive_params_t *p, const drive_samples_t *ra
 {
     const uint16_t call = (uint16_t)((d->ticks / SLOW_EVERY) & (SLOW_CALLS - 1u));
     uint16_t done = 0;
-
     switch (SLOT_OF(call)) {
         SCHEDULE_TABLE(SCHEDULE_CASE)
-    default: /* there is none */
-        break;
+    default: break; /* there is none */
     }
     SELFTEST_MARK(d, done);
 }

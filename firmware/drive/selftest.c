@@ -59,7 +59,6 @@ uint16_t selftest_march(volatile uint16_t *first, uint16_t words, uint16_t backg
 {
     volatile uint16_t *at = first, *kept = spare;
     uint16_t inverse = (uint16_t)~background, wrong, left;
-
     for (left = words; left != 0u; left--) {
         if (spare) {
             *kept = SELFTEST_READ(at);

@@ -116,7 +116,6 @@ uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p)
 {
     const uint16_t now = d->ticks;
     uint16_t wait;
-
     if (!drive_is_running(d) || s->sums.samples >= SIGNALS_SAMPLES) {
         drive_zero(&s->sums, sizeof s->sums);
     }
@@ -138,7 +137,6 @@ uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t 
     const drive_control_t *c = &d->run.control;
     int32_t off_q16;
     int16_t size;
-
     if (!drive_is_running(d)) {
         s->id_q16 = 0;
     }

@@ -145,7 +145,6 @@ static void speed_go_on(drive_t *d)
 void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
-
     if (!stops) {
         if (other || !d->command.run) {
             drive_enter(d, DRIVE_STOPPING);
@@ -156,8 +155,7 @@ void speed_choose_state(drive_t *d, const drive_params_t *p)
         }
     } else if (speed_has_stopped(d, p)) {
         drive_enter(d, DRIVE_STOPPED);
-    } else {
-        /* on its way */
+    } else { /* on its way */
     }
 }
 
@@ -184,7 +182,6 @@ void speed_step(drive_t *d, const drive_params_t *p)
     drive_control_t *c = &d->run.control;
     speed_erpm_t speed = observer_speed(&d->run.observer);
     current_q13_t iq_q13;
-
     if (!mode_current_step(d, p, &iq_q13)) {
         speed_reference_step(d, p);
         iq_q13 = speed_current_step(&d->run, p, c->reference_erpm);

@@ -50,7 +50,6 @@ void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     angle_t quarter = (angle_t)along_direction(d, 0x4000), estimated = estimator_next_angle(&run->estimator);
     angle_t forced = (angle_t)(estimated - quarter);
     dq_t v = c->v_q14;
-
     run->handover.agreed_steps = 0;
     run->handover.at_end = 0;
     run->handover.ahead_erpm = 0;

@@ -174,7 +174,6 @@ void states_rotor_step(drive_t *d, const drive_params_t *p)
     case DRIVE_RAMP: handover_step(d, p); break;
     case DRIVE_STOPPING: speed_turn_round(d, p); break;
     case DRIVE_CATCH: catch_step(d, p); break;
-    default: /* the others are left elsewhere */
-        break;
+    default: break; /* the others are left elsewhere */
     }
 }

@@ -1,9 +1,8 @@
 /* One PWM period of the drive, top to bottom: samples, currents, current control, angle, modulation; then the slow work. */
 #include "drive/tick.h"
 
-#include "drive/limits.h"
-#include "drive/deferred.h"
 #include "drive/drive.h"
+#include "drive/limits.h"
 #include "drive/protection.h"
 #include "drive/speed.h"
 
@@ -20,7 +19,6 @@ INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     drive_control_t *c = &run->control;
     const angle_t before = d->angle;
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), e, v;
-
     c->i_q13 = park(i, d->frame);
     c->i_q13.q = (int16_t)(c->i_q13.q + c->sample_shift_q13);
     c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, c->ref_q13, c->i_q13, &d->circle, &c->vq_limit_q14);
@@ -90,13 +88,11 @@ INLINE uint16_t drive_slow_follows(const drive_t *d)
 uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     uint16_t was_running = drive_is_running(d), is_due = schedule_is_due(d->ticks);
-
     if (!was_running) {
         drive_idle(d, p, raw);
     } else if (is_due != (uint16_t)DEFER_DUTIES) { /* deferred duties leave time between the slots */
         drive_follow(d, p);
-    } else {
-        /* the slot alone */
+    } else { /* the slot alone */
     }
     if (!is_due) {
         return was_running;
@@ -109,4 +105,70 @@ uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *
         drive_prepare(d, p);
     }
     return was_running;
+}
+
+/* ---- Deferred duties, and dead time's compensation for each pulse ---- */
+
+/** Half steps of the angle from the frame that the slow work sees to the middle of the next two pulses, or to the first one. */
+#define DEFER_HALF_STEPS (3 - DEAD_EACH + 2 * DEFER_DUTIES)
+
+/** Largest half step that so many leave within a word. */
+#define DEFER_HALF_STEP_MOST (32767 / DEFER_HALF_STEPS)
+
+/** 1 where no speed that a word holds has a larger one. */
+#define DEFER_HALF_STEP_FITS (32768.0F * 65536.0F * PARAM_PI / 60.0F * PARAM_F(LOOPTIME_SEC) * PARAM_F(SPEED_UNIT) < 32767.0F / PARAM_F(DEFER_HALF_STEPS))
+
+INLINE QM_WRAPS sincos_t deferred_frame(const drive_t *d, angle_t before)
+{
+    if (DEFER_DUTIES) {
+        return trig_sincos((angle_t)(2u * (uint32_t)d->angle - before));
+    }
+    return d->frame;
+}
+
+INLINE alphabeta_t deferred_vector(drive_run_t *run, alphabeta_t v_q13)
+{
+    if (DEFER_DUTIES) {
+        alphabeta_t waited = run->deferred_v_q13;
+        run->deferred_v_q13 = v_q13;
+        return waited;
+    }
+    return v_q13;
+}
+
+void deferred_preset(drive_run_t *run, alphabeta_t v_q13)
+{
+    run->estimator.v_last_q13 = v_q13;
+    run->estimator.v_mean_q13 = v_q13;
+    (void)deferred_vector(run, v_q13);
+}
+
+dq_t deferred_currents(const drive_run_t *run)
+{
+    int16_t half_step = run->estimator.half_step_q16_rad;
+    if (!DEFER_HALF_STEP_FITS) {
+        half_step = qm_limit(half_step, DEFER_HALF_STEP_MOST);
+    }
+    return dq_turn(run->control.ref_q13, (int16_t)(DEFER_HALF_STEPS * half_step));
+}
+
+#define DEAD_STEP 20861 /**< 65536 / pi: from half a step, radians * 65536, to a step, angle counts */
+
+INLINE const dead_duties_t *dead_of_pulse(const drive_t *d)
+{
+    if (DEAD_EACH && (d->ticks & (SLOW_EVERY - 1u)) == 0u) {
+        return &d->dead_second;
+    }
+    return &d->dead;
+}
+
+void dead_prepare_second(drive_t *d, const drive_params_t *p, dq_t asked)
+{
+    if (DEAD_EACH) {
+        sincos_t frame = d->frame;
+        if (!drive_is_forced(d)) {
+            frame = trig_sincos((angle_t)(d->angle + (uint16_t)qm_mulhi(d->run.estimator.half_step_q16_rad, DEAD_STEP)));
+        }
+        svm_compensation(&p->svm, phases_of(asked, frame), &d->dead_second);
+    }
 }

@@ -87,11 +87,9 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
     X(FAULT, "CURRENT_SENSOR, OPEN_PHASE, BUS_SENSOR: signals and motor do not fit each other")
 
 /** What drives the six outputs. */
-typedef enum {
-    OUTPUTS_OFF,
-    OUTPUTS_BOOTSTRAP,
-    OUTPUTS_PWM
-} outputs_t;
+typedef enum { OUTPUTS_OFF,
+               OUTPUTS_BOOTSTRAP,
+               OUTPUTS_PWM } outputs_t;
 
 /** 1 where the table has this transition. */
 uint16_t drive_may_follow(uint16_t state, drive_state_t next);

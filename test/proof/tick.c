@@ -57,7 +57,6 @@ static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t 
 #define adaptation_learn adaptation_learn_bounded
 #include "firmware/drive/limits.c"
 #include "firmware/drive/catch.c"
-#include "firmware/drive/deferred.c"
 #include "firmware/drive/drive.c"
 #include "firmware/drive/handover.c"
 #include "firmware/drive/model.c"

@@ -1,5 +1,5 @@
 /* Dead time's compensation of a motor that turns far in a period: each of the two pulses to come has its own. */
-#include "drive/deferred.h"
+#include "drive/tick.h"
 #include "hurst_params.h"
 
 #undef MAXIMUM_SPEED_RPM

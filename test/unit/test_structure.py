@@ -86,7 +86,6 @@ PREFIXES = {
     "control/motor_model": "adaptation salience",
     "control/soft_float": "root soft",
     "drive/drive": "along drive",
-    "drive/deferred": "dead deferred",
     "drive/limits": "bus limits",
     "drive/model": "model salient",
     "drive/modes/bringup": "bringup mode",
@@ -97,7 +96,7 @@ PREFIXES = {
     "drive/speed": "reference speed",
     "drive/startup": "calibration startup",
     "drive/states": "drive idle states",
-    "drive/tick": "drive",
+    "drive/tick": "dead deferred drive",
 }
 """Of the functions of a file, where they are not its name's first word."""
 

@@ -60,8 +60,6 @@ void identify_watch(const drive_t *d)
 }
 #endif
 
-/* ---- BRINGUP on the board: the guide in the panel's place, its lines on the serial line, and the two pins that this may be on ---- */
-
 uint16_t mode_speaks(char **end)
 {
 #ifdef BRINGUP
@@ -221,8 +219,6 @@ char *bringup_line(char *line)
 }
 #endif
 
-/* ---- SNAPSHOT on the board: AN1292's arrays, and the recorder that fills them ---- */
-
 void mode_record(void)
 {
 #ifdef SNAPSHOT
@@ -239,8 +235,6 @@ snapshot_t board_snapshot = {
     { SnapBuf1, SnapBuf2, SnapBuf3, SnapBuf4 }, DATA_BUFFER_SIZE, SNAPDELAY, &SnapStart, &SnapDone, 0, 0
 };
 #endif
-
-/* ---- Who looks at buttons and potentiometer: the panel, or BRINGUP's guide in its place ---- */
 
 void mode_panel_init(void)
 {

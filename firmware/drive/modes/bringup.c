@@ -82,7 +82,6 @@ void bringup_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     uint16_t settled = bringup_step_amplitude(d);
     dq_t vector;
     phases_t part;
-
     (void)p;
     if (settled) {
         bringup_turn(t);
@@ -179,8 +178,7 @@ uint16_t bringup_answered(bringup_guide_t *g, bringup_question_t question, uint1
     } else if (button != 0u) {
         g->asked = 0;
         g->waited_ms = 0;
-    } else {
-        /* the user thinks */
+    } else { /* the user thinks */
     }
     g->button = 0;
     return button;
@@ -227,8 +225,7 @@ uint16_t bringup_has_tripped(bringup_guide_t *g, const drive_t *d)
         finding = BRINGUP_SHORT_CIRCUIT;
     } else if (d->fault == (uint16_t)FAULT_OVERCURRENT_SW) {
         finding = BRINGUP_OVERCURRENT;
-    } else {
-        /* another one */
+    } else { /* another one */
     }
     bringup_give_up(g, finding, 0);
     g->message.value = (int32_t)d->fault;
@@ -421,8 +418,7 @@ static void judge_phases(const bringup_level_t *full, bringup_wiring_t *w)
             w->high |= bit;
         } else if (back < (away >> MISSING_SHIFT)) {
             w->low |= bit;
-        } else {
-            /* both ways */
+        } else { /* both ways */
         }
     }
 }

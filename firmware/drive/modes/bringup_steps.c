@@ -22,8 +22,7 @@ void bringup_step_begin(bringup_guide_t *g, const panel_inputs_t *in)
         } else if (g->waited_ms >= REST_MS) {
             g->phase = 1;
             g->waited_ms = REPEAT_MS;
-        } else {
-            /* at rest so far */
+        } else { /* at rest so far */
         }
     } else if (g->button != 0u) {
         g->first = g->button;
@@ -33,8 +32,7 @@ void bringup_step_begin(bringup_guide_t *g, const panel_inputs_t *in)
         g->sender = (uint16_t)((g->sender == 0u) ? 1u : 0u);
         bringup_say(g, BRINGUP_ASKS, (uint16_t)BRINGUP_ASK_BEGIN, g->sender);
         g->waited_ms = 0;
-    } else {
-        /* it has been said */
+    } else { /* it has been said */
     }
 }
 
@@ -82,8 +80,7 @@ void bringup_step_led(bringup_guide_t *g, uint16_t led)
         bringup_go(g, led ? BRINGUP_STEP_POT_LEFT : BRINGUP_STEP_LED_RUN);
     } else if (button == 3u) {
         bringup_go(g, led ? BRINGUP_STEP_LED_RUN_OTHER : BRINGUP_STEP_LED_ALIVE_OTHER);
-    } else {
-        /* no answer yet */
+    } else { /* no answer yet */
     }
 }
 
@@ -338,8 +335,7 @@ static void find_legs(bringup_guide_t *g)
         bringup_find(g, BRINGUP_CURRENTS_SWAPPED, 0);
     } else if (a == 2u || b == 2u) {
         bringup_find(g, BRINGUP_DRIVER_SWAPPED, (uint16_t)(a != 2u));
-    } else {
-        /* each its own */
+    } else { /* each its own */
     }
 }
 
@@ -456,8 +452,7 @@ void bringup_step_gains(bringup_guide_t *g)
         bringup_find(g, BRINGUP_SHUNT_GAIN, g->yes); /* A's, or where A's is right B's */
     } else if (by_a < R_LEAST_MOHM || by_a > R_MOST_MOHM) {
         bringup_find(g, BRINGUP_RESISTANCE, 0);
-    } else {
-        /* right */
+    } else { /* right */
     }
     bringup_go(g, BRINGUP_STEP_DIRECTION);
 }

@@ -17,8 +17,6 @@ void mode_start(drive_t *d, const drive_params_t *p)
 #endif
 }
 
-/* ---- OPEN_LOOP_FUNCTIONING: the forced angle keeps turning the motor at END_SPEED_RPM, for a first look at currents and voltages ---- */
-
 uint16_t mode_hands_over(void)
 {
 #if defined OPEN_LOOP_FUNCTIONING || defined IDENTIFY || defined BRINGUP /* these have vectors of their own */
@@ -27,8 +25,6 @@ uint16_t mode_hands_over(void)
     return 1;
 #endif
 }
-
-/* ---- TUNING: in closed loop the reference climbs slowly to the maximum speed, whatever the potentiometer says ---- */
 
 speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p)
 {
@@ -57,8 +53,6 @@ uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
 #endif
 }
 
-/* ---- BIDIRECTIONAL_SPEED: the middle of the potentiometer is the lowest speed, its two halves are the two directions ---- */
-
 uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction)
 {
 #ifdef BIDIRECTIONAL_SPEED
@@ -73,8 +67,6 @@ uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction)
     return pot_q16;
 #endif
 }
-
-/* ---- TORQUE_MODE: the potentiometer commands the q current; speed is only limited ---- */
 
 mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range)
 {
@@ -140,8 +132,6 @@ uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t 
     return 0;
 #endif
 }
-
-/* ---- SNAPSHOT, AN1292's recorder: four arrays filled with one row every SNAPDELAY periods, on request ---- */
 
 void snapshot_tick(snapshot_t *s, const drive_t *d)
 {

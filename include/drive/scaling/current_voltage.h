@@ -89,7 +89,7 @@
         .turn_q13 = (int16_t)(PARAM_DI(MAXIMUM_SPEED_RPM) * (float)(1 + DEFER_DUTIES) / 2.0F) \
     }
 
-/* ---- Duties: in time for the next pulse, or in a shorter period for the one after it (drive/deferred.h). The tuner reads the period. ---- */
+/* ---- Duties: in time for the next pulse, or in a shorter period for the one after it (drive/tick.h). The tuner reads the period. ---- */
 #define DEFER_BELOW_SEC 0.00004
 #define DEFER_DUTIES (PARAM_F(LOOPTIME_SEC) < PARAM_F(DEFER_BELOW_SEC))
 
