@@ -12,7 +12,6 @@
 #include "firmware/control/angle.c"
 #include "firmware/control/current_control.c"
 #include "firmware/control/estimator.c"
-#include "firmware/control/fieldweak.c"
 #include "firmware/control/motor_model.c"
 #include "firmware/control/observer.c"
 #include "firmware/control/soft_float.c"

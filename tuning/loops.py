@@ -5,9 +5,9 @@ and acts for one period, and is turned by the angle of sample n+1; so, with h = 
 
     i[n+1] = h^2 e^(-j phi) i[n] + (1 - h)/R v[n] + h (1 - h)/R e^(-j phi) v[n-1]      C(z) = Kp + Ki/(z - 1)
 
-With late duties (include/drive/tick.h) v[n] acts a period later, turned by the angle of sample n+2: one more delay, 1/z.
+With deferred duties (include/drive/tick.h) v[n] acts a period later, turned by the angle of sample n+2: one more delay, 1/z.
 
-Speed loop. Every 8 periods, with late duties 16, the load observer (include/control/observer.h) takes the estimated speed's mean over them and the q current and
+Speed loop. Every 8 periods, with deferred duties 16, the load observer (include/control/observer.h) takes the estimated speed's mean over them and the q current and
 gives the speed and the load, from which the controller makes the q current of a quarter of that later; the estimated speed is half a period older.
 Per step T, with a = Kt P/J, r the rate times T, w^ that mean,
 

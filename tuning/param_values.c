@@ -84,8 +84,8 @@ static void speeds(void)
     FIELD(fieldweak.on_speed_erpm, FW_START_SPEED_RPM, "rpm", erpm, "erpm", "field weakening starts");
     FIELD(estimator.nominal_erpm, EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS), "rpm", erpm, "erpm", "one-sample derivative above");
     FIELD(estimator.decimate_erpm, NOMINAL_SPEED_RPM / 10.0, "rpm", erpm, "erpm", "sign of Equation 2 from the filtered speed below");
-    FIELD(speed_ramp_q16, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm a slow step", "slope of the reference");
-    FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (65536.0 * SLOW_PERIODS / SPEED_UNIT / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm a slow step",
+    FIELD(speed_ramp_q16, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm every 8 periods", "slope of the reference");
+    FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (65536.0 * SLOW_PERIODS / SPEED_UNIT / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm every 8 periods",
           "slope in TUNING");
     FIELD(ramp_hold_erpm, NOMINAL_SPEED_RPM / 8.0, "rpm", erpm, "erpm", "the ramp waits when the motor is further behind");
     FIELD(overspeed_erpm, at_most(MAXIMUM_SPEED_RPM * 1.25, 32700.0 * erpm), "rpm", erpm, "erpm", "lost lock above");
@@ -109,7 +109,7 @@ static void controllers(void)
 static void observer(void)
 {
     double unit = 1.0 / (1 << p.observer.shift), lost = PARAM_LOST_CURRENT_Q13;
-    double rate = 1.0 / (2.0 * PI * slots * 65536.0), learns = 1.0 / (SLOW_SELDOM * slots * 65536.0);
+    double rate = 1.0 / (2.0 * PI * slots * 65536.0), learns = 1.0 / (SLOW_ROUND_STEPS * slots * 65536.0);
     GROUP("load observer, adaptation and low speed");
     FIELD(observer.deltat_q32, slots / 8.0, "s", 60.0 / 4294967296.0 / SPEED_UNIT, "Q32 of a turn/erpm", "angle in an eighth of a step");
     FIELD(observer.per_turn_q12, 65536.0 / 4294967296.0 * 60.0 / slots / pairs, "rpm", erpm / 4096.0, "Q12 erpm", "2^16 counts of the angle in a step");
@@ -154,7 +154,7 @@ static void start(void)
     FIELD(open_loop_q13, Q_CURRENT_REF_OPENLOOP, "A", q13_a, "Q13 A", "current of lock and ramp");
     FIELD(early_erpm, PARAM_EARLY_ERPM / pairs, "rpm", erpm, "erpm", "the hand-over may come from here on");
     FIELD(bootstrap_periods, 0.010, "s", period, "periods", "low sides on before the start");
-    FIELD(agree_steps, 0.02, "s", slots, "slow steps", "agreement before the hand-over");
+    FIELD(agree_steps, 0.02, "s", slots, "8 periods", "agreement before the hand-over");
     FIELD(wait_periods, 0.2, "s", period, "periods", "and how long it may take at the end of the ramp");
 }
 
@@ -179,10 +179,10 @@ static void limits(void)
     FIELD(bus_regen_q15, REGEN_LIMIT_V, "V", bus, "Q15 of full scale", "braking is reduced from here");
     FIELD(bus_nominal_q15, NOMINAL_BUS_V, "V", bus, "Q15 of full scale", "supply");
     FIELD(brake_per_bus_q8, most / 2.0, "A/V", most / 2.0 / (256.0 * p.current_max_q13 / BUS_Q15(2.0F)), "Q8", "braking current taken off a volt");
-    FIELD(stall_steps, PARAM_STALL_SEC, "s", SLOW_RARE * slots, "rare steps", "stall");
-    FIELD(lost_lock_steps, 0.06, "s", SLOW_RARE * slots, "rare steps", "lost lock");
-    FIELD(wrong_steps, 0.1, "s", slots, "slow steps", "voltages and currents do not fit the motor");
-    FIELD(impossible_steps, 0.25, "s", SLOW_SELDOM * slots, "seldom steps", "flux or resistance impossible");
+    FIELD(stall_steps, PARAM_STALL_SEC, "s", 2.0 * slots, "16 periods", "stall");
+    FIELD(lost_lock_steps, 0.06, "s", 2.0 * slots, "16 periods", "lost lock");
+    FIELD(wrong_steps, 0.1, "s", slots, "8 periods", "voltages and currents do not fit the motor");
+    FIELD(impossible_steps, 0.25, "s", SLOW_ROUND_STEPS * slots, "32 periods", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
     FIELD(id_off_q13, most / 32.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
     FIELD(rs_impossible, (PARAM_RS_RISES > 0.99 * PARAM_RS_MOST) ? PARAM_RS_RISES : 1.0, "1", 1.0 / 32768.0, "Q15", "change of R that no winding survives, 1: not told");

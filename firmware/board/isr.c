@@ -7,7 +7,6 @@
 #include "board/reset.h"
 #include "board/watch.h"
 #include "drive/param_init.h"
-#include "drive/param_scaling.h"
 #include "drive/tick.h"
 
 /* Defined here so that the compiler folds each constant into the interrupt's instructions; PARAMS_IN_RAM gives that up. */
@@ -27,7 +26,7 @@ void BOARD_ISR _AddressError(void) __attribute__((alias("_DefaultInterrupt")));
 void BOARD_ISR _StackError(void) __attribute__((alias("_DefaultInterrupt")));
 void BOARD_ISR _MathError(void) __attribute__((alias("_DefaultInterrupt")));
 
-/* ---- the way of the duties to the PWM: written as soon as they are computed, or, where they are deferred, at the begin of the next period ---- */
+/* ---- the duties' way to the PWM: at once, or, where they are deferred, at the begin of the next period ---- */
 
 /** The duties load when the counter reaches zero. @return 1 once it counts up: too late */
 QM_INLINE uint16_t duties_write(const duties_t *duty)
@@ -50,7 +49,7 @@ QM_INLINE uint16_t duties_write_now(const duties_t *duty)
     return (uint16_t)(DEFER_DUTIES ? 0u : duties_write(duty));
 }
 
-/** 1 where the duties are the law's. Deferred ones come a period after it has begun: until then they are 0, as those of a bridge that does not switch. */
+/** 1 where the duties are the law's. Deferred ones come a period after it has begun: until then they are 0, as with the bridge off. */
 QM_INLINE uint16_t duties_are_the_laws(void)
 {
     return (uint16_t)(!DEFER_DUTIES || (P1DC1 | P1DC2 | P1DC3) != 0u);
@@ -99,7 +98,7 @@ QM_INLINE void board_write(const duties_t *duty)
     }
 }
 
-/** The end of a period whose bridge does not switch; with late duties the zeros wait. Called, for its way to write them is not that of the law's. */
+/** The end of a period whose bridge does not switch; deferred, the zeros wait. Called, for its way to write them is not that of the law's. */
 static NOINLINE void board_idle(void)
 {
     const duties_t off = { 0, 0, 0 };

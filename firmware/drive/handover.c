@@ -42,8 +42,7 @@ uint16_t handover_is_overdue(speed_erpm_t forced, const drive_params_t *p)
 /** 1 where the current pulls the rotor, or cannot fall further and the rotor has swung to where the floor pulls it: while it falls behind it is slower
  *  than the speed that the closed loop begins with, and loses more of it before the observer knows.
  *  @param current_q13 its magnitude @param ahead_erpm of the forced speed */
-static uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, current_q13_t current_q13, speed_erpm_t forced,
-                                int16_t ahead_erpm)
+static uint16_t handover_is_due(const drive_t *d, const drive_params_t *p, current_q13_t current_q13, speed_erpm_t forced, int16_t ahead_erpm)
 {
     int16_t offset = (int16_t)(angle_t)(d->angle - estimator_next_angle(&d->run.estimator));
     return (uint16_t)(!qm_beyond(offset, HANDOVER_MOST_OFFSET)

@@ -30,8 +30,8 @@ void board_cpu_test(void) FIRMWARE_CALLED;
 /** Not 0: they do. In memory, because it could be the register of a function's value that is wrong. */
 extern volatile uint16_t board_cpu_holds;
 
-/** 1 while no control interrupt can come for 400 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. With late duties
- *  there is less: 300 are enough as a rule, and the control interrupt has time for 50 more. */
+/** 1 while no control interrupt can come for 400 cycles: the counter goes up, and the conversion's end is 250 cycles after its peak. With
+ *  deferred duties there is less: 300 are enough as a rule, and the control interrupt has time for 50 more. */
 #define BOARD_QUIET() (P1TMR < (uint16_t)(BOARD_P1TPER - (DEFER_DUTIES ? 60u : 150u)))
 
 /** A pass of waiting for the watchdog's reset. @return 0: the reset leaves no time for another answer */

@@ -42,7 +42,7 @@ typedef struct {
     int16_t qInvKFi, qRs;
 } tAdaptParm;
 
-/** Why the drive gives less than it is asked for, sums of limit_reason_t (drive/limit_reasons.h): now, and since the last status line. */
+/** Why the drive gives less than it is asked for, sums of limit_reason_t (drive/limits.h): now, and since the last status line. */
 typedef struct {
     uint16_t now, seen;
 } tLimitParm;

@@ -1,4 +1,4 @@
-/* Angles: sine, cosine and direction from tables of 128 steps a turn, the circle sqrt(1 - x^2), and the angle that a start forces on the rotor. */
+/* Angles: sine and cosine from a table of 128 steps a turn, the circle sqrt(1 - x^2), and the angle that a start forces on the rotor. */
 #ifndef CONTROL_ANGLE_H
 #define CONTROL_ANGLE_H
 

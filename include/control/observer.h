@@ -15,8 +15,8 @@
 
 #include "control/qmath.h"
 
-/** Constants; `erpm` stands for counts of speed_erpm_t. A step is a slow one, eight periods. Accelerations have a unit of their own, erpm per
- *  step / 2^shift, chosen so that a count of current gives 1/2 to 1 of it. */
+/** Constants; `erpm` stands for counts of speed_erpm_t. A step is eight periods, with deferred duties sixteen.
+ *  Accelerations have a unit of their own, erpm per step / 2^shift, chosen so that a count of current gives 1/2 to 1 of it. */
 typedef struct {
     int16_t deltat_q32;                      /**< angle in an eighth of a step and erpm: per period, see estimator_params_t */
     int16_t per_turn_q12;                    /**< speed that turns 2^16 counts of the angle's 2^32 further in a step, erpm * 4096 */

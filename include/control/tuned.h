@@ -36,13 +36,13 @@
 #define PARAM_CALM_SHARE 0.4        /* [1] most of SPEED_BANDWIDTH_HZ over the electrical frequency, or the speed hunts without load; over 2.7 in a message | lowspeed */
 #define PARAM_LOWEST_SHARE 0.65     /* [1] back-EMF over dead-time voltage at the lowest speed at which a rotor is held; times 1732 in a message | lowspeed */
 #define RAMP_HOLD_SHARE 0.125       /* [1] of the nominal speed: the ramp waits for a motor that is further behind | run SCENARIO=rated */
-#define SPEED_TRIM_SHIFT 8          /* [shift] the trim takes 1/256 of the error in half of the rare steps: 2.4 rad/s at 20 kHz | lowspeed */
+#define SPEED_TRIM_SHIFT 8          /* [shift] the trim takes 1/256 of the error in half of its steps, 16 periods apart: 2.4 rad/s at 20 kHz | lowspeed */
 #define SPEED_TRIM_LEAK_SHIFT 7     /* [shift] and is forgotten in a tenth of a second | loadsteps */
 #define SPEED_TRIM_MOST_SHIFT 3     /* [shift] an eighth of the largest current at most | lowspeed */
 #define SPEED_TRIM_ERROR_SHIFT 3    /* [shift] an error beyond an eighth of the speed is no rest | loadsteps */
 
 /* ---- Field weakening and d current ---- */
-#define FIELDWEAK_TRIM_STEP 4       /* [Q13 A] d current that the voltage feedback gives back in a rare step | run SCENARIO=demo */
+#define FIELDWEAK_TRIM_STEP 4       /* [Q13 A] d current that the voltage feedback gives back every 16 periods | run SCENARIO=demo */
 #define FIELDWEAK_TRIM_MOST 24      /* [Q13 A] and takes at most | run SCENARIO=demo */
 #define FIELDWEAK_TRIM_DEFERRED 15      /* [Q13 A] the same with deferred duties | run SCENARIO=demo_40khz */
 #define FIELDWEAK_TRIM_FROM 0.6     /* [1] of FW_START_SPEED_RPM: below the voltage feedback takes nothing | run SCENARIO=demo */
@@ -53,7 +53,7 @@
 #define FLUX_BRAKE_DEAD_SHARE 0.5         /* [1] of dead time's voltage, which R at full current must exceed for d current to burn anything | catch */
 #define ASKED_LESS_SHIFT 5          /* [shift] of MAXIMUM_CURRENT_A 1/32 is left to what the current controllers overshoot | run SCENARIO=demo */
 #define BRAKE_BAND_V 2.0            /* [V] above REGEN_LIMIT_V, over which braking current falls to nothing | run SCENARIO=brake_without_sink */
-#define SALIENCE_LEAST_SHIFT 2      /* [shift] MTPA's d current follows in four rare steps | run MOTOR=ipm_4pp_24v_2000 */
+#define SALIENCE_LEAST_SHIFT 2      /* [shift] MTPA's d current follows in four steps of 16 periods | run MOTOR=ipm_4pp_24v_2000 */
 #define PARAM_SALIENT_FROM 8.0      /* [1] times the largest current: with more to double the flux MTPA would save less than 0.8 % of it; the tuner reads it | run MOTOR=ipm_4pp_24v_2000 */
 
 /* ---- Load observer ---- */
@@ -83,14 +83,14 @@
 #define HANDOVER_FLOOR_SHIFT 3      /* [shift] to an eighth at least | starts */
 #define HANDOVER_SWUNG_SHIFT 5      /* [shift] where the rotor is no longer slower than by 1/32 | starts */
 #define HANDOVER_MEAN_SHIFT 5       /* [shift] the speed's mean deviation is one over 32 steps: a rotor swings about the forced speed, a wrong constant is off it | starts */
-#define HANDOVER_DECAY 16           /* [2^-16 turn] of the angle's offset that go in a rare step | starts */
+#define HANDOVER_DECAY 16           /* [2^-16 turn] of the angle's offset that go every 16 periods | starts */
 #define HANDOVER_MOST_OFFSET 8192   /* [2^-16 turn] 45 degrees: so much torque of the current is no surprise to the estimator's frame | starts */
-#define CATCH_LOOK_STEPS 4u         /* [slow steps] of a look at a slow rotor | catch */
+#define CATCH_LOOK_STEPS 4u         /* [8 periods] of a look at a slow rotor | catch */
 #define CATCH_STANDS 8u             /* [Q11 A] mean of a look's currents below which the rotor stands: two steps of the converter | catch */
 #define CATCH_PAUSE_TURN 13653u     /* [2^-16 turn] 75 degrees: less than half a turn, even where a look and a wrong Kphi make them twice as many | catch */
 #define CATCH_LEAST_TURN 1638       /* [2^-16 turn] 9 degrees: below a rotor stands | catch */
 #define CATCH_PAUSE_LEAST 4u        /* [periods] the look's current goes first | catch */
-#define CATCH_PAUSE_STEPS 125u      /* [slow steps] 50 ms: in them a rotor turns a tenth of a right angle, or it stands | catch */
+#define CATCH_PAUSE_STEPS 125u      /* [8 periods] 50 ms: in them a rotor turns a tenth of a right angle, or it stands | catch */
 #define CATCH_BUS_SHIFT 5           /* [shift] a start waits for a bus 1/32 below its trip | catch */
 #define CATCH_FALL_SHIFT 7          /* [shift] which must fall by 1/128 in some tenths of a second, or it is the supply that holds it | catch */
 
@@ -110,10 +110,10 @@
 #define SIGNALS_UNEXPLAINED 2u      /* [steps] so many wrong innovations is an unexplained voltage | run SCENARIO=fault_open_phase */
 #define SIGNALS_OPEN_SHIFT 2        /* [shift] an open phase carries less than a quarter of its share, in both rules | run SCENARIO=fault_open_phase */
 #define SIGNALS_BLUR_SHIFT 2        /* [shift] dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below | run SCENARIO=stop_from_top */
-#define PROBE_WAIT_STEPS 13         /* [seldom steps] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
-#define PROBE_STEPS 25              /* [seldom steps] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
-#define PROBE_DIP_STEPS 6           /* [seldom steps] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
-#define PROBE_EVERY_STEPS 3125      /* [seldom steps] five seconds from one to the next | lowspeed */
+#define PROBE_WAIT_STEPS 13         /* [32 periods] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
+#define PROBE_STEPS 25              /* [32 periods] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
+#define PROBE_DIP_STEPS 6           /* [32 periods] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
+#define PROBE_EVERY_STEPS 3125      /* [32 periods] five seconds from one to the next | lowspeed */
 #define PROBE_SLOPE_SHIFT 3         /* [shift] the largest current takes 8 steps, so that the estimate does not jump | lowspeed */
 #define PROBE_MOST_Q15 22528        /* [Q15] of the largest current, so that as much q current is left | lowspeed */
 #define PROBE_LEAST_Q15 14648       /* [Q15] 1/sqrt(5): takes a tenth of the largest q current, and half of a standing rotor's estimate | lowspeed */

@@ -57,7 +57,7 @@ void catch_preset_estimator(drive_t *d, const drive_params_t *p);
 /** In closed loop from the next period on, at the rotor's speed and without torque. */
 void catch_close(drive_t *d, const drive_params_t *p);
 
-/** In CATCH, every slow step: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
+/** In CATCH, slots 1, 5, 9, 13: goes on from what was seen. A rotor below the minimum speed, whichever way it turns, is taken by the ramp. */
 void catch_step(drive_t *d, const drive_params_t *p);
 
 #endif

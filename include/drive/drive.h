@@ -4,7 +4,6 @@
 
 #include "control/motor_model.h"
 #include "control/current_control.h"
-#include "control/fieldweak.h"
 #include "control/observer.h"
 #include "control/svm.h"
 #include "drive/catch.h"
@@ -14,7 +13,8 @@
 #include "drive/selftest.h"
 #include "drive/startup.h"
 
-/** Constants of the machine around the control law. Times in periods, in slow steps (SLOW_PERIODS), in rare ones, of two, or in seldom ones, of four. */
+/** Constants of the machine around the control law. Times in periods, or in steps of the slot that counts them (drive/schedule.h): 8, 16
+ *  or 32 periods apart, with deferred duties twice as many. */
 struct drive_params {
     estimator_params_t estimator;
     fieldweak_params_t fieldweak;
@@ -57,13 +57,13 @@ struct drive_params {
     speed_erpm_t minimum_erpm, nominal_erpm, maximum_erpm, end_erpm;
     uint16_t pot_zero_q16;     /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
     uint16_t pot_scale_q15;    /**< 1 / (1 - 2 POT_LIVE_ZERO) */
-    int32_t speed_ramp_q16;    /**< reference step per slow step, electrical rpm with 16 fraction bits */
+    int32_t speed_ramp_q16;    /**< reference step every 8 periods, electrical rpm with 16 fraction bits */
     int32_t tuning_step_q16;   /**< the same in TUNING */
     int16_t ramp_hold_erpm;    /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
-    uint16_t stall_steps;      /**< rare steps below half the reference that are a stall */
-    uint16_t lost_lock_steps;  /**< and out of lock that are a lost one */
-    uint16_t wrong_steps;      /**< voltages and currents do not fit the motor */
-    uint16_t impossible_steps; /**< flux or resistance beyond what a motor can have */
+    uint16_t stall_steps;      /**< steps of 16 periods below half the reference that are a stall */
+    uint16_t lost_lock_steps;  /**< of 16 periods: out of lock that are a lost one */
+    uint16_t wrong_steps;      /**< of 8 periods: voltages and currents do not fit the motor */
+    uint16_t impossible_steps; /**< of 32 periods: flux or resistance beyond what a motor can have */
     q15_t kfi_impossible;      /**< change of 1/Kphi that asks for more flux than the header's may be off */
     current_q13_t id_off_q13;  /**< d current's mean deviation that noise and dead time make at most */
     q15_t rs_impossible;       /**< change of R that no winding survives; INT16_MAX: the format ends before */
@@ -112,7 +112,7 @@ struct drive_run {
     handover_t handover;
     catch_t catching;
     drive_control_t control;
-    uint16_t stall_steps;         /**< rare steps below half the reference, less four for each above */
+    uint16_t stall_steps;         /**< of 16 periods below half the reference, less four for each above */
     uint16_t probe_phase;         /**< probe_phase_t, of the probe whether the rotor turns; written by probe_enter() only */
     uint16_t probe_steps;         /**< in the phase */
     uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference; more than a dip while the probe's own lasts */
@@ -120,7 +120,7 @@ struct drive_run {
     current_q13_t probe_most_q13; /**< and the most of it */
     uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
     uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
-    uint16_t lost_lock_steps;     /**< two for each rare step out of lock, less one for each in lock */
+    uint16_t lost_lock_steps;     /**< two for each 16 periods out of lock, less one for each in lock */
     alphabeta_t deferred_v_q13;   /**< the vector whose duties wait for the next control interrupt, where they do */
     SALIENT_STATE
     MODE_STATE

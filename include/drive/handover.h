@@ -17,7 +17,7 @@ typedef enum {
     START_DONE       /**< the observer runs */
 } start_phase_t;
 
-/** The way from the forced angle to the estimator's. A step is a slow one. */
+/** The way from the forced angle to the estimator's. A step is 8 periods, with deferred duties 16. */
 typedef struct {
     uint16_t phase;            /**< start_phase_t; written by handover_enter() only */
     uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
@@ -42,7 +42,7 @@ speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p);
 /** 1 from the forced speed on at which the estimator should have agreed. */
 uint16_t handover_is_overdue(speed_erpm_t forced, const drive_params_t *p);
 
-/** In RAMP, every slow step: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
+/** In RAMP, slots 0, 4, 8, 12: from the speed on that the back-EMF allows, counts how long the estimator agrees with the forced speed; at the ramp's
  *  end it gives up by name. Once it agrees the speed may swing more, for the current that holds it falls. Where it does not agree by half as much
  *  again, the rotor is blocked or the constants are off: the rest of the ramp is quicker. */
 void handover_wait(drive_t *d, const drive_params_t *p);
@@ -61,7 +61,7 @@ void handover_step(drive_t *d, const drive_params_t *p);
  *  current, so that the speed controller, which comes next, goes on from it. */
 void handover_observe(drive_run_t *run, const drive_params_t *p);
 
-/** What is left of the angle offset falls every rare step, while there is any; its d current follows. */
+/** What is left of the angle offset falls in slots 2 and 10, while there is any; its d current follows. */
 void handover_decay(handover_t *h);
 
 #endif

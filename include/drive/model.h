@@ -27,7 +27,7 @@ int32_t salient_current_q26(const drive_run_t *run, int32_t torque_q26);
  *  @return not negative */
 uint16_t salient_current_beside(const drive_run_t *run, const drive_params_t *p, current_q13_t id_q13);
 
-/** d current of the least current, or field weakening's if that is more. Every rare step in closed loop. */
+/** d current of the least current, or field weakening's if that is more. Slots 2, 10 in closed loop. */
 current_q13_t salient_id(drive_run_t *run, const drive_params_t *p);
 
 /** R of the header times a current. @param i_q13 not negative */
@@ -36,11 +36,11 @@ voltage_q12_t model_header_ri(const drive_params_t *p, current_q13_t i_q13);
 /** R i_q in the format of the filtered back-EMF. */
 voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
 
-/** A step of the adaptation, every seldom step. At the end of the ramp, while the estimator is waited for, it may need a truer flux before it can
+/** A step of the adaptation. Slot 10. At the end of the ramp, while the estimator is waited for, it may need a truer flux before it can
  *  lock, with flux, R and L all off; the current is nearly all d current there and says nothing of R. */
 void model_learn_step(drive_t *d, const drive_params_t *p);
 
-/** The motor's constants follow the speed reference, and what was learnt. Every seldom step in closed loop. */
+/** The motor's constants follow the speed reference, and what was learnt. Slot 14 in closed loop. */
 void model_update(drive_t *d, const drive_params_t *p);
 
 /** The same in RAMP. */

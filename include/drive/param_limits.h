@@ -231,9 +231,7 @@
       #name PARAM_IS(name) " must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI_V_PER_KRPM: raise it, " \
       "below the rotor is not held against what dead time leaves")
 
-/* ---- how the build refuses a parameter ----
- *
- * How the build refuses a parameter: a call that constant folding does not remove stops the compiler with its message.
+/* ---- How the build refuses a parameter: a call that constant folding does not remove stops the compiler with its message ----
  *
  * gcc 4.5, the chip's compiler, has no _Static_assert. With one function a parameter the compiler's other messages name the parameter,
  * too ("In function 'range_of_..."). The functions are empty in the end, and the linker drops them. */

@@ -9,7 +9,7 @@
 uint16_t protection_check_current(drive_t *d, const drive_params_t *p);
 
 /** Over-voltage at once, under-voltage filtered, both while anything is on: at rest a rotor may charge the bus, but no further than what can be
- *  measured. Every slow step. @param now_q15 unfiltered @param bus_q15 filtered */
+ *  measured. Slots 1, 5, 9, 13. @param now_q15 unfiltered @param bus_q15 filtered */
 void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15);
 
 /** 1 where no flux within the header's tolerances explains the q back-EMF: what dead time, and R and L within theirs, may put into it is taken off first.
@@ -19,7 +19,7 @@ void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, 
 uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_params_t *p);
 
 /** What the motor has shown against the header must be possible: the flux within its tolerance, and a winding that has gained 60 % of its
- *  resistance is too hot. Every seldom step in closed loop. */
+ *  resistance is too hot. Slot 14 in closed loop. */
 void protection_check_model(drive_t *d, const drive_params_t *p);
 
 /** The probe whether the rotor turns. */
@@ -35,15 +35,13 @@ current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t
 
 /** Where the rotor may stand, as much d current as q current: a standing rotor's estimate, (Eq - Ed)/Kphi of what R i leaves, falls to
  *  nothing and is a stall; a turning one does not care. It begins when the rotor seems to turn, waits for the stall while E has the
- *  current's direction, and comes again: soon after a dip of the speed. Every seldom step in closed loop. */
+ *  current's direction, and comes again: soon after a dip of the speed. Slot 6 in closed loop. */
 void protection_probe_rotor(drive_t *d, const drive_params_t *p);
 
-/** Stall and lost lock: conditions that must not last. Every rare step in closed loop. */
+/** Stall and lost lock: conditions that must not last. Slots 7, 15 in closed loop. */
 void protection_check_rotor(drive_t *d, const drive_params_t *p);
 
-/* ---- overload ----
- *
- * I2t: the heat that the current leaves in the winding, for motors whose sheet gives a thermal time constant.
+/* ---- I2t: the heat that the current leaves in the winding, for motors whose sheet gives a thermal time constant ----
  *
  *     dh/dt = (i_d^2 + i_q^2 - h) / I2T_TIME_SEC,  too hot from h = I2T_CURRENT_A^2
  *

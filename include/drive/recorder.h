@@ -72,7 +72,7 @@ uint16_t recorder_rows(const recorder_t *r);
 /** Place in the ring of the row that so many later ones follow: the newest has none. */
 uint16_t recorder_place(const recorder_t *r, uint16_t later);
 
-/** 1 in the periods that get a row: those of the slow steps, with late duties those between, which have the time. */
+/** 1 in the periods that get a row: every RECORDER_EVERY, those of a slot; with deferred duties those between, which have the time. */
 uint16_t recorder_is_due(const drive_t *d);
 
 /** A period in a fault, before recorder_write(). */

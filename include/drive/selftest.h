@@ -19,7 +19,7 @@ typedef struct {
 /** Goes with every write of a field that is kept twice. */
 #define SELFTEST_KEEP(d, field, value) ((d)->selftest.field = (uint16_t) ~(uint16_t)(value))
 
-/** A slow phase has come to its end. */
+/** A slot, or its half, has come to its end. */
 #define SELFTEST_MARK(d, phase) ((d)->selftest.phases = (uint16_t)((d)->selftest.phases + (phase)))
 #else
 #define SELFTEST_STATE

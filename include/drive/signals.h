@@ -17,7 +17,7 @@
 /* ---- the law's rule, in the control law's slow work ---- */
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
- *  with what is measured. In closed loop every seldom step, and every slow one while something is wrong: the phases' sums must not meet the same
+ *  with what is measured. Slot 14 in closed loop; while something is wrong slots 3, 7, 11, 15 in its place, for the phases' sums must not meet the same
  *  angles of each turn. */
 void signals_check(drive_t *d, const drive_params_t *p);
 

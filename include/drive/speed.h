@@ -11,7 +11,7 @@ speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t ste
 /** One step of the reference towards the target; what a step has below a whole electrical rpm counts in the next. @param step_q16 0 or more */
 void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t target, int32_t step_q16);
 
-/** The observer's rate and the gain that goes with it. Every rare step in closed loop. */
+/** The observer's rate and the gain that goes with it. */
 void speed_schedule(drive_run_t *run, const drive_params_t *p);
 
 /** The same in whole counts. */
@@ -20,7 +20,7 @@ current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, spe
 /** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer, that acts while the
  *  reference stands, nothing changes fast and no limit is reached, and is forgotten otherwise. It waits in the steps in which the observer's
  *  load moves against the error by itself: while a load grows, the error is the observer's.
- *  @param before_erpm the reference a rare step ago @param iq_q13 the q current that is asked for */
+ *  @param before_erpm the reference 16 periods ago @param iq_q13 the q current that is asked for */
 void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_erpm, current_q13_t iq_q13);
 
 /** The same step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */
@@ -29,21 +29,21 @@ current_q13_t speed_current_step(drive_run_t *run, const drive_params_t *p, spee
 /** The next speed reference. */
 void speed_reference_step(drive_t *d, const drive_params_t *p);
 
-/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Every rare step in closed loop, after a large
- *  innovation every slow one. */
+/** What belongs to the speed: the observer's rate, the gain, the current that the samples miss. Slots 3, 11 in closed loop; while the
+ *  innovation gate is open 7, 15, too. */
 void speed_follow(drive_run_t *run, const drive_params_t *p);
 
 /** Whether the run goes on or slows down: the wish to stop or a target in the other direction slows it down; a new wish to run goes on from the present speed.
- *  Every seldom step in closed loop. */
+ *  Slot 6 in closed loop. */
 void speed_choose_state(drive_t *d, const drive_params_t *p);
 
-/** In STOPPING, every slow step: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero. */
+/** In STOPPING, slots 1, 5, 9, 13: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero. */
 void speed_turn_round(drive_t *d, const drive_params_t *p);
 
-/** The controller's trim, every rare step in closed loop. */
+/** The controller's trim. Slots 7, 15 in closed loop. */
 void speed_trim_step(drive_t *d, const drive_params_t *p);
 
-/** One step of the controller, every slow step in closed loop. */
+/** One step of the controller. Slots 0, 4, 8, 12 in closed loop. */
 void speed_step(drive_t *d, const drive_params_t *p);
 
 #endif

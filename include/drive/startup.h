@@ -25,7 +25,7 @@ drive_state_t startup_bootstrap(drive_t *d, const drive_params_t *p);
 void startup_ramp_from_here(drive_t *d, const drive_params_t *p);
 
 /** The vector of ALIGN turns PARAM_ALIGN_TURNS times while its current grows from nothing. A weak current passes a rotor that lies against it and takes
- *  it along the next time, so that it is never thrown back; the ramp goes on from this speed. Every slow step. */
+ *  it along the next time, so that it is never thrown back; the ramp goes on from this speed. Slots 0, 4, 8, 12. */
 void startup_align(drive_t *d, const drive_params_t *p);
 
 #endif

@@ -22,11 +22,11 @@ uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *
 /** First of the slow work: what a period with the bridge off is. */
 void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 
-/** 1 where the slow work has something to do in this period while the bridge switches: with late duties in each. */
+/** 1 where the slow work has something to do in this period while the bridge switches: with deferred duties in each. */
 uint16_t drive_slow_follows(const drive_t *d);
 
 /** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
- *  With late duties the periods between those of the parts take the estimator's share, and the recorder's.
+ *  With deferred duties the periods between the slots take the estimator's share, and the recorder's.
  *  @param raw the converter's results of this period @return 1 while the bridge goes on switching */
 uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 

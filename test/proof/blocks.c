@@ -9,7 +9,6 @@
 #include "firmware/control/motor_model.c"
 #include "firmware/control/current_control.c"
 #include "firmware/control/estimator.c"
-#include "firmware/control/fieldweak.c"
 #include "firmware/control/angle.c"
 #include "firmware/control/observer.c"
 #include "firmware/control/svm.c"

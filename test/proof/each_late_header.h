@@ -1,4 +1,4 @@
-/* The same with late duties. */
+/* The same with deferred duties. */
 #include "late_header.h"
 
 #include "each_header.h"

@@ -49,7 +49,6 @@ static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t 
 #define pi_tick pi_tick_bounded
 #include "firmware/control/motor_model.c"
 #include "firmware/control/estimator.c"
-#include "firmware/control/fieldweak.c"
 #include "firmware/control/observer.c"
 #include "firmware/control/svm.c"
 #define current_control current_control_bounded
@@ -249,7 +248,7 @@ static drive_samples_t any_samples(void)
 
 static uint16_t calibrates; /* the calibration has had its sample, and its sums are sealed */
 
-#define ROUND (SLOW_SELDOM * SLOW_PERIODS)
+#define ROUND (SLOW_ROUND_STEPS * SLOW_PERIODS)
 
 static void slow_in(uint16_t slot)
 {

@@ -195,7 +195,7 @@ void test_withdrawn_request_in_every_state(void)
         drive.fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
         drive.periods = 0;
         drive.command.run = 0;
-        rig_tick(SLOW_SELDOM * SLOW_PERIODS);
+        rig_tick(SLOW_ROUND_STEPS * SLOW_PERIODS);
         TEST_ASSERT_EQUAL_UINT16(next[state], drive.state);
     }
 }
@@ -216,7 +216,7 @@ void test_stop_ramps_down_to_the_minimum_speed_and_then_switches_off_in_both_dir
     EACH_DIRECTION(direction) {
         run_at(direction, 10000);
         drive.command.run = 0;
-        ideal_motor_run(SLOW_SELDOM * SLOW_PERIODS);
+        ideal_motor_run(SLOW_ROUND_STEPS * SLOW_PERIODS);
         EXPECT_DRIVE(DRIVE_STOPPING, FAULT_NONE, "asked to stop");
         drive_start(&drive, &params, (int16_t)-direction); /* waits for the stop */
         TEST_ASSERT_EQUAL_INT16(0, drive.command.run);

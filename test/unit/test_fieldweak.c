@@ -1,5 +1,5 @@
 /* Field weakening by table: start speed, every index, interpolation, the end and beyond, the back-EMF's filter, and the voltage trim. */
-#include "control/fieldweak.h"
+#include "control/motor_model.h"
 #include "golden.h"
 #include "golden_emf_filter.h"
 #include "golden_fieldweak_params.h"

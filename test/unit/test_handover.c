@@ -528,7 +528,7 @@ void test_observer_is_preset_once_and_before_the_first_step_of_the_speed_control
     int16_t held_q13;
     handover_now(&drive, &params);
     drive.run.observer.omega_q16 = 12345;
-    for (uint16_t part = 1; part < SLOW_PARTS / SLOW_SELDOM; part++) {
+    for (uint16_t part = 1; part < SLOW_PARTS / SLOW_ROUND_STEPS; part++) {
         rig_slow(part);
         TEST_ASSERT_EQUAL_INT32(12345, drive.run.observer.omega_q16);
     }

@@ -321,7 +321,7 @@ def random_value(dice: random.Random, p: Parameter) -> str:
 def numbers_in_counts(wide: bool) -> tuple[list[str], list[list[str]]]:
     """The names of all numbers in the drive's parameters; for each case whether the build accepts it, and the numbers."""
     headers = "".join((ROOT / "include" / h).read_text(encoding="utf-8") for h in (
-        "control/estimator.h", "control/fieldweak.h", "control/angle.h", "control/svm.h", "control/current_control.h", "control/observer.h",
+        "control/estimator.h", "control/angle.h", "control/svm.h", "control/current_control.h", "control/observer.h",
         "control/motor_model.h", "drive/drive.h"))
     paths = members("drive_params_t", headers)
     assert len(paths) > 60, paths

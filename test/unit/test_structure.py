@@ -83,7 +83,7 @@ PREFIXES = {
     "board/status": "record status text",
     "control/angle": "forced trig",
     "control/current_control": "current pi vd voltage vq",
-    "control/motor_model": "adaptation salience",
+    "control/motor_model": "adaptation fieldweak salience",
     "control/soft_float": "root soft",
     "drive/drive": "along drive",
     "drive/limits": "bus limits",
@@ -119,7 +119,7 @@ def test_nothing_is_written_twice_for_the_proofs_or_the_compiler() -> None:
 def test_the_firmware_grows_no_further_in_files_and_lines() -> None:
     files = [f for top in ("firmware", "include") for f in (ROOT / top).rglob("*") if f.is_file()]
     lines = sum(len(f.read_text(encoding="utf-8").splitlines()) for f in files)
-    assert len(files) <= 98 and lines <= 13_036, f"{len(files)} files, {lines} lines: the goal is 100 and 12 600, so only lower these"
+    assert len(files) <= 94 and lines <= 12_600, f"{len(files)} files, {lines} lines: more than there were, so merge or shorten"
 
 
 def test_one_header_alone_reads_userparams_h() -> None:

@@ -53,7 +53,7 @@ def duties_are_late(period_s: float) -> bool:
 
 
 def slow_periods(period_s: float) -> int:
-    """Periods of a slow step: SLOW_PERIODS of scaling/current_voltage.h."""
+    """Periods of a step of four slots: SLOW_PERIODS of scaling/current_voltage.h."""
     return int(number("SLOW_PERIODS_IN_TIME")) * (2 if duties_are_late(period_s) else 1)
 
 

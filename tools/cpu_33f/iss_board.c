@@ -110,7 +110,7 @@ static void enter_interrupt(void *context, unsigned vector, uint64_t cycle)
     iss_shadow_tick(b);
 }
 
-/* What the control interrupt has done goes into the trace. With late duties its slow work ends behind the next sample, and is in the next row. */
+/* What the control interrupt has done goes into the trace. With deferred duties its slow work ends behind the next sample, and is in the next row. */
 static void row_is_due(iss_board_t *b)
 {
     b->handled = true;

@@ -22,7 +22,7 @@
 #define DRIVE_SIGNALS(X) \
     X(state, "fw.state", "", "drive state (drive_state_t)", (double)d->state) \
     X(fault, "fw.fault", "", "fault code (drive_fault_t)", (double)d->fault) \
-    X(slow_phase, "fw.slow_phase", "", "period of the slow step that was the last, from 0 on", (double)(d->ticks % SLOW_PERIODS)) \
+    X(slow_phase, "fw.slow_phase", "", "period of the last step of 8, from 0 on", (double)(d->ticks % SLOW_PERIODS)) \
     X(running, "fw.run", "", "1 while the bridge switches", (double)drive_is_running(d)) \
     X(calibrated, "fw.calibrated", "", "1 after the offset calibration", (double)d->calibration.done) \
     X(theta_est, "fw.theta_est_deg", "deg", "estimated rotor angle at the last sample", \
@@ -54,7 +54,7 @@
     X(ls_ratio, "fw.ls_ratio", "", "Ls/(2 Ls0) in use", (double)d->run.model.ls_q16 / (double)board_params.fieldweak.ls_base_q16 / 2.0) \
     X(offset, "fw.offset_deg", "deg", "hand-over angle offset that is left", ANGLE_DEG(d->run.handover.offset)) \
     X(speed_obs, "fw.speed_obs_rpm", "rpm", "speed of the load observer", SPEED_RPM(observer_speed(&d->run.observer))) \
-    X(wrong_steps, "fw.wrong_steps", "", "slow steps", (double)d->run.observer.wrong_steps) \
+    X(wrong_steps, "fw.wrong_steps", "", "8 periods", (double)d->run.observer.wrong_steps) \
     X(load, "fw.load_a", "A", "q current that holds the observed load", CURRENT_A(observer_load(&d->run.observer, &board_params.observer))) \
     X(kphi_change, "fw.kphi_change_percent", "%", "flux that the motor has shown against the header's Kphi: the magnets' temperature", \
       100.0 / (1.0 + (double)d->run.adaptation.kfi_q31 / 2147483648.0) - 100.0) \

@@ -26,7 +26,7 @@ extern const unsigned probe_signal_count;
 extern const probe_param_t probe_params[];
 extern const unsigned probe_param_count;
 
-/* From the control interrupt to the write of the duties, as cpu.isr_us: with late duties the write is the first that it does. */
+/* From the control interrupt to the write of the duties, as cpu.isr_us: with deferred duties the write is the first that it does. */
 extern const double probe_isr_us;
 
 /* Read or write a parameter while the motor turns, as a debugger does: the entries of the three field-weakening tables and what frames

@@ -158,8 +158,7 @@ uint16_t bringup_tell(bringup_guide_t *g, bringup_value_t what, uint16_t part, i
     return (uint16_t)(value >= low && value <= high);
 }
 
-void bringup_tell_or_find(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high,
-                          bringup_finding_t finding)
+void bringup_tell_or_find(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high, bringup_finding_t finding)
 {
     if (!bringup_tell(g, what, part, value, low, high)) {
         g->pending = (uint16_t)finding;

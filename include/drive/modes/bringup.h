@@ -289,8 +289,7 @@ void bringup_give_up(bringup_guide_t *g, bringup_finding_t finding, uint16_t par
 uint16_t bringup_tell(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high);
 
 /** A value with its range; outside of it the finding follows. */
-void bringup_tell_or_find(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high,
-                          bringup_finding_t finding);
+void bringup_tell_or_find(bringup_guide_t *g, bringup_value_t what, uint16_t part, int32_t value, int32_t low, int32_t high, bringup_finding_t finding);
 
 /** Asks once and waits. @return the button that answers, 2 or 3; 0: none yet */
 uint16_t bringup_answered(bringup_guide_t *g, bringup_question_t question, uint16_t part, int32_t value);

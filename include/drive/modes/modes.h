@@ -1,12 +1,19 @@
 /* The seam between the drive and its modes: each mode defines its hook twice, with the mode and without it.
  *
- * hook mode what it takes over MODE_RUN IDENTIFY, BRINGUP a period with the bridge switching MODE_ALIGNS IDENTIFY, BRINGUP what ALIGN does
- * every slow step mode_start IDENTIFY, BRINGUP the end of drive_start() mode_idle BRINGUP a period with the bridge off mode_background
- * IDENTIFY a pass of the background mode_reference_step TUNING the speed reference in closed loop mode_speed_target TUNING the speed that
- * the reference goes to mode_current_step TORQUE_MODE the speed controller in closed loop mode_limit_reasons TORQUE_MODE why the commanded
- * current is not given mode_target_range TORQUE_MODE what the potentiometer's travel means mode_pot_split BIDIRECTIONAL_SPEED the
- * potentiometer's direction mode_hands_over OPEN_LOOP_FUNCTIONING the hand-over MODE_PARAMS_PLACE PARAMS_IN_RAM, TUNING where the
- * parameters are
+ * hook                  mode                   what it takes over
+ * MODE_RUN              IDENTIFY, BRINGUP      a period with the bridge switching
+ * MODE_ALIGNS           IDENTIFY, BRINGUP      what ALIGN does in slots 0, 4, 8, 12
+ * mode_start            IDENTIFY, BRINGUP      the end of drive_start()
+ * mode_idle             BRINGUP                a period with the bridge off
+ * mode_background       IDENTIFY               a pass of the background
+ * mode_reference_step   TUNING                 the speed reference in closed loop
+ * mode_speed_target     TUNING                 the speed that the reference goes to
+ * mode_current_step     TORQUE_MODE            the speed controller in closed loop
+ * mode_limit_reasons    TORQUE_MODE            why the commanded current is not given
+ * mode_target_range     TORQUE_MODE            what the potentiometer's travel means
+ * mode_pot_split        BIDIRECTIONAL_SPEED    the potentiometer's direction
+ * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
+ * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
  *
  * SNAPSHOT is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of panel_tick(). */
 #ifndef DRIVE_MODES_MODES_H

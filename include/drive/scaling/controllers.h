@@ -48,7 +48,7 @@
 /** Below, the voltage that dead time's compensation leaves takes the estimator's lock from a rotor under load. */
 #define PARAM_LOWEST_ERPM (PARAM_F(PARAM_LOWEST_SHARE) * PARAM_DEAD_TIME_V * PARAM_ERPM_PER_V)
 #define SPEEDREFRAMP PARAM_ROUND(SPEED_COUNTS(PARAM_F(SPEEDREFRAMP_RPM_PER_S) * PARAM_F(NOPOLESPAIRS)) / SLOW_STEPS_PER_SEC * 65536.0F)
-/** TUNING's ramp: Q16 of a count per slow step. */
+/** TUNING's ramp: Q16 of a count every 8 periods. */
 #define TUNING_STEP_Q16 (PARAM_ROUND(SPEED_COUNTS(SLOW_PERIODS) * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 
 /* ---- Field weakening ---- */

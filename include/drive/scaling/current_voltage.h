@@ -96,19 +96,18 @@
 /** Two pulses have one compensation of dead time, unless the rotor may turn too far in a period. */
 #define DEAD_EACH (PARAM_TOP_ERPM / 60.0F * PARAM_F(LOOPTIME_SEC) > PARAM_F(DEAD_EACH_TURN))
 
-/* ---- The slow work: a part of it follows every second period, with late duties half a part. Sixteen parts are a round: speed and bus come every slow step,
- *      four times in it; limits and rates every rare step, twice; the others once, every seldom step. The tools read the periods. ---- */
+/* ---- The slow work (drive/schedule.h): a slot follows every second period, with deferred duties half a slot. A step is four slots, a round sixteen.
+ *      PARAM_STEPS_OF_N counts steps N periods apart, with deferred duties twice as many. The tools read the periods. ---- */
 #define SLOW_EVERY 2u
 #define SLOW_PARTS 16u /* of a round */
 #define SLOW_PERIODS_IN_TIME 8
 #define SLOW_CALLS ((DEFER_DUTIES) ? 2u * SLOW_PARTS : SLOW_PARTS)                                     /* of a round */
-#define SLOW_PERIODS ((DEFER_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a slow step */
-#define SLOW_RARE 2u                                                                                   /* slow steps in a rare one */
-#define SLOW_SELDOM 4u                                                                                 /* and in a seldom one, which is a round */
+#define SLOW_PERIODS ((DEFER_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a step */
+#define SLOW_ROUND_STEPS (SLOW_PARTS / 4u)
 #define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
-#define PARAM_SLOW_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
-#define PARAM_RARE_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_RARE))
-#define PARAM_SELDOM_STEPS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / (float)SLOW_SELDOM))
+#define PARAM_STEPS_OF_8(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
+#define PARAM_STEPS_OF_16(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / 2.0F))
+#define PARAM_STEPS_OF_32(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / 4.0F))
 #define PARAM_PERIODS(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) / PARAM_F(LOOPTIME_SEC)))
 #define PARAM_STEP_SEC ((float)SLOW_PERIODS * PARAM_F(LOOPTIME_SEC))
 

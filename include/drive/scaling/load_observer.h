@@ -3,7 +3,7 @@
  *     J dw/dt = Kt (i_q - i_load)                              the shaft
  *     dw/dt += 2 r (w^ - w),   d i_load/dt = -r^2 J/Kt (w^ - w)    both poles at the rate r: a Luenberger observer
  *
- * A step is a slow one. Below the electrical frequency LOAD_BANDWIDTH_HZ / 2.7 times 2 pi (PARAM_FULL_RATIO) rates fall with the speed. */
+ * A step is SLOW_PERIODS. Below the electrical frequency LOAD_BANDWIDTH_HZ / 2.7 times 2 pi (PARAM_FULL_RATIO) rates fall with the speed. */
 #ifndef DRIVE_SCALING_LOAD_OBSERVER_H
 #define DRIVE_SCALING_LOAD_OBSERVER_H
 
@@ -31,7 +31,7 @@
                                                                         : 15))
 #define PARAM_ACCEL_UNITS (PARAM_ACCEL * (float)(1L << PARAM_ACCEL_SHIFT)) /* 0.5 .. 1 a count */
 
-/* ---- Rates in rad/s times the slow step ---- */
+/* ---- Rates in rad/s times the step ---- */
 #define PARAM_RATE_Q16(hz) (2.0F * PARAM_PI * (hz)*PARAM_STEP_SEC * 65536.0F)
 #define PARAM_QUICK_Q16 PARAM_RATE_Q16(PARAM_F(LOAD_BANDWIDTH_HZ))
 #define PARAM_LOADED_Q16 (PARAM_F(PARAM_LOADED_SHARE) * PARAM_QUICK_Q16)

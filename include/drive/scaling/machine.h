@@ -1,5 +1,5 @@
-/* The constants around the law. The start: align, ramp, hand-over. The limits and what protects: trip levels, how long a wrong state may last, and
- * how far the header may be off.
+/* The constants around the law: the start, the limits, and what protects (trip levels, how long a wrong state may last, how far the header
+ * may be off).
  *
  *     align: I(t) = I t/T while the vector turns n times in T:  n/T turns a second        (AN1292: LOCK_TIME)
  *     ramp:  dw/dt constant, to END_SPEED_RPM      (AN1292: OPENLOOP_RAMPSPEED_INCREASERATE; 2^26 counts a turn: Q10 of 2^16)
@@ -35,7 +35,7 @@
     .align_rate_q12 = (uint16_t)(PARAM_F(Q_CURRENT_REF_OPENLOOP) / PARAM_F(NORM_CURRENT_CONST) * 1024.0F / PARAM_F(LOCK_TIME) + 0.5F), \
     .align_speed_q10 = (int32_t)((PARAM_ALIGN_TURNS * 67108864l + LOCK_TIME / 2) / LOCK_TIME), \
     .early_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_EARLY_ERPM)), \
-    .agree_steps = PARAM_SLOW_STEPS(AGREE_SEC), \
+    .agree_steps = PARAM_STEPS_OF_8(AGREE_SEC), \
     .wait_periods = PARAM_PERIODS(WAIT_SEC), \
     .open_loop_q13 = CURRENT_Q13(Q_CURRENT_REF_OPENLOOP)
 
@@ -55,10 +55,10 @@
     .bus_used_q15 = BUS_Q15(PARAM_USED_BUS_V), \
     .bus_regen_q15 = BUS_Q15(REGEN_LIMIT_V), \
     .brake_per_bus_q8 = (int16_t)(256.0F * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(BRAKE_BAND_V)) + 0.5F), \
-    .stall_steps = PARAM_RARE_STEPS(PARAM_F(PARAM_STALL_SEC)), \
-    .lost_lock_steps = PARAM_RARE_STEPS(LOST_LOCK_SEC), \
-    .wrong_steps = PARAM_SLOW_STEPS(WRONG_SEC), \
-    .impossible_steps = PARAM_SELDOM_STEPS(IMPOSSIBLE_SEC), \
+    .stall_steps = PARAM_STEPS_OF_16(PARAM_F(PARAM_STALL_SEC)), \
+    .lost_lock_steps = PARAM_STEPS_OF_16(LOST_LOCK_SEC), \
+    .wrong_steps = PARAM_STEPS_OF_8(WRONG_SEC), \
+    .impossible_steps = PARAM_STEPS_OF_32(IMPOSSIBLE_SEC), \
     .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
     .id_off_q13 = CURRENT_Q13(PARAM_ID_OFF), \
     .rs_impossible = (PARAM_RS_RISES > 0.99F * PARAM_F(PARAM_RS_MOST)) ? Q15(PARAM_RS_RISES) : INT16_MAX, \

@@ -160,13 +160,13 @@ static inline void rig_closed(int16_t direction, int16_t speed_erpm)
 /** Counter of the periods brought to a value, so that the next tick runs this part of the slow work. */
 static inline void rig_next_part(uint16_t part)
 {
-    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_SELDOM * SLOW_PERIODS - 1u)) + SLOW_EVERY * part - 1u);
+    drive.ticks = (uint16_t)((drive.ticks & ~(SLOW_ROUND_STEPS * SLOW_PERIODS - 1u)) + SLOW_EVERY * part - 1u);
 }
 
 /** This part of the slow work alone, without the period before it. */
 static inline void rig_slow(uint16_t part)
 {
-    drive.ticks = (uint16_t)(SLOW_SELDOM * SLOW_PERIODS + SLOW_EVERY * part);
+    drive.ticks = (uint16_t)(SLOW_ROUND_STEPS * SLOW_PERIODS + SLOW_EVERY * part);
     (void)drive_slow(&drive, &params, &samples);
 }
 

@@ -2,7 +2,7 @@
 #ifndef GOLDEN_FIELDWEAK_PARAMS_H
 #define GOLDEN_FIELDWEAK_PARAMS_H
 
-#include "control/fieldweak.h"
+#include "control/motor_model.h"
 #include "golden.h"
 #include "golden_fieldweak.h"
 #include "golden_fieldweak_tables.h"
