@@ -632,6 +632,19 @@ void test_top_speed_is_twice_END_SPEED_RPM_within_seven_eighths_of_the_voltage(v
                                                    * (7000.0F - 0.0527F * 0.5F * (float)params.open_loop_q13 * 3.353F) / 5148.0F), id->top_q10);
 }
 
+void test_top_speed_ends_at_30000_electrical_rpm_where_the_formats_do(void)
+{
+    static const int32_t cases[][2] = { { 838800, 2 * 838800 }, { 838900, 1677721 }, { 1000000, 1677721 } }; /* END_SPEED_RPM, top: 0.025 turns a period */
+    EACH(n, cases) {
+        drive_params_t quick = params;
+        quick.forced.end_speed_q10 = cases[n][0];
+        begin_spin(IDENTIFY_SPIN_FULL, 267, 1920);
+        id->emf_sum = 2000ul << BLOCKS_LOG2; /* twice that is less than seven eighths of the circle */
+        mechanics_start(&drive, &quick);
+        TEST_ASSERT_EQUAL_INT32(cases[n][1], id->top_q10);
+    }
+}
+
 void test_the_frame_follows_the_rotor_by_its_back_emf(void)
 {
     uint32_t before;

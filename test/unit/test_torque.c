@@ -47,6 +47,20 @@ void test_the_speed_controller_s_trim_is_left_alone(void)
     TEST_ASSERT_EQUAL_INT16(drive.run.control.reference_erpm, drive.run.control.trim_reference_erpm);
 }
 
+void test_a_start_that_asks_for_no_current_turns_forwards(void)
+{
+    drive_params_t small = params;
+    small.current_max_q13 = 1000; /* half a step of the potentiometer's converter is less than a count */
+    panel_turn_pot(0);
+    drive_set_direction(&drive, -1); /* of the run before */
+    the_panel.wish_run = 1;
+    inputs.elapsed_ms = 1;
+    the_lights = panel_tick(&the_panel, &drive, &small, &inputs);
+    TEST_ASSERT_EQUAL_INT16(0, drive.command.target_erpm);
+    TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
+    TEST_ASSERT_EQUAL_INT16(1, drive.direction);
+}
+
 void test_command_is_the_q_current_between_minimum_and_maximum_speed_and_holds_below(void)
 {
     static const struct {

@@ -381,7 +381,7 @@ static uint16_t leg_of(const current_q13_t *signal, uint16_t expected)
         positive |= (uint16_t)((size >= BRINGUP_LEAST_Q13) ? 1u << phase : 0u);
         negative |= (uint16_t)((size <= -BRINGUP_LEAST_Q13) ? 1u << phase : 0u);
     }
-    if ((positive | negative) != 7u || positive == 0u || negative == 0u) {
+    if ((positive | negative) != 7u) {
         return expected;
     }
     for (phase = 0; phase < PHASES; phase++) {
