@@ -6,6 +6,7 @@ import subprocess
 import pytest
 
 from tools.common.paths import ROOT
+from tools.docs import tables
 
 TOPS = "firmware|include|tools|tuning|test|docs|examples"
 GROUPS = {"run", "your motor", "your board", "tests", "simulator", "upkeep"}
@@ -114,3 +115,11 @@ def test_make_lists_every_target_in_a_group():
 def test_the_workflow_runs_what_a_push_runs():
     workflow = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
     assert "- run: .ci/run" in re.sub(r"- name: .*\n\s+run", "- run", workflow)
+
+
+def test_the_schedule_counts_the_slots_of_the_halves_that_call_a_function():
+    lines = {line.split("`")[1]: line for line in tables.schedule().splitlines() if line.startswith("| `")}
+    assert "| 2; 10 by `limit_and_learn` | 16 periods |" in lines["limit_currents"]
+    assert "| 3, 11; 7, 15 by `trim_speed` | 16 periods, at times 8 |" in lines["follow_speed"] # while the innovation gate is open
+    assert "| 3, 11; 7, 15 by `follow_estimate` | 8 periods |" in lines["watch_signals"]
+    assert "| 14 | 32 periods |" in lines["check_model"]

@@ -67,6 +67,22 @@ SLOT_MS = 0.1
 """Two periods (SLOW_EVERY) at 20 kHz."""
 
 
+def _calls(source: str, names: list[str]) -> list[tuple[str, str, bool]]:
+    """Of the schedule's functions: which calls which, and whether it always does in the states in which the called one runs by its own row."""
+    found = []
+    for caller, body in re.findall(r"\nstatic void (\w+)\([^\n]*\n\{\n(.*?)\n\}", source, re.DOTALL):
+        for condition, name in re.findall(r"(?:if \(([^\n]*)\) \{\n\s+)?\b(\w+)\(d, p, raw\);", body):
+            if name in names and caller in names:
+                found.append((caller, name, condition in ("", "drive_is_closed(d)")))
+    return found
+
+
+def _every(slots: int, always: int, at_times: int) -> str:
+    """How often a function of so many of the slots runs: in each round, and where its callers let it."""
+    often = f"{2 * slots // always} periods"
+    return often + (f", at times {2 * slots // (always + at_times)}" if at_times else "")
+
+
 def schedule() -> str:
     """The slots, and what each of their functions does, as its comment says."""
     found = rows("include", "drive/schedule.h", "SCHEDULE_TABLE", "#number #first #first_in #second #second_in")
@@ -81,8 +97,13 @@ def schedule() -> str:
             raise UserError(f"no comment says what '{name}' does", "firmware/drive/schedule.c", "write one above it: /** ... */")
     when = table("slot, ms, first half, in states, second half, in states", "rrllll", [
         [number, f"{int(number) * SLOT_MS:.1f}", f"`{first}`", first_in, f"`{second}`", second_in] for number, first, first_in, second, second_in in found])
-    return when + "\n" + table("function, in slots, every, what it does", "llrl", [
-        [f"`{name}`", ", ".join(numbers), f"{2 * len(found) // len(numbers)} periods", says[name]] for name, numbers in slots.items()])
+    lines = []
+    for name, numbers in slots.items():
+        callers = [(caller, always) for caller, called, always in _calls(source, list(slots)) if called == name]
+        places = [", ".join(numbers)] + [f"{', '.join(slots[caller])} by `{caller}`" for caller, _ in callers]
+        often = len(numbers) + sum(len(slots[caller]) for caller, always in callers if always)
+        lines.append([f"`{name}`", "; ".join(places), _every(len(found), often, sum(len(slots[caller]) for caller, always in callers if not always)), says[name]])
+    return when + "\n" + table("function, in slots, every, what it does", "llrl", lines)
 
 
 def selftest() -> str:
