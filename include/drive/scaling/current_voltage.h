@@ -103,7 +103,7 @@
 #define SLOW_PERIODS_IN_TIME 8
 #define SLOW_CALLS ((DEFER_DUTIES) ? 2u * SLOW_PARTS : SLOW_PARTS)                                     /* of a round */
 #define SLOW_PERIODS ((DEFER_DUTIES) ? 2u * (SLOW_PERIODS_IN_TIME) : (unsigned)(SLOW_PERIODS_IN_TIME)) /* of a step */
-#define SLOW_ROUND_STEPS 4u /* of a round */
+#define SLOW_ROUND_STEPS 4u                                                                            /* of a round */
 #define SLOW_STEPS_PER_SEC (1.0F / PARAM_STEP_SEC)
 #define PARAM_STEPS_OF_8(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC))
 #define PARAM_STEPS_OF_16(time_s) ((uint16_t)PARAM_ROUND(PARAM_F(time_s) * SLOW_STEPS_PER_SEC / 2.0F))
