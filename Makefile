@@ -124,7 +124,13 @@ options = $(what) $(out)
 scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
 ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
-.PHONY: sensitivity anymotor bringup run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch setup-run
+# MOTOR=all: the target for each motor of tuning/motors, with its own header; fails at the end if one of them did.
+every = $(filter all,$(MOTOR))
+every_motor = failed=; for motor in $(basename $(notdir $(wildcard tuning/motors/*.toml))); do \
+    $(MAKE) $@ MOTOR=$$motor $(if $(OUT),OUT=$(call quoted,$(OUT))/$$motor) || failed="$$failed $$motor"; done; \
+    test -z "$$failed" || { echo "foc33: $@ fails for$$failed" >&2; exit 1; }
+
+.PHONY: sensitivity anymotor bringup run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch pulse held setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
@@ -169,6 +175,14 @@ lowspeed: setup-run ## [run] low speeds held under load, and how low it goes [MO
 catch: setup-run ## [run] S2 while the rotor turns at any speed, and stops on a supply that cannot sink [MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)
 	@$(front_end) catch $(options)
+
+pulse: setup-run ## [run] a load that pulses with the shaft's angle, as that of a piston: mean speed and swing [MOTOR=name or all, BOARD= USERPARAMS= OUT=]
+	@+$(if $(every),$(every_motor),$(ready))
+	@$(if $(every),,$(front_end) pulse $(options))
+
+held: setup-run ## [run] a shaft that is held and let go: how far it turns backwards, and what follows [FULL=1 MOTOR=name or all, BOARD= USERPARAMS= OUT=]
+	@+$(if $(every),$(every_motor),$(ready))
+	@$(if $(every),,$(front_end) held $(if $(FULL),--full) $(options))
 
 sensitivity: setup-run ## [tests] every number chosen by trial a fifth less and more: what moves, what is on an edge [ONLY="GATE_SHARE ..." ALL=1 MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)

@@ -180,7 +180,7 @@ def test_the_list_of_scenarios_has_a_line_for_each_and_keys_has_unit_and_range_o
     assert code == 0 and re.search(r"(?m)^motor\.rs_ohm +ohm +\S+ \.\. \S+ +\w", out)
 
 
-@pytest.mark.parametrize("name", ["run", "table2", "starts", "rated", "loadsteps", "lowspeed", "catch", "robust", "scenarios", "motors", "keys"])
+@pytest.mark.parametrize("name", ["run", "table2", "starts", "rated", "loadsteps", "lowspeed", "catch", "pulse", "held", "robust", "scenarios", "motors", "keys"])
 def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main([name, "--help"])

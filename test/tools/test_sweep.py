@@ -108,5 +108,5 @@ def test_searches_share_the_runs_of_their_group_and_go_on_until_each_knows_its_e
 
 
 def test_a_kind_of_sweep_and_of_series_has_its_command():
-    assert {kind.name for kind in cli.SWEEPS} == {"table2", "starts", "rated", "loadsteps", "lowspeed", "catch", "robust", "bringup", "sensitivity"}
+    assert {kind.name for kind in cli.SWEEPS} == {"table2", "starts", "rated", "loadsteps", "lowspeed", "catch", "pulse", "held", "robust", "bringup", "sensitivity"}
     assert all(kind.about and kind.keys for kind in (*cli.SWEEPS, *draws.Series.__subclasses__()))

@@ -13,8 +13,10 @@ from .bringup import Bringup
 from .campaign import Campaign
 from .catch_sweep import Catch
 from .expect import Outcome
+from .held_sweep import Held
 from .loadsteps import LoadSteps
 from .lowspeed import LowSpeed
+from .pulse_sweep import Pulse
 from .rating_sweep import Rated
 from .robust import Robust
 from .run import HAND_OVER_AFTER_S, HAND_OVER_BEFORE_S, Run
@@ -23,7 +25,7 @@ from .soak import Soak
 from .start_sweep import Starts
 from .table2 import Table2
 
-SWEEPS = (Table2, Starts, Rated, LoadSteps, LowSpeed, Catch, Robust, Bringup, Sensitivity)
+SWEEPS = (Table2, Starts, Rated, LoadSteps, LowSpeed, Catch, Pulse, Held, Robust, Bringup, Sensitivity)
 
 
 def main(arguments: list[str] | None = None) -> int:
