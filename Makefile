@@ -150,9 +150,10 @@ table2: setup-run ## [run] the eight rows of AN1292's Table 2 beside ours [MOTOR
 	@+$(ready)
 	@$(front_end) table2 $(options)
 
-starts: setup-run ## [run] starts from every rotor angle under several loads [MOTOR= BOARD= USERPARAMS= OUT=]
-	@+$(ready)
-	@$(front_end) starts $(options)
+starts: setup-run ## [run] starts from every rotor angle under several loads, and with R, L, Kphi off; or drawn [FULL=1, DRAW=300 SEED=1 CASE=, MOTOR=name or all, BOARD= USERPARAMS= OUT=]
+	@+$(if $(every),$(every_motor),$(ready))
+	@$(if $(every),,$(front_end) starts $(if $(FULL),--full) $(if $(DRAW),--draw $(call quoted,$(DRAW))) $(if $(SEED),--seed $(call quoted,$(SEED))) \
+	    $(if $(CASE),--case $(call quoted,$(CASE))) $(options))
 
 motors: setup-run ## [your motor] every motor with its own header: 20, 50, 100 % of rated speed at half torque [BOARD= OUT=]
 	@$(tuner) motors $(board) $(out)

@@ -67,7 +67,7 @@ def test_a_mistake_in_a_table_is_one_line_with_its_place(tmp_path, room, name, o
 # ---- starts --------------------------------------------------------------------------------------------------------------
 def start(**more):
     return {"rotor_deg": 45.0, "load_nm": 0.03, "inertia": 1.0, "kind": "0.03 N m", "closed_after_s": 1.6, "hand_over_rpm": 250.0, "back_rpm": 120.0,
-            "overshoot_percent": 1.0, "speed_error_percent": 0.0, "fault": None} | more
+            "overshoot_percent": 1.0, "speed_error_percent": 0.0, "fault": None, "is_off": False, "beyond": ""} | more
 
 
 def other(**params):

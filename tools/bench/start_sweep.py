@@ -1,10 +1,14 @@
-"""`starts`: the motor started from every rotor angle under several loads, and with heavier rotors. Limits are in tools/bench/scenarios/tables/starts.toml.
+"""`starts`: the motor started from every rotor angle under several loads, with heavier rotors, and under load with R, L and Kphi that the header does
+not know; or drawn starts, where more is off. Limits are in tools/bench/scenarios/tables/starts.toml.
 
 Loads, speed and times of the table are for its own motor; another one gets shares of its start torque and rated speed, and the time that
 its header's lock and ramp take.
 """
 
 import argparse
+import itertools
+import math
+import random
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -15,9 +19,11 @@ import numpy as np
 from tools.common import motor_file
 from tools.common.board_keys import Values
 from tools.common.errors import UserError
-from . import case, simulate, sweep
+from . import case, reach, report, simulate, sweep
+from .draws import MOST_NUMBER
 from .expect import Outcome
-from .scenario import BRAKE, start_time_s
+from .robust import PARAMETERS
+from .scenario import BRAKE, START_MARGIN_S, param, start_time_s
 from .sweep import within
 
 MARGIN_S = 0.1
@@ -50,6 +56,20 @@ class Table(sweep.Table):
     other_may_fail_from: float = within(1.0)
     other_loads_percent: list[float] = within(0.0, 100.0)
     other_speed_percent: float = within(1.0, 100.0)
+    box_resistance: list[float] = within(0.1, 10.0)
+    box_inductance: list[float] = within(0.1, 10.0)
+    box_kphi: list[float] = within(0.1, 10.0)
+    box_angles: float = within(1.0, 360.0)
+    box_starts: float = within(0.0, 360.0)
+    box_load: float = within(0.0, 1.0)
+    box_overshoot_percent: float = within(0.0)
+    draw_resistance: float = within(0.0, 0.9)
+    draw_inductance: float = within(0.0, 0.9)
+    draw_kphi: float = within(0.0, 0.9)
+    draw_supply: float = within(0.0, 0.9)
+    draw_dead_time: float = within(0.0, 0.9)
+    draw_inertia: list[float] = within(0.1, 100.0)
+    draw_offset_v: float = within(0.0, 1.0)
 
     def __post_init__(self) -> None:
         if not self.start_s + self.within_s < self.measure_from_s < self.measure_to_s:
@@ -69,6 +89,28 @@ class Table(sweep.Table):
         kinds = [(load, 1.0) for load in self.loads_nm] + [(0.0, factor) for factor in self.heavy_factors]
         return [Case(load, inertia, angle) for load, inertia in kinds for angle in np.arange(0.0, 360.0, self.every_deg).tolist()]
 
+    def box(self, full: bool) -> list["Case"]:
+        """Every combination of R, L and Kphi, under load: from all of the angles, or so many of them in turn."""
+        angles = [360.0 * number / int(self.box_angles) for number in range(int(self.box_angles))]
+        each, load_nm, result = len(angles) if full else int(self.box_starts), case.three_digits(self.box_load * max(self.loads_nm)), []
+        for factors in itertools.product(self.box_resistance, self.box_inductance, self.box_kphi):
+            first = len(result)
+            result += [Case(load_nm, 1.0, angles[(first + number) % len(angles)], *factors, box=True) for number in range(each)]
+        return result
+
+    def drawn(self, seed: int, number: int, dead_s: float) -> "Case":
+        """The start with this number: always the same."""
+        r = random.Random(f"starts/{seed}/{number}")
+        factors = [1.0 + r.uniform(-part, part) for part in (self.draw_resistance, self.draw_inductance, self.draw_kphi)]
+        low, high = self.draw_inertia
+        later_s = r.uniform(-self.draw_dead_time, self.draw_dead_time) * dead_s
+        keys = {"supply.voltage_v": ("factor", 1.0 + r.uniform(-self.draw_supply, self.draw_supply)),
+                "inverter.turn_on_s": 1e-7 + max(later_s, 0.0), "inverter.turn_off_s": 1.5e-7 + max(-later_s, 0.0),
+                "shunt.offset_a_v": r.uniform(-self.draw_offset_v, self.draw_offset_v), "shunt.offset_b_v": r.uniform(-self.draw_offset_v, self.draw_offset_v),
+                "rng.seed": float(r.randrange(1, 2**31))}
+        return Case(case.three_digits(r.uniform(0.0, self.box_load * max(self.loads_nm))), low * (high / low) ** r.random(), r.uniform(0.0, 360.0), *factors,
+                    number=number, keys=tuple(keys.items()))
+
 
 @dataclass(frozen=True)
 class Case:
@@ -78,13 +120,31 @@ class Case:
     inertia: float
     """of the rotor's"""
     rotor_deg: float
+    R: float = 1.0
+    L: float = 1.0
+    Kphi: float = 1.0
+    """true value / the header's, as the two before"""
+    box: bool = False
+    number: int = 0
+    """of the draw"""
+    keys: tuple[tuple[str, Any], ...] = ()
+    """what else the plant has otherwise"""
 
     @property
     def is_heavy(self) -> bool:
         return self.inertia > 1.0
 
     @property
+    def is_off(self) -> bool:
+        """Whether the motor may be another one than the header's."""
+        return self.box or self.number > 0
+
+    @property
     def kind(self) -> str:
+        if self.number:
+            return f"draw {self.number}: {self.load_nm:g} N m, R x{self.R:.2f}, L x{self.L:.2f}, Kphi x{self.Kphi:.2f}, inertia x{self.inertia:.2f}"
+        if self.is_off:
+            return f"{self.load_nm:g} N m, R x{self.R:g}, L x{self.L:g}, Kphi x{self.Kphi:g}"
         return f"inertia x{self.inertia:g}" if self.is_heavy else f"{self.load_nm:g} N m"
 
 
@@ -92,14 +152,32 @@ class Starts(sweep.Sweep):
     """The sweep."""
 
     name, about, kind_of_table = "starts", "start from every rotor angle under several loads", Table
-    keys = ("load_nm", "inertia", "rotor_deg", "closed_after_s", "hand_over_rpm", "back_rpm", "overshoot_percent", "speed_error_percent",
-            "angle_error_rms_deg", "fault")
+    keys = ("load_nm", "inertia", "rotor_deg", "R", "L", "Kphi", "number", "closed_after_s", "hand_over_rpm", "back_rpm", "overshoot_percent",
+            "speed_error_percent", "angle_error_rms_deg", "beyond", "fault")
+    full, seed, numbers = False, 1, ()
 
     @classmethod
     def add_command(cls, commands: Any) -> argparse.ArgumentParser:
         parser = super().add_command(commands)
         parser.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
+        parser.add_argument("--full", action="store_true", help="every combination of R, L and Kphi from every angle")
+        parser.add_argument("--draw", type=int, metavar="COUNT", help="only drawn starts, so many")
+        parser.add_argument("--seed", type=int, default=1, help="of the draw; default 1")
+        parser.add_argument("--case", type=int, nargs="+", metavar="NUMBER", help="these drawn starts alone")
         return parser
+
+    @classmethod
+    def folder(cls, options: argparse.Namespace) -> str:
+        if not options.draw and not options.case:
+            return cls.name
+        return f"{cls.name}-draw-{options.seed}" + (f"-case-{min(options.case)}" if options.case else "")
+
+    def ask(self, options: argparse.Namespace) -> None:
+        for flag, value in (("--draw", options.draw), ("--case", min(options.case) if options.case else None)):
+            if value is not None and not 1 <= value <= MOST_NUMBER:
+                raise UserError(f"{value} is no number of starts or of a start", flag, f"choose 1 .. {MOST_NUMBER}")
+        self.full, self.seed = options.full, options.seed
+        self.numbers = sorted(set(options.case)) if options.case else range(1, (options.draw or 0) + 1)
 
     @classmethod
     def read(cls, options: argparse.Namespace) -> Table:
@@ -109,27 +187,48 @@ class Starts(sweep.Sweep):
         return table if options.every_deg is None else replace(table, every_deg=options.every_deg)
 
     def cases(self) -> list[Case]:
-        return self.table.cases()
+        """Those of the table with its box; or else the drawn ones."""
+        table = self.table
+        if self.numbers:
+            return [table.drawn(self.seed, number, param(self.params, "DEADTIME_SEC")) for number in self.numbers]
+        return table.cases() + table.box(self.full)
 
     def job(self, item: Case) -> simulate.Job:
         table = self.table
         events = case.start_events(table.start_s, table.speed_rpm, self.params.get("NOMINAL_SPEED_RPM", 0.0), table.where)
-        plant = Values({BRAKE: item.load_nm, INERTIA: ("factor", item.inertia)}, {BRAKE: table.where, INERTIA: table.where})
+        plant = Values({BRAKE: item.load_nm, INERTIA: ("factor", item.inertia), **dict(item.keys)})
+        for keys, factor in zip(PARAMETERS.values(), (item.R, item.L, item.Kphi)):
+            plant.values.update(dict.fromkeys(keys, ("factor", factor)) if factor != 1.0 else {})
+        plant.where.update(dict.fromkeys(plant.values, table.where))
         later_s = table.heavy_later_s if item.is_heavy else 0.0
         scenario = case.scenario(f"{item.rotor_deg:g} deg, {item.kind}", table.title, events, table.speed_rpm, table.measure_from_s + later_s,
                                  table.measure_to_s + later_s, rotor_deg=item.rotor_deg, plant=plant)
         return simulate.prepare(scenario, self.library, self.motor, self.board)
 
     def row(self, item: Case, job: simulate.Job, result: dict[str, Any]) -> dict[str, Any]:
-        return {**asdict(item), "kind": item.kind, **result}
+        return {**asdict(item), "keys": None, "kind": item.kind, "is_off": item.is_off, "beyond": self.beyond(item, job.values) if item.is_off else "", **result}
+
+    def beyond(self, item: Case, values: Mapping[str, float]) -> str:
+        """Which limit forbids the start of this motor with this header, with its numbers; "" if none does."""
+        params = self.params
+        ramp_s = start_time_s(params) - START_MARGIN_S - param(params, "LOCK_TIME") * param(params, "LOOPTIME_SEC")
+        end_w = param(params, "END_SPEED_RPM") * math.pi / 30.0
+        needs_nm = item.load_nm + values.get("mech.coulomb_nm", 0.0) + values.get("mech.viscous_nms", 0.0) * end_w + values[INERTIA] * end_w / ramp_s
+        gives_nm = reach.torque_per_amp(values) * param(params, "Q_CURRENT_REF_OPENLOOP")
+        if needs_nm > gives_nm:
+            return f"the start's current gives {gives_nm:.3g} N m, load, friction and ramp need {needs_nm:.3g}"
+        most_a = param(params, "MAXIMUM_CURRENT_A")
+        return reach.out_of_reach(reach.least(values, self.table.speed_rpm, item.load_nm, most_a), most_a, values["supply.voltage_v"] / math.sqrt(3.0))
 
     def check(self, item: Case, row: dict[str, Any]) -> list[Outcome]:
-        """One start against the limits; the first that does not hold is named."""
-        return [Outcome(f"start from {row['rotor_deg']:g} deg with {row['kind']}", *self.first_limit(row))]
+        """One start against the limits; the first that does not hold is named. What a limit forbids is told as that."""
+        ok, got, allowed = self.first_limit(row)
+        return [Outcome(f"start from {row['rotor_deg']:.4g} deg with {row['kind']}", ok or bool(row["beyond"]),
+                        f"{got}, {reach.BEYOND}: {row['beyond']}" if row["beyond"] and not ok else got, allowed)]
 
     def first_limit(self, row: dict[str, Any]) -> tuple[bool, str, str]:
         """Whether it holds, what was found, and what is allowed: of the first limit that does not hold, else of the last."""
-        table, heavy = self.table, row["inertia"] > 1.0
+        table, heavy = self.table, row["inertia"] > 1.0 and not row["is_off"]
         closed, over, error = row["closed_after_s"], row["overshoot_percent"], row["speed_error_percent"]
         if row["back_rpm"] > table.back_rpm:
             return False, f"{row['back_rpm']:.0f} rpm against the direction", f"at most {table.back_rpm:g} rpm"
@@ -138,22 +237,44 @@ class Starts(sweep.Sweep):
             return row["fault"] == named, f"fault {row['fault']}", f"no fault but {named}" if named else "no fault"
         if closed is None or closed > table.within_s:
             return False, "never in closed loop" if closed is None else f"closed loop after {closed:.3f} s", f"at most {table.within_s:g} s"
-        most = table.heavy_overshoot_percent if heavy else table.overshoot_percent
+        most = table.heavy_overshoot_percent if heavy else table.box_overshoot_percent if row["is_off"] else table.overshoot_percent
         if over > most:
             return False, f"overshoot {over:.1f} %", f"at most {most:g} %"
-        if not heavy and row["hand_over_rpm"] > table.hand_over_rpm:
+        if not heavy and not row["is_off"] and row["hand_over_rpm"] > table.hand_over_rpm:
             return False, f"hand-over at {row['hand_over_rpm']:.0f} rpm", f"at most {table.hand_over_rpm:g} rpm"
         allowed = table.heavy_error_percent if heavy else table.error_percent
         return abs(error) <= allowed, f"speed error {error:+.2f} %", f"at most {allowed:g} %"
 
     def more(self, rows: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
         from . import plots
-        return {"plots": plots.write_starts(rows, folder)}
+        plain = [row for row in rows if not row["is_off"]]
+        return {"plots": plots.write_starts(plain, folder)} if plain else {}
 
     def title(self, rows: list[dict[str, Any]]) -> str:
         return f"{self.table.title}: {len(rows)} starts"
 
     def text(self, rows: list[dict[str, Any]]) -> str:
+        """The table's starts; then of the others how many hold, and what is out of reach."""
+        plain, off = ([row for row in rows if row["is_off"] == whether] for whether in (False, True))
+        parts = [self.plain_text(plain)] if plain else []
+        drawn, box = [row for row in off if row["number"]], [row for row in off if not row["number"]]
+        if box:
+            parts.append(self.box_text(box))
+        if drawn:
+            parts.append(f"{sum(self.first_limit(row)[0] for row in drawn)} of {len(drawn)} drawn starts hold, seed {self.seed}")
+        beyond = dict.fromkeys(f"{reach.BEYOND}: {row['kind']}: {row['beyond']}" for row in off if row["beyond"] and not self.first_limit(row)[0])
+        return "\n\n".join(parts + ["\n".join(beyond)] * bool(beyond))
+
+    def box_text(self, rows: list[dict[str, Any]]) -> str:
+        """Kphi down, R across: how many starts hold, of every L and angle."""
+        found = {(kphi, r): [row for row in rows if (row["Kphi"], row["R"]) == (kphi, r)] for kphi in self.table.box_kphi for r in self.table.box_resistance}
+        lines = [{"name": f"true Kphi x{kphi:g}", **{r: f"{sum(self.first_limit(row)[0] for row in found[kphi, r])} of {len(found[kphi, r])}"
+                                                     for r in self.table.box_resistance}} for kphi in self.table.box_kphi]
+        columns = tuple((r, f"true R\nx{r:g}", "{}") for r in self.table.box_resistance)
+        return f"starts under {rows[0]['load_nm']:g} N m that hold, true value / the header's, L x{' x'.join(f'{l:g}' for l in self.table.box_inductance)}:\n\n" \
+               + report.table(lines, columns)
+
+    def plain_text(self, rows: list[dict[str, Any]]) -> str:
         """Angles down, loads and inertias across; each cell: seconds to closed loop, its speed, the worst speed backwards, overshoot, speed error."""
         cells = {(row["kind"], row["rotor_deg"]): _cell(row) for row in rows}
         kinds = list(dict.fromkeys(row["kind"] for row in rows))

@@ -114,6 +114,11 @@ class Sweep:
         """The table that is asked for."""
         return cls.kind_of_table.read(paths.TABLES / f"{cls.name}.toml")
 
+    @classmethod
+    def folder(cls, options: argparse.Namespace) -> str:
+        """The name of its result folder, without motor, board and header."""
+        return cls.name
+
     def ask(self, options: argparse.Namespace) -> None:
         """Takes what else the command line says."""
 
@@ -180,7 +185,7 @@ class Sweep:
         """The whole command; returns the exit code."""
         table = cls.read(options)
         motor, board, library, used = command_common.set_up(table, options, list(cls.defines))
-        target = command_common.results(cls.name, table.motor, options)
+        target = command_common.results(cls.folder(options), table.motor, options)
         if motor.path.stem != table.motor:
             table = table.for_motor(motor_file.load(str(motor.path)), library.params)
         sweep = cls(table, motor, board, library, used, options.quiet)
