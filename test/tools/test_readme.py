@@ -84,6 +84,35 @@ def test_every_motor_has_its_line_of_flying_starts_and_stops(result, tmp_path):
 
 
 @pytest.fixture
+def one_motor(tmp_path):
+    (tmp_path / "tuning/motors").mkdir(parents=True)
+    (tmp_path / "tuning/motors/own.toml").touch()
+
+
+def test_every_motor_has_its_line_of_holds(result, tmp_path, one_motor):
+    back = {"backwards_rpm": 40.4, "fault": None, "fault_s": None, "back_s": 0.4}
+    stop = {"backwards_rpm": 112.0, "fault": "STALL", "fault_s": 0.21, "back_s": None}
+    left(tmp_path, "held", "own", [back, back | {"back_s": 0.61}, stop, stop | {"fault_s": -0.2, "ok": False}, stop | {"fault": "LOST_LOCK"}])
+    assert figures.helds()[1] == [["own", "4 of 5", "112 rpm", "2", "0.61 s", "1 LOST_LOCK, 2 STALL", "0.21 s"]]
+
+
+def test_every_motor_has_its_line_of_pulsing_loads(result, tmp_path, one_motor):
+    ok = {"beyond": "", "fault": None, "speed_error_percent": -0.21, "swing_limit": "0.50", "swing_share": 0.4}
+    left(tmp_path, "pulse", "own", [ok, ok | {"speed_error_percent": 0.1, "swing_limit": "-", "swing_share": 1.4}, ok | {"beyond": "mean needs", "fault": "STALL"},
+                                    ok | {"fault": "CURRENT_SENSOR", "speed_error_percent": None, "swing_share": None, "ok": False}])
+    assert figures.pulses()[1] == [["own", "3 of 4", "1", "1 CURRENT_SENSOR", "0.21 %", "0.40"]]
+
+
+def test_every_motor_has_its_line_of_starts_in_the_box_and_drawn_and_the_plain_ones_do_not_count(result, tmp_path, one_motor):
+    plain = {"is_off": False, "beyond": "", "fault": None, "inertia": 1.0, "back_rpm": 100.0, "hand_over_rpm": 250.0}
+    off = plain | {"is_off": True, "back_rpm": 400.0, "hand_over_rpm": None}
+    left(tmp_path, "starts", "own", [plain, plain, off, off | {"fault": "STALL", "ok": False}])
+    left(tmp_path, "starts-draw-1", "own", [off, off, off | {"fault": "STALL", "beyond": "needs"}])
+    assert figures.boxes()[1] == [["own", "1 of 2", "3 of 3", "1", "2 STALL"]]
+    assert figures.starts() == "2 of 2; 100 rpm; 250 rpm"
+
+
+@pytest.fixture
 def long_draws(result, tmp_path):
     """What a campaign and a soak leave, with numbers changed."""
     def write(cases: int = 1990, hours: float = 24.2) -> None:

@@ -102,7 +102,8 @@ class Held(sweep.Sweep):
     def speeds_rpm(self) -> list[float]:
         """Those of the rating as far as the header has them, and one in field weakening if it has that."""
         nominal, most = (param(self.params, f"{name}_SPEED_RPM") for name in ("NOMINAL", "MAXIMUM"))
-        speeds = [case.within_header(self.params, case.three_digits(percent / 100.0 * self.rated.rated_speed_rpm)) for percent in self.table.speeds_percent]
+        rated_rpm = self.rated.rated_speed_rpm
+        speeds = [case.within_header(self.params, case.three_digits(percent / 100.0 * rated_rpm)) for percent in self.table.speeds_percent]
         weakened = [case.three_digits(nominal + self.table.weakened_percent / 100.0 * (most - nominal))] if most > nominal else []
         return list(dict.fromkeys(speeds + weakened))
 
@@ -147,8 +148,8 @@ class Held(sweep.Sweep):
                    Event(settled_s, "set", where, keys={BRAKE: item.torque_nm}, over_s=table.torque_over_s),
                    Event(held_s, "set", where, keys={LOCKED: 1.0}, note="the shaft is held"),
                    Event(held_s + item.hold_s, "set", where, keys={LOCKED: 0.0}, note="and let go")]
-        return simulate.prepare(case.scenario(item.name, table.title, events, item.rpm, held_s, held_s + item.hold_s + self.allowed_s(item) + WATCH_S),
-                                self.library, self.motor, self.board)
+        end_s = held_s + item.hold_s + self.allowed_s(item) + WATCH_S
+        return simulate.prepare(case.scenario(item.name, table.title, events, item.rpm, held_s, end_s), self.library, self.motor, self.board)
 
     def measured(self, run: Run, item: Case) -> dict[str, Any]:
         held_s, end_s = run.scenario.measures[0].from_s, run.scenario.duration_s
@@ -179,8 +180,8 @@ class Held(sweep.Sweep):
 
     def check(self, item: Case, row: dict[str, Any]) -> list[Outcome]:
         return [Outcome(item.name, row["verdict"] == "ok", f"{row['verdict']}; {row['backwards_rpm']:.0f} rpm backwards, {row['afterwards']}",
-                        f"{self.most_back_rpm:g} rpm backwards, then within {self.near_percent(item):g} % after {self.allowed_s(item):.1f} s, or stopped by name "
-                        f"{self.table.stop_s:g} s after the release")]
+                        f"{self.most_back_rpm:g} rpm backwards, then within {self.near_percent(item):g} % after {self.allowed_s(item):.1f} s, "
+                        f"or stopped by name {self.table.stop_s:g} s after the release")]
 
     def title(self, rows: list[dict[str, Any]]) -> str:
         return f"{self.table.title}: {len(rows)} rows"
@@ -195,8 +196,8 @@ class Held(sweep.Sweep):
             lines.append({"name": name, **{hold_s: cell(max(group, key=lambda row: (row["verdict"] != "ok", row["backwards_rpm"])))
                                            for hold_s, group in own.items()}})
         return report.table(lines, columns) + (
-            f"\n\neach cell: the highest speed backwards, rpm (at most {self.most_back_rpm:g}), then the time from the release to the reference, or the fault"
-            f" (at most {self.table.stop_s:g} s after it); ! = does not hold")
+            f"\n\neach cell: the highest speed backwards, rpm (at most {self.most_back_rpm:g}), then the time from the release to the reference, "
+            f"or the fault (at most {self.table.stop_s:g} s after it); ! = does not hold")
 
 
 def cell(row: dict[str, Any]) -> str:

@@ -42,7 +42,8 @@ class Table(sweep.Loaded, sweep.Table):
     def for_motor(self, motor: motor_file.Motor, params: dict[str, float]) -> "Table":
         """The table for another motor than its own: the same shares of its rating, and no speed that its header does not have."""
         speeds, torques = case.shares(self.motor, motor, self.speeds_rpm, self.torques_nm)
-        return replace(self, motor=motor.name, speeds_rpm=list(dict.fromkeys(case.within_header(params, rpm) for rpm in speeds)), torques_nm=torques)
+        possible = dict.fromkeys(case.within_header(params, rpm) for rpm in speeds)
+        return replace(self, motor=motor.name, speeds_rpm=list(possible), torques_nm=torques)
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,8 @@ class Pulse(sweep.Sweep):
         """A start of the motor alone, the speed; then the inertia, and the load as a ramp. Its measure begins when that has settled."""
         table, where = self.table, self.table.where
         events, settled_s = case.loaded_run(self.params, item.rpm, table, item.name)
-        events += [Event(settled_s, "set", where, keys={INERTIA: item.inertia * self.motor.values.values[INERTIA]}, note=f"inertia x{item.inertia:g}"),
+        inertia = {INERTIA: item.inertia * self.motor.values.values[INERTIA]}
+        events += [Event(settled_s, "set", where, keys=inertia, note=f"inertia x{item.inertia:g}"),
                    Event(settled_s, "set", where, keys={BRAKE: item.torque_nm, AMPLITUDE: item.torque_nm}, over_s=table.torque_over_s)]
         from_s = settled_s + table.torque_over_s + table.settle_s
         scenario = case.scenario(item.name, table.title, events, item.rpm, from_s, from_s + table.measure_s,
@@ -117,7 +119,8 @@ class Pulse(sweep.Sweep):
         constant = constant_current_rpm(values[INERTIA], item.rpm, item.torque_nm, item.pulses)
         reference = self.reference_rpm(item.rpm, result["asked_rpm"])
         row = {"name": f"{item.rpm:g} rpm, {item.torque_nm:g} N m", "reference_rpm": item.rpm, "torque_nm": item.torque_nm, "inertia": item.inertia,
-               "pulses": item.pulses, **result, "constant_rpm": constant, "swing_share": result["swing_rpm"] / constant if constant and not result["fault"] else None,
+               "pulses": item.pulses, **result, "constant_rpm": constant,
+               "swing_share": result["swing_rpm"] / constant if constant and not result["fault"] else None,
                "speed_error_percent": None if result["fault"] else 100.0 * (result["mean_rpm"] / reference - 1.0),
                "beyond": self.beyond(values, item, result["voltage_limit_v"], constant), "swing_beyond": ""}
         if self.swing_counts(item):
@@ -188,4 +191,5 @@ def whole_turns(part: Trace) -> Trace:
     turns = np.cumsum(part.column("plant.speed_rpm").astype(np.float64)) * part.period_s / 60.0 if len(part) else np.zeros(1)
     if turns[-1] < 1.0:
         return part
-    return part.part(part.time_s[0] - 0.5 * part.period_s, part.time_s[int(np.searchsorted(turns, math.floor(turns[-1])))] + 0.5 * part.period_s)
+    last, half_s = int(np.searchsorted(turns, math.floor(turns[-1]))), 0.5 * part.period_s
+    return part.part(part.time_s[0] - half_s, part.time_s[last] + half_s)

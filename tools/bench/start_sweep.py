@@ -1,5 +1,5 @@
-"""`starts`: the motor started from every rotor angle under several loads, with heavier rotors, and under load with R, L and Kphi that the header does
-not know; or drawn starts, where more is off. Limits are in tools/bench/scenarios/tables/starts.toml.
+"""`starts`: the motor started from every rotor angle under several loads, with heavier rotors, and under load with R, L and Kphi that the
+header does not know; or drawn starts, where more is off. Limits are in tools/bench/scenarios/tables/starts.toml.
 
 Loads, speed and times of the table are for its own motor; another one gets shares of its start torque and rated speed, and the time that
 its header's lock and ramp take.
@@ -106,10 +106,10 @@ class Table(sweep.Table):
         later_s = r.uniform(-self.draw_dead_time, self.draw_dead_time) * dead_s
         keys = {"supply.voltage_v": ("factor", 1.0 + r.uniform(-self.draw_supply, self.draw_supply)),
                 "inverter.turn_on_s": 1e-7 + max(later_s, 0.0), "inverter.turn_off_s": 1.5e-7 + max(-later_s, 0.0),
-                "shunt.offset_a_v": r.uniform(-self.draw_offset_v, self.draw_offset_v), "shunt.offset_b_v": r.uniform(-self.draw_offset_v, self.draw_offset_v),
+                **{f"shunt.offset_{phase}_v": r.uniform(-self.draw_offset_v, self.draw_offset_v) for phase in "ab"},
                 "rng.seed": float(r.randrange(1, 2**31))}
-        return Case(case.three_digits(r.uniform(0.0, self.box_load * max(self.loads_nm))), low * (high / low) ** r.random(), r.uniform(0.0, 360.0), *factors,
-                    number=number, keys=tuple(keys.items()))
+        load_nm = case.three_digits(r.uniform(0.0, self.box_load * max(self.loads_nm)))
+        return Case(load_nm, low * (high / low) ** r.random(), r.uniform(0.0, 360.0), *factors, number=number, keys=tuple(keys.items()))
 
 
 @dataclass(frozen=True)
@@ -206,19 +206,22 @@ class Starts(sweep.Sweep):
         return simulate.prepare(scenario, self.library, self.motor, self.board)
 
     def row(self, item: Case, job: simulate.Job, result: dict[str, Any]) -> dict[str, Any]:
-        return {**asdict(item), "keys": None, "kind": item.kind, "is_off": item.is_off, "beyond": self.beyond(item, job.values) if item.is_off else "", **result}
+        beyond = self.beyond(item, job.values) if item.is_off else ""
+        return {**asdict(item), "keys": None, "kind": item.kind, "is_off": item.is_off, "beyond": beyond, **result}
 
     def beyond(self, item: Case, values: Mapping[str, float]) -> str:
         """Which limit forbids the start of this motor with this header, with its numbers; "" if none does."""
         params = self.params
         ramp_s = start_time_s(params) - START_MARGIN_S - param(params, "LOCK_TIME") * param(params, "LOOPTIME_SEC")
         end_w = param(params, "END_SPEED_RPM") * math.pi / 30.0
-        needs_nm = item.load_nm + values.get("mech.coulomb_nm", 0.0) + values.get("mech.viscous_nms", 0.0) * end_w + values[INERTIA] * end_w / ramp_s
+        friction_nm = values.get("mech.coulomb_nm", 0.0) + values.get("mech.viscous_nms", 0.0) * end_w
+        needs_nm = item.load_nm + friction_nm + values[INERTIA] * end_w / ramp_s
         gives_nm = reach.torque_per_amp(values) * param(params, "Q_CURRENT_REF_OPENLOOP")
         if needs_nm > gives_nm:
             return f"the start's current gives {gives_nm:.3g} N m, load, friction and ramp need {needs_nm:.3g}"
         most_a = param(params, "MAXIMUM_CURRENT_A")
-        return reach.out_of_reach(reach.least(values, self.table.speed_rpm, item.load_nm, most_a), most_a, values["supply.voltage_v"] / math.sqrt(3.0))
+        need = reach.least(values, self.table.speed_rpm, item.load_nm, most_a)
+        return reach.out_of_reach(need, most_a, values["supply.voltage_v"] / math.sqrt(3.0))
 
     def check(self, item: Case, row: dict[str, Any]) -> list[Outcome]:
         """One start against the limits; the first that does not hold is named. What a limit forbids is told as that."""
@@ -262,17 +265,21 @@ class Starts(sweep.Sweep):
             parts.append(self.box_text(box))
         if drawn:
             parts.append(f"{sum(self.first_limit(row)[0] for row in drawn)} of {len(drawn)} drawn starts hold, seed {self.seed}")
-        beyond = dict.fromkeys(f"{reach.BEYOND}: {row['kind']}: {row['beyond']}" for row in off if row["beyond"] and not self.first_limit(row)[0])
+        forbidden = [row for row in off if row["beyond"] and not self.first_limit(row)[0]]
+        beyond = dict.fromkeys(f"{reach.BEYOND}: {row['kind']}: {row['beyond']}" for row in forbidden)
         return "\n\n".join(parts + ["\n".join(beyond)] * bool(beyond))
 
     def box_text(self, rows: list[dict[str, Any]]) -> str:
         """Kphi down, R across: how many starts hold, of every L and angle."""
-        found = {(kphi, r): [row for row in rows if (row["Kphi"], row["R"]) == (kphi, r)] for kphi in self.table.box_kphi for r in self.table.box_resistance}
-        lines = [{"name": f"true Kphi x{kphi:g}", **{r: f"{sum(self.first_limit(row)[0] for row in found[kphi, r])} of {len(found[kphi, r])}"
-                                                     for r in self.table.box_resistance}} for kphi in self.table.box_kphi]
-        columns = tuple((r, f"true R\nx{r:g}", "{}") for r in self.table.box_resistance)
-        return f"starts under {rows[0]['load_nm']:g} N m that hold, true value / the header's, L x{' x'.join(f'{l:g}' for l in self.table.box_inductance)}:\n\n" \
-               + report.table(lines, columns)
+        table = self.table
+
+        def cell(kphi: float, r: float) -> str:
+            holds = [self.first_limit(row)[0] for row in rows if (row["Kphi"], row["R"]) == (kphi, r)]
+            return f"{sum(holds)} of {len(holds)}"
+        lines = [{"name": f"true Kphi x{kphi:g}", **{r: cell(kphi, r) for r in table.box_resistance}} for kphi in table.box_kphi]
+        columns = tuple((r, f"true R\nx{r:g}", "{}") for r in table.box_resistance)
+        inductances = " ".join(f"x{factor:g}" for factor in table.box_inductance)
+        return (f"starts under {rows[0]['load_nm']:g} N m that hold, true value / the header's, L {inductances}:\n\n" + report.table(lines, columns))
 
     def plain_text(self, rows: list[dict[str, Any]]) -> str:
         """Angles down, loads and inertias across; each cell: seconds to closed loop, its speed, the worst speed backwards, overshoot, speed error."""

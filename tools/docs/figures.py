@@ -115,6 +115,57 @@ def catches() -> Table:
     return ["motor", "rotor at S2, rpm", "in control", "slowest, after S2", "largest current", "stop from", "inertia x1 / x9 / x36", "bus, at most"], rows
 
 
+def motor_names() -> list[str]:
+    return sorted(path.stem for path in (ROOT / "tuning/motors").glob("*.toml"))
+
+
+def counted(names: list[str]) -> str:
+    """Each name once, with how often it is there."""
+    return ", ".join(f"{names.count(name)} {name}" for name in sorted(set(names))) or "none"
+
+
+def helds() -> Table:
+    """A line for each motor: a shaft that is held and let go."""
+    rows = []
+    for motor in motor_names():
+        data = of_motor("held", motor)
+        back, faults = ([row for row in data["rows"] if bool(row["fault"]) == stopped] for stopped in (False, True))
+        taken = [row["back_s"] for row in back]
+        rows.append([motor, held(data), f"{max(row['backwards_rpm'] for row in data['rows']):.0f} rpm", str(len(back)),
+                     "never" if None in taken else f"{max(taken, default=0.0):.2f} s", counted([row["fault"] for row in faults]),
+                     f"{max((row['fault_s'] for row in faults), default=0.0):.2f} s"])
+    return ["motor", "holds after which all is well", "backwards, at most", "back at the speed", "slowest", "stopped", "latest after the release"], rows
+
+
+def pulses() -> Table:
+    """A line for each motor: a load that pulses with the shaft's angle."""
+    rows = []
+    for motor in motor_names():
+        data = of_motor("pulse", motor)
+        carried = [row for row in data["rows"] if not row["beyond"]]
+        errors = [abs(row["speed_error_percent"]) for row in carried if row["speed_error_percent"] is not None]
+        swings = [row["swing_share"] for row in carried if row["swing_limit"] != "-" and row["swing_share"] is not None]
+        rows.append([motor, held(data), str(len(data["rows"]) - len(carried)), counted([row["fault"] for row in carried if row["fault"]]),
+                     f"{max(errors, default=0.0):.2f} %", f"{max(swings, default=0.0):.2f}"])
+    return ["motor", "rows that hold", "out of reach", "faults of the others", "mean speed off, at most", "swing, inertia x3, of constant current's"], rows
+
+
+def boxes() -> Table:
+    """A line for each motor: starts with R, L and Kphi that the header does not know."""
+    rows = []
+    for motor in motor_names():
+        box = [row for row in zipped(of_motor("starts", motor)) if row["is_off"]]
+        drawn = zipped(of_motor("starts-draw-1", motor))
+        rows.append([motor, *(f"{sum(row['ok'] for row in some)} of {len(some)}" for some in (box, drawn)),
+                     str(sum(bool(row["beyond"]) for row in box + drawn)), counted([row["fault"] for row in box + drawn if row["fault"]])])
+    return ["motor", "starts of the box that hold", "drawn starts that hold", "out of reach", "faults"], rows
+
+
+def zipped(data: dict) -> list[dict]:
+    """Rows with whether each holds."""
+    return [row | {"ok": outcome["ok"]} for row, outcome in zip(data["rows"], data["expectations"])]
+
+
 def campaign() -> str:
     classes = {name: count for name, count in result("seed-1", "campaign", "make campaign")["classes"].items() if count}
     if sum(classes.values()) < 2000:
@@ -135,9 +186,9 @@ def closed_loop() -> str:
 
 
 def starts() -> str:
-    found = result("starts")
-    hand_over = max(row["hand_over_rpm"] for row in found["rows"] if row["inertia"] == 1.0)
-    return f"{held(found)}; {max(row['back_rpm'] for row in found['rows']):.0f} rpm; {hand_over:.0f} rpm"
+    found = [row for row in zipped(result("starts")) if not row["is_off"]]
+    hand_over = max(row["hand_over_rpm"] for row in found if row["inertia"] == 1.0)
+    return f"{sum(row['ok'] for row in found)} of {len(found)}; {max(row['back_rpm'] for row in found):.0f} rpm; {hand_over:.0f} rpm"
 
 
 def stop() -> str:
@@ -218,6 +269,9 @@ BLOCKS: dict[str, list[Part]] = {
     "motors": [Part(("motors", "identify"), motors)],
     "stiffness": [Part(("loadsteps", "lowspeed"), stiffness)],
     "catch": [Part(("catch",), catches)],
+    "held": [Part(("held",), helds)],
+    "pulse": [Part(("pulse",), pulses)],
+    "box": [Part(("box",), boxes)],
     "tests": [Part(("tests",), tests)],
     "table2": [Part(("table2",), table2)],
     "size": [Part(("size",), lambda: size.readme_table(loaded("target/size.json")))],
