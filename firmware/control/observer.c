@@ -147,6 +147,7 @@ void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, 
     int32_t before_q16 = o->omega_q16;
     o->omega_q16 = observer_sum(o->omega_q16, (qm_mulsu(iq_q13, p->per_current_q16) - o->load_q16) >> p->shift);
     innovation = observer_innovation(o, p, rho_q32, qm_hi((before_q16 >> 1) + (o->omega_q16 >> 1)));
+    o->innovation_erpm = innovation;
     o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
     o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
     if (qm_abs(innovation) > o->wrong_erpm) {

@@ -24,6 +24,9 @@ void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t 
     fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, ref_erpm);
     salient_model(run, p);
     adaptation_apply(&run->adaptation, &p->adaptation, &run->model);
+    if (held_angle_stands(&run->held)) {
+        run->model.inv_kfi = 0;
+    }
 }
 
 void drive_init(drive_t *d, const drive_params_t *p)

@@ -136,6 +136,9 @@ void handover_step(drive_t *d, const drive_params_t *p)
 void handover_observe(drive_run_t *run, const drive_params_t *p)
 {
     const drive_control_t *c = &run->control;
+    if (held_angle_stands(&run->held)) {
+        return;
+    }
     if (run->handover.phase == (uint16_t)START_DONE) {
         observer_step(&run->observer, &p->observer, run->estimator.rho_q32, salient_torque(run, c->i_q13.q));
         if (run->handover.offset != 0) {

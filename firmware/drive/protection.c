@@ -65,7 +65,7 @@ void protection_check_model(drive_t *d, const drive_params_t *p)
 
 /** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand, for a voltage in phase
  *  with the current is both. */
-static uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
+uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t r_more = (int16_t)(p->rs_off_most - qm_hi(run->adaptation.rs_q31));
     int16_t less_q12 = (int16_t)(qm_abs(estimator_emf(&run->estimator).q) - p->adaptation.emf_least_q12);
@@ -85,7 +85,7 @@ current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t
 }
 
 /** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
-static speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
+speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
     return (least < standing) ? standing : least;

@@ -2,6 +2,7 @@
 #include "drive/schedule.h"
 
 #include "drive/drive.h"
+#include "drive/held.h"
 #include "drive/limits.h"
 #include "drive/protection.h"
 #include "drive/signals.h"
@@ -103,6 +104,7 @@ static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_
 {
     speed_trim_step(d, p);
     protection_check_rotor(d, p);
+    held_step(d, p);
     if (!observer_gate_is_closed(&d->run.observer)) {
         follow_speed(d, p, raw);
     }

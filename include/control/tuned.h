@@ -94,6 +94,15 @@
 #define CATCH_BUS_SHIFT 5           /* [shift] a start waits for a bus 1/32 below its trip | catch */
 #define CATCH_FALL_SHIFT 7          /* [shift] which must fall by 1/128 in some tenths of a second, or it is the supply that holds it | catch */
 
+/* ---- Held shaft ---- */
+#define HELD_DOUBTS_MOST 5u   /* [1] steps of 16 periods, below half the reference, that look like a held rotor: then the angle stands | loadsteps */
+#define HELD_DOUBTS_FAR 3u    /* [1] below an eighth of the reference a step counts as many | held */
+#define HELD_LAG_SHIFT 4      /* [shift] of what the back-EMF's filter is behind 1/16 is forgotten a step | held */
+#define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
+#define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
+#define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
+#define HELD_AGAIN_STEPS 10u  /* [steps] of 16 periods before a rotor that turns is asked again | pulse */
+
 /* ---- Protection ---- */
 #define PARAM_R_LEAST 0.7           /* [1] true R over the header's, as make robust promises | robust */
 #define PARAM_R_MOST 1.5            /* [1] upwards | robust */

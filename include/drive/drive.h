@@ -8,6 +8,7 @@
 #include "control/svm.h"
 #include "drive/catch.h"
 #include "drive/handover.h"
+#include "drive/held.h"
 #include "drive/model.h"
 #include "drive/modes/modes.h"
 #include "drive/selftest.h"
@@ -110,6 +111,7 @@ struct drive_run {
     adaptation_t adaptation;
     observer_t observer;
     handover_t handover;
+    held_t held;
     catch_t catching;
     drive_control_t control;
     uint16_t stall_steps;         /**< of 16 periods below half the reference, less four for each above */

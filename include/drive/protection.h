@@ -22,6 +22,9 @@ uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_param
  *  resistance is too hot. Slot 14 in closed loop. */
 void protection_check_model(drive_t *d, const drive_params_t *p);
 
+uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p);
+speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p);
+
 /** The probe whether the rotor turns. */
 typedef enum {
     PROBE_WAIT, /**< until the rotor may stand though it seems to turn */

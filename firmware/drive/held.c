@@ -1,0 +1,235 @@
+/* A shaft that is held: may the rotor stand, does it, and does it turn again? */
+#include "drive/held.h"
+
+#include "control/tuned.h"
+#include "drive/drive.h"
+#include "drive/protection.h"
+#include "drive/speed.h"
+
+#define HELD_QUARTER 16384                      /* of a turn, angle counts */
+#define HELD_PERIOD_MOST (DEFER_DUTIES ? 512 : 1024) /* a quarter turn a step, of a period, high word */
+#define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12) /* from a period's turn, Q32, to a step's, angle counts */
+
+/** The one place that writes the phase. */
+static void held_enter(held_t *h, held_phase_t next)
+{
+    h->phase = (uint16_t)next;
+    h->steps = 0;
+    h->doubts = 0;
+}
+
+uint16_t held_angle_stands(const held_t *h)
+{
+    return (uint16_t)(h->phase >= (uint16_t)HELD_SETTLES);
+}
+
+/** How far the back-EMF has moved. */
+static uint16_t held_moved(dq_t emf, dq_t from)
+{
+    return (uint16_t)((uint16_t)qm_abs((int16_t)(emf.d - from.d)) + (uint16_t)qm_abs((int16_t)(emf.q - from.q)));
+}
+
+/** How fast the estimator would turn. */
+static speed_erpm_t held_speed(const drive_run_t *run, dq_t emf)
+{
+    return estimator_omega((int16_t)(emf.q - run->estimator.sign * emf.d), run->model.emf_sum_max_q12, run->held.inv_kfi);
+}
+
+/** The angle that a speed turns in so many steps, a quarter turn at most. */
+static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uint16_t steps)
+{
+    const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST, HELD_PERIOD_MOST); /* a quarter turn in a step */
+    const int32_t turned = qm_mulss((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), (int16_t)steps);
+    return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER : turned);
+}
+
+int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
+{
+    const speed_erpm_t more = estimator_omega(lag_q12, run->model.emf_sum_max_q12, run->model.inv_kfi);
+    const uint32_t period_q32 = (uint32_t)qm_mulss(qm_abs(more), p->estimator.deltat_q32);
+    const uint16_t k_q16 = run->model.kfilter_esdq_q16;
+    const uint16_t lead = ((uint16_t)(period_q32 >> 16) >= (k_q16 >> 1)) ? 32767u : qm_divud(period_q32, k_q16);
+    return qm_with_sign((int16_t)lead, more);
+}
+
+/** Turns the frame back, and the vector that is commanded stays. */
+static void held_turn_back(drive_t *d, const drive_params_t *p, int16_t lead)
+{
+    drive_control_t *c = &d->run.control;
+    estimator_t *e = &d->run.estimator;
+    const alphabeta_t v = inverse_park(c->v_q14, trig_sincos((angle_t)lead));
+    c->v_q14.d = (int16_t)(2 * v.alpha);
+    c->v_q14.q = (int16_t)(2 * v.beta);
+    e->rho_q32 = qm_turn_sub(e->rho_q32, (uint32_t)(angle_t)lead << 16);
+    e->next = (angle_t)(e->next - (angle_t)lead);
+    handover_preset(d, p, e->next);
+}
+
+/** How much a step says for a rotor that stands: it is slower than what counts as a stall, and R i may be all of the back-EMF. Once R is known it is
+ *  a rotor without back-EMF. */
+static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
+{
+    const drive_run_t *run = &d->run;
+    const speed_erpm_t along = along_direction(d, observer_speed(&run->observer)), least = protection_least_speed(run, p);
+    const dq_t none = { 0, 0 };
+    if (run->held.stood) {
+        return (uint16_t)((held_moved(emf, none) <= (uint16_t)p->adaptation.emf_least_q12) ? HELD_DOUBTS_FAR : 0u);
+    }
+    if (along >= least || run->handover.phase != (uint16_t)START_DONE || run->probe_phase == (uint16_t)PROBE_TEST || mode_commands_current(d)
+        || !protection_rotor_is_doubtful(run, p)) {
+        return 0;
+    }
+    return (along < (least >> 2)) ? HELD_DOUBTS_FAR : 1u;
+}
+
+/** The angle stops where a rotor would be that stopped at once. */
+static void held_stop_angle(drive_t *d, const drive_params_t *p)
+{
+    held_t *h = &d->run.held;
+    const int16_t lead = held_lead(&d->run, p, h->lag_q12);
+    h->omega_erpm = d->run.estimator.omega_erpm;
+    h->inv_kfi = d->run.model.inv_kfi;
+    h->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
+    h->stopped_steps = 0;
+    held_turn_back(d, p, lead);
+    held_enter(h, HELD_SETTLES);
+    d->run.model.inv_kfi = 0;
+    d->run.observer.omega_q16 = 0;
+    d->run.estimator.omega_filtered_q16 = 0;
+}
+
+/** The estimator goes on. @param omega_erpm of the rotor @param load of the observer */
+static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_erpm, int32_t load_q16)
+{
+    drive_run_t *run = &d->run;
+    held_enter(&run->held, HELD_TURNS);
+    drive_update_model(run, p, run->control.reference_erpm);
+    observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, omega_erpm, 0);
+    run->observer.load_q16 = load_q16;
+    run->observer.fast_share_q15 = 32767;
+    run->observer.gate_level = 0;
+    run->held.lag_q12 = 0;
+}
+
+/** It has turned all the time, as fast as the estimator saw it. */
+static void held_has_turned(drive_t *d, const drive_params_t *p)
+{
+    const speed_erpm_t omega_erpm = d->run.held.omega_erpm;
+    held_turn_back(d, p, (int16_t)-held_turned(p, omega_erpm, d->run.held.stopped_steps));
+    held_go_on(d, p, omega_erpm, d->run.observer.load_q16);
+}
+
+/** It stood, and turns now. The load is that of before; where that was too little before, what flows. */
+static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
+{
+    drive_run_t *run = &d->run;
+    held_t *h = &run->held;
+    const int32_t load_q16 = (h->stood > 1u) ? run->observer.load_q16 : (int32_t)h->load * 65536;
+    h->stood = 2;
+    held_go_on(d, p, held_speed(run, emf), load_q16);
+}
+
+/** 1 where the back-EMF has turned as with a rotor as fast as it says: by more than half of that. */
+static uint16_t held_emf_turns(const held_t *h, const drive_run_t *run, const drive_params_t *p, dq_t emf)
+{
+    const int16_t angle = held_turned(p, held_speed(run, h->emf_q12), h->steps);
+    const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(h->emf_q12.q, angle))); /* pi, nearly */
+    const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 2);
+    return (uint16_t)(qm_abs((int16_t)(emf.d - h->emf_q12.d)) > ((half > least) ? half : least));
+}
+
+/** The rotor stands: all of the back-EMF is R i, and turned the angle while it seemed one. */
+static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
+{
+    drive_run_t *run = &d->run;
+    held_t *h = &run->held;
+    const current_q13_t iq_q13 = run->control.i_q13.q;
+    const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(emf.q);
+    int16_t share;
+    held_enter(h, HELD_STANDS);
+    if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
+        if (h->stood == 0u) {
+            held_turn_back(d, p, held_turned(p, held_speed(run, emf), (uint16_t)(h->doubted_steps + 1u)));
+        }
+        share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
+        share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
+        run->adaptation.rs_q31 = qm_clamp_hi(run->adaptation.rs_q31 + (int32_t)share * 65536, p->adaptation.rs_least, p->adaptation.rs_most);
+        drive_update_model(run, p, run->control.reference_erpm);
+        emf.d = 0;
+        emf.q = 0;
+    }
+    h->stood = (h->stood == 0u) ? 1u : h->stood;
+    h->emf_q12 = emf;
+}
+
+/** The angle turns. */
+static void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
+{
+    held_t *h = &d->run.held;
+    const uint16_t doubts = held_doubts(d, p, emf);
+    int32_t lag = (int32_t)h->lag_q12 - (h->lag_q12 >> HELD_LAG_SHIFT) + h->emf_q12.q - emf.q
+                  - d->run.estimator.sign * (qm_mulsu(emf.d, d->run.model.kfilter_esdq_q16) >> 12);
+    h->lag_q12 = (int16_t)((lag > 32767) ? 32767 : (lag < -32767) ? -32767 : lag);
+    h->doubted_steps = (uint16_t)((doubts != 0u) ? h->doubted_steps + 1u : 0u);
+    h->doubts = (uint16_t)((doubts != 0u) ? h->doubts + doubts : 0u);
+    if (h->phase == (uint16_t)HELD_NOT) {
+        if (observer_gate_is_closed(&d->run.observer)) {
+            h->load = qm_hi(d->run.observer.load_q16);
+        }
+    } else if (along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
+               || (h->stood == 0u && h->steps >= HELD_AGAIN_STEPS)) {
+        held_enter(h, HELD_NOT);
+        h->stood = 0;
+    } else if (h->stood == 0u) {
+        h->doubts = 0;
+    } else {
+        /* it speeds up */
+    }
+    if (h->doubts >= HELD_DOUBTS_MOST) {
+        held_stop_angle(d, p);
+    }
+}
+
+void held_step(drive_t *d, const drive_params_t *p)
+{
+    held_t *h = &d->run.held;
+    const dq_t emf = estimator_emf(&d->run.estimator);
+    const uint16_t moved = held_moved(emf, h->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
+
+    h->steps++;
+    h->stopped_steps++;
+    switch (h->phase) {
+    case HELD_SETTLES:
+        if (moved <= most >> 1) {
+            held_enter(h, HELD_ASKED);
+        } else if (h->steps > h->patience) {
+            held_has_turned(d, p);
+        } else {
+            /* the current changes */
+        }
+        h->emf_q12 = emf;
+        break;
+    case HELD_ASKED:
+        if (moved > 2u * most || (h->steps == HELD_ASK_STEPS && held_emf_turns(h, &d->run, p, emf))) {
+            held_has_turned(d, p);
+            h->emf_q12 = emf;
+        } else if (h->steps == HELD_ASK_STEPS) {
+            held_learn(d, p, emf);
+        } else {
+            /* wait */
+        }
+        break;
+    case HELD_STANDS:
+        if (moved > most) {
+            held_turns_again(d, p, emf);
+            h->emf_q12 = emf;
+        } else { /* the load is what flows, and it grows */
+            observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
+        }
+        break;
+    default:
+        held_watch(d, p, emf);
+        h->emf_q12 = emf;
+        break;
+    }
+}

@@ -1,0 +1,48 @@
+/* A shaft that is held: the rotor stands while the drive turns it, and then it is let go.
+ *
+ * The estimator cannot see a rotor that stands: R i and a back-EMF look alike. Its angle runs away, and a shaft that is let go is thrown wherever the
+ * angle has come to. So where the rotor may stand, the angle stands, too, and the current with it. A back-EMF that stands still is R i alone: it tells R,
+ * and how far the angle had run. One that turns or changes is a rotor that turns, and the estimator goes on. A rotor that stands for PARAM_STALL_SEC is a
+ * stall as ever. */
+#ifndef DRIVE_HELD_H
+#define DRIVE_HELD_H
+
+#include "control/transforms.h"
+#include "drive/forward.h"
+
+/** What is known of the rotor. From HELD_SETTLES on the angle stands. */
+typedef enum {
+    HELD_NOT,     /**< it turns as it should */
+    HELD_TURNS,   /**< it was asked, and turns */
+    HELD_SETTLES, /**< the angle stands, until the back-EMF does */
+    HELD_ASKED,   /**< both stand: does the back-EMF turn as a rotor would? */
+    HELD_STANDS   /**< the rotor stands, until the back-EMF moves */
+} held_phase_t;
+
+/** A rotor that may be held. A step is two of the load observer's, 16 periods. Zero is a valid start. */
+typedef struct {
+    uint16_t phase;          /**< held_phase_t; written by held_enter() only */
+    uint16_t steps;          /**< in the phase */
+    uint16_t doubts;         /**< steps that look like a held rotor; a rotor far below its reference counts three */
+    uint16_t doubted_steps;  /**< since then */
+    uint16_t stopped_steps;  /**< since the angle stands */
+    uint16_t patience;       /**< steps that the back-EMF has to settle */
+    uint16_t stood;          /**< 1: the rotor has stood since it was as fast as it should be, so R is known */
+    dq_t emf_q12;            /**< filtered back-EMF of the last step; of an older one from HELD_ASKED on */
+    int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */
+    int16_t inv_kfi;         /**< of the model when the angle stopped */
+    speed_erpm_t omega_erpm; /**< the estimator's speed then */
+    int16_t load;            /**< the load before all that, of the load observer */
+} held_t;
+
+/** 1 while the angle stands. The model's 1/Kphi is 0 then: no back-EMF turns the angle. */
+uint16_t held_angle_stands(const held_t *h);
+
+/** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter went on turning it. @param lag_q12 see held_t
+ *  @return angle counts, half a turn at most */
+int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12);
+
+/** A step, every 16 periods in closed loop. */
+void held_step(drive_t *d, const drive_params_t *p);
+
+#endif
