@@ -79,7 +79,10 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
         || !protection_rotor_is_doubtful(run, p)) {
         return 0;
     }
-    return (along < (least >> 2)) ? HELD_DOUBTS_FAR : 1u;
+    if (along < (least >> 2)) {
+        return HELD_DOUBTS_FAR;
+    }
+    return (uint16_t)!observer_gate_is_closed(&run->observer); /* a load slows it down that the observer knows */
 }
 
 /** The angle stops where a rotor would be that stopped at once. */
@@ -210,7 +213,7 @@ void held_step(drive_t *d, const drive_params_t *p)
         h->emf_q12 = emf;
         break;
     case HELD_ASKED:
-        if (moved > 2u * most || (h->steps == HELD_ASK_STEPS && held_emf_turns(h, &d->run, p, emf))) {
+        if (moved > 2u * most || (h->steps > 1u && held_emf_turns(h, &d->run, p, emf))) {
             held_has_turned(d, p);
             h->emf_q12 = emf;
         } else if (h->steps == HELD_ASK_STEPS) {
