@@ -48,26 +48,80 @@ static drive_fault_t signals_which_is_wrong(const uint16_t *sums)
     return (least < (most >> SIGNALS_OPEN_SHIFT)) ? FAULT_OPEN_PHASE : FAULT_CURRENT_SENSOR;
 }
 
+/** Adds x times a pointer. */
+static void signals_add_along(signals_beat_t *sum, int16_t x, sincos_t at)
+{
+    sum->cosine += qm_hi(2 * qm_mulss(x, at.cos));
+    sum->sine += qm_hi(2 * qm_mulss(x, at.sin));
+}
+
+/** Takes a step into the sums. */
+static void signals_gather(signals_evidence_t *e, const drive_t *d, uint16_t unexplained)
+{
+    const int16_t x = d->run.observer.innovation_erpm;
+    const sincos_t at = d->frame;
+    sincos_t twice;
+    twice.cos = (int16_t)(qm_mulhi(at.cos, at.cos) - qm_mulhi(at.sin, at.sin)); /* half */
+    twice.sin = (int16_t)(2 * qm_mulhi(at.cos, at.sin));
+    signals_add_along(&e->once, x, at);
+    signals_add_along(&e->twice, (int16_t)(2 * qm_limit(x, 16383)), twice);
+    e->size += (uint16_t)qm_abs(x);
+    e->checks++;
+    e->unexplained = (uint16_t)(e->unexplained + unexplained);
+    signals_add_sizes(e->phases, d->phases_q13.a, d->phases_q13.b, d->phases_q13.c, SIGNALS_WRONG_SHIFT);
+}
+
+/** How much of the sum turns with its pointer. @return 1 to 1.4 times that */
+static uint32_t signals_beat(const signals_beat_t *sum)
+{
+    return (uint32_t)((sum->cosine < 0) ? -sum->cosine : sum->cosine) + (uint32_t)((sum->sine < 0) ? -sum->sine : sum->sine);
+}
+
+/** 1 where only a wrong signal can be behind it. */
+static uint16_t signals_prove(const signals_evidence_t *e, const drive_params_t *p)
+{
+    return (uint16_t)(signals_beat(&e->once) + signals_beat(&e->twice) > e->size / 2u + e->size / 8u || e->size > qm_muluu(e->checks, p->load_erpm)
+                      || e->unexplained > e->checks / 2u);
+}
+
+/** Half of all that proves nothing. */
+static void signals_fade(observer_t *o, signals_evidence_t *e)
+{
+    uint16_t n;
+    o->wrong_steps >>= 1;
+    e->once.cosine /= 2;
+    e->once.sine /= 2;
+    e->twice.cosine /= 2;
+    e->twice.sine /= 2;
+    e->size >>= 1;
+    e->checks >>= 1;
+    e->unexplained >>= 1;
+    for (n = 0; n < 3u; n++) { /* wcet: at most 3 turns */
+        e->phases[n] >>= 1;
+    }
+}
+
 void signals_check(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    if (signals_voltage_is_unexplained(run, p)) {
+    const uint16_t unexplained = signals_voltage_is_unexplained(run, p);
+    if (unexplained) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + SIGNALS_UNEXPLAINED);
     }
     if (run->observer.wrong_steps == 0u) {
-        run->phase_sums[0] = 0;
-        run->phase_sums[1] = 0;
-        run->phase_sums[2] = 0;
+        drive_zero(&run->evidence, sizeof run->evidence);
         return;
     }
-    signals_add_sizes(run->phase_sums, d->phases_q13.a, d->phases_q13.b, d->phases_q13.c, SIGNALS_WRONG_SHIFT);
+    signals_gather(&run->evidence, d, unexplained);
     if (run->observer.wrong_steps <= p->wrong_steps) {
         return;
     }
     if (signals_stop_is_blurred(d, p)) {
         drive_enter(d, DRIVE_STOPPED); /* as at a stop's end: the bridge goes off and the rotor runs out */
+    } else if (signals_prove(&run->evidence, p)) {
+        drive_raise(d, signals_which_is_wrong(run->evidence.phases));
     } else {
-        drive_raise(d, signals_which_is_wrong(run->phase_sums));
+        signals_fade(&run->observer, &run->evidence);
     }
 }
 

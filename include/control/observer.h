@@ -41,7 +41,7 @@ typedef struct {
     int16_t wrong_erpm;     /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
     int16_t gate_erpm;      /**< a large innovation begins here */
     q15_t fast_share_q15;   /**< 1 = a large innovation was just seen */
-    int16_t innovation_erpm;
+    int16_t innovation_erpm; /**< of the last step: the speed that was seen, less the one expected */
     uint16_t wrong_steps;   /**< steps with an innovation above wrong_erpm, less those without */
     int16_t gate_last_erpm; /**< the last large innovation */
     uint16_t gate_level;    /**< four for each step that was not calm, less one for each that was */

@@ -12,6 +12,7 @@
 #include "drive/model.h"
 #include "drive/modes/modes.h"
 #include "drive/selftest.h"
+#include "drive/signals.h"
 #include "drive/startup.h"
 
 /** Constants of the machine around the control law. Times in periods, or in steps of the slot that counts them (drive/schedule.h): 8, 16
@@ -64,6 +65,7 @@ struct drive_params {
     uint16_t stall_steps;      /**< steps of 16 periods below half the reference that are a stall */
     uint16_t lost_lock_steps;  /**< of 16 periods: out of lock that are a lost one */
     uint16_t wrong_steps;      /**< of 8 periods: voltages and currents do not fit the motor */
+    uint16_t load_erpm;        /**< mean innovation that no load can make that the motor can carry */
     uint16_t impossible_steps; /**< of 32 periods: flux or resistance beyond what a motor can have */
     q15_t kfi_impossible;      /**< change of 1/Kphi that asks for more flux than the header's may be off */
     current_q13_t id_off_q13;  /**< d current's mean deviation that noise and dead time make at most */
@@ -120,7 +122,7 @@ struct drive_run {
     uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference; more than a dip while the probe's own lasts */
     current_q13_t probe_id_q13;   /**< its d current */
     current_q13_t probe_most_q13; /**< and the most of it */
-    uint16_t phase_sums[3];       /**< |current| of the phases while wrong_steps grow, Q13 / 64 */
+    signals_evidence_t evidence;  /**< while wrong_steps grow */
     uint16_t impossible_steps;    /**< how long flux or resistance has been impossible */
     uint16_t lost_lock_steps;     /**< two for each 16 periods out of lock, less one for each in lock */
     alphabeta_t deferred_v_q13;   /**< the vector whose duties wait for the next control interrupt, where they do */

@@ -1,6 +1,8 @@
 /* Do the measured currents fit? An open phase and a wrong current signal, by two rules that see different motors.
  *
  *                   the law's rule: signals_check()                      the background's rule: signals_phases(), signals_d_current()
+ * asks first        are innovations large in time with the electrical
+ *                   angle, or beyond what a load can do?
  * asks              do voltages and currents fit the motor?              does what flows follow what is asked for?
  * sums              |current| of each phase, while they do not fit       |current| of each phase, asked and measured, over 64 samples
  * OPEN_PHASE        the least sum is below a quarter of the largest      a phase's measured sum, as a share of what is asked of it, is
@@ -15,6 +17,21 @@
 #include "drive/forward.h"
 
 /* ---- the law's rule, in the control law's slow work ---- */
+
+/** Sums of something times a turning pointer: large where it turns with the pointer. */
+typedef struct {
+    int32_t cosine, sine;
+} signals_beat_t;
+
+/** What the innovations are like while many are large. Those of a load follow the shaft; those of a wrong current signal follow the electrical angle or
+ *  twice that, or are larger than any load makes them. All of it is halved where it proves nothing. */
+typedef struct {
+    signals_beat_t once, twice; /**< innovations times cosine and sine of the angle, and of twice the angle, erpm */
+    uint32_t size;             /**< sum of their sizes */
+    uint16_t checks;           /**< in the sums */
+    uint16_t unexplained;      /**< of them, with a voltage that nothing explains */
+    uint16_t phases[3];        /**< |current| of the phases, Q13 / 64 */
+} signals_evidence_t;
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
  *  with what is measured. Slot 14 in closed loop; while something is wrong slots 3, 7, 11, 15 in its place, for the phases' sums must not meet the same
