@@ -36,8 +36,9 @@ POWER_UP_S = 0.1
 PRESS_S = 0.1
 PERIODS_A_LOOK = 20
 SIGNALS = ("plant.i_a", "plant.i_b", "plant.speed_rpm", "fw.i_d_a", "fw.i_q_a", "fw.v_d_v", "fw.v_q_v")
-WATCH = ("step", "result", "Rs_mohm", "Ld_uH", "Lq_uH", "Kphi_mV_per_krpm", "J_1e8_kgm2", "Coulomb_uNm", "Viscous_nNms")
-"""Members of IdentifyParm in include/board/watch.h."""
+WATCH = ("step", "result")
+VALUES = ("Rs_uohm", "Ld_nH", "Lq_nH", "Kphi_uV_per_krpm", "J_1e9_kgm2", "Coulomb_1e8_Nm", "Viscous_1e9_Nms")
+"""Members of IdentifyParm in include/board/modes/mode_board.h: of 16 bits, then of 32."""
 
 
 # ---- the neutral header ----------------------------------------------------------------------------------------------------
@@ -98,7 +99,9 @@ def measure(job: Job, report_s: Callable[[float], None]) -> Measured:
 
 
 def _watch(board: Board) -> dict[str, int]:
-    return {name: value & 0xFFFF for name, value in zip(WATCH, board.variable("IdentifyParm", len(WATCH)))}
+    words = [value & 0xFFFF for value in board.variable("IdentifyParm", len(WATCH) + 2 * len(VALUES))]
+    low, high = words[len(WATCH)::2], words[len(WATCH) + 1::2]
+    return dict(zip(WATCH, words)) | {name: lower + 65536 * upper for name, lower, upper in zip(VALUES, low, high)}
 
 
 def _measure(job: Job, library: Library, board: Board, report_s: Callable[[float], None]) -> Measured:

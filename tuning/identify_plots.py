@@ -49,11 +49,11 @@ def _resistance(item: Identified, spans: dict[str, tuple[float, float]], axes: n
         ax.plot(part.time_s, part.column(signal), color="tab:blue")
         ax.set(ylabel=label, xlabel="time [s]")
         _label_steps(ax, spans, steps)
-    axes[0].set_title(f"{item.motor.name}: two levels of current along phase A; R loop = {item.measured.watch['Rs_mohm']} mohm")
+    axes[0].set_title(f"{item.motor.name}: two levels of current along phase A; R loop = {1e-3 * item.measured.watch['Rs_uohm']:.5g} mohm")
 
 
 def _inductance(item: Identified, spans: dict[str, tuple[float, float]], axes: np.ndarray) -> None:
-    for ax, step, on_q, value in ((axes[0], "INDUCTANCE_D", False, "Ld_uH"), (axes[1], "INDUCTANCE_Q", True, "Lq_uH")):
+    for ax, step, on_q, value in ((axes[0], "INDUCTANCE_D", False, "Ld_nH"), (axes[1], "INDUCTANCE_Q", True, "Lq_nH")):
         if step not in spans:
             ax.set_axis_off()
             continue
@@ -66,7 +66,7 @@ def _inductance(item: Identified, spans: dict[str, tuple[float, float]], axes: n
         ax.plot(time_ms, current, ".-", color="tab:blue", label=f"{axis} current at the samples")
         ax.plot(time_ms, part.column("fw.i_q_a" if on_q else "fw.i_d_a"), ".", markersize=3, color="tab:orange", label="as the converter sees it")
         ax.set(ylabel="current [A]", xlabel="time [ms]")
-        ax.set_title(f"{item.motor.name}, {axis} axis: L{axis} = {item.measured.watch[value]} uH", loc="left")
+        ax.set_title(f"{item.motor.name}, {axis} axis: L{axis} = {1e-3 * item.measured.watch[value]:.5g} uH", loc="left")
         other = ax.twinx()
         other.step(time_ms, part.column("fw.v_q_v" if on_q else "fw.v_d_v"), where="post", color="tab:grey", linewidth=0.8)
         other.set_ylabel("commanded voltage [V]")
@@ -89,7 +89,7 @@ def _back_emf(item: Identified, spans: dict[str, tuple[float, float]], axes: np.
     omega = pairs * speed * np.pi / 30.0
     i = _blocks(part, "fw.i_d_a") + 1j * _blocks(part, "fw.i_q_a")
     v = _blocks(part, "fw.v_d_v") + 1j * _blocks(part, "fw.v_q_v")
-    emf = v - 1e-3 * watch["Rs_mohm"] * i - 1j * omega * 1e-6 * watch["Ld_uH"] * i
+    emf = v - 1e-6 * watch["Rs_uohm"] * i - 1j * omega * 1e-9 * watch["Ld_nH"] * i
     axes[0].plot(time_s, speed, color="tab:blue", label="true speed")
     axes[0].axhline(item.known.speed_rpm, color="black", linewidth=0.7, label="END_SPEED_RPM")
     axes[0].axhline(0.5 * item.known.speed_rpm, color="black", linewidth=0.7, linestyle="--", label="half of it")
@@ -97,7 +97,7 @@ def _back_emf(item: Identified, spans: dict[str, tuple[float, float]], axes: np.
     axes[1].plot(time_s, np.abs(emf), color="tab:blue", label="length of v - R i - jwL i")
     axes[1].plot(time_s, emf.real, color="tab:orange", linewidth=0.7, label="along the current")
     axes[1].plot(time_s, omega * item.values["motor.psi_vs"], color="black", linewidth=0.7, label="true")
-    axes[1].set(ylabel="back-EMF [V, phase]", xlabel="time [s]", title=f"Kphi = {watch['Kphi_mV_per_krpm']} mV peak line to line per 1000 rpm")
+    axes[1].set(ylabel="back-EMF [V, phase]", xlabel="time [s]", title=f"Kphi = {1e-3 * watch['Kphi_uV_per_krpm']:.5g} mV peak line to line per 1000 rpm")
     for ax in axes:
         _label_steps(ax, spans, tuple(steps))
         ax.legend(loc="center right")

@@ -115,12 +115,12 @@ class Identified:
 
     @property
     def winding_ohm(self) -> float:
-        return 1e-3 * self.measured.watch["Rs_mohm"] - self.bridge_ohm
+        return 1e-6 * self.measured.watch["Rs_uohm"] - self.bridge_ohm
 
     @property
     def inertia_kgm2(self) -> float:
         """Of all that turns."""
-        return 1e-8 * self.measured.watch["J_1e8_kgm2"]
+        return 1e-9 * self.measured.watch["J_1e9_kgm2"]
 
     def rows(self) -> list[dict[str, Any]]:
         """Measured and true values with the limits of the errors. The truth is the plant's, changes and temperature included."""
@@ -130,13 +130,13 @@ class Identified:
         kphi = 3.0 ** 0.5 * plant_now["motor.psi_vs"] * plant_now["motor.pole_pairs"] * 1000.0 * 2.0 * np.pi / 60.0
         kphi *= 1.0 + plant_now["motor.psi_tempco"] * degrees
         rows = [
-            _row("R loop [mohm]", f"{watch['Rs_mohm']}", f"{1e3 * (rs_ohm + self.bridge_ohm):.1f}"),
-            _row("R winding [mohm]", f"{1e3 * self.winding_ohm:.1f}", f"{1e3 * rs_ohm:.1f}", self.winding_ohm / rs_ohm, "R"),
-            _row("Ld [uH]", f"{watch['Ld_uH']}", f"{1e6 * plant_now['motor.ld_h']:.1f}", 1e-6 * watch["Ld_uH"] / plant_now["motor.ld_h"], "Ld"),
-            _row("Lq [uH]", f"{watch['Lq_uH']}", f"{1e6 * plant_now['motor.lq_h']:.1f}", 1e-6 * watch["Lq_uH"] / plant_now["motor.lq_h"], "Lq"),
-            _row("Kphi [mV/krpm]", f"{watch['Kphi_mV_per_krpm']}", f"{1e3 * kphi:.1f}", 1e-3 * watch["Kphi_mV_per_krpm"] / kphi, "Kphi")]
+            _row("R loop [mohm]", f"{1e-3 * watch['Rs_uohm']:.2f}", f"{1e3 * (rs_ohm + self.bridge_ohm):.2f}"),
+            _row("R winding [mohm]", f"{1e3 * self.winding_ohm:.2f}", f"{1e3 * rs_ohm:.2f}", self.winding_ohm / rs_ohm, "R"),
+            _row("Ld [uH]", f"{1e-3 * watch['Ld_nH']:.2f}", f"{1e6 * plant_now['motor.ld_h']:.2f}", 1e-9 * watch["Ld_nH"] / plant_now["motor.ld_h"], "Ld"),
+            _row("Lq [uH]", f"{1e-3 * watch['Lq_nH']:.2f}", f"{1e6 * plant_now['motor.lq_h']:.2f}", 1e-9 * watch["Lq_nH"] / plant_now["motor.lq_h"], "Lq"),
+            _row("Kphi [mV/krpm]", f"{1e-3 * watch['Kphi_uV_per_krpm']:.1f}", f"{1e3 * kphi:.1f}", 1e-6 * watch["Kphi_uV_per_krpm"] / kphi, "Kphi")]
         if self.done:
-            rows.append(_row("J [1e-8 kg m2]", f"{watch['J_1e8_kgm2']}", f"{1e8 * plant_now['mech.inertia_kgm2']:.1f}",
+            rows.append(_row("J [1e-6 kg m2]", f"{1e6 * self.inertia_kgm2:.5g}", f"{1e6 * plant_now['mech.inertia_kgm2']:.5g}",
                              self.inertia_kgm2 / plant_now["mech.inertia_kgm2"], "J"))
             rows += [self._friction_row(share, kphi) for share in (0.5, 1.0)]
         return rows
@@ -149,7 +149,7 @@ class Identified:
         speed_rad_s = speed_rpm * np.pi / 30.0
         true_nm = plant_now["mech.coulomb_nm"] + plant_now.get("load.constant_nm", 0.0)
         true_nm += speed_rad_s * (plant_now["mech.viscous_nms"] + plant_now.get("load.viscous_nms", 0.0))
-        found_nm = 1e-6 * watch["Coulomb_uNm"] + 1e-9 * watch["Viscous_nNms"] * speed_rad_s
+        found_nm = 1e-8 * watch["Coulomb_1e8_Nm"] + 1e-9 * watch["Viscous_1e9_Nms"] * speed_rad_s
         kt_nm_per_a = kphi * 1.5 / (3.0 ** 0.5 * 1000.0 * np.pi / 30.0)
         least_nm = LEAST_FRICTION_STEPS * self.board.current_full_scale_a / CONVERTER_STEPS * kt_nm_per_a
         name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of rated speed"
@@ -173,7 +173,7 @@ class Identified:
         """The lines for a motor file: line to line, which means the same in a star and in a delta."""
         watch = self.measured.watch
         source = f"measured with {MODE}, {self.known.current_a:.3g} A"
-        ld_mh, lq_mh = 1e-3 * watch["Ld_uH"], 1e-3 * watch["Lq_uH"]
+        ld_mh, lq_mh = 1e-6 * watch["Ld_nH"], 1e-6 * watch["Lq_nH"]
         lines = ["[electrical]", f'pole_pairs = {{ value = {self.known.pole_pairs}, source = "counted" }}',
                  f'resistance = {{ value = {2.0 * self.winding_ohm:.4g}, unit = "ohm line-to-line", at_degc = 25, source = "{source}" }}']
         if abs(ld_mh - lq_mh) <= SALIENT * ld_mh:
@@ -181,12 +181,12 @@ class Identified:
         else:
             lines.append(f'inductance_d = {{ value = {2.0 * ld_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
             lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
-        lines.append(f'kphi = {{ value = {1e-3 * watch["Kphi_mV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
+        lines.append(f'kphi = {{ value = {1e-6 * watch["Kphi_uV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
                      f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
         if self.done:
             lines += ["", "[mechanical]", f'inertia = {{ value = {self.inertia_kgm2:.4g}, unit = "kg m2", source = "{source}" }}',
-                      f'viscous_friction = {{ value = {1e-9 * watch["Viscous_nNms"]:.4g}, unit = "N m s", source = "{source}" }}',
-                      f'coulomb_friction = {{ value = {1e-3 * watch["Coulomb_uNm"]:.4g}, unit = "mN m", source = "{source}" }}']
+                      f'viscous_friction = {{ value = {1e-9 * watch["Viscous_1e9_Nms"]:.4g}, unit = "N m s", source = "{source}" }}',
+                      f'coulomb_friction = {{ value = {1e-5 * watch["Coulomb_1e8_Nm"]:.4g}, unit = "mN m", source = "{source}" }}']
         return "\n".join(lines)
 
     def text(self) -> str:

@@ -54,6 +54,14 @@ uint16_t soft_float_to_uint16(soft_float_t a)
     return (uint16_t)((((uint32_t)a.m >> (uint16_t)(-a.e - 1)) + 1u) >> 1);
 }
 
+uint32_t soft_float_to_uint32(soft_float_t a)
+{
+    if (a.e > 16) {
+        return 0xFFFFFFFFul;
+    }
+    return (a.e < 0) ? soft_float_to_uint16(a) : (uint32_t)a.m << (uint16_t)a.e;
+}
+
 int32_t soft_float_times(int32_t x, soft_float_t a)
 {
     soft_float_t n = soft_float_mul(soft_float_of((uint32_t)((x < 0) ? -x : x)), a);

@@ -10,8 +10,8 @@
 /** The first line, version and cause of the last reset: "foc33 0.10.0 reset BOR POR". */
 void status_init(void);
 
-/** Composes the next line when it is due: "state 5 fault NONE speed 1000 rpm limit CURRENT RAMP"; in IDENTIFY "step 11 BUSY fault NONE R 2692 mohm
- *  Ld 1919 uH Lq 1920 uH Kphi 0 mV/krpm" in one line. */
+/** Composes the next line when it is due: "state 5 fault NONE speed 1000 rpm limit CURRENT RAMP"; in IDENTIFY "step 11 BUSY fault NONE R 2692100 uohm
+ *  Ld 1919400 nH Lq 1920100 nH Kphi 0 uV/krpm ..." in one line. */
 void status_tick(uint16_t elapsed_ms);
 
 /** Hands one character to the UART if it has room. */

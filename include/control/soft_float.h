@@ -25,6 +25,9 @@ soft_float_t soft_float_div(soft_float_t a, soft_float_t b);
 /** Rounded, at most 65535. */
 uint16_t soft_float_to_uint16(soft_float_t a);
 
+/** Rounded, at most 2^32 - 1. */
+uint32_t soft_float_to_uint32(soft_float_t a);
+
 /** x times a, truncated towards zero, for products below 2^30. */
 int32_t soft_float_times(int32_t x, soft_float_t a);
 

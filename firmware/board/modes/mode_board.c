@@ -30,19 +30,32 @@ void mode_watch(const drive_t *d)
 #ifdef IDENTIFY
 tIdentifyParm IdentifyParm;
 
+/** A number of 32 bits, with what stands before it. */
+static char *put_long(char *at, const char *before, uint32_t number)
+{
+    char digits[11], *digit = &digits[10];
+    uint32_t left = number;
+    *digit = '\0';
+    do {
+        *--digit = (char)('0' + left % 10u);
+        left /= 10u;
+    } while (left != 0u);
+    return text_put(text_put(at, before), digit);
+}
+
 char *identify_status_line(char *line, const drive_t *d)
 {
     static const char *const results[] = { IDENTIFY_RESULT_TABLE(IDENTIFY_RESULT_NAME) };
     const identify_t *id = &d->run.identify;
     char *at = text_put(text_put_unsigned(text_put(line, "step "), id->step), " ");
-    at = text_put(text_put_fault(text_put(at, results[id->result]), " fault ", d->fault), " R ");
-    at = text_put(text_put_unsigned(at, id->values.rs_mohm), " mohm Ld ");
-    at = text_put(text_put_unsigned(at, id->values.ld_uh), " uH Lq ");
-    at = text_put(text_put_unsigned(at, id->values.lq_uh), " uH Kphi ");
-    at = text_put(text_put_unsigned(at, id->values.kphi_mv_per_krpm), " mV/krpm J ");
-    at = text_put(text_put_unsigned(at, id->values.inertia_1e8_kgm2), "e-8 kgm2 friction ");
-    at = text_put(text_put_unsigned(at, id->values.coulomb_unm), " uNm + ");
-    return text_put(text_put_unsigned(at, id->values.viscous_nnms), " nNms\r\n");
+    at = text_put_fault(text_put(at, results[id->result]), " fault ", d->fault);
+    at = put_long(at, " R ", id->values.rs_uohm);
+    at = put_long(at, " uohm Ld ", id->values.ld_nh);
+    at = put_long(at, " nH Lq ", id->values.lq_nh);
+    at = put_long(at, " nH Kphi ", id->values.kphi_uv_per_krpm);
+    at = put_long(at, " uV/krpm J ", id->values.inertia_1e9_kgm2);
+    at = put_long(at, "e-9 kgm2 friction ", id->values.coulomb_1e8_nm);
+    return text_put(put_long(at, "e-8 Nm + ", id->values.viscous_1e9_nms), "e-9 Nms\r\n");
 }
 
 void identify_watch(const drive_t *d)
@@ -50,13 +63,13 @@ void identify_watch(const drive_t *d)
     const identify_t *id = &d->run.identify;
     IdentifyParm.step = id->step;
     IdentifyParm.result = id->result;
-    IdentifyParm.Rs_mohm = id->values.rs_mohm;
-    IdentifyParm.Ld_uH = id->values.ld_uh;
-    IdentifyParm.Lq_uH = id->values.lq_uh;
-    IdentifyParm.Kphi_mV_per_krpm = id->values.kphi_mv_per_krpm;
-    IdentifyParm.J_1e8_kgm2 = id->values.inertia_1e8_kgm2;
-    IdentifyParm.Coulomb_uNm = id->values.coulomb_unm;
-    IdentifyParm.Viscous_nNms = id->values.viscous_nnms;
+    IdentifyParm.Rs_uohm = id->values.rs_uohm;
+    IdentifyParm.Ld_nH = id->values.ld_nh;
+    IdentifyParm.Lq_nH = id->values.lq_nh;
+    IdentifyParm.Kphi_uV_per_krpm = id->values.kphi_uv_per_krpm;
+    IdentifyParm.J_1e9_kgm2 = id->values.inertia_1e9_kgm2;
+    IdentifyParm.Coulomb_1e8_Nm = id->values.coulomb_1e8_nm;
+    IdentifyParm.Viscous_1e9_Nms = id->values.viscous_1e9_nms;
 }
 #endif
 

@@ -31,47 +31,57 @@
 #define PASSAGE_MOST 64u   /* stretches of one line: its sums fit into 32 bits */
 #define CYCLES_LEAST 4u
 #define CYCLES_MOST 12u
+#define LEAST_UOHM 5000u
+#define MOST_UOHM 40000000ul
+#define LEAST_NH 5000u
+#define MOST_NH 60000000ul
+#define LEAST_UV 100000ul
+#define MOST_UV 2000000000ul
+#define LEAST_INERTIA 50u
+#define MOST_INERTIA 2000000000ul
+#define MOST_FRICTION 300000000l
 #define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST */
 #define FASTEST_Q10 ((int32_t)(30000.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 67108864.0F)) /* electrical rpm that every format holds */
 
 /* ---- Constants from the board's parameters ---- */
 #define TS_US (PARAM_F(LOOPTIME_SEC) * 1000000.0F)
 
-/* mohm for a bus of 1 (Q16) and one duty count along phase A per current count. */
-#define MOHM_PER_RATIO (1000.0F * PARAM_F(BUS_FULL_SCALE_V) / (65536.0F * 3.0F * (float)PWM_FULL_DUTY * 4.0F * PARAM_F(NORM_CURRENT_CONST)))
-#define C_RESISTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * 16777216.0F), 24)
+/* uohm for a bus of 1 (Q16) and one duty count along phase A per current count. */
+#define UOHM_PER_RATIO (1000000.0F * PARAM_F(BUS_FULL_SCALE_V) / (65536.0F * 3.0F * (float)PWM_FULL_DUTY * 4.0F * PARAM_F(NORM_CURRENT_CONST)))
+#define C_RESISTANCE soft_float_scaled((uint32_t)(UOHM_PER_RATIO * 65536.0F), 16)
 
 /* The sums of duties are sums of two. */
-#define C_INDUCTANCE soft_float_scaled((uint32_t)(MOHM_PER_RATIO * TS_US / 2000.0F * 268435456.0F), 28)
-#define C_TS soft_float_scaled((uint32_t)(TS_US / 1000.0F * 16777216.0F), 24) /* uH per mohm */
-#define C_KP soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.000001F * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 16777216.0F), 24)
-#define C_KI soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.001F * PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 268435456.0F), 28)
-#define C_OHMIC soft_float_scaled((uint32_t)(0.001F * 2.0F * PARAM_IU * 4294967296.0F), 32) /* Q13 current to Q14 voltage per mohm */
+#define C_INDUCTANCE soft_float_scaled((uint32_t)(UOHM_PER_RATIO * TS_US / 2000.0F * 1048576.0F), 20)
+#define C_TS soft_float_scaled((uint32_t)(TS_US / 1000.0F * 16777216.0F), 24) /* nH per uohm */
+#define C_KP soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.000000001F * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 17179869184.0F), 34)
+#define C_KI soft_float_scaled((uint32_t)(LOOP_RAD_S * 0.000001F * PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * (float)(1u << LOOP_SHIFT) * 274877906944.0F), 38)
+#define C_OHMIC soft_float_scaled((uint32_t)(0.000001F * 2.0F * PARAM_IU * 4398046511104.0F), 42) /* Q13 current to Q14 voltage per uohm */
 
-/* The same per uH and 1/1024 angle count a period. */
-#define C_REACTIVE soft_float_scaled((uint32_t)(0.000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 72057594037927936.0F), 56)
+/* The same per nH and 1/1024 angle count a period. */
+#define C_REACTIVE soft_float_scaled((uint32_t)(0.000000001F * 2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) * 2.0F * PARAM_IU * 73786976294838206464.0F), 66)
 
-/* mV line to line per 1000 rpm, from Q14 voltage over 1/1024 angle counts a period. */
+/* uV line to line per 1000 rpm, from Q14 voltage over 1/1024 angle counts a period. */
 #define C_KPHI soft_float_scaled((uint32_t)(PARAM_SQRT3 * 2.0F * NORM_VOLTAGE_CONST * 1000000.0F * 67108864.0F * PARAM_F(LOOPTIME_SEC) \
-                                            * PARAM_F(NOPOLESPAIRS) / 60.0F * 64.0F), \
-                                 6)
+                                            * PARAM_F(NOPOLESPAIRS) / 60.0F * 62.5F), \
+                                 -4)
 
-/* Torque of one count of q current for a Kphi of 1 mV/krpm, uN m: 3/2 psi P i. */
-#define UNM_PER_COUNT (1000.0F * 1.5F * 60.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * 4.0F * PARAM_F(NORM_CURRENT_CONST))
+/* Torque of one count of q current for a Kphi of 1 uV/krpm, 10^-8 N m: 3/2 psi P i. */
+#define TORQUE_PER_COUNT (100.0F * 1.5F * 60.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * 4.0F * PARAM_F(NORM_CURRENT_CONST))
 
 /* Mechanical rad/s of 1/1024 angle count a period. */
 #define RAD_S_PER_COUNT (2.0F * PARAM_PI / 67108864.0F / PARAM_F(LOOPTIME_SEC) / PARAM_F(NOPOLESPAIRS))
 
-/* Currents are means * 2^FOLLOW_LOG2, accelerations counts a period * 128, speeds / 16. */
-#define C_TORQUE soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 1099511627776.0F), 40)
-#define C_INERTIA soft_float_scaled((uint32_t)(UNM_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 12800.0F * PARAM_F(LOOPTIME_SEC) \
-                                               / RAD_S_PER_COUNT * 65536.0F), \
-                                    16)
+/* Currents are means * 2^FOLLOW_LOG2, accelerations counts a period * RATE_SCALE, speeds / 16. */
+#define RATE_SCALE 32768.0F
+#define C_TORQUE soft_float_scaled((uint32_t)(TORQUE_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 1099511627776.0F), 40)
+#define C_INERTIA soft_float_scaled((uint32_t)(TORQUE_PER_COUNT / (float)(1u << FOLLOW_LOG2) * 10.0F * RATE_SCALE * PARAM_F(LOOPTIME_SEC) \
+                                               / RAD_S_PER_COUNT * 1048576.0F), \
+                                    20)
 
-#define C_DRAG soft_float_scaled((uint32_t)(RAD_S_PER_COUNT / PARAM_F(LOOPTIME_SEC) / 128.0F / 100.0F * 4294967296.0F), 32)
-#define C_VISCOUS soft_float_scaled((uint32_t)(1000.0F / (16.0F * RAD_S_PER_COUNT) * 256.0F), 8)
+#define C_DRAG soft_float_scaled((uint32_t)(RAD_S_PER_COUNT / PARAM_F(LOOPTIME_SEC) / RATE_SCALE / 10.0F * 1099511627776.0F), 40)
+#define C_VISCOUS soft_float_scaled((uint32_t)(10.0F / (16.0F * RAD_S_PER_COUNT) * 256.0F), 8)
 
-/* Sums of current over a stretch for a back-EMF of 1 mV/krpm, a speed / 16 and 1/uH that a sample misses which is taken so much late. */
+/* Sums of current over a stretch for a back-EMF of 1 uV/krpm, a speed / 16 and 1/nH that a sample misses which is taken so much late. */
 #define MISSED(late_sec) \
     ((float)(16u << FOLLOW_LOG2) * RAD_S_PER_COUNT * 60000.0F / (2000.0F * PARAM_PI * PARAM_SQRT3) * (late_sec) \
      / (4.0F * PARAM_F(NORM_CURRENT_CONST)))
@@ -208,8 +218,8 @@ static void resistance_done(drive_t *d, const drive_params_t *p)
     /* Standing, one phase carries it and the other two their halves: 4/3 of a leg's voltage; turning, 4/pi. */
     id->dead_q13 = soft_float_times((soft_float_times(duty_first, soft_float_div(soft_float_of(1), id->duty_per_amp)) - id->i_first) >> MEAN_LOG2,
                                     soft_float_scaled((uint32_t)(3.0F / PARAM_PI * 65536.0F), 16));
-    id->values.rs_mohm = soft_float_to_uint16(soft_float_mul(soft_float_mul(id->duty_per_amp, soft_float_of((uint32_t)(id->sum[3] >> MEAN_LOG2))), C_RESISTANCE));
-    if (id->values.rs_mohm < 20u || id->values.rs_mohm > 40000u) {
+    id->values.rs_uohm = soft_float_to_uint32(soft_float_mul(soft_float_mul(id->duty_per_amp, soft_float_of((uint32_t)(id->sum[3] >> MEAN_LOG2))), C_RESISTANCE));
+    if (id->values.rs_uohm < LEAST_UOHM || id->values.rs_uohm > MOST_UOHM) {
         finish(d, IDENTIFY_RESULT_R_RANGE);
         return;
     }
@@ -261,28 +271,28 @@ static void try_done(drive_t *d, const drive_params_t *p, identify_step_t next)
 }
 
 /** L = Ts sum((v - R i) s) / sum(di s), less what R/L does within a period: voltages come as pulses a quarter period from the
- *  samples, which makes this L too large by 3/8 (Ts R / (2 L))^2. @return uH, or 0 when it cannot be */
-static uint16_t inductance(const identify_t *id)
+ *  samples, which makes this L too large by 3/8 (Ts R / (2 L))^2. @return nH, or 0 when it cannot be */
+static uint32_t inductance(const identify_t *id)
 {
     int32_t volts = id->sum[0] - soft_float_times(id->sum[1], id->duty_per_amp);
     soft_float_t l, rt;
-    uint16_t l_uh, less_uh;
+    uint32_t l_nh, less_nh;
     if (volts <= 0 || id->sum[2] <= 0) {
         return 0;
     }
     l = soft_float_div(soft_float_of((uint32_t)volts), soft_float_of((uint32_t)id->sum[2]));
     l = soft_float_mul(soft_float_mul(l, soft_float_of(id->bus_q16)), C_INDUCTANCE);
-    rt = soft_float_mul(soft_float_of(id->values.rs_mohm), C_TS);
-    less_uh = soft_float_to_uint16(soft_float_div(soft_float_mul(soft_float_mul(rt, rt), soft_float_scaled(3, 5)), l));
-    l_uh = soft_float_to_uint16(l);
-    return (uint16_t)((l_uh >= 20u && l_uh <= 60000u && less_uh < l_uh >> 1) ? (uint16_t)(l_uh - less_uh) : 0u);
+    rt = soft_float_mul(soft_float_of(id->values.rs_uohm), C_TS);
+    less_nh = soft_float_to_uint32(soft_float_div(soft_float_mul(soft_float_mul(rt, rt), soft_float_scaled(3, 5)), l));
+    l_nh = soft_float_to_uint32(l);
+    return (l_nh >= LEAST_NH && l_nh <= MOST_NH && less_nh < l_nh >> 1) ? l_nh - less_nh : 0u;
 }
 
 static void inductance_d_done(drive_t *d)
 {
     identify_t *id = &d->run.identify;
-    id->values.ld_uh = inductance(id);
-    if (id->values.ld_uh == 0u) {
+    id->values.ld_nh = inductance(id);
+    if (id->values.ld_nh == 0u) {
         finish(d, IDENTIFY_RESULT_L_RANGE);
         return;
     }
@@ -315,14 +325,14 @@ static void inductance_q_done(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
     pi_gains_t gains = { 0, 0, 0, LOOP_SHIFT };
-    id->values.lq_uh = inductance(id);
-    if (id->values.lq_uh == 0u) {
+    id->values.lq_nh = inductance(id);
+    if (id->values.lq_nh == 0u) {
         finish(d, IDENTIFY_RESULT_L_RANGE);
         return;
     }
-    id->kp_d = gain_of(soft_float_mul(soft_float_of(id->values.ld_uh), C_KP));
-    id->kp_q = gain_of(soft_float_mul(soft_float_of(id->values.lq_uh), C_KP));
-    id->ki_d = gain_of(soft_float_mul(soft_float_of(id->values.rs_mohm), C_KI));
+    id->kp_d = gain_of(soft_float_mul(soft_float_of(id->values.ld_nh), C_KP));
+    id->kp_q = gain_of(soft_float_mul(soft_float_of(id->values.lq_nh), C_KP));
+    id->ki_d = gain_of(soft_float_mul(soft_float_of(id->values.rs_uohm), C_KI));
     id->ki_q = id->ki_d;
     id->shift = LOOP_SHIFT;
     id->halvings = 1;
@@ -355,8 +365,8 @@ static int16_t emf_mean(int32_t sum)
 static void emf_block(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
-    soft_float_t ohmic = soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC);
-    soft_float_t reactive = soft_float_mul(soft_float_mul(soft_float_of(id->values.ld_uh), soft_float_of(turn_speed(d, p))), C_REACTIVE);
+    soft_float_t ohmic = soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC);
+    soft_float_t reactive = soft_float_mul(soft_float_mul(soft_float_of(id->values.ld_nh), soft_float_of(turn_speed(d, p))), C_REACTIVE);
     int16_t e_d = emf_mean(id->sum[0] - soft_float_times(id->sum[2] + id->dead_q13 * (1 << BLOCK_LOG2), ohmic) + soft_float_times(id->sum[3], reactive));
     int16_t e_q = emf_mean(id->sum[1] - soft_float_times(id->sum[3], ohmic) - soft_float_times(id->sum[2], reactive));
     id->blocks++;
@@ -365,12 +375,12 @@ static void emf_block(drive_t *d, const drive_params_t *p)
     id->emf_q_sum += e_q;
 }
 
-/** mV per 1000 rpm: the mean length, so that swinging of the rotor, which turns the vector to and fro, does not shorten it. */
-static uint16_t kphi(const drive_t *d, const drive_params_t *p)
+/** uV per 1000 rpm: the mean length, so that swinging of the rotor, which turns the vector to and fro, does not shorten it. */
+static uint32_t kphi(const drive_t *d, const drive_params_t *p)
 {
     soft_float_t mean = soft_float_of(d->run.identify.emf_sum);
     mean.e = (int16_t)(mean.e - BLOCKS_LOG2);
-    return soft_float_to_uint16(soft_float_mul(soft_float_div(mean, soft_float_of(turn_speed(d, p))), C_KPHI));
+    return soft_float_to_uint32(soft_float_mul(soft_float_div(mean, soft_float_of(turn_speed(d, p))), C_KPHI));
 }
 
 /** 1 if the stretches agree in direction: a rotor that slips has them everywhere. */
@@ -382,14 +392,18 @@ static uint16_t coherent(const identify_t *id)
 
 /* ---- Inertia and friction ---- */
 
+#define RATE_OF_SLOPE ((int32_t)(6.0F * 16.0F * RATE_SCALE))
+
 enum { PART_PUSH,
        PART_FAST,
        PART_SLOW };
 
-/** x * part / whole, within 2^30. */
+/** x * part / whole, within 2^30. @param whole above 0 */
 static int32_t share_of(int32_t x, int32_t part, int32_t whole)
 {
-    return soft_float_times(x, soft_float_div(soft_float_of((uint32_t)part), soft_float_of((uint32_t)whole)));
+    uint32_t size = (uint32_t)((part < 0) ? -part : part);
+    int32_t share = soft_float_times(x, soft_float_div(soft_float_of(size), soft_float_of((uint32_t)whole)));
+    return (part < 0) ? -share : share;
 }
 
 /** The least-squares line through a passage: its slope times its weight, so that passages can be added. */
@@ -421,8 +435,8 @@ static void mechanics_drops(drive_t *d, int32_t speed_q10)
     identify_t *id = &d->run.identify;
     int16_t iq_q13 = d->run.control.ref_q13.q;
     soft_float_t w = soft_float_of((uint32_t)speed_q10);
-    id->drop_q_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC));
-    id->drop_d_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_mul(soft_float_of(id->values.lq_uh), w), C_REACTIVE));
+    id->drop_q_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC));
+    id->drop_d_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_mul(soft_float_of(id->values.lq_nh), w), C_REACTIVE));
 }
 
 static void forget_parts(identify_t *id)
@@ -467,7 +481,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     identify_t *id = &d->run.identify;
     uint32_t speed = turn_speed(d, p);
     uint16_t emf_q14 = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
-    int32_t ohmic = soft_float_times(p->open_loop_q13 >> 1, soft_float_mul(soft_float_of(id->values.rs_mohm), C_OHMIC));
+    int32_t ohmic = soft_float_times(p->open_loop_q13 >> 1, soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC));
     int32_t most = d->circle.limit_q14 - (d->circle.limit_q14 >> 3) - ohmic;
     int16_t lag_q12;
     id->speed_per_emf_q5 = soft_float_to_uint16(soft_float_div(soft_float_of(speed << 5), soft_float_of(emf_q14)));
@@ -525,53 +539,55 @@ static int32_t part_current(const identify_t *id, uint16_t part)
 {
     const identify_part_t *of = &id->parts[part];
     soft_float_t missed = (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING;
-    missed = soft_float_mul(missed, soft_float_div(soft_float_of(id->values.kphi_mv_per_krpm), soft_float_of(id->values.lq_uh)));
+    missed = soft_float_mul(missed, soft_float_div(soft_float_of(id->values.kphi_uv_per_krpm), soft_float_of(id->values.lq_nh)));
     return share_of(of->current, 1, of->blocks) + soft_float_times(part_speed(of), missed);
 }
 
-/** Change of speed, counts a period * 128. */
+/** Change of speed, counts a period * RATE_SCALE. */
 static int32_t part_rate(const identify_part_t *part)
 {
     uint32_t slope = (uint32_t)((part->slope < 0) ? -part->slope : part->slope);
     soft_float_t rate = soft_float_div(soft_float_mul(soft_float_of(slope), soft_float_of((uint32_t)part->steps)),
                                        soft_float_mul(soft_float_of((uint32_t)part->weight), soft_float_of((uint32_t)part->periods)));
-    return soft_float_times((part->slope < 0) ? -6 * 16 * 128 : 6 * 16 * 128, rate);
+    return soft_float_times((part->slope < 0) ? -RATE_OF_SLOPE : RATE_OF_SLOPE, rate);
 }
 
-/** J dw/dt = Kt i - friction, accelerating and coasting at the same mean speed. @return 1 when J can be */
-static uint16_t inertia(identify_t *id, int32_t share_q12)
+/** J dw/dt = Kt i - friction, accelerating and coasting at the same mean speed. @return 10^-9 kg m2; 0 when it cannot be */
+static uint32_t inertia(const identify_t *id)
 {
     const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
-    int32_t rate = part_rate(push) - part_rate(slow) - (((part_rate(fast) - part_rate(slow)) * share_q12) >> 12);
-    int32_t slow_current = part_current(id, PART_SLOW);
-    int32_t current = part_current(id, PART_PUSH) - slow_current - (((part_current(id, PART_FAST) - slow_current) * share_q12) >> 12);
+    int32_t slow_rate = part_rate(slow), slow_current = part_current(id, PART_SLOW);
+    int32_t rate = part_rate(push) - slow_rate, current = part_current(id, PART_PUSH) - slow_current;
+    int32_t apart = part_speed(fast) - part_speed(slow), above = part_speed(push) - part_speed(slow);
     soft_float_t j;
+    if (apart > 0) {
+        rate -= share_of(part_rate(fast) - slow_rate, above, apart);
+        current -= share_of(part_current(id, PART_FAST) - slow_current, above, apart);
+    }
     if (rate <= 0 || current <= 0) {
         return 0;
     }
-    j = soft_float_mul(soft_float_mul(soft_float_of((uint32_t)current), soft_float_of(id->values.kphi_mv_per_krpm)), C_INERTIA);
-    id->values.inertia_1e8_kgm2 = soft_float_to_uint16(soft_float_div(j, soft_float_of((uint32_t)rate)));
-    return 1;
+    j = soft_float_mul(soft_float_mul(soft_float_of((uint32_t)current), soft_float_of(id->values.kphi_uv_per_krpm)), C_INERTIA);
+    return soft_float_to_uint32(soft_float_div(j, soft_float_of((uint32_t)rate)));
 }
 
-/** Torque that brakes a coasting rotor, uN m. */
+/** Torque that brakes a coasting rotor, 10^-8 N m. */
 static int32_t drag(const identify_t *id, uint16_t part)
 {
-    int32_t braked = -soft_float_times(part_rate(&id->parts[part]), soft_float_mul(soft_float_of(id->values.inertia_1e8_kgm2), C_DRAG));
-    return braked + soft_float_times(part_current(id, part), soft_float_mul(soft_float_of(id->values.kphi_mv_per_krpm), C_TORQUE));
+    int32_t braked = -soft_float_times(part_rate(&id->parts[part]), soft_float_mul(soft_float_of(id->values.inertia_1e9_kgm2), C_DRAG));
+    return braked + soft_float_times(part_current(id, part), soft_float_mul(soft_float_of(id->values.kphi_uv_per_krpm), C_TORQUE));
 }
 
-static uint16_t not_negative(int32_t x)
+static uint32_t not_negative(int32_t x)
 {
-    return (uint16_t)((x < 0) ? 0 : (x > 65535) ? 65535
-                                                : x);
+    return (uint32_t)((x < 0) ? 0 : x);
 }
 
 static void mechanics_done(drive_t *d)
 {
     identify_t *id = &d->run.identify;
     const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
-    int32_t fast_unm, slow_unm, apart, viscous;
+    int32_t fast_nm, slow_nm, apart, grows;
     passage_end(id);
     if (slow->periods == 0) { /* it coasts too long: the friction counts as constant */
         id->parts[PART_SLOW] = *fast;
@@ -580,16 +596,26 @@ static void mechanics_done(drive_t *d)
         finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
         return;
     }
-    apart = part_speed(fast) - part_speed(slow);
-    if (!inertia(id, (apart > 0) ? share_of(part_speed(push) - part_speed(slow), 4096, apart) : 0)) {
-        finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
+    id->values.inertia_1e9_kgm2 = inertia(id);
+    if (id->values.inertia_1e9_kgm2 < LEAST_INERTIA || id->values.inertia_1e9_kgm2 > MOST_INERTIA) {
+        id->values.inertia_1e9_kgm2 = 0;
+        finish(d, IDENTIFY_RESULT_INERTIA_RANGE);
         return;
     }
-    fast_unm = drag(id, PART_FAST);
-    slow_unm = drag(id, PART_SLOW);
-    viscous = (apart > 0) ? soft_float_times(fast_unm - slow_unm, soft_float_div(C_VISCOUS, soft_float_of((uint32_t)apart))) : 0;
-    id->values.coulomb_unm = not_negative(slow_unm - ((apart > 0) ? share_of(fast_unm - slow_unm, part_speed(slow), apart) : 0));
-    id->values.viscous_nnms = not_negative(viscous);
+    apart = part_speed(fast) - part_speed(slow);
+    fast_nm = drag(id, PART_FAST);
+    slow_nm = drag(id, PART_SLOW);
+    grows = (apart > 0) ? fast_nm - slow_nm : 0;
+    if (fast_nm > MOST_FRICTION || slow_nm > MOST_FRICTION) {
+        finish(d, IDENTIFY_RESULT_FRICTION_RANGE);
+        return;
+    }
+    if (apart > 0) {
+        slow_nm -= share_of(grows, part_speed(slow), apart);
+        grows = soft_float_times(grows, soft_float_div(C_VISCOUS, soft_float_of((uint32_t)apart)));
+    }
+    id->values.coulomb_1e8_nm = not_negative(slow_nm);
+    id->values.viscous_1e9_nms = not_negative(grows);
     finish(d, IDENTIFY_RESULT_DONE);
 }
 
@@ -681,7 +707,7 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
 static void spin_done(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
-    uint16_t result_mv;
+    uint32_t uv;
     dq_t v;
     v.d = (int16_t)(id->sum[0] >> BLOCK_LOG2);
     v.q = (int16_t)(id->sum[1] >> BLOCK_LOG2);
@@ -694,20 +720,20 @@ static void spin_done(drive_t *d, const drive_params_t *p)
         go(id, (identify_step_t)id->step, 0, 1u << BLOCK_LOG2);
         return;
     }
-    result_mv = kphi(d, p);
-    if (!coherent(id) || result_mv < 500u) {
+    uv = kphi(d, p);
+    if (!coherent(id) || uv < LEAST_UV) {
         finish(d, IDENTIFY_RESULT_NOT_TURNING);
-    } else if (result_mv > 65000u) {
+    } else if (uv > MOST_UV) {
         finish(d, IDENTIFY_RESULT_KPHI_RANGE);
     } else if (id->step == (uint16_t)IDENTIFY_SPIN_HALF) {
-        id->kphi_half = result_mv;
+        id->kphi_half = uv;
         id->halvings = 0;
         forget_emf(id);
         go(id, IDENTIFY_SPIN_FULL, SETTLE_PERIODS, 1u << BLOCK_LOG2);
-    } else if ((uint16_t)((result_mv > id->kphi_half) ? result_mv - id->kphi_half : id->kphi_half - result_mv) > result_mv >> 3) {
+    } else if (((uv > id->kphi_half) ? uv - id->kphi_half : id->kphi_half - uv) > uv >> 3) {
         finish(d, IDENTIFY_RESULT_NOT_TURNING);
     } else {
-        id->values.kphi_mv_per_krpm = result_mv;
+        id->values.kphi_uv_per_krpm = uv;
         mechanics_start(d, p);
     }
 }

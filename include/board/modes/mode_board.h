@@ -8,16 +8,19 @@
 #include "drive/panel.h"
 
 #ifdef IDENTIFY
-/** What the drive has measured: step and result (identify_step_t, identify_result_t in drive/modes/identify.h), phase resistance [mohm]
- *  with the bridge's share, d and q inductance [uH], back-EMF [mV peak line to line per 1000 rpm], inertia
- *  [10^-8 kg m2], friction at standstill [uN m] and its growth [nN m s]; 0 = not measured yet. */
+
+/** What the drive has measured: step and result (identify_step_t, identify_result_t in drive/modes/identify.h), phase resistance [uohm]
+ *  with the bridge's share, d and q inductance [nH], back-EMF [uV peak line to line per 1000 rpm], inertia
+ *  [10^-9 kg m2], friction at standstill [10^-8 N m] and its growth [10^-9 N m s]; 0 = not measured. */
 typedef struct {
-    uint16_t step, result, Rs_mohm, Ld_uH, Lq_uH, Kphi_mV_per_krpm, J_1e8_kgm2, Coulomb_uNm, Viscous_nNms;
+    uint16_t step, result;
+    uint32_t Rs_uohm, Ld_nH, Lq_nH, Kphi_uV_per_krpm, J_1e9_kgm2, Coulomb_1e8_Nm, Viscous_1e9_Nms;
 } tIdentifyParm;
 
 extern tIdentifyParm IdentifyParm;
 
-/** "step 0 DONE fault NONE R 2692 mohm Ld 1919 uH Lq 1920 uH Kphi 7240 mV/krpm J 550e-8 kgm2 friction 4000 uNm + 15300 nNms" in one line. @return its end */
+/** "step 0 DONE fault NONE R 2692100 uohm Ld 1919400 nH Lq 1920100 nH Kphi 7240300 uV/krpm J 5500e-9 kgm2 friction
+ *  400000e-8 Nm + 15300e-9 Nms" in one line. @return its end */
 char *identify_status_line(char *line, const drive_t *d);
 
 /** Copies what has been measured to IdentifyParm. */
@@ -27,7 +30,7 @@ void identify_watch(const drive_t *d);
 /** Longest status line and its end: retries with four reasons of a limit or more, or all that IDENTIFY measures, or a remedy of BRINGUP, or a client's
  *  longest frame. */
 #if defined IDENTIFY
-#define MODE_LINE_SIZE 160
+#define MODE_LINE_SIZE 208
 #elif defined BRINGUP
 #define MODE_LINE_SIZE 240
 #else

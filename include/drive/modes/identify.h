@@ -33,21 +33,24 @@
 /** X(code, name, cause, remedy): how it went. Codes never change their meaning. */
 #define IDENTIFY_RESULT_TABLE(X) \
     X(0, NONE, "nothing has been measured yet", "press S2") \
-    X(1, BUSY, "the measurement is running", "wait; it takes about twelve seconds, longer with a heavy rotor") \
+    X(1, BUSY, "the measurement is running", "wait; it takes about twelve seconds, minutes with a heavy rotor") \
     X(2, DONE, "all of it has been measured", "write them into the motor file") \
     X(3, STOPPED, "S2 or a fault ended it", "see the fault, if there is one; press S2 to begin anew") \
     X(4, NO_CURRENT, "current does not flow through all three phases: motor not connected, or a phase open", "check the three wires") \
     X(5, CURRENT_NOT_REACHED, "the bus voltage cannot drive Q_CURRENT_REF_OPENLOOP through the winding", \
       "lower Q_CURRENT_REF_OPENLOOP; check NORM_CURRENT_CONST") \
-    X(6, R_RANGE, "R is not between 0.02 and 40 ohm", "check KCURRA, KCURRB, NORM_CURRENT_CONST and the wires") \
-    X(7, L_RANGE, "L is not between 0.02 and 60 mH, or changes the current too little to be measured", \
+    X(6, R_RANGE, "R is not between 5 mohm and 40 ohm, the bridge included", "check KCURRA, KCURRB, NORM_CURRENT_CONST and the wires") \
+    X(7, L_RANGE, "L is not between 5 uH and 60 mH, or changes the current too little to be measured", \
       "raise Q_CURRENT_REF_OPENLOOP; check the wires") \
     X(8, NOT_TURNING, "the rotor did not follow: its back-EMF is missing, slips, or is not proportional to speed", \
       "free the shaft and take the load off; raise Q_CURRENT_REF_OPENLOOP, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
     X(9, VOLTAGE_LIMIT, "the bus voltage is too low for END_SPEED_RPM", "lower END_SPEED_RPM") \
-    X(10, KPHI_RANGE, "Kphi is above 65 V per 1000 rpm", "check NOPOLESPAIRS") \
-    X(11, NOT_ACCELERATING, "Q_CURRENT_REF_OPENLOOP does not accelerate the rotor to twice END_SPEED_RPM in four seconds, or loses it", \
-      "take the load off; raise Q_CURRENT_REF_OPENLOOP or lower END_SPEED_RPM; R, L and Kphi are valid")
+    X(10, KPHI_RANGE, "Kphi is above 2000 V per 1000 rpm", "check NOPOLESPAIRS") \
+    X(11, NOT_ACCELERATING, "Q_CURRENT_REF_OPENLOOP does not accelerate the rotor to twice END_SPEED_RPM, or loses it", \
+      "take the load off; raise Q_CURRENT_REF_OPENLOOP or lower END_SPEED_RPM; R, L and Kphi are valid") \
+    X(12, INERTIA_RANGE, "the inertia is not between 5e-8 and 2 kg m2", \
+      "lower or raise Q_CURRENT_REF_OPENLOOP tenfold, or take the inertia from a drawing; R, L and Kphi are valid") \
+    X(13, FRICTION_RANGE, "the friction is above 3 N m", "take the load off; R, L, Kphi and inertia are valid")
 
 #define IDENTIFY_RESULT_NAME(code, name, cause, remedy) #name,
 
@@ -72,12 +75,12 @@ typedef enum {
 
 /** What has been measured, in engineering units; 0 = not yet. Loop values: winding, bridge and wires together. */
 typedef struct {
-    uint16_t rs_mohm;          /**< phase resistance, mohm */
-    uint16_t ld_uh, lq_uh;     /**< phase inductances, uH */
-    uint16_t kphi_mv_per_krpm; /**< back-EMF, mV peak line to line per 1000 mechanical rpm */
-    uint16_t inertia_1e8_kgm2; /**< of all that turns, 10^-8 kg m2 */
-    uint16_t coulomb_unm;      /**< friction at standstill, taken from two speeds, uN m */
-    uint16_t viscous_nnms;     /**< and what it grows by, nN m s */
+    uint32_t rs_uohm;          /**< phase resistance, uohm */
+    uint32_t ld_nh, lq_nh;     /**< phase inductances, nH */
+    uint32_t kphi_uv_per_krpm; /**< back-EMF, uV peak line to line per 1000 mechanical rpm */
+    uint32_t inertia_1e9_kgm2; /**< of all that turns, 10^-9 kg m2 */
+    uint32_t coulomb_1e8_nm;   /**< friction at standstill, taken from two speeds, 10^-8 N m */
+    uint32_t viscous_1e9_nms;  /**< and what it grows by, 10^-9 N m s */
 } identify_values_t;
 
 /** Sums over a part of the rotor's speeds, accelerating or coasting; a line is laid through the speeds of each passage. */
@@ -129,7 +132,7 @@ typedef struct {
     uint16_t blocks;                        /**< stretches of back-EMF that have been evaluated */
     uint32_t emf_sum;                       /**< their lengths */
     int32_t emf_d_sum, emf_q_sum;           /**< and their components */
-    uint16_t kphi_half;                     /**< mV per 1000 rpm at half speed */
+    uint32_t kphi_half;                     /**< uV per 1000 rpm at half speed */
     int32_t top_q10;                        /**< MECHANICS: up to this speed, and down to 3/8 of it */
     current_q13_t push_q13;                 /**< q current that accelerates */
     int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
