@@ -10,7 +10,7 @@ share, which is known from the board file: one transistor, and the shunt for the
 import argparse
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,8 @@ from .identify_result import MODE, Identified, Known, Measured, step_names, trip
 
 RESULTS = paths.ROOT / "build" / "identify"
 HEADERS = RESULTS / "headers"
-LONGEST_S = 60.0
+LONGEST_S = 900.0
+ALL_ROWS_S = 60.0
 POWER_UP_S = 0.1
 PRESS_S = 0.1
 PERIODS_A_LOOK = 20
@@ -114,21 +115,24 @@ def _measure(job: Job, library: Library, board: Board, report_s: Callable[[float
     board.trace_start(list(SIGNALS), 1)
     board.set("input.s2", 1.0)
     began_s = board.get("time_s")
-    now_s, rows, changes = began_s, [], [(began_s, 0)]
+    last = len(step_names()) - 1
+    now_s, rows, times, changes = began_s, [], [], [(began_s, 0)]
     while now_s - began_s < LONGEST_S:
         board.run(PERIODS_A_LOOK)
-        rows.append(board.trace_take())
         before_s, now_s = now_s, board.get("time_s")
         report_s(now_s - before_s)
         watch = _watch(board)
+        seen = board.trace_take()
+        shown = slice(-1, None) if watch["step"] == last or now_s - began_s > ALL_ROWS_S else slice(None) # no plot shows the rest
+        times.append(np.linspace(before_s, now_s, len(seen) + 1)[1:][shown])
+        rows.append(seen[shown])
         board.set("input.s2", 1.0 if now_s - began_s < PRESS_S or now_s - began_s >= job.stop_after_s else 0.0)
         if watch["step"] != changes[-1][1]:
             changes.append((now_s, watch["step"]))
         if watch["step"] == 0 and watch["result"] > 1:
             break
     board.run(PERIODS_A_LOOK)
-    data = np.concatenate(rows)
-    time_s = began_s + (now_s - began_s) / len(data) * np.arange(1, len(data) + 1)
+    data, time_s = np.concatenate(rows), np.concatenate(times)
     return Measured(_watch(board), library.faults.get(int(board.get("fw.fault")), "?"), changes,
                     Trace(list(SIGNALS), time_s, np.ascontiguousarray(data.T)), now_s - began_s, board.get("pwm.outputs_seen"))
 
@@ -143,20 +147,22 @@ class Prepared:
     known: Known
     header: str
     library: Path
+    changes: board_keys.Values = field(default_factory=board_keys.Values)
 
 
-def prepared(motor: Motor, board_name: str | None, current_a: float | None, speed_rpm: float | None) -> Prepared:
+def prepared(motor: Motor, board_name: str | None, current_a: float | None, speed_rpm: float | None,
+             changes: board_keys.Values | None = None) -> Prepared:
     """Builds the firmware for a motor; on its own board if none is named."""
     board = board_file.load(*board_file.named(motor, board_name))
     known = Known.of(motor, board, current_a, speed_rpm)
     text = header(known, board)
-    return Prepared(motor, board, known, text, built(HEADERS / paths.name_of(motor.path, paths.MOTORS), text, [MODE]))
+    return Prepared(motor, board, known, text, built(HEADERS / paths.name_of(motor.path, paths.MOTORS), text, [MODE]), changes or board_keys.Values())
 
 
 def identify(items: list[Prepared], changes: board_keys.Values, quiet: bool = True) -> list[Identified]:
     """Identifies the motors, side by side."""
     keys = workers.run_all([items[0].library], _keys, lambda seconds: None)[0]
-    values = [_plant(item.motor, item.board, changes, keys) for item in items]
+    values = [_plant(item, changes, keys) for item in items]
     jobs = [Job(item.library, value) for item, value in zip(items, values)]
     with Progress("identify", 12.0 * len(jobs), quiet) as progress:
         measured = workers.run_all(jobs, measure, progress)
@@ -168,8 +174,9 @@ def _keys(library: Path, report_s: Callable[[float], None]) -> dict[str, board_k
     return Library(library).keys
 
 
-def _plant(motor: Motor, board: BoardFile, changes: board_keys.Values, keys: Any) -> dict[str, float]:
-    values = board_keys.resolve([motor.plant_values(), board.plant_values(), changes], keys)
+def _plant(item: Prepared, changes: board_keys.Values, keys: Any) -> dict[str, float]:
+    motor, board = item.motor, item.board
+    values = board_keys.resolve([motor.plant_values(), board.plant_values(), item.changes, changes], keys)
     values.setdefault("state.theta_e_deg", 137.0)
     values.setdefault("bus.voltage_v", values["supply.voltage_v"])
     values.setdefault("motor.r_tempco", motor.resistance_tempco_per_k)
@@ -183,6 +190,7 @@ def add_command(commands: Any) -> None:
     parser = commands.add_parser("identify", help="R, L, Kphi, inertia, friction as IDENTIFY measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
+    parser.add_argument("--range", action="store_true", help="motors over the whole range: tuning/identify_range.toml")
     parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--current", type=float, metavar="A", help="Q_CURRENT_REF_OPENLOOP; default: from the rating")
     parser.add_argument("--speed", type=float, metavar="RPM", help="END_SPEED_RPM; default: 40 %% of the rating")
@@ -195,6 +203,9 @@ def add_command(commands: Any) -> None:
 
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code: 1 if a value is outside its limit or the identification did not end with DONE."""
+    if options.range:
+        from . import identify_range
+        return identify_range.command(options)
     names = command_line.one_or_all(options, paths.names(paths.MOTORS))
     _check(options)
     changes = command_common.changes(options.changes)
@@ -237,7 +248,7 @@ def _write(item: Identified, target: Path) -> None:
         data = item.data()
         (folder.work / build.HEADER).write_text(item.header, encoding="utf-8")
         if item.has_electrical:
-            (folder.work / "motor.toml").write_text(item.paste() + "\n", encoding="utf-8")
+            (folder.work / "motor.toml").write_text(item.file() + "\n", encoding="utf-8")
         from . import identify_plots
         data["plots"] = identify_plots.write_all(item, step_names(), folder.work)
         output.write_summary(folder.work, data)

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 
 from tools.bench import report
-from tools.common import paths, x_macro
+from tools.common import board_file, motor_file, paths, x_macro
 from tools.common.board_file import BoardFile
+from tools.common.errors import UserError
 from tools.common.motor_file import Motor
+from tools.common.param_rows import parameters
+from tools.common.toml_file import Document
 from tools.common.trace import Trace
 
 MODE = "IDENTIFY"
@@ -60,7 +63,7 @@ class Known:
     def of(cls, motor: Motor, board: BoardFile, current_a: float | None = None, speed_rpm: float | None = None) -> "Known":
         """From the rating: the rated current as far as the board allows it, and 40 % of the speed that the rating promises at this bus."""
         share = min(1.0, board.nominal_bus_v / motor.rated_voltage_v)
-        return cls(motor.pole_pairs, current_a or min(motor.rated_current_a, 0.8 * trip_a(board)),
+        return cls(motor.pole_pairs, current_a or min(motor.rated_current_a, 0.8 * trip_a(board), float(parameters()["Q_CURRENT_REF_OPENLOOP"].high)),
                    speed_rpm or max(50.0, min(0.4 * share * motor.rated_speed_rpm, 5000.0)))
 
 
@@ -106,7 +109,12 @@ class Identified:
     @property
     def has_electrical(self) -> bool:
         """R, L and Kphi are valid, whether or not inertia and friction could be measured."""
-        return self.result.name in ("DONE", "NOT_ACCELERATING")
+        return self.result.name in ("DONE", "NOT_ACCELERATING", "INERTIA_RANGE", "FRICTION_RANGE")
+
+    @property
+    def has_inertia(self) -> bool:
+        """The inertia is valid, whether or not the friction could be measured."""
+        return self.result.name in ("DONE", "FRICTION_RANGE")
 
     @property
     def bridge_ohm(self) -> float:
@@ -135,9 +143,10 @@ class Identified:
             _row("Ld [uH]", f"{1e-3 * watch['Ld_nH']:.2f}", f"{1e6 * plant_now['motor.ld_h']:.2f}", 1e-9 * watch["Ld_nH"] / plant_now["motor.ld_h"], "Ld"),
             _row("Lq [uH]", f"{1e-3 * watch['Lq_nH']:.2f}", f"{1e6 * plant_now['motor.lq_h']:.2f}", 1e-9 * watch["Lq_nH"] / plant_now["motor.lq_h"], "Lq"),
             _row("Kphi [mV/krpm]", f"{1e-3 * watch['Kphi_uV_per_krpm']:.1f}", f"{1e3 * kphi:.1f}", 1e-6 * watch["Kphi_uV_per_krpm"] / kphi, "Kphi")]
-        if self.done:
+        if self.has_inertia:
             rows.append(_row("J [1e-6 kg m2]", f"{1e6 * self.inertia_kgm2:.5g}", f"{1e6 * plant_now['mech.inertia_kgm2']:.5g}",
                              self.inertia_kgm2 / plant_now["mech.inertia_kgm2"], "J"))
+        if self.done:
             rows += [self._friction_row(share, kphi) for share in (0.5, 1.0)]
         return rows
 
@@ -169,8 +178,8 @@ class Identified:
         return problems + [f"{row['name']} is off by {row['error_percent']:+.2f} %, allowed are {row['limit_percent']:g} %"
                 for row in self.rows() if row["verdict"] == "FAIL"]
 
-    def paste(self) -> str:
-        """The lines for a motor file: line to line, which means the same in a star and in a delta."""
+    def paste(self, inertia_kgm2: float | None = None) -> str:
+        """The lines for a motor file: line to line, which means the same in a star and in a delta. `inertia_kgm2`: the rotor's share"""
         watch = self.measured.watch
         source = f"measured with {MODE}, {self.known.current_a:.3g} A"
         ld_mh, lq_mh = 1e-6 * watch["Ld_nH"], 1e-6 * watch["Lq_nH"]
@@ -183,11 +192,32 @@ class Identified:
             lines.append(f'inductance_q = {{ value = {2.0 * lq_mh:.4g}, unit = "mH line-to-line", source = "{source}" }}')
         lines.append(f'kphi = {{ value = {1e-6 * watch["Kphi_uV_per_krpm"]:.4g}, unit = "V peak line-to-line/krpm", at_degc = 25, '
                      f'source = "{source}, {self.known.speed_rpm:.4g} rpm" }}')
+        lines += ["", "[mechanical]", f'inertia = {{ value = {inertia_kgm2 or self.inertia_kgm2:.4g}, unit = "kg m2", source = "{source}" }}' if self.has_inertia
+                  else f"# inertia is missing: {self.result.name}, {self.result.cause}"]
         if self.done:
-            lines += ["", "[mechanical]", f'inertia = {{ value = {self.inertia_kgm2:.4g}, unit = "kg m2", source = "{source}" }}',
-                      f'viscous_friction = {{ value = {1e-9 * watch["Viscous_1e9_Nms"]:.4g}, unit = "N m s", source = "{source}" }}',
+            lines += [f'viscous_friction = {{ value = {1e-9 * watch["Viscous_1e9_Nms"]:.4g}, unit = "N m s", source = "{source}" }}',
                       f'coulomb_friction = {{ value = {1e-5 * watch["Coulomb_1e8_Nm"]:.4g}, unit = "mN m", source = "{source}" }}']
         return "\n".join(lines)
+
+    def file(self) -> str:
+        """A whole motor file: what was measured, and the rating that was told."""
+        motor, where = self.motor, f'source = "{paths.shown(self.motor.path)}"'
+        rating = (("voltage", motor.rated_voltage_v, "V"), ("current", motor.rated_current_a, "A peak"), ("torque", motor.rated_torque_nm, "N m"),
+                  ("speed", motor.rated_speed_rpm, "rpm"), ("maximum_speed", motor.maximum_speed_rpm, "rpm"),
+                  ("maximum_current", motor.maximum_current_a, "A peak"))
+        rotor = min(self.inertia_kgm2, motor.heaviest_kgm2)
+        load = ["", "[load]", f'inertia = {{ value = {self.inertia_kgm2 - rotor:.4g}, unit = "kg m2" }}'] if self.has_inertia and rotor < self.inertia_kgm2 else []
+        return "\n".join([f'title = "{motor.title}, as measured"', f'connection = "{motor.connection}"', f'board = "{self.board.path.resolve()}"', "",
+                          self.paste(rotor), "", "[rating]", *(f'{key} = {{ value = {value:.6g}, unit = "{unit}", {where} }}' for key, value, unit in rating), *load])
+
+    def tuner(self) -> str:
+        """Why `make tune` refuses the motor as it was measured; "" if it takes it."""
+        from .design import design
+        try:
+            design(motor_file.read(Document(self.motor.path, self.file())), board_file.load(str(self.board.path)))
+        except UserError as error:
+            return error.lines[0]
+        return ""
 
     def text(self) -> str:
         """The whole report, as printed."""
@@ -197,8 +227,10 @@ class Identified:
                  f"bridge of {self.board.name}: {1e3 * self.bridge_ohm:.1f} mohm (transistor, half of the shunt)",
                  "\n".join(f"{at_s:9.4f} s  {step_names()[number]}" for at_s, number in self.measured.steps[1:])]
         if self.has_electrical:
-            parts += [report.table(self.rows(), COLUMNS), "For the motor file (R without the bridge; note the winding's temperature):\n\n" + self.paste()]
-        if self.done:
+            parts += [report.table(self.rows(), COLUMNS), "The motor file (R without the bridge; note the winding's temperature):\n\n" + self.file()]
+            refused = self.tuner()
+            parts += [f"`make tune` refuses this motor: {refused}"] if refused else []
+        if self.has_inertia:
             parts.append(f"For userparams.h, a load's inertia comes on top:\n\n#define MOTOR_INERTIA_KGM2 {self.inertia_kgm2:.4g}")
         return "\n\n".join(parts)
 

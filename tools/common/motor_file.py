@@ -22,7 +22,9 @@ FERRITE_PER_K = -0.002
 MAXIMUM_OVER_RATED = 1.5
 START_OVER_RATED = 0.25
 LARGEST_FILE = 65536
-PLANT_TABLES = ("motor.", "mech.", "load.pulse")
+SLOWEST_S = 5.0
+"""In which rated torque brings a bare rotor to rated speed; what is heavier is a load."""
+PLANT_TABLES = ("motor.", "mech.")
 DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "motor.r_tempco", "motor.psi_tempco",
                 "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm", "load.pulse1_nm", "load.pulse1_order")
 
@@ -130,6 +132,11 @@ class Motor:
         """True if the two inductances differ."""
         return self.ld_h != self.lq_h
 
+    @property
+    def heaviest_kgm2(self) -> float:
+        """More is no rotor's inertia, but a load's."""
+        return SLOWEST_S * self.rated_torque_nm / (self.rated_speed_rpm * units.RPM)
+
     def plant_values(self) -> Values:
         """Keys of the virtual board; each `where` is the line of the number that it follows from."""
         result = Values()
@@ -155,6 +162,11 @@ def load(name_or_path: str, where: str = "") -> Motor:
     """tuning/motors/NAME.toml or a path; `where` says who asked for it, for the error about a name that does not exist."""
     path = paths.find("motor", name_or_path, paths.MOTORS, where)
     return read_safely(path, _read)
+
+
+def read(document: Document) -> Motor:
+    """What a document says that is not in a file yet."""
+    return _read(document.root)
 
 
 def part(name_or_path: str, where: str = "") -> Part:
@@ -384,9 +396,9 @@ def _check(motor: Motor) -> None:
         key = "coulomb_friction" if motor.coulomb_nm > motor.rated_torque_nm / 2.0 else "viscous_friction"
         fail(key, f"friction at rated speed, {friction_nm:.3g} N m, exceeds the rated torque", "check the unit of friction")
     acceleration_s = motor.inertia_kgm2 * rated_rad_s / motor.rated_torque_nm
-    if not 1e-3 <= acceleration_s <= 5.0:
+    if not 1e-3 <= acceleration_s <= SLOWEST_S:
         fail("inertia", f"rated torque would bring the bare rotor to rated speed in {acceleration_s:.3g} s",
-                   "0.001 .. 5 s are usual; check the unit of inertia")
+                   f"0.001 .. {SLOWEST_S:g} s are usual; check the unit of inertia")
     _check_limits(motor, fail)
     problems.tell()
 

@@ -22,13 +22,19 @@
 #define BLOCK_LOG2 5  /* periods of a stretch of back-EMF: short against the rotor's swinging */
 #define BLOCKS_LOG2 8 /* stretches: many swings */
 #define BLOCKS 256u
-#define FOLLOW_LOG2 5      /* periods of a stretch while accelerating and coasting */
-#define FOLLOW_SETTLE 6u   /* stretches after a change of current: the frame's angle changes by what dead time takes */
-#define PUSH_BLOCKS 1000u  /* stretches, some 2 s, after which the current is doubled; at the last one twice as many */
-#define PUSH_LEAST 20u     /* fewer, and less current pushes the next time */
-#define GENTLER_MOST 16u   /* times: to a hundredth of the current */
-#define COAST_BLOCKS 5000u /* some 10 s: a rotor without friction coasts for ever */
-#define PASSAGE_MOST 64u   /* stretches of one line: its sums fit into 32 bits */
+#define FOLLOW_LOG2 5          /* periods of a stretch while accelerating and coasting, first */
+#define FOLLOW_MOST 9u         /* and of a rotor that takes long: its speed hardly changes within one */
+#define LONGER_EVERY 512u      /* stretches */
+#define LONGER_BELOW 0x100000l /* of the top speed: the sum of a stretch fits into 32 bits */
+#define FOLLOW_SETTLE 6u       /* stretches after a change of current: the frame's angle changes by what dead time takes */
+#define DOUBLE_UNITS 200u    /* first stretches, a third of a second, after which the current is doubled: much current outweighs what samples miss */
+#define PUSH_UNITS 1250u      /* and 2 s, in which all of it must bring 1/128 of the top speed */
+#define PUSH_LEAST 20u         /* stretches: fewer, and less current pushes the next time */
+#define GENTLER_MOST 16u       /* times: to a hundredth of the current */
+#define COAST_UNITS 6250u      /* 10 s: a rotor without friction coasts for ever */
+#define UNITS_MOST 60000u      /* a minute and a half */
+#define PART_UNITS 4096        /* more count half: the sums fit into 32 bits */
+#define PASSAGE_MOST 64u       /* stretches of one line: its sums fit into 32 bits */
 #define CYCLES_LEAST 4u
 #define CYCLES_MOST 12u
 #define LEAST_UOHM 5000u
@@ -40,7 +46,9 @@
 #define LEAST_INERTIA 50u
 #define MOST_INERTIA 2000000000ul
 #define MOST_FRICTION 300000000l
-#define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST */
+#define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST; four times as many with two */
+#define REST_MOST 150u                                                                  /* means until the rotor counts as resting: half a minute */
+#define RAMPS_MOST 4u                                                                   /* each with a quarter of the acceleration of the one before */
 #define FASTEST_Q10 ((int32_t)(30000.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 67108864.0F)) /* electrical rpm that every format holds */
 
 /* ---- Constants from the board's parameters ---- */
@@ -153,7 +161,8 @@ static void rise_done(drive_t *d, const drive_params_t *p)
         i_q13 = LEAST_CURRENT_Q13;
     }
     ki = qm_divud(qm_muluu((uint16_t)v_q14, (uint16_t)(SLOW_LOOP_RAD_S * PARAM_F(LOOPTIME_SEC) * 16384.0F + 0.5F)), (uint16_t)i_q13);
-    id->ki_d = (int16_t)((ki == 0u) ? 1u : ki); /* at most the voltage: what divides is larger than the factor */
+    id->ki_slow = (int16_t)((ki == 0u) ? 1u : ki); /* at most the voltage: what divides is larger than the factor */
+    id->ki_d = id->ki_slow;
     id->mode = (uint16_t)IDENTIFY_CURRENT;
     go(id, IDENTIFY_CONNECT, SETTLE_PERIODS, 1u << MEAN_LOG2);
 }
@@ -173,11 +182,32 @@ static uint16_t current_reached(drive_t *d, int16_t mean_q13)
     return 1;
 }
 
+/** A heavy rotor swings for long, and its back-EMF is in current and voltage. 1 when the current across the axis is none or has not changed
+ *  since the last mean; else the step's mean is taken anew. @param across sum of sqrt(3) times that current */
+static uint16_t rests(drive_t *d, int32_t across)
+{
+    identify_t *id = &d->run.identify;
+    int16_t now_q13 = (int16_t)(across >> MEAN_LOG2), before_q13 = id->across_q13;
+    int16_t little_q13 = (int16_t)((d->run.control.ref_q13.d >> 6) + 16);
+    id->across_q13 = now_q13;
+    id->unrest++;
+    if (qm_abs(now_q13) > little_q13 && qm_abs((int16_t)(now_q13 - before_q13)) > little_q13 && id->unrest < REST_MOST) {
+        go(id, (identify_step_t)id->step, 0, 1u << MEAN_LOG2);
+        return 0;
+    }
+    id->across_q13 = 0;
+    id->unrest = 0;
+    return 1;
+}
+
 /** At -60 degrees phase B carries all of the current and A and C half of it each. */
 static void connect_done(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
     int16_t a_q13 = (int16_t)(id->sum[1] >> MEAN_LOG2), b_q13 = (int16_t)(id->sum[2] >> MEAN_LOG2);
+    if (!rests(d, 2 * id->sum[1] + id->sum[2])) {
+        return;
+    }
     if (!current_reached(d, (int16_t)-b_q13)) {
         return;
     }
@@ -193,6 +223,9 @@ static void connect_done(drive_t *d, const drive_params_t *p)
 static void align_done(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
+    if (!rests(d, id->sum[1] + 2 * id->sum[2])) {
+        return;
+    }
     if (current_reached(d, (int16_t)(id->sum[1] >> MEAN_LOG2))) {
         id->duty_first = id->sum[0];
         id->i_first = id->sum[1];
@@ -210,6 +243,9 @@ static void resistance_done(drive_t *d, const drive_params_t *p)
     soft_float_t bus = soft_float_div(soft_float_of((uint32_t)id->bus_first), soft_float_of((uint32_t)id->sum[3]));
     int32_t duty_first = soft_float_times(id->duty_first, bus);
     int32_t duty = duty_first - id->sum[0], i = id->i_first - id->sum[1];
+    if (!rests(d, id->sum[1] + 2 * id->sum[2])) {
+        return;
+    }
     if (duty <= 0 || i <= 0) {
         finish(d, IDENTIFY_RESULT_R_RANGE);
         return;
@@ -406,16 +442,32 @@ static int32_t share_of(int32_t x, int32_t part, int32_t whole)
     return (part < 0) ? -share : share;
 }
 
+/** Halves sums that have grown long: all of them, so that means and rates stay as they are. */
+static void part_shrink(identify_part_t *part)
+{
+    if (part->units > PART_UNITS) {
+        part->units >>= 1;
+        part->current /= 2;
+        part->speed >>= 1;
+        part->slope /= 2;
+        part->weight >>= 1;
+        part->steps >>= 1;
+        part->periods >>= 1;
+    }
+}
+
 /** The least-squares line through a passage: its slope times its weight, so that passages can be added. */
 static void passage_end(identify_t *id)
 {
     if (id->part != 0u && id->passed > 1u) {
         identify_part_t *to = &id->parts[id->part - 1u];
         int32_t n = (int32_t)id->passed;
+        uint16_t longer = (uint16_t)(id->follow_log2 - FOLLOW_LOG2);
         to->slope += 2 * id->rise_moment - (n - 1) * id->rise;
-        to->weight += n * (n * n - 1);
-        to->steps += n - 1;
+        to->weight += (n * (n * n - 1)) << longer;
+        to->steps += (n - 1) << longer;
         to->periods += (uint16_t)(id->ended_at - id->began_at);
+        part_shrink(to);
     }
     id->part = 0;
 }
@@ -425,27 +477,43 @@ static void mechanics_current(drive_t *d, current_q13_t iq_q13)
 {
     identify_t *id = &d->run.identify;
     d->run.control.ref_q13.q = iq_q13;
-    id->phase_blocks = 0;
     passage_end(id);
+    id->phase_blocks = 0;
+    id->phase_units = 0;
+    id->look_units = DOUBLE_UNITS;
+    id->look_q10 = 0;
+    id->follow_log2 = FOLLOW_LOG2;
+}
+
+/** What the samples of a stretch miss of the current at a speed / 16: they are taken after the centre of the low sides' conduction, when the
+ *  back-EMF has taken some of it off. */
+static int32_t missed(const identify_t *id, int32_t speed, soft_float_t factor)
+{
+    return soft_float_times(speed, soft_float_mul(factor, soft_float_div(soft_float_of(id->values.kphi_uv_per_krpm), soft_float_of(id->values.lq_nh))));
 }
 
 /** What the q current takes of the voltage is not the rotor's. */
 static void mechanics_drops(drive_t *d, int32_t speed_q10)
 {
     identify_t *id = &d->run.identify;
-    int16_t iq_q13 = d->run.control.ref_q13.q;
     soft_float_t w = soft_float_of((uint32_t)speed_q10);
+    int16_t iq_q13;
+    if (id->coasting) { /* no current, not none at the samples: that would push a rotor of little inductance */
+        d->run.control.ref_q13.q = (int16_t) - (missed(id, speed_q10 >> 4, C_MISSED_COASTING) >> FOLLOW_LOG2);
+    }
+    iq_q13 = d->run.control.ref_q13.q;
     id->drop_q_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC));
     id->drop_d_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_mul(soft_float_of(id->values.lq_nh), w), C_REACTIVE));
 }
 
 static void forget_parts(identify_t *id)
 {
-    static const identify_part_t nothing = { .blocks = 0 };
+    static const identify_part_t nothing = { .units = 0 };
     int16_t n;
     for (n = 0; n < 3; n++) {
         id->parts[n] = nothing;
     }
+    id->part = 0; /* the passage under way is forgotten, too */
     id->cycles = 0;
 }
 
@@ -508,6 +576,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
 static void part_add(identify_t *id, uint16_t part, int32_t speed_q10)
 {
     identify_part_t *to = &id->parts[part];
+    uint16_t longer;
     int32_t rise;
     if (id->part != part + 1u || id->passed == PASSAGE_MOST) {
         passage_end(id);
@@ -518,29 +587,27 @@ static void part_add(identify_t *id, uint16_t part, int32_t speed_q10)
         id->rise = 0;
         id->rise_moment = 0;
     }
+    longer = (uint16_t)(id->follow_log2 - FOLLOW_LOG2);
     rise = (speed_q10 - id->from_q10) >> 4;
     id->rise += rise;
     id->rise_moment += rise * (int32_t)id->passed;
     id->passed++;
     id->ended_at = id->at;
-    to->blocks++;
+    to->units += (int32_t)1 << longer;
     to->current += id->sum[1];
-    to->speed += speed_q10 >> 4;
+    to->speed += (speed_q10 >> 4) * ((int32_t)1 << longer);
 }
 
 static int32_t part_speed(const identify_part_t *part)
 {
-    return share_of(part->speed, 1, part->blocks);
+    return share_of(part->speed, 1, part->units);
 }
 
-/** Mean q current, with what the samples miss: they are taken after the centre of the low sides' conduction, when the back-EMF has taken
- *  some of it off. */
+/** Mean q current, with what the samples miss. */
 static int32_t part_current(const identify_t *id, uint16_t part)
 {
     const identify_part_t *of = &id->parts[part];
-    soft_float_t missed = (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING;
-    missed = soft_float_mul(missed, soft_float_div(soft_float_of(id->values.kphi_uv_per_krpm), soft_float_of(id->values.lq_nh)));
-    return share_of(of->current, 1, of->blocks) + soft_float_times(part_speed(of), missed);
+    return share_of(of->current, 1, of->units) + missed(id, part_speed(of), (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING);
 }
 
 /** Change of speed, counts a period * RATE_SCALE. */
@@ -583,29 +650,13 @@ static uint32_t not_negative(int32_t x)
     return (uint32_t)((x < 0) ? 0 : x);
 }
 
-static void mechanics_done(drive_t *d)
+/** Friction from coasting at two speeds. */
+static void friction_done(drive_t *d)
 {
     identify_t *id = &d->run.identify;
-    const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
-    int32_t fast_nm, slow_nm, apart, grows;
-    passage_end(id);
-    if (slow->periods == 0) { /* it coasts too long: the friction counts as constant */
-        id->parts[PART_SLOW] = *fast;
-    }
-    if (push->periods == 0 || fast->periods == 0) {
-        finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
-        return;
-    }
-    id->values.inertia_1e9_kgm2 = inertia(id);
-    if (id->values.inertia_1e9_kgm2 < LEAST_INERTIA || id->values.inertia_1e9_kgm2 > MOST_INERTIA) {
-        id->values.inertia_1e9_kgm2 = 0;
-        finish(d, IDENTIFY_RESULT_INERTIA_RANGE);
-        return;
-    }
-    apart = part_speed(fast) - part_speed(slow);
-    fast_nm = drag(id, PART_FAST);
-    slow_nm = drag(id, PART_SLOW);
-    grows = (apart > 0) ? fast_nm - slow_nm : 0;
+    const identify_part_t *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
+    int32_t fast_nm = drag(id, PART_FAST), slow_nm = drag(id, PART_SLOW), apart = part_speed(fast) - part_speed(slow);
+    int32_t grows = (apart > 0) ? fast_nm - slow_nm : 0;
     if (fast_nm > MOST_FRICTION || slow_nm > MOST_FRICTION) {
         finish(d, IDENTIFY_RESULT_FRICTION_RANGE);
         return;
@@ -619,11 +670,48 @@ static void mechanics_done(drive_t *d)
     finish(d, IDENTIFY_RESULT_DONE);
 }
 
+static void mechanics_done(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    identify_part_t *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
+    passage_end(id);
+    if (slow->periods == 0) { /* one speed only: the friction counts as constant */
+        *slow = *fast;
+    } else if (fast->periods == 0) {
+        *fast = *slow;
+    } else {
+        /* both */
+    }
+    if (id->parts[PART_PUSH].periods == 0 || fast->periods == 0) {
+        finish(d, IDENTIFY_RESULT_NOT_ACCELERATING);
+        return;
+    }
+    id->values.inertia_1e9_kgm2 = inertia(id);
+    if (id->values.inertia_1e9_kgm2 < LEAST_INERTIA || id->values.inertia_1e9_kgm2 > MOST_INERTIA) {
+        id->values.inertia_1e9_kgm2 = 0;
+        finish(d, IDENTIFY_RESULT_INERTIA_RANGE);
+    } else {
+        friction_done(d);
+    }
+}
+
+static int32_t bottom_of(const identify_t *id)
+{
+    return (id->top_q10 >> 2) + (id->top_q10 >> 3);
+}
+
+/** Speed at which a push ends. The first one is half as long: a rotor that coasts for minutes is seen at a low speed, then at the top. */
+static int32_t goal_of(const identify_t *id)
+{
+    return (id->cycles != 0u) ? id->top_q10 : id->top_q10 - bottom_of(id);
+}
+
 /** It is as fast as it shall be: what is left is to coast. */
 static void push_ends(drive_t *d)
 {
     identify_t *id = &d->run.identify;
-    if (id->phase_blocks < PUSH_LEAST && id->gentler < GENTLER_MOST) { /* too quick to be seen: it counts no more */
+    uint16_t least = (uint16_t)((id->cycles != 0u) ? PUSH_LEAST : PUSH_LEAST / 2u);
+    if (id->phase_blocks < least && id->first_q10 < bottom_of(id) && id->gentler < GENTLER_MOST) { /* too quick to be seen: it counts no more */
         id->push_q13 = (int16_t)(id->push_q13 - (id->push_q13 >> 2));
         id->gentler++;
         forget_parts(id);
@@ -645,41 +733,59 @@ static void push_harder(drive_t *d, const drive_params_t *p, uint16_t follows)
     mechanics_current(d, id->push_q13);
 }
 
+/** 1 where the push has lasted long and more current, or the end, is due: with all of it a heavy rotor goes on as long as it gets faster. */
+static uint16_t push_is_overdue(identify_t *id, const drive_params_t *p, int32_t speed_q10)
+{
+    int32_t before_q10 = id->look_q10;
+    if (id->phase_units < id->look_units) {
+        return 0;
+    }
+    id->look_units = (uint16_t)(id->look_units + PUSH_UNITS);
+    id->look_q10 = speed_q10;
+    return (uint16_t)(id->push_q13 < p->open_loop_q13 || id->look_units > UNITS_MOST || speed_q10 - before_q10 < (id->top_q10 >> 7));
+}
+
 /** A stretch with current. */
 static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
 {
     identify_t *id = &d->run.identify;
-    int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
-    uint16_t last = (uint16_t)(id->push_q13 >= p->open_loop_q13), settled = (uint16_t)(id->phase_blocks > FOLLOW_SETTLE);
+    int32_t bottom_q10 = bottom_of(id), goal_q10 = goal_of(id);
+    uint16_t settled = (uint16_t)(id->phase_blocks > FOLLOW_SETTLE);
     if (id->phase_blocks == 1u) {
         id->first_q10 = speed_q10 - (speed_q10 >> 3);
     }
-    if (settled && speed_q10 >= bottom_q10 && speed_q10 <= id->top_q10) {
+    if (settled && speed_q10 >= bottom_q10 && speed_q10 <= goal_q10) {
         part_add(id, PART_PUSH, speed_q10);
     }
-    if (speed_q10 > id->top_q10 + (id->top_q10 >> 5)) {
+    if (speed_q10 > goal_q10 + (goal_q10 >> 5)) {
         push_ends(d);
-    } else if ((settled && speed_q10 < id->first_q10) || id->phase_blocks > (uint16_t)(PUSH_BLOCKS << last)) {
+    } else if ((settled && speed_q10 < id->first_q10) || push_is_overdue(id, p, speed_q10)) {
         push_harder(d, p, (uint16_t)(speed_q10 >= (bottom_q10 >> 1)));
     } else {
         /* it accelerates */
     }
 }
 
+/** 1 when the rotor has coasted often or long enough. */
+static uint16_t coasted_enough(const identify_t *id, uint16_t late)
+{
+    int32_t periods = id->parts[PART_FAST].periods + id->parts[PART_SLOW].periods;
+    return (uint16_t)(id->cycles >= CYCLES_MOST || (id->cycles >= 2u && (late || periods > 4 * (int32_t)COAST_PERIODS))
+                      || (id->cycles >= CYCLES_LEAST && periods > (int32_t)COAST_PERIODS));
+}
+
 /** A stretch without. */
 static void coast_block(drive_t *d, int32_t speed_q10)
 {
     identify_t *id = &d->run.identify;
-    int32_t bottom_q10 = (id->top_q10 >> 2) + (id->top_q10 >> 3);
-    int32_t middle_q10 = (id->top_q10 + bottom_q10) >> 1;
-    uint16_t late = (uint16_t)(id->phase_blocks > COAST_BLOCKS);
+    int32_t bottom_q10 = bottom_of(id), middle_q10 = (id->top_q10 + bottom_q10) >> 1;
+    uint16_t late = (uint16_t)(id->phase_units > ((id->cycles != 0u && id->parts[PART_PUSH].periods == 0) ? UNITS_MOST : COAST_UNITS));
     if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10) {
         part_add(id, (speed_q10 > middle_q10) ? PART_FAST : PART_SLOW, speed_q10);
     }
     if (speed_q10 < bottom_q10 || late) {
         id->cycles++;
-        if (late || id->cycles >= CYCLES_MOST
-            || (id->cycles >= CYCLES_LEAST && id->parts[PART_FAST].periods + id->parts[PART_SLOW].periods > (int32_t)COAST_PERIODS)) {
+        if (coasted_enough(id, late)) {
             mechanics_done(d);
             return;
         }
@@ -691,8 +797,9 @@ static void coast_block(drive_t *d, int32_t speed_q10)
 static void mechanics_block(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
-    int32_t speed_q10 = id->sum[0] >> FOLLOW_LOG2;
+    int32_t speed_q10 = id->sum[0] >> id->follow_log2;
     id->phase_blocks++;
+    id->phase_units = (uint16_t)(id->phase_units + (1u << (id->follow_log2 - FOLLOW_LOG2)));
     if (id->coasting) {
         coast_block(d, speed_q10);
     } else {
@@ -700,8 +807,40 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
     }
     if (id->step == (uint16_t)IDENTIFY_MECHANICS) {
         mechanics_drops(d, speed_q10);
-        go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
+        if ((id->phase_blocks & (LONGER_EVERY - 1u)) == 0u && id->phase_blocks != 0u && id->follow_log2 < FOLLOW_MOST && id->top_q10 < LONGER_BELOW) {
+            passage_end(id);
+            id->follow_log2 = (uint16_t)(id->follow_log2 + 2u);
+        }
+        go(id, IDENTIFY_MECHANICS, 0, (uint16_t)(1u << id->follow_log2));
     }
+}
+
+/** The rotor slipped: too heavy for the ramp, or not free. What stood at the beginning stands again, and a ramp with a quarter of the
+ *  acceleration follows. @return 1 when that is worth a try, and no back-EMF would drive more current than was asked for */
+static uint16_t ramp_slower(drive_t *d, const drive_params_t *p)
+{
+    static const pi_gains_t gains = { 0, 0, 0, SLOW_SHIFT };
+    identify_t *id = &d->run.identify;
+    int32_t ohmic = soft_float_times(p->open_loop_q13, soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC));
+    id->ramps++;
+    if (id->step != (uint16_t)IDENTIFY_SPIN_HALF || id->ramps >= RAMPS_MOST || (int32_t)(id->emf_sum >> BLOCKS_LOG2) > ohmic) {
+        return 0;
+    }
+    id->kp_d = 0;
+    id->kp_q = 0;
+    id->ki_d = id->ki_slow;
+    id->ki_q = 0;
+    id->shift = SLOW_SHIFT;
+    pi_preset(&d->run.control.pi_d, &gains, 0, (int16_t)(id->bias_q14 + id->bias_q14 / 3));
+    pi_preset(&d->run.control.pi_q, &gains, 0, 0);
+    d->forced.speed_q10 = 0;
+    d->forced.angle_q32 = IDENTIFY_START_ANGLE_Q32;
+    id->sweep = 1;
+    id->on_q = 0;
+    id->half = HALF_FIRST;
+    id->mode = (uint16_t)IDENTIFY_CURRENT;
+    go(id, IDENTIFY_ALIGN, SETTLE_PERIODS, 1u << MEAN_LOG2);
+    return 1;
 }
 
 static void spin_done(drive_t *d, const drive_params_t *p)
@@ -722,7 +861,9 @@ static void spin_done(drive_t *d, const drive_params_t *p)
     }
     uv = kphi(d, p);
     if (!coherent(id) || uv < LEAST_UV) {
-        finish(d, IDENTIFY_RESULT_NOT_TURNING);
+        if (!ramp_slower(d, p)) {
+            finish(d, IDENTIFY_RESULT_NOT_TURNING);
+        }
     } else if (uv > MOST_UV) {
         finish(d, IDENTIFY_RESULT_KPHI_RANGE);
     } else if (id->step == (uint16_t)IDENTIFY_SPIN_HALF) {
@@ -815,7 +956,7 @@ uint16_t identify_turn(drive_t *d, const drive_params_t *p)
         if (d->state == (uint16_t)DRIVE_ALIGN) {
             drive_enter(d, DRIVE_RAMP);
         }
-        settled = (uint16_t)forced_angle_accelerate(&d->forced, &to, 1, 1);
+        settled = (uint16_t)forced_angle_accelerate(&d->forced, &to, 1, (uint16_t)((d->ticks & ((1u << 2u * id->ramps) - 1u)) == 0u));
         forced_angle_move(&d->forced);
     } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
         identify_follow(d);
@@ -927,7 +1068,8 @@ void identify_record(drive_t *d, const drive_params_t *p, uint16_t settled)
  *  costs up to 0.3 V across the current, which is where the back-EMF is; standing, the first current would come with a jump. */
 static void identify_duties(const drive_t *d, const drive_params_t *p, duties_t *duty)
 {
-    phases_t asked = phases_of(d->run.control.ref_q13, d->frame);
+    static const dq_t none = { 0, 0 }; /* a rotor that coasts: what is asked for is what the samples miss */
+    phases_t asked = phases_of(d->run.identify.coasting ? none : d->run.control.ref_q13, d->frame);
     dead_duties_t dead;
     svm_compensation(&p->svm, asked, &dead);
     svm(&p->svm, inverse_park(d->run.control.v_q14, d->frame), d->duty_per_volt_q16, &dead, &asked, duty);

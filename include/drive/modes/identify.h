@@ -85,7 +85,7 @@ typedef struct {
 
 /** Sums over a part of the rotor's speeds, accelerating or coasting; a line is laid through the speeds of each passage. */
 typedef struct {
-    int32_t blocks;  /**< stretches */
+    int32_t units;   /**< stretches of the first length */
     int32_t current; /**< of their sums of q current */
     int32_t speed;   /**< of their speeds / 16 */
     int32_t slope;   /**< of the passages' slopes, each times its weight */
@@ -128,6 +128,9 @@ typedef struct {
     identify_values_t values;
     soft_float_t duty_per_amp;              /**< duty counts per current count along phase A: R before it is scaled */
     int32_t duty_first, i_first, bus_first; /**< sums of the first level */
+    int16_t ki_slow;                        /**< of the slow current controller */
+    int16_t across_q13;                     /**< sqrt(3) times the current across the axis, mean of the last time */
+    uint16_t unrest, ramps;                 /**< times that the rotor did not rest; ramps that it did not follow */
     int32_t dead_q13;                       /**< what dead time and diodes take beyond the compensation, as the current for which R takes it */
     uint16_t blocks;                        /**< stretches of back-EMF that have been evaluated */
     uint32_t emf_sum;                       /**< their lengths */
@@ -137,7 +140,11 @@ typedef struct {
     current_q13_t push_q13;                 /**< q current that accelerates */
     int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
     uint16_t gentler;                       /**< times that the push was too quick */
-    uint16_t coasting, cycles, phase_blocks;
+    uint16_t coasting, cycles;
+    uint16_t phase_blocks, phase_units;  /**< stretches since the current changed, counted as they are and in the first length */
+    uint16_t follow_log2;                /**< periods of a stretch */
+    uint16_t look_units;                 /**< when the push is looked at again */
+    int32_t look_q10;                    /**< speed at the last look */
     uint16_t part;                       /**< where the passage belongs that is under way, counted from 1; 0 = none is */
     uint16_t passed, began_at, ended_at; /**< its stretches, and when the first and the last one ended */
     int32_t from_q10;                    /**< speed of the first one */
