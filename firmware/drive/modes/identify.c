@@ -27,8 +27,8 @@
 #define LONGER_EVERY 512u      /* stretches */
 #define LONGER_BELOW 0x100000l /* of the top speed: the sum of a stretch fits into 32 bits */
 #define FOLLOW_SETTLE 6u       /* stretches after a change of current: the frame's angle changes by what dead time takes */
-#define DOUBLE_UNITS 200u    /* first stretches, a third of a second, after which the current is doubled: much current outweighs what samples miss */
-#define PUSH_UNITS 1250u      /* and 2 s, in which all of it must bring 1/128 of the top speed */
+#define DOUBLE_UNITS 200u      /* first stretches, a third of a second, after which the current is doubled: much current outweighs what samples miss */
+#define PUSH_UNITS 1250u       /* and 2 s, in which all of it must bring 1/128 of the top speed */
 #define PUSH_LEAST 20u         /* stretches: fewer, and less current pushes the next time */
 #define GENTLER_MOST 16u       /* times: to a hundredth of the current */
 #define COAST_UNITS 6250u      /* 10 s: a rotor without friction coasts for ever */
@@ -48,6 +48,9 @@
 #define MOST_FRICTION 300000000l
 #define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST; four times as many with two */
 #define REST_MOST 150u                                                                  /* means until the rotor counts as resting: half a minute */
+#define SWING_LOG2 6                                                                    /* periods of the filter of the back-EMF along the current, 3 ms */
+#define SWING_MEAN_LOG2 13                                                              /* and of its mean, 0.4 s: heavy rotors swing with 2 rad/s and more */
+#define SWING_GAIN 2                                                                    /* speed by voltage: damps with 20 rad/s where the back-EMF is 0.4 of the circle, as END_SPEED_RPM is to be chosen */
 #define RAMPS_MOST 4u                                                                   /* each with a quarter of the acceleration of the one before */
 #define FASTEST_Q10 ((int32_t)(30000.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 67108864.0F)) /* electrical rpm that every format holds */
 
@@ -376,6 +379,8 @@ static void inductance_q_done(drive_t *d, const drive_params_t *p)
     pi_preset(&d->run.control.pi_q, &gains, 0, 0);
     d->run.control.ref_q13.d = p->open_loop_q13;
     id->mode = (uint16_t)IDENTIFY_TURN;
+    id->swing = (int32_t)id->bias_q14 * (1 << SWING_LOG2);
+    id->swing_mean = (int32_t)id->bias_q14 * (1 << SWING_MEAN_LOG2);
     forget_emf(id);
     go(id, IDENTIFY_SPIN_HALF, SETTLE_PERIODS, 1u << BLOCK_LOG2);
 }
@@ -567,6 +572,7 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     forget_parts(id);
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
+    id->seen_q10 = (int32_t)speed;
     mechanics_drops(d, (int32_t)speed);
     id->mode = (uint16_t)IDENTIFY_FOLLOW;
     go(id, IDENTIFY_MECHANICS, 0, 1u << FOLLOW_LOG2);
@@ -751,8 +757,9 @@ static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
     identify_t *id = &d->run.identify;
     int32_t bottom_q10 = bottom_of(id), goal_q10 = goal_of(id);
     uint16_t settled = (uint16_t)(id->phase_blocks > FOLLOW_SETTLE);
-    if (id->phase_blocks == 1u) {
-        id->first_q10 = speed_q10 - (speed_q10 >> 3);
+    if (id->phase_blocks == 1u) { /* the step of current disturbs what is seen of it */
+        id->first_q10 = (speed_q10 < id->seen_q10) ? speed_q10 : id->seen_q10;
+        id->first_q10 -= id->first_q10 >> 3;
     }
     if (settled && speed_q10 >= bottom_q10 && speed_q10 <= goal_q10) {
         part_add(id, PART_PUSH, speed_q10);
@@ -806,6 +813,7 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
         push_block(d, p, speed_q10);
     }
     if (id->step == (uint16_t)IDENTIFY_MECHANICS) {
+        id->seen_q10 = speed_q10;
         mechanics_drops(d, speed_q10);
         if ((id->phase_blocks & (LONGER_EVERY - 1u)) == 0u && id->phase_blocks != 0u && id->follow_log2 < FOLLOW_MOST && id->top_q10 < LONGER_BELOW) {
             passage_end(id);
@@ -823,7 +831,7 @@ static uint16_t ramp_slower(drive_t *d, const drive_params_t *p)
     identify_t *id = &d->run.identify;
     int32_t ohmic = soft_float_times(p->open_loop_q13, soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC));
     id->ramps++;
-    if (id->step != (uint16_t)IDENTIFY_SPIN_HALF || id->ramps >= RAMPS_MOST || (int32_t)(id->emf_sum >> BLOCKS_LOG2) > ohmic) {
+    if (id->ramps >= RAMPS_MOST || (int32_t)(id->emf_sum >> BLOCKS_LOG2) > ohmic) {
         return 0;
     }
     id->kp_d = 0;
@@ -946,6 +954,16 @@ void identify_follow(drive_t *d)
     d->forced.angle_q32 = qm_turn_add(d->forced.angle_q32, (uint32_t)d->forced.speed_q10 << 6);
 }
 
+void identify_damp(drive_t *d)
+{
+    identify_t *id = &d->run.identify;
+    int16_t v_q14 = d->run.control.v_q14.d, ahead_q14;
+    id->swing += v_q14 - (id->swing >> SWING_LOG2);
+    id->swing_mean += v_q14 - (id->swing_mean >> SWING_MEAN_LOG2);
+    ahead_q14 = (int16_t)((id->swing >> SWING_LOG2) - (id->swing_mean >> SWING_MEAN_LOG2));
+    d->forced.step_q32 -= (uint32_t)((int32_t)ahead_q14 * SWING_GAIN * 64);
+}
+
 uint16_t identify_turn(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
@@ -957,6 +975,7 @@ uint16_t identify_turn(drive_t *d, const drive_params_t *p)
             drive_enter(d, DRIVE_RAMP);
         }
         settled = (uint16_t)forced_angle_accelerate(&d->forced, &to, 1, (uint16_t)((d->ticks & ((1u << 2u * id->ramps) - 1u)) == 0u));
+        identify_damp(d);
         forced_angle_move(&d->forced);
     } else if (id->mode == (uint16_t)IDENTIFY_FOLLOW) {
         identify_follow(d);

@@ -111,6 +111,7 @@ typedef struct {
     volatile uint16_t half;                  /**< periods of one half of it */
     volatile int16_t drop_d_q14, drop_q_q14; /**< IDENTIFY_FOLLOW: what the q current takes of the voltage: w Lq i_q, and R i_q */
     volatile uint16_t speed_per_emf_q5;      /**< 1/1024 angle counts a period per count of back-EMF, * 32 */
+    volatile int32_t swing, swing_mean;      /**< IDENTIFY_TURN: d voltage filtered, times the filters' periods */
     volatile int32_t emf_q22;                /**< filtered back-EMF */
     volatile int32_t sum[4];                 /**< see identify_add() */
     volatile uint16_t at;                    /**< drive_t.ticks when the sums were complete */
@@ -138,6 +139,7 @@ typedef struct {
     uint32_t kphi_half;                     /**< uV per 1000 rpm at half speed */
     int32_t top_q10;                        /**< MECHANICS: up to this speed, and down to 3/8 of it */
     current_q13_t push_q13;                 /**< q current that accelerates */
+    int32_t seen_q10;                       /**< speed in the last stretch */
     int32_t first_q10;                      /**< a rotor that is slower now than with this speed does not follow it */
     uint16_t gentler;                       /**< times that the push was too quick */
     uint16_t coasting, cycles;
@@ -173,6 +175,9 @@ int16_t identify_current(const drive_t *d);
 /** Moves the frame along with the rotor. As in the estimator (Equation 2), the sum of both components is the speed; a frame that leads has
  *  a negative speed of its own. The voltage that was commanded a period ago is centred on this sample, whose frame this still is. */
 void identify_follow(drive_t *d);
+
+/** A rotor on a current vector swings without friction: while it falls behind, which is seen in the d voltage, the frame waits for it. */
+void identify_damp(drive_t *d);
 
 /** Moves the frame. @return 1 when it stands or has reached its speed */
 uint16_t identify_turn(drive_t *d, const drive_params_t *p);
