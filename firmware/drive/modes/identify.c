@@ -51,6 +51,7 @@
 #define SWING_LOG2 6                                                                    /* periods of the filter of the back-EMF along the current, 3 ms */
 #define SWING_MEAN_LOG2 13                                                              /* and of its mean, 0.4 s: heavy rotors swing with 2 rad/s and more */
 #define SWING_GAIN 2                                                                    /* speed by voltage: damps with 20 rad/s where the back-EMF is 0.4 of the circle, as END_SPEED_RPM is to be chosen */
+#define RAMP_END_SHIFT 11                                                               /* of what is left of a ramp: its end takes a tenth of a second, and longer as the ramps become slower */
 #define RAMPS_MOST 4u                                                                   /* each with a quarter of the acceleration of the one before */
 #define FASTEST_Q10 ((int32_t)(30000.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 67108864.0F)) /* electrical rpm that every format holds */
 
@@ -191,7 +192,7 @@ static uint16_t rests(drive_t *d, int32_t across)
 {
     identify_t *id = &d->run.identify;
     int16_t now_q13 = (int16_t)(across >> MEAN_LOG2), before_q13 = id->across_q13;
-    int16_t little_q13 = (int16_t)((d->run.control.ref_q13.d >> 6) + 16);
+    int16_t little_q13 = (int16_t)((d->run.control.ref_q13.d >> 9) + 4); /* half a step of the converter */
     id->across_q13 = now_q13;
     id->unrest++;
     if (qm_abs(now_q13) > little_q13 && qm_abs((int16_t)(now_q13 - before_q13)) > little_q13 && id->unrest < REST_MOST) {
@@ -874,6 +875,8 @@ static void spin_done(drive_t *d, const drive_params_t *p)
         }
     } else if (uv > MOST_UV) {
         finish(d, IDENTIFY_RESULT_KPHI_RANGE);
+    } else if (id->step == (uint16_t)IDENTIFY_SPIN_HALF && 2 * v.q + qm_abs(v.d) / 2 > d->circle.limit_q14 - (d->circle.limit_q14 >> 4)) {
+        finish(d, IDENTIFY_RESULT_VOLTAGE_LIMIT); /* twice the speed takes nearly twice the voltage */
     } else if (id->step == (uint16_t)IDENTIFY_SPIN_HALF) {
         id->kphi_half = uv;
         id->halvings = 0;
@@ -970,7 +973,10 @@ uint16_t identify_turn(drive_t *d, const drive_params_t *p)
     uint16_t settled = 1;
     if (id->mode == (uint16_t)IDENTIFY_TURN) {
         forced_angle_params_t to = p->forced;
+        int32_t less_q10;
         to.end_speed_q10 >>= id->halvings;
+        less_q10 = (to.end_speed_q10 - d->forced.speed_q10) >> RAMP_END_SHIFT; /* a heavy rotor that overshoots charges the bus */
+        d->forced.increase_q10 = (less_q10 < p->forced.increase_rate_q10) ? (int16_t)(less_q10 + 1) : p->forced.increase_rate_q10;
         if (d->state == (uint16_t)DRIVE_ALIGN) {
             drive_enter(d, DRIVE_RAMP);
         }
