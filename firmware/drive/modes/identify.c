@@ -26,7 +26,8 @@
 #define FOLLOW_MOST 9u         /* and of a rotor that takes long: its speed hardly changes within one */
 #define LONGER_EVERY 512u      /* stretches */
 #define LONGER_BELOW 0x100000l /* of the top speed: the sum of a stretch fits into 32 bits */
-#define FOLLOW_SETTLE 6u       /* stretches after a change of current: the frame's angle changes by what dead time takes */
+#define FOLLOW_SETTLE 6u       /* first stretches after a change of current: the frame's angle changes by what dead time takes */
+#define SETTLE_MOST 192u       /* an eighth of how long such a phase lasts, up to 0.3 s: the bus, too, is another one then */
 #define DOUBLE_UNITS 200u      /* first stretches, a third of a second, after which the current is doubled: much current outweighs what samples miss */
 #define PUSH_UNITS 1250u       /* and 2 s, in which all of it must bring 1/128 of the top speed */
 #define PUSH_LEAST 20u         /* stretches: fewer, and less current pushes the next time */
@@ -35,7 +36,7 @@
 #define UNITS_MOST 60000u      /* a minute and a half */
 #define PART_UNITS 4096        /* more count half: the sums fit into 32 bits */
 #define PASSAGE_MOST 64u       /* stretches of one line: its sums fit into 32 bits */
-#define CYCLES_LEAST 4u
+#define CYCLES_LEAST 5u
 #define CYCLES_MOST 12u
 #define LEAST_UOHM 5000u
 #define MOST_UOHM 40000000ul
@@ -512,12 +513,13 @@ static void mechanics_drops(drive_t *d, int32_t speed_q10)
     id->drop_d_q14 = (int16_t)soft_float_times(iq_q13, soft_float_mul(soft_float_mul(soft_float_of(id->values.lq_nh), w), C_REACTIVE));
 }
 
+static const identify_part_t no_part = { .units = 0 };
+
 static void forget_parts(identify_t *id)
 {
-    static const identify_part_t nothing = { .units = 0 };
     int16_t n;
     for (n = 0; n < 3; n++) {
-        id->parts[n] = nothing;
+        id->parts[n] = no_part;
     }
     id->part = 0; /* the passage under way is forgotten, too */
     id->cycles = 0;
@@ -571,6 +573,8 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     id->push_q13 = (int16_t)((qm_mulss(p->open_loop_q13, lag_q12) >> 12) + (p->open_loop_q13 >> 4));
     follow_gains(id, speed);
     forget_parts(id);
+    id->settle[0] = FOLLOW_SETTLE;
+    id->settle[1] = FOLLOW_SETTLE;
     d->run.control.ref_q13.d = 0;
     mechanics_current(d, id->push_q13);
     id->seen_q10 = (int32_t)speed;
@@ -713,6 +717,14 @@ static int32_t goal_of(const identify_t *id)
     return (id->cycles != 0u) ? id->top_q10 : id->top_q10 - bottom_of(id);
 }
 
+/** How long the next phase of this kind settles. */
+static uint16_t settle_of(const identify_t *id)
+{
+    uint16_t units = (uint16_t)(id->phase_units >> 3);
+    return (uint16_t)((units > SETTLE_MOST) ? SETTLE_MOST : (units < FOLLOW_SETTLE) ? FOLLOW_SETTLE
+                                                                                    : units);
+}
+
 /** It is as fast as it shall be: what is left is to coast. */
 static void push_ends(drive_t *d)
 {
@@ -723,6 +735,7 @@ static void push_ends(drive_t *d)
         id->gentler++;
         forget_parts(id);
     }
+    id->settle[0] = settle_of(id);
     id->coasting = 1;
     mechanics_current(d, 0);
 }
@@ -757,7 +770,7 @@ static void push_block(drive_t *d, const drive_params_t *p, int32_t speed_q10)
 {
     identify_t *id = &d->run.identify;
     int32_t bottom_q10 = bottom_of(id), goal_q10 = goal_of(id);
-    uint16_t settled = (uint16_t)(id->phase_blocks > FOLLOW_SETTLE);
+    uint16_t settled = (uint16_t)(id->phase_units > id->settle[0]);
     if (id->phase_blocks == 1u) { /* the step of current disturbs what is seen of it */
         id->first_q10 = (speed_q10 < id->seen_q10) ? speed_q10 : id->seen_q10;
         id->first_q10 -= id->first_q10 >> 3;
@@ -788,11 +801,16 @@ static void coast_block(drive_t *d, int32_t speed_q10)
     identify_t *id = &d->run.identify;
     int32_t bottom_q10 = bottom_of(id), middle_q10 = (id->top_q10 + bottom_q10) >> 1;
     uint16_t late = (uint16_t)(id->phase_units > ((id->cycles != 0u && id->parts[PART_PUSH].periods == 0) ? UNITS_MOST : COAST_UNITS));
-    if (id->phase_blocks > FOLLOW_SETTLE && speed_q10 >= bottom_q10) {
+    if (id->phase_units > id->settle[1] && speed_q10 >= bottom_q10) {
         part_add(id, (speed_q10 > middle_q10) ? PART_FAST : PART_SLOW, speed_q10);
     }
     if (speed_q10 < bottom_q10 || late) {
         id->cycles++;
+        id->settle[1] = settle_of(id);
+        if (id->cycles == 1u && !id->heavy) { /* the first cycle has shown how long to settle */
+            forget_parts(id);
+            id->cycles = 1;
+        }
         if (coasted_enough(id, late)) {
             mechanics_done(d);
             return;
@@ -800,6 +818,19 @@ static void coast_block(drive_t *d, int32_t speed_q10)
         id->coasting = 0;
         mechanics_current(d, id->push_q13);
     }
+}
+
+/** Longer stretches. The first time that a rotor coasts so long, what the shorter ones have seen of it counts no more. */
+static void lengthen(identify_t *id)
+{
+    passage_end(id);
+    if (id->coasting && !id->heavy) {
+        id->heavy = 1;
+        id->settle[1] = SETTLE_MOST;
+        id->parts[PART_FAST] = no_part;
+        id->parts[PART_SLOW] = no_part;
+    }
+    id->follow_log2 = (uint16_t)(id->follow_log2 + 2u);
 }
 
 static void mechanics_block(drive_t *d, const drive_params_t *p)
@@ -817,8 +848,7 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
         id->seen_q10 = speed_q10;
         mechanics_drops(d, speed_q10);
         if ((id->phase_blocks & (LONGER_EVERY - 1u)) == 0u && id->phase_blocks != 0u && id->follow_log2 < FOLLOW_MOST && id->top_q10 < LONGER_BELOW) {
-            passage_end(id);
-            id->follow_log2 = (uint16_t)(id->follow_log2 + 2u);
+            lengthen(id);
         }
         go(id, IDENTIFY_MECHANICS, 0, (uint16_t)(1u << id->follow_log2));
     }

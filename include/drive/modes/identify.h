@@ -145,6 +145,7 @@ typedef struct {
     uint16_t coasting, cycles;
     uint16_t phase_blocks, phase_units;  /**< stretches since the current changed, counted as they are and in the first length */
     uint16_t follow_log2;                /**< periods of a stretch */
+    uint16_t settle[2], heavy;           /**< phase_units before stretches count, with current and without; 1: it coasts for long */
     uint16_t look_units;                 /**< when the push is looked at again */
     int32_t look_q10;                    /**< speed at the last look */
     uint16_t part;                       /**< where the passage belongs that is under way, counted from 1; 0 = none is */
