@@ -795,6 +795,19 @@ static uint16_t coasted_enough(const identify_t *id, uint16_t late)
                       || (id->cycles >= CYCLES_LEAST && periods > (int32_t)COAST_PERIODS));
 }
 
+/** The first cycle has shown how long to settle: what it has seen itself does not count, where there will be more. */
+static void first_cycle_done(identify_t *id, int32_t speed_q10)
+{
+    passage_end(id);
+    if (speed_q10 < id->top_q10 - (id->top_q10 >> 2)) {
+        id->parts[PART_PUSH] = no_part;
+    }
+    if (!id->heavy) {
+        id->parts[PART_FAST] = no_part;
+        id->parts[PART_SLOW] = no_part;
+    }
+}
+
 /** A stretch without. */
 static void coast_block(drive_t *d, int32_t speed_q10)
 {
@@ -807,9 +820,8 @@ static void coast_block(drive_t *d, int32_t speed_q10)
     if (speed_q10 < bottom_q10 || late) {
         id->cycles++;
         id->settle[1] = settle_of(id);
-        if (id->cycles == 1u && !id->heavy) { /* the first cycle has shown how long to settle */
-            forget_parts(id);
-            id->cycles = 1;
+        if (id->cycles == 1u) {
+            first_cycle_done(id, speed_q10);
         }
         if (coasted_enough(id, late)) {
             mechanics_done(d);
@@ -830,7 +842,9 @@ static void lengthen(identify_t *id)
         id->parts[PART_FAST] = no_part;
         id->parts[PART_SLOW] = no_part;
     }
-    id->follow_log2 = (uint16_t)(id->follow_log2 + 2u);
+    if (id->follow_log2 < FOLLOW_MOST && id->top_q10 < LONGER_BELOW) {
+        id->follow_log2 = (uint16_t)(id->follow_log2 + 2u);
+    }
 }
 
 static void mechanics_block(drive_t *d, const drive_params_t *p)
@@ -847,7 +861,7 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
     if (id->step == (uint16_t)IDENTIFY_MECHANICS) {
         id->seen_q10 = speed_q10;
         mechanics_drops(d, speed_q10);
-        if ((id->phase_blocks & (LONGER_EVERY - 1u)) == 0u && id->phase_blocks != 0u && id->follow_log2 < FOLLOW_MOST && id->top_q10 < LONGER_BELOW) {
+        if ((id->phase_blocks & (LONGER_EVERY - 1u)) == 0u && id->phase_blocks != 0u) {
             lengthen(id);
         }
         go(id, IDENTIFY_MECHANICS, 0, (uint16_t)(1u << id->follow_log2));
