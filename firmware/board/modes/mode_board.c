@@ -30,17 +30,27 @@ void mode_watch(const drive_t *d)
 #ifdef IDENTIFY
 tIdentifyParm IdentifyParm;
 
-/** A number of 32 bits, with what stands before it. */
+/** A number of 32 bits, with what stands before it: by subtraction, for the chip divides 32 bits by 16 only. */
 static char *put_long(char *at, const char *before, uint32_t number)
 {
-    char digits[11], *digit = &digits[10];
+    static const uint32_t tens[] = { 1000000000ul, 100000000ul, 10000000ul, 1000000ul, 100000ul, 10000ul, 1000ul, 100ul, 10ul };
+    char *next = text_put(at, before);
     uint32_t left = number;
-    *digit = '\0';
-    do {
-        *--digit = (char)('0' + left % 10u);
-        left /= 10u;
-    } while (left != 0u);
-    return text_put(text_put(at, before), digit);
+    uint16_t n, begun = 0;
+    for (n = 0; n < 9u; n++) {
+        char digit = '0';
+        while (left >= tens[n]) {
+            left -= tens[n];
+            digit++;
+            begun = 1;
+        }
+        if (begun) {
+            *next++ = digit;
+        }
+    }
+    *next++ = (char)('0' + (uint16_t)left);
+    *next = '\0';
+    return next;
 }
 
 char *identify_status_line(char *line, const drive_t *d)
