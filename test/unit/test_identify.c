@@ -108,6 +108,7 @@ void test_current_must_reach_its_reference_within_the_voltage_and_the_phases_mus
         setUp();
         control->ref_q13.d = REF;
         control->v_q14.d = (int16_t)(identify_most(&drive.circle) - cases[n].v_below_most);
+        id->across_q13 = (int16_t)((2 * cases[n].a_q13 - cases[n].b_q13) / 2); /* as it was before: the rotor rests */
         set_sums(0, (int32_t)cases[n].a_q13 << (MEAN_LOG2 - 1), -((int32_t)cases[n].b_q13 << (MEAN_LOG2 - 1)), 0);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, finished(IDENTIFY_CONNECT), cases[n].what);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result == IDENTIFY_RESULT_BUSY ? IDENTIFY_ALIGN : IDENTIFY_IDLE, id->step, cases[n].what);
@@ -143,22 +144,22 @@ void test_two_exact_levels_give_R_to_a_milliohm(void)
     set_sums((15l + 179) << MEAN_LOG2, 1000l << MEAN_LOG2, -(500l << MEAN_LOG2), BUS_SUM);
     (void)finished(IDENTIFY_RESISTANCE);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_BIAS, id->step);
-    TEST_ASSERT_UINT16_WITHIN(1, 1333, id->values.rs_mohm); /* 179 * 4 mV / 0.5371 A */
+    TEST_ASSERT_UINT32_WITHIN(500, 1333200, id->values.rs_uohm); /* 179 * 4 mV / 0.5371 A */
     TEST_ASSERT_INT32_WITHIN(1, 80, id->dead_q13); /* the 15 counts are those of 83.8 current counts; 3/pi of it when turning */
 }
 
-void test_resistance_is_believed_from_20_mohm_to_40_ohm(void)
+void test_resistance_is_believed_from_5_mohm_to_40_ohm(void)
 {
     static const struct {
         int32_t duty, i; /* by how much two levels differ */
-        uint16_t rs_mohm, tolerance;
+        uint32_t rs_uohm, tolerance;
         identify_result_t result;
     } cases[] = {
-        { 10725, 4096000l, 19, 0, IDENTIFY_RESULT_R_RANGE },
-        { 10726, 4096000l, 20, 0, IDENTIFY_RESULT_BUSY },
-        { 22887000l, 4261000l, 40000u, 0, IDENTIFY_RESULT_BUSY },
-        { 22887500l, 4261000l, 40001u, 0, IDENTIFY_RESULT_R_RANGE },
-        { 1, 1, 7448, 2, IDENTIFY_RESULT_BUSY }, /* a count of 4 mV over one of 0.5371 mA */
+        { 2749, 4096000l, 4998, 2, IDENTIFY_RESULT_R_RANGE },
+        { 2751, 4096000l, 5002, 2, IDENTIFY_RESULT_BUSY },
+        { 22885000l, 4261000l, 39998000ul, 2000, IDENTIFY_RESULT_BUSY },
+        { 22889500l, 4261000l, 40005000ul, 2000, IDENTIFY_RESULT_R_RANGE },
+        { 1, 1, 7448000ul, 2000, IDENTIFY_RESULT_BUSY }, /* a count of 4 mV over one of 0.5371 mA */
         { 0, 1, 0, 0, IDENTIFY_RESULT_R_RANGE },
         { 1, 0, 0, 0, IDENTIFY_RESULT_R_RANGE },
         { 1, -1, 0, 0, IDENTIFY_RESULT_R_RANGE },
@@ -171,7 +172,7 @@ void test_resistance_is_believed_from_20_mohm_to_40_ohm(void)
         id->bus_first = BUS_SUM;
         set_sums(0, 0, 0, BUS_SUM);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, finished(IDENTIFY_RESISTANCE), golden_row(n));
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(cases[n].tolerance, cases[n].rs_mohm, id->values.rs_mohm, golden_row(n));
+        TEST_ASSERT_UINT32_WITHIN_MESSAGE(cases[n].tolerance, cases[n].rs_uohm, id->values.rs_uohm, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].result == IDENTIFY_RESULT_BUSY, drive.command.run, golden_row(n));
     }
 }
@@ -179,8 +180,8 @@ void test_resistance_is_believed_from_20_mohm_to_40_ohm(void)
 /* ---- Inductance ---- */
 
 /** Sums of a coil whose current changes by di in a period between samples in which the voltage had one sign, by nothing where it
- *  changed. @return uH */
-static uint16_t coil(int16_t duties, int16_t di_q13, uint16_t on_q)
+ *  changed. @return nH */
+static uint32_t coil(int16_t duties, int16_t di_q13, uint16_t on_q)
 {
     int16_t n, before = 0, i_q13 = 1000;
     id->mode = (uint16_t)IDENTIFY_INJECT;
@@ -209,10 +210,10 @@ static uint16_t coil(int16_t duties, int16_t di_q13, uint16_t on_q)
 /* L = 50 us * duties * 4 mV / (di * 0.5371 mA) */
 void test_exact_square_wave_gives_L_exactly(void)
 {
-    TEST_ASSERT_UINT16_WITHIN(1, 1490, coil(400, 100, 1));
-    TEST_ASSERT_UINT16_WITHIN(1, 149, coil(40, 100, 0));
-    TEST_ASSERT_UINT16_WITHIN(30, 18617, coil(1000, 20, 0));
-    TEST_ASSERT_UINT16_WITHIN(1, 745, coil(200, 100, 0));
+    TEST_ASSERT_UINT32_WITHIN(300, 1489600, coil(400, 100, 1));
+    TEST_ASSERT_UINT32_WITHIN(30, 148960, coil(40, 100, 0));
+    TEST_ASSERT_UINT32_WITHIN(4000, 18620000ul, coil(1000, 20, 0));
+    TEST_ASSERT_UINT32_WITHIN(200, 744800, coil(200, 100, 0));
     TEST_ASSERT_EQUAL_INT32(600l * 400, id->sum[0]); /* three of four periods, without a change of sign: two duties each */
     TEST_ASSERT_EQUAL_INT32(600l * 100, id->sum[2]);
     TEST_ASSERT_EQUAL_INT32(0, id->sum[1]);
@@ -220,38 +221,38 @@ void test_exact_square_wave_gives_L_exactly(void)
 
 void test_resistance_is_taken_from_the_voltage_and_corrects_a_short_time_constant(void)
 {
-    uint16_t without = coil(200, 100, 0);
+    uint32_t without = coil(200, 100, 0);
     id->duty_per_amp = soft_float_scaled(1, 3);
     id->sum[1] = 80000l;
-    TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)((uint32_t)without * 230u / 240u), inductance(id));
+    TEST_ASSERT_UINT32_WITHIN(100, without * 23u / 24u, inductance(id));
     without = coil(200, 100, 0);
     id->duty_per_amp = soft_float_of(0);
-    id->values.rs_mohm = (uint16_t)(10u * without); /* R Ts = L / 2: its two per cent */
-    TEST_ASSERT_UINT16_WITHIN(1, (uint16_t)(without - (without * 3u + 64u) / 128u), inductance(id));
-    id->values.rs_mohm = 34350u; /* R may take less than half of the inductance within a period */
-    TEST_ASSERT_EQUAL_UINT16(374, inductance(id));
-    id->values.rs_mohm = 34360u;
-    TEST_ASSERT_EQUAL_UINT16(0, inductance(id));
-    id->values.rs_mohm = 40000u; /* the time constant is below half a period */
-    TEST_ASSERT_EQUAL_UINT16(0, inductance(id));
+    id->values.rs_uohm = 10u * without; /* R Ts = L / 2: its two per cent */
+    TEST_ASSERT_UINT32_WITHIN(100, without - without * 3u / 128u, inductance(id));
+    id->values.rs_uohm = 34380000ul; /* R may take less than half of the inductance within a period */
+    TEST_ASSERT_UINT32_WITHIN(600, 373000, inductance(id));
+    id->values.rs_uohm = 34440000ul;
+    TEST_ASSERT_EQUAL_UINT32(0, inductance(id));
+    id->values.rs_uohm = 40000000ul; /* the time constant is below half a period */
+    TEST_ASSERT_EQUAL_UINT32(0, inductance(id));
 }
 
-void test_inductance_is_believed_from_20_uH_to_60_mH_and_sums_without_sense_are_none(void)
+void test_inductance_is_believed_from_5_uH_to_60_mH_and_sums_without_sense_are_none(void)
 {
     static const struct {
         int32_t volts, change;
-        uint16_t uh;
+        uint32_t nh, tolerance;
     } cases[] = {
-        { 6284, 60000l, 0 }, { 6285, 60000l, 20 }, { 19338200l, 60000l, 60000u }, { 19338300l, 60000l, 0 },
-        { 240000l, 0, 0 }, { 240000l, -5, 0 }, { 0, 60000l, 0 }, { 600, 60000l, 0 }, /* the last: 2 uH */
+        { 1611, 60000l, 0, 0 }, { 1612, 60000l, 5000, 5 }, { 19337000l, 60000l, 59998000ul, 3000 }, { 19341000l, 60000l, 0, 0 },
+        { 240000l, 0, 0, 0 }, { 240000l, -5, 0, 0 }, { 0, 60000l, 0, 0 }, { 600, 60000l, 0, 0 }, /* the last: 2 uH */
     };
     static const identify_step_t axes[] = { IDENTIFY_INDUCTANCE_D, IDENTIFY_INDUCTANCE_Q };
     EACH(n, cases) {
-        id->values.rs_mohm = 0;
+        id->values.rs_uohm = 0;
         id->duty_per_amp = soft_float_of(0);
         id->bus_q16 = BUS_Q16;
         set_sums(cases[n].volts, 0, cases[n].change, 0);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].uh, inductance(id), golden_row(n));
+        TEST_ASSERT_UINT32_WITHIN_MESSAGE(cases[n].tolerance, cases[n].nh, inductance(id), golden_row(n));
     }
     EACH(n, axes) { /* no sums at all end the procedure */
         setUp();
@@ -351,9 +352,9 @@ static void begin_spin(identify_step_t step, uint16_t rs_mohm, uint16_t ld_uh)
     setUp();
     id->step = (uint16_t)step;
     id->halvings = (uint16_t)(step == IDENTIFY_SPIN_HALF);
-    id->values.rs_mohm = rs_mohm;
-    id->values.ld_uh = ld_uh;
-    id->kphi_half = 7240;
+    id->values.rs_uohm = 1000ul * rs_mohm;
+    id->values.ld_nh = 1000ul * ld_uh;
+    id->kphi_half = 7240000ul;
 }
 
 /** Stretches with these means of voltage and current. */
@@ -396,7 +397,7 @@ void test_back_emf_is_the_voltage_less_R_L_and_dead_time(void)
         id->dead_q13 = cases[n].dead_q13;
         stretches(256, cases[n].v_d, cases[n].v_q, cases[n].i_d, cases[n].i_q);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_BUSY, id->result, cases[n].what);
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(4, 7240, id->values.kphi_mv_per_krpm, cases[n].what);
+        TEST_ASSERT_UINT32_WITHIN_MESSAGE(4000, 7240000ul, id->values.kphi_uv_per_krpm, cases[n].what);
     }
     TEST_ASSERT_INT32_WITHIN(256l * 4, 0, id->emf_d_sum);
 }
@@ -407,15 +408,15 @@ void test_half_speed_is_followed_by_full_speed(void)
     stretches(256, 0, 2574, 0, 0);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_SPIN_FULL, id->step);
     TEST_ASSERT_EQUAL_UINT16(0, id->halvings);
-    TEST_ASSERT_UINT16_WITHIN(4, 7240, id->kphi_half);
-    TEST_ASSERT_EQUAL_UINT16(0, id->values.kphi_mv_per_krpm);
+    TEST_ASSERT_UINT32_WITHIN(4000, 7240000ul, id->kphi_half);
+    TEST_ASSERT_EQUAL_UINT32(0, id->values.kphi_uv_per_krpm);
     TEST_ASSERT_EQUAL_UINT16(0, id->blocks);
 }
 
 void test_stretches_agree_when_they_lie_within_41_degrees_to_both_sides_and_swinging_does_not_shorten_the_mean(void)
 {
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, swing(1760, 4838, -1760, 4838)); /* 20 degrees */
-    TEST_ASSERT_UINT16_WITHIN(4, 7240, id->values.kphi_mv_per_krpm);
+    TEST_ASSERT_UINT32_WITHIN(4000, 7240000ul, id->values.kphi_uv_per_krpm);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, swing(3944, 3309, 3944, -3309)); /* 40 degrees */
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, swing(3309, 3944, -3309, 3944));
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, swing(3765, 3511, 3765, -3511)); /* 43 degrees */
@@ -441,22 +442,22 @@ void test_half_and_full_speed_agree_within_an_eighth(void)
     static const struct {
         int16_t half_more;
         identify_result_t expected;
-    } cases[] = { { 904, IDENTIFY_RESULT_BUSY }, { 905, IDENTIFY_RESULT_NOT_TURNING },
-                  { -904, IDENTIFY_RESULT_BUSY }, { -905, IDENTIFY_RESULT_NOT_TURNING } };
+    } cases[] = { { 900, IDENTIFY_RESULT_BUSY }, { 910, IDENTIFY_RESULT_NOT_TURNING },
+                  { -900, IDENTIFY_RESULT_BUSY }, { -910, IDENTIFY_RESULT_NOT_TURNING } };
     EACH(n, cases) {
         begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
-        id->kphi_half = (uint16_t)(7239 + cases[n].half_more); /* an eighth is 904 */
+        id->kphi_half = 1000ul * (uint16_t)(7239 + cases[n].half_more); /* an eighth is 904.9 */
         stretches(256, 0, 5148, 0, 0);
         TEST_ASSERT_EQUAL_UINT16(cases[n].expected, id->result);
     }
 }
 
-/** At 7/40 of the usual speed: a few stretches with a count more. @return the result */
-static uint16_t slow_spin(int16_t v_q, uint16_t more)
+/** At 7/40 of the usual speed, and a share of that: a few stretches with a count more. @return the result */
+static uint16_t slow_spin(uint16_t share, int16_t v_q, uint16_t more)
 {
     drive_params_t slow = params;
     uint16_t n;
-    slow.forced.end_speed_q10 = (uint16_t)(params.forced.end_speed_q10 / 40 * 7);
+    slow.forced.end_speed_q10 = params.forced.end_speed_q10 / 40 * 7 / share;
     begin_spin(IDENTIFY_SPIN_HALF, 0, 0);
     for (n = 0; n < 256u; n++) {
         id->sum[0] = 0;
@@ -467,14 +468,28 @@ static uint16_t slow_spin(int16_t v_q, uint16_t more)
     return id->result;
 }
 
-void test_back_emf_is_believed_from_500_to_65000_mV(void)
+void test_back_emf_is_believed_from_a_tenth_of_a_volt_to_2000_V(void)
 {
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, slow_spin(31, 19));
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, slow_spin(31, 20));
-    TEST_ASSERT_EQUAL_UINT16(500, id->kphi_half);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, slow_spin(4044, 63));
-    TEST_ASSERT_EQUAL_UINT16(64999u, id->kphi_half);
-    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_KPHI_RANGE, slow_spin(4044, 64));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, slow_spin(1, 6, 50));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, slow_spin(1, 6, 60));
+    TEST_ASSERT_UINT32_WITHIN(2000, 100400, id->kphi_half);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, slow_spin(32, 3875, 0));
+    TEST_ASSERT_UINT32_WITHIN(4000000ul, 1995000000ul, id->kphi_half);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_KPHI_RANGE, slow_spin(32, 3895, 0));
+}
+
+void test_back_emf_below_an_eighth_of_what_the_inductance_takes_is_a_blocked_shaft(void)
+{
+    static const struct {
+        int16_t emf;
+        identify_result_t result;
+    } cases[] = { { 210, IDENTIFY_RESULT_NOT_TURNING }, { 226, IDENTIFY_RESULT_BUSY } }; /* w L I: 1746 counts */
+    EACH(n, cases) {
+        begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
+        id->kphi_half = (uint32_t)cases[n].emf * 1406u;
+        stretches(256, 4637, (int16_t)(1746 + cases[n].emf), 2625, 0);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, id->result, golden_row(n));
+    }
 }
 
 void test_voltage_limit_is_seven_eighths_of_the_circle(void)
@@ -515,7 +530,7 @@ typedef struct {
 static void begin_mechanics(int16_t v_d)
 {
     begin_spin(IDENTIFY_SPIN_FULL, 2670, 1920);
-    id->values.lq_uh = 60000u; /* so large that the samples miss nothing worth a count */
+    id->values.lq_nh = 60000000ul; /* so large that the samples miss nothing worth a count */
     id->ki_q = 100;
     stretches(256, v_d, 5148, 0, 0);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_MECHANICS, id->step);
@@ -547,23 +562,24 @@ void test_the_frame_follows_a_quick_rotor_with_controllers_twice_as_fast_and_no_
     }
 }
 
-/** A shaft answers the q current, a stretch and eight periods for the background at a time. @return stretches until the end */
-static uint16_t turn_shaft(shaft_t *shaft)
+/** A shaft answers the q current, a stretch and eight periods for the background at a time. @return seconds until the end */
+static float turn_shaft(shaft_t *shaft)
 {
-    uint16_t n = 0, began = 0;
-    while (id->step == (uint16_t)IDENTIFY_MECHANICS && n < 20000u) {
+    float seconds = 0.0F;
+    while (id->step == (uint16_t)IDENTIFY_MECHANICS && seconds < 200.0F) {
+        uint16_t left = id->left;
+        float step_s = (float)(left + 8u) * 0.00005F;
         float torque = NM_PER_COUNT * (float)control->ref_q13.q - shaft->coulomb_nm - shaft->viscous_nms * shaft->speed;
-        shaft->speed += torque / shaft->inertia * 0.00005F * 40.0F;
+        shaft->speed += torque / shaft->inertia * step_s;
         shaft->most_q13 = (control->ref_q13.q > shaft->most_q13) ? control->ref_q13.q : shaft->most_q13;
         shaft->brakes = (int16_t)(shaft->brakes | (control->ref_q13.q < 0));
-        began = (uint16_t)(began + 40u);
-        id->at = began;
-        set_sums((int32_t)(shaft->speed * RAD_S_TO_Q10) * 32, (int32_t)control->ref_q13.q * 32, 0, 0);
+        id->at = (uint16_t)(id->at + left + 8u);
+        set_sums((int32_t)(shaft->speed * RAD_S_TO_Q10) * (int32_t)left, (int32_t)control->ref_q13.q * (int32_t)left, 0, 0);
         id->ready = 1;
         (void)identify_background(&drive, &params);
-        n++;
+        seconds += step_s;
     }
-    return n;
+    return seconds;
 }
 
 void test_inertia_and_friction_of_an_exact_shaft(void)
@@ -577,36 +593,36 @@ void test_inertia_and_friction_of_an_exact_shaft(void)
         begin_mechanics((int16_t)(n * 100));
         (void)turn_shaft(&shaft);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_DONE, id->result, golden_row(n));
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.02F * shaft.inertia + 1e-8F, shaft.inertia, (float)id->values.inertia_1e8_kgm2 * 1e-8F, golden_row(n));
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03F * shaft.coulomb_nm + 1.2e-4F, shaft.coulomb_nm, (float)id->values.coulomb_unm * 1e-6F, golden_row(n));
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03F * shaft.viscous_nms + 2.5e-6F, shaft.viscous_nms, (float)id->values.viscous_nnms * 1e-9F, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.02F * shaft.inertia + 1e-9F, shaft.inertia, (float)id->values.inertia_1e9_kgm2 * 1e-9F, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03F * shaft.coulomb_nm + 1.2e-4F, shaft.coulomb_nm, (float)id->values.coulomb_1e8_nm * 1e-8F, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03F * shaft.viscous_nms + 2.5e-6F, shaft.viscous_nms, (float)id->values.viscous_1e9_nms * 1e-9F, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(0, shaft.brakes, "it never brakes");
         TEST_ASSERT_TRUE(shaft.most_q13 <= params.open_loop_q13);
     }
 }
 
-void test_a_shaft_without_friction_coasts_for_ten_seconds_and_has_an_inertia(void)
+void test_a_shaft_without_friction_coasts_twice_for_ten_seconds_and_has_an_inertia(void)
 {
     shaft_t shaft = { 5.5e-6F, 0.0F, 0.0F, 105.0F, 0, 0 };
     begin_mechanics(0);
-    TEST_ASSERT_UINT16_WITHIN(300, 5300, turn_shaft(&shaft));
+    TEST_ASSERT_FLOAT_WITHIN(2.0F, 22.0F, turn_shaft(&shaft)); /* at two speeds */
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, id->result);
-    TEST_ASSERT_UINT16_WITHIN(12, 550, id->values.inertia_1e8_kgm2);
-    TEST_ASSERT_UINT16_WITHIN(40, 0, id->values.coulomb_unm);
-    TEST_ASSERT_EQUAL_UINT16(0, id->values.viscous_nnms);
+    TEST_ASSERT_UINT32_WITHIN(120, 5500, id->values.inertia_1e9_kgm2);
+    TEST_ASSERT_UINT32_WITHIN(4000, 0, id->values.coulomb_1e8_nm);
+    TEST_ASSERT_UINT32_WITHIN(100, 0, id->values.viscous_1e9_nms);
 }
 
 void test_a_shaft_that_does_not_accelerate_gets_more_current_up_to_all_of_it_and_then_its_name(void)
 {
-    static const shaft_t cases[] = { { 5e-2F, 0.004F, 0.0F, 105.0F, 0, 0 }, { 1e-4F, 0.1F, 0.0F, 105.0F, 0, 0 } };
+    static const shaft_t cases[] = { { 2.0F, 0.004F, 0.0F, 105.0F, 0, 0 }, { 1e-4F, 0.1F, 0.0F, 105.0F, 0, 0 } };
     EACH(n, cases) {
         shaft_t shaft = cases[n];
         begin_mechanics(0);
         (void)turn_shaft(&shaft);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_NOT_ACCELERATING, id->result, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(params.open_loop_q13, shaft.most_q13, golden_row(n));
-        TEST_ASSERT_UINT16_WITHIN(4, 7240, id->values.kphi_mv_per_krpm);
-        TEST_ASSERT_EQUAL_UINT16(0, id->values.inertia_1e8_kgm2);
+        TEST_ASSERT_UINT32_WITHIN(4000, 7240000ul, id->values.kphi_uv_per_krpm);
+        TEST_ASSERT_EQUAL_UINT32(0, id->values.inertia_1e9_kgm2);
     }
 }
 
@@ -672,8 +688,8 @@ void test_the_frame_follows_the_rotor_by_its_back_emf(void)
 void test_current_gains_follow_from_R_and_L(void)
 {
     (void)coil(200, 100, 0);
-    id->values.rs_mohm = 2670;
-    id->values.ld_uh = 1920;
+    id->values.rs_uohm = 2670000ul;
+    id->values.ld_nh = 1920000ul;
     id->bias_q14 = 2000;
     control->pi_q.sum = 100000l;
     (void)finished(IDENTIFY_INDUCTANCE_Q);

@@ -52,35 +52,35 @@ static void expect_line(const char *text)
 
 void test_line_before_the_first_measurement(void)
 {
-    expect_line("step 0 NONE fault NONE R 0 mohm Ld 0 uH Lq 0 uH Kphi 0 mV/krpm J 0e-8 kgm2 friction 0 uNm + 0 nNms\r\n");
+    expect_line("step 0 NONE fault NONE R 0 uohm Ld 0 nH Lq 0 nH Kphi 0 uV/krpm J 0e-9 kgm2 friction 0e-8 Nm + 0e-9 Nms\r\n");
 }
 
 void test_line_with_the_largest_numbers_fits(void)
 {
-    identify_values_t all = { 65535u, 65535u, 65535u, 65535u, 65535u, 65535u, 65535u };
+    identify_values_t all = { 40000000ul, 60000000ul, 4294967295ul, 2000000000ul, 1000000001ul, 300000000ul, 1073741823ul };
     board_drive.run.identify.step = IDENTIFY_MECHANICS;
     board_drive.run.identify.result = IDENTIFY_RESULT_CURRENT_NOT_REACHED;
     board_drive.run.identify.values = all;
     board_drive.fault = FAULT_OVERTEMPERATURE;
-    expect_line("step 12 CURRENT_NOT_REACHED fault OVERTEMPERATURE R 65535 mohm Ld 65535 uH Lq 65535 uH Kphi 65535 mV/krpm"
-                " J 65535e-8 kgm2 friction 65535 uNm + 65535 nNms\r\n");
+    expect_line("step 12 CURRENT_NOT_REACHED fault OVERTEMPERATURE R 40000000 uohm Ld 60000000 nH Lq 4294967295 nH Kphi 2000000000 uV/krpm"
+                " J 1000000001e-9 kgm2 friction 300000000e-8 Nm + 1073741823e-9 Nms\r\n");
     TEST_ASSERT_TRUE(sent_count < sizeof sent_line);
 }
 
 void test_watch_variable_shows_all_of_it(void)
 {
-    identify_values_t all = { 2692, 1919, 1920, 40000u, 550, 4000, 15300 };
+    identify_values_t all = { 2692100, 1919400, 1920200, 40000000ul, 1000000000ul, 400000, 15300 };
     board_drive.run.identify.step = IDENTIFY_INDUCTANCE_Q;
     board_drive.run.identify.result = IDENTIFY_RESULT_BUSY;
     board_drive.run.identify.values = all;
     watch_refresh();
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_INDUCTANCE_Q, IdentifyParm.step);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_BUSY, IdentifyParm.result);
-    TEST_ASSERT_EQUAL_UINT16(2692, IdentifyParm.Rs_mohm);
-    TEST_ASSERT_EQUAL_UINT16(1919, IdentifyParm.Ld_uH);
-    TEST_ASSERT_EQUAL_UINT16(1920, IdentifyParm.Lq_uH);
-    TEST_ASSERT_EQUAL_UINT16(40000u, IdentifyParm.Kphi_mV_per_krpm);
-    TEST_ASSERT_EQUAL_UINT16(550, IdentifyParm.J_1e8_kgm2);
-    TEST_ASSERT_EQUAL_UINT16(4000, IdentifyParm.Coulomb_uNm);
-    TEST_ASSERT_EQUAL_UINT16(15300, IdentifyParm.Viscous_nNms);
+    TEST_ASSERT_EQUAL_UINT32(2692100, IdentifyParm.Rs_uohm);
+    TEST_ASSERT_EQUAL_UINT32(1919400, IdentifyParm.Ld_nH);
+    TEST_ASSERT_EQUAL_UINT32(1920200, IdentifyParm.Lq_nH);
+    TEST_ASSERT_EQUAL_UINT32(40000000ul, IdentifyParm.Kphi_uV_per_krpm);
+    TEST_ASSERT_EQUAL_UINT32(1000000000ul, IdentifyParm.J_1e9_kgm2);
+    TEST_ASSERT_EQUAL_UINT32(400000, IdentifyParm.Coulomb_1e8_Nm);
+    TEST_ASSERT_EQUAL_UINT32(15300, IdentifyParm.Viscous_1e9_Nms);
 }

@@ -37,11 +37,11 @@ void test_measures_motors_of_every_kind(void)
     EACH(n, cases) {
         unknown_set(cases[n].rs, cases[n].ld_mh, cases[n].lq_mh, cases[n].kphi);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, unknown_identify(), golden_row(n));
-        TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].rs + 0.0005F, cases[n].rs, (float)values->rs_mohm * 0.001F);
-        TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].ld_mh, cases[n].ld_mh, (float)values->ld_uh * 0.001F);
-        TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].lq_mh, cases[n].lq_mh, (float)values->lq_uh * 0.001F);
-        TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].kphi, cases[n].kphi, (float)values->kphi_mv_per_krpm * 0.001F);
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(55, (cases[n].result == IDENTIFY_RESULT_DONE) ? 550 : 0, values->inertia_1e8_kgm2, golden_row(n));
+        TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].rs + 0.0005F, cases[n].rs, (float)values->rs_uohm * 0.000001F);
+        TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].ld_mh, cases[n].ld_mh, (float)values->ld_nh * 0.000001F);
+        TEST_ASSERT_FLOAT_WITHIN(0.015F * cases[n].lq_mh, cases[n].lq_mh, (float)values->lq_nh * 0.000001F);
+        TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].kphi, cases[n].kphi, (float)values->kphi_uv_per_krpm * 0.000001F);
+        TEST_ASSERT_UINT32_WITHIN_MESSAGE(550, (cases[n].result == IDENTIFY_RESULT_DONE) ? 5500 : 0, values->inertia_1e9_kgm2, golden_row(n));
         expect_off();
         TEST_ASSERT_TRUE(motor.highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
     }
@@ -57,8 +57,25 @@ void test_follows_rotors_of_little_resistance(void)
         unknown_set(cases[n][0], cases[n][1], cases[n][1], cases[n][2]);
         motor.friction_nm = cases[n][3];
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_RESULT_DONE, unknown_identify(), golden_row(n));
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(55, 550, values->inertia_1e8_kgm2, golden_row(n));
+        TEST_ASSERT_UINT32_WITHIN_MESSAGE(550, 5500, values->inertia_1e9_kgm2, golden_row(n));
     }
+}
+
+void test_a_rotor_that_is_too_heavy_for_the_ramp_gets_a_slower_one(void)
+{
+    motor.inertia = 1e-2F;
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
+    TEST_ASSERT_TRUE(drive.run.identify.ramps > 0u);
+    TEST_ASSERT_UINT32_WITHIN(500000ul, 10000000ul, values->inertia_1e9_kgm2);
+    TEST_ASSERT_TRUE(motor.highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
+}
+
+void test_a_blocked_shaft_is_not_tried_with_slower_ramps(void)
+{
+    motor.blocked = 1;
+    unknown_begin();
+    TEST_ASSERT_UINT32_WITHIN(2000, 7000, unknown_until(IDENTIFY_IDLE));
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_NOT_TURNING, drive.run.identify.result);
 }
 
 void test_finds_the_rotor_wherever_it_stands(void)
@@ -69,8 +86,8 @@ void test_finds_the_rotor_wherever_it_stands(void)
         motor.cos_e = at[n][0];
         motor.sin_e = at[n][1];
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, unknown_identify());
-        TEST_ASSERT_UINT16_WITHIN(20, 1000, values->ld_uh);
-        TEST_ASSERT_UINT16_WITHIN(40, 2000, values->lq_uh);
+        TEST_ASSERT_UINT32_WITHIN(20000, 1000000, values->ld_nh);
+        TEST_ASSERT_UINT32_WITHIN(40000, 2000000, values->lq_nh);
     }
 }
 
@@ -82,7 +99,7 @@ void test_a_rotor_that_swings_does_not_change_the_back_emf(void)
     motor.omega *= 0.9F; /* a knock */
     (void)unknown_until(IDENTIFY_IDLE);
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, drive.run.identify.result);
-    TEST_ASSERT_UINT16_WITHIN(72, 7240, values->kphi_mv_per_krpm);
+    TEST_ASSERT_UINT32_WITHIN(72000, 7240000, values->kphi_uv_per_krpm);
 }
 
 void test_a_bus_that_sags_with_the_current_does_not_change_R(void)
@@ -91,7 +108,7 @@ void test_a_bus_that_sags_with_the_current_does_not_change_R(void)
     (void)unknown_until(IDENTIFY_RESISTANCE);
     motor.bus_v += 0.5F; /* the second level takes less from the supply */
     (void)unknown_until(IDENTIFY_BIAS);
-    TEST_ASSERT_UINT16_WITHIN(27, 2670, values->rs_mohm);
+    TEST_ASSERT_UINT32_WITHIN(27000, 2670000, values->rs_uohm);
 }
 
 void test_each_motor_that_cannot_be_measured_is_refused_by_name(void)
@@ -104,7 +121,7 @@ void test_each_motor_that_cannot_be_measured_is_refused_by_name(void)
         identify_result_t result;
     } cases[] = {
         { "blocked shaft", 2.67F, 1.92F, 7.24F, 5.5e-6F, 1, 0, IDENTIFY_RESULT_NOT_TURNING },
-        { "too heavy for the ramp", 2.67F, 1.92F, 7.24F, 5.5e-3F, 0, 0, IDENTIFY_RESULT_NOT_TURNING },
+        { "too heavy for the slowest ramp", 2.67F, 1.92F, 7.24F, 1.0F, 0, 0, IDENTIFY_RESULT_NOT_TURNING },
         { "phase A open", 2.67F, 1.92F, 7.24F, 5.5e-6F, 0, 1, IDENTIFY_RESULT_NO_CURRENT },
         { "phase B open", 2.67F, 1.92F, 7.24F, 5.5e-6F, 0, 2, IDENTIFY_RESULT_NO_CURRENT },
         { "phase C open", 2.67F, 1.92F, 7.24F, 5.5e-6F, 0, 3, IDENTIFY_RESULT_NO_CURRENT },
@@ -122,11 +139,11 @@ void test_each_motor_that_cannot_be_measured_is_refused_by_name(void)
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, unknown_identify(), cases[n].what);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(IDENTIFY_IDLE, drive.run.identify.step, cases[n].what);
         expect_off();
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, values->kphi_mv_per_krpm, cases[n].what);
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, values->kphi_uv_per_krpm, cases[n].what);
         TEST_ASSERT_TRUE_MESSAGE(cases[n].open_phase == 0u || motor.highest_a < PARAM_F(Q_CURRENT_REF_OPENLOOP), cases[n].what);
         if (cases[n].blocked) { /* what standstill tells is kept */
-            TEST_ASSERT_UINT16_WITHIN(27, 2670, values->rs_mohm);
-            TEST_ASSERT_UINT16_WITHIN(20, 1920, values->ld_uh);
+            TEST_ASSERT_UINT32_WITHIN(27000, 2670000, values->rs_uohm);
+            TEST_ASSERT_UINT32_WITHIN(20000, 1920000, values->ld_nh);
         }
     }
 }
@@ -202,6 +219,6 @@ void test_does_not_start_again_by_itself_but_with_S2_which_forgets_the_old_value
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_DONE, drive.run.identify.result);
     motor.omega = 0.0F;
     unknown_press_s2();
-    TEST_ASSERT_EQUAL_UINT16(0, values->rs_mohm);
-    TEST_ASSERT_EQUAL_UINT16(0, values->kphi_mv_per_krpm);
+    TEST_ASSERT_EQUAL_UINT32(0, values->rs_uohm);
+    TEST_ASSERT_EQUAL_UINT32(0, values->kphi_uv_per_krpm);
 }

@@ -197,6 +197,7 @@ static uint16_t rests(drive_t *d, int32_t across)
     id->across_q13 = now_q13;
     id->unrest++;
     if (qm_abs(now_q13) > little_q13 && qm_abs((int16_t)(now_q13 - before_q13)) > little_q13 && id->unrest < REST_MOST) {
+        id->swung = (uint16_t)(id->swung | (id->unrest > 1u));
         go(id, (identify_step_t)id->step, 0, 1u << MEAN_LOG2);
         return 0;
     }
@@ -431,6 +432,14 @@ static uint16_t coherent(const identify_t *id)
 {
     uint16_t mean = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
     return (uint16_t)(root_length((int16_t)(id->emf_d_sum >> BLOCKS_LOG2), (int16_t)(id->emf_q_sum >> BLOCKS_LOG2)) > mean - (mean >> 2));
+}
+
+/** 1 where the back-EMF is no more than what an error of L may leave of a current that turns. */
+static uint16_t hardly_emf(const drive_t *d, const drive_params_t *p)
+{
+    const identify_t *id = &d->run.identify;
+    soft_float_t reactive = soft_float_mul(soft_float_mul(soft_float_of(id->values.ld_nh), soft_float_of(turn_speed(d, p))), C_REACTIVE);
+    return (uint16_t)((int32_t)(id->emf_sum >> (BLOCKS_LOG2 - 3)) < soft_float_times(p->open_loop_q13, reactive));
 }
 
 /* ---- Inertia and friction ---- */
@@ -672,8 +681,17 @@ static void friction_done(drive_t *d)
         finish(d, IDENTIFY_RESULT_FRICTION_RANGE);
         return;
     }
-    if (apart > 0) {
+    if (grows <= 0) { /* none of it grows, or hardly: their mean */
+        grows = 0;
+        slow_nm = (slow_nm >> 1) + (fast_nm >> 1);
+    } else if (share_of(grows, part_speed(slow), apart) > slow_nm) { /* all of it grows */
+        grows = fast_nm;
+        apart = part_speed(fast);
+        slow_nm = 0;
+    } else {
         slow_nm -= share_of(grows, part_speed(slow), apart);
+    }
+    if (apart > 0) {
         grows = soft_float_times(grows, soft_float_div(C_VISCOUS, soft_float_of((uint32_t)apart)));
     }
     id->values.coulomb_1e8_nm = not_negative(slow_nm);
@@ -868,15 +886,16 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** The rotor slipped: too heavy for the ramp, or not free. What stood at the beginning stands again, and a ramp with a quarter of the
- *  acceleration follows. @return 1 when that is worth a try, and no back-EMF would drive more current than was asked for */
+/** The rotor slipped. One that swung while it was aligned is too heavy for the ramp, others are not free: what stood at the beginning stands
+ *  again, and a ramp with a quarter of the acceleration follows. @return 1 when that is worth a try, and no back-EMF would drive more
+ *  current than was asked for */
 static uint16_t ramp_slower(drive_t *d, const drive_params_t *p)
 {
     static const pi_gains_t gains = { 0, 0, 0, SLOW_SHIFT };
     identify_t *id = &d->run.identify;
     int32_t ohmic = soft_float_times(p->open_loop_q13, soft_float_mul(soft_float_of(id->values.rs_uohm), C_OHMIC));
     id->ramps++;
-    if (id->ramps >= RAMPS_MOST || (int32_t)(id->emf_sum >> BLOCKS_LOG2) > ohmic) {
+    if (!id->swung || id->ramps >= RAMPS_MOST || (int32_t)(id->emf_sum >> BLOCKS_LOG2) > ohmic) {
         return 0;
     }
     id->kp_d = 0;
@@ -913,7 +932,7 @@ static void spin_done(drive_t *d, const drive_params_t *p)
         return;
     }
     uv = kphi(d, p);
-    if (!coherent(id) || uv < LEAST_UV) {
+    if (!coherent(id) || uv < LEAST_UV || hardly_emf(d, p)) {
         if (!ramp_slower(d, p)) {
             finish(d, IDENTIFY_RESULT_NOT_TURNING);
         }

@@ -131,7 +131,7 @@ typedef struct {
     int32_t duty_first, i_first, bus_first; /**< sums of the first level */
     int16_t ki_slow;                        /**< of the slow current controller */
     int16_t across_q13;                     /**< sqrt(3) times the current across the axis, mean of the last time */
-    uint16_t unrest, ramps;                 /**< times that the rotor did not rest; ramps that it did not follow */
+    uint16_t unrest, swung, ramps;          /**< means in which the rotor did not rest; 1: there were some; ramps that it did not follow */
     int32_t dead_q13;                       /**< what dead time and diodes take beyond the compensation, as the current for which R takes it */
     uint16_t blocks;                        /**< stretches of back-EMF that have been evaluated */
     uint32_t emf_sum;                       /**< their lengths */

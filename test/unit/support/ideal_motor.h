@@ -16,6 +16,7 @@ typedef struct {
     float i_alpha, i_beta;  /* A */
     float sin_e, cos_e;     /* of the rotor flux */
     float omega;            /* electrical rad/s */
+    float omega_rest;       /* what its last step has lost by rounding */
     float highest_a;        /* largest current of phases a and b so far */
     duties_t acting;        /* duties in force until the next PWM boundary */
 } ideal_motor_t;
@@ -70,6 +71,14 @@ static inline float ideal_motor_phase_b(void)
     return -0.5F * motor.i_alpha + 0.8660254F * motor.i_beta;
 }
 
+/** A small step of a large speed: what single precision rounds away belongs to the next one. */
+static inline void ideal_motor_accelerate(float step)
+{
+    float whole = step + motor.omega_rest, before = motor.omega;
+    motor.omega = motor.blocked ? 0.0F : before + whole;
+    motor.omega_rest = motor.blocked ? 0.0F : whole - (motor.omega - before);
+}
+
 static inline void ideal_motor_half_period(duties_t duty, uint16_t outputs)
 {
     int16_t n;
@@ -94,7 +103,7 @@ static inline void ideal_motor_half_period(duties_t duty, uint16_t outputs)
         }
         torque = 1.5F * pairs * (motor.psi + (motor.ld - motor.lq) * i_d) * i_q - motor.viscous_nms * motor.omega / pairs;
         torque -= (motor.friction_nm + motor.load_nm) * ideal_limit(motor.omega / 20.0F, 1.0F);
-        motor.omega = motor.blocked ? 0.0F : motor.omega + torque / motor.inertia * pairs * IDEAL_DT;
+        ideal_motor_accelerate(torque / motor.inertia * pairs * IDEAL_DT);
         ideal_motor_turn(motor.omega * IDEAL_DT);
         motor.i_alpha = i_d * motor.cos_e - i_q * motor.sin_e;
         motor.i_beta = i_d * motor.sin_e + i_q * motor.cos_e;

@@ -46,10 +46,10 @@ static inline void unknown_begin(void)
 }
 
 /** Until a step is reached or the procedure has ended. @return milliseconds */
-static inline uint16_t unknown_until(identify_step_t step)
+static inline uint32_t unknown_until(identify_step_t step)
 {
-    uint16_t ms = 0;
-    while (drive.run.identify.step != (uint16_t)step && drive.run.identify.result == (uint16_t)IDENTIFY_RESULT_BUSY && ms < 20000u) {
+    uint32_t ms = 0;
+    while (drive.run.identify.step != (uint16_t)step && drive.run.identify.result == (uint16_t)IDENTIFY_RESULT_BUSY && ms < 300000ul) {
         unknown_ms();
         ms++;
     }
