@@ -207,7 +207,7 @@ soak: setup-run ## [tests] motor hours of random commands, loads, temperatures, 
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
-.PHONY: tune tune-fw identify board spreadsheet userparams setup-tune
+.PHONY: tune tune-fw identify identify-range board spreadsheet userparams setup-tune
 tune: setup-run ## [your motor] data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD= OUT=]
 	@$(tuner) tune $(tune_motor) $(board) $(out)
 
@@ -216,6 +216,9 @@ tune-fw: setup-run ## [your motor] search the field-weakening tables, into tunin
 
 identify: setup-run ## [your motor] R, L, Kphi, inertia and friction as the IDENTIFY firmware measures them [MOTOR=name or all, BOARD= OUT=]
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
+
+identify-range: setup-run ## [tests] motors from 5 mohm, 10 uH, 1e-7 kg m2 to 20 ohm, 20 mH, 1 kg m2, 1 N m: measured over true [OUT=]
+	@$(tuner) identify --range $(out)
 
 userparams: setup-run ## [your motor] install the tuned header; yours is kept as userparams.h.old [MOTOR= BOARD=]
 	@$(tuner) tune $(tune_motor) $(board) --brief --install

@@ -32,6 +32,7 @@ from .identify_result import MODE, Identified, Known, Measured, step_names, trip
 RESULTS = paths.ROOT / "build" / "identify"
 HEADERS = RESULTS / "headers"
 LONGEST_S = 900.0
+USUAL_S = 12.0
 ALL_ROWS_S = 60.0
 POWER_UP_S = 0.1
 PRESS_S = 0.1
@@ -164,8 +165,14 @@ def identify(items: list[Prepared], changes: board_keys.Values, quiet: bool = Tr
     keys = workers.run_all([items[0].library], _keys, lambda seconds: None)[0]
     values = [_plant(item, changes, keys) for item in items]
     jobs = [Job(item.library, value) for item, value in zip(items, values)]
-    with Progress("identify", 12.0 * len(jobs), quiet) as progress:
-        measured = workers.run_all(jobs, measure, progress)
+    with Progress("identify", USUAL_S * len(jobs), quiet) as progress:
+        spent_s = 0.0
+
+        def tell(more_s: float) -> None:
+            nonlocal spent_s
+            spent_s += more_s
+            progress.reach(spent_s, "" if spent_s <= USUAL_S * len(jobs) else f"identify, {spent_s:.0f} s: heavy rotors take minutes")
+        measured = workers.run_all(jobs, measure, tell)
     return [Identified(item.motor, item.board, item.known, item.header, *found) for item, *found in zip(items, values, measured)]
 
 

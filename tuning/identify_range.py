@@ -1,12 +1,13 @@
 """`identify --range`: motors over the whole range, from identify_range.toml, on boards that fit them: measured over true, or how it ends."""
 
 import argparse
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tools.bench import report
-from tools.common import board_file, board_keys, motor_file, output, paths
+from tools.common import board_file, board_keys, motor_file, output, paths, units
 from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
 from tools.common.toml_file import Document, Section
@@ -21,8 +22,9 @@ BOUNDS = {"ohm": (1e-3, 40.0), "uh": (1.0, 60000.0), "kphi": (0.2, 2000.0), "ine
           "current": (0.05, 20.0), "speed": (50.0, 30000.0)}
 LEAST_OHM, LEAST_UH = 0.01, 10.0
 """Of a motor file; what is less goes straight to the virtual board."""
-COLUMNS = (("name", "motor\n", "{}"), ("result", "ends with\n", "{}"), ("motor_s", "motor time\ns", "{:.0f}"), ("R", "measured / true - 1 in %\nR", "{:+.1f}"),
-           *((name, f"\n{name}", "{:+.1f}") for name in ("Ld", "Lq", "Kphi", "J")), ("half", "friction at\nhalf speed", "{:+.1f}"), ("full", "\nfull speed", "{:+.1f}"))
+COLUMNS = (("result", "ends\nwith", "{}"), ("motor_s", "time\ns", "{:.0f}"), ("R", "%\nR", "{:+.1f}"),
+           *((name, f"%\n{name}", "{:+.1f}") for name in ("Ld", "Lq", "Kphi", "J")), ("half", "friction %\nat half", "{:+.1f}"), ("full", "friction %\nat full speed", "{:+.1f}"))
+"""Errors of what was measured; `make readme` puts them into docs/tuning.md."""
 ROWS = {"R winding": "R", "Ld": "Ld", "Lq": "Lq", "Kphi": "Kphi", "J": "J"}
 
 
@@ -110,7 +112,7 @@ def measured(chosen: list[Case], quiet: bool) -> list[Identified]:
 
 def row(case: Case, item: Identified) -> dict[str, Any]:
     """A line of the table."""
-    found: dict[str, Any] = {"name": case.name, "result": item.result.name, "motor_s": item.measured.motor_s}
+    found: dict[str, Any] = {"name": case.name, "is": _facts(item), "result": item.result.name, "motor_s": item.measured.motor_s}
     for line in item.rows() if item.has_electrical else []:
         name = line["name"].split(" [")[0]
         key = ROWS.get(name, "")
@@ -119,6 +121,23 @@ def row(case: Case, item: Identified) -> dict[str, Any]:
         if key:
             found[key] = line["error_percent"]
     return found
+
+
+def _facts(item: Identified) -> str:
+    """What the virtual motor is."""
+    of = item.values
+    kphi = 3.0 ** 0.5 * of["motor.psi_vs"] * of["motor.pole_pairs"] * 1000.0 * units.RPM
+    lh = [of["motor.ld_h"], of["motor.lq_h"]]
+    numbers = [_engineering(of["motor.rs_ohm"], "ohm"), "/".join(dict.fromkeys(_engineering(value, "H") for value in lh)), f"{kphi:.3g} V",
+               f"{of['mech.inertia_kgm2']:.2g} kg m2", _engineering(of["mech.coulomb_nm"], "N m")]
+    return ", ".join(numbers)
+
+
+def _engineering(value: float, unit: str) -> str:
+    for factor, prefix in ((1.0, ""), (1e-3, "m"), (1e-6, "u")):
+        if value >= factor:
+            return f"{value / factor:.3g} {prefix}{unit}"
+    return f"{value:.2g} {unit}"
 
 
 def wrong(case: Case, item: Identified) -> list[str]:
@@ -138,8 +157,8 @@ def command(options: argparse.Namespace) -> int:
     rows = [row(case, item) for case, item in zip(every, items)]
     with output.ResultFolder(options.out or RESULTS) as folder:
         output.write_summary(folder.work, {"rows": rows, "tune": [item.tuner() for item in items]})
-    print(report.table([{key: line.get(key) for key, *_ in COLUMNS} for line in rows], COLUMNS))
+    print(report.table(rows, COLUMNS))
     lines = [f"{case.name}: {text}" for case, item in zip(every, items) for text in wrong(case, item)]
     for line in lines:
-        print(f"foc33: {line}")
+        print(f"foc33: {line}", file=sys.stderr)
     return 1 if lines else 0

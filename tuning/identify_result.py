@@ -11,14 +11,16 @@ from tools.common import board_file, motor_file, paths, x_macro
 from tools.common.board_file import BoardFile
 from tools.common.errors import UserError
 from tools.common.motor_file import Motor
-from tools.common.param_rows import parameters
+from tools.common.param_rows import number, parameters
 from tools.common.toml_file import Document
 from tools.common.trace import Trace
 
 MODE = "IDENTIFY"
 LIMITS_PERCENT = {"R": 3.0, "Ld": 5.0, "Lq": 5.0, "Kphi": 2.0, "J": 10.0, "friction": 10.0}
 LEAST_FRICTION_STEPS = 5.0
-"""Friction that takes less current than so many steps of the converter counts as that much: the limit is half a step."""
+"""Friction that takes less current than so many steps of the converter counts as that much: the limit is half a step. So does friction that
+takes less than what a sample misses of the current, which is taken late: delay * back-EMF / L. A tenth of that is not known."""
+SAMPLE_LATE_S = 25e-9 * number("SAMPLE_DELAY_CLOCKS")
 CONVERTER_STEPS = 512
 """In the current's full scale."""
 SALIENT = 0.03
@@ -160,7 +162,8 @@ class Identified:
         true_nm += speed_rad_s * (plant_now["mech.viscous_nms"] + plant_now.get("load.viscous_nms", 0.0))
         found_nm = 1e-8 * watch["Coulomb_1e8_Nm"] + 1e-9 * watch["Viscous_1e9_Nms"] * speed_rad_s
         kt_nm_per_a = kphi * 1.5 / (3.0 ** 0.5 * 1000.0 * np.pi / 30.0)
-        least_nm = LEAST_FRICTION_STEPS * self.board.current_full_scale_a / CONVERTER_STEPS * kt_nm_per_a
+        missed_a = SAMPLE_LATE_S * kphi / 3.0 ** 0.5 * speed_rpm / 1000.0 / plant_now["motor.lq_h"]
+        least_nm = max(LEAST_FRICTION_STEPS * self.board.current_full_scale_a / CONVERTER_STEPS, missed_a) * kt_nm_per_a
         name = "rated speed" if share == 1.0 else f"{100.0 * share:.0f} % of rated speed"
         if allowed_rpm < self.motor.rated_speed_rpm:
             name = f"{speed_rpm:.0f} rpm"

@@ -59,6 +59,15 @@ def motors() -> Table:
                   "IDENTIFY: error of R / Ld / Lq / Kphi / J / friction in %"], rows
 
 
+def identify_range() -> Table:
+    """A line for each motor of tuning/identify_range.toml."""
+    rows = []
+    for row in result("range", "identify")["rows"]:
+        values = [f"{row[key]:+.1f} %" if key in row else "-" for key in ("R", "Ld", "Lq", "Kphi", "J", "half", "full")]
+        rows.append([row["name"], row["is"], f"{row['motor_s']:.0f} s", *values])
+    return ["motor", "it is: R, L, Kphi per 1000 rpm, inertia, friction", "time", "R", "Ld", "Lq", "Kphi", "J", "friction at half speed", "at full speed"], rows
+
+
 def of_motor(name: str, motor: str) -> dict:
     """What a table of many runs left for a motor; the table's own one has no name there."""
     own = result(name)
@@ -267,6 +276,7 @@ BLOCKS: dict[str, list[Part]] = {
     "demo": [Part(("demo",), demo)],
     "loadsteps": [Part(("loadsteps",), loadsteps)],
     "motors": [Part(("motors", "identify"), motors)],
+    "identify range": [Part(("identify-range",), identify_range)],
     "stiffness": [Part(("loadsteps", "lowspeed"), stiffness)],
     "catch": [Part(("catch",), catches)],
     "held": [Part(("held",), helds)],

@@ -48,7 +48,7 @@
 #define MOST_INERTIA 2000000000ul
 #define MOST_FRICTION 300000000l
 #define COAST_PERIODS PARAM_PERIODS(1.0F)                                               /* enough, with CYCLES_LEAST; four times as many with two */
-#define REST_MOST 150u                                                                  /* means until the rotor counts as resting: half a minute */
+#define REST_MOST 300u                                                                  /* means until the rotor counts as resting: a minute */
 #define SWING_LOG2 6                                                                    /* periods of the filter of the back-EMF along the current, 3 ms */
 #define SWING_MEAN_LOG2 13                                                              /* and of its mean, 0.4 s: heavy rotors swing with 2 rad/s and more */
 #define SWING_GAIN 2                                                                    /* speed by voltage: damps with 20 rad/s where the back-EMF is 0.4 of the circle, as END_SPEED_RPM is to be chosen */
