@@ -208,9 +208,10 @@ class Identified:
         rating = (("voltage", motor.rated_voltage_v, "V"), ("current", motor.rated_current_a, "A peak"), ("torque", motor.rated_torque_nm, "N m"),
                   ("speed", motor.rated_speed_rpm, "rpm"), ("maximum_speed", motor.maximum_speed_rpm, "rpm"),
                   ("maximum_current", motor.maximum_current_a, "A peak"))
+        board = self.board.name if self.board.path.resolve().parent == paths.BOARDS else self.board.path.resolve()
         rotor = min(self.inertia_kgm2, motor.heaviest_kgm2)
         load = ["", "[load]", f'inertia = {{ value = {self.inertia_kgm2 - rotor:.4g}, unit = "kg m2" }}'] if self.has_inertia and rotor < self.inertia_kgm2 else []
-        return "\n".join([f'title = "{motor.title}, as measured"', f'connection = "{motor.connection}"', f'board = "{self.board.path.resolve()}"', "",
+        return "\n".join([f'title = "{motor.title}, as measured"', f'connection = "{motor.connection}"', f'board = "{board}"', "",
                           self.paste(rotor), "", "[rating]", *(f'{key} = {{ value = {value:.6g}, unit = "{unit}", {where} }}' for key, value, unit in rating), *load])
 
     def tuner(self) -> str:

@@ -6,7 +6,7 @@ from support import MOTORS
 
 from tools.bench import build
 from tools.common import board_keys, motor_file, paths, workers
-from tuning import identify, identify_result
+from tuning import identify, identify_range, identify_result
 
 HURST = "hurst_dmb0224c10002"
 
@@ -83,11 +83,17 @@ def test_a_hot_motor_is_measured_hot():
     assert item.problems() == [] and item.winding_ohm > 3.1
 
 
+def test_the_whole_range_of_motors_is_measured_or_ends_by_name():
+    cases = identify_range.cases()
+    wrong = {case.name: identify_range.wrong(case, item) for case, item in zip(cases, identify_range.measured(cases, True))}
+    assert wrong == {case.name: [] for case in cases}
+
+
 # ---- troubles --------------------------------------------------------------------------------------------------------------
 def test_a_blocked_shaft_has_a_resistance_and_no_kphi():
     item = run(load__locked=1.0)
     assert ends(item, "NOT_TURNING") and item.winding_ohm == approx(2.67, abs=0.03)
-    assert item.measured.watch["Kphi_mV_per_krpm"] == 0
+    assert item.measured.watch["Kphi_uV_per_krpm"] == 0
 
 
 @pytest.mark.parametrize("result, motor", [

@@ -135,7 +135,7 @@ class Motor:
     @property
     def heaviest_kgm2(self) -> float:
         """More is no rotor's inertia, but a load's."""
-        return SLOWEST_S * self.rated_torque_nm / (self.rated_speed_rpm * units.RPM)
+        return 0.99 * SLOWEST_S * self.rated_torque_nm / (self.rated_speed_rpm * units.RPM)
 
     def plant_values(self) -> Values:
         """Keys of the virtual board; each `where` is the line of the number that it follows from."""
