@@ -21,6 +21,8 @@ LEAST_FRICTION_STEPS = 5.0
 """Friction that takes less current than so many steps of the converter counts as that much: the limit is half a step. So does friction that
 takes less than what a sample misses of the current, which is taken late: delay * back-EMF / L. A tenth of that is not known."""
 SAMPLE_LATE_S = 25e-9 * number("SAMPLE_DELAY_CLOCKS")
+FASTEST_ERPM, BEYOND_TOP = 30000.0, 1.25
+"""IDENTIFY turns no rotor faster; usually the rated speed is 1.25 times the top speed of the measurement."""
 CONVERTER_STEPS = 512
 """In the current's full scale."""
 SALIENT = 0.03
@@ -153,9 +155,9 @@ class Identified:
         return rows
 
     def _friction_row(self, share: float, kphi: float) -> dict[str, Any]:
-        """Friction at a share of the rated speed, or of the one that the bus allows: what is far above all that was measured says nothing."""
+        """Friction at a share of the rated speed, or of the one that bus and firmware allow: what is far above all that was measured says nothing."""
         watch, plant_now = self.measured.watch, self.values
-        allowed_rpm = 1000.0 * self.board.nominal_bus_v / kphi
+        allowed_rpm = min(1000.0 * self.board.nominal_bus_v / kphi, BEYOND_TOP * FASTEST_ERPM / self.motor.pole_pairs)
         speed_rpm = share * min(self.motor.rated_speed_rpm, allowed_rpm)
         speed_rad_s = speed_rpm * np.pi / 30.0
         true_nm = plant_now["mech.coulomb_nm"] + plant_now.get("load.constant_nm", 0.0)

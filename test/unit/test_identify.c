@@ -626,6 +626,100 @@ void test_a_shaft_that_does_not_accelerate_gets_more_current_up_to_all_of_it_and
     }
 }
 
+void test_an_inertia_or_friction_beyond_the_range_is_named_and_not_a_value(void)
+{
+    static const struct {
+        const char *what;
+        uint32_t kphi_uv;
+        int32_t push_slope, coast_slope;
+        identify_result_t result;
+    } cases[] = {
+        { "usual", 7240000ul, 40000l, -4000l, IDENTIFY_RESULT_DONE },
+        { "too heavy", 1000000000ul, 400l, -40l, IDENTIFY_RESULT_INERTIA_RANGE },
+        { "too light", 100000ul, 400000000l, -4000l, IDENTIFY_RESULT_INERTIA_RANGE },
+        { "too much friction", 400000000ul, 40000l, -400000l, IDENTIFY_RESULT_FRICTION_RANGE },
+    };
+    EACH(n, cases) {
+        uint16_t part;
+        begin_mechanics(0);
+        id->values.kphi_uv_per_krpm = cases[n].kphi_uv;
+        for (part = 0; part < 3u; part++) {
+            identify_part_t whole = { 64, 0, 64 * 20000l, cases[n].coast_slope, 262080l, 63, 2520 };
+            whole.current = (part == (uint16_t)PART_PUSH) ? 64 * 32 * 2000l : 0;
+            whole.slope = (part == (uint16_t)PART_PUSH) ? cases[n].push_slope : cases[n].coast_slope;
+            whole.speed = (part == (uint16_t)PART_SLOW) ? 64 * 12000l : 64 * 16000l;
+            id->parts[part] = whole;
+        }
+        mechanics_done(&drive);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].result, id->result, cases[n].what);
+        TEST_ASSERT_EQUAL_MESSAGE(cases[n].result == IDENTIFY_RESULT_INERTIA_RANGE, id->values.inertia_1e9_kgm2 == 0u, cases[n].what);
+        TEST_ASSERT_EQUAL_MESSAGE(cases[n].result != IDENTIFY_RESULT_DONE, id->values.coulomb_1e8_nm == 0u, cases[n].what);
+    }
+}
+
+void test_friction_that_does_not_grow_is_constant_and_one_that_begins_below_zero_grows_from_zero(void)
+{
+    static const int32_t cases[][4] = { /* slopes of slow and fast, and what comes of it: more than nothing? */
+        { -4000, -3000, 1, 0 }, { -4000, -5000, 1, 1 }, { -4000, -9000, 0, 1 }
+    };
+    EACH(n, cases) {
+        uint16_t part;
+        begin_mechanics(0);
+        for (part = 0; part < 3u; part++) {
+            identify_part_t whole = { 64, 0, 64 * 16000l, 40000l, 262080l, 63, 2520 };
+            whole.current = (part == (uint16_t)PART_PUSH) ? 64 * 32 * 2000l : 0;
+            if (part != (uint16_t)PART_PUSH) {
+                whole.slope = cases[n][(part == (uint16_t)PART_SLOW) ? 0 : 1];
+                whole.speed = (part == (uint16_t)PART_SLOW) ? 64 * 12000l : 64 * 20000l;
+            }
+            id->parts[part] = whole;
+        }
+        mechanics_done(&drive);
+        TEST_ASSERT_EQUAL_MESSAGE(cases[n][2], id->values.coulomb_1e8_nm > 0u, golden_row(n));
+        TEST_ASSERT_EQUAL_MESSAGE(cases[n][3], id->values.viscous_1e9_nms > 0u, golden_row(n));
+    }
+}
+
+void test_a_rotor_that_swings_is_waited_for_a_minute_at_most(void)
+{
+    uint16_t n;
+    control->ref_q13.d = 2000;
+    for (n = 1; n < REST_MOST; n++) { /* across the axis 200 and 400 */
+        set_sums(0, ((n & 1u) ? 2200l : 2400l) << MEAN_LOG2, -(1000l << MEAN_LOG2), BUS_SUM);
+        (void)finished(IDENTIFY_ALIGN);
+        TEST_ASSERT_EQUAL_UINT16(IDENTIFY_ALIGN, id->step);
+    }
+    set_sums(0, 2100l << MEAN_LOG2, -(900l << MEAN_LOG2), BUS_SUM);
+    (void)finished(IDENTIFY_ALIGN);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESISTANCE, id->step);
+    TEST_ASSERT_EQUAL_UINT16(1, id->swung);
+    setUp();
+    control->ref_q13.d = 2000;
+    set_sums(0, 2000l << MEAN_LOG2, -(1000l << MEAN_LOG2), BUS_SUM);
+    (void)finished(IDENTIFY_ALIGN);
+    TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESISTANCE, id->step);
+    TEST_ASSERT_EQUAL_UINT16(0, id->swung);
+}
+
+void test_the_vector_waits_for_a_rotor_that_falls_behind_but_not_for_a_lasting_load(void)
+{
+    uint16_t n;
+    id->swing = 1000l << SWING_LOG2;
+    id->swing_mean = 1000l << SWING_MEAN_LOG2;
+    control->v_q14.d = 1000;
+    drive.forced.step_q32 = 1000000ul;
+    identify_damp(&drive);
+    TEST_ASSERT_EQUAL_UINT32(1000000ul, drive.forced.step_q32);
+    control->v_q14.d = 1640; /* 10 of 64 in the filter at once */
+    identify_damp(&drive);
+    TEST_ASSERT_EQUAL_UINT32(1000000ul - 10ul * SWING_GAIN * 64u, drive.forced.step_q32);
+    for (n = 0; n < 60000u; n++) {
+        drive.forced.step_q32 = 1000000ul;
+        identify_damp(&drive);
+    }
+    TEST_ASSERT_UINT32_WITHIN(128, 1000000ul, drive.forced.step_q32);
+}
+
 void test_the_first_push_is_what_friction_takes_and_a_sixteenth(void)
 {
     begin_mechanics(0);

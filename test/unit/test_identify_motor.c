@@ -43,7 +43,7 @@ void test_measures_motors_of_every_kind(void)
         TEST_ASSERT_FLOAT_WITHIN(0.01F * cases[n].kphi, cases[n].kphi, (float)values->kphi_uv_per_krpm * 0.000001F);
         TEST_ASSERT_UINT32_WITHIN_MESSAGE(550, (cases[n].result == IDENTIFY_RESULT_DONE) ? 5500 : 0, values->inertia_1e9_kgm2, golden_row(n));
         expect_off();
-        TEST_ASSERT_TRUE(motor.highest_a < 1.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.15F * PARAM_F(Q_CURRENT_REF_OPENLOOP), PARAM_F(Q_CURRENT_REF_OPENLOOP), motor.highest_a, golden_row(n));
     }
 }
 

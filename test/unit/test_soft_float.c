@@ -52,6 +52,12 @@ void test_whole_numbers_are_rounded_and_limited(void)
     TEST_ASSERT_EQUAL_UINT16(65535u, soft_float_to_uint16(soft_float_of(65535u)));
     TEST_ASSERT_EQUAL_UINT16(65535u, soft_float_to_uint16(soft_float_of(65536ul)));
     TEST_ASSERT_EQUAL_UINT16(65535u, soft_float_to_uint16(soft_float_of(0xFFFFFFFFul)));
+    TEST_ASSERT_EQUAL_UINT32(0, soft_float_to_uint32(soft_float_of(0)));
+    TEST_ASSERT_EQUAL_UINT32(3, soft_float_to_uint32(soft_float_scaled(5, 1)));
+    TEST_ASSERT_EQUAL_UINT32(65535u, soft_float_to_uint32(soft_float_of(65535u)));
+    TEST_ASSERT_EQUAL_UINT32(65536ul, soft_float_to_uint32(soft_float_of(65536ul)));
+    TEST_ASSERT_EQUAL_UINT32(0xFFFF0000ul, soft_float_to_uint32(soft_float_of(0xFFFFFFFFul)));
+    TEST_ASSERT_EQUAL_UINT32(0xFFFFFFFFul, soft_float_to_uint32(soft_float_scaled(0x80000000ul, -1))); /* from 2^32 on: limited */
 }
 
 void test_signed_products(void)

@@ -37,13 +37,15 @@
 #define PART_UNITS 4096        /* more count half: the sums fit into 32 bits */
 #define PASSAGE_MOST 64u       /* stretches of one line: its sums fit into 32 bits */
 #define CYCLES_LEAST 5u
-#define CYCLES_MOST 12u
+#define CYCLES_MOST 32u
 #define LEAST_UOHM 5000u
 #define MOST_UOHM 40000000ul
 #define LEAST_NH 5000u
 #define MOST_NH 60000000ul
 #define LEAST_UV 100000ul
 #define MOST_UV 2000000000ul
+#define RIPPLE_PER_MISSED 5                                                                                                                      /* half of the ripple, E (1 - m) T / (4 L), over what a sample misses, at m = 0.4 */
+#define DEAD_EMF_Q14 ((uint16_t)(2.0F / PARAM_PI * PARAM_F(NOMINAL_BUS_V) * PARAM_F(DEADTIME_SEC) / PARAM_F(LOOPTIME_SEC) / NORM_VOLTAGE_CONST)) /* what it takes */
 #define LEAST_INERTIA 50u
 #define MOST_INERTIA 2000000000ul
 #define MOST_FRICTION 300000000l
@@ -563,6 +565,7 @@ static void follow_gains(identify_t *id, uint32_t speed_q10)
  *  half of the current. */
 static void mechanics_start(drive_t *d, const drive_params_t *p)
 {
+    static const pi_gains_t gains = { 0, 0, 0, LOOP_SHIFT };
     identify_t *id = &d->run.identify;
     uint32_t speed = turn_speed(d, p);
     uint16_t emf_q14 = (uint16_t)(id->emf_sum >> BLOCKS_LOG2);
@@ -585,6 +588,10 @@ static void mechanics_start(drive_t *d, const drive_params_t *p)
     id->settle[0] = FOLLOW_SETTLE;
     id->settle[1] = FOLLOW_SETTLE;
     d->run.control.ref_q13.d = 0;
+    if (emf_q14 > DEAD_EMF_Q14) { /* the frame follows by voltage: R i of the d axis would look like a slower rotor */
+        pi_preset(&d->run.control.pi_d, &gains, 0, 0);
+        pi_preset(&d->run.control.pi_q, &gains, 0, (int16_t)emf_q14);
+    }
     mechanics_current(d, id->push_q13);
     id->seen_q10 = (int32_t)speed;
     mechanics_drops(d, (int32_t)speed);
@@ -623,11 +630,16 @@ static int32_t part_speed(const identify_part_t *part)
     return share_of(part->speed, 1, part->units);
 }
 
-/** Mean q current, with what the samples miss. */
+/** Mean q current, with what the samples miss. A current below the ripple, some five times of that, changes its sign within the period, and
+ *  dead time delays nothing. */
 static int32_t part_current(const identify_t *id, uint16_t part)
 {
     const identify_part_t *of = &id->parts[part];
-    return share_of(of->current, 1, of->units) + missed(id, part_speed(of), (part == (uint16_t)PART_PUSH) ? C_MISSED_PUSHING : C_MISSED_COASTING);
+    int32_t current = share_of(of->current, 1, of->units), late = missed(id, part_speed(of), C_MISSED_COASTING);
+    if (part == (uint16_t)PART_PUSH && current > RIPPLE_PER_MISSED * late) {
+        late = missed(id, part_speed(of), C_MISSED_PUSHING);
+    }
+    return current + late;
 }
 
 /** Change of speed, counts a period * RATE_SCALE. */
