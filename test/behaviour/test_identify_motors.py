@@ -46,10 +46,9 @@ def test_long_time_constant_at_a_speed_that_the_measurement_does_not_reach():
     assert abs(item.rows()[-1]["error_percent"]) < 15.0
 
 
-def test_less_back_emf_than_dead_time_takes_leaves_inertia_and_friction_open():
+def test_less_back_emf_than_dead_time_takes_is_enough():
     item = made_up(0.1, 5e-5, 5e-5, 1.0, 3.0, 2000.0) # 1.15 V, and dead time takes 1.2 V
-    assert ends(item, "NOT_ACCELERATING") and failed(item) == [] and len(item.rows()) == 5
-    assert "kphi" in item.paste() and "# inertia is missing" in item.paste()
+    assert item.done and item.problems() == []
 
 
 def test_a_load_counts_as_friction_and_leaves_the_rest_as_it_is():

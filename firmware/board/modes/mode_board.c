@@ -31,7 +31,7 @@ void mode_watch(const drive_t *d)
 tIdentifyParm IdentifyParm;
 
 /** A number of 32 bits, with what stands before it: by subtraction, for the chip divides 32 bits by 16 only. */
-static char *put_long(char *at, const char *before, uint32_t number)
+static char *put_decimal(char *at, const char *before, uint32_t number)
 {
     static const uint32_t tens[] = { 1000000000ul, 100000000ul, 10000000ul, 1000000ul, 100000ul, 10000ul, 1000ul, 100ul, 10ul };
     char *next = text_put(at, before);
@@ -59,13 +59,13 @@ char *identify_status_line(char *line, const drive_t *d)
     const identify_t *id = &d->run.identify;
     char *at = text_put(text_put_unsigned(text_put(line, "step "), id->step), " ");
     at = text_put_fault(text_put(at, results[id->result]), " fault ", d->fault);
-    at = put_long(at, " R ", id->values.rs_uohm);
-    at = put_long(at, " uohm Ld ", id->values.ld_nh);
-    at = put_long(at, " nH Lq ", id->values.lq_nh);
-    at = put_long(at, " nH Kphi ", id->values.kphi_uv_per_krpm);
-    at = put_long(at, " uV/krpm J ", id->values.inertia_1e9_kgm2);
-    at = put_long(at, "e-9 kgm2 friction ", id->values.coulomb_1e8_nm);
-    return text_put(put_long(at, "e-8 Nm + ", id->values.viscous_1e9_nms), "e-9 Nms\r\n");
+    at = put_decimal(at, " R ", id->values.rs_uohm);
+    at = put_decimal(at, " uohm Ld ", id->values.ld_nh);
+    at = put_decimal(at, " nH Lq ", id->values.lq_nh);
+    at = put_decimal(at, " nH Kphi ", id->values.kphi_uv_per_krpm);
+    at = put_decimal(at, " uV/krpm J ", id->values.inertia_1e9_kgm2);
+    at = put_decimal(at, "e-9 kgm2 friction ", id->values.coulomb_1e8_nm);
+    return text_put(put_decimal(at, "e-8 Nm + ", id->values.viscous_1e9_nms), "e-9 Nms\r\n");
 }
 
 void identify_watch(const drive_t *d)

@@ -110,7 +110,7 @@
 /* ---- Requests to the interrupt ---- */
 
 /** Sums anew: `periods` of them after `wait`. The last word of every step: from here on the interrupt owns the state. */
-static void go(identify_t *id, identify_step_t step, uint16_t wait, uint16_t periods)
+static NOINLINE void go(identify_t *id, identify_step_t step, uint16_t wait, uint16_t periods)
 {
     int16_t n;
     for (n = 0; n < 4; n++) {
@@ -122,7 +122,7 @@ static void go(identify_t *id, identify_step_t step, uint16_t wait, uint16_t per
     id->ready = 0;
 }
 
-static void finish(drive_t *d, identify_result_t result)
+static NOINLINE void finish(drive_t *d, identify_result_t result)
 {
     d->run.identify.result = (uint16_t)result;
     d->run.identify.step = (uint16_t)IDENTIFY_IDLE;
@@ -175,7 +175,7 @@ static void rise_done(drive_t *d, const drive_params_t *p)
 }
 
 /** 1 if the current is within an eighth of what was asked for; else the end of the procedure. @param mean_q13 along the frame's d axis */
-static uint16_t current_reached(drive_t *d, int16_t mean_q13)
+static NOINLINE uint16_t current_reached(drive_t *d, int16_t mean_q13)
 {
     int16_t ref_q13 = d->run.control.ref_q13.d;
     if (mean_q13 < (ref_q13 >> 2)) {
@@ -191,7 +191,7 @@ static uint16_t current_reached(drive_t *d, int16_t mean_q13)
 
 /** A heavy rotor swings for long, and its back-EMF is in current and voltage. 1 when the current across the axis is none or has not changed
  *  since the last mean; else the step's mean is taken anew. @param across sum of sqrt(3) times that current */
-static uint16_t rests(drive_t *d, int32_t across)
+static NOINLINE uint16_t rests(drive_t *d, int32_t across)
 {
     identify_t *id = &d->run.identify;
     int16_t now_q13 = (int16_t)(across >> MEAN_LOG2), before_q13 = id->across_q13;
@@ -453,7 +453,7 @@ enum { PART_PUSH,
        PART_SLOW };
 
 /** x * part / whole, within 2^30. @param whole above 0 */
-static int32_t share_of(int32_t x, int32_t part, int32_t whole)
+static NOINLINE int32_t share_of(int32_t x, int32_t part, int32_t whole)
 {
     uint32_t size = (uint32_t)((part < 0) ? -part : part);
     int32_t share = soft_float_times(x, soft_float_div(soft_float_of(size), soft_float_of((uint32_t)whole)));
@@ -491,7 +491,7 @@ static void passage_end(identify_t *id)
 }
 
 /** Another q current. */
-static void mechanics_current(drive_t *d, current_q13_t iq_q13)
+static NOINLINE void mechanics_current(drive_t *d, current_q13_t iq_q13)
 {
     identify_t *id = &d->run.identify;
     d->run.control.ref_q13.q = iq_q13;
@@ -505,7 +505,7 @@ static void mechanics_current(drive_t *d, current_q13_t iq_q13)
 
 /** What the samples of a stretch miss of the current at a speed / 16: they are taken after the centre of the low sides' conduction, when the
  *  back-EMF has taken some of it off. */
-static int32_t missed(const identify_t *id, int32_t speed, soft_float_t factor)
+static NOINLINE int32_t missed(const identify_t *id, int32_t speed, soft_float_t factor)
 {
     return soft_float_times(speed, soft_float_mul(factor, soft_float_div(soft_float_of(id->values.kphi_uv_per_krpm), soft_float_of(id->values.lq_nh))));
 }
@@ -526,7 +526,7 @@ static void mechanics_drops(drive_t *d, int32_t speed_q10)
 
 static const identify_part_t no_part = { .units = 0 };
 
-static void forget_parts(identify_t *id)
+static NOINLINE void forget_parts(identify_t *id)
 {
     int16_t n;
     for (n = 0; n < 3; n++) {
@@ -632,7 +632,7 @@ static int32_t part_speed(const identify_part_t *part)
 
 /** Mean q current, with what the samples miss. A current below the ripple, some five times of that, changes its sign within the period, and
  *  dead time delays nothing. */
-static int32_t part_current(const identify_t *id, uint16_t part)
+static NOINLINE int32_t part_current(const identify_t *id, uint16_t part)
 {
     const identify_part_t *of = &id->parts[part];
     int32_t current = share_of(of->current, 1, of->units), late = missed(id, part_speed(of), C_MISSED_COASTING);

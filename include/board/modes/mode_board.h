@@ -100,6 +100,9 @@ panel_lights_t mode_panel(const panel_inputs_t *in);
 #endif
 #ifdef IDENTIFY
 #define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 128u) /* its stack, too */
+#if SCOPE && defined __XC16__
+#error userparams.h: SCOPE 1 and IDENTIFY together do not fit into the flash: set SCOPE 0, the status line has all that is measured
+#endif
 #else
 #define SCOPE_MODE_IDENTIFY 0u
 #endif
