@@ -218,7 +218,7 @@ identify: setup-run ## [your motor] R, L, Kphi, inertia and friction as the IDEN
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)
 
 identify-range: setup-run ## [tests] motors from 5 mohm, 10 uH, 1e-7 kg m2 to 20 ohm, 20 mH, 1 kg m2, 1 N m: measured over true [OUT=]
-	@$(tuner) identify --range $(out)
+	@$(tuner) identify-range $(out)
 
 userparams: setup-run ## [your motor] install the tuned header; yours is kept as userparams.h.old [MOTOR= BOARD=]
 	@$(tuner) tune $(tune_motor) $(board) --brief --install

@@ -19,6 +19,7 @@
 #include "firmware/drive/catch.c"
 #include "firmware/drive/drive.c"
 #include "firmware/drive/handover.c"
+#include "firmware/drive/held.c"
 #include "firmware/drive/limits.c"
 #include "firmware/drive/model.c"
 #include "firmware/drive/panel.c"

@@ -197,7 +197,6 @@ def add_command(commands: Any) -> None:
     parser = commands.add_parser("identify", help="R, L, Kphi, inertia, friction as IDENTIFY measures them on the virtual board")
     parser.add_argument("motor", nargs="?", help="a name in tuning/motors, or a motor file")
     parser.add_argument("--all", action="store_true", help="every motor of tuning/motors")
-    parser.add_argument("--range", action="store_true", help="motors over the whole range: tuning/identify_range.toml")
     parser.add_argument("--board", help="a name in tuning/boards, or a board file; default: the one in the motor file, else mclv")
     parser.add_argument("--current", type=float, metavar="A", help="Q_CURRENT_REF_OPENLOOP; default: from the rating")
     parser.add_argument("--speed", type=float, metavar="RPM", help="END_SPEED_RPM; default: 40 %% of the rating")
@@ -210,9 +209,6 @@ def add_command(commands: Any) -> None:
 
 def command(options: argparse.Namespace) -> int:
     """The whole command; returns the exit code: 1 if a value is outside its limit or the identification did not end with DONE."""
-    if options.range:
-        from . import identify_range
-        return identify_range.command(options)
     names = command_line.one_or_all(options, paths.names(paths.MOTORS))
     _check(options)
     changes = command_common.changes(options.changes)

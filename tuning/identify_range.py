@@ -1,4 +1,4 @@
-"""`identify --range`: motors over the whole range, from identify_range.toml, on boards that fit them: measured over true, or how it ends."""
+"""`identify-range`: motors over the whole range, from identify_range.toml, on boards that fit them: measured over true, or how it ends."""
 
 import argparse
 import sys
@@ -147,6 +147,14 @@ def wrong(case: Case, item: Identified) -> list[str]:
     rows = item.rows() if item.has_electrical else []
     return [f"{line['name']} is off by {line['error_percent']:+.1f} %" for line in rows
             if (line["verdict"] == "FAIL") and not line["name"].startswith(case.fails or ("-",))]
+
+
+def add_command(commands: Any) -> None:
+    """Adds `identify-range` to a command line's commands."""
+    parser = commands.add_parser("identify-range", help="IDENTIFY on motors over the whole range: tuning/identify_range.toml")
+    parser.add_argument("--out", type=Path, help="result folder; default build/identify/range")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    parser.set_defaults(command=command)
 
 
 def command(options: argparse.Namespace) -> int:

@@ -11,16 +11,16 @@
 #define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12) /* from a period's turn, Q32, to a step's, angle counts */
 
 /** The one place that writes the phase. */
-static void held_enter(held_t *h, held_phase_t next)
+static void held_enter(held_t *shaft, held_phase_t next)
 {
-    h->phase = (uint16_t)next;
-    h->steps = 0;
-    h->doubts = 0;
+    shaft->phase = (uint16_t)next;
+    shaft->steps = 0;
+    shaft->doubts = 0;
 }
 
-uint16_t held_angle_stands(const held_t *h)
+uint16_t held_angle_stands(const held_t *shaft)
 {
-    return (uint16_t)(h->phase >= (uint16_t)HELD_SETTLES);
+    return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
 /** How far the back-EMF has moved. */
@@ -47,8 +47,8 @@ int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q
 {
     const speed_erpm_t more = estimator_omega(lag_q12, run->model.emf_sum_max_q12, run->model.inv_kfi);
     const uint32_t period_q32 = (uint32_t)qm_mulss(qm_abs(more), p->estimator.deltat_q32);
-    const uint16_t k_q16 = run->model.kfilter_esdq_q16;
-    const uint16_t lead = ((uint16_t)(period_q32 >> 16) >= (k_q16 >> 1)) ? 32767u : qm_divud(period_q32, k_q16);
+    const uint16_t k_q16 = (uint16_t)run->model.kfilter_esdq_q16;
+    const uint16_t lead = ((period_q32 >> 15) >= (uint32_t)k_q16) ? 32767u : qm_divud(period_q32, k_q16); /* half a turn at most */
     return qm_with_sign((int16_t)lead, more);
 }
 
@@ -88,14 +88,14 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
 /** The angle stops where a rotor would be that stopped at once. */
 static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
-    held_t *h = &d->run.held;
-    const int16_t lead = held_lead(&d->run, p, h->lag_q12);
-    h->omega_erpm = d->run.estimator.omega_erpm;
-    h->inv_kfi = d->run.model.inv_kfi;
-    h->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
-    h->stopped_steps = 0;
+    held_t *shaft = &d->run.held;
+    const int16_t lead = held_lead(&d->run, p, shaft->lag_q12);
+    shaft->omega_erpm = d->run.estimator.omega_erpm;
+    shaft->inv_kfi = d->run.model.inv_kfi;
+    shaft->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
+    shaft->stopped_steps = 0;
     held_turn_back(d, p, lead);
-    held_enter(h, HELD_SETTLES);
+    held_enter(shaft, HELD_SETTLES);
     d->run.model.inv_kfi = 0;
     d->run.observer.omega_q16 = 0;
     d->run.estimator.omega_filtered_q16 = 0;
@@ -126,33 +126,33 @@ static void held_has_turned(drive_t *d, const drive_params_t *p)
 static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     drive_run_t *run = &d->run;
-    held_t *h = &run->held;
-    const int32_t load_q16 = (h->stood > 1u) ? run->observer.load_q16 : (int32_t)h->load * 65536;
-    h->stood = 2;
+    held_t *shaft = &run->held;
+    const int32_t load_q16 = (shaft->stood > 1u) ? run->observer.load_q16 : (int32_t)shaft->load * 65536;
+    shaft->stood = 2;
     held_go_on(d, p, held_speed(run, emf), load_q16);
 }
 
 /** 1 where the back-EMF has turned as with a rotor as fast as it says: by more than half of that. */
-static uint16_t held_emf_turns(const held_t *h, const drive_run_t *run, const drive_params_t *p, dq_t emf)
+static uint16_t held_emf_turns(const held_t *shaft, const drive_run_t *run, const drive_params_t *p, dq_t emf)
 {
-    const int16_t angle = held_turned(p, held_speed(run, h->emf_q12), h->steps);
-    const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(h->emf_q12.q, angle))); /* pi, nearly */
+    const int16_t angle = held_turned(p, held_speed(run, shaft->emf_q12), shaft->steps);
+    const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
     const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 2);
-    return (uint16_t)(qm_abs((int16_t)(emf.d - h->emf_q12.d)) > ((half > least) ? half : least));
+    return (uint16_t)(qm_abs((int16_t)(emf.d - shaft->emf_q12.d)) > ((half > least) ? half : least));
 }
 
 /** The rotor stands: all of the back-EMF is R i, and turned the angle while it seemed one. */
 static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     drive_run_t *run = &d->run;
-    held_t *h = &run->held;
+    held_t *shaft = &run->held;
     const current_q13_t iq_q13 = run->control.i_q13.q;
     const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(emf.q);
     int16_t share;
-    held_enter(h, HELD_STANDS);
+    held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
-        if (h->stood == 0u) {
-            held_turn_back(d, p, held_turned(p, held_speed(run, emf), (uint16_t)(h->doubted_steps + 1u)));
+        if (shaft->stood == 0u) {
+            held_turn_back(d, p, held_turned(p, held_speed(run, emf), (uint16_t)(shaft->doubted_steps + 1u)));
         }
         share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
@@ -161,62 +161,77 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         emf.d = 0;
         emf.q = 0;
     }
-    h->stood = (h->stood == 0u) ? 1u : h->stood;
-    h->emf_q12 = emf;
+    shaft->stood = (shaft->stood == 0u) ? 1u : shaft->stood;
+    shaft->emf_q12 = emf;
+}
+
+/** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. */
+static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
+{
+    const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
+    const int32_t lag = (int32_t)shaft->lag_q12 - (shaft->lag_q12 >> HELD_LAG_SHIFT) + shaft->emf_q12.q - emf.q - taken_back;
+    shaft->lag_q12 = (int16_t)((lag > 32767) ? 32767 : (lag < -32767) ? -32767 : lag);
+}
+
+/** 1 where a rotor that was asked is back at its speed, or may be asked again. */
+static uint16_t held_is_over(const drive_t *d, const drive_params_t *p)
+{
+    const held_t *shaft = &d->run.held;
+    return (uint16_t)(along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
+                      || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS));
 }
 
 /** The angle turns. */
 static void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 {
-    held_t *h = &d->run.held;
-    const uint16_t doubts = held_doubts(d, p, emf);
-    int32_t lag = (int32_t)h->lag_q12 - (h->lag_q12 >> HELD_LAG_SHIFT) + h->emf_q12.q - emf.q
-                  - d->run.estimator.sign * (qm_mulsu(emf.d, d->run.model.kfilter_esdq_q16) >> 12);
-    h->lag_q12 = (int16_t)((lag > 32767) ? 32767 : (lag < -32767) ? -32767 : lag);
-    h->doubted_steps = (uint16_t)((doubts != 0u) ? h->doubted_steps + 1u : 0u);
-    h->doubts = (uint16_t)((doubts != 0u) ? h->doubts + doubts : 0u);
-    if (h->phase == (uint16_t)HELD_NOT) {
+    held_t *shaft = &d->run.held;
+    uint16_t doubts = held_doubts(d, p, emf);
+
+    held_follow_lag(shaft, &d->run, emf);
+    if (shaft->phase == (uint16_t)HELD_NOT) {
         if (observer_gate_is_closed(&d->run.observer)) {
-            h->load = qm_hi(d->run.observer.load_q16);
+            shaft->load = qm_hi(d->run.observer.load_q16);
         }
-    } else if (along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
-               || (h->stood == 0u && h->steps >= HELD_AGAIN_STEPS)) {
-        held_enter(h, HELD_NOT);
-        h->stood = 0;
-    } else if (h->stood == 0u) {
-        h->doubts = 0;
+    } else if (held_is_over(d, p)) {
+        held_enter(shaft, HELD_NOT);
+        shaft->stood = 0;
+        doubts = 0;
+    } else if (shaft->stood == 0u) {
+        doubts = 0;
     } else {
-        /* it speeds up */
+        /* it stood, and speeds up */
     }
-    if (h->doubts >= HELD_DOUBTS_MOST) {
+    shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
+    shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
+    if (shaft->doubts >= HELD_DOUBTS_MOST) {
         held_stop_angle(d, p);
     }
 }
 
 void held_step(drive_t *d, const drive_params_t *p)
 {
-    held_t *h = &d->run.held;
+    held_t *shaft = &d->run.held;
     const dq_t emf = estimator_emf(&d->run.estimator);
-    const uint16_t moved = held_moved(emf, h->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
+    const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
 
-    h->steps++;
-    h->stopped_steps++;
-    switch (h->phase) {
+    shaft->steps++;
+    shaft->stopped_steps++;
+    switch (shaft->phase) {
     case HELD_SETTLES:
         if (moved <= most >> 1) {
-            held_enter(h, HELD_ASKED);
-        } else if (h->steps > h->patience) {
+            held_enter(shaft, HELD_ASKED);
+        } else if (shaft->steps > shaft->patience) {
             held_has_turned(d, p);
         } else {
             /* the current changes */
         }
-        h->emf_q12 = emf;
+        shaft->emf_q12 = emf;
         break;
     case HELD_ASKED:
-        if (moved > 2u * most || (h->steps > 1u && held_emf_turns(h, &d->run, p, emf))) {
+        if (moved > 2u * most || (shaft->steps > 1u && held_emf_turns(shaft, &d->run, p, emf))) {
             held_has_turned(d, p);
-            h->emf_q12 = emf;
-        } else if (h->steps == HELD_ASK_STEPS) {
+            shaft->emf_q12 = emf;
+        } else if (shaft->steps == HELD_ASK_STEPS) {
             held_learn(d, p, emf);
         } else {
             /* wait */
@@ -225,14 +240,14 @@ void held_step(drive_t *d, const drive_params_t *p)
     case HELD_STANDS:
         if (moved > most) {
             held_turns_again(d, p, emf);
-            h->emf_q12 = emf;
+            shaft->emf_q12 = emf;
         } else { /* the load is what flows, and it grows */
             observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         }
         break;
     default:
         held_watch(d, p, emf);
-        h->emf_q12 = emf;
+        shaft->emf_q12 = emf;
         break;
     }
 }

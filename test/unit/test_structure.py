@@ -203,7 +203,7 @@ def test_the_state_is_written_in_one_place() -> None:
 
 
 @pytest.mark.parametrize("field, writer", [("catching.phase|c->phase", "firmware/drive/catch.c"), ("handover.phase|h->phase", "firmware/drive/handover.c"),
-                                           ("probe_phase", "firmware/drive/protection.c")])
+                                           ("probe_phase", "firmware/drive/protection.c"), ("held.phase|shaft->phase", "firmware/drive/held.c")])
 def test_a_phase_is_written_in_one_place(field: str, writer: str) -> None:
     written = [path for path, text in sources().items() for _ in re.findall(rf"(?:->|\.|\b)(?:{field})\s*=(?!=)", text)]
     assert written == [writer], written

@@ -24,7 +24,7 @@ START_OVER_RATED = 0.25
 LARGEST_FILE = 65536
 SLOWEST_S = 5.0
 """In which rated torque brings a bare rotor to rated speed; what is heavier is a load."""
-PLANT_TABLES = ("motor.", "mech.")
+PLANT_TABLES = ("motor.", "mech.", "load.pulse")
 DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "motor.r_tempco", "motor.psi_tempco",
                 "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm", "load.pulse1_nm", "load.pulse1_order")
 
