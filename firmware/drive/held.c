@@ -6,9 +6,9 @@
 #include "drive/protection.h"
 #include "drive/speed.h"
 
-#define HELD_QUARTER 16384                      /* of a turn, angle counts */
+#define HELD_QUARTER 16384                           /* of a turn, angle counts */
 #define HELD_PERIOD_MOST (DEFER_DUTIES ? 512 : 1024) /* a quarter turn a step, of a period, high word */
-#define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12) /* from a period's turn, Q32, to a step's, angle counts */
+#define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12)   /* from a period's turn, Q32, to a step's, angle counts */
 
 /** The one place that writes the phase. */
 static void held_enter(held_t *shaft, held_phase_t next)
@@ -40,7 +40,8 @@ static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uin
 {
     const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST, HELD_PERIOD_MOST); /* a quarter turn in a step */
     const int32_t turned = qm_mulss((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), (int16_t)steps);
-    return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER : turned);
+    return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER
+                                                                                       : turned);
 }
 
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
@@ -158,6 +159,8 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         run->adaptation.rs_q31 = qm_clamp_hi(run->adaptation.rs_q31 + (int32_t)share * 65536, p->adaptation.rs_least, p->adaptation.rs_most);
         drive_update_model(run, p, run->control.reference_erpm);
+        run->estimator.e_d_q28 = 0; /* the filter would take a while */
+        run->estimator.e_q_q28 = 0;
         emf.d = 0;
         emf.q = 0;
     }
@@ -170,7 +173,8 @@ static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
     const int32_t lag = (int32_t)shaft->lag_q12 - (shaft->lag_q12 >> HELD_LAG_SHIFT) + shaft->emf_q12.q - emf.q - taken_back;
-    shaft->lag_q12 = (int16_t)((lag > 32767) ? 32767 : (lag < -32767) ? -32767 : lag);
+    shaft->lag_q12 = (int16_t)((lag > 32767) ? 32767 : (lag < -32767) ? -32767
+                                                                      : lag);
 }
 
 /** 1 where a rotor that was asked is back at its speed, or may be asked again. */

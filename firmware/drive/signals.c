@@ -94,7 +94,7 @@ static void signals_fade(observer_t *o, signals_evidence_t *e)
     e->twice.cosine /= 2;
     e->twice.sine /= 2;
     e->size >>= 1;
-    e->checks >>= 1;
+    e->checks = (uint16_t)((e->checks + 1u) >> 1); /* the mean size does not grow by rounding */
     e->unexplained >>= 1;
     for (n = 0; n < 3u; n++) { /* wcet: at most 3 turns */
         e->phases[n] >>= 1;

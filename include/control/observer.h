@@ -34,18 +34,18 @@ typedef struct {
 
 /** State. */
 typedef struct {
-    int32_t omega_q16;      /**< speed, erpm with 16 fraction bits */
-    int32_t load_q16;       /**< acceleration that the load takes, units with 16 fraction bits */
-    uint32_t rho_q32;       /**< the estimator's angle a step ago */
-    int16_t rate_q16;       /**< rate * step in use */
-    int16_t wrong_erpm;     /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
-    int16_t gate_erpm;      /**< a large innovation begins here */
-    q15_t fast_share_q15;   /**< 1 = a large innovation was just seen */
+    int32_t omega_q16;       /**< speed, erpm with 16 fraction bits */
+    int32_t load_q16;        /**< acceleration that the load takes, units with 16 fraction bits */
+    uint32_t rho_q32;        /**< the estimator's angle a step ago */
+    int16_t rate_q16;        /**< rate * step in use */
+    int16_t wrong_erpm;      /**< larger innovations are not dead time's; twice as much without load, when it disturbs most */
+    int16_t gate_erpm;       /**< a large innovation begins here */
+    q15_t fast_share_q15;    /**< 1 = a large innovation was just seen */
     int16_t innovation_erpm; /**< of the last step: the speed that was seen, less the one expected */
-    uint16_t wrong_steps;   /**< steps with an innovation above wrong_erpm, less those without */
-    int16_t gate_last_erpm; /**< the last large innovation */
-    uint16_t gate_level;    /**< four for each step that was not calm, less one for each that was */
-    q15_t share_q15;        /**< of the full rates, by the speed */
+    uint16_t wrong_steps;    /**< steps with an innovation above wrong_erpm, less those without */
+    int16_t gate_last_erpm;  /**< the last large innovation */
+    uint16_t gate_level;     /**< four for each step that was not calm, less one for each that was */
+    q15_t share_q15;         /**< of the full rates, by the speed */
 } observer_t;
 
 /** Speed, electrical rpm. */

@@ -27,10 +27,10 @@ typedef struct {
  *  twice that, or are larger than any load makes them. All of it is halved where it proves nothing. */
 typedef struct {
     signals_beat_t once, twice; /**< innovations times cosine and sine of the angle, and of twice the angle, erpm */
-    uint32_t size;             /**< sum of their sizes */
-    uint16_t checks;           /**< in the sums */
-    uint16_t unexplained;      /**< of them, with a voltage that nothing explains */
-    uint16_t phases[3];        /**< |current| of the phases, Q13 / 64 */
+    uint32_t size;              /**< sum of their sizes */
+    uint16_t checks;            /**< in the sums */
+    uint16_t unexplained;       /**< of them, with a voltage that nothing explains */
+    uint16_t phases[3];         /**< |current| of the phases, Q13 / 64 */
 } signals_evidence_t;
 
 /** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold

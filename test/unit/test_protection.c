@@ -491,6 +491,7 @@ void test_signals_and_model_are_checked_in_closed_loop_only_signals_that_seem_wr
     for (part = 0; part < SLOW_PARTS; part++) {
         rig_closed(1, 10000);
         drive.run.observer.wrong_steps = 1000;
+        drive.run.observer.innovation_erpm = 32000; /* more than any load makes */
         drive.run.impossible_steps = 1000;
         drive.run.adaptation.rs_q31 = INT32_MAX;
         rig_slow(part);

@@ -1,6 +1,8 @@
 /* Both rules of the signals: what flows against what is asked for, and voltages and currents against the motor. */
 #include "drive_rig.h"
 
+#include <math.h>
+
 #include "drive/signals.h"
 
 static signals_t signals;
@@ -192,23 +194,36 @@ void test_noise_of_one_phase_opens_no_other(void)
 
 /* ---- signals that do not fit the motor ---- */
 
-/** Slow steps with these phase currents and innovations that do not end, until a fault. @return steps */
-static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13)
+/** What the innovations are like. */
+typedef struct {
+    int16_t amplitude_erpm, constant_erpm;
+    uint16_t step;  /**< the electrical angle between two checks, angle counts */
+    uint16_t order; /**< how often the innovation swings in an electrical turn, in fifths */
+} beat_t;
+
+static const beat_t offset_like = { 600, 0, 7001, 5 }, gain_like = { 600, 0, 7001, 10 };
+
+/** Checks with these phase currents and innovations, all of them large, until a fault. @return checks, most if there is none */
+static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13, beat_t beat, uint16_t most)
 {
-    uint16_t steps = 0;
+    uint16_t checks = 0;
     rig_closed(1, 10000);
-    while (drive.fault == (uint16_t)FAULT_NONE && steps < 1000u) {
+    while (drive.fault == (uint16_t)FAULT_NONE && checks < most) {
+        const uint32_t turned = (uint32_t)checks * beat.step;
         drive.phases_q13.a = a_q13;
         drive.phases_q13.b = b_q13;
         drive.phases_q13.c = (int16_t)(-a_q13 - b_q13);
+        drive.frame = trig_sincos((angle_t)turned);
+        drive.run.observer.innovation_erpm =
+            (int16_t)(beat.constant_erpm + qm_mulhi(beat.amplitude_erpm, trig_sincos((angle_t)(turned * beat.order / 5u + 5000u)).cos) * 2);
         drive.run.observer.wrong_steps++;
         signals_check(&drive, &params);
-        steps++;
+        checks++;
     }
-    return steps;
+    return checks;
 }
 
-void test_innovations_that_do_not_end_are_a_sensor_or_an_open_phase_after_100_ms(void)
+void test_innovations_in_time_with_the_electrical_angle_are_a_sensor_or_an_open_phase_after_100_ms(void)
 {
     static const struct {
         int16_t a_q13, b_q13;
@@ -219,18 +234,54 @@ void test_innovations_that_do_not_end_are_a_sensor_or_an_open_phase_after_100_ms
         { 7000, -7000, FAULT_OPEN_PHASE }, { 0, 0, FAULT_CURRENT_SENSOR }, { 4192, -7000, FAULT_CURRENT_SENSOR }, /* no sum wraps */
     };
     EACH(n, cases) {
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(251, wrong_until_fault(cases[n].a_q13, cases[n].b_q13), golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(251, wrong_until_fault(cases[n].a_q13, cases[n].b_q13, (n & 1u) ? offset_like : gain_like, 1000), golden_row(n));
         TEST_ASSERT_EQUAL_UINT16(cases[n].fault, drive.fault);
         drive.fault = (uint16_t)FAULT_NONE;
     }
 }
 
-void test_phase_currents_are_summed_anew_when_the_innovations_have_ended(void)
+void test_innovations_in_time_with_the_shaft_accuse_nobody_however_long_they_last(void)
 {
-    rig_closed(1, 10000);
-    drive.run.phase_sums[1] = 77;
+    static const uint16_t orders[] = { 1, 2, 3, 4, 6, 7 }; /* of the shaft, at five pole pairs */
+    EACH(n, orders) {
+        const beat_t load = { (int16_t)params.load_erpm, 0, 7001, orders[n] };
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(5000, wrong_until_fault(1000, -10, load, 5000), golden_row(n));
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(params.wrong_steps, drive.run.observer.wrong_steps);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(params.wrong_steps, drive.run.evidence.checks);
+    }
+}
+
+void test_innovations_that_no_load_makes_that_the_motor_can_carry_are_a_wrong_signal(void)
+{
+    const beat_t beyond = { 0, (int16_t)(params.load_erpm + 1u), 7001, 0 }, most = { 0, (int16_t)params.load_erpm, 7001, 0 };
+    TEST_ASSERT_EQUAL_UINT16(251, wrong_until_fault(1000, -500, beyond, 1000));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_CURRENT_SENSOR, drive.fault);
+    drive.fault = (uint16_t)FAULT_NONE;
+    TEST_ASSERT_EQUAL_UINT16(1000, wrong_until_fault(1000, -500, most, 1000));
+}
+
+void test_the_innovation_that_a_load_can_make_follows_from_current_torque_inertia_and_the_observer_s_rate(void)
+{
+    const double acceleration = 1.5 * 5.0 * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / sqrt(3.0) * 60.0 / (2.0 * M_PI * 1000.0 * 5.0)
+                                * PARAM_F(MAXIMUM_CURRENT_A) / 2.0 / PARAM_F(MOTOR_INERTIA_KGM2); /* rad/s2 of half the largest current */
+    const double rate = PARAM_F(PARAM_LOADED_SHARE) * 2.0 * M_PI * PARAM_F(LOAD_BANDWIDTH_HZ);
+    const double mean_erpm = 2.0 / M_PI * acceleration / (2.0 * rate) * 5.0 * 60.0 / (2.0 * M_PI);
+    TEST_ASSERT_UINT16_WITHIN((uint16_t)(mean_erpm / 100.0), (uint16_t)mean_erpm, params.load_erpm);
+}
+
+void test_what_proves_nothing_is_halved_and_what_has_ended_is_forgotten(void)
+{
+    const beat_t load = { 0, 300, 7001, 0 };
+    TEST_ASSERT_EQUAL_UINT16(250, wrong_until_fault(1000, -10, load, 250));
+    TEST_ASSERT_EQUAL_UINT16(250, drive.run.evidence.checks);
+    TEST_ASSERT_EQUAL_UINT32(250u * 300u, drive.run.evidence.size);
+    TEST_ASSERT_EQUAL_UINT16(251, wrong_until_fault(1000, -10, load, 251));
+    TEST_ASSERT_EQUAL_UINT16(126, drive.run.evidence.checks);
+    TEST_ASSERT_EQUAL_UINT32(251u * 300u / 2u, drive.run.evidence.size);
+    TEST_ASSERT_EQUAL_UINT16(125, drive.run.observer.wrong_steps);
+    drive.run.observer.wrong_steps = 0;
     signals_check(&drive, &params);
-    TEST_ASSERT_EQUAL_UINT16(0, drive.run.phase_sums[1]);
+    TEST_ASSERT_EACH_EQUAL_UINT8(0, &drive.run.evidence, sizeof drive.run.evidence);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
 
@@ -300,6 +351,7 @@ void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_withou
             rig_emf(0, (int16_t)(sign * (blurred_q12 - 1 + cases[n].clear_q12)));
             drive.run.control.ref_q13.q = (int16_t)(sign * (params.id_off_q13 - 1 + cases[n].more_q13));
             drive.run.observer.wrong_steps = params.wrong_steps;
+            drive.run.observer.innovation_erpm = INT16_MAX;
             signals_check(&drive, &params);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, cases[n].what);
             drive.run.observer.wrong_steps++;

@@ -1,0 +1,344 @@
+/* A shaft that is held and let go: when the drive asks, where the angle stops, what a rotor that stands tells, and how the estimator goes on. */
+#include "drive_rig.h"
+
+#include <math.h>
+
+#include "drive/held.h"
+
+#define FAST_ERPM 10000 /* reference, and the speed before */
+
+static held_t *shaft;
+
+void setUp(void)
+{
+    rig_power_up();
+}
+
+/** In closed loop at a reference, the observer at a speed, the filtered back-EMF as given. */
+static void at(int16_t direction, int16_t reference_erpm, int16_t speed_erpm, int16_t d_q12, int16_t q_q12)
+{
+    rig_closed(direction, (int16_t)(direction * reference_erpm));
+    rig_speed((int16_t)(direction * speed_erpm));
+    rig_emf(d_q12, (int16_t)(direction * q_q12));
+    drive.run.estimator.sign = direction;
+    drive.run.control.ref_q13.q = (int16_t)(direction * rig_current_of_ri(1.0F));
+    drive.run.control.i_q13.q = drive.run.control.ref_q13.q;
+    drive.run.observer.fast_share_q15 = 32767; /* the gate is open */
+    shaft = &drive.run.held;
+    shaft->emf_q12 = estimator_emf(&drive.run.estimator);
+}
+
+static void steps(uint16_t count)
+{
+    while (count-- != 0u) {
+        held_step(&drive, &params);
+    }
+}
+
+/** A rotor that has been stopped: far below its reference, R i alone in the back-EMF. @param more_q12 that R is off */
+static void asked(int16_t direction, int16_t more_q12)
+{
+    at(direction, FAST_ERPM, 100, 0, more_q12);
+    steps(HELD_DOUBTS_MOST / HELD_DOUBTS_FAR + 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+}
+
+static void stands(int16_t direction, int16_t more_q12)
+{
+    asked(direction, more_q12);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    steps(HELD_ASK_STEPS);
+    TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+}
+
+/* ---- when it is asked ---- */
+
+void test_the_angle_stops_after_two_steps_far_below_the_reference_and_after_five_below_half_of_it(void)
+{
+    EACH_DIRECTION(direction) {
+        static const struct {
+            int16_t speed_erpm;
+            uint16_t steps;
+        } cases[] = { { FAST_ERPM / 8 - 10, 2 }, { -FAST_ERPM, 2 }, { FAST_ERPM / 8 + 10, 5 }, { FAST_ERPM / 2 - 10, 5 }, { FAST_ERPM / 2 + 10, 1000 } };
+        EACH(n, cases) {
+            uint16_t count = 0;
+            at(direction, FAST_ERPM, cases[n].speed_erpm, 0, 200);
+            while (!held_angle_stands(shaft) && count < 1000u) {
+                steps(1);
+                count++;
+            }
+            TEST_ASSERT_EQUAL_UINT16(cases[n].steps, count);
+            TEST_ASSERT_EQUAL_INT16((count < 1000u) ? 0 : 1, drive.run.model.inv_kfi != 0);
+        }
+    }
+}
+
+void test_a_rotor_that_a_known_load_slows_down_is_not_asked_before_it_is_far_below(void)
+{
+    at(1, FAST_ERPM, FAST_ERPM / 2 - 10, 0, 200);
+    drive.run.observer.fast_share_q15 = 0; /* the gate is closed */
+    steps(100);
+    TEST_ASSERT_FALSE(held_angle_stands(shaft));
+    rig_speed(FAST_ERPM / 8 - 10);
+    steps(2);
+    TEST_ASSERT_TRUE(held_angle_stands(shaft));
+}
+
+void test_a_rotor_is_not_asked_where_no_resistance_explains_its_back_emf_nor_in_a_probe_nor_before_the_observer_runs(void)
+{
+    at(1, FAST_ERPM, 100, 0, 4000); /* R i is 4000: half more of it would be 2000 */
+    steps(100);
+    TEST_ASSERT_FALSE(held_angle_stands(shaft));
+    at(1, FAST_ERPM, 100, 0, 200);
+    drive.run.probe_phase = (uint16_t)PROBE_TEST;
+    steps(100);
+    TEST_ASSERT_FALSE(held_angle_stands(shaft));
+    at(1, FAST_ERPM, 100, 0, 200);
+    drive.run.handover.phase = (uint16_t)START_OBSERVE;
+    steps(100);
+    TEST_ASSERT_FALSE(held_angle_stands(shaft));
+}
+
+void test_a_speed_that_is_half_the_reference_now_and_then_is_no_doubt(void)
+{
+    at(1, FAST_ERPM, FAST_ERPM / 2 - 10, 0, 200);
+    for (uint16_t n = 0; n < 100u; n++) {
+        rig_speed((n % 5u == 4u) ? FAST_ERPM : FAST_ERPM / 2 - 10);
+        drive.run.observer.fast_share_q15 = 32767;
+        steps(1);
+    }
+    TEST_ASSERT_FALSE(held_angle_stands(shaft));
+}
+
+/* ---- where the angle stops ---- */
+
+void test_the_frame_is_ahead_by_the_speed_times_the_filter_s_time(void)
+{
+    rig_closed(1, 1000);
+    EACH_DIRECTION(direction) {
+        for (int16_t lag_q12 = 100; lag_q12 <= 3000; lag_q12 = (int16_t)(lag_q12 + 290)) {
+            const float erpm = (float)lag_q12 * (float)drive.run.model.inv_kfi / 2048.0F;
+            const float turns = erpm / 60.0F * PARAM_F(LOOPTIME_SEC) * 65536.0F / (float)drive.run.model.kfilter_esdq_q16;
+            const float expected = 65536.0F * ((turns > 0.5F) ? 0.5F : turns);
+            TEST_ASSERT_INT16_WITHIN(2 + (int16_t)(expected / 200.0F), (int16_t)((float)direction * expected),
+                                     held_lead(&drive.run, &params, (int16_t)(direction * lag_q12)));
+        }
+    }
+    drive.run.model.kfilter_esdq_q16 = 256;
+    TEST_ASSERT_EQUAL_INT16(32767, held_lead(&drive.run, &params, 30000)); /* never more than half a turn */
+    TEST_ASSERT_EQUAL_INT16(0, held_lead(&drive.run, &params, 0));
+}
+
+void test_a_back_emf_that_is_lost_at_once_turns_the_frame_back_by_its_lag_and_the_commanded_vector_stays(void)
+{
+    EACH_DIRECTION(direction) {
+        alphabeta_t before, after;
+        angle_t angle;
+        int16_t back, expected;
+        at(direction, FAST_ERPM, 100, 0, 0);
+        shaft->emf_q12.q = (int16_t)(direction * 900); /* was there a step ago */
+        drive.run.control.v_q14.d = -3000;
+        drive.run.control.v_q14.q = (int16_t)(direction * 8000);
+        before = inverse_park(drive.run.control.v_q14, trig_sincos(estimator_next_angle(&drive.run.estimator)));
+        angle = estimator_next_angle(&drive.run.estimator);
+        steps(2);
+        TEST_ASSERT_TRUE(held_angle_stands(shaft));
+        back = (int16_t)(angle_t)(angle - estimator_next_angle(&drive.run.estimator));
+        drive.run.model.inv_kfi = shaft->inv_kfi;
+        expected = held_lead(&drive.run, &params, (int16_t)(direction * (900 - 900 / 16)));
+        TEST_ASSERT_INT16_WITHIN(20, expected, back);
+        TEST_ASSERT_GREATER_THAN_INT16(2000, (int16_t)(direction * back));
+        TEST_ASSERT_EQUAL_UINT16(estimator_next_angle(&drive.run.estimator), drive.angle);
+        after = inverse_park(drive.run.control.v_q14, drive.frame);
+        TEST_ASSERT_INT16_WITHIN(8, before.alpha, after.alpha);
+        TEST_ASSERT_INT16_WITHIN(8, before.beta, after.beta);
+    }
+}
+
+void test_what_the_estimator_took_back_by_itself_is_no_lag(void)
+{
+    const int16_t k_q16 = drive.run.model.kfilter_esdq_q16;
+    at(1, FAST_ERPM, FAST_ERPM, 200, 1000);
+    steps(1);
+    TEST_ASSERT_INT16_WITHIN(1, (int16_t)(-200.0F * 16.0F * (float)k_q16 / 65536.0F), shaft->lag_q12);
+    at(-1, FAST_ERPM, FAST_ERPM, -200, 1000);
+    steps(1);
+    TEST_ASSERT_INT16_WITHIN(1, (int16_t)(-200.0F * 16.0F * (float)k_q16 / 65536.0F), shaft->lag_q12);
+}
+
+/* ---- does it stand? ---- */
+
+void test_a_back_emf_that_stands_still_is_resistance_and_turns_the_frame_back_by_what_it_had_turned(void)
+{
+    static const int16_t more_q12[] = { 0, 40, 400, 1000, -400, -1000 }; /* of 4000 */
+    EACH_DIRECTION(direction) {
+        EACH(n, more_q12) {
+            angle_t before;
+            int16_t back, turned;
+            asked(direction, more_q12[n]);
+            before = estimator_next_angle(&drive.run.estimator);
+            turned = (int16_t)(3.0F * 16.0F * (float)more_q12[n] * (float)shaft->inv_kfi / 2048.0F / 60.0F * PARAM_F(LOOPTIME_SEC) * 65536.0F);
+            steps(1u + HELD_ASK_STEPS);
+            TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+            TEST_ASSERT_INT16_WITHIN(30, (int16_t)((float)more_q12[n] / 4000.0F * 32768.0F), qm_hi(drive.run.adaptation.rs_q31));
+            back = (int16_t)(angle_t)(before - estimator_next_angle(&drive.run.estimator));
+            TEST_ASSERT_INT16_WITHIN(40 + qm_abs(turned) / 50, (int16_t)(direction * turned), back);
+            TEST_ASSERT_EQUAL_INT16(0, drive.run.model.inv_kfi);
+        }
+    }
+}
+
+void test_resistance_is_learnt_within_the_adaptation_s_bounds_and_not_without_current(void)
+{
+    stands(1, 1900);
+    TEST_ASSERT_INT16_WITHIN(400, (int16_t)(1900.0F / 4000.0F * 32768.0F), qm_hi(drive.run.adaptation.rs_q31));
+    asked(1, -1900);
+    steps(1u + HELD_ASK_STEPS);
+    TEST_ASSERT_EQUAL_INT16(params.adaptation.rs_least, qm_hi(drive.run.adaptation.rs_q31));
+    asked(1, 40);
+    drive.run.control.i_q13.q = 0;
+    steps(1u + HELD_ASK_STEPS);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+}
+
+void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_the_rotor_is(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t stopped;
+        float per_step;
+        int16_t ahead;
+        int32_t load_q16;
+        at(direction, FAST_ERPM, 1500, 0, 400);
+        drive.run.observer.load_q16 = (int32_t)direction * 77 * 65536;
+        load_q16 = drive.run.observer.load_q16;
+        steps(HELD_DOUBTS_MOST);
+        TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+        stopped = estimator_next_angle(&drive.run.estimator);
+        per_step = 1500.0F / 60.0F * 16.0F * PARAM_F(LOOPTIME_SEC) * 65536.0F; /* angle counts */
+        steps(1);
+        for (uint16_t n = 1; n <= HELD_ASK_STEPS && held_angle_stands(shaft); n++) {
+            rig_emf((int16_t)(-400.0F * sinf((float)n * per_step / 65536.0F * 2.0F * (float)M_PI)), (int16_t)(direction * 395));
+            steps(1);
+        }
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
+        TEST_ASSERT_INT16_WITHIN(60, (int16_t)((float)direction * 3.0F * per_step), ahead);
+        TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 1500), observer_speed(&drive.run.observer));
+        TEST_ASSERT_EQUAL_INT32(load_q16, drive.run.observer.load_q16);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+        TEST_ASSERT_NOT_EQUAL(0, drive.run.model.inv_kfi);
+    }
+}
+
+void test_a_back_emf_that_does_not_settle_is_a_rotor_that_turns(void)
+{
+    asked(1, 200);
+    for (uint16_t n = 0; held_angle_stands(shaft) && n < 20u; n++) {
+        rig_emf((n & 1u) ? 300 : -300, 200);
+        steps(1);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(HELD_PATIENCE_STEPS, n);
+    }
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    rig_speed(100);
+    rig_emf(0, 10);
+    steps(HELD_AGAIN_STEPS - 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase); /* not asked again at once */
+    steps(3);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+}
+
+/* ---- it stands, and is let go ---- */
+
+void test_while_the_rotor_stands_the_load_is_the_current_that_flows_and_nothing_else_is_learnt(void)
+{
+    stands(1, 200);
+    steps(3);
+    TEST_ASSERT_INT16_WITHIN(2, drive.run.control.ref_q13.q, observer_load(&drive.run.observer, &params.observer));
+    TEST_ASSERT_EQUAL_INT16(0, observer_speed(&drive.run.observer));
+    rig_slow(14); /* the model follows the reference */
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.model.inv_kfi);
+    drive.run.adaptation.kfi_q31 = 0;
+    rig_emf(3000, 3000);
+    drive.run.observer.fast_share_q15 = 0;
+    rig_slow(10); /* it would learn */
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.kfi_q31);
+}
+
+void test_the_observer_rests_while_the_angle_stands(void)
+{
+    stands(1, 0);
+    drive.run.observer.omega_q16 = 0;
+    drive.run.observer.rho_q32 = 12345;
+    rig_slow(0);
+    TEST_ASSERT_EQUAL_UINT32(12345, drive.run.observer.rho_q32);
+}
+
+void test_a_rotor_that_turns_again_takes_the_load_of_before_and_the_second_time_the_one_that_flows(void)
+{
+    EACH_DIRECTION(direction) {
+        at(direction, FAST_ERPM, FAST_ERPM, 0, 3000);
+        drive.run.observer.fast_share_q15 = 0;
+        drive.run.observer.load_q16 = (int32_t)direction * 55 * 65536;
+        steps(1); /* the load is remembered */
+        drive.run.observer.fast_share_q15 = 32767;
+        drive.run.observer.load_q16 = (int32_t)direction * 5000 * 65536;
+        rig_speed((int16_t)(direction * 100));
+        rig_emf(0, 0);
+        shaft->emf_q12.q = 0;
+        steps(2u + 1u + HELD_ASK_STEPS + 1u);
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 55), qm_hi(drive.run.observer.load_q16));
+        TEST_ASSERT_GREATER_THAN_INT16(0, (int16_t)(direction * observer_speed(&drive.run.observer)));
+        TEST_ASSERT_EQUAL_INT16(32767, drive.run.observer.fast_share_q15);
+        rig_emf(0, 0); /* the load of before was too little */
+        shaft->emf_q12.q = 0;
+        steps(2u + 1u + HELD_ASK_STEPS + 2u);
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_INT16_WITHIN(2, drive.run.control.ref_q13.q, observer_load(&drive.run.observer, &params.observer));
+    }
+}
+
+void test_a_rotor_whose_resistance_is_known_is_held_again_only_without_back_emf_until_it_is_fast(void)
+{
+    stands(1, 200);
+    rig_emf(0, (int16_t)(params.adaptation.emf_least_q12 + 20));
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    rig_speed(100);
+    steps(50); /* slow, but it turns */
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    rig_emf(0, 10);
+    steps(2);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+    stands(1, 200);
+    rig_emf(0, (int16_t)(params.adaptation.emf_least_q12 + 20));
+    steps(1);
+    rig_speed(FAST_ERPM / 2 + 10);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
+    TEST_ASSERT_EQUAL_UINT16(0, shaft->stood);
+}
+
+void test_a_step_comes_every_16_periods_in_closed_loop(void)
+{
+    uint16_t part, before;
+    at(1, FAST_ERPM, FAST_ERPM, 0, 3000);
+    for (part = 0; part < SLOW_PARTS; part++) {
+        before = shaft->steps;
+        rig_slow(part);
+        TEST_ASSERT_EQUAL_UINT16(before + (((part & 7u) == 7u) ? 1u : 0u), shaft->steps);
+    }
+    rig_lock(1);
+    for (part = 0; part < SLOW_PARTS; part++) {
+        rig_slow(part);
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.held.steps);
+}
