@@ -208,7 +208,7 @@ static void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
     if (shaft->doubts >= HELD_DOUBTS_MOST) {
-        held_stop_angle(d, p);
+        shaft->act = (uint16_t)HELD_STOP;
     }
 }
 
@@ -225,26 +225,22 @@ void held_step(drive_t *d, const drive_params_t *p)
         if (moved <= most >> 1) {
             held_enter(shaft, HELD_ASKED);
         } else if (shaft->steps > shaft->patience) {
-            held_has_turned(d, p);
-        } else {
-            /* the current changes */
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+        } else { /* the current changes */
         }
         shaft->emf_q12 = emf;
         break;
     case HELD_ASKED:
         if (moved > 2u * most || (shaft->steps > 1u && held_emf_turns(shaft, &d->run, p, emf))) {
-            held_has_turned(d, p);
-            shaft->emf_q12 = emf;
-        } else if (shaft->steps == HELD_ASK_STEPS) {
-            held_learn(d, p, emf);
-        } else {
-            /* wait */
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+        } else if (shaft->steps >= HELD_ASK_STEPS) {
+            shaft->act = (uint16_t)HELD_LEARN;
+        } else { /* it may turn slowly */
         }
         break;
     case HELD_STANDS:
         if (moved > most) {
-            held_turns_again(d, p, emf);
-            shaft->emf_q12 = emf;
+            shaft->act = (uint16_t)HELD_GOES_ON;
         } else { /* the load is what flows, and it grows */
             observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         }
@@ -253,5 +249,27 @@ void held_step(drive_t *d, const drive_params_t *p)
         held_watch(d, p, emf);
         shaft->emf_q12 = emf;
         break;
+    }
+}
+
+void held_act(drive_t *d, const drive_params_t *p)
+{
+    held_t *shaft = &d->run.held;
+    const dq_t emf = estimator_emf(&d->run.estimator);
+    const uint16_t act = shaft->act;
+
+    shaft->act = (uint16_t)HELD_WAITS;
+    switch (act) {
+    case HELD_STOP: held_stop_angle(d, p); break;
+    case HELD_HAS_TURNED:
+        held_has_turned(d, p);
+        shaft->emf_q12 = emf;
+        break;
+    case HELD_LEARN: held_learn(d, p, emf); break;
+    case HELD_GOES_ON:
+        held_turns_again(d, p, emf);
+        shaft->emf_q12 = emf;
+        break;
+    default: break; /* HELD_WAITS */
     }
 }

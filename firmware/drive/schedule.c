@@ -30,7 +30,21 @@ static void control_speed(drive_t *d, const drive_params_t *p, const drive_sampl
 static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     (void)raw;
+    if (drive_is_closed(d) && d->run.held.act != (uint16_t)HELD_WAITS) {
+        held_act(d, p);
+    } else {
+        states_rotor_step(d, p);
+    }
+}
+
+/** As step_state(); then, in closed loop: may the rotor stand? */
+static void ask_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+{
+    (void)raw;
     states_rotor_step(d, p);
+    if (drive_is_closed(d)) {
+        held_step(d, p);
+    }
 }
 
 /** The modulator's gain follows the bus, and so does what braking may do to it. */
@@ -76,12 +90,13 @@ static void follow_speed(drive_t *d, const drive_params_t *p, const drive_sample
     speed_follow(&d->run, p);
 }
 
-/** Once signals seem wrong, they are looked at in every such slot. */
+/** Once signals seem wrong, they are looked at in every such slot, and judged. */
 static void watch_signals(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     (void)raw;
     if (d->run.observer.wrong_steps != 0u) {
         signals_check(d, p);
+        signals_judge(d, p);
     }
 }
 
@@ -104,7 +119,6 @@ static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_
 {
     speed_trim_step(d, p);
     protection_check_rotor(d, p);
-    held_step(d, p);
     if (!observer_gate_is_closed(&d->run.observer)) {
         follow_speed(d, p, raw);
     }
@@ -113,9 +127,10 @@ static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_
 /** The estimator's sign, and the signals while they seem wrong. */
 static void follow_estimate(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
+    (void)raw;
     estimator_follow(&d->run.estimator, &p->estimator);
-    if (drive_is_closed(d)) {
-        watch_signals(d, p, raw);
+    if (drive_is_closed(d) && d->run.observer.wrong_steps != 0u) {
+        signals_check(d, p);
     }
 }
 

@@ -65,7 +65,7 @@ INLINE uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samp
     return 0;
 }
 
-/* wcet: idle_step excludes estimator_remember speed_step signals_check protection_probe_rotor protection_check_rotor adaptation_learn */
+/* wcet: idle_step excludes estimator_remember speed_step signals_check protection_probe_rotor protection_check_rotor adaptation_learn held_step held_act */
 void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     mode_idle(d);

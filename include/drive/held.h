@@ -19,9 +19,19 @@ typedef enum {
     HELD_STANDS   /**< the rotor stands, until the back-EMF moves */
 } held_phase_t;
 
+/** What follows from a step, a while later: each of them takes a slot of its own. */
+typedef enum {
+    HELD_WAITS,      /**< nothing */
+    HELD_STOP,       /**< the angle stops */
+    HELD_HAS_TURNED, /**< the rotor has turned all the time */
+    HELD_LEARN,      /**< the rotor stands: all of the back-EMF is R i */
+    HELD_GOES_ON     /**< it stood, and turns now */
+} held_act_t;
+
 /** A rotor that may be held. A step is two of the load observer's, 16 periods. Zero is a valid start. */
 typedef struct {
     uint16_t phase;          /**< held_phase_t; written by held_enter() only */
+    uint16_t act;            /**< held_act_t that waits for the rotor's next step */
     uint16_t steps;          /**< in the phase */
     uint16_t doubts;         /**< steps that look like a held rotor; a rotor far below its reference counts three */
     uint16_t doubted_steps;  /**< since then */
@@ -42,7 +52,10 @@ uint16_t held_angle_stands(const held_t *h);
  *  @return angle counts, half a turn at most */
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12);
 
-/** A step, every 16 periods in closed loop. */
+/** A step, slots 5 and 13 in closed loop. */
 void held_step(drive_t *d, const drive_params_t *p);
+
+/** What the last step has decided, slots 1 and 9. */
+void held_act(drive_t *d, const drive_params_t *p);
 
 #endif

@@ -22,7 +22,7 @@ typedef struct {
     SLOT( 2, limit_voltage, EVERY,     limit_currents,   CLOSED) \
     SLOT( 3, follow_speed,  CLOSED,    watch_signals,    CLOSED) \
     SLOT( 4, observe_load,  RUNNING,   control_speed,    CLOSED) \
-    SLOT( 5, step_state,    EVERY,     follow_bus,       EVERY) \
+    SLOT( 5, ask_rotor,     EVERY,     follow_bus,       EVERY) \
     SLOT( 6, probe_rotor,   CLOSED,    choose_state,     CLOSED) \
     SLOT( 7, trim_speed,    CLOSED,    follow_estimate,  RUNNING) \
     SLOT( 8, observe_load,  RUNNING,   control_speed,    CLOSED) \
@@ -30,7 +30,7 @@ typedef struct {
     SLOT(10, limit_voltage, EVERY,     limit_and_learn,  RUNNING) \
     SLOT(11, follow_speed,  CLOSED,    watch_signals,    CLOSED) \
     SLOT(12, observe_load,  RUNNING,   control_speed,    CLOSED) \
-    SLOT(13, step_state,    EVERY,     follow_bus,       EVERY) \
+    SLOT(13, ask_rotor,     EVERY,     follow_bus,       EVERY) \
     SLOT(14, update_model,  RUNNING,   check_model,      CLOSED) \
     SLOT(15, trim_speed,    CLOSED,    follow_estimate,  RUNNING)
 /* clang-format on */

@@ -33,10 +33,13 @@ typedef struct {
     uint16_t phases[3];         /**< |current| of the phases, Q13 / 64 */
 } signals_evidence_t;
 
-/** Innovations of the load observer that no load explains, for they do not end, or voltage that nothing explains: the voltage equation does not hold
- *  with what is measured. Slot 14 in closed loop; while something is wrong slots 3, 7, 11, 15 in its place, for the phases' sums must not meet the same
- *  angles of each turn. */
+/** Looks whether the voltage equation holds with what is measured, and gathers evidence while it does not: many large innovations of the load observer,
+ *  or voltage that nothing explains. Slot 14 in closed loop; while something is wrong slots 3, 7, 11, 15 in its place, for the phases' sums must not meet
+ *  the same angles of each turn. */
 void signals_check(drive_t *d, const drive_params_t *p);
+
+/** After a tenth of a second of it: the verdict. Evidence that a load can explain is halved. Slots 3 and 11 in closed loop. */
+void signals_judge(drive_t *d, const drive_params_t *p);
 
 /* ---- the background's rule ---- */
 

@@ -32,6 +32,7 @@ static void steps(uint16_t count)
 {
     while (count-- != 0u) {
         held_step(&drive, &params);
+        held_act(&drive, &params);
     }
 }
 
@@ -327,14 +328,23 @@ void test_a_rotor_whose_resistance_is_known_is_held_again_only_without_back_emf_
     TEST_ASSERT_EQUAL_UINT16(0, shaft->stood);
 }
 
-void test_a_step_comes_every_16_periods_in_closed_loop(void)
+void test_a_step_comes_in_slots_5_and_13_and_what_follows_in_slots_1_and_9_of_closed_loop(void)
 {
     uint16_t part, before;
     at(1, FAST_ERPM, FAST_ERPM, 0, 3000);
     for (part = 0; part < SLOW_PARTS; part++) {
         before = shaft->steps;
         rig_slow(part);
-        TEST_ASSERT_EQUAL_UINT16(before + (((part & 7u) == 7u) ? 1u : 0u), shaft->steps);
+        TEST_ASSERT_EQUAL_UINT16(before + (((part & 7u) == 5u) ? 1u : 0u), shaft->steps);
+    }
+    for (uint16_t stops = 0; stops < 2u; stops++) {
+        for (part = 0; part < SLOW_PARTS; part++) {
+            asked(1, 0);
+            drive.state = (uint16_t)(stops ? DRIVE_STOPPING : DRIVE_CLOSED);
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+            rig_slow(part);
+            TEST_ASSERT_EQUAL_UINT16(((part & 7u) == 1u) ? HELD_WAITS : HELD_HAS_TURNED, shaft->act);
+        }
     }
     rig_lock(1);
     for (part = 0; part < SLOW_PARTS; part++) {

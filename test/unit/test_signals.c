@@ -218,6 +218,7 @@ static uint16_t wrong_until_fault(int16_t a_q13, int16_t b_q13, beat_t beat, uin
             (int16_t)(beat.constant_erpm + qm_mulhi(beat.amplitude_erpm, trig_sincos((angle_t)(turned * beat.order / 5u + 5000u)).cos) * 2);
         drive.run.observer.wrong_steps++;
         signals_check(&drive, &params);
+        signals_judge(&drive, &params);
         checks++;
     }
     return checks;
@@ -281,6 +282,7 @@ void test_what_proves_nothing_is_halved_and_what_has_ended_is_forgotten(void)
     TEST_ASSERT_EQUAL_UINT16(125, drive.run.observer.wrong_steps);
     drive.run.observer.wrong_steps = 0;
     signals_check(&drive, &params);
+    signals_judge(&drive, &params);
     TEST_ASSERT_EACH_EQUAL_UINT8(0, &drive.run.evidence, sizeof drive.run.evidence);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
@@ -303,9 +305,11 @@ void test_voltage_that_neither_speed_nor_resistance_nor_dead_time_explains_is_a_
             drive.run.control.i_q13.q = rig_current_of_ri(cases[n].ri_q);
             rig_emf((int16_t)(sign * (explained - 8)), cases[n].q_q12);
             signals_check(&drive, &params);
+            signals_judge(&drive, &params);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive.run.observer.wrong_steps, cases[n].what);
             rig_emf((int16_t)(sign * (explained + 8)), cases[n].q_q12);
             signals_check(&drive, &params);
+            signals_judge(&drive, &params);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(2, drive.run.observer.wrong_steps, cases[n].what);
         }
     }
@@ -324,6 +328,7 @@ void test_voltage_without_current_on_a_rotor_that_stands_is_an_open_phase_within
             drive.run.observer.wrong_steps--; /* the observer sees nothing wrong */
         }
         signals_check(&drive, &params);
+        signals_judge(&drive, &params);
         steps++;
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_OPEN_PHASE, drive.fault);
@@ -353,9 +358,11 @@ void test_innovations_at_the_end_of_a_stop_that_dead_time_explains_end_it_withou
             drive.run.observer.wrong_steps = params.wrong_steps;
             drive.run.observer.innovation_erpm = INT16_MAX;
             signals_check(&drive, &params);
+            signals_judge(&drive, &params);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, cases[n].what);
             drive.run.observer.wrong_steps++;
             signals_check(&drive, &params);
+            signals_judge(&drive, &params);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].next, drive.state, cases[n].what);
             drive.fault = (uint16_t)FAULT_NONE;
         }
