@@ -29,10 +29,16 @@ static uint16_t held_moved(dq_t emf, dq_t from)
     return (uint16_t)((uint16_t)qm_abs((int16_t)(emf.d - from.d)) + (uint16_t)qm_abs((int16_t)(emf.q - from.q)));
 }
 
+/** What the estimator makes of a sum of back-EMFs, with the 1/Kphi from before the angle stopped. */
+static NOINLINE speed_erpm_t held_omega(const drive_run_t *run, int16_t sum_q12)
+{
+    return estimator_omega(sum_q12, run->model.emf_sum_max_q12, run->held.inv_kfi);
+}
+
 /** How fast the estimator would turn. */
 static speed_erpm_t held_speed(const drive_run_t *run, dq_t emf)
 {
-    return estimator_omega((int16_t)(emf.q - run->estimator.sign * emf.d), run->model.emf_sum_max_q12, run->held.inv_kfi);
+    return held_omega(run, (int16_t)(emf.q - run->estimator.sign * emf.d));
 }
 
 /** The angle that a speed turns in so many steps, a quarter turn at most. */
@@ -46,7 +52,7 @@ static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uin
 
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
 {
-    const speed_erpm_t more = estimator_omega(lag_q12, run->model.emf_sum_max_q12, run->model.inv_kfi);
+    const speed_erpm_t more = held_omega(run, lag_q12);
     const uint32_t period_q32 = (uint32_t)qm_mulss(qm_abs(more), p->estimator.deltat_q32);
     const uint16_t k_q16 = (uint16_t)run->model.kfilter_esdq_q16;
     const uint16_t lead = ((period_q32 >> 15) >= (uint32_t)k_q16) ? 32767u : qm_divud(period_q32, k_q16); /* half a turn at most */
@@ -90,9 +96,10 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
 static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
-    const int16_t lead = held_lead(&d->run, p, shaft->lag_q12);
+    int16_t lead;
     shaft->omega_erpm = d->run.estimator.omega_erpm;
     shaft->inv_kfi = d->run.model.inv_kfi;
+    lead = held_lead(&d->run, p, shaft->lag_q12);
     shaft->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
     shaft->stopped_steps = 0;
     held_turn_back(d, p, lead);

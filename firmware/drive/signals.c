@@ -85,7 +85,7 @@ static uint16_t signals_prove(const signals_evidence_t *e, const drive_params_t 
 }
 
 /** Begins anew; member by member, for the longest path knows of no loop over bytes. */
-static void signals_forget(signals_evidence_t *e)
+static NOINLINE void signals_forget(signals_evidence_t *e)
 {
     if (e->checks != 0u) {
         e->once.cosine = 0;

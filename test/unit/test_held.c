@@ -117,6 +117,7 @@ void test_a_speed_that_is_half_the_reference_now_and_then_is_no_doubt(void)
 void test_the_frame_is_ahead_by_the_speed_times_the_filter_s_time(void)
 {
     rig_closed(1, 1000);
+    drive.run.held.inv_kfi = drive.run.model.inv_kfi;
     EACH_DIRECTION(direction) {
         for (int16_t lag_q12 = 100; lag_q12 <= 3000; lag_q12 = (int16_t)(lag_q12 + 290)) {
             const float erpm = (float)lag_q12 * (float)drive.run.model.inv_kfi / 2048.0F;
