@@ -145,7 +145,7 @@ static uint16_t held_emf_turns(const held_t *shaft, const drive_run_t *run, cons
 {
     const int16_t angle = held_turned(p, held_speed(run, shaft->emf_q12), shaft->steps);
     const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
-    const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 2);
+    const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 1); /* dead time shakes it by as much */
     return (uint16_t)(qm_abs((int16_t)(emf.d - shaft->emf_q12.d)) > ((half > least) ? half : least));
 }
 
