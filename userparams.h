@@ -17,6 +17,7 @@
 /* #define TUNING */                /* the speed reference ramps slowly from the hand-over to MAXIMUM_SPEED_RPM by itself */
 /* #define TORQUE_MODE */           /* the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed */
 /* #define BIDIRECTIONAL_SPEED */   /* the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function */
+/* #define TORQUE_PROFILE */        /* learn the current that a load pulsing with the shaft's turn takes: piston pumps, compressors */
 /* #define SNAPSHOT */              /* record SnapBuf1..4 */
 /* #define IDENTIFY */              /* measure R, L, Kphi, inertia and friction of the motor instead of running it (docs/tuning.md) */
 /* #define BRINGUP */               /* check a new board step by step with little current instead of running the motor (docs/bringup.md) */
@@ -189,8 +190,8 @@
  *   fieldweak.on_speed_erpm              2640 rpm             13200  erpm                           exact  field weakening starts
  *   estimator.nominal_erpm               2800 rpm             14000  erpm                           exact  one-sample derivative above
  *   estimator.decimate_erpm               280 rpm              1400  erpm                           exact  sign of Equation 2 from the filtered speed below
- *   speed_ramp_q16                       4000 rpm/s          524288  Q16 erpm a slow step           exact  slope of the reference
- *   tuning_step_q16                        15 periods         32768  Q16 erpm a slow step           exact  slope in TUNING
+ *   speed_ramp_q16                       4000 rpm/s          524288  Q16 erpm every 8 periods       exact  slope of the reference
+ *   tuning_step_q16                        15 periods         32768  Q16 erpm every 8 periods       exact  slope in TUNING
  *   ramp_hold_erpm                        350 rpm              1750  erpm                           exact  the ramp waits when the motor is further behind
  *   overspeed_erpm                       6540 rpm             32700  erpm                           exact  lost lock above
  *
@@ -240,7 +241,7 @@
  *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
  *   early_erpm                            240 rpm              1200  erpm                           exact  the hand-over may come from here on
  *   bootstrap_periods                    0.01 s                 200  periods                        exact  low sides on before the start
- *   agree_steps                          0.02 s                  50  slow steps                     exact  agreement before the hand-over
+ *   agree_steps                          0.02 s                  50  8 periods                      exact  agreement before the hand-over
  *   wait_periods                          0.2 s                4000  periods                        exact  and how long it may take at the end of the ramp
  *
  * limits
@@ -257,10 +258,10 @@
  *   bus_regen_q15                          27 V               16756  Q15 of full scale           -0.002 %  braking is reduced from here
  *   bus_nominal_q15                        24 V               14895  Q15 of full scale           +0.003 %  supply
  *   brake_per_bus_q8                    1.375 A/V              1056  Q8                          -0.017 %  braking current taken off a volt
- *   stall_steps                          0.23 s                 288  rare steps                  +0.174 %  stall
- *   lost_lock_steps                      0.06 s                  75  rare steps                     exact  lost lock
- *   wrong_steps                           0.1 s                 250  slow steps                     exact  voltages and currents do not fit the motor
- *   impossible_steps                     0.25 s                 156  seldom steps                -0.160 %  flux or resistance impossible
+ *   stall_steps                          0.23 s                 288  16 periods                  +0.174 %  stall
+ *   lost_lock_steps                      0.06 s                  75  16 periods                     exact  lost lock
+ *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
+ *   impossible_steps                     0.25 s                 156  32 periods                  -0.160 %  flux or resistance impossible
  *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
  *   id_off_q13                        0.10185 A                 190  Q13 A                       +0.194 %  d current's mean deviation
  *   rs_impossible                         0.6 1               19660  Q15                         -0.004 %  change of R that no winding survives, 1: not told

@@ -38,3 +38,4 @@
 #include "firmware/drive/modes/bringup_steps.c"
 #include "firmware/drive/modes/identify.c"
 #include "firmware/drive/modes/modes.c"
+#include "firmware/drive/modes/profile.c"

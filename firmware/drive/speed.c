@@ -46,7 +46,7 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
     int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
-    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, run->control.ref_q13.q);
+    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, (int16_t)(run->control.ref_q13.q - mode_profile_current(run)));
     gain = observer_between(p->speed_kp_q13, p->speed_kp_fast_q13, o->fast_share_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */
 }
@@ -59,7 +59,7 @@ static int32_t speed_current_q26(const drive_run_t *run, const drive_params_t *p
     const drive_control_t *c = &run->control;
     int32_t limit_q26 = qm_mulss(c->iq_limit_q13, 8192);
     int32_t torque_q26 = qm_mulss(qm_sub_limited(target_erpm, observer_speed(&run->observer)), c->speed_kp_q13)
-                         + observer_load_q26(&run->observer, &p->observer) + c->iq_trim_q26;
+                         + observer_load_q26(&run->observer, &p->observer) + c->iq_trim_q26 + mode_profile_current_q26(run);
     int32_t iq_q26 = salient_current_q26(run, torque_q26);
     if (iq_q26 > limit_q26) {
         return limit_q26;
@@ -113,6 +113,7 @@ void speed_reference_step(drive_t *d, const drive_params_t *p)
 void speed_follow(drive_run_t *run, const drive_params_t *p)
 {
     speed_schedule(run, p);
+    mode_profile_follow(run, p);
     run->control.sample_shift_q13 = qm_mulhi(observer_speed(&run->observer), p->sample_shift_q16);
 }
 
@@ -182,6 +183,7 @@ void speed_step(drive_t *d, const drive_params_t *p)
     drive_control_t *c = &d->run.control;
     speed_erpm_t speed = observer_speed(&d->run.observer);
     current_q13_t iq_q13;
+    mode_profile_step(d, p);
     if (!mode_current_step(d, p, &iq_q13)) {
         speed_reference_step(d, p);
         iq_q13 = speed_current_step(&d->run, p, c->reference_erpm);

@@ -71,6 +71,20 @@
 #define OBSERVER_GATE_STEPS 1000  /* [steps] a load step is over in a tenth of a second; what goes on longer is the loop's own | loadsteps */
 #define OBSERVER_GATE_AT_START 768   /* [steps] at the hand-over it is four times as large: d current and wrong constants shake the estimate | starts */
 
+/* ---- TORQUE_PROFILE ---- */
+#define PROFILE_RATE 40.0           /* [1/s] twice the rate at which a harmonic is learned where the header has the inertia; less with more of it | run SCENARIO=pulse_learned */
+#define PROFILE_CORNER_RATIO 4.2    /* [1] over SPEED_BANDWIDTH_HZ: where shaft and loop lag by a quarter of a turn | run SCENARIO=pulse_learned */
+#define PROFILE_DELAY_QUARTERS 15u  /* [1/4 step] and the delay of estimator, observer and current: 1.5 ms at 20 kHz | run SCENARIO=pulse_learned */
+#define PROFILE_UNREST_STEPS 700    /* [steps] the gate has been open for so long, four a step: no load step | loadsteps */
+#define PROFILE_ERROR_SHARE 0.125   /* [1] of the largest current: the controller's answer counts up to here, so that a load step teaches little | run SCENARIO=pulse_learned */
+#define PROFILE_MOST_SHARE 0.5      /* [1] of the largest current: most of a cosine or sine | run SCENARIO=pulse_learned */
+#define PROFILE_SUM_SHARE 0.5       /* [1] and of all of them together | run SCENARIO=pulse_learned */
+#define PROFILE_LEAST_SHARE 0.15    /* [1] of the nominal speed: below nothing is learned | run SCENARIO=pulse_learned */
+#define PROFILE_LEAK_SHIFT 14       /* [shift] of each of its steps: what does not help is forgotten in 13 s | run SCENARIO=pulse_learned */
+#define PROFILE_LIMITED_SHIFT 4     /* [shift] a turn that met a limit of voltage or current takes back 1/16 | run SCENARIO=pulse_learned */
+#define PROFILE_MISSING_SHIFT 5     /* [shift] voltage is short where 1/32 of the largest current is missing | run SCENARIO=pulse_learned */
+#define PROFILE_FADE_SHIFT 9        /* [shift] and in 0.2 s where nothing is learned | run SCENARIO=pulse_learned */
+
 /* ---- Start, hand-over, catch ---- */
 #define BOOTSTRAP_SEC 0.010         /* [s] low sides on before the start, for the drivers' supply | starts */
 #define PARAM_ALIGN_TURNS 5         /* [turns] of the vector while the current of ALIGN grows; the tuner reads it | starts */

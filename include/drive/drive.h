@@ -76,6 +76,7 @@ struct drive_params {
     int16_t dead_emf_q12;      /**< what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
     SALIENT_PARAMS
+    PROFILE_PARAMS
 };
 
 /** Requests from the background; 16-bit, so written in one instruction. */

@@ -19,7 +19,7 @@ PAGE = "docs/deviations.md"
 BUILD = Path("build/static")
 MODE_TABLE = Path("include/drive/modes/mode_table.h")
 COMBINED = [("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
-            ("TUNING", "SELFTEST_OFF"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"),
+            ("TUNING", "SELFTEST_OFF"), ("TORQUE_PROFILE", "BIDIRECTIONAL_SPEED", "TORQUE_MODE"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"),
             ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
 ON_TARGET = ("__XC16__",)
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align

@@ -111,8 +111,8 @@ def test_a_slider_on_its_way_has_one_line_and_a_curve_a_gap_where_it_means_nothi
         lines += passes(board, 0.05)["log"]
     texts = {line["id"]: line["text"] for line in lines}
     assert [text for text in texts.values() if text.startswith("Load")] == ["Load torque 10 mN·m"]
-    row = dict(zip(("t", "reference", "estimate", "true", "d", "q", "asked", "torque", "bus"), passes(board, 0.1)["strip"][-1]))
-    assert [name for name, value in row.items() if value is None] == ["reference", "estimate", "d", "q", "asked"]
+    row = dict(zip(("t", "reference", "estimate", "true", "d", "q", "asked", "learned", "torque", "bus"), passes(board, 0.1)["strip"][-1]))
+    assert [name for name, value in row.items() if value is None] == ["reference", "estimate", "d", "q", "asked", "learned"]
     assert None not in passes(started(), 0.1)["strip"][-1]
 
 

@@ -62,8 +62,21 @@
       (double)d->run.adaptation.rs_q31 / 21474836.48) \
     X(e_d, "fw.e_d_v", "V", "filtered d back-EMF", EMF_V(estimator_emf(&d->run.estimator).d)) \
     X(e_q, "fw.e_q_v", "V", "filtered q back-EMF", EMF_V(estimator_emf(&d->run.estimator).q)) \
+    X(profile, "fw.profile_a", "A", "learned q current of this step (TORQUE_PROFILE)", CURRENT_A(mode_profile_current(&d->run))) \
     X(offset_a, "fw.offset_a_a", "A", "calibrated offset of phase A", CURRENT_A(d->calibration.offset_a_q13)) \
     X(offset_b, "fw.offset_b_a", "A", "calibrated offset of phase B", CURRENT_A(d->calibration.offset_b_q13))
+
+#ifdef TORQUE_PROFILE
+#define PROFILE_COS(k) ((double)d->run.profile.harmonic[k].cos_q29 / 65536.0)
+#define PROFILE_SIN(k) ((double)d->run.profile.harmonic[k].sin_q29 / 65536.0)
+#define PROFILE_SIGNALS(X) \
+    X(profile1, "fw.profile1_a", "A", "amplitude of the learned current once a turn", CURRENT_A(hypot(PROFILE_COS(0), PROFILE_SIN(0)))) \
+    X(profile1_deg, "fw.profile1_deg", "deg", "shaft's angle of its most, from where the count began", atan2(PROFILE_SIN(0), PROFILE_COS(0)) * 57.29577951) \
+    X(profile2, "fw.profile2_a", "A", "amplitude of the learned current twice a turn", CURRENT_A(hypot(PROFILE_COS(1), PROFILE_SIN(1)))) \
+    X(profile2_deg, "fw.profile2_deg", "deg", "angle of its most, 360 degrees in half a turn", atan2(PROFILE_SIN(1), PROFILE_COS(1)) * 57.29577951)
+#else
+#define PROFILE_SIGNALS(X)
+#endif
 
 #ifdef SNAPSHOT
 #define SNAPSHOT_SIGNALS(X) \
@@ -85,10 +98,11 @@
         return (value); \
     }
 DRIVE_SIGNALS(SIGNAL_FUNCTION)
+PROFILE_SIGNALS(SIGNAL_FUNCTION)
 SNAPSHOT_SIGNALS(SIGNAL_FUNCTION)
 
 #define SIGNAL_ROW(id, name, unit, meaning, value) { name, unit, meaning, read_##id },
-const probe_signal_t probe_signals[] = { DRIVE_SIGNALS(SIGNAL_ROW) SNAPSHOT_SIGNALS(SIGNAL_ROW) };
+const probe_signal_t probe_signals[] = { DRIVE_SIGNALS(SIGNAL_ROW) PROFILE_SIGNALS(SIGNAL_ROW) SNAPSHOT_SIGNALS(SIGNAL_ROW) };
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
 
 #define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },

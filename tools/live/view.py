@@ -53,7 +53,8 @@ PANELS = (
     Panel("speed", "rpm", (Line("reference", "fw.speed_ref_rpm", "reference_rpm", REFERENCE, CONTROLLED, True),
                            Line("estimate", "fw.speed_est_rpm", "estimate_rpm", ESTIMATE, ESTIMATING), Line("true", "plant.speed_rpm", "", TRUE))),
     Panel("current", "A", (Line("d", "fw.i_d_a", "i_d_a", D, SWITCHING), Line("q", "fw.i_q_a", "i_q_a", Q, SWITCHING),
-                           Line("q asked for", "fw.iq_ref_a", "iq_ref_a", REFERENCE, SWITCHING, True))),
+                           Line("q asked for", "fw.iq_ref_a", "iq_ref_a", REFERENCE, SWITCHING, True),
+                           Line("learned", "fw.profile_a", "", ESTIMATE, CONTROLLED))),
     Panel("torque", "mN·m", (Line("motor", "plant.torque_nm", "", TRUE),)),
     Panel("bus", "V", (Line("bus", "bus.voltage_v", "bus_v", D),)))
 SCALES = {"mN·m": 1000.0}

@@ -24,7 +24,7 @@ from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
 from .symbols import Symbols
 
-SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm"]
+SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a"]
 FIRST_S = 0.01
 """What passes at power-up before anybody can act."""
 RECORDED_ROW_S = 0.001

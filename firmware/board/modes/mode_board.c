@@ -18,10 +18,26 @@ char *mode_status_line(char *line, const drive_t *d)
 #endif
 }
 
+#ifdef TORQUE_PROFILE
+tProfileParm ProfileParm;
+
+static void profile_watch(const profile_t *f)
+{
+    uint16_t k;
+    ProfileParm.qNow = (int16_t)(4 * f->now_q13);
+    for (k = 0; k < PROFILE_ORDERS; k++) {
+        ProfileParm.qCos[k] = qm_hi(4 * f->harmonic[k].cos_q29);
+        ProfileParm.qSin[k] = qm_hi(4 * f->harmonic[k].sin_q29);
+    }
+}
+#endif
+
 void mode_watch(const drive_t *d)
 {
 #ifdef IDENTIFY
     identify_watch(d);
+#elif defined TORQUE_PROFILE
+    profile_watch(&d->run.profile);
 #else
     (void)d;
 #endif

@@ -53,6 +53,44 @@ uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
 #endif
 }
 
+#ifndef TORQUE_PROFILE
+void mode_profile_step(drive_t *d, const drive_params_t *p)
+{
+    (void)d;
+    (void)p;
+}
+#endif
+
+void mode_profile_follow(drive_run_t *run, const drive_params_t *p)
+{
+#ifdef TORQUE_PROFILE
+    profile_follow(&run->profile, &p->profile, observer_speed(&run->observer));
+#else
+    (void)run;
+    (void)p;
+#endif
+}
+
+current_q13_t mode_profile_current(const drive_run_t *run)
+{
+#ifdef TORQUE_PROFILE
+    return run->profile.now_q13;
+#else
+    (void)run;
+    return 0;
+#endif
+}
+
+int32_t mode_profile_current_q26(const drive_run_t *run)
+{
+#ifdef TORQUE_PROFILE
+    return qm_mulss(run->profile.now_q13, 8192);
+#else
+    (void)run;
+    return 0;
+#endif
+}
+
 uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction)
 {
 #ifdef BIDIRECTIONAL_SPEED

@@ -27,6 +27,15 @@ char *identify_status_line(char *line, const drive_t *d);
 void identify_watch(const drive_t *d);
 #endif
 
+#ifdef TORQUE_PROFILE
+/** The learned q current (Q15 of full scale): of this moment, and the cosine and sine of each harmonic of the turn. */
+typedef struct {
+    int16_t qNow, qCos[PROFILE_ORDERS], qSin[PROFILE_ORDERS];
+} tProfileParm;
+
+extern tProfileParm ProfileParm;
+#endif
+
 /** Longest status line and its end: retries with four reasons of a limit or more, or all that IDENTIFY measures, or a remedy of BRINGUP, or a client's
  *  longest frame. */
 #if defined IDENTIFY

@@ -10,6 +10,7 @@
     X(TUNING, "the speed reference ramps slowly from the hand-over to MAXIMUM_SPEED_RPM by itself") \
     X(TORQUE_MODE, "the potentiometer commands the q current; MAXIMUM_SPEED_RPM still limits the speed") \
     X(BIDIRECTIONAL_SPEED, "the potentiometer's sides are the two directions, its middle is MINIMUM_SPEED_RPM; S3 has no function") \
+    X(TORQUE_PROFILE, "learn the current that a load pulsing with the shaft's turn takes: piston pumps, compressors") \
     X(SNAPSHOT, "record SnapBuf1..4") \
     X(IDENTIFY, "measure R, L, Kphi, inertia and friction of the motor instead of running it (docs/tuning.md)") \
     X(BRINGUP, "check a new board step by step with little current instead of running the motor (docs/bringup.md)") \

@@ -11,6 +11,9 @@
  * mode_current_step     TORQUE_MODE            the speed controller in closed loop
  * mode_limit_reasons    TORQUE_MODE            why the commanded current is not given
  * mode_target_range     TORQUE_MODE            what the potentiometer's travel means
+ * mode_profile_step     TORQUE_PROFILE         the learned current, before the speed controller's step
+ * mode_profile_follow   TORQUE_PROFILE         its gain and lags
+ * mode_profile_current  TORQUE_PROFILE         what the speed controller adds and the load observer does not see
  * mode_pot_split        BIDIRECTIONAL_SPEED    the potentiometer's direction
  * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
  * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
@@ -21,6 +24,7 @@
 
 #include "drive/modes/bringup.h"
 #include "drive/modes/identify.h"
+#include "drive/modes/profile.h"
 
 /** What runs a period with the bridge switching; and 1 where ALIGN is the start's. */
 #if defined IDENTIFY
@@ -40,7 +44,7 @@ void mode_start(drive_t *d, const drive_params_t *p);
 /* ---- What the modes add to the state of a run: nothing unless userparams.h or DEFINES switches one on ---- */
 
 /** Members of drive_run_t. */
-#define MODE_STATE IDENTIFY_STATE BRINGUP_STATE
+#define MODE_STATE IDENTIFY_STATE BRINGUP_STATE PROFILE_STATE
 
 /** 0 where no state has a closed loop: what belongs to it is left out. */
 #ifdef BRINGUP
