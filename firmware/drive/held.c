@@ -145,7 +145,7 @@ static uint16_t held_emf_turns(const held_t *shaft, const drive_run_t *run, cons
 {
     const int16_t angle = held_turned(p, held_speed(run, shaft->emf_q12), shaft->steps);
     const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
-    const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 1); /* dead time shakes it by as much */
+    const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 1);             /* dead time shakes it by as much */
     return (uint16_t)(qm_abs((int16_t)(emf.d - shaft->emf_q12.d)) > ((half > least) ? half : least));
 }
 
@@ -192,25 +192,19 @@ static uint16_t held_is_over(const drive_t *d, const drive_params_t *p)
                       || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS));
 }
 
-/** The angle turns. */
-static void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
+/** The angle turns, and something changes fast or the rotor is slow. */
+static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     uint16_t doubts = held_doubts(d, p, emf);
 
     held_follow_lag(shaft, &d->run, emf);
-    if (shaft->phase == (uint16_t)HELD_NOT) {
-        if (observer_gate_is_closed(&d->run.observer)) {
-            shaft->load = qm_hi(d->run.observer.load_q16);
+    if (shaft->phase != (uint16_t)HELD_NOT) {
+        if (held_is_over(d, p)) {
+            held_enter(shaft, HELD_NOT);
+            shaft->stood = 0;
         }
-    } else if (held_is_over(d, p)) {
-        held_enter(shaft, HELD_NOT);
-        shaft->stood = 0;
-        doubts = 0;
-    } else if (shaft->stood == 0u) {
-        doubts = 0;
-    } else {
-        /* it stood, and speeds up */
+        doubts = (uint16_t)((shaft->stood != 0u) ? doubts : 0u); /* it stood, and speeds up */
     }
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
@@ -219,13 +213,12 @@ static void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     }
 }
 
-void held_step(drive_t *d, const drive_params_t *p)
+/** The angle stands. */
+static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
-    const dq_t emf = estimator_emf(&d->run.estimator);
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
 
-    shaft->steps++;
     shaft->stopped_steps++;
     switch (shaft->phase) {
     case HELD_SETTLES:
@@ -246,20 +239,38 @@ void held_step(drive_t *d, const drive_params_t *p)
         }
         break;
     case HELD_STANDS:
+    default:
         if (moved > most) {
             shaft->act = (uint16_t)HELD_GOES_ON;
         } else { /* the load is what flows, and it grows */
             observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         }
         break;
-    default:
-        held_watch(d, p, emf);
-        shaft->emf_q12 = emf;
-        break;
     }
 }
 
-void held_act(drive_t *d, const drive_params_t *p)
+void held_step(drive_t *d, const drive_params_t *p)
+{
+    held_t *shaft = &d->run.held;
+    const dq_t emf = estimator_emf(&d->run.estimator);
+
+    if (shaft->phase == (uint16_t)HELD_NOT && d->run.stall_steps == 0u && observer_gate_is_closed(&d->run.observer)) {
+        shaft->load = qm_hi(d->run.observer.load_q16); /* as a rule: at its speed, and nothing changes fast */
+        shaft->lag_q12 = 0;
+        shaft->doubts = 0;
+        shaft->emf_q12 = emf;
+        return;
+    }
+    shaft->steps++;
+    if (held_angle_stands(shaft)) {
+        held_ask(d, p, emf);
+    } else {
+        held_watch(d, p, emf);
+        shaft->emf_q12 = emf;
+    }
+}
+
+NOINLINE void held_act(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
     const dq_t emf = estimator_emf(&d->run.estimator);

@@ -26,7 +26,7 @@ static void control_speed(drive_t *d, const drive_params_t *p, const drive_sampl
     speed_step(d, p);
 }
 
-/** Where a state leads to the next by what the rotor does. */
+/** Where a state leads to the next by what the rotor does, and what follows for a rotor that may be held. */
 static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     (void)raw;
@@ -37,13 +37,15 @@ static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_
     }
 }
 
-/** As step_state(); then, in closed loop: may the rotor stand? */
+/** As step_state(); in closed loop: may the rotor stand? */
 static void ask_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     (void)raw;
-    states_rotor_step(d, p);
     if (drive_is_closed(d)) {
         held_step(d, p);
+    }
+    if (d->state != (uint16_t)DRIVE_CLOSED) {
+        states_rotor_step(d, p);
     }
 }
 

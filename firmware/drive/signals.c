@@ -87,17 +87,15 @@ static uint16_t signals_prove(const signals_evidence_t *e, const drive_params_t 
 /** Begins anew; member by member, for the longest path knows of no loop over bytes. */
 static NOINLINE void signals_forget(signals_evidence_t *e)
 {
-    if (e->checks != 0u) {
-        e->once.cosine = 0;
-        e->once.sine = 0;
-        e->twice = e->once;
-        e->size = 0;
-        e->checks = 0;
-        e->unexplained = 0;
-        e->phases[0] = 0;
-        e->phases[1] = 0;
-        e->phases[2] = 0;
-    }
+    e->once.cosine = 0;
+    e->once.sine = 0;
+    e->twice = e->once;
+    e->size = 0;
+    e->checks = 0;
+    e->unexplained = 0;
+    e->phases[0] = 0;
+    e->phases[1] = 0;
+    e->phases[2] = 0;
 }
 
 /** Half of all that proves nothing. */
@@ -125,7 +123,9 @@ void signals_check(drive_t *d, const drive_params_t *p)
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + SIGNALS_UNEXPLAINED);
     }
     if (run->observer.wrong_steps == 0u) {
-        signals_forget(&run->evidence);
+        if (run->evidence.checks != 0u) {
+            signals_forget(&run->evidence);
+        }
         return;
     }
     signals_gather(&run->evidence, d, unexplained);

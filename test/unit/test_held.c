@@ -82,6 +82,7 @@ void test_a_rotor_that_a_known_load_slows_down_is_not_asked_before_it_is_far_bel
     steps(100);
     TEST_ASSERT_FALSE(held_angle_stands(shaft));
     rig_speed(FAST_ERPM / 8 - 10);
+    drive.run.stall_steps = 1;
     steps(2);
     TEST_ASSERT_TRUE(held_angle_stands(shaft));
 }
