@@ -82,7 +82,7 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
     if (run->held.stood) {
         return (uint16_t)((held_moved(emf, none) <= (uint16_t)p->adaptation.emf_least_q12) ? HELD_DOUBTS_FAR : 0u);
     }
-    if (along >= least || run->handover.phase != (uint16_t)START_DONE || run->probe_phase == (uint16_t)PROBE_TEST || mode_commands_current(d)
+    if (along >= least || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d)
         || !protection_rotor_is_doubtful(run, p)) {
         return 0;
     }
@@ -99,7 +99,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     int16_t lead;
     shaft->omega_erpm = d->run.estimator.omega_erpm;
     shaft->inv_kfi = d->run.model.inv_kfi;
-    lead = held_lead(&d->run, p, shaft->lag_q12);
+    lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
     shaft->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
     shaft->stopped_steps = 0;
     held_turn_back(d, p, lead);

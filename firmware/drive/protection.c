@@ -118,11 +118,15 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     dq_t emf = estimator_emf(&run->estimator);
     uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2));
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
+    if (held_angle_stands(&run->held)) { /* its question, at the currents that flow */
+        return;
+    }
     switch (run->probe_phase) {
     case PROBE_WAIT:
         run->probe_steps = (uint16_t)((doubtful && seems_to_turn) ? run->probe_steps + 1u : 0u);
         run->probe_most_q13 = protection_probe_most(run, p);
         if (run->probe_steps == PROBE_WAIT_STEPS) {
+            run->probe_asked = 0;
             probe_enter(run, PROBE_TEST);
         }
         break;
@@ -138,7 +142,11 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     default:
         protection_count_dip(run, (uint16_t)(along < reference - (reference >> 2)));
         run->probe_steps++;
-        if (run->probe_steps > PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS || run->dip_steps == PROBE_DIP_STEPS) {
+        if (doubtful && run->probe_steps > PROBE_CALM_STEPS && !observer_gate_is_closed(&run->observer)) {
+            run->probe_asked = 1; /* a shaft that is blocked looks like a load step, if R is off */
+        }
+        if (run->probe_steps > PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS || run->dip_steps == PROBE_DIP_STEPS
+            || (run->probe_asked && run->probe_steps > PROBE_SOON_STEPS)) {
             probe_enter(run, PROBE_WAIT);
         }
         break;

@@ -136,6 +136,8 @@
 #define PROBE_WAIT_STEPS 13         /* [32 periods] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
 #define PROBE_STEPS 25              /* [32 periods] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
 #define PROBE_DIP_STEPS 6           /* [32 periods] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
+#define PROBE_CALM_STEPS 63       /* [steps] of 32 periods, a tenth of a second after a probe: until its own unrest is over | run SCENARIO=fault_stall */
+#define PROBE_SOON_STEPS 312      /* [steps] of 32 periods, half a second from one to the next, where something changed fast | run SCENARIO=fault_stall */
 #define PROBE_EVERY_STEPS 3125      /* [32 periods] five seconds from one to the next | lowspeed */
 #define PROBE_SLOPE_SHIFT 3         /* [shift] the largest current takes 8 steps, so that the estimate does not jump | lowspeed */
 #define PROBE_MOST_Q15 22528        /* [Q15] of the largest current, so that as much q current is left | lowspeed */

@@ -120,6 +120,7 @@ struct drive_run {
     uint16_t stall_steps;         /**< of 16 periods below half the reference, less four for each above */
     uint16_t probe_phase;         /**< probe_phase_t, of the probe whether the rotor turns; written by probe_enter() only */
     uint16_t probe_steps;         /**< in the phase */
+    uint16_t probe_asked;         /**< 1: something changed fast since the last one, so the next comes soon */
     uint16_t dip_steps;           /**< how long the speed has been a quarter below the reference; more than a dip while the probe's own lasts */
     current_q13_t probe_id_q13;   /**< its d current */
     current_q13_t probe_most_q13; /**< and the most of it */
