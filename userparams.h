@@ -237,6 +237,7 @@
  *   flying_start                            1 1                   1  flag                           exact  1: a rotor that turns is caught
  *   align_periods                      0.9375 s               18750  periods                        exact  lock
  *   align_rate_q12                      1.504 A/s               573  Q12 of Q13 A a period       -0.083 %  growth of the lock's current
+ *   align_rise_q14                    0.75294 V                 927  Q14 V                       -0.041 %  what R takes more from turn to turn of the lock; 0: R is not measured
  *   align_speed_q10                        64 rpm             17896  Q10 angle counts a period   +0.002 %  speed of the lock
  *   open_loop_q13                        1.41 A                2625  Q13 A                       -0.006 %  current of lock and ramp
  *   early_erpm                            240 rpm              1200  erpm                           exact  the hand-over may come from here on

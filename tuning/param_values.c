@@ -150,6 +150,7 @@ static void start(void)
     FIELD(flying_start, FLYING_START, "1", 1.0, "flag", "1: a rotor that turns is caught");
     FIELD(align_periods, LOCK_TIME * period, "s", 0.0, "periods", "lock");
     FIELD(align_rate_q12, Q_CURRENT_REF_OPENLOOP / (LOCK_TIME * period), "A/s", q13_a / period / 4096.0, "Q12 of Q13 A a period", "growth of the lock's current");
+    FIELD(align_rise_q14, PARAM_ALIGN_TEACHES ? PARAM_ALIGN_RI_V / PARAM_ALIGN_TURNS : 0.0, "V", 2.0 * volt, "Q14 V", "what R takes more from turn to turn of the lock; 0: R is not measured");
     FIELD(align_speed_q10, PARAM_ALIGN_TURNS * 60.0 / (LOCK_TIME * period) / pairs, "rpm", 60.0 / pairs / period / 67108864.0, "Q10 angle counts a period", "speed of the lock");
     FIELD(open_loop_q13, Q_CURRENT_REF_OPENLOOP, "A", q13_a, "Q13 A", "current of lock and ramp");
     FIELD(early_erpm, PARAM_EARLY_ERPM / pairs, "rpm", erpm, "erpm", "the hand-over may come from here on");

@@ -34,11 +34,12 @@ struct drive_params {
     uint16_t bootstrap_periods;
     uint16_t flying_start; /**< 1: a start looks whether the rotor turns (FLYING_START) */
     uint16_t align_periods;
-    uint16_t agree_steps;    /**< agreement needed for the hand-over */
-    uint16_t wait_periods;   /**< how long it may take at the end of the ramp */
-    uint16_t align_rate_q12; /**< by which the current of ALIGN grows every period, Q13 counts * 4096 */
-    int32_t align_speed_q10; /**< of the forced angle in ALIGN */
-    speed_erpm_t early_erpm; /**< from this forced speed on the estimator may take over */
+    uint16_t agree_steps;         /**< agreement needed for the hand-over */
+    uint16_t wait_periods;        /**< how long it may take at the end of the ramp */
+    uint16_t align_rate_q12;      /**< by which the current of ALIGN grows every period, Q13 counts * 4096 */
+    voltage_q14_t align_rise_q14; /**< what the header's R takes more from turn to turn of ALIGN; 0: R is not measured */
+    int32_t align_speed_q10;      /**< of the forced angle in ALIGN */
+    speed_erpm_t early_erpm;      /**< from this forced speed on the estimator may take over */
 
     current_q13_t open_loop_q13;        /**< Q_CURRENT_REF_OPENLOOP */
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
@@ -115,6 +116,7 @@ struct drive_run {
     observer_t observer;
     handover_t handover;
     held_t held;
+    align_t align;
     catch_t catching;
     drive_control_t control;
     uint16_t stall_steps;         /**< of 16 periods below half the reference, less four for each above */

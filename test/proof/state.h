@@ -42,6 +42,14 @@ static void any_drive(uint16_t state)
     drive.forced.angle_q32 = any_ul(0, UINT32_MAX);
     drive.forced.step_q32 = any_ul(0, UINT32_MAX);
     drive.forced.increase_q10 = any(0, HANDOVER_HURRY * params.forced.increase_rate_q10);
+    drive.run.align.sum_q14 = any_ul(0, 32767ul * 8000ul);
+    drive.run.align.steps = ANYU16();
+    drive.run.align.turned = ANYU16();
+    drive.run.align.turns = any_u(0, PARAM_ALIGN_TURNS);
+    drive.run.align.mean_q14 = any(0, 32767);
+    drive.run.align.least_q14 = any(-32767, 32767);
+    drive.run.align.second_q14 = any(-32767, 32767);
+    drive.run.align.is_limited = any_u(0, 1);
     drive.run.handover.agreed_steps = ANYU16();
     drive.run.handover.phase = any_u(START_ALIGN, START_DONE);
     drive.run.handover.at_end = any_u(0, 1);
@@ -155,6 +163,7 @@ static void bounds_hold_again(void)
     //@ check ref: -current_max <= c->ref_q13.d <= current_max && -current_max <= c->ref_q13.q <= current_max;
     //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;
     //@ check brake_limit: 0 <= c->brake_limit_q13 <= current_max;
+    //@ check align: 0 <= drive.run.align.mean_q14 && -32767 <= drive.run.align.least_q14 && -32767 <= drive.run.align.second_q14;
     //@ check handover: -current_max <= drive.run.handover.id_q13 <= current_max;
     //@ check v: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max && -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;
     //@ check vq_limit: 0 <= c->vq_limit_q14 <= radius_max;

@@ -231,6 +231,7 @@ void test_speeds_and_times(void)
     EXACT(p.bootstrap_periods, 200); /* 10 ms */
     EXACT(p.align_periods, 10000);
     EXACT(p.align_rate_q12, 1075); /* 1.41 A in half a second */
+    EXACT(p.align_rise_q14, 927);  /* 2.67 ohm * 1.41 A / 5 of 26.6 V = 32768 counts */
     EXACT(p.align_speed_q10, 5l * 67108864 / LOCK_TIME); /* five turns */
     EXACT(p.early_erpm, 3125);                           /* 1.25 times the minimum speed */
     EXACT(p.agree_steps, 50);                            /* 20 ms */

@@ -230,6 +230,122 @@ void test_speed_waits_once_the_estimator_agrees(void)
     TEST_ASSERT_LESS_THAN_INT16(params.open_loop_q13 / 2, drive.run.control.ref_q13.q);
 }
 
+/* ---- R from ALIGN ---- */
+
+/** Change of R that ALIGN has found, of a motor with another R than the header's. @param share of the header's */
+static float start_measures(int16_t direction, float share, float load_nm)
+{
+    rig_start(direction);
+    ideal_motor_reset(0.0F, 1.0F);
+    motor.rs *= share;
+    motor.load_nm = load_nm;
+    (void)ideal_motor_run_until(DRIVE_RAMP, 300u + LOCK_PERIODS);
+    EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "aligned");
+    return (float)drive.run.adaptation.rs_q31 / 2147483648.0F;
+}
+
+void test_align_measures_R_and_gives_the_estimator_a_sixteenth_less(void)
+{
+    static const float shares[] = { 0.7F, 0.85F, 1.0F, 1.15F, 1.3F };
+    EACH_DIRECTION(direction) {
+        EACH(n, shares) {
+            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05F, shares[n] * 15.0F / 16.0F - 1.0F, start_measures(direction, shares[n], 0.0F), golden_row(n));
+        }
+    }
+}
+
+void test_R_of_the_estimator_is_the_measured_one_from_the_begin_of_the_ramp(void)
+{
+    float change = start_measures(1, 0.75F, 0.0F);
+    ideal_motor_run(SLOW_SELDOM * SLOW_PERIODS);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 1.0F + change, (float)drive.run.model.rs_q16 / (float)params.adaptation.rs_base_q16);
+}
+
+void test_rotor_that_begins_to_follow_at_any_current_does_not_raise_R(void)
+{
+    static const float loads_nm[] = { 0.0F, 0.01F, 0.02F, 0.03F, 0.04F, 0.05F, 0.06F, 0.07F, 0.2F };
+    EACH(n, loads_nm) {
+        float change = start_measures(1, 0.85F, loads_nm[n]);
+        TEST_ASSERT_TRUE_MESSAGE(change < 0.85F - 1.0F, golden_row(n));
+        TEST_ASSERT_TRUE_MESSAGE(change > 0.85F * 0.85F - 1.0F, golden_row(n));
+    }
+}
+
+void test_measured_R_keeps_to_the_bounds_of_what_may_be_learnt(void)
+{
+    TEST_ASSERT_FLOAT_WITHIN(0.0001F, -0.4F, start_measures(1, 0.4F, 0.0F));
+    TEST_ASSERT_FLOAT_WITHIN(0.0001F, 0.6F, start_measures(1, 1.8F, 0.0F));
+    TEST_ASSERT_FLOAT_WITHIN(0.0001F, 0.6F, start_measures(1, 2.5F, 0.0F));
+}
+
+void test_voltage_at_its_limit_measures_nothing(void)
+{
+    rig_start(1);
+    ideal_motor_reset(0.0F, 1.0F);
+    motor.rs *= 0.8F;
+    (void)ideal_motor_run_until(DRIVE_ALIGN, 300);
+    ideal_motor_run(LOCK_PERIODS / 2u);
+    drive.run.control.vq_limit_q14 = drive.run.control.v_q14.q; /* for a step */
+    startup_align(&drive, &params);
+    (void)ideal_motor_run_until(DRIVE_RAMP, LOCK_PERIODS);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+}
+
+/* The state may begin with the slow step itself: there is no voltage yet, and no limit either. */
+void test_first_step_of_align_meets_no_limit(void)
+{
+    rig_start(1);
+    drive.state = (uint16_t)DRIVE_ALIGN;
+    startup_align(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.align.is_limited);
+    TEST_ASSERT_EQUAL_UINT16(1, drive.run.align.steps);
+}
+
+void test_R_stays_the_headers_where_the_parameters_say_that_align_cannot_tell(void)
+{
+    drive_params_t other = params;
+    other.align_rise_q14 = 0;
+    (void)start_measures(1, 0.8F, 0.0F);
+    drive.state = (uint16_t)DRIVE_ALIGN;
+    drive.periods = params.align_periods;
+    drive.run.align.turns = PARAM_ALIGN_TURNS - 1u;
+    drive.run.adaptation.rs_q31 = 0;
+    startup_align(&drive, &other);
+    EXPECT_DRIVE(DRIVE_RAMP, FAULT_NONE, "aligned");
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+}
+
+/** ALIGN's last step, after turns with rises of voltage that the fifth one ends. */
+static int32_t last_turn_teaches(int16_t least, int16_t second, uint16_t turns)
+{
+    rig_lock(1);
+    drive.periods = params.align_periods;
+    drive.run.align.turns = turns;
+    drive.run.align.least_q14 = least;
+    drive.run.align.second_q14 = second;
+    drive.run.align.mean_q14 = 1000;
+    drive.run.align.steps = 250;
+    drive.run.align.sum_q14 = 250ul * 5000ul; /* a rise of 4000 */
+    startup_align(&drive, &params);
+    return drive.run.adaptation.rs_q31;
+}
+
+void test_rise_that_no_winding_makes_teaches_nothing(void)
+{
+    TEST_ASSERT_NOT_EQUAL_INT32(0, last_turn_teaches(100, 800, PARAM_ALIGN_TURNS - 1u));
+    TEST_ASSERT_EQUAL_INT32(0, last_turn_teaches(-200, -100, PARAM_ALIGN_TURNS - 1u));
+    TEST_ASSERT_EQUAL_INT32(0, last_turn_teaches(-200, 0, PARAM_ALIGN_TURNS - 1u));
+    TEST_ASSERT_EQUAL_INT32(0, last_turn_teaches(100, 800, PARAM_ALIGN_TURNS - 2u)); /* a turn is missing */
+}
+
+void test_start_forgets_the_R_of_the_last_one(void)
+{
+    (void)start_measures(1, 0.7F, 0.0F);
+    rig_start(1);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.align.turns);
+}
+
 /* ---- the whole start ---- */
 
 void test_start_is_BOOTSTRAP_ALIGN_RAMP_CLOSED_in_the_times_of_the_parameters(void)

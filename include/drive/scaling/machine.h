@@ -2,6 +2,7 @@
  * may be off).
  *
  *     align: I(t) = I t/T while the vector turns n times in T:  n/T turns a second        (AN1292: LOCK_TIME)
+ *     R of the winding: dv = R I/n from turn to turn                (drive/startup.h), where w psi < 0.4 R I (ALIGN_EMF_MOST)
  *     ramp:  dw/dt constant, to END_SPEED_RPM      (AN1292: OPENLOOP_RAMPSPEED_INCREASERATE; 2^26 counts a turn: Q10 of 2^16)
  *     hand-over: from w = 2 pi 20 Hz (PARAM_EARLY_HZ) or 1.25 times the minimum speed on; the estimator's lock is as quick as the rotor turns
  *     i2t:   dh/dt = (i^2 - h)/T, too hot from h = I2T_CURRENT_A^2                        (drive/protection.h)
@@ -26,6 +27,12 @@
         .increase_rate_q10 = OPENLOOP_RAMPSPEED_INCREASERATE \
     }
 
+/** What R of the header takes more of voltage from one turn of ALIGN to the next; 0 where that is not to be told from rounding or from back-EMF. */
+#define PARAM_ALIGN_RI_V (PARAM_F(MOTOR_RS_OHM) * PARAM_F(Q_CURRENT_REF_OPENLOOP))
+#define PARAM_ALIGN_EMF_V (60.0F * PARAM_F(PARAM_ALIGN_TURNS) / (PARAM_F(LOCK_TIME) * PARAM_F(LOOPTIME_SEC)) / PARAM_ERPM_PER_V)
+#define PARAM_ALIGN_RISE_Q14 VOLTAGE_Q14(PARAM_ALIGN_RI_V / PARAM_F(PARAM_ALIGN_TURNS))
+#define PARAM_ALIGN_TEACHES (PARAM_ALIGN_EMF_V < PARAM_F(ALIGN_EMF_MOST) * PARAM_ALIGN_RI_V && PARAM_ALIGN_RISE_Q14 >= ALIGN_RISE_LEAST)
+
 /** The fields of drive_params_t that are the start's. */
 #define PARAM_START_INIT \
     .offset_max_q13 = (int16_t)(8192.0F * PARAM_F(OFFSET_MOST_SHARE)), \
@@ -34,6 +41,7 @@
     .align_periods = LOCK_TIME, \
     .align_rate_q12 = (uint16_t)(PARAM_F(Q_CURRENT_REF_OPENLOOP) / PARAM_F(NORM_CURRENT_CONST) * 1024.0F / PARAM_F(LOCK_TIME) + 0.5F), \
     .align_speed_q10 = (int32_t)((PARAM_ALIGN_TURNS * 67108864l + LOCK_TIME / 2) / LOCK_TIME), \
+    .align_rise_q14 = (int16_t)(PARAM_ALIGN_TEACHES ? PARAM_ALIGN_RISE_Q14 : 0), \
     .early_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_EARLY_ERPM)), \
     .agree_steps = PARAM_STEPS_OF_8(AGREE_SEC), \
     .wait_periods = PARAM_PERIODS(WAIT_SEC), \
