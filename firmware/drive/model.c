@@ -1,6 +1,7 @@
 /* What the running motor teaches about itself, and what a salient motor adds. */
 #include "drive/model.h"
 
+#include "control/tuned.h"
 #include "drive/drive.h"
 
 void salient_model(drive_run_t *run, const drive_params_t *p)
@@ -123,10 +124,19 @@ void model_learn_step(drive_t *d, const drive_params_t *p)
     adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), ri_q12);
 }
 
+/** While there is d current of the start: what R has too much then loses a loaded rotor, what it lacks does not. After drive_update_model(). */
+static void model_starts_with_less_resistance(motor_model_t *model)
+{
+    model->rs_q16 = (uint16_t)(model->rs_q16 - (model->rs_q16 >> START_LESS_SHIFT));
+}
+
 void model_update(drive_t *d, const drive_params_t *p)
 {
     salient_sees_current(&d->run);
     drive_update_model(&d->run, p, d->run.control.reference_erpm);
+    if (d->run.handover.offset != 0) {
+        model_starts_with_less_resistance(&d->run.model);
+    }
 }
 
 void model_update_in_ramp(drive_t *d, const drive_params_t *p)
@@ -134,5 +144,6 @@ void model_update_in_ramp(drive_t *d, const drive_params_t *p)
     if (d->state == (uint16_t)DRIVE_RAMP) {
         salient_sees_forced_current(d);
         drive_update_model(&d->run, p, p->end_erpm);
+        model_starts_with_less_resistance(&d->run.model);
     }
 }

@@ -109,7 +109,7 @@ static void align_teaches(drive_run_t *run, const drive_params_t *p)
     align_t *a = &run->align;
     uint16_t header = (uint16_t)p->align_rise_q14, rise, off;
     align_turn_ends(a);
-    rise = (uint16_t)(a->second_q14 - (a->second_q14 >> ALIGN_LESS_SHIFT));
+    rise = (uint16_t)a->second_q14;
     if (header == 0u || a->is_limited || a->turns < PARAM_ALIGN_TURNS || a->second_q14 <= 0) {
         return;
     }

@@ -90,7 +90,7 @@
 #define PARAM_ALIGN_TURNS 5         /* [turns] of the vector while the current of ALIGN grows; the tuner reads it | starts */
 #define ALIGN_EMF_MOST 0.4          /* [1] of R times the start's current: with more back-EMF ALIGN would measure R by a fifth too low, and does not | starts */
 #define ALIGN_RISE_LEAST 64         /* [Q14 V] what R takes more of voltage from turn to turn: with less, rounding would be a percent and a half of it | starts */
-#define ALIGN_LESS_SHIFT 4          /* [shift] the estimator starts with 1/16 less R than measured: too much loses a loaded rotor, too little does not | starts */
+#define START_LESS_SHIFT 4          /* [shift] until the d current of the hand-over has gone the estimator has 1/16 less R: too much loses a loaded rotor, too little does not | starts */
 #define PARAM_EARLY_HZ 20           /* [Hz] electrical frequency from which the load observer is quick enough to catch the rotor | starts */
 #define PARAM_EARLY_SHARE 1.25      /* [1] of the minimum speed, at least | starts */
 #define AGREE_SEC 0.02              /* [s] the estimator agrees for so long before the hand-over | starts */

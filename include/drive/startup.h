@@ -41,7 +41,7 @@ void startup_ramp_from_here(drive_t *d, const drive_params_t *p);
  *
  *  The current grows by the same amount every turn, and with it the voltage along it: by R of that, for what dead time leaves is the same in each. A rotor that
  *  stands adds nothing, one that follows a falling part of its back-EMF. Where it begins to follow, at most two of the four rises are too large; the
- *  second smallest is none of them. It becomes R before RAMP, less 1/16. */
+ *  second smallest is none of them. It becomes R before RAMP. */
 void startup_align(drive_t *d, const drive_params_t *p);
 
 #endif

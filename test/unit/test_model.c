@@ -21,6 +21,12 @@ static int16_t learns(void)
     return (int16_t)(drive.run.adaptation.kfi_q31 != before.kfi_q31 || drive.run.adaptation.rs_q31 != before.rs_q31);
 }
 
+/** R of the model over the header's. */
+static float rs_in_use(void)
+{
+    return (float)drive.run.model.rs_q16 / (float)params.adaptation.rs_base_q16;
+}
+
 void setUp(void)
 {
     teachable(1);
@@ -158,4 +164,29 @@ void test_what_was_learnt_comes_into_the_model_with_the_tables_and_a_start_forge
     TEST_ASSERT_EQUAL_UINT16(rs_q16, drive.run.model.rs_q16);
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.kfi_q31);
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+}
+
+/* ---- R of a start ---- */
+
+void test_R_is_a_sixteenth_less_while_d_current_of_the_hand_over_is_left(void)
+{
+    drive.run.adaptation.rs_q31 = INT32_C(1) << 29; /* a quarter more than the header's */
+    drive.run.handover.offset = -1;
+    model_update(&drive, &params);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 1.25F * 15.0F / 16.0F, rs_in_use());
+    drive.run.handover.offset = 0;
+    model_update(&drive, &params);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 1.25F, rs_in_use());
+}
+
+void test_R_is_a_sixteenth_less_in_the_ramp_and_not_in_align(void)
+{
+    drive.run.adaptation.rs_q31 = 0;
+    model_update(&drive, &params);
+    drive.state = (uint16_t)DRIVE_ALIGN;
+    model_update_in_ramp(&drive, &params);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 1.0F, rs_in_use());
+    drive.state = (uint16_t)DRIVE_RAMP;
+    model_update_in_ramp(&drive, &params);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 15.0F / 16.0F, rs_in_use());
 }

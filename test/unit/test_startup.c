@@ -244,30 +244,30 @@ static float start_measures(int16_t direction, float share, float load_nm)
     return (float)drive.run.adaptation.rs_q31 / 2147483648.0F;
 }
 
-void test_align_measures_R_and_gives_the_estimator_a_sixteenth_less(void)
+void test_align_measures_R_in_both_directions(void)
 {
     static const float shares[] = { 0.7F, 0.85F, 1.0F, 1.15F, 1.3F };
     EACH_DIRECTION(direction) {
         EACH(n, shares) {
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05F, shares[n] * 15.0F / 16.0F - 1.0F, start_measures(direction, shares[n], 0.0F), golden_row(n));
+            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05F, shares[n] - 1.0F, start_measures(direction, shares[n], 0.0F), golden_row(n));
         }
     }
 }
 
-void test_R_of_the_estimator_is_the_measured_one_from_the_begin_of_the_ramp(void)
+void test_estimator_has_a_sixteenth_less_than_the_measured_R_from_the_begin_of_the_ramp(void)
 {
     float change = start_measures(1, 0.75F, 0.0F);
     ideal_motor_run(SLOW_SELDOM * SLOW_PERIODS);
-    TEST_ASSERT_FLOAT_WITHIN(0.001F, 1.0F + change, (float)drive.run.model.rs_q16 / (float)params.adaptation.rs_base_q16);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, (1.0F + change) * 15.0F / 16.0F, (float)drive.run.model.rs_q16 / (float)params.adaptation.rs_base_q16);
 }
 
-void test_rotor_that_begins_to_follow_at_any_current_does_not_raise_R(void)
+void test_rotor_that_begins_to_follow_at_any_current_leaves_the_estimator_no_more_than_the_true_R(void)
 {
     static const float loads_nm[] = { 0.0F, 0.01F, 0.02F, 0.03F, 0.04F, 0.05F, 0.06F, 0.07F, 0.2F };
     EACH(n, loads_nm) {
         float change = start_measures(1, 0.85F, loads_nm[n]);
-        TEST_ASSERT_TRUE_MESSAGE(change < 0.85F - 1.0F, golden_row(n));
-        TEST_ASSERT_TRUE_MESSAGE(change > 0.85F * 0.85F - 1.0F, golden_row(n));
+        TEST_ASSERT_TRUE_MESSAGE((1.0F + change) * 15.0F / 16.0F < 0.85F, golden_row(n));
+        TEST_ASSERT_TRUE_MESSAGE(change > 0.85F * 0.9F - 1.0F, golden_row(n));
     }
 }
 
