@@ -257,7 +257,7 @@ void test_align_measures_R_in_both_directions(void)
 void test_estimator_has_a_sixteenth_less_than_the_measured_R_from_the_begin_of_the_ramp(void)
 {
     float change = start_measures(1, 0.75F, 0.0F);
-    ideal_motor_run(SLOW_SELDOM * SLOW_PERIODS);
+    ideal_motor_run(SLOW_ROUND_STEPS * SLOW_PERIODS);
     TEST_ASSERT_FLOAT_WITHIN(0.001F, (1.0F + change) * 15.0F / 16.0F, (float)drive.run.model.rs_q16 / (float)params.adaptation.rs_base_q16);
 }
 
