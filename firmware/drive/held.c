@@ -80,7 +80,8 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
     const speed_erpm_t along = along_direction(d, observer_speed(&run->observer)), least = protection_least_speed(run, p);
     const dq_t none = { 0, 0 };
     if (run->held.stood) {
-        return (uint16_t)((held_moved(emf, none) <= (uint16_t)p->adaptation.emf_least_q12) ? HELD_DOUBTS_FAR : 0u);
+        const uint16_t off = (uint16_t)((run->held.steps < HELD_SLOW_STEPS) ? 0 : model_header_ri(p, qm_abs(run->control.i_q13.q)) >> HELD_R_SHIFT);
+        return (uint16_t)((held_moved(emf, none) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
     }
     if (along >= least || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d)
         || !protection_rotor_is_doubtful(run, p)) {

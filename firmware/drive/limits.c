@@ -60,7 +60,10 @@ void limits_current(drive_run_t *run, const drive_params_t *p)
     drive_control_t *c = &run->control;
     int16_t id_max = limits_asked_most(p), id_q13;
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
-    id_q13 = (int16_t)(run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 + run->probe_id_q13 - c->flux_brake_q13);
+    id_q13 = run->probe_id_q13;
+    if (!held_angle_stands(&run->held)) { /* a rotor that stands needs none but a probe's: it would turn the vector away from q */
+        id_q13 = (int16_t)(id_q13 + run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 - c->flux_brake_q13);
+    }
     c->ref_q13.d = qm_limit(id_q13, id_max);
     c->iq_limit_q13 = limits_beside(p, (uint16_t)qm_abs(c->ref_q13.d));
 }
