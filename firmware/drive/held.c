@@ -18,34 +18,53 @@ static void held_enter(held_t *shaft, held_phase_t next)
     shaft->doubts = 0;
 }
 
+void held_forget(held_t *shaft)
+{
+    held_enter(shaft, HELD_NOT);
+    shaft->act = (uint16_t)HELD_WAITS;
+    shaft->stood = 0;
+}
+
 uint16_t held_angle_stands(const held_t *shaft)
 {
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
+/** a - b, within half the format. */
+static NOINLINE int16_t held_less(int16_t a, int16_t b)
+{
+    return qm_sub_limited(a, b);
+}
+
 /** How far the back-EMF has moved. */
 static uint16_t held_moved(dq_t emf, dq_t from)
 {
-    return (uint16_t)((uint16_t)qm_abs((int16_t)(emf.d - from.d)) + (uint16_t)qm_abs((int16_t)(emf.q - from.q)));
+    return (uint16_t)((uint16_t)qm_abs(held_less(emf.d, from.d)) + (uint16_t)qm_abs(held_less(emf.q, from.q)));
 }
 
-/** What the estimator makes of a sum of back-EMFs, with the 1/Kphi from before the angle stopped. */
+/** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
 static NOINLINE speed_erpm_t held_omega(const drive_run_t *run, int16_t sum_q12)
 {
-    return estimator_omega(sum_q12, run->model.emf_sum_max_q12, run->held.inv_kfi);
+    return estimator_omega(sum_q12, run->held.emf_sum_max_q12, run->held.inv_kfi);
+}
+
+/** The sum that the estimator takes of a back-EMF. It fits a word, for the vector's length does. */
+static int16_t held_sum(int16_t sign, dq_t emf)
+{
+    return (int16_t)(emf.q - sign * emf.d);
 }
 
 /** How fast the estimator would turn. */
 static speed_erpm_t held_speed(const drive_run_t *run, dq_t emf)
 {
-    return held_omega(run, (int16_t)(emf.q - run->estimator.sign * emf.d));
+    return held_omega(run, held_sum(run->estimator.sign, emf));
 }
 
 /** The angle that a speed turns in so many steps, a quarter turn at most. */
 static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uint16_t steps)
 {
     const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST, HELD_PERIOD_MOST); /* a quarter turn in a step */
-    const int32_t turned = qm_mulss((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), (int16_t)steps);
+    const int32_t turned = qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps);
     return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER
                                                                                        : turned);
 }
@@ -55,8 +74,8 @@ int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q
     const speed_erpm_t more = held_omega(run, lag_q12);
     const uint32_t period_q32 = (uint32_t)qm_mulss(qm_abs(more), p->estimator.deltat_q32);
     const uint16_t k_q16 = (uint16_t)run->model.kfilter_esdq_q16;
-    const uint16_t lead = ((period_q32 >> 15) >= (uint32_t)k_q16) ? 32767u : qm_divud(period_q32, k_q16); /* half a turn at most */
-    return qm_with_sign((int16_t)lead, more);
+    const uint16_t lead = ((uint16_t)(period_q32 >> 16) >= k_q16) ? 32767u : qm_divud(period_q32, k_q16);
+    return qm_with_sign((int16_t)((lead > 32767u) ? 32767u : lead), more); /* half a turn at most */
 }
 
 /** Turns the frame back, and the vector that is commanded stays. */
@@ -100,6 +119,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     int16_t lead;
     shaft->omega_erpm = d->run.estimator.omega_erpm;
     shaft->inv_kfi = d->run.model.inv_kfi;
+    shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
     shaft->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
     shaft->stopped_steps = 0;
@@ -147,7 +167,15 @@ static uint16_t held_emf_turns(const held_t *shaft, const drive_run_t *run, cons
     const int16_t angle = held_turned(p, held_speed(run, shaft->emf_q12), shaft->steps);
     const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
     const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 1);             /* dead time shakes it by as much */
-    return (uint16_t)(qm_abs((int16_t)(emf.d - shaft->emf_q12.d)) > ((half > least) ? half : least));
+    return (uint16_t)(qm_abs(held_less(emf.d, shaft->emf_q12.d)) > ((half > least) ? half : least));
+}
+
+/** R's change and more of it, which may be beyond the format, within its limits. */
+static q15_t held_rs(const adaptation_params_t *p, q15_t change, q15_t more)
+{
+    const int32_t sum = (int32_t)change + more;
+    return (int16_t)((sum > p->rs_most) ? p->rs_most : (sum < p->rs_least) ? p->rs_least
+                                                                           : sum);
 }
 
 /** The rotor stands: all of the back-EMF is R i, and turned the angle while it seemed one. */
@@ -165,7 +193,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         }
         share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
-        run->adaptation.rs_q31 = qm_clamp_hi(run->adaptation.rs_q31 + (int32_t)share * 65536, p->adaptation.rs_least, p->adaptation.rs_most);
+        run->adaptation.rs_q31 = (int32_t)held_rs(&p->adaptation, qm_hi(run->adaptation.rs_q31), share) * 65536;
         drive_update_model(run, p, run->control.reference_erpm);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;

@@ -14,7 +14,9 @@ static void signals_add_sizes(uint16_t *sums, current_q13_t a, current_q13_t b, 
 
 /* ---- the law's rule: voltages and currents fit the motor ---- */
 
-#define SIGNALS_WRONG_SHIFT 6                                                       /* 250 sums of a current above the trip level fit a word */
+#define SIGNALS_WRONG_SHIFT 6                                                       /* 280 sums of a current at the trip level fit a word */
+#define SIGNALS_CHECKS_MOST 256u                                                    /* in the sums: more are halved at the next judgement */
+#define SIGNALS_CHECKS_END 272u                                                     /* and forgotten, where none comes */
 #define SIGNALS_DEAD_TIMES ((int16_t)(1.0F / PARAM_F(ADAPTATION_EMF_SHARE) + 0.5F)) /* emf_least_q12 is a fifth of what dead time takes */
 
 /** 1 where neither a back-EMF in its direction nor R off by all of it nor dead time explains the voltage: one is commanded that drives no current. */
@@ -99,10 +101,9 @@ static NOINLINE void signals_forget(signals_evidence_t *e)
 }
 
 /** Half of all that proves nothing. */
-static void signals_fade(observer_t *o, signals_evidence_t *e)
+static NOINLINE void signals_fade(signals_evidence_t *e)
 {
     uint16_t n;
-    o->wrong_steps >>= 1;
     e->once.cosine /= 2;
     e->once.sine /= 2;
     e->twice.cosine /= 2;
@@ -122,7 +123,7 @@ void signals_check(drive_t *d, const drive_params_t *p)
     if (unexplained) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + SIGNALS_UNEXPLAINED);
     }
-    if (run->observer.wrong_steps == 0u) {
+    if (run->observer.wrong_steps == 0u || run->evidence.checks >= SIGNALS_CHECKS_END) {
         if (run->evidence.checks != 0u) {
             signals_forget(&run->evidence);
         }
@@ -135,6 +136,9 @@ void signals_judge(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     if (run->observer.wrong_steps <= p->wrong_steps) {
+        if (run->evidence.checks > SIGNALS_CHECKS_MOST) { /* what comes and goes for long */
+            signals_fade(&run->evidence);
+        }
         return;
     }
     if (signals_stop_is_blurred(d, p)) {
@@ -142,7 +146,8 @@ void signals_judge(drive_t *d, const drive_params_t *p)
     } else if (signals_prove(&run->evidence, p)) {
         drive_raise(d, signals_which_is_wrong(run->evidence.phases));
     } else {
-        signals_fade(&run->observer, &run->evidence);
+        run->observer.wrong_steps >>= 1;
+        signals_fade(&run->evidence);
     }
 }
 

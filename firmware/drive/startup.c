@@ -3,6 +3,7 @@
 
 #include "control/tuned.h"
 #include "drive/drive.h"
+#include "drive/held.h"
 #include "drive/protection.h"
 
 drive_state_t calibration_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
@@ -51,6 +52,7 @@ void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     angle_t quarter = (angle_t)along_direction(d, 0x4000), estimated = estimator_next_angle(&run->estimator);
     angle_t forced = (angle_t)(estimated - quarter);
     dq_t v = c->v_q14;
+    held_forget(&run->held); /* the ramp's estimator must see the rotor */
     run->handover.agreed_steps = 0;
     run->handover.at_end = 0;
     run->handover.ahead_erpm = 0;

@@ -41,12 +41,16 @@ typedef struct {
     dq_t emf_q12;            /**< filtered back-EMF of the last step; of an older one from HELD_ASKED on */
     int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */
     int16_t inv_kfi;         /**< of the model when the angle stopped */
+    int16_t emf_sum_max_q12; /**< and its limit of the sum of back-EMFs */
     speed_erpm_t omega_erpm; /**< the estimator's speed then */
     int16_t load;            /**< the load before all that, of the load observer */
 } held_t;
 
 /** 1 while the angle stands. The model's 1/Kphi is 0 then: no back-EMF turns the angle. */
-uint16_t held_angle_stands(const held_t *h);
+uint16_t held_angle_stands(const held_t *shaft);
+
+/** Begins anew: the angle turns, and nothing is known of the rotor. Where the closed loop ends that goes on as a ramp. */
+void held_forget(held_t *shaft);
 
 /** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter went on turning it. @param lag_q12 see held_t
  *  @return angle counts, half a turn at most */

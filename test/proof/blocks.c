@@ -108,9 +108,11 @@ static void omega_limited_from(uint16_t low)
     }
 }
 
-/** estimator_omega: every 1/Kphi, with the limit that adaptation_apply() leaves beside it, keeps the speed in 16 bits. */
+/** estimator_omega: every 1/Kphi, with the limit that adaptation_apply() leaves beside it, keeps the speed in 16 bits; and 0 with any of them. */
 void proof_omega(void)
 {
+    int16_t stands = estimator_omega(ANY16(), any(2048, 32767), 0);
+    //@ check stands: stands == 0;
     omega_of(1024, 2047);
     //@ loop unroll 24;
     for (uint16_t low = 2048; low <= 7936u; low = (uint16_t)(low + 256u)) {

@@ -9,6 +9,43 @@
 
 #define DEAD_MOST 120 /* duty counts: blocks.c, proof_dead_time */
 
+/** A sum of so many innovations times a pointer is at most this: proof_evidence. */
+#define EVIDENCE_MOST (32768l * (SIGNALS_CHECKS_END + 1))
+
+static void any_evidence(signals_evidence_t *e)
+{
+    e->once.cosine = any_l(-EVIDENCE_MOST, EVIDENCE_MOST);
+    e->once.sine = any_l(-EVIDENCE_MOST, EVIDENCE_MOST);
+    e->twice.cosine = any_l(-EVIDENCE_MOST, EVIDENCE_MOST);
+    e->twice.sine = any_l(-EVIDENCE_MOST, EVIDENCE_MOST);
+    e->size = any_ul(0, EVIDENCE_MOST);
+    e->checks = any_u(0, SIGNALS_CHECKS_END);
+    e->unexplained = any_u(0, SIGNALS_CHECKS_END);
+    e->phases[0] = ANYU16();
+    e->phases[1] = ANYU16();
+    e->phases[2] = ANYU16();
+}
+
+/** Zero from drive_begin() to the closed loop, which alone goes on. @param phase the last possible one: from HELD_SETTLES on the angle stands */
+static void any_held(held_t *h, held_phase_t phase)
+{
+    h->phase = any_u(HELD_NOT, phase);
+    h->act = any_u(HELD_WAITS, HELD_GOES_ON);
+    h->steps = ANYU16();
+    h->doubts = ANYU16();
+    h->doubted_steps = ANYU16();
+    h->stopped_steps = ANYU16();
+    h->patience = ANYU16();
+    h->stood = any_u(0, 2);
+    h->emf_q12.d = any((int16_t)-emf_dq_max, emf_dq_max);
+    h->emf_q12.q = any((int16_t)-emf_dq_max, emf_dq_max);
+    h->lag_q12 = any(-32767, 32767);
+    h->inv_kfi = any(0, 32767);
+    h->emf_sum_max_q12 = any(0, 32767);
+    h->omega_erpm = any(-32767, 32767);
+    h->load = any((int16_t)(-params.observer.load_max - 1), params.observer.load_max);
+}
+
 static void any_drive(uint16_t state)
 {
     drive.command.run = any(0, 1);
@@ -59,6 +96,11 @@ static void any_drive(uint16_t state)
     drive.run.control.ramp_q16 = ANYU16();
     drive.run.control.ramp_waits = any_u(0, 1);
 #endif
+    any_held(&drive.run.held, (state == DRIVE_CLOSED || state == DRIVE_STOPPING) ? HELD_STANDS : HELD_TURNS);
+    any_evidence(&drive.run.evidence);
+    drive.run.probe_phase = any_u(PROBE_WAIT, PROBE_PAUSE);
+    drive.run.probe_steps = ANYU16();
+    drive.run.dip_steps = ANYU16();
     drive.run.stall_steps = any_u(0, params.stall_steps);
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);
 }
@@ -101,6 +143,9 @@ static void any_observer_state(observer_t *o)
     o->fast_share_q15 = any(0, 32767);
     o->gate_level = ANYU16();
     o->gate_last_erpm = ANY16();
+    o->wrong_erpm = any(0, 32767);
+    o->innovation_erpm = any((int16_t)-params.observer.innovation_max_erpm, params.observer.innovation_max_erpm);
+    o->wrong_steps = ANYU16();
     o->share_q15 = any(0, 32767);
 }
 
@@ -126,6 +171,22 @@ static void any_control(drive_control_t *c)
     c->pi_q.sum = any_l(-SUM_MAX, SUM_MAX);
     c->speed_kp_q13 = any(0, params.speed_kp_fast_q13);
     c->sample_shift_q13 = any((int16_t)-sample_shift_max, sample_shift_max);
+}
+
+static void held_holds_again(const held_t *h)
+{
+    //@ check held: h->phase <= HELD_STANDS && h->act <= HELD_GOES_ON && h->stood <= 2;
+    //@ check held_emf_d: -emf_dq_max <= h->emf_q12.d <= emf_dq_max;
+    //@ check held_emf_q: -emf_dq_max <= h->emf_q12.q <= emf_dq_max;
+    //@ check held_lag: -32767 <= h->lag_q12 && 0 <= h->inv_kfi && 0 <= h->emf_sum_max_q12 && -32767 <= h->omega_erpm;
+    //@ check held_load: -params.observer.load_max - 1 <= h->load <= params.observer.load_max;
+}
+
+static void evidence_holds_again(const signals_evidence_t *e)
+{
+    //@ check once: -EVIDENCE_MOST <= e->once.cosine <= EVIDENCE_MOST && -EVIDENCE_MOST <= e->once.sine <= EVIDENCE_MOST;
+    //@ check twice: -EVIDENCE_MOST <= e->twice.cosine <= EVIDENCE_MOST && -EVIDENCE_MOST <= e->twice.sine <= EVIDENCE_MOST;
+    //@ check size: e->size <= EVIDENCE_MOST && e->checks <= SIGNALS_CHECKS_END;
 }
 
 static void bounds_hold_again(void)
@@ -176,12 +237,15 @@ static void bounds_hold_again(void)
     //@ check rate: 0 <= o->rate_q16 <= params.observer.fast_q16;
     //@ check large: 0 <= o->gate_erpm;
     //@ check quick: 0 <= o->fast_share_q15 && 0 <= o->share_q15;
+    //@ check innovation: -params.observer.innovation_max_erpm <= o->innovation_erpm <= params.observer.innovation_max_erpm && 0 <= o->wrong_erpm;
     //@ check learnt_kfi: params.adaptation.kfi_least * 65536 <= a->kfi_q31 <= params.adaptation.kfi_most * 65536;
     //@ check learnt_rs: params.adaptation.rs_least * 65536 <= a->rs_q31 <= params.adaptation.rs_most * 65536;
     //@ check model_rs: drive.run.model.rs_q16 <= rs_max;
     //@ check trim: -params.fieldweak.trim_max_q13 <= drive.run.fieldweak.trim_q13 <= 0;
     //@ check table: drive.run.fieldweak.index < FIELDWEAK_ENTRIES;
     //@ check counts: drive.run.stall_steps <= params.stall_steps + 1 && drive.run.lost_lock_steps <= params.lost_lock_steps + 2;
+    held_holds_again(&drive.run.held);
+    evidence_holds_again(&drive.run.evidence);
 }
 
 #endif

@@ -1,7 +1,7 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING LATE EACH EACH_LATE
- * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between,fieldweak_between
+ * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between,fieldweak_between,held_sum
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
  *     -eva-slevel-function drive_tick:200,drive_idle:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp:10
@@ -15,8 +15,14 @@
 #include "firmware/control/angle.c"
 
 /*@ assigns \result \from sum, sum_max, inv_kfi;
-    admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: adaptation_apply() alone writes the last two */
+    admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: adaptation_apply() alone writes the last two, but for the 0 of an angle that stands */
 int16_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi);
+
+/*@ requires axes: -emf_dq_max <= emf.d <= emf_dq_max && -emf_dq_max <= emf.q <= emf_dq_max;
+    requires turns: -1 <= sign <= 1;
+    assigns \result \from sign, emf;
+    admit ensures length: -32767 <= \result <= 32767; */ /* circle.c, proof_lowpass: |d| + |q| is at most sqrt(2) times the length */
+static int16_t held_sum(int16_t sign, dq_t emf);
 
 /*@ assigns \result \from a, b, share;
     admit ensures between: a <= \result <= b || b <= \result <= a; */ /* blocks.c, proof_between */
@@ -55,16 +61,26 @@ static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t 
 #define observer_step observer_step_bounded
 #define adaptation_learn adaptation_learn_bounded
 #include "firmware/drive/limits.c"
+static void startup_ramp_turning(drive_t *d, const drive_params_t *p);
+#define startup_ramp_from_here startup_ramp_turning
 #include "firmware/drive/catch.c"
 #include "firmware/drive/drive.c"
 #include "firmware/drive/handover.c"
+#include "firmware/drive/held.c"
 #include "firmware/drive/model.c"
 #include "firmware/drive/modes/bringup.c"
 #include "firmware/drive/modes/modes.c"
 #include "firmware/drive/protection.c"
-#include "firmware/drive/schedule.c"
 #include "firmware/drive/signals.c"
+static void signals_check_bounded(drive_t *d, const drive_params_t *p);
+static void signals_judge_bounded(drive_t *d, const drive_params_t *p);
+#define signals_check signals_check_bounded
+#define signals_judge signals_judge_bounded
+#include "firmware/drive/schedule.c"
+#undef signals_check
+#undef signals_judge
 #include "firmware/drive/speed.c"
+#undef startup_ramp_from_here
 #include "firmware/drive/startup.c"
 #include "firmware/drive/states.c"
 #include "firmware/drive/tick.c"
@@ -211,6 +227,8 @@ static void observer_step_bounded(observer_t *o, const observer_params_t *p, uin
     o->fast_share_q15 = any(0, 32767);
     o->gate_level = ANYU16();
     o->gate_last_erpm = ANY16();
+    o->innovation_erpm = any((int16_t)-p->innovation_max_erpm, p->innovation_max_erpm);
+    o->wrong_steps = ANYU16();
 }
 
 /** observer.c, proof_adaptation_learn. */
@@ -221,6 +239,28 @@ static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t 
     //@ check rate: 0 <= p->rate_q16 <= 8192 && 1 <= p->emf_least_q12;
     //@ check limits: -16384 <= p->kfi_least <= 0 <= p->kfi_most <= 16384 && -16384 <= p->rs_least <= 0 <= p->rs_most <= 24576;
     any_adaptation(a);
+}
+
+/** No ramp begins with an angle that stands. */
+static void startup_ramp_turning(drive_t *d, const drive_params_t *p)
+{
+    startup_ramp_from_here(d, p);
+    //@ check turns: d->run.held.phase <= HELD_TURNS;
+}
+
+/** The bounds of the sums are those of so many checks: proof_evidence. */
+static void signals_check_bounded(drive_t *d, const drive_params_t *p)
+{
+    signals_check(d, p);
+    //@ check so_many: d->run.evidence.checks <= SIGNALS_CHECKS_END;
+    any_evidence(&d->run.evidence);
+}
+
+static void signals_judge_bounded(drive_t *d, const drive_params_t *p)
+{
+    signals_judge(d, p);
+    //@ check so_many: d->run.evidence.checks <= SIGNALS_CHECKS_END;
+    any_evidence(&d->run.evidence);
 }
 
 static void any_state(uint16_t state)
@@ -289,14 +329,65 @@ static void tick(void)
     slow();
 }
 
+/** What a run has left: from here only drive_begin() goes on, which clears it. */
+static void tick_left(uint16_t state)
+{
+    any_state(state);
+    any_held(&drive.run.held, HELD_STANDS);
+    drive.command.run = 0;
+    drive_update_model(&drive.run, &params, any(-32767, 32767));
+    tick();
+    //@ check off: drive.state == DRIVE_STOPPED || drive.state == DRIVE_CALIBRATE || drive.state == DRIVE_FAULT;
+}
+
 /** Every state but CALIBRATE, every slot. */
 void proof_tick(void)
 {
     set_bounds();
+    tick_left(DRIVE_STOPPED);
+    tick_left(DRIVE_FAULT);
     //@ loop unroll DRIVE_STATE_COUNT;
     for (uint16_t state = DRIVE_STOPPED; state <= DRIVE_FAULT; state++) {
         any_state(state);
         tick();
+    }
+}
+
+/** The evidence of so many checks. */
+static void evidence_of(signals_evidence_t *e, uint16_t checks)
+{
+    const int32_t most = 32768l * checks;
+    any_evidence(e);
+    e->checks = checks;
+    e->once.cosine = any_l(-most, most);
+    e->once.sine = any_l(-most, most);
+    e->twice.cosine = any_l(-most, most);
+    e->twice.sine = any_l(-most, most);
+    e->size = any_ul(0, (uint32_t)most);
+}
+
+static void evidence_is_of(const signals_evidence_t *e, uint16_t checks)
+{
+    //@ check checks: e->checks == checks;
+    //@ check once: -32768 * checks <= e->once.cosine <= 32768 * checks && -32768 * checks <= e->once.sine <= 32768 * checks;
+    //@ check twice: -32768 * checks <= e->twice.cosine <= 32768 * checks && -32768 * checks <= e->twice.sine <= 32768 * checks;
+    //@ check size: e->size <= 32768 * checks;
+}
+
+/** signals.c: a check more, and half of them: the sums keep to what so many checks can make. */
+void proof_evidence(void)
+{
+    signals_evidence_t e;
+    set_bounds();
+    any_state(DRIVE_CLOSED);
+    //@ loop unroll 300;
+    for (uint16_t checks = 0; checks <= SIGNALS_CHECKS_END; checks++) {
+        evidence_of(&e, checks);
+        signals_fade(&e);
+        evidence_is_of(&e, (uint16_t)((checks + 1u) / 2u));
+        evidence_of(&e, checks);
+        signals_gather(&e, &drive, any_u(0, 1));
+        evidence_is_of(&e, (uint16_t)(checks + 1u));
     }
 }
 
