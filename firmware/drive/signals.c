@@ -14,9 +14,9 @@ static void signals_add_sizes(uint16_t *sums, current_q13_t a, current_q13_t b, 
 
 /* ---- the law's rule: voltages and currents fit the motor ---- */
 
-#define SIGNALS_WRONG_SHIFT 6                                                       /* 280 sums of a current at the trip level fit a word */
-#define SIGNALS_CHECKS_MOST 256u                                                    /* in the sums: more are halved at the next judgement */
-#define SIGNALS_CHECKS_END 272u                                                     /* and forgotten, where none comes */
+#define SIGNALS_WRONG_SHIFT 6                                                       /* SIGNALS_CHECKS_END sums of a current at the trip level fit a word */
+#define SIGNALS_CHECKS_MOST 512u                                                    /* in the sums: more of them are halved */
+#define SIGNALS_CHECKS_END 528u                                                     /* and forgotten where no judgement comes */
 #define SIGNALS_DEAD_TIMES ((int16_t)(1.0F / PARAM_F(ADAPTATION_EMF_SHARE) + 0.5F)) /* emf_least_q12 is a fifth of what dead time takes */
 
 /** 1 where neither a back-EMF in its direction nor R off by all of it nor dead time explains the voltage: one is commanded that drives no current. */
@@ -136,7 +136,7 @@ void signals_judge(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     if (run->observer.wrong_steps <= p->wrong_steps) {
-        if (run->evidence.checks > SIGNALS_CHECKS_MOST) { /* what comes and goes for long */
+        if (run->evidence.checks > SIGNALS_CHECKS_MOST) { /* what comes and goes has no end */
             signals_fade(&run->evidence);
         }
         return;

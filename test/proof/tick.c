@@ -380,7 +380,7 @@ void proof_evidence(void)
     signals_evidence_t e;
     set_bounds();
     any_state(DRIVE_CLOSED);
-    //@ loop unroll 300;
+    //@ loop unroll 600;
     for (uint16_t checks = 0; checks <= SIGNALS_CHECKS_END; checks++) {
         evidence_of(&e, checks);
         signals_fade(&e);

@@ -115,6 +115,7 @@ void test_the_frame_is_ahead_by_the_speed_times_the_filter_s_time(void)
 {
     rig_closed(1, 1000);
     drive.run.held.inv_kfi = drive.run.model.inv_kfi;
+    drive.run.held.emf_sum_max_q12 = drive.run.model.emf_sum_max_q12;
     EACH_DIRECTION(direction) {
         for (int16_t lag_q12 = 100; lag_q12 <= 3000; lag_q12 = (int16_t)(lag_q12 + 290)) {
             const float erpm = (float)lag_q12 * (float)drive.run.model.inv_kfi / 2048.0F;
@@ -200,6 +201,18 @@ void test_resistance_is_learnt_within_the_adaptation_s_bounds_and_not_without_cu
     steps(1u + HELD_ASK_STEPS);
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
     TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+}
+
+void test_resistance_that_has_risen_rises_to_its_bound_and_not_beyond(void)
+{
+    EACH_DIRECTION(direction) {
+        asked(direction, 1900);
+        drive.run.control.i_q13.q = (int16_t)(direction * rig_current_of_ri(0.45F)); /* R i is 1800 */
+        drive.run.adaptation.rs_q31 = (int32_t)qm_abs(params.adaptation.rs_least) * 65536;
+        steps(1u + HELD_ASK_STEPS);
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        TEST_ASSERT_EQUAL_INT16(params.adaptation.rs_most, qm_hi(drive.run.adaptation.rs_q31));
+    }
 }
 
 void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_the_rotor_is(void)
@@ -324,6 +337,36 @@ void test_a_rotor_whose_resistance_is_known_is_held_again_only_without_back_emf_
     steps(1);
     TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
     TEST_ASSERT_EQUAL_UINT16(0, shaft->stood);
+}
+
+void test_a_reversal_in_which_the_rotor_stands_begins_a_ramp_that_sees_the_rotor(void)
+{
+    EACH_DIRECTION(direction) {
+        stands(direction, 200);
+        drive.state = (uint16_t)DRIVE_STOPPING;
+        drive.run.control.reference_erpm = 0;
+        drive.command.run = 1;
+        drive.command.target_erpm = (int16_t)(direction * -FAST_ERPM);
+        rig_slow(1);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+        TEST_ASSERT_FALSE(held_angle_stands(shaft));
+        rig_slow(14);
+        TEST_ASSERT_NOT_EQUAL(0, drive.run.model.inv_kfi);
+    }
+}
+
+void test_the_speed_of_a_rotor_that_is_let_go_is_limited_by_the_flux_of_when_the_angle_stopped(void)
+{
+    EACH_DIRECTION(direction) {
+        stands(direction, 200);
+        shaft->inv_kfi = 32767; /* in field weakening; the model has left it since */
+        shaft->emf_sum_max_q12 = 2048;
+        drive.run.model.emf_sum_max_q12 = 32767;
+        rig_emf(0, (int16_t)(direction * 2500));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_INT16_WITHIN(10, (int16_t)(direction * 32767), observer_speed(&drive.run.observer));
+    }
 }
 
 void test_a_step_comes_in_slots_5_and_13_and_what_follows_in_slots_1_and_9_of_closed_loop(void)

@@ -287,6 +287,38 @@ void test_what_proves_nothing_is_halved_and_what_has_ended_is_forgotten(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
 
+void test_evidence_that_comes_and_goes_for_long_is_halved_and_ends_in_no_fault(void)
+{
+    EACH_DIRECTION(sign) {
+        rig_closed(1, 10000);
+        drive.frame = trig_sincos(0x2000);
+        int32_t expected;
+        for (uint32_t n = 0; n < 140000ul; n++) { /* a minute */
+            drive.run.observer.innovation_erpm = (int16_t)(sign * (int16_t)(params.load_erpm - 1u));
+            drive.run.observer.wrong_steps = (uint16_t)(1u + n % 4u);
+            signals_check(&drive, &params);
+            signals_judge(&drive, &params);
+            TEST_ASSERT_LESS_OR_EQUAL_UINT16(513, drive.run.evidence.checks);
+            TEST_ASSERT_GREATER_OR_EQUAL_UINT16((n < 256u) ? n : 256u, drive.run.evidence.checks);
+        }
+        expected = (int32_t)(drive.run.evidence.checks * M_SQRT1_2 * drive.run.observer.innovation_erpm);
+        TEST_ASSERT_INT32_WITHIN(labs(expected) / 100, expected, drive.run.evidence.once.sine);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+    }
+}
+
+void test_evidence_that_is_never_judged_is_forgotten(void)
+{
+    rig_closed(1, 10000);
+    drive.run.observer.wrong_steps = 1;
+    for (uint32_t n = 0; n < 100000ul; n++) {
+        drive.run.observer.innovation_erpm = 16000;
+        signals_check(&drive, &params);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(528, drive.run.evidence.checks);
+        TEST_ASSERT_EQUAL_UINT32(16000ul * drive.run.evidence.checks, drive.run.evidence.size);
+    }
+}
+
 void test_voltage_that_neither_speed_nor_resistance_nor_dead_time_explains_is_a_wrong_signal(void)
 {
     const int16_t dead_q12 = (int16_t)(5 * params.adaptation.emf_least_q12);
