@@ -2,6 +2,7 @@
 #include "drive/states.h"
 
 #include "drive/drive.h"
+#include "drive/held.h"
 #include "drive/limits.h"
 #include "drive/speed.h"
 
@@ -132,6 +133,7 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
     case DRIVE_STOPPED:
         d->run.estimator.omega_filtered_q16 = 0; /* nothing is known of a rotor that coasts */
         d->run.control.reference_erpm = 0;
+        held_forget(&d->run.held);
         if (d->command.run) {
             next = (uint16_t)(catch_waits_for_bus(d, p) ? DRIVE_CATCH : DRIVE_BOOTSTRAP);
         }

@@ -49,8 +49,8 @@ typedef struct {
 /** 1 while the angle stands. The model's 1/Kphi is 0 then: no back-EMF turns the angle. */
 uint16_t held_angle_stands(const held_t *shaft);
 
-/** Begins anew: the angle turns, and nothing is known of the rotor. Where the closed loop ends that goes on as a ramp. */
-void held_forget(held_t *shaft);
+/** Begins anew: the angle turns, and nothing is known of the rotor. For a ramp that follows the closed loop, and for any start. */
+void held_forget(held_t *h);
 
 /** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter went on turning it. @param lag_q12 see held_t
  *  @return angle counts, half a turn at most */

@@ -63,7 +63,7 @@ static void observer_piece(int16_t quick, int16_t next, uint16_t shift, int16_t 
     observer_step(&o, &p, any_ul(0, UINT32_MAX), any(-IQ_MAX, IQ_MAX));
     //@ check speed: -32767 * 65536 <= o.omega_q16 <= 32767 * 65536;
     //@ check load: -8192 * 65536 <= o.load_q16 <= 8192 * 65536;
-    //@ check innovation: -p.innovation_max_erpm <= o.innovation_erpm <= p.innovation_max_erpm;
+    //@ check innovation: -16383 <= o.innovation_erpm <= 16383;
     //@ check quick: calm_low == 16384 || 0 <= o.fast_share_q15;
 }
 

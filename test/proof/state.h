@@ -26,7 +26,13 @@ static void any_evidence(signals_evidence_t *e)
     e->phases[2] = ANYU16();
 }
 
-/** Zero from drive_begin() to the closed loop, which alone goes on. @param phase the last possible one: from HELD_SETTLES on the angle stands */
+/** 1 where the angle may stand: in closed loop, and where a run may have left it so with the bridge off. */
+static uint16_t may_stand(uint16_t state)
+{
+    return (uint16_t)(state == DRIVE_CLOSED || state == DRIVE_STOPPING || state == DRIVE_CALIBRATE || state == DRIVE_STOPPED || state == DRIVE_FAULT);
+}
+
+/** @param phase the last possible one: from HELD_SETTLES on the angle stands */
 static void any_held(held_t *h, held_phase_t phase)
 {
     h->phase = any_u(HELD_NOT, phase);
@@ -96,7 +102,7 @@ static void any_drive(uint16_t state)
     drive.run.control.ramp_q16 = ANYU16();
     drive.run.control.ramp_waits = any_u(0, 1);
 #endif
-    any_held(&drive.run.held, (state == DRIVE_CLOSED || state == DRIVE_STOPPING) ? HELD_STANDS : HELD_TURNS);
+    any_held(&drive.run.held, may_stand(state) ? HELD_STANDS : HELD_TURNS);
     any_evidence(&drive.run.evidence);
     drive.run.probe_phase = any_u(PROBE_WAIT, PROBE_PAUSE);
     drive.run.probe_steps = ANYU16();
@@ -144,7 +150,7 @@ static void any_observer_state(observer_t *o)
     o->gate_level = ANYU16();
     o->gate_last_erpm = ANY16();
     o->wrong_erpm = any(0, 32767);
-    o->innovation_erpm = any((int16_t)-params.observer.innovation_max_erpm, params.observer.innovation_max_erpm);
+    o->innovation_erpm = any(-16383, 16383);
     o->wrong_steps = ANYU16();
     o->share_q15 = any(0, 32767);
 }
@@ -237,7 +243,7 @@ static void bounds_hold_again(void)
     //@ check rate: 0 <= o->rate_q16 <= params.observer.fast_q16;
     //@ check large: 0 <= o->gate_erpm;
     //@ check quick: 0 <= o->fast_share_q15 && 0 <= o->share_q15;
-    //@ check innovation: -params.observer.innovation_max_erpm <= o->innovation_erpm <= params.observer.innovation_max_erpm && 0 <= o->wrong_erpm;
+    //@ check innovation: -16383 <= o->innovation_erpm <= 16383 && 0 <= o->wrong_erpm;
     //@ check learnt_kfi: params.adaptation.kfi_least * 65536 <= a->kfi_q31 <= params.adaptation.kfi_most * 65536;
     //@ check learnt_rs: params.adaptation.rs_least * 65536 <= a->rs_q31 <= params.adaptation.rs_most * 65536;
     //@ check model_rs: drive.run.model.rs_q16 <= rs_max;

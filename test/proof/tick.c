@@ -15,7 +15,7 @@
 #include "firmware/control/angle.c"
 
 /*@ assigns \result \from sum, sum_max, inv_kfi;
-    admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: adaptation_apply() alone writes the last two, but for the 0 of an angle that stands */
+    admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: the last two are of one adaptation_apply(), or inv_kfi is 0 */
 int16_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi);
 
 /*@ requires axes: -emf_dq_max <= emf.d <= emf_dq_max && -emf_dq_max <= emf.q <= emf_dq_max;
@@ -227,7 +227,7 @@ static void observer_step_bounded(observer_t *o, const observer_params_t *p, uin
     o->fast_share_q15 = any(0, 32767);
     o->gate_level = ANYU16();
     o->gate_last_erpm = ANY16();
-    o->innovation_erpm = any((int16_t)-p->innovation_max_erpm, p->innovation_max_erpm);
+    o->innovation_erpm = any(-16383, 16383);
     o->wrong_steps = ANYU16();
 }
 
@@ -290,6 +290,16 @@ static uint16_t calibrates; /* the calibration has had its sample, and its sums 
 
 #define ROUND (SLOW_ROUND_STEPS * SLOW_PERIODS)
 
+static uint16_t began = DRIVE_STATE_COUNT; /* the state in which the period began, where a check wants to know it */
+
+/** A start, also from what the last run has left, sees a rotor that turns; a fault is left with the bridge off. In closed loop see startup_ramp_turning(). */
+static void starts_turn(void)
+{
+    uint16_t phase = drive.run.held.phase, state = drive.state, starts = (uint16_t)(began == DRIVE_STOPPED || !may_stand(began));
+    //@ check turns: starts == 0 || began == DRIVE_STATE_COUNT || phase <= HELD_TURNS;
+    //@ check off: began != DRIVE_FAULT || state == DRIVE_STOPPED || state == DRIVE_CALIBRATE || state == DRIVE_FAULT;
+}
+
 static void slow_in(uint16_t slot)
 {
     uint16_t seals = calibrates, state = drive.state; /* what a check alone reads, the analyser's memory of calls does not know */
@@ -304,6 +314,7 @@ static void slow_in(uint16_t slot)
     //@ check sums_stay: seals == 0 || (SEALED(drive.calibration.sum_a) == &drive && SEALED(drive.calibration.sum_b) == &drive);
     //@ check ended: seals == 0 || state == DRIVE_CALIBRATE || drive.state != DRIVE_CALIBRATE;
     bounds_hold_again();
+    starts_turn();
 }
 
 /** What a tick has left, with the slow work of each slot. */
@@ -329,26 +340,14 @@ static void tick(void)
     slow();
 }
 
-/** What a run has left: from here only drive_begin() goes on, which clears it. */
-static void tick_left(uint16_t state)
-{
-    any_state(state);
-    any_held(&drive.run.held, HELD_STANDS);
-    drive.command.run = 0;
-    drive_update_model(&drive.run, &params, any(-32767, 32767));
-    tick();
-    //@ check off: drive.state == DRIVE_STOPPED || drive.state == DRIVE_CALIBRATE || drive.state == DRIVE_FAULT;
-}
-
 /** Every state but CALIBRATE, every slot. */
 void proof_tick(void)
 {
     set_bounds();
-    tick_left(DRIVE_STOPPED);
-    tick_left(DRIVE_FAULT);
     //@ loop unroll DRIVE_STATE_COUNT;
     for (uint16_t state = DRIVE_STOPPED; state <= DRIVE_FAULT; state++) {
         any_state(state);
+        began = state;
         tick();
     }
 }

@@ -302,7 +302,7 @@ void test_evidence_that_comes_and_goes_for_long_is_halved_and_ends_in_no_fault(v
             TEST_ASSERT_GREATER_OR_EQUAL_UINT16((n < 256u) ? n : 256u, drive.run.evidence.checks);
         }
         expected = (int32_t)(drive.run.evidence.checks * M_SQRT1_2 * drive.run.observer.innovation_erpm);
-        TEST_ASSERT_INT32_WITHIN(labs(expected) / 100, expected, drive.run.evidence.once.sine);
+        TEST_ASSERT_INT32_WITHIN(params.load_erpm * 4, expected, drive.run.evidence.once.sine);
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     }
 }
