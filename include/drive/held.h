@@ -50,7 +50,7 @@ typedef struct {
 uint16_t held_angle_stands(const held_t *shaft);
 
 /** Begins anew: the angle turns, and nothing is known of the rotor. For a ramp that follows the closed loop, and for any start. */
-void held_forget(held_t *h);
+void held_forget(held_t *shaft);
 
 /** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter went on turning it. @param lag_q12 see held_t
  *  @return angle counts, half a turn at most */
