@@ -4,6 +4,8 @@
 #include <math.h>
 
 #include "drive/held.h"
+#include "drive/limits.h"
+#include "drive/protection.h"
 
 #define FAST_ERPM 10000 /* reference, and the speed before */
 
@@ -244,6 +246,25 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
     }
 }
 
+void test_a_back_emf_that_turns_by_less_than_half_of_what_it_says_or_by_what_dead_time_does_is_one_that_stands(void)
+{
+    const int16_t least = (int16_t)(params.adaptation.emf_least_q12 / 2);
+    static const int16_t emf_q12[] = { 500, 40 }; /* half of its turn in three steps is more than dead time's, and less */
+    EACH(n, emf_q12) {
+        const int16_t half = (int16_t)(3.14F * (float)emf_q12[n] * 3.0F * 16.0F * (float)emf_q12[n] * (float)drive.run.model.inv_kfi / 2048.0F / 60.0F
+                                       * PARAM_F(LOOPTIME_SEC));
+        const int16_t most = (half > least) ? half : least;
+        asked(1, emf_q12[n]);
+        steps(3); /* settled, and two steps asked */
+        rig_emf((int16_t)(-most + 8), emf_q12[n]);
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+        rig_emf((int16_t)(-2 * most), emf_q12[n]);
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    }
+}
+
 void test_a_back_emf_that_does_not_settle_is_a_rotor_that_turns(void)
 {
     asked(1, 200);
@@ -276,6 +297,24 @@ void test_while_the_rotor_stands_the_load_is_the_current_that_flows_and_nothing_
     drive.run.observer.fast_share_q15 = 0;
     rig_slow(10); /* it would learn */
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.kfi_q31);
+}
+
+void test_a_rotor_that_stands_gets_the_d_current_of_a_probe_alone_and_the_probe_waits(void)
+{
+    stands(1, 200);
+    drive.run.fieldweak.table_q13 = -1000;
+    drive.run.probe_id_q13 = 321;
+    drive.run.probe_phase = (uint16_t)PROBE_TEST;
+    drive.run.probe_steps = 3;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(321, drive.run.control.ref_q13.d);
+    protection_probe_rotor(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, drive.run.probe_phase);
+    TEST_ASSERT_EQUAL_UINT16(3, drive.run.probe_steps);
+    TEST_ASSERT_EQUAL_INT16(321, drive.run.probe_id_q13);
+    shaft->phase = (uint16_t)HELD_NOT;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_LESS_THAN_INT16(0, drive.run.control.ref_q13.d);
 }
 
 void test_the_observer_rests_while_the_angle_stands(void)

@@ -331,6 +331,29 @@ void test_probe_comes_again_after_five_seconds_or_a_dip_of_10_ms(void)
     TEST_ASSERT_GREATER_THAN_INT16(0, probe(25, 0, 400));
 }
 
+void test_probe_comes_again_after_half_a_second_where_something_changed_fast_but_for_its_own_unrest(void)
+{
+    loaded(2.2F);
+    (void)probe(38, 0, 400);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, drive.run.probe_phase);
+    drive.run.observer.fast_share_q15 = 32767; /* the gate opens within a tenth of a second: the probe's own doing */
+    (void)probe(PROBE_CALM_STEPS, 0, 400);
+    drive.run.observer.fast_share_q15 = 0;
+    TEST_ASSERT_EQUAL_INT16(0, probe(600, 0, 400));
+    loaded(2.2F);
+    (void)probe(38, 0, 400);
+    (void)probe(PROBE_CALM_STEPS, 0, 400);
+    drive.run.observer.fast_share_q15 = 32767;
+    (void)probe(1, 0, 400);
+    drive.run.observer.fast_share_q15 = 0;
+    (void)probe(PROBE_SOON_STEPS - PROBE_CALM_STEPS - 1u, 0, 400);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, drive.run.probe_phase);
+    (void)probe(1, 0, 400);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, drive.run.probe_phase);
+    TEST_ASSERT_GREATER_THAN_INT16(0, probe(25, 0, 400));
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.probe_asked);
+}
+
 void test_a_dip_that_the_probe_itself_makes_brings_no_other(void)
 {
     loaded(2.2F);

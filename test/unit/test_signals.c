@@ -261,6 +261,17 @@ void test_innovations_that_no_load_makes_that_the_motor_can_carry_are_a_wrong_si
     TEST_ASSERT_EQUAL_UINT16(1000, wrong_until_fault(1000, -500, most, 1000));
 }
 
+void test_five_eighths_of_the_innovations_size_in_time_with_the_electrical_angle_are_enough_and_less_is_not(void)
+{
+    static const uint16_t orders[] = { 5, 10 };
+    EACH(n, orders) {
+        const beat_t more = { 580, 600, 7001, orders[n] }, less = { 530, 600, 7001, orders[n] }; /* 0.67 of their quotient */
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(251, wrong_until_fault(1000, -500, more, 1000), golden_row(n));
+        drive.fault = (uint16_t)FAULT_NONE;
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(1000, wrong_until_fault(1000, -500, less, 1000), golden_row(n));
+    }
+}
+
 void test_the_innovation_that_a_load_can_make_follows_from_current_torque_inertia_and_the_observer_s_rate(void)
 {
     const double acceleration = 1.5 * 5.0 * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / sqrt(3.0) * 60.0 / (2.0 * M_PI * 1000.0 * 5.0)
