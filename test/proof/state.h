@@ -106,6 +106,7 @@ static void any_drive(uint16_t state)
     any_evidence(&drive.run.evidence);
     drive.run.probe_phase = any_u(PROBE_WAIT, PROBE_PAUSE);
     drive.run.probe_steps = ANYU16();
+    drive.run.probe_asked = any_u(0, 1);
     drive.run.dip_steps = ANYU16();
     drive.run.stall_steps = any_u(0, params.stall_steps);
     drive.run.lost_lock_steps = any_u(0, params.lost_lock_steps);
