@@ -1,8 +1,6 @@
 /* A shaft that is held and let go: when the drive asks, where the angle stops, what a rotor that stands tells, and how the estimator goes on. */
 #include "drive_rig.h"
 
-#include <math.h>
-
 #include "drive/held.h"
 #include "drive/limits.h"
 #include "drive/protection.h"
@@ -233,7 +231,7 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
         per_step = 1500.0F / 60.0F * 16.0F * PARAM_F(LOOPTIME_SEC) * 65536.0F; /* angle counts */
         steps(1);
         for (uint16_t n = 1; n <= HELD_ASK_STEPS && held_angle_stands(shaft); n++) {
-            rig_emf((int16_t)(-400.0F * sinf((float)n * per_step / 65536.0F * 2.0F * (float)M_PI)), (int16_t)(direction * 395));
+            rig_emf(qm_mulhi(-800, trig_sincos((angle_t)((float)n * per_step)).sin), (int16_t)(direction * 395));
             steps(1);
         }
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);

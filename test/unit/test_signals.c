@@ -1,7 +1,9 @@
 /* Both rules of the signals: what flows against what is asked for, and voltages and currents against the motor. */
 #include "drive_rig.h"
 
-#include <math.h>
+#define PI 3.14159265
+#define ROOT_OF_3 1.7320508
+#define ROOT_OF_HALF 0.70710678
 
 #include "drive/signals.h"
 
@@ -274,10 +276,10 @@ void test_five_eighths_of_the_innovations_size_in_time_with_the_electrical_angle
 
 void test_the_innovation_that_a_load_can_make_follows_from_current_torque_inertia_and_the_observer_s_rate(void)
 {
-    const double acceleration = 1.5 * 5.0 * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / sqrt(3.0) * 60.0 / (2.0 * M_PI * 1000.0 * 5.0)
+    const double acceleration = 1.5 * 5.0 * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / ROOT_OF_3 * 60.0 / (2.0 * PI * 1000.0 * 5.0)
                                 * PARAM_F(MAXIMUM_CURRENT_A) / 2.0 / PARAM_F(MOTOR_INERTIA_KGM2); /* rad/s2 of half the largest current */
-    const double rate = PARAM_F(PARAM_LOADED_SHARE) * 2.0 * M_PI * PARAM_F(LOAD_BANDWIDTH_HZ);
-    const double mean_erpm = 2.0 / M_PI * acceleration / (2.0 * rate) * 5.0 * 60.0 / (2.0 * M_PI);
+    const double rate = PARAM_F(PARAM_LOADED_SHARE) * 2.0 * PI * PARAM_F(LOAD_BANDWIDTH_HZ);
+    const double mean_erpm = 2.0 / PI * acceleration / (2.0 * rate) * 5.0 * 60.0 / (2.0 * PI);
     TEST_ASSERT_UINT16_WITHIN((uint16_t)(mean_erpm / 100.0), (uint16_t)mean_erpm, params.load_erpm);
 }
 
@@ -312,7 +314,7 @@ void test_evidence_that_comes_and_goes_for_long_is_halved_and_ends_in_no_fault(v
             TEST_ASSERT_LESS_OR_EQUAL_UINT16(513, drive.run.evidence.checks);
             TEST_ASSERT_GREATER_OR_EQUAL_UINT16((n < 256u) ? n : 256u, drive.run.evidence.checks);
         }
-        expected = (int32_t)(drive.run.evidence.checks * M_SQRT1_2 * drive.run.observer.innovation_erpm);
+        expected = (int32_t)(drive.run.evidence.checks * ROOT_OF_HALF * drive.run.observer.innovation_erpm);
         TEST_ASSERT_INT32_WITHIN(params.load_erpm * 4, expected, drive.run.evidence.once.sine);
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     }

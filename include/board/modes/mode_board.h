@@ -108,10 +108,7 @@ panel_lights_t mode_panel(const panel_inputs_t *in);
 #define SCOPE_MODE_PARAMS 0u
 #endif
 #ifdef IDENTIFY
-#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 128u) /* its stack, too */
-#if SCOPE && defined __XC16__
-#error userparams.h: SCOPE 1 and IDENTIFY together do not fit into the flash: set SCOPE 0, the status line has all that is measured
-#endif
+#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 144u) /* its stack, too */
 #else
 #define SCOPE_MODE_IDENTIFY 0u
 #endif
@@ -130,6 +127,6 @@ panel_lights_t mode_panel(const panel_inputs_t *in);
 #endif
 
 /** Of the trace buffer. */
-#define SCOPE_BYTES ((848u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY - SCOPE_MODE_BRINGUP - SCOPE_MODE_SNAPSHOT) & ~3u)
+#define SCOPE_BYTES ((760u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY - SCOPE_MODE_BRINGUP - SCOPE_MODE_SNAPSHOT) & ~3u)
 
 #endif

@@ -47,7 +47,7 @@ void mode_start(drive_t *d, const drive_params_t *p);
 #define MODE_STATE IDENTIFY_STATE BRINGUP_STATE PROFILE_STATE
 
 /** 0 where no state has a closed loop: what belongs to it is left out. */
-#ifdef BRINGUP
+#if defined BRINGUP || defined IDENTIFY
 #define MODE_CLOSES_LOOP 0
 #else
 #define MODE_CLOSES_LOOP 1
