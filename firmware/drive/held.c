@@ -18,10 +18,16 @@ static void held_enter(held_t *shaft, held_phase_t next)
     shaft->doubts = 0;
 }
 
+/** What follows. */
+static void held_will(held_t *shaft, held_act_t act)
+{
+    shaft->act = (uint16_t)act;
+}
+
 void held_forget(held_t *shaft)
 {
     held_enter(shaft, HELD_NOT);
-    shaft->act = (uint16_t)HELD_WAITS;
+    held_will(shaft, HELD_WAITS);
     shaft->stood = 0;
 }
 
@@ -185,13 +191,12 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
     held_t *shaft = &run->held;
     const current_q13_t iq_q13 = run->control.i_q13.q;
     const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(emf.q);
-    int16_t share;
     held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
         if (shaft->stood == 0u) {
             held_turn_back(d, p, held_turned(p, held_speed(run, emf), (uint16_t)(shaft->doubted_steps + 1u)));
         }
-        share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
+        int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         run->adaptation.rs_q31 = (int32_t)held_rs(&p->adaptation, qm_hi(run->adaptation.rs_q31), share) * 65536;
         drive_update_model(run, p, run->control.reference_erpm);
@@ -238,7 +243,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
     if (shaft->doubts >= HELD_DOUBTS_MOST) {
-        shaft->act = (uint16_t)HELD_STOP;
+        held_will(shaft, HELD_STOP);
     }
 }
 
@@ -254,23 +259,23 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
         if (moved <= most >> 1) {
             held_enter(shaft, HELD_ASKED);
         } else if (shaft->steps > shaft->patience) {
-            shaft->act = (uint16_t)HELD_HAS_TURNED;
+            held_will(shaft, HELD_HAS_TURNED);
         } else { /* the current changes */
         }
         shaft->emf_q12 = emf;
         break;
     case HELD_ASKED:
         if (moved > 2u * most || (shaft->steps > 1u && held_emf_turns(shaft, &d->run, p, emf))) {
-            shaft->act = (uint16_t)HELD_HAS_TURNED;
+            held_will(shaft, HELD_HAS_TURNED);
         } else if (shaft->steps >= HELD_ASK_STEPS) {
-            shaft->act = (uint16_t)HELD_LEARN;
+            held_will(shaft, HELD_LEARN);
         } else { /* it may turn slowly */
         }
         break;
     case HELD_STANDS:
     default:
         if (moved > most) {
-            shaft->act = (uint16_t)HELD_GOES_ON;
+            held_will(shaft, HELD_GOES_ON);
         } else { /* the load is what flows, and it grows */
             observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         }
@@ -305,7 +310,7 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     const dq_t emf = estimator_emf(&d->run.estimator);
     const uint16_t act = shaft->act;
 
-    shaft->act = (uint16_t)HELD_WAITS;
+    held_will(shaft, HELD_WAITS);
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;
     case HELD_HAS_TURNED:

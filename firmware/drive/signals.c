@@ -62,11 +62,11 @@ static void signals_gather(signals_evidence_t *e, const drive_t *d, uint16_t une
 {
     const int16_t x = d->run.observer.innovation_erpm;
     const sincos_t at = d->frame;
-    sincos_t twice;
-    twice.cos = (int16_t)(qm_mulhi(at.cos, at.cos) - qm_mulhi(at.sin, at.sin)); /* half */
-    twice.sin = (int16_t)(2 * qm_mulhi(at.cos, at.sin));
+    sincos_t double_angle;
+    double_angle.cos = (int16_t)(qm_mulhi(at.cos, at.cos) - qm_mulhi(at.sin, at.sin)); /* half */
+    double_angle.sin = (int16_t)(2 * qm_mulhi(at.cos, at.sin));
     signals_add_along(&e->once, x, at);
-    signals_add_along(&e->twice, (int16_t)(2 * qm_limit(x, 16383)), twice);
+    signals_add_along(&e->twice, (int16_t)(2 * qm_limit(x, 16383)), double_angle);
     e->size += (uint16_t)qm_abs(x);
     e->checks++;
     e->unexplained = (uint16_t)(e->unexplained + unexplained);

@@ -92,7 +92,7 @@ static void align_turn_ends(align_t *a)
 static void align_measure(drive_t *d)
 {
     align_t *a = &d->run.align;
-    angle_t turned = (angle_t)((d->direction > 0) ? d->angle : 0u - d->angle);
+    angle_t turned = (angle_t)((d->direction > 0) ? d->angle : 65536ul - d->angle);
     int16_t v = along_direction(d, d->run.control.v_q14.q);
     if (turned < a->turned) {
         align_turn_ends(a);

@@ -1039,7 +1039,7 @@ void identify_damp(drive_t *d)
     id->swing += v_q14 - (id->swing >> SWING_LOG2);
     id->swing_mean += v_q14 - (id->swing_mean >> SWING_MEAN_LOG2);
     ahead_q14 = (int16_t)((id->swing >> SWING_LOG2) - (id->swing_mean >> SWING_MEAN_LOG2));
-    d->forced.step_q32 -= (uint32_t)((int32_t)ahead_q14 * SWING_GAIN * 64);
+    d->forced.step_q32 = qm_turn_sub(d->forced.step_q32, (uint32_t)((int32_t)ahead_q14 * SWING_GAIN * 64));
 }
 
 uint16_t identify_turn(drive_t *d, const drive_params_t *p)
