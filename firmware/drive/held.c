@@ -193,11 +193,11 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
     const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(emf.q);
     held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
+        int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
+        share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         if (shaft->stood == 0u) {
             held_turn_back(d, p, held_turned(p, held_speed(run, emf), (uint16_t)(shaft->doubted_steps + 1u)));
         }
-        int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
-        share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         run->adaptation.rs_q31 = (int32_t)held_rs(&p->adaptation, qm_hi(run->adaptation.rs_q31), share) * 65536;
         drive_update_model(run, p, run->control.reference_erpm);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */

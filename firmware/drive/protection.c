@@ -109,6 +109,19 @@ static void protection_count_dip(drive_run_t *run, uint16_t dips)
     }
 }
 
+/** A step between two probes. */
+static void protection_pause(drive_run_t *run, uint16_t doubtful)
+{
+    run->probe_steps++;
+    if (doubtful && run->probe_steps > PROBE_CALM_STEPS && !observer_gate_is_closed(&run->observer)) {
+        run->probe_asked = 1; /* a shaft that is blocked looks like a load step, if R is off */
+    }
+    if (run->probe_steps > PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS || run->dip_steps == PROBE_DIP_STEPS
+        || (run->probe_asked && run->probe_steps > PROBE_SOON_STEPS)) {
+        probe_enter(run, PROBE_WAIT);
+    }
+}
+
 void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
@@ -141,14 +154,7 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     case PROBE_PAUSE:
     default:
         protection_count_dip(run, (uint16_t)(along < reference - (reference >> 2)));
-        run->probe_steps++;
-        if (doubtful && run->probe_steps > PROBE_CALM_STEPS && !observer_gate_is_closed(&run->observer)) {
-            run->probe_asked = 1; /* a shaft that is blocked looks like a load step, if R is off */
-        }
-        if (run->probe_steps > PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS || run->dip_steps == PROBE_DIP_STEPS
-            || (run->probe_asked && run->probe_steps > PROBE_SOON_STEPS)) {
-            probe_enter(run, PROBE_WAIT);
-        }
+        protection_pause(run, doubtful);
         break;
     }
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));

@@ -657,11 +657,11 @@ static uint32_t inertia(const identify_t *id)
     const identify_part_t *push = &id->parts[PART_PUSH], *fast = &id->parts[PART_FAST], *slow = &id->parts[PART_SLOW];
     int32_t slow_rate = part_rate(slow), slow_current = part_current(id, PART_SLOW);
     int32_t rate = part_rate(push) - slow_rate, current = part_current(id, PART_PUSH) - slow_current;
-    int32_t apart = part_speed(fast) - part_speed(slow), above = part_speed(push) - part_speed(slow);
+    int32_t span = part_speed(fast) - part_speed(slow), pushed = part_speed(push) - part_speed(slow);
     soft_float_t j;
-    if (apart > 0) {
-        rate -= share_of(part_rate(fast) - slow_rate, above, apart);
-        current -= share_of(part_current(id, PART_FAST) - slow_current, above, apart);
+    if (span > 0) {
+        rate -= share_of(part_rate(fast) - slow_rate, pushed, span);
+        current -= share_of(part_current(id, PART_FAST) - slow_current, pushed, span);
     }
     if (rate <= 0 || current <= 0) {
         return 0;
