@@ -685,7 +685,7 @@ void test_a_rotor_that_swings_is_waited_for_a_minute_at_most(void)
     uint16_t n;
     control->ref_q13.d = 2000;
     for (n = 1; n < REST_MOST; n++) { /* across the axis 200 and 400 */
-        set_sums(0, ((n & 1u) ? 2200l : 2400l) << MEAN_LOG2, -(1000l << MEAN_LOG2), BUS_SUM);
+        set_sums(0, (int32_t)(((n & 1u) ? 2200l : 2400l) << MEAN_LOG2), (int32_t)-(1000l << MEAN_LOG2), BUS_SUM);
         (void)finished(IDENTIFY_ALIGN);
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_ALIGN, id->step);
     }
