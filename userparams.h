@@ -262,7 +262,7 @@
  *   stall_steps                          0.23 s                 288  16 periods                  +0.174 %  stall
  *   lost_lock_steps                      0.06 s                  75  16 periods                     exact  lost lock
  *   wrong_steps                           0.1 s                 250  8 periods                      exact  voltages and currents do not fit the motor
- *   load_erpm                          225.59 rpm              1127  erpm                        -0.084 %  mean innovation that no load makes
+ *   load_erpm                          225.59 rpm              1128  erpm                        +0.005 %  mean innovation that no load makes
  *   impossible_steps                     0.25 s                 156  32 periods                  -0.160 %  flux or resistance impossible
  *   kfi_impossible                       -0.2 1               -6554  Q15                         +0.006 %  change of 1/Kphi that no magnet gives
  *   id_off_q13                        0.10185 A                 190  Q13 A                       +0.194 %  d current's mean deviation

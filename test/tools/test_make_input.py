@@ -65,7 +65,7 @@ def test_the_nearest_name_is_the_one_that_was_meant(typed, meant):
 
 
 @pytest.mark.parametrize("goal, word, text", [
-    ("starts", "SCENARIO=demo", "make starts has no SCENARIO, .*: it takes MOTOR BOARD"), ("run", "SAN=1", "make run has no SAN"),
+    ("starts", "SCENARIO=demo", "make starts has no SCENARIO, .*: it takes FULL DRAW SEED CASE MOTOR BOARD"), ("run", "SAN=1", "make run has no SAN"),
     ("cycles", "MOTOR=x", "make cycles has no MOTOR"), ("motors", "MOTOR=x", "it takes BOARD OUT"), ("format", "OUT=x", "leave it out"),
     ("table2", "DEFINES=-DTUNING", "make table2 has no DEFINES")])
 def test_a_variable_that_a_target_would_not_read_is_refused(goal, word, text):

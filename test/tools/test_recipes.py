@@ -93,7 +93,7 @@ def add_state(tree: Tree) -> None:
     tree.row(states, "TRANSITIONS_FROM_STOPPED", 'X(COAST, "the rotor still turns")')
     tree.change(states, r"(?=^#define TRANSITIONS_FROM_STOPPED)",
                 '#define TRANSITIONS_FROM_COAST(X) \\\\\n    X(STOPPED, "the rotor stands") \\\\\n    TRANSITIONS_BY_SUPERVISION(X)\n')
-    tree.change("firmware/drive/states.c", r"(    case DRIVE_CATCH:\n)", r"    case DRIVE_COAST:\n        next = (uint16_t)DRIVE_STOPPED;\n        break;\n\1")
+    tree.change("firmware/drive/states.c", r"(    case DRIVE_CATCH: next)", r"    case DRIVE_COAST: next = (uint16_t)DRIVE_STOPPED; break;\n\1")
     tree.compile("DRIVE_COAST == DRIVE_STATE_COUNT - 1")
     page = tree.page("states")
     assert "    STOPPED --> COAST: the rotor still turns\n" in page and "| COAST | outputs off, the rotor runs out |" in page

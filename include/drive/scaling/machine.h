@@ -65,7 +65,7 @@
     .brake_per_bus_q8 = (int16_t)(256.0F * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(BRAKE_BAND_V)) + 0.5F), \
     .stall_steps = PARAM_STEPS_OF_16(PARAM_F(PARAM_STALL_SEC)), \
     .lost_lock_steps = PARAM_STEPS_OF_16(LOST_LOCK_SEC), \
-    .wrong_steps = PARAM_STEPS_OF_8(WRONG_SEC), .load_erpm = (uint16_t)PARAM_LOAD_ERPM, \
+    .wrong_steps = PARAM_STEPS_OF_8(WRONG_SEC), .load_erpm = (uint16_t)(PARAM_LOAD_ERPM + 0.5F), \
     .impossible_steps = PARAM_STEPS_OF_32(IMPOSSIBLE_SEC), \
     .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
     .id_off_q13 = CURRENT_Q13(PARAM_ID_OFF), \
