@@ -288,10 +288,10 @@ void test_what_proves_nothing_is_halved_and_what_has_ended_is_forgotten(void)
     const beat_t load = { 0, 300, 7001, 0 };
     TEST_ASSERT_EQUAL_UINT16(250, wrong_until_fault(1000, -10, load, 250));
     TEST_ASSERT_EQUAL_UINT16(250, drive.run.evidence.checks);
-    TEST_ASSERT_EQUAL_UINT32(250u * 300u, drive.run.evidence.size);
+    TEST_ASSERT_EQUAL_UINT32(250ul * 300ul, drive.run.evidence.size);
     TEST_ASSERT_EQUAL_UINT16(251, wrong_until_fault(1000, -10, load, 251));
     TEST_ASSERT_EQUAL_UINT16(126, drive.run.evidence.checks);
-    TEST_ASSERT_EQUAL_UINT32(251u * 300u / 2u, drive.run.evidence.size);
+    TEST_ASSERT_EQUAL_UINT32(251ul * 300ul / 2ul, drive.run.evidence.size);
     TEST_ASSERT_EQUAL_UINT16(125, drive.run.observer.wrong_steps);
     drive.run.observer.wrong_steps = 0;
     signals_check(&drive, &params);
