@@ -21,10 +21,10 @@ def sweep(*words, **changes):
 
 
 # ---- what is asked -------------------------------------------------------------------------------------------------------
-def test_the_box_has_every_combination_under_the_largest_load_and_in_full_600_starts_from_eight_angles():
+def test_the_box_has_every_combination_under_what_its_weakest_magnets_carry_and_in_full_600_starts_from_eight_angles():
     plain, box = ([item for item in sweep("--full").cases() if item.is_off == whether] for whether in (False, True))
     assert len(plain) == 24 * 5 and {(item.R, item.L, item.Kphi) for item in plain} == {(1.0, 1.0, 1.0)}
-    assert len(box) == len(set(box)) == 600 and {(item.load_nm, item.inertia) for item in box} == {(0.06, 1.0)}
+    assert len(box) == len(set(box)) == 600 and {(item.load_nm, item.inertia) for item in box} == {(0.048, 1.0)}
     assert {item.R for item in box} == {0.7, 0.85, 1.0, 1.15, 1.3} and {item.L for item in box} == {0.75, 1.0, 1.25}
     assert {item.Kphi for item in box} == {0.8, 0.9, 1.0, 1.1, 1.2} and len({item.rotor_deg for item in box}) == 8
     some = [item for item in sweep().cases() if item.is_off]
@@ -44,7 +44,7 @@ def test_a_drawn_start_is_always_the_same_and_all_of_it_is_off_within_its_bounds
     assert sweep("--case", "9", "3", "--seed", "7").cases() == [cases[2], cases[8]]
     for spread, low, high in (([item.R for item in cases], 0.7, 1.3), ([item.L for item in cases], 0.7, 1.3), ([item.Kphi for item in cases], 0.8, 1.2),
                               ([item.inertia for item in cases], 0.5, 3.0), ([item.rotor_deg for item in cases], 0.0, 360.0),
-                              ([item.load_nm for item in cases], 0.0, 0.06), ([dict(item.keys)["supply.voltage_v"][1] for item in cases], 0.9, 1.1),
+                              ([item.load_nm for item in cases], 0.0, 0.048), ([dict(item.keys)["supply.voltage_v"][1] for item in cases], 0.9, 1.1),
                               ([dict(item.keys)["inverter.turn_on_s"] * 1e6 for item in cases], 0.1, 0.7),
                               ([dict(item.keys)["inverter.turn_off_s"] * 1e6 for item in cases], 0.15, 0.75),
                               ([dict(item.keys)["shunt.offset_b_v"] for item in cases], -0.02, 0.02)):

@@ -48,7 +48,7 @@
 
 /** Mean innovation of a load that swings between nothing and all that MAXIMUM_CURRENT_A carries, i/2 sin wt, where the observer is worst, w = r:
  *  Kt/J i/2 / (2 r), and 2/pi of that in the mean. */
-#define PARAM_LOAD_ERPM PARAM_MIN(PARAM_ACCEL *PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / (2.0F * PARAM_PI * PARAM_LOADED_Q16 / 65536.0F), 32766.0F)
+#define PARAM_LOAD_ERPM PARAM_MIN(PARAM_ACCEL *PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / (2.0F * PARAM_PI * PARAM_LOADED_Q16 / 65536.0F), 32767.0F)
 
 /* A speed's angle is rounded as the estimator rounds it. */
 #define PARAM_OBSERVER_INIT \
