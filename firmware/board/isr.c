@@ -68,11 +68,7 @@ QM_INLINE void board_set_idle_outputs(uint16_t outputs)
 /** 1 in the periods with the bridge switching that slow work follows: scope and SNAPSHOT look at each. */
 QM_INLINE uint16_t board_slow_is_due(void)
 {
-#if SCOPE || MODE_RECORDS
-    return 1;
-#else
-    return drive_slow_follows(&board_drive);
-#endif
+    return (uint16_t)(MODE_SEES_EVERY_PERIOD || drive_slow_follows(&board_drive));
 }
 
 #define BOARD_TRAP_FLAGS 0x001Cu /* ADDRERR, STKERR, MATHERR */

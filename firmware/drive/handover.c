@@ -104,6 +104,16 @@ void handover_preset(drive_t *d, const drive_params_t *p, angle_t angle)
     d->frame = trig_sincos(angle);
 }
 
+NOINLINE sincos_t handover_turn_voltage(drive_run_t *run, int16_t back)
+{
+    drive_control_t *c = &run->control;
+    const sincos_t turn = trig_sincos((angle_t)back);
+    const alphabeta_t v = inverse_park(c->v_q14, turn);
+    c->v_q14.d = (int16_t)(2 * v.alpha);
+    c->v_q14.q = (int16_t)(2 * v.beta);
+    return turn;
+}
+
 void handover_now(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
@@ -112,10 +122,7 @@ void handover_now(drive_t *d, const drive_params_t *p)
     sincos_t turn;
     alphabeta_t y;
     h->offset = (int16_t)(angle_t)(d->angle - estimated);
-    turn = trig_sincos((angle_t)h->offset);
-    y = inverse_park(c->v_q14, turn);
-    c->v_q14.d = (int16_t)(2 * y.alpha);
-    c->v_q14.q = (int16_t)(2 * y.beta);
+    turn = handover_turn_voltage(&d->run, h->offset);
     h->current_q13 = c->ref_q13.q;
     y = inverse_park_q(h->current_q13, turn);
     c->ref_q13.d = (int16_t)(2 * y.alpha);

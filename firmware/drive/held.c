@@ -69,7 +69,8 @@ static speed_erpm_t held_speed(const drive_run_t *run, dq_t emf)
 /** The angle that a speed turns in so many steps, a quarter turn at most. */
 static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uint16_t steps)
 {
-    const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST, HELD_PERIOD_MOST); /* a quarter turn in a step */
+    const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST,
+                                           HELD_PERIOD_MOST); /* a quarter turn in a step */
     const int32_t turned = qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps);
     return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER
                                                                                        : turned);
@@ -84,14 +85,11 @@ int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q
     return qm_with_sign((int16_t)((lead > 32767u) ? 32767u : lead), more); /* half a turn at most */
 }
 
-/** Turns the frame back, and the vector that is commanded stays. */
+/** Turns the frame back, and the vector that is commanded stays. @param lead angle counts */
 static void held_turn_back(drive_t *d, const drive_params_t *p, int16_t lead)
 {
-    drive_control_t *c = &d->run.control;
     estimator_t *e = &d->run.estimator;
-    const alphabeta_t v = inverse_park(c->v_q14, trig_sincos((angle_t)lead));
-    c->v_q14.d = (int16_t)(2 * v.alpha);
-    c->v_q14.q = (int16_t)(2 * v.beta);
+    (void)handover_turn_voltage(&d->run, lead);
     e->rho_q32 = qm_turn_sub(e->rho_q32, (uint32_t)(angle_t)lead << 16);
     e->next = (angle_t)(e->next - (angle_t)lead);
     handover_preset(d, p, e->next);
@@ -195,8 +193,9 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
         int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
-        if (shaft->stood == 0u) {
-            held_turn_back(d, p, held_turned(p, held_speed(run, emf), (uint16_t)(shaft->doubted_steps + 1u)));
+        if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
+            shaft->run_on = held_turned(p, held_speed(run, emf), (uint16_t)(shaft->doubted_steps + 1u));
+            held_will(shaft, HELD_TURN_BACK);
         }
         run->adaptation.rs_q31 = (int32_t)held_rs(&p->adaptation, qm_hi(run->adaptation.rs_q31), share) * 65536;
         drive_update_model(run, p, run->control.reference_erpm);
@@ -274,7 +273,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
         break;
     case HELD_STANDS:
     default:
-        if (moved > most) {
+        if (shaft->act == (uint16_t)HELD_WAITS && moved > most) { /* the frame is turned back first */
             held_will(shaft, HELD_GOES_ON);
         } else { /* the load is what flows, and it grows */
             observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
@@ -318,6 +317,7 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
         shaft->emf_q12 = emf;
         break;
     case HELD_LEARN: held_learn(d, p, emf); break;
+    case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;
     case HELD_GOES_ON:
         held_turns_again(d, p, emf);
         shaft->emf_q12 = emf;

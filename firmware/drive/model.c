@@ -103,8 +103,8 @@ voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p)
 static uint16_t model_is_taught(const drive_run_t *run)
 {
     const drive_control_t *c = &run->control;
-    return (uint16_t)(run->handover.phase == (uint16_t)START_DONE && observer_gate_is_closed(&run->observer) && qm_abs(c->v_q14.q) < c->vq_limit_q14 && !held_angle_stands(&run->held)
-                      && qm_abs(c->ref_q13.q) < c->iq_limit_q13);
+    return (uint16_t)(run->handover.phase == (uint16_t)START_DONE && observer_gate_is_closed(&run->observer) && qm_abs(c->v_q14.q) < c->vq_limit_q14
+                      && !held_angle_stands(&run->held) && qm_abs(c->ref_q13.q) < c->iq_limit_q13);
 }
 
 void model_learn_step(drive_t *d, const drive_params_t *p)

@@ -63,8 +63,6 @@ void protection_check_model(drive_t *d, const drive_params_t *p)
 
 #define PROTECTION_PROBE_LEAST_Q15 ((MOTOR_SALIENCY_UH) ? PROBE_LEAST_SALIENT_Q15 : PROBE_LEAST_Q15)
 
-/** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand, for a voltage in phase
- *  with the current is both. */
 uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t r_more = (int16_t)(p->rs_off_most - qm_hi(run->adaptation.rs_q31));
@@ -84,11 +82,23 @@ current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t
     return most;
 }
 
-/** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */
 speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
 {
     int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
     return (least < standing) ? standing : least;
+}
+
+/** 1 where a probe can tell something. */
+static uint16_t probe_is_wanted(const drive_run_t *run, const drive_params_t *p)
+{
+    return (uint16_t)(run->handover.id_q13 == 0 && protection_rotor_is_doubtful(run, p));
+}
+
+/** 1 where the rotor seems to turn, or the back-EMF has a direction. @param along speed along the run's direction */
+static uint16_t probe_sees_a_turn(const drive_run_t *run, const drive_params_t *p, speed_erpm_t along)
+{
+    dq_t emf = estimator_emf(&run->estimator);
+    return (uint16_t)(along >= protection_least_speed(run, p) || qm_abs(emf.d) < (qm_abs(emf.q) >> 2));
 }
 
 /** The one place that writes the phase. */
@@ -110,10 +120,10 @@ static void protection_count_dip(drive_run_t *run, uint16_t dips)
 }
 
 /** A step between two probes. */
-static void protection_pause(drive_run_t *run, uint16_t doubtful)
+static void protection_pause(drive_run_t *run, const drive_params_t *p)
 {
     run->probe_steps++;
-    if (doubtful && run->probe_steps > PROBE_CALM_STEPS && !observer_gate_is_closed(&run->observer)) {
+    if (run->probe_steps > PROBE_CALM_STEPS && !observer_gate_is_closed(&run->observer) && probe_is_wanted(run, p)) {
         run->probe_asked = 1; /* a shaft that is blocked looks like a load step, if R is off */
     }
     if (run->probe_steps > PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS || run->dip_steps == PROBE_DIP_STEPS
@@ -126,17 +136,13 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_abs(run->control.reference_erpm);
-    uint16_t doubtful = (uint16_t)(run->handover.id_q13 == 0 && protection_rotor_is_doubtful(run, p));
-    uint16_t seems_to_turn = (uint16_t)(along >= protection_least_speed(run, p));
-    dq_t emf = estimator_emf(&run->estimator);
-    uint16_t turns = (uint16_t)(seems_to_turn || qm_abs(emf.d) < (qm_abs(emf.q) >> 2));
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
     if (held_angle_stands(&run->held)) { /* its question, at the currents that flow */
         return;
     }
     switch (run->probe_phase) {
     case PROBE_WAIT:
-        run->probe_steps = (uint16_t)((doubtful && seems_to_turn) ? run->probe_steps + 1u : 0u);
+        run->probe_steps = (uint16_t)((along >= protection_least_speed(run, p) && probe_is_wanted(run, p)) ? run->probe_steps + 1u : 0u);
         run->probe_most_q13 = protection_probe_most(run, p);
         if (run->probe_steps == PROBE_WAIT_STEPS) {
             run->probe_asked = 0;
@@ -146,15 +152,15 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     case PROBE_TEST:
         id_q13 = qm_clamp(qm_abs(run->control.ref_q13.q), 0, run->probe_most_q13);
         run->dip_steps = PROBE_DIP_STEPS + 1u; /* a heavy load dips for want of the probe's current: none counts before it is over */
-        run->probe_steps = (uint16_t)(run->probe_steps + turns);
-        if (!doubtful || run->probe_steps == PROBE_STEPS) {
+        run->probe_steps = (uint16_t)(run->probe_steps + probe_sees_a_turn(run, p, along));
+        if (run->probe_steps == PROBE_STEPS || !probe_is_wanted(run, p)) {
             probe_enter(run, PROBE_PAUSE);
         }
         break;
     case PROBE_PAUSE:
     default:
         protection_count_dip(run, (uint16_t)(along < reference - (reference >> 2)));
-        protection_pause(run, doubtful);
+        protection_pause(run, p);
         break;
     }
     run->probe_id_q13 = qm_clamp(id_q13, (int16_t)(run->probe_id_q13 - slope), (int16_t)(run->probe_id_q13 + slope));

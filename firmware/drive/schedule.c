@@ -26,14 +26,22 @@ static void control_speed(drive_t *d, const drive_params_t *p, const drive_sampl
     speed_step(d, p);
 }
 
+/** Where a state leads to the next by what the rotor does: CLOSED does not. */
+static void step_beside_closed(drive_t *d, const drive_params_t *p)
+{
+    if (d->state != (uint16_t)DRIVE_CLOSED) {
+        states_rotor_step(d, p);
+    }
+}
+
 /** Where a state leads to the next by what the rotor does, and what follows for a rotor that may be held. */
 static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     (void)raw;
-    if (drive_is_closed(d) && d->run.held.act != (uint16_t)HELD_WAITS) {
+    if (d->run.held.act != (uint16_t)HELD_WAITS && drive_is_closed(d)) {
         held_act(d, p);
     } else {
-        states_rotor_step(d, p);
+        step_beside_closed(d, p);
     }
 }
 
@@ -44,9 +52,7 @@ static void ask_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t
     if (drive_is_closed(d)) {
         held_step(d, p);
     }
-    if (d->state != (uint16_t)DRIVE_CLOSED) {
-        states_rotor_step(d, p);
-    }
+    step_beside_closed(d, p);
 }
 
 /** The modulator's gain follows the bus, and so does what braking may do to it. */

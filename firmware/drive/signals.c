@@ -24,10 +24,14 @@ static uint16_t signals_voltage_is_unexplained(const drive_run_t *run, const dri
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
     int16_t unturned_q12 = (int16_t)(qm_abs(emf.d) - qm_abs(emf.q)); /* beyond a back-EMF in its direction */
+    uint16_t ri_q12, dead_q12;
+    if (unturned_q12 <= 0) { /* as a rule */
+        return 0;
+    }
     /* fits a word: no current flows for which R takes more voltage than there is */
-    uint16_t ri_q12 = (uint16_t)((uint16_t)model_header_ri(p, qm_abs(i.d)) + (uint16_t)model_header_ri(p, qm_abs(i.q)));
-    uint16_t dead_q12 = (uint16_t)(SIGNALS_DEAD_TIMES * p->adaptation.emf_least_q12);
-    return (uint16_t)(unturned_q12 > 0 && (uint16_t)unturned_q12 > ri_q12 + dead_q12);
+    ri_q12 = (uint16_t)((uint16_t)model_header_ri(p, qm_abs(i.d)) + (uint16_t)model_header_ri(p, qm_abs(i.q)));
+    dead_q12 = (uint16_t)(SIGNALS_DEAD_TIMES * p->adaptation.emf_least_q12);
+    return (uint16_t)((uint16_t)unturned_q12 > ri_q12 + dead_q12);
 }
 
 /** 1 near the end of a stop, where what dead time leaves can make innovations that do not end: the currents of a rotor that slows down by
@@ -123,13 +127,12 @@ void signals_check(drive_t *d, const drive_params_t *p)
     if (unexplained) {
         run->observer.wrong_steps = (uint16_t)(run->observer.wrong_steps + SIGNALS_UNEXPLAINED);
     }
-    if (run->observer.wrong_steps == 0u || run->evidence.checks >= SIGNALS_CHECKS_END) {
-        if (run->evidence.checks != 0u) {
-            signals_forget(&run->evidence);
-        }
-        return;
+    if (run->observer.wrong_steps != 0u && run->evidence.checks < SIGNALS_CHECKS_END) {
+        signals_gather(&run->evidence, d, unexplained);
+    } else if (run->evidence.checks != 0u) {
+        signals_forget(&run->evidence);
+    } else { /* as a rule: nothing is wrong */
     }
-    signals_gather(&run->evidence, d, unexplained);
 }
 
 void signals_judge(drive_t *d, const drive_params_t *p)

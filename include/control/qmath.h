@@ -150,7 +150,8 @@ QM_INLINE int16_t qm_with_sign(int16_t most, int16_t x)
 /** 1 where |x| > most. @param most not negative */
 QM_INLINE uint16_t qm_beyond(int16_t x, int16_t most)
 {
-    return (uint16_t)(x > most || x < -most);
+    /* one compare: x + most is a word, and negative ones are beyond all others */
+    return (uint16_t)((uint16_t)((uint16_t)x + (uint16_t)most) > 2u * (uint16_t)most);
 }
 
 /** x limited to -most..most. @param most not negative */

@@ -2,7 +2,7 @@
 #ifndef DRIVE_HANDOVER_H
 #define DRIVE_HANDOVER_H
 
-#include "control/qmath.h"
+#include "control/angle.h"
 #include "drive/forward.h"
 #include "drive/param_scaling.h"
 
@@ -49,6 +49,9 @@ void handover_wait(drive_t *d, const drive_params_t *p);
 
 /** The law goes on at an angle: its frame, and integrators that give the voltages that are commanded. */
 void handover_preset(drive_t *d, const drive_params_t *p, angle_t angle);
+
+/** The vector that is commanded stays, in a frame that is turned back. @param back angle counts @return cosine and sine of them */
+sincos_t handover_turn_voltage(drive_run_t *run, int16_t back);
 
 /** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
  *  those of the next sample. */

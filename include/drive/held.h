@@ -25,6 +25,7 @@ typedef enum {
     HELD_STOP,       /**< the angle stops */
     HELD_HAS_TURNED, /**< the rotor has turned all the time */
     HELD_LEARN,      /**< the rotor stands: all of the back-EMF is R i */
+    HELD_TURN_BACK,  /**< the frame turns back by what R i had turned it */
     HELD_GOES_ON     /**< it stood, and turns now */
 } held_act_t;
 
@@ -37,13 +38,14 @@ typedef struct {
     uint16_t doubted_steps;  /**< since then */
     uint16_t stopped_steps;  /**< since the angle stands */
     uint16_t patience;       /**< steps that the back-EMF has to settle */
-    uint16_t stood;          /**< 1: the rotor has stood since it was as fast as it should be, so R is known */
+    uint16_t stood;          /**< since the rotor was as fast as it should be: 1 it has stood, so R is known; 2 and has turned again */
     dq_t emf_q12;            /**< filtered back-EMF of the last step; of an older one from HELD_ASKED on */
     int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */
     int16_t inv_kfi;         /**< of the model when the angle stopped */
     int16_t emf_sum_max_q12; /**< and its limit of the sum of back-EMFs */
     speed_erpm_t omega_erpm; /**< the estimator's speed then */
-    int16_t load;            /**< the load before all that, of the load observer */
+    int16_t load;            /**< the load before all that, in units of the load observer: high word of its load_q16 */
+    int16_t run_on;          /**< by how much R i had turned the frame, angle counts */
 } held_t;
 
 /** 1 while the angle stands. The model's 1/Kphi is 0 then: no back-EMF turns the angle. */
@@ -52,8 +54,8 @@ uint16_t held_angle_stands(const held_t *shaft);
 /** Begins anew: the angle turns, and nothing is known of the rotor. For a ramp that follows the closed loop, and for any start. */
 void held_forget(held_t *shaft);
 
-/** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter went on turning it. @param lag_q12 see held_t
- *  @return angle counts, half a turn at most */
+/** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter, y += K (x - y), went on turning it by w/K periods' turns, w the
+ *  speed that is in the filter alone. After held_t has its inv_kfi. @param lag_q12 see held_t @return angle counts, half a turn at most */
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12);
 
 /** A step, slots 5 and 13 in closed loop. */

@@ -81,13 +81,6 @@ extern volatile uint16_t SnapStart, SnapDone;
 extern snapshot_t board_snapshot;
 #endif
 
-/** 1 where the mode has work in every period. */
-#ifdef SNAPSHOT
-#define MODE_RECORDS 1
-#else
-#define MODE_RECORDS 0
-#endif
-
 /** The mode's part of the slow work. */
 void mode_record(void);
 

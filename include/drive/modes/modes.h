@@ -46,6 +46,16 @@ void mode_start(drive_t *d, const drive_params_t *p);
 /** Members of drive_run_t. */
 #define MODE_STATE IDENTIFY_STATE BRINGUP_STATE PROFILE_STATE
 
+/** 1 where the mode has work in every period. */
+#ifdef SNAPSHOT
+#define MODE_RECORDS 1
+#else
+#define MODE_RECORDS 0
+#endif
+
+/** 1 where the slow work is called in every period, whether its slots are due or not: the scope and SNAPSHOT look at each. */
+#define MODE_SEES_EVERY_PERIOD (SCOPE || MODE_RECORDS)
+
 /** 0 where no state has a closed loop: what belongs to it is left out. */
 #if defined BRINGUP || defined IDENTIFY
 #define MODE_CLOSES_LOOP 0
