@@ -121,7 +121,6 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
     int16_t lead;
-    shaft->omega_erpm = d->run.estimator.omega_erpm;
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
@@ -147,12 +146,12 @@ static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_e
     run->held.lag_q12 = 0;
 }
 
-/** It has turned all the time, as fast as the estimator saw it. */
-static void held_has_turned(drive_t *d, const drive_params_t *p)
+/** It has turned all the time, as fast as the back-EMF says of the question's begin and of now. */
+static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
 {
-    const speed_erpm_t omega_erpm = d->run.held.omega_erpm;
-    held_turn_back(d, p, (int16_t)-held_turned(p, omega_erpm, d->run.held.stopped_steps));
-    held_go_on(d, p, omega_erpm, d->run.observer.load_q16);
+    const speed_erpm_t first_erpm = held_speed(&d->run, d->run.held.emf_q12), now_erpm = held_speed(&d->run, emf);
+    held_turn_back(d, p, (int16_t)-held_turned(p, (speed_erpm_t)((first_erpm >> 1) + (now_erpm >> 1)), d->run.held.stopped_steps));
+    held_go_on(d, p, now_erpm, d->run.observer.load_q16);
 }
 
 /** It stood, and turns now. The load is that of before; where that was too little before, what flows. */
@@ -165,13 +164,28 @@ static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
     held_go_on(d, p, held_speed(run, emf), load_q16);
 }
 
-/** 1 where the back-EMF has turned as with a rotor as fast as it says: by more than half of that. */
-static uint16_t held_emf_turns(const held_t *shaft, const drive_run_t *run, const drive_params_t *p, dq_t emf)
+/** Half of what the back-EMF's d part would have changed by, of a rotor as fast as the back-EMF says. */
+static uint16_t held_half_turned(const held_t *shaft, const drive_run_t *run, const drive_params_t *p)
 {
     const int16_t angle = held_turned(p, held_speed(run, shaft->emf_q12), shaft->steps);
-    const int16_t half = (int16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
-    const int16_t least = (int16_t)(p->adaptation.emf_least_q12 >> 1);             /* dead time shakes it by as much */
-    return (uint16_t)(qm_abs(held_less(emf.d, shaft->emf_q12.d)) > ((half > least) ? half : least));
+    return (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
+}
+
+/** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
+ *  that changes then was let go, or so slow that the frame is not far off. */
+static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
+{
+    held_t *shaft = &d->run.held;
+    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1; /* dead time shakes it by as much */
+    const uint16_t half = held_half_turned(shaft, &d->run, p), tells = (uint16_t)(half > least);
+    const int16_t turned = held_less(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
+
+    if (moved > 2u * most || (shaft->steps > 1u && turned > (int16_t)(tells ? half : least))) {
+        held_will(shaft, (tells || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
+    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && shaft->steps >= HELD_ASK_STEPS)) {
+        held_will(shaft, HELD_LEARN);
+    } else { /* it may turn slowly */
+    }
 }
 
 /** R's change and more of it, which may be beyond the format, within its limits. */
@@ -263,14 +277,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
         }
         shaft->emf_q12 = emf;
         break;
-    case HELD_ASKED:
-        if (moved > 2u * most || (shaft->steps > 1u && held_emf_turns(shaft, &d->run, p, emf))) {
-            held_will(shaft, HELD_HAS_TURNED);
-        } else if (shaft->steps >= HELD_ASK_STEPS) {
-            held_will(shaft, HELD_LEARN);
-        } else { /* it may turn slowly */
-        }
-        break;
+    case HELD_ASKED: held_compare(d, p, emf, moved); break;
     case HELD_STANDS:
     default:
         if (shaft->act == (uint16_t)HELD_WAITS && moved > most) { /* the frame is turned back first */
@@ -313,7 +320,7 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;
     case HELD_HAS_TURNED:
-        held_has_turned(d, p);
+        held_has_turned(d, p, emf);
         shaft->emf_q12 = emf;
         break;
     case HELD_LEARN: held_learn(d, p, emf); break;

@@ -137,8 +137,11 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
     drive_run_t *run = &d->run;
     int16_t along = along_direction(d, estimator_speed(&run->estimator)), reference = qm_abs(run->control.reference_erpm);
     int16_t id_q13 = 0, slope = (int16_t)(p->current_max_q13 >> PROBE_SLOPE_SHIFT);
-    if (held_angle_stands(&run->held)) { /* its question, at the currents that flow */
-        return;
+    if (held_angle_stands(&run->held)) {
+        if (run->held.phase != (uint16_t)HELD_STANDS) { /* its question, at the currents that flow */
+            return;
+        }
+        probe_enter(run, PROBE_PAUSE); /* it has the answer */
     }
     switch (run->probe_phase) {
     case PROBE_WAIT:

@@ -118,6 +118,7 @@
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
+#define HELD_ASK_MOST_STEPS 32u /* [steps] of 16 periods, for a back-EMF too small to tell sooner | lowspeed */
 #define HELD_SLOW_STEPS 64u    /* [steps] of 16 periods, in which the heaviest rotor that was let go is faster than what follows | held */
 #define HELD_R_SHIFT 5         /* [shift] after them: R that was learnt at standstill may be off by 1/32 | held */
 #define HELD_AGAIN_STEPS 10u  /* [steps] of 16 periods before a rotor that turns is asked again | pulse */

@@ -2,7 +2,8 @@
  *
  * The estimator cannot see a rotor that stands: R i and a back-EMF look alike. Its angle runs away, and a shaft that is let go is thrown wherever the
  * angle has come to. So where the rotor may stand, the angle stands, too, and the current with it. A back-EMF that stands still is R i alone: it tells R,
- * and how far the angle had run. One that turns or changes is a rotor that turns, and the estimator goes on. A rotor that stands for PARAM_STALL_SEC is a
+ * and how far the angle had run. One that turns or changes is a rotor that turns, and the estimator goes on. The less back-EMF there is, the longer
+ * the question takes: dead time must not hide the turn. A rotor that stands for PARAM_STALL_SEC is a
  * stall as ever. */
 #ifndef DRIVE_HELD_H
 #define DRIVE_HELD_H
@@ -43,7 +44,6 @@ typedef struct {
     int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */
     int16_t inv_kfi;         /**< of the model when the angle stopped */
     int16_t emf_sum_max_q12; /**< and its limit of the sum of back-EMFs */
-    speed_erpm_t omega_erpm; /**< the estimator's speed then */
     int16_t load;            /**< the load before all that, in units of the load observer: high word of its load_q16 */
     int16_t run_on;          /**< by how much R i had turned the frame, angle counts */
 } held_t;

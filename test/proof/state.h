@@ -48,7 +48,7 @@ static void any_held(held_t *h, held_phase_t phase)
     h->lag_q12 = any(-32767, 32767);
     h->inv_kfi = any(0, 32767);
     h->emf_sum_max_q12 = any(0, 32767);
-    h->omega_erpm = any(-32767, 32767);
+    h->run_on = any(-16384, 16384);
     h->load = any((int16_t)(-params.observer.load_max - 1), params.observer.load_max);
 }
 
@@ -185,7 +185,8 @@ static void held_holds_again(const held_t *h)
     //@ check held: h->phase <= HELD_STANDS && h->act <= HELD_GOES_ON && h->stood <= 2;
     //@ check held_emf_d: -emf_dq_max <= h->emf_q12.d <= emf_dq_max;
     //@ check held_emf_q: -emf_dq_max <= h->emf_q12.q <= emf_dq_max;
-    //@ check held_lag: -32767 <= h->lag_q12 && 0 <= h->inv_kfi && 0 <= h->emf_sum_max_q12 && -32767 <= h->omega_erpm;
+    //@ check held_lag: -32767 <= h->lag_q12 && 0 <= h->inv_kfi && 0 <= h->emf_sum_max_q12;
+    //@ check held_run_on: -16384 <= h->run_on <= 16384;
     //@ check held_load: -params.observer.load_max - 1 <= h->load <= params.observer.load_max;
 }
 

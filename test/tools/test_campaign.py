@@ -52,6 +52,33 @@ def test_a_thousand_cases_have_every_kind_scene_slow_phase_motor_and_load():
     assert {bool(case.lasts_s) for case in CASES} == {True, False}
 
 
+def test_a_quarter_of_the_cases_has_another_motor_than_its_header_says_and_some_a_load_that_pulses():
+    off, pulses = [case for case in CASES if case.header], [case for case in CASES if case.pulse]
+    assert 200 < len(off) < 300 and 110 < len(pulses) < 190
+    assert len({case.kind for case in off}) > 0.9 * len(injection.BY_NAME)
+    for (_, low, high), factors in zip(injection.HEADER_OFF, zip(*(case.header for case in off))):
+        assert low <= min(factors) < low + 0.02 and high - 0.02 < max(factors) <= high
+    assert 0.05 <= min(case.pulse for case in pulses) and max(case.pulse for case in pulses) <= 0.3
+
+
+def test_the_true_motor_is_off_its_header_from_power_up_on_and_its_load_swings_the_speed_by_no_more_than_a_share(bench):
+    plain = replace(CASES[0], kind="shaft: blocked", scene="low speed", header=(), pulse=0.0)
+    assert set(trial.scene(plain, bench).scenario.plant.values) == {"rng.seed"}
+    off = trial.scene(replace(plain, header=(0.7, 1.2, 0.75), pulse=0.3), bench).scenario.plant.values
+    assert off["motor.rs_ohm"] == pytest.approx(0.7 * 2.67) and off["motor.psi_vs"] == pytest.approx(1.2 * bench.motor.values.values["motor.psi_vs"])
+    assert off["motor.ld_h"] == off["motor.lq_h"] == pytest.approx(0.75 * 1.92e-3)
+    omega = 1.4 * bench.library.params["MINIMUM_SPEED_RPM"] * np.pi / 30.0
+    swing = off["load.pulse1_nm"] / (bench.motor.values.values["mech.inertia_kgm2"] * omega)
+    assert swing == pytest.approx(0.15 * omega)
+    fast = trial.scene(replace(plain, scene="rated speed", pulse=0.05), bench).scenario.plant.values
+    assert fast["load.pulse1_nm"] == pytest.approx(0.05 * motor_file.load(HURST).rated_torque_nm)
+
+
+def test_a_shaft_is_held_for_a_hundredth_to_a_second():
+    lasts_s = [case.lasts_s for case in CASES if case.kind == "shaft: held and let go"]
+    assert len(lasts_s) > 20 and 0.01 <= min(lasts_s) < 0.1 and 0.9 < max(lasts_s) <= 1.0
+
+
 def test_each_kind_is_drawn_as_often_as_its_weight_says_in_every_stretch():
     counts = Counter(case.kind for case in CASES)
     total = sum(kind.weight for kind in injection.KINDS)
@@ -92,6 +119,17 @@ def verdict(limits=LIMITS, without=None, **signals):
 def test_a_run_like_the_one_without_the_fault_shows_no_effect():
     assert verdict().outcome == judge.NO_EFFECT
     assert verdict(plant__speed_rpm=after(0.6, 1004.0, 1000.0)).outcome == judge.NO_EFFECT
+
+
+def test_a_speed_that_a_load_swings_is_judged_over_a_turn():
+    rating = injection.Rating(3.0, 0.1, 24.0, 1.0, 0.01, 8e6, 5e-6, 600.0)
+    plain = replace(CASES[0], kind="shaft: blocked", pulse=0.0)
+    assert trial.mean_s(plain, rating) == judge.MEAN_S and trial.mean_s(replace(plain, pulse=0.1), rating) == 0.1
+    assert trial.mean_s(replace(plain, kind="shaft: load that pulses"), rating) == 0.1
+    swings = lambda time_s: 1000.0 + 150.0 * np.sin(2.0 * np.pi * 10.0 * time_s) # noqa: E731
+    assert verdict(plant__speed_rpm=swings).outcome == judge.SILENT
+    assert verdict(replace(LIMITS, mean_s=0.1), plant__speed_rpm=swings).outcome == judge.RIDDEN
+    assert verdict(replace(LIMITS, mean_s=0.1), plant__speed_rpm=lambda time_s: 0.93 * swings(time_s)).outcome == judge.SILENT
 
 
 def test_a_dip_that_is_over_within_a_second_is_ridden_through_and_a_later_one_is_silent():
@@ -360,10 +398,10 @@ def rows_of(folder):
 
 
 def test_a_campaign_leaves_a_line_for_each_case_a_table_and_a_page(hurst, tmp_path):
-    code, out, _ = call("--count", "12", "--kind", "supply", "--out", str(tmp_path / "out"))
+    code, out, _ = call("--count", "24", "--kind", "supply", "--out", str(tmp_path / "out"))
     rows = rows_of(tmp_path / "out")
-    numbers = [number for number in range(1, 13) if injection.draw(1, number, [HURST]).kind.startswith("supply")]
-    assert [int(row["case"]) for row in rows] == numbers and {row["class"] for row in rows} <= set(judge.CLASSES) and code == 0, out
+    numbers = [number for number in range(1, 25) if injection.draw(1, number, [HURST]).kind.startswith("supply")]
+    assert [int(row["case"]) for row in rows] == numbers != [] and {row["class"] for row in rows} <= set(judge.CLASSES) and code == 0, out
     assert (tmp_path / "out" / "index.html").is_file() and not (tmp_path / "out.part").exists()
     assert sum(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["classes"].values()) == len(rows)
 

@@ -28,20 +28,48 @@ def test_the_segments_have_all_that_may_happen_and_stay_within_the_rating(benche
     segments = [soak.draw(1, number, benches) for number in range(1, 41)]
     events = [event for segment in segments for event in segment.scenario.events]
     keys = {key for event in events for key in event.keys}
-    assert keys == {"load.constant_nm", "supply.voltage_v", "motor.rs_ohm", "motor.psi_vs"} and {event.kind for event in events} == {"set", "speed_rpm", "press"}
+    assert keys == {"load.constant_nm", "load.pulse1_nm", "load.pulse1_order", "supply.voltage_v", "motor.rs_ohm", "motor.psi_vs"} and {event.kind for event in events} == {"set", "speed_rpm", "press"}
     params = benches[HURST, ""].library.params
     speeds = [event.value for event in events if event.kind == "speed_rpm"]
     assert max(speeds) > params["NOMINAL_SPEED_RPM"] and min(speeds) < 0.0 # field weakening, and the other direction where the mode has it
     assert all(params["MINIMUM_SPEED_RPM"] <= abs(rpm) <= params["MAXIMUM_SPEED_RPM"] for rpm in speeds)
     loads = [event.keys["load.constant_nm"] for event in events if "load.constant_nm" in event.keys]
+    most_nm = params["MAXIMUM_CURRENT_A"] * 1.5 * 5.0 * 7.983e-3
+    held = [torque_nm for torque_nm in loads if torque_nm > most_nm]
+    assert len(held) > 20 and 1.3 * most_nm <= min(held) and max(held) <= 3.0 * most_nm + 0.6 * motor_file.load(HURST).rated_torque_nm
+    loads = [torque_nm for torque_nm in loads if torque_nm <= most_nm]
     assert min(loads) >= 0.0 and 0.03 < max(loads) <= 0.6 * motor_file.load(HURST).rated_torque_nm
     assert sum(segment.starts for segment in segments) > 60 and sum(len(segment.rests) for segment in segments) > 200
+
+
+def test_a_load_that_pulses_never_pushes_swings_the_speed_by_a_share_at_most_and_ends(benches):
+    seen = 0
+    for number in range(1, 101):
+        rpm, load_nm, pulse_nm = 0.0, 0.0, 0.0
+        for event in soak.draw(1, number, benches).scenario.events:
+            assert pulse_nm == 0.0 or set(event.keys) == {"load.pulse1_nm"}, (number, event)
+            rpm = abs(event.value) if event.kind == "speed_rpm" else rpm
+            load_nm = event.keys.get("load.constant_nm", load_nm)
+            pulse_nm = event.keys.get("load.pulse1_nm", pulse_nm)
+            if pulse_nm > 0.0:
+                seen += 1
+                omega = rpm * np.pi / 30.0
+                assert pulse_nm <= load_nm and pulse_nm <= 0.1501 * 5.5e-6 * event.keys["load.pulse1_order"] * omega ** 2
+    assert seen > 40
+
+
+def test_the_true_motor_is_off_its_header(benches):
+    plants = [soak.draw(1, number, benches).scenario.plant.values for number in range(1, 61)]
+    for key, own, low, high in (("motor.rs_ohm", 2.67, 0.7, 1.4), ("motor.psi_vs", 7.983e-3, 0.8, 1.2), ("motor.ld_h", 1.92e-3, 0.75, 1.25)):
+        factors = [plant[key] / own for plant in plants]
+        assert low <= min(factors) < low + 0.1 and high - 0.1 < max(factors) <= high, key
+    assert all(plant["motor.ld_h"] == plant["motor.lq_h"] for plant in plants)
 
 
 def test_loads_at_low_speed_leave_an_estimator_something_to_see(benches):
     """Half of E = P w psi for what R may be off, and half of w for what a load takes in an electrical period; of the Hurst, by hand."""
     seen = 0
-    for number in range(1, 401):
+    for number in range(1, 801):
         rpm, load_nm = 0.0, 0.0
         for event in soak.draw(1, number, benches).scenario.events:
             rpm = abs(event.value) if event.kind == "speed_rpm" else rpm
@@ -49,9 +77,9 @@ def test_loads_at_low_speed_leave_an_estimator_something_to_see(benches):
                 change_nm, load_nm = event.keys["load.constant_nm"] - load_nm, event.keys["load.constant_nm"]
                 omega = rpm * 2.0 * np.pi / 60.0
                 if event.at_s > 5.0 and 0.0 < omega < 40.0 and change_nm > 0.005 and event.over_s > 0.05:
-                    current_a = (load_nm + 0.004 + 15.3e-6 * omega) / 0.05987
+                    current_a = (load_nm + 0.004 + 15.3e-6 * omega) / (0.8 * 0.05987)
                     seen += 1
-                    assert 2.67 * 0.4 * current_a <= 0.51 * 5.0 * omega * 7.983e-3 * 0.85
+                    assert 2.67 * 0.4 * current_a <= 0.51 * 5.0 * omega * 7.983e-3 * 0.8
                     assert change_nm / event.over_s / (2.0 * 5.5e-6 * (5.0 * rpm / 60.0) ** 2) <= 0.51 * omega
     assert seen > 20
 

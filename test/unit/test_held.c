@@ -44,13 +44,25 @@ static void asked(int16_t direction, int16_t more_q12)
     TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
 }
 
+/** To the question's end: it stands. Returns the steps. */
+static uint16_t answered(void)
+{
+    uint16_t count = 0;
+    while (shaft->phase != (uint16_t)HELD_STANDS && count < 100u) {
+        steps(1);
+        count++;
+    }
+    TEST_ASSERT_LESS_THAN_UINT16(100, count);
+    return count;
+}
+
 static void stands(int16_t direction, int16_t more_q12)
 {
     asked(direction, more_q12);
     steps(1);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
-    steps(HELD_ASK_STEPS);
-    TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+    (void)answered();
+    steps(1); /* the frame a step later */
 }
 
 /* ---- when it is asked ---- */
@@ -179,8 +191,8 @@ void test_a_back_emf_that_stands_still_is_resistance_and_turns_the_frame_back_by
             asked(direction, more_q12[n]);
             before = estimator_next_angle(&drive.run.estimator);
             turned = (int16_t)(3.0F * 16.0F * (float)more_q12[n] * (float)shaft->inv_kfi / 2048.0F / 60.0F * PARAM_F(LOOPTIME_SEC) * 65536.0F);
-            steps(1u + HELD_ASK_STEPS);
-            TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+            (void)answered();
+            steps(1); /* the frame a step later */
             TEST_ASSERT_INT16_WITHIN(30, (int16_t)((float)more_q12[n] / 4000.0F * 32768.0F), qm_hi(drive.run.adaptation.rs_q31));
             back = (int16_t)(angle_t)(before - estimator_next_angle(&drive.run.estimator));
             TEST_ASSERT_INT16_WITHIN(40 + qm_abs(turned) / 50, (int16_t)(direction * turned), back);
@@ -194,13 +206,12 @@ void test_resistance_is_learnt_within_the_adaptation_s_bounds_and_not_without_cu
     stands(1, 1900);
     TEST_ASSERT_INT16_WITHIN(400, (int16_t)(1900.0F / 4000.0F * 32768.0F), qm_hi(drive.run.adaptation.rs_q31));
     asked(1, -1900);
-    steps(1u + HELD_ASK_STEPS);
+    (void)answered();
     TEST_ASSERT_EQUAL_INT16(params.adaptation.rs_least, qm_hi(drive.run.adaptation.rs_q31));
     asked(1, 40);
     drive.run.control.i_q13.q = 0;
-    steps(1u + HELD_ASK_STEPS);
+    (void)answered();
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
-    TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
 }
 
 void test_resistance_that_has_risen_rises_to_its_bound_and_not_beyond(void)
@@ -209,8 +220,7 @@ void test_resistance_that_has_risen_rises_to_its_bound_and_not_beyond(void)
         asked(direction, 1900);
         drive.run.control.i_q13.q = (int16_t)(direction * rig_current_of_ri(0.45F)); /* R i is 1800 */
         drive.run.adaptation.rs_q31 = (int32_t)qm_abs(params.adaptation.rs_least) * 65536;
-        steps(1u + HELD_ASK_STEPS);
-        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        (void)answered();
         TEST_ASSERT_EQUAL_INT16(params.adaptation.rs_most, qm_hi(drive.run.adaptation.rs_q31));
     }
 }
@@ -236,8 +246,13 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
         }
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
         ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
-        TEST_ASSERT_INT16_WITHIN(60, (int16_t)((float)direction * 3.0F * per_step), ahead);
-        TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 1500), observer_speed(&drive.run.observer));
+        { /* the mean speed of the first and the last back-EMF, 400 and 395 more what turned into the d axis */
+            const dq_t last = estimator_emf(&drive.run.estimator);
+            const float erpm_per_q12 = (float)shaft->inv_kfi / 2048.0F, now_erpm = (395.0F + (float)qm_abs(last.d)) * erpm_per_q12;
+            const float mean_erpm = (400.0F * erpm_per_q12 + now_erpm) / 2.0F;
+            TEST_ASSERT_INT16_WITHIN(60, (int16_t)((float)direction * 3.0F * per_step * mean_erpm / 1500.0F), ahead);
+            TEST_ASSERT_INT16_WITHIN(10, (int16_t)((float)direction * now_erpm), observer_speed(&drive.run.observer));
+        }
         TEST_ASSERT_EQUAL_INT32(load_q16, drive.run.observer.load_q16);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
         TEST_ASSERT_NOT_EQUAL(0, drive.run.model.inv_kfi);
@@ -260,6 +275,53 @@ void test_a_back_emf_that_turns_by_less_than_half_of_what_it_says_or_by_what_dea
         rig_emf((int16_t)(-2 * most), emf_q12[n]);
         steps(1);
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    }
+}
+
+void test_a_back_emf_whose_turn_dead_time_would_hide_is_asked_for_longer(void)
+{
+    static const struct {
+        int16_t emf_q12;
+        uint16_t steps;
+    } cases[] = { { 400, HELD_ASK_STEPS }, { -400, HELD_ASK_STEPS }, { 40, HELD_ASK_MOST_STEPS }, { 0, HELD_ASK_MOST_STEPS } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            asked(direction, cases[n].emf_q12);
+            TEST_ASSERT_EQUAL_UINT16(1u + cases[n].steps, answered());
+        }
+        asked(direction, 150); /* between: when half of its turn is more than dead time's */
+        TEST_ASSERT_UINT16_WITHIN((HELD_ASK_MOST_STEPS - HELD_ASK_STEPS) / 2u - 2u, (HELD_ASK_MOST_STEPS + HELD_ASK_STEPS) / 2u, answered());
+    }
+}
+
+void test_a_back_emf_that_turns_backwards_is_no_rotor_that_turns_forwards(void)
+{
+    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8); /* than dead time shakes it by */
+    EACH_DIRECTION(direction) {
+        asked(direction, 40);
+        steps(3);
+        rig_emf(more, (int16_t)(direction * 40));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+        rig_emf((int16_t)-more, (int16_t)(direction * 40));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    }
+}
+
+void test_a_back_emf_that_changes_late_in_a_long_question_turns_no_frame(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t stopped;
+        asked(direction, 20);
+        steps(1u + HELD_ASK_MOST_STEPS / 2u);
+        TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+        stopped = estimator_next_angle(&drive.run.estimator);
+        rig_emf(0, (int16_t)(direction * (3 * params.adaptation.emf_least_q12)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_UINT16(stopped, estimator_next_angle(&drive.run.estimator));
+        TEST_ASSERT_GREATER_THAN_INT16(100, (int16_t)(direction * observer_speed(&drive.run.observer)));
     }
 }
 
@@ -297,9 +359,9 @@ void test_while_the_rotor_stands_the_load_is_the_current_that_flows_and_nothing_
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.kfi_q31);
 }
 
-void test_a_rotor_that_stands_gets_the_d_current_of_a_probe_alone_and_the_probe_waits(void)
+void test_a_rotor_that_stands_gets_the_d_current_of_a_probe_alone_and_the_probe_waits_for_the_answer(void)
 {
-    stands(1, 200);
+    asked(1, 200);
     drive.run.fieldweak.table_q13 = -1000;
     drive.run.probe_id_q13 = 321;
     drive.run.probe_phase = (uint16_t)PROBE_TEST;
@@ -310,7 +372,13 @@ void test_a_rotor_that_stands_gets_the_d_current_of_a_probe_alone_and_the_probe_
     TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, drive.run.probe_phase);
     TEST_ASSERT_EQUAL_UINT16(3, drive.run.probe_steps);
     TEST_ASSERT_EQUAL_INT16(321, drive.run.probe_id_q13);
+    (void)answered();
+    protection_probe_rotor(&drive, &params); /* it has the answer: all of the current is torque */
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, drive.run.probe_phase);
+    TEST_ASSERT_LESS_THAN_INT16(321, drive.run.probe_id_q13);
     shaft->phase = (uint16_t)HELD_NOT;
+    drive.run.probe_id_q13 = 0;
+    drive.run.fieldweak.table_q13 = -1000;
     limits_current(&drive.run, &params);
     TEST_ASSERT_LESS_THAN_INT16(0, drive.run.control.ref_q13.d);
 }
@@ -322,6 +390,16 @@ void test_the_observer_rests_while_the_angle_stands(void)
     drive.run.observer.rho_q32 = 12345;
     rig_slow(0);
     TEST_ASSERT_EQUAL_UINT32(12345, drive.run.observer.rho_q32);
+}
+
+/** It is asked, stands, and turns again. */
+static void lets_go(int16_t direction)
+{
+    (void)answered();
+    steps(2);
+    rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
 }
 
 void test_a_rotor_that_turns_again_takes_the_load_of_before_and_the_second_time_the_one_that_flows(void)
@@ -336,21 +414,13 @@ void test_a_rotor_that_turns_again_takes_the_load_of_before_and_the_second_time_
         rig_speed((int16_t)(direction * 100));
         rig_emf(0, 0);
         shaft->emf_q12.q = 0;
-        steps(2u + 1u + HELD_ASK_STEPS + 1u);
-        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
-        rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
-        steps(1);
-        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        lets_go(direction);
         TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 55), qm_hi(drive.run.observer.load_q16));
         TEST_ASSERT_GREATER_THAN_INT16(0, (int16_t)(direction * observer_speed(&drive.run.observer)));
         TEST_ASSERT_EQUAL_INT16(32767, drive.run.observer.fast_share_q15);
         rig_emf(0, 0); /* the load of before was too little */
         shaft->emf_q12.q = 0;
-        steps(2u + 1u + HELD_ASK_STEPS + 2u);
-        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
-        rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
-        steps(1);
-        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        lets_go(direction);
         TEST_ASSERT_INT16_WITHIN(2, drive.run.control.ref_q13.q, observer_load(&drive.run.observer, &params.observer));
     }
 }

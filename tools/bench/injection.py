@@ -31,6 +31,9 @@ class Rating:
     rs_ohm: float
     psi_vs: float
     crystal_hz: float
+    inertia_kgm2: float = 0.0
+    speed_rpm: float = 0.0
+    """of the reference when it happens, at least the lowest"""
     dead_rpm: float = 0.0
     """from which deviation of the speed on dead time cannot be behind it (PARAM_LARGE_ERPM)"""
     start_dead: float = 0.0
@@ -52,8 +55,11 @@ class Kind:
     reverses: bool = False
     """a negative size turns the rotor backwards: a start catches it, and needs a second ramp to bring it up"""
     passes: float = 0.0
-    """share of the cases in which it is over soon"""
+    """share of the cases in which it is over soon, within a time between lasts_s"""
+    lasts_s: tuple[float, float] = (0.02, 0.3)
     limits: bool = False
+    swings: bool = False
+    """its torque swings the speed with the turn"""
     weight: float = 1.0
     unseen: Callable[[float, Rating], Unseen] = lambda size, rating: Unseen()
 
@@ -92,6 +98,21 @@ def _bits(first: tuple[str, ...]) -> Callable[[random.Random], tuple[float, str]
 def _sets(key: str, of: str = "") -> Callable[[float, str, Rating], Keys]:
     """The size goes to a key of the board, or that share of what the rating says; {} is the place."""
     return lambda size, place, rating: {key.format(place): size * (getattr(rating, of) if of else 1.0)}
+
+
+def _pulses(size: float, place: str, rating: Rating) -> Keys:
+    """A torque that swings with the shaft's angle, as that of a piston."""
+    return {"load.pulse1_nm": pulse_nm(size * rating.torque_nm, float(place), rating), "load.pulse1_order": float(place)}
+
+
+def pulse_nm(torque_nm: float, order: float, rating: Rating) -> float:
+    """What of a torque may swing so often in a turn: a motor with constant current swings by J w dw/dt = T, at most PULSE_SWING of its speed."""
+    omega = rating.speed_rpm * math.pi / 30.0
+    return min(torque_nm, PULSE_SWING * rating.inertia_kgm2 * order * omega ** 2)
+
+
+PULSE_SWING = 0.15
+PULSE_ORDERS = ("1", "2")
 
 
 def _as_dead_time(size: float, rating: Rating) -> Unseen:
@@ -159,6 +180,8 @@ KINDS = (
     Kind("shaft", "blocked", (*NO_TURN, *OVERCURRENT), _one_of(1.0), _sets("load.locked"), passes=0.2, weight=2.0),
     Kind("shaft", "load step", (*NO_TURN, "OVERTEMPERATURE"), _size(0.1, 3.0), _sets(BRAKE, "torque_nm"), passes=0.5,
          limits=True),
+    Kind("shaft", "held and let go", (*NO_TURN, *OVERCURRENT), _one_of(1.0), _sets("load.locked"), passes=1.0, lasts_s=(0.01, 1.0), weight=2.0),
+    Kind("shaft", "load that pulses", NO_TURN, lambda r: (r.uniform(0.05, 0.5), r.choice(PULSE_ORDERS)), _pulses, limits=True, swings=True),
     Kind("shaft", "driven by the load", (*NO_TURN, "OVERVOLTAGE"), _size(0.1, 1.0, True), _sets("load.active_nm", "torque_nm"),
          passes=0.5, limits=True, reverses=True),
     Kind("temperature", "warm winding", ("OVERTEMPERATURE",), _size(1.05, 1.6), _sets("motor.rs_ohm", "rs_ohm"),
@@ -184,7 +207,10 @@ SCENES = {"CALIBRATE": 0.6, "STOPPED": 0.6, "BOOTSTRAP": 0.6, "ALIGN": 1.0, "RAM
           "accelerating": 1.2, "braking": 1.5, "field weakening": 2.0, "STOPPING": 1.0, "FAULT": 0.8, "retry": 0.8}
 """When it happens, and how often: a state of the drive, or what it does in closed loop; "retry" is the pause after a stall."""
 SLOW_PHASES = int(param_rows.number("SLOW_PERIODS_IN_TIME"))
-PASSES_S = (0.02, 0.3)
+HEADER_OFF, HEADER_SHARE = (("motor.rs_ohm", 0.7, 1.3), ("motor.psi_vs", 0.8, 1.2), ("motor.ld_h", 0.75, 1.25)), 0.25
+"""What the true motor may be of its header's, and the share of the cases in which it is."""
+PULSE_SHARE, PULSE_MOST = 0.15, 0.3
+"""Of the cases, and of the rated torque."""
 
 
 @dataclass(frozen=True)
@@ -204,10 +230,19 @@ class Case:
     lasts_s: float
     rotor_deg: float
     noise: int
+    header: tuple[float, ...] = ()
+    """the true motor's values over its header's, of HEADER_OFF; empty: the same"""
+    pulse: float = 0.0
+    """a torque that swings once a turn all the time, of the rated torque"""
 
     @property
     def what(self) -> Kind:
         return BY_NAME[self.kind]
+
+    @property
+    def swings(self) -> bool:
+        """A load swings the speed with the turn."""
+        return self.what.swings or self.pulse > 0.0
 
 
 def draw(seed: int, number: int, motors: list[str], scenes: tuple[str, ...] = tuple(SCENES)) -> Case:
@@ -220,8 +255,18 @@ def draw(seed: int, number: int, motors: list[str], scenes: tuple[str, ...] = tu
     size, place = kind.draw(r)
     motor = r.choice(motors)
     return Case(number, name, float(f"{size:.4g}"), place, scene, r.random(), r.randrange(SLOW_PHASES), IMAGE_MOTOR if kind.room == IMAGE else motor,
-                r.choice((0.0, 0.25, 0.5, 0.75)), round(r.uniform(*kind.over_s), 3), round(r.uniform(*PASSES_S), 3) if r.random() < kind.passes else 0.0,
-                float(r.randrange(360)), r.randrange(1, 2**31))
+                r.choice((0.0, 0.25, 0.5, 0.75)), round(r.uniform(*kind.over_s), 3), round(r.uniform(*kind.lasts_s), 3) if r.random() < kind.passes else 0.0,
+                float(r.randrange(360)), r.randrange(1, 2**31), _header(r), round(r.uniform(0.05, PULSE_MOST), 3) if r.random() < PULSE_SHARE else 0.0)
+
+
+def _header(r: random.Random) -> tuple[float, ...]:
+    return tuple(round(r.uniform(low, high), 3) for _, low, high in HEADER_OFF) if r.random() < HEADER_SHARE else ()
+
+
+def true_motor(case: Case, values: Keys) -> Keys:
+    """What of the motor is not as its header says."""
+    off = {key: values[key] * factor for (key, _, _), factor in zip(HEADER_OFF, case.header)}
+    return off | ({"motor.lq_h": values["motor.lq_h"] * case.header[2]} if case.header else {})
 
 
 def _in_turn(seed: int, number: int, weights: dict[str, float], what: str) -> str:

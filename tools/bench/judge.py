@@ -19,7 +19,7 @@ BAND_OF_SPEED, BAND_OF_RATED = 0.03, 0.02
 CURRENT_MARGIN = 1.1
 """Of the most that the header allows, or of what the run without the fault takes."""
 MEAN_S, CURRENT_S = 0.01, 0.005
-"""The speed is judged as a mean over the first; more current than allowed counts when it lasts for the second."""
+"""The speed is judged as a mean over the first, as a rule; more current than allowed counts when it lasts for the second."""
 BACKWARDS_TURNS = 0.5
 """Mechanical turns against its direction that a motor may make: a rotor recoils when a block lets it go."""
 HOLDS_BACK = ("VOLTAGE", "CURRENT", "BRAKE", "RAMP_WAITS")
@@ -54,6 +54,8 @@ class Limits:
     closed: tuple[int, ...]
     """numbers of the states in closed loop; before, a rotor swings while it is aligned"""
     limited_is_right: bool = False
+    mean_s: float = MEAN_S
+    """over which the speed is judged; a turn where the load pulses with it"""
     unseen: Unseen = Unseen()
 
 
@@ -125,7 +127,7 @@ def _still_on(after: Trace, reference: Trace) -> str:
 
 def _wrong(after: Trace, reference: Trace, limits: Limits, unseen: Unseen = Unseen()) -> str:
     """What is wrong with a run that has raised no fault, but for what nobody can know; "" if nothing is."""
-    speed, expected = _smooth(after, "plant.speed_rpm"), _smooth(reference, "plant.speed_rpm")
+    speed, expected = _smooth(after, "plant.speed_rpm", limits), _smooth(reference, "plant.speed_rpm", limits)
     ends = np.sort(np.vstack((expected, unseen.clock * expected)), axis=0)
     last, last_expected = _on_at_end(after), _on_at_end(reference)
     if last_expected and not last:
@@ -194,9 +196,9 @@ def _amplitude(trace: Trace) -> np.ndarray:
     return np.hypot(trace.column("plant.i_d"), trace.column("plant.i_q"))
 
 
-def _smooth(trace: Trace, name: str) -> np.ndarray:
+def _smooth(trace: Trace, name: str, limits: Limits) -> np.ndarray:
     values = trace.column(name).astype(np.float64)
-    rows = max(1, round(MEAN_S / max(trace.period_s, 1e-6)))
+    rows = max(1, round(limits.mean_s / max(trace.period_s, 1e-6)))
     if len(values) < rows:
         return values
     return np.convolve(np.pad(values, (rows // 2, rows - 1 - rows // 2), "edge"), np.ones(rows) / rows, "valid")
@@ -207,7 +209,7 @@ def _speed_error_percent(after: Trace, reference: Trace, limits: Limits) -> floa
     judged = after.time_s >= limits.settled_s
     if not np.any(judged):
         return None
-    off_rpm = _smooth(after, "plant.speed_rpm")[judged] - _smooth(reference, "plant.speed_rpm")[judged]
+    off_rpm = (_smooth(after, "plant.speed_rpm", limits) - _smooth(reference, "plant.speed_rpm", limits))[judged]
     return float(100.0 * off_rpm[np.argmax(np.abs(off_rpm))] / limits.rated_rpm)
 
 
@@ -215,7 +217,7 @@ def _same(after: Trace, reference: Trace, limits: Limits) -> bool:
     """As if nothing had happened: states, speed and current."""
     if [value for _, value in after.changes("fw.state")] != [value for _, value in reference.changes("fw.state")]:
         return False
-    off_rpm = np.abs(_smooth(after, "plant.speed_rpm") - _smooth(reference, "plant.speed_rpm"))
+    off_rpm = np.abs(_smooth(after, "plant.speed_rpm", limits) - _smooth(reference, "plant.speed_rpm", limits))
     off_a = np.abs(_amplitude(after) - _amplitude(reference))
     return bool(np.max(off_rpm, initial=0.0) <= SAME_SPEED * limits.rated_rpm
                 and np.sqrt(np.mean(off_a ** 2)) <= SAME_CURRENT * limits.most_current_a)

@@ -35,7 +35,12 @@ LOST_LOCK_DEG, LOST_LOCK_S = 60.0, 0.05
 REST_S = 0.4
 SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 """Of the rated torque: the largest that motor and supply can hold is drawn from."""
-SAGS, WARM_R, WARM_PSI = (0.87, 1.0), (0.85, 1.4), (0.85, 1.05)
+SAGS, WARM_R, WARM_PSI, TRUE_L = (0.87, 1.0), (0.7, 1.4), (0.8, 1.2), (0.75, 1.25)
+"""What the supply may sag to, and what the true motor may be of its header's: a wrong header, and temperature."""
+HOLD_S, HOLD_TORQUES = (0.01, 0.1), (1.3, 3.0)
+"""How long a hand holds the shaft, and how hard: times the most torque that the drive has."""
+PULSE_SWING = 0.15
+"""Of the speed: by how much a load that pulses with the turn would swing a motor with constant current, at most."""
 MIDDLE = 0.05
 """Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
@@ -169,17 +174,18 @@ class _Drawing:
         self.settle_s = max(8.0 / param(self.params, "SPEED_BANDWIDTH_HZ"), 0.7)
         self.events: list[Event] = []
         self.rests: list[tuple[float, float, float]] = []
-        self.rpm, self.load_nm, self.starts, self.now_s = 0.0, 0.0, 0, 0.2
+        self.rpm, self.load_nm, self.starts, self.now_s, self.true_l = 0.0, 0.0, 0, 0.2, r.uniform(*TRUE_L)
 
     def segment(self) -> Segment:
         values = {"rng.seed": float(self.r.randrange(1, 2**31)), "adc.noise_lsb": self.r.uniform(0.3, 1.5),
                   "shunt.offset_a_v": self.r.uniform(-0.02, 0.02), "shunt.offset_b_v": self.r.uniform(-0.02, 0.02),
                   "supply.resistance_ohm": float(self.plant.get("supply.resistance_ohm", 0.1)) * self.r.uniform(0.5, 2.0),
                   **{key: value * self.r.uniform(*span) for key, value, span in self._warm()}}
+        values |= {key: float(self.plant[key]) * self.true_l for key in ("motor.ld_h", "motor.lq_h")}
         self._load(self.r.uniform(0.0, 0.5) * self.motor.start_torque_nm, 0.0, 0.0)
         self._start()
         while self.now_s < SEGMENT_S:
-            self.r.choices((self._speed, self._new_load, self._again, self._sag, self._temperature), (45, 25, 8, 12, 10))[0]()
+            self.r.choices((self._speed, self._new_load, self._again, self._sag, self._temperature, self._held, self._pulse), (38, 22, 8, 10, 8, 7, 7))[0]()
         scenario = Scenario(f"segment {self.number}", f"{self.name} {self.mode}".strip(), "", "", "", round(self.now_s, 3), defines=[self.mode] if self.mode else [],
                             events=sorted(self.events, key=lambda event: event.at_s), rotor_deg=float(self.r.randrange(360)),
                             plant=Values(values, {key: WHERE for key in values}))
@@ -246,15 +252,19 @@ class _Drawing:
         for share in SHARES:
             need = reach.least(values, abs(rpm), share * self.motor.rated_torque_nm, most_a)
             holds = need.voltage_v is not None and need.voltage_v <= VOLTAGE_SHARE * SAGS[0] * self.bus_v / math.sqrt(3.0)
-            if holds and unknown_ohm * need.iq_a <= HIDDEN_SHARE * emf_v:
+            iq_a = need.iq_a * WARM_PSI[1] / WARM_PSI[0] # of the weakest magnets
+            if holds and unknown_ohm * iq_a <= HIDDEN_SHARE * emf_v:
                 return share * self.motor.rated_torque_nm
         return 0.0
+
+    @property
+    def _inertia_kgm2(self) -> float:
+        return self.motor.inertia_kgm2 + self.motor.load_inertia_kgm2
 
     def _load_time_s(self, change_nm: float) -> float:
         """A load that grows by m a second takes m / (2 J f^2) of the speed in an electrical period 1/f."""
         turns_hz = abs(self.rpm) / 60.0
-        inertia_kgm2 = self.motor.inertia_kgm2 + self.motor.load_inertia_kgm2
-        return abs(change_nm) / (2.0 * inertia_kgm2 * (self.motor.pole_pairs * turns_hz) ** 2 * SWING_SHARE * 2.0 * math.pi * turns_hz)
+        return abs(change_nm) / (2.0 * self._inertia_kgm2 * (self.motor.pole_pairs * turns_hz) ** 2 * SWING_SHARE * 2.0 * math.pi * turns_hz)
 
     def _load(self, torque_nm: float, over_s: float, at_s: float | None = None) -> None:
         self.load_nm = torque_nm
@@ -286,6 +296,29 @@ class _Drawing:
         self._set({key: value * self.r.uniform(*span) for key, value, span in self._warm()}, over_s)
         self.now_s += over_s
         self._rest(0.0)
+
+    def _held(self) -> None:
+        """A hand on the shaft, harder than the drive, and off again."""
+        most_nm = param(self.params, "MAXIMUM_CURRENT_A") * reach.torque_per_amp(self.plant)
+        self._set({BRAKE: self.load_nm + self.r.uniform(*HOLD_TORQUES) * most_nm}, 0.002)
+        self.now_s += self.r.uniform(*HOLD_S)
+        self._set({BRAKE: self.load_nm})
+        self._rest(abs(self.rpm), self._back_s(most_nm))
+
+    def _back_s(self, most_nm: float) -> float:
+        """How long the rotor takes to be back at its speed."""
+        spare_nm = max(0.5 * most_nm - self.load_nm, 0.1 * most_nm)
+        return self._inertia_kgm2 * abs(self.rpm) * math.pi / 30.0 / spare_nm
+
+    def _pulse(self) -> None:
+        """A load that pulses once or twice a turn, for a while."""
+        order, omega = self.r.choice((1.0, 2.0)), abs(self.rpm) * math.pi / 30.0
+        room_nm = max(self._most_nm(self.rpm) - self.load_nm, 0.0)
+        swing_nm = PULSE_SWING * self._inertia_kgm2 * order * omega ** 2
+        self._set({"load.pulse1_nm": self.r.random() * min(room_nm, self.load_nm, swing_nm), "load.pulse1_order": order})
+        self._rest(0.0, 1.0)
+        self._set({"load.pulse1_nm": 0.0})
+        self.now_s += 0.2
 
 
 def run(segment: Segment, benches: dict[tuple[str, str], Bench], tell: Callable[[float], None]) -> Run:

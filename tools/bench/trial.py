@@ -112,9 +112,20 @@ def scene(case: Case, bench: Bench) -> Scene:
         events += [_event(speed_s, "set", keys={"load.locked": 1.0}), _event(speed_s + BLOCKED_S, "set", keys={"load.locked": 0.0})]
         end_s = speed_s + BLOCKED_S + RETRY_PAUSE_S + start_time_s(params) + judge.SETTLE_S
     text = f"{case.kind} {case.size:g} {case.place}".strip()
+    plant = {"rng.seed": float(case.noise)} | _true_motor(case, bench, min(speed for speed in (first, second) if speed))
     scenario = Scenario(f"case {case.number}", f"{text}, {case.scene}", "", "", "", 60.0, events=sorted(events, key=lambda event: event.at_s),
-                        rotor_deg=case.rotor_deg, plant=Values({"rng.seed": float(case.noise)}, {"rng.seed": WHERE}))
+                        rotor_deg=case.rotor_deg, plant=Values(plant, dict.fromkeys(plant, WHERE)))
     return Scene(scenario, *begin, end_s)
+
+
+def _true_motor(case: Case, bench: Bench, rpm: float) -> dict[str, float]:
+    """What the motor and its load have that the header does not know. @param rpm the slowest of the way: the load that pulses swings it most"""
+    values = {key: value for key, value in {**bench.board.values.values, **bench.motor.values.values}.items() if not isinstance(value, tuple)}
+    result = injection.true_motor(case, values)
+    if case.pulse:
+        rating = injection.Rating(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, values["mech.inertia_kgm2"], rpm)
+        result["load.pulse1_nm"] = injection.pulse_nm(case.pulse * motor_file.load(str(bench.motor.path)).rated_torque_nm, 1.0, rating)
+    return result
 
 
 def coast_s(motor: motor_file.Motor, rpm: float) -> float:
@@ -177,16 +188,22 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         without = session.run()
     closed = tuple(number for number, name in bench.library.states.items() if name in CLOSED)
     limits = judge.Limits(injected_s, settled_s, motor_file.load(str(bench.motor.path)).rated_speed_rpm, rating.current_a, case.what.ends,
-                          bench.library.faults, closed, case.what.limits, unseen)
+                          bench.library.faults, closed, case.what.limits, mean_s(case, rating), unseen)
     with_fault, target = result or (None, "")
     verdict = _ended(ending) if with_fault is None else judge.judge(with_fault.trace, without.trace, limits)
     return Trial(case, with_fault, without, injected_s, state, target, verdict)
 
 
+def mean_s(case: Case, rating: injection.Rating) -> float:
+    """Over which the speed is judged: a turn where a load swings it, else as a rule."""
+    return max(judge.MEAN_S, 60.0 / rating.speed_rpm) if case.swings else judge.MEAN_S
+
+
 def rating_of(library: Library, motor: Part, board: Any) -> injection.Rating:
     """What the sizes of faults are shares of, for the motor on this board."""
     return injection.Rating(param(library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(motor.path)).rated_torque_nm,
-                            *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz")),
+                            *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz", "mech.inertia_kgm2")),
+                            speed_rpm=max(abs(board.get("fw.speed_ref_rpm")), param(library.params, "MINIMUM_SPEED_RPM")),
                             dead_rpm=dead_rpm(library.params), start_dead=start_dead(library.params))
 
 
