@@ -109,7 +109,7 @@ def test_a_trace_comes_over_the_same_line(desk):
     desk.page.scope.ask({"channels": ["board_drive.state", "board_drive.ticks"], "trigger": None, "level": 0, "rising": True, "position": 0.0, "factor": 1,
                          "mode": "single"})
     ticks = [row[2] for row in desk.trace()["rows"]]
-    assert [(later - earlier) % 65536 for earlier, later in zip(ticks, ticks[1:])] == [1] * (len(ticks) - 1) and len(ticks) > 180
+    assert [(later - earlier) % 65536 for earlier, later in zip(ticks, ticks[1:])] == [1] * (len(ticks) - 1) and len(ticks) > 200
 
 
 @pytest.mark.parametrize("wish, part", [

@@ -101,14 +101,19 @@ panel_lights_t mode_panel(const panel_inputs_t *in);
 #define SCOPE_MODE_PARAMS 0u
 #endif
 #ifdef IDENTIFY
-#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 144u) /* its stack, too */
+#define SCOPE_MODE_IDENTIFY (sizeof(identify_t) + 232u) /* its stack, too */
 #else
 #define SCOPE_MODE_IDENTIFY 0u
 #endif
 #ifdef BRINGUP
-#define SCOPE_MODE_BRINGUP 332u
+#define SCOPE_MODE_BRINGUP 360u
 #else
 #define SCOPE_MODE_BRINGUP 0u
+#endif
+#ifdef TORQUE_PROFILE
+#define SCOPE_MODE_PROFILE 48u
+#else
+#define SCOPE_MODE_PROFILE 0u
 #endif
 #ifdef SNAPSHOT
 #define SCOPE_MODE_SNAPSHOT (8u * (DATA_BUFFER_SIZE) + 24u)
@@ -120,6 +125,6 @@ panel_lights_t mode_panel(const panel_inputs_t *in);
 #endif
 
 /** Of the trace buffer. */
-#define SCOPE_BYTES ((760u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY - SCOPE_MODE_BRINGUP - SCOPE_MODE_SNAPSHOT) & ~3u)
+#define SCOPE_BYTES ((848u - SCOPE_MODE_PARAMS - SCOPE_MODE_IDENTIFY - SCOPE_MODE_BRINGUP - SCOPE_MODE_PROFILE - SCOPE_MODE_SNAPSHOT) & ~3u)
 
 #endif
