@@ -14,28 +14,56 @@
 #define IN_RANGE(name, min, max) ((PARAM_F(name) >= PARAM_F(min) && PARAM_F(name) <= PARAM_F(max)) || FOLLOWS_KPHI(name))
 #define IS_WHOLE(name) (PARAM_F(name) <= (float)(int32_t)PARAM_F(name))
 
+/* 5/2 is 2 to C, and (5/2) too; 20/10 is what it looks like, of (20/10) nobody can tell. */
+#define IS_INTEGER(name) ((((name) * 0 + 1) / 2) <= 0)
+#define HAS_QUOTIENT(text) (sizeof(text) <= 80 && __builtin_strchr(text, '/') != 0) /* a longer one is computed from other parameters */
+#define IS_DIVIDED(name) (HAS_QUOTIENT(PARAM_TEXT(name)) && IS_INTEGER(name) && (PARAM_TEXT(name)[0] == '(' || 1.0F * name != 1.0F * (name)))
+
 #define CHECK_RANGE(name, unit, min, max, value, meaning) \
     PARAM_CHECK(range_of_##name) \
     { \
-        if (!IN_RANGE(name, min, max)) \
+        if (!__builtin_constant_p(PARAM_F(name))) \
+            PARAM_REFUSE(divided_##name, #name " = " PARAM_TEXT(name) " divides by 0: write a number, " PARAM_RANGE(unit, min, max, meaning)) \
+        else if (IS_DIVIDED(name)) \
+            PARAM_REFUSE(fraction_##name, #name " = " PARAM_TEXT(name) " divides whole numbers, of which C drops the fraction: write one with a decimal " \
+                         "point, or the result, " PARAM_RANGE(unit, min, max, meaning)) \
+        else if (!IN_RANGE(name, min, max)) \
             PARAM_REFUSE(outside_##name, #name " = " PARAM_TEXT(name) " is outside " PARAM_RANGE(unit, min, max, meaning) ": correct it") \
         else if (PARAM_COUNTED(unit) && !IS_WHOLE(name)) \
             PARAM_REFUSE(part_##name, #name " = " PARAM_TEXT(name) " must be a whole number, " PARAM_RANGE(unit, min, max, meaning)) \
     }
 PARAM_TABLE(CHECK_RANGE)
 
-/* One wrong value breaks several relations: they are asked only when each value alone is right, and the first that fails ends it. */
+/* One wrong value breaks several relations: they are asked only when each value alone is right, and the first of a group that fails ends it. */
 #define RANGE_HOLDS(name, unit, min, max, value, meaning) \
     &&IN_RANGE(name, min, max) && (!PARAM_COUNTED(unit) || IS_WHOLE(name))
+#define RANGES_HOLD (1 PARAM_TABLE(RANGE_HOLDS))
+#define HOLDS(condition, message) &&(condition)
 #define CHECK_RELATION(condition, message) CHECK_RELATION_N(__COUNTER__, condition, message)
 #define CHECK_RELATION_N(n, condition, message) CHECK_RELATION_N_(n, condition, message)
 #define CHECK_RELATION_N_(n, condition, message) \
     else if (!(condition)) \
         PARAM_REFUSE(relation_##n, message)
-PARAM_CHECK(relations)
-{
-    if (!(1 PARAM_TABLE(RANGE_HOLDS))) {
+#define CHECK_ALONE(condition, message) \
+    if (0) { \
+    } \
+    CHECK_RELATION(condition, message)
+#define CHECK_GROUP(name, asked, ...) \
+    PARAM_CHECK(name) \
+    { \
+        if (!(asked)) { \
+        } \
+        __VA_ARGS__ \
     }
-    MODE_RELATION_TABLE(CHECK_RELATION)
-    PARAM_RELATION_TABLE(CHECK_RELATION)
+
+PARAM_CHECK(relations_alone)
+{
+    if (RANGES_HOLD) {
+        PARAM_RELATION_ALONE(CHECK_ALONE)
+    }
 }
+CHECK_GROUP(relations_speeds, RANGES_HOLD, PARAM_RELATION_SPEEDS(CHECK_RELATION))
+CHECK_GROUP(relations_currents, RANGES_HOLD, PARAM_RELATION_CURRENTS(CHECK_RELATION))
+CHECK_GROUP(relations_bus, RANGES_HOLD, PARAM_RELATION_BUS(CHECK_RELATION))
+CHECK_GROUP(relations_rest, RANGES_HOLD PARAM_RELATION_ALONE(HOLDS) PARAM_RELATION_SPEEDS(HOLDS) PARAM_RELATION_CURRENTS(HOLDS) PARAM_RELATION_BUS(HOLDS),
+            MODE_RELATION_TABLE(CHECK_RELATION) PARAM_RELATION_REST(CHECK_RELATION))

@@ -1,4 +1,4 @@
-/* Refuses a userparams.h by its text: a parameter that is missing, empty or no number (2,67; two; 2.67 ohm), and a mode with = 0.
+/* Refuses a userparams.h by its text: a parameter that is missing, empty, octal (05500) or no number (2,67; two; 2.67 ohm), and a mode with = 0.
  *
  * Only the text is looked at, for as an expression such a value gives messages about formulas, in every file that uses it; this file
  * therefore comes first in the build. Without optimisation (-O0) the compiler does not evaluate the texts, and they are not looked at. */
@@ -26,6 +26,12 @@
      || (__builtin_strspn(text, ALLOWED) == sizeof(text) - 1 && HAS("(" DIGITS, (text)[FIRST(text)]) \
          && (BEHIND(text) == NUMBER(text) || ENDS(text))))
 
+/* 05500 is 2880 to C, 0.5 and 0x5 are what they look like. */
+#define AFTER_DIGITS(text) ((text)[NUMBER(text) + __builtin_strspn((text) + NUMBER(text), "0123456789")])
+#define IS_OCTAL(text) \
+    (!IS_COMPUTED(text) && (text)[NUMBER(text)] == '0' && __builtin_strspn((text) + NUMBER(text), "0123456789") > 1 \
+     && AFTER_DIGITS(text) != '.' && AFTER_DIGITS(text) != 'e' && AFTER_DIGITS(text) != 'E')
+
 #define ANEW ", or make tune"
 #define HOW ", with a decimal point and without a unit"
 #define CHECK_TEXT(name, unit, min, max, value, meaning) \
@@ -37,6 +43,9 @@
             PARAM_REFUSE(empty_##name, #name " has no value: write a number, " PARAM_RANGE(unit, min, max, meaning)) \
         else if (!IS_NUMBER(PARAM_TEXT(name))) \
             PARAM_REFUSE(not_##name, #name " = " PARAM_TEXT(name) " is no number: write one, " PARAM_RANGE(unit, min, max, meaning) HOW) \
+        else if (IS_OCTAL(PARAM_TEXT(name))) \
+            PARAM_REFUSE(octal_##name, #name " = " PARAM_TEXT(name) " is octal to C, for it begins with 0: write it without, " \
+                         PARAM_RANGE(unit, min, max, meaning)) \
     }
 #define CHECK_OPTIONAL(name) \
     PARAM_CHECK(text_of_##name) \

@@ -112,6 +112,9 @@
 /** A parameter and its value, in a message: "NOPOLESPAIRS = 5". */
 #define PARAM_NAMED(name) #name PARAM_IS(name)
 
+/** Whether userparams.h defines a name: the preprocessor leaves any other as it is. */
+#define PARAM_GIVEN(name) (__builtin_strcmp(#name, PARAM_TEXT(name)) != 0)
+
 /** X(name): what userparams.h may define, too; otherwise drive/param_scaling.h computes it. */
 #define PARAM_OPTIONAL(X) \
     X(D_CURRCNTR_PTERM) X(D_CURRCNTR_ITERM) X(D_CURRCNTR_CTERM) \
@@ -122,25 +125,72 @@
     (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 || __builtin_strcmp(unit, "times") == 0 || __builtin_strcmp(unit, "switch") == 0 \
      || __builtin_strcmp(unit, "uH") == 0 || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
-/** X(condition, message): what must hold between parameters, and what to change when it does not. */
-#define PARAM_RELATION_TABLE(X) \
+/** X(condition, message): what must hold between parameters, and what to change when it does not. Of a group in which one wrong value breaks
+ *  several, the build tells the first; PARAM_RELATION_REST is asked only where the groups before it hold. */
+#define PARAM_RELATION_TABLE(X) PARAM_RELATION_ALONE(X) PARAM_RELATION_SPEEDS(X) PARAM_RELATION_CURRENTS(X) PARAM_RELATION_BUS(X) PARAM_RELATION_REST(X)
+
+/* Each is told. */
+#define PARAM_RELATION_ALONE(X) \
     X(PARAM_PWM_REST < 0.01F, \
       PARAM_NAMED(LOOPTIME_SEC) " must be a multiple of 50 ns, as 0.00005 is: the PWM counts up and down in steps of 25 ns") \
-    X(!DEFER_DUTIES || (SCOPE) == 0, \
-      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with SCOPE, for which a shorter period has no time: leave SCOPE 0, or use a longer period") \
     PARAM_RELATION_GAIN(X, KCURRA) PARAM_RELATION_GAIN(X, KCURRB) \
+    X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
+      PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
+    X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \
+      "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+    X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \
+      "Q_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+    X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, \
+      "the controllers' PTERMs must be positive") \
+    X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F && PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F, "the current controllers' ITERMs must not be negative") \
+    X(PARAM_F(KCURRA) * PARAM_F(KCURRB) >= 0.0F || PARAM_GIVEN(KCURR_SIGNS_DIFFER), \
+      PARAM_NAMED(KCURRB) " must have the sign of " PARAM_NAMED(KCURRA) ": the amplifiers are alike; if BRINGUP found one inverted, add " \
+      "#define KCURR_SIGNS_DIFFER") \
+    PARAM_RELATION_INVKFI(X, 1) PARAM_RELATION_INVKFI(X, 2) PARAM_RELATION_INVKFI(X, 3) PARAM_RELATION_INVKFI(X, 4) \
+    PARAM_RELATION_INVKFI(X, 5) PARAM_RELATION_INVKFI(X, 6) PARAM_RELATION_INVKFI(X, 7) PARAM_RELATION_INVKFI(X, 8) \
+    PARAM_RELATION_INVKFI(X, 9) PARAM_RELATION_INVKFI(X, 10) PARAM_RELATION_INVKFI(X, 11) PARAM_RELATION_INVKFI(X, 12) \
+    PARAM_RELATION_INVKFI(X, 13) PARAM_RELATION_INVKFI(X, 14) PARAM_RELATION_INVKFI(X, 15) PARAM_RELATION_INVKFI(X, 16) \
+    PARAM_RELATION_INVKFI(X, 17)
+
+#define PARAM_RELATION_SPEEDS(X) \
     X(NOMINAL_SPEED_RPM > MINIMUM_SPEED_RPM, PARAM_NAMED(NOMINAL_SPEED_RPM) " must be above " PARAM_NAMED(MINIMUM_SPEED_RPM)) \
     X(MAXIMUM_SPEED_RPM >= NOMINAL_SPEED_RPM, PARAM_NAMED(MAXIMUM_SPEED_RPM) " must be at least " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
     X(FW_START_SPEED_RPM < MAXIMUM_SPEED_RPM, PARAM_NAMED(FW_START_SPEED_RPM) " must be below " PARAM_NAMED(MAXIMUM_SPEED_RPM)) \
+    X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, PARAM_NAMED(END_SPEED_RPM) " must be at most " PARAM_NAMED(NOMINAL_SPEED_RPM))
+
+#define PARAM_RELATION_CURRENTS(X) \
+    X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
+      PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \
+    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
+    X(PARAM_F(I2T_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
+      PARAM_NAMED(I2T_CURRENT_A) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A) ": a larger one never trips; 0: no I2t") \
+    X(PARAM_F(FW_TRIM_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
+      PARAM_NAMED(FW_TRIM_CURRENT_A) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
+    PARAM_RELATION_IDREF(X, 0) PARAM_RELATION_IDREF(X, 1) PARAM_RELATION_IDREF(X, 2) PARAM_RELATION_IDREF(X, 3) \
+    PARAM_RELATION_IDREF(X, 4) PARAM_RELATION_IDREF(X, 5) PARAM_RELATION_IDREF(X, 6) PARAM_RELATION_IDREF(X, 7) \
+    PARAM_RELATION_IDREF(X, 8) PARAM_RELATION_IDREF(X, 9) PARAM_RELATION_IDREF(X, 10) PARAM_RELATION_IDREF(X, 11) \
+    PARAM_RELATION_IDREF(X, 12) PARAM_RELATION_IDREF(X, 13) PARAM_RELATION_IDREF(X, 14) PARAM_RELATION_IDREF(X, 15) \
+    PARAM_RELATION_IDREF(X, 16) PARAM_RELATION_IDREF(X, 17)
+
+#define PARAM_RELATION_BUS(X) \
+    X(OVER_VOLTAGE_V > NOMINAL_BUS_V, PARAM_NAMED(OVER_VOLTAGE_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
+    X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, PARAM_NAMED(UNDER_VOLTAGE_V) " must be below " PARAM_NAMED(NOMINAL_BUS_V)) \
+    X(REGEN_LIMIT_V > NOMINAL_BUS_V, PARAM_NAMED(REGEN_LIMIT_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
+    X(PARAM_F(REGEN_LIMIT_V) + PARAM_F(BRAKE_BAND_V) <= PARAM_F(OVER_VOLTAGE_V), \
+      PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V))
+
+#define PARAM_RELATION_REST(X) \
+    X(!DEFER_DUTIES || (SCOPE) == 0, \
+      PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with SCOPE, for which a shorter period has no time: leave SCOPE 0, or use a longer period") \
     X(PARAM_TOP_ERPM <= PARAM_F(PARAM_LARGEST_ERPM), \
-      PARAM_NAMED(MAXIMUM_SPEED_RPM) " times " PARAM_NAMED(NOPOLESPAIRS) " must be at most 75000 electrical rpm: lower MAXIMUM_SPEED_RPM") \
+      PARAM_NAMED(MAXIMUM_SPEED_RPM) " times " PARAM_NAMED(NOPOLESPAIRS) " must be at most 75000 electrical rpm: lower MAXIMUM_SPEED_RPM, or write pole pairs, " \
+      "half the number of poles") \
     X(PARAM_TOP_ERPM <= PARAM_F(SPEED_UNIT_ERPM) || PARAM_TOP_ERPM * PARAM_F(LOOPTIME_SEC) <= 1.0001F * PARAM_F(PARAM_LARGEST_TURN), \
       PARAM_NAMED(MAXIMUM_SPEED_RPM) " times NOPOLESPAIRS must be at most 3.75 / LOOPTIME_SEC above 32000 electrical rpm, a sixteenth of a turn " \
       "a period: lower it, or shorten LOOPTIME_SEC") \
     X(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) <= PARAM_F(PARAM_LARGEST_NOMINAL_ERPM) * PARAM_F(SPEED_UNIT), \
       "NOMINAL_SPEED_RPM * NOPOLESPAIRS must be at most 27000 (54000 where MAXIMUM_SPEED_RPM is above 32000 electrical rpm): lower NOMINAL_SPEED_RPM, " \
       "the one-sample derivative then starts earlier") \
-    X(END_SPEED_RPM <= NOMINAL_SPEED_RPM, PARAM_NAMED(END_SPEED_RPM) " must be at most " PARAM_NAMED(NOMINAL_SPEED_RPM)) \
     X(PARAM_RS_FULL < 524287.0F, \
       PARAM_NAMED(MOTOR_RS_OHM) " does not fit its Q format: raise NORM_CURRENT_CONST's inverse, i.e. use a smaller current range") \
     X(PARAM_LS_FULL * PARAM_LS_RAISED < 524287.0F, \
@@ -149,7 +199,7 @@
     X(PARAM_INVKFI >= 1024.0F && PARAM_INVKFI < 32767.0F, \
       PARAM_NAMED(MOTOR_KPHI_V_PER_KRPM) " does not fit 1/Kphi's Q format (1024 .. 32767): check its unit, V peak line to line per " \
       "1000 rpm") \
-    X(PARAM_INVKFI >= 32767.0F || (PARAM_F(INVKFI_SPEED0) >= 0.6F * PARAM_INVKFI && PARAM_F(INVKFI_SPEED0) <= 1.6F * PARAM_INVKFI), \
+    X(PARAM_INVKFI >= 32767.0F || PARAM_INVKFI_FITS(0), \
       PARAM_NAMED(INVKFI_SPEED0) " must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that; a table for another motor, or for another side of 32000 or " \
       "64000 electrical rpm of MAXIMUM_SPEED_RPM, counts otherwise") \
     X(MOTOR_SALIENCY_UH == 0 || PARAM_F(MOTOR_SALIENCY_UH) < 950.0F * PARAM_F(MOTOR_LS_MH), \
@@ -158,43 +208,20 @@
                                  && PARAM_SALIENCE_Q13 <= PARAM_F(PARAM_SALIENT_FROM) * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A))), \
       PARAM_NAMED(MOTOR_SALIENCY_UH) " times MAXIMUM_CURRENT_A must be 1/8 to 1 of MOTOR_KPHI_V_PER_KRPM * 5513 / NOPOLESPAIRS, the magnets' flux: " \
       "less is not worth it (0), with more the start's current does not align the rotor") \
-    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
-    X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
-      PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \
-    X(PARAM_F(I2T_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
-      PARAM_NAMED(I2T_CURRENT_A) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A) ": a larger one never trips; 0: no I2t") \
     X(PARAM_F(OVER_CURRENT_THRESHOLD_A) <= PARAM_F(PARAM_TRIP_SHARE) * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
       PARAM_NAMED(OVER_CURRENT_THRESHOLD_A) " must be at most 86.5 % of the range NORM_CURRENT_CONST * 32768, or it never trips") \
     X(PARAM_F(MAXIMUM_CURRENT_A) >= 0.063F * 32768.0F * PARAM_F(NORM_CURRENT_CONST), \
       PARAM_NAMED(MAXIMUM_CURRENT_A) " must be at least 6.3 % of the range NORM_CURRENT_CONST * 32768") \
-    X(PARAM_F(FW_TRIM_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
-      PARAM_NAMED(FW_TRIM_CURRENT_A) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
-    X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \
-      "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \
-      "Q_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, \
-      "the controllers' PTERMs must be positive") \
-    X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F && PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F, "the current controllers' ITERMs must not be negative") \
     X(PARAM_EMF_MAX_V < 0.99F * 131068.0F * NORM_VOLTAGE_CONST, \
-      "the back-EMF's format overflows: lower OVER_VOLTAGE_V, OVER_CURRENT_THRESHOLD_A or MAXIMUM_SPEED_RPM") \
-    PARAM_RELATION_IDREF(X, 0) PARAM_RELATION_IDREF(X, 1) PARAM_RELATION_IDREF(X, 2) PARAM_RELATION_IDREF(X, 3) \
-    PARAM_RELATION_IDREF(X, 4) PARAM_RELATION_IDREF(X, 5) PARAM_RELATION_IDREF(X, 6) PARAM_RELATION_IDREF(X, 7) \
-    PARAM_RELATION_IDREF(X, 8) PARAM_RELATION_IDREF(X, 9) PARAM_RELATION_IDREF(X, 10) PARAM_RELATION_IDREF(X, 11) \
-    PARAM_RELATION_IDREF(X, 12) PARAM_RELATION_IDREF(X, 13) PARAM_RELATION_IDREF(X, 14) PARAM_RELATION_IDREF(X, 15) \
-    PARAM_RELATION_IDREF(X, 16) PARAM_RELATION_IDREF(X, 17) \
+      "the back-EMF's format overflows: check " PARAM_NAMED(NOPOLESPAIRS) ", half the number of poles, or lower OVER_VOLTAGE_V, OVER_CURRENT_THRESHOLD_A " \
+      "or MAXIMUM_SPEED_RPM") \
     X(PARAM_VOLTAGE_PER_BUS < 4.0F * 65535.0F, PARAM_NAMED(BUS_FULL_SCALE_V) " is too large for NOMINAL_BUS_V: their ratio must be at most 16") \
-    X(OVER_VOLTAGE_V > NOMINAL_BUS_V, PARAM_NAMED(OVER_VOLTAGE_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(PARAM_F(OVER_VOLTAGE_V) <= 0.98F * PARAM_F(BUS_FULL_SCALE_V), \
       PARAM_NAMED(OVER_VOLTAGE_V) " must be inside BUS_FULL_SCALE_V, or it never trips") \
     X(PARAM_F(OVER_VOLTAGE_V) <= 1.9F * PARAM_F(NOMINAL_BUS_V), \
       PARAM_NAMED(OVER_VOLTAGE_V) " must be at most 1.9 * NOMINAL_BUS_V: the voltage's Q format ends there") \
-    X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, PARAM_NAMED(UNDER_VOLTAGE_V) " must be below " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(PARAM_F(UNDER_VOLTAGE_V) >= 0.3F * PARAM_F(NOMINAL_BUS_V), \
       PARAM_NAMED(UNDER_VOLTAGE_V) " must be at least 0.3 * NOMINAL_BUS_V: the voltage circle's reciprocal ends there") \
-    X(REGEN_LIMIT_V > NOMINAL_BUS_V, PARAM_NAMED(REGEN_LIMIT_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
-    X(PARAM_F(REGEN_LIMIT_V) + PARAM_F(BRAKE_BAND_V) <= PARAM_F(OVER_VOLTAGE_V), \
-      PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V)) \
     X(PARAM_F(DUTY_PER_VOLT_NUMERATOR) / 65536.0F < PARAM_F(BUS_Q15(UNDER_VOLTAGE_V)) * 2.0F, \
       PARAM_NAMED(UNDER_VOLTAGE_V) " is too low for the modulator's division") \
     X(PARAM_F(SAMPLE_WINDOW_SEC) + PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC >= PARAM_F(DEADTIME_SEC) + 0.000000999F, \
@@ -212,11 +239,15 @@
       "check its unit") \
     X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074, or 0.0037 with a LOOPTIME_SEC below 0.00004: the observer's step is eight or sixteen periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
-    X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
-      PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
     X(PARAM_F(SPEED_BANDWIDTH_HZ) <= PARAM_CALM_HZ, \
       PARAM_NAMED(SPEED_BANDWIDTH_HZ) " must be at most 0.148 * LOAD_BANDWIDTH_HZ, or 0.4 of the electrical frequency at " \
       PARAM_NAMED(MINIMUM_SPEED_RPM) " if that is more: lower it, or the speed hunts without load")
+
+/* Where entry 0 does not fit the motor, it is told, not each of the others. */
+#define PARAM_INVKFI_FITS(i) (PARAM_F(INVKFI_SPEED##i) >= 0.6F * PARAM_INVKFI && PARAM_F(INVKFI_SPEED##i) <= 1.6F * PARAM_INVKFI)
+#define PARAM_RELATION_INVKFI(X, i) \
+    X(PARAM_INVKFI >= 32767.0F || !PARAM_INVKFI_FITS(0) || PARAM_INVKFI_FITS(i), \
+      PARAM_NAMED(INVKFI_SPEED##i) " must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that, or make tune-fw")
 
 #define PARAM_RELATION_IDREF(X, i) \
     X(PARAM_F(IDREF_SPEED##i) >= -PARAM_F(MAXIMUM_CURRENT_A), \

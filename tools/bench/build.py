@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 from tools.common import paths
-from tools.common.errors import UserError
+from tools.common.errors import UserError, UserErrors
 from tools.common.progress import waiting
 
 HEADER = "userparams.h"
@@ -40,8 +40,8 @@ def library(defines: list[str], userparams: Path | None = None, target: str = "v
     variant = variant_name(defines, userparams)
     result = make(target, defines, userparams, sanitized)
     if result.returncode != 0:
-        if told := re.search(r"^foc33: (.*)", result.stderr, re.MULTILINE):
-            raise UserError(told[1])
+        if told := re.findall(r"^foc33: (.*)", result.stderr, re.MULTILINE):
+            raise UserErrors([UserError(line) for line in told])
         raise UserError("the firmware does not build", _what(variant, result.args, userparams), _reason(result.stderr))
     return paths.ROOT / "build" / "-".join(part for part in ("host", variant, "san" if sanitized else "") if part) / "libvboard.so"
 

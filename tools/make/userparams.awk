@@ -1,13 +1,14 @@
 # Names in userparams.h that cannot be meant: defined twice with two values, or close to a name that is missing.
 #
-#   awk -v places=FILE -f tools/make/nearest.awk -f tools/make/userparams.awk KNOWN DEFINED
+#   awk -v places=FILE -v least=FILE -v refused=FILE -v near=FILE -f tools/make/nearest.awk -f tools/make/userparams.awk KNOWN DEFINED
 #
 # KNOWN: the rows of the tables of parameters and modes, with @ between the cells; DEFINED: userparams.h as gcc -E -dD shows it, with line
-# markers. To FILE goes where each parameter stands: name, file:line, range, with tabs between them.
+# markers. To the files go: where each parameter stands (name, file:line, range, with tabs between them); the least value of each (name, value);
+# the names that are refused; the missing names that they may stand for.
 
-function refuse(what) {
+function refuse(name, what) {
     print "foc33: " what
-    wrong = 1
+    print name >>refused
 }
 
 BEGIN { option = "DEFINES or the scenario" }
@@ -33,7 +34,7 @@ $1 == "#define" && counts {
     text = substr($0, length("#define " name) + 2)
     here = by_option ? option : file ":" line
     if (name in value && value[name] != text)
-        refuse(here ": " name (text == "" ? "" : " = " text) " is the second definition, the first stands in " place[name] \
+        refuse(name, here ": " name (text == "" ? "" : " = " text) " is the second definition, the first stands in " place[name] \
                ": keep one of the two")
     value[name] = text
     place[name] = here
@@ -46,6 +47,10 @@ END {
         gsub(/[" ]/, "", cell[i + 1])
         gsub(/"/, "", cell[i + 2])
         known[cell[i + 1]] = cell[i + 2]
+        if (cell[i] ~ /parameter/) {
+            split(cell[i + 2], ends, " ")
+            print cell[i + 1] "\t" ends[1] >least
+        }
     }
     gsub(/[^A-Za-z0-9_]+/, " ", used)
     used = " " used " "
@@ -55,10 +60,10 @@ END {
         if (name in known)
             print name "\t" place[name] "\t" known[name] >places
         else if (place[name] != option && !index(used, " " name " ")) { # what another macro uses is the user's own
-            near = nearest(name, missing, 0.83)
-            if (near != "")
-                refuse(place[name] ": " name " is no parameter: did you mean " near (known[near] == "" ? "" : ", " known[near]) "?")
+            meant = nearest(name, missing, 0.83)
+            if (meant == "") continue
+            refuse(meant, place[name] ": " name " is no parameter: did you mean " meant (known[meant] == "" ? "" : ", " known[meant]) "?")
+            print meant >>near
         }
     }
-    exit wrong
 }

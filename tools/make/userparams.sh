@@ -1,11 +1,12 @@
 #!/bin/sh
-# Refuses a userparams.h that cannot work before anything is compiled with it, each mistake in one line.
+# Refuses a userparams.h that cannot work before anything is compiled with it: every mistake in one build, each in one line.
 #
 #   tools/make/userparams.sh STAMP COMPILER [FLAG ...]
 #
-# Only the compiler reads the header, so all that it accepts is accepted: comments, expressions, macros, #ifdef, #include. Three steps, and
-# the first that finds something ends it: names (defined twice, misspelt); then texts and values, which are the compiler's own messages of
-# firmware/drive/param_text.c and param_check.c. If nothing is wrong, writes STAMP, and to STAMP.d what it depends on.
+# Only the compiler reads the header, so all that it accepts is accepted: comments, expressions, macros, #ifdef, #include. Four steps: names
+# (defined twice, misspelt); texts (firmware/drive/param_text.c); numbers inside them (literals.awk); values (param_check.c). For the steps
+# that follow, what is refused is replaced by the least value of its range, so that it hides no other mistake; how values fit each other is
+# told where none of them is refused. If nothing is wrong, writes STAMP, and to STAMP.d what it depends on.
 set -u
 export LC_ALL=C
 
@@ -19,50 +20,81 @@ compiler() {
     "$@" 2>"$work/messages"
 }
 
-# Ends with the messages of the header's own checks; without one, with the compiler's first error and the parameter that it was met in.
-refuse() {
-    awk -F '\t' -v header="$header" -v compiler="$1" '
-        FILENAME ~ /places$/ { place[$1] = $2; range[$1] = $3; next }
-        match($0, /In function .(range|text)_of_[A-Z0-9_]+/) {
-            name = substr($0, RSTART, RLENGTH)
-            sub(/.*_of_/, "", name)
-        }
-        match($0, /error: userparams\.h: /) {
-            text = substr($0, RSTART + RLENGTH)
-            first = text
-            sub(/ .*/, "", first)
-            print "foc33: " (first in place ? place[first] : header) ": " text
-            checked = 1
-        }
-        /error: / && other == "" {
-            other = $0
-            if (name in place) {
-                sub(/.*error: /, "", other)
-                other = place[name] ": " name " is no number (" other "): write one, " range[name]
-            } else
-                other = other ": correct it"
-        }
-        END {
-            if (!checked)
-                print "foc33: " (other != "" ? other : "the compiler cannot read " header ", " compiler ": it ended without a message, try it by hand")
-        }' "$work/places" "$work/messages" >&2
-    exit 2
+# The messages of the last compilation as lines for a user; adds the parameters to $work/refused. Exit code: messages.awk
+tell() {
+    awk -F '\t' -v header="$header" -v compiler="$1" -v refused="$work/refused" -v near="$work/near" -f tools/make/messages.awk \
+        "$work/places" "$work/messages" >&2
+}
+
+# A userparams.h that takes the user's and replaces what is refused.
+replace() {
+    mkdir -p "$work/replaced"
+    {
+        printf '#pragma GCC system_header\n#include_next <userparams.h>\n'
+        awk -F '\t' 'FILENAME ~ /refused$/ { refused[$1] = 1; next } $1 in refused { printf "#undef %s\n#define %s %s\n", $1, $1, $2 }' \
+            "$work/refused" "$work/least"
+    } >"$work/replaced/userparams.h"
+}
+
+# checked SOURCE COMPILER FLAG ...: compiles one check, again where one value kept the compiler from looking at the others
+checked() {
+    source=$1
+    shift
+    until [ -s "$work/refused" ] && replace; compiler "$@" -w -MMD -MP -MF "$work/depends" -MT "$stamp" -c "$source" -o "$work/object.o"; do
+        before=$(wc -l <"$work/refused")
+        tell "$1"
+        case $? in
+            0) break ;;                                                    # the header's own checks have told all that they find
+            3) [ "$(wc -l <"$work/refused")" -gt "$before" ] || exit 2 ;; # one value that is no C: the others come next
+            *) exit 2 ;;
+        esac
+    done
 }
 
 : >"$work/places"
+: >"$work/refused"
+: >"$work/near"
 header=userparams.h
 known='#include "drive/param_limits.h"
 #include "drive/modes/mode_table.h"
 #define PARAMETER(name, unit, min, max, ...) @parameter@#name@#min .. #max unit@
 #define OTHER(name, ...) @other@#name@@
 PARAM_TABLE(PARAMETER) PARAM_OPTIONAL(OTHER) MODE_TABLE(OTHER)'
-echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || refuse "$1"
-echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || refuse "$1"
-header=$(sed -n 's|^# 1 "\(\./\)\{0,1\}\(.*userparams\.h\)".*|\2|p' "$work/defined" | head -n 1)
+echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || { tell "$1"; exit 2; }
+echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || { tell "$1"; exit 2; }
+# The file that the user knows: of a copy, the one that its #line names.
+header=$(awk '/^# 1 ".*userparams\.h"/ {
+    name = $0
+    while ((getline) > 0 && $0 == "") continue
+    if (/^# 1 ".*userparams\.h" *$/) name = $0
+    sub(/^# 1 "(\.\/)?/, "", name)
+    sub(/".*/, "", name)
+    print name
+    exit
+}' "$work/defined")
 command -v python3 >/dev/null || echo "foc33: no python3: a misspelt name in $header is not looked for" >&2
-awk -v places="$work/places" -f tools/make/nearest.awk -f tools/make/userparams.awk "$work/known" "$work/defined" >&2 || exit 2
+awk -v places="$work/places" -v refused="$work/refused" -v near="$work/near" -v least="$work/least" -f tools/make/nearest.awk -f tools/make/userparams.awk \
+    "$work/known" "$work/defined" >&2
 
-for source in param_text param_check; do
-    compiler "$@" -w -MMD -MP -MF "$work/depends" -MT "$stamp" -c "firmware/drive/$source.c" -o "$work/object.o" || refuse "$1"
+# The replaced header comes before the user's: in front of the compiler's first option.
+first=yes
+for word; do
+    shift
+    case $first$word in yes-*)
+        set -- "$@" "-I$work/replaced"
+        first=
+        ;;
+    esac
+    set -- "$@" "$word"
 done
+
+checked firmware/drive/param_text.c "$@"
+{
+    printf '#include <userparams.h>\n'
+    sed 's/^\([A-Z_0-9]*\).*/"\1" \1/' "$work/least"
+} | compiler "$@" -w -E -P -x c - | awk -v refused="$work/refused" -f tools/make/literals.awk >"$work/literals.c"
+checked "$work/literals.c" "$@"
+checked firmware/drive/param_check.c "$@"
+[ ! -s "$work/refused" ] || checked firmware/drive/param_check.c "$@" # what a value out of its range has kept back
+[ ! -s "$work/refused" ] || exit 2
 cp "$work/depends" "$stamp.d" && : >"$stamp"
