@@ -9,6 +9,8 @@ ifeq ($(origin CC),default)
 CC := gcc
 endif
 export CC PYTHON RUBY INSTALL
+# What would keep Python from finding tools/, and matplotlib from drawing into files.
+unexport PYTHONSAFEPATH MPLBACKEND
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -130,7 +132,7 @@ every_motor = failed=; for motor in $(basename $(notdir $(wildcard tuning/motors
     $(MAKE) $@ MOTOR=$$motor $(if $(OUT),OUT=$(call quoted,$(OUT))/$$motor) || failed="$$failed $$motor"; done; \
     test -z "$$failed" || { echo "foc33: $@ fails for$$failed" >&2; exit 1; }
 
-.PHONY: sensitivity anymotor bringup run recorder scenarios list-motors table2 starts motors robust loadsteps lowspeed catch pulse held setup-run
+.PHONY: sensitivity anymotor bringup run recorder scenarios keys list-motors table2 starts motors robust loadsteps lowspeed catch pulse held setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
@@ -142,6 +144,9 @@ recorder: setup-run ## [run] draw what the fault recorder has sent: a log of you
 
 scenarios: setup-run ## [run] list the scenarios of make run SCENARIO=name
 	@$(front_end) scenarios
+
+keys: setup-run ## [run] list the keys of the virtual board: unit, range, meaning
+	@$(front_end) keys
 
 list-motors: setup-run ## [your motor] the motor files of tuning/motors: data and rating
 	@$(front_end) motors
@@ -271,7 +276,8 @@ $B/contents: FORCE
 
 # Nothing is compiled with a userparams.h that cannot work.
 params = @tools/make/userparams.sh $@
-$B/params: $B/flags $(params_source) $(addprefix tools/make/,userparams.sh userparams.awk nearest.awk)
+params_tools := $(addprefix tools/make/,userparams.sh userparams.awk nearest.awk literals.awk messages.awk)
+$B/params: $B/flags $(params_source) $(params_tools)
 	$(params) $(compile)
 
 $(board_objects): private INCLUDES += $(board_includes)

@@ -1,7 +1,7 @@
 """`board`: the calculator of an inverter of one's own: what its parts measure, and the board file that says so.
 
     python3 -m tuning board mclv                                                what a board file comes to
-    python3 -m tuning board my_inverter shunt=10mohm gain=20 supply=36 trip=12  writes tuning/boards/my_inverter.toml, then the same
+    python3 -m tuning board my_inverter shunt=10mohm gain=20 supply=36 pwm=16kHz  writes tuning/boards/my_inverter.toml, then the same
 
 A new file begins as a copy of mclv.toml (from=NAME: of another one). Every key of a board file may be given, and the pins of [pins]."""
 
@@ -19,13 +19,16 @@ from tools.common.units import Kind
 from . import limits
 
 SHORT = {"shunt": "shunt.resistance", "gain": "shunt.amplifier_gain", "offset": "shunt.reference", "divider": "adc.bus_divider",
-         "supply": "supply.voltage", "cable": "supply.resistance", "trip": "inverter.trip_current", "range": "adc.full_scale"}
+         "supply": "supply.voltage", "cable": "supply.resistance", "trip": "inverter.trip_current", "range": "adc.full_scale",
+         "pwm": "pwm.period", "deadtime": "pwm.dead_time"}
 """Short names of keys."""
 FLAGS = {"inverted": "shunt.inverted", "sinks": "supply.sinks"}
 OF_SUPPLY = {"limits.over_voltage": 1.4, "limits.under_voltage": 0.5, "limits.regen": 1.125}
 """Limits that follow the supply's voltage, if they are not given: their share of it."""
 LEAST_SHARE = 0.063
 """Of full scale: the smallest MAXIMUM_CURRENT_A of include/drive/param_limits.h."""
+PWM_STEP_US = 0.05
+"""The PWM counts up and down in steps of 25 ns."""
 WHERE = "SET"
 
 
@@ -42,7 +45,8 @@ def command(options: argparse.Namespace) -> int:
     if not options.given:
         print(text(board_file.load(options.board, "command line")))
         return 0
-    path = Path(options.board) if paths.is_path(options.board) else paths.BOARDS / f"{options.board}.toml"
+    path = Path(options.board) if paths.is_path(options.board) else paths.BOARDS / options.board
+    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
     label = str(paths.shown(path))
     if path.exists():
         raise UserError("the board file is there already", label, "give another name, or remove it first")
@@ -67,16 +71,29 @@ def keys() -> dict[str, str]:
 def given(words: list[str]) -> dict[str, str]:
     """The words of the command line by key; "from" and pins keep their name."""
     known, result = keys(), {}
-    for word in words:
+    for word in _joined(words):
         name, sign, value = word.partition("=")
+        name = name if name in pins.firmware() else name.lower()
         if not sign or not value:
             raise UserError(f"'{word}' is no key=value", WHERE, "write e.g. shunt=10mohm gain=20, without blanks inside")
         if name not in {**known, **FLAGS, **pins.firmware(), "from": "", "title": ""}:
-            raise UserError(f"unknown key '{name}'", WHERE, suggestion(name, [*known, *FLAGS, *pins.firmware(), "from", "title"]))
+            raise UserError(f"unknown key '{name}'", WHERE, suggestion(name, [*known, *FLAGS, *pins.firmware(), "from", "title"], "docs/files.md"))
         key = known.get(name) or FLAGS.get(name) or name
         if key in result:
             raise UserError(f"'{name}' is given twice", WHERE, "give it once")
         result[key] = value
+    return result
+
+
+def _joined(words: list[str]) -> list[str]:
+    """The words, a unit that a blank has cut off (pwm=20 kHz) back at its number."""
+    units = {unit for table in board_file.TABLES.values() for key in table.values() if key.has_units for unit in key.kind.units}
+    result: list[str] = []
+    for word in words:
+        if word in units and result and re.search(r"=[-+\d.eE]+$", result[-1]):
+            result[-1] += word
+        else:
+            result.append(word)
     return result
 
 
@@ -93,11 +110,15 @@ def number(name: str, kind: Kind, value: str) -> tuple[float, str]:
         if not match:
             raise UserError(f"{name} = '{value}' is not a number", WHERE, "write a number with a decimal point, with its unit if you like: 10mohm")
         found, unit = _float(match[1], name), match[2] or next(iter(kind.units))
+        unit = next((known for known in kind.units if known.lower() == unit.lower()), unit)
     if unit not in kind.units:
         raise UserError(f"'{unit}' is no unit of {name}", WHERE, "use one of " + ", ".join(kind.units))
-    low, high = (kind.units[unit].given(limit) for limit in (kind.minimum, kind.maximum))
+    low, high = sorted(kind.units[unit].given(limit) for limit in (kind.minimum, kind.maximum))
     if not low <= found <= high:
-        raise UserError(f"{name} = {found:g} {unit} is impossible", WHERE, f"choose {low:g} .. {high:g} {unit}")
+        also = " or a frequency such as 16kHz" if "kHz" in kind.units and unit == "s" else ""
+        raise UserError(f"{name} = {found:g} {unit} is impossible", WHERE, f"choose {low:g} .. {high:g} {unit}{also}")
+    if kind.units[unit].reciprocal: # as a period, of which the PWM counts whole steps
+        return round(1e6 * kind.units[unit](found) / PWM_STEP_US) * PWM_STEP_US, "us"
     return found, unit
 
 

@@ -527,7 +527,7 @@ def _field_weakening(d: Design) -> None:
     d.put("FW_START_SPEED_RPM", plain(start_rpm), f"7/8 of the no-load base speed {d.envelope.base_speed(0.0):.0f} rpm, but at most 95 % of the maximum speed, and 18 "
           "entries reach that")
     known = {name: number_of(text) for name, text in d.params.items() if text != "NORM_INVKFIBASE"}
-    tables, reason = fw_tables.load_for(d.motor.name, known | {"NORM_INVKFIBASE": d.scales.invkfi})
+    tables, reason = fw_tables.load_for(fw_tables.names_of(d.motor), known | {"NORM_INVKFIBASE": d.scales.invkfi})
     if reason:
         d.warnings.append(reason)
     rows = {f"IDREF_SPEED{i}": f"{i_d:.2f}" for i, i_d in enumerate(limits.table(d.envelope, d.value("FW_START_SPEED_RPM")))}
@@ -536,7 +536,7 @@ def _field_weakening(d: Design) -> None:
     why = f"least d current that keeps the voltage within {limits.TABLE_SHARE:.0%} of its circle without load"
     if tables is not None and "FW_START_SPEED_RPM" not in d.motor.tune:
         rows, d.tuned_by_machine = tables.parameters(), True
-        d.tables_from = f"{paths.shown(tables.path or fw_tables.path_of(d.motor.name))}, found on the virtual board by make tune-fw"
+        d.tables_from = f"{paths.shown(tables.path or fw_tables.path_of(fw_tables.names_of(d.motor)[0]))}, found on the virtual board by make tune-fw"
         why = "found on the virtual board"
     for name, text in rows.items():
         d.put(name, text, why)

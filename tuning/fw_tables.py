@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import functools
+import glob
 import json
 import math
 import os
@@ -123,16 +124,24 @@ def _rows(measured: Section | None) -> list[dict[str, float]]:
     return [dict(zip(columns, values)) for values in zip(*columns.values())]
 
 
-def load_for(motor: str, params: Mapping[str, float], folder: Path = FOLDER) -> tuple[Tables | None, str]:
+def names_of(motor: Any) -> list[str]:
+    """What a motor's tables may be called: of a motor in another folder than tuning/motors its path tells it from its namesakes. Its plain name
+    comes last: it is a namesake's, or older than that."""
+    return list(dict.fromkeys([paths.name_of(motor.path, paths.MOTORS), motor.name]))
+
+
+def load_for(names: list[str], params: Mapping[str, float], folder: Path = FOLDER) -> tuple[Tables | None, str]:
     """The motor's tables, those for one board or another, or None and the reason in one line ("" where there is simply no file)."""
     told = ""
-    for path in (folder / f"{motor}.toml", *sorted(folder.glob(f"{motor}-*.toml"))):
-        if path.is_file():
-            tables = load(path)
-            reason = tables.mismatch(params)
-            if not reason:
-                return tables, ""
-            told = told or f"{paths.shown(path)} is not used: {reason}; run make tune-fw MOTOR={motor}"
+    for name in names:
+        for path in (folder / f"{name}.toml", *sorted(folder.glob(f"{glob.escape(name)}-*.toml"))):
+            if path.is_file():
+                tables = load(path)
+                reason = tables.mismatch(params)
+                if not reason:
+                    return tables, ""
+                if name == names[0] or not (paths.MOTORS / f"{name}.toml").exists(): # else they are a namesake's
+                    told = told or f"{paths.shown(path)} is not used: {reason}; run make tune-fw MOTOR={tables.motor}"
     return None, told
 
 

@@ -76,8 +76,8 @@ def command(options: argparse.Namespace) -> int:
     header, risks = _header(motor, board)
     name = paths.name_of(motor.path, paths.MOTORS)
     target = options.out or RESULTS / name
-    own = board_file.load(*board_file.named(motor)).name
-    path = options.tables or fw_tables.path_of(motor.name, "" if board.name == own else board.name)
+    own = board_file.load(*board_file.named(motor))
+    path = options.tables or fw_tables.path_of(name, "" if board.path.resolve() == own.path.resolve() else paths.name_of(board.path, paths.BOARDS))
     fw_tables.check_place(path)
     with output.in_turn(f"tune-fw-{name}"), output.ResultFolder(target) as folder:
         work = _Work(motor, header, risks, [motor.plant_values(), board.plant_values(), command_common.changes(options.changes)], options)

@@ -1,8 +1,11 @@
 """The plots of a tuning report, as SVG text."""
 
 import io
+import os
 
-import matplotlib
+os.environ.pop("MPLBACKEND", None) # a wrong one ends the import
+
+import matplotlib # noqa: E402
 
 matplotlib.use("Agg")
 

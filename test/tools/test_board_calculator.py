@@ -64,6 +64,36 @@ def test_a_motor_can_name_the_new_board_beside_it(path):
     assert board_file.load(*board_file.named(motor_file.load(str(motor)))).nominal_bus_v == 30.0
 
 
+@pytest.mark.parametrize("words, unit, period_s", [
+    (("pwm=16kHz",), "62.5 us", 62.5e-6), (("pwm=20", "kHz"), "50 us", 50e-6), (("pwm=20 kHz",), "50 us", 50e-6), (("PWM=16000hz",), "62.5 us", 62.5e-6),
+    (("period=62.5us",), "62.5 us", 62.5e-6), (("pwm=15kHz",), "66.65 us", 66.65e-6)])
+def test_a_pwm_may_be_given_as_frequency_or_period(path, words, unit, period_s):
+    shown(str(path), *words)
+    made = board_file.load(str(path))
+    assert (made.quantities["pwm.period"].given, made.pwm_period_s) == (unit, pytest.approx(period_s, rel=1e-9))
+
+
+def test_a_board_file_may_say_a_frequency(path):
+    text = (paths.BOARDS / "mclv.toml").read_text(encoding="utf-8")
+    path.write_text(re.sub(r'(?m)^(period = \{) value = 50, unit = "us"', r'\1 value = 16, unit = "kHz"', text), encoding="utf-8")
+    assert board_file.load(str(path)).pwm_period_s == 62.5e-6
+
+
+def test_capitals_are_no_other_key(path):
+    shown(str(path), "SUPPLY=36", "DeadTime=1.5US", "fault=RB9")
+    made = board_file.load(str(path))
+    assert (made.nominal_bus_v, made.dead_time_s, made.pins) == (36.0, 1.5e-6, {"fault": "RB9"})
+
+
+def test_a_path_without_toml_is_written_with_it_and_found_by_either_name(tmp_path):
+    name = tmp_path / "own boards" / "x.y"
+    name.parent.mkdir()
+    assert f"wrote {paths.shown(name)}.toml;" in shown(str(name), "supply=30")
+    assert [board_file.load(text).nominal_bus_v for text in (str(name), f"{name}.toml")] == [30.0, 30.0]
+    refused(command("board", str(name), "supply=36"), "is there already", "x.y.toml")
+    assert board_file.load(str(name)).nominal_bus_v == 30.0
+
+
 def test_an_existing_file_stays_as_it_is(path):
     path.write_text("mine", encoding="utf-8")
     refused(command("board", str(path), "gain=20"), "is there already", "give another name")
@@ -78,6 +108,9 @@ def test_an_existing_file_stays_as_it_is(path):
     (("divider=2k/30k",), ["do not rise in this order", "3.52 V"]), (("divider=30k/0",), ["the lower resistor of '30k/0' is 0"]),
     (("offset=2.5",), ["reference = 2.5 V is not the middle of the converter's 3.3 V"]), (("supply=70",), ["supply.voltage = 70 V", "choose 8 .. 60 V"]),
     (("supply=48",), ["do not rise in this order", "67.2 and 52.8 V"]), (("inverted=true",), ["'inverted' = 'true' is neither yes nor no"]),
+    (("pwm=16",), ["pwm.period = 16 s is impossible", "choose 2.5e-05 .. 0.00014 s or a frequency such as 16kHz"]),
+    (("pwm=2kHz",), ["pwm.period = 2 kHz is impossible", "choose 7.14286 .. 40 kHz"]), (("pwm=0kHz",), ["pwm.period = 0 kHz is impossible"]),
+    (("zzz=3",), ["unknown key 'zzz', SET: docs/files.md lists them"]), (("gain=20", "kHz"), ["'kHz' is no unit of shunt.amplifier_gain"]),
     (("fault=RA8",), ["fault cannot be on RA8"]), (("from=no_such",), ["no board 'no_such'", "SET"])])
 def test_nonsense_is_one_line_and_writes_nothing(path, words, parts):
     refused(command("board", str(path), *words), *parts)

@@ -295,14 +295,14 @@ def test_what_is_written_is_read(path):
     assert fw_tables.load(path) == TABLES
     assert fw_tables.load(path).mismatch(PARAMS) == ""
     # the rounding of single precision is no difference, and no file no complaint
-    found, reason = fw_tables.load_for(HURST, {name: value * 1.0000001 for name, value in PARAMS.items()}, path.parent)
+    found, reason = fw_tables.load_for([HURST], {name: value * 1.0000001 for name, value in PARAMS.items()}, path.parent)
     assert (found is None, reason) == (False, "")
-    assert fw_tables.load_for("nobody", PARAMS, path.parent) == (None, "")
+    assert fw_tables.load_for(["nobody"], PARAMS, path.parent) == (None, "")
     # of several boards' files the one that fits; the motor's own one first
     other = replace(TABLES, fingerprint=TABLES.fingerprint | {"LOOPTIME_SEC": 25e-6}, start_speed_rpm=2330.0)
     fw_tables.write(path.with_name(f"{HURST}-quick.toml"), other)
     assert fw_tables.path_of(HURST, "quick").name == f"{HURST}-quick.toml" and fw_tables.path_of(HURST).name == f"{HURST}.toml"
-    assert [fw_tables.load_for(HURST, PARAMS | more, path.parent)[0].start_speed_rpm for more in ({}, {"LOOPTIME_SEC": 25e-6})] \
+    assert [fw_tables.load_for([HURST], PARAMS | more, path.parent)[0].start_speed_rpm for more in ({}, {"LOOPTIME_SEC": 25e-6})] \
         == [TABLES.start_speed_rpm, 2330.0]
     # header names keep the base value by name
     values = TABLES.parameters()
@@ -312,14 +312,14 @@ def test_what_is_written_is_read(path):
 
 @pytest.mark.parametrize("name", fw_tables.FINGERPRINT)
 def test_tables_of_another_motor_value_are_not_used_and_the_line_says_which(path, name):
-    found, reason = fw_tables.load_for(HURST, {**PARAMS, name: PARAMS[name] * 1.01}, path.parent)
+    found, reason = fw_tables.load_for([HURST], {**PARAMS, name: PARAMS[name] * 1.01}, path.parent)
     assert found is None and name in reason and f"make tune-fw MOTOR={HURST}" in reason and "\n" not in reason
 
 
 def test_tables_whose_1_over_Kphi_counts_another_unit_of_speed_are_not_used(path):
-    found, reason = fw_tables.load_for(HURST, {**PARAMS, "NORM_INVKFIBASE": TABLES.inv_kfi_base / 2.0}, path.parent)
+    found, reason = fw_tables.load_for([HURST], {**PARAMS, "NORM_INVKFIBASE": TABLES.inv_kfi_base / 2.0}, path.parent)
     assert found is None and "another SPEED_UNIT" in reason and f"make tune-fw MOTOR={HURST}" in reason
-    assert fw_tables.load_for(HURST, {**PARAMS, "NORM_INVKFIBASE": TABLES.inv_kfi_base + 0.4}, path.parent)[1] == ""
+    assert fw_tables.load_for([HURST], {**PARAMS, "NORM_INVKFIBASE": TABLES.inv_kfi_base + 0.4}, path.parent)[1] == ""
 
 
 @pytest.mark.parametrize("wrong, word", [
@@ -331,6 +331,30 @@ def test_damaged_files_have_their_line(path, wrong, word):
     path.write_text(wrong, encoding="utf-8")
     with pytest.raises(UserError, match=word):
         fw_tables.load(path)
+
+
+def test_a_namesake_in_another_folder_has_tables_of_its_own(tmp_path):
+    home = paths.MOTORS / f"{HURST}.toml"
+    (tmp_path / home.name).write_bytes(home.read_bytes())
+    asked = []
+    with mock.patch.object(fw_tables, "check_place", side_effect=lambda path: asked.append(path) or (_ for _ in ()).throw(UserError("looked"))):
+        for name, more in ((HURST, ()), (str(tmp_path / home.name), ()), (HURST, ("--board", "mclv_40khz"))):
+            assert command("tune-fw", name, *more, "--quiet") == (2, "", "foc33: looked\n")
+    own, namesake, quick = asked
+    assert (own, quick) == (fw_tables.FOLDER / f"{HURST}.toml", fw_tables.FOLDER / f"{HURST}-mclv_40khz.toml")
+    assert namesake.parent == own.parent and re.fullmatch(rf"{HURST}-[0-9a-f]{{8}}\.toml", namesake.name)
+    assert fw_tables.names_of(motor_file.load(str(tmp_path / home.name))) == [namesake.stem, HURST]
+    assert fw_tables.names_of(motor_file.load(HURST)) == [HURST]
+
+
+def test_a_motor_s_own_tables_come_before_its_namesake_s_which_are_used_if_they_fit_and_else_not_told(path):
+    names = ["mine-0123abcd", HURST]
+    fw_tables.write(path, TABLES)
+    assert fw_tables.load_for(names, PARAMS, path.parent)[0].start_speed_rpm == TABLES.start_speed_rpm
+    assert fw_tables.load_for(names, PARAMS | {"NOMINAL_BUS_V": 12.0}, path.parent) == (None, "")
+    fw_tables.write(path.with_name("mine-0123abcd.toml"), replace(TABLES, start_speed_rpm=2330.0))
+    assert fw_tables.load_for(names, PARAMS, path.parent)[0].start_speed_rpm == 2330.0
+    assert "mine-0123abcd.toml is not used" in fw_tables.load_for(names, PARAMS | {"NOMINAL_BUS_V": 12.0}, path.parent)[1]
 
 
 def test_an_interrupted_write_leaves_the_old_file(path):

@@ -39,6 +39,18 @@ def test_a_missing_compiler_is_one_line_that_says_what_to_install(tmp_path, word
     assert not (ROOT / "build/target-none/foc33.hex").exists()
 
 
+@pytest.mark.parametrize("name", ["xc16-gcc", "xc-dsc-gcc"])
+@pytest.mark.parametrize("end", ["", "/bin", "/bin/"])
+def test_the_folder_of_the_compiler_s_programs_is_taken_for_its_own(tmp_path, name, end):
+    path = compiler_free_path(tmp_path, "df")
+    folder = tmp_path / "the compiler/bin"
+    folder.mkdir(parents=True)
+    (folder / name).symlink_to(shutil.which("true"))
+    assert make("find-xc16", f"XC16={folder.parent}{end}", path=path).returncode == 0
+    done = make("find-xc16", f"XC16={tmp_path}/none{end}", path=path)
+    assert done.returncode == 2 and "has no bin/xc16-gcc" in our_lines(done)[0]
+
+
 @pytest.mark.parametrize("word, expected", [
     ("OPT=-O7", "no such level, OPT=-O7: use -O1, -O2 or -O3"), ("OPT=", "no such level, OPT=: use"), ("OPT=-O1 -O2", "no such level"),
     ("OPT=fast", "no such level"), ("DFP=/nowhere", "no device pack for XC16, DFP=/nowhere: name"),

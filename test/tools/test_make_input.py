@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -130,6 +131,45 @@ def test_a_build_folder_that_cannot_be_used_is_named(goal, kind):
         finally:
             (root / bad).chmod(0o755) if (root / bad).exists() else None
         refused(done, f"^foc33: cannot read and write {re.escape(bad)}, {re.escape(str(root))}: change owner and permissions$")
+
+
+def room(folder: Path, **environment: str) -> subprocess.CompletedProcess:
+    (folder / "build").mkdir(exist_ok=True)
+    return subprocess.run([ROOT / "tools/make/room.sh"], cwd=folder, env={"PATH": os.environ["PATH"], **environment}, capture_output=True, text=True, check=False)
+
+
+def test_a_disk_with_room_is_silent_and_nothing_stays_there(tmp_path):
+    done = room(tmp_path, TMPDIR=str(tmp_path))
+    assert (done.returncode, done.stdout, done.stderr, list((tmp_path / "build").iterdir())) == (0, "", "", [])
+
+
+@pytest.mark.parametrize("program, body, text", [
+    ("df", "printf 'Filesystem 1024-blocks Used Available Capacity Mounted\\nx 9 9 100 9% /\\n'", "the disk of {} has only 100 KiB free: free at least 8 MiB"),
+    ("head", "echo \"head: error writing 'standard output': No space left on device\" >&2; exit 1",
+     "cannot write {} (No space left on device): free some space or make the folder writable")])
+def test_a_full_disk_is_one_line(tmp_path, program, body, text):
+    (tmp_path / program).write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+    (tmp_path / program).chmod(0o755)
+    done = room(tmp_path, PATH=f"{tmp_path}:{os.environ['PATH']}")
+    assert (done.returncode, done.stdout) == (1, f"foc33: {text.format(f'build, {tmp_path}')}\n") and not list((tmp_path / "build").iterdir())
+
+
+def test_a_folder_for_temporary_files_that_takes_none_is_one_line_of_make_before_any_work():
+    done = subprocess.run(["make", "-s", "lib", "VARIANT=none"], cwd=ROOT, env=os.environ | {"TMPDIR": "/proc"}, capture_output=True, text=True, check=False)
+    refused(done, r"^foc33: cannot write temporary files, TMPDIR=/proc \(.+\): free some space or make the folder writable$")
+
+
+@pytest.mark.parametrize("name, value", [("PYTHONSAFEPATH", "1"), ("MPLBACKEND", "nonsense")])
+def test_what_the_environment_says_to_python_does_not_stop_make(name, value):
+    clean = {key: text for key, text in os.environ.items() if key not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    done = subprocess.run(["make", "-s", "scenarios"], cwd=ROOT, env=clean | {name: value}, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "demo" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("module", ["tools.bench.plots", "tuning.plots"])
+def test_a_wrong_backend_does_not_stop_the_plots(module):
+    done = subprocess.run([sys.executable, "-c", f"import {module}"], cwd=ROOT, env=os.environ | {"MPLBACKEND": "nonsense"}, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("words, text", [

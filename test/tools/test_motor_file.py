@@ -118,6 +118,8 @@ BAD = {
     "choice that is a fact": ("", "[tune]\nMOTOR_RS_OHM = 1", "'MOTOR_RS_OHM' is no choice", "line 20", "[electrical] resistance"),
     "plant key that is derived": ("", "[plant]\n\"motor.rs_ohm\" = 1", "'motor.rs_ohm' stands in another table", "line 20"),
     "plant key of the board": ("", "[plant]\n\"supply.voltage_v\" = 1", "'supply.voltage_v' is no key of the motor", "line 20"),
+    "tune key in small letters": ("", "[tune]\nspeed_bandwidth_hz = 10", "'speed_bandwidth_hz' is no parameter", "did you mean 'SPEED_BANDWIDTH_HZ'?"),
+    "tune key like no other": ("", "[tune]\nxyz = 10", "'xyz' is no parameter of userparams.h", "docs/parameters.md lists them"),
     "plant key misspelt": ("", "[plant]\n\"motor.sat_lq_ration\" = 0.2", "unknown key 'motor.sat_lq_ration'", "line 20", "did you mean 'motor.sat_lq_ratio'?"),
     "plant key out of range": ("", "[plant]\n\"motor.temp_c\" = 300", "'motor.temp_c' = 300 is impossible", "line 20", "choose -60 .. 250 degC"),
     "plant key in words": ("", "[plant]\n\"mech.stiction_nm\" = \"x\"", "'mech.stiction_nm' is not a number", "line 20"),
@@ -206,6 +208,12 @@ def test_a_delta_motor_given_by_its_windings_is_the_star_motor_given_line_to_lin
         .replace("2.6, unit = \"mH line-to-line\"", "3.9, unit = \"mH winding\"")
     star = load(MOTOR)
     shows(load(text), {"rs_ohm": star.rs_ohm, "lq_h": star.lq_h}, 1e-12)
+
+
+def test_a_motor_file_may_say_any_key_of_motor_mechanics_and_load(load):
+    keys = {"load.viscous_nms": 1e-5, "load.quadratic_nms2": 1e-8, "load.constant_nm": 0.01, "load.active_nm": -0.01, "motor.temp_c": 60.0, "mech.stiction_nm": 0.01}
+    values = load(MOTOR + "[plant]\n" + "".join(f'"{key}" = {value}\n' for key, value in keys.items())).plant_values().values
+    assert {key: values[key] for key in keys} == keys
 
 
 def test_the_virtual_board_gets_its_keys_from_the_same_numbers(load):

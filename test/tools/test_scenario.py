@@ -6,6 +6,7 @@ from support import SCENARIO, document, refusal, scenario
 from tools.bench.scenario import Rating, asks_for_rating, in_numbers
 from tools.bench.scenario_file import load, read
 from tools.common import paths
+from tools.common.toml_file import Document
 
 EVENT = "[[event]]\nat_s = 1.0\n"
 MEASURE = "[[measure]]\nname = \"m\"\nfrom_s = 0.5\nto_s = 1.0\n"
@@ -200,3 +201,18 @@ def test_every_scenario_of_the_project_is_valid_and_expects_something_and_there_
     faults = {expectation.name for item in items for expectation in item.expectations if type(expectation).__name__ == "FaultExpectation"}
     assert {"OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
             "ISR_OVERRUN"} <= faults
+
+
+def test_a_motor_and_a_board_are_seen_from_the_scenario_s_folder(tmp_path, monkeypatch):
+    motor = paths.MOTORS / "linix_45zwn24_40.toml"
+    (tmp_path / "mine").mkdir()
+    for name in ("a motor.toml", "mine/a motor.toml"):
+        (tmp_path / name).write_bytes(motor.read_bytes())
+    (tmp_path / "old.toml").write_bytes((paths.BOARDS / "mclv2.toml").read_bytes())
+    file = tmp_path / "mine" / "s.toml"
+    file.write_text(SCENARIO.replace("hurst_dmb0224c10002", "./a motor.toml").replace("\"mclv\"", "\"./old.toml\""), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    item = read(Document(file))
+    assert (item.motor, item.board) == (str(tmp_path / "mine" / "a motor.toml"), "./old.toml")
+    assert item.notes == [f"{paths.shown(file)} line 4: './old.toml' is found from the current folder, not from the file's: write \"../old.toml\""]
+    assert not load("demo").notes

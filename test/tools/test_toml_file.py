@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from support import document, refusal
 
+from tools.common import paths
 from tools.common.toml_file import Document, flatten
 
 KEYS = ("press", "set")
@@ -79,3 +80,16 @@ def test_a_factor_is_allowed_only_where_it_makes_sense():
     root = document("[plant]\n\"motor.psi_vs\" = { factor = 0.5 }\n").root
     assert root.values("plant", factors=True) == {"motor.psi_vs": ("factor", 0.5)}
     assert root.values("plant") == {"motor.psi_vs.factor": 0.5}
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_file_in_utf_16_is_called_so(tmp_path, encoding):
+    path = tmp_path / "x.toml"
+    path.write_bytes("a = 1\n".encode(encoding))
+    refusal(lambda: Document(path), f"the file is UTF-16, {paths.shown(path)}: save it as UTF-8")
+
+
+def test_line_ends_and_a_mark_are_no_matter(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xef\xbb\xbfa = 1\r\nb = 2\r\n")
+    assert Document(path).data == {"a": 1, "b": 2}

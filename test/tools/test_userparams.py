@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 import xc16
 
+from tools.bench import build
 from tools.common import paths
+from tools.common.errors import UserError
 from tools.common.param_rows import modes, parameters
 from tools.common.x_macro import rows
 from tools.image import image
@@ -99,8 +101,18 @@ MISTAKES = {
                                               f"LOOPTIME_SEC = 0.0000245 is outside {range_of('LOOPTIME_SEC')}"),
     "a mode that late duties have no time for": (value("LOOPTIME_SEC", "0.000025").replace(MODE, "#define IDENTIFY"), "LOOPTIME_SEC",
                                                  "LOOPTIME_SEC = 0.000025 must be at least 0.00004 with IDENTIFY"),
-    "whole numbers divided": (value("LOOPTIME_SEC", "(1/20000)"), "LOOPTIME_SEC",
-                              f"LOOPTIME_SEC = (1/20000) is outside {range_of('LOOPTIME_SEC')}"),
+    **{f"whole numbers divided, {name} {text}": (value(name, text), name,
+                                                 f"{name} = {text} divides whole numbers, of which C drops the fraction: write ")
+       for name, text in (("LOOPTIME_SEC", "(1/20000)"), ("MOTOR_RS_OHM", "5/2"), ("MOTOR_RS_OHM", "(5 / 2)"), ("KCURRA", "-1/2"),
+                          ("OVER_CURRENT_THRESHOLD_A", "38/10"), ("SNAPDELAY", "11/2"))},
+    **{f"a division by 0, {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM",
+                                    f"MOTOR_RS_OHM = {text} divides by 0: write a number, {range_of('MOTOR_RS_OHM')}") for text in ("1/0", "(2/0)")},
+    **{f"octal {text}": (value("MAXIMUM_SPEED_RPM", text), "MAXIMUM_SPEED_RPM",
+                         f"MAXIMUM_SPEED_RPM = {text} is octal to C, for it begins with 0: write it without, {range_of('MAXIMUM_SPEED_RPM')}")
+       for text in ("05500", "(05500)", "05500 + 1", "09")},
+    "gains of two signs": (value("KCURRB", "0.5"), "KCURRB", "KCURRB = 0.5 must have the sign of KCURRA = -0.5: the amplifiers are alike"),
+    **{f"1/Kphi of entry {i}": (value(f"INVKFI_SPEED{i}", "19750"), f"INVKFI_SPEED{i}",
+                                f"INVKFI_SPEED{i} = 19750 must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that") for i in (0, 1, 9, 17)},
     # these break relations, too, and the formulas of other files
     **{f"{name} out of range": (value(name, text), name, f"{name} = {text} is outside {range_of(name)}: correct it") for name, text in (
         ("MOTOR_RS_OHM", "99"), ("MAXIMUM_SPEED_RPM", "50000"), ("MOTOR_KPHI_V_PER_KRPM", "0.1"), ("NOPOLESPAIRS", "0"),
@@ -135,6 +147,48 @@ def test_several_mistakes_of_a_kind_are_a_line_each(tmp_path, compiler):
     code, lines = checked(tmp_path, compiler, text)
     assert code == 2 and [line.split(" is outside ")[0] for line in lines] == [
         f"foc33: {place(text, 'MOTOR_RS_OHM')}: MOTOR_RS_OHM = 99", f"foc33: {place(text, 'KFILTER_ESDQ')}: KFILTER_ESDQ = 9"]
+
+
+WRONG = {"MOTOR_RS_OHM": "5/2", "MOTOR_LS_MH": "two", "MOTOR_KPHI_V_PER_KRPM": None, "NOMINAL_SPEED_RPM": "02800", "KCURRB": "0.5", "LOCK_TIME": "(x)",
+         "REGEN_LIMIT_V": "20", "SPEED_BANDWIDTH_HZ": "(12.6", "KFILTER_ESDQ": "9", "INVKFI_SPEED2": None, "IDREF_SPEED9": "1 /0", "SNAPDELAY": "(010)",
+         "RETRY_COUNT": "99", "RETRY_PAUSE_SEC": "1.0 * (5/2)"}
+
+
+def test_mistakes_of_all_kinds_are_told_in_one_build(tmp_path):
+    text = HEADER.replace("#define KCURRA", "#define KCRURA")
+    for name, wrong in WRONG.items():
+        text = text.replace(line_of(name), "" if wrong is None else f"#define {name} {wrong}\n")
+    code, lines = checked(tmp_path, PC, text)
+    told = {line.split(": ", 2)[2].split()[0]: line for line in lines}
+    # KCURRB needs the sign of a KCURRA that is missing
+    assert code == 2 and sorted(told) == sorted({"KCRURA", *WRONG} - {"KCURRB"}) and len(lines) == len(told), lines
+    for name, line in told.items():
+        assert line.startswith(f"foc33: {place(text, name) if WRONG.get(name, 1) else 'userparams.h'}: {name} "), line
+
+
+def test_every_name_that_a_header_does_not_have_is_told_in_one_build(tmp_path):
+    code, lines = checked(tmp_path, PC, "#define NOPOLESPAIRS 5\n#define NORM_RS 17616\n")
+    assert code == 2 and [line.split()[2] for line in lines] == [name for name in parameters() if name != "NOPOLESPAIRS"]
+    assert all(line.startswith("foc33: userparams.h: ") and " is missing: add #define " in line for line in lines)
+
+
+def test_poles_in_place_of_pole_pairs_are_told_by_that_name(tmp_path):
+    text = value("NOPOLESPAIRS", "10")
+    code, lines = checked(tmp_path, PC, text)
+    assert code == 2 and len(lines) == 1 and lines[0].startswith(
+        f"foc33: {place(text, 'NOPOLESPAIRS')}: the back-EMF's format overflows: check NOPOLESPAIRS = 10, half the number of poles, or lower "), lines
+
+
+@pytest.mark.parametrize("text, remedy", [("5/2", "5.0/2.0"), ("1.0 * (5/2)", "1.0 * (5.0/2.0)"), ("2.5f*3/(2/1.5) + 7 / 3", "2.5f*3.0/(2.0/1.5) + 7.0 / 3.0")])
+def test_a_quotient_is_told_with_what_to_write(tmp_path, text, remedy):
+    code, lines = checked(tmp_path, PC, value("MOTOR_RS_OHM", text))
+    assert code == 2 and len(lines) == 1 and lines[0].endswith(f"MOTOR_RS_OHM = {text} divides whole numbers, of which C drops the fraction: write {remedy}")
+
+
+def test_a_number_that_only_the_build_sees_is_octal_is_told(tmp_path):
+    text = value("MAXIMUM_SPEED_RPM", "5000 + 0500")
+    assert checked(tmp_path, PC, text) == (2, [
+        f"foc33: {place(text, 'MAXIMUM_SPEED_RPM')}: MAXIMUM_SPEED_RPM = 5000 + 0500 has an octal number, 0500: write it without the 0 in front"])
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -201,13 +255,24 @@ def test_what_is_no_header_is_the_compiler_s_first_line(tmp_path, compiler, line
     assert code == 2 and len(lines) == 1 and re.match(f"foc33: {told}", lines[0]), lines
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_header_in_utf_16_is_called_so(tmp_path, encoding):
+    (tmp_path / "userparams.h").write_bytes(HEADER.encode(encoding))
+    done = make("lib", "VARIANT=refused", f"USERPARAMS={tmp_path}")
+    assert [line for line in done.stderr.splitlines() if not line.startswith("make")] == [f"foc33: {tmp_path}/userparams.h is UTF-16: save it as UTF-8"]
+    assert done.returncode == 2 and done.stdout == ""
+
+
 # ---- what C allows -------------------------------------------------------------------------------------------------------
 LEGAL = {
     "as it is": HEADER,
     **{f"MOTOR_RS_OHM {text}": value("MOTOR_RS_OHM", text) for text in (
         "2.67f", "2.67F", "(2.67)", "267e-2", ".5", "3.", "3", "0x3", "3u", "(5.34 / 2)", "5.34/2.", "(float)2.67", "(float)(5.34 / 2)",
         "2.67 /* a comment, with a comma */", "2.67 // and one", "2.67 \\\n", "+2.67", "(1 ? 2.67 : 3)", "(2.67 > 0) * 2.67",
-        "((2.0) + (0.67))", "2*1.335")},
+        "((2.0) + (0.67))", "2*1.335", "1.0*5/2", "6/2", "5/2.", "0.5e1", "00.5", "(0 + 2.67)")},
+    "a whole quotient of counts": value("SNAPDELAY", "10/2"),
+    "gains of two signs, on purpose": value("KCURRB", "0.5") + "#define KCURR_SIGNS_DIFFER\n",
+    "a share of 1/Kphi": value("INVKFI_SPEED3", "(NORM_INVKFIBASE * 11 / 10)"),
     "a negative expression": value("KCURRA", "-(0.25 + 0.25)"),
     "names of one's own": HEADER.replace(
         RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),
@@ -274,6 +339,24 @@ def test_nothing_is_compiled_with_a_header_that_is_refused_and_a_mended_one_is_l
     assert make(*words).returncode == 0
     (tmp_path / "more.h").write_text("#define MOTOR_RS_OHM two\n", encoding="utf-8")
     assert "MOTOR_RS_OHM = two is no number" in make(*words).stderr
+
+
+@pytest.mark.parametrize("words", [["lib"], pytest.param(["target-elf"], marks=xc16.MARKS)])
+def test_what_is_missing_is_told_with_the_user_s_own_path(tmp_path, words):
+    folder = tmp_path / "my motor"
+    folder.mkdir()
+    (folder / "userparams.h").write_text(HEADER.replace(RS, "").replace(line_of("KCURRA"), "#define KCURRA 5\n"), encoding="utf-8")
+    done = make(*words, "VARIANT=refused", f"USERPARAMS={folder}")
+    lines = [line for line in done.stderr.splitlines() if line.startswith("foc33: ")]
+    assert done.returncode == 2 and len(lines) == 2 and lines[0].startswith(f"foc33: {folder}/userparams.h: MOTOR_RS_OHM is missing: "), lines
+    assert lines[1].startswith(f"foc33: {folder}/userparams.h:") and "KCURRA = 5 is outside" in lines[1], lines
+
+
+def test_who_runs_a_header_hears_of_every_mistake(tmp_path):
+    (tmp_path / "userparams.h").write_text(HEADER.replace(RS, "").replace(line_of("KCURRA"), "#define KCURRA 5\n"), encoding="utf-8")
+    with pytest.raises(UserError) as told:
+        build.library([], tmp_path)
+    assert ["MOTOR_RS_OHM is missing" in line for line in told.value.lines] == [True, False] and "KCURRA = 5 is outside" in told.value.lines[1]
 
 
 def test_the_optional_gains_are_those_that_have_a_default():

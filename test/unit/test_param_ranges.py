@@ -123,6 +123,9 @@ RELATIONS = {
         case("MOTOR_KPHI_V_PER_KRPM", "1.7", "1.8"), case("MOTOR_KPHI_V_PER_KRPM", "56.5", "56.1", SPEED_BANDWIDTH_HZ="4")],
     "INVKFI_SPEED0 must be 0.6 .. 1.6 of NORM_INVKFIBASE": [
         case("INVKFI_SPEED0", "4770", "4780"), case("INVKFI_SPEED0", "12740", "12720"), case("MAXIMUM_SPEED_RPM", "6401", "6400", INVKFI_SPEED0="7956")],
+    **{f"INVKFI_SPEED{i} must be 0.6 .. 1.6 of NORM_INVKFIBASE": [case(f"INVKFI_SPEED{i}", "4770" if i % 2 else "12740", "4780" if i % 2 else "12720")]
+       for i in range(1, 18)},
+    "KCURRB must have the sign of KCURRA": [case("KCURRB", "0.5", "-0.5"), case("KCURRA", "0.1", "-0.1"), case("KCURRA", "-0.4", "0.4", KCURRB="0.4")],
     "MOTOR_SALIENCY_UH must be below 950 * MOTOR_LS_MH": [case("MOTOR_SALIENCY_UH", "1824", "1823")],
     "MOTOR_SALIENCY_UH times MAXIMUM_CURRENT_A must be 1/8 to 1 of": [
         case("MOTOR_SALIENCY_UH", "362", "364"), case("MOTOR_SALIENCY_UH", "1605", "1603", MOTOR_KPHI_V_PER_KRPM="4")],

@@ -2,6 +2,7 @@
 
 import argparse
 import functools
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,8 @@ def _run(options: argparse.Namespace) -> int:
     motor, board, library, used = command_common.set_up(item, options, item.defines)
     job = simulate.prepare(item, library, motor, board, command_common.changes(options.changes))
     target = command_common.results(item.name, item.motor, options, asked)
+    for note in item.notes:
+        print(f"foc33: {note}", file=sys.stderr, flush=True)
     with output.ResultFolder(target) as folder:
         text, outcomes = sweep.run_cases(item.name, [job], options.quiet, functools.partial(_reported, folder.work, used, options))[0]
     print(text)

@@ -451,7 +451,7 @@ KINDS = {
     "stop": Kind("outputs off after S2, and off to the end", (StopExpectation,)),
     "outputs_off": Kind("all six outputs off", (OutputsOffExpectation,)),
     "bus_voltage": Kind("lowest and highest bus voltage", (BusVoltageExpectation,)),
-    "signal": Kind("a signal of the trace: a readable key below or of `python3 -m tools.bench keys`", (SignalExpectation,)),
+    "signal": Kind("a signal of the trace: a readable key below or of `make keys`", (SignalExpectation,)),
     "state": Kind("the drive's state", (StateExpectation,)),
     "fault": Kind("a fault", (FaultExpectation,)),
     "no_fault": Kind("no fault", (NoFaultExpectation,)),

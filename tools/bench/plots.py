@@ -1,9 +1,12 @@
 """The plots of a run, as PNG files."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
-import matplotlib
+os.environ.pop("MPLBACKEND", None) # a wrong one ends the import
+
+import matplotlib # noqa: E402
 
 matplotlib.use("Agg")
 

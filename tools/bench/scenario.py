@@ -75,6 +75,8 @@ class Scenario:
     expectations_where: list[str] = field(default_factory=list)
     motor_where: str = ""
     board_where: str = ""
+    notes: list[str] = field(default_factory=list)
+    """what to write otherwise in the file, though it works"""
 
 
 def asks_for_rating(scenario: Scenario) -> bool:

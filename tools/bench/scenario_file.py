@@ -35,10 +35,15 @@ def read(document: Document) -> Scenario:
     root = document.root
     scenario = Scenario(
         document.path.stem, root.text("title", meaning="one line for the list of scenarios"), root.text("description", "", "longer text"),
-        root.text("motor", MOTOR, "name in tuning/motors or a path"), root.text("board", "", "name in tuning/boards or a path; else the motor file's"),
+        root.text("motor", MOTOR, "name in tuning/motors, or a path as seen from this file"),
+        root.text("board", "", "name in tuning/boards, or a path as seen from this file; else the motor file's"),
         root.number("duration_s", REQUIRED, 0.01, 120.0, "motor time of the run"),
         root.flag("follows_header", False, "true: a start or a ramp that takes longer with this header shifts what comes after"))
     scenario.motor_where, scenario.board_where = root.where("motor"), root.where("board")
+    for key, where in (("motor", scenario.motor_where), ("board", scenario.board_where)):
+        name, note = paths.beside(getattr(scenario, key), document.path)
+        setattr(scenario, key, name)
+        scenario.notes += [f"{where}: {note}"] if note else []
     _read_firmware(root.section("firmware"), scenario)
     scenario.plant = Values.from_section(root.section("plant"))
     _read_start(root.section("start"), scenario)

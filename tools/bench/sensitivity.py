@@ -142,7 +142,7 @@ class Sensitivity(sweep.Sweep):
     def ask(self, options: argparse.Namespace) -> None:
         for name in options.only:
             if name not in tuned():
-                raise UserError(f"no number '{name}'", str(paths.shown(TABLE)), suggestion(name, tuned()))
+                raise UserError(f"no number '{name}'", str(paths.shown(TABLE)), suggestion(name, tuned(), "docs/tuned.md"))
         self.only, self.all = tuple(options.only), options.all
         asked = command_common.header_for(options)
         self.header = asked and build.header_folder(asked) or paths.ROOT

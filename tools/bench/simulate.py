@@ -100,7 +100,7 @@ def _check_signals(signals: list[str], library: Library, scenario: Scenario) -> 
         if name not in readable and not name.startswith("reg."):
             where = next((where for expectation, where in zip(scenario.expectations, scenario.expectations_where)
                           if name in expectation.signals()), str(library.path))
-            raise UserError(f"the board has no signal '{name}'", where, suggestion(name, readable))
+            raise UserError(f"the board has no signal '{name}'", where, suggestion(name, readable, "`make keys`"))
 
 
 def simulate(job: Job, report: Callable[[float], None]) -> Run:

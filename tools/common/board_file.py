@@ -18,6 +18,7 @@ from .units import Conversion, Key, Kind, Quantity
 _VOLT = {"V": Conversion(1.0), "mV": Conversion(1e-3)}
 _OHM = {"ohm": Conversion(1.0), "mohm": Conversion(1e-3)}
 _TIME = {"s": Conversion(1.0), "ms": Conversion(1e-3), "us": Conversion(1e-6), "ns": Conversion(1e-9)}
+_FREQUENCY = {"kHz": Conversion(1e-3, reciprocal=True), "Hz": Conversion(1.0, reciprocal=True)}
 _AMPERE = {"A": Conversion(1.0), "mA": Conversion(1e-3)}
 _ONE = {"1": Conversion(1.0)}
 
@@ -41,7 +42,7 @@ TABLES: dict[str, dict[str, Key]] = {
             "full_scale": Key("voltage of the converter's full scale", Kind("V", 1.0, 5.5, _VOLT)),
             "bus_divider": Key("bus voltage over the pin's voltage", Kind("1", 1.0, 100.0, _ONE), plant="adc.vbus_ratio"),
             "noise": Key("standard deviation of a conversion", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}), plant="adc.noise_lsb")},
-    "pwm": {"period": Key("PWM and control period", Kind("s", 25e-6, 140e-6, _TIME)),
+    "pwm": {"period": Key("PWM and control period", Kind("s", 25e-6, 140e-6, _TIME | _FREQUENCY)),
             "dead_time": Key("between the transistors of a leg", Kind("s", 0.5e-6, 3e-6, _TIME)),
             "sample_window": Key("low sides on, on each side of the sample", Kind("s", 1.5e-6, 4e-6, _TIME))},
     "limits": {"over_voltage": Key("bus above it trips", Kind("V", 6.0, 100.0, _VOLT)),

@@ -66,7 +66,7 @@ def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:
     else:
         writable = [name for name, info in keys.items() if info.writable]
         what = f"'{key}' can only be read" if key in keys else f"unknown key '{key}'"
-        raise UserError(what, where, suggestion(key, writable))
+        raise UserError(what, where, suggestion(key, writable, "`make keys`"))
     if not info.minimum <= value <= info.maximum:
         unit = f" {info.unit}" if info.unit else ""
         raise UserError(f"'{key}' = {value:g} is impossible", where, f"choose {info.minimum:g} .. {info.maximum:g}{unit}")

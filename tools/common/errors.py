@@ -43,12 +43,16 @@ class Problems:
             raise self.found[0] if len(self.found) == 1 else UserErrors(self.found)
 
 
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """What to write instead of an unknown word."""
-    names = sorted(known)
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5) or [name for name in names if word and name.startswith(word)]
+def suggestion(word: str, known: Iterable[str], listed: str = "") -> str:
+    """What to write instead of an unknown word, small letters or capitals; `listed`: where the names stand if they are too many for a line."""
+    names = {name.lower(): name for name in sorted(known, reverse=True)}
+    small = word.lower()
+    near = difflib.get_close_matches(small, names, n=1, cutoff=0.5) or sorted(name for name in names if small and name.startswith(small))
     if near:
-        return f"did you mean '{near[0]}'?"
+        return f"did you mean '{names[near[0]]}'?"
+    names = sorted(names.values())
+    if listed and len(names) > 30:
+        return f"{listed} lists them"
     if len(names) > 30:
-        return "see the list that `python3 -m tools.bench keys` prints"
+        return "check its spelling"
     return "use one of " + ", ".join(names) if names else "remove it"

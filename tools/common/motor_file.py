@@ -24,7 +24,7 @@ START_OVER_RATED = 0.25
 LARGEST_FILE = 65536
 SLOWEST_S = 5.0
 """In which rated torque brings a bare rotor to rated speed; what is heavier is a load."""
-PLANT_TABLES = ("motor.", "mech.", "load.pulse")
+PLANT_TABLES = ("motor.", "mech.", "load.")
 DERIVED_KEYS = ("motor.rs_ohm", "motor.ld_h", "motor.lq_h", "motor.psi_vs", "motor.pole_pairs", "motor.r_tempco", "motor.psi_tempco",
                 "mech.inertia_kgm2", "mech.viscous_nms", "mech.coulomb_nm", "load.pulse1_nm", "load.pulse1_order")
 
@@ -63,7 +63,7 @@ TABLES: dict[str, dict[str, Key] | None] = {
     "tune": None, "plant": None}
 """Tables of a motor file with their keys; None: any key, checked elsewhere. Kinds are a star's; a delta, and Kphi, have other factors."""
 ROOT = {"title": Key("one line for tables and reports"), "connection": Key("`Y` (star) or `delta`; counts only for values per `winding`"),
-        "board": Key("the board that turns it: a name in tuning/boards or a path; `BOARD=` overrides it", default="`mclv`")}
+        "board": Key("the board that turns it: a name in tuning/boards, or a path as seen from this file; `BOARD=` overrides it", default="`mclv`")}
 
 FACTS = {"NOPOLESPAIRS": "[electrical] pole_pairs", "MOTOR_RS_OHM": "[electrical] resistance", "MOTOR_LS_MH": "[electrical] inductance",
          "MOTOR_SALIENCY_UH": "[electrical] inductance_d and inductance_q", "MOTOR_KPHI_V_PER_KRPM": "[electrical] kphi", "MOTOR_INERTIA_KGM2": "[mechanical] inertia",
@@ -252,8 +252,7 @@ def _read(root: Section) -> Motor:
 
 def _board(root: Section) -> str:
     """Name or path of the board; a path is seen from the motor file's folder."""
-    name = root.text("board", "")
-    return str(root.document.path.parent / name) if paths.is_path(name) else name
+    return paths.beside(root.text("board", ""), root.document.path)[0]
 
 
 def _read_electrical(section: Section, connection: str, reader: _Reader) -> dict[str, Any]:
@@ -333,7 +332,7 @@ def _read_tune(section: Section | None) -> dict[str, float]:
         if name in FACTS:
             raise section.fail(name, f"'{name}' is no choice of the tuner", f"it follows from {FACTS[name]}; change that")
         if name not in known:
-            raise section.fail(name, f"'{name}' is no parameter of userparams.h", suggestion(name, set(known) - set(FACTS)))
+            raise section.fail(name, f"'{name}' is no parameter of userparams.h", suggestion(name, set(known) - set(FACTS), "docs/parameters.md"))
         result[name] = section.number(name, minimum=float(known[name].low), maximum=float(known[name].high))
     return result
 
@@ -342,7 +341,7 @@ def _read_tune(section: Section | None) -> dict[str, float]:
 def plant_ranges() -> dict[str, tuple[str, float, float]]:
     """Unit, minimum and maximum of the virtual board's keys of a motor, from its source: what runs only when it is built knows too late."""
     text = (paths.ROOT / "tools" / "vboard" / "vb_keys.c").read_text(encoding="utf-8")
-    rows = re.findall(r'\b[PI]\("((?:motor\.|mech\.|load\.pulse)\w+)", [\w.\[\]]+, \S+, (\S+), (\S+), "([^"]*)"', text)
+    rows = re.findall(r'\b[PI]\("((?:motor\.|mech\.|load\.)\w+)", [\w.\[\]]+, \S+, (\S+), (\S+), "([^"]*)"', text)
     return {name: (unit, float(low), float(high)) for name, low, high, unit in rows}
 
 
@@ -354,9 +353,9 @@ def _read_plant(section: Section | None) -> Values:
         if key in DERIVED_KEYS:
             raise section.fail(key, f"'{key}' stands in another table of this file", "change the number there")
         if not key.startswith(PLANT_TABLES):
-            raise section.fail(key, f"'{key}' is no key of the motor", "use motor.*, mech.* and load.pulse* only, see `python3 -m tools.bench keys`")
+            raise section.fail(key, f"'{key}' is no key of the motor", "use motor.*, mech.* and load.* here; of the rest board file and scenario have a [plant], too")
         if key not in ranges:
-            raise section.fail(key, f"unknown key '{key}'", suggestion(key, set(ranges) - set(DERIVED_KEYS)))
+            raise section.fail(key, f"unknown key '{key}'", suggestion(key, set(ranges) - set(DERIVED_KEYS), "`make keys`"))
         unit, low, high = ranges[key]
         if not low <= value <= high:
             raise section.fail(key, f"'{key}' = {value:g} is impossible", f"choose {low:g} .. {high:g} {unit}".rstrip())

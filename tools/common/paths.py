@@ -1,5 +1,6 @@
 """Where things are in the project, and how a name on the command line becomes a file."""
 
+import os
 import re
 import zlib
 from pathlib import Path
@@ -13,6 +14,8 @@ MOTORS = ROOT / "tuning" / "motors"
 BOARDS = ROOT / "tuning" / "boards"
 RESULTS = ROOT / "build" / "run"
 TUNED = ROOT / "build" / "tune"
+LISTS = {"scenario": "`make scenarios`", "motor": "`make list-motors`"}
+"""What lists the names of a kind."""
 
 
 def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
@@ -20,14 +23,34 @@ def find(kind: str, name: str, folder: Path, where: str = "") -> Path:
     by_path = is_path(name)
     path = Path(name) if by_path else folder / f"{name}.toml"
     try:
-        found = path.is_file()
+        found = _file(path)
     except OSError as error:
         raise _unreadable(path.parent, error) from None
     if not found and by_path:
         raise UserError(f"no {kind} file '{name}'", where, "check the path")
     if not found:
-        raise UserError(f"no {kind} '{name}'", where or str(shown(folder)), suggestion(name, names(folder)))
-    return path
+        raise UserError(f"no {kind} '{name}'", where or str(shown(folder)), suggestion(name, names(folder), LISTS.get(kind, "")))
+    return found
+
+
+def _file(path: Path) -> Path | None:
+    """The file of a path that may lack its .toml."""
+    full = path.with_name(f"{path.name}.toml") if path.name and path.suffix != ".toml" else path
+    return next((place for place in (path, full) if place.is_file()), None)
+
+
+def beside(name: str, file: Path) -> tuple[str, str]:
+    """What a file says of another: a name stays, a path is seen from the file's folder. One that is only there as seen from the current folder
+    is taken, too; the second text then says how to write it."""
+    if not is_path(name) or Path(name).is_absolute():
+        return name, ""
+    own = file.parent / name
+    try:
+        if _file(own) or not (found := _file(Path(name))):
+            return str(own), ""
+    except OSError: # find() tells
+        return str(own), ""
+    return name, f"'{name}' is found from the current folder, not from the file's: write \"{os.path.relpath(found, file.parent)}\""
 
 
 def is_path(name: str) -> bool:

@@ -34,13 +34,14 @@ class Document:
         self.path = path
         self.label = str(paths.shown(path))
         try:
-            self.text = path.read_text(encoding="utf-8-sig") if text is None else text # some editors begin a file with a mark
+            self.text = self._read() if text is None else text
         except FileNotFoundError:
             raise UserError("no such file", self.label,
-                            "check the name; `python3 -m tools.bench scenarios` lists the scenarios") from None
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-            raise UserError(f"cannot read the file ({reason})", self.label, "give a readable TOML file") from None
+                            "check the name; `make scenarios` lists the scenarios") from None
+        except OSError as error:
+            raise UserError(f"cannot read the file ({error.strerror})", self.label, "give a readable TOML file") from None
+        except UnicodeDecodeError:
+            raise UserError("cannot read the file (it is not UTF-8 text)", self.label, "save it as UTF-8") from None
         try:
             self.data = tomllib.loads(self.text)
         except tomllib.TOMLDecodeError as error:
@@ -50,6 +51,13 @@ class Document:
         self.asked: dict[tuple[str, str], Asked] = {}
         """By table and key."""
         self.root = Section(self, self.data, ())
+
+    def _read(self) -> str:
+        """The file's text; some editors begin it with a mark, and some write UTF-16."""
+        content = self.path.read_bytes()
+        if content[:2] in (b"\xff\xfe", b"\xfe\xff") or content[:2].count(0) == 1 < len(content):
+            raise UserError("the file is UTF-16", self.label, "save it as UTF-8")
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
 
     def _syntax(self, message: str) -> tuple[str, str]:
         place = re.search(r"\(at (?:line (\d+), column (\d+)|end of document)\)", message)

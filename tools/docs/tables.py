@@ -132,7 +132,7 @@ def params() -> str:
             for row in group if not row.stem or row.name == f"{row.stem}0"]) + "\n"
     relations = [message for _, message in rows("include", "drive/param_limits.h", "PARAM_RELATION_TABLE", "#condition message")]
     return text + "## What must hold between them\n\n" + "".join(
-        f"- {message.replace('SPEED0', 'SPEED0 .. 17')}\n" for message in relations if not re.match(r"IDREF_SPEED[1-9]", message))
+        f"- {message.replace('SPEED0', 'SPEED0 .. 17')}\n" for message in relations if not re.match(r"(IDREF|INVKFI)_SPEED[1-9]", message))
 
 
 def tuned_numbers() -> str:

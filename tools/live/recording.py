@@ -112,7 +112,7 @@ class Recording:
 
 def _name(part: Part, folder) -> str:
     """As a scenario names it: of the project's own files the stem."""
-    return part.path.stem if part.path.resolve().parent == folder.resolve() else str(part.path)
+    return part.path.stem if part.path.resolve().parent == folder.resolve() else str(part.path.resolve())
 
 
 def _text(text: str) -> str:

@@ -5,8 +5,14 @@
 
 OPT ?= -O2
 # XC16, or its successor XC-DSC: its programs have other names, and it need not call itself __XC16__.
-xc_names := $(or $(shell for name in xc16- xc-dsc-; do command -v $(call quoted,$(if $(XC16),$(XC16)/bin/))$${name}gcc >/dev/null && echo $$name && \
-    break; done),xc16-)
+xc16_in = $(shell for name in xc16- xc-dsc-; do command -v $(call quoted,$1)$${name}gcc >/dev/null && echo $$name && break; done)
+# XC16=.../bin is the same compiler.
+ifeq ($(if $(XC16),$(call xc16_in,$(XC16)/bin/),on PATH),)
+ifneq ($(call xc16_in,$(XC16)/),)
+override XC16 := $(XC16)/..
+endif
+endif
+xc_names := $(or $(call xc16_in,$(if $(XC16),$(XC16)/bin/)),xc16-)
 xc16 = $(if $(XC16),$(call quoted,$(XC16)/bin/$(xc_names)),$(xc_names))
 target_device := 33FJ32MC204
 
@@ -67,7 +73,7 @@ $X/flags: FORCE $(if $(USERPARAMS),$X/header/userparams.h) | target-input
 $X/image.c: FORCE | target-input
 	@mkdir -p $(@D); printf '%s\n' $(target_unit) | cmp -s - $@ || printf '%s\n' $(target_unit) >$@
 
-$X/params: $X/flags $(params_source)
+$X/params: $X/flags $(params_source) $(params_tools)
 	$(params) $(target_compile)
 
 $X/image.o: $X/image.c $X/flags | $X/params

@@ -17,4 +17,6 @@ $(if $(filter-out help,$(goals)),$(call good,if test -e build || test -L build; 
     test -d build && bad=$$(find build -maxdepth 1 -type d ! '(' -readable -writable -executable ')' -print -quit 2>/dev/null); \
     else bad=; test -w . || bad=.; fi; test -z "$$bad" || { printf 'foc33: cannot read and write %s$(comma) %s: change owner and permissions\n' \
     "$$bad" $(call quoted,$(CURDIR)); exit 1; }))
+# Room for what a build writes there and, as the compiler does, into the folder of temporary files.
+$(if $(filter-out help clean,$(goals)),$(call good,tools/make/room.sh))
 endif

@@ -16,7 +16,7 @@ function place_of(text,   word, count, words, i) {
 
 # Whether a relation may be told beside other mistakes: not if it needs the whole header, or names what is refused.
 function stands_alone(text,   count, words, i) {
-    if (name ~ /relations_rest/ || text ~ /NORM_/) return 0
+    if (name ~ /relations_(rest|entries)/) return 0
     gsub(/[^A-Za-z0-9_]+/, " ", text)
     count = split(text, words, " ")
     for (i = 1; i <= count; i++)

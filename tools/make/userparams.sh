@@ -26,6 +26,17 @@ tell() {
         "$work/places" "$work/messages" >&2
 }
 
+# unreadable COMPILER: ends where the compiler could not read the header; a file that begins as UTF-16 does is called so.
+unreadable() {
+    file=$(tr -d '\000' <"$work/messages" | sed -n 's/\(userparams\.h\):[0-9].*/\1/p' | sed -n '/^In file/!{p;q;}')
+    begin=$( (head -c 2 "$file" | od -An -tx1) 2>/dev/null)
+    case $begin in
+        *fe* | *ff* | *00*) echo "foc33: $file is UTF-16: save it as UTF-8" >&2 ;;
+        *) tell "$1" ;;
+    esac
+    exit 2
+}
+
 # A userparams.h that takes the user's and replaces what is refused.
 replace() {
     mkdir -p "$work/replaced"
@@ -60,8 +71,8 @@ known='#include "drive/param_limits.h"
 #define PARAMETER(name, unit, min, max, ...) @parameter@#name@#min .. #max unit@
 #define OTHER(name, ...) @other@#name@@
 PARAM_TABLE(PARAMETER) PARAM_OPTIONAL(OTHER) MODE_TABLE(OTHER)'
-echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || { tell "$1"; exit 2; }
-echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || { tell "$1"; exit 2; }
+echo "$known" | compiler "$@" -w -E -P -x c - >"$work/known" || unreadable "$1"
+echo '#include <userparams.h>' | compiler "$@" -w -E -dD -x c - >"$work/defined" || unreadable "$1"
 # The file that the user knows: of a copy, the one that its #line names.
 header=$(awk '/^# 1 ".*userparams\.h"/ {
     name = $0
