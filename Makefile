@@ -70,7 +70,8 @@ remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || pri
 # Whoever compiles holds build/lock or its variant's, so that two makes in this tree take turns; what such a make starts holds it, too.
 lock_file = $(if $(FOC33_LOCK),,mkdir -p build; exec 9>$1; flock -n 9 || { echo "waiting for another make"; flock 9; }; export FOC33_LOCK=1;)
 lock = $(call lock_file,build/lock$(suffix))
-build = +@$(lock) $(if $2,$(still) '$2') $(MAKE) $1
+# A disk that has filled up meanwhile is named in one line below what the compiler says of it.
+build = +@$(lock) $(if $2,$(still) '$2') $(MAKE) $1 || { status=$$?; tools/make/room.sh >&2; exit $$status; }
 # What the variants share is made before: under one lock for all.
 shared = ($(call lock_file,build/lock) $(MAKE) -s VARIANT= SAN= $(golden_stamp) build/iss/libiss33f.a) &&
 # The rest of the line runs alone among all makes of this tree with the same target.

@@ -15,18 +15,20 @@
 #define IS_WHOLE(name) (PARAM_F(name) <= (float)(int32_t)PARAM_F(name))
 
 /* 5/2 is 2 to C, and (5/2) too; 20/10 is what it looks like, of (20/10) nobody can tell. */
-#define IS_INTEGER(name) ((((name) * 0 + 1) / 2) <= 0)
-#define HAS_QUOTIENT(text) (sizeof(text) <= 80 && __builtin_strchr(text, '/') != 0) /* a longer one is computed from other parameters */
-#define IS_DIVIDED(name) (HAS_QUOTIENT(PARAM_TEXT(name)) && IS_INTEGER(name) && (PARAM_TEXT(name)[0] == '(' || 1.0F * name != 1.0F * (name)))
+#define IS_INTEGER(name) ((((name)*0 + 1) / 2) <= 0)
+#define HAS_QUOTIENT(text) (sizeof(text) <= 80 && __builtin_strcspn(text, "/") < sizeof(text) - 1) /* a longer one is computed from other parameters */
+#define IS_FRACTION(name) ((float)(1.0 * name) > PARAM_F(name) || (float)(1.0 * name) < PARAM_F(name))
+#define IS_DIVIDED(name) (HAS_QUOTIENT(PARAM_TEXT(name)) && IS_INTEGER(name) && (PARAM_TEXT(name)[0] == '(' || IS_FRACTION(name)))
+#define IS_CONSTANT(name) __builtin_constant_p((int32_t)PARAM_F(name))
 
 #define CHECK_RANGE(name, unit, min, max, value, meaning) \
     PARAM_CHECK(range_of_##name) \
     { \
-        if (!__builtin_constant_p(PARAM_F(name))) \
+        if (!IS_CONSTANT(name)) \
             PARAM_REFUSE(divided_##name, #name " = " PARAM_TEXT(name) " divides by 0: write a number, " PARAM_RANGE(unit, min, max, meaning)) \
         else if (IS_DIVIDED(name)) \
             PARAM_REFUSE(fraction_##name, #name " = " PARAM_TEXT(name) " divides whole numbers, of which C drops the fraction: write one with a decimal " \
-                         "point, or the result, " PARAM_RANGE(unit, min, max, meaning)) \
+                                                                       "point, or the result, " PARAM_RANGE(unit, min, max, meaning)) \
         else if (!IN_RANGE(name, min, max)) \
             PARAM_REFUSE(outside_##name, #name " = " PARAM_TEXT(name) " is outside " PARAM_RANGE(unit, min, max, meaning) ": correct it") \
         else if (PARAM_COUNTED(unit) && !IS_WHOLE(name)) \

@@ -44,8 +44,7 @@
         else if (!IS_NUMBER(PARAM_TEXT(name))) \
             PARAM_REFUSE(not_##name, #name " = " PARAM_TEXT(name) " is no number: write one, " PARAM_RANGE(unit, min, max, meaning) HOW) \
         else if (IS_OCTAL(PARAM_TEXT(name))) \
-            PARAM_REFUSE(octal_##name, #name " = " PARAM_TEXT(name) " is octal to C, for it begins with 0: write it without, " \
-                         PARAM_RANGE(unit, min, max, meaning)) \
+            PARAM_REFUSE(octal_##name, #name " = " PARAM_TEXT(name) " is octal to C, for it begins with 0: write it without, " PARAM_RANGE(unit, min, max, meaning)) \
     }
 #define CHECK_OPTIONAL(name) \
     PARAM_CHECK(text_of_##name) \
