@@ -50,7 +50,7 @@ match($0, /error: userparams\.h: /) {
     other_name = name
 }
 END {
-    if (other != "" && other_name in place) {
+    if (other != "" && other_name in place && !(other_name in told)) {
         sub(/.*error: /, "", other)
         print "foc33: " place[other_name] ": " other_name " is no number (" other "): write one, " range[other_name]
         print other_name >>refused
