@@ -213,12 +213,16 @@ soak: setup-run ## [tests] motor hours of random commands, loads, temperatures, 
 
 # ---- tuning --------------------------------------------------------------------------------------------------------------
 tune_motor = $(call quoted,$(or $(MOTOR),hurst_dmb0224c10002))
-.PHONY: tune tune-fw identify identify-range board spreadsheet userparams setup-tune
+.PHONY: tune tune-fw import identify identify-range board spreadsheet userparams setup-tune
 tune: setup-run ## [your motor] data sheet to build/tune/NAME/userparams.h and a report [MOTOR=hurst_dmb0224c10002 BOARD= OUT=]
 	@$(tuner) tune $(tune_motor) $(board) $(out)
 
 tune-fw: setup-run ## [your motor] search the field-weakening tables, into tuning/tables/NAME.toml [MOTOR= BOARD= OUT=]
 	@$(tuner) tune-fw $(tune_motor) $(board) $(out)
+
+import: setup-run ## [your motor] a userparms.h of AN1292 to motor file, tables and userparams.h [HEADER=userparms.h NAME= BOARD= SET="inertia=5.5e-6 ..." DEFINES=-D...]
+	@$(tuner) import $(if $(HEADER),$(call quoted,$(HEADER)) $(foreach word,$(SET),$(call quoted,$(word)))) $(if $(NAME),--name $(call quoted,$(NAME))) $(board) \
+	    $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
 
 identify: setup-run ## [your motor] R, L, Kphi, inertia and friction as the IDENTIFY firmware measures them [MOTOR=name or all, BOARD= OUT=]
 	@$(tuner) identify $(if $(filter all,$(MOTOR)),--all,$(tune_motor)) $(board) $(out)

@@ -13,7 +13,7 @@ from tools.common import command_line, paths
 from tools.common.errors import UserError
 from tools.common.progress import waiting
 
-from . import any_motor, board, fw_tune, identify, identify_range, spreadsheet
+from . import any_motor, board, fw_tune, identify, identify_range, import_header, spreadsheet
 
 if TYPE_CHECKING:
     from tools.common.board_file import BoardFile
@@ -42,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
     motors.set_defaults(command=_motors)
     for command in (tune, motors):
         command.add_argument("--board", help="a name in tuning/boards or a path; default: the one in the motor file, else mclv")
-    for module in (fw_tune, spreadsheet, identify, identify_range, board, any_motor):
+    for module in (fw_tune, spreadsheet, identify, identify_range, board, any_motor, import_header):
         module.add_command(commands)
     return parser
 

@@ -536,8 +536,8 @@ def _field_weakening(d: Design) -> None:
     why = f"least d current that keeps the voltage within {limits.TABLE_SHARE:.0%} of its circle without load"
     if tables is not None and "FW_START_SPEED_RPM" not in d.motor.tune:
         rows, d.tuned_by_machine = tables.parameters(), True
-        d.tables_from = f"{paths.shown(tables.path or fw_tables.path_of(fw_tables.names_of(d.motor)[0]))}, found on the virtual board by make tune-fw"
-        why = "found on the virtual board"
+        why = f"from {tables.origin}" if tables.origin else "found on the virtual board"
+        d.tables_from = f"{paths.shown(tables.path or fw_tables.path_of(fw_tables.names_of(d.motor)[0]))}, {why}{'' if tables.origin else ' by make tune-fw'}"
     for name, text in rows.items():
         d.put(name, text, why)
 

@@ -53,6 +53,8 @@ class Tables:
     rows: list[dict[str, float]] = field(default_factory=list)
     path: Path | None = field(default=None, compare=False)
     """where they were read"""
+    origin: str = ""
+    """the header that they were imported from; "" for those that make tune-fw has found"""
 
     def speed_rpm(self, index: int) -> float:
         """Speed reference of an entry."""
@@ -99,7 +101,7 @@ def load(path: Path) -> Tables:
             raise root.fail(name, f"'{name}' has {len(column)} values", f"it needs {ENTRIES}; make tune-fw writes the file anew")
     tables = Tables(root.text("motor"), root.number("start_speed_rpm", minimum=100.0, maximum=20000.0),
                     [Entry(*values) for values in zip(*columns)], {}, base, root.integer("last_index", 0, 0, ENTRIES - 1),
-                    root.text("stopped", ""), root.number("maximum_speed_rpm", 0.0, 0.0))
+                    root.text("stopped", ""), root.number("maximum_speed_rpm", 0.0, 0.0), origin=root.text("from", ""))
     known, goal = root.section("fingerprint"), root.section("goal")
     if known is None:
         raise UserError("'fingerprint' is missing", root.where(), "run make tune-fw for the motor")
@@ -130,9 +132,9 @@ def names_of(motor: Any) -> list[str]:
     return list(dict.fromkeys([paths.name_of(motor.path, paths.MOTORS), motor.name]))
 
 
-def load_for(names: list[str], params: Mapping[str, float], folder: Path = FOLDER) -> tuple[Tables | None, str]:
+def load_for(names: list[str], params: Mapping[str, float], folder: Path | None = None) -> tuple[Tables | None, str]:
     """The motor's tables, those for one board or another, or None and the reason in one line ("" where there is simply no file)."""
-    told = ""
+    folder, told = folder or FOLDER, ""
     for name in names:
         for path in (folder / f"{name}.toml", *sorted(folder.glob(f"{glob.escape(name)}-*.toml"))):
             if path.is_file():
@@ -175,12 +177,15 @@ def _beside(path: Path) -> Iterator[Path]:
 
 
 def text(tables: Tables) -> str:
+    """The whole file."""
     entries = tables.entries
-    lines = [f"# Field-weakening tables of {tables.motor}, found on the virtual board by: make tune-fw MOTOR={tables.motor}",
+    found = f"from {_quoted(tables.origin)} by: make import" if tables.origin else f"found on the virtual board by: make tune-fw MOTOR={tables.motor}"
+    lines = [f"# Field-weakening tables of {tables.motor}, {found}",
              "# make tune puts them into the motor's userparams.h as long as the fingerprint matches the motor file.",
-             f"motor = {_quoted(tables.motor)}", f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
-             f"last_index = {tables.last_index}          # the last entry that was reached",
-             f"stopped = {_quoted(tables.stopped)}", f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # reached without load",
+             f"motor = {_quoted(tables.motor)}", *([f"from = {_quoted(tables.origin)}"] if tables.origin else []), f"start_speed_rpm = {tables.start_speed_rpm:g}   # speed reference of entry 0",
+             f"last_index = {tables.last_index}          # the last entry that {'the maximum speed needs' if tables.origin else 'was reached'}",
+             f"stopped = {_quoted(tables.stopped)}",
+             f"maximum_speed_rpm = {tables.maximum_speed_rpm:.0f}   # {'of the header' if tables.origin else 'reached without load'}",
              f"inv_kfi_base = {tables.inv_kfi_base:.0f}",
              "idref_a = " + _list(f"{entry.idref_a:.2f}" for entry in entries),
              "inv_kfi = " + _list(f"{entry.inv_kfi:.0f}" for entry in entries),

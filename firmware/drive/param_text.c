@@ -6,6 +6,10 @@
 #include "drive/param_limits.h"
 #include "drive/param_scaling.h"
 
+#ifdef PARAM_OF_AN1292
+#error userparams.h: NORM_RS, NORM_LSDTBASE, NORM_INVKFIBASE and NORM_DELTAT are constants of AN1292 that follow from the parameters: remove them, or make import HEADER=file
+#endif
+
 #ifdef __OPTIMIZE__
 #define IS_EMPTY(text) (sizeof(text) == 1)
 #define HAS(characters, character) (__builtin_strchr(characters, character) != 0)
@@ -31,6 +35,7 @@
 #define IS_OCTAL(text) \
     (!IS_COMPUTED(text) && (text)[NUMBER(text)] == '0' && __builtin_strspn((text) + NUMBER(text), "0123456789") > 1 \
      && AFTER_DIGITS(text) != '.' && AFTER_DIGITS(text) != 'e' && AFTER_DIGITS(text) != 'E')
+#define ENDS_IN_SEMICOLON(text) HAS(";", (text)[sizeof(text) - 2])
 
 #define ANEW ", or make tune"
 #define HOW ", with a decimal point and without a unit"
@@ -41,6 +46,8 @@
             PARAM_REFUSE(gone_##name, #name " is missing: add #define " #name " and a number, " PARAM_RANGE(unit, min, max, meaning) ANEW) \
         else if (IS_EMPTY(PARAM_TEXT(name))) \
             PARAM_REFUSE(empty_##name, #name " has no value: write a number, " PARAM_RANGE(unit, min, max, meaning)) \
+        else if (ENDS_IN_SEMICOLON(PARAM_TEXT(name))) \
+            PARAM_REFUSE(semicolon_##name, #name " = " PARAM_TEXT(name) " ends in a semicolon: write the number without it") \
         else if (!IS_NUMBER(PARAM_TEXT(name))) \
             PARAM_REFUSE(not_##name, #name " = " PARAM_TEXT(name) " is no number: write one, " PARAM_RANGE(unit, min, max, meaning) HOW) \
         else if (IS_OCTAL(PARAM_TEXT(name))) \

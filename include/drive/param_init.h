@@ -19,8 +19,8 @@
         .speed_kp_q13 = PARAM_KP(SPEEDCNTR_PTERM), \
         .speed_kp_fast_q13 = (int16_t)PARAM_MIN(PARAM_F(PARAM_FAST_GAIN) * 32768.0F * PARAM_F(SPEEDCNTR_PTERM), 32767.0F), \
         .sample_shift_q16 = (int16_t)PARAM_MIN(PARAM_SAMPLE_SHIFT_Q16 + 0.5F, 32767.0F), \
-        .kcurr_a = Q15(KCURRA), \
-        .kcurr_b = Q15(KCURRB), \
+        .kcurr_a = PARAM_Q15(KCURRA), \
+        .kcurr_b = PARAM_Q15(KCURRB), \
         .bus_shift = BUS_SHIFT, \
         .voltage_limit_per_bus_q16 = VOLTAGE_LIMIT_PER_BUS_Q16, \
         .duty_per_volt_numerator = DUTY_PER_VOLT_NUMERATOR, \

@@ -137,15 +137,15 @@ void test_exponents_change_where_a_word_ends_and_scaled_constants_are_rounded(vo
 
 void test_NORM_CURRENT_of_1_41_A_is_11653_and_Q15_rounds_as_AN1292_does(void)
 {
-    EXACT(NORM_CURRENT(1.41), 11653);
-    NEAR(NORM_CURRENT(-1.41), -11653, 1);
-    EXACT(Q15(1.0), 32767);
-    EXACT(Q15(-1.0), -32768);
-    EXACT(Q15(0.5), 16384);
-    EXACT(Q15(-0.5), -16384);
-    EXACT(Q15(0.00001), 0);
-    EXACT(Q15(0.00003), 1);
-    EXACT(Q15(-0.00003), -1);
+    EXACT(CURRENT_Q15(1.41), 11653);
+    NEAR(CURRENT_Q15(-1.41), -11653, 1);
+    EXACT(PARAM_Q15(1.0), 32767);
+    EXACT(PARAM_Q15(-1.0), -32768);
+    EXACT(PARAM_Q15(0.5), 16384);
+    EXACT(PARAM_Q15(-0.5), -16384);
+    EXACT(PARAM_Q15(0.00001), 0);
+    EXACT(PARAM_Q15(0.00003), 1);
+    EXACT(PARAM_Q15(-0.00003), -1);
     EXACT(PARAM_ROUND(1.5F), 2);
     EXACT(PARAM_ROUND(1.4F), 1);
     EXACT(PARAM_ROUND(-1.5F), -2);

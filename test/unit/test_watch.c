@@ -31,11 +31,11 @@ void test_currents_are_Q15_of_full_scale_and_limited_to_it(void)
     watch_refresh();
     TEST_ASSERT_INT16_WITHIN(4, 10500, ParkParm.qIa); /* 1.41 A of 4.40 A; the drive's count is four of AN1292's */
     TEST_ASSERT_INT16_WITHIN(4, -10500, ParkParm.qIb);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.41), ParkParm.qIa);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-0.5), ParkParm.qId);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(2.0), ParkParm.qIq);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(-1.0), CtrlParm.qVdRef);
-    TEST_ASSERT_INT16_WITHIN(4, NORM_CURRENT(1.5), CtrlParm.qVqRef);
+    TEST_ASSERT_INT16_WITHIN(4, CURRENT_Q15(1.41), ParkParm.qIa);
+    TEST_ASSERT_INT16_WITHIN(4, CURRENT_Q15(-0.5), ParkParm.qId);
+    TEST_ASSERT_INT16_WITHIN(4, CURRENT_Q15(2.0), ParkParm.qIq);
+    TEST_ASSERT_INT16_WITHIN(4, CURRENT_Q15(-1.0), CtrlParm.qVdRef);
+    TEST_ASSERT_INT16_WITHIN(4, CURRENT_Q15(1.5), CtrlParm.qVqRef);
     TEST_ASSERT_EQUAL_INT16(CtrlParm.qVdRef, FdWeakParm.qIdRef);
     board_drive.phases_q13.a = 9000;
     board_drive.phases_q13.b = -9000;
@@ -116,7 +116,7 @@ void test_load_observer_shows_its_speed_and_the_current_that_holds_the_load(void
         board_drive.run.observer.load_q16 = qm_mulsu(load_q13, board_params.observer.per_current_q16);
         watch_refresh();
         TEST_ASSERT_EQUAL_INT16(-12345, LoadParm.qVel);
-        TEST_ASSERT_INT16_WITHIN(8, NORM_CURRENT(loads_a[n]), LoadParm.qLoad);
+        TEST_ASSERT_INT16_WITHIN(8, CURRENT_Q15(loads_a[n]), LoadParm.qLoad);
     }
 }
 

@@ -1104,7 +1104,7 @@ dq_t identify_voltage(drive_t *d, int16_t sign)
     }
     gains_d.kp = id->kp_d;
     gains_d.ki = id->ki_d;
-    gains_d.kc = Q15(0.999);
+    gains_d.kc = PARAM_Q15(0.999);
     gains_d.shift = id->shift;
     gains_q = gains_d;
     gains_q.kp = id->kp_q;

@@ -34,7 +34,7 @@
 #define PARAM_CURRENT_KI(iterm) ((int16_t)PARAM_ROUND(PARAM_F(iterm) * 2048.0F))
 #define PARAM_PI_INIT(p, i, c, s) \
     { \
-        .kp = PARAM_KP(p), .ki = (i), .kc = Q15(c), .shift = (s) \
+        .kp = PARAM_KP(p), .ki = (i), .kc = PARAM_Q15(c), .shift = (s) \
     }
 
 /* ---- Speed loop ---- */

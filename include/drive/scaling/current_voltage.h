@@ -13,6 +13,16 @@
 #include "control/tuned.h"
 #include "userparams.h"
 
+#if defined(NORM_RS) || defined(NORM_LSDTBASE) || defined(NORM_INVKFIBASE) || defined(NORM_DELTAT)
+#define PARAM_OF_AN1292 /* firmware/drive/param_text.c refuses it */
+#endif
+/* In userparams.h AN1292's forms stand for the number in their brackets, Q15(-0.5) for -0.5 and NORM_CURRENT(-0.09) for -0.09 A: parameters have
+ * engineering units. A definition of AN1292's own there (its Example 2) means the same. */
+#undef Q15
+#undef NORM_CURRENT
+#define Q15(fraction) (fraction)
+#define NORM_CURRENT(current_a) (current_a)
+
 #define PARAM_F(x) ((float)(x))
 #define PARAM_ROUND(x) ((int32_t)((x) + (((x) < 0.0F) ? -0.5F : 0.5F)))
 #define PARAM_PI 3.14159265F
@@ -29,9 +39,9 @@
 #define SPEED_COUNTS(erpm) (PARAM_F(erpm) / PARAM_F(SPEED_UNIT))
 
 /** Q15 of a fraction, rounded as AN1292 does: positive * 32767, negative * 32768. */
-#define Q15(x) ((int16_t)((PARAM_F(x) < 0.0F) ? PARAM_F(x) * 32768.0F - 0.5F : PARAM_F(x) * 32767.0F + 0.5F))
-/** Counts of a current in AN1292's format (Q15 of full scale): NORM_CURRENT(1.41) = 11653 at 0.000121 A/count. */
-#define NORM_CURRENT(current_a) Q15(PARAM_F(current_a) / PARAM_F(NORM_CURRENT_CONST) / 32768.0F)
+#define PARAM_Q15(x) ((int16_t)((PARAM_F(x) < 0.0F) ? PARAM_F(x) * 32768.0F - 0.5F : PARAM_F(x) * 32767.0F + 0.5F))
+/** Counts of a current in AN1292's format (Q15 of full scale): CURRENT_Q15(1.41) = 11653 at 0.000121 A/count. */
+#define CURRENT_Q15(current_a) PARAM_Q15(PARAM_F(current_a) / PARAM_F(NORM_CURRENT_CONST) / 32768.0F)
 
 /* ---- Base quantities (facts: U0 is the largest phase voltage Vbus/sqrt(3), less the dead time's share) ---- */
 #define NORM_VOLTAGE_CONST (PARAM_F(NOMINAL_BUS_V) / PARAM_SQRT3 * (1.0F - PARAM_F(DEADTIME_SEC) / PARAM_F(LOOPTIME_SEC)) / 32768.0F)

@@ -80,7 +80,7 @@
 #define PARAM_ADAPTATION_INIT \
     { \
         .rate_q16 = (int16_t)(PARAM_F(ADAPTATION_RATE) * (float)SLOW_ROUND_STEPS * PARAM_STEP_SEC * 65536.0F + 0.5F), \
-        .kfi_least = Q15(-ADAPTATION_KFI_LESS), .kfi_most = Q15(ADAPTATION_KFI_MORE), .rs_least = Q15(-ADAPTATION_RS_LESS), .rs_most = Q15(PARAM_RS_RISES), \
+        .kfi_least = PARAM_Q15(-ADAPTATION_KFI_LESS), .kfi_most = PARAM_Q15(ADAPTATION_KFI_MORE), .rs_least = PARAM_Q15(-ADAPTATION_RS_LESS), .rs_most = PARAM_Q15(PARAM_RS_RISES), \
         .emf_least_q12 = (int16_t)(PARAM_F(ADAPTATION_EMF_SHARE) * PARAM_DEAD_TIME_V / NORM_VOLTAGE_CONST / 8.0F), \
         .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
     }

@@ -67,12 +67,12 @@
     .lost_lock_steps = PARAM_STEPS_OF_16(LOST_LOCK_SEC), \
     .wrong_steps = PARAM_STEPS_OF_8(WRONG_SEC), .load_erpm = (uint16_t)(PARAM_LOAD_ERPM + 0.5F), \
     .impossible_steps = PARAM_STEPS_OF_32(IMPOSSIBLE_SEC), \
-    .kfi_impossible = Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
+    .kfi_impossible = PARAM_Q15(1.0F / PARAM_F(PARAM_FLUX_MOST) - 1.0F), \
     .id_off_q13 = CURRENT_Q13(PARAM_ID_OFF), \
-    .rs_impossible = (PARAM_RS_RISES > 0.99F * PARAM_F(PARAM_RS_MOST)) ? Q15(PARAM_RS_RISES) : INT16_MAX, \
-    .rs_off_least = Q15(PARAM_R_LEAST - 1.0), \
-    .rs_off_most = Q15(PARAM_R_MOST - 1.0), \
-    .ls_off = Q15(PARAM_L_OFF), \
+    .rs_impossible = (PARAM_RS_RISES > 0.99F * PARAM_F(PARAM_RS_MOST)) ? PARAM_Q15(PARAM_RS_RISES) : INT16_MAX, \
+    .rs_off_least = PARAM_Q15(PARAM_R_LEAST - 1.0), \
+    .rs_off_most = PARAM_Q15(PARAM_R_MOST - 1.0), \
+    .ls_off = PARAM_Q15(PARAM_L_OFF), \
     .dead_emf_q12 = (int16_t)((VOLTAGE_Q14(PARAM_DEAD_TIME_V) + 2) / 4), \
     .overspeed_erpm = (int16_t)PARAM_ROUND(PARAM_MIN(SPEED_COUNTS(PARAM_TOP_ERPM * PARAM_F(OVERSPEED_SHARE)), 32700.0F))
 
