@@ -64,6 +64,8 @@ class Plan:
     board_text: str = ""
     """of a board file of its own; "" where the board that is there fits"""
     motor_text: str = ""
+    rating: dict[str, tuple[float, str]] = field(default_factory=dict)
+    """numbers of the motor file that the header does not have, each with its source"""
     tune: dict[str, float] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
     estimated: list[str] = field(default_factory=list)
@@ -173,16 +175,23 @@ def _supply_v(told: Given, base: BoardFile) -> float:
 # ---- the plan ----------------------------------------------------------------------------------------------------------------
 def planned(name: str, found: UserParms, base: BoardFile, told: Given) -> Plan:
     """What is going to be written; refuses what could not be used, and files that are there."""
+    plan = prepared(name, found, base, told)
+    plan.design = _settled(plan, told)
+    plan.tables = _tables(plan, told)
+    return plan
+
+
+def prepared(name: str, found: UserParms, base: BoardFile, told: Given) -> Plan:
+    """The same before the tuner has seen it: the board, the motor file, and which of the header's choices are in range."""
     plan = Plan(name, found, base)
     _plan_board(plan, base, told)
     wanted = {"motor": plan.motor_path, "tables": plan.tables_path} | ({"board": plan.board_path} if plan.board_text else {})
     for kind, path in wanted.items():
         if path.exists():
             raise UserError(f"the {kind} file is there already", str(paths.shown(path)), "give another name, NAME=, or remove it first")
-    rating = _rating(plan, told)
+    plan.rating = _rating(plan, told)
     _plan_tune(plan)
-    plan.design = _settled(plan, rating, told)
-    plan.tables = _tables(plan, told)
+    plan.motor_text = _motor_text(plan, told)
     return plan
 
 
@@ -304,8 +313,8 @@ def _plan_tune(plan: Plan) -> None:
             plan.tune[name] = value
 
 
-def _motor_text(plan: Plan, rating: dict[str, tuple[float, str]], told: Given) -> str:
-    found = plan.found
+def _motor_text(plan: Plan, told: Given) -> str:
+    found, rating = plan.found, plan.rating
 
     def row(key: str, value: float, unit: str, source: str) -> str:
         return f'{key} = {{ value = {value:.6g}, ' + (f'unit = "{unit}", ' if unit else "") + f'source = "{source}" }}'
@@ -347,12 +356,12 @@ def _of_header(plan: Plan, line: str) -> str:
     return re.sub(re.escape(str(paths.shown(plan.motor_path))) + r" line (\d+)", source, line).replace(f"{paths.shown(plan.motor_path)} [tune]", plan.found.header.label)
 
 
-def _settled(plan: Plan, rating: dict[str, tuple[float, str]], told: Given) -> Design:
+def _settled(plan: Plan, told: Given) -> Design:
     """The design with as much of the header's choices as works."""
     while True:
-        plan.motor_text = _motor_text(plan, rating, told)
+        plan.motor_text = _motor_text(plan, told)
         try:
-            return _calmed(plan, _designed(plan), rating, told)
+            return _calmed(plan, _designed(plan), told)
         except UserError as error:
             if not plan.tune:
                 raise
@@ -360,14 +369,14 @@ def _settled(plan: Plan, rating: dict[str, tuple[float, str]], told: Given) -> D
             _drop(plan, blamed, error.lines[0])
 
 
-def _calmed(plan: Plan, made: Design, rating: dict[str, tuple[float, str]], told: Given) -> Design:
+def _calmed(plan: Plan, made: Design, told: Given) -> Design:
     """A design whose rotor starts: without the header's start where the tuner's own is calmer."""
     if not made.start_risks:
         return made
     for names in (START[:1], START):
         kept = [name for name in names if name in plan.tune]
         other = replace(plan, tune={name: value for name, value in plan.tune.items() if name not in kept})
-        other.motor_text = _motor_text(other, rating, told)
+        other.motor_text = _motor_text(other, told)
         calmer = _designed(other) if kept else made
         if len(calmer.start_risks) < len(made.start_risks):
             _drop(plan, kept, made.start_risks[0])

@@ -35,7 +35,7 @@
 #define IS_OCTAL(text) \
     (!IS_COMPUTED(text) && (text)[NUMBER(text)] == '0' && __builtin_strspn((text) + NUMBER(text), "0123456789") > 1 \
      && AFTER_DIGITS(text) != '.' && AFTER_DIGITS(text) != 'e' && AFTER_DIGITS(text) != 'E')
-#define ENDS_IN_SEMICOLON(text) HAS(";", (text)[sizeof(text) - 2])
+#define ENDS_IN_SEMICOLON(text) ((text)[sizeof(text) - 2] == ';')
 
 #define ANEW ", or make tune"
 #define HOW ", with a decimal point and without a unit"

@@ -17,6 +17,7 @@ from tools.common.errors import UserError
 from tools.common.param_rows import modes, parameters
 from tools.common.x_macro import rows
 from tools.image import image
+from tuning import constants
 
 HEADER = (paths.ROOT / "userparams.h").read_text(encoding="utf-8")
 PC = [*shlex.split(os.environ.get("CC") or "gcc"), "-O2", "-ftrack-macro-expansion=0"]
@@ -79,7 +80,7 @@ assert MODE in HEADER
 # What is typed, the parameter it is about, and what the build and the compiler say of it.
 MISTAKES = {
     **{f"no number {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM", f"MOTOR_RS_OHM = {text} is no number: {NUMBER}") for text in (
-        "2,67", "(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "2.67;", "= 2.67",
+        "2,67", "(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "= 2.67",
         "-two", "[2.67]", "2.67 1", "24V", "(24 V)", "2.67\N{GREEK CAPITAL LETTER OMEGA}")},
     "a comma within the range": (value("MOTOR_KPHI_V_PER_KRPM", "7,24"), "MOTOR_KPHI_V_PER_KRPM",
                                  f"MOTOR_KPHI_V_PER_KRPM = 7,24 is no number: write one, {range_of('MOTOR_KPHI_V_PER_KRPM')}"),
@@ -199,6 +200,56 @@ def test_a_number_that_only_the_build_sees_is_octal_is_told(tmp_path):
 def test_what_only_the_compiler_finds_is_told_with_the_parameter(tmp_path, compiler, text, told):
     code, lines = checked(tmp_path, compiler, value("MOTOR_RS_OHM", text))
     assert code == 2 and len(lines) == 1 and re.match(f"foc33: {place(HEADER, 'MOTOR_RS_OHM')}: {told}", lines[0]), lines
+
+
+# ---- AN1292's own header and its examples ------------------------------------------------------------------------------------
+EXAMPLE_2 = "#define NORM_CURRENT(current_real) (Q15(current_real/NORM_CURRENT_CONST/32768))\n"
+FORMS = {"KCURRA": "Q15(-0.5)", "KCURRB": "Q15(-0.5)", "IDREF_SPEED1": "NORM_CURRENT(-0.09)", "Q_CURRENT_REF_OPENLOOP": "NORM_CURRENT(1.41)", "LS_OVER2LS0_SPEED1": "Q15(0.25)",
+         "INVKFI_SPEED0": "7900"}
+"""As AN1292 prints them, Examples 1, 2, 4, 5 and 6; parameters are fractions and ampere, not counts."""
+
+
+def of_an1292(semicolon: str = "") -> str:
+    text = HEADER.replace(RS, EXAMPLE_2 + RS).replace("/* #define OPEN_LOOP_FUNCTIONING */", "#define OPEN_LOOP_FUNCTIONING")
+    for name, form in FORMS.items():
+        text = text.replace(line_of(name), f"#define {name} {form}{semicolon if form.startswith('Q15(0') else ''}\n")
+    return text
+
+
+def test_the_forms_of_an1292_s_examples_are_the_numbers_in_their_brackets():
+    plain = {name: re.sub(r".*\((.*)\)", r"\1", form) for name, form in FORMS.items()}
+    others = {name: re.split(r"[ \t]+", line_of(name).strip())[2] for name in parameters() if name not in FORMS}
+    macros = ("PARAM_Q15(KCURRA)", "CURRENT_Q13(IDREF_SPEED1)", "CURRENT_Q13(Q_CURRENT_REF_OPENLOOP)", "PARAM_LS_ENTRY(1)", "PARAM_INVKFI_ENTRY(0)")
+    assert constants.evaluate(others | FORMS, *macros) == constants.evaluate(others | plain, *macros)
+    assert constants.evaluate(others | FORMS, *macros)[0::3] == [-16384.0, 8192.0]
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_an1292_s_printed_examples_are_understood(tmp_path, compiler):
+    assert checked(tmp_path, compiler, of_an1292()) == (0, []) and compiled(tmp_path, compiler, of_an1292()) == ""
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name, form, number", [("LS_OVER2LS0_SPEED1", "Q15(0.25);", "0.25"), ("IDREF_SPEED3", "NORM_CURRENT( -0.27 ) ;", "-0.27"), ("MOTOR_RS_OHM", "2.67;", "2.67")])
+def test_a_semicolon_behind_a_number_is_one_line_with_the_number_to_write(tmp_path, compiler, name, form, number):
+    text = value(name, form)
+    assert checked(tmp_path, compiler, text) == (2, [f"foc33: {place(text, name)}: {name} = {form} ends in a semicolon: write {number}"])
+    assert re.search(rf"userparams\.h: {name} = .*; ends in a semicolon: write the number without it", compiled(tmp_path, compiler, text))
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_a_header_of_an1292_is_answered_with_the_command_that_converts_it(tmp_path, compiler):
+    code, lines = checked(tmp_path, compiler, "#define NOPOLESPAIRS 2\n#define NORM_RS 14361\n#define NORM_LSDTBASE 1397\n")
+    assert code == 2 and lines == ["foc33: userparams.h:2: NORM_RS = 14361 is a constant of AN1292's header, here it follows from MOTOR_RS_OHM: remove it; "
+                                   "of a whole header of AN1292's `make import HEADER=file` makes a motor file and a userparams.h"]
+    assert "make import HEADER=file" in compiled(tmp_path, compiler, HEADER.replace(RS, RS + "#define NORM_DELTAT 1790\n"))
+
+
+@pytest.mark.parametrize("name, follows", [("SPEEDREFRAMP", "SPEEDREFRAMP_RPM_PER_S"), ("D_ILIMIT_HS", "MAXIMUM_SPEED_RPM"), ("NORM_INVKFIBASE", "MOTOR_KPHI_V_PER_KRPM")])
+def test_a_constant_of_an1292_beside_the_parameters_names_the_one_that_it_follows_from(tmp_path, name, follows):
+    text = HEADER.replace(RS, RS + f"#define {name} 100\n")
+    code, lines = checked(tmp_path, PC, text)
+    assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: {place(text, name)}: {name} = 100 is a constant of AN1292's header, here it follows from {follows}: remove it")
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------------
