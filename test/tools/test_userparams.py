@@ -226,7 +226,7 @@ def test_the_forms_of_an1292_s_examples_are_the_numbers_in_their_brackets():
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_an1292_s_printed_examples_are_understood(tmp_path, compiler):
-    assert checked(tmp_path, compiler, of_an1292()) == (0, []) and compiled(tmp_path, compiler, of_an1292()) == ""
+    assert checked(tmp_path, compiler, of_an1292()) == (0, []) and compiled(tmp_path, [*compiler, "-Werror"], of_an1292()) == ""
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
