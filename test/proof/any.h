@@ -6,6 +6,26 @@
 
 #include "__fc_builtin.h"
 
+/* Two compares tell an interval analysis what is left of x, and qmath.h's one compare does not; test_qmath.c shows that they are the same. */
+#define qm_beyond qm_beyond_by_one_compare
+#define qm_limit qm_limit_by_one_compare
+#include "control/qmath.h"
+#undef qm_beyond
+#undef qm_limit
+
+static inline uint16_t qm_beyond(int16_t x, int16_t most)
+{
+    return (uint16_t)(x > most || x < -most);
+}
+
+static inline int16_t qm_limit(int16_t x, int16_t most)
+{
+    if (qm_beyond(x, most)) {
+        return qm_with_sign(most, x);
+    }
+    return x;
+}
+
 /** Any value of low..high. */
 static inline int16_t any(int16_t low, int16_t high)
 {

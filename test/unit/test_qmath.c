@@ -111,6 +111,18 @@ static int16_t near_bound(int16_t most, int16_t k)
 #define NEAR_COUNT 25
 static const int16_t mosts[] = { 0, 1, 2, 255, 4681, 16383, 16384, 20000, 32765, 32766, 32767 };
 
+/** What the proofs take in place of the one compare. */
+void test_one_compare_is_two_for_every_limit(void)
+{
+    for (int32_t most = 0; most <= INT16_MAX; most++) { /* it goes up or down by one with x, so that the ends tell all */
+        const int32_t ends[] = { INT16_MIN, -most - 1, -most, 0, most, most + 1, INT16_MAX };
+        for (unsigned n = 0; n < sizeof ends / sizeof ends[0]; n++) {
+            const int16_t x = (int16_t)((ends[n] > INT16_MAX) ? INT16_MAX : ends[n]);
+            TEST_ASSERT_EQUAL_UINT16(x > most || x < -most, qm_beyond(x, (int16_t)most));
+        }
+    }
+}
+
 void test_a_number_is_beyond_a_limit_of_either_sign_only_if_its_magnitude_is_larger(void)
 {
     for (unsigned n = 0; n < sizeof mosts / sizeof mosts[0]; n++) {
