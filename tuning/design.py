@@ -12,7 +12,7 @@ from tools.common.errors import Problems, UserError
 from tools.common.motor_file import FACTS, Motor
 from tools.common.param_rows import FOLLOWS, number, parameters
 
-from . import constants, fw_tables, limits, loops, start
+from . import constants, design_warnings, fw_tables, limits, loops, remedies, start
 from .constants import Constant, number_of
 from .limits import RPM, Envelope
 
@@ -29,21 +29,15 @@ thresholds see its speed too late."""
 REFERENCE_RISE_S = 0.7
 """The speed reference goes from 0 to rated speed in this time, unless inertia asks for more."""
 REFERENCE_TORQUE_SHARE = 0.3
-BRAKE_SHARE = 0.4
-"""Beyond limits.UNIT_ERPM the reference falls with this share of what friction alone would do: with a q current near zero dead time takes from the
-quick lock more than it can bear, on the virtual board, and a supply that takes nothing back allows no larger braking current."""
+BRAKE_SHARE, LIGHT_S = 0.4, 0.3
+"""Beyond limits.UNIT_ERPM a light rotor's reference falls with this share of what friction alone would do: with a q current near zero dead time takes
+from the quick lock more than it can bear, on the virtual board, and a supply that takes nothing back allows no larger braking current. Light is one
+that rated torque brings to rated speed in less than LIGHT_S: a propeller (0.46 s), a spindle with its tool (0.42 s) and a scooter (3 s) kept their lock."""
 TRIM_SHARE = 0.3
 TRIM_SPEED_SHARE = 0.9
 """The voltage feedback's d current allows the rated torque up to this share of rated speed, where the current limit does."""
 TRIM_WEAK_FLUX, TRIM_STRONG_FLUX = 0.8, 1.2
 """Flux over the header's at which the voltage feedback must still help, and for which it must be enough: the adaptation's tolerance."""
-ROUNDING_LIMIT_PERCENT = 0.1
-MOTOR_CONSTANTS = {"adaptation.rs_base_q16": "MOTOR_RS_OHM", "fieldweak.ls_base_q16": "MOTOR_LS_MH", "NORM_INVKFIBASE": "MOTOR_KPHI_V_PER_KRPM"}
-"""Constants that the estimator computes with: their rounding is an error of the motor's values."""
-ROUNDING_REMEDY = {"MOTOR_RS_OHM": "a larger current range (smaller shunt or gain) gives it more counts",
-                   "MOTOR_LS_MH": "a larger current range or a shorter PWM period gives it more counts",
-                   "MOTOR_KPHI_V_PER_KRPM": "a higher bus voltage gives it more counts"}
-L_FREQUENCY_RATIO = 10.0
 BOARD_KEYS = {"NOMINAL_BUS_V": "supply.voltage", "LOOPTIME_SEC": "pwm.period", "DEADTIME_SEC": "pwm.dead_time", "SAMPLE_WINDOW_SEC": "pwm.sample_window",
               "NORM_CURRENT_CONST": "shunt.amplifier_gain", "BUS_FULL_SCALE_V": "adc.bus_divider", "OVER_VOLTAGE_V": "limits.over_voltage",
               "UNDER_VOLTAGE_V": "limits.under_voltage", "REGEN_LIMIT_V": "limits.regen"}
@@ -104,6 +98,8 @@ class Design:
     tuned_by_machine: bool = False
     calm_hz: float = 0.0
     """speed bandwidth that the lowest speed and the load observer allow"""
+    gains: loops.Gains | None = None
+    """of the current loops"""
 
     @functools.cached_property
     def scales(self) -> Scales:
@@ -121,11 +117,43 @@ class Design:
     def value(self, name: str) -> float:
         return number_of(self.choices[name].text)
 
+    @property
+    def inertia_kgm2(self) -> float:
+        """Rotor and load."""
+        return self.motor.inertia_kgm2 + self.motor.load_inertia_kgm2
+
+    @property
+    def nominal_erpm(self) -> float:
+        """Where NOMINAL_SPEED_RPM ends."""
+        return limits.LARGEST_NOMINAL_ERPM * self.scales.speed_unit
+
     def put(self, name: str, text: str, why: str) -> None:
         """Sets a parameter, unless the motor file's [tune] says otherwise."""
         if name in self.motor.tune:
             text, why = plain(self.motor.tune[name]), "the motor file's [tune]"
         self.choices[name] = Choice(name, text, why)
+
+    @property
+    def plant(self) -> loops.Plant:
+        m = self.motor
+        return loops.Plant(m.rs_ohm, m.ld_h, m.lq_h, m.psi_vs, m.pole_pairs, self.inertia_kgm2, m.viscous_nms)
+
+    @property
+    def filter_gains(self) -> loops.Gains:
+        """The back-EMF's filter; no controllers yet."""
+        return loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, self.value("KFILTER_ESDQ") / 32768.0, self.board.pwm_period_s)
+
+    def current_loop_at(self, top_rpm: float) -> loops.LoopDesign:
+        """The current loops of this motor with a top speed."""
+        low, high = _range("CURRENT_BANDWIDTH_HZ")
+        largest = min(high, 0.98 / self.scales.pterm_per_hz, 15.7 / self.scales.iterm_per_hz)
+        return loops.design_current(self.plant, spread_of(self.motor), self.filter_gains, self.envelope.omega(top_rpm), largest, low,
+                                    self.motor.tune.get("CURRENT_BANDWIDTH_HZ"))
+
+    def start_of(self, motor: Motor, maximum_a: float) -> start.StartDesign:
+        """The start of this motor, or of a changed one, with these current loops."""
+        return start.design_start(motor, self.board, self.plant, self.gains, maximum_a, self.value("OVER_CURRENT_THRESHOLD_A"), self.value("NOMINAL_SPEED_RPM"),
+                                  motor.tune)
 
     def constant(self, name: str) -> Constant:
         return next(item for item in self.constants if item.name == name)
@@ -157,7 +185,7 @@ def short(value: float, digits: int = 4) -> str:
 def design(motor: Motor, board: BoardFile) -> Design:
     """Everything. Refuses by UserError what cannot work; what works with a cost is in `.warnings`."""
     problems = Problems()
-    currents = _fit_emf(motor, board, limits.currents(motor, board))
+    currents = limits.fit_emf(motor, board, limits.currents(motor, board))
     d = Design(motor, board, Envelope(motor, limits.circle_v(board), currents.maximum_a))
     _motor(d)
     _board(d)
@@ -173,7 +201,9 @@ def design(motor: Motor, board: BoardFile) -> Design:
     found = constants.header(d.params)
     _check(d, found.wrong)
     d.constants = found.constants
-    _warn(d, currents)
+    margins, of_start = design_warnings.margins(d), design_warnings.of_start(d)
+    d.warnings += [*design_warnings.of_numbers(d, currents), *margins, *design_warnings.of_running(d), *of_start]
+    d.start_risks = [*of_start, *margins]
     return d
 
 
@@ -189,7 +219,7 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
     rated_erpm, largest_erpm = m.rated_speed_rpm * m.pole_pairs, limits.largest_erpm(d.board.pwm_period_s)
     if rated_erpm > largest_erpm:
         refuse(f"rated speed {m.rated_speed_rpm:g} rpm with {m.pole_pairs} pole pairs is {rated_erpm:.0f} electrical rpm", d.where("speed"),
-                        f"the firmware's speeds end at {largest_erpm:.0f}{_of_period(largest_erpm)}; a speed of {math.floor(largest_erpm / m.pole_pairs)} rpm is possible")
+                        f"the firmware's speeds end at {largest_erpm:.0f}{limits.of_period(largest_erpm)}; a speed of {math.floor(largest_erpm / m.pole_pairs)} rpm is possible")
     problems.attempt(lambda: _refuse_kphi(d))
     problems.attempt(lambda: _refuse_light(d))
     half = 0.5 * m.rated_torque_nm
@@ -198,14 +228,18 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
         refuse(f"half the rated torque needs {needed_a:.2f} A peak, {currents.maximum_a:.2f} A are allowed", d.where("torque"),
                _current_remedy(d, currents, needed_a))
     if not problems.found and e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
-        reachable = e.highest_speed(half, limits.FULL_SHARE)
-        refuse(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"),
-                        f"raise the supply voltage in {paths.shown(d.board.path)}, or lower the rated speed to {limits.digits_down(max(reachable, 1.0), 2):g} rpm")
+        refuse(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"), _voltage_remedy(d, half))
 
 
-def _of_period(largest_erpm: float) -> str:
-    """A shorter PWM period would allow more."""
-    return " with this PWM period" if largest_erpm < limits.LARGEST_ERPM else ""
+def _voltage_remedy(d: Design, torque_nm: float) -> str:
+    """What to change where the voltage is too low for a torque at rated speed."""
+    m, e = d.motor, d.envelope
+
+    def reaches(x: Envelope) -> bool:
+        return x.least_id(m.rated_speed_rpm, torque_nm, limits.FULL_SHARE) is not None
+    found = remedies.either(remedies.raise_supply(remedies.least_supply(e, d.board, reaches)),
+                            remedies.lower_rated_speed(e.highest_speed(torque_nm, limits.FULL_SHARE), m))
+    return found or f"the motor needs {remedies.needed_supply(e, d.board, reaches):g} V, the firmware's supply ends at {remedies.MOST_SUPPLY_V:g} V: take another winding"
 
 
 def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> str:
@@ -213,16 +247,13 @@ def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> st
     m, board_a = d.motor, currents.board_a
     if needed_a > board_a:
         carried_nm = m.kt_nm_per_a * board_a - d.envelope.friction_nm(m.rated_speed_rpm)
-        return (f"lower [rating] torque and current to what the board carries, {limits.digits_down(max(carried_nm, 1e-4), 2):g} N m and {board_a:g} A peak, or use a board "
-                f"with a larger current range than {d.board.current_full_scale_a:.3g} A (smaller shunt or gain)")
+        who, more = "the board carries", f", or use a board with a larger current range than {d.board.current_full_scale_a:.3g} A (smaller shunt or gain)"
+        if board_a >= remedies.MOST_CURRENT_A:
+            who, more = "the firmware's largest MAXIMUM_CURRENT_A carries", ""
+        return f"lower [rating] torque and current to what {who}, {limits.digits_down(max(carried_nm, 1e-4), 2):g} N m and {board_a:g} A peak{more}"
     if needed_a > m.maximum_current_a:
-        return f"{_change_maximum_current(m, 'raise')} to at least {limits.digits_up(needed_a, 3):g} A peak"
+        return remedies.maximum_current(m, "raise", limits.digits_up(needed_a, 3))
     return "with more current R I + L dI/dt leave the back-EMF's number format: lower maximum_speed, or raise the supply voltage"
-
-
-def _change_maximum_current(motor: Motor, how: str) -> str:
-    """How to set the largest current: without a line in the motor file there is nothing to raise or to lower."""
-    return f"{how} [rating] maximum_current" if "maximum_current" in motor.quantities else "add [rating] maximum_current and set it"
 
 
 def _refuse_kphi(d: Design) -> None:
@@ -230,8 +261,10 @@ def _refuse_kphi(d: Design) -> None:
     counts = d.scales.invkfi
     least = _range("INVKFI_SPEED0")[0]
     if counts < least:
+        needed_v = math.ceil(d.board.nominal_bus_v * least / counts)
+        end = "" if needed_v <= remedies.MOST_SUPPLY_V else f", but the firmware's supply ends at {remedies.MOST_SUPPLY_V:g} V: take another winding"
         raise UserError(f"1/Kphi has only {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs, {least:g} is the least",
-                        d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {math.ceil(d.board.nominal_bus_v * least / counts)} V")
+                        d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {needed_v} V{end}")
     if counts >= 32767.0:
         raise UserError(f"1/Kphi does not fit 16 bits: {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs",
                         d.where("kphi"), f"the motor is too fast for {d.board.nominal_bus_v:g} V: use at most {math.floor(d.board.nominal_bus_v * 32766.0 / counts)} V")
@@ -249,10 +282,6 @@ def _refuse_light(d: Design) -> None:
     if accel < ACCEL_LEAST:
         raise UserError(f"the load observer cannot count the acceleration of {inertia:.3g} kg m2 by {d.board.current_full_scale_a:.3g} A", d.where("inertia"),
                         f"{limits.digits_down(0.999 * inertia * accel / ACCEL_LEAST, 2):g} kg m2 of rotor and load are possible")
-
-
-def motor_current_above(d: Design, currents: limits.Currents) -> bool:
-    return d.motor.maximum_current_a > currents.board_a
 
 
 def _check(d: Design, wrong: list[str]) -> None:
@@ -274,7 +303,7 @@ def _range_remedy(d: Design, name: str) -> str:
         return "change the motor file or the board file"
     if name == "MAXIMUM_CURRENT_A":
         p = parameters()[name]
-        return f"{_change_maximum_current(d.motor, 'change')} to {p.low} .. {p.high} A peak"
+        return f"set [rating] maximum_current to {p.low} .. {p.high} A peak"
     return f"it follows from {FACTS[name]}; change that"
 
 
@@ -336,23 +365,18 @@ def _maximum_speed(d: Design) -> tuple[float, str]:
                                  "electrical speed's end" if maximum == most_rpm else "what field weakening reaches without load")
 
 
-def _nominal_erpm(d: Design) -> float:
-    """Where NOMINAL_SPEED_RPM ends."""
-    return limits.LARGEST_NOMINAL_ERPM * d.scales.speed_unit
-
-
 def _speeds(d: Design) -> None:
     m = d.motor
-    nominal = min(m.rated_speed_rpm, math.floor(_nominal_erpm(d) / m.pole_pairs))
-    d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else f", lowered to {_nominal_erpm(d):.0f} electrical rpm"))
+    nominal = min(m.rated_speed_rpm, math.floor(d.nominal_erpm / m.pole_pairs))
+    d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else f", lowered to {d.nominal_erpm:.0f} electrical rpm"))
     maximum, why = _maximum_speed(d)
     d.put("MAXIMUM_SPEED_RPM", plain(maximum), why)
     inertia = m.inertia_kgm2 + m.load_inertia_kgm2
     slope = min(m.rated_speed_rpm / REFERENCE_RISE_S, REFERENCE_TORQUE_SHARE * m.rated_torque_nm / inertia / RPM, 60000.0)
     friction = BRAKE_SHARE * d.envelope.friction_nm(0.5 * m.rated_speed_rpm) / inertia / RPM
-    quick = maximum * m.pole_pairs > limits.UNIT_ERPM and 0.0 < friction < slope
+    quick = maximum * m.pole_pairs > limits.UNIT_ERPM and 0.0 < friction < slope and _rise_s(m) < LIGHT_S
     d.put("SPEEDREFRAMP_RPM_PER_S", plain(limits.digits_down(max(friction if quick else slope, 1.0), 2)), (
-        f"{BRAKE_SHARE:.0%} of what friction alone slows it: a quick motor must not be without q current" if quick else
+        f"{BRAKE_SHARE:.0%} of what friction alone slows it: a quick, light motor must not be without q current" if quick else
         f"rated speed in {REFERENCE_RISE_S:g} s, or J dw/dt at most {REFERENCE_TORQUE_SHARE:.0%} of rated torque"))
 
 
@@ -361,8 +385,9 @@ def _currents(d: Design, currents: limits.Currents) -> None:
     why = "motor file's maximum_current"
     if maximum < limits.currents(m, d.board).maximum_a:
         why = "lowered until the back-EMF's number format holds voltage + R I + L dI/dt"
-    elif motor_current_above(d, currents):
-        why = f"what this board can measure with a margin to its trip level ({currents.board_a:g} A)"
+    elif m.maximum_current_a > currents.board_a:
+        why = ("the firmware's largest" if currents.board_a >= remedies.MOST_CURRENT_A else
+               f"what this board can measure with a margin to its trip level ({currents.board_a:g} A)")
     d.put("MAXIMUM_CURRENT_A", plain(maximum), why)
     lowered = currents.trip_a < limits.currents(m, d.board).trip_a
     d.put("OVER_CURRENT_THRESHOLD_A", plain(currents.trip_a), f"{limits.TRIP_OVER_MAXIMUM:g} times the largest current, at most "
@@ -381,25 +406,6 @@ def _currents(d: Design, currents: limits.Currents) -> None:
           f"no more than {abs(useful):.2f} A, beyond which d current asks for more voltage than it saves with {1.0 - TRIM_WEAK_FLUX:.0%} less flux")
 
 
-def _fit_emf(motor: Motor, board: BoardFile, wanted: limits.Currents) -> limits.Currents:
-    """Lowers first the trip level, then the largest current, until Equation 4 stays inside its format (a relation of param_limits.h).
-    Gives up at half the rated current; the relation's own message tells then."""
-    fastest = max(min(motor.maximum_speed_rpm, limits.largest_erpm(board.pwm_period_s) / motor.pole_pairs), 1.5 * motor.rated_speed_rpm) * RPM * motor.pole_pairs
-    room_v = 0.985 * 4.0 * board.nominal_bus_v / math.sqrt(3.0) * (1.0 - board.dead_time_s / board.pwm_period_s) - board.over_voltage_v / math.sqrt(3.0)
-
-    def fits(trip_a: float, maximum_a: float) -> bool:
-        return 2.0 / math.sqrt(3.0) * trip_a * motor.rs_ohm + fastest * 1.2 * motor.lq_h * maximum_a < room_v
-
-    trip, maximum = wanted.trip_a, wanted.maximum_a
-    while not fits(trip, maximum) and maximum > 0.5 * motor.rated_current_a:
-        if trip > 1.02 * limits.LEAST_TRIP_OVER_MAXIMUM * maximum:
-            trip = float(f"{max(0.98 * trip, limits.LEAST_TRIP_OVER_MAXIMUM * maximum):.3g}")
-        else:
-            maximum = float(f"{0.97 * maximum:.3g}")
-            trip = float(f"{1.001 * limits.LEAST_TRIP_OVER_MAXIMUM * maximum:.3g}")
-    return limits.Currents(trip, maximum, wanted.board_a) if fits(trip, maximum) else wanted
-
-
 def _range(name: str) -> tuple[float, float]:
     row = parameters()[name]
     return float(row.low), float(row.high)
@@ -407,7 +413,7 @@ def _range(name: str) -> tuple[float, float]:
 
 # ---- loops and start -----------------------------------------------------------------------------------------------------------
 
-def _spread(motor: Motor) -> dict[str, tuple[float, float]]:
+def spread_of(motor: Motor) -> dict[str, tuple[float, float]]:
     """The motor file's published spread as factors."""
     found = {}
     for key, name, nominal in (("rs_ohm", "rs", motor.rs_ohm), ("ls_h", "ls", motor.lq_h), ("kphi_v_per_krpm", "psi", motor.kphi_v_per_krpm)):
@@ -419,12 +425,7 @@ def _spread(motor: Motor) -> dict[str, tuple[float, float]]:
 
 def _loops_and_start(d: Design) -> None:
     m, period = d.motor, d.board.pwm_period_s
-    plant = loops.Plant(m.rs_ohm, m.ld_h, m.lq_h, m.psi_vs, m.pole_pairs, m.inertia_kgm2 + m.load_inertia_kgm2, m.viscous_nms)
-    base = loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, d.value("KFILTER_ESDQ") / 32768.0, period)
-    low, high = _range("CURRENT_BANDWIDTH_HZ")
-    largest = min(high, 0.98 / d.scales.pterm_per_hz, 15.7 / d.scales.iterm_per_hz)
-    d.current_loop = loops.design_current(plant, _spread(m), base, d.envelope.omega(d.value("MAXIMUM_SPEED_RPM")), largest, low,
-                                          m.tune.get("CURRENT_BANDWIDTH_HZ"))
+    d.current_loop = d.current_loop_at(d.value("MAXIMUM_SPEED_RPM"))
     bandwidth = d.current_loop.bandwidth_hz
     cap = f"1/{1 / loops.CURRENT_CAP:.0f} of the PWM frequency"
     d.put("CURRENT_BANDWIDTH_HZ", plain(bandwidth), (
@@ -439,19 +440,19 @@ def _loops_and_start(d: Design) -> None:
     problems.attempt(lambda: _refuse_hidden(d))
     problems.attempt(lambda: _refuse_coarse(d))
     problems.tell()
-    gains = loops.current_gains(plant, bandwidth, base)
-    _start(d, plant, gains)
-    _speed_loop(d, plant, gains)
+    d.gains = loops.current_gains(d.plant, bandwidth, d.filter_gains)
+    _start(d)
+    _speed_loop(d, d.gains)
 
 
-def _speed_loop(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
+def _speed_loop(d: Design, gains: loops.Gains) -> None:
     m, names = d.motor, {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
     speeds = {label: d.envelope.omega(d.value(name)) for label, name in names.items()}
     (low, high), (least_load, most_load) = _range("SPEED_BANDWIDTH_HZ"), _range("LOAD_BANDWIDTH_HZ")
     quickest = loops.load_bandwidth(gains, constants.filter_hz(d.value("KFILTER_ESDQ"), gains.period_s), d.value("CURRENT_BANDWIDTH_HZ"))
     calm = loops.calm_load_bandwidth(d.scales.large_counts, d.scales.acceleration, d.value("MAXIMUM_CURRENT_A") / d.scales.count_a, gains.period_s)
     cap = loops.speed_cap(_friction_over_lost(d))
-    loop = loops.design_speed(plant, _spread(m), gains, speeds, max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz)),
+    loop = loops.design_speed(d.plant, spread_of(m), gains, speeds, max(low, min(high, 0.98 / d.scales.speed_pterm_per_hz)),
                               max(least_load, min(most_load, limits.digits_down(min(quickest, calm), 2))), m.tune.get("SPEED_BANDWIDTH_HZ"), m.tune.get("LOAD_BANDWIDTH_HZ"), cap)
     d.speed_loop, d.calm_hz = loop, loops.calm_bandwidth(loop.load_hz, min(speeds.values()), cap)
     asked = ", ".join(f"{degrees:.0f} degrees {mode}" for mode, (degrees, _) in loops.SPEED_MARGINS.items())
@@ -504,11 +505,9 @@ def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:
                         "current range; a larger one gives room for more")
 
 
-def _start(d: Design, plant: loops.Plant, gains: loops.Gains) -> None:
+def _start(d: Design) -> None:
     m = d.motor
-    s = start.design_start(m, d.board, plant, gains, d.value("MAXIMUM_CURRENT_A"), d.value("OVER_CURRENT_THRESHOLD_A"),
-                           d.value("NOMINAL_SPEED_RPM"), m.tune)
-    d.start_up = s
+    s = d.start_up = d.start_of(m, d.value("MAXIMUM_CURRENT_A"))
     d.put("Q_CURRENT_REF_OPENLOOP", plain(s.current_a), f"{start.CURRENT_SHARE:.0%} of the rated current with the trip level at least {start.TRIP_HEADROOM:g} times that, or (load + friction)/(Kt {start.LOAD_ANGLE_SINE:g}): "
           f"pull-out torque {s.pull_out_nm:.3g} N m for {s.needed_nm:.3g} N m")
     d.put("END_SPEED_RPM", plain(s.end_speed_rpm), f"back-EMF {s.emf_v:.2f} V: its error, {s.error_v:.2f} V (R {start.R_ERROR:.0%} wrong, "
@@ -540,108 +539,3 @@ def _field_weakening(d: Design) -> None:
         d.tables_from = f"{paths.shown(tables.path or fw_tables.path_of(fw_tables.names_of(d.motor)[0]))}, {why}{'' if tables.origin else ' by make tune-fw'}"
     for name, text in rows.items():
         d.put(name, text, why)
-
-
-# ---- what works with a cost ----------------------------------------------------------------------------------------------------
-
-def _warn(d: Design, currents: limits.Currents) -> None:
-    _warn_currents(d, currents)
-    _warn_speeds(d)
-    _warn_numbers(d)
-    _warn_loops(d)
-
-
-def _warn_currents(d: Design, currents: limits.Currents) -> None:
-    m = d.motor
-    if motor_current_above(d, currents):
-        d.warnings.append(f"maximum_current {m.maximum_current_a:.3g} A peak is above what this board can measure and protect ({currents.board_a:g} A of "
-                          f"{d.board.current_full_scale_a:.3g} A): MAXIMUM_CURRENT_A is {currents.maximum_a:g}; a smaller shunt or gain raises it")
-    elif currents.maximum_a < float(f"{m.maximum_current_a:.3g}"):
-        d.warnings.append(f"MAXIMUM_CURRENT_A is {currents.maximum_a:g} instead of {m.maximum_current_a:.3g}: with more, R I + L dI/dt leave the back-EMF's number "
-                          "format; lower maximum_speed, or raise the supply voltage")
-    if m.rated_current_a > currents.maximum_a:
-        d.warnings.append(f"rated current {m.rated_current_a:.3g} A peak is above MAXIMUM_CURRENT_A = {currents.maximum_a:g}: at most "
-                          f"{m.kt_nm_per_a * currents.maximum_a:.3g} N m of {m.rated_torque_nm:.3g} N m; a smaller shunt or gain raises it")
-
-
-def _warn_speeds(d: Design) -> None:
-    m, e = d.motor, d.envelope
-    torque = e.torque(m.rated_speed_rpm, limits.FULL_SHARE)
-    if torque < 0.99 * m.rated_torque_nm and e.iq(m.rated_speed_rpm, m.rated_torque_nm) <= e.maximum_a:
-        d.warnings.append(f"{d.board.nominal_bus_v:g} V are too low for the rated torque at rated speed: about {torque:.2g} N m of {m.rated_torque_nm:.2g} N m at "
-                          f"{m.rated_speed_rpm:g} rpm; raise the supply voltage, or lower the rated speed to {limits.digits_down(max(e.highest_speed(m.rated_torque_nm, limits.FULL_SHARE), 1.0), 2):g} rpm")
-    most = d.value("MAXIMUM_SPEED_RPM")
-    if most < math.floor(m.maximum_speed_rpm):
-        largest_erpm = limits.largest_erpm(d.board.pwm_period_s)
-        if most * m.pole_pairs >= largest_erpm - m.pole_pairs:
-            why = f"{largest_erpm:.0f} electrical rpm are the firmware's end{_of_period(largest_erpm)}"
-        else:
-            why = f"{d.board.nominal_bus_v:g} V and {e.maximum_a:g} A reach no more; raise the supply voltage or maximum_current"
-        d.warnings.append(f"maximum_speed {m.maximum_speed_rpm:g} rpm is not reachable, MAXIMUM_SPEED_RPM is {most:g}: {why}")
-    if d.value("NOMINAL_SPEED_RPM") < m.rated_speed_rpm:
-        d.warnings.append(f"rated speed {m.rated_speed_rpm:g} rpm is above {_nominal_erpm(d):.0f} electrical rpm: NOMINAL_SPEED_RPM is "
-                          f"{d.value('NOMINAL_SPEED_RPM'):g}, use S3 for the rest")
-    electrical_hz = m.rated_speed_rpm * m.pole_pairs / 60.0
-    measured = m.inductance_frequency_hz
-    if measured is not None and not 1.0 / L_FREQUENCY_RATIO <= measured / electrical_hz <= L_FREQUENCY_RATIO:
-        d.warnings.append(f"the inductance was measured at {measured:g} Hz, the motor turns at {electrical_hz:.0f} Hz electrical: iron and eddy currents make "
-                          "it differ; measure it near the motor's frequency or by `make identify`")
-
-
-def _warn_numbers(d: Design) -> None:
-    for name, parameter in MOTOR_CONSTANTS.items():
-        item = d.constant(name)
-        if abs(item.error_percent) > ROUNDING_LIMIT_PERCENT:
-            d.warnings.append(f"{parameter} = {d.choices[parameter].text} is rounded by {item.error_percent:+.2f} % ({name} = {item.q_value}): "
-                              f"{ROUNDING_REMEDY[parameter]}")
-    fast = d.constant("svm.turn_q13").value / (2.0 * d.value("NORM_CURRENT_CONST"))
-    slow = fast * d.constant("estimator.nominal_erpm").value / d.value("MAXIMUM_SPEED_RPM")
-    for name, wanted, limit in (("D_ILIMIT_LS", 8.0 * slow, 16383.0), ("D_ILIMIT_HS", fast, 4095.0)):
-        if wanted > 1.02 * limit:
-            d.warnings.append(f"{name} ends at {limit:.0f} of the {wanted:.0f} counts that the largest current can change: the estimated angle lags at "
-                              "high current; lower MAXIMUM_CURRENT_A or the speed")
-
-
-def _warn_loops(d: Design) -> None:
-    margins, start_up = _margin_warnings(d), _start_warnings(d)
-    d.warnings += [*margins, *_slow_loop_warnings(d), *start_up]
-    d.start_risks = [*start_up, *margins]
-
-
-def _margin_warnings(d: Design) -> list[str]:
-    found = []
-    for what, loop, name in (("current", d.current_loop, "CURRENT_BANDWIDTH_HZ"), ("speed", d.speed_loop, "SPEED_BANDWIDTH_HZ")):
-        if loop and not loop.reached:
-            name, value = ("LOAD_BANDWIDTH_HZ", loop.load_hz) if what == "speed" and "LOAD_BANDWIDTH_HZ" in d.motor.tune else (name, loop.bandwidth_hz)
-            left = f"has {loop.worst.phase_deg:.0f} degrees and {loop.worst.gain_db:.0f} dB of margin" if loop.worst.stable else "is unstable"
-            found.append(f"{name} = {value:g}: the {what} loop {left} at worst ({loop.worst_case}), {loop.worst.asked_deg:.0f} degrees and "
-                         f"{loop.worst.asked_db:.0f} dB are asked for; "
-                         + ("remove it from [tune]" if name in d.motor.tune else "a lower maximum_speed or a shorter PWM period helps" if what == "current"
-                            else "a smaller load inertia helps"))
-    return found
-
-
-def _slow_loop_warnings(d: Design) -> list[str]:
-    if not d.speed_loop or not d.speed_loop.reached or d.speed_loop.bandwidth_hz >= 0.5 * d.calm_hz:
-        return []
-    kind, remedy = " with so much inertia", "lower the load's inertia, or use a board with a larger current range"
-    if "SPEED_BANDWIDTH_HZ" in d.motor.tune:
-        kind, remedy = "", "remove SPEED_BANDWIDTH_HZ from [tune]"
-    return [f"the speed loop's {d.speed_loop.bandwidth_hz:g} Hz are slow{kind} ({d.calm_hz:.2g} Hz would be calm): after a load step the speed comes back in "
-            f"{1.0 / d.speed_loop.bandwidth_hz:.2g} s; {remedy}"]
-
-
-def _start_warnings(d: Design) -> list[str]:
-    s = d.start_up
-    calming = "add [mechanical] coulomb_friction, which the no-load current gives"
-    if s and not s.follows and s.trial is not None:
-        lost = [label for label, ok in zip(s.trial.labels, s.trial.followed) if not ok]
-        return [f"the rotor may not follow the ramp ({len(lost)} of {len(s.trial.labels)} start angles and loads, e.g. {lost[0]}): " + (
-            calming if d.motor.coulomb_nm == 0.0 and any(label.endswith(" 0 N m") for label in lost) else "raise maximum_current, or lower start_torque or the load's inertia")]
-    if s and s.loud:
-        return [f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
-                "to start from some angles: " + (
-                    calming if d.motor.coulomb_nm == 0.0 else "remove LOCK_TIME from [tune]" if "LOCK_TIME" in d.motor.tune
-                    else "with so little inductance the current's sample, after the pulse's centre, feeds the swing; put chokes into the motor's leads"
-                    if s.damping < 0.0 else "raise END_SPEED_RPM in [tune]")]
-    return []

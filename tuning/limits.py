@@ -156,6 +156,30 @@ def largest_erpm(period_s: float) -> float:
     return min(LARGEST_ERPM, max(UNIT_ERPM, LARGEST_TURN / period_s * (1.0 + 1e-6)))
 
 
+def fit_emf(motor: Motor, board: BoardFile, wanted: Currents) -> Currents:
+    """Lowers first the trip level, then the largest current, until Equation 4 stays inside its format (a relation of param_h).
+    Gives up at half the rated current; the relation's own message tells then."""
+    fastest = max(min(motor.maximum_speed_rpm, largest_erpm(board.pwm_period_s) / motor.pole_pairs), 1.5 * motor.rated_speed_rpm) * RPM * motor.pole_pairs
+    room_v = 0.985 * 4.0 * board.nominal_bus_v / math.sqrt(3.0) * (1.0 - board.dead_time_s / board.pwm_period_s) - board.over_voltage_v / math.sqrt(3.0)
+
+    def fits(trip_a: float, maximum_a: float) -> bool:
+        return 2.0 / math.sqrt(3.0) * trip_a * motor.rs_ohm + fastest * 1.2 * motor.lq_h * maximum_a < room_v
+
+    trip, maximum = wanted.trip_a, wanted.maximum_a
+    while not fits(trip, maximum) and maximum > 0.5 * motor.rated_current_a:
+        if trip > 1.02 * LEAST_TRIP_OVER_MAXIMUM * maximum:
+            trip = float(f"{max(0.98 * trip, LEAST_TRIP_OVER_MAXIMUM * maximum):.3g}")
+        else:
+            maximum = float(f"{0.97 * maximum:.3g}")
+            trip = float(f"{1.001 * LEAST_TRIP_OVER_MAXIMUM * maximum:.3g}")
+    return Currents(trip, maximum, wanted.board_a) if fits(trip, maximum) else wanted
+
+
+def of_period(erpm: float) -> str:
+    """A shorter PWM period would allow more."""
+    return " with this PWM period" if erpm < LARGEST_ERPM else ""
+
+
 def circle_v(board: BoardFile) -> float:
     """Radius of the voltage circle at the nominal bus: the sampling window takes its share of the duty."""
     return (1.0 - 2.0 * board.sample_window_s / board.pwm_period_s) * board.nominal_bus_v / math.sqrt(3.0)

@@ -1,0 +1,179 @@
+"""A load that grows on a slowly turning rotor: the speed loop's own model, for what it holds and what stops the rotor.
+
+What decides at low speed is how soon the drive sees the load, for its rates fall with the speed (include/control/observer.h): a light rotor stands
+before. The model has the shaft, the current loop as a lag, Equation 4's filter and the estimator's angle, the load observer at its three rates with
+its gate, and the speed controller; electrical rad/s, A, N m. Dead time and the converter's steps are left out, so MARGIN is added."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tools.bench import lowspeed
+from tools.common import paths
+from tools.common.param_rows import number, slow_periods
+
+from . import constants, limits
+from .limits import RPM
+from .loops import ESDQ_RATIO, FAST_GAIN, FULL_RATIO, LOADED_SHARE, QUIET_RATIO
+
+if TYPE_CHECKING:
+    from .design import Design
+
+LOWSPEED = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
+ONSET_S, CURRENT_SHARE = LOWSPEED.torque_over_s, LOWSPEED.current_percent / 100.0
+"""What `make lowspeed` asks for: the load comes within this time, and takes so much of the largest current at most."""
+MARGIN = 1.1
+"""Of the speed that the model holds. On the virtual board 15 loads on 8 motors that their rotor's inertia limits were held from 0.99 to 1.2 times it."""
+AFTER_S = 0.6
+LOST_RAD, BACK_SHARE = 1.2, 0.9
+"""Angle error that no lock survives; share of its speed to which the rotor must have come back."""
+LOAD_FROM_LOST, GATE, GATE_LOADED = (number(name) for name in ("PARAM_LOAD_FROM_LOST", "GATE_SHARE", "GATE_LOADED_SHARE"))
+GATE_SPEED, GATE_GROWS, GATE_STEPS = (number(f"OBSERVER_GATE_{name}") for name in ("SPEED_SHIFT", "SHIFT", "STEPS"))
+FADE, HALF_LEVEL = 1.0 - 2.0 ** -number("OBSERVER_FAST_FADE_SHIFT"), number("OBSERVER_FAST_HALF_Q15") / 32768.0
+OPEN_SHARE = 2.0 ** (number("OBSERVER_GATE_OPEN_SHIFT") - 15.0)
+SUB_STEPS = 2
+SPEEDS, PARTS = 60, 20
+"""How many speeds between the nominal and the minimum one are tried; parts of a load."""
+
+
+@dataclass
+class Drive:
+    """Shaft and controllers."""
+
+    step_s: float
+    per_amp: float
+    """electrical rad/s2 per A"""
+    per_nm: float
+    pull_a: float
+    """friction"""
+    psi: float
+    bridge_ohm: float
+    filter_rad_s: float
+    current_rad_s: float
+    full_rad_s: float
+    quiet: float
+    loaded: float
+    fast: float
+    """rates times the step"""
+    gain: float
+    load_from_a: float
+    gate: float
+    gate_loaded: float
+    most_a: float
+
+    @classmethod
+    def of(cls, d: "Design", inertia: float) -> "Drive":
+        m, b, loop = d.motor, d.board, d.speed_loop
+        step_s, dead_v = slow_periods(b.pwm_period_s) * b.pwm_period_s, b.nominal_bus_v * b.dead_time_s / b.pwm_period_s
+        rate = 2.0 * math.pi * step_s
+        loaded = LOADED_SHARE * rate * loop.load_hz
+        return cls(step_s, m.kt_nm_per_a * m.pole_pairs / inertia, m.pole_pairs / inertia, d.envelope.friction_nm(d.value("MINIMUM_SPEED_RPM")) / m.kt_nm_per_a,
+                   m.psi_vs, b.rds_on_ohm + 0.5 * b.shunt_ohm, 2.0 * math.pi * constants.filter_hz(d.value("KFILTER_ESDQ"), b.pwm_period_s),
+                   2.0 * math.pi * d.value("CURRENT_BANDWIDTH_HZ"), 2.0 * math.pi * loop.load_hz / FULL_RATIO,
+                   min(rate * QUIET_RATIO * loop.bandwidth_hz, loaded), loaded, rate * loop.load_hz,
+                   2.0 * math.pi * loop.bandwidth_hz * inertia / m.kt_nm_per_a / m.pole_pairs, LOAD_FROM_LOST * d.scales.lost_counts * d.scales.count_a,
+                   GATE * dead_v / m.psi_vs, GATE_LOADED * dead_v / m.psi_vs, d.value("MAXIMUM_CURRENT_A"))
+
+
+class Model:
+    """A motor on its way: its reference speed and a load that grows."""
+
+    def __init__(self, drive: Drive, reference: float) -> None:
+        self.drive, self.reference = drive, reference
+        self.speed, self.angle, self.e_d, self.e_q = reference, 0.0, 0.0, drive.psi * reference
+        self.seen, self.load_a, self.current_a = reference, drive.pull_a, drive.pull_a
+        self.quick, self.level, self.last = 0.0, 0.0, 0.0
+        self.lost = False
+
+    def step(self, load_nm: float) -> None:
+        """A slow step: rates and gate, the current that is asked for, the shaft, and what the observer learns."""
+        p, speed = self.drive, max(abs(self.seen), self.reference)
+        loaded = min(max((min(abs(self.load_a), abs(self.current_a)) - p.load_from_a) / p.load_from_a, 0.0), 1.0)
+        share = min(speed / p.full_rad_s, 1.0)
+        quiet = p.quiet * share
+        share += (min(2.0 * share, 1.0) - share) * loaded
+        rate = quiet + (p.loaded * share - quiet) * loaded
+        rate += (p.fast * share - rate) * self.quick
+        gate = (p.gate + (p.gate_loaded - p.gate) * loaded + speed / 2.0 ** GATE_SPEED) * (1.0 + self.level / 2.0 ** GATE_GROWS)
+        gain = p.gain * (1.0 + (FAST_GAIN - 1.0) * self.quick) * min(2.0 * share, 1.0)
+        seen = self._turn(self._within(gain * (self.reference - self.seen) + self.load_a), load_nm)
+        before = self.seen
+        self.seen += p.per_amp * p.step_s * (self.current_a - self.load_a)
+        innovation = seen - 0.5 * (before + self.seen)
+        self.seen += 2.0 * rate * innovation
+        self.load_a = self._within(self.load_a - rate ** 2 / (p.per_amp * p.step_s) * innovation)
+        self._answer(innovation, gate)
+
+    def _within(self, ampere: float) -> float:
+        return min(max(ampere, -self.drive.most_a), self.drive.most_a)
+
+    def _turn(self, asked_a: float, load_nm: float) -> float:
+        """Current, shaft and estimator over a step; returns the mean speed that the estimator has seen."""
+        p, dt, mean = self.drive, self.drive.step_s / SUB_STEPS, 0.0
+        k, current_k = 1.0 - math.exp(-min(p.filter_rad_s, ESDQ_RATIO * max(self.speed, 1.0)) * dt), 1.0 - math.exp(-p.current_rad_s * dt)
+        for _ in range(SUB_STEPS):
+            self.current_a += (asked_a - self.current_a) * current_k
+            self.e_d += k * (p.psi * self.speed * math.sin(self.angle) - self.e_d)
+            self.e_q += k * (p.psi * self.speed * math.cos(self.angle) + p.bridge_ohm * self.current_a - self.e_q)
+            estimated = (self.e_q - self.e_d) / p.psi
+            mean += estimated / SUB_STEPS
+            resisting = p.per_nm * load_nm + p.per_amp * p.pull_a if self.speed > 0.0 else 0.0
+            self.speed = max(self.speed + dt * (p.per_amp * self.current_a * math.cos(self.angle) - resisting), 0.0)
+            self.angle += (estimated - self.speed) * dt
+        self.lost = self.lost or abs(self.angle) > LOST_RAD
+        return mean
+
+    def _answer(self, innovation: float, gate: float) -> None:
+        """The quick rate after a large innovation, until the loop's own swing turns it back."""
+        is_open = self.quick > OPEN_SHARE
+        self.level = min(self.level + 4.0, 4.0 * GATE_STEPS) if is_open else max(self.level - 1.0, 0.0)
+        self.quick *= FADE
+        if abs(innovation) > gate and (not is_open or self.level < GATE_STEPS):
+            if is_open and innovation * self.last < 0.0:
+                self.level = GATE_STEPS
+            self.last = innovation
+            self.quick = max(self.quick, 1.0 if abs(innovation) > 1.5 * gate else HALF_LEVEL)
+
+
+def asked_nm(d: "Design") -> float:
+    """The rated torque, as far as the current allows; friction comes on top."""
+    return min(d.motor.rated_torque_nm, CURRENT_SHARE * d.value("MAXIMUM_CURRENT_A") * d.motor.kt_nm_per_a)
+
+
+def held(d: "Design", rpm: float, load_nm: float, inertia: float = 0.0, over_s: float = ONSET_S) -> bool:
+    """Whether the rotor is back at its speed after a load has come within a time; with another inertia, if one is given."""
+    drive = Drive.of(d, inertia or d.inertia_kgm2)
+    model = Model(drive, rpm * RPM * d.motor.pole_pairs)
+    for k in range(int((over_s + AFTER_S) / drive.step_s)):
+        model.step(load_nm * min(k * drive.step_s / over_s, 1.0))
+        if model.lost:
+            return False
+    return model.speed > BACK_SHARE * model.reference
+
+
+def holds(d: "Design", rpm: float, load_nm: float, inertia: float = 0.0) -> bool:
+    """The same with MARGIN: whether the motor is sure to hold it."""
+    return held(d, rpm / MARGIN, load_nm, inertia)
+
+
+def lowest_rpm(d: "Design", load_nm: float) -> float | None:
+    """The lowest speed from which on the load is held, to two digits; None if it is not held at the nominal speed."""
+    least, found = d.value("MINIMUM_SPEED_RPM"), None
+    for rpm in np.geomspace(d.value("NOMINAL_SPEED_RPM"), least, SPEEDS):
+        tried = min(limits.digits_up(rpm, 2), d.value("NOMINAL_SPEED_RPM"))
+        if not holds(d, tried, load_nm):
+            break
+        found = tried
+    return found
+
+
+def most_nm(d: "Design", rpm: float, load_nm: float) -> float:
+    """The largest part of a load that is held at a speed, in twentieths; 0 for none."""
+    held_nm = 0.0
+    for share in range(1, PARTS + 1):
+        if not holds(d, rpm, load_nm * share / PARTS):
+            break
+        held_nm = load_nm * share / PARTS
+    return held_nm
