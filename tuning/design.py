@@ -151,8 +151,10 @@ class Design:
                                     self.motor.tune.get("CURRENT_BANDWIDTH_HZ"))
 
     def start_of(self, motor: Motor, maximum_a: float) -> start.StartDesign:
-        """The start of this motor, or of a changed one, with these current loops."""
-        return start.design_start(motor, self.board, self.plant, self.gains, maximum_a, self.value("OVER_CURRENT_THRESHOLD_A"), self.value("NOMINAL_SPEED_RPM"),
+        """The start of this motor, or of a changed one, with current loops of this bandwidth."""
+        plant = replace(self.plant, ld=motor.ld_h, lq=motor.lq_h)
+        gains = loops.current_gains(plant, self.value("CURRENT_BANDWIDTH_HZ"), self.filter_gains)
+        return start.design_start(motor, self.board, plant, gains, maximum_a, self.value("OVER_CURRENT_THRESHOLD_A"), self.value("NOMINAL_SPEED_RPM"),
                                   motor.tune)
 
     def constant(self, name: str) -> Constant:

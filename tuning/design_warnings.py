@@ -157,7 +157,7 @@ def _nominal_speed(d: "Design") -> list[str]:
     m, nominal = d.motor, d.value("NOMINAL_SPEED_RPM")
     if nominal >= m.rated_speed_rpm:
         return []
-    return [warning(f"rated speed {m.rated_speed_rpm:g} rpm is above {d.nominal_erpm:.0f} electrical rpm: NOMINAL_SPEED_RPM is {nominal:g}, S3 gives the rest",
+    return [warning(f"rated speed {m.rated_speed_rpm:g} rpm is above {d.nominal_erpm:.0f} electrical rpm: NOMINAL_SPEED_RPM is {nominal:g}, use S3 for the rest",
                     f"lower the rated speed to {nominal:g} rpm")]
 
 
@@ -288,16 +288,16 @@ def of_start(d: "Design") -> list[str]:
                         *start_ways(d, lambda x: x.follows))]
     if not s.loud:
         return []
-    ways = ["remove LOCK_TIME from [tune]"] if "LOCK_TIME" in m.tune else start_ways(d, lambda x: x.follows and not x.loud)
-    if s.damping < 0.0 and not ways:
-        ways = ["with so little inductance the current's sample, after the pulse's centre, feeds the swing: put chokes into the motor's leads"]
+    why = ": with so little inductance the current's sample, after the pulse's centre, feeds the swing" if s.damping < 0.0 else ""
     return [warning(f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
-                    "to start from some angles", *ways)]
+                    f"to start from some angles{why}", *start_ways(d, lambda x: x.follows and not x.loud))]
 
 
 TRIED_SHARES = (0.8, 0.6, 0.4, 0.2, 0.1)
 """Of a load, from the least change on."""
 TRIED_FACTORS = (1.15, 1.3, 1.6, 2.0)
+CHOKE_FACTORS = (1.2, 1.5, 2.0, 3.0, 4.0)
+START_NAMES = ("LOCK_TIME", "Q_CURRENT_REF_OPENLOOP", "OPENLOOP_RAMPSPEED_INCREASERATE", "END_SPEED_RPM")
 TRIED_FRICTION = (0.01, 0.02, 0.04, 0.08)
 """Of the rated torque."""
 
@@ -309,7 +309,8 @@ def start_ways(d: "Design", good: Callable[[start.StartDesign], bool]) -> list[s
     def tried(values: list[float], changed: Callable[[float], Motor], maximum_a: Callable[[float], float] = lambda _: most) -> float | None:
         return next((value for value in values if good(d.start_of(changed(value), maximum_a(value)))), None)
 
-    ways = []
+    ways = [f"remove {name} from [tune]" for name in START_NAMES if name in m.tune
+            and good(d.start_of(replace(m, tune={key: value for key, value in m.tune.items() if key != name}), most))]
     if m.coulomb_nm == 0.0:
         found = tried([limits.digits_up(share * m.rated_torque_nm, 2) for share in TRIED_FRICTION], lambda value: replace(m, coulomb_nm=value))
         ways += [f"add [mechanical] coulomb_friction, which the no-load current gives: {found:g} N m is enough"] if found else []
@@ -324,6 +325,9 @@ def start_ways(d: "Design", good: Callable[[start.StartDesign], bool]) -> list[s
         raised = [limits.digits_down(min(factor * most, board_a), 3) for factor in TRIED_FACTORS]
         found = tried(raised, lambda value: replace(m, maximum_current_a=value), lambda value: value)
         ways += [remedies.maximum_current(m, "raise", found)] if found else []
+    if d.start_up.damping < 0.0 and not m.salient:
+        found = tried([limits.digits_up(factor * m.lq_h, 2) for factor in CHOKE_FACTORS], lambda value: replace(m, ld_h=value, lq_h=value))
+        ways += [f"raise [electrical] inductance to {found * 1e3:g} mH phase by chokes in the motor's leads"] if found else []
     ends = [limits.digits_up(factor * d.start_up.end_speed_rpm, 2) for factor in TRIED_FACTORS]
     found = tried([rpm for rpm in ends if rpm <= d.value("NOMINAL_SPEED_RPM")], lambda value: replace(m, tune=m.tune | {"END_SPEED_RPM": value})) if not ways else None
     return ways + ([f"set END_SPEED_RPM to {found:g} in [tune]"] if found else [])

@@ -26,7 +26,8 @@ ONSET_S, CURRENT_SHARE = LOWSPEED.torque_over_s, LOWSPEED.current_percent / 100.
 """What `make lowspeed` asks for: the load comes within this time, and takes so much of the largest current at most."""
 MARGIN = 1.1
 """Of the speed that the model holds. On the virtual board 15 loads on 8 motors that their rotor's inertia limits were held from 0.99 to 1.2 times it."""
-AFTER_S = 0.6
+AFTER_S, LONGEST_S = 0.6, 10.0
+"""How long the rotor has for coming back, at least and at most: in between one period of the speed loop's bandwidth."""
 LOST_RAD, BACK_SHARE = 1.2, 0.9
 """Angle error that no lock survives; share of its speed to which the rotor must have come back."""
 LOAD_FROM_LOST, GATE, GATE_LOADED = (number(name) for name in ("PARAM_LOAD_FROM_LOST", "GATE_SHARE", "GATE_LOADED_SHARE"))
@@ -146,7 +147,8 @@ def held(d: "Design", rpm: float, load_nm: float, inertia: float = 0.0, over_s: 
     """Whether the rotor is back at its speed after a load has come within a time; with another inertia, if one is given."""
     drive = Drive.of(d, inertia or d.inertia_kgm2)
     model = Model(drive, rpm * RPM * d.motor.pole_pairs)
-    for k in range(int((over_s + AFTER_S) / drive.step_s)):
+    bandwidth_hz = d.speed_loop.bandwidth_hz * min(2.0 * model.reference / drive.full_rad_s, 1.0)
+    for k in range(int((over_s + min(max(1.0 / bandwidth_hz, AFTER_S), LONGEST_S)) / drive.step_s)):
         model.step(load_nm * min(k * drive.step_s / over_s, 1.0))
         if model.lost:
             return False

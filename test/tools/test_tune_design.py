@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from pytest import approx
 from support import MOTORS
-from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, designed, motor_path, of
+from tune_support import FOR_ANOTHER_BOARD, HURST, MOTOR, NO_FRICTION, SMALL_MOTOR, designed, motor_path, of
 
 from tools.common import board_file, motor_file
 from tools.common.errors import UserError
@@ -18,10 +18,15 @@ from tuning.limits import Envelope
 BOARD = board_file.load("mclv")
 
 
-def made(changes=(), more: str = "", board: dict | None = None, **other) -> Design:
-    """The design of MOTOR with texts replaced, lines added, and numbers of the motor and the board replaced."""
+def parts(changes=(), more: str = "", board: dict | None = None, **other) -> tuple[motor_file.Motor, board_file.BoardFile]:
+    """MOTOR with texts replaced, lines added, and numbers of the motor and the board replaced."""
     with motor_path(*changes, more=more) as path:
-        return design(replace(motor_file.load(str(path)), **other), replace(BOARD, **(board or {})))
+        return replace(motor_file.load(str(path)), **other), replace(BOARD, **(board or {}))
+
+
+def made(*arguments, **words) -> Design:
+    """The design of parts()."""
+    return design(*parts(*arguments, **words))
 
 
 HEAVIER = ("value = 5.5e-6", "value = 5.5e-5")
@@ -44,7 +49,7 @@ REFUSED = {
         {"changes": FOR_ANOTHER_BOARD},
         ("3.45 A are allowed", "lower [rating] torque and current to what the board carries, 0.19 N m and 3.45 A peak")),
     "torque beyond maximum_current": ({"changes": (("value = 2.75", "value = 0.55"),)},
-                                      ("0.55 A are allowed", "raise [rating] maximum_current to at least 0.802 A peak")),
+                                      ("0.55 A are allowed", "raise [rating] maximum_current to 0.802 A peak")),
     "inertia below the load observer's format": (
         {"changes": (("value = 5.5e-6", "value = 0.5e-6"),)},
         ("cannot count the acceleration of 5e-07 kg m2 by 4.4 A, ", "add at least 1.2e-07 kg m2 of [load] inertia, or use a board with at most 3.5 A of")),
@@ -68,15 +73,41 @@ REFUSED = {
                                       ("MAXIMUM_CURRENT_A = 0.2 must be at least 6.3 %",)),
     "choice in [tune] that breaks a relation": ({"more": "[tune]\nEND_SPEED_RPM = 2700\n"},
                                                 ("[tune]", "END_SPEED_RPM = 2700 must be at most NOMINAL_SPEED_RPM = 2500"))}
+FAST = {"pole_pairs": 7, "rs_ohm": 0.35, "ld_h": 1e-4, "lq_h": 1e-4, "kphi_v_per_krpm": 1.88, "psi_vs": 1.88 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 7),
+        "coulomb_nm": 2.5e-3, "viscous_nms": 1.5e-6, "rated_torque_nm": 0.025, "rated_current_a": 1.9, "rated_speed_rpm": 10000.0, "start_torque_nm": 0.006,
+        "maximum_current_a": 2.6, "inertia_kgm2": 2.5e-6}
+GIMBAL = {"pole_pairs": 7, "rs_ohm": 5.0, "ld_h": 1.5e-3, "lq_h": 1.5e-3, "kphi_v_per_krpm": 40.0, "psi_vs": 40.0 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 7),
+          "inertia_kgm2": 1.2e-5, "coulomb_nm": 8e-3, "viscous_nms": 0.0, "rated_torque_nm": 0.18, "rated_current_a": 0.6, "rated_speed_rpm": 130.0, "maximum_speed_rpm": 140.0,
+          "maximum_current_a": 0.9, "start_torque_nm": 0.03, "board": {"current_full_scale_a": 1.3}}
 WARNED = {
-    "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "larger current range")),
+    "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "lower [shunt] amplifier_gain to")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),
     "maximum current beyond the firmware's range": (
         {"changes": (*OTHER, HEAVIER, ("value = 2.75", "value = 24")), "board": {"current_full_scale_a": 60.0}},
-        ("maximum_current 24 A peak is above", "MAXIMUM_CURRENT_A is 20")),
+        ("maximum_current 24 A peak is above 20 A, the firmware's largest", "MAXIMUM_CURRENT_A is 20; lower [rating] maximum_current to 20 A peak$")),
     "maximum current beyond the board": ({"maximum_current_a": 4.2},
                                          ("maximum_current 4.2 A peak is above what this board can measure", "MAXIMUM_CURRENT_A is 3.45")),
-    "rated current beyond the board": ({"rated_current_a": 3.6, "maximum_current_a": 3.4}, ("rated current 3.6 A peak is above MAXIMUM_CURRENT_A",)),
+    "rated current beyond the board": ({"rated_current_a": 3.6, "maximum_current_a": 3.4},
+                                       ("rated current 3.6 A peak is above MAXIMUM_CURRENT_A", "amplifier_gain to 71.3 and raise [rating] maximum_current to 3.6 A peak, or")),
+    "rated current beyond the motor's own maximum": ({"rated_current_a": 2.8, "maximum_current_a": 2.7},
+                                                     ("rated current 2.8 A peak is above MAXIMUM_CURRENT_A = 2.7", "; raise [rating] maximum_current to 2.8 A peak, or lower")),
+    "rated current beyond the firmware's range": (
+        {"changes": (*OTHER[1:], HEAVIER, ("value = 1.53", "value = 22"), ("value = 2.75", "value = 24")), "board": {"current_full_scale_a": 60.0}},
+        ("rated current 22 A peak is above MAXIMUM_CURRENT_A = 20", "N m; lower [rating] current to 20 A peak and [rating] torque to")),
+    "kphi that is a factor of 1.4 too small": ({"changes": (("value = 7.24", "value = 5.12"),)},
+                                               ("kphi and the rated current give 0.057 N m", "peak and RMS confused?", "kphi to 6.")),
+    "torque that is far more than the current gives": ({"rated_torque_nm": 0.125}, ("the rated torque is 0.12 N m: one of the three is wrong",)),
+    "largest current beyond the back-EMF's format": ({"rs_ohm": 6.0, "rated_torque_nm": 0.04, "rated_current_a": 0.7, "rated_speed_rpm": 1800.0},
+                                                     ("leave the back-EMF's number format", "lower [rating] maximum_current to")),
+    "maximum speed that more current reaches": ({"changes": (("value = 5000", "value = 5900"),), "maximum_current_a": 1.9, "rated_torque_nm": 0.07, "rated_current_a": 1.4},
+                                                ("maximum_speed 5900 rpm is not reachable", "raise [rating] maximum_current to")),
+    "light rotor that a load stops": ({"changes": (("value = 5.5e-6", "value = 2e-6"),)},
+                                      ("MINIMUM_SPEED_RPM = 150: a load of 0.08 N m that comes within 0.5 s stops the rotor there", "set MINIMUM_SPEED_RPM to")),
+    "rotor so light that no speed holds": (GIMBAL, ("held at no speed up to NOMINAL_SPEED_RPM", "; raise [load] inertia to")),
+    "swing that a tuned lock leaves": ({"changes": NO_FRICTION, "more": "[tune]\nLOCK_TIME = 4000\n"}, ("the unloaded rotor still swings by", "remove LOCK_TIME from [tune]")),
+    "swing that a small inductance feeds": ({"changes": (*SMALL_MOTOR, ("value = 1.92", "value = 0.1"))}, ("feeds the swing", "by chokes in the motor's leads")),
+    "heavy load's slow reference": ({"more": INERTIA % "3e-3"}, ("SPEEDREFRAMP_RPM_PER_S = 76: 33 s to the rated speed", "at most 30% of rated torque")),
+    "rotation that takes the current loop's margin": ({**FAST, "maximum_speed_rpm": 10500.0}, ("the current loop has", "lower the rated speed to", "and [rating] maximum_speed to")),
     "maximum speed beyond field weakening": ({"changes": (("value = 5000", "value = 6300"),)}, ("maximum_speed 6300 rpm is not reachable",)),
     "maximum speed beyond the speed format": (
         {"changes": (("value = 5000", "value = 9000"),), "ld_h": 6e-3, "lq_h": 6e-3, "maximum_current_a": 3.4, "board": {"pwm_period_s": 125e-6}},
@@ -84,15 +115,18 @@ WARNED = {
     "rated speed that only S3 reaches": (
         {"changes": (("value = 2500", "value = 2000"),), "pole_pairs": 14, "psi_vs": 7.983e-3 * 5 / 14, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2280.0},
         ("is above 27000 electrical rpm", "use S3 for the rest",)),
+    "start that the rotor may not follow": (
+        {"changes": (("value = 0.08", "value = 0.06"),), "more": '[load]\ninertia = { value = 1.5e-3, unit = "kg m2" }\nstart_torque = { value = 60, unit = "mN m" }\n'},
+        ("the rotor may not follow the ramp",)),
     "inductance measured far from the motor's frequency": ({"changes": (("frequency_hz = 1000", "frequency_hz = 10000"),)},
                                                            ("was measured at 10000 Hz, the motor turns at 208 Hz",)),
     "heavy load's slow speed loop": (
         {"more": '[load]\ninertia = { value = 12000, unit = "g cm2" }\n'},
-        ("the speed loop's", "are slow with so much inertia (4 Hz would be calm)", "lower the load's inertia, or use")),
+        ("the speed loop's", "are slow with so much inertia (4 Hz would be calm)", "; lower [load] inertia to")),
     "speed loop that is slow by choice": ({"more": "[tune]\nSPEED_BANDWIDTH_HZ = 4\n"},
                                           ("the speed loop's 4 Hz are slow (13 Hz", "; remove SPEED_BANDWIDTH_HZ from [tune]$")),
     "load observer that is quick by choice": ({"more": "[tune]\nLOAD_BANDWIDTH_HZ = 135\n"},
-                                              ("LOAD_BANDWIDTH_HZ = 135: the speed loop has", "15 degrees and 4 dB are asked for; remove it from [tune]$")),
+                                              ("LOAD_BANDWIDTH_HZ = 135: the speed loop has", "15 degrees and 4 dB are asked for; remove LOAD_BANDWIDTH_HZ from [tune]$")),
     "derivative limit that clips": (
         {"pole_pairs": 12, "psi_vs": 7.983e-3 * 5 / 12, "ld_h": 3e-4, "lq_h": 3e-4, "maximum_speed_rpm": 2660.0, "board": {"pwm_period_s": 125e-6},
          "inertia_kgm2": 2e-5},

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from pytest import approx
 from support import MOTORS
-from tune_support import HURST, designed, of
+from tune_support import HURST, NO_FRICTION, SMALL_MOTOR, designed, of
 
 from tools.common import board_file, motor_file, param_rows, paths
 from tuning import start
@@ -115,26 +115,18 @@ def test_what_is_left_of_the_lock_s_swing_is_measured_on_the_plateau_and_the_loc
 
 
 # ---- warnings --------------------------------------------------------------------------------------------------------------
-NO_FRICTION = (("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 0.0"),
-               ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0"))
-SMALL = (("pole_pairs = { value = 5", "pole_pairs = { value = 1"), ("value = 2.67", "value = 1.5"), ("value = 7.24", "value = 2.084"),
-         ("value = 5.5e-6", "value = 5e-7"), ("value = 15.3e-6", "value = 1e-9"), ("value = 0.004", "value = 0.0024"),
-         ("value = 1.53", "value = 1.32"), ("value = 0.08", "value = 0.022"), ("speed = { value = 2500", "speed = { value = 8000"),
-         ("value = 5000", "value = 10000"), ("value = 2.75", "value = 1.98"))
-
-
 @pytest.mark.parametrize("changes, more, warning", [
-    ((), "[tune]\nQ_CURRENT_REF_OPENLOOP = 0.1\n", "may not follow the ramp"),
-    ((*NO_FRICTION, ("value = 5.5e-6", "value = 6e-5")), "[tune]\nLOCK_TIME = 2000\n", r"may not follow.*0 N m\): add \[mechanical\] coulomb_friction"),
-    (NO_FRICTION, "[tune]\nLOCK_TIME = 4000\n", r"still swings by \d+ rpm when the estimator takes over at \d+ rpm.*: add \[mechanical\] coulomb_friction"),
+    ((), "[tune]\nQ_CURRENT_REF_OPENLOOP = 0.1\n", r"may not follow the ramp.*; remove Q_CURRENT_REF_OPENLOOP from \[tune\]"),
+    ((*NO_FRICTION, ("value = 5.5e-6", "value = 6e-5")), "[tune]\nLOCK_TIME = 2000\n", r"may not follow.*0 N m\); .*add \[mechanical\] coulomb_friction"),
+    (NO_FRICTION, "[tune]\nLOCK_TIME = 4000\n", r"still swings by \d+ rpm when the estimator takes over at \d+ rpm.*; .*add \[mechanical\] coulomb_friction"),
     # on the virtual board 24 of 72 starts of this motor succeed; with 0.15 mH all
-    ((*SMALL, ("value = 1.92", "value = 0.1")), "", "put chokes into the motor's leads")])
+    ((*SMALL_MOTOR, ("value = 1.92", "value = 0.1")), "", "mH phase by chokes in the motor's leads")])
 def test_a_start_that_may_fail_is_warned_about_once_with_the_line_to_add(changes, more, warning):
     found = designed(*changes, more=more).warnings
     assert sum(bool(re.search(warning, line)) for line in found) == 1, found
 
 
 def test_a_small_inductance_lets_the_swing_grow():
-    assert designed(*SMALL, ("value = 1.92", "value = 0.1")).start_up.damping < 0.0
-    large = designed(*SMALL, ("value = 1.92", "value = 0.5")).warnings
+    assert designed(*SMALL_MOTOR, ("value = 1.92", "value = 0.1")).start_up.damping < 0.0
+    large = designed(*SMALL_MOTOR, ("value = 1.92", "value = 0.5")).warnings
     assert not any("chokes" in warning or "swings" in warning for warning in large), large

@@ -49,6 +49,13 @@ FOR_ANOTHER_BOARD = (("value = 1.53", "value = 15.3"), ("value = 0.08", "value =
                      ("value = 1.92", "value = 0.2"))
 """Changes of MOTOR that make it a motor for ten times the current."""
 
+NO_FRICTION = (("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 0.0"),
+               ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0"))
+SMALL_MOTOR = (("pole_pairs = { value = 5", "pole_pairs = { value = 1"), ("value = 2.67", "value = 1.5"), ("value = 7.24", "value = 2.084"),
+         ("value = 5.5e-6", "value = 5e-7"), ("value = 15.3e-6", "value = 1e-9"), ("value = 0.004", "value = 0.0024"),
+         ("value = 1.53", "value = 1.32"), ("value = 0.08", "value = 0.022"), ("speed = { value = 2500", "speed = { value = 8000"),
+         ("value = 5000", "value = 10000"), ("value = 2.75", "value = 1.98"))
+
 command = functools.partial(support.command, main=cli.main)
 
 

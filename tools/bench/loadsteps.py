@@ -178,9 +178,11 @@ class LoadSteps(sweep.Sweep):
         return f"{self.table.title}: {len(rows)} rows"
 
     def text(self, rows: list[dict[str, Any]]) -> str:
-        """And by which numbers a load is out of reach."""
-        lines = [f"{row['name']}, Kphi x{row['kphi']:g}: {row['beyond'] or row['too_quick']}" for row in rows if row["verdict"] == reach.BEYOND]
-        return "\n".join([super().text(rows)] + ["", f"{reach.BEYOND}, friction included:", *lines] * bool(lines))
+        """And by which numbers a load is out of reach, or a reason for what does not hold."""
+        beyond, others = ([f"{row['name']}, Kphi x{row['kphi']:g}: {row['beyond'] or row['too_quick']}" for row in rows
+                           if row["verdict"] != "ok" and (row["verdict"] == reach.BEYOND) == whether and (row["beyond"] or row["too_quick"])] for whether in (True, False))
+        return "\n".join([super().text(rows)] + ["", f"{reach.BEYOND}, friction included:", *beyond] * bool(beyond)
+                         + ["", "why others do not hold, friction included:", *others] * bool(others))
 
 
 def back_after(speed: np.ndarray, reference: float, percent: float, period_s: float) -> float | None:

@@ -79,7 +79,7 @@ def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
     axes.plot(thin.time_s, reference, label="reference", color="black", linewidth=0.7)
     for item in run.hand_overs():
         axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":",
-                     label=f"closed loop, {item.after_s2_s:.2f} s after S2")
+                     label=item.text)
     _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
 
 

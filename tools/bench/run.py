@@ -20,12 +20,18 @@ class HandOver:
 
     at_s: float
     row: int
-    after_s2_s: float
+    after_s2_s: float | None
+    """None where the start needed no S2"""
     overshoot_percent: float
     speed_rpm: float
     """true speed in the direction of rotation"""
     lowest_rpm: float
     """lowest true speed in the direction of rotation, from 50 ms before the hand-over to 1 s after it"""
+
+    @property
+    def text(self) -> str:
+        """When the loop closed, where S2 was pressed for it."""
+        return "closed loop" if self.after_s2_s is None else f"closed loop {self.after_s2_s:.2f} s after S2"
 
 
 @dataclass
@@ -85,10 +91,10 @@ class Run:
         for (_, _, before), (row, at_s, name) in zip(changes, changes[1:]):
             if name == "CLOSED" and before == "RAMP":
                 presses = [time for time in self.press_times("S2") if time < at_s]
-                result.append(self._hand_over(row, at_s, at_s - presses[-1] if presses else float("nan")))
+                result.append(self._hand_over(row, at_s, at_s - presses[-1] if presses else None))
         return result
 
-    def _hand_over(self, row: int, at_s: float, after_s2_s: float) -> HandOver:
+    def _hand_over(self, row: int, at_s: float, after_s2_s: float | None) -> HandOver:
         after = self.trace.part(at_s, at_s + 1.0)
         reference = after.column("fw.speed_ref_rpm").astype(np.float64)
         direction = -1.0 if reference[min(1, len(reference) - 1)] < 0.0 else 1.0
@@ -108,7 +114,7 @@ class Run:
             text = f"state {name}"
             if row in hand_overs:
                 item = hand_overs[row]
-                text = f"closed loop {item.after_s2_s:.2f} s after S2, overshoot {item.overshoot_percent:.1f} %"
+                text = f"{item.text}, overshoot {item.overshoot_percent:.1f} %"
             entries.append((at_s, text))
         faults = self.fault_changes()
         entries += [(at_s, f"fault {name}" if code else "fault cleared") for (row, at_s, name), code in

@@ -45,12 +45,15 @@ def in_rounds(first: Iterable[tuple[Hashable, float]], searches: dict[Any, Searc
               run: Callable[[int, list[tuple[Any, float]]], list[dict[str, Any]]]) -> None:
     """Rounds of runs until each search knows its end to so many per cent. A run is of a group and a value; group() tells that of a search's key.
     `run` gets the number of the round."""
-    wanted, number = list(first), 0
+    def unknown() -> list[tuple[Any, float]]:
+        found = ((group(key), search.next(percent / 100.0)) for key, search in searches.items())
+        return list(dict.fromkeys((name, value) for name, value in found if value is not None))
+
+    wanted, number = list(first) or unknown(), 0
     while wanted:
         number += 1
         for (name, value), row in zip(wanted, run(number, wanted)):
             for key, search in searches.items():
                 if group(key) == name and (value == search.start or (value > search.start) == search.upwards):
                     search.narrow(value, row)
-        found = ((group(key), search.next(percent / 100.0)) for key, search in searches.items())
-        wanted = list(dict.fromkeys((name, value) for name, value in found if value is not None))
+        wanted = unknown()

@@ -290,7 +290,20 @@ class Starts(sweep.Sweep):
         width = max(width, 14)
         lines = ["rotor deg  " + "  ".join(kind.center(width) for kind in kinds)]
         lines += [f"{angle:9g}  " + "  ".join(cells[kind, angle].rjust(width) for kind in kinds) for angle in angles]
-        return "\n".join(lines) + "\n\neach cell: closed loop after S2 and at what speed, highest speed backwards before, rpm; overshoot and speed error at the end, %"
+        lines += ["", "each cell: closed loop after S2 and at what speed, highest speed backwards before, rpm; overshoot and speed error at the end, %"]
+        return "\n".join(lines + self.failed_text(rows))
+
+    def failed_text(self, rows: list[dict[str, Any]]) -> list[str]:
+        """How many of each kind end in a fault: some count as holding, for so much inertia may fail to start."""
+        lines = []
+        for kind, some in ((kind, [row for row in rows if row["kind"] == kind]) for kind in dict.fromkeys(row["kind"] for row in rows)):
+            failed = [row for row in some if row["fault"]]
+            allowed = [row for row in failed if self.first_limit(row)[0]]
+            if failed:
+                lines.append(f"{kind}: {len(failed)} of {len(some)} starts end in a fault" + (
+                    f", {len(allowed)} of them in START_FAILED, which is allowed from {self.table.may_fail_from:g} times the inertia on: the header is made for less, "
+                    "give the motor file its [load] inertia" if allowed else ""))
+        return ["", *lines] if lines else []
 
 
 def _cell(row: dict[str, Any]) -> str:

@@ -1,0 +1,100 @@
+"""Each warning of the tuner names a key and a value, and each of its ways is tried: with the change the warning is gone."""
+
+import ast
+import inspect
+import re
+from dataclasses import replace
+
+import pytest
+from test_tune_design import WARNED, parts
+
+from tools.common import board_file, motor_file
+from tuning import design_warnings
+from tuning.design import Design, design
+
+NUMBER = r"([\d.]+(?:e-?\d+)?)"
+MOTOR_KEYS = {"[rating] current": "rated_current_a", "[rating] torque": "rated_torque_nm", "the rated speed": "rated_speed_rpm", "[rating] maximum_speed": "maximum_speed_rpm",
+              "[rating] maximum_current": "maximum_current_a", "[load] inertia": "load_inertia_kgm2", "[load] start_torque": "start_torque_nm",
+              "[mechanical] coulomb_friction": "coulomb_nm", "[electrical] inductance": "inductance_frequency_hz"}
+Parts = tuple[motor_file.Motor, board_file.BoardFile]
+
+
+def kind(warning: str) -> str:
+    """What a warning is about, whatever its numbers."""
+    return re.sub(r"[\d.e+-]+", "#", warning)[:26]
+
+
+def ways(warning: str) -> list[str]:
+    """The ways that a warning offers."""
+    return re.split(r", or (?=raise|lower|set|add|remove|measure|by)", warning.rpartition("; ")[2])
+
+
+def with_supply(board: board_file.BoardFile, volt: float) -> board_file.BoardFile:
+    """A board for another supply: its limits and its divider go with it."""
+    ratio = volt / board.nominal_bus_v
+    return replace(board, nominal_bus_v=volt, **{name: ratio * getattr(board, name) for name in ("bus_full_scale_v", "over_voltage_v", "under_voltage_v", "regen_limit_v")})
+
+
+def changed(one: str, motor: motor_file.Motor, board: board_file.BoardFile) -> Parts:
+    """Motor and board after what one change asks for."""
+    if tuned := re.fullmatch(rf"set (\w+) to {NUMBER} in \[tune\](?:, if the load allows it)?", one):
+        return replace(motor, tune=motor.tune | {tuned[1]: float(tuned[2])}), board
+    if removed := re.fullmatch(r"remove (\w+) from \[tune\]", one):
+        return replace(motor, tune={name: value for name, value in motor.tune.items() if name != removed[1]}), board
+    if one == "raise the supply voltage":
+        return motor, with_supply(board, 1.3 * board.nominal_bus_v)
+    if one == "remove [load] inertia":
+        return replace(motor, load_inertia_kgm2=0.0), board
+    if found := re.fullmatch(rf"(?:raise|lower|set|measure|add|)\s?(the supply voltage|the rated speed|\[\w+\] \w+)(?: to|, which the no-load current gives:| at) {NUMBER}(?: .*)?", one):
+        key, value = found[1], float(found[2])
+        if key == "the supply voltage":
+            return motor, with_supply(board, value)
+        if key == "[shunt] amplifier_gain":
+            return motor, replace(board, current_full_scale_a=board.current_full_scale_a * board.quantities["shunt.amplifier_gain"].value_si / value)
+        if key == "[electrical] kphi":
+            return replace(motor, kphi_v_per_krpm=value, psi_vs=motor.psi_vs * value / motor.kphi_v_per_krpm), board
+        return replace(motor, **{MOTOR_KEYS[key]: value}), board
+    raise AssertionError(f"'{one}' names no key that a test can change")
+
+
+def after(way: str, motor: motor_file.Motor, board: board_file.BoardFile) -> Design:
+    """The design after all changes of a way."""
+    for one in way.split(" and "):
+        motor, board = changed(one, motor, board)
+    return design(motor, board)
+
+
+def about(name: str) -> tuple[Parts, str]:
+    """A motor with its board, and the warning that it is an example of."""
+    words, says = WARNED[name]
+    both = parts(**words)
+    return both, next(warning for warning in design(*both).warnings if all(part in f"{warning}$" for part in says))
+
+
+@pytest.mark.parametrize("name", WARNED)
+def test_after_each_change_that_a_warning_names_it_is_gone(name):
+    both, warning = about(name)
+    offered = ways(warning)
+    assert "; " in warning and offered, warning
+    for way in offered:
+        if way.startswith("by make"):
+            continue
+        left = after(way, *both).warnings
+        assert kind(warning) not in map(kind, left), f"{way}: {left}"
+
+
+def test_every_warning_that_the_tuner_has_is_among_them(monkeypatch):
+    """The lines of design_warnings.py that made one, and those that could."""
+    tree = ast.parse(inspect.getsource(design_warnings))
+    functions = {function.name for function in ast.walk(tree) if isinstance(function, ast.FunctionDef)
+                 for call in ast.walk(function) if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "warning"}
+    found = set()
+
+    def noted(what: str, *more: str) -> str:
+        found.add(inspect.stack()[1].function)
+        return made(what, *more)
+    made = design_warnings.warning
+    monkeypatch.setattr(design_warnings, "warning", noted)
+    for words, _ in WARNED.values():
+        design(*parts(**words))
+    assert functions - found == set()
