@@ -21,6 +21,8 @@ L_FREQUENCY_RATIO = 10.0
 TORQUE_TOLERANCE = 0.25
 """Sheets round, and leave open what friction takes; a factor of sqrt(2) is more."""
 NEAR_FACTOR = 0.08
+MOST_INVKFI = 32766.0
+"""Counts of 1/Kphi: a slower motor counts its speed finer."""
 LONG_RAMP_S = 30.0
 """To the rated speed: a user who turns the potentiometer up waits for it."""
 HEAVIER_FACTORS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 36.0)
@@ -29,7 +31,7 @@ KPHI_FACTORS = {math.sqrt(2.0): "peak and RMS", math.sqrt(3.0): "line to line an
 
 def of_numbers(d: "Design", currents: limits.Currents) -> list[str]:
     """Of the sheet's numbers, the board's and the formats'."""
-    return [*_torque(d.motor), *_currents(d, currents), *_speeds(d), *_numbers(d)]
+    return [*_torque(d), *_currents(d, currents), *_speeds(d), *_numbers(d)]
 
 
 def of_running(d: "Design") -> list[str]:
@@ -51,16 +53,19 @@ def shaft_nm(m: Motor, ampere: float) -> float:
     return most - e.friction_nm(m.rated_speed_rpm)
 
 
-def _torque(m: Motor) -> list[str]:
+def _torque(d: "Design") -> list[str]:
     """kphi, current and torque are one too many: two of them give the third."""
+    m = d.motor
     given_nm, friction_nm = shaft_nm(m, m.rated_current_a), Envelope(m, math.inf, 1.0).friction_nm(m.rated_speed_rpm)
     if abs(given_nm / m.rated_torque_nm - 1.0) <= TORQUE_TOLERANCE:
         return []
     factor = (m.rated_torque_nm + friction_nm) / (given_nm + friction_nm)
     size = max(factor, 1.0 / factor)
+    other = replace(d.envelope, motor=replace(m, psi_vs=factor * m.psi_vs)) # no kphi with which the voltage is too low
+    kphi = f"set [electrical] kphi to {m.kphi_v_per_krpm * factor:.4g} V peak line-to-line/krpm"
     guess = next((f" (a factor of {size:.2f}: {names} confused?)" for known, names in KPHI_FACTORS.items() if abs(size / known - 1.0) < NEAR_FACTOR), "")
     return [warning(f"kphi and the rated current give {given_nm:.2g} N m at the shaft, the rated torque is {m.rated_torque_nm:.2g} N m: one of the three is wrong{guess}",
-                    f"set [electrical] kphi to {m.kphi_v_per_krpm * factor:.4g} V peak line-to-line/krpm", f"set [rating] current to {m.rated_current_a * factor:.3g} A peak",
+                    kphi if other.least_id(m.rated_speed_rpm, 0.5 * m.rated_torque_nm, limits.FULL_SHARE) is not None else "", f"set [rating] current to {m.rated_current_a * factor:.3g} A peak",
                     f"set [rating] torque to {given_nm:.3g} N m" if given_nm > 0.0 else "")]
 
 
@@ -77,7 +82,7 @@ def _largest_current(d: "Design", currents: limits.Currents) -> list[str]:
         if currents.board_a >= remedies.MOST_CURRENT_A:
             return [warning(f"maximum_current {m.maximum_current_a:.3g} A peak is above {remedies.MOST_CURRENT_A:g} A, the firmware's largest: MAXIMUM_CURRENT_A is {most:g}", lower)]
         return [warning(f"maximum_current {m.maximum_current_a:.3g} A peak is above what this board can measure and protect ({currents.board_a:g} A of "
-                        f"{d.board.current_full_scale_a:.3g} A): MAXIMUM_CURRENT_A is {most:g}", remedies.widen_range(d.board, m.maximum_current_a), lower)]
+                        f"{d.board.current_full_scale_a:.3g} A): MAXIMUM_CURRENT_A is {most:g}", remedies.widen_range(d.board, m.maximum_current_a) if remedies.format_holds(m, d.board, m.maximum_current_a) else "", lower)]
     if most < float(f"{m.maximum_current_a:.3g}"):
         return [warning(f"MAXIMUM_CURRENT_A is {most:g} instead of {m.maximum_current_a:.3g}: with more, R I + L dI/dt leave the back-EMF's number format",
                         *_format_ways(d, currents), lower)]
@@ -111,11 +116,12 @@ def _rated_current(d: "Design", currents: limits.Currents) -> list[str]:
     raised = [remedies.maximum_current(m, "raise", limits.digits_up(m.rated_current_a, 3))] if m.maximum_current_a < m.rated_current_a else []
     wider = m.rated_current_a > currents.board_a
     gain = remedies.widen_range(d.board, m.rated_current_a) if wider else ""
-    possible = (gain or not wider) and most >= min(m.maximum_current_a, currents.board_a) * 0.999 # the number format allows it
+    possible = (gain or not wider) and remedies.format_holds(m, d.board, m.rated_current_a)
     torque_nm = limits.digits_down(max(shaft_nm(m, most), 1e-4), 3)
+    torque = f" and [rating] torque to {torque_nm:g} N m" if torque_nm < m.rated_torque_nm else ""
     return [warning(f"rated current {m.rated_current_a:.3g} A peak is above MAXIMUM_CURRENT_A = {most:g}: at most "
                     f"{m.kt_nm_per_a * most:.3g} N m of {m.rated_torque_nm:.3g} N m", " and ".join(filter(None, [gain, *raised])) if possible else "",
-                    f"lower [rating] current to {limits.digits_down(most, 3):g} A peak and [rating] torque to {torque_nm:g} N m")]
+                    f"lower [rating] current to {limits.digits_down(most, 3):g} A peak{torque}")]
 
 
 # ---- speeds ------------------------------------------------------------------------------------------------------------------
@@ -149,7 +155,8 @@ def _top_speed(d: "Design") -> list[str]:
     more = ""
     if board_a > e.maximum_a and reaches(replace(e, maximum_a=board_a)):
         needed = limits.halved(lambda ampere: not reaches(replace(e, maximum_a=ampere)), e.maximum_a, board_a, 20)
-        more = remedies.maximum_current(m, "raise", min(limits.digits_up(1.002 * needed, 3), board_a))
+        needed = min(limits.digits_up(1.002 * needed, 3), board_a)
+        more = remedies.maximum_current(m, "raise", needed) if remedies.format_holds(m, d.board, needed) else ""
     return [warning(f"{what}: {d.board.nominal_bus_v:g} V and {e.maximum_a:g} A reach no more", remedies.raise_supply(remedies.least_supply(e, d.board, reaches)), more, lower)]
 
 
@@ -220,7 +227,8 @@ def _slower_top(d: "Design") -> str:
     rpm = limits.halved(lambda rpm: d.current_loop_at(rpm).reached, 0.0, top, 6)
     if rpm >= m.rated_speed_rpm:
         return f"lower [rating] maximum_speed to {limits.digits_down(rpm, 3):g} rpm"
-    lower = remedies.lower_rated_speed(rpm, m)
+    unit = 1 + (rpm * m.pole_pairs > limits.UNIT_ERPM) + 2 * (rpm * m.pole_pairs > 2.0 * limits.UNIT_ERPM)
+    lower = remedies.lower_rated_speed(rpm, m) if d.scales.invkfi * d.scales.speed_unit / unit < MOST_INVKFI else ""
     return lower and f"{lower} and [rating] maximum_speed to {limits.digits_down(rpm, 2):g} rpm"
 
 
@@ -262,17 +270,17 @@ def _held(d: "Design") -> list[str]:
     if load_onset.holds(d, least, torque):
         return []
     rpm, held_nm = load_onset.lowest_rpm(d, torque), load_onset.most_nm(d, least, torque)
-    what = (f"MINIMUM_SPEED_RPM = {least:g}: a load of {torque:.3g} N m that comes within {load_onset.ONSET_S:g} s stops the rotor there, "
-            + (f"{held_nm:.2g} N m are held" if held_nm > 0.0 else "none is held"))
     if rpm is None:
-        return [warning(f"{what}; the rated torque is held at no speed up to NOMINAL_SPEED_RPM: so light a rotor is stopped before the drive answers", _heavier(d, torque))]
-    return [warning(what, f"set MINIMUM_SPEED_RPM to {rpm:g} in [tune]")]
+        return [warning(f"a load of {torque:.3g} N m that comes within {load_onset.ONSET_S:g} s stops so light a rotor at every speed up to NOMINAL_SPEED_RPM = "
+                        f"{d.value('NOMINAL_SPEED_RPM'):g}, before the drive answers", _heavier(d, torque))]
+    return [warning(f"MINIMUM_SPEED_RPM = {least:g}: a load of {torque:.3g} N m that comes within {load_onset.ONSET_S:g} s stops the rotor there, "
+                    + (f"{held_nm:.2g} N m are held" if held_nm > 0.0 else "none is held"), f"set MINIMUM_SPEED_RPM to {rpm:g} in [tune]")]
 
 
 def _heavier(d: "Design", load_nm: float) -> str:
-    """More inertia that gives the drive the time which it needs at the lowest speed."""
+    """More inertia that gives the drive the time which it needs at the nominal speed."""
     heavy = (factor * d.inertia_kgm2 for factor in HEAVIER_FACTORS)
-    found = next((inertia for inertia in heavy if load_onset.holds(d, d.value("MINIMUM_SPEED_RPM"), load_nm, inertia)), None)
+    found = next((inertia for inertia in heavy if load_onset.holds(d, d.value("NOMINAL_SPEED_RPM"), load_nm, inertia)), None)
     return f"raise [load] inertia to {limits.digits_up(found - d.motor.inertia_kgm2, 2):g} kg m2" if found else ""
 
 

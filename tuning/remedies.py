@@ -60,6 +60,12 @@ def widen_range(board: BoardFile, wanted_a: float) -> str:
     return lower_gain(board, 0.99 * board.current_full_scale_a / needed_a)
 
 
+def format_holds(motor: Motor, board: BoardFile, wanted_a: float) -> bool:
+    """Whether the back-EMF's number format takes this current, on a board that measures it."""
+    motor, wider = replace(motor, maximum_current_a=wanted_a), replace(board, current_full_scale_a=max(2.0 * wanted_a, board.current_full_scale_a))
+    return limits.fit_emf(motor, wider, limits.currents(motor, wider)).maximum_a >= 0.999 * wanted_a
+
+
 def lower_gain(board: BoardFile, factor: float) -> str:
     gain = limits.digits_down(board.quantities["shunt.amplifier_gain"].value_si * factor, 3)
     return f"lower [shunt] amplifier_gain to {gain:g}" if gain >= LEAST_GAIN else ""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import LIBRARY, run, small_sweep, step
 
-from tools.bench import case, loadsteps, lowspeed, plots, reach, simulate
+from tools.bench import case, loadsteps, lowspeed, plots, reach, search, simulate
 from tools.bench.board import Library
 from tools.bench.build import library
 from tools.common import board_file, motor_file, paths, workers
@@ -132,6 +132,14 @@ def test_the_table_ends_with_the_numbers_of_what_is_out_of_reach():
     assert text(rows).endswith("\nx, Kphi x1: needs 14.00 V of 13.00 V") and "friction" not in text(rows[:1])
 
 
+def test_a_row_that_does_not_hold_says_which_load_stops_its_rotor_before_the_drive_answers():
+    why = "the load stops the rotor in 1.78 ms, the drive answers in 2.80 ms"
+    rows = [step_row(unloaded="1 .. 2", angle_error_max_deg=3.0, verdict=verdict, too_quick=why) for verdict in ("ok", "step on: not back in 0.3 s")]
+    text = loadsteps.LoadSteps(STEPS).text
+    assert text(rows).endswith(f"\nwhy others do not hold, friction included:\nx, Kphi x1: {why}") and text(rows).count(why) == 1
+    assert why not in text(rows[:1])
+
+
 # ---- low speed -----------------------------------------------------------------------------------------------------------
 def test_another_motor_gets_the_same_shares_of_its_rating_and_no_speed_below_its_header_s():
     hurst, linix = motor_file.load(HURST), motor_file.load(LINIX)
@@ -189,6 +197,14 @@ def test_each_way_not_to_hold_a_low_speed_is_named(values, text):
     row = slow_row(**values)
     assert lowspeed.LowSpeed(SLOW).verdict(None, row) == text
     assert lowspeed.LowSpeed(SLOW).check(None, row | {"verdict": text})[0].ok == (text == "ok")
+
+
+def test_a_search_that_has_no_value_to_begin_with_goes_on_from_what_is_known():
+    limit = search.Search(False, lambda row: row["verdict"] == "ok", 200.0)
+    for rpm in (200.0, 100.0, 50.0):
+        limit.narrow(rpm, {"verdict": "ok" if rpm > 120.0 else "speed"})
+    search.in_rounds([], {"": limit}, lambda key: key, 2.0, lambda number, wanted: [{"verdict": "ok" if rpm > 120.0 else "speed"} for _, rpm in wanted])
+    assert limit.bad <= 120.0 < limit.good <= 1.02 * limit.bad
 
 
 def test_the_speed_is_compared_with_the_reference_that_the_firmware_had():

@@ -69,6 +69,14 @@ def test_hand_over_is_timed_from_the_last_s2_before_it():
     assert [item.after_s2_s for item in found] == [pytest.approx(0.3, abs=2 * PERIOD_S)]
 
 
+def test_a_hand_over_that_needed_no_s2_says_no_time_after_it():
+    signals = {"fw__state": step((0, 4), (0.8, 5)), "fw__speed_ref_rpm": 1000, "plant__speed_rpm": 1000}
+    (remote,), (pressed,) = (run(text, **signals).hand_overs() for text in ("", S2))
+    assert (remote.after_s2_s, remote.text, pressed.text) == (None, "closed loop", "closed loop 0.70 s after S2")
+    lines = [line for _, line in run("", **signals).protocol()]
+    assert "closed loop, overshoot 0.0 %" in lines and not any("nan" in line for line in lines)
+
+
 def ramp(time_s: np.ndarray) -> np.ndarray:
     return 1000 + 500 * np.maximum(time_s - 0.8, 0)
 

@@ -111,6 +111,16 @@ def test_another_motor_s_header_may_refuse_a_rotor_that_it_is_not_made_for_by_na
     assert [key for key, ok in found.items() if ok] == [(36.0, "START_FAILED")]
 
 
+def test_starts_that_may_fail_are_counted_below_the_table_by_kind():
+    rows = [start(rotor_deg=15.0 * number, inertia=inertia, kind=f"inertia x{inertia:g}", fault="START_FAILED" if fails else None)
+            for inertia, fails in ((9.0, 0), (36.0, 1)) for number in range(3)]
+    lines = start_sweep.Starts(other()).text(rows).splitlines()
+    assert lines[-1].startswith("inertia x36: 3 of 3 starts end in a fault, 3 of them in START_FAILED, which is allowed from 36 times the inertia on")
+    assert "[load] inertia" in lines[-1] and "inertia x9:" not in "\n".join(lines)
+    stalled = start_sweep.Starts(other()).text([start(kind="0.03 N m", fault="STALL")]).splitlines()
+    assert stalled[-1] == "0.03 N m: 1 of 1 starts end in a fault"
+
+
 def test_every_load_and_every_heavy_rotor_comes_from_every_angle():
     cases = STARTS.cases()
     assert len(set(cases)) == len(cases) == 24 * 5 and {(case.load_nm, case.inertia) for case in cases} == {(0.0, 1.0), (0.03, 1.0), (0.06, 1.0), (0.0, 9.0), (0.0, 36.0)}

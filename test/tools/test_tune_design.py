@@ -73,12 +73,12 @@ REFUSED = {
                                       ("MAXIMUM_CURRENT_A = 0.2 must be at least 6.3 %",)),
     "choice in [tune] that breaks a relation": ({"more": "[tune]\nEND_SPEED_RPM = 2700\n"},
                                                 ("[tune]", "END_SPEED_RPM = 2700 must be at most NOMINAL_SPEED_RPM = 2500"))}
-FAST = {"pole_pairs": 7, "rs_ohm": 0.35, "ld_h": 1e-4, "lq_h": 1e-4, "kphi_v_per_krpm": 1.88, "psi_vs": 1.88 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 7),
+FAST = {"pole_pairs": 7, "rs_ohm": 0.45, "ld_h": 3e-4, "lq_h": 3e-4, "kphi_v_per_krpm": 1.8, "psi_vs": 1.8 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 7),
         "coulomb_nm": 2.5e-3, "viscous_nms": 1.5e-6, "rated_torque_nm": 0.025, "rated_current_a": 1.9, "rated_speed_rpm": 10000.0, "start_torque_nm": 0.006,
         "maximum_current_a": 2.6, "inertia_kgm2": 2.5e-6}
 GIMBAL = {"pole_pairs": 7, "rs_ohm": 5.0, "ld_h": 1.5e-3, "lq_h": 1.5e-3, "kphi_v_per_krpm": 40.0, "psi_vs": 40.0 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 7),
           "inertia_kgm2": 1.2e-5, "coulomb_nm": 8e-3, "viscous_nms": 0.0, "rated_torque_nm": 0.18, "rated_current_a": 0.6, "rated_speed_rpm": 130.0, "maximum_speed_rpm": 140.0,
-          "maximum_current_a": 0.9, "start_torque_nm": 0.03, "board": {"current_full_scale_a": 1.3}}
+          "maximum_current_a": 0.9, "start_torque_nm": 0.03, "board": {"current_full_scale_a": 1.3, "adc_bits": 14}}
 WARNED = {
     "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "lower [shunt] amplifier_gain to")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),
@@ -87,8 +87,8 @@ WARNED = {
         ("maximum_current 24 A peak is above 20 A, the firmware's largest", "MAXIMUM_CURRENT_A is 20; lower [rating] maximum_current to 20 A peak$")),
     "maximum current beyond the board": ({"maximum_current_a": 4.2},
                                          ("maximum_current 4.2 A peak is above what this board can measure", "MAXIMUM_CURRENT_A is 3.45")),
-    "rated current beyond the board": ({"rated_current_a": 3.6, "maximum_current_a": 3.4},
-                                       ("rated current 3.6 A peak is above MAXIMUM_CURRENT_A", "amplifier_gain to 71.3 and raise [rating] maximum_current to 3.6 A peak, or")),
+    "rated current beyond the board": ({"rated_current_a": 2.5, "maximum_current_a": 2.3, "board": {"current_full_scale_a": 3.0}},
+                                       ("rated current 2.5 A peak is above MAXIMUM_CURRENT_A = 2.3", "amplifier_gain to 70 and raise [rating] maximum_current to 2.5 A peak, or")),
     "rated current beyond the motor's own maximum": ({"rated_current_a": 2.8, "maximum_current_a": 2.7},
                                                      ("rated current 2.8 A peak is above MAXIMUM_CURRENT_A = 2.7", "; raise [rating] maximum_current to 2.8 A peak, or lower")),
     "rated current beyond the firmware's range": (
@@ -99,11 +99,11 @@ WARNED = {
     "torque that is far more than the current gives": ({"rated_torque_nm": 0.125}, ("the rated torque is 0.12 N m: one of the three is wrong",)),
     "largest current beyond the back-EMF's format": ({"rs_ohm": 6.0, "rated_torque_nm": 0.04, "rated_current_a": 0.7, "rated_speed_rpm": 1800.0},
                                                      ("leave the back-EMF's number format", "lower [rating] maximum_current to")),
-    "maximum speed that more current reaches": ({"changes": (("value = 5000", "value = 5900"),), "maximum_current_a": 1.9, "rated_torque_nm": 0.07, "rated_current_a": 1.4},
-                                                ("maximum_speed 5900 rpm is not reachable", "raise [rating] maximum_current to")),
+    "maximum speed that more current reaches": ({"changes": (("value = 5000", "value = 4800"),), "maximum_current_a": 1.9, "rated_torque_nm": 0.07, "rated_current_a": 1.4},
+                                                ("maximum_speed 4800 rpm is not reachable", "raise [rating] maximum_current to")),
     "light rotor that a load stops": ({"changes": (("value = 5.5e-6", "value = 2e-6"),)},
                                       ("MINIMUM_SPEED_RPM = 150: a load of 0.08 N m that comes within 0.5 s stops the rotor there", "set MINIMUM_SPEED_RPM to")),
-    "rotor so light that no speed holds": (GIMBAL, ("held at no speed up to NOMINAL_SPEED_RPM", "; raise [load] inertia to")),
+    "rotor so light that no speed holds": (GIMBAL, ("stops so light a rotor at every speed up to NOMINAL_SPEED_RPM = 130", "; raise [load] inertia to")),
     "swing that a tuned lock leaves": ({"changes": NO_FRICTION, "more": "[tune]\nLOCK_TIME = 4000\n"}, ("the unloaded rotor still swings by", "remove LOCK_TIME from [tune]")),
     "swing that a small inductance feeds": ({"changes": (*SMALL_MOTOR, ("value = 1.92", "value = 0.1"))}, ("feeds the swing", "by chokes in the motor's leads")),
     "heavy load's slow reference": ({"more": INERTIA % "3e-3"}, ("SPEEDREFRAMP_RPM_PER_S = 76: 33 s to the rated speed", "at most 30% of rated torque")),
@@ -142,6 +142,29 @@ def test_beyond_32000_electrical_rpm_the_back_emf_s_filter_follows_the_frequency
     assert quick.scales.speed_unit == 4.0 and quick.value("NOMINAL_SPEED_RPM") == 10000.0
     slow = design(motor_file.load("maxon_ec45flat_30w_24v"), BOARD) # 507 Hz
     assert slow.scales.speed_unit == 1.0 and slow.value("KFILTER_ESDQ") == 2000.0 and slow.value("SPEEDREFRAMP_RPM_PER_S") > 1000.0
+
+
+def test_beyond_32000_electrical_rpm_a_heavy_rotor_s_reference_rises_by_torque_and_not_by_friction():
+    """A propeller's and a vehicle's: 2.5 rpm/s would be an hour of motor time."""
+    spindle = motor_file.load("spindle_7pp_24v_10000")
+    heavy = design(replace(spindle, load_inertia_kgm2=7.5e-6), BOARD)
+    by_torque = 0.3 * spindle.rated_torque_nm / 1e-5 / limits.RPM
+    assert 0.9 * by_torque < heavy.value("SPEEDREFRAMP_RPM_PER_S") <= by_torque
+    friction_rpm_s = heavy.envelope.friction_nm(5000.0) / 1e-5 / limits.RPM
+    assert heavy.value("SPEEDREFRAMP_RPM_PER_S") > 3.0 * 0.4 * friction_rpm_s
+
+
+def test_a_motor_for_mains_voltage_is_told_what_it_needs_and_not_to_turn_at_one_rpm():
+    washer = {"rs_ohm": 20.0, "ld_h": 20e-3, "lq_h": 20e-3, "kphi_v_per_krpm": 12.0, "psi_vs": 12.0 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 5), "rated_speed_rpm": 1500.0,
+              "rated_current_a": 2.0, "maximum_current_a": 2.5, "rated_torque_nm": 0.19}
+    with pytest.raises(UserError) as caught:
+        made(**washer)
+    said = str(caught.value)
+    assert "24 V are too low for 1500 rpm at half the rated torque" in said and "rated speed to" not in said, said
+    needed = float(re.search(r"raise the supply voltage to ([\d.]+) V$|the motor needs ([\d.]+) V", said).group(1) or 0.0)
+    assert 40.0 < needed <= 60.0, said
+    with pytest.raises(UserError, match="the motor needs [0-9]+ V, the firmware's supply ends at 60 V: take another winding"):
+        made(**washer | {"rs_ohm": 38.0, "ld_h": 29e-3, "lq_h": 29e-3})
 
 
 def test_remedies_for_a_speed_that_would_wander_are_enough_and_hardly_more():

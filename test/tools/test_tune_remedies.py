@@ -1,6 +1,7 @@
 """Each warning of the tuner names a key and a value, and each of its ways is tried: with the change the warning is gone."""
 
 import ast
+import functools
 import inspect
 import re
 from dataclasses import replace
@@ -43,6 +44,8 @@ def changed(one: str, motor: motor_file.Motor, board: board_file.BoardFile) -> P
         return replace(motor, tune={name: value for name, value in motor.tune.items() if name != removed[1]}), board
     if one == "raise the supply voltage":
         return motor, with_supply(board, 1.3 * board.nominal_bus_v)
+    if chokes := re.match(rf"raise \[electrical\] inductance to {NUMBER} mH phase", one):
+        return replace(motor, ld_h=1e-3 * float(chokes[1]), lq_h=1e-3 * float(chokes[1])), board
     if one == "remove [load] inertia":
         return replace(motor, load_inertia_kgm2=0.0), board
     if found := re.fullmatch(rf"(?:raise|lower|set|measure|add|)\s?(the supply voltage|the rated speed|\[\w+\] \w+)(?: to|, which the no-load current gives:| at) {NUMBER}(?: .*)?", one):
@@ -64,37 +67,32 @@ def after(way: str, motor: motor_file.Motor, board: board_file.BoardFile) -> Des
     return design(motor, board)
 
 
-def about(name: str) -> tuple[Parts, str]:
-    """A motor with its board, and the warning that it is an example of."""
-    words, says = WARNED[name]
-    both = parts(**words)
-    return both, next(warning for warning in design(*both).warnings if all(part in f"{warning}$" for part in says))
+@functools.cache
+def example(name: str) -> tuple[Parts, list[str], set[str]]:
+    """A motor with its board, its warnings, and the functions that made them."""
+    makers, made, both = set(), design_warnings.warning, parts(**WARNED[name][0])
+
+    def noted(what: str, *more: str) -> str:
+        makers.add(inspect.stack()[1].function)
+        return made(what, *more)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(design_warnings, "warning", noted)
+        return both, design(*both).warnings, makers
 
 
 @pytest.mark.parametrize("name", WARNED)
 def test_after_each_change_that_a_warning_names_it_is_gone(name):
-    both, warning = about(name)
-    offered = ways(warning)
-    assert "; " in warning and offered, warning
-    for way in offered:
-        if way.startswith("by make"):
-            continue
-        left = after(way, *both).warnings
-        assert kind(warning) not in map(kind, left), f"{way}: {left}"
+    both, warnings, _ = example(name)
+    warning = next(warning for warning in warnings if all(part in f"{warning}$" for part in WARNED[name][1]))
+    assert "; " in warning, warning
+    for way in ways(warning):
+        if not way.startswith("by make"):
+            left = after(way, *both).warnings
+            assert kind(warning) not in map(kind, left), f"{way}: {left}"
 
 
-def test_every_warning_that_the_tuner_has_is_among_them(monkeypatch):
-    """The lines of design_warnings.py that made one, and those that could."""
+def test_every_warning_that_the_tuner_has_is_among_them():
     tree = ast.parse(inspect.getsource(design_warnings))
     functions = {function.name for function in ast.walk(tree) if isinstance(function, ast.FunctionDef)
                  for call in ast.walk(function) if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "warning"}
-    found = set()
-
-    def noted(what: str, *more: str) -> str:
-        found.add(inspect.stack()[1].function)
-        return made(what, *more)
-    made = design_warnings.warning
-    monkeypatch.setattr(design_warnings, "warning", noted)
-    for words, _ in WARNED.values():
-        design(*parts(**words))
-    assert functions - found == set()
+    assert functions - set().union(*(example(name)[2] for name in WARNED)) == set()

@@ -1,0 +1,48 @@
+"""A load that comes at low speed, on the tuner's model: what it holds, and that it is what the virtual board holds."""
+
+from dataclasses import replace
+
+import pytest
+from tune_support import HURST, designed, of
+
+from tools.bench import lowspeed
+from tools.bench.board import Library
+from tools.bench.build import library
+from tools.common import board_file, motor_file, paths
+from tuning import load_onset
+
+LIGHT = ("value = 5.5e-6", "value = 2e-6")
+TORQUE_NM = 0.08
+
+
+def test_the_delivered_motors_of_the_table_are_held_at_their_minimum_speed_but_for_two_whose_windings_have_little_resistance():
+    """`make lowspeed`: the Linix holds its rated torque from 276 rpm on, the larger Hurst from 182."""
+    found = {name: load_onset.holds(of(name), of(name).value("MINIMUM_SPEED_RPM"), load_onset.asked_nm(of(name)))
+             for name in (HURST, "maxon_ec45flat_30w_24v", "anaheim_bly172s_24v_4000", "linix_45zwn24_40", "hurst_dma0204024b101")}
+    assert found == {HURST: True, "maxon_ec45flat_30w_24v": True, "anaheim_bly172s_24v_4000": True, "linix_45zwn24_40": False, "hurst_dma0204024b101": False}
+    assert 260.0 <= load_onset.lowest_rpm(of("linix_45zwn24_40"), 0.0924) <= 290.0 and 175.0 <= load_onset.lowest_rpm(of("hurst_dma0204024b101"), 0.16) <= 195.0
+
+
+def test_a_lighter_rotor_a_larger_or_a_quicker_load_needs_more_speed():
+    usual, light = designed(), designed(LIGHT)
+    lowest = load_onset.lowest_rpm(light, TORQUE_NM)
+    assert load_onset.lowest_rpm(light, 0.25 * TORQUE_NM) < lowest and load_onset.lowest_rpm(usual, TORQUE_NM) < lowest
+    assert not load_onset.held(light, 150.0, TORQUE_NM) and load_onset.held(light, 150.0, TORQUE_NM, over_s=8.0)
+    assert load_onset.held(light, 150.0, TORQUE_NM, inertia=2e-5)
+    assert 0.0 < load_onset.most_nm(light, 150.0, TORQUE_NM) < TORQUE_NM == load_onset.most_nm(usual, 150.0, TORQUE_NM)
+
+
+def test_what_is_asked_for_is_the_rated_torque_as_far_as_the_current_allows():
+    d = designed()
+    assert load_onset.asked_nm(d) == d.motor.rated_torque_nm
+    weak = replace(d, motor=replace(d.motor, rated_torque_nm=1.0))
+    assert load_onset.asked_nm(weak) == pytest.approx(0.85 * 2.75 * d.motor.kt_nm_per_a)
+
+
+def test_the_virtual_board_holds_the_speed_that_the_model_names_and_not_two_thirds_of_it():
+    table = replace(lowspeed.Table.read(paths.TABLES / "lowspeed.toml"), measure_s=2.0)
+    bench = lowspeed.LowSpeed(table, motor_file.part(HURST), board_file.part("mclv"), Library(library(["PARAMS_IN_RAM"])), quiet=True)
+    minimum = replace(of(HURST).choices["MINIMUM_SPEED_RPM"], text="60")
+    named = load_onset.lowest_rpm(replace(of(HURST), choices=of(HURST).choices | {"MINIMUM_SPEED_RPM": minimum}), TORQUE_NM)
+    rows = bench.run([(named, TORQUE_NM), (named / 1.5, TORQUE_NM)], "low")
+    assert rows[0]["verdict"] == "ok" and rows[1]["verdict"] != "ok", (named, rows)
