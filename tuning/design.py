@@ -1,10 +1,8 @@
 """From a motor and a board to every parameter of userparams.h, with the reason for each, the constants, the margins and the warnings."""
 
-import functools
 import math
 import re
-from dataclasses import dataclass, field, replace
-from decimal import Decimal
+from dataclasses import replace
 
 from tools.common import paths
 from tools.common.board_file import BoardFile
@@ -13,7 +11,8 @@ from tools.common.motor_file import FACTS, Motor
 from tools.common.param_rows import FOLLOWS, number, parameters
 
 from . import constants, design_warnings, fw_tables, limits, loops, remedies, start
-from .constants import Constant, number_of
+from .constants import number_of
+from .design_result import Design, maximum_speed, plain, range_of, real, short, spread_of
 from .limits import RPM, Envelope
 
 ESDQ_HZ = 200.49
@@ -44,144 +43,6 @@ BOARD_KEYS = {"NOMINAL_BUS_V": "supply.voltage", "LOOPTIME_SEC": "pwm.period", "
 """Parameters that the board file alone decides, with the key that they come from."""
 SALIENT_FROM = number("PARAM_SALIENT_FROM")
 ACCEL_MOST, ACCEL_LEAST = number("PARAM_ACCEL_MOST"), number("PARAM_ACCEL_LEAST")
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One parameter: the text that stands in the header, and why."""
-
-    name: str
-    text: str
-    why: str
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Numbers that the scaling headers make of motor and board."""
-
-    invkfi: float
-    """counts of 1/Kphi"""
-    ampere_per_volt: float
-    """I0/U0"""
-    pterm_per_hz: float
-    iterm_per_hz: float
-    speed_pterm_per_hz: float
-    acceleration: float
-    """of a count of current, counts of speed in a slow step"""
-    large_counts: float
-    """innovation that the load observer calls large, counts of speed"""
-    count_a: float
-    """a count of current"""
-    lost_counts: float
-    """current that dead time loses, in counts of count_a"""
-    speed_unit: float
-    """electrical rpm of a count of speed"""
-
-
-@dataclass
-class Design:
-    """A finished design."""
-
-    motor: Motor
-    board: BoardFile
-    envelope: Envelope
-    choices: dict[str, Choice] = field(default_factory=dict)
-    constants: list[Constant] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    start_risks: list[str] = field(default_factory=list)
-    """those of the warnings that tell why the motor may not start"""
-    current_loop: loops.LoopDesign | None = None
-    speed_loop: loops.LoopDesign | None = None
-    start_up: start.StartDesign | None = None
-    tables_from: str = ""
-    """where the field-weakening tables come from"""
-    tuned_by_machine: bool = False
-    calm_hz: float = 0.0
-    """speed bandwidth that the lowest speed and the load observer allow"""
-    gains: loops.Gains | None = None
-    """of the current loops"""
-
-    @functools.cached_property
-    def scales(self) -> Scales:
-        """What the header makes of motor and board; asked for when their parameters are chosen."""
-        top_rpm = self.motor.tune.get("MAXIMUM_SPEED_RPM", _maximum_speed(self)[0])
-        return Scales(*constants.evaluate(self.params | {"CURRENT_BANDWIDTH_HZ": "1", "SPEED_BANDWIDTH_HZ": "1", "MAXIMUM_SPEED_RPM": plain(top_rpm)},
-                                          "PARAM_INVKFI", "PARAM_IU", "Q_CURRCNTR_PTERM", "Q_CURRCNTR_ITERM", "SPEEDCNTR_PTERM", "PARAM_ACCEL",
-                                          "SPEED_COUNTS(PARAM_LARGE_ERPM)", "4.0F * PARAM_F(NORM_CURRENT_CONST)", "PARAM_LOST_CURRENT_Q13", "SPEED_UNIT"))
-
-    @property
-    def params(self) -> dict[str, str]:
-        """Every define by name, as text."""
-        return {name: choice.text for name, choice in self.choices.items()}
-
-    def value(self, name: str) -> float:
-        return number_of(self.choices[name].text)
-
-    @property
-    def inertia_kgm2(self) -> float:
-        """Rotor and load."""
-        return self.motor.inertia_kgm2 + self.motor.load_inertia_kgm2
-
-    @property
-    def nominal_erpm(self) -> float:
-        """Where NOMINAL_SPEED_RPM ends."""
-        return limits.LARGEST_NOMINAL_ERPM * self.scales.speed_unit
-
-    def put(self, name: str, text: str, why: str) -> None:
-        """Sets a parameter, unless the motor file's [tune] says otherwise."""
-        if name in self.motor.tune:
-            text, why = plain(self.motor.tune[name]), "the motor file's [tune]"
-        self.choices[name] = Choice(name, text, why)
-
-    @property
-    def plant(self) -> loops.Plant:
-        m = self.motor
-        return loops.Plant(m.rs_ohm, m.ld_h, m.lq_h, m.psi_vs, m.pole_pairs, self.inertia_kgm2, m.viscous_nms)
-
-    @property
-    def filter_gains(self) -> loops.Gains:
-        """The back-EMF's filter; no controllers yet."""
-        return loops.Gains(0.0, 0.0, 0.0, 0.0, 0.0, self.value("KFILTER_ESDQ") / 32768.0, self.board.pwm_period_s)
-
-    def current_loop_at(self, top_rpm: float) -> loops.LoopDesign:
-        """The current loops of this motor with a top speed."""
-        low, high = _range("CURRENT_BANDWIDTH_HZ")
-        largest = min(high, 0.98 / self.scales.pterm_per_hz, 15.7 / self.scales.iterm_per_hz)
-        return loops.design_current(self.plant, spread_of(self.motor), self.filter_gains, self.envelope.omega(top_rpm), largest, low,
-                                    self.motor.tune.get("CURRENT_BANDWIDTH_HZ"))
-
-    def start_of(self, motor: Motor, maximum_a: float) -> start.StartDesign:
-        """The start of this motor, or of a changed one, with current loops of this bandwidth."""
-        plant = replace(self.plant, ld=motor.ld_h, lq=motor.lq_h)
-        gains = loops.current_gains(plant, self.value("CURRENT_BANDWIDTH_HZ"), self.filter_gains)
-        return start.design_start(motor, self.board, plant, gains, maximum_a, self.value("OVER_CURRENT_THRESHOLD_A"), self.value("NOMINAL_SPEED_RPM"),
-                                  motor.tune)
-
-    def constant(self, name: str) -> Constant:
-        return next(item for item in self.constants if item.name == name)
-
-    def where(self, key: str) -> str:
-        """Line of the motor file that a message is about."""
-        quantity = self.motor.quantities.get(key) or self.motor.quantities.get(f"{key}_q")
-        return quantity.where if quantity else str(paths.shown(self.motor.path))
-
-
-def plain(value: float, digits: int = 6) -> str:
-    """A decimal number without exponent."""
-    return format(Decimal(f"{value:.{digits}g}"), "f")
-
-
-def real(value: float, digits: int = 6) -> str:
-    """The same with a point, so that it reads as a physical value."""
-    text = plain(value, digits)
-    return text if "." in text else text + ".0"
-
-
-def short(value: float, digits: int = 4) -> str:
-    """With an exponent where that is shorter: 5.5e-6."""
-    text = f"{value:.{digits}g}"
-    mantissa, sign, exponent = text.partition("e")
-    return f"{mantissa}e{int(exponent)}" if sign else text
 
 
 def design(motor: Motor, board: BoardFile) -> Design:
@@ -261,7 +122,7 @@ def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> st
 def _refuse_kphi(d: Design) -> None:
     """1/Kphi has 16 bits: the electrical speed at full voltage must be 2048 .. 65534 counts."""
     counts = d.scales.invkfi
-    least = _range("INVKFI_SPEED0")[0]
+    least = range_of("INVKFI_SPEED0")[0]
     if counts < least:
         needed_v = math.ceil(d.board.nominal_bus_v * least / counts)
         end = "" if needed_v <= remedies.MOST_SUPPLY_V else f", but the firmware's supply ends at {remedies.MOST_SUPPLY_V:g} V: take another winding"
@@ -339,7 +200,7 @@ def _board(d: Design) -> None:
                        ("SAMPLE_WINDOW_SEC", plain(b.sample_window_s)), ("OVER_VOLTAGE_V", real(b.over_voltage_v)),
                        ("UNDER_VOLTAGE_V", real(b.under_voltage_v)), ("REGEN_LIMIT_V", real(b.regen_limit_v))):
         d.put(name, text, "board file")
-    esdq_hz = max(ESDQ_HZ, ESDQ_SHARE * _maximum_speed(d)[0] * d.motor.pole_pairs / 60.0)
+    esdq_hz = max(ESDQ_HZ, ESDQ_SHARE * maximum_speed(d)[0] * d.motor.pole_pairs / 60.0)
     d.put("KFILTER_ESDQ", str(constants.filter_k(esdq_hz, b.pwm_period_s)), f"{esdq_hz:.0f} Hz at this PWM period" + (
         "" if esdq_hz == ESDQ_HZ else f", {ESDQ_SHARE:g} of the top electrical frequency") + "; at low speed the firmware lowers it")
     d.put("KFILTER_ESDQ_FW", str(constants.filter_k(esdq_hz, b.pwm_period_s)),
@@ -357,21 +218,11 @@ def _rise_s(m: Motor) -> float:
 
 # ---- speeds and currents -------------------------------------------------------------------------------------------------------
 
-def _maximum_speed(d: Design) -> tuple[float, str]:
-    """MAXIMUM_SPEED_RPM, and why."""
-    m = d.motor
-    most_rpm = math.floor(limits.largest_erpm(d.board.pwm_period_s) / m.pole_pairs)
-    reachable = limits.digits_down(max(d.envelope.highest_speed(0.0, limits.REACH_SHARE), 1.0), 3)
-    maximum = min(m.maximum_speed_rpm, most_rpm, max(reachable, m.rated_speed_rpm))
-    return math.floor(maximum), ("motor file's maximum_speed" if maximum == m.maximum_speed_rpm else
-                                 "electrical speed's end" if maximum == most_rpm else "what field weakening reaches without load")
-
-
 def _speeds(d: Design) -> None:
     m = d.motor
     nominal = min(m.rated_speed_rpm, math.floor(d.nominal_erpm / m.pole_pairs))
     d.put("NOMINAL_SPEED_RPM", plain(nominal), "rated speed" + ("" if nominal == m.rated_speed_rpm else f", lowered to {d.nominal_erpm:.0f} electrical rpm"))
-    maximum, why = _maximum_speed(d)
+    maximum, why = maximum_speed(d)
     d.put("MAXIMUM_SPEED_RPM", plain(maximum), why)
     inertia = m.inertia_kgm2 + m.load_inertia_kgm2
     slope = min(m.rated_speed_rpm / REFERENCE_RISE_S, REFERENCE_TORQUE_SHARE * m.rated_torque_nm / inertia / RPM, 60000.0)
@@ -408,22 +259,7 @@ def _currents(d: Design, currents: limits.Currents) -> None:
           f"no more than {abs(useful):.2f} A, beyond which d current asks for more voltage than it saves with {1.0 - TRIM_WEAK_FLUX:.0%} less flux")
 
 
-def _range(name: str) -> tuple[float, float]:
-    row = parameters()[name]
-    return float(row.low), float(row.high)
-
-
 # ---- loops and start -----------------------------------------------------------------------------------------------------------
-
-def spread_of(motor: Motor) -> dict[str, tuple[float, float]]:
-    """The motor file's published spread as factors."""
-    found = {}
-    for key, name, nominal in (("rs_ohm", "rs", motor.rs_ohm), ("ls_h", "ls", motor.lq_h), ("kphi_v_per_krpm", "psi", motor.kphi_v_per_krpm)):
-        if key in motor.spread:
-            low, high = motor.spread[key]
-            found[name] = (low / nominal, high / nominal)
-    return found
-
 
 def _loops_and_start(d: Design) -> None:
     m, period = d.motor, d.board.pwm_period_s
@@ -450,7 +286,7 @@ def _loops_and_start(d: Design) -> None:
 def _speed_loop(d: Design, gains: loops.Gains) -> None:
     m, names = d.motor, {"minimum speed": "MINIMUM_SPEED_RPM", "nominal speed": "NOMINAL_SPEED_RPM", "maximum speed": "MAXIMUM_SPEED_RPM"}
     speeds = {label: d.envelope.omega(d.value(name)) for label, name in names.items()}
-    (low, high), (least_load, most_load) = _range("SPEED_BANDWIDTH_HZ"), _range("LOAD_BANDWIDTH_HZ")
+    (low, high), (least_load, most_load) = range_of("SPEED_BANDWIDTH_HZ"), range_of("LOAD_BANDWIDTH_HZ")
     quickest = loops.load_bandwidth(gains, constants.filter_hz(d.value("KFILTER_ESDQ"), gains.period_s), d.value("CURRENT_BANDWIDTH_HZ"))
     calm = loops.calm_load_bandwidth(d.scales.large_counts, d.scales.acceleration, d.value("MAXIMUM_CURRENT_A") / d.scales.count_a, gains.period_s)
     cap = loops.speed_cap(_friction_over_lost(d))
@@ -481,7 +317,7 @@ def _refuse_hidden(d: Design) -> None:
     if not 0.0 < ratio < least:
         return
     dead_s, chokes_mh = 0.999 * d.board.dead_time_s * ratio / least, d.motor.lq_h * 1e3 * (least / ratio - 1.0)
-    shorter = f"[pwm] dead_time of {limits.digits_down(dead_s, 2) * 1e6:g} us, or " if dead_s >= _range("DEADTIME_SEC")[0] else ""
+    shorter = f"[pwm] dead_time of {limits.digits_down(dead_s, 2) * 1e6:g} us, or " if dead_s >= range_of("DEADTIME_SEC")[0] else ""
     raise UserError(f"dead time loses {lost_a:.2g} A, friction takes only {ratio * lost_a:.2g} A: without load the speed would wander", d.board.quantities["pwm.dead_time"].where,
                     f"{shorter}chokes of {limits.digits_up(1.001 * chokes_mh, 2):g} mH in each phase, added to the motor's inductance")
 
@@ -498,7 +334,7 @@ def _refuse_coarse(d: Design) -> None:
 
 def _refuse_inertia(d: Design, gain_at_1_hz: float) -> None:
     """The speed gain grows with the inertia: at the least bandwidth it must still fit its number."""
-    least_hz, _ = _range("SPEED_BANDWIDTH_HZ")
+    least_hz, _ = range_of("SPEED_BANDWIDTH_HZ")
     if gain_at_1_hz * least_hz >= 1.0 and "SPEED_BANDWIDTH_HZ" not in d.motor.tune:
         inertia = d.value("MOTOR_INERTIA_KGM2")
         raise UserError(f"the speed gain exceeds its Q format with {inertia:.3g} kg m2 even at SPEED_BANDWIDTH_HZ = {least_hz:g}",

@@ -3,16 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from tools.common.motor_file import Motor
 
 from . import limits, load_onset, remedies, start
+from .design_result import Design
 from .limits import Envelope
 from .remedies import either
-
-if TYPE_CHECKING:
-    from .design import Design
 
 ROUNDING_LIMIT_PERCENT = 0.1
 MOTOR_CONSTANTS = {"adaptation.rs_base_q16": "MOTOR_RS_OHM", "fieldweak.ls_base_q16": "MOTOR_LS_MH", "NORM_INVKFIBASE": "MOTOR_KPHI_V_PER_KRPM"}
@@ -29,12 +26,12 @@ HEAVIER_FACTORS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 36.0)
 KPHI_FACTORS = {math.sqrt(2.0): "peak and RMS", math.sqrt(3.0): "line to line and phase"}
 
 
-def of_numbers(d: "Design", currents: limits.Currents) -> list[str]:
+def of_numbers(d: Design, currents: limits.Currents) -> list[str]:
     """Of the sheet's numbers, the board's and the formats'."""
     return [*_torque(d), *_currents(d, currents), *_speeds(d), *_numbers(d)]
 
 
-def of_running(d: "Design") -> list[str]:
+def of_running(d: Design) -> list[str]:
     """What makes the motor slow, or lets it down under load."""
     return [*_slow_loop(d), *_slow_ramp(d), *_held(d)]
 
@@ -53,7 +50,7 @@ def shaft_nm(m: Motor, ampere: float) -> float:
     return most - e.friction_nm(m.rated_speed_rpm)
 
 
-def _torque(d: "Design") -> list[str]:
+def _torque(d: Design) -> list[str]:
     """kphi, current and torque are one too many: two of them give the third."""
     m = d.motor
     given_nm, friction_nm = shaft_nm(m, m.rated_current_a), Envelope(m, math.inf, 1.0).friction_nm(m.rated_speed_rpm)
@@ -70,11 +67,11 @@ def _torque(d: "Design") -> list[str]:
 
 
 # ---- currents ----------------------------------------------------------------------------------------------------------------
-def _currents(d: "Design", currents: limits.Currents) -> list[str]:
+def _currents(d: Design, currents: limits.Currents) -> list[str]:
     return [*_largest_current(d, currents), *_rated_current(d, currents)]
 
 
-def _largest_current(d: "Design", currents: limits.Currents) -> list[str]:
+def _largest_current(d: Design, currents: limits.Currents) -> list[str]:
     """Board, parameter or number format may allow less than the motor."""
     m, most = d.motor, currents.maximum_a
     lower = remedies.maximum_current(m, "lower", limits.digits_down(most, 3))
@@ -89,7 +86,7 @@ def _largest_current(d: "Design", currents: limits.Currents) -> list[str]:
     return []
 
 
-def _format_ways(d: "Design", currents: limits.Currents) -> list[str]:
+def _format_ways(d: Design, currents: limits.Currents) -> list[str]:
     """A lower top speed or a higher supply voltage with which the format holds the whole current."""
     m, b, wanted = d.motor, d.board, limits.currents(d.motor, d.board)
 
@@ -109,7 +106,7 @@ def _format_ways(d: "Design", currents: limits.Currents) -> list[str]:
     return ways
 
 
-def _rated_current(d: "Design", currents: limits.Currents) -> list[str]:
+def _rated_current(d: Design, currents: limits.Currents) -> list[str]:
     m, most = d.motor, currents.maximum_a
     if m.rated_current_a <= most:
         return []
@@ -125,11 +122,11 @@ def _rated_current(d: "Design", currents: limits.Currents) -> list[str]:
 
 
 # ---- speeds ------------------------------------------------------------------------------------------------------------------
-def _speeds(d: "Design") -> list[str]:
+def _speeds(d: Design) -> list[str]:
     return [*_rated_torque(d), *_top_speed(d), *_nominal_speed(d), *_inductance(d)]
 
 
-def _rated_torque(d: "Design") -> list[str]:
+def _rated_torque(d: Design) -> list[str]:
     m, e, volt = d.motor, d.envelope, d.board.nominal_bus_v
     torque = e.torque(m.rated_speed_rpm, limits.FULL_SHARE)
     if torque >= 0.99 * m.rated_torque_nm or e.iq(m.rated_speed_rpm, m.rated_torque_nm) > e.maximum_a:
@@ -140,7 +137,7 @@ def _rated_torque(d: "Design") -> list[str]:
                     remedies.lower_rated_speed(max(e.highest_speed(m.rated_torque_nm, limits.FULL_SHARE), 1.0), m))]
 
 
-def _top_speed(d: "Design") -> list[str]:
+def _top_speed(d: Design) -> list[str]:
     m, e, most = d.motor, d.envelope, d.value("MAXIMUM_SPEED_RPM")
     if most >= math.floor(m.maximum_speed_rpm):
         return []
@@ -160,7 +157,7 @@ def _top_speed(d: "Design") -> list[str]:
     return [warning(f"{what}: {d.board.nominal_bus_v:g} V and {e.maximum_a:g} A reach no more", remedies.raise_supply(remedies.least_supply(e, d.board, reaches)), more, lower)]
 
 
-def _nominal_speed(d: "Design") -> list[str]:
+def _nominal_speed(d: Design) -> list[str]:
     m, nominal = d.motor, d.value("NOMINAL_SPEED_RPM")
     if nominal >= m.rated_speed_rpm:
         return []
@@ -168,7 +165,7 @@ def _nominal_speed(d: "Design") -> list[str]:
                     f"lower the rated speed to {nominal:g} rpm")]
 
 
-def _inductance(d: "Design") -> list[str]:
+def _inductance(d: Design) -> list[str]:
     m, measured = d.motor, d.motor.inductance_frequency_hz
     hz = m.rated_speed_rpm * m.pole_pairs / 60.0
     if measured is None or 1.0 / L_FREQUENCY_RATIO <= measured / hz <= L_FREQUENCY_RATIO:
@@ -179,11 +176,11 @@ def _inductance(d: "Design") -> list[str]:
 
 
 # ---- number formats ------------------------------------------------------------------------------------------------------------
-def _numbers(d: "Design") -> list[str]:
+def _numbers(d: Design) -> list[str]:
     return [*_rounding(d), *_derivative(d)]
 
 
-def _rounding(d: "Design") -> list[str]:
+def _rounding(d: Design) -> list[str]:
     found = []
     for name, parameter in MOTOR_CONSTANTS.items():
         item = d.constant(name)
@@ -195,7 +192,7 @@ def _rounding(d: "Design") -> list[str]:
     return found
 
 
-def _derivative(d: "Design") -> list[str]:
+def _derivative(d: Design) -> list[str]:
     found, m = [], d.motor
     fast = d.constant("svm.turn_q13").value / (2.0 * d.value("NORM_CURRENT_CONST"))
     slow = fast * d.constant("estimator.nominal_erpm").value / d.value("MAXIMUM_SPEED_RPM")
@@ -208,7 +205,7 @@ def _derivative(d: "Design") -> list[str]:
 
 
 # ---- loops -------------------------------------------------------------------------------------------------------------------
-def margins(d: "Design") -> list[str]:
+def margins(d: Design) -> list[str]:
     """Loops that have less than is asked of them, which may cost the start."""
     found = []
     for what, loop, name in (("current", d.current_loop, "CURRENT_BANDWIDTH_HZ"), ("speed", d.speed_loop, "SPEED_BANDWIDTH_HZ")):
@@ -221,7 +218,7 @@ def margins(d: "Design") -> list[str]:
     return found
 
 
-def _slower_top(d: "Design") -> str:
+def _slower_top(d: Design) -> str:
     """A top speed whose rotation leaves the current loop its margin."""
     m, top = d.motor, d.value("MAXIMUM_SPEED_RPM")
     rpm = limits.halved(lambda rpm: d.current_loop_at(rpm).reached, 0.0, top, 6)
@@ -232,7 +229,7 @@ def _slower_top(d: "Design") -> str:
     return lower and f"{lower} and [rating] maximum_speed to {limits.digits_down(rpm, 2):g} rpm"
 
 
-def _lighter(d: "Design", factor: float) -> str:
+def _lighter(d: Design, factor: float) -> str:
     """This much of the inertia, where that leaves more than the rotor."""
     m = d.motor
     load = (m.inertia_kgm2 + m.load_inertia_kgm2) * factor - m.inertia_kgm2
@@ -241,7 +238,7 @@ def _lighter(d: "Design", factor: float) -> str:
     return f"lower [load] inertia to {limits.digits_down(load, 2):g} kg m2" if load > 1e-9 else "remove [load] inertia"
 
 
-def _slow_loop(d: "Design") -> list[str]:
+def _slow_loop(d: Design) -> list[str]:
     loop = d.speed_loop
     if not loop or not loop.reached or loop.bandwidth_hz >= 0.5 * d.calm_hz:
         return []
@@ -252,7 +249,7 @@ def _slow_loop(d: "Design") -> list[str]:
                     f"{1.0 / loop.bandwidth_hz:.2g} s", way)]
 
 
-def _slow_ramp(d: "Design") -> list[str]:
+def _slow_ramp(d: Design) -> list[str]:
     """A reference that takes long says why, and what makes it quicker."""
     rpm_s = d.value("SPEEDREFRAMP_RPM_PER_S")
     seconds = d.motor.rated_speed_rpm / rpm_s
@@ -263,7 +260,7 @@ def _slow_ramp(d: "Design") -> list[str]:
     return [warning(f"SPEEDREFRAMP_RPM_PER_S = {rpm_s:g}: {seconds:.0f} s to the rated speed ({d.choices['SPEEDREFRAMP_RPM_PER_S'].why})", _lighter(d, 0.98 * LONG_RAMP_S / seconds), way)]
 
 
-def _held(d: "Design") -> list[str]:
+def _held(d: Design) -> list[str]:
     """What the shaft may carry at the lowest speed, on the speed loop's own model."""
     m, least = d.motor, d.value("MINIMUM_SPEED_RPM")
     torque = load_onset.asked_nm(d)
@@ -277,7 +274,7 @@ def _held(d: "Design") -> list[str]:
                     + (f"{held_nm:.2g} N m are held" if held_nm > 0.0 else "none is held"), f"set MINIMUM_SPEED_RPM to {rpm:g} in [tune]")]
 
 
-def _heavier(d: "Design", load_nm: float) -> str:
+def _heavier(d: Design, load_nm: float) -> str:
     """More inertia that gives the drive the time which it needs at the nominal speed."""
     heavy = (factor * d.inertia_kgm2 for factor in HEAVIER_FACTORS)
     found = next((inertia for inertia in heavy if load_onset.holds(d, d.value("NOMINAL_SPEED_RPM"), load_nm, inertia)), None)
@@ -285,7 +282,7 @@ def _heavier(d: "Design", load_nm: float) -> str:
 
 
 # ---- start -------------------------------------------------------------------------------------------------------------------
-def of_start(d: "Design") -> list[str]:
+def of_start(d: Design) -> list[str]:
     """What the start's trial has found; each way was tried on it."""
     s, m = d.start_up, d.motor
     if not s or s.trial is None:
@@ -310,7 +307,7 @@ TRIED_FRICTION = (0.01, 0.02, 0.04, 0.08)
 """Of the rated torque."""
 
 
-def start_ways(d: "Design", good: Callable[[start.StartDesign], bool]) -> list[str]:
+def start_ways(d: Design, good: Callable[[start.StartDesign], bool]) -> list[str]:
     """Each change of one key that makes the start good, with the first value that does."""
     m, most = d.motor, d.value("MAXIMUM_CURRENT_A")
 

@@ -6,7 +6,6 @@ its gate, and the speed controller; electrical rad/s, A, N m. Dead time and the 
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +14,9 @@ from tools.common import paths
 from tools.common.param_rows import number, slow_periods
 
 from . import constants, limits
+from .design_result import Design
 from .limits import RPM
 from .loops import ESDQ_RATIO, FAST_GAIN, FULL_RATIO, LOADED_SHARE, QUIET_RATIO
-
-if TYPE_CHECKING:
-    from .design import Design
 
 LOWSPEED = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
 ONSET_S, CURRENT_SHARE = LOWSPEED.torque_over_s, LOWSPEED.current_percent / 100.0
@@ -65,7 +62,7 @@ class Drive:
     most_a: float
 
     @classmethod
-    def of(cls, d: "Design", inertia: float) -> "Drive":
+    def of(cls, d: Design, inertia: float) -> "Drive":
         m, b, loop = d.motor, d.board, d.speed_loop
         step_s, dead_v = slow_periods(b.pwm_period_s) * b.pwm_period_s, b.nominal_bus_v * b.dead_time_s / b.pwm_period_s
         rate = 2.0 * math.pi * step_s
@@ -138,12 +135,12 @@ class Model:
             self.quick = max(self.quick, 1.0 if abs(innovation) > 1.5 * gate else HALF_LEVEL)
 
 
-def asked_nm(d: "Design") -> float:
+def asked_nm(d: Design) -> float:
     """The rated torque, as far as the current allows; friction comes on top."""
     return min(d.motor.rated_torque_nm, CURRENT_SHARE * d.value("MAXIMUM_CURRENT_A") * d.motor.kt_nm_per_a)
 
 
-def held(d: "Design", rpm: float, load_nm: float, inertia: float = 0.0, over_s: float = ONSET_S) -> bool:
+def held(d: Design, rpm: float, load_nm: float, inertia: float = 0.0, over_s: float = ONSET_S) -> bool:
     """Whether the rotor is back at its speed after a load has come within a time; with another inertia, if one is given."""
     drive = Drive.of(d, inertia or d.inertia_kgm2)
     model = Model(drive, rpm * RPM * d.motor.pole_pairs)
@@ -155,12 +152,12 @@ def held(d: "Design", rpm: float, load_nm: float, inertia: float = 0.0, over_s: 
     return model.speed > BACK_SHARE * model.reference
 
 
-def holds(d: "Design", rpm: float, load_nm: float, inertia: float = 0.0) -> bool:
+def holds(d: Design, rpm: float, load_nm: float, inertia: float = 0.0) -> bool:
     """The same with MARGIN: whether the motor is sure to hold it."""
     return held(d, rpm / MARGIN, load_nm, inertia)
 
 
-def lowest_rpm(d: "Design", load_nm: float) -> float | None:
+def lowest_rpm(d: Design, load_nm: float) -> float | None:
     """The lowest speed from which on the load is held, to two digits; None if it is not held at the nominal speed."""
     least, found = d.value("MINIMUM_SPEED_RPM"), None
     for rpm in np.geomspace(d.value("NOMINAL_SPEED_RPM"), least, SPEEDS):
@@ -171,7 +168,7 @@ def lowest_rpm(d: "Design", load_nm: float) -> float | None:
     return found
 
 
-def most_nm(d: "Design", rpm: float, load_nm: float) -> float:
+def most_nm(d: Design, rpm: float, load_nm: float) -> float:
     """The largest part of a load that is held at a speed, in twentieths; 0 for none."""
     held_nm = 0.0
     for share in range(1, PARTS + 1):
