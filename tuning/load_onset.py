@@ -21,8 +21,9 @@ from .loops import ESDQ_RATIO, FAST_GAIN, FULL_RATIO, LOADED_SHARE, QUIET_RATIO
 LOWSPEED = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
 ONSET_S, CURRENT_SHARE = LOWSPEED.torque_over_s, LOWSPEED.current_percent / 100.0
 """What `make lowspeed` asks for: the load comes within this time, and takes so much of the largest current at most."""
-MARGIN = 1.1
-"""Of the speed that the model holds. On the virtual board 15 loads on 8 motors that their rotor's inertia limits were held from 0.99 to 1.2 times it."""
+MARGIN = 1.15
+"""Of the speed that the model holds. With it 16 loads on 8 motors that their rotor's inertia limits were named 0.89 to 1.16 of the lowest speed that
+the virtual board held."""
 AFTER_S, LONGEST_S = 0.6, 10.0
 """How long the rotor has for coming back, at least and at most: in between one period of the speed loop's bandwidth."""
 LOST_RAD, BACK_SHARE = 1.2, 0.9
@@ -47,7 +48,6 @@ class Drive:
     pull_a: float
     """friction"""
     psi: float
-    bridge_ohm: float
     filter_rad_s: float
     current_rad_s: float
     full_rad_s: float
@@ -68,7 +68,7 @@ class Drive:
         rate = 2.0 * math.pi * step_s
         loaded = LOADED_SHARE * rate * loop.load_hz
         return cls(step_s, m.kt_nm_per_a * m.pole_pairs / inertia, m.pole_pairs / inertia, d.envelope.friction_nm(d.value("MINIMUM_SPEED_RPM")) / m.kt_nm_per_a,
-                   m.psi_vs, b.rds_on_ohm + 0.5 * b.shunt_ohm, 2.0 * math.pi * constants.filter_hz(d.value("KFILTER_ESDQ"), b.pwm_period_s),
+                   m.psi_vs, 2.0 * math.pi * constants.filter_hz(d.value("KFILTER_ESDQ"), b.pwm_period_s),
                    2.0 * math.pi * d.value("CURRENT_BANDWIDTH_HZ"), 2.0 * math.pi * loop.load_hz / FULL_RATIO,
                    min(rate * QUIET_RATIO * loop.bandwidth_hz, loaded), loaded, rate * loop.load_hz,
                    2.0 * math.pi * loop.bandwidth_hz * inertia / m.kt_nm_per_a / m.pole_pairs, LOAD_FROM_LOST * d.scales.lost_counts * d.scales.count_a,
@@ -114,7 +114,7 @@ class Model:
         for _ in range(SUB_STEPS):
             self.current_a += (asked_a - self.current_a) * current_k
             self.e_d += k * (p.psi * self.speed * math.sin(self.angle) - self.e_d)
-            self.e_q += k * (p.psi * self.speed * math.cos(self.angle) + p.bridge_ohm * self.current_a - self.e_q)
+            self.e_q += k * (p.psi * self.speed * math.cos(self.angle) - self.e_q)
             estimated = (self.e_q - self.e_d) / p.psi
             mean += estimated / SUB_STEPS
             resisting = p.per_nm * load_nm + p.per_amp * p.pull_a if self.speed > 0.0 else 0.0

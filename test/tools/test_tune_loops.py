@@ -12,7 +12,8 @@ from tune_support import HURST, designed, of
 
 from tools.common import board_file, motor_file
 from tuning import loops
-from tuning.design import _spread, design
+from tuning.design import design
+from tuning.design_result import spread_of
 from tuning.loops import (SPEED_MARGINS, Gains, Plant, current_gains, current_grid, current_loop, full_rad_s, margins, observer_law, speed_gains,
                           speed_loop)
 
@@ -191,7 +192,7 @@ def test_the_worst_case_is_no_better_than_any_corner_and_the_published_spread_is
     d = of(HURST)
     gains = speed_gains(MOTOR, d.value("SPEED_BANDWIDTH_HZ"), d.value("LOAD_BANDWIDTH_HZ"), AT_1000_HZ, erpm(d.value("MINIMUM_SPEED_RPM")))["quiet"]
     grid = np.geomspace(0.05, 0.45 / (8 * TS), 400)
-    corners = dict(loops.corners(MOTOR, _spread(d.motor)))
+    corners = dict(loops.corners(MOTOR, spread_of(d.motor)))
     assert "R -25%, L +27%" in corners
     for name, plant in corners.items():
         found = margins(grid, speed_loop(grid, plant, MOTOR, gains, erpm(d.value("MINIMUM_SPEED_RPM"))))
