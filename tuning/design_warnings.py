@@ -295,9 +295,11 @@ def of_start(d: Design) -> list[str]:
         return []
     why = ": with so little inductance the current's sample, after the pulse's centre, feeds the swing" if s.damping < 0.0 else ""
     return [warning(f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
-                    f"to start from some angles{why}", *start_ways(d, lambda x: x.follows and not x.loud))]
+                    f"to start from some angles{why}", *start_ways(d, lambda x: x.follows and x.trial.swing_rpm < SURELY_CALM * start.LOUD_SHARE * x.end_speed_rpm))]
 
 
+SURELY_CALM = 0.8
+"""Of the swing that is loud: other current loops, which a change brings with it, may leave more."""
 TRIED_SHARES = (0.8, 0.6, 0.4, 0.2, 0.1)
 """Of a load, from the least change on."""
 TRIED_FACTORS = (1.15, 1.3, 1.6, 2.0)

@@ -22,7 +22,7 @@ Parts = tuple[motor_file.Motor, board_file.BoardFile]
 
 def kind(warning: str) -> str:
     """What a warning is about, whatever its numbers."""
-    return re.sub(r"[\d.e+-]+", "#", warning)[:26]
+    return re.sub(r"\d[\d.]*(e-?\d+)?", "#", warning)[:26]
 
 
 def ways(warning: str) -> list[str]:
