@@ -303,7 +303,7 @@ SURELY_CALM = 0.8
 TRIED_SHARES = (0.8, 0.6, 0.4, 0.2, 0.1)
 """Of a load, from the least change on."""
 TRIED_FACTORS = (1.15, 1.3, 1.6, 2.0)
-CHOKE_FACTORS = (1.2, 1.5, 2.0, 3.0, 4.0)
+CHOKE_FACTORS = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0)
 START_NAMES = ("LOCK_TIME", "Q_CURRENT_REF_OPENLOOP", "OPENLOOP_RAMPSPEED_INCREASERATE", "END_SPEED_RPM")
 TRIED_FRICTION = (0.01, 0.02, 0.04, 0.08)
 """Of the rated torque."""
