@@ -37,6 +37,8 @@ RISE_S = 0.03
 FRICTION_SHARE = 0.05
 """Estimate: of the rated torque; 0.04 to 0.05 of the project's motors."""
 LEAST_INVKFI, LEAST_LS, MOST_LS = (float(text) for text in (parameters()["INVKFI_SPEED0"].low, parameters()["LS_OVER2LS0_SPEED0"].low, parameters()["LS_OVER2LS0_SPEED0"].high))
+KFI_LEAST, KFI_MOST = 0.6, 1.6
+"""An entry of 1/Kphi over the motor's: what the firmware's build accepts (PARAM_INVKFI_FITS)."""
 SCALE_SAME = 0.005
 """A board file is written where the header's numbers differ by more."""
 SAMPLE_MARGIN_S = 1.0e-6
@@ -402,11 +404,16 @@ def _tables(plan: Plan, told: Given) -> Tables | None:
         return None
     deepest, base = made.value("MAXIMUM_CURRENT_A"), made.scales.invkfi
     _tell_tables(plan, deepest, base, told.flat_tables)
-    entries = [Entry(-min(round(-entry.idref_a, 2), limits.down(deepest, 0.01)), base if told.flat_tables else min(max(base * entry.inv_kfi, LEAST_INVKFI), 32767.0),
+    entries = [Entry(-min(round(-entry.idref_a, 2), limits.down(deepest, 0.01)), base if told.flat_tables else _kfi(base, entry.inv_kfi),
                      0.5 if told.flat_tables else min(max(entry.ls_ratio, LEAST_LS), MOST_LS)) for entry in found.tables]
     last = min(ENTRIES - 1, math.ceil((found.maximum_rpm - found.nominal_rpm) * found.pole_pairs / fw_tables.STEP_ERPM))
     return Tables(plan.name, found.nominal_rpm, entries, fw_tables.fingerprint({name: made.value(name) for name in fw_tables.FINGERPRINT}), base,
                   last, "", found.maximum_rpm, origin=found.header.label)
+
+
+def _kfi(base: float, share: float) -> float:
+    """An entry of 1/Kphi, in counts, within what the build accepts."""
+    return min(max(base * share, math.ceil(KFI_LEAST * base), LEAST_INVKFI), math.floor(KFI_MOST * base), 32767.0)
 
 
 def _tell_tables(plan: Plan, deepest: float, base: float, flat: bool) -> None:
@@ -422,8 +429,8 @@ def _tell_tables(plan: Plan, deepest: float, base: float, flat: bool) -> None:
                                 f"flat tables may give the better angle: SET={TABLES_KEY}={FLAT}, or make tune-fw MOTOR={plan.name}")
         if any(not LEAST_LS <= entry.ls_ratio <= MOST_LS for entry in tables):
             plan.dropped.append(f"LS_OVER2LS0_SPEED outside {LEAST_LS:g} .. {MOST_LS:g}: those entries end there")
-        if any(not LEAST_INVKFI <= base * entry.inv_kfi <= 32767.0 for entry in tables):
-            plan.dropped.append(f"INVKFI_SPEED outside {LEAST_INVKFI:g} .. 32767: those entries end there")
+        if any(abs(_kfi(base, entry.inv_kfi) - base * entry.inv_kfi) > 1.0 for entry in tables):
+            plan.dropped.append(f"INVKFI_SPEED outside {KFI_LEAST:g} .. {KFI_MOST:g} of NORM_INVKFIBASE: those entries end there")
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------------------

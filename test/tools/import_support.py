@@ -42,7 +42,8 @@ HEAD = """/* Circulation pump P7: numbers of the drive.
 #define D_CURRCNTR_PTERM (int)(0.02*32768)
 #define SPEEDCNTR_OUTMAX 0x5000
 """
-INVKFI = [7945 + 500 * i for i in range(18)]
+INVKFI = [7945 + 300 * i for i in range(18)]
+"""The last two are more than 1.6 of the first: they end there."""
 IDREF = ["0", "-0.3", "-0.6", "-0.85", "-1.1", "-1.35", "-1.6", "-1.8", "-2.0", "-2.15", "-2.3", "-2.4", "-2.5", "-2.6", "-2.6", "-2.6", "-2.6", "-2.6"]
 LS = ["0.5", "0.48", "0.46", "0.44", "0.42", *["0.4"] * 13]
 TABLES = "".join(f"#define {stem}{i} {form.format(value)}\n" for stem, form, column in (

@@ -79,7 +79,8 @@ def test_the_header_s_choices_and_tables_are_those_of_userparams_h(pump):
     params = pump.design.params
     assert pump.design.tuned_by_machine and "pump.h" in pump.design.tables_from
     assert [params[f"IDREF_SPEED{i}"] for i in (0, 1, 9, 17)] == ["0.00", "-0.30", "-2.15", "-2.60"]
-    assert (params["INVKFI_SPEED0"], float(params["INVKFI_SPEED10"])) == ("NORM_INVKFIBASE", pytest.approx(7945 + 5000, abs=2))
+    assert (params["INVKFI_SPEED0"], float(params["INVKFI_SPEED10"])) == ("NORM_INVKFIBASE", pytest.approx(7945 + 3000, abs=2))
+    assert [float(params[f"INVKFI_SPEED{i}"]) for i in (15, 16, 17)] == [pytest.approx(7945 + 4500, abs=2), *[pytest.approx(1.6 * 7945, abs=2)] * 2]
     assert (float(params["LS_OVER2LS0_SPEED4"]), params["FW_START_SPEED_RPM"]) == (pytest.approx(0.42), "3200")
     assert {name: pump.motor.tune[name] for name in ("Q_CURRENT_REF_OPENLOOP", "SPEEDREFRAMP_RPM_PER_S")} == {"Q_CURRENT_REF_OPENLOOP": 1.8, "SPEEDREFRAMP_RPM_PER_S": 5000.0}
     constants = {item.name: item.q_value for item in pump.design.constants}
@@ -99,7 +100,7 @@ def test_the_imported_motor_turns_on_the_virtual_board(pump, tmp_path):
 
 
 def test_everything_is_told_value_line_place_branch_reason_and_estimate(pump):
-    for words in (r"line +name +header +is +goes to", r" 25 +NORM_RS +7991 +1\.1 ohm +\[electrical\] resistance", r"3 +3968 rpm +-0\.85 A \(line \d+\) +4\.879 V/krpm \(line \d+\) +0\.792\d mH",
+    for words in (r"line +name +header +is +goes to", r" 25 +NORM_RS +7991 +1\.1 ohm +\[electrical\] resistance", r"3 +3968 rpm +-0\.85 A \(line \d+\) +5\.21\d* V/krpm \(line \d+\) +0\.792\d mH",
                   r"line \d+ INITOFFSET_TRANS_OPEN_CLSD \(45 degrees\): the hand-over measures", r"line \d+ PUMP_COLOUR: no name of AN1292's header",
                   r"line 9: #ifdef TUNING is not taken", r'line 5: #include "general\.h" is not read', r"torque 0\.08\d+ N m: torque constant times current",
                   r"SNAPSHOT +a mode +DEFINES=-DSNAPSHOT", r"next: make run MOTOR=pump"):

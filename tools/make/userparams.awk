@@ -28,7 +28,7 @@ function an1292(   count, word, i, name) {
     for (i = 1; i < count; i += 2) {
         name = word[i]
         if (name in value && place[name] != option) {
-            refuse(place[name] ": " name " = " value[name] " is a constant of AN1292\47s header, here it follows from " word[i + 1] \
+            refuse(name, place[name] ": " name " = " value[name] " is a constant of AN1292\47s header, here it follows from " word[i + 1] \
                    ": remove it; of a whole header of AN1292\47s `make import HEADER=file` makes a motor file and a userparams.h")
             return 1
         }
@@ -90,7 +90,7 @@ END {
         if (name in known) {
             print name "\t" place[name] "\t" known[name] >places
             if (value[name] ~ /;[ \t]*$/)
-                refuse(place[name] ": " name " = " value[name] " ends in a semicolon: write " plain(value[name]))
+                refuse(name, place[name] ": " name " = " value[name] " ends in a semicolon: write " plain(value[name]))
         }
         else if (place[name] != option && !index(used, " " name " ")) { # what another macro uses is the user's own
             meant = nearest(name, missing, 0.83)

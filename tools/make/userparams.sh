@@ -85,7 +85,7 @@ header=$(awk '/^# 1 ".*userparams\.h"/ {
 }' "$work/defined")
 command -v python3 >/dev/null || echo "foc33: no python3: a misspelt name in $header is not looked for" >&2
 awk -v places="$work/places" -v refused="$work/refused" -v near="$work/near" -v least="$work/least" -f tools/make/nearest.awk -f tools/make/userparams.awk \
-    "$work/known" "$work/defined" >&2
+    "$work/known" "$work/defined" >&2 || exit 2 # a header of AN1292
 
 # The replaced header comes before the user's: in front of the compiler's first option.
 first=yes
