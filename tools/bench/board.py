@@ -75,6 +75,11 @@ class Library:
         names = {number: function(number).decode() for number in range(64)}
         return {number: name for number, name in names.items() if name not in ("", "?")}
 
+    def tunable(self, name: str) -> bool:
+        """Whether a parameter of userparams.h can change while this firmware runs."""
+        call = getattr(self.c, "probe_param_get", None)
+        return call is not None and call(name.encode(), ctypes.byref(ctypes.c_double())) == 0
+
     @property
     def states(self) -> dict[int, str]:
         """Names of the numbers in "fw.state"."""

@@ -25,6 +25,7 @@ class Action:
     at_s: float
     keys: dict[str, float] = field(default_factory=dict)
     variables: dict[str, int] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
     text: str = ""
 
 
@@ -130,7 +131,9 @@ def _actions(event: Event, panel: _Panel) -> list[Action]:
         return panel.press(event.button, event.at_s, event.hold_s)
     if event.kind == "debug":
         text = ", ".join(f"{name} = {value}" for name, value in event.variables.items())
-        return [Action(event.at_s, {}, event.variables, event.note or f"debugger writes {text}")]
+        return [Action(event.at_s, {}, event.variables, text=event.note or f"debugger writes {text}")]
+    if event.kind == "parameter": # those of time 0 are in place when the firmware begins: Job.parameters
+        return [Action(event.at_s, parameters=event.parameters if event.at_s > 0.0 else {}, text=event.note or event.written)]
     try:
         if event.finds_range:
             panel.ranges.check_speed(event.value)

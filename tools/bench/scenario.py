@@ -32,6 +32,7 @@ class Event:
     value: float = 0.0
     keys: dict[str, float] = field(default_factory=dict)
     variables: dict[str, int] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
     over_s: float = 0.0
     note: str = ""
     text: str = ""

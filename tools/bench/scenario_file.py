@@ -4,8 +4,9 @@ docs/scenarios.md says how to write one; docs/files.md lists every key."""
 
 from typing import Any
 
-from tools.common import paths
+from tools.common import param_rows, paths
 from tools.common.board_keys import Values
+from tools.common.errors import suggestion
 from tools.common.toml_file import REQUIRED, Document, Section
 from .expect import read_expectations
 from .metrics import SPEEDS, Measure
@@ -21,7 +22,9 @@ EVENT_KINDS = {
     "current_a": "potentiometer to this current, in TORQUE_MODE", "pot": "potentiometer's position, left to right",
     "set": "keys of the virtual board with their new values: `{ \"load.constant_nm\" = 0.05 }`",
     "torque_percent": "the brake `load.constant_nm` to this share of the rated torque",
-    "debug": "writes 16-bit variables of the firmware, as a debugger would: `{ SnapStart = 1 }`"}
+    "debug": "writes 16-bit variables of the firmware, as a debugger would: `{ SnapStart = 1 }`",
+    "parameter": "changes parameters of userparams.h, in a build with PARAMS_IN_RAM or TUNING; a list goes on with the table's next entries: "
+                 "`{ IDREF_SPEED5 = [-0.7, -0.8] }`"}
 """What an event does, and what docs/files.md says of it."""
 
 
@@ -119,7 +122,7 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
     meaning = EVENT_KINDS[kind]
     if hold_s is not None and kind != "press":
         raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
-    if over_s is not None and kind in ("start_rpm", "press", "debug"):
+    if over_s is not None and kind in ("start_rpm", "press", "debug", "parameter"):
         raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
     event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
     if kind == "start_rpm":
@@ -131,6 +134,8 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
         event["keys"] = section.values(kind, meaning=meaning)
     elif kind == "debug":
         event["variables"] = _variables(section, kind, meaning)
+    elif kind == "parameter":
+        event["parameters"], event["written"] = _parameters(section, kind, meaning)
     elif kind == "speed":
         event["text"] = section.choice(kind, SPEEDS, meaning=meaning)
     else:
@@ -148,6 +153,35 @@ def _variables(section: Section, key: str, meaning: str) -> dict[str, int]:
         if value != int(value) or not -32768 <= value <= 65535:
             raise section.fail(key, f"'{name}' = {value:g} is impossible", "choose a whole number within 16 bits")
     return {name: int(value) for name, value in values.items()}
+
+
+def _parameters(section: Section, key: str, meaning: str) -> tuple[dict[str, float], str]:
+    """Values by name, and the same as a text. A list under an entry of a table is for this entry and the next ones."""
+    section.note(key, "table of parameters", meaning)
+    table = section.data[key]
+    if not isinstance(table, dict) or not table:
+        raise section.fail(key, f"'{key}' is not a table", f"write {key} = {{ IDREF_SPEED5 = -0.7 }}")
+    known, inner = param_rows.parameters(), Section(section.document, table, section.path + (key,), noted=False)
+    result: dict[str, float] = {}
+    texts = []
+    for first, value in table.items():
+        if first not in known:
+            raise inner.fail(first, f"'{first}' is no parameter of userparams.h", suggestion(first, known, "docs/parameters.md"))
+        row = known[first]
+        values = inner.numbers(first) if isinstance(value, list) else [inner.number(first)]
+        names = [first] if len(values) == 1 else [name for name in known if row.stem and known[name].stem == row.stem]
+        names = names[names.index(first):][:len(values)]
+        if len(names) < len(values):
+            raise inner.fail(first, f"'{first}' has {len(values)} values for {len(names)}", f"a list goes on to the table's last entry, {names[-1]}, at most" if row.stem else "write one number")
+        for name, number in zip(names, values):
+            if not float(row.low) <= number <= float(row.high):
+                raise inner.fail(first, f"'{name}' = {number:g} is impossible", f"choose {row.low} .. {row.high} {row.unit}")
+            if name in result:
+                raise inner.fail(first, f"'{name}' is there twice", "keep one of them")
+            result[name] = number
+        last = f" .. {names[-1].removeprefix(row.stem)} = {values[0]:g} .. {values[-1]:g}" if len(names) > 1 else f" = {values[0]:g}"
+        texts.append(first + last)
+    return result, ", ".join(texts)
 
 
 def _read_measures(sections: list[Section], scenario: Scenario) -> None:

@@ -55,7 +55,8 @@ class Job:
 def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board: board_keys.Part, extra: board_keys.Values | None = None,
             parameters: dict[str, float] | None = None) -> Job:
     """Check the scenario against motor, board and firmware, and work out what happens when. Nothing runs yet."""
-    keys, params = library.keys, library.params | (parameters or {})
+    parameters = {name: value for event in scenario.events if event.at_s == 0.0 for name, value in event.parameters.items()} | (parameters or {})
+    keys, params = library.keys, library.params | parameters
     rating = rating_of(motor, board) if scenarios.asks_for_rating(scenario) else None
     scenario = scenarios.in_numbers(scenario, rating, params)
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
@@ -63,6 +64,7 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
     for event in scenario.events:
         for key, value in event.keys.items():
             board_keys.check(key, value, keys, event.where)
+        _check_parameters(event, library)
     start = {key: values.get(key, 0.0) for event in scenario.events for key in event.keys}
     actions = panel.plan(scenario, panel.Ranges.of(params, scenario.defines), start)
     variables: dict[str, int] = {}
@@ -73,7 +75,7 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
         for name, count in expectation.variables().items():
             variables[name] = max(count, variables.get(name, 0))
     _check_signals(signals, library, scenario)
-    job = Job(scenario, library.path, values, actions, signals, variables, parameters or {})
+    job = Job(scenario, library.path, values, actions, signals, variables, parameters)
     if scenario.duration_s > long_run.LONG_S:
         job.long = long_run.reason(scenario, params, (rating or rating_of(motor, board)).coast_s_per_rpm)
     return job
@@ -85,6 +87,18 @@ def rating_of(motor: board_keys.Part, board: board_keys.Part) -> scenarios.Ratin
     coasts = data.coulomb_nm > 0.0 and not board.values.values.get("supply.sinks", 0.0)
     seconds = (data.inertia_kgm2 + data.load_inertia_kgm2) * math.pi / 30.0 / data.coulomb_nm if coasts else 0.0
     return scenarios.Rating(data.rated_speed_rpm, data.rated_torque_nm, min(seconds, LONGEST_COAST_S / data.rated_speed_rpm))
+
+
+def _check_parameters(event: scenarios.Event, library: Library) -> None:
+    for name, value in event.parameters.items():
+        if not library.tunable(name):
+            remedy = "add PARAMS_IN_RAM to [firmware] defines, or build with DEFINES=-DPARAMS_IN_RAM; TUNING has them in RAM, too"
+            if library.tunable("FW_TRIM_CURRENT_A"):
+                remedy = "the field-weakening tables, what frames them, and MINIMUM_SPEED_RPM can; set others in userparams.h"
+            raise UserError(f"{name} cannot change while this firmware runs", event.where, remedy)
+        most_a = library.params["MAXIMUM_CURRENT_A"]
+        if name.startswith(("IDREF_SPEED", "FW_TRIM_CURRENT_A")) and abs(value) > most_a:
+            raise UserError(f"{name} = {value:g} exceeds MAXIMUM_CURRENT_A", event.where, f"choose {most_a:g} A at most")
 
 
 def _check_names(names: dict[str, str], library: Library, where: str) -> None:
@@ -206,6 +220,8 @@ def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> Non
         board.set(key, value)
     for name, value in action.variables.items():
         board.write_variable(name, value)
+    for name, value in action.parameters.items():
+        board.write_parameter(name, value)
     if action.text:
         done.append((action.at_s, action.text))
 
