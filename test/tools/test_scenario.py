@@ -30,6 +30,16 @@ MISTAKES = {
     "pressing slowly": (EVENT + "press = \"S2\"\nover_s = 1", ["'over_s' with 'press'"]),
     "text as a plant value": (EVENT + "set = { \"load.constant_nm\" = \"big\" }", ["'load.constant_nm' is not a number"]),
     "variable beyond 16 bits": (EVENT + "debug = { SnapStart = 70000 }", ["'SnapStart' = 70000 is impossible"]),
+    "parameters that are no table": (EVENT + "parameter = 3", ["'parameter' is not a table"]),
+    "no parameter at all": (EVENT + "parameter = {}", ["'parameter' is not a table"]),
+    "misspelt parameter": (EVENT + "parameter = { IDREF_SPED5 = -0.7 }", ["'IDREF_SPED5' is no parameter of userparams.h", "did you mean 'IDREF_SPEED5'?"]),
+    "parameter beyond its range": (EVENT + "parameter = { IDREF_SPEED5 = 0.7 }", ["'IDREF_SPEED5' = 0.7 is impossible", "-20 .. 0 A"]),
+    "list with a value beyond its range": (EVENT + "parameter = { IDREF_SPEED5 = [-0.7, 0.7] }", ["'IDREF_SPEED6' = 0.7 is impossible"]),
+    "list beyond the table's end": (EVENT + "parameter = { IDREF_SPEED16 = [0, 0, 0] }", ["'IDREF_SPEED16' has 3 values for 2", "IDREF_SPEED17"]),
+    "list for a single parameter": (EVENT + "parameter = { FW_TRIM_CURRENT_A = [0, 1] }", ["has 2 values for 1", "write one number"]),
+    "parameter as a text": (EVENT + "parameter = { IDREF_SPEED5 = \"much\" }", ["'IDREF_SPEED5' is not a number"]),
+    "entry that two lists have": (EVENT + "parameter = { IDREF_SPEED5 = [-0.7, -0.8], IDREF_SPEED6 = -0.9 }", ["'IDREF_SPEED6' is there twice"]),
+    "changing a parameter slowly": (EVENT + "parameter = { IDREF_SPEED5 = -0.7 }\nover_s = 1", ["'over_s' with 'parameter'"]),
     "measure backwards": ("[[measure]]\nname = \"m\"\nfrom_s = 1.0\nto_s = 0.5", ["to_s = 0.5 is not after from_s = 1"]),
     "measure after the end": ("[[measure]]\nname = \"m\"\nfrom_s = 1.0\nto_s = 3.0", ["'to_s' = 3 is impossible"]),
     "measure without a name": ("[[measure]]\nfrom_s = 0.5\nto_s = 1.0", ["'name' is missing"]),
@@ -89,6 +99,12 @@ def test_a_start_turns_the_potentiometer_before_power_up_and_presses_s2():
         (0.0, "speed_rpm", 1000.0, "", 0.0), (0.2, "press", 0.0, "S2", 0.1)]
     # and events come in order of time
     assert [event.at_s for event in scenario("[[event]]\nat_s = 1.5\npot = 1\n[[event]]\nat_s = 0.5\npot = 0\n").events] == [0.5, 1.5]
+
+
+def test_a_list_of_parameters_goes_on_with_the_table_s_next_entries_and_the_protocol_has_it_short():
+    event = scenario(EVENT + "parameter = { FW_TRIM_CURRENT_A = 0, IDREF_SPEED9 = [-0.7, -0.8], LS_OVER2LS0_SPEED1 = [0.4, 0.4] }").events[0]
+    assert event.parameters == {"FW_TRIM_CURRENT_A": 0.0, "IDREF_SPEED9": -0.7, "IDREF_SPEED10": -0.8, "LS_OVER2LS0_SPEED1": 0.4, "LS_OVER2LS0_SPEED2": 0.4}
+    assert event.written == "FW_TRIM_CURRENT_A = 0, IDREF_SPEED9 .. 10 = -0.7 .. -0.8, LS_OVER2LS0_SPEED1 .. 2 = 0.4"
 
 
 PERCENT = """

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from support import FAULTS, LIBRARY, SCENARIO, STATES, refusal, scenario
 
-from tools.bench import long_run, simulate
-from tools.common import paths, workers
+from tools.bench import command_common, long_run, simulate
+from tools.common import board_file, motor_file, paths, workers
 from tools.common.errors import UserError
 from tools.bench.panel import Ranges, plan
 
@@ -60,6 +60,9 @@ class FakeBoard:
         return ""
 
     def write_variable(self, name, value):
+        self.calls.append((self.now(), name, value))
+
+    def write_parameter(self, name, value):
         self.calls.append((self.now(), name, value))
 
     def variable(self, name, count):
@@ -158,6 +161,33 @@ def test_variables_are_written_and_read():
     board = FakeBoard()
     result, _ = simulated("[[event]]\nat_s = 0.5\ndebug = { SnapStart = 1 }\n", board)
     assert (0.5, "SnapStart", 1) in board.calls and result.variables == {"SnapBuf1": [7, 7, 7]}
+
+
+PARAMETERS = "[[event]]\nat_s = 0.0\nparameter = { FW_TRIM_CURRENT_A = 0 }\n[[event]]\nat_s = 0.5\nparameter = { IDREF_SPEED5 = [-0.7, -0.8] }\n"
+
+
+def prepared(text: str, *defines: str, **parameters: float) -> simulate.Job:
+    item = scenario(text)
+    return simulate.prepare(item, command_common.library_for(list(defines), None), motor_file.part(item.motor), board_file.part("mclv"), parameters=parameters)
+
+
+def test_parameters_change_at_their_time_and_those_of_time_0_when_the_firmware_begins():
+    job, board = prepared(PARAMETERS, "TUNING"), FakeBoard()
+    simulate.simulate_on(job, FakeLibrary, board, lambda seconds: None)
+    names = ("power_up", "FW_TRIM_CURRENT_A", "IDREF_SPEED5", "IDREF_SPEED6")
+    assert [call for call in board.calls if call[1] in names] == [
+        (0.0, "power_up"), (0.0, "FW_TRIM_CURRENT_A", 0.0), (0.5, "IDREF_SPEED5", -0.7), (0.5, "IDREF_SPEED6", -0.8)]
+    # what a sweep asks for counts more than the scenario's own, and the run tells what was used
+    assert prepared(PARAMETERS, "TUNING", FW_TRIM_CURRENT_A=1.0).parameters == {"FW_TRIM_CURRENT_A": 1.0}
+
+
+@pytest.mark.parametrize("text, defines, parts", [
+    (PARAMETERS, (), ["FW_TRIM_CURRENT_A cannot change while this firmware runs", "line 8", "add PARAMS_IN_RAM"]),
+    (PARAMETERS.replace("FW_TRIM_CURRENT_A", "LOCK_TIME").replace("= 0 }", "= 2000 }"), ("PARAMS_IN_RAM",), ["LOCK_TIME cannot change", "set others in userparams.h"]),
+    (PARAMETERS.replace("-0.8", "-2.8"), ("PARAMS_IN_RAM",), ["IDREF_SPEED6 = -2.8 exceeds MAXIMUM_CURRENT_A", "line 11", "2.75 A at most"]),
+    (PARAMETERS.replace("CURRENT_A = 0", "CURRENT_A = 3"), ("PARAMS_IN_RAM",), ["FW_TRIM_CURRENT_A = 3 exceeds MAXIMUM_CURRENT_A"])])
+def test_what_this_firmware_cannot_change_is_refused_before_the_run(text, defines, parts):
+    refusal(lambda: prepared(text, *defines), *parts)
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------------

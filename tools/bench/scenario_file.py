@@ -169,18 +169,19 @@ def _parameters(section: Section, key: str, meaning: str) -> tuple[dict[str, flo
             raise inner.fail(first, f"'{first}' is no parameter of userparams.h", suggestion(first, known, "docs/parameters.md"))
         row = known[first]
         values = inner.numbers(first) if isinstance(value, list) else [inner.number(first)]
-        names = [first] if len(values) == 1 else [name for name in known if row.stem and known[name].stem == row.stem]
+        names = [name for name in known if known[name].stem == row.stem] if row.stem else [first]
         names = names[names.index(first):][:len(values)]
         if len(names) < len(values):
-            raise inner.fail(first, f"'{first}' has {len(values)} values for {len(names)}", f"a list goes on to the table's last entry, {names[-1]}, at most" if row.stem else "write one number")
+            raise inner.fail(first, f"'{first}' has {len(values)} values for {len(names)}",
+                             f"a list goes on to the table's last entry, {names[-1]}, at most" if row.stem else "write one number")
         for name, number in zip(names, values):
             if not float(row.low) <= number <= float(row.high):
                 raise inner.fail(first, f"'{name}' = {number:g} is impossible", f"choose {row.low} .. {row.high} {row.unit}")
             if name in result:
                 raise inner.fail(first, f"'{name}' is there twice", "keep one of them")
             result[name] = number
-        last = f" .. {names[-1].removeprefix(row.stem)} = {values[0]:g} .. {values[-1]:g}" if len(names) > 1 else f" = {values[0]:g}"
-        texts.append(first + last)
+        last = f" .. {names[-1].removeprefix(row.stem)}" if len(names) > 1 else ""
+        texts.append(f"{first}{last} = {values[0]:g}" + ("" if len(set(values)) == 1 else f" .. {values[-1]:g}"))
     return result, ", ".join(texts)
 
 
