@@ -304,7 +304,7 @@ $B/%.o: %.c $B/flags | $B/params
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
 $B/unit.c: FORCE
-	$(call remember_lines,$(call includes_of,$(filter-out %/main.c,$(firmware_sources))))
+	$(call remember_lines,$(call includes_of,$(filter-out %/main.c,$(firmware_sources)) tools/cpu_host/written.h))
 
 # Control and drive as one unit, for tests with a mode or parameters of their own and for the image's probe.
 $B/law.c: FORCE

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from tools.common import command_line, motor_file, output, paths
+from tools.common.errors import UserError
 from tools.common.progress import waiting
-from . import build, command_common, report, scenario_file, simulate, sweep
+from . import build, command_common, report, scenario_file, selftest, simulate, sweep
 from .bringup import Bringup
 from .campaign import Campaign
 from .catch_sweep import Catch
@@ -65,6 +66,11 @@ def _parser() -> argparse.ArgumentParser:
 
     motors = commands.add_parser("motors", help="list the motor files: data and rating")
     motors.set_defaults(command=_motors)
+
+    registers = commands.add_parser("registers", help="list what the self-test REGISTERS compares: register, bits, value")
+    registers.add_argument("--defines", default="", metavar="MACROS", help="of a firmware with more macros, written as \"-DNAME -DNAME=value\"")
+    registers.add_argument("--userparams", metavar="FOLDER", help="with the userparams.h in this folder")
+    registers.set_defaults(command=_registers)
 
     keys = commands.add_parser("keys", help="list the virtual board's keys: unit, range, meaning")
     keys.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
@@ -136,6 +142,15 @@ def _motors(options: argparse.Namespace) -> int:
     motors, code = command_line.each(paths.names(paths.MOTORS), motor_file.load)
     print(motor_file.listing(motors))
     return code
+
+
+def _registers(options: argparse.Namespace) -> int:
+    found = selftest.written(command_common.library_for(command_common.macros(options.defines), None, options.userparams))
+    if not found:
+        raise UserError("this firmware has no self-tests", "--defines", "leave out SELFTEST_OFF")
+    for register in found:
+        print(f"{register.name:10} bits 0x{register.mask:04X}  value 0x{register.value:04X}")
+    return 0
 
 
 def _keys(options: argparse.Namespace) -> int:

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from tools.common import board_keys, motor_file
-from . import long_run, panel
+from . import long_run, panel, selftest
 from . import scenario as scenarios
 from .board import Board, BoardError, Library
 from tools.common.errors import UserError, suggestion
 from .recorder import under_way
 from .run import Run
 from .scenario import Scenario
-from tools.common.trace import MOST_ROWS, Recording
+from tools.common.trace import MOST_ROWS, Recording, Trace
 
 CHUNK_PERIODS = 2000
 LONGEST_RECORD_CHUNKS = 10
@@ -200,8 +200,14 @@ class Session:
         motor_s, trace, warnings = self.board.get("time_s"), self.recorder.recording.trace(), self.board.warnings()
         if "fw.fault" in trace and len(trace) and trace.column("fw.fault")[-1] != 0:
             self.recorder.sent += _rest_of_record(self.board, self.recorder.sent)
-        return Run(job.scenario, trace, list(self.done), warnings, library.states, library.faults, variables, library.params | job.parameters,
+        return Run(job.scenario, trace, self.done + self._self_test(trace, motor_s), warnings, library.states, library.faults, variables, library.params | job.parameters,
                    self.recorder.sent, self.wall_s, self.cpu_s, motor_s)
+
+
+    def _self_test(self, trace: Trace, at_s: float) -> list[tuple[float, str]]:
+        """What a failed self-test is about, of a run that ended in its fault."""
+        ended = self.library.faults.get(int(trace.column("fw.fault")[-1])) if "fw.fault" in trace and len(trace) else None
+        return [(at_s, line) for line in selftest.told(self.board, self.library)] if ended == selftest.FAULT else []
 
 
 def _rest_of_record(board: Any, sent: str) -> str:
