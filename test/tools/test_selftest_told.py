@@ -25,7 +25,7 @@ def test_an_own_output_pin_is_named_with_its_bit():
 
 
 def test_another_self_test_is_told_by_its_name_and_a_run_without_one_says_nothing():
-    lines = protocol(DEBUG.format("board_selftest_parts", 0x5555))
+    lines = protocol(DEBUG.format("board_selftest_failed", 5))
     assert lines[-2:] == ["fault SELFTEST", "self-test FLOW failed"]
     assert not [line for line in protocol("[[event]]\nat_s = 0.5\npot = 1\n") if "self-test" in line]
 

@@ -1,5 +1,5 @@
-/* What the self-test REGISTERS compares, for the tools: the last lines of the PC's unit of the firmware, behind firmware/board/selftest_run.c. The image has
- * none of it. tools/bench/selftest.py reads the registers' names from the firmware's source, in this order. */
+/* What the self-test REGISTERS compares, for the tools: the end of the PC's unit of the firmware, behind firmware/board/selftest_run.c. The
+ * image has none of it. tools/bench/selftest.py reads the registers' names from the firmware's source, in this order. */
 #ifndef WRITTEN_H
 #define WRITTEN_H
 
